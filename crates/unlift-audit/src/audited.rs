@@ -1,5 +1,3 @@
-//! What an audit found, of a map or of images, before it is written and after.
-
 use std::path::{Path, PathBuf};
 
 use unlift::OneLine;
@@ -12,41 +10,40 @@ use unlift_report::{
 use crate::Error;
 use crate::outputs::{FIGURES, PAGE, stage_audit};
 
-/// What an audit found, before it is written.
+/// The results of an audit, before they are written.
 #[derive(Clone, Debug)]
 pub struct Audited {
     /// The figures.
     pub document: Document,
     pub(crate) scene: Option<Scene3d>,
-    /// What the page draws beside: curves and pictures.
     pub(crate) drawn: RenderOptions,
 }
 
-/// What an audit left behind.
+/// A written audit.
 pub struct Finished {
     /// The figures, as written.
     pub document: Document,
-    /// Where the report is.
+    /// The path of the report.
     pub report: PathBuf,
 }
 
 impl Audited {
-    /// The page, self-contained.
+    /// Renders the self-contained page.
     ///
     /// # Errors
-    /// When it cannot be rendered.
+    /// If rendering fails.
     pub fn page(&self, share_safe: bool) -> Result<String, Error> {
         let options = RenderOptions { share_safe, ..self.drawn.clone() };
         Ok(render(&self.document, self.scene.as_ref(), &options)?)
     }
 
-    /// What came back of every scheme, the worst first.
+    /// Returns the recovered shares of every scheme, the largest first.
     pub fn shares(&self) -> Vec<Shares> {
         shares(&self.document, &self.drawn.inversions)
     }
 
-    /// Puts the verdict and pictures of `other` before this audit's on its page, under `title`. `details` is a link to
-    /// the page of `other`.
+    /// Puts the verdict and pictures of `other` at the top of this audit's page, under `title`.
+    /// `details` is a link to the page of `other`.
     #[must_use]
     pub fn opening_with(mut self, other: &Self, title: &str, details: &str) -> Self {
         let inversions = &other.drawn.inversions;
@@ -54,11 +51,10 @@ impl Audited {
         self
     }
 
-    /// Writes page and figures under these names into the folder that `out` was opened for; they appear when `out` is
-    /// committed.
+    /// Stages page and figures under `names` in `out`. They appear when `out` is committed.
     ///
     /// # Errors
-    /// When they cannot be written.
+    /// If a file cannot be written.
     pub fn stage(
         &self,
         out: &mut OutputSet,
@@ -71,10 +67,11 @@ impl Audited {
         Ok(document)
     }
 
-    /// Writes page and figures into the folder that `out` was opened for, both or none; `share_safe`: figures only.
+    /// Writes page and figures to `folder`, for which `out` was opened: both or none. With
+    /// `share_safe` they contain figures only.
     ///
     /// # Errors
-    /// When they cannot be written.
+    /// If a file cannot be written.
     pub fn write(
         &self,
         mut out: OutputSet,
@@ -88,12 +85,12 @@ impl Audited {
 }
 
 impl Finished {
-    /// Whether every gate held.
+    /// Returns true if every gate held.
     pub fn passed(&self) -> bool {
         self.document.gates.iter().all(|gate| gate.passed)
     }
 
-    /// The short table, how gates ended, and where the report is.
+    /// Returns the short table, the results of the gates and the path of the report.
     pub fn text(&self) -> String {
         let mut text = text_table(&self.document);
         text.push_str(&gate_lines(&self.document));

@@ -1,5 +1,3 @@
-//! Whether recovered points, a truth and a released map belong together.
-
 use unlift::audit::Threshold;
 use unlift::evaluate::{are_strangers, away_from_own, belongs, nearer_to_own, recovered_away};
 use unlift::recover::Recovered;
@@ -9,15 +7,16 @@ use unlift::{Error, Unit};
 
 use crate::doubts::{stray_positions, stray_truth};
 
-/// Whether what is compared belongs together, whatever the files say: of strangers next to nothing comes back, and that
-/// reads as "safe".
+/// Checks by geometry that compared data belongs together, whatever the files state. Of data of
+/// another map hardly anything is recovered, which would look like protection.
 #[derive(Debug, Default)]
 pub struct Checked {
-    /// Positions nearer to their own than to strangers, and how many there are.
+    /// The number of positions nearer to their own point than to another one, and the number
+    /// compared.
     nearer: (usize, usize),
-    /// How far hidden points lie from their own records, where these are at hand.
+    /// Distances of hidden points from their own records, if the records are given.
     truth: Vec<f64>,
-    /// How far recovered positions do.
+    /// Distances of recovered positions from their own records, if the records are given.
     recovered: Vec<f64>,
 }
 
@@ -25,7 +24,7 @@ impl Checked {
     /// Adds a map or an image.
     ///
     /// # Errors
-    /// When the truth is not that of `released`.
+    /// If the ground truth is not that of `released`.
     pub fn add<const D: usize>(
         &mut self,
         recovered: &Recovered<D>,
@@ -43,10 +42,10 @@ impl Checked {
         Ok(())
     }
 
-    /// What speaks against the figures.
+    /// Returns the doubts about the figures.
     ///
     /// # Errors
-    /// When positions by where they lie are not of this truth.
+    /// If the positions are not of this ground truth.
     pub fn notes(&self, thresholds: &[Threshold], unit: Unit) -> Result<Vec<String>, Error> {
         if are_strangers(self.nearer) {
             let expected = "nearer to their own records or points than to those of others";

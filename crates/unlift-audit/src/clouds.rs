@@ -1,4 +1,4 @@
-//! `--write-clouds`: what was hidden, how, and what came back, for any point cloud viewer.
+//! `--write-clouds`: original, hidden and recovered points for point cloud viewers.
 
 use std::path::{Path, PathBuf};
 
@@ -9,20 +9,20 @@ use unlift_io::Error;
 use unlift_io::atomic::{Kind, OutputSet};
 use unlift_io::clouds::{record_segments, write_lines, write_points, write_recovered};
 
-/// Writes clouds in map units, so that they lie on the owner's map.
+/// Writes clouds in map units, so that they align with the owner's map.
 pub struct Clouds {
     unit_in_map_units: f64,
     schemes: Vec<String>,
 }
 
 impl Clouds {
-    /// No clouds yet.
+    /// Creates a writer that has written no clouds.
     pub fn new(unit_in_map_units: f64) -> Self {
         Self { unit_in_map_units, schemes: Vec::new() }
     }
 
-    /// Writes the clouds of one result to the folder [`FOLDER`] of `out`; `full_scale` is the error at the end of the
-    /// color ramp.
+    /// Writes the clouds of one result to the folder [`FOLDER`] of `out`. `full_scale` is the error
+    /// at the end of the color ramp.
     pub fn write(
         &mut self,
         out: &mut OutputSet,
@@ -42,7 +42,7 @@ impl Clouds {
             self.write_obfuscated(out, scheme, cell.released, cell.original.reveal().positions())?;
         }
         let row = cell.row;
-        // A measured ratio is no name: two sources may share it.
+        // A measured ratio is not part of the name: two sources may have the same one.
         let given = match row.oracle_noise {
             None => row.neighbors.clone(),
             Some("uniform") => row.inlier_ratio.to_string(),
@@ -56,8 +56,8 @@ impl Clouds {
         write_recovered(&stage(out, &name)?, &points, &errors, full_scale * scale)
     }
 
-    /// Lines and rays clipped to the 1-99 % box as OBJ; published points as PLY. Planes have no
-    /// finite shape and are left out.
+    /// Writes lines and rays, clipped to the 1-99 % box, as OBJ, and published points as PLY.
+    /// Planes have no finite shape and are omitted.
     fn write_obfuscated(
         &self,
         out: &mut OutputSet,
@@ -91,7 +91,8 @@ impl Clouds {
 /// The folder of clouds in the folder of an audit.
 pub const FOLDER: &str = "clouds";
 
-/// Clouds in the folder `out` of an audit that another one may replace, as paths within it.
+/// Lists the clouds of an earlier audit in the folder `out`, as relative paths. A new audit may
+/// replace them.
 pub fn earlier(out: &Path) -> Vec<String> {
     let Ok(entries) = std::fs::read_dir(out.join(FOLDER)) else { return Vec::new() };
     let names = entries.flatten().filter_map(|entry| entry.file_name().into_string().ok());
@@ -101,7 +102,6 @@ pub fn earlier(out: &Path) -> Vec<String> {
     names.filter(is_ours).map(|name| format!("{FOLDER}/{name}")).collect()
 }
 
-/// Where to write a cloud.
 fn stage(out: &mut OutputSet, name: &str) -> Result<PathBuf, Error> {
     out.stage(&format!("{FOLDER}/{name}"), Kind::Cloud)
 }

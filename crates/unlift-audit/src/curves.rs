@@ -1,44 +1,42 @@
-//! Error curves over many images or tiles: counts, so that their size does not depend on the number of items.
+//! Error curves over many images or tiles. They are counts, so their size does not depend on the
+//! number of items.
 
 use unlift::audit::{Cell, Observer, Row};
 
 use crate::progress::Progress;
 
-/// Points of an error curve.
 const CURVE_POINTS: i32 = 80;
 
-/// The errors of an error curve: from a hundredth of the largest threshold to ten times it, evenly on a
+/// The errors of an error curve: from 0.01 to 10 times the largest threshold, evenly on a
 /// logarithmic axis.
 pub fn curve_errors(largest_threshold: f64) -> impl Iterator<Item = f64> {
     let exponent = |step: i32| -2.0 + 3.0 * f64::from(step) / f64::from(CURVE_POINTS);
     (0..=CURVE_POINTS).map(move |step| largest_threshold * 10f64.powf(exponent(step)))
 }
 
-/// One curve.
 struct Curve {
-    /// The row of one item.
     cell: Row,
     within: Vec<usize>,
     n: usize,
 }
 
-/// The error curves of one item, of the first repeat; or of many, merged.
+/// The error curves of the first repeat of one item, or of many items merged.
 pub struct Curves<'a> {
     errors: Vec<f64>,
     curves: Vec<Curve>,
     steps: &'a dyn Progress,
-    /// The share of the item that was told to be finished.
+    /// The share of the item that was reported as finished.
     told: f64,
 }
 
 impl<'a> Curves<'a> {
-    /// No curve yet, looked at where `largest_threshold` says.
+    /// Creates an empty set of curves over the errors of [`curve_errors`].
     pub fn new(largest_threshold: f64, steps: &'a dyn Progress) -> Self {
         let errors = curve_errors(largest_threshold).collect();
         Self { errors, curves: Vec::new(), steps, told: 0.0 }
     }
 
-    /// Adds those of another item.
+    /// Adds the curves of another item.
     pub fn merge(&mut self, more: Self) {
         for more in more.curves {
             match self.curves.iter_mut().find(|to| to.cell.is_same_cell(&more.cell)) {
@@ -51,7 +49,7 @@ impl<'a> Curves<'a> {
         }
     }
 
-    /// The curves in percent, by cell.
+    /// Returns the curves in percent, by cell.
     pub fn shares(self) -> Vec<(Row, Vec<(f64, f64)>)> {
         let shares = |curve: Curve| {
             let percent = |count: usize| 100.0 * count as f64 / curve.n.max(1) as f64;

@@ -1,4 +1,4 @@
-//! An audit's outcome as the document that is written: names and shapes only, nothing is computed.
+//! Converts an audit's outcome to the written document. Nothing is computed here.
 
 use std::time::Instant;
 
@@ -12,23 +12,23 @@ use unlift_report::document as report;
 
 use crate::tiles::Tile;
 
-/// What an outcome does not know about itself.
+/// Facts about an audit that its outcome does not contain.
 pub struct Provenance {
-    /// What was read.
+    /// The input files.
     pub input: report::Input,
-    /// Options for the record.
+    /// The recorded options.
     pub options: Map<String, Value>,
-    /// What whoever reads the figures must know.
+    /// Notes for readers of the figures.
     pub notes: Vec<String>,
-    /// Gates and what they found.
+    /// Gates and their results.
     pub gates: Vec<report::GateResult>,
     /// The command line, if there was one.
     pub command: Option<String>,
-    /// When it began.
+    /// The start of the audit.
     pub started: Instant,
 }
 
-/// The plan and `more` as options for the record.
+/// Returns the plan and `more` as recorded options.
 pub fn options<const D: usize>(plan: &Plan<D>, more: Map<String, Value>) -> Map<String, Value> {
     let names: Vec<&str> = plan.schemes.iter().map(|scheme| scheme.name()).collect();
     let labels: Vec<&str> = plan.thresholds.iter().map(|t| t.label.as_str()).collect();
@@ -62,19 +62,19 @@ pub fn options<const D: usize>(plan: &Plan<D>, more: Map<String, Value>) -> Map<
     options
 }
 
-/// What an audit of a map or of images found.
+/// The results of an audit of a map or of images.
 pub struct Found<'a> {
     /// One row per combination.
     pub rows: &'a [Row],
-    /// What has no row.
+    /// Combinations without a row.
     pub not_audited: &'a [NotAudited],
-    /// The ratios at which half comes back.
+    /// The inlier ratios at which half of the points come back.
     pub break_even: &'a [audit::BreakEven],
-    /// Where the time went.
+    /// The times of the stages.
     pub seconds: &'a audit::Seconds,
 }
 
-/// The document of an audit; of images it lacks the figures of each.
+/// Builds the document of an audit. For images, the caller adds the figures of each image.
 pub fn document<const D: usize>(
     plan: &Plan<D>,
     outcome: &Found<'_>,
@@ -119,12 +119,11 @@ pub fn document<const D: usize>(
     }
 }
 
-/// Percentages by threshold as typed.
 fn by_threshold(thresholds: &[Threshold], percents: &[f64]) -> report::ByThreshold {
     ordered(thresholds.iter().map(|t| t.label.clone()).zip(percents.iter().copied()))
 }
 
-/// The figures of every tile: of its `rows`, those that are among the pooled `results`.
+/// Returns the figures of every tile: those of its `rows` that are in the pooled `results`.
 pub fn tiles(
     tiles: &[Tile],
     rows: &[Vec<Row>],
@@ -145,7 +144,7 @@ pub fn tiles(
     tiles.iter().zip(rows).map(one).collect()
 }
 
-/// The figures of one image of an audit.
+/// Returns the figures of one image of an audit.
 pub fn image(
     name: &str,
     n_points: usize,
@@ -169,7 +168,7 @@ pub fn image(
     }
 }
 
-/// The neighborhoods of a row, as the page tells them apart.
+/// Returns the neighborhoods of a row, as the page distinguishes them.
 pub(crate) fn given(row: &Row) -> Given {
     Given {
         neighbors: row.neighbors.clone(),
@@ -178,13 +177,13 @@ pub(crate) fn given(row: &Row) -> Given {
     }
 }
 
-/// What is not known of a row where points came from files: its name.
+/// Fields of a row that are unknown where points come from files.
 const UNKNOWN: [&str; 6] = ["scheme", "neighbors", "oracle_noise", "inlier_ratio", "k", "solver"];
 
-/// A row as `evaluate` tells it, rounded as it is written: without its name, with what speaks against its figures.
+/// Returns a row as `evaluate` prints it: rounded, without the fields of its name, with `notes`.
 ///
 /// # Errors
-/// When a figure cannot be written (a bug).
+/// If a figure cannot be serialized (a bug).
 pub fn evaluated(
     found: &Row,
     thresholds: &[Threshold],
@@ -203,7 +202,7 @@ pub fn evaluated(
     Ok(value)
 }
 
-/// A row as it is written.
+/// Converts a row to its written form.
 pub fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
     let by_threshold = |percents: &[f64]| by_threshold(thresholds, percents);
     let by_reason = |counts: &std::collections::BTreeMap<&'static str, usize>| {
@@ -268,8 +267,8 @@ pub fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
     }
 }
 
-/// What has no row, told once per scheme, source and reason, with the part of the source's rows that it is
-/// about where others are there.
+/// Lists what has no row, once per scheme, source and reason. If other rows of the source exist,
+/// the reason names the affected part.
 fn not_audited<const D: usize>(plan: &Plan<D>, missing: &[NotAudited]) -> Vec<report::NotAudited> {
     let mut told: Vec<(&NotAudited, Vec<&NotAudited>)> = Vec::new();
     for one in missing {
@@ -295,7 +294,7 @@ fn not_audited<const D: usize>(plan: &Plan<D>, missing: &[NotAudited]) -> Vec<re
     told.into_iter().map(text).collect()
 }
 
-/// Inlier ratios, with the noise model where there are several.
+/// Returns inlier ratios, with the noise model if there are several.
 fn parts<const D: usize>(plan: &Plan<D>, missing: &[&NotAudited]) -> Vec<String> {
     let part = |one: &&NotAudited| {
         let ratio = one.inlier_ratio.map(|ratio| ratio.to_string()).unwrap_or_default();
@@ -326,7 +325,7 @@ fn break_even(row: &audit::BreakEven) -> report::BreakEven {
     }
 }
 
-/// An ordered map from pairs.
+/// Collects pairs into an ordered map.
 pub fn ordered<V>(pairs: impl IntoIterator<Item = (String, V)>) -> IndexMap<String, V> {
     pairs.into_iter().collect()
 }

@@ -1,5 +1,6 @@
-//! Figures that may be too small: the attack was not at its best, or the truth is not that of the map. Next to nothing
-//! coming back reads as protection, so that each is said beside the verdict and lets no gate hold.
+//! Doubts: reasons why figures may be too small, because the attack was not at its best or the
+//! ground truth is of another map. Low recovery would look like protection, so each doubt is shown
+//! beside the verdict, and no gate holds with one.
 
 use unlift::Unit;
 use unlift::audit::{Plan, REFERENCE, Row, Threshold};
@@ -11,36 +12,37 @@ use unlift::truth::{Original, Secret};
 use crate::lengths::short;
 use crate::tiles::Tile;
 
-/// On RedKitchen and Castle delta is 0.1 (`density`) to 4.8 times (`consensus`, noise that is near) the median distance to the
-/// K-th neighbor, whatever scheme, solver, source and noise. Beyond these times the quartiles of that distance the attack has not
-/// found how far apart neighbors are.
+/// Limits of delta, in multiples of the quartiles of the distance to the K-th neighbor; beyond them
+/// the attack did not learn the distance of neighbors. On RedKitchen and Castle delta is 0.1
+/// (`density`) to 4.8 times (`consensus`, noise `near`) the median distance, for all schemes,
+/// solvers, sources and noise models.
 const NARROW: f64 = 0.05;
 const WIDE: f64 = 8.0;
-/// Points whose neighbors are looked at: enough for quartiles.
+/// Number of points whose neighbors are searched: enough for quartiles.
 const SAMPLE: usize = 2000;
-/// Points that may lie farther from their own records than the smallest threshold: some mistake of a few is nobody's
-/// protection.
+/// Tolerated share of points that are farther from their own records than the smallest threshold.
 const STRAY: f64 = 0.01;
-/// The usual distance to the K-th neighbor in units of itself, whatever the K that the unit was made with.
+/// Usual median distance to the K-th neighbor in its own unit, whatever K the unit was made with.
 const UNIT: [f64; 2] = [0.2, 5.0];
-/// Lists that hold a larger share of the map than this are said to be long (`tests/doubts.rs` has how much that costs).
+/// Lists are long if they name a larger share of the map than this (`tests/doubts.rs` states the
+/// cost).
 const LONG: f64 = 0.05;
-/// Lists that cannot be shorter.
+/// Lists of at most this length are never long.
 const SHORT: usize = 5;
 
-/// What speaks against the figures of an audit of a map.
+/// The doubts about an audit of a map.
 #[derive(Debug, Default)]
 pub(crate) struct Doubts {
-    /// Per row, why its figures may be too small.
     pub(crate) of_rows: Vec<Option<String>>,
-    /// What to say once.
+    /// Notes of the whole audit.
     pub(crate) notes: Vec<String>,
 }
 
-/// Finds what speaks against the figures of a map.
+/// Finds the doubts about the figures of a map.
 ///
-/// `spread` says how far apart its points are, `hidden` is what was released of it if that was given and not made here, and `of_file`
-/// holds what speaks against the points. Each tile has rows of its own: a mean of delta over tiles would hide a tile whose delta collapsed.
+/// `spread` holds the distances of its points, `hidden` the given release, if it was not made here,
+/// and `of_file` the doubts about the points. Deltas of tiles are checked one by one, because their
+/// mean would hide a tile whose delta collapsed.
 pub(crate) fn doubts(
     (original, spread): (&Original<3>, Spread),
     hidden: Option<&(Released<3>, Secret)>,
@@ -58,7 +60,7 @@ pub(crate) fn doubts(
     let share = plan.k as f64 / n_points.max(1) as f64;
     if plan.asks_oracle() && plan.k > SHORT && share > LONG {
         found.notes.push(format!(
-            "K = {} is {:.0} % of the map's points: of so long lists less comes back than of shorter ones (--k)",
+            "K = {} is {:.0} % of the map's points: such long lists lower recovery (try a smaller --k)",
             plan.k,
             100.0 * share
         ));
@@ -71,15 +73,15 @@ pub(crate) fn doubts(
             .filter(|_| row.solver != REFERENCE);
         let of_delta = unusual.map(|delta| {
             format!(
-                "{}: delta, {}, is far from the usual distance to the K-th neighbor, {} to {}, so that less may have come back \
-                 than could (try --delta, --outlier-filter, or parts of the map by themselves)",
+                "{}: delta, {}, is far from the usual distance to the K-th neighbor, {} to {}: recovery may be too low \
+                 (try --delta, --outlier-filter, or separate parts of the map)",
                 row.scheme,
                 in_unit(delta, unit),
                 short(low),
                 in_unit(high, unit)
             )
         });
-        // One line per scheme will do.
+        // One line per scheme is enough.
         let start = format!("{}: delta", row.scheme);
         if let Some(doubt) = &of_delta
             && !found.notes.iter().any(|note| note.starts_with(&start))
@@ -96,23 +98,17 @@ pub(crate) struct Spread {
     low: f64,
     middle: f64,
     high: f64,
-    /// Points of the map, or of its smallest tile.
+    /// Number of points of the map, or of its smallest tile.
     n_points: usize,
 }
 
 impl Spread {
     /// Measures the spread of a map on a sample of its points.
-    ///
-    /// # Errors
-    /// When points cannot be searched.
     pub(crate) fn of(points: &[[f64; 3]], k: usize) -> Result<Self, unlift::Error> {
         Ok(Self::of_distances(distances(points, k, SAMPLE)?, points.len()))
     }
 
-    /// Measures the spread of a map in tiles. Points have no neighbors beyond their tile.
-    ///
-    /// # Errors
-    /// When points cannot be searched.
+    /// Measures the spread of a map in tiles. Neighbors are searched within a tile.
     pub(crate) fn of_tiles(
         original: &Original<3>,
         tiles: &[Tile],
@@ -135,7 +131,6 @@ impl Spread {
     }
 }
 
-/// Distances to the K-th neighbor of about `sample` points.
 fn distances(points: &[[f64; 3]], k: usize, sample: usize) -> Result<Vec<f64>, unlift::Error> {
     let knn = Knn::new(points)?;
     let mut found = Vec::new();
@@ -147,7 +142,7 @@ fn distances(points: &[[f64; 3]], k: usize, sample: usize) -> Result<Vec<f64>, u
     Ok((0..points.len()).step_by(every).map(kth).collect())
 }
 
-/// What to say of a truth whose points are not where the released records are.
+/// Returns a doubt if points of the ground truth are far from their released records.
 fn not_its_own(
     original: &Original<3>,
     (released, secret): &(Released<3>, Secret),
@@ -157,16 +152,16 @@ fn not_its_own(
     stray_truth(&away, &plan.thresholds, released.unit())
 }
 
-/// What to say of a truth of which such lengths lie between points and their own records.
+/// Returns a doubt about the ground truth, given the distances of points from their own records.
 pub(crate) fn stray_truth(away: &[f64], thresholds: &[Threshold], unit: Unit) -> Option<String> {
     let strays = strays(away, thresholds, unit)?;
     Some(format!(
-        "truth: {strays} away from their own records, where no attack could find them: is it that of this map, in its \
-         frame, scale and order?"
+        "truth: {strays} away from their own records, where no attack can find them: check that it is of this map, in its \
+         frame, scale and order"
     ))
 }
 
-/// What to say of recovered positions of which such lengths lie between them and their own records.
+/// Returns a doubt about recovered positions, given their distances from their own records.
 pub(crate) fn stray_positions(
     away: &[f64],
     thresholds: &[Threshold],
@@ -174,12 +169,12 @@ pub(crate) fn stray_positions(
 ) -> Option<String> {
     let strays = strays(away, thresholds, unit)?;
     Some(format!(
-        "recovered: {strays} away from their own records, where no hidden point is: are they of this map, in its frame, \
-         scale and order?"
+        "recovered: {strays} away from their own records, where no hidden point is: check that they are of this map, in its \
+         frame, scale and order"
     ))
 }
 
-/// How many are farther away than the smallest threshold, if they are more than a few.
+/// Counts the distances of at least the smallest threshold; `None` up to a share of [`STRAY`].
 fn strays(away: &[f64], thresholds: &[Threshold], unit: Unit) -> Option<String> {
     let least = thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min);
     let (n, of) = (away.iter().filter(|&&away| away >= least).count(), away.len());
@@ -187,13 +182,13 @@ fn strays(away: &[f64], thresholds: &[Threshold], unit: Unit) -> Option<String> 
     are_many.then(|| format!("{n} of {of} points are {} or more", in_unit(least, unit)))
 }
 
-/// What to say of lengths that are not in the unit that a file states.
+/// Returns a doubt if lengths are not in the unit that a file states.
 fn mistaken_unit(unit: Unit, k: usize, middle: f64) -> Option<String> {
     let is_usual = (UNIT[0]..=UNIT[1]).contains(&middle);
     (unit == Unit::KthNeighbor && !is_usual).then(|| {
         format!(
-            "unit: expected a usual distance to the K-th neighbor (K = {k}) of about 1, as lengths are said to be in multiples of it, found \
-             {}: thresholds mean something else than they say",
+            "unit: expected a usual distance to the K-th neighbor (K = {k}) of about 1, because the file \
+             states lengths in multiples of it, found {}: thresholds do not have their stated meaning",
             short(middle)
         )
     })

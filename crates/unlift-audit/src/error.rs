@@ -1,5 +1,3 @@
-//! What keeps an audit from its result: one line, and a way out where there is one.
-
 use std::fmt;
 
 /// An error of an audit.
@@ -11,14 +9,14 @@ pub struct Error {
 
 #[derive(Debug)]
 enum Fault {
-    /// What was asked for cannot be done.
+    /// The request cannot be carried out.
     Request(String),
     /// A file cannot be read, used or written.
     Input(Box<dyn std::error::Error + Send + Sync>),
 }
 
 impl Error {
-    /// What was asked for cannot be done.
+    /// Creates an error of the request, not of a file.
     pub fn request(message: impl Into<String>) -> Self {
         Self { fault: Fault::Request(message.into()), advice: None }
     }
@@ -27,18 +25,18 @@ impl Error {
         Self { fault: Fault::Input(Box::new(error)), advice: None }
     }
 
-    /// The same with a way out: what the user could try instead.
+    /// Adds advice: what the user could try instead.
     #[must_use]
     pub fn advise(self, advice: impl Into<String>) -> Self {
         Self { advice: Some(advice.into()), ..self }
     }
 
-    /// Whether the request is wrong, not a file.
+    /// Returns true if the request is wrong, not a file.
     pub fn is_request(&self) -> bool {
         matches!(self.fault, Fault::Request(_))
     }
 
-    /// What the user could try instead.
+    /// Returns what the user could try instead.
     pub fn advice(&self) -> Option<&str> {
         self.advice.as_deref()
     }

@@ -1,4 +1,4 @@
-//! Neighborhoods that an owner lists by point, in a file.
+//! Neighborhoods by point, from a file of the owner.
 
 use std::path::Path;
 
@@ -9,12 +9,12 @@ use unlift_io::stage::read_point_neighborhoods;
 use crate::Error;
 use crate::prepare::Prepared;
 
-/// Lists by row of the file, for the rows that were kept.
+/// Reads lists by row of the file and keeps those of the prepared rows.
 ///
-/// `n_read` rows were read from the file of the map. What speaks against the lists is added to `notes`.
+/// `n_read` rows were read from the file of the map. Doubts about the lists are added to `notes`.
 ///
 /// # Errors
-/// When the file cannot be read, or has another number of rows.
+/// If the file cannot be read, or has another number of rows.
 pub fn by_point(
     path: &Path,
     prepared: &Prepared,
@@ -41,12 +41,13 @@ pub fn by_point(
         offsets.push(neighbors.len() as u64);
     }
     notes.extend(doubts(&offsets, &neighbors, prepared));
-    // Which file it was stands in the hashes; a file called oracle must not pass for one.
+    // The hashes identify the file; a file called oracle must not appear as the source `oracle`.
     let name = "file".to_owned();
     Ok(PointNeighbors { name, offsets, neighbors, scores })
 }
 
-/// What speaks against given lists: with lists of another map little comes back, and that is no protection.
+/// Returns doubts about given lists. With lists of another map little is recovered, which would
+/// look like protection.
 fn doubts(offsets: &[u64], neighbors: &[u32], prepared: &Prepared) -> Vec<String> {
     let points = prepared.original.reveal().positions();
     let mut doubts = Vec::new();
@@ -60,18 +61,18 @@ fn doubts(offsets: &[u64], neighbors: &[u32], prepared: &Prepared) -> Vec<String
     let (mut nearer, mut n) = (0usize, 0usize);
     for (point, w) in offsets.windows(2).enumerate() {
         for &neighbor in &neighbors[w[0] as usize..w[1] as usize] {
-            // A stranger of each, spread over the map by a large odd factor.
+            // A large odd factor spreads the compared points over the map.
             let stranger = (n * 7919 + 3) % points.len();
             let to = |other: usize| distance(&points[point], &points[other]);
             nearer += usize::from(to(neighbor as usize) < to(stranger));
             n += 1;
         }
     }
-    // Of strangers half are nearer; two standard deviations on top.
+    // Of random points half are nearer; two standard deviations are added.
     if n > 0 && nearer as f64 <= 0.5 * n as f64 + (n as f64).sqrt() {
         doubts.push(format!(
-            "lists: the neighbors in the file are no nearer than any points ({nearer} of {n}): of another map, or in \
-             another order of rows?"
+            "lists: the neighbors in the file are no nearer than random points ({nearer} of {n}): check that they are \
+             of this map and in its order of rows"
         ));
     }
     doubts
@@ -83,7 +84,7 @@ mod tests {
     use unlift::truth::Original;
     use unlift::{PointSet, Unit};
 
-    /// Lists of the next few of 200 points on a line; with a factor other than 1, of other points.
+    /// Lists the next few of 200 points on a line; with a factor other than 1, other points.
     fn doubts_about(factor: usize, length: usize) -> Vec<String> {
         let n = 200;
         let points = (0..n).map(|i| [0.1 * i as f64, 0.0, 0.0]).collect();

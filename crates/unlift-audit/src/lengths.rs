@@ -1,5 +1,5 @@
-//! Whether a declared scale and thresholds fit a map: where every point counts as recovered wherever it
-//! is put, or none could ever, a figure says nothing, and 0 % would look like protection.
+//! Checks that a declared scale and thresholds fit a map. If any guess counts as recovered, or no
+//! attack can come near, a figure means nothing, and 0 % would look like protection.
 
 use unlift::audit::Threshold;
 use unlift::geometry::knn::Knn;
@@ -9,21 +9,21 @@ use unlift::{PointSet, Unit};
 use crate::Error;
 use crate::gate::Gate;
 
-/// How far apart the points of a map lie.
+/// The size of a map and the distance of its points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extent {
-    /// Twice the distance from the middle (the median of every coordinate) within which nine tenths of
-    /// the points lie: a few outliers make no map large.
+    /// Twice the distance from the median point within which 90 % of the points lie, so that a few
+    /// outliers do not count.
     pub across: f64,
     /// The median distance to the nearest other point.
     pub nearest: f64,
 }
 
 impl Extent {
-    /// That of `points`, of which there must be two.
+    /// Measures `points`, at least two.
     ///
     /// # Errors
-    /// When a coordinate is not finite.
+    /// If a coordinate is not finite.
     pub fn of(points: &[[f64; 3]]) -> Result<Self, unlift::Error> {
         let nearest = median(&mut Knn::new(points)?.kth_distances(1));
         Ok(Self { across: across(points), nearest })
@@ -46,22 +46,22 @@ fn across(points: &[[f64; 3]]) -> f64 {
     2.0 * *distances.select_nth_unstable_by(at, f64::total_cmp).1
 }
 
-/// What a map in meters can be across: from a grain of dust to beyond the orbit of the moon.
+/// Plausible sizes of a map in meters: from a grain of dust to beyond the orbit of the moon.
 const ACROSS_M: [f64; 2] = [1e-6, 1e9];
-/// Where even nearest neighbors are this many times the largest threshold apart, no attack could hit.
+/// If nearest neighbors are this many times the largest threshold apart, no attack can come near
+/// ([`HOPELESS`]), or the lengths are doubtful ([`UNUSUAL`]).
 const HOPELESS: f64 = 100.0;
-/// The same for what is possible but unusual.
 const UNUSUAL: f64 = 10.0;
 
 /// Checks a scale against the points as they were read.
 ///
 /// # Errors
-/// When it makes the map smaller than dust or larger than the solar system has room for.
+/// If it makes the map smaller than dust or larger than the orbit of the moon.
 pub fn check_scale(points: &[[f64; 3]], scale: Option<f64>) -> Result<(), Error> {
     let Some(scale) = scale else { return Ok(()) };
     let across = across(points);
     let [least, most] = ACROSS_M;
-    // Points that all coincide have their own error.
+    // Coincident points have their own error.
     if across == 0.0 || (least..=most).contains(&(across * scale)) {
         return Ok(());
     }
@@ -74,7 +74,7 @@ pub fn check_scale(points: &[[f64; 3]], scale: Option<f64>) -> Result<(), Error>
     Err(error.advise("--scale 1 for a map in meters, or no --scale for relative lengths"))
 }
 
-/// What to tell the user of lengths: a note, and a doubt, on which no gate holds.
+/// Messages about lengths: a note, and a doubt, with which no gate holds.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct SaidOfLengths {
     /// Figures may be too large.
@@ -83,11 +83,11 @@ pub struct SaidOfLengths {
     pub doubt: Option<String>,
 }
 
-/// Checks thresholds against the points in the unit of the audit, and says what to tell the user.
-/// Usual thresholds in a relative unit fit by themselves.
+/// Checks thresholds against the points, in the unit of the audit. Default thresholds in a relative
+/// unit always fit.
 ///
 /// # Errors
-/// When every point would count as recovered wherever it is put, or none could ever.
+/// If any guess would count as recovered, or no attack could come near.
 pub fn check_thresholds(
     points: &[[f64; 3]],
     unit: Unit,
@@ -159,10 +159,7 @@ pub fn check_thresholds(
     Ok(SaidOfLengths::default())
 }
 
-/// Checks the threshold of every gate: a bound that no attack could ever break says nothing.
-///
-/// # Errors
-/// When even nearest neighbors are too far apart for one.
+/// Checks the thresholds of gates: a gate that no attack can break means nothing.
 pub(crate) fn check_lengths_of_gates(points: &PointSet<3>, gates: &[Gate]) -> Result<(), Error> {
     let by_size = |a: &&Gate, b: &&Gate| a.threshold.total_cmp(&b.threshold);
     let Some(gate) = gates.iter().min_by(by_size) else { return Ok(()) };
@@ -178,7 +175,7 @@ pub(crate) fn check_lengths_of_gates(points: &PointSet<3>, gates: &[Gate]) -> Re
     )))
 }
 
-/// Three digits, and an exponent where there would be many zeros.
+/// Formats three digits, with an exponent where there would be many zeros.
 pub(crate) fn short(length: f64) -> String {
     if (1e-3..1e6).contains(&length) || length == 0.0 {
         let digits = (2 - length.max(1e-3).log10().floor() as i32).clamp(0, 6) as usize;
@@ -215,7 +212,7 @@ mod tests {
         for scale in [None, Some(1e-3), Some(1.0), Some(1000.0)] {
             check_scale(&points, scale).unwrap();
         }
-        // Georeferenced coordinates are large, maps are not; and an outlier makes no map large.
+        // Georeferenced coordinates are large although the map is not; an outlier does not count.
         let mut far: Vec<_> = points.iter().map(|p| p.map(|x| x + 5e6)).collect();
         far.push([1e15; 3]);
         check_scale(&far, Some(1.0)).unwrap();
@@ -226,7 +223,7 @@ mod tests {
         let error = told(0.01).unwrap_err();
         assert!(error.starts_with("--scale: expected a map larger than"), "{error}");
         assert!(error.ends_with("any guess would count as recovered"), "{error}");
-        // The larger one alone is still worth a word.
+        // The larger threshold alone gives a note.
         let note = told(0.03).unwrap().note.unwrap();
         assert!(note.contains("less than the threshold 0.25 m"), "{note}");
         assert_eq!(told(1.0), Ok(SaidOfLengths::default()));

@@ -1,4 +1,4 @@
-//! An audit as a library call: from a map or images on disk to figures and a page.
+//! Audits of files as a library call: from a map or images on disk to figures and a page.
 //!
 //! ```text
 //! open ──> Plan ──> perform (run, gate, draw) ──> audit.json, report.html
@@ -32,7 +32,7 @@
 //! # }
 //! ```
 //!
-//! Schemes, sources of neighborhoods and measures of the plan may be anybody's; see `unlift`.
+//! The schemes, sources and measures of the plan may be your own; see `unlift`.
 
 mod audited;
 mod checked;

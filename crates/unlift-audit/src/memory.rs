@@ -1,16 +1,14 @@
-//! How much memory the program has used, and how much there is.
-
-/// Peak resident memory of this process in bytes, where the system tells it (Linux).
+/// Returns the peak resident memory of this process in bytes, if the system reports it (Linux).
 pub fn peak_bytes() -> Option<u64> {
     kibibytes(&std::fs::read_to_string("/proc/self/status").ok()?, "VmHWM:")
 }
 
-/// Memory of this machine in bytes, where the system tells it (Linux).
+/// Returns the memory of this machine in bytes, if the system reports it (Linux).
 pub fn total_bytes() -> Option<u64> {
     kibibytes(&std::fs::read_to_string("/proc/meminfo").ok()?, "MemTotal:")
 }
 
-/// The number after `name`, which counts kibibytes, in bytes.
+/// Reads the number of kibibytes after `name`, and returns bytes.
 fn kibibytes(text: &str, name: &str) -> Option<u64> {
     let line = text.lines().find_map(|line| line.strip_prefix(name))?;
     let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;

@@ -1,4 +1,4 @@
-//! Where results go: checked before anything is computed, and never over what is not ours.
+//! Output files: checked before anything is computed; only files that unlift wrote are replaced.
 
 use std::path::{Path, PathBuf};
 
@@ -7,26 +7,26 @@ use unlift_io::atomic::{Access, Kind, OutputFile, OutputSet, Rules, sweep};
 use crate::clouds;
 use crate::{Error, Progress};
 
-/// The page of an audit.
+/// File name of the page of an audit.
 pub const PAGE: &str = "report.html";
-/// The figures of an audit.
+/// File name of the figures of an audit.
 pub const FIGURES: &str = "audit.json";
 
-/// An error of `--out`: of the command line, not of an input.
+/// Converts an error of a file to an error of the option `--out`.
 pub fn refused(error: unlift_io::Error) -> Error {
     Error::request(format!("--out: {error}"))
 }
 
-/// Whether the one file `path` may and can be written, asked before the work and after it; where it will stand, links
-/// followed. What dead runs left unfinished beside it is cleared away.
+/// Checks that the file `path` may be written, and returns its path with links resolved. Deletes
+/// temporary files of crashed runs beside it. Call it before and after the work.
 ///
-/// One rule for every command, as [`open_audit`] has it for folders: a place where nothing can be written is an error of
-/// the command line, a disk that fails later is none.
+/// Like [`open_audit`] for folders, it reports a place that cannot be written as an error of the
+/// command line.
 pub fn check_file(path: &Path, kind: Kind, rules: &Rules) -> Result<PathBuf, Error> {
     check_file_of("--out", path, kind, rules)
 }
 
-/// The same of the file that another option names.
+/// Checks the file that the option `option` names, as [`check_file`] does.
 pub fn check_file_of(
     option: &str,
     path: &Path,
@@ -35,25 +35,25 @@ pub fn check_file_of(
 ) -> Result<PathBuf, Error> {
     let refused = |error: unlift_io::Error| Error::request(format!("{option}: {error}"));
     let target = rules.check(path, kind).map_err(refused)?;
-    // Begun and given up: permissions alone do not say it.
+    // Permissions alone do not show whether a file can be written.
     drop(OutputFile::create(path, Access::Private).map_err(refused)?);
     let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty());
     sweep(folder.unwrap_or(Path::new(".")));
     Ok(target)
 }
 
-/// What an audit shows.
+/// The contents of an audit's output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shown {
     /// Figures.
     Figures,
-    /// Points in the page.
+    /// Figures, and points in the page.
     Points,
-    /// Also clouds.
+    /// Figures, points in the page, and clouds.
     Clouds,
 }
 
-/// Opens the folder that an audit goes to.
+/// Opens the output folder of an audit.
 pub fn open_audit(
     out: &Path,
     rules: Rules,
@@ -67,7 +67,7 @@ pub fn open_audit(
         Shown::Clouds => first.extend(earlier.iter().map(|name| (name.as_str(), Kind::Cloud))),
         Shown::Figures if !earlier.is_empty() => {
             let folder = out.join(clouds::FOLDER);
-            let what = "clouds of an earlier audit show points, and stay";
+            let what = "clouds of an earlier audit show points and are kept";
             progress.say(&format!("note: {}: {what}", folder.display()));
         }
         Shown::Figures | Shown::Points => {}
@@ -75,8 +75,7 @@ pub fn open_audit(
     OutputSet::create(out, rules, access, &first).map_err(refused)
 }
 
-/// Writes a page and its figures under these names into the folder that `out` was opened for; neither is in its place
-/// before `out` is committed.
+/// Stages a page and its figures under these names in `out`. They appear when `out` is committed.
 pub fn stage_audit(
     out: &mut OutputSet,
     [page_name, figures_name]: [&str; 2],

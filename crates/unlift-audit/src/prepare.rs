@@ -1,4 +1,4 @@
-//! From a file's points to the points that are audited: filter, subset, unit.
+//! Selects and scales the points of a file for an audit.
 
 use std::borrow::Cow;
 
@@ -10,28 +10,29 @@ use unlift::{Descriptors, Error, ErrorKind, PointSet, Unit};
 /// Statistical outlier removal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutlierFilter {
-    /// Neighbors whose mean distance is judged.
+    /// Number of neighbors whose mean distance is compared.
     pub neighbors: usize,
-    /// Points beyond the mean of that distance by this many standard deviations go.
+    /// A point is removed if its mean distance exceeds the mean by this many standard deviations.
     pub std_ratio: f64,
 }
 
-/// What to do with the points of a file.
+/// Options for the points of a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Preparation {
-    /// Meters per unit of the file; without it, the K-th neighbor distance becomes the unit.
+    /// Meters per unit of the file. Without it, the median distance to the K-th neighbor is the
+    /// unit.
     pub scale: Option<f64>,
     /// The K of that unit.
     pub k: usize,
-    /// Statistical outlier removal, first.
+    /// Statistical outlier removal, the first step.
     pub outlier_filter: Option<OutlierFilter>,
-    /// Random subset, second.
+    /// Size of the random subset, the second step.
     pub max_points: Option<usize>,
     /// Seed of the subset.
     pub seed: u64,
 }
 
-/// In the unit of the usual distance to the 50th neighbor, all points.
+/// All points, in the unit of the median distance to the 50th neighbor.
 impl Default for Preparation {
     fn default() -> Self {
         Self { scale: None, k: 50, outlier_filter: None, max_points: None, seed: 0 }
@@ -43,23 +44,23 @@ impl Default for Preparation {
 pub struct Prepared {
     /// The points in the unit of the audit.
     pub original: Original<3>,
-    /// One row per point.
+    /// Descriptors, one row per point.
     pub descriptors: Option<Descriptors>,
-    /// Length of that unit in the units of the file.
+    /// Length of the unit of the audit in units of the file.
     pub unit_in_map_units: f64,
-    /// Which rows of the file were kept, ascending.
+    /// Rows of the file that were kept, ascending.
     pub rows: Vec<u32>,
-    /// What whoever reads figures of them must know; share-safe documents withhold those with a path.
+    /// Notes for readers of the figures. Share-safe documents omit those that contain a path.
     pub notes: Vec<String>,
-    /// Why any figure of them may be wrong, which lets no gate hold.
+    /// Doubts about all figures. No gate holds with one.
     pub doubts: Vec<String>,
 }
 
-/// Filters, thins out and scales `positions` (and `descriptors` with them). Positions that are handed over, all of which stay,
-/// are not copied: of a large map every copy counts, also one that is given back.
+/// Filters, thins out and scales `positions` and `descriptors`. Owned positions that are all kept
+/// are not copied, because large maps need the memory.
 ///
 /// # Errors
-/// When fewer than K + 1 points are left, they coincide, or a scaled coordinate is not finite.
+/// If fewer than K + 1 points are left, they coincide, or a scaled coordinate is not finite.
 pub fn prepare<'a>(
     positions: impl Into<Cow<'a, [[f64; 3]]>>,
     descriptors: Option<&Descriptors>,
@@ -73,7 +74,7 @@ pub fn prepare<'a>(
         let n = n_read - rows.len();
         if n > 0 {
             notes.push(format!(
-                "--outlier-filter: {n} of {n_read} points are left out, as if never mapped"
+                "--outlier-filter: {n} of {n_read} points are left out of the audit"
             ));
         }
     }
@@ -81,8 +82,8 @@ pub fn prepare<'a>(
         && rows.len() > most
     {
         notes.push(format!(
-            "--max-points: {most} of {n_read} points are audited, and neighbors are farther apart: of the whole map \
-             more comes back"
+            "--max-points: {most} of {n_read} points are audited; the whole map is denser, so more of it is \
+             recovered"
         ));
         Draws::new(preparation.seed, Stage::Subset, 0).shuffle(&mut rows);
         rows.truncate(most);
@@ -112,7 +113,7 @@ pub fn prepare<'a>(
     Ok(Prepared { original, descriptors, unit_in_map_units, rows, notes, doubts: Vec::new() })
 }
 
-/// The median over all points of the distance to the `k`-th nearest other point.
+/// Returns the median over all points of the distance to the `k`-th nearest other point.
 fn median_kth_distance(points: &[[f64; 3]], k: usize) -> Result<f64, Error> {
     let knn = Knn::new(points)?;
     let mut distances = knn.kth_distances(k);
@@ -124,7 +125,7 @@ fn median_kth_distance(points: &[[f64; 3]], k: usize) -> Result<f64, Error> {
     Err(Error::new(what, "more than 0 (points that do not coincide)", median.to_string()))
 }
 
-/// The rows whose mean distance to their nearest neighbors is usual.
+/// Returns the rows whose mean distance to their nearest neighbors is usual.
 fn without_outliers(points: &[[f64; 3]], filter: OutlierFilter) -> Result<Vec<u32>, Error> {
     let n = filter.neighbors;
     if points.len() <= n {
@@ -149,7 +150,7 @@ mod tests {
     const PLAIN: Preparation =
         Preparation { scale: None, k: 2, outlier_filter: None, max_points: None, seed: 0 };
 
-    /// Points 0.5 apart on a line: the second neighbor is 0.5 away but at the ends.
+    /// Points 0.5 apart on a line; the second neighbor is 0.5 away except at the ends.
     fn line(n: usize) -> Vec<[f64; 3]> {
         (0..n).map(|i| [0.5 * i as f64, 0.0, 0.0]).collect()
     }
@@ -207,10 +208,7 @@ mod tests {
         let prepared =
             prepare(&points, None, &Preparation { outlier_filter: filter, ..PLAIN }).unwrap();
         assert_eq!(prepared.rows, (0..30).collect::<Vec<u32>>());
-        assert_eq!(
-            prepared.notes,
-            ["--outlier-filter: 1 of 31 points are left out, as if never mapped"]
-        );
+        assert_eq!(prepared.notes, ["--outlier-filter: 1 of 31 points are left out of the audit"]);
         let prepared =
             prepare(&points, None, &Preparation { max_points: Some(10), ..PLAIN }).unwrap();
         assert_eq!(prepared.rows.len(), 10);

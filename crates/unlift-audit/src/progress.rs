@@ -1,30 +1,28 @@
-//! How long work is heard of, and stopped.
-
-/// Hears how an audit goes, from any thread.
+/// Receives the progress of an audit, from any thread.
 pub trait Progress: Send + Sync {
-    /// `done` of `total` items are finished; `what` comes next.
+    /// Reports that `done` of `total` items are finished and that `what` comes next.
     fn show(&self, done: usize, total: usize, what: &str) {
         let _ = (done, total, what);
     }
 
-    /// A share of an item more is finished; `what` is at work, unless it is empty.
+    /// Reports that another share of an item is finished. `what` is the current step, or empty.
     fn add(&self, share: f64, what: &str) {
         let _ = (share, what);
     }
 
-    /// Something that a user should know.
+    /// Passes a note to the user.
     fn say(&self, line: &str) {
         let _ = line;
     }
 
-    /// Whether the work shall go on. Asked between cells; once it does not, the audit ends with an error and
-    /// nothing is written.
+    /// Returns whether the work continues. The audit calls it between cells; on false, it ends with
+    /// an error and writes nothing.
     fn goes_on(&self) -> bool {
         true
     }
 }
 
-/// Nobody listens.
+/// A progress receiver that ignores everything.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Quiet;
 

@@ -1,4 +1,4 @@
-//! What the report's 3D view shows: a sample of points, hidden and recovered.
+//! The data of the report's 3D view: a sample of original, hidden and recovered points.
 
 use unlift::audit::{Cell, Plan};
 use unlift::released::{Obfuscation, Released};
@@ -9,20 +9,20 @@ use unlift_report::scene::{
 
 use crate::document::given;
 
-/// Points and shapes kept while an audit runs.
+/// Points and shapes that are collected while an audit runs.
 pub struct Pictures {
     sample: Vec<usize>,
-    /// The middle of the map: `f32` is enough about it, even for georeferenced maps.
+    /// The middle of the map. Relative to it `f32` is precise enough, even for georeferenced maps.
     middle: [f64; 3],
     bounds: SceneBox,
     scene: Scene3d,
 }
 
-/// Shapes drawn per scheme: more lines than this are a fog.
+/// Maximum number of shapes per scheme; more lines cannot be distinguished.
 const MOST_SHAPES: usize = 3_000;
 
 impl Pictures {
-    /// Chooses the points to show; `n_views` results will be shown on them.
+    /// Chooses the points for `n_views` results.
     pub fn new(original: &Original<3>, plan: &Plan<3>, n_views: usize) -> Self {
         let points = original.reveal().positions();
         let most = points_within_budget(n_views, plan.schemes.len());
@@ -35,7 +35,7 @@ impl Pictures {
         Self { sample, middle, bounds, scene }
     }
 
-    /// Keeps one result.
+    /// Adds one result.
     pub fn add(&mut self, cell: &Cell<'_>) {
         let mut slot_of = vec![None; cell.original.len()];
         for (slot, original) in cell.secret.hidden().iter().enumerate() {
@@ -70,7 +70,7 @@ impl Pictures {
         });
     }
 
-    /// The finished scene; `cameras` in the unit of the audit.
+    /// Returns the finished scene; `cameras` are in the unit of the audit.
     pub fn into_scene(mut self, cameras: &[[f64; 3]], up: Option<[f64; 3]>) -> Scene3d {
         self.scene.cameras = cameras.iter().map(|c| near(c, &self.middle)).collect();
         self.scene.up = up.map(|v| v.map(|x| x as f32));
@@ -78,7 +78,7 @@ impl Pictures {
     }
 }
 
-/// The records of these numbers, clipped to `bounds`, about `middle`.
+/// Returns the records with these numbers, clipped to `bounds`, relative to `middle`.
 pub fn shapes(
     bounds: &SceneBox,
     middle: &[f64; 3],
@@ -115,7 +115,6 @@ pub fn shapes(
     }
 }
 
-/// A point about `middle`.
 pub fn near(point: &[f64; 3], middle: &[f64; 3]) -> [f32; 3] {
     std::array::from_fn(|c| (point[c] - middle[c]) as f32)
 }

@@ -1,17 +1,17 @@
-//! Sources of neighborhoods by name: the core's, and those that need a network.
+//! Sources of neighborhoods by name: those of the core, and those that need a network.
 
 use unlift::Error;
 use unlift::neighbors::sources::{self, Named, SourceEntry};
 
-/// All of them.
+/// Returns all sources.
 pub fn all() -> Vec<&'static SourceEntry> {
     sources::SOURCES.iter().chain(unlift_nn::SOURCES).collect()
 }
 
-/// The source called `name`.
+/// Returns the source called `name`.
 ///
 /// # Errors
-/// When there is none; the error lists the names.
+/// If there is none; the error lists the names.
 pub fn named(name: &str) -> Result<Named, Error> {
     Named::parse_among(name, &all())
 }

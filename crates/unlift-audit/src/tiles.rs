@@ -1,4 +1,4 @@
-//! A large map in tiles: each is hidden and attacked as a map of its own, as a service releases a city.
+//! Large maps in tiles: each tile is hidden and attacked as a map of its own.
 
 use unlift::audit::{self, Item, Outcome, Plan, Row, run_many};
 use unlift::truth::Original;
@@ -7,22 +7,20 @@ use unlift::{Descriptors, Error, PointSet};
 use crate::curves::Curves;
 use crate::progress::Progress;
 
-/// A part of a map: a box in plan view, which no other tile shares.
+/// A part of a map: a box in plan view that overlaps no other tile.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tile {
     /// Its number, from 0.
     pub at: usize,
     /// Rows of the map's points, ascending.
     pub rows: Vec<u32>,
-    /// The lowest and highest corner of its points in plan view, but for a fiftieth on every side: a stray point would stretch it.
+    /// The lowest and highest corner of its points in plan view, without the outer 2 % on every
+    /// side, which may be outliers.
     pub bounds: [[f64; 2]; 2],
 }
 
 impl Tile {
-    /// The tile as an audit takes it. Its randomness comes from its number.
-    ///
-    /// # Errors
-    /// Never for points of a map.
+    /// Returns the tile as an item of an audit. Its random seed depends on its number.
     pub fn item(
         &self,
         original: &Original<3>,
@@ -36,23 +34,23 @@ impl Tile {
     }
 }
 
-/// How a map is cut.
+/// The split of a map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tiles {
-    /// Points of a tile at most.
+    /// Maximum number of points of a tile.
     pub most: usize,
-    /// The number of the one tile that is audited, as a task of a cluster; `None` for all.
+    /// The number of the only tile to audit, as a task of a cluster; `None` for all.
     pub only: Option<usize>,
 }
 
 impl Tiles {
-    /// Cuts points into as few tiles as have at most `most` of them each, of nearly equal size, by a k-d split in plan view: across the
-    /// longer side, never across the height.
+    /// Splits points into the fewest tiles of at most `most` points, of nearly equal size, by a k-d
+    /// tree in plan view: across the longer side, never across the height.
     ///
-    /// The height is the axis nearest to `up`, or without it the one along which the points extend least.
+    /// The height is the axis nearest to `up`; without `up`, the axis of the smallest extent.
     ///
     /// # Errors
-    /// When there is no tile of the number that is asked for.
+    /// If `only` is not the number of a tile.
     pub fn of(
         self,
         positions: &[[f64; 3]],
@@ -102,7 +100,7 @@ fn split(
     let axis = if high[a] - low[a] >= high[b] - low[b] { a } else { b };
     let left_tiles = n_tiles / 2;
     let n_left = rows.len() * left_tiles / n_tiles;
-    // Ties by row: the same tiles whatever the order in which a selection leaves the rest.
+    // Ties are broken by row, so the tiles do not depend on the order that the selection leaves.
     rows.select_nth_unstable_by(n_left, |&i, &j| {
         let [x, y] = [i, j].map(|row| positions[row as usize][axis]);
         x.total_cmp(&y).then(i.cmp(&j))
@@ -112,7 +110,6 @@ fn split(
     split(positions, right, n_tiles - left_tiles, plan, found);
 }
 
-/// The lowest and the highest corner of some points.
 fn bounds(positions: &[[f64; 3]], rows: &[u32]) -> [[f64; 3]; 2] {
     let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
     for &row in rows {
@@ -123,18 +120,13 @@ fn bounds(positions: &[[f64; 3]], rows: &[u32]) -> [[f64; 3]; 2] {
     bounds
 }
 
-/// What is found of the tiles of a map.
 pub(crate) struct Found<'a> {
     pub(crate) outcome: Outcome,
-    /// The rows of every tile.
     pub(crate) rows: Vec<Vec<Row>>,
     pub(crate) curves: Curves<'a>,
 }
 
 /// Runs `plan` on every tile of a map, one after the other.
-///
-/// # Errors
-/// When the plan does not fit a tile, or `progress` says stop.
 pub(crate) fn run<'a>(
     (original, descriptors): (&Original<3>, Option<&Descriptors>),
     tiles: &[Tile],
@@ -144,13 +136,12 @@ pub(crate) fn run<'a>(
     let most = plan.thresholds.iter().map(|t| t.value).fold(0.0, f64::max);
     let mut watcher =
         Watcher { progress, most, rows: Vec::new(), curves: Curves::new(most, progress) };
-    progress.show(0, tiles.len(), "cutting the map into tiles");
+    progress.show(0, tiles.len(), "splitting the map into tiles");
     let items = tiles.iter().map(|tile| tile.item(original, descriptors));
     let outcome = run_many(items, plan, &mut watcher)?;
     Ok(Found { outcome, rows: watcher.rows, curves: watcher.curves })
 }
 
-/// Shows progress and keeps the figures of every tile.
 struct Watcher<'a> {
     progress: &'a dyn Progress,
     most: f64,
@@ -166,7 +157,7 @@ impl<'a> audit::Watcher<3> for Watcher<'a> {
     }
 
     fn progress(&mut self, _: usize, _: usize, what: &str) {
-        // Tiles tell themselves how far they are.
+        // Each tile reports its own share.
         self.progress.add(0.0, what);
     }
 
@@ -202,7 +193,7 @@ mod tests {
                 assert!(apart(0) || apart(1), "{one:?} and {other:?}");
             }
         }
-        // Where x is up, tiles are cut across y and z.
+        // If x is up, tiles are split across y and z.
         let upright = cut(600, Some([-1.0, 0.1, 0.0]));
         assert!(
             upright[0].bounds[1][0] <= upright[1].bounds[0][0] && upright[0].bounds[1][0] < 4.0

@@ -1,4 +1,5 @@
-//! Audits that would hold their gates because the attack was not at its best, or the truth was that of something else.
+//! Audits whose gates would hold without doubts, because the attack was weak or the ground truth
+//! was of another map.
 
 use std::sync::Arc;
 
@@ -39,7 +40,6 @@ fn plan(names: &[&str]) -> Plan<3> {
     }
 }
 
-/// An audit of `prepared`, or of what is `hidden` of it, by `plan` with one gate.
 fn audit(
     prepared: &Prepared,
     hidden: Option<&(Released<3>, Secret)>,
@@ -80,7 +80,7 @@ fn audit(
     maps::find(job, None)
 }
 
-/// Why the one gate of an audit does not hold, which is said beside the verdict, too.
+/// Returns the doubt with which the only gate does not hold. The notes contain it, too.
 fn reason(found: &Audited) -> &str {
     let [gate] = &found.document.gates[..] else { panic!("{:?}", found.document.gates) };
     assert!(!gate.passed && gate.found_percent <= Some(gate.bound_percent), "{gate:?}");
@@ -97,7 +97,7 @@ fn usual_maps_are_not_doubted() {
     assert!(found.document.gates[0].passed);
 }
 
-/// Whoever attacks with long lists of a small map gets less back than could come, and is told.
+/// Long lists of a small map recover less, and the audit notes it.
 #[test]
 fn lists_that_are_long_for_a_map_are_said() {
     let points = prepared(&unlift::synthetic::room(1, 800).points);
@@ -112,7 +112,8 @@ fn lists_that_are_long_for_a_map_are_said() {
     assert!(nothing.is_empty(), "{nothing:?}");
 }
 
-/// What comes back of `points` by `scheme` within 0.25 m, in percent; nothing is doubted.
+/// Returns the share of `points` that is recovered under `scheme` within 0.25 m, in percent; there
+/// are no doubts.
 fn recovered(points: &[[f64; 3]], scheme: &str) -> f64 {
     let gate = format!("{scheme}:0.25<=100");
     let found = audit(&prepared(points), None, plan(&[scheme]), &gate).expect("an audit");
@@ -120,7 +121,8 @@ fn recovered(points: &[[f64; 3]], scheme: &str) -> f64 {
     found.document.results[0].recovered_percent["0.25"]
 }
 
-/// One of two centers lies by the far point, so that nothing of the map's size is seen from the distance of centers.
+/// One of two centers is near the far point, so the distance of centers is not related to the map's
+/// size.
 #[test]
 fn a_far_point_is_no_protection() {
     let mut points = room();
@@ -130,7 +132,7 @@ fn a_far_point_is_no_protection() {
     assert!(far > usual - 10.0, "{usual} {far}");
 }
 
-/// The quartiles of all offsets are those of no part.
+/// The quartiles of all offsets are those of neither part.
 #[test]
 fn parts_far_apart_are_no_protection() {
     let points = room();
@@ -158,7 +160,8 @@ fn a_gate_that_no_attack_could_break_is_refused() {
     assert!(error.starts_with("--gate olc:1e-6<=1: expected points less"), "{error}");
 }
 
-/// The truth of a map that was scaled since: its points are nearer to their own records than to others, but not near.
+/// Ground truth of a map that was scaled later: its points are nearer to their own records than to
+/// others, but not near.
 #[test]
 fn a_truth_in_another_scale_is_no_protection() {
     let prepared_truth = prepared(&room());
@@ -177,7 +180,7 @@ fn a_truth_in_another_scale_is_no_protection() {
     assert!(reason(&found).contains(&told), "{}", reason(&found));
 }
 
-/// Lengths in millimeters are said to be in multiples of the distance to the K-th neighbor.
+/// Lengths in millimeters are declared as multiples of the distance to the K-th neighbor.
 #[test]
 fn a_unit_that_is_only_stated_is_no_protection() {
     let points = room().iter().map(|point| point.map(|x| 1000.0 * x)).collect();

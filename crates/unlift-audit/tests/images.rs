@@ -1,4 +1,4 @@
-//! Images in memory: the figures of the same features in a file, what is looked at when, and mistakes in a line.
+//! Images in memory: same figures as from a file, number of requests, and error lines.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ use unlift_io::features::{FeatureWriter, ImageFeatures};
 
 const NAMES: [&str; 5] = ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "e.jpg"];
 
-/// Keypoints on a grid that leans, and bytes that change along it.
+/// Keypoints on a slanted grid, and bytes that change along it.
 fn image(at: usize) -> ImageFeatures {
     let n = 60 + 10 * at;
     let place = |i: usize| [(31 * i % 600) as f64 + 0.25 * at as f64, (17 * i % 440) as f64];
@@ -93,10 +93,10 @@ fn images_in_memory_have_the_figures_of_a_file() {
     let input = |audited: &Audited| audited.document.input.clone();
     assert_eq!(input(&of_memory).path, None);
     assert_ne!(input(&of_memory).sha256, input(&of_file).sha256);
-    // Three are drawn.
+    // Three images are drawn.
     assert_eq!(asked.load(Ordering::Relaxed), NAMES.len() + 3);
 
-    // What is found and then written is what is written at once.
+    // Finding and writing in one call gives the same page.
     let out = place.path().join("audit");
     let files = open_audit(&out, Rules::new([], false), Shown::Points, &Quiet).expect("a folder");
     let (finished, _) =

@@ -1,4 +1,4 @@
-//! A measure of somebody's own, from the plan to the files.
+//! A third-party measure, from the plan to the files.
 
 use std::fs;
 use std::path::Path;
@@ -15,7 +15,7 @@ use unlift_audit::{maps, open_audit};
 use unlift_io::atomic::Rules;
 use unlift_report::Document;
 
-/// Points that were found, as `found`, and a third of them times `factor`.
+/// Measures the number of recovered points as `found`, and a third of it times `factor`.
 #[derive(Debug)]
 struct Found {
     factor: f64,
@@ -29,7 +29,7 @@ impl Measure<3> for Found {
     }
 }
 
-/// An audit of a small room with this measure, in `folder`.
+/// Audits a small room with this measure, in `folder`.
 fn audit(folder: &Path, factor: f64) -> Result<Finished, AuditError> {
     let map = folder.join("room.csv");
     let points = unlift::synthetic::room(1, 400).points;
@@ -66,14 +66,14 @@ fn figures_of_a_measure_stand_in_the_files() {
         assert_eq!(row.metrics["found"], found, "{} {}", row.solver, row.inlier_ratio);
         assert!((row.metrics["thirds"] - found / 3.0).abs() < 1e-3, "{}", row.metrics["thirds"]);
     }
-    // Rows differ, so that no constant passes.
+    // Rows differ, so a constant would fail.
     let lost: Vec<u64> = document.results.iter().map(|row| row.n_lost).collect();
     assert!(lost.iter().any(|&n| n != lost[0]), "{lost:?}");
     let page = fs::read_to_string(place.path().join("audit/report.html")).expect("a page");
     assert!(page.contains("id=\"table-metrics\"") && page.contains(">thirds<"));
 }
 
-/// No file is written with a figure that JSON cannot hold.
+/// Nothing is written if JSON cannot hold a figure.
 #[test]
 fn a_measure_that_is_no_number_is_refused() {
     let place = tempfile::tempdir().expect("a temporary folder");
@@ -83,7 +83,7 @@ fn a_measure_that_is_no_number_is_refused() {
     assert!(!place.path().join("audit/audit.json").exists());
 }
 
-/// The points of an image, of those whose names do not begin with `none`.
+/// Measures the number of points of images whose names do not begin with `none`.
 #[derive(Debug)]
 struct Size(Counts);
 
@@ -99,7 +99,7 @@ impl Measure<2> for Size {
     }
 }
 
-/// The figure over images of these names and numbers of points.
+/// Returns the mean over images with these names and numbers of points.
 fn size(counts: Counts, images: &[(&str, usize)]) -> Option<f64> {
     let usual = Plan::<2>::new(Unit::Pixel);
     let plan = Plan {
@@ -126,7 +126,7 @@ fn a_mean_over_images_counts_points_or_images() {
     let images = [("a", 40), ("b", 80)];
     assert_eq!(size(Counts::Points, &images), Some((40.0 * 40.0 + 80.0 * 80.0) / 120.0));
     assert_eq!(size(Counts::Images, &images), Some(60.0));
-    // A mean over points must be one over all of them; of images those count that have the figure.
+    // A mean over points needs all images; a mean over images uses those that have the figure.
     let images = [("a", 40), ("none", 80)];
     assert_eq!(size(Counts::Points, &images), None);
     assert_eq!(size(Counts::Images, &images), Some(40.0));

@@ -1,4 +1,4 @@
-//! What is said of how a map was read, in an audit of it: beside the verdict, and in gates.
+//! Notes and doubts about how a map was read, in its audit and in gates.
 
 use std::fmt::Write;
 use std::fs;
@@ -10,7 +10,7 @@ use unlift::synthetic::room;
 use unlift_audit::{Gate, Job, Preparation, maps};
 use unlift_report::Document;
 
-/// A table of a room in which every `every`th point has no place.
+/// A table of a room in which every `every`th point has no position.
 fn table(every: usize) -> String {
     room(1, 400).points.iter().enumerate().fold(String::new(), |mut text, (at, [x, y, z])| {
         match at % every {
@@ -63,7 +63,7 @@ fn rows_are_those_of_the_file() {
     assert!(rows.len() == 100 && rows.is_sorted() && rows.iter().all(|row| row % 50 != 0));
 }
 
-/// LAS of a room on a sphere of degrees, or projected.
+/// LAS of a room with coordinates in degrees, or projected.
 fn las(system: &[u8]) -> Vec<u8> {
     let points = room(1, 400).points;
     let mut file = vec![0; 227];

@@ -1,4 +1,5 @@
-//! A map in tiles: each is audited as a map of its own, and the page shows which leaks most.
+//! A map in tiles: each tile is audited as a map of its own, and the page shows which one leaks
+//! most.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -46,7 +47,7 @@ fn a_tile_is_the_same_alone_and_among_all() {
     assert_eq!(document.results, audit(None, 1).document.results);
     let sources: Vec<[&str; 2]> =
         document.results.iter().map(|row| [&*row.scheme, &*row.neighbors]).collect();
-    // Planes have no geometric neighbors: these rows alone are missing.
+    // Planes have no geometric neighbors, so only these rows are missing.
     assert_eq!(sources, [["ppl", "oracle"], ["ppl", "geometric"], ["plane", "oracle"]]);
     assert_eq!(document.not_audited.len(), 1);
     assert_eq!(document.tiles.len(), 4);
@@ -60,7 +61,7 @@ fn a_tile_is_the_same_alone_and_among_all() {
             let sum: f64 = document.tiles.iter().map(of).sum();
             assert!((sum / 2_000.0 - pooled).abs() < 1e-9);
         }
-        // A map of planes gives nothing away by its records alone.
+        // There is no attack on planes from records alone.
         assert_eq!(row.records_alone_percent.is_some(), row.scheme == "ppl");
     }
     let third = audit(Some(2), 1).document;

@@ -1,7 +1,8 @@
-//! How many of a photo's true neighbors its descriptors name: `descriptors_tell FOLDER [--superpoint]`.
+//! Measures inlier ratios of descriptors in photos: `descriptors_tell FOLDER [--superpoint]`.
 //!
-//! Prints the rows of a table in docs/benchmarks.md: the share of the first 20 of every list that are among the 20 nearest
-//! keypoints, over all photos of the folder, for each kind of features and each source.
+//! Prints the rows of a table in docs/benchmarks.md: the share of the first 20 entries of every
+//! list that are among the 20 nearest keypoints, over all photos of the folder, for each kind of
+//! features and each source.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -23,10 +24,11 @@ use unlift_nn::Learned;
 
 const K: usize = 20;
 
-/// Keypoints of a photo, and per column the share of right entries, where the source takes such descriptors.
+/// Number of keypoints of a photo and, per column, the inlier ratio, if the source accepts the
+/// descriptors.
 type Shares = (usize, [Option<f64>; COLUMNS.len()]);
 
-/// The columns: plain cosines, then what the program offers.
+/// The columns: plain cosines, then the sources of unlift.
 const COLUMNS: [&str; 4] = ["cosines alone", "`similarity`", "`overlap`", "`learned`"];
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -70,7 +72,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// What the descriptors of a photo name; `None` of a photo with too few keypoints.
+/// Measures the inlier ratios of a photo; `None` if it has too few keypoints.
 fn named(extractor: &Extractor, photo: &Path) -> Result<Option<Shares>, unlift::Error> {
     let (places, values, dim) = match extractor.read(photo)?.found {
         Found::Sift(found) => {
@@ -99,7 +101,7 @@ fn named(extractor: &Extractor, photo: &Path) -> Result<Option<Shares>, unlift::
     Ok(Some((places.len(), shares)))
 }
 
-/// The records with the largest cosines, and nothing else.
+/// Lists the records with the largest cosines.
 fn cosines(released: &Released<2>) -> Result<Neighborhoods, unlift::Error> {
     let n = released.n_records();
     let Some(descriptors) = released.descriptors() else {

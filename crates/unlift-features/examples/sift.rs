@@ -1,7 +1,7 @@
-//! Extracts features of photos, with the time it took: `sift IMAGE... [--out FILE] [--threads N]
+//! Extracts features of photos and prints the time: `sift IMAGE... [--out FILE] [--threads N]
 //! [--max-features N]`.
 //!
-//! FILE gets, per photo in order and in little-endian: u32 n, then n times x, y, scale and
+//! FILE contains for each photo, in order and in little-endian: u32 n, then n times x, y, scale and
 //! orientation as f32, then n descriptors of 128 bytes.
 
 use std::error::Error;
@@ -28,7 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
     let sift = Sift::try_new(options)?;
-    // Once for memory and caches, as for the extractors this is compared with.
+    // A warm-up run, as for the compared extractors.
     if let Some(image) = images.first() {
         sift.extract(image);
     }

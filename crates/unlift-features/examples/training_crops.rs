@@ -1,12 +1,14 @@
-//! Makes what networks of neighborhoods are trained on, from photos: `training_crops OUT LIST [--type sift|aliked|superpoint]
-//! [--seed N] [--sizes 128,256,384] [--share 1.0] [--max-image-size N] [--whole N]`.
+//! Makes the training data of the networks of `learned` from photos: `training_crops OUT LIST
+//! [--type sift|aliked|superpoint] [--seed N] [--sizes 128,256,384] [--share 1.0] [--max-image-size
+//! N] [--whole N]`.
 //!
-//! LIST names a photo per line. A crop is `n` keypoints of one photo, near each other; OUT gets a folder per `n` with
-//! files that go on from crop to crop, little-endian: `descriptors.u8` `(crops, n, dim)` of SIFT, `descriptors.f32` of
-//! others, `places.f32` `(crops, n, 2)` in pixels, `pairs.i16` `(crops, reaches, n, n)` (`neighbors::dense`, in 1/1024; of
-//! others than SIFT in deviations of the whole photo, as their descriptors see much of it) and `photos.u32` `(crops,)`, the
-//! line of LIST. `--share` is how many of a photo's keypoints stand in its crops, on average. `--whole N`: one crop per
-//! photo, the N keypoints nearest the middle, or all; a folder per photo, named by its line.
+//! LIST names a photo per line. A crop is `n` neighboring keypoints of one photo. OUT gets a folder
+//! per `n` with files to which crops are appended, little-endian: `descriptors.u8`
+//! `(crops, n, dim)` of SIFT, `descriptors.f32` of others, `places.f32` `(crops, n, 2)` in pixels,
+//! `pairs.i16` `(crops, reaches, n, n)` (`neighbors::dense`, in 1/1024; except for SIFT in standard
+//! deviations of the whole photo) and `photos.u32` `(crops,)`, the line of LIST. `--share` is the
+//! average number of crops that contain a keypoint. `--whole N`: one crop per photo, the N
+//! keypoints nearest the middle, or all; a folder per photo, named by its line.
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -33,11 +35,10 @@ struct Options {
     whole: Option<usize>,
 }
 
-/// The features of a photo.
 struct Features {
     places: Vec<[f32; 2]>,
     descriptors: Descriptors,
-    /// Of others than SIFT: what each scores with all others of the photo.
+    /// Except for SIFT: the statistics of each keypoint's scores with all others of the photo.
     usual: Option<Vec<(f64, f64)>>,
 }
 
@@ -114,7 +115,7 @@ fn extraction(kind: &str, max_image_size: Option<usize>) -> Result<Extraction, S
     Ok(extraction)
 }
 
-/// What was found in a photo, if it is enough to have neighbors.
+/// Converts the features of a photo; `None` if there are too few.
 fn features(found: Found) -> Result<Option<Features>, unlift::Error> {
     let (places, values, dim): (Vec<[f32; 2]>, _, _) = match found {
         Found::Sift(found) => {
@@ -132,7 +133,7 @@ fn features(found: Found) -> Result<Option<Features>, unlift::Error> {
     Ok(Some(Features { places, descriptors, usual }))
 }
 
-/// The rows of each crop of a photo.
+/// Chooses the rows of each crop of a photo.
 fn chosen(features: &Features, photo: u32, options: &Options) -> Vec<Vec<u32>> {
     let n = features.places.len();
     if let Some(most) = options.whole {
@@ -145,7 +146,7 @@ fn chosen(features: &Features, photo: u32, options: &Options) -> Vec<Vec<u32>> {
     }
     let mut draws = Draws::new(options.seed, Stage::Subset, u64::from(photo));
     let mut crops = Vec::new();
-    // Every size gets its part of the photo; the last crop by chance.
+    // All sizes get equal parts of the photo; chance rounds the number of crops.
     for &size in options.sizes.iter().filter(|&&size| size <= n) {
         let wanted = options.share * n as f64 / size as f64 / options.sizes.len() as f64;
         for _ in 0..(wanted + draws.unit()).floor() as usize {
@@ -157,8 +158,8 @@ fn chosen(features: &Features, photo: u32, options: &Options) -> Vec<Vec<u32>> {
     crops
 }
 
-/// The `most` keypoints nearest `place`, by the larger of the distances along the axes, of which that along y is
-/// stretched.
+/// Returns the `most` keypoints nearest `place`, by the larger of the distances along the axes,
+/// with y multiplied by `stretch`.
 fn nearest(features: &Features, place: [f32; 2], stretch: f32, most: usize) -> Vec<u32> {
     let distance = |row: &u32| {
         let [x, y] = features.places[*row as usize];
@@ -180,7 +181,6 @@ fn crop(features: &Features, photo: u32, rows: &[u32]) -> Result<Crop, unlift::E
     Ok(Crop { photo, places, descriptors, pairs })
 }
 
-/// Files of crops of one size.
 struct Folder {
     files: [BufWriter<File>; 4],
 }

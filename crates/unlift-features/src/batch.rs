@@ -1,14 +1,14 @@
-//! Many photos: in parallel, in order, in constant memory.
+//! Parallel work on many photos, in order and in constant memory.
 
 use rayon::prelude::*;
 
-/// Items per thread that are worked on before results are handed over.
+/// Items per thread that are processed before results are passed on.
 const PER_THREAD: usize = 8;
 
-/// Calls `work` on all items in parallel and `sink` on the results, one at a time and in order.
+/// Calls `work` on all items in parallel, and `sink` on the results, one at a time and in order.
 ///
-/// No more than 8 items per thread are in memory at once, so ten thousand photos take no more than
-/// a hundred. Runs on rayon's present pool. Ends early with the first error of `sink`.
+/// At most 8 items per thread are in memory at once. Runs on rayon's current pool. Ends with the
+/// first error of `sink`.
 ///
 /// # Errors
 /// Those of `sink`.
@@ -31,7 +31,7 @@ pub fn in_order<T: Sync, R: Send, E>(
 ) -> Result<(), E> {
     let size = PER_THREAD * rayon::current_num_threads();
     for (chunk, items) in items.chunks(size).enumerate() {
-        // One item is a job: photos differ in cost.
+        // One item per job, because photos differ in cost.
         let results: Vec<R> = items.par_iter().with_max_len(1).map(&work).collect();
         for (at, result) in results.into_iter().enumerate() {
             sink(chunk * size + at, result)?;

@@ -1,4 +1,4 @@
-//! Gaussian smoothing: how one level of scale space is made from the one before.
+//! Gaussian smoothing, which makes one level of scale space from the previous one.
 
 use unlift::simd::{Kernel, dispatch};
 
@@ -7,14 +7,13 @@ use crate::plane::{LANES, Plane, lanes};
 /// Radius of the widest filter: one level per octave needs 45.
 const MOST_RADIUS: usize = 48;
 
-/// A sampled, normalized Gaussian.
 pub(crate) struct Gaussian {
-    /// The middle and one side: `taps[i]` weighs both neighbors `i` away.
+    /// The middle and one side: `taps[i]` is the weight of both neighbors at distance `i`.
     taps: Vec<f32>,
 }
 
 impl Gaussian {
-    /// Of standard deviation `sigma` pixels, cut off at four of them.
+    /// Creates a Gaussian of standard deviation `sigma` pixels, truncated at four of them.
     pub(crate) fn new(sigma: f64) -> Self {
         let radius = (libm::ceil(4.0 * sigma) as usize).clamp(1, MOST_RADIUS);
         let weight = |at: usize| libm::exp(-0.5 * (at as f64 / sigma) * (at as f64 / sigma));
@@ -22,7 +21,7 @@ impl Gaussian {
         Self { taps: (0..=radius).map(|at| (weight(at) / total) as f32).collect() }
     }
 
-    /// Smooths `from` into `to`; values beyond a border are those on it. `line` is memory to work in.
+    /// Smooths `from` into `to`, repeating values at the border. `line` is a buffer.
     pub(crate) fn smooth(&self, from: &Plane, to: &mut Plane, line: &mut Vec<f32>) {
         to.reshape(from.width, from.height);
         line.resize(from.stride() + 2 * MOST_RADIUS, 0.0);
@@ -30,7 +29,8 @@ impl Gaussian {
     }
 }
 
-/// Columns, then rows, of one output row at a time: what lies between stays in the cache.
+/// Filters columns, then rows, one output row at a time, so that intermediate values stay in the
+/// cache.
 struct Smooth<'a> {
     from: &'a Plane,
     to: &'a mut Plane,
@@ -65,7 +65,7 @@ impl Kernel for Smooth<'_> {
 
 type Chunks<'a> = &'a [[f32; LANES]];
 
-/// A loop, as `map` over an array is not inlined and would leave the vector registers.
+/// A loop, because `map` over an array is not inlined and not vectorized.
 #[inline(always)]
 fn scaled(values: &[f32; LANES], by: f32) -> [f32; LANES] {
     let mut scaled = [0.0; LANES];
@@ -75,7 +75,6 @@ fn scaled(values: &[f32; LANES], by: f32) -> [f32; LANES] {
     scaled
 }
 
-/// One row of sums over columns.
 #[inline(always)]
 fn columns(middle: Chunks, sides: &[(Chunks, Chunks)], taps: &[f32], line: &mut [f32]) {
     for (at, (out, middle)) in line.as_chunks_mut::<LANES>().0.iter_mut().zip(middle).enumerate() {
@@ -90,7 +89,7 @@ fn columns(middle: Chunks, sides: &[(Chunks, Chunks)], taps: &[f32], line: &mut 
     }
 }
 
-/// One row of sums along the row; `line` has `taps.len() - 1` values before and after it.
+/// Computes one row of sums along the row; `line` has `taps.len() - 1` values before and after it.
 #[inline(always)]
 fn rows(line: &[f32], taps: &[f32], out: &mut [f32]) {
     let radius = taps.len() - 1;
@@ -112,7 +111,6 @@ mod tests {
     use super::*;
     use crate::image::GrayImage;
 
-    /// Some image without symmetry.
     fn plane(width: usize, height: usize) -> Plane {
         let value = |i: usize| ((i * 7919) % 101) as f32 / 101.0;
         let pixels = (0..width * height).map(value).collect();

@@ -1,5 +1,3 @@
-//! What learned extractors read: colors, row by row.
-
 use image::buffer::ConvertBuffer;
 use image::{GrayImage as Luma, ImageBuffer, Rgb};
 use unlift::Error;
@@ -18,10 +16,10 @@ pub struct ColorImage {
 }
 
 impl ColorImage {
-    /// An image of `width` x `height` pixels from its rows.
+    /// Creates an image of `width` x `height` pixels from its rows.
     ///
     /// # Errors
-    /// When a side is zero or above 2^24, or `pixels` has another length than `3 * width * height`.
+    /// If a side is zero or above 2^24, or the length of `pixels` is not `3 * width * height`.
     pub fn try_new(width: usize, height: usize, pixels: Vec<u8>) -> Result<Self, Error> {
         let sides = 1..=1 << 24;
         if !sides.contains(&width) || !sides.contains(&height) {
@@ -35,34 +33,34 @@ impl ColorImage {
         Ok(Self { width, height, pixels })
     }
 
-    /// Pixels in a row.
+    /// Returns the number of columns.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Rows.
+    /// Returns the number of rows.
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// All values, `(height, width, 3)`, row-major.
+    /// Returns all values, `(height, width, 3)`, row-major.
     pub fn pixels(&self) -> &[u8] {
         &self.pixels
     }
 
-    /// Red, green and blue of the pixel in column `x` of row `y`.
+    /// Returns red, green and blue of the pixel in column `x` of row `y`.
     ///
     /// # Panics
-    /// When there is no such pixel.
+    /// If there is no such pixel.
     pub fn pixel(&self, x: usize, y: usize) -> [u8; 3] {
         let at = 3 * (y * self.width + x);
         [self.pixels[at], self.pixels[at + 1], self.pixels[at + 2]]
     }
 
-    /// Without its colors, as [`read`](crate::load::read) would give it.
+    /// Converts the image to gray values, as [`read`](crate::load::read) does.
     ///
     /// # Errors
-    /// Never: the image is as large as it says.
+    /// Never: the length of the pixels was checked.
     pub fn gray(&self) -> Result<GrayImage, Error> {
         let (width, height) = (self.width as u32, self.height as u32);
         let pixels = ImageBuffer::<Rgb<u8>, &[u8]>::from_raw(width, height, &self.pixels);
@@ -70,10 +68,10 @@ impl ColorImage {
         GrayImage::from_bytes(self.width, self.height, luma.unwrap_or_default().as_raw())
     }
 
-    /// The image at half its size, every pixel the mean of four; an odd last row or column is left out.
+    /// Halves the image: every pixel is the mean of four. An odd last row or column is omitted.
     ///
     /// # Errors
-    /// When a side has less than two pixels.
+    /// If a side has less than two pixels.
     pub fn halved(&self) -> Result<Self, Error> {
         let (width, height) = (self.width / 2, self.height / 2);
         let mut pixels = Vec::with_capacity(3 * width * height);
@@ -88,7 +86,8 @@ impl ColorImage {
         Self::try_new(width, height, pixels)
     }
 
-    /// Where the middle of pixel `place` of `small`, this image shrunk, is in pixels of this image.
+    /// Converts the position `place` in `small`, this image downsized, to pixels of this image.
+    /// Pixel centers have integer coordinates.
     pub(crate) fn unshrunk<T: Into<f64>>(&self, small: &Self, place: [T; 2]) -> [f32; 2] {
         let scales = [(self.width, small.width), (self.height, small.height)];
         let [x, y] = place.map(Into::into);
@@ -99,7 +98,7 @@ impl ColorImage {
         [full(x, scales[0]), full(y, scales[1])]
     }
 
-    /// The image shrunk so that no side exceeds `most` pixels, or `None` if it is small enough.
+    /// Downsizes the image so that no side exceeds `most` pixels; `None` if it is small enough.
     pub(crate) fn fitted(&self, most: usize) -> Option<Self> {
         let pixels = ImageBuffer::<Rgb<u8>, &[u8]>::from_raw(
             self.width as u32,

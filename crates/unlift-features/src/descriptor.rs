@@ -1,4 +1,4 @@
-//! What the surroundings of a keypoint look like: 4 x 4 histograms of gradient directions.
+//! SIFT descriptors: 4 x 4 histograms of gradient directions around a keypoint.
 
 use std::f64::consts::TAU;
 
@@ -19,20 +19,19 @@ pub(crate) const LENGTH: usize = CELLS * CELLS * BINS;
 const MAGNIFICATION: f64 = 3.0;
 /// Standard deviation of the window, in sides of a histogram.
 const WINDOW: f64 = 2.0;
-/// Cells with a rim around: pixels near the outer edge vote for a half outside.
+/// Cells in a row with a rim: pixels near the outer edge also vote for cells outside.
 const RIM: usize = CELLS + 2;
-/// Room for cells; a power of two, so that indices need no check.
+/// Allocated cells; a power of two, so that indices need no bounds check.
 const ROOM: usize = 64;
 /// Pixels computed together.
 const BLOCK: usize = 16;
 
-/// Memory to describe in.
 #[derive(Default)]
 pub(crate) struct Desk {
     pub(crate) weights: [Vec<f32>; 2],
 }
 
-/// Unnormalized histograms of the pixels around `place`, turned by `angle` radians: value
+/// Returns unnormalized histograms of the pixels around `place`, rotated by `angle` radians: value
 /// `(row * 4 + column) * 8 + direction`. Lowe 2004, Sec. 6.1.
 pub(crate) fn describe(
     gradients: &mut Gradients,
@@ -42,15 +41,15 @@ pub(crate) fn describe(
     desk: &mut Desk,
 ) -> [f32; LENGTH] {
     let side = MAGNIFICATION * place.sigma;
-    // Half the diagonal of the cells, a half cell of rim included.
+    // Half the diagonal of the cells, with half a cell of rim.
     let radius = (std::f64::consts::SQRT_2 * side * (CELLS + 1) as f64 / 2.0 + 0.5) as usize;
     let (column, row) = place.pixel();
     let shift = (column as f64 - place.x, row as f64 - place.y);
     weights(radius, shift.0, WINDOW * side, &mut desk.weights[0]);
     weights(radius, shift.1, WINDOW * side, &mut desk.weights[1]);
-    // Blocks read on beyond the last pixel of a row.
+    // Blocks read beyond the last pixel of a row.
     desk.weights[0].resize(2 * radius + 1 + BLOCK, 0.0);
-    // Gradients at the border are one-sided, so they are left out.
+    // Gradients at the border are one-sided, so they are omitted.
     let rows = row.saturating_sub(radius).max(1)..(row + radius + 1).min(level.height - 1);
     let columns = column.saturating_sub(radius).max(1)..(column + radius + 1).min(level.width - 1);
     gradients.prepare(level, rows.clone());
@@ -66,10 +65,10 @@ pub(crate) fn describe(
     histograms
 }
 
-/// From pixels to cells and directions.
+/// The transform from pixels to cells and directions.
 #[derive(Clone, Copy)]
 struct Frame {
-    /// Sine and cosine of the orientation, over the side of a cell.
+    /// Sine and cosine of the orientation, divided by the side of a cell.
     sin: f64,
     cos: f64,
     /// The orientation in eighths of a turn.
@@ -77,8 +76,9 @@ struct Frame {
 }
 
 impl Frame {
-    /// Offsets from the middle, in pixels along a row, whose cells the histograms cover, for a row
-    /// `dy` below the middle. Half of a bounding box lies outside and is never visited.
+    /// Returns the range of offsets from the middle, in pixels along a row, that the histograms
+    /// cover, for a row `dy` below the middle. It skips the half of the bounding box that is
+    /// outside.
     #[inline(always)]
     fn covered(self, dy: f64) -> (f64, f64) {
         let half = (CELLS + 1) as f64 / 2.0;
@@ -102,7 +102,7 @@ struct Votes<'a> {
     frame: Frame,
     rows: std::ops::Range<usize>,
     columns: std::ops::Range<usize>,
-    /// The pixel of the first weights; may lie outside.
+    /// The pixel of the first weights; may be outside the image.
     first: (f64, f64),
     weights: &'a [Vec<f32>; 2],
 }
@@ -153,7 +153,8 @@ impl Kernel for Votes<'_> {
 }
 
 impl Block {
-    /// Votes of the pixels from `(dx, dy)` off the middle on; `across` and `down` are their weights.
+    /// Computes the votes of the pixels from offset `(dx, dy)` on; `across` and `down` are their
+    /// weights.
     #[inline(always)]
     fn new(
         frame: Frame,
@@ -163,7 +164,7 @@ impl Block {
         across: [f32; BLOCK],
         down: f32,
     ) -> Self {
-        // The largest value that still has its cell below the rim's end.
+        // The largest value whose cell is inside the rim.
         const END: f32 = 4.999_999_5;
         let (sin, cos) = (frame.sin as f32, frame.cos as f32);
         let middle = (CELLS + 1) as f32 / 2.0;
@@ -174,7 +175,7 @@ impl Block {
             let column = (cos * dx + sin * dy + middle).clamp(0.0, END);
             let row = (cos * dy - sin * dx + middle).clamp(0.0, END);
             let (right, below) = (column - column.floor(), row - row.floor());
-            // Whole numbers stand in the last bits of a sum with 2^23; a cast would not be a vector instruction.
+            // The last bits of a sum with 2^23 contain the integer; a cast would not be vectorized.
             let cell = row.floor() * RIM as f32 + column.floor();
             block.cell[i] = (cell + 8_388_608.0).to_bits();
             let turned = angles[i] - frame.turn;
@@ -193,7 +194,7 @@ impl Block {
     #[inline(always)]
     fn vote(&self, i: usize, cells: &mut [[f32; BINS]; ROOM]) {
         const DIRECTIONS: [f32; BINS] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
-        // All eight at once: a tent around the direction, which goes on at the other end.
+        // All eight directions at once: linear weights around the direction, with wrap-around.
         let mut share = [0.0; BINS];
         for (share, direction) in share.iter_mut().zip(DIRECTIONS) {
             let away = (self.direction[i] - direction).abs();
@@ -227,7 +228,7 @@ mod tests {
         describe(&mut gradients, level, place, angle, &mut Desk::default())
     }
 
-    /// The definition, pixel by pixel over the whole box.
+    /// Computes the definition, pixel by pixel over the whole box.
     fn plain(level: &Plane, place: Place, angle: f64) -> Vec<f64> {
         let mut gradients = Gradients::default();
         gradients.reset(level);

@@ -1,4 +1,4 @@
-//! Whichever features were asked for, from a photo in a file.
+//! Extracts features of any kind from a photo in a file.
 
 use std::path::Path;
 
@@ -11,14 +11,14 @@ use crate::load::{self, Turn};
 use crate::options::SiftOptions;
 use crate::sift::{Features, Sift};
 
-/// Pixels a side below which nothing can be an extremum.
+/// Smallest side of an image that can have an extremum.
 const LEAST_SIDE: usize = 3;
-/// Standard deviation of a keypoint in pixels of the image it was found in, as hloc states it.
+/// Standard deviation of a keypoint in pixels of the processed image, as hloc states it.
 const DETECTION_NOISE: f64 = 1.0;
-/// The same of SuperPoint's, which lie on pixels.
+/// Standard deviation of a SuperPoint keypoint, which is on a pixel.
 const SUPERPOINT_NOISE: f64 = 2.0;
 
-/// Which features, and how.
+/// Kind and options of the extraction.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Extraction {
     /// SIFT.
@@ -36,7 +36,7 @@ impl Default for Extraction {
 }
 
 impl Extraction {
-    /// Of which kind the descriptors are.
+    /// Returns the kind of the descriptors.
     pub fn kind(&self) -> DescriptorKind {
         match self {
             Self::Sift(_) => DescriptorKind::Sift,
@@ -54,7 +54,7 @@ impl Extraction {
     }
 }
 
-/// What extracts them. Shared by threads.
+/// An extractor; threads can share it.
 pub struct Extractor {
     of: Of,
     max_image_size: usize,
@@ -69,27 +69,27 @@ enum Of {
 
 /// The features of a photo.
 pub struct Photo {
-    /// Width and height in pixels of the photo in which features were found.
+    /// Width and height of the photo in pixels.
     pub size: [usize; 2],
     /// Standard deviation of a keypoint in pixels of the photo.
     pub noise_px: f64,
-    /// What was found.
+    /// The features.
     pub found: Found,
 }
 
-/// Features of either kind.
+/// Features of SIFT or of a network.
 pub enum Found {
-    /// SIFT's.
+    /// Features of SIFT.
     Sift(Features),
-    /// A network's.
+    /// Features of a network.
     Learned(LearnedFeatures),
 }
 
 impl Extractor {
-    /// An extractor with these options.
+    /// Creates an extractor with these options.
     ///
     /// # Errors
-    /// Names the first option that is out of range; says which model is missing.
+    /// If an option is out of range or a model is missing; the error names it.
     pub fn try_new(extraction: &Extraction) -> Result<Self, Error> {
         let of = match extraction {
             Extraction::Sift(options) => Of::Sift(Sift::try_new(options.clone())?),
@@ -101,16 +101,16 @@ impl Extractor {
         Ok(Self { of, max_image_size: extraction.max_image_size(), turn: Turn::Upright })
     }
 
-    /// Sets how photos are turned before features are extracted.
+    /// Sets how photos are turned before extraction.
     #[must_use]
     pub fn with_turn(self, turn: Turn) -> Self {
         Self { turn, ..self }
     }
 
-    /// The features of the photo at `path`.
+    /// Extracts the features of the photo at `path`.
     ///
     /// # Errors
-    /// As [`load::read`], and when a side has fewer than 3 pixels.
+    /// See [`load::read`]; also if a side has fewer than 3 pixels.
     pub fn read(&self, path: &Path) -> Result<Photo, Error> {
         let (size, noise_px, found) = match &self.of {
             Of::Sift(sift) => {
@@ -131,7 +131,8 @@ impl Extractor {
         Ok(Photo { size, noise_px: noise_px * shrunk.max(1.0), found })
     }
 
-    /// Hash of the network's file where it is the user's: what they supply may change between runs.
+    /// Returns the hash of the network's file if the user supplies it; such a file may change
+    /// between runs.
     pub fn sha256(&self) -> Option<&str> {
         match &self.of {
             Of::Sift(_) | Of::Aliked(_) => None,

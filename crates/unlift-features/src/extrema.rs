@@ -1,34 +1,36 @@
-//! Where a difference of levels is larger, or smaller, than all its 26 neighbors.
+//! Extrema of a difference of levels among their 26 neighbors.
 
 use unlift::simd::{Kernel, dispatch};
 
 use crate::plane::{Plane, lanes};
 
-/// Pixels looked at together.
+/// Pixels compared together.
 const BLOCK: usize = 16;
-/// A sample may be this much fainter than its refined peak may.
+/// Contrast that a sample needs, as a share of the threshold of its refined peak.
 const SAMPLED: f64 = 0.8;
 
-/// Three differences of four consecutive levels, never stored: subtracting again is cheaper than memory.
+/// Three differences of four consecutive levels, computed on demand: subtracting again is cheaper
+/// than memory.
 #[derive(Clone, Copy)]
 pub(crate) struct Differences<'a>(pub(crate) &'a [Plane; 4]);
 
 impl Differences<'_> {
-    /// Difference `level` (0, 1 or 2) at column `x` of row `y`.
+    /// Returns difference `level` (0, 1 or 2) at column `x` of row `y`.
     #[inline(always)]
     pub(crate) fn at(self, level: usize, x: usize, y: usize) -> f32 {
         self.0[level + 1].at(x, y) - self.0[level].at(x, y)
     }
 
-    /// Replaces `found` by the extrema `(x, y)` of the middle difference, row by row, that are not
-    /// much fainter than `peak`. Pixels of the border are none. Lowe 2004, Sec. 3.1.
+    /// Replaces `found` by the extrema `(x, y)` of the middle difference, row by row, with a
+    /// contrast of at least [`SAMPLED`] times `peak`. Border pixels are excluded. Lowe 2004, Sec.
+    /// 3.1.
     pub(crate) fn extrema(self, peak: f64, found: &mut Vec<(u32, u32)>) {
         found.clear();
         dispatch(Scan { differences: self, least: (SAMPLED * peak) as f32, found });
     }
 
-    /// Whether the middle difference at `(x, y)`, not zero, is farther from it than all neighbors, or
-    /// they lie on the other side.
+    /// Returns true if the middle difference at `(x, y)` is larger than all 26 neighbors (smaller
+    /// if it is negative).
     #[inline(always)]
     fn extreme(self, x: usize, y: usize) -> bool {
         let sign = self.at(1, x, y).signum();
@@ -82,7 +84,6 @@ impl Kernel for Scan<'_> {
     }
 }
 
-/// `BLOCK` differences of a row from column `at` on.
 #[inline(always)]
 fn difference(below: &[f32], above: &[f32], at: usize) -> [f32; BLOCK] {
     let mut values = lanes::<BLOCK>(above, at);
@@ -92,7 +93,6 @@ fn difference(below: &[f32], above: &[f32], at: usize) -> [f32; BLOCK] {
     values
 }
 
-/// Whether any pixel of a block has the contrast.
 #[inline(always)]
 fn strong(below: &[f32], above: &[f32], at: usize, least: f32) -> bool {
     let mut any = 0;
@@ -102,8 +102,8 @@ fn strong(below: &[f32], above: &[f32], at: usize, least: f32) -> bool {
     any != 0
 }
 
-/// The pixels of a block, as bits, that have the contrast and exceed the four neighbors of their own
-/// level and the two of the others. One in hundreds does, and is worth the full test.
+/// Returns as bits the pixels of a block that have the contrast and exceed six neighbors: four in
+/// their level, one in each other. One in hundreds does, and needs the full test.
 #[inline(always)]
 fn peaks(levels: &[&[f32]; 4], across: &[&[f32]; 4], at: usize, least: f32) -> u32 {
     let here = difference(levels[1], levels[2], at);
@@ -130,7 +130,8 @@ mod tests {
     use super::*;
     use crate::image::GrayImage;
 
-    /// Four levels whose middle difference is `middle`, and whose others are flat.
+    /// Creates four levels whose middle difference is `middle`, and whose other differences are
+    /// flat.
     fn levels(width: usize, height: usize, middle: impl Fn(usize, usize) -> f32) -> [Plane; 4] {
         let mut levels: [Plane; 4] = Default::default();
         for (at, level) in levels.iter_mut().enumerate() {

@@ -1,13 +1,11 @@
-//! Large images made smaller before anything is looked for in them.
-
 use std::ops::Deref;
 
 use image::imageops::{FilterType, resize};
 use image::{ImageBuffer, Pixel};
 
-/// `image` shrunk so that no side exceeds `most` pixels, or `None` if it is small enough.
+/// Downsizes `image` so that no side exceeds `most` pixels; `None` if it is small enough.
 ///
-/// Sides are rounded down, as COLMAP does; the filter is Lanczos of three lobes.
+/// Sides are rounded down, as in COLMAP; the filter is Lanczos of three lobes.
 pub(crate) fn fitted<P: Pixel + 'static, C: Deref<Target = [P::Subpixel]>>(
     image: &ImageBuffer<P, C>,
     most: usize,

@@ -1,4 +1,4 @@
-//! Length and direction of the gradient of a level, row by row as keypoints ask for them.
+//! Gradients of a level, computed row by row on demand.
 
 use std::f32::consts::FRAC_1_PI;
 use std::ops::Range;
@@ -7,23 +7,21 @@ use unlift::simd::{Kernel, dispatch};
 
 use crate::plane::{Plane, lanes};
 
-/// Pixels computed together.
 const BLOCK: usize = 16;
-/// Directions in a full turn: angles are in units of descriptor bins, `0..=8`.
+/// Eighths in a full turn: angles are in units of descriptor bins, `0..=8`.
 pub(crate) const TURN: f32 = 8.0;
 
-/// Gradients of one level.
 #[derive(Default)]
 pub(crate) struct Gradients {
     /// Length of the gradient, gray values per pixel.
     pub(crate) length: Plane,
-    /// Its direction in eighths of a turn, from x to y.
+    /// Direction of the gradient in eighths of a turn, from x to y.
     pub(crate) angle: Plane,
     ready: Vec<bool>,
 }
 
 impl Gradients {
-    /// Forgets all rows: the level is another one.
+    /// Discards all rows, for a new level.
     pub(crate) fn reset(&mut self, level: &Plane) {
         self.length.reshape(level.width, level.height);
         self.angle.reshape(level.width, level.height);
@@ -31,7 +29,7 @@ impl Gradients {
         self.ready.resize(level.height, false);
     }
 
-    /// Computes those of `rows` that are not there yet.
+    /// Computes the missing rows of `rows`.
     pub(crate) fn prepare(&mut self, level: &Plane, rows: Range<usize>) {
         if self.ready[rows.clone()].iter().all(|&ready| ready) {
             return;
@@ -60,7 +58,7 @@ impl Kernel for Prepare<'_> {
             let here = level.row(y);
             let (above, below) = (y.saturating_sub(1), (y + 1).min(last.1));
             let (up, down) = (level.row(above), level.row(below));
-            // One-sided at a border, where the two rows are one apart.
+            // One-sided at a border, where the two rows differ by one.
             let per_row = if below - above == 2 { 0.5 } else { 1.0 };
             let length = gradients.length.row_mut(y);
             let angle = gradients.angle.row_mut(y);
@@ -86,19 +84,20 @@ impl Kernel for Prepare<'_> {
     }
 }
 
-/// Length and direction, the latter in eighths of a turn within `0..=8`.
+/// Returns length and direction, the latter in eighths of a turn within `0..=8`.
 ///
-/// The arc tangent is a cubic in `(|y| - |x|) / (|y| + |x|)`, at most 0.6 degrees off: the one that
-/// VLFeat documents, so that its histograms come out, and without a branch.
+/// The arc tangent is a cubic in `(|y| - |x|) / (|y| + |x|)`, with an error of at most 0.6 degrees.
+/// VLFeat documents this one, so histograms agree with it. It has no branch.
 #[inline(always)]
 fn polar(x: f32, y: f32) -> (f32, f32) {
     const CUBIC: f32 = 0.1821 * 4.0 * FRAC_1_PI;
     const LINEAR: f32 = 0.9675 * 4.0 * FRAC_1_PI;
     let length = (x * x + y * y).sqrt();
     let (ax, ay) = (x.abs(), y.abs());
-    // Tiny, so that no gradient at all has a direction, too.
+    // A small term gives zero gradients a direction, too.
     let r = (ax - ay) / (ax + ay + 1e-12);
-    // Of the quadrant with both positive: 1 eighth at 45 degrees. The cubic ends a little below zero.
+    // In the quadrant with both positive: 1 eighth at 45 degrees. The cubic ends slightly below
+    // zero.
     let angle = (1.0 + (CUBIC * r * r - LINEAR) * r).max(0.0);
     let angle = if x < 0.0 { 4.0 - angle } else { angle };
     let angle = if y < 0.0 { TURN - angle } else { angle };

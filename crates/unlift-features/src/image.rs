@@ -1,5 +1,3 @@
-//! What an extractor reads: gray values, row by row.
-
 use image::{ImageBuffer, Luma};
 use unlift::Error;
 
@@ -7,8 +5,8 @@ use crate::fit::fitted;
 
 /// A gray image.
 ///
-/// `pixels` is `(height, width)`, row-major; 0 is black, 1 is white. Thresholds of the extractor are
-/// stated on that scale.
+/// `pixels` is `(height, width)`, row-major; 0 is black, 1 is white. Thresholds of the extractor
+/// use this scale.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GrayImage {
     width: usize,
@@ -17,10 +15,10 @@ pub struct GrayImage {
 }
 
 impl GrayImage {
-    /// An image of `width` x `height` pixels from its rows.
+    /// Creates an image of `width` x `height` pixels from its rows.
     ///
     /// # Errors
-    /// When a side is zero, `pixels` has another length than `width * height`, or a value is not finite.
+    /// If a side is zero, the length of `pixels` is not `width * height`, or a value is not finite.
     pub fn try_new(width: usize, height: usize, pixels: Vec<f32>) -> Result<Self, Error> {
         if width == 0 || height == 0 {
             let found = format!("{width} x {height}");
@@ -37,34 +35,34 @@ impl GrayImage {
         Ok(Self { width, height, pixels })
     }
 
-    /// The same from bytes: 0 is black, 255 is white.
+    /// Creates an image from bytes: 0 is black, 255 is white.
     ///
     /// # Errors
-    /// As [`try_new`](Self::try_new).
+    /// See [`try_new`](Self::try_new).
     pub fn from_bytes(width: usize, height: usize, bytes: &[u8]) -> Result<Self, Error> {
         let pixels = bytes.iter().map(|&byte| f32::from(byte) / 255.0).collect();
         Self::try_new(width, height, pixels)
     }
 
-    /// Pixels in a row.
+    /// Returns the number of columns.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Rows.
+    /// Returns the number of rows.
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// Row `y`, of `width` pixels.
+    /// Returns row `y`, of `width` pixels.
     ///
     /// # Panics
-    /// When there is no such row.
+    /// If there is no such row.
     pub fn row(&self, y: usize) -> &[f32] {
         &self.pixels[y * self.width..(y + 1) * self.width]
     }
 
-    /// The image shrunk so that no side exceeds `most` pixels, or `None` if it is small enough.
+    /// Downsizes the image so that no side exceeds `most` pixels; `None` if it is small enough.
     pub(crate) fn fitted(&self, most: usize) -> Option<Self> {
         let pixels = ImageBuffer::<Luma<f32>, &[f32]>::from_raw(
             self.width as u32,

@@ -1,13 +1,13 @@
-//! Photos in, keypoints and descriptors out: SIFT as COLMAP extracts it by default, or learned features.
+//! Keypoints and descriptors of photos: SIFT as COLMAP extracts it by default, or learned features.
 //!
 //! ```text
 //! photo ──> GrayImage ──> octaves ──> extrema ──> orientations ──> descriptors ──> Features
 //! photo ──> ColorImage ──> network ──> maxima ──> descriptors ──> LearnedFeatures
 //! ```
 //!
-//! [`read`](load::read) decodes a photo, [`Sift`] or [`Aliked`] extracts, [`in_order`](batch::in_order) does many in
-//! constant memory; [`Extractor`] is whichever was asked for. The same image gives the same bytes for any number of
-//! threads.
+//! [`read`](load::read) decodes a photo, [`Sift`] or [`Aliked`] extracts features,
+//! [`in_order`](batch::in_order) processes many photos in constant memory. [`Extractor`] extracts
+//! any kind of features. The same image gives the same bytes for any number of threads.
 //!
 //! ```
 //! use unlift_features::{GrayImage, Sift};

@@ -1,4 +1,4 @@
-//! From a photo in a file to gray values or colors.
+//! Decodes photos to gray values or colors.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -10,39 +10,38 @@ use unlift::Error;
 use crate::color::ColorImage;
 use crate::image::GrayImage;
 
-/// What is read, as told to people.
+/// The readable formats, for errors.
 const KINDS: &str = "a JPEG, PNG or WebP image";
-/// Pixels of a photo at most: 16384 x 16384. A header can claim any size in a few bytes.
+/// Maximum number of pixels of a photo: 16384 x 16384. A header can declare any size in a few
+/// bytes.
 const MOST_PIXELS: u64 = 1 << 28;
-/// Pixels per byte of the file at most: what is beyond was cut off, or is one color all over, and no photo.
-/// In a JPEG every block of 8 x 8 pixels takes a bit; decoders fill in those that are not there.
+/// Maximum number of pixels per byte of a JPEG: every block of 8 x 8 pixels takes a bit. A file
+/// beyond it is truncated or of one color, but decoders fill in missing blocks.
 const JPEG_PIXELS_PER_BYTE: u64 = 512;
-/// The compression of PNG makes at most 1032 bytes of one. That of WebP knows no bound, but photos take a
-/// hundred times as much.
+/// Maximum number of pixels per byte of other formats: PNG compresses by at most 1032. WebP has no
+/// bound, but photos need a hundred times as many bytes.
 const OTHER_PIXELS_PER_BYTE: u64 = 1032;
-/// A photo may have as many pixels, 4096 x 4096, whatever its bytes: black frames exist.
+/// Number of pixels allowed for any file size, 4096 x 4096: black frames exist.
 const FREE_PIXELS: u64 = 1 << 24;
-/// Bytes that a decoder may take for what is no pixel.
+/// Bytes that a decoder may allocate besides pixels.
 const BESIDE_PIXELS: u64 = 32 << 20;
-/// Bytes that a decoder may take for a pixel: four channels of 16 bits.
+/// Bytes that a decoder may allocate per pixel: four channels of 16 bits.
 const PIXEL_BYTES: u64 = 8;
 
-/// Whether a photo is turned as its EXIF orientation says. Keypoints are in pixels of the photo that they were found in.
+/// Use of a photo's EXIF orientation. Keypoints are in pixels of the turned photo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Turn {
-    /// Turned, as people see it.
+    /// Turned by the EXIF orientation.
     Upright,
-    /// Not turned, as COLMAP and hloc see it.
+    /// Not turned, as in COLMAP and hloc.
     AsStored,
 }
 
-/// Reads the photo at `path`, upright, as gray values.
-///
-/// What a file is, its bytes decide, not its name.
+/// Reads the photo at `path`, upright, as gray values. The format is detected from the bytes.
 ///
 /// # Errors
-/// One line with the path: no such file, neither JPEG nor PNG nor WebP, cut off, larger than
-/// 2^28 pixels, or larger than so few bytes can describe.
+/// One line with the path, if the file does not exist, is not JPEG, PNG or WebP, is truncated, or
+/// has more than 2^28 pixels or more than its size allows.
 pub fn read(path: &Path) -> Result<GrayImage, Error> {
     gray(&photo(path, Turn::Upright)?)
 }
@@ -50,7 +49,7 @@ pub fn read(path: &Path) -> Result<GrayImage, Error> {
 /// Reads the photo at `path`, upright, in colors.
 ///
 /// # Errors
-/// As [`read`].
+/// See [`read`].
 pub fn read_color(path: &Path) -> Result<ColorImage, Error> {
     read_color_with(path, Turn::Upright)
 }
@@ -58,22 +57,17 @@ pub fn read_color(path: &Path) -> Result<ColorImage, Error> {
 /// Reads the photo at `path` in colors.
 ///
 /// # Errors
-/// As [`read`].
+/// See [`read`].
 pub fn read_color_with(path: &Path, turn: Turn) -> Result<ColorImage, Error> {
     let photo = photo(path, turn)?;
     let (width, height) = (photo.width() as usize, photo.height() as usize);
     ColorImage::try_new(width, height, photo.into_rgb8().into_raw())
 }
 
-/// Reads the photo at `path` as gray values.
-///
-/// # Errors
-/// As [`read`].
 pub(crate) fn read_with(path: &Path, turn: Turn) -> Result<GrayImage, Error> {
     gray(&photo(path, turn)?)
 }
 
-/// The photo at `path` as it is decoded.
 pub(crate) fn photo(path: &Path, turn: Turn) -> Result<DynamicImage, Error> {
     let (bytes, name) = bytes_of(path)?;
     let (mut photo, orientation) = decoded(&bytes, &name)?;
@@ -83,7 +77,7 @@ pub(crate) fn photo(path: &Path, turn: Turn) -> Result<DynamicImage, Error> {
     Ok(photo)
 }
 
-/// The bytes of a file, and how it is called in errors.
+/// Returns the bytes of a file, and its name in errors.
 fn bytes_of(path: &Path) -> Result<(Vec<u8>, String), Error> {
     let name = path.display().to_string();
     let bytes = unlift_nn::file::bytes(path)
@@ -94,16 +88,16 @@ fn bytes_of(path: &Path) -> Result<(Vec<u8>, String), Error> {
 /// Decodes the bytes of a photo in a file called `name`, upright, as gray values.
 ///
 /// # Errors
-/// As [`read`].
+/// See [`read`].
 pub fn decode(bytes: &[u8], name: &str) -> Result<GrayImage, Error> {
     let (mut photo, orientation) = decoded(bytes, name)?;
     photo.apply_orientation(orientation);
     gray(&photo)
 }
 
-/// The photo as it is stored, and how it is to be turned.
+/// Decodes a photo as stored, and its orientation.
 fn decoded(bytes: &[u8], name: &str) -> Result<(DynamicImage, Orientation), Error> {
-    // One line, whatever the name holds.
+    // Escaping keeps the error in one line.
     let wrong = |expected: &str, found: String| {
         Error::new(name.escape_debug().to_string(), expected, found.escape_debug().to_string())
     };
@@ -119,7 +113,8 @@ fn decoded(bytes: &[u8], name: &str) -> Result<(DynamicImage, Orientation), Erro
     let broken = |error: ::image::ImageError| wrong(&whole, error.to_string());
     let most = most_pixels(format, bytes.len() as u64);
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
-    // A PNG says first how large it is: what else it holds, as a profile of colors, inflates a thousand times.
+    // Limits memory by the size in a PNG's header, because a color profile can inflate a thousand
+    // times.
     let declared = bytes.get(16..24).filter(|_| format == ImageFormat::Png).map(|sides| {
         let side =
             |at: usize| u64::from(u32::from_be_bytes(std::array::from_fn(|byte| sides[at + byte])));
@@ -141,7 +136,7 @@ fn decoded(bytes: &[u8], name: &str) -> Result<(DynamicImage, Orientation), Erro
     Ok((DynamicImage::from_decoder(decoder).map_err(broken)?, orientation))
 }
 
-/// Pixels that a photo of `n_bytes` bytes can have.
+/// Returns the maximum number of pixels of a photo of `n_bytes` bytes.
 fn most_pixels(format: ImageFormat, n_bytes: u64) -> u64 {
     let per_byte = match format {
         ImageFormat::Jpeg => JPEG_PIXELS_PER_BYTE,
@@ -150,7 +145,8 @@ fn most_pixels(format: ImageFormat, n_bytes: u64) -> u64 {
     n_bytes.saturating_mul(per_byte).clamp(FREE_PIXELS, MOST_PIXELS)
 }
 
-/// Gray values as COLMAP makes them: rounded to bytes, weights of Rec. 709, transparency ignored.
+/// Converts to gray values as COLMAP does: rounded to bytes, weights of Rec. 709, transparency
+/// ignored.
 fn gray(photo: &DynamicImage) -> Result<GrayImage, Error> {
     let (width, height) = (photo.width() as usize, photo.height() as usize);
     if !photo.color().has_color() {
@@ -165,7 +161,6 @@ fn gray(photo: &DynamicImage) -> Result<GrayImage, Error> {
     GrayImage::from_bytes(width, height, &bytes)
 }
 
-/// A name for bytes that are no photo.
 fn kind(bytes: &[u8]) -> String {
     if bytes.is_empty() {
         return "an empty file".to_owned();
@@ -189,14 +184,14 @@ fn label(format: ImageFormat) -> String {
     }
 }
 
-/// Whether a JPEG has an end after its first scan. Decoders fill what is missing with gray, which would
-/// be taken for a photo; the end of a thumbnail in the header does not count.
+/// Returns true if a JPEG has an end marker after its first scan. Decoders fill missing parts with
+/// gray. The end marker of a thumbnail in the header does not count.
 fn has_end(bytes: &[u8]) -> bool {
     const SCAN: u8 = 0xda;
     let mut at = 2;
     while let Some(&[0xff, marker, high, low]) = bytes.get(at..at + 4) {
         match marker {
-            // Fill bytes may stand before a marker.
+            // Fill bytes may precede a marker.
             0xff => at += 1,
             _ => at += 2 + usize::from(u16::from_be_bytes([high, low])),
         }

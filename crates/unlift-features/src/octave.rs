@@ -5,7 +5,7 @@ use crate::image::GrayImage;
 use crate::options::SiftOptions;
 use crate::plane::Plane;
 
-/// Smoothing that a photo is taken to have, in pixels.
+/// Assumed smoothing of a photo, in pixels.
 const NOMINAL: f64 = 0.5;
 /// Smoothing of the first level of an octave, in pixels of the octave.
 const FIRST: f64 = 1.6;
@@ -20,7 +20,6 @@ pub(crate) struct Ladder {
 }
 
 impl Ladder {
-    /// The filters for `options`.
     pub(crate) fn new(options: &SiftOptions) -> Self {
         let ratio = libm::exp2(1.0 / options.levels as f64);
         let nominal = if options.doubled { 2.0 * NOMINAL } else { NOMINAL };
@@ -32,25 +31,25 @@ impl Ladder {
         Self { first: Gaussian::new(first), steps, levels: options.levels }
     }
 
-    /// Smoothing, in pixels of the octave, at `level`: level 1 is the first one with keypoints.
+    /// Returns the smoothing at `level`, in pixels of the octave; level 1 is the first one with
+    /// keypoints.
     pub(crate) fn sigma(&self, level: f64) -> f64 {
         FIRST * libm::exp2(level / self.levels as f64)
     }
 }
 
-/// Four consecutive levels of an octave, each smoother than the one before by the same factor.
+/// Four consecutive levels of an octave, each smoother than the previous one by the same factor.
 ///
-/// The three differences between them are what an extremum of the middle one needs; nothing else of
-/// an octave is ever in memory. Lowe 2004, Sec. 3.
+/// An extremum of the middle difference needs only the three differences between them, so no other
+/// level is in memory. Lowe 2004, Sec. 3.
 #[derive(Default)]
 pub(crate) struct Octave {
     levels: [Plane; 4],
-    /// Memory to smooth in.
     line: Vec<f32>,
 }
 
 impl Octave {
-    /// The first four levels of the first octave.
+    /// Computes the first four levels of the first octave.
     pub(crate) fn start(&mut self, image: &GrayImage, doubled: bool, ladder: &Ladder) {
         let [level, .., spare] = &mut self.levels;
         if doubled {
@@ -62,10 +61,10 @@ impl Octave {
         self.fill(ladder);
     }
 
-    /// The first four levels of the next octave; the last step of this one must have been made.
+    /// Computes the first four levels of the next octave, after the last step of this one.
     pub(crate) fn next(&mut self, ladder: &Ladder) {
-        // The second level is twice as smooth as the first level of the octave was: at half the
-        // resolution it is the first level of the next.
+        // The second level has twice the smoothing of the octave's first level: at half the
+        // resolution it is the first level of the next octave.
         let [first, second, ..] = &mut self.levels;
         first.halve(second);
         self.fill(ladder);
@@ -85,12 +84,10 @@ impl Octave {
         ladder.steps[level + 2].smooth(from, to, &mut self.line);
     }
 
-    /// The four levels; differences are those of neighbors.
     pub(crate) fn levels(&self) -> &[Plane; 4] {
         &self.levels
     }
 
-    /// The size of this octave.
     pub(crate) fn size(&self) -> (usize, usize) {
         (self.levels[0].width, self.levels[0].height)
     }

@@ -1,29 +1,27 @@
-//! What a user may choose about SIFT, and what is allowed.
-
 use unlift::Error;
 
-/// How to extract. The defaults are COLMAP's.
+/// Options of SIFT. The defaults are COLMAP's.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SiftOptions {
-    /// Features wanted, 8192. Levels of scale are kept whole from the coarsest on, up to and
-    /// including the one that exceeds this number, so that more may come out.
+    /// Number of requested features, default 8192. Whole levels are kept, from the coarsest to the
+    /// one that exceeds this number, so more may be returned.
     pub max_features: usize,
-    /// Longest side in pixels, 3200; larger images are shrunk first, keypoints are in pixels of
-    /// the image as it was given.
+    /// Longest side in pixels, default 3200. Larger images are downsized; keypoints are in pixels
+    /// of the original image.
     pub max_image_size: usize,
-    /// Whether to double the image first, which finds the finest features (COLMAP: first octave -1).
+    /// Doubles the image first, which finds the finest features (COLMAP: first octave -1).
     pub doubled: bool,
-    /// Octaves at most, 4, the doubled one included.
+    /// Maximum number of octaves, with the doubled one; default 4.
     pub octaves: usize,
-    /// Levels of scale in an octave, 3.
+    /// Levels of scale in an octave; default 3.
     pub levels: usize,
-    /// Least contrast of a keypoint, as a difference of gray values in `0..1`: 0.02 / 3.
+    /// Minimum contrast of a keypoint, as a difference of gray values in `0..1`; default 0.02 / 3.
     pub peak_threshold: f64,
-    /// Largest ratio of principal curvatures, 10; keypoints above it lie on edges.
+    /// Maximum ratio of principal curvatures, default 10; keypoints above it are on edges.
     pub edge_threshold: f64,
-    /// Keypoints made of one place at most, 2, each with an orientation of its own.
+    /// Maximum number of keypoints per position, each with its own orientation; default 2.
     pub max_orientations: usize,
-    /// Whether all orientations are zero.
+    /// Sets all orientations to zero.
     pub upright: bool,
 }
 
@@ -44,10 +42,10 @@ impl Default for SiftOptions {
 }
 
 impl SiftOptions {
-    /// Whether every value is one that the extractor takes.
+    /// Checks that every value is in its range.
     ///
     /// # Errors
-    /// Names the first field that is out of range.
+    /// If a field is out of range; the error names the first one.
     pub fn check(&self) -> Result<(), Error> {
         let whole: [(&str, usize, usize, usize); 5] = [
             ("max_features", self.max_features, 1, usize::MAX),

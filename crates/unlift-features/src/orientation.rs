@@ -1,4 +1,4 @@
-//! Which way a keypoint points: peaks of a histogram of gradient directions.
+//! Orientations of a keypoint: peaks of a histogram of gradient directions.
 
 use std::f64::consts::TAU;
 
@@ -7,18 +7,18 @@ use unlift::simd::{Kernel, dispatch};
 use crate::gradient::{Gradients, TURN};
 use crate::plane::Plane;
 
-/// Orientations of one place at most.
+/// Maximum number of orientations of a keypoint.
 pub(crate) const MOST: usize = 4;
-/// Directions that are told apart.
+/// Bins of the histogram.
 const BINS: usize = 36;
 /// Standard deviation of the window, in scales of the keypoint.
 const WINDOW: f64 = 1.5;
-/// Times the histogram is averaged with its neighbors.
+/// Number of times that the histogram is averaged with its neighbors.
 const SMOOTHED: usize = 6;
-/// Height of a peak, as a share of the highest.
+/// Minimum height of a peak, as a share of the highest.
 const SHARE: f32 = 0.8;
 
-/// A place in an octave: pixels of the octave, the middle of the first pixel at 0.
+/// A position in an octave: pixels of the octave, the middle of the first pixel at 0.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     pub(crate) x: f64,
@@ -27,16 +27,16 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    /// The pixel it lies in.
     pub(crate) fn pixel(self) -> (usize, usize) {
         ((self.x + 0.5) as usize, (self.y + 0.5) as usize)
     }
 }
 
-/// Gaussian weights of a row or column of pixels: `exp(-(i - radius + shift)^2 / (2 sigma^2))`.
+/// Computes Gaussian weights of a row or column of pixels:
+/// `exp(-(i - radius + shift)^2 / (2 sigma^2))`.
 ///
-/// Two multiplications each, as a quotient of neighboring weights is geometric; windows are products
-/// of one for x and one for y, so that no pixel needs an exponential.
+/// Quotients of neighboring weights are geometric, so each needs two multiplications. Windows are
+/// products of weights for x and y, so no pixel needs an exponential.
 pub(crate) fn weights(radius: usize, shift: f64, sigma: f64, into: &mut Vec<f32>) {
     let falloff = 0.5 / (sigma * sigma);
     let first = shift - radius as f64;
@@ -51,8 +51,8 @@ pub(crate) fn weights(radius: usize, shift: f64, sigma: f64, into: &mut Vec<f32>
     }
 }
 
-/// The orientations of `place`, in radians within `0..TAU`, in the order of their bins; `found` of
-/// them. Lowe 2004, Sec. 5, with a smoothed histogram and linear votes.
+/// Returns the orientations of `place`, in radians within `0..TAU`, in the order of their bins, and
+/// their number. Lowe 2004, Sec. 5, with a smoothed histogram and linear votes.
 pub(crate) fn orientations(
     gradients: &mut Gradients,
     level: &Plane,
@@ -94,12 +94,12 @@ impl Kernel for Votes<'_> {
         let (column, row) = place.pixel();
         let (width, height) = (gradients.length.width, gradients.length.height);
         let reach = (radius * radius) as f64 + 0.6;
-        // Bin -1 is the last one and bin 36 the first; here they have a place of their own.
+        // Bins -1 and 36 have their own places here and are added to the last and first bin below.
         let mut histogram = [0.0_f32; BINS + 2];
         for y in row.saturating_sub(radius)..(row + radius + 1).min(height) {
             let dy = y as f64 - row as f64 + shift.1;
             let half = libm::sqrt((reach - dy * dy).max(0.0));
-            // Whole pixels within the circle, by their distance from the middle one.
+            // Integer pixels within the circle around the middle pixel.
             let middle = column as f64 - shift.0;
             let low =
                 libm::ceil(middle - half).max(column as f64 - radius as f64).max(0.0) as usize;
@@ -113,7 +113,8 @@ impl Kernel for Votes<'_> {
             let across = &weights[0][low + radius - column..];
             let down = weights[1][y + radius - row];
             for ((&length, &angle), &across) in lengths.iter().zip(angles).zip(across) {
-                // Bins have their middle at one half; one more, since they are stored one up.
+                // Bin centers are at one half; one is added because bins are stored with offset
+                // one.
                 let at = angle * (BINS as f32 / TURN) + 0.5;
                 let bin = at as usize;
                 let (part, vote) = (at - bin as f32, length * across * down);
@@ -129,7 +130,7 @@ impl Kernel for Votes<'_> {
     }
 }
 
-/// Peaks of a histogram, each moved to the top of the parabola through its neighbors.
+/// Finds the peaks of a histogram, each moved to the vertex of the parabola through its neighbors.
 fn peaks(histogram: &[f32; BINS]) -> ([f64; MOST], usize) {
     let highest = histogram.iter().fold(0.0_f32, |most, &value| most.max(value));
     let (mut angles, mut found) = ([0.0; MOST], 0);
@@ -164,7 +165,7 @@ mod tests {
 
     #[test]
     fn a_ramp_points_uphill_whichever_way() {
-        // Not on a border of two bins, where both are equally high and neither is a peak.
+        // Avoids borders of two bins, where both are equally high and neither is a peak.
         for degrees in (2..360).step_by(7).filter(|degrees| degrees % 10 != 0) {
             let (sin, cos) = f64::from(degrees).to_radians().sin_cos();
             let value = |i: usize| (cos * (i % 41) as f64 + sin * (i / 41) as f64) as f32;

@@ -1,14 +1,12 @@
-//! A level of scale space in memory.
-
 use crate::image::GrayImage;
 
-/// Values that one step of a vector loop handles.
+/// Values per step of a vector loop.
 pub(crate) const LANES: usize = 32;
-/// Columns that may be read to the right of a row, so that loops need no second version for its end.
+/// Columns that may be read beyond a row, so that loops need no special case for its end.
 const SLACK: usize = 16;
 
-/// Rows of `f32`, each longer than the image is wide. What lies beyond `width` is finite and means
-/// nothing.
+/// Rows of `f32`, each longer than the image is wide. Values beyond `width` are finite but
+/// undefined.
 #[derive(Default)]
 pub(crate) struct Plane {
     pub(crate) width: usize,
@@ -18,7 +16,7 @@ pub(crate) struct Plane {
 }
 
 impl Plane {
-    /// Makes room for `width` x `height` values; keeps the memory, and says nothing about values.
+    /// Resizes to `width` x `height` undefined values; keeps the memory.
     pub(crate) fn reshape(&mut self, width: usize, height: usize) {
         self.width = width;
         self.height = height;
@@ -26,30 +24,26 @@ impl Plane {
         self.values.resize(self.stride * height, 0.0);
     }
 
-    /// Row `y`, slack included.
     #[inline(always)]
     pub(crate) fn row(&self, y: usize) -> &[f32] {
         &self.values[y * self.stride..(y + 1) * self.stride]
     }
 
-    /// Row `y`, slack included, to write.
     #[inline(always)]
     pub(crate) fn row_mut(&mut self, y: usize) -> &mut [f32] {
         &mut self.values[y * self.stride..(y + 1) * self.stride]
     }
 
-    /// The value at column `x` of row `y`.
     #[inline(always)]
     pub(crate) fn at(&self, x: usize, y: usize) -> f32 {
         self.values[y * self.stride + x]
     }
 
-    /// Length of a row, slack included: a multiple of [`LANES`].
+    /// Returns the length of a row with its slack, a multiple of [`LANES`].
     pub(crate) fn stride(&self) -> usize {
         self.stride
     }
 
-    /// Copies an image.
     pub(crate) fn copy(&mut self, image: &GrayImage) {
         self.reshape(image.width(), image.height());
         for y in 0..self.height {
@@ -59,7 +53,8 @@ impl Plane {
         }
     }
 
-    /// Doubles an image: linear between pixels, the last one repeated. Pixel `i` moves to `2 i`.
+    /// Doubles an image by linear interpolation; the last pixel is repeated. Pixel `i` moves to
+    /// `2 i`.
     pub(crate) fn double(&mut self, image: &GrayImage) {
         let (width, height) = (image.width(), image.height());
         self.reshape(2 * width, 2 * height);
@@ -99,7 +94,6 @@ impl Plane {
     }
 }
 
-/// `N` values of a row from column `at` on.
 #[inline(always)]
 pub(crate) fn lanes<const N: usize>(row: &[f32], at: usize) -> [f32; N] {
     let mut values = [0.0; N];

@@ -1,4 +1,4 @@
-//! Small pictures of photos and other images, for reports.
+//! Small encoded images for reports.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -11,14 +11,14 @@ use unlift::Error;
 use crate::color::ColorImage;
 use crate::load::{self, Turn};
 
-/// Quality of the JPEG, of 100: good enough to recognize, small enough to embed.
+/// JPEG quality, of 100: recognizable, and small enough to embed.
 const QUALITY: u8 = 72;
 
-/// The photo at `path`, shrunk so that no side exceeds `longest` pixels, as the bytes of a
-/// JPEG in color. Nothing of its metadata is kept.
+/// Encodes the photo at `path` as a color JPEG, downsized so that no side exceeds `longest` pixels,
+/// without metadata.
 ///
 /// # Errors
-/// As [`load::read`].
+/// See [`load::read`].
 pub fn jpeg(path: &Path, longest: u32, turn: Turn) -> Result<Vec<u8>, Error> {
     let photo = load::photo(path, turn)?;
     let photo = match photo.width().max(photo.height()) > longest {
@@ -27,24 +27,24 @@ pub fn jpeg(path: &Path, longest: u32, turn: Turn) -> Result<Vec<u8>, Error> {
     };
     encoded(&photo.to_rgb8()).map_err(|error| {
         let name = path.display().to_string();
-        Error::new(name, "a photo that can be shrunk", error.to_string())
+        Error::new(name, "a photo that can be downsized", error.to_string())
     })
 }
 
-/// An image, shrunk so that no side exceeds `longest` pixels, as the bytes of a JPEG.
+/// Encodes an image as JPEG, downsized so that no side exceeds `longest` pixels.
 ///
 /// # Errors
-/// When a side still has more than 65,535 pixels.
+/// If a side still has more than 65,535 pixels.
 pub fn jpeg_of(image: &ColorImage, longest: usize) -> Result<Vec<u8>, Error> {
     let small = image.fitted(longest);
     encoded(&buffer(small.as_ref().unwrap_or(image)))
         .map_err(|error| Error::new("picture", "at most 65535 pixels a side", error.to_string()))
 }
 
-/// An image as the bytes of a PNG.
+/// Encodes an image as PNG.
 ///
 /// # Errors
-/// Only without memory.
+/// If encoding fails.
 pub fn png_of(image: &ColorImage) -> Result<Vec<u8>, Error> {
     let mut bytes = Cursor::new(Vec::new());
     buffer(image)

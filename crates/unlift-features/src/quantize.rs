@@ -1,17 +1,16 @@
-//! From histograms to the 128 bytes that COLMAP stores.
+//! Conversion of histograms to the 128 bytes that COLMAP stores.
 
 use crate::descriptor::{BINS, LENGTH};
 
-/// Share of the length that one value may have, so that a strong edge does not drown the rest.
+/// Maximum value of a normalized descriptor, which limits the effect of a strong edge.
 const LARGEST: f32 = 0.2;
-/// Length of a descriptor in bytes' units.
+/// Length of a descriptor in bytes.
 const SCALE: f32 = 512.0;
 
-/// The bytes of a descriptor: unit length, values clamped to 0.2, unit length again, then the root of
+/// Quantizes a descriptor: unit length, values clamped to 0.2, unit length again, then the root of
 /// its shares (RootSIFT, Arandjelovic and Zisserman 2012) times 512.
 ///
-/// Directions run the other way around than in the histograms, as in Lowe's program. Nothing in
-/// sight (all zero) gives zeros.
+/// The order of directions is reversed, as in Lowe's program. All zeros stay zeros.
 pub(crate) fn quantize(mut histograms: [f32; LENGTH]) -> [u8; LENGTH] {
     normalize(&mut histograms);
     for value in &mut histograms {
@@ -39,7 +38,7 @@ fn normalize(values: &mut [f32; LENGTH]) {
     }
 }
 
-/// A sum in a fixed order that a compiler can do eight lanes at a time.
+/// Sums in a fixed order that compiles to eight lanes.
 fn sum(values: &[f32; LENGTH], of: impl Fn(f32) -> f32) -> f32 {
     let mut lanes = [0.0; BINS];
     for chunk in values.as_chunks::<BINS>().0 {

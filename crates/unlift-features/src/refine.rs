@@ -1,12 +1,12 @@
-//! From an extremum on the grid to its place between pixels and levels.
+//! Refinement of an extremum to a position between pixels and levels.
 
 use crate::extrema::Differences;
 
-/// Moves to a neighboring pixel at most.
+/// Number of fits at most, each at the pixel that the previous one moved to.
 const MOVES: usize = 5;
 /// An offset beyond this moves to the neighbor.
 const FAR: f64 = 0.6;
-/// An offset beyond this is no longer the same extremum.
+/// An offset beyond this belongs to another extremum.
 const TOO_FAR: f64 = 1.5;
 
 /// An extremum of the differences, in pixels of its octave.
@@ -14,17 +14,18 @@ const TOO_FAR: f64 = 1.5;
 pub(crate) struct Peak {
     /// Column, the middle of the first pixel at 0.
     pub(crate) x: f64,
-    /// Row, likewise.
+    /// Row, the middle of the first pixel at 0.
     pub(crate) y: f64,
     /// Offset from the middle difference, in levels.
     pub(crate) level: f64,
 }
 
-/// The extremum of the quadratic through the samples around `(x, y)`.
+/// Returns the extremum of the quadratic through the samples around `(x, y)`.
 ///
-/// `None` if the extremum is fainter than `peak`, its principal curvatures have a ratio above `edge`
-/// or opposite signs, or it lies elsewhere. `level` is the number of the middle difference and
-/// `levels` the largest that an offset may lead to. Lowe 2004, Sec. 4; moving and limits as VLFeat documents them.
+/// `None` if its contrast is not above `peak`, its principal curvatures have a ratio above `edge`
+/// or opposite signs, or it is too far away. `level` is the number of the middle difference, and
+/// `levels` the largest allowed level. Lowe 2004, Sec. 4; moves and limits as VLFeat documents
+/// them.
 pub(crate) fn refine(
     differences: Differences<'_>,
     (mut x, mut y): (usize, usize),
@@ -56,7 +57,7 @@ pub(crate) fn refine(
     (value.abs() > peak && round && near && inside).then_some(found)
 }
 
-/// The pixel where a refinement goes on; those of the border have no neighbors on all sides.
+/// Returns the pixel where the refinement continues; border pixels are excluded.
 fn moved(at: usize, offset: f64, length: usize) -> usize {
     if offset > FAR && at + 2 < length {
         at + 1
@@ -104,23 +105,22 @@ impl Shape {
         }
     }
 
-    /// Where the slope vanishes; no offset if the curvature is singular.
+    /// Returns where the slope vanishes; no offset if the curvature is singular.
     fn offset(&self) -> [f64; 3] {
         solve(self.curvature, self.slope.map(|slope| -slope)).unwrap_or([0.0; 3])
     }
 
-    /// Squared trace over determinant of the curvature in the image: `(r + 1)^2 / r` for a ratio
-    /// `r` of principal curvatures, negative if they have opposite signs.
+    /// Returns squared trace over determinant of the curvature in the image: `(r + 1)^2 / r` for a
+    /// ratio `r` of principal curvatures, negative for opposite signs.
     fn roundness(&self) -> f64 {
         let [[xx, xy, _], [_, yy, _], _] = self.curvature;
         (xx + yy) * (xx + yy) / (xx * yy - xy * xy)
     }
 }
 
-/// Pivots below this are taken for zero.
+/// Pivots below this count as zero.
 const SINGULAR: f64 = 1e-10;
 
-/// Gauss elimination with row pivots.
 fn solve(mut a: [[f64; 3]; 3], mut b: [f64; 3]) -> Option<[f64; 3]> {
     for j in 0..3 {
         let pivot =
@@ -154,7 +154,8 @@ mod tests {
     use crate::image::GrayImage;
     use crate::plane::Plane;
 
-    /// Levels whose differences are a quadratic with its top, 1, at `(x, y, s)`, `s` from the middle.
+    /// Levels whose differences are a quadratic with its maximum, 1, at `(x, y, s)`, `s` from the
+    /// middle.
     fn paraboloid(top: [f64; 3], bend: [f64; 3]) -> [Plane; 4] {
         let (width, height) = (24, 20);
         let mut levels: [Plane; 4] = Default::default();

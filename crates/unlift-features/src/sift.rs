@@ -1,4 +1,4 @@
-//! The extractor: octave by octave, level by level.
+//! The SIFT extractor, octave by octave and level by level.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -14,39 +14,40 @@ use crate::orientation::{self, Place};
 use crate::quantize::quantize;
 use crate::refine::refine;
 
-/// A place in an image with a scale and an orientation.
+/// A position in an image with a scale and an orientation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Keypoint {
     /// Column in pixels; the middle of the first pixel is at 0.5 (COLMAP's convention).
     pub x: f32,
-    /// Row in pixels, likewise.
+    /// Row in pixels; the middle of the first pixel is at 0.5.
     pub y: f32,
-    /// Standard deviation of the smoothing at which the keypoint stands out, in pixels.
+    /// Standard deviation of the smoothing of the extremum, in pixels.
     pub scale: f32,
     /// Main direction of the gradient, in radians within `-PI..=PI`, from x to y.
     pub orientation: f32,
 }
 
-/// Keypoints of an image and what they look like, the finest scales first.
+/// Keypoints and descriptors of an image, the finest scales first.
 ///
-/// A place with two orientations is there twice.
+/// A position with two orientations appears twice.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Features {
     /// `n` keypoints.
     pub keypoints: Vec<Keypoint>,
-    /// `(n, 128)` RootSIFT descriptors, their Euclidean length scaled to 512.
+    /// RootSIFT descriptors `(n, 128)`, scaled to length 512.
     pub descriptors: Vec<[u8; descriptor::LENGTH]>,
 }
 
-/// Scale-invariant features as COLMAP extracts them on a CPU: of the same pixels the same keypoints
-/// within a thousandth of a pixel, and bytes that differ by one here and there.
+/// SIFT as COLMAP extracts it on a CPU: from the same pixels, keypoints agree within a thousandth
+/// of a pixel, and some bytes differ by one.
 ///
-/// Shared by any number of threads: each call borrows a set of buffers, and buffers are kept for the
-/// next. A set takes 24 bytes per pixel of the doubled image: 30 MB for 640 x 480, 740 MB for 3200 x
-/// 2400 (larger images are shrunk). The same pixels give the same bytes on any machine, unless they are shrunk.
+/// Threads can share it: each call takes a set of buffers, which is reused. A set needs 24 bytes
+/// per pixel of the doubled image: 30 MB for 640 x 480, 740 MB for 3200 x 2400 (larger images are
+/// downsized). The same pixels give the same bytes on any machine, unless they are downsized.
 ///
-/// Source: D. Lowe, Distinctive image features from scale-invariant keypoints, IJCV 2004; where that
-/// leaves a choice, the documentation of VLFeat (vlfeat.org) and COLMAP (colmap.github.io).
+/// Source: D. Lowe, Distinctive image features from scale-invariant keypoints, IJCV 2004; details
+/// that it leaves open follow the documentation of VLFeat (vlfeat.org) and COLMAP
+/// (colmap.github.io).
 pub struct Sift {
     options: SiftOptions,
     ladder: Ladder,
@@ -54,13 +55,12 @@ pub struct Sift {
 }
 
 impl Default for Sift {
-    /// COLMAP's defaults.
+    /// Uses COLMAP's defaults.
     fn default() -> Self {
         Self::unchecked(SiftOptions::default())
     }
 }
 
-/// Everything an extraction writes to, kept between images.
 #[derive(Default)]
 struct Workspace {
     octave: Octave,
@@ -70,19 +70,18 @@ struct Workspace {
     places: Vec<Place>,
 }
 
-/// What one level of scale gave.
+/// The results of one level of scale.
 struct Level {
-    /// Places found, before orientations.
     places: usize,
-    /// `None` where describing was put off.
+    /// `None` if the description is deferred.
     features: Option<Features>,
 }
 
 impl Sift {
-    /// An extractor with `options`.
+    /// Creates an extractor with `options`.
     ///
     /// # Errors
-    /// When [`SiftOptions::check`] refuses them.
+    /// If [`SiftOptions::check`] fails.
     pub fn try_new(options: SiftOptions) -> Result<Self, Error> {
         options.check()?;
         Ok(Self::unchecked(options))
@@ -92,9 +91,9 @@ impl Sift {
         Self { ladder: Ladder::new(&options), options, idle: Mutex::default() }
     }
 
-    /// The features of `image`, in pixels of it even where it was shrunk.
+    /// Extracts the features of `image`, in its pixels even if it is downsized.
     ///
-    /// An image without structure, or of fewer than 3 pixels a side, has none.
+    /// An image without structure, or with a side of less than 3 pixels, has none.
     pub fn extract(&self, image: &GrayImage) -> Features {
         let idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut workspace = idle.unwrap_or_default();
@@ -114,8 +113,8 @@ impl Sift {
     }
 
     fn run(&self, image: &GrayImage, workspace: &mut Workspace) -> Features {
-        // A level with most of the features wanted is likely to be dropped in favor of coarser
-        // ones, and describing is the dearest part: such levels are described when it is known.
+        // Describing is the most expensive step, and a level with most of the requested features is
+        // often dropped for coarser ones. Such levels are described only if they are kept.
         let put_off = self.options.max_features / 2;
         let mut levels = self.scan(image, workspace, |_, places| places <= put_off);
         let first = self.first_kept(&levels);
@@ -138,8 +137,8 @@ impl Sift {
         all
     }
 
-    /// The finest level that is kept: levels from the coarsest on until they have more places than
-    /// features are wanted.
+    /// Returns the finest kept level: levels are added from the coarsest on until they exceed the
+    /// number of requested features.
     fn first_kept(&self, levels: &[Level]) -> usize {
         let mut places = 0;
         for (at, level) in levels.iter().enumerate().rev() {
@@ -151,7 +150,8 @@ impl Sift {
         0
     }
 
-    /// All levels, from the finest; `wanted(level, places)` are described.
+    /// Scans all levels, from the finest; describes those for which `wanted(level, places)` is
+    /// true.
     fn scan(
         &self,
         image: &GrayImage,
@@ -176,7 +176,7 @@ impl Sift {
                     wanted(levels.len(), places).then(|| self.describe(pixel, workspace));
                 levels.push(Level { places, features });
             }
-            // An octave without an inside has no extrema, and neither have those after it.
+            // This octave has no interior pixels, and later ones have none either.
             let (width, height) = workspace.octave.size();
             if width.min(height) < 6 {
                 break;
@@ -185,7 +185,7 @@ impl Sift {
         levels
     }
 
-    /// Fills `places` with the refined extrema of the present level.
+    /// Fills `places` with the refined extrema of the current level.
     fn find(&self, level: usize, workspace: &mut Workspace) {
         let Workspace { octave, extrema, places, .. } = workspace;
         let differences = Differences(octave.levels());
@@ -201,7 +201,8 @@ impl Sift {
         }));
     }
 
-    /// Orientations and descriptors of `places`; a pixel of the octave has `pixel` of the image.
+    /// Computes orientations and descriptors of `places`; a pixel of the octave is `pixel` pixels
+    /// of the image.
     fn describe(&self, pixel: f64, workspace: &mut Workspace) -> Features {
         let Workspace { octave, gradients, desk, places, .. } = workspace;
         let level = &octave.levels()[1];
@@ -222,7 +223,6 @@ impl Sift {
     }
 }
 
-/// A place in pixels of the image.
 fn keypoint(place: Place, angle: f64, pixel: f64) -> Keypoint {
     use std::f64::consts::{PI, TAU};
     Keypoint {

@@ -1,9 +1,9 @@
-//! What each stage costs on the way from a photo to a picture of its keypoints that is judged: milliseconds of one thread, and the
-//! memory of its own at most.
+//! Time and memory of each stage from a photo to a compared picture: milliseconds on one thread,
+//! and peak memory.
 //!
-//! `cargo bench -p unlift-invert --bench stages [-- FOLDER]`: the first eight photos of a folder, by default those of RedKitchen where it is beside
-//! the repository, else a made-up one. Times are medians of all, after one that is not counted; memory is the most that any one
-//! added to what was there.
+//! `cargo bench -p unlift-invert --bench stages [-- FOLDER]` uses the first eight photos of a
+//! folder, by default those of RedKitchen beside the repository, else a synthetic one. Times are
+//! medians without a warm-up run. Memory is the largest increase by one photo.
 
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
@@ -16,11 +16,10 @@ use unlift_invert::{Detector, Inverter, Lpips, Points, feature_image, psnr, ssim
 use unlift_nn::DescriptorKind;
 
 const PHOTOS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/redkitchen/images");
-/// Photos at most.
 const MOST: usize = 8;
 
 fn main() {
-    // `cargo test --benches` asks for a quick check that the bench still runs.
+    // `cargo test --benches` passes `--test`: one synthetic photo is enough.
     let quick = std::env::args().any(|a| a == "--test");
     let folder = std::env::args().skip(1).find(|a| !a.starts_with("--"));
     let photos = match quick {
@@ -55,10 +54,11 @@ fn main() {
     }
 }
 
-/// Does `work` on each of `items`, one after the other, prints what it took, and hands on what it made.
+/// Runs `work` on each of `items`, one after the other, prints time and memory, and returns the
+/// results.
 fn stage<T, R>(name: &str, items: &[T], work: impl Fn(&T) -> R) -> Vec<R> {
     let (mut times, mut made, mut most) = (Vec::new(), Vec::new(), Some(0));
-    // The first one twice: it takes memory that is used again, and time that the others do not.
+    // The first item runs twice: its first run allocates memory that later runs reuse.
     for (at, item) in items[..1].iter().chain(items).enumerate() {
         let is_reset = std::fs::write("/proc/self/clear_refs", "5").is_ok();
         let before = kib("VmRSS:").filter(|_| is_reset);
@@ -77,14 +77,14 @@ fn stage<T, R>(name: &str, items: &[T], work: impl Fn(&T) -> R) -> Vec<R> {
     made
 }
 
-/// What the system says of this process under `name`, in kibibytes (Linux).
+/// Reads the entry `name` of this process in kibibytes (Linux).
 fn kib(name: &str) -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with(name))?;
     line.split_whitespace().nth(1)?.parse().ok()
 }
 
-/// Keypoints of a photo, all of them trusted.
+/// Keypoints of a photo, all with weight 1.
 struct Keypoints {
     places: Vec<[f32; 2]>,
     descriptors: Descriptors,
@@ -128,7 +128,6 @@ fn size_of(photo: &ColorImage) -> [usize; 2] {
     [photo.width(), photo.height()]
 }
 
-/// The first photos of `folder`, by name.
 fn photos(folder: &Path) -> Vec<ColorImage> {
     let Ok(entries) = std::fs::read_dir(folder) else {
         println!("no photos in {}: a made-up one", folder.display());
@@ -142,7 +141,7 @@ fn photos(folder: &Path) -> Vec<ColorImage> {
     paths.iter().take(MOST).map(|path| load::read_color(path).unwrap()).collect()
 }
 
-/// Something with keypoints.
+/// Creates a synthetic photo with keypoints.
 fn waves() -> ColorImage {
     let pixel = |x: usize, y: usize| {
         let (x, y) = (x as f32, y as f32);

@@ -1,5 +1,3 @@
-//! How alike two pictures are, by every metric there is.
-
 use unlift::Error;
 use unlift_features::ColorImage;
 
@@ -7,7 +5,7 @@ use crate::lpips::Lpips;
 use crate::psnr::psnr;
 use crate::ssim::ssim;
 
-/// What the metrics say of a picture and its photo.
+/// Similarity metrics of a picture and its photo.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Metrics {
     /// Structural similarity, 1 for equal pictures.
@@ -19,10 +17,10 @@ pub struct Metrics {
 }
 
 impl Metrics {
-    /// All metrics of `a` and `b`; which is which makes no difference.
+    /// Computes all metrics of `a` and `b`; they are symmetric.
     ///
     /// # Errors
-    /// When the pictures differ in size, or a side has less than 16 pixels.
+    /// If the pictures differ in size, or a side has less than 16 pixels.
     pub fn of(a: &ColorImage, b: &ColorImage, lpips: &Lpips) -> Result<Self, Error> {
         Ok(Self { ssim: ssim(a, b)?, psnr: psnr(a, b)?, lpips: lpips.distance(a, b)? })
     }

@@ -1,23 +1,22 @@
-//! What a detector finds in a picture.
+//! Object detection in pictures.
 //!
-//! Objects of everyday classes only: text is not read and faces are not compared. That something *can* be recognized is
-//! shown by what an ordinary detector finds; who lives there is nobody's business, the auditor's neither.
+//! Only objects of everyday classes are detected. To protect the people in the photos, text is not
+//! read and faces are not compared.
 
 use unlift::Error;
 use unlift_features::ColorImage;
 use unlift_nn::{Network, Tensor};
 
-/// Name of the model.
 const MODEL: &str = "yolox-nano";
-/// Side of what the network sees.
+/// Side of the network's input.
 const SIDE: usize = 416;
-/// What is around a picture that is not square.
+/// Padding around a picture that is not square.
 const GRAY: u8 = 114;
-/// Cells of the three grids that predictions come from.
+/// Strides of the three grids of predictions.
 const STRIDES: [usize; 3] = [8, 16, 32];
-/// Numbers of a prediction before its classes: place, size, objectness.
+/// Numbers of a prediction before its classes: position, size, objectness.
 const BEFORE: usize = 5;
-/// Boxes of one class that overlap by more are one object.
+/// Boxes of one class with a larger overlap are one object.
 const OVERLAP: f32 = 0.45;
 
 /// The classes of COCO, by number.
@@ -36,16 +35,17 @@ pub const CLASSES: [&str; 80] = [
 /// An object in a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Detection {
-    /// Number of its class in [`CLASSES`].
+    /// Index of its class in [`CLASSES`].
     pub class: usize,
-    /// How sure the detector is, 0 to 1.
+    /// Confidence of the detector, 0 to 1.
     pub score: f32,
-    /// Left, top, right and bottom in pixels, the corner of the picture at (0, 0); may reach beyond the picture.
+    /// Left, top, right and bottom in pixels, the corner of the picture at (0, 0); may exceed the
+    /// picture.
     pub sides: [f32; 4],
 }
 
 impl Detection {
-    /// Area of the overlap over that of both boxes.
+    /// Returns the intersection over union of both boxes.
     pub fn overlap(&self, other: &Self) -> f32 {
         let side = |at: usize| {
             let low = self.sides[at].max(other.sides[at]);
@@ -65,18 +65,18 @@ pub struct Detector {
 }
 
 impl Detector {
-    /// The detector that the program carries.
+    /// Loads the embedded detector, or the file that replaces it.
     ///
     /// # Errors
-    /// When a file of the model that is to be taken in its place cannot be.
+    /// If the replacing file cannot be loaded.
     pub fn try_new() -> Result<Self, Error> {
         Ok(Self { network: Network::load(MODEL)? })
     }
 
-    /// The objects in `picture` that the detector is surer of than `min_score`, the surest first.
+    /// Finds the objects in `picture` with a score above `min_score`, the highest first.
     ///
     /// # Errors
-    /// Only when the network is not what its hash says.
+    /// If the network returns another shape.
     pub fn find(&self, picture: &ColorImage, min_score: f32) -> Result<Vec<Detection>, Error> {
         let (input, scale) = seen(picture)?;
         let [output] = self.network.run(vec![("images", input)], ["output"])?;
@@ -102,7 +102,7 @@ impl Detector {
                 }
             }
         }
-        // Equal scores in the order of cells.
+        // The sort is stable, so equal scores keep the order of cells.
         found.sort_by(|a, b| b.score.total_cmp(&a.score));
         let mut kept: Vec<Detection> = Vec::new();
         for one in found {
@@ -114,13 +114,13 @@ impl Detector {
     }
 }
 
-/// What the network sees: the picture made to fit, blue first, and by how much it was made larger.
+/// Resizes the picture to the network's input, in BGR, and returns the scale.
 fn seen(picture: &ColorImage) -> Result<(Tensor, f32), Error> {
     let (width, height) = (picture.width(), picture.height());
     let scale = (SIDE as f64 / height as f64).min(SIDE as f64 / width as f64);
     let [wide, high] = [width, height].map(|side| ((side as f64 * scale) as usize).clamp(1, SIDE));
     let mut values = vec![f32::from(GRAY); 3 * SIDE * SIDE];
-    // Bilinear, the middles of pixels where they belong, as OpenCV does.
+    // Bilinear with aligned pixel centers, as in OpenCV.
     let between = |at: usize, from: usize, to: usize| {
         let x = ((at as f64 + 0.5) * from as f64 / to as f64 - 0.5).clamp(0.0, from as f64 - 1.0);
         (x as usize, ((x as usize) + 1).min(from - 1), (x - x.floor()) as f32)

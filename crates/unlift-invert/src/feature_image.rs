@@ -1,29 +1,27 @@
-//! Feature images: what the inverter sees of places and descriptors.
+//! Feature images: the inverter's input, made from positions and descriptors.
 
 use unlift::{Descriptors, Error};
 use unlift_nn::Tensor;
 
 /// Side of a cell in pixels.
 pub const CELL: usize = 4;
-/// Beside a descriptor's columns: the place inside the cell, and the weight.
+/// Channels besides the descriptor: the position inside the cell (two), and the weight.
 const MORE: usize = 3;
 
 /// Points of one image.
 #[derive(Clone, Copy, Debug)]
 pub struct Points<'a> {
-    /// Where they are, `(n, 2)`, in pixels, the middle of the first one at (0, 0).
+    /// Positions `(n, 2)` in pixels, the middle of the first pixel at (0, 0).
     pub places: &'a [[f32; 2]],
-    /// Their descriptors, of any length.
+    /// Descriptors of any length.
     pub descriptors: &'a Descriptors,
-    /// How much each is trusted, 0 to 1.
+    /// Confidence of each point, 0 to 1.
     pub weights: &'a [f32],
-    /// How far from the camera each is, where that is known: then the nearest of a cell is taken in place of a mean.
+    /// Distances from the camera, if known: then the nearest point of a cell replaces the mean.
     pub depths: Option<&'a [f32]>,
 }
 
 impl Points<'_> {
-    /// # Errors
-    /// When the columns differ in length.
     fn check(&self) -> Result<(), Error> {
         let n = self.places.len();
         let depths = self.depths.map_or(n, <[f32]>::len);
@@ -39,12 +37,13 @@ impl Points<'_> {
         Ok(())
     }
 
-    /// The cell of point `at` in an image of `size` cells of pixels; `None` outside, and without weight.
+    /// Returns the cell of point `at` in an image of `size` pixels, and the position inside it from
+    /// -1 to 1. `None` outside the image and without weight.
     fn cell(&self, at: usize, size: [usize; 2]) -> Option<([usize; 2], [f32; 2])> {
-        // The corner of the first pixel at (0, 0), so that cells begin where pixels do.
+        // Shifts the corner of the first pixel to (0, 0), where the first cell begins.
         let place = self.places[at].map(|x| x + 0.5);
         let inside = (0..2).all(|c| place[c] >= 0.0 && place[c] < size[c] as f32);
-        // Comparisons are false for what is not a number.
+        // NaN fails every comparison.
         let trusted = self.weights[at] > 0.0;
         if !inside || !trusted {
             return None;
@@ -55,10 +54,10 @@ impl Points<'_> {
     }
 }
 
-/// As many pixels as a photo may have: a network holds a gigabyte for so many.
+/// Same limit as for photos; a network needs a gigabyte for this size.
 const MOST_PIXELS: usize = 1 << 24;
 
-/// Refuses sizes that no picture has, as files may claim any.
+/// Rejects implausible sizes, because files may contain any.
 pub(crate) fn check_size([width, height]: [usize; 2]) -> Result<(), Error> {
     let sides = 2..=1 << 24;
     if sides.contains(&width) && sides.contains(&height) && width * height <= MOST_PIXELS {
@@ -68,15 +67,16 @@ pub(crate) fn check_size([width, height]: [usize; 2]) -> Result<(), Error> {
     Err(Error::new("image size", "at least 2 x 2 and at most 16777216 pixels", found))
 }
 
-/// The feature image `(1, columns + 3, height, width)` of points in an image of `size` (width, height) pixels, in cells
-/// of [`CELL`] pixels.
+/// Makes the feature image `(1, columns + 3, height, width)` of points in an image of `size`
+/// (width, height) pixels, in cells of [`CELL`] pixels.
 ///
-/// Channels: the descriptor (of unit length, times the root of its columns), the place inside the cell from -1 to 1,
-/// the weight. Of several points in a cell the mean by weight, and the largest weight; the nearest one where depths are
-/// known. Zero where no point is.
+/// Channels: the descriptor (of unit length, times the root of its columns), the position inside
+/// the cell from -1 to 1, the weight. Several points in a cell give their weighted mean and the
+/// largest weight; with depths, the nearest point. Cells without points are zero.
 ///
 /// # Errors
-/// When the columns of `points` differ in length, or a side has less than 2 pixels or the image more than 2^24.
+/// If the columns of `points` differ in length, a side has less than 2 pixels, or the image has
+/// more than 2^24 pixels.
 pub fn feature_image(points: &Points<'_>, size: [usize; 2]) -> Result<Tensor, Error> {
     points.check()?;
     check_size(size)?;
@@ -96,7 +96,7 @@ pub fn feature_image(points: &Points<'_>, size: [usize; 2]) -> Result<Tensor, Er
                 continue;
             }
             nearest[cell] = depths[at];
-            // What was behind it is forgotten.
+            // Removes farther points of the cell.
             (0..=columns + 2).for_each(|channel| values[channel * plane + cell] = 0.0);
             total[cell] = 0.0;
         }

@@ -1,5 +1,3 @@
-//! From feature images to pictures.
-
 use std::path::Path;
 
 use unlift::{Descriptors, Error};
@@ -8,7 +6,7 @@ use unlift_nn::{DescriptorKind, Entry, Network, Tensor, entry};
 
 use crate::feature_image::{Points, feature_image};
 
-/// A network that was trained to make pictures of points and their descriptors.
+/// A network trained to make pictures from points and their descriptors.
 #[derive(Debug)]
 pub struct Inverter {
     kind: DescriptorKind,
@@ -16,35 +14,35 @@ pub struct Inverter {
 }
 
 impl Inverter {
-    /// The inverter of descriptors of `kind`.
+    /// Loads the inverter of descriptors of `kind`.
     ///
     /// # Errors
-    /// When the program carries none and there is none among the models of its user, or a file of the model cannot be
-    /// used.
+    /// If it is neither embedded nor in the user's folders, or its file cannot be loaded.
     pub fn of(kind: DescriptorKind) -> Result<Self, Error> {
         Ok(Self { kind, network: Network::load(model(kind))? })
     }
 
-    /// The inverter of descriptors of `kind` in a file, as `training/inversion` exports them: input `features`
+    /// Loads an inverter from a file, as `training/inversion` exports it: input `features`
     /// `(1, columns + 3, h, w)`, which is a [`feature_image`], output `picture` `(1, 3, 2 h, 2 w)`.
     ///
     /// # Errors
-    /// When the file cannot be read, or has other inputs and outputs.
+    /// If the file cannot be read, or has other inputs and outputs.
     pub fn read(path: &Path, kind: DescriptorKind) -> Result<Self, Error> {
         let entry = Entry { sha256: None, ..*entry(model(kind))? };
         Ok(Self { kind, network: Network::read_plain(path, &entry)? })
     }
 
-    /// SHA-256 of the model, in hexadecimal.
+    /// Returns the SHA-256 of the model, in hexadecimal.
     pub fn sha256(&self) -> &str {
         self.network.sha256()
     }
 
-    /// The picture of points in an image of `size` (width, height) pixels, at half that size, rounded down.
+    /// Makes the picture of points in an image of `size` (width, height) pixels, at half that size,
+    /// rounded down.
     ///
     /// # Errors
-    /// When the columns of `points` differ in length, their descriptors are not of the kind that the network knows, or
-    /// a side has less than 2 pixels or the image more than 2^24.
+    /// If the columns of `points` differ in length, their descriptors are of another kind, a side
+    /// has less than 2 pixels, or the image has more than 2^24 pixels.
     pub fn invert(&self, points: &Points<'_>, size: [usize; 2]) -> Result<ColorImage, Error> {
         self.takes(points.descriptors)?;
         let features = feature_image(points, size)?;
@@ -62,7 +60,6 @@ impl Inverter {
         }
     }
 
-    /// Whether `descriptors` are of the kind that the network knows.
     fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
         let found = match descriptors.is_empty() {
             true => return Ok(()),
@@ -71,12 +68,11 @@ impl Inverter {
         if found == self.kind {
             return Ok(());
         }
-        let expected = format!("descriptors as the network knows them ({:?})", self.kind);
+        let expected = format!("descriptors of the network's kind ({:?})", self.kind);
         Err(Error::new("pictures", expected, format!("{found:?}")))
     }
 }
 
-/// The model that paints descriptors of `kind`.
 fn model(kind: DescriptorKind) -> &'static str {
     match kind {
         DescriptorKind::Sift => "inverter-sift",
@@ -85,7 +81,7 @@ fn model(kind: DescriptorKind) -> &'static str {
     }
 }
 
-/// The upper-left part of planes `(1, 3, height, width)` from 0 to 1, rounded to bytes.
+/// Crops planes `(1, 3, height, width)` with values from 0 to 1 and rounds them to bytes.
 fn color_image(planes: &Tensor, [width, height]: [usize; 2]) -> Result<ColorImage, Error> {
     let [.., rows, columns] = planes.shape() else { unreachable!("four sides were seen") };
     let (plane, columns) = (rows * columns, *columns);

@@ -1,28 +1,29 @@
-//! From directions in a camera's frame to places in its image, for every camera model of COLMAP.
+//! Projection of directions in a camera's frame into its image, for every camera model of COLMAP.
 //!
-//! Source: COLMAP's documentation ("Camera Models") and the papers it names; no model's inverse is needed here.
+//! Source: COLMAP's documentation ("Camera Models") and the papers it cites.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use unlift::Error;
 
-/// Angles that are tried for the one at which a model folds: 0.03 degrees apart.
+/// Number of angles tested for the fold of a model: 0.03 degrees apart.
 const TRIED: usize = 6000;
 
-/// What a camera model does to directions.
+/// The distortion of a camera model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
-    /// Perspective, radial distortion `(1 + k1 r2 + k2 r4 + k3 r6) / (1 + k4 r2 + k5 r4 + k6 r6)`, tangential `p`.
+    /// Perspective, radial distortion `(1 + k1 r2 + k2 r4 + k3 r6) / (1 + k4 r2 + k5 r4 + k6 r6)`,
+    /// tangential `p`.
     Perspective { k: [f64; 6], p: [f64; 2] },
-    /// Angle from the axis, times `1 + k1 a2 + k2 a4 ..`, then tangential and thin-prism terms.
+    /// Fisheye: the angle from the axis, times `1 + k1 a2 + k2 a4 ..`.
     Fisheye { k: [f64; 6] },
-    /// THIN_PRISM_FISHEYE: the angle, then radial terms in its square, added.
+    /// THIN_PRISM_FISHEYE: the angle with radial, tangential and thin-prism terms, added.
     ThinPrism { k: [f64; 4], p: [f64; 2], s: [f64; 2] },
     /// RAD_TAN_THIN_PRISM_FISHEYE.
     RadTan { k: [f64; 6], p: [f64; 2], s: [f64; 4] },
     /// FOV: one parameter, an angle.
     Fov(f64),
-    /// One parameter, by which the distorted radius is divided.
+    /// Division: one parameter, by which the distorted radius is divided.
     Division(f64),
     /// EUCM: alpha and beta.
     Unified(f64, f64),
@@ -31,7 +32,7 @@ enum Kind {
 }
 
 impl Kind {
-    /// Up to which angle from the axis places lie the further out the larger the angle.
+    /// Returns the largest angle from the axis up to which the image radius increases.
     fn most(&self) -> f64 {
         let all = match self {
             Self::Perspective { .. } | Self::Fov(_) | Self::Division(_) => FRAC_PI_2,
@@ -49,7 +50,7 @@ impl Kind {
         all
     }
 
-    /// How far out the radial terms alone lead; `None` beyond a pole.
+    /// Returns the image radius by the radial terms alone; `None` beyond a pole.
     fn radial(&self, angle: f64) -> Option<f64> {
         Some(match self {
             Self::Perspective { k, .. } => {
@@ -63,7 +64,7 @@ impl Kind {
             }
             Self::Fisheye { k } | Self::RadTan { k, .. } => angle * polynomial(k, angle * angle),
             Self::ThinPrism { k, .. } => angle * polynomial(k, angle * angle),
-            // These have no polynomial; where they end, `bent` knows.
+            // These have no polynomial; `bent` detects their limits.
             Self::Fov(_) | Self::Division(_) | Self::Unified(..) | Self::Equirectangular => angle,
         })
     }
@@ -73,17 +74,17 @@ impl Kind {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lens {
     kind: Kind,
-    /// Up to which angle from the axis the model leads outward: beyond, its polynomial folds back.
+    /// Largest angle from the axis; beyond it the model folds back.
     most: f64,
     focal: [f64; 2],
     center: [f64; 2],
 }
 
 impl Lens {
-    /// The lens of COLMAP's camera model `model` with its parameters, in COLMAP's order.
+    /// Creates the lens of COLMAP's camera model `model` from its parameters, in COLMAP's order.
     ///
     /// # Errors
-    /// When the model is not known or has another number of parameters, or one is not finite.
+    /// If the model is unknown or has another number of parameters, or one is not finite.
     pub fn try_new(model: &str, params: &[f64]) -> Result<Self, Error> {
         if let Some(bad) = params.iter().find(|x| !x.is_finite()) {
             return Err(Error::new(model, "finite parameters", bad.to_string()));
@@ -95,7 +96,7 @@ impl Lens {
             k
         };
         let plain = |k: [f64; 6], p: [f64; 2]| Kind::Perspective { k, p };
-        // One focal length or two, how many parameters follow the center.
+        // Single focal length, number of parameters after the center, distortion.
         let (single, n, kind) = match model {
             "SIMPLE_PINHOLE" => (true, 0, plain([0.0; 6], [0.0; 2])),
             "PINHOLE" => (false, 0, plain([0.0; 6], [0.0; 2])),
@@ -141,8 +142,8 @@ impl Lens {
         Ok(Self { most: kind.most(), kind, focal, center: [f(first), f(first + 1)] })
     }
 
-    /// Where a point at `x` (right, down, ahead of the camera) is seen, in pixels with the middle of the first pixel
-    /// at (0, 0); `None` where the lens does not see it: behind the camera, or where the model folds back.
+    /// Projects a point at `x` (right, down, forward) into the image, in pixels with the middle of
+    /// the first pixel at (0, 0). `None` behind the camera, or where the model folds back.
     pub fn project(&self, x: [f64; 3]) -> Option<[f64; 2]> {
         let radius = libm::sqrt(x[0] * x[0] + x[1] * x[1]);
         if libm::atan2(radius, x[2]) > self.most {
@@ -154,11 +155,11 @@ impl Lens {
         place.iter().all(|x| x.is_finite()).then_some(place)
     }
 
-    /// The place on a plane one focal length away.
+    /// Returns the position on the plane at focal length one.
     fn bent(&self, [x, y, z]: [f64; 3]) -> Option<[f64; 2]> {
         let flat = [x / z, y / z];
         let radius = libm::sqrt(x * x + y * y);
-        // Toward the angle from the axis, in the direction of the point.
+        // The angle from the axis, in the direction of the point.
         let angle = libm::atan2(radius, z);
         let angular = match radius > 0.0 {
             true => [x / radius * angle, y / radius * angle],
@@ -187,7 +188,7 @@ impl Lens {
             Kind::RadTan { k, p, s } => {
                 let radial = angular.map(|x| x * polynomial(k, angle * angle));
                 let r2 = squared(radial);
-                // Here the first tangential parameter goes across.
+                // Here the first tangential parameter is horizontal.
                 let moved = tangential(radial, r2, [p[1], p[0]]);
                 [0, 1].map(|c| radial[c] + moved[c] + s[2 * c] * r2 + s[2 * c + 1] * r2 * r2)
             }
@@ -224,7 +225,7 @@ impl Lens {
     }
 }
 
-/// `1 + k1 x + k2 x^2 ..`
+/// Returns `1 + k1 x + k2 x^2 ..`.
 fn polynomial(k: &[f64], x: f64) -> f64 {
     1.0 + x * k.iter().rev().fold(0.0, |sum, k| k + x * sum)
 }

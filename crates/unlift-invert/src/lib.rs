@@ -1,12 +1,13 @@
-//! Pictures from keypoints and descriptors, and how much of the photo they show (Sec. 4.3 and 6 of the paper).
+//! Pictures from keypoints and descriptors, and their similarity to the photo (Sec. 4.3 and 6 of
+//! the paper).
 //!
 //! ```text
 //! places, descriptors, weights ──> feature image ──> Inverter ──> picture ──> metrics, Detector
 //! points of a map, a camera ──> projection ──┘                    photo ──┘
 //! ```
 //!
-//! Pictures are [`ColorImage`]s, so whatever is compared was rounded to bytes first. Places are in pixels with the
-//! middle of the first pixel at (0, 0), as everywhere in unlift.
+//! Pictures are [`ColorImage`]s, so metrics compare values rounded to bytes. Positions are in
+//! pixels with the middle of the first pixel at (0, 0), as everywhere in unlift.
 
 mod compared;
 mod detect;

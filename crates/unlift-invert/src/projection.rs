@@ -1,46 +1,49 @@
-//! A map seen by a camera: where its points are in an image, and which of them it can see.
+//! Projection of a map into a camera, with an occlusion test.
 
 use unlift::Error;
 
 use crate::feature_image::check_size;
 use crate::lens::Lens;
 
-/// A camera somewhere in the world.
+/// A camera with its pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
-    /// Where it is, in units of the map.
+    /// Camera center, in units of the map.
     pub center: [f64; 3],
-    /// How it is turned: a point `x` is at `rotation (x - center)` from it, to the right, down and ahead.
+    /// Rotation from the map to the camera: `rotation (x - center)` is a point `x` in the frame
+    /// right, down, forward.
     pub rotation: [[f64; 3]; 3],
-    /// What it looks through.
+    /// The lens.
     pub lens: Lens,
-    /// Width and height of its image in pixels.
+    /// Width and height of the image in pixels.
     pub size: [usize; 2],
 }
 
-/// The points of a map that lie in an image.
+/// The points of a map that project into an image.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Projection {
-    /// Which points, rising.
+    /// Indices of the points, ascending.
     pub points: Vec<u32>,
-    /// Where they are, `(n, 2)`, in pixels, the middle of the first one at (0, 0).
+    /// Positions `(n, 2)` in pixels, the middle of the first pixel at (0, 0).
     pub places: Vec<[f32; 2]>,
-    /// How far ahead of the camera they are, `(n,)`, in units of the map.
+    /// Distances from the camera, `(n,)`, in units of the map.
     pub depths: Vec<f32>,
 }
 
 /// Side of a window of the occlusion test in pixels.
 const WINDOW: usize = 16;
-/// A point this much farther than what lies before it is hidden.
+/// A point is hidden if it is farther than others by this factor.
 const BEHIND: f32 = 1.15;
-/// How many points before a point hide it: fewer may be errors.
+/// Number of nearer points that hide a point; fewer may be outliers.
 const ENOUGH: usize = 3;
 
 impl View {
-    /// The points that fall into the image, hidden or not. Positions that are `None` or not finite are left out.
+    /// Projects points into the image, hidden or not. Skips positions that are `None` or not
+    /// finite.
     ///
     /// # Errors
-    /// When there are more points than 32 bits count, or no feature image is as large as the camera's.
+    /// If there are more points than 32 bits can count, or the image is too large for a feature
+    /// image.
     pub fn project(&self, points: &[Option<[f64; 3]>]) -> Result<Projection, Error> {
         check_size(self.size)?;
         u32::try_from(points.len()).map_err(|_| {
@@ -64,7 +67,7 @@ impl View {
 }
 
 impl Projection {
-    /// Those of the points for which `keep` says so of their row here.
+    /// Keeps the points for whose row `keep` is true.
     #[must_use]
     pub fn only(&self, keep: impl Fn(usize) -> bool) -> Self {
         let kept: Vec<usize> = (0..self.points.len()).filter(|&at| keep(at)).collect();
@@ -75,11 +78,13 @@ impl Projection {
         }
     }
 
-    /// Which points nothing lies before: a point is hidden where several others of the window around it, 16 pixels
-    /// wide, are clearly nearer. Sparse points hide little, so some hidden ones pass.
+    /// Returns which points are visible. A point is hidden if at least three points in the window
+    /// around it, 16 pixels wide, are clearly nearer. Where points are sparse, some hidden ones
+    /// pass.
     pub fn visible(&self, size: [usize; 2]) -> Vec<bool> {
         let [width, height] = size.map(|side| side.div_ceil(WINDOW / 2));
-        // Windows overlap by half: cells of half the side, a point looks at the four that are nearest to it.
+        // Windows overlap by half: cells have half the side, and each point checks the four nearest
+        // cells.
         let cell = |place: [f32; 2]| place.map(|x| (x + 0.5).max(0.0) / (WINDOW / 2) as f32);
         let mut depths: Vec<Vec<f32>> = vec![Vec::new(); width * height];
         for (place, depth) in self.places.iter().zip(&self.depths) {

@@ -1,14 +1,13 @@
-//! Peak signal-to-noise ratio.
-
 use unlift::Error;
 use unlift_features::ColorImage;
 
 use crate::sizes::check_sizes;
 
-/// `10 log10(255^2 / MSE)` in dB, the mean over all pixels and colors; infinite for equal pictures.
+/// Returns `10 log10(255^2 / MSE)` in dB, with the mean over all pixels and colors; infinite for
+/// equal pictures.
 ///
 /// # Errors
-/// When the pictures differ in size.
+/// If the pictures differ in size.
 pub fn psnr(a: &ColorImage, b: &ColorImage) -> Result<f64, Error> {
     check_sizes(a, b, 1)?;
     let square = |(&a, &b): (&u8, &u8)| u64::from(a.abs_diff(b)).pow(2);

@@ -1,12 +1,7 @@
-//! Whether pictures can be compared.
-
 use unlift::Error;
 use unlift_features::ColorImage;
 
-/// Whether two pictures have the same size, of at least `least` pixels a side.
-///
-/// # Errors
-/// One line with both sizes.
+/// Checks that two pictures have the same size, with at least `least` pixels per side.
 pub(crate) fn check_sizes(a: &ColorImage, b: &ColorImage, least: usize) -> Result<(), Error> {
     let size = |image: &ColorImage| format!("{} x {}", image.width(), image.height());
     if (a.width(), a.height()) != (b.width(), b.height()) {

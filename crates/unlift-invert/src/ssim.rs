@@ -1,14 +1,14 @@
 //! Structural similarity.
 //!
-//! Source: Wang et al., "Image Quality Assessment: From Error Visibility to Structural Similarity", IEEE TIP 2004, with
-//! the choices that scikit-image has by default and inversion papers use: uniform windows, sample covariance.
+//! Source: Wang et al., "Image Quality Assessment: From Error Visibility to Structural Similarity",
+//! IEEE TIP 2004, with the defaults of scikit-image, which inversion papers use: uniform windows,
+//! sample covariance.
 
 use unlift::Error;
 use unlift_features::ColorImage;
 
 use crate::sizes::check_sizes;
 
-/// Side of a window.
 const WINDOW: usize = 7;
 const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);
 const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
@@ -39,12 +39,11 @@ impl Sums {
         }
     }
 
-    /// What comes in without what goes out.
+    /// Adds the entering and subtracts the leaving sums.
     fn moved(self, enters: Self, leaves: Self) -> Self {
         self.zip(enters, |x, y| x + y).zip(leaves, |x, y| x - y)
     }
 
-    /// The similarity of a window with these sums.
     fn similarity(self) -> f64 {
         let n = (WINDOW * WINDOW) as f64;
         let mean = |sum: u64| sum as f64 / n;
@@ -57,15 +56,15 @@ impl Sums {
     }
 }
 
-/// Mean structural similarity over all windows of 7 x 7 pixels that lie within the pictures, and over the colors.
+/// Returns the mean structural similarity over all windows of 7 x 7 pixels inside the pictures, and
+/// over the colors.
 ///
 /// # Errors
-/// When the pictures differ in size or a side has less than 7 pixels.
+/// If the pictures differ in size, or a side has less than 7 pixels.
 pub fn ssim(a: &ColorImage, b: &ColorImage) -> Result<f64, Error> {
     check_sizes(a, b, WINDOW)?;
     let (width, height) = (a.width(), a.height());
     let stride = 3 * width;
-    // Sums over seven rows, of every column and color.
     let mut columns = vec![Sums::default(); stride];
     let pair =
         |y: usize, x: usize| Sums::of(a.pixels()[y * stride + x], b.pixels()[y * stride + x]);

@@ -1,4 +1,4 @@
-//! Feature images, against those that training sees and against a slow twin.
+//! Feature images, compared with those of training and with a slow implementation.
 
 use safetensors::SafeTensors;
 use unlift::descriptors::Values;
@@ -22,7 +22,7 @@ fn floats(file: &SafeTensors, name: &str) -> Vec<f32> {
     view.data().as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect()
 }
 
-/// The golden points: their places are counted from the corner of the first pixel there, from its middle here.
+/// Reads the golden points and converts positions from the corner to the middle of the first pixel.
 fn columns() -> (Columns, Vec<f32>) {
     let file = SafeTensors::deserialize(GOLDEN).unwrap();
     let places = floats(&file, "places");
@@ -44,7 +44,7 @@ fn image(columns: &Columns, with_depths: bool) -> Result<Tensor, Error> {
     feature_image(&Points { places, descriptors, weights, depths }, SIZE)
 }
 
-/// Cell by cell, looking at every point.
+/// Computes the feature image cell by cell over all points.
 fn slow(columns: &Columns, with_depths: bool) -> Vec<f32> {
     let [width, height] = SIZE.map(|side| side.div_ceil(CELL));
     let mut values = vec![0.0; (COLUMNS + 3) * width * height];
@@ -126,7 +126,7 @@ fn points_nowhere_are_left_out() {
     assert_eq!(error, "weights: expected 150, one per point, found 149");
 }
 
-/// A camera may claim any size: memory goes with it.
+/// A camera may declare any size, and memory depends on it.
 #[test]
 fn sizes_that_no_photo_has_are_refused() {
     let (columns, _) = columns();

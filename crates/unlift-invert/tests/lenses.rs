@@ -1,4 +1,4 @@
-//! Every camera model of COLMAP, against what COLMAP 4.2 computes.
+//! Every camera model of COLMAP, compared with COLMAP 4.2.
 
 use unlift_invert::Lens;
 
@@ -8,7 +8,8 @@ const POINTS: [[f64; 3]; 5] =
 
 type Seen = (&'static str, &'static [f64], [[f64; 2]; 5]);
 
-/// Model, parameters, and `pycolmap.Camera.img_from_cam` of each point: the middle of the first pixel at (0.5, 0.5).
+/// Model, parameters, and `pycolmap.Camera.img_from_cam` of each point: the middle of the first
+/// pixel at (0.5, 0.5).
 #[rustfmt::skip]
 const SEEN: [Seen; 18] = [
     ("SIMPLE_PINHOLE", &[500.0, 320.0, 240.0], [[320.0, 240.0], [420.0, 173.333333], [1.818182, 421.818182], [748.571429, 561.428571], [288.75, -103.75]]),
@@ -48,17 +49,19 @@ fn what_a_lens_cannot_see_is_not_seen() {
     let plain = Lens::try_new("PINHOLE", &[500.0, 500.0, 320.0, 240.0]).unwrap();
     assert_eq!(plain.project([0.1, 0.1, -1.0]), None);
     assert_eq!(plain.project([0.0, 0.0, 0.0]), None);
-    // This polynomial is at its largest at a radius of 1.15: what lies further out would come back into the image.
+    // This polynomial has its maximum at a radius of 1.15; points beyond would fold back into the
+    // image.
     let folding = Lens::try_new("SIMPLE_RADIAL", &[500.0, 320.0, 240.0, -0.25]).unwrap();
     assert!(folding.project([1.1, 0.0, 1.0]).is_some());
     assert_eq!(folding.project([1.2, 0.0, 1.0]), None);
-    // This one folds at a radius of 1 and rises again from 1.41; that one has a pole at 1.83.
+    // The first model folds at a radius of 1 and rises again from 1.41; the second has a pole at
+    // 1.83.
     let rising = Lens::try_new("RADIAL", &[500.0, 320.0, 240.0, -0.5, 0.1]).unwrap();
     assert!(rising.project([0.9, 0.0, 1.0]).is_some());
     assert_eq!(rising.project([1.5, 0.0, 1.0]), None);
     let pole = [500.0, 500.0, 320.0, 240.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.3, 0.0, 0.0];
     assert_eq!(Lens::try_new("FULL_OPENCV", &pole).unwrap().project([8.0, 0.0, 1.0]), None);
-    // A fisheye sees a bit behind itself.
+    // A fisheye lens covers more than a half-space.
     let wide = Lens::try_new("SIMPLE_FISHEYE", &[200.0, 320.0, 240.0]).unwrap();
     assert!(wide.project([1.0, 0.0, -0.1]).is_some());
 }

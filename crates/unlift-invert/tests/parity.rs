@@ -1,4 +1,4 @@
-//! Metrics and detections, against scikit-image, the official LPIPS and YOLOX.
+//! Metrics and detections, compared with scikit-image, the official LPIPS and YOLOX.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use serde_json::Value;
 use unlift_features::load::read_color;
 use unlift_invert::{CLASSES, Detection, Detector, Lpips, Metrics};
 
-/// `../shared`, and the reference file `name` in it; `None` with a message where a clone lacks it.
+/// Returns `../shared` and the reference file `name` in it; `None` with a message if it is missing.
 fn reference(name: &str) -> Option<(PathBuf, Value)> {
     let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
     let path = shared.join("reference").join(name);
@@ -56,7 +56,8 @@ fn detections_are_those_of_others() {
                 Detection { class, score: number(&one["score"]), sides }
             })
             .collect();
-        // Another decoder's pixels differ by a level: objects at the threshold may come and go.
+        // Another JPEG decoder gives slightly different pixels, so only scores clearly above the
+        // threshold are compared.
         for (these, those) in [(&found, &expected), (&expected, &found)] {
             for one in these.iter().filter(|one| one.score > 0.15) {
                 let same =

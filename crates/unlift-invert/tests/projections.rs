@@ -1,4 +1,4 @@
-//! Maps seen by cameras.
+//! Projection of maps and occlusion.
 
 use unlift_invert::{Lens, View};
 
@@ -7,7 +7,7 @@ const SIZE: [usize; 2] = [640, 480];
 fn view() -> View {
     View {
         center: [1.0, 2.0, 3.0],
-        // Looks along the world's x, its right is -y.
+        // Looks along the world's x axis; right is -y.
         rotation: [[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]],
         lens: Lens::try_new("PINHOLE", &[500.0, 500.0, 320.0, 240.0]).unwrap(),
         size: SIZE,
@@ -25,7 +25,8 @@ fn points_are_where_the_camera_sees_them() {
         Some([3.0, -5.0, 3.0]),
     ];
     let found = view().project(&points).unwrap();
-    // Straight ahead; one to the right and a half down; the others are unknown, behind or beside.
+    // One point straight ahead, one to the right and below; the others are unknown, behind or
+    // outside.
     assert_eq!(found.points, [0, 3]);
     assert_eq!(found.places, [[319.5, 239.5], [569.5, 364.5]]);
     assert_eq!(found.depths[0], 2.0);
@@ -34,7 +35,7 @@ fn points_are_where_the_camera_sees_them() {
 
 #[test]
 fn a_wall_hides_what_is_behind_it() {
-    // Two walls in front of the camera, the near one over the left half; a grid of points 4 pixels apart on each.
+    // Two walls, the near one over the left half, with a grid of points 4 pixels apart on each.
     let wall = |depth: f64, columns: std::ops::Range<i32>| {
         columns.flat_map(move |x| (-40..40).map(move |y| (x, y))).map(move |(x, y)| {
             let [across, down] = [x, y].map(|at| (4.0 * f64::from(at) + 1.0) / 500.0 * depth);
@@ -49,7 +50,7 @@ fn a_wall_hides_what_is_behind_it() {
     let mut wrong = 0;
     for ((point, place), visible) in found.points.iter().zip(&found.places).zip(visible) {
         let truly = (*point as usize) < near.len() || place[0] > 320.0;
-        // Windows reach across the edge of the near wall.
+        // Windows extend across the edge of the near wall.
         if (place[0] - 320.0).abs() > 16.0 && place[0] > 84.0 {
             wrong += usize::from(truly != visible);
         }

@@ -1,16 +1,16 @@
-//! The bytes of a file that is one.
+//! Reads regular files.
 
 use std::fs;
 use std::io;
 use std::path::Path;
 
-/// All bytes of the file `path`.
+/// Reads all bytes of the file `path`.
 ///
 /// # Errors
-/// When it cannot be read, or is a pipe, a socket or a device: these may never end, or never begin.
+/// If it cannot be read, or is a pipe, a socket or a device, from which reading may never end.
 pub fn bytes(path: &Path) -> io::Result<Vec<u8>> {
     let metadata = fs::metadata(path)?;
-    // Of a folder, the system says so.
+    // For a folder, the system returns an error.
     if !metadata.is_file() && !metadata.is_dir() {
         return Err(io::Error::other("a pipe, a socket or a device"));
     }

@@ -1,4 +1,4 @@
-//! Where a model's file lies: in the user's folders, or in the program.
+//! The places of model files: in the user's folders, or embedded in the program.
 
 use std::path::PathBuf;
 
@@ -9,27 +9,27 @@ use crate::registry::Entry;
 /// The environment variable that names a folder of models.
 pub const VARIABLE: &str = "UNLIFT_MODELS";
 
-/// The folders in which models are looked for, before what the program carries.
+/// Folders that are searched for models before the embedded ones.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Folders {
-    /// What `UNLIFT_MODELS` names.
+    /// The folder in `UNLIFT_MODELS`.
     pub given: Option<PathBuf>,
-    /// The user's own: `unlift/models` where the system keeps data of programs.
+    /// `unlift/models` in the user's data folder.
     pub user: Option<PathBuf>,
 }
 
-/// Where a model is.
+/// The place of a model.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Place {
     /// A file.
     File(PathBuf),
-    /// In the program.
+    /// Embedded in the program.
     Carried,
 }
 
 impl Folders {
-    /// Those of this process: `UNLIFT_MODELS`, and `XDG_DATA_HOME/unlift/models` (`~/.local/share` where that is
-    /// not set, `%APPDATA%` on Windows).
+    /// Returns the folders of this process: `UNLIFT_MODELS`, and `XDG_DATA_HOME/unlift/models`
+    /// (default `~/.local/share`, on Windows `%APPDATA%`).
     pub fn of_process() -> Self {
         let set =
             |name| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
@@ -41,10 +41,10 @@ impl Folders {
         Self { given: set(VARIABLE), user: user.map(|data| data.join("unlift").join("models")) }
     }
 
-    /// Where the file of `entry` is: the first folder that has it, then the program; `None` where it is missing.
+    /// Finds the file of `entry` in the folders, then in the program; `None` if it is missing.
     ///
     /// # Errors
-    /// When `UNLIFT_MODELS` names something that is no folder.
+    /// If `UNLIFT_MODELS` is not a folder.
     pub fn find(&self, entry: &Entry) -> Result<Option<Place>, Error> {
         if let Some(given) = &self.given
             && !given.is_dir()
@@ -57,7 +57,7 @@ impl Folders {
         Ok(file.map(Place::File).or(entry.carried.map(|_| Place::Carried)))
     }
 
-    /// What to say where `entry` is missing: one line that tells where it belongs.
+    /// Returns the error for a missing `entry`, which names the folders it belongs in.
     pub fn missing(&self, entry: &Entry) -> Error {
         let folders = [&self.given, &self.user].into_iter().flatten();
         let folders: Vec<String> =

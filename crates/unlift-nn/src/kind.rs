@@ -1,28 +1,28 @@
-//! Of which feature descriptors are, by what they look like.
+//! Kinds of descriptors, detected from their values.
 
 use unlift::descriptors::Values;
 use unlift::neighbors::{Overlap, Source};
 use unlift::{Descriptors, Error, ErrorKind};
 
-/// Descriptors that networks are trained for.
+/// Descriptors for which networks are trained.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DescriptorKind {
-    /// 128 values, none negative: gradients of a patch, as `unlift features` and COLMAP write them.
+    /// 128 nonnegative values: gradients of a patch, as `unlift features` and COLMAP write them.
     Sift,
-    /// 128 floats that are not SIFT's.
+    /// 128 floats that are not SIFT.
     Aliked,
     /// 256 floats.
     SuperPoint,
 }
 
 impl DescriptorKind {
-    /// All of them, in the order of their numbers.
+    /// All kinds, in the order of their discriminants.
     pub const ALL: [Self; 3] = [Self::Sift, Self::Aliked, Self::SuperPoint];
 
-    /// What `descriptors` are taken for. Other features of 128 floats look the same as ALIKED.
+    /// Detects the kind of `descriptors`. Other features of 128 floats are taken for ALIKED.
     ///
     /// # Errors
-    /// One line, about `whose` they are, when they are none of these.
+    /// If they are of no known kind; the error names `whose` they are.
     pub fn of(descriptors: &Descriptors, whose: &str) -> Result<Self, Error> {
         let is_sift = Source::<2>::takes(&Overlap, descriptors).is_ok();
         let floats = matches!(descriptors.values(), Values::F32(_));
@@ -38,10 +38,10 @@ impl DescriptorKind {
         }
     }
 
-    /// The kind that users call `name`: "sift", "aliked" or "superpoint".
+    /// Returns the kind called `name`: "sift", "aliked" or "superpoint".
     ///
     /// # Errors
-    /// When there is none; the message lists all.
+    /// If there is none; the message lists all.
     pub fn from_name(name: &str) -> Result<Self, Error> {
         Self::ALL.into_iter().find(|kind| kind.name() == name).ok_or_else(|| {
             let names = Self::ALL.map(Self::name).join(", ");
@@ -49,7 +49,7 @@ impl DescriptorKind {
         })
     }
 
-    /// As users write it.
+    /// Returns the name that users type.
     pub fn name(self) -> &'static str {
         match self {
             Self::Sift => "sift",
@@ -58,7 +58,7 @@ impl DescriptorKind {
         }
     }
 
-    /// How many values one has.
+    /// Returns the number of values of a descriptor.
     pub fn dim(self) -> usize {
         match self {
             Self::Sift | Self::Aliked => 128,

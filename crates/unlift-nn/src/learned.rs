@@ -14,32 +14,33 @@ use crate::tensor::Tensor;
 
 const NAME: &str = "learned";
 
-/// Sources that need a network, as users choose them: beside [`unlift::neighbors::sources::SOURCES`].
+/// The sources that need a network, in addition to [`unlift::neighbors::sources::SOURCES`].
 pub const SOURCES: &[SourceEntry] = &[SourceEntry {
     name: NAME,
-    summary: "records that a network, trained on photos, takes for near ones; SIFT or ALIKED descriptors",
+    summary: "records that a network trained on photos scores as near; SIFT or ALIKED descriptors",
     in_2d: Some(|| Arc::new(Learned::default())),
     in_3d: Some(|| Arc::new(Learned::default())),
 }];
 
-/// The `k` records that a network finds nearest by their descriptors, or that a short walk over such records
-/// reaches: [`scored`] by what `training/neighbors` trains. It is fed what is known without training, too: how well
-/// patches overlap (SIFT), how alike descriptors are (learned ones).
+/// Lists the `k` records that a network scores highest by their descriptors, directly or over a
+/// short walk: [`scored`] with a network of `training/neighbors`. Its inputs include training-free
+/// scores: overlap of patches (SIFT) or similarity of descriptors (learned ones).
 ///
-/// Which network follows from the descriptors: SIFT, floats of 128 values that are not SIFT (taken for ALIKED's) or of
-/// 256 (SuperPoint's, whose network users train for themselves). Of others `similarity` says all there is.
+/// The descriptors choose the network: SIFT, 128 floats that are not SIFT (taken for ALIKED), or
+/// 256 floats (SuperPoint, whose network users train themselves).
 ///
-/// Source: Sec. 5 and supplement E, where positions are not known either; pair scores, the loss and the walk are ours.
+/// Source: Sec. 5 and supplement E, where positions are not known either; pair scores, the loss and
+/// the walk are ours.
 #[derive(Clone, Debug, Default)]
 pub struct Learned {
     network: Option<Arc<Network>>,
 }
 
-/// What a standard deviation of a learned descriptor's cosines counts beside the network's scores. The network tells who is
-/// among the nearest twenty, and not who is the nearest, which likeness does tell (docs/decisions/sources.md).
+/// Weight of a standard deviation of learned descriptors' cosines beside the network's scores. The
+/// network finds the nearest twenty but does not order them; similarity does
+/// (docs/decisions/sources.md).
 const LIKENESS: f32 = 0.2;
 
-/// The model that scores pairs of such descriptors.
 fn model(kind: DescriptorKind) -> &'static str {
     match kind {
         DescriptorKind::Sift => "neighbors-sift",
@@ -48,7 +49,6 @@ fn model(kind: DescriptorKind) -> &'static str {
     }
 }
 
-/// The network for such descriptors, loaded once.
 fn network(kind: DescriptorKind) -> Result<&'static Network, Error> {
     static LOADED: [OnceLock<Result<Network, Error>>; DescriptorKind::ALL.len()] =
         [const { OnceLock::new() }; DescriptorKind::ALL.len()];
@@ -57,7 +57,7 @@ fn network(kind: DescriptorKind) -> Result<&'static Network, Error> {
 }
 
 impl Learned {
-    /// With another network than the one that descriptors decide: inputs `descriptors` (n, dim) of unit length and
+    /// Creates the source with a given network: inputs `descriptors` (n, dim) of unit length and
     /// `pairs` (reaches, n, n) of [`dense`], output `scores` (n, n).
     pub fn with(network: Arc<Network>) -> Self {
         Self { network: Some(network) }
@@ -81,7 +81,7 @@ impl<const D: usize> Source<D> for Learned {
     }
 
     fn k(&self, released: &Released<D>) -> usize {
-        // Of an image's fewer keypoints only the first of a ranking are near; of learned descriptors the first are mostly right.
+        // Images have fewer keypoints, so only the first of a ranking are near.
         match released.descriptors().map(|some| DescriptorKind::of(some, NAME)) {
             Some(Ok(DescriptorKind::Sift)) | None => Source::<D>::k(&Overlap, released),
             Some(_) if D == 2 => 7,
@@ -98,7 +98,7 @@ impl<const D: usize> Source<D> for Learned {
     }
 
     fn note(&self, n_slots: usize) -> Option<String> {
-        // Sets are made of what is found without training.
+        // Large maps are split into sets with the training-free source.
         Source::<D>::note(&Overlap, n_slots)
     }
 }

@@ -1,13 +1,13 @@
-//! Learned networks: which models there are, where their files lie, and running them.
+//! Learned networks: the list of models, their files, and how to run them.
 //!
 //! ```text
 //! name ──> registry ──> folders, or what the program carries ──> hash, ports ──> Network ──> run
 //! ```
 //!
-//! A *model* is a file in ONNX, a *network* is one that is loaded. [`MODELS`] lists all models that the program
-//! knows: some it carries, others are the user's to supply. What goes into a
-//! network and comes out are [`Tensor`]s, made and read by whoever uses it: [`Learned`], a source of neighborhoods,
-//! and the extractors of `unlift-features`.
+//! A *model* is a file in ONNX, a *network* is a loaded model. [`MODELS`] lists all models: some
+//! are embedded in the program, others are supplied by the user. Inputs and outputs are
+//! [`Tensor`]s, which the users of a network make and read: the source [`Learned`], and the
+//! extractors of `unlift-features`.
 //!
 //! ```
 //! use unlift_nn::{Network, Tensor};

@@ -1,4 +1,4 @@
-//! A network from a file of a model: checked, loaded, run.
+//! Checks, loads and runs the network of a model file.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -19,16 +19,16 @@ use crate::registry::{Entry, Port, entry};
 use crate::tensor::Tensor;
 use crate::wire;
 
-/// A model that is loaded. Shared by threads: [`run`](Self::run) may be called from many at once.
+/// A loaded model. Threads can share it and call [`run`](Self::run) at the same time.
 pub struct Network {
-    /// How it is called in errors: a path, or the name of what the program carries.
+    /// Name in errors: a path, or the name of an embedded model.
     place: String,
     sha256: String,
-    // Boxed: half a kilobyte, and networks stand in enums beside small things.
+    // Boxed, because it has half a kilobyte and networks are fields of small enums.
     model: Box<rten::Model>,
-    /// What the model gives, of which shapes.
+    /// The model's outputs and their shapes.
     outputs: &'static [Port],
-    /// One per call that runs at the same time, each of one thread.
+    /// Idle pools of one thread each, one per concurrent call.
     idle: Mutex<Vec<Arc<ThreadPool>>>,
 }
 
@@ -42,19 +42,20 @@ impl fmt::Debug for Network {
 }
 
 impl Network {
-    /// The model `name` of [`MODELS`](crate::MODELS), from where [`Folders::of_process`] finds it.
+    /// Loads the model `name` of [`MODELS`](crate::MODELS) from the place where
+    /// [`Folders::of_process`] finds it.
     ///
     /// # Errors
-    /// One line: no such name, missing, another file than the one that is known by its hash, no ONNX, or one with other
-    /// inputs and outputs.
+    /// If there is no such name, the model is missing, its hash differs, it is not ONNX, or it has
+    /// other inputs and outputs.
     pub fn load(name: &str) -> Result<Self, Error> {
         Self::load_from(&Folders::of_process(), entry(name)?)
     }
 
-    /// The same from given folders.
+    /// Loads the model of `entry` from given folders.
     ///
     /// # Errors
-    /// As [`load`](Self::load).
+    /// See [`load`](Self::load).
     pub fn load_from(folders: &Folders, entry: &Entry) -> Result<Self, Error> {
         match (folders.find(entry)?, entry.carried) {
             (Some(Place::File(path)), _) => Self::read(&path, entry),
@@ -66,19 +67,20 @@ impl Network {
         }
     }
 
-    /// The model in a file anywhere, as `entry` describes it.
+    /// Loads the model in the file `path`, as `entry` describes it.
     ///
     /// # Errors
-    /// As [`load`](Self::load), and when the file cannot be read.
+    /// See [`load`](Self::load); also if the file cannot be read.
     pub fn read(path: &Path, entry: &Entry) -> Result<Self, Error> {
         Self::read_with(path, entry, OpRegistry::with_all_ops)
     }
 
-    /// The model in a file of a stranger, as `entry` describes it: with plain operators alone, whose results are about as large as
-    /// what they are made of or as the file, so that none makes anything huge or endless out of a few numbers.
+    /// Loads a model from an untrusted file, as `entry` describes it. Only plain operators are
+    /// allowed, whose results are about as large as their inputs or the file, so that a small file
+    /// cannot use unlimited memory or time.
     ///
     /// # Errors
-    /// As [`read`](Self::read), and when it has other operators.
+    /// See [`read`](Self::read); also if it has other operators.
     pub fn read_plain(path: &Path, entry: &Entry) -> Result<Self, Error> {
         Self::read_with(path, entry, plain_operators)
     }
@@ -90,7 +92,6 @@ impl Network {
         Self::from_bytes(Cow::Owned(bytes), (&place, entry), operators)
     }
 
-    /// The model of these bytes, called `place` in errors.
     fn from_bytes(
         bytes: Cow<'static, [u8]>,
         (place, entry): (&str, &Entry),
@@ -105,7 +106,7 @@ impl Network {
         wire::check(&bytes).map_err(|found| Error::new(place, "a model in ONNX", found))?;
         let model = aside(|| {
             let mut options = ModelOptions::with_ops(operators());
-            // Twice the memory of the weights, a tenth of the time.
+            // Uses twice the memory of the weights, but a tenth of the time.
             options.prepack_weights(true);
             match bytes {
                 Cow::Borrowed(bytes) => options.load_static_slice(bytes),
@@ -127,19 +128,20 @@ impl Network {
         Ok(network)
     }
 
-    /// SHA-256 of the file, in hexadecimal.
+    /// Returns the SHA-256 of the file, in hexadecimal.
     pub fn sha256(&self) -> &str {
         &self.sha256
     }
 
-    /// Runs the parts of the network that lead from `inputs` to `outputs`, by their names, on one thread.
+    /// Runs the part of the network from `inputs` to `outputs`, given by name, on one thread.
     ///
-    /// One thread, as there are many pictures or maps to do at once: whoever calls this does so from as many threads
-    /// as there are, and the numbers do not depend on how many that is. They may differ in the last bits between
-    /// machines with other vector instructions.
+    /// Callers process several pictures or maps in parallel, so results do not depend on the number
+    /// of threads. They may differ in the last bits between machines with other vector
+    /// instructions.
     ///
     /// # Errors
-    /// When a name is not one of the network's, a shape is not what it takes, or an output is no array of floats.
+    /// If the network has no such name, a shape does not fit, or an output is not an array of
+    /// floats.
     pub fn run<const N: usize>(
         &self,
         inputs: Vec<(&str, Tensor)>,
@@ -152,10 +154,10 @@ impl Network {
         found.try_into().map_err(fewer)
     }
 
-    /// The same with any number of outputs.
+    /// Runs the network like [`run`](Self::run), with any number of outputs.
     ///
     /// # Errors
-    /// As [`run`](Self::run).
+    /// See [`run`](Self::run).
     pub fn run_all(
         &self,
         inputs: Vec<(&str, Tensor)>,
@@ -183,7 +185,7 @@ impl Network {
         let tensors = values.into_iter().zip(outputs).map(|(value, name)| match value {
             Value::FloatTensor(tensor) => {
                 let shape = tensor.shape().to_vec();
-                // What a file says of its outputs need not be so.
+                // The declared shapes of a file may be wrong.
                 let port = self.outputs.iter().find(|port| port.name == *name);
                 if let Some(port) = port.filter(|port| !port.takes(&shape)) {
                     return Err(wrong(&format!("an output {port}"), &format!("{shape:?}")));
@@ -196,11 +198,11 @@ impl Network {
     }
 
     fn idle(&self) -> MutexGuard<'_, Vec<Arc<ThreadPool>>> {
-        // A list of idle pools is whole whatever happened to who held it.
+        // The list stays valid if another thread panics.
         self.idle.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether the file has these inputs or outputs, of these shapes.
+    /// Checks that the file has these inputs or outputs, with these shapes.
     fn check(&self, ports: &[Port], ids: &[NodeId], kind: &str) -> Result<(), Error> {
         for port in ports {
             let info = ids.iter().filter_map(|&id| self.model.node_info(id));
@@ -212,7 +214,7 @@ impl Network {
                 let names: Vec<&str> = names.collect();
                 return Err(wrong(format!("{kind}s {}", one_line(&names.join(", ")))));
             };
-            // Exporters may leave shapes of outputs out; `run` gives the true one.
+            // Exporters may omit shapes of outputs; `run` checks the actual ones.
             let Some(shape) = found.shape() else { continue };
             let fits = shape.len() == port.shape.len()
                 && shape.iter().zip(port.shape).all(|(side, expected)| match (side, expected) {
@@ -228,7 +230,7 @@ impl Network {
     }
 }
 
-/// Operators of networks that nobody has looked at: no loops, and none that fills a shape that it is told.
+/// Operators for untrusted networks: no loops, and none that fills a shape given as a value.
 fn plain_operators() -> OpRegistry {
     op_registry!(
         Abs,
@@ -292,9 +294,9 @@ fn plain_operators() -> OpRegistry {
     )
 }
 
-/// Does `work`, which waits for a pool of rten, on a thread of its own. A thread of rayon that waits for another pool
-/// takes up other work in the meantime: one more picture, with all its maps in memory, and one more above it; or work
-/// that needs the very network that it is loading. What rten panics at is an error like another: what the panic says.
+/// Runs `work`, which waits for a pool of rten, on its own thread. A waiting rayon thread would
+/// start other work in the meantime: more pictures in memory, or work that needs the network that
+/// is being loaded. A panic of rten becomes an error with its message.
 fn aside<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, String> {
     thread::scope(|scope| {
         let done = scope.spawn(|| caught(work)).join();
@@ -303,7 +305,7 @@ fn aside<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, String> {
     .map_err(|panic| format!("one that fails ({panic})"))
 }
 
-/// What others say, in one line that holds nothing odd.
+/// Returns text of other libraries in one line, with control characters escaped.
 fn one_line(text: &str) -> String {
     text.lines().map(str::trim).collect::<Vec<_>>().join(" ").escape_debug().to_string()
 }

@@ -1,28 +1,28 @@
-//! All models that the program knows.
+//! The registry of models.
 
 use std::fmt;
 
 use unlift::Error;
 
-/// What is known about a model.
+/// A model's description.
 #[derive(Debug)]
 pub struct Entry {
-    /// Its name; the file is called so, with `.onnx` behind.
+    /// Its name; the file is `NAME.onnx`.
     pub name: &'static str,
-    /// What it is for, in a line.
+    /// Its purpose, in a line.
     pub purpose: &'static str,
-    /// Licence of the weights, as an SPDX identifier where there is one.
+    /// License of the weights, as an SPDX identifier if there is one.
     pub licence: &'static str,
-    /// Where its owner publishes it.
+    /// The page or file that publishes it.
     pub owner: &'static str,
-    /// SHA-256 of the file, in hexadecimal; `None` where users make the file themselves, so that its bytes
-    /// depend on what they made it with.
+    /// SHA-256 of the file, in hexadecimal; `None` if users make the file themselves, so that its
+    /// bytes vary.
     pub sha256: Option<&'static str>,
-    /// What goes in, in the order of the file.
+    /// The inputs, in the order of the file.
     pub inputs: &'static [Port],
-    /// What comes out.
+    /// The outputs.
     pub outputs: &'static [Port],
-    /// The file itself, where the program carries it.
+    /// The file itself, if it is embedded in the program.
     pub carried: Option<&'static [u8]>,
 }
 
@@ -36,7 +36,6 @@ pub struct Port {
 }
 
 impl Port {
-    /// Whether a tensor of `shape` is one.
     pub(crate) fn takes(&self, shape: &[usize]) -> bool {
         let fits = |(side, expected): (&usize, &Option<usize>)| expected.is_none_or(|n| n == *side);
         shape.len() == self.shape.len() && shape.iter().zip(self.shape).all(fits)
@@ -52,16 +51,16 @@ impl fmt::Display for Port {
 }
 
 impl Entry {
-    /// The name of the file: `aliked-n16rot.onnx`.
+    /// Returns the file name: `aliked-n16rot.onnx`.
     pub fn file(&self) -> String {
         format!("{}.onnx", self.name)
     }
 }
 
-/// The entry called `name`.
+/// Returns the entry called `name`.
 ///
 /// # Errors
-/// When there is none.
+/// If there is none.
 pub fn entry(name: &str) -> Result<&'static Entry, Error> {
     let known = || MODELS.iter().map(|entry| entry.name).collect::<Vec<_>>().join(", ");
     MODELS.iter().find(|entry| entry.name == name).ok_or_else(|| {
@@ -69,7 +68,8 @@ pub fn entry(name: &str) -> Result<&'static Entry, Error> {
     })
 }
 
-/// All models, by name. A `static`, as a `const` would put the bytes of all carried files into the program at each use.
+/// All models, by name. A `static`, because a `const` would copy the bytes of all embedded files to
+/// each use.
 pub static MODELS: &[Entry] = &[
     Entry {
         name: "aliked-n16rot",
@@ -115,11 +115,11 @@ pub static MODELS: &[Entry] = &[
     },
     Entry {
         name: "inverter-superpoint",
-        purpose: "pictures from keypoints or points of a map and their SuperPoint descriptors, trained by those who have \
-                  SuperPoint: training/inversion",
+        purpose: "pictures from keypoints or points of a map and their SuperPoint descriptors, trained by users who \
+                  have SuperPoint: training/inversion",
         licence: "yours",
         owner: "training/inversion/README.md of https://github.com/unlift/unlift",
-        // Whoever trains it knows what they trained.
+        // Users train it themselves.
         sha256: None,
         inputs: &[Port { name: "features", shape: &[Some(1), Some(259), None, None] }],
         outputs: &[Port { name: "picture", shape: &[Some(1), Some(3), None, None] }],
@@ -166,11 +166,11 @@ pub static MODELS: &[Entry] = &[
     },
     Entry {
         name: "neighbors-superpoint",
-        purpose: "near points by their SuperPoint descriptors (the source `learned`), trained by those who have SuperPoint: \
+        purpose: "near points by their SuperPoint descriptors (the source `learned`), trained by users who have SuperPoint: \
                   training/neighbors",
         licence: "yours",
         owner: "training/neighbors/README.md of https://github.com/unlift/unlift",
-        // Whoever trains it knows what they trained.
+        // Users train it themselves.
         sha256: None,
         inputs: &[
             Port { name: "descriptors", shape: &[None, Some(256)] },
@@ -181,11 +181,12 @@ pub static MODELS: &[Entry] = &[
     },
     Entry {
         name: "superpoint",
-        purpose: "keypoints and descriptors of photos (SuperPoint), made of the owner's superpoint_v1.pth by \
+        purpose: "keypoints and descriptors of photos (SuperPoint), converted from the owner's superpoint_v1.pth by \
                   training/export/superpoint.py",
-        licence: "non-commercial research only, not to be passed on",
+        licence: "non-commercial research only, no redistribution",
         owner: "https://github.com/magicleap/SuperPointPretrainedNetwork",
-        // What an exporter writes depends on its version; the script checks the hash of the published weights.
+        // The bytes depend on the exporter's version; the script checks the hash of the published
+        // weights.
         sha256: None,
         inputs: &[Port { name: "image", shape: &[Some(1), Some(1), None, None] }],
         outputs: &[

@@ -1,5 +1,3 @@
-//! What goes into a network and comes out: numbers and their shape.
-
 use unlift::Error;
 
 /// An array of floats, row-major.
@@ -10,10 +8,10 @@ pub struct Tensor {
 }
 
 impl Tensor {
-    /// `values` as an array of this shape.
+    /// Creates an array with this shape.
     ///
     /// # Errors
-    /// When the shape asks for another number of values.
+    /// If the shape needs another number of values.
     pub fn try_new(shape: &[usize], values: Vec<f32>) -> Result<Self, Error> {
         let asked = shape.iter().try_fold(1_usize, |product, &side| product.checked_mul(side));
         if asked != Some(values.len()) {
@@ -23,17 +21,17 @@ impl Tensor {
         Ok(Self { shape: shape.to_vec(), values })
     }
 
-    /// Lengths of the sides, outermost first.
+    /// Returns the lengths of the sides, outermost first.
     pub fn shape(&self) -> &[usize] {
         &self.shape
     }
 
-    /// All values, row-major.
+    /// Returns all values, row-major.
     pub fn values(&self) -> &[f32] {
         &self.values
     }
 
-    /// The same, handed over.
+    /// Returns all values and consumes the tensor.
     pub fn into_values(self) -> Vec<f32> {
         self.values
     }

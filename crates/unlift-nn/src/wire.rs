@@ -1,22 +1,23 @@
-//! Whether bytes are laid out as a model in ONNX, before the library that loads models sees them: it waits forever for the end of
-//! a number that has none, and follows graphs within graphs as deep as they go.
+//! Checks the layout of an ONNX file before the loader reads it: the loader waits forever on a
+//! number without an end, and follows nested graphs to any depth.
 
-/// Graphs within graphs, at most; a message of ONNX without them is nested less deep.
+/// Maximum nesting of messages; ONNX without nested graphs needs less.
 const MOST_DEEP: u32 = 64;
-/// Nodes, at most: the loader follows them one within the other. Networks of hundreds of layers have fewer.
+/// Maximum number of nodes, because the loader recurses over them. Networks of hundreds of layers
+/// have fewer.
 const MOST_NODES: u32 = 4096;
-/// Bytes of a number, at most.
+/// Maximum number of bytes of a number.
 const MOST_LONG: usize = 10;
 
-/// What the bytes of a field are.
+/// The content of a field.
 #[derive(Clone, Copy)]
 enum Inside {
     Message(&'static Message),
-    /// Numbers of any length, one after the other.
+    /// Packed numbers of any length.
     Numbers,
 }
 
-/// The fields of a message that hold more than bytes, by their numbers.
+/// The fields of a message with messages or packed numbers inside, by number.
 struct Message(&'static [(u64, Inside)]);
 
 const fn of(message: &'static Message) -> Inside {
@@ -68,10 +69,10 @@ static GRAPH: Message = Message(&[
 ]);
 static MODEL: Message = Message(&[(7, of(&GRAPH)), (8, of(&TEXTS)), (14, of(&TEXTS))]);
 
-/// Walks over all that the loader of models reads.
+/// Checks everything that the loader of models reads.
 ///
 /// # Errors
-/// What is wrong, and at which byte.
+/// Describes the fault, and its byte.
 pub fn check(bytes: &[u8]) -> Result<(), String> {
     Walk { bytes, at: 0, n_nodes: 0 }.message(&MODEL, bytes.len(), 0)
 }
@@ -83,7 +84,7 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    /// A message that ends at `end`.
+    /// Checks a message that ends at `end`.
     fn message(&mut self, message: &Message, end: usize, deep: u32) -> Result<(), String> {
         if deep > MOST_DEEP {
             return Err(format!("parts nested more than {MOST_DEEP} deep at byte {}", self.at));
@@ -120,11 +121,11 @@ impl Walk<'_> {
         Ok(())
     }
 
-    /// A number of 7 bits a byte, before `end`.
+    /// Reads a number of 7 bits per byte, before `end`.
     fn number(&mut self, end: usize) -> Result<u64, String> {
         let rest = &self.bytes[self.at..end];
         let length = 1 + rest.iter().take(MOST_LONG).take_while(|byte| **byte >= 0x80).count();
-        // Of the tenth byte a single bit fits.
+        // The tenth byte has room for one bit.
         let fits = length < MOST_LONG || length == MOST_LONG && rest.get(MOST_LONG - 1) == Some(&1);
         if length > rest.len() || !fits {
             return Err(format!("a number without end at byte {}", self.at));
@@ -164,13 +165,13 @@ mod tests {
 
     #[test]
     fn numbers_end() {
-        // Found by fuzzing: ten bytes that all say that more follow.
+        // Found by fuzzing: ten bytes that all have the continuation bit.
         let found = [0xff, 0xff, 0xff, 0xb3, 0xb3, 0xb3, 0xb3, 0xb3, 0xff, 0xff, 0xff];
         assert_eq!(check(&found), Err("a number without end at byte 0".to_owned()));
         let largest = [&[0x08][..], &[0xff; 9], &[1]].concat();
         assert_eq!(check(&largest), Ok(()));
         assert!(check(&[&[0x08][..], &[0xff; 9], &[2]].concat()).is_err());
-        // Within a tensor's numbers, in a graph.
+        // This fault within a tensor's numbers, in a graph.
         let tensor = [&[7 << 3 | 2, 10][..], &[0xff; 10]].concat();
         let graph = [&[5 << 3 | 2, 12][..], &tensor].concat();
         let model = [&[7 << 3 | 2, 14][..], &graph].concat();

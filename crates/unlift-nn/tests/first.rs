@@ -1,4 +1,4 @@
-//! The network of `learned` is loaded by whoever comes first: a process of its own, where nobody came before.
+//! The first use of the network of `learned`, in its own process, where it is not loaded yet.
 
 use rayon::prelude::*;
 use unlift::neighbors::Source;
@@ -6,8 +6,9 @@ use unlift::obfuscate::olc::Olc;
 use unlift_nn::Learned;
 use unlift_testkit::described_map;
 
-/// Tasks of one pool ask for it at the same time: a thread that waited for
-/// rten's pool would take up the next task, which needs what the thread is loading, and both would wait for ever.
+/// Several tasks of one pool request the network at the same time. If a thread waited for rten's
+/// pool, it could start the next task, which needs the network that the thread is loading: a
+/// deadlock.
 #[test]
 fn many_maps_may_ask_at_once() {
     let maps: Vec<_> = (0..6).map(|at| described_map(&Olc, 60 + at)).collect();

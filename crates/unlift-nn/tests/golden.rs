@@ -1,4 +1,4 @@
-//! Every model of the repository gives what PyTorch gave when it was exported, and its card tells its hash.
+//! Every embedded model gives the output of PyTorch at its export, and its card states its hash.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use safetensors::SafeTensors;
 use unlift_nn::{MODELS, Network, Port, Tensor};
 
-/// Of outputs longer than this a golden file keeps every 37th number: `training/export/common.py`.
+/// Of longer outputs a golden file keeps every 37th number: `training/export/common.py`.
 const LONG: usize = 4096;
 const STRIDE: usize = 37;
 /// Other kernels sum in another order; values are about 1.
@@ -22,8 +22,8 @@ fn tensor(file: &SafeTensors, name: &str) -> Tensor {
     Tensor::try_new(view.shape(), floats.collect()).unwrap()
 }
 
-/// The input that a golden file leaves out, as it would be larger than the network: waves, times 255, as
-/// `training/export/yolox.py` makes them. Such ports have no open sides.
+/// Computes an input that a golden file omits because it is large: waves, times 255, as in
+/// `training/export/yolox.py`. Such ports have fixed sides.
 fn waves(port: &Port) -> Tensor {
     let shape: Vec<usize> = port.shape.iter().map(|side| side.unwrap()).collect();
     let [_, channels, height, width] = shape[..] else { panic!("{shape:?}") };

@@ -1,4 +1,4 @@
-//! The source `learned`, from the network that the program carries.
+//! The source `learned` with the embedded networks.
 
 use unlift::descriptors::Values;
 use unlift::neighbors::Source;
@@ -18,7 +18,7 @@ fn the_laws_hold() {
     }
 }
 
-/// A map that is cut into sets.
+/// A map large enough to be split into sets.
 #[test]
 fn a_blank_descriptor_is_near_none_and_spoils_nothing() {
     let n = 3200;
@@ -36,7 +36,7 @@ fn a_blank_descriptor_is_near_none_and_spoils_nothing() {
     assert_eq!(lists.longest(), 5);
 }
 
-/// Floats of `dim` values that change slowly along a line of points.
+/// Descriptors of `dim` floats that change slowly along a line of points.
 fn floats(n: usize, dim: usize) -> Descriptors {
     let value =
         |at: usize, c: usize| libm::sin(at as f64 / 40.0 * (1 + c % 7) as f64 + c as f64) as f32;

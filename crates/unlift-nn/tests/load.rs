@@ -1,4 +1,4 @@
-//! What keeps a network from being loaded or run is one line.
+//! Errors of loading and running a network are one line.
 
 use std::fs;
 use std::path::PathBuf;
@@ -10,7 +10,6 @@ fn aliked() -> &'static Entry {
     entry("aliked-n16rot").unwrap()
 }
 
-/// A folder of models with the bytes of `entry`'s file.
 fn with_file(entry: &Entry, bytes: &[u8]) -> (TempDir, Folders) {
     let place = tempfile::tempdir().unwrap();
     fs::write(place.path().join(entry.file()), bytes).unwrap();
@@ -28,7 +27,7 @@ fn refused(entry: &Entry, bytes: &[u8]) -> String {
 #[test]
 fn another_file_of_that_name_is_refused() {
     let hash = aliked().sha256.unwrap();
-    // The empty string's hash.
+    // The hash of the empty string.
     let empty = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855";
     assert_eq!(
         refused(aliked(), b""),
@@ -110,7 +109,7 @@ fn many_threads_give_the_same_bytes() {
     });
 }
 
-/// A field of a message of ONNX, which holds bytes.
+/// Encodes a length-delimited field of an ONNX message.
 fn field(number: u8, inside: &[u8]) -> Vec<u8> {
     let mut bytes = vec![number << 3 | 2];
     let mut length = inside.len();
@@ -123,7 +122,7 @@ fn field(number: u8, inside: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// A network from `features` to `picture`: in turn the operators, each of what the one before made.
+/// Encodes a network from `features` to `picture` that applies the operators in turn.
 fn network(operators: &[&str]) -> Vec<u8> {
     let name = |at: usize| match at {
         0 => "features".to_owned(),
@@ -146,7 +145,7 @@ fn network(operators: &[&str]) -> Vec<u8> {
     [vec![8, 8], field(7, &graph), field(8, &[16, 13])].concat()
 }
 
-/// The entry of a user's own inverter, whose hash is not known.
+/// The entry of a user's inverter, without a hash.
 fn stranger() -> Entry {
     let any = &[None; 4];
     let port = |name| Port { name, shape: any };
@@ -158,7 +157,6 @@ fn stranger() -> Entry {
     }
 }
 
-/// The network of `operators` in a file of a stranger.
 fn read(operators: &[&str], entry: &Entry) -> Result<Network, String> {
     let place = tempfile::tempdir().unwrap();
     let path = place.path().join("x.onnx");
@@ -189,7 +187,7 @@ fn what_could_be_huge_or_endless_is_not_loaded() {
     assert_eq!(picture(&["Relu"; 4096]).values(), [1.0; 4]);
 }
 
-/// The file says that its output may have any number of planes.
+/// The file declares any number of planes for its output.
 #[test]
 fn an_output_of_another_shape_is_one_line() {
     let three = Port { name: "picture", shape: &[Some(1), Some(3), None, None] };

@@ -258,7 +258,7 @@ def with_b(**change):
         (lambda i: quick(i, neighbors="geometric", inlier_ratios=None), "expected one that is defined in 2 dimensions, found geometric"),
         (lambda i: quick(i, in_space), r"in_space: expected records of points \(n, 2\), found \(n, 3\)"),
         (lambda i: quick(i, show=["x.jpg"]), "^show: expected an image of images, found x.jpg"),
-        (lambda i: quick(i, show=["Z.png"], max_images=1), "^show: expected an image that max_images leaves in, found Z.png"),
+        (lambda i: quick(i, show=["Z.png"], max_images=1), "^show: expected an image that max_images keeps, found Z.png"),
         (lambda i: quick(i, features="sift"), "^features: expected with a folder of photos, found arrays"),
         (lambda i: quick(i, features="orb"), "features: expected one of sift, aliked, superpoint, found orb"),
         (lambda i: quick(i, min_score=2.0), "min_score: expected a number from 0 to below 1, found 2"),

@@ -1,17 +1,16 @@
-//! Gates: bounds on how much of a map may come back.
+//! Gates: bounds on how much of a map may be recovered.
 //!
 //! ```text
 //! SCHEME[:SOLVER][:SOURCE][@RATIO]:THRESHOLD[:gain]<=PERCENT
 //! ```
 //!
-//! `ppl@0.5:0.10<=20` fails when more than 20 % of the points come back within 0.10 under `ppl` at
-//! inlier ratio 0.5. `SCHEME` may be `all`; without `@RATIO` every ratio counts, without a solver or a source
-//! of neighborhoods every one; every noise model and K always counts: the largest figure decides, which is
-//! that of the strongest attack. Without a solver and a source, attacks that need no neighborhoods count as well (a blind
-//! guess, the records alone): they are in anybody's hands. `:gain` bounds what neighborhoods add to an attacker without them (the larger of
-//! a blind guess and what the records alone give), in percentage points. Numbers are compared as
-//! numbers, so `0.1` finds the threshold `0.10`. No name of a solver or a source is a number, so the first
-//! number after the scheme is the threshold.
+//! `ppl@0.5:0.10<=20` fails if more than 20 % of the points are recovered within 0.10 under `ppl`
+//! at inlier ratio 0.5. `SCHEME` may be `all`. Without `@RATIO`, a solver or a source, all of them
+//! count. Every noise model and K counts. The strongest attack decides. Without a solver and a
+//! source, attacks that need no neighborhoods count as well (the blind guess and records alone).
+//! `:gain` bounds what neighborhoods add to the larger of these two baselines, in percentage
+//! points. Numbers are compared by value, so `0.1` matches the threshold `0.10`. No name of a
+//! solver or a source is a number, so the first number after the scheme is the threshold.
 
 mod parse;
 mod results;
@@ -25,21 +24,21 @@ pub(crate) use results::{check_gates, gate_results};
 /// A bound on a figure of an audit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gate {
-    /// As typed.
+    /// The gate as typed.
     pub typed: String,
     /// The scheme's name; `None` for all.
     pub scheme: Option<String>,
     /// The solver's name; `None` for all.
     pub solver: Option<&'static str>,
-    /// Where neighborhoods come from, as in the rows of an audit; `None` for all.
+    /// The source of neighborhoods, as in the rows of an audit; `None` for all.
     pub source: Option<String>,
     /// The inlier ratio; `None` for all.
     pub inlier_ratio: Option<f64>,
     /// The threshold, in the unit of the audit.
     pub threshold: f64,
-    /// Which figure is bounded.
+    /// The bounded figure.
     pub figure: Figure,
-    /// The bound in percent or percentage points, itself allowed.
+    /// The largest allowed value, in percent or percentage points.
     pub bound_percent: f64,
 }
 
@@ -48,36 +47,35 @@ pub struct Gate {
 pub enum Figure {
     /// The percentage recovered.
     Recovered,
-    /// The percentage recovered, less that of an attacker without neighborhoods.
+    /// The percentage recovered, minus that of an attacker without neighborhoods.
     Gain,
 }
 
-/// What a gate compares, from one row and one threshold of an audit.
+/// The figures that a gate compares, of one row and one threshold.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate<'a> {
     /// The row's scheme.
     pub scheme: &'a str,
     /// The row's solver.
     pub solver: &'a str,
-    /// Where its neighborhoods come from.
+    /// The row's source of neighborhoods.
     pub source: &'a str,
-    /// The row's inlier ratio, as requested; `None` when it was measured.
+    /// The row's inlier ratio, as requested; `None` if it was measured.
     pub inlier_ratio: Option<f64>,
     /// The threshold's value.
     pub threshold: f64,
-    /// Percent recovered within the threshold.
+    /// Percentage recovered within the threshold.
     pub recovered_percent: f64,
     /// Percentage recovered by an attacker without neighborhoods.
     pub baseline_percent: f64,
 }
 
-/// The larger figure; what is not a number is worse than any.
 fn worse(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }
 
 impl Gate {
-    /// Whether the gate is about this row and threshold.
+    /// Returns true if the gate applies to this row and threshold.
     pub fn covers(&self, row: &Candidate<'_>) -> bool {
         self.scheme.as_deref().is_none_or(|name| name == row.scheme)
             && self.solver.is_none_or(|name| name == row.solver)
@@ -86,8 +84,8 @@ impl Gate {
             && self.threshold == row.threshold
     }
 
-    /// Whether the gate is about something that has no row. Where the scheme itself could not be applied,
-    /// every gate on it is.
+    /// Returns true if the gate applies to something without a row. If a scheme could not be
+    /// applied, every gate on it does.
     pub fn misses(&self, missing: &NotAudited) -> bool {
         let of_source = |name: &String| self.source.as_ref().is_none_or(|wanted| wanted == name);
         let of_ratio = self.inlier_ratio.is_none_or(|wanted| missing.inlier_ratio == Some(wanted));
@@ -95,7 +93,7 @@ impl Gate {
             && missing.neighbors.as_ref().is_none_or(|name| of_source(name) && of_ratio)
     }
 
-    /// The part of the gate that `plan` has no row for, as expected and found.
+    /// Returns a part of the gate for which `plan` has no row, as expected and found.
     pub fn not_in<const D: usize>(&self, plan: &Plan<D>) -> Option<(String, String)> {
         let listed = |names: Vec<String>| format!("one of {}", names.join(", "));
         let lacks = |what: &str, wanted: &str, names: Vec<String>| {
@@ -114,7 +112,7 @@ impl Gate {
             let wanted = self.inlier_ratio.filter(|wanted| !ratios.contains(wanted))?;
             let expected = match oracle {
                 true => listed(ratios.iter().map(f64::to_string).collect()),
-                false => "none, as measured ratios have no gates of their own".to_owned(),
+                false => "none, because measured ratios have no gates".to_owned(),
             };
             Some((format!("inlier ratio: {expected}"), wanted.to_string()))
         };
@@ -126,8 +124,8 @@ impl Gate {
         scheme.or_else(solver).or_else(source).or_else(ratio).or_else(threshold)
     }
 
-    /// The largest bounded figure among `candidates`; `None` when the gate covers none of them,
-    /// which must never count as passing.
+    /// Returns the largest bounded figure among `candidates`. `None` if the gate covers none of
+    /// them, which must never count as passing.
     pub fn worst<'a>(&self, candidates: impl IntoIterator<Item = Candidate<'a>>) -> Option<f64> {
         candidates
             .into_iter()
@@ -142,7 +140,7 @@ impl Gate {
             .reduce(worse)
     }
 
-    /// Whether a figure keeps the bound. What is not a number does not.
+    /// Returns true if a figure is within the bound. NaN is not.
     pub fn passes(&self, found_percent: f64) -> bool {
         found_percent <= self.bound_percent
     }

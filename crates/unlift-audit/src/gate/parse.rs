@@ -1,4 +1,4 @@
-//! From the text of a gate to a gate.
+//! Parses gates.
 
 use unlift::recover::Builtin;
 
@@ -6,10 +6,10 @@ use super::{Figure, Gate};
 use crate::sources;
 
 impl Gate {
-    /// Reads the form that the module describes.
+    /// Parses the form that the module describes.
     ///
     /// # Errors
-    /// Says which part is wrong.
+    /// If a part is wrong; the error names it.
     pub fn parse(text: &str) -> Result<Self, String> {
         const FORM: &str = "SCHEME[:SOLVER][:SOURCE][@RATIO]:THRESHOLD[:gain]<=PERCENT";
         let form =
@@ -47,7 +47,7 @@ impl Gate {
         let scheme = match scheme.trim() {
             "all" => None,
             "" => return Err(form("no scheme")),
-            // Whether a plan has it, the plan knows.
+            // Names are checked against the plan later.
             name => Some(name.to_owned()),
         };
         let threshold = positive(threshold).map_err(|error| format!("threshold: {error}"))?;
@@ -60,11 +60,10 @@ impl Gate {
     }
 }
 
-/// The source that is asked for a ratio.
 const ORACLE: &str = "oracle";
 
-/// How many of the parts left of `<=` are names: all before the first number; without one, all that are
-/// known, so that what stands where the threshold belongs is told as such.
+/// Counts the names left of `<=`: all parts before the first number. Without a number, all known
+/// names, so that the next part is reported as a wrong threshold.
 fn n_names(parts: &[&str]) -> usize {
     let is_number = |part: &&str| part.trim().parse::<f64>().is_ok();
     let known = |part: &&str| solver_name(part).is_some() || source_name(part).is_some();
@@ -79,7 +78,6 @@ fn solver_name(text: &str) -> Option<&'static str> {
     Builtin::from_name(text.trim()).ok().map(|solver| solver.name())
 }
 
-/// A source as rows name it.
 fn source_name(text: &str) -> Option<String> {
     match text.trim() {
         name @ (ORACLE | "file") => Some(name.to_owned()),
@@ -87,7 +85,7 @@ fn source_name(text: &str) -> Option<String> {
     }
 }
 
-/// A solver and a source among the names after a scheme, each at most once, in any order.
+/// Finds a solver and a source among the names after a scheme, each at most once, in any order.
 fn qualifiers(names: &[&str]) -> Result<(Option<&'static str>, Option<String>), String> {
     let (mut solver, mut source) = (None, None);
     for name in names {
@@ -118,7 +116,6 @@ fn qualifiers(names: &[&str]) -> Result<(Option<&'static str>, Option<String>), 
     Ok((solver, source))
 }
 
-/// A finite number above zero.
 fn positive(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
@@ -126,7 +123,6 @@ fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A share.
 fn ratio(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),

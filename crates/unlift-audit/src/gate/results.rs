@@ -1,4 +1,4 @@
-//! Gates about an audit: whether each is about a row of it, and how it ended.
+//! Results of gates, and a check that each gate applies to a row.
 
 use unlift::Unit;
 use unlift::audit::{NotAudited, Plan, REFERENCE, Row, Threshold};
@@ -8,13 +8,13 @@ use unlift_report::document::GateResult;
 use super::{Candidate, Figure, Gate};
 use crate::Error;
 
-/// Rows as gates see them, each with the row and the number of the threshold that it is from.
+/// Returns the candidates of gates, each with its row and the index of its threshold.
 fn candidates<'a, const D: usize>(
     plan: &Plan<D>,
     rows: &'a [Row],
 ) -> Vec<(Candidate<'a>, &'a Row, usize)> {
     let mut candidates = Vec::new();
-    // The reference is no attack.
+    // The reference is not an attack.
     for row in rows.iter().filter(|row| row.solver != REFERENCE) {
         for (at, threshold) in plan.thresholds.iter().enumerate() {
             let candidate = Candidate {
@@ -32,9 +32,8 @@ fn candidates<'a, const D: usize>(
     candidates
 }
 
-/// What the figure of `gate` is of, the threshold numbered `at` of `row`, in words.
 fn in_words(gate: &Gate, found: f64, row: &Row, at: usize, threshold: &Threshold) -> String {
-    // Where the row's own figure is smaller, that of an attack without neighborhoods decides.
+    // If the row's own figure is smaller, a baseline without neighborhoods decides.
     let is_own = gate.figure == Figure::Gain || found == row.recovered_percent[at];
     let attack = match row.best_alone(at) {
         _ if is_own => {
@@ -57,7 +56,7 @@ fn in_words(gate: &Gate, found: f64, row: &Row, at: usize, threshold: &Threshold
     format!("{}, {attack}, {verb} within {} {unit}", row.scheme, threshold.label)
 }
 
-/// A gate about no row is told before the audit runs, not after.
+/// Reports a gate without rows before the audit runs.
 pub fn check_gates<const D: usize>(gates: &[Gate], plan: &Plan<D>) -> Result<(), Error> {
     let lacking = |gate: &Gate| gate.not_in(plan).map(|part| (gate.typed.clone(), part));
     match gates.iter().find_map(lacking) {
@@ -75,8 +74,8 @@ pub fn check_gates<const D: usize>(gates: &[Gate], plan: &Plan<D>) -> Result<(),
     }
 }
 
-/// How every gate ended. One that is about something that could not be audited does not hold, nor one about a row whose
-/// figures may be too small; `doubts` says why they may, per row, or is empty.
+/// Returns the results of all gates. A gate fails if something it applies to was not audited, or if
+/// a row it applies to has a doubt; `doubts` has one entry per row, or is empty.
 pub fn gate_results<const D: usize>(
     gates: &[Gate],
     plan: &Plan<D>,
@@ -108,7 +107,7 @@ pub fn gate_results<const D: usize>(
         });
         let keeps = found_percent.is_some_and(|found| gate.passes(found));
         let reason = reason.or_else(|| doubt.filter(|_| keeps).map(|doubt| doubt.to_string()));
-        // A gate that is about no row must never count as held.
+        // A gate without a row must never count as held.
         if found_percent.is_none() && reason.is_none() {
             return Err(Error::request(format!(
                 "--gate {}: expected a row, found none",

@@ -1,4 +1,4 @@
-//! What gates read, cover and bound.
+//! Tests of parsing, covering and bounding.
 
 use super::*;
 
@@ -123,7 +123,7 @@ fn what_was_not_audited_is_missed() {
 fn a_figure_that_is_no_number_fails() {
     let gate = Gate::parse("ppl:0.10<=100").unwrap();
     assert!(!gate.passes(f64::NAN));
-    // Nor does it hide behind a figure that is one.
+    // NaN decides, whatever the other figures.
     let rows = [row("ppl", 1.0, 3.0), row("ppl", 0.5, f64::NAN), row("ppl", 0.3, 2.0)];
     assert!(!gate.passes(gate.worst(rows).unwrap()));
 }
@@ -139,7 +139,7 @@ fn each_wrong_part_is_named() {
     assert_eq!(message("ppl:x<=20"), "threshold: expected a number above 0, found x");
     assert_eq!(message("ppl:0.1<=120"), "bound: expected 0 to 100 percent, found 120");
     assert_eq!(message(":0.1<=20"), format!("{form}, found no scheme"));
-    // A scheme may be anybody's: the plan knows whether it has it.
+    // Schemes may come from other crates, so only the plan can check the name.
     let unknown = Gate::parse("pl:0.1<=20").unwrap().not_in(&Plan::<3>::new(unlift::Unit::Meter));
     assert!(unknown.unwrap().0.starts_with("scheme: one of olc, ppl"));
     assert_eq!(message("ppl:joint<=20"), format!("{form}, found no threshold"));
@@ -159,7 +159,7 @@ fn each_wrong_part_is_named() {
     assert_eq!(message("ppl:joint:x<=20"), "threshold: expected a number above 0, found x");
 }
 
-/// `olc` by `similarity` gave 58.6 % where the records alone gave 66.6: a gate of 60 held.
+/// `olc` with `similarity` recovered 58.6 % but records alone 66.6 %, and a gate of 60 held.
 #[test]
 fn what_needs_no_neighborhoods_counts_unless_an_attack_is_named() {
     let candidate = Candidate { baseline_percent: 66.6, ..row("olc", 0.5, 58.6) };

@@ -1,4 +1,4 @@
-//! One audit of images from a source of features to what it found, and to the files in its folder.
+//! Audits of images, from a source of features to results, and to the files of the output folder.
 
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
@@ -22,19 +22,20 @@ use crate::gate::{check_gates, gate_results};
 use crate::maps::curves_of;
 use crate::progress::Progress;
 
-/// What became of the images.
+/// The numbers of used and unusable images.
 #[derive(Clone, Copy, Debug)]
 pub struct Used {
     /// Images that were used.
     pub used: usize,
-    /// Images that were not, as they could not be read.
+    /// Images that could not be read.
     pub unusable: usize,
 }
 
-/// Runs the job and writes its folder, whole or not at all; without a single usable image none.
+/// Runs the job and writes its folder, completely or not at all. Without a usable image nothing is
+/// written.
 ///
 /// # Errors
-/// As [`find`], and when the folder cannot be written.
+/// See [`find`]; also if the folder cannot be written.
 pub fn perform(job: ImagesJob<'_>, out: OutputSet) -> Result<(Option<Finished>, Used), Error> {
     let (folder, share_safe) = (job.out.clone(), job.share_safe);
     let (found, used) = find(job)?;
@@ -42,12 +43,12 @@ pub fn perform(job: ImagesJob<'_>, out: OutputSet) -> Result<(Option<Finished>, 
     Ok((found.map(write).transpose()?, used))
 }
 
-/// Runs the job: what it found, of which nothing is written; nothing without a single usable image. Of a share-safe one no
-/// pictures are drawn.
+/// Runs the job and writes nothing. Returns no results without a usable image. A share-safe job
+/// draws no pictures.
 ///
 /// # Errors
-/// When the plan does not fit images, a gate cannot be looked at, an image in memory cannot be used, or `progress` says
-/// stop. Images of files that cannot be used are told, counted and left out.
+/// If the plan does not fit images, a gate cannot be checked, an image in memory cannot be used, or
+/// `progress` stops the audit. Unusable images in files are reported, counted and skipped.
 pub fn find(job: ImagesJob<'_>) -> Result<(Option<Audited>, Used), Error> {
     check_gates(&job.gates, &job.plan)?;
     let tally = RefCell::new(Tally::default());
@@ -81,7 +82,7 @@ pub fn find(job: ImagesJob<'_>) -> Result<(Option<Audited>, Used), Error> {
     if let Some(doubt) = &doubt {
         steps.say(&format!("note: {doubt}"));
     }
-    // Photos are read for figures, for pictures and for their hash.
+    // Photos are read several times: for figures, for pictures and for their hash.
     let changed = job.source.changed(&tally.used).or_else(|| beside.changed(0..beside.len()));
     if let Some(path) = changed {
         steps.say(&format!("note: {}: {CHANGED}", path.display()));
@@ -119,22 +120,21 @@ pub fn find(job: ImagesJob<'_>) -> Result<(Option<Audited>, Used), Error> {
     Ok((Some(Audited { document, scene: None, drawn }), used))
 }
 
-/// Why no gate holds on images of which a file is not what it was.
+/// The doubt if a file of an image has changed.
 const CHANGED: &str =
     "changed since reading began: figures, hash and pictures may be of different files";
 
-/// Photos of the images, where the source is a file.
+/// Returns the photos of the images if the source is a file.
 fn beside(job: &ImagesJob<'_>) -> Seen {
     let names = job.source.names();
     let of_folder = |folder: &Path| -> Vec<PathBuf> {
         let paths = job.chosen.iter().map(|&at| folder.join(&names[at]));
-        // Of those that are missing it is said that they are not painted.
+        // Missing photos are reported as not painted.
         paths.filter(|path| path.is_file()).collect()
     };
     Seen::new(job.photos.as_deref().map(of_folder).unwrap_or_default())
 }
 
-/// What was read: of photos, those that were used.
 fn input(job: &ImagesJob<'_>, tally: &Tally, outcome: &Outcome) -> Result<Input, Error> {
     let (mut path, names) = (Some(job.path.display().to_string()), job.source.names());
     let sha256 = match job.source {
@@ -165,13 +165,12 @@ fn input(job: &ImagesJob<'_>, tally: &Tally, outcome: &Outcome) -> Result<Input,
     })
 }
 
-/// Shows progress and keeps the figures of every image.
+/// Reports progress and keeps the figures of every image.
 struct Watcher<'a> {
     progress: &'a dyn Progress,
     tally: &'a RefCell<Tally>,
     plan: &'a Plan<2>,
     figures: Vec<ImageFigures>,
-    /// The largest threshold.
     most: f64,
     curves: Curves<'a>,
 }
@@ -200,7 +199,7 @@ impl<'a> audit::Watcher<2> for Watcher<'a> {
     }
 
     fn progress(&mut self, _: usize, _: usize, what: &str) {
-        // Images tell themselves how far they are.
+        // Each image reports its own share.
         self.progress.add(0.0, what);
     }
 

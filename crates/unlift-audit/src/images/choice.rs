@@ -1,29 +1,30 @@
-//! Which of many images are used, and which of these are drawn.
+//! The choice of images to use and to draw.
 
 use unlift::audit::Threshold;
 use unlift_report::pictures::MOST_PICTURES;
 
 use crate::Error;
 
-/// The threshold that speaks for an audit, in pixels, or the nearest one asked for.
+/// The headline threshold in pixels; the nearest given threshold is used.
 const HEADLINE_PX: f64 = 10.0;
 
-/// Which of `thresholds` speaks for an audit of images.
+/// Returns the index of the headline threshold in `thresholds`.
 pub fn headline(thresholds: &[Threshold]) -> usize {
     let away = |at: &usize| (thresholds[*at].value / HEADLINE_PX).ln().abs();
     (0..thresholds.len()).min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0)
 }
 
-/// Numbers of at most `most` images, evenly spaced over all `n`: the middles of as many equal parts.
+/// Returns the numbers of at most `most` of `n` images, evenly spaced: the middles of equal parts.
 pub fn evenly(n: usize, most: Option<usize>) -> Vec<usize> {
     let most = most.unwrap_or(n).min(n);
     (0..most).map(|at| ((2 * at + 1) * n) / (2 * most)).collect()
 }
 
-/// Numbers of the images `wanted`, each once, of which all are called `names` and those in use `chosen`; `place` holds them.
+/// Returns the numbers of the images `wanted`, without repetition. `names` are all images, `chosen`
+/// those in use, and `place` their source.
 ///
 /// # Errors
-/// When one of them is not among them, or there are more than a page shows.
+/// If one of them is not in use, or there are more than a page shows.
 pub fn shown(
     wanted: &[String],
     names: &[String],
@@ -37,7 +38,7 @@ pub fn shown(
             |expected: &str| Error::request(format!("--show: expected {expected}, found {name}"));
         let at = at.map_err(|_| found(&format!("an image of {place}")))?;
         if !chosen.contains(&at) {
-            return Err(found("an image that --max-images leaves in"));
+            return Err(found("an image that --max-images keeps"));
         }
         if !numbers.contains(&at) {
             numbers.push(at);

@@ -1,4 +1,4 @@
-//! Which images a report draws, and what it draws of them.
+//! The choice of images that a report draws, and their pictures.
 
 use std::cell::RefCell;
 
@@ -13,16 +13,15 @@ use super::pictures::Album;
 use super::stream::{Needs, Stream, Tally};
 use crate::Error;
 
-/// Longest side of an embedded photo in pixels.
 const PREVIEW: u32 = 640;
-/// The inlier ratio by which images are compared, or the nearest one tested.
+/// The inlier ratio by which images are compared; the nearest tested one is used.
 const USUAL_RATIO: f64 = 0.5;
 
-/// Audits the images to be drawn once more, by the first solver and seed: an image's randomness comes from
-/// its name, so what is drawn is what was counted, and no picture had to be kept in between.
+/// Audits the drawn images again, with the first solver and seed. The seed of an image depends on
+/// its name, so the result is that of the audit, and no picture is kept in between.
 ///
 /// # Errors
-/// When an image cannot be audited once more.
+/// If an image cannot be audited again.
 pub fn drawn(
     job: &ImagesJob<'_>,
     tally: &Tally,
@@ -46,7 +45,7 @@ pub fn drawn(
     plan.solvers.truncate(1);
     (plan.repeats, plan.reference) = (1, false);
     let needs = Needs::of_plan(&plan);
-    // The album looks for itself.
+    // The album makes the pictures itself.
     plan.measures.clear();
     let mut album = Album::new(job.inversion.clone(), job.progress);
     let again = RefCell::new(Tally::default());
@@ -69,14 +68,15 @@ pub fn drawn(
     Ok((album.pictures, album.inversions))
 }
 
-/// Positions in `figures` of the images of which least, about half and most came back, by the mean over
-/// schemes within the headline threshold; fewer when there are fewer.
+/// Returns the indices in `figures` of the images with the lowest, the median and the highest
+/// share, by the mean over schemes within the headline threshold; fewer if there are fewer.
 fn telling(plan: &Plan<2>, figures: &[ImageFigures]) -> Vec<(usize, &'static str)> {
     let label = &plan.thresholds[plan.headline].label;
     let away = |ratio: &f64| (ratio - USUAL_RATIO).abs();
     let per_scheme = plan.rows_per_scheme();
     let variants = plan.variants();
-    // The first solver's row of the variant nearest to the usual ratio; an own source has no ratio yet.
+    // The first solver's row of the variant nearest to the usual ratio; other sources have no
+    // requested ratio.
     let at = (0..variants.len())
         .min_by(|&a, &b| {
             let of = |at: usize| variants[at].inlier_ratio.as_ref().map_or(f64::INFINITY, away);

@@ -1,4 +1,4 @@
-//! What is extracted from photos: what users ask for as one value, by the names of the command line's options.
+//! Options of the feature extraction, as the command line names them.
 
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -10,23 +10,24 @@ use unlift_nn::DescriptorKind;
 
 use crate::Error;
 
-/// Descriptors such as a network will make, to be shown to sources before the work; `None` of SIFT, which every source takes.
+/// Returns two sample descriptors of a network, to check sources before the work; `None` for SIFT,
+/// which every source accepts.
 pub fn sample(extraction: &Extraction) -> Option<Descriptors> {
     if extraction.kind() == DescriptorKind::Sift {
         return None;
     }
-    // Any two rows of floats that are not all alike.
+    // The rows differ because equal rows are rejected.
     let dim = extraction.kind().dim();
     let rows = (0..2 * dim).map(|at| if at < dim { 0.1 } else { -0.1 }).collect();
     Descriptors::try_new(Values::F32(rows), dim).ok()
 }
 
-/// What was asked for; `None` is as usual.
+/// Options of the user; `None` is the default.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Wanted {
-    /// How the option is called that says which features.
+    /// The option that chooses the features.
     pub option: &'static str,
-    /// Which features.
+    /// The chosen features.
     pub kind: Option<DescriptorKind>,
     /// `--max-features`.
     pub max_features: Option<NonZeroUsize>,
@@ -39,10 +40,10 @@ pub struct Wanted {
 }
 
 impl Wanted {
-    /// The same as options of the extractor, for what is at `path`: none of them fits a file.
+    /// Returns the options of the extractor for the photos at `path`.
     ///
     /// # Errors
-    /// When one of them fits a file or other features only.
+    /// If `path` is a file and an option is given, or an option belongs to other features.
     pub fn extraction(self, path: &Path) -> Result<Extraction, Error> {
         if path.is_file() {
             self.check_unused("a file")?;
@@ -81,10 +82,10 @@ impl Wanted {
         })
     }
 
-    /// Refuses all of it where features are there already, in `found`.
+    /// Rejects all options if features exist already, in `found`.
     ///
     /// # Errors
-    /// When anything was asked for.
+    /// If an option is given.
     pub fn check_unused(&self, found: &str) -> Result<(), Error> {
         let given = [
             (self.option, self.kind.is_some()),
@@ -102,7 +103,6 @@ impl Wanted {
         }
     }
 
-    /// Refuses an option of other features.
     fn refuse(&self, name: &str, given: bool, fits: DescriptorKind) -> Result<(), Error> {
         if !given {
             return Ok(());

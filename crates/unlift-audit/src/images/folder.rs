@@ -1,5 +1,3 @@
-//! A folder of photos: which there are, and the features of one.
-
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,18 +10,18 @@ use unlift_io::Error;
 use unlift_io::features::{ImageFeatures, round_to_half};
 use unlift_io::seen::Seen;
 
-/// What is taken for a photo; what a file is, its bytes decide when it is read.
+/// File name endings of photos. The format is detected from the bytes.
 const ENDINGS: [&str; 6] = ["jpg", "jpeg", "jpe", "jfif", "png", "webp"];
-/// Other images that people have beside these, or in place of them: passed over, and told.
+/// File name endings of images that cannot be read; they are counted and skipped.
 const OTHER_ENDINGS: [&str; 24] = [
     "arw", "avif", "bmp", "cr2", "cr3", "dng", "exr", "gif", "hdr", "heic", "heif", "j2k", "jp2",
     "jxl", "nef", "orf", "pbm", "pgm", "ppm", "raf", "rw2", "tga", "tif", "tiff",
 ];
 
-/// How deep folders may nest: photos lie in dates and rooms, not in hundreds of folders.
+/// Maximum depth of nested folders.
 const DEEPEST: usize = 64;
 
-/// Whether a file of this name in a folder of photos is taken for one.
+/// Returns true if the file name is that of a photo.
 pub fn is_photo(path: &Path) -> bool {
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
     ending.is_some_and(|ending| ENDINGS.contains(&&*ending))
@@ -36,18 +34,19 @@ pub struct Folder {
     extraction: Extraction,
     names: Vec<String>,
     paths: Vec<PathBuf>,
-    /// The same before any of them was read.
+    /// The state of the files before any of them was read.
     seen: Seen,
     refused: Vec<Error>,
     passed_over: Option<String>,
 }
 
 impl Folder {
-    /// Lists the photos in `root` and in folders inside it, each folder once: under its own name, or
-    /// under the first link that leads to it. Names that begin with a dot are passed over.
+    /// Lists the photos in `root` and its subfolders, each folder once: under its own name, or
+    /// under the first link to it. Names that begin with a dot are skipped.
     ///
     /// # Errors
-    /// When the folder cannot be read or holds no photo, an option is out of range, or a model is missing.
+    /// If the folder cannot be read or contains no photo, an option is out of range, or a model is
+    /// missing.
     pub fn open(root: &Path, extraction: &Extraction) -> Result<Self, crate::Error> {
         let extractor = Extractor::try_new(extraction)?;
         let mut found = Found::default();
@@ -74,46 +73,46 @@ impl Folder {
         Ok(Self { extractor, turn, extraction, names, paths, seen, refused, passed_over })
     }
 
-    /// How photos are turned before features are extracted.
+    /// Returns how photos are turned before extraction.
     pub fn turn(&self) -> Turn {
         self.turn
     }
 
-    /// Sets how photos are turned before features are extracted.
+    /// Sets how photos are turned before extraction.
     #[must_use]
     pub fn with_turn(self, turn: Turn) -> Self {
         Self { extractor: self.extractor.with_turn(turn), turn, ..self }
     }
 
-    /// Names of all photos, sorted by their bytes.
+    /// Returns the names of all photos, sorted by their bytes.
     pub fn names(&self) -> &[String] {
         &self.names
     }
 
-    /// What cannot be used, one error each.
+    /// Returns one error for each file or folder that cannot be used.
     pub fn refused(&self) -> &[Error] {
         &self.refused
     }
 
-    /// Images of other kinds, in a line.
+    /// Describes the skipped images in one line.
     pub fn passed_over(&self) -> Option<&str> {
         self.passed_over.as_deref()
     }
 
-    /// Where photo `at` is.
+    /// Returns the path of photo `at`.
     pub fn path(&self, at: usize) -> &Path {
         &self.paths[at]
     }
 
-    /// One of the photos `which` that is not what it was when the folder was opened.
+    /// Returns one of the photos `which` that has changed since the folder was opened.
     pub fn changed(&self, which: &[usize]) -> Option<&Path> {
         self.seen.changed(which.iter().copied())
     }
 
-    /// The features of photo `at`.
+    /// Extracts the features of photo `at`.
     ///
     /// # Errors
-    /// When this photo cannot be used.
+    /// If this photo cannot be used.
     pub fn get(&self, at: usize) -> Result<ImageFeatures, crate::Error> {
         let path = &self.paths[at];
         let photo = self.extractor.read(path)?;
@@ -131,25 +130,24 @@ impl Folder {
         })
     }
 
-    /// All that features depend on beside the photo, as text.
     pub(crate) fn settings(&self) -> String {
         let sha256 = self.extractor.sha256().unwrap_or_default();
         format!("{:?} {:?} {sha256}", self.extraction, self.turn)
     }
 
-    /// Which features they are.
+    /// Returns the options of the extraction.
     pub fn extraction(&self) -> &Extraction {
         &self.extraction
     }
 }
 
-/// Features in hloc's convention: here, and nowhere else, the middle of the first pixel goes from
-/// (0.5, 0.5) to (0, 0).
+/// Converts features to hloc's convention: the middle of the first pixel moves from (0.5, 0.5) to
+/// (0, 0). No other function does this.
 fn of_sift(features: Features) -> ImageFeatures {
     let keypoints = &features.keypoints;
     let scales: Vec<f32> = keypoints.iter().map(|keypoint| keypoint.scale).collect();
     let bytes = features.descriptors.into_flattened();
-    // Real images do not give dummies; an image whose features are all alike has nothing to tell.
+    // Descriptors that are all equal are rejected; such an image has none.
     let descriptors = Descriptors::try_new(Values::U8(bytes), 128).ok();
     ImageFeatures {
         keypoints: keypoints
@@ -157,7 +155,7 @@ fn of_sift(features: Features) -> ImageFeatures {
             .map(|keypoint| [f64::from(keypoint.x - 0.5), f64::from(keypoint.y - 0.5)])
             .collect(),
         orientations_deg: Some(keypoints.iter().map(|k| k.orientation.to_degrees()).collect()),
-        // The contrast is not kept; large features are found again more often than small ones.
+        // SIFT contrast is not kept; large features are more repeatable than small ones.
         scores: Some(scales.clone()),
         scales: Some(scales),
         descriptors,
@@ -165,7 +163,7 @@ fn of_sift(features: Features) -> ImageFeatures {
     }
 }
 
-/// What a network found, which is in hloc's convention.
+/// Converts the features of a network, which are already in hloc's convention.
 fn of_network(features: LearnedFeatures) -> ImageFeatures {
     let LearnedFeatures { keypoints, scores, mut descriptors, dim } = features;
     round_to_half(&mut descriptors);
@@ -181,25 +179,23 @@ fn of_network(features: LearnedFeatures) -> ImageFeatures {
 struct Found {
     photos: Vec<(String, PathBuf)>,
     refused: Vec<Error>,
-    /// How many images of other kinds there are, by ending.
     others: BTreeMap<String, usize>,
 }
 
 impl Found {
-    /// Images of other kinds: `12 .heic, 1 .tiff`.
+    /// Formats the skipped images: `12 .heic, 1 .tiff`.
     fn others(&self) -> Option<String> {
         let others = self.others.iter().map(|(ending, n)| format!("{n} .{ending}"));
         let others: Vec<String> = others.collect();
         (!others.is_empty()).then(|| others.join(", "))
     }
 
-    /// Adds what is in `root` and in the folders inside it.
     fn visit(&mut self, root: &Path) {
         let mut seen = HashSet::new();
         let mut waiting = Waiting::default();
         waiting.folders.push((String::new(), root.to_owned()));
         while let Some((name, folder)) = waiting.next() {
-            // Folders that link to each other have more paths than can be walked.
+            // Links between folders can create endless paths, so each folder is visited once.
             let Ok(real) = fs::canonicalize(&folder) else { continue };
             if !seen.insert(real) {
                 continue;
@@ -213,7 +209,7 @@ impl Found {
         }
     }
 
-    /// Adds what is in `folder`, whose name is `prefix`; folders in it are left `waiting`.
+    /// Adds the files in `folder`, whose name is `prefix`; its subfolders are added to `waiting`.
     fn list(&mut self, prefix: &str, folder: &Path, waiting: &mut Waiting) {
         let entries = match fs::read_dir(folder) {
             Ok(entries) => entries,
@@ -246,14 +242,14 @@ impl Found {
             match name {
                 Some(name) if is_folder && is_link => _ = waiting.links.insert((name, path)),
                 Some(name) if is_folder => waiting.folders.push((name, path)),
-                // Opening a pipe that nobody writes to waits for ever.
+                // Opening a pipe without a writer blocks forever.
                 Some(_) if is_photo && kind.as_ref().is_ok_and(|kind| !kind.is_file()) => {
                     let found = "a pipe, a socket or a device";
                     self.refused.push(Error::new(&path, "", "a file", found));
                 }
                 Some(name) if is_photo => self.photos.push((name, path)),
                 None if is_folder || is_photo => {
-                    let found = "bytes that are no text";
+                    let found = "another encoding";
                     self.refused.push(Error::new(&path, "", "a name in UTF-8", found));
                 }
                 _ => {}
@@ -262,12 +258,12 @@ impl Found {
     }
 }
 
-/// Names and paths of folders that are still to be listed.
+/// Names and paths of folders that are not listed yet.
 #[derive(Default)]
 struct Waiting {
     folders: Vec<(String, PathBuf)>,
-    /// After all folders, so that photos have the names of the folders that they are in; sorted, so
-    /// that the order in which a disk lists them decides nothing.
+    /// Links come after all folders, so that photos have the names of their own folders. They are
+    /// sorted, so that the result does not depend on the order of the file system.
     links: BTreeSet<(String, PathBuf)>,
 }
 
@@ -300,7 +296,7 @@ mod tests {
     #[test]
     fn folders_that_link_to_each_other_are_listed_once() {
         let (dir, outside) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-        // Twelve folders with links to all of them: 12! paths.
+        // Twelve folders that link to each other: 12! paths.
         for at in 0..12 {
             let folder = dir.path().join(format!("f{at:02}"));
             fs::create_dir(&folder).unwrap();

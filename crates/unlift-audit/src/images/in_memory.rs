@@ -1,23 +1,23 @@
-//! Images in memory, or made by whoever asks for the audit when their turn comes.
-
 use unlift_io::features::ImageFeatures;
 
 use crate::Error;
 
-/// Makes the features of the image of a number.
 type Get = Box<dyn Fn(usize) -> Result<ImageFeatures, Error> + Send + Sync>;
 
-/// Images by name, each made when it is asked for: an audit asks a few at a time, and once more for those that it draws.
+/// Images by name, each made on request. An audit requests a few at a time, and the drawn ones
+/// again.
 pub struct InMemory {
     names: Vec<String>,
     get: Get,
 }
 
 impl InMemory {
-    /// The images called `names`, of which `get` gives the features by their number in `names`, from any thread.
+    /// Creates a source of the images `names`. `get` returns the features of the image with an
+    /// index in `names`, from any thread.
     ///
     /// # Errors
-    /// When there is no name, or they are not sorted by their bytes, each once: the order decides the last bits of sums.
+    /// If `names` is empty, or not sorted by bytes without repetition: the order decides the last
+    /// bits of sums.
     pub fn try_new(
         names: Vec<String>,
         get: impl Fn(usize) -> Result<ImageFeatures, Error> + Send + Sync + 'static,
@@ -35,15 +35,15 @@ impl InMemory {
         Ok(Self { names, get: Box::new(get) })
     }
 
-    /// Names of all images.
+    /// Returns the names of all images.
     pub fn names(&self) -> &[String] {
         &self.names
     }
 
-    /// The features of image `at`, under its name.
+    /// Returns the features of image `at`, under its name.
     ///
     /// # Errors
-    /// When it cannot be made.
+    /// If it cannot be made.
     pub fn get(&self, at: usize) -> Result<ImageFeatures, Error> {
         let name = self.names[at].clone();
         Ok(ImageFeatures { name, ..(self.get)(at)? })

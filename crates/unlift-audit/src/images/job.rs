@@ -1,5 +1,3 @@
-//! What an audit of images needs.
-
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -12,34 +10,34 @@ use crate::gate::Gate;
 use crate::inversion::Inversion;
 use crate::progress::Progress;
 
-/// Everything an audit of images needs.
+/// The inputs of an audit of images.
 pub struct ImagesJob<'a> {
-    /// Where images are.
+    /// The source of the images.
     pub source: &'a FeatureSource,
-    /// The same as the user named it; of images in memory what errors call them.
+    /// The path of the source as typed; for images in memory, their name in errors.
     pub path: &'a Path,
-    /// Numbers of the images to be used, rising.
+    /// Numbers of the images to use, ascending.
     pub chosen: Vec<usize>,
-    /// What is to be done.
+    /// The plan of the audit.
     pub plan: Plan<2>,
-    /// Options for the record, beside those in the plan.
+    /// Recorded options, in addition to those of the plan.
     pub options: Map<String, Value>,
-    /// Bounds to hold.
+    /// The gates.
     pub gates: Vec<Gate>,
-    /// Numbers of the images to draw; `None` chooses.
+    /// Numbers of the images to draw; with `None` the audit chooses.
     pub show: Option<Vec<usize>>,
-    /// Folder of photos, where the source is a file.
+    /// The folder of photos, if the source is a file.
     pub photos: Option<PathBuf>,
-    /// Folder to write.
+    /// The output folder.
     pub out: PathBuf,
-    /// Figures only.
+    /// Writes figures only.
     pub share_safe: bool,
-    /// Makes pictures of what comes back; the plan measures with it, too.
+    /// Makes pictures of recovered keypoints; the plan measures with it, too.
     pub inversion: Option<Arc<Inversion>>,
-    /// Hears how it goes.
+    /// Receives the progress.
     pub progress: &'a dyn Progress,
     /// The command line, for the record.
     pub command: Option<String>,
-    /// When the command began.
+    /// The start of the command.
     pub started: Instant,
 }

@@ -1,4 +1,4 @@
-//! Features of images from wherever they are: a folder of photos, hloc's HDF5, a COLMAP database, memory.
+//! Features of images from a folder of photos, an HDF5 file of hloc, a COLMAP database, or memory.
 
 pub mod audit;
 pub mod choice;
@@ -22,16 +22,16 @@ use crate::Error;
 pub use folder::{Folder, is_photo};
 pub use in_memory::InMemory;
 
-/// Images by name, one at a time. Shared by threads; memory grows by names only.
+/// Images by name, read one at a time. Threads can share it; it holds the names only.
 ///
-/// All images in parallel, in order and in constant memory is `in_order` of `unlift-features` over the
-/// numbers of [`names`](Self::names), with `get` in its work.
+/// To read all images in parallel, in order and in constant memory, call `in_order` of
+/// `unlift-features` over the indices of [`names`](Self::names), with `get` as its work.
 pub enum FeatureSource {
-    /// Photos, whose features are extracted when they are asked for.
+    /// Photos, whose features are extracted on request.
     Folder(Folder),
-    /// A file.
+    /// A file of features.
     File(features::FeatureSource),
-    /// What the caller has, or makes.
+    /// Images of the caller.
     InMemory(InMemory),
 }
 
@@ -39,7 +39,7 @@ impl FeatureSource {
     /// Opens a folder of photos, or a file of features.
     ///
     /// # Errors
-    /// When there is no such thing, or no image in it.
+    /// If `path` does not exist, or contains no image.
     pub fn open(path: &Path, extraction: &Extraction) -> Result<Self, Error> {
         let metadata = std::fs::metadata(path).map_err(|e| unlift_io::Error::read(path, e))?;
         Ok(match metadata.is_dir() {
@@ -48,7 +48,7 @@ impl FeatureSource {
         })
     }
 
-    /// How photos are turned in whose pixels the keypoints are.
+    /// Returns the orientation of photos in which keypoints are pixels.
     pub fn turn(&self) -> Turn {
         match self {
             Self::Folder(folder) => folder.turn(),
@@ -57,7 +57,7 @@ impl FeatureSource {
         }
     }
 
-    /// Sets how photos of a folder are turned. It changes nothing for a file, which says how its photos were turned.
+    /// Sets how photos of a folder are turned. No effect for files, which state it themselves.
     #[must_use]
     pub fn with_turn(self, turn: Turn) -> Self {
         match self {
@@ -66,7 +66,7 @@ impl FeatureSource {
         }
     }
 
-    /// Names of all images, sorted by their bytes.
+    /// Returns the names of all images, sorted by their bytes.
     pub fn names(&self) -> &[String] {
         match self {
             Self::Folder(folder) => folder.names(),
@@ -75,7 +75,7 @@ impl FeatureSource {
         }
     }
 
-    /// What was found beside images and cannot be used, one error each.
+    /// Returns one error for each entry that cannot be used.
     pub fn refused(&self) -> &[unlift_io::Error] {
         match self {
             Self::Folder(folder) => folder.refused(),
@@ -84,7 +84,7 @@ impl FeatureSource {
         }
     }
 
-    /// What was found beside images and passed over, in a line.
+    /// Describes skipped entries in one line.
     pub fn passed_over(&self) -> Option<&str> {
         match self {
             Self::Folder(folder) => folder.passed_over(),
@@ -92,7 +92,7 @@ impl FeatureSource {
         }
     }
 
-    /// A file of the images `which` that is not what it was when it was opened.
+    /// Returns a file of the images `which` that has changed since it was opened.
     pub fn changed(&self, which: &[usize]) -> Option<&Path> {
         match self {
             Self::Folder(folder) => folder.changed(which),
@@ -101,10 +101,10 @@ impl FeatureSource {
         }
     }
 
-    /// The features of image `at` of [`names`](Self::names).
+    /// Reads the features of image `at` of [`names`](Self::names).
     ///
     /// # Errors
-    /// One line when this image cannot be used; others may be.
+    /// If this image cannot be used; others may be.
     pub fn get(&self, at: usize) -> Result<ImageFeatures, Error> {
         match self {
             Self::Folder(folder) => folder.get(at),
@@ -113,8 +113,8 @@ impl FeatureSource {
         }
     }
 
-    /// The first of `chosen` that can be read and has keypoints: what it has and lacks is asked before the work, which tells of
-    /// the others.
+    /// Returns the first of `chosen` that can be read and has keypoints, to check its contents
+    /// before the audit. The audit reports the unusable ones.
     pub fn first(&self, chosen: &[usize]) -> Option<ImageFeatures> {
         let mut read = chosen.iter().filter_map(|&at| self.get(at).ok());
         read.find(|image| !image.keypoints.is_empty())

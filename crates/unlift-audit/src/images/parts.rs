@@ -1,4 +1,4 @@
-//! Finished images of a run that may be interrupted, each in a file of its own.
+//! Finished images of an extraction that may be interrupted, each in its own file.
 
 use std::collections::HashMap;
 use std::fs::{self, File, TryLockError};
@@ -12,43 +12,43 @@ use unlift_io::hash::{hash_bytes, hash_file};
 
 use super::folder::Folder;
 
-/// Changes when the same photo and options may give other features.
+/// Changes when the same photo and options may give different features.
 const VERSION: &str = concat!("unlift ", env!("CARGO_PKG_VERSION"), " features 1");
 const ENDING: &str = ".part.h5";
-/// Letters of a key, and of a hash of content.
 const KEY: usize = 32;
 const HASH: usize = 64;
 
 /// The folder `FILE.parts` beside an output `FILE`.
 ///
-/// A part's name is a key and the SHA-256 of its content. The key is a hash of all that the content depends on: the
-/// program's version, the options, and the photo's name and content. So a part is either right or none.
+/// The name of a part contains a key and the SHA-256 of its content. The key is a hash of
+/// everything that the content depends on: the program's version, the options, and the photo's name
+/// and content. So damaged or outdated parts are never used.
 pub struct Parts {
     target: PathBuf,
     folder: PathBuf,
     options: String,
-    /// What earlier runs left, by key: hashes of the content.
+    /// Parts of earlier runs: hashes of their contents by key.
     earlier: HashMap<String, Vec<String>>,
-    /// Holds the lock on the folder.
     _locked: Option<File>,
 }
 
-/// A photo's key.
+/// The key of a photo.
 pub struct Key(String);
 
 impl Parts {
-    /// The parts of the output `target` with these features; the folder of parts is made if it is not there.
+    /// Opens the parts of the output `target` with these features, and creates their folder if
+    /// needed.
     ///
     /// # Errors
-    /// When it cannot be made or read, or another run is at work in it: the first to be done would remove the parts of
-    /// the other.
+    /// If the folder cannot be created or read, or another run uses it: the first run to finish
+    /// would remove the parts of the other.
     pub fn open(target: &Path, features: &Folder) -> Result<Self, Error> {
         let mut folder = target.as_os_str().to_owned();
         folder.push(".parts");
         let folder = PathBuf::from(folder);
         let locked = locked(&folder).map_err(|source| match source.kind() {
             io::ErrorKind::WouldBlock => {
-                Error::new(target, "", "one run at a time", "another run at work")
+                Error::new(target, "", "no other run with this output", "one in progress")
             }
             _ => Error::write(target, source),
         })?;
@@ -64,20 +64,20 @@ impl Parts {
         Ok(Self { target, folder, options: features.settings(), earlier, _locked: locked })
     }
 
-    /// The key of the photo `name` at `photo`.
+    /// Returns the key of the photo `name` at `photo`.
     ///
     /// # Errors
-    /// When the photo cannot be read.
+    /// If the photo cannot be read.
     pub fn key(&self, name: &str, photo: &Path) -> Result<Key, Error> {
-        // Its length and time would not tell one that was put in its place.
+        // Length and time of a file do not identify its content.
         let content = hash_file(photo)?;
         let key = format!("{VERSION}\n{}\n{content}\n{name}", self.options);
         let hash = hash_bytes(key.as_bytes());
         Ok(Key(hash[..KEY].to_owned()))
     }
 
-    /// The part that an earlier run made, if its content still is what its name says. One that has changed is not
-    /// taken up, and goes away with the others.
+    /// Returns the part of an earlier run if its content fits its name. Other parts are not used,
+    /// and removed at the end.
     pub fn earlier(&self, key: &Key) -> Option<PathBuf> {
         let hashes = self.earlier.get(&key.0)?;
         let parts = hashes.iter().map(|hash| (self.path(key, hash), hash));
@@ -86,10 +86,10 @@ impl Parts {
         whole.next().map(|(path, _)| path)
     }
 
-    /// Writes a part, whole or not at all; where it is.
+    /// Writes a part atomically and returns its path.
     ///
     /// # Errors
-    /// When the disk fails.
+    /// If writing fails.
     pub fn write(&self, key: &Key, image: &ImageFeatures) -> Result<PathBuf, Error> {
         let bytes = encode(image, &self.target)?;
         let part = self.path(key, &hash_bytes(&bytes));
@@ -102,11 +102,11 @@ impl Parts {
         self.folder.join(format!("{}-{hash}{ENDING}", key.0))
     }
 
-    /// Joins the parts of these images, in this order, to the output, which appears whole; then
-    /// removes all parts.
+    /// Joins the parts of these images, in this order, to the output, which is written atomically.
+    /// Then removes all parts.
     ///
     /// # Errors
-    /// When a part or the output fails; the parts stay then.
+    /// If a part or the output fails; then the parts stay.
     pub fn join(
         self,
         images: &[(&str, PathBuf)],
@@ -123,9 +123,9 @@ impl Parts {
         Ok(())
     }
 
-    /// Removes all parts, those of earlier options and versions too, and the folder if nothing else is in it.
+    /// Removes all parts, also of other options and versions, and the folder if it is empty then.
     pub fn remove(self) {
-        // What cannot be removed is in nobody's way: the output is there.
+        // The output exists, so remaining parts are harmless.
         let Ok(entries) = fs::read_dir(&self.folder) else { return };
         for entry in entries.flatten() {
             if of_name(&entry.file_name().to_string_lossy()).is_some() {
@@ -136,8 +136,8 @@ impl Parts {
     }
 }
 
-/// Makes the folder of parts if it is not there and locks it, where folders can be locked. The system takes the lock
-/// back when the process ends in any way.
+/// Creates the folder of parts if needed, and locks it if the system supports locks on folders. The
+/// system releases the lock when the process ends.
 fn locked(folder: &Path) -> io::Result<Option<File>> {
     loop {
         match fs::create_dir(folder) {
@@ -156,7 +156,7 @@ fn locked(folder: &Path) -> io::Result<Option<File>> {
             Err(TryLockError::WouldBlock) => return Err(io::ErrorKind::WouldBlock.into()),
             Err(TryLockError::Error(_)) => return Ok(None),
         }
-        // Another run may have removed it, being done, before it was locked here.
+        // Another run may have finished and removed the folder before it was locked.
         if is_at(&file, folder) {
             return Ok(Some(file));
         }
@@ -176,7 +176,8 @@ fn is_at(_: &File, path: &Path) -> bool {
     path.is_dir()
 }
 
-/// The key in the name of a part, and the hash of its content, which those of the first version lack.
+/// Parses the name of a part: its key and the hash of its content, which parts of the first version
+/// lack.
 fn of_name(name: &str) -> Option<(&str, Option<&str>)> {
     let is_hash =
         |text: &str, n| text.len() == n && text.bytes().all(|byte| byte.is_ascii_hexdigit());

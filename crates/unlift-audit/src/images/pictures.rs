@@ -1,4 +1,4 @@
-//! What the report draws of chosen images, collected while these are audited once more.
+//! Pictures of the chosen images, collected while these are audited again.
 
 use std::sync::Arc;
 
@@ -13,18 +13,16 @@ use crate::document::given;
 use crate::inversion::Inversion;
 use crate::progress::Progress;
 
-/// Collects pictures of all images that pass by, in their order.
+/// Collects the pictures of all audited images, in their order.
 pub struct Album<'a> {
     inverter: Option<Arc<Inversion>>,
     steps: &'a dyn Progress,
-    /// Finished pictures.
     pub pictures: Vec<Picture>,
-    /// What a network painted of these images.
     pub inversions: Vec<Inverted>,
 }
 
 impl<'a> Album<'a> {
-    /// With paintings, if there is an inverter; while `steps` says that it goes on.
+    /// Creates an empty album. It paints if there is an inverter, and stops when `steps` does.
     pub fn new(inverter: Option<Arc<Inversion>>, steps: &'a dyn Progress) -> Self {
         Self { inverter, steps, pictures: Vec::new(), inversions: Vec::new() }
     }
@@ -51,7 +49,6 @@ impl<'a> Watcher<2> for Album<'a> {
     }
 }
 
-/// The picture of an image at work.
 pub struct Page<'a> {
     inverter: Option<Arc<Inversion>>,
     steps: &'a dyn Progress,
@@ -66,14 +63,14 @@ impl Observer<2> for Page<'_> {
 
     fn cell(&mut self, cell: &Cell<'_, 2>) {
         if let Some(inverter) = self.inverter.clone() {
-            // What fails here failed when it was measured, and was told.
+            // This error was reported when the image was measured.
             let _ = inverter.add(cell, &mut self.painted);
         }
         let picture = &mut self.picture;
         let truth = cell.original.reveal().positions();
         if picture.keypoints.is_empty() {
             picture.keypoints = truth.iter().map(narrow).collect();
-            // Bounds reach half a pixel beyond the middles of the outermost ones.
+            // Bounds reach half a pixel beyond the outermost pixel centers.
             let sides = cell.original.bounds().map(|b| [0, 1].map(|c| b.high[c] - b.low[c]));
             picture.size = sides.unwrap_or([1.0; 2]).map(|side| side.round() as u32);
         }
@@ -105,8 +102,9 @@ impl Observer<2> for Page<'_> {
     }
 }
 
-/// True places of the neighbors of `slot` that a graph shows: those with the best scores; without scores
-/// (oracle) those with the lowest record numbers, which are random.
+/// Returns the true positions of the neighbors of `slot` in the drawn graph: those with the highest
+/// scores. Lists without scores (oracle) are cut at the beginning, which is random because record
+/// numbers are.
 fn best(cell: &Cell<'_, 2>, slot: usize) -> Vec<[f32; 2]> {
     let lists = cell.lists;
     let listed = lists.of(slot);
@@ -123,7 +121,6 @@ fn best(cell: &Cell<'_, 2>, slot: usize) -> Vec<[f32; 2]> {
     order.iter().take(GRAPH_NEIGHBORS).filter_map(place).collect()
 }
 
-/// What is released, by original.
 fn marks(released: &Released<2>, slot_of: &[Option<usize>]) -> Option<Marks> {
     let origin = released.origin();
     let bounds = released.bounds()?;
@@ -159,12 +156,12 @@ fn marks(released: &Released<2>, slot_of: &[Option<usize>]) -> Option<Marks> {
                 .map(|slot| Some(place(points.position().get((*slot)?)?).map(|x| x as f32)))
                 .collect(),
         ),
-        // No scheme for images makes planes: in an image they would be lines.
+        // No scheme for images makes planes.
         Obfuscation::AxisPlanes(_) => return None,
     })
 }
 
-/// Where a ray leaves the part of the image in which its point lies.
+/// Returns where a ray leaves the region of the image in which its point lies.
 fn ray_end(
     released: &Released<2>,
     center: usize,
@@ -175,9 +172,9 @@ fn ray_end(
     let bounds = released.bounds()?;
     let origin = released.origin();
     let region = rays.regions().and_then(|regions| regions.get(center));
-    // Regions are about the origin.
+    // Regions are relative to the origin.
     let region = region.map(|region| region.about(&origin.map(|x| -x))).unwrap_or(bounds);
-    // Rounded directions of rays along a border may miss the part by a hair.
+    // Because of rounding, a ray along a border may miss the region.
     let (_, to) = region.clip(anchor, along).or_else(|| bounds.clip(anchor, along))?;
     Some(to.max(0.0))
 }

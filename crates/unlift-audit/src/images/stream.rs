@@ -1,4 +1,5 @@
-//! Images for an audit: one after the other, the next ones read in parallel, broken ones of files told and left out.
+//! Images for an audit, one after the other. The next ones are read in parallel; broken ones in
+//! files are reported and skipped.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -18,19 +19,18 @@ use unlift_io::hash::hash_features;
 use super::FeatureSource;
 use crate::progress::Progress;
 
-/// Images per thread that are read ahead.
 const PER_THREAD: usize = 2;
 
-/// What became of the images so far.
+/// Counts of the images that were read so far.
 #[derive(Debug, Default)]
 pub struct Tally {
-    /// Keypoints of each image that was handed out and not yet [taken](Self::take).
+    /// Keypoint counts of the images that were returned and not yet [taken](Self::take).
     sizes: VecDeque<usize>,
-    /// Numbers of the images that were handed out.
+    /// Numbers of the images that were returned.
     pub used: Vec<usize>,
-    /// Keypoints of all of them.
+    /// Their total number of keypoints.
     pub n_points: usize,
-    /// Hashes of the same, of images in memory.
+    /// Their hashes, for images in memory.
     pub hashes: Vec<String>,
     /// Images that could not be used.
     pub unusable: usize,
@@ -40,9 +40,9 @@ pub struct Tally {
     filled: Option<Bounds<2>>,
 }
 
-/// Keypoints that say where an image ends.
+/// Minimum number of keypoints to estimate where an image ends.
 const TELLING: usize = 30;
-/// Keypoints fill more of the declared sizes than this share, unless the sizes are others.
+/// Keypoints fill more than this share of the correct size.
 const FILLED: f64 = 0.5;
 
 impl Tally {
@@ -64,21 +64,21 @@ impl Tally {
         }
     }
 
-    /// Why figures may be too small: images are declared to be larger than where keypoints of any of them are. Schemes and
-    /// attacks take the declared size for the true one.
+    /// Returns a doubt if the images are declared larger than the area of their keypoints. Schemes
+    /// and attacks use the declared size.
     pub fn doubt(&self) -> Option<String> {
         let Bounds { low, high } = self.filled.as_ref()?;
         let share = (high[0] - low[0]) * (high[1] - low[1]);
         (share < FILLED).then(|| {
             format!(
-                "sizes: keypoints fill {:.0} % of the declared size of the images: if that is not theirs, more may come \
-                 back",
+                "sizes: keypoints fill {:.0} % of the declared size of the images: if it is wrong, recovery may be too \
+                 low",
                 100.0 * share
             )
         })
     }
 
-    /// What to say of keypoints that were moved.
+    /// Returns a note about keypoints that were moved.
     pub fn moved(&self) -> Option<String> {
         let n = self.n_moved;
         (n > 0).then(|| {
@@ -86,53 +86,53 @@ impl Tally {
         })
     }
 
-    /// The keypoints of the image that was handed out first and not taken yet.
+    /// Removes and returns the number of keypoints of the earliest image that was not taken yet.
     pub fn take(&mut self) -> usize {
         self.sizes.pop_front().unwrap_or(0)
     }
 }
 
-/// What an image must have, beside keypoints and a size: what these sources need.
+/// Data that an image must have besides keypoints and a size, depending on the sources.
 #[derive(Clone, Debug, Default)]
 pub struct Needs {
     sources: Vec<Arc<dyn Source<2>>>,
-    /// Descriptors are kept where there are any.
+    /// Descriptors are kept if there are any.
     whatever: bool,
 }
 
 impl Needs {
-    /// What a source needs.
+    /// Returns the needs of a source.
     pub fn of(source: &Arc<dyn Source<2>>) -> Self {
         let needy = |source: &Arc<dyn Source<2>>| source.needs() == neighbors::Needs::Descriptors;
         let sources = Some(source.clone()).filter(needy).into_iter().collect();
         Self { sources, whatever: false }
     }
 
-    /// What a plan needs.
+    /// Returns the needs of a plan.
     pub fn of_plan(plan: &Plan<2>) -> Self {
         let own = plan.neighbors.iter().flat_map(|by| match by {
             NeighborsBy::Source(source) => Self::of(source).sources,
             NeighborsBy::Oracle | NeighborsBy::Given(_) => Vec::new(),
         });
-        // Measures may look at them, where there are any.
+        // Measures may use descriptors if there are any.
         Self { sources: own.collect(), whatever: !plan.measures.is_empty() }
     }
 
-    /// Nothing, and descriptors are handed on where there are any.
+    /// Needs nothing, but keeps descriptors if there are any.
     pub fn whatever_there_is() -> Self {
         Self { sources: Vec::new(), whatever: true }
     }
 
-    /// Whether it is descriptors.
+    /// Returns true if descriptors are needed.
     pub fn descriptors(&self) -> bool {
         !self.sources.is_empty()
     }
 }
 
-/// An image, its hash where it is one in memory, and how many of its keypoints were moved.
+/// An image, its hash if it is in memory, and the number of its moved keypoints.
 type Ready = (Item<2>, Option<String>, usize);
 
-/// The images `chosen` of a source. Memory depends on the number of threads, not on that of images.
+/// The images `chosen` of a source. Memory depends on the number of threads, not of images.
 pub struct Stream<'a> {
     source: &'a FeatureSource,
     path: &'a Path,
@@ -145,7 +145,8 @@ pub struct Stream<'a> {
 }
 
 impl<'a> Stream<'a> {
-    /// `path` names the source in errors, which `steps` tells and `tally` counts.
+    /// Creates a stream. `path` names the source in errors, which are reported to `steps` and
+    /// counted in `tally`.
     pub fn new(
         (source, path): (&'a FeatureSource, &'a Path),
         chosen: &'a [usize],
@@ -174,7 +175,7 @@ impl<'a> Stream<'a> {
                     drop(tally);
                     self.ready.push_back((at, Ok(image)));
                 }
-                // A mistake of the caller's, who is there to mend it.
+                // The caller can correct images in memory, so the error ends the audit.
                 Err(error) if in_memory => self.ready.push_back((at, Err(error))),
                 Err(error) => {
                     self.tally.borrow_mut().unusable += 1;
@@ -229,7 +230,7 @@ fn image(
         Error::core(path, error.within(&format!("image {}", features.name.escape_debug())))
     };
     let bounds = Bounds::try_new([-0.5; 2], high).map_err(of_image)?;
-    // Half floats, as hloc stores them, round by up to a pixel.
+    // hloc stores half floats, whose rounding error is up to a pixel.
     let mut n_moved = 0;
     let to_edge = |keypoint: [f64; 2]| {
         let near: [f64; 2] =
@@ -241,13 +242,13 @@ fn image(
     let keypoints = features.keypoints.iter().copied().map(to_edge).collect();
     let points = PointSet::try_new(keypoints, Unit::Pixel).map_err(of_image)?;
     let original = Original::within(points, bounds).map_err(of_image)?;
-    // Nobody asks for them otherwise, and they are most of an image.
+    // Descriptors use most of the memory of an image.
     let descriptors = features.descriptors.filter(|_| needs.descriptors() || needs.whatever);
     Ok((Item { name: features.name, original, descriptors }, sha256, n_moved))
 }
 
-/// What was expected of these features, and found; `None` where they have what is needed. An image
-/// without keypoints needs nothing.
+/// Returns what was expected of these features and what was found; `None` if nothing is missing. An
+/// image without keypoints needs nothing.
 pub fn lacking(features: &ImageFeatures, needs: &Needs) -> Option<(String, String)> {
     if features.keypoints.is_empty() || !needs.descriptors() {
         return None;

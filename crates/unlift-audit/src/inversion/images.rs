@@ -1,5 +1,3 @@
-//! Pictures of images: of recovered keypoints.
-
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -15,24 +13,22 @@ use unlift_report::inversions::Inversion as Sheet;
 
 use super::{Judged, Painter, SHOWN, boxed, figures, needed, painted, shown, size};
 
-/// A photo at the size of its pictures, and how well the true points paint it.
+/// A photo at the size of its pictures, and the baseline of its true points.
 struct Truth {
-    /// At half its size.
     photo: ColorImage,
     objects: Vec<Detection>,
-    /// The picture of the true points.
     picture: ColorImage,
-    /// No attack on positions can be expected to do better.
+    /// The figures of that picture: no attack on positions can be expected to do better.
     baseline: Judged,
 }
 
-/// Photos that are kept for cells to come; fewer images are at work.
+/// Number of photos kept for further cells; fewer images are processed at the same time.
 const KEPT: usize = 64;
 
 /// Makes pictures of images and compares them with the photos.
 pub struct Inversion {
     painter: Painter,
-    /// Folder of the photos, by the names of the images.
+    /// Folder of the photos, which have the names of the images.
     photos: PathBuf,
     turn: Turn,
     known: Mutex<BTreeMap<String, Arc<Truth>>>,
@@ -46,26 +42,27 @@ impl fmt::Debug for Inversion {
 }
 
 impl Inversion {
-    /// Paints images whose photos are in the folder `photos`. `turn` says in which photos keypoints are pixels.
+    /// Creates a measure for images whose photos are in the folder `photos`. `turn` sets the
+    /// orientation of photos in which keypoints are pixels.
     pub fn new(painter: Painter, photos: &Path, turn: Turn) -> Self {
         let photos = photos.to_owned();
         Self { painter, photos, turn, known: Mutex::default(), failed: Mutex::default() }
     }
 
-    /// SHA-256 of the network that paints, in hexadecimal.
+    /// Returns the SHA-256 of the painting network, in hexadecimal.
     pub fn sha256(&self) -> &str {
         self.painter.sha256()
     }
 
-    /// Why images have no pictures, by their names.
+    /// Returns the reasons why images have no pictures, ordered by image name.
     pub fn failed(&self) -> Vec<Error> {
         lock(&self.failed).values().cloned().collect()
     }
 
-    /// Adds the picture of `cell` to those of its image.
+    /// Adds the picture of `cell` to the sheet of its image.
     ///
     /// # Errors
-    /// As those that [`failed`](Self::failed) tells.
+    /// If the photo cannot be used (see [`failed`](Self::failed)).
     pub fn add(&self, cell: &Cell<'_, 2>, sheet: &mut Sheet) -> Result<(), Error> {
         let truth = self.truth(cell)?;
         if sheet.photo.is_empty() {
@@ -79,7 +76,6 @@ impl Inversion {
         Ok(())
     }
 
-    /// The photo of the image of `cell`, and the picture of its true keypoints.
     fn truth(&self, cell: &Cell<'_, 2>) -> Result<Arc<Truth>, Error> {
         let name = cell.name.unwrap_or_default();
         if let Some(known) = lock(&self.known).get(name) {
@@ -120,7 +116,8 @@ impl Measure<2> for Inversion {
         Counts::Images
     }
 
-    /// Nothing of an image whose photo cannot be used, which [`failed`](Inversion::failed) tells: other images go on.
+    /// Returns no figures if the photo cannot be used; [`failed`](Inversion::failed) has the
+    /// reason. Other images continue.
     fn measure(&self, cell: &Cell<'_, 2>) -> Result<Vec<(String, f64)>, Error> {
         let name = cell.name.unwrap_or_default();
         let truth = match self.truth(cell) {
@@ -137,7 +134,7 @@ impl Measure<2> for Inversion {
     }
 }
 
-/// What stands in these maps is whole whatever happened to who held them.
+/// Each entry is complete even if another thread panicked.
 fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
     of.lock().unwrap_or_else(PoisonError::into_inner)
 }

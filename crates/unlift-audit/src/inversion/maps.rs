@@ -1,4 +1,4 @@
-//! Pictures of a map: of recovered points, seen by the cameras of its photos.
+//! Pictures of a map: recovered points as the cameras of its photos see them.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -22,28 +22,26 @@ use super::{Judged, Painter, SHOWN, boxed, figures, needed, painted, shown};
 use crate::progress::Progress;
 use crate::scene::{near, shapes};
 
-/// Sides of a picture that metrics can be taken of.
+/// Smallest side of a picture for which the metrics are defined.
 const LEAST_SIDE: usize = 16;
 
 /// One camera of the map that took a photo.
 struct Seen {
     name: String,
     view: View,
-    /// At half its size.
     photo: ColorImage,
     objects: Vec<Detection>,
-    /// What the true points paint.
     truth: OnceLock<Result<Picture, Error>>,
 }
 
-/// A picture, and what it shows of its photo.
 type Picture = (ColorImage, Judged);
 
 /// Makes pictures of a map and compares them with the photos.
 pub struct MapInversion {
     painter: Painter,
     seen: Vec<Seen>,
-    /// The cell that was measured last and its pictures, one per photo: whoever draws it next need not paint again.
+    /// The cell that was measured last and its pictures, one per photo, so that the page does not
+    /// paint them again.
     last: Mutex<Option<(Row, u32, Vec<Picture>)>>,
 }
 
@@ -54,13 +52,14 @@ impl fmt::Debug for MapInversion {
 }
 
 impl MapInversion {
-    /// Of the COLMAP model in `model`, whose lengths are multiplied by `scale` in the audit, by at most `most` of its
-    /// images that have a photo in `photos`, evenly spaced over their names.
+    /// Opens the COLMAP model in `model`, whose lengths are multiplied by `scale` in the audit.
+    /// Uses at most `most` of its images that have a photo in `photos`, evenly spaced over their
+    /// names.
     ///
-    /// A camera that no lens is known for and a photo that cannot be used are told; the others are taken.
+    /// Cameras with an unknown lens and unusable photos are reported and skipped.
     ///
     /// # Errors
-    /// When there is not one, or a file of the model cannot be read.
+    /// If no photo is left, or a file of the model cannot be read.
     pub fn open(
         painter: Painter,
         model: &Path,
@@ -101,10 +100,10 @@ impl MapInversion {
         Ok(Self { painter, seen, last: Mutex::default() })
     }
 
-    /// Of photos at hand: name, camera in the unit of the audit, pixels.
+    /// Creates a measure from photos in memory: name, camera in the unit of the audit, pixels.
     ///
     /// # Errors
-    /// When a photo has not the size of its camera or is too small.
+    /// If a photo does not have the size of its camera, or is too small.
     pub fn of(
         painter: Painter,
         photos: impl IntoIterator<Item = (String, View, ColorImage)>,
@@ -116,12 +115,12 @@ impl MapInversion {
         Ok(Self { painter, seen, last: Mutex::default() })
     }
 
-    /// SHA-256 of the network that paints, in hexadecimal.
+    /// Returns the SHA-256 of the painting network, in hexadecimal.
     pub fn sha256(&self) -> &str {
         self.painter.sha256()
     }
 
-    /// How many photos there are.
+    /// Returns the number of photos.
     pub fn n_photos(&self) -> usize {
         self.seen.len()
     }
@@ -129,7 +128,7 @@ impl MapInversion {
     /// Adds the pictures of `cell` by the first cameras, one per sheet.
     ///
     /// # Errors
-    /// When a picture cannot be made.
+    /// If a picture cannot be made.
     pub fn add(&self, cell: &Cell<'_>, sheets: &mut [Sheet]) -> Result<(), Error> {
         let last = self.last.lock().unwrap_or_else(PoisonError::into_inner).take();
         let pictures = match last {
@@ -160,7 +159,6 @@ impl MapInversion {
         Ok(())
     }
 
-    /// The pictures of `cell` by the first `n` cameras.
     fn pictures(&self, cell: &Cell<'_>, n: usize) -> Result<Vec<Picture>, Error> {
         let of_one = |seen: &Seen| {
             let picture = self.painter.map(&seen.view, cell.released, cell.recovered)?;
@@ -170,7 +168,6 @@ impl MapInversion {
         self.seen.par_iter().take(n).map(of_one).collect()
     }
 
-    /// What the true points paint.
     fn truth<'a>(&'a self, seen: &'a Seen, cell: &Cell<'_>) -> Result<&'a Picture, Error> {
         let make = || {
             let originals = cell.original.reveal().positions();
@@ -185,7 +182,7 @@ impl MapInversion {
 }
 
 impl Measure<3> for MapInversion {
-    /// Means over the photos that have the figure: not every photo has objects.
+    /// Returns means over the photos that have the figure: not every photo has objects.
     fn measure(&self, cell: &Cell<'_>) -> Result<Vec<(String, f64)>, Error> {
         let pictures = self.pictures(cell, self.seen.len())?;
         let mut all = Vec::new();
@@ -203,12 +200,12 @@ impl Measure<3> for MapInversion {
     }
 }
 
-/// Records that are drawn at most: more are a fog.
+/// Maximum number of drawn records; more cannot be distinguished.
 const MOST_RECORDS: usize = 700;
-/// Places along a line that are looked at to find where it enters and leaves an image.
+/// Number of places along a line that are projected to find where it enters and leaves an image.
 const STEPS: u32 = 64;
 
-/// Some of the released records, clipped to the map, and the place that they are about.
+/// Returns some released records, clipped to the map, and the origin of their coordinates.
 fn records(cell: &Cell<'_>) -> (Shapes, [f64; 3]) {
     let points = cell.original.reveal().positions();
     let middle = rounded_origin(points);
@@ -219,7 +216,6 @@ fn records(cell: &Cell<'_>) -> (Shapes, [f64; 3]) {
     (shapes(&bounds, &middle, cell.released, &chosen), middle)
 }
 
-/// Records as `view` would see them, in pixels.
 fn marks(view: &View, shapes: &Shapes, middle: &[f64; 3]) -> Result<Marks, Error> {
     let place = |p: [f32; 3]| Some([0, 1, 2].map(|c| f64::from(p[c]) + middle[c]));
     let line = |a: [f32; 3], b: [f32; 3]| -> Result<Option<[[f32; 2]; 2]>, Error> {
@@ -252,7 +248,7 @@ fn one(
     path: &Path,
     scale: f64,
 ) -> Result<Seen, Error> {
-    // COLMAP does not turn photos.
+    // COLMAP ignores the orientation tag of photos.
     let photo = read_color_with(path, Turn::AsStored)?;
     let name = String::from_utf8_lossy(&image.name).into_owned();
     view(camera, image, scale)
@@ -260,7 +256,6 @@ fn one(
         .map_err(|error| error.within(&path.display().to_string().escape_debug().to_string()))
 }
 
-/// A photo as it is needed to compare pictures with it.
 fn seen(painter: &Painter, name: String, view: View, photo: &ColorImage) -> Result<Seen, Error> {
     let [width, height] = view.size;
     if [photo.width(), photo.height()] != view.size {
@@ -277,10 +272,11 @@ fn seen(painter: &Painter, name: String, view: View, photo: &ColorImage) -> Resu
     Ok(Seen { name, view, photo, objects, truth: OnceLock::new() })
 }
 
-/// What an image of a COLMAP model sees, in units of which one of the model has `scale`.
+/// Returns the view of an image of a COLMAP model; `scale` is the number of units per unit of the
+/// model.
 ///
 /// # Errors
-/// When the camera is none that COLMAP knows.
+/// If COLMAP has no such camera model.
 pub fn view(camera: &colmap::Camera, image: &colmap::Image, scale: f64) -> Result<View, Error> {
     Ok(View {
         center: image.center.map(|x| x * scale),

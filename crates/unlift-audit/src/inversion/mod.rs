@@ -1,4 +1,4 @@
-//! Pictures that a network makes of what came back, and how alike they are to the photos.
+//! Pictures that a network makes from recovered points, and their similarity to the photos.
 
 mod images;
 mod maps;
@@ -21,58 +21,56 @@ use crate::document::given;
 pub use images::Inversion;
 pub use maps::{MapInversion, view};
 
-/// Points that are less likely to be about where they were recovered are left out: they paint wrong things over right
-/// ones.
+/// Points with a lower probability of being near their recovered place are omitted: they would
+/// paint wrong content over correct content.
 const LEAST: f64 = 0.2;
-/// Longest side of a picture on the page in pixels.
 const SHOWN: usize = 320;
-/// Behind the names of figures of true points.
 const BASELINE: &str = "_baseline";
-/// Equal pictures have no finite ratio of signal to noise.
+/// Limit of PSNR, which is infinite for equal pictures.
 const MOST_DB: f64 = 100.0;
 
-/// The share of a photo's objects that are found in a picture.
 const OBJECTS: &str = "objects_found";
-/// How sure the detector must be of an object.
+/// Minimum confidence of the detector for an object.
 const SURE: f32 = 0.3;
-/// How much two boxes of a class must overlap to be the same object.
+/// Minimum overlap (intersection over union) of two boxes of the same object.
 const SAME: f32 = 0.5;
 
-/// Within how many pixels a keypoint must lie for its descriptor to paint the right thing.
+/// Distance in pixels within which a keypoint's descriptor paints the correct content.
 const NEAR_PX: f64 = 10.0;
-/// The same for a point of a map, of its distance from the camera: about 15 of 640 pixels.
+/// Distance within which a map point's descriptor paints the correct content, as a share of its
+/// depth: about 15 of 640 pixels.
 const NEAR: f64 = 0.03;
 
-/// Paints points, and compares what it painted. Every picture has half the size of the photo, rounded down.
+/// Makes pictures from points and compares them with photos. Every picture has half the size of the
+/// photo, rounded down.
 pub struct Painter {
     inverter: Inverter,
     lpips: Lpips,
     detector: Detector,
 }
 
-/// What a picture shows of its photo.
+/// The comparison of a picture with its photo.
 #[derive(Clone, Debug)]
 struct Judged {
     metrics: Metrics,
-    /// What the detector sees in it.
     objects: Vec<Detection>,
-    /// For every object of the photo its class, and whether it is found in the picture.
+    /// The class of every object of the photo, and whether it is found in the picture.
     found: Vec<(usize, bool)>,
 }
 
 impl Painter {
-    /// With the network that paints, and those that judge.
+    /// Creates a painter with the painting network, and loads the networks that compare.
     ///
     /// # Errors
-    /// When a file that is to be taken in place of one that the program carries cannot be.
+    /// If a file that replaces an embedded network cannot be loaded.
     pub fn try_new(inverter: Inverter) -> Result<Self, Error> {
         Ok(Self { inverter, lpips: Lpips::try_new()?, detector: Detector::try_new()? })
     }
 
-    /// The picture of keypoints `(n, 2)` in an image of `size` (width, height) pixels.
+    /// Makes the picture of keypoints `(n, 2)` in an image of `size` (width, height) pixels.
     ///
     /// # Errors
-    /// When there is not one descriptor per keypoint, of the kind that the network knows.
+    /// If there is not one descriptor per keypoint, of a kind that the network supports.
     pub fn keypoints(
         &self,
         places: &[[f32; 2]],
@@ -83,11 +81,12 @@ impl Painter {
         self.inverter.invert(&Points { places, descriptors, weights, depths: None }, size)
     }
 
-    /// The picture of what came back of an image: every recovered keypoint with the descriptor that it was given, as
-    /// much as the attacker trusts it.
+    /// Makes the picture of a recovered image: every recovered keypoint with its assigned
+    /// descriptor, weighted by its probability of being correct.
     ///
     /// # Errors
-    /// When the size of the image or descriptors were not released, or the network does not know these.
+    /// If the size of the image or descriptors were not released, or the network does not support
+    /// the descriptors.
     pub fn image(
         &self,
         released: &Released<2>,
@@ -102,10 +101,10 @@ impl Painter {
         self.inverter.invert(&points, size(released)?)
     }
 
-    /// The picture of what came back of a map, as `view` sees it.
+    /// Makes the picture of a recovered map as `view` sees it.
     ///
     /// # Errors
-    /// When descriptors were not released, or the network does not know them.
+    /// If descriptors were not released, or the network does not support them.
     pub fn map(
         &self,
         view: &View,
@@ -119,17 +118,16 @@ impl Painter {
         })
     }
 
-    /// Whether any recovered point lies before the camera.
+    /// Returns true if any recovered point is in front of the camera.
     ///
     /// # Errors
-    /// As [`map`](Self::map).
+    /// See [`map`](Self::map).
     pub fn sees(&self, view: &View, recovered: &Recovered<3>) -> Result<bool, Error> {
         let positions: Vec<_> =
             (0..recovered.n_slots()).map(|slot| recovered.position(slot)).collect();
         Ok(!view.project(&positions)?.points.is_empty())
     }
 
-    /// The picture of points as `view` sees them, without those behind others.
     fn seen(
         &self,
         view: &View,
@@ -144,17 +142,14 @@ impl Painter {
         self.inverter.invert(&points, view.size)
     }
 
-    /// SHA-256 of the network that paints, in hexadecimal.
     fn sha256(&self) -> &str {
         self.inverter.sha256()
     }
 
-    /// The objects in a photo.
     fn objects(&self, photo: &ColorImage) -> Result<Vec<Detection>, Error> {
         self.detector.find(photo, SURE)
     }
 
-    /// What `picture` shows of a photo with these objects.
     fn judge(
         &self,
         picture: &ColorImage,
@@ -172,7 +167,8 @@ impl Painter {
 }
 
 impl Judged {
-    /// The share of the photo's objects that are found in the picture, where the photo has any; then by class.
+    /// Returns the share of the photo's objects that are found in the picture, if there are any;
+    /// then by class.
     fn objects_found(&self) -> Vec<(String, f64)> {
         let share = |of: &dyn Fn(usize) -> bool| {
             let of = self.found.iter().filter(|(class, _)| of(*class));
@@ -189,7 +185,6 @@ impl Judged {
     }
 }
 
-/// Named figures of a picture, and of that of the true points.
 fn figures(found: &Judged, baseline: &Judged) -> Vec<(String, f64)> {
     let named = |(judged, of): (&Judged, &str)| {
         let Metrics { ssim, psnr, lpips } = judged.metrics;
@@ -201,7 +196,6 @@ fn figures(found: &Judged, baseline: &Judged) -> Vec<(String, f64)> {
     [(found, ""), (baseline, BASELINE)].into_iter().flat_map(named).collect()
 }
 
-/// A picture of what came back, for the page.
 fn shown(row: &Row, picture: &ColorImage, judged: &Judged) -> Result<InvertedView, Error> {
     Ok(InvertedView {
         scheme: row.scheme.clone(),
@@ -211,7 +205,6 @@ fn shown(row: &Row, picture: &ColorImage, judged: &Judged) -> Result<InvertedVie
     })
 }
 
-/// A picture and what is said about it, for the page.
 fn painted(picture: &ColorImage, judged: &Judged) -> Result<Painted, Error> {
     Ok(Painted {
         jpeg: jpeg_of(picture, SHOWN)?,
@@ -220,7 +213,6 @@ fn painted(picture: &ColorImage, judged: &Judged) -> Result<Painted, Error> {
     })
 }
 
-/// Where objects are in a picture.
 fn boxed(objects: &[Detection], picture: &ColorImage) -> Vec<Object> {
     let size = [picture.width(), picture.height()].map(|side| side as f32);
     let share = |object: &Detection| std::array::from_fn(|at| object.sides[at] / size[at % 2]);
@@ -231,13 +223,12 @@ fn boxed(objects: &[Detection], picture: &ColorImage) -> Vec<Object> {
     objects.iter().map(boxed).collect()
 }
 
-/// Descriptors, which nothing can be painted without.
 fn needed(descriptors: Option<&Descriptors>) -> Result<&Descriptors, Error> {
     descriptors.ok_or_else(|| Error::new("pictures", "descriptors", "none"))
 }
 
-/// The descriptors of recovered points, in their order. Lists that an attacker makes from descriptors are counted as
-/// these are: there is nothing to guess.
+/// Returns the descriptors of recovered points, in their order. Lists made from descriptors have
+/// their order, so no assignment is needed.
 fn assigned<'a, const D: usize>(
     released: &'a Released<D>,
     recovered: &Recovered<D>,
@@ -250,8 +241,8 @@ fn assigned<'a, const D: usize>(
     })
 }
 
-/// The points that are trusted and fall into a view's image, and their weights: 0 for those behind others. Whoever
-/// distrusts a point does not let it hide others.
+/// Returns the trusted points inside a view's image and their weights: 0 for hidden points. A point
+/// with weight 0 does not hide others.
 fn in_sight(
     view: &View,
     positions: &[Option<[f64; 3]>],
@@ -267,15 +258,14 @@ fn in_sight(
     Ok((kept, weights))
 }
 
-/// Width and height of a released image in pixels.
 fn size(released: &Released<2>) -> Result<[usize; 2], Error> {
     let bounds = released.bounds();
     let bounds = bounds.ok_or_else(|| Error::new("image size", "known", "none"))?;
     Ok([0, 1].map(|c| (bounds.high[c] - bounds.low[c]).round() as usize))
 }
 
-/// How much a recovered point is trusted to be about where it is said to be; fully by attackers who do not know how
-/// sure they are.
+/// Returns the probability that a recovered point is within `near` of its place; 0 below [`LEAST`],
+/// and 1 if the attack estimates no probability.
 fn weight<const D: usize>(recovered: &Recovered<D>, slot: usize, near: f64) -> f32 {
     match recovered.probability_within(slot, near) {
         Some(sure) if sure < LEAST => 0.0,
@@ -306,7 +296,7 @@ mod tests {
 
     #[test]
     fn points_that_nobody_trusts_hide_nothing() {
-        // Three points before a fourth.
+        // Three points in front of a fourth.
         let positions = [1.0, 1.1, 1.2, 2.0].map(|depth| Some([0.0, 0.0, depth]));
         let weights = |distrusted: f32| {
             let of = |slot: usize, _: f32| if slot < 3 { distrusted } else { 0.9 };

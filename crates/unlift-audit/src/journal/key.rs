@@ -1,10 +1,9 @@
-//! What tells a recovery from all others.
+//! The key of a recovery in a journal.
 
 use unlift::audit::Recovery;
 use unlift::recover::Delta;
 use unlift_io::hash::Hasher;
 
-/// A hash of all that `recovery` by `program` follows from.
 pub(super) fn key(program: &str, recovery: &Recovery<'_, 3>) -> String {
     let Recovery { released, lists, solver, options } = recovery;
     let mut hasher = Hasher::default();
@@ -40,7 +39,7 @@ mod tests {
 
     const N: usize = 9;
 
-    /// Each lists the two after it, the first one `first`.
+    /// Each record lists the next two; the first one lists `first`.
     fn records(first: u32) -> Vec<RecordId> {
         let after = |slot: usize| [1, 2].map(|more| RecordId(((slot + more) % N) as u32));
         let mut records: Vec<RecordId> = (0..N).flat_map(after).collect();

@@ -1,8 +1,9 @@
-//! What was recovered, kept in a folder until all is done: an interrupted run goes on from there.
+//! The journal: recovered points are kept in a folder until the audit is complete, so that an
+//! interrupted audit can resume.
 //!
-//! A file is named by a key, a hash of everything that its content follows from (program, released map, lists, options), and by a
-//! hash of that key and the content together. So nothing is taken that another audit, another version or a damaged disk left, nor
-//! a file that was given the name of another. What was taken is said in the notes of the audit.
+//! A file name contains a key (hash of program, released map, lists and options) and a hash of key
+//! and content. So files of another audit or version, damaged files and renamed files are not used.
+//! The notes of the audit state how many recoveries were read.
 
 mod key;
 
@@ -22,28 +23,27 @@ use unlift_io::stage::{read_recovered, write_recovered};
 use crate::{Error, Progress};
 use key::key;
 
-/// How names of recoveries end.
 const ENDING: &str = ".recovered.parquet";
 
 /// A folder of recovered points.
 pub struct Journal<'a> {
     folder: PathBuf,
-    /// The same for the same program only.
+    /// Identifies programs that recover identical bits.
     program: String,
     progress: &'a dyn Progress,
-    /// Of what was asked for or kept: their files are removed when all is done.
+    /// Keys that this run used. Their files are removed at the end.
     keys: BTreeSet<String>,
     n_recalled: usize,
-    /// Whether a file could not be written: the audit goes on without.
+    /// True after a file could not be written; the audit continues without further writes.
     is_full: bool,
 }
 
 impl<'a> Journal<'a> {
-    /// The journal in `folder`, which is made if it is not there, for its owner alone. `program` is what tells programs apart
-    /// that may recover different bits.
+    /// Opens the journal in `folder`, or creates the folder with access for the owner only.
+    /// `program` must differ between programs that may recover different bits.
     ///
     /// # Errors
-    /// When there is no such folder and none can be made.
+    /// If the folder does not exist and cannot be created.
     pub fn open(folder: &Path, program: String, progress: &'a dyn Progress) -> Result<Self, Error> {
         let mut builder = fs::DirBuilder::new();
         #[cfg(unix)]
@@ -58,13 +58,12 @@ impl<'a> Journal<'a> {
             }
             _ => {}
         }
-        // What was being written when a run was killed.
+        // Removes temporary files of a run that was killed.
         sweep(folder);
         let folder = folder.to_owned();
         Ok(Self { folder, program, progress, keys: BTreeSet::new(), n_recalled: 0, is_full: false })
     }
 
-    /// What was recovered before, where that is so.
     pub(crate) fn recall(&mut self, recovery: &Recovery<'_, 3>) -> Option<Recovered<3>> {
         if !can_keep(recovery) {
             return None;
@@ -83,7 +82,6 @@ impl<'a> Journal<'a> {
         }
     }
 
-    /// Keeps what was recovered now.
     pub(crate) fn keep(&mut self, recovery: &Recovery<'_, 3>, recovered: &Recovered<3>) {
         if self.is_full || !can_keep(recovery) {
             return;
@@ -94,33 +92,29 @@ impl<'a> Journal<'a> {
         }
     }
 
-    /// What to say of recoveries that were not done now, if there are any.
+    /// Returns a note about recoveries that were read from the journal, if there are any.
     pub(crate) fn note(&self) -> Option<String> {
         let n = self.n_recalled;
-        (n > 0).then(|| {
-            format!(
-                "{n} recoveries were taken from a journal, as a run that was interrupted left them"
-            )
-        })
+        (n > 0).then(|| format!("{n} recoveries were read from the journal of an interrupted run"))
     }
 
-    /// Removes all files of what this run asked for or kept, and the folder if nothing else is in it.
+    /// Removes all files of the keys that this run used, and the folder if it is empty then.
     pub fn finish(self) {
         for path in self.files(|name| self.keys.iter().any(|key| name.starts_with(key.as_str()))) {
-            // What stays is found by its name, and is as right then as now.
+            // A remaining file stays valid, so a failure is harmless.
             let _ = fs::remove_file(path);
         }
     }
 
     fn write(&self, key: &str, recovered: &Recovered<3>) -> Result<(), unlift_io::Error> {
-        // Before the content is known: another name for every process.
+        // The hash of the content is unknown until the file is written; the process id avoids
+        // conflicts.
         let unnamed = self.folder.join(format!("{key}.{}{ENDING}", std::process::id()));
         write_recovered(&unnamed, recovered)?;
         let path = self.folder.join(named(key, &hash_file(&unnamed)?));
         fs::rename(&unnamed, &path).map_err(|source| unlift_io::Error::write(&path, source))
     }
 
-    /// Files of the folder whose names are such, in order.
     fn files(&self, is: impl Fn(&str) -> bool) -> Vec<PathBuf> {
         let Ok(entries) = fs::read_dir(&self.folder) else { return Vec::new() };
         let entries = entries.filter_map(Result::ok);
@@ -130,7 +124,8 @@ impl<'a> Journal<'a> {
         paths
     }
 
-    /// The first file of `key` that is named as its content asks for. Others are removed; what cannot be read stays.
+    /// Returns the first file of `key` whose name fits its content. Removes damaged files;
+    /// unreadable files stay.
     fn whole(&self, key: &str) -> Option<PathBuf> {
         let of_key = format!("{key}-");
         for path in self.files(|name| name.starts_with(&of_key) && name.ends_with(ENDING)) {
@@ -143,7 +138,6 @@ impl<'a> Journal<'a> {
         None
     }
 
-    /// A hash of all that `recovery` follows from.
     fn key(&mut self, recovery: &Recovery<'_, 3>) -> String {
         let key = key(&self.program, recovery);
         self.keys.insert(key.clone());
@@ -155,22 +149,21 @@ impl<'a> Journal<'a> {
         self.progress.say(&format!("note: --journal: {error}; nothing more is kept"));
     }
 
-    /// Says that a file cannot be used, which may be as right as it was.
+    /// Reports that a file cannot be used. It may still be valid, so it stays.
     fn pass_over(&self, path: &Path, error: &dyn Display) {
         let shown = OneLine(path.display());
         self.progress.say(&format!("note: --journal: {shown}: {error}: recovered again"));
     }
 
-    /// Removes a file whose content is not the one that it is named by.
+    /// Removes a file whose content does not fit its name.
     fn drop_damaged(&self, path: &Path) {
         let shown = OneLine(path.display());
         self.progress.say(&format!("note: --journal: {shown} is damaged: recovered again"));
-        // Its name is one that only we give.
+        // Only a journal creates such names.
         let _ = fs::remove_file(path);
     }
 }
 
-/// The name of a file of `key` whose content has the hash `content`.
 fn named(key: &str, content: &str) -> String {
     let mut both = Hasher::default();
     both.add(key.as_bytes());
@@ -180,13 +173,13 @@ fn named(key: &str, content: &str) -> String {
 
 impl Drop for Journal<'_> {
     fn drop(&mut self) {
-        // Only if it is empty, as after a run that ended before anything was kept.
+        // Fails unless the folder is empty, as after a run that kept nothing.
         let _ = fs::remove_dir(&self.folder);
     }
 }
 
-/// Whether a journal may answer for the solver. The sampling loop's counts are in no file, and a solver of somebody's own may have
-/// changed since.
+/// Returns true if the solver's results can be kept. The trial counts of RANSAC are not in the
+/// files, and a third-party solver may have changed.
 fn can_keep(recovery: &Recovery<'_, 3>) -> bool {
     Builtin::of(recovery.solver).is_some_and(|builtin| builtin != Builtin::Ransac)
 }

@@ -1,4 +1,4 @@
-//! One audit from a prepared map to the files in its folder: what `audit map` and `demo` share.
+//! Audits of a prepared map, as `audit map` and `demo` run them.
 
 mod watcher;
 
@@ -35,58 +35,60 @@ pub use crate::tiles::{Tile, Tiles};
 pub use watcher::curves_of;
 use watcher::{Watcher, drawn};
 
-/// Everything an audit needs.
+/// The inputs of an audit.
 pub struct Job<'a> {
     /// The points, in the unit of the audit.
     pub original: &'a Original<3>,
-    /// One row per point.
+    /// Descriptors, one row per point.
     pub descriptors: Option<&'a Descriptors>,
-    /// What is released of them and the secret, where they are hidden already.
+    /// The release and its secret, if the points are hidden already.
     pub hidden: Option<&'a (Released<3>, Secret)>,
-    /// Camera centers in the unit of the audit, for the picture.
+    /// Camera centers in the unit of the audit, for the 3D view.
     pub cameras: Vec<[f64; 3]>,
-    /// The direction that is up in the picture, where known.
+    /// The up direction of the 3D view, if known.
     pub up: Option<[f64; 3]>,
-    /// What is to be done.
+    /// The plan of the audit.
     pub plan: Plan<3>,
-    /// What was read.
+    /// The input files.
     pub input: Input,
-    /// Options for the record, beside those in the plan.
+    /// Recorded options, in addition to those of the plan.
     pub options: serde_json::Map<String, serde_json::Value>,
-    /// What whoever reads the figures must know; told to `progress` as well.
+    /// Notes for readers of the figures; also reported to `progress`.
     pub notes: Vec<String>,
-    /// Why any figure may be wrong, whatever the attack: told as notes are, and no gate holds.
+    /// Doubts about all figures: reported as notes, and no gate holds with one.
     pub doubts: Vec<String>,
-    /// Bounds to hold.
+    /// The gates.
     pub gates: Vec<Gate>,
-    /// Folder to write.
+    /// The output folder.
     pub out: PathBuf,
-    /// Length of the audit's unit in map units; clouds are written in map units.
+    /// Length of the audit's unit in map units. Clouds are written in map units.
     pub unit_in_map_units: f64,
-    /// Hide and attack each tile of the map as a map of its own. Nothing is drawn then but where the map leaks most, and nothing
-    /// kept in a journal.
+    /// Hides and attacks each tile as a map of its own. Then the page shows only where the map
+    /// leaks most, and no journal is kept.
     pub tiles: Option<Tiles>,
-    /// Also write clouds.
+    /// Also writes clouds.
     pub write_clouds: bool,
-    /// Figures only.
+    /// Writes figures only.
     pub share_safe: bool,
-    /// Makes pictures of what comes back; the plan measures with it, too.
+    /// Makes pictures of recovered points; the plan measures with it, too.
     pub inversion: Option<Arc<MapInversion>>,
-    /// Keeps what was recovered until all is done, and goes on from what is kept there; [`perform`] clears it then.
+    /// Keeps recovered points until the audit is complete and resumes from them. [`perform`] clears
+    /// it at the end.
     pub journal: Option<Journal<'a>>,
-    /// Hears how it goes.
+    /// Receives the progress.
     pub progress: &'a dyn Progress,
     /// The command line, for the record.
     pub command: Option<String>,
-    /// When the command began.
+    /// The start of the command.
     pub started: Instant,
 }
 
 impl<'a> Job<'a> {
-    /// The default audit of the map at `path`, as [`open`] read it, into the folder `out`.
+    /// Creates the default audit of the map at `path`, as [`open`] read it, with the output folder
+    /// `out`.
     ///
     /// # Errors
-    /// When the files of the map cannot be read again, for their hash, or are not what they were.
+    /// If the files of the map cannot be read again for their hash, or have changed.
     pub fn new(
         path: &Path,
         input: &read::Input,
@@ -130,17 +132,17 @@ impl<'a> Job<'a> {
     }
 }
 
-/// Photos at most that are shown beside pictures of what came back.
+/// Maximum number of photos shown beside pictures.
 const SHEETS: usize = 3;
-/// Neighbors of every point in a default audit of a map.
+/// K of a default audit of a map.
 const USUAL_K: usize = 50;
 
-/// Reads a map and makes it ready for an audit; `descriptors` is a file of them, beside the map. What a user should
-/// know of how it was read stands in the notes and doubts of what was made ready.
+/// Reads a map and prepares it for an audit; `descriptors` is a separate file of descriptors. Notes
+/// and doubts about the input are in the result.
 ///
 /// # Errors
-/// When a file cannot be read, there is a scale and coordinates are no lengths or lengths become meaningless by it, or too
-/// few points are left.
+/// If a file cannot be read, if a scale is given and coordinates are not lengths, if the scale
+/// makes lengths meaningless, or if too few points are left.
 pub fn open(
     path: &Path,
     descriptors: Option<&Path>,
@@ -168,7 +170,7 @@ pub fn open(
     prepared.notes.extend(prepared.descriptors.as_ref().and_then(zeros));
     prepared.notes.splice(0..0, input.notes.iter().cloned());
     prepared.doubts.clone_from(&input.doubts);
-    // Rows of the file, also where some of its points are left out.
+    // `rows` numbers rows of the file, which may contain points that the reader left out.
     let mut left_out = input.left_out.iter().peekable();
     let mut shift = 0;
     for row in &mut prepared.rows {
@@ -180,7 +182,8 @@ pub fn open(
     Ok((input, prepared))
 }
 
-/// What to say of descriptors that are all zero: as some exporters mark points without one.
+/// Returns a note about descriptors that are all zero; some exporters mark missing descriptors like
+/// this.
 pub fn zeros(descriptors: &Descriptors) -> Option<String> {
     let mut row = vec![0.0; descriptors.dim()];
     let mut zero = |at: &usize| {
@@ -188,7 +191,9 @@ pub fn zeros(descriptors: &Descriptors) -> Option<String> {
         row.iter().all(|&value| value == 0.0)
     };
     let (n, of) = ((0..descriptors.len()).filter(|at| zero(at)).count(), descriptors.len());
-    (n > 0).then(|| format!("{n} of {of} descriptors are all zero, and tell an attacker nothing"))
+    (n > 0).then(|| {
+        format!("{n} of {of} descriptors are all zero and give an attacker no information")
+    })
 }
 
 /// Runs the job and writes its files, all or none.
@@ -203,10 +208,10 @@ pub fn perform(mut job: Job<'_>, mut out: OutputSet) -> Result<Finished, Error> 
     Ok(finished)
 }
 
-/// Runs the job: what it found, of which nothing is written but clouds, if these are asked for and `out` is there.
+/// Runs the job without writing page and figures. Clouds are staged in `out`, if given.
 ///
 /// # Errors
-/// When the plan does not fit the map, a gate or cloud cannot be made, or `progress` says stop.
+/// If the plan does not fit the map, a gate or a cloud fails, or `progress` stops the audit.
 pub fn find(mut job: Job<'_>, out: Option<&mut OutputSet>) -> Result<Audited, Error> {
     let mut journal = job.journal.take();
     find_with(job, journal.as_mut(), out)
@@ -307,19 +312,17 @@ fn find_with(
     Ok(Audited { document, scene, drawn })
 }
 
-/// What a job found before it becomes a document.
+/// The results of a job before they become a document.
 struct Ran {
     outcome: Outcome,
     scene: Option<Scene3d>,
     curves: Vec<(Row, Vec<(f64, f64)>)>,
     sheets: Vec<Sheet>,
-    /// The rows of every tile, where the map is cut.
     tile_rows: Vec<Vec<Row>>,
-    /// What the journal says.
     note: Option<String>,
 }
 
-/// What hears of the cells of `job`.
+/// Creates the observer of the cells of `job`.
 fn watcher<'a, 'j>(
     job: &Job<'a>,
     journal: Option<&'a mut Journal<'j>>,

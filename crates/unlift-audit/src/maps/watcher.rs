@@ -1,5 +1,3 @@
-//! Hears of every cell of an audit, and keeps what its page draws.
-
 use std::sync::Arc;
 
 use unlift::audit::{Cell, Observer, Plan, Recovery, Row};
@@ -16,24 +14,23 @@ use crate::journal::Journal;
 use crate::progress::Progress;
 use crate::scene::Pictures;
 
-/// Shows progress and keeps what the report draws.
+/// Reports progress and collects what the page draws.
 pub(super) struct Watcher<'a, 'j> {
     pub(super) journal: Option<&'a mut Journal<'j>>,
     pub(super) progress: &'a dyn Progress,
     pub(super) pictures: Option<Pictures>,
-    /// The error curve of every cell.
     pub(super) curves: Vec<(Row, Vec<(f64, f64)>)>,
-    /// Names of the solvers whose points are drawn.
     pub(super) drawn: Vec<String>,
     pub(super) clouds: Option<(Clouds, &'a mut OutputSet)>,
     pub(super) thresholds: Vec<f64>,
     pub(super) inversion: Option<Arc<MapInversion>>,
-    /// What the first cameras see.
+    /// One sheet for each of the first cameras.
     pub(super) sheets: Vec<Sheet>,
     pub(super) failed: Option<Error>,
 }
 
-/// Names of the solvers whose points are drawn: what joint recovery starts from is not, beside what it ends with.
+/// Returns the names of the solvers whose points are drawn. `joint-start` is not drawn beside
+/// `joint`.
 pub(super) fn drawn<const D: usize>(plan: &Plan<D>) -> Vec<String> {
     let hides_start = plan.has_solver(Builtin::Joint);
     let solvers = plan.solvers.iter();
@@ -41,7 +38,7 @@ pub(super) fn drawn<const D: usize>(plan: &Plan<D>) -> Vec<String> {
     drawn.map(|solver| solver.name().to_owned()).collect()
 }
 
-/// The curve of every row of `rows` that has one, by its cell.
+/// Returns the curve of every row of `rows` that has one.
 pub fn curves_of(cells: Vec<(Row, Vec<(f64, f64)>)>, rows: &[Row]) -> Vec<ErrorCdf> {
     let curve = |(cell, points): (Row, Vec<(f64, f64)>)| {
         // A cell that failed under another seed has no row.

@@ -1,11 +1,11 @@
-//! A number of the paper and ours, from the rows of the scenes' documents.
+//! A number of the paper beside ours, from the rows of the scenes' documents.
 
 use indexmap::IndexMap;
 use unlift_report::Document;
 use unlift_report::document::Row;
 use unlift_report::printed::{Measured, Points, Printed};
 
-/// The audit of a scene, and how its rows are found.
+/// The audit of a scene, and the keys of its rows.
 pub struct OfScene {
     /// The scene's name.
     pub scene: String,
@@ -13,30 +13,30 @@ pub struct OfScene {
     pub dim: usize,
     /// `sift` or `superpoint`.
     pub features: &'static str,
-    /// The paper's thresholds, as the document calls them.
+    /// The paper's thresholds, with their labels in the document.
     pub thresholds: Vec<(f64, String)>,
     /// The figures.
     pub document: Document,
 }
 
-/// A number of the paper and ours.
+/// A number of the paper beside ours.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compared {
-    /// The paper's.
+    /// The number of the paper.
     pub printed: Printed,
-    /// Ours, by scene: of the strongest attack that was tried.
+    /// Our numbers by scene, of the strongest attack.
     pub by_scene: IndexMap<String, f64>,
 }
 
 impl Compared {
-    /// `printed` beside what `audits` found.
+    /// Compares `printed` with the results of `audits`.
     pub fn new(printed: Printed, audits: &[OfScene]) -> Self {
         let found = audits.iter().filter_map(|one| Some((one.scene.clone(), one.ours(&printed)?)));
         let by_scene = found.collect();
         Self { printed, by_scene }
     }
 
-    /// The mean over the scenes, as the paper's is; `None` without one.
+    /// Returns the mean over the scenes, as in the paper; `None` without a scene.
     pub fn ours(&self) -> Option<f64> {
         let n = self.by_scene.len();
         (n > 0).then(|| self.by_scene.values().sum::<f64>() / n as f64)
@@ -44,7 +44,7 @@ impl Compared {
 }
 
 impl OfScene {
-    /// What this scene has to say: the largest share, the most alike picture.
+    /// Returns the number of this scene: the largest share, or the most similar picture.
     fn ours(&self, number: &Printed) -> Option<f64> {
         if (self.dim, self.features) != (number.dim, number.features) {
             return None;
@@ -75,7 +75,7 @@ impl OfScene {
 fn is_about(row: &Row, number: &Printed) -> bool {
     let is_oracle = row.neighbors == "oracle";
     match number.points {
-        // In every row, whatever its scheme.
+        // Every row contains the figures of the original points.
         Points::Originals => true,
         Points::Oracle(ratio) => {
             row.scheme == number.scheme && is_oracle && row.inlier_ratio == ratio
@@ -88,7 +88,7 @@ fn is_about(row: &Row, number: &Printed) -> bool {
 mod tests {
     use super::*;
 
-    /// Two solvers by an oracle at a half, and a source.
+    /// Two solvers with the oracle at ratio 0.5, and one other source.
     fn audited(scene: &str, shares: [f64; 3]) -> OfScene {
         let rows = [("oracle", "joint"), ("oracle", "consensus"), ("overlap", "joint")];
         let rows: Vec<String> = rows
@@ -128,7 +128,7 @@ mod tests {
         assert_eq!(ours(Points::Estimated, Measured::Within(5.0)), Some(70.0));
         assert_eq!(ours(Points::Oracle(0.5), Measured::Lpips), Some(10.0));
         assert_eq!(ours(Points::Originals, Measured::Lpips), Some(0.25));
-        // Not asked, not known.
+        // Numbers that were not measured are `None`.
         assert_eq!(ours(Points::Oracle(0.3), Measured::Within(5.0)), None);
         assert_eq!(ours(Points::Oracle(0.5), Measured::Within(10.0)), None);
         assert_eq!(ours(Points::Oracle(0.5), Measured::Ssim), None);

@@ -1,11 +1,11 @@
-//! What keeps a table from being whole: one line each, with where its owners publish what is not there.
+//! Lists what is missing for a table: one line each, with the web site that publishes it.
 
 use unlift_report::printed::{Printed, printed};
 
 use super::layouts::{Dataset, Scene, looked_in};
 use super::request::{Part, Request};
 
-/// The tables of the numbers that `is_about` picks, for people: `table 1`, `tables 3, 4`.
+/// Names the tables of the numbers for which `is_about` is true: `table 1`, `tables 3, 4`.
 pub fn tables(dataset: Dataset, is_about: impl Fn(&Printed) -> bool) -> String {
     let numbers = printed(dataset.published());
     let mut tables: Vec<u8> =
@@ -16,7 +16,7 @@ pub fn tables(dataset: Dataset, is_about: impl Fn(&Printed) -> bool) -> String {
     format!("{word} {}", tables.join(", "))
 }
 
-/// The tables that are wanted of a dataset's maps or images, with these features.
+/// Names the wanted tables of a dataset's maps or images, with these features.
 pub fn tables_of(request: &Request<'_>, dim: usize, features: &str) -> String {
     let wanted = |number: &Printed| {
         (number.dim, number.features) == (dim, features)
@@ -25,7 +25,7 @@ pub fn tables_of(request: &Request<'_>, dim: usize, features: &str) -> String {
     tables(request.dataset, wanted)
 }
 
-/// What can be told from the folders alone.
+/// Lists what is missing according to the folders alone.
 pub fn from_layout(request: &Request<'_>, scenes: &[Scene]) -> Vec<String> {
     let (dataset, mut lines) = (request.dataset, Vec::new());
     let there = |name: &&&str| scenes.iter().any(|scene| scene.name == **name);
@@ -59,7 +59,7 @@ pub fn from_layout(request: &Request<'_>, scenes: &[Scene]) -> Vec<String> {
     lines
 }
 
-/// What the paper prints of this dataset and this command does not hold anything against.
+/// Lists the results that the paper prints for this dataset and this command does not compare.
 pub fn elsewhere(dataset: Dataset) -> Vec<&'static str> {
     match dataset {
         Dataset::SevenScenes => vec![

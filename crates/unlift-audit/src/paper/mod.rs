@@ -1,11 +1,11 @@
-//! The paper's tables on its own datasets: ours beside the published numbers.
+//! The paper's tables on its own datasets: our numbers beside the published ones.
 //!
 //! ```text
 //! layouts::open ──> Scene .. ──> audits (maps, images) ──> Compared .. ──> sheets, paper.json, paper.csv
 //! ```
 //!
-//! Nothing is measured here: every scene goes through [`crate::maps`] and [`crate::images::audit`] as any other map or
-//! folder of photos would, and what is compared are the rows of their documents.
+//! Every scene is audited by [`crate::maps`] and [`crate::images::audit`] like any other map or
+//! folder of photos. The comparison uses the rows of their documents.
 
 mod audits;
 mod compared;
@@ -24,12 +24,12 @@ pub use result::{FIGURES, Reproduction, Sheet, TABLE};
 
 use crate::{Error, refused};
 
-/// Audits every scene that is there and holds what comes back against the paper's tables. Scenes that cannot be audited are
-/// told and counted; the others go on. Without a single audit nothing is written.
+/// Audits every existing scene and compares the results with the paper's tables. Scenes that cannot
+/// be audited are reported and skipped. Without a single audit nothing is written.
 ///
 /// # Errors
-/// When there is no scene, a list of the dataset is malformed, the folder cannot be written, or `begin`'s progress says
-/// stop.
+/// If there is no scene, a list of the dataset is malformed, the folder cannot be written, or the
+/// progress of `begin` stops the audit.
 pub fn reproduce(request: &Request<'_>) -> Result<Reproduction, Error> {
     let mut scenes = layouts::open(request.dataset, request.root, request.models)?;
     chosen(request, &mut scenes)?;
@@ -47,7 +47,6 @@ pub fn reproduce(request: &Request<'_>) -> Result<Reproduction, Error> {
     Ok(result)
 }
 
-/// Keeps the scenes that were asked for.
 fn chosen(request: &Request<'_>, scenes: &mut Vec<Scene>) -> Result<(), Error> {
     for name in &request.scenes {
         let known = request.dataset.scenes();

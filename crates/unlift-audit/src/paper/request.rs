@@ -1,5 +1,3 @@
-//! What is to be reproduced.
-
 use std::path::Path;
 
 use unlift_io::atomic::Rules;
@@ -8,24 +6,24 @@ use unlift_report::printed::{Measured, Points, Printed, printed};
 use super::layouts::Dataset;
 use crate::Progress;
 
-/// What of the tables is wanted.
+/// A part of the tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// Points of maps, by an oracle.
+    /// Points of maps, with the oracle.
     Maps,
-    /// Keypoints of images, by an oracle.
+    /// Keypoints of images, with the oracle.
     Images,
-    /// Keypoints of images, by neighbors that are estimated from descriptors.
+    /// Keypoints of images, with neighbors that are estimated from descriptors.
     Estimated,
-    /// Pictures of either, and how alike they are to the photos.
+    /// Pictures of maps and images, and their similarity to the photos.
     Pictures,
 }
 
 impl Part {
-    /// All of them.
+    /// All parts.
     pub const ALL: [Self; 4] = [Self::Maps, Self::Images, Self::Estimated, Self::Pictures];
 
-    /// The name that users type.
+    /// Returns the name that users type.
     pub fn name(self) -> &'static str {
         match self {
             Self::Maps => "maps",
@@ -35,7 +33,7 @@ impl Part {
         }
     }
 
-    /// The parts that a number takes: it is there when all of them are wanted.
+    /// Returns the parts that a number needs: it is compared if all of them are wanted.
     pub(super) fn of(number: &Printed) -> Vec<Self> {
         let is_picture = !matches!(number.measured, Measured::Within(_));
         let points = match number.points {
@@ -47,33 +45,33 @@ impl Part {
     }
 }
 
-/// What is to be reproduced.
+/// The options of a reproduction.
 pub struct Request<'a> {
-    /// Which dataset.
+    /// The dataset.
     pub dataset: Dataset,
     /// The folder of its scenes.
     pub root: &'a Path,
-    /// A folder with a map per scene, in place of those that lie in the dataset.
+    /// A folder with a map per scene, which replaces the maps of the dataset.
     pub models: Option<&'a Path>,
-    /// Meters per unit of all maps, in place of what the dataset's poses say.
+    /// Meters per unit of all maps, which replaces the scale from the dataset's poses.
     pub scale: Option<f64>,
-    /// Scenes by name; all without one.
+    /// Names of the scenes; all if empty.
     pub scenes: Vec<String>,
-    /// What of the tables.
+    /// The wanted parts of the tables.
     pub parts: Vec<Part>,
-    /// Photos of the test split per scene at most, evenly spaced over their names.
+    /// Maximum number of photos of the test split per scene, evenly spaced over their names.
     pub images: usize,
-    /// Points per map at most, a random subset; all without a number.
+    /// Maximum number of points per map, a random subset; `None` for all.
     pub max_points: Option<usize>,
-    /// The integer that all randomness comes from.
+    /// The random seed.
     pub seed: u64,
-    /// Folder to write; the audit of a scene has a folder of its own in it.
+    /// The output folder; the audit of each scene has a subfolder.
     pub out: &'a Path,
-    /// Replace files of others.
+    /// Allows replacing files that unlift did not write.
     pub force: bool,
     /// The command line, for the record.
     pub command: Option<String>,
-    /// Makes what hears how the next audit goes.
+    /// Creates the receiver of the next audit's progress.
     pub begin: &'a (dyn Fn() -> Box<dyn Progress> + Sync),
 }
 
@@ -82,14 +80,13 @@ impl Request<'_> {
         self.parts.contains(&part)
     }
 
-    /// The numbers of the paper that are wanted.
     pub(super) fn numbers(&self) -> Vec<Printed> {
         let mut numbers = printed(self.dataset.published());
         numbers.retain(|number| Part::of(number).iter().all(|&part| self.wants(part)));
         numbers
     }
 
-    /// What must not be written over.
+    /// Returns the rules for replacing files, which protect the inputs.
     pub(super) fn rules(&self) -> Rules {
         Rules::new([self.root].into_iter().chain(self.models), self.force)
     }

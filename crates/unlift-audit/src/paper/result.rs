@@ -1,5 +1,3 @@
-//! What was found: the tables as text, `paper.json` and `paper.csv`.
-
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -15,40 +13,39 @@ use super::missing::{elsewhere, from_layout};
 use super::request::Request;
 use crate::Error;
 
-/// The numbers, those of the paper and ours.
+/// File name of the numbers as JSON.
 pub const FIGURES: &str = "paper.json";
-/// The same as a table.
+/// File name of the numbers as CSV.
 pub const TABLE: &str = "paper.csv";
 
 /// The paper's tables beside ours.
 #[derive(Clone, Debug)]
 pub struct Reproduction {
-    /// Of which dataset.
+    /// The dataset.
     pub dataset: Dataset,
-    /// Every number that was wanted, by table.
+    /// Every wanted number, by table.
     pub compared: Vec<Compared>,
     /// Pages of the audits of scenes.
     pub pages: Vec<PathBuf>,
-    /// What keeps tables from being whole, one line each.
+    /// Missing data for complete tables, one line each.
     pub missing: Vec<String>,
-    /// Tables that other commands are about, one line each.
+    /// Tables that other commands reproduce, one line each.
     pub elsewhere: Vec<&'static str>,
     /// Audits and photos that failed, one line each.
     pub failed: Vec<String>,
     options: Value,
 }
 
-/// A table for people.
+/// A table as text.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sheet {
-    /// What it is about.
+    /// The title.
     pub title: String,
-    /// Cells, the heads first.
+    /// Cells; the first row contains the column heads.
     pub rows: Vec<Vec<String>>,
 }
 
 impl Reproduction {
-    /// What `run` found of these scenes.
     pub(super) fn new(request: &Request<'_>, scenes: &[Scene], run: Run<'_>) -> Self {
         let mut missing = from_layout(request, scenes);
         missing.extend(run.missing);
@@ -73,9 +70,6 @@ impl Reproduction {
     }
 
     /// Writes both files, or none.
-    ///
-    /// # Errors
-    /// When they cannot be written.
     pub(super) fn write(&self, mut out: OutputSet) -> Result<(), Error> {
         let json = serde_json::to_string_pretty(&self.json())? + "\n";
         for (name, kind, text) in
@@ -87,7 +81,7 @@ impl Reproduction {
         Ok(out.commit()?)
     }
 
-    /// What `paper.json` holds: the same for the same files, options and seed.
+    /// Returns the content of `paper.json`; the same files, options and seed give the same content.
     pub fn json(&self) -> Value {
         let number = |one: &Compared| {
             let Printed { table, dim, features, scheme, points, measured, value } = one.printed;
@@ -120,7 +114,7 @@ impl Reproduction {
         })
     }
 
-    /// What `paper.csv` holds.
+    /// Returns the content of `paper.csv`.
     pub fn csv(&self) -> String {
         let mut text = "scheme,neighbors,oracle_noise,inlier_ratio,table,dimensions,features,measure,published,ours,\
                         scenes\n"
@@ -139,8 +133,8 @@ impl Reproduction {
         text
     }
 
-    /// The tables that have a number of ours: a row per share of right neighbors, a column per scheme, and in each cell ours
-    /// and in brackets the paper's.
+    /// Returns the tables with at least one number of ours: a row per inlier ratio, a column per
+    /// scheme; in each cell our number, and the paper's in brackets.
     pub fn sheets(&self) -> Vec<Sheet> {
         let mut sheets = Vec::new();
         for of_table in self.compared.chunk_by(|a, b| a.printed.table == b.printed.table) {
@@ -202,7 +196,7 @@ impl Reproduction {
     }
 }
 
-/// Ours and in brackets the paper's, one after the other for every measure.
+/// Formats our numbers and, in brackets, the paper's, one for every measure.
 fn cell(numbers: &[&Compared], measures: &[Measured]) -> String {
     let of = |value: &dyn Fn(&Compared) -> Option<f64>| {
         let one = |measured: &Measured| {
@@ -227,7 +221,6 @@ fn row_name(points: Points) -> String {
     }
 }
 
-/// Where neighbors came from, and which share was right.
 fn points_of(points: Points) -> (&'static str, Option<f64>) {
     match points {
         Points::Oracle(ratio) => ("oracle", Some(ratio)),
@@ -246,7 +239,7 @@ fn measure(measured: Measured, dim: usize) -> String {
     }
 }
 
-/// To four digits behind the point: what the scenes differ by is far more.
+/// Rounds to four decimal places; scenes differ by far more.
 fn round(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
 }

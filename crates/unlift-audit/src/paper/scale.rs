@@ -1,4 +1,4 @@
-//! Meters per unit of a map: from the poses that its dataset publishes, never guessed.
+//! Computes meters per unit of a map from the poses that its dataset publishes.
 
 use std::path::{Path, PathBuf};
 
@@ -7,19 +7,20 @@ use unlift_io::read::colmap::{Image, read_images};
 
 use super::layouts::Scene;
 
-/// Cameras that are compared at most, evenly spaced over the map's.
+/// Maximum number of compared cameras, evenly spaced over the map's.
 const MOST: usize = 400;
-/// Pairs of cameras that say how large a map is.
+/// Minimum number of pairs of cameras.
 const LEAST_PAIRS: usize = 2;
-/// A map within this of 1 is in the frame of the dataset: what differs is what its maker adjusted.
+/// A scale this near to 1 is treated as 1: such maps are in the frame of the dataset, up to bundle
+/// adjustment.
 const SAME: f64 = 0.02;
-/// Ratios of lengths of a tenth of the pairs may lie farther than this from the middle one.
+/// The outer tenths of the ratios of lengths may differ from the median by this share.
 const SPREAD: f64 = 0.1;
 
-/// The images of the COLMAP model in `model`; none where they were left out.
+/// Reads the images of the COLMAP model in `model`; none if the file is missing.
 ///
 /// # Errors
-/// When their file cannot be read.
+/// If the file cannot be read.
 pub fn images(model: &Path) -> Result<(PathBuf, Vec<Image>), Error> {
     let extension = if model.join("points3D.bin").is_file() { "bin" } else { "txt" };
     let path = model.join(format!("images.{extension}"));
@@ -27,17 +28,19 @@ pub fn images(model: &Path) -> Result<(PathBuf, Vec<Image>), Error> {
     Ok((path, images))
 }
 
-/// The folder by which a map's images are named: that of the scene's photos, or of the scene.
+/// Returns the folder that names of a map's images are relative to: that of the scene's photos, or
+/// of the scene.
 pub fn photos<'a>(images: &[Image], scene: &'a Scene) -> &'a Path {
     let is_root = |root: &&Path| images.iter().any(|image| root.join(name(image)).is_file());
     [&*scene.photos, &*scene.root].into_iter().find(is_root).unwrap_or(&scene.photos)
 }
 
-/// Meters per unit of the map with these `images` of the file `path`: by the distances of its cameras from each other,
-/// beside those of the dataset's poses. `None` when fewer than four images have a pose there.
+/// Returns meters per unit of the map with these `images` of the file `path`: the ratio of
+/// distances between cameras in the dataset and in the map. `None` if fewer than four images have a
+/// pose in the dataset.
 ///
 /// # Errors
-/// When a pose cannot be read, or the poses are those of another scene: their distances do not agree.
+/// If a pose cannot be read, or the ratios do not agree because the poses are of another scene.
 pub fn scale((path, images): &(PathBuf, Vec<Image>), scene: &Scene) -> Result<Option<f64>, Error> {
     let below = scene.photos.strip_prefix(photos(images, scene)).unwrap_or(Path::new(""));
     let mut both = Vec::new();
@@ -57,8 +60,8 @@ pub fn scale((path, images): &(PathBuf, Vec<Image>), scene: &Scene) -> Result<Op
     let at = |share: f64| ratios[(share * (ratios.len() - 1) as f64).round() as usize];
     let (low, middle, high) = (at(0.1), at(0.5), at(0.9));
     if high > (1.0 + SPREAD) * middle || low < (1.0 - SPREAD) * middle {
-        let found = format!("{low:.3} to {high:.3} times as far apart");
-        let expected = "cameras as the dataset places them, all farther apart by one factor";
+        let found = format!("ratios from {low:.3} to {high:.3}");
+        let expected = "camera distances that have one ratio to those in the dataset";
         return Err(Error::new(path, "", expected, found));
     }
     Ok(Some(if (middle - 1.0).abs() <= SAME { 1.0 } else { middle }))
@@ -68,11 +71,10 @@ fn name(image: &Image) -> String {
     String::from_utf8_lossy(&image.name).into_owned()
 }
 
-/// Where a camera stands in the map and in the dataset.
 type Twice = ([f64; 3], [f64; 3]);
 
-/// How much farther apart two cameras are in the dataset than in the map: of every camera and the one half of them later,
-/// so that no step of a hand decides.
+/// Returns ratios of camera distances, dataset to map. Each camera is paired with the one half of
+/// all cameras later, because distances of consecutive hand-held frames are too small.
 fn ratios(both: &[Twice]) -> Vec<f64> {
     let distance = |a: &[f64; 3], b: &[f64; 3]| {
         a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
@@ -93,7 +95,7 @@ mod tests {
     #[test]
     fn lengths_between_cameras_have_one_ratio() {
         let places = [[0.0, 0.0, 0.0], [1.0, 0.0, 2.0], [0.5, 3.0, 0.0], [4.0, 1.0, 1.0]];
-        // Turned, moved and three times as large.
+        // Rotated, moved and scaled by three.
         let meters = |[x, y, z]: [f64; 3]| [3.0 * y + 7.0, -3.0 * x, 3.0 * z - 1.0];
         let both: Vec<_> = places.iter().map(|place| (*place, meters(*place))).collect();
         let found = ratios(&both);

@@ -138,7 +138,8 @@ fn similarity_takes_descriptors_of_any_kind_and_overlap_those_of_sift() {
     let n = bytes.len();
     bytes[n - 2 * 2 * 64..].fill(0);
     place.write("partial.npy", bytes);
-    let note = "unlift: note: 2 of 700 descriptors are all zero, and tell an attacker nothing\n";
+    let note =
+        "unlift: note: 2 of 700 descriptors are all zero and give an attacker no information\n";
     assert_eq!(place.ends(&format!("{hide} partial.npy --out hidden2"), 0).1, note);
 }
 

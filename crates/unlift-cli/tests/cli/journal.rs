@@ -58,9 +58,7 @@ fn what_was_recovered_is_not_recovered_again() {
     let (place, kept) = interrupted();
     let told = go_on(&place);
     let n = kept.len();
-    let taken = format!(
-        "{n} recoveries were taken from a journal, as a run that was interrupted left them"
-    );
+    let taken = format!("{n} recoveries were read from the journal of an interrupted run");
     assert!(told.lines().any(|line| line == format!("unlift: note: {taken}")), "{told}");
     let notes = &place.json("out/audit.json")["notes"];
     assert!(notes.as_array().unwrap().contains(&taken.into()), "whoever reads the figures knows");

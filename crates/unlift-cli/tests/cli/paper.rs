@@ -219,7 +219,10 @@ fn a_map_of_another_scene_is_refused_and_others_go_on() {
     let line = "paper --dataset 7scenes d --parts maps,images --images 1 --quiet --out o";
     let (text, stderr) = place.ends(line, 3);
     assert!(text.contains("table 1: images"), "{text}");
-    assert!(stderr.contains("images.txt: expected cameras as the dataset places them"), "{stderr}");
+    assert!(
+        stderr.contains("images.txt: expected camera distances that have one ratio"),
+        "{stderr}"
+    );
     assert!(text.contains("failed: chess, map: "), "{text}");
     // Who knows better says so.
     place.ends(&format!("{line} --scale 1"), 0);

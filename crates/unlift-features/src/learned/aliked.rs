@@ -1,7 +1,8 @@
-//! ALIKED: sub-pixel keypoints, descriptors from places that each keypoint chooses itself.
+//! ALIKED: sub-pixel keypoints, and descriptors from sample positions that the network chooses for
+//! each keypoint.
 //!
-//! Source: Zhao et al., "ALIKED: A Lighter Keypoint and Descriptor Extraction Network via Deformable Transformation",
-//! IEEE TIM 2023; the weights are the authors' aliked-n16rot.
+//! Source: Zhao et al., "ALIKED: A Lighter Keypoint and Descriptor Extraction Network via
+//! Deformable Transformation", IEEE TIM 2023; the weights are the authors' aliked-n16rot.
 
 use unlift::Error;
 use unlift_nn::{Network, Tensor};
@@ -11,30 +12,30 @@ use super::levels::{DIM, Levels};
 use super::maxima::{Scores, Wanted};
 use crate::color::ColorImage;
 
-/// Name of the model.
 const MODEL: &str = "aliked-n16rot";
 /// The network halves an image five times.
 const MULTIPLE: usize = 32;
-/// Pixels around a keypoint, to each side, from which its exact place comes, and in which there is no other one.
+/// Radius in pixels of the window that determines the sub-pixel position, and in which there is no
+/// other keypoint.
 const RADIUS: usize = 2;
-/// How much the best score decides the exact place; smaller is more.
+/// Softmax temperature of the sub-pixel position; with a smaller one the best score decides more.
 const TEMPERATURE: f32 = 0.1;
-/// Places at which a descriptor looks.
+/// Sample positions of a descriptor.
 const SAMPLES: usize = 16;
-/// Pixels that decide which places these are.
+/// Pixels around a keypoint from which the network computes these positions.
 const PATCH: usize = 9;
 /// Keypoints that are described at a time: 13 MB.
 const BATCH: usize = 1024;
 
-/// What a user may choose about ALIKED. The defaults are COLMAP's.
+/// Options of ALIKED. The defaults are COLMAP's.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AlikedOptions {
-    /// Features at most, the best, 2048.
+    /// Maximum number of features, the best ones; default 2048.
     pub max_features: usize,
-    /// Score that a keypoint must exceed, 0 to 1: 0.2.
+    /// Score that a keypoint must exceed, 0 to 1; default 0.2.
     pub min_score: f32,
-    /// Longest side in pixels, 1600; larger images are shrunk first, keypoints are in pixels of the image as it was
-    /// given.
+    /// Longest side in pixels, default 1600. Larger images are downsized; keypoints are in pixels
+    /// of the original image.
     pub max_image_size: usize,
 }
 
@@ -51,19 +52,21 @@ pub struct Aliked {
 }
 
 impl Aliked {
-    /// An extractor with these options.
+    /// Creates an extractor with these options.
     ///
     /// # Errors
-    /// Names the first field that is out of range; when a file of the model that is to be taken cannot be.
+    /// If a field is out of range (the error names the first one), or a file that replaces the
+    /// embedded model cannot be loaded.
     pub fn try_new(options: AlikedOptions) -> Result<Self, Error> {
         super::check(options.max_features, options.min_score, options.max_image_size)?;
         Ok(Self { network: Network::load(MODEL)?, options })
     }
 
-    /// The features of an image. Takes about 330 bytes per pixel of the image that the network sees.
+    /// Extracts the features of an image. Uses about 330 bytes of memory per pixel after
+    /// downsizing.
     ///
     /// # Errors
-    /// Only when the network is not what its hash says.
+    /// If the network returns other shapes.
     pub fn extract(&self, image: &ColorImage) -> Result<LearnedFeatures, Error> {
         let small = image.fitted(self.options.max_image_size);
         let seen = small.as_ref().unwrap_or(image);
@@ -85,7 +88,7 @@ impl Aliked {
         Ok(LearnedFeatures { keypoints, scores, descriptors, dim: DIM })
     }
 
-    /// Scores of all pixels, and the maps that descriptors are made of.
+    /// Returns the scores of all pixels, and the maps from which descriptors are made.
     fn dense(&self, image: &ColorImage) -> Result<(Scores, Levels), Error> {
         let size = [image.width(), image.height()];
         let padded = size.map(|side| side.next_multiple_of(MULTIPLE));
@@ -110,7 +113,7 @@ impl Aliked {
         Ok((scores, Levels::new([a, b, c, d], padding, size)))
     }
 
-    /// The descriptors at these places, one after the other.
+    /// Returns the descriptors at these positions, one after the other.
     fn describe(&self, levels: &Levels, places: &[[f32; 2]]) -> Result<Vec<f32>, Error> {
         let n = places.len();
         let mut patches = vec![0.0; n * PATCH * DIM];
@@ -138,8 +141,8 @@ impl Aliked {
     }
 }
 
-/// The place of a keypoint between pixels: the mean of those around it, weighted by how near their scores come to the
-/// best.
+/// Returns the sub-pixel position of a keypoint: the mean of the pixels around it, weighted by the
+/// softmax of their scores.
 fn refined(scores: &Scores, [x, y]: [usize; 2]) -> [f32; 2] {
     let side = 2 * RADIUS + 1;
     let around = |at: usize| {
@@ -168,7 +171,7 @@ mod tests {
         (values[3 * 7 + 3], values[3 * 7 + 4]) = (1.0, 1.0);
         let scores = Scores { width: 7, height: 7, values };
         let [x, y] = refined(&scores, [3, 3]);
-        // The other 23 pixels weigh exp(-10) each.
+        // The other 23 pixels have weight exp(-10) each.
         assert!((x - 3.5).abs() < 1e-3 && (y - 3.0).abs() < 1e-3, "({x}, {y})");
     }
 }

@@ -1,17 +1,16 @@
-//! What an image looks like at a pixel: four maps of different fineness, joined.
+//! Feature maps of ALIKED: four levels of different resolution, joined at a pixel.
 
 use unlift_nn::Tensor;
 
 use super::maxima::corners;
 
-/// Channels of a level.
 const CHANNELS: usize = 32;
-/// Numbers that describe a pixel.
 pub(crate) const DIM: usize = 4 * CHANNELS;
 
 /// The four levels of ALIKED over an image that was padded on all sides.
 ///
-/// Enlarging the coarse levels to all pixels would take 512 bytes a pixel; only those that are asked for are made.
+/// Resizing the coarse levels to all pixels would need 512 bytes per pixel, so only requested
+/// pixels are computed.
 pub(crate) struct Levels {
     /// `(1, 32, height, width)`.
     fine: Tensor,
@@ -19,18 +18,17 @@ pub(crate) struct Levels {
     coarse: [Tensor; 3],
     /// Pixels of padding on the left and above.
     pub padding: [usize; 2],
-    /// Width and height of the image without it.
+    /// Width and height of the image without padding.
     pub size: [usize; 2],
 }
 
 impl Levels {
-    /// Levels as the network gives them.
     pub(crate) fn new(levels: [Tensor; 4], padding: [usize; 2], size: [usize; 2]) -> Self {
         let [fine, a, b, c] = levels;
         Self { fine, coarse: [a, b, c], padding, size }
     }
 
-    /// Describes the place `(x, y)` between pixels: what the four pixels around it say, weighted.
+    /// Describes the position `(x, y)` by bilinear interpolation of four pixels.
     pub(crate) fn between(&self, x: f32, y: f32, out: &mut [f32]) {
         out.fill(0.0);
         let mut pixel = [0.0; DIM];
@@ -40,7 +38,8 @@ impl Levels {
         }
     }
 
-    /// Describes the pixel in column `x` of row `y` by 128 numbers of length 1; zeros outside the image.
+    /// Describes the pixel in column `x` of row `y` by 128 values of length 1; zeros outside the
+    /// image.
     pub(crate) fn pixel(&self, x: isize, y: isize, out: &mut [f32]) {
         let [width, height] = self.size;
         if !(0..width as isize).contains(&x) || !(0..height as isize).contains(&y) {
@@ -59,8 +58,8 @@ impl Levels {
     }
 }
 
-/// The value of a coarse level at pixel `(x, y)` of an image of `size`, between the four around it; the corners of both
-/// lie on each other.
+/// Interpolates a coarse level at pixel `(x, y)` of an image of `size`; the corners of both
+/// coincide.
 fn enlarged(level: &Tensor, [x, y]: [usize; 2], size: [usize; 2], out: &mut [f32]) {
     let [rows, columns] = [level.shape()[1], level.shape()[2]];
     let place = |at: usize, small: usize, large: usize| {
@@ -83,7 +82,7 @@ fn enlarged(level: &Tensor, [x, y]: [usize; 2], size: [usize; 2], out: &mut [f32
     }
 }
 
-/// Sum of squares, in eight sums side by side.
+/// Returns the sum of squares, accumulated in eight lanes.
 fn square(values: &[f32]) -> f32 {
     let mut sums = [0.0; 8];
     for eight in values.as_chunks::<8>().0 {
@@ -131,7 +130,7 @@ mod tests {
             levels.pixel(x, y, &mut pixel);
             assert_eq!(pixel, [0.0; DIM]);
         }
-        // Half of it lies outside.
+        // Half of it is outside.
         levels.between(57.5, 3.0, &mut pixel);
         assert!((square(&pixel).sqrt() - 0.5).abs() < 1e-6);
     }

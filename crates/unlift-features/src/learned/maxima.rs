@@ -1,4 +1,4 @@
-//! Where a map of scores has its maxima, none within a radius of a better one.
+//! Non-maximum suppression in a map of scores.
 
 /// A map of scores, `(height, width)`, row-major.
 pub(crate) struct Scores {
@@ -7,23 +7,23 @@ pub(crate) struct Scores {
     pub values: Vec<f32>,
 }
 
-/// Which maxima are taken.
+/// Criteria of maxima.
 pub(crate) struct Wanted {
-    /// Pixels around a maximum, square, in which no other one may be.
+    /// Half side of the square around a maximum that contains no other one.
     pub radius: usize,
-    /// Pixels at the edge of the image in which there are none.
+    /// Width in pixels of the image border without maxima.
     pub border: usize,
     /// The score that must be exceeded.
     pub min_score: f32,
-    /// So many at most, the best.
+    /// Maximum number of maxima, the best ones.
     pub most: usize,
 }
 
 impl Scores {
-    /// Places `(x, y)` of the maxima, the best first, of equal ones the first in reading order.
+    /// Returns the positions `(x, y)` of the maxima, the best first, equal ones in reading order.
     ///
-    /// In three passes, as ALIKED's and SuperPoint's authors have it: what is taken hides what is near it, and among
-    /// the rest there are new maxima.
+    /// Three passes, as in the code of ALIKED and SuperPoint: each maximum suppresses its
+    /// neighborhood, then the rest may have new maxima.
     pub(crate) fn maxima(&self, wanted: &Wanted) -> Vec<[usize; 2]> {
         let Self { width, height, ref values } = *self;
         let radius = wanted.radius;
@@ -52,7 +52,7 @@ impl Scores {
         found.into_iter().map(|at| [at % width, at / width]).collect()
     }
 
-    /// The score at a place between pixels, from the four around it; 0 outside.
+    /// Returns the bilinearly interpolated score at a position; 0 outside.
     pub(crate) fn at(&self, [x, y]: [f32; 2]) -> f32 {
         corners(x, y)
             .into_iter()
@@ -64,7 +64,7 @@ impl Scores {
     }
 }
 
-/// The four pixels around a place, and the share of each.
+/// Returns the four pixels around a position and their bilinear weights.
 pub(crate) fn corners(x: f32, y: f32) -> [([isize; 2], f32); 4] {
     let (left, top) = (x.floor(), y.floor());
     let (right, bottom) = (x - left, y - top);
@@ -77,7 +77,8 @@ pub(crate) fn corners(x: f32, y: f32) -> [([isize; 2], f32); 4] {
     ]
 }
 
-/// The largest value in the square of `2 * radius + 1` pixels around every pixel of a map with rows of `width`.
+/// Returns the largest value in the square of `2 * radius + 1` pixels around every pixel of a map
+/// with rows of `width`.
 fn windows<T: Copy>(map: &[T], width: usize, radius: usize, larger: fn(T, T) -> T) -> Vec<T> {
     let mut across = map.to_vec();
     for (row, out) in map.chunks_exact(width).zip(across.chunks_exact_mut(width)) {
@@ -111,7 +112,7 @@ mod tests {
 
     #[test]
     fn what_a_maximum_hides_may_hide_nothing_itself() {
-        // 5 hides 4, and so 3 is a maximum of what is left; 2 is beside it.
+        // 5 suppresses 4, and so 3 is a maximum of the rest; 2 is beside it.
         let row = scores(4, &[0.5, 0.4, 0.3, 0.2]);
         assert_eq!(row.maxima(&ALL), [[0, 0], [2, 0]]);
         let limited = Wanted { most: 1, ..ALL };

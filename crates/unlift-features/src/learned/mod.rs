@@ -1,4 +1,4 @@
-//! Learned features: a network says how much every pixel is a keypoint, and what it looks like.
+//! Learned features: a network scores every pixel as a keypoint and computes descriptors.
 //!
 //! ```text
 //! ColorImage ──> network ──> scores ──> maxima ──> keypoints ──> descriptors ──> LearnedFeatures
@@ -18,17 +18,18 @@ pub use superpoint::{SuperPoint, SuperPointOptions};
 /// Features of one image, the best first.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LearnedFeatures {
-    /// Places `(x, y)` in pixels of the image as it was given; the middle of the first pixel is `(0, 0)`, as hloc has it.
+    /// Positions `(x, y)` in pixels of the original image; the middle of the first pixel is
+    /// `(0, 0)`, as in hloc.
     pub keypoints: Vec<[f32; 2]>,
-    /// How sure the network is of each, 0 to 1.
+    /// The network's score of each keypoint, 0 to 1.
     pub scores: Vec<f32>,
-    /// `(n, dim)`, row-major, each of length 1.
+    /// Descriptors `(n, dim)`, row-major, each of length 1.
     pub descriptors: Vec<f32>,
-    /// Numbers in a descriptor.
+    /// Number of values of a descriptor.
     pub dim: usize,
 }
 
-/// Whether the options that all learned features have are in their ranges.
+/// Checks the ranges of the common options.
 fn check(max_features: usize, min_score: f32, max_image_size: usize) -> Result<(), Error> {
     if max_features == 0 {
         return Err(Error::new("max_features", "at least 1", "0"));

@@ -1,8 +1,8 @@
-//! SuperPoint: keypoints on pixels, descriptors between the middles of cells of 8 x 8 pixels.
+//! SuperPoint: keypoints on pixels, descriptors interpolated between cells of 8 x 8 pixels.
 //!
-//! Source: DeTone, Malisiewicz, Rabinovich, "SuperPoint: Self-Supervised Interest Point Detection and Description", CVPR
-//! workshops 2018. Its weights may not be passed on: users supply them, made into ONNX by
-//! `training/export/superpoint.py`.
+//! Source: DeTone, Malisiewicz, Rabinovich, "SuperPoint: Self-Supervised Interest Point Detection
+//! and Description", CVPR workshops 2018. Its license forbids distributing the weights: users
+//! supply them, converted to ONNX by `training/export/superpoint.py`.
 
 use unlift::Error;
 use unlift_nn::{Network, Tensor};
@@ -11,22 +11,22 @@ use super::LearnedFeatures;
 use super::maxima::{Scores, Wanted, corners};
 use crate::color::ColorImage;
 
-/// Name of the model.
 const MODEL: &str = "superpoint";
-/// Pixels a side of a cell.
+/// Side of a cell in pixels.
 const CELL: usize = 8;
-/// Pixels around a keypoint, to each side, in which there is no other one, and at the edge of the image.
+/// Radius in pixels around a keypoint without other keypoints; also the width of the border without
+/// keypoints.
 const RADIUS: usize = 4;
 
-/// What a user may choose about SuperPoint. The defaults are hloc's.
+/// Options of SuperPoint. The defaults are hloc's.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SuperPointOptions {
-    /// Features at most, the best, 4096.
+    /// Maximum number of features, the best ones; default 4096.
     pub max_features: usize,
-    /// Score that a keypoint must exceed, 0 to 1: 0.005.
+    /// Score that a keypoint must exceed, 0 to 1; default 0.005.
     pub min_score: f32,
-    /// Longest side in pixels, 1600; larger images are shrunk first, keypoints are in pixels of the image as it was
-    /// given.
+    /// Longest side in pixels, default 1600. Larger images are downsized; keypoints are in pixels
+    /// of the original image.
     pub max_image_size: usize,
 }
 
@@ -43,32 +43,33 @@ pub struct SuperPoint {
 }
 
 impl SuperPoint {
-    /// An extractor with these options, and with the weights that the user supplies.
+    /// Creates an extractor with these options and the user's weights.
     ///
     /// # Errors
-    /// Names the first field that is out of range; says where the model belongs that is missing.
+    /// If a field is out of range (the error names the first one), or the model is missing (the
+    /// error names its folder).
     pub fn try_new(options: SuperPointOptions) -> Result<Self, Error> {
         Self::of_network(Network::load(MODEL)?, options)
     }
 
-    /// The same with a network that has the inputs and outputs of SuperPoint's.
+    /// Creates an extractor with a network that has the inputs and outputs of SuperPoint.
     ///
     /// # Errors
-    /// Names the first field that is out of range.
+    /// If a field is out of range; the error names the first one.
     pub fn of_network(network: Network, options: SuperPointOptions) -> Result<Self, Error> {
         super::check(options.max_features, options.min_score, options.max_image_size)?;
         Ok(Self { network, options })
     }
 
-    /// Hash of the file of the network.
+    /// Returns the SHA-256 of the network's file.
     pub fn sha256(&self) -> &str {
         self.network.sha256()
     }
 
-    /// The features of an image.
+    /// Extracts the features of an image.
     ///
     /// # Errors
-    /// Only when the network is not what its names say.
+    /// If the network returns other shapes.
     pub fn extract(&self, image: &ColorImage) -> Result<LearnedFeatures, Error> {
         let small = image.fitted(self.options.max_image_size);
         let seen = small.as_ref().unwrap_or(image);
@@ -114,16 +115,17 @@ impl SuperPoint {
     }
 }
 
-/// Gray as OpenCV makes it, whose weights are those of Rec. 601, in 0..1.
+/// Converts to gray in 0..1 with the weights of Rec. 601, as OpenCV does.
 fn gray([red, green, blue]: [u8; 3]) -> f32 {
     let [red, green, blue] = [red, green, blue].map(f32::from);
     (0.299 * red + 0.587 * green + 0.114 * blue).round() / 255.0
 }
 
-/// The descriptor of a pixel, from the four cells around it, brought to length 1.
+/// Interpolates the descriptor of a pixel from the four cells around it, and normalizes it to
+/// length 1.
 ///
-/// A cell's stands at its middle. Pixels are brought to cells by the scale of the authors' code, which is a little
-/// less than eight.
+/// A cell's descriptor is at its middle. Pixels are scaled to cells as in the authors' code, by
+/// slightly less than eight.
 fn describe(coarse: &Tensor, place: [usize; 2], size: [usize; 2], out: &mut [f32]) {
     let dim = out.len();
     let cells = [coarse.shape()[2], coarse.shape()[1]];

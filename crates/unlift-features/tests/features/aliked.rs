@@ -1,4 +1,4 @@
-//! ALIKED: the same as the authors' code on real photos, and what it must do on made-up ones.
+//! ALIKED, compared with the authors' code on real photos, and tests on synthetic images.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -8,7 +8,7 @@ use serde_json::Value;
 use sha2::{Digest, Sha256};
 use unlift_features::{Aliked, AlikedOptions, ColorImage, LearnedFeatures, load};
 
-/// The folder of evaluation data beside the repository, if there is one.
+/// Returns the folder of evaluation data beside the repository, if it exists.
 fn shared() -> Option<PathBuf> {
     let folder = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared"));
     Some(folder).filter(|path| path.join("reference/aliked_n16rot.safetensors").is_file())
@@ -27,14 +27,13 @@ fn waves(width: usize, height: usize) -> ColorImage {
     ColorImage::try_new(width, height, (0..3 * width * height).map(value).collect()).unwrap()
 }
 
-/// Floats of a tensor of the reference.
 fn floats(file: &SafeTensors, name: &str) -> Vec<f32> {
     let data = file.tensor(name).unwrap().data().as_chunks::<4>().0;
     data.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect()
 }
 
-/// Of the reference's keypoints the shares that are found within 0.05 pixels, and of these that have a descriptor with
-/// a cosine above 0.999.
+/// Returns the share of the reference's keypoints that are found within 0.05 pixels, and the share
+/// of these whose descriptor has a cosine above 0.999.
 fn parity(found: &LearnedFeatures, places: &[f32], descriptors: &[f32]) -> (f64, f64) {
     let (mut near, mut alike) = (0, 0);
     let expected = places.as_chunks::<2>().0.iter().zip(descriptors.chunks_exact(found.dim));
@@ -52,7 +51,7 @@ fn parity(found: &LearnedFeatures, places: &[f32], descriptors: &[f32]) -> (f64,
     (f64::from(near) / n, f64::from(alike) / f64::from(near.max(1)))
 }
 
-/// The photo as Pillow decodes it, as the reference had it; `None` where Python or Pillow is missing.
+/// Decodes the photo with Pillow, as for the reference; `None` if Python or Pillow is missing.
 fn by_pillow(path: &Path) -> Option<ColorImage> {
     let program = "import sys; from PIL import Image; \
                    Image.open(sys.argv[1]).convert('RGB').save(sys.stdout.buffer, 'PPM')";
@@ -95,7 +94,7 @@ fn features_are_those_of_the_authors_code() {
             Some(image_of_reference) => {
                 let found = aliked.extract(&image_of_reference).unwrap();
                 let n = image["n_keypoints"].as_u64().unwrap() as usize;
-                // A score at the threshold may be a rounding above it.
+                // A score at the threshold may be above it after rounding.
                 assert!(found.keypoints.len().abs_diff(n) <= 1, "{at}: {n} keypoints expected");
                 let (near, alike) = parity(&found, &places, &descriptors);
                 eprintln!("image {at}, the same pixels: {near:.4} near, {alike:.4} of them alike");
@@ -106,7 +105,7 @@ fn features_are_those_of_the_authors_code() {
                 "image {at}: skipped: Pillow, which has the reference's pixels, is missing"
             ),
         }
-        // Another decoder's pixels are a level off here and there; where colors are subsampled, more.
+        // Another decoder's pixels differ slightly, and more where colors are subsampled.
         let (near, alike) = parity(&aliked.extract(&own).unwrap(), &places, &descriptors);
         eprintln!("image {at}, own decoder: {near:.4} near, {alike:.4} of them alike");
         assert!(near >= 0.8, "{at}: {near}");

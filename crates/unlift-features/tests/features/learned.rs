@@ -1,4 +1,4 @@
-//! What the network of neighborhoods is worth on a photo that it never saw.
+//! Inlier ratios of `learned` on a photo outside the training data.
 
 use std::path::Path;
 
@@ -16,7 +16,8 @@ use unlift_nn::Learned;
 
 const K: usize = 20;
 
-/// The share of right entries among the first K of every list, by `learned` and by `other`; `None` where the photo is not here.
+/// Returns the inlier ratio among the first K entries of every list, by `learned` and by `other`;
+/// `None` without the photo.
 fn ratios(extraction: &Extraction, other: &dyn Source<2>) -> Option<[f64; 2]> {
     let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
     let photo = shared.join("data/redkitchen/images/frame-000500.color.jpg");

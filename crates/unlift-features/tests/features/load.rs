@@ -1,4 +1,4 @@
-//! Photos as people have them: good ones, turned ones, and files that are none.
+//! Photos that can be read, turned photos, and files that are not photos.
 
 use std::io::Cursor;
 use std::path::PathBuf;
@@ -38,7 +38,7 @@ fn gray_values_are_those_of_colmap() {
     assert_eq!(decode(&deep, "photo").unwrap().width(), 31);
 }
 
-/// A JPEG with an EXIF header that says nothing but how it is turned.
+/// Encodes a JPEG whose EXIF header contains only the orientation.
 fn turned(image: &DynamicImage, orientation: u8) -> Vec<u8> {
     let jpeg = encode(image, ImageFormat::Jpeg);
     let mut exif = b"Exif\0\0MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0".to_vec();
@@ -56,7 +56,7 @@ fn photos_are_turned_upright() {
     let plain = decode(&encode(&image, ImageFormat::Jpeg), "photo").unwrap();
     let same = decode(&turned(&image, 1), "photo").unwrap();
     assert_eq!(same, plain);
-    // 6: the camera was turned left, so the photo is turned right: (x, y) comes to (height - 1 - y, x).
+    // Orientation 6 turns the photo right: (x, y) moves to (height - 1 - y, x).
     let right = decode(&turned(&image, 6), "photo").unwrap();
     assert_eq!((right.width(), right.height()), (16, 24));
     assert_eq!(right.row(20)[3], plain.row(16 - 1 - 3)[20]);
@@ -85,13 +85,13 @@ fn a_photo_that_is_cut_off_gives_one_clear_line() {
             "a.jpg: expected a whole JPEG image, found one that is cut off"
         );
     }
-    // The end of a thumbnail in the header is not the end of the photo.
+    // The end marker of a thumbnail in the header does not count.
     let mut thumbnail = jpeg[..2].to_vec();
     thumbnail.extend([0xff, 0xe1, 0, 6, 1, 1, 0xff, 0xd9]);
     thumbnail.extend(&jpeg[2..]);
     assert!(decode(&thumbnail, "a.jpg").is_ok());
     assert!(text(&thumbnail[..jpeg.len() / 2], "a.jpg").contains("cut off"));
-    // Neither is what some cameras append.
+    // Some cameras append data.
     let appended = [&jpeg[..], b"maker notes"].concat();
     assert!(decode(&appended, "a.jpg").is_ok());
     for format in [ImageFormat::Png, ImageFormat::WebP] {
@@ -121,17 +121,16 @@ fn a_header_that_claims_too_much_is_refused_before_memory_is_taken() {
     );
 }
 
-/// Decoders fill in what a JPEG lacks: 2^28 gray pixels of 700 bytes, for seconds.
+/// Decoders fill in what a JPEG lacks: 2^28 gray pixels from 700 bytes, for seconds.
 #[test]
 fn a_header_that_claims_more_than_its_bytes_can_hold_is_refused() {
     let mut jpeg = encode(&DynamicImage::from(colors(8, 8)), ImageFormat::Jpeg);
     let frame = jpeg.windows(2).position(|pair| pair == [0xff, 0xc0]).unwrap();
-    // Height and width.
     jpeg[frame + 5..frame + 9].copy_from_slice(&[0x40, 0, 0x40, 0]);
     let expected =
         format!("a: expected at most 16777216 pixels in {} bytes, found 16384 x 16384", jpeg.len());
     assert_eq!(text(&jpeg, "a"), expected);
-    // One color all over is allowed as far as cameras go, in every format.
+    // A single color is allowed up to the size of cameras, in every format.
     for format in [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::WebP] {
         let black = encode(&DynamicImage::new_luma8(2048, 1024).into_rgb8().into(), format);
         assert_eq!(decode(&black, "black").unwrap().width(), 2048);

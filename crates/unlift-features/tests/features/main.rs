@@ -1,4 +1,4 @@
-//! Photos in, features out: of SIFT, ALIKED and SuperPoint.
+//! Features of photos: SIFT, ALIKED and SuperPoint.
 
 mod aliked;
 mod learned;

@@ -1,4 +1,4 @@
-//! What features must do on made-up images, whose keypoints are known.
+//! SIFT on synthetic images with known keypoints.
 
 use std::f32::consts::{FRAC_PI_2, TAU};
 
@@ -18,11 +18,12 @@ fn blobs(width: usize, height: usize, blobs: &[(f32, f32, f32, f32)]) -> GrayIma
     GrayImage::try_new(width, height, (0..width * height).map(value).collect()).unwrap()
 }
 
-/// A photo's stand-in: many blobs of all sizes, the same on every machine, `zoom` times as large.
+/// Creates a substitute for a photo: many blobs of all sizes, the same on every machine, scaled by
+/// `zoom`.
 fn scene(width: usize, height: usize, zoom: usize) -> GrayImage {
     let spots: Vec<_> = (0..width * height / 150)
         .map(|i| {
-            // Fractional parts of multiples of irrationals spread evenly.
+            // Fractional parts of multiples of irrational numbers are evenly distributed.
             let part = |by: f64| (i as f64 * by).fract() as f32;
             let (x, y) = (part(0.754_877_666_2), part(0.569_840_290_9));
             let sigma = 1.0 + 5.0 * part(0.618_033_988_7) * part(0.414_213_562_4);
@@ -34,7 +35,7 @@ fn scene(width: usize, height: usize, zoom: usize) -> GrayImage {
     blobs(zoom * width, zoom * height, &spots)
 }
 
-/// The image turned by 90 degrees so that `(x, y)` comes to `(height - y, x)`.
+/// Rotates the image by 90 degrees so that `(x, y)` moves to `(height - y, x)`.
 fn turned(image: &GrayImage) -> GrayImage {
     let (width, height) = (image.height(), image.width());
     let value = |i: usize| image.row(width - 1 - i % width)[i / width];
@@ -50,8 +51,8 @@ fn distance(a: &[u8; 128], b: &[u8; 128]) -> f32 {
     unit(a).iter().zip(unit(b)).map(|(a, b)| (a - b).powi(2)).sum::<f32>().sqrt()
 }
 
-/// Share of `expected` that `features` has within half a pixel, 5 % of scale, 5 degrees and a
-/// descriptor distance of 0.1.
+/// Returns the share of `expected` that `features` contains within half a pixel, 5 % of scale, 5
+/// degrees and a descriptor distance of 0.1.
 fn share(features: &Features, expected: &Features) -> f64 {
     let near = |a: &Keypoint, b: &Keypoint| {
         let turn = (a.orientation - b.orientation).rem_euclid(TAU);
@@ -66,7 +67,6 @@ fn share(features: &Features, expected: &Features) -> f64 {
     found.count() as f64 / expected.keypoints.len() as f64
 }
 
-/// The features whose keypoints pass.
 fn only(features: &Features, pass: impl Fn(&Keypoint) -> bool) -> Features {
     let rows = features.keypoints.iter().zip(&features.descriptors);
     let (keypoints, descriptors) = rows.filter(|row| pass(row.0)).unzip();
@@ -76,8 +76,8 @@ fn only(features: &Features, pass: impl Fn(&Keypoint) -> bool) -> Features {
 #[test]
 fn a_blob_gives_a_keypoint_at_its_center_with_its_scale() {
     // At smoothing s the middle of the blob has 1 / (sigma^2 + s^2 - 0.25) of its height times
-    // sigma^2, as photos are taken to be smoothed by 0.5 already. The difference to k s, where k is the
-    // step of levels, is largest at s^2 = (sigma^2 - 0.25) / k.
+    // sigma^2, because photos are assumed to be smoothed by 0.5. The difference to k s, where k is
+    // the step of levels, is largest at s^2 = (sigma^2 - 0.25) / k.
     let step = 2_f32.powf(1.0 / 3.0);
     for (sigma, contrast) in [(1.5, 0.4_f32), (2.6, -0.35), (4.0, 0.4), (7.0, -0.3), (10.0, 0.4)] {
         // Not midway between pixels of any octave, where two are equally high.
@@ -98,22 +98,22 @@ fn a_blob_gives_a_keypoint_at_its_center_with_its_scale() {
 
 #[test]
 fn turning_the_image_turns_keypoints_and_keeps_descriptors() {
-    // Halving keeps every second pixel: the same ones of the turned image if sides are 8 n + 1.
+    // Halving keeps every second pixel: the same ones of the rotated image if sides are 8 n + 1.
     let image = scene(161, 121, 1);
-    // All orientations: the first two are others when directions are counted from elsewhere.
+    // All orientations, because the first two depend on where directions are counted from.
     let options = SiftOptions { max_orientations: 4, ..SiftOptions::default() };
     let sift = Sift::try_new(options).unwrap();
     let (upright, mut expected) = (sift.extract(&image), sift.extract(&turned(&image)));
     assert!(upright.keypoints.len() > 100, "{}", upright.keypoints.len());
-    // Back again: (x', y') = (height - y, x), and directions by a quarter turn.
+    // Inverse: (x', y') = (height - y, x), and directions by a quarter turn.
     for keypoint in &mut expected.keypoints {
         (keypoint.x, keypoint.y) = (keypoint.y, image.height() as f32 - keypoint.x);
         keypoint.orientation -= FRAC_PI_2;
     }
-    // Doubling is not symmetric (the last pixel is repeated), so borders differ.
+    // Doubling repeats the last pixel, so borders differ.
     let kept = only(&expected, |keypoint| {
         let rim = 12.0 * keypoint.scale;
-        // Blobs that are round have more directions than the four that are kept.
+        // Round blobs may have more than the four kept directions.
         let twins = expected.keypoints.iter().filter(|other| other.x == keypoint.x).count();
         let inside = keypoint.x.min(161.0 - keypoint.x).min(keypoint.y).min(121.0 - keypoint.y);
         inside > rim && twins < 4
@@ -125,7 +125,7 @@ fn turning_the_image_turns_keypoints_and_keeps_descriptors() {
 #[test]
 fn a_larger_image_has_the_same_features_at_larger_scales() {
     let sift = Sift::default();
-    // The finest ones differ, as the first doubling is linear.
+    // The finest features differ, because the first doubling is linear.
     let small = only(&sift.extract(&scene(160, 120, 1)), |keypoint| keypoint.scale > 2.0);
     let mut large = sift.extract(&scene(160, 120, 2));
     for keypoint in &mut large.keypoints {
@@ -142,7 +142,7 @@ fn nothing_to_see_gives_nothing() {
     for (width, height) in [(1, 1), (1, 40), (2, 2), (3, 3), (5, 7), (16, 9), (64, 64)] {
         let flat = GrayImage::try_new(width, height, vec![0.5; width * height]).unwrap();
         assert_eq!(sift.extract(&flat), Features::default(), "{width} x {height}");
-        // Noise in an image of any size is no reason to fail.
+        // Noise in an image of any size must not fail.
         let value = |i: usize| ((i * 7919) % 13) as f32 / 13.0;
         let noise = (0..width * height).map(value).collect();
         let features = sift.extract(&GrayImage::try_new(width, height, noise).unwrap());
@@ -160,7 +160,7 @@ fn features_are_kept_from_the_coarsest_level_on_and_levels_whole() {
         let options = SiftOptions { max_features, ..SiftOptions::default() };
         let some = Sift::try_new(options).unwrap().extract(&image);
         let n = some.keypoints.len();
-        // The coarsest ones, unchanged, in the same order; enough of them.
+        // The coarsest features, unchanged, in the same order, and at least the requested number.
         assert_eq!(some.keypoints, all.keypoints[all.keypoints.len() - n..]);
         assert_eq!(some.descriptors, all.descriptors[all.descriptors.len() - n..]);
         assert!(n > max_features && n <= last, "{max_features}: {n}");
@@ -219,7 +219,7 @@ fn the_same_bytes_for_any_number_of_threads_and_in_used_buffers() {
 
 #[test]
 fn features_are_the_same_bits_everywhere() {
-    // Values that are exact on every machine: discs on a checked ground.
+    // Values that are exact on every machine: discs on a checkerboard.
     let value = |i: usize| {
         let (x, y) = (i % 150, i / 150);
         let (dx, dy) = ((x % 29).abs_diff(14), (y % 23).abs_diff(11));

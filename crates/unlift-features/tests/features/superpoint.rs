@@ -1,6 +1,6 @@
-//! SuperPoint, on seeded random weights: the same as `training/export/superpoint.py`.
+//! SuperPoint with seeded random weights, compared with `training/export/superpoint.py`.
 //!
-//! `tests/data/superpoint-random` is made by `python export/superpoint.py --random FOLDER`.
+//! `python export/superpoint.py --random FOLDER` makes `tests/data/superpoint-random`.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/superpoint-random").join(name)
 }
 
-/// The narrow network, whose descriptors have 16 numbers.
+/// Creates an extractor with the narrow network, whose descriptors have 16 values.
 fn superpoint(options: SuperPointOptions) -> SuperPoint {
     const OUTPUTS: &[Port] = &[
         Port { name: "score", shape: &[Some(1), None, None] },

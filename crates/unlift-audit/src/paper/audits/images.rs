@@ -1,5 +1,3 @@
-//! The audit of the photos of a scene's test split.
-
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
@@ -18,11 +16,11 @@ use crate::paper::layouts::Scene;
 use crate::paper::request::Part;
 use crate::{Error, Progress, Shown, open_audit, sources};
 
-/// How an attacker estimates neighbors; rows each, of which the stronger counts.
+/// Sources that estimate neighbors, each in its own rows; the stronger one counts.
 const SOURCES: [&str; 2] = ["descriptors", "learned"];
 
 impl Run<'_> {
-    /// The audit of as many photos as were asked for; none where nothing of these features is wanted.
+    /// Audits the requested number of photos; `None` if no number with these features is wanted.
     pub(super) fn images(
         &mut self,
         scene: &Scene,
@@ -39,7 +37,8 @@ impl Run<'_> {
             let expected = format!("a photo of the test split of {name} with keypoints");
             return Err(unlift_io::Error::new(&scene.photos, "", expected, "none").into());
         };
-        // The paper measures in pixels of the photos that it shrank, unlift in those of the photo.
+        // The paper measures in pixels of its downsized photos, unlift in pixels of the original
+        // photo.
         let longest = first.size.map_or(0, |[width, height]| width.max(height));
         let side = request.dataset.shrunk_to().filter(|&side| side < longest);
         let factor = side.map_or(1.0, |side| f64::from(longest) / f64::from(side));
@@ -55,7 +54,7 @@ impl Run<'_> {
         let mut plan = Plan { neighbors, seed: request.seed, ..Plan::new(Unit::Pixel) };
         plan.schemes.retain(|scheme| schemes.contains(&scheme.name()));
         plan.thresholds = thresholds.iter().map(|(_, threshold)| threshold.clone()).collect();
-        // The second largest of the paper's, 10 pixels, speaks for an audit.
+        // The second largest threshold of the paper, 10 pixels, is the headline.
         plan.headline = plan.thresholds.len().saturating_sub(2);
         plan.measures.extend(inversion.iter().map(|one| Arc::clone(one) as Arc<dyn Measure<2>>));
         let of_features = if features == "sift" { String::new() } else { format!("-{features}") };
@@ -88,7 +87,8 @@ impl Run<'_> {
         Ok(finished.map(|finished| of_scene(scene, (2, features), thresholds, finished)))
     }
 
-    /// The oracle, and the sources that take these descriptors, as far as they are wanted.
+    /// Returns the oracle, and the sources that accept these descriptors, as far as they are
+    /// wanted.
     fn neighbors(
         &self,
         features: &str,

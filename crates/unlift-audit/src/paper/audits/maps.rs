@@ -1,5 +1,3 @@
-//! The audit of a scene's map.
-
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -20,13 +18,13 @@ use crate::paper::request::Part;
 use crate::paper::scale;
 use crate::{Error, Preparation, Progress, Shown, open_audit};
 
-/// Photos that pictures are compared with, as in any audit of a map.
 const PHOTOS: usize = 12;
-/// Neighbors of a point: as many as in the paper's runtime table; the others do not say.
+/// K as in the paper's runtime table; its other tables do not state it.
 const K: usize = 50;
 
 impl Run<'_> {
-    /// The audit of the map at `path`; none where its scale is not known, or pictures alone are wanted and cannot be made.
+    /// Audits the map at `path`; `None` if its scale is unknown, or only pictures are wanted and
+    /// cannot be made.
     pub(super) fn map(
         &mut self,
         scene: &Scene,
@@ -39,13 +37,13 @@ impl Run<'_> {
         let scale = match (request.scale, &images) {
             (Some(scale), _) => Some(scale),
             (None, Some(images)) => scale::scale(images, scene)?,
-            // A file is the dataset's own, in the frame of its poses.
+            // A single file is published with the dataset, in the frame of its poses.
             (None, None) => path.is_file().then_some(1.0),
         };
         let Some(scale) = scale else {
             let (tables, path) = (tables_of(request, 3, "sift"), path.display());
             self.lacks(format!(
-                "{tables}: meters of the map of {name}: fewer than 4 images of {path} have a pose in the dataset (else \
+                "{tables}: meters of the map of {name}: fewer than 4 images of {path} have a pose in the dataset (try \
                  --scale)"
             ));
             return Ok(None);

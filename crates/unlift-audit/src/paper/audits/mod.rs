@@ -1,4 +1,4 @@
-//! The audits of one scene after the other, by the calls that audit any map and any photos.
+//! Audits of all scenes, with the same calls as audits of other maps and photos.
 
 mod images;
 mod maps;

@@ -1,5 +1,3 @@
-//! What became of the scenes so far, and what their audits share.
-
 use std::path::PathBuf;
 
 use serde_json::{Map, Value, json};
@@ -16,25 +14,25 @@ use crate::paper::missing::tables_of;
 use crate::paper::request::{Part, Request};
 use crate::{Error, Finished, Progress};
 
-/// What became of the scenes so far.
+/// The state of the audits of all scenes.
 pub struct Run<'a> {
     pub(super) request: &'a Request<'a>,
     pub(super) numbers: Vec<Printed>,
-    /// Features of photos, where what extracts them is there.
+    /// Kinds of features whose extractor is available.
     features: Vec<(&'static str, Extraction)>,
-    /// Audits that were done, and where their pages are.
+    /// Finished audits and the paths of their pages.
     pub done: Vec<(OfScene, PathBuf)>,
-    /// What they lacked, one line each.
+    /// Missing data, one line each.
     pub missing: Vec<String>,
-    /// Why audits failed, one line each.
+    /// Failed audits, one line each.
     pub failed: Vec<String>,
 }
 
-/// A threshold of the paper, and the same in the unit of an audit.
+/// A threshold of the paper, and the same threshold in the unit of an audit.
 pub type Within = (f64, Threshold);
 
 impl<'a> Run<'a> {
-    /// Nothing done yet.
+    /// Creates the state before the first audit.
     pub fn new(request: &'a Request<'a>) -> Self {
         let numbers = request.numbers();
         let usual = SiftOptions::default();
@@ -59,10 +57,10 @@ impl<'a> Run<'a> {
         Self { request, numbers, features, done: Vec::new(), missing, failed: Vec::new() }
     }
 
-    /// Audits the map and the photos of a scene, as far as they are there.
+    /// Audits the map and the photos of a scene, if they exist.
     ///
     /// # Errors
-    /// When progress says stop.
+    /// If the progress stops the audit.
     pub fn audit(&mut self, scene: &Scene) -> Result<(), Error> {
         let wants = |part| self.request.wants(part);
         if let (Some(map), true) = (&scene.map, wants(Part::Maps) || wants(Part::Pictures)) {
@@ -97,14 +95,13 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Notes what is missing, once.
     pub(super) fn lacks(&mut self, line: String) {
         if !self.missing.contains(&line) {
             self.missing.push(line);
         }
     }
 
-    /// What paints descriptors of this kind; none where a network is not there.
+    /// Returns a painter for descriptors of this kind; `None` if a network is missing.
     pub(super) fn painter(&mut self, kind: DescriptorKind) -> Option<Painter> {
         match Inverter::of(kind).and_then(Painter::try_new) {
             Ok(painter) => Some(painter),
@@ -115,7 +112,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Schemes and thresholds of the paper; the latter `factor` times as large in the audit.
+    /// Returns schemes and thresholds of the paper; thresholds are multiplied by `factor` in the
+    /// audit.
     pub(super) fn asked(
         &self,
         dim: usize,
@@ -140,7 +138,7 @@ impl<'a> Run<'a> {
         (schemes, thresholds)
     }
 
-    /// What the plan does not say.
+    /// Returns options that are not in the plan.
     pub(super) fn options(&self) -> Map<String, Value> {
         let mut options = Map::new();
         options.insert("dataset".into(), json!(self.request.dataset.name()));
@@ -148,7 +146,7 @@ impl<'a> Run<'a> {
     }
 }
 
-/// A finished audit, ready to be compared.
+/// Returns a finished audit, ready to be compared.
 pub fn of_scene(
     scene: &Scene,
     (dim, features): (usize, &'static str),

@@ -1,5 +1,5 @@
-//! Cambridge Landmarks: `SCENE/dataset_test.txt` and `SCENE/dataset_train.txt` list photos and poses, below a head of two
-//! lines: `seq1/frame00001.png X Y Z W P Q R`.
+//! The layout of Cambridge Landmarks: `SCENE/dataset_test.txt` and `SCENE/dataset_train.txt` list
+//! photos and poses, below a head of two lines: `seq1/frame00001.png X Y Z W P Q R`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -10,7 +10,7 @@ use super::poses::Poses;
 use super::scene::Scene;
 use super::text::{lines, wrong};
 
-/// Those of the benchmark; the paper does not say which it took.
+/// The scenes of the usual benchmark; the paper does not state which scenes it used.
 pub const SCENES: [&str; 5] =
     ["KingsCollege", "OldHospital", "ShopFacade", "StMarysChurch", "GreatCourt"];
 
@@ -19,10 +19,6 @@ const TRAIN: &str = "dataset_train.txt";
 /// Words of a line: a name, a position and a quaternion.
 const WORDS: usize = 8;
 
-/// The scene `name` below `root`.
-///
-/// # Errors
-/// When a list is malformed.
 pub fn open(root: &Path, name: &str) -> Result<Scene, Error> {
     let folder = root.join(name);
     let mut poses = listed(&folder.join(TRAIN))?;
@@ -47,7 +43,7 @@ pub fn open(root: &Path, name: &str) -> Result<Scene, Error> {
     })
 }
 
-/// Photos and where they were taken; none without the file.
+/// Reads photos and camera centers; none without the file.
 fn listed(path: &Path) -> Result<BTreeMap<String, [f64; 3]>, Error> {
     let mut poses = BTreeMap::new();
     if !path.is_file() {
@@ -64,7 +60,7 @@ fn listed(path: &Path) -> Result<BTreeMap<String, [f64; 3]>, Error> {
                 is_head = false;
                 poses.insert(words[0].to_owned(), [numbers[0], numbers[1], numbers[2]]);
             }
-            // What stands above the first photo says what the columns are.
+            // The first lines describe the columns.
             _ if is_head && number <= 3 => {}
             _ => return Err(wrong(path, number, "a photo, X Y Z and W P Q R", &line)),
         }
@@ -72,7 +68,6 @@ fn listed(path: &Path) -> Result<BTreeMap<String, [f64; 3]>, Error> {
     Ok(poses)
 }
 
-/// Whether a name is not that of a file below the scene.
 fn leads_out(name: &str) -> bool {
     let inside = |part| matches!(part, std::path::Component::Normal(_));
     !Path::new(name).components().all(inside)

@@ -1,4 +1,4 @@
-//! What is known of each dataset: its scenes, and who publishes what.
+//! The datasets of the paper: their names, scenes and web sites.
 
 use super::{cambridge, seven_scenes, twelve_scenes};
 
@@ -14,10 +14,10 @@ pub enum Dataset {
 }
 
 impl Dataset {
-    /// All of them.
+    /// All datasets.
     pub const ALL: [Self; 3] = [Self::SevenScenes, Self::TwelveScenes, Self::Cambridge];
 
-    /// The name that users type.
+    /// Returns the name that users type.
     pub fn name(self) -> &'static str {
         match self {
             Self::SevenScenes => "7scenes",
@@ -26,7 +26,7 @@ impl Dataset {
         }
     }
 
-    /// The name in the published tables.
+    /// Returns the name in the published tables.
     pub fn published(self) -> &'static str {
         match self {
             Self::SevenScenes => "7-scenes",
@@ -35,7 +35,7 @@ impl Dataset {
         }
     }
 
-    /// Names of its scenes, which are those of their folders.
+    /// Returns the names of its scenes, which are those of their folders.
     pub fn scenes(self) -> &'static [&'static str] {
         match self {
             Self::SevenScenes => &seven_scenes::SCENES,
@@ -44,7 +44,7 @@ impl Dataset {
         }
     }
 
-    /// Where its owners publish photos and poses.
+    /// Returns the web site of its photos and poses.
     pub fn owner(self) -> &'static str {
         match self {
             Self::SevenScenes => {
@@ -55,14 +55,14 @@ impl Dataset {
         }
     }
 
-    /// Where maps of it are published, or how one is made.
+    /// Returns where its maps are published, or how to make one.
     pub fn maps(self) -> &'static str {
         match self {
             Self::SevenScenes => {
                 "7scenes_sfm_triangulated.zip, \
                  https://github.com/cvg/Hierarchical-Localization/tree/master/hloc/pipelines/7Scenes"
             }
-            Self::TwelveScenes => "none is published with it: COLMAP makes one of its photos",
+            Self::TwelveScenes => "none is published with it: make one from its photos with COLMAP",
             Self::Cambridge => {
                 "CambridgeLandmarks_Colmap_Retriangulated_1024px.zip, \
                  https://github.com/cvg/Hierarchical-Localization/tree/master/hloc/pipelines/Cambridge, \
@@ -71,7 +71,7 @@ impl Dataset {
         }
     }
 
-    /// Longest side in pixels to which the paper shrank photos, where it did.
+    /// Returns the longest side in pixels to which the paper downsized photos, if it did.
     pub fn shrunk_to(self) -> Option<u32> {
         match self {
             Self::SevenScenes | Self::TwelveScenes => None,

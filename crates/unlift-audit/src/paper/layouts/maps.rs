@@ -1,5 +1,5 @@
-//! Where the map of a scene lies: beside its photos, where hloc unpacks the published ones, or where hloc and COLMAP
-//! leave their own.
+//! Finds the map of a scene: beside its photos, where hloc unpacks the published maps, or where
+//! hloc and COLMAP write their own.
 
 use std::path::{Path, PathBuf};
 
@@ -7,12 +7,12 @@ use unlift_io::read;
 
 use super::dataset::Dataset;
 
-/// Folders of a scene's map inside the place of the scene; [`read::open`] finds `sparse/0` and its like by itself.
+/// Folders of a map inside the folder of the scene. [`read::open`] finds `sparse/0` and similar
+/// folders itself.
 const INSIDE: [&str; 5] = ["", "triangulated", "model_train", "sfm", "sfm_sift"];
-/// The file of Cambridge Landmarks.
 const NVM: &str = "reconstruction.nvm";
 
-/// The folder beside the scenes into which hloc unpacks published maps.
+/// Returns the folder beside the scenes into which hloc unpacks published maps.
 fn beside(dataset: Dataset) -> Option<&'static str> {
     match dataset {
         Dataset::SevenScenes => Some("7scenes_sfm_triangulated"),
@@ -21,7 +21,7 @@ fn beside(dataset: Dataset) -> Option<&'static str> {
     }
 }
 
-/// The map of the scene `name` of the dataset in `root`, or of the scene in `models`; the first that is there.
+/// Returns the first existing map of the scene `name`, in the dataset at `root` or in `models`.
 pub fn find(dataset: Dataset, root: &Path, name: &str, models: Option<&Path>) -> Option<PathBuf> {
     let places = match models {
         Some(models) => vec![models.join(name)],
@@ -35,7 +35,7 @@ pub fn find(dataset: Dataset, root: &Path, name: &str, models: Option<&Path>) ->
     inside.filter(|folder| read::is_project(folder)).chain(nvm.filter(|file| file.is_file())).next()
 }
 
-/// Where [`find`] looks, for people.
+/// Describes the places that [`find`] checks.
 pub fn looked_in(dataset: Dataset, models: Option<&Path>) -> String {
     let inside = "itself, sparse, triangulated, model_train, sfm, sfm_sift";
     match (models, beside(dataset)) {

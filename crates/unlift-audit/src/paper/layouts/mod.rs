@@ -1,4 +1,5 @@
-//! Where the datasets of the paper have their photos, poses, splits and maps, as their owners publish them.
+//! File layouts of the paper's datasets: photos, poses, splits and maps, as their owners publish
+//! them.
 
 mod cambridge;
 mod dataset;
@@ -18,11 +19,11 @@ pub use maps::looked_in;
 pub use poses::Poses;
 pub use scene::Scene;
 
-/// The scenes of `dataset` below `root`, in the paper's order; `models` is a folder with a map per scene, in place of those that
-/// lie in the dataset.
+/// Opens the scenes of `dataset` below `root`, in the paper's order. `models` is a folder with a
+/// map per scene, which replaces the maps of the dataset.
 ///
 /// # Errors
-/// When there is none, or a list of photos or poses is malformed.
+/// If there is no scene, or a list of photos or poses is malformed.
 pub fn open(dataset: Dataset, root: &Path, models: Option<&Path>) -> Result<Vec<Scene>, Error> {
     let there = dataset.scenes().iter().filter(|name| root.join(name).is_dir());
     let mut scenes = Vec::new();

@@ -1,5 +1,3 @@
-//! Where a dataset says that its cameras stood.
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -10,18 +8,18 @@ use super::text::{lines, wrong};
 /// Poses of photos.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Poses {
-    /// Below this folder, a file beside each photo: `frame-000000.pose.txt` of `frame-000000.color.png`, four rows of the
-    /// matrix from the camera to the world, in meters.
+    /// The folder with a file beside each photo: `frame-000000.pose.txt` of
+    /// `frame-000000.color.png`, four rows of the matrix from the camera to the world, in meters.
     Beside(PathBuf),
     /// Camera centers by the photo's name.
     Listed(BTreeMap<String, [f64; 3]>),
 }
 
 impl Poses {
-    /// The camera center of `photo`, where it is known: some poses of the datasets were lost when these were recorded.
+    /// Returns the camera center of `photo`, if it is known; the datasets lack some poses.
     ///
     /// # Errors
-    /// When its file is malformed.
+    /// If its file is malformed.
     pub fn center(&self, photo: &str) -> Result<Option<[f64; 3]>, Error> {
         match self {
             Self::Listed(poses) => Ok(poses.get(photo).copied()),
@@ -40,13 +38,12 @@ impl Poses {
     }
 }
 
-/// A number, or what C prints for none: lost poses of 12-Scenes are rows of `-1.#INF`.
+/// Parses a number. Lost poses of 12-Scenes are rows of `-1.#INF`, as C prints them.
 fn number_of(word: &str) -> Option<f64> {
     let is_lost = word.contains("#INF") || word.contains("#IND") || word.contains("#QNAN");
     if is_lost { Some(f64::NAN) } else { word.parse().ok() }
 }
 
-/// The last column of the matrix.
 fn of_file(path: &Path) -> Result<Option<[f64; 3]>, Error> {
     let lines = lines(path)?;
     let mut center = [0.0; 3];

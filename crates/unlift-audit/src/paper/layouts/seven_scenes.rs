@@ -1,4 +1,5 @@
-//! 7-Scenes: `SCENE/TestSplit.txt` names sequences, whose frames lie in `SCENE/seq-01/frame-000000.color.png`.
+//! The layout of 7-Scenes: `SCENE/TestSplit.txt` names sequences, whose frames are
+//! `SCENE/seq-01/frame-000000.color.png`.
 
 use std::path::Path;
 
@@ -8,16 +9,12 @@ use super::poses::Poses;
 use super::scene::Scene;
 use super::text::{files, lines, wrong};
 
-/// In the order of the paper's figures, which is that of the dataset's page.
+/// The scenes in the order of the paper's figures, which is that of the dataset's page.
 pub const SCENES: [&str; 7] =
     ["chess", "fire", "heads", "office", "pumpkin", "redkitchen", "stairs"];
 
 const SPLIT: &str = "TestSplit.txt";
 
-/// The scene `name` below `root`.
-///
-/// # Errors
-/// When its split is malformed.
 pub fn open(root: &Path, name: &str) -> Result<Scene, Error> {
     let folder = root.join(name);
     let split = folder.join(SPLIT);

@@ -1,5 +1,6 @@
-//! 12-Scenes: `apt1/kitchen/split.txt` has a line per sequence, of which the first is for tests; all frames lie in
-//! `apt1/kitchen/data/frame-000000.color.jpg`, one sequence after the other.
+//! The layout of 12-Scenes: `apt1/kitchen/split.txt` has a line per sequence, of which the first is
+//! the test split. All frames are `apt1/kitchen/data/frame-000000.color.jpg`, one sequence after
+//! the other.
 
 use std::path::Path;
 
@@ -9,7 +10,7 @@ use super::poses::Poses;
 use super::scene::Scene;
 use super::text::{files, lines, wrong};
 
-/// As the dataset's archives have them.
+/// The scenes, named as in the dataset's archives.
 pub const SCENES: [&str; 12] = [
     "apt1/kitchen",
     "apt1/living",
@@ -29,10 +30,6 @@ const SPLIT: &str = "split.txt";
 const FRAME: &str = "frame-";
 const PHOTO: &str = ".color.jpg";
 
-/// The scene `name` below `root`.
-///
-/// # Errors
-/// When its split is malformed.
 pub fn open(root: &Path, name: &str) -> Result<Scene, Error> {
     let folder = root.join(name);
     let (split, photos) = (folder.join(SPLIT), folder.join("data"));
@@ -55,7 +52,7 @@ pub fn open(root: &Path, name: &str) -> Result<Scene, Error> {
     Ok(Scene { name: name.to_owned(), root: folder, photos, test, lacking, map: None, poses })
 }
 
-/// Frames of the first sequence: `sequence0 [frames=357] [start=0 ; end=356]`.
+/// Reads the number of frames of the first sequence: `sequence0 [frames=357] [start=0 ; end=356]`.
 fn test_frames(split: &Path) -> Result<u64, Error> {
     let lines = lines(split)?;
     let (number, line) = lines.first().map_or((1, ""), |(number, line)| (*number, line));
