@@ -37,8 +37,8 @@ pub struct AttackArgs {
     /// Records per list, for sources other than the oracle [default: chosen by each source]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
     pub source_k: Option<u16>,
-    /// Distance within which a listed record supports a position, in the unit of the audit; auto
-    /// computes it from the released records and the lists
+    /// Distance within which a listed record (what replaces a point) supports a position, in the
+    /// unit of the audit; auto computes it from the released records and the lists
     #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
     pub delta: Delta,
     /// Average over N random seeds
@@ -96,9 +96,9 @@ pub struct RunArgs {
 pub struct SolverArgs {
     /// Recovery methods, separated by commas or repeated. From lists of neighbors: joint (usually
     /// the strongest), joint-start (its first pass), consensus (each point by its own list), ransac
-    /// (that of the paper). From released records alone: density (published attacks), tomography
-    /// (stronger) [default: joint,joint-start; also consensus on maps of fewer than 150 x K points,
-    /// 7,500 by default]
+    /// (that of the paper). From the released records alone (what a scheme publishes in place of
+    /// points): density (published attacks), tomography (stronger) [default: joint,joint-start;
+    /// also consensus on maps of fewer than 150 x K points, 7,500 by default]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
           help_heading = "Attack")]
     pub solver: Vec<Builtin>,

@@ -208,8 +208,8 @@ pub struct BenchRecoverArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
           default_value = "joint")]
     pub solver: Vec<Builtin>,
-    /// Distance within which a listed record supports a position, in the unit of the map; auto
-    /// computes it from the released records and the lists
+    /// Distance within which a listed record (what replaces a point) supports a position, in the
+    /// unit of the map; auto computes it from the released records and the lists
     #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
     pub delta: Delta,
     /// Also compute the probability that each position is correct, as an audit does

@@ -153,8 +153,8 @@ pub struct RecoverArgs {
     /// pairs; ray-voxel: a checkerboard of voxels picks the center)
     #[arg(long)]
     pub no_exact_constraints: bool,
-    /// Distance within which a listed record supports a position, in the unit of the map; auto
-    /// computes it from the released records and the lists
+    /// Distance within which a listed record (what replaces a point) supports a position, in the
+    /// unit of the map; auto computes it from the released records and the lists
     #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
     pub delta: Delta,
     /// Random seed
