@@ -1,4 +1,4 @@
-//! `unlift split`: a stage file as a folder of parts.
+//! `unlift split`: splits a stage file into a folder of parts.
 
 use unlift::OneLine;
 use unlift_audit::refused;

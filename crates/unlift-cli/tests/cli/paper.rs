@@ -196,7 +196,7 @@ fn what_is_wrong_is_one_line() {
         (
             "cambridge e",
             3,
-            "e: expected photos of a test split or a map of a scene, in meters, found none",
+            "e: expected photos of a test split, or a map of a scene in meters, found none",
         ),
     ] {
         let told = place.complains(&format!("paper --quiet --out o --dataset {line}"), code);

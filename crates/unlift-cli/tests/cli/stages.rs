@@ -220,8 +220,8 @@ fn files_that_do_not_say_are_taken_with_a_note() {
     write_neighborhoods(&place.path("bare-lists"), &lists.with_about(About::default())).unwrap();
     let recover = "recover one/released.parquet --neighbors bare-lists --out bare-back --seed 1";
     let (_, stderr) = place.ends(recover, 0);
-    assert!(stderr.contains("unlift: note: bare-lists: says not which released map"), "{stderr}");
-    assert!(stderr.contains("says not what its rows are counted by"), "{stderr}");
+    assert!(stderr.contains("unlift: note: bare-lists: does not name its released map"), "{stderr}");
+    assert!(stderr.contains("does not state what its rows are counted by"), "{stderr}");
 
     let back = read_recovered::<3>(&place.path("one-back")).unwrap();
     write_recovered(&place.path("bare-back"), &back.with_about(About::default())).unwrap();
