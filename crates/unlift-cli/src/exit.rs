@@ -39,12 +39,10 @@ impl fmt::Display for Usage {
 
 impl std::error::Error for Usage {}
 
-/// Returns a usage error.
 pub fn usage(message: impl Into<String>) -> anyhow::Error {
     Usage(message.into()).into()
 }
 
-/// An error with a line of advice.
 #[derive(Debug)]
 struct Advised {
     error: anyhow::Error,
@@ -95,7 +93,6 @@ pub fn finish(result: anyhow::Result<Outcome>) -> ExitCode {
     }
 }
 
-/// Returns the lines to print on stderr.
 pub fn lines(error: &anyhow::Error) -> Vec<String> {
     let of_audit = |error: &anyhow::Error| {
         let error = error.downcast_ref::<unlift_audit::Error>();
@@ -111,7 +108,6 @@ pub fn line(error: &anyhow::Error) -> String {
     format!("unlift: {error:#}")
 }
 
-/// Returns the exit code of an error.
 pub fn code(error: &anyhow::Error) -> u8 {
     if let Some(advised) = error.downcast_ref::<Advised>() {
         return code(&advised.error);

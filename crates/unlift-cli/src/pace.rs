@@ -28,7 +28,6 @@ impl Pace {
         self.done
     }
 
-    /// Number of all items.
     pub fn total(&self) -> usize {
         self.total
     }
@@ -40,7 +39,6 @@ impl Pace {
         self.add(done - self.done, now);
     }
 
-    /// Adds a fraction of an item.
     pub fn add(&mut self, share: f64, now: Duration) {
         let share = share.clamp(0.0, (self.total as f64 - self.done).max(0.0));
         if share == 0.0 {

@@ -20,7 +20,6 @@ const LINES: Duration = Duration::from_secs(60);
 /// Steps of a bar per item, so that it moves within items.
 const PARTS: f64 = 1000.0;
 
-/// Form of the progress.
 #[derive(Clone, Copy)]
 enum Shown {
     Nothing,
@@ -44,7 +43,6 @@ pub struct Steps {
 struct State {
     pace: Pace,
     shown: Shown,
-    /// The current item.
     what: String,
 }
 
@@ -107,7 +105,6 @@ impl Progress {
         self.0.say(line);
     }
 
-    /// Returns a handle for other threads.
     pub fn steps(&self) -> Steps {
         self.0.clone()
     }
@@ -216,7 +213,6 @@ impl Spinner {
         Self { bar, _lines: Some(lines) }
     }
 
-    /// Starts an indicator, unless `quiet`.
     pub fn unless(quiet: bool, what: &'static str) -> Self {
         if quiet { Self { bar: ProgressBar::hidden(), _lines: None } } else { Self::new(what) }
     }
@@ -252,7 +248,6 @@ mod tests {
     use indicatif::TermLike;
     use std::io;
 
-    /// The frames that were drawn.
     static DRAWN: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
     #[derive(Debug)]

@@ -22,7 +22,6 @@ pub fn tell(line: impl Display) {
     let _ = io::stderr().lock().write_all(line.as_bytes());
 }
 
-/// Prints a note about a result.
 pub fn note(text: impl Display) {
     tell(format_args!("unlift: note: {text}"));
 }

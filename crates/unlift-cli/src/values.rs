@@ -33,7 +33,6 @@ pub fn one_of<T: Clone + Send + Sync + 'static, const N: usize>(
     })
 }
 
-/// Parses a type of features.
 pub fn feature_type(text: &str) -> Result<DescriptorKind, String> {
     DescriptorKind::from_name(text).map_err(|error| expected(&error))
 }
@@ -43,7 +42,6 @@ const MOST_THREADS: usize = 512;
 /// Maximum number of points, images or features: stage files number rows with 32 bits.
 const MOST: usize = u32::MAX as usize;
 
-/// Parses a number of threads.
 pub fn threads(text: &str) -> Result<NonZeroUsize, String> {
     whole(text, MOST_THREADS)
 }
@@ -94,7 +92,6 @@ pub fn size(text: &str) -> Result<u64, String> {
     bytes.filter(|bytes| *bytes > 0).ok_or_else(wrong)
 }
 
-/// Parses a scheme for maps or images.
 pub fn any_scheme(text: &str) -> Result<&'static Entry, String> {
     unlift::obfuscate::scheme(text).map_err(|error| expected(&error))
 }
@@ -109,7 +106,6 @@ pub fn scheme_name(text: &str) -> Result<String, String> {
     Err(format!("expected up to 40 letters, digits, +, -, _ and . (not all), found {text}"))
 }
 
-/// Parses a scheme for maps.
 pub fn scheme(text: &str) -> Result<&'static Entry, String> {
     if let Some(entry) = all_schemes().into_iter().find(|entry| entry.name == text) {
         return Ok(entry);
@@ -119,7 +115,6 @@ pub fn scheme(text: &str) -> Result<&'static Entry, String> {
     Err(format!("expected one of {}, found {text}{note}", names.join(", ")))
 }
 
-/// Parses a scheme for images.
 pub fn image_scheme(text: &str) -> Result<&'static Entry, String> {
     let of_images = |entry: &&Entry| entry.in_2d.is_some();
     match SCHEMES.iter().filter(of_images).find(|entry| entry.name == text) {
@@ -139,7 +134,6 @@ pub fn image_solver(text: &str) -> Result<Builtin, String> {
     found.ok_or_else(|| format!("expected one of {}, found {text}", names()))
 }
 
-/// Parses `oracle` or a source for images.
 pub fn image_source(text: &str) -> Result<NeighborSource, String> {
     if text == "oracle" {
         return Ok(NeighborSource::Oracle);
@@ -153,17 +147,14 @@ pub fn image_source(text: &str) -> Result<NeighborSource, String> {
     })
 }
 
-/// Returns all schemes for maps.
 pub fn all_schemes() -> Vec<&'static Entry> {
     SCHEMES.iter().filter(|entry| entry.in_3d.is_some()).collect()
 }
 
-/// Parses a solver.
 pub fn solver(text: &str) -> Result<Builtin, String> {
     Builtin::from_name(text).map_err(|error| expected(&error))
 }
 
-/// Parses a noise model.
 pub fn noise(text: &str) -> Result<Noise, String> {
     Noise::from_name(text).map_err(|error| expected(&error))
 }
@@ -172,7 +163,6 @@ fn expected(error: &unlift::Error) -> String {
     format!("expected {}, found {}", error.expected(), error.found())
 }
 
-/// Parses a finite number above zero.
 pub fn positive(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
@@ -180,13 +170,11 @@ pub fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Parses meters per unit of a map.
 pub fn scale(text: &str) -> Result<f64, String> {
     positive(text)
         .map_err(|_| format!("expected meters per unit of the map, a number above 0, found {text}"))
 }
 
-/// Parses a number from 0 to 1.
 pub fn ratio(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
@@ -207,7 +195,6 @@ pub fn points(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Parses `auto` or a length.
 pub fn delta(text: &str) -> Result<Delta, String> {
     if text.trim() == "auto" {
         return Ok(Delta::Auto);
@@ -217,7 +204,6 @@ pub fn delta(text: &str) -> Result<Delta, String> {
     value.map(Delta::Fixed)
 }
 
-/// Parses `oracle`, a source or a file.
 pub fn neighbor_source(text: &str) -> Result<NeighborSource, String> {
     match text {
         "" => Err("expected oracle, a source or a file".to_owned()),

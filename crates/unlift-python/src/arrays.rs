@@ -15,9 +15,7 @@ use crate::errors::{raised, wrong};
 
 /// Numbers: NumPy's kinds, and their name in errors.
 const NUMBERS: (&str, &str) = ("fiu", "numbers");
-/// Whole numbers.
 const WHOLE: (&str, &str) = ("iu", "whole numbers");
-/// Values of descriptors.
 const DESCRIPTORS: (&str, &str) = ("fiu", "uint8 or floats");
 
 /// Converts `given` to an array of one of `kinds`, without a copy if it is one already.

@@ -85,7 +85,6 @@ where
     asked.extract::<T>().map_err(|error| of_argument(asked.py(), error))
 }
 
-/// Parses gates.
 pub fn gates_of(texts: &[String]) -> PyResult<Vec<Gate>> {
     texts.iter().map(|text| Gate::parse(text)).collect::<Result<_, _>>().map_err(raised)
 }

@@ -141,7 +141,6 @@ pub fn audit_images(
     Ok((Report::of(found), said))
 }
 
-/// Images that are ready for an audit.
 struct Opened {
     source: FeatureSource,
     path: PathBuf,

@@ -15,7 +15,6 @@ const ROUNDING: f64 = 1e-6;
 pub struct Heard {
     tell: Option<Py<PyAny>>,
     stop: Arc<AtomicBool>,
-    /// The exception of the function.
     failed: Mutex<Option<PyErr>>,
     said: Mutex<Vec<String>>,
     counted: Mutex<Counted>,

@@ -14,14 +14,11 @@ use crate::calls;
 use crate::errors::{UnliftError, raised, wrong};
 use crate::own::Raised;
 
-/// Keys of the dict of an image.
 const KEYS: [&str; 5] = ["keypoints", "width", "height", "descriptors", "scores"];
 
 /// Source of images.
 pub enum Images {
-    /// A file or folder.
     Path(PathBuf),
-    /// Arrays in Python.
     InMemory(InMemory),
 }
 

@@ -120,7 +120,6 @@ pub fn prepare(
     Ok(Model(Arc::new(model)))
 }
 
-/// Converts estimates to columns.
 fn columns(py: Python<'_>, part: Part<3>) -> PyResult<Bound<'_, PyDict>> {
     let rows = &part.estimates;
     let values = [

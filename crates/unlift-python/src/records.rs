@@ -130,7 +130,6 @@ impl Records {
     }
 }
 
-/// Initializes a class of records.
 fn of<T: PyClass<BaseType = Records>>(hiding: OfEither, class: T) -> PyClassInitializer<T> {
     PyClassInitializer::from(Records(hiding)).add_subclass(class)
 }
@@ -158,10 +157,8 @@ impl Lines {
     }
 }
 
-/// An array argument.
 type Given<'a, 'py> = &'a Bound<'py, PyAny>;
 
-/// Creates lines.
 fn lines<const D: usize>(
     (points, directions, hidden): (Given<'_, '_>, Given<'_, '_>, Option<Given<'_, '_>>),
 ) -> PyResult<Hiding<D>> {
@@ -195,7 +192,6 @@ impl Rays {
     }
 }
 
-/// Creates rays.
 fn rays<const D: usize>(
     (centers, center, directions, hidden): (
         Given<'_, '_>,
@@ -255,7 +251,6 @@ impl Candidates {
     }
 }
 
-/// Creates candidates.
 fn candidates<const D: usize>(
     (positions, swapped_axis, hidden): (Given<'_, '_>, Given<'_, '_>, Option<Given<'_, '_>>),
 ) -> PyResult<Hiding<D>> {

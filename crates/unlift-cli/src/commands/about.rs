@@ -13,7 +13,6 @@ use crate::args::{Cli, CompletionsArgs, DoctorArgs, ManArgs, ModelsArgs};
 use crate::exit::{Outcome, usage};
 use crate::output::print;
 
-/// Lists all schemes.
 pub fn schemes() -> anyhow::Result<Outcome> {
     let mut text = String::new();
     for scheme in SCHEMES {
@@ -32,7 +31,6 @@ pub fn schemes() -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Lists all models.
 pub fn models(args: &ModelsArgs) -> anyhow::Result<Outcome> {
     let folders = Folders::of_process();
     let mut text = String::new();
@@ -71,7 +69,6 @@ fn here(place: Option<&Place>, folders: &Folders, entry: &Entry) -> String {
     }
 }
 
-/// Programs that can open a report.
 const BROWSERS: [&str; 6] =
     ["firefox", "chromium", "chromium-browser", "google-chrome", "microsoft-edge", "xdg-open"];
 
@@ -140,10 +137,8 @@ fn is_on_path(name: &str) -> bool {
     std::env::split_paths(&folders).any(|folder| folder.join(name).is_file())
 }
 
-/// The name of the program.
 const NAME: &str = "unlift";
 
-/// Prints a completion script for a shell.
 pub fn completions(args: &CompletionsArgs) -> anyhow::Result<Outcome> {
     let mut script = Vec::new();
     generate(args.shell, &mut Cli::definition(), NAME, &mut script);
@@ -151,7 +146,6 @@ pub fn completions(args: &CompletionsArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Prints a manual page.
 pub fn man(args: &ManArgs) -> anyhow::Result<Outcome> {
     let mut found = Cli::definition();
     // `build` adds the global options.

@@ -30,7 +30,6 @@ use crate::progress::{Progress, Stderr};
 use crate::stderr;
 use crate::values::{NeighborSource, distinct};
 
-/// Runs `audit images`.
 pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
     let (finished, used) = audit(args)?;
     if let Some(finished) = &finished {

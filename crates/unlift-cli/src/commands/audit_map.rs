@@ -30,12 +30,10 @@ use crate::values::{NeighborSource, all_schemes, distinct};
 
 /// Schemes of `--quick`: the best-known one, and one that hides two points per record.
 const QUICK_SCHEMES: [&str; 2] = ["olc", "ppl"];
-/// Inlier ratio of `--quick`.
 const QUICK_RATIO: f64 = 0.5;
 /// Source of `--quick`: the fastest one, for any descriptors.
 const QUICK_SOURCE: &str = "similarity";
 
-/// Runs `audit map`.
 pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
     let json = args.result.json;
     let finished = audit(&args)?;
@@ -180,7 +178,6 @@ fn beside(args: &AuditMapArgs) -> impl Iterator<Item = (&'static str, &Path)> {
     args.map.descriptors.iter().map(|path| ("descriptors", path.as_path())).chain(lists)
 }
 
-/// Returns the hashes of the files beside the map.
 fn others(args: &AuditMapArgs) -> anyhow::Result<IndexMap<String, String>> {
     beside(args).map(|(name, path)| Ok((name.to_owned(), hash_stage(path)?))).collect()
 }

@@ -28,7 +28,6 @@ use crate::values::{self, NeighborSource};
 /// Name of a scheme without a name.
 const UNNAMED: &str = "released";
 
-/// Runs `audit released`.
 pub fn run(args: &AuditReleasedArgs) -> anyhow::Result<Outcome> {
     let finished = audit(args)?;
     print(&if args.result.json { summary(&finished)? } else { finished.text() })?;
@@ -93,7 +92,6 @@ pub fn inputs(args: &AuditReleasedArgs) -> Vec<&Path> {
     stages.chain(args.descriptors.as_deref()).chain(lists(args)).collect()
 }
 
-/// Returns the files of lists.
 fn lists(args: &AuditReleasedArgs) -> impl Iterator<Item = &Path> {
     args.neighbors.iter().filter_map(|source| match source {
         NeighborSource::File(path) => Some(path.as_path()),

@@ -18,7 +18,6 @@ use crate::args::MapArgs;
 use crate::exit::Outcome;
 use crate::progress::Spinner;
 
-/// File name of the released map.
 pub const RELEASED: &str = "released.parquet";
 /// File name of the truth, which only the owner has.
 pub const TRUTH: &str = "truth.parquet";

@@ -14,10 +14,8 @@ use crate::args::CompareArgs;
 use crate::exit::Outcome;
 use crate::output::{print, table};
 
-/// File name of the page.
 const PAGE: &str = "compare.html";
 
-/// Compares two audits.
 pub fn run(args: &CompareArgs) -> anyhow::Result<Outcome> {
     let (old, new) = (read_document(&args.old)?, read_document(&args.new)?);
     // A comparison of share-safe audits is readable by others, like the audits.

@@ -31,7 +31,6 @@ use crate::exit::Outcome;
 use crate::output::{command_line, print, table};
 use crate::progress::Progress;
 
-/// Seed of the synthetic room.
 const SEED: u64 = 0;
 /// Inlier ratios of the oracle for the map.
 const RATIOS: [f64; 2] = [0.5, 0.1];
@@ -40,7 +39,6 @@ const MIN_SCORE: f32 = 0.02;
 /// Page and JSON file of the photos; the map has the audit's usual names.
 const PHOTOS: [&str; 2] = ["photos.html", "photos.json"];
 
-/// Runs the demo.
 pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
     let files = [
         (PAGE, Kind::Page),
@@ -69,7 +67,6 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Attacks the two photos.
 fn photos(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
     let started = Instant::now();
     let folder = tempdir()?;
@@ -115,7 +112,6 @@ fn photos(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
     Ok(found)
 }
 
-/// Attacks the map of the room.
 fn map(progress: &Part<'_>, out: &Path, room: &unlift_demo::Mapped) -> anyhow::Result<Audited> {
     let started = Instant::now();
     let sha256 = hash_positions(&room.points);

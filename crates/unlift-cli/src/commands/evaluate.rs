@@ -17,7 +17,6 @@ use crate::exit::{Outcome, advise};
 use crate::output::{print, table};
 use crate::stderr;
 
-/// Compares recovered points with the truth.
 pub fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     if has_images(&args.truth)? {
         return images(args);
@@ -43,7 +42,6 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     told(args, &row, &thresholds, &notes)
 }
 
-/// Compares recovered images with the truth.
 fn images(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     let thresholds = match args.thresholds.as_slice() {
         [] => Plan::<2>::new(Unit::Pixel).thresholds,
@@ -72,7 +70,6 @@ fn check(
     })
 }
 
-/// Prints the results.
 fn told(
     args: &EvaluateArgs,
     row: &Row,
@@ -97,7 +94,6 @@ fn released_path(args: &EvaluateArgs) -> Option<PathBuf> {
     args.released.clone().or(beside)
 }
 
-/// Reads the released map.
 fn released(args: &EvaluateArgs, secret: &Secret) -> anyhow::Result<Option<Released<3>>> {
     let Some(path) = released_path(args) else { return Ok(None) };
     let released = read_released::<3>(&path)?;

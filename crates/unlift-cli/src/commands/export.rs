@@ -21,14 +21,12 @@ use crate::output::print;
 /// File name of nerfstudio's cameras.
 const TRANSFORMS: &str = "transforms.json";
 
-/// Content of a stage file.
 enum Shown {
     /// A row per slot or original; `None` for lost points.
     Points(Vec<Option<[f64; 3]>>),
     Segments(Vec<Segment<3>>),
 }
 
-/// Exports a stage file.
 pub fn run(args: &ExportArgs) -> anyhow::Result<Outcome> {
     let inputs = [Some(args.path.as_path()), args.cameras.as_deref()];
     let rules = Rules::new(inputs.into_iter().flatten(), args.force);
@@ -82,7 +80,6 @@ fn cloud(args: &ExportArgs, ending: Option<&str>, shown: &Shown) -> anyhow::Resu
     }
 }
 
-/// Writes a COLMAP model.
 fn model(args: &ExportArgs, rules: Rules) -> anyhow::Result<String> {
     let names = ["cameras.txt", "images.txt", "points3D.txt"];
     let first = names.map(|name| (name, Kind::Model));
@@ -133,7 +130,6 @@ fn transforms(args: &ExportArgs, rules: Rules) -> anyhow::Result<String> {
     Ok(format!("{} points and {} images", points.len(), images.len()))
 }
 
-/// Reads cameras and images of a COLMAP project.
 fn views(project: &Path) -> anyhow::Result<(Vec<colmap::Camera>, Vec<colmap::Image>)> {
     match read::open(project)?.model {
         Some(folder) => Ok(colmap::read_views(&folder)?),

@@ -20,7 +20,6 @@ use unlift_audit::images::parts::Parts;
 use unlift_audit::images::{FeatureSource, Folder, is_photo};
 use unlift_audit::{check_file, refused};
 
-/// Counts of processed and failed images.
 #[derive(Default)]
 struct Tally {
     images: usize,
@@ -29,7 +28,6 @@ struct Tally {
     failed: usize,
 }
 
-/// Extracts or copies the features of all images.
 pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
     let rules = Rules::new([args.images.as_path()], args.force);
     let target = check_file(&args.out, Kind::Features, &rules)?;
@@ -83,7 +81,6 @@ fn check_no_photo(images: &Path, target: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Returns the options of the extractor.
 fn extraction(args: &FeaturesArgs) -> anyhow::Result<Extraction> {
     let wanted = Wanted {
         option: "--type",
@@ -175,7 +172,6 @@ impl std::fmt::Display for Fatal {
 
 impl std::error::Error for Fatal {}
 
-/// Copies the features of a file.
 fn copy(
     source: &FeatureSource,
     (args, rules): (&FeaturesArgs, &Rules),

@@ -13,7 +13,6 @@ use unlift_report::{junit, sarif};
 use crate::args::ResultArgs;
 use crate::exit::usage;
 
-/// A requested file of gate results.
 struct GateFile {
     option: &'static str,
     path: PathBuf,

@@ -32,15 +32,12 @@ const AT_WORK: usize = 2;
 /// Counts over the images of a stage.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Counts {
-    /// Number of images.
     pub images: usize,
     /// Number of hidden points, or of lists.
     pub slots: usize,
-    /// Length of the longest list.
     pub longest: usize,
     /// Number of points that were left out, or recovered.
     pub points: usize,
-    /// Number of images that could not be used.
     pub unusable: usize,
 }
 
@@ -197,9 +194,7 @@ pub fn recover_all(
     })
 }
 
-/// Result of evaluating images.
 pub struct Evaluated {
-    /// The row over all images.
     pub row: Row,
     /// Without a fingerprint if any image lacks that of its released image.
     pub about: About,
@@ -289,7 +284,6 @@ impl<'a> Pairs<'a> {
     }
 }
 
-/// Adds the lists of one image.
 fn list(
     writer: &mut ImageWriter<'_>,
     counts: &mut Counts,

@@ -33,7 +33,6 @@ use crate::stderr;
 /// Images in memory per thread.
 const AT_WORK: usize = 2;
 
-/// Paints pictures.
 pub fn run(args: &InvertArgs) -> anyhow::Result<Outcome> {
     with_threads(args.threads, || {
         let inputs = [Some(&args.path), args.recovered.as_ref(), args.cameras.as_ref()];
@@ -55,7 +54,6 @@ pub fn run(args: &InvertArgs) -> anyhow::Result<Outcome> {
     })
 }
 
-/// The output folder.
 struct Target<'a> {
     args: &'a InvertArgs,
     rules: Rules,

@@ -14,7 +14,6 @@ use crate::exit::{Outcome, usage};
 use crate::output::{print, table};
 use crate::stderr;
 
-/// Compares two pictures, or those of two folders.
 pub fn run(args: &MetricsArgs) -> anyhow::Result<Outcome> {
     let lpips = Lpips::try_new()?;
     let compare = |a: &Path, b: &Path| -> anyhow::Result<Metrics> {

@@ -15,11 +15,9 @@ use crate::progress::Stderr;
 use crate::stderr;
 use unlift_audit::{Progress as _, refused};
 
-/// Note on `--seed`.
 const GUESSABLE: &str = "unlift: note: --seed repeats experiments; whoever guesses the number undoes the hiding: \
     do not release this map";
 
-/// Hides a map or images under one scheme.
 pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
     let inputs = [args.path.as_path()].into_iter().chain(args.map.descriptors.as_deref());
     let files = [(RELEASED, Kind::Stage(Stage::Released)), (TRUTH, Kind::Stage(Stage::Truth))];

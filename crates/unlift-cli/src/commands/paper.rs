@@ -13,7 +13,6 @@ use crate::output::{command_line, print, table};
 use crate::progress::Progress;
 use crate::stderr;
 
-/// Audits the available scenes of a dataset.
 pub fn run(args: &PaperArgs) -> anyhow::Result<Outcome> {
     let parts = if args.parts.is_empty() { &Part::ALL[..] } else { &args.parts };
     let found = with_threads(args.threads, || {

@@ -42,7 +42,6 @@ fn notes(offsets: &[u64], about: About, slots_per_record: usize) -> Vec<String> 
     notes
 }
 
-/// Recovers a released map.
 pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
     let rules = Rules::new([args.released.as_path(), &args.neighbors], args.force);
     let kind = Kind::Stage(Stage::Recovered);
@@ -83,7 +82,6 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Recovers released images one after the other.
 fn images(args: &RecoverArgs, options: &RecoverOptions, rules: &Rules) -> anyhow::Result<Outcome> {
     let alive = Spinner::new("recovering");
     // The same note about several images is printed once.

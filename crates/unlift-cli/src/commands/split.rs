@@ -9,7 +9,6 @@ use crate::args::SplitArgs;
 use crate::exit::Outcome;
 use crate::output::print;
 
-/// Writes the parts of a stage file.
 pub fn run(args: &SplitArgs) -> anyhow::Result<Outcome> {
     let split = Split::open(&args.path, args.rows)?;
     let rules = Rules::new([args.path.as_path()], args.force);

@@ -14,7 +14,6 @@ use crate::output::print;
 use crate::stderr;
 use unlift_io::atomic::place_of;
 
-/// Writes the table and, if requested, the curves.
 pub fn run(args: &TableArgs) -> anyhow::Result<Outcome> {
     let rules = Rules::new([args.audit.as_path()], args.force);
     let mut taken = Vec::new();

@@ -4,7 +4,6 @@ use serde_json::{Value, json};
 
 use crate::common::Place;
 
-/// Creates a folder with an audit in `a`.
 fn audited() -> Place {
     let place = Place::with_room(500);
     let audit = "audit map room.csv --scale 1 --k 10 --schemes olc,ppl --inlier-ratios 1,0.5 --neighbors \

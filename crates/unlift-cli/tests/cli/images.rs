@@ -12,7 +12,6 @@ use crate::common::Place;
 
 const QUICK: &str = "--k 10 --inlier-ratios 1,0.5";
 
-/// Creates three photos in `photos`.
 fn photos() -> Place {
     Place::with_photos(&["a.png", "b.png", "c/d.png"])
 }

@@ -16,7 +16,6 @@ use crate::common::Place;
 
 const POINTS: usize = 400;
 
-/// Creates a folder with a small room and synthetic descriptors.
 fn place() -> Place {
     let place = Place::with_room(POINTS);
     place.write_descriptors("d.bin", &unlift::synthetic::room(1, POINTS).points, 128);
@@ -279,7 +278,6 @@ fn what_does_not_belong_together_is_not_believed_for_its_fingerprint() {
     }
 }
 
-/// Returns the estimate of one slot.
 fn estimate(of: &Recovered<3>, slot: usize) -> Estimate<3> {
     let origin = of.origin();
     let position = of.position(slot).unwrap_or([f64::NAN; 3]);

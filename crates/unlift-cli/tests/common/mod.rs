@@ -10,11 +10,9 @@ use std::process::{Child, Command, Output, Stdio};
 use image::RgbImage;
 use serde_json::Value;
 
-/// A temporary folder of one test.
 pub struct Place(tempfile::TempDir);
 
 impl Place {
-    /// Creates an empty folder.
     pub fn empty() -> Self {
         Self(tempfile::tempdir().expect("a temporary folder"))
     }
@@ -41,13 +39,11 @@ impl Place {
         fs::write(self.path(name), content).unwrap();
     }
 
-    /// Writes `points` as a table.
     pub fn write_points(&self, name: &str, points: &[[f64; 3]]) {
         let text: String = points.iter().map(|[x, y, z]| format!("{x},{y},{z}\n")).collect();
         self.write(name, text);
     }
 
-    /// Writes a synthetic photo.
     pub fn write_photo(&self, name: &str, which: u32) {
         self.write(name, "");
         photo(which).save(self.path(name)).unwrap();
@@ -67,7 +63,6 @@ impl Place {
         self.0.path().join(name)
     }
 
-    /// Returns the text of a file.
     pub fn text(&self, name: &str) -> String {
         String::from_utf8(self.bytes(name)).expect("UTF-8")
     }
@@ -153,7 +148,6 @@ impl Place {
     }
 }
 
-/// Returns stdout and stderr of a run.
 pub fn said(output: &Output) -> (String, String) {
     let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).expect("UTF-8");
     (text(&output.stdout), text(&output.stderr))

@@ -26,22 +26,18 @@ pub struct Bench {
 }
 
 static NONE: Tree = Tree::new();
-/// Inputs, made once for all tests.
 static INPUTS: OnceLock<Tree> = OnceLock::new();
 /// Undisturbed results by the name of the case, computed once for all tests.
 static KNOWN: Mutex<Option<HashMap<&str, Arc<Known>>>> = Mutex::new(None);
 
 /// Outputs of the undisturbed runs of a case.
 pub struct Known {
-    /// Output of the run.
     pub new: Tree,
     /// Output of the earlier run.
     pub old: Tree,
-    /// Duration of the run.
     pub took: Duration,
 }
 
-/// Result of a run.
 #[derive(Debug)]
 pub struct Ended {
     pub code: Option<i32>,
@@ -100,7 +96,6 @@ impl Bench {
         }
     }
 
-    /// Restores the inputs.
     pub fn restore_inputs(&self) {
         let _ = fs::remove_dir_all(self.path("in"));
         self.inputs.put(&self.path("in"));
@@ -137,12 +132,10 @@ impl Bench {
             .expect("the program starts")
     }
 
-    /// Runs a line to its end.
     pub fn run(&self, before: Option<&str>, line: &str) -> Ended {
         finish(self.start(before, line), line)
     }
 
-    /// Runs a line that must succeed.
     pub fn succeeds(&self, line: &str) -> Ended {
         let ended = self.run(None, line);
         assert_eq!(ended.code, Some(0), "{line}: {ended:?}");
@@ -184,7 +177,6 @@ impl Bench {
     }
 }
 
-/// Waits for the end of a run.
 pub fn finish(mut child: Child, line: &str) -> Ended {
     let started = Instant::now();
     let status = loop {

@@ -1,6 +1,5 @@
 //! The commands of the tests: command line, inputs and kind of output.
 
-/// Kind of output of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Writes {
     /// Text only.
@@ -147,12 +146,10 @@ pub const CASES: [Case; 19] = [
     },
 ];
 
-/// Iterates over the cases that take seconds.
 pub fn quick() -> impl Iterator<Item = &'static Case> {
     CASES.iter().filter(|case| !case.is_slow)
 }
 
-/// Returns the case of this name.
 pub fn named(name: &str) -> &'static Case {
     CASES.iter().find(|case| case.name == name).expect("a case")
 }

@@ -13,7 +13,6 @@ use crate::tree::{Tree, is_part, is_partial};
 use crate::verdict::{State, state};
 use crate::{full, tables};
 
-/// The moment of a kill.
 #[derive(Clone, Copy, Debug)]
 enum Moment {
     /// After this share of the usual duration.
@@ -31,7 +30,6 @@ struct Kill {
     had_old: bool,
 }
 
-/// Counts of states after a kill.
 #[derive(Default)]
 struct Row {
     kills: usize,

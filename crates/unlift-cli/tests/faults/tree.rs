@@ -11,7 +11,6 @@ use serde_json::Value;
 pub struct Tree(BTreeMap<String, Vec<u8>>);
 
 impl Tree {
-    /// Returns an empty tree.
     pub const fn new() -> Self {
         Self(BTreeMap::new())
     }
@@ -49,7 +48,6 @@ impl Tree {
         tree
     }
 
-    /// Writes all files into a folder.
     pub fn put(&self, root: &Path) {
         for (name, bytes) in &self.0 {
             let path = root.join(name);
@@ -67,17 +65,14 @@ impl Tree {
         self.0.keys().map(String::as_str)
     }
 
-    /// Returns the content of a file.
     pub fn get(&self, name: &str) -> Option<&[u8]> {
         self.0.get(name).map(Vec::as_slice)
     }
 
-    /// Returns the size of all files in bytes.
     pub fn size(&self) -> usize {
         self.0.values().map(Vec::len).sum()
     }
 
-    /// Returns the size of the largest file in bytes.
     pub fn largest(&self) -> usize {
         self.0.values().map(Vec::len).max().unwrap_or(0)
     }

@@ -11,10 +11,8 @@ use crate::tree::{Tree, differing};
 use crate::verdict::{Found, of_failure};
 use crate::{full, tables};
 
-/// A change of an input.
 #[derive(Clone, Copy, Debug)]
 enum Fate {
-    /// The file is removed.
     Removed,
     /// The file is cut to half of its bytes.
     Cut,

@@ -4,12 +4,10 @@ use crate::bench::{Ended, Known};
 use crate::commands::{Case, Writes};
 use crate::tree::{Tree, is_part, is_partial};
 
-/// State of the output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum State {
     /// The earlier output, or nothing.
     Before,
-    /// The complete new output.
     New,
     /// Some files of each, all complete.
     Some,
@@ -34,7 +32,6 @@ pub fn state(known: &Known, had_old: bool, left: &Tree) -> Result<State, String>
     })
 }
 
-/// Result of a run with a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Found {
     /// The new output is complete.

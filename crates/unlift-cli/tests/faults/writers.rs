@@ -34,7 +34,6 @@ fn of_two_writers_one_whole_output_stays() {
     tables::print("Two writers", &header, &rows);
 }
 
-/// The run whose output stays.
 #[derive(Clone, Copy, Debug)]
 enum Whose {
     Ones,

@@ -15,10 +15,8 @@ const PATH: &str = "path";
 /// Options that a configuration cannot set, because `check` decides what is printed.
 const NO_KEYS: [&str; 2] = ["help", "json"];
 
-/// An audit in a configuration.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Entry {
-    /// `map`, `images` or `released`.
     pub kind: &'static str,
     /// First line of the entry.
     pub line: usize,

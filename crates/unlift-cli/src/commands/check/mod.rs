@@ -20,7 +20,6 @@ use crate::exit::{self, Outcome, usage};
 use crate::output::print;
 use crate::stderr::tell;
 
-/// Runs every audit of a configuration.
 pub fn run(args: &CheckArgs) -> anyhow::Result<Outcome> {
     let config = args.config.display().to_string();
     let mut text = String::new();
@@ -73,7 +72,6 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<Outcome> {
     }
 }
 
-/// Parses the command line of an entry.
 fn parsed(entry: &Entry) -> Result<AuditCommand, String> {
     match Cli::read(&entry.words) {
         Ok(Cli { command: Command::Audit(audit), .. }) => Ok(audit),
@@ -117,7 +115,6 @@ fn in_repository(config: &Path) -> String {
     named.display().to_string()
 }
 
-/// Returns the input paths of an audit.
 fn inputs(audit: &AuditCommand) -> Vec<&Path> {
     match audit {
         AuditCommand::Map(args) => audit_map::inputs(args),
