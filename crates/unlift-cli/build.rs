@@ -1,4 +1,4 @@
-//! The version with the commit that it was built from, where that is known.
+//! Sets the version string, with the commit that was built if it is available.
 
 use std::path::Path;
 use std::process::Command;
@@ -14,13 +14,14 @@ fn main() {
     println!("cargo::rustc-env=UNLIFT_VERSION={named}");
 }
 
-/// As packagers give it, else as git says; not of debug builds, which would be linked anew for every commit.
+/// Returns the commit from `UNLIFT_COMMIT`, else from git. Debug builds skip git, because each new
+/// commit would link them again.
 fn commit() -> Option<String> {
     let given = std::env::var("UNLIFT_COMMIT").ok().filter(|commit| !commit.is_empty());
     if given.is_some() || std::env::var("PROFILE").ok()? != "release" {
         return given;
     }
-    // Of a published crate within somebody else's repository, its commit is not ours.
+    // If this crate lies in another repository, that repository's commit is not ours.
     git(&["ls-files", "--error-unmatch", "build.rs"])?;
     let log = git(&["rev-parse", "--git-path", "logs/HEAD"])?;
     if Path::new(&log).is_file() {

@@ -1,4 +1,4 @@
-//! How the program ends: exit codes, and errors as one line with a way out.
+//! Exit codes, and errors as one line with advice.
 
 use std::fmt;
 use std::process::ExitCode;
@@ -9,23 +9,25 @@ use crate::args::Cli;
 use crate::output::printed;
 use crate::stderr::tell;
 
-/// How a command ended that did its work.
+/// The result of a command that completed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// Exit code 0.
     Done,
-    /// Exit code 1: the audit was done, and the map comes back further than the user allows.
+    /// Exit code 1: the audit completed, and more points come back than a gate allows.
     GateFailed,
 }
 
-/// Exit code of a wrong command line; clap uses the same.
+/// Exit code for a wrong command line, as in clap.
 pub const USAGE: u8 = 2;
-/// Exit code of files that cannot be read, written or used; of many images, a single one. Also that of results that
-/// stdout does not take. A place that nothing can be written to is found before the work, and one of the command line:
-/// see [`unlift_audit::check_file`].
+/// Exit code for files that cannot be read, written or used, even a single image of many, and for a
+/// stdout that cannot be
+/// written. A place that cannot be written is found before the work starts; on the command line it
+/// is a usage error, see
+/// [`unlift_audit::check_file`].
 const BAD_INPUT: u8 = 3;
 
-/// The command line asks for something that cannot be done (exit code 2).
+/// A command line that asks for something impossible (exit code 2).
 #[derive(Debug)]
 pub struct Usage(String);
 
@@ -37,12 +39,10 @@ impl fmt::Display for Usage {
 
 impl std::error::Error for Usage {}
 
-/// An error in the command line.
 pub fn usage(message: impl Into<String>) -> anyhow::Error {
     Usage(message.into()).into()
 }
 
-/// An error with a line of advice below it.
 #[derive(Debug)]
 struct Advised {
     error: anyhow::Error,
@@ -57,31 +57,31 @@ impl fmt::Display for Advised {
 
 impl std::error::Error for Advised {}
 
-/// `error` with a way out: what the user could try instead.
+/// Adds advice to `error`: what the user can try instead.
 pub fn advise(error: impl Into<anyhow::Error>, advice: impl Into<String>) -> anyhow::Error {
     Advised { error: error.into(), advice: advice.into() }.into()
 }
 
-/// Prints help, or what is wrong with the command line, and returns the exit code.
+/// Prints help or a usage error, and returns the exit code.
 pub fn told(told: clap::Error) -> ExitCode {
-    // It quotes what was typed: the same is said of words without what a terminal obeys.
+    // clap's message quotes the command line: parse it again without terminal control characters.
     let words = std::env::args_os().map(|word| OneLine(word.display()).to_string());
     let told = Cli::read(words).err().unwrap_or(told);
     let text = told.render().to_string();
     if !told.use_stderr() {
-        // Help: a result, in colors where clap has them.
+        // Help is a result and goes to stdout, in clap's colors.
         return finish(printed(told.print()).map(|()| Outcome::Done));
     }
     if text.chars().any(|c| c != '\n' && is_obeyed(c)) {
         text.lines().for_each(tell);
     } else {
-        // As any message, it may be lost.
+        // A message that cannot be written is dropped.
         let _ = told.print();
     }
     ExitCode::from(USAGE)
 }
 
-/// Prints what is left to say and returns the exit code.
+/// Prints an error, if any, and returns the exit code.
 pub fn finish(result: anyhow::Result<Outcome>) -> ExitCode {
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
@@ -93,7 +93,6 @@ pub fn finish(result: anyhow::Result<Outcome>) -> ExitCode {
     }
 }
 
-/// The lines on stderr.
 pub fn lines(error: &anyhow::Error) -> Vec<String> {
     let of_audit = |error: &anyhow::Error| {
         let error = error.downcast_ref::<unlift_audit::Error>();
@@ -104,12 +103,11 @@ pub fn lines(error: &anyhow::Error) -> Vec<String> {
     [line(error)].into_iter().chain(advice).collect()
 }
 
-/// An error as `stderr::tell` takes it.
+/// Formats an error for `stderr::tell`.
 pub fn line(error: &anyhow::Error) -> String {
     format!("unlift: {error:#}")
 }
 
-/// The exit code of an error.
 pub fn code(error: &anyhow::Error) -> u8 {
     if let Some(advised) = error.downcast_ref::<Advised>() {
         return code(&advised.error);

@@ -1,4 +1,4 @@
-//! Ctrl-C, `kill` and `ulimit -f`: nothing half-written stays behind.
+//! Handles Ctrl-C, `kill` and `ulimit -f`, so that no half-written file stays behind.
 
 use std::process;
 use std::sync::Arc;
@@ -10,12 +10,14 @@ use signal_hook::flag;
 use signal_hook::iterator::Signals;
 use unlift_io::atomic::abandon;
 
-/// From here on an interrupt removes what is unfinished before the program ends: exit codes 130 and 143, as shells have
-/// them. Parts from which `features` goes on stay.
+/// Starts the handler that removes unfinished files on an interrupt, then exits with 130 or 143, as
+/// shells do. Parts from
+/// which `features` resumes stay.
 pub fn watch() {
-    // Heard, it kills nobody: the write that was one too many fails, as on a full disk.
+    // With a handler, a write beyond the limit fails as on a full disk instead of killing the
+    // process.
     let _ = flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)));
-    // Without it the program still works, and the next run clears away what an interrupt leaves.
+    // Without the handler the next run removes what an interrupt leaves.
     let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else { return };
     let _ = thread::Builder::new().name("interrupt".into()).spawn(move || {
         if let Some(signal) = signals.forever().next() {

@@ -1,4 +1,4 @@
-//! The command line of unlift: parse, call the library, print.
+//! The command line of unlift: parses arguments, calls the library, prints results.
 
 mod args;
 mod commands;

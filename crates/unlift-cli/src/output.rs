@@ -1,20 +1,21 @@
-//! Results on stdout, and nothing else there.
+//! Prints results on stdout.
 
 use std::io::{self, Write};
 
 use unlift::{OneLine, is_obeyed};
 
-/// Prints `text`, lines or JSON. A reader that closes the pipe early (`| head`) ends the output, not the program.
+/// Prints `text`, lines or JSON. If the reader closes the pipe early (`| head`), the rest is
+/// dropped without an error.
 ///
 /// # Errors
-/// When stdout cannot be written for another reason.
+/// If stdout cannot be written for another reason.
 pub fn print(text: &str) -> anyhow::Result<()> {
     let text = harmless(text);
     let mut stdout = io::stdout().lock();
     printed(stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()))
 }
 
-/// What became of something printed.
+/// Converts the result of a write to stdout; a broken pipe is no error.
 pub fn printed(result: io::Result<()>) -> anyhow::Result<()> {
     match result {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
@@ -24,8 +25,8 @@ pub fn printed(result: io::Result<()>) -> anyhow::Result<()> {
     }
 }
 
-/// The same without what a terminal obeys but for ends of lines, as JSON escapes it: within its texts, where alone such
-/// characters stand, that changes no value.
+/// Escapes terminal control characters except newlines as JSON does. In JSON they occur only within
+/// strings, so no value changes.
 fn harmless(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -37,21 +38,21 @@ fn harmless(text: &str) -> String {
     out
 }
 
-/// Rows of text with columns as wide as their widest cell, two spaces apart; the first column is
-/// left-aligned, as are those in `left`.
+/// Formats rows as aligned columns, two spaces apart. The first column and those in `left` are
+/// left-aligned.
 pub fn table(rows: &[Vec<String>], left: &[usize]) -> String {
     let shown = |row: &Vec<String>| row.iter().map(|cell| OneLine(cell).to_string()).collect();
     let rows: Vec<Vec<String>> = rows.iter().map(shown).collect();
     unlift_report::align(&rows, &[&[0], left].concat())
 }
 
-/// The command line as a shell would need it, for the record.
+/// Returns the command line, quoted for a shell.
 pub fn command_line() -> String {
     let words = std::env::args_os().skip(1).map(|word| quoted(&word.to_string_lossy()));
     ["unlift".to_owned()].into_iter().chain(words).collect::<Vec<_>>().join(" ")
 }
 
-/// A word of the command line as a shell would need it.
+/// Quotes a word for a shell if necessary.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@+%".contains(c);
     if !word.is_empty() && word.chars().all(plain) {

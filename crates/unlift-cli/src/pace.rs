@@ -1,44 +1,44 @@
-//! How far work is and how long it will still take.
+//! Progress and remaining time of a task.
 
 use std::fmt;
 use std::time::Duration;
 
-/// Steps this long ago count for a third; longer in long work, whose items may differ in cost.
+/// Time constant of the running average in seconds: steps this long ago count a third. It grows
+/// with the duration of the task.
 const MEMORY_S: f64 = 30.0;
 
-/// Items that must be done at most, or a tenth of all, before a time is told.
+/// Finished items needed for an estimate, or a tenth of all if that is less.
 const BASIS: f64 = 5.0;
 
-/// Items that are done, and how fast that went. Times are those since the beginning.
+/// Number of finished items, and their speed. Times are relative to the start.
 #[derive(Clone, Debug, Default)]
 pub struct Pace {
     done: f64,
     total: usize,
-    /// When the last step was made, in seconds.
+    /// Time of the last step, in seconds.
     last: f64,
-    /// Seconds and items of steps, those of long ago discounted.
+    /// Discounted sums of the seconds and items of steps.
     seconds: f64,
     items: f64,
 }
 
 impl Pace {
-    /// Items of which so many are done, some of them in part.
+    /// Number of finished items, including fractions.
     pub fn done(&self) -> f64 {
         self.done
     }
 
-    /// Items in all.
     pub fn total(&self) -> usize {
         self.total
     }
 
-    /// `done` of `total` items are finished. What threads said of parts of items may be ahead of that.
+    /// Sets `done` of `total` items as finished. Fractions that threads added may already exceed
+    /// `done`.
     pub fn set(&mut self, done: f64, total: usize, now: Duration) {
         self.total = total;
         self.add(done - self.done, now);
     }
 
-    /// A share of an item more is finished.
     pub fn add(&mut self, share: f64, now: Duration) {
         let share = share.clamp(0.0, (self.total as f64 - self.done).max(0.0));
         if share == 0.0 {
@@ -53,7 +53,7 @@ impl Pace {
         self.last = now;
     }
 
-    /// How long it will still take; `None` when there is nothing to tell by: the first items are often far from usual.
+    /// Returns the remaining time; `None` during the first items, which are often not typical.
     pub fn left(&self, now: Duration) -> Option<Duration> {
         let open = self.total as f64 - self.done;
         let basis = (self.total as f64 / 10.0).clamp(1.0, BASIS);
@@ -62,18 +62,18 @@ impl Pace {
         }
         let since = (now.as_secs_f64() - self.last).max(0.0);
         let expected = open * self.seconds / self.items - since;
-        // A step that takes longer than the others so far is finished at this moment at best.
+        // If the current step already takes longer than average, it ends now at the earliest.
         let at_least = (open - 1.0).max(0.0) * (self.seconds + since) / (self.items + 1.0);
         Some(Duration::from_secs_f64(expected.max(at_least)))
     }
 
-    /// Both in a few words: `12/40, 3 min left`.
+    /// Returns the progress as a short text: `12/40, 3 min left`.
     pub fn status(&self, now: Duration) -> Status {
         Status { done: self.done as usize, total: self.total, left: self.left(now) }
     }
 }
 
-/// See [`Pace::status`].
+/// The short text of [`Pace::status`].
 #[derive(Clone, Copy, Debug)]
 pub struct Status {
     done: usize,
@@ -114,7 +114,7 @@ mod tests {
         }
         assert_eq!(pace.status(s(20.0)).to_string(), "10/40, 60 s left");
         assert_eq!(pace.status(s(21.0)).to_string(), "10/40, 59 s left");
-        // A step that never ends: what is left can only grow.
+        // During a step that never ends, the remaining time grows.
         assert!(pace.left(s(500.0)) > pace.left(s(400.0)));
     }
 

@@ -1,5 +1,5 @@
-//! Progress on stderr, for what takes longer than a second: a bar on a terminal, elsewhere (a log, a pipe) a
-//! line a minute; nothing of either when `--quiet`.
+//! Progress on stderr for work of more than a second: a bar on a terminal, otherwise a line per
+//! minute. `--quiet` disables both.
 
 use std::io::IsTerminal;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
@@ -11,29 +11,28 @@ use unlift::OneLine;
 use crate::pace::Pace;
 use crate::stderr::tell;
 
-/// Shorter work shows nothing.
+/// Work that takes less time shows no progress.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// A bar is drawn anew this often, whether or not a step was made: what is left counts down.
+/// Interval at which a bar is redrawn, so that the remaining time counts down.
 const TICK: Duration = Duration::from_millis(500);
-/// Lines of a log come at most this often.
+/// Shortest interval between lines in a log.
 const LINES: Duration = Duration::from_secs(60);
 /// Steps of a bar per item, so that it moves within items.
 const PARTS: f64 = 1000.0;
 
-/// How progress is shown.
 #[derive(Clone, Copy)]
 enum Shown {
     Nothing,
-    /// A bar, drawn to what is made when it is worth it.
+    /// A bar, with its draw target.
     Bar(fn() -> ProgressDrawTarget),
-    /// Lines, the last one then.
+    /// Lines, with the time of the last one.
     Lines(Duration),
 }
 
-/// Progress of work in items that can be counted; gone when dropped.
+/// Progress over countable items; removed when dropped.
 pub struct Progress(Steps);
 
-/// What any thread may tell about it.
+/// A handle with which any thread can report progress.
 #[derive(Clone)]
 pub struct Steps {
     started: Instant,
@@ -44,12 +43,11 @@ pub struct Steps {
 struct State {
     pace: Pace,
     shown: Shown,
-    /// What is at work, as it was said last.
     what: String,
 }
 
 impl Progress {
-    /// Of work that begins now.
+    /// Starts the progress of new work.
     pub fn new(quiet: bool) -> Self {
         Self::with(match (quiet, std::io::stderr().is_terminal()) {
             (true, _) => Shown::Nothing,
@@ -69,12 +67,12 @@ impl Progress {
         bar.set_style(style.with_key(
             "status",
             move |_: &ProgressState, text: &mut dyn std::fmt::Write| {
-                // What cannot be written is not shown.
+                // A failed write only loses the status.
                 let _ = write!(text, "{}", lock(&of_bar).pace.status(started.elapsed()));
             },
         ));
         if let Shown::Bar(target) = shown {
-            // Not at the next step: the first one may take a minute.
+            // In a thread, because the first step may take a minute.
             let bar = bar.downgrade();
             std::thread::spawn(move || {
                 std::thread::sleep(PATIENCE);
@@ -88,12 +86,12 @@ impl Progress {
         Self(Steps { started, state, bar })
     }
 
-    /// `done` of `total` items are finished; `what` is next.
+    /// Sets `done` of `total` items as finished; `what` is the next item.
     pub fn show(&self, done: usize, total: usize, what: &str) {
         self.0.tell(what, |pace, now| pace.set(done as f64, total, now));
     }
 
-    /// That of further work that begins now; this one is finished.
+    /// Ends this progress and starts that of further work.
     pub fn again(&self) -> Self {
         self.0.bar.finish_and_clear();
         Self::with(match lock(&self.0.state).shown {
@@ -102,12 +100,11 @@ impl Progress {
         })
     }
 
-    /// Prints a line on stderr without tearing the bar.
+    /// Prints a line on stderr without breaking the bar.
     pub fn say(&self, line: &str) {
         self.0.say(line);
     }
 
-    /// The same for whoever makes steps, or has something to say, while another one shows progress.
     pub fn steps(&self) -> Steps {
         self.0.clone()
     }
@@ -127,7 +124,7 @@ impl unlift_audit::Progress for Progress {
     }
 }
 
-/// Only what a user should know, without bars.
+/// Prints messages on stderr, without progress.
 #[derive(Clone, Copy, Debug)]
 pub struct Stderr;
 
@@ -150,12 +147,12 @@ impl Drop for Progress {
 }
 
 impl Steps {
-    /// A share of an item more is finished; `what` is at work, unless it is empty.
+    /// Adds a fraction of an item; `what` is the current item, unless it is empty.
     pub fn add(&self, share: f64, what: &str) {
         self.tell(what, |pace, now| pace.add(share, now));
     }
 
-    /// Prints a line on stderr without tearing the bar.
+    /// Prints a line on stderr without breaking the bar.
     pub fn say(&self, line: &str) {
         self.bar.suspend(|| tell(line));
     }
@@ -178,7 +175,7 @@ impl Steps {
             }
             Shown::Bar(_) => {
                 let (pace, what) = (pace.clone(), what.clone());
-                // The bar asks for the state when it is drawn.
+                // Drawing the bar locks the state.
                 drop(state);
                 self.bar.set_length((pace.total() as f64 * PARTS) as u64);
                 self.bar.set_message(what);
@@ -192,20 +189,21 @@ fn lock(state: &Mutex<State>) -> MutexGuard<'_, State> {
     state.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A sign of life for work whose steps cannot be counted; gone when dropped. Where stderr is no terminal it is a line a minute.
+/// An activity indicator for work whose steps cannot be counted; removed when dropped. Without a
+/// terminal it prints a line per minute.
 pub struct Spinner {
     bar: ProgressBar,
-    /// Lines end when this is dropped.
+    /// Dropping it ends the thread that prints lines.
     _lines: Option<mpsc::Sender<()>>,
 }
 
 impl Spinner {
-    /// Says `what` is being done, and for how long.
+    /// Starts an indicator that shows `what` and the elapsed time.
     pub fn new(what: &'static str) -> Self {
         let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed}");
         let bar = ProgressBar::new_spinner().with_message(what);
         bar.set_style(style.expect("the template is ours"));
-        // A thread of its own, which nobody needs where it is hidden.
+        // Without a terminal, a thread prints lines instead.
         if !bar.is_hidden() {
             bar.enable_steady_tick(PATIENCE / 8);
             return Self { bar, _lines: None };
@@ -215,12 +213,11 @@ impl Spinner {
         Self { bar, _lines: Some(lines) }
     }
 
-    /// None of it when `quiet`.
     pub fn unless(quiet: bool, what: &'static str) -> Self {
         if quiet { Self { bar: ProgressBar::hidden(), _lines: None } } else { Self::new(what) }
     }
 
-    /// Prints a line on stderr without tearing it.
+    /// Prints a line on stderr without breaking the indicator.
     pub fn say(&self, line: &str) {
         self.bar.suspend(|| tell(line));
     }
@@ -232,7 +229,7 @@ impl Drop for Spinner {
     }
 }
 
-/// Says `what` is being done, and for how long, once in a `while_`, until the other end of `ended` is dropped.
+/// Prints `what` and the elapsed time once per `while_`, until the other end of `ended` is dropped.
 fn tell_each(
     while_: Duration,
     what: &str,
@@ -251,7 +248,6 @@ mod tests {
     use indicatif::TermLike;
     use std::io;
 
-    /// What was drawn, frame by frame.
     static DRAWN: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
     #[derive(Debug)]
@@ -311,7 +307,7 @@ mod tests {
     fn wait_until(done: impl Fn() -> bool) {
         let started = Instant::now();
         while !done() {
-            // A busy machine may take a while; forever is a bar that never comes.
+            // A busy machine may take a while.
             assert!(started.elapsed() < Duration::from_secs(20), "{:?}", DRAWN.lock().unwrap());
             std::thread::sleep(Duration::from_millis(20));
         }
@@ -325,7 +321,7 @@ mod tests {
         let frames = || DRAWN.lock().unwrap().clone();
         progress.show(0, 4, "a.jpg");
         assert_eq!(frames(), [""; 0], "too early");
-        // It appears by itself, and moves by itself.
+        // The bar appears and moves without further steps.
         wait_until(|| frames().iter().any(|f| f.contains("0/4") && f.contains("a.jpg")));
         let steps = progress.steps();
         std::thread::spawn(move || steps.add(1.0, "b.jpg")).join().unwrap();

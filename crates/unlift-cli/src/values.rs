@@ -1,4 +1,4 @@
-//! Strings become types, here and in `unlift_audit::Gate` and nowhere else.
+//! Parses option values; gates are parsed by `unlift_audit::Gate`.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -12,18 +12,18 @@ use unlift::recover::{Builtin, Delta};
 use unlift_audit::{OutlierFilter, sources};
 use unlift_nn::DescriptorKind;
 
-/// Where neighborhoods come from.
+/// Source of neighbor lists.
 #[derive(Clone, Debug, PartialEq)]
 pub enum NeighborSource {
-    /// Made from the originals at chosen inlier ratios.
+    /// Lists from ground truth, at chosen inlier ratios.
     Oracle,
-    /// Made from the released map alone.
+    /// Lists from the released map alone.
     Own(Named),
-    /// Lists by point, in a file.
+    /// A file with lists by point.
     File(PathBuf),
 }
 
-/// One of a few names, each of which stands for a value. Errors and shells name all of them.
+/// Returns a parser that maps each name to its value. Errors and shell completions list all names.
 pub fn one_of<T: Clone + Send + Sync + 'static, const N: usize>(
     names: [(&'static str, T); N],
 ) -> impl TypedValueParser<Value = T> {
@@ -33,38 +33,36 @@ pub fn one_of<T: Clone + Send + Sync + 'static, const N: usize>(
     })
 }
 
-/// Features by their name.
 pub fn feature_type(text: &str) -> Result<DescriptorKind, String> {
     DescriptorKind::from_name(text).map_err(|error| expected(&error))
 }
 
-/// Threads at most: more than machines have cores, and few enough to be started.
+/// Maximum number of threads: more than machines have cores, and few enough to start.
 const MOST_THREADS: usize = 512;
-/// Points, images or features at most: as many rows as files number.
+/// Maximum number of points, images or features: stage files number rows with 32 bits.
 const MOST: usize = u32::MAX as usize;
 
-/// A number of threads.
 pub fn threads(text: &str) -> Result<NonZeroUsize, String> {
     whole(text, MOST_THREADS)
 }
 
-/// A number of points, images or features.
+/// Parses a number of points, images or features.
 pub fn count(text: &str) -> Result<NonZeroUsize, String> {
     whole(text, MOST)
 }
 
-/// Points of a map that is made up: what hundreds of gigabytes hold.
+/// Parses the number of points of a synthetic map; the maximum needs hundreds of gigabytes.
 pub fn made_points(text: &str) -> Result<NonZeroUsize, String> {
     whole(text, 1_000_000_000)
 }
 
-/// A whole number from 1 to `most`.
+/// Parses a whole number from 1 to `most`.
 fn whole(text: &str, most: usize) -> Result<NonZeroUsize, String> {
     let number = text.trim().parse::<NonZeroUsize>().ok().filter(|number| number.get() <= most);
     number.ok_or_else(|| format!("expected a whole number from 1 to {most}, found {text}"))
 }
 
-/// A score from 0 to below 1.
+/// Parses a score in `0..1`.
 pub fn score(text: &str) -> Result<f32, String> {
     match text.trim().parse::<f32>() {
         Ok(value) if (0.0..1.0).contains(&value) => Ok(value),
@@ -72,7 +70,7 @@ pub fn score(text: &str) -> Result<f32, String> {
     }
 }
 
-/// Bytes: a whole number, and a unit of 1000 (kB, MB, GB) or 1024 (KiB, MiB, GiB).
+/// Parses a size: a whole number and a unit of 1000 (kB, MB, GB) or 1024 (KiB, MiB, GiB).
 pub fn size(text: &str) -> Result<u64, String> {
     const UNITS: [(&str, u64); 8] = [
         ("", 1),
@@ -94,12 +92,11 @@ pub fn size(text: &str) -> Result<u64, String> {
     bytes.filter(|bytes| *bytes > 0).ok_or_else(wrong)
 }
 
-/// A scheme by its name, be it for maps or for images.
 pub fn any_scheme(text: &str) -> Result<&'static Entry, String> {
     unlift::obfuscate::scheme(text).map_err(|error| expected(&error))
 }
 
-/// A name for a scheme of somebody else, as it can stand in a gate and in the name of a file.
+/// Parses the name of a user's scheme, which must fit into a gate and a file name.
 pub fn scheme_name(text: &str) -> Result<String, String> {
     let known = |c: char| c.is_ascii_alphanumeric() || "+-_.".contains(c);
     let fits = (1..=40).contains(&text.len()) && text.chars().all(known);
@@ -109,7 +106,6 @@ pub fn scheme_name(text: &str) -> Result<String, String> {
     Err(format!("expected up to 40 letters, digits, +, -, _ and . (not all), found {text}"))
 }
 
-/// A scheme for maps by its name.
 pub fn scheme(text: &str) -> Result<&'static Entry, String> {
     if let Some(entry) = all_schemes().into_iter().find(|entry| entry.name == text) {
         return Ok(entry);
@@ -119,7 +115,6 @@ pub fn scheme(text: &str) -> Result<&'static Entry, String> {
     Err(format!("expected one of {}, found {text}{note}", names.join(", ")))
 }
 
-/// A scheme for images by its name.
 pub fn image_scheme(text: &str) -> Result<&'static Entry, String> {
     let of_images = |entry: &&Entry| entry.in_2d.is_some();
     match SCHEMES.iter().filter(of_images).find(|entry| entry.name == text) {
@@ -131,15 +126,14 @@ pub fn image_scheme(text: &str) -> Result<&'static Entry, String> {
     }
 }
 
-/// A solver for images by its name: one that recovers from lists. In the plane all lines meet, so
-/// records alone tell nothing.
+/// Parses a solver for images, which must use lists: in the plane all lines intersect, so records
+/// alone reveal nothing.
 pub fn image_solver(text: &str) -> Result<Builtin, String> {
     let names = || Builtin::FROM_LISTS.map(|solver| solver.name()).join(", ");
     let found = Builtin::FROM_LISTS.into_iter().find(|solver| solver.name() == text);
     found.ok_or_else(|| format!("expected one of {}, found {text}", names()))
 }
 
-/// `oracle`, or a source for images, with the length of lists usual there.
 pub fn image_source(text: &str) -> Result<NeighborSource, String> {
     if text == "oracle" {
         return Ok(NeighborSource::Oracle);
@@ -153,17 +147,14 @@ pub fn image_source(text: &str) -> Result<NeighborSource, String> {
     })
 }
 
-/// Every scheme that is defined on maps.
 pub fn all_schemes() -> Vec<&'static Entry> {
     SCHEMES.iter().filter(|entry| entry.in_3d.is_some()).collect()
 }
 
-/// A solver by its name.
 pub fn solver(text: &str) -> Result<Builtin, String> {
     Builtin::from_name(text).map_err(|error| expected(&error))
 }
 
-/// A noise model by its name.
 pub fn noise(text: &str) -> Result<Noise, String> {
     Noise::from_name(text).map_err(|error| expected(&error))
 }
@@ -172,7 +163,6 @@ fn expected(error: &unlift::Error) -> String {
     format!("expected {}, found {}", error.expected(), error.found())
 }
 
-/// A finite number above zero.
 pub fn positive(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
@@ -180,13 +170,11 @@ pub fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Meters per unit of a map.
 pub fn scale(text: &str) -> Result<f64, String> {
     positive(text)
         .map_err(|_| format!("expected meters per unit of the map, a number above 0, found {text}"))
 }
 
-/// A share from 0 to 1.
 pub fn ratio(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
@@ -194,12 +182,12 @@ pub fn ratio(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A threshold; reports use its typed form as the key.
+/// Parses a threshold; reports use the typed text as key.
 pub fn threshold(text: &str) -> Result<Threshold, String> {
     Threshold::parse(text).map_err(|_| format!("expected a number above 0, found {text}"))
 }
 
-/// A tolerance in percentage points.
+/// Parses a tolerance in percentage points.
 pub fn points(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(value) if (0.0..=100.0).contains(&value) => Ok(value),
@@ -207,7 +195,6 @@ pub fn points(text: &str) -> Result<f64, String> {
     }
 }
 
-/// `auto`, or a length.
 pub fn delta(text: &str) -> Result<Delta, String> {
     if text.trim() == "auto" {
         return Ok(Delta::Auto);
@@ -217,13 +204,12 @@ pub fn delta(text: &str) -> Result<Delta, String> {
     value.map(Delta::Fixed)
 }
 
-/// `oracle`, a source, or a file.
 pub fn neighbor_source(text: &str) -> Result<NeighborSource, String> {
     match text {
         "" => Err("expected oracle, a source or a file".to_owned()),
         "oracle" => Ok(NeighborSource::Oracle),
         name if sources::named(name).is_ok() => own_source(name).map(NeighborSource::Own),
-        // One name that is known makes the others names as well: a slip is no missing file.
+        // If one name of a list is known, an unknown one is a typo, not a missing file.
         names
             if !names.contains(std::path::is_separator)
                 && names
@@ -236,12 +222,12 @@ pub fn neighbor_source(text: &str) -> Result<NeighborSource, String> {
     }
 }
 
-/// A source that needs no oracle, by its name.
+/// Parses a source other than the oracle.
 pub fn own_source(text: &str) -> Result<Named, String> {
     sources::named(text).map_err(|error| expected(&error))
 }
 
-/// `NEIGHBORS,RATIO`, for example `20,2.0`.
+/// Parses `NEIGHBORS,RATIO`, for example `20,2.0`.
 pub fn outlier_filter(text: &str) -> Result<OutlierFilter, String> {
     let fields = text.split_once(',').and_then(|(neighbors, std_ratio)| {
         Some((count(neighbors).ok()?.get(), positive(std_ratio).ok()?))
@@ -254,7 +240,7 @@ pub fn outlier_filter(text: &str) -> Result<OutlierFilter, String> {
     }
 }
 
-/// `items` without those that repeat an earlier one: an audit has one row per combination.
+/// Removes items that repeat an earlier one, because an audit has one row per combination.
 pub fn distinct<T>(items: Vec<T>, same: impl Fn(&T, &T) -> bool) -> Vec<T> {
     let mut kept: Vec<T> = Vec::with_capacity(items.len());
     for item in items {

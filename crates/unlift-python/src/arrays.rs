@@ -1,4 +1,5 @@
-//! NumPy arrays in and out: shapes and kinds checked, one copy in, as the work outlives the call, and none out.
+//! NumPy arrays in and out. Shapes and types are checked. Input is copied, because the work may
+//! outlive the call; output is not.
 
 use std::fmt::Display;
 use std::ops::RangeInclusive;
@@ -12,28 +13,27 @@ use unlift::{Descriptors, OneLine};
 
 use crate::errors::{raised, wrong};
 
-/// Numbers of any kind: NumPy's letters of what is taken, and their name.
+/// Numbers: NumPy's kinds, and their name in errors.
 const NUMBERS: (&str, &str) = ("fiu", "numbers");
-/// Whole numbers.
 const WHOLE: (&str, &str) = ("iu", "whole numbers");
-/// Values of descriptors.
 const DESCRIPTORS: (&str, &str) = ("fiu", "uint8 or floats");
 
-/// What `given` is as an array of `kinds`; its own memory where it is one already.
+/// Converts `given` to an array of one of `kinds`, without a copy if it is one already.
 fn array<'py>(
     name: &str,
     given: &Bound<'py, PyAny>,
     (kinds, what): (&str, &str),
 ) -> PyResult<Bound<'py, PyAny>> {
     let numpy = given.py().import("numpy")?;
-    // What stands behind a mask would pass for a value.
+    // Masked values would otherwise pass as valid.
     if given.is_instance(&numpy.getattr("ma")?.getattr("MaskedArray")?)? {
         let expected = format!("an array of {what} without a mask (`.filled(..)` makes one)");
         return Err(wrong(name, expected, "a masked array"));
     }
     let array = numpy.call_method1("asarray", (given,)).map_err(|error| {
         let py = given.py();
-        // NumPy's own errors about rows of different lengths; neither an interrupt nor a lack of memory.
+        // NumPy's errors about uneven rows are of these types; interrupts and lack of memory are
+        // not.
         match error.is_instance_of::<PyValueError>(py) || error.is_instance_of::<PyTypeError>(py) {
             true => wrong(name, format!("an array of {what}"), OneLine(error.value(py))),
             false => error,
@@ -47,7 +47,7 @@ fn array<'py>(
     Ok(array)
 }
 
-/// `array` as one of `T`, contiguous; its own memory where it is one already.
+/// Converts `array` to a contiguous array of `T`, without a copy if it is one already.
 fn contiguous<'py, T: Element>(array: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
     let py = array.py();
     let options = PyDict::new(py);
@@ -56,7 +56,7 @@ fn contiguous<'py, T: Element>(array: &Bound<'py, PyAny>) -> PyResult<Bound<'py,
     made.cast_into().map_err(|error| raised(error.to_string()))
 }
 
-/// The rows of an array `(n, D)`.
+/// Returns the rows of an array `(n, D)`.
 pub fn rows<const D: usize>(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; D]>> {
     let array = contiguous::<f64>(&array(name, given, NUMBERS)?)?;
     match array.shape() {
@@ -67,19 +67,19 @@ pub fn rows<const D: usize>(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Ve
     }
 }
 
-/// Whether an array has rows of two numbers.
+/// Returns true for an array of rows of two numbers.
 pub fn is_of_pairs(name: &str, given: &Bound<'_, PyAny>) -> PyResult<bool> {
     let shape: Vec<usize> = array(name, given, NUMBERS)?.getattr("shape")?.extract()?;
     Ok(matches!(shape[..], [_, 2]))
 }
 
-/// The numbers of an array, and its shape.
+/// Returns the values of an array, and its shape.
 pub fn numbers(name: &str, given: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<usize>)> {
     let array = contiguous::<f64>(&array(name, given, NUMBERS)?)?;
     Ok((array.readonly().as_slice()?.to_vec(), array.shape().to_vec()))
 }
 
-/// The numbers of an array `(n,)`.
+/// Returns the values of an array `(n,)`.
 pub fn column(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     match numbers(name, given)? {
         (values, shape) if shape.len() == 1 => Ok(values),
@@ -87,7 +87,7 @@ pub fn column(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     }
 }
 
-/// Whole numbers in `range`, of an array with one of `dims` axes, and its shape.
+/// Returns whole numbers in `range`, from an array with one of `dims` axes, and its shape.
 pub fn whole(
     name: &str,
     given: &Bound<'_, PyAny>,
@@ -96,7 +96,8 @@ pub fn whole(
 ) -> PyResult<(Vec<i64>, Vec<usize>)> {
     let array = array(name, given, WHOLE)?;
     let unsigned = array.getattr("dtype")?.getattr("kind")?.extract::<String>()? == "u";
-    // Each in the widest of its kind: the largest of uint64 would pass for -1 among int64.
+    // Use the widest type of the same signedness, because large values of uint64 would wrap in
+    // int64.
     match unsigned {
         true => within(name, &contiguous::<u64>(&array)?, dims, range),
         false => within(name, &contiguous::<i64>(&array)?, dims, range),
@@ -123,14 +124,14 @@ fn within<T: Element + Copy + Display + TryInto<i64>>(
     Ok((values, shape))
 }
 
-/// Whole numbers from 0 below `most`, of an array with one of `dims` axes, and its shape.
+/// Returns whole numbers from 0 below `most`, from an array with one of `dims` axes, and its shape.
 pub fn indices(
     name: &str,
     given: &Bound<'_, PyAny>,
     dims: &[usize],
     most: u32,
 ) -> PyResult<(Vec<u32>, Vec<usize>)> {
-    // Lists are long: as they are, where they are of this kind.
+    // Lists are long: avoid a conversion if the type fits.
     if let Ok(array) = array(name, given, WHOLE)?.cast::<PyArrayDyn<u32>>()
         && dims.contains(&array.ndim())
         && array.is_c_contiguous()
@@ -143,7 +144,7 @@ pub fn indices(
     Ok((values.into_iter().map(|value| value as u32).collect(), shape))
 }
 
-/// Descriptors `(n, dim)`: bytes, or floats.
+/// Returns descriptors `(n, dim)`: bytes, or floats.
 pub fn descriptors(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Descriptors> {
     let array = array(name, given, DESCRIPTORS)?;
     let dtype: String = array.getattr("dtype")?.getattr("name")?.extract()?;
@@ -162,12 +163,12 @@ pub fn descriptors(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Descriptors
     };
     Descriptors::try_new(values, dim).map_err(|error| match error.what() {
         "descriptors" => wrong(name, error.expected(), error.found()),
-        // It says which one of them.
+        // The error names the row.
         _ => raised(error.within(name)),
     })
 }
 
-/// `(3, 4)`, as NumPy writes it.
+/// Formats a shape as NumPy does: `(3, 4)`.
 pub fn told(shape: &[usize]) -> String {
     let sides: Vec<String> = shape.iter().map(usize::to_string).collect();
     match sides.as_slice() {
@@ -176,7 +177,7 @@ pub fn told(shape: &[usize]) -> String {
     }
 }
 
-/// An array `(n, D)` of rows, in their memory.
+/// Returns an array `(n, D)` that uses the memory of `rows`.
 pub fn to_rows<T: Element, const D: usize>(
     py: Python<'_>,
     rows: Vec<[T; D]>,
@@ -185,12 +186,12 @@ pub fn to_rows<T: Element, const D: usize>(
     PyArray1::from_vec(py, rows.into_flattened()).reshape([n, D])
 }
 
-/// An array `(n,)`.
+/// Returns an array `(n,)`.
 pub fn to_array<T: Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_, PyArray1<T>> {
     PyArray1::from_vec(py, values)
 }
 
-/// Descriptors as an array `(n, dim)`.
+/// Returns descriptors as an array `(n, dim)`.
 pub fn to_descriptors<'py>(
     py: Python<'py>,
     descriptors: &Descriptors,

@@ -1,4 +1,4 @@
-//! The audit of a map: a map in, a report out.
+//! Audits of maps.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -16,7 +16,8 @@ use crate::plan::Asked;
 use crate::report::Report;
 use crate::work;
 
-/// Audits `map` as `asked` says, a dict of all options; `tell` hears of every cell: done, total, what comes next.
+/// Audits `map` with the options in the dict `asked`, and calls `tell` with done, total and the
+/// next item.
 #[pyfunction]
 pub fn audit(
     py: Python<'_>,
@@ -76,7 +77,7 @@ pub fn audit(
     found.map(Report::of).map_err(|error| by.as_cause_of(py, error))
 }
 
-/// Options in the dict `asked`.
+/// Extracts options from the dict `asked`.
 pub fn asked_of<'py, T>(asked: &Bound<'py, PyAny>) -> PyResult<T>
 where
     T: for<'a> FromPyObject<'a, 'py, Error = PyErr>,
@@ -84,12 +85,11 @@ where
     asked.extract::<T>().map_err(|error| of_argument(asked.py(), error))
 }
 
-/// Gates as they were written.
 pub fn gates_of(texts: &[String]) -> PyResult<Vec<Gate>> {
     texts.iter().map(|text| Gate::parse(text)).collect::<Result<_, _>>().map_err(raised)
 }
 
-/// An error about an item of the dict, as Python tells it of an argument.
+/// Converts an error about an item of the dict to one about an argument.
 fn of_argument(py: Python<'_>, error: PyErr) -> PyErr {
     let text = error.value(py).to_string();
     match (text.rsplit_once('.'), error.cause(py)) {

@@ -1,4 +1,4 @@
-//! The audit of images: arrays or a path in, a report out.
+//! Audits of images, from arrays or a path.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -26,10 +26,10 @@ use crate::plan::Asked;
 use crate::report::Report;
 use crate::work;
 
-/// What images are called in errors that are arrays.
+/// Name of images in arrays, for errors.
 const ARRAYS: &str = "images";
 
-/// What is asked of images, beside what is asked of every audit.
+/// Options of audits of images, beside the common ones.
 #[derive(FromPyObject)]
 struct OfImages {
     #[pyo3(item)]
@@ -47,7 +47,7 @@ struct OfImages {
 }
 
 impl OfImages {
-    /// Options for the record, as the command line keeps them.
+    /// Returns the options for the report, with the names of the command line.
     fn options(&self) -> Map<String, serde_json::Value> {
         let mut options = Map::new();
         if let Some(name) = &self.features {
@@ -68,8 +68,9 @@ impl OfImages {
         options
     }
 
-    /// What extracts features of photos at `path`, fit for the sources of `plan`; nothing of that fits arrays, whose path is
-    /// [`ARRAYS`].
+    /// Returns the options of the extractor for photos at `path`, checked against the sources of
+    /// `plan`. Arrays, whose path is
+    /// [`ARRAYS`], must not have such options.
     fn wanted(&self) -> PyResult<Wanted> {
         let kind = self.features.as_deref().map(DescriptorKind::from_name);
         if let Some(score) = self.min_score.filter(|score| !(0.0..1.0).contains(score)) {
@@ -85,8 +86,9 @@ impl OfImages {
     }
 }
 
-/// Audits `images` as `asked` says, a dict of all options; `tell` hears of every image: done, total, what is at work. Returns
-/// what was said on the way, too, that the report does not tell.
+/// Audits `images` with the options in the dict `asked`, and calls `tell` with done, total and the
+/// current image. Also returns
+/// messages that the report lacks.
 #[pyfunction]
 pub fn audit_images(
     py: Python<'_>,
@@ -139,7 +141,6 @@ pub fn audit_images(
     Ok((Report::of(found), said))
 }
 
-/// Images that are ready to be audited.
 struct Opened {
     source: FeatureSource,
     path: PathBuf,
@@ -177,7 +178,7 @@ fn open(
         None => None,
         Some(wanted) => Some(choice::shown(wanted, names, &chosen, &place)?),
     };
-    // One line in place of one per image.
+    // One error instead of one per image.
     if let (FeatureSource::File(_), true) = (&source, Needs::of_plan(plan).descriptors())
         && let Some(first) = source.first(&chosen)
     {
@@ -186,7 +187,7 @@ fn open(
     Ok(Opened { source, path, chosen, show })
 }
 
-/// Refuses sources of `plan` that cannot work on such descriptors.
+/// Returns an error if a source of `plan` does not support the descriptors.
 fn fit(plan: &Plan<2>, descriptors: Option<&Descriptors>) -> Result<(), Error> {
     for source in plan.own_sources() {
         let (expected, found) = match descriptors {
@@ -205,7 +206,7 @@ fn fit(plan: &Plan<2>, descriptors: Option<&Descriptors>) -> Result<(), Error> {
     Ok(())
 }
 
-/// What was found; without a single image that can be used an error, with what is wrong with the first.
+/// Returns the results; an error with that of the first image if no image can be used.
 fn found(
     (found, used): (Option<Audited>, Used),
     path: &Path,
@@ -221,7 +222,7 @@ fn found(
     })
 }
 
-/// An error that names arguments as Python has them.
+/// Renames options of the command line in an error to Python arguments.
 fn renamed(py: Python<'_>, error: PyErr) -> PyErr {
     let text = error.value(py).to_string();
     let names = ["features", "max-features", "min-score", "max-images", "show"];

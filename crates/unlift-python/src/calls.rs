@@ -1,6 +1,7 @@
-//! Calls of functions in Python from threads of ours: none begins or goes on where the interpreter ends.
+//! Calls of Python functions from Rust threads, which stop before the interpreter ends.
 //!
-//! A thread that takes the interpreter's lock while it ends is ended by the system within our frames, which aborts the process.
+//! A thread that takes the interpreter's lock while the interpreter ends is killed within our
+//! frames, which aborts the process.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -9,22 +10,25 @@ use std::time::{Duration, Instant};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
-/// How many threads are inside a call or wait for the lock; the highest bit is set once the interpreter is about to end.
+/// Number of threads inside a call or waiting for the lock. The highest bit is set when the
+/// interpreter is about to end.
 static INSIDE: AtomicUsize = AtomicUsize::new(0);
 const ENDING: usize = 1 << (usize::BITS - 1);
-/// Python's numbers of these threads, and what stops their work. Held only with the interpreter's lock, so that no forked child
-/// finds it held.
+/// Python's ids of these threads, with the flags that stop their work. It is locked only under the
+/// interpreter's lock, so that
+/// it is free in a forked child.
 static NUMBERS: Mutex<Vec<(u64, Arc<AtomicBool>)>> = Mutex::new(Vec::new());
-/// How long the end of the interpreter waits for functions of users.
+/// Maximum wait for user functions at the end of the interpreter.
 const PATIENCE: Duration = Duration::from_secs(10);
 const ASKED: Duration = Duration::from_millis(5);
 
-/// What `call` makes with the interpreter's lock, which this thread does not hold, for work that `stop` stops; `None` once it is
-/// stopped, or the interpreter is about to end.
+/// Calls `call` with the interpreter's lock, which this thread must not hold. Returns `None` if
+/// `stop` is set or the interpreter
+/// is about to end.
 pub fn attached<T>(stop: &Arc<AtomicBool>, call: impl FnOnce(Python<'_>) -> T) -> Option<T> {
     let _inside = Inside::new()?;
     Python::attach(|py| {
-        // That may have come while this thread waited.
+        // The flags may have been set while this thread waited.
         if ending() || stop.load(Ordering::SeqCst) {
             return None;
         }
@@ -33,17 +37,18 @@ pub fn attached<T>(stop: &Arc<AtomicBool>, call: impl FnOnce(Python<'_>) -> T) -
     })
 }
 
-/// Whether no call begins any more.
+/// Returns true if no further call may begin.
 pub fn ending() -> bool {
     INSIDE.load(Ordering::SeqCst) & ENDING != 0
 }
 
-/// A thread that is counted until it is dropped.
+/// Counts a thread until it is dropped.
 struct Inside;
 
 impl Inside {
     fn new() -> Option<Self> {
-        // Counted before the bit is looked at: who sets it waits for this thread, or this thread sees it.
+        // Count before reading the bit: then either `end` waits for this thread, or this thread
+        // sees the bit.
         let earlier = INSIDE.fetch_add(1, Ordering::SeqCst);
         let inside = Self;
         (earlier & ENDING == 0).then_some(inside)
@@ -56,7 +61,7 @@ impl Drop for Inside {
     }
 }
 
-/// A thread whose number is known until it is dropped, if Python tells it.
+/// Registers a thread's id until it is dropped, if Python provides one.
 struct Numbered(Option<u64>);
 
 impl Numbered {
@@ -80,7 +85,7 @@ impl Drop for Numbered {
     }
 }
 
-/// Interrupts the functions that run, as the user would those of the main thread: all, or those for work that `stop` stops.
+/// Raises KeyboardInterrupt in running functions: in all, or in those that `stop` stops.
 pub fn interrupt(py: Python<'_>, stop: Option<&Arc<AtomicBool>>) -> PyResult<()> {
     let numbers = NUMBERS.lock().unwrap_or_else(PoisonError::into_inner).clone();
     let numbers = numbers.iter().filter(|(_, own)| stop.is_none_or(|stop| Arc::ptr_eq(own, stop)));
@@ -94,11 +99,12 @@ pub fn interrupt(py: Python<'_>, stop: Option<&Arc<AtomicBool>>) -> PyResult<()>
     Ok(())
 }
 
-/// Lets no call begin, interrupts those that run, and waits for them, unless the user interrupts once more.
+/// Prevents further calls, interrupts running functions and waits for them, unless the user
+/// interrupts again.
 #[pyfunction]
 fn end(py: Python<'_>) -> PyResult<()> {
     INSIDE.fetch_or(ENDING, Ordering::SeqCst);
-    // Best effort: without it a function is waited for that takes its time.
+    // If this fails, the wait may be longer.
     let _ = interrupt(py, None);
     let until = Instant::now() + PATIENCE;
     while INSIDE.load(Ordering::SeqCst) != ENDING && Instant::now() < until {
@@ -108,18 +114,18 @@ fn end(py: Python<'_>) -> PyResult<()> {
     Ok(())
 }
 
-/// Forgets the threads of the parent, which a forked child has not.
+/// Forgets the threads of the parent in a forked child.
 #[pyfunction]
 fn forget() {
     INSIDE.fetch_and(ENDING, Ordering::SeqCst);
     NUMBERS.lock().unwrap_or_else(PoisonError::into_inner).clear();
 }
 
-/// Has Python call both when it is time.
+/// Registers `end` with `atexit`, and `forget` with `register_at_fork`.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = module.py();
     py.import("atexit")?.call_method1("register", (wrap_pyfunction!(end, module)?,))?;
-    // There is no fork on Windows.
+    // Windows has no fork.
     if let Ok(at_fork) = py.import("os")?.getattr("register_at_fork") {
         let options = pyo3::types::PyDict::new(py);
         options.set_item("after_in_child", wrap_pyfunction!(forget, module)?)?;

@@ -1,13 +1,13 @@
-//! What is of an image or of a map: the same in two dimensions and in three.
+//! A value of an image or of a map.
 
-/// Of an image, or of a map.
+/// A value of an image (2D) or of a map (3D).
 #[derive(Clone, Debug)]
 pub enum Either<I, M> {
     Image(I),
     Map(M),
 }
 
-/// `$made` of `$one`, which is what `$either` holds.
+/// Evaluates `$made` with `$one` as the content of `$either`.
 macro_rules! of_either {
     ($either:expr, $one:ident => $made:expr) => {
         match $either {

@@ -1,4 +1,4 @@
-//! Errors of every crate as one exception, in one line.
+//! Errors of all crates as one Python exception.
 
 use std::fmt::Display;
 
@@ -9,15 +9,15 @@ pyo3::create_exception!(
     unlift,
     UnliftError,
     PyValueError,
-    "What is wrong with an argument, a file or a map, in one line: what, what was expected, what was found."
+    "An error in an argument, a file or a map: one line that names it, what was expected and what was found."
 );
 
-/// The exception that says `error`.
+/// Returns an exception with the message `error`.
 pub fn raised(error: impl Display) -> PyErr {
     PyErr::new::<UnliftError, _>(error.to_string())
 }
 
-/// The exception about an argument.
+/// Returns an exception about an argument.
 pub fn wrong(name: &str, expected: impl Display, found: impl Display) -> PyErr {
     raised(format!("{name}: expected {expected}, found {found}"))
 }

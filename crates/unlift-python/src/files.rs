@@ -1,4 +1,4 @@
-//! Stage files to their place, by the rule of the command line: what is there and not of their kind stays.
+//! Writing of stage files, by the rules of the command line: foreign files stay.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use unlift_io::stage;
 
 use crate::errors::raised;
 
-/// Writes a stage file of `kind` to `path` by `write`; with `force` also over what unlift did not write.
+/// Writes a stage file of `kind` to `path` by `write`; with `force`, also over foreign files.
 pub fn save(
     py: Python<'_>,
     (path, force): (PathBuf, bool),
@@ -23,7 +23,7 @@ pub fn save(
     })
 }
 
-/// An error that names the way out as Python has it.
+/// Renames the option that an error advises to its Python name.
 pub fn refused(error: unlift_audit::Error) -> PyErr {
     raised(error.to_string().replace("--force", "force=True").replace("--out", "out"))
 }

@@ -1,4 +1,4 @@
-//! What is heard of an audit while it runs: progress, for a function in Python, and lines.
+//! Progress and messages of a running audit.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -8,42 +8,41 @@ use unlift_audit::Progress;
 
 use crate::calls;
 
-/// Shares of items that add up to a whole lack this much at most.
+/// Largest rounding error of fractions that add up to whole items.
 const ROUNDING: f64 = 1e-6;
 
-/// Tells a function in Python how an audit goes, and the audit whether it shall go on.
+/// An observer that calls a Python function and stops the audit if the function raises.
 pub struct Heard {
     tell: Option<Py<PyAny>>,
     stop: Arc<AtomicBool>,
-    /// What the function raised.
     failed: Mutex<Option<PyErr>>,
     said: Mutex<Vec<String>>,
     counted: Mutex<Counted>,
 }
 
-/// How far an audit is whose items are at work at the same time.
+/// Progress of an audit that processes several items at a time.
 #[derive(Default)]
 struct Counted {
     done: f64,
-    /// Whole items that were told.
+    /// Number of whole items that were reported.
     told: usize,
     total: usize,
     what: String,
 }
 
 impl Heard {
-    /// For work that `stop` stops.
+    /// Creates an observer for work that `stop` stops.
     pub fn new(tell: Option<Py<PyAny>>, stop: Arc<AtomicBool>) -> Self {
         let (failed, said, counted) = Default::default();
         Self { tell, stop, failed, said, counted }
     }
 
-    /// What the function raised.
+    /// Returns the exception of the function.
     pub fn failed(&self) -> Option<PyErr> {
         locked(&self.failed).take()
     }
 
-    /// Lines that were said.
+    /// Returns the messages.
     pub fn said(&self) -> Vec<String> {
         locked(&self.said).clone()
     }
@@ -66,7 +65,8 @@ impl Progress for Heard {
     }
 
     fn add(&self, share: f64, what: &str) {
-        // Held while it is told: one call at a time, and none that goes back.
+        // The lock is held during the call, so that calls do not overlap and numbers never
+        // decrease.
         let mut counted = locked(&self.counted);
         counted.done += share;
         let done = (counted.done + ROUNDING) as usize;

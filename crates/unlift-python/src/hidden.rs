@@ -1,4 +1,4 @@
-//! Hidden maps: what is released, and the truth beside it.
+//! Hidden maps: the released part, and the truth.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use crate::either::{Either, of_either};
 use crate::errors::{raised, wrong};
 use crate::files::save;
 
-/// All that an attacker sees of a map, or of an image.
+/// Everything that an attacker sees of a map or an image.
 #[pyclass(frozen, module = "unlift")]
 #[derive(Clone)]
 pub struct Released(pub Either<Arc<released::Released<2>>, Arc<released::Released<3>>>);
@@ -33,7 +33,7 @@ impl From<released::Released<3>> for Released {
 }
 
 impl Released {
-    /// That of a map.
+    /// Returns the released map; an error for an image.
     pub fn of_map(self) -> PyResult<Arc<released::Released<3>>> {
         match self.0 {
             Either::Map(of_map) => Ok(of_map),
@@ -50,7 +50,8 @@ impl Released {
         py.detach(|| read_released::<3>(&path)).map(Self::from).map_err(raised)
     }
 
-    /// Writes it (Parquet), as `unlift obfuscate` does. What is there and no released map stays, unless `force`.
+    /// Writes the released map (Parquet), as `unlift obfuscate` does. Replaces other files only
+    /// with `force`.
     #[pyo3(signature = (path, *, force=false))]
     fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
         save(
@@ -70,19 +71,19 @@ impl Released {
         format!("<unlift.Released: {n} {family} hiding {} points>", self.n_slots())
     }
 
-    /// What records are: "lines", "rays", "axis_planes" or "axis_candidates".
+    /// Kind of records: "lines", "rays", "axis_planes" or "axis_candidates".
     #[getter]
     fn family(&self) -> &'static str {
         of_either!(&self.0, released => released.obfuscation().family())
     }
 
-    /// The unit of lengths.
+    /// Unit of lengths.
     #[getter]
     fn unit(&self) -> &'static str {
         of_either!(&self.0, released => released.unit().name())
     }
 
-    /// Hidden points per record.
+    /// Number of hidden points per record.
     #[getter]
     fn slots_per_record(&self) -> usize {
         of_either!(&self.0, released => released.slots_per_record())
@@ -94,13 +95,13 @@ impl Released {
         of_either!(&self.0, released => released.n_slots())
     }
 
-    /// The point `(3,)` that records are stored about; of an image its middle `(2,)`.
+    /// Origin `(3,)` of the stored records; for an image, its middle `(2,)`.
     #[getter]
     fn origin<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         of_either!(&self.0, released => to_array(py, released.origin().to_vec()).into_any())
     }
 
-    /// The outermost corners of an image `(2, 2)`, lowest first, in pixels; None of a map.
+    /// Lower and upper corner of an image `(2, 2)`, in pixels; None for a map.
     #[getter]
     fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let Either::Image(of_image) = &self.0 else { return Ok(None) };
@@ -108,7 +109,7 @@ impl Released {
         corners.map(|corners| Ok(to_rows(py, corners)?.into_any())).transpose()
     }
 
-    /// What tells this map from others, in hexadecimal.
+    /// Hash of this map, in hexadecimal.
     #[getter]
     fn fingerprint(&self) -> String {
         of_either!(&self.0, released => released.fingerprint().to_string())
@@ -121,16 +122,17 @@ impl Released {
         rows.map(|rows| to_descriptors(py, rows)).transpose()
     }
 
-    /// The columns of the records by name, about `origin`: of lines foot and direction `(n, 3)`; of rays centers `(m, 3)`,
-    /// center `(n,)` and direction `(n, 3)`; of planes axis and offset `(n,)`; of candidates position `(n, 3)`; of an image
-    /// all `(n, 2)`.
+    /// Columns of the records by name, relative to `origin`. Lines: foot and direction `(n, 3)`.
+    /// Rays: centers `(m, 3)`, center `(n,)`
+    /// and direction `(n, 3)`. Planes: axis and offset `(n,)`. Candidates: position `(n, 3)`.
+    /// Images have 2 instead of 3.
     #[getter]
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         of_either!(&self.0, released => columns(py, released.obfuscation()))
     }
 }
 
-/// The columns of records by name.
+/// Returns the columns of records by name.
 fn columns<'py, const D: usize>(
     py: Python<'py>,
     records: &Obfuscation<D>,
@@ -157,7 +159,7 @@ fn columns<'py, const D: usize>(
     Ok(columns)
 }
 
-/// What only the owner of a map has: its points, and which record hides which.
+/// What only the owner of a map has: its points, and the record that hides each.
 #[pyclass(frozen, module = "unlift")]
 #[derive(Clone)]
 pub struct Truth {
@@ -165,7 +167,7 @@ pub struct Truth {
     pub secret: Arc<Secret>,
 }
 
-/// Points of a map that is at hand, or of a file.
+/// Points in memory, or read from a file.
 #[derive(Clone)]
 enum Whose {
     Map(Arc<Prepared>),
@@ -173,7 +175,7 @@ enum Whose {
 }
 
 impl Truth {
-    /// The truth of a map that is at hand.
+    /// Returns the truth of a map in memory.
     pub fn of(prepared: Arc<Prepared>, secret: Secret) -> Self {
         Self { of: Whose::Map(prepared), secret: Arc::new(secret) }
     }
@@ -188,33 +190,34 @@ impl Truth {
 
 #[pymethods]
 impl Truth {
-    /// Reads a truth (Parquet).
+    /// Reads a truth file (Parquet).
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let (original, secret) = py.detach(|| read_truth::<3>(&path)).map_err(raised)?;
         Ok(Self { of: Whose::File(Arc::new(original)), secret: Arc::new(secret) })
     }
 
-    /// Writes it (Parquet), as `unlift obfuscate` does, for your eyes only. What is there and no truth stays, unless `force`.
+    /// Writes the truth (Parquet), as `unlift obfuscate` does, readable only by you. Replaces other
+    /// files only with `force`.
     #[pyo3(signature = (path, *, force=false))]
     fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
         let write = |path: &Path| write_truth(path, self.original(), &self.secret);
         save(py, (path, force), Kind::Truth, write)
     }
 
-    /// The points `(n, 3)`.
+    /// Points `(n, 3)`.
     #[getter]
     fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Ok(to_rows(py, self.original().reveal().positions().to_vec())?.into_any())
     }
 
-    /// Which point each slot hides `(n_slots,)`.
+    /// Index of the point in each slot `(n_slots,)`.
     #[getter]
     fn hidden<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         to_array(py, self.secret.hidden().iter().map(|id| id.0).collect()).into_any()
     }
 
-    /// How many points are in no record, by reason.
+    /// Number of points without a record, by reason.
     #[getter]
     fn dropped<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let counts = PyDict::new(py);
@@ -231,7 +234,7 @@ impl Truth {
     }
 }
 
-/// A map that is hidden: `released` for the attacker, `truth` for its owner.
+/// A hidden map: `released` for the attacker, `truth` for the owner.
 #[pyclass(frozen, module = "unlift", get_all)]
 pub struct Hidden {
     released: Released,
@@ -259,7 +262,7 @@ impl Hidden {
     }
 }
 
-/// The released map in `given`: a Released, or a Hidden, whose truth is not looked at.
+/// Extracts the released map from a Released or a Hidden, without reading the truth.
 pub fn released_of(given: &Bound<'_, PyAny>) -> PyResult<Released> {
     if let Ok(hidden) = given.cast::<Hidden>() {
         return Ok(hidden.get().released.clone());
@@ -271,7 +274,7 @@ pub fn released_of(given: &Bound<'_, PyAny>) -> PyResult<Released> {
     })
 }
 
-/// The truth in `given`: a Truth, or a Hidden.
+/// Extracts the truth from a Truth or a Hidden.
 pub fn truth_of(given: &Bound<'_, PyAny>) -> PyResult<Truth> {
     if let Ok(hidden) = given.cast::<Hidden>() {
         return Ok(hidden.get().truth.clone());

@@ -1,4 +1,4 @@
-//! Images for an audit: a path, or arrays by name, looked at when their turn comes.
+//! Images of an audit: a path, or arrays by name, which are read when needed.
 
 use std::path::PathBuf;
 
@@ -14,19 +14,16 @@ use crate::calls;
 use crate::errors::{UnliftError, raised, wrong};
 use crate::own::Raised;
 
-/// What there may be of an image, the least first.
 const KEYS: [&str; 5] = ["keypoints", "width", "height", "descriptors", "scores"];
 
-/// Where images are.
+/// Source of images.
 pub enum Images {
-    /// In a file or folder.
     Path(PathBuf),
-    /// In Python.
     InMemory(InMemory),
 }
 
 impl Images {
-    /// Those in `given`: a path, a mapping of names to arrays, or pairs of both.
+    /// Accepts a path, a mapping of names to arrays, or pairs of both.
     pub fn of(given: &Bound<'_, PyAny>, by: &Raised) -> PyResult<Self> {
         if let Ok(path) = given.extract::<PathBuf>() {
             return Ok(Self::Path(path));
@@ -47,7 +44,7 @@ impl Images {
             let features = calls::attached(&stop, |py| {
                 let given = by_name.bind(py).get_item(name);
                 let features = given.and_then(|given| features_of(&place, &given));
-                // What reads them from somewhere may fail at it.
+                // The user's mapping may fail to read an image.
                 features.map_err(|error| raised_by(py, &place, &by, error).value(py).to_string())
             });
             features
@@ -58,12 +55,13 @@ impl Images {
     }
 }
 
-/// How Python writes the image of this name.
+/// Returns the place of an image in errors, in Python notation.
 fn place(name: &str) -> String {
     format!("images[{name:?}]")
 }
 
-/// What a mapping of the user's raised, as an error about what it was asked for; one of ours says that itself.
+/// Converts an exception of the user's mapping to an error about the place; keeps our own
+/// exceptions.
 fn raised_by(py: Python<'_>, place: &str, by: &Raised, error: PyErr) -> PyErr {
     match error.is_instance_of::<UnliftError>(py) {
         true => error,
@@ -82,7 +80,8 @@ fn name_of(name: &Bound<'_, PyAny>) -> PyResult<String> {
     text.extract()
 }
 
-/// Pairs of a name and arrays, as a dict. All are looked at, as no image is audited before every name is known; arrays are
+/// Converts pairs of a name and arrays to a dict. All pairs are read, because an audit must know
+/// every name first; arrays are
 /// not copied.
 fn pairs<'py>(given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
     let expected = "a path, a dict of names to arrays, or pairs of both";
@@ -105,7 +104,7 @@ fn pairs<'py>(given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
     Ok(by_name)
 }
 
-/// The features of one image, a mapping of arrays by their names.
+/// Converts the dict of one image to features.
 fn features_of(place: &str, given: &Bound<'_, PyAny>) -> PyResult<ImageFeatures> {
     if !is_mapping(given)? {
         return Err(wrong(place, "a dict of arrays", given.get_type()));

@@ -1,10 +1,10 @@
-//! Values of JSON as Python has them.
+//! Conversion of JSON to Python values.
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use serde_json::Value;
 
-/// A value of JSON as Python has it.
+/// Converts a JSON value to a Python value.
 pub fn as_python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
     Ok(match value {
         Value::Null => py.None().into_bound(py),

@@ -1,4 +1,4 @@
-//! The laws of schemes, sources and solvers, for tests in Python.
+//! Property tests of schemes, sources and solvers.
 
 use std::sync::Arc;
 
@@ -11,16 +11,19 @@ use crate::lists::Neighborhoods;
 use crate::own::{OwnScheme, OwnSolver, OwnSource, Raised};
 use crate::work;
 
-/// Runs `laws`; one that is broken is an AssertionError that says which, on which points, and what was found.
+/// Runs `laws`; a failure becomes an AssertionError with the property, the points and the result.
 fn kept(py: Python<'_>, by: &Raised, laws: impl FnOnce() + Send + 'static) -> PyResult<()> {
     let result = work::run(py, None, Some(by.stop()), move || Ok::<_, String>(caught(laws)))?;
     result.map_err(|text| by.as_cause_of(py, PyAssertionError::new_err(text)))
 }
 
-/// Whether a scheme hides every point, on its record, by its key alone, and in an order that tells nothing.
+/// Checks that a scheme hides every point, on its record, by its key alone, and in an order that
+/// reveals nothing.
 ///
-/// It is called with 0, 1, 2, 3, 7, 120, 200, 300, 301, 600 and 700 points: of a made-up room, at random, many in one place. By an
-/// exception it refuses points, which it may but for 200, 600 and 700 of a room. With `images` with keypoints `(n, 2)` in their place.
+/// It calls the scheme with 0, 1, 2, 3, 7, 120, 200, 300, 301, 600 and 700 points: of a made-up
+/// room, at random, many in one place;
+/// with `images`, keypoints `(n, 2)`. A scheme may refuse points by an exception, except 200, 600
+/// and 700 points of a room.
 #[pyfunction]
 #[pyo3(signature = (scheme, *, images=false))]
 pub fn check_scheme(py: Python<'_>, scheme: &Bound<'_, PyAny>, images: bool) -> PyResult<()> {
@@ -32,9 +35,10 @@ pub fn check_scheme(py: Python<'_>, scheme: &Bound<'_, PyAny>, images: bool) -> 
     })
 }
 
-/// Whether a source gives every hidden point of `released` a list, of records of this map, by its seed alone.
+/// Checks that a source returns a list for every hidden point of `released`, of records of this
+/// map, by its seed alone.
 ///
-/// It is called three times.
+/// It calls the source three times.
 #[pyfunction]
 pub fn check_source(
     py: Python<'_>,
@@ -46,9 +50,10 @@ pub fn check_source(
     kept(py, &by, move || unlift_testkit::source_laws::<3>(&source, &released))
 }
 
-/// Checks that a solver answers for every hidden point of `released`, and gives the same positions again.
+/// Checks that a solver returns a row for every hidden point of `released`, and the same positions
+/// again.
 ///
-/// It is called three times, the last time with empty lists.
+/// It calls the solver three times, the last time with empty lists.
 #[pyfunction]
 pub fn check_solver(
     py: Python<'_>,

@@ -1,4 +1,4 @@
-//! The native part of the Python package `unlift`: the same words as the library and the command line.
+//! The native part of the Python package `unlift`.
 //!
 //! ```text
 //! arrays, paths ──> Map ──> obfuscate ──> Hidden { Released, Truth }
@@ -8,7 +8,8 @@
 //! arrays by name, paths ──> audit_images (as above) ────────────────────────┘
 //! ```
 //!
-//! Work runs on threads of its own, without the interpreter's lock, and ends when the user interrupts.
+//! Work runs on threads of its own, without the interpreter's lock. KeyboardInterrupt ends the wait
+//! at once.
 
 mod arrays;
 mod audit;
@@ -37,7 +38,7 @@ mod work;
 use pyo3::prelude::*;
 use unlift::recover::Builtin;
 
-/// What `unlift` (the package) is made of.
+/// The native module.
 #[pymodule]
 mod _unlift {
     use pyo3::prelude::*;
@@ -74,7 +75,7 @@ mod _unlift {
     }
 }
 
-/// Version, and the names that arguments take.
+/// Adds the version, and the names that arguments accept.
 fn names(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let (all_schemes, all_sources) = (unlift::obfuscate::SCHEMES, unlift_audit::sources::all());
     let schemes = all_schemes.iter().filter(|entry| entry.in_2d.is_some());

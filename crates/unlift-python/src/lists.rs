@@ -1,4 +1,4 @@
-//! Lists of near records: of an oracle, of a source, of one's own.
+//! Neighbor lists: of the oracle, of a source, or given.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -21,13 +21,15 @@ use crate::files::save;
 use crate::hidden::{Hidden, released_of};
 use crate::work;
 
-/// For every hidden point the records that are taken for near ones, likeliest first.
+/// For every hidden point, a list of records that probably hide its nearest neighbors, likeliest
+/// first.
 #[pyclass(frozen, module = "unlift")]
 pub struct Neighborhoods(pub Arc<neighbors::Neighborhoods>);
 
 #[pymethods]
 impl Neighborhoods {
-    /// Of an array `(n_slots, k)` of records of `released`, padded by -1, with scores of the same shape if there are some.
+    /// Converts an array `(n_slots, k)` of records of `released`, padded by -1, and optional scores
+    /// of the same shape.
     #[new]
     #[pyo3(signature = (released, records, scores=None, *, needs="descriptors"))]
     fn new(
@@ -55,7 +57,8 @@ impl Neighborhoods {
         Ok(Self(Arc::new(lists.map_err(raised)?)))
     }
 
-    /// Writes them (Parquet), as `unlift neighbors` does. What is there and no lists stays, unless `force`.
+    /// Writes the lists (Parquet), as `unlift neighbors` does. Replaces other files only with
+    /// `force`.
     #[pyo3(signature = (path, *, force=false))]
     fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
         save(py, (path, force), Kind::Neighborhoods, |path| write_neighborhoods(path, &self.0))
@@ -70,26 +73,27 @@ impl Neighborhoods {
         format!("<unlift.Neighborhoods: {} lists of up to {}>", self.0.n_slots(), self.0.longest())
     }
 
-    /// All lists, one after the other: record numbers.
+    /// Record numbers of all lists, one list after the other.
     #[getter]
     fn records<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         to_array(py, self.0.records().iter().map(|record| record.0).collect()).into_any()
     }
 
-    /// Where each list starts in `records`; one more entry than there are lists.
+    /// Start of each list in `records`, and the total number of entries.
     #[getter]
     fn offsets<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         to_array(py, self.0.offsets().to_vec()).into_any()
     }
 
-    /// A score per entry, higher for likelier ones, or None.
+    /// Scores of the entries, higher for likelier ones, or None.
     #[getter]
     fn scores<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyAny>> {
         self.0.scores().map(|scores| to_array(py, scores.to_vec()).into_any())
     }
 }
 
-/// Lists of `released` in an array `(n_slots, k)`, padded by -1; at most `k` each.
+/// Converts an array `(n_slots, k)`, padded by -1, to lists of `released` with at most `k` entries
+/// each.
 fn lists_of<const D: usize>(
     released: &released::Released<D>,
     records: &Bound<'_, PyAny>,
@@ -138,7 +142,7 @@ fn lists_of<const D: usize>(
     Ok(lists.map_err(raised)?.with_about(About { map, order, ..About::default() }))
 }
 
-/// Lists as a function returned them: Neighborhoods, an array of records, or records and scores.
+/// Converts the result of a function: Neighborhoods, an array of records, or records and scores.
 pub fn returned<const D: usize>(
     given: &Bound<'_, PyAny>,
     released: &released::Released<D>,
@@ -155,17 +159,18 @@ pub fn returned<const D: usize>(
     lists_of(released, given, None, k, needs)
 }
 
-/// The process that has used networks, whose threads a forked child lacks; 0 before.
+/// Id of the process that has used networks, or 0. Forked children lack the threads of the
+/// networks.
 static NETWORKS_OF: AtomicU32 = AtomicU32::new(0);
 
-/// The source called `name`, with lists of `k` if that is given.
+/// Returns the source called `name`, with lists of `k` if given.
 pub fn named(name: &str, k: Option<usize>) -> PyResult<Named> {
     let named = sources::named(name).map_err(raised)?;
     if named.name() == "learned" {
         let own = std::process::id();
         let earlier = NETWORKS_OF.compare_exchange(0, own, Ordering::Relaxed, Ordering::Relaxed);
         if earlier.is_err_and(|earlier| earlier != own) {
-            // It would wait for them.
+            // The call would wait forever for the missing threads.
             let expected = "a process whose parent has not used it (get_context(\"spawn\"))";
             return Err(wrong("learned", expected, "a forked child"));
         }
@@ -173,7 +178,7 @@ pub fn named(name: &str, k: Option<usize>) -> PyResult<Named> {
     Ok(if let Some(k) = k { named.with_k(k) } else { named })
 }
 
-/// Lists by a source of the attacker's own, as `unlift neighbors find` makes them.
+/// Makes lists from released data alone, as `unlift neighbors find` does.
 #[pyfunction]
 #[pyo3(signature = (released, source, *, k=None, seed=0, threads=None))]
 pub fn find(
@@ -193,7 +198,7 @@ pub fn find(
     Ok(Neighborhoods(Arc::new(lists)))
 }
 
-/// Lists by an oracle who knows the truth: `inlier_ratio` of each are among the `k` true neighbors.
+/// Makes lists from the truth: a share `inlier_ratio` of each are among the `k` true neighbors.
 #[pyfunction]
 #[pyo3(signature = (hidden, inlier_ratio, *, k=50, noise="uniform", seed=0))]
 pub fn oracle(

@@ -1,4 +1,4 @@
-//! Maps: read from files, or made of arrays.
+//! Maps, from files or arrays.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -13,21 +13,21 @@ use crate::arrays::{descriptors, rows, to_array, to_descriptors, to_rows};
 use crate::errors::wrong;
 use crate::work;
 
-/// Points to audit, with descriptors where there are some: in meters with a scale, else in the usual distance to the K-th
-/// neighbor.
+/// Points to audit, with optional descriptors. Lengths are in meters with a scale, else in median
+/// distances to the K-th neighbor.
 #[pyclass(frozen, module = "unlift")]
 pub struct Map {
     pub prepared: Arc<Prepared>,
-    /// What the record says of where it came from.
+    /// Origin of the points, for the report.
     pub input: Input,
     /// Camera centers in the unit of the map.
     pub cameras: Vec<[f64; 3]>,
     pub up: Option<[f64; 3]>,
-    /// What whoever reads figures of it must know.
+    /// Notes that a report must contain.
     pub notes: Vec<String>,
 }
 
-/// What is done with points before anything else.
+/// Returns the options of preparation.
 fn preparation(
     scale: Option<f64>,
     k: usize,
@@ -120,25 +120,25 @@ impl Map {
         self.prepared.descriptors.as_ref().map(|rows| to_descriptors(py, rows)).transpose()
     }
 
-    /// The unit of lengths: "m", or "kth_neighbor".
+    /// Unit of lengths: "m", or "kth_neighbor".
     #[getter]
     fn unit(&self) -> &'static str {
         self.prepared.original.reveal().unit().name()
     }
 
-    /// Length of `unit` in the units that the points were given in.
+    /// Length of `unit` in the units of the input.
     #[getter]
     fn unit_in_map_units(&self) -> f64 {
         self.prepared.unit_in_map_units
     }
 
-    /// What you should know of how it was read and made ready; a report has these, too.
+    /// Notes on reading and preparation; a report has them, too.
     #[getter]
     fn notes(&self) -> Vec<String> {
         self.prepared.doubts.iter().chain(&self.notes).cloned().collect()
     }
 
-    /// Which of the points that were given are left, ascending `(n,)`.
+    /// Indices of the points that are left, ascending `(n,)`.
     #[getter]
     fn rows<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         to_array(py, self.prepared.rows.clone()).into_any()

@@ -1,4 +1,4 @@
-//! Hiding a map: by a scheme of unlift's, or of one's own.
+//! Hiding of maps under schemes of unlift or of the user.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::map::Map;
 use crate::own::{OwnScheme, Raised};
 use crate::work;
 
-/// The scheme in `given`, a name or a function.
+/// Returns the scheme for `given`, a name or a function.
 pub fn scheme_of<const D: usize>(
     given: &Bound<'_, PyAny>,
     options: &SchemeOptions,
@@ -31,8 +31,9 @@ where
     entry.of_dimension::<D>(options).ok_or_else(|| wrong("scheme", expected, name))
 }
 
-/// Hides a map by a scheme, a name or a function. Without a seed under a fresh key, for maps that are released; a seed
-/// repeats experiments, and whoever guesses it undoes the hiding.
+/// Hides a map under a scheme, a name or a function. Without a seed it uses a fresh key, for maps
+/// that are released. A seed is for
+/// experiments: whoever guesses it undoes the hiding.
 #[pyfunction]
 #[pyo3(signature = (map, scheme, *, seed=None))]
 pub fn obfuscate(

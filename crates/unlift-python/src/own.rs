@@ -1,4 +1,4 @@
-//! Schemes, sources and solvers that are functions in Python.
+//! Schemes, sources and solvers that are Python functions.
 
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -20,37 +20,37 @@ use crate::hidden::Released as PyReleased;
 use crate::lists::{self, Neighborhoods as PyNeighborhoods};
 use crate::records::{Hiding, InDimension, hiding};
 
-/// What ended functions of the user's, one of which is the cause of what the user sees; and whether none is to be called any more.
+/// Exceptions of user functions, and a flag that prevents further calls.
 #[derive(Clone, Debug, Default)]
 pub struct Raised {
-    /// Exceptions, each with the line that tells it.
+    /// Exceptions, each with its message.
     errors: Arc<Mutex<Vec<(String, PyErr)>>>,
     stop: Arc<AtomicBool>,
 }
 
 impl Raised {
-    /// Set where no function is to be called any more: the user has interrupted.
+    /// Returns the flag that prevents further calls, set when the user interrupts.
     pub fn stop(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.stop)
     }
 
-    /// Keeps `error`, and says it in a line.
+    /// Stores `error`, and returns its message.
     pub fn keep(&self, py: Python<'_>, error: PyErr) -> String {
         let told = OneLine(error.to_string()).to_string();
         let mut errors = self.errors.lock().unwrap_or_else(PoisonError::into_inner);
-        // Once for all points that a function is called with.
+        // One exception may concern several points: store it once.
         if errors.iter().all(|(line, _)| *line != told) {
             errors.push((told.clone(), error.clone_ref(py)));
         }
         told
     }
 
-    /// `error` with the exception that it came from, if it tells of one.
+    /// Sets the stored exception whose message `error` contains as its cause.
     pub fn as_cause_of(&self, py: Python<'_>, error: PyErr) -> PyErr {
         let text = error.value(py).to_string();
         let errors = self.errors.lock().unwrap_or_else(PoisonError::into_inner);
         let told = errors.iter().filter(|(line, _)| text.contains(line.as_str()));
-        // Of two lines of which one begins with the other, the longer one.
+        // If one message is the beginning of another, the longer one is the cause.
         if let Some((_, cause)) = told.max_by_key(|(line, _)| line.len()) {
             error.set_cause(py, Some(cause.clone_ref(py)));
         }
@@ -58,18 +58,18 @@ impl Raised {
     }
 }
 
-/// A function in Python, and how it is called.
+/// A Python function, and how it is called.
 #[derive(Debug)]
 struct Function {
     name: String,
     call: Py<PyAny>,
-    /// Whether it takes a random generator, too.
+    /// True if it takes a random generator.
     takes_random: bool,
     raised: Raised,
 }
 
 impl Function {
-    /// A function of `n_given` arguments, and of a random generator if it takes one more.
+    /// Accepts a function of `n_given` arguments, or one more for a random generator.
     fn new(
         function: &Bound<'_, PyAny>,
         (what, n_given): (&str, usize),
@@ -90,7 +90,7 @@ impl Function {
         Ok(Self { name, call, takes_random: parameters.len()? > n_given, raised })
     }
 
-    /// What `make` makes of a call, an error where it raises, or where no function is called any more.
+    /// Calls `make`; returns an error if it raises, or if calls are no longer allowed.
     fn made<T>(&self, make: impl FnOnce(Python<'_>) -> PyResult<T>) -> Result<T, Error> {
         let Self { name, raised, .. } = self;
         let made =
@@ -99,7 +99,7 @@ impl Function {
         made.map_err(|found| Error::new(name, "records, lists or positions", found))
     }
 
-    /// What it returns for `given`; with a generator of these words of seed, if it takes one.
+    /// Calls the function with `given`, and a generator seeded by these words if it takes one.
     fn call<'py>(
         &self,
         py: Python<'py>,
@@ -114,7 +114,7 @@ impl Function {
     }
 }
 
-/// A scheme that is a function: `points` (n, D), and a random generator if it takes one, to records.
+/// A scheme that is a function from `points` (n, D) to records.
 #[derive(Debug)]
 pub struct OwnScheme(Function);
 
@@ -149,7 +149,7 @@ where
     }
 }
 
-/// A source that is a function: a released map, and a random generator if it takes one, to lists.
+/// A source that is a function from a released map to lists.
 #[derive(Debug)]
 pub struct OwnSource {
     function: Function,
@@ -157,11 +157,11 @@ pub struct OwnSource {
     k: usize,
 }
 
-/// Records of a list that are looked at, unless its attribute `k` says otherwise.
+/// Default number of records of a list that are used; the attribute `k` changes it.
 const USUAL_K: usize = 50;
 
 impl OwnSource {
-    /// One that reads descriptors, unless its attribute `needs` is "nothing", with lists of `k`.
+    /// Creates a source. It reads descriptors unless the attribute `needs` is "nothing".
     pub fn new(function: &Bound<'_, PyAny>, raised: &Raised) -> PyResult<Self> {
         let needs: Option<String> = match function.getattr("needs") {
             Ok(needs) => Some(needs.extract()?),
@@ -205,8 +205,9 @@ where
     }
 }
 
-/// A solver that is a function: a released map, its lists, and a random generator if it takes one, to positions about the released
-/// origin, `(n_slots, D)`; what is not finite was not recovered.
+/// A solver that is a function from a released map and its lists to positions `(n_slots, D)`
+/// relative to the released origin. Rows
+/// that are not finite were not recovered.
 #[derive(Debug)]
 pub struct OwnSolver(Function);
 
@@ -241,7 +242,7 @@ where
     }
 }
 
-/// The solver that `given` is: the name of one of ours, or a function.
+/// Returns the solver for `given`, a name or a function.
 pub fn solver_of<const D: usize>(
     given: &Bound<'_, PyAny>,
     raised_by: &Raised,

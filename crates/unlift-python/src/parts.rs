@@ -1,4 +1,4 @@
-//! A map solved in parts, each by whoever has its records and the lists of some slots.
+//! Recovery of a map in parts.
 
 use std::sync::Arc;
 
@@ -15,27 +15,28 @@ use crate::lists::Neighborhoods;
 use crate::recovered::{Recovered, options};
 use crate::work;
 
-/// What is learned of a released map and its lists before any point is placed: small, whatever the size of the map.
+/// What `prepare` learns from a released map and all of its lists. Its size does not depend on the
+/// size of the map.
 #[pyclass(frozen, module = "unlift")]
 pub struct Model(Arc<Learned<3>>);
 
-/// The columns of solved slots, in order.
+/// Columns of solved slots, in order.
 const COLUMNS: [&str; 6] = ["position", "status", "support", "axis", "evidence", "descriptor_row"];
 
 #[pymethods]
 impl Model {
-    /// The model that `to_bytes` gave.
+    /// Restores a model from the bytes of `to_bytes`.
     #[staticmethod]
     fn from_bytes(bytes: &[u8]) -> PyResult<Self> {
         Learned::from_bytes(bytes).map(|model| Self(Arc::new(model))).map_err(raised)
     }
 
-    /// The model as bytes: a few hundred kilobytes at most, the same on every machine.
+    /// Returns the model as bytes: at most a few hundred kilobytes, the same on every machine.
     fn to_bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
         PyBytes::new(py, &self.0.to_bytes())
     }
 
-    /// How it is pickled.
+    /// Supports pickle.
     fn __reduce__<'py>(
         &self,
         py: Python<'py>,
@@ -48,14 +49,16 @@ impl Model {
         format!("<unlift.Model: delta {}>", self.delta())
     }
 
-    /// The distance up to which a record agrees.
+    /// Distance within which a listed record supports a position.
     #[getter]
     fn delta(&self) -> f64 {
         self.0.delta()
     }
 
-    /// Solves the slots from `first` on by consensus. Their lists stand one after the other in `records` and start at `offsets`, which
-    /// has an entry more than there are slots; whatever other lists say changes nothing. A dict of columns, a row per slot.
+    /// Solves the slots from `first` on by consensus, and returns a dict of columns with a row per
+    /// slot. Their lists are joined in
+    /// `records` and start at `offsets`, which has one entry more than there are slots. Other lists
+    /// do not matter.
     #[pyo3(signature = (released, first, offsets, records, *, threads=None))]
     #[allow(clippy::too_many_arguments)]
     fn solve_part<'py>(
@@ -83,7 +86,7 @@ impl Model {
         columns(py, part)
     }
 
-    /// What came back of the whole map, from the `columns` of all slots in order: what `recover` gives, bit for bit.
+    /// Joins the `columns` of all slots in order to the result of `recover`, bit for bit.
     fn join(
         &self,
         py: Python<'_>,
@@ -98,7 +101,7 @@ impl Model {
     }
 }
 
-/// Learns what consensus must know of a released map and all of its lists.
+/// Learns from a released map and all of its lists what consensus needs.
 #[pyfunction]
 #[pyo3(signature = (released, lists, *, delta=None, seed=0, exact_constraints=true, threads=None))]
 pub fn prepare(
@@ -117,7 +120,6 @@ pub fn prepare(
     Ok(Model(Arc::new(model)))
 }
 
-/// Estimates as columns.
 fn columns(py: Python<'_>, part: Part<3>) -> PyResult<Bound<'_, PyDict>> {
     let rows = &part.estimates;
     let values = [
@@ -136,7 +138,7 @@ fn columns(py: Python<'_>, part: Part<3>) -> PyResult<Bound<'_, PyDict>> {
     Ok(found)
 }
 
-/// The columns of `n` slots as estimates.
+/// Converts the columns of `n` slots to estimates.
 fn part(columns: &Bound<'_, PyDict>, n: usize) -> PyResult<Part<3>> {
     let given = |name: &str| -> PyResult<Bound<'_, PyAny>> {
         let missing = || wrong("columns", format!("a column {name}"), "none");

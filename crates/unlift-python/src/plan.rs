@@ -1,4 +1,4 @@
-//! From arguments to a plan: the usual one, with what was asked for.
+//! Conversion of arguments to a plan.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use crate::obfuscate::scheme_of;
 use crate::own::{OwnScheme, OwnSolver, OwnSource, Raised, solver_of};
 use crate::work;
 
-/// What an audit was asked for; `None` is as usual.
+/// Options of an audit; `None` means the default.
 #[derive(FromPyObject)]
 pub struct Asked<'py> {
     #[pyo3(item)]
@@ -60,7 +60,7 @@ pub struct Asked<'py> {
 }
 
 impl Asked<'_> {
-    /// The plan for `prepared`, what a user should know about it, and what speaks against its figures.
+    /// Returns the plan for `prepared`, notes for the user, and doubts about the results.
     pub fn plan(
         &self,
         py: Python<'_>,
@@ -88,7 +88,7 @@ impl Asked<'_> {
         })
     }
 
-    /// The plan for images.
+    /// Returns the plan for images.
     pub fn plan_of_images(&self, by: &Raised) -> PyResult<Plan<2>> {
         let plan = self.with(Plan::<2>::new(Unit::Pixel), Unit::Pixel, by)?;
         let plan = Plan { headline: headline(&plan.thresholds), ..plan };
@@ -96,7 +96,7 @@ impl Asked<'_> {
         Ok(plan)
     }
 
-    /// `usual` with what was asked for, of points in `unit`.
+    /// Returns the plan `usual` with these options, for points in `unit`.
     fn with<const D: usize>(&self, usual: Plan<D>, unit: Unit, by: &Raised) -> PyResult<Plan<D>>
     where
         OwnScheme: Scheme<D>,
@@ -138,7 +138,7 @@ impl Asked<'_> {
         })
     }
 
-    /// Refuses what would be about none of `sources`, as the command line does.
+    /// Returns an error for an option that applies to none of `sources`, as on the command line.
     fn check_about<const D: usize>(&self, sources: &[NeighborsBy<D>]) -> PyResult<()> {
         let about = |name: &str, expected: &str| {
             let found: Vec<&str> = sources.iter().map(NeighborsBy::name).collect();
@@ -155,13 +155,13 @@ impl Asked<'_> {
         let is_ours =
             |given: &Bound<'_, PyAny>| given.extract::<String>().is_ok_and(|name| name != "oracle");
         if self.source_k.is_some() && !self.neighbors.iter().any(is_ours) {
-            // A function has a length of lists of its own.
+            // A function determines the length of its lists.
             return Err(about("source_k", "neighbors with a source of unlift's"));
         }
         Ok(())
     }
 
-    /// Sources of neighborhoods, each name once.
+    /// Returns the sources; each name may occur once.
     fn sources<const D: usize>(&self, by: &Raised) -> PyResult<Vec<NeighborsBy<D>>>
     where
         OwnSource: Source<D>,
@@ -185,7 +185,7 @@ impl Asked<'_> {
         Ok(sources)
     }
 
-    /// A source of neighborhoods, a name or a function.
+    /// Returns the source for a name or a function.
     fn source<const D: usize>(
         &self,
         given: &Bound<'_, PyAny>,
@@ -205,7 +205,8 @@ impl Asked<'_> {
     }
 }
 
-/// Refuses a function under a name of ours: a report would say of it what is so of ours.
+/// Returns an error for a function with a built-in name, because a report would mistake it for the
+/// built-in one.
 fn of_its_own(what: &str, given: &Bound<'_, PyAny>, name: &str, taken: bool) -> PyResult<()> {
     match taken && given.extract::<String>().is_err() {
         true => Err(wrong(what, "functions with a name that unlift does not use", name)),
@@ -213,7 +214,7 @@ fn of_its_own(what: &str, given: &Bound<'_, PyAny>, name: &str, taken: bool) -> 
     }
 }
 
-/// Solvers by name or as functions; names that repeat an earlier one are left out, as on the command line.
+/// Returns the solvers for names or functions, without repeated names, as on the command line.
 fn solvers<const D: usize>(
     given: &[Bound<'_, PyAny>],
     by: &Raised,
@@ -232,7 +233,7 @@ where
     Ok(kept)
 }
 
-/// What `names` stand for, each once.
+/// Returns what `names` stand for, each once.
 fn named<T: PartialEq>(
     names: &[String],
     of: impl Fn(&str) -> Result<T, unlift::Error>,
@@ -241,7 +242,7 @@ fn named<T: PartialEq>(
     all.map(distinct).map_err(raised)
 }
 
-/// `items` without those that repeat an earlier one, as on the command line: an audit has one row per combination.
+/// Removes items that repeat an earlier one, because an audit has one row per combination.
 fn distinct<T: PartialEq>(items: Vec<T>) -> Vec<T> {
     let mut kept = Vec::with_capacity(items.len());
     for item in items {
@@ -252,7 +253,7 @@ fn distinct<T: PartialEq>(items: Vec<T>) -> Vec<T> {
     kept
 }
 
-/// Thresholds as they were written, texts or numbers; else the usual ones.
+/// Returns thresholds from strings or numbers, or the default.
 pub fn thresholds(
     given: Option<&Bound<'_, PyAny>>,
     usual: &[Threshold],
@@ -274,7 +275,7 @@ pub fn thresholds(
     Ok(thresholds)
 }
 
-/// The distance that decides support, or the attack's own choice.
+/// Returns the distance within which a record supports a position.
 pub fn delta(given: Option<f64>) -> PyResult<Delta> {
     match given {
         None => Ok(Delta::Auto),

@@ -1,4 +1,4 @@
-//! Records of one's own scheme: what a function returns that hides points.
+//! Records that a user's scheme returns.
 
 use pyo3::PyClass;
 use pyo3::prelude::*;
@@ -13,7 +13,7 @@ use crate::arrays::{column, indices, is_of_pairs, rows, told};
 use crate::either::{Either, of_either};
 use crate::errors::{raised, wrong};
 
-/// Records, and which points they hide; `None` is one each, in order.
+/// Records, and the points that they hide; `None` means one point each, in order.
 #[derive(Clone)]
 pub struct Hiding<const D: usize> {
     obfuscation: Obfuscation<D>,
@@ -23,7 +23,8 @@ pub struct Hiding<const D: usize> {
 }
 
 impl<const D: usize> Hiding<D> {
-    /// With the points in `hidden`, an array `(n,)`, or `(n, 2)` of lines that hide two points each.
+    /// Combines records with the points in `hidden`, an array `(n,)`, or `(n, 2)` for lines that
+    /// hide two points each.
     fn of(obfuscation: Obfuscation<D>, hidden: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let n = obfuscation.len();
         let (mut slots_per_record, mut rows) = (1, None);
@@ -40,7 +41,7 @@ impl<const D: usize> Hiding<D> {
         Ok(Self { obfuscation, slots_per_record, hidden: rows, swapped_axis: None })
     }
 
-    /// The same about `n` points: those in no record are dropped.
+    /// Converts to records of `n` points; points without a record are dropped.
     pub fn lifted(self, n: usize, name: &str) -> Result<Lifted<D>, Error> {
         let Some(hidden) = self.hidden else {
             let found = self.obfuscation.len();
@@ -80,12 +81,12 @@ impl<const D: usize> Hiding<D> {
     }
 }
 
-/// Records of keypoints of an image, or of points of a map.
+/// Records of an image or of a map.
 type OfEither = Either<Hiding<2>, Hiding<3>>;
 
-/// Records in one of the two dimensions.
+/// Access to records by dimension.
 pub trait InDimension: Sized {
-    /// Those of `records`, if they are in this one.
+    /// Returns `records` if they are of this dimension.
     fn of_records(records: &Records) -> Option<&Self>;
 }
 
@@ -107,7 +108,7 @@ impl InDimension for Hiding<3> {
     }
 }
 
-/// Records that hide points, and which ones: what Lines, Rays, Planes and Candidates have in common.
+/// Records and the points that they hide: the base class of Lines, Rays, Planes and Candidates.
 #[pyclass(frozen, subclass, module = "unlift")]
 pub struct Records(OfEither);
 
@@ -129,12 +130,12 @@ impl Records {
     }
 }
 
-/// A class of records.
 fn of<T: PyClass<BaseType = Records>>(hiding: OfEither, class: T) -> PyClassInitializer<T> {
     PyClassInitializer::from(Records(hiding)).add_subclass(class)
 }
 
-/// Lines through `points` (n, 3) along `directions` (n, 3); of an image (n, 2) both. With `hidden` (n, 2) each hides two points.
+/// Lines through `points` (n, 3) along `directions` (n, 3); for an image, both (n, 2). With
+/// `hidden` (n, 2) each hides two points.
 #[pyclass(frozen, extends = Records, module = "unlift")]
 pub struct Lines;
 
@@ -156,10 +157,8 @@ impl Lines {
     }
 }
 
-/// An array, as it was given.
 type Given<'a, 'py> = &'a Bound<'py, PyAny>;
 
-/// Lines through points, along directions, which hide points.
 fn lines<const D: usize>(
     (points, directions, hidden): (Given<'_, '_>, Given<'_, '_>, Option<Given<'_, '_>>),
 ) -> PyResult<Hiding<D>> {
@@ -168,8 +167,9 @@ fn lines<const D: usize>(
     Hiding::of(Obfuscation::Lines(lines), hidden)
 }
 
-/// Half-lines from `centers` (m, 3), of which `center` (n,) says which, along `directions` (n, 3), from the center to the point;
-/// of an image centers (m, 2) and directions (n, 2).
+/// Rays from `centers` (m, 3) along `directions` (n, 3), from the center to the point; `center`
+/// (n,) is the index of each ray's
+/// center. For an image, centers (m, 2) and directions (n, 2).
 #[pyclass(frozen, extends = Records, module = "unlift")]
 pub struct Rays;
 
@@ -192,7 +192,6 @@ impl Rays {
     }
 }
 
-/// Half-lines from centers, each from one of them, along directions, which hide points.
 fn rays<const D: usize>(
     (centers, center, directions, hidden): (
         Given<'_, '_>,
@@ -208,7 +207,7 @@ fn rays<const D: usize>(
     Hiding::of(Obfuscation::Rays(rays.map_err(raised)?), hidden)
 }
 
-/// Planes of which coordinate `axis` (n,), 0 to 2, is `offset` (n,). There are none of images.
+/// Planes on which coordinate `axis` (n,), 0 to 2, equals `offset` (n,). Not for images.
 #[pyclass(frozen, extends = Records, module = "unlift")]
 pub struct Planes;
 
@@ -228,8 +227,9 @@ impl Planes {
     }
 }
 
-/// Points `positions` (n, 3) of which one coordinate, `swapped_axis` (n,), 0 to 2, is another point's: the secret, which is not
-/// released. Of an image positions (n, 2), and coordinates 0 and 1.
+/// Points `positions` (n, 3) with one coordinate, `swapped_axis` (n,), 0 to 2, of another point.
+/// The axis is secret and not
+/// released. For an image, positions (n, 2), and axes 0 and 1.
 #[pyclass(frozen, extends = Records, module = "unlift")]
 pub struct Candidates;
 
@@ -251,7 +251,6 @@ impl Candidates {
     }
 }
 
-/// Points with a swapped coordinate, which hide points.
 fn candidates<const D: usize>(
     (positions, swapped_axis, hidden): (Given<'_, '_>, Given<'_, '_>, Option<Given<'_, '_>>),
 ) -> PyResult<Hiding<D>> {
@@ -266,7 +265,7 @@ fn candidates<const D: usize>(
     Ok(Hiding { swapped_axis, ..hiding })
 }
 
-/// What a function called `name` returned, as records of points `(n, D)`.
+/// Converts the result of the function `name` to records of points `(n, D)`.
 pub fn hiding<const D: usize>(returned: &Bound<'_, PyAny>, name: &str) -> PyResult<Hiding<D>>
 where
     Hiding<D>: InDimension,

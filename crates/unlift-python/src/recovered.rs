@@ -1,4 +1,4 @@
-//! Recovery and its figures.
+//! Recovery and evaluation.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ use crate::own::{Raised, solver_of};
 use crate::plan::{delta, thresholds};
 use crate::work;
 
-/// What came back of a map: a position for every hidden point, or the reason why there is none.
+/// Recovered points of a map: a position for every hidden point, or the reason why there is none.
 #[pyclass(frozen, module = "unlift")]
 pub struct Recovered(pub Arc<Found<3>>);
 
@@ -34,7 +34,8 @@ impl Recovered {
         Ok(Self(Arc::new(found)))
     }
 
-    /// Writes them (Parquet), as `unlift recover` does. What is there and no recovered points stays, unless `force`.
+    /// Writes the points (Parquet), as `unlift recover` does. Replaces other files only with
+    /// `force`.
     #[pyo3(signature = (path, *, force=false))]
     fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
         save(py, (path, force), Kind::Recovered, |path| write_recovered(path, &self.0))
@@ -56,32 +57,32 @@ impl Recovered {
         Ok(to_rows(py, rows)?.into_any())
     }
 
-    /// "ok", or why nothing was recovered, for each.
+    /// For each slot "ok", or the reason why nothing was recovered.
     #[getter]
     fn status(&self) -> Vec<&'static str> {
         self.0.status().iter().map(|status| status.name()).collect()
     }
 
-    /// Listed records that agree, for each `(n_slots,)`.
+    /// Number of listed records that support each position `(n_slots,)`.
     #[getter]
     fn support<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         to_array(py, self.0.support().to_vec()).into_any()
     }
 
-    /// The distance up to which a record agrees.
+    /// Distance within which a listed record supports a position.
     #[getter]
     fn delta(&self) -> f64 {
         self.0.delta()
     }
 
-    /// The unit of lengths.
+    /// Unit of lengths.
     #[getter]
     fn unit(&self) -> &'static str {
         self.0.unit().name()
     }
 
-    /// How likely each lies within `threshold` of the truth `(n_slots,)`, by the attacker's own reckoning; None where that is
-    /// not known.
+    /// Probability that each position lies within `threshold` of the truth `(n_slots,)`, as the
+    /// attacker computes it; None if unknown.
     fn probability_within<'py>(
         &self,
         py: Python<'py>,
@@ -92,16 +93,16 @@ impl Recovered {
         Some(to_array(py, (0..self.0.n_slots()).map(of).collect()).into_any())
     }
 
-    /// Why certainty is not known, or None.
+    /// Reason why `probability_within` is unknown, or None.
     #[getter]
     fn confidence_unknown(&self) -> Option<&'static str> {
         self.0.confidence_unknown().map(|unknown| unknown.reason())
     }
 }
 
-/// Recovers the points of a released map from lists of near records by `solver`, a name of `SOLVERS` ("joint" without one) or a
-/// function: no truth is looked at. Without `confidence` nobody asks how sure
-/// the attacker is.
+/// Recovers the points of a released map from neighbor lists, without the truth. `solver` is a name
+/// in `SOLVERS` or a function;
+/// default: "joint". `confidence=False` skips the computation of `probability_within`.
 #[pyfunction]
 #[pyo3(signature = (released, lists, *, solver=None, delta=None, seed=0, exact_constraints=true, confidence=true, threads=None))]
 #[allow(clippy::too_many_arguments)]
@@ -133,7 +134,7 @@ pub fn recover(
     Ok(Recovered(Arc::new(found.map_err(|error| by.as_cause_of(py, error))?)))
 }
 
-/// Options of recovery as arguments say them.
+/// Converts arguments to options of recovery.
 pub fn options(delta: Option<f64>, seed: u64, exact_constraints: bool) -> PyResult<RecoverOptions> {
     Ok(RecoverOptions {
         delta: self::delta(delta)?,
@@ -143,7 +144,8 @@ pub fn options(delta: Option<f64>, seed: u64, exact_constraints: bool) -> PyResu
     })
 }
 
-/// The figures of what came back, as a row of an audit has them: a dict. With a Hidden also those of a blind guess.
+/// Compares recovered points with the truth; returns a dict like a row of an audit. With a Hidden
+/// it includes the blind baseline.
 #[pyfunction]
 #[pyo3(signature = (recovered, truth, *, thresholds=None))]
 pub fn evaluate<'py>(

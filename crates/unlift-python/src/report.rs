@@ -1,4 +1,4 @@
-//! What an audit found, for Python.
+//! Results of an audit.
 
 use std::path::PathBuf;
 
@@ -12,7 +12,7 @@ use crate::files::refused;
 use crate::json::as_python;
 use crate::rows::Rows;
 
-/// What an audit found: figures, and a page that shows them.
+/// Results of an audit: numbers, and a page that shows them.
 #[pyclass(frozen, module = "unlift")]
 pub struct Report(Audited);
 
@@ -35,22 +35,22 @@ impl Report {
         Ok(Rows::of(self.value(false)?["results"].as_array().map_or(&[][..], Vec::as_slice)))
     }
 
-    /// All figures, as `audit.json` has them: a dict.
+    /// All numbers, as in `audit.json`.
     #[getter]
     fn document<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         as_python(py, &self.value(false)?)
     }
 
-    /// Whether every gate held, and every image could be used.
+    /// True if every gate held and every image could be used.
     #[getter]
     fn passed(&self) -> bool {
         let document = &self.0.document;
-        // Figures of fewer images than asked for decide no gate.
+        // Results over fewer images than requested decide no gate.
         let all_used = document.input.images.as_ref().is_none_or(|images| images.unusable == 0);
         all_used && document.gates.iter().all(|gate| gate.passed)
     }
 
-    /// The text of `audit.json`.
+    /// Returns the text of `audit.json`.
     #[pyo3(signature = (*, share_safe=false))]
     fn json(&self, share_safe: bool) -> PyResult<String> {
         let document = &self.0.document;
@@ -58,14 +58,15 @@ impl Report {
         text.map_err(raised)
     }
 
-    /// The page, one self-contained HTML file.
+    /// Returns the page, one self-contained HTML file.
     #[pyo3(signature = (*, share_safe=false))]
     fn html(&self, py: Python<'_>, share_safe: bool) -> PyResult<String> {
         py.detach(|| self.0.page(share_safe)).map_err(raised)
     }
 
-    /// Writes `report.html` and `audit.json` into the folder `out`, both or none; `share_safe`: figures only. What is there
-    /// and not an audit's stays, unless `force`.
+    /// Writes `report.html` and `audit.json` into the folder `out`, both or none; with
+    /// `share_safe`, numbers only. Replaces files that
+    /// are not of an audit only with `force`.
     #[pyo3(signature = (out, *, share_safe=false, force=false))]
     fn save(
         &self,
@@ -81,7 +82,7 @@ impl Report {
         })
     }
 
-    /// The table that the command line prints, and how gates ended.
+    /// Returns the table that the command line prints, and the results of gates.
     fn __str__(&self) -> String {
         let document = &self.0.document;
         unlift_report::text_table(document) + &unlift_report::gate_lines(document)

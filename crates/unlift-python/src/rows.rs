@@ -1,4 +1,4 @@
-//! Rows as a table in Arrow, which pandas, polars, DuckDB and pyarrow read without a copy and without each other.
+//! Rows as an Arrow table, which pandas, polars, DuckDB and pyarrow read without a copy.
 
 use std::sync::Arc;
 
@@ -14,8 +14,10 @@ use serde_json::Value;
 use crate::errors::raised;
 use crate::json::as_python;
 
-/// The rows of an audit, one column per figure: names as in the CSV of `unlift table` (`recovered_percent_within_0.10`), and
-/// those of `audit.json` for what the CSV lacks, with a dot before what stands within (`lost.no_neighbors`).
+/// The rows of an audit, one column per number. Names are those in the CSV of `unlift table`
+/// (`recovered_percent_within_0.10`);
+/// columns that the CSV lacks have their names of `audit.json`, with a dot between the levels
+/// (`lost.no_neighbors`).
 #[pyclass(frozen, module = "unlift")]
 pub struct Rows {
     columns: Vec<(String, Vec<Value>)>,
@@ -66,7 +68,7 @@ impl Rows {
     }
 }
 
-/// A value, or each of those that stand within it, under the names of the CSV.
+/// Passes a value, or each value within it, to `put` with its name in the CSV.
 fn put_each(name: &str, value: &Value, put: &mut impl FnMut(String, &Value)) {
     let Value::Object(within) = value else { return put(name.to_owned(), value) };
     for (key, value) in within {
@@ -85,7 +87,7 @@ fn put_each(name: &str, value: &Value, put: &mut impl FnMut(String, &Value)) {
     }
 }
 
-/// A column of the one kind that all of its values are; texts where they are none.
+/// Builds a column of the common type of all values; mixed types become strings.
 fn array(values: &[Value]) -> ArrayRef {
     let all = |is: fn(&Value) -> bool| {
         values.iter().any(|value| !value.is_null()) && values.iter().all(|v| v.is_null() || is(v))
@@ -124,7 +126,7 @@ impl Rows {
         self.columns.iter().map(|(name, _)| name.clone()).collect()
     }
 
-    /// A column, as a list.
+    /// Returns a column as a list.
     fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         match self.columns.iter().find(|(other, _)| other == name) {
             Some((_, values)) => as_python(py, &Value::Array(values.clone())),
@@ -132,7 +134,7 @@ impl Rows {
         }
     }
 
-    /// The table as Arrow's C interface hands it on; the schema that is asked for is not looked at.
+    /// Exports the table through Arrow's C interface; `requested_schema` is ignored.
     #[pyo3(signature = (requested_schema=None))]
     fn __arrow_c_stream__<'py>(
         &self,

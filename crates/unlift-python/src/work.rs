@@ -1,7 +1,8 @@
-//! Work without the interpreter's lock, which ends for the user when the user interrupts it.
+//! Work without the interpreter's lock, which an interrupt can end.
 //!
-//! All that computes runs here, on threads that end with it: the threads of rayon's own pool, which lasts, a forked child would
-//! wait for and not have.
+//! All work runs on threads that end with it. rayon's global pool lasts, but a forked child would
+//! wait for its threads, which it
+//! does not have.
 
 use std::fmt::Display;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -15,14 +16,15 @@ use unlift::guard::told;
 use crate::calls;
 use crate::errors::{raised, wrong};
 
-/// How often the interpreter is asked whether the user has interrupted.
+/// Interval of checks for an interrupt.
 const ASKED: Duration = Duration::from_millis(50);
 
-/// Threads at most: more than machines have cores, and few enough to be started.
+/// Maximum number of threads: more than machines have cores, and few enough to start.
 const MOST_THREADS: usize = 512;
 
-/// Runs `work` on `threads` threads (all cores without a number) and waits for it. An interrupt ends the wait at once; the work
-/// ends where `stop` is asked about, and of work that never asks the result is thrown away.
+/// Runs `work` on `threads` threads (default: all cores) and waits for it. An interrupt ends the
+/// wait at once; the work ends
+/// at its next check of `stop`, and its result is dropped.
 pub fn run<T: Send + 'static, E: Display>(
     py: Python<'_>,
     threads: Option<usize>,
@@ -56,7 +58,7 @@ pub fn run<T: Send + 'static, E: Display>(
         if let Err(interrupt) = py.check_signals() {
             if let Some(stop) = &stop {
                 stop.store(true, Ordering::SeqCst);
-                // Best effort: a function that runs on takes time that the user wants back.
+                // If this fails, the user's function continues for a while.
                 let _ = calls::interrupt(py, Some(stop));
             }
             return Err(interrupt);

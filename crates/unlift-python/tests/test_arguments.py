@@ -1,4 +1,4 @@
-"""Arguments that are taken as they are meant, or refused in one line."""
+"""Valid arguments are accepted, others refused in one line."""
 
 import numpy as np
 import pytest
@@ -23,16 +23,16 @@ def cheap(points, schemes=("olc",), *more, **options):
 
 @pytest.mark.parametrize("dtype", ["u1", "i1", "u2", "u4", "i8", "u8"])
 def test_records_are_those_of_the_array_in_every_kind_of_number(points, dtype):
-    # As many records as the kind can name.
+    # As many records as the type can number.
     n = min(256, int(np.iinfo(dtype).max) + 1)
     some = unlift.obfuscate(unlift.Map(points[:n], scale=1.0), "olc", seed=1)
     rows = ((np.arange(n)[:, None] + [1, 2, 3]) % n).astype(dtype)
     lists = unlift.Neighborhoods(some, rows, np.tile([3, 2, 1], (n, 1)))
     assert rows.max() == n - 1
-    # Lists are kept in the order of records.
+    # Lists are stored in the order of records.
     np.testing.assert_array_equal(lists.records, np.sort(rows, 1).ravel())
     np.testing.assert_array_equal(lists.offsets, 3 * np.arange(n + 1))
-    # Rows of numbers are arrays, too.
+    # Sequences of rows are accepted as arrays.
     assert unlift.Neighborhoods(some, rows.tolist(), [[3.0, 2.0, 1.0]] * n).scores[:3].tolist() == [3, 2, 1]
     if dtype[0] == "i":
         rows[:, 1] = -1
@@ -134,7 +134,7 @@ def test_a_broken_law_is_told_by_its_exception_alone(capfd):
             raise ValueError(f"not of {len(points)}")
         return level(points)
 
-    # What the exception tells of, not what was rightly refused before.
+    # The cause is the exception that failed the check, not an earlier refusal.
     with pytest.raises(AssertionError, match="not of 200") as error:
         unlift.testing.check_scheme(refuses)
     assert str(error.value.__cause__) == "not of 200"

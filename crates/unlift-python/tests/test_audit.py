@@ -1,4 +1,4 @@
-"""Audits: the same figures as the command line, schemes and sources that are functions, interrupts."""
+"""Audits: the results of the command line, schemes and sources that are functions, interrupts."""
 
 import json
 import os
@@ -36,7 +36,7 @@ def cheap(map, schemes, **more):
 
 
 def figures(document):
-    """What does not depend on when and where it was computed."""
+    """Returns what does not depend on the time and the machine."""
     keep = ["schema", "seed", "options", "results", "not_audited", "break_even", "gates"]
     return json.dumps({key: document.get(key) for key in keep}, sort_keys=True)
 
@@ -56,7 +56,7 @@ def test_figures_are_those_of_the_command_line(points, tmp_path):
     assert lines == [line for line in str(report).splitlines() if line.startswith("gate ")]
     cli = json.loads((tmp_path / "cli" / "audit.json").read_text())
     assert figures(report.document) == figures(cli)
-    # From the file, with its path and hash.
+    # Read from a file, the report has its path and hash.
     read = unlift.audit(
         unlift.read(tmp_path / "points.npy", scale=1.0, k=20), ["olc", "cp"], inlier_ratios=[0.5], k=20, gates=["all:0.10<=1"]
     )
@@ -105,7 +105,7 @@ def test_a_solver_is_a_function(small):
     assert np.allclose(found.positions, hidden.released.columns["foot"] + hidden.released.origin, atol=1e-5)
     rows = cheap(small, ["olc"], solvers=[foot, "consensus"]).rows
     assert rows["solver"] == ["foot", "consensus"]
-    # It knows no planes: its rows are missing, those of ours are there.
+    # The solver does not support planes: its rows are missing, the others are not.
     report = cheap(small, ["plane"], solvers=[foot, "consensus"])
     assert report.rows["solver"] == ["consensus"]
     assert "KeyError" in report.document["not_audited"][0]["reason"]
@@ -150,7 +150,7 @@ def test_every_family_of_records_can_be_returned(small, family):
 def test_a_source_is_a_function(small, points):
     @unlift.source(needs="nothing", k=10)
     def meeting(released):
-        # Lines whose feet are near each other: next to nothing, but a list.
+        # Lines whose feet are near each other: a poor list, but valid.
         foot = released.columns["foot"]
         apart = np.linalg.norm(foot[:, None] - foot[None], axis=2)
         near = np.argsort(apart, axis=1)[:, 1:11]
@@ -221,7 +221,7 @@ def test_progress_is_told_and_may_stop(small):
 def test_an_interrupt_ends_the_wait_within_a_second():
     points = np.random.default_rng(1).uniform(0, 9, (60_000, 3))
     large = unlift.Map(points, scale=1.0)
-    # What runs in the background of a shell ignores interrupts from its start.
+    # Background processes of a shell ignore interrupts from their start.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     started = time.monotonic()
     timer = threading.Timer(1.0, lambda: os.kill(os.getpid(), signal.SIGINT))
@@ -251,7 +251,7 @@ def test_reports_are_saved_and_tables_read_by_others(small, tmp_path):
     if PROGRAM is not None:
         csv = subprocess.run([PROGRAM, "table", tmp_path / "out" / "audit.json", "--format", "csv"], capture_output=True, text=True)
         heads, cells = (line.split(",") for line in csv.stdout.splitlines()[:2])
-        # What is not known has no column here; a single repeat is not said.
+        # Unknown values have no column; nor has a single repeat.
         known = {head for head, cell in zip(heads, cells) if cell} - {"repeats"}
         assert len(known) > 15 and known <= set(report.rows.columns)
 

@@ -1,4 +1,4 @@
-"""What the documentation shows runs."""
+"""The code of the documentation runs."""
 
 import doctest
 import importlib
@@ -23,7 +23,7 @@ def test_the_readme(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     points = np.random.default_rng(1).uniform(0, 3, (300, 3))
     np.save("PROJECT.npy", points)
-    # A small map and few rows: the same lines, in seconds.
+    # A small map and few rows, so that the code runs in seconds.
     usual = unlift.audit
     monkeypatch.setattr(unlift, "audit", lambda m, **more: usual(m, **(more | {"solvers": ["consensus"], "inlier_ratios": [0.5]})))
     blocks = re.findall(r"```python\n(.*?)```", README.read_text(), re.S)

@@ -1,4 +1,4 @@
-"""What the command line writes is opened by those it is written for."""
+"""Other programs open what the command line writes."""
 
 import os
 import pathlib
@@ -19,7 +19,7 @@ def test_pycolmap_opens_a_model(tmp_path: pathlib.Path):
     points = np.random.default_rng(1).uniform(0, 4, (300, 3))
     hidden = unlift.obfuscate(unlift.Map(points, scale=0.5), "olc", seed=1)
     hidden.truth.save(tmp_path / "truth.parquet")
-    # A model with a turned camera, to take cameras and images from.
+    # A model with a rotated camera, for --cameras.
     (tmp_path / "from").mkdir()
     (tmp_path / "from/cameras.txt").write_text("1 SIMPLE_RADIAL 640 480 500 320 240 0.01\n")
     (tmp_path / "from/images.txt").write_text("4 0.6 0.48 -0.64 0 1 2 3 1 seq/a.png\n\n")

@@ -1,4 +1,4 @@
-"""Files that are saved: nothing of others is lost, and the truth is its owner's alone."""
+"""Saved files: foreign files are not replaced, and only the owner can read the truth."""
 
 import os
 import stat
@@ -11,7 +11,7 @@ import unlift
 
 @pytest.fixture(scope="module")
 def parts():
-    """What can be saved, and its class, by name."""
+    """Returns objects that can be saved, and their classes, by name."""
     points = np.random.default_rng(7).uniform(0, 4, (300, 3))
     hidden = unlift.obfuscate(unlift.Map(points, scale=1.0), "olc", seed=1)
     lists = unlift.neighbors.oracle(hidden, 0.7, k=20)
@@ -33,7 +33,7 @@ def test_what_is_not_of_its_kind_stays(parts, name, tmp_path):
         part.save(path)
     assert path.read_bytes() == kept
     part.save(path, force=True)
-    # Its own kind is replaced unasked.
+    # A file of the same kind is replaced without `force`.
     part.save(path)
     with pytest.raises(unlift.UnliftError, match="expected a file, found a folder"):
         part.save(tmp_path, force=True)

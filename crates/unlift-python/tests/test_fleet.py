@@ -1,4 +1,4 @@
-"""Many maps at once, as engines run them."""
+"""Audits of many maps, as engines run them."""
 
 import pathlib
 

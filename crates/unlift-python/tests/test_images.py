@@ -1,4 +1,4 @@
-"""Audits of images: the figures of the command line from arrays, schemes and sources that are functions, mistakes in a line."""
+"""Audits of images: the results of the command line, schemes and sources that are functions, one-line errors."""
 
 import json
 import os
@@ -21,7 +21,7 @@ QUICK = {"inlier_ratios": [0.5], "solvers": ["consensus"], "k": 10}
 
 
 def features(seed, n=90, size=(640, 480)):
-    """Keypoints at halves, which COLMAP's single floats hold, and SIFT that changes slowly from place to place."""
+    """Returns keypoints at multiples of 0.5, exact in single precision, and SIFT that varies slowly with the position."""
     random = np.random.default_rng(seed)
     keypoints = random.integers(0, 2 * (np.array(size) - 1), (n, 2)) / 2
     waves = np.sin(keypoints / 90 @ random.uniform(-2, 2, (2, 128)) + random.uniform(0, 6, 128))
@@ -44,13 +44,13 @@ def quick(images, *more, **options):
 
 
 def figures(document):
-    """What does not depend on when, where and of which file it was computed."""
+    """Returns what does not depend on the time, the machine and the file."""
     keep = ["schema", "seed", "options", "results", "not_audited", "notes", "break_even", "gates", "images"]
     return json.dumps({key: document.get(key) for key in keep}, sort_keys=True)
 
 
 def database(path, images):
-    """The same as COLMAP keeps it, whose first pixel has its middle at (0.5, 0.5)."""
+    """Writes the images to a COLMAP database, where the middle of the first pixel is (0.5, 0.5)."""
     with sqlite3.connect(path) as base:
         base.executescript("""
             CREATE TABLE cameras (camera_id INTEGER PRIMARY KEY, model INTEGER, width INTEGER, height INTEGER);
@@ -85,7 +85,7 @@ def test_figures_are_those_of_the_command_line(images, tmp_path):
     assert figures(of_arrays.document) == figures(cli) and not of_arrays.passed
     assert [one["name"] for one in cli["images"]] == ["Z.png", "a.jpg", "b.jpg", "sub/c.jpg"]
     assert of_arrays.document["input"]["path"] is None and of_arrays.document["input"]["sha256"] != cli["input"]["sha256"]
-    # In another order, by pairs, on another number of threads.
+    # In another order, as pairs, with another number of threads.
     pairs = reversed(list(images.items()))
     assert figures(unlift.audit_images(pairs, *given, **options, threads=1).document) == figures(cli)
     of_file = unlift.audit_images(tmp_path / "database.db", *given, **options)
@@ -110,7 +110,7 @@ def test_photos_and_features_in_hdf5_are_read_as_by_the_command_line(tmp_path):
 
 
 def png(gray):
-    """A gray photo as PNG."""
+    """Returns a gray photo as bytes of a PNG file."""
     import struct
     import zlib
 
@@ -326,7 +326,7 @@ def test_progress_is_told_image_by_image_and_may_stop(images):
 
 
 def test_other_threads_run_meanwhile(images):
-    # Without the interpreter's lock, a second audit ends while the first is at work.
+    # The audit runs without the interpreter's lock, so a second one ends while it runs.
     found = []
     threads = [threading.Thread(target=lambda: found.append(quick(images).document["results"])) for _ in range(2)]
     [thread.start() for thread in threads]

@@ -1,4 +1,4 @@
-"""A map in parts is the map at once, bit for bit."""
+"""Recovery in parts equals recovery of the whole map, bit for bit."""
 
 import pathlib
 import pickle
@@ -46,7 +46,7 @@ def test_slots_without_rows_have_no_lists():
     rows = unlift.parts.table(unlift.neighbors.oracle(of, 0.5, k=20))
     lists = unlift.Neighborhoods(of, np.full((len(rows), 1), -1))
     model = unlift.prepare(of, unlift.neighbors.oracle(of, 0.5, k=20))
-    # One slot of a record alone, in the middle: both of its slots come out, and nothing else.
+    # The part has one slot of a record: both slots of the record are solved, and no others.
     (found,) = unlift.parts.recover(rows.slice(101, 1).to_batches(), of, model)
     assert found["slot"].to_pylist() == [100, 101] and found["status"].to_pylist() == [1, 0]
     back = unlift.parts.join([found], of, model)

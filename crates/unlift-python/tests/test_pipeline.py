@@ -1,4 +1,4 @@
-"""The pipeline step by step, against NumPy."""
+"""The pipeline step by step, compared with NumPy."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ import unlift
 
 @pytest.fixture
 def points():
-    """A surface: neighbors are near each other, as on walls."""
+    """Returns points on a surface, such as a wall, where neighbors are near each other."""
     random = np.random.default_rng(7)
     flat = random.uniform(0, 4, (600, 2))
     return np.column_stack([flat, 0.3 * np.sin(flat[:, 0] * 2) + 1.0])
@@ -70,7 +70,7 @@ def test_what_comes_back_is_where_it_was(described, tmp_path):
     assert figures["n_points"] == 600 and figures["blind_percent"]["0.25"] < 10
     assert figures["recovered_percent"]["0.25"] > 50
     assert back.status.count("ok") == np.isfinite(back.positions).all(1).sum()
-    # Files are those of the command line.
+    # Files equal those of the command line.
     for name, part in [("r", hidden.released), ("t", hidden.truth), ("l", lists), ("b", back)]:
         part.save(tmp_path / f"{name}.parquet")
     read = unlift.Released.read(tmp_path / "r.parquet")

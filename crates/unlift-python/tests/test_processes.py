@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-# Everything that computes.
+# A script that runs every computation.
 USE = """
 import os
 import numpy as np, unlift
@@ -51,7 +51,7 @@ def python(tmp_path, code, *arguments, **options):
 
 
 def ended(process, seconds):
-    """What it said; a process that hangs is killed, and fails the test."""
+    """Returns the output of a process; a process that hangs is killed and fails the test."""
     try:
         out, err = process.communicate(timeout=seconds)
     except subprocess.TimeoutExpired:
@@ -144,7 +144,7 @@ def test_an_interrupt_in_a_function_ends_the_process_in_order(tmp_path, what, bo
     process.send_signal(signal.SIGINT)
     out, err = ended(process, 60)
     assert err.rstrip().endswith("KeyboardInterrupt") and "FATAL" not in err and "panicked" not in err, err
-    # As Python itself ends: by the signal.
+    # Python itself ends by the signal, too.
     assert process.returncode == -signal.SIGINT and time.monotonic() - started < 8
     assert out == "", "no function is called again"
 
@@ -226,7 +226,7 @@ unlift.audit_images(images, progress=lambda done, total, what: print(done, flush
     time.sleep(0.5)
     started = time.monotonic()
     process.send_signal(signal.SIGINT)
-    # The interpreter ends when the wait does.
+    # The interpreter ends after the wait.
     process.stdout.read()
     assert time.monotonic() - started < 5
     _, err = ended(process, 60)
@@ -243,7 +243,7 @@ class Slow:
         return ["a", "b"]
 
     def __getitem__(self, name):
-        # In one write: images are looked up by several threads.
+        # In one write, because several threads read images.
         os.write(1, b"asked\\n")
         while True:
             pass

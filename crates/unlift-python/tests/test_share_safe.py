@@ -1,4 +1,4 @@
-"""What may leave the house holds figures only."""
+"""Share-safe reports contain only numbers."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""On a real local cluster: a master and two workers, each a process of its own, one of which is killed."""
+"""Tests on a local Spark cluster of a master and two worker processes, one of which is killed."""
 
 import os
 import pathlib
@@ -29,7 +29,7 @@ N_MAPS = 8
 
 @pytest.fixture(scope="module")
 def spark():
-    # Workers run this very Python.
+    # Workers run this Python.
     os.environ["PYSPARK_PYTHON"] = sys.executable
     os.environ.setdefault("SPARK_LOCAL_IP", "127.0.0.1")
     builder = pyspark.sql.SparkSession.builder.master("local-cluster[2,1,1024]").appName("unlift")
@@ -107,7 +107,7 @@ def test_a_map_on_a_cluster_is_the_map_of_one_machine(spark, tmp_path: pathlib.P
     back.save(tmp_path / "parts")
     whole.save(tmp_path / "whole")
     assert (tmp_path / "parts").read_bytes() == (tmp_path / "whole").read_bytes()
-    # What Spark writes is read as it is.
+    # Parts that Spark writes are read directly.
     frame.write.parquet(str(tmp_path / "lists"))
     again = unlift.Neighborhoods.read(tmp_path / "lists", hidden)
     assert (again.records == lists.records).all() and (again.offsets == lists.offsets).all()
@@ -126,7 +126,7 @@ def test_tiles_are_those_of_one_machine_though_an_executor_is_killed(spark, tmp_
         ends = time.monotonic() + 400
         while time.monotonic() < ends:
             stages = [tracker.getStageInfo(stage) for stage in tracker.getActiveStageIds()]
-            # Some tasks are done, others under way.
+            # Some tasks are finished, others are running.
             if any(stage and stage.numCompletedTasks and stage.numActiveTasks for stage in stages):
                 os.kill(before[0], signal.SIGKILL)
                 seen.extend(stage.numCompletedTasks for stage in stages)

@@ -1,4 +1,4 @@
-"""Recordings for rerun, opened by rerun."""
+"""rerun opens the recordings of the viewer."""
 
 import pathlib
 import shutil

@@ -1,4 +1,4 @@
-//! The command lines of `docs/examples` are command lines.
+//! Tests that the command lines in `docs/examples` parse.
 
 use std::fs;
 use std::path::Path;
@@ -10,14 +10,14 @@ fn example(name: &str) -> String {
     fs::read_to_string(folder.join(name)).expect(name)
 }
 
-/// The lines of ours in a file of YAML or in comments: items of lists, and what `run` names.
+/// Returns the unlift command lines of a YAML file: items of lists, values of `run`, and comments.
 fn command_lines(text: &str) -> Vec<Vec<String>> {
     let command = |line: &str| {
         let line = line.trim_start_matches(['-', ' ', '#']);
         let line = line.strip_prefix("run: ").unwrap_or(line);
         let line = line.split(" #").next().unwrap_or_default().trim();
         assert!(!line.contains(['\'', '|']), "this test does not read quotes and pipes: {line}");
-        // Within a container it is the name of an image.
+        // After `docker run`, unlift is the name of the image.
         let ours = line.split_once("docker run ").and_then(|(_, rest)| rest.split_once(" unlift "));
         let ours = ours.map(|(_, rest)| format!("unlift {rest}"));
         ours.or_else(|| line.starts_with("unlift ").then(|| line.to_owned()))
@@ -26,7 +26,7 @@ fn command_lines(text: &str) -> Vec<Vec<String>> {
     lines.map(|line| line.split_whitespace().map(str::to_owned).collect()).collect()
 }
 
-/// The words of a line of a Dockerfile that is a list, such as `CMD ["check"]`.
+/// Parses an instruction of a Dockerfile with a list of words, such as `CMD ["check"]`.
 fn listed(text: &str, instruction: &str) -> Vec<String> {
     let line = text.lines().find_map(|line| line.strip_prefix(instruction)).expect(instruction);
     serde_json::from_str(line.trim()).expect("a list of words")

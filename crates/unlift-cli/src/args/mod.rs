@@ -1,4 +1,4 @@
-//! The command line as types. What a string means is in `values.rs`.
+//! The command line as types; `values.rs` parses the strings.
 
 mod audits;
 #[cfg(test)]
@@ -33,34 +33,35 @@ pub use stages::{
     term_width = 100,
     after_help = "\
 Examples:
-  unlift demo                                  protect and attack two photos and a map; no data needed
+  unlift demo                                  protect and attack two photos and a map
   unlift audit map PROJECT/sparse/0 --scale 1  audit a COLMAP map that is in meters
   unlift audit images photos                   audit the keypoints of photos
-  unlift check                                 run all audits of unlift.toml, for a build
-  unlift schemes                               list the schemes that can be audited
+  unlift check                                 run all audits of unlift.toml, for CI
+  unlift schemes                               list the schemes
 
-Exit codes: 0 done, 1 a gate failed, 2 usage, 3 bad input.
+Exit codes: 0 done, 1 a gate failed, 2 wrong usage, 3 bad input.
 Recovered points are as private as the original map."
 )]
 pub struct Cli {
-    /// Most memory that decoding one input may take [default: 64 times its size, at least 256 MiB]
+    /// Limit the memory for decoding one input, for example 2GB [default: 64 times its size, at
+    /// least 256 MiB]
     #[arg(long, value_name = "SIZE", global = true, value_parser = values::size)]
     pub memory_limit: Option<u64>,
-    /// What to do.
+    /// The command.
     #[command(subcommand)]
     pub command: Command,
 }
 
 impl Cli {
-    /// All commands and options, as they are read.
+    /// Returns the definition of all commands and options.
     pub fn definition() -> clap::Command {
         numbers_may_be_negative(Self::command())
     }
 
-    /// Reads a command line, the name of the program first.
+    /// Reads a command line, whose first word is the name of the program.
     ///
     /// # Errors
-    /// When it is none of ours, or asks for help.
+    /// If the line is wrong, or asks for help.
     pub fn read(
         line: impl IntoIterator<Item = impl Into<OsString> + Clone>,
     ) -> Result<Self, clap::Error> {
@@ -69,7 +70,8 @@ impl Cli {
     }
 }
 
-/// So that `--scale -1` is told what is wrong with -1, not that there is no option `-1`.
+/// Accepts negative numbers as values, so that the error of `--scale -1` is about the value -1, not
+/// about an option `-1`.
 fn numbers_may_be_negative(command: clap::Command) -> clap::Command {
     let forgiving = |arg: clap::Arg| match arg.get_action().takes_values() && !arg.is_positional() {
         true => arg.allow_negative_numbers(true),
@@ -78,45 +80,48 @@ fn numbers_may_be_negative(command: clap::Command) -> clap::Command {
     command.mut_args(forgiving).mut_subcommands(numbers_may_be_negative)
 }
 
-/// What to do.
+/// The command.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Protect two photos and a map, attack them, and show what comes back
     Demo(DemoArgs),
-    /// Audit a map, images, or records of your own scheme
+    /// Hide points, attack the result and report how many come back, for a map, images or your own
+    /// scheme
     #[command(subcommand)]
     Audit(AuditCommand),
     /// Run all audits of a configuration file, unlift.toml
     Check(CheckArgs),
-    /// Hide the points of a map or the keypoints of images by one scheme; writes a released file and a truth file
+    /// Hide the points of a map, or the keypoints of images, under one scheme
     Obfuscate(ObfuscateArgs),
-    /// List the neighbors of every hidden point, as an oracle or as an attacker
+    /// Make lists of the neighbors of every hidden point, from the truth or as an attacker
     #[command(subcommand)]
     Neighbors(NeighborsCommand),
-    /// Recover the points of an obfuscated map from released files alone
+    /// Recover hidden points from released files and lists of neighbors, without the truth
     Recover(RecoverArgs),
     /// Compare recovered points with the truth
     Evaluate(EvaluateArgs),
-    /// Export released, recovered or true points: PLY, OBJ, a COLMAP model, nerfstudio
+    /// Export released, recovered or true points as PLY, OBJ, a COLMAP model or for nerfstudio
     Export(ExportArgs),
-    /// Split a stage file into a folder of parts, for engines that read many files at once
+    /// Split a released, truth, list or recovered file into a folder of parts, for engines that
+    /// read many files at once
     Split(SplitArgs),
     /// Print the results of an audit as a table for a paper, or draw them as curves
     Table(TableArgs),
-    /// Compare two audits and fail if more leaks
+    /// Compare two audits, and fail if the later one leaks more
     Compare(CompareArgs),
     /// Reproduce the paper's tables on its datasets, beside the published numbers
     Paper(PaperArgs),
     /// Measure speed and memory
     #[command(subcommand)]
     Bench(BenchCommand),
-    /// Extract keypoints and descriptors from photos, or copy them from a file of features (hloc's layout)
+    /// Write the keypoints and descriptors of photos, or of another file, to a file in hloc's
+    /// layout
     Features(FeaturesArgs),
-    /// Paint pictures from keypoints or recovered points and their descriptors
+    /// Paint pictures from descriptors and keypoints or recovered points
     Invert(InvertArgs),
     /// Compare pictures by SSIM, PSNR and LPIPS
     Metrics(MetricsArgs),
-    /// List the schemes: rule, what stays hidden, source, stated patents
+    /// List the schemes: how they hide points, what stays hidden, source, stated patents
     Schemes,
     /// List the networks: purpose, license, hash, owner, and whether they are installed
     Models(ModelsArgs),
@@ -128,7 +133,7 @@ pub enum Command {
     Man(ManArgs),
 }
 
-/// What can be audited.
+/// Kinds of audits.
 #[derive(Debug, Subcommand)]
 #[command(after_help = "\
 Examples:
@@ -136,19 +141,19 @@ Examples:
   unlift audit images photos
   unlift audit released mine.parquet --truth truth.parquet")]
 pub enum AuditCommand {
-    /// Audit a 3D map: COLMAP, OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler, NVM, PLY, tables, NPY, LAS, PCD or E57
-    // Boxed: ten times the size of the other commands.
+    /// Audit a 3D map: hide its points, attack the result, and report how many come back
+    // Boxed, because it is ten times larger than the other commands.
     Map(Box<AuditMapArgs>),
-    /// Audit images: a folder of photos, hloc's features.h5, or a COLMAP database.db
+    /// Audit images: hide their keypoints, attack the result, and report how many come back
     Images(Box<AuditImagesArgs>),
-    /// Audit records that you made yourself: released.parquet and truth.parquet of a scheme of your own
+    /// Audit a scheme of your own: attack its records, and report how many points come back
     Released(Box<AuditReleasedArgs>),
 }
 
-/// What can be measured.
+/// Kinds of benchmarks.
 #[derive(Debug, Subcommand)]
 pub enum BenchCommand {
-    /// Seconds of recovery per inlier ratio, beside those of the paper
+    /// Measure the seconds that recovery takes, beside those of the paper
     Recover(BenchRecoverArgs),
 }
 

@@ -1,4 +1,4 @@
-//! Arguments of what tells about the program.
+//! Arguments of commands about the program itself.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -15,19 +15,19 @@ Examples:
   unlift demo
   unlift demo --out /tmp/demo
 
-Protects two photos and the map of a made-up room by ten published schemes, attacks what a service
-would receive, and shows what came back. It needs no data.")]
+Protects two photos and the map of a made-up room under ten published schemes, attacks what a
+service would receive, and shows what comes back. It needs no data.")]
 pub struct DemoArgs {
-    /// Folder for report.html, photos.html and their figures; whatever else is in it stays
+    /// Folder for report.html, photos.html and their JSON files; other files in it stay
     #[arg(long, value_name = "DIR", default_value = "unlift-demo")]
     pub out: PathBuf,
-    /// Replace files of that name that unlift did not write
+    /// Replace files of the same name that unlift did not write
     #[arg(long)]
     pub force: bool,
-    /// Threads to use [default: one per core]
+    /// Number of threads [default: one per core]
     #[arg(long, value_parser = values::threads, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
-    /// No progress on stderr
+    /// Show no progress on stderr
     #[arg(long)]
     pub quiet: bool,
 }
@@ -35,11 +35,11 @@ pub struct DemoArgs {
 /// Options of `models`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-A model is looked for in the folder that UNLIFT_MODELS names, then in unlift/models under
-XDG_DATA_HOME (~/.local/share), then in the program itself. A file with another hash than the one
-listed is refused.")]
+Networks are searched in the folder that the environment variable UNLIFT_MODELS names, then in
+unlift/models under XDG_DATA_HOME (~/.local/share), then in the program itself. A file with another
+hash than the listed one is refused.")]
 pub struct ModelsArgs {
-    /// Print a list of objects in place of the text
+    /// Print a JSON list in place of the text
     #[arg(long)]
     pub json: bool,
 }
@@ -47,9 +47,9 @@ pub struct ModelsArgs {
 /// Options of `doctor`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-To be pasted into a report of a defect: names no folder and no file, and sends nothing.")]
+Paste this into a bug report. It names no folders or files. unlift sends nothing.")]
 pub struct DoctorArgs {
-    /// Print an object in place of the text
+    /// Print a JSON object in place of the text
     #[arg(long)]
     pub json: bool,
 }
@@ -62,7 +62,7 @@ Examples:
   unlift completions zsh > ~/.zfunc/_unlift
   unlift completions fish > ~/.config/fish/completions/unlift.fish")]
 pub struct CompletionsArgs {
-    /// The shell
+    /// Name of the shell
     #[arg(value_name = "SHELL", value_enum)]
     pub shell: Shell,
 }
@@ -74,7 +74,7 @@ Examples:
   unlift man | man -l -
   unlift man audit map > unlift-audit-map.1")]
 pub struct ManArgs {
-    /// A command and its own commands, for example audit map
+    /// A command and its subcommand, for example audit map
     #[arg(value_name = "COMMAND")]
     pub command: Vec<String>,
 }

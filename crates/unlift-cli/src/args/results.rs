@@ -1,4 +1,4 @@
-//! Arguments of what sets figures beside each other.
+//! Arguments of `table`, `compare`, `paper` and `bench`.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -15,11 +15,12 @@ use crate::values;
 /// Options of `table`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-csv has every row of audit.json and a column per figure. latex (for the package booktabs) and
-markdown have a row per scheme and a column per share of right neighbors (oracle) and per source,
-with the strongest attack tried, and the baselines beside them; several thresholds stand in one cell.
+csv has every row of audit.json, and a column per value. latex (for the package booktabs) and
+markdown have a row per scheme. Their columns are the inlier ratios of the oracle (the share of
+listed neighbors that are true), the other sources of neighbors, and the baselines. A cell shows the
+strongest attack, at all thresholds.
 
-Curves are percent recovered over the share of right neighbors, of the strongest attack per scheme.
+Curves show the percentage recovered by the strongest attack against the inlier ratio, per scheme.
 For PDF, convert them: rsvg-convert -f pdf -o curves.pdf curves.svg, or Inkscape.
 
 Examples:
@@ -27,27 +28,27 @@ Examples:
   unlift table unlift-audit/audit.json --format latex --threshold 0.10 --out table.tex
   unlift table unlift-audit/audit.json --format csv --out rows.csv --curves curves.svg")]
 pub struct TableArgs {
-    /// The figures of an audit
+    /// The audit.json of an audit
     #[arg(value_name = "AUDIT.json")]
     pub audit: PathBuf,
-    /// How the table is written
+    /// Format of the table
     #[arg(long, value_name = "csv|latex|markdown", hide_possible_values = true, value_parser = values::one_of([
         ("csv", TableFormat::Csv),
         ("latex", TableFormat::Latex),
         ("markdown", TableFormat::Markdown),
     ]))]
     pub format: TableFormat,
-    /// Only what is recovered within this threshold of the audit [default: all; curves: the first, in
-    /// pixels the nearest to 10]
+    /// Show only this threshold of the audit: the error up to which a point counts as recovered
+    /// [default: all; curves: the first, in pixels the nearest to 10]
     #[arg(long, value_name = "T", value_parser = values::threshold)]
     pub threshold: Option<Threshold>,
     /// Write the table to this file in place of stdout
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
-    /// Also draw the curves to this file (SVG)
+    /// Also draw curves to this file (SVG)
     #[arg(long, value_name = "FILE")]
     pub curves: Option<PathBuf>,
-    /// Replace files of that name that unlift did not write
+    /// Replace files of the same name that unlift did not write
     #[arg(long)]
     pub force: bool,
 }
@@ -55,36 +56,38 @@ pub struct TableArgs {
 /// Options of `compare`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Figures are compared by scheme, source of neighborhoods, noise, inlier ratio (of the oracle; of
-others it is a result), K, solver and threshold, and the baselines by scheme and threshold. Rows
-that only one audit has are told. A scheme or source that the new audit has nothing to compare of
-fails as well: nothing says that it leaks no more.
+Results are compared if scheme, source of neighbors, noise, number of neighbors K, solver, threshold
+and, for the oracle, inlier ratio agree. Baselines are compared by scheme and threshold. Rows of
+only one audit are listed. The comparison also fails if the later audit has no counterpart for a
+scheme or source, because nothing shows that it leaks no more.
 
-Audits in other units or with other thresholds are refused (exit code 3).
+Audits in different units or with different thresholds are refused (exit code 3).
 
 Examples:
   unlift compare before/audit.json unlift-audit/audit.json
   unlift compare before/audit.json unlift-audit/audit.json --tolerance 2.5 --out compared
   unlift compare before/audit.json unlift-audit/audit.json --json
 
-Exit codes: 0 nothing leaks more, 1 something does by more than the tolerance, 2 usage, 3 bad input.")]
+Exit codes: 0 nothing leaks more, 1 something leaks more than --tolerance allows, 2 wrong usage,
+3 bad input.")]
 pub struct CompareArgs {
-    /// The figures of the earlier audit
+    /// The audit.json of the earlier audit
     #[arg(value_name = "OLD.json")]
     pub old: PathBuf,
-    /// The figures of the later audit
+    /// The audit.json of the later audit
     #[arg(value_name = "NEW.json")]
     pub new: PathBuf,
-    /// Percentage points up to which a figure counts as the same [default: twice the spread of repeats, or 2 without repeats]
+    /// Difference up to which two results count as equal, in percentage points [default: twice the
+    /// standard deviation over repeats, or 2 without repeats]
     #[arg(long, value_name = "POINTS", value_parser = values::points)]
     pub tolerance: Option<f64>,
-    /// Also write a page, compare.html, to this folder; whatever else is in it stays
+    /// Also write a page, compare.html, to this folder; other files in it stay
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Replace a file of that name that unlift did not write
+    /// Replace a file of the same name that unlift did not write
     #[arg(long)]
     pub force: bool,
-    /// Print all of it as JSON in place of the text
+    /// Print the comparison as JSON in place of the text
     #[arg(long)]
     pub json: bool,
 }
@@ -99,69 +102,71 @@ PATH is the folder of the scenes, as the dataset's owners pack them:
   cambridge  ShopFacade/dataset_test.txt, dataset_train.txt, seq1/frame00001.png and
              reconstruction.nvm
 
-Maps are looked for in SCENE and its folders sparse, triangulated, model_train, sfm and
-sfm_sift, and where hloc unpacks published ones (7scenes_sfm_triangulated and
-CambridgeLandmarks_Colmap_Retriangulated_1024px); --models names another folder with one per
-scene. How long their unit is, the poses of the dataset say.
+Maps are searched in the folder of a scene, in its folders sparse, triangulated, model_train, sfm
+and sfm_sift, and where hloc unpacks published maps (7scenes_sfm_triangulated and
+CambridgeLandmarks_Colmap_Retriangulated_1024px). --models names another folder with a map per
+scene. The poses of the dataset give the scale of the maps.
 
-Every scene that is there is audited as unlift audit map and unlift audit images do, into a
-folder of its own below DIR; DIR has paper.json and paper.csv: every number of the paper's
-tables and ours, of the strongest attack that was tried. What is missing is told, with where
-its owners publish it.
+Every scene is audited as by unlift audit map and unlift audit images, into a folder of its own in
+DIR. paper.json and paper.csv hold every number of the paper's tables beside ours, which is that of
+the strongest attack. Missing data is listed with the place where its owners publish it.
 
 Examples:
   unlift paper --dataset 7scenes datasets/7scenes
   unlift paper --dataset cambridge datasets/cambridge --scenes ShopFacade --parts maps
   unlift paper --dataset 12scenes datasets/12scenes --models outputs/12scenes --images 100
 
-Exit codes: 0 done, 2 usage, 3 bad input, be it a single scene or photo; the others are audited.")]
+Exit codes: 0 done, 2 wrong usage, 3 bad input, even of a single scene or photo; the others are
+audited.")]
 pub struct PaperArgs {
-    /// The folder of the dataset
+    /// Folder of the dataset
     #[arg(value_name = "PATH")]
     pub path: PathBuf,
-    /// Which dataset
+    /// Name of the dataset
     #[arg(long, value_name = "7scenes|12scenes|cambridge", hide_possible_values = true, value_parser = values::one_of([
         ("7scenes", Dataset::SevenScenes),
         ("12scenes", Dataset::TwelveScenes),
         ("cambridge", Dataset::Cambridge),
     ]))]
     pub dataset: Dataset,
-    /// A folder with a map per scene (DIR/chess, DIR/apt1/kitchen), in place of those in PATH
+    /// Folder with a map per scene (DIR/chess, DIR/apt1/kitchen), in place of the maps in PATH
     #[arg(long, value_name = "DIR")]
     pub models: Option<PathBuf>,
-    /// Meters per unit of all maps [default: what the poses of the dataset say]
+    /// Meters per unit of all maps [default: computed from the poses of the dataset]
     #[arg(long, value_name = "METERS", value_parser = values::scale)]
     pub scale: Option<f64>,
-    /// Only these scenes, by commas [default: all that are there]
+    /// Audit only these scenes, separated by commas [default: all in PATH]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub scenes: Vec<String>,
-    /// Only these parts of the tables, by commas: maps, images (both by an oracle), estimated (neighbors
-    /// from descriptors), pictures [default: all]
+    /// Reproduce only these parts of the tables, separated by commas: maps, images (both with lists
+    /// of neighbors made from the truth), estimated (with lists made from descriptors), pictures
+    /// [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',', hide_possible_values = true,
           value_parser = values::one_of(Part::ALL.map(|part| (part.name(), part))))]
     pub parts: Vec<Part>,
     /// Photos of the test split per scene, evenly spaced over their names
     #[arg(long, value_parser = values::count, value_name = "N", default_value = "20")]
     pub images: NonZeroUsize,
-    /// Points per map, a random subset, of which less comes back than of all [default: all]
+    /// Use a random subset of at most N points per map; a smaller share comes back than of all
+    /// points [default: all]
     #[arg(long, value_parser = values::count, value_name = "N")]
     pub max_points: Option<NonZeroUsize>,
     /// Random seed
     #[arg(long, value_name = "INTEGER", default_value_t = 0)]
     pub seed: u64,
-    /// Folder for paper.json, paper.csv and the audits of scenes; whatever else is in it stays
+    /// Folder for paper.json, paper.csv and the audits of the scenes; other files in it stay
     #[arg(long, value_name = "DIR", default_value = "unlift-paper")]
     pub out: PathBuf,
-    /// Replace files of that name that unlift did not write
+    /// Replace files of the same name that unlift did not write
     #[arg(long)]
     pub force: bool,
     /// Print paper.json in place of the tables
     #[arg(long)]
     pub json: bool,
-    /// Threads to use; never changes a figure [default: one per core]
+    /// Number of threads; results do not depend on it [default: one per core]
     #[arg(long, value_parser = values::threads, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
-    /// No progress on stderr
+    /// Show no progress on stderr
     #[arg(long)]
     pub quiet: bool,
 }
@@ -169,48 +174,51 @@ pub struct PaperArgs {
 /// Options of `bench recover`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Seconds are those of positions alone, as the paper's are; an audit also finds out how sure each of them
-is, which --confidence adds.
+Like the paper's seconds, these are for positions alone. An audit also computes the probability that
+each position is correct; --confidence includes that.
 
 Examples:
   unlift bench recover --points 700000 --scheme ppl
   unlift bench recover --points 100000 --scheme plane --map PROJECT --solver joint,ransac --json
 
-The paper's seconds (64 cores) are shown where it measured the same scheme, K, inlier ratio and
-number of points: ppl, 50, and 100000, 300000 or 700000.")]
+The paper's seconds (64 cores) are shown where it measured the same scheme, K, inlier ratio (share
+of true neighbors) and number of points: ppl, 50, and 100000, 300000 or 700000.")]
 pub struct BenchRecoverArgs {
-    /// Points of the map
+    /// Number of points of the map
     #[arg(long, value_parser = values::made_points, value_name = "N", default_value = "700000")]
     pub points: NonZeroUsize,
-    /// Map to thin out, or to repeat side by side with a jitter [default: the room of the demo]
+    /// Map to measure on, thinned out or repeated side by side with a jitter to the number of
+    /// points [default: the room of the demo]
     #[arg(long, value_name = "PATH")]
     pub map: Option<PathBuf>,
-    /// The scheme, see unlift schemes
+    /// Scheme that hides the points (unlift schemes lists them)
     #[arg(long, value_name = "SCHEME", value_parser = values::scheme, default_value = "ppl")]
     pub scheme: &'static Entry,
-    /// Neighbors per hidden point
+    /// Entries per list of neighbors (K); there is a list per hidden point
     #[arg(long, value_name = "K", default_value = "50",
           value_parser = clap::value_parser!(u16).range(1..))]
     pub k: u16,
-    /// Shares of true neighbors to try, by commas
+    /// Shares of true neighbors in the lists to measure, separated by commas
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::ratio,
           default_value = "1,0.5,0.3,0.2,0.1")]
     pub inlier_ratios: Vec<f64>,
-    /// Recovery methods, by commas or repeated: joint, joint-start, consensus, ransac, density,
-    /// tomography
+    /// Recovery methods, separated by commas or repeated: joint, joint-start (its first pass),
+    /// consensus (each point by its own list) and ransac (that of the paper) use lists of
+    /// neighbors; density and tomography do not
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
           default_value = "joint")]
     pub solver: Vec<Builtin>,
-    /// Distance up to which a neighbor supports a position, in the unit of the map
+    /// Distance within which a listed record (what replaces a point) supports a position, in the
+    /// unit of the map; auto computes it from the released records and the lists
     #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
     pub delta: Delta,
-    /// Also find out how sure every position is, as an audit does
+    /// Also compute the probability that each position is correct, as an audit does
     #[arg(long)]
     pub confidence: bool,
     /// Random seed
     #[arg(long, value_name = "INTEGER", default_value_t = 0)]
     pub seed: u64,
-    /// Threads to use [default: one per core]
+    /// Number of threads [default: one per core]
     #[arg(long, value_parser = values::threads, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
     /// Print JSON in place of the table

@@ -1,4 +1,4 @@
-//! Arguments of the stages: from a map to lists, to what came back, to figures.
+//! Arguments of the stages, and of `split` and `export`.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -21,70 +21,78 @@ Examples:
   unlift obfuscate PROJECT --scheme olc --descriptors PROJECT/database.db --out hidden
   unlift obfuscate features.h5 --scheme dcl2d --out hidden-images
 
-Writes hidden/released.parquet (what an attacker sees) and hidden/truth.parquet (keep it private).
-What is drawn comes from a fresh 256-bit key that is kept nowhere. With --seed it comes from that
-number, for experiments only: whoever guesses it undoes the order of the records, and cp entirely.
-Release a map once: of two releases with descriptors, records of the same point meet in it.")]
+released.parquet is what an attacker sees: a record (such as a line) in place of each point.
+truth.parquet holds the original points; keep it private.
+
+A fresh 256-bit key draws what hides the points, and is kept nowhere. With --seed that number
+replaces it, for experiments only: whoever guesses the number undoes the order of the records, and
+cp entirely. Release a map once: in two releases with descriptors, the records of a point can be
+matched, and they meet in it.")]
 pub struct ObfuscateArgs {
-    /// A map as audit map reads it: a COLMAP model or project folder, a .ply, .csv or .npy file; of images hloc's features.h5, a
-    /// COLMAP database.db, or a folder of photos
+    /// A map: a COLMAP model or project folder, a .ply, .csv or .npy file, or another format of
+    /// unlift audit map. Or images: a folder of photos, hloc's features.h5, or a COLMAP database.db
     #[arg(value_name = "PATH")]
     pub path: PathBuf,
-    /// The scheme, see unlift schemes; those for images take features of images
+    /// Scheme that hides the points (unlift schemes lists them). Schemes for images need images
     #[arg(long, value_name = "SCHEME", value_parser = values::any_scheme)]
     pub scheme: &'static Entry,
-    /// Folder for released.parquet and truth.parquet; whatever else is in it stays
+    /// Folder for released.parquet and truth.parquet; other files in it stay
     #[arg(long, value_name = "DIR", default_value = "unlift-obfuscated")]
     pub out: PathBuf,
-    /// Replace files of that name that unlift did not write
+    /// Replace files of the same name that unlift did not write
     #[arg(long)]
     pub force: bool,
     #[command(flatten)]
     pub map: MapArgs,
 }
 
-/// Sources of neighborhoods.
+/// Ways to make lists of neighbors.
 #[derive(Debug, Subcommand)]
 #[command(after_help = "\
 Examples:
   unlift neighbors oracle hidden/truth.parquet --inlier-ratio 0.5 --out lists.parquet
   unlift neighbors find hidden/released.parquet --source overlap --out lists.parquet")]
 pub enum NeighborsCommand {
-    /// From the truth, at a chosen inlier ratio: an attacker of stated quality
+    /// Make lists of neighbors from the truth, with a chosen share of true neighbors
     Oracle(OracleArgs),
-    /// List neighbors from a released map alone, as an attacker does
+    /// Make lists of neighbors from a released file alone, as an attacker does
     Find(FindArgs),
 }
 
 /// Options of `neighbors find`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Sources: descriptors (the best that they allow without training: overlap or similarity), similarity (any descriptors),
-overlap (SIFT), learned (a network; SIFT or ALIKED), geometric (no descriptors).
+Sources:
+  descriptors  overlap or similarity, whichever suits the descriptors; no training
+  similarity   similar descriptors, of any kind
+  overlap      overlapping patches, for SIFT
+  learned      a network, for SIFT or ALIKED
+  geometric    places where many records meet; no descriptors; for maps only
 
 Examples:
   unlift neighbors find hidden/released.parquet --source overlap --out lists.parquet
   unlift neighbors find hidden/released.parquet --source geometric --k 20")]
 pub struct FindArgs {
-    /// A released map
+    /// The released.parquet of a map or of images
     #[arg(value_name = "OBFUSCATED")]
     pub released: PathBuf,
-    /// Where the lists come from, see below
+    /// Method that makes the lists, see below
     #[arg(long, value_name = "SOURCE", value_parser = values::own_source)]
     pub source: Named,
-    /// Records per list [default: the source's own choice]
+    /// Records per list; a record is what a scheme publishes in place of a point [default: chosen
+    /// by the source]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
     pub k: Option<u16>,
     /// Random seed
     #[arg(long, value_name = "INTEGER", default_value_t = 0)]
     pub seed: u64,
-    /// Threads to use; never changes a result [default: one per core]
+    /// Number of threads; results do not depend on it [default: one per core]
     #[arg(long, value_parser = values::threads, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
     /// File to write
     #[arg(long, value_name = "FILE", default_value = "neighborhoods.parquet")]
     pub out: PathBuf,
-    /// Replace files of that name that unlift did not write
+    /// Replace files of the same name that unlift did not write
     #[arg(long)]
     pub force: bool,
 }
@@ -95,20 +103,21 @@ pub struct FindArgs {
 Example:
   unlift neighbors oracle hidden/truth.parquet --inlier-ratio 0.5 --out lists.parquet")]
 pub struct OracleArgs {
-    /// The truth.parquet of an obfuscation
+    /// The truth.parquet that unlift obfuscate wrote
     #[arg(value_name = "TRUTH")]
     pub truth: PathBuf,
-    /// The released map of the same obfuscation [default: released.parquet beside TRUTH]
+    /// The released.parquet of the same run [default: the one beside TRUTH]
     #[arg(long, value_name = "FILE")]
     pub released: Option<PathBuf>,
-    /// Share of true neighbors: round(RATIO x K) are kept, the others are wrong
+    /// Share of each list that are true nearest neighbors, from 0 to 1: round(RATIO x K) of K
+    /// entries
     #[arg(long, value_name = "RATIO", value_parser = values::ratio)]
     pub inlier_ratio: f64,
-    /// The wrong ones: uniform (any record), near (the 2K-th to 10K-th nearest), clustered (wrong
-    /// places that neighbors share, as of look-alike descriptors)
+    /// Where the wrong entries lie: uniform (anywhere), near (a little too far: the 2K-th to 10K-th
+    /// nearest), clustered (at wrong places that neighbors share, as with look-alike descriptors)
     #[arg(long, value_name = "MODEL", value_parser = values::noise, default_value = "uniform")]
     pub oracle_noise: Noise,
-    /// Neighbors per hidden point
+    /// Entries per list (K); there is a list per hidden point
     #[arg(long, value_name = "K", default_value = "50",
           value_parser = clap::value_parser!(u16).range(1..))]
     pub k: u16,
@@ -118,7 +127,7 @@ pub struct OracleArgs {
     /// File to write
     #[arg(long, value_name = "FILE", default_value = "neighborhoods.parquet")]
     pub out: PathBuf,
-    /// Replace files of that name that unlift did not write
+    /// Replace files of the same name that unlift did not write
     #[arg(long)]
     pub force: bool,
 }
@@ -129,31 +138,35 @@ pub struct OracleArgs {
 Example:
   unlift recover hidden/released.parquet --neighbors lists.parquet --out back.parquet")]
 pub struct RecoverArgs {
-    /// A released map
+    /// The released.parquet of a map or of images
     #[arg(value_name = "OBFUSCATED")]
     pub released: PathBuf,
-    /// Lists of records, one per hidden point
+    /// File with the lists of neighbors, as unlift neighbors writes it
     #[arg(long, value_name = "FILE")]
     pub neighbors: PathBuf,
-    /// Recovery method: joint, joint-start, consensus, ransac, density or tomography
+    /// Recovery method. From lists of neighbors: joint (usually the strongest), joint-start (its
+    /// first pass), consensus (each point by its own list), ransac (that of the paper). From the
+    /// released records alone: density (published attacks), tomography (stronger)
     #[arg(long, value_name = "SOLVER", value_parser = values::solver, default_value = "joint")]
     pub solver: Builtin,
-    /// Do not use constraints between records (cp: swaps are mutual; ray-voxel: parity)
+    /// Do not use rules of schemes that fix coordinates exactly (cp: coordinates are swapped in
+    /// pairs; ray-voxel: a checkerboard of voxels picks the center)
     #[arg(long)]
     pub no_exact_constraints: bool,
-    /// Distance up to which a neighbor supports a position, in the unit of the map
+    /// Distance within which a listed record (what replaces a point) supports a position, in the
+    /// unit of the map; auto computes it from the released records and the lists
     #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
     pub delta: Delta,
     /// Random seed
     #[arg(long, value_name = "INTEGER", default_value_t = 0)]
     pub seed: u64,
-    /// Threads to use; never changes a result [default: one per core]
+    /// Number of threads; results do not depend on it [default: one per core]
     #[arg(long, value_parser = values::threads, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
     /// File to write
     #[arg(long, value_name = "FILE", default_value = "recovered.parquet")]
     pub out: PathBuf,
-    /// Replace files of that name that unlift did not write
+    /// Replace files of the same name that unlift did not write
     #[arg(long)]
     pub force: bool,
 }
@@ -165,19 +178,21 @@ Examples:
   unlift evaluate back.parquet --truth hidden/truth.parquet
   unlift evaluate back.parquet --truth hidden/truth.parquet --thresholds 0.05,0.10 --json")]
 pub struct EvaluateArgs {
-    /// Recovered points
+    /// Recovered points, as unlift recover writes them
     #[arg(value_name = "RECOVERED")]
     pub recovered: PathBuf,
-    /// The truth.parquet of the obfuscation
+    /// The truth.parquet that unlift obfuscate wrote
     #[arg(long, value_name = "TRUTH")]
     pub truth: PathBuf,
-    /// The released map, for the figures of a blind attacker [default: released.parquet beside TRUTH]
+    /// The released.parquet, for the baseline that guesses from one record at a time [default: the
+    /// one beside TRUTH]
     #[arg(long, value_name = "FILE")]
     pub released: Option<PathBuf>,
-    /// Errors that count as recovered, by commas [default: 0.10,0.25 in meters, else 1.0,2.5]
+    /// Errors up to which a point counts as recovered, separated by commas [default: 0.10,0.25 in
+    /// meters, 1,5,10,25 in pixels, else 1.0,2.5]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold)]
     pub thresholds: Vec<Threshold>,
-    /// Print a row of audit.json in place of the table
+    /// Print the results as JSON, like a row of audit.json
     #[arg(long)]
     pub json: bool,
 }
@@ -185,25 +200,25 @@ pub struct EvaluateArgs {
 /// Options of `split`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Parts are part-000000.parquet and following, in the order of the rows; _manifest.json says how many
-rows and bytes each has, and what all of them are about. Every command that reads FILE reads the
-folder as it does FILE, and so does any engine that reads Parquet. A folder that an engine wrote is
-read too, with or without a manifest.
+Parts are called part-000000.parquet and so on, in the order of the rows. _manifest.json holds the
+rows and bytes of each part, and which map they belong to. Commands that read FILE also read the
+folder, and so do engines that read Parquet. unlift also reads a folder that an engine wrote, with
+or without a manifest.
 
 Examples:
   unlift split hidden/released.parquet --out hidden/released
   unlift split lists --rows 100000 --out lists-in-parts")]
 pub struct SplitArgs {
-    /// A stage file, or a folder of its parts
+    /// A Parquet file that obfuscate, neighbors or recover wrote, or a folder of its parts
     #[arg(value_name = "FILE")]
     pub path: PathBuf,
-    /// Rows of a part; an odd number is rounded up
+    /// Rows per part; an odd number is rounded up
     #[arg(long, value_name = "N", default_value_t = 1 << 20, value_parser = value_parser!(u64).range(1..=u64::from(u32::MAX)))]
     pub rows: u64,
-    /// The folder for the parts
+    /// Folder for the parts
     #[arg(long, value_name = "FOLDER")]
     pub out: PathBuf,
-    /// Replace files of those names that unlift did not write
+    /// Replace files of the same names that unlift did not write
     #[arg(long)]
     pub force: bool,
 }
@@ -211,10 +226,13 @@ pub struct SplitArgs {
 /// Options of `export`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The ending of --out says what is written: .ply points, .obj released lines or rays as segments,
-transforms.json cameras for nerfstudio, and sparse_pc.ply beside it, none a folder with a COLMAP
-model in text (cameras.txt, images.txt, points3D.txt). Whatever shows points is as private as the
-map.
+The ending of --out decides what is written:
+  .ply             points
+  .obj             released lines or rays, as segments
+  transforms.json  cameras for nerfstudio, and the points in sparse_pc.ply beside it
+  no ending        a folder with a COLMAP model in text (cameras.txt, images.txt, points3D.txt)
+
+Every file that shows points is as private as the map.
 
 Examples:
   unlift export back.parquet --scale 1 --out back.ply
@@ -225,16 +243,18 @@ pub struct ExportArgs {
     /// A released, recovered or truth file of a map
     #[arg(value_name = "FILE")]
     pub path: PathBuf,
-    /// File or folder to write
+    /// File or folder to write; its ending decides the format, see below
     #[arg(long, value_name = "PATH")]
     pub out: PathBuf,
-    /// Meters per unit of the map, as obfuscate was told: what is written lies on the map [default: lengths as in FILE]
+    /// Meters per unit of the map, as given to unlift obfuscate: the output then fits the map
+    /// [default: lengths as in FILE]
     #[arg(long, value_name = "METERS", value_parser = values::scale)]
     pub scale: Option<f64>,
-    /// A COLMAP model or project of the same map, whose cameras and images the model gets, or transforms.json
+    /// A COLMAP model or project of the same map; its cameras and images go into the exported model
+    /// or transforms.json
     #[arg(long, value_name = "PROJECT")]
     pub cameras: Option<PathBuf>,
-    /// Replace files of that name that unlift did not write
+    /// Replace files of the same name that unlift did not write
     #[arg(long)]
     pub force: bool,
 }

@@ -1,4 +1,4 @@
-//! What tells about the program: its schemes, networks and surroundings, and its command line for shells and manuals.
+//! Commands about the program: schemes, models, doctor, completions, man.
 
 use clap_complete::generate;
 use clap_mangen::Man;
@@ -13,7 +13,6 @@ use crate::args::{Cli, CompletionsArgs, DoctorArgs, ManArgs, ModelsArgs};
 use crate::exit::{Outcome, usage};
 use crate::output::print;
 
-/// Lists every scheme with what is known about it.
 pub fn schemes() -> anyhow::Result<Outcome> {
     let mut text = String::new();
     for scheme in SCHEMES {
@@ -32,7 +31,6 @@ pub fn schemes() -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Lists every model with what is known about it.
 pub fn models(args: &ModelsArgs) -> anyhow::Result<Outcome> {
     let folders = Folders::of_process();
     let mut text = String::new();
@@ -71,11 +69,10 @@ fn here(place: Option<&Place>, folders: &Folders, entry: &Entry) -> String {
     }
 }
 
-/// Programs that show a report.
 const BROWSERS: [&str; 6] =
     ["firefox", "chromium", "chromium-browser", "google-chrome", "microsoft-edge", "xdg-open"];
 
-/// Tells version, instructions, threads, memory, models and what would open a page.
+/// Prints version, CPU features, threads, memory, models and a browser.
 pub fn doctor(args: &DoctorArgs) -> anyhow::Result<Outcome> {
     let folders = Folders::of_process();
     let (mut here, mut missing) = (Vec::new(), Vec::new());
@@ -140,10 +137,8 @@ fn is_on_path(name: &str) -> bool {
     std::env::split_paths(&folders).any(|folder| folder.join(name).is_file())
 }
 
-/// The name of the program.
 const NAME: &str = "unlift";
 
-/// Prints a script for a shell.
 pub fn completions(args: &CompletionsArgs) -> anyhow::Result<Outcome> {
     let mut script = Vec::new();
     generate(args.shell, &mut Cli::definition(), NAME, &mut script);
@@ -151,10 +146,9 @@ pub fn completions(args: &CompletionsArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Prints a page of the manual.
 pub fn man(args: &ManArgs) -> anyhow::Result<Outcome> {
     let mut found = Cli::definition();
-    // With what all commands have in common, as their help shows it.
+    // `build` adds the global options.
     found.build();
     let mut name = NAME.to_owned();
     for word in &args.command {

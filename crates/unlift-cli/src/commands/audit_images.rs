@@ -1,4 +1,4 @@
-//! `unlift audit images`: keypoints of images in, one honest answer out.
+//! `unlift audit images`: audits the keypoints of images.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -30,7 +30,6 @@ use crate::progress::{Progress, Stderr};
 use crate::stderr;
 use crate::values::{NeighborSource, distinct};
 
-/// Audits images.
 pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
     let (finished, used) = audit(args)?;
     if let Some(finished) = &finished {
@@ -41,13 +40,13 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
     Ok(if passed { Outcome::Done } else { Outcome::GateFailed })
 }
 
-/// What is read, and must not be written over.
+/// Returns the input paths, which must not be overwritten.
 pub fn inputs(args: &AuditImagesArgs) -> Vec<&Path> {
     let others = args.photos.as_deref().into_iter().chain(args.inverter.as_deref());
     [args.path.as_path()].into_iter().chain(others).collect()
 }
 
-/// The audit and its files; no figures without an image that can be used.
+/// Audits images and writes the results; returns no results if no image can be used.
 pub fn audit(args: &AuditImagesArgs) -> anyhow::Result<(Option<Finished>, Used)> {
     let started = Instant::now();
     let mut plan = plan(args)?;
@@ -148,7 +147,7 @@ fn plan(args: &AuditImagesArgs) -> anyhow::Result<Plan<2>> {
     Ok(plan)
 }
 
-/// The options of the extractor, fit for the sources of the plan.
+/// Returns the options of the extractor, checked against the sources of the plan.
 fn extraction(args: &AuditImagesArgs, plan: &Plan<2>) -> anyhow::Result<Extraction> {
     if args.photos.is_some() && args.path.is_dir() {
         return Err(usage("--photos: expected with a file of features, found a folder of photos"));
@@ -167,7 +166,7 @@ fn extraction(args: &AuditImagesArgs, plan: &Plan<2>) -> anyhow::Result<Extracti
     Ok(extraction)
 }
 
-/// Whether there is any photo to compare with.
+/// Checks that at least one photo to compare with exists.
 fn check_photos(
     args: &AuditImagesArgs,
     source: &FeatureSource,
@@ -181,7 +180,7 @@ fn check_photos(
     Err(Error::new(photos, "", expected, "none").into())
 }
 
-/// The folder of photos that pictures are compared with, if they were asked for.
+/// Returns the folder of photos for painted pictures, if requested.
 fn painted(args: &AuditImagesArgs) -> anyhow::Result<Option<&Path>> {
     match (&args.photos, args.path.is_dir()) {
         _ if !args.invert => Ok(None),
@@ -191,15 +190,17 @@ fn painted(args: &AuditImagesArgs) -> anyhow::Result<Option<&Path>> {
     }
 }
 
-/// Asks the first image with keypoints whether it has what the sources need: one line in place of one per
-/// image. What is wrong with single images is told when they are read. Returns its descriptors, if they were looked at.
+/// Checks the first image with keypoints for what the sources need, to get one error instead of one
+/// per image. Other
+/// errors of single images are reported when they are read. Returns the descriptors if they were
+/// read.
 fn check_descriptors(
     source: &FeatureSource,
     chosen: &[usize],
     plan: &Plan<2>,
     invert: bool,
 ) -> anyhow::Result<Option<Descriptors>> {
-    // Extracted features always have them.
+    // Extracted features always have descriptors.
     let wanted = invert || Needs::of_plan(plan).descriptors();
     if matches!(source, FeatureSource::Folder(_)) || !wanted {
         return Ok(None);
@@ -221,7 +222,7 @@ fn check_descriptors(
     Ok(first.descriptors)
 }
 
-/// Options that change the images, not the plan.
+/// Returns the options that change the images, for the report.
 fn more_options(args: &AuditImagesArgs) -> Map<String, serde_json::Value> {
     let mut options = Map::new();
     if let Some(kind) = args.features {

@@ -1,4 +1,4 @@
-//! `unlift audit map`: a map in, one honest answer out.
+//! `unlift audit map`: audits a map.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -28,14 +28,12 @@ use crate::output::{command_line, print};
 use crate::progress::{Progress, Stderr};
 use crate::values::{NeighborSource, all_schemes, distinct};
 
-/// Schemes of a first look: the one that most is known of, and the one that hides two points in a record.
+/// Schemes of `--quick`: the best-known one, and one that hides two points per record.
 const QUICK_SCHEMES: [&str; 2] = ["olc", "ppl"];
-/// The inlier ratio of a first look.
 const QUICK_RATIO: f64 = 0.5;
-/// The attack on what is released, of a first look: the fastest one, of any descriptors.
+/// Source of `--quick`: the fastest one, for any descriptors.
 const QUICK_SOURCE: &str = "similarity";
 
-/// Audits a map.
 pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
     let json = args.result.json;
     let finished = audit(&args)?;
@@ -43,7 +41,7 @@ pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
     Ok(if finished.passed() { Outcome::Done } else { Outcome::GateFailed })
 }
 
-/// The audit and its files.
+/// Audits a map and writes the results.
 pub fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
     let started = Instant::now();
     let shown = match (args.result.share_safe, args.write_clouds) {
@@ -86,13 +84,13 @@ pub fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
     Ok(finished)
 }
 
-/// What was recovered before, if it was to be kept: by this very program.
+/// Opens the journal, if requested; it is valid for this build only.
 fn journal<'a>(args: &AuditMapArgs, progress: &'a Progress) -> anyhow::Result<Option<Journal<'a>>> {
     let Some(folder) = &args.journal else { return Ok(None) };
     Ok(Some(Journal::open(folder, this_program()?, progress)?))
 }
 
-/// What paints pictures, if that was asked for.
+/// Returns the painter of pictures, if requested.
 fn inversion(
     args: &AuditMapArgs,
     prepared: &Prepared,
@@ -112,7 +110,7 @@ fn inversion(
     Ok(Some(Arc::new(MapInversion::open(painter, model, photos, scale, most, progress)?)))
 }
 
-/// What is read, and must not be written over.
+/// Returns the input paths, which must not be overwritten.
 pub fn inputs(args: &AuditMapArgs) -> Vec<&Path> {
     let beside = beside(args).map(|(_, path)| path);
     let of_pictures = args.photos.iter().chain(&args.inverter).map(PathBuf::as_path);
@@ -171,7 +169,7 @@ fn plan(
     })
 }
 
-/// Files that are read beside the map, and what they are.
+/// Returns the files that are read beside the map, by their role.
 fn beside(args: &AuditMapArgs) -> impl Iterator<Item = (&'static str, &Path)> {
     let lists = args.neighbors.iter().filter_map(|source| match source {
         NeighborSource::File(path) => Some(("neighbors", path.as_path())),
@@ -180,12 +178,11 @@ fn beside(args: &AuditMapArgs) -> impl Iterator<Item = (&'static str, &Path)> {
     args.map.descriptors.iter().map(|path| ("descriptors", path.as_path())).chain(lists)
 }
 
-/// Their hashes.
 fn others(args: &AuditMapArgs) -> anyhow::Result<IndexMap<String, String>> {
     beside(args).map(|(name, path)| Ok((name.to_owned(), hash_stage(path)?))).collect()
 }
 
-/// Options that change the points, not the plan.
+/// Returns the options that change the points, for the report.
 fn more_options(args: &AuditMapArgs) -> Map<String, Value> {
     let mut options = Map::new();
     if let Some(most) = args.map.max_points {

@@ -1,4 +1,4 @@
-//! `unlift audit released`: records that somebody else made, and their truth, in; one honest answer out.
+//! `unlift audit released`: audits records of a user's scheme.
 
 use std::path::Path;
 use std::time::Instant;
@@ -25,17 +25,16 @@ use crate::output::{command_line, print};
 use crate::progress::{Progress, Stderr};
 use crate::values::{self, NeighborSource};
 
-/// What a scheme is called that nobody named.
+/// Name of a scheme without a name.
 const UNNAMED: &str = "released";
 
-/// Audits a map that is hidden already.
 pub fn run(args: &AuditReleasedArgs) -> anyhow::Result<Outcome> {
     let finished = audit(args)?;
     print(&if args.result.json { summary(&finished)? } else { finished.text() })?;
     Ok(if finished.passed() { Outcome::Done } else { Outcome::GateFailed })
 }
 
-/// The audit and its files.
+/// Audits released records and writes the results.
 pub fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
     let started = Instant::now();
     let shown = match (args.result.share_safe, args.write_clouds) {
@@ -87,13 +86,12 @@ pub fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
     Ok(finished)
 }
 
-/// What is read, and must not be written over.
+/// Returns the input paths, which must not be overwritten.
 pub fn inputs(args: &AuditReleasedArgs) -> Vec<&Path> {
     let stages = [args.released.as_path(), &args.truth].into_iter();
     stages.chain(args.descriptors.as_deref()).chain(lists(args)).collect()
 }
 
-/// Files of lists.
 fn lists(args: &AuditReleasedArgs) -> impl Iterator<Item = &Path> {
     args.neighbors.iter().filter_map(|source| match source {
         NeighborSource::File(path) => Some(path.as_path()),
@@ -101,7 +99,7 @@ fn lists(args: &AuditReleasedArgs) -> impl Iterator<Item = &Path> {
     })
 }
 
-/// What the scheme is called: as the user says, else as the file does.
+/// Returns the name of the scheme, from `--name` or from the file.
 fn name(args: &AuditReleasedArgs) -> anyhow::Result<String> {
     if let Some(name) = &args.name {
         return Ok(name.clone());
@@ -115,7 +113,8 @@ fn name(args: &AuditReleasedArgs) -> anyhow::Result<String> {
     })
 }
 
-/// The originals, what is released of them and the secret, known to belong together.
+/// Reads the original points, the released map and the secret, and checks that they belong
+/// together.
 fn open(args: &AuditReleasedArgs) -> anyhow::Result<(Prepared, (Released<3>, Secret))> {
     if has_images(&args.released)? {
         let error = unlift_io::Error::new(&args.released, "", "a released map", "released images");
@@ -142,7 +141,7 @@ fn open(args: &AuditReleasedArgs) -> anyhow::Result<(Prepared, (Released<3>, Sec
     Ok((prepared, (released, secret)))
 }
 
-/// The released map with the descriptors of the originals, if a file of them is given.
+/// Returns the released map with the descriptors of `--descriptors`, if given.
 fn described(
     args: &AuditReleasedArgs,
     released: Released<3>,
@@ -155,7 +154,7 @@ fn described(
             "--descriptors: expected with a released map without, found some in {found}"
         )));
     }
-    // Which points they are of is all that is asked.
+    // Only the ids of the points are needed.
     let points = Points { ids: (0..secret.n_originals() as u64).collect(), ..Points::default() };
     let of_originals = read::descriptors(path, &points)?;
     let mut of_rows = vec![0; secret.n_slots()];

@@ -1,4 +1,4 @@
-//! `unlift bench recover`: how long recovery takes, beside the paper's runtime table.
+//! `unlift bench recover`: measures the time of recovery, beside the paper's runtime table.
 
 use std::time::Instant;
 
@@ -20,17 +20,17 @@ use crate::progress::Spinner;
 use unlift_audit::peak_bytes;
 use unlift_audit::{Preparation, prepare};
 
-/// What was measured, in seconds of the wall clock.
+/// Measured times, in seconds of wall clock.
 struct Bench {
     n_points: usize,
     threads: usize,
     obfuscate: f64,
     search: f64,
-    /// (inlier ratio, solver, seconds)
+    /// Inlier ratio, solver and seconds.
     rows: Vec<(f64, &'static str, f64)>,
 }
 
-/// Hides a map of the size asked for and recovers it.
+/// Hides a map of the requested size and measures its recovery.
 pub fn recovery(args: &BenchRecoverArgs) -> anyhow::Result<Outcome> {
     let alive = Spinner::new("measuring");
     let bench = with_threads(args.threads, || measure(args))?;
@@ -72,7 +72,7 @@ fn measure(args: &BenchRecoverArgs) -> anyhow::Result<Bench> {
     Ok(Bench { n_points, threads, obfuscate: hidden, search: searched, rows })
 }
 
-/// The map of `--map` (the demo's room without one), thinned out or tiled to `--points`.
+/// Returns the map of `--map` (default: the demo's room), thinned out or tiled to `--points`.
 fn map(args: &BenchRecoverArgs) -> anyhow::Result<Original<3>> {
     let preparation = Preparation {
         scale: args.map.is_none().then_some(1.0),

@@ -1,4 +1,4 @@
-//! What several commands share.
+//! Functions that several commands share.
 
 use std::io::Read;
 use std::num::NonZeroUsize;
@@ -18,21 +18,20 @@ use crate::args::MapArgs;
 use crate::exit::Outcome;
 use crate::progress::Spinner;
 
-/// What the attacker sees.
 pub const RELEASED: &str = "released.parquet";
-/// What only the owner has.
+/// File name of the truth, which only the owner has.
 pub const TRUTH: &str = "truth.parquet";
 
-/// What tells this program from others, which may recover different bits: a hash of its file.
+/// Returns a hash of this program's file; other builds may recover different bits.
 ///
 /// # Errors
-/// When it cannot be read.
+/// If the file cannot be read.
 pub fn this_program() -> anyhow::Result<String> {
     Ok(hash_file(&std::env::current_exe()?)?)
 }
 
-/// Runs `work` on `threads` threads (all cores without a number); never changes a result. Without a pool of its own
-/// work would panic where the system refuses threads.
+/// Runs `work` on `threads` threads (default: all cores). rayon's global pool would panic if the
+/// system refuses threads.
 pub fn with_threads<T: Send>(
     threads: Option<NonZeroUsize>,
     work: impl FnOnce() -> anyhow::Result<T> + Send,
@@ -43,7 +42,8 @@ pub fn with_threads<T: Send>(
     pool.install(work)
 }
 
-/// Refuses `file` when it is about another released map than `of`; what does not say is taken.
+/// Returns an error if `file` belongs to another released map than `of`. A missing fingerprint is
+/// accepted.
 pub fn same_map(
     file: &Path,
     found: Option<Fingerprint>,
@@ -59,7 +59,7 @@ pub fn same_map(
     }
 }
 
-/// Reads a map and makes it ready: the first step of `audit map` and `obfuscate`.
+/// Reads and prepares a map, for `audit map` and `obfuscate`.
 pub fn open_map(path: &Path, args: &MapArgs, quiet: bool) -> anyhow::Result<(Input, Prepared)> {
     let _alive = Spinner::unless(quiet, "reading the map");
     let preparation = Preparation {
@@ -72,7 +72,8 @@ pub fn open_map(path: &Path, args: &MapArgs, quiet: bool) -> anyhow::Result<(Inp
     Ok(maps::open(path, args.descriptors.as_deref(), &preparation)?)
 }
 
-/// Refuses a released map that hides another number of points than the truth, or another number per record.
+/// Returns an error if the released map and the truth differ in the number of hidden points, in
+/// total or per record.
 pub fn expect_slots<const D: usize>(
     path: &Path,
     released: &Released<D>,
@@ -91,23 +92,23 @@ pub fn expect_slots<const D: usize>(
     Ok(())
 }
 
-/// Reads the figures of an audit.
+/// Reads an `audit.json`.
 ///
 /// # Errors
-/// When the file cannot be read, or is no `audit.json` of this version of the format.
+/// If the file cannot be read, or is no `audit.json` of this version of the format.
 pub fn read_document(path: &Path) -> anyhow::Result<Document> {
     let mut text = String::new();
     let (mut file, _) = unlift_io::input::open(path)?;
     file.read_to_string(&mut text).map_err(|error| Error::read(path, error))?;
     Document::from_json(&text).map_err(|error| {
         let said = error.to_string();
-        // Which file it is, the user says.
+        // The path names the file already.
         let said = said.strip_prefix("audit.json: ").unwrap_or(&said);
         anyhow::anyhow!("{}: {}", unlift::OneLine(path.display()), unlift::OneLine(said))
     })
 }
 
-/// Refuses an output of fewer images than there are: `failed` of them could not be `done`, which a line told of each.
+/// Returns an error if `failed` images could not be `done`; each was reported in a line before.
 pub fn all_could_be(done: &str, path: &Path, n: usize, failed: usize) -> anyhow::Result<Outcome> {
     if failed == 0 {
         return Ok(Outcome::Done);

@@ -1,4 +1,4 @@
-//! `unlift compare`: two audits side by side.
+//! `unlift compare`: compares two audits.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -14,13 +14,11 @@ use crate::args::CompareArgs;
 use crate::exit::Outcome;
 use crate::output::{print, table};
 
-/// The page.
 const PAGE: &str = "compare.html";
 
-/// Compares two audits.
 pub fn run(args: &CompareArgs) -> anyhow::Result<Outcome> {
     let (old, new) = (read_document(&args.old)?, read_document(&args.new)?);
-    // As an audit that names nothing is read by anybody, so may its comparison be.
+    // A comparison of share-safe audits is readable by others, like the audits.
     let named = old.input.path.is_some() || new.input.path.is_some();
     let access = if named { Access::Private } else { Access::Usual };
     let out = match &args.out {
@@ -50,7 +48,7 @@ pub fn run(args: &CompareArgs) -> anyhow::Result<Outcome> {
     Ok(if comparison.passed { Outcome::Done } else { Outcome::GateFailed })
 }
 
-/// What differs, and what that comes to.
+/// Formats the differences and the verdict.
 fn text(comparison: &Comparison, written: Option<PathBuf>) -> String {
     let mut text = String::new();
     let changed = [(&comparison.more, "leaks more"), (&comparison.less, "leaks less")];

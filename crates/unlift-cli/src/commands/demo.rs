@@ -1,4 +1,4 @@
-//! `unlift demo`: two photos and a map are protected and attacked, no data needed.
+//! `unlift demo`: protects and attacks two photos and a map, without data of the user.
 
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -31,16 +31,14 @@ use crate::exit::Outcome;
 use crate::output::{command_line, print, table};
 use crate::progress::Progress;
 
-/// Which of the made-up rooms.
 const SEED: u64 = 0;
-/// Inlier ratios of the oracle's neighborhoods of the map.
+/// Inlier ratios of the oracle for the map.
 const RATIOS: [f64; 2] = [0.5, 0.1];
-/// Score that a keypoint of the photos must exceed: faint ones, too, as there is one photo of each scene.
+/// Minimum score of keypoints of the photos. It is low, because each scene has only one photo.
 const MIN_SCORE: f32 = 0.02;
-/// Page and figures of the photos; those of the map are the audit's usual ones.
+/// Page and JSON file of the photos; the map has the audit's usual names.
 const PHOTOS: [&str; 2] = ["photos.html", "photos.json"];
 
-/// Attacks two photos and the map of a made-up room.
 pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
     let files = [
         (PAGE, Kind::Page),
@@ -69,7 +67,6 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Attacks the two photos from what is released of them.
 fn photos(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
     let started = Instant::now();
     let folder = tempdir()?;
@@ -82,7 +79,7 @@ fn photos(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
     let usual = Plan::new(Unit::Pixel);
     let plan = Plan {
         neighbors: vec![NeighborsBy::Source(Arc::new(Learned::default()))],
-        // What joint recovery starts from would be painted, too.
+        // The pictures of `joint-start` would be painted, too.
         solvers: vec![Arc::new(Builtin::Joint)],
         k: 20,
         headline: headline(&usual.thresholds),
@@ -110,12 +107,11 @@ fn photos(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
     };
     let (found, _) = find_images(job)?;
     let mut found = found.ok_or_else(|| anyhow::anyhow!("demo: the photos could not be read"))?;
-    // Where they lay for a moment says nothing.
+    // The temporary path is meaningless.
     found.document.input.path = Some("two photos of the demo".to_owned());
     Ok(found)
 }
 
-/// Attacks the map of the room.
 fn map(progress: &Part<'_>, out: &Path, room: &unlift_demo::Mapped) -> anyhow::Result<Audited> {
     let started = Instant::now();
     let sha256 = hash_positions(&room.points);
@@ -160,7 +156,7 @@ fn map(progress: &Part<'_>, out: &Path, room: &unlift_demo::Mapped) -> anyhow::R
     Ok(find_map(job, None)?)
 }
 
-/// What came back, in a dozen lines for somebody who has not heard of any scheme.
+/// Formats a short summary for users who do not know the schemes.
 fn said(photos: Vec<Shares>, map: Vec<Shares>, page: &Path) -> String {
     let percent = |share: Option<f64>| share.map_or("-".to_owned(), |x| format!("{x:.1} %"));
     let of_photos = photos.into_iter().map(|one| {
@@ -183,16 +179,16 @@ fn said(photos: Vec<Shares>, map: Vec<Shares>, page: &Path) -> String {
     )
 }
 
-/// Steps of the bar in all; parts of the demo take as many as they take time.
+/// Length of the progress bar; each part of the demo takes steps in proportion to its time.
 const PARTS: usize = 100;
 
-/// One part of the demo: moves the bar by its share, and says in plain words what it does.
+/// Progress of one part of the demo, with a plain description.
 struct Part<'a> {
     bar: &'a Progress,
     words: &'static str,
-    /// Its steps of the bar.
+    /// Number of steps of the bar.
     weight: f64,
-    /// How many items are done, and of how many.
+    /// Finished items and all items.
     items: Mutex<(f64, usize)>,
 }
 

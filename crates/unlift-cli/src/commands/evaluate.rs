@@ -1,4 +1,4 @@
-//! `unlift evaluate`: recovered points and the truth in, the figures of an audit's row out.
+//! `unlift evaluate`: compares recovered points with the truth.
 
 use std::path::PathBuf;
 
@@ -17,7 +17,6 @@ use crate::exit::{Outcome, advise};
 use crate::output::{print, table};
 use crate::stderr;
 
-/// Compares recovered points with the truth.
 pub fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     if has_images(&args.truth)? {
         return images(args);
@@ -43,7 +42,6 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     told(args, &row, &thresholds, &notes)
 }
 
-/// Compares recovered images with the truth.
 fn images(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     let thresholds = match args.thresholds.as_slice() {
         [] => Plan::<2>::new(Unit::Pixel).thresholds,
@@ -56,7 +54,7 @@ fn images(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     told(args, &row, &thresholds, &notes)
 }
 
-/// What speaks against the figures.
+/// Returns notes on results that may be wrong; an error if the files do not belong together.
 fn check(
     args: &EvaluateArgs,
     checked: &Checked,
@@ -67,12 +65,11 @@ fn check(
         let error = unlift_io::Error::core(&args.recovered, error).into();
         match released_path(args) {
             Some(_) => error,
-            None => advise(error, "--released FILE, as records tell more surely than points"),
+            None => advise(error, "--released FILE: records identify a map better than points"),
         }
     })
 }
 
-/// Prints what was found.
 fn told(
     args: &EvaluateArgs,
     row: &Row,
@@ -90,14 +87,13 @@ fn told(
     Ok(Outcome::Done)
 }
 
-/// Where the released map of the truth is, for the figures of a blind attacker: the one given, or that beside the
-/// truth if there is one.
+/// Returns the path of the released map, for the blind baseline: `--released`, or the file beside
+/// the truth if it exists.
 fn released_path(args: &EvaluateArgs) -> Option<PathBuf> {
     let beside = Some(args.truth.with_file_name(RELEASED)).filter(|path: &PathBuf| path.exists());
     args.released.clone().or(beside)
 }
 
-/// That map.
 fn released(args: &EvaluateArgs, secret: &Secret) -> anyhow::Result<Option<Released<3>>> {
     let Some(path) = released_path(args) else { return Ok(None) };
     let released = read_released::<3>(&path)?;
@@ -106,22 +102,22 @@ fn released(args: &EvaluateArgs, secret: &Secret) -> anyhow::Result<Option<Relea
     Ok(Some(released))
 }
 
-/// What a user should know about a file that somebody else wrote.
+/// Returns notes on a file that another program wrote.
 fn notes(about: About, slots_per_record: usize) -> Vec<String> {
     let mut notes = Vec::new();
     if about.map.is_none() {
-        let note = "says not which released map it is of: taken to be of that of the truth";
+        let note = "does not name its released map; assumed to be that of the truth";
         notes.push(note.to_owned());
     }
     if about.order == RowOrder::Unstated && slots_per_record > 1 {
-        let note = "says not what its rows are counted by: every position is compared with the nearer point of its \
+        let note = "does not state what its rows are counted by: each position is compared with the nearer point of its \
                     record, so the figures are upper bounds";
         notes.push(note.to_owned());
     }
     notes
 }
 
-/// A share that is not zero never reads as zero.
+/// Formats a percentage; one above zero never reads as zero.
 fn percent(share: f64) -> String {
     if share > 0.0 && share < 0.05 { "under 0.1 %".to_owned() } else { format!("{share:.1} %") }
 }

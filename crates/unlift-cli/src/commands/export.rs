@@ -1,4 +1,4 @@
-//! `unlift export`: stage files of maps as other programs read them.
+//! `unlift export`: writes stage files of maps in formats of other programs.
 
 use std::path::Path;
 
@@ -18,17 +18,15 @@ use crate::args::ExportArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::print;
 
-/// The file of nerfstudio's cameras.
+/// File name of nerfstudio's cameras.
 const TRANSFORMS: &str = "transforms.json";
 
-/// What a stage file shows.
 enum Shown {
-    /// A row per slot or original; of those that were lost none.
+    /// A row per slot or original; `None` for lost points.
     Points(Vec<Option<[f64; 3]>>),
     Segments(Vec<Segment<3>>),
 }
 
-/// Writes a stage file in another form.
 pub fn run(args: &ExportArgs) -> anyhow::Result<Outcome> {
     let inputs = [Some(args.path.as_path()), args.cameras.as_deref()];
     let rules = Rules::new(inputs.into_iter().flatten(), args.force);
@@ -58,7 +56,7 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Writes a PLY or OBJ file: what was written, and how much of it.
+/// Writes a PLY or OBJ file, and returns a description of its content.
 fn cloud(args: &ExportArgs, ending: Option<&str>, shown: &Shown) -> anyhow::Result<String> {
     let wrong = |expected: &str, found: &str, way_out: &str| {
         Err(advise(unlift_io::Error::new(&args.path, "", expected, found), way_out))
@@ -82,7 +80,6 @@ fn cloud(args: &ExportArgs, ending: Option<&str>, shown: &Shown) -> anyhow::Resu
     }
 }
 
-/// Writes a COLMAP model.
 fn model(args: &ExportArgs, rules: Rules) -> anyhow::Result<String> {
     let names = ["cameras.txt", "images.txt", "points3D.txt"];
     let first = names.map(|name| (name, Kind::Model));
@@ -104,7 +101,7 @@ fn model(args: &ExportArgs, rules: Rules) -> anyhow::Result<String> {
     Ok(format!("a model of {n} points, {} cameras and {} images", cameras.len(), images.len()))
 }
 
-/// Writes nerfstudio's cameras, and the points beside them.
+/// Writes nerfstudio's cameras and a point cloud.
 fn transforms(args: &ExportArgs, rules: Rules) -> anyhow::Result<String> {
     let name = args.out.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     if name != TRANSFORMS {
@@ -127,13 +124,12 @@ fn transforms(args: &ExportArgs, rules: Rules) -> anyhow::Result<String> {
     let points: Vec<[f64; 3]> = points.into_iter().flatten().collect();
     let [json, cloud] = first.map(|(name, kind)| out.stage(name, kind));
     write_transforms(&json?, &cameras, &images).map_err(|error| error.at(&args.out))?;
-    // Gray: nerfstudio takes no cloud without colors.
+    // Points are gray, because nerfstudio requires colors.
     write_points(&cloud?, &points, Some(&vec![[128; 3]; points.len()]))?;
     out.commit()?;
     Ok(format!("{} points and {} images", points.len(), images.len()))
 }
 
-/// Cameras and images of a COLMAP project.
 fn views(project: &Path) -> anyhow::Result<(Vec<colmap::Camera>, Vec<colmap::Image>)> {
     match read::open(project)?.model {
         Some(folder) => Ok(colmap::read_views(&folder)?),
@@ -144,7 +140,7 @@ fn views(project: &Path) -> anyhow::Result<(Vec<colmap::Camera>, Vec<colmap::Ima
     }
 }
 
-/// What the file at `path` shows, and the unit of its lengths.
+/// Reads the file at `path`, and returns its content and its unit.
 fn read(path: &Path) -> anyhow::Result<(Shown, Unit)> {
     let header = peek(path)?;
     let wrong = |found: &str| {
@@ -188,7 +184,7 @@ fn read(path: &Path) -> anyhow::Result<(Shown, Unit)> {
     }
 }
 
-/// In the units of the map, where its scale is given.
+/// Converts lengths to the units of the map, if `--scale` is given.
 fn scaled(args: &ExportArgs, (mut shown, unit): (Shown, Unit)) -> anyhow::Result<Shown> {
     let Some(scale) = args.scale else { return Ok(shown) };
     if unit != Unit::Meter {
@@ -209,8 +205,10 @@ fn scaled(args: &ExportArgs, (mut shown, unit): (Shown, Unit)) -> anyhow::Result
     Ok(shown)
 }
 
-/// A box that holds most of what lines and rays hide, from the records alone: the feet of lines, but for a hundredth on either
-/// side, and half as much around them; the centers of rays, and three times as much.
+/// Estimates from the records alone a box that holds most of the hidden points. Lines: the box of
+/// the feet without 1 % at
+/// each end, extended by half its width. Rays: the box of the centers, extended by three times its
+/// width.
 fn surroundings(released: &Released<3>) -> Bounds<3> {
     let (places, left_out, around) = match released.obfuscation() {
         Obfuscation::Lines(lines) => (lines.foot(), 0.01, 0.5),
@@ -223,7 +221,7 @@ fn surroundings(released: &Released<3>) -> Bounds<3> {
     let bounds = Bounds::quantiles(&places, left_out);
     let Bounds { low, high } = bounds.unwrap_or(Bounds { low: origin, high: origin });
     let widest = (0..3).map(|c| high[c] - low[c]).fold(0.0, f64::max);
-    // Of a single place nothing is known; a unit is better than nothing.
+    // All places may coincide: then extend by one unit.
     let more = if widest > 0.0 { around * widest } else { 1.0 };
     Bounds { low: low.map(|x| x - more), high: high.map(|x| x + more) }
 }

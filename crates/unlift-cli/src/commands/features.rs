@@ -1,4 +1,4 @@
-//! `unlift features`: keypoints and descriptors of images into one file.
+//! `unlift features`: writes the keypoints and descriptors of images to one file.
 
 use std::path::{Path, PathBuf};
 
@@ -20,7 +20,6 @@ use unlift_audit::images::parts::Parts;
 use unlift_audit::images::{FeatureSource, Folder, is_photo};
 use unlift_audit::{check_file, refused};
 
-/// What was done, and what could not be.
 #[derive(Default)]
 struct Tally {
     images: usize,
@@ -29,7 +28,6 @@ struct Tally {
     failed: usize,
 }
 
-/// Extracts or copies the features of all images.
 pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
     let rules = Rules::new([args.images.as_path()], args.force);
     let target = check_file(&args.out, Kind::Features, &rules)?;
@@ -67,7 +65,7 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
     all_could_be("used", &args.images, tally.images, tally.failed)
 }
 
-/// A file that would be taken for a photo by the next run.
+/// Refuses an output file that the next run would read as a photo.
 fn check_no_photo(images: &Path, target: &Path) -> anyhow::Result<()> {
     let folder = match target.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -83,7 +81,6 @@ fn check_no_photo(images: &Path, target: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The options of the extractor.
 fn extraction(args: &FeaturesArgs) -> anyhow::Result<Extraction> {
     let wanted = Wanted {
         option: "--type",
@@ -99,13 +96,13 @@ fn extraction(args: &FeaturesArgs) -> anyhow::Result<Extraction> {
     Ok(wanted.extraction(&args.images)?)
 }
 
-/// What became of one photo.
+/// The part of one photo, written in this run or in an earlier one.
 enum Done {
     Now(PathBuf),
     Earlier(PathBuf),
 }
 
-/// Features of photos: each into a part, then all parts into the file.
+/// Extracts the features of each photo into a part, then joins the parts into the file.
 fn extract(
     folder: &Folder,
     (args, rules, target): (&FeaturesArgs, &Rules, &Path),
@@ -124,7 +121,7 @@ fn extract(
     };
     progress.show(0, names.len(), "reading images");
     let steps = progress.steps();
-    // Told here: results are handed over many at a time.
+    // Progress is reported here, because results arrive in batches.
     let one = |&at: &usize| {
         let done = extract(at);
         steps.add(1.0, &names[at]);
@@ -138,7 +135,7 @@ fn extract(
                 tally.resumed += 1;
                 finished.push((&names[at][..], part));
             }
-            // A full disk is not the photo's fault, and the next one will not fit either.
+            // A full disk concerns all photos.
             Err(error) if error.is::<Fatal>() => return Err(error),
             Err(error) => {
                 tally.failed += 1;
@@ -151,10 +148,10 @@ fn extract(
         parts.remove();
         return Ok(());
     }
-    // What came to stand there meanwhile stays.
+    // Check again, because another program may have written a file here.
     check_file(&args.out, Kind::Features, rules)?;
     tally.images = finished.len();
-    // Far faster than what was done before: it has a pace of its own.
+    // Joining is much faster and needs its own estimate.
     let joining = progress.again();
     parts.join(&finished, |at, image| {
         tally.features += image.keypoints.len();
@@ -175,7 +172,6 @@ impl std::fmt::Display for Fatal {
 
 impl std::error::Error for Fatal {}
 
-/// Features of a file, written anew.
 fn copy(
     source: &FeatureSource,
     (args, rules): (&FeaturesArgs, &Rules),

@@ -1,4 +1,4 @@
-//! `--junit` and `--sarif`: gates as services that build software show them.
+//! `--junit` and `--sarif`: writes the results of gates for CI services.
 
 use std::fs;
 use std::io::Write;
@@ -13,7 +13,6 @@ use unlift_report::{junit, sarif};
 use crate::args::ResultArgs;
 use crate::exit::usage;
 
-/// A file of gates that was asked for.
 struct GateFile {
     option: &'static str,
     path: PathBuf,
@@ -21,10 +20,10 @@ struct GateFile {
     text: Text,
 }
 
-/// The text of a file of gates, and what it points to.
+/// Formats a file of gate results, with the place that it points to.
 type Text = fn(&Document, Option<(&str, usize)>) -> String;
 
-/// The files of gates of an audit: checked before the work, written after it.
+/// The requested files of gate results: checked before the work, written after it.
 pub struct GateFiles {
     files: Vec<GateFile>,
     rules: Rules,
@@ -32,7 +31,7 @@ pub struct GateFiles {
 }
 
 impl GateFiles {
-    /// Those that `result` asks for, if they can be written, and over nothing else of the same run.
+    /// Checks that all requested files can be written, and that no file is written twice.
     pub fn check(result: &ResultArgs, rules: &Rules) -> anyhow::Result<Self> {
         let asked = [
             ("--junit", &result.junit, Kind::Junit, (|document, _| junit(document)) as Text),
@@ -45,7 +44,7 @@ impl GateFiles {
             let Some(path) = path else { continue };
             let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
             if let Some(folder) = folder.filter(|folder| !folder.exists()) {
-                // As the folder of the report, which may be the same.
+                // As for the folder of the report, which may be the same folder.
                 let access = if result.share_safe { Access::Usual } else { Access::Private };
                 make_folders(folder, access)
                     .map_err(|error| usage(format!("{option}: {error}")))?;
@@ -63,8 +62,9 @@ impl GateFiles {
         Ok(Self { files, rules: rules.clone(), asked_at: result.asked_at.clone() })
     }
 
-    /// Writes them, each whole or not at all. They are made to be shown: whoever may see a build may read them. Where another run
-    /// has put its figures in place of those of `finished`, they would be about other figures than stand there, and are not written.
+    /// Writes each file atomically, readable by all users. Returns an error if another run has
+    /// replaced the results of `finished` in
+    /// the meantime, because the files would not match.
     pub fn write(&self, finished: &Finished) -> anyhow::Result<()> {
         if self.files.is_empty() {
             return Ok(());
@@ -74,7 +74,7 @@ impl GateFiles {
         let _alone = alone_in(finished.report.parent().unwrap_or(Path::new(".")));
         let there = fs::read(&figures).map_err(|source| Error::read(&figures, source))?;
         if there != document.to_json()?.as_bytes() {
-            let found = "those of another run that ended meanwhile: gates are not written";
+            let found = "those of another run that ended in the meantime; gates are not written";
             return Err(Error::new(&figures, "", "the figures of this run", found).into());
         }
         for GateFile { option, path, kind, text } in &self.files {

@@ -1,4 +1,4 @@
-//! The stages for many images: from file to file, a few images in memory at a time.
+//! The stages for files of many images, with only a few images in memory at a time.
 
 use std::cell::RefCell;
 use std::path::Path;
@@ -26,25 +26,22 @@ use unlift_audit::images::FeatureSource;
 use unlift_audit::images::stream::{Needs, Stream, Tally};
 use unlift_audit::{Checked, check_file};
 
-/// Images at work per thread.
+/// Images in memory per thread.
 const AT_WORK: usize = 2;
 
-/// What became of the images of a stage.
+/// Counts over the images of a stage.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Counts {
-    /// Images.
     pub images: usize,
-    /// Hidden points, or lists, of all of them.
+    /// Number of hidden points, or of lists.
     pub slots: usize,
-    /// Records of the longest list.
     pub longest: usize,
-    /// Points that were left out, or recovered.
+    /// Number of points that were left out, or recovered.
     pub points: usize,
-    /// Images that could not be used.
     pub unusable: usize,
 }
 
-/// Hands what `next` gives to `work`, some at a time in parallel, and its results to `done` in their order.
+/// Runs `work` in parallel on the items of `next`, and passes the results to `done` in order.
 fn each<T: Send, U: Send>(
     mut next: impl FnMut() -> anyhow::Result<Option<T>>,
     work: impl Fn(T) -> anyhow::Result<U> + Sync,
@@ -118,7 +115,7 @@ pub fn hide(args: &ObfuscateArgs, key: &Key, out: &mut OutputSet) -> anyhow::Res
     Ok(counts)
 }
 
-/// Lists by the oracle for all images of `args.truth`, written to `args.out` where `rules` allow it.
+/// Writes the oracle's lists for all images of `args.truth` to `args.out`, if `rules` allow it.
 pub fn list_by_oracle(args: &OracleArgs, released: &Path, rules: &Rules) -> anyhow::Result<Counts> {
     let mut pairs = Pairs::open(&args.truth, Some(released))?;
     let how = (args.oracle_noise, args.inlier_ratio, usize::from(args.k));
@@ -135,7 +132,7 @@ pub fn list_by_oracle(args: &OracleArgs, released: &Path, rules: &Rules) -> anyh
     write((&args.out, rules), Stage::Neighborhoods, || pairs.next(), work, list)
 }
 
-/// Lists by a source of the attacker for all images of `released`, written to `out`.
+/// Writes a source's lists for all images of `released` to `out`.
 pub fn list_by_source(
     released: &Path,
     source: &dyn Source<2>,
@@ -161,8 +158,8 @@ pub fn list_by_source(
     write(out, Stage::Neighborhoods, || Ok(images.next_image()?), work, list)
 }
 
-/// Positions for all images of `released` from the lists in `neighbors`, written to `out`. `note` hears about the
-/// lists of each.
+/// Recovers all images of `released` with the lists in `neighbors` and writes them to `out`. Calls
+/// `note` with the lists of each.
 pub fn recover_all(
     (released, neighbors): (&Path, &Path),
     (solver, options): (Builtin, &RecoverOptions),
@@ -197,17 +194,15 @@ pub fn recover_all(
     })
 }
 
-/// What evaluation found of images.
 pub struct Evaluated {
-    /// The row over all of them.
     pub row: Row,
-    /// Whether every image says which released image it is of.
+    /// Without a fingerprint if any image lacks that of its released image.
     pub about: About,
-    /// Whether what was compared belongs together.
+    /// Checks that the compared files belong together.
     pub checked: Checked,
 }
 
-/// The row over all images of `args.recovered`.
+/// Computes the row over all images of `args.recovered`.
 pub fn evaluate_all(
     args: &EvaluateArgs,
     released: Option<&Path>,
@@ -233,7 +228,7 @@ pub fn evaluate_all(
         checked
             .add(&recovered, &original, &secret, released.as_ref())
             .map_err(|error| Error::core(&args.truth, error.within(&format!("image {name}"))))?;
-        // One image that does not say is enough for a note.
+        // One image without a fingerprint suffices for a note.
         if about.is_none_or(|about: About| about.map.is_some()) {
             about = Some(recovered.about());
         }
@@ -245,7 +240,7 @@ pub fn evaluate_all(
     Ok(Evaluated { row, about: about.unwrap_or_default(), checked })
 }
 
-/// Truths of images with what was released of them.
+/// Iterator over images of a truth file and of the released file.
 struct Pairs<'a> {
     truth: (&'a Path, ImageFile<'a>),
     released: Option<(&'a Path, ImageFile<'a>)>,
@@ -255,7 +250,7 @@ struct Pair {
     name: String,
     original: Original<2>,
     secret: Secret,
-    /// `None` where nothing was released, or the file is not at hand.
+    /// `None` if no record was released, or there is no released file.
     released: Option<Released<2>>,
 }
 
@@ -289,7 +284,6 @@ impl<'a> Pairs<'a> {
     }
 }
 
-/// Adds the lists of one image.
 fn list(
     writer: &mut ImageWriter<'_>,
     counts: &mut Counts,
@@ -301,7 +295,7 @@ fn list(
     writer.neighborhoods(name, lists)
 }
 
-/// Writes a file of images: what `work` makes of what `next` gives, by `add`.
+/// Writes a file of images: applies `work` to the items of `next`, and writes the results by `add`.
 fn write<T: Send, U: Send>(
     (out, rules): (&Path, &Rules),
     kind: Stage,
@@ -318,7 +312,7 @@ fn write<T: Send, U: Send>(
         Ok(add(&mut writer, &mut counts, &name, &made)?)
     })?;
     writer.finish()?;
-    // What came to stand there meanwhile stays.
+    // Check again, because another program may have written a file here.
     check_file(out, Kind::Stage(kind), rules)?;
     output.commit()?;
     Ok(counts)

@@ -1,4 +1,4 @@
-//! `unlift invert`: pictures of keypoints, of what came back of them, or of a map that came back.
+//! `unlift invert`: paints pictures from keypoints, recovered keypoints or a recovered map.
 
 use std::collections::BTreeSet;
 use std::num::NonZeroUsize;
@@ -30,15 +30,14 @@ use crate::exit::{Outcome, line, usage};
 use crate::output::print;
 use crate::stderr;
 
-/// Images at work per thread.
+/// Images in memory per thread.
 const AT_WORK: usize = 2;
 
-/// Paints.
 pub fn run(args: &InvertArgs) -> anyhow::Result<Outcome> {
     with_threads(args.threads, || {
         let inputs = [Some(&args.path), args.recovered.as_ref(), args.cameras.as_ref()];
         let rules = Rules::new(inputs.into_iter().flatten().map(PathBuf::as_path), args.force);
-        // Begun and given up: whether anything can be written there.
+        // Only checks that files can be written there.
         drop(OutputSet::create(&args.out, rules.clone(), Access::Private, &[]).map_err(refused)?);
         let to = Target { args, rules, painted: AtomicUsize::new(0), swept: Mutex::default() };
         let unusable = match (&args.recovered, declared_kind(&args.path)) {
@@ -55,12 +54,11 @@ pub fn run(args: &InvertArgs) -> anyhow::Result<Outcome> {
     })
 }
 
-/// Where pictures go.
 struct Target<'a> {
     args: &'a InvertArgs,
     rules: Rules,
     painted: AtomicUsize,
-    /// Folders from which the rests of dead runs are gone.
+    /// Folders in which unfinished files of earlier runs were removed.
     swept: Mutex<BTreeSet<PathBuf>>,
 }
 
@@ -69,7 +67,7 @@ impl Target<'_> {
         painter(kind, self.args.inverter.as_deref())
     }
 
-    /// The file of the picture of image `name`, which may lie in folders of its own.
+    /// Returns the path of the picture of image `name`, which may contain folders.
     fn file(&self, name: &str) -> anyhow::Result<PathBuf> {
         let relative = Path::new(name);
         let within = relative.components().all(|part| matches!(part, Component::Normal(_)));
@@ -77,7 +75,7 @@ impl Target<'_> {
             let (expected, found) = ("a name within a folder", format!("{name:?}"));
             return Err(Error::new(&self.args.path, "image", expected, found).into());
         }
-        // Behind the whole name: `a.jpg` and `a.png` may be two images.
+        // Append to the whole name, because `a.jpg` and `a.png` may be two images.
         let mut file = self.args.out.join(relative).into_os_string();
         file.push(".png");
         let file = PathBuf::from(file);
@@ -98,13 +96,14 @@ impl Target<'_> {
         Ok(())
     }
 
-    /// Numbers of the images to paint, of `n`.
+    /// Returns the indices of the images to paint, out of `n`.
     fn chosen(&self, n: usize) -> Vec<usize> {
         choice::evenly(n, self.args.max_images.map(NonZeroUsize::get))
     }
 }
 
-/// Paints what there is of every image, some at a time; what cannot be painted gets a line. Returns how many these are.
+/// Paints all images in parallel, and prints a line for each that fails. Returns the number of
+/// failures.
 fn each<T: Sync>(
     to: &Target<'_>,
     images: &[T],
@@ -120,7 +119,7 @@ fn each<T: Sync>(
     Ok(failed.len())
 }
 
-/// The keypoints of photos or of a file, as they are.
+/// Paints from the keypoints of photos or of a file.
 fn keypoints(to: &Target<'_>) -> anyhow::Result<usize> {
     let path = &to.args.path;
     let wanted = Wanted { option: "--features", kind: to.args.features, ..Wanted::default() };
@@ -129,7 +128,7 @@ fn keypoints(to: &Target<'_>) -> anyhow::Result<usize> {
     let chosen = to.chosen(source.names().len());
     let kind = match &source {
         FeatureSource::Folder(_) => extraction.kind(),
-        // What is wrong with single images is told when they are painted.
+        // Errors of single images are reported when they are painted.
         _ => kind("PATH", source.first(&chosen).and_then(|image| image.descriptors).as_ref())?,
     };
     let painter = &to.painter(kind)?;
@@ -147,7 +146,7 @@ fn keypoints(to: &Target<'_>) -> anyhow::Result<usize> {
     })
 }
 
-/// The descriptors of the first released image that has any.
+/// Returns the descriptor kind of the first released image that has descriptors.
 fn kind_of_images(path: &Path) -> anyhow::Result<DescriptorKind> {
     let mut released = ImageFile::open(path, Stage::Released)?;
     while let Some(rows) = released.next_image()? {
@@ -159,7 +158,7 @@ fn kind_of_images(path: &Path) -> anyhow::Result<DescriptorKind> {
     kind("PATH", None)
 }
 
-/// What came back of released images.
+/// Paints from the recovered keypoints of released images.
 fn images(to: &Target<'_>, recovered: &Path) -> anyhow::Result<usize> {
     let path = &to.args.path;
     let painter = &to.painter(kind_of_images(path)?)?;
@@ -194,7 +193,7 @@ fn images(to: &Target<'_>, recovered: &Path) -> anyhow::Result<usize> {
     Ok(unusable + paint(&mut at_work)?)
 }
 
-/// What came back of a released map, by the cameras of a model.
+/// Paints from the recovered points of a map, as the cameras of a model see them.
 fn map(to: &Target<'_>, recovered: &Path) -> anyhow::Result<usize> {
     let (args, path) = (to.args, &to.args.path);
     let Some(model) = &args.cameras else {

@@ -1,4 +1,4 @@
-//! `unlift metrics`: how alike pictures are.
+//! `unlift metrics`: compares pictures.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,6 @@ use crate::exit::{Outcome, usage};
 use crate::output::{print, table};
 use crate::stderr;
 
-/// Compares two pictures, or those of two folders.
 pub fn run(args: &MetricsArgs) -> anyhow::Result<Outcome> {
     let lpips = Lpips::try_new()?;
     let compare = |a: &Path, b: &Path| -> anyhow::Result<Metrics> {
@@ -88,7 +87,8 @@ pub fn run(args: &MetricsArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// The pictures of a folder by their names without what tells their kind: `a.jpg.png`, as `unlift invert` writes, is `a`.
+/// Returns the pictures of a folder by name, without extensions: `a.jpg.png`, as `unlift invert`
+/// writes it, is `a`.
 fn pictures(folder: &Path) -> anyhow::Result<BTreeMap<String, PathBuf>> {
     let read = |error| unlift_io::Error::read(folder, error);
     let mut found = BTreeMap::new();
@@ -114,7 +114,7 @@ fn pictures(folder: &Path) -> anyhow::Result<BTreeMap<String, PathBuf>> {
     Ok(found)
 }
 
-/// Equal pictures have no finite ratio of signal to noise: `null`.
+/// Converts metrics to JSON. The PSNR of equal pictures is infinite: `null`.
 fn object(metrics: &Metrics) -> Value {
     let psnr = metrics.psnr.is_finite().then_some(metrics.psnr);
     json!({ "ssim": metrics.ssim, "psnr": psnr, "lpips": metrics.lpips })

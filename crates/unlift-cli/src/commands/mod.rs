@@ -1,4 +1,4 @@
-//! One file per command: parse, call the library, print.
+//! The commands, one file each.
 
 mod about;
 mod audit_images;
@@ -33,7 +33,7 @@ use crate::exit::Outcome;
 /// Runs one command.
 ///
 /// # Errors
-/// Whatever keeps it from its result; `exit` turns it into a line and a code.
+/// If the command cannot complete; `exit` turns the error into a line and an exit code.
 pub fn run(command: Command) -> anyhow::Result<Outcome> {
     match command {
         Command::Demo(args) => demo::run(&args),

@@ -1,4 +1,4 @@
-//! `unlift neighbors`: from the truth at a chosen quality, or from a released map alone.
+//! `unlift neighbors`: makes neighbor lists from the truth, or from released data alone.
 
 use std::path::Path;
 
@@ -18,7 +18,7 @@ use crate::progress::Spinner;
 use crate::stderr;
 use unlift_audit::check_file;
 
-/// Makes neighborhoods at one inlier ratio.
+/// Makes lists at one inlier ratio.
 pub fn oracle(args: &OracleArgs) -> anyhow::Result<Outcome> {
     let beside = || args.truth.with_file_name(RELEASED);
     let released_path = args.released.clone().unwrap_or_else(beside);
@@ -42,7 +42,7 @@ pub fn oracle(args: &OracleArgs) -> anyhow::Result<Outcome> {
         return Ok(Outcome::Done);
     }
     let (original, secret) = read_truth::<3>(&args.truth)?;
-    // The truth does not say how many points share a record.
+    // Only the released map has the number of points per record.
     let released = read_released::<3>(&released_path)
         .map_err(|error| without_released(error.into(), args, &released_path))?;
     same_map(&released_path, Some(released.fingerprint()), &args.truth, secret.map())?;
@@ -60,7 +60,7 @@ pub fn oracle(args: &OracleArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// `error` with a way out where there is no released map beside the truth.
+/// Adds advice to `error` if there is no released map beside the truth.
 fn without_released(error: anyhow::Error, args: &OracleArgs, path: &Path) -> anyhow::Error {
     match args.released {
         None if !path.exists() => advise(error, "--released FILE"),
@@ -68,7 +68,7 @@ fn without_released(error: anyhow::Error, args: &OracleArgs, path: &Path) -> any
     }
 }
 
-/// Makes neighborhoods as an attacker would.
+/// Makes lists as an attacker does.
 pub fn find(args: &FindArgs) -> anyhow::Result<Outcome> {
     let rules = Rules::new([args.released.as_path()], args.force);
     let kind = Kind::Stage(Stage::Neighborhoods);
@@ -113,7 +113,7 @@ fn listed(n: usize, k: usize, args: &FindArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// What a source lacks in a released map, and what to do about it.
+/// Returns an error, with advice, if the released map lacks what a source needs.
 fn check_own(source: &dyn Source<3>, released: &Released<3>) -> Result<(), (Error, &'static str)> {
     match released.descriptors() {
         None if source.needs() == Needs::Descriptors => {

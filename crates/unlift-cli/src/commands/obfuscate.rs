@@ -1,4 +1,4 @@
-//! `unlift obfuscate`: a map, or features of images, in; a released file and a truth file out.
+//! `unlift obfuscate`: hides a map or features of images; writes a released file and a truth file.
 
 use unlift::obfuscate::{SchemeOptions, obfuscate};
 use unlift::seed::Key;
@@ -15,11 +15,9 @@ use crate::progress::Stderr;
 use crate::stderr;
 use unlift_audit::{Progress as _, refused};
 
-/// What an integer seed is worth.
 const GUESSABLE: &str = "unlift: note: --seed repeats experiments; whoever guesses the number undoes the hiding: \
     do not release this map";
 
-/// Hides a map, or images, by one scheme.
 pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
     let inputs = [args.path.as_path()].into_iter().chain(args.map.descriptors.as_deref());
     let files = [(RELEASED, Kind::Stage(Stage::Released)), (TRUTH, Kind::Stage(Stage::Truth))];
@@ -51,7 +49,7 @@ pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// What everything is drawn under.
+/// Returns the key that all randomness comes from.
 fn key(args: &ObfuscateArgs) -> anyhow::Result<Key> {
     Ok(match args.map.seed {
         Some(seed) => {

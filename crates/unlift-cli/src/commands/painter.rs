@@ -1,4 +1,4 @@
-//! What paints: the network for the descriptors at hand, or the one that its user names.
+//! Selection of the network that paints.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use unlift_nn::DescriptorKind;
 
 use crate::exit::usage;
 
-/// The kind of descriptors that pictures shall be made from, which `option` asks for.
+/// Returns the kind of `descriptors`; an error about `option` if there are none.
 pub fn kind(option: &str, descriptors: Option<&Descriptors>) -> anyhow::Result<DescriptorKind> {
     let Some(descriptors) = descriptors else {
         return Err(usage(format!("{option}: expected descriptors, found none")));
@@ -17,7 +17,7 @@ pub fn kind(option: &str, descriptors: Option<&Descriptors>) -> anyhow::Result<D
     DescriptorKind::of(descriptors, option).map_err(|error| usage(error.to_string()))
 }
 
-/// What paints descriptors of `kind`: the network in the file `own`, or the one that is known for them.
+/// Opens the painter for descriptors of `kind`: the network in the file `own`, or the known one.
 pub fn painter(kind: DescriptorKind, own: Option<&Path>) -> anyhow::Result<Painter> {
     let inverter = match own {
         Some(path) => Inverter::read(path, kind),

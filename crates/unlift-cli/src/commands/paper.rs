@@ -1,4 +1,4 @@
-//! `unlift paper`: the paper's tables on its datasets.
+//! `unlift paper`: reproduces the paper's tables on its datasets.
 
 use std::num::NonZeroUsize;
 
@@ -13,7 +13,6 @@ use crate::output::{command_line, print, table};
 use crate::progress::Progress;
 use crate::stderr;
 
-/// Audits what is there of a dataset.
 pub fn run(args: &PaperArgs) -> anyhow::Result<Outcome> {
     let parts = if args.parts.is_empty() { &Part::ALL[..] } else { &args.parts };
     let found = with_threads(args.threads, || {
@@ -40,7 +39,7 @@ pub fn run(args: &PaperArgs) -> anyhow::Result<Outcome> {
     }
     let expected = match (found.pages.is_empty(), found.failed.len()) {
         (false, 0) => return Ok(Outcome::Done),
-        (true, 0) => "photos of a test split or a map of a scene, in meters",
+        (true, 0) => "photos of a test split, or a map of a scene in meters",
         _ => "scenes that can be audited, with photos that can be used",
     };
     let failed = match found.failed.len() {
@@ -50,7 +49,7 @@ pub fn run(args: &PaperArgs) -> anyhow::Result<Outcome> {
     Err(Error::new(&args.path, "", expected, failed).into())
 }
 
-/// The tables, what is missing and where the figures are.
+/// Formats the tables, missing data and the paths of the results.
 fn text(args: &PaperArgs, found: &Reproduction) -> String {
     let mut text = String::new();
     for sheet in found.sheets() {

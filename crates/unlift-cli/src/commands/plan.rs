@@ -1,4 +1,4 @@
-//! What audits of maps and of images have in common: from arguments to a plan, and the summary.
+//! Plans and summaries that audits of maps and of images share.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use crate::exit::{advise, usage};
 use crate::values::{NeighborSource, distinct};
 use unlift_audit::{Finished, Prepared, by_point};
 
-/// `usual` with what was asked for.
+/// Returns the plan `usual` with the options of the attack.
 pub fn attack<const D: usize>(args: &AttackArgs, usual: Plan<D>) -> Plan<D> {
     let mut plan = usual;
     if !args.inlier_ratios.is_empty() {
@@ -30,13 +30,13 @@ pub fn attack<const D: usize>(args: &AttackArgs, usual: Plan<D>) -> Plan<D> {
     plan
 }
 
-/// `options` with what the attack was told beyond the plan, for the record.
+/// Adds the options of the attack that are not in the plan, for the report.
 pub fn with_attack(mut options: Map<String, Value>, args: &AttackArgs) -> Map<String, Value> {
     options.extend(args.source_k.map(|k| ("source_k".to_owned(), json!(k))));
     options
 }
 
-/// The solvers asked for, each once, else the usual ones.
+/// Returns the requested solvers, each once, or the default.
 pub fn solvers<const D: usize>(given: &[Builtin], usual: &Plan<D>) -> Vec<Arc<dyn Solver<D>>> {
     match given {
         [] => usual.solvers.clone(),
@@ -44,7 +44,7 @@ pub fn solvers<const D: usize>(given: &[Builtin], usual: &Plan<D>) -> Vec<Arc<dy
     }
 }
 
-/// The thresholds asked for, each once, else the usual ones.
+/// Returns the requested thresholds, or the default. A repeated threshold is an error.
 pub fn thresholds<const D: usize>(
     given: &[Threshold],
     usual: &Plan<D>,
@@ -61,7 +61,7 @@ pub fn thresholds<const D: usize>(
     Ok(thresholds.to_vec())
 }
 
-/// A source of the attacker's own, with lists as long as asked for.
+/// Returns a source other than the oracle, with the requested length of lists.
 pub fn own<const D: usize>(named: Named, args: &AttackArgs) -> anyhow::Result<NeighborsBy<D>> {
     let named = match args.source_k {
         Some(k) => named.with_k(usize::from(k)),
@@ -70,9 +70,10 @@ pub fn own<const D: usize>(named: Named, args: &AttackArgs) -> anyhow::Result<Ne
     Ok(NeighborsBy::Source(named.of_dimension()?))
 }
 
-/// The sources of an audit of a map: every one once, each with what it needs, and no option that would be about none of
-/// them. `n_read` points were read from the file; what a user should know is added to `notes`; `lacking` makes the error of
-/// a source without descriptors.
+/// Returns the sources of an audit of a map, each once, and checks that options and descriptors fit
+/// them. The file had `n_read`
+/// points. Notes for the user are added to `notes`; `lacking` makes the error of a source without
+/// descriptors.
 pub fn neighbors(
     (asked, args): (&[NeighborSource], &AttackArgs),
     (prepared, descriptors): (&Prepared, Option<&Descriptors>),
@@ -113,14 +114,14 @@ pub fn neighbors(
     Ok(sources)
 }
 
-/// Refuses a source that cannot work on descriptors of this kind.
+/// Returns an error if a source does not support this kind of descriptors.
 pub fn check_fit<const D: usize>(
     source: &dyn Source<D>,
     descriptors: &Descriptors,
 ) -> anyhow::Result<()> {
     source.takes(descriptors).map_err(|error| {
         let name = source.name();
-        // What is wrong may be the source's model, of which the error tells the path.
+        // Errors of another kind are about the source's model and name its path.
         if error.kind() != ErrorKind::Descriptors {
             return usage(format!("--neighbors {name}: {error}"));
         }
@@ -130,7 +131,7 @@ pub fn check_fit<const D: usize>(
     })
 }
 
-/// Refuses options that would be about none of the sources.
+/// Returns an error for an option that applies to none of the sources.
 pub fn check_about<const D: usize>(
     args: &AttackArgs,
     sources: &[NeighborsBy<D>],
@@ -156,7 +157,7 @@ pub fn check_about<const D: usize>(
     Ok(())
 }
 
-/// What a script wants to know: the results and where the rest is.
+/// Returns the summary of `--json`: results and paths.
 pub fn summary(finished: &Finished) -> anyhow::Result<String> {
     let mut document: Value = serde_json::from_str(&finished.document.to_json()?)?;
     let keep = ["unlift", "schema", "results", "not_audited", "break_even", "gates"];

@@ -1,4 +1,4 @@
-//! `unlift recover`: released files in, positions out; no truth needed.
+//! `unlift recover`: recovers points from released files.
 
 use std::collections::HashSet;
 
@@ -19,7 +19,7 @@ use crate::progress::Spinner;
 use crate::stderr;
 use unlift_audit::check_file;
 
-/// What a user should know about lists that somebody else wrote, which start at these `offsets`.
+/// Returns notes on lists that another program wrote; `offsets` are the starts of the lists.
 fn notes(offsets: &[u64], about: About, slots_per_record: usize) -> Vec<String> {
     let mut notes = Vec::new();
     let empty = offsets.windows(2).filter(|pair| pair[0] == pair[1]).count();
@@ -30,19 +30,18 @@ fn notes(offsets: &[u64], about: About, slots_per_record: usize) -> Vec<String> 
         ));
     }
     if about.map.is_none() {
-        notes.push("says not which released map it is of: taken to be of this one".to_owned());
+        notes.push("does not name its released map; assumed to be this one".to_owned());
     }
     if about.order == RowOrder::Unstated && slots_per_record > 1 {
         let names = RowOrder::STATED.map(|order| order.name().unwrap_or_default()).join(", ");
         notes.push(format!(
-            "says not what its rows are counted by (metadata rows_by: {names}): figures of what is recovered \
+            "does not state what its rows are counted by (metadata rows_by: {names}): figures of what is recovered \
              will be upper bounds"
         ));
     }
     notes
 }
 
-/// Recovers a released map.
 pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
     let rules = Rules::new([args.released.as_path(), &args.neighbors], args.force);
     let kind = Kind::Stage(Stage::Recovered);
@@ -83,10 +82,9 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Recovers released images, one after the other.
 fn images(args: &RecoverArgs, options: &RecoverOptions, rules: &Rules) -> anyhow::Result<Outcome> {
     let alive = Spinner::new("recovering");
-    // A note says of one image what is so of many.
+    // The same note about several images is printed once.
     let mut told = HashSet::new();
     let note = |lists: &Neighborhoods, slots: usize| {
         for note in notes(lists.offsets(), lists.about(), slots) {

@@ -1,4 +1,4 @@
-//! `unlift split`: a stage file as a folder of parts.
+//! `unlift split`: splits a stage file into a folder of parts.
 
 use unlift::OneLine;
 use unlift_audit::refused;
@@ -9,7 +9,6 @@ use crate::args::SplitArgs;
 use crate::exit::Outcome;
 use crate::output::print;
 
-/// Writes the parts of a stage file.
 pub fn run(args: &SplitArgs) -> anyhow::Result<Outcome> {
     let split = Split::open(&args.path, args.rows)?;
     let rules = Rules::new([args.path.as_path()], args.force);

@@ -1,4 +1,4 @@
-//! `unlift table`: the figures of an audit for a paper.
+//! `unlift table`: prints the results of an audit as a table or curves.
 
 use std::io::Write;
 use std::path::Path;
@@ -14,7 +14,6 @@ use crate::output::print;
 use crate::stderr;
 use unlift_io::atomic::place_of;
 
-/// Writes a table and, where asked for, curves.
 pub fn run(args: &TableArgs) -> anyhow::Result<Outcome> {
     let rules = Rules::new([args.audit.as_path()], args.force);
     let mut taken = Vec::new();
@@ -48,7 +47,7 @@ pub fn run(args: &TableArgs) -> anyhow::Result<Outcome> {
         None => None,
     };
     let text = table(&document, args.format, only);
-    // Nothing is known of these, and a table without them does not say so.
+    // A table does not show schemes that were not audited.
     for refused in &document.not_audited {
         let by = refused.neighbors.as_ref().map(|by| format!(" by {by}")).unwrap_or_default();
         stderr::note(format_args!("not audited: {}{by}: {}", refused.scheme, refused.reason));
@@ -63,7 +62,7 @@ pub fn run(args: &TableArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// As any new file: figures that are made to be shown.
+/// Writes a file that all users may read.
 fn write(path: &Path, text: &str) -> anyhow::Result<()> {
     Ok(write_file(path, Access::Usual, |w| w.write_all(text.as_bytes()))?)
 }

@@ -1,4 +1,4 @@
-//! `unlift audit map` as a user runs it: figures, baselines, noise and lengths.
+//! `unlift audit map`: results, baselines, noise and lengths.
 
 use crate::common::Place;
 
@@ -25,7 +25,8 @@ fn without_a_scale_no_centimeter_appears() {
     assert_eq!(place.json("a/audit.json")["results"][0]["unit"], "kth_neighbor");
 }
 
-/// What can be shared names neither the map nor a hash of it, which would confirm a guess.
+/// A share-safe report contains neither the name nor a hash of the map, which would confirm a
+/// guess.
 #[test]
 fn a_shareable_report_names_nothing() {
     let place = Place::with_room(200);
@@ -54,14 +55,14 @@ fn every_noise_model_has_rows_and_break_even_ratios_of_its_own() {
     for rows in results.chunks(6) {
         let names: Vec<&str> = rows.iter().filter_map(|row| row["oracle_noise"].as_str()).collect();
         assert_eq!(names, ["uniform", "uniform", "near", "near", "clustered", "clustered"]);
-        // Without outliers there is nothing to differ in.
+        // Without outliers the noise models do not differ.
         for other in [2, 4] {
             assert_eq!(rows[0]["recovered_percent"], rows[other]["recovered_percent"]);
             assert_ne!(rows[1]["recovered_percent"], rows[other + 1]["recovered_percent"]);
         }
     }
     let points = audit["break_even"].as_array().expect("ratios");
-    // A blind guess may be the strongest, with a ratio of its own.
+    // A blind guess, which has a ratio of its own, may be the strongest.
     let by_joint = points.iter().filter(|point| point["solver"] == "joint");
     let noises: Vec<&str> = by_joint.filter_map(|p| p["oracle_noise"].as_str()).collect();
     assert_eq!(noises, ["uniform", "near", "clustered", "uniform", "near", "clustered"]);
@@ -69,13 +70,13 @@ fn every_noise_model_has_rows_and_break_even_ratios_of_its_own() {
     for noise in ["clustered", "near"] {
         assert!(page.contains(&format!("oracle ({noise}), 30 % true neighbors")), "{noise}");
     }
-    // The uniform rows are those of an audit that names no model.
+    // The rows with uniform noise equal those of an audit without `--oracle-noise`.
     place.ends(&format!("audit map room.csv --scale 1 {quick}"), 0);
     let usual = place.json("audit/audit.json");
     assert_eq!(usual["results"].as_array().unwrap()[..2], results[..2]);
 }
 
-/// A first look is two schemes at one ratio, and the attack on what is released where there are descriptors.
+/// `--quick` audits two schemes at one ratio, and one source if there are descriptors.
 #[test]
 fn a_first_look_is_two_schemes_and_the_attack_on_what_is_released() {
     let place = Place::with_room(700);
@@ -98,7 +99,7 @@ fn a_first_look_is_two_schemes_and_the_attack_on_what_is_released() {
     assert!(stderr.contains("--quick") && stderr.contains("--schemes"), "{stderr}");
 }
 
-/// Whoever reads only the page or the JSON file is told as well.
+/// The page and the JSON file contain the notes, too.
 #[test]
 fn a_thinned_map_is_told() {
     let place = Place::with_room(400);

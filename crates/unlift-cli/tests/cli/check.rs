@@ -1,4 +1,4 @@
-//! `unlift check`: the audits of a configuration, each in one line, by one word.
+//! `unlift check`: runs the audits of a configuration, with one line each.
 
 use std::fs;
 
@@ -6,7 +6,7 @@ use crate::common::Place;
 
 const QUICK: &str = "k = 10\nschemes = [\"olc\"]\ninlier-ratios = [1, 0.5]\nsolver = \"joint\"\n";
 
-/// A folder with `ci/room.csv`, `ci/photos` and this configuration in `ci`.
+/// Creates a folder with `ci/room.csv`, `ci/photos` and this configuration in `ci`.
 fn place(config: &str) -> Place {
     let place = Place::empty();
     place.write_photo("ci/photos/a.jpg", 0);
@@ -39,7 +39,7 @@ fn every_audit_is_a_line_and_paths_are_relative_to_the_configuration() {
     }
     assert!(place.text("ci/map/audit.json").contains("\"0.250\""), "thresholds are names");
     assert!(!place.text("ci/other/audit.json").contains("room"));
-    // Figures are those of the command line.
+    // The results equal those of the command line.
     let line = "audit map ci/room.csv --scale 1 --thresholds 0.10,0.250 --k 10 --schemes olc --inlier-ratios 1,0.5";
     place.ends(&format!("{line} --solver joint --quiet --out b"), 0);
     let results = |name: &str| place.json(name)["results"].clone();
@@ -70,7 +70,7 @@ fn gates_point_to_the_configuration() {
 #[test]
 fn an_audit_that_cannot_run_does_not_keep_the_others() {
     let place = Place::with_room(400);
-    // One word is enough where the configuration is here.
+    // The configuration has a default path.
     place.write(
         "unlift.toml",
         format!(
@@ -85,7 +85,8 @@ fn an_audit_that_cannot_run_does_not_keep_the_others() {
     assert_eq!(lines.last(), Some(&"unlift: unlift.toml: 1 of 2 audits failed to run"));
 }
 
-/// What is wrong in a line of a configuration is tested where it is read. Here: one line before any work.
+/// A wrong configuration gives one line before any work. Single errors are tested beside the
+/// parser.
 #[test]
 fn what_is_wrong_with_a_configuration_is_one_line_before_any_work() {
     let good = "[[map]]\npath = \"room.csv\"\n";
@@ -110,7 +111,7 @@ fn what_is_wrong_with_a_configuration_is_one_line_before_any_work() {
     assert!(told.starts_with("unlift: unlift.toml: "), "{told}");
 }
 
-/// One place by several names, and outputs over what is read: told before any work.
+/// Two outputs at one place, or an output over an input, are refused before any work.
 #[test]
 fn no_audit_writes_over_another_or_over_what_is_read() {
     let map = |out: &str| format!("[[map]]\npath = \"room.csv\"\n{QUICK}out = \"{out}\"\n");

@@ -1,10 +1,9 @@
-//! `unlift compare`: what leaks more, what is out of view, and what cannot be compared.
+//! `unlift compare`: leaks, missing counterparts, and audits that cannot be compared.
 
 use serde_json::{Value, json};
 
 use crate::common::Place;
 
-/// A folder with an audit in `a`.
 fn audited() -> Place {
     let place = Place::with_room(500);
     let audit = "audit map room.csv --scale 1 --k 10 --schemes olc,ppl --inlier-ratios 1,0.5 --neighbors \
@@ -13,7 +12,7 @@ fn audited() -> Place {
     place
 }
 
-/// Writes the audit of `a`, changed, as `name`.
+/// Writes a changed copy of the audit as `name`.
 fn change(place: &Place, name: &str, change: impl FnOnce(&mut Value)) {
     let mut document = place.json("a/audit.json");
     document["run"]["seconds"]["rows"] = json!([]);
@@ -25,7 +24,7 @@ fn rows(document: &mut Value) -> &mut Vec<Value> {
     document["results"].as_array_mut().unwrap()
 }
 
-/// Sets what comes back within 0.10 in the row of `olc` by the oracle at 0.5.
+/// Sets the share within 0.10 in the row of `olc` by the oracle at 0.5.
 fn set_share(document: &mut Value, percent: f64) {
     let row = rows(document).iter_mut().find(|row| {
         row["scheme"] == "olc" && row["neighbors"] == "oracle" && row["inlier_ratio"] == 0.5
@@ -83,7 +82,7 @@ fn what_leaks_more_than_the_tolerance_fails() {
         let (text, _) = place.ends(&format!("compare {files} {tolerance}"), code);
         assert!(text.contains(expected) && text.contains("20 figures compared"), "{text}");
     }
-    // The page is written over by the next one, another file is not.
+    // The page of an earlier comparison is replaced, another file is not.
     place.ends("compare new.json old.json --out c", 0);
     place.write("c/compare.html", "mine");
     let told = place.complains("compare new.json old.json --out c", 2);
@@ -123,13 +122,13 @@ fn what_is_out_of_view_fails_and_what_only_one_has_is_told() {
         without_ppl(document);
         document["not_audited"] = json!([{ "scheme": "ppl", "reason": "flat" }]);
     });
-    // A source that could be asked before.
+    // A source that the later audit lacks.
     change(&place, "source.json", |document| {
         rows(document).retain(|row| row["scheme"] != "ppl" || row["neighbors"] == "oracle");
         document["not_audited"] =
             json!([{ "scheme": "ppl", "neighbors": "geometric", "reason": "no lists" }]);
     });
-    // Other ratios were tried of a scheme that is there: told, and no failure.
+    // Other ratios of a scheme are listed, and are no failure.
     change(&place, "ratios.json", |document| {
         rows(document).retain(|row| row["inlier_ratio"] != 1.0);
     });
@@ -141,7 +140,7 @@ fn what_is_out_of_view_fails_and_what_only_one_has_is_told() {
             row.remove("records_alone_by");
         }
     });
-    // A measured ratio is a result: the attack is the same.
+    // A measured ratio is a result and does not identify the attack.
     change(&place, "measured.json", |document| {
         for row in rows(document).iter_mut().filter(|row| row["neighbors"] == "geometric") {
             row["inlier_ratio"] = json!(0.987);
@@ -174,7 +173,7 @@ fn other_units_thresholds_or_attacks_are_refused() {
     place.ends("audit map room.csv --k 10 --schemes olc --inlier-ratios 1 --quiet --out u", 0);
     let audit = "audit map room.csv --scale 1 --k 10 --schemes olc --inlier-ratios 1 --quiet";
     place.ends(&format!("{audit} --thresholds 0.10 --out t"), 0);
-    // The numbers of `a`, typed otherwise, can be compared.
+    // The same thresholds in another spelling can be compared.
     place.ends(&format!("{audit} --thresholds 0.1,0.250 --out n"), 0);
     place.ends("compare n/audit.json a/audit.json", 0);
     change(&place, "k.json", |document| {

@@ -1,4 +1,4 @@
-//! What fuzzers start from and what they found, through the functions that they call: no panic, no hang.
+//! Runs the seeds and findings of the fuzzers through the fuzzed functions: no panic, no hang.
 
 use std::path::Path;
 

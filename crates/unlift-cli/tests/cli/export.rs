@@ -1,10 +1,10 @@
-//! `unlift export`: what was written is what is read again, on the map, and nothing else is lost.
+//! `unlift export`: exported files are read back and lie on the map.
 
 use unlift_io::read;
 
 use crate::common::Place;
 
-/// A room whose map is in half meters, hidden by `scheme` and recovered.
+/// Recovers a room that `scheme` hides; a unit of its map is half a meter.
 fn recovered(scheme: &str) -> Place {
     let place = Place::with_room(400);
     let hide = "obfuscate room.csv --scale 0.5 --seed 1 --k 10 --out hidden --scheme";
@@ -39,7 +39,7 @@ fn points_and_lines_come_back_in_every_form_and_on_the_map() {
             "400 points and 1 images, in nerf/transforms.json\n",
         ),
     ] {
-        // Ours are replaced.
+        // Files of unlift are replaced.
         for _ in 0..2 {
             let line = format!("export hidden/truth.parquet --scale 0.5 {more} --out {name}");
             assert_eq!(place.ends(&line, 0).0, said);
@@ -50,7 +50,7 @@ fn points_and_lines_come_back_in_every_form_and_on_the_map() {
     }
     let nerf = read::open(&place.path("nerf")).expect("a map");
     assert_eq!((nerf.format, nerf.cameras), ("nerfstudio", vec![[1.0, 2.0, -3.0]]));
-    // Without a scale lengths are those of the file: meters, half as many as units.
+    // Without `--scale` lengths are those of the file, in meters: half as many as units.
     place.ends("export hidden/truth.parquet --out meters.ply", 0);
     assert!(distance(&positions(&place, "meters.ply")[7], &room[7].map(|x| 0.5 * x)) < 1e-9);
 

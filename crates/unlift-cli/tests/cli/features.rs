@@ -1,5 +1,5 @@
-//! `unlift features` as a user runs it: photos and files in, one whole file out, bad ones named. What interrupts leave is
-//! tested by `faults`.
+//! `unlift features`: photos and files in, one complete file out, unusable images named. `faults`
+//! tests interrupts.
 
 use std::fs;
 use std::path::Path;
@@ -22,7 +22,7 @@ fn all(place: &Place, name: &str) -> Vec<ImageFeatures> {
 #[test]
 fn photos_become_one_file_that_is_the_same_for_any_number_of_threads() {
     let place = photos();
-    // Made-up photos have faint keypoints.
+    // Synthetic photos have faint keypoints.
     for (kind, more) in [("sift", ""), ("aliked", "--min-score 0.05")] {
         let line = format!("features photos --type {kind} {more}");
         let (stdout, stderr) = place.ends(&format!("{line} --out one.h5 --threads 1"), 0);
@@ -59,7 +59,7 @@ fn photos_become_one_file_that_is_the_same_for_any_number_of_threads() {
                 );
             }
         }
-        // Two bytes a number of a descriptor: with four each, descriptors alone were longer than the whole file.
+        // Descriptors have 2 bytes per value: with 4 they alone would exceed this size.
         assert!(one.len() < n_features * 128 * 4 || kind == "sift", "{} bytes", one.len());
     }
 }
@@ -68,7 +68,7 @@ fn photos_become_one_file_that_is_the_same_for_any_number_of_threads() {
 fn photos_are_turned_unless_they_are_to_be_left_as_stored() {
     let place = photos();
     let jpeg = place.bytes("photos/b/c.jpg");
-    // An EXIF header that says that the photo stands on its head.
+    // An EXIF header for a photo that is stored upside down.
     let mut exif =
         b"\xff\xe1\0\x22Exif\0\0MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0".to_vec();
     exif.extend([3, 0, 0, 0, 0, 0, 0]);
@@ -84,14 +84,14 @@ fn photos_are_turned_unless_they_are_to_be_left_as_stored() {
     };
     let (a, b) = (middle("upright.h5", true), middle("stored.h5", false));
     middle("copy.h5", false);
-    // The blobs are turned by half about the middle of 128 x 96 pixels.
+    // The blobs are rotated by 180 degrees about the middle of 128 x 96 pixels.
     assert!((a[0] + b[0] - 127.0).abs() < 3.0 && (a[1] + b[1] - 95.0).abs() < 3.0, "{a:?} {b:?}");
 }
 
 #[test]
 fn keypoints_are_in_the_convention_of_hloc() {
     let place = Place::empty();
-    // A blob whose middle is the pixel in column 30 and row 34.
+    // A blob with its middle at the pixel in column 30 and row 34.
     let blob = GrayImage::from_fn(64, 64, |x, y| {
         let (dx, dy) = (f64::from(x) - 30.0, f64::from(y) - 34.0);
         Luma([(255.0 * (-(dx * dx + dy * dy) / 50.0).exp()) as u8])
@@ -190,8 +190,9 @@ fn what_cannot_be_used_at_all_leaves_no_file() {
     assert_eq!(place.names(""), ["bad", "empty", "photos"]);
 }
 
-/// An earlier run has left finished parts. One was damaged since, and one is of another photo of the same name, length
-/// and time: both are made again.
+/// An earlier run left parts. One was damaged, and one is of another photo with the same name,
+/// length and time: both
+/// are extracted again.
 #[cfg(unix)]
 #[test]
 fn a_part_that_does_not_fit_is_made_again() {
@@ -208,14 +209,15 @@ fn a_part_that_does_not_fit_is_made_again() {
     };
     put(&first);
     place.ends("features photos --out whole.h5", 0);
-    // Room for each part and not for all of them, in blocks of 512 bytes: the parts are left.
+    // There is room for each part but not for all of them, in blocks of 512 bytes, so the parts are
+    // left.
     let blocks = place.bytes("whole.h5").len() / 512 * 2 / 3;
     let stopped =
         place.shell(&format!("ulimit -f {blocks}; exec unlift features photos --out again.h5"));
     assert_eq!(stopped.status.code(), Some(3));
     let parts = place.names("again.h5.parts");
     assert_eq!(parts.len(), 3);
-    // Somewhere among the descriptors, where every value is one.
+    // This position lies among the descriptors.
     let damaged = format!("again.h5.parts/{}", parts[1]);
     let mut bytes = place.bytes(&damaged);
     let middle = bytes.len() / 2;

@@ -1,4 +1,5 @@
-//! `--junit` and `--sarif`: written beside the audit, over nothing else. What stands in them is tested where they are made.
+//! `--junit` and `--sarif`: files beside the audit that replace nothing else. Other tests check
+//! their content.
 
 use std::fs;
 
@@ -33,7 +34,7 @@ fn gates_are_test_cases_and_rules() {
     let uri = &results[0]["locations"][0]["physicalLocation"]["artifactLocation"]["uri"];
     assert_eq!(uri, "maps%2B/room.csv");
     assert_eq!(run["automationDetails"]["id"], "unlift/maps%2B/room.csv/");
-    // Those of a share-safe audit name no map.
+    // Files of a share-safe audit do not name the map.
     place.ends(&format!("{audit} {GATES} --junit g.xml --sarif g.sarif --share-safe"), 1);
     for name in ["g.xml", "g.sarif"] {
         assert!(!place.text(name).contains("room"), "{name}");
@@ -73,7 +74,7 @@ fn files_of_gates_replace_their_own_kind_and_nothing_else() {
             "--junit: room.csv: expected a file that is not read, found the input room.csv".to_owned(),
         ),
         ("--junit g --sarif ./g", format!("--sarif: ./g: {own} --junit")),
-        // Where the report goes, too.
+        // Over the report of the same run.
         ("--junit a/report.html --force", format!("--junit: a/report.html: {own} --out")),
     ] {
         let told = place.complains(&format!("{line} {more}"), 2);
@@ -83,7 +84,7 @@ fn files_of_gates_replace_their_own_kind_and_nothing_else() {
     let told = place.complains(&format!("{AUDIT} --junit g.xml"), 2);
     assert!(told.contains("--gate <GATE>"), "without a gate it would say that all held: {told}");
     for _ in 0..2 {
-        // Folders are made, as that of the report is.
+        // Missing folders are created, as for the report.
         place.ends(&format!("{line} --junit g.xml --sarif new/er/g.sarif"), 0);
         assert!(place.path("new/er/g.sarif").is_file());
     }

@@ -1,4 +1,4 @@
-//! Gates by solver and source, over both baselines, and about what a map does not allow.
+//! Gates by solver and source, over both baselines, and on what a map does not allow.
 
 use serde_json::Value;
 
@@ -8,7 +8,7 @@ fn rows(document: &Value) -> &Vec<Value> {
     document["results"].as_array().expect("rows")
 }
 
-/// The largest share within 0.25 of the rows that have these values, where they are not empty.
+/// Returns the largest share within 0.25 of the rows with these values; an empty value matches all.
 fn largest(document: &Value, scheme: &str, solver: &str, source: &str) -> f64 {
     let is = |row: &Value, field: &str, name: &str| name.is_empty() || row[field] == name;
     let of = rows(document).iter().filter(|row| {
@@ -103,8 +103,8 @@ fn lists_that_cannot_be_made_at_some_ratios_cost_these_rows() {
     assert!(!missing.is_empty() && missing.iter().all(is_told), "{missing:?}");
 }
 
-/// A file that declares fewer points than it holds is audited in part. In a map whose scale is a hundred times too large
-/// nothing can come back within a threshold, which is no protection.
+/// No gate holds for a file that declares fewer points than it has, or for a map whose scale is a
+/// hundred times too large.
 #[test]
 fn no_gate_holds_on_figures_that_are_doubtful() {
     let place = Place::with_room(300);

@@ -1,4 +1,4 @@
-//! What users, shells, manuals and reports of defects get.
+//! Help, completions, manual pages and `doctor`.
 
 use std::path::Path;
 
@@ -53,7 +53,8 @@ fn the_doctor_tells_what_a_report_of_a_defect_needs() {
     assert!(object["version"].as_str().is_some_and(|v| v.starts_with(env!("CARGO_PKG_VERSION"))));
 }
 
-/// Without a terminal there is no color anyway; with one NO_COLOR is obeyed by what draws (clap, indicatif).
+/// `NO_COLOR` disables colors (clap, indicatif). This test has no terminal, so it only checks
+/// forced colors.
 #[test]
 fn nothing_is_colored_where_it_is_not_wanted() {
     let place = Place::empty();

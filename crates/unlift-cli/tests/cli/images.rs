@@ -1,4 +1,4 @@
-//! `unlift audit images` as a user runs it: photos and files in, one audit out, bad images named.
+//! `unlift audit images`: photos and files in, one audit out, unusable images named.
 
 use std::fs;
 
@@ -12,19 +12,18 @@ use crate::common::Place;
 
 const QUICK: &str = "--k 10 --inlier-ratios 1,0.5";
 
-/// Three photos in `photos`.
 fn photos() -> Place {
     Place::with_photos(&["a.png", "b.png", "c/d.png"])
 }
 
-/// Three photos in `photos`, and their features in `f.h5`.
+/// Creates three photos in `photos`, and their features in `f.h5`.
 fn features() -> Place {
     let place = photos();
     place.ends("features photos --out f.h5", 0);
     place
 }
 
-/// Writes the features of `f.h5` to `name`, each image as `change` leaves it.
+/// Writes the features of `f.h5` to `name`, each image modified by `change`.
 fn write_changed(place: &Place, name: &str, change: impl Fn(&mut ImageFeatures)) {
     let source = FeatureSource::open(&place.path("f.h5")).unwrap();
     let mut writer = FeatureWriter::create(&place.path(name)).unwrap();
@@ -46,7 +45,7 @@ fn photos_become_pooled_rows_rows_per_image_and_pictures() {
     let counts = &document["input"]["images"];
     assert_eq!((counts["found"].as_u64(), counts["used"].as_u64()), (Some(3), Some(3)));
     let rows = document["results"].as_array().expect("rows");
-    // By joint, and by joint-start.
+    // Solvers are joint and joint-start.
     assert_eq!(rows.len(), 3 * (2 + 2) * 2);
     for row in rows {
         assert_eq!(row["unit"], "px");
@@ -72,7 +71,7 @@ fn photos_become_pooled_rows_rows_per_image_and_pictures() {
     assert!(page.contains("c/d.png") && page.contains("id=\"picture-graph\""));
     assert_eq!(page.matches("/9j/").count(), 3, "a JPEG per image");
 
-    // What can be shared has neither names nor pictures.
+    // A share-safe audit has neither names nor pictures.
     place.ends(&format!("audit images photos {QUICK} --share-safe --max-images 2 --out s"), 0);
     for file in ["s/audit.json", "s/report.html"] {
         let text = place.text(file);
@@ -116,13 +115,13 @@ fn a_file_without_photos_has_frames_and_chosen_images_are_shown() {
         let page = place.text("a/report.html");
         assert!(page.contains("\"name\":\"b.png\"") && !page.contains("\"name\":\"a.png\""));
         assert!(!page.contains("/9j/"));
-        // Only the neighborhoods that were asked for are drawn.
+        // Only the requested sources are drawn.
         ["oracle", "descriptors", "overlap"]
             .map(|source| page.contains(&format!("\"label\":\"{source}, ")))
     };
     assert_eq!(page("f.h5"), [true, false, false]);
     assert_eq!(page("f.h5 --neighbors oracle --neighbors descriptors"), [true, true, false]);
-    // By the oracle, keypoints are enough.
+    // The oracle needs only keypoints.
     assert_eq!(page("bare.h5"), [true, false, false]);
 }
 
@@ -134,7 +133,7 @@ fn broken_images_are_named_counted_and_left_out() {
     let whole = place.bytes("photos/cut.jpg");
     place.write("photos/cut.jpg", &whole[..1000]);
     RgbImage::new(1, 1).save(place.path("photos/one.png")).unwrap();
-    // Too few keypoints to be attacked, but an image.
+    // An image with too few keypoints to attack counts as usable.
     RgbImage::new(40, 40).save(place.path("photos/plain.png")).unwrap();
     let (stdout, stderr) = place.ends(&format!("audit images photos {QUICK} --out a"), 3);
     assert!(stdout.contains("report: a/report.html"));
@@ -207,14 +206,15 @@ fn what_cannot_be_audited_is_one_line() {
     for line in ["--neighbors geometric", "--solver tomography", "--schemes olc"] {
         place.ends(&format!("audit images photos {line}"), 2);
     }
-    // Before any photo is read.
+    // The error comes before any photo is read.
     let told = place.complains("audit images photos --features aliked --neighbors overlap", 2);
     assert!(told.starts_with("unlift: --neighbors overlap: expected "), "{told}");
     assert!(!place.path("unlift-audit").exists());
     place.ends("audit images floats.h5 --k 10 --neighbors similarity --out a", 0);
 }
 
-/// Schemes and attacks take the declared size for the true one: with twice the sides a third comes back of `dcl2d`.
+/// Schemes and attacks depend on the declared size: with doubled sides a third of the points of
+/// `dcl2d` comes back.
 #[test]
 fn a_declared_size_that_is_too_large_lets_no_gate_hold() {
     let place = features();
@@ -231,7 +231,7 @@ fn a_declared_size_that_is_too_large_lets_no_gate_hold() {
         let reason = wide["gates"][0]["reason"].as_str().expect("a reason");
         assert!(reason.starts_with("sizes: keypoints fill"), "{reason}");
         assert_eq!(wide["notes"][0], reason);
-        // What publishes coordinates is attacked by these.
+        // These solvers attack schemes that publish coordinates.
         let of = |document: &Value| {
             let rows = document["results"].as_array().expect("rows").iter();
             let found = rows.filter(|row| row["scheme"] == "cp2d" && row["solver"] == "joint");

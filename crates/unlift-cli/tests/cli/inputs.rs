@@ -1,17 +1,17 @@
-//! Maps, descriptors and scales as users have them: what is read, and what a line tells where it is not.
+//! Maps, descriptors and scales: what is read, and the error for what is not.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::common::Place;
 
-/// A folder of what the readers are tested with.
+/// Returns a path in the test data of the readers.
 fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../unlift-io/tests/data").join(name)
 }
 
-/// Descriptors of `dim` values for the points of `room.csv` as an array of `descr`: near rows of the file
-/// look alike.
+/// Writes an array of `descr` with `dim` values for each point of `room.csv`; near rows have
+/// similar descriptors.
 fn npy(place: &Place, name: &str, descr: &str, dim: usize, write: impl Fn(&mut Vec<u8>, f32)) {
     let header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': (700, {dim}), }}");
     let mut bytes = b"\x93NUMPY\x01\0\x76\0".to_vec();
@@ -26,7 +26,7 @@ fn npy(place: &Place, name: &str, descr: &str, dim: usize, write: impl Fn(&mut V
 
 const QUICK: &str = "--k 10 --schemes olc --quiet --out a";
 
-/// One line each, before any work; a second line tells a way out, where there is one.
+/// Errors are one line, with a line of advice if there is any, and come before any work.
 #[test]
 fn what_cannot_be_meant_is_refused_with_a_way_out() {
     let place = Place::with_room(700);
@@ -59,7 +59,7 @@ fn what_cannot_be_meant_is_refused_with_a_way_out() {
         ("room.csv --scale 1e-3", 2, "any guess would count as recovered", "another --scale"),
         ("room.csv --scale 1e5", 2, "no attack could come near", "another --scale"),
         ("room.csv --thresholds 1e9", 2, "unlift: --thresholds: expected a map larger", ""),
-        // Meters in a gate, none in the audit.
+        // The gate has a threshold in meters, but the audit has no scale.
         (
             "room.csv --gate olc:0.10<=20",
             2,
@@ -97,7 +97,8 @@ fn what_cannot_be_meant_is_refused_with_a_way_out() {
 fn similarity_takes_descriptors_of_any_kind_and_overlap_those_of_sift() {
     let place = Place::with_room(700);
     npy(&place, "learned.npy", "<f2", 64, |bytes, value| {
-        // A half: sign, five bits of exponent, ten of mantissa; rounding does not matter here.
+        // A half-precision float: sign, 5 bits of exponent, 10 of mantissa; rounding does not
+        // matter here.
         let bits = value.to_bits();
         let exponent = ((bits >> 23) & 0xff) as i32 - 112;
         let half = match exponent {
@@ -133,7 +134,7 @@ fn similarity_takes_descriptors_of_any_kind_and_overlap_those_of_sift() {
         let expected = format!("unlift: {expected}which takes descriptors of any kind\n");
         assert_eq!(told, expected);
     }
-    // Zeros mark points without a descriptor: lists of them are worse, which is no protection.
+    // Zeros mark points without a descriptor: their lists are worse, which is no protection.
     let mut bytes = place.bytes("learned.npy");
     let n = bytes.len();
     bytes[n - 2 * 2 * 64..].fill(0);
@@ -152,7 +153,7 @@ fn descriptors_that_are_missing_are_told_with_where_they_are() {
         "unlift: hidden/released.parquet: descriptors for overlap: expected some in the released map, \
          found none\n  try: --source geometric, or hide the map with unlift obfuscate --descriptors FILE\n"
     );
-    // Six points suffice: what is missing is told before any attack.
+    // Six points suffice, because the error comes before any attack.
     let project = data("project");
     let line = format!("audit map {} --k 3 --neighbors overlap", project.display());
     let advice = format!("\n  try: --descriptors {}\n", project.join("database.db").display());

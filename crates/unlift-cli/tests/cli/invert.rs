@@ -1,4 +1,4 @@
-//! Pictures of what came back, and how alike they are, as a user has them.
+//! `unlift invert`, `unlift metrics` and `--invert`.
 
 use std::fs;
 
@@ -31,7 +31,7 @@ fn an_audit_of_images_tells_how_alike_pictures_are_and_shows_them() {
     }
     let page = place.text("a/report.html");
     assert!(page.contains("id=\"inversions\"") && page.contains("data:image/jpeg;base64,"));
-    // A photo, its baseline and what came back, of three images.
+    // A photo, its baseline and its recovered picture, for three images.
     assert!(page.matches("<figure").count() >= 9);
     place.ends(&format!("audit images photos --invert {CHEAP} --share-safe --out safe"), 0);
     assert!(!place.text("safe/report.html").contains("id=\"inversions\""));
@@ -61,7 +61,7 @@ fn what_cannot_be_painted_is_told() {
         assert!(told.contains(expected), "{told}");
     }
     assert!(!place.path("x").exists());
-    // One photo is missing, and the others go on.
+    // If one photo is missing, the others are painted.
     let line = format!("audit images features.h5 --photos some --invert {CHEAP} --out audit");
     let (_, stderr) = place.ends(&line, 0);
     let note = "note: not painted: image b/c.jpg: some/b/c.jpg: expected a JPEG";
@@ -72,7 +72,7 @@ fn what_cannot_be_painted_is_told() {
 #[test]
 fn a_network_of_ones_own_paints_what_the_program_has_none_for() {
     let place = place();
-    // Of SuperPoint there is none.
+    // There is no network for SuperPoint.
     let mut writer = FeatureWriter::create(&place.path("superpoint.h5")).unwrap();
     let values = (0..40 * 256).map(|i| f32::from(u8::from(i % 256 == i / 256))).collect();
     let image = ImageFeatures {
@@ -95,7 +95,7 @@ fn a_network_of_ones_own_paints_what_the_program_has_none_for() {
     let told = place.complains(&other, 3);
     assert!(told.contains("expected an input features of shape (1, 131, any, any)"), "{told}");
     assert!(!place.path("x").exists());
-    // The network for SIFT takes as many columns as ALIKED has, whatever it makes of them.
+    // The network for SIFT accepts the descriptors of ALIKED, which have as many columns.
     let own = format!("--inverter {models}/inverter-sift/inverter-sift.onnx");
     let line = format!("audit images photos --features aliked --invert {own} {CHEAP} --out own");
     place.ends(&line, 0);
@@ -113,7 +113,7 @@ fn keypoints_and_what_came_back_are_painted_to_files() {
     assert_eq!(stdout, "3 pictures, in pictures\n");
     let size = |file: &str| image::image_dimensions(place.path(file)).unwrap();
     assert_eq!(size("pictures/b/c.jpg.png"), (64, 48));
-    // Again over its own pictures, never over others or what is read.
+    // Pictures are replaced, other files and inputs are not.
     place.ends("invert photos --out pictures", 0);
     place.write("pictures/a.png.png", "mine");
     let (_, stderr) = place.ends("invert photos --out pictures", 3);
@@ -152,7 +152,7 @@ fn pictures_and_folders_of_them_have_three_figures() {
     assert!((0.0..1.5).contains(&figure("lpips")), "{found}");
     let (text, _) = place.ends("metrics a/one.png b/one.jpg", 0);
     assert!(text.contains(&format!("SSIM  {:.4}\n", figure("ssim"))), "{text}");
-    // Equal pictures are alike and have no ratio of signal to noise.
+    // Equal pictures have no PSNR.
     let equal = place.prints("metrics a/one.png a/one.png --json", 0);
     assert_eq!((equal["ssim"].as_f64(), equal["lpips"].as_f64()), (Some(1.0), Some(0.0)));
     assert!(equal["psnr"].is_null());

@@ -1,4 +1,4 @@
-//! An interrupted audit goes on from what it kept, to the same figures.
+//! `--journal`: an interrupted audit resumes, with the same results.
 
 use std::fs;
 use std::time::{Duration, Instant};
@@ -11,7 +11,7 @@ const AUDIT: &str = "audit map room.csv --schemes olc,ppl,plane,cp --inlier-rati
 
 const RECOVERED: &str = ".recovered.parquet";
 
-/// The recoveries that are kept, by their names, sorted. What is being written has another name yet.
+/// Returns the sorted names of the kept recoveries; unfinished files have another name.
 fn kept(place: &Place) -> Vec<String> {
     if !place.path("kept").exists() {
         return Vec::new();
@@ -21,7 +21,7 @@ fn kept(place: &Place) -> Vec<String> {
     place.names("kept").into_iter().filter(is_named).collect()
 }
 
-/// A place where an audit that keeps what it recovers was killed when three recoveries were kept; their names.
+/// Kills an audit with a journal after three recoveries; returns their names.
 fn interrupted() -> (Place, Vec<String>) {
     let place = Place::with_room(3000);
     let mut child = place.start(&format!("{AUDIT} --journal kept --out out"));
@@ -38,7 +38,7 @@ fn interrupted() -> (Place, Vec<String>) {
     (place, kept)
 }
 
-/// Goes on from what is kept, and returns what is said. The figures are those of an audit that nothing interrupts.
+/// Resumes the audit and returns stderr. The results must equal those of an uninterrupted audit.
 fn go_on(place: &Place) -> String {
     let (_, told) = place.ends(&format!("{AUDIT} --journal kept --out out"), 0);
     place.ends(&format!("{AUDIT} --out whole"), 0);
@@ -81,13 +81,13 @@ fn what_is_damaged_or_of_another_audit_is_not_taken() {
     let (_, told) = place.ends(&format!("{AUDIT} --seed 2 --journal kept --out other"), 0);
     assert!(!told.contains("--journal") && !told.contains("were taken"), "{told}");
     let told = go_on(&place);
-    // Of joint recovery and the pass that it starts from the first tells of both.
+    // Joint recovery and its first pass share one message.
     let damaged = told.lines().filter(|line| line.ends_with("is damaged: recovered again"));
     assert_eq!(damaged.count(), kept.len() - 1, "{told}");
     assert_eq!(place.names("kept"), ["notes.txt"], "what is not ours stays");
 }
 
-/// Two files that change places, or one with another content: neither is the recovery that its key asks for.
+/// Two exchanged files, or one with other content, do not match their keys.
 #[test]
 fn files_that_were_exchanged_or_replaced_are_not_taken() {
     let (place, kept) = interrupted();
@@ -97,7 +97,7 @@ fn files_that_were_exchanged_or_replaced_are_not_taken() {
     fs::rename(path(&kept[0]), place.path("first")).unwrap();
     fs::rename(path(&kept[1]), path(&exchanged(0, 1))).unwrap();
     fs::rename(place.path("first"), path(&exchanged(1, 0))).unwrap();
-    // Its own content under the plain hash of that content.
+    // The name has the plain hash of the content.
     let hash = unlift_io::hash::hash_file(&path(&kept[2])).unwrap();
     fs::rename(path(&kept[2]), path(&format!("{}-{hash}{RECOVERED}", parts[2].0))).unwrap();
     assert!(!go_on(&place).contains("were taken"));

@@ -1,5 +1,4 @@
-//! Miniatures of the datasets' folders and of a COLMAP project: made-up photos of blobs and made-up rooms, in the places
-//! of the real ones.
+//! Miniatures of the datasets' folders and of a COLMAP project, with synthetic photos and rooms.
 
 use std::path::Path;
 
@@ -7,10 +6,10 @@ use unlift::synthetic;
 
 use crate::common::{Place, descriptor};
 
-/// Points of a map: more than its lists have neighbors.
+/// Points of a map: more than the entries of a list.
 const N_POINTS: usize = 200;
 
-/// Where camera `at` stands, in meters.
+/// Returns the center of camera `at`, in meters.
 fn center(at: usize) -> [f64; 3] {
     let at = at as f64;
     [0.5 * at, 0.1 * at * at, 1.5 + 0.2 * (3.0 * at).sin()]
@@ -21,7 +20,8 @@ fn pose(at: usize) -> String {
     format!("1 0 0 {x}\n0 1 0 {y}\n0 0 1 {z}\n0 0 0 1\n")
 }
 
-/// A scene of 7-Scenes with `n` frames in sequence 3, its only one for tests; the names of its photos.
+/// Creates a scene of 7-Scenes with `n` frames in the test sequence 3; returns the names of its
+/// photos.
 pub fn seven_scenes(place: &Place, scene: &str, n: usize) -> Vec<String> {
     place.write(&format!("{scene}/TestSplit.txt"), "sequence3\r\n");
     place.write(&format!("{scene}/TrainSplit.txt"), "sequence1\r\n");
@@ -29,14 +29,14 @@ pub fn seven_scenes(place: &Place, scene: &str, n: usize) -> Vec<String> {
     for (at, name) in names.iter().enumerate() {
         let beside = |kind: &str| format!("{scene}/{}", name.replace("color.png", kind));
         place.write_photo(&beside("color.png"), at as u32);
-        // Depth is a photo by its name alone.
+        // Depth images differ from photos only by name.
         place.write_photo(&beside("depth.png"), 90 + at as u32);
         place.write(&beside("pose.txt"), pose(at));
     }
     names
 }
 
-/// A scene of 12-Scenes, whose first `n_test` frames are for tests, of `n`.
+/// Creates a scene of 12-Scenes with `n` frames, of which the first `n_test` are for tests.
 pub fn twelve_scenes(place: &Place, scene: &str, n_test: usize, n: usize) {
     let split = format!(
         "sequence0 [frames={n_test}] [start=0 ; end={}]\nsequence1 [frames={}] [start={n_test} ; end={}]\n",
@@ -51,7 +51,8 @@ pub fn twelve_scenes(place: &Place, scene: &str, n_test: usize, n: usize) {
     }
 }
 
-/// A scene of Cambridge Landmarks with these photos for tests, 2048 pixels wide, and a map of VisualSFM.
+/// Creates a scene of Cambridge Landmarks with these test photos, 2048 pixels wide, and a VisualSFM
+/// map.
 pub fn cambridge(place: &Place, scene: &str, names: &[&str]) {
     let head = "Visual Landmark Dataset V1\nImageFile, Camera Position [X Y Z W P Q R]\n\n";
     let (mut list, mut nvm) = (head.to_owned(), format!("NVM_V3\n\n{}\n", names.len()));
@@ -72,19 +73,21 @@ pub fn cambridge(place: &Place, scene: &str, names: &[&str]) {
     place.write(&format!("{scene}/reconstruction.nvm"), nvm + "\n0\n");
 }
 
-/// A COLMAP model of a room in `folder`, `unit` meters to a unit: images with these names, all of which see all points.
+/// Creates a COLMAP model of a room in `folder`; a unit is `unit` meters. All images see all
+/// points.
 pub fn model(place: &Place, folder: &str, names: &[String], unit: f64) {
     let points = synthetic::room(1, N_POINTS).points;
     write_model(place, folder, (names, [128, 96]), (&points, unit), |_, _| true);
 }
 
-/// The database of such a model.
+/// Creates the database of such a model.
 pub fn database(place: &Place, name: &str, names: &[String]) {
     let points = synthetic::room(1, N_POINTS).points;
     write_database(&place.path(name), names, &points, |_, _| true);
 }
 
-/// A COLMAP project of a room in `root`, with photos: each of 600 points is seen by two of three images.
+/// Creates a COLMAP project of a room in `root`, with photos: each of 600 points is seen by two of
+/// three images.
 pub fn project(place: &Place, root: &str) {
     let names: Vec<String> = (0..3).map(|image| format!("room/{image}.jpg")).collect();
     let points = synthetic::room(1, 600).points;
@@ -100,7 +103,7 @@ pub fn project(place: &Place, root: &str) {
     }
 }
 
-/// Where keypoint `at` of an image lies: on a grid with a wave in it.
+/// Returns keypoint `at` of an image, on a wavy grid.
 fn keypoint(at: usize) -> [f64; 2] {
     let wave = 3.0 * (at as f64).sin();
     [12.0 + 24.0 * (at % 25) as f64 + wave, 12.0 + 22.0 * (at / 25) as f64 - wave]
@@ -150,7 +153,7 @@ fn write_database(
          INSERT INTO cameras VALUES (1, 1, 640, 480);";
     database.execute_batch(tables).unwrap();
     for (image, name) in names.iter().enumerate() {
-        // In reverse order: names join, not ids.
+        // Ids are in reverse order, because images are matched by name.
         let id = (names.len() - image) as i64;
         let insert = "INSERT INTO images VALUES (?, ?, 1)";
         database.execute(insert, rusqlite::params![id, name]).unwrap();

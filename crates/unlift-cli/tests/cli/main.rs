@@ -1,4 +1,4 @@
-//! The program as a user runs it: exit codes, one-line errors, whole outputs, the same bytes.
+//! Tests of the program: exit codes, one-line errors, complete outputs, identical bytes.
 
 #[path = "../common/mod.rs"]
 mod common;

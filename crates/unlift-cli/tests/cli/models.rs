@@ -1,10 +1,10 @@
-//! `unlift models`, and models that are missing.
+//! `unlift models`, and missing models.
 
 use serde_json::Value;
 
 use crate::common::{Place, said};
 
-/// What `unlift` prints with this folder of models and none of the user's own.
+/// Runs a line with this folder of models and without those of the user; returns stdout and stderr.
 fn with_models(place: &Place, folder: &str, line: &str, code: i32) -> (String, String) {
     let mut program = place.program(line.split_whitespace());
     let output =

@@ -1,5 +1,5 @@
-//! Nothing of the user's is lost: not beside an output, not under its name, not as an input. What interrupts leave is
-//! tested by `faults`.
+//! User files are never lost: beside an output, at its path, or as an input. `faults` tests
+//! interrupts.
 
 use std::fs;
 use std::path::Path;
@@ -12,7 +12,7 @@ const QUICK: &str = "--k 10 --schemes olc --inlier-ratios 1 --quiet";
 fn files_beside_an_audit_survive_and_a_strangers_audit_json_is_refused() {
     let place = Place::with_room(200);
     place.write("site/src/app.ts", "precious");
-    // As `npm audit --json > audit.json` leaves it; an empty one used to suffice.
+    // As `npm audit --json > audit.json` writes it, and an empty file.
     for foreign in ["", r#"{"auditReportVersion": 2, "vulnerabilities": {}}"#] {
         place.write("site/audit.json", foreign);
         assert_eq!(
@@ -90,9 +90,9 @@ fn inputs_are_never_written_over() {
         }
     }
     for (line, expected) in [
-        // A new name that the next run would take for a photo.
+        // The next run would read this file as a photo.
         ("features photos --out photos/new.jpg", "a name that is not read as a photo"),
-        // Stage files of another kind are somebody's work, too.
+        // Stage files of another kind are not replaced.
         (
             &format!("{recover} x/truth.parquet"),
             "a file of recovered points of an earlier run (else --force)",

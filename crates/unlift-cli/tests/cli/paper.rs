@@ -1,4 +1,4 @@
-//! The paper's tables on miniatures of its datasets: what is found, what is missing, what is refused.
+//! `unlift paper` on miniatures of its datasets: what is found, missing or refused.
 
 use std::fs;
 
@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::common::Place;
 use crate::layouts;
 
-/// Our number of this table, scheme, measure and ratio.
+/// Returns our number for this table, scheme, measure and ratio.
 fn ours(paper: &Value, (table, scheme): (u64, &str), measure: &str, ratio: Option<f64>) -> f64 {
     let numbers = paper["numbers"].as_array().unwrap().iter();
     let mut fits = numbers.filter(|number| {
@@ -21,7 +21,7 @@ fn ours(paper: &Value, (table, scheme): (u64, &str), measure: &str, ratio: Optio
     number["ours"].as_f64().unwrap_or_else(|| panic!("nothing of ours: {number}"))
 }
 
-/// The largest share of an audit.
+/// Returns the largest share of an audit.
 fn largest(audit: &Value, scheme: &str, ratio: f64, threshold: &str) -> f64 {
     let rows = audit["results"].as_array().unwrap().iter();
     let of = rows.filter(|row| {
@@ -39,7 +39,7 @@ fn names(audit: &Value) -> Vec<&str> {
     images.map(|image| image["name"].as_str().unwrap()).collect()
 }
 
-/// Runs `paper` on a dataset in `d`, and returns what it printed.
+/// Runs `paper` on a dataset in `d`, and returns stdout.
 fn table_of(place: &Place, line: &str) -> String {
     place.ends(&format!("paper --quiet --out o --dataset {line}"), 0).0
 }
@@ -73,14 +73,14 @@ fn seven_scenes_with_a_published_map() {
     let found = ours(&paper, (7, "olc"), "percent within 0.25 m", Some(0.1));
     near(found, largest(&map, "olc", 0.1, "0.25"));
     assert!(found > 0.0);
-    // Two of the five photos of the split, and none of the depth.
+    // Two of the five photos of the split, and no depth images.
     let images = place.json("o/chess/images/audit.json");
     assert_eq!(names(&images), [&*photos[1], &*photos[3]]);
     let found = ours(&paper, (1, "cp2d"), "percent within 10 px", Some(0.5));
     near(found, largest(&images, "cp2d", 0.5, "10"));
     let estimated = ours(&paper, (4, "lines2d"), "percent within 25 px", None);
     assert!(estimated > 0.0 && estimated <= 100.0, "{estimated}");
-    // A second run gives the same bytes.
+    // A second run writes the same bytes.
     let files = || ["o/paper.json", "o/paper.csv"].map(|name| place.bytes(name));
     let before = files();
     let whole = table_of(&place, &format!("{line} --threads 1 --json"));
@@ -104,7 +104,7 @@ fn twelve_scenes_by_its_first_sequence() {
     }
     let images = place.json("o/apt1/kitchen/images/audit.json");
     assert_eq!(names(&images), ["frame-000000.color.jpg", "frame-000001.color.jpg"]);
-    // A map of its own, in a folder of maps; in meters by the poses beside the photos.
+    // `--models` names another folder of maps; the poses beside the photos give their scale.
     let frames: Vec<String> = (0..4).map(|at| format!("data/frame-{at:06}.color.jpg")).collect();
     layouts::model(&place, "m/apt1/kitchen/sparse/0", &frames, 0.25);
     table_of(&place, "12scenes d --models m --parts maps --max-points 150");
@@ -128,7 +128,7 @@ fn cambridge_in_the_pixels_of_the_paper() {
     let [paper, images, map] =
         ["paper.json", "ShopFacade/images/audit.json", "ShopFacade/map/audit.json"]
             .map(|name| place.json(&format!("o/{name}")));
-    // Photos of twice the size: 10 pixels of the paper are 20.
+    // Photos have twice the usual size, so 10 pixels of the paper are 20.
     let found = ours(&paper, (1, "lines2d"), "percent within 10 px", Some(1.0));
     near(found, largest(&images, "lines2d", 1.0, "20"));
     near(map["input"]["scale_m_per_unit"].as_f64().unwrap(), 1.0);
@@ -152,7 +152,7 @@ fn pictures_of_photos_and_of_maps_with_descriptors() {
 
     layouts::database(&place, "d/heads/database.db", &photos);
     fs::remove_file(place.path("d/heads/TestSplit.txt")).unwrap();
-    // One photo is as good as four here, and takes a quarter of the time.
+    // One photo suffices here, and takes a quarter of the time.
     photos[1..].iter().for_each(|name| fs::remove_file(place.path("d/heads").join(name)).unwrap());
     let text = table_of(&place, "7scenes d --parts pictures");
     assert!(text.contains("table 10: maps of 7-scenes, SIFT: SSIM / PSNR / LPIPS"), "{text}");
@@ -196,7 +196,7 @@ fn what_is_wrong_is_one_line() {
         (
             "cambridge e",
             3,
-            "e: expected photos of a test split or a map of a scene, in meters, found none",
+            "e: expected photos of a test split, or a map of a scene in meters, found none",
         ),
     ] {
         let told = place.complains(&format!("paper --quiet --out o --dataset {line}"), code);
@@ -211,7 +211,7 @@ fn a_map_of_another_scene_is_refused_and_others_go_on() {
     let photos = layouts::seven_scenes(&place, "d/chess", 6);
     layouts::model(&place, "d/chess/sfm", &photos, 1.0);
     let pose = |at: usize| format!("d/chess/{}", photos[at].replace("color.png", "pose.txt"));
-    // The poses of the photos are turned about: no scale fits.
+    // The poses of the photos are turned: no scale fits.
     for at in 0..photos.len() {
         let text = format!("1 0 0 {}\n0 1 0 0\n0 0 1 0\n0 0 0 1\n", at * at * at);
         place.write(&pose(at), text);
@@ -224,7 +224,7 @@ fn a_map_of_another_scene_is_refused_and_others_go_on() {
         "{stderr}"
     );
     assert!(text.contains("failed: chess, map: "), "{text}");
-    // Who knows better says so.
+    // `--scale` overrides the poses.
     place.ends(&format!("{line} --scale 1"), 0);
     place.write(&pose(2), "1 0 0\n");
     let told = "pose.txt:1: expected 4 numbers of a row of a pose, found \"1 0 0\"";

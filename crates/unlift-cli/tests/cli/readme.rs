@@ -1,4 +1,4 @@
-//! Every command line of the README, run in order in an empty folder: what it says can be done can be done.
+//! Runs every command line of the README in order, in an empty folder.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -7,14 +7,14 @@ use std::path::{Path, PathBuf};
 use crate::common::{Place, said};
 use crate::layouts;
 
-/// Names that the README uses for what a reader has; everything else a line must make itself.
+/// Inputs of the reader; the lines must make everything else.
 const FIXTURES: [&str; 3] = ["PROJECT/", "photos/", "cloud.ply"];
 
 fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// The command lines of all `sh` blocks of a document, comments taken off.
+/// Returns the command lines of all `sh` blocks of a document, without comments.
 fn command_lines(markdown: &str) -> Vec<String> {
     let mut lines = Vec::new();
     let mut within = false;
@@ -31,7 +31,8 @@ fn command_lines(markdown: &str) -> Vec<String> {
     lines
 }
 
-/// The line as it is run with the program of this build; `None` for what builds the program or runs the tests.
+/// Returns the line for the program of this build; `None` for lines that build the program or run
+/// the tests.
 fn runnable(line: &str) -> Option<String> {
     let ours = line.strip_prefix("cargo run --release -- ").map(|words| format!("unlift {words}"));
     let is_build = ["cargo install --path crates/unlift-cli", "cargo test --workspace"];
@@ -48,7 +49,7 @@ fn runnable(line: &str) -> Option<String> {
     }
 }
 
-/// What a line of ours writes: what `--out` names, else the usual place.
+/// Returns the output path of a line of unlift: `--out` or the default.
 fn output(line: &str) -> Option<&str> {
     let mut words = line.split_whitespace();
     match words.find(|&word| word == "--out") {
@@ -83,7 +84,7 @@ fn every_command_line_of_the_readme_runs_as_it_is_written() {
         }
         let run = place.shell(&line);
         let (stdout, stderr) = said(&run);
-        // A gate may fail: that is what it is for. It must say so, and nothing else may go wrong.
+        // A gate may fail, and must report that; nothing else may fail.
         let failed = line.contains("--gate") && stdout.contains("FAILED");
         assert_eq!(run.status.code(), Some(i32::from(failed)), "{line}\n{stdout}{stderr}");
         if let Some(out) = output(&line) {
@@ -93,7 +94,7 @@ fn every_command_line_of_the_readme_runs_as_it_is_written() {
     assert!(given() == before, "a line of the README changed what a reader has");
 }
 
-/// A cloud in no unit that anybody knows.
+/// Writes a point cloud with an unknown unit.
 fn write_cloud(place: &Place) {
     let head = "ply\nformat ascii 1.0\nelement vertex 400\nproperty float x\nproperty float y\nproperty float z\n";
     let point = |p: &[f64; 3]| format!("{} {} {}\n", 3.0 * p[0], 3.0 * p[1], 3.0 * p[2]);
@@ -101,14 +102,13 @@ fn write_cloud(place: &Place) {
     place.write("cloud.ply", format!("{head}end_header\n{rows}"));
 }
 
-/// How GitHub names a heading in links.
+/// Returns GitHub's anchor of a heading.
 fn anchor(heading: &str) -> String {
     let kept = heading.trim_start_matches('#').trim().to_lowercase();
     let kept = kept.chars().filter(|c| c.is_alphanumeric() || [' ', '-', '_'].contains(c));
     kept.map(|c| if c == ' ' { '-' } else { c }).collect()
 }
 
-/// The documents of the repository that link to each other.
 const DOCUMENTS: [&str; 6] = [
     "README.md",
     "ARCHITECTURE.md",
@@ -125,7 +125,7 @@ fn links_between_documents_lead_somewhere() {
         let path = repository().join(document);
         let text = fs::read_to_string(&path).unwrap();
         for link in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
-            // Code has brackets and parentheses, too.
+            // Skip brackets and parentheses of code.
             if link.contains("://") || link.contains(' ') || !link.contains(['.', '#']) {
                 continue;
             }

@@ -1,4 +1,4 @@
-//! `unlift audit released`: records of somebody else, audited end to end.
+//! `unlift audit released`: records of another program, audited end to end.
 
 use std::fs;
 use std::process::Command;
@@ -11,8 +11,9 @@ use unlift_io::stage::{read_truth, write_truth};
 
 use crate::common::Place;
 
-/// A scheme as a researcher writes it: every point on a line of random direction through it, records in random
-/// order, a tenth of the points left out.
+/// A scheme of a researcher: each point on a random line through it, records in random order, a
+/// tenth of the points
+/// left out.
 const SCHEME: &str = r#"
 import json, numpy as np, pyarrow as pa, pyarrow.parquet as pq
 points = np.loadtxt("room.csv", delimiter=",")
@@ -53,7 +54,7 @@ fn a_scheme_written_in_python_gets_rows_page_and_gates() {
     let gates = "--inlier-ratios 1,0.5,0.1 --gate numpy-lines@0.1:0.25<=100 --gate all@1:0.25<=5";
     let found = place.prints(&format!("{audit} {gates} --out a --json"), 1);
     let rows = found["results"].as_array().unwrap();
-    // Three ratios; joint, joint-start and consensus, as the map is small.
+    // Three ratios; joint, joint-start and, because the map is small, consensus.
     assert_eq!(rows.len(), 9);
     for row in rows {
         assert_eq!((&row["scheme"], &row["unit"]), (&"numpy-lines".into(), &"m".into()));
@@ -71,7 +72,7 @@ fn a_scheme_written_in_python_gets_rows_page_and_gates() {
     let page = place.text("a/report.html");
     assert!(page.contains("numpy-lines") && page.contains("<canvas"), "no page of numpy-lines");
 
-    // By another name, from the records alone.
+    // With another name, and lists from the records alone.
     let found = place.prints(&format!("{audit} --name own --neighbors geometric --json"), 0);
     assert!(found["results"].as_array().unwrap().iter().all(|row| row["scheme"] == "own"));
     for (more, expected) in [
@@ -84,7 +85,7 @@ fn a_scheme_written_in_python_gets_rows_page_and_gates() {
     }
 }
 
-/// The `k` nearest points of every point, for the `n` first ones, as a file that any program could write.
+/// Writes lists of the `k` nearest points for the first `n` points, as another program would.
 fn write_lists(place: &Place, name: &str, points: &[[f64; 3]], n: usize, k: usize) {
     let near = |at: usize| {
         let off = |other: &u32| {
@@ -106,8 +107,9 @@ fn write_lists(place: &Place, name: &str, points: &[[f64; 3]], n: usize, k: usiz
     writer.close().unwrap();
 }
 
-/// What unlift hid itself has the rows of `audit map`, figure by figure: also with lists by original in a file, and with
-/// descriptors of the originals, which go to the records that hide them.
+/// Released maps of unlift have the rows of `audit map`, also with lists by original in a file, and
+/// with descriptors of the
+/// originals.
 #[test]
 fn the_rows_are_those_of_an_audit_of_the_map() {
     let place = Place::with_room(400);
@@ -138,19 +140,19 @@ fn the_rows_are_those_of_an_audit_of_the_map() {
                 *sources != described || rows[0]["assignment_accuracy_percent"].is_f64();
             assert!(is_described, "{}", rows[0]);
             for row in rows.iter().filter(|row| row["neighbors"] == "file") {
-                // All of them are right, but for a partner on the same line.
+                // All entries are true, except a partner on the same line.
                 assert!(row["inlier_ratio"].as_f64() > Some(0.9), "{scheme}: {row}");
                 let percent = |of: &str| row[of]["0.25"].as_f64().unwrap();
                 assert!(percent("recovered_percent") > 2.0 * percent("blind_percent"), "{row}");
             }
         }
     }
-    // Points without a row have no neighbors, and that is told.
+    // Points without a row have no neighbors, and a note says so.
     write_lists(&place, "few.parquet", &points, 300, 10);
     let (_, stderr) =
         place.ends(&format!("{released} --k 10 --neighbors few.parquet --out few"), 0);
     assert!(stderr.contains("note: lists: 100 of 400 points have no neighbors"), "{stderr}");
-    // Lists of another map name points that this one lacks.
+    // Lists of a larger map name points that this one lacks.
     let more = unlift::synthetic::room(1, 401).points;
     write_lists(&place, "other.parquet", &more, 401, 10);
     let line = format!("{released} --k 10 --neighbors other.parquet --out other");
@@ -159,7 +161,8 @@ fn the_rows_are_those_of_an_audit_of_the_map() {
     assert!(!place.path("other").exists());
 }
 
-/// With the truth of another map next to nothing comes back, which would read as "safe".
+/// The truth of another map is an error, because almost nothing would come back, which reads as
+/// "safe".
 #[test]
 fn a_truth_of_another_map_is_refused() {
     let place = Place::with_room(400);

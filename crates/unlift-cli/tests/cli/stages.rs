@@ -1,4 +1,5 @@
-//! The stages as a user chains them: the audit's figures, and no file of another map.
+//! The stages, one after another: they give the results of an audit, and refuse files of another
+//! map.
 
 use std::fs;
 
@@ -15,14 +16,14 @@ use crate::common::Place;
 
 const POINTS: usize = 400;
 
-/// A small room with made-up descriptors.
 fn place() -> Place {
     let place = Place::with_room(POINTS);
     place.write_descriptors("d.bin", &unlift::synthetic::room(1, POINTS).points, 128);
     place
 }
 
-/// An obfuscation, oracle lists and recovered points in the folder `name`. The truth is out of reach while recovery runs.
+/// Runs obfuscation, oracle lists and recovery in the folder `name`. The truth is moved away during
+/// recovery.
 fn chain(place: &Place, name: &str, scheme: &str, seed: u32) {
     let map = "room.csv --scale 1 --k 10 --descriptors d.bin";
     place.ends(&format!("obfuscate {map} --scheme {scheme} --seed {seed} --out {name}"), 0);
@@ -35,7 +36,7 @@ fn chain(place: &Place, name: &str, scheme: &str, seed: u32) {
     fs::rename(place.path("away"), truth).unwrap();
 }
 
-/// A row of an audit as `evaluate` prints it: without what is of the lists alone.
+/// Returns a row of an audit as `evaluate` prints it, without what depends on the lists alone.
 fn as_staged(row: &Value, staged: &Value) -> Value {
     let mut row = row.as_object().expect("a row").clone();
     for name in ["scheme", "neighbors", "oracle_noise", "inlier_ratio", "k", "solver"] {
@@ -46,7 +47,7 @@ fn as_staged(row: &Value, staged: &Value) -> Value {
     Value::Object(row)
 }
 
-/// With one `--seed` everywhere, `evaluate` prints the row of the audit, figure by figure.
+/// With the same `--seed` everywhere, `evaluate` prints the row of the audit.
 #[test]
 fn the_stages_print_the_row_of_the_audit() {
     let place = place();
@@ -71,14 +72,14 @@ fn the_stages_print_the_row_of_the_audit() {
             let staged =
                 place.prints("evaluate hidden-back --truth hidden/truth.parquet --json", 0);
             let rows = audit["results"].as_array().expect("rows");
-            // The strongest attack of a source may have rows of other solvers beside it.
+            // A source may also have rows of other solvers.
             let row = rows.iter().find(|r| r["neighbors"] == source && r["solver"] == "joint");
             let row = row.expect("a row");
             assert_eq!(
                 (row["k"].as_u64(), row["oracle_noise"].is_null()),
                 (Some(n_listed), source != "oracle")
             );
-            // Against as many nearest as are listed more of them are right than against the ten nearest.
+            // More list entries are true if as many nearest neighbors count as a list has entries.
             let at_k = row["metrics"]["inlier_ratio_at_k"].as_f64();
             assert!(
                 at_k.is_none() == (source == "oracle")
@@ -97,7 +98,7 @@ fn the_stages_print_the_row_of_the_audit() {
     assert_eq!(files.len(), 3, "each noise model has lists of its own");
 }
 
-/// Many images in one file give the row of the audit, too, whatever the number of threads.
+/// A file of many images gives the row of the audit, for any number of threads.
 #[test]
 fn the_stages_of_images_print_the_row_of_the_audit() {
     let place = Place::with_photos(&["a.png", "b.png", "c/d.png"]);
@@ -141,7 +142,7 @@ fn the_stages_of_images_print_the_row_of_the_audit() {
     }
 }
 
-/// That parts are read as the whole file is tested where they are read: here that every command takes them.
+/// Every command accepts a folder of parts; other tests check that parts equal the whole file.
 #[test]
 fn parts_are_what_the_file_is() {
     let place = place();
@@ -171,7 +172,7 @@ fn parts_are_what_the_file_is() {
     let told = place.complains("recover p/released --neighbors p/lists --out none", 3);
     let expected = "expected part-000003.parquet, as in _manifest.json, found no such file\n";
     assert!(told.ends_with(expected), "{told}");
-    // What cannot be written is told before the work.
+    // A place that cannot be written is reported before the work.
     let refused = place.complains("split p-lists --rows 300 --out p/truth", 2);
     assert!(refused.contains("expected a folder without other parts"), "{refused}");
     place.ends("split p/released/_manifest.json --out p/none", 3);
@@ -181,7 +182,7 @@ fn parts_are_what_the_file_is() {
 fn files_of_another_map_are_refused() {
     let place = place();
     chain(&place, "one", "ppl", 1);
-    // As many points and records; only the released content differs.
+    // Both maps have the same number of points and records.
     chain(&place, "two", "ppl", 2);
     for (line, file, of) in [
         ("evaluate one-back --truth two/truth.parquet", "one-back", "two/truth.parquet"),
@@ -209,8 +210,8 @@ fn files_of_another_map_are_refused() {
     }
 }
 
-/// What somebody else wrote does not say which map it is of: it is taken, and told, unless its positions lie where
-/// only those of another map would.
+/// A file without a fingerprint is accepted with a note, unless its positions fit another map
+/// better.
 #[test]
 fn files_that_do_not_say_are_taken_with_a_note() {
     let place = place();
@@ -220,8 +221,11 @@ fn files_that_do_not_say_are_taken_with_a_note() {
     write_neighborhoods(&place.path("bare-lists"), &lists.with_about(About::default())).unwrap();
     let recover = "recover one/released.parquet --neighbors bare-lists --out bare-back --seed 1";
     let (_, stderr) = place.ends(recover, 0);
-    assert!(stderr.contains("unlift: note: bare-lists: says not which released map"), "{stderr}");
-    assert!(stderr.contains("says not what its rows are counted by"), "{stderr}");
+    assert!(
+        stderr.contains("unlift: note: bare-lists: does not name its released map"),
+        "{stderr}"
+    );
+    assert!(stderr.contains("does not state what its rows are counted by"), "{stderr}");
 
     let back = read_recovered::<3>(&place.path("one-back")).unwrap();
     write_recovered(&place.path("bare-back"), &back.with_about(About::default())).unwrap();
@@ -238,8 +242,8 @@ fn files_that_do_not_say_are_taken_with_a_note() {
     assert!(stderr.starts_with(start), "{stderr}");
 }
 
-/// Rows in another order, and a truth in another scale, with the fingerprint of the right one copied: next to nothing
-/// comes back, as if the scheme protected the map.
+/// Files with reordered rows or a scaled truth have the right fingerprint, but almost nothing would
+/// come back.
 #[test]
 fn what_does_not_belong_together_is_not_believed_for_its_fingerprint() {
     let place = place();
@@ -250,7 +254,7 @@ fn what_does_not_belong_together_is_not_believed_for_its_fingerprint() {
 
         let back = read_recovered::<3>(&place.path("of-back")).unwrap();
         let (n, origin, unit) = (back.n_slots(), back.origin(), back.unit());
-        // All rows in other places are seen by where they lie; a fifth of them is told.
+        // Reordering all rows is an error; reordering a fifth of them is a note.
         for (name, code) in [("rolled", 3), ("some", 0)] {
             let moves = |slot: usize| name == "rolled" || slot % 20 < 4;
             let of = |slot: usize| if moves(slot) { (slot + 8) % n } else { slot };
@@ -274,7 +278,6 @@ fn what_does_not_belong_together_is_not_believed_for_its_fingerprint() {
     }
 }
 
-/// The estimate of one slot.
 fn estimate(of: &Recovered<3>, slot: usize) -> Estimate<3> {
     let origin = of.origin();
     let position = of.position(slot).unwrap_or([f64::NAN; 3]);

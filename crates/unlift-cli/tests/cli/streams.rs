@@ -1,4 +1,4 @@
-//! What the program says, and to whom: streams that nobody reads, disks that are full, names that a terminal obeys.
+//! Output streams: unread pipes, full disks, and names with terminal control characters.
 
 use std::fs;
 
@@ -11,7 +11,7 @@ fn messages_that_nobody_hears_change_nothing() {
     let place = Place::with_room(200);
     let full = cfg!(target_os = "linux").then_some("2>/dev/full");
     for redirection in ["2>&-", "2>&1 | true"].into_iter().chain(full) {
-        // Obfuscation with a seed has something to say. Errors of the command line, of options and of files keep their codes.
+        // Obfuscation with a seed prints a note. Exit codes of errors do not change.
         for (line, code) in [
             (HIDE, "0\n"),
             ("schemes --no-such", "2\n"),
@@ -53,7 +53,7 @@ fn a_place_that_cannot_be_written_is_an_error_of_the_command_line() {
     place.ends(HIDE, 0);
     let oracle = "neighbors oracle hidden/truth.parquet --inlier-ratio 1 --k 10 --out";
     place.ends(&format!("{oracle} lists.parquet"), 0);
-    // No file can be made in /proc, whoever asks.
+    // Nobody can create a file in /proc.
     for line in [
         "obfuscate room.csv --scheme olc --k 10 --out /proc",
         "audit map room.csv --k 10 --schemes olc --out /proc",

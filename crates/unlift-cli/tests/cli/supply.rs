@@ -1,5 +1,7 @@
-//! Whose code is in the program: licences that go with MIT OR Apache-2.0, one registry, no crate twice that need not be.
-//! A test, so that it runs wherever the others do, without a program that has to be compiled first. Advisories change while code does not: `cargo audit` or `cargo deny check advisories`, where there is a network.
+//! Licenses, registry and duplicates of the dependencies. This is a test, so that it needs no other
+//! program. Advisories change while
+//! code does not: check them by `cargo audit` or `cargo deny check advisories`, where there is a
+//! network.
 
 use std::collections::BTreeMap;
 use std::process::Command;
@@ -11,11 +13,12 @@ const ALLOWED: &str = "0BSD, Apache-2.0, Apache-2.0 WITH LLVM-exception, BSD-2-C
 
 const REGISTRY: &str = "registry+https://github.com/rust-lang/crates.io-index";
 
-/// Crates of which two versions are compiled, as those that we depend on ask for different ones. Who adds one has looked.
+/// Crates with two versions, because dependencies require different ones. Check a new one before
+/// you add it.
 const TWICE: &str = "base64 block-buffer cpufeatures crypto-common digest getrandom glam hashbrown miniz_oxide num-bigint \
     rand rand_core syn";
 
-/// All crates on this machine's platform, from the lock file.
+/// Returns all crates for this platform, from the lock file.
 fn packages() -> Vec<Value> {
     let cargo = |arguments: &[&str]| {
         let output = Command::new(env!("CARGO")).args(arguments).output().expect("cargo runs");
@@ -31,7 +34,7 @@ fn packages() -> Vec<Value> {
     serde_json::from_value(metadata["packages"].take()).expect("a list")
 }
 
-/// Whether an SPDX expression leaves a choice of licences that are all allowed.
+/// Returns true if an SPDX expression allows a choice of accepted licenses.
 fn may_be_carried(expression: &str) -> bool {
     let choices = |part: &str| {
         let part = part.trim_matches(['(', ')']).replace('/', " OR ");
@@ -72,7 +75,7 @@ fn no_crate_is_compiled_twice_unless_others_ask_for_it() {
     assert!(new.is_empty(), "compiled twice: {new:?}");
 }
 
-/// A constant that holds a file is copied wherever it is used; a static is in the program once.
+/// A constant with a file is copied wherever it is used; a static is stored once.
 #[test]
 fn the_program_holds_every_network_once() {
     let program = std::fs::read(env!("CARGO_BIN_EXE_unlift")).expect("the program");
@@ -83,7 +86,7 @@ fn the_program_holds_every_network_once() {
         let copies = program.windows(sample.len()).filter(|window| *window == sample).count();
         assert_eq!(copies, 1, "{}", entry.name);
     }
-    // Lines for backtraces are most of a program that is built for tests.
+    // Line numbers for backtraces are most of a debug build.
     let most = if cfg!(debug_assertions) { 200 } else { 70 };
     assert!(program.len() < most * 1_000_000, "{} bytes", program.len());
 }

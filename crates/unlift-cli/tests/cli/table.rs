@@ -1,10 +1,10 @@
-//! `unlift table`: the figures of audit.json and no others, set for papers.
+//! `unlift table`: formats the results of audit.json for papers.
 
 use serde_json::Value;
 
 use crate::common::Place;
 
-/// A folder with an audit in `a`, and its figures.
+/// Creates a folder with an audit in `a`, and returns its results.
 fn audited(more: &str) -> (Place, Value) {
     let place = Place::with_room(500);
     let audit = "audit map room.csv --scale 1 --k 10 --schemes olc,ppl --inlier-ratios 1,0.5 --quiet --out a";
@@ -13,7 +13,8 @@ fn audited(more: &str) -> (Place, Value) {
     (place, document)
 }
 
-/// The largest share of `scheme` within `typed` from the oracle at `ratio`, as tables say it.
+/// Returns the largest share of `scheme` within `typed` by the oracle at `ratio`, as tables print
+/// it.
 fn largest(document: &Value, scheme: &str, ratio: f64, typed: &str) -> String {
     let rows = document["results"].as_array().unwrap().iter();
     let of = rows.filter(|row| {
@@ -107,9 +108,9 @@ fn curves_are_a_drawing_of_every_scheme() {
     place.ends("table a/audit.json --format csv --out t.csv --curves c.svg --threshold 0.25", 0);
     let svg = place.text("c.svg");
     assert!(svg.contains("<title>points recovered within 25 cm, %</title>"), "{svg}");
-    // A curve per scheme and noise, a mark per ratio of each.
+    // A curve per scheme and noise, and a mark per ratio.
     assert_eq!((svg.matches("<polyline").count(), svg.matches("<circle").count()), (4, 8));
-    // The share at ratio 1, the right edge: 346 is 0 %, 34 is 100 %.
+    // The share at ratio 1, at the right edge: 346 is 0 %, 34 is 100 %.
     let share: f64 = largest(&document, "olc", 1.0, "0.25").parse().unwrap();
     let mut shares = svg.split("<circle cx=\"470.0\" cy=\"").skip(1).map(|mark| {
         let y: f64 = mark.split('"').next().unwrap().parse().unwrap();

@@ -1,6 +1,6 @@
-//! A folder of photos or with a small map, and the program run in it as a user would.
+//! Helpers of the tests: a temporary folder with inputs, and runs of the program in it.
 
-// Each test program compiles this file and uses its own part of it.
+// Each test program compiles this file and uses only a part of it.
 #![allow(dead_code)]
 
 use std::fs;
@@ -10,16 +10,14 @@ use std::process::{Child, Command, Output, Stdio};
 use image::RgbImage;
 use serde_json::Value;
 
-/// A folder of its own per test.
 pub struct Place(tempfile::TempDir);
 
 impl Place {
-    /// With nothing in it.
     pub fn empty() -> Self {
         Self(tempfile::tempdir().expect("a temporary folder"))
     }
 
-    /// With these photos in `photos`, each of its own kind.
+    /// Creates a folder with these photos in `photos`, each with its own content.
     pub fn with_photos(names: &[&str]) -> Self {
         let place = Self::empty();
         for (at, name) in names.iter().enumerate() {
@@ -28,32 +26,30 @@ impl Place {
         place
     }
 
-    /// With `n_points` of a made-up room in `room.csv`.
+    /// Creates a folder with `n_points` of the synthetic room in `room.csv`.
     pub fn with_room(n_points: usize) -> Self {
         let place = Self::empty();
         place.write_points("room.csv", &unlift::synthetic::room(1, n_points).points);
         place
     }
 
-    /// Writes a file, and the folders that it lies in.
+    /// Writes a file and its parent folders.
     pub fn write(&self, name: &str, content: impl AsRef<[u8]>) {
         fs::create_dir_all(self.path(name).parent().expect("a folder")).unwrap();
         fs::write(self.path(name), content).unwrap();
     }
 
-    /// Writes `points` as a table.
     pub fn write_points(&self, name: &str, points: &[[f64; 3]]) {
         let text: String = points.iter().map(|[x, y, z]| format!("{x},{y},{z}\n")).collect();
         self.write(name, text);
     }
 
-    /// Writes a made-up photo.
     pub fn write_photo(&self, name: &str, which: u32) {
         self.write(name, "");
         photo(which).save(self.path(name)).unwrap();
     }
 
-    /// Writes `dim` made-up bytes for each point as descriptors: near points look alike.
+    /// Writes a descriptor of `dim` bytes per point; near points have similar ones.
     pub fn write_descriptors(&self, name: &str, points: &[[f64; 3]], dim: u32) {
         let mut bytes = b"P3DESC01".to_vec();
         bytes.extend((points.len() as u64).to_le_bytes());
@@ -67,7 +63,6 @@ impl Place {
         self.0.path().join(name)
     }
 
-    /// The text of a file.
     pub fn text(&self, name: &str) -> String {
         String::from_utf8(self.bytes(name)).expect("UTF-8")
     }
@@ -80,7 +75,7 @@ impl Place {
         serde_json::from_str(&self.text(name)).expect("JSON")
     }
 
-    /// The names of what is in a folder, sorted.
+    /// Returns the sorted names of the entries of a folder.
     pub fn names(&self, folder: &str) -> Vec<String> {
         let entries = fs::read_dir(self.path(folder)).unwrap();
         let name = |entry: std::io::Result<fs::DirEntry>| entry.unwrap().file_name();
@@ -90,7 +85,7 @@ impl Place {
         names
     }
 
-    /// All files, as paths within the folder, sorted.
+    /// Returns the sorted paths of all files, relative to the folder.
     pub fn files(&self) -> Vec<String> {
         let (mut found, mut waiting) = (Vec::new(), vec![self.path("")]);
         while let Some(folder) = waiting.pop() {
@@ -109,14 +104,14 @@ impl Place {
         found
     }
 
-    /// The program with these words, in the folder.
+    /// Returns a command that runs the program with these words in the folder.
     pub fn program<'a>(&self, words: impl IntoIterator<Item = &'a str>) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_unlift"));
         command.args(words).current_dir(self.0.path());
         command
     }
 
-    /// A line of the shell in the folder, `unlift` being the program of this build.
+    /// Runs a line in a shell; `unlift` is the program of this build.
     pub fn shell(&self, line: &str) -> Output {
         let ours = Path::new(env!("CARGO_BIN_EXE_unlift")).parent().expect("a folder").to_owned();
         let others = std::env::var_os("PATH").unwrap_or_default();
@@ -126,13 +121,13 @@ impl Place {
         shell.current_dir(self.0.path()).stdin(Stdio::null()).output().expect("a shell")
     }
 
-    /// Starts the program; nobody hears what it says.
+    /// Starts the program without capturing its output.
     pub fn start(&self, line: &str) -> Child {
         let mut command = self.program(line.split_whitespace());
         command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program starts")
     }
 
-    /// What a run that must end with `code` printed: on stdout, and on stderr.
+    /// Runs a line that must end with `code`, and returns stdout and stderr.
     pub fn ends(&self, line: &str, code: i32) -> (String, String) {
         let output = self.program(line.split_whitespace()).output().expect("the program starts");
         let (stdout, stderr) = said(&output);
@@ -140,26 +135,25 @@ impl Place {
         (stdout, stderr)
     }
 
-    /// What a run prints on stderr that must end with `code` and print nothing else.
+    /// Runs a line that must end with `code` and an empty stdout, and returns stderr.
     pub fn complains(&self, line: &str, code: i32) -> String {
         let (stdout, stderr) = self.ends(line, code);
         assert!(stdout.is_empty(), "{line}: {stdout}");
         stderr
     }
 
-    /// The JSON that a run prints which must end with `code`.
+    /// Runs a line that must end with `code`, and returns the JSON from stdout.
     pub fn prints(&self, line: &str, code: i32) -> Value {
         serde_json::from_str(&self.ends(line, code).0).expect("JSON")
     }
 }
 
-/// What a run printed on stdout and on stderr.
 pub fn said(output: &Output) -> (String, String) {
     let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).expect("UTF-8");
     (text(&output.stdout), text(&output.stderr))
 }
 
-/// Blobs of several sizes; `which` moves them.
+/// Draws blobs of several sizes at positions that depend on `which`.
 pub fn photo(which: u32) -> RgbImage {
     RgbImage::from_fn(128, 96, |x, y| {
         let (x, y) = (f64::from(x + 9 * which), f64::from(y));
@@ -169,7 +163,7 @@ pub fn photo(which: u32) -> RgbImage {
     })
 }
 
-/// A descriptor that changes with the place of its point: near points look alike.
+/// Returns a descriptor that varies smoothly with the position of the point.
 pub fn descriptor(point: &[f64; 3], dim: u32) -> impl Iterator<Item = u8> {
     let [x, y, z] = *point;
     (0..dim).map(move |c| {

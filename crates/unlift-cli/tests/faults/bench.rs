@@ -1,4 +1,4 @@
-//! A place with small inputs for every command, and runs of them in a folder of their own.
+//! A workplace with small inputs for every command, and runs in a folder of their own.
 
 use std::collections::{BTreeSet, HashMap};
 use std::fs;
@@ -16,32 +16,28 @@ use crate::full;
 use crate::tree::{Tree, differing};
 
 const POINTS: usize = 1500;
-/// Nothing here takes as long, on the busiest machine: it hangs.
+/// A run that takes longer hangs.
 const PATIENCE: Duration = Duration::from_secs(3600);
 
-/// Inputs in `in`; `work`, where commands run, has what they write and nothing else.
+/// Inputs are in `in`; `work`, the working directory of runs, contains only their outputs.
 pub struct Bench {
     place: Place,
     inputs: &'static Tree,
 }
 
 static NONE: Tree = Tree::new();
-/// Made once for all tests.
 static INPUTS: OnceLock<Tree> = OnceLock::new();
-/// Found out once for all tests, by the names of cases.
+/// Undisturbed results by the name of the case, computed once for all tests.
 static KNOWN: Mutex<Option<HashMap<&str, Arc<Known>>>> = Mutex::new(None);
 
-/// What runs of a case leave that nothing disturbs.
+/// Outputs of the undisturbed runs of a case.
 pub struct Known {
-    /// The output.
     pub new: Tree,
-    /// That of the earlier run.
+    /// Output of the earlier run.
     pub old: Tree,
-    /// How long the first one takes.
     pub took: Duration,
 }
 
-/// How a run ended.
 #[derive(Debug)]
 pub struct Ended {
     pub code: Option<i32>,
@@ -62,9 +58,9 @@ impl Bench {
         self.place.path(name)
     }
 
-    /// What a case leaves when nothing disturbs it; a slow one is run by the full version alone.
+    /// Returns the undisturbed results of a case; only the full version runs slow cases.
     pub fn known(&self, case: &'static Case) -> Arc<Known> {
-        // What was found out before another test failed is as true as before.
+        // Results stay valid if another test failed.
         let mut all = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
         let all = all.get_or_insert_default();
         if let Some(known) = all.get(case.name) {
@@ -91,7 +87,7 @@ impl Bench {
         known
     }
 
-    /// Empties the folder of outputs, or puts there what an earlier run left.
+    /// Empties the output folder, or restores the output of an earlier run in it.
     pub fn begin(&self, earlier: Option<&Tree>) {
         fs::remove_dir_all(self.path("work")).unwrap();
         fs::create_dir(self.path("work")).unwrap();
@@ -100,7 +96,6 @@ impl Bench {
         }
     }
 
-    /// The inputs as they were, whatever has become of them.
     pub fn restore_inputs(&self) {
         let _ = fs::remove_dir_all(self.path("in"));
         self.inputs.put(&self.path("in"));
@@ -110,19 +105,19 @@ impl Bench {
         Tree::of(&self.path("in")) == *self.inputs
     }
 
-    /// What is in the folder of outputs, of a run that has settled.
+    /// Returns the output folder of a run that ended.
     pub fn tree(&self) -> Tree {
         Tree::of(&self.path("work")).settled()
     }
 
-    /// Begins a run, in a shell that does `before` first if there is something.
+    /// Starts a run, in a shell that first runs `before` if given.
     pub fn start(&self, before: Option<&str>, line: &str) -> Child {
         let program = self.place.program([]);
         let mut command = match before {
             None => program,
             Some(before) => {
                 let mut shell = Command::new("sh");
-                // A kernel's dump of a program that aborts is none of its outputs.
+                // A core dump is no output.
                 shell.args(["-c", &format!("ulimit -c 0; {before}")]).arg(program.get_program());
                 shell
             }
@@ -137,25 +132,23 @@ impl Bench {
             .expect("the program starts")
     }
 
-    /// Runs a line to its end.
     pub fn run(&self, before: Option<&str>, line: &str) -> Ended {
         finish(self.start(before, line), line)
     }
 
-    /// Runs a line that must work.
     pub fn succeeds(&self, line: &str) -> Ended {
         let ended = self.run(None, line);
         assert_eq!(ended.code, Some(0), "{line}: {ended:?}");
         ended
     }
 
-    /// What a dead run may have left wherever this one builds something.
+    /// Plants unfinished files of a dead run wherever this case may leave some.
     fn plant(&self, case: &Case, output: &Tree) {
         let files = output.names().filter(|name| !name.ends_with('/'));
         let folders: BTreeSet<&str> = files
             .map(|name| match case.writes {
                 Writes::Each => name.rsplit_once('/'),
-                // What belongs together is built in one folder.
+                // Files that belong together are built in one folder.
                 Writes::Nothing | Writes::Whole => name.split_once('/'),
             })
             .map(|parts| parts.map_or("", |(folder, _)| folder))
@@ -167,8 +160,9 @@ impl Bench {
         }
     }
 
-    /// The next run of a case works, leaves the same as one that nothing disturbed, and no rest of an earlier one.
-    /// After a slow one that is its quick variant, at the same place.
+    /// Checks that the next run of a case succeeds with the undisturbed output and without
+    /// unfinished files. After a slow case the
+    /// next run is its quick variant, at the same place.
     pub fn goes_on(&self, case: &'static Case, what: &str) {
         let known = self.known(case);
         let (line, expected) = match case.is_slow {
@@ -183,7 +177,6 @@ impl Bench {
     }
 }
 
-/// Waits for the end of a run.
 pub fn finish(mut child: Child, line: &str) -> Ended {
     let started = Instant::now();
     let status = loop {
@@ -202,7 +195,7 @@ pub fn finish(mut child: Child, line: &str) -> Ended {
     Ended { code: status.code(), signal: status.signal(), stderr }
 }
 
-/// Maps, photos, features, and what the stages make of them, each twice.
+/// Makes maps, photos, features and the outputs of the stages, each twice.
 fn inputs() -> Tree {
     let bench = Bench { place: Place::empty(), inputs: &NONE };
     let place = &bench.place;

@@ -1,49 +1,48 @@
-//! The commands: what each is called with, what it reads and what it leaves.
+//! The commands of the tests: command line, inputs and kind of output.
 
-/// What a command leaves behind when it is done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Writes {
-    /// Words alone.
+    /// Text only.
     Nothing,
-    /// A file, or files that belong together.
+    /// One file, or files that belong together.
     Whole,
-    /// Files each of which is whole by itself.
+    /// Independent files.
     Each,
 }
 
-/// A command line in two variants, which write to the same places.
+/// A command line in two variants that write to the same places.
 #[derive(Debug)]
 pub struct Case {
     pub name: &'static str,
-    /// `{}` is the variant: a seed, or a part of the name of an input.
+    /// `{}` stands for the variant: a seed, or a part of the name of an input.
     line: &'static str,
-    /// Where the first variant is another line.
+    /// The line of the first variant, if it differs.
     earlier: Option<&'static str>,
     pub writes: Writes,
-    /// What the second variant reads.
+    /// Inputs of the second variant.
     pub inputs: &'static [&'static str],
-    /// Minutes: done in full by the full version alone.
+    /// True if it takes minutes; only the full version runs all of it.
     pub is_slow: bool,
 }
 
-/// A command whose files belong together, and that takes seconds.
+/// Returns a command whose files belong together and that takes seconds.
 const fn whole(name: &'static str, line: &'static str, inputs: &'static [&'static str]) -> Case {
     Case { name, line, earlier: None, writes: Writes::Whole, inputs, is_slow: false }
 }
 
 impl Case {
-    /// The run that the tests are about.
+    /// Returns the command line under test.
     pub fn line(&self) -> String {
         self.line.replace("{}", "2")
     }
 
-    /// A run that left its output at the same place before.
+    /// Returns the command line of an earlier run with the same output.
     pub fn earlier(&self) -> String {
         self.earlier.unwrap_or(self.line).replace("{}", "1")
     }
 }
 
-/// Every command. Those with a seed differ by it, the others by what they read.
+/// Every command. Variants differ in the seed, or else in the input.
 pub const CASES: [Case; 19] = [
     whole(
         "obfuscate",
@@ -140,19 +139,17 @@ pub const CASES: [Case; 19] = [
         ..whole("bench recover", "bench recover --points 1000 --k 10 --inlier-ratios 1 --json", &[])
     },
     Case {
-        // Another command leaves the same kind of output in less than a second.
+        // This command leaves the same kind of output in less than a second.
         earlier: Some("audit map ../in/room.csv --k 10 --schemes olc --inlier-ratios 1 --out out"),
         is_slow: true,
         ..whole("demo", "demo --out out", &[])
     },
 ];
 
-/// Those that end within seconds.
 pub fn quick() -> impl Iterator<Item = &'static Case> {
     CASES.iter().filter(|case| !case.is_slow)
 }
 
-/// The case of this name.
 pub fn named(name: &str) -> &'static Case {
     CASES.iter().find(|case| case.name == name).expect("a case")
 }

@@ -1,5 +1,6 @@
-//! Kills at moments spread over every command, and at the moments that matter: what is left is all of the old output or
-//! all of the new one, and the next run works and clears away the rest.
+//! Kills every command at many moments. The output must be all old or all new, and the next run
+//! must succeed and remove
+//! unfinished files.
 
 use std::os::unix::fs::MetadataExt;
 use std::process::{Child, Command};
@@ -12,14 +13,13 @@ use crate::tree::{Tree, is_part, is_partial};
 use crate::verdict::{State, state};
 use crate::{full, tables};
 
-/// When a run is killed.
 #[derive(Clone, Copy, Debug)]
 enum Moment {
-    /// After this share of what it usually takes.
+    /// After this share of the usual duration.
     Share(f64),
-    /// As soon as something unfinished is there.
+    /// When an unfinished file appears.
     Begun,
-    /// As soon as the first file has taken its place: the others may be about to.
+    /// When the first file is in its place; others may follow.
     Placed,
 }
 
@@ -30,23 +30,22 @@ struct Kill {
     had_old: bool,
 }
 
-/// What was found, counted.
 #[derive(Default)]
 struct Row {
     kills: usize,
     /// Nothing had begun.
     before: usize,
-    /// The program cleared away what it had begun.
+    /// The program removed its unfinished files.
     cleared: usize,
-    /// Something unfinished was left.
+    /// Unfinished files were left.
     left: usize,
-    /// The output was there.
+    /// The new output was complete.
     after: usize,
-    /// Files of the old and the new output, each whole.
+    /// Some files were old and some new, all complete.
     some: usize,
 }
 
-/// Kills of one case: the short version has two, evenly spread over all cases.
+/// Returns the kills of one case; the short version has two, spread over all cases.
 fn plan(case: &Case, at: usize) -> Vec<Kill> {
     let kill = |moment, signal, had_old| Kill { moment, signal, had_old };
     if case.is_slow {
@@ -58,7 +57,7 @@ fn plan(case: &Case, at: usize) -> Vec<Kill> {
         }
         return kills;
     }
-    // Where they fall is the same in every run, and another for each case.
+    // The moments are the same in every run, and differ between cases.
     let jitter = |of: usize| ((of * 61 + at * 23) % 100) as f64 / 100.0;
     if !full() {
         let aimed = if at.is_multiple_of(3) { Moment::Placed } else { Moment::Begun };
@@ -83,7 +82,7 @@ fn plan(case: &Case, at: usize) -> Vec<Kill> {
     spread.chain(aimed.map(|(moment, had_old)| kill(moment, "KILL", had_old))).collect()
 }
 
-/// Sends a signal; a run that has ended already is none the worse for it.
+/// Sends a signal; the run may have ended already.
 fn send(child: &mut Child, signal: &str) {
     if signal == "KILL" {
         child.kill().expect("it can be killed");
@@ -119,7 +118,7 @@ fn wait(bench: &Bench, case: &Case, known: &Known, child: &mut Child, moment: Mo
     }
 }
 
-/// One kill, and the run after it.
+/// Kills a run once, and checks the next run.
 fn try_one(bench: &Bench, case: &'static Case, known: &Known, kill: Kill, row: &mut Row) {
     let what = format!("{}, {kill:?}", case.name);
     bench.begin(kill.had_old.then_some(&known.old));
@@ -133,7 +132,7 @@ fn try_one(bench: &Bench, case: &'static Case, known: &Known, kill: Kill, row: &
     let rest = left.names().find(|name| is_partial(name) || is_part(name));
     row.kills += 1;
     match (found, rest, code) {
-        // Files change their names one after the other: `kill -9` may come between two.
+        // Files are renamed one by one, so `kill -9` may come between two.
         (State::Some, ..) if case.writes == Writes::Each || kill.signal == "KILL" => row.some += 1,
         (State::Some, ..) => panic!("{what}: some files are old, others new"),
         (State::New, ..) if case.writes != Writes::Nothing => row.after += 1,
@@ -144,7 +143,7 @@ fn try_one(bench: &Bench, case: &'static Case, known: &Known, kill: Kill, row: &
     }
     if kill.signal != "KILL" {
         let expected = if kill.signal == "INT" { 130 } else { 143 };
-        // Before the program listens the signal itself ends it.
+        // Before the handler is installed, the signal itself ends the program.
         let is_usual = [Some(0), Some(expected)].contains(&code) || signal.is_some();
         assert!(is_usual && !left.names().any(is_partial), "{what}: {code:?}, {rest:?}: {stderr}");
         let is_one = left == begun || found == State::New || rest.is_some();

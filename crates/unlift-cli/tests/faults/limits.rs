@@ -1,5 +1,6 @@
-//! Limits on open files, on the size of files and on memory, disks that are full, and streams that are closed, step by
-//! step: all of the output or nothing of it, and a line that names it.
+//! Limits on open files, file size and memory, full disks, and closed streams: all of the output or
+//! none of it, and an error that
+//! names it.
 
 use std::process::Command;
 
@@ -12,23 +13,23 @@ use crate::verdict::{Found, State, of_failure, state};
 
 const ABORTED: i32 = 6;
 const PAGE: usize = 4096;
-/// How a run is started that a shell has prepared.
+/// Runs the program after the commands of the shell.
 const EXEC: &str = "exec \"$0\" \"$@\"";
 
-/// How the runs under one limit ended.
+/// Counts of how runs under one limit ended.
 #[derive(Default)]
 struct Row {
     runs: usize,
     worked: usize,
     told: usize,
-    /// Ended for want of memory or threads, without a line of ours.
+    /// Ended because memory or threads were refused, without our error.
     refused: usize,
-    /// Left something unfinished that the next run cleared away.
+    /// Left unfinished files, which the next run removed.
     swept: usize,
 }
 
 impl Row {
-    /// Counts a run, which worked or told a line.
+    /// Counts a run, which succeeded or reported an error.
     fn add(&mut self, found: Result<Found, String>, what: &str, ended: &Ended) {
         self.runs += 1;
         match found {
@@ -40,7 +41,7 @@ impl Row {
     }
 }
 
-/// Every quick command in the full version, else those with these names.
+/// Returns every quick command in the full version, else those with these names.
 fn cases<const N: usize>(names: [&'static str; N]) -> Vec<&'static Case> {
     if full() { quick().collect() } else { names.map(named).into() }
 }
@@ -49,7 +50,7 @@ fn usual_cases() -> Vec<&'static Case> {
     cases(["obfuscate", "recover, images", "features", "audit map", "invert"])
 }
 
-/// Runs a case under each limit, in turn onto nothing and onto an earlier output.
+/// Runs a case under each limit, alternately with and without an earlier output.
 fn sweep(bench: &Bench, case: &'static Case, option: &str, limits: &[usize]) -> Row {
     let known = bench.known(case);
     let mut row = Row::default();
@@ -63,7 +64,7 @@ fn sweep(bench: &Bench, case: &'static Case, option: &str, limits: &[usize]) -> 
         let what = format!("{}, ulimit {option} {limit}", case.name);
         let is_refused = option == "-v" && is_refused(&ended);
         if left.names().any(is_partial) && (is_refused || option == "-n") {
-            // Folders cannot be emptied when no file can be opened: the next run does it.
+            // Without file descriptors folders cannot be emptied; the next run does it.
             row.swept += 1;
             bench.goes_on(case, &what);
             left = left.files_without(is_partial);
@@ -71,7 +72,7 @@ fn sweep(bench: &Bench, case: &'static Case, option: &str, limits: &[usize]) -> 
         if is_refused {
             (row.runs, row.refused) = (row.runs + 1, row.refused + 1);
             let found = state(&known, had_old, &left);
-            // Who writes files one by one may have written some of them, each of them whole.
+            // Commands with independent files may have written some of them.
             let some = found == Ok(State::Some) && !matches!(case.writes, Writes::Whole);
             let all_or_nothing = [Ok(State::Before), Ok(State::New)].contains(&found);
             assert!(all_or_nothing || some, "{what}: {found:?}");
@@ -85,7 +86,7 @@ fn sweep(bench: &Bench, case: &'static Case, option: &str, limits: &[usize]) -> 
     row
 }
 
-/// Whether a run ended at once as memory or threads were refused, which is what Rust and rayon do then.
+/// Returns true if Rust or rayon ended the run because memory or threads were refused.
 fn is_refused(ended: &Ended) -> bool {
     let is_told = ended.stderr.contains("Resource temporarily unavailable");
     ended.signal == Some(ABORTED) || ended.code == Some(101) && is_told
@@ -113,7 +114,7 @@ fn few_open_files_leave_all_or_nothing() {
 fn small_files_leave_all_or_nothing() {
     let bench = Bench::new();
     let row = |case: &'static Case| {
-        // In the blocks of most shells; those of others are twice as large.
+        // Most shells count blocks of 512 bytes, some of 1024.
         let blocks = bench.known(case).new.largest() / 500 + 4;
         let n = if full() { 12 } else { 2 };
         let limits: Vec<usize> = (0..=n).map(|step| blocks * step / n).collect();
@@ -125,7 +126,7 @@ fn small_files_leave_all_or_nothing() {
 #[test]
 fn little_memory_leaves_all_or_nothing() {
     let bench = Bench::new();
-    // From where the program can say what it is, to where it can do everything.
+    // From the limit where the program starts to the one where it can do everything.
     let starts = |kib: usize| {
         let before = format!("ulimit -v {kib} || exit 99; {EXEC}");
         bench.run(Some(&before), "--version").code == Some(0)
@@ -141,7 +142,7 @@ fn little_memory_leaves_all_or_nothing() {
     print(&format!("Memory, `ulimit -v` {least} KiB and up"), usual_cases().into_iter().map(row));
 }
 
-/// What lets a shell mount a disk that nobody else sees, where anything does.
+/// Returns the command with which a shell can mount a private disk, if the system allows it.
 fn unshared() -> Option<&'static str> {
     let works = |options: &str| {
         let line = format!("unshare {options} sh -c 'mount -t tmpfs none /mnt'");
@@ -164,7 +165,7 @@ fn a_full_disk_costs_nothing_that_was_there() {
         for step in 0..=steps {
             let had_old = step % 2 == 1;
             bench.begin(had_old.then_some(&known.old));
-            // On a disk with as much room beside what is there, which is copied back as it is in the end.
+            // The disk has as much room as the present files, which are copied back in the end.
             let pages = |tree: &Tree| tree.size().div_ceil(PAGE) + tree.names().count();
             let room = 1 + pages(&known.new) * step / steps;
             let size = PAGE * (room + if had_old { pages(&known.old) } else { 0 });
@@ -191,7 +192,7 @@ fn a_full_disk_costs_nothing_that_was_there() {
     print("Full disks", cases.filter(|case| case.writes != Writes::Nothing).map(on_disks));
 }
 
-/// A file that gets the number of a closed stream hears none of our words.
+/// Checks that a file that gets the descriptor of a closed stream receives no messages.
 #[test]
 fn closed_streams_change_no_byte_of_an_output() {
     let bench = Bench::new();
@@ -210,6 +211,6 @@ fn closed_streams_change_no_byte_of_an_output() {
         }
         (case.name, row)
     };
-    // They have something to say on both streams.
+    // These commands write to both streams.
     print("Closed streams", cases(["obfuscate", "features", "audit map"]).into_iter().map(closed));
 }

@@ -1,4 +1,4 @@
-//! What becomes of outputs when the world fails: kills, full disks, limits, closed streams, inputs that go away, two
+//! Tests of outputs under faults: kills, full disks, limits, closed streams, changing inputs, two
 //! writers.
 //!
 //! ```text
@@ -6,7 +6,8 @@
 //! UNLIFT_FAULTS=full cargo test -p unlift-cli --test faults -- --nocapture --test-threads 1
 //! ```
 //!
-//! The second one takes hundreds of kills and every step of the limits, and prints a table for each file here.
+//! The full version makes hundreds of kills and tries every step of the limits. It prints a table
+//! per file.
 
 #![cfg(unix)]
 
@@ -23,7 +24,7 @@ mod vanishing;
 mod verdict;
 mod writers;
 
-/// Whether everything is wanted, not only what every run of the tests has time for.
+/// Returns true for the full version.
 fn full() -> bool {
     std::env::var("UNLIFT_FAULTS").is_ok_and(|value| value == "full")
 }

@@ -1,6 +1,6 @@
 //! Tables of the full version.
 
-/// Prints a table in one piece; tests may run at the same time.
+/// Prints a table in one write, because tests may run in parallel.
 pub fn print(title: &str, header: &[&str], rows: &[Vec<String>]) {
     if !crate::full() {
         return;

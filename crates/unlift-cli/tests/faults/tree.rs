@@ -1,4 +1,4 @@
-//! What lies in a folder, and whether two runs have left the same.
+//! The content of a folder, and comparisons of two.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -6,17 +6,16 @@ use std::path::Path;
 
 use serde_json::Value;
 
-/// Files and folders below a folder, by their paths within it; those of folders end with a slash.
+/// Files and folders below a folder by relative path; paths of folders end with a slash.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Tree(BTreeMap<String, Vec<u8>>);
 
 impl Tree {
-    /// An empty one.
     pub const fn new() -> Self {
         Self(BTreeMap::new())
     }
 
-    /// What lies there now, also while somebody works on it.
+    /// Reads a folder, which others may be changing.
     pub fn of(root: &Path) -> Self {
         let mut tree = Self::default();
         tree.add(root, "");
@@ -36,7 +35,7 @@ impl Tree {
         }
     }
 
-    /// The figures of audits alone, without what they are of and what is noted of it.
+    /// Keeps only the results of audits, without names, hashes and notes.
     pub fn figures(&self) -> Self {
         let mut tree = self.files_without(|name| !name.ends_with("audit.json"));
         for bytes in tree.0.values_mut() {
@@ -49,7 +48,6 @@ impl Tree {
         tree
     }
 
-    /// Makes all of it in the folder.
     pub fn put(&self, root: &Path) {
         for (name, bytes) in &self.0 {
             let path = root.join(name);
@@ -62,33 +60,30 @@ impl Tree {
         }
     }
 
-    /// The paths, those of folders with a slash.
+    /// Iterates over the paths; those of folders end with a slash.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.0.keys().map(String::as_str)
     }
 
-    /// The content of a file.
     pub fn get(&self, name: &str) -> Option<&[u8]> {
         self.0.get(name).map(Vec::as_slice)
     }
 
-    /// Bytes of all files.
     pub fn size(&self) -> usize {
         self.0.values().map(Vec::len).sum()
     }
 
-    /// Bytes of the largest file.
     pub fn largest(&self) -> usize {
         self.0.values().map(Vec::len).max().unwrap_or(0)
     }
 
-    /// Its files without those for which `is_other` is true.
+    /// Returns the files for which `is_other` is false.
     pub fn files_without(&self, is_other: impl Fn(&str) -> bool) -> Self {
         let kept = self.0.iter().filter(|(name, _)| !name.ends_with('/') && !is_other(name));
         Self(kept.map(|(name, bytes)| (name.clone(), bytes.clone())).collect())
     }
 
-    /// The same without what two runs of one command differ in: how long they took, and in what memory.
+    /// Removes what differs between two runs of one command: duration and memory.
     pub fn settled(mut self) -> Self {
         for (name, bytes) in &mut self.0 {
             if name.ends_with("audit.json") {
@@ -101,7 +96,7 @@ impl Tree {
     }
 }
 
-/// What is not JSON stays as it is: it is no figure of anything.
+/// Keeps only results; other content than JSON is unchanged.
 fn figures(json: &[u8]) -> Vec<u8> {
     let Ok(mut value) = serde_json::from_slice::<Value>(json) else { return json.to_vec() };
     let run = value.as_object_mut().and_then(|value| value["run"].as_object_mut());
@@ -120,17 +115,17 @@ fn page(html: &[u8]) -> Vec<u8> {
     kept.join("\n").into_bytes()
 }
 
-/// Whether a path is of something unfinished that the next run clears away.
+/// Returns true for unfinished files, which the next run removes.
 pub fn is_partial(name: &str) -> bool {
     name.contains(".unlift-") && name.contains(".partial")
 }
 
-/// Whether a path is of finished images, from which the next run of `features` goes on.
+/// Returns true for finished images, from which the next run of `features` resumes.
 pub fn is_part(name: &str) -> bool {
     name.contains(".parts/")
 }
 
-/// The paths at which two trees differ.
+/// Returns the paths at which two trees differ.
 pub fn differing(a: &Tree, b: &Tree) -> String {
     let mut names: Vec<&str> = a.names().chain(b.names()).collect();
     names.sort_unstable();

@@ -1,4 +1,5 @@
-//! Inputs that go away, shrink or become others while they are read: the output of what was there, or a line.
+//! Inputs that are removed, cut or replaced while they are read: the output of the old input, or an
+//! error.
 
 use std::fs;
 use std::path::Path;
@@ -10,16 +11,14 @@ use crate::tree::{Tree, differing};
 use crate::verdict::{Found, of_failure};
 use crate::{full, tables};
 
-/// What befalls an input.
 #[derive(Clone, Copy, Debug)]
 enum Fate {
-    /// It is gone.
     Removed,
-    /// The same file has half of its bytes.
+    /// The file is cut to half of its bytes.
     Cut,
-    /// Another file of the same kind has its name.
+    /// The file is replaced by one of the same kind.
     Replaced,
-    /// Text has its name.
+    /// The file is replaced by text.
     Spoiled,
 }
 
@@ -79,8 +78,9 @@ fn an_input_that_changes_gives_its_output_or_a_line() {
     tables::print("Vanishing inputs", &header, &rows);
 }
 
-/// 1: as if nothing had been; 2: as of what the input became; 3: a line; 4: a line, and the other images;
-/// 5: figures of one of them, with the hash or a picture of the other, and a note that says so.
+/// Returns the result: 1, the output of the old input; 2, that of the changed input; 3, an error;
+/// 4, an error, and the other
+/// images; 5, results of one input with the hash or a picture of the other, and a note.
 fn try_one(bench: &Bench, case: &'static Case, input: &str, fate: Fate, share: f64) -> usize {
     bench.restore_inputs();
     let known = bench.known(case);
@@ -98,20 +98,21 @@ fn try_one(bench: &Bench, case: &'static Case, input: &str, fate: Fate, share: f
         Ok(Found::FewerImages) => return 4,
         Err(_) => {}
     }
-    // What it became is used, or its images that can be.
+    // The changed input is used, or those of its images that are usable.
     bench.begin(Some(&known.old));
     let Ended { code, stderr, .. } = bench.run(None, &case.line());
     let expected = bench.tree();
     let is_same = code == ended.code && left == expected;
-    // An audit takes the hash of photos after its figures, and reads them once more to draw them. So figures are those of one file, and
-    // the hash or a picture may be of the other: this is told, and no gate holds.
+    // An audit hashes photos after its results, and reads them again to draw them. So the hash or a
+    // picture may be of
+    // another file than the results; a note says so, and no gate holds.
     let figures = [&known.new, &expected].map(Tree::figures);
     let is_audit = ended.code == Some(0) && case.name.starts_with("audit");
     if !is_same && is_audit && figures.contains(&left.figures()) {
         assert!(ended.stderr.contains(": changed since reading began:"), "{what}: {ended:?}");
         return 5;
     }
-    // A photo that went away while others were painted: they are in the rows, it is named.
+    // A photo that vanished while others were painted is in the rows, and is named.
     let named =
         format!("note: not painted: image {}", input.split_once('/').map_or(input, |x| x.1));
     if is_audit && case.name.contains("--invert") && ended.stderr.contains(&named) {

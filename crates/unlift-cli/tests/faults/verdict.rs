@@ -1,21 +1,19 @@
-//! What is left after a fault: all of the new output, all of the old one, or what must never be.
+//! The state of the output after a fault: all new, all old, or an error.
 
 use crate::bench::{Ended, Known};
 use crate::commands::{Case, Writes};
 use crate::tree::{Tree, is_part, is_partial};
 
-/// What stands at the place of the output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum State {
-    /// What stood there before, be it nothing.
+    /// The earlier output, or nothing.
     Before,
-    /// The complete output.
     New,
-    /// Some files of each, every one of them whole.
+    /// Some files of each, all complete.
     Some,
 }
 
-/// What stands at the place of the output; an error names a file that is neither old nor new.
+/// Returns the state of the output; an error names a file that is neither old nor new.
 pub fn state(known: &Known, had_old: bool, left: &Tree) -> Result<State, String> {
     let none = Tree::default();
     let earlier = if had_old { &known.old } else { &none };
@@ -34,19 +32,18 @@ pub fn state(known: &Known, had_old: bool, left: &Tree) -> Result<State, String>
     })
 }
 
-/// How a run ended that something failed for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Found {
-    /// With the whole output.
+    /// The new output is complete.
     Worked,
-    /// With a line, and what stood there before.
+    /// An error, and the earlier output.
     Told,
-    /// With a line for each image that could not be used, and an output without these.
+    /// An error per unusable image, and an output without these images.
     FewerImages,
 }
 
-/// What must hold of a run that something failed for and that ended by itself: the whole output and code 0; or what
-/// stood there before, a line, and a code that says so.
+/// Checks a run with a fault that ended by itself: the complete output and code 0, or the earlier
+/// output, an error and its code.
 pub fn of_failure(
     case: &Case,
     known: &Known,
@@ -80,7 +77,7 @@ pub fn of_failure(
     }
 }
 
-/// Whether a line is one that the program tells on purpose.
+/// Returns true for a line that the program prints on purpose.
 fn is_line(line: &str) -> bool {
     line.starts_with("unlift: ") || line.starts_with("  try: ")
 }

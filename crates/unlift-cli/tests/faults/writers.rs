@@ -1,11 +1,11 @@
-//! Two runs that write to one place at the same time: what is there in the end is the output of one of them.
+//! Two runs that write to one place at the same time: the final output is that of one of them.
 
 use crate::bench::{Bench, finish};
 use crate::commands::{Case, Writes, quick};
 use crate::tree::differing;
 use crate::{full, tables};
 
-/// What two runs are that meet.
+/// Part of the error when two runs meet.
 const BUSY: &str = "another run";
 
 #[test]
@@ -34,19 +34,18 @@ fn of_two_writers_one_whole_output_stays() {
     tables::print("Two writers", &header, &rows);
 }
 
-/// Whose output stays.
 #[derive(Clone, Copy, Debug)]
 enum Whose {
     Ones,
     Others,
-    /// Files of each, where every file stands for itself.
+    /// Files of each, for commands with independent files.
     Both,
 }
 
-/// Whose output stays, and whether one of the runs was refused.
+/// Runs two at the same time; returns whose output stays, and true if one run was refused.
 fn race(bench: &Bench, case: &'static Case, at: usize) -> (Whose, bool) {
     let known = bench.known(case);
-    // Onto nothing, and onto the output of one of them.
+    // Alternately with and without an earlier output.
     bench.begin((at % 2 == 1).then_some(&known.old));
     let lines = [case.earlier(), case.line()];
     let children = lines.each_ref().map(|line| bench.start(None, line));

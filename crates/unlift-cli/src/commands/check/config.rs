@@ -1,4 +1,4 @@
-//! From a configuration to command lines. What an option means is what it means there: there is one definition of each.
+//! Turns a configuration into command lines, so that options are defined only once.
 
 use std::ops::Range;
 
@@ -8,34 +8,32 @@ use toml::de::{DeTable, DeValue};
 
 use crate::args::Cli;
 
-/// What can be audited, as a configuration and as the command line call it.
+/// Kinds of audits, in configurations and on the command line.
 const KINDS: [&str; 3] = ["map", "images", "released"];
-/// The key of what stands on a command line without an option.
+/// Key of the positional argument.
 const PATH: &str = "path";
-/// Options of the command line that are about what is printed, which a check decides.
+/// Options that a configuration cannot set, because `check` decides what is printed.
 const NO_KEYS: [&str; 2] = ["help", "json"];
 
-/// An audit that is asked for.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Entry {
-    /// `map`, `images` or `released`.
     pub kind: &'static str,
-    /// The line that it begins in.
+    /// First line of the entry.
     pub line: usize,
-    /// What is audited.
+    /// Path of the map, images or records.
     pub path: String,
-    /// The command line, the name of the program first.
+    /// The command line, including the name of the program.
     pub words: Vec<String>,
 }
 
-/// What is wrong with a configuration, and in which line.
+/// An error in a configuration, with its line.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Wrong {
     pub line: usize,
     pub what: String,
 }
 
-/// Reads a configuration: its audits, in order.
+/// Reads the audits of a configuration, in order.
 pub fn read(text: &str, quiet: bool) -> Result<Vec<Entry>, Wrong> {
     let line = |span: Range<usize>| 1 + text[..span.start].matches('\n').count();
     let wrong = |span, what: String| Wrong { line: line(span), what };
@@ -73,14 +71,14 @@ pub fn read(text: &str, quiet: bool) -> Result<Vec<Entry>, Wrong> {
         let known = KINDS.map(|kind| format!("[[{kind}]]")).join(", ");
         return Err(wrong(0..0, format!("expected one of {known}, found none")));
     }
-    // By kind in the format; one after the other in the file.
+    // The parser groups entries by kind: restore the order of the file.
     entries.sort_by_key(|(start, _)| *start);
     Ok(entries.into_iter().map(|(_, entry)| entry).collect())
 }
 
 type Misplaced = (Range<usize>, String);
 
-/// The path and the command line of one audit.
+/// Converts one entry to its path and command line.
 fn entry(
     kind: &str,
     fields: &DeTable<'_>,
@@ -118,15 +116,15 @@ fn entry(
     if quiet && !words.iter().any(|word| word == "--quiet") {
         words.push("--quiet".to_owned());
     }
-    // Whatever it begins with, it is no option.
+    // After `--`, a path that begins with a dash is no option.
     words.extend(["--".to_owned(), path.clone()]);
     Ok((path, words))
 }
 
-/// An option and its value as words of a command line.
+/// Converts an option and its value to words of a command line.
 fn typed(long: &str, arg: &Arg, value: &Spanned<DeValue<'_>>) -> Result<Vec<String>, String> {
     let is_flag = matches!(arg.get_action(), ArgAction::SetTrue);
-    // `--outlier-filter` alone has a value that is usual.
+    // `--outlier-filter` has a default value when given alone.
     let may_be_flag = arg.get_num_args().is_some_and(|n| n.min_values() == 0);
     match value.get_ref() {
         DeValue::Boolean(set) if is_flag || may_be_flag => {
@@ -148,7 +146,7 @@ fn typed(long: &str, arg: &Arg, value: &Spanned<DeValue<'_>>) -> Result<Vec<Stri
     }
 }
 
-/// A value as it would be typed: numbers keep the digits that they have in the file, as thresholds are names, too.
+/// Returns a value as typed: numbers keep their digits, because thresholds are also names.
 fn text(value: &DeValue<'_>) -> Option<String> {
     match value {
         DeValue::String(text) => Some(text.to_string()),
@@ -158,7 +156,7 @@ fn text(value: &DeValue<'_>) -> Option<String> {
     }
 }
 
-/// What a value is, for a message.
+/// Describes a value for an error message.
 fn said(value: &Spanned<DeValue<'_>>) -> String {
     let value = value.get_ref();
     match text(value) {

@@ -1,4 +1,4 @@
-//! `unlift check`: the audits of a configuration, for a build that needs one word.
+//! `unlift check`: runs the audits of a configuration.
 
 mod config;
 
@@ -20,7 +20,6 @@ use crate::exit::{self, Outcome, usage};
 use crate::output::print;
 use crate::stderr::tell;
 
-/// Runs every audit of a configuration.
 pub fn run(args: &CheckArgs) -> anyhow::Result<Outcome> {
     let config = args.config.display().to_string();
     let mut text = String::new();
@@ -36,7 +35,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<Outcome> {
         result_mut(&mut audit).asked_at = Some((in_repository(&args.config), entry.line));
         audits.push((entry, audit));
     }
-    // Everything in it is relative to it: paths, lists of neighbors, and what is written.
+    // All paths are relative to the configuration.
     let folder = match args.config.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new(""),
@@ -54,7 +53,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<Outcome> {
                 failed |= !finished.passed();
                 print(&format!("{}\n", OneLine(told(entry, &finished, folder))))?;
             }
-            // The others may still be worth an answer.
+            // The other audits still run.
             Err(error) => {
                 let error = Err::<(), _>(error).context(place(entry)).unwrap_err();
                 exit::lines(&error).iter().for_each(tell);
@@ -73,15 +72,14 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<Outcome> {
     }
 }
 
-/// An entry as the command line has it.
 fn parsed(entry: &Entry) -> Result<AuditCommand, String> {
     match Cli::read(&entry.words) {
         Ok(Cli { command: Command::Audit(audit), .. }) => Ok(audit),
-        // The words begin with those of an audit.
+        // The words always begin with `audit`.
         Ok(_) => Err("expected an audit, found another command".to_owned()),
         Err(error) => {
             let text = error.to_string();
-            // Up to the usage, which is that of a command line.
+            // Drop clap's usage text, which is about the command line.
             let said = text.lines().take_while(|line| !line.trim().is_empty());
             let said: Vec<&str> = said.map(str::trim).collect();
             Err(OneLine(said.join(" ").trim_start_matches("error: ")).to_string())
@@ -105,7 +103,7 @@ fn result_mut(audit: &mut AuditCommand) -> &mut ResultArgs {
     }
 }
 
-/// A configuration as files that are shown name it: without folders of this machine.
+/// Returns the path of the configuration within its repository, for files that are shown to others.
 fn in_repository(config: &Path) -> String {
     let here = std::env::current_dir().ok();
     let within = here.and_then(|here| config.strip_prefix(here).ok());
@@ -117,7 +115,6 @@ fn in_repository(config: &Path) -> String {
     named.display().to_string()
 }
 
-/// What an audit reads.
 fn inputs(audit: &AuditCommand) -> Vec<&Path> {
     match audit {
         AuditCommand::Map(args) => audit_map::inputs(args),
@@ -126,8 +123,8 @@ fn inputs(audit: &AuditCommand) -> Vec<&Path> {
     }
 }
 
-/// Refuses two audits that write to one place, as the second would replace what the first found, and one that writes over what
-/// any of them reads by `rules`, the configuration among it.
+/// Returns an error if two audits write to the same place, or if one overwrites an input of any
+/// audit or the configuration.
 fn apart(
     audits: &[(&Entry, AuditCommand)],
     rules: &Rules,
@@ -173,7 +170,8 @@ fn perform(audit: &AuditCommand) -> anyhow::Result<Finished> {
     }
 }
 
-/// How an audit ended, in one line; where its report is, seen from where the check was started.
+/// Formats the result of an audit as one line. The path of its report is relative to the working
+/// directory.
 fn told(entry: &Entry, finished: &Finished, folder: &Path) -> String {
     let gates = &finished.document.gates;
     let count = |n: usize| if n == 1 { "1 gate".to_owned() } else { format!("{n} gates") };
