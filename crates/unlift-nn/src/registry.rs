@@ -91,7 +91,7 @@ pub static MODELS: &[Entry] = &[
             Port { name: "offsets", shape: &[None, Some(2), Some(16)] },
             Port { name: "descriptors", shape: &[None, Some(128)] },
         ],
-        carried: Some(include_bytes!("../models/aliked-n16rot/aliked-n16rot.onnx")),
+        carried: Some(unlift_model_aliked_n16rot::ONNX),
     },
     Entry {
         name: "inverter-aliked",
@@ -101,7 +101,7 @@ pub static MODELS: &[Entry] = &[
         sha256: Some("99a466241a5d569053bb514c0e35f348faed8867c65c7054aeb8422841aca69e"),
         inputs: &[Port { name: "features", shape: &[Some(1), Some(131), None, None] }],
         outputs: &[Port { name: "picture", shape: &[Some(1), Some(3), None, None] }],
-        carried: Some(include_bytes!("../models/inverter-aliked/inverter-aliked.onnx")),
+        carried: Some(unlift_model_inverter_aliked::ONNX),
     },
     Entry {
         name: "inverter-sift",
@@ -111,7 +111,7 @@ pub static MODELS: &[Entry] = &[
         sha256: Some("a7c0124cf6b1b5c90323086b544d539bd4030135d66ddc5f344d437a006428f5"),
         inputs: &[Port { name: "features", shape: &[Some(1), Some(131), None, None] }],
         outputs: &[Port { name: "picture", shape: &[Some(1), Some(3), None, None] }],
-        carried: Some(include_bytes!("../models/inverter-sift/inverter-sift.onnx")),
+        carried: Some(unlift_model_inverter_sift::ONNX),
     },
     Entry {
         name: "inverter-superpoint",
@@ -136,7 +136,7 @@ pub static MODELS: &[Entry] = &[
             Port { name: "b", shape: &[Some(1), Some(3), None, None] },
         ],
         outputs: &[Port { name: "distance", shape: &[Some(1)] }],
-        carried: Some(include_bytes!("../models/lpips-squeeze/lpips-squeeze.onnx")),
+        carried: Some(unlift_model_lpips_squeeze::ONNX),
     },
     Entry {
         name: "neighbors-aliked",
@@ -149,7 +149,7 @@ pub static MODELS: &[Entry] = &[
             Port { name: "pairs", shape: &[Some(1), None, None] },
         ],
         outputs: &[Port { name: "scores", shape: &[None, None] }],
-        carried: Some(include_bytes!("../models/neighbors-aliked/neighbors-aliked.onnx")),
+        carried: Some(unlift_model_neighbors_aliked::ONNX),
     },
     Entry {
         name: "neighbors-sift",
@@ -162,7 +162,7 @@ pub static MODELS: &[Entry] = &[
             Port { name: "pairs", shape: &[Some(3), None, None] },
         ],
         outputs: &[Port { name: "scores", shape: &[None, None] }],
-        carried: Some(include_bytes!("../models/neighbors-sift/neighbors-sift.onnx")),
+        carried: Some(unlift_model_neighbors_sift::ONNX),
     },
     Entry {
         name: "neighbors-superpoint",
@@ -203,6 +203,6 @@ pub static MODELS: &[Entry] = &[
         sha256: Some("695e750a5d5754bb5a8d5325643b59282191a7e7a564e435a415fd3c578eab14"),
         inputs: &[Port { name: "images", shape: &[Some(1), Some(3), Some(416), Some(416)] }],
         outputs: &[Port { name: "output", shape: &[Some(1), Some(3549), Some(85)] }],
-        carried: Some(include_bytes!("../models/yolox-nano/yolox-nano.onnx")),
+        carried: Some(unlift_model_yolox_nano::ONNX),
     },
 ];
