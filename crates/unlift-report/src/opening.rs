@@ -1,4 +1,4 @@
-//! What a page begins with.
+//! The opening of a page.
 
 use serde::Serialize;
 
@@ -7,17 +7,17 @@ use crate::exhibit::{Exhibit, exhibits};
 use crate::inversions::Inversion;
 use crate::verdict::{Verdict, verdict};
 
-/// What a page begins with: the verdict on an audit, and its pictures if it has any.
+/// The opening of a page: the verdict on an audit, and its pictures if it has any.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Opening {
-    /// Stands above the verdict where a page has several.
+    /// The title above the verdict, if the page has several verdicts.
     title: Option<String>,
-    /// A page with the details, as a link relative to this one.
+    /// A relative link to the page with the details.
     details: Option<String>,
     verdict: Verdict,
     exhibits: Vec<Exhibit>,
     notes: Vec<String>,
-    /// Whether it is about images.
+    /// Whether the audit is of images.
     images: bool,
 }
 
@@ -33,7 +33,7 @@ impl Opening {
         }
     }
 
-    /// The opening of another audit under this title, whose own page `details` is a link to.
+    /// Returns the opening of another audit under a title; `details` is a link to that audit's own page.
     pub fn titled(
         document: &Document,
         inversions: &[Inversion],
