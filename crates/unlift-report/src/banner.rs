@@ -15,7 +15,8 @@ pub(crate) struct Banner {
     pub headline: String,
     /// What the strongest attack recovers, and from which data.
     pub sentence: String,
-    /// What known neighbors would give away under every scheme, so that schemes not named above do not look fine.
+    /// What known neighbors would give away under every scheme, so that schemes not named above do not look
+    /// fine.
     pub every: Option<String>,
     /// The schemes that were not audited, if any.
     pub unknown: Option<String>,

@@ -33,7 +33,8 @@ pub(crate) struct Card {
     pub scheme: String,
     pub title: String,
     pub rule: &'static str,
-    /// One finding per kind of attack that ran: from released data alone, with given lists, with known neighbors.
+    /// One finding per kind of attack that ran: from released data alone, with given lists, with known
+    /// neighbors.
     pub findings: Vec<Finding>,
     /// A sentence on both baselines and on what lists of neighbors add.
     pub baselines: String,
@@ -83,7 +84,8 @@ impl Card {
         self.finding(Basis::Released).map(|finding| finding.recovered)
     }
 
-    /// Returns the sort key of a card: the share from released data alone, then the larger other share; -1 if not tried.
+    /// Returns the sort key of a card: the share from released data alone, then the larger other share;
+    /// -1 if not tried.
     pub(crate) fn badness(&self) -> (f64, f64) {
         let share = |basis| self.finding(basis).map_or(-1.0, |finding| finding.recovered);
         (share(Basis::Released), share(Basis::Oracle).max(share(Basis::Given)))

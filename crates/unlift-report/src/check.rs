@@ -146,7 +146,8 @@ fn check_row(place: &str, row: &Row) -> Result<(), Error> {
     Ok(())
 }
 
-/// Checks that both fields of the records alone have the keys of the recovered percentages, or are absent.
+/// Checks that both fields of the records alone have the keys of the recovered percentages, or are
+/// absent.
 fn check_records_alone(place: &str, row: &Row) -> Result<(), Error> {
     let keys =
         |keys: &mut dyn Iterator<Item = &String>| keys.cloned().collect::<Vec<_>>().join(", ");

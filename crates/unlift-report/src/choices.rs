@@ -1,5 +1,5 @@
-//! The choices of the page's menus: scheme, neighborhoods, solver. All charts and the 3D view share one list
-//! of each. A row of the results has a place in each list.
+//! The choices of the page's menus: scheme, neighborhoods, solver. All charts and the 3D view share one
+//! list of each. A row of the results has a place in each list.
 
 use std::collections::HashSet;
 
@@ -15,7 +15,8 @@ pub(crate) struct Choices {
     pub schemes: Vec<SchemeChoice>,
     pub givens: Vec<GivenChoice>,
     pub solvers: Vec<String>,
-    /// The neighborhoods that are shown first: those of today's strongest attack, else known neighbors, half of them right.
+    /// The neighborhoods that are shown first: those of today's strongest attack, else known neighbors,
+    /// half of them right.
     pub first_given: usize,
 }
 

@@ -67,8 +67,8 @@ pub struct Document {
 pub struct Input {
     /// Path of the map, as typed; `None` in a share-safe document.
     pub path: Option<String>,
-    /// SHA-256 over the map's files, in lowercase hexadecimal; `None` in a share-safe document, because a hash confirms
-    /// a guess of the map.
+    /// SHA-256 over the map's files, in lowercase hexadecimal; `None` in a share-safe document, because a hash
+    /// confirms a guess of the map.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sha256: Option<String>,
     /// Points read from the map, before a scheme drops some.

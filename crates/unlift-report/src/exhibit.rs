@@ -1,4 +1,5 @@
-//! The exhibits at the top of a page: a photo, the released records, and the picture that an attacker paints from them.
+//! The exhibits at the top of a page: a photo, the released records, and the picture that an attacker paints from
+//! them.
 
 use serde::Serialize;
 
@@ -51,8 +52,8 @@ fn rebuilt(ratio: f64) -> (Level, &'static str) {
     }
 }
 
-/// Returns how many photos of a scheme can be rebuilt from the released data alone: "1 of 2 pictures can be rebuilt, 1 in
-/// parts"; `None` if no picture was painted.
+/// Returns how many photos of a scheme can be rebuilt from the released data alone: "1 of 2 pictures can be rebuilt, 1
+/// in parts"; `None` if no picture was painted.
 pub(crate) fn pictures_said(
     document: &Document,
     inversions: &[Inversion],
@@ -70,8 +71,8 @@ pub(crate) fn pictures_said(
     (n > 0).then(|| format!("{whole} of {n} {pictures} can be rebuilt{in_parts}"))
 }
 
-/// Returns at most three exhibits. The first two show the best pictures from the released data alone, of different schemes
-/// and photos if possible. The last one shows an attack with given or known neighbors.
+/// Returns at most three exhibits. The first two show the best pictures from the released data alone, of different
+/// schemes and photos if possible. The last one shows an attack with given or known neighbors.
 pub(crate) fn exhibits(document: &Document, inversions: &[Inversion]) -> Vec<Exhibit> {
     let Some(first) = inversions.first() else { return Vec::new() };
     let mut shown: Vec<(&Inversion, &InvertedView)> = Vec::new();

@@ -22,12 +22,13 @@ pub(crate) fn findings(document: &Document) -> Findings {
     Findings { curves: curves(document), errors: errors(document), certainty: certainty(document) }
 }
 
-/// Ratio of the recovery with the fewest right neighbors to that with the most, from which on wrong neighbors hardly matter;
-/// below [`STEEP`] they matter much.
+/// Ratio of the recovery with the fewest right neighbors to that with the most, from which on wrong
+/// neighbors hardly matter; below [`STEEP`] they matter much.
 const FLAT: f64 = 0.9;
 const STEEP: f64 = 0.5;
 
-/// Returns a title on how much wrong neighbors reduce the recovery: the best oracle rows at the lowest and highest tested ratio.
+/// Returns a title on how much wrong neighbors reduce the recovery: the best oracle rows at the lowest and
+/// highest tested ratio.
 fn curves(document: &Document) -> String {
     let points = document.results.first().map_or("points", |row| words::points(row.unit));
     let usual = format!("How many {points} come back, by the share of right neighbors");

@@ -52,7 +52,8 @@ pub(crate) fn unusable(document: &Document) -> Option<String> {
     Some(format!("{unusable} of {found} images could not be used, and are in no figure"))
 }
 
-/// Returns a line per gate: whether it held, the figure found, and its attack. The text ends with a line break or is empty.
+/// Returns a line per gate: whether it held, the figure found, and its attack. The text ends with a line break
+/// or is empty.
 pub fn gate_lines(document: &Document) -> String {
     let line = |gate: &GateResult| {
         let word = if gate.passed { "held" } else { "FAILED" };
@@ -87,8 +88,8 @@ pub(crate) fn in_words(gate: &GateResult) -> GateWords {
     GateWords { gate: gate.gate.clone(), passed: gate.passed, word, said: said.join("; "), allowed }
 }
 
-/// Returns `found` with one decimal, or more if needed to stay on its side of `bound`: 20.04 must not become 20.0 beside a
-/// bound of 20.
+/// Returns `found` with one decimal, or more if needed to stay on its side of `bound`: 20.04 must not become
+/// 20.0 beside a bound of 20.
 fn beside(found: f64, bound: f64) -> String {
     let texts = (1..=6).map(|digits| format!("{found:.digits$}"));
     let on_its_side = |text: &String| {

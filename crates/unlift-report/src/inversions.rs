@@ -135,8 +135,8 @@ struct Shown {
 /// Maximal number of bytes for all pictures of the page.
 const BUDGET_BYTES: usize = 2_500_000;
 
-/// Returns the sheets of `inversions` and the number of pictures that were left out to keep the page small: first whole
-/// photos from the end, then the last pictures of the longest rows of `others`.
+/// Returns the sheets of `inversions` and the number of pictures that were left out to keep the page small: first
+/// whole photos from the end, then the last pictures of the longest rows of `others`.
 pub(crate) fn sheets(document: &Document, inversions: &[Inversion]) -> (Vec<Sheet>, usize) {
     let mut sheets: Vec<Sheet> = inversions.iter().map(|one| sheet(document, one)).collect();
     let size = |sheets: &[Sheet]| sheets.iter().map(Sheet::size).sum::<usize>();
@@ -225,8 +225,8 @@ fn painted(inversion: &Inversion, painted: &Painted, label: String) -> Shown {
     }
 }
 
-/// Returns the boxes of objects that were found in the photo and again in the picture. A box in the picture alone is no
-/// evidence.
+/// Returns the boxes of objects that were found in the photo and again in the picture. A box in the picture alone is
+/// no evidence.
 fn found_again(photo: &[Object], picture: &[Object]) -> Vec<Boxed> {
     let again = picture.iter().filter(|object| photo.iter().any(|one| one.is(object)));
     let boxed = |object: &Object| {

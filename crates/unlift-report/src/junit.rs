@@ -4,8 +4,8 @@ use crate::document::Document;
 use crate::gates;
 use crate::xml::escaped;
 
-/// Returns the gates of `document` as JUnit XML: one test suite with a test case per gate. A gate that did not hold is a
-/// failure. Unusable images are an error, because gates do not cover them. The text ends with a line break.
+/// Returns the gates of `document` as JUnit XML: one test suite with a test case per gate. A gate that did not hold
+/// is a failure. Unusable images are an error, because gates do not cover them. The text ends with a line break.
 pub fn junit(document: &Document) -> String {
     let gates: Vec<_> = document.gates.iter().map(gates::in_words).collect();
     let failures = gates.iter().filter(|gate| !gate.passed).count();

@@ -33,7 +33,8 @@ impl Opening {
         }
     }
 
-    /// Returns the opening of another audit under a title; `details` is a link to that audit's own page.
+    /// Returns the opening of another audit under a title; `details` is a link to that audit's own
+    /// page.
     pub fn titled(
         document: &Document,
         inversions: &[Inversion],

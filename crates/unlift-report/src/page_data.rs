@@ -57,7 +57,8 @@ struct RowData {
     recovered: Vec<Option<f64>>,
     /// (error, percent of the points within it), ascending.
     errors: Vec<(f64, f64)>,
-    /// (stated probability, share that was right), in percent, ascending; without bins of few points.
+    /// (stated probability, share that was right), in percent, ascending; without bins of few
+    /// points.
     reliability: Vec<(f64, f64)>,
     /// Why the attacker's probabilities are not known.
     unknown: Option<String>,

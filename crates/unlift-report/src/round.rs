@@ -5,7 +5,8 @@ use serde_json::Value;
 
 /// Significant decimal digits of every measured number in `audit.json`.
 ///
-/// Six digits resolve a micron in a meter, far below any threshold and far above the rounding noise of sums.
+/// Six digits resolve a micron in a meter, far below any threshold and far above the rounding noise
+/// of sums.
 pub const SIGNIFICANT_DIGITS: usize = 6;
 
 /// Rounds `value` to [`SIGNIFICANT_DIGITS`]; zero and non-finite values stay unchanged.
@@ -13,7 +14,8 @@ pub(crate) fn round(value: f64) -> f64 {
     if value == 0.0 || !value.is_finite() {
         return value;
     }
-    // Rounding through decimal text is exact; `(value * 10^n).round() / 10^n` leaves a tail of nines.
+    // Rounding through decimal text is exact; `(value * 10^n).round() / 10^n` leaves a tail of
+    // nines.
     format!("{value:.*e}", SIGNIFICANT_DIGITS - 1).parse().unwrap_or(value)
 }
 

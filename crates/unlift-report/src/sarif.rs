@@ -9,8 +9,8 @@ use crate::gates::{self, GateWords};
 const UNNAMED: &str = "audit.json";
 const REPOSITORY: &str = env!("CARGO_PKG_REPOSITORY");
 
-/// Returns the gates of `document` as a SARIF log of one run. Results point to `asked_at` (the file and line that request the
-/// audit), else to the map. The text ends with a line break.
+/// Returns the gates of `document` as a SARIF log of one run. Results point to `asked_at` (the file and line that request
+/// the audit), else to the map. The text ends with a line break.
 pub fn sarif(document: &Document, asked_at: Option<(&str, usize)>) -> String {
     let mut gates: Vec<GateWords> = Vec::new();
     for gate in document.gates.iter().map(gates::in_words) {

@@ -16,7 +16,8 @@ pub struct Shares {
     pub title: String,
     /// Percent from the released data alone; `None` if no such attack was tried.
     pub today: Option<f64>,
-    /// Percent with known neighbors, at the tested inlier ratio nearest to one half; `None` without an oracle.
+    /// Percent with known neighbors, at the tested inlier ratio nearest to one half; `None` without an
+    /// oracle.
     pub known: Option<f64>,
     /// How many pictures can be rebuilt from the released data alone; `None` if no picture was painted.
     pub pictures: Option<String>,

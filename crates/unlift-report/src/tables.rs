@@ -211,7 +211,7 @@ pub(crate) fn errors(document: &Document) -> Table {
     let percentiles = distinct(keys.filter(|key| *key != "50"));
     let mut heads = figures(["median", "median of a blind guess"]);
     heads.extend(figures(percentiles.iter().map(|key| format!("{key} % within"))));
-    let caption = "Errors: distances from recovered to true points. Lost points count as infinitely far, shown as a dash.";
+    let caption = "Errors: distances from recovered to true points. Lost points count as infinitely far; a percentile among them is a dash.";
     let table = Table::of_results(document, ("errors", caption), heads, |row| {
         let of = |key: &&String| row.error_percentiles.get(*key).copied().flatten();
         let errors = [row.median_error, row.blind_median_error].into_iter();
@@ -408,7 +408,8 @@ pub(crate) fn likeness(document: &Document) -> Option<Table> {
     Some(with_unprotected(table, unprotected).without_empty_columns())
 }
 
-/// Returns the table of the photos' objects that are found again in the pictures, a column per class; `None` if no row has any.
+/// Returns the table of the photos' objects that are found again in the pictures, a column per class; `None` if no row
+/// has any.
 pub(crate) fn objects(document: &Document) -> Option<Table> {
     let names = document.results.iter().flat_map(|row| row.metrics.keys());
     let classes = names.filter_map(|name| name.strip_prefix(OF_CLASS));

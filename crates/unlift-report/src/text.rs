@@ -5,8 +5,8 @@ use crate::verdict::Verdict;
 use crate::{attack, tables, tiles, verdict, words};
 
 /// Returns the verdict in two lines, then a table with a few lines per scheme, the worst first: every source tried, the
-/// records alone, and the oracle at the headline inlier ratio. Columns are the percentages within each threshold, a blind
-/// guess and the break-even ratio.
+/// records alone, and the oracle at the headline inlier ratio. Columns are the percentages within each threshold, a
+/// blind guess and the break-even ratio.
 ///
 /// The text has at most about 100 columns and ends with a line break.
 pub fn text_table(document: &Document) -> String {
@@ -130,8 +130,8 @@ fn break_even(document: &Document, row: &Row, typed: &str) -> String {
     }
 }
 
-/// Aligns rows of text: columns are as wide as their widest cell and two spaces apart; those in `left` are flush left, others
-/// flush right.
+/// Aligns rows of text: columns are as wide as their widest cell and two spaces apart; those in `left` are flush left,
+/// others flush right.
 pub fn align(rows: &[Vec<String>], left: &[usize]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |column: usize| {

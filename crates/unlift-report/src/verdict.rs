@@ -102,7 +102,8 @@ pub(crate) fn by_source<'a>(document: &'a Document, scheme: &str) -> Vec<&'a Row
     rows
 }
 
-/// Returns the percentage by the records alone within `typed`, the best of the scheme's rows, and the attack's name.
+/// Returns the percentage by the records alone within `typed`, the best of the scheme's rows, and the attack's
+/// name.
 pub(crate) fn records_alone<'a>(
     document: &'a Document,
     scheme: &str,
@@ -182,8 +183,8 @@ fn when(basis: Basis, row: &Row) -> String {
 }
 
 /// Returns what the two baselines recover, and what lists of neighbors add to the larger one: "A blind guess recovers
-/// 8.1 %, the released records alone 65.2 %. Lists of neighbors add 21.3 percentage points (neighbors by
-/// descriptor overlap)."
+/// 8.1 %, the released records alone 65.2 %. Lists of neighbors add 21.3 percentage points (by descriptor
+/// overlap)."
 fn baselines(
     document: &Document,
     scheme: &str,
@@ -207,6 +208,7 @@ fn baselines(
         .filter(|row| attack::has_neighborhoods(row))
         .map(|row| {
             let source = attack::plain_source(&row.neighbors, row.oracle_noise.as_deref());
+            let source = source.trim_start_matches("neighbors ");
             format!("{} ({source})", added(share(row, typed) - floor))
         })
         .collect();

@@ -18,8 +18,8 @@ const COLORS: [&str; 8] =
 /// Dashes of the oracle's sources; the first is solid.
 const DASHES: [&str; 3] = ["none", "7 4", "2 3"];
 
-/// Returns the curves of the oracle's rows within the threshold `only` (as typed), or the headline threshold: the strongest
-/// attack at every inlier ratio, as on the page. `None` without a row by the oracle.
+/// Returns the curves of the oracle's rows within the threshold `only` (as typed), or the headline threshold: the
+/// strongest attack at every inlier ratio, as on the page. `None` without a row by the oracle.
 pub fn curves(document: &Document, only: Option<&str>) -> Option<String> {
     let typed = only.map(str::to_owned).or_else(|| tables::headline_threshold(document))?;
     let choices = Choices::of(document);

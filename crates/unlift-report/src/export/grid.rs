@@ -18,7 +18,8 @@ pub(super) struct Grid {
 /// The cell of a figure that the audit could not measure; it must not look like a small one.
 const NOT_AUDITED: &str = "not audited";
 
-/// Returns the strongest attack per scheme and neighborhoods, and the two baselines; a cell has a figure per threshold of `within`.
+/// Returns the strongest attack per scheme and neighborhoods, and the two baselines; a cell has a figure per threshold of
+/// `within`.
 pub(super) fn grid(document: &Document, within: &[String]) -> Grid {
     let choices = Choices::of(document);
     let givens: Vec<&GivenChoice> =

@@ -26,7 +26,8 @@ pub fn thresholds(document: &Document) -> Vec<String> {
     tables::thresholds(document)
 }
 
-/// Returns the figures of `document` as a table, for the threshold `only` (as typed) or for all. The text ends with a line break.
+/// Returns the figures of `document` as a table, for the threshold `only` (as typed) or for all. The text ends
+/// with a line break.
 pub fn table(document: &Document, format: TableFormat, only: Option<&str>) -> String {
     let within: Vec<String> = match only {
         Some(typed) => vec![typed.to_owned()],

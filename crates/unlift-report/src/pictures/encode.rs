@@ -66,7 +66,8 @@ struct EncodedGraph {
     block: usize,
 }
 
-/// Returns the key of the neighborhoods that are shown first: those made by the attacker that recover most of the first picture.
+/// Returns the key of the neighborhoods that are shown first: those made by the attacker that recover
+/// most of the first picture.
 pub(crate) fn first_choice(pictures: &[EncodedPicture]) -> Option<&str> {
     let own = pictures.first()?.views.iter().filter(|view| view.own);
     own.max_by(|a, b| a.share.total_cmp(&b.share)).map(|view| view.given.as_str())
@@ -75,8 +76,8 @@ pub(crate) fn first_choice(pictures: &[EncodedPicture]) -> Option<&str> {
 /// Edges below this fraction of the smaller side are short, as in the paper's figures.
 const SHORT_SHARE: f32 = 0.1;
 
-/// Encodes up to [`MOST_PICTURES`] pictures and appends their blocks to `blocks`. Keypoints are thinned to
-/// keep the budget. Shares within `within` pixels are over all released keypoints.
+/// Encodes up to [`MOST_PICTURES`] pictures and appends their blocks to `blocks`. Keypoints are thinned
+/// to keep the budget. Shares within `within` pixels are over all released keypoints.
 pub(crate) fn encode(
     pictures: &[Picture],
     within: f64,
@@ -164,7 +165,8 @@ fn at(
     chosen.iter().flat_map(|&i| place(all.get(i).copied().flatten())).collect()
 }
 
-/// Encodes a position as a little-endian u16 pair, 0..=65534 across the image; points outside move to the border.
+/// Encodes a position as a little-endian u16 pair, 0..=65534 across the image; points outside move to
+/// the border.
 fn quantize(size: [u32; 2], point: Option<[f32; 2]>) -> [u8; BYTES_PER_POINT] {
     let steps = |c: usize| {
         let share = (point?[c] + 0.5) / size[c].max(1) as f32;
@@ -195,7 +197,8 @@ fn picture_said(picture: &Picture, drawn: usize) -> String {
     format!("{}, {w} x {h} px, {} keypoints{some}", picture.name, count(n))
 }
 
-/// Returns the share of the released keypoints, drawn or not, and a sentence: "81.3 % within 10 px (blue), the others orange; 3 lost".
+/// Returns the share of the released keypoints, drawn or not, and a sentence: "81.3 % within 10 px
+/// (blue), the others orange; 3 lost".
 fn recovered_said(picture: &Picture, view: &super::RecoveredView, within: f64) -> (f64, String) {
     let released = picture.released.iter().find(|one| one.scheme == view.scheme);
     let is_released = |i: usize| match released.map(|one| &one.marks) {
@@ -218,7 +221,8 @@ fn recovered_said(picture: &Picture, view: &super::RecoveredView, within: f64) -
     (share, format!("{percent} % within {within} px (blue), the others orange{lost}"))
 }
 
-/// Returns a sentence: "the first five neighbors of each keypoint; 45.1 % of the edges are shorter than 48 px (green), the others red".
+/// Returns a sentence: "the first five neighbors of each keypoint; 45.1 % of the edges are shorter than
+/// 48 px (green), the others red".
 fn graph_said(picture: &Picture, graph: &super::Graph, short_px: f32) -> String {
     let (mut n, mut short) = (0u64, 0u64);
     for (from, neighbors) in picture.keypoints.iter().zip(&graph.neighbors) {

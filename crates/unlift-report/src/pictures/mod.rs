@@ -64,7 +64,8 @@ pub struct RecoveredView {
     pub given: Given,
     /// The solver's name.
     pub solver: String,
-    /// Recovered positions, one per keypoint of [`Picture::keypoints`]; `None` if it is lost or was not released.
+    /// Recovered positions, one per keypoint of [`Picture::keypoints`]; `None` if it is lost or was not
+    /// released.
     pub recovered: Vec<Option<[f32; 2]>>,
 }
 

@@ -10,10 +10,12 @@ pub struct SceneBox {
 }
 
 impl SceneBox {
-    /// Returns the box from the 1st to the 99th percentile of each coordinate, widened by a tenth of its
-    /// longest side. Percentiles exclude far outliers, which would shrink the scene to a dot.
+    /// Returns the box from the 1st to the 99th percentile of each coordinate, widened by a tenth
+    /// of its longest side. Percentiles exclude far outliers, which would shrink the scene to a
+    /// dot.
     ///
-    /// Ignores non-finite coordinates; without points it starts from the unit cube about the origin.
+    /// Ignores non-finite coordinates; without points it starts from the unit cube about the
+    /// origin.
     pub fn robust(points: &[[f32; 3]]) -> Self {
         let mut low = [-0.5; 3];
         let mut high = [0.5; 3];
@@ -37,8 +39,8 @@ impl SceneBox {
         Self { low, high }
     }
 
-    /// Returns the part in the box of the line through `point` along `direction`; `None` if the line
-    /// misses the box or `direction` is zero.
+    /// Returns the part in the box of the line through `point` along `direction`; `None` if the
+    /// line misses the box or `direction` is zero.
     pub fn clip_line(&self, point: [f32; 3], direction: [f32; 3]) -> Option<[[f32; 3]; 2]> {
         self.clip(point, direction, f32::NEG_INFINITY)
     }
@@ -69,7 +71,8 @@ impl SceneBox {
         Some([at(near), at(far)])
     }
 
-    /// Returns the rectangle of the plane `coordinate[axis] == offset` in the box; `None` if it is outside.
+    /// Returns the rectangle of the plane `coordinate[axis] == offset` in the box; `None` if it is
+    /// outside.
     pub fn axis_patch(&self, axis: usize, offset: f32) -> Option<[[f32; 3]; 4]> {
         if !(self.low[axis]..=self.high[axis]).contains(&offset) {
             return None;
@@ -90,8 +93,8 @@ impl SceneBox {
     }
 }
 
-/// Returns at most `max` of the indices `0..n`, ascending, chosen by a hash of the index and `seed`. The
-/// choice is equal on every machine and independent of the order of a map file.
+/// Returns at most `max` of the indices `0..n`, ascending, chosen by a hash of the index and
+/// `seed`. The choice is equal on every machine and independent of the order of a map file.
 pub fn subsample(n: usize, max: usize, seed: u64) -> Vec<usize> {
     if n <= max {
         return (0..n).collect();

@@ -1,7 +1,7 @@
 //! The data of the page's 3D view: originals, obfuscations and recovered points.
 //!
-//! All positions are in the document's unit (meters, or usual distances to the K-th neighbor), relative to an origin near
-//! the map: large coordinates (10^6) must be centered before they become `f32`.
+//! All positions are in the document's unit (meters, or usual distances to the K-th neighbor), relative to an origin
+//! near the map: large coordinates (10^6) must be centered before they become `f32`.
 
 mod encode;
 mod geometry;

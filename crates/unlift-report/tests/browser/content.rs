@@ -1,4 +1,5 @@
-//! Tests of the page's content: curves, tables and canvases, without errors and network; parts of it without script.
+//! Tests of the page's content: curves, tables and canvases, without errors and network; parts of it
+//! without script.
 
 use serde_json::json;
 use unlift_report::{RenderOptions, render};

@@ -5,7 +5,8 @@ use unlift_report::document::{Document, Spread};
 
 use super::{browser, page, sample};
 
-/// Tables that are cut, and the number of those that show this neither by a shade nor by the keyboard.
+/// Tables that are cut, and the number of those that show this neither by a shade nor by the
+/// keyboard.
 const CUT: &str =
     "[...document.querySelectorAll('.wide')].filter(s => s.scrollWidth > s.clientWidth)
     .map(s => `${s.ariaLabel}: ${s.scrollWidth} > ${s.clientWidth}`)";
@@ -13,7 +14,8 @@ const SILENT: &str =
     "[...document.querySelectorAll('.wide')].filter(s => s.scrollWidth > s.clientWidth
     && !(getComputedStyle(s).backgroundImage.includes('gradient') && s.tabIndex === 0)).length";
 
-/// Returns an audit of many schemes with long names, sources, noise models, solvers, thresholds and seeds.
+/// Returns an audit of many schemes with long names, sources, noise models, solvers, thresholds and
+/// seeds.
 fn crowded() -> Document {
     let mut document = sample::mixed(true);
     let rows = std::mem::take(&mut document.results);

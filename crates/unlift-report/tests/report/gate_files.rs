@@ -1,5 +1,5 @@
-//! Tests of gates as JUnit XML and SARIF: the whole text, which was validated by the schemas of Jenkins (`junit-10.xsd`) and
-//! SARIF 2.1.0.
+//! Tests of gates as JUnit XML and SARIF: the whole text, which was validated by the schemas of Jenkins (`junit-10.xsd`)
+//! and SARIF 2.1.0.
 
 use serde_json::json;
 use unlift_report::document::{Document, ImageCounts};

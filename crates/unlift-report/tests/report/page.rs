@@ -89,8 +89,7 @@ fn the_verdict_names_the_strongest_attack_of_today() {
     assert!(
         text.contains(
             "A blind guess recovers 1.2 %, the released records alone 7.3 %. Lists of neighbors add 33.7 percentage points \
-            (neighbors by descriptor overlap), nothing (neighbors by record geometry) and 81.8 percentage points \
-            (known neighbors)."
+            (by descriptor overlap), nothing (by record geometry) and 81.8 percentage points (known neighbors)."
         ),
         "{text}"
     );
@@ -226,7 +225,8 @@ fn names_are_escaped_everywhere() {
 fn the_terminal_table_is_short_and_worst_first() {
     let table = text_table(&sample::document(true));
     let lines: Vec<&str> = table.lines().collect();
-    // Two lines of verdict, an empty line, the head, a line per scheme and per records alone (not for planes), and two notes.
+    // Two lines of verdict, an empty line, the head, a line per scheme and per records alone (not for planes), and two
+    // notes.
     assert_eq!(lines.len(), 4 + 7 + 6 + 2);
     assert!(table.contains("\nblind, break-even: within 0.10 m\n"), "{table}");
     assert!(lines[4].starts_with("olc  ") && lines[4].contains("58.6 %"), "{table}");

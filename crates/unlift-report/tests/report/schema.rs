@@ -1,7 +1,7 @@
 //! Tests that written documents follow the committed JSON Schema.
 //!
-//! The schema uses few keywords. This file checks only those and rejects others, which compiles faster
-//! than a full validator.
+//! The schema uses few keywords. This file checks only those and rejects others, which compiles
+//! faster than a full validator.
 
 use serde_json::{Value, json};
 use unlift_report::Document;

@@ -110,8 +110,8 @@ pub fn document(metric: bool) -> Document {
     }
 }
 
-/// Returns the audit of [`document`] with an attacker's own neighborhoods, whose ratios differ between schemes: `overlap`
-/// for all schemes, `geometric` for all but planes.
+/// Returns the audit of [`document`] with an attacker's own neighborhoods, whose ratios differ between
+/// schemes: `overlap` for all schemes, `geometric` for all but planes.
 pub fn mixed(metric: bool) -> Document {
     let mut document = document(metric);
     let half: Vec<Row> =

@@ -32,7 +32,8 @@ fn room(n: usize) -> Vec<[f32; 3]> {
     (0..n).map(point).collect()
 }
 
-/// Returns points of the room and their recovered positions, consistent with the figures of `document`.
+/// Returns points of the room and their recovered positions, consistent with the figures of
+/// `document`.
 pub fn scene(document: &Document, n: usize) -> Scene3d {
     let originals = room(n);
     let bounds = SceneBox::robust(&originals);
