@@ -34,7 +34,6 @@ impl Given {
                 || (self.inlier_ratio == other.inlier_ratio && noise(self) == noise(other)))
     }
 
-    /// Returns the label of these neighborhoods on the page, see [`neighborhoods`].
     pub(crate) fn label(&self) -> String {
         neighborhoods(&self.neighbors, self.oracle_noise.as_deref(), self.inlier_ratio)
     }
@@ -42,7 +41,6 @@ impl Given {
 
 /// The solver and source of a row that is no attack: it uses the true places of true neighbors.
 const REFERENCE: &str = "reference";
-/// Solvers that use only the records, whatever neighborhoods their row names.
 const WITHOUT_NEIGHBORS: [&str; 2] = ["density", "tomography"];
 
 /// The data behind an attack.
@@ -61,7 +59,6 @@ pub(crate) fn basis(row: &Row) -> Option<Basis> {
     basis_of(&row.neighbors, &row.solver)
 }
 
-/// Returns the basis of an attack by the names of its source and solver; `None` if it is no attack.
 pub(crate) fn basis_of(neighbors: &str, solver: &str) -> Option<Basis> {
     match neighbors {
         _ if solver == REFERENCE => None,
@@ -72,22 +69,18 @@ pub(crate) fn basis_of(neighbors: &str, solver: &str) -> Option<Basis> {
     }
 }
 
-/// Returns whether the attack of a row uses neighborhoods.
 pub(crate) fn has_neighborhoods(row: &Row) -> bool {
     looks_at_neighbors(&row.solver)
 }
 
-/// Returns whether a solver uses neighborhoods.
 pub(crate) fn looks_at_neighbors(solver: &str) -> bool {
     !WITHOUT_NEIGHBORS.contains(&solver)
 }
 
-/// Returns the label of an attack's neighborhoods, or `records alone (tomography)`.
 pub(crate) fn without_solver(given: &Given, solver: &str) -> String {
     if looks_at_neighbors(solver) { given.label() } else { records_alone(Some(solver)) }
 }
 
-/// Returns whether the source is the oracle, whose ratio is requested; the ratio of others is measured.
 pub(crate) fn is_oracle(neighbors: &str) -> bool {
     neighbors == "oracle"
 }

@@ -18,11 +18,9 @@ pub(crate) struct Banner {
     /// What known neighbors would give away under every scheme, so that schemes not named above do not look
     /// fine.
     pub every: Option<String>,
-    /// The schemes that were not audited, if any.
     pub unknown: Option<String>,
 }
 
-/// Returns the banner of `document`; `cards` are its schemes, the worst first.
 pub(crate) fn banner(document: &Document, cards: &[Card], refusals: &[Refusal]) -> Banner {
     let names: Vec<String> = refusals.iter().map(|one| one.scheme.to_uppercase()).collect();
     let unknown = (!refusals.is_empty())
@@ -58,7 +56,6 @@ fn every(cards: &[Card]) -> Option<String> {
     Some(format!("{when}, every scheme tried would give back {percent} % or more."))
 }
 
-/// Returns the card and finding of this basis with the largest share; of equal ones the first.
 fn worst(cards: &[Card], basis: Basis) -> Option<(&Card, &Finding)> {
     let found = cards.iter().filter_map(|card| Some((card, card.finding(basis)?)));
     found.reduce(|a, b| if b.1.recovered > a.1.recovered { b } else { a })
@@ -101,7 +98,6 @@ fn said(document: &Document, (card, finding): (&Card, &Finding)) -> String {
     }
 }
 
-/// Sources that use descriptors.
 const BY_DESCRIPTORS: [&str; 4] = ["similarity", "overlap", "descriptors", "learned"];
 
 /// Returns the next steps, the most urgent first. Options of the command line are in back quotes.
@@ -151,7 +147,6 @@ fn has_pictures(row: &Row) -> bool {
     row.metrics.contains_key("ssim")
 }
 
-/// Returns a sentence on the scheme that leaks least, if there are several.
 fn least(cards: &[Card]) -> Option<String> {
     let share = |card: &Card| card.today().or(card.finding(Basis::Oracle).map(|f| f.recovered));
     let known = cards.iter().filter(|card| card.today().is_some()).count();

@@ -17,7 +17,6 @@ pub(crate) enum Level {
 }
 
 impl Level {
-    /// Returns the level of a percentage of the points.
     pub(crate) fn of(percent: f64) -> Self {
         match percent {
             50.0.. => Self::Red,
@@ -36,7 +35,6 @@ pub(crate) struct Card {
     /// One finding per kind of attack that ran: from released data alone, with given lists, with known
     /// neighbors.
     pub findings: Vec<Finding>,
-    /// A sentence on both baselines and on what lists of neighbors add.
     pub baselines: String,
     pub break_even: Option<String>,
     /// Whether no attack from the released data alone was tried on this scheme.
@@ -45,28 +43,22 @@ pub(crate) struct Card {
     pub refused: Vec<String>,
 }
 
-/// The result of the strongest attack of one kind.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Finding {
     #[serde(skip)]
     pub basis: Basis,
     /// "Today, from the released data alone".
     pub when: String,
-    /// Percent within the headline threshold.
     pub recovered: f64,
-    /// `recovered` with one decimal, as in the tables.
     pub percent: String,
     pub level: Level,
     /// The attack: "neighbors by descriptor overlap, 35 listed, 11 % of them right, solver joint".
     pub by: String,
-    /// The attack in a few words: "neighbors by descriptor overlap".
     #[serde(skip)]
     pub briefly: String,
-    /// The larger baseline, in percent.
     pub floor: f64,
 }
 
-/// A scheme that could not be audited, with the reason.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Refusal {
     pub scheme: String,

@@ -24,13 +24,10 @@ pub(crate) struct Choices {
 pub(crate) struct SchemeChoice {
     pub name: String,
     pub title: String,
-    /// The number of its color and mark.
     pub slot: usize,
-    /// Percent by a blind guess, per threshold.
     pub blind: Vec<Option<f64>>,
     /// Percent by the records alone, per threshold; `None` where that was not tried.
     pub alone: Vec<Option<f64>>,
-    /// The label of the attack on the records alone.
     pub alone_by: String,
     /// The larger of the two baselines, per threshold; neighborhoods add what exceeds it.
     pub floor: Vec<Option<f64>>,
@@ -44,7 +41,6 @@ pub(crate) struct GivenChoice {
     pub group: &'static str,
     /// The source: one curve of the oracle's ratios, or one mark of another source.
     pub source: String,
-    /// The source in plain words.
     pub name: String,
     #[serde(skip)]
     pub given: Given,
@@ -77,7 +73,6 @@ impl Choices {
         choices
     }
 
-    /// Returns the place of a row's neighborhoods.
     pub(crate) fn given(&self, given: &Given) -> Option<usize> {
         self.givens.iter().position(|known| known.given.same_choice(given))
     }
@@ -156,7 +151,6 @@ fn first_given(document: &Document, givens: &[GivenChoice]) -> usize {
     place.unwrap_or(0)
 }
 
-/// Returns the unit sign of lengths in charts; `×` means times the usual distance to the K-th neighbor.
 pub(crate) fn unit_sign(unit: Option<LengthUnit>) -> &'static str {
     match unit {
         Some(LengthUnit::KthNeighbor) => "×",
@@ -165,14 +159,11 @@ pub(crate) fn unit_sign(unit: Option<LengthUnit>) -> &'static str {
     }
 }
 
-/// Schemes with a fixed color and mark, the same on every page.
 const KNOWN_SCHEMES: [&str; 7] = ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp"];
-/// Number of colors and marks; further schemes reuse them.
 const SLOTS: usize = 8;
 
 /// Returns the number of the color and mark of `scheme`; unknown schemes are numbered as they appear.
 fn slot(document: &Document, scheme: &str) -> usize {
-    // A scheme for images has the color of the most similar scheme for maps.
     let known = match scheme {
         "lines2d" => "olc",
         "cp2d" => "cp",

@@ -10,22 +10,18 @@ use crate::inversions::{Inversion, InvertedView, source, strongest};
 use crate::pictures::Marks;
 use crate::{tables, words};
 
-/// A row of three pictures, with a sentence.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Exhibit {
     level: Level,
     /// "An attacker can rebuild the picture."
     verdict: &'static str,
-    /// A sentence on the attack and what it recovers.
     said: String,
     photo: String,
     released: Option<Drawing>,
     painted: String,
-    /// The image's name.
     name: String,
 }
 
-/// Released records as an SVG path.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct Drawing {
     size: [u32; 2],
@@ -43,7 +39,6 @@ const IN_PARTS: f64 = 0.6;
 /// The picture of the true points counts as poor below this SSIM.
 const POOR: f64 = 0.5;
 
-/// Returns the level and the sentence for a ratio of SSIM to that without protection.
 fn rebuilt(ratio: f64) -> (Level, &'static str) {
     match ratio {
         REBUILT.. => (Level::Red, "An attacker can rebuild the picture."),
@@ -109,7 +104,6 @@ fn best<'a>(
     best.map(|(_, view)| view)
 }
 
-/// Returns the row of a view.
 fn row_of<'a>(document: &'a Document, view: &InvertedView) -> Option<&'a Row> {
     document.results.iter().find(|row| {
         row.scheme == view.scheme
@@ -118,7 +112,6 @@ fn row_of<'a>(document: &'a Document, view: &InvertedView) -> Option<&'a Row> {
     })
 }
 
-/// Returns the percentage recovered within the headline threshold.
 fn share(document: &Document, row: &Row) -> Option<f64> {
     row.recovered_percent.get(&tables::headline_threshold(document)?).copied()
 }
@@ -167,7 +160,6 @@ fn exhibit(document: &Document, inversion: &Inversion, view: &InvertedView) -> O
     })
 }
 
-/// More lines than this cannot be told apart.
 const MOST_LINES: usize = 700;
 const MOST_POINTS: usize = 4_000;
 
@@ -197,7 +189,6 @@ fn drawing(size: [u32; 2], scheme: &str, marks: &Marks) -> Option<Drawing> {
     (drawn > 0).then_some(Drawing { size, kind, path, said })
 }
 
-/// Returns at most `most` of `all`, evenly spaced.
 fn evenly<T: Copy>(all: &[T], most: usize) -> Vec<T> {
     let n = all.len().min(most);
     (0..n).map(|at| all[at * all.len() / n]).collect()

@@ -6,18 +6,13 @@ use crate::attack::{self, Basis};
 use crate::document::{Document, Row};
 use crate::{tables, verdict, words};
 
-/// A title per chart.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Findings {
-    /// Title of the chart over the share of right neighbors.
     pub curves: String,
-    /// Title of the chart over the error.
     pub errors: String,
-    /// Title of the chart over the probability that the attacker states.
     pub certainty: String,
 }
 
-/// Returns the titles for `document`.
 pub(crate) fn findings(document: &Document) -> Findings {
     Findings { curves: curves(document), errors: errors(document), certainty: certainty(document) }
 }
@@ -63,7 +58,6 @@ fn curves(document: &Document) -> String {
     }
 }
 
-/// Returns a title with the median error of the row that the verdict leads with.
 fn errors(document: &Document) -> String {
     let points = document.results.first().map_or("points", |row| words::points(row.unit));
     let strongest = speaking(document);
@@ -98,7 +92,6 @@ fn certainty(document: &Document) -> String {
     said.unwrap_or_else(|| "How well the attacker can judge its own result".to_owned())
 }
 
-/// Returns the row that the verdict leads with.
 fn speaking(document: &Document) -> Option<&Row> {
     let typed = tables::headline_threshold(document)?;
     let share = |row: &Row| verdict::share(row, &typed);

@@ -5,7 +5,6 @@ use serde::Serialize;
 use crate::document::{Document, GateResult};
 use crate::words;
 
-/// All gates of a document.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Gates {
     /// "2 of 3 gates failed", or "All 3 gates passed".
@@ -28,7 +27,6 @@ pub(crate) struct GateWords {
     pub allowed: String,
 }
 
-/// Returns the gates of `document`; `None` without any.
 pub(crate) fn gates(document: &Document) -> Option<Gates> {
     let all = &document.gates;
     let failed = all.iter().filter(|gate| !gate.passed).count();

@@ -163,7 +163,6 @@ fn turns(c: char) -> bool {
     matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// The values of the template.
 #[derive(Debug, Serialize)]
 struct Page<'a> {
     style: [&'static str; 2],
@@ -173,17 +172,13 @@ struct Page<'a> {
     data: String,
     blocks: &'a [String],
     scene: Option<SceneWords>,
-    /// Number of images that are drawn.
     pictures: usize,
     /// The verdict of this audit, after that of another audit if there is one.
     parts: Vec<Opening>,
-    /// Titles of charts.
     findings: Findings,
-    /// Pictures painted from recovered points.
     sheets: Vec<Sheet>,
     /// Number of pictures that were left out to keep the page small.
     sheets_left_out: usize,
-    /// Heat maps of a map in tiles.
     heat_maps: Vec<HeatMap>,
     share_safe: bool,
     subject: Subject,
@@ -196,21 +191,16 @@ struct Page<'a> {
     times: Option<Table>,
     options: Vec<(String, String)>,
     command: Option<&'a str>,
-    /// Hash of the map; `None` in a share-safe document.
     sha256: Option<&'a str>,
-    /// (role, SHA-256) of further input files.
     other_sha256: Vec<(&'a String, &'a String)>,
     seconds: String,
     memory: Option<String>,
-    /// (scheme, source, reason) of what could not be audited.
     not_audited: Vec<(&'a String, Option<String>, &'a String)>,
-    /// Notes on how the figures came to be.
     notes: &'a [String],
     document: &'a Document,
     attribution: &'static str,
 }
 
-/// Returns escaped text, with parts in back quotes set as code.
 fn coded(text: &str) -> minijinja::Value {
     let escaped = text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
     let parts = escaped.split('`').enumerate();
@@ -234,16 +224,11 @@ struct Subject {
     name: Option<String>,
     n_points: String,
     metric: bool,
-    /// "map" or "images".
     kind: &'static str,
-    /// "points" or "keypoints".
     points: &'static str,
     images: Option<String>,
-    /// A sentence on the unit of lengths.
     unit: String,
-    /// The ordinal of the neighbor whose distance is the unit: "50th".
     kth: String,
-    /// The name of the unit without a scale.
     usual_distance: &'static str,
 }
 
@@ -280,7 +265,6 @@ fn subject(document: &Document) -> Subject {
     }
 }
 
-/// Returns the counts of images in a few sentences.
 fn images_text(counts: &ImageCounts) -> String {
     let count = words::thousands;
     let mut text = match counts.found == counts.used {

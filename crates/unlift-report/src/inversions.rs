@@ -88,13 +88,11 @@ pub struct InvertedView {
 }
 
 impl InvertedView {
-    /// Returns the basis of the attack; `None` if it is no attack.
     pub(crate) fn basis(&self) -> Option<Basis> {
         basis_of(&self.given.neighbors, &self.solver)
     }
 }
 
-/// All pictures of one photo, as the page shows them.
 #[derive(Debug, Serialize)]
 pub(crate) struct Sheet {
     name: String,
@@ -103,7 +101,6 @@ pub(crate) struct Sheet {
     rows: Vec<SheetRow>,
 }
 
-/// The box of an object, in percent of the picture.
 #[derive(Debug, Serialize)]
 struct Boxed {
     class: String,
@@ -116,19 +113,15 @@ struct Boxed {
 #[derive(Debug, Serialize)]
 struct SheetRow {
     scheme: String,
-    /// The strongest attack of each basis.
     main: Vec<Shown>,
-    /// All other attacks.
     others: Vec<Shown>,
 }
 
 #[derive(Debug, Serialize)]
 struct Shown {
-    /// The attack that recovered the keypoints.
     label: String,
     said: String,
     source: String,
-    /// Objects of the photo that were found again.
     boxes: Vec<Boxed>,
 }
 
@@ -156,7 +149,6 @@ pub(crate) fn sheets(document: &Document, inversions: &[Inversion]) -> (Vec<Shee
 }
 
 impl Sheet {
-    /// Returns the pictures painted from recovered keypoints.
     fn pictures(&self) -> impl Iterator<Item = &Shown> {
         self.rows.iter().flat_map(|row| row.main.iter().chain(&row.others))
     }
@@ -237,7 +229,6 @@ fn found_again(photo: &[Object], picture: &[Object]) -> Vec<Boxed> {
     again.map(boxed).collect()
 }
 
-/// Returns a JPEG as a data URL.
 pub(crate) fn source(jpeg: &[u8]) -> String {
     format!("data:image/jpeg;base64,{}", STANDARD.encode(jpeg))
 }

@@ -10,14 +10,11 @@ use crate::verdict::{Verdict, verdict};
 /// The opening of a page: the verdict on an audit, and its pictures if it has any.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Opening {
-    /// The title above the verdict, if the page has several verdicts.
     title: Option<String>,
-    /// A relative link to the page with the details.
     details: Option<String>,
     verdict: Verdict,
     exhibits: Vec<Exhibit>,
     notes: Vec<String>,
-    /// Whether the audit is of images.
     images: bool,
 }
 

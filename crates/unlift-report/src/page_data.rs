@@ -18,18 +18,15 @@ pub(crate) struct PageData<'a> {
     thresholds: Vec<ThresholdData>,
     rows: Vec<RowData>,
     published: Vec<PublishedData>,
-    /// The index of the threshold that is shown first.
     headline: usize,
     /// `m`, `px`, or `×` for multiples of the usual distance to the K-th neighbor.
     unit: &'static str,
     scene: Option<&'a Encoded>,
     pictures: &'a [EncodedPicture],
-    /// The key of the neighborhoods that pictures show first.
     first_picture: Option<&'a str>,
 }
 
 impl PageData<'_> {
-    /// Returns whether a published curve is drawn beside ours.
     pub(crate) fn has_published(&self) -> bool {
         !self.published.is_empty()
     }
@@ -50,17 +47,13 @@ struct RowData {
     /// The label of this row's neighborhoods: `neighbors by descriptor overlap, 11 % right`.
     label: String,
     ratio: f64,
-    /// Whether it is an attack; a reference row is none.
     attack: bool,
-    /// Per threshold, whether no solver recovers more of this scheme with these neighborhoods.
     strongest: Vec<bool>,
     recovered: Vec<Option<f64>>,
-    /// (error, percent of the points within it), ascending.
     errors: Vec<(f64, f64)>,
     /// (stated probability, share that was right), in percent, ascending; without bins of few
     /// points.
     reliability: Vec<(f64, f64)>,
-    /// Why the attacker's probabilities are not known.
     unknown: Option<String>,
 }
 
@@ -72,7 +65,6 @@ struct PublishedData {
     points: Vec<(f64, f64)>,
 }
 
-/// Returns whether `row` recovers most of its scheme from its neighborhoods.
 fn is_strongest(document: &Document, row: &Row, typed: &str) -> bool {
     let best = verdict::strongest_given(document, &row.scheme, &Given::of(row), typed);
     best.is_some_and(|best| std::ptr::eq(best, row))
@@ -102,7 +94,6 @@ pub(crate) fn page_data<'a>(
     let by_threshold = |map: &crate::document::ByThreshold| {
         thresholds.iter().map(|typed| map.get(typed).copied()).collect::<Vec<_>>()
     };
-    // The lists were made from the rows, so each row is in them.
     let rows = document.results.iter().enumerate().filter_map(|(index, row)| {
         let cdf = options.error_cdf.iter().find(|cdf| cdf.row == index);
         let given = Given::of(row);

@@ -63,7 +63,6 @@ pub fn printed(dataset: &str) -> Vec<Printed> {
     all
 }
 
-/// Returns the recovered shares of images (`dim` 2) or maps (3), with an oracle.
 fn recovered(dataset: &str, dim: usize) -> Vec<Printed> {
     let table = match (dim, dataset) {
         (2, "12-scenes") => 5,
@@ -121,7 +120,6 @@ fn pictures(dataset: &str) -> Vec<Printed> {
     all
 }
 
-/// Returns whether the supplement prints the numbers of another dataset here.
 fn copied(dataset: &str, dim: &str, scheme: &str) -> bool {
     dataset != "7-scenes" && dim == "3" && scheme == "none"
 }

@@ -4,7 +4,6 @@ use serde_json::Value;
 
 use crate::document::Document;
 
-/// Replaces a value that names something on the owner's machine.
 const WITHHELD: &str = "(withheld)";
 
 /// Options whose value may identify a file of the owner.
@@ -16,9 +15,7 @@ const SCHEMES: [&str; 10] =
     ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp", "lines2d", "cp2d", "dcl2d"];
 const SOURCES: [&str; 7] =
     ["oracle", "file", "similarity", "overlap", "descriptors", "geometric", "learned"];
-/// Replaces the reason of another scheme, source or solver.
 const OWN_FAILED: &str = "its own function failed";
-/// Separates the subject from the reason in the reason of a gate.
 const NOT_AUDITED: &str = " was not audited";
 
 impl Document {

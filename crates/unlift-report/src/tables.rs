@@ -6,7 +6,6 @@ use crate::document::{Bound, ByReason, ByThreshold, Document, LengthUnit, Row};
 use crate::paper::{self, PublishedPictures};
 use crate::{attack, words};
 
-/// A table of text.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Table {
     pub id: &'static str,
@@ -18,7 +17,6 @@ pub(crate) struct Table {
     pub notes: Vec<String>,
 }
 
-/// The head of a column.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Column {
     pub name: String,
@@ -61,7 +59,6 @@ impl Table {
         Self::new(id, caption, [key_columns(), more].concat(), rows.collect())
     }
 
-    /// Removes columns that contain only dashes.
     fn without_empty_columns(mut self) -> Self {
         let kept: Vec<bool> = (0..self.columns.len())
             .map(|at| self.rows.is_empty() || self.rows.iter().any(|row| row[at] != NONE))
@@ -85,7 +82,6 @@ pub(crate) fn column(name: impl Into<String>, class: Class) -> Column {
     Column { name: name.into(), class }
 }
 
-/// Returns columns of figures with these names.
 fn figures<T: Into<String>>(names: impl IntoIterator<Item = T>) -> Vec<Column> {
     names.into_iter().map(|name| column(name, Class::Figure)).collect()
 }
@@ -94,7 +90,6 @@ fn labels<const N: usize>(names: [&str; N]) -> Vec<Column> {
     names.map(|name| column(name, Class::Label)).into()
 }
 
-/// Returns the columns that identify a row.
 fn key_columns() -> Vec<Column> {
     [labels(["scheme", "solver", "neighbors"]), figures(["of them right"])].concat()
 }
@@ -110,12 +105,10 @@ fn within_columns(document: &Document, who: &str) -> Vec<Column> {
     figures(names.map(|name| format!("{who}within {name}, %")))
 }
 
-/// Returns the cell of an optional value; a dash for `None`.
 fn known<T>(value: Option<T>, said: impl FnOnce(T) -> String) -> String {
     value.map_or(NONE.into(), said)
 }
 
-/// Returns the shares within all thresholds, with their standard deviations over seeds.
 fn shares(document: &Document, shares: &ByThreshold, spread: Option<&ByThreshold>) -> Vec<String> {
     let cell = |typed: &String| percent_cell(shares.get(typed), spread.and_then(|s| s.get(typed)));
     thresholds(document).iter().map(cell).collect()
@@ -132,7 +125,6 @@ pub(crate) fn distinct<T: PartialEq>(items: impl IntoIterator<Item = T>) -> Vec<
     kept
 }
 
-/// Returns the schemes of a document, in the order of its rows.
 pub(crate) fn schemes(document: &Document) -> Vec<&str> {
     distinct(document.results.iter().map(|row| row.scheme.as_str()))
 }
@@ -164,7 +156,6 @@ pub(crate) fn recovered(document: &Document) -> Table {
     table.without_empty_columns()
 }
 
-/// Returns the table of baselines per scheme: a blind guess, and the records alone.
 pub(crate) fn baselines(document: &Document) -> Table {
     let mut rows: Vec<Vec<String>> = Vec::new();
     for scheme in schemes(document) {
@@ -185,11 +176,9 @@ pub(crate) fn baselines(document: &Document) -> Table {
     }
     let caption = "Baselines: what an attacker recovers without lists of neighbors. Lists add what exceeds the larger baseline.";
     let columns = [labels(["scheme", "attacker"]), within_columns(document, "")].concat();
-    // Rows of one scheme share their baselines.
     Table::new("baselines", caption, columns, distinct(rows))
 }
 
-/// Returns the table of shares over distinct places; `None` if no row has them.
 pub(crate) fn distinct_places(document: &Document) -> Option<Table> {
     let blind = within_columns(document, "blind guess, ");
     let heads = [within_columns(document, ""), blind, figures(["places"])].concat();
@@ -204,7 +193,6 @@ pub(crate) fn distinct_places(document: &Document) -> Option<Table> {
     table.if_any()
 }
 
-/// Returns the table of the error's percentiles.
 pub(crate) fn errors(document: &Document) -> Table {
     let keys = document.results.iter().flat_map(|row| row.error_percentiles.keys());
     // Percentile 50 is the median, which has its own column.
@@ -221,7 +209,6 @@ pub(crate) fn errors(document: &Document) -> Table {
     table.without_empty_columns()
 }
 
-/// Returns the table of break-even ratios for every threshold; `None` without any.
 pub(crate) fn break_even(document: &Document) -> Option<Table> {
     let rows = document.break_even.iter().map(|point| {
         let ratio = point.inlier_ratio.map(words::ratio_percent);
@@ -242,7 +229,6 @@ pub(crate) fn break_even(document: &Document) -> Option<Table> {
     (!table.rows.is_empty()).then_some(table)
 }
 
-/// Returns the table of points that were lost or not released, by reason.
 pub(crate) fn losses(document: &Document) -> Table {
     let points = points(document);
     let capital = words::capital(points);
@@ -271,7 +257,6 @@ fn reasons(map: &ByReason) -> String {
     if parts.is_empty() { NONE.to_owned() } else { parts.join(", ") }
 }
 
-/// The cell of an unknown share of sure points.
 const UNKNOWN: &str = "not known here";
 
 /// Returns the table of correct choices and of points that the attacker is sure of; `None` if no row has any.
@@ -306,7 +291,6 @@ pub(crate) fn choices(document: &Document) -> Option<Table> {
     table.without_empty_columns().if_any()
 }
 
-/// Returns the table of metrics, a column each; `None` if no row has any.
 pub(crate) fn metrics(document: &Document) -> Option<Table> {
     let names = document.results.iter().flat_map(|row| row.metrics.keys());
     let names = distinct(names.filter(|name| !is_of_pictures(name)));
@@ -318,7 +302,6 @@ pub(crate) fn metrics(document: &Document) -> Option<Table> {
     table.if_any()
 }
 
-/// Returns the table of RANSAC's trials per point; `None` if no row has them.
 pub(crate) fn trials(document: &Document) -> Option<Table> {
     let points = points(document);
     let heads = vec![column(format!("{points} by trials"), Class::Prose)];
@@ -332,7 +315,6 @@ pub(crate) fn trials(document: &Document) -> Option<Table> {
     table.if_any()
 }
 
-/// Returns the table of seconds per row and stage; `None` if the run has none.
 pub(crate) fn times(document: &Document) -> Option<Table> {
     let seconds = &document.run.seconds;
     let stages = distinct(seconds.rows.iter().flat_map(|row| row.keys()));
@@ -349,9 +331,7 @@ pub(crate) fn times(document: &Document) -> Option<Table> {
 /// The metrics of [`likeness`]: name in a document, head of a column, decimals.
 const LIKENESS: [(&str, &str, usize); 3] =
     [("ssim", "SSIM", 3), ("psnr", "PSNR, dB", 1), ("lpips", "LPIPS", 3)];
-/// Prefix of metrics about a class of objects.
 const OF_CLASS: &str = "objects_found_of_";
-/// Suffix of metrics about pictures of the true points.
 const BASELINE: &str = "_baseline";
 
 /// Returns whether a table of pictures shows the metric `name`.
@@ -360,7 +340,6 @@ fn is_of_pictures(name: &str) -> bool {
     name.starts_with(OF_CLASS) || LIKENESS.iter().any(|(metric, _, _)| *metric == of)
 }
 
-/// Adds a first row for pictures of the true points.
 fn with_unprotected(mut table: Table, cells: Vec<String>) -> Table {
     let keys = ["without protection", NONE, NONE, NONE].map(str::to_owned);
     table.rows.insert(0, [keys.to_vec(), cells].concat());
@@ -431,13 +410,11 @@ pub(crate) fn objects(document: &Document) -> Option<Table> {
     with_unprotected(table, found(first, BASELINE)).if_any()
 }
 
-/// Returns every threshold of the document, as typed, in order.
 pub(crate) fn thresholds(document: &Document) -> Vec<String> {
     let typed = document.results.iter().flat_map(|row| row.recovered_percent.keys());
     distinct(typed).into_iter().cloned().collect()
 }
 
-/// The headline threshold of images, in pixels.
 const HEADLINE_PX: f64 = 10.0;
 
 /// Returns the threshold of verdicts: the first; for images the one nearest to 10 px.
@@ -452,7 +429,6 @@ pub(crate) fn headline_threshold(document: &Document) -> Option<String> {
     all.into_iter().min_by(|a, b| away(a).total_cmp(&away(b)))
 }
 
-/// Returns a threshold in words, in the document's unit.
 pub(crate) fn threshold_text(document: &Document, typed: &str) -> String {
     match document.results.first() {
         Some(row) => words::threshold(typed, row.unit),

@@ -76,7 +76,6 @@ fn records_alone(
     Some((share, cells))
 }
 
-/// Returns the cells of a row.
 fn cells(document: &Document, row: &Row, thresholds: &[String], headline: &str) -> Vec<String> {
     let right = format!("{} %", words::ratio_percent(row.inlier_ratio));
     let source = attack::source(&row.neighbors, row.oracle_noise.as_deref());
@@ -115,7 +114,6 @@ fn break_even(document: &Document, row: &Row, typed: &str) -> String {
             && noise(&point.oracle_noise) == noise(&row.oracle_noise)
             && point.threshold == typed
     });
-    // A single ratio makes no curve.
     let of_scheme = document.results.iter().filter(|other| other.scheme == row.scheme);
     let is_other =
         |other: &Row| other.oracle_noise.is_some() && other.inlier_ratio != row.inlier_ratio;

@@ -19,24 +19,19 @@ pub struct TileFigures {
     pub recovered_percent: Vec<ByThreshold>,
 }
 
-/// A heat map of one scheme.
 #[derive(Debug, Serialize)]
 pub(crate) struct HeatMap {
-    /// The scheme and the attack.
     title: String,
-    /// Width and height of the drawing.
     size: [f64; 2],
     boxes: Vec<HeatBox>,
 }
 
-/// A tile of a heat map.
 #[derive(Debug, Serialize)]
 struct HeatBox {
     x: f64,
     y: f64,
     width: f64,
     height: f64,
-    /// Opacity of its color, from 0 to 1.
     share: f64,
     /// Percent that came back, drawn if there is room; `title` appears under the pointer.
     percent: String,
@@ -45,7 +40,6 @@ struct HeatBox {
 
 /// The longer side of a heat map, in units of the drawing.
 const SIDE: f64 = 480.0;
-/// Maximal number of heat maps.
 const MOST: usize = 4;
 
 /// Returns, for every scheme, the row with the largest share and its index in the results; the worst scheme first.
@@ -99,7 +93,6 @@ pub(crate) fn heat_maps(document: &Document) -> Vec<HeatMap> {
     strongest(document).iter().take(MOST).map(drawn).collect()
 }
 
-/// Returns the table of tiles, a column per scheme; `None` for a document without tiles.
 pub(crate) fn table(document: &Document) -> Option<Table> {
     if document.tiles.is_empty() {
         return None;

@@ -15,13 +15,11 @@ use crate::{tables, words};
 /// The oracle's headline is its tested inlier ratio nearest to this one.
 const HEADLINE_RATIO: f64 = 0.5;
 
-/// The verdict on an audit: a summary, one card per scheme, and the next steps.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Verdict {
     pub banner: Banner,
     pub cards: Vec<Card>,
     pub refusals: Vec<Refusal>,
-    /// What to do next, the most urgent first.
     pub steps: Vec<String>,
 }
 
@@ -45,7 +43,6 @@ pub(crate) fn verdict(document: &Document) -> Verdict {
     Verdict { banner, cards, refusals, steps }
 }
 
-/// Returns the percentage recovered within the threshold `typed`.
 pub(crate) fn share(row: &Row, typed: &str) -> f64 {
     row.recovered_percent.get(typed).copied().unwrap_or(0.0)
 }
@@ -173,7 +170,6 @@ fn card(document: &Document, scheme: &str) -> Option<Card> {
     })
 }
 
-/// Returns the condition for an attack on this basis, as the title of a finding.
 fn when(basis: Basis, row: &Row) -> String {
     match basis {
         Basis::Released => "Today, from the released data alone".to_owned(),
@@ -227,7 +223,6 @@ fn added(gain: f64) -> String {
     }
 }
 
-/// Returns the lowest break-even ratio of the scheme's attacks.
 fn lowest<'a>(document: &'a Document, scheme: &str, typed: &str) -> Option<&'a BreakEven> {
     let rank = |point: &BreakEven| match (point.bound, point.inlier_ratio) {
         (Bound::BelowTested, ratio) => (0, ratio.unwrap_or(0.0)),

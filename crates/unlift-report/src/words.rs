@@ -61,7 +61,6 @@ pub(crate) fn within(typed: &str, unit: LengthUnit) -> String {
     }
 }
 
-/// Returns the word for what is hidden: points of a map, or keypoints of images.
 pub(crate) fn points(unit: LengthUnit) -> &'static str {
     match unit {
         LengthUnit::Meter | LengthUnit::KthNeighbor => "points",
@@ -88,17 +87,14 @@ fn meters_text(meters: f64) -> String {
     }
 }
 
-/// Returns `value` with three significant digits and thousands grouped.
 fn grouped(value: f64) -> String {
     let text = significant(value, 3);
-    // A value of a thousand or more has no fraction.
     match text.parse::<u64>() {
         Ok(whole) => thousands(whole),
         Err(_) => text,
     }
 }
 
-/// Returns `value` with at most `digits` significant digits and no trailing zeros.
 pub(crate) fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
@@ -107,7 +103,6 @@ pub(crate) fn significant(value: f64, digits: usize) -> String {
     rounded.to_string()
 }
 
-/// Returns a percentage with one decimal.
 pub(crate) fn percent(value: f64) -> String {
     format!("{value:.1}")
 }
@@ -128,7 +123,6 @@ pub(crate) fn if_known(ratio: f64) -> String {
     }
 }
 
-/// Returns `text` with a capital first letter.
 pub(crate) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
@@ -191,7 +185,6 @@ pub(crate) fn seconds(value: f64) -> String {
     format!("{} min {} s", whole / 60, whole % 60)
 }
 
-/// Returns a size in MB or GB, in powers of ten.
 pub(crate) fn bytes(count: u64) -> String {
     let value = count as f64;
     if value < 1e9 {

@@ -183,7 +183,6 @@
     return drawn.said;
   }
 
-  /** Draws one view of a picture. */
   function drawPicture(data, picture, view) {
     const within = data.thresholds[data.headline]?.value ?? 10;
     const say = (id, words) => { document.getElementById(id).textContent = words; };

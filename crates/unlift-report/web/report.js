@@ -58,7 +58,6 @@
       root.dataset.scene = "no-webgl";
       return;
     }
-    // Only rows with points in the page can be chosen.
     const items = data.scene.views.map((one) => ({ ...rows[one.row], ...one, solverName: data.solvers[rows[one.row].solver] }));
     const wide = at("stage").clientWidth >= 620;
     const state = { show: wide ? "all" : "recovered", cameras: false };

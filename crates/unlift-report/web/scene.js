@@ -276,7 +276,6 @@
     }
   }
 
-  /** Draws the legend of the error colors. */
   function ramp(node, scene, unit) {
     const bar = element("i", { style: `background:linear-gradient(90deg,${HIT[0]},${HIT[1]} 50%,${MISS[0]} 50%,${MISS[1]})` });
     const at = (factor) => length(scene.error_unit * factor, unit);

@@ -81,11 +81,9 @@ pub struct Incomparable {
     pub found: String,
 }
 
-/// The origin of a tolerance that the user requested.
 const ASKED: &str = "asked";
 /// Usual largest difference between seeds of one audit, in percentage points.
 const USUAL_TOLERANCE: f64 = 2.0;
-/// The name of the second baseline.
 const RECORDS_ALONE: &str = "records alone";
 
 /// Compares the figures of two audits. Rows match by scheme, source, noise, requested inlier ratio (a measured one is a result),
@@ -181,7 +179,6 @@ fn spread(old: &Document, new: &Document) -> Option<f64> {
     shares.copied().reduce(f64::max)
 }
 
-/// Returns the pairs of equal thresholds, as typed in both audits.
 fn common_thresholds(
     old: &Document,
     new: &Document,
@@ -254,7 +251,6 @@ fn change(scheme: &str, attack: String, typed: &str, (was, is): (f64, f64)) -> C
     }
 }
 
-/// Returns the changes of both baselines of `scheme`, each the largest of its rows.
 fn baselines(
     old: &Document,
     new: &Document,

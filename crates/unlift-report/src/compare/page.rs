@@ -16,13 +16,11 @@ struct Page<'a> {
     style: &'static str,
     comparison: &'a Comparison,
     summary: String,
-    /// Whether both documents are share-safe.
     share_safe: bool,
     audits: [Audit<'a>; 2],
     tables: Vec<Figures>,
 }
 
-/// One of the two audits.
 #[derive(Serialize)]
 struct Audit<'a> {
     which: &'static str,

@@ -40,7 +40,6 @@ pub(super) fn csv(document: &Document, within: &[String]) -> String {
 
 type Figure = fn(&Row) -> Option<f64>;
 
-/// Figures with one value per row.
 const ALWAYS: [(&str, Figure); 7] = [
     ("axis_accuracy_percent", |row| row.axis_accuracy_percent),
     ("exact_percent", |row| row.exact_percent),

@@ -69,7 +69,6 @@ fn place((ratio, percent): (f64, f64)) -> (f64, f64) {
     (LEFT + ratio * (RIGHT - LEFT), BOTTOM - percent / 100.0 * (BOTTOM - TOP))
 }
 
-/// Returns the drawing up to the curves: title, grid and axes.
 fn frame(document: &Document, typed: &str) -> String {
     let unit = document.results.first().map(|row| row.unit);
     let points = unit.map_or("points", words::points);

@@ -6,11 +6,8 @@ use crate::document::Document;
 use crate::tables::{self, percent_cell};
 use crate::{verdict, words};
 
-/// A table of text without markup.
 pub(super) struct Grid {
-    /// A sentence on the meaning of the cells.
     pub caption: String,
-    /// Heads of the columns; the first column contains the schemes.
     pub heads: Vec<String>,
     pub rows: Vec<Vec<String>>,
 }

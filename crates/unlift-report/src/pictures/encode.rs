@@ -13,17 +13,14 @@ const BUDGET_BYTES: usize = 3_600_000;
 const NOT_DRAWN: u16 = u16::MAX;
 const BYTES_PER_POINT: usize = 2 * size_of::<u16>();
 
-/// A picture for the page's script; it refers to blocks by their number.
 #[derive(Debug, serde::Serialize)]
 pub(crate) struct EncodedPicture {
     name: String,
     note: String,
     size: [u32; 2],
     photo: Option<usize>,
-    /// A sentence on the image and its keypoints.
     said: String,
     keypoints: usize,
-    /// Edges shorter than this, in pixels, are drawn as short.
     short_px: f32,
     released: Vec<EncodedMarks>,
     views: Vec<EncodedView>,
@@ -42,16 +39,12 @@ struct EncodedView {
     scheme: String,
     /// The key of the neighborhoods, equal in all pictures.
     given: String,
-    /// The label of the neighborhoods in this picture.
     label: String,
     solver: String,
     block: usize,
-    /// A sentence on the recovered share.
     said: String,
-    /// The recovered share in percent.
     #[serde(skip)]
     share: f64,
-    /// Whether the attacker made the lists.
     #[serde(skip)]
     own: bool,
 }
@@ -59,7 +52,6 @@ struct EncodedView {
 #[derive(Debug, serde::Serialize)]
 struct EncodedGraph {
     given: String,
-    /// A sentence on the share of short edges.
     said: String,
     /// Neighbors per keypoint; shorter lists are padded with points that are not drawn.
     k: usize,

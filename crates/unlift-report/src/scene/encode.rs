@@ -19,10 +19,8 @@ const MAX_SHAPE_POINTS: usize = 6_000;
 const MAX_CAMERAS: usize = 5_000;
 
 const BYTES_PER_POINT: usize = 3 * size_of::<u16>();
-/// A recovered point has a position and one byte of error.
 const BYTES_PER_RECOVERED: usize = BYTES_PER_POINT + 1;
 const BYTES_PER_PATCH: usize = 4 * BYTES_PER_POINT;
-/// Markup around one embedded block.
 const BYTES_PER_BLOCK: usize = 200;
 
 /// The position of a point that is not drawn: lost, not released, or outside the box. Others are 0..=65534.
@@ -42,16 +40,13 @@ pub fn points_within_budget(n_views: usize, n_schemes: usize) -> usize {
     budget.saturating_sub(fixed) / (BYTES_PER_POINT + n_views * BYTES_PER_RECOVERED)
 }
 
-/// The 3D view as the page's script reads it.
 #[derive(Debug, serde::Serialize)]
 pub(crate) struct Encoded {
     pub low: [f32; 3],
     pub high: [f32; 3],
     pub up: [f32; 3],
     pub n_points: u64,
-    /// Number of the map's points in the page.
     pub n_drawn: usize,
-    /// A sentence on the originals that are drawn.
     pub originals_said: String,
     pub n_cameras: usize,
     /// The first viewpoint: a camera of the map.
@@ -70,18 +65,14 @@ pub(crate) struct EncodedShapes {
     pub kind: &'static str,
     pub count: usize,
     pub block: usize,
-    /// A sentence on the shapes that are drawn.
     pub said: String,
 }
 
 #[derive(Debug, serde::Serialize)]
 pub(crate) struct EncodedView {
-    /// The index of the row of the results.
     pub row: usize,
     pub block: usize,
-    /// Number of points that are drawn.
     pub drawn: usize,
-    /// A sentence on the points that are drawn and those that are not.
     pub said: String,
 }
 
@@ -152,7 +143,6 @@ pub(crate) fn encode(scene: &Scene3d, rows: &[Row], error_unit: f32) -> Encoded 
     }
 }
 
-/// Returns the index of the row that `view` shows.
 fn row_of(rows: &[Row], view: &View) -> Option<usize> {
     rows.iter().position(|row| {
         row.scheme == view.scheme
@@ -161,7 +151,6 @@ fn row_of(rows: &[Row], view: &View) -> Option<usize> {
     })
 }
 
-/// Encodes the positions of all points, then one byte of error each.
 fn encode_view(
     bounds: &SceneBox,
     scene: &Scene3d,
@@ -243,13 +232,9 @@ fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
 /// Counts of the points of one pane; each point is counted once.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 struct Fate {
-    /// Points that are drawn.
     drawn: usize,
-    /// Points that the scheme did not release.
     withheld: usize,
-    /// Released points without a position after recovery.
     lost: usize,
-    /// Points outside the box of the drawing.
     outside: usize,
 }
 

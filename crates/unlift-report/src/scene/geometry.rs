@@ -110,7 +110,6 @@ pub fn subsample(n: usize, max: usize, seed: u64) -> Vec<usize> {
     indices
 }
 
-/// Hashes a counter with the mix of SplitMix64.
 fn mix(seed: u64, counter: u64) -> u64 {
     let mut z = seed.wrapping_add(counter.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

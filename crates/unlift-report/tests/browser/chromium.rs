@@ -145,7 +145,6 @@ impl Browser {
         }
     }
 
-    /// Returns the value of a JavaScript expression.
     pub fn evaluate(&mut self, expression: &str) -> Value {
         let params = json!({"expression": expression, "returnByValue": true, "awaitPromise": true});
         let result = self.call("Runtime.evaluate", params);
@@ -199,7 +198,6 @@ impl Browser {
         }
     }
 
-    /// Returns a screenshot of the window as PNG.
     pub fn screenshot(&mut self) -> Vec<u8> {
         let result = self.call("Page.captureScreenshot", json!({"format": "png"}));
         let data = result["data"].as_str().expect("a picture");

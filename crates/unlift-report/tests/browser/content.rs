@@ -6,7 +6,6 @@ use unlift_report::{RenderOptions, render};
 
 use super::{browser, page, page_with_points, sample};
 
-/// Number of drawn charts.
 const CHARTS: &str = "document.querySelectorAll('.chart svg').length";
 
 #[test]
@@ -15,12 +14,10 @@ fn curves_tables_and_canvas_are_there_without_errors_or_network() {
     let page = page_with_points(&sample::document(true), 4_000);
     for width in [1280, 390] {
         browser.open(&page, width);
-        // Folded charts are drawn when they are opened.
         let folded =
             browser.evaluate("document.querySelectorAll('#chart-multiples .chart').length");
         assert_eq!(folded, json!(0));
         browser.unfold();
-        // One overview, one chart per scheme, one of errors, one of certainty.
         assert_eq!(browser.evaluate(CHARTS), json!(10));
         let empty = "[...document.querySelectorAll('.chart')].filter(c => c.querySelectorAll('svg path').length < 10).length";
         assert_eq!(browser.evaluate(empty), json!(0));

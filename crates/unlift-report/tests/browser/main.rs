@@ -23,12 +23,10 @@ fn browser() -> Option<Browser> {
     found.map(|program| Browser::start(&program))
 }
 
-/// Renders the page without a 3D view.
 fn page(document: &Document) -> String {
     render(document, None, &RenderOptions::default()).expect("a page")
 }
 
-/// Renders the page with a 3D view of `n` points.
 fn page_with_points(document: &Document, n: usize) -> String {
     let scene = sample::scene(document, n);
     render(document, Some(&scene), &RenderOptions::default()).expect("a page")

@@ -28,7 +28,6 @@ fn pictures(browser: &mut Browser, (width, colors): (u32, &str)) -> Vec<(Vec<u8>
     pictures
 }
 
-/// Returns width and height of a PNG.
 fn size(picture: &[u8]) -> [u32; 2] {
     assert!(picture.starts_with(b"\x89PNG"));
     [16, 20].map(|at| u32::from_be_bytes(picture[at..at + 4].try_into().expect("four bytes")))

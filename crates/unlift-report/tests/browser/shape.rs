@@ -59,7 +59,6 @@ fn crowded() -> Document {
     document
 }
 
-/// Labels of charts that overlap or are cut.
 const OVERLAPS: &str = "[...document.querySelectorAll('.chart svg')].flatMap(svg => {
     const frame = svg.getBoundingClientRect();
     const texts = [...svg.querySelectorAll('text')].filter(t => t.textContent.trim());
@@ -72,7 +71,6 @@ const OVERLAPS: &str = "[...document.querySelectorAll('.chart svg')].flatMap(svg
     return [...met, ...out];
 })";
 
-/// Elements that reach beyond the page.
 const BEYOND: &str = "[...document.querySelectorAll('main *')]
     .filter(n => !n.closest('.wide') && n.getBoundingClientRect().right > document.documentElement.clientWidth + 1)
     .map(n => `${n.tagName}.${n.className?.baseVal ?? n.className}: ${n.textContent.slice(0, 60)}`)";

@@ -81,11 +81,9 @@ fn the_verdict_leads_with_the_strongest_attack_from_the_released_data() {
 #[test]
 fn the_verdict_names_the_strongest_attack_of_today() {
     let text = verdict(&sample::mixed(true));
-    // The strongest attack on PPL is by overlap and stronger than the records alone.
     let by =
         "41.0 % neighbors by descriptor overlap, 35 listed, 8.2 % of them right, solver consensus";
     assert!(text.contains(by), "{text}");
-    // The gain counts from the larger baseline, per source.
     assert!(
         text.contains(
             "A blind guess recovers 1.2 %, the released records alone 7.3 %. Lists of neighbors add 33.7 percentage points \
@@ -93,7 +91,6 @@ fn the_verdict_names_the_strongest_attack_of_today() {
         ),
         "{text}"
     );
-    // Attacks from the released data decide the order, not the oracle.
     let (olc, plane) = (text.find("OLC Random lines"), text.find("PLANE Axis-aligned planes"));
     assert!(olc < plane && plane.is_some());
     assert!(text.contains(

@@ -9,7 +9,6 @@ use unlift_report::pictures::{Graph, Marks, Picture, RecoveredView, ReleasedView
 
 use super::{document, unit_random};
 
-/// Returns an audit of two images under two schemes.
 pub fn images() -> Document {
     let mut document = document(true);
     let by_threshold = |values: [f64; 4]| -> IndexMap<String, f64> {
