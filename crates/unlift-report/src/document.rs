@@ -40,11 +40,10 @@ pub struct Document {
     pub seed: u64,
     /// The figures, one row per combination that was tried.
     pub results: Vec<Row>,
-    /// Schemes and sources that could not be audited, with the reason. Their figures are unknown and must not
-    /// look like small ones.
+    /// Schemes and sources that could not be audited; their figures must not look like small ones.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub not_audited: Vec<NotAudited>,
-    /// Notes that readers of the figures need: only a part of the map was audited, unusual lengths, empty lists.
+    /// Notes for readers of the figures: only a part of the map was audited, unusual lengths, empty lists.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
     /// The smallest inlier ratio at which half of the points come back, per scheme, noise and solver.
@@ -52,10 +51,10 @@ pub struct Document {
     /// The user's gates and their results; empty if there were none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub gates: Vec<GateResult>,
-    /// Every image that was used, in the order of names; empty for maps.
+    /// Every used image, in the order of names; empty for maps.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub images: Vec<ImageFigures>,
-    /// Every tile of a large map, in the order in which the map was cut; empty for other audits.
+    /// Every tile of a large map, in the order of cutting; empty for other audits.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tiles: Vec<TileFigures>,
     /// The data that differ between runs.
@@ -67,13 +66,12 @@ pub struct Document {
 pub struct Input {
     /// Path of the map, as typed; `None` in a share-safe document.
     pub path: Option<String>,
-    /// SHA-256 over the map's files, in lowercase hexadecimal; `None` in a share-safe document, because a hash
-    /// confirms a guess of the map.
+    /// SHA-256 over the map's files, in lowercase hexadecimal; `None` in a share-safe document.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sha256: Option<String>,
     /// Points read from the map, before a scheme drops some.
     pub n_points: u64,
-    /// Meters per map unit, as declared by the user; `None` without a declared scale.
+    /// Declared scale in meters per map unit, if any.
     pub scale_m_per_unit: Option<f64>,
     /// Length of one unit of this document in the map's own units: `1 / scale` with a scale, else
     /// the median distance to the K-th nearest neighbor.
@@ -92,7 +90,7 @@ pub struct Input {
 pub struct NotAudited {
     /// The scheme's user-facing name.
     pub scheme: String,
-    /// The source that made no lists, as in [`Row::neighbors`]; absent if the scheme cannot be applied and has no row.
+    /// The source, as in [`Row::neighbors`]; absent if the whole scheme has no row.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub neighbors: Option<String>,
     /// The reason: what was expected and what was found.
@@ -131,7 +129,7 @@ pub struct Row {
     pub k: u32,
     /// `joint`, `joint-start`, `consensus`, `ransac`, `density` or `tomography`.
     pub solver: String,
-    /// The distance within which a listed record supports a position, in `unit`; `None` if it was chosen per point.
+    /// Delta in `unit`; `None` if it was chosen per point.
     pub delta: Option<f64>,
     /// The unit of all lengths in this row.
     pub unit: LengthUnit,
@@ -145,20 +143,18 @@ pub struct Row {
     pub dropped: ByReason,
     /// Percent of the released points recovered within each threshold.
     pub recovered_percent: ByThreshold,
-    /// Percent recovered by a blind guess, from one record at a time and without neighborhoods.
+    /// Percent recovered by a blind guess from one record at a time.
     pub blind_percent: ByThreshold,
-    /// Percent recovered by the best attack on the released records alone, without neighborhoods and descriptors; the
-    /// best per threshold. Equal in all rows of a scheme; absent without such an attack. Neighborhoods add what exceeds
-    /// [`Row::baseline_percent`].
+    /// Percent recovered by the best attack on the released records alone, per threshold; equal in all rows of a
+    /// scheme, absent without such an attack.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub records_alone_percent: Option<ByThreshold>,
-    /// The attack behind `records_alone_percent`, by threshold: `tomography`, `density` or `geometric, joint`; has the
-    /// same keys and is absent with it.
+    /// The attack behind `records_alone_percent`, with the same keys: `tomography`, `density` or `geometric, joint`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub records_alone_by: Option<IndexMap<String, String>>,
     /// Percent of points whose swapped axis was identified correctly (`cp` only).
     pub axis_accuracy_percent: Option<f64>,
-    /// Percent of points recovered exactly: each coordinate equals the published value (`cp`, `cp2d` only).
+    /// Percent of points whose coordinates all equal the published values (`cp`, `cp2d` only).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exact_percent: Option<f64>,
     /// Percent of descriptors assigned to the right point of their line (`ppl`, `ppl+` only).
@@ -166,22 +162,21 @@ pub struct Row {
     /// Figures of added measures, by name; each has its own unit.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub metrics: IndexMap<String, f64>,
-    /// Median error over the released points, in `unit`. Lost points count as infinitely far, so it is
-    /// `None` if half of the points or more are lost.
+    /// Median error over the released points, in `unit`; lost points count as infinitely far, and `None` is infinite.
     pub median_error: Option<f64>,
     /// Median error of a blind guess; absent in documents of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blind_median_error: Option<f64>,
-    /// Percentiles of the error by number (`50`, `75`, `90`, `95`, `99`), counted as in `median_error`.
+    /// Percentiles (`50`, `75`, `90`, `95`, `99`) of the error, as in `median_error`.
     pub error_percentiles: IndexMap<String, Option<f64>>,
-    /// Percent of the released points that are within the smallest threshold with a probability of at least
-    /// 90 %, by the attacker's own estimate; `None` if unknown.
+    /// Percent of the released points that the attacker estimates to be within the smallest threshold with a
+    /// probability of at least 90 %; `None` if unknown.
     #[serde(default)]
     pub sure_percent: Option<f64>,
     /// Why `sure_percent` is not known; absent if it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sure_unknown: Option<String>,
-    /// Percent of the sure points that are within the smallest threshold; absent without sure points.
+    /// Percent of these points that are within the smallest threshold; absent without such points.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sure_correct_percent: Option<f64>,
     /// Ten bins of the attacker's estimated probability, from 0 to 1, over recovered points.
@@ -268,9 +263,9 @@ pub struct GateResult {
     pub of: Option<String>,
     /// The bound of the figure.
     pub bound_percent: f64,
-    /// Whether every figure keeps the bound; `false` if a figure of the gate is unknown.
+    /// Whether every figure is known and keeps the bound.
     pub passed: bool,
-    /// Why the gate failed although no figure exceeds the bound, for example because something was not audited.
+    /// Why the gate failed although no figure exceeds the bound, for example what was not audited.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
 }
@@ -283,7 +278,7 @@ pub struct Run {
     pub command: Option<String>,
     /// Worker threads.
     pub threads: u32,
-    /// Peak resident memory of the process; `None` if the system does not report it.
+    /// Peak resident memory of the process, if known.
     pub peak_memory_bytes: Option<u64>,
     /// Wall time.
     pub seconds: Seconds,
@@ -306,7 +301,7 @@ pub struct Seconds {
 pub struct ImageCounts {
     /// Images in the folder or file.
     pub found: u64,
-    /// Images that were used; the others were left out by choice or could not be used.
+    /// Images that were used, neither left out by choice nor unusable.
     pub used: u64,
     /// Images that could not be used; stderr had the reasons.
     pub unusable: u64,
@@ -400,7 +395,7 @@ impl Document {
     /// [`Error::Invalid`] if a rule of the format is broken.
     pub fn from_json(text: &str) -> Result<Self, Error> {
         let value: serde_json::Value = serde_json::from_str(text)?;
-        // The schema is checked first, because a later schema would fail with an unclear error about a missing field.
+        // A later schema would fail with an unclear error about a missing field.
         if let Some(found) = value.get("schema").and_then(serde_json::Value::as_u64)
             && found != u64::from(SCHEMA)
         {
