@@ -1,10 +1,10 @@
-//! Renders a made-up audit of a made-up room, to look at the page while working on it.
+//! Renders a synthetic audit of a synthetic room, for a look at the page during work on it.
 //!
 //! ```text
 //! cargo run -p unlift-report --example sample_report -- report.html [--mixed] [--no-scale] [--share-safe]
 //! ```
 //!
-//! No figure in it was measured.
+//! No figure of it was measured.
 
 #[path = "../tests/sample/mod.rs"]
 mod sample;

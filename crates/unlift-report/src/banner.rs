@@ -1,4 +1,4 @@
-//! The first lines of a page and of the terminal: how bad it is, by which attack, and what to do next.
+//! The first lines of the page and of the terminal: the severity, the strongest attack, and the next steps.
 
 use serde::Serialize;
 
@@ -7,21 +7,20 @@ use crate::cards::{Card, Finding, Level, Refusal};
 use crate::document::{Document, LengthUnit, Row};
 use crate::{tables, words};
 
-/// The verdict on a whole audit in three lines.
+/// The verdict on a whole audit in a few lines.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Banner {
     pub level: Level,
     /// "Not protected."
     pub headline: String,
-    /// Who recovers how much from what.
+    /// What the strongest attack recovers, and from which data.
     pub sentence: String,
-    /// What known neighbors would give away under every scheme: a scheme that is not named above is not fine.
+    /// What known neighbors would give away under every scheme, so that schemes not named above do not look
+    /// fine.
     pub every: Option<String>,
-    /// What is not known, if anything.
     pub unknown: Option<String>,
 }
 
-/// The banner of `document`, whose schemes `cards` judge, the worst first.
 pub(crate) fn banner(document: &Document, cards: &[Card], refusals: &[Refusal]) -> Banner {
     let names: Vec<String> = refusals.iter().map(|one| one.scheme.to_uppercase()).collect();
     let unknown = (!refusals.is_empty())
@@ -33,10 +32,10 @@ pub(crate) fn banner(document: &Document, cards: &[Card], refusals: &[Refusal]) 
             let level = Level::of(found.1.recovered);
             (level, headline(level, cards), said(document, found))
         }
-        // Untested is not harmless: what known neighbors would give away decides the color.
+        // An untested attack may succeed, so known neighbors decide the color.
         (None, Some(found)) => {
             let level = Level::of(found.1.recovered).min(Level::Orange);
-            let headline = "Not tested: what an attacker gets from the released data alone.";
+            let headline = "Not tested: what an attacker recovers from the released data alone.";
             (level, headline.to_owned(), said(document, found))
         }
         (None, None) => {
@@ -47,7 +46,7 @@ pub(crate) fn banner(document: &Document, cards: &[Card], refusals: &[Refusal]) 
     Banner { level, headline, sentence, every: every(cards), unknown }
 }
 
-/// What all schemes give back if neighbors were known, of several that were tried so.
+/// Returns a sentence on what every scheme would give back with known neighbors, if several were tried so.
 fn every(cards: &[Card]) -> Option<String> {
     let known: Option<Vec<&Finding>> =
         cards.iter().map(|card| card.finding(Basis::Oracle)).collect();
@@ -57,10 +56,8 @@ fn every(cards: &[Card]) -> Option<String> {
     Some(format!("{when}, every scheme tried would give back {percent} % or more."))
 }
 
-/// The card and finding of this basis with the largest share.
 fn worst(cards: &[Card], basis: Basis) -> Option<(&Card, &Finding)> {
     let found = cards.iter().filter_map(|card| Some((card, card.finding(basis)?)));
-    // Of equal ones the first.
     found.reduce(|a, b| if b.1.recovered > a.1.recovered { b } else { a })
 }
 
@@ -93,7 +90,7 @@ fn said(document: &Document, (card, finding): (&Card, &Finding)) -> String {
         Basis::Released => {
             format!("An attacker recovers {what} today, from the released data alone ({by}).")
         }
-        Basis::Given => format!("An attacker recovers {what} with the given neighbors ({by})."),
+        Basis::Given => format!("An attacker recovers {what} with given neighbors ({by})."),
         Basis::Oracle => {
             let known = finding.when.to_lowercase();
             format!("An attacker would recover {what} {known} ({by}).")
@@ -101,10 +98,9 @@ fn said(document: &Document, (card, finding): (&Card, &Finding)) -> String {
     }
 }
 
-/// Sources that read descriptors.
 const BY_DESCRIPTORS: [&str; 4] = ["similarity", "overlap", "descriptors", "learned"];
 
-/// What to do next, the most urgent first. Options of the command line stand in back quotes.
+/// Returns the next steps, the most urgent first. Options of the command line are in back quotes.
 pub(crate) fn next_steps(document: &Document, cards: &[Card]) -> Vec<String> {
     let images = document.results.first().is_some_and(|row| row.unit == LengthUnit::Pixel);
     let tried = |name: &str| document.results.iter().any(|row| row.neighbors.contains(name));
@@ -117,8 +113,8 @@ pub(crate) fn next_steps(document: &Document, cards: &[Card]) -> Vec<String> {
             false => "`--descriptors FILE --neighbors descriptors`",
         };
         steps.push(format!(
-            "Try the stronger attack: add {options}. Descriptors tell an attacker which {} are \
-             neighbors, and no attack here has used them.",
+            "Try the stronger attack: add {options}. Descriptors show an attacker which {} are \
+             neighbors, and no attack here used them.",
             if images { "keypoints" } else { "points" }
         ));
     } else if !tried("learned") {
@@ -140,7 +136,7 @@ pub(crate) fn next_steps(document: &Document, cards: &[Card]) -> Vec<String> {
     if document.gates.is_empty() {
         let typed = tables::headline_threshold(document).unwrap_or_default();
         steps.push(format!(
-            "Watch it in your build: `--gate 'all@0.5:{typed}<=20'` fails when more than 20 % \
+            "Test it in your build: `--gate 'all@0.5:{typed}<=20'` fails if more than 20 % \
              comes back."
         ));
     }
@@ -151,7 +147,6 @@ fn has_pictures(row: &Row) -> bool {
     row.metrics.contains_key("ssim")
 }
 
-/// The scheme that leaks least, of several.
 fn least(cards: &[Card]) -> Option<String> {
     let share = |card: &Card| card.today().or(card.finding(Basis::Oracle).map(|f| f.recovered));
     let known = cards.iter().filter(|card| card.today().is_some()).count();

@@ -1,14 +1,14 @@
-//! The verdict on one scheme, as it stands on the page.
+//! The verdict on one scheme: a card of the page.
 
 use serde::Serialize;
 
 use crate::attack::Basis;
 
-/// How bad a share of recovered points is. Color on the page means this and nothing else.
+/// The severity of a share of recovered points. It alone decides colors on the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Level {
-    /// Less than a fifth came back by the attacks tried. There is no green: another attack may get more.
+    /// Less than a fifth came back. There is no green, because another attack may recover more.
     Gray,
     /// A fifth or more came back.
     Orange,
@@ -17,7 +17,6 @@ pub(crate) enum Level {
 }
 
 impl Level {
-    /// The level of `percent` of the points.
     pub(crate) fn of(percent: f64) -> Self {
         match percent {
             50.0.. => Self::Red,
@@ -33,39 +32,33 @@ pub(crate) struct Card {
     pub scheme: String,
     pub title: String,
     pub rule: &'static str,
-    /// What came back by kind of attack: today, with given lists, with the oracle's; those that ran.
+    /// One finding per kind of attack that ran: from released data alone, with given lists, with known
+    /// neighbors.
     pub findings: Vec<Finding>,
-    /// What an attacker gets without neighborhoods, and what neighborhoods add to that.
     pub baselines: String,
     pub break_even: Option<String>,
     /// Whether no attack from the released data alone was tried on this scheme.
     pub untried_today: bool,
-    /// Sources that could not be tried on the scheme, with the reason.
+    /// A sentence per source that could not be tried on the scheme, with the reason.
     pub refused: Vec<String>,
 }
 
-/// What the strongest attack of one kind got back.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Finding {
     #[serde(skip)]
     pub basis: Basis,
     /// "Today, from the released data alone".
     pub when: String,
-    /// Percent within the headline threshold.
     pub recovered: f64,
-    /// The percentage as every table says it: one decimal.
     pub percent: String,
     pub level: Level,
-    /// The attack: "overlap, 35 listed, 11 % of them true, joint".
+    /// The attack: "neighbors by descriptor overlap, 35 listed, 11 % of them right, solver joint".
     pub by: String,
-    /// The attack in a word or two: "overlap neighbors".
     #[serde(skip)]
     pub briefly: String,
-    /// Percent of an attacker without neighborhoods: the larger baseline.
     pub floor: f64,
 }
 
-/// A scheme that could not be audited, and why.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Refusal {
     pub scheme: String,
@@ -78,12 +71,13 @@ impl Card {
         self.findings.iter().find(|finding| finding.basis == basis)
     }
 
-    /// Percent that came back from the released data alone, where that was tried.
+    /// Returns the percentage recovered from the released data alone; `None` if that was not tried.
     pub(crate) fn today(&self) -> Option<f64> {
         self.finding(Basis::Released).map(|finding| finding.recovered)
     }
 
-    /// Orders cards: today's share first; schemes without one come after those with one.
+    /// Returns the sort key of a card: the share from released data alone, then the larger other share;
+    /// -1 if not tried.
     pub(crate) fn badness(&self) -> (f64, f64) {
         let share = |basis| self.finding(basis).map_or(-1.0, |finding| finding.recovered);
         (share(Basis::Released), share(Basis::Oracle).max(share(Basis::Given)))

@@ -1,4 +1,4 @@
-//! The rules of `audit.json` that its types cannot say.
+//! The rules of `audit.json` that its types cannot express.
 
 use crate::Error;
 use crate::document::{ByThreshold, Document, ImageFigures, Row, SCHEMA, TileFigures};
@@ -10,7 +10,7 @@ impl Document {
     ///
     /// # Errors
     ///
-    /// [`Error::Invalid`] with the place of the first broken rule.
+    /// [`Error::Invalid`] with the place of the first broken rule, or [`Error::Schema`].
     pub fn check(&self) -> Result<(), Error> {
         if self.schema != SCHEMA {
             return Err(Error::Schema { expected: SCHEMA, found: self.schema.into() });
@@ -109,7 +109,7 @@ fn check_row(place: &str, row: &Row) -> Result<(), Error> {
         return Err(invalid(format!("{place}.sure_percent"), expected, sure.to_string()));
     }
     let lost: u64 = row.lost.values().sum();
-    // With repeats each count is a rounded mean, and rounded parts need not add up.
+    // With repeats each count is a rounded mean, so the sum may differ.
     if row.repeats == 1 && lost != row.n_lost {
         let expected = format!("a sum of {}", row.n_lost);
         return Err(invalid(format!("{place}.lost"), expected, lost.to_string()));
@@ -146,7 +146,8 @@ fn check_row(place: &str, row: &Row) -> Result<(), Error> {
     Ok(())
 }
 
-/// Two maps with the same keys as the recovered percentages, or neither.
+/// Checks that both fields of the records alone have the keys of the recovered percentages, or are
+/// absent.
 fn check_records_alone(place: &str, row: &Row) -> Result<(), Error> {
     let keys =
         |keys: &mut dyn Iterator<Item = &String>| keys.cloned().collect::<Vec<_>>().join(", ");

@@ -1,5 +1,5 @@
-//! What a reader of the page can choose: scheme, neighborhoods, solver. One list of each for every
-//! chart and for the 3D view; a row of the results is a place in each list.
+//! The choices of the page's menus: scheme, neighborhoods, solver. All charts and the 3D view share one
+//! list of each. A row of the results has a place in each list.
 
 use std::collections::HashSet;
 
@@ -9,13 +9,14 @@ use crate::attack::{self, Basis, Given};
 use crate::document::{Document, LengthUnit, Row};
 use crate::{tables, verdict, words};
 
-/// The lists. A row is found by its place in them and by nothing else.
+/// The lists of choices. The script finds a row only by its places in them.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub(crate) struct Choices {
     pub schemes: Vec<SchemeChoice>,
     pub givens: Vec<GivenChoice>,
     pub solvers: Vec<String>,
-    /// The neighborhoods that are shown first: what an attacker has today, else half right.
+    /// The neighborhoods that are shown first: those of today's strongest attack, else known neighbors,
+    /// half of them right.
     pub first_given: usize,
 }
 
@@ -23,26 +24,24 @@ pub(crate) struct Choices {
 pub(crate) struct SchemeChoice {
     pub name: String,
     pub title: String,
-    /// Its color and mark.
     pub slot: usize,
-    /// Percent of an attacker who guesses, per threshold.
     pub blind: Vec<Option<f64>>,
-    /// Percent by the records alone, per threshold; nothing where that was not tried.
+    /// Percent by the records alone, per threshold; `None` where that was not tried.
     pub alone: Vec<Option<f64>>,
-    /// What that attack is called.
     pub alone_by: String,
-    /// The larger of both, per threshold: what exceeds it is what neighborhoods give away.
+    /// The larger of the two baselines, per threshold; neighborhoods add what exceeds it.
     pub floor: Vec<Option<f64>>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct GivenChoice {
-    /// `oracle, 50 % true neighbors`, `overlap, 9 to 12 % true neighbors`.
+    /// `known neighbors, 50 % right`, `neighbors by descriptor overlap, 9 to 12 % right`.
     pub label: String,
-    /// `released`, `given`, `oracle` or `reference` (no attack): the groups of a menu.
+    /// The group in a menu: `released`, `given`, `oracle` or `reference` (no attack).
     pub group: &'static str,
-    /// Whose neighborhoods: the curve on which the oracle's ratios lie, the mark of other sources.
+    /// The source: one curve of the oracle's ratios, or one mark of another source.
     pub source: String,
+    pub name: String,
     #[serde(skip)]
     pub given: Given,
 }
@@ -63,7 +62,7 @@ impl Choices {
                 choices.givens.push(given_choice(document, row));
             }
         }
-        // By falling ratio within a source of the oracle; the order of sources stays.
+        // Sorts by falling ratio within a source and keeps the order of sources.
         let sources: Vec<String> =
             choices.givens.iter().map(|given| given.source.clone()).collect();
         let turn = |given: &GivenChoice| sources.iter().position(|source| *source == given.source);
@@ -74,7 +73,6 @@ impl Choices {
         choices
     }
 
-    /// The place of a row's neighborhoods.
     pub(crate) fn given(&self, given: &Given) -> Option<usize> {
         self.givens.iter().position(|known| known.given.same_choice(given))
     }
@@ -118,7 +116,7 @@ fn group(row: &Row) -> &'static str {
     }
 }
 
-/// One entry for all rows with these neighborhoods; measured ratios become a range.
+/// Returns one entry for all rows with these neighborhoods; their measured ratios become a range.
 fn given_choice(document: &Document, row: &Row) -> GivenChoice {
     let given = Given::of(row);
     let same = document.results.iter().filter(|other| Given::of(other).same_choice(&given));
@@ -126,16 +124,17 @@ fn given_choice(document: &Document, row: &Row) -> GivenChoice {
     let low = ratios.iter().copied().fold(f64::INFINITY, f64::min);
     let high = ratios.iter().copied().fold(0.0, f64::max);
     let source = attack::source(&row.neighbors, row.oracle_noise.as_deref());
+    let name = attack::plain_source(&row.neighbors, row.oracle_noise.as_deref());
     let said = [low, high].map(words::ratio_percent);
     let label = match said[0] == said[1] {
         true => given.label(),
-        false => format!("{source}, {} to {} % true neighbors", said[0], said[1]),
+        false => format!("{name}, {} to {} % right", said[0], said[1]),
     };
-    GivenChoice { label, group: group(row), source, given }
+    GivenChoice { label, group: group(row), source, name, given }
 }
 
-/// Today's attack comes first: of the attacker's own sources the one that gets most; without one the
-/// oracle nearest to half.
+/// Returns the place of the neighborhoods that are shown first: of the attacker's own sources the one that
+/// recovers most; without one, the oracle whose ratio is nearest to half.
 fn first_given(document: &Document, givens: &[GivenChoice]) -> usize {
     let typed = tables::headline_threshold(document).unwrap_or_default();
     let share = |row: &Row| verdict::share(row, &typed);
@@ -152,7 +151,6 @@ fn first_given(document: &Document, givens: &[GivenChoice]) -> usize {
     place.unwrap_or(0)
 }
 
-/// What stands behind a length in charts: `2.5×` is so many times the usual distance to the K-th neighbor.
 pub(crate) fn unit_sign(unit: Option<LengthUnit>) -> &'static str {
     match unit {
         Some(LengthUnit::KthNeighbor) => "×",
@@ -161,14 +159,11 @@ pub(crate) fn unit_sign(unit: Option<LengthUnit>) -> &'static str {
     }
 }
 
-/// Schemes with a color and a mark of their own, the same on every page.
 const KNOWN_SCHEMES: [&str; 7] = ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp"];
-/// Colors and marks there are; further schemes reuse them in turn.
 const SLOTS: usize = 8;
 
-/// The color and mark of `scheme`; unknown ones take turns in the order they appear.
+/// Returns the number of the color and mark of `scheme`; unknown schemes are numbered as they appear.
 fn slot(document: &Document, scheme: &str) -> usize {
-    // Schemes for images have the color of the scheme for maps that they are most like.
     let known = match scheme {
         "lines2d" => "olc",
         "cp2d" => "cp",

@@ -1,8 +1,8 @@
 //! The structs of `audit.json`, schema 1.
 //!
-//! One row per (scheme, neighbors, oracle noise, inlier ratio, K, solver). Whatever differs from
-//! run to run (seconds, memory, threads, paths on this machine) stands in [`Run`] and nowhere
-//! else, so `results` are the same bytes for the same input, options and seed.
+//! `results` has one row per (scheme, neighbors, oracle noise, inlier ratio, K, solver). Only [`Run`]
+//! holds what differs between runs (seconds, memory, threads, command line), so `results` are
+//! byte-identical for the same input, options and seed.
 
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
@@ -13,68 +13,65 @@ use crate::round::round_floats;
 pub use crate::round::SIGNIFICANT_DIGITS;
 pub use crate::tiles::TileFigures;
 
-/// The schema this build writes and reads.
+/// The schema that this build writes and reads.
 pub const SCHEMA: u32 = 1;
 
-/// Threshold, as the user typed it, to a number of percent; in the order typed.
+/// Percentages by threshold, as typed by the user and in that order.
 pub type ByThreshold = IndexMap<String, f64>;
 
-/// Stands for a solver's name in [`BreakEven::solver`]: at every inlier ratio the attack that got most.
+/// The value of [`BreakEven::solver`] for the strongest attack at every inlier ratio.
 pub const STRONGEST: &str = "strongest";
 
-/// Reason to a number of points.
+/// Numbers of points by reason.
 pub type ByReason = IndexMap<String, u64>;
 
-/// A whole audit: what `audit.json` holds.
+/// A whole audit: the content of `audit.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Document {
     /// Version of the program that wrote the document.
     pub unlift: String,
     /// Version of the format, [`SCHEMA`].
     pub schema: u32,
-    /// What was audited.
+    /// The audited input.
     pub input: Input,
-    /// The options that decide the results, by their long name without dashes.
+    /// The options that decide the results, by their long names without dashes.
     pub options: serde_json::Map<String, serde_json::Value>,
-    /// The integer all randomness came from.
+    /// The random seed.
     pub seed: u64,
     /// The figures, one row per combination that was tried.
     pub results: Vec<Row>,
-    /// What was to be audited and could not be, with the reason; empty when everything was. No figure
-    /// of such a scheme is known: it must never read as a small one.
+    /// Schemes and sources that could not be audited; their figures must not look like small ones.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub not_audited: Vec<NotAudited>,
-    /// What whoever reads the figures must know of how they came to be: only a part of the map, unusual lengths, lists
-    /// that name nobody.
+    /// Notes for readers of the figures: only a part of the map was audited, unusual lengths, empty lists.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
     /// The smallest inlier ratio at which half of the points come back, per scheme, noise and solver.
     pub break_even: Vec<BreakEven>,
-    /// The user's gates and how they ended; empty when none was given.
+    /// The user's gates and their results; empty if there were none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub gates: Vec<GateResult>,
-    /// Audits of images: every image that was used, in the order of names; empty for maps.
+    /// Every used image, in the order of names; empty for maps.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub images: Vec<ImageFigures>,
-    /// Audits of a large map in tiles: every tile, in the order in which the map was cut; empty for others.
+    /// Every tile of a large map, in the order of cutting; empty for other audits.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tiles: Vec<TileFigures>,
-    /// What varies from run to run.
+    /// The data that differ between runs.
     pub run: Run,
 }
 
-/// What was audited.
+/// The audited input.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Input {
-    /// The map as the user named it; `None` in a share-safe document.
+    /// Path of the map, as typed; `None` in a share-safe document.
     pub path: Option<String>,
-    /// SHA-256 over the map's files, in lowercase hexadecimal; `None` in a share-safe document: whoever guesses the
-    /// map could confirm it.
+    /// SHA-256 over the map's files, in lowercase hexadecimal; `None` in a share-safe document.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sha256: Option<String>,
-    /// Points read from the map, before any scheme dropped some.
+    /// Points read from the map, before a scheme drops some.
     pub n_points: u64,
-    /// Meters per map unit, as declared by the user; `None` when no scale was declared.
+    /// Declared scale in meters per map unit, if any.
     pub scale_m_per_unit: Option<f64>,
     /// Length of one unit of this document in the map's own units: `1 / scale` with a scale, else
     /// the median distance to the K-th nearest neighbor.
@@ -83,7 +80,7 @@ pub struct Input {
     /// SHA-256 of further files that were read, by role (`descriptors`, `neighbors`).
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub other_sha256: IndexMap<String, String>,
-    /// How many images there were; `None` for maps.
+    /// Counts of images; `None` for maps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub images: Option<ImageCounts>,
 }
@@ -93,11 +90,10 @@ pub struct Input {
 pub struct NotAudited {
     /// The scheme's user-facing name.
     pub scheme: String,
-    /// The source without lists, as [`Row::neighbors`]; absent when the scheme itself cannot be applied,
-    /// and so has no row at all.
+    /// The source, as in [`Row::neighbors`]; absent if the whole scheme has no row.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub neighbors: Option<String>,
-    /// Why, in plain words: what was expected and what was found.
+    /// The reason: what was expected and what was found.
     pub reason: String,
 }
 
@@ -110,7 +106,7 @@ pub enum LengthUnit {
     /// The median distance of an original to its K-th nearest neighbor; used without a scale.
     #[serde(rename = "kth_neighbor")]
     KthNeighbor,
-    /// Pixels of the image: audits of images.
+    /// Pixels; used for audits of images.
     #[serde(rename = "px")]
     Pixel,
 }
@@ -122,10 +118,10 @@ pub enum LengthUnit {
 pub struct Row {
     /// The scheme's user-facing name, for example `ppl+`.
     pub scheme: String,
-    /// Where the neighborhoods came from: `oracle`, `file`, or the name of a source.
+    /// The source of the neighborhoods: `oracle`, `file`, or the name of a source.
     pub neighbors: String,
-    /// How the oracle chose the false neighbors: `uniform`, `near` or `clustered`; `None` without
-    /// an oracle.
+    /// How the oracle chose the wrong neighbors: `uniform`, `near` or `clustered`; `None` for other
+    /// sources.
     pub oracle_noise: Option<String>,
     /// Share of true neighbors: as requested for the oracle, measured for other sources.
     pub inlier_ratio: f64,
@@ -133,82 +129,79 @@ pub struct Row {
     pub k: u32,
     /// `joint`, `joint-start`, `consensus`, `ransac`, `density` or `tomography`.
     pub solver: String,
-    /// The distance that decided support, in `unit`; `None` when it was chosen per point.
+    /// Delta in `unit`; `None` if it was chosen per point.
     pub delta: Option<f64>,
     /// The unit of all lengths in this row.
     pub unit: LengthUnit,
-    /// Points released under the scheme: the base of all percentages.
+    /// Points released under the scheme, the base of all percentages.
     pub n_points: u64,
     /// Released points without a position after recovery; they count as misses.
     pub n_lost: u64,
     /// `n_lost` by reason.
     pub lost: ByReason,
-    /// Points the scheme's rule did not release, by reason.
+    /// Points that the scheme did not release, by reason.
     pub dropped: ByReason,
     /// Percent of the released points recovered within each threshold.
     pub recovered_percent: ByThreshold,
-    /// The same for a blind guess: no neighborhoods, and no look at more than one record.
+    /// Percent recovered by a blind guess from one record at a time.
     pub blind_percent: ByThreshold,
-    /// The same for the best of our attacks that need the released records alone, neither neighborhoods nor
-    /// descriptors; per threshold the best. The same in all rows of a scheme; absent where there is no
-    /// such attack. What neighborhoods add is what exceeds [`Row::baseline_percent`].
+    /// Percent recovered by the best attack on the released records alone, per threshold; equal in all rows of a
+    /// scheme, absent without such an attack.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub records_alone_percent: Option<ByThreshold>,
-    /// Which attack that was, by threshold: `tomography`, `density` or `geometric, joint`; has the keys of
-    /// `records_alone_percent` and is absent with it.
+    /// The attack behind `records_alone_percent`, with the same keys: `tomography`, `density` or `geometric, joint`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub records_alone_by: Option<IndexMap<String, String>>,
-    /// Percent of points whose swapped axis was told correctly (`cp` only).
+    /// Percent of points whose swapped axis was identified correctly (`cp` only).
     pub axis_accuracy_percent: Option<f64>,
-    /// Percent of points recovered exactly: every coordinate is the original's as published (`cp`, `cp2d` only).
+    /// Percent of points whose coordinates all equal the published values (`cp`, `cp2d` only).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exact_percent: Option<f64>,
     /// Percent of descriptors assigned to the right point of their line (`ppl`, `ppl+` only).
     pub assignment_accuracy_percent: Option<f64>,
-    /// Figures of measures that whoever planned the audit added, by name; each in a unit of its own.
+    /// Figures of added measures, by name; each has its own unit.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub metrics: IndexMap<String, f64>,
-    /// Median error over the released points, in `unit`; lost points count as infinitely far, so
-    /// `None` when half of them or more are lost.
+    /// Median error over the released points, in `unit`; lost points count as infinitely far, and `None` is infinite.
     pub median_error: Option<f64>,
-    /// The same of an attacker without neighborhoods; absent in documents of earlier versions.
+    /// Median error of a blind guess; absent in documents of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blind_median_error: Option<f64>,
-    /// Percentiles of the error by their number (`50`, `75`, `90`, `95`, `99`), as `median_error`.
+    /// Percentiles (`50`, `75`, `90`, `95`, `99`) of the error, as in `median_error`.
     pub error_percentiles: IndexMap<String, Option<f64>>,
-    /// Percent of the released points that the attacker is 90 % sure to have within the smallest
-    /// threshold, from its own data alone; `None` where that is not known.
+    /// Percent of the released points that the attacker estimates to be within the smallest threshold with a
+    /// probability of at least 90 %; `None` if unknown.
     #[serde(default)]
     pub sure_percent: Option<f64>,
-    /// Why `sure_percent` is not known here, in plain words; absent where it is.
+    /// Why `sure_percent` is not known; absent if it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sure_unknown: Option<String>,
-    /// Percent of those that are within it; absent without any.
+    /// Percent of these points that are within the smallest threshold; absent without such points.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sure_correct_percent: Option<f64>,
-    /// Ten bins of the probability that the attacker states, from 0 to 1, over recovered points.
+    /// Ten bins of the attacker's estimated probability, from 0 to 1, over recovered points.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reliability: Option<Vec<ReliabilityBin>>,
-    /// RANSAC's trials per point: (largest number of trials in the bin, points in it).
+    /// Histogram of RANSAC's trials per point: (largest number of trials in the bin, points in it).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ransac_trials: Option<Vec<(u64, u64)>>,
-    /// Runs with different seeds behind this row.
+    /// Number of runs with different seeds.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub repeats: u32,
-    /// Standard deviation over the repeats; `None` for a single run.
+    /// Standard deviations over the repeats; `None` for a single run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub std: Option<Spread>,
-    /// The shares over distinct places; images only.
+    /// Shares over distinct places (images only).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distinct: Option<Distinct>,
 }
 
-/// Points of similar stated probability, over all repeats.
+/// A bin of points with similar estimated probability, over all repeats.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct ReliabilityBin {
-    /// The mean stated probability, 0 to 1; `None` without points.
+    /// The mean estimated probability, 0 to 1; `None` without points.
     pub predicted: Option<f64>,
-    /// The share that was within the smallest threshold; `None` without points.
+    /// The share of points within the smallest threshold; `None` without points.
     pub observed: Option<f64>,
     /// Points in the bin.
     pub n: u64,
@@ -217,12 +210,12 @@ pub struct ReliabilityBin {
 /// Standard deviations of a row's figures over its repeats.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
-    /// Of [`Row::recovered_percent`], in percentage points.
+    /// Deviation of [`Row::recovered_percent`], in percentage points.
     pub recovered_percent: ByThreshold,
-    /// Of [`Row::blind_percent`], in percentage points.
+    /// Deviation of [`Row::blind_percent`], in percentage points.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub blind_percent: ByThreshold,
-    /// Of [`Row::median_error`], in the row's unit.
+    /// Deviation of [`Row::median_error`], in the row's unit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub median_error: Option<f64>,
 }
@@ -232,52 +225,52 @@ pub struct Spread {
 pub struct BreakEven {
     /// The scheme's user-facing name.
     pub scheme: String,
-    /// The solver's name, or [`STRONGEST`] where several attacks ran.
+    /// The solver's name, or [`STRONGEST`] if several attacks ran.
     pub solver: String,
-    /// How the oracle chose the false neighbors, as [`Row::oracle_noise`].
+    /// How the oracle chose the wrong neighbors, as in [`Row::oracle_noise`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub oracle_noise: Option<String>,
     /// The threshold as typed.
     pub threshold: String,
-    /// The ratio: interpolated, or the smallest / largest tested one as [`BreakEven::bound`] says.
+    /// The ratio: interpolated, or the smallest or largest tested one; see [`BreakEven::bound`].
     pub inlier_ratio: Option<f64>,
-    /// How to read the ratio.
+    /// How the ratio relates to the tested ratios.
     pub bound: Bound,
 }
 
-/// How a break-even ratio relates to the ratios that were tested.
+/// The relation of a break-even ratio to the tested ratios.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Bound {
     /// Between two tested ratios, by linear interpolation.
     Interpolated,
-    /// Half comes back even at the smallest tested ratio: the true value is at most this.
+    /// Half comes back even at the smallest tested ratio, so the true value is at most this.
     BelowTested,
     /// Half does not come back at any tested ratio.
     AboveTested,
 }
 
-/// One gate of the user and its outcome.
+/// A gate of the user and its result.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GateResult {
     /// The gate as typed, for example `ppl@0.5:0.10<=20`.
     pub gate: String,
     /// The figure that was compared, in percent (or percentage points for a gain over the larger
-    /// baseline); `None` when no row could be audited that the gate is about.
+    /// baseline); `None` if no row of the gate could be audited.
     pub found_percent: Option<f64>,
-    /// What that figure is of: scheme, source and ratio, solver, distance.
+    /// The attack behind the figure: scheme, source and ratio, solver, distance.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
-    /// The bound it may not exceed.
+    /// The bound of the figure.
     pub bound_percent: f64,
-    /// Whether every figure keeps the bound; `false` whenever one that the gate is about is not known.
+    /// Whether every figure is known and keeps the bound.
     pub passed: bool,
-    /// Why the gate did not pass although no figure exceeds the bound: what was not audited.
+    /// Why the gate failed although no figure exceeds the bound, for example what was not audited.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
 }
 
-/// What varies from run to run.
+/// The data that differ between runs.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Run {
     /// The command line, ready to paste into a shell; `None` in a share-safe document.
@@ -285,7 +278,7 @@ pub struct Run {
     pub command: Option<String>,
     /// Worker threads.
     pub threads: u32,
-    /// Peak resident memory of the process, where the system tells it.
+    /// Peak resident memory of the process, if known.
     pub peak_memory_bytes: Option<u64>,
     /// Wall time.
     pub seconds: Seconds,
@@ -296,46 +289,46 @@ pub struct Run {
 pub struct Seconds {
     /// The whole run.
     pub total: f64,
-    /// Per row of `results`, in the same order: stage to seconds.
+    /// Seconds by stage, per row of `results` in the same order.
     pub rows: Vec<IndexMap<String, f64>>,
-    /// Stage to seconds over the whole run.
+    /// Seconds by stage over the whole run.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub stages: IndexMap<String, f64>,
 }
 
-/// How many images an audit had, and what became of them.
+/// Counts of the images of an audit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ImageCounts {
     /// Images in the folder or file.
     pub found: u64,
-    /// Images that were used: the rest was left out by choice, or could not be used.
+    /// Images that were used, neither left out by choice nor unusable.
     pub used: u64,
-    /// Images that could not be used; a line on stderr told why.
+    /// Images that could not be used; stderr had the reasons.
     pub unusable: u64,
-    /// Used images with at most K keypoints: attacked with lists as long as can be.
+    /// Used images with at most K keypoints; their lists are shorter than K.
     pub too_small: u64,
 }
 
-/// Shares over distinct places: a fifth of the keypoints of an image lie exactly on another one, and
-/// every place counts once here.
+/// Shares over distinct places, each counted once. About a fifth of an image's keypoints lie exactly on
+/// another one.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Distinct {
-    /// Places.
+    /// Number of places.
     pub n_places: u64,
     /// Percent of the places recovered within each threshold.
     pub recovered_percent: ByThreshold,
-    /// Percentage recovered by an attacker without neighborhoods.
+    /// Percent of the places recovered by a blind guess.
     pub blind_percent: ByThreshold,
 }
 
 /// The figures of one image.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ImageFigures {
-    /// Its name; `None` in a share-safe document.
+    /// The image's name; `None` in a share-safe document.
     pub name: Option<String>,
-    /// Its keypoints.
+    /// Number of keypoints.
     pub n_points: u64,
-    /// One per row of `results`, in the same order; empty for an image without keypoints.
+    /// Figures per row of `results`, in the same order; empty for an image without keypoints.
     pub rows: Vec<ImageRow>,
 }
 
@@ -346,15 +339,15 @@ pub struct ImageRow {
     pub recovered_percent: ByThreshold,
     /// Percent of the distinct places of the image recovered within each threshold.
     pub distinct_percent: ByThreshold,
-    /// Share of true neighbors in this image, as requested or measured.
+    /// Share of true neighbors in this image: as requested for the oracle, else measured.
     pub inlier_ratio: f64,
-    /// Median error in pixels; `None` when half of the keypoints or more are lost.
+    /// Median error in pixels; `None` if half of the keypoints or more are lost.
     pub median_error: Option<f64>,
 }
 
 impl Row {
-    /// What an attacker without neighborhoods gets within `threshold` (as typed): the larger of a blind guess
-    /// and the best attack on the records alone. What neighborhoods add is what exceeds it.
+    /// Returns the larger baseline within `threshold` (as typed): a blind guess, or the best attack on the records
+    /// alone. Neighborhoods add what exceeds it.
     pub fn baseline_percent(&self, threshold: &str) -> Option<f64> {
         let alone = self.records_alone_percent.as_ref().and_then(|map| map.get(threshold));
         let blind = self.blind_percent.get(threshold);
@@ -371,13 +364,13 @@ fn is_one(value: &u32) -> bool {
 }
 
 impl Document {
-    /// The text of `audit.json`: indented, measured numbers rounded to [`SIGNIFICANT_DIGITS`].
+    /// Returns the text of `audit.json`, indented, with measured numbers rounded to [`SIGNIFICANT_DIGITS`].
     ///
-    /// `options` and `input.scale_m_per_unit` are the user's own numbers and keep every digit.
+    /// `options` and `input.scale_m_per_unit` are numbers of the user and keep every digit.
     ///
     /// # Errors
     ///
-    /// [`Error::Invalid`] when a rule of the format is broken, see [`Document::check`].
+    /// [`Error::Invalid`] if a rule of the format is broken, see [`Document::check`].
     pub fn to_json(&self) -> Result<String, Error> {
         self.check()?;
         let mut value = serde_json::to_value(self)?;
@@ -399,10 +392,10 @@ impl Document {
     /// # Errors
     ///
     /// [`Error::Schema`] for another schema, [`Error::Json`] for text that is not such a document,
-    /// [`Error::Invalid`] when a rule of the format is broken.
+    /// [`Error::Invalid`] if a rule of the format is broken.
     pub fn from_json(text: &str) -> Result<Self, Error> {
         let value: serde_json::Value = serde_json::from_str(text)?;
-        // Asked first: a later schema would fail on some missing field, which helps nobody.
+        // A later schema would fail with an unclear error about a missing field.
         if let Some(found) = value.get("schema").and_then(serde_json::Value::as_u64)
             && found != u64::from(SCHEMA)
         {

@@ -1,6 +1,6 @@
 //! The errors of this crate.
 
-/// What can go wrong between an audit's numbers and its files.
+/// An error in reading, checking or writing an audit's files.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -18,14 +18,14 @@ pub enum Error {
         /// The schema the text declares.
         found: u64,
     },
-    /// A field breaks a rule of the format, for example a NaN or a row that stands twice.
+    /// A field breaks a rule of the format, for example a NaN or a repeated row.
     #[error("audit.json: {place}: expected {expected}, found {found}")]
     Invalid {
         /// Where in the document, for example `results[3].recovered_percent["0.10"]`.
         place: String,
-        /// What the format asks for.
+        /// The rule of the format.
         expected: String,
-        /// What stands there.
+        /// The value found.
         found: String,
     },
 }

@@ -1,4 +1,5 @@
-//! What a page with pictures begins with: the photo, what the service receives, what an attacker paints from it.
+//! The exhibits at the top of a page: a photo, the released records, and the picture that an attacker paints from
+//! them.
 
 use serde::Serialize;
 
@@ -9,40 +10,35 @@ use crate::inversions::{Inversion, InvertedView, source, strongest};
 use crate::pictures::Marks;
 use crate::{tables, words};
 
-/// One row of three pictures, with a sentence.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Exhibit {
     level: Level,
     /// "An attacker can rebuild the picture."
     verdict: &'static str,
-    /// Who gets what from what.
     said: String,
     photo: String,
     released: Option<Drawing>,
     painted: String,
-    /// The image's name.
     name: String,
 }
 
-/// Released records as an SVG path.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct Drawing {
     size: [u32; 2],
     /// `lines` or `points`.
     kind: &'static str,
     path: String,
-    /// What is drawn, in words.
+    /// The rule of the scheme, and how many records are drawn.
     said: String,
 }
 
-/// Share of the SSIM without protection from which on the picture is rebuilt, or parts of it are.
+/// Ratios of SSIM to that without protection, from which on the picture, or parts of it, count as rebuilt.
 const REBUILT: f64 = 0.85;
 const IN_PARTS: f64 = 0.6;
 
-/// The picture of true points is poor below this SSIM, whatever comes back of it.
+/// The picture of the true points counts as poor below this SSIM.
 const POOR: f64 = 0.5;
 
-/// How well a picture came back, by its SSIM over that of the picture without protection.
 fn rebuilt(ratio: f64) -> (Level, &'static str) {
     match ratio {
         REBUILT.. => (Level::Red, "An attacker can rebuild the picture."),
@@ -51,8 +47,8 @@ fn rebuilt(ratio: f64) -> (Level, &'static str) {
     }
 }
 
-/// How many photos of a scheme can be rebuilt from the released data alone: "1 of 2 pictures can be rebuilt, 1 in
-/// parts"; `None` where nothing was painted.
+/// Returns how many photos of a scheme can be rebuilt from the released data alone: "1 of 2 pictures can be rebuilt, 1
+/// in parts"; `None` if no picture was painted.
 pub(crate) fn pictures_said(
     document: &Document,
     inversions: &[Inversion],
@@ -70,8 +66,8 @@ pub(crate) fn pictures_said(
     (n > 0).then(|| format!("{whole} of {n} {pictures} can be rebuilt{in_parts}"))
 }
 
-/// At most three exhibits. The first two show the best pictures from the released data alone: of different schemes and
-/// photos, where there are several. The last one shows what half of the neighbors would give.
+/// Returns at most three exhibits. The first two show the best pictures from the released data alone, of different
+/// schemes and photos if possible. The last one shows an attack with given or known neighbors.
 pub(crate) fn exhibits(document: &Document, inversions: &[Inversion]) -> Vec<Exhibit> {
     let Some(first) = inversions.first() else { return Vec::new() };
     let mut shown: Vec<(&Inversion, &InvertedView)> = Vec::new();
@@ -86,7 +82,7 @@ pub(crate) fn exhibits(document: &Document, inversions: &[Inversion]) -> Vec<Exh
     shown.into_iter().filter_map(|(one, view)| exhibit(document, one, view)).take(3).collect()
 }
 
-/// The view whose picture came back best; of equally good ones that of the stronger attack.
+/// Returns the view with the best level of its picture; of equal ones, that of the stronger attack.
 fn best<'a>(
     document: &Document,
     inversion: &'a Inversion,
@@ -108,7 +104,6 @@ fn best<'a>(
     best.map(|(_, view)| view)
 }
 
-/// The row that a view is of.
 fn row_of<'a>(document: &'a Document, view: &InvertedView) -> Option<&'a Row> {
     document.results.iter().find(|row| {
         row.scheme == view.scheme
@@ -117,12 +112,11 @@ fn row_of<'a>(document: &'a Document, view: &InvertedView) -> Option<&'a Row> {
     })
 }
 
-/// Percent that came back within the headline threshold.
 fn share(document: &Document, row: &Row) -> Option<f64> {
     row.recovered_percent.get(&tables::headline_threshold(document)?).copied()
 }
 
-/// How much of the SSIM without protection the picture has.
+/// Returns the ratio of the picture's SSIM to that without protection.
 fn kept(inversion: &Inversion, view: &InvertedView) -> f64 {
     let baseline = inversion.baseline.likeness.ssim;
     if baseline > 0.0 { view.painted.likeness.ssim / baseline } else { 0.0 }
@@ -141,17 +135,17 @@ fn exhibit(document: &Document, inversion: &Inversion, view: &InvertedView) -> O
     let by = format!("({}, {})", view.scheme.to_uppercase(), attack::briefly(row));
     let mut said = match view.basis()? {
         Basis::Released => format!("From the released data alone, {back} {by}."),
-        Basis::Given => format!("With the given neighbors, {back} {by}."),
+        Basis::Given => format!("With given neighbors, {back} {by}."),
         Basis::Oracle => {
             let known = words::capital(&words::if_known(row.inlier_ratio));
             format!("{known}: {back} {by}.")
         }
     };
-    // What little there was cannot come back.
+    // If the network paints badly even from true points, the result shows little.
     let baseline = inversion.baseline.likeness.ssim;
     if baseline < POOR {
         said.push_str(&format!(
-            " Even from the true points this network paints a poor picture (SSIM {baseline:.2})."
+            " Even from the true points this network paints a poor picture (similarity to the photo: SSIM {baseline:.2} of 1)."
         ));
     }
     let released = inversion.released.iter().find(|one| one.scheme == view.scheme);
@@ -166,11 +160,10 @@ fn exhibit(document: &Document, inversion: &Inversion, view: &InvertedView) -> O
     })
 }
 
-/// More lines than this are a fog.
 const MOST_LINES: usize = 700;
 const MOST_POINTS: usize = 4_000;
 
-/// The records as one path, thinned evenly; `None` where there is nothing to draw.
+/// Returns the records as one path, thinned evenly; `None` if there is nothing to draw.
 fn drawing(size: [u32; 2], scheme: &str, marks: &Marks) -> Option<Drawing> {
     let mut path = String::new();
     let at = |p: [f32; 2]| format!("{} {}", p[0].round(), p[1].round());
@@ -191,12 +184,11 @@ fn drawing(size: [u32; 2], scheme: &str, marks: &Marks) -> Option<Drawing> {
     let [n, of] = [drawn, all].map(|n| words::thousands(n as u64));
     let some = if drawn < all { format!(" ({n} of {of} drawn)") } else { String::new() };
     let rule = words::scheme_rule(scheme);
-    let rule = if rule.is_empty() { "Its records." } else { rule };
+    let rule = if rule.is_empty() { "What the scheme releases." } else { rule };
     let said = format!("{rule}{some}");
     (drawn > 0).then_some(Drawing { size, kind, path, said })
 }
 
-/// At most `most` of `all`, evenly spaced.
 fn evenly<T: Copy>(all: &[T], most: usize) -> Vec<T> {
     let n = all.len().min(most);
     (0..n).map(|at| all[at * all.len() / n]).collect()

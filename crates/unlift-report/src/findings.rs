@@ -1,4 +1,4 @@
-//! Titles of the page's charts: each says what its chart shows.
+//! Titles of the page's charts: each states the result that its chart shows.
 
 use serde::Serialize;
 
@@ -6,30 +6,27 @@ use crate::attack::{self, Basis};
 use crate::document::{Document, Row};
 use crate::{tables, verdict, words};
 
-/// A title per chart.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Findings {
-    /// Over the share of true neighbors.
     pub curves: String,
-    /// Over the error.
     pub errors: String,
-    /// Over what the attacker said.
     pub certainty: String,
 }
 
-/// The titles for `document`.
 pub(crate) fn findings(document: &Document) -> Findings {
     Findings { curves: curves(document), errors: errors(document), certainty: certainty(document) }
 }
 
-/// Share of what the most true neighbors give from which on the fewest tested give nearly as much.
+/// Ratio of the recovery with the fewest right neighbors to that with the most, from which on wrong
+/// neighbors hardly matter; below [`STEEP`] they matter much.
 const FLAT: f64 = 0.9;
 const STEEP: f64 = 0.5;
 
-/// What wrong neighbors cost an attacker: the worst scheme's oracle rows at both ends of the ratios tested.
+/// Returns a title on how much wrong neighbors reduce the recovery: the best oracle rows at the lowest and
+/// highest tested ratio.
 fn curves(document: &Document) -> String {
     let points = document.results.first().map_or("points", |row| words::points(row.unit));
-    let usual = format!("How many {points} come back, by the share of true neighbors");
+    let usual = format!("How many {points} come back, by the share of right neighbors");
     let Some(typed) = tables::headline_threshold(document) else { return usual };
     let oracle = || document.results.iter().filter(|row| attack::basis(row) == Some(Basis::Oracle));
     let share = |row: &Row| verdict::share(row, &typed);
@@ -39,7 +36,7 @@ fn curves(document: &Document) -> String {
     };
     let ratios = || oracle().map(|row| row.inlier_ratio);
     let (low, high) = (ratios().fold(f64::INFINITY, f64::min), ratios().fold(0.0, f64::max));
-    // Far from wrong is no test.
+    // Mostly right neighbors show nothing about wrong ones.
     if low >= high || low > 0.2 {
         return usual;
     }
@@ -48,16 +45,19 @@ fn curves(document: &Document) -> String {
     let few_said = words::percent(few);
     match few / many.max(f64::MIN_POSITIVE) {
         FLAT.. => format!(
-            "Wrong neighbors hardly help: with {wrong} % of them wrong, {few_said} % still come back"
+            "Wrong neighbors hardly stop the attack: with {wrong} % of them wrong, {few_said} % of the {points} still come back"
         ),
         STEEP.. => {
-            format!("With {wrong} % of the neighbors wrong, {few_said} % still come back")
+            format!(
+                "With {wrong} % of the neighbors wrong, {few_said} % of the {points} still come back"
+            )
         }
-        _ => format!("Wrong neighbors help: with {wrong} % of them wrong, {few_said} % come back"),
+        _ => format!(
+            "Wrong neighbors weaken the attack: with {wrong} % of them wrong, {few_said} % of the {points} come back"
+        ),
     }
 }
 
-/// The median error of the strongest attack of today, else of the oracle's.
 fn errors(document: &Document) -> String {
     let points = document.results.first().map_or("points", |row| words::points(row.unit));
     let strongest = speaking(document);
@@ -65,7 +65,7 @@ fn errors(document: &Document) -> String {
         Some((row, median)) => {
             let scheme = row.scheme.to_uppercase();
             let smallest = tables::thresholds(document).first().and_then(|t| t.parse::<f64>().ok());
-            // An exchanged coordinate that is put back leaves an error of rounding.
+            // Swapped coordinates that are restored leave only an error of rounding.
             match smallest.is_some_and(|smallest| median < 0.001 * smallest) {
                 true => format!("Half of the {points} come back exactly ({scheme})"),
                 false => {
@@ -89,10 +89,9 @@ fn certainty(document: &Document) -> String {
             row.scheme.to_uppercase()
         ))
     });
-    said.unwrap_or_else(|| "How well the attacker knows what is right".to_owned())
+    said.unwrap_or_else(|| "How well the attacker can judge its own result".to_owned())
 }
 
-/// The row that the verdict leads with.
 fn speaking(document: &Document) -> Option<&Row> {
     let typed = tables::headline_threshold(document)?;
     let share = |row: &Row| verdict::share(row, &typed);

@@ -1,17 +1,16 @@
-//! How the user's gates ended, in words: what failed stands first on the page.
+//! The results of the user's gates in words; failed gates come first on the page.
 
 use serde::Serialize;
 
 use crate::document::{Document, GateResult};
 use crate::words;
 
-/// All gates of a document.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Gates {
     /// "2 of 3 gates failed", or "All 3 gates passed".
     pub summary: String,
     pub passed: bool,
-    /// Failed ones first, else in the order given.
+    /// Failed gates first, else in the given order.
     pub gates: Vec<GateWords>,
 }
 
@@ -28,7 +27,6 @@ pub(crate) struct GateWords {
     pub allowed: String,
 }
 
-/// The gates of `document`; `None` without any.
 pub(crate) fn gates(document: &Document) -> Option<Gates> {
     let all = &document.gates;
     let failed = all.iter().filter(|gate| !gate.passed).count();
@@ -45,14 +43,15 @@ pub(crate) fn gates(document: &Document) -> Option<Gates> {
     Some(Gates { summary, passed: failed == 0, gates })
 }
 
-/// That images could not be used, which no gate speaks of: the figures are of fewer than were asked for.
+/// Returns a sentence if images could not be used, because gates do not cover them.
 pub(crate) fn unusable(document: &Document) -> Option<String> {
     let images = document.input.images.as_ref().filter(|images| images.unusable > 0)?;
     let (unusable, found) = (images.unusable, images.used + images.unusable);
     Some(format!("{unusable} of {found} images could not be used, and are in no figure"))
 }
 
-/// A line per gate: whether it held, what was found, and what that is of. Ends with a line break, or is empty.
+/// Returns a line per gate: whether it held, the figure found, and its attack. The text ends with a line break
+/// or is empty.
 pub fn gate_lines(document: &Document) -> String {
     let line = |gate: &GateResult| {
         let word = if gate.passed { "held" } else { "FAILED" };
@@ -61,7 +60,7 @@ pub fn gate_lines(document: &Document) -> String {
     document.gates.iter().map(line).collect()
 }
 
-/// What was found of a gate, what that is of, and why the gate did not hold in spite of it.
+/// Returns the figure found for a gate, its attack, and the reason if the gate failed for another reason.
 pub fn gate_found(gate: &GateResult) -> String {
     let of = gate.of.as_ref().map_or_else(String::new, |of| format!(": {of}"));
     let found = gate.found_percent.map(|found| format!("found {found:.1} %{of}"));
@@ -87,8 +86,8 @@ pub(crate) fn in_words(gate: &GateResult) -> GateWords {
     GateWords { gate: gate.gate.clone(), passed: gate.passed, word, said: said.join("; "), allowed }
 }
 
-/// `found` with one decimal, or as many more as it takes to stand on its side of `bound`: 20.04 must not
-/// read as 20.0 beside a bound of 20.
+/// Returns `found` with one decimal, or more if needed to stay on its side of `bound`: 20.04 must not become
+/// 20.0 beside a bound of 20.
 fn beside(found: f64, bound: f64) -> String {
     let texts = (1..=6).map(|digits| format!("{found:.digits$}"));
     let on_its_side = |text: &String| {

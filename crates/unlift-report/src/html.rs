@@ -1,4 +1,4 @@
-//! The page: one file, no network, numbers readable without script.
+//! The page: one file that loads nothing and shows all numbers without script.
 
 use minijinja::value::Serde;
 use minijinja::{AutoEscape, Environment, UndefinedBehavior};
@@ -16,7 +16,7 @@ use crate::tables::Table;
 use crate::tiles::{HeatMap, heat_maps};
 use crate::{Error, attack, paper, pictures, tables, tiles, words};
 
-/// The template and its parts, by the names they include each other with.
+/// The templates, by the names under which they include each other.
 const TEMPLATES: [(&str, &str); 10] = [
     ("report.html", include_str!("../template/report.html")),
     ("terms.html", include_str!("../template/terms.html")),
@@ -62,7 +62,7 @@ pub fn render(
     let scene = scene.filter(|scene| !options.share_safe && !scene.originals.is_empty());
     let error_unit = tables::thresholds(&document).first().and_then(|typed| typed.parse().ok());
     let encoded = scene.map(|scene| encode(scene, &document.results, error_unit.unwrap_or(1.0)));
-    // A view without points, or without anything that came back, would be an empty box.
+    // A view without points or without recovered points would be empty.
     let encoded = encoded.filter(|scene| scene.n_drawn > 0 && !scene.views.is_empty());
     let mut blocks = encoded.as_ref().map(|scene| scene.blocks.clone()).unwrap_or_default();
     let shown = if options.share_safe { &[] } else { options.pictures.as_slice() };
@@ -128,7 +128,7 @@ pub fn render(
             .not_audited
             .iter()
             .map(|one| {
-                let source = one.neighbors.as_deref().map(|by| attack::source(by, None));
+                let source = one.neighbors.as_deref().map(|by| attack::plain_source(by, None));
                 (&one.scheme, source, &one.reason)
             })
             .collect(),
@@ -137,7 +137,7 @@ pub fn render(
         attribution: paper::ATTRIBUTION,
     };
     let mut env = environment();
-    // A figure and its unit stay on one line.
+    // A non-breaking space keeps a figure and its unit on one line.
     env.add_filter("tied", |text: String| {
         [" %", " cm", " px"]
             .iter()
@@ -150,7 +150,7 @@ pub fn render(
     Ok(env.get_template("report.html")?.render(Serde(&page))?.replace(turns, "\u{fffd}"))
 }
 
-/// What renders templates: what they name must be there, and text is escaped.
+/// Returns an environment that escapes text and fails on undefined names.
 pub(crate) fn environment() -> Environment<'static> {
     let mut env = Environment::new();
     env.set_undefined_behavior(UndefinedBehavior::Strict);
@@ -158,12 +158,11 @@ pub(crate) fn environment() -> Environment<'static> {
     env
 }
 
-/// Whether a character turns the direction of what follows: names may hold it, and nothing of ours does.
+/// Returns whether a character changes the direction of text; a name may contain one.
 fn turns(c: char) -> bool {
     matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// All that the template may print.
 #[derive(Debug, Serialize)]
 struct Page<'a> {
     style: [&'static str; 2],
@@ -173,44 +172,35 @@ struct Page<'a> {
     data: String,
     blocks: &'a [String],
     scene: Option<SceneWords>,
-    /// Images that are drawn.
     pictures: usize,
-    /// The verdict of this audit, after that of another one if there is any.
+    /// The verdict of this audit, after that of another audit if there is one.
     parts: Vec<Opening>,
-    /// Titles of charts.
     findings: Findings,
-    /// Pictures painted from what came back.
     sheets: Vec<Sheet>,
-    /// How many of them would make the page too large.
+    /// Number of pictures that were left out to keep the page small.
     sheets_left_out: usize,
-    /// Where a map in tiles leaks most.
     heat_maps: Vec<HeatMap>,
     share_safe: bool,
     subject: Subject,
     gates: Option<Gates>,
     published: bool,
-    /// Whether any attacker said how sure it is.
+    /// Whether any row has stated probabilities, or a reason why not.
     judged: bool,
     tables: Vec<Table>,
     losses: Vec<Table>,
     times: Option<Table>,
     options: Vec<(String, String)>,
     command: Option<&'a str>,
-    /// Of the map; nothing in a share-safe document.
     sha256: Option<&'a str>,
-    /// (role, SHA-256) of further input files.
     other_sha256: Vec<(&'a String, &'a String)>,
     seconds: String,
     memory: Option<String>,
-    /// (scheme, source, reason) of what could not be audited.
     not_audited: Vec<(&'a String, Option<String>, &'a String)>,
-    /// What whoever reads the figures must know.
     notes: &'a [String],
     document: &'a Document,
     attribution: &'static str,
 }
 
-/// Text with what stands in back quotes set as code; everything else is escaped.
 fn coded(text: &str) -> minijinja::Value {
     let escaped = text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
     let parts = escaped.split('`').enumerate();
@@ -230,25 +220,21 @@ struct SceneWords {
 
 #[derive(Debug, Serialize)]
 struct Subject {
-    /// Last part of the path: the whole path stands in the last section only.
+    /// The last telling part of the path; the whole path is in the last section.
     name: Option<String>,
     n_points: String,
     metric: bool,
-    /// "map" or "images", and what these consist of: "points" or "keypoints".
     kind: &'static str,
     points: &'static str,
     images: Option<String>,
-    /// What one unit of this page is.
     unit: String,
-    /// "50th", of the neighbor whose distance is the unit.
     kth: String,
-    /// What the unit is called where there is no scale.
     usual_distance: &'static str,
 }
 
 fn subject(document: &Document) -> Subject {
     let input = &document.input;
-    // The oracle's K is the audit's; sources of an attacker's own choose theirs.
+    // The oracle uses the K of the audit; other sources choose their own.
     let oracle = document.results.iter().find(|row| row.neighbors == "oracle");
     let typed = document.options.get("k").and_then(serde_json::Value::as_u64);
     let k = oracle.map(|row| row.k).or(typed.and_then(|k| u32::try_from(k).ok())).unwrap_or(50);
@@ -279,7 +265,6 @@ fn subject(document: &Document) -> Subject {
     }
 }
 
-/// How many images there were, in a sentence or two.
 fn images_text(counts: &ImageCounts) -> String {
     let count = words::thousands;
     let mut text = match counts.found == counts.used {
@@ -290,13 +275,13 @@ fn images_text(counts: &ImageCounts) -> String {
         text.push_str(&format!(" {} could not be used.", count(counts.unusable)));
     }
     if counts.too_small > 0 {
-        let (n, few) = (count(counts.too_small), "had fewer keypoints than neighbors asked for");
+        let (n, few) = (count(counts.too_small), "had fewer keypoints than requested neighbors");
         text.push_str(&format!(" {n} {few}, and were attacked with fewer."));
     }
     text
 }
 
-/// The part of a path that names the map: `room` of `maps/room/sparse/0`.
+/// Returns the part of a path that names the map: `room` of `maps/room/sparse/0`.
 fn short_name(path: &str) -> String {
     let says_little = |part: &&str| {
         matches!(*part, "" | "." | ".." | "sparse" | "model" | "dense" | "colmap")
@@ -316,7 +301,7 @@ fn plain(value: &serde_json::Value) -> String {
     }
 }
 
-/// JSON that may stand inside a script element: no `<` can end or open one.
+/// Returns JSON that can be inside a script element, because it contains no `<`.
 fn script_text(json: &str) -> String {
     json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026")
 }

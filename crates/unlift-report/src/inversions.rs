@@ -18,13 +18,13 @@ pub struct Inversion {
     pub size: [u32; 2],
     /// The photo.
     pub photo: Vec<u8>,
-    /// What a detector finds in the photo.
+    /// Objects that a detector found in the photo.
     pub objects: Vec<Object>,
-    /// The picture of the true keypoints.
+    /// The picture painted from the true keypoints.
     pub baseline: Painted,
     /// What each scheme releases, in pixels of the photo.
     pub released: Vec<ReleasedView>,
-    /// Pictures of what came back.
+    /// Pictures painted from recovered keypoints.
     pub views: Vec<InvertedView>,
 }
 
@@ -33,23 +33,23 @@ pub struct Inversion {
 pub struct Painted {
     /// The picture.
     pub jpeg: Vec<u8>,
-    /// How alike it is to the photo.
+    /// Its similarity to the photo.
     pub likeness: Likeness,
-    /// What a detector finds in it.
+    /// Objects that a detector found in it.
     pub objects: Vec<Object>,
 }
 
 /// An everyday object that a detector found in a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Object {
-    /// Its class: `chair`.
+    /// Its class, for example `chair`.
     pub class: String,
-    /// Left, top, right and bottom as shares of the picture's sides; may reach beyond it.
+    /// Left, top, right and bottom as fractions of the picture's sides; may be outside 0 to 1.
     pub sides: [f32; 4],
 }
 
 impl Object {
-    /// Whether `other` is this object: of one class, and at least half of the boxes in common.
+    /// Returns whether `other` is this object: the same class, and intersection over union of at least one half.
     fn is(&self, other: &Self) -> bool {
         let [a, b] = [self.sides, other.sides];
         let side = |low: f32, high: f32| (high - low).max(0.0);
@@ -59,12 +59,12 @@ impl Object {
     }
 }
 
-/// How alike a picture is to the photo.
+/// The similarity of a picture to the photo.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Likeness {
-    /// Structural similarity.
+    /// Structural similarity (SSIM); 1 for equal pictures.
     pub ssim: f64,
-    /// Perceptual distance.
+    /// Perceptual distance (LPIPS); 0 for equal pictures.
     pub lpips: f64,
 }
 
@@ -74,7 +74,7 @@ impl Likeness {
     }
 }
 
-/// The picture of what came back under one scheme, from one kind of neighborhoods.
+/// A picture painted from the keypoints recovered under one scheme, from one kind of neighborhoods.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InvertedView {
     /// The scheme's user-facing name.
@@ -88,13 +88,11 @@ pub struct InvertedView {
 }
 
 impl InvertedView {
-    /// What the attack had to go on.
     pub(crate) fn basis(&self) -> Option<Basis> {
         basis_of(&self.given.neighbors, &self.solver)
     }
 }
 
-/// All pictures of one photo, as the page shows them.
 #[derive(Debug, Serialize)]
 pub(crate) struct Sheet {
     name: String,
@@ -103,7 +101,6 @@ pub(crate) struct Sheet {
     rows: Vec<SheetRow>,
 }
 
-/// Where an object is drawn, in per cent of the picture.
 #[derive(Debug, Serialize)]
 struct Boxed {
     class: String,
@@ -116,27 +113,23 @@ struct Boxed {
 #[derive(Debug, Serialize)]
 struct SheetRow {
     scheme: String,
-    /// The strongest attack from the released data alone, and the oracle's nearest to half.
     main: Vec<Shown>,
-    /// All others.
     others: Vec<Shown>,
 }
 
 #[derive(Debug, Serialize)]
 struct Shown {
-    /// What it was painted from.
     label: String,
     said: String,
     source: String,
-    /// Objects of the photo that are found again.
     boxes: Vec<Boxed>,
 }
 
-/// Bytes of the page that all of them may take.
+/// Maximal number of bytes for all pictures of the page.
 const BUDGET_BYTES: usize = 2_500_000;
 
-/// The sheets of `inversions`, in their order, and how many pictures are left out because they would make the page too
-/// large: first whole photos from the end, then the last of the longest rows of other pictures.
+/// Returns the sheets of `inversions` and the number of pictures that were left out to keep the page small: first
+/// whole photos from the end, then the last pictures of the longest rows of `others`.
 pub(crate) fn sheets(document: &Document, inversions: &[Inversion]) -> (Vec<Sheet>, usize) {
     let mut sheets: Vec<Sheet> = inversions.iter().map(|one| sheet(document, one)).collect();
     let size = |sheets: &[Sheet]| sheets.iter().map(Sheet::size).sum::<usize>();
@@ -156,7 +149,6 @@ pub(crate) fn sheets(document: &Document, inversions: &[Inversion]) -> (Vec<Shee
 }
 
 impl Sheet {
-    /// Pictures of what came back.
     fn pictures(&self) -> impl Iterator<Item = &Shown> {
         self.rows.iter().flat_map(|row| row.main.iter().chain(&row.others))
     }
@@ -167,8 +159,7 @@ impl Sheet {
     }
 }
 
-/// The view of `scheme` that speaks for attacks on this basis: of the attack that recovers most, of the oracle's the
-/// one nearest to half.
+/// Returns the view of [`verdict::strongest`] for `scheme` and this basis.
 pub(crate) fn strongest<'a>(
     document: &Document,
     inversion: &'a Inversion,
@@ -186,7 +177,7 @@ pub(crate) fn strongest<'a>(
     let best = |a: &&InvertedView, b: &&InvertedView| {
         a.painted.likeness.ssim.total_cmp(&b.painted.likeness.ssim)
     };
-    // The strongest attack may not have been painted: then the best picture there is.
+    // If the strongest attack was not painted, the best picture stands in.
     views().find(is_row).or_else(|| views().max_by(best))
 }
 
@@ -226,8 +217,8 @@ fn painted(inversion: &Inversion, painted: &Painted, label: String) -> Shown {
     }
 }
 
-/// Boxes of objects that were found in the photo and again in a picture. A box that only the picture has is no
-/// evidence of anything.
+/// Returns the boxes of objects that were found in the photo and again in the picture. A box in the picture alone is
+/// no evidence.
 fn found_again(photo: &[Object], picture: &[Object]) -> Vec<Boxed> {
     let again = picture.iter().filter(|object| photo.iter().any(|one| one.is(object)));
     let boxed = |object: &Object| {
@@ -238,7 +229,6 @@ fn found_again(photo: &[Object], picture: &[Object]) -> Vec<Boxed> {
     again.map(boxed).collect()
 }
 
-/// A JPEG as a page holds it.
 pub(crate) fn source(jpeg: &[u8]) -> String {
     format!("data:image/jpeg;base64,{}", STANDARD.encode(jpeg))
 }

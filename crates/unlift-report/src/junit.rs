@@ -1,20 +1,18 @@
-//! Gates as JUnit XML, as GitLab, Jenkins and most others show test results: a test case per gate.
+//! Gates as JUnit XML, the test results that GitLab, Jenkins and others show: a test case per gate.
 
 use crate::document::Document;
 use crate::gates;
 use crate::xml::escaped;
 
-/// The gates of `document` as JUnit XML: one test suite, a test case per gate in the order given. A gate that did not
-/// hold is a failure; images that could not be used are an error, as no gate decides then.
-///
-/// Ends with a line break.
+/// Returns the gates of `document` as JUnit XML: one test suite with a test case per gate. A gate that did not hold
+/// is a failure. Unusable images are an error, because gates do not cover them. The text ends with a line break.
 pub fn junit(document: &Document) -> String {
     let gates: Vec<_> = document.gates.iter().map(gates::in_words).collect();
     let failures = gates.iter().filter(|gate| !gate.passed).count();
     let unusable = gates::unusable(document);
     let errors = usize::from(unusable.is_some());
     let tests = gates.len() + errors;
-    // Three decimals at most are what the schema of Jenkins takes.
+    // The schema of Jenkins accepts at most three decimals.
     let time = format!("{:.3}", document.run.seconds.total.max(0.0));
     let counts = format!("tests=\"{tests}\" failures=\"{failures}\" errors=\"{errors}\"");
     let suite = escaped(document.input.path.as_deref().unwrap_or("unlift audit"));
@@ -24,7 +22,7 @@ pub fn junit(document: &Document) -> String {
          <testsuite name=\"{suite}\" {counts} skipped=\"0\" time=\"{time}\">\n"
     );
     for gate in &gates {
-        // Grouped by the scheme that a gate begins with.
+        // Test cases are grouped by the scheme at the start of a gate.
         let scheme = gate.gate.split([':', '@']).next().unwrap_or_default();
         let (name, said) = (escaped(&gate.gate), escaped(&gate.said));
         let case =

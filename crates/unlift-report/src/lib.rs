@@ -1,7 +1,7 @@
-//! What an audit found, as a document and as a page.
+//! The result of an audit as a document (`audit.json`) and as a page.
 //!
-//! [`document`] holds the structs of `audit.json`; everything else here only shows them:
-//! nothing is measured in this crate, and a number on the page is a number of the document.
+//! [`document`] contains the structs of `audit.json`. The other modules only show them: this crate
+//! measures nothing, and each number on the page is a number of the document.
 //!
 //! ```
 //! use unlift_report::{Document, Error, RenderOptions, render, text_table};

@@ -1,4 +1,4 @@
-//! What a page begins with.
+//! The opening of a page.
 
 use serde::Serialize;
 
@@ -7,17 +7,14 @@ use crate::exhibit::{Exhibit, exhibits};
 use crate::inversions::Inversion;
 use crate::verdict::{Verdict, verdict};
 
-/// What a page begins with: the verdict on an audit, and its pictures if it has any.
+/// The opening of a page: the verdict on an audit, and its pictures if it has any.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Opening {
-    /// Stands above the verdict where a page has several.
     title: Option<String>,
-    /// A page with the details, as a link relative to this one.
     details: Option<String>,
     verdict: Verdict,
     exhibits: Vec<Exhibit>,
     notes: Vec<String>,
-    /// Whether it is about images.
     images: bool,
 }
 
@@ -33,7 +30,8 @@ impl Opening {
         }
     }
 
-    /// The opening of another audit under this title, whose own page `details` is a link to.
+    /// Returns the opening of another audit under a title; `details` is a link to that audit's own
+    /// page.
     pub fn titled(
         document: &Document,
         inversions: &[Inversion],

@@ -1,4 +1,4 @@
-//! How a page is drawn.
+//! Options of the page.
 
 #[cfg(doc)]
 use crate::document::Document;
@@ -6,18 +6,18 @@ use crate::inversions::Inversion;
 use crate::opening::Opening;
 use crate::pictures::Picture;
 
-/// How to draw the page.
+/// Options of the page.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RenderOptions {
-    /// Leave out everything but figures: no points, paths, names, command line.
+    /// Leaves out everything but figures: no points, paths, names, command line.
     pub share_safe: bool,
-    /// Finer error curves than the percentiles of the document; may be empty.
+    /// Error curves finer than the percentiles of the document; may be empty.
     pub error_cdf: Vec<ErrorCdf>,
-    /// Audits of images: those to be drawn, at most [`MOST_PICTURES`](crate::pictures::MOST_PICTURES).
+    /// Images to draw, at most [`MOST_PICTURES`](crate::pictures::MOST_PICTURES); empty for maps.
     pub pictures: Vec<Picture>,
-    /// Pictures that a network painted from what came back.
+    /// Pictures that a network painted from recovered points.
     pub inversions: Vec<Inversion>,
-    /// The verdict on another audit, which the page begins with.
+    /// The verdict on another audit, at the top of the page.
     pub opening: Option<Opening>,
 }
 
@@ -26,7 +26,7 @@ pub struct RenderOptions {
 pub struct ErrorCdf {
     /// Index into [`Document::results`].
     pub row: usize,
-    /// (error in the row's unit, percent of the released points within it), rising; a hundred
-    /// points are plenty.
+    /// (error in the row's unit, percent of the released points within it), ascending; a hundred
+    /// points suffice.
     pub points: Vec<(f64, f64)>,
 }

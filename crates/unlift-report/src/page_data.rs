@@ -1,4 +1,4 @@
-//! The figures as the page's script reads them: the same numbers as the tables, by position.
+//! The data of the page's script: the numbers of the tables, by position.
 
 use serde::Serialize;
 
@@ -18,18 +18,15 @@ pub(crate) struct PageData<'a> {
     thresholds: Vec<ThresholdData>,
     rows: Vec<RowData>,
     published: Vec<PublishedData>,
-    /// The threshold that is shown first.
     headline: usize,
     /// `m`, `px`, or `×` for multiples of the usual distance to the K-th neighbor.
     unit: &'static str,
     scene: Option<&'a Encoded>,
     pictures: &'a [EncodedPicture],
-    /// The neighborhoods that pictures show first.
     first_picture: Option<&'a str>,
 }
 
 impl PageData<'_> {
-    /// Whether any published curve stands beside ours.
     pub(crate) fn has_published(&self) -> bool {
         !self.published.is_empty()
     }
@@ -47,19 +44,16 @@ struct RowData {
     scheme: usize,
     given: usize,
     solver: usize,
-    /// The neighborhoods of this very row: `overlap, 11 % true neighbors`.
+    /// The label of this row's neighborhoods: `neighbors by descriptor overlap, 11 % right`.
     label: String,
     ratio: f64,
-    /// Whether it is an attack: a reference row is told what no attacker knows.
     attack: bool,
-    /// Per threshold, whether no solver got more of this scheme with these neighborhoods.
     strongest: Vec<bool>,
     recovered: Vec<Option<f64>>,
-    /// (error, percent of the points within it), rising.
     errors: Vec<(f64, f64)>,
-    /// (stated probability, share that came true), in percent, rising; bins of few points left out.
+    /// (stated probability, share that was right), in percent, ascending; without bins of few
+    /// points.
     reliability: Vec<(f64, f64)>,
-    /// Why the attacker's own probabilities are not known here.
     unknown: Option<String>,
 }
 
@@ -71,13 +65,12 @@ struct PublishedData {
     points: Vec<(f64, f64)>,
 }
 
-/// Whether `row` is the one that recovers most of its scheme from its neighborhoods.
 fn is_strongest(document: &Document, row: &Row, typed: &str) -> bool {
     let best = verdict::strongest_given(document, &row.scheme, &Given::of(row), typed);
     best.is_some_and(|best| std::ptr::eq(best, row))
 }
 
-/// Bins with at least this share of the released points are drawn: fewer scatter.
+/// Bins with at least this share of the released points are drawn; smaller ones scatter.
 const LEAST_DRAWN: f64 = 0.005;
 
 fn judged(row: &Row) -> Vec<(f64, f64)> {
@@ -101,7 +94,6 @@ pub(crate) fn page_data<'a>(
     let by_threshold = |map: &crate::document::ByThreshold| {
         thresholds.iter().map(|typed| map.get(typed).copied()).collect::<Vec<_>>()
     };
-    // Every row is in the lists, as these were made of the rows.
     let rows = document.results.iter().enumerate().filter_map(|(index, row)| {
         let cdf = options.error_cdf.iter().find(|cdf| cdf.row == index);
         let given = Given::of(row);
@@ -140,8 +132,8 @@ pub(crate) fn page_data<'a>(
     }
 }
 
-/// Published curves whose scheme was tested and whose threshold is one of ours; none for a map
-/// without a declared scale.
+/// Returns the published curves of tested schemes and thresholds; none for a map without a declared
+/// scale.
 fn published(document: &Document, thresholds: &[String]) -> Vec<PublishedData> {
     let all = |unit| document.results.iter().all(|row| row.unit == unit);
     let published = match () {
@@ -166,7 +158,7 @@ fn percentile_points(row: &crate::document::Row) -> Vec<(f64, f64)> {
     let points = row.error_percentiles.iter();
     let mut points: Vec<(f64, f64)> =
         points.filter_map(|(percent, error)| Some(((*error)?, percent.parse().ok()?))).collect();
-    // The shares within the thresholds are points of the same curve.
+    // Shares within thresholds lie on the same curve.
     for (typed, &percent) in &row.recovered_percent {
         points.extend(typed.parse().ok().map(|threshold: f64| (threshold, percent)));
     }

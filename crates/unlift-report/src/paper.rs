@@ -1,36 +1,36 @@
-//! The figures of the paper this tool follows, to draw beside one's own.
+//! Published figures of the paper behind unlift, to draw beside the figures of an audit.
 //!
 //! Source: tables "geometric accuracy" of the paper and its supplement for 7-scenes, 12-scenes and
-//! Cambridge Landmarks. Those are other places than the reader's, so only the trend compares.
+//! Cambridge Landmarks. The scenes differ from those of an audit, so only the trend can be compared.
 
-/// Who published the dashed curves.
+/// The source of the dashed curves.
 pub const ATTRIBUTION: &str = "Chelani et al., Obfuscation Based Privacy Preserving \
     Representations are Recoverable Using Neighborhood Information, 3DV 2025";
 
 /// `published_3d.csv`: dataset, scheme, inlier ratio, threshold in meters, percent recovered.
 const TABLE: &str = include_str!("../published_3d.csv");
 
-/// Recovered share over inlier ratio, as printed for one dataset, scheme and threshold.
+/// The recovered share over the inlier ratio, as published for one dataset, scheme and threshold.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PublishedCurve {
-    /// `7-scenes`, `12-scenes` or `cambridge`; for images with the features if these are not SIFT.
+    /// `7-scenes`, `12-scenes` or `cambridge`; for images followed by the features if these are not SIFT.
     pub dataset: &'static str,
     /// The scheme's user-facing name.
     pub scheme: &'static str,
-    /// Error below which a point counts as recovered: meters in three dimensions, else pixels.
+    /// Largest error of a recovered point, in meters for maps and in pixels for images.
     pub threshold: f64,
-    /// (inlier ratio, percent of the points recovered), by falling ratio.
+    /// (inlier ratio, percent of the points recovered), by descending ratio.
     pub points: Vec<(f64, f64)>,
 }
 
-/// `published_2d.csv`: the same of keypoints of images, threshold in pixels.
+/// `published_2d.csv`: the columns of [`TABLE`] for keypoints of images, threshold in pixels.
 const TABLE_2D: &str = include_str!("../published_2d.csv");
 
 /// `published_seconds.csv`: scheme, points, K, inlier ratio, seconds. Source: supplementary table
 /// "runtime" of the same paper; 64 cores.
 const SECONDS: &str = include_str!("../published_seconds.csv");
 
-/// The seconds that the paper's recovery took on 64 cores, where it measured exactly this.
+/// Returns the published seconds of recovery on 64 cores; `None` if this case was not published.
 pub fn published_seconds(
     scheme: &str,
     n_points: usize,
@@ -48,22 +48,22 @@ pub fn published_seconds(
     })
 }
 
-/// All published curves in three dimensions, in the order of the table.
+/// Returns all published curves of maps, in the order of the table.
 pub fn published_3d() -> Vec<PublishedCurve> {
     curves(TABLE)
 }
 
-/// All published curves of keypoints of images, in the order of the table.
+/// Returns all published curves of images, in the order of the table.
 pub fn published_2d() -> Vec<PublishedCurve> {
     curves(TABLE_2D)
 }
 
-/// `published_pictures.csv`: dataset, dimensions, features, scheme (`none`: of the true points), inlier ratio, SSIM, PSNR in
-/// dB and LPIPS. Source: tables "SSIM 2D", "SSIM 3D" and the supplement's tables of perceptual similarity; where two disagree
-/// (the baseline of Cambridge in 3D) the paper's own.
+/// `published_pictures.csv`: dataset, dimensions, features, scheme (`none` for true points), inlier ratio, SSIM, PSNR in
+/// dB and LPIPS. Source: tables "SSIM 2D", "SSIM 3D" and the supplement's tables of perceptual similarity. If two disagree
+/// (the baseline of Cambridge in 3D), the value is from the paper itself.
 pub(crate) const PICTURES: &str = include_str!("../published_pictures.csv");
 
-/// How alike pictures of what came back were to the photos, SIFT, on one dataset.
+/// The published similarity of pictures to photos on one dataset, with SIFT.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PublishedPictures {
     /// `7-scenes`, `12-scenes` or `cambridge`.
@@ -72,8 +72,8 @@ pub struct PublishedPictures {
     pub ssim: f64,
 }
 
-/// What was published on pictures of what `scheme` hides (`none`: of the true points, then without a ratio) in `dim`
-/// dimensions, at most one of each dataset.
+/// Returns the published similarity of pictures for `scheme` in `dim` dimensions, at most one per dataset. The scheme `none`
+/// means the true points and has no ratio.
 pub fn published_pictures(
     dim: usize,
     scheme: &str,

@@ -1,36 +1,36 @@
-//! Every number of the paper's tables that an audit can be held against, with the table that prints it.
+//! Every number of the paper's tables that an audit can be compared with, and its table.
 //!
-//! Tables are counted as in the version on arXiv, which has the supplement behind the paper. Table 2 prints a part of
-//! tables 7 and 9, and the right half of table 3 a part of tables 10 and 12: what stands twice is listed once, under the
+//! Tables are numbered as in the version on arXiv, which has the supplement after the paper. Table 2 repeats a part of
+//! tables 7 and 9, and the right half of table 3 a part of tables 10 and 12. Repeated numbers are listed once, under the
 //! larger table.
 
 use crate::paper::{PICTURES, published_2d, published_3d};
 
-/// What a printed number measures.
+/// The quantity that a published number measures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Measured {
-    /// Percent of the points that are recovered within this distance: meters in three dimensions, else pixels.
+    /// Percent of the points recovered within this distance, in meters for maps and in pixels for images.
     Within(f64),
-    /// Structural similarity of a picture and its photo.
+    /// Structural similarity (SSIM) of a picture and its photo.
     Ssim,
-    /// The ratio of signal to noise of the same, in dB.
+    /// Peak signal-to-noise ratio (PSNR) of a picture and its photo, in dB.
     Psnr,
-    /// Their perceptual distance: less is more alike.
+    /// Perceptual distance (LPIPS) of a picture and its photo; lower means more similar.
     Lpips,
 }
 
-/// Whose points they are.
+/// The origin of the points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Points {
-    /// Recovered by neighbors of an oracle, of which this share is right.
+    /// Recovered with neighbors of an oracle, of which this share is right.
     Oracle(f64),
-    /// Recovered by neighbors that are estimated from descriptors.
+    /// Recovered with neighbors estimated from descriptors.
     Estimated,
     /// The originals themselves.
     Originals,
 }
 
-/// A number of a table.
+/// A published number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Printed {
     /// The number of the table.
@@ -41,11 +41,11 @@ pub struct Printed {
     pub features: &'static str,
     /// The scheme's user-facing name; `none` for originals.
     pub scheme: &'static str,
-    /// Whose points.
+    /// The origin of the points.
     pub points: Points,
-    /// What is measured of them.
+    /// The quantity.
     pub measured: Measured,
-    /// The number: a mean over the scenes of the dataset.
+    /// The number, a mean over the scenes of the dataset.
     pub value: f64,
 }
 
@@ -53,7 +53,7 @@ pub struct Printed {
 /// Source: table "End-to-end attack evaluation".
 const END_TO_END: &str = include_str!("../published_end_to_end.csv");
 
-/// All numbers of `7-scenes`, `12-scenes` or `cambridge`, table by table.
+/// Returns all numbers of `7-scenes`, `12-scenes` or `cambridge`, table by table.
 pub fn printed(dataset: &str) -> Vec<Printed> {
     let mut all = recovered(dataset, 2);
     all.extend(recovered(dataset, 3));
@@ -63,7 +63,6 @@ pub fn printed(dataset: &str) -> Vec<Printed> {
     all
 }
 
-/// What came back of images (2) or maps (3), by an oracle.
 fn recovered(dataset: &str, dim: usize) -> Vec<Printed> {
     let table = match (dim, dataset) {
         (2, "12-scenes") => 5,
@@ -99,8 +98,8 @@ fn pictures(dataset: &str) -> Vec<Printed> {
         if of != dataset {
             continue;
         }
-        // Of the originals of all three datasets the supplement prints what is that of 7-scenes: a slip of the heads of
-        // two tables. The paper itself has the SSIM of Cambridge.
+        // For originals, the supplement prints the numbers of 7-scenes for all three datasets, by mistake. The paper
+        // itself has the SSIM of Cambridge.
         let (psnr, lpips) = if copied(of, dim, scheme) { ("", "") } else { (psnr, lpips) };
         let ssim = if of == "12-scenes" && copied(of, dim, scheme) { "" } else { ssim };
         let table = match (of, dim) {
@@ -121,7 +120,6 @@ fn pictures(dataset: &str) -> Vec<Printed> {
     all
 }
 
-/// Whether the supplement prints another dataset's numbers here.
 fn copied(dataset: &str, dim: &str, scheme: &str) -> bool {
     dataset != "7-scenes" && dim == "3" && scheme == "none"
 }
@@ -142,7 +140,7 @@ fn end_to_end(dataset: &str) -> Vec<Printed> {
             "ssim" => Measured::Ssim,
             _ => Measured::Within(threshold.parse().ok()?),
         };
-        // These are those of table 1.
+        // Table 1 has these numbers, too.
         let repeated = features == "sift"
             && matches!(points, Points::Oracle(_))
             && matches!(measured, Measured::Within(_));

@@ -1,33 +1,35 @@
-//! Rounding to significant digits, so that a document's text is short and stable.
+//! Rounding to significant digits, which keeps a document's text short and stable.
 
 use serde::Serialize;
 use serde_json::Value;
 
 /// Significant decimal digits of every measured number in `audit.json`.
 ///
-/// Six digits are a micron in a meter: far below any threshold, and far above the noise of a sum.
+/// Six digits resolve a micron in a meter, far below any threshold and far above the rounding noise
+/// of sums.
 pub const SIGNIFICANT_DIGITS: usize = 6;
 
-/// `value` rounded to [`SIGNIFICANT_DIGITS`]; zero and non-finite values stay as they are.
+/// Rounds `value` to [`SIGNIFICANT_DIGITS`]; zero and non-finite values stay unchanged.
 pub(crate) fn round(value: f64) -> f64 {
     if value == 0.0 || !value.is_finite() {
         return value;
     }
-    // Through decimal text: exact where `(value * 10^n).round() / 10^n` leaves a tail of nines.
+    // Rounding through decimal text is exact; `(value * 10^n).round() / 10^n` leaves a tail of
+    // nines.
     format!("{value:.*e}", SIGNIFICANT_DIGITS - 1).parse().unwrap_or(value)
 }
 
-/// `value` as JSON, with numbers as `audit.json` has them.
+/// Returns `value` as JSON, with numbers rounded as in `audit.json`.
 ///
 /// # Errors
-/// When `value` cannot be JSON.
+/// Fails if `value` cannot be JSON.
 pub fn rounded(value: &impl Serialize) -> serde_json::Result<Value> {
     let mut value = serde_json::to_value(value)?;
     round_floats(&mut value);
     Ok(value)
 }
 
-/// Rounds every float inside `value`; integers keep all their digits.
+/// Rounds every float in `value`; integers keep all digits.
 pub(crate) fn round_floats(value: &mut Value) {
     match value {
         Value::Number(number) if number.is_f64() => {

@@ -1,22 +1,20 @@
-//! Gates as SARIF 2.1.0, as GitHub shows alerts: a rule per gate, a result per gate that did not hold.
+//! Gates as SARIF 2.1.0, which GitHub shows as alerts: a rule per gate, a result per failed gate.
 
 use serde_json::{Value, json};
 
 use crate::document::Document;
 use crate::gates::{self, GateWords};
 
-/// Where results point to in a document that names no map: the file that holds the figures.
+/// The location of results if the document names no map.
 const UNNAMED: &str = "audit.json";
 const REPOSITORY: &str = env!("CARGO_PKG_REPOSITORY");
 
-/// The gates of `document` as a SARIF log of one run. Results point to `asked_at`, a file and a line of it that asks for the
-/// audit, else to the map.
-///
-/// Ends with a line break.
+/// Returns the gates of `document` as a SARIF log of one run. Results point to `asked_at` (the file and line that request
+/// the audit), else to the map. The text ends with a line break.
 pub fn sarif(document: &Document, asked_at: Option<(&str, usize)>) -> String {
     let mut gates: Vec<GateWords> = Vec::new();
     for gate in document.gates.iter().map(gates::in_words) {
-        // A rule has one place in the list, however often its gate was typed.
+        // SARIF lists a rule once, even if its gate was given twice.
         if gates.iter().all(|known| known.gate != gate.gate) {
             gates.push(gate);
         }
@@ -44,7 +42,7 @@ pub fn sarif(document: &Document, asked_at: Option<(&str, usize)>) -> String {
         "invocations": [invocation],
         "results": failed.map(|(rule, gate)| result(rule, gate, (&at, line))).collect::<Vec<_>>(),
     });
-    // Two audits of one commit replace each other's alerts unless each has a category; the slash ends it.
+    // Two audits of one commit replace each other's alerts unless each has a category; the slash ends the category.
     let category = of_map.or_else(|| asked_at.map(|_| format!("{at}/{line}")));
     if let Some(category) = category {
         run["automationDetails"] = json!({ "id": format!("unlift/{category}/") });
@@ -61,7 +59,7 @@ fn rule(gate: &GateWords) -> Value {
     json!({
         "id": gate.gate,
         "shortDescription": { "text": format!("{}: {}", gate.gate, gate.allowed) },
-        "help": { "text": "report.html of the audit says what came back, and by which attack." },
+        "help": { "text": "report.html of the audit shows what came back, and by which attack." },
         "defaultConfiguration": { "level": "error" },
         "properties": { "tags": ["privacy"] },
     })
@@ -73,7 +71,7 @@ fn result(rule: usize, gate: &GateWords, (uri, line): (&str, usize)) -> Value {
         "ruleIndex": rule,
         "level": "error",
         "message": { "text": format!("{}: {}", gate.gate, gate.said) },
-        // GitHub takes no result without a line.
+        // GitHub rejects results without a line.
         "locations": [{ "physicalLocation": {
             "artifactLocation": { "uri": uri },
             "region": { "startLine": line },
@@ -81,7 +79,7 @@ fn result(rule: usize, gate: &GateWords, (uri, line): (&str, usize)) -> Value {
     })
 }
 
-/// A path as a reference of RFC 3986: what is absolute as `file:`, what is relative as it stands.
+/// Returns a path as a URI reference (RFC 3986): an absolute path as `file:`, a relative one unchanged.
 fn uri(path: &str) -> String {
     let path = match std::path::MAIN_SEPARATOR {
         '\\' => path.replace('\\', "/"),
@@ -97,7 +95,7 @@ fn uri(path: &str) -> String {
             b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'.' | b'_' | b'~' | b'/' => {
                 out.push(char::from(byte));
             }
-            // A colon, too, as what stands before the first one would be a scheme.
+            // A colon is escaped, too, because text before it would be a URI scheme.
             _ => out.push_str(&format!("%{byte:02X}")),
         }
     }

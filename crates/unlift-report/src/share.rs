@@ -1,29 +1,26 @@
-//! Documents that may leave the house: figures only.
+//! Documents that may be shared: figures only.
 
 use serde_json::Value;
 
 use crate::document::Document;
 
-/// What stands in place of a value that names something on the owner's machine.
 const WITHHELD: &str = "(withheld)";
 
-/// Options whose value is a name of the owner's, or tells a file of theirs.
+/// Options whose value may identify a file of the owner.
 const NAMING_OPTIONS: [&str; 9] =
     ["descriptors", "input", "inverter_sha256", "map", "model", "out", "path", "photos", "show"];
 
-/// Schemes and sources of unlift's. What others say of why they failed may be anything: a line of their data, a path.
+/// The schemes of unlift. A reason from another scheme or source may contain anything: a line of data, a path.
 const SCHEMES: [&str; 10] =
     ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp", "lines2d", "cp2d", "dcl2d"];
 const SOURCES: [&str; 7] =
     ["oracle", "file", "similarity", "overlap", "descriptors", "geometric", "learned"];
-/// What stands in place of what they say.
 const OWN_FAILED: &str = "its own function failed";
-/// Before the reason in that of a gate.
 const NOT_AUDITED: &str = " was not audited";
 
 impl Document {
-    /// A copy without paths, names, hashes of inputs (which confirm a guess of them), the command line and what schemes and
-    /// sources of others say of why they failed: figures and plain options only.
+    /// Returns a copy without paths, names, the command line, hashes of inputs (a hash confirms a guess of the input), and
+    /// reasons from schemes and sources of others.
     pub fn share_safe(&self) -> Self {
         let mut safe = self.clone();
         safe.input.path = None;
@@ -43,14 +40,14 @@ impl Document {
             let source = missing.neighbors.as_deref();
             let is_ours = SCHEMES.contains(&&*missing.scheme)
                 && source.is_none_or(|source| SOURCES.contains(&source));
-            // So are reasons told of solvers of others.
+            // A reason may also come from the solver of another author.
             if !is_ours || missing.reason.contains("solver ") {
                 missing.reason = OWN_FAILED.to_owned();
             }
             without_places(&mut missing.reason);
         }
         for reason in safe.gates.iter_mut().filter_map(|gate| gate.reason.as_mut()) {
-            // It stands with what was not audited, if it may.
+            // `not_audited` keeps the reason, if it may be shared.
             if let Some((what, _)) = reason.split_once(NOT_AUDITED) {
                 *reason = format!("{what}{NOT_AUDITED}");
             }
@@ -61,7 +58,7 @@ impl Document {
     }
 }
 
-/// Withholds a text that may name a file: where its path ends nobody can tell.
+/// Withholds a text that may contain a path, because the end of a path cannot be found.
 fn without_places(text: &mut String) {
     if text.contains(['/', '\\']) {
         *text = WITHHELD.to_owned();
@@ -71,7 +68,7 @@ fn without_places(text: &mut String) {
 fn withhold(option: &str, value: &mut Value) {
     match value {
         Value::String(text) => {
-            // `--neighbors oracle+x` is a choice, `--neighbors lists.parquet` a name of the owner's.
+            // `--neighbors oracle+x` is a choice, `--neighbors lists.parquet` a file of the owner.
             let is_choice = |c: char| c.is_ascii_lowercase() || c == '+';
             let names = NAMING_OPTIONS.contains(&option)
                 || (option == "neighbors" && !text.chars().all(is_choice))

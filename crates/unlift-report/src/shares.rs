@@ -1,4 +1,4 @@
-//! What came back of every scheme, for a summary in a few lines.
+//! The recovered share of every scheme, for a short summary.
 
 use crate::attack::Basis;
 use crate::cards::Card;
@@ -7,22 +7,23 @@ use crate::exhibit;
 use crate::inversions::Inversion;
 use crate::verdict::verdict;
 
-/// What came back of one scheme within the headline threshold, by the strongest attacks tried.
+/// The share of one scheme recovered within the headline threshold by the strongest attacks tried.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shares {
     /// The scheme's user-facing name.
     pub scheme: String,
-    /// What a person would call the scheme.
+    /// The scheme's title.
     pub title: String,
-    /// Percent from the released data alone; `None` where no such attack was tried.
+    /// Percent from the released data alone; `None` if no such attack was tried.
     pub today: Option<f64>,
-    /// Percent if neighbors were known, at the tested share nearest to half; `None` without an oracle.
+    /// Percent with known neighbors, at the tested inlier ratio nearest to one half; `None` without an
+    /// oracle.
     pub known: Option<f64>,
-    /// How many pictures can be rebuilt from the released data alone; `None` where nothing was painted.
+    /// How many pictures can be rebuilt from the released data alone; `None` if no picture was painted.
     pub pictures: Option<String>,
 }
 
-/// The shares of every scheme, the worst first, as the page leads with them.
+/// Returns the shares of every scheme, the worst first, as at the top of the page.
 pub fn shares(document: &Document, inversions: &[Inversion]) -> Vec<Shares> {
     let of = |card: Card| Shares {
         today: card.today(),

@@ -1,4 +1,4 @@
-//! The figures as tables of text: what the page shows without script.
+//! The figures as tables of text, which the page shows without script.
 
 use serde::Serialize;
 
@@ -6,26 +6,24 @@ use crate::document::{Bound, ByReason, ByThreshold, Document, LengthUnit, Row};
 use crate::paper::{self, PublishedPictures};
 use crate::{attack, words};
 
-/// A table of text.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Table {
     pub id: &'static str,
     pub caption: String,
     pub columns: Vec<Column>,
-    /// Cells by row; as many as there are columns.
+    /// Cells by row, one per column.
     pub rows: Vec<Vec<String>>,
-    /// What a cell means that a head cannot say.
+    /// Explanations below the table.
     pub notes: Vec<String>,
 }
 
-/// The head of a column.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Column {
     pub name: String,
     pub class: Class,
 }
 
-/// How the cells of a column are set.
+/// The layout of a column's cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Class {
@@ -49,7 +47,7 @@ impl Table {
         Self { id, caption: caption.into(), columns, rows, notes: Vec::new() }
     }
 
-    /// A row per row of the results: the cells that tell it apart, and those that `cells` adds under the heads `more`.
+    /// Returns a table with a row per row of the results: its key cells, then those of `cells` under the heads `more`.
     fn of_results(
         document: &Document,
         (id, caption): (&'static str, impl Into<String>),
@@ -61,7 +59,6 @@ impl Table {
         Self::new(id, caption, [key_columns(), more].concat(), rows.collect())
     }
 
-    /// Without columns of dashes: what no row has takes no room.
     fn without_empty_columns(mut self) -> Self {
         let kept: Vec<bool> = (0..self.columns.len())
             .map(|at| self.rows.is_empty() || self.rows.iter().any(|row| row[at] != NONE))
@@ -75,7 +72,7 @@ impl Table {
         self
     }
 
-    /// The table, unless it has no column beside those that tell rows apart.
+    /// Returns the table if it has rows, and columns besides the key columns.
     fn if_any(self) -> Option<Self> {
         (self.columns.len() > key_columns().len() && !self.rows.is_empty()).then_some(self)
     }
@@ -85,7 +82,6 @@ pub(crate) fn column(name: impl Into<String>, class: Class) -> Column {
     Column { name: name.into(), class }
 }
 
-/// Columns of figures.
 fn figures<T: Into<String>>(names: impl IntoIterator<Item = T>) -> Vec<Column> {
     names.into_iter().map(|name| column(name, Class::Figure)).collect()
 }
@@ -94,13 +90,12 @@ fn labels<const N: usize>(names: [&str; N]) -> Vec<Column> {
     names.map(|name| column(name, Class::Label)).into()
 }
 
-/// The columns that tell rows apart.
 fn key_columns() -> Vec<Column> {
-    [labels(["scheme", "solver", "neighbors by"]), figures(["of them right"])].concat()
+    [labels(["scheme", "solver", "neighbors"]), figures(["of them right"])].concat()
 }
 
 fn key_cells(row: &Row) -> Vec<String> {
-    let source = attack::source(&row.neighbors, row.oracle_noise.as_deref());
+    let source = attack::plain_source(&row.neighbors, row.oracle_noise.as_deref());
     let right = format!("{} %", words::ratio_percent(row.inlier_ratio));
     vec![row.scheme.clone(), row.solver.clone(), source, right]
 }
@@ -110,18 +105,16 @@ fn within_columns(document: &Document, who: &str) -> Vec<Column> {
     figures(names.map(|name| format!("{who}within {name}, %")))
 }
 
-/// A cell of a value that may not be known.
 fn known<T>(value: Option<T>, said: impl FnOnce(T) -> String) -> String {
     value.map_or(NONE.into(), said)
 }
 
-/// The shares within all thresholds, with their spread over seeds.
 fn shares(document: &Document, shares: &ByThreshold, spread: Option<&ByThreshold>) -> Vec<String> {
     let cell = |typed: &String| percent_cell(shares.get(typed), spread.and_then(|s| s.get(typed)));
     thresholds(document).iter().map(cell).collect()
 }
 
-/// `items` without those that repeat an earlier one.
+/// Returns `items` without repetitions, in their order.
 pub(crate) fn distinct<T: PartialEq>(items: impl IntoIterator<Item = T>) -> Vec<T> {
     let mut kept = Vec::new();
     for item in items {
@@ -132,7 +125,6 @@ pub(crate) fn distinct<T: PartialEq>(items: impl IntoIterator<Item = T>) -> Vec<
     kept
 }
 
-/// The schemes of a document, in the order of its rows.
 pub(crate) fn schemes(document: &Document) -> Vec<&str> {
     distinct(document.results.iter().map(|row| row.scheme.as_str()))
 }
@@ -141,7 +133,7 @@ fn points(document: &Document) -> &'static str {
     document.results.first().map_or("points", |row| words::points(row.unit))
 }
 
-/// The main figures: percent recovered, a column per threshold.
+/// Returns the table of main figures: percent recovered, a column per threshold.
 pub(crate) fn recovered(document: &Document) -> Table {
     let points = points(document);
     let heads = [figures(["K", "delta"]), within_columns(document, ""), figures([points])].concat();
@@ -152,7 +144,7 @@ pub(crate) fn recovered(document: &Document) -> Table {
         ),
         false => String::new(),
     };
-    let caption = format!("Recovered {points}, in percent of the {points} released.{spread}");
+    let caption = format!("Recovered {points}, in percent of the released {points}.{spread}");
     let table = Table::of_results(document, ("recovered", caption), heads, |row| {
         let mut cells =
             vec![row.k.to_string(), known(row.delta, |delta| words::length(delta, row.unit))];
@@ -164,7 +156,6 @@ pub(crate) fn recovered(document: &Document) -> Table {
     table.without_empty_columns()
 }
 
-/// What an attacker gets without neighborhoods, per scheme: by a guess, and by the records alone.
 pub(crate) fn baselines(document: &Document) -> Table {
     let mut rows: Vec<Vec<String>> = Vec::new();
     for scheme in schemes(document) {
@@ -176,25 +167,22 @@ pub(crate) fn baselines(document: &Document) -> Table {
         }));
         rows.extend(of().filter_map(|row| {
             let alone = row.records_alone_percent.as_ref()?;
-            // Another attack may be best at another threshold.
+            // The best attack may differ between thresholds.
             let by = row.records_alone_by.iter().flat_map(|by| by.values());
             let by = distinct(by.map(String::as_str)).join("; ");
             let who = attack::records_alone(Some(by.as_str()).filter(|by| !by.is_empty()));
             Some(line(who, shares(document, alone, None)))
         }));
     }
-    let caption =
-        "Attackers without lists of neighbors. Lists add what exceeds the larger of the two.";
+    let caption = "Baselines: what an attacker recovers without lists of neighbors. Lists add what exceeds the larger baseline.";
     let columns = [labels(["scheme", "attacker"]), within_columns(document, "")].concat();
-    // Rows of one scheme share their baselines: each is said once.
     Table::new("baselines", caption, columns, distinct(rows))
 }
 
-/// The shares over distinct places; `None` when no row has them.
 pub(crate) fn distinct_places(document: &Document) -> Option<Table> {
-    let blind = within_columns(document, "blind, ");
+    let blind = within_columns(document, "blind guess, ");
     let heads = [within_columns(document, ""), blind, figures(["places"])].concat();
-    let caption = "The same over distinct places: keypoints that lie on each other count once.";
+    let caption = "Recovered places, in percent: keypoints at the same place count once.";
     let table = Table::of_results(document, ("distinct", caption), heads, |row| {
         let distinct = row.distinct.as_ref()?;
         let mut cells = shares(document, &distinct.recovered_percent, None);
@@ -205,14 +193,13 @@ pub(crate) fn distinct_places(document: &Document) -> Option<Table> {
     table.if_any()
 }
 
-/// Percentiles of the error.
 pub(crate) fn errors(document: &Document) -> Table {
     let keys = document.results.iter().flat_map(|row| row.error_percentiles.keys());
-    // Half within is the median, which has a column.
+    // Percentile 50 is the median, which has its own column.
     let percentiles = distinct(keys.filter(|key| *key != "50"));
-    let mut heads = figures(["median", "blind, median"]);
+    let mut heads = figures(["median", "median of a blind guess"]);
     heads.extend(figures(percentiles.iter().map(|key| format!("{key} % within"))));
-    let caption = "Errors. Lost points count as infinitely far; a dash is a percentile among them.";
+    let caption = "Errors: distances from recovered to true points. Lost points count as infinitely far; a percentile among them is a dash.";
     let table = Table::of_results(document, ("errors", caption), heads, |row| {
         let of = |key: &&String| row.error_percentiles.get(*key).copied().flatten();
         let errors = [row.median_error, row.blind_median_error].into_iter();
@@ -222,7 +209,6 @@ pub(crate) fn errors(document: &Document) -> Table {
     table.without_empty_columns()
 }
 
-/// Break-even ratios, for every threshold; `None` without any.
 pub(crate) fn break_even(document: &Document) -> Option<Table> {
     let rows = document.break_even.iter().map(|point| {
         let ratio = point.inlier_ratio.map(words::ratio_percent);
@@ -233,23 +219,22 @@ pub(crate) fn break_even(document: &Document) -> Option<Table> {
             (_, None) => "not reached".to_owned(),
         };
         let within = threshold_text(document, &point.threshold);
-        let source = attack::source("oracle", point.oracle_noise.as_deref());
+        let source = attack::plain_source("oracle", point.oracle_noise.as_deref());
         vec![point.scheme.clone(), point.solver.clone(), source, within, ratio]
     });
-    let columns =
-        [labels(["scheme", "solver", "neighbors by"]), figures(["within", "of them right"])];
+    let columns = [labels(["scheme", "solver", "neighbors"]), figures(["within", "of them right"])];
     let caption =
         "Break-even: the smallest share of right neighbors at which half of the points come back.";
     let table = Table::new("break-even", caption, columns.concat(), rows.collect());
     (!table.rows.is_empty()).then_some(table)
 }
 
-/// Points lost and not released, by reason.
 pub(crate) fn losses(document: &Document) -> Table {
     let points = points(document);
     let capital = words::capital(points);
-    let caption =
-        format!("{capital} not released by the scheme, and {points} that recovery gave up.");
+    let caption = format!(
+        "{capital} that the scheme did not release, and {points} that were lost in recovery, by reason."
+    );
     let heads = vec![
         column(format!("{points} released"), Class::Figure),
         column("not released", Class::Prose),
@@ -272,21 +257,20 @@ fn reasons(map: &ByReason) -> String {
     if parts.is_empty() { NONE.to_owned() } else { parts.join(", ") }
 }
 
-/// What stands in place of a share of sure points that cannot be had.
 const UNKNOWN: &str = "not known here";
 
-/// Choices that recovery got right, and points it is sure of; `None` when no row has any.
+/// Returns the table of correct choices and of points that the attacker is sure of; `None` if no row has any.
 pub(crate) fn choices(document: &Document) -> Option<Table> {
     let percent = |value: Option<f64>| known(value, words::percent);
     let mut notes: Vec<String> = Vec::new();
     let heads = figures([
-        "axis right, %",
-        "exact, %",
-        "descriptor right, %",
-        "sure, %",
-        "sure ones right, %",
+        "swapped axis found, %",
+        "recovered exactly, %",
+        "descriptor assigned right, %",
+        "attacker sure, %",
+        "right of these, %",
     ]);
-    let caption = "Choices that recovery got right, and points that the attacker is sure of.";
+    let caption = "Correct choices of the attack, and points that the attacker is sure of.";
     let mut table = Table::of_results(document, ("choices", caption), heads, |row| {
         let sure = match (&row.sure_unknown, row.sure_percent) {
             (Some(reason), None) => {
@@ -307,23 +291,21 @@ pub(crate) fn choices(document: &Document) -> Option<Table> {
     table.without_empty_columns().if_any()
 }
 
-/// Metrics, a column each; `None` when no row has any.
 pub(crate) fn metrics(document: &Document) -> Option<Table> {
     let names = document.results.iter().flat_map(|row| row.metrics.keys());
     let names = distinct(names.filter(|name| !is_of_pictures(name)));
     let heads = figures(names.iter().map(|name| name.as_str()));
-    let table = Table::of_results(document, ("metrics", "Further figures."), heads, |row| {
+    let table = Table::of_results(document, ("metrics", "Further measures."), heads, |row| {
         let text = |name: &&String| known(row.metrics.get(*name), |x| words::significant(*x, 3));
         Some(names.iter().map(text).collect())
     });
     table.if_any()
 }
 
-/// RANSAC's trials per point; `None` when no row has them.
 pub(crate) fn trials(document: &Document) -> Option<Table> {
     let points = points(document);
     let heads = vec![column(format!("{points} by trials"), Class::Prose)];
-    let caption = format!("RANSAC: number of {points} by trials needed.");
+    let caption = format!("RANSAC: number of {points} by the number of random trials needed.");
     let table = Table::of_results(document, ("trials", caption), heads, |row| {
         let bins = row.ransac_trials.as_ref()?.iter().map(|&(bound, count)| {
             format!("≤ {}: {}", words::thousands(bound), words::thousands(count))
@@ -333,7 +315,6 @@ pub(crate) fn trials(document: &Document) -> Option<Table> {
     table.if_any()
 }
 
-/// Seconds per row and stage; `None` when the run has none.
 pub(crate) fn times(document: &Document) -> Option<Table> {
     let seconds = &document.run.seconds;
     let stages = distinct(seconds.rows.iter().flat_map(|row| row.keys()));
@@ -347,28 +328,25 @@ pub(crate) fn times(document: &Document) -> Option<Table> {
     table.if_any()
 }
 
-/// The metrics of [`likeness`] and how they are told.
+/// The metrics of [`likeness`]: name in a document, head of a column, decimals.
 const LIKENESS: [(&str, &str, usize); 3] =
     [("ssim", "SSIM", 3), ("psnr", "PSNR, dB", 1), ("lpips", "LPIPS", 3)];
-/// What the names of metrics begin with that are about a class of objects.
 const OF_CLASS: &str = "objects_found_of_";
-/// What they end with when they are about pictures of the true points.
 const BASELINE: &str = "_baseline";
 
-/// Whether one of the tables of pictures shows the metric `name`.
+/// Returns whether a table of pictures shows the metric `name`.
 fn is_of_pictures(name: &str) -> bool {
     let of = name.strip_suffix(BASELINE).unwrap_or(name);
     name.starts_with(OF_CLASS) || LIKENESS.iter().any(|(metric, _, _)| *metric == of)
 }
 
-/// The table with a first line, of pictures of the true points.
 fn with_unprotected(mut table: Table, cells: Vec<String>) -> Table {
     let keys = ["without protection", NONE, NONE, NONE].map(str::to_owned);
     table.rows.insert(0, [keys.to_vec(), cells].concat());
     table
 }
 
-/// How alike pictures are to the photos, beside what was published on other places; `None` when no row has any.
+/// Returns the table of the similarity of pictures to the photos, beside published figures; `None` if no row has any.
 pub(crate) fn likeness(document: &Document) -> Option<Table> {
     let first = document.results.iter().find(|row| row.metrics.contains_key("ssim"))?;
     let dim = if first.unit == LengthUnit::Pixel { 2 } else { 3 };
@@ -396,8 +374,8 @@ pub(crate) fn likeness(document: &Document) -> Option<Table> {
     };
     let mut heads = figures(LIKENESS.map(|(_, name, _)| name).into_iter().chain(["SSIM lost"]));
     heads.extend(figures(baselines.iter().map(|one| format!("paper, {}: SSIM", one.dataset))));
-    let caption = "How alike pictures of what came back are to the photos, means over photos: SSIM and PSNR are larger, LPIPS smaller the \
-                   more alike. The paper’s figures are of other places, another network and full size: compare what is lost.";
+    let caption = "Similarity of pictures, painted from recovered points, to the photos; means over photos. Higher SSIM and PSNR and lower \
+                   LPIPS mean more similar. The paper’s figures are of other places, another network and full size: compare only the loss.";
     let table = Table::of_results(document, ("likeness", caption), heads, |row| {
         let found = match row.neighbors.as_str() {
             "oracle" => paper::published_pictures(dim, &row.scheme, Some(row.inlier_ratio)),
@@ -409,7 +387,8 @@ pub(crate) fn likeness(document: &Document) -> Option<Table> {
     Some(with_unprotected(table, unprotected).without_empty_columns())
 }
 
-/// The share of the photos' objects that is found again in the pictures, a column per class; `None` when no row has any.
+/// Returns the table of the photos' objects that are found again in the pictures, a column per class; `None` if no row
+/// has any.
 pub(crate) fn objects(document: &Document) -> Option<Table> {
     let names = document.results.iter().flat_map(|row| row.metrics.keys());
     let classes = names.filter_map(|name| name.strip_prefix(OF_CLASS));
@@ -424,23 +403,21 @@ pub(crate) fn objects(document: &Document) -> Option<Table> {
     };
     let first = document.results.iter().find(|row| row.metrics.contains_key("objects_found"))?;
     let heads = figures(classes.iter().map(|class| format!("{}, %", class.replace('_', " "))));
-    let caption = "Everyday objects that a detector finds again, in the same place, of those that it finds in the photos; means over \
-                   the photos that show one.";
+    let caption = "Everyday objects that a detector finds in the photos, and the share that it finds again in the same place of the \
+                   pictures; means over the photos that show one.";
     let cells = |row: &Row| Some(found(row, ""));
     let table = Table::of_results(document, ("objects", caption), heads, cells);
     with_unprotected(table, found(first, BASELINE)).if_any()
 }
 
-/// Every threshold of the document, as typed, in order.
 pub(crate) fn thresholds(document: &Document) -> Vec<String> {
     let typed = document.results.iter().flat_map(|row| row.recovered_percent.keys());
     distinct(typed).into_iter().cloned().collect()
 }
 
-/// In pixels, the threshold that speaks for an image: half way between exact and roughly right.
 const HEADLINE_PX: f64 = 10.0;
 
-/// The threshold that verdicts are about: the first; for images the one nearest to 10 px.
+/// Returns the threshold of verdicts: the first; for images the one nearest to 10 px.
 pub(crate) fn headline_threshold(document: &Document) -> Option<String> {
     let all = thresholds(document);
     if document.results.first().is_none_or(|row| row.unit != LengthUnit::Pixel) {
@@ -452,7 +429,6 @@ pub(crate) fn headline_threshold(document: &Document) -> Option<String> {
     all.into_iter().min_by(|a, b| away(a).total_cmp(&away(b)))
 }
 
-/// A threshold in words of the document's unit.
 pub(crate) fn threshold_text(document: &Document, typed: &str) -> String {
     match document.results.first() {
         Some(row) => words::threshold(typed, row.unit),
@@ -460,10 +436,10 @@ pub(crate) fn threshold_text(document: &Document, typed: &str) -> String {
     }
 }
 
-/// A standard deviation over seeds up to this many percentage points is not worth a look.
+/// Standard deviations over seeds up to this many percentage points are not shown.
 const SPREAD_THAT_COUNTS: f64 = 0.5;
 
-/// A percentage, with its standard deviation over seeds where that is worth a look.
+/// Returns the cell of a percentage, with its standard deviation over seeds if that is above [`SPREAD_THAT_COUNTS`].
 pub(crate) fn percent_cell(value: Option<&f64>, spread: Option<&f64>) -> String {
     match (value, spread.filter(|spread| **spread > SPREAD_THAT_COUNTS)) {
         (None, _) => NONE.to_owned(),

@@ -4,11 +4,11 @@ use crate::document::{Bound, Document, LengthUnit, Row, STRONGEST};
 use crate::verdict::Verdict;
 use crate::{attack, tables, tiles, verdict, words};
 
-/// The verdict in a line or two, then a few lines per scheme, the worst first: what comes back today by every source
-/// tried and by the records alone, then by the oracle at the headline inlier ratio. Percent recovered within each
-/// threshold, a blind guess, the break-even ratio.
+/// Returns the verdict in two lines, then a table with a few lines per scheme, the worst first: every source tried, the
+/// records alone, and the oracle at the headline inlier ratio. Columns are the percentages within each threshold, a
+/// blind guess and the break-even ratio.
 ///
-/// Plain text, at most about 100 columns, ends with a line break.
+/// The text has at most about 100 columns and ends with a line break.
 pub fn text_table(document: &Document) -> String {
     let thresholds = tables::thresholds(document);
     let headline = tables::headline_threshold(document).unwrap_or_default();
@@ -50,7 +50,7 @@ pub fn text_table(document: &Document) -> String {
     for refused in &document.not_audited {
         let by = refused.neighbors.as_ref().map(|source| format!(" by {source}"));
         let (scheme, by) = (&refused.scheme, by.unwrap_or_default());
-        // A source's own reasons begin with its name.
+        // The reason of a source may begin with the source's name.
         let own = refused.neighbors.as_ref().map(|source| format!("{source}: "));
         let reason = own.and_then(|own| refused.reason.strip_prefix(&own));
         let reason = reason.unwrap_or(&refused.reason);
@@ -59,7 +59,7 @@ pub fn text_table(document: &Document) -> String {
     text
 }
 
-/// The line of an attack on the records alone, without the last two cells, and its share within the headline threshold.
+/// Returns the share by the records alone within the headline threshold, and its line without the last two cells.
 fn records_alone(
     document: &Document,
     scheme: &str,
@@ -76,7 +76,6 @@ fn records_alone(
     Some((share, cells))
 }
 
-/// The line of a row.
 fn cells(document: &Document, row: &Row, thresholds: &[String], headline: &str) -> Vec<String> {
     let right = format!("{} %", words::ratio_percent(row.inlier_ratio));
     let source = attack::source(&row.neighbors, row.oracle_noise.as_deref());
@@ -105,7 +104,7 @@ fn unit(document: &Document) -> &'static str {
     }
 }
 
-/// Of the curve on which the row lies; rows that are no oracle's lie on none.
+/// Returns the break-even ratio of the curve with this row; a dash for rows that are not the oracle's.
 fn break_even(document: &Document, row: &Row, typed: &str) -> String {
     let noise = |noise: &Option<String>| noise.clone().unwrap_or_else(|| "uniform".to_owned());
     let mut points = document.break_even.iter().filter(|point| {
@@ -115,7 +114,6 @@ fn break_even(document: &Document, row: &Row, typed: &str) -> String {
             && noise(&point.oracle_noise) == noise(&row.oracle_noise)
             && point.threshold == typed
     });
-    // Of one ratio there is no curve.
     let of_scheme = document.results.iter().filter(|other| other.scheme == row.scheme);
     let is_other =
         |other: &Row| other.oracle_noise.is_some() && other.inlier_ratio != row.inlier_ratio;
@@ -130,8 +128,8 @@ fn break_even(document: &Document, row: &Row, typed: &str) -> String {
     }
 }
 
-/// Rows of text with columns as wide as their widest cell, two spaces apart: those in `left` flush left, others flush
-/// right.
+/// Aligns rows of text: columns are as wide as their widest cell and two spaces apart; those in `left` are flush left,
+/// others flush right.
 pub fn align(rows: &[Vec<String>], left: &[usize]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |column: usize| {

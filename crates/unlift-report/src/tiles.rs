@@ -1,4 +1,4 @@
-//! What is known of the tiles of a large map, and where it leaks most: a heat map of the plan view.
+//! The figures of the tiles of a large map, as a table and as a heat map of the plan view.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,46 +9,40 @@ use crate::{attack, verdict, words};
 /// The figures of one tile.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct TileFigures {
-    /// The lowest and the highest corner of its points in plan view, but for a fiftieth on every side, in the unit of the audit; `None`
-    /// in a share-safe document.
+    /// The lowest and the highest corner of its points in plan view, in the unit of the audit, without a fiftieth of the points on
+    /// every side; `None` in a share-safe document.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bounds: Option<[[f64; 2]; 2]>,
-    /// Its points.
+    /// Number of its points.
     pub n_points: u64,
-    /// Percent of them recovered within each threshold: one per row of `results`, in the same order.
+    /// Percent recovered within each threshold; one per row of `results`, in the same order.
     pub recovered_percent: Vec<ByThreshold>,
 }
 
-/// A heat map of one scheme.
 #[derive(Debug, Serialize)]
 pub(crate) struct HeatMap {
-    /// What it shows.
     title: String,
-    /// Width and height of the drawing.
     size: [f64; 2],
     boxes: Vec<HeatBox>,
 }
 
-/// A tile of a heat map.
 #[derive(Debug, Serialize)]
 struct HeatBox {
     x: f64,
     y: f64,
     width: f64,
     height: f64,
-    /// How strong its color is, from 0 to 1.
     share: f64,
-    /// What it says: shown where there is room, and when pointed at.
+    /// Percent that came back, drawn if there is room; `title` appears under the pointer.
     percent: String,
     title: String,
 }
 
-/// The longer side of a heat map.
+/// The longer side of a heat map, in units of the drawing.
 const SIDE: f64 = 480.0;
-/// Heat maps at most: those of the schemes that leak most.
 const MOST: usize = 4;
 
-/// The row that leaks most of every scheme within the headline threshold, by its place among the results; the worst scheme first.
+/// Returns, for every scheme, the row with the largest share and its index in the results; the worst scheme first.
 fn strongest(document: &Document) -> Vec<(usize, &Row)> {
     verdict::verdict(document)
         .cards
@@ -61,7 +55,7 @@ fn strongest(document: &Document) -> Vec<(usize, &Row)> {
         .collect()
 }
 
-/// Heat maps of the schemes that leak most; none of a document without tiles or without their places.
+/// Returns heat maps of the schemes that leak most; none if the document has no tiles or not their bounds.
 pub(crate) fn heat_maps(document: &Document) -> Vec<HeatMap> {
     let Some(headline) = tables::headline_threshold(document) else { return Vec::new() };
     let placed: Option<Vec<[[f64; 2]; 2]>> =
@@ -81,7 +75,7 @@ pub(crate) fn heat_maps(document: &Document) -> Vec<HeatMap> {
             let points = words::thousands(tile.n_points);
             HeatBox {
                 x: scale * (first[0] - low[0]),
-                // The page counts downwards.
+                // The y axis of SVG points down.
                 y: scale * (high[1] - last[1]),
                 width: (scale * (last[0] - first[0])).max(1.0),
                 height: (scale * (last[1] - first[1])).max(1.0),
@@ -99,7 +93,6 @@ pub(crate) fn heat_maps(document: &Document) -> Vec<HeatMap> {
     strongest(document).iter().take(MOST).map(drawn).collect()
 }
 
-/// A row per tile, a column per scheme; `None` of a document without tiles.
 pub(crate) fn table(document: &Document) -> Option<Table> {
     if document.tiles.is_empty() {
         return None;
@@ -118,14 +111,14 @@ pub(crate) fn table(document: &Document) -> Option<Table> {
         cells
     };
     let caption = format!(
-        "Recovered points of every tile within {}, by the strongest attack on the whole map.",
+        "Points of every tile recovered within {}, in percent, by the strongest attack on the whole map.",
         tables::threshold_text(document, &headline)
     );
     let rows = document.tiles.iter().enumerate().map(cells).collect();
     Some(Table::new("tiles", caption, columns, rows))
 }
 
-/// The tile from which most comes back, in a line for a terminal; `None` of a document without tiles.
+/// Returns a line for the terminal about the tile that leaks most; `None` for a document without tiles.
 pub(crate) fn line(document: &Document) -> Option<String> {
     let headline = tables::headline_threshold(document)?;
     let (at, row) = *strongest(document).first()?;

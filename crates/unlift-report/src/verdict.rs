@@ -1,6 +1,6 @@
-//! The verdict on every scheme by the strongest attack tried: first today, from the released data
-//! alone, then if neighbors were known. The worst scheme comes first. The word "safe" never appears: an
-//! audit shows what some attacks took, not what no attack can take.
+//! The verdict on every scheme by the strongest attack tried: first from the released data alone, then with
+//! known neighbors. The worst scheme comes first. The word "safe" never appears, because an audit shows what
+//! the tried attacks recover, and others may recover more.
 
 use std::collections::BTreeMap;
 
@@ -12,16 +12,14 @@ use crate::cards::{Card, Finding, Level, Refusal};
 use crate::document::{Bound, BreakEven, Document, Row};
 use crate::{tables, words};
 
-/// The inlier ratio of the oracle's headline, if it was tested; else the tested one nearest to it.
+/// The oracle's headline is its tested inlier ratio nearest to this one.
 const HEADLINE_RATIO: f64 = 0.5;
 
-/// The verdict on an audit: in a few lines, by scheme, and what to do next.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Verdict {
     pub banner: Banner,
     pub cards: Vec<Card>,
     pub refusals: Vec<Refusal>,
-    /// What to do next, the most urgent first.
     pub steps: Vec<String>,
 }
 
@@ -29,7 +27,7 @@ pub(crate) struct Verdict {
 pub(crate) fn verdict(document: &Document) -> Verdict {
     let schemes = tables::schemes(document).into_iter();
     let mut cards: Vec<Card> = schemes.filter_map(|scheme| card(document, scheme)).collect();
-    // Stable: equal shares keep the document's order.
+    // The sort is stable, so equal shares keep the document's order.
     cards.sort_by(|a, b| {
         let ((a, a_then), (b, b_then)) = (a.badness(), b.badness());
         b.total_cmp(&a).then(b_then.total_cmp(&a_then))
@@ -45,13 +43,12 @@ pub(crate) fn verdict(document: &Document) -> Verdict {
     Verdict { banner, cards, refusals, steps }
 }
 
-/// Percent that came back within the threshold `typed`.
 pub(crate) fn share(row: &Row, typed: &str) -> f64 {
     row.recovered_percent.get(typed).copied().unwrap_or(0.0)
 }
 
-/// The row of `scheme` that speaks for attacks on this basis: the largest share, of the oracle's rows at
-/// the ratio nearest to the headline's.
+/// Returns the row of `scheme` with the largest share on this basis; for the oracle, among the rows whose
+/// ratio is nearest to [`HEADLINE_RATIO`].
 pub(crate) fn strongest<'a>(document: &'a Document, scheme: &str, basis: Basis) -> Option<&'a Row> {
     let typed = tables::headline_threshold(document)?;
     let away = |row: &Row| match basis {
@@ -64,7 +61,7 @@ pub(crate) fn strongest<'a>(document: &'a Document, scheme: &str, basis: Basis) 
     })
 }
 
-/// The row that recovers most of `scheme` within `typed` from these neighborhoods; of equal ones the first.
+/// Returns the row that recovers most of `scheme` within `typed` from these neighborhoods; of equal ones the first.
 pub(crate) fn strongest_given<'a>(
     document: &'a Document,
     scheme: &str,
@@ -84,7 +81,7 @@ pub(crate) fn strongest_given<'a>(
     best
 }
 
-/// The strongest row of every source of `scheme` but the oracle, most recovered first, then the oracle's.
+/// Returns the strongest row of every source of `scheme`: most recovered first, the oracle last.
 pub(crate) fn by_source<'a>(document: &'a Document, scheme: &str) -> Vec<&'a Row> {
     let typed = tables::headline_threshold(document).unwrap_or_default();
     let mut best: BTreeMap<&str, &Row> = BTreeMap::new();
@@ -102,7 +99,8 @@ pub(crate) fn by_source<'a>(document: &'a Document, scheme: &str) -> Vec<&'a Row
     rows
 }
 
-/// Percent by the records alone within `typed`, and the attack that got it: the best of the scheme's rows.
+/// Returns the percentage by the records alone within `typed`, the best of the scheme's rows, and the attack's
+/// name.
 pub(crate) fn records_alone<'a>(
     document: &'a Document,
     scheme: &str,
@@ -121,7 +119,7 @@ fn card(document: &Document, scheme: &str) -> Option<Card> {
     let typed = &tables::headline_threshold(document)?;
     let alone = records_alone(document, scheme, typed);
     let blind = |row: &Row| row.blind_percent.get(typed).copied().unwrap_or(0.0);
-    // An attack without neighborhoods counts wherever it gets more than one with them.
+    // A baseline that recovers more than the row replaces it.
     let without = |row: &Row| match alone {
         Some((percent, by)) if percent >= blind(row) => {
             (percent, attack::records_alone(by), "records alone".to_owned())
@@ -144,7 +142,7 @@ fn card(document: &Document, scheme: &str) -> Option<Card> {
     let any = document.results.iter().find(|row| row.scheme == scheme)?;
     let mut findings: Vec<Finding> =
         [Basis::Released, Basis::Given, Basis::Oracle].into_iter().filter_map(of).collect();
-    // Records alone are released as well, and so is what a guess needs.
+    // Baselines need only the released data, so they are attacks of today.
     let (floor, ..) = without(any);
     let tells = alone.is_some() || Level::of(floor) > Level::Gray;
     if tells && findings.iter().all(|finding| finding.basis != Basis::Released) {
@@ -156,11 +154,8 @@ fn card(document: &Document, scheme: &str) -> Option<Card> {
     let has_today = findings.iter().any(|finding| finding.basis == Basis::Released);
     let refused = document.not_audited.iter().filter(|refused| refused.scheme == scheme);
     let refused = refused.filter_map(|refused| {
-        let source = attack::source(refused.neighbors.as_deref()?, None);
-        Some(format!(
-            "Neighborhoods by {source} were not tried: {}.",
-            refused.reason.trim_end_matches('.')
-        ))
+        let source = attack::plain_source(refused.neighbors.as_deref()?, None);
+        Some(format!("Not tried with {source}: {}.", refused.reason.trim_end_matches('.')))
     });
     let points = words::points(any.unit);
     Some(Card {
@@ -175,18 +170,17 @@ fn card(document: &Document, scheme: &str) -> Option<Card> {
     })
 }
 
-/// Under which condition an attack on this basis gets what it got.
 fn when(basis: Basis, row: &Row) -> String {
     match basis {
         Basis::Released => "Today, from the released data alone".to_owned(),
-        Basis::Given => "With the given neighborhoods".to_owned(),
+        Basis::Given => "With neighbors from a given file".to_owned(),
         Basis::Oracle => words::capital(&words::if_known(row.inlier_ratio)),
     }
 }
 
-/// What an attacker without neighborhoods gets, and what neighborhoods add to the larger of the two: "A blind guess
-/// gets 8.1 %, the records alone 65.2 %. Neighborhoods add 21.3 percentage
-/// points (overlap)."
+/// Returns what the two baselines recover, and what lists of neighbors add to the larger one: "A blind guess recovers
+/// 8.1 %, the released records alone 65.2 %. Lists of neighbors add 21.3 percentage points (by descriptor
+/// overlap)."
 fn baselines(
     document: &Document,
     scheme: &str,
@@ -196,30 +190,31 @@ fn baselines(
     let rows = document.results.iter().filter(|row| row.scheme == scheme);
     let blind = rows.filter_map(|row| row.blind_percent.get(typed).copied());
     let blind = blind.max_by(f64::total_cmp).unwrap_or(0.0);
-    let guess = format!("A blind guess gets {} %", words::percent(blind));
+    let guess = format!("A blind guess recovers {} %", words::percent(blind));
     let (without, floor) = match alone {
         Some((percent, _)) => {
             let records = words::percent(percent);
-            (format!("{guess}, the records alone {records} %."), percent.max(blind))
+            (format!("{guess}, the released records alone {records} %."), percent.max(blind))
         }
         None => (format!("{guess}."), blind),
     };
     let adds: Vec<String> = by_source(document, scheme)
         .into_iter()
-        // A solver that needs no neighborhoods tells nothing about what they add.
+        // Solvers without neighborhoods do not show what lists add.
         .filter(|row| attack::has_neighborhoods(row))
         .map(|row| {
-            let source = attack::source(&row.neighbors, row.oracle_noise.as_deref());
+            let source = attack::plain_source(&row.neighbors, row.oracle_noise.as_deref());
+            let source = source.trim_start_matches("neighbors ");
             format!("{} ({source})", added(share(row, typed) - floor))
         })
         .collect();
     match adds.is_empty() {
         true => without,
-        false => format!("{without} Neighborhoods add {}.", words::list(&adds)),
+        false => format!("{without} Lists of neighbors add {}.", words::list(&adds)),
     }
 }
 
-/// A gain over a baseline in percentage points. It is nothing only where nothing was gained.
+/// Returns a gain over a baseline in words; `nothing` only if it is not positive.
 fn added(gain: f64) -> String {
     match gain {
         0.05.. => format!("{} percentage points", words::percent(gain)),
@@ -228,7 +223,6 @@ fn added(gain: f64) -> String {
     }
 }
 
-/// The break-even ratio of the scheme's strongest attack: the lowest one.
 fn lowest<'a>(document: &'a Document, scheme: &str, typed: &str) -> Option<&'a BreakEven> {
     let rank = |point: &BreakEven| match (point.bound, point.inlier_ratio) {
         (Bound::BelowTested, ratio) => (0, ratio.unwrap_or(0.0)),
@@ -251,16 +245,18 @@ fn break_even(point: &BreakEven, points: &str) -> String {
         }
         (Bound::BelowTested, Some(ratio)) => {
             format!(
-                "Half of the {points} come back even when {ratio} % of the neighbors are right, the fewest tested."
+                "Half of the {points} come back even when only {ratio} % of the neighbors are right, the smallest share tested."
             )
         }
         (Bound::AboveTested, Some(ratio)) => {
             format!(
-                "Less than half came back at every share of right neighbors tested, up to {ratio} %."
+                "Less than half of the {points} came back, even with {ratio} % of the neighbors right, the largest share tested."
             )
         }
         (_, None) => {
-            "Less than half came back at every share of right neighbors tested.".to_owned()
+            format!(
+                "Less than half of the {points} came back at every tested share of right neighbors."
+            )
         }
     }
 }

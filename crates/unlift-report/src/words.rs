@@ -1,8 +1,8 @@
-//! How numbers are said: thresholds, shares, ratios, schemes, reasons.
+//! Numbers and names in words: thresholds, shares, ratios, schemes, reasons.
 
 use crate::document::LengthUnit;
 
-/// A scheme as a person would call it; unknown schemes are called by their short name.
+/// Returns the title of a scheme; an unknown scheme keeps its name.
 pub(crate) fn scheme_title(scheme: &str) -> &str {
     match scheme {
         "olc" => "Random lines",
@@ -19,14 +19,16 @@ pub(crate) fn scheme_title(scheme: &str) -> &str {
     }
 }
 
-/// What a scheme publishes in place of a point, in a sentence; empty for unknown schemes.
+/// Returns a sentence on what a scheme publishes in place of a point; empty for unknown schemes.
 pub(crate) fn scheme_rule(scheme: &str) -> &'static str {
     match scheme {
         "olc" => "Each point becomes a line of random direction through it.",
         "ppl" => "Two random points share the line through both.",
         "ppl+" => "Two points share a line that leaves the surface around them.",
         "ray" => "Each point becomes a ray from one of two published centers.",
-        "ray-voxel" => "As the ray cloud; the center follows the parity of the point's voxel.",
+        "ray-voxel" => {
+            "Each point becomes a ray from one of two published centers; the voxel of the point decides which."
+        }
         "plane" => "Each point keeps one coordinate of three.",
         "cp" => "Two points swap one coordinate.",
         "lines2d" => "Each keypoint becomes a line of random direction through it.",
@@ -36,10 +38,10 @@ pub(crate) fn scheme_rule(scheme: &str) -> &'static str {
     }
 }
 
-/// The unit of a map without a scale, in words; the page says once what it is exactly.
+/// The unit of a map without a scale, in words; the page defines it once.
 pub(crate) const USUAL_DISTANCE: &str = "the usual distance to the K-th neighbor";
 
-/// A threshold as typed, short: `10 cm`, `2.5×` (times [`USUAL_DISTANCE`]), `10 px`.
+/// Returns a threshold in short form: `10 cm`, `2.5×` (times [`USUAL_DISTANCE`]), `10 px`.
 pub(crate) fn threshold(typed: &str, unit: LengthUnit) -> String {
     match (unit, typed.parse::<f64>()) {
         (LengthUnit::Meter, Ok(meters)) => meters_text(meters),
@@ -50,7 +52,7 @@ pub(crate) fn threshold(typed: &str, unit: LengthUnit) -> String {
     }
 }
 
-/// A threshold as typed, in a sentence: `within 10 cm`, `within 2.5 times the usual distance ...`.
+/// Returns a threshold for a sentence: `within 10 cm`, `within 2.5 times the usual distance ...`.
 pub(crate) fn within(typed: &str, unit: LengthUnit) -> String {
     match (unit, typed.parse::<f64>()) {
         (LengthUnit::KthNeighbor, Ok(1.0)) => format!("within {USUAL_DISTANCE}"),
@@ -59,7 +61,6 @@ pub(crate) fn within(typed: &str, unit: LengthUnit) -> String {
     }
 }
 
-/// What is hidden: points of a map, or keypoints of images.
 pub(crate) fn points(unit: LengthUnit) -> &'static str {
     match unit {
         LengthUnit::Meter | LengthUnit::KthNeighbor => "points",
@@ -67,7 +68,7 @@ pub(crate) fn points(unit: LengthUnit) -> &'static str {
     }
 }
 
-/// A length of the document's unit: centimeters below a meter, pixels, or multiples of the unit.
+/// Returns a length in words: centimeters below a meter, pixels, or multiples of the unit.
 pub(crate) fn length(value: f64, unit: LengthUnit) -> String {
     match unit {
         LengthUnit::Meter => meters_text(value),
@@ -86,17 +87,14 @@ fn meters_text(meters: f64) -> String {
     }
 }
 
-/// `value` with three significant digits, in groups of thousands.
 fn grouped(value: f64) -> String {
     let text = significant(value, 3);
-    // From a thousand on three digits leave no fraction.
     match text.parse::<u64>() {
         Ok(whole) => thousands(whole),
         Err(_) => text,
     }
 }
 
-/// `value` with at most `digits` significant digits and no trailing zeros.
 pub(crate) fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
@@ -105,12 +103,11 @@ pub(crate) fn significant(value: f64, digits: usize) -> String {
     rounded.to_string()
 }
 
-/// A percentage for tables: one decimal.
 pub(crate) fn percent(value: f64) -> String {
     format!("{value:.1}")
 }
 
-/// "if half of the neighbors were known", for any inlier ratio.
+/// Returns "if half of the neighbors were known", for any inlier ratio.
 pub(crate) fn if_known(ratio: f64) -> String {
     let common = [
         (1.0, "if all neighbors were known"),
@@ -126,13 +123,12 @@ pub(crate) fn if_known(ratio: f64) -> String {
     }
 }
 
-/// `text` with a capital first letter.
 pub(crate) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// "a, b and c".
+/// Joins items: "a, b and c".
 pub(crate) fn list(items: &[String]) -> String {
     match items {
         [] => String::new(),
@@ -141,7 +137,7 @@ pub(crate) fn list(items: &[String]) -> String {
     }
 }
 
-/// An inlier ratio as a percentage without the sign, to two digits; 100 is said of nothing less.
+/// Returns an inlier ratio as a percentage of two digits without the sign; only 1 gives 100.
 pub(crate) fn ratio_percent(ratio: f64) -> String {
     match ratio {
         0.999..1.0 => "99.9".to_owned(),
@@ -150,12 +146,12 @@ pub(crate) fn ratio_percent(ratio: f64) -> String {
     }
 }
 
-/// A reason in words: `odd_point` reads "odd point".
+/// Returns a reason in words: "odd point" for `odd_point`.
 pub(crate) fn reason(name: &str) -> String {
     name.replace('_', " ")
 }
 
-/// 21149 reads "21,149".
+/// Returns a count with thousands grouped: "21,149" for 21149.
 pub(crate) fn thousands(count: u64) -> String {
     let digits = count.to_string();
     let mut text = String::with_capacity(digits.len() + digits.len() / 3);
@@ -168,7 +164,7 @@ pub(crate) fn thousands(count: u64) -> String {
     text
 }
 
-/// 50 reads "50th".
+/// Returns an ordinal number: "50th" for 50.
 pub(crate) fn ordinal(number: u32) -> String {
     let ending = match (number % 10, number % 100) {
         (_, 11..=13) => "th",
@@ -180,7 +176,7 @@ pub(crate) fn ordinal(number: u32) -> String {
     format!("{number}{ending}")
 }
 
-/// Seconds for people: `0.42 s`, `38 s`, `4 min 10 s`.
+/// Returns a duration in words: `0.42 s`, `38 s`, `4 min 10 s`.
 pub(crate) fn seconds(value: f64) -> String {
     if value < 60.0 {
         return format!("{} s", significant(value, 2));
@@ -189,7 +185,6 @@ pub(crate) fn seconds(value: f64) -> String {
     format!("{} min {} s", whole / 60, whole % 60)
 }
 
-/// Bytes for people, in powers of ten.
 pub(crate) fn bytes(count: u64) -> String {
     let value = count as f64;
     if value < 1e9 {

@@ -1,6 +1,6 @@
-//! Text within XML.
+//! Escaping of text in XML.
 
-/// `text` as it may stand between tags and in quoted attributes. What XML 1.0 cannot hold at all becomes U+FFFD.
+/// Escapes `text` for content and quoted attributes. Characters that XML 1.0 does not allow become U+FFFD.
 pub(crate) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -9,7 +9,7 @@ pub(crate) fn escaped(text: &str) -> String {
             '<' => out.push_str("&lt;"),
             '>' => out.push_str("&gt;"),
             '"' => out.push_str("&quot;"),
-            // As they are, attributes would make spaces of them.
+            // Unescaped, they would become spaces in attributes.
             '\t' | '\n' | '\r' => out.push_str(&format!("&#{};", u32::from(c))),
             '\0'..='\x1f' | '\u{fffe}' | '\u{ffff}' => out.push('\u{fffd}'),
             _ => out.push(c),

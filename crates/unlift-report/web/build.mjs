@@ -1,5 +1,5 @@
-// Bundles vendor.mjs into vendor/bundle.min.js, copies the licences, writes VENDOR.md.
-// Run by hand after changing a version:  npm ci && npm run build
+// Bundles vendor.mjs into vendor/bundle.min.js, copies the licenses and writes VENDOR.md.
+// Run it by hand after a change of a version:  npm ci && npm run build
 import { createHash } from "node:crypto";
 import { copyFileSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { build } from "esbuild";
@@ -20,7 +20,7 @@ const result = await build({
   write: false,
 });
 const text = result.outputFiles[0].text;
-// The bundle is inlined into a page: neither may end or open a script on its own.
+// The bundle is inlined into a page, so it must not open or close a script element.
 for (const mark of ["</script", "<!--", "<script"]) {
   if (text.toLowerCase().includes(mark)) throw new Error(`the bundle contains ${mark}`);
 }

@@ -1,4 +1,4 @@
-// What all charts share: how they are drawn (by ECharts, as SVG), axes, lines, marks, legends.
+// Shared parts of all charts: drawing (by ECharts, as SVG), axes, lines, marks, legends.
 "use strict";
 
 (() => {
@@ -10,7 +10,7 @@
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const color = (slot) => css(`--s${slot}`);
 
-  /** A length of the document's unit, as the tables say it. */
+  /** Formats a length of the document's unit as in the tables. */
   function length(value, unit) {
     const short = (x) => x.toLocaleString("en-US", { maximumSignificantDigits: 2 });
     if (unit === "×") return `${short(value)}×`;
@@ -19,7 +19,7 @@
     return value >= 0.01 ? `${short(value * 100)} cm` : `${short(value * 1000)} mm`;
   }
 
-  /** Creates or updates the chart in `node` and keeps it at the node's size; `rows` are those it shows. */
+  /** Creates or updates the chart in `node` and keeps it at the node's size; `rows` are the rows that it shows. */
   function draw(node, option, rows = []) {
     node.dataset.rows = rows.join(" ");
     let chart = drawn.get(node);
@@ -47,7 +47,7 @@
 
   const percentAxis = (extra) => axis({ type: "value", min: 0, max: 100, interval: 25, axisLabel: labels("{value} %"), ...extra });
 
-  /** Below the plot: far enough down that its first label clears that of the upright axis. */
+  /** Returns options of the horizontal axis, low enough that its first label clears the vertical axis. */
   const below = (name, formatter) => ({ name, nameGap: 34, axisLabel: labels(formatter, 14) });
 
   const box = () => ({
@@ -57,7 +57,7 @@
     textStyle: { color: css("--ink"), fontSize: 12 },
   });
 
-  /** The box beside the pointer: one line per curve, largest first. */
+  /** Returns the box beside the pointer: one line per curve, the largest value first. */
   function tooltip(head) {
     return {
       ...box(),
@@ -73,7 +73,7 @@
     };
   }
 
-  /** The box beside the point under the pointer. */
+  /** Returns the box beside the point under the pointer. */
   const itemTooltip = (say) => ({ ...box(), trigger: "item", formatter: (item) => element("span", {}, say(item)) });
 
   const baseOption = (grid) => ({
@@ -100,7 +100,7 @@
     };
   }
 
-  /** A point that lies on no curve: hollow, in the scheme's color. (The bundle draws lines only.) */
+  /** Returns a hollow mark that lies on no curve, as a line of one point, because the bundle draws only lines. */
   function mark(name, point, slot, symbol, size = 13) {
     const hollow = { color: css("--paper"), borderColor: color(slot), borderWidth: 2.5 };
     return { ...line(name, [point], slot, { mark: symbol, size }), itemStyle: hollow, z: 5 };
@@ -108,7 +108,7 @@
 
   const SVG = "http://www.w3.org/2000/svg";
 
-  /** A legend entry: a sample of the line with its mark, and its name. */
+  /** Makes a legend entry: a sample of the line with its mark, and its name. */
   function legendEntry(name, stroke, dash, mark) {
     const svg = document.createElementNS(SVG, "svg");
     svg.setAttribute("width", "30");

@@ -1,10 +1,10 @@
-// What a reader can choose: one chain of menus for every chart, the 3D view and the pictures. Each menu
-// narrows the next one, so that what is chosen always is one of the rows.
+// The menus of charts, 3D view and pictures. Each menu narrows the next one, so every choice is a row of
+// the results.
 "use strict";
 window.Unlift = window.Unlift || {};
 
 (() => {
-  /** An element with text and children; text never passes through innerHTML. */
+  /** Makes an element with children; text never passes through innerHTML. */
   function element(tag, attributes = {}, ...children) {
     const node = document.createElement(tag);
     for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
@@ -13,18 +13,18 @@ window.Unlift = window.Unlift || {};
   }
 
   const distinct = (items) => [...new Set(items)];
-  /** More than this many letters on buttons are a list. */
+  /** Options with more letters than this become a list instead of buttons. */
   const MOST_LETTERS = 60;
 
   /** The groups of neighborhoods, in the order of menus. */
   const GROUPS = {
     released: "Today, from the released data alone",
-    given: "Given neighborhoods",
-    oracle: "If so many neighbors were known (oracle)",
+    given: "Given lists of neighbors",
+    oracle: "If this share of neighbors were known",
     reference: "No attack, for comparison",
   };
 
-  /** A row of buttons of which one is chosen. Options are {value, label}. */
+  /** Makes a row of buttons, one of which is chosen. Options are {value, label}. */
   function buttons(id, name, options, chosen, changed) {
     const box = element("div", { class: "choices" });
     for (const { value, label } of options) {
@@ -36,7 +36,7 @@ window.Unlift = window.Unlift || {};
     return element("fieldset", {}, element("legend", {}, name), box);
   }
 
-  /** A drop-down list, in groups where options have one. */
+  /** Makes a drop-down list, with groups if options have one. */
   function list(id, name, options, chosen, changed) {
     const select = element("select", { name: id });
     const groups = new Map();
@@ -54,7 +54,7 @@ window.Unlift = window.Unlift || {};
     return element("label", {}, element("span", { class: "name" }, name), select);
   }
 
-  /** Buttons where these are few and short, else a list; nothing where there is nothing to choose. */
+  /** Makes buttons if options are few and short, else a list; nothing for a single option. */
   function menu(id, name, options, chosen, changed) {
     if (options.length < 2) return [];
     const letters = options.reduce((sum, { label }) => sum + label.length, 0);
@@ -69,7 +69,7 @@ window.Unlift = window.Unlift || {};
     return element("label", { class: "check" }, input, name);
   }
 
-  /** A menu on its own: {key: value} of `state` is what was chosen. */
+  /** Adds a single menu, which sets `state[key]`. */
   function single(form, state, key, name, options, changed) {
     form.append(...menu(`${form.id}-${key}`, name, options, state[key], (value) => { state[key] = value; changed(); }));
   }
@@ -77,12 +77,12 @@ window.Unlift = window.Unlift || {};
   class Chain {
     /**
      * `fields` are {key, name, option(value, items)}, from the first menu to the last; `option` gives
-     * {label, group, order}. `first` has the values to begin with, where there are such.
+     * {label, group, order}. `first` has the initial values, by key.
      */
     constructor(form, fields, first, changed) {
       this.form = form;
       this.fields = fields;
-      // What was asked for, and what there is: a choice that is gone for one scheme comes back with the next.
+      // `wanted` keeps a choice that one scheme does not offer, so that the next scheme can restore it.
       this.wanted = { ...first };
       this.state = {};
       this.changed = changed;
@@ -90,7 +90,7 @@ window.Unlift = window.Unlift || {};
       form.append(this.box);
     }
 
-    /** Chooses among `items` from now on; every item has the keys of all fields. */
+    /** Sets the items to choose from; every item has the keys of all fields. */
     of(items) {
       this.all = items;
       this.update();
@@ -122,14 +122,14 @@ window.Unlift = window.Unlift || {};
     }
   }
 
-  /** The fields of rows of the results; labels are those of the rows in reach. */
+  /** Returns the fields of rows of the results; labels come from the rows that can be chosen. */
   function fieldsOf(data) {
     const groups = Object.keys(GROUPS);
     return {
       scheme: { key: "scheme", name: "Scheme", option: (s) => ({ label: data.schemes[s].name, order: s }) },
       given: {
         key: "given",
-        name: "Neighborhoods",
+        name: "Neighbors",
         option: (g, rows) => {
           const given = data.givens[g];
           const labels = distinct(rows.map((row) => row.label));

@@ -1,4 +1,4 @@
-// Chosen images: keypoints, what a scheme releases, what comes back, who is listed as whose neighbor.
+// Chosen images: keypoints, released records, recovered keypoints, and the graph of neighbors.
 "use strict";
 
 (() => {
@@ -13,7 +13,7 @@
   const text = (block) => document.getElementById(`block-${block}`).textContent.trim();
   const cache = new Map();
 
-  /** Places as x, y, x, y, ... in pixels; those not drawn are NaN. */
+  /** Returns positions as x, y, x, y, ... in pixels; NaN if not drawn. */
   function places(picture, block) {
     if (!cache.has(block)) {
       const bytes = Uint8Array.from(atob(text(block)), (c) => c.charCodeAt(0));
@@ -30,7 +30,7 @@
 
   const photos = new Map();
 
-  /** Calls `ready` when the photo is there; at once, with null, when there is none. */
+  /** Calls `ready` when the photo is loaded, or at once with null if there is none. */
   function photo(picture, ready) {
     if (picture.photo === null) return ready(null);
     const known = photos.get(picture.photo);
@@ -41,11 +41,11 @@
     image.src = `data:image/jpeg;base64,${text(picture.photo)}`;
   }
 
-  /** A canvas as wide as its place, ready to be drawn on in pixels of the image. */
+  /** Prepares a canvas as wide as its parent, with coordinates in pixels of the image. */
   function open(id, picture, background) {
     const canvas = document.getElementById(id);
     const [w, h] = picture.size;
-    // Upright photos would be taller than a screen.
+    // Limits the height of upright photos.
     const width = Math.max(1, Math.min(canvas.parentElement.clientWidth, (0.8 * window.innerHeight * w) / h));
     const height = (width * h) / w;
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
@@ -58,11 +58,11 @@
     context.fillRect(0, 0, canvas.width, canvas.height);
     const scale = canvas.width / w;
     context.setTransform(scale, 0, 0, scale, 0.5 * scale, 0.5 * scale);
-    /** `pixel` is the size of a pixel of the screen. */
+    /** `pixel` is the size of a screen pixel in pixels of the image. */
     return { context, pixel: ratio / scale, w, h };
   }
 
-  /** The photo under a veil, so that marks stand out; a gray frame without one. */
+  /** Draws the photo, dimmed so that marks stand out; without a photo the frame stays gray. */
   function ground({ context, w, h }, image, veil) {
     if (!image) return;
     context.drawImage(image, -0.5, -0.5, w, h);
@@ -81,7 +81,7 @@
     context.fill();
   }
 
-  /** Segments as x, y, x, y each; one path, one stroke. */
+  /** Draws segments (x, y, x, y each) in one stroke. */
   function segments({ context, pixel }, ends, width, style) {
     context.strokeStyle = style;
     context.lineWidth = width * pixel;
@@ -94,7 +94,7 @@
     context.stroke();
   }
 
-  /** How opaque `n` lines may be so that they are no fog. */
+  /** Returns the opacity at which `n` lines can still be told apart. */
   const opacity = (n, most) => Math.max(0.06, Math.min(most, (most * 260) / Math.max(n, 1)));
 
   function original(picture, image) {
@@ -117,16 +117,16 @@
       }
       segments(pane, axes, 1, `rgba(201,179,255,${opacity(axes.length / 4, 0.3)})`);
       dots(pane, ends, 1.8, "#e2d6ff");
-      return "a point each, moved along one of its two axis lines";
+      return "one point per keypoint; one of its two coordinates is wrong";
     }
     segments(pane, ends, 1, `rgba(201,179,255,${opacity(ends.length / 4, 0.55)})`);
-    if (marks.kind === "lines") return "a line each";
+    if (marks.kind === "lines") return "one line per keypoint";
     const anchors = ends.filter((_, i) => i % 4 < 2);
     dots(pane, anchors, 5, "#ffffff");
-    return "a half-line each, from the anchor of its half";
+    return "one half-line per keypoint, from the anchor of its half of the image";
   }
 
-  /** Lines from true to recovered places, with a head where there is room for one. */
+  /** Draws lines from true to recovered positions, with a head if there is room. */
   function arrows(pane, ends, style) {
     const { context, pixel } = pane;
     segments(pane, ends, 1.1, style);
@@ -183,7 +183,6 @@
     return drawn.said;
   }
 
-  /** Draws one view of a picture. */
   function drawPicture(data, picture, view) {
     const within = data.thresholds[data.headline]?.value ?? 10;
     const say = (id, words) => { document.getElementById(id).textContent = words; };
@@ -192,10 +191,10 @@
     say("said-released", released(picture, view.scheme));
     say("said-graph", graph(picture, view));
     photo(picture, (image) => {
-      // Another picture may have been chosen while this photo was read.
+      // Another picture may have been chosen while this photo loaded.
       if (drawPicture.latest !== picture) return;
       original(picture, image);
-      say("said-recovered", `by ${view.label}, ${view.solver}: ${recovered(picture, image, view, within)}`);
+      say("said-recovered", `with ${view.label}, solver ${view.solver}: ${recovered(picture, image, view, within)}`);
       document.documentElement.dataset.pictures = "drawn";
     });
     say("picture-status", picture.said);

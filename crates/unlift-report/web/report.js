@@ -1,4 +1,4 @@
-// Puts the page together: reads the figures, makes the controls, draws what they ask for.
+// Assembles the page: reads the figures, makes the controls, draws the charts.
 "use strict";
 
 (() => {
@@ -29,18 +29,18 @@
       const all = [{ value: STRONGEST, label: "the strongest" }, ...options(solvers, (solver) => data.solvers[solver])];
       single(form, state, "solver", "Solver", all, redraw);
     }
-    single(form, state, "source", "Neighbors by", options(sources, String), redraw);
-    single(form, state, "dataset", "The paper’s curves, on", options(datasets, String), redraw);
+    single(form, state, "source", "Neighbors", options(sources, (source) => data.givens.find((given) => given.source === source).name), redraw);
+    single(form, state, "dataset", "Curves of the paper, on", options(datasets, String), redraw);
     redraw();
     redraws.push(redraw);
   }
 
-  /** Charts in a folded part have no size: `work` is done when it is first opened. */
+  /** Runs `work` when a folded part is first opened, because charts in it have no size before. */
   function once(folded, work) {
     folded.addEventListener("toggle", work, { once: true });
   }
 
-  /** A chart over all schemes: neighborhoods and solver are chosen, what is drawn are the rows that fit. */
+  /** Makes a chart over all schemes; it draws the rows of the chosen neighborhoods and solver. */
   function chart(form, node, items, draw, first = data.first_given) {
     const redraw = (chosen) => draw(node, data, chosen.items);
     const chain = new Chain(form, [fields.given, fields.solver], { given: first }, redraw);
@@ -54,17 +54,16 @@
     try {
       view = new SceneView(at("canvas"), data);
     } catch (error) {
-      at("scene-status").replaceChildren(element("li", {}, "This browser offers no WebGL, so the 3D view stays empty; all figures stand in the tables."));
+      at("scene-status").replaceChildren(element("li", {}, "This browser has no WebGL, so the 3D view is empty; all figures are in the tables."));
       root.dataset.scene = "no-webgl";
       return;
     }
-    // Only what has points in the page can be chosen.
     const items = data.scene.views.map((one) => ({ ...rows[one.row], ...one, solverName: data.solvers[rows[one.row].solver] }));
     const wide = at("stage").clientWidth >= 620;
     const state = { show: wide ? "all" : "recovered", cameras: false };
     const redraw = ({ items: [item] }) => {
       const kinds = state.show === "all" ? ["original", "released", "recovered"] : [state.show];
-      const shown = { ...item, label: `${item.label}, ${item.solverName}` };
+      const shown = { ...item, label: `${item.label}, solver ${item.solverName}` };
       const panes = view.show({ kinds, scheme: data.schemes[item.scheme].name, view: shown, cameras: state.cameras });
       const box = at("panes");
       const across = wide || panes.length === 1;
@@ -72,7 +71,7 @@
       box.style[across ? "gridTemplateRows" : "gridTemplateColumns"] = "1fr";
       box.replaceChildren(...panes.map(({ kind, name, said }) => {
         const pane = element("div", {}, element("span", {}, name));
-        // An empty box would read as nothing to fear: it says what happened.
+        // An empty pane shows why it is empty, so that it does not look harmless.
         if (kind === "recovered" && !item.drawn) pane.append(element("strong", {}, said));
         return pane;
       }));
@@ -99,7 +98,7 @@
     const byText = (key, name, label) => ({ key, name, option: (value, views) => ({ label: label(value, views) }) });
     const chain = new Chain(form, [
       byText("scheme", "Scheme", String),
-      byText("given", "Neighborhoods", (_, [view]) => view.label),
+      byText("given", "Neighbors", (_, [view]) => view.label),
       byText("solver", "Solver", String),
     ], { given: data.first_picture }, ({ items: [view] }) => view && drawPicture(data, picture(), view));
     chain.of(picture().views);
@@ -112,7 +111,7 @@
   }
 
   const judged = rows.filter((row) => row.reliability.length || row.unknown);
-  // A chart without a curve reads as one without an error: it begins with what has one, if there is any.
+  // The chart starts with neighborhoods that have a curve, because an empty chart looks like a good result.
   const told = judged.filter((row) => row.reliability.length);
   const firstTold = (told.find((row) => row.given === data.first_given) ?? told[0])?.given ?? data.first_given;
   const sheets = [...document.querySelectorAll(".sheet")];
@@ -128,7 +127,7 @@
   ];
   root.dataset.script = "1";
   for (const [wanted, part] of parts) {
-    // A part that a browser cannot draw takes no other with it.
+    // If one part fails, the others are still drawn.
     try { if (wanted) part(); } catch (error) { console.error(error); }
   }
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => redraws.forEach((redraw) => redraw()));

@@ -1,4 +1,4 @@
-// The 3D view: originals, what a scheme releases, what comes back, colored by error. three.js.
+// The 3D view by three.js: originals, released records, and recovered points colored by error.
 "use strict";
 
 (() => {
@@ -6,12 +6,12 @@
   const { element, length } = window.Unlift;
   const NOT_DRAWN = 65535;
   const BACKGROUND = "#10141a";
-  /** Colors below and above the threshold: blue comes back, orange misses; told apart by the color-blind. */
+  /** Colors below (blue) and above (orange) the threshold, suitable for color-blind readers. */
   const HIT = ["#e3f6ff", "#3d9be0"];
   const MISS = ["#ffb14a", "#b3331a"];
-  /** Decades of error drawn on either side of the threshold. */
+  /** Decades of error in the color scale on each side of the threshold. */
   const DECADES = 1.5;
-  /** In degrees; from 2.5 radii away a usual scene just fits. From a camera of the map it is as wide as a phone's. */
+  /** Field of view in degrees: a scene fits from 2.5 radii away; from a camera of the map it is as wide as a phone's. */
   const FIELD_OF_VIEW = 36;
   const CAMERA_VIEW = 65;
 
@@ -61,7 +61,7 @@
     return cache.get(block);
   }
 
-  /** Decodes `count` positions about the box's center; those not drawn are NaN. */
+  /** Decodes `count` positions relative to the box's center; NaN if not drawn. */
   function decode(scene, block, count) {
     const view = new DataView(bytesOf(block).buffer);
     const points = new Float32Array(3 * count);
@@ -74,7 +74,7 @@
     return points;
   }
 
-  /** Keeps the drawn points, with their errors as -1..1 about the threshold. */
+  /** Makes the geometry of the drawn points, with errors from -1 to 1 around the threshold. */
   function geometryOfPoints(points, errorBytes) {
     const kept = [];
     const errors = [];
@@ -89,7 +89,7 @@
     return geometry;
   }
 
-  /** Line segments from records of `corners` points each. */
+  /** Makes line segments from records of `corners` points each. */
   function geometryOfLines(points, corners) {
     const kept = [];
     const push = (i) => kept.push(points[3 * i], points[3 * i + 1], points[3 * i + 2]);
@@ -122,16 +122,16 @@
       this.camera = new THREE.PerspectiveCamera(this.fov, 1, this.radius / 200, this.radius * 30);
       this.up = new THREE.Vector3(...up).normalize();
       this.camera.up.copy(this.up);
-      // Any direction across `up` will do for a start; then a little above the horizon.
+      // The view starts in any direction across `up`, slightly above the horizon.
       const across = Math.abs(up[0]) < 0.8 * Math.hypot(...up) ? new THREE.Vector3(1, 0.35, 0) : new THREE.Vector3(0.35, 0, 1);
       across.addScaledVector(this.up, -across.dot(this.up)).normalize();
       this.camera.position.copy(across).addScaledVector(this.up, 0.55).normalize().multiplyScalar(this.radius * 2.5);
-      // Where one of the map's cameras stood, the map looks like the place that it is of.
+      // From the place of a camera, the map resembles the photo.
       if (eye) this.camera.position.set(...eye.map((x, i) => x - (low[i] + high[i]) / 2));
       this.controls = new THREE.OrbitControls(this.camera, canvas);
       this.controls.enableZoom = false;
       this.controls.addEventListener("change", () => this.render());
-      // The wheel scrolls the page until the reader takes hold of the view.
+      // The wheel scrolls the page until the view has focus.
       canvas.addEventListener("pointerdown", () => { canvas.focus({ preventScroll: true }); });
       canvas.addEventListener("focus", () => { this.controls.enableZoom = true; });
       canvas.addEventListener("blur", () => { this.controls.enableZoom = false; });
@@ -158,7 +158,7 @@
       });
     }
 
-    /** A layer by name, made on first use: decoding waits until somebody looks. */
+    /** Returns a layer by name; it is decoded on first use. */
     layer(name, make) {
       if (!this.layers.has(name)) {
         const layer = make();
@@ -201,8 +201,8 @@
     }
 
     /**
-     * Shows the panes `kinds` of `view` of a scheme, with cameras or without. Returns the panes with what
-     * each of them draws, in words.
+     * Shows the panes `kinds` of `view` of a scheme, with or without cameras. Returns the panes, each with a
+     * sentence on what it draws.
      */
     show({ kinds, scheme, view, cameras }) {
       const made = {
@@ -237,7 +237,7 @@
         const h = wide ? height : height / this.panes.length;
         const [x, y] = wide ? [index * w, 0] : [0, (this.panes.length - 1 - index) * h];
         this.camera.aspect = w / h;
-        // The whole scene fits a narrow pane, too: there the width decides, not the height.
+        // In a narrow pane the width decides whether the scene fits.
         const half = Math.tan((this.fov * Math.PI) / 360) / Math.min(1, this.camera.aspect);
         this.camera.fov = (Math.atan(half) * 360) / Math.PI;
         this.camera.updateProjectionMatrix();
@@ -262,7 +262,7 @@
       const zoom = { "+": 0.9, "=": 0.9, "-": 1 / 0.9 }[event.key];
       if (turn) {
         const moved = offset.clone().applyAxisAngle(...turn);
-        // Not over the pole, where left and right would swap.
+        // The view stops at the pole, where left and right would swap.
         if (moved.angleTo(this.up) > 0.05 && moved.angleTo(this.up) < Math.PI - 0.05) offset.copy(moved);
       } else if (zoom) {
         offset.multiplyScalar(zoom);
@@ -276,7 +276,6 @@
     }
   }
 
-  /** The legend of the error colors. */
   function ramp(node, scene, unit) {
     const bar = element("i", { style: `background:linear-gradient(90deg,${HIT[0]},${HIT[1]} 50%,${MISS[0]} 50%,${MISS[1]})` });
     const at = (factor) => length(scene.error_unit * factor, unit);

@@ -1,10 +1,10 @@
-// Painted pictures: one photo at a time, and a picture laid over its photo with an edge that is moved.
+// Painted pictures: one photo at a time, and a picture laid over its photo with a movable edge.
 "use strict";
 
 (() => {
   const { element, single } = window.Unlift;
 
-  /** Shows one sheet, which a menu chooses. */
+  /** Shows the sheet that a menu chooses. */
   function chosen(sheets) {
     const state = { sheet: 0 };
     const show = () => sheets.forEach((sheet, at) => { sheet.hidden = at !== state.sheet; });
@@ -13,14 +13,14 @@
     show();
   }
 
-  /** The name of a picture, as it stands below it, with its scheme. */
+  /** Returns the label of a picture with its scheme. */
   function named(shot) {
     const scheme = shot.closest(".of-scheme")?.querySelector("h3");
     const label = shot.closest("figure").querySelector("strong").textContent;
     return scheme ? `${scheme.textContent}, ${label}` : label;
   }
 
-  /** Adds to a sheet the photo with a picture over it; pictures become buttons that choose. */
+  /** Adds the photo with a picture over it to a sheet; pictures become buttons. */
   function wipe(sheet) {
     const [photo, ...shots] = sheet.querySelectorAll(".shot");
     const over = element("img", { alt: "" });

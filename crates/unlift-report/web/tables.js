@@ -1,17 +1,17 @@
-// Sorts a table by the column that is chosen.
+// Sorts a table by a column that the reader chooses.
 "use strict";
 
 (() => {
   const number = (text) => parseFloat(text.replace(/[,≤]/g, ""));
 
-  /** Orders two cells: numbers before words, numbers by value. */
+  /** Compares two cells: numbers before words, numbers by value. */
   function compare(a, b) {
     const [x, y] = [number(a), number(b)];
     if (Number.isNaN(x) || Number.isNaN(y)) return Number.isNaN(x) - Number.isNaN(y) || a.localeCompare(b);
     return x - y;
   }
 
-  /** Makes the heads of a table sort it: rising first for words, falling first for figures. */
+  /** Makes the heads of a table sort it: first ascending for words, descending for figures. */
   function sortable(table) {
     const body = table.tBodies[0];
     [...table.tHead.rows[0].cells].forEach((head, column) => {

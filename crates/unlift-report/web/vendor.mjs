@@ -1,4 +1,4 @@
-// What the report's page needs of ECharts and three.js, and nothing else: the bundler drops the rest.
+// The parts of ECharts and three.js that the page needs; the bundler drops the rest.
 import { LineChart } from "echarts/charts";
 import { AriaComponent, GridComponent, TooltipComponent } from "echarts/components";
 import { init, use } from "echarts/core";

@@ -68,7 +68,10 @@ fn every_noise_model_has_rows_and_break_even_ratios_of_its_own() {
     assert_eq!(noises, ["uniform", "near", "clustered", "uniform", "near", "clustered"]);
     let page = place.text("audit/report.html");
     for noise in ["clustered", "near"] {
-        assert!(page.contains(&format!("oracle ({noise}), 30 % true neighbors")), "{noise}");
+        assert!(
+            page.contains(&format!("known neighbors, wrong ones {noise}, 30 % right")),
+            "{noise}"
+        );
     }
     // The rows with uniform noise equal those of an audit without `--oracle-noise`.
     place.ends(&format!("audit map room.csv --scale 1 {quick}"), 0);

@@ -116,7 +116,7 @@ fn a_file_without_photos_has_frames_and_chosen_images_are_shown() {
         assert!(page.contains("\"name\":\"b.png\"") && !page.contains("\"name\":\"a.png\""));
         assert!(!page.contains("/9j/"));
         // Only the requested sources are drawn.
-        ["oracle", "descriptors", "overlap"]
+        ["known neighbors", "neighbors by descriptors", "neighbors by descriptor overlap"]
             .map(|source| page.contains(&format!("\"label\":\"{source}, ")))
     };
     assert_eq!(page("f.h5"), [true, false, false]);

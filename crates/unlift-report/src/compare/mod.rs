@@ -1,4 +1,4 @@
-//! Two audits side by side: what leaks more, what leaks less, and what only one of them knows.
+//! The comparison of two audits: what leaks more, what leaks less, and what only one of them has.
 
 mod page;
 
@@ -10,7 +10,7 @@ use crate::{tables, words};
 
 pub use page::page;
 
-/// Two figures of one attack, scheme and threshold.
+/// The old and the new figure of one attack, scheme and threshold.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Change {
     /// The scheme's user-facing name.
@@ -23,11 +23,11 @@ pub struct Change {
     pub old_percent: f64,
     /// Percent that comes back in the new one.
     pub new_percent: f64,
-    /// How much more, in percentage points.
+    /// The difference (new minus old) in percentage points.
     pub points: f64,
 }
 
-/// A row that has its like in one audit only.
+/// A row that only one audit has.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Unmatched {
     /// The scheme's user-facing name.
@@ -36,65 +36,63 @@ pub struct Unmatched {
     pub attack: String,
 }
 
-/// What the old audit speaks of and the new one does not: no figure says that it leaks no more.
+/// A scheme or source of the old audit without figures in the new one, so it may leak more.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Lost {
     /// The scheme's user-facing name.
     pub scheme: String,
-    /// The source of neighborhoods, where not the whole scheme is lost.
+    /// The source of neighborhoods; `None` if the whole scheme is lost.
     pub neighbors: Option<String>,
-    /// Why, in plain words.
+    /// The reason.
     pub reason: String,
 }
 
-/// What two audits say beside each other.
+/// The comparison of two audits.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
-    /// Percentage points up to which a figure counts as the same.
+    /// Largest difference, in percentage points, at which a figure counts as the same.
     pub tolerance_points: f64,
-    /// Why so many: `asked`, `twice the spread of repeats` or `usual without repeats`.
+    /// The origin of the tolerance: `asked`, `twice the spread of repeats` or `usual without repeats`.
     pub tolerance_is: &'static str,
     /// Whether nothing leaks more and nothing is lost.
     pub passed: bool,
-    /// What leaks more, most first.
+    /// Figures that leak more, the largest difference first.
     pub more: Vec<Change>,
-    /// What leaks less, most first.
+    /// Figures that leak less, the largest difference first.
     pub less: Vec<Change>,
-    /// What is the same up to the tolerance, in the order of the new audit.
+    /// Figures that are the same up to the tolerance, in the order of the new audit.
     pub same: Vec<Change>,
-    /// What cannot be compared any more.
+    /// Schemes and sources that cannot be compared any more.
     pub lost: Vec<Lost>,
-    /// Rows of the old audit alone.
+    /// Rows of the old audit only.
     pub only_old: Vec<Unmatched>,
-    /// Rows of the new audit alone.
+    /// Rows of the new audit only.
     pub only_new: Vec<Unmatched>,
 }
 
-/// Why two audits cannot be compared: what was expected, as in the old one, and what the new one has.
+/// The reason why two audits cannot be compared.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Incomparable {
     /// `unit`, `thresholds` or `results`.
     pub place: &'static str,
-    /// What the old audit has.
+    /// The value of the old audit.
     pub expected: String,
-    /// What the new one has.
+    /// The value of the new audit.
     pub found: String,
 }
 
-/// Why a tolerance is what it is, where it was asked for.
 const ASKED: &str = "asked";
-/// Percentage points by which seeds of one audit differ at most, usually.
+/// Usual largest difference between seeds of one audit, in percentage points.
 const USUAL_TOLERANCE: f64 = 2.0;
-/// What the second baseline is called.
 const RECORDS_ALONE: &str = "records alone";
 
-/// Compares the figures of two audits. Rows are the same by scheme, source, noise, inlier ratio as requested (a measured one is a
-/// result), K and solver; a blind guess and the records alone are compared per scheme.
+/// Compares the figures of two audits. Rows match by scheme, source, noise, requested inlier ratio (a measured one is a result),
+/// K and solver. Baselines are compared per scheme.
 ///
-/// Without a tolerance, figures count as the same up to twice the largest spread of repeats in both, or 2 points without repeats.
+/// The default tolerance is twice the largest standard deviation over repeats in both audits, or 2 points without repeats.
 ///
 /// # Errors
-/// When their units or thresholds differ, or no row of one has its like in the other.
+/// Fails if units or thresholds differ, or if no row matches.
 pub fn compare(
     old: &Document,
     new: &Document,
@@ -150,7 +148,7 @@ pub fn compare(
         (None, Some(spread)) => ((200.0 * spread).ceil() / 100.0, "twice the spread of repeats"),
         (None, None) => (USUAL_TOLERANCE, "usual without repeats"),
     };
-    // Sums of decimals must not fail a build by the last bit.
+    // Rounding errors in the last bit must not fail a build.
     let beyond = tolerance_points + 1e-9;
     let (mut more, rest): (Vec<_>, Vec<_>) =
         changes.into_iter().partition(|change| change.points > beyond);
@@ -172,7 +170,7 @@ pub fn compare(
     })
 }
 
-/// The largest standard deviation of a share over repeats, in percentage points; `None` where nothing was repeated.
+/// Returns the largest standard deviation of a share over repeats, in percentage points; `None` without repeats.
 fn spread(old: &Document, new: &Document) -> Option<f64> {
     let rows = old.results.iter().chain(&new.results);
     let spreads = rows.filter_map(|row| row.std.as_ref());
@@ -181,7 +179,6 @@ fn spread(old: &Document, new: &Document) -> Option<f64> {
     shares.copied().reduce(f64::max)
 }
 
-/// The thresholds of both, as typed in each: equal as numbers.
 fn common_thresholds(
     old: &Document,
     new: &Document,
@@ -229,7 +226,7 @@ fn same_attack(a: &Row, b: &Row) -> bool {
         && a.solver == b.solver
 }
 
-/// The attack without its measured ratio, which differs between two audits that are the same otherwise.
+/// Returns the name of a row's attack, without a measured ratio, which differs even between equal audits.
 fn attack_of(row: &Row) -> String {
     let source = attack::source(&row.neighbors, row.oracle_noise.as_deref());
     let right = match attack::is_oracle(&row.neighbors) {
@@ -254,7 +251,6 @@ fn change(scheme: &str, attack: String, typed: &str, (was, is): (f64, f64)) -> C
     }
 }
 
-/// What comes back of `scheme` without neighborhoods: the largest figure of its rows, in both audits.
 fn baselines(
     old: &Document,
     new: &Document,
@@ -281,7 +277,7 @@ fn baselines(
     changes
 }
 
-/// Schemes of the old audit of which no row has its like in the new one, and sources that were audited and are not any more.
+/// Returns the schemes of the old audit without a matching row in the new one, and the sources that are no longer audited.
 fn lost(old: &Document, new: &Document, taken: &[bool]) -> Vec<Lost> {
     let mut lost: Vec<Lost> = Vec::new();
     for row in &old.results {
@@ -318,7 +314,7 @@ fn lost(old: &Document, new: &Document, taken: &[bool]) -> Vec<Lost> {
 }
 
 impl Comparison {
-    /// What it comes to, in one line.
+    /// Returns the comparison in one line.
     pub fn summary(&self) -> String {
         let count = self.more.len() + self.less.len() + self.same.len();
         let point = if self.tolerance_points == 1.0 { "point" } else { "points" };

@@ -16,13 +16,11 @@ struct Page<'a> {
     style: &'static str,
     comparison: &'a Comparison,
     summary: String,
-    /// Whether both documents name nothing of their owner's.
     share_safe: bool,
     audits: [Audit<'a>; 2],
     tables: Vec<Figures>,
 }
 
-/// One of the two audits, as its document says.
 #[derive(Serialize)]
 struct Audit<'a> {
     which: &'static str,
@@ -43,7 +41,7 @@ struct Figures {
 /// Draws `comparison` of `old` and `new` as one self-contained HTML page.
 ///
 /// # Errors
-/// [`Error::Template`] when it cannot be rendered (a bug of this crate).
+/// [`Error::Template`] if it cannot be rendered (a bug of this crate).
 pub fn page(comparison: &Comparison, old: &Document, new: &Document) -> Result<String, Error> {
     let audits = [("old", old), ("new", new)].map(|(which, document)| Audit {
         which,

@@ -1,14 +1,14 @@
-//! Every row of `results` as CSV (RFC 4180): what a script or a spreadsheet works on.
+//! Every row of `results` as CSV (RFC 4180), for scripts and spreadsheets.
 
 use crate::document::{ByThreshold, Document, Row};
 use crate::tables::distinct;
 
-/// All rows, with a column per figure and one per threshold of `within` where a figure has several. What is not known is empty.
+/// Returns all rows, with a column per figure, or per threshold of `within` if a figure depends on it. Unknown cells are empty.
 pub(super) fn csv(document: &Document, within: &[String]) -> String {
     let rows = &document.results;
     let names = distinct(rows.iter().flat_map(|row| row.metrics.keys()));
     let percentiles = distinct(rows.iter().flat_map(|row| row.error_percentiles.keys()));
-    // The program knows its tables by the first four.
+    // The command line recognizes its tables by the first four columns.
     let mut heads: Vec<String> = [
         "scheme",
         "neighbors",
@@ -40,7 +40,6 @@ pub(super) fn csv(document: &Document, within: &[String]) -> String {
 
 type Figure = fn(&Row) -> Option<f64>;
 
-/// Figures that every row may have one of.
 const ALWAYS: [(&str, Figure); 7] = [
     ("axis_accuracy_percent", |row| row.axis_accuracy_percent),
     ("exact_percent", |row| row.exact_percent),
@@ -97,7 +96,7 @@ fn line(cells: &[String]) -> String {
     cells.join(",") + "\n"
 }
 
-/// A cell in the marks of the format. Text that a spreadsheet would take for a formula has a `'` before it.
+/// Quotes a cell. Text that a spreadsheet would take for a formula gets a leading `'`.
 fn quoted(cell: &str) -> String {
     let is_formula =
         cell.starts_with(['=', '+', '-', '@', '\t', '\r']) && cell.parse::<f64>().is_err();

@@ -1,4 +1,4 @@
-//! The share that comes back over the inlier ratio, one curve per scheme, as a drawing that stands alone.
+//! The recovered share over the inlier ratio as an SVG file, one curve per scheme.
 
 use crate::attack;
 use crate::choices::Choices;
@@ -6,20 +6,20 @@ use crate::document::Document;
 use crate::xml::escaped;
 use crate::{tables, verdict, words};
 
-/// Size of the drawing, and of the plot within it, in units of the drawing.
+/// Width and height of the drawing; the constants below are the sides of the plot in it.
 const SIZE: (f64, f64) = (640.0, 400.0);
 const LEFT: f64 = 58.0;
 const RIGHT: f64 = 470.0;
 const TOP: f64 = 34.0;
 const BOTTOM: f64 = 346.0;
-/// The colors of schemes on the page, on white paper (`--s0` to `--s7` of its style).
+/// The colors of schemes on the page in light mode (`--s0` to `--s7` of its style).
 const COLORS: [&str; 8] =
     ["#0072b2", "#d55e00", "#a87800", "#008a63", "#66707c", "#c0468f", "#6a4fb3", "#8a4b2a"];
-/// The first source of the oracle is drawn solid, those after it in these dashes.
+/// Dashes of the oracle's sources; the first is solid.
 const DASHES: [&str; 3] = ["none", "7 4", "2 3"];
 
-/// The curves of the oracle's rows within the threshold `only` (as typed), else the one that verdicts are about: at every
-/// inlier ratio the strongest attack, as on the page. `None` without a row by the oracle.
+/// Returns the curves of the oracle's rows within the threshold `only` (as typed), or the headline threshold: the
+/// strongest attack at every inlier ratio, as on the page. `None` without a row by the oracle.
 pub fn curves(document: &Document, only: Option<&str>) -> Option<String> {
     let typed = only.map(str::to_owned).or_else(|| tables::headline_threshold(document))?;
     let choices = Choices::of(document);
@@ -34,7 +34,7 @@ pub fn curves(document: &Document, only: Option<&str>) -> Option<String> {
                 .filter_map(|choice| {
                     let given = &choice.given;
                     let row = verdict::strongest_given(document, &scheme.name, given, &typed)?;
-                    // A solver that looks at records alone has no ratio.
+                    // A solver that uses only the records has no ratio.
                     let has_ratio = attack::has_neighborhoods(row);
                     let share = row.recovered_percent.get(&typed).filter(|_| has_ratio)?;
                     Some((given.inlier_ratio, *share))
@@ -69,7 +69,6 @@ fn place((ratio, percent): (f64, f64)) -> (f64, f64) {
     (LEFT + ratio * (RIGHT - LEFT), BOTTOM - percent / 100.0 * (BOTTOM - TOP))
 }
 
-/// The drawing up to the curves: what it shows, grid and axes.
 fn frame(document: &Document, typed: &str) -> String {
     let unit = document.results.first().map(|row| row.unit);
     let points = unit.map_or("points", words::points);

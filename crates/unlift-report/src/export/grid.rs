@@ -1,4 +1,4 @@
-//! The table of a paper, before it is set: a row per scheme, a column per kind of neighborhoods.
+//! The cells of a table for a paper: a row per scheme, a column per kind of neighborhoods.
 
 use crate::attack;
 use crate::choices::{Choices, GivenChoice};
@@ -6,19 +6,17 @@ use crate::document::Document;
 use crate::tables::{self, percent_cell};
 use crate::{verdict, words};
 
-/// Cells of text, in no markup.
 pub(super) struct Grid {
-    /// What the cells are, in a sentence.
     pub caption: String,
-    /// One more than there are columns of figures: the first is of schemes.
     pub heads: Vec<String>,
     pub rows: Vec<Vec<String>>,
 }
 
-/// Stands where an audit was asked for a figure and has none: it must not read as a small one.
+/// The cell of a figure that the audit could not measure; it must not look like a small one.
 const NOT_AUDITED: &str = "not audited";
 
-/// The strongest attack per scheme and neighborhoods, and the two baselines; a cell has a figure per threshold of `within`.
+/// Returns the strongest attack per scheme and neighborhoods, and the two baselines; a cell has a figure per threshold of
+/// `within`.
 pub(super) fn grid(document: &Document, within: &[String]) -> Grid {
     let choices = Choices::of(document);
     let givens: Vec<&GivenChoice> =
@@ -80,8 +78,8 @@ fn caption(document: &Document, within: &[String]) -> String {
     let within: Vec<String> =
         within.iter().map(|typed| tables::threshold_text(document, typed)).collect();
     let mut text = format!(
-        "Percent of the {points} recovered within {}, by the strongest attack tried. Columns: the share of listed \
-         neighbors that are right (oracle), or who lists them; blind is a guess without neighborhoods.",
+        "Percent of the {points} recovered within {}, by the strongest attack tried. Columns: the share of right \
+         neighbors in the lists of an oracle, or another source of lists; blind is a guess without neighborhoods.",
         within.join(" / ")
     );
     let repeats = document.results.iter().map(|row| row.repeats).max().unwrap_or(1);
@@ -94,7 +92,7 @@ fn caption(document: &Document, within: &[String]) -> String {
     text
 }
 
-/// `0.5`, `0.5 (near)`, `overlap`: as short as a column of a paper.
+/// Returns a short head: `0.5`, `0.5 (near)` or `overlap`.
 fn head(choice: &GivenChoice) -> String {
     let given = &choice.given;
     match given.oracle_noise.as_deref() {

@@ -10,23 +10,24 @@ use crate::tables;
 
 pub use curves::curves;
 
-/// How a table is written.
+/// The format of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TableFormat {
     /// Every row of `results`, a column per figure.
     Csv,
     /// Rows of schemes, columns of neighborhoods, by the strongest attack; for the package booktabs.
     Latex,
-    /// The same as a table of GitHub's Markdown.
+    /// The table of [`TableFormat::Latex`] in GitHub's Markdown.
     Markdown,
 }
 
-/// The thresholds of a document, as typed, in their order.
+/// Returns the thresholds of a document, as typed, in their order.
 pub fn thresholds(document: &Document) -> Vec<String> {
     tables::thresholds(document)
 }
 
-/// The figures of `document` as a table, of the threshold `only` (as typed) or of all. Ends with a line break.
+/// Returns the figures of `document` as a table, for the threshold `only` (as typed) or for all. The text ends
+/// with a line break.
 pub fn table(document: &Document, format: TableFormat, only: Option<&str>) -> String {
     let within: Vec<String> = match only {
         Some(typed) => vec![typed.to_owned()],

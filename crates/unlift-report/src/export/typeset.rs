@@ -1,9 +1,9 @@
-//! A grid as LaTeX and as Markdown.
+//! Writes a grid as LaTeX and as Markdown.
 
 use super::grid::Grid;
 use crate::document::Document;
 
-/// A `tabular` for booktabs, which brings its own lines above, below and under the heads.
+/// Returns a `tabular` with the rules of booktabs.
 pub(super) fn latex(document: &Document, grid: &Grid) -> String {
     let columns = "r".repeat(grid.heads.len().saturating_sub(1));
     let line = |cells: &[String]| {
@@ -21,13 +21,13 @@ pub(super) fn latex(document: &Document, grid: &Grid) -> String {
     text + "\\bottomrule\n\\end{tabular}\n"
 }
 
-/// A table as GitHub reads it, figures flush right, under a sentence that says what they are.
+/// Returns a table in GitHub's Markdown, with figures flush right, below the caption.
 pub(super) fn markdown(document: &Document, grid: &Grid) -> String {
     let line = |cells: &[String]| {
         let cells: Vec<String> = cells.iter().map(|cell| in_markdown(cell)).collect();
         format!("| {} |\n", cells.join(" | "))
     };
-    // A comment ends at the first two dashes.
+    // Two dashes would end the comment.
     let version = on_one_line(&document.unlift).replace("--", "- -");
     let rule = " ---: |".repeat(grid.heads.len().saturating_sub(1));
     let mut text = format!(

@@ -1,4 +1,4 @@
-//! Pictures as 16-bit numbers in base64, within a budget of bytes.
+//! Encodes pictures as 16-bit numbers in base64, within a fixed budget of bytes.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -7,23 +7,20 @@ use super::{GRAPH_NEIGHBORS, Given, MOST_PICTURES, Marks, Picture};
 use crate::scene::subsample;
 use crate::{attack, words};
 
-/// Bytes of the page that all pictures may take beside their photos, before base64.
+/// Maximal number of bytes of all pictures without their photos, before base64.
 const BUDGET_BYTES: usize = 3_600_000;
-/// Positions are 0..=65534 across the image; this one is "not drawn".
+/// The position of a point that is not drawn. Others are 0..=65534 across the image.
 const NOT_DRAWN: u16 = u16::MAX;
 const BYTES_PER_POINT: usize = 2 * size_of::<u16>();
 
-/// A picture as the page's script reads it; blocks by their number on the page.
 #[derive(Debug, serde::Serialize)]
 pub(crate) struct EncodedPicture {
     name: String,
     note: String,
     size: [u32; 2],
     photo: Option<usize>,
-    /// How many keypoints there are and are drawn, in words.
     said: String,
     keypoints: usize,
-    /// Edges below this many pixels are short.
     short_px: f32,
     released: Vec<EncodedMarks>,
     views: Vec<EncodedView>,
@@ -40,14 +37,12 @@ struct EncodedMarks {
 #[derive(Debug, serde::Serialize)]
 struct EncodedView {
     scheme: String,
-    /// What tells the neighborhoods apart in every picture, and what they are called in this one.
+    /// The key of the neighborhoods, equal in all pictures.
     given: String,
     label: String,
     solver: String,
     block: usize,
-    /// How much came back, in words.
     said: String,
-    /// The same as a share, and whether the attacker made the lists.
     #[serde(skip)]
     share: f64,
     #[serde(skip)]
@@ -57,24 +52,24 @@ struct EncodedView {
 #[derive(Debug, serde::Serialize)]
 struct EncodedGraph {
     given: String,
-    /// How many edges are short, in words.
     said: String,
-    /// Neighbors per keypoint; fewer are filled up with places that are not drawn.
+    /// Neighbors per keypoint; shorter lists are padded with points that are not drawn.
     k: usize,
     block: usize,
 }
 
-/// The neighborhoods that are shown first: the attacker's own that give back most of the first picture.
+/// Returns the key of the neighborhoods that are shown first: those made by the attacker that recover
+/// most of the first picture.
 pub(crate) fn first_choice(pictures: &[EncodedPicture]) -> Option<&str> {
     let own = pictures.first()?.views.iter().filter(|view| view.own);
     own.max_by(|a, b| a.share.total_cmp(&b.share)).map(|view| view.given.as_str())
 }
 
-/// An edge is short below this share of the smaller side, as in the paper's figures.
+/// Edges below this fraction of the smaller side are short, as in the paper's figures.
 const SHORT_SHARE: f32 = 0.1;
 
 /// Encodes up to [`MOST_PICTURES`] pictures and appends their blocks to `blocks`. Keypoints are thinned
-/// out where all of them would break the budget. Shares are over all of them, within `within` pixels.
+/// to keep the budget. Shares within `within` pixels are over all released keypoints.
 pub(crate) fn encode(
     pictures: &[Picture],
     within: f64,
@@ -162,7 +157,8 @@ fn at(
     chosen.iter().flat_map(|&i| place(all.get(i).copied().flatten())).collect()
 }
 
-/// Little-endian u16 pair, 0..=65534 across the image; what lies outside goes to its border.
+/// Encodes a position as a little-endian u16 pair, 0..=65534 across the image; points outside move to
+/// the border.
 fn quantize(size: [u32; 2], point: Option<[f32; 2]>) -> [u8; BYTES_PER_POINT] {
     let steps = |c: usize| {
         let share = (point?[c] + 0.5) / size[c].max(1) as f32;
@@ -175,7 +171,7 @@ fn quantize(size: [u32; 2], point: Option<[f32; 2]>) -> [u8; BYTES_PER_POINT] {
     [x[0], x[1], y[0], y[1]]
 }
 
-/// What tells neighborhoods apart: a measured ratio differs from image to image.
+/// Returns the key of neighborhoods, without a measured ratio, which differs between images.
 fn key(given: &Given) -> String {
     let source = attack::source(&given.neighbors, given.oracle_noise.as_deref());
     match attack::is_oracle(&given.neighbors) {
@@ -184,7 +180,7 @@ fn key(given: &Given) -> String {
     }
 }
 
-/// "frame-1.jpg, 640 x 480 px, 2,113 keypoints, 900 of them drawn".
+/// Returns a sentence: "frame-1.jpg, 640 x 480 px, 2,113 keypoints, 900 of them drawn".
 fn picture_said(picture: &Picture, drawn: usize) -> String {
     let count = |n: usize| words::thousands(n as u64);
     let [w, h] = picture.size;
@@ -193,7 +189,8 @@ fn picture_said(picture: &Picture, drawn: usize) -> String {
     format!("{}, {w} x {h} px, {} keypoints{some}", picture.name, count(n))
 }
 
-/// "81.3 % within 10 px (blue), the others orange; 3 lost": of the released keypoints, drawn or not.
+/// Returns the share of the released keypoints, drawn or not, and a sentence: "81.3 % within 10 px
+/// (blue), the others orange; 3 lost".
 fn recovered_said(picture: &Picture, view: &super::RecoveredView, within: f64) -> (f64, String) {
     let released = picture.released.iter().find(|one| one.scheme == view.scheme);
     let is_released = |i: usize| match released.map(|one| &one.marks) {
@@ -216,7 +213,8 @@ fn recovered_said(picture: &Picture, view: &super::RecoveredView, within: f64) -
     (share, format!("{percent} % within {within} px (blue), the others orange{lost}"))
 }
 
-/// "five of each list; 45.1 % of the edges are shorter than 48 px (green), the others red".
+/// Returns a sentence: "the first five neighbors of each keypoint; 45.1 % of the edges are shorter than
+/// 48 px (green), the others red".
 fn graph_said(picture: &Picture, graph: &super::Graph, short_px: f32) -> String {
     let (mut n, mut short) = (0u64, 0u64);
     for (from, neighbors) in picture.keypoints.iter().zip(&graph.neighbors) {
@@ -228,7 +226,7 @@ fn graph_said(picture: &Picture, graph: &super::Graph, short_px: f32) -> String 
     let share = words::percent(100.0 * short as f64 / n.max(1) as f64);
     let reach = words::significant(f64::from(short_px), 3);
     format!(
-        "five of each list; {share} % of the edges are shorter than {reach} px (green), the others red"
+        "the first five neighbors of each keypoint; {share} % of the edges are shorter than {reach} px (green), the others red"
     )
 }
 

@@ -1,7 +1,7 @@
-//! Chosen images on the page: the photo, its keypoints, what is released and what comes back.
+//! Chosen images on the page: photo, keypoints, released records and recovered keypoints.
 //!
-//! Positions are in pixels; the middle of the first pixel is `(0, 0)`, so an image of width `w` reaches
-//! from `-0.5` to `w - 0.5`.
+//! Positions are in pixels. The center of the first pixel is `(0, 0)`, so an image of width `w` spans
+//! `-0.5` to `w - 0.5`.
 
 mod encode;
 
@@ -9,53 +9,53 @@ pub use crate::attack::Given;
 
 pub(crate) use encode::{EncodedPicture, encode, first_choice};
 
-/// Images on a page at most: a page is for looking at, and stays below 10 MB.
+/// Maximal number of images on a page, which stays below 10 MB.
 pub const MOST_PICTURES: usize = 12;
-/// Neighbors per keypoint that a graph shows.
+/// Number of neighbors per keypoint in a graph.
 pub const GRAPH_NEIGHBORS: usize = 5;
 
-/// One image to be drawn.
+/// An image of the page.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Picture {
     /// The image's name.
     pub name: String,
-    /// Why it was chosen, for example `worst`; may be empty.
+    /// The reason for its choice, for example `worst`; may be empty.
     pub note: String,
     /// Width and height in pixels.
     pub size: [u32; 2],
     /// The photo as a small JPEG; `None` draws a gray frame.
     pub photo: Option<Vec<u8>>,
-    /// True keypoints, `n` places.
+    /// True positions of the `n` keypoints.
     pub keypoints: Vec<[f32; 2]>,
-    /// What each scheme publishes.
+    /// Released records, one entry per scheme.
     pub released: Vec<ReleasedView>,
-    /// What came back, one per scheme and neighborhoods.
+    /// Recovered keypoints, one entry per attack.
     pub views: Vec<RecoveredView>,
-    /// Who is said to be near whom, one per neighborhoods.
+    /// Graphs of neighbors, one per kind of neighborhoods.
     pub graphs: Vec<Graph>,
 }
 
-/// What one scheme publishes.
+/// The released records of one scheme.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReleasedView {
     /// The scheme's user-facing name.
     pub scheme: String,
-    /// Its records, one per keypoint of [`Picture::keypoints`] in the same order.
+    /// The records, one per keypoint of [`Picture::keypoints`] in the same order.
     pub marks: Marks,
 }
 
-/// Records as drawn; `None` where a keypoint was not released.
+/// Records as drawn; `None` if a keypoint was not released.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Marks {
     /// Lines clipped to the image.
     Lines(Vec<Option<[[f32; 2]; 2]>>),
-    /// Half-lines from an anchor (the first end) to where they leave their part of the image.
+    /// Half-lines from an anchor (the first end) to the border of their part of the image.
     Rays(Vec<Option<[[f32; 2]; 2]>>),
-    /// Published points of which one coordinate belongs to another keypoint.
+    /// Published points with one coordinate of another keypoint.
     Points(Vec<Option<[f32; 2]>>),
 }
 
-/// What came back under one scheme, from one kind of neighborhoods.
+/// The keypoints recovered under one scheme, from one kind of neighborhoods.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecoveredView {
     /// The scheme's user-facing name.
@@ -64,7 +64,8 @@ pub struct RecoveredView {
     pub given: Given,
     /// The solver's name.
     pub solver: String,
-    /// One per keypoint of [`Picture::keypoints`]; `None` where it is lost or was not released.
+    /// Recovered positions, one per keypoint of [`Picture::keypoints`]; `None` if it is lost or was not
+    /// released.
     pub recovered: Vec<Option<[f32; 2]>>,
 }
 
@@ -73,6 +74,6 @@ pub struct RecoveredView {
 pub struct Graph {
     /// The neighborhoods.
     pub given: Given,
-    /// Per keypoint of [`Picture::keypoints`] the true places of its neighbors.
+    /// True positions of the neighbors, per keypoint of [`Picture::keypoints`].
     pub neighbors: Vec<Vec<[f32; 2]>>,
 }

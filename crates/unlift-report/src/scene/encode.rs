@@ -1,4 +1,4 @@
-//! Positions as 16-bit numbers in base64, within a budget of bytes whatever the map's size.
+//! Encodes positions as 16-bit numbers in base64, within a fixed budget of bytes.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -8,33 +8,30 @@ use crate::attack::Given;
 use crate::document::Row;
 use crate::words;
 
-/// Bytes of the page that the 3D view may take. With the libraries (about 1.1 MB), the tables and
-/// the curves the page stays below 10 MB.
+/// Maximal number of bytes of the 3D view. With the libraries (about 1.1 MB), tables and curves the page
+/// stays below 10 MB.
 pub const SCENE_BUDGET_BYTES: usize = 6_000_000;
 
-/// Shapes drawn per scheme: a screen is full of lines long before that.
+/// Maximal number of lines or planes drawn per scheme.
 const MAX_SHAPES: usize = 1_500;
-/// Points drawn for a scheme that publishes points.
+/// Maximal number of points drawn for a scheme that publishes points.
 const MAX_SHAPE_POINTS: usize = 6_000;
 const MAX_CAMERAS: usize = 5_000;
 
 const BYTES_PER_POINT: usize = 3 * size_of::<u16>();
-/// A recovered point: its position and one byte of error.
 const BYTES_PER_RECOVERED: usize = BYTES_PER_POINT + 1;
 const BYTES_PER_PATCH: usize = 4 * BYTES_PER_POINT;
-/// Markup around one embedded block.
 const BYTES_PER_BLOCK: usize = 200;
 
-/// Positions are 0..=65534; this one is "not drawn": lost, not released, or outside the box.
+/// The position of a point that is not drawn: lost, not released, or outside the box. Others are 0..=65534.
 const NOT_DRAWN: u16 = u16::MAX;
-/// The byte of error of a point that is lost or not released.
+/// The error byte of a point that is lost or not released.
 const LOST: u8 = u8::MAX;
-/// Errors are stored as `log10(error / first threshold)` from -3 to 3 in 0..=254.
+/// Errors are stored as `log10(error / first threshold)`, from -3 to 3, in 0..=254.
 const ERROR_DECADES: f32 = 3.0;
 
-/// How many points may stand in the page for `n_views` views and `n_schemes` schemes.
-///
-/// More views mean fewer points each, so that the page stays within [`SCENE_BUDGET_BYTES`].
+/// Returns the maximal number of points for `n_views` views and `n_schemes` schemes within
+/// [`SCENE_BUDGET_BYTES`].
 pub fn points_within_budget(n_views: usize, n_schemes: usize) -> usize {
     let shapes = (MAX_SHAPES * BYTES_PER_PATCH).max(MAX_SHAPE_POINTS * BYTES_PER_POINT);
     let blocks = (n_views + n_schemes + 2) * BYTES_PER_BLOCK;
@@ -43,24 +40,21 @@ pub fn points_within_budget(n_views: usize, n_schemes: usize) -> usize {
     budget.saturating_sub(fixed) / (BYTES_PER_POINT + n_views * BYTES_PER_RECOVERED)
 }
 
-/// The 3D view as the page's script reads it.
 #[derive(Debug, serde::Serialize)]
 pub(crate) struct Encoded {
     pub low: [f32; 3],
     pub high: [f32; 3],
     pub up: [f32; 3],
     pub n_points: u64,
-    /// Points of the map that stand in the page.
     pub n_drawn: usize,
-    /// What is drawn of them, in words.
     pub originals_said: String,
     pub n_cameras: usize,
-    /// Where the view is seen from first: a camera of the map.
+    /// The first viewpoint: a camera of the map.
     pub eye: Option<[f32; 3]>,
     pub error_unit: f32,
     pub obfuscations: Vec<EncodedShapes>,
     pub views: Vec<EncodedView>,
-    /// Base64 blocks; everything above refers to them by index.
+    /// Base64 blocks; the fields above refer to them by index.
     #[serde(skip)]
     pub blocks: Vec<String>,
 }
@@ -71,22 +65,18 @@ pub(crate) struct EncodedShapes {
     pub kind: &'static str,
     pub count: usize,
     pub block: usize,
-    /// What is drawn, in words.
     pub said: String,
 }
 
 #[derive(Debug, serde::Serialize)]
 pub(crate) struct EncodedView {
-    /// The row of the results that this is.
     pub row: usize,
     pub block: usize,
-    /// Points that are drawn.
     pub drawn: usize,
-    /// What is drawn and what is not, in words.
     pub said: String,
 }
 
-/// The camera that sees most of the scene, as it looks at the middle: of those in the box the farthest from there.
+/// Returns the camera in the box that is farthest from its middle, because it sees most of the scene.
 fn eye(bounds: &SceneBox, cameras: &[[f32; 3]]) -> Option<[f32; 3]> {
     let middle: [f32; 3] = std::array::from_fn(|c| 0.5 * (bounds.low[c] + bounds.high[c]));
     let far = |camera: &[f32; 3]| (0..3).map(|c| (camera[c] - middle[c]).powi(2)).sum::<f32>();
@@ -94,9 +84,8 @@ fn eye(bounds: &SceneBox, cameras: &[[f32; 3]]) -> Option<[f32; 3]> {
     within.copied().max_by(|a, b| far(a).total_cmp(&far(b)))
 }
 
-/// Encodes `scene`, thinned further if it breaks the budget; errors are told relative to
-/// `error_unit`, the first threshold. Views that belong to none of `rows`, or to one that has a view
-/// already, are left out.
+/// Encodes `scene`, thinned further if it exceeds the budget. Errors are relative to `error_unit`, the
+/// first threshold. Leaves out views without a row in `rows`, and further views of one row.
 ///
 /// Block 0 holds the originals, block 1 the cameras.
 pub(crate) fn encode(scene: &Scene3d, rows: &[Row], error_unit: f32) -> Encoded {
@@ -154,7 +143,6 @@ pub(crate) fn encode(scene: &Scene3d, rows: &[Row], error_unit: f32) -> Encoded 
     }
 }
 
-/// The row of the results that `view` shows.
 fn row_of(rows: &[Row], view: &View) -> Option<usize> {
     rows.iter().position(|row| {
         row.scheme == view.scheme
@@ -163,7 +151,6 @@ fn row_of(rows: &[Row], view: &View) -> Option<usize> {
     })
 }
 
-/// Positions of all points, then one byte of error each.
 fn encode_view(
     bounds: &SceneBox,
     scene: &Scene3d,
@@ -206,7 +193,7 @@ fn encode_shapes(bounds: &SceneBox, shapes: &Shapes) -> (&'static str, Vec<u8>, 
     }
 }
 
-/// Little-endian u16 triples, 0..=65534 across the box.
+/// Encodes positions as little-endian u16 triples, 0..=65534 across the box.
 fn positions(bounds: &SceneBox, points: impl Iterator<Item = [f32; 3]>) -> Vec<u8> {
     let mut bytes = Vec::new();
     for point in points {
@@ -221,7 +208,7 @@ fn quantize(bounds: &SceneBox, point: [f32; 3]) -> [u16; 3] {
     let mut cells = [0; 3];
     for axis in 0..3 {
         let share = (point[axis] - bounds.low[axis]) / (bounds.high[axis] - bounds.low[axis]);
-        // A hair of slack: ends of clipped lines lie on the box up to rounding.
+        // Ends of clipped lines lie on the box only up to rounding.
         if !(-1e-4..=1.0001).contains(&share) {
             return [NOT_DRAWN; 3];
         }
@@ -242,21 +229,17 @@ fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
     a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f32>().sqrt()
 }
 
-/// What became of the points of one pane.
+/// Counts of the points of one pane; each point is counted once.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 struct Fate {
-    /// Points that are drawn.
     drawn: usize,
-    /// Points that the scheme's rule did not release.
     withheld: usize,
-    /// Released points without a position after recovery.
     lost: usize,
-    /// Points outside the box that is drawn.
     outside: usize,
 }
 
 impl Fate {
-    /// "3,861 of 3,895 points drawn; 34 not released".
+    /// Returns a sentence: "3,861 of 3,895 points drawn; 34 not released".
     fn said(&self) -> String {
         let count = |n: usize| words::thousands(n as u64);
         let all = self.drawn + self.withheld + self.lost + self.outside;
@@ -281,7 +264,7 @@ impl Fate {
     }
 }
 
-/// "1,500 of 3,895 lines drawn".
+/// Returns a sentence: "1,500 of 3,895 lines drawn".
 fn shapes_said(shapes: &Shapes, drawn: usize, n_records: u64) -> String {
     let what = match shapes {
         Shapes::Segments(_) => "lines",

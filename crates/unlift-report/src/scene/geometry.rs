@@ -10,10 +10,12 @@ pub struct SceneBox {
 }
 
 impl SceneBox {
-    /// The box from the 1st to the 99th percentile of each coordinate, widened by a tenth of its
-    /// longest side: far outliers of a map would else shrink the scene to a dot.
+    /// Returns the box from the 1st to the 99th percentile of each coordinate, widened by a tenth
+    /// of its longest side. Percentiles exclude far outliers, which would shrink the scene to a
+    /// dot.
     ///
-    /// Non-finite points are ignored; without points it is the unit cube about the origin.
+    /// Ignores non-finite coordinates; without points it starts from the unit cube about the
+    /// origin.
     pub fn robust(points: &[[f32; 3]]) -> Self {
         let mut low = [-0.5; 3];
         let mut high = [0.5; 3];
@@ -37,13 +39,13 @@ impl SceneBox {
         Self { low, high }
     }
 
-    /// The part of the line through `point` along `direction` that lies in the box; `None` when
-    /// the line misses it or has no direction.
+    /// Returns the part in the box of the line through `point` along `direction`; `None` if the
+    /// line misses the box or `direction` is zero.
     pub fn clip_line(&self, point: [f32; 3], direction: [f32; 3]) -> Option<[[f32; 3]; 2]> {
         self.clip(point, direction, f32::NEG_INFINITY)
     }
 
-    /// As [`SceneBox::clip_line`], for the half-line that starts at `center`.
+    /// Returns the part in the box of the half-line from `center`, like [`SceneBox::clip_line`].
     pub fn clip_ray(&self, center: [f32; 3], direction: [f32; 3]) -> Option<[[f32; 3]; 2]> {
         self.clip(center, direction, 0.0)
     }
@@ -69,7 +71,8 @@ impl SceneBox {
         Some([at(near), at(far)])
     }
 
-    /// The rectangle of the plane `coordinate[axis] == offset` within the box; `None` outside it.
+    /// Returns the rectangle of the plane `coordinate[axis] == offset` in the box; `None` if it is
+    /// outside.
     pub fn axis_patch(&self, axis: usize, offset: f32) -> Option<[[f32; 3]; 4]> {
         if !(self.low[axis]..=self.high[axis]).contains(&offset) {
             return None;
@@ -90,8 +93,8 @@ impl SceneBox {
     }
 }
 
-/// At most `max` of the indices `0..n`, ascending, chosen by a hash of the index and `seed`: the
-/// same on every machine, and no stride that could follow the order of a map file.
+/// Returns at most `max` of the indices `0..n`, ascending, chosen by a hash of the index and
+/// `seed`. The choice is equal on every machine and independent of the order of a map file.
 pub fn subsample(n: usize, max: usize, seed: u64) -> Vec<usize> {
     if n <= max {
         return (0..n).collect();
@@ -107,7 +110,6 @@ pub fn subsample(n: usize, max: usize, seed: u64) -> Vec<usize> {
     indices
 }
 
-/// SplitMix64's mix of a counter.
 fn mix(seed: u64, counter: u64) -> u64 {
     let mut z = seed.wrapping_add(counter.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

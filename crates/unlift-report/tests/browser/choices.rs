@@ -1,4 +1,4 @@
-//! What the menus offer, and that the page shows the rows that are chosen.
+//! Tests of the menus: their options, and the rows that the page shows.
 
 use serde_json::{Value, json};
 use unlift_report::document::Document;
@@ -6,8 +6,8 @@ use unlift_report::{RenderOptions, render};
 
 use super::{browser, page, sample};
 
-/// Picks every option of a form's menus `keys`, one after the other, and says what the page shows then:
-/// an array of `[labels of the options, what "show" returns]`.
+/// Picks every combination of options of a form's menus `keys`; returns an array of
+/// `[labels of the options, result of "show"]`.
 const WALK: &str = "((form, keys, show) => {
     const controls = document.getElementById(form);
     const options = (key) => [...controls.querySelectorAll(`[name='${form}-${key}'] option, input[name='${form}-${key}']`)];
@@ -38,12 +38,22 @@ fn text(value: &Value) -> &str {
     value.as_str().expect("a text")
 }
 
-/// What a row of `document` is called in menus: its neighborhoods with their source's name.
+/// Returns the name of a source in menus.
+fn plain(neighbors: &str) -> &str {
+    match neighbors {
+        "oracle" => "known neighbors",
+        "overlap" => "neighbors by descriptor overlap",
+        "geometric" => "neighbors by record geometry",
+        other => other,
+    }
+}
+
+/// Returns the scheme, neighborhoods and solver of a row, as in menus.
 fn called(document: &Document, row: usize) -> (String, String, String) {
     let row = &document.results[row];
     let percent = format!("{:.1}", 100.0 * row.inlier_ratio);
     let share = percent.trim_end_matches(".0");
-    let given = format!("{}, {share} % true neighbors", row.neighbors);
+    let given = format!("{}, {share} % right", plain(&row.neighbors));
     (row.scheme.clone(), given, row.solver.clone())
 }
 
@@ -52,7 +62,7 @@ fn every_choice_of_the_view_names_its_source_and_shows_points_or_words() {
     let Some(mut browser) = browser() else { return };
     let document = sample::mixed(true);
     let mut scene = sample::scene(&document, 600);
-    // One cell has no points in the page, and of one cell nothing came back.
+    // One row has no points in the page, and one row has no recovered points.
     let gone = scene.views.pop().expect("a view");
     scene.views[0].recovered.fill([f32::NAN; 3]);
     let page = render(&document, Some(&scene), &RenderOptions::default()).expect("a page");
@@ -72,7 +82,7 @@ fn every_choice_of_the_view_names_its_source_and_shows_points_or_words() {
         // A menu of one entry is not drawn.
         assert!(labels[2] == solver || labels[2].is_empty(), "{labels:?}");
         let (panes, status) = (text(&choice[1][2]), text(&choice[1][3]));
-        assert!(panes.contains(&format!("recovered, {given}, {solver}")), "{panes}");
+        assert!(panes.contains(&format!("recovered, {given}, solver {solver}")), "{panes}");
         assert!(status.contains("released") && status.contains("drawn"), "{status}");
         let drawn = choice[1][1].as_u64().expect("points");
         let lost = panes.contains("None of 600 points drawn; 600 lost");
@@ -106,8 +116,9 @@ fn charts_show_the_rows_that_are_chosen() {
         assert_eq!(seen.len(), 8 * 2, "{chart}");
         for choice in seen {
             let (given, solver) = (text(&choice[0][0]), text(&choice[0][1]));
-            let (source, _) = given.split_once(',').expect("a source and a share");
-            assert!(["oracle", "overlap", "geometric"].contains(&source), "{given}");
+            let (called, _) = given.split_once(',').expect("a source and a share");
+            let mut sources = ["oracle", "overlap", "geometric"].into_iter();
+            let source = sources.find(|source| plain(source) == called).expect("a known source");
             let rows =
                 text(&choice[1][0]).split(' ').map(|row| row.parse::<usize>().expect("a row"));
             let rows: Vec<usize> = rows.collect();
@@ -115,11 +126,11 @@ fn charts_show_the_rows_that_are_chosen() {
             for &row in &rows {
                 let row = &document.results[row];
                 assert_eq!((row.neighbors.as_str(), row.solver.as_str()), (source, solver));
-                let asked = format!("oracle, {} % true neighbors", 100.0 * row.inlier_ratio);
+                let asked = format!("known neighbors, {} % right", 100.0 * row.inlier_ratio);
                 assert!(source != "oracle" || given == asked, "{given}, {}", row.inlier_ratio);
             }
             let said = text(&choice[1][1]);
-            assert!(said.starts_with(&format!("Shown: {given}, by {solver}.")), "{said}");
+            assert!(said.starts_with(&format!("Shown: {given}, solver {solver}.")), "{said}");
             assert_eq!(
                 said.contains("Not tried with these: plane."),
                 source == "geometric",
@@ -127,11 +138,11 @@ fn charts_show_the_rows_that_are_chosen() {
             );
         }
     }
-    // Today's attack comes first, and no menu knows a solver that is none.
+    // Today's attack comes first, and the menus of solvers contain no source.
     let first =
         "document.querySelector('[name=error-controls-given]').selectedOptions[0].textContent";
     browser.open(&page, 1280);
-    assert_eq!(browser.evaluate(first), json!("overlap, 8 to 9.2 % true neighbors"));
+    assert_eq!(browser.evaluate(first), json!("neighbors by descriptor overlap, 8 to 9.2 % right"));
     let names = browser.evaluate("[...document.querySelectorAll('[name$=-solver]')].map(i => i.nextElementSibling?.textContent ?? '').join()");
     assert!(!text(&names).contains("overlap"), "{names}");
 }

@@ -1,4 +1,4 @@
-//! A headless Chromium, driven over the DevTools protocol: as much of it as these tests need.
+//! A minimal client of the DevTools protocol for a headless Chromium.
 
 use std::io::{BufRead, BufReader, Read};
 use std::net::TcpStream;
@@ -32,7 +32,7 @@ const FLAGS: [&str; 15] = [
 ];
 const PATIENCE: Duration = Duration::from_secs(90);
 
-/// An installed browser: `CHROMIUM`, or one of the usual names on the `PATH`.
+/// Finds an installed browser: `CHROMIUM`, or one of the usual names on the `PATH`.
 pub fn find() -> Option<PathBuf> {
     if let Some(named) = std::env::var_os("CHROMIUM") {
         return Some(PathBuf::from(named));
@@ -43,7 +43,7 @@ pub fn find() -> Option<PathBuf> {
     candidates.into_iter().find(|candidate| candidate.is_file())
 }
 
-/// A running browser with one page; ends with this value.
+/// A running browser with one page; it ends when this value is dropped.
 pub struct Browser {
     child: Child,
     profile: PathBuf,
@@ -77,7 +77,7 @@ impl Browser {
                 break address.trim().to_owned();
             }
         };
-        // The browser must never block on a full pipe.
+        // Reading stderr keeps the browser from blocking on a full pipe.
         std::thread::spawn(move || {
             let mut sink = Vec::new();
             let _ = stderr.read_to_end(&mut sink);
@@ -104,7 +104,7 @@ impl Browser {
         browser
     }
 
-    /// Sends a command and returns its result; events that arrive meanwhile are noted.
+    /// Sends a command and returns its result; records complaints of events that arrive meanwhile.
     pub fn call(&mut self, method: &str, params: Value) -> Value {
         self.next_id += 1;
         let id = self.next_id;
@@ -145,7 +145,6 @@ impl Browser {
         }
     }
 
-    /// The value of a JavaScript expression.
     pub fn evaluate(&mut self, expression: &str) -> Value {
         let params = json!({"expression": expression, "returnByValue": true, "awaitPromise": true});
         let result = self.call("Runtime.evaluate", params);
@@ -153,7 +152,7 @@ impl Browser {
         result["result"]["value"].clone()
     }
 
-    /// Sets the size of the page and the color scheme it is asked to prefer.
+    /// Sets the size of the page and the preferred color scheme.
     pub fn emulate(&mut self, width: u32, height: u32, color_scheme: &str) {
         let size = json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600});
         self.call("Emulation.setDeviceMetricsOverride", size);
@@ -168,21 +167,21 @@ impl Browser {
         self.call("Page.navigate", json!({"url": format!("file://{}", file.display())}));
     }
 
-    /// Opens a page at this width and waits until its script says that it is done.
+    /// Opens a page at this width and waits until its script has finished.
     pub fn open(&mut self, page: &str, width: u32) {
         self.emulate(width, 900, "light");
         self.navigate(page);
         self.wait_for("document.documentElement?.dataset.ready === '1'");
     }
 
-    /// No errors, nothing blocked, and no scrolling sideways.
+    /// Asserts that there are no errors, no blocked loads, and no horizontal scrolling.
     pub fn is_fine(&mut self) {
         let wider = "document.documentElement.scrollWidth > document.documentElement.clientWidth";
         assert_eq!(self.evaluate(wider), json!(false), "the page scrolls sideways");
         assert_eq!(self.complaints, Vec::<String>::new());
     }
 
-    /// Opens all folded parts of the page and waits until what is in them is drawn.
+    /// Opens all folded parts of the page and waits until they are drawn.
     pub fn unfold(&mut self) {
         self.evaluate(
             "document.querySelectorAll('details').forEach(part => { part.open = true; })",
@@ -199,7 +198,6 @@ impl Browser {
         }
     }
 
-    /// A picture of the window, as PNG.
     pub fn screenshot(&mut self) -> Vec<u8> {
         let result = self.call("Page.captureScreenshot", json!({"format": "png"}));
         let data = result["data"].as_str().expect("a picture");

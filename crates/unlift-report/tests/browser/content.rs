@@ -1,11 +1,11 @@
-//! What the page shows: curves, tables, canvases; no errors, no network, some of it without script.
+//! Tests of the page's content: curves, tables and canvases, without errors and network; parts of it
+//! without script.
 
 use serde_json::json;
 use unlift_report::{RenderOptions, render};
 
 use super::{browser, page, page_with_points, sample};
 
-/// Charts that are drawn.
 const CHARTS: &str = "document.querySelectorAll('.chart svg').length";
 
 #[test]
@@ -14,12 +14,10 @@ fn curves_tables_and_canvas_are_there_without_errors_or_network() {
     let page = page_with_points(&sample::document(true), 4_000);
     for width in [1280, 390] {
         browser.open(&page, width);
-        // Charts that are folded away are drawn when they are opened.
         let folded =
             browser.evaluate("document.querySelectorAll('#chart-multiples .chart').length");
         assert_eq!(folded, json!(0));
         browser.unfold();
-        // One overview, one chart per scheme, one of errors, one of certainty; each with drawn curves.
         assert_eq!(browser.evaluate(CHARTS), json!(10));
         let empty = "[...document.querySelectorAll('.chart')].filter(c => c.querySelectorAll('svg path').length < 10).length";
         assert_eq!(browser.evaluate(empty), json!(0));
@@ -45,7 +43,7 @@ fn the_canvas_shows_points_and_answers_every_choice() {
         );
         browser.evaluate(&press);
     }
-    // The drawing buffer is gone after the frame: read it in the same turn as the drawing.
+    // The drawing buffer is lost after the frame, so it is read in the same turn as the drawing.
     let lit = "(() => {
         const canvas = document.getElementById('canvas');
         canvas.dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight'}));
@@ -105,7 +103,7 @@ fn the_page_can_be_read_without_script() {
     let seen = "['.card', '.finding', '#gates li', '#numbers details', '.stage', '.chart'].map(s =>
         [...document.querySelectorAll(s)].filter(n => n.getClientRects().length && n.clientHeight > 0).length)";
     let seen = browser.evaluate(seen);
-    // Cards, findings, gates and tables (folded) are there; nothing that needs script is.
+    // Cards, findings, gates and folded tables are visible; parts that need script are not.
     assert_eq!(seen, json!([7, 14, 2, 7, 0, 0]));
 }
 

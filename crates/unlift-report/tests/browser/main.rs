@@ -1,7 +1,7 @@
-//! The page in a real browser: no errors, no network, and everything is there.
+//! Tests of the page in a real browser.
 //!
-//! Skipped with a message where no Chromium is installed; `CHROMIUM` names one. With
-//! `UNLIFT_SCREENSHOTS=DIR` pictures are written there, to be looked at.
+//! They are skipped with a message if no Chromium is installed; `CHROMIUM` can name one. With
+//! `UNLIFT_SCREENSHOTS=DIR` they write screenshots to that folder.
 
 mod choices;
 mod chromium;
@@ -23,12 +23,10 @@ fn browser() -> Option<Browser> {
     found.map(|program| Browser::start(&program))
 }
 
-/// The page of figures alone.
 fn page(document: &Document) -> String {
     render(document, None, &RenderOptions::default()).expect("a page")
 }
 
-/// The page with so many points.
 fn page_with_points(document: &Document, n: usize) -> String {
     let scene = sample::scene(document, n);
     render(document, Some(&scene), &RenderOptions::default()).expect("a page")

@@ -1,5 +1,5 @@
-//! Pictures of the page: every section can be seen, in light and in dark. Where `UNLIFT_SCREENSHOTS` names a folder they
-//! are written there, to be looked at, of more pages and narrow screens.
+//! Screenshots of the page: every section is visible, in light and dark mode. If `UNLIFT_SCREENSHOTS` names a folder,
+//! screenshots of more pages and of narrow screens are written to it.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use super::{browser, page_with_points, sample};
 
 const SECTIONS: [&str; 6] = ["verdict", "next", "scene", "curves", "distribution", "numbers"];
 
-/// What an open page looks like, and how far down: first as it opens, then from each section on.
+/// Returns screenshots of an open page with their scroll positions: as it opens, then at each section.
 fn pictures(browser: &mut Browser, (width, colors): (u32, &str)) -> Vec<(Vec<u8>, i64)> {
     let mut pictures = vec![(browser.screenshot(), -1)];
     for section in SECTIONS {
@@ -28,7 +28,6 @@ fn pictures(browser: &mut Browser, (width, colors): (u32, &str)) -> Vec<(Vec<u8>
     pictures
 }
 
-/// Width and height of a PNG.
 fn size(picture: &[u8]) -> [u32; 2] {
     assert!(picture.starts_with(b"\x89PNG"));
     [16, 20].map(|at| u32::from_be_bytes(picture[at..at + 4].try_into().expect("four bytes")))
@@ -55,8 +54,8 @@ fn every_section_is_seen_in_light_and_dark() {
             for (at, (picture, down)) in pictures.iter().enumerate() {
                 let kind = at.checked_sub(1).map_or("fold", |section| SECTIONS[section]);
                 assert_eq!(size(picture), [screen.0, if at == 0 { 1000 } else { 1400 }]);
-                // The last sections share the end of the page. Else nothing is drawn, or dark is as light, where a
-                // picture is there twice.
+                // Equal screenshots mean that nothing is drawn or that dark mode looks like light mode. Only the last
+                // sections may share the end of the page.
                 if pictures[..at].iter().all(|(_, other)| other != down) {
                     assert!(!all.contains(picture), "{name}, {kind}, {screen:?}: seen before");
                     all.push(picture.clone());

@@ -1,11 +1,12 @@
-//! Nothing overlaps, is cut or scrolls sideways, on a laptop or on a phone.
+//! Tests that nothing overlaps, is cut or scrolls horizontally, on a laptop and on a phone.
 
 use serde_json::json;
 use unlift_report::document::{Document, Spread};
 
 use super::{browser, page, sample};
 
-/// Tables that are cut, and those that do not say so by a shade and by the keyboard.
+/// Tables that are cut, and the number of those that show this neither by a shade nor by the
+/// keyboard.
 const CUT: &str =
     "[...document.querySelectorAll('.wide')].filter(s => s.scrollWidth > s.clientWidth)
     .map(s => `${s.ariaLabel}: ${s.scrollWidth} > ${s.clientWidth}`)";
@@ -13,7 +14,8 @@ const SILENT: &str =
     "[...document.querySelectorAll('.wide')].filter(s => s.scrollWidth > s.clientWidth
     && !(getComputedStyle(s).backgroundImage.includes('gradient') && s.tabIndex === 0)).length";
 
-/// Many schemes with long names, sources, noise models, solvers, thresholds and seeds.
+/// Returns an audit of many schemes with long names, sources, noise models, solvers, thresholds and
+/// seeds.
 fn crowded() -> Document {
     let mut document = sample::mixed(true);
     let rows = std::mem::take(&mut document.results);
@@ -57,7 +59,6 @@ fn crowded() -> Document {
     document
 }
 
-/// Labels of charts that meet or are cut.
 const OVERLAPS: &str = "[...document.querySelectorAll('.chart svg')].flatMap(svg => {
     const frame = svg.getBoundingClientRect();
     const texts = [...svg.querySelectorAll('text')].filter(t => t.textContent.trim());
@@ -70,7 +71,6 @@ const OVERLAPS: &str = "[...document.querySelectorAll('.chart svg')].flatMap(svg
     return [...met, ...out];
 })";
 
-/// What reaches beyond the page.
 const BEYOND: &str = "[...document.querySelectorAll('main *')]
     .filter(n => !n.closest('.wide') && n.getBoundingClientRect().right > document.documentElement.clientWidth + 1)
     .map(n => `${n.tagName}.${n.className?.baseVal ?? n.className}: ${n.textContent.slice(0, 60)}`)";

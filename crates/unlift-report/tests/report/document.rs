@@ -1,4 +1,4 @@
-//! `audit.json`: round trip, stable text, and the rules it keeps.
+//! Tests of `audit.json`: round trip, stable text, and the rules of the format.
 
 use serde_json::Value;
 use unlift_report::document::{GateResult, NotAudited};
@@ -29,12 +29,12 @@ fn a_document_survives_its_text() {
     (row.sure_percent, row.sure_unknown) = (None, Some("too few points".into()));
     row.metrics = [("ssim".to_owned(), 0.512_345_6), ("faces".into(), 7.0)].into();
     row.median_error = Some(0.012_345_678_9);
-    // Thresholds keep their spelling and order.
+    // Thresholds keep spelling and order.
     row.recovered_percent = [("0.250".to_owned(), 98.0), ("0.10".to_owned(), 93.0)].into();
     row.blind_percent = [("0.250".to_owned(), 2.0), ("0.10".to_owned(), 1.0)].into();
     (row.records_alone_percent, row.records_alone_by) = (None, None);
     let text = document.to_json().unwrap();
-    // Null is not absent; measured numbers are rounded, typed ones are not.
+    // Null differs from absent; measured numbers are rounded, typed ones are not.
     for field in [
         "\"sure_percent\": null",
         "\"median_error\": 0.0123457,",
@@ -75,7 +75,7 @@ fn the_larger_baseline_counts() {
     let document = sample::document(true);
     let of = |scheme: &str| document.results.iter().find(|row| row.scheme == scheme).unwrap();
     assert_eq!(of("olc").baseline_percent("0.10"), Some(58.6));
-    // No attack on planes works from records alone.
+    // No attack on the records alone works for planes.
     assert_eq!(of("plane").baseline_percent("0.10"), Some(0.2));
     let mut worse = of("olc").clone();
     worse.blind_percent[0] = 60.0;
@@ -144,7 +144,7 @@ fn a_broken_rule_names_its_place() {
     assert_eq!(Document::from_json(&text).expect("a document").images, document.images);
 }
 
-/// What may leave the house says nothing that others wrote.
+/// A share-safe document contains no text from schemes, sources or solvers of others.
 #[test]
 fn what_others_say_of_why_they_failed_is_kept_back() {
     let mut document = sample::document(true);

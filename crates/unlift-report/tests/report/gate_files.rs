@@ -1,5 +1,5 @@
-//! Gates as JUnit XML and as SARIF: the whole text, as it was held against the schemas of Jenkins (`junit-10.xsd`) and of
-//! SARIF 2.1.0.
+//! Tests of gates as JUnit XML and SARIF: the whole text, which was validated by the schemas of Jenkins (`junit-10.xsd`)
+//! and SARIF 2.1.0.
 
 use serde_json::json;
 use unlift_report::document::{Document, ImageCounts};
@@ -7,7 +7,7 @@ use unlift_report::{junit, sarif};
 
 use crate::sample;
 
-/// An audit with a gate that failed, one that held, and an image that could not be used.
+/// Returns an audit with a failed gate, a gate that held, and an unusable image.
 fn document() -> Document {
     let mut document = sample::document(true);
     document.gates[0].of = Some("olc, \"oracle\" at 0.50".into());
@@ -39,13 +39,13 @@ fn gates_are_test_cases() {
 #[test]
 fn gates_are_rules_and_failed_ones_results() {
     let mut document = document();
-    // A rule stands once, however often its gate was typed.
+    // SARIF lists a rule once, even if its gate was given twice.
     document.gates.push(document.gates[0].clone());
     let rule = |gate: &str| {
         json!({
             "id": gate,
             "shortDescription": { "text": format!("{gate}: at most 20 % may come back") },
-            "help": { "text": "report.html of the audit says what came back, and by which attack." },
+            "help": { "text": "report.html of the audit shows what came back, and by which attack." },
             "defaultConfiguration": { "level": "error" },
             "properties": { "tags": ["privacy"] },
         })

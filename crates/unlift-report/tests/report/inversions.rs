@@ -1,4 +1,4 @@
-//! Pictures of what came back, and what the page says about them.
+//! Tests of painted pictures on the page.
 
 use unlift_report::document::{Document, Row};
 use unlift_report::inversions::{Inversion, InvertedView, Likeness, Object, Painted};
@@ -6,7 +6,7 @@ use unlift_report::{Given, RenderOptions, render};
 
 use crate::sample;
 
-/// An audit of images, of which the first two rows are from an attacker's own lists.
+/// Returns an audit of images, with rows by an attacker's own lists for both schemes.
 fn document() -> Document {
     let mut document = sample::images();
     for (row, ssim) in document.results.iter_mut().zip([0.48, 0.33].into_iter().cycle()) {
@@ -21,7 +21,7 @@ fn document() -> Document {
         (row.neighbors, row.oracle_noise, row.inlier_ratio) = ("overlap".into(), None, 0.2);
         document.results.push(row);
     }
-    // Rows of the images are not asked here, and are as many as results or none.
+    // Rows of images must match the results in number, or be absent.
     document.images.iter_mut().for_each(|image| image.rows.clear());
     document
 }
@@ -68,11 +68,9 @@ fn the_page_begins_with_what_an_attacker_paints_from_the_released_data() {
     let not = "<strong>The picture does not come back well by this attack.</strong> If half of the neighbors were known: ";
     let (first, second) = (found.find(rebuilt), found.find(not));
     assert!(first.is_some() && first < second, "{found}");
-    assert!(
-        found.contains(
-            "% of the keypoints come back within 10\u{a0}px (LINES2D, overlap neighbors)."
-        )
-    );
+    assert!(found.contains(
+        "% of the keypoints come back within 10\u{a0}px (LINES2D, neighbors by descriptor overlap)."
+    ));
     assert!(found.contains("What the service receives") && found.contains("<path d=\"M"));
     assert!(!found.to_lowercase().contains("worse picture"));
     let safe = page(&document, vec![inversion(&document, ssim)], true);
@@ -83,7 +81,7 @@ fn the_page_begins_with_what_an_attacker_paints_from_the_released_data() {
 fn a_picture_that_was_poor_without_protection_is_called_so() {
     let document = document();
     let mut poor = inversion(&document, |_| 0.4);
-    let said = "Even from the true points this network paints a poor picture (SSIM 0.43).";
+    let said = "Even from the true points this network paints a poor picture (similarity to the photo: SSIM 0.43 of 1).";
     assert!(!page(&document, vec![poor.clone()], false).contains("Even from the true points"));
     poor.baseline.likeness.ssim = 0.43;
     assert!(page(&document, vec![poor], false).contains(said));
@@ -96,8 +94,8 @@ fn two_photos_show_two_schemes() {
     let found = page(&document, vec![all(), all(), all()], false);
     assert_eq!(found.matches("<div class=\"exhibit").count(), 3);
     assert!(
-        found.contains("(LINES2D, overlap neighbors)")
-            && found.contains("(CP2D, overlap neighbors)")
+        found.contains("(LINES2D, neighbors by descriptor overlap)")
+            && found.contains("(CP2D, neighbors by descriptor overlap)")
     );
 }
 
@@ -109,7 +107,8 @@ fn only_the_strongest_attacks_are_shown_at_first() {
     let (_, row) = section.split_once("<h3>LINES2D</h3>").expect("a scheme");
     let (main, others) = row.split_once("<details>").expect("the others are folded away");
     assert_eq!(main.matches("<img").count(), 2, "released data alone, and half of the neighbors");
-    assert!(main.contains("overlap, 20 % true neighbors") && main.contains("oracle, 50 % true"));
+    assert!(main.contains("neighbors by descriptor overlap, 20 % right"));
+    assert!(main.contains("known neighbors, 50 % right"));
     let (others, _) = others.split_once("</details>").expect("an end");
     assert_eq!(others.matches("<img").count(), 5);
 }
@@ -126,7 +125,7 @@ fn boxes_are_of_objects_that_are_found_again() {
 fn figures_of_pictures_stand_beside_the_papers() {
     let found = page(&document(), Vec::new(), false);
     assert!(found.contains("tv, %"), "{found}");
-    // The paper's figures of the same cell stand beside ours.
+    // The published figures of the same case are beside ours.
     assert!(found.contains("<td>0.480</td><td>0.020</td><td>0.62</td>"), "{found}");
     assert!(!found.contains("ssim_baseline"));
     assert!(found.contains("<td>75.0</td>") && found.contains("<td>25.0</td>"));

@@ -1,4 +1,4 @@
-//! What `audit.json`, the page and the files of gates hold, without a browser.
+//! Tests of `audit.json`, the page and the files of gates, without a browser.
 
 #[path = "../sample/mod.rs"]
 mod sample;

@@ -1,4 +1,4 @@
-//! The page as text: numbers without script, escaping, nothing private in a page to share.
+//! Tests of the page as text: numbers without script, escaping, and share-safe pages.
 
 use sha2::{Digest, Sha256};
 use unlift_report::document::{Document, NotAudited, Spread};
@@ -11,7 +11,7 @@ fn page(document: &Document, scene: Option<&Scene3d>, share_safe: bool) -> Strin
     render(document, scene, &options).expect("a page")
 }
 
-/// The page without its scripts and styles: what a browser without script shows.
+/// Returns the page without scripts and styles, as a browser without script shows it.
 fn without_script(page: &str) -> String {
     let mut text = page.to_owned();
     for (open, close) in [("<script", "</script>"), ("<style", "</style>")] {
@@ -23,7 +23,7 @@ fn without_script(page: &str) -> String {
     text
 }
 
-/// The text of an element's content without tags, spaces made single.
+/// Returns the text without tags and with single spaces.
 fn plain(markup: &str) -> String {
     let mut text = String::new();
     let mut inside = false;
@@ -38,20 +38,20 @@ fn plain(markup: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// The page as text without script, tags and explanations of words.
+/// Returns the page as text without scripts, tags and tooltips.
 fn said(document: &Document) -> String {
     let mut text = without_script(&page(document, None, false));
     while let Some(start) = text.find("<span class=\"tip\"") {
         let end = start + text[start..].find("</span>").expect("it ends") + "</span>".len();
         text.replace_range(start..end, "");
     }
-    // Where the verdict begins and the contents end.
+    // Marks the start of the verdict and cuts the table of contents.
     let text = text.replace("<section class=\"part", "VERDICT <section class=\"part");
     let (contents, rest) = text.split_once("</nav>").expect("contents");
     plain(&format!("{}{rest}", contents.split("<nav").next().unwrap_or_default()))
 }
 
-/// The verdict's part of a page, without tags.
+/// Returns the verdict section of a page, without tags.
 fn verdict(document: &Document) -> String {
     let text = said(document);
     let from = text.find("VERDICT ").expect("a verdict") + "VERDICT ".len();
@@ -67,11 +67,11 @@ fn the_verdict_leads_with_the_strongest_attack_from_the_released_data() {
          tried would give back 83.3 % or more. Next: Try the stronger attack: add \
          --descriptors FILE --neighbors descriptors .",
         "OLC Random lines Today, from the released data alone 58.6 % records alone (tomography) If half of the \
-         neighbors were known 92.3 % oracle, 50 % true neighbors, consensus A blind guess gets 1.9 %, \
-         the records alone 58.6 %. Neighborhoods add 33.7 percentage points (oracle). Half of the points come \
-         back even when 10 % of the neighbors are right, the fewest tested.",
-        "PLANE Axis-aligned planes Today, from the released data alone Not tried on this scheme, so nothing is \
-         known. If half of the neighbors were known 83.7 %",
+         neighbors were known 92.3 % known neighbors, 50 % right, solver consensus A blind guess recovers \
+         1.9 %, the released records alone 58.6 %. Lists of neighbors add 33.7 percentage points (known neighbors). Half \
+         of the points come back even when only 10 % of the neighbors are right, the smallest share tested.",
+        "PLANE Axis-aligned planes Today, from the released data alone Not tried on this scheme, so the \
+         result is unknown. If half of the neighbors were known 83.7 %",
     ];
     let places: Vec<Option<usize>> = in_order.iter().map(|sentence| text.find(sentence)).collect();
     assert!(places.iter().all(Option::is_some), "{places:?}\n{text}");
@@ -81,21 +81,20 @@ fn the_verdict_leads_with_the_strongest_attack_from_the_released_data() {
 #[test]
 fn the_verdict_names_the_strongest_attack_of_today() {
     let text = verdict(&sample::mixed(true));
-    // PPL by overlap: stronger than its records alone; the weaker solver of the cell is not named.
-    assert!(text.contains("41.0 % overlap, 35 listed, 8.2 % of them true, consensus"), "{text}");
-    // What neighborhoods add is counted from the larger baseline, per source.
+    let by =
+        "41.0 % neighbors by descriptor overlap, 35 listed, 8.2 % of them right, solver consensus";
+    assert!(text.contains(by), "{text}");
     assert!(
         text.contains(
-            "A blind guess gets 1.2 %, the records alone 7.3 %. Neighborhoods add \
-            33.7 percentage points (overlap), nothing (geometric) and 81.8 percentage points (oracle)."
+            "A blind guess recovers 1.2 %, the released records alone 7.3 %. Lists of neighbors add 33.7 percentage points \
+            (by descriptor overlap), nothing (by record geometry) and 81.8 percentage points (known neighbors)."
         ),
         "{text}"
     );
-    // The released data, not the oracle, decides the order.
     let (olc, plane) = (text.find("OLC Random lines"), text.find("PLANE Axis-aligned planes"));
     assert!(olc < plane && plane.is_some());
     assert!(text.contains(
-        "Neighborhoods by geometric were not tried: planes say nothing of where points are."
+        "Not tried with neighbors by record geometry: planes say nothing of where points are."
     ));
 }
 
@@ -109,7 +108,7 @@ fn what_to_do_next_names_what_was_not_tried_and_what_leaks_least() {
     let mixed = said(&sample::mixed(true));
     assert!(mixed.contains("add --neighbors learned , a network"), "{mixed}");
     assert!(mixed.contains("add --invert and the photos."));
-    assert!(said(&sample::images()).contains("add --neighbors descriptors . Descriptors tell"));
+    assert!(said(&sample::images()).contains("add --neighbors descriptors . Descriptors show"));
 }
 
 #[test]
@@ -223,8 +222,8 @@ fn names_are_escaped_everywhere() {
 fn the_terminal_table_is_short_and_worst_first() {
     let table = text_table(&sample::document(true));
     let lines: Vec<&str> = table.lines().collect();
-    // Two lines of verdict, an empty one, a head, a line per scheme and its records alone (not of planes), what the last
-    // columns are within, and what "true" is.
+    // Two lines of verdict, an empty line, the head, a line per scheme and per records alone (not for planes), and two
+    // notes.
     assert_eq!(lines.len(), 4 + 7 + 6 + 2);
     assert!(table.contains("\nblind, break-even: within 0.10 m\n"), "{table}");
     assert!(lines[4].starts_with("olc  ") && lines[4].contains("58.6 %"), "{table}");
@@ -264,7 +263,7 @@ fn a_page_of_images_speaks_of_keypoints_and_pixels() {
     assert!(!json.contains("secret") && json.contains("\"name\": null"));
 }
 
-/// A guess that gets more than every attack leads, and needs no other attack to be tried.
+/// A blind guess that recovers more than every attack leads the verdict.
 #[test]
 fn a_guess_that_gets_more_than_every_attack_is_the_verdict() {
     let mut document = sample::document(true);
@@ -298,7 +297,7 @@ fn every_figure_stands_in_a_table_and_what_must_be_known_beside_the_verdict() {
         "1 odd point",
         "<td>not known here</td>",
         "Not known here: the map is too small",
-        "<strong>Mind:</strong> --max-points: 200 of 400 points are audited &lt;b&gt;.",
+        "<strong>Note:</strong> --max-points: 200 of 400 points are audited &lt;b&gt;.",
     ] {
         assert!(text.contains(said), "{said}");
     }
@@ -308,19 +307,19 @@ fn every_figure_stands_in_a_table_and_what_must_be_known_beside_the_verdict() {
     assert!(page(&document, None, false).contains("No scheme was tested."));
 }
 
-/// Few schemes are spoken of as such, and colors are those of the share.
+/// The banner counts the schemes, and its color follows the share.
 #[test]
 fn the_banner_says_how_bad_it_is() {
     for (schemes, color, expected) in [
         (&["olc"][..], "red", "Not protected. An attacker recovers 58.6 %"),
         (&["ray", "ray-voxel"], "orange", "Badly protected under either scheme."),
         (&["ppl", "cp"], "gray", "No attack tried here recovers much. An attacker recovers 16.2"),
-        // What was not tested is no good news.
+        // An untested attack is no good result.
         (
             &["plane"],
             "orange",
-            "Not tested: what an attacker gets from the released data alone. An attacker would recover 83.7 % of \
-             the points of this map within 10 cm if half of the neighbors were known (PLANE, oracle neighbors).",
+            "Not tested: what an attacker recovers from the released data alone. An attacker would recover 83.7 % of \
+             the points of this map within 10 cm if half of the neighbors were known (PLANE, known neighbors).",
         ),
     ] {
         let mut document = sample::document(true);
@@ -385,7 +384,7 @@ fn the_terminal_table_has_a_line_per_source_and_says_what_is_missing() {
     let table = text_table(&document);
     let lines: Vec<&str> = table.lines().collect();
     let cells = |line: usize| lines[line].split_whitespace().collect::<Vec<_>>().join(" ");
-    // The strongest attack of a source speaks, and a spread is shown that matters.
+    // The table shows the strongest attack of a source, with its standard deviation if that is large.
     assert!(cells(4).starts_with("olc overlap 13 % joint 63.5 ± 5.0 % 98.1 %"), "{table}");
     assert!(!table.contains("41.5 %"), "{table}");
     let alone = "olc records alone - tomography 58.6 % 76.4 % 1.9 % -";

@@ -1,7 +1,7 @@
-//! Every written document keeps the committed JSON Schema, and the schema keeps the structs.
+//! Tests that written documents follow the committed JSON Schema.
 //!
-//! The schema uses few keywords; this file checks those and refuses any other, which costs less to
-//! compile than a validator for all of them.
+//! The schema uses few keywords. This file checks only those and rejects others, which compiles
+//! faster than a full validator.
 
 use serde_json::{Value, json};
 use unlift_report::Document;
@@ -13,7 +13,7 @@ fn schema() -> Value {
     serde_json::from_str(include_str!("../../audit.schema.json")).expect("the schema is JSON")
 }
 
-/// The places where `value` breaks `schema`.
+/// Returns the places where `value` breaks `schema`.
 fn breaks(root: &Value, schema: &Value, value: &Value, place: &str) -> Vec<String> {
     let mut found = Vec::new();
     let rules = schema.as_object().expect("a schema is an object");

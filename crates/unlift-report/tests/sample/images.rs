@@ -1,4 +1,4 @@
-//! An audit of made-up images, and a picture of one of them.
+//! A synthetic audit of images, and a picture of one of them.
 
 use indexmap::IndexMap;
 use unlift_report::Given;
@@ -9,7 +9,6 @@ use unlift_report::pictures::{Graph, Marks, Picture, RecoveredView, ReleasedView
 
 use super::{document, unit_random};
 
-/// An audit of two images under two schemes.
 pub fn images() -> Document {
     let mut document = document(true);
     let by_threshold = |values: [f64; 4]| -> IndexMap<String, f64> {
@@ -56,7 +55,7 @@ pub fn images() -> Document {
     document
 }
 
-/// A picture of the first image of [`images`].
+/// Returns a picture of the first image of [`images`].
 pub fn picture() -> Picture {
     let place = |i: u64| [0, 1].map(|c| unit_random(2 * i + c) * [640.0, 480.0][c as usize]);
     let keypoints: Vec<[f32; 2]> = (0..300).map(place).collect();

@@ -1,4 +1,4 @@
-//! A made-up audit of a made-up room, for tests and for looking at the page.
+//! A synthetic audit of a synthetic room, for tests and for a look at the page.
 
 #![allow(dead_code, unused_imports, reason = "each user of this file uses a part of it")]
 
@@ -30,7 +30,7 @@ const SHARES: [[[f64; 6]; 2]; 7] = [
 const BLIND: [[f64; 2]; 7] =
     [[1.9, 6.4], [1.2, 6.0], [1.1, 5.8], [3.2, 9.7], [5.9, 14.1], [0.2, 1.1], [4.8, 12.9]];
 
-/// The same for the best attack on the records alone, where there is one.
+/// Percent by the best attack on the records alone within both thresholds, if there is one.
 const RECORDS_ALONE: [(&str, [f64; 2]); 6] = [
     ("olc", [58.6, 76.4]),
     ("ppl", [7.3, 14.8]),
@@ -40,7 +40,7 @@ const RECORDS_ALONE: [(&str, [f64; 2]); 6] = [
     ("cp", [16.2, 31.9]),
 ];
 
-/// A whole audit; without a scale lengths are times the usual distance to the K-th neighbor.
+/// Returns a whole audit; without a scale lengths are multiples of the usual distance to the K-th neighbor.
 pub fn document(metric: bool) -> Document {
     let thresholds = if metric { ["0.10", "0.25"] } else { ["1.0", "2.5"] };
     let unit = if metric { LengthUnit::Meter } else { LengthUnit::KthNeighbor };
@@ -110,8 +110,8 @@ pub fn document(metric: bool) -> Document {
     }
 }
 
-/// The same with neighborhoods of an attacker's own, at ratios that differ from scheme to scheme: `overlap`
-/// for all schemes, `geometric` where records tell something.
+/// Returns the audit of [`document`] with an attacker's own neighborhoods, whose ratios differ between
+/// schemes: `overlap` for all schemes, `geometric` for all but planes.
 pub fn mixed(metric: bool) -> Document {
     let mut document = document(metric);
     let half: Vec<Row> =
@@ -123,7 +123,7 @@ pub fn mixed(metric: bool) -> Document {
             let mut row = row.clone();
             (row.neighbors, row.oracle_noise) = (neighbors.into(), None);
             (row.inlier_ratio, row.k) = (inlier_ratio, 35);
-            // Half or more are too far off for any percentile that is listed.
+            // Half of the points or more are lost, so no percentile is known.
             row.median_error = None;
             row.error_percentiles.values_mut().for_each(|error| *error = None);
             for (value, share) in row.recovered_percent.values_mut().zip(shares) {
@@ -156,7 +156,7 @@ fn row(s: usize, r: usize, solver: &str, thresholds: [&str; 2], unit: LengthUnit
     let by_threshold = |values: [f64; 2]| -> IndexMap<String, f64> {
         thresholds.iter().map(|t| (*t).to_owned()).zip(values).collect()
     };
-    // Error over percent, straight on a log scale between the shares within the thresholds.
+    // Error over percent, linear on a log scale between the shares within the thresholds.
     let known = [(0.5, 0.002), (share(0), 0.10), (share(1), 0.25), (99.8, 3.0)];
     let percentiles = ["50", "75", "90", "95", "99"].map(|name| {
         let percent: f64 = name.parse().expect("a number");

@@ -1,4 +1,4 @@
-//! The made-up room in three dimensions, and what came back of it.
+//! The synthetic room in three dimensions, and its recovered points.
 
 use unlift_report::Given;
 use unlift_report::document::Document;
@@ -6,7 +6,7 @@ use unlift_report::scene::{ObfuscationView, Scene3d, SceneBox, Shapes, View};
 
 use super::{SCHEMES, unit_random};
 
-/// A room of 6 x 4.5 x 2.6 with a table, a shelf and two boxes.
+/// Returns a room of 6 x 4.5 x 2.6 with a table, a shelf and two boxes.
 fn room(n: usize) -> Vec<[f32; 3]> {
     let boxes: [([f32; 3], [f32; 3]); 8] = [
         ([0.0, 0.0, 0.0], [6.0, 4.5, 2.6]),
@@ -32,7 +32,8 @@ fn room(n: usize) -> Vec<[f32; 3]> {
     (0..n).map(point).collect()
 }
 
-/// Points of the room and what came back of them, in keeping with the figures of `document`.
+/// Returns points of the room and their recovered positions, consistent with the figures of
+/// `document`.
 pub fn scene(document: &Document, n: usize) -> Scene3d {
     let originals = room(n);
     let bounds = SceneBox::robust(&originals);
@@ -72,7 +73,7 @@ pub fn scene(document: &Document, n: usize) -> Scene3d {
                 indices.filter_map(|i| bounds.clip_line(originals[i], direction(i))).collect(),
             ),
         };
-        // Every hundredth point is left out by one scheme.
+        // One scheme does not release every hundredth point.
         let withheld = (0..if scheme == "ppl+" { n } else { 0 }).step_by(100).collect();
         ObfuscationView { scheme: scheme.into(), shapes, n_records: n as u64, withheld }
     });
