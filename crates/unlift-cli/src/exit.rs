@@ -1,11 +1,11 @@
 //! Exit codes, and errors as one line with advice.
 
 use std::fmt;
-use std::process::ExitCode;
 
 use unlift::{OneLine, is_obeyed};
 
 use crate::args::Cli;
+use crate::call;
 use crate::output::printed;
 use crate::stderr::tell;
 
@@ -63,9 +63,9 @@ pub fn advise(error: impl Into<anyhow::Error>, advice: impl Into<String>) -> any
 }
 
 /// Prints help or a usage error, and returns the exit code.
-pub fn told(told: clap::Error) -> ExitCode {
+pub fn told(told: clap::Error) -> u8 {
     // clap's message quotes the command line: parse it again without terminal control characters.
-    let words = std::env::args_os().map(|word| OneLine(word.display()).to_string());
+    let words = call().words.iter().map(|word| OneLine(word.display()).to_string());
     let told = Cli::read(words).err().unwrap_or(told);
     let text = told.render().to_string();
     if !told.use_stderr() {
@@ -78,17 +78,17 @@ pub fn told(told: clap::Error) -> ExitCode {
         // A message that cannot be written is dropped.
         let _ = told.print();
     }
-    ExitCode::from(USAGE)
+    USAGE
 }
 
 /// Prints an error, if any, and returns the exit code.
-pub fn finish(result: anyhow::Result<Outcome>) -> ExitCode {
+pub fn finish(result: anyhow::Result<Outcome>) -> u8 {
     match result {
-        Ok(Outcome::Done) => ExitCode::SUCCESS,
-        Ok(Outcome::GateFailed) => ExitCode::FAILURE,
+        Ok(Outcome::Done) => 0,
+        Ok(Outcome::GateFailed) => 1,
         Err(error) => {
             lines(&error).iter().for_each(tell);
-            ExitCode::from(code(&error))
+            code(&error)
         }
     }
 }

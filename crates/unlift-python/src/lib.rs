@@ -15,6 +15,7 @@ mod arrays;
 mod audit;
 mod audit_images;
 mod calls;
+mod command_line;
 mod either;
 mod errors;
 mod files;
@@ -47,6 +48,8 @@ mod _unlift {
     use super::audit::audit;
     #[pymodule_export]
     use super::audit_images::audit_images;
+    #[pymodule_export]
+    use super::command_line::command_line;
     #[pymodule_export]
     use super::hidden::{Hidden, Released, Truth};
     #[pymodule_export]

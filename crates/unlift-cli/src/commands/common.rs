@@ -27,7 +27,7 @@ pub const TRUTH: &str = "truth.parquet";
 /// # Errors
 /// If the file cannot be read.
 pub fn this_program() -> anyhow::Result<String> {
-    Ok(hash_file(&std::env::current_exe()?)?)
+    Ok(hash_file(&crate::call().program)?)
 }
 
 /// Runs `work` on `threads` threads (default: all cores). rayon's global pool would panic if the

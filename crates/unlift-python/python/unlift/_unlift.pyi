@@ -39,6 +39,7 @@ __all__ = [
     "check_scheme",
     "check_solver",
     "check_source",
+    "command_line",
     "evaluate",
     "find",
     "obfuscate",
