@@ -4,19 +4,25 @@
 //! the whole file in memory, or rewrites a group's list of names at every addition, which is
 //! quadratic in images.
 
-#[cfg(test)]
+#[cfg(all(test, feature = "hdf5"))]
 mod hostile;
+#[cfg(feature = "hdf5")]
 mod links;
 mod messages;
+#[cfg_attr(not(feature = "hdf5"), path = "../../absent/hdf5.rs")]
 mod read;
+#[cfg(feature = "hdf5")]
 mod source;
 mod tree;
 mod write;
 
 use half::f16;
 
-pub(crate) use read::{DEEPEST, FeatureStore};
+pub(crate) use read::FeatureStore;
 pub(crate) use write::Writer;
+
+/// The maximum depth of groups, because links may form cycles.
+pub(crate) const DEEPEST: usize = 64;
 
 /// The values of an array, row-major.
 #[derive(Clone, Debug, PartialEq)]

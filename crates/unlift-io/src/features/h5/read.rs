@@ -10,7 +10,7 @@ use hdf5_pure::{
 
 use super::links::{Target, links};
 use super::source::{self, Bounded};
-use super::{Array, Numbers, shape_text};
+use super::{Array, DEEPEST, Numbers, shape_text};
 use crate::error::Error;
 use crate::guard::without_panic;
 use crate::input::{Budget, size};
@@ -18,8 +18,6 @@ use crate::read::lines::quoted;
 
 /// A header can declare any size in a few bytes.
 const MOST_VALUES: u64 = 1 << 28;
-/// The maximum depth of groups, because links may form cycles.
-pub(crate) const DEEPEST: usize = 64;
 /// The least memory in bytes for a group besides its path, a chunk besides its bytes, and a value.
 const PER_GROUP: u64 = 256;
 const PER_CHUNK: u64 = 128;
