@@ -4,11 +4,12 @@ use std::sync::{Arc, OnceLock};
 
 use unlift::descriptors::Values;
 use unlift::neighbors::sources::SourceEntry;
-use unlift::neighbors::{Needs, Neighborhoods, Overlap, Part, Similarity, Source, dense, scored};
+use unlift::neighbors::{
+    DescriptorKind, Needs, Neighborhoods, Overlap, Part, Similarity, Source, dense, scored,
+};
 use unlift::released::Released;
 use unlift::{Descriptors, Error};
 
-use crate::kind::DescriptorKind;
 use crate::network::Network;
 use crate::tensor::Tensor;
 

@@ -21,7 +21,6 @@
 
 pub mod file;
 mod folders;
-mod kind;
 mod learned;
 mod network;
 mod registry;
@@ -29,8 +28,8 @@ mod tensor;
 mod wire;
 
 pub use folders::{Folders, Place, VARIABLE};
-pub use kind::DescriptorKind;
 pub use learned::{Learned, SOURCES};
 pub use network::Network;
 pub use registry::{Entry, MODELS, Port, entry};
 pub use tensor::Tensor;
+pub use unlift::neighbors::DescriptorKind;

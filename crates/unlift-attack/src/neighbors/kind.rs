@@ -1,8 +1,8 @@
 //! Kinds of descriptors, detected from their values.
 
-use unlift::descriptors::Values;
-use unlift::neighbors::{Overlap, Source};
-use unlift::{Descriptors, Error, ErrorKind};
+use crate::descriptors::Values;
+use crate::neighbors::{Overlap, Source};
+use crate::{Descriptors, Error, ErrorKind};
 
 /// Descriptors for which networks are trained.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
