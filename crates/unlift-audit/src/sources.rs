@@ -5,7 +5,10 @@ use unlift::neighbors::sources::{self, Named, SourceEntry};
 
 /// Returns all sources.
 pub fn all() -> Vec<&'static SourceEntry> {
-    sources::SOURCES.iter().chain(unlift_nn::SOURCES).collect()
+    let all = sources::SOURCES.iter();
+    #[cfg(feature = "networks")]
+    let all = all.chain(unlift_nn::SOURCES);
+    all.collect()
 }
 
 /// Returns the source called `name`.
@@ -13,6 +16,10 @@ pub fn all() -> Vec<&'static SourceEntry> {
 /// # Errors
 /// If there is none; the error lists the names.
 pub fn named(name: &str) -> Result<Named, Error> {
+    if cfg!(not(feature = "networks")) && name.trim() == "learned" {
+        let expected = "unlift-audit with the feature `networks`";
+        return Err(Error::new("source learned", expected, "a build without it"));
+    }
     Named::parse_among(name, &all())
 }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use unlift::Error;
-use unlift_nn::DescriptorKind;
+use unlift::neighbors::DescriptorKind;
 
 use crate::color::ColorImage;
 use crate::learned::{Aliked, AlikedOptions, LearnedFeatures, SuperPoint, SuperPointOptions};

@@ -23,6 +23,9 @@
 //! assert!((keypoint.x - 30.5).abs() < 0.1 && (keypoint.y - 34.5).abs() < 0.1);
 //! # Ok::<(), unlift::Error>(())
 //! ```
+//!
+//! The feature `networks` (on by default) compiles the networks of learned features. Without it,
+//! the error of an extractor that needs a network names the feature.
 
 pub mod batch;
 mod blur;
@@ -35,6 +38,8 @@ mod gradient;
 mod image;
 mod learned;
 pub mod load;
+#[cfg(not(feature = "networks"))]
+mod networks;
 mod octave;
 mod options;
 mod orientation;
@@ -50,3 +55,5 @@ pub use image::GrayImage;
 pub use learned::{Aliked, AlikedOptions, LearnedFeatures, SuperPoint, SuperPointOptions};
 pub use options::SiftOptions;
 pub use sift::{Features, Keypoint, Sift};
+#[cfg(feature = "networks")]
+use unlift_nn as networks;

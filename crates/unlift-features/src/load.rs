@@ -1,6 +1,7 @@
 //! Decodes photos to gray values or colors.
 
-use std::io::Cursor;
+use std::fs;
+use std::io::{self, Cursor};
 use std::path::Path;
 
 use ::image::metadata::Orientation;
@@ -80,9 +81,18 @@ pub(crate) fn photo(path: &Path, turn: Turn) -> Result<DynamicImage, Error> {
 /// Returns the bytes of a file, and its name in errors.
 fn bytes_of(path: &Path) -> Result<(Vec<u8>, String), Error> {
     let name = path.display().to_string();
-    let bytes = unlift_nn::file::bytes(path)
+    let bytes = read_regular(path)
         .map_err(|error| Error::new(name.escape_debug().to_string(), KINDS, error.to_string()))?;
     Ok((bytes, name))
+}
+
+/// Pipes, sockets and devices may never end, or never begin. Of a folder, the system says so.
+fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
+    let metadata = fs::metadata(path)?;
+    if !metadata.is_file() && !metadata.is_dir() {
+        return Err(io::Error::other("a pipe, a socket or a device"));
+    }
+    fs::read(path)
 }
 
 /// Decodes the bytes of a photo in a file called `name`, upright, as gray values.

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use unlift::Descriptors;
 use unlift::descriptors::Values;
+use unlift::neighbors::DescriptorKind;
 use unlift_features::{AlikedOptions, Extraction, SiftOptions, SuperPointOptions};
-use unlift_nn::DescriptorKind;
 
 use crate::Error;
 

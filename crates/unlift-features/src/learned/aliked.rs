@@ -5,12 +5,12 @@
 //! Deformable Transformation", IEEE TIM 2023; the weights are the authors' aliked-n16rot.
 
 use unlift::Error;
-use unlift_nn::{Network, Tensor};
 
 use super::LearnedFeatures;
 use super::levels::{DIM, Levels};
 use super::maxima::{Scores, Wanted};
 use crate::color::ColorImage;
+use crate::networks::{Network, Tensor};
 
 const MODEL: &str = "aliked-n16rot";
 /// The network halves an image five times.

@@ -1,8 +1,7 @@
 //! Feature maps of ALIKED: four levels of different resolution, joined at a pixel.
 
-use unlift_nn::Tensor;
-
 use super::maxima::corners;
+use crate::networks::Tensor;
 
 const CHANNELS: usize = 32;
 pub(crate) const DIM: usize = 4 * CHANNELS;

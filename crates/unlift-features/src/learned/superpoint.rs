@@ -5,11 +5,11 @@
 //! supply them, converted to ONNX by `training/export/superpoint.py`.
 
 use unlift::Error;
-use unlift_nn::{Network, Tensor};
 
 use super::LearnedFeatures;
 use super::maxima::{Scores, Wanted, corners};
 use crate::color::ColorImage;
+use crate::networks::{Network, Tensor};
 
 const MODEL: &str = "superpoint";
 /// Side of a cell in pixels.
