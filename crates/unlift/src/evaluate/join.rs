@@ -12,7 +12,7 @@ use crate::truth::{Original, Secret};
 
 /// Returns `secret` with slots in the row order of `recovered`.
 ///
-/// - [`RowOrder::Slots`]: unchanged;
+/// - [`RowOrder::Slots`][]: unchanged;
 /// - [`RowOrder::DescriptorRows`]: by [`Secret::by_descriptor_row`];
 /// - [`RowOrder::Either`] and [`RowOrder::Unstated`]: each record's two points in the order with
 ///   the smaller error, because an attacker without descriptors cannot know it. The published
