@@ -6,7 +6,7 @@ use crate::tree::differing;
 use crate::{full, tables};
 
 /// Part of the error when two runs meet.
-const BUSY: &str = "another run";
+const BUSY: &str = "no other run";
 
 #[test]
 fn of_two_writers_one_whole_output_stays() {

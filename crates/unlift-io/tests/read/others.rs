@@ -263,7 +263,7 @@ fn what_is_wrong_is_told_with_its_line() {
     assert!(line("transforms.json", &nerfstudio("\"none.ply\"")).contains("none.ply: expected"));
     assert!(
         line("a.laz", "LASF")
-            .contains("found a .laz file (pdal translate IN.laz OUT.las makes one")
+            .contains("found a .laz file (convert it: pdal translate IN.laz OUT.las)")
     );
     assert!(read::open(Path::new("no such folder")).is_err());
 }

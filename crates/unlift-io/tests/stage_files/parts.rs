@@ -73,7 +73,7 @@ fn what_is_missing_or_other_is_told() {
     assert!(line().contains("part-000001.parquet: expected 30 rows in "), "{}", line());
     fs::write(&second, &kept).unwrap();
     fs::write(parts.join("part-000009.parquet"), &kept).unwrap();
-    assert!(line().ends_with("found part-000009.parquet too"), "{}", line());
+    assert!(line().ends_with("found also part-000009.parquet"), "{}", line());
     fs::remove_file(parts.join("part-000009.parquet")).unwrap();
     assert!(read().is_ok());
     fs::write(parts.join("_manifest.json"), "{}").unwrap();

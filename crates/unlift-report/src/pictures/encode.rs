@@ -303,6 +303,6 @@ mod tests {
         };
         assert_eq!(key(&given("overlap", 0.18)), key(&given("overlap", 0.2)));
         assert_ne!(key(&given("oracle", 0.18)), key(&given("oracle", 0.2)));
-        assert_eq!(given("overlap", 0.183).label(), "overlap, 18 % true neighbors");
+        assert_eq!(given("overlap", 0.183).label(), "neighbors by descriptor overlap, 18 % right");
     }
 }
