@@ -27,8 +27,8 @@ def sections(binary: str, *command: str) -> list[str]:
     text = help_of(binary, *command)
     name = " ".join(("unlift", *command))
     found = [f"## {name}\n\n```text\n{text}\n```\n"]
-    listed = re.search(r"^Commands:\n((?:  .*\n)+)", text, re.MULTILINE)
-    for line in listed.group(1).splitlines() if listed else []:
+    listed = re.findall(r"^(?:Commands|Audits|Stages|Tools):\n((?:  .*\n)+)", text, re.MULTILINE)
+    for line in "".join(listed).splitlines():
         sub = re.match(r"  ([a-z-]+) ", line)
         if sub and sub.group(1) != "help":
             found += sections(binary, *command, sub.group(1))

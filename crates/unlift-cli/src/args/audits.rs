@@ -13,35 +13,42 @@ use unlift_nn::DescriptorKind;
 
 use crate::values::{self, NeighborSource};
 
+/// Heading of options that few audits need.
+const EXPERIMENTS: &str = "For experiments";
+
 /// Options of the attacker.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Attack")]
 pub struct AttackArgs {
-    /// Inlier ratios of the oracle's lists, separated by commas: the share of a list that are true
-    /// nearest neighbors [default: 1,0.75,0.5,0.3,0.2,0.1]
+    /// Inlier ratios of the oracle's lists (fractions of true nearest neighbors), separated by
+    /// commas [default: 1,0.75,0.5,0.3,0.2,0.1]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::ratio)]
     pub inlier_ratios: Vec<f64>,
-    /// Where the wrong entries of the oracle's lists lie, separated by commas or repeated: uniform
-    /// (anywhere), near (a little too far: the 2K-th to 10K-th nearest), clustered (at wrong places
-    /// that neighbors share, as with look-alike descriptors) [default: uniform]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::noise)]
+    /// Wrong entries of the oracle's lists, separated by commas or repeated: uniform (random
+    /// records), near (from the 2K-th to the 10K-th nearest record), clustered (at wrong places
+    /// that nearby points have in common, as with descriptors that look alike) [default: uniform]
+    #[arg(long, help_heading = EXPERIMENTS, value_name = "LIST", value_delimiter = ',',
+          value_parser = values::noise)]
     pub oracle_noise: Vec<Noise>,
-    /// Do not use rules of schemes that fix coordinates exactly (cp: coordinates are swapped in
-    /// pairs; ray-voxel: a checkerboard of voxels picks the center)
-    #[arg(long)]
+    /// Ignore rules of a scheme that narrow down a hidden coordinate (cp: another record publishes
+    /// the value; ray-voxel: a checkerboard of voxels decides the center of a ray)
+    #[arg(long, help_heading = EXPERIMENTS)]
     pub no_exact_constraints: bool,
-    /// Add a row per scheme for an attacker who has the positions of three true neighbors of every
-    /// point
-    #[arg(long)]
+    /// Add a row per scheme for an attacker who already has the positions of three true neighbors
+    /// of every point
+    #[arg(long, help_heading = EXPERIMENTS)]
     pub reference: bool,
-    /// Records per list, for sources other than the oracle [default: chosen by each source]
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
+    /// Number of records per list, for sources other than the oracle [default: chosen by each
+    /// source]
+    #[arg(long, help_heading = EXPERIMENTS, value_name = "K",
+          value_parser = clap::value_parser!(u16).range(1..))]
     pub source_k: Option<u16>,
-    /// Distance within which a listed record (what replaces a point) supports a position, in the
-    /// unit of the audit; auto computes it from the released records and the lists
-    #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
+    /// Distance up to which a listed record counts for a position, in the unit of the audit; auto
+    /// computes it from the released records and the lists
+    #[arg(long, help_heading = EXPERIMENTS, value_name = "auto|VALUE",
+          value_parser = values::delta, default_value = "auto")]
     pub delta: Delta,
-    /// Average over N random seeds
+    /// Average the results over N random seeds
     #[arg(long, value_name = "N", default_value = "1",
           value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub repeats: u32,
@@ -51,8 +58,8 @@ pub struct AttackArgs {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Result")]
 pub struct ResultArgs {
-    /// Fail with exit code 1 if an attacker recovers more than this; repeatable. The syntax is
-    /// explained below
+    /// Fail with exit code 1 if an attack recovers more than this; repeatable. Syntax: see Gates in
+    /// unlift audit map --help
     #[arg(long, value_name = "GATE", value_parser = Gate::parse)]
     pub gate: Vec<Gate>,
     /// Also write the results of the gates as JUnit XML, for GitLab, Jenkins and others
@@ -67,7 +74,7 @@ pub struct ResultArgs {
     /// Replace files of the same name that unlift did not write
     #[arg(long)]
     pub force: bool,
-    /// Write only numbers, so that you can show the report: no points, paths, names or hashes
+    /// Write only numbers, which you can show to others: no points, paths, names or hashes
     #[arg(long)]
     pub share_safe: bool,
     /// Print a summary as JSON in place of the table
@@ -94,15 +101,16 @@ pub struct RunArgs {
 /// Options of recovery and baselines for maps.
 #[derive(Clone, Debug, Args)]
 pub struct SolverArgs {
-    /// Recovery methods, separated by commas or repeated. From lists of neighbors: joint (usually
-    /// the strongest), joint-start (its first pass), consensus (each point by its own list), ransac
-    /// (that of the paper). From the released records alone (what a scheme publishes in place of
-    /// points): density (published attacks), tomography (stronger) [default: joint,joint-start;
-    /// also consensus on maps of fewer than 150 x K points, 7,500 by default]
+    /// Recovery methods, separated by commas or repeated. With lists of neighbors: joint (usually
+    /// the strongest), joint-start (the first pass of joint), consensus (each point from its own
+    /// list), ransac (the attack of Chelani et al. 2025). From the released records alone (a record
+    /// replaces one or two points): density (published attacks), tomography (stronger) [default:
+    /// joint,joint-start; also consensus if the map has fewer than 150 x K points]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
           help_heading = "Attack")]
     pub solver: Vec<Builtin>,
-    /// Skip the baseline that attacks the released records alone, without neighbors and descriptors
+    /// Skip the baseline "records alone", the best attack that uses neither given lists nor
+    /// descriptors. It often takes most of the time
     #[arg(long, help_heading = "Attack")]
     pub no_records_alone: bool,
 }
@@ -111,31 +119,29 @@ pub struct SolverArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Input")]
 pub struct MapArgs {
-    /// Meters per unit of the map. Without it, the unit of length is the median distance of the
-    /// points to their K-th nearest neighbor (see --k)
+    /// Meters per unit of the map. Without it, lengths are multiples of the median distance from a
+    /// point to its K-th nearest neighbor (see --k)
     #[arg(long, value_name = "METERS_PER_UNIT", value_parser = values::scale)]
     pub scale: Option<f64>,
-    /// File with the descriptors of the points: the COLMAP database.db or hloc features.h5 that the
-    /// model was made from, a .npy array with a row per point (of a COLMAP model by ascending point
-    /// id), or a file that begins with P3DESC01
+    /// File with the descriptors of the points: the COLMAP database.db or hloc features.h5 from
+    /// which the model was made, a .npy array with a row per point (for a COLMAP model, by
+    /// ascending point id), or a file in unlift's format P3DESC01 (docs/formats.md)
     #[arg(long, value_name = "FILE")]
     pub descriptors: Option<PathBuf>,
     /// Use a random subset of at most N points
     #[arg(long, value_parser = values::count, value_name = "N")]
     pub max_points: Option<NonZeroUsize>,
-    /// Leave out points far from others: their mean distance to the NEIGHBORS nearest points
-    /// exceeds the mean over all points by more than RATIO standard deviations [default when given:
-    /// 20,2.0]
+    /// Leave out isolated points: those whose mean distance to their NEIGHBORS nearest points
+    /// exceeds the average by more than RATIO standard deviations [without a value: 20,2.0]
     #[arg(long, value_name = "NEIGHBORS,RATIO", value_parser = values::outlier_filter,
           num_args = 0..=1, require_equals = true, default_missing_value = "20,2.0")]
     pub outlier_filter: Option<OutlierFilter>,
     /// Number of nearest neighbors of a point that count as true neighbors (K). Without --scale,
-    /// the median distance to the K-th is the unit of length
+    /// the median distance to the K-th neighbor is the unit of length
     #[arg(long, value_name = "K", default_value = "50",
           value_parser = clap::value_parser!(u16).range(1..))]
     pub k: u16,
-    /// Random seed [default: 0 for audits; for obfuscate a fresh key of 256 bits, because whoever
-    /// guesses the seed can undo the hiding]
+    /// Random seed [default: 0 for audits, a fresh 256-bit key for obfuscate]
     #[arg(long, value_name = "INTEGER")]
     pub seed: Option<u64>,
 }
@@ -156,12 +162,16 @@ Examples:
 
 Gates: SCHEME[:SOLVER][:SOURCE][@RATIO]:THRESHOLD[:gain]<=PERCENT
 
-A gate bounds the percentage of points that come back within THRESHOLD, one of --thresholds. The
-strongest attack counts, over all noise models (--oracle-noise). SCHEME may be all. Without a
-solver, a source of neighbors or an inlier ratio, the gate bounds all of them. With :gain, it bounds
-by how many percentage points the attack exceeds the larger of two baselines: a blind guess, and an
-attack on the records alone. A gate on something that is not in the audit is a usage error. A gate
-on a scheme that cannot be applied to the map fails.
+A gate fails if more than PERCENT of the points are recovered within THRESHOLD, one of --thresholds.
+SCHEME may be all. SOLVER, SOURCE (a value of --neighbors; file for FILE) and RATIO limit the gate
+to some attacks; without them, it covers all attacks. The strongest attack counts.
+
+A gate without SOLVER and SOURCE also covers the two baselines: blind (a guess from one record at a
+time) and records alone (see --no-records-alone). With :gain, a gate fails if an attack exceeds the
+larger baseline by more than PERCENT percentage points.
+
+A gate that matches nothing in the audit is a usage error. A gate on a scheme that cannot be applied
+to the map fails.
 
 Exit codes: 0 done, 1 a gate failed, 2 wrong usage, 3 bad input.")]
 pub struct AuditMapArgs {
@@ -171,9 +181,9 @@ pub struct AuditMapArgs {
     pub path: PathBuf,
     #[command(flatten)]
     pub map: MapArgs,
-    /// Run a small audit: the schemes olc (random lines) and ppl (lines through two points), with
-    /// lists of which half of the entries are true neighbors, and with lists by similarity if there
-    /// are descriptors
+    /// Run a small audit: the schemes olc (a random line through each point) and ppl (one line
+    /// through two points), with the oracle at inlier ratio 0.5 and, if there are descriptors, the
+    /// source similarity
     #[arg(long, conflicts_with_all = ["schemes", "inlier_ratios", "neighbors"], help_heading = "Attack")]
     pub quick: bool,
     /// Schemes to audit, separated by commas (unlift schemes lists them) [default: all]
@@ -182,54 +192,54 @@ pub struct AuditMapArgs {
     pub schemes: Vec<&'static Entry>,
     #[command(flatten)]
     pub solvers: SolverArgs,
-    /// Source of the attacker's lists of neighbors, repeatable. oracle: from the unprotected map,
-    /// with a chosen share of true neighbors. From the released map, as an attacker makes them:
-    /// descriptors (overlap or similarity, whichever suits the descriptors), similarity (any
-    /// descriptors), overlap (SIFT), learned (a network; SIFT or ALIKED), geometric (no
-    /// descriptors). Or a file with a list of points per point (docs/formats.md)
+    /// Source of the attacker's lists of neighbors; repeatable. oracle, a test tool, makes lists
+    /// from the original points, with a chosen fraction of true neighbors. The others make lists
+    /// from the released map: descriptors (overlap or similarity, depending on the descriptors),
+    /// similarity (any descriptors), overlap (SIFT), learned (a network, for SIFT or ALIKED),
+    /// geometric (places where many records meet; no descriptors). FILE has a list of neighbors per
+    /// point (docs/formats.md)
     #[arg(long, value_name = "oracle|SOURCE|FILE", value_parser = values::neighbor_source,
           default_value = "oracle", help_heading = "Attack")]
     pub neighbors: Vec<NeighborSource>,
-    #[command(flatten)]
-    pub attack: AttackArgs,
-    /// Errors up to which a point counts as recovered, separated by commas; reports show them as
-    /// you type them [default: 0.10,0.25 with --scale, else 1.0,2.5]
+    /// Largest errors at which a point counts as recovered, separated by commas [default: 0.10,0.25
+    /// (meters) with --scale, otherwise 1.0,2.5 (multiples, see --scale)]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold,
           help_heading = "Result")]
     pub thresholds: Vec<Threshold>,
-    /// Paint pictures from the recovered points as the map's cameras see them, and compare them
-    /// with the photos. The results get SSIM, PSNR and LPIPS, the report the pictures. Needs
-    /// --photos and a COLMAP model with descriptors
+    /// Paint pictures of what the map's cameras see from the recovered points, and compare them
+    /// with the photos by SSIM, PSNR and LPIPS. Needs --photos and a COLMAP model with descriptors
     #[arg(long, help_heading = "Result", requires = "photos")]
     pub invert: bool,
-    /// Network that paints, in place of the one for these descriptors: an ONNX file as
-    /// training/inversion exports it
+    /// ONNX file of the network that paints, as training/inversion exports it [default: the network
+    /// for these descriptors, see unlift models]
     #[arg(long, value_name = "FILE", help_heading = "Result", requires = "invert")]
     pub inverter: Option<PathBuf>,
-    /// Folder of the map's photos, to compare with painted pictures
+    /// Folder of the map's photos, to compare with the painted pictures
     #[arg(long, value_name = "DIR", help_heading = "Result", requires = "invert")]
     pub photos: Option<PathBuf>,
-    /// Compare with at most N photos, evenly spaced over their names
+    /// Compare with at most N photos, evenly spaced by name
     #[arg(long, value_parser = values::count, value_name = "N", default_value = "12", help_heading = "Result")]
     pub max_photos: NonZeroUsize,
-    /// Cut a large map into tiles of at most N points and audit each tile as a map of its own.
-    /// Memory stays that of one tile, and the report shows which tiles leak most. Recommended
-    /// beyond a few million points
+    /// Cut a large map into tiles of at most N points and audit each tile as a separate map. This
+    /// needs the memory of one tile, and the report shows which tiles leak most. Recommended beyond
+    /// a few million points
     #[arg(long, value_parser = values::count, value_name = "N", help_heading = "Run",
           conflicts_with_all = ["invert", "write_clouds", "journal"])]
     pub tile_points: Option<NonZeroUsize>,
     /// Also write the original, obfuscated and recovered point clouds (PLY, OBJ)
     #[arg(long, help_heading = "Result", conflicts_with = "share_safe")]
     pub write_clouds: bool,
-    /// Keep recovered points in this folder until the audit is done. If it is interrupted, repeat
-    /// the command: it resumes from there, with the same results. The folder is as private as the
-    /// map
+    /// Keep recovered points in this folder until the audit is done. If the audit is interrupted,
+    /// repeat the command to resume it with the same results. The folder is as private as the map
     #[arg(long, value_name = "DIR", help_heading = "Run")]
     pub journal: Option<PathBuf>,
     #[command(flatten)]
     pub result: ResultArgs,
     #[command(flatten)]
     pub run: RunArgs,
+    // Last, because headings stand in the order of their first options.
+    #[command(flatten)]
+    pub attack: AttackArgs,
 }
 
 /// Options of `audit images`.
@@ -243,13 +253,13 @@ Examples:
   unlift audit images photos --features aliked --neighbors descriptors
   unlift audit images photos --gate 'cp2d@0.5:10<=20' --share-safe --json
 
-Photos are JPEG, PNG or WebP files at any depth of the folder. unlift features describes how
+Photos are JPEG, PNG or WebP files at any depth of the folder. unlift features --help explains how
 features are extracted. Results cover the keypoints of all images. Lengths are in pixels.
 
-unlift audit map --help explains gates. An image that cannot be used gets one line on stderr and is
-counted in audit.json. The others are audited, and the exit code is 3.
+If an image cannot be used, unlift prints a line on stderr, counts the image in audit.json, and
+audits the others.
 
-Exit codes: 0 done, 1 a gate failed, 2 wrong usage, 3 bad input, even of a single image.")]
+Exit codes: 0 done, 1 a gate failed, 2 wrong usage, 3 bad input (at least one image).")]
 pub struct AuditImagesArgs {
     /// A folder of photos, hloc's features.h5, or a COLMAP database.db
     #[arg(value_name = "PATH")]
@@ -258,15 +268,16 @@ pub struct AuditImagesArgs {
     /// unlift models) [default: sift]
     #[arg(long, value_name = "TYPE", value_parser = values::feature_type, help_heading = "Input")]
     pub features: Option<DescriptorKind>,
-    /// Number of features per photo. sift takes the coarsest and completes the last scale, so it
-    /// may exceed N; the others take the best [default: 8192, aliked 2048, superpoint 4096]
+    /// Number of features per photo. aliked and superpoint keep the N best. sift adds whole scales,
+    /// the coarsest first, until it has more than N features [default: sift 8192, aliked 2048,
+    /// superpoint 4096]
     #[arg(long, value_parser = values::count, value_name = "N", help_heading = "Input")]
     pub max_features: Option<NonZeroUsize>,
-    /// Keep only keypoints whose score exceeds this; not for sift [default: aliked 0.2, superpoint
+    /// Keep only keypoints whose score exceeds SCORE; not for sift [default: aliked 0.2, superpoint
     /// 0.005]
     #[arg(long, value_name = "SCORE", value_parser = values::score, help_heading = "Input")]
     pub min_score: Option<f32>,
-    /// Use at most N images, evenly spaced over their sorted names
+    /// Use at most N images, evenly spaced by name
     #[arg(long, value_parser = values::count, value_name = "N", help_heading = "Input")]
     pub max_images: Option<NonZeroUsize>,
     /// Number of nearest neighbors of a keypoint that count as true neighbors (K)
@@ -282,45 +293,48 @@ pub struct AuditImagesArgs {
           help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
     /// Recovery methods, separated by commas or repeated: joint (usually the strongest),
-    /// joint-start (its first pass), consensus (each keypoint by its own list), ransac (that of the
-    /// paper) [default: joint,joint-start]
+    /// joint-start (the first pass of joint), consensus (each keypoint from its own list), ransac
+    /// (the attack of Chelani et al. 2025) [default: joint,joint-start]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_solver,
           help_heading = "Attack")]
     pub solver: Vec<Builtin>,
-    /// Source of the attacker's lists of neighbors, repeatable. oracle: from the unprotected
-    /// keypoints, with a chosen share of true neighbors. From the released descriptors, as an
-    /// attacker makes them: descriptors (overlap or similarity, whichever suits the descriptors),
-    /// similarity (any descriptors), overlap (SIFT), learned (a network; SIFT or ALIKED)
+    /// Source of the attacker's lists of neighbors; repeatable. oracle, a test tool, makes lists
+    /// from the original keypoints, with a chosen fraction of true neighbors. The others make lists
+    /// from the released descriptors: descriptors (overlap or similarity, depending on the
+    /// descriptors), similarity (any descriptors), overlap (SIFT), learned (a network, for SIFT or
+    /// ALIKED)
     #[arg(long, value_name = "oracle|SOURCE", value_parser = values::image_source,
           default_value = "oracle", help_heading = "Attack")]
     pub neighbors: Vec<NeighborSource>,
-    #[command(flatten)]
-    pub attack: AttackArgs,
-    /// Errors in pixels up to which a keypoint counts as recovered, separated by commas; reports
-    /// show them as you type them [default: 1,5,10,25]
+    /// Largest errors, in pixels, at which a keypoint counts as recovered, separated by commas
+    /// [default: 1,5,10,25]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold,
           help_heading = "Result")]
     pub thresholds: Vec<Threshold>,
-    /// Draw this image in the report; repeatable [default: those with the least, the median and the
-    /// most recovered]
+    /// Draw this image in the report; repeatable [default: the images with the lowest, the median
+    /// and the highest percentage recovered]
     #[arg(long, value_name = "NAME", help_heading = "Result", conflicts_with = "share_safe")]
     pub show: Vec<String>,
-    /// Folder of the photos if PATH is a file, for drawings and for --invert. Photos are turned by
-    /// their EXIF orientation only if the file states that its features are of upright photos
+    /// Folder of the photos if PATH is a file, for drawings and for --invert. Photos are turned
+    /// upright by their EXIF orientation only if PATH states that its features are of upright
+    /// photos
     #[arg(long, value_name = "DIR", help_heading = "Result")]
     pub photos: Option<PathBuf>,
-    /// Paint pictures from the recovered keypoints and compare them with the photos. The results
-    /// get SSIM, PSNR and LPIPS, the report the pictures
+    /// Paint pictures from the recovered keypoints, and compare them with the photos by SSIM, PSNR
+    /// and LPIPS
     #[arg(long, help_heading = "Result")]
     pub invert: bool,
-    /// Network that paints, in place of the one for these descriptors: an ONNX file as
-    /// training/inversion exports it
+    /// ONNX file of the network that paints, as training/inversion exports it [default: the network
+    /// for these descriptors, see unlift models]
     #[arg(long, value_name = "FILE", help_heading = "Result", requires = "invert")]
     pub inverter: Option<PathBuf>,
     #[command(flatten)]
     pub result: ResultArgs,
     #[command(flatten)]
     pub run: RunArgs,
+    // Last, because headings stand in the order of their first options.
+    #[command(flatten)]
+    pub attack: AttackArgs,
 }
 
 /// Options of `audit released`.
@@ -332,25 +346,26 @@ Examples:
   unlift audit released mine.parquet --truth truth.parquet --gate 'all@0.5:0.10<=20' --json
 
 A record is what a scheme publishes in place of a point: a line, a ray, an axis-parallel plane, or a
-point with one foreign coordinate. Make the records with any program and write two Parquet files:
-what an attacker sees, and which record hides which point. docs/formats.md shows how, with pyarrow.
+point that swapped one coordinate with another point. Write two Parquet files: the records, which an
+attacker sees, and the truth, which assigns each original point to its record. docs/formats.md shows
+how, with pyarrow.
 
-unlift audit map --help explains gates. Use the name of your scheme, or all.
+In a gate, SCHEME is the name of your scheme, or all.
 
 Exit codes: 0 done, 1 a gate failed, 2 wrong usage, 3 bad input.")]
 pub struct AuditReleasedArgs {
     /// A Parquet file with the records of your scheme: what an attacker sees
     #[arg(value_name = "RELEASED")]
     pub released: PathBuf,
-    /// A Parquet file with the original points, and the record that hides each
+    /// A Parquet file with the original points and, for each, the record that hides it
     #[arg(long, value_name = "TRUTH", help_heading = "Input")]
     pub truth: PathBuf,
-    /// Name of the scheme in the results [default: scheme in the metadata of RELEASED, else
-    /// released]
+    /// Name of the scheme in the results [default: the entry scheme in the metadata of RELEASED or,
+    /// without it, released]
     #[arg(long, value_name = "NAME", value_parser = values::scheme_name, help_heading = "Input")]
     pub name: Option<String>,
     /// Descriptors of the original points, if RELEASED has none: a .npy array with a row per point,
-    /// or a file that begins with P3DESC01
+    /// or a file in unlift's format P3DESC01 (docs/formats.md)
     #[arg(long, value_name = "FILE", help_heading = "Input")]
     pub descriptors: Option<PathBuf>,
     /// Number of nearest neighbors of a point that count as true neighbors (K)
@@ -362,18 +377,17 @@ pub struct AuditReleasedArgs {
     pub seed: u64,
     #[command(flatten)]
     pub solvers: SolverArgs,
-    /// Source of the attacker's lists of neighbors, repeatable. oracle: from the truth, with a
-    /// chosen share of true neighbors. From the released map, as an attacker makes them:
-    /// descriptors (overlap or similarity, whichever suits the descriptors), similarity (any
-    /// descriptors), overlap (SIFT), learned (a network; SIFT or ALIKED), geometric (no
-    /// descriptors). Or a file with a list of original points per original point (docs/formats.md)
+    /// Source of the attacker's lists of neighbors; repeatable. oracle, a test tool, makes lists
+    /// from the original points, with a chosen fraction of true neighbors. The others make lists
+    /// from RELEASED: descriptors (overlap or similarity, depending on the descriptors), similarity
+    /// (any descriptors), overlap (SIFT), learned (a network, for SIFT or ALIKED), geometric
+    /// (places where many records meet; no descriptors). FILE has a list of neighbors per original
+    /// point (docs/formats.md)
     #[arg(long, value_name = "oracle|SOURCE|FILE", value_parser = values::neighbor_source,
           default_value = "oracle", help_heading = "Attack")]
     pub neighbors: Vec<NeighborSource>,
-    #[command(flatten)]
-    pub attack: AttackArgs,
-    /// Errors up to which a point counts as recovered, separated by commas; reports show them as
-    /// you type them [default: 0.10,0.25 in meters, else 1.0,2.5]
+    /// Largest errors at which a point counts as recovered, separated by commas [default: 0.10,0.25
+    /// in meters, 1.0,2.5 in other units]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold,
           help_heading = "Result")]
     pub thresholds: Vec<Threshold>,
@@ -384,14 +398,17 @@ pub struct AuditReleasedArgs {
     pub result: ResultArgs,
     #[command(flatten)]
     pub run: RunArgs,
+    // Last, because headings stand in the order of their first options.
+    #[command(flatten)]
+    pub attack: AttackArgs,
 }
 
 /// Options of `check`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-A configuration has a table per audit: [[map]], [[images]] or [[released]]. A table has a path, and
-any long options of unlift audit map, images or released, except --json. A list is an array, or text
-with commas. Paths are relative to the configuration file.
+A configuration has one table per audit: [[map]], [[images]] or [[released]]. A table has a path and
+the long options of unlift audit map, images or released; only --json is not allowed. A list is an
+array, or a string with commas. Paths are relative to the configuration file.
 
   [[map]]
   path = \"maps/office\"
@@ -402,14 +419,14 @@ with commas. Paths are relative to the configuration file.
   junit = \"audits/office.xml\"
   share-safe = true
 
-All audits run, even if some fail. Each prints one line.
+All audits run, even if some fail. unlift prints one line per audit.
 
 Examples:
   unlift check
   unlift check ci/unlift.toml --quiet
 
-Exit codes: 0 done, 1 a gate failed, 2 wrong usage or a wrong configuration, 3 bad input. With
-several audits, the largest code counts.")]
+Exit codes: 0 done, 1 a gate failed, 2 wrong usage or a wrong configuration, 3 bad input. The
+largest code of all audits counts.")]
 pub struct CheckArgs {
     /// A configuration file
     #[arg(value_name = "CONFIG", default_value = "unlift.toml")]

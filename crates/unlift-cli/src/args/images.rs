@@ -17,19 +17,18 @@ Examples:
   unlift features photos --type aliked --out features.h5
   unlift features PROJECT/database.db --out features.h5
 
-Photos are JPEG, PNG or WebP files at any depth of the folder, and are named relative to it. sift is
-as in COLMAP; its descriptors are bytes, RootSIFT times 512. Descriptors of aliked and superpoint
-are floats of length 1. Features of a file are copied, not extracted.
+Photos are JPEG, PNG or WebP files at any depth of the folder. Images are named by their path in the
+folder. sift computes the features of COLMAP: RootSIFT descriptors times 512, as bytes. aliked and
+superpoint compute descriptors of length 1, as floats. If IMAGES is a file, its features are copied.
 
 Photos are turned upright by their EXIF orientation, and keypoints are in pixels of the upright
-photo. The file records this in the attribute upright of keypoints. COLMAP and hloc do not turn
-photos: for them, use --as-stored.
+photo. The output records this (attribute upright of keypoints). COLMAP and hloc do not turn photos:
+use --as-stored for them.
 
-To resume an interrupted run, repeat the command. Finished images wait in FILE.parts, which is
-removed when FILE is complete. An image that cannot be used gets one line on stderr. The others are
-written, and the exit code is 3.
+To resume an interrupted run, repeat the command. Finished images are kept in FILE.parts until FILE
+is complete. If an image cannot be used, unlift prints a line on stderr and writes the others.
 
-Exit codes: 0 done, 2 wrong usage, 3 bad input, even of a single image.")]
+Exit codes: 0 done, 2 wrong usage, 3 bad input (at least one image).")]
 pub struct FeaturesArgs {
     /// A folder of photos, hloc's features.h5, or a COLMAP database.db
     #[arg(value_name = "IMAGES")]
@@ -44,24 +43,25 @@ pub struct FeaturesArgs {
     /// models) [default: sift]
     #[arg(long = "type", value_name = "TYPE", value_parser = values::feature_type)]
     pub kind: Option<DescriptorKind>,
-    /// Number of features per photo. sift takes the coarsest and completes the last scale, so it
-    /// may exceed N; the others take the best [default: 8192, aliked 2048, superpoint 4096]
+    /// Number of features per photo. aliked and superpoint keep the N best. sift adds whole scales,
+    /// the coarsest first, until it has more than N features [default: sift 8192, aliked 2048,
+    /// superpoint 4096]
     #[arg(long, value_parser = values::count, value_name = "N")]
     pub max_features: Option<NonZeroUsize>,
-    /// Keep only keypoints whose score exceeds this; not for sift [default: aliked 0.2, superpoint
+    /// Keep only keypoints whose score exceeds SCORE; not for sift [default: aliked 0.2, superpoint
     /// 0.005]
     #[arg(long, value_name = "SCORE", value_parser = values::score)]
     pub min_score: Option<f32>,
-    /// Leave photos as they are stored, as COLMAP and hloc do. Without it, they are turned upright
-    /// by their EXIF orientation
+    /// Do not turn photos, like COLMAP and hloc. Without this option, photos are turned upright by
+    /// their EXIF orientation
     #[arg(long)]
     pub as_stored: bool,
-    /// Shrink photos whose longer side exceeds this; keypoints stay in pixels of the original photo
-    /// [default: sift 3200, others 1600]
+    /// Shrink photos whose longer side exceeds PIXELS; keypoints stay in pixels of the original
+    /// photo [default: sift 3200, others 1600]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(16..=65536))]
     pub max_image_size: Option<u32>,
-    /// Octave at which sift begins. -1 doubles the photo and finds the finest features; 0 does not
-    /// and takes a third of the time [default: -1]
+    /// Octave at which sift begins: -1 doubles the photo first and finds the finest features; 0
+    /// uses the photo as it is and takes a third of the time [default: -1]
     #[arg(long, value_name = "OCTAVE", allow_hyphen_values = true,
           value_parser = clap::value_parser!(i8).range(-1..=0))]
     pub first_octave: Option<i8>,
@@ -76,8 +76,8 @@ pub struct FeaturesArgs {
 /// Options of `invert`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Writes one PNG per image, half as large, and named like the image with .png appended. unlift models
-lists the networks.
+unlift writes one PNG per image, half as large as the image. The picture of a.jpg is a.jpg.png.
+unlift models lists the networks.
 
 Examples:
   unlift invert photos --out pictures
@@ -92,21 +92,20 @@ pub struct InvertArgs {
     /// unlift models) [default: sift]
     #[arg(long, value_name = "TYPE", value_parser = values::feature_type)]
     pub features: Option<DescriptorKind>,
-    /// Points recovered from PATH, as unlift recover writes them
+    /// Points that unlift recover recovered from PATH; required if PATH is a released.parquet
     #[arg(long, value_name = "FILE")]
     pub recovered: Option<PathBuf>,
-    /// COLMAP model whose cameras see the map; for maps only
+    /// COLMAP model with the cameras from which to paint the map; only if PATH is a released map
     #[arg(long, value_name = "MODEL", requires = "recovered", requires = "scale")]
     pub cameras: Option<PathBuf>,
-    /// Units of the released map per unit of the COLMAP model: the --scale given to unlift
-    /// obfuscate
+    /// The --scale given to unlift obfuscate: units of the released map per unit of MODEL
     #[arg(long, value_name = "SCALE", value_parser = values::positive, requires = "cameras")]
     pub scale: Option<f64>,
-    /// Network that paints, in place of the one for these descriptors: an ONNX file as
-    /// training/inversion exports it
+    /// ONNX file of the network that paints, as training/inversion exports it [default: the network
+    /// for these descriptors, see unlift models]
     #[arg(long, value_name = "FILE")]
     pub inverter: Option<PathBuf>,
-    /// Paint at most N images, evenly spaced over their names; of released images, the first N
+    /// Paint at most N images, evenly spaced by name; of a released.parquet of images, the first N
     #[arg(long, value_parser = values::count, value_name = "N")]
     pub max_images: Option<NonZeroUsize>,
     /// Number of threads; results do not depend on it [default: one per core]
@@ -123,9 +122,9 @@ pub struct InvertArgs {
 /// Options of `metrics`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-SSIM is that of scikit-image by default (7 x 7 windows, mean of the colors). PSNR is in dB. LPIPS is
-version 0.1 on SqueezeNet. In folders, pictures of the same name are compared, whatever their
-extension. A picture of twice the other's size is halved first.
+SSIM is computed as in scikit-image with default options (7 x 7 windows, mean over the colors). PSNR
+is in dB. LPIPS is version 0.1 with SqueezeNet. In folders, pictures of the same name are compared;
+extensions are ignored. If a picture has twice the size of the other, it is halved first.
 
 Examples:
   unlift metrics photo.jpg picture.png
@@ -135,8 +134,8 @@ pub struct MetricsArgs {
     pub a: PathBuf,
     /// Another picture of the same, half or twice the size, or a folder of such pictures
     pub b: PathBuf,
-    /// Print JSON with ssim, psnr and lpips in place of the text; for folders, the means, and
-    /// `pictures` with the values of each
+    /// Print JSON with ssim, psnr and lpips in place of the text. For folders, these are means;
+    /// `pictures` has the values of each picture
     #[arg(long)]
     pub json: bool,
 }

@@ -55,7 +55,7 @@ pub struct Cli {
 impl Cli {
     /// Returns the definition of all commands and options.
     pub fn definition() -> clap::Command {
-        numbers_may_be_negative(Self::command())
+        grouped(numbers_may_be_negative(Self::command()))
     }
 
     /// Reads a command line, whose first word is the name of the program.
@@ -80,48 +80,74 @@ fn numbers_may_be_negative(command: clap::Command) -> clap::Command {
     command.mut_args(forgiving).mut_subcommands(numbers_may_be_negative)
 }
 
+/// The commands under each heading of `unlift --help`.
+const GROUPS: [(&str, &str); 3] = [
+    ("Audits", "demo audit check compare table"),
+    ("Stages", "obfuscate neighbors recover evaluate export split features invert metrics"),
+    ("Tools", "paper bench schemes models doctor completions man help"),
+];
+
+/// Lists the commands under the headings of `GROUPS`, because clap has one heading for all commands.
+fn grouped(command: clap::Command) -> clap::Command {
+    // `build` adds the command `help`.
+    let mut built = command.clone();
+    built.build();
+    let (header, literal) = (built.get_styles().get_header(), built.get_styles().get_literal());
+    let mut lists = String::new();
+    for (heading, names) in GROUPS {
+        lists += &format!("{header}{heading}:{header:#}\n");
+        for name in names.split(' ') {
+            let about = built.find_subcommand(name).and_then(clap::Command::get_about);
+            let about = about.map(ToString::to_string).unwrap_or_default();
+            lists += &format!("  {literal}{name}{literal:#}{:1$}{about}\n", "", 13 - name.len());
+        }
+        lists.push('\n');
+    }
+    command.help_template(format!(
+        "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n\
+         {lists}{header}Options:{header:#}\n{{options}}{{after-help}}"
+    ))
+}
+
 /// The command.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Protect two photos and a map, attack them, and show what comes back
+    /// Protect two photos and a map, attack them, and show what the attacks recover
     Demo(DemoArgs),
-    /// Hide points, attack the result and report how many come back, for a map, images or your own
-    /// scheme
+    /// Audit a map, images or your own scheme: measure how much an attack recovers
     #[command(subcommand)]
     Audit(AuditCommand),
     /// Run all audits of a configuration file, unlift.toml
     Check(CheckArgs),
-    /// Hide the points of a map, or the keypoints of images, under one scheme
-    Obfuscate(ObfuscateArgs),
-    /// Make lists of the neighbors of every hidden point, from the truth or as an attacker
-    #[command(subcommand)]
-    Neighbors(NeighborsCommand),
-    /// Recover hidden points from released files and lists of neighbors, without the truth
-    Recover(RecoverArgs),
-    /// Compare recovered points with the truth
-    Evaluate(EvaluateArgs),
-    /// Export released, recovered or true points as PLY, OBJ, a COLMAP model or for nerfstudio
-    Export(ExportArgs),
-    /// Split a released, truth, list or recovered file into a folder of parts, for engines that
-    /// read many files at once
-    Split(SplitArgs),
-    /// Print the results of an audit as a table for a paper, or draw them as curves
-    Table(TableArgs),
     /// Compare two audits, and fail if the later one leaks more
     Compare(CompareArgs),
-    /// Reproduce the paper's tables on its datasets, beside the published numbers
-    Paper(PaperArgs),
-    /// Measure speed and memory
+    /// Print the results of an audit as a table for a paper, or draw them as curves
+    Table(TableArgs),
+    /// Hide the points of a map, or the keypoints of images, with one scheme
+    Obfuscate(ObfuscateArgs),
+    /// Make lists of neighbors of the hidden points, from original or from released data
     #[command(subcommand)]
-    Bench(BenchCommand),
-    /// Write the keypoints and descriptors of photos, or of another file, to a file in hloc's
-    /// layout
+    Neighbors(NeighborsCommand),
+    /// Recover hidden points from a released file and lists of neighbors
+    Recover(RecoverArgs),
+    /// Compare recovered points with the original points
+    Evaluate(EvaluateArgs),
+    /// Convert released, recovered or original points to PLY, OBJ, COLMAP or nerfstudio
+    Export(ExportArgs),
+    /// Split a Parquet file into parts that other programs, such as Spark, read in parallel
+    Split(SplitArgs),
+    /// Write keypoints and descriptors of photos (or a COLMAP database) in hloc's format
     Features(FeaturesArgs),
-    /// Paint pictures from descriptors and keypoints or recovered points
+    /// Paint pictures from descriptors and the positions of keypoints or recovered points
     Invert(InvertArgs),
     /// Compare pictures by SSIM, PSNR and LPIPS
     Metrics(MetricsArgs),
-    /// List the schemes: how they hide points, what stays hidden, source, stated patents
+    /// Reproduce the paper's tables on its datasets, next to the published numbers
+    Paper(PaperArgs),
+    /// Measure the time and memory of recovery
+    #[command(subcommand)]
+    Bench(BenchCommand),
+    /// List the schemes: how they hide points, what stays hidden, publication, patents
     Schemes,
     /// List the networks: purpose, license, hash, owner, and whether they are installed
     Models(ModelsArgs),
@@ -141,19 +167,19 @@ Examples:
   unlift audit images photos
   unlift audit released mine.parquet --truth truth.parquet")]
 pub enum AuditCommand {
-    /// Audit a 3D map: hide its points, attack the result, and report how many come back
+    /// Audit a 3D map: hide its points, attack the result, and report how many are recovered
     // Boxed, because it is ten times larger than the other commands.
     Map(Box<AuditMapArgs>),
-    /// Audit images: hide their keypoints, attack the result, and report how many come back
+    /// Audit images: hide their keypoints, attack the result, and report how many are recovered
     Images(Box<AuditImagesArgs>),
-    /// Audit a scheme of your own: attack its records, and report how many points come back
+    /// Audit a scheme of your own: attack its records, and report how many points are recovered
     Released(Box<AuditReleasedArgs>),
 }
 
 /// Kinds of benchmarks.
 #[derive(Debug, Subcommand)]
 pub enum BenchCommand {
-    /// Measure the seconds that recovery takes, beside those of the paper
+    /// Measure the time of recovery, next to the published time
     Recover(BenchRecoverArgs),
 }
 
@@ -175,6 +201,14 @@ mod tests {
     #[test]
     fn the_definition_is_consistent() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn every_command_is_in_one_group() {
+        let mut command = Cli::command();
+        command.build();
+        let known = command.get_subcommands().map(clap::Command::get_name);
+        assert!(known.eq(GROUPS.iter().flat_map(|(_, names)| names.split(' '))));
     }
 
     #[test]

@@ -15,8 +15,8 @@ Examples:
   unlift demo
   unlift demo --out /tmp/demo
 
-Protects two photos and the map of a made-up room under ten published schemes, attacks what a
-service would receive, and shows what comes back. It needs no data.")]
+unlift protects two photos and the map of a made-up room with ten published schemes, attacks what a
+service would receive, and shows what is recovered. The demo needs no input.")]
 pub struct DemoArgs {
     /// Folder for report.html, photos.html and their JSON files; other files in it stay
     #[arg(long, value_name = "DIR", default_value = "unlift-demo")]
@@ -35,9 +35,9 @@ pub struct DemoArgs {
 /// Options of `models`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Networks are searched in the folder that the environment variable UNLIFT_MODELS names, then in
-unlift/models under XDG_DATA_HOME (~/.local/share), then in the program itself. A file with another
-hash than the listed one is refused.")]
+unlift looks for a network in the folder that the environment variable UNLIFT_MODELS names, then in
+XDG_DATA_HOME/unlift/models (~/.local/share/unlift/models by default), then in the program itself.
+It refuses a file whose hash differs from the listed one.")]
 pub struct ModelsArgs {
     /// Print a JSON list in place of the text
     #[arg(long)]
@@ -47,7 +47,7 @@ pub struct ModelsArgs {
 /// Options of `doctor`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Paste this into a bug report. It names no folders or files. unlift sends nothing.")]
+Paste the output into a bug report. It names no folders or files, and unlift sends nothing.")]
 pub struct DoctorArgs {
     /// Print a JSON object in place of the text
     #[arg(long)]

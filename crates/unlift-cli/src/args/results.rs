@@ -16,12 +16,12 @@ use crate::values;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 csv has every row of audit.json, and a column per value. latex (for the package booktabs) and
-markdown have a row per scheme. Their columns are the inlier ratios of the oracle (the share of
-listed neighbors that are true), the other sources of neighbors, and the baselines. A cell shows the
-strongest attack, at all thresholds.
+markdown have a row per scheme. Their columns are the inlier ratios of the oracle (the fraction of
+true neighbors in its lists), the other sources of neighbors, and the two baselines. A cell has the
+percentage that the strongest attack recovers, at each threshold.
 
-Curves show the percentage recovered by the strongest attack against the inlier ratio, per scheme.
-For PDF, convert them: rsvg-convert -f pdf -o curves.pdf curves.svg, or Inkscape.
+For each scheme, a curve shows the percentage that the strongest attack recovers, against the inlier
+ratio. To convert curves to PDF, use rsvg-convert -f pdf -o curves.pdf curves.svg, or Inkscape.
 
 Examples:
   unlift table unlift-audit/audit.json --format markdown
@@ -38,8 +38,9 @@ pub struct TableArgs {
         ("markdown", TableFormat::Markdown),
     ]))]
     pub format: TableFormat,
-    /// Show only this threshold of the audit: the error up to which a point counts as recovered
-    /// [default: all; curves: the first, in pixels the nearest to 10]
+    /// Show only this threshold of the audit, the largest error of a recovered point. Without it,
+    /// tables show all thresholds, and curves the first or, for images, the one nearest to 10
+    /// pixels
     #[arg(long, value_name = "T", value_parser = values::threshold)]
     pub threshold: Option<Threshold>,
     /// Write the table to this file in place of stdout
@@ -56,10 +57,13 @@ pub struct TableArgs {
 /// Options of `compare`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Results are compared if scheme, source of neighbors, noise, number of neighbors K, solver, threshold
-and, for the oracle, inlier ratio agree. Baselines are compared by scheme and threshold. Rows of
-only one audit are listed. The comparison also fails if the later audit has no counterpart for a
-scheme or source, because nothing shows that it leaks no more.
+Two results are compared if they have the same scheme, source of neighbors, noise (--oracle-noise),
+number of neighbors K, solver and threshold and, for the oracle, the same inlier ratio. Baselines
+are compared by scheme and threshold. Rows that only one of the audits has are listed.
+
+The comparison fails if a result of the later audit is larger by more than --tolerance. It also
+fails if a scheme of the earlier audit has no comparable result in the later one, or if one of its
+sources could not be used there.
 
 Audits in different units or with different thresholds are refused (exit code 3).
 
@@ -68,8 +72,8 @@ Examples:
   unlift compare before/audit.json unlift-audit/audit.json --tolerance 2.5 --out compared
   unlift compare before/audit.json unlift-audit/audit.json --json
 
-Exit codes: 0 nothing leaks more, 1 something leaks more than --tolerance allows, 2 wrong usage,
-3 bad input.")]
+Exit codes: 0 nothing leaks more, 1 something leaks more or can no longer be compared, 2 wrong
+usage, 3 bad input.")]
 pub struct CompareArgs {
     /// The audit.json of the earlier audit
     #[arg(value_name = "OLD.json")]
@@ -78,7 +82,7 @@ pub struct CompareArgs {
     #[arg(value_name = "NEW.json")]
     pub new: PathBuf,
     /// Difference up to which two results count as equal, in percentage points [default: twice the
-    /// standard deviation over repeats, or 2 without repeats]
+    /// standard deviation over --repeats, or 2 without --repeats]
     #[arg(long, value_name = "POINTS", value_parser = values::points)]
     pub tolerance: Option<f64>,
     /// Also write a page, compare.html, to this folder; other files in it stay
@@ -95,29 +99,32 @@ pub struct CompareArgs {
 /// Options of `paper`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-PATH is the folder of the scenes, as the dataset's owners pack them:
+The paper is Chelani et al., Obfuscation Based Privacy Preserving Representations are Recoverable
+Using Neighborhood Information, 3DV 2025.
+
+PATH is the folder of the scenes, with the files that the dataset publishes:
 
   7scenes    chess/TestSplit.txt, chess/seq-01/frame-000000.color.png and .pose.txt
   12scenes   apt1/kitchen/split.txt, apt1/kitchen/data/frame-000000.color.jpg and .pose.txt
   cambridge  ShopFacade/dataset_test.txt, dataset_train.txt, seq1/frame00001.png and
              reconstruction.nvm
 
-Maps are searched in the folder of a scene, in its folders sparse, triangulated, model_train, sfm
-and sfm_sift, and where hloc unpacks published maps (7scenes_sfm_triangulated and
-CambridgeLandmarks_Colmap_Retriangulated_1024px). --models names another folder with a map per
-scene. The poses of the dataset give the scale of the maps.
+unlift looks for maps in the folder of a scene, in its subfolders sparse, triangulated, model_train,
+sfm and sfm_sift, and where hloc unpacks published maps (7scenes_sfm_triangulated and
+CambridgeLandmarks_Colmap_Retriangulated_1024px). The scale of a map is computed from the camera
+poses of the dataset.
 
-Every scene is audited as by unlift audit map and unlift audit images, into a folder of its own in
-DIR. paper.json and paper.csv hold every number of the paper's tables beside ours, which is that of
-the strongest attack. Missing data is listed with the place where its owners publish it.
+unlift audits each scene like unlift audit map and unlift audit images, into a folder per scene in
+DIR. paper.json and paper.csv hold every number of the paper's tables and, next to it, the number
+for the strongest attack of unlift. Missing data is listed with the web page that publishes it.
 
 Examples:
   unlift paper --dataset 7scenes datasets/7scenes
   unlift paper --dataset cambridge datasets/cambridge --scenes ShopFacade --parts maps
   unlift paper --dataset 12scenes datasets/12scenes --models outputs/12scenes --images 100
 
-Exit codes: 0 done, 2 wrong usage, 3 bad input, even of a single scene or photo; the others are
-audited.")]
+Exit codes: 0 done, 2 wrong usage, 3 bad input (at least one scene or photo; the others are
+audited).")]
 pub struct PaperArgs {
     /// Folder of the dataset
     #[arg(value_name = "PATH")]
@@ -129,26 +136,27 @@ pub struct PaperArgs {
         ("cambridge", Dataset::Cambridge),
     ]))]
     pub dataset: Dataset,
-    /// Folder with a map per scene (DIR/chess, DIR/apt1/kitchen), in place of the maps in PATH
+    /// Folder with a map per scene (DIR/chess, DIR/apt1/kitchen), to use in place of the maps in
+    /// PATH
     #[arg(long, value_name = "DIR")]
     pub models: Option<PathBuf>,
-    /// Meters per unit of all maps [default: computed from the poses of the dataset]
+    /// Meters per unit of all maps [default: computed from the camera poses of the dataset]
     #[arg(long, value_name = "METERS", value_parser = values::scale)]
     pub scale: Option<f64>,
     /// Audit only these scenes, separated by commas [default: all in PATH]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub scenes: Vec<String>,
-    /// Reproduce only these parts of the tables, separated by commas: maps, images (both with lists
-    /// of neighbors made from the truth), estimated (with lists made from descriptors), pictures
-    /// [default: all]
+    /// Reproduce only these parts of the tables, separated by commas: maps (points of maps, lists
+    /// by the oracle), images (keypoints, lists by the oracle), estimated (keypoints, lists made
+    /// from descriptors), pictures (painted from recovered points) [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',', hide_possible_values = true,
           value_parser = values::one_of(Part::ALL.map(|part| (part.name(), part))))]
     pub parts: Vec<Part>,
-    /// Photos of the test split per scene, evenly spaced over their names
+    /// Number of test photos per scene, evenly spaced by name
     #[arg(long, value_parser = values::count, value_name = "N", default_value = "20")]
     pub images: NonZeroUsize,
-    /// Use a random subset of at most N points per map; a smaller share comes back than of all
-    /// points [default: all]
+    /// Use a random subset of at most N points per map, of which a smaller percentage is recovered
+    /// [default: all]
     #[arg(long, value_parser = values::count, value_name = "N")]
     pub max_points: Option<NonZeroUsize>,
     /// Random seed
@@ -174,21 +182,22 @@ pub struct PaperArgs {
 /// Options of `bench recover`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Like the paper's seconds, these are for positions alone. An audit also computes the probability that
-each position is correct; --confidence includes that.
+unlift measures the time to compute positions, as the paper does. An audit also computes the
+probability that each position is correct; --confidence includes that time.
 
 Examples:
   unlift bench recover --points 700000 --scheme ppl
   unlift bench recover --points 100000 --scheme plane --map PROJECT --solver joint,ransac --json
 
-The paper's seconds (64 cores) are shown where it measured the same scheme, K, inlier ratio (share
-of true neighbors) and number of points: ppl, 50, and 100000, 300000 or 700000.")]
+The output includes the paper's time (64 cores) if the paper measured the same scheme, K, inlier
+ratio (fraction of true neighbors) and number of points. It measured ppl with K = 50 and 100000,
+300000 or 700000 points.")]
 pub struct BenchRecoverArgs {
     /// Number of points of the map
     #[arg(long, value_parser = values::made_points, value_name = "N", default_value = "700000")]
     pub points: NonZeroUsize,
-    /// Map to measure on, thinned out or repeated side by side with a jitter to the number of
-    /// points [default: the room of the demo]
+    /// Map to measure on; unlift takes random points of it, or repeats it side by side with random
+    /// offsets, up to --points points [default: the room of the demo]
     #[arg(long, value_name = "PATH")]
     pub map: Option<PathBuf>,
     /// Scheme that hides the points (unlift schemes lists them)
@@ -198,18 +207,18 @@ pub struct BenchRecoverArgs {
     #[arg(long, value_name = "K", default_value = "50",
           value_parser = clap::value_parser!(u16).range(1..))]
     pub k: u16,
-    /// Shares of true neighbors in the lists to measure, separated by commas
+    /// Fractions of true neighbors in the lists, separated by commas; each is measured
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::ratio,
           default_value = "1,0.5,0.3,0.2,0.1")]
     pub inlier_ratios: Vec<f64>,
-    /// Recovery methods, separated by commas or repeated: joint, joint-start (its first pass),
-    /// consensus (each point by its own list) and ransac (that of the paper) use lists of
-    /// neighbors; density and tomography do not
+    /// Recovery methods, separated by commas or repeated. With lists of neighbors: joint,
+    /// joint-start, consensus, ransac. From the released records alone: density, tomography. See
+    /// unlift recover --help
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
           default_value = "joint")]
     pub solver: Vec<Builtin>,
-    /// Distance within which a listed record (what replaces a point) supports a position, in the
-    /// unit of the map; auto computes it from the released records and the lists
+    /// Distance up to which a listed record (a record replaces points) counts for a position, in
+    /// the unit of the map; auto computes it from the released records and the lists
     #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
     pub delta: Delta,
     /// Also compute the probability that each position is correct, as an audit does

@@ -21,13 +21,15 @@ Examples:
   unlift obfuscate PROJECT --scheme olc --descriptors PROJECT/database.db --out hidden
   unlift obfuscate features.h5 --scheme dcl2d --out hidden-images
 
-released.parquet is what an attacker sees: a record (such as a line) in place of each point.
-truth.parquet holds the original points; keep it private.
+released.parquet is what an attacker sees: records (such as lines) in place of points. truth.parquet
+holds the original points; keep it private.
 
-A fresh 256-bit key draws what hides the points, and is kept nowhere. With --seed that number
-replaces it, for experiments only: whoever guesses the number undoes the order of the records, and
-cp entirely. Release a map once: in two releases with descriptors, the records of a point can be
-matched, and they meet in it.")]
+All random choices come from a fresh 256-bit key, which unlift does not store. --seed replaces this
+key, for experiments only: whoever guesses the seed can restore the order of the records and, under
+cp, the points.
+
+Release a map only once. From two releases with descriptors, an attacker can match the two records
+of each point, which intersect in the point.")]
 pub struct ObfuscateArgs {
     /// A map: a COLMAP model or project folder, a .ply, .csv or .npy file, or another format of
     /// unlift audit map. Or images: a folder of photos, hloc's features.h5, or a COLMAP database.db
@@ -53,9 +55,9 @@ Examples:
   unlift neighbors oracle hidden/truth.parquet --inlier-ratio 0.5 --out lists.parquet
   unlift neighbors find hidden/released.parquet --source overlap --out lists.parquet")]
 pub enum NeighborsCommand {
-    /// Make lists of neighbors from the truth, with a chosen share of true neighbors
+    /// Make lists of neighbors from the original points, with a chosen fraction of true neighbors
     Oracle(OracleArgs),
-    /// Make lists of neighbors from a released file alone, as an attacker does
+    /// Make lists of neighbors from a released file alone, as an attacker can
     Find(FindArgs),
 }
 
@@ -63,11 +65,11 @@ pub enum NeighborsCommand {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Sources:
-  descriptors  overlap or similarity, whichever suits the descriptors; no training
-  similarity   similar descriptors, of any kind
-  overlap      overlapping patches, for SIFT
-  learned      a network, for SIFT or ALIKED
-  geometric    places where many records meet; no descriptors; for maps only
+  descriptors  overlap or similarity, depending on the descriptors; needs no training
+  similarity   points with similar descriptors of any kind
+  overlap      points whose patches overlap, according to their SIFT descriptors
+  learned      points that a network finds, from SIFT or ALIKED descriptors
+  geometric    points near places where many records meet; maps only; needs no descriptors
 
 Examples:
   unlift neighbors find hidden/released.parquet --source overlap --out lists.parquet
@@ -76,11 +78,11 @@ pub struct FindArgs {
     /// The released.parquet of a map or of images
     #[arg(value_name = "OBFUSCATED")]
     pub released: PathBuf,
-    /// Method that makes the lists, see below
+    /// Method that makes the lists, see Sources below
     #[arg(long, value_name = "SOURCE", value_parser = values::own_source)]
     pub source: Named,
-    /// Records per list; a record is what a scheme publishes in place of a point [default: chosen
-    /// by the source]
+    /// Number of records per list; a record is what a scheme publishes in place of points [default:
+    /// chosen by the source]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
     pub k: Option<u16>,
     /// Random seed
@@ -106,15 +108,16 @@ pub struct OracleArgs {
     /// The truth.parquet that unlift obfuscate wrote
     #[arg(value_name = "TRUTH")]
     pub truth: PathBuf,
-    /// The released.parquet of the same run [default: the one beside TRUTH]
+    /// The released.parquet that belongs to TRUTH [default: the one in the folder of TRUTH]
     #[arg(long, value_name = "FILE")]
     pub released: Option<PathBuf>,
-    /// Share of each list that are true nearest neighbors, from 0 to 1: round(RATIO x K) of K
-    /// entries
+    /// Fraction of each list that consists of true nearest neighbors, from 0 to 1: round(RATIO x K)
+    /// of K entries
     #[arg(long, value_name = "RATIO", value_parser = values::ratio)]
     pub inlier_ratio: f64,
-    /// Where the wrong entries lie: uniform (anywhere), near (a little too far: the 2K-th to 10K-th
-    /// nearest), clustered (at wrong places that neighbors share, as with look-alike descriptors)
+    /// Wrong entries of the lists: uniform (random records), near (from the 2K-th to the 10K-th
+    /// nearest record), clustered (at wrong places that nearby points have in common, as with
+    /// descriptors that look alike)
     #[arg(long, value_name = "MODEL", value_parser = values::noise, default_value = "uniform")]
     pub oracle_noise: Noise,
     /// Entries per list (K); there is a list per hidden point
@@ -141,20 +144,22 @@ pub struct RecoverArgs {
     /// The released.parquet of a map or of images
     #[arg(value_name = "OBFUSCATED")]
     pub released: PathBuf,
-    /// File with the lists of neighbors, as unlift neighbors writes it
+    /// File with the lists of neighbors that unlift neighbors wrote. density and tomography compute
+    /// positions without the lists and need them only to tell apart the two points of a line
     #[arg(long, value_name = "FILE")]
     pub neighbors: PathBuf,
-    /// Recovery method. From lists of neighbors: joint (usually the strongest), joint-start (its
-    /// first pass), consensus (each point by its own list), ransac (that of the paper). From the
-    /// released records alone: density (published attacks), tomography (stronger)
+    /// Recovery method. With lists of neighbors: joint (usually the strongest), joint-start (the
+    /// first pass of joint), consensus (each point from its own list), ransac (the attack of
+    /// Chelani et al. 2025). From the released records alone (a record replaces one or two points):
+    /// density (published attacks), tomography (stronger)
     #[arg(long, value_name = "SOLVER", value_parser = values::solver, default_value = "joint")]
     pub solver: Builtin,
-    /// Do not use rules of schemes that fix coordinates exactly (cp: coordinates are swapped in
-    /// pairs; ray-voxel: a checkerboard of voxels picks the center)
+    /// Ignore rules of a scheme that narrow down a hidden coordinate (cp: another record publishes
+    /// the value; ray-voxel: a checkerboard of voxels decides the center of a ray)
     #[arg(long)]
     pub no_exact_constraints: bool,
-    /// Distance within which a listed record (what replaces a point) supports a position, in the
-    /// unit of the map; auto computes it from the released records and the lists
+    /// Distance up to which a listed record counts for a position, in the unit of the map; auto
+    /// computes it from the released records and the lists
     #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
     pub delta: Delta,
     /// Random seed
@@ -178,21 +183,21 @@ Examples:
   unlift evaluate back.parquet --truth hidden/truth.parquet
   unlift evaluate back.parquet --truth hidden/truth.parquet --thresholds 0.05,0.10 --json")]
 pub struct EvaluateArgs {
-    /// Recovered points, as unlift recover writes them
+    /// Recovered points that unlift recover wrote
     #[arg(value_name = "RECOVERED")]
     pub recovered: PathBuf,
     /// The truth.parquet that unlift obfuscate wrote
     #[arg(long, value_name = "TRUTH")]
     pub truth: PathBuf,
-    /// The released.parquet, for the baseline that guesses from one record at a time [default: the
-    /// one beside TRUTH]
+    /// The released.parquet that belongs to TRUTH, for the baseline that guesses from one record at
+    /// a time [default: the one in the folder of TRUTH]
     #[arg(long, value_name = "FILE")]
     pub released: Option<PathBuf>,
-    /// Errors up to which a point counts as recovered, separated by commas [default: 0.10,0.25 in
-    /// meters, 1,5,10,25 in pixels, else 1.0,2.5]
+    /// Largest errors at which a point counts as recovered, separated by commas [default: 0.10,0.25
+    /// in meters, 1,5,10,25 in pixels, 1.0,2.5 in other units]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold)]
     pub thresholds: Vec<Threshold>,
-    /// Print the results as JSON, like a row of audit.json
+    /// Print the results as JSON, with the fields of a row of audit.json
     #[arg(long)]
     pub json: bool,
 }
@@ -200,19 +205,20 @@ pub struct EvaluateArgs {
 /// Options of `split`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Parts are called part-000000.parquet and so on, in the order of the rows. _manifest.json holds the
-rows and bytes of each part, and which map they belong to. Commands that read FILE also read the
-folder, and so do engines that read Parquet. unlift also reads a folder that an engine wrote, with
-or without a manifest.
+The parts are part-000000.parquet and so on, in the order of the rows. _manifest.json holds the
+metadata of FILE and the number of rows and bytes of each part. unlift and other programs that read
+Parquet read the folder in place of FILE. unlift also reads a folder that another program wrote,
+with or without _manifest.json.
 
 Examples:
   unlift split hidden/released.parquet --out hidden/released
   unlift split lists --rows 100000 --out lists-in-parts")]
 pub struct SplitArgs {
-    /// A Parquet file that obfuscate, neighbors or recover wrote, or a folder of its parts
+    /// A Parquet file that obfuscate, neighbors or recover wrote, or a folder of such parts
     #[arg(value_name = "FILE")]
     pub path: PathBuf,
-    /// Rows per part; an odd number is rounded up
+    /// Number of rows per part. An odd number is increased by one, to keep the two points of a
+    /// record in one part
     #[arg(long, value_name = "N", default_value_t = 1 << 20, value_parser = value_parser!(u64).range(1..=u64::from(u32::MAX)))]
     pub rows: u64,
     /// Folder for the parts
@@ -226,13 +232,13 @@ pub struct SplitArgs {
 /// Options of `export`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The ending of --out decides what is written:
+The ending of --out decides the format:
   .ply             points
-  .obj             released lines or rays, as segments
+  .obj             released lines or rays, drawn as segments
   transforms.json  cameras for nerfstudio, and the points in sparse_pc.ply beside it
   no ending        a folder with a COLMAP model in text (cameras.txt, images.txt, points3D.txt)
 
-Every file that shows points is as private as the map.
+A file that shows points is as private as the map.
 
 Examples:
   unlift export back.parquet --scale 1 --out back.ply
@@ -240,18 +246,18 @@ Examples:
   unlift export back.parquet --scale 1 --cameras PROJECT --out back-model
   unlift export back.parquet --scale 1 --cameras PROJECT --out back-nerf/transforms.json")]
 pub struct ExportArgs {
-    /// A released, recovered or truth file of a map
+    /// A released, recovered or truth file of a map (Parquet)
     #[arg(value_name = "FILE")]
     pub path: PathBuf,
     /// File or folder to write; its ending decides the format, see below
     #[arg(long, value_name = "PATH")]
     pub out: PathBuf,
-    /// Meters per unit of the map, as given to unlift obfuscate: the output then fits the map
-    /// [default: lengths as in FILE]
+    /// Meters per unit of the map, as given to unlift obfuscate. The output then has the
+    /// coordinates of the map [default: coordinates as in FILE]
     #[arg(long, value_name = "METERS", value_parser = values::scale)]
     pub scale: Option<f64>,
-    /// A COLMAP model or project of the same map; its cameras and images go into the exported model
-    /// or transforms.json
+    /// A COLMAP model or project of the same map. Its cameras and images are copied to the exported
+    /// model or transforms.json
     #[arg(long, value_name = "PROJECT")]
     pub cameras: Option<PathBuf>,
     /// Replace files of the same name that unlift did not write

@@ -23,7 +23,7 @@ pub fn schemes() -> anyhow::Result<Outcome> {
         };
         let facts = scheme.facts;
         text.push_str(&format!(
-            "{}\n  for      {meant_for}\n  rule     {}\n  hidden   {}\n  source   {}\n  patents  {}\n",
+            "{}\n  for          {meant_for}\n  rule         {}\n  hidden       {}\n  publication  {}\n  patents      {}\n",
             scheme.name, facts.summary, facts.hidden, facts.source, facts.patents
         ));
     }

@@ -15,8 +15,8 @@ use crate::progress::Stderr;
 use crate::stderr;
 use unlift_audit::{Progress as _, refused};
 
-const GUESSABLE: &str = "unlift: note: --seed repeats experiments; whoever guesses the number undoes the hiding: \
-    do not release this map";
+const GUESSABLE: &str = "unlift: note: whoever guesses the --seed can restore the order of the records and, under cp, \
+    the points: do not release this map";
 
 pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
     let inputs = [args.path.as_path()].into_iter().chain(args.map.descriptors.as_deref());
