@@ -21,10 +21,8 @@ pub enum Outcome {
 /// Exit code for a wrong command line, as in clap.
 pub const USAGE: u8 = 2;
 /// Exit code for files that cannot be read, written or used, even a single image of many, and for a
-/// stdout that cannot be
-/// written. A place that cannot be written is found before the work starts; on the command line it
-/// is a usage error, see
-/// [`unlift_audit::check_file`].
+/// stdout that cannot be written. A place that cannot be written is found before the work starts;
+/// on the command line it is a usage error, see [`unlift_audit::check_file`].
 const BAD_INPUT: u8 = 3;
 
 /// A command line that asks for something impossible (exit code 2).

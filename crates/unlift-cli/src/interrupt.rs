@@ -11,8 +11,7 @@ use signal_hook::iterator::Signals;
 use unlift_io::atomic::abandon;
 
 /// Starts the handler that removes unfinished files on an interrupt, then exits with 130 or 143, as
-/// shells do. Parts from
-/// which `features` resumes stay.
+/// shells do. Parts from which `features` resumes stay.
 pub fn watch() {
     // With a handler, a write beyond the limit fails as on a full disk instead of killing the
     // process.

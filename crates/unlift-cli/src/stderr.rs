@@ -9,8 +9,7 @@ use unlift::OneLine;
 const LONGEST: usize = 2000;
 
 /// Prints `line` with control characters escaped. If stderr cannot be written (a full disk, a
-/// closed pipe), the line is
-/// lost and the work continues.
+/// closed pipe), the line is lost and the work continues.
 pub fn tell(line: impl Display) {
     let mut line = OneLine(line).to_string();
     if let Some((end, _)) = line.char_indices().nth(LONGEST) {

@@ -32,8 +32,8 @@ impl Place {
     }
 }
 
-/// Computes Gaussian weights of a row or column of pixels:
-/// `exp(-(i - radius + shift)^2 / (2 sigma^2))`.
+/// Computes Gaussian weights of a row or column of pixels: `exp(-(i - radius + shift)^2 / (2
+/// sigma^2))`.
 ///
 /// Quotients of neighboring weights are geometric, so each needs two multiplications. Windows are
 /// products of weights for x and y, so no pixel needs an exponential.

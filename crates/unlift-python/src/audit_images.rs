@@ -69,8 +69,7 @@ impl OfImages {
     }
 
     /// Returns the options of the extractor for photos at `path`, checked against the sources of
-    /// `plan`. Arrays, whose path is
-    /// [`ARRAYS`], must not have such options.
+    /// `plan`. Arrays, whose path is [`ARRAYS`], must not have such options.
     fn wanted(&self) -> PyResult<Wanted> {
         let kind = self.features.as_deref().map(DescriptorKind::from_name);
         if let Some(score) = self.min_score.filter(|score| !(0.0..1.0).contains(score)) {
@@ -87,8 +86,7 @@ impl OfImages {
 }
 
 /// Audits `images` with the options in the dict `asked`, and calls `tell` with done, total and the
-/// current image. Also returns
-/// messages that the report lacks.
+/// current image. Also returns messages that the report lacks.
 #[pyfunction]
 pub fn audit_images(
     py: Python<'_>,

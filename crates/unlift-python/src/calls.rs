@@ -15,16 +15,14 @@ use pyo3::prelude::*;
 static INSIDE: AtomicUsize = AtomicUsize::new(0);
 const ENDING: usize = 1 << (usize::BITS - 1);
 /// Python's ids of these threads, with the flags that stop their work. It is locked only under the
-/// interpreter's lock, so that
-/// it is free in a forked child.
+/// interpreter's lock, so that it is free in a forked child.
 static NUMBERS: Mutex<Vec<(u64, Arc<AtomicBool>)>> = Mutex::new(Vec::new());
 /// Maximum wait for user functions at the end of the interpreter.
 const PATIENCE: Duration = Duration::from_secs(10);
 const ASKED: Duration = Duration::from_millis(5);
 
 /// Calls `call` with the interpreter's lock, which this thread must not hold. Returns `None` if
-/// `stop` is set or the interpreter
-/// is about to end.
+/// `stop` is set or the interpreter is about to end.
 pub fn attached<T>(stop: &Arc<AtomicBool>, call: impl FnOnce(Python<'_>) -> T) -> Option<T> {
     let _inside = Inside::new()?;
     Python::attach(|py| {

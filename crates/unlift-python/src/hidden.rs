@@ -123,9 +123,8 @@ impl Released {
     }
 
     /// Columns of the records by name, relative to `origin`. Lines: foot and direction `(n, 3)`.
-    /// Rays: centers `(m, 3)`, center `(n,)`
-    /// and direction `(n, 3)`. Planes: axis and offset `(n,)`. Candidates: position `(n, 3)`.
-    /// Images have 2 instead of 3.
+    /// Rays: centers `(m, 3)`, center `(n,)` and direction `(n, 3)`. Planes: axis and offset
+    /// `(n,)`. Candidates: position `(n, 3)`. Images have 2 instead of 3.
     #[getter]
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         of_either!(&self.0, released => columns(py, released.obfuscation()))

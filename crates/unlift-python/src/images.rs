@@ -81,8 +81,7 @@ fn name_of(name: &Bound<'_, PyAny>) -> PyResult<String> {
 }
 
 /// Converts pairs of a name and arrays to a dict. All pairs are read, because an audit must know
-/// every name first; arrays are
-/// not copied.
+/// every name first; arrays are not copied.
 fn pairs<'py>(given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
     let expected = "a path, a dict of names to arrays, or pairs of both";
     let by_name = PyDict::new(given.py());

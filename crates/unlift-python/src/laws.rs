@@ -21,9 +21,8 @@ fn kept(py: Python<'_>, by: &Raised, laws: impl FnOnce() + Send + 'static) -> Py
 /// reveals nothing.
 ///
 /// It calls the scheme with 0, 1, 2, 3, 7, 120, 200, 300, 301, 600 and 700 points: of a made-up
-/// room, at random, many in one place;
-/// with `images`, keypoints `(n, 2)`. A scheme may refuse points by an exception, except 200, 600
-/// and 700 points of a room.
+/// room, at random, many in one place; with `images`, keypoints `(n, 2)`. A scheme may refuse
+/// points by an exception, except 200, 600 and 700 points of a room.
 #[pyfunction]
 #[pyo3(signature = (scheme, *, images=false))]
 pub fn check_scheme(py: Python<'_>, scheme: &Bound<'_, PyAny>, images: bool) -> PyResult<()> {

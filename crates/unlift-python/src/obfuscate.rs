@@ -32,8 +32,7 @@ where
 }
 
 /// Hides a map under a scheme, a name or a function. Without a seed it uses a fresh key, for maps
-/// that are released. A seed is for
-/// experiments: whoever guesses it undoes the hiding.
+/// that are released. A seed is for experiments: whoever guesses it undoes the hiding.
 #[pyfunction]
 #[pyo3(signature = (map, scheme, *, seed=None))]
 pub fn obfuscate(

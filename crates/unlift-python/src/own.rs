@@ -206,8 +206,7 @@ where
 }
 
 /// A solver that is a function from a released map and its lists to positions `(n_slots, D)`
-/// relative to the released origin. Rows
-/// that are not finite were not recovered.
+/// relative to the released origin. Rows that are not finite were not recovered.
 #[derive(Debug)]
 pub struct OwnSolver(Function);
 

@@ -56,9 +56,8 @@ impl Model {
     }
 
     /// Solves the slots from `first` on by consensus, and returns a dict of columns with a row per
-    /// slot. Their lists are joined in
-    /// `records` and start at `offsets`, which has one entry more than there are slots. Other lists
-    /// do not matter.
+    /// slot. Their lists are joined in `records` and start at `offsets`, which has one entry more
+    /// than there are slots. Other lists do not matter.
     #[pyo3(signature = (released, first, offsets, records, *, threads=None))]
     #[allow(clippy::too_many_arguments)]
     fn solve_part<'py>(

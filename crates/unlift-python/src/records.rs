@@ -168,8 +168,7 @@ fn lines<const D: usize>(
 }
 
 /// Rays from `centers` (m, 3) along `directions` (n, 3), from the center to the point; `center`
-/// (n,) is the index of each ray's
-/// center. For an image, centers (m, 2) and directions (n, 2).
+/// (n,) is the index of each ray's center. For an image, centers (m, 2) and directions (n, 2).
 #[pyclass(frozen, extends = Records, module = "unlift")]
 pub struct Rays;
 
@@ -228,8 +227,7 @@ impl Planes {
 }
 
 /// Points `positions` (n, 3) with one coordinate, `swapped_axis` (n,), 0 to 2, of another point.
-/// The axis is secret and not
-/// released. For an image, positions (n, 2), and axes 0 and 1.
+/// The axis is secret and not released. For an image, positions (n, 2), and axes 0 and 1.
 #[pyclass(frozen, extends = Records, module = "unlift")]
 pub struct Candidates;
 

@@ -101,8 +101,8 @@ impl Recovered {
 }
 
 /// Recovers the points of a released map from neighbor lists, without the truth. `solver` is a name
-/// in `SOLVERS` or a function;
-/// default: "joint". `confidence=False` skips the computation of `probability_within`.
+/// in `SOLVERS` or a function; default: "joint". `confidence=False` skips the computation of
+/// `probability_within`.
 #[pyfunction]
 #[pyo3(signature = (released, lists, *, solver=None, delta=None, seed=0, exact_constraints=true, confidence=true, threads=None))]
 #[allow(clippy::too_many_arguments)]

@@ -65,8 +65,7 @@ impl Report {
     }
 
     /// Writes `report.html` and `audit.json` into the folder `out`, both or none; with
-    /// `share_safe`, numbers only. Replaces files that
-    /// are not of an audit only with `force`.
+    /// `share_safe`, numbers only. Replaces files that are not of an audit only with `force`.
     #[pyo3(signature = (out, *, share_safe=false, force=false))]
     fn save(
         &self,

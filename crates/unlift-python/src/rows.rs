@@ -15,9 +15,8 @@ use crate::errors::raised;
 use crate::json::as_python;
 
 /// The rows of an audit, one column per number. Names are those in the CSV of `unlift table`
-/// (`recovered_percent_within_0.10`);
-/// columns that the CSV lacks have their names of `audit.json`, with a dot between the levels
-/// (`lost.no_neighbors`).
+/// (`recovered_percent_within_0.10`); columns that the CSV lacks have their names of `audit.json`,
+/// with a dot between the levels (`lost.no_neighbors`).
 #[pyclass(frozen, module = "unlift")]
 pub struct Rows {
     columns: Vec<(String, Vec<Value>)>,

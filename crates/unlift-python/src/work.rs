@@ -1,8 +1,7 @@
 //! Work without the interpreter's lock, which an interrupt can end.
 //!
 //! All work runs on threads that end with it. rayon's global pool lasts, but a forked child would
-//! wait for its threads, which it
-//! does not have.
+//! wait for its threads, which it does not have.
 
 use std::fmt::Display;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -23,8 +22,7 @@ const ASKED: Duration = Duration::from_millis(50);
 const MOST_THREADS: usize = 512;
 
 /// Runs `work` on `threads` threads (default: all cores) and waits for it. An interrupt ends the
-/// wait at once; the work ends
-/// at its next check of `stop`, and its result is dropped.
+/// wait at once; the work ends at its next check of `stop`, and its result is dropped.
 pub fn run<T: Send + 'static, E: Display>(
     py: Python<'_>,
     threads: Option<usize>,

@@ -191,9 +191,8 @@ fn painted(args: &AuditImagesArgs) -> anyhow::Result<Option<&Path>> {
 }
 
 /// Checks the first image with keypoints for what the sources need, to get one error instead of one
-/// per image. Other
-/// errors of single images are reported when they are read. Returns the descriptors if they were
-/// read.
+/// per image. Other errors of single images are reported when they are read. Returns the
+/// descriptors if they were read.
 fn check_descriptors(
     source: &FeatureSource,
     chosen: &[usize],

@@ -206,9 +206,8 @@ fn scaled(args: &ExportArgs, (mut shown, unit): (Shown, Unit)) -> anyhow::Result
 }
 
 /// Estimates from the records alone a box that holds most of the hidden points. Lines: the box of
-/// the feet without 1 % at
-/// each end, extended by half its width. Rays: the box of the centers, extended by three times its
-/// width.
+/// the feet without 1 % at each end, extended by half its width. Rays: the box of the centers,
+/// extended by three times its width.
 fn surroundings(released: &Released<3>) -> Bounds<3> {
     let (places, left_out, around) = match released.obfuscation() {
         Obfuscation::Lines(lines) => (lines.foot(), 0.01, 0.5),

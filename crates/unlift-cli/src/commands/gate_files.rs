@@ -63,8 +63,7 @@ impl GateFiles {
     }
 
     /// Writes each file atomically, readable by all users. Returns an error if another run has
-    /// replaced the results of `finished` in
-    /// the meantime, because the files would not match.
+    /// replaced the results of `finished` in the meantime, because the files would not match.
     pub fn write(&self, finished: &Finished) -> anyhow::Result<()> {
         if self.files.is_empty() {
             return Ok(());

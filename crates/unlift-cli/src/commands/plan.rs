@@ -71,9 +71,8 @@ pub fn own<const D: usize>(named: Named, args: &AttackArgs) -> anyhow::Result<Ne
 }
 
 /// Returns the sources of an audit of a map, each once, and checks that options and descriptors fit
-/// them. The file had `n_read`
-/// points. Notes for the user are added to `notes`; `lacking` makes the error of a source without
-/// descriptors.
+/// them. The file had `n_read` points. Notes for the user are added to `notes`; `lacking` makes the
+/// error of a source without descriptors.
 pub fn neighbors(
     (asked, args): (&[NeighborSource], &AttackArgs),
     (prepared, descriptors): (&Prepared, Option<&Descriptors>),

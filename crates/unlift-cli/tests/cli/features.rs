@@ -191,8 +191,7 @@ fn what_cannot_be_used_at_all_leaves_no_file() {
 }
 
 /// An earlier run left parts. One was damaged, and one is of another photo with the same name,
-/// length and time: both
-/// are extracted again.
+/// length and time: both are extracted again.
 #[cfg(unix)]
 #[test]
 fn a_part_that_does_not_fit_is_made_again() {

@@ -12,8 +12,7 @@ use unlift_io::stage::{read_truth, write_truth};
 use crate::common::Place;
 
 /// A scheme of a researcher: each point on a random line through it, records in random order, a
-/// tenth of the points
-/// left out.
+/// tenth of the points left out.
 const SCHEME: &str = r#"
 import json, numpy as np, pyarrow as pa, pyarrow.parquet as pq
 points = np.loadtxt("room.csv", delimiter=",")
@@ -108,8 +107,7 @@ fn write_lists(place: &Place, name: &str, points: &[[f64; 3]], n: usize, k: usiz
 }
 
 /// Released maps of unlift have the rows of `audit map`, also with lists by original in a file, and
-/// with descriptors of the
-/// originals.
+/// with descriptors of the originals.
 #[test]
 fn the_rows_are_those_of_an_audit_of_the_map() {
     let place = Place::with_room(400);

@@ -1,7 +1,6 @@
 //! Licenses, registry and duplicates of the dependencies. This is a test, so that it needs no other
-//! program. Advisories change while
-//! code does not: check them by `cargo audit` or `cargo deny check advisories`, where there is a
-//! network.
+//! program. Advisories change while code does not: check them by `cargo audit` or `cargo deny check
+//! advisories`, where there is a network.
 
 use std::collections::BTreeMap;
 use std::process::Command;

@@ -161,8 +161,7 @@ impl Bench {
     }
 
     /// Checks that the next run of a case succeeds with the undisturbed output and without
-    /// unfinished files. After a slow case the
-    /// next run is its quick variant, at the same place.
+    /// unfinished files. After a slow case the next run is its quick variant, at the same place.
     pub fn goes_on(&self, case: &'static Case, what: &str) {
         let known = self.known(case);
         let (line, expected) = match case.is_slow {

@@ -1,6 +1,5 @@
 //! Kills every command at many moments. The output must be all old or all new, and the next run
-//! must succeed and remove
-//! unfinished files.
+//! must succeed and remove unfinished files.
 
 use std::os::unix::fs::MetadataExt;
 use std::process::{Child, Command};

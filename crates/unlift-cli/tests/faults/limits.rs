@@ -1,6 +1,5 @@
 //! Limits on open files, file size and memory, full disks, and closed streams: all of the output or
-//! none of it, and an error that
-//! names it.
+//! none of it, and an error that names it.
 
 use std::process::Command;
 

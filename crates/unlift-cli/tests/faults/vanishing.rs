@@ -79,8 +79,8 @@ fn an_input_that_changes_gives_its_output_or_a_line() {
 }
 
 /// Returns the result: 1, the output of the old input; 2, that of the changed input; 3, an error;
-/// 4, an error, and the other
-/// images; 5, results of one input with the hash or a picture of the other, and a note.
+/// 4, an error, and the other images; 5, results of one input with the hash or a picture of the
+/// other, and a note.
 fn try_one(bench: &Bench, case: &'static Case, input: &str, fate: Fate, share: f64) -> usize {
     bench.restore_inputs();
     let known = bench.known(case);
@@ -104,8 +104,7 @@ fn try_one(bench: &Bench, case: &'static Case, input: &str, fate: Fate, share: f
     let expected = bench.tree();
     let is_same = code == ended.code && left == expected;
     // An audit hashes photos after its results, and reads them again to draw them. So the hash or a
-    // picture may be of
-    // another file than the results; a note says so, and no gate holds.
+    // picture may be of another file than the results; a note says so, and no gate holds.
     let figures = [&known.new, &expected].map(Tree::figures);
     let is_audit = ended.code == Some(0) && case.name.starts_with("audit");
     if !is_same && is_audit && figures.contains(&left.figures()) {
