@@ -25,13 +25,15 @@ pub struct AttackArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::ratio)]
     pub inlier_ratios: Vec<f64>,
     /// Wrong entries of the oracle's lists, separated by commas or repeated: uniform (random
-    /// records), near (from the 2K-th to the 10K-th nearest record), clustered (at wrong places
-    /// that nearby points have in common, as with descriptors that look alike) [default: uniform]
+    /// records), near (random records between the (2 x K)-th and the (10 x K)-th nearest),
+    /// clustered (nearby points share the same few wrong places, as happens where descriptors look
+    /// alike) [default: uniform]
     #[arg(long, help_heading = EXPERIMENTS, value_name = "LIST", value_delimiter = ',',
           value_parser = values::noise)]
     pub oracle_noise: Vec<Noise>,
-    /// Ignore rules of a scheme that narrow down a hidden coordinate (cp: another record publishes
-    /// the value; ray-voxel: a checkerboard of voxels decides the center of a ray)
+    /// Make the attack weaker: do not use the public rule of a scheme to narrow down positions (cp:
+    /// the true coordinate is in another record; ray-voxel: the voxel of a point decides the center
+    /// of its ray)
     #[arg(long, help_heading = EXPERIMENTS)]
     pub no_exact_constraints: bool,
     /// Add a row per scheme for an attacker who already has the positions of three true neighbors
@@ -43,8 +45,8 @@ pub struct AttackArgs {
     #[arg(long, help_heading = EXPERIMENTS, value_name = "K",
           value_parser = clap::value_parser!(u16).range(1..))]
     pub source_k: Option<u16>,
-    /// Distance up to which a listed record counts for a position, in the unit of the audit; auto
-    /// computes it from the released records and the lists
+    /// A listed record supports a position if it passes within this distance of it, in the unit of
+    /// the audit; auto computes the distance from the released records and the lists
     #[arg(long, help_heading = EXPERIMENTS, value_name = "auto|VALUE",
           value_parser = values::delta, default_value = "auto")]
     pub delta: Delta,
@@ -103,14 +105,15 @@ pub struct RunArgs {
 pub struct SolverArgs {
     /// Recovery methods, separated by commas or repeated. With lists of neighbors: joint (usually
     /// the strongest), joint-start (the first pass of joint), consensus (each point from its own
-    /// list), ransac (the attack of Chelani et al. 2025). From the released records alone (a record
-    /// replaces one or two points): density (published attacks), tomography (stronger) [default:
-    /// joint,joint-start; also consensus if the map has fewer than 150 x K points]
+    /// list), ransac (the attack of Chelani et al. 2025). Without lists, from the records alone
+    /// (what a scheme releases in place of points): density (published attacks), tomography
+    /// (stronger) [default: joint,joint-start; also consensus if the map has fewer than 150 x K
+    /// points]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
           help_heading = "Attack")]
     pub solver: Vec<Builtin>,
-    /// Skip the baseline "records alone", the best attack that uses neither given lists nor
-    /// descriptors. It often takes most of the time
+    /// Skip the baseline "records alone", the best attack that uses only the records, without
+    /// descriptors; it may make lists from them. It often takes most of the time
     #[arg(long, help_heading = "Attack")]
     pub no_records_alone: bool,
 }
@@ -163,8 +166,9 @@ Examples:
 Gates: SCHEME[:SOLVER][:SOURCE][@RATIO]:THRESHOLD[:gain]<=PERCENT
 
 A gate fails if more than PERCENT of the points are recovered within THRESHOLD, one of --thresholds.
-SCHEME may be all. SOLVER, SOURCE (a value of --neighbors; file for FILE) and RATIO limit the gate
-to some attacks; without them, it covers all attacks. The strongest attack counts.
+SCHEME may be all. SOLVER, SOURCE and RATIO limit the gate to some attacks; without them, it covers
+all attacks. SOURCE is a value of --neighbors, or the word \"file\" for lists from a FILE. The
+strongest attack counts.
 
 A gate without SOLVER and SOURCE also covers the two baselines: blind (a guess from one record at a
 time) and records alone (see --no-records-alone). With :gain, a gate fails if an attack exceeds the
@@ -206,12 +210,12 @@ pub struct AuditMapArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold,
           help_heading = "Result")]
     pub thresholds: Vec<Threshold>,
-    /// Paint pictures of what the map's cameras see from the recovered points, and compare them
-    /// with the photos by SSIM, PSNR and LPIPS. Needs --photos and a COLMAP model with descriptors
+    /// From the recovered points, paint the views of the map's cameras, and compare them with the
+    /// photos by SSIM, PSNR and LPIPS. Needs --photos and a COLMAP model with descriptors
     #[arg(long, help_heading = "Result", requires = "photos")]
     pub invert: bool,
-    /// ONNX file of the network that paints, as training/inversion exports it [default: the network
-    /// for these descriptors, see unlift models]
+    /// ONNX file of the network that paints, as written by the scripts in the repository's folder
+    /// training/inversion [default: the network for these descriptors, see unlift models]
     #[arg(long, value_name = "FILE", help_heading = "Result", requires = "invert")]
     pub inverter: Option<PathBuf>,
     /// Folder of the map's photos, to compare with the painted pictures
@@ -268,9 +272,9 @@ pub struct AuditImagesArgs {
     /// unlift models) [default: sift]
     #[arg(long, value_name = "TYPE", value_parser = values::feature_type, help_heading = "Input")]
     pub features: Option<DescriptorKind>,
-    /// Number of features per photo. aliked and superpoint keep the N best. sift adds whole scales,
-    /// the coarsest first, until it has more than N features [default: sift 8192, aliked 2048,
-    /// superpoint 4096]
+    /// Number of features per photo. aliked and superpoint keep the N best. sift keeps whole
+    /// scales, the coarsest first, and stops after the scale that exceeds N, so it may return more
+    /// than N [default: sift 8192, aliked 2048, superpoint 4096]
     #[arg(long, value_parser = values::count, value_name = "N", help_heading = "Input")]
     pub max_features: Option<NonZeroUsize>,
     /// Keep only keypoints whose score exceeds SCORE; not for sift [default: aliked 0.2, superpoint
@@ -315,17 +319,17 @@ pub struct AuditImagesArgs {
     /// and the highest percentage recovered]
     #[arg(long, value_name = "NAME", help_heading = "Result", conflicts_with = "share_safe")]
     pub show: Vec<String>,
-    /// Folder of the photos if PATH is a file, for drawings and for --invert. Photos are turned
-    /// upright by their EXIF orientation only if PATH states that its features are of upright
-    /// photos
+    /// Folder of the photos if PATH is a file, for drawings and for --invert. unlift applies the
+    /// EXIF orientation of the photos only if PATH states that its keypoints refer to upright
+    /// photos, as the output of unlift features does without --as-stored
     #[arg(long, value_name = "DIR", help_heading = "Result")]
     pub photos: Option<PathBuf>,
     /// Paint pictures from the recovered keypoints, and compare them with the photos by SSIM, PSNR
     /// and LPIPS
     #[arg(long, help_heading = "Result")]
     pub invert: bool,
-    /// ONNX file of the network that paints, as training/inversion exports it [default: the network
-    /// for these descriptors, see unlift models]
+    /// ONNX file of the network that paints, as written by the scripts in the repository's folder
+    /// training/inversion [default: the network for these descriptors, see unlift models]
     #[arg(long, value_name = "FILE", help_heading = "Result", requires = "invert")]
     pub inverter: Option<PathBuf>,
     #[command(flatten)]
@@ -360,8 +364,8 @@ pub struct AuditReleasedArgs {
     /// A Parquet file with the original points and, for each, the record that hides it
     #[arg(long, value_name = "TRUTH", help_heading = "Input")]
     pub truth: PathBuf,
-    /// Name of the scheme in the results [default: the entry scheme in the metadata of RELEASED or,
-    /// without it, released]
+    /// Name of the scheme in the results [default: the value of "scheme" in the metadata of
+    /// RELEASED, otherwise "released"]
     #[arg(long, value_name = "NAME", value_parser = values::scheme_name, help_heading = "Input")]
     pub name: Option<String>,
     /// Descriptors of the original points, if RELEASED has none: a .npy array with a row per point,

@@ -22,8 +22,8 @@ folder. sift computes the features of COLMAP: RootSIFT descriptors times 512, as
 superpoint compute descriptors of length 1, as floats. If IMAGES is a file, its features are copied.
 
 Photos are turned upright by their EXIF orientation, and keypoints are in pixels of the upright
-photo. The output records this (attribute upright of keypoints). COLMAP and hloc do not turn photos:
-use --as-stored for them.
+photo. The output file states this: the attribute \"upright\" of its keypoints is 1. COLMAP and hloc
+do not turn photos: use --as-stored for them.
 
 To resume an interrupted run, repeat the command. Finished images are kept in FILE.parts until FILE
 is complete. If an image cannot be used, unlift prints a line on stderr and writes the others.
@@ -43,17 +43,17 @@ pub struct FeaturesArgs {
     /// models) [default: sift]
     #[arg(long = "type", value_name = "TYPE", value_parser = values::feature_type)]
     pub kind: Option<DescriptorKind>,
-    /// Number of features per photo. aliked and superpoint keep the N best. sift adds whole scales,
-    /// the coarsest first, until it has more than N features [default: sift 8192, aliked 2048,
-    /// superpoint 4096]
+    /// Number of features per photo. aliked and superpoint keep the N best. sift keeps whole
+    /// scales, the coarsest first, and stops after the scale that exceeds N, so it may return more
+    /// than N [default: sift 8192, aliked 2048, superpoint 4096]
     #[arg(long, value_parser = values::count, value_name = "N")]
     pub max_features: Option<NonZeroUsize>,
     /// Keep only keypoints whose score exceeds SCORE; not for sift [default: aliked 0.2, superpoint
     /// 0.005]
     #[arg(long, value_name = "SCORE", value_parser = values::score)]
     pub min_score: Option<f32>,
-    /// Do not turn photos, like COLMAP and hloc. Without this option, photos are turned upright by
-    /// their EXIF orientation
+    /// Leave photos as they are stored, as COLMAP and hloc do. Without this option, photos are
+    /// turned upright by their EXIF orientation
     #[arg(long)]
     pub as_stored: bool,
     /// Shrink photos whose longer side exceeds PIXELS; keypoints stay in pixels of the original
@@ -92,7 +92,7 @@ pub struct InvertArgs {
     /// unlift models) [default: sift]
     #[arg(long, value_name = "TYPE", value_parser = values::feature_type)]
     pub features: Option<DescriptorKind>,
-    /// Points that unlift recover recovered from PATH; required if PATH is a released.parquet
+    /// Output file of unlift recover for PATH; required if PATH is a released.parquet
     #[arg(long, value_name = "FILE")]
     pub recovered: Option<PathBuf>,
     /// COLMAP model with the cameras from which to paint the map; only if PATH is a released map
@@ -101,11 +101,12 @@ pub struct InvertArgs {
     /// The --scale given to unlift obfuscate: units of the released map per unit of MODEL
     #[arg(long, value_name = "SCALE", value_parser = values::positive, requires = "cameras")]
     pub scale: Option<f64>,
-    /// ONNX file of the network that paints, as training/inversion exports it [default: the network
-    /// for these descriptors, see unlift models]
+    /// ONNX file of the network that paints, as written by the scripts in the repository's folder
+    /// training/inversion [default: the network for these descriptors, see unlift models]
     #[arg(long, value_name = "FILE")]
     pub inverter: Option<PathBuf>,
-    /// Paint at most N images, evenly spaced by name; of a released.parquet of images, the first N
+    /// Paint at most N images: evenly spaced by name or, if PATH is a released.parquet of images,
+    /// the first N
     #[arg(long, value_parser = values::count, value_name = "N")]
     pub max_images: Option<NonZeroUsize>,
     /// Number of threads; results do not depend on it [default: one per core]

@@ -144,7 +144,7 @@ pub enum Command {
     Metrics(MetricsArgs),
     /// Reproduce the paper's tables on its datasets, next to the published numbers
     Paper(PaperArgs),
-    /// Measure the time and memory of recovery
+    /// Measure the time of recovery, next to the published time
     #[command(subcommand)]
     Bench(BenchCommand),
     /// List the schemes: how they hide points, what stays hidden, publication, patents

@@ -38,9 +38,9 @@ pub struct TableArgs {
         ("markdown", TableFormat::Markdown),
     ]))]
     pub format: TableFormat,
-    /// Show only this threshold of the audit, the largest error of a recovered point. Without it,
-    /// tables show all thresholds, and curves the first or, for images, the one nearest to 10
-    /// pixels
+    /// Show only this threshold (the error up to which a point counts as recovered), one of the
+    /// audit's --thresholds. By default, tables show all thresholds, and curves show one: the first
+    /// or, for images, the one nearest to 10 pixels
     #[arg(long, value_name = "T", value_parser = values::threshold)]
     pub threshold: Option<Threshold>,
     /// Write the table to this file in place of stdout
@@ -62,8 +62,8 @@ number of neighbors K, solver and threshold and, for the oracle, the same inlier
 are compared by scheme and threshold. Rows that only one of the audits has are listed.
 
 The comparison fails if a result of the later audit is larger by more than --tolerance. It also
-fails if a scheme of the earlier audit has no comparable result in the later one, or if one of its
-sources could not be used there.
+fails if a scheme of the earlier audit has no comparable result in the later one, or if a source of
+the earlier audit could not be used in the later one.
 
 Audits in different units or with different thresholds are refused (exit code 3).
 
@@ -114,9 +114,10 @@ sfm and sfm_sift, and where hloc unpacks published maps (7scenes_sfm_triangulate
 CambridgeLandmarks_Colmap_Retriangulated_1024px). The scale of a map is computed from the camera
 poses of the dataset.
 
-unlift audits each scene like unlift audit map and unlift audit images, into a folder per scene in
-DIR. paper.json and paper.csv hold every number of the paper's tables and, next to it, the number
-for the strongest attack of unlift. Missing data is listed with the web page that publishes it.
+unlift audits each scene like unlift audit map and unlift audit images, and writes one folder per
+scene into the folder of --out. paper.json and paper.csv hold every number of the paper's tables
+and, next to it, the number for the strongest attack of unlift. Missing data is listed with the web
+page that publishes it.
 
 Examples:
   unlift paper --dataset 7scenes datasets/7scenes
@@ -155,8 +156,8 @@ pub struct PaperArgs {
     /// Number of test photos per scene, evenly spaced by name
     #[arg(long, value_parser = values::count, value_name = "N", default_value = "20")]
     pub images: NonZeroUsize,
-    /// Use a random subset of at most N points per map, of which a smaller percentage is recovered
-    /// [default: all]
+    /// Use a random subset of at most N points per map. This makes the attack weaker: it recovers a
+    /// smaller percentage than on the full map [default: all]
     #[arg(long, value_parser = values::count, value_name = "N")]
     pub max_points: Option<NonZeroUsize>,
     /// Random seed
@@ -183,7 +184,8 @@ pub struct PaperArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 unlift measures the time to compute positions, as the paper does. An audit also computes the
-probability that each position is correct; --confidence includes that time.
+probability that each position is correct; --confidence includes that time. The output also has the
+peak memory of the whole run.
 
 Examples:
   unlift bench recover --points 700000 --scheme ppl
@@ -196,8 +198,9 @@ pub struct BenchRecoverArgs {
     /// Number of points of the map
     #[arg(long, value_parser = values::made_points, value_name = "N", default_value = "700000")]
     pub points: NonZeroUsize,
-    /// Map to measure on; unlift takes random points of it, or repeats it side by side with random
-    /// offsets, up to --points points [default: the room of the demo]
+    /// Map to measure on. If it has more than --points points, unlift takes a random subset; if
+    /// fewer, unlift puts copies of it, with slightly moved points, side by side [default: the room
+    /// of the demo]
     #[arg(long, value_name = "PATH")]
     pub map: Option<PathBuf>,
     /// Scheme that hides the points (unlift schemes lists them)
@@ -212,13 +215,13 @@ pub struct BenchRecoverArgs {
           default_value = "1,0.5,0.3,0.2,0.1")]
     pub inlier_ratios: Vec<f64>,
     /// Recovery methods, separated by commas or repeated. With lists of neighbors: joint,
-    /// joint-start, consensus, ransac. From the released records alone: density, tomography. See
-    /// unlift recover --help
+    /// joint-start, consensus, ransac. Without lists, from the records alone (what a scheme
+    /// releases in place of points): density, tomography. See unlift recover --help
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
           default_value = "joint")]
     pub solver: Vec<Builtin>,
-    /// Distance up to which a listed record (a record replaces points) counts for a position, in
-    /// the unit of the map; auto computes it from the released records and the lists
+    /// A listed record supports a position if it passes within this distance of it, in the unit of
+    /// the map; auto computes the distance from the released records and the lists
     #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
     pub delta: Delta,
     /// Also compute the probability that each position is correct, as an audit does

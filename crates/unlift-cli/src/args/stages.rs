@@ -25,8 +25,8 @@ released.parquet is what an attacker sees: records (such as lines) in place of p
 holds the original points; keep it private.
 
 All random choices come from a fresh 256-bit key, which unlift does not store. --seed replaces this
-key, for experiments only: whoever guesses the seed can restore the order of the records and, under
-cp, the points.
+key, for experiments. Never release a map made with --seed: whoever guesses the seed can restore the
+order of the records and, under cp, the points.
 
 Release a map only once. From two releases with descriptors, an attacker can match the two records
 of each point, which intersect in the point.")]
@@ -115,9 +115,9 @@ pub struct OracleArgs {
     /// of K entries
     #[arg(long, value_name = "RATIO", value_parser = values::ratio)]
     pub inlier_ratio: f64,
-    /// Wrong entries of the lists: uniform (random records), near (from the 2K-th to the 10K-th
-    /// nearest record), clustered (at wrong places that nearby points have in common, as with
-    /// descriptors that look alike)
+    /// Wrong entries of the lists: uniform (random records), near (random records between the (2 x
+    /// K)-th and the (10 x K)-th nearest), clustered (nearby points share the same few wrong
+    /// places, as happens where descriptors look alike)
     #[arg(long, value_name = "MODEL", value_parser = values::noise, default_value = "uniform")]
     pub oracle_noise: Noise,
     /// Entries per list (K); there is a list per hidden point
@@ -144,22 +144,24 @@ pub struct RecoverArgs {
     /// The released.parquet of a map or of images
     #[arg(value_name = "OBFUSCATED")]
     pub released: PathBuf,
-    /// File with the lists of neighbors that unlift neighbors wrote. density and tomography compute
-    /// positions without the lists and need them only to tell apart the two points of a line
+    /// File with lists of neighbors, written by unlift neighbors find, unlift neighbors oracle or
+    /// your own program (docs/formats.md). density and tomography compute positions without the
+    /// lists and need them only to tell apart the two points of a line
     #[arg(long, value_name = "FILE")]
     pub neighbors: PathBuf,
     /// Recovery method. With lists of neighbors: joint (usually the strongest), joint-start (the
     /// first pass of joint), consensus (each point from its own list), ransac (the attack of
-    /// Chelani et al. 2025). From the released records alone (a record replaces one or two points):
-    /// density (published attacks), tomography (stronger)
+    /// Chelani et al. 2025). Without lists, from the records alone (what a scheme releases in place
+    /// of points): density (published attacks), tomography (stronger)
     #[arg(long, value_name = "SOLVER", value_parser = values::solver, default_value = "joint")]
     pub solver: Builtin,
-    /// Ignore rules of a scheme that narrow down a hidden coordinate (cp: another record publishes
-    /// the value; ray-voxel: a checkerboard of voxels decides the center of a ray)
+    /// Make the attack weaker: do not use the public rule of a scheme to narrow down positions (cp:
+    /// the true coordinate is in another record; ray-voxel: the voxel of a point decides the center
+    /// of its ray)
     #[arg(long)]
     pub no_exact_constraints: bool,
-    /// Distance up to which a listed record counts for a position, in the unit of the map; auto
-    /// computes it from the released records and the lists
+    /// A listed record supports a position if it passes within this distance of it, in the unit of
+    /// the map; auto computes the distance from the released records and the lists
     #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
     pub delta: Delta,
     /// Random seed
