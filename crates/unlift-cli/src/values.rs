@@ -302,7 +302,7 @@ mod tests {
              expected NEIGHBORS,RATIO with both above 0 (for example 20,2.0), found 20\n\
              expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, found pppl\n\
              expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, found cp2d (for images only)\n\
-             expected one of joint, joint-start, consensus, ransac, density, tomography, found magic\n\
+             expected one of joint, ranking, joint-start, consensus, ransac, density, tomography, found magic\n\
              expected one of uniform, near, clustered, found white\n\
              expected one of sift, aliked, superpoint, found SIFT\n\
              expected a number from 0 to below 1, found 1\n\

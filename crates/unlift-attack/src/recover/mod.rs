@@ -24,6 +24,7 @@ mod model;
 mod options;
 mod problem;
 mod published_density;
+mod ranking;
 mod ransac;
 mod records_alone;
 mod result;

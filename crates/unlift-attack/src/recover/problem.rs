@@ -16,7 +16,7 @@ use crate::recover::ransac::Ransac;
 use crate::recover::records_alone::{self, Placement};
 use crate::recover::result::{Estimate, Recovered, TrialCounts, Unknown};
 use crate::recover::solver::Builtin;
-use crate::recover::{confidence, consensus, delta, exact, joint};
+use crate::recover::{confidence, consensus, delta, exact, joint, ranking};
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, Fingerprint};
 
@@ -73,9 +73,11 @@ impl<'a, const D: usize> Problem<'a, D> {
         let (delta, records) = match solver {
             Builtin::Density => at_peaks(published(released)),
             Builtin::Tomography => at_peaks(tomography(released)),
-            Builtin::Consensus | Builtin::Joint | Builtin::JointStart | Builtin::Ransac => {
-                Self::listed(released, lists, solver, options, model)?
-            }
+            Builtin::Consensus
+            | Builtin::Joint
+            | Builtin::JointStart
+            | Builtin::Ranking
+            | Builtin::Ransac => Self::listed(released, lists, solver, options, model)?,
         };
         let trials = TrialCounts::default();
         Ok(Self { released, map, lists, solver, options: *options, delta, records, trials })
@@ -90,7 +92,7 @@ impl<'a, const D: usize> Problem<'a, D> {
     ) -> Result<(f64, Records<'a, D>), Error> {
         let family = Family::new(released, lists, model.map(|model| model.chance.clone()))?;
         // Joint recovery reads lists in both directions from its start on.
-        let is_joint = matches!(solver, Builtin::Joint | Builtin::JointStart);
+        let is_joint = matches!(solver, Builtin::Joint | Builtin::JointStart | Builtin::Ranking);
         let graph = is_joint.then(|| Graph::new(lists, released.slots_per_record()));
         let single = graph.as_ref().filter(|_| released.slots_per_record() == 1);
         let both_ways = single.map(Graph::neighborhoods);
@@ -138,12 +140,22 @@ impl<'a, const D: usize> Problem<'a, D> {
         }
     }
 
-    /// Returns the estimates of all slots after joint recovery from `start`; for other solvers, `start`.
+    /// Whether the solver continues with joint recovery after its start.
+    fn iterates(&self) -> bool {
+        matches!(self.solver, Builtin::Joint | Builtin::Ranking)
+    }
+
+    /// Returns the estimates of all slots after joint recovery from `start`, and after ranking if that is the solver; for other
+    /// solvers, `start`.
     pub(super) fn run_joint(&self, start: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
         match &self.records {
-            Records::Listed { family, graph: Some(graph), .. } if self.solver == Builtin::Joint => {
+            Records::Listed { family, graph: Some(graph), .. } if self.iterates() => {
                 let (delta, seed) = (self.delta as f32, self.options.seed);
-                joint::recover(family, graph, delta, seed, start)
+                let found = joint::recover(family, graph, delta, seed, start);
+                match self.solver {
+                    Builtin::Ranking => ranking::recover(family, self.lists, delta, seed, found),
+                    _ => found,
+                }
             }
             _ => start,
         }
@@ -230,7 +242,7 @@ impl<'a, const D: usize> Problem<'a, D> {
     /// Applies exact constraints, and repeats joint recovery from the result where that helps.
     fn settled(&self, estimates: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
         let mut settled = self.settle(estimates);
-        if self.solver == Builtin::Joint {
+        if self.iterates() {
             for _ in 0..exact::joint_reruns(self.released) {
                 settled = self.settle(self.run_joint(settled));
             }

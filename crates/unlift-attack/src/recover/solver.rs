@@ -44,6 +44,9 @@ pub enum Builtin {
     Consensus,
     /// Consensus, then iterations that also use the estimates of neighbors.
     Joint,
+    /// Joint recovery, then the positions under which the whole lists are likeliest: also what lists do not name is evidence. The most
+    /// accurate solver, and the slowest of ours.
+    Ranking,
     /// The consensus pass that joint recovery starts from. It differs from [`Self::Consensus`]: its delta is narrower, and for
     /// records with one slot it reads lists in both directions.
     JointStart,
@@ -59,8 +62,9 @@ pub enum Builtin {
 
 impl Builtin {
     /// All solvers, in the order of help texts.
-    pub const ALL: [Builtin; 6] = [
+    pub const ALL: [Builtin; 7] = [
         Self::Joint,
+        Self::Ranking,
         Self::JointStart,
         Self::Consensus,
         Self::Ransac,
@@ -70,14 +74,15 @@ impl Builtin {
 
     /// The solvers that compute positions from lists. The others have no delta, and use lists only to decide which point of a
     /// paired line belongs to which slot.
-    pub const FROM_LISTS: [Builtin; 4] =
-        [Self::Joint, Self::JointStart, Self::Consensus, Self::Ransac];
+    pub const FROM_LISTS: [Builtin; 5] =
+        [Self::Joint, Self::Ranking, Self::JointStart, Self::Consensus, Self::Ransac];
 
     /// Name of the solver on the command line.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Consensus => "consensus",
             Self::Joint => "joint",
+            Self::Ranking => "ranking",
             Self::JointStart => "joint-start",
             Self::Ransac => "ransac",
             Self::Density => "density",
@@ -115,7 +120,8 @@ mod tests {
     /// Returns the solver after `solver` in [`Builtin::ALL`]. A new variant does not compile until it is added here.
     fn next(solver: Builtin) -> Option<Builtin> {
         match solver {
-            Builtin::Joint => Some(Builtin::JointStart),
+            Builtin::Joint => Some(Builtin::Ranking),
+            Builtin::Ranking => Some(Builtin::JointStart),
             Builtin::JointStart => Some(Builtin::Consensus),
             Builtin::Consensus => Some(Builtin::Ransac),
             Builtin::Ransac => Some(Builtin::Density),
@@ -127,7 +133,11 @@ mod tests {
     /// Whether `solver` computes positions from lists.
     fn reads_lists(solver: Builtin) -> bool {
         match solver {
-            Builtin::Joint | Builtin::JointStart | Builtin::Consensus | Builtin::Ransac => true,
+            Builtin::Joint
+            | Builtin::Ranking
+            | Builtin::JointStart
+            | Builtin::Consensus
+            | Builtin::Ransac => true,
             Builtin::Density | Builtin::Tomography => false,
         }
     }

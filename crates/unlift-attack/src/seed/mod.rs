@@ -46,6 +46,8 @@ pub enum Stage {
     Tiling = 21,
     /// Simple shapes, to test attacks on.
     Shapes = 22,
+    /// Steps that ranking tries.
+    Ranking = 23,
 }
 
 /// A source of random bits: a [`Counter`], or the owner's cipher.

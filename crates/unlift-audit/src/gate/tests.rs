@@ -144,7 +144,7 @@ fn each_wrong_part_is_named() {
     assert!(unknown.unwrap().0.starts_with("scheme: one of olc, ppl"));
     assert_eq!(message("ppl:joint<=20"), format!("{form}, found no threshold"));
     assert_eq!(message("ppl:joint@0.5<=20"), format!("{form}, found no threshold"));
-    let names = "expected a solver (joint, joint-start, consensus, ransac, density, tomography) or \
+    let names = "expected a solver (joint, ranking, joint-start, consensus, ransac, density, tomography) or \
                  a source of neighborhoods (oracle, file, similarity, overlap, descriptors, \
                  geometric, learned)";
     assert_eq!(message("ppl:jiont:0.1<=20"), format!("{names}, found jiont"));

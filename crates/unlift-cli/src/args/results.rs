@@ -215,7 +215,7 @@ pub struct BenchRecoverArgs {
           default_value = "1,0.5,0.3,0.2,0.1")]
     pub inlier_ratios: Vec<f64>,
     /// Recovery methods, separated by commas or repeated. With lists of neighbors: joint,
-    /// joint-start, consensus, ransac. Without lists, from the records alone (what a scheme
+    /// ranking, joint-start, consensus, ransac. Without lists, from the records alone (what a scheme
     /// releases in place of points): density, tomography. See unlift recover --help
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
           default_value = "joint")]

@@ -149,8 +149,8 @@ pub struct RecoverArgs {
     /// lists and need them only to tell apart the two points of a line
     #[arg(long, value_name = "FILE")]
     pub neighbors: PathBuf,
-    /// Recovery method. With lists of neighbors: joint (usually the strongest), joint-start (the
-    /// first pass of joint), consensus (each point from its own list), ransac (the attack of
+    /// Recovery method. With lists of neighbors: joint, ranking (stronger and slower: also uses
+    /// which points are not in a list), joint-start (the first pass of joint), consensus (each point from its own list), ransac (the attack of
     /// Chelani et al. 2025). Without lists, from the records alone (what a scheme releases in place
     /// of points): density (published attacks), tomography (stronger)
     #[arg(long, value_name = "SOLVER", value_parser = values::solver, default_value = "joint")]

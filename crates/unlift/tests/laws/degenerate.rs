@@ -63,7 +63,7 @@ fn statuses<const D: usize>(
             let evidence = recovered.evidence()[slot];
             assert!(evidence >= 0.0 && evidence.is_finite(), "{what}: evidence {evidence}");
             let asked = match solver {
-                Builtin::Joint | Builtin::JointStart => both_ways.len(),
+                Builtin::Joint | Builtin::JointStart | Builtin::Ranking => both_ways.len(),
                 _ => lists.of(slot).len(),
             };
             let support = usize::from(recovered.support()[slot]);
@@ -105,7 +105,7 @@ fn short_lists<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
         let got = statuses(&what, &hidden.released, &lists, &harsh_options());
         // Joint recovery uses lists in both directions, so a slot with a list of one may have two
         // neighbors.
-        let both_ways = [Builtin::Joint, Builtin::JointStart];
+        let both_ways = [Builtin::Joint, Builtin::JointStart, Builtin::Ranking];
         let by_lists = |options: &Options| !both_ways.contains(&options.0) || length == 0;
         let told = harsh_options().iter().flat_map(|o| vec![by_lists(o); n]).collect::<Vec<_>>();
         if length < 2 {

@@ -24,6 +24,7 @@ mod maps;
 mod noise;
 mod parts;
 mod pins;
+mod ranking;
 mod records;
 mod recovery;
 mod released_again;

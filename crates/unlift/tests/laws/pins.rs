@@ -111,6 +111,11 @@ fn bytes_of_confidence_are_pinned() {
 
 /// (Solver, scheme, hash of the recovery).
 const BASELINES: &[(&str, &str, u64)] = &[
+    ("ranking", "olc", 0x9c515412cd1da9f1),
+    ("ranking", "ppl", 0xae9bb9f8192fd4fa),
+    ("ranking", "ray", 0x5ebc45b5a3ad69a5),
+    ("ranking", "plane", 0xf381e6ce5a80adbb),
+    ("ranking", "cp", 0xd13cc22d2fce95b9),
     ("joint-start", "olc", 0xaf63f5032f96a9d9),
     ("joint-start", "ppl", 0x46e1864ebd342411),
     ("joint-start", "ray", 0xaffb76e949a42c6b),
@@ -137,7 +142,14 @@ const BASELINES: &[(&str, &str, u64)] = &[
 fn bytes_of_other_solvers_are_pinned() {
     let points = room::<3>(2029, 300);
     let mut found = Vec::new();
-    for solver in [Builtin::JointStart, Builtin::Ransac, Builtin::Density, Builtin::Tomography] {
+    let others = [
+        Builtin::Ranking,
+        Builtin::JointStart,
+        Builtin::Ransac,
+        Builtin::Density,
+        Builtin::Tomography,
+    ];
+    for solver in others {
         for name in ["olc", "ppl", "ray", "plane", "cp"] {
             let hidden = hide(unlift::obfuscate::scheme(name).unwrap(), &points, 0);
             let options = RecoverOptions { seed: 4, ..RecoverOptions::default() };

@@ -101,7 +101,7 @@ fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
             }
             // Joint recovery uses all estimates within reach, so a nearby pile has a small
             // influence.
-            if options.0 == Builtin::Joint {
+            if [Builtin::Joint, Builtin::Ranking].contains(&options.0) {
                 tolerance = tolerance.max(0.05 * delta);
             }
             // Otherwise: a few units in the last place at 6 m, divided by the sine of the best
