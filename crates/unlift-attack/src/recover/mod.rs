@@ -5,7 +5,7 @@
 //! 1. `options`: options of recovery. `assignment`: descriptors of paired lines. `result`: recovered positions. `solver`: the
 //!    trait [`Solver`], which you can implement.
 //! 2. `map`: the data that all solvers read. `Settings` in `map/family` holds every constant that differs between maps and images.
-//! 3. `consensus` and `joint`: our solvers. `ransac` and `published_density`: published attacks, for comparison.
+//! 3. `consensus`, `joint` and `ranking`: our solvers. `ransac` and `published_density`: published attacks, for comparison.
 //! 4. `delta`: the choice of the distance that decides support.
 //! 5. `exact`: coordinates that a rule of the scheme fixes. `confidence`: the probability that an estimate is right.
 //! 6. `model`: what consensus learns of a whole map. `problem`: solves a map at once, or in parts by consensus.
