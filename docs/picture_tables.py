@@ -4,18 +4,16 @@ Used by make_benchmarks.py; standard library only.
 """
 import csv, json, pathlib, subprocess, tempfile
 
-RATIOS = ["1.0", "0.5"]
-# Attacks that read lists: of records alone, and of the descriptors of each kind.
-SIFT, ALIKED = ["overlap", "learned"], ["similarity", "learned"]
+RATIO = 0.5
+SOURCE = "learned"
 FLAT, SOLID = ["lines2d", "cp2d", "dcl2d"], ["olc", "ppl", "ray", "plane", "cp"]
 SCENES = [("RedKitchen", "redkitchen", ["--scale", "1"]), ("Castle", "castle", [])]
 
 
-def audit(program, names, *options):
+def audit(program, *options):
     with tempfile.TemporaryDirectory() as out:
-        ratios = ["--inlier-ratios", ",".join(RATIOS), "--neighbors", "oracle"]
-        sources = [option for name in names for option in ("--neighbors", name)]
-        command = [program, "audit", *options, *ratios, *sources, "--invert", "--solver", "joint", "--quiet", "--share-safe", "--out", f"{out}/audit"]
+        ratios = ["--inlier-ratios", str(RATIO), "--neighbors", "oracle", "--neighbors", SOURCE]
+        command = [program, "audit", *options, *ratios, "--invert", "--solver", "joint", "--quiet", "--share-safe", "--out", f"{out}/audit"]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         return json.loads(pathlib.Path(out, "audit/audit.json").read_text())
 
@@ -35,45 +33,51 @@ def published(shared, dim):
     return table
 
 
-def table(document, schemes, sources, paper):
+def head(schemes):
+    yield "| of | In | " + " | ".join(schemes) + " |"
+    yield "|" + " --- |" * (len(schemes) + 2)
+
+
+def baseline(document, first, paper):
+    """The figures of the true points, which every row of the scheme `first` has."""
+    row = next(r["metrics"] for r in document["results"] if r["scheme"] == first)
+    known = paper.get(("none", "baseline"))
+    return (f"{row['ssim_baseline']:.3f} / {row['psnr_baseline']:.1f} dB / {row['lpips_baseline']:.3f}"
+            + (f" [{known}]" if known else ""))
+
+
+def table(name, document, schemes, paper):
     rows = {}
     for row in document["results"]:
         key = row["inlier_ratio"] if row["neighbors"] == "oracle" else row["neighbors"]
         rows[key, row["scheme"]] = row["metrics"]
-    base, known = rows[1.0, schemes[0]], paper.get(("none", "baseline"))
-    yield (f"True points: {base['ssim_baseline']:.3f} / {base['psnr_baseline']:.1f} dB / {base['lpips_baseline']:.3f}"
-           + (f" [{known}]." if known else "."))
-    yield ""
-    yield "| In | " + " | ".join(schemes) + " |"
-    yield "|" + " --- |" * (len(schemes) + 1)
-    for key in [*map(float, RATIOS), *sources]:
+    for key in [RATIO, SOURCE]:
         cells = []
         for scheme in schemes:
             known = paper.get((scheme, key))
             cells.append(told(rows[key, scheme]) + (f" [{known}]" if known else ""))
-        yield f"| {key if isinstance(key, float) else f'`{key}`'} | " + " | ".join(cells) + " |"
-    yield ""
+        yield f"| {name} | {key if key == RATIO else f'`{key}`'} | " + " | ".join(cells) + " |"
 
 
 def tables(program, shared):
     """All lines of the section."""
-    data = shared / "data"
-    yield from ["SSIM / LPIPS, means over the photos (RedKitchen 40, Castle 11) at half their size, of images and of maps as their cameras see them;",
-                "in brackets the paper's SSIM on 7-Scenes (another network, full size). True points also have the PSNR.", ""]
+    data, flat, solid, true = shared / "data", [], [], []
     for name, scene, scale in SCENES:
-        photos = data / scene / "images"
-        yield from [f"### Images of {name}, SIFT", ""]
-        paper = published(shared, "2") if scene == "redkitchen" else {}
-        document = audit(program, SIFT, "images", photos)
-        yield from table(document, FLAT, SIFT, paper)
-        yield from [f"### Images of {name}, ALIKED", ""]
-        document = audit(program, ALIKED, "images", photos, "--features", "aliked")
-        yield from table(document, FLAT, ALIKED, {})
-        for kind, sources, map_of in [("SIFT", SIFT, data / scene), ("ALIKED", ALIKED, data / f"{scene}-aliked")]:
+        photos, paper = data / scene / "images", published(shared, "2") if scene == "redkitchen" else {}
+        for kind, options in (("SIFT", []), ("ALIKED", ["--features", "aliked"])):
+            document = audit(program, "images", photos, *options)
+            beside = paper if kind == "SIFT" else {}
+            flat += table(f"{name}, {kind}", document, FLAT, beside)
+            true.append(f"| {name}, {kind} | {baseline(document, FLAT[0], beside)} | ")
+            map_of = data / (scene if kind == "SIFT" else f"{scene}-aliked")
             if not map_of.exists():
+                true[-1] += "- |"
                 continue
-            yield from [f"### Map of {name}, {kind}", ""]
-            paper = published(shared, "3") if (scene, kind) == ("redkitchen", "SIFT") else {}
-            document = audit(program, sources, "map", map_of / "model", "--descriptors", map_of / "descriptors.bin", *scale,
+            document = audit(program, "map", map_of / "model", "--descriptors", map_of / "descriptors.bin", *scale,
                              "--photos", photos, "--max-photos", "40", "--schemes", ",".join(SOLID), "--no-records-alone")
-            yield from table(document, SOLID, sources, paper)
+            beside = published(shared, "3") if (scene, kind) == ("redkitchen", "SIFT") else {}
+            solid += table(f"{name}, {kind}", document, SOLID, beside)
+            true[-1] += f"{baseline(document, SOLID[0], beside)} |"
+    yield from ["SSIM / LPIPS, means over the photos (RedKitchen 40, Castle 11) at half their size; in brackets the paper's SSIM on 7-Scenes",
+                "(another network, full size).", "", "Images:", "", *head(FLAT), *flat, "", "Maps as their cameras see them:", "", *head(SOLID),
+                *solid, "", "True points, SSIM / PSNR / LPIPS:", "", "| of | images | map |", "| --- | --- | --- |", *true, ""]
