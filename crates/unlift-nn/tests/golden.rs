@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use safetensors::SafeTensors;
 use unlift_nn::{MODELS, Network, Port, Tensor};
 
-/// Of longer outputs a golden file keeps every 37th number: `training/export/common.py`.
+/// Outputs with more numbers than this are stored as every 37th number, see `training/export/common.py`.
 const LONG: usize = 4096;
 const STRIDE: usize = 37;
 /// Other kernels sum in another order; values are about 1.

@@ -75,7 +75,7 @@ pub(super) struct Finished<'a> {
 /// Hides the points with `scheme` under `key` and computes every cell.
 ///
 /// # Errors
-/// Those of [`attack`]. For images also when the scheme cannot hide the points.
+/// Returns the errors of [`attack`]. For images, it also fails if the scheme cannot hide the points.
 pub(super) fn cells<const D: usize>(
     owned: &Owned<'_, D>,
     run: &Run<'_, D>,

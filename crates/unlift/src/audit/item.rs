@@ -25,7 +25,7 @@ pub(super) struct Rows {
 /// Computes the rows of `owned`. Calls `finished` with every row of every repeat.
 ///
 /// # Errors
-/// Those of [`cells`].
+/// Returns the errors of [`cells`].
 pub(super) fn of_item<const D: usize>(
     owned: &Owned<'_, D>,
     plan: &Plan<D>,

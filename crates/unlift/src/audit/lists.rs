@@ -87,7 +87,7 @@ impl<'a, const D: usize> Lists<'a, D> {
     /// record has an empty list only if it is the only one.
     ///
     /// # Errors
-    /// Those of [`make`](Self::make), if the map is large enough.
+    /// Returns the errors of [`make`](Self::make), if the map is large enough.
     pub fn make_of_what_there_is(&mut self, variant: &Variant<'_, D>) -> Result<Made, Error> {
         let others = self.released.n_records().saturating_sub(1);
         match variant.by {

@@ -31,7 +31,7 @@ impl<'a, const D: usize> Solved<'a, D> {
     /// Returns the result of the solver numbered `at`, and its seconds.
     ///
     /// # Errors
-    /// Those of [`recover`].
+    /// Returns the errors of [`recover`].
     pub(super) fn by(
         &mut self,
         at: usize,

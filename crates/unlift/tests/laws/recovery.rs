@@ -99,8 +99,8 @@ fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
                 }
                 tolerance = delta;
             }
-            // Joint recovery uses all estimates within reach, so a nearby pile has a small
-            // influence.
+            // Joint recovery, from which ranking starts, uses all estimates within reach, so a nearby
+            // pile has a small influence.
             if [Builtin::Joint, Builtin::Ranking].contains(&options.0) {
                 tolerance = tolerance.max(0.05 * delta);
             }

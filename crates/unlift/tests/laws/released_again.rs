@@ -1,5 +1,5 @@
-//! The same map in another form gives the same shares: records in another order, lines reversed and
-//! through another of their points, centers in another order.
+//! Recovery from another form of the same map recovers the same percentage of points: records in
+//! another order, lines reversed and through another of their points, centers in another order.
 
 use unlift::neighbors::Neighborhoods;
 use unlift::obfuscate::Entry;

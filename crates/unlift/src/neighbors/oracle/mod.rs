@@ -110,7 +110,7 @@ impl TrueNeighbors {
     /// Makes [`lists`](Self::lists) with uniformly random outliers.
     ///
     /// # Errors
-    /// Those of [`lists`](Self::lists).
+    /// Returns the errors of [`lists`](Self::lists).
     pub fn at_inlier_ratio(&self, inlier_ratio: f64, seed: u64) -> Result<Neighborhoods, Error> {
         self.lists(inlier_ratio, &Outliers::uniform(), seed)
     }
