@@ -1,97 +1,102 @@
-"""How good pictures of whole photos are: `evaluate.py WEIGHTS PREPARED --lpips FILE [--images N] [--pictures DIR]`.
+"""How good pictures of whole photos are: `evaluate.py WEIGHTS PREPARED/SET --lpips FILE [--images N] [--pictures DIR]`.
 
-SSIM (mean of the channels), PSNR and LPIPS (squeeze) at half the photos' size, of the true keypoints and of what
+Prints SSIM (mean of the channels), PSNR and LPIPS (squeeze) at half the photos' size, of the true keypoints and of what
 recovery could leave of them; of the true ones also at the photos' size, to which pictures are enlarged.
 """
 
 import argparse
 import pathlib
 
-import numpy
 import torch
-from PIL import Image
 from torch.nn import functional
 
-import data
 import metrics
 import weights
-from raster import raster
+from batches import Photos, channels, feature_image
 
-WORN = ["true", "half", "moved 2", "moved 5", "moved 10", "elsewhere 10", "elsewhere 30", "swapped 30"]
+WORN = ["true", "colors", "half", "moved 2", "moved 5", "moved 10", "elsewhere 10", "elsewhere 30", "swapped 30"]
 
 
-def seen(photo: data.Photo, how: str) -> numpy.ndarray:
-    """The feature image of a photo's points, worn as `how` says: pixels, per cents."""
-    random = numpy.random.default_rng(1)
-    places, descriptors = photo.places.copy(), photo.descriptors.copy()
-    n = len(places)
+def seen(photos: Photos, at: int, how: str, colors: bool) -> torch.Tensor:
+    """Returns the feature image of a photo's points, worn as `how` says: pixels, percent. `colors`: the network takes them."""
+    random = torch.Generator(photos.device).manual_seed(1)
+    rand = lambda *shape: torch.rand(*shape, generator=random, device=photos.device)  # noqa: E731
+    rows = torch.arange(int(photos.first[at]), int(photos.first[at + 1]), device=photos.device)
     what, _, much = how.partition(" ")
     if what == "half":
-        kept = random.random(n) < 0.5
-        places, descriptors = places[kept], descriptors[kept]
-    elif what == "moved":
-        places += random.normal(0, float(much), places.shape)
+        rows = rows[rand(len(rows)) < 0.5]
+    places, sources = photos.keypoints[rows], rows.clone()
+    if what == "moved":
+        places = places + float(much) * torch.randn(len(rows), 2, generator=random, device=photos.device)
     elif what == "elsewhere":
-        chosen = random.random(n) < float(much) / 100
-        places[chosen] = random.random((chosen.sum(), 2)) * photo.pixels.shape[1::-1]
+        chosen = rand(len(rows)) < float(much) / 100
+        places = torch.where(chosen[:, None], rand(len(rows), 2) * torch.tensor(photos.size[at], device=photos.device), places)
     elif what == "swapped":
-        chosen = numpy.flatnonzero(random.random(n) < float(much) / 100)
-        descriptors[chosen] = descriptors[random.permutation(chosen)]
-    ones = numpy.ones(len(places), numpy.float32)
-    high, wide = (side // 4 * 4 for side in photo.pixels.shape[:2])
-    return raster(places, descriptors, ones, (wide, high))
+        chosen = torch.nonzero(rand(len(rows)) < float(much) / 100)[:, 0]
+        sources[chosen] = rows[chosen[torch.argsort(rand(len(chosen)))]]
+    known = torch.full((len(rows),), float(what == "colors"), device=photos.device)
+    values = channels(photos.descriptors[sources], photos.colors(rows) if colors else None, known)
+    size = tuple(int(side) // 4 * 4 for side in photos.size[at])
+    return feature_image(places.float(), values, torch.ones_like(known), torch.zeros_like(rows), 1, size)
 
 
-def pictures(network, photo: data.Photo, how: str) -> tuple[torch.Tensor, torch.Tensor]:
-    """What the network makes, and the photo at the same size."""
-    high, wide = (side // 4 * 4 for side in photo.pixels.shape[:2])
-    with torch.inference_mode():
-        made = network(torch.from_numpy(seen(photo, how))[None]).clamp(0, 1)
-    return made, torch.from_numpy(data.shrunk(photo.pixels[:high, :wide]))[None]
+def photo(photos: Photos, at: int, full: bool = False) -> torch.Tensor:
+    """Returns a photo (1, 3, h, w) from 0 to 1 at half its size, or at the `full` one."""
+    wide, high = (int(side) // 4 * 4 for side in photos.size[at])
+    pixels = photos.pixels[at, :high, :wide].permute(2, 0, 1)[None].float() / 255
+    return pixels if full else functional.avg_pool2d(pixels, 2)
 
 
-def enlarged(made: torch.Tensor, photo: data.Photo) -> tuple[torch.Tensor, torch.Tensor]:
-    """The picture at the photo's size (bicubic), and the photo."""
-    real = torch.from_numpy(photo.pixels.transpose(2, 0, 1).astype(numpy.float32) / 255)[None]
-    high, wide = (2 * side for side in made.shape[-2:])
-    made = functional.interpolate(made, size=(high, wide), mode="bicubic", align_corners=False).clamp(0, 1)
-    return made, real[..., :high, :wide].contiguous()
+@torch.inference_mode()
+def pictures(network, photos: Photos, at: int, how: str) -> torch.Tensor:
+    """Returns what the network paints of a photo's points."""
+    return network(seen(photos, at, how, bool(network.shape.colors)).contiguous()).float().clamp(0, 1)
 
 
-def measure(network, distance: metrics.Lpips, photos: list[data.Photo], how: str, full: bool = False) -> list[float]:
-    """Means of SSIM, PSNR and LPIPS, at half the photos' size or at the `full` one."""
+@torch.inference_mode()
+def measure(network, distance: metrics.Lpips, photos: Photos, how: str, images: int | None = None, full: bool = False) -> list[float]:
+    """Returns means of SSIM, PSNR and LPIPS, at half the photos' size or at the `full` one."""
     rows = []
-    for photo in photos:
-        made, real = pictures(network, photo, how)
+    for at in range(len(photos))[:images]:
+        made, real = pictures(network, photos, at, how), photo(photos, at, full)
         if full:
-            made, real = enlarged(made, photo)
-        with torch.inference_mode():
-            rows.append([metrics.ssim(made, real), metrics.psnr(made, real), distance(made, real)])
+            made = functional.interpolate(made, size=real.shape[-2:], mode="bicubic", align_corners=False).clamp(0, 1)
+        rows.append([metrics.ssim(made, real), metrics.psnr(made, real), distance(made, real)])
     return torch.tensor(rows).mean(0).tolist()
+
+
+def sheet(network, photos: Photos, indices: list[int], path: pathlib.Path):
+    """Writes photos beside what is painted of their keypoints, without and with colors, one row each."""
+    from PIL import Image
+
+    rows = []
+    for at in indices:
+        row = [photo(photos, at), pictures(network, photos, at, "true")]
+        if network.shape.colors:
+            row.append(pictures(network, photos, at, "colors"))
+        row = torch.cat([functional.pad(part, (0, 320 - part.shape[3], 0, 320 - part.shape[2])) for part in row], 3)
+        rows.append((row[0].permute(1, 2, 0) * 255).round().byte().cpu())
+    Image.fromarray(torch.cat(rows).numpy()).save(path, quality=92)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("weights", type=pathlib.Path)
-    parser.add_argument("data", type=pathlib.Path)
+    parser.add_argument("data", type=pathlib.Path, nargs="+")
     parser.add_argument("--lpips", type=pathlib.Path, required=True)
     parser.add_argument("--images", type=int)
-    parser.add_argument("--pictures", type=pathlib.Path, help="folder that gets the photo above the picture")
+    parser.add_argument("--sheet", type=pathlib.Path, help="an image of the first ten photos beside the pictures")
     options = parser.parse_args()
-    torch.set_num_threads(1)
     network, about = weights.load(options.weights)
     print(about)
     distance = metrics.Lpips(options.lpips)
-    photos = data.photos(options.data, options.images)
+    photos = Photos(options.data, "cpu")
     for how in WORN:
-        print(how, *(f"{figure:.3f}" for figure in measure(network, distance, photos, how)))
-    print("true, full size", *(f"{figure:.3f}" for figure in measure(network, distance, photos, "true", full=True)))
-    if options.pictures:
-        options.pictures.mkdir(parents=True, exist_ok=True)
-        for at, photo in enumerate(photos):
-            rows = [part[0].permute(1, 2, 0) for part in reversed(pictures(network, photo, "true"))]
-            stacked = (torch.cat(rows) * 255).round().byte().numpy()
-            Image.fromarray(stacked).save(options.pictures / f"{at:03}.png")
+        print(how, *(f"{figure:.3f}" for figure in measure(network, distance, photos, how, options.images)))
+    for how in ["true", "colors"]:
+        print(f"{how}, full size", *(f"{figure:.3f}" for figure in measure(network, distance, photos, how, options.images, full=True)))
+    if options.sheet:
+        sheet(network, photos, list(range(min(10, len(photos)))), options.sheet)
 
 
 if __name__ == "__main__":

@@ -33,9 +33,9 @@ class Lpips(torch.nn.Module):
     POOLED = (0, 3, 6)  # a maximum over 3 x 3 comes after these
     TAKEN = (0, 2, 4, 5, 6, 7, 8)  # what is compared: the first convolution, then fire modules by number
 
-    def __init__(self, path: pathlib.Path):
+    def __init__(self, path: pathlib.Path, device: str = "cpu"):
         super().__init__()
-        self.tensors = load_file(path)
+        self.tensors = load_file(path, device)
         self.fires = [3, 4, 6, 7, 9, 10, 11, 12]
         self.shift = self.tensors["scaling_layer.shift"].view(1, 3, 1, 1)
         self.scale = self.tensors["scaling_layer.scale"].view(1, 3, 1, 1)

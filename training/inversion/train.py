@@ -1,8 +1,8 @@
-"""Trains an inversion network: `train.py OUT PREPARED.. --lpips FILE --minutes 100 [--validate PREPARED]`.
+"""Trains an inversion network: `train.py OUT PREPARED.. --lpips FILE --minutes 8`, on a GPU if there is one.
 
-PREPARED are folders of photos with their features beside (`data.py prepare`, then `unlift features`). OUT gets
-`curve.csv`, `best.safetensors` (averaged weights, by LPIPS on the first photos of the validation folder) and
-`checkpoint.pt`, from which the same command goes on. Time is CPU time of the training alone; it sets the schedule.
+PREPARED are folders that `prepare.py` wrote. OUT gets `curve.csv`, `weights.safetensors` (averaged over steps, for
+`export.py`) and a sheet of pictures for each validation set, at every validation. With `--state FILE` the same command resumes. Time is
+wall clock on a GPU and CPU time on a CPU; it sets the schedule.
 """
 
 import argparse
@@ -15,10 +15,10 @@ import time
 
 import torch
 
-import data
 import evaluate
 import metrics
 import weights
+from batches import Batches, Photos
 from model import Network, Shape
 
 
@@ -27,80 +27,85 @@ def parsed():
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("data", type=pathlib.Path, nargs="+")
     parser.add_argument("--lpips", type=pathlib.Path, required=True, help="lpips_squeeze_v0.1.safetensors")
-    parser.add_argument("--minutes", type=float, default=100.0, help="CPU time of the training, validation apart")
+    parser.add_argument("--sets", default="train-1,train-0.7,train-soft")
+    parser.add_argument("--validate", default="val-1,look-1", help="sets that are measured")
+    parser.add_argument("--images", type=int, default=48, help="photos of each that are used")
+    parser.add_argument("--minutes", type=float, default=8.0, help="time of the training, validation apart")
     parser.add_argument("--steps", type=int, help="stop after so many steps")
+    parser.add_argument("--every", type=float, default=2.0, help="minutes between validations")
     parser.add_argument("--repeat", action="store_true", help="the first batch only: its loss must fall")
-    parser.add_argument("--validate", type=pathlib.Path, help="a prepared folder")
-    parser.add_argument("--images", type=int, default=16, help="photos of it that are used")
-    parser.add_argument("--every", type=float, default=10.0, help="minutes between validations")
-    parser.add_argument("--batch", type=int, default=2, help="crops per step")
-    parser.add_argument("--crop", type=int, default=256, help="its sides in pixels of the photo, a multiple of 4")
-    parser.add_argument("--warm-up", type=int, default=100, help="steps over which rates rise")
-    parser.add_argument("--rate", type=float, default=1e-3, help="of AdamW")
-    parser.add_argument("--losses", default="0.5,0.8,0.3", help="weights of L1, LPIPS and 1 - SSIM")
-    parser.add_argument("--half", action="store_true", help="16-bit products where the processor has them")
-    parser.add_argument("--plain", action="store_true", help="never show what recovery leaves")
+    parser.add_argument("--state", type=pathlib.Path, help="file to resume from")
     parser.add_argument("--start", type=pathlib.Path, help="weights to start from")
+    parser.add_argument("--batch", type=int, default=32, help="crops per step")
+    parser.add_argument("--crop", type=int, default=384, help="its sides in pixels of the photo, a multiple of 4")
+    parser.add_argument("--rate", type=float, default=1.5e-3, help="of AdamW")
+    parser.add_argument("--warm-up", type=int, default=200, help="steps over which the rate rises")
+    parser.add_argument("--losses", default="0.5,0.8,0.3", help="weights of L1, LPIPS and 1 - SSIM")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
     for field in dataclasses.fields(Shape):
         parser.add_argument(f"--{field.name}", type=type(field.default), default=field.default)
     return parser.parse_args()
 
 
 class Run:
-    """All that a checkpoint keeps."""
+    """Everything that a state file keeps."""
 
     def __init__(self, options):
         torch.manual_seed(options.seed)
-        self.options = options
+        self.options, self.gpu = options, options.device == "cuda"
         self.l1, self.lpips, self.ssim = map(float, options.losses.split(","))
-        self.distance = metrics.Lpips(options.lpips)
+        self.distance = metrics.Lpips(options.lpips, options.device)
         if options.start:
             self.network, _ = weights.load(options.start)
         else:
-            fields = {field.name: getattr(options, field.name) for field in dataclasses.fields(Shape)}
-            self.network = Network(Shape(**fields))
-        self.network.to(memory_format=torch.channels_last)
+            self.network = Network(Shape(**{field.name: getattr(options, field.name) for field in dataclasses.fields(Shape)}))
+        self.network.to(options.device, memory_format=torch.channels_last)
         self.averaged = copy.deepcopy(self.network).requires_grad_(False)
-        self.optimizer = torch.optim.AdamW(self.network.parameters(), lr=options.rate, weight_decay=0.01, betas=(0.9, 0.98))
-        self.step, self.seconds, self.best = 0, 0.0, math.inf
-        self.path = options.out / "checkpoint.pt"
-        if self.path.exists():
-            state = torch.load(self.path, weights_only=True)
-            self.network.load_state_dict(state["network"])
-            self.averaged.load_state_dict(state["averaged"])
-            self.optimizer.load_state_dict(state["optimizer"])
-            self.step, self.seconds, self.best = state["step"], state["seconds"], state["best"]
+        self.optimizer = torch.optim.AdamW(self.network.parameters(), lr=options.rate, weight_decay=0.01, betas=(0.9, 0.98), fused=self.gpu)
+        self.step, self.seconds = 0, 0.0
+        if options.state and options.state.exists():
+            state = torch.load(options.state, map_location=options.device, weights_only=True)
+            for part in ("network", "averaged", "optimizer"):
+                getattr(self, part).load_state_dict(state[part])
+            self.step, self.seconds = state["at"]
 
     def save(self):
-        state = {"step": self.step, "seconds": self.seconds, "best": self.best}
-        state |= {"network": self.network.state_dict(), "averaged": self.averaged.state_dict()}
-        state["optimizer"] = self.optimizer.state_dict()
-        scratch = self.path.with_suffix(".part")
-        torch.save(state, scratch)
-        scratch.replace(self.path)
+        about = {"step": str(self.step), "minutes": f"{self.seconds / 60:.1f}"}
+        weights.save(self.averaged, self.options.out / "weights.safetensors", about)
+        if self.options.state:
+            state = {part: getattr(self, part).state_dict() for part in ("network", "averaged", "optimizer")}
+            scratch = self.options.state.with_suffix(".part")
+            torch.save(state | {"at": (self.step, self.seconds)}, scratch)
+            scratch.replace(self.options.state)
 
     def set_rate(self):
-        """Warm-up, then half a cosine over the planned time, down to 2 %."""
+        """Warm-up, then half a cosine over the planned time, down to 1 %."""
         done = min(self.seconds / (60 * self.options.minutes), 1.0)
-        share = min(1.0, (self.step + 1) / self.options.warm_up) * (0.02 + 0.98 * (1 + math.cos(math.pi * done)) / 2)
+        share = min(1.0, (self.step + 1) / self.options.warm_up) * (0.01 + 0.99 * (1 + math.cos(math.pi * done)) / 2)
         for group in self.optimizer.param_groups:
             group["lr"] = self.options.rate * share
 
-    def loss_of(self, made: torch.Tensor, wanted: torch.Tensor) -> torch.Tensor:
-        with torch.no_grad():
-            seen = self.distance.features(wanted)
-        loss = self.l1 * (made - wanted).abs().mean()
-        loss = loss + self.lpips * self.distance.between(self.distance.features(made), seen).mean()
-        return loss + self.ssim * (1 - metrics.ssim(made, wanted)).mean()
+    def half(self):
+        return torch.autocast(self.options.device, torch.bfloat16, enabled=self.gpu)
 
-    def train(self, batch) -> float:
+    def loss(self, made: torch.Tensor, wanted: torch.Tensor) -> torch.Tensor:
+        loss = self.l1 * (made - wanted).abs().mean() + self.ssim * (1 - metrics.ssim(made, wanted)).mean()
+        # The first layer of LPIPS sees every second pixel, and a network would learn which ones.
+        x, y = torch.randint(0, 2, (2,)).tolist()
+        a, b = made[..., y:, x:], wanted[..., y:, x:]
+        with self.half():
+            with torch.no_grad():
+                seen = self.distance.features(b)
+            return loss + self.lpips * self.distance.between(self.distance.features(a), seen).float().mean()
+
+    def train(self, features: torch.Tensor, wanted: torch.Tensor) -> torch.Tensor:
         """One step; the loss before it."""
-        features, wanted = (part.contiguous(memory_format=torch.channels_last) for part in batch)
+        features, wanted = (part.contiguous(memory_format=torch.channels_last) for part in (features, wanted))
         self.set_rate()
-        with torch.autocast("cpu", torch.bfloat16, enabled=self.options.half):
+        with self.half():
             made = self.network(features)
-        loss = self.loss_of(made.float(), wanted)
+        loss = self.loss(made.float(), wanted)
         loss.backward()
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), 1.0)
         self.optimizer.step()
@@ -108,51 +113,68 @@ class Run:
         self.step += 1
         decay = min(0.999, (1 + self.step) / (10 + self.step))
         with torch.no_grad():
-            pairs = list(zip(self.averaged.parameters(), self.network.parameters()))
-            torch._foreach_lerp_([a for a, _ in pairs], [b for _, b in pairs], 1 - decay)
-        return loss.item()
+            torch._foreach_lerp_(list(self.averaged.parameters()), [p.detach() for p in self.network.parameters()], 1 - decay)
+        return loss.detach()
 
-    def validate(self, photos: list[data.Photo]) -> list[float]:
-        """SSIM, PSNR and LPIPS of whole photos; keeps the averaged weights if they are the best."""
-        if not photos:
-            return []
-        found = evaluate.measure(self.averaged, self.distance, photos, "true")
-        if found[-1] <= self.best:
-            self.best = found[-1]
-            about = {"step": str(self.step), "minutes": f"{self.seconds / 60:.1f}", "validated": f"{self.best:.4f}"}
-            weights.save(self.averaged, self.options.out / "best.safetensors", about)
+    def validate(self, name: str, photos: Photos) -> list[float]:
+        """SSIM, PSNR and LPIPS of whole photos by the averaged weights, without and then with colors."""
+        torch.backends.cudnn.benchmark = False  # sizes differ
+        found = []
+        for how in ["true", "colors"][: 1 + self.network.shape.colors]:
+            found += evaluate.measure(self.averaged, self.distance, photos, how, self.options.images)
+        evaluate.sheet(self.averaged, photos, list(range(min(8, len(photos)))), self.options.out / f"{name}.jpg")
+        torch.backends.cudnn.benchmark = True
         return found
 
 
 def main():
     options = parsed()
-    # With other work on the machine, threads wait for each other: two are slower than one.
-    torch.set_num_threads(1)
+    if options.device == "cpu":
+        # With other work on the machine, threads wait for each other: two are slower than one.
+        torch.set_num_threads(1)
+    torch.backends.cudnn.benchmark = True
+    torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = True
     options.out.mkdir(parents=True, exist_ok=True)
+
+    def photos(sets: str) -> Photos | None:
+        paths = [folder / name for folder in options.data for name in sets.split(",")]
+        paths = [path for path in paths if path.exists()]
+        return Photos(paths, options.device) if paths else None
+
     run = Run(options)
-    batches = data.Batches([photo for folder in options.data for photo in data.photos(folder)], options.batch, options.crop, options.seed, options.plain)
-    judged = data.photos(options.validate, options.images) if options.validate else []
-    fresh = run.step == 0
-    with open(options.out / "curve.csv", "a" if not fresh else "w", newline="") as file:
+    print(sum(p.numel() for p in run.network.parameters()), "weights", flush=True)
+    train = photos(options.sets)
+    print(len(train), "photos", flush=True)
+    batches = Batches(train, options.crop, options.seed + run.step, bool(run.network.shape.colors))
+    validated = {name: found for name in options.validate.split(",") if (found := photos(name))}
+    first = batches.batch(options.batch) if options.repeat else None
+    clock = time.time if run.gpu else time.process_time
+    with open(options.out / "curve.csv", "a" if run.step else "w", newline="") as file:
         curve = csv.writer(file)
-        if fresh:
-            curve.writerow(["minutes", "step", "loss", "ssim", "psnr", "lpips"])
-        losses, since = [], run.seconds
+        if not run.step:
+            figures = [f"{name} {figure}{how}" for name in validated for how in ("", " colors")[: 1 + run.network.shape.colors] for figure in ("ssim", "psnr", "lpips")]
+            curve.writerow(["minutes", "step", "loss", *figures])
+        start, since, losses = clock() - run.seconds, run.seconds, []
         done = False
         while not done:
-            start = time.process_time()
-            losses.append(run.train(batches.batch(0 if options.repeat else run.step)))
-            run.seconds += time.process_time() - start
+            losses.append(run.train(*(first or batches.batch(options.batch))))
+            # Kernels are queued far ahead of the clock.
+            if run.gpu and run.step % 20 == 0:
+                torch.cuda.synchronize()
+            run.seconds = clock() - start
+            if run.step % 100 == 0:
+                print(f"{run.seconds:.0f} s, step {run.step}, loss {torch.stack(losses[-100:]).mean().item():.4f}", flush=True)
             done = run.seconds >= 60 * options.minutes or run.step == options.steps
             if done or run.seconds - since >= 60 * options.every:
-                since = run.seconds
+                paused = clock()
                 run.save()
-                row = [f"{run.seconds / 60:.2f}", run.step, f"{sum(losses) / len(losses):.4f}"]
-                row += [f"{figure:.4f}" for figure in run.validate(judged)]
+                row = [f"{run.seconds / 60:.2f}", run.step, f"{torch.stack(losses).mean().item():.4f}"]
+                row += [f"{figure:.4f}" for name, photos in validated.items() for figure in run.validate(name, photos)]
                 curve.writerow(row)
                 file.flush()
                 print(*row, flush=True)
-                losses = []
+                start += clock() - paused
+                since, losses = run.seconds, []
 
 
 if __name__ == "__main__":
