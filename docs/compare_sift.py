@@ -2,7 +2,7 @@
 """Compares our SIFT with pycolmap's (the oracle) and OpenCV's: what is found, and how fast.
 
     pip install pycolmap opencv-python-headless numpy
-    cargo build --release -p unlift-features --example sift
+    cargo build --release -p unlift-features --no-default-features --example features
     python3 docs/compare_sift.py IMAGE... [--max-features N] [--no-speed]
 
 A keypoint of one is found by the other if there is one within 1 pixel whose scale has a ratio below 1.1
@@ -23,15 +23,15 @@ TARGET = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
 
 def ours(images, threads, options=()):
     with tempfile.NamedTemporaryFile() as out:
-        command = [TARGET / "release/examples/sift", *images, "--out", out.name, "--threads", str(threads), *options]
+        command = [TARGET / "release/examples/features", *images, "--out", out.name, "--threads", str(threads), *options]
         printed = subprocess.run(command, check=True, capture_output=True, text=True).stdout
         data, at, features = pathlib.Path(out.name).read_bytes(), 0, []
         for _ in images:
-            (n,) = struct.unpack_from("<I", data, at)
-            keypoints = numpy.frombuffer(data, "<f4", 4 * n, at + 4).reshape(n, 4)
-            descriptors = numpy.frombuffer(data, "u1", 128 * n, at + 4 + 16 * n).reshape(n, 128)
+            n, wide = struct.unpack_from("<II", data, at)
+            keypoints = numpy.frombuffer(data, "<f4", 4 * n, at + 8).reshape(n, 4)
+            descriptors = numpy.frombuffer(data, "u1", wide * n, at + 8 + 16 * n).reshape(n, wide)
             features.append((keypoints, descriptors.astype("f4") / 512))
-            at += 4 + 16 * n + 128 * n
+            at += 8 + (16 + wide) * n
     return features, float(printed.split()[-2])
 
 
