@@ -1,9 +1,10 @@
-"""Photos to arrays for training: `prepare.py OUT PACK.. --sift PROGRAM`, with packs that `pack.py` wrote.
+"""Converts photos to arrays for training: `prepare.py OUT PACK.. --features PROGRAM`, with packs that `pack.py` wrote.
 
-PROGRAM is `cargo build --release --example sift -p unlift-features`: one portable file with the product's extractor. OUT gets
-folders `SPLIT-SIZE` with NumPy files: `pixels` (n, 640, 640, 3) bytes, mirrored at the right and lower border where the photo
-ends, `size` (n, 2), `counts` (n,), `keypoints` (k, 2) with the corner of the first pixel at (0, 0), `descriptors` (k, 128).
-Training photos come at these sizes: 1, 0.7, and `soft`, as a cheap video camera takes them.
+`cargo build --release --example features -p unlift-features` builds PROGRAM, unlift's extractor in one file. For SIFT alone,
+`--no-default-features` makes it small. OUT gets a folder `SPLIT-SIZE` for each split of the packs and each size, with NumPy files:
+`pixels` (n, 640, 640, 3) bytes, a smaller photo continued by its mirror image to the right and below; `size` (n, 2), width and
+height of the photo; `counts` (n,), its number of keypoints; `keypoints` (k, 2) in pixels, the corner of the first pixel at (0, 0);
+`descriptors` (k, 128), bytes of SIFT and 32-bit floats of ALIKED.
 """
 
 import argparse
@@ -20,15 +21,19 @@ import numpy
 from PIL import Image, ImageFilter
 
 SIDE = 640
+# Values of a descriptor.
+TYPES = {"sift": "u1", "aliked": "<f4"}
 
 
 def soft(photo: Image.Image, random: numpy.random.Generator) -> Image.Image:
-    """Returns the photo out of focus, lighter or darker, of another contrast, with grain. Without such photos a network
-    learns that what is blurred is dark, because the dark photos that people keep are blurred."""
+    """Returns the photo as a cheap video camera takes it: out of focus, lighter or darker, of another contrast, with grain.
+
+    Without such photos a network learns that what is blurred is dark, because the dark photos that people keep are blurred.
+    """
     blurred = photo.filter(ImageFilter.GaussianBlur(random.uniform(0.4, 2.0)))
     light = (numpy.asarray(blurred, numpy.float32) / 255) ** numpy.exp(random.uniform(-0.6, 0.5))
     light = random.uniform(0.75, 1.1) * (light - 0.5) + 0.5 + random.uniform(-0.08, 0.1)
-    # Grain is as large as a pixel or two after a camera's own smoothing.
+    # A camera smooths its noise, so that a grain covers a pixel or two.
     noise = Image.fromarray(random.normal(128, 40, light.shape).clip(0, 255).astype(numpy.uint8))
     noise = numpy.asarray(noise.filter(ImageFilter.GaussianBlur(random.uniform(0.3, 1.0))), numpy.float32) - 128
     light = 255 * light + random.uniform(0, 0.12) * noise
@@ -37,7 +42,7 @@ def soft(photo: Image.Image, random: numpy.random.Generator) -> Image.Image:
 
 def part(job) -> dict[str, numpy.ndarray]:
     """Returns the arrays of some photos at one size."""
-    photos, size, program = job
+    photos, size, program, kind = job
     with tempfile.TemporaryDirectory() as scratch:
         paths, pixels, sizes = [], [], []
         for at, (name, data) in enumerate(photos):
@@ -54,15 +59,17 @@ def part(job) -> dict[str, numpy.ndarray]:
             wide, high = photo.size
             pixels.append(numpy.pad(numpy.asarray(photo), [(0, SIDE - high), (0, SIDE - wide), (0, 0)], "symmetric"))
         out = pathlib.Path(scratch, "features")
-        subprocess.run([program, *paths, "--threads", "1", "--out", out], check=True, stdout=subprocess.DEVNULL)
+        subprocess.run([program, *paths, "--type", kind, "--threads", "1", "--out", out], check=True, stdout=subprocess.DEVNULL)
         raw = out.read_bytes()
+    value = numpy.dtype(TYPES[kind])
     at, counts, keypoints, descriptors = 0, [], [], []
     for _ in photos:
-        n = int(numpy.frombuffer(raw, "<u4", 1, at)[0])
-        keypoints.append(numpy.frombuffer(raw, "<f4", 4 * n, at + 4).reshape(n, 4)[:, :2])
-        descriptors.append(numpy.frombuffer(raw, numpy.uint8, 128 * n, at + 4 + 16 * n).reshape(n, 128))
+        n, wide = map(int, numpy.frombuffer(raw, "<u4", 2, at))
+        keypoints.append(numpy.frombuffer(raw, "<f4", 4 * n, at + 8).reshape(n, 4)[:, :2])
+        columns = wide // value.itemsize
+        descriptors.append(numpy.frombuffer(raw, value, columns * n, at + 8 + 16 * n).reshape(n, columns))
         counts.append(n)
-        at += 4 + 144 * n
+        at += 8 + (16 + wide) * n
     return {
         "pixels": numpy.stack(pixels),
         "size": numpy.array(sizes),
@@ -76,11 +83,12 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("packs", type=pathlib.Path, nargs="+")
-    parser.add_argument("--sift", type=pathlib.Path, required=True)
-    parser.add_argument("--sizes", default="1,0.7,soft", help="of training photos")
+    parser.add_argument("--features", type=pathlib.Path, required=True, help="the extractor")
+    parser.add_argument("--type", choices=TYPES, default="sift")
+    parser.add_argument("--sizes", default="1,0.7,soft", help="of training photos: factors, or `soft` as of a cheap video camera")
     parser.add_argument("--workers", type=int, default=os.cpu_count())
     options = parser.parse_args()
-    start = time.time()
+    start, program = time.time(), options.features.resolve()
     splits: dict[str, list] = {}
     for pack in options.packs:
         with tarfile.open(pack) as tar:
@@ -92,13 +100,14 @@ def main():
         waiting = []
         for split, size in sets:
             photos = splits[split]
-            jobs = [(photos[at : at + 16], size, options.sift.resolve()) for at in range(0, len(photos), 16)]
+            jobs = [(photos[at : at + 16], size, program, options.type) for at in range(0, len(photos), 16)]
             waiting.append(pool.map_async(part, jobs, 1))
         for (split, size), parts in zip(sets, waiting):
             folder = options.out / f"{split}-{size}"
             folder.mkdir(exist_ok=True)
-            for name in parts.get()[0]:
-                numpy.save(folder / f"{name}.npy", numpy.concatenate([made[name] for made in parts.get()]))
+            parts = parts.get()
+            for name in parts[0]:
+                numpy.save(folder / f"{name}.npy", numpy.concatenate([made[name] for made in parts]))
             print(f"{folder.name}: {len(splits[split])} photos, {time.time() - start:.0f} s", flush=True)
 
 
