@@ -1,10 +1,9 @@
-"""Weights on disk: safetensors of 16-bit floats, the shape of the network beside them."""
+"""Saves and loads weights: safetensors of 16-bit floats, with the shape of the network in the metadata."""
 
 import dataclasses
 import json
 import pathlib
 
-import onnx
 import torch
 from safetensors import safe_open
 from safetensors.torch import save_file
@@ -13,7 +12,7 @@ from model import Network, Shape
 
 
 def save(network: Network, path: pathlib.Path, about: dict[str, str]):
-    """Writes weights, shape and what `about` says of them."""
+    """Writes weights and their shape, with further metadata `about` them."""
     tensors = {name: value.detach().half().contiguous() for name, value in network.state_dict().items()}
     about = {"shape": json.dumps(dataclasses.asdict(network.shape)), **about}
     scratch = path.with_suffix(".part")
@@ -21,22 +20,8 @@ def save(network: Network, path: pathlib.Path, about: dict[str, str]):
     scratch.replace(path)
 
 
-def exported(path: pathlib.Path) -> Network:
-    """The network in a file that `export.py` wrote, of the usual shape."""
-    network = Network(Shape())
-    stored = {tensor.name: onnx.numpy_helper.to_array(tensor) for tensor in onnx.load(path).graph.initializer}
-    tensors = {}
-    for name in network.state_dict():
-        value = stored.get(f"network.{name}.half", stored.get(f"network.{name}"))
-        tensors[name] = torch.from_numpy(value.astype("float32"))
-    network.load_state_dict(tensors)
-    return network
-
-
 def load(path: pathlib.Path) -> tuple[Network, dict[str, str]]:
-    """The network and what is said of it, from weights or from the ONNX file made of them."""
-    if path.suffix == ".onnx":
-        return exported(path), {}
+    """Returns the network and the metadata."""
     with safe_open(path, "pt") as file:
         about = file.metadata()
         network = Network(Shape(**json.loads(about["shape"])))
