@@ -1,7 +1,7 @@
-"""How good pictures of whole photos are: `evaluate.py WEIGHTS PREPARED/SET --lpips FILE [--images N] [--pictures DIR]`.
+"""Measures pictures of whole photos: `evaluate.py WEIGHTS PREPARED/SET.. --lpips FILE [--images N] [--sheet FILE]`.
 
-Prints SSIM (mean of the channels), PSNR and LPIPS (squeeze) at half the photos' size, of the true keypoints and of what
-recovery could leave of them; of the true ones also at the photos' size, to which pictures are enlarged.
+Prints SSIM (mean of the channels), PSNR and LPIPS (squeeze) at half the photos' size: for the true keypoints, without and with
+their colors, and for keypoints with errors. For the true ones also at the photos' size, to which pictures are enlarged.
 """
 
 import argparse
@@ -14,11 +14,12 @@ import metrics
 import weights
 from batches import Photos, channels, feature_image
 
-WORN = ["true", "colors", "half", "moved 2", "moved 5", "moved 10", "elsewhere 10", "elsewhere 30", "swapped 30"]
+# Errors of keypoints: sigma in pixels (moved), or percent (elsewhere, swapped).
+ERRORS = ["half", "moved 2", "moved 5", "moved 10", "elsewhere 10", "elsewhere 30", "swapped 30"]
 
 
 def seen(photos: Photos, at: int, how: str, colors: bool) -> torch.Tensor:
-    """Returns the feature image of a photo's points, worn as `how` says: pixels, percent. `colors`: the network takes them."""
+    """Returns the feature image of a photo's points: `how` is "true", "colors" or one of ERRORS. `colors`: the network takes colors."""
     random = torch.Generator(photos.device).manual_seed(1)
     rand = lambda *shape: torch.rand(*shape, generator=random, device=photos.device)  # noqa: E731
     rows = torch.arange(int(photos.first[at]), int(photos.first[at + 1]), device=photos.device)
@@ -41,7 +42,7 @@ def seen(photos: Photos, at: int, how: str, colors: bool) -> torch.Tensor:
 
 
 def photo(photos: Photos, at: int, full: bool = False) -> torch.Tensor:
-    """Returns a photo (1, 3, h, w) from 0 to 1 at half its size, or at the `full` one."""
+    """Returns a photo (1, 3, h, w) from 0 to 1, at half its size or its `full` size."""
     wide, high = (int(side) // 4 * 4 for side in photos.size[at])
     pixels = photos.pixels[at, :high, :wide].permute(2, 0, 1)[None].float() / 255
     return pixels if full else functional.avg_pool2d(pixels, 2)
@@ -49,13 +50,13 @@ def photo(photos: Photos, at: int, full: bool = False) -> torch.Tensor:
 
 @torch.inference_mode()
 def pictures(network, photos: Photos, at: int, how: str) -> torch.Tensor:
-    """Returns what the network paints of a photo's points."""
+    """Returns the picture (1, 3, h, w) that the network paints of a photo's points."""
     return network(seen(photos, at, how, bool(network.shape.colors)).contiguous()).float().clamp(0, 1)
 
 
 @torch.inference_mode()
 def measure(network, distance: metrics.Lpips, photos: Photos, how: str, images: int | None = None, full: bool = False) -> list[float]:
-    """Returns means of SSIM, PSNR and LPIPS, at half the photos' size or at the `full` one."""
+    """Returns the mean SSIM, PSNR and LPIPS, at half the photos' size or their `full` size."""
     rows = []
     for at in range(len(photos))[:images]:
         made, real = pictures(network, photos, at, how), photo(photos, at, full)
@@ -66,7 +67,7 @@ def measure(network, distance: metrics.Lpips, photos: Photos, how: str, images: 
 
 
 def sheet(network, photos: Photos, indices: list[int], path: pathlib.Path):
-    """Writes photos beside what is painted of their keypoints, without and with colors, one row each."""
+    """Writes a row for each photo: the photo, and the pictures of its keypoints without and with colors."""
     from PIL import Image
 
     rows = []
@@ -84,17 +85,17 @@ def main():
     parser.add_argument("weights", type=pathlib.Path)
     parser.add_argument("data", type=pathlib.Path, nargs="+")
     parser.add_argument("--lpips", type=pathlib.Path, required=True)
-    parser.add_argument("--images", type=int)
-    parser.add_argument("--sheet", type=pathlib.Path, help="an image of the first ten photos beside the pictures")
+    parser.add_argument("--images", type=int, help="largest number of photos")
+    parser.add_argument("--sheet", type=pathlib.Path, help="writes an image of the first ten photos beside their pictures")
     options = parser.parse_args()
     network, about = weights.load(options.weights)
     print(about)
     distance = metrics.Lpips(options.lpips)
     photos = Photos(options.data, "cpu")
-    for how in WORN:
-        print(how, *(f"{figure:.3f}" for figure in measure(network, distance, photos, how, options.images)))
-    for how in ["true", "colors"]:
-        print(f"{how}, full size", *(f"{figure:.3f}" for figure in measure(network, distance, photos, how, options.images, full=True)))
+    true = ["true", "colors"][: 1 + network.shape.colors]
+    for how, full in [(how, False) for how in true + ERRORS] + [(how, True) for how in true]:
+        figures = measure(network, distance, photos, how, options.images, full)
+        print(how + ", full size" * full, *(f"{figure:.3f}" for figure in figures))
     if options.sheet:
         sheet(network, photos, list(range(min(10, len(photos)))), options.sheet)
 

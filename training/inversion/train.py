@@ -1,8 +1,8 @@
 """Trains an inversion network: `train.py OUT PREPARED.. --lpips FILE --minutes 8`, on a GPU if there is one.
 
-PREPARED are folders that `prepare.py` wrote. OUT gets `curve.csv`, `weights.safetensors` (averaged over steps, for
-`export.py`) and a sheet of pictures for each validation set, at every validation. With `--state FILE` the same command resumes. Time is
-wall clock on a GPU and CPU time on a CPU; it sets the schedule.
+PREPARED are folders that `prepare.py` wrote. At every validation OUT gets a row of `curve.csv`, `weights.safetensors` (averaged over
+steps, for `export.py`) and a sheet of pictures for each validation set. With `--state FILE` the same command resumes. Time is wall
+clock on a GPU and CPU time on a CPU. The learning rate follows it.
 """
 
 import argparse
@@ -27,19 +27,20 @@ def parsed():
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("data", type=pathlib.Path, nargs="+")
     parser.add_argument("--lpips", type=pathlib.Path, required=True, help="lpips_squeeze_v0.1.safetensors")
-    parser.add_argument("--sets", default="train-1,train-0.7,train-soft")
-    parser.add_argument("--validate", default="val-1,look-1", help="sets that are measured")
-    parser.add_argument("--images", type=int, default=48, help="photos of each that are used")
-    parser.add_argument("--minutes", type=float, default=8.0, help="time of the training, validation apart")
-    parser.add_argument("--steps", type=int, help="stop after so many steps")
+    parser.add_argument("--sets", default="train-1,train-0.7,train-soft", help="folders in PREPARED to train on")
+    parser.add_argument("--validate", default="val-1,look-1", help="folders in PREPARED to measure")
+    parser.add_argument("--images", type=int, default=48, help="photos of each to measure")
+    parser.add_argument("--minutes", type=float, default=8.0, help="time of training, without validation")
+    parser.add_argument("--steps", type=int, default=math.inf, help="largest number of steps")
     parser.add_argument("--every", type=float, default=2.0, help="minutes between validations")
-    parser.add_argument("--repeat", action="store_true", help="the first batch only: its loss must fall")
-    parser.add_argument("--state", type=pathlib.Path, help="file to resume from")
-    parser.add_argument("--start", type=pathlib.Path, help="weights to start from")
+    parser.add_argument("--repeat", action="store_true", help="trains on the first batch only: its loss must fall")
+    parser.add_argument("--state", type=pathlib.Path, help="file to resume from, written at every validation")
+    parser.add_argument("--start", type=pathlib.Path, help="weights.safetensors to start from; its shape replaces the options")
     parser.add_argument("--batch", type=int, default=32, help="crops per step")
-    parser.add_argument("--crop", type=int, default=384, help="its sides in pixels of the photo, a multiple of 4")
-    parser.add_argument("--rate", type=float, default=1.5e-3, help="of AdamW")
-    parser.add_argument("--warm-up", type=int, default=200, help="steps over which the rate rises")
+    parser.add_argument("--crop", type=int, default=384, help="width and height of a crop in pixels, a multiple of 4")
+    # At 1.5e-3 the loss of batches of 32 had spikes in the first two minutes on a GPU.
+    parser.add_argument("--rate", type=float, default=8e-4, help="learning rate of AdamW")
+    parser.add_argument("--warm-up", type=int, default=200, help="steps over which the learning rate rises")
     parser.add_argument("--losses", default="0.5,0.8,0.3", help="weights of L1, LPIPS and 1 - SSIM")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
@@ -49,7 +50,7 @@ def parsed():
 
 
 class Run:
-    """Everything that a state file keeps."""
+    """A network in training, and everything else that a state file holds."""
 
     def __init__(self, options):
         torch.manual_seed(options.seed)
@@ -80,7 +81,7 @@ class Run:
             scratch.replace(self.options.state)
 
     def set_rate(self):
-        """Warm-up, then half a cosine over the planned time, down to 1 %."""
+        """Sets the learning rate: a warm-up, then half a cosine over the planned time, down to 1 %."""
         done = min(self.seconds / (60 * self.options.minutes), 1.0)
         share = min(1.0, (self.step + 1) / self.options.warm_up) * (0.01 + 0.99 * (1 + math.cos(math.pi * done)) / 2)
         for group in self.optimizer.param_groups:
@@ -100,7 +101,7 @@ class Run:
             return loss + self.lpips * self.distance.between(self.distance.features(a), seen).float().mean()
 
     def train(self, features: torch.Tensor, wanted: torch.Tensor) -> torch.Tensor:
-        """One step; the loss before it."""
+        """Makes one step and returns the loss before it."""
         features, wanted = (part.contiguous(memory_format=torch.channels_last) for part in (features, wanted))
         self.set_rate()
         with self.half():
@@ -117,7 +118,7 @@ class Run:
         return loss.detach()
 
     def validate(self, name: str, photos: Photos) -> list[float]:
-        """SSIM, PSNR and LPIPS of whole photos by the averaged weights, without and then with colors."""
+        """Returns SSIM, PSNR and LPIPS of whole photos with the averaged weights, without and then with colors."""
         torch.backends.cudnn.benchmark = False  # sizes differ
         found = []
         for how in ["true", "colors"][: 1 + self.network.shape.colors]:
@@ -136,26 +137,28 @@ def main():
     torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = True
     options.out.mkdir(parents=True, exist_ok=True)
 
-    def photos(sets: str) -> Photos | None:
+    def load(sets: str) -> Photos | None:
         paths = [folder / name for folder in options.data for name in sets.split(",")]
         paths = [path for path in paths if path.exists()]
         return Photos(paths, options.device) if paths else None
 
     run = Run(options)
     print(sum(p.numel() for p in run.network.parameters()), "weights", flush=True)
-    train = photos(options.sets)
+    train = load(options.sets)
+    if not train:
+        raise SystemExit(f"PREPARED: expected a folder of {options.sets}, found none")
     print(len(train), "photos", flush=True)
     batches = Batches(train, options.crop, options.seed + run.step, bool(run.network.shape.colors))
-    validated = {name: found for name in options.validate.split(",") if (found := photos(name))}
+    validated = {name: found for name in options.validate.split(",") if (found := load(name))}
     first = batches.batch(options.batch) if options.repeat else None
     clock = time.time if run.gpu else time.process_time
     with open(options.out / "curve.csv", "a" if run.step else "w", newline="") as file:
         curve = csv.writer(file)
-        if not run.step:
-            figures = [f"{name} {figure}{how}" for name in validated for how in ("", " colors")[: 1 + run.network.shape.colors] for figure in ("ssim", "psnr", "lpips")]
+        if not file.tell():
+            hows = ["", " colors"][: 1 + run.network.shape.colors]
+            figures = [f"{name} {figure}{how}" for name in validated for how in hows for figure in ("ssim", "psnr", "lpips")]
             curve.writerow(["minutes", "step", "loss", *figures])
-        start, since, losses = clock() - run.seconds, run.seconds, []
-        done = False
+        start, since, losses, done = clock() - run.seconds, run.seconds, [], False
         while not done:
             losses.append(run.train(*(first or batches.batch(options.batch))))
             # Kernels are queued far ahead of the clock.
@@ -164,7 +167,7 @@ def main():
             run.seconds = clock() - start
             if run.step % 100 == 0:
                 print(f"{run.seconds:.0f} s, step {run.step}, loss {torch.stack(losses[-100:]).mean().item():.4f}", flush=True)
-            done = run.seconds >= 60 * options.minutes or run.step == options.steps
+            done = run.seconds >= 60 * options.minutes or run.step >= options.steps
             if done or run.seconds - since >= 60 * options.every:
                 paused = clock()
                 run.save()
