@@ -1,35 +1,58 @@
 #!/bin/bash
-# Runs on a machine with a GPU, from the root of the repository, in as many calls as it takes to carry the packs:
-#   gpu.sh packs FOLDER        keep the packs in FOLDER, and extract their keypoints in the background
-#   gpu.sh train MINUTES ..    wait for the keypoints, then train; further options go to train.py
-# FOLDER/code has the program `sift` and lpips_squeeze_v0.1.safetensors. KEPT outlives a call, OUT is what comes back.
-set -eu
+# Runs on a machine with a GPU, in the root of the repository, one call for each pack if they cannot travel at once:
+#   gpu.sh packs FOLDER ..     keeps the packs of FOLDER and prepares them in the background; further options go to prepare.py
+#   gpu.sh train MINUTES ..    waits for that, then trains on all packs; further options go to train.py
+# FOLDER/code holds the program `features` and lpips_squeeze_v0.1.safetensors. The folder $KEPT stays from call to call, and $OUT is
+# what comes back.
+set -euo pipefail
 export PYTHONUNBUFFERED=1 PYTHONDONTWRITEBYTECODE=1
-here=$(dirname "$(realpath "$0")") kept=${KEPT:-/tmp/kept} out=${OUT:-/tmp/out}
+export here=$(dirname "$(realpath "$0")") kept=${KEPT:-/tmp/kept}
+out=${OUT:-/tmp/out}
 mkdir -p "$kept" "$out"
 
-case $1 in
-packs)
-    cp -n "$2"/code/* "$kept/"
-    chmod +x "$kept/sift"
-    for pack in "$2"/pack-*.tar; do
-        name=$(basename "$pack" .tar)
-        cp "$pack" "$kept/"
-        echo "$name" >>"$kept/names"
+# Prepares packs, one after the other: `prepare "NAME NAME" ..`.
+prepare() {
+    local name names=$1
+    shift
+    for name in $names; do
+        python3 "$here/prepare.py" "$kept/$name" "$kept/$name.tar" --features "$kept/features" "$@" >"$kept/$name.log" 2>&1
+        echo $? >"$kept/$name.done"
     done
+}
+export -f prepare
+
+case ${1:-} in
+packs)
+    folder=$2
+    shift 2
+    if [ ! -e "$kept/features" ]; then
+        cp "$folder"/code/* "$kept/"
+        chmod +x "$kept/features"
+    fi
+    cp "$folder"/pack-*.tar "$kept/"
+    names=$(basename -s .tar "$folder"/pack-*.tar | xargs)
     # A process session of its own outlives the call.
-    setsid bash -c "for name in $(cd "$2" && echo pack-*.tar | sed 's/\.tar//g'); do
-        python3 '$here/prepare.py' '$kept/'\$name '$kept/'\$name.tar --sift '$kept/sift' ${SIZES:+--sizes $SIZES} >'$kept/'\$name.log 2>&1; touch '$kept/'\$name.done; done" </dev/null >/dev/null 2>&1 &
+    setsid bash -c 'prepare "$@"' - "$names" "$@" </dev/null >/dev/null 2>&1 &
     ;;
 train)
-    folders=()
-    for name in $(sort -u "$kept/names"); do
-        while [ ! -e "$kept/$name.done" ]; do sleep 1; done
-        cat "$kept/$name.log"
-        folders+=("$kept/$name")
-    done
     minutes=$2
     shift 2
-    python3 "$here/train.py" "$out" "${folders[@]}" --lpips "$kept/lpips_squeeze_v0.1.safetensors" --state "$kept/state.pt" --minutes "$minutes" "$@" 2>&1 | tee "$out/log"
+    folders=()
+    for pack in "$kept"/pack-*.tar; do
+        name=$(basename "$pack" .tar)
+        until [ -s "$kept/$name.done" ]; do sleep 1; done
+        cat "$kept/$name.log"
+        if [ "$(cat "$kept/$name.done")" = 0 ]; then
+            folders+=("$kept/$name")
+        else
+            echo "$name could not be prepared and is left out"
+        fi
+    done
+    python3 "$here/train.py" "$out" "${folders[@]}" --lpips "$kept/lpips_squeeze_v0.1.safetensors" --state "$kept/state.pt" \
+        --minutes "$minutes" "$@" 2>&1 | tee "$out/log"
+    ;;
+*)
+    echo "expected gpu.sh packs or gpu.sh train, found '${1:-}'" >&2
+    exit 2
     ;;
 esac
