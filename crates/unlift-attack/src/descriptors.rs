@@ -14,11 +14,12 @@ pub enum Values {
     F32(Vec<f32>),
 }
 
-/// A matrix `(rows, dim)` of descriptors.
+/// A matrix `(rows, dim)` of descriptors, and the color of each point if the release keeps it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Descriptors {
     values: Values,
     dim: usize,
+    colors: Option<Vec<[u8; 3]>>,
 }
 
 impl Descriptors {
@@ -62,7 +63,24 @@ impl Descriptors {
                 "the same row for every point (dummies)",
             ));
         }
-        Ok(Self { values, dim })
+        Ok(Self { values, dim, colors: None })
+    }
+
+    /// Adds the color (red, green, blue) of each point. Attacks do not use it, pictures do.
+    ///
+    /// # Errors
+    /// When there is not one color per row.
+    pub fn with_colors(self, colors: Vec<[u8; 3]>) -> Result<Self, Error> {
+        if colors.len() != self.len() {
+            let expected = format!("{}, one per descriptor", self.len());
+            return Err(Error::new("colors", expected, colors.len().to_string()));
+        }
+        Ok(Self { colors: Some(colors), ..self })
+    }
+
+    /// Colors of the points, `(rows, 3)`, if they are known.
+    pub fn colors(&self) -> Option<&[[u8; 3]]> {
+        self.colors.as_deref()
     }
 
     /// Number of rows.
@@ -88,7 +106,7 @@ impl Descriptors {
         &self.values
     }
 
-    /// Returns the rows `order[0], order[1], ...` as a new matrix.
+    /// Returns the rows `order[0], order[1], ...` as a new matrix, with their colors.
     ///
     /// # Panics
     /// When an index is out of range.
@@ -104,7 +122,8 @@ impl Descriptors {
             Values::U8(v) => Values::U8(rows(v, self.dim, order)),
             Values::F32(v) => Values::F32(rows(v, self.dim, order)),
         };
-        Self { values, dim: self.dim }
+        let colors = self.colors.as_ref().map(|colors| rows(colors, 1, order));
+        Self { values, dim: self.dim, colors }
     }
 
     /// Copies row `at` to `row`, which has one value per column.

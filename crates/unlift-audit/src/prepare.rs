@@ -30,12 +30,14 @@ pub struct Preparation {
     pub max_points: Option<usize>,
     /// Seed of the subset.
     pub seed: u64,
+    /// Also reads the colors of the points, which a COLMAP model has, for pictures.
+    pub colors: bool,
 }
 
 /// All points, in the unit of the median distance to the 50th neighbor.
 impl Default for Preparation {
     fn default() -> Self {
-        Self { scale: None, k: 50, outlier_filter: None, max_points: None, seed: 0 }
+        Self { scale: None, k: 50, outlier_filter: None, max_points: None, seed: 0, colors: false }
     }
 }
 
@@ -148,7 +150,7 @@ mod tests {
     use super::*;
 
     const PLAIN: Preparation =
-        Preparation { scale: None, k: 2, outlier_filter: None, max_points: None, seed: 0 };
+        Preparation { scale: None, k: 2, outlier_filter: None, max_points: None, seed: 0, colors: false };
 
     /// Points 0.5 apart on a line; the second neighbor is 0.5 away except at the ends.
     fn line(n: usize) -> Vec<[f64; 3]> {

@@ -37,7 +37,7 @@ fn main() {
         let n = found.iter().map(|found| found.places.len()).sum::<usize>() / photos.len();
         let seen: Vec<(&ColorImage, Keypoints)> = photos.iter().zip(found).collect();
         stage(&format!("feature image, {name} ({n} keypoints)"), &seen, |(photo, found)| {
-            feature_image(&found.points(), size_of(photo)).unwrap()
+            feature_image(&found.points(), size_of(photo), kind == DescriptorKind::Sift).unwrap()
         });
         let inverter = Inverter::of(kind).unwrap();
         let painted = stage(&format!("picture, {name}"), &seen, |(photo, found)| {

@@ -5,15 +5,18 @@ use unlift_nn::Tensor;
 
 /// Side of a cell in pixels.
 pub const CELL: usize = 4;
-/// Channels besides the descriptor: the position inside the cell (two), and the weight.
-const MORE: usize = 3;
+/// Channels after those of the descriptor and the color: the position inside the cell (two), and
+/// the weight.
+const PLACE: usize = 3;
+/// Channels of the color: red, green, blue, and whether it is known.
+const COLOR: usize = 4;
 
 /// Points of one image.
 #[derive(Clone, Copy, Debug)]
 pub struct Points<'a> {
     /// Positions `(n, 2)` in pixels, the middle of the first pixel at (0, 0).
     pub places: &'a [[f32; 2]],
-    /// Descriptors of any length.
+    /// Descriptors of any length, with colors or without.
     pub descriptors: &'a Descriptors,
     /// Confidence of each point, 0 to 1.
     pub weights: &'a [f32],
@@ -67,23 +70,31 @@ pub(crate) fn check_size([width, height]: [usize; 2]) -> Result<(), Error> {
     Err(Error::new("image size", "at least 2 x 2 and at most 16777216 pixels", found))
 }
 
-/// Makes the feature image `(1, columns + 3, height, width)` of points in an image of `size`
-/// (width, height) pixels, in cells of [`CELL`] pixels.
+/// Makes the feature image of points in an image of `size` (width, height) pixels, in cells of
+/// [`CELL`] pixels: `(1, columns + 3, height, width)`, or `(1, columns + 7, height, width)` with
+/// `colored`.
 ///
-/// Channels: the descriptor (of unit length, times the root of its columns), the position inside
-/// the cell from -1 to 1, the weight. Several points in a cell give their weighted mean and the
+/// Channels: the descriptor (of unit length, times the root of its columns); with `colored`, red,
+/// green and blue from -2 to 2, and 1 if they are known; the position inside the cell from -1 to 1;
+/// the weight. Several points in a cell give their weighted mean and the
 /// largest weight; with depths, the nearest point. Cells without points are zero.
 ///
 /// # Errors
 /// If the columns of `points` differ in length, a side has less than 2 pixels, or the image has
 /// more than 2^24 pixels.
-pub fn feature_image(points: &Points<'_>, size: [usize; 2]) -> Result<Tensor, Error> {
+pub fn feature_image(
+    points: &Points<'_>,
+    size: [usize; 2],
+    colored: bool,
+) -> Result<Tensor, Error> {
     points.check()?;
     check_size(size)?;
-    let columns = points.descriptors.dim();
+    let dim = points.descriptors.dim();
+    let colors = points.descriptors.colors().filter(|_| colored);
+    let columns = dim + if colored { COLOR } else { 0 };
     let [width, height] = size.map(|side| side.div_ceil(CELL));
     let plane = width * height;
-    let mut values = vec![0.0; (columns + MORE) * plane];
+    let mut values = vec![0.0; (columns + PLACE) * plane];
     let mut total = vec![0.0_f32; plane];
     let mut nearest = vec![f32::INFINITY; plane];
     let mut row = vec![0.0; columns + 2];
@@ -100,10 +111,14 @@ pub fn feature_image(points: &Points<'_>, size: [usize; 2]) -> Result<Tensor, Er
             (0..=columns + 2).for_each(|channel| values[channel * plane + cell] = 0.0);
             total[cell] = 0.0;
         }
-        points.descriptors.read_row(at, &mut row[..columns]);
-        let length = row[..columns].iter().map(|x| x * x).sum::<f32>().sqrt();
-        let scale = (columns as f32).sqrt() / length.max(1e-12);
-        row[..columns].iter_mut().for_each(|x| *x *= scale);
+        points.descriptors.read_row(at, &mut row[..dim]);
+        let length = row[..dim].iter().map(|x| x * x).sum::<f32>().sqrt();
+        let scale = (dim as f32).sqrt() / length.max(1e-12);
+        row[..dim].iter_mut().for_each(|x| *x *= scale);
+        if let Some(colors) = colors {
+            let [red, green, blue] = colors[at].map(|byte| 4.0 * (f32::from(byte) / 255.0 - 0.5));
+            row[dim..columns].copy_from_slice(&[red, green, blue, 1.0]);
+        }
         row[columns..].copy_from_slice(&inside);
         for (channel, value) in row.iter().enumerate() {
             values[channel * plane + cell] += weight * value;
@@ -120,5 +135,5 @@ pub fn feature_image(points: &Points<'_>, size: [usize; 2]) -> Result<Tensor, Er
             }
         }
     }
-    Tensor::try_new(&[1, columns + MORE, height, width], values)
+    Tensor::try_new(&[1, columns + PLACE, height, width], values)
 }

@@ -22,8 +22,8 @@ impl Inverter {
         Ok(Self { kind, network: Network::load(model(kind))? })
     }
 
-    /// Loads an inverter from a file, as `training/inversion` exports it: input `features`
-    /// `(1, columns + 3, h, w)`, which is a [`feature_image`], output `picture` `(1, 3, 2 h, 2 w)`.
+    /// Loads an inverter from a file, as `training/inversion` exports it: input `features`, which
+    /// is a [`feature_image`] (with colors for SIFT), output `picture` `(1, 3, 2 h, 2 w)`.
     ///
     /// # Errors
     /// If the file cannot be read, or has other inputs and outputs.
@@ -37,6 +37,11 @@ impl Inverter {
         self.network.sha256()
     }
 
+    /// Returns true if the network uses the colors of points that have some.
+    pub fn takes_colors(&self) -> bool {
+        self.kind == DescriptorKind::Sift
+    }
+
     /// Makes the picture of points in an image of `size` (width, height) pixels, at half that size,
     /// rounded down.
     ///
@@ -45,7 +50,7 @@ impl Inverter {
     /// has less than 2 pixels, or the image has more than 2^24 pixels.
     pub fn invert(&self, points: &Points<'_>, size: [usize; 2]) -> Result<ColorImage, Error> {
         self.takes(points.descriptors)?;
-        let features = feature_image(points, size)?;
+        let features = feature_image(points, size, self.takes_colors())?;
         let [picture] = self.network.run(vec![("features", features)], ["picture"])?;
         let size = size.map(|side| side / 2);
         match *picture.shape() {

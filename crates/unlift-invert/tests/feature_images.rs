@@ -22,26 +22,29 @@ fn floats(file: &SafeTensors, name: &str) -> Vec<f32> {
     view.data().as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect()
 }
 
-/// Reads the golden points and converts positions from the corner to the middle of the first pixel.
-fn columns() -> (Columns, Vec<f32>) {
+/// Reads the golden points, with colors, and converts positions from the corner to the middle of
+/// the first pixel. Returns them and the golden feature images without and with colors.
+fn columns() -> (Columns, [Vec<f32>; 2]) {
     let file = SafeTensors::deserialize(GOLDEN).unwrap();
     let places = floats(&file, "places");
     let places = places.as_chunks::<2>().0.iter().map(|place| place.map(|x| x - 0.5));
     let values = Values::F32(floats(&file, "descriptors"));
     let weights = floats(&file, "weights");
+    let colors = file.tensor("colors").unwrap().data().as_chunks::<3>().0.to_vec();
+    let descriptors = Descriptors::try_new(values, COLUMNS).unwrap();
     let columns = Columns {
         places: places.collect(),
-        descriptors: Descriptors::try_new(values, COLUMNS).unwrap(),
+        descriptors: descriptors.with_colors(colors).unwrap(),
         depths: (0..weights.len()).map(|at| (at * 7 % 31) as f32 + 1.0).collect(),
         weights,
     };
-    (columns, floats(&file, "features"))
+    (columns, ["features", "features_colored"].map(|name| floats(&file, name)))
 }
 
 fn image(columns: &Columns, with_depths: bool) -> Result<Tensor, Error> {
     let Columns { places, descriptors, weights, depths } = columns;
     let depths = with_depths.then_some(&depths[..]);
-    feature_image(&Points { places, descriptors, weights, depths }, SIZE)
+    feature_image(&Points { places, descriptors, weights, depths }, SIZE, false)
 }
 
 /// Computes the feature image cell by cell over all points.
@@ -95,7 +98,7 @@ fn slow(columns: &Columns, with_depths: bool) -> Vec<f32> {
 }
 
 fn check(found: &Tensor, expected: &[f32]) {
-    assert_eq!(found.shape(), [1, COLUMNS + 3, 6, 8]);
+    assert_eq!(found.shape()[2..], [6, 8]);
     assert_eq!(found.values().len(), expected.len());
     for (at, (found, expected)) in found.values().iter().zip(expected).enumerate() {
         assert!((found - expected).abs() < 1e-5, "value {at}: {found} and {expected}");
@@ -104,8 +107,27 @@ fn check(found: &Tensor, expected: &[f32]) {
 
 #[test]
 fn training_sees_the_same() {
-    let (columns, golden) = columns();
+    let (columns, [golden, colored]) = columns();
     check(&image(&columns, false).unwrap(), &golden);
+    let Columns { places, descriptors, weights, .. } = &columns;
+    let points = Points { places, descriptors, weights, depths: None };
+    check(&feature_image(&points, SIZE, true).unwrap(), &colored);
+}
+
+#[test]
+fn unknown_colors_are_zero() {
+    let (columns, [golden, _]) = columns();
+    let values = columns.descriptors.values().clone();
+    let descriptors = &Descriptors::try_new(values, COLUMNS).unwrap();
+    let Columns { places, weights, .. } = &columns;
+    let points = Points { places, descriptors, weights, depths: None };
+    let found = feature_image(&points, SIZE, true).unwrap();
+    let plane = 6 * 8;
+    let (before, rest) = found.values().split_at(COLUMNS * plane);
+    let (colors, after) = rest.split_at(4 * plane);
+    assert!(colors.iter().all(|x| *x == 0.0));
+    let found = Tensor::try_new(&[1, COLUMNS + 3, 6, 8], [before, after].concat()).unwrap();
+    check(&found, &golden);
 }
 
 #[test]
@@ -133,8 +155,8 @@ fn sizes_that_no_photo_has_are_refused() {
     let Columns { places, descriptors, weights, depths } = &columns;
     let points = Points { places, descriptors, weights, depths: Some(depths) };
     for size in [[1, 22], [30, 0], [16_384, 16_384], [usize::MAX, 2], [1 << 23, 3]] {
-        let error = feature_image(&points, size).unwrap_err();
+        let error = feature_image(&points, size, false).unwrap_err();
         assert_eq!(error.expected(), "at least 2 x 2 and at most 16777216 pixels", "{size:?}");
     }
-    feature_image(&points, [4096, 4096]).unwrap();
+    feature_image(&points, [4096, 4096], false).unwrap();
 }

@@ -50,7 +50,7 @@ fn preparation(
         let found = format!("({}, {})", filter.neighbors, filter.std_ratio);
         return Err(wrong("outlier_filter", "(neighbors, ratio), both above 0", found));
     }
-    Ok(Preparation { scale, k, outlier_filter, max_points, seed })
+    Ok(Preparation { scale, k, outlier_filter, max_points, seed, ..Preparation::default() })
 }
 
 #[pymethods]

@@ -5,7 +5,6 @@
 
 mod alike;
 mod best;
-mod by_descriptors;
 mod compare;
 mod dense;
 mod geometric;
@@ -21,7 +20,6 @@ pub mod sources;
 mod tiles;
 mod walk;
 
-pub use by_descriptors::ByDescriptors;
 pub use dense::{Dense, dense, usual};
 pub(crate) use geometric::geometric_by;
 pub use geometric::{Geometric, geometric};

@@ -4,7 +4,6 @@ use std::any::Any;
 use std::sync::Arc;
 
 use super::Neighborhoods;
-use super::by_descriptors::ByDescriptors;
 use super::geometric::Geometric;
 use super::overlap::Overlap;
 use super::similarity::Similarity;
@@ -41,7 +40,7 @@ impl PartialEq for SourceEntry {
     }
 }
 
-/// All sources of this crate. `unlift-audit` adds those that need a network.
+/// All sources of this crate. `unlift-audit` adds those that need a network, and `descriptors`.
 pub const SOURCES: &[SourceEntry] = &[
     SourceEntry {
         name: "similarity",
@@ -54,12 +53,6 @@ pub const SOURCES: &[SourceEntry] = &[
         summary: "records whose SIFT patches overlap, and a short walk from these; no training",
         in_2d: Some(|| Arc::new(Overlap)),
         in_3d: Some(|| Arc::new(Overlap)),
-    },
-    SourceEntry {
-        name: "descriptors",
-        summary: "the best that descriptors allow without training: overlap of SIFT, similarity of others",
-        in_2d: Some(|| Arc::new(ByDescriptors)),
-        in_3d: Some(|| Arc::new(ByDescriptors)),
     },
     SourceEntry {
         name: "geometric",

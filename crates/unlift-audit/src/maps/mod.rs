@@ -161,7 +161,11 @@ pub fn open(
         return Err(Error::request(error).advise("a map that is projected, in meters"));
     }
     check_scale(&input.positions, preparation.scale)?;
-    let rows = descriptors.map(|file| read::descriptors(file, &input)).transpose()?;
+    let mut rows = descriptors.map(|file| read::descriptors(file, &input)).transpose()?;
+    if preparation.colors {
+        let colored = |rows: Descriptors| rows.with_colors(input.colors.clone());
+        rows = rows.map(colored).transpose().map_err(|e| unlift_io::Error::core(path, e))?;
+    }
     let mut prepared = prepare(&input.positions, rows.as_ref(), preparation).map_err(|error| {
         let few = error.kind() == ErrorKind::TooFewPoints && input.positions.len() > 2;
         let error = Error::from(unlift_io::Error::core(path, error));

@@ -199,7 +199,7 @@ pub struct AuditMapArgs {
     pub solvers: SolverArgs,
     /// Source of the attacker's lists of neighbors; repeatable. oracle, a test tool, makes lists
     /// from the original points, with a chosen fraction of true neighbors. The others make lists
-    /// from the released map: descriptors (overlap or similarity, depending on the descriptors),
+    /// from the released map: descriptors (the best one for the descriptors),
     /// similarity (any descriptors), overlap (SIFT), learned (a network, for SIFT or ALIKED),
     /// geometric (places where many records meet; no descriptors). FILE has a list of neighbors per
     /// point (docs/formats.md)
@@ -222,6 +222,10 @@ pub struct AuditMapArgs {
     /// Folder of the map's photos, to compare with the painted pictures
     #[arg(long, value_name = "DIR", help_heading = "Result", requires = "invert")]
     pub photos: Option<PathBuf>,
+    /// Paint with the colors of the points. Assumes that the obfuscated map keeps the colors of the
+    /// COLMAP model beside the descriptors. Only the network for SIFT uses them
+    #[arg(long, help_heading = "Result", requires = "invert")]
+    pub colors: bool,
     /// Compare with at most N photos, evenly spaced by name
     #[arg(long, value_parser = values::count, value_name = "N", default_value = "12", help_heading = "Result")]
     pub max_photos: NonZeroUsize,
@@ -306,9 +310,8 @@ pub struct AuditImagesArgs {
     pub solver: Vec<Builtin>,
     /// Source of the attacker's lists of neighbors; repeatable. oracle, a test tool, makes lists
     /// from the original keypoints, with a chosen fraction of true neighbors. The others make lists
-    /// from the released descriptors: descriptors (overlap or similarity, depending on the
-    /// descriptors), similarity (any descriptors), overlap (SIFT), learned (a network, for SIFT or
-    /// ALIKED)
+    /// from the released descriptors: descriptors (the best one for the descriptors), similarity
+    /// (any descriptors), overlap (SIFT), learned (a network, for SIFT or ALIKED)
     #[arg(long, value_name = "oracle|SOURCE", value_parser = values::image_source,
           default_value = "oracle", help_heading = "Attack")]
     pub neighbors: Vec<NeighborSource>,
@@ -385,10 +388,10 @@ pub struct AuditReleasedArgs {
     pub solvers: SolverArgs,
     /// Source of the attacker's lists of neighbors; repeatable. oracle, a test tool, makes lists
     /// from the original points, with a chosen fraction of true neighbors. The others make lists
-    /// from RELEASED: descriptors (overlap or similarity, depending on the descriptors), similarity
-    /// (any descriptors), overlap (SIFT), learned (a network, for SIFT or ALIKED), geometric
-    /// (places where many records meet; no descriptors). FILE has a list of neighbors per original
-    /// point (docs/formats.md)
+    /// from RELEASED: descriptors (the best one for the descriptors), similarity (any descriptors),
+    /// overlap (SIFT), learned (a network, for SIFT or ALIKED), geometric (places where many
+    /// records meet; no descriptors). FILE has a list of neighbors per original point
+    /// (docs/formats.md)
     #[arg(long, value_name = "oracle|SOURCE|FILE", value_parser = values::neighbor_source,
           default_value = "oracle", help_heading = "Attack")]
     pub neighbors: Vec<NeighborSource>,

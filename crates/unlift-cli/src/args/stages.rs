@@ -65,7 +65,7 @@ pub enum NeighborsCommand {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Sources:
-  descriptors  overlap or similarity, depending on the descriptors; needs no training
+  descriptors  the best of the others for the descriptors: learned, overlap or similarity
   similarity   points with similar descriptors of any kind
   overlap      points whose patches overlap, according to their SIFT descriptors
   learned      points that a network finds, from SIFT or ALIKED descriptors

@@ -54,11 +54,14 @@ pub fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
     let out = open_audit(&args.result.out, rules, shown, &Stderr)?;
     let beside = Seen::of_stages(beside(args).map(|(_, path)| path));
     let finished = with_threads(args.run.threads, || {
-        let (input, prepared) = open_map(&args.path, &args.map, args.run.quiet)?;
+        let (input, prepared) = open_map(&args.path, &args.map, args.colors, args.run.quiet)?;
         let progress = Progress::new(args.run.quiet);
         let (path, result) = (&args.path, &args.result);
         let inversion = inversion(args, &prepared, &input, &progress)?;
         let (mut notes, mut doubts) = (prepared.notes.clone(), prepared.doubts.clone());
+        if args.colors {
+            notes.push("pictures assume that the obfuscated map keeps the points' colors".into());
+        }
         let mut plan = plan(args, &prepared, &input, (&mut notes, &mut doubts))?;
         plan.measures.extend(inversion.iter().map(|one| Arc::clone(one) as Arc<dyn Measure<3>>));
         let mut job = Job {
@@ -104,7 +107,12 @@ fn inversion(
     let Some(descriptors) = &prepared.descriptors else {
         return Err(usage("--invert: expected descriptors (--descriptors FILE), found none"));
     };
-    let painter = painter(kind("--invert", Some(descriptors))?, args.inverter.as_deref())?;
+    let kind = kind("--invert", Some(descriptors))?;
+    let painter = painter(kind, args.inverter.as_deref())?;
+    if args.colors && !painter.takes_colors() {
+        let found = format!("those of {}", kind.name());
+        return Err(usage(format!("--colors: expected SIFT descriptors, found {found}")));
+    }
     let scale = 1.0 / prepared.unit_in_map_units;
     let most = args.max_photos.get();
     Ok(Some(Arc::new(MapInversion::open(painter, model, photos, scale, most, progress)?)))
@@ -191,6 +199,9 @@ fn more_options(args: &AuditMapArgs) -> Map<String, Value> {
     if args.invert {
         options.insert("invert".into(), json!(true));
         options.insert("max_photos".into(), json!(args.max_photos.get()));
+        if args.colors {
+            options.insert("colors".into(), json!(true));
+        }
     }
     if let Some(filter) = args.map.outlier_filter {
         let value = json!({ "neighbors": filter.neighbors, "std_ratio": filter.std_ratio });

@@ -77,9 +77,7 @@ fn map(args: &BenchRecoverArgs) -> anyhow::Result<Original<3>> {
     let preparation = Preparation {
         scale: args.map.is_none().then_some(1.0),
         k: usize::from(args.k),
-        outlier_filter: None,
-        max_points: None,
-        seed: 0,
+        ..Preparation::default()
     };
     let prepared = match &args.map {
         Some(path) => prepare(&read::open(path)?.positions, None, &preparation)

@@ -60,7 +60,12 @@ pub fn same_map(
 }
 
 /// Reads and prepares a map, for `audit map` and `obfuscate`.
-pub fn open_map(path: &Path, args: &MapArgs, quiet: bool) -> anyhow::Result<(Input, Prepared)> {
+pub fn open_map(
+    path: &Path,
+    args: &MapArgs,
+    colors: bool,
+    quiet: bool,
+) -> anyhow::Result<(Input, Prepared)> {
     let _alive = Spinner::unless(quiet, "reading the map");
     let preparation = Preparation {
         scale: args.scale,
@@ -68,6 +73,7 @@ pub fn open_map(path: &Path, args: &MapArgs, quiet: bool) -> anyhow::Result<(Inp
         outlier_filter: args.outlier_filter,
         max_points: args.max_points.map(NonZeroUsize::get),
         seed: args.seed.unwrap_or(0),
+        colors,
     };
     Ok(maps::open(path, args.descriptors.as_deref(), &preparation)?)
 }

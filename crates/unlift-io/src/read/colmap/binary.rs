@@ -66,12 +66,14 @@ pub fn points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
     let n = bytes.count("points", POINT3D_BYTES)? as usize;
     let mut ids = Vec::with_capacity(n);
     let mut positions = Vec::with_capacity(n);
+    let mut colors = Vec::with_capacity(n);
     let mut tracks = with_tracks.then(Tracks::new);
     for number in 1..=n as u64 {
         bytes.record(number);
         let id = bytes.u64("point id")?;
         let position = bytes.doubles::<3>("coordinates")?;
-        bytes.skip(3, "color")?;
+        let mut color = [0; 3];
+        bytes.fill(&mut color, "color")?;
         bytes.skip(8, "reprojection error")?;
         let n_observations = bytes.count("observations", OBSERVATION_BYTES)?;
         if let Some(tracks) = &mut tracks {
@@ -85,9 +87,10 @@ pub fn points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
         }
         ids.push(id);
         positions.push(position);
+        colors.push(color);
     }
     bytes.end()?;
-    Ok(Points { ids, positions, tracks })
+    Ok(Points { ids, positions, colors, tracks })
 }
 
 pub fn rigs(path: &Path) -> Result<u64, Error> {

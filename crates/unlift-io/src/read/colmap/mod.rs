@@ -135,6 +135,7 @@ fn sorted(points: Points) -> Points {
     Points {
         ids: order.iter().map(|&row| points.ids[row]).collect(),
         positions: order.iter().map(|&row| points.positions[row]).collect(),
+        colors: order.iter().map(|&row| points.colors[row]).collect(),
         tracks,
     }
 }
@@ -148,6 +149,7 @@ mod tests {
         let points = Points {
             ids: vec![7, 2],
             positions: vec![[7.0; 3], [2.0; 3]],
+            colors: vec![[7; 3], [2; 3]],
             tracks: Some(Tracks {
                 offsets: vec![0, 2, 3],
                 observations: vec![(7, 0), (7, 1), (2, 0)],
@@ -156,6 +158,7 @@ mod tests {
         let sorted = sorted(points);
         assert_eq!(sorted.ids, [2, 7]);
         assert_eq!(sorted.positions, [[2.0; 3], [7.0; 3]]);
+        assert_eq!(sorted.colors, [[2; 3], [7; 3]]);
         let tracks = sorted.tracks.unwrap();
         assert_eq!(tracks.row(0), [(2, 0)]);
         assert_eq!(tracks.row(1), [(7, 0), (7, 1)]);

@@ -58,6 +58,8 @@ pub struct Points {
     pub ids: Vec<u64>,
     /// Coordinates `(n, 3)` in units of the model. Not finite if the file has no position.
     pub positions: Vec<[f64; 3]>,
+    /// Colors `(n, 3)`: red, green, blue.
+    pub colors: Vec<[u8; 3]>,
     /// The observations of each point, if requested.
     pub tracks: Option<Tracks>,
 }

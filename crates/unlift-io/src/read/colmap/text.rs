@@ -91,7 +91,7 @@ pub fn points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
         let mut words = words(lines.line());
         let id: u64 = next(&lines, &mut words, "a point id")?;
         let position = coordinates::<3>(&lines, &mut words, "3 coordinates")?;
-        coordinates::<3>(&lines, &mut words, "a color (3 numbers)")?;
+        let color = coordinates::<3>(&lines, &mut words, "a color (3 numbers)")?;
         coordinates::<1>(&lines, &mut words, "a reprojection error")?;
         if let Some(tracks) = &mut points.tracks {
             while let Some(word) = words.next() {
@@ -110,6 +110,8 @@ pub fn points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
         }
         points.ids.push(id);
         points.positions.push(position);
+        // A cast saturates.
+        points.colors.push(color.map(|x| x as u8));
     }
     Ok(points)
 }
