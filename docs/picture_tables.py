@@ -73,11 +73,13 @@ def tables(program, shared):
             if not map_of.exists():
                 true[-1] += "- |"
                 continue
-            document = audit(program, "map", map_of / "model", "--descriptors", map_of / "descriptors.bin", *scale,
-                             "--photos", photos, "--max-photos", "40", "--schemes", ",".join(SOLID), "--no-records-alone")
-            beside = published(shared, "3") if (scene, kind) == ("redkitchen", "SIFT") else {}
-            solid += table(f"{name}, {kind}", document, SOLID, beside)
-            true[-1] += f"{baseline(document, SOLID[0], beside)} |"
+            for colors in [[], ["--colors"]][: 2 if kind == "SIFT" else 1]:
+                document = audit(program, "map", map_of / "model", "--descriptors", map_of / "descriptors.bin", *scale, "--photos", photos,
+                                 "--max-photos", "40", "--schemes", ",".join(SOLID), "--no-records-alone", *colors)
+                beside = published(shared, "3") if (scene, kind, colors) == ("redkitchen", "SIFT", []) else {}
+                solid += table(f"{name}, {kind}" + (" and colors" if colors else ""), document, SOLID, beside)
+                true[-1] += f"{'<br>with colors ' if colors else ''}{baseline(document, SOLID[0], beside)}"
+            true[-1] += " |"
     yield from ["SSIM / LPIPS, means over the photos (RedKitchen 40, Castle 11) at half their size; in brackets the paper's SSIM on 7-Scenes",
                 "(another network, full size).", "", "Images:", "", *head(FLAT), *flat, "", "Maps as their cameras see them:", "", *head(SOLID),
                 *solid, "", "True points, SSIM / PSNR / LPIPS:", "", "| of | images | map |", "| --- | --- | --- |", *true, ""]

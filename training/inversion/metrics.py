@@ -7,17 +7,22 @@ from safetensors.torch import load_file
 from torch.nn import functional
 
 
-def ssim(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
-    """Mean over pixels and channels, `(b,)`: uniform windows of 7 x 7 as scikit-image has them by default."""
+def ssim(a: torch.Tensor, b: torch.Tensor, peak: float = 1.0, gaussian: bool = False) -> torch.Tensor:
+    """Mean over pixels and channels, `(b,)`: uniform windows of 7 x 7 as scikit-image has them by default, or a Gaussian
+    window (11 x 11, sigma 1.5). `peak` is the range of values that the constants assume."""
+    line = torch.exp(-((torch.arange(11, dtype=a.dtype, device=a.device) - 5) ** 2) / 4.5)
+    window = torch.outer(line, line) / line.sum() ** 2
 
     def mean(x):
+        if gaussian:
+            return functional.conv2d(x, window.expand(x.shape[1], 1, 11, 11), groups=x.shape[1])
         return functional.avg_pool2d(x, 7, 1)
 
     at_a, at_b = mean(a), mean(b)
-    unbiased = 49 / 48
+    unbiased = 1 if gaussian else 49 / 48
     aa, bb = unbiased * (mean(a * a) - at_a**2), unbiased * (mean(b * b) - at_b**2)
     ab = unbiased * (mean(a * b) - at_a * at_b)
-    c1, c2 = 0.01**2, 0.03**2
+    c1, c2 = (0.01 * peak) ** 2, (0.03 * peak) ** 2
     s = (2 * at_a * at_b + c1) * (2 * ab + c2) / ((at_a**2 + at_b**2 + c1) * (aa + bb + c2))
     return s.mean((1, 2, 3))
 
