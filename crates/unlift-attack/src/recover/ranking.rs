@@ -5,21 +5,25 @@
 //! starts from its estimates and uses both, in both directions. For a slot `i` at `x`, let `R_i` be the distance to the K-th
 //! nearest estimate, and `d` the distance to the estimate of record `j`. Then
 //!
-//! `P(j is in the list of i) = In f(d / R_i) + q (1 - f(d / R_i))`, with `f(u) = 1 / (1 + exp((u - 1) / s))` and
+//! `P(j is in the list of i) = In f(d / R_i) + q (1 - f(d / R_i))`, with `f(u) = 1 / (1 + exp((u^2 - 1) / (2 s)))` and
 //! `q = (1 - In) K / n`.
 //!
 //! The log-likelihood of slot `i` is the sum of `ln P` over its list and over the slots that list its record, and of `ln(1 - P)`
 //! over the slots nearby that are not listed and over those that do not list its record. An iteration moves each slot along its
 //! record to the likeliest of some places around its estimate. The inlier ratio `In` is estimated from lists and
 //! estimates. Even and odd slots take turns, as in joint recovery.
+//!
+//! Far estimates are as likely at all places, so only those within a few `R_i` count, and each likelihood is divided by that of a far
+//! estimate. Slots near each other share the search for them (`Group`). Eight places are scored at a time.
 
 use rayon::prelude::*;
 
-use crate::RecordId;
 use crate::geometry::knn::Knn;
+use crate::geometry::vector::squared_distance;
 use crate::neighbors::Neighborhoods;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::record_of;
+use crate::recover::map::lines::{LANES, Lanes, ln};
 use crate::recover::map::lists::CHUNK;
 use crate::recover::map::pieces::{CandidatePieces, LinePieces, Pieces, PlanePieces};
 use crate::recover::map::places::distance2;
@@ -31,16 +35,37 @@ use crate::simd::{Kernel, dispatch};
 const ITERATIONS: usize = 5;
 /// Softness `s`.
 const SOFTNESS: f32 = 0.06;
-/// Nearest estimates that are compared with a list, as a multiple of its length.
-const NEAR: f32 = 2.5;
-/// Largest step along the record, in units of `R_i`, the factor from one step to the next, and the number of steps. Each is tried in
-/// both directions.
-const LARGEST_STEP: f32 = 0.5;
-const STEP_FACTOR: f32 = 0.42;
-const STEPS: i32 = 5;
+/// Estimates within this many radii are compared with a list.
+const NEAR: f32 = 1.6;
+/// A slot belongs to a group if all estimates within this many radii of it are near the group.
+const COVERED: f32 = 1.45;
+/// Number of slots in a group.
+const GROUP: usize = 16;
+/// Largest reach of a member of a group, as a multiple of the smallest.
+const WIDEST: f64 = 1.6;
+/// Largest number of estimates near a group, as a multiple of the length of lists.
+const MOST_NEAR: usize = 16;
+/// Largest number of passes that look for a radius.
+const PASSES: usize = 8;
+/// Steps along the record, in radii.
+const LINE_STEPS: [Lanes; 2] = [
+    [0.0, 0.5, -0.5, 0.21, -0.21, 0.09, -0.09, 0.04],
+    [0.12, -0.12, 0.05, -0.05, 0.022, -0.022, 0.01, -0.01],
+];
+const PLANE_STEPS: [Lanes; 4] = [
+    [0.0, 0.5, -0.5, 0.25, -0.25, 0.12, -0.12, 0.05],
+    [0.3, -0.3, 0.15, -0.15, 0.07, -0.07, 0.03, -0.03],
+    [0.12, -0.12, 0.06, -0.06, 0.03, -0.03, 0.015, -0.015],
+    [0.12, -0.12, 0.06, -0.06, 0.03, -0.03, 0.015, -0.015],
+];
 /// Listed records near which the first iteration tries places, too, because the estimate may be elsewhere; only above the following
 /// inlier ratio. Below it, such places win by chance too often.
 const ELSEWHERE: usize = 8;
+/// Steps from such a place, in radii.
+const ELSEWHERE_STEPS: Lanes = [0.0, 0.1, -0.1, 0.2, -0.2, 0.4, -0.4, 0.6];
+/// These places are tried for slots with fewer listed estimates nearby than this fraction of the expected number. Slots with several
+/// pieces always try them, because the piece may be wrong.
+const LOST: f32 = 0.85;
 const LEAST_ELSEWHERE: f32 = 0.5;
 /// Bounds of the number of estimates within the radius, as a fraction of K. Far from the center, only a part of them is counted.
 const RATIO: (f32, f32) = (0.8, 1.25);
@@ -88,37 +113,61 @@ fn iterate<const D: usize, P: Pieces<D>>(
         return estimates;
     }
     let listers = Listers::new(lists, n / pieces.slots_per_record());
+    let mut radius = vec![0.0; n];
     for iteration in 0..ITERATIONS {
-        let Some(around) = Surroundings::new(&estimates, lists) else { return estimates };
+        let Some(around) = Surroundings::new(&estimates, lists, radius) else { return estimates };
         let inlier_ratio = inlier_ratio(pieces, lists, &estimates, &around);
         if inlier_ratio < LEAST_RATIO {
             return estimates;
         }
-        let curve = Curve::new(inlier_ratio, mean_length / n as f32);
+        let place = |(e, &radius): (&Estimate<D>, &f32)| {
+            let inverse = if radius > 0.0 { 1.0 / (radius * radius) } else { 0.0 };
+            Place { x: e.position, inverse }
+        };
+        let mut places: Vec<Place<D>> = estimates.iter().zip(&around.radius).map(place).collect();
         for half in 0..2 {
             let context = Context {
                 pieces,
                 lists,
                 listers: &listers,
                 estimates: &estimates,
+                places: &places,
                 around: &around,
-                curve: &curve,
+                odds: Odds::new(inlier_ratio, mean_length / n as f32),
+                inlier_ratio,
                 tries_elsewhere: iteration == 0 && inlier_ratio > LEAST_ELSEWHERE,
                 iteration,
                 seed,
             };
-            let mut moved: Vec<(usize, Estimate<D>)> = (half..n)
-                .step_by(2)
-                .filter(|&slot| around.radius[slot] > 0.0)
-                .map(|slot| (slot, estimates[slot]))
+            let moved: Vec<Vec<(u32, Best<D>)>> = around
+                .groups
+                .par_chunks(CHUNK)
+                .map_init(
+                    || Terms::new(n),
+                    |terms, groups| {
+                        let mut moved = Vec::new();
+                        for group in groups {
+                            dispatch(Half {
+                                context: &context,
+                                group,
+                                half,
+                                terms: &mut *terms,
+                                moved: &mut moved,
+                            });
+                        }
+                        moved
+                    },
+                )
                 .collect();
-            moved.par_chunks_mut(CHUNK).for_each_init(Terms::default, |terms, moved| {
-                dispatch(Chunk { context: &context, moved, terms });
-            });
-            for (slot, estimate) in moved {
-                estimates[slot] = estimate;
+            for (slot, Best { x, axis, .. }) in moved.into_iter().flatten() {
+                if x.iter().all(|x| x.is_finite()) {
+                    let slot = slot as usize;
+                    (estimates[slot].position, estimates[slot].axis) = (x, axis as u8);
+                    places[slot].x = x;
+                }
             }
         }
+        radius = around.radius;
     }
     estimates
 }
@@ -153,34 +202,235 @@ impl Listers {
     }
 }
 
-/// The nearest estimates of every slot.
+/// Slots whose estimates are near each other.
+struct Group {
+    members: Vec<u32>,
+    /// Slots near the members, themselves included.
+    near: Vec<u32>,
+}
+
+/// The estimates around every slot.
 struct Surroundings {
-    /// Distance to the K-th nearest estimate, where the list of the slot has K records; 0 for slots without estimate or list.
+    /// Distance within which as many estimates lie as the list of the slot is long; 0 for slots without estimate or list.
     radius: Vec<f32>,
-    near: Vec<Vec<u32>>,
+    groups: Vec<Group>,
+    /// Group of each slot with an estimate.
+    group_of: Vec<u32>,
 }
 
 impl Surroundings {
-    /// Returns `None` if no slot has an estimate.
-    fn new<const D: usize>(estimates: &[Estimate<D>], lists: &Neighborhoods) -> Option<Self> {
+    /// Returns `None` if no slot has an estimate. `before` are the radii in the iteration before, or 0.
+    fn new<const D: usize>(
+        estimates: &[Estimate<D>],
+        lists: &Neighborhoods,
+        before: Vec<f32>,
+    ) -> Option<Self> {
         let is_known = |slot: &u32| estimates[*slot as usize].status == Status::Ok;
         let slots: Vec<u32> = (0..estimates.len() as u32).filter(is_known).collect();
-        let place = |slot: &u32| estimates[*slot as usize].position.map(f64::from);
-        let places: Vec<[f64; D]> = slots.iter().map(place).collect();
-        let tree = Knn::new(&places).ok()?;
+        let point = |slot: &u32| estimates[*slot as usize].position.map(f64::from);
+        let points: Vec<[f64; D]> = slots.iter().map(point).collect();
+        let tree = Knn::new(&points).ok()?;
         let mean_length = lists.records().len() / estimates.len();
-        let rows = tree.per_row((NEAR * mean_length as f32) as usize, |row, found| {
-            let kth = lists.of(slots[row] as usize).len().checked_sub(1);
-            let kth = kth.and_then(|kth| found.get(kth).or(found.last()));
-            let radius = kth.map_or(0.0, |kth| kth.0.sqrt() as f32);
-            (radius, found.iter().map(|near| slots[near.1 as usize]).collect())
-        });
-        let (mut radius, mut near) =
-            (vec![0.0; estimates.len()], vec![Vec::new(); estimates.len()]);
-        for (&slot, row) in slots.iter().zip(rows) {
-            (radius[slot as usize], near[slot as usize]) = row;
+        let (tree, points, slots, before) = (&tree, &points, &slots, &before);
+        let grouping = Grouping { tree, points, slots, lists, before, mean_length };
+        let groups = |near: &mut Near<D>, rows: &[u32]| {
+            let mut groups = Vec::new();
+            grouping.add(rows, near, &mut groups);
+            groups
+        };
+        let patches = tree.patches(GROUP).into_par_iter();
+        let found: Vec<Vec<(Group, Vec<f32>)>> = patches.map_init(Near::default, groups).collect();
+        let (mut radius, mut group_of) = (vec![0.0; estimates.len()], vec![0; estimates.len()]);
+        let mut groups = Vec::new();
+        for (group, radii) in found.into_iter().flatten() {
+            for (&slot, &r) in group.members.iter().zip(&radii) {
+                (radius[slot as usize], group_of[slot as usize]) = (r, groups.len() as u32);
+            }
+            groups.push(group);
         }
-        Some(Self { radius, near })
+        Some(Self { radius, groups, group_of })
+    }
+}
+
+/// Buffers of one thread: the slots and estimates near a group.
+struct Near<const D: usize> {
+    slots: Vec<u32>,
+    x: [Vec<f32>; D],
+    squared: Vec<f32>,
+    found: Vec<(f64, u32)>,
+}
+
+impl<const D: usize> Default for Near<D> {
+    fn default() -> Self {
+        let x = std::array::from_fn(|_| Vec::new());
+        Self { slots: Vec::new(), x, squared: Vec::new(), found: Vec::new() }
+    }
+}
+
+/// What groups are made from.
+struct Grouping<'a, const D: usize> {
+    tree: &'a Knn<'a, D>,
+    points: &'a [[f64; D]],
+    slots: &'a [u32],
+    lists: &'a Neighborhoods,
+    before: &'a [f32],
+    mean_length: usize,
+}
+
+impl<const D: usize> Grouping<'_, D> {
+    /// Adds the group of `rows`, with the radius of each slot. Slots that do not fit get groups of their own.
+    fn add(&self, rows: &[u32], near: &mut Near<D>, groups: &mut Vec<(Group, Vec<f32>)>) {
+        let Self { tree, points, slots, lists, before, mean_length } = *self;
+        let middle: [f64; D] = std::array::from_fn(|c| {
+            let mut column: Vec<f64> = rows.iter().map(|&row| points[row as usize][c]).collect();
+            let middle = column.len() / 2;
+            *column.select_nth_unstable_by(middle, f64::total_cmp).1
+        });
+        let away = |row: u32| squared_distance(&middle, &points[row as usize]).sqrt();
+        let before = |row: u32| f64::from(before[slots[row as usize] as usize]);
+        let mut typical = 0.0;
+        if rows.iter().any(|&row| before(row) == 0.0) {
+            tree.nearest_to(middle, mean_length + 1, &mut near.found);
+            typical = near.found.last().map_or(0.0, |last| 1.25 * last.0.sqrt());
+        }
+        let reach = |row: u32| {
+            let before = before(row);
+            away(row) + f64::from(NEAR) * if before == 0.0 { typical } else { before }
+        };
+        // A group has one size: the others follow.
+        let mut rows = rows.to_vec();
+        rows.sort_by(|&a, &b| reach(a).total_cmp(&reach(b)));
+        let most = WIDEST * reach(rows[0]);
+        let rest = rows.split_off(rows.partition_point(|&row| reach(row) <= most).max(1));
+        let is_one = rows.len() == 1;
+        let most = MOST_NEAR * mean_length;
+        let mut within = reach(rows[rows.len() - 1]);
+        let (mut members, mut radii) = (Vec::new(), Vec::new());
+        loop {
+            near.slots.clear();
+            near.x.iter_mut().for_each(Vec::clear);
+            dispatch(Within { grouping: self, middle: &middle, within, near: &mut *near });
+            let is_crowded = near.slots.len() > most;
+            if is_crowded && is_one {
+                tree.nearest_to(middle, most, &mut near.found);
+                near.slots.clear();
+                near.x.iter_mut().for_each(Vec::clear);
+                for &(_, row) in &near.found {
+                    near.slots.push(slots[row as usize]);
+                    (0..D).for_each(|c| near.x[c].push(points[row as usize][c] as f32));
+                }
+            }
+            let is_all = near.slots.len() == slots.len() || (is_crowded && is_one);
+            for &row in rows.iter().filter(|_| is_one || !is_crowded) {
+                let slot = slots[row as usize];
+                let x = points[row as usize].map(|x| x as f32);
+                let most = if is_all { f64::INFINITY } else { within - away(row) };
+                let wanted = lists.of(slot as usize).len() + 1;
+                let radius = match wanted {
+                    1 => Some(0.0),
+                    _ if most <= 0.0 && !is_one => None,
+                    _ => dispatch(Radius { near: &mut *near, x, wanted, most: most as f32 }),
+                };
+                let covers = |radius: &f32| is_all || f64::from(COVERED * radius) <= most;
+                if let Some(radius) = radius.filter(covers) {
+                    members.push(slot);
+                    radii.push(radius);
+                }
+            }
+            if !is_one || members.len() == 1 {
+                break;
+            }
+            within = (1.5 * within).max(f64::MIN_POSITIVE);
+        }
+        if !members.is_empty() {
+            let near = near.slots.clone();
+            groups.push((Group { members: members.clone(), near }, radii));
+        }
+        let is_left = |row: &u32| !members.contains(&slots[*row as usize]);
+        let left: Vec<u32> = rows.into_iter().filter(is_left).collect();
+        // Half of them at a time, if none fits.
+        let parts = if members.is_empty() { left.len().div_ceil(2) } else { left.len().max(1) };
+        left.chunks(parts).for_each(|rows| self.add(rows, near, groups));
+        if !rest.is_empty() {
+            self.add(&rest, near, groups);
+        }
+    }
+}
+
+/// Gathers all estimates within a distance of a place.
+struct Within<'a, 'b, const D: usize> {
+    grouping: &'a Grouping<'b, D>,
+    middle: &'a [f64; D],
+    within: f64,
+    near: &'a mut Near<D>,
+}
+
+impl<const D: usize> Kernel for Within<'_, '_, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { grouping: Grouping { tree, slots, .. }, middle, within, near } = self;
+        tree.within(middle, within, |row, x| {
+            near.slots.push(slots[row as usize]);
+            (0..D).for_each(|c| near.x[c].push(x[c] as f32));
+        });
+    }
+}
+
+/// Finds the distance from `x` to the `wanted`-th nearest estimate; `None` if it is above `most`.
+struct Radius<'a, const D: usize> {
+    near: &'a mut Near<D>,
+    x: [f32; D],
+    wanted: usize,
+    most: f32,
+}
+
+impl<const D: usize> Kernel for Radius<'_, D> {
+    type Output = Option<f32>;
+
+    #[inline(always)]
+    fn run(self) -> Option<f32> {
+        let Self { near: Near { slots, x: columns, squared, .. }, x, wanted, most } = self;
+        let n = slots.len();
+        squared.resize(n, 0.0);
+        let (columns, squared): ([&[f32]; D], _) =
+            (std::array::from_fn(|c| &columns[c][..n]), &mut squared[..n]);
+        for i in 0..n {
+            squared[i] = distance2(&std::array::from_fn(|c| columns[c][i]), &x);
+        }
+        let count =
+            |bound: f32| squared.iter().map(|&s| u32::from(s <= bound)).sum::<u32>() as usize;
+        let is_all = most == f32::INFINITY;
+        let wanted = if is_all { wanted.min(n) } else { wanted };
+        let mut high = match is_all {
+            true => squared.iter().fold(0.0, |most: f32, &s| most.max(s)),
+            false => most * most,
+        };
+        let (mut low, mut below, mut above) = (0.0, 0, count(high));
+        if above < wanted {
+            return None;
+        }
+        for pass in 0..PASSES {
+            if above == wanted {
+                let within = squared.iter().map(|&s| if s <= high { s } else { 0.0 });
+                return Some(within.fold(0.0, f32::max).sqrt());
+            }
+            // Interpolation alone may approach from one side only.
+            let share = match pass % 2 {
+                0 => ((wanted - below) as f32 + 0.5) / (above - below) as f32,
+                _ => 0.5,
+            };
+            let guess = low + (high - low) * share;
+            let within = count(guess);
+            if within >= wanted {
+                (high, above) = (guess, within);
+            } else {
+                (low, below) = (guess, within);
+            }
+        }
+        // Piles of estimates take too many passes.
+        Some(squared.select_nth_unstable_by(wanted - 1, f32::total_cmp).1.sqrt())
     }
 }
 
@@ -224,107 +474,167 @@ fn nearest_slot<const D: usize, P: Pieces<D>>(
     nearest
 }
 
-const BINS: usize = 1024;
-/// Bins per unit of `(d / R)^2`. The last bin stands for all larger values.
-const BINS_PER_UNIT: f32 = 256.0;
-
-/// `ln P` and `ln(1 - P)` in bins of `(d / R)^2`.
-struct Curve {
-    listed: Vec<f32>,
-    not_listed: Vec<f32>,
+/// Likelihood ratios of entries that are surely within the radius, against entries far outside.
+#[derive(Clone, Copy)]
+struct Odds {
+    listed: f32,
+    not_listed: f32,
 }
 
-impl Curve {
-    /// Creates the curve for an inlier ratio. `by_chance` is the chance that a wrong entry is a given record.
+impl Odds {
+    /// `by_chance` is the chance that a wrong entry is a given record.
     fn new(inlier_ratio: f32, by_chance: f32) -> Self {
         let q = (1.0 - inlier_ratio) * by_chance;
-        let p = |bin: usize| {
-            let u = ((bin as f64 + 0.5) / f64::from(BINS_PER_UNIT)).sqrt();
-            let f = 1.0 / (1.0 + libm::exp((u - 1.0) / f64::from(SOFTNESS)));
-            f64::from(inlier_ratio) * f + f64::from(q) * (1.0 - f)
-        };
-        let listed = (0..BINS).map(|bin| libm::log(p(bin)) as f32).collect();
-        let not_listed = (0..BINS).map(|bin| libm::log1p(-p(bin)) as f32).collect();
-        Self { listed, not_listed }
+        let listed = (inlier_ratio / q).min(LARGEST);
+        Self { listed, not_listed: (1.0 - inlier_ratio) / (1.0 - q) }
     }
 }
 
-/// The terms of the log-likelihood of one slot: the estimates of other slots, in columns.
+/// Largest value of `exp`, and of an odds ratio: products of four are finite.
+const LARGEST: f32 = (1 << 28) as f32;
+/// `1 / (2 s)` in powers of two.
+const STEEPNESS: f32 = std::f32::consts::LOG2_E / (2.0 * SOFTNESS);
+
+/// Returns about `exp((v - 1) / (2 s))`, where `y` is `v` times [`STEEPNESS`], to 6 %: exact at powers of two, linear between.
+#[inline(always)]
+fn exponential(y: f32) -> f32 {
+    // In [512, 1024), the last 23 bits of a number count units of 2^-14. Moved by 9, the lowest of its integer bits is that of an exponent.
+    const ZERO: f32 = 512.0 + 127.0;
+    f32::from_bits((y + (ZERO - STEEPNESS)).min(ZERO + 28.0).to_bits() << 9)
+}
+
+/// The place of a slot, and `1 / R^2`; 0 if it has no list.
+#[derive(Clone, Copy)]
+struct Place<const D: usize> {
+    x: [f32; D],
+    inverse: f32,
+}
+
+/// The estimates near a group, and those near one slot, which are the terms of its log-likelihood.
 struct Terms<const D: usize> {
-    /// Length of the list of the center of these terms, and its squared radius.
-    length: f32,
-    radius2: f32,
-    /// Estimates on the own list, and others nearby.
-    listed: Columns<D>,
-    not_listed: Columns<D>,
-    /// Slots that list the own record, and others nearby.
-    listers: Columns<D>,
-    not_listers: Columns<D>,
-}
-
-impl<const D: usize> Default for Terms<D> {
-    fn default() -> Self {
-        Self {
-            length: 0.0,
-            radius2: 0.0,
-            listed: Columns::default(),
-            not_listed: Columns::default(),
-            listers: Columns::default(),
-            not_listers: Columns::default(),
-        }
-    }
-}
-
-struct Columns<const D: usize> {
+    /// Per slot, its row in the following columns; 0 if it is not near. Row 0 is far from all.
+    row: Vec<u32>,
+    places: Vec<Place<D>>,
     x: [Vec<f32>; D],
-    inverse_radius2: Vec<f32>,
+    /// Odds of each estimate as a neighbor of the slot, and of the slot as a neighbor of it.
+    own: Vec<f32>,
+    theirs: Vec<f32>,
     /// Squared distance to the other slot of the own record, which explains the entry if it is nearer; else infinite.
     most: Vec<f32>,
+    squared: Vec<f32>,
+    kept: Vec<u32>,
+    /// Of the center of the terms.
+    length: f32,
+    radius: f32,
+    away: [Vec<f32>; D],
+    terms: Vec<Term>,
+    aimed: Vec<[f32; 2]>,
 }
 
-impl<const D: usize> Default for Columns<D> {
-    fn default() -> Self {
-        let x = std::array::from_fn(|_| Vec::new());
-        Self { x, inverse_radius2: Vec::new(), most: Vec::new() }
-    }
+/// What the estimate of one other slot contributes.
+#[derive(Clone, Copy, Default)]
+struct Term {
+    inverse: f32,
+    own: f32,
+    theirs: f32,
+    most: f32,
 }
 
-impl<const D: usize> Columns<D> {
-    fn clear(&mut self) {
-        self.x.iter_mut().for_each(Vec::clear);
-        self.inverse_radius2.clear();
-        self.most.clear();
-    }
+/// Coordinate that is far from all estimates, and finite when squared.
+const FAR: f32 = 1e18;
 
-    #[inline(always)]
-    fn push(&mut self, x: &[f32; D], radius: f32, most: f32) {
-        self.x.iter_mut().zip(x).for_each(|(column, x)| column.push(*x));
-        self.inverse_radius2.push(1.0 / (radius * radius));
-        self.most.push(most);
-    }
-
-    /// Counts the rows whose squared distance to `x` is below `most`.
-    #[inline(always)]
-    fn count(&self, x: &[f32; D], most: f32) -> u32 {
-        let n = self.most.len();
-        let columns: [&[f32]; D] = std::array::from_fn(|c| &self.x[c][..n]);
-        let near = |i: usize| distance2(&std::array::from_fn(|c| columns[c][i]), x) < most;
-        (0..n).map(|i| u32::from(near(i))).sum()
-    }
-
-    /// Sums `table` over all rows for a slot at `x`, with squared radii divided by `scale`.
-    #[inline(always)]
-    fn sum(&self, table: &[f32], x: &[f32; D], scale: f32) -> f32 {
-        let n = self.most.len();
-        let columns: [&[f32]; D] = std::array::from_fn(|c| &self.x[c][..n]);
-        let (inverse, most, table) = (&self.inverse_radius2[..n], &self.most[..n], &table[..BINS]);
-        let mut sum = 0.0;
-        for i in 0..n {
-            let d2 = distance2(&std::array::from_fn(|c| columns[c][i]), x).min(most[i]);
-            let bin = (d2 * inverse[i] * (scale * BINS_PER_UNIT)).min((BINS - 1) as f32);
-            sum += table[(bin as usize).min(BINS - 1)];
+impl<const D: usize> Terms<D> {
+    fn new(n: usize) -> Self {
+        Self {
+            row: vec![0; n],
+            places: Vec::new(),
+            x: std::array::from_fn(|_| Vec::new()),
+            own: Vec::new(),
+            theirs: Vec::new(),
+            most: Vec::new(),
+            squared: Vec::new(),
+            kept: Vec::new(),
+            length: 0.0,
+            radius: 0.0,
+            away: std::array::from_fn(|_| Vec::new()),
+            terms: Vec::new(),
+            aimed: Vec::new(),
         }
-        sum
+    }
+
+    /// Reads the estimates near a group.
+    #[inline(always)]
+    fn enter(&mut self, places: &[Place<D>], near: &[u32]) {
+        self.places.clear();
+        self.places.push(Place { x: [FAR; D], inverse: 0.0 });
+        self.places.extend(near.iter().map(|&slot| places[slot as usize]));
+        for (row, &slot) in near.iter().enumerate() {
+            self.row[slot as usize] = row as u32 + 1;
+        }
+        for c in 0..D {
+            self.x[c].clear();
+            self.x[c].extend(self.places.iter().map(|place| place.x[c]));
+        }
+    }
+
+    fn leave(&mut self, near: &[u32]) {
+        near.iter().for_each(|&slot| self.row[slot as usize] = 0);
+    }
+
+    /// Prepares for places `from + t * direction`, where `from` is relative to the center.
+    #[inline(always)]
+    fn aim(&mut self, from: &[f32; D], direction: &[f32; D]) {
+        let n = self.terms.len();
+        self.aimed.resize(n, [0.0; 2]);
+        let away: [&[f32]; D] = std::array::from_fn(|c| &self.away[c][..n]);
+        let aimed = &mut self.aimed[..n];
+        for i in 0..n {
+            let (mut s, mut a) = (0.0, 0.0);
+            for c in 0..D {
+                let d = away[c][i] - from[c];
+                s += d * d;
+                a += d * direction[c];
+            }
+            aimed[i] = [s, 2.0 * a];
+        }
+    }
+
+    /// Returns the log-likelihoods at some `t`.
+    #[inline(always)]
+    fn scores(&self, t: &Lanes, length2: f32) -> Lanes {
+        let t2: Lanes = t.map(|t| t * t * length2);
+        let radius2 = self.radius * self.radius;
+        let mut counts = [0u32; LANES];
+        for &[squared, along] in &self.aimed {
+            for w in 0..LANES {
+                let d2 = squared + (t2[w] - t[w] * along);
+                counts[w] += u32::from(d2 < radius2);
+            }
+        }
+        // Points are on surfaces, so their number grows with the square of the radius.
+        let scale = counts.map(|count| {
+            let ratio = (count as f32 / self.length).clamp(RATIO.0, RATIO.1);
+            STEEPNESS / radius2 * ratio
+        });
+        let mut sums = [0.0; LANES];
+        let aimed = self.aimed.as_chunks::<2>().0;
+        let terms = self.terms.as_chunks::<2>().0;
+        for (aimed, terms) in aimed.iter().zip(terms) {
+            let (mut above, mut under) = ([1.0f32; LANES], [1.0f32; LANES]);
+            for ([squared, along], Term { inverse, own, theirs, most }) in aimed.iter().zip(terms) {
+                for w in 0..LANES {
+                    let d2 = squared + (t2[w] - t[w] * along);
+                    let mine = exponential(d2 * scale[w]);
+                    let other = exponential(d2.min(*most) * inverse);
+                    above[w] *= (own + mine) * (theirs + other);
+                    under[w] *= (1.0 + mine) * (1.0 + other);
+                }
+            }
+            for w in 0..LANES {
+                sums[w] += ln(above[w] / under[w]);
+            }
+        }
+        sums
     }
 }
 
@@ -334,163 +644,222 @@ struct Context<'a, const D: usize, P> {
     lists: &'a Neighborhoods,
     listers: &'a Listers,
     estimates: &'a [Estimate<D>],
+    places: &'a [Place<D>],
     around: &'a Surroundings,
-    curve: &'a Curve,
+    odds: Odds,
+    inlier_ratio: f32,
     tries_elsewhere: bool,
     iteration: usize,
     seed: u64,
 }
 
-/// Slots with their estimates, which are replaced by new ones.
-struct Chunk<'a, 'b, const D: usize, P> {
+/// The even or the odd slots of a group.
+struct Half<'a, 'b, const D: usize, P> {
     context: &'a Context<'b, D, P>,
-    moved: &'a mut [(usize, Estimate<D>)],
+    group: &'a Group,
+    half: u32,
     terms: &'a mut Terms<D>,
+    moved: &'a mut Vec<(u32, Best<D>)>,
 }
 
-impl<const D: usize, P: Pieces<D>> Kernel for Chunk<'_, '_, D, P> {
+impl<const D: usize, P: Pieces<D>> Kernel for Half<'_, '_, D, P> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        for (slot, estimate) in self.moved {
-            *estimate = self.context.likeliest(*slot, self.terms);
+        let Self { context, group, half, terms, moved } = self;
+        let mut lost = Vec::new();
+        terms.enter(context.places, &group.near);
+        for &slot in &group.members {
+            if slot % 2 == half && context.around.radius[slot as usize] > 0.0 {
+                let (best, is_lost) = context.likeliest(slot as usize, terms);
+                if context.tries_elsewhere && (is_lost || P::PER_SLOT > 1) {
+                    lost.push(moved.len());
+                }
+                moved.push((slot, best));
+            }
+        }
+        terms.leave(&group.near);
+        for at in lost {
+            let (slot, best) = &mut moved[at];
+            context.try_elsewhere(*slot as usize, best, terms);
         }
     }
 }
 
+/// A place with its score and its piece.
+#[derive(Clone, Copy)]
+struct Best<const D: usize> {
+    score: f32,
+    x: [f32; D],
+    axis: usize,
+}
+
 impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
-    /// Returns the likeliest of some places on the record of `slot`.
+    /// Returns the likeliest of some places on the record of `slot`, and whether few listed estimates are near it.
     #[inline(always)]
-    fn likeliest(&self, slot: usize, terms: &mut Terms<D>) -> Estimate<D> {
+    fn likeliest(&self, slot: usize, terms: &mut Terms<D>) -> (Best<D>, bool) {
         let old = self.estimates[slot];
-        let radius = self.around.radius[slot];
-        let mut draws =
-            Draws::new(self.seed, Stage::Ranking, (slot * ITERATIONS + self.iteration) as u64);
-        self.collect(slot, slot, terms);
-        let mut best = (self.log_likelihood(terms, &old.position), old.position, old.axis);
+        let item = (slot * ITERATIONS + self.iteration) as u64;
+        let mut draws = Draws::new(self.seed, Stage::Ranking, item);
+        let n_near = self.collect(slot, slot, terms);
+        let is_lost = (n_near as f32) < LOST * self.inlier_ratio * self.lists.of(slot).len() as f32;
         let axis = usize::from(old.axis);
-        let piece = self.pieces.piece(slot, axis);
-        let mut size = LARGEST_STEP * radius;
-        for _ in 0..STEPS {
-            let direction: [f32; D] = match P::NORMAL {
-                true => std::array::from_fn(|_| draws.between(-1.0, 1.0) as f32),
-                false => self.pieces.direction(slot, axis),
-            };
-            let step = size * draws.between(0.75, 1.25) as f32;
-            size *= STEP_FACTOR;
-            let from = best.1;
-            for step in [-step, step] {
-                let x = piece.project(&std::array::from_fn(|c| from[c] + step * direction[c]));
-                let score = self.log_likelihood(terms, &x);
-                if score > best.0 {
-                    best = (score, x, old.axis);
-                }
-            }
+        let mut best = Best { score: f32::NEG_INFINITY, x: old.position, axis };
+        let rounds: &[Lanes] = if P::NORMAL { &PLANE_STEPS } else { &LINE_STEPS };
+        for steps in rounds {
+            let from = Best { axis, ..best };
+            self.search(slot, (&old.position, from), steps, &mut draws, terms, &mut best);
         }
-        if self.tries_elsewhere {
-            let own = self.lists.of(slot);
-            for record in own.iter().step_by(own.len().div_ceil(ELSEWHERE).max(1)) {
-                self.try_near(slot, record.index(), terms, &mut best);
-            }
-        }
-        let (_, position, axis) = best;
-        if !position.iter().all(|x| x.is_finite()) {
-            return old;
-        }
-        Estimate { position, axis, ..old }
+        (best, is_lost)
     }
 
-    /// Tries the places of `slot` that are nearest to the estimates of a listed record.
+    /// Searches in `steps` from a place; `terms` are around `center`.
     #[inline(always)]
-    fn try_near(
+    fn search(
         &self,
         slot: usize,
-        record: usize,
+        (center, from): (&[f32; D], Best<D>),
+        steps: &Lanes,
+        draws: &mut Draws,
         terms: &mut Terms<D>,
-        best: &mut (f32, [f32; D], u8),
+        best: &mut Best<D>,
     ) {
-        let first = record * self.pieces.slots_per_record();
-        for center in first..first + self.pieces.slots_per_record() {
-            let (x, radius) = (self.estimates[center].position, self.around.radius[center]);
-            if radius == 0.0 {
-                continue;
+        let Best { x: from, axis, .. } = from;
+        let piece = self.pieces.piece(slot, axis);
+        let radius = terms.radius;
+        let direction: [f32; D] = match P::NORMAL {
+            true => {
+                let random: [f32; D] =
+                    std::array::from_fn(|c| from[c] + draws.between(-1.0, 1.0) as f32 * radius);
+                let to = piece.project(&random);
+                let away: [f32; D] = std::array::from_fn(|c| to[c] - from[c]);
+                let length = distance2(&away, &[0.0; D]).sqrt().max(f32::MIN_POSITIVE);
+                away.map(|x| x / length)
             }
-            let near = |piece: usize| self.pieces.piece(slot, piece).project(&x);
-            let is_near = |piece: &usize| distance2(&near(*piece), &x) < radius * radius;
-            if !(0..P::PER_SLOT).any(|piece| is_near(&piece)) {
-                continue;
-            }
-            self.collect(slot, center, terms);
-            for piece in (0..P::PER_SLOT).filter(is_near) {
-                let x = near(piece);
-                let score = self.log_likelihood(terms, &x);
-                if score > best.0 {
-                    *best = (score, x, piece as u8);
-                }
+            false => self.pieces.direction(slot, axis),
+        };
+        let size = radius * draws.between(0.75, 1.25) as f32;
+        let length2 = distance2(&direction, &[0.0; D]);
+        let places: [[f32; D]; LANES] = std::array::from_fn(|w| {
+            piece.project(&std::array::from_fn(|c| from[c] + size * steps[w] * direction[c]))
+        });
+        let t: Lanes = std::array::from_fn(|w| {
+            (0..D).map(|c| (places[w][c] - from[c]) * direction[c]).sum::<f32>() / length2
+        });
+        let relative = std::array::from_fn(|c| from[c] - center[c]);
+        terms.aim(&relative, &direction);
+        let scores = terms.scores(&t, length2);
+        for w in 0..LANES {
+            if scores[w] > best.score {
+                let x = if steps[w] == 0.0 { from } else { places[w] };
+                *best = Best { score: scores[w], x, axis };
             }
         }
     }
 
-    /// Returns the log-likelihood of a slot at `x`. The radius there follows from the number of estimates within the radius of the
-    /// center, as if they were spread evenly.
-    #[inline(always)]
-    fn log_likelihood(&self, terms: &Terms<D>, x: &[f32; D]) -> f32 {
-        let Terms { length, radius2, listed, not_listed, listers, not_listers } = terms;
-        let n = listed.count(x, *radius2) + not_listed.count(x, *radius2);
-        let ratio = (n as f32 / *length).clamp(RATIO.0, RATIO.1);
-        let scale = if D == 2 { ratio } else { libm::cbrtf(ratio * ratio) };
-        let Curve { listed: p, not_listed: p_not } = self.curve;
-        listed.sum(p, x, scale)
-            + not_listed.sum(p_not, x, scale)
-            + listers.sum(p, x, 1.0)
-            + not_listers.sum(p_not, x, 1.0)
+    /// Tries the places of `slot` that are near the estimates of listed records.
+    #[inline(never)]
+    fn try_elsewhere(&self, slot: usize, best: &mut Best<D>, terms: &mut Terms<D>) {
+        let own = self.lists.of(slot);
+        let mut draws = Draws::new(self.seed, Stage::Ranking, u64::MAX - slot as u64);
+        for record in own.iter().step_by(own.len().div_ceil(ELSEWHERE).max(1)) {
+            let first = record.index() * self.pieces.slots_per_record();
+            for center in first..first + self.pieces.slots_per_record() {
+                let (x, radius) = (self.estimates[center].position, self.around.radius[center]);
+                let near = |axis: usize| self.pieces.piece(slot, axis).project(&x);
+                let is_near = |&axis: &usize| distance2(&near(axis), &x) < radius * radius;
+                if !(0..P::PER_SLOT).any(|axis| is_near(&axis)) {
+                    continue;
+                }
+                let group = &self.around.groups[self.around.group_of[center] as usize];
+                terms.enter(self.places, &group.near);
+                self.collect(slot, center, terms);
+                for axis in (0..P::PER_SLOT).filter(is_near) {
+                    let from = Best { score: 0.0, x: near(axis), axis };
+                    self.search(slot, (&x, from), &ELSEWHERE_STEPS, &mut draws, terms, best);
+                }
+                terms.leave(&group.near);
+            }
+        }
     }
 
-    /// Collects the terms of `slot` for places around the estimate of `center`.
+    /// Collects the terms of `slot` for places around the estimate of `center`; returns how many listed records are near.
     #[inline(always)]
-    fn collect(&self, slot: usize, center: usize, terms: &mut Terms<D>) {
-        let Self { pieces, lists, estimates, around, .. } = self;
-        let Terms { length, radius2, listed, not_listed, listers, not_listers } = terms;
-        [&mut *listed, not_listed, listers, not_listers].into_iter().for_each(Columns::clear);
+    fn collect(&self, slot: usize, center: usize, terms: &mut Terms<D>) -> usize {
+        let Self { pieces, lists, estimates, around, odds, .. } = self;
+        let Terms { row, places, x, own, theirs, most, squared, kept, .. } = terms;
         let slots_per_record = pieces.slots_per_record();
         let record = record_of(slot, slots_per_record);
-        let (own, radius) = (lists.of(slot), around.radius[center]);
-        (*length, *radius2) = (lists.of(center).len() as f32, radius * radius);
-        let at = &estimates[center].position;
-        for record in own {
-            if let Some((_, nearest)) = nearest_slot(*pieces, estimates, record.index(), at) {
-                listed.push(&estimates[nearest].position, radius, f32::INFINITY);
+        terms.radius = around.radius[center];
+        terms.length = lists.of(center).len() as f32;
+        let reach2 = NEAR * NEAR * terms.radius * terms.radius;
+        let at = self.places[center].x;
+        let n = places.len();
+        for column in [&mut *own, theirs] {
+            column.clear();
+            column.resize(n, odds.not_listed);
+        }
+        if slots_per_record == 2 || most.len() < n {
+            most.clear();
+            most.resize(n, f32::INFINITY);
+        }
+        squared.resize(n, 0.0);
+        kept.resize(n + 1, 0);
+        let (own, theirs, most) = (&mut own[..n], &mut theirs[..n], &mut most[..n]);
+        let (places, squared) = (&places[..n], &mut squared[..n]);
+        let x: [&[f32]; D] = std::array::from_fn(|c| &x[c][..n]);
+        for i in 0..n {
+            squared[i] = distance2(&std::array::from_fn(|c| x[c][i]), &at);
+        }
+        let mut n_near = 0;
+        for record in lists.of(slot) {
+            let first = record.index() * slots_per_record;
+            let mut i = row[first] as usize;
+            if slots_per_record == 2 {
+                let other = row[first + 1] as usize;
+                let is_other = squared[other] < squared[i];
+                let (nearer, farther) = if is_other { (other, i) } else { (i, other) };
+                own[farther] = 1.0;
+                i = nearer;
             }
+            own[i] = odds.listed;
+            n_near += usize::from(squared[i] < reach2);
         }
         let partner = slot ^ 1;
         let has_partner = slots_per_record == 2 && estimates[partner].status == Status::Ok;
         for &lister in self.listers.of(record) {
-            let lister = lister as usize;
-            if around.radius[lister] > 0.0 {
-                let x = &estimates[lister].position;
-                let most = match has_partner {
-                    true => distance2(&estimates[partner].position, x),
-                    false => f32::INFINITY,
-                };
-                listers.push(x, around.radius[lister], most);
+            let i = row[lister as usize] as usize;
+            theirs[i] = odds.listed;
+            if has_partner {
+                most[i] = distance2(&self.places[partner].x, &places[i].x);
             }
         }
-        let id = RecordId::from_index(record);
-        let center = (center != slot).then_some(center as u32);
-        for &other in around.near[center.map_or(slot, |c| c as usize)].iter().chain(&center) {
-            let other = other as usize;
-            let theirs = record_of(other, slots_per_record);
-            if theirs == record {
-                continue;
-            }
-            let x = &estimates[other].position;
-            if own.binary_search(&RecordId::from_index(theirs)).is_err() {
-                not_listed.push(x, radius, f32::INFINITY);
-            }
-            if around.radius[other] > 0.0 && lists.of(other).binary_search(&id).is_err() {
-                not_listers.push(x, around.radius[other], f32::INFINITY);
-            }
+        for slot in 0..slots_per_record {
+            squared[row[record * slots_per_record + slot] as usize] = f32::INFINITY;
         }
+        let mut n_kept = 0;
+        for (i, &squared) in squared.iter().enumerate().skip(1) {
+            kept[n_kept] = i as u32;
+            n_kept += usize::from(squared < reach2);
+        }
+        // Row 0 completes the last pair, without effect.
+        kept[n_kept] = 0;
+        n_kept = n_kept.next_multiple_of(2);
+        (own[0], theirs[0]) = (1.0, 1.0);
+        let kept = &kept[..n_kept];
+        terms.terms.resize(n_kept, Term::default());
+        terms.away.iter_mut().for_each(|away| away.resize(n_kept, 0.0));
+        let mut away = terms.away.each_mut().map(|away| &mut away[..n_kept]);
+        let terms = &mut terms.terms[..n_kept];
+        for (k, &i) in kept.iter().enumerate() {
+            let i = i as usize;
+            let Place { x, inverse } = places[i];
+            let theirs = if inverse > 0.0 { theirs[i] } else { 1.0 };
+            let inverse = STEEPNESS * inverse;
+            terms[k] = Term { inverse, own: own[i], theirs, most: most[i] };
+            (0..D).for_each(|c| away[c][k] = x[c] - at[c]);
+        }
+        n_near
     }
 }

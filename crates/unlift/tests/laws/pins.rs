@@ -111,11 +111,11 @@ fn bytes_of_confidence_are_pinned() {
 
 /// (Solver, scheme, hash of the recovery).
 const BASELINES: &[(&str, &str, u64)] = &[
-    ("ranking", "olc", 0x9c515412cd1da9f1),
-    ("ranking", "ppl", 0xae9bb9f8192fd4fa),
-    ("ranking", "ray", 0x5ebc45b5a3ad69a5),
-    ("ranking", "plane", 0xf381e6ce5a80adbb),
-    ("ranking", "cp", 0xd13cc22d2fce95b9),
+    ("ranking", "olc", 0xa0bee0ece36cfe86),
+    ("ranking", "ppl", 0x85166a8a437ff161),
+    ("ranking", "ray", 0x03da975f51e39ffc),
+    ("ranking", "plane", 0xaf2fae05d3e868ff),
+    ("ranking", "cp", 0xff535d2f0d74ee78),
     ("joint-start", "olc", 0xaf63f5032f96a9d9),
     ("joint-start", "ppl", 0x46e1864ebd342411),
     ("joint-start", "ray", 0xaffb76e949a42c6b),

@@ -1,6 +1,7 @@
 //! The search tree and single queries.
 
 use crate::Error;
+use crate::geometry::vector::squared_distance;
 use crate::simd::{Kernel, dispatch};
 
 /// Largest number of points per leaf.
@@ -115,6 +116,20 @@ impl<'a, const D: usize> Knn<'a, D> {
     /// Finds the `k` nearest rows of any position, in the same form.
     pub fn nearest_to(&self, position: [f64; D], k: usize, found: &mut Vec<(f64, u32)>) {
         self.search(position, None, k, found);
+    }
+
+    /// Calls `of(row, point)` for all points within `radius` of a position.
+    #[inline(always)]
+    pub fn within(&self, position: &[f64; D], radius: f64, mut of: impl FnMut(u32, [f64; D])) {
+        let bound = radius * radius;
+        self.leaves_within(position, (bound, usize::MAX), usize::MAX, |places| {
+            for place in places {
+                let point = std::array::from_fn(|c| self.columns[c][place]);
+                if squared_distance(position, &point) <= bound {
+                    of(self.rows[place], point);
+                }
+            }
+        });
     }
 
     fn search(&self, query: [f64; D], own: Option<usize>, k: usize, found: &mut Vec<(f64, u32)>) {
