@@ -149,8 +149,14 @@ fn without_outliers(points: &[[f64; 3]], filter: OutlierFilter) -> Result<Vec<u3
 mod tests {
     use super::*;
 
-    const PLAIN: Preparation =
-        Preparation { scale: None, k: 2, outlier_filter: None, max_points: None, seed: 0, colors: false };
+    const PLAIN: Preparation = Preparation {
+        scale: None,
+        k: 2,
+        outlier_filter: None,
+        max_points: None,
+        seed: 0,
+        colors: false,
+    };
 
     /// Points 0.5 apart on a line; the second neighbor is 0.5 away except at the ends.
     fn line(n: usize) -> Vec<[f64; 3]> {

@@ -103,13 +103,12 @@ pub struct RunArgs {
 /// Options of recovery and baselines for maps.
 #[derive(Clone, Debug, Args)]
 pub struct SolverArgs {
-    /// Recovery methods, separated by commas or repeated. With lists of neighbors: joint,
-    /// ranking (stronger and slower: also uses which points are not in a list), joint-start (the
-    /// first pass of joint), consensus (each point from its own list), ransac (the attack of
-    /// Chelani et al. 2025). Without lists, from the records alone
-    /// (what a scheme releases in place of points): density (published attacks), tomography
-    /// (stronger) [default: joint,joint-start; also consensus if the map has fewer than 150 x K
-    /// points]
+    /// Recovery methods, separated by commas or repeated. With lists of neighbors: ranking (the
+    /// strongest: also uses which points are not in a list), joint (faster), joint-start (the first
+    /// pass of joint), consensus (each point from its own list), ransac (the attack of Chelani et
+    /// al. 2025). Without lists, from the records alone (what a scheme releases in place of
+    /// points): density (published attacks), tomography (stronger) [default:
+    /// ranking,joint,joint-start; also consensus if the map has fewer than 150 x K points]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
           help_heading = "Attack")]
     pub solver: Vec<Builtin>,
@@ -301,10 +300,10 @@ pub struct AuditImagesArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_scheme,
           help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
-    /// Recovery methods, separated by commas or repeated: joint, ranking
-    /// (stronger and slower: also uses which keypoints are not in a list), joint-start (the first
-    /// pass of joint), consensus (each keypoint from its own list), ransac (the attack of Chelani
-    /// et al. 2025) [default: joint,joint-start]
+    /// Recovery methods, separated by commas or repeated: ranking (the strongest: also uses which
+    /// keypoints are not in a list), joint (faster), joint-start (the first pass of joint),
+    /// consensus (each keypoint from its own list), ransac (the attack of Chelani et al. 2025)
+    /// [default: ranking,joint,joint-start]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_solver,
           help_heading = "Attack")]
     pub solver: Vec<Builtin>,

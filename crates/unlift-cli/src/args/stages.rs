@@ -150,9 +150,10 @@ pub struct RecoverArgs {
     #[arg(long, value_name = "FILE")]
     pub neighbors: PathBuf,
     /// Recovery method. With lists of neighbors: joint, ranking (stronger and slower: also uses
-    /// which points are not in a list), joint-start (the first pass of joint), consensus (each point from its own list), ransac (the attack of
-    /// Chelani et al. 2025). Without lists, from the records alone (what a scheme releases in place
-    /// of points): density (published attacks), tomography (stronger)
+    /// which points are not in a list), joint-start (the first pass of joint), consensus (each
+    /// point from its own list), ransac (the attack of Chelani et al. 2025). Without lists, from
+    /// the records alone (what a scheme releases in place of points): density (published attacks),
+    /// tomography (stronger)
     #[arg(long, value_name = "SOLVER", value_parser = values::solver, default_value = "joint")]
     pub solver: Builtin,
     /// Make the attack weaker: do not use the public rule of a scheme to narrow down positions (cp:

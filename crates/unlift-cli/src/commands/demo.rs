@@ -79,8 +79,8 @@ fn photos(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
     let usual = Plan::new(Unit::Pixel);
     let plan = Plan {
         neighbors: vec![NeighborsBy::Source(Arc::new(Learned::default()))],
-        // The pictures of `joint-start` would be painted, too.
-        solvers: vec![Arc::new(Builtin::Joint)],
+        // Pictures are painted of every solver.
+        solvers: vec![Arc::new(Builtin::Ranking)],
         k: 20,
         headline: headline(&usual.thresholds),
         measures: vec![Arc::clone(&inversion) as Arc<dyn Measure<2>>],

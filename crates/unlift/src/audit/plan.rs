@@ -132,8 +132,13 @@ impl<const D: usize> Plan<D> {
             oracle_noise: vec![Noise::Uniform],
             inlier_ratios: vec![1.0, 0.75, 0.5, 0.3, 0.2, 0.1],
             k: if of_images { 20 } else { 50 },
-            // `joint-start` costs no extra run and is sometimes the stronger attack.
-            solvers: vec![Arc::new(Builtin::Joint), Arc::new(Builtin::JointStart)],
+            // The strongest result counts. Only `joint` estimates its confidence, and `joint-start`
+            // costs no extra run.
+            solvers: vec![
+                Arc::new(Builtin::Ranking),
+                Arc::new(Builtin::Joint),
+                Arc::new(Builtin::JointStart),
+            ],
             records_alone: true,
             reference: false,
             delta: Delta::Auto,
