@@ -13,7 +13,7 @@ SCENES = [("RedKitchen", "redkitchen", ["--scale", "1"]), ("Castle", "castle", [
 def audit(program, *options):
     with tempfile.TemporaryDirectory() as out:
         ratios = ["--inlier-ratios", str(RATIO), "--neighbors", "oracle", "--neighbors", SOURCE]
-        command = [program, "audit", *options, *ratios, "--invert", "--solver", "joint", "--quiet", "--share-safe", "--out", f"{out}/audit"]
+        command = [program, "audit", *options, *ratios, "--invert", "--solver", "ranking", "--quiet", "--share-safe", "--out", f"{out}/audit"]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         return json.loads(pathlib.Path(out, "audit/audit.json").read_text())
 

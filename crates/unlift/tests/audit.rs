@@ -39,7 +39,7 @@ fn a_usual_audit_has_a_row_for_what_joint_recovery_starts_from() {
     plan.records_alone = false;
     let usual = audit(&room, &plan);
     let solvers: Vec<&str> = usual.rows.iter().map(|row| &*row.solver).collect();
-    assert_eq!(solvers, ["joint", "joint-start"].repeat(4));
+    assert_eq!(solvers, ["ranking", "joint", "joint-start"].repeat(4));
     // `joint-start` gives the same rows with and without `joint`, in either order.
     for solvers in [
         Builtin::list(&[Builtin::JointStart]),
@@ -53,7 +53,8 @@ fn a_usual_audit_has_a_row_for_what_joint_recovery_starts_from() {
     for (row, seconds) in usual.rows.iter().zip(&usual.seconds.rows) {
         let is_start = row.solver == "joint-start";
         assert_eq!(seconds.recover == 0.0, is_start, "no run of its own");
-        let reason = if is_start { Unknown::OtherSolver } else { Unknown::SmallMap };
+        let is_joint = row.solver == "joint";
+        let reason = if is_joint { Unknown::SmallMap } else { Unknown::OtherSolver };
         assert_eq!(row.sure_unknown, Some(reason));
         assert!(row.reliability.is_none());
     }
@@ -138,8 +139,8 @@ fn break_even_takes_the_strongest_attack_at_every_ratio() {
         |solver: &str| found.iter().find(|b| (&*b.scheme, &*b.solver) == ("olc", solver)).unwrap();
     assert_eq!(of("strongest").inlier_ratio, 0.1, "half comes back at the lowest ratio");
     assert!((of("joint").inlier_ratio - 0.3).abs() < 1e-12);
-    assert_eq!(found.len(), 2 * 4);
-    plan.solvers.truncate(1);
+    assert_eq!(found.len(), 2 * 5);
+    plan.solvers = Builtin::list(&[Builtin::Joint]);
     let mut by_joint = outcome.rows.clone();
     by_joint.retain(|row| row.solver == "joint");
     by_joint.iter_mut().for_each(|row| row.blind_percent.fill(0.0));
@@ -166,7 +167,7 @@ fn a_scheme_that_a_map_does_not_allow_is_told_and_the_audit_goes_on() {
     assert!(outcome.rows.iter().all(|row| row.scheme != "ppl+"));
     for scheme in plan.schemes.iter().filter(|scheme| scheme.name() != "ppl+") {
         let n = outcome.rows.iter().filter(|row| row.scheme == scheme.name()).count();
-        assert_eq!(n, 4, "{}", scheme.name());
+        assert_eq!(n, 6, "{}", scheme.name());
     }
     assert_eq!(outcome.rows.len(), outcome.seconds.rows.len());
 
@@ -192,10 +193,13 @@ fn a_source_without_lists_for_a_scheme_costs_its_rows_alone() {
         [scheme, neighbors, solver].map(str::to_owned)
     };
     let expected = [
+        row("olc", "oracle", "ranking"),
         row("olc", "oracle", "joint"),
         row("olc", "oracle", "joint-start"),
+        row("olc", "geometric", "ranking"),
         row("olc", "geometric", "joint"),
         row("olc", "geometric", "joint-start"),
+        row("plane", "oracle", "ranking"),
         row("plane", "oracle", "joint"),
         row("plane", "oracle", "joint-start"),
     ];
@@ -207,7 +211,7 @@ fn a_map_too_small_for_wrong_neighbors_loses_these_rows_alone() {
     let mut plan = plan(&["olc"]);
     (plan.inlier_ratios, plan.k, plan.records_alone) = (vec![1.0, 0.1], 50, false);
     let outcome = audit(&room(60), &plan);
-    assert!(outcome.rows.iter().all(|row| row.inlier_ratio == 1.0) && outcome.rows.len() == 2);
+    assert!(outcome.rows.iter().all(|row| row.inlier_ratio == 1.0) && outcome.rows.len() == 3);
     let [missing] = outcome.not_audited.as_slice() else { panic!("{:?}", outcome.not_audited) };
     assert_eq!((missing.inlier_ratio, missing.oracle_noise), (Some(0.1), Some("uniform")));
 }

@@ -94,7 +94,10 @@ fn what_the_plan_lacks_is_named() {
     assert_eq!(lacking("all:joint-start:oracle:0.25<=20"), None);
     let told = |text: &str| lacking(text).unwrap_or_default();
     assert_eq!(told("olc:0.10<=20"), "scheme: one of ppl, found olc");
-    assert_eq!(told("ppl:ransac:0.10<=20"), "solver: one of joint, joint-start, found ransac");
+    assert_eq!(
+        told("ppl:ransac:0.10<=20"),
+        "solver: one of ranking, joint, joint-start, found ransac"
+    );
     assert_eq!(told("ppl:overlap:0.10<=20"), "neighbors: one of oracle, found overlap");
     assert_eq!(told("ppl@0.4:0.10<=20"), "inlier ratio: one of 1, 0.5, found 0.4");
     assert_eq!(told("ppl:0.2<=20"), "threshold: one of 0.10, 0.25, found 0.2");

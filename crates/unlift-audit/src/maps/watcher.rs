@@ -96,7 +96,7 @@ mod tests {
     #[test]
     fn what_joint_starts_from_is_drawn_only_by_itself() {
         let mut plan = Plan::<3>::new(unlift::Unit::Meter);
-        assert_eq!(drawn(&plan), ["joint"]);
+        assert_eq!(drawn(&plan), ["ranking", "joint"]);
         plan.solvers = vec![Arc::new(Builtin::JointStart), Arc::new(Builtin::Ransac)];
         assert_eq!(drawn(&plan), ["joint-start", "ransac"]);
     }

@@ -37,7 +37,7 @@ fn a_gate_may_name_a_solver_and_a_source_and_decides_the_exit_code() {
         assert_eq!(found, Some(largest(&document, scheme, solver, source)), "{gate}");
         assert_eq!(gate["passed"], at < 2);
     }
-    let expected = "unlift: --gate ppl:ransac:0.25<=1: solver: expected one of joint, joint-start, consensus, found ransac\n";
+    let expected = "unlift: --gate ppl:ransac:0.25<=1: solver: expected one of ranking, joint, joint-start, consensus, found ransac\n";
     assert_eq!(place.complains(&format!("{audit} --gate ppl:ransac:0.25<=1"), 2), expected);
 }
 

@@ -53,8 +53,8 @@ fn a_scheme_written_in_python_gets_rows_page_and_gates() {
     let gates = "--inlier-ratios 1,0.5,0.1 --gate numpy-lines@0.1:0.25<=100 --gate all@1:0.25<=5";
     let found = place.prints(&format!("{audit} {gates} --out a --json"), 1);
     let rows = found["results"].as_array().unwrap();
-    // Three ratios; joint, joint-start and, because the map is small, consensus.
-    assert_eq!(rows.len(), 9);
+    // Three ratios; ranking, joint, joint-start and, because the map is small, consensus.
+    assert_eq!(rows.len(), 12);
     for row in rows {
         assert_eq!((&row["scheme"], &row["unit"]), (&"numpy-lines".into(), &"m".into()));
         let counts = (row["n_points"].as_u64(), row["dropped"]["other"].as_u64());

@@ -16,11 +16,11 @@
 //! Far estimates are as likely at all places, so only those within a few `R_i` count, and each likelihood is divided by that of a far
 //! estimate. Slots near each other share the search for them (`Group`). Eight places are scored at a time.
 
+mod surroundings;
+
 use rayon::prelude::*;
 
 use crate::about::ListsBy;
-use crate::geometry::knn::Knn;
-use crate::geometry::vector::squared_distance;
 use crate::neighbors::Neighborhoods;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::record_of;
@@ -31,23 +31,12 @@ use crate::recover::map::places::distance2;
 use crate::recover::result::{Estimate, Status};
 use crate::seed::{Draws, Stage};
 use crate::simd::{Kernel, dispatch};
+use surroundings::{Group, NEAR, Surroundings};
 
 /// Number of iterations.
 const ITERATIONS: usize = 5;
 /// Softness `s`.
 const SOFTNESS: f32 = 0.06;
-/// Estimates within this many radii are compared with a list.
-const NEAR: f32 = 1.6;
-/// A slot belongs to a group if all estimates within this many radii of it are near the group.
-const COVERED: f32 = 1.45;
-/// Number of slots in a group.
-const GROUP: usize = 16;
-/// Largest reach of a member of a group, as a multiple of the smallest.
-const WIDEST: f64 = 1.6;
-/// Largest number of estimates near a group, as a multiple of the length of lists.
-const MOST_NEAR: usize = 16;
-/// Largest number of passes that look for a radius.
-const PASSES: usize = 8;
 /// Steps along the record, in radii.
 const LINE_STEPS: [Lanes; 2] = [
     [0.0, 0.5, -0.5, 0.21, -0.21, 0.09, -0.09, 0.04],
@@ -208,238 +197,6 @@ impl Listers {
 
     fn of(&self, record: usize) -> &[u32] {
         &self.slots[self.offsets[record]..self.offsets[record + 1]]
-    }
-}
-
-/// Slots whose estimates are near each other.
-struct Group {
-    members: Vec<u32>,
-    /// Slots near the members, themselves included.
-    near: Vec<u32>,
-}
-
-/// The estimates around every slot.
-struct Surroundings {
-    /// Distance within which as many estimates lie as the list of the slot is long; 0 for slots without estimate or list.
-    radius: Vec<f32>,
-    groups: Vec<Group>,
-    /// Group of each slot with an estimate.
-    group_of: Vec<u32>,
-}
-
-impl Surroundings {
-    /// Returns `None` if no slot has an estimate. `before` are the radii in the iteration before, or 0.
-    fn new<const D: usize>(
-        estimates: &[Estimate<D>],
-        lists: &Neighborhoods,
-        before: Vec<f32>,
-    ) -> Option<Self> {
-        let is_known = |slot: &u32| estimates[*slot as usize].status == Status::Ok;
-        let slots: Vec<u32> = (0..estimates.len() as u32).filter(is_known).collect();
-        let point = |slot: &u32| estimates[*slot as usize].position.map(f64::from);
-        let points: Vec<[f64; D]> = slots.iter().map(point).collect();
-        let tree = Knn::new(&points).ok()?;
-        let mean_length = lists.records().len() / estimates.len();
-        let (tree, points, slots, before) = (&tree, &points, &slots, &before);
-        let grouping = Grouping { tree, points, slots, lists, before, mean_length };
-        let groups = |near: &mut Near<D>, rows: &[u32]| {
-            let mut groups = Vec::new();
-            grouping.add(rows, near, &mut groups);
-            groups
-        };
-        let patches = tree.patches(GROUP).into_par_iter();
-        let found: Vec<Vec<(Group, Vec<f32>)>> = patches.map_init(Near::default, groups).collect();
-        let (mut radius, mut group_of) = (vec![0.0; estimates.len()], vec![0; estimates.len()]);
-        let mut groups = Vec::new();
-        for (group, radii) in found.into_iter().flatten() {
-            for (&slot, &r) in group.members.iter().zip(&radii) {
-                (radius[slot as usize], group_of[slot as usize]) = (r, groups.len() as u32);
-            }
-            groups.push(group);
-        }
-        Some(Self { radius, groups, group_of })
-    }
-}
-
-/// Buffers of one thread: the slots and estimates near a group.
-struct Near<const D: usize> {
-    slots: Vec<u32>,
-    x: [Vec<f32>; D],
-    squared: Vec<f32>,
-    found: Vec<(f64, u32)>,
-}
-
-impl<const D: usize> Default for Near<D> {
-    fn default() -> Self {
-        let x = std::array::from_fn(|_| Vec::new());
-        Self { slots: Vec::new(), x, squared: Vec::new(), found: Vec::new() }
-    }
-}
-
-/// What groups are made from.
-struct Grouping<'a, const D: usize> {
-    tree: &'a Knn<'a, D>,
-    points: &'a [[f64; D]],
-    slots: &'a [u32],
-    lists: &'a Neighborhoods,
-    before: &'a [f32],
-    mean_length: usize,
-}
-
-impl<const D: usize> Grouping<'_, D> {
-    /// Adds the group of `rows`, with the radius of each slot. Slots that do not fit get groups of their own.
-    fn add(&self, rows: &[u32], near: &mut Near<D>, groups: &mut Vec<(Group, Vec<f32>)>) {
-        let Self { tree, points, slots, lists, before, mean_length } = *self;
-        let middle: [f64; D] = std::array::from_fn(|c| {
-            let mut column: Vec<f64> = rows.iter().map(|&row| points[row as usize][c]).collect();
-            let middle = column.len() / 2;
-            *column.select_nth_unstable_by(middle, f64::total_cmp).1
-        });
-        let away = |row: u32| squared_distance(&middle, &points[row as usize]).sqrt();
-        let before = |row: u32| f64::from(before[slots[row as usize] as usize]);
-        let mut typical = 0.0;
-        if rows.iter().any(|&row| before(row) == 0.0) {
-            tree.nearest_to(middle, mean_length + 1, &mut near.found);
-            typical = near.found.last().map_or(0.0, |last| 1.25 * last.0.sqrt());
-        }
-        let reach = |row: u32| {
-            let before = before(row);
-            away(row) + f64::from(NEAR) * if before == 0.0 { typical } else { before }
-        };
-        // A group has one size: the others follow.
-        let mut rows = rows.to_vec();
-        rows.sort_by(|&a, &b| reach(a).total_cmp(&reach(b)));
-        let most = WIDEST * reach(rows[0]);
-        let rest = rows.split_off(rows.partition_point(|&row| reach(row) <= most).max(1));
-        let is_one = rows.len() == 1;
-        let most = MOST_NEAR * mean_length;
-        let mut within = reach(rows[rows.len() - 1]);
-        let (mut members, mut radii) = (Vec::new(), Vec::new());
-        loop {
-            near.slots.clear();
-            near.x.iter_mut().for_each(Vec::clear);
-            dispatch(Within { grouping: self, middle: &middle, within, near: &mut *near });
-            let is_crowded = near.slots.len() > most;
-            if is_crowded && is_one {
-                tree.nearest_to(middle, most, &mut near.found);
-                near.slots.clear();
-                near.x.iter_mut().for_each(Vec::clear);
-                for &(_, row) in &near.found {
-                    near.slots.push(slots[row as usize]);
-                    (0..D).for_each(|c| near.x[c].push(points[row as usize][c] as f32));
-                }
-            }
-            let is_all = near.slots.len() == slots.len() || (is_crowded && is_one);
-            for &row in rows.iter().filter(|_| is_one || !is_crowded) {
-                let slot = slots[row as usize];
-                let x = points[row as usize].map(|x| x as f32);
-                let most = if is_all { f64::INFINITY } else { within - away(row) };
-                let wanted = lists.of(slot as usize).len() + 1;
-                let radius = match wanted {
-                    1 => Some(0.0),
-                    _ if most <= 0.0 && !is_one => None,
-                    _ => dispatch(Radius { near: &mut *near, x, wanted, most: most as f32 }),
-                };
-                let covers = |radius: &f32| is_all || f64::from(COVERED * radius) <= most;
-                if let Some(radius) = radius.filter(covers) {
-                    members.push(slot);
-                    radii.push(radius);
-                }
-            }
-            if !is_one || members.len() == 1 {
-                break;
-            }
-            within = (1.5 * within).max(f64::MIN_POSITIVE);
-        }
-        if !members.is_empty() {
-            let near = near.slots.clone();
-            groups.push((Group { members: members.clone(), near }, radii));
-        }
-        let is_left = |row: &u32| !members.contains(&slots[*row as usize]);
-        let left: Vec<u32> = rows.into_iter().filter(is_left).collect();
-        // Half of them at a time, if none fits.
-        let parts = if members.is_empty() { left.len().div_ceil(2) } else { left.len().max(1) };
-        left.chunks(parts).for_each(|rows| self.add(rows, near, groups));
-        if !rest.is_empty() {
-            self.add(&rest, near, groups);
-        }
-    }
-}
-
-/// Gathers all estimates within a distance of a place.
-struct Within<'a, 'b, const D: usize> {
-    grouping: &'a Grouping<'b, D>,
-    middle: &'a [f64; D],
-    within: f64,
-    near: &'a mut Near<D>,
-}
-
-impl<const D: usize> Kernel for Within<'_, '_, D> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let Self { grouping: Grouping { tree, slots, .. }, middle, within, near } = self;
-        tree.within(middle, within, |row, x| {
-            near.slots.push(slots[row as usize]);
-            (0..D).for_each(|c| near.x[c].push(x[c] as f32));
-        });
-    }
-}
-
-/// Finds the distance from `x` to the `wanted`-th nearest estimate; `None` if it is above `most`.
-struct Radius<'a, const D: usize> {
-    near: &'a mut Near<D>,
-    x: [f32; D],
-    wanted: usize,
-    most: f32,
-}
-
-impl<const D: usize> Kernel for Radius<'_, D> {
-    type Output = Option<f32>;
-
-    #[inline(always)]
-    fn run(self) -> Option<f32> {
-        let Self { near: Near { slots, x: columns, squared, .. }, x, wanted, most } = self;
-        let n = slots.len();
-        squared.resize(n, 0.0);
-        let (columns, squared): ([&[f32]; D], _) =
-            (std::array::from_fn(|c| &columns[c][..n]), &mut squared[..n]);
-        for i in 0..n {
-            squared[i] = distance2(&std::array::from_fn(|c| columns[c][i]), &x);
-        }
-        let count =
-            |bound: f32| squared.iter().map(|&s| u32::from(s <= bound)).sum::<u32>() as usize;
-        let is_all = most == f32::INFINITY;
-        let wanted = if is_all { wanted.min(n) } else { wanted };
-        let mut high = match is_all {
-            true => squared.iter().fold(0.0, |most: f32, &s| most.max(s)),
-            false => most * most,
-        };
-        let (mut low, mut below, mut above) = (0.0, 0, count(high));
-        if above < wanted {
-            return None;
-        }
-        for pass in 0..PASSES {
-            if above == wanted {
-                let within = squared.iter().map(|&s| if s <= high { s } else { 0.0 });
-                return Some(within.fold(0.0, f32::max).sqrt());
-            }
-            // Interpolation alone may approach from one side only.
-            let share = match pass % 2 {
-                0 => ((wanted - below) as f32 + 0.5) / (above - below) as f32,
-                _ => 0.5,
-            };
-            let guess = low + (high - low) * share;
-            let within = count(guess);
-            if within >= wanted {
-                (high, above) = (guess, within);
-            } else {
-                (low, below) = (guess, within);
-            }
-        }
-        // Piles of estimates take too many passes.
-        Some(squared.select_nth_unstable_by(wanted - 1, f32::total_cmp).1.sqrt())
     }
 }
 
