@@ -306,7 +306,7 @@ mod tests {
              expected one of uniform, near, clustered, found white\n\
              expected one of sift, aliked, superpoint, found SIFT\n\
              expected a number from 0 to below 1, found 1\n\
-             expected one of similarity, overlap, descriptors, geometric, learned, found magic"
+             expected one of similarity, overlap, geometric, learned, descriptors, found magic"
         );
     }
 

@@ -189,14 +189,13 @@ mod tests {
         assert_eq!(k(named("overlap"), &sift), 35);
         assert_eq!(k(named("similarity"), &sift), 30);
         assert_eq!(k(named("similarity"), &learned), 12);
-        assert_eq!(k(named("descriptors"), &sift), 35);
         assert_eq!(k(named("overlap").with_k(7), &sift), 7);
     }
 
     #[test]
     fn unknown_names_are_told() {
         let message = Named::parse("overlap+similarity").unwrap_err().to_string();
-        let expected = "source: expected one of similarity, overlap, descriptors, geometric";
+        let expected = "source: expected one of similarity, overlap, geometric";
         assert_eq!(message, format!("{expected}, found overlap+similarity"));
     }
 

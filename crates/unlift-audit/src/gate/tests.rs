@@ -148,8 +148,8 @@ fn each_wrong_part_is_named() {
     assert_eq!(message("ppl:joint<=20"), format!("{form}, found no threshold"));
     assert_eq!(message("ppl:joint@0.5<=20"), format!("{form}, found no threshold"));
     let names = "expected a solver (joint, ranking, joint-start, consensus, ransac, density, tomography) or \
-                 a source of neighborhoods (oracle, file, similarity, overlap, descriptors, \
-                 geometric, learned)";
+                 a source of neighborhoods (oracle, file, similarity, overlap, geometric, learned, \
+                 descriptors)";
     assert_eq!(message("ppl:jiont:0.1<=20"), format!("{names}, found jiont"));
     assert_eq!(message("ppl:jiont@0.5:0.1<=20"), format!("{names}, found jiont"));
     assert_eq!(message("ppl:0.1@0.5:0.1<=20"), format!("{names}, found 0.1"));

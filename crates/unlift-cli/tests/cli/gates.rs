@@ -73,7 +73,7 @@ fn a_scheme_that_the_map_does_not_allow_is_told_and_no_gate_on_it_holds() {
     let (text, _) = place.ends(&format!("{audit} {gates}"), 1);
     assert!(text.contains("gate ppl+:1.0<=100: FAILED, ppl+ was not audited: k:"), "{text}");
     let document = place.json("a/audit.json");
-    assert_eq!(rows(&document).len(), 6, "rows of olc");
+    assert_eq!(rows(&document).len(), 8, "rows of olc");
     let missing = &document["not_audited"];
     assert_eq!(missing.as_array().map(Vec::len), Some(1), "{missing}");
     assert_eq!((&missing[0]["scheme"], &missing[0]["neighbors"]), (&"ppl+".into(), &Value::Null));
@@ -95,7 +95,7 @@ fn lists_that_cannot_be_made_at_some_ratios_cost_these_rows() {
     let line = "audit map room.csv --schemes olc --inlier-ratios 1,0.3,0.1 --no-records-alone";
     place.ends(&format!("{line} --out a"), 0);
     let document = place.json("a/audit.json");
-    assert_eq!(rows(&document).len(), 3);
+    assert_eq!(rows(&document).len(), 4);
     let missing = document["not_audited"].as_array().expect("ratios");
     let is_told = |one: &Value| {
         one["neighbors"] == "oracle" && one["reason"].as_str().unwrap().starts_with("at 0.")

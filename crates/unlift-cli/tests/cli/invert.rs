@@ -93,10 +93,9 @@ fn a_network_of_ones_own_paints_what_the_program_has_none_for() {
     let other =
         format!("invert photos --inverter {models}/lpips-squeeze/lpips-squeeze.onnx --out x");
     let told = place.complains(&other, 3);
-    assert!(told.contains("expected an input features of shape (1, 131, any, any)"), "{told}");
+    assert!(told.contains("expected an input features of shape (1, 135, any, any)"), "{told}");
     assert!(!place.path("x").exists());
-    // The network for SIFT accepts the descriptors of ALIKED, which have as many columns.
-    let own = format!("--inverter {models}/inverter-sift/inverter-sift.onnx");
+    let own = format!("--inverter {models}/inverter-aliked/inverter-aliked.onnx");
     let line = format!("audit images photos --features aliked --invert {own} {CHEAP} --out own");
     place.ends(&line, 0);
     let document = place.json("own/audit.json");

@@ -20,7 +20,6 @@ mod surroundings;
 
 use rayon::prelude::*;
 
-use crate::about::ListsBy;
 use crate::neighbors::Neighborhoods;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::record_of;
@@ -69,10 +68,10 @@ const SAMPLE: usize = 1 << 12;
 const LEAST_LISTS: f32 = 4.0;
 /// Below this inlier ratio, the estimates of joint recovery are kept: Castle at 0.1 would lose up to 4 points within 1.0.
 const LEAST_RATIO: f32 = 0.15;
-/// The limit for lists that the oracle did not make. A choice by descriptors leaves out near points, too, so that a record that is
+/// The limit for lists with scores, which sources make. A choice by descriptors leaves out near points, too, so that a record that is
 /// not listed says little: lists of SIFT maps (0.2) would lose up to 17 points, those of ALIKED maps (0.6) up to 4. Lists of ALIKED images
 /// (0.9) gain up to 20 (docs/decisions/ranking.md).
-const LEAST_RATIO_OF_OTHERS: f32 = 0.75;
+const LEAST_RATIO_OF_SOURCES: f32 = 0.75;
 
 /// Returns the estimates of all slots after ranking from `start`, the estimates of joint recovery.
 pub(crate) fn recover<const D: usize>(
@@ -106,9 +105,9 @@ fn iterate<const D: usize, P: Pieces<D>>(
     if (n as f32) < LEAST_LISTS * mean_length {
         return estimates;
     }
-    let least_ratio = match lists.about().lists_by {
-        ListsBy::Oracle => LEAST_RATIO,
-        _ => LEAST_RATIO_OF_OTHERS,
+    let least_ratio = match lists.scores() {
+        None => LEAST_RATIO,
+        Some(_) => LEAST_RATIO_OF_SOURCES,
     };
     let listers = Listers::new(lists, n / pieces.slots_per_record());
     let mut radius = vec![0.0; n];
