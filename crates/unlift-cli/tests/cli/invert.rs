@@ -101,7 +101,8 @@ fn a_network_of_ones_own_paints_what_the_program_has_none_for() {
     let document = place.json("own/audit.json");
     assert!(document["results"][0]["metrics"]["ssim"].is_f64(), "{document}");
     assert_eq!(document["options"]["inverter_sha256"].as_str().unwrap().len(), 64, "{document}");
-    let (stdout, _) = place.ends(&format!("invert photos {own} --out pictures"), 0);
+    let (stdout, _) =
+        place.ends(&format!("invert photos --features aliked {own} --out pictures"), 0);
     assert_eq!(stdout, "3 pictures, in pictures\n");
 }
 
