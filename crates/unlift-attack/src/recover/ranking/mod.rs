@@ -288,7 +288,7 @@ struct Terms<const D: usize> {
     most: Vec<f32>,
     squared: Vec<f32>,
     kept: Vec<u32>,
-    /// Of the center of the terms.
+    /// The radius of the slot at the center.
     length: f32,
     radius: f32,
     away: [Vec<f32>; D],

@@ -168,7 +168,7 @@ impl<const D: usize> Grouping<'_, D> {
         }
         let is_left = |row: &u32| !members.contains(&slots[*row as usize]);
         let left: Vec<u32> = rows.into_iter().filter(is_left).collect();
-        // Half of them at a time, if none fits.
+        // If no slot fits, the group is halved.
         let parts = if members.is_empty() { left.len().div_ceil(2) } else { left.len().max(1) };
         left.chunks(parts).for_each(|rows| self.add(rows, near, groups));
         if !rest.is_empty() {
