@@ -1,4 +1,5 @@
-"""Measures pictures of whole photos: `evaluate.py WEIGHTS PREPARED/SET.. --lpips FILE [--images N] [--sheet FILE]`.
+"""Measures pictures of whole photos: `evaluate.py WEIGHTS PREPARED/SET.. --lpips FILE [--images N] [--sheet FILE]`. WEIGHTS may also
+be an exported network (.onnx) for SIFT.
 
 Prints SSIM (mean of the channels), PSNR and LPIPS (squeeze) at half the photos' size: for the true keypoints, without and with
 their colors, and for keypoints with errors. For the true ones also at the photos' size, to which pictures are enlarged.
@@ -13,9 +14,24 @@ from torch.nn import functional
 import metrics
 import weights
 from batches import Photos, channels, feature_image
+from model import Shape
 
 # Errors of keypoints: sigma in pixels (moved), or percent (elsewhere, swapped).
 ERRORS = ["half", "moved 2", "moved 5", "moved 10", "elsewhere 10", "elsewhere 30", "swapped 30"]
+
+
+class Exported:
+    """A network in an ONNX file."""
+
+    def __init__(self, path: pathlib.Path):
+        import onnxruntime
+
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = 1
+        self.session, self.shape = onnxruntime.InferenceSession(str(path), options), Shape()
+
+    def __call__(self, features: torch.Tensor) -> torch.Tensor:
+        return torch.from_numpy(self.session.run(None, {"features": features.numpy()})[0])
 
 
 def seen(photos: Photos, at: int, how: str, colors: bool) -> torch.Tensor:
@@ -88,8 +104,11 @@ def main():
     parser.add_argument("--images", type=int, help="largest number of photos")
     parser.add_argument("--sheet", type=pathlib.Path, help="writes an image of the first ten photos beside their pictures")
     options = parser.parse_args()
-    network, about = weights.load(options.weights)
-    print(about)
+    if options.weights.suffix == ".onnx":
+        network = Exported(options.weights)
+    else:
+        network, about = weights.load(options.weights)
+        print(about)
     distance = metrics.Lpips(options.lpips)
     photos = Photos(options.data, "cpu")
     true = ["true", "colors"][: 1 + network.shape.colors]

@@ -7,12 +7,11 @@ thumbnail of 20 x 15 pixels, enlarged. NETWORK is an exported network for colore
 import argparse
 import pathlib
 
-import onnxruntime
 import torch
 from torch.nn import functional
 
 from batches import Photos
-from evaluate import photo, seen
+from evaluate import Exported, photo, pictures
 from metrics import ssim
 
 LIGHT = torch.tensor([0.299, 0.587, 0.114]).view(1, 3, 1, 1)
@@ -33,15 +32,14 @@ def main():
     parser.add_argument("--images", type=int)
     options = parser.parse_args()
     torch.set_num_threads(1)
-    session = onnxruntime.InferenceSession(str(options.network))
+    network = Exported(options.network)
     photos = Photos(options.data, "cpu")
     found = {"pictures": [], "gray": [], "thumbnail": []}
     for at in range(len(photos))[: options.images]:
         real = photo(photos, at, full=True)
-        (made,) = session.run(None, {"features": seen(photos, at, "true", True).numpy()})
         small = functional.interpolate(real, size=(15, 20), mode="area")
         full = lambda x: functional.interpolate(x, size=real.shape[-2:], mode="bicubic", align_corners=False).clamp(0, 1)  # noqa: E731
-        for name, shown in [("pictures", full(torch.from_numpy(made))), ("gray", torch.full_like(real, 0.5)), ("thumbnail", full(small))]:
+        for name, shown in [("pictures", full(pictures(network, photos, at, "true"))), ("gray", torch.full_like(real, 0.5)), ("thumbnail", full(small))]:
             found[name].append(settings(shown, real))
     print("colors 7x7: range 1, 2; Gaussian: range 1, 2; gray 7x7: range 1, 2; Gaussian: range 1, 2")
     for name, rows in found.items():

@@ -99,16 +99,9 @@ fn gather<const D: usize>(
     let bound = radius * radius + f64::MIN_POSITIVE;
     scratch.rows.clear();
     scratch.columns.iter_mut().for_each(Vec::clear);
-    tree.leaves_within(middle, (bound, most), usize::MAX, |places| {
-        for place in places {
-            let point: [f64; D] = std::array::from_fn(|c| tree.columns[c][place]);
-            if squared_distance(middle, &point) <= bound {
-                for (column, x) in scratch.columns.iter_mut().zip(point) {
-                    column.push(x);
-                }
-                scratch.rows.push(tree.rows[place]);
-            }
-        }
+    tree.within(middle, (bound, most), |row, point| {
+        scratch.columns.iter_mut().zip(point).for_each(|(column, x)| column.push(x));
+        scratch.rows.push(row);
     });
 }
 

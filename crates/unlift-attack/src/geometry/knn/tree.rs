@@ -118,11 +118,16 @@ impl<'a, const D: usize> Knn<'a, D> {
         self.search(position, None, k, found);
     }
 
-    /// Calls `of(row, point)` for all points within `radius` of a position.
+    /// Calls `of(row, point)` for all points whose squared distance to a position is at most `bound`; of coinciding points, at least for
+    /// the `most` with the lowest rows.
     #[inline(always)]
-    pub fn within(&self, position: &[f64; D], radius: f64, mut of: impl FnMut(u32, [f64; D])) {
-        let bound = radius * radius;
-        self.leaves_within(position, (bound, usize::MAX), usize::MAX, |places| {
+    pub fn within(
+        &self,
+        position: &[f64; D],
+        (bound, most): (f64, usize),
+        mut of: impl FnMut(u32, [f64; D]),
+    ) {
+        self.leaves_within(position, (bound, most), usize::MAX, |places| {
             for place in places {
                 let point = std::array::from_fn(|c| self.columns[c][place]);
                 if squared_distance(position, &point) <= bound {

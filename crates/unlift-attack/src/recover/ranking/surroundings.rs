@@ -191,7 +191,7 @@ impl<const D: usize> Kernel for Within<'_, '_, D> {
     #[inline(always)]
     fn run(self) {
         let Self { grouping: Grouping { tree, slots, .. }, middle, within, near } = self;
-        tree.within(middle, within, |row, x| {
+        tree.within(middle, (within * within, usize::MAX), |row, x| {
             near.slots.push(slots[row as usize]);
             (0..D).for_each(|c| near.x[c].push(x[c] as f32));
         });
