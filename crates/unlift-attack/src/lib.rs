@@ -45,6 +45,7 @@ pub mod points;
 pub mod recover;
 pub mod released;
 pub mod seed;
+pub mod sequence;
 // Not part of the interface: `unlift-features` compiles its loops through it, so that all `unsafe` stays here.
 #[doc(hidden)]
 pub mod simd;

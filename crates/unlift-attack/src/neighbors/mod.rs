@@ -20,6 +20,7 @@ pub mod sources;
 mod tiles;
 mod walk;
 
+pub(crate) use compare::Likeness;
 pub use dense::{Dense, dense, usual};
 pub(crate) use geometric::geometric_by;
 pub use geometric::{Geometric, geometric};
@@ -27,6 +28,7 @@ pub use kind::DescriptorKind;
 pub use neighborhoods::Neighborhoods;
 pub use overlap::{Overlap, REACHES, overlap};
 pub use scored::{Part, Scores, scored};
+pub(crate) use similarity::Cosine;
 pub use similarity::{Similarity, similarity};
 #[doc(hidden)]
 pub use source::lacks_descriptors;

@@ -1,0 +1,219 @@
+//! Recovery of keypoints from a sequence of protected queries whose poses are known.
+//!
+//! Each query hides its keypoints on its own. A line seen from a known pose is a plane in space, and three planes meet in the point that
+//! the keypoint shows. Links between queries come from descriptors alone; no lists of neighbors are needed.
+//!
+//! ```text
+//! queries, poses ──Links──> tracks ──triangulate──> points ──project──> positions on the records
+//! ```
+
+mod links;
+mod triangulate;
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+pub use links::Links;
+use triangulate::{Fit, Sight, triangulate};
+
+use crate::geometry::frame::Bounds;
+use crate::geometry::vector::{dot, median, widen};
+use crate::recover::{Confidence, Estimate, Recovered, Status};
+use crate::released::{Obfuscation, Released};
+use crate::{About, Error, RowOrder, Unit};
+
+/// A pinhole camera with its pose: a point `x` of the world is at `rotation x + translation` in the frame right, down, forward.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Camera {
+    /// Focal lengths in pixels.
+    pub focal: [f64; 2],
+    /// Principal point in pixels; the middle of the first pixel is `(0, 0)`.
+    pub center: [f64; 2],
+    /// Rotation from the world to the camera.
+    pub rotation: [[f64; 3]; 3],
+    /// Position of the world's origin in the frame of the camera.
+    pub translation: [f64; 3],
+}
+
+/// Cosine of the largest angle between the viewing directions of two queries that are compared: 75 degrees.
+const TURNED: f64 = 0.26;
+
+impl Camera {
+    /// Returns the matrix `K [R | t]`.
+    fn projection(&self) -> [[f64; 4]; 3] {
+        let row = |r: usize| -> [f64; 4] {
+            let [x, y, z] = self.rotation[r];
+            [x, y, z, self.translation[r]]
+        };
+        let last = row(2);
+        let scaled = |r: usize| -> [f64; 4] {
+            let own = row(r);
+            std::array::from_fn(|c| self.focal[r] * own[c] + self.center[r] * last[c])
+        };
+        [scaled(0), scaled(1), last]
+    }
+
+    /// Whether both cameras look in similar directions, so that they can match.
+    fn looks_like(&self, other: &Self) -> bool {
+        dot(&self.rotation[2], &other.rotation[2]) > TURNED
+    }
+}
+
+/// A protected query and the pose at which the service localized it.
+#[derive(Clone, Debug)]
+pub struct Query {
+    /// The released records and descriptors. Pixels are those of a pinhole camera, without distortion.
+    pub released: Released<2>,
+    /// Camera and pose.
+    pub camera: Camera,
+}
+
+impl Query {
+    /// Back-projects the record of `slot`.
+    fn sight(&self, projection: [[f64; 4]; 3], slot: usize) -> Sight {
+        let origin = self.released.origin();
+        let record = slot / self.released.slots_per_record();
+        let absolute = |p: &[f32; 2]| [0, 1].map(|c| f64::from(p[c]) + origin[c]);
+        let through = |p: [f64; 2], d: &[f32; 2]| {
+            let [x, y] = widen(d);
+            let length = dot(&[x, y], &[x, y]).sqrt();
+            let normal = [-y / length, x / length];
+            [normal[0], normal[1], -dot(&normal, &p)]
+        };
+        let all = self.released.bounds().map_or(EVERYWHERE, |bounds| (bounds.low, bounds.high));
+        match self.released.obfuscation() {
+            Obfuscation::Lines(lines) => {
+                let line = through(absolute(&lines.foot()[record]), &lines.direction()[record]);
+                Sight::new(projection, all, [line])
+            }
+            Obfuscation::Rays(rays) => {
+                let center = usize::from(rays.center()[record]);
+                let line = through(absolute(&rays.centers()[center]), &rays.direction()[record]);
+                let region = rays.regions().map(|of| {
+                    let Bounds { low, high } = of[center];
+                    ([0, 1].map(|c| low[c] + origin[c]), [0, 1].map(|c| high[c] + origin[c]))
+                });
+                Sight::new(projection, region.unwrap_or(all), [line])
+            }
+            Obfuscation::AxisCandidates(candidates) => {
+                let [u, v] = absolute(&candidates.position()[record]);
+                Sight::new(projection, all, [[1.0, 0.0, -u], [0.0, 1.0, -v]])
+            }
+            Obfuscation::AxisPlanes(planes) => {
+                let axis = usize::from(planes.axis()[record]);
+                let at = f64::from(planes.offset()[record]) + origin[axis];
+                let line = if axis == 0 { [1.0, 0.0, -at] } else { [0.0, 1.0, -at] };
+                Sight::new(projection, all, [line])
+            }
+        }
+    }
+}
+
+const EVERYWHERE: ([f64; 2], [f64; 2]) = ([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
+
+/// Positions of one query's keypoints, recovered from a sequence.
+#[derive(Clone, Debug)]
+pub struct Solved {
+    /// Positions with their confidence.
+    pub recovered: Recovered<2>,
+    /// Number of views of each slot's track, with the query itself.
+    pub n_views: Vec<usize>,
+    /// Condition of each position: its standard deviation in pixels if all lines are off by one pixel. Infinite without a position.
+    pub condition: Vec<f64>,
+    /// The noise of keypoints and poses that the tracks show, in pixels.
+    pub noise_px: f64,
+}
+
+/// Noise with which tracks are first triangulated, in pixels. Shares depend little on it.
+const FIRST_NOISE_PX: f64 = 5.0;
+/// Least noise assumed, in pixels.
+const LEAST_NOISE_PX: f64 = 1.0;
+/// Largest noise assumed, in pixels. With more, every line would agree.
+const MOST_NOISE_PX: f64 = 12.0;
+/// Tracks with at least this many agreeing views show the noise.
+const TELLING: usize = 5;
+
+/// Recovers the keypoints of `queries[query]` from the queries in `window`, which may contain it. The position of a slot is the projection
+/// of its point in space, moved onto its own record.
+///
+/// # Errors
+/// When `query` or the window is out of range.
+pub fn recover(
+    queries: &[Query],
+    links: &Links,
+    query: usize,
+    window: Range<usize>,
+) -> Result<Solved, Error> {
+    if query >= queries.len() || window.end > queries.len() {
+        let found = format!("query {query}, window {window:?}");
+        return Err(Error::new("sequence", format!("{} queries", queries.len()), found));
+    }
+    let projections: Vec<_> = queries.iter().map(|query| query.camera.projection()).collect();
+    let own = &queries[query];
+    let n_slots = own.released.n_slots();
+    let sight = |query: usize, slot: usize| queries[query].sight(projections[query], slot);
+    let sights = |slot: usize| -> Vec<Sight> {
+        let track = links.track(query, slot, &window);
+        let others = track.iter().map(|&(other, at)| sight(other as usize, at as usize));
+        std::iter::once(sight(query, slot)).chain(others).collect()
+    };
+    let solve = |noise_px: f64| -> Vec<(usize, Option<Fit>)> {
+        let of = |slot: usize| {
+            let sights = sights(slot);
+            (sights.len(), triangulate(&sights, noise_px))
+        };
+        (0..n_slots).into_par_iter().map(of).collect()
+    };
+    let first = solve(FIRST_NOISE_PX);
+    let telling = first.iter().filter_map(|(_, fit)| fit.filter(|fit| fit.n_agree >= TELLING));
+    let mut residuals: Vec<f64> = telling.map(|fit| fit.residual_px).collect();
+    // A track's residual has three unknowns less than views, and a noise that is too small loses more than one too large.
+    let noise_px = match residuals.is_empty() {
+        true => FIRST_NOISE_PX,
+        false => (2.0 * median(&mut residuals)).clamp(LEAST_NOISE_PX, MOST_NOISE_PX),
+    };
+    let fits = solve(noise_px);
+    let is_pair = matches!(own.released.obfuscation(), Obfuscation::AxisCandidates(_));
+    let origin = own.released.origin();
+    let estimate = |(n_views, fit): &(usize, Option<Fit>)| match fit {
+        Some(fit) => Estimate {
+            position: [0, 1].map(|c| (fit.place[c] - origin[c]) as f32),
+            status: Status::Ok,
+            support: fit.n_agree as u16,
+            axis: if is_pair { 1 - fit.line as u8 } else { 0 },
+            evidence: 0.0,
+        },
+        None if *n_views < 3 => Estimate::lost(Status::TooFewNeighbors),
+        None => Estimate::lost(Status::NoSupport),
+    };
+    let estimates: Vec<Estimate<2>> = fits.iter().map(estimate).collect();
+    let confidence = fits.iter().map(|(n_views, fit)| match fit {
+        Some(fit) => confidence(fit, *n_views, is_pair, noise_px),
+        None => Confidence::LOST,
+    });
+    let about =
+        About { map: Some(own.released.fingerprint()), order: RowOrder::Slots, ..About::default() };
+    let recovered = Recovered::try_new(&estimates, is_pair, None, origin, Unit::Pixel, noise_px)?
+        .with_about(about)
+        .with_confidence(confidence.collect())?;
+    let condition = |(_, fit): &(usize, Option<Fit>)| fit.map_or(f64::INFINITY, |f| f.condition);
+    Ok(Solved {
+        recovered,
+        n_views: fits.iter().map(|(n_views, _)| *n_views).collect(),
+        condition: fits.iter().map(condition).collect(),
+        noise_px,
+    })
+}
+
+/// Predicts whether a fit is right and its error, from the views that agree and disagree. Constants are rounded from the shares observed
+/// on RedKitchen (docs/decisions/sequence.md).
+fn confidence(fit: &Fit, n_views: usize, is_pair: bool, noise_px: f64) -> Confidence {
+    let agree = fit.n_agree as f64 - 3.0;
+    let disagree = (n_views - fit.n_agree.min(n_views)) as f64;
+    let logit = if is_pair { 0.8 } else { 1.5 } + 1.3 * agree - 1.2 * libm::log1p(disagree);
+    let chance = |logit: f64| 1.0 / (1.0 + libm::exp(-logit));
+    let found = chance(logit) * chance(0.5 * fit.lead);
+    // `noise_px` is twice the residual, and the median of an error is two thirds of its deviation.
+    Confidence { found: found as f32, scale: (0.33 * noise_px * fit.condition) as f32 }
+}
