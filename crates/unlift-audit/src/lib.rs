@@ -39,7 +39,7 @@
 //!
 //! | feature | compiles |
 //! | --- | --- |
-//! | `networks` | Learned features, the source `learned`, pictures ([`inversion`]), and `paper`. |
+//! | `networks` | Learned features, the source `learned`, pictures ([`inversion`]), `paper` and `sequence`. |
 //! | `hdf5` | hloc's HDF5 files of features; writing them needs no feature. |
 //! | `sqlite` | COLMAP's `database.db`. |
 //! | `scans` | Maps in E57; LAS and PCD need no feature. |
@@ -69,6 +69,8 @@ pub mod paper;
 mod prepare;
 mod progress;
 mod scene;
+#[cfg(feature = "networks")]
+pub mod sequence;
 pub mod sources;
 mod tiles;
 

@@ -227,6 +227,23 @@ pub fn own_source(text: &str) -> Result<Named, String> {
     sources::named(text).map_err(|error| expected(&error))
 }
 
+/// Parses a number of queries: two or more.
+pub fn queries(text: &str) -> Result<usize, String> {
+    let number = text.trim().parse::<usize>().ok().filter(|n| *n >= 2);
+    number.ok_or_else(|| format!("expected a whole number from 2, found {text}"))
+}
+
+/// Parses `perturbed:CM,DEG`.
+pub fn poses(text: &str) -> Result<(f64, f64), String> {
+    let wrong = || format!("expected perturbed:CM,DEG (for example perturbed:5,0.5), found {text}");
+    let (cm, angle) =
+        text.strip_prefix("perturbed:").and_then(|of| of.split_once(',')).ok_or_else(wrong)?;
+    let size = |text: &str| {
+        text.trim().parse::<f64>().ok().filter(|x| x.is_finite() && *x >= 0.0).ok_or_else(wrong)
+    };
+    Ok((size(cm)?, size(angle)?))
+}
+
 /// Parses `NEIGHBORS,RATIO`, for example `20,2.0`.
 pub fn outlier_filter(text: &str) -> Result<OutlierFilter, String> {
     let fields = text.split_once(',').and_then(|(neighbors, std_ratio)| {

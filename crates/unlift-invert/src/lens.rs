@@ -9,6 +9,9 @@ use unlift::Error;
 /// Number of angles tested for the fold of a model: 0.03 degrees apart.
 const TRIED: usize = 6000;
 
+/// Most steps of Newton's method when a place is undistorted.
+const MOST_STEPS: usize = 50;
+
 /// The distortion of a camera model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
@@ -153,6 +156,40 @@ impl Lens {
         let on = |c: usize| self.focal[c] * place[c] + self.center[c] - 0.5;
         let place = [on(0), on(1)];
         place.iter().all(|x| x.is_finite()).then_some(place)
+    }
+
+    /// Focal lengths and principal point in pixels, with the middle of the first pixel at (0, 0).
+    pub fn pinhole(&self) -> ([f64; 2], [f64; 2]) {
+        (self.focal, self.center.map(|x| x - 0.5))
+    }
+
+    /// Returns the place at which a pinhole camera with the focal lengths and the principal point of
+    /// this lens sees what this lens sees at `place`, in pixels. `None` where the search finds none:
+    /// at 90 degrees from the axis and beyond, and outside of the lens's image.
+    pub fn undistorted(&self, place: [f64; 2]) -> Option<[f64; 2]> {
+        let (focal, center) = self.pinhole();
+        let flat = |place: [f64; 2]| [0, 1].map(|c| (place[c] - center[c]) / focal[c]);
+        let wanted = flat(place);
+        let mut guess = wanted;
+        for _ in 0..MOST_STEPS {
+            let error = |at: [f64; 2]| {
+                let seen = flat(self.project([at[0], at[1], 1.0])?);
+                Some([wanted[0] - seen[0], wanted[1] - seen[1]])
+            };
+            let off = error(guess)?;
+            if (0..2).all(|c| (off[c] * focal[c]).abs() < 1e-9) {
+                return Some([0, 1].map(|c| focal[c] * guess[c] + center[c]));
+            }
+            // Newton's method with differences.
+            let step = 1e-6;
+            let moved = [error([guess[0] + step, guess[1]])?, error([guess[0], guess[1] + step])?];
+            let by = |row: usize, c: usize| (off[row] - moved[c][row]) / step;
+            let (a, b, c, d) = (by(0, 0), by(0, 1), by(1, 0), by(1, 1));
+            let det = a * d - b * c;
+            guess[0] += (d * off[0] - b * off[1]) / det;
+            guess[1] += (a * off[1] - c * off[0]) / det;
+        }
+        None
     }
 
     /// Returns the position on the plane at focal length one.

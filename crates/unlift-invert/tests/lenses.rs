@@ -76,3 +76,17 @@ fn bad_cameras_are_said() {
         "EQUIRECTANGULAR: expected finite parameters, found NaN"
     );
 }
+
+#[test]
+fn a_place_is_undistorted_to_that_of_a_pinhole_camera() {
+    for (model, params, _) in SEEN.iter().filter(|(model, ..)| *model != "EQUIRECTANGULAR") {
+        let lens = Lens::try_new(model, params).unwrap();
+        let (focal, center) = lens.pinhole();
+        for [x, y, z] in POINTS {
+            let expected = [focal[0] * x / z + center[0], focal[1] * y / z + center[1]];
+            let found = lens.undistorted(lens.project([x, y, z]).unwrap()).unwrap();
+            let apart = (found[0] - expected[0]).hypot(found[1] - expected[1]);
+            assert!(apart < 1e-6, "{model}: {found:?}, not {expected:?}");
+        }
+    }
+}

@@ -11,6 +11,8 @@
 //! `:gain` bounds what neighborhoods add to the larger of these two baselines, in percentage
 //! points. Numbers are compared by value, so `0.1` matches the threshold `0.10`. No name of a
 //! solver or a source is a number, so the first number after the scheme is the threshold.
+//! `sequence@5` and `tracks@5` are sources: `dcl2d:sequence@5:10<=20` bounds what comes back from
+//! five queries.
 
 mod parse;
 mod results;

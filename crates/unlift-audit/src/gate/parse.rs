@@ -17,12 +17,13 @@ impl Gate {
         let typed = text.trim();
         let (left, bound) = typed.split_once("<=").ok_or_else(|| form("no <="))?;
         let (names, inlier_ratio, rest) = match left.split_once('@') {
-            Some((names, rest)) => {
+            // `sequence@5` is the name of a source.
+            Some((names, rest)) if !SEQUENCES.iter().any(|name| names.ends_with(name)) => {
                 let (text, rest) = rest.split_once(':').ok_or_else(|| form("no threshold"))?;
                 let value = ratio(text).map_err(|error| format!("inlier ratio: {error}"))?;
                 (names.split(':').collect::<Vec<_>>(), Some(value), rest.split(':').collect())
             }
-            None => {
+            _ => {
                 let mut names: Vec<&str> = left.split(':').collect();
                 let rest = names.split_off(n_names(&names));
                 (names, None, rest)
@@ -61,6 +62,8 @@ impl Gate {
 }
 
 const ORACLE: &str = "oracle";
+/// Sources of `audit sequence`, with the number of queries behind an `@`.
+const SEQUENCES: [&str; 2] = ["sequence", "tracks"];
 
 /// Counts the names left of `<=`: all parts before the first number. Without a number, all known
 /// names, so that the next part is reported as a wrong threshold.
@@ -81,6 +84,9 @@ fn solver_name(text: &str) -> Option<&'static str> {
 fn source_name(text: &str) -> Option<String> {
     match text.trim() {
         name @ (ORACLE | "file") => Some(name.to_owned()),
+        name if name.split_once('@').is_some_and(|(name, _)| SEQUENCES.contains(&name)) => {
+            Some(name.to_owned())
+        }
         name => sources::named(name).ok().map(|named| named.name().to_owned()),
     }
 }

@@ -172,3 +172,15 @@ fn what_needs_no_neighborhoods_counts_unless_an_attack_is_named() {
     assert_eq!(worst("olc:joint:0.10<=60"), Some(58.6));
     assert_eq!(worst("olc:oracle:0.10<=60"), Some(58.6));
 }
+
+#[test]
+fn a_sequence_is_named_with_its_number_of_queries() {
+    let gate = Gate::parse("dcl2d:sequence@5:10<=20").unwrap();
+    assert_eq!(
+        (gate.scheme.as_deref(), gate.source.as_deref()),
+        (Some("dcl2d"), Some("sequence@5"))
+    );
+    assert_eq!((gate.inlier_ratio, gate.threshold, gate.bound_percent), (None, 10.0, 20.0));
+    let gate = Gate::parse("all:tracks@20:5:gain<=1").unwrap();
+    assert_eq!((gate.source.as_deref(), gate.figure), (Some("tracks@20"), Figure::Gain));
+}

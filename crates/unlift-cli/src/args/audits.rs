@@ -345,6 +345,73 @@ pub struct AuditImagesArgs {
     pub attack: AttackArgs,
 }
 
+/// Options of `audit sequence`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  unlift audit sequence PROJECT photos
+  unlift audit sequence PROJECT PROJECT/database.db --queries 3,5,10 --schemes dcl2d
+  unlift audit sequence PROJECT photos --features aliked --gate 'dcl2d:sequence@5:10<=20'
+  unlift audit sequence PROJECT photos --poses perturbed:5,0.5 --scale 1
+
+Every image is a query that hides its keypoints on its own. A service knows the pose of each query.
+A line seen from a known pose is a plane in space, and three planes meet in a point, so several
+queries give keypoints back without neighbors. The attack links keypoints by their descriptors.
+
+The row sequence@5 attacks each image with the five consecutive images around it, in the order of
+their names. The row tracks@5 links them by the tracks of MODEL instead: what better links would
+give.
+
+Exit codes: 0 done, 1 a gate failed, 2 wrong usage, 3 bad input.")]
+pub struct AuditSequenceArgs {
+    /// A COLMAP project or model with the poses of the images
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// A folder of photos, hloc's features.h5, or a COLMAP database.db
+    #[arg(value_name = "PATH")]
+    pub path: PathBuf,
+    /// Features to extract from photos: sift, aliked, or superpoint, whose weights you supply (see
+    /// unlift models) [default: sift]
+    #[arg(long, value_name = "TYPE", value_parser = values::feature_type, help_heading = "Input")]
+    pub features: Option<DescriptorKind>,
+    /// Number of features per photo, as in unlift audit images
+    #[arg(long, value_parser = values::count, value_name = "N", help_heading = "Input")]
+    pub max_features: Option<NonZeroUsize>,
+    /// Keep only keypoints whose score exceeds SCORE; not for sift [default: aliked 0.2, superpoint
+    /// 0.005]
+    #[arg(long, value_name = "SCORE", value_parser = values::score, help_heading = "Input")]
+    pub min_score: Option<f32>,
+    /// Meters per unit of MODEL, for --poses
+    #[arg(long, value_name = "FACTOR", value_parser = values::scale, help_heading = "Input")]
+    pub scale: Option<f64>,
+    /// Random seed
+    #[arg(long, value_name = "INTEGER", default_value_t = 0, help_heading = "Input")]
+    pub seed: u64,
+    /// Schemes to audit, separated by commas (unlift schemes lists them) [default:
+    /// lines2d,cp2d,dcl2d]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_scheme,
+          help_heading = "Attack")]
+    pub schemes: Vec<&'static Entry>,
+    /// Numbers of queries that the attacker watches, separated by commas
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::queries,
+          default_value = "2,3,5,10,20", help_heading = "Attack")]
+    pub queries: Vec<usize>,
+    /// Add an error to each pose, as localization has it: CM centimeters in a random direction and
+    /// a turn by DEG degrees [default: the poses of MODEL]
+    #[arg(long, value_name = "perturbed:CM,DEG", value_parser = values::poses,
+          help_heading = "Attack")]
+    pub poses: Option<(f64, f64)>,
+    /// Largest errors, in pixels, at which a keypoint counts as recovered, separated by commas
+    /// [default: 5,10,25]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold,
+          help_heading = "Result")]
+    pub thresholds: Vec<Threshold>,
+    #[command(flatten)]
+    pub result: ResultArgs,
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
 /// Options of `audit released`.
 #[derive(Debug, Args)]
 #[command(after_help = "\

@@ -15,7 +15,8 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use crate::values;
 
 pub use audits::{
-    AttackArgs, AuditImagesArgs, AuditMapArgs, AuditReleasedArgs, CheckArgs, MapArgs, ResultArgs,
+    AttackArgs, AuditImagesArgs, AuditMapArgs, AuditReleasedArgs, AuditSequenceArgs, CheckArgs,
+    MapArgs, ResultArgs,
 };
 pub use images::{FeaturesArgs, InvertArgs, MetricsArgs};
 pub use program::{CompletionsArgs, DemoArgs, DoctorArgs, ManArgs, ModelsArgs};
@@ -174,6 +175,8 @@ pub enum AuditCommand {
     Images(Box<AuditImagesArgs>),
     /// Audit a scheme of your own: attack its records, and report how many points are recovered
     Released(Box<AuditReleasedArgs>),
+    /// Audit several images with known poses: report how many keypoints they give away together
+    Sequence(Box<AuditSequenceArgs>),
 }
 
 /// Kinds of benchmarks.

@@ -4,6 +4,7 @@ mod about;
 mod audit_images;
 mod audit_map;
 mod audit_released;
+mod audit_sequence;
 mod bench;
 mod check;
 mod common;
@@ -40,6 +41,7 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Audit(AuditCommand::Map(args)) => audit_map::run(*args),
         Command::Audit(AuditCommand::Images(args)) => audit_images::run(&args),
         Command::Audit(AuditCommand::Released(args)) => audit_released::run(&args),
+        Command::Audit(AuditCommand::Sequence(args)) => audit_sequence::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Obfuscate(args) => with_threads(None, || obfuscate::run(&args)),
         Command::Neighbors(NeighborsCommand::Oracle(args)) => {

@@ -14,7 +14,7 @@ use unlift_report::gate_found;
 
 use self::config::Entry;
 use super::common::all_could_be;
-use super::{audit_images, audit_map, audit_released};
+use super::{audit_images, audit_map, audit_released, audit_sequence};
 use crate::args::{AuditCommand, CheckArgs, Cli, Command, ResultArgs};
 use crate::exit::{self, Outcome, usage};
 use crate::output::print;
@@ -92,6 +92,7 @@ fn result(audit: &AuditCommand) -> &ResultArgs {
         AuditCommand::Map(args) => &args.result,
         AuditCommand::Images(args) => &args.result,
         AuditCommand::Released(args) => &args.result,
+        AuditCommand::Sequence(args) => &args.result,
     }
 }
 
@@ -100,6 +101,7 @@ fn result_mut(audit: &mut AuditCommand) -> &mut ResultArgs {
         AuditCommand::Map(args) => &mut args.result,
         AuditCommand::Images(args) => &mut args.result,
         AuditCommand::Released(args) => &mut args.result,
+        AuditCommand::Sequence(args) => &mut args.result,
     }
 }
 
@@ -120,6 +122,7 @@ fn inputs(audit: &AuditCommand) -> Vec<&Path> {
         AuditCommand::Map(args) => audit_map::inputs(args),
         AuditCommand::Images(args) => audit_images::inputs(args),
         AuditCommand::Released(args) => audit_released::inputs(args),
+        AuditCommand::Sequence(args) => audit_sequence::inputs(args),
     }
 }
 
@@ -161,6 +164,7 @@ fn perform(audit: &AuditCommand) -> anyhow::Result<Finished> {
     match audit {
         AuditCommand::Map(args) => audit_map::audit(args),
         AuditCommand::Released(args) => audit_released::audit(args),
+        AuditCommand::Sequence(args) => audit_sequence::audit(args),
         AuditCommand::Images(args) => {
             let (finished, used) = audit_images::audit(args)?;
             all_could_be("used", &args.path, used.used, used.unusable)?;

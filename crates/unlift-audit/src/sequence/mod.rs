@@ -1,0 +1,346 @@
+//! Audits of a sequence of queries: every image hides its keypoints on its own, and the attacker, who
+//! knows the poses, recovers them from several images.
+//!
+//! ```text
+//! model, features ──> views ──obfuscate──> queries ──Links──> recover ──> rows by number of queries
+//! ```
+
+mod view;
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use serde_json::{Map, Value, json};
+use unlift::audit::staged::{Pooled, key_of};
+use unlift::audit::{NeighborsBy, Plan, PointNeighbors, Row, Seconds};
+use unlift::evaluate::evaluate;
+use unlift::obfuscate::{Scheme, obfuscate};
+use unlift::seed::Key;
+use unlift::sequence::{Links, Query, recover};
+use unlift::truth::Secret;
+use unlift_io::atomic::OutputSet;
+use unlift_io::hash::{hash_file, hash_files};
+use unlift_io::read;
+use unlift_report::RenderOptions;
+use unlift_report::document::{ImageCounts, Input};
+
+use self::view::Model;
+pub use self::view::{PoseError, View};
+use crate::Error;
+use crate::audited::{Audited, Finished};
+use crate::document::{self, Found, Provenance};
+use crate::gate::{Gate, check_gates, gate_results};
+use crate::images::FeatureSource;
+use crate::images::audit::Used;
+use crate::progress::Progress;
+
+/// The inputs of an audit of a sequence.
+pub struct SequenceJob<'a> {
+    /// The COLMAP project or model with the poses.
+    pub model: &'a Path,
+    /// The features of the images.
+    pub source: &'a FeatureSource,
+    /// The path of the features as typed.
+    pub path: &'a Path,
+    /// The plan: schemes, thresholds and seed count.
+    pub plan: Plan<2>,
+    /// Numbers of queries to attack with, ascending.
+    pub queries: Vec<usize>,
+    /// The error that is added to the poses.
+    pub pose_error: Option<PoseError>,
+    /// Recorded options, in addition to those of the plan.
+    pub options: Map<String, Value>,
+    /// The gates.
+    pub gates: Vec<Gate>,
+    /// The output folder.
+    pub out: PathBuf,
+    /// Writes figures only.
+    pub share_safe: bool,
+    /// Receives the progress.
+    pub progress: &'a dyn Progress,
+    /// The command line, for the record.
+    pub command: Option<String>,
+    /// The start of the command.
+    pub started: Instant,
+}
+
+/// The solver of all rows.
+const SOLVER: &str = "triangulation";
+/// Links that the attacker makes from descriptors.
+const SEQUENCE: &str = "sequence";
+/// Links that the model's tracks give: the oracle.
+const TRACKS: &str = "tracks";
+/// A line of each of three views meets the others in a point.
+const LEAST_VIEWS: usize = 3;
+
+/// Runs the job and writes its folder, completely or not at all.
+///
+/// # Errors
+/// If the model cannot be read, fewer than two of its images have usable features, a number of
+/// queries exceeds theirs and has a gate, `progress` stops the audit, or the folder cannot be
+/// written. Unusable images are reported and counted.
+pub fn perform(mut job: SequenceJob<'_>, out: OutputSet) -> Result<(Finished, Used), Error> {
+    let steps = job.progress;
+    steps.show(0, 1, "reading images");
+    let input = read::open(job.model)?;
+    let Some(folder) = &input.model else {
+        let expected = "a COLMAP model, which has the poses";
+        return Err(unlift_io::Error::new(job.model, "", expected, input.format).into());
+    };
+    let pose_error = job.pose_error.map(|error| (error, job.plan.seed));
+    let (mut views, mut unusable) = (Vec::new(), job.source.refused().len());
+    job.source.refused().iter().for_each(|error| steps.say(&error.to_string()));
+    for view in Model::read(folder)?.views((job.source, job.path), pose_error) {
+        match view {
+            Ok(view) => views.push(view),
+            Err(error) => {
+                unusable += 1;
+                steps.say(&error.to_string());
+            }
+        }
+    }
+    let used = Used { used: views.len(), unusable };
+    let fewest = job.queries.first().copied().unwrap_or(2);
+    if views.len() < fewest {
+        let expected = format!("at least {fewest} images that are in {}", job.model.display());
+        let found = views.len().to_string();
+        return Err(unlift_io::Error::new(job.path, "", expected, found).into());
+    }
+    let mut notes = Vec::new();
+    let n_left_out: usize = views.iter().map(|view| view.n_left_out).sum();
+    if n_left_out > 0 {
+        notes.push(format!("{n_left_out} keypoints have no place in a pinhole camera: left out"));
+    }
+    let too_many: Vec<usize> = job.queries.extract_if(.., |n| *n > views.len()).collect();
+    if !too_many.is_empty() {
+        notes.push(format!("{} images: no rows for {too_many:?} queries", views.len()));
+    }
+    notes.iter().for_each(|note| steps.say(&format!("note: {note}")));
+    job.plan.neighbors = sources(&job.queries);
+    check_gates(&job.gates, &job.plan)?;
+    let (rows, seconds) = rows(&job, &views)?;
+    let gates = gate_results(&job.gates, &job.plan, &rows, &[], &[])?;
+    let provenance = Provenance {
+        notes,
+        input: described(&job, &input, &views, used)?,
+        options: options(&job),
+        gates,
+        command: job.command,
+        started: job.started,
+    };
+    let found = Found { rows: &rows, not_audited: &[], break_even: &[], seconds: &seconds };
+    let document = document::document(&job.plan, &found, provenance);
+    let audited = Audited { document, scene: None, drawn: RenderOptions::default() };
+    Ok((audited.write(out, &job.out, job.share_safe)?, used))
+}
+
+/// Names the sources of the rows, for gates.
+fn sources(queries: &[usize]) -> Vec<NeighborsBy<2>> {
+    let names = queries.iter().flat_map(|n| [SEQUENCE, TRACKS].map(|by| format!("{by}@{n}")));
+    let given = |name| {
+        let (offsets, neighbors, scores) = (Vec::new(), Vec::new(), None);
+        NeighborsBy::Given(PointNeighbors { name, offsets, neighbors, scores })
+    };
+    names.map(given).collect()
+}
+
+fn options(job: &SequenceJob<'_>) -> Map<String, Value> {
+    let schemes: Vec<&str> = job.plan.schemes.iter().map(|scheme| scheme.name()).collect();
+    let thresholds: Vec<&str> = job.plan.thresholds.iter().map(|t| t.label.as_str()).collect();
+    let mut options = job.options.clone();
+    options.insert("schemes".into(), json!(schemes));
+    options.insert("thresholds".into(), json!(thresholds));
+    options.insert("queries".into(), json!(job.queries));
+    if let Some(error) = job.pose_error {
+        options.insert("pose_error_distance".into(), json!(error.distance));
+        options.insert("pose_error_angle_deg".into(), json!(error.angle_deg));
+    }
+    options
+}
+
+fn described(
+    job: &SequenceJob<'_>,
+    model: &read::Input,
+    views: &[View],
+    used: Used,
+) -> Result<Input, Error> {
+    let sha256 = match job.source {
+        FeatureSource::Folder(folder) => {
+            let photos: Vec<&Path> = (0..folder.names().len()).map(|at| folder.path(at)).collect();
+            hash_files(&photos)?
+        }
+        FeatureSource::File(_) | FeatureSource::InMemory(_) => hash_file(job.path)?,
+    };
+    let n_points: usize = views.iter().map(|view| view.original.len()).sum();
+    Ok(Input {
+        path: Some(job.path.display().to_string()),
+        sha256: Some(sha256),
+        n_points: n_points as u64,
+        scale_m_per_unit: None,
+        unit_in_map_units: None,
+        other_sha256: [("model".to_owned(), hash_files(&model.files)?)].into_iter().collect(),
+        images: Some(ImageCounts {
+            found: (job.source.names().len() + job.source.refused().len()) as u64,
+            used: used.used as u64,
+            unusable: used.unusable as u64,
+            too_small: 0,
+        }),
+    })
+}
+
+/// Hides the views under each scheme and attacks them with each number of queries.
+fn rows(job: &SequenceJob<'_>, views: &[View]) -> Result<(Vec<Row>, Seconds), Error> {
+    let mut seconds = Seconds::default();
+    let mut rows = Vec::new();
+    let reach = job.queries.iter().copied().max().unwrap_or(0);
+    let mut linked: Option<(Vec<Query>, Links)> = None;
+    let total = job.plan.schemes.len() * job.queries.len() * 2;
+    for scheme in &job.plan.schemes {
+        let started = Instant::now();
+        let (queries, secrets) = hide(&**scheme, views, job.plan.seed)?;
+        seconds.obfuscate += started.elapsed().as_secs_f64();
+        job.progress.show(rows.len(), total, &format!("{}, linking queries", scheme.name()));
+        let started = Instant::now();
+        // Links depend on descriptors and cameras only, and most schemes release the same descriptors.
+        let links = match linked.take().filter(|(of, _)| have_same_descriptors(of, &queries)) {
+            Some((_, links)) => links,
+            None => Links::by_descriptors(&queries, reach)?,
+        };
+        seconds.neighbors += started.elapsed().as_secs_f64();
+        let tracks = tracks(views, &secrets);
+        let hidden = Hidden { views, queries, secrets };
+        for &n in &job.queries {
+            for (by, links) in [(SEQUENCE, &links), (TRACKS, &tracks)] {
+                if !job.progress.goes_on() {
+                    return Err(Error::request(
+                        "audit: expected to run to the end, found a request to stop",
+                    ));
+                }
+                let what = format!("{}, {n} queries, links by {by}", scheme.name());
+                job.progress.show(rows.len(), total, &what);
+                let started = Instant::now();
+                let row = hidden.row(links, &tracks, n, &job.plan)?;
+                seconds.recover += started.elapsed().as_secs_f64();
+                let (scheme, neighbors) = (scheme.name().to_owned(), format!("{by}@{n}"));
+                rows.push(Row { scheme, neighbors, k: n, solver: SOLVER.to_owned(), ..row });
+            }
+        }
+        linked = Some((hidden.queries, links));
+    }
+    seconds.rows = vec![Default::default(); rows.len()];
+    Ok((rows, seconds))
+}
+
+fn hide(
+    scheme: &dyn Scheme<2>,
+    views: &[View],
+    seed: u64,
+) -> Result<(Vec<Query>, Vec<Secret>), Error> {
+    let one = |view: &View| {
+        let key = key_of(&Key::from_seed(seed), &view.name);
+        let hidden = obfuscate(scheme, &view.original, Some(&view.descriptors), &key);
+        let (released, secret) = hidden.map_err(|error| error.within(&view.name))?;
+        Ok((Query { released, camera: view.camera.clone() }, secret))
+    };
+    let hidden: Result<Vec<_>, unlift::Error> = views.iter().map(one).collect();
+    Ok(hidden?.into_iter().unzip())
+}
+
+fn have_same_descriptors(a: &[Query], b: &[Query]) -> bool {
+    a.iter().map(|a| a.released.descriptors()).eq(b.iter().map(|b| b.released.descriptors()))
+}
+
+/// Links the slots that hide keypoints of the same point of the model.
+fn tracks(views: &[View], secrets: &[Secret]) -> Links {
+    let mut of_point: std::collections::BTreeMap<u32, Vec<(u32, u32)>> = Default::default();
+    for (query, (view, secret)) in views.iter().zip(secrets).enumerate() {
+        for (slot, original) in secret.hidden().iter().enumerate() {
+            if let Some(point) = view.shows[original.index()] {
+                of_point.entry(point).or_default().push((query as u32, slot as u32));
+            }
+        }
+    }
+    Links::of_tracks(secrets.iter().map(Secret::n_slots), of_point.into_values())
+}
+
+/// Protected views with their secrets.
+struct Hidden<'a> {
+    views: &'a [View],
+    queries: Vec<Query>,
+    secrets: Vec<Secret>,
+}
+
+/// Keypoints, and those recovered within the headline threshold.
+#[derive(Default)]
+struct Share {
+    n: usize,
+    within: usize,
+}
+
+impl Share {
+    fn add(&mut self, is_within: bool) {
+        self.n += 1;
+        self.within += usize::from(is_within);
+    }
+
+    fn percent(&self) -> f64 {
+        100.0 * self.within as f64 / self.n.max(1) as f64
+    }
+}
+
+impl Hidden<'_> {
+    /// Attacks every query with the `n` consecutive queries around it.
+    fn row(
+        &self,
+        links: &Links,
+        tracks: &Links,
+        n: usize,
+        plan: &Plan<2>,
+    ) -> Result<Row, unlift::Error> {
+        let headline = &plan.thresholds[plan.headline];
+        let mut pooled = Pooled::new(&plan.thresholds);
+        let (mut linked, mut tracked, mut right) =
+            (Share::default(), Share::default(), Share::default());
+        for (query, view) in self.views.iter().enumerate() {
+            let secret = &self.secrets[query];
+            let first = query.saturating_sub(n / 2).min(self.views.len() - n);
+            let window = first..first + n;
+            let solved = recover(&self.queries, links, query, window.clone())?;
+            let released = &self.queries[query].released;
+            pooled.add(&solved.recovered, &view.original, secret, Some(released))?;
+            let accuracy = evaluate(&solved.recovered, &view.original, secret)?;
+            for (slot, &error) in accuracy.errors().iter().enumerate() {
+                let is_within = error <= headline.value;
+                if solved.n_views[slot] >= LEAST_VIEWS {
+                    linked.add(is_within);
+                }
+                if 1 + tracks.track(query, slot, &window).len() >= LEAST_VIEWS {
+                    tracked.add(is_within);
+                }
+                let Some(point) = self.point(query, slot) else { continue };
+                for (other, at) in links.track(query, slot, &window) {
+                    if let Some(other) = self.point(other as usize, at as usize) {
+                        right.add(point == other);
+                    }
+                }
+            }
+        }
+        let missing = || unlift::Error::new("sequence", "keypoints", "none");
+        let mut row = pooled.row().ok_or_else(missing)?;
+        let of_all = |share: &Share| 100.0 * share.n as f64 / row.n_points.max(1) as f64;
+        let label = &headline.label;
+        row.metrics.extend([
+            ("linked_percent".to_owned(), of_all(&linked)),
+            (format!("linked_within_{label}_percent"), linked.percent()),
+            ("tracked_percent".to_owned(), of_all(&tracked)),
+            (format!("tracked_within_{label}_percent"), tracked.percent()),
+        ]);
+        row.inlier_ratio = right.percent() / 100.0;
+        Ok(row)
+    }
+
+    /// Returns the point of the model that a slot shows.
+    fn point(&self, query: usize, slot: usize) -> Option<u32> {
+        self.views[query].shows[self.secrets[query].hidden()[slot].index()]
+    }
+}

@@ -1,0 +1,235 @@
+//! The owner's side of each query: its keypoints, its camera, and the points of the model that they
+//! show.
+
+use std::path::Path;
+
+use rayon::prelude::*;
+use unlift::geometry::frame::Bounds;
+use unlift::seed::{Draws, Stage};
+use unlift::sequence::Camera;
+use unlift::truth::Original;
+use unlift::{Descriptors, PointSet, Unit};
+use unlift_invert::Lens;
+use unlift_io::Error;
+use unlift_io::features::ImageFeatures;
+use unlift_io::read::colmap::{self, Image};
+
+use crate::images::FeatureSource;
+
+/// A keypoint shows a point of the model if it is the nearest one to the point's projection and at
+/// most this far away, in pixels.
+const SHOWS_PX: f64 = 2.0;
+/// Places on each side of an image whose undistorted places bound the undistorted image.
+const PER_SIDE: usize = 32;
+
+/// An error added to each pose, as a service has it: of this size, in a random direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseError {
+    /// Distance of the camera from its true place, in units of the model.
+    pub distance: f64,
+    /// Angle between the camera and its true orientation, in degrees.
+    pub angle_deg: f64,
+}
+
+/// A query before it is protected.
+pub struct View {
+    /// The name of its image.
+    pub name: String,
+    /// The keypoints where a pinhole camera sees them.
+    pub original: Original<2>,
+    /// Their descriptors.
+    pub descriptors: Descriptors,
+    /// The camera, with the pose that the service has.
+    pub camera: Camera,
+    /// The row of the model's point that each keypoint shows, if any.
+    pub shows: Vec<Option<u32>>,
+    /// Keypoints without a place in a pinhole camera, which are left out.
+    pub n_left_out: usize,
+}
+
+/// The model: cameras, images by name, and the points that each image shows.
+pub struct Model {
+    lenses: Vec<(u32, Result<Lens, unlift::Error>, [u64; 2])>,
+    images: Vec<Image>,
+    positions: Vec<[f64; 3]>,
+    /// Rows of the points of each image.
+    shown: Vec<Vec<u32>>,
+}
+
+impl Model {
+    /// Reads the COLMAP model in the folder `folder`.
+    pub fn read(folder: &Path) -> Result<Self, Error> {
+        let (cameras, mut images) = colmap::read_views(folder)?;
+        images.sort_by(|a, b| a.name.cmp(&b.name));
+        let extension = if folder.join("points3D.bin").is_file() { "bin" } else { "txt" };
+        let points = colmap::read_points(&folder.join(format!("points3D.{extension}")), true)?;
+        let lens = |camera: &colmap::Camera| {
+            let lens = Lens::try_new(camera.model.name, &camera.params);
+            (camera.id, lens, [camera.width_px, camera.height_px])
+        };
+        let mut by_id: Vec<(u32, usize)> =
+            images.iter().enumerate().map(|(at, image)| (image.id, at)).collect();
+        by_id.sort_unstable();
+        let mut shown = vec![Vec::new(); images.len()];
+        if let Some(tracks) = &points.tracks {
+            for row in 0..points.ids.len() {
+                for &(id, _) in tracks.row(row) {
+                    if let Ok(at) = by_id.binary_search_by_key(&id, |image| image.0) {
+                        shown[by_id[at].1].push(row as u32);
+                    }
+                }
+            }
+        }
+        let lenses = cameras.iter().map(lens).collect();
+        Ok(Self { lenses, images, positions: points.positions, shown })
+    }
+
+    /// Returns the views of all images that are in the model and in `source`, in the order of their
+    /// names, and an error for each that cannot be used. `path` names the source in errors.
+    pub fn views(
+        &self,
+        (source, path): (&FeatureSource, &Path),
+        pose_error: Option<(PoseError, u64)>,
+    ) -> Vec<Result<View, crate::Error>> {
+        let names = source.names();
+        let both: Vec<(usize, usize)> = names
+            .iter()
+            .enumerate()
+            .filter_map(|(at, name)| {
+                let of = self
+                    .images
+                    .binary_search_by(|image| image.name.as_slice().cmp(name.as_bytes()));
+                Some((at, of.ok()?))
+            })
+            .collect();
+        let view = |&(at, of): &(usize, usize)| {
+            let features = source.get(at)?;
+            let place = format!("image {}", features.name.escape_debug());
+            let wrong = |expected: String, found: String| {
+                crate::Error::from(Error::new(path, place.clone(), expected, found))
+            };
+            self.view(features, of, pose_error).map_err(|(expected, found)| wrong(expected, found))
+        };
+        both.par_iter().with_max_len(1).map(view).collect()
+    }
+
+    /// Returns the view of the image `of`, or what was expected and found.
+    fn view(
+        &self,
+        features: ImageFeatures,
+        of: usize,
+        pose_error: Option<(PoseError, u64)>,
+    ) -> Result<View, (String, String)> {
+        let image = &self.images[of];
+        let unusable =
+            |error: &unlift::Error| (error.expected().to_owned(), error.found().to_owned());
+        let lens = self.lenses.iter().find(|(id, ..)| *id == image.camera_id);
+        let Some((_, lens, [width, height])) = lens else {
+            return Err(("a camera".to_owned(), "none".to_owned()));
+        };
+        let lens = lens.as_ref().map_err(unusable)?;
+        if let Some([w, h]) = features.size
+            && [u64::from(w), u64::from(h)] != [*width, *height]
+        {
+            let expected = format!("{width} x {height} pixels, as its camera in the model");
+            return Err((expected, format!("{w} x {h}")));
+        }
+        let descriptors = features.descriptors.as_ref();
+        let descriptors = descriptors.ok_or(("descriptors".to_owned(), "none".to_owned()))?;
+        let bounds = bounds(lens, [*width as f64, *height as f64])
+            .ok_or(("a camera with less than 180 degrees".to_owned(), "a wider one".to_owned()))?;
+        let (mut kept, mut places) = (Vec::new(), Vec::new());
+        for (row, &keypoint) in features.keypoints.iter().enumerate() {
+            if let Some(place) = lens.undistorted(keypoint).filter(|place| bounds.contains(place)) {
+                kept.push(row as u32);
+                places.push(place);
+            }
+        }
+        let points = PointSet::try_new(places, Unit::Pixel).map_err(|error| unusable(&error))?;
+        let original = Original::within(points, bounds).map_err(|error| unusable(&error))?;
+        let (focal, center) = lens.pinhole();
+        let (rotation, translation) = pose(image, pose_error);
+        Ok(View {
+            shows: self.shows(&features, of, lens, &kept),
+            original,
+            descriptors: descriptors.select(&kept),
+            camera: Camera { focal, center, rotation, translation },
+            n_left_out: features.keypoints.len() - kept.len(),
+            name: features.name,
+        })
+    }
+
+    /// Returns the point that each of the `kept` keypoints shows.
+    fn shows(
+        &self,
+        features: &ImageFeatures,
+        of: usize,
+        lens: &Lens,
+        kept: &[u32],
+    ) -> Vec<Option<u32>> {
+        let image = &self.images[of];
+        let mut shows: Vec<Option<(f64, u32)>> = vec![None; kept.len()];
+        for &row in &self.shown[of] {
+            let away = [0, 1, 2].map(|c| self.positions[row as usize][c] - image.center[c]);
+            let x = image.rotation.map(|r| (0..3).map(|c| r[c] * away[c]).sum::<f64>());
+            let Some(place) = lens.project(x) else { continue };
+            let distance = |at: usize| {
+                let [u, v] = features.keypoints[kept[at] as usize];
+                (u - place[0]).hypot(v - place[1])
+            };
+            let nearest = (0..kept.len()).min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
+            let Some(at) = nearest.filter(|&at| distance(at) <= SHOWS_PX) else { continue };
+            if shows[at].is_none_or(|(other, _)| distance(at) < other) {
+                shows[at] = Some((distance(at), row));
+            }
+        }
+        shows.into_iter().map(|shown| shown.map(|(_, row)| row)).collect()
+    }
+}
+
+/// Returns the box of the undistorted image.
+fn bounds(lens: &Lens, size: [f64; 2]) -> Option<Bounds<2>> {
+    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    for at in 0..=PER_SIDE {
+        let t = at as f64 / PER_SIDE as f64;
+        let [x, y] = size.map(|side| side * t - 0.5);
+        let [right, bottom] = size.map(|side| side - 0.5);
+        for place in [[x, -0.5], [x, bottom], [-0.5, y], [right, y]] {
+            let place = lens.undistorted(place)?;
+            for c in 0..2 {
+                low[c] = low[c].min(place[c]);
+                high[c] = high[c].max(place[c]);
+            }
+        }
+    }
+    Bounds::try_new(low, high).ok()
+}
+
+type Pose = ([[f64; 3]; 3], [f64; 3]);
+
+/// Returns rotation and translation of an image, with the error that a service has.
+fn pose(image: &Image, error: Option<(PoseError, u64)>) -> Pose {
+    let (mut rotation, mut center) = (image.rotation, image.center);
+    if let Some((error, seed)) = error {
+        let mut draws = Draws::new(seed, Stage::Image, u64::from(image.id));
+        let (axis, direction): ([f64; 3], [f64; 3]) = (draws.direction(), draws.direction());
+        (0..3).for_each(|c| center[c] += error.distance * direction[c]);
+        rotation = turned(&rotation, axis, error.angle_deg.to_radians());
+    }
+    let translation = rotation.map(|row| -(0..3).map(|c| row[c] * center[c]).sum::<f64>());
+    (rotation, translation)
+}
+
+/// Returns `rotation`, followed by a turn by `angle` about `axis`.
+fn turned(rotation: &[[f64; 3]; 3], axis: [f64; 3], angle: f64) -> [[f64; 3]; 3] {
+    let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+    let [x, y, z] = axis;
+    let cross = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
+    let turn = |r: usize, c: usize| {
+        let same = if r == c { cos } else { 0.0 };
+        same + sin * cross[r][c] + (1.0 - cos) * axis[r] * axis[c]
+    };
+    std::array::from_fn(|r| {
+        std::array::from_fn(|c| (0..3).map(|k| turn(r, k) * rotation[k][c]).sum())
+    })
+}

@@ -1,0 +1,126 @@
+//! `unlift audit sequence`: audits several queries with known poses.
+
+use std::path::Path;
+use std::time::Instant;
+
+use serde_json::{Map, json};
+use unlift::Unit;
+use unlift::audit::{Plan, Threshold};
+use unlift::obfuscate::SchemeOptions;
+use unlift_audit::images::extraction::Wanted;
+use unlift_audit::images::{FeatureSource, choice};
+use unlift_audit::sequence::{PoseError, SequenceJob, perform};
+use unlift_audit::{Finished, Shown, open_audit};
+use unlift_features::load::Turn;
+use unlift_io::atomic::Rules;
+
+use super::common::with_threads;
+use super::gate_files::GateFiles;
+use super::plan::{summary, thresholds};
+use crate::args::AuditSequenceArgs;
+use crate::exit::{Outcome, usage};
+use crate::output::{command_line, print};
+use crate::progress::{Progress, Stderr};
+use crate::stderr;
+use crate::values::distinct;
+
+pub fn run(args: &AuditSequenceArgs) -> anyhow::Result<Outcome> {
+    let finished = audit(args)?;
+    print(&if args.result.json { summary(&finished)? } else { finished.text() })?;
+    Ok(if finished.passed() { Outcome::Done } else { Outcome::GateFailed })
+}
+
+/// Returns the input paths, which must not be overwritten.
+pub fn inputs(args: &AuditSequenceArgs) -> Vec<&Path> {
+    vec![&args.model, &args.path]
+}
+
+/// Audits a sequence and writes the results.
+pub fn audit(args: &AuditSequenceArgs) -> anyhow::Result<Finished> {
+    let started = Instant::now();
+    let plan = plan(args)?;
+    let pose_error = pose_error(args)?;
+    let rules = Rules::new(inputs(args), args.result.force);
+    let shown = if args.result.share_safe { Shown::Figures } else { Shown::Points };
+    let gate_files = GateFiles::check(&args.result, &rules)?;
+    let out = open_audit(&args.result.out, rules, shown, &Stderr)?;
+    let finished = with_threads(args.run.threads, || {
+        let wanted = Wanted {
+            option: "--features",
+            kind: args.features,
+            max_features: args.max_features,
+            min_score: args.min_score,
+            ..Wanted::default()
+        };
+        // A model is of the photos as they are stored.
+        let source = FeatureSource::open(&args.path, &wanted.extraction(&args.path)?)?;
+        let source = source.with_turn(Turn::AsStored);
+        if let Some(note) = source.passed_over() {
+            stderr::note(note);
+        }
+        let progress = Progress::new(args.run.quiet);
+        let mut queries = args.queries.clone();
+        queries.sort_unstable();
+        queries.dedup();
+        let job = SequenceJob {
+            model: &args.model,
+            source: &source,
+            path: &args.path,
+            plan,
+            queries,
+            pose_error,
+            options: options(args),
+            gates: args.result.gate.clone(),
+            out: args.result.out.clone(),
+            share_safe: args.result.share_safe,
+            progress: &progress,
+            command: Some(command_line()),
+            started,
+        };
+        Ok(perform(job, out)?.0)
+    })?;
+    gate_files.write(&finished)?;
+    Ok(finished)
+}
+
+fn plan(args: &AuditSequenceArgs) -> anyhow::Result<Plan<2>> {
+    let usual = Plan::new(Unit::Pixel);
+    let schemes = match args.schemes.as_slice() {
+        [] => usual.schemes.clone(),
+        given => {
+            let options = SchemeOptions::usual(Unit::Pixel);
+            let entries = distinct(given.to_vec(), |a, b| a.name == b.name);
+            entries.iter().filter_map(|entry| entry.of_dimension(&options)).collect()
+        }
+    };
+    let of = |label: &str, value: f64| Threshold { label: label.to_owned(), value };
+    let few = Plan { thresholds: vec![of("5", 5.0), of("10", 10.0), of("25", 25.0)], ..usual };
+    let thresholds = thresholds(&args.thresholds, &few)?;
+    let headline = choice::headline(&thresholds);
+    Ok(Plan { schemes, thresholds, headline, seed: args.seed, ..few })
+}
+
+/// Returns the error of the poses in units of the model.
+fn pose_error(args: &AuditSequenceArgs) -> anyhow::Result<Option<PoseError>> {
+    let Some((cm, angle_deg)) = args.poses else { return Ok(None) };
+    let Some(scale) = args.scale else {
+        return Err(usage("--poses perturbed: expected --scale, meters per unit of the model"));
+    };
+    Ok(Some(PoseError { distance: 0.01 * cm / scale, angle_deg }))
+}
+
+/// Returns the options that change the images, for the report.
+fn options(args: &AuditSequenceArgs) -> Map<String, serde_json::Value> {
+    let mut options = Map::new();
+    options.insert("model".into(), json!(args.model.display().to_string()));
+    if let Some(kind) = args.features {
+        options.insert("features".into(), json!(kind.name()));
+    }
+    if let Some(most) = args.max_features {
+        options.insert("max_features".into(), json!(most.get()));
+    }
+    if let Some(score) = args.min_score {
+        options.insert("min_score".into(), json!(score));
+    }
+    options
+}
