@@ -13,6 +13,7 @@ or parts of them, named after the folder; each tells on stderr how long it took 
     large       5 min    the cost of 700,000 points
     images      5 min    keypoints of photos
     pictures    5 min    what came back, painted
+    sequence    6 min    several queries with known poses
 
 `± s` is the standard deviation over seeds, where it exceeds 0.5. Needs the scenes (SHARED/data) and the paper's tables (SHARED/paper/tables);
 standard library only. Everything between the begin and end markers of the two files is replaced.
@@ -21,6 +22,7 @@ import array, csv, json, math, pathlib, random, struct, subprocess, sys, tempfil
 
 import image_tables
 import picture_tables
+import sequence_tables
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 SHARED = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else ROOT.parent / "shared").resolve()
@@ -367,9 +369,13 @@ def pictures():
     put(ROOT / "docs/benchmarks.md", "pictures", picture_tables.tables(ROOT / "target/release/unlift", SHARED))
 
 
+def sequence():
+    put(ROOT / "docs/benchmarks.md", "sequence", sequence_tables.tables(ROOT / "target/release/unlift", SHARED))
+
+
 def main():
     sections = {"accuracy": accuracy, "low": below_a_tenth, "noise": noise, "own": own, "alone": alone, "large": large,
-                "images": images, "pictures": pictures}
+                "images": images, "pictures": pictures, "sequence": sequence}
     for name in sys.argv[2:] or sections:
         started = time.monotonic()
         sections[name]()

@@ -64,9 +64,19 @@ pub(crate) fn basis_of(neighbors: &str, solver: &str) -> Option<Basis> {
         _ if solver == REFERENCE => None,
         _ if !looks_at_neighbors(solver) => Some(Basis::Released),
         "oracle" => Some(Basis::Oracle),
+        name if name.starts_with(TRACKS) => Some(Basis::Oracle),
         "file" => Some(Basis::Given),
         _ => Some(Basis::Released),
     }
+}
+
+/// Sources of a sequence, before the number of queries: links by descriptors, and by true tracks.
+const SEQUENCE: &str = "sequence@";
+const TRACKS: &str = "tracks@";
+
+/// Returns the number of queries of a row of a sequence, as text.
+pub(crate) fn queries(neighbors: &str) -> Option<&str> {
+    neighbors.strip_prefix(SEQUENCE).or_else(|| neighbors.strip_prefix(TRACKS))
 }
 
 pub(crate) fn has_neighborhoods(row: &Row) -> bool {
@@ -105,6 +115,12 @@ pub(crate) fn plain_source(neighbors: &str, oracle_noise: Option<&str>) -> Strin
         ("similarity", _) => "neighbors by descriptor similarity".to_owned(),
         ("learned", _) => "neighbors by a learned network".to_owned(),
         ("geometric", _) => "neighbors by record geometry".to_owned(),
+        (own, _) if own.starts_with(TRACKS) => {
+            format!("{} queries with known poses and tracks", &own[TRACKS.len()..])
+        }
+        (own, _) if own.starts_with(SEQUENCE) => {
+            format!("{} queries with known poses", &own[SEQUENCE.len()..])
+        }
         (own, _) => format!("neighbors by {own}"),
     }
 }
@@ -130,6 +146,9 @@ pub(crate) fn briefly(row: &Row) -> String {
 pub(crate) fn name(row: &Row) -> String {
     if !has_neighborhoods(row) {
         return records_alone(Some(&row.solver));
+    }
+    if queries(&row.neighbors).is_some() {
+        return plain_source(&row.neighbors, None);
     }
     // The attacker chooses the length of its own lists, and the share of right neighbors depends on it.
     let given = match basis(row) {

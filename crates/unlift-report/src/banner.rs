@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::attack::Basis;
 use crate::cards::{Card, Finding, Level, Refusal};
 use crate::document::{Document, LengthUnit, Row};
-use crate::{tables, words};
+use crate::{sequence, tables, words};
 
 /// The verdict on a whole audit in a few lines.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -88,7 +88,8 @@ fn said(document: &Document, (card, finding): (&Card, &Finding)) -> String {
     let by = format!("{}, {}", card.scheme.to_uppercase(), finding.briefly);
     match finding.basis {
         Basis::Released => {
-            format!("An attacker recovers {what} today, from the released data alone ({by}).")
+            let from = finding.when.trim_start_matches("Today, ");
+            format!("An attacker recovers {what} today, {from} ({by}).")
         }
         Basis::Given => format!("An attacker recovers {what} with given neighbors ({by})."),
         Basis::Oracle => {
@@ -107,6 +108,15 @@ pub(crate) fn next_steps(document: &Document, cards: &[Card]) -> Vec<String> {
     let with_descriptors = BY_DESCRIPTORS.iter().any(|name| tried(name));
     let has_file = document.options.get("descriptors").is_some_and(|given| !given.is_null());
     let mut steps = Vec::new();
+    if sequence::is_sequence(document) {
+        steps.extend(sequence::sentences(document));
+        steps.push(
+            "Mitigate and measure again: send fewer queries, or withhold the pose. Fewer views of \
+             a point give an attacker less to work with."
+                .to_owned(),
+        );
+        return steps;
+    }
     if !with_descriptors {
         let options = match images || has_file {
             true => "`--neighbors descriptors`",

@@ -51,6 +51,7 @@ pub mod printed;
 mod round;
 mod sarif;
 pub mod scene;
+mod sequence;
 mod share;
 mod shares;
 mod tables;

@@ -2,7 +2,7 @@
 
 use crate::document::{Bound, Document, LengthUnit, Row, STRONGEST};
 use crate::verdict::Verdict;
-use crate::{attack, tables, tiles, verdict, words};
+use crate::{attack, sequence, tables, tiles, verdict, words};
 
 /// Returns the verdict in two lines, then a table with a few lines per scheme, the worst first: every source tried, the
 /// records alone, and the oracle at the headline inlier ratio. Columns are the percentages within each threshold, a
@@ -14,6 +14,10 @@ pub fn text_table(document: &Document) -> String {
     let headline = tables::headline_threshold(document).unwrap_or_default();
     let Verdict { banner, cards, .. } = verdict::verdict(document);
 
+    if sequence::is_sequence(document) {
+        let sentences = sequence::sentences(document).join("\n");
+        return format!("{}\n{sentences}\n\n{}", banner.headline, sequence::table(document));
+    }
     let mut head = ["scheme", "neighbors by", "true", "solver"].map(str::to_owned).to_vec();
     head.extend(thresholds.iter().map(|typed| format!("{typed} {}", unit(document))));
     head.extend(["blind", "break-even"].map(str::to_owned));

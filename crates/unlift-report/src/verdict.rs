@@ -10,7 +10,7 @@ use crate::attack::{self, Basis, Given};
 use crate::banner::{Banner, banner, next_steps};
 use crate::cards::{Card, Finding, Level, Refusal};
 use crate::document::{Bound, BreakEven, Document, Row};
-use crate::{tables, words};
+use crate::{sequence, tables, words};
 
 /// The oracle's headline is its tested inlier ratio nearest to this one.
 const HEADLINE_RATIO: f64 = 0.5;
@@ -172,8 +172,14 @@ fn card(document: &Document, scheme: &str) -> Option<Card> {
 
 fn when(basis: Basis, row: &Row) -> String {
     match basis {
+        Basis::Released if attack::queries(&row.neighbors).is_some() => {
+            "Today, from released queries and their poses".to_owned()
+        }
         Basis::Released => "Today, from the released data alone".to_owned(),
         Basis::Given => "With neighbors from a given file".to_owned(),
+        Basis::Oracle if attack::queries(&row.neighbors).is_some() => {
+            "With the true tracks".to_owned()
+        }
         Basis::Oracle => words::capital(&words::if_known(row.inlier_ratio)),
     }
 }
@@ -208,7 +214,7 @@ fn baselines(
             format!("{} ({source})", added(share(row, typed) - floor))
         })
         .collect();
-    match adds.is_empty() {
+    match adds.is_empty() || sequence::is_sequence(document) {
         true => without,
         false => format!("{without} Lists of neighbors add {}.", words::list(&adds)),
     }

@@ -3,12 +3,12 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use unlift::Error;
-use unlift::audit::{Cell, Counts, Measure};
+use unlift::audit::{Cell, Counts, Measure, Row};
+use unlift::{Descriptors, Error};
 use unlift_features::ColorImage;
 use unlift_features::load::{Turn, read_color_with};
 use unlift_features::preview::jpeg_of;
-use unlift_invert::Detection;
+use unlift_invert::{Detection, Points};
 use unlift_report::inversions::Inversion as Sheet;
 
 use super::{Judged, Painter, SHOWN, boxed, figures, needed, painted, shown, size};
@@ -65,23 +65,62 @@ impl Inversion {
     /// If the photo cannot be used (see [`failed`](Self::failed)).
     pub fn add(&self, cell: &Cell<'_, 2>, sheet: &mut Sheet) -> Result<(), Error> {
         let truth = self.truth(cell)?;
+        let picture = self.painter.image(cell.released, cell.recovered)?;
+        self.put(&truth, cell.row, &picture, sheet)
+    }
+
+    /// Adds the picture of `recovered` keypoints to the sheet of the image `name`, whose photo has
+    /// `size` pixels and shows the keypoints `original`.
+    ///
+    /// # Errors
+    /// If the photo cannot be used.
+    pub fn add_keypoints(
+        &self,
+        (name, size): (&str, [usize; 2]),
+        original: (&[[f32; 2]], &Descriptors),
+        recovered: &Points<'_>,
+        row: &Row,
+        sheet: &mut Sheet,
+    ) -> Result<(), Error> {
+        let truth = self.truth_of(name, size, original)?;
+        let picture = self.painter.inverter.invert(recovered, size)?;
+        self.put(&truth, row, &picture, sheet)
+    }
+
+    fn put(
+        &self,
+        truth: &Truth,
+        row: &Row,
+        picture: &ColorImage,
+        sheet: &mut Sheet,
+    ) -> Result<(), Error> {
         if sheet.photo.is_empty() {
             sheet.photo = jpeg_of(&truth.photo, SHOWN)?;
             sheet.objects = boxed(&truth.objects, &truth.photo);
             sheet.baseline = painted(&truth.picture, &truth.baseline)?;
         }
-        let picture = self.painter.image(cell.released, cell.recovered)?;
-        let judged = self.painter.judge(&picture, &truth.photo, &truth.objects)?;
-        sheet.views.push(shown(cell.row, &picture, &judged)?);
+        let judged = self.painter.judge(picture, &truth.photo, &truth.objects)?;
+        sheet.views.push(shown(row, picture, &judged)?);
         Ok(())
     }
 
     fn truth(&self, cell: &Cell<'_, 2>) -> Result<Arc<Truth>, Error> {
-        let name = cell.name.unwrap_or_default();
+        let points = cell.original.reveal().positions().iter();
+        let places: Vec<[f32; 2]> = points.map(|place| place.map(|x| x as f32)).collect();
+        let original = (&places[..], needed(cell.descriptors)?);
+        self.truth_of(cell.name.unwrap_or_default(), size(cell.released)?, original)
+    }
+
+    fn truth_of(
+        &self,
+        name: &str,
+        size: [usize; 2],
+        (places, descriptors): (&[[f32; 2]], &Descriptors),
+    ) -> Result<Arc<Truth>, Error> {
         if let Some(known) = lock(&self.known).get(name) {
             return Ok(Arc::clone(known));
         }
-        let (path, size) = (self.photos.join(name), size(cell.released)?);
+        let path = self.photos.join(name);
         let photo = read_color_with(&path, self.turn)?;
         if [photo.width(), photo.height()] != size {
             let [expected, found] = [size, [photo.width(), photo.height()]]
@@ -90,15 +129,7 @@ impl Inversion {
             return Err(Error::new(path, format!("a photo of {expected}"), found));
         }
         let photo = photo.halved()?;
-        let descriptors = needed(cell.descriptors)?;
-        let places: Vec<[f32; 2]> = cell
-            .original
-            .reveal()
-            .positions()
-            .iter()
-            .map(|place| place.map(|x| x as f32))
-            .collect();
-        let picture = self.painter.keypoints(&places, descriptors, size)?;
+        let picture = self.painter.keypoints(places, descriptors, size)?;
         let objects = self.painter.objects(&photo)?;
         let baseline = self.painter.judge(&picture, &photo, &objects)?;
         let truth = Arc::new(Truth { photo, objects, picture, baseline });

@@ -36,7 +36,7 @@ const SURE: f32 = 0.3;
 const SAME: f32 = 0.5;
 
 /// Distance in pixels within which a keypoint's descriptor paints the correct content.
-const NEAR_PX: f64 = 10.0;
+pub(crate) const NEAR_PX: f64 = 10.0;
 /// Distance within which a map point's descriptor paints the correct content, as a share of its
 /// depth: about 15 of 640 pixels.
 const NEAR: f64 = 0.03;
@@ -271,7 +271,7 @@ fn size(released: &Released<2>) -> Result<[usize; 2], Error> {
 
 /// Returns the probability that a recovered point is within `near` of its place; 0 below [`LEAST`],
 /// and 1 if the attack estimates no probability.
-fn weight<const D: usize>(recovered: &Recovered<D>, slot: usize, near: f64) -> f32 {
+pub(crate) fn weight<const D: usize>(recovered: &Recovered<D>, slot: usize, near: f64) -> f32 {
     match recovered.probability_within(slot, near) {
         Some(sure) if sure < LEAST => 0.0,
         Some(sure) => sure as f32,

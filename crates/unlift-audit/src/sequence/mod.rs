@@ -5,8 +5,10 @@
 //! model, features ──> views ──obfuscate──> queries ──Links──> recover ──> rows by number of queries
 //! ```
 
+mod pictures;
 mod view;
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -23,6 +25,7 @@ use unlift_io::hash::{hash_file, hash_files};
 use unlift_io::read;
 use unlift_report::RenderOptions;
 use unlift_report::document::{ImageCounts, Input};
+use unlift_report::inversions::Inversion as Sheet;
 
 use self::view::Model;
 pub use self::view::{PoseError, View};
@@ -32,6 +35,7 @@ use crate::document::{self, Found, Provenance};
 use crate::gate::{Gate, check_gates, gate_results};
 use crate::images::FeatureSource;
 use crate::images::audit::Used;
+use crate::inversion::Inversion;
 use crate::progress::Progress;
 
 /// The inputs of an audit of a sequence.
@@ -52,6 +56,8 @@ pub struct SequenceJob<'a> {
     pub options: Map<String, Value>,
     /// The gates.
     pub gates: Vec<Gate>,
+    /// Makes pictures of recovered keypoints, if they are wanted.
+    pub inversion: Option<&'a Inversion>,
     /// The output folder.
     pub out: PathBuf,
     /// Writes figures only.
@@ -118,7 +124,8 @@ pub fn perform(mut job: SequenceJob<'_>, out: OutputSet) -> Result<(Finished, Us
     notes.iter().for_each(|note| steps.say(&format!("note: {note}")));
     job.plan.neighbors = sources(&job.queries);
     check_gates(&job.gates, &job.plan)?;
-    let (rows, seconds) = rows(&job, &views)?;
+    let mut inversions = Vec::new();
+    let (rows, seconds) = rows(&job, &views, &mut inversions)?;
     let gates = gate_results(&job.gates, &job.plan, &rows, &[], &[])?;
     let provenance = Provenance {
         notes,
@@ -130,7 +137,10 @@ pub fn perform(mut job: SequenceJob<'_>, out: OutputSet) -> Result<(Finished, Us
     };
     let found = Found { rows: &rows, not_audited: &[], break_even: &[], seconds: &seconds };
     let document = document::document(&job.plan, &found, provenance);
-    let audited = Audited { document, scene: None, drawn: RenderOptions::default() };
+    // Photos that could not be used have no pictures.
+    inversions.retain(|sheet| !sheet.views.is_empty());
+    let drawn = RenderOptions { inversions, ..RenderOptions::default() };
+    let audited = Audited { document, scene: None, drawn };
     Ok((audited.write(out, &job.out, job.share_safe)?, used))
 }
 
@@ -189,7 +199,11 @@ fn described(
 }
 
 /// Hides the views under each scheme and attacks them with each number of queries.
-fn rows(job: &SequenceJob<'_>, views: &[View]) -> Result<(Vec<Row>, Seconds), Error> {
+fn rows(
+    job: &SequenceJob<'_>,
+    views: &[View],
+    inversions: &mut Vec<Sheet>,
+) -> Result<(Vec<Row>, Seconds), Error> {
     let mut seconds = Seconds::default();
     let mut rows = Vec::new();
     let reach = job.queries.iter().copied().max().unwrap_or(0);
@@ -222,7 +236,11 @@ fn rows(job: &SequenceJob<'_>, views: &[View]) -> Result<(Vec<Row>, Seconds), Er
                 let row = hidden.row(links, &tracks, n, &job.plan)?;
                 seconds.recover += started.elapsed().as_secs_f64();
                 let (scheme, neighbors) = (scheme.name().to_owned(), format!("{by}@{n}"));
-                rows.push(Row { scheme, neighbors, k: n, solver: SOLVER.to_owned(), ..row });
+                let row = Row { scheme, neighbors, k: n, solver: SOLVER.to_owned(), ..row };
+                if let (Some(inversion), SEQUENCE) = (job.inversion, by) {
+                    pictures::paint(inversion, (&hidden, links), &row, job.progress, inversions)?;
+                }
+                rows.push(row);
             }
         }
         linked = Some((hidden.queries, links));
@@ -303,8 +321,7 @@ impl Hidden<'_> {
             (Share::default(), Share::default(), Share::default());
         for (query, view) in self.views.iter().enumerate() {
             let secret = &self.secrets[query];
-            let first = query.saturating_sub(n / 2).min(self.views.len() - n);
-            let window = first..first + n;
+            let window = self.window(query, n);
             let solved = recover(&self.queries, links, query, window.clone())?;
             let released = &self.queries[query].released;
             pooled.add(&solved.recovered, &view.original, secret, Some(released))?;
@@ -337,6 +354,12 @@ impl Hidden<'_> {
         ]);
         row.inlier_ratio = right.percent() / 100.0;
         Ok(row)
+    }
+
+    /// Returns the `n` consecutive queries around `query`.
+    fn window(&self, query: usize, n: usize) -> Range<usize> {
+        let first = query.saturating_sub(n / 2).min(self.views.len() - n);
+        first..first + n
     }
 
     /// Returns the point of the model that a slot shows.

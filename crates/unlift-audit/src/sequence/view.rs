@@ -41,10 +41,23 @@ pub struct View {
     pub descriptors: Descriptors,
     /// The camera, with the pose that the service has.
     pub camera: Camera,
+    /// The camera's lens.
+    pub lens: Lens,
+    /// Width and height of the photo in pixels.
+    pub size: [usize; 2],
     /// The row of the model's point that each keypoint shows, if any.
     pub shows: Vec<Option<u32>>,
     /// Keypoints without a place in a pinhole camera, which are left out.
     pub n_left_out: usize,
+}
+
+impl View {
+    /// Returns where the photo shows a place of the pinhole camera; NaN where it does not.
+    pub fn in_photo(&self, place: [f64; 2]) -> [f32; 2] {
+        let (focal, center) = self.lens.pinhole();
+        let [x, y] = [0, 1].map(|c| (place[c] - center[c]) / focal[c]);
+        self.lens.project([x, y, 1.0]).map_or([f32::NAN; 2], |place| place.map(|x| x as f32))
+    }
 }
 
 /// The model: cameras, images by name, and the points that each image shows.
@@ -154,6 +167,8 @@ impl Model {
             original,
             descriptors: descriptors.select(&kept),
             camera: Camera { focal, center, rotation, translation },
+            lens: lens.clone(),
+            size: [*width as usize, *height as usize],
             n_left_out: features.keypoints.len() - kept.len(),
             name: features.name,
         })

@@ -406,6 +406,12 @@ pub struct AuditSequenceArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold,
           help_heading = "Result")]
     pub thresholds: Vec<Threshold>,
+    /// Paint pictures of three images from the keypoints recovered with each number of queries
+    #[arg(long, help_heading = "Result", conflicts_with = "share_safe")]
+    pub invert: bool,
+    /// Folder of the photos for --invert, if PATH is a file
+    #[arg(long, value_name = "DIR", help_heading = "Result", requires = "invert")]
+    pub photos: Option<PathBuf>,
     #[command(flatten)]
     pub result: ResultArgs,
     #[command(flatten)]

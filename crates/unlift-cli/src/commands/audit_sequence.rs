@@ -9,6 +9,7 @@ use unlift::audit::{Plan, Threshold};
 use unlift::obfuscate::SchemeOptions;
 use unlift_audit::images::extraction::Wanted;
 use unlift_audit::images::{FeatureSource, choice};
+use unlift_audit::inversion::Inversion;
 use unlift_audit::sequence::{PoseError, SequenceJob, perform};
 use unlift_audit::{Finished, Shown, open_audit};
 use unlift_features::load::Turn;
@@ -16,6 +17,7 @@ use unlift_io::atomic::Rules;
 
 use super::common::with_threads;
 use super::gate_files::GateFiles;
+use super::painter::{kind, painter};
 use super::plan::{summary, thresholds};
 use crate::args::AuditSequenceArgs;
 use crate::exit::{Outcome, usage};
@@ -55,6 +57,7 @@ pub fn audit(args: &AuditSequenceArgs) -> anyhow::Result<Finished> {
         // A model is of the photos as they are stored.
         let source = FeatureSource::open(&args.path, &wanted.extraction(&args.path)?)?;
         let source = source.with_turn(Turn::AsStored);
+        let inversion = inversion(args, &source)?;
         if let Some(note) = source.passed_over() {
             stderr::note(note);
         }
@@ -71,6 +74,7 @@ pub fn audit(args: &AuditSequenceArgs) -> anyhow::Result<Finished> {
             pose_error,
             options: options(args),
             gates: args.result.gate.clone(),
+            inversion: inversion.as_ref(),
             out: args.result.out.clone(),
             share_safe: args.result.share_safe,
             progress: &progress,
@@ -81,6 +85,28 @@ pub fn audit(args: &AuditSequenceArgs) -> anyhow::Result<Finished> {
     })?;
     gate_files.write(&finished)?;
     Ok(finished)
+}
+
+/// Returns what paints, if pictures are requested.
+fn inversion(
+    args: &AuditSequenceArgs,
+    source: &FeatureSource,
+) -> anyhow::Result<Option<Inversion>> {
+    if !args.invert {
+        return Ok(None);
+    }
+    let photos = match (&args.photos, args.path.is_dir()) {
+        (Some(photos), _) => photos,
+        (None, true) => &args.path,
+        (None, false) => {
+            let expected = "--invert: expected --photos, as PATH is no folder of photos";
+            return Err(usage(expected));
+        }
+    };
+    let all: Vec<usize> = (0..source.names().len()).collect();
+    let first = source.first(&all).and_then(|first| first.descriptors);
+    let painter = painter(kind("--invert", first.as_ref())?, None)?;
+    Ok(Some(Inversion::new(painter, photos, source.turn())))
 }
 
 fn plan(args: &AuditSequenceArgs) -> anyhow::Result<Plan<2>> {

@@ -1,0 +1,66 @@
+//! Results of several queries with known poses, by the number of queries.
+
+use crate::attack;
+use crate::document::{Document, Row};
+use crate::tables;
+use crate::text::align;
+use crate::words;
+
+/// Returns whether the document is of a sequence.
+pub(crate) fn is_sequence(document: &Document) -> bool {
+    document.results.iter().any(|row| attack::queries(&row.neighbors).is_some())
+}
+
+/// Returns one sentence per scheme: what came back after each number of queries, with links by descriptors.
+pub(crate) fn sentences(document: &Document) -> Vec<String> {
+    let typed = tables::headline_threshold(document).unwrap_or_default();
+    let sentence = |scheme: &str| {
+        let rows = document.results.iter().filter(|row| row.scheme == scheme && !is_tracks(row));
+        let parts: Vec<String> = rows
+            .filter_map(|row| {
+                let share = row.recovered_percent.get(&typed)?;
+                Some(format!("{} % after {} queries", words::percent(*share), row.k))
+            })
+            .collect();
+        let scheme = scheme.to_uppercase();
+        format!("Under {scheme}, came back within {typed} px: {}.", words::list(&parts))
+    };
+    tables::schemes(document).into_iter().map(sentence).collect()
+}
+
+/// Returns the table for a terminal: rows by scheme and number of queries.
+pub(crate) fn table(document: &Document) -> String {
+    let thresholds = tables::thresholds(document);
+    let headline = tables::headline_threshold(document).unwrap_or_default();
+    let mut head = ["scheme", "queries", "links by", "right"].map(str::to_owned).to_vec();
+    head.extend(thresholds.iter().map(|typed| format!("{typed} px")));
+    head.extend(["blind", "linked", "of linked", "tracked", "of tracked"].map(str::to_owned));
+    let mut lines = vec![head];
+    for row in &document.results {
+        let percent = |value: Option<&f64>| match value {
+            Some(value) => format!("{} %", words::percent(*value)),
+            None => "-".to_owned(),
+        };
+        let by = if is_tracks(row) { "tracks" } else { "descriptors" };
+        let right = format!("{} %", words::ratio_percent(row.inlier_ratio));
+        let mut cells = vec![row.scheme.clone(), row.k.to_string(), by.to_owned(), right];
+        cells.extend(thresholds.iter().map(|typed| percent(row.recovered_percent.get(typed))));
+        cells.push(percent(row.blind_percent.get(&headline)));
+        for of in ["linked", "tracked"] {
+            cells.push(percent(row.metrics.get(&format!("{of}_percent"))));
+            cells.push(percent(row.metrics.get(&format!("{of}_within_{headline}_percent"))));
+        }
+        lines.push(cells);
+    }
+    let mut text = align(&lines, &[0, 2]);
+    text.push_str(&format!(
+        "right: share of the links that the model confirms, where it knows both keypoints\n\
+         linked: keypoints linked in three or more views; tracked: by the model's tracks\n\
+         blind, of linked, of tracked: within {headline} px\n"
+    ));
+    text
+}
+
+fn is_tracks(row: &Row) -> bool {
+    attack::basis(row) == Some(attack::Basis::Oracle)
+}
