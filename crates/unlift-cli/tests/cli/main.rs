@@ -23,6 +23,7 @@ mod outputs;
 mod paper;
 mod readme;
 mod released;
+mod sequence;
 mod stages;
 #[cfg(unix)]
 mod streams;

@@ -1,0 +1,142 @@
+//! `unlift audit sequence`: a model and features in, rows by number of queries out.
+
+use std::fmt::Write;
+use std::fs;
+
+use unlift::Descriptors;
+use unlift::descriptors::Values;
+use unlift_io::features::{FeatureWriter, ImageFeatures};
+
+use crate::common::Place;
+
+const N_IMAGES: usize = 6;
+const N_POINTS: usize = 80;
+
+/// Returns a number in [0, 1) for any index.
+fn random(at: usize) -> f64 {
+    (at as f64 * 0.754_877_666 + 0.1).fract()
+}
+
+/// Creates the COLMAP model of a walk in `model` and the features of its images in `f.h5`, without
+/// noise.
+fn walk() -> Place {
+    let place = Place::empty();
+    fs::create_dir(place.path("model")).unwrap();
+    let points: Vec<[f64; 3]> = (0..N_POINTS)
+        .map(|at| {
+            let [a, b, c] = [random(3 * at), random(3 * at + 1), random(3 * at + 2)];
+            [2.0 * a - 1.0, 1.4 * b - 0.7, 3.0 + 2.0 * c]
+        })
+        .collect();
+    let values =
+        (0..N_POINTS * 128).map(|at| (random(at * at % 7919 + at) * 255.0) as u8).collect();
+    let descriptors = Descriptors::try_new(Values::U8(values), 128).unwrap();
+    let mut images = String::new();
+    let mut writer = FeatureWriter::create(&place.path("f.h5")).unwrap();
+    for at in 0..N_IMAGES {
+        // The camera walks to the right, up and down, and turns about its axis.
+        let turn = 0.1 * at as f64;
+        let center = [0.2 * at as f64 - 0.5, 0.1 * (at % 3) as f64, 0.0];
+        let (sin, cos) = turn.sin_cos();
+        let rotated = |x: [f64; 3]| [cos * x[0] - sin * x[1], sin * x[0] + cos * x[1], x[2]];
+        let t = rotated(center).map(|x| -x);
+        let (half_sin, half_cos) = (turn / 2.0).sin_cos();
+        let id = at + 1;
+        writeln!(images, "{id} {half_cos} 0 0 {half_sin} {} {} {} 1 {at}.png\n", t[0], t[1], t[2])
+            .unwrap();
+        let keypoint = |x: &[f64; 3]| {
+            let [x, y, z] = rotated([0, 1, 2].map(|c| x[c] - center[c]));
+            [500.0 * x / z + 319.5, 500.0 * y / z + 239.5]
+        };
+        let image = ImageFeatures {
+            name: format!("{at}.png"),
+            size: Some([640, 480]),
+            keypoints: points.iter().map(keypoint).collect(),
+            descriptors: Some(descriptors.clone()),
+            ..ImageFeatures::default()
+        };
+        writer.append(&image).unwrap();
+    }
+    writer.finish().unwrap();
+    let track: String = (1..=N_IMAGES).map(|id| format!(" {id} 0")).collect();
+    let lines = points.iter().enumerate();
+    let lines = lines.map(|(at, [x, y, z])| format!("{} {x} {y} {z} 9 9 9 0{track}\n", at + 1));
+    fs::write(place.path("model/points3D.txt"), lines.collect::<String>()).unwrap();
+    fs::write(place.path("model/images.txt"), images).unwrap();
+    fs::write(place.path("model/cameras.txt"), "1 SIMPLE_PINHOLE 640 480 500 320 240\n").unwrap();
+    place
+}
+
+#[test]
+fn keypoints_come_back_by_the_number_of_queries() {
+    let place = walk();
+    let line = "audit sequence model f.h5 --queries 2,3,5,9 --schemes lines2d,cp2d --out a";
+    let (stdout, stderr) = place.ends(line, 0);
+    assert!(stderr.contains("6 images: no rows for [9] queries"), "{stderr}");
+    assert!(
+        stdout.contains("Under LINES2D, came back within 10 px: 0.0 % after 2 queries"),
+        "{stdout}"
+    );
+    let document = place.json("a/audit.json");
+    let share = |scheme: &str, neighbors: &str| {
+        let mut rows = document["results"].as_array().unwrap().iter();
+        let row =
+            rows.find(|row| row["scheme"] == scheme && row["neighbors"] == neighbors).unwrap();
+        row["recovered_percent"]["5"].as_f64().unwrap()
+    };
+    for by in ["sequence", "tracks"] {
+        assert_eq!(share("lines2d", &format!("{by}@2")), 0.0);
+        assert!(share("lines2d", &format!("{by}@3")) > 95.0, "{by}");
+        assert!(share("lines2d", &format!("{by}@5")) > 95.0, "{by}");
+        assert!(share("cp2d", &format!("{by}@5")) > 90.0, "{by}");
+    }
+    assert_eq!(document["results"].as_array().unwrap().len(), 2 * 3 * 2);
+    // The same seed gives the same figures for any number of threads.
+    place.ends(&line.replace("--out a", "--threads 1 --out b"), 0);
+    assert_eq!(place.json("b/audit.json")["results"], document["results"]);
+}
+
+#[test]
+fn a_gate_names_a_number_of_queries() {
+    let place = walk();
+    let audit = "audit sequence model f.h5 --queries 3,5 --schemes lines2d --force";
+    place.ends(&format!("{audit} --gate lines2d:sequence@3:10<=100"), 0);
+    let (stdout, _) = place.ends(&format!("{audit} --gate lines2d:sequence@5:10<=20"), 1);
+    assert!(stdout.contains("lines2d:sequence@5:10<=20"), "{stdout}");
+    let stderr = place.complains(&format!("{audit} --gate lines2d:sequence@4:10<=20"), 2);
+    assert!(stderr.contains("expected one of sequence@3, tracks@3, sequence@5"), "{stderr}");
+}
+
+#[test]
+fn wrong_poses_give_less_back() {
+    let place = walk();
+    let audit = "audit sequence model f.h5 --queries 5 --schemes lines2d";
+    let share = |options: &str, out: &str| {
+        place.ends(&format!("{audit} {options} --out {out}"), 0);
+        let document = place.json(&format!("{out}/audit.json"));
+        document["results"][0]["recovered_percent"]["5"].as_f64().unwrap()
+    };
+    let exact = share("", "a");
+    let wrong = share("--poses perturbed:5,0.5 --scale 1", "b");
+    assert!(wrong < exact - 20.0, "{wrong} of {exact}");
+    let stderr = place.complains(&format!("{audit} --poses perturbed:5,0.5"), 2);
+    assert!(stderr.contains("expected --scale, meters per unit of the model"), "{stderr}");
+    let stderr = place.complains(&format!("{audit} --poses exact"), 2);
+    assert!(stderr.contains("expected perturbed:CM,DEG"), "{stderr}");
+}
+
+#[test]
+fn inputs_that_do_not_fit_are_named() {
+    let place = walk();
+    fs::write(place.path("model/cameras.txt"), "1 SIMPLE_PINHOLE 320 240 500 160 120\n").unwrap();
+    let stderr = place.complains("audit sequence model f.h5", 3);
+    let expected =
+        "f.h5: image 0.png: expected 320 x 240 pixels, as its camera in the model, found 640 x 480";
+    assert!(stderr.contains(expected), "{stderr}");
+    assert!(stderr.contains("expected at least 2 images that are in model, found 0"), "{stderr}");
+    fs::write(place.path("cloud.csv"), "x,y,z\n0,0,0\n1,0,0\n0,1,0\n").unwrap();
+    let stderr = place.complains("audit sequence cloud.csv f.h5", 3);
+    assert!(stderr.contains("expected a COLMAP model, which has the poses"), "{stderr}");
+    let stderr = place.complains("audit sequence model f.h5 --queries 1", 2);
+    assert!(stderr.contains("expected a whole number from 2, found 1"), "{stderr}");
+}
