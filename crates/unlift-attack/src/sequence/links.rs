@@ -1,6 +1,5 @@
 //! Links between queries: slots that probably hide keypoints of the same point in space.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -103,21 +102,26 @@ impl Links {
     pub fn track(&self, query: usize, slot: usize, window: &Range<usize>) -> Vec<(u32, u32)> {
         let within = |link: &&(u32, u32)| window.contains(&(link.0 as usize));
         let direct = &self.of_slot[query][slot];
-        let mut found: BTreeMap<u32, u32> = direct.iter().filter(within).copied().collect();
-        let mut votes: BTreeMap<(u32, u32), u32> = BTreeMap::new();
-        for &(other, at) in direct.iter().filter(within) {
-            let next = self.of_slot[other as usize][at as usize].iter().filter(within);
-            next.for_each(|&link| *votes.entry(link).or_default() += 1);
-        }
-        let mut best: BTreeMap<u32, (u32, u32)> = BTreeMap::new();
-        for (&(other, at), &n) in &votes {
-            let is_new = other as usize != query && !found.contains_key(&other);
-            if is_new && best.get(&other).is_none_or(|&(most, _)| n > most) {
-                best.insert(other, (n, at));
+        let mut found: Vec<(u32, u32)> = direct.iter().filter(within).copied().collect();
+        let is_new = |link: &&(u32, u32)| {
+            let is_linked = direct.binary_search_by_key(&link.0, |direct| direct.0).is_ok();
+            link.0 as usize != query && !is_linked
+        };
+        let next = |&(other, at): &(u32, u32)| &self.of_slot[other as usize][at as usize];
+        let votes = found.iter().flat_map(|link| next(link).iter().filter(within).filter(is_new));
+        let mut votes: Vec<(u32, u32)> = votes.copied().collect();
+        votes.sort_unstable();
+        for of_query in votes.chunk_by(|a, b| a.0 == b.0) {
+            let mut best: &[(u32, u32)] = &[];
+            for of_slot in of_query.chunk_by(|a, b| a == b) {
+                if of_slot.len() > best.len() {
+                    best = of_slot;
+                }
             }
+            found.extend(best.first());
         }
-        found.extend(best.into_iter().map(|(other, (_, at))| (other, at)));
-        found.into_iter().collect()
+        found.sort_unstable();
+        found
     }
 }
 

@@ -131,6 +131,8 @@ const FIRST_NOISE_PX: f64 = 5.0;
 const LEAST_NOISE_PX: f64 = 1.0;
 /// Largest noise assumed, in pixels. With more, every line would agree.
 const MOST_NOISE_PX: f64 = 12.0;
+/// Planes that meet in a point.
+const LEAST_VIEWS: usize = 3;
 /// Tracks with at least this many agreeing views show the noise.
 const TELLING: usize = 5;
 
@@ -158,14 +160,15 @@ pub fn recover(
         let others = track.iter().map(|&(other, at)| sight(other as usize, at as usize));
         std::iter::once(sight(query, slot)).chain(others).collect()
     };
-    let solve = |noise_px: f64| -> Vec<(usize, Option<Fit>)> {
+    let solve = |noise_px: f64, least_views: usize| -> Vec<(usize, Option<Fit>)> {
         let of = |slot: usize| {
             let sights = sights(slot);
-            (sights.len(), triangulate(&sights, noise_px))
+            let enough = sights.len() >= least_views;
+            (sights.len(), enough.then(|| triangulate(&sights, noise_px)).flatten())
         };
         (0..n_slots).into_par_iter().map(of).collect()
     };
-    let first = solve(FIRST_NOISE_PX);
+    let first = solve(FIRST_NOISE_PX, TELLING);
     let telling = first.iter().filter_map(|(_, fit)| fit.filter(|fit| fit.n_agree >= TELLING));
     let mut residuals: Vec<f64> = telling.map(|fit| fit.residual_px).collect();
     // A track's residual has three unknowns less than views, and a noise that is too small loses more than one too large.
@@ -173,7 +176,7 @@ pub fn recover(
         true => FIRST_NOISE_PX,
         false => (2.0 * median(&mut residuals)).clamp(LEAST_NOISE_PX, MOST_NOISE_PX),
     };
-    let fits = solve(noise_px);
+    let fits = solve(noise_px, LEAST_VIEWS);
     let is_pair = matches!(own.released.obfuscation(), Obfuscation::AxisCandidates(_));
     let origin = own.released.origin();
     let estimate = |(n_views, fit): &(usize, Option<Fit>)| match fit {
@@ -184,7 +187,7 @@ pub fn recover(
             axis: if is_pair { 1 - fit.line as u8 } else { 0 },
             evidence: 0.0,
         },
-        None if *n_views < 3 => Estimate::lost(Status::TooFewNeighbors),
+        None if *n_views < LEAST_VIEWS => Estimate::lost(Status::TooFewNeighbors),
         None => Estimate::lost(Status::NoSupport),
     };
     let estimates: Vec<Estimate<2>> = fits.iter().map(estimate).collect();

@@ -12,11 +12,13 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use unlift::audit::staged::{Pooled, key_of};
 use unlift::audit::{NeighborsBy, Plan, PointNeighbors, Row, Seconds};
 use unlift::evaluate::evaluate;
 use unlift::obfuscate::{Scheme, obfuscate};
+use unlift::recover::Recovered;
 use unlift::seed::Key;
 use unlift::sequence::{Links, Query, recover};
 use unlift::truth::Secret;
@@ -288,21 +290,46 @@ struct Hidden<'a> {
     secrets: Vec<Secret>,
 }
 
-/// Keypoints, and those recovered within the headline threshold.
+/// A number of keypoints or links, and how many of them are right.
 #[derive(Default)]
 struct Share {
     n: usize,
-    within: usize,
+    right: usize,
 }
 
 impl Share {
-    fn add(&mut self, is_within: bool) {
+    fn count(&mut self, is_right: bool) {
         self.n += 1;
-        self.within += usize::from(is_within);
+        self.right += usize::from(is_right);
     }
 
     fn percent(&self) -> f64 {
-        100.0 * self.within as f64 / self.n.max(1) as f64
+        100.0 * self.right as f64 / self.n.max(1) as f64
+    }
+}
+
+/// Shares within the headline threshold, and the share of right links.
+#[derive(Default)]
+struct Shares {
+    /// Keypoints linked in three or more views.
+    linked: Share,
+    /// Keypoints that the model's tracks link so.
+    tracked: Share,
+    /// Links of which the model knows both keypoints.
+    right: Share,
+}
+
+impl Shares {
+    fn add(&mut self, more: &Self) {
+        let pairs = [
+            (&mut self.linked, &more.linked),
+            (&mut self.tracked, &more.tracked),
+            (&mut self.right, &more.right),
+        ];
+        for (to, more) in pairs {
+            to.n += more.n;
+            to.right += more.right;
+        }
     }
 }
 
@@ -315,45 +342,60 @@ impl Hidden<'_> {
         n: usize,
         plan: &Plan<2>,
     ) -> Result<Row, unlift::Error> {
-        let headline = &plan.thresholds[plan.headline];
+        let headline = plan.thresholds[plan.headline].value;
+        let of_query = |query| self.of_query(links, tracks, (query, n), headline);
+        let queries = (0..self.views.len()).into_par_iter().with_max_len(1);
+        let found = queries.map(of_query).collect::<Result<Vec<_>, unlift::Error>>()?;
         let mut pooled = Pooled::new(&plan.thresholds);
-        let (mut linked, mut tracked, mut right) =
-            (Share::default(), Share::default(), Share::default());
-        for (query, view) in self.views.iter().enumerate() {
-            let secret = &self.secrets[query];
-            let window = self.window(query, n);
-            let solved = recover(&self.queries, links, query, window.clone())?;
-            let released = &self.queries[query].released;
-            pooled.add(&solved.recovered, &view.original, secret, Some(released))?;
-            let accuracy = evaluate(&solved.recovered, &view.original, secret)?;
-            for (slot, &error) in accuracy.errors().iter().enumerate() {
-                let is_within = error <= headline.value;
-                if solved.n_views[slot] >= LEAST_VIEWS {
-                    linked.add(is_within);
-                }
-                if 1 + tracks.track(query, slot, &window).len() >= LEAST_VIEWS {
-                    tracked.add(is_within);
-                }
-                let Some(point) = self.point(query, slot) else { continue };
-                for (other, at) in links.track(query, slot, &window) {
-                    if let Some(other) = self.point(other as usize, at as usize) {
-                        right.add(point == other);
-                    }
-                }
-            }
+        let mut all = Shares::default();
+        for (query, (recovered, shares)) in found.iter().enumerate() {
+            let (original, released) = (&self.views[query].original, &self.queries[query].released);
+            pooled.add(recovered, original, &self.secrets[query], Some(released))?;
+            all.add(shares);
         }
         let missing = || unlift::Error::new("sequence", "keypoints", "none");
         let mut row = pooled.row().ok_or_else(missing)?;
         let of_all = |share: &Share| 100.0 * share.n as f64 / row.n_points.max(1) as f64;
-        let label = &headline.label;
+        let label = &plan.thresholds[plan.headline].label;
         row.metrics.extend([
-            ("linked_percent".to_owned(), of_all(&linked)),
-            (format!("linked_within_{label}_percent"), linked.percent()),
-            ("tracked_percent".to_owned(), of_all(&tracked)),
-            (format!("tracked_within_{label}_percent"), tracked.percent()),
+            ("linked_percent".to_owned(), of_all(&all.linked)),
+            (format!("linked_within_{label}_percent"), all.linked.percent()),
+            ("tracked_percent".to_owned(), of_all(&all.tracked)),
+            (format!("tracked_within_{label}_percent"), all.tracked.percent()),
         ]);
-        row.inlier_ratio = right.percent() / 100.0;
+        row.inlier_ratio = all.right.percent() / 100.0;
         Ok(row)
+    }
+
+    /// Attacks `query` with the `n` queries around it.
+    fn of_query(
+        &self,
+        links: &Links,
+        tracks: &Links,
+        (query, n): (usize, usize),
+        headline: f64,
+    ) -> Result<(Recovered<2>, Shares), unlift::Error> {
+        let window = self.window(query, n);
+        let solved = recover(&self.queries, links, query, window.clone())?;
+        let original = &self.views[query].original;
+        let accuracy = evaluate(&solved.recovered, original, &self.secrets[query])?;
+        let mut shares = Shares::default();
+        for (slot, &error) in accuracy.errors().iter().enumerate() {
+            let is_within = error <= headline;
+            if solved.n_views[slot] >= LEAST_VIEWS {
+                shares.linked.count(is_within);
+            }
+            if 1 + tracks.track(query, slot, &window).len() >= LEAST_VIEWS {
+                shares.tracked.count(is_within);
+            }
+            let Some(point) = self.point(query, slot) else { continue };
+            for (other, at) in links.track(query, slot, &window) {
+                if let Some(other) = self.point(other as usize, at as usize) {
+                    shares.right.count(point == other);
+                }
+            }
+        }
+        Ok((solved.recovered, shares))
     }
 
     /// Returns the `n` consecutive queries around `query`.
