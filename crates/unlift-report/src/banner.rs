@@ -27,6 +27,8 @@ pub(crate) fn banner(document: &Document, cards: &[Card], refusals: &[Refusal]) 
         .then(|| format!("Not audited, so nothing is known: {}.", words::list(&names)));
     let today = worst(cards, Basis::Released);
     let known = worst(cards, Basis::Given).or_else(|| worst(cards, Basis::Oracle));
+    // The model may have fewer tracks than an attacker finds links.
+    let every = every(cards).filter(|_| !sequence::is_sequence(document));
     let (level, headline, sentence) = match (today, known) {
         (Some(found), _) => {
             let level = Level::of(found.1.recovered);
@@ -43,7 +45,7 @@ pub(crate) fn banner(document: &Document, cards: &[Card], refusals: &[Refusal]) 
             (Level::Gray, "No scheme was tested.".to_owned(), nothing.to_owned())
         }
     };
-    Banner { level, headline, sentence, every: every(cards), unknown }
+    Banner { level, headline, sentence, every, unknown }
 }
 
 /// Returns a sentence on what every scheme would give back with known neighbors, if several were tried so.

@@ -178,7 +178,7 @@ fn when(basis: Basis, row: &Row) -> String {
         Basis::Released => "Today, from the released data alone".to_owned(),
         Basis::Given => "With neighbors from a given file".to_owned(),
         Basis::Oracle if attack::queries(&row.neighbors).is_some() => {
-            "With the true tracks".to_owned()
+            "With links by the tracks of the model alone".to_owned()
         }
         Basis::Oracle => words::capital(&words::if_known(row.inlier_ratio)),
     }
