@@ -13,7 +13,7 @@ or parts of them, named after the folder; each tells on stderr how long it took 
     large       5 min    the cost of 700,000 points
     images      5 min    keypoints of photos
     pictures    5 min    what came back, painted
-    sequence    6 min    several queries with known poses
+    sequence   15 min    several queries with known poses
 
 `± s` is the standard deviation over seeds, where it exceeds 0.5. Needs the scenes (SHARED/data) and the paper's tables (SHARED/paper/tables);
 standard library only. Everything between the begin and end markers of the two files is replaced.
