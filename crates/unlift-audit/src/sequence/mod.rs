@@ -209,7 +209,7 @@ fn rows(
     let mut seconds = Seconds::default();
     let mut rows = Vec::new();
     let reach = job.queries.iter().copied().max().unwrap_or(0);
-    let mut linked: Option<(Vec<Query>, Links)> = None;
+    let mut known: Vec<(Vec<Query>, Links)> = Vec::new();
     let total = job.plan.schemes.len() * job.queries.len() * 2;
     for scheme in &job.plan.schemes {
         let started = Instant::now();
@@ -217,16 +217,20 @@ fn rows(
         seconds.obfuscate += started.elapsed().as_secs_f64();
         job.progress.show(rows.len(), total, &format!("{}, linking queries", scheme.name()));
         let started = Instant::now();
-        // Links depend on descriptors and cameras only, and most schemes release the same descriptors.
-        let links = match linked.take().filter(|(of, _)| have_same_descriptors(of, &queries)) {
-            Some((_, links)) => links,
-            None => Links::by_descriptors(&queries, reach)?,
+        // Links depend on descriptors and cameras only, and some schemes release the same descriptors.
+        let same = known.iter().position(|(of, _)| have_same_descriptors(of, &queries));
+        let links = match same {
+            Some(at) => &known[at].1,
+            None => {
+                known.push((queries.clone(), Links::by_descriptors(&queries, reach)?));
+                &known[known.len() - 1].1
+            }
         };
         seconds.neighbors += started.elapsed().as_secs_f64();
         let tracks = tracks(views, &secrets);
         let hidden = Hidden { views, queries, secrets };
         for &n in &job.queries {
-            for (by, links) in [(SEQUENCE, &links), (TRACKS, &tracks)] {
+            for (by, links) in [(SEQUENCE, links), (TRACKS, &tracks)] {
                 if !job.progress.goes_on() {
                     return Err(Error::request(
                         "audit: expected to run to the end, found a request to stop",
@@ -245,7 +249,6 @@ fn rows(
                 rows.push(row);
             }
         }
-        linked = Some((hidden.queries, links));
     }
     seconds.rows = vec![Default::default(); rows.len()];
     Ok((rows, seconds))
