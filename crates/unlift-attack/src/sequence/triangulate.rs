@@ -206,8 +206,9 @@ fn refine(sights: &[Sight], mut x: [f64; 3], noise_px: f64) -> Option<(f64, Fit)
             }
             let weight = 1.0 / (1.0 + ratio * ratio) / (depth * depth);
             add(&mut normal, &sight.planes[at], weight);
-            for c in 0..3 {
-                right[c] -= weight * sight.planes[at][c] * affine(&sight.planes[at], &x);
+            let plane = &sight.planes[at];
+            for (right, normal) in right.iter_mut().zip(plane) {
+                *right -= weight * normal * affine(plane, &x);
             }
         }
         // The step, slightly damped: three planes may be nearly dependent.
