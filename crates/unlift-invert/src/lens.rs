@@ -155,6 +155,32 @@ impl Lens {
         place.iter().all(|x| x.is_finite()).then_some(place)
     }
 
+    /// Returns where the point that [`project`](Self::project) maps to `place` is on the plane at
+    /// focal length one; `None` beyond a right angle from the axis, or without such a point.
+    pub fn undistort(&self, place: [f64; 2]) -> Option<[f64; 2]> {
+        let target = [0, 1].map(|c| (place[c] + 0.5 - self.center[c]) / self.focal[c]);
+        let at = |flat: [f64; 2]| self.bent([flat[0], flat[1], 1.0]);
+        let mut flat = target;
+        // Newton's method with differences for derivatives.
+        for _ in 0..20 {
+            let now = at(flat)?;
+            let off = [0, 1].map(|c| now[c] - target[c]);
+            if off[0].abs().max(off[1].abs()) < 1e-12 {
+                break;
+            }
+            let step = 1e-6;
+            let (by_x, by_y) = (at([flat[0] + step, flat[1]])?, at([flat[0], flat[1] + step])?);
+            let [a, c] = [0, 1].map(|k| (by_x[k] - now[k]) / step);
+            let [b, d] = [0, 1].map(|k| (by_y[k] - now[k]) / step);
+            let determinant = a * d - b * c;
+            flat[0] -= (d * off[0] - b * off[1]) / determinant;
+            flat[1] -= (a * off[1] - c * off[0]) / determinant;
+        }
+        let back = self.project([flat[0], flat[1], 1.0])?;
+        // A hundredth of a pixel; beyond a fold, the iteration ends elsewhere.
+        (0..2).all(|c| (back[c] - place[c]).abs() < 1e-2).then_some(flat)
+    }
+
     /// Returns the position on the plane at focal length one.
     fn bent(&self, [x, y, z]: [f64; 3]) -> Option<[f64; 2]> {
         let flat = [x / z, y / z];

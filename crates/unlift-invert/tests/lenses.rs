@@ -76,3 +76,18 @@ fn bad_cameras_are_said() {
         "EQUIRECTANGULAR: expected finite parameters, found NaN"
     );
 }
+
+#[test]
+fn undistortion_is_the_inverse_of_projection() {
+    for (model, params, _) in SEEN {
+        let lens = Lens::try_new(model, params).unwrap();
+        for point in POINTS {
+            let Some(flat) = lens.undistort(lens.project(point).unwrap()) else {
+                panic!("{model} {point:?}: not undistorted");
+            };
+            let expected = [point[0] / point[2], point[1] / point[2]];
+            let apart = (0..2).map(|c| (flat[c] - expected[c]).abs()).fold(0.0, f64::max);
+            assert!(apart < 1e-4, "{model} {point:?}: {flat:?}, not {expected:?}");
+        }
+    }
+}
