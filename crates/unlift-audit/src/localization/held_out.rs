@@ -440,7 +440,9 @@ impl Photo {
         let rows = self.places.iter().map(|(_, row)| *row as usize);
         let descriptors = Unit32::of(&self.descriptors, rows);
         let places = self.places.iter().map(|(place, _)| *place).collect();
-        Query { view: view.clone(), places, descriptors }
+        // Pose estimation copies the view in every step.
+        let view = View { observed: Vec::new(), ..view.clone() };
+        Query { view, places, descriptors }
     }
 }
 
