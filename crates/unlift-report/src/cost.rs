@@ -289,7 +289,11 @@ pub(crate) fn text(document: &Document) -> String {
         };
         let leak = leak(document, &one.scheme, basis(document)).filter(|_| !one.of_queries);
         let leak = leak.map_or("-".to_owned(), |leak| format!("{} %", words::percent(leak)));
-        let failed = format!("{} %", words::percent(one.failed_percent));
+        // This percentage is of the bound.
+        let failed = match one.held_out {
+            Some(_) => "-".to_owned(),
+            None => format!("{} %", words::percent(one.failed_percent)),
+        };
         vec![one.scheme.clone(), leak, cost, held_out.to_owned(), failed]
     };
     if document.localization.is_empty() {
