@@ -14,12 +14,14 @@ or parts of them, named after the folder; each tells on stderr how long it took 
     images      5 min    keypoints of photos
     pictures    5 min    what came back, painted
     sequence   15 min    several queries with known poses
+    cost       20 min    leak and localization accuracy side by side, with mitigations
 
 `± s` is the standard deviation over seeds, where it exceeds 0.5. Needs the scenes (SHARED/data) and the paper's tables (SHARED/paper/tables);
 standard library only. Everything between the begin and end markers of the two files is replaced.
 """
 import array, csv, json, math, pathlib, random, struct, subprocess, sys, tempfile, time
 
+import cost_tables
 import image_tables
 import picture_tables
 import sequence_tables
@@ -373,9 +375,13 @@ def sequence():
     put(ROOT / "docs/benchmarks.md", "sequence", sequence_tables.tables(ROOT / "target/release/unlift", SHARED))
 
 
+def what_protection_costs():
+    put(ROOT / "docs/benchmarks.md", "cost", cost_tables.tables(ROOT / "target/release/unlift", SHARED))
+
+
 def main():
     sections = {"accuracy": accuracy, "low": below_a_tenth, "noise": noise, "own": own, "alone": alone, "large": large,
-                "images": images, "pictures": pictures, "sequence": sequence}
+                "images": images, "pictures": pictures, "sequence": sequence, "cost": what_protection_costs}
     for name in sys.argv[2:] or sections:
         started = time.monotonic()
         sections[name]()

@@ -106,6 +106,7 @@ pub fn document<const D: usize>(
         gates: provenance.gates,
         images: Vec::new(),
         tiles: Vec::new(),
+        localization: Vec::new(),
         run: report::Run {
             command: provenance.command,
             threads: rayon::current_num_threads() as u32,

@@ -81,6 +81,7 @@ fn doubts(offsets: &[u64], neighbors: &[u32], prepared: &Prepared) -> Vec<String
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::localization::Cameras;
     use unlift::truth::Original;
     use unlift::{PointSet, Unit};
 
@@ -94,6 +95,7 @@ mod tests {
             descriptors: None,
             unit_in_map_units: 1.0,
             rows: (0..n as u32).collect(),
+            cameras: Cameras::default(),
             notes: Vec::new(),
             doubts: Vec::new(),
         };

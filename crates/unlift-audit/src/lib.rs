@@ -61,6 +61,7 @@ pub mod inversion;
 #[cfg_attr(not(feature = "parquet"), path = "absent/journal.rs")]
 mod journal;
 mod lengths;
+pub mod localization;
 pub mod maps;
 mod memory;
 mod outputs;

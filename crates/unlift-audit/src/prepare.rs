@@ -7,6 +7,8 @@ use unlift::seed::{Draws, Stage};
 use unlift::truth::Original;
 use unlift::{Descriptors, Error, ErrorKind, PointSet, Unit};
 
+use crate::localization::Cameras;
+
 /// Statistical outlier removal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutlierFilter {
@@ -52,6 +54,8 @@ pub struct Prepared {
     pub unit_in_map_units: f64,
     /// Rows of the file that were kept, ascending.
     pub rows: Vec<u32>,
+    /// The cameras that observe the points, if the file has them.
+    pub cameras: Cameras,
     /// Notes for readers of the figures. Share-safe documents omit those that contain a path.
     pub notes: Vec<String>,
     /// Doubts about all figures. No gate holds with one.
@@ -112,7 +116,8 @@ pub fn prepare<'a>(
     let points = if factor == 1.0 { points } else { points.scaled(factor, unit)? };
     let descriptors = descriptors.map(|all| all.select(&rows));
     let original = Original::new(points);
-    Ok(Prepared { original, descriptors, unit_in_map_units, rows, notes, doubts: Vec::new() })
+    let (cameras, doubts) = (Cameras::default(), Vec::new());
+    Ok(Prepared { original, descriptors, unit_in_map_units, rows, cameras, notes, doubts })
 }
 
 /// Returns the median over all points of the distance to the `k`-th nearest other point.

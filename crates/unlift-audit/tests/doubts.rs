@@ -13,6 +13,7 @@ use unlift::released::Released;
 use unlift::seed::Key;
 use unlift::truth::{Original, Secret};
 use unlift::{PointSet, Unit};
+use unlift_audit::localization::Cameras;
 use unlift_audit::{Audited, Error, Gate, Job, Preparation, Prepared, Quiet, maps, prepare};
 use unlift_report::document::Input;
 
@@ -50,6 +51,7 @@ fn audit(
         original: &prepared.original,
         descriptors: None,
         hidden,
+        localize: None,
         cameras: Vec::new(),
         up: None,
         plan,
@@ -188,8 +190,15 @@ fn a_unit_that_is_only_stated_is_no_protection() {
     let original = Original::new(points);
     let rows = (0..N as u32).collect();
     let (notes, doubts) = Default::default();
-    let prepared =
-        Prepared { original, descriptors: None, unit_in_map_units: 1.0, rows, notes, doubts };
+    let prepared = Prepared {
+        original,
+        descriptors: None,
+        unit_in_map_units: 1.0,
+        rows,
+        cameras: Cameras::default(),
+        notes,
+        doubts,
+    };
     let options = SchemeOptions::usual(Unit::KthNeighbor);
     let olc = scheme("olc").expect("olc").of_dimension::<3>(&options).expect("in 3D");
     let hidden = obfuscate(&*olc, &prepared.original, None, &Key::from_seed(1)).expect("hidden");

@@ -7,7 +7,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use unlift::audit::Threshold;
 use unlift::neighbors::oracle::Noise;
 use unlift::neighbors::sources::Named;
-use unlift::obfuscate::{Entry, SCHEMES};
+use unlift::obfuscate::{Entry, Mitigation, SCHEMES};
 use unlift::recover::{Builtin, Delta};
 use unlift_audit::{OutlierFilter, sources};
 use unlift_nn::DescriptorKind;
@@ -149,6 +149,10 @@ pub fn image_source(text: &str) -> Result<NeighborSource, String> {
 
 pub fn all_schemes() -> Vec<&'static Entry> {
     SCHEMES.iter().filter(|entry| entry.in_3d.is_some()).collect()
+}
+
+pub fn mitigation(text: &str) -> Result<Mitigation, String> {
+    Mitigation::parse(text).map_err(|error| expected(&error))
 }
 
 pub fn solver(text: &str) -> Result<Builtin, String> {

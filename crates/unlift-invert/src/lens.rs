@@ -9,8 +9,6 @@ use unlift::Error;
 /// Number of angles tested for the fold of a model: 0.03 degrees apart.
 const TRIED: usize = 6000;
 
-/// Most steps of Newton's method when a place is undistorted.
-const MOST_STEPS: usize = 50;
 
 /// The distortion of a camera model.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -163,33 +161,30 @@ impl Lens {
         (self.focal, self.center.map(|x| x - 0.5))
     }
 
-    /// Returns the place at which a pinhole camera with the focal lengths and the principal point of
-    /// this lens sees what this lens sees at `place`, in pixels. `None` where the search finds none:
-    /// at 90 degrees from the axis and beyond, and outside of the lens's image.
-    pub fn undistorted(&self, place: [f64; 2]) -> Option<[f64; 2]> {
-        let (focal, center) = self.pinhole();
-        let flat = |place: [f64; 2]| [0, 1].map(|c| (place[c] - center[c]) / focal[c]);
-        let wanted = flat(place);
-        let mut guess = wanted;
-        for _ in 0..MOST_STEPS {
-            let error = |at: [f64; 2]| {
-                let seen = flat(self.project([at[0], at[1], 1.0])?);
-                Some([wanted[0] - seen[0], wanted[1] - seen[1]])
-            };
-            let off = error(guess)?;
-            if (0..2).all(|c| (off[c] * focal[c]).abs() < 1e-9) {
-                return Some([0, 1].map(|c| focal[c] * guess[c] + center[c]));
+    /// Returns where the point that [`project`](Self::project) maps to `place` is on the plane at
+    /// focal length one; `None` beyond a right angle from the axis, or without such a point.
+    pub fn undistort(&self, place: [f64; 2]) -> Option<[f64; 2]> {
+        let target = [0, 1].map(|c| (place[c] + 0.5 - self.center[c]) / self.focal[c]);
+        let at = |flat: [f64; 2]| self.bent([flat[0], flat[1], 1.0]);
+        let mut flat = target;
+        // Newton's method with differences for derivatives.
+        for _ in 0..20 {
+            let now = at(flat)?;
+            let off = [0, 1].map(|c| now[c] - target[c]);
+            if off[0].abs().max(off[1].abs()) < 1e-12 {
+                break;
             }
-            // Newton's method with differences.
             let step = 1e-6;
-            let moved = [error([guess[0] + step, guess[1]])?, error([guess[0], guess[1] + step])?];
-            let by = |row: usize, c: usize| (off[row] - moved[c][row]) / step;
-            let (a, b, c, d) = (by(0, 0), by(0, 1), by(1, 0), by(1, 1));
-            let det = a * d - b * c;
-            guess[0] += (d * off[0] - b * off[1]) / det;
-            guess[1] += (a * off[1] - c * off[0]) / det;
+            let (by_x, by_y) = (at([flat[0] + step, flat[1]])?, at([flat[0], flat[1] + step])?);
+            let [a, c] = [0, 1].map(|k| (by_x[k] - now[k]) / step);
+            let [b, d] = [0, 1].map(|k| (by_y[k] - now[k]) / step);
+            let determinant = a * d - b * c;
+            flat[0] -= (d * off[0] - b * off[1]) / determinant;
+            flat[1] -= (a * off[1] - c * off[0]) / determinant;
         }
-        None
+        let back = self.project([flat[0], flat[1], 1.0])?;
+        // A hundredth of a pixel; beyond a fold, the iteration ends elsewhere.
+        (0..2).all(|c| (back[c] - place[c]).abs() < 1e-2).then_some(flat)
     }
 
     /// Returns the position on the plane at focal length one.

@@ -50,6 +50,7 @@ pub fn audit(
             original: &prepared.original,
             descriptors: prepared.descriptors.as_ref(),
             hidden: None,
+            localize: None,
             cameras,
             up,
             plan,

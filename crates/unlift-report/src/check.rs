@@ -1,7 +1,9 @@
 //! The rules of `audit.json` that its types cannot express.
 
 use crate::Error;
-use crate::document::{ByThreshold, Document, ImageFigures, Row, SCHEMA, TileFigures};
+use crate::document::{
+    ByThreshold, Document, ImageFigures, Localization, Row, SCHEMA, TileFigures,
+};
 
 impl Document {
     /// Checks the rules of the format: the schema, one row per combination, finite numbers,
@@ -50,6 +52,9 @@ impl Document {
         for (i, tile) in self.tiles.iter().enumerate() {
             check_tile(&format!("tiles[{i}]"), tile, self.results.len())?;
         }
+        for (i, one) in self.localization.iter().enumerate() {
+            check_localization(&format!("localization[{i}]"), one)?;
+        }
         self.check_run()
     }
 
@@ -82,6 +87,28 @@ impl Document {
         }
         Ok(())
     }
+}
+
+fn check_localization(place: &str, one: &Localization) -> Result<(), Error> {
+    between(&format!("{place}.failed_percent"), one.failed_percent, 0.0, 100.0)?;
+    let held_out = one.held_out.as_ref();
+    let errors = [
+        ("multiple", one.multiple),
+        ("center_error", one.center_error),
+        ("rotation_error_degrees", one.rotation_error_degrees),
+        ("held_out.center_error", held_out.and_then(|held_out| held_out.center_error)),
+        ("held_out.multiple", held_out.and_then(|held_out| held_out.multiple)),
+        (
+            "held_out.rotation_error_degrees",
+            held_out.and_then(|held_out| held_out.rotation_error_degrees),
+        ),
+    ];
+    for (name, value) in errors {
+        value.map_or(Ok(()), |value| between(&format!("{place}.{name}"), value, 0.0, f64::MAX))?;
+    }
+    held_out.map_or(Ok(()), |held_out| {
+        percentages(&format!("{place}.held_out.recall_percent"), &held_out.recall_percent)
+    })
 }
 
 fn check_row(place: &str, row: &Row) -> Result<(), Error> {

@@ -48,6 +48,10 @@ pub struct Document {
     pub notes: Vec<String>,
     /// The smallest inlier ratio at which half of the points come back, per scheme, noise and solver.
     pub break_even: Vec<BreakEven>,
+    /// How precisely a camera can be placed under every scheme; the first entry is the map without
+    /// protection. Empty unless the map has cameras and tracks.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub localization: Vec<Localization>,
     /// The user's gates and their results; empty if there were none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub gates: Vec<GateResult>,
@@ -250,13 +254,81 @@ pub enum Bound {
     AboveTested,
 }
 
+/// The accuracy of localization under a scheme: medians over the images of the map.
+///
+/// These figures are an information bound: all true matches of an image, at the true pose, with
+/// noise of 1 px. Errors are standard deviations. A value is `None` if at least half of the images
+/// do not localize.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Localization {
+    /// The scheme's user-facing name; [`UNPROTECTED`] for the map without protection.
+    pub scheme: String,
+    /// Whether the scheme protects keypoints of queries; else it protects the map.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub of_queries: bool,
+    /// Error of the camera center, as a multiple of the unprotected one: the median over images.
+    pub multiple: Option<f64>,
+    /// Error of the camera center, in the unit of the rows.
+    pub center_error: Option<f64>,
+    /// Error of the rotation in degrees.
+    pub rotation_error_degrees: Option<f64>,
+    /// Percent of the images that do not localize.
+    pub failed_percent: f64,
+    /// Whether the scheme changes descriptors. The bound does not include matching, so it does not
+    /// tell what this costs.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub changes_descriptors: bool,
+    /// What was measured on images that were held out; `None` if it was not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<HeldOut>,
+}
+
+/// The accuracy of localization of images that the map was made without.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct HeldOut {
+    /// Number of held-out images.
+    pub n_images: u64,
+    /// Median number of matches within 3 px of the true projection.
+    pub right_matches: f64,
+    /// Median number of matches.
+    pub matches: f64,
+    /// Median error of the camera center, in the unit of the rows. `None` if at least half of the
+    /// images have no pose.
+    pub center_error: Option<f64>,
+    /// Median error of the rotation in degrees.
+    pub rotation_error_degrees: Option<f64>,
+    /// The median error of the center as a multiple of the unprotected one.
+    pub multiple: Option<f64>,
+    /// Percent of the images within limits of both errors, by limit: `5 cm, 5 deg`.
+    pub recall_percent: ByThreshold,
+}
+
+/// The value of [`Localization::scheme`] for the map without protection.
+pub const UNPROTECTED: &str = "none";
+
+impl Localization {
+    /// Returns the error as a multiple of the unprotected one: as measured on held-out images, else
+    /// by the bound. `None` if cameras do not localize, or if the bound does not tell.
+    pub fn cost(&self) -> Option<f64> {
+        match &self.held_out {
+            Some(held_out) => held_out.multiple,
+            None => self.multiple.filter(|_| !self.changes_descriptors),
+        }
+    }
+
+    /// Returns true if what localization costs under this scheme was not measured.
+    pub fn is_unknown(&self) -> bool {
+        self.held_out.is_none() && self.changes_descriptors
+    }
+}
+
 /// A gate of the user and its result.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GateResult {
     /// The gate as typed, for example `ppl@0.5:0.10<=20`.
     pub gate: String,
     /// The figure that was compared, in percent (or percentage points for a gain over the larger
-    /// baseline); `None` if no row of the gate could be audited.
+    /// baseline, or multiples for localization); `None` if it is not known or infinite.
     pub found_percent: Option<f64>,
     /// The attack behind the figure: scheme, source and ratio, solver, distance.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -357,6 +429,10 @@ impl Row {
 
 fn one() -> u32 {
     1
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 fn is_one(value: &u32) -> bool {

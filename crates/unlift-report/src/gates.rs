@@ -63,14 +63,26 @@ pub fn gate_lines(document: &Document) -> String {
 /// Returns the figure found for a gate, its attack, and the reason if the gate failed for another reason.
 pub fn gate_found(gate: &GateResult) -> String {
     let of = gate.of.as_ref().map_or_else(String::new, |of| format!(": {of}"));
-    let found = gate.found_percent.map(|found| format!("found {found:.1} %{of}"));
+    let found = gate.found_percent.map(|found| match is_of_localization(gate) {
+        true => format!("found {found:.2} times the unprotected error{of}"),
+        false => format!("found {found:.1} %{of}"),
+    });
     let found: Vec<String> = found.into_iter().chain(gate.reason.clone()).collect();
     found.join("; ")
+}
+
+/// Returns true if the gate bounds a localization error, whose figures are multiples.
+pub(crate) fn is_of_localization(gate: &GateResult) -> bool {
+    gate.gate.contains(":localization")
 }
 
 pub(crate) fn in_words(gate: &GateResult) -> GateWords {
     let bound = words::significant(gate.bound_percent, 4);
     let (unit, verb, whole) = match gate.gate.contains(":gain") {
+        _ if is_of_localization(gate) => {
+            let whole = "the localization error may become";
+            (" times", ("the unprotected localization error", "may be"), whole)
+        }
         true => (" percentage points", ("were gained", "may be"), "may be gained"),
         false => (" %", ("came back", "may"), "may come back"),
     };

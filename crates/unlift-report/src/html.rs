@@ -14,10 +14,10 @@ use crate::page_data::page_data;
 use crate::scene::{Scene3d, encode};
 use crate::tables::Table;
 use crate::tiles::{HeatMap, heat_maps};
-use crate::{Error, attack, paper, pictures, tables, tiles, words};
+use crate::{Error, attack, cost, paper, pictures, tables, tiles, words};
 
 /// The templates, by the names under which they include each other.
-const TEMPLATES: [(&str, &str); 10] = [
+const TEMPLATES: [(&str, &str); 11] = [
     ("report.html", include_str!("../template/report.html")),
     ("terms.html", include_str!("../template/terms.html")),
     ("gates.html", include_str!("../template/gates.html")),
@@ -25,6 +25,7 @@ const TEMPLATES: [(&str, &str); 10] = [
     ("figures.html", include_str!("../template/figures.html")),
     ("inversions.html", include_str!("../template/inversions.html")),
     ("pictures.html", include_str!("../template/pictures.html")),
+    ("cost.html", include_str!("../template/cost.html")),
     ("tiles.html", include_str!("../template/tiles.html")),
     ("tables.html", include_str!("../template/tables.html")),
     ("notes.html", include_str!("../template/notes.html")),
@@ -75,6 +76,7 @@ pub fn render(
     let table_list = [
         Some(tables::recovered(&document)),
         Some(tables::baselines(&document)),
+        cost::table(&document),
         tables::distinct_places(&document),
         tiles::table(&document),
         tables::likeness(&document),
@@ -102,6 +104,7 @@ pub fn render(
         sheets: drawn,
         sheets_left_out,
         heat_maps: heat_maps(&document),
+        cost: cost::chart(&document),
         scene: encoded.as_ref().map(|scene| SceneWords {
             n_points: words::thousands(scene.n_points),
             n_drawn: words::thousands(scene.n_drawn as u64),
@@ -180,6 +183,7 @@ struct Page<'a> {
     /// Number of pictures that were left out to keep the page small.
     sheets_left_out: usize,
     heat_maps: Vec<HeatMap>,
+    cost: Option<cost::Chart>,
     share_safe: bool,
     subject: Subject,
     gates: Option<Gates>,

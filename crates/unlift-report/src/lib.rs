@@ -33,6 +33,7 @@ mod cards;
 mod check;
 mod choices;
 pub mod compare;
+mod cost;
 pub mod document;
 mod error;
 mod exhibit;

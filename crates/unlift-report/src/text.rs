@@ -2,7 +2,7 @@
 
 use crate::document::{Bound, Document, LengthUnit, Row, STRONGEST};
 use crate::verdict::Verdict;
-use crate::{attack, sequence, tables, tiles, verdict, words};
+use crate::{attack, cost, sequence, tables, tiles, verdict, words};
 
 /// Returns the verdict in two lines, then a table with a few lines per scheme, the worst first: every source tried, the
 /// records alone, and the oracle at the headline inlier ratio. Columns are the percentages within each threshold, a
@@ -51,6 +51,7 @@ pub fn text_table(document: &Document) -> String {
         text.push_str(&format!("x: times {}\n", words::USUAL_DISTANCE));
     }
     text.push_str(&tiles::line(document).unwrap_or_default());
+    text.push_str(&cost::text(document));
     for refused in &document.not_audited {
         let by = refused.neighbors.as_ref().map(|source| format!(" by {source}"));
         let (scheme, by) = (&refused.scheme, by.unwrap_or_default());

@@ -51,6 +51,7 @@ pub mod evaluate;
 // Not public: for crates that run third-party code.
 #[doc(hidden)]
 pub mod guard;
+pub mod localization;
 pub mod neighbors;
 pub mod obfuscate;
 pub mod seed;

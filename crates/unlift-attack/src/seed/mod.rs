@@ -48,6 +48,10 @@ pub enum Stage {
     Shapes = 22,
     /// Steps that ranking tries.
     Ranking = 23,
+    /// Points and descriptors that a mitigation changes.
+    Mitigation = 24,
+    /// Starts of pose estimation.
+    Localization = 25,
 }
 
 /// A source of random bits: a [`Counter`], or the owner's cipher.

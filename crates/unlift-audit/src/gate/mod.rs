@@ -9,7 +9,8 @@
 //! count. Every noise model and K counts. The strongest attack decides. Without a solver and a
 //! source, attacks that need no neighborhoods count as well (the blind guess and records alone).
 //! `:gain` bounds what neighborhoods add to the larger of these two baselines, in percentage
-//! points. Numbers are compared by value, so `0.1` matches the threshold `0.10`. No name of a
+//! points. `SCHEME:localization<=MULTIPLE` fails if the error of localization exceeds the
+//! unprotected one by more than this factor. Numbers are compared by value, so `0.1` matches the threshold `0.10`. No name of a
 //! solver or a source is a number, so the first number after the scheme is the threshold.
 //! `sequence@5` and `tracks@5` are sources: `dcl2d:sequence@5:10<=20` bounds what comes back from
 //! five queries.
@@ -36,11 +37,11 @@ pub struct Gate {
     pub source: Option<String>,
     /// The inlier ratio; `None` for all.
     pub inlier_ratio: Option<f64>,
-    /// The threshold, in the unit of the audit.
+    /// The threshold, in the unit of the audit; infinite for localization, which has none.
     pub threshold: f64,
     /// The bounded figure.
     pub figure: Figure,
-    /// The largest allowed value, in percent or percentage points.
+    /// The largest allowed value, in percent, percentage points or multiples.
     pub bound_percent: f64,
 }
 
@@ -51,6 +52,8 @@ pub enum Figure {
     Recovered,
     /// The percentage recovered, minus that of an attacker without neighborhoods.
     Gain,
+    /// The error of localization, as a multiple of the unprotected one.
+    Localization,
 }
 
 /// The figures that a gate compares, of one row and one threshold.
@@ -123,6 +126,9 @@ impl Gate {
             let known = plan.thresholds.iter().any(|t| t.value == self.threshold);
             (!known).then(|| (format!("threshold: {}", listed(labels)), self.threshold.to_string()))
         };
+        if self.figure == Figure::Localization {
+            return scheme;
+        }
         scheme.or_else(solver).or_else(source).or_else(ratio).or_else(threshold)
     }
 
@@ -138,6 +144,8 @@ impl Gate {
                 }
                 Figure::Recovered => c.recovered_percent,
                 Figure::Gain => c.recovered_percent - c.baseline_percent,
+                // Not a figure of a row.
+                Figure::Localization => f64::NAN,
             })
             .reduce(worse)
     }

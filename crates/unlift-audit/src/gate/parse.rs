@@ -16,6 +16,9 @@ impl Gate {
             |what: &str| format!("expected {FORM} (for example ppl@0.5:0.10<=20), found {what}");
         let typed = text.trim();
         let (left, bound) = typed.split_once("<=").ok_or_else(|| form("no <="))?;
+        if let Some((scheme, "localization")) = left.rsplit_once(':') {
+            return localization(typed, scheme.trim(), bound);
+        }
         let (names, inlier_ratio, rest) = match left.split_once('@') {
             // `sequence@5` is the name of a source.
             Some((names, rest)) if !SEQUENCES.iter().any(|name| names.ends_with(name)) => {
@@ -59,6 +62,26 @@ impl Gate {
         let typed = typed.to_owned();
         Ok(Self { typed, scheme, solver, source, inlier_ratio, threshold, figure, bound_percent })
     }
+}
+
+fn localization(typed: &str, scheme: &str, bound: &str) -> Result<Gate, String> {
+    let bound_percent = match bound.trim().trim_end_matches('x').parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => value,
+        _ => return Err(format!("bound: expected a multiple above 0, found {bound}")),
+    };
+    if scheme.is_empty() || scheme.contains([':', '@']) {
+        return Err(format!("expected SCHEME:localization<=MULTIPLE, found {typed}"));
+    }
+    Ok(Gate {
+        typed: typed.to_owned(),
+        scheme: (scheme != "all").then(|| scheme.to_owned()),
+        solver: None,
+        source: None,
+        inlier_ratio: None,
+        threshold: f64::INFINITY,
+        figure: Figure::Localization,
+        bound_percent,
+    })
 }
 
 const ORACLE: &str = "oracle";

@@ -3,7 +3,7 @@
 use unlift::Unit;
 use unlift::audit::{NotAudited, Plan, REFERENCE, Row, Threshold};
 use unlift::neighbors::oracle::Noise;
-use unlift_report::document::GateResult;
+use unlift_report::document::{GateResult, Localization, UNPROTECTED};
 
 use super::{Candidate, Figure, Gate};
 use crate::Error;
@@ -44,10 +44,7 @@ fn in_words(gate: &Gate, found: f64, row: &Row, at: usize, threshold: &Threshold
         Some((name, alone)) if found == alone => format!("records alone, {name}"),
         _ => "a blind guess".to_owned(),
     };
-    let verb = match gate.figure {
-        Figure::Recovered => "recovered",
-        Figure::Gain => "gained",
-    };
+    let verb = if gate.figure == Figure::Gain { "gained" } else { "recovered" };
     let unit = match row.unit {
         Unit::Meter => "m",
         Unit::Pixel => "px",
@@ -56,8 +53,18 @@ fn in_words(gate: &Gate, found: f64, row: &Row, at: usize, threshold: &Threshold
     format!("{}, {attack}, {verb} within {} {unit}", row.scheme, threshold.label)
 }
 
-/// Reports a gate without rows before the audit runs.
-pub fn check_gates<const D: usize>(gates: &[Gate], plan: &Plan<D>) -> Result<(), Error> {
+/// Reports a gate without rows before the audit runs. `localizes` is true if the audit measures
+/// localization.
+pub fn check_gates<const D: usize>(
+    gates: &[Gate],
+    plan: &Plan<D>,
+    localizes: bool,
+) -> Result<(), Error> {
+    let of_localization = |gate: &&Gate| gate.figure == Figure::Localization;
+    if let Some(gate) = gates.iter().find(of_localization).filter(|_| !localizes) {
+        let expected = "expected a COLMAP model with cameras and tracks, not in tiles";
+        return Err(Error::request(format!("--gate {}: {expected}, found none", gate.typed)));
+    }
     let lacking = |gate: &Gate| gate.not_in(plan).map(|part| (gate.typed.clone(), part));
     match gates.iter().find_map(lacking) {
         None => Ok(()),
@@ -82,12 +89,16 @@ pub fn gate_results<const D: usize>(
     rows: &[Row],
     not_audited: &[NotAudited],
     doubts: &[Option<String>],
+    localization: &[Localization],
 ) -> Result<Vec<GateResult>, Error> {
     let doubtful = rows.iter().zip(doubts).filter_map(|(row, doubt)| Some((row, doubt.as_ref()?)));
     let doubtful: Vec<(Vec<_>, &String)> =
         doubtful.map(|(row, doubt)| (candidates(plan, std::slice::from_ref(row)), doubt)).collect();
     let rows = candidates(plan, rows);
     let result = |gate: &Gate| {
+        if gate.figure == Figure::Localization {
+            return Ok(of_localization(gate, localization, not_audited));
+        }
         let found_percent = gate.worst(rows.iter().map(|(candidate, ..)| *candidate));
         let of = found_percent.and_then(|found| {
             let decides = |candidate| {
@@ -119,4 +130,45 @@ pub fn gate_results<const D: usize>(
         Ok(GateResult { gate, found_percent, of, bound_percent, passed, reason })
     };
     gates.iter().map(result).collect()
+}
+
+/// Returns the result of a gate on localization. A scheme without a finite error fails it.
+fn of_localization(
+    gate: &Gate,
+    localization: &[Localization],
+    not_audited: &[NotAudited],
+) -> GateResult {
+    let covered = |scheme: &str| gate.scheme.as_deref().is_none_or(|name| name == scheme);
+    let of_map =
+        |one: &&Localization| !one.of_queries && one.scheme != UNPROTECTED && covered(&one.scheme);
+    let all: Vec<&Localization> = localization.iter().filter(of_map).collect();
+    let missing = not_audited.iter().find(|one| one.neighbors.is_none() && covered(&one.scheme));
+    let worst = all.iter().max_by(|a, b| {
+        let cost = |one: &Localization| one.cost().unwrap_or(f64::INFINITY);
+        cost(a).total_cmp(&cost(b))
+    });
+    let reason = match (worst, missing) {
+        (_, Some(missing)) => {
+            Some(format!("{} was not audited: {}", missing.scheme, missing.reason))
+        }
+        (None, None) => Some("localization was not measured".to_owned()),
+        (Some(one), None) if one.is_unknown() => Some(format!(
+            "{} changes descriptors, so its cost is not known without held-out images",
+            one.scheme
+        )),
+        (Some(one), None) if one.cost().is_none() => {
+            Some(format!("{}: most images do not localize", one.scheme))
+        }
+        (Some(_), None) => None,
+    };
+    let found_percent = worst.and_then(|one| one.cost());
+    let by = |one: &Localization| if one.held_out.is_some() { "held-out images" } else { "bound" };
+    GateResult {
+        gate: gate.typed.clone(),
+        found_percent,
+        of: worst.map(|one| format!("{}, {}", one.scheme, by(one))),
+        bound_percent: gate.bound_percent,
+        passed: reason.is_none() && found_percent.is_some_and(|found| gate.passes(found)),
+        reason,
+    }
 }

@@ -50,7 +50,7 @@ pub fn perform(job: ImagesJob<'_>, out: OutputSet) -> Result<(Option<Finished>, 
 /// If the plan does not fit images, a gate cannot be checked, an image in memory cannot be used, or
 /// `progress` stops the audit. Unusable images in files are reported, counted and skipped.
 pub fn find(job: ImagesJob<'_>) -> Result<(Option<Audited>, Used), Error> {
-    check_gates(&job.gates, &job.plan)?;
+    check_gates(&job.gates, &job.plan, false)?;
     let tally = RefCell::new(Tally::default());
     let mut watcher = Watcher::new(&job, &tally);
     let steps = job.progress;
@@ -94,7 +94,7 @@ pub fn find(job: ImagesJob<'_>) -> Result<(Option<Audited>, Used), Error> {
         steps.say(&format!("note: {moved}"));
         notes.push(moved);
     }
-    let gates = gate_results(&job.gates, &job.plan, &outcome.rows, &[], &doubts)?;
+    let gates = gate_results(&job.gates, &job.plan, &outcome.rows, &[], &doubts, &[])?;
     let mut options = job.options;
     if let Some(inversion) = &job.inversion {
         options.insert("inverter_sha256".into(), inversion.sha256().into());

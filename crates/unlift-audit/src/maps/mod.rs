@@ -27,6 +27,7 @@ use crate::gate::{Gate, check_gates, gate_results};
 use crate::inversion::MapInversion;
 use crate::journal::Journal;
 use crate::lengths::{check_lengths_of_gates, check_scale};
+use crate::localization::{self, Cameras, Localize};
 use crate::prepare::{Preparation, Prepared, prepare};
 use crate::progress::{Progress, Quiet};
 use crate::scene::Pictures;
@@ -43,6 +44,8 @@ pub struct Job<'a> {
     pub descriptors: Option<&'a Descriptors>,
     /// The release and its secret, if the points are hidden already.
     pub hidden: Option<&'a (Released<3>, Secret)>,
+    /// The cameras that observe the points, for localization; not used with tiles.
+    pub localize: Option<Localize<'a>>,
     /// Camera centers in the unit of the audit, for the 3D view.
     pub cameras: Vec<[f64; 3]>,
     /// The up direction of the 3D view, if known.
@@ -102,6 +105,7 @@ impl<'a> Job<'a> {
             original: &prepared.original,
             descriptors: prepared.descriptors.as_ref(),
             hidden: None,
+            localize: Some(Localize { cameras: &prepared.cameras, held_out: None }),
             cameras: input.cameras.iter().map(|c| c.map(|x| x * scale)).collect(),
             up: input.up,
             plan: Plan::new(points.unit()).for_map(points.len(), USUAL_K),
@@ -171,19 +175,37 @@ pub fn open(
         let error = Error::from(unlift_io::Error::core(path, error));
         if few { error.advise("a smaller --k, or more points") } else { error }
     })?;
+    if let Some(model) = &input.model {
+        let scale = 1.0 / prepared.unit_in_map_units;
+        // `prepared.rows` counts finite points only.
+        let rows = rows_of_file(&prepared.rows, &input.left_out);
+        match Cameras::read(model, &rows, scale) {
+            Ok(cameras) => {
+                prepared.notes.extend(cameras.note());
+                prepared.cameras = cameras;
+            }
+            // An audit of points needs no cameras.
+            Err(error) => prepared.notes.push(format!("localization: not measured: {error}")),
+        }
+    }
     prepared.notes.extend(prepared.descriptors.as_ref().and_then(zeros));
     prepared.notes.splice(0..0, input.notes.iter().cloned());
     prepared.doubts.clone_from(&input.doubts);
-    // `rows` numbers rows of the file, which may contain points that the reader left out.
-    let mut left_out = input.left_out.iter().peekable();
+    prepared.rows = rows_of_file(&prepared.rows, &input.left_out);
+    Ok((input, prepared))
+}
+
+/// Returns `rows` among all points of the file, which may contain points that the reader left out.
+fn rows_of_file(rows: &[u32], left_out: &[u64]) -> Vec<u32> {
+    let mut left_out = left_out.iter().peekable();
     let mut shift = 0;
-    for row in &mut prepared.rows {
-        while left_out.next_if(|&&out| out <= u64::from(*row) + shift).is_some() {
+    let of_file = |&row: &u32| {
+        while left_out.next_if(|&&out| out <= u64::from(row) + shift).is_some() {
             shift += 1;
         }
-        *row += shift as u32;
-    }
-    Ok((input, prepared))
+        row + shift as u32
+    };
+    rows.iter().map(of_file).collect()
 }
 
 /// Returns a note about descriptors that are all zero; some exporters mark missing descriptors like
@@ -226,7 +248,9 @@ fn find_with(
     journal: Option<&mut Journal<'_>>,
     out: Option<&mut OutputSet>,
 ) -> Result<Audited, Error> {
-    check_gates(&job.gates, &job.plan)?;
+    let localize = job.localize.as_ref().filter(|_| job.tiles.is_none());
+    let localizes = localize.is_some_and(|localize| !localize.cameras.views.is_empty());
+    check_gates(&job.gates, &job.plan, localizes)?;
     check_lengths_of_gates(job.original.reveal(), &job.gates)?;
     for note in job.doubts.iter().chain(&job.notes) {
         job.progress.say(&format!("note: {note}"));
@@ -280,7 +304,14 @@ fn find_with(
         job.progress.say(&format!("note: {note}"));
     }
     let (rows, missing) = (&outcome.rows, &outcome.not_audited);
-    let gates = gate_results(&job.gates, &job.plan, rows, missing, &doubts.of_rows)?;
+    let (localization, said) = match localize {
+        Some(localize) => {
+            localization::of_schemes(localize, job.original, &job.plan, job.progress)?
+        }
+        None => Default::default(),
+    };
+    doubts.notes.extend(said);
+    let gates = gate_results(&job.gates, &job.plan, rows, missing, &doubts.of_rows, &localization)?;
     let mut options = job.options;
     if let Some(inversion) = &job.inversion {
         options.insert("inverter_sha256".into(), inversion.sha256().into());
@@ -305,6 +336,7 @@ fn find_with(
         seconds: &outcome.seconds,
     };
     let mut document = document::document(&job.plan, &found, provenance);
+    document.localization = localization;
     if let Some(tiles) = &cut {
         document.tiles = document::tiles(tiles, &tile_rows, &outcome.rows, &job.plan.thresholds);
     }

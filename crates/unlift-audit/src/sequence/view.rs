@@ -153,7 +153,7 @@ impl Model {
             .ok_or(("a camera with less than 180 degrees".to_owned(), "a wider one".to_owned()))?;
         let (mut kept, mut places) = (Vec::new(), Vec::new());
         for (row, &keypoint) in features.keypoints.iter().enumerate() {
-            if let Some(place) = lens.undistorted(keypoint).filter(|place| bounds.contains(place)) {
+            if let Some(place) = undistorted(lens, keypoint).filter(|place| bounds.contains(place)) {
                 kept.push(row as u32);
                 places.push(place);
             }
@@ -202,6 +202,13 @@ impl Model {
     }
 }
 
+/// Returns where a pinhole camera with the focal lengths and the principal point of the lens sees what the lens sees at `place`.
+fn undistorted(lens: &Lens, place: [f64; 2]) -> Option<[f64; 2]> {
+    let (focal, center) = lens.pinhole();
+    let flat = lens.undistort(place)?;
+    Some([0, 1].map(|c| focal[c] * flat[c] + center[c]))
+}
+
 /// Returns the box of the undistorted image.
 fn bounds(lens: &Lens, size: [f64; 2]) -> Option<Bounds<2>> {
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
@@ -210,7 +217,7 @@ fn bounds(lens: &Lens, size: [f64; 2]) -> Option<Bounds<2>> {
         let [x, y] = size.map(|side| side * t - 0.5);
         let [right, bottom] = size.map(|side| side - 0.5);
         for place in [[x, -0.5], [x, bottom], [-0.5, y], [right, y]] {
-            let place = lens.undistorted(place)?;
+            let place = undistorted(lens, place)?;
             for c in 0..2 {
                 low[c] = low[c].min(place[c]);
                 high[c] = high[c].max(place[c]);

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use unlift::audit::Threshold;
 use unlift::neighbors::oracle::Noise;
-use unlift::obfuscate::Entry;
+use unlift::obfuscate::{Entry, Mitigation};
 use unlift::recover::{Builtin, Delta};
 use unlift_audit::{Gate, OutlierFilter};
 use unlift_nn::DescriptorKind;
@@ -160,6 +160,7 @@ Examples:
   unlift audit map cloud.ply --descriptors d.npy --neighbors overlap --gate 'all:overlap:1.0<=20'
   unlift audit map PROJECT --neighbors lists-by-point.parquet --solver joint,ransac
   unlift audit map PROJECT --descriptors PROJECT/database.db --neighbors oracle --neighbors overlap
+  unlift audit map PROJECT --scale 1 --gate 'ppl:localization<=2.0' --mitigate thin:1/4
   unlift audit map PROJECT --share-safe --json
   unlift audit map PROJECT --scale 1 --gate 'all@0.5:0.10<=20' --junit gates.xml --sarif gates.sarif
 
@@ -173,6 +174,9 @@ strongest attack counts.
 A gate without SOLVER and SOURCE also covers the two baselines: blind (a guess from one record at a
 time) and records alone (see --no-records-alone). With :gain, a gate fails if an attack exceeds the
 larger baseline by more than PERCENT percentage points.
+
+SCHEME:localization<=MULTIPLE bounds the error of localization, as a multiple of that without
+protection. It needs a COLMAP model with tracks.
 
 A gate that matches nothing in the audit is a usage error. A gate on a scheme that cannot be applied
 to the map fails.
@@ -194,6 +198,13 @@ pub struct AuditMapArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::scheme,
           help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
+    /// Also audit every scheme after these changes to the map; separate steps by commas, repeat for
+    /// alternatives. thin:1/4 keeps a random quarter of the points, thin:tracks:1/4 those that most
+    /// images observe; noise:0.1 adds Gaussian noise of this standard deviation to each value of
+    /// unit-length descriptors; bits:2 rounds each value to 2 bits; pca:32 keeps 32 principal
+    /// components; drop:0.5 withholds half of the descriptors
+    #[arg(long, value_name = "STEPS", value_parser = values::mitigation, help_heading = "Attack")]
+    pub mitigate: Vec<Mitigation>,
     #[command(flatten)]
     pub solvers: SolverArgs,
     /// Source of the attacker's lists of neighbors; repeatable. oracle, a test tool, makes lists
@@ -228,6 +239,21 @@ pub struct AuditMapArgs {
     /// Compare with at most N photos, evenly spaced by name
     #[arg(long, value_parser = values::count, value_name = "N", default_value = "12", help_heading = "Result")]
     pub max_photos: NonZeroUsize,
+    /// Also localize held-out images of the map. The folder has its photos (SIFT features are
+    /// extracted), or the file their features (see unlift features --as-stored). The map is made
+    /// without the held-out images, with new descriptors; their keypoints are matched with it by
+    /// descriptors, and the pose is estimated from the matches. Needs a COLMAP model with tracks
+    #[arg(
+        long,
+        value_name = "PHOTOS|FEATURES",
+        help_heading = "Result",
+        conflicts_with = "tile_points"
+    )]
+    pub localize: Option<PathBuf>,
+    /// Hold out one image of N
+    #[arg(long, value_parser = values::count, value_name = "N", default_value = "10",
+          help_heading = "Result", requires = "localize")]
+    pub hold_out: NonZeroUsize,
     /// Cut a large map into tiles of at most N points and audit each tile as a separate map. This
     /// needs the memory of one tile, and the report shows which tiles leak most. Recommended beyond
     /// a few million points

@@ -7,8 +7,9 @@ use std::time::Instant;
 use indexmap::IndexMap;
 use serde_json::{Map, Value, json};
 use unlift::audit::{Measure, Plan};
-use unlift::obfuscate::SchemeOptions;
+use unlift::obfuscate::{Mitigated, Mitigation, Scheme, SchemeOptions};
 use unlift_audit::inversion::MapInversion;
+use unlift_audit::localization::Localize;
 use unlift_audit::maps::{Tiles, perform};
 use unlift_audit::{
     Finished, Job, Journal, Prepared, Shown, check_thresholds, open_audit, sources,
@@ -79,6 +80,14 @@ pub fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
             command: Some(command_line()),
             ..Job::new(path, &input, &prepared, &result.out, started)?
         };
+        if let Some(features) = &args.localize {
+            if prepared.cameras.views.is_empty() || args.tile_points.is_some() {
+                let expected = "expected a COLMAP model with cameras and tracks, not in tiles";
+                return Err(usage(format!("--localize: {expected}, found none")));
+            }
+            let held_out = Some((features.clone(), args.hold_out.get()));
+            job.localize = Some(Localize { cameras: &prepared.cameras, held_out });
+        }
         job.input.other_sha256 = others(args)?;
         beside.check()?;
         Ok(perform(job, out)?)
@@ -121,7 +130,8 @@ fn inversion(
 /// Returns the input paths, which must not be overwritten.
 pub fn inputs(args: &AuditMapArgs) -> Vec<&Path> {
     let beside = beside(args).map(|(_, path)| path);
-    let of_pictures = args.photos.iter().chain(&args.inverter).map(PathBuf::as_path);
+    let of_pictures = args.photos.iter().chain(&args.inverter).chain(&args.localize);
+    let of_pictures = of_pictures.map(PathBuf::as_path);
     [args.path.as_path()].into_iter().chain(beside).chain(of_pictures).collect()
 }
 
@@ -146,7 +156,9 @@ fn plan(
     }
     let entries = distinct(entries, |a, b| a.name == b.name);
     let options = SchemeOptions::usual(unit);
-    let schemes = entries.iter().filter_map(|entry| entry.of_dimension(&options)).collect();
+    let mut schemes: Vec<Arc<dyn Scheme<3>>> =
+        entries.iter().filter_map(|entry| entry.of_dimension(&options)).collect();
+    schemes.extend(mitigated(args, &schemes, prepared)?);
     let thresholds = thresholds(&args.thresholds, &usual)?;
     let points = prepared.original.reveal();
     let typed = !args.thresholds.is_empty();
@@ -177,6 +189,32 @@ fn plan(
     })
 }
 
+/// Returns `schemes` under every mitigation of the command line.
+fn mitigated(
+    args: &AuditMapArgs,
+    schemes: &[Arc<dyn Scheme<3>>],
+    prepared: &Prepared,
+) -> anyhow::Result<Vec<Arc<dyn Scheme<3>>>> {
+    let tracks = Some(&prepared.cameras.tracks).filter(|tracks| !tracks.is_empty());
+    let mut all: Vec<Arc<dyn Scheme<3>>> = Vec::new();
+    for mitigation in &args.mitigate {
+        let name = mitigation.name();
+        if mitigation.needs_tracks() && (tracks.is_none() || args.tile_points.is_some()) {
+            let expected = "expected a COLMAP model with tracks, not in tiles";
+            return Err(usage(format!("--mitigate {name}: {expected}, found none")));
+        }
+        if mitigation.changes_descriptors() && prepared.descriptors.is_none() {
+            let expected = "expected descriptors (--descriptors FILE)";
+            return Err(usage(format!("--mitigate {name}: {expected}, found none")));
+        }
+        all.extend(schemes.iter().map(|scheme| {
+            let (scheme, tracks) = (Arc::clone(scheme), tracks.cloned());
+            Arc::new(Mitigated::new(scheme, mitigation.clone(), tracks)) as Arc<dyn Scheme<3>>
+        }));
+    }
+    Ok(all)
+}
+
 /// Returns the files that are read beside the map, by their role.
 fn beside(args: &AuditMapArgs) -> impl Iterator<Item = (&'static str, &Path)> {
     let lists = args.neighbors.iter().filter_map(|source| match source {
@@ -195,6 +233,13 @@ fn more_options(args: &AuditMapArgs) -> Map<String, Value> {
     let mut options = Map::new();
     if let Some(most) = args.map.max_points {
         options.insert("max_points".into(), json!(most.get()));
+    }
+    if !args.mitigate.is_empty() {
+        let names: Vec<String> = args.mitigate.iter().map(Mitigation::name).collect();
+        options.insert("mitigate".into(), json!(names));
+    }
+    if args.localize.is_some() {
+        options.insert("hold_out".into(), json!(args.hold_out.get()));
     }
     if args.invert {
         options.insert("invert".into(), json!(true));

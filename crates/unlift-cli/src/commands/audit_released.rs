@@ -7,6 +7,7 @@ use serde_json::{Map, json};
 use unlift::audit::{Plan, scheme_called};
 use unlift::released::Released;
 use unlift::truth::Secret;
+use unlift_audit::localization::Cameras;
 use unlift_audit::maps::{self, perform};
 use unlift_audit::{Finished, Job, Prepared, Shown, check_thresholds, open_audit, ordered};
 use unlift_io::atomic::Rules;
@@ -58,6 +59,7 @@ pub fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
             original: &prepared.original,
             descriptors: None,
             hidden: Some(&hidden),
+            localize: None,
             cameras: Vec::new(),
             up: None,
             plan,
@@ -135,6 +137,7 @@ fn open(args: &AuditReleasedArgs) -> anyhow::Result<(Prepared, (Released<3>, Sec
         descriptors: None,
         unit_in_map_units: 1.0,
         rows,
+        cameras: Cameras::default(),
         notes,
         doubts: Vec::new(),
     };

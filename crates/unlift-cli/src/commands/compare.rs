@@ -66,6 +66,14 @@ fn text(comparison: &Comparison, written: Option<PathBuf>) -> String {
             text.push_str(&format!("{}\n", OneLine(said)));
         }
     }
+    for one in &comparison.costs_more {
+        let now = one.new_multiple.map_or("no pose or not known".into(), |new| format!("{new:.2}"));
+        let (scheme, was) = (&one.scheme, one.old_multiple);
+        let said = format!(
+            "LOCALIZES LESS PRECISELY: {scheme}: {was:.2} times the unprotected error before, {now} now"
+        );
+        text.push_str(&format!("{}\n", OneLine(said)));
+    }
     for lost in &comparison.lost {
         let by = lost.neighbors.as_ref().map(|by| format!(" by {by}")).unwrap_or_default();
         let said = format!("OUT OF VIEW: {}{by}: {}", lost.scheme, lost.reason);

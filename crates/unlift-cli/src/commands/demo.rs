@@ -122,6 +122,7 @@ fn map(progress: &Part<'_>, out: &Path, room: &unlift_demo::Mapped) -> anyhow::R
         original: &original,
         descriptors: Some(&room.descriptors),
         hidden: None,
+        localize: None,
         cameras: room.cameras.clone(),
         up: Some([0.0, 0.0, 1.0]),
         plan: Plan {

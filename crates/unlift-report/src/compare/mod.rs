@@ -5,7 +5,7 @@ mod page;
 use serde::Serialize;
 
 use crate::attack;
-use crate::document::{Document, LengthUnit, Row};
+use crate::document::{Document, LengthUnit, Localization, Row};
 use crate::{tables, words};
 
 pub use page::page;
@@ -47,6 +47,17 @@ pub struct Lost {
     pub reason: String,
 }
 
+/// A scheme under which cameras are placed less precisely than before.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CostsMore {
+    /// The scheme's user-facing name.
+    pub scheme: String,
+    /// The localization error in the old audit, as a multiple of the unprotected one.
+    pub old_multiple: f64,
+    /// The error in the new audit; `None` if it is not known or cameras do not localize.
+    pub new_multiple: Option<f64>,
+}
+
 /// The comparison of two audits.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
@@ -62,6 +73,9 @@ pub struct Comparison {
     pub less: Vec<Change>,
     /// Figures that are the same up to the tolerance, in the order of the new audit.
     pub same: Vec<Change>,
+    /// Schemes whose localization error has grown by more than a tenth. Held-out images are compared
+    /// with held-out images, bounds with bounds.
+    pub costs_more: Vec<CostsMore>,
     /// Schemes and sources that cannot be compared any more.
     pub lost: Vec<Lost>,
     /// Rows of the old audit only.
@@ -84,6 +98,9 @@ pub struct Incomparable {
 const ASKED: &str = "asked";
 /// Usual largest difference between seeds of one audit, in percentage points.
 const USUAL_TOLERANCE: f64 = 2.0;
+/// Growth of a localization error that counts as the same; random directions change it by some
+/// percent.
+const GROWTH: f64 = 1.1;
 const RECORDS_ALONE: &str = "records alone";
 
 /// Compares the figures of two audits. Rows match by scheme, source, noise, requested inlier ratio (a measured one is a result),
@@ -156,7 +173,8 @@ pub fn compare(
         rest.into_iter().partition(|change| change.points < -beyond);
     more.sort_by(|a, b| b.points.total_cmp(&a.points));
     less.sort_by(|a, b| a.points.total_cmp(&b.points));
-    let passed = more.is_empty() && lost.is_empty();
+    let costs_more = costs_more(old, new);
+    let passed = more.is_empty() && costs_more.is_empty() && lost.is_empty();
     Ok(Comparison {
         tolerance_points,
         tolerance_is,
@@ -164,10 +182,29 @@ pub fn compare(
         more,
         less,
         same,
+        costs_more,
         lost,
         only_old,
         only_new,
     })
+}
+
+/// Returns the schemes of the old audit that localize less precisely in the new one, or whose
+/// error is no longer known.
+fn costs_more(old: &Document, new: &Document) -> Vec<CostsMore> {
+    let held_out = |document: &Document| document.localization.iter().all(|o| o.held_out.is_some());
+    let both = held_out(old) && held_out(new);
+    let multiple = |one: &Localization| match &one.held_out {
+        Some(held_out) if both => held_out.multiple,
+        _ => one.multiple.filter(|_| !one.changes_descriptors),
+    };
+    let worse = |was: &Localization| {
+        let is = new.localization.iter().find(|is| is.scheme == was.scheme);
+        let (old_multiple, new_multiple) = (multiple(was)?, is.and_then(multiple));
+        let is_worse = new_multiple.is_none_or(|new| new > GROWTH * old_multiple);
+        is_worse.then(|| CostsMore { scheme: was.scheme.clone(), old_multiple, new_multiple })
+    };
+    old.localization.iter().filter_map(worse).collect()
 }
 
 /// Returns the largest standard deviation of a share over repeats, in percentage points; `None` without repeats.
@@ -329,6 +366,10 @@ impl Comparison {
             self.less.len(),
             self.same.len()
         );
+        if !self.costs_more.is_empty() {
+            let n = self.costs_more.len();
+            text.push_str(&format!("; {n} localize less precisely"));
+        }
         if !self.lost.is_empty() {
             text.push_str(&format!("; {} cannot be compared any more", self.lost.len()));
         }

@@ -3,6 +3,7 @@
 #[path = "../sample/mod.rs"]
 mod sample;
 
+mod cost;
 mod document;
 mod gate_files;
 mod inversions;

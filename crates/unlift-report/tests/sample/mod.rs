@@ -99,6 +99,7 @@ pub fn document(metric: bool) -> Document {
         gates: vec![gate("ppl@0.5:0.10<=20", 89.1, 20.0), gate("plane@0.1:0.10<=20", 11.8, 20.0)],
         images: Vec::new(),
         tiles: Vec::new(),
+        localization: Vec::new(),
         run: Run {
             command: Some(
                 "unlift audit map maps/furnished-room --scale 1 --solver consensus".into(),

@@ -29,6 +29,8 @@ pub fn obfuscate<const D: usize>(
         let expected = format!("{} rows, one per point", points.len());
         return Err(Error::new("descriptors", expected, descriptors.len().to_string()));
     }
+    let changed = descriptors.map(|rows| scheme.descriptors(rows, key)).transpose()?.flatten();
+    let descriptors = changed.as_ref().or(descriptors);
     size::check(points.positions())?;
     // The center of known bounds reveals nothing about the points.
     let bounds = original.bounds();

@@ -5,6 +5,7 @@
 
 mod hide;
 mod kmeans;
+mod mitigate;
 mod pairs;
 mod scheme;
 mod size;
@@ -21,6 +22,7 @@ pub mod ray;
 pub mod ray_voxel;
 
 pub use hide::obfuscate;
+pub use mitigate::{Mitigated, Mitigation};
 pub use scheme::{Build, Entry, Facts, Lifted, Scheme, SchemeOptions};
 
 use crate::Error;

@@ -10,7 +10,7 @@ use crate::seed::Key;
 #[cfg(doc)]
 use crate::seed::Stage;
 use crate::truth::Dropped;
-use crate::{Error, OriginalId, Unit};
+use crate::{Descriptors, Error, OriginalId, Unit};
 
 /// An entry of the registry: a built-in scheme and its constructors.
 #[derive(Debug)]
@@ -104,6 +104,26 @@ pub trait Scheme<const D: usize>: Debug + Send + Sync {
         bounds: Option<&Bounds<D>>,
         key: &Key,
     ) -> Result<Lifted<D>, Error>;
+
+    /// Returns the descriptors that are released in place of `descriptors`, one row per original;
+    /// `None` if they are released unchanged, as geometric schemes do. Randomness must come from
+    /// `key` with [`Stage::Mitigation`].
+    ///
+    /// # Errors
+    /// If the rule cannot change these descriptors.
+    fn descriptors(
+        &self,
+        descriptors: &Descriptors,
+        key: &Key,
+    ) -> Result<Option<Descriptors>, Error> {
+        let _ = (descriptors, key);
+        Ok(None)
+    }
+
+    /// Returns true if the scheme changes descriptors, so that fewer keypoints find their points.
+    fn changes_descriptors(&self) -> bool {
+        false
+    }
 }
 
 /// Result of a scheme, before shuffling.

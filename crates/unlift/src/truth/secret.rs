@@ -13,14 +13,22 @@ pub enum DropReason {
     RejectedPair,
     /// It lies on the center of a ray cloud or the anchor of an image, so its ray has no direction.
     OnCenter,
+    /// A mitigation kept only a part of the points.
+    Thinned,
     /// A custom scheme left it out.
     Other,
 }
 
 impl DropReason {
     /// All reasons.
-    pub const ALL: [DropReason; 5] =
-        [Self::OddPoint, Self::CoincidentPair, Self::RejectedPair, Self::OnCenter, Self::Other];
+    pub const ALL: [DropReason; 6] = [
+        Self::OddPoint,
+        Self::CoincidentPair,
+        Self::RejectedPair,
+        Self::OnCenter,
+        Self::Thinned,
+        Self::Other,
+    ];
 
     /// Returns the name used in files and reports.
     pub fn name(self) -> &'static str {
@@ -29,6 +37,7 @@ impl DropReason {
             Self::CoincidentPair => "coincident_pair",
             Self::RejectedPair => "rejected_pair",
             Self::OnCenter => "on_center",
+            Self::Thinned => "thinned",
             Self::Other => "other",
         }
     }

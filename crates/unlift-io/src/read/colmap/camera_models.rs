@@ -43,6 +43,11 @@ impl CameraModel {
         CAMERA_MODELS.get(usize::try_from(id).ok()?)
     }
 
+    /// Returns true if the first parameter is the focal length in both directions.
+    pub fn has_one_focal(&self) -> bool {
+        self.name.starts_with("SIMPLE_") || self.name.starts_with("RADIAL")
+    }
+
     /// Returns the model with this name.
     pub fn from_name(name: &[u8]) -> Option<&'static Self> {
         CAMERA_MODELS.iter().find(|m| m.name.as_bytes() == name)

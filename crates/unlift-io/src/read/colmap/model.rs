@@ -18,6 +18,22 @@ pub struct Camera {
     pub params: Vec<f64>,
 }
 
+impl Camera {
+    /// Returns focal lengths and principal point in pixels; `None` for a panorama, which has none.
+    pub fn pinhole(&self) -> Option<([f64; 2], [f64; 2])> {
+        if self.model.name == "EQUIRECTANGULAR" {
+            return None;
+        }
+        let first = if self.model.has_one_focal() { 1 } else { 2 };
+        let value = |at: usize| self.params.get(at).copied();
+        let focal = [value(0)?, value(first - 1)?];
+        let principal = [value(first)?, value(first + 1)?];
+        let all = [focal, principal].concat();
+        let usable = all.iter().all(|x| x.is_finite()) && focal.iter().all(|&f| f > 0.0);
+        usable.then_some((focal, principal))
+    }
+}
+
 /// A registered image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {

@@ -1,0 +1,55 @@
+//! Prints the matches of held-out images and our errors as JSON, for docs/compare_poses.py.
+//!
+//! ```text
+//! cargo run --release -p unlift-audit --example held_out_matches -- MODEL FEATURES N
+//! ```
+
+use std::error::Error;
+use std::path::PathBuf;
+
+use serde_json::{Value, json};
+use unlift::Unit;
+use unlift::localization::Match;
+use unlift::obfuscate::{SchemeOptions, scheme};
+use unlift::seed::Key;
+use unlift_audit::localization::held_out::{Held, Problem};
+use unlift_audit::{Preparation, Quiet, maps};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let mut next = || arguments.next().ok_or("expected MODEL FEATURES N");
+    let (model, features, nth): (PathBuf, PathBuf, usize) =
+        (next()?.into(), next()?.into(), next()?.parse()?);
+    let preparation = Preparation { scale: Some(1.0), ..Preparation::default() };
+    let (_, prepared) = maps::open(&model, None, &preparation)?;
+    let cameras = &prepared.cameras;
+    let mut held = Held::open(&features, nth, cameras, &prepared.original, &Quiet)?;
+    let lines = scheme("lines2d")?.of_dimension::<2>(&SchemeOptions::usual(Unit::Pixel));
+    let lines = lines.ok_or("expected lines2d in 2D")?;
+    let queries = held.with_queries(&*lines, &Key::from_seed(0))?;
+    let points = held.unprotected();
+    println!("{}", json!({ "point": of(&points), "lines2d": of(&queries) }));
+    Ok(())
+}
+
+fn of(problems: &[Problem]) -> Vec<Value> {
+    let one = |(seed, problem): (usize, &Problem)| {
+        let (view, error) = (&problem.truth, problem.solve(seed as u64));
+        let matches: Vec<Value> = problem.matches.iter().filter_map(flat).collect();
+        json!({
+            "rotation": view.rotation, "center": view.center, "focal": view.focal,
+            "principal": view.principal, "size": view.size, "matches": matches,
+            "center_error": error.map(|error| error.0), "rotation_error_degrees": error.map(|error| error.1),
+        })
+    };
+    problems.iter().enumerate().map(one).collect()
+}
+
+/// Returns place, direction (zero for a point) and point.
+fn flat(one: &Match) -> Option<Value> {
+    match one {
+        Match::Point { place, point } => Some(json!([place, [0.0, 0.0], point])),
+        Match::ImageLine { place, direction, point } => Some(json!([place, direction, point])),
+        Match::MapLine { .. } => None,
+    }
+}

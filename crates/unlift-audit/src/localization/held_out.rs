@@ -1,0 +1,520 @@
+//! Localization of held-out images: their keypoints are matched with a map that was made without
+//! them, and their poses are estimated from the matches.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+use unlift::descriptors::Values;
+use unlift::geometry::frame::Bounds;
+use unlift::geometry::vector::{distance, median, squared_distance};
+use unlift::localization::{Free, Match, View, estimate, free_directions};
+use unlift::obfuscate::{Scheme, obfuscate};
+use unlift::released::Released;
+use unlift::seed::{Key, Stage};
+use unlift::truth::{Original, Secret};
+use unlift::{Descriptors, Error, PointSet, Unit};
+use unlift_features::Extraction;
+use unlift_features::load::Turn;
+use unlift_invert::Lens;
+use unlift_report::document::HeldOut;
+
+use super::Cameras;
+use crate::images::FeatureSource;
+use crate::progress::Progress;
+
+/// A keypoint belongs to a point that its image observes if it is this near to the projection, in
+/// pixels. Right matches have the same limit.
+const NEAR: f64 = 3.0;
+/// Smallest number of other images in which a point of the map must be found.
+const FEWEST_OTHERS: usize = 2;
+/// Largest ratio of the distances to the most similar descriptor and the next one.
+const RATIO: f32 = 0.8;
+/// Standard deviation of the centers of starts, as a share of the distance to the points.
+const REACH: f64 = 0.1;
+
+/// A held-out image.
+struct Query {
+    /// The image with its true pose.
+    view: View,
+    /// Undistorted keypoints in pixels of the pinhole, within the image.
+    places: Vec<[f64; 2]>,
+    descriptors: Unit32,
+}
+
+/// Rows of unit length, or zero.
+#[derive(PartialEq)]
+struct Unit32 {
+    dim: usize,
+    values: Vec<f32>,
+}
+
+/// A match of a keypoint with a point, by their rows.
+type Pair = (usize, usize);
+
+/// The rows of a map, their descriptors, and the matches of every image with them.
+type Known = (Vec<usize>, Unit32, Arc<Vec<Vec<Pair>>>);
+
+/// A map that was made without some images, and these images.
+pub struct Held<'a> {
+    original: &'a Original<3>,
+    /// All images of the map but the held-out ones.
+    others: Vec<&'a View>,
+    queries: Vec<Query>,
+    /// One row per point. Points that are not part of the map have the descriptor of another.
+    descriptors: Descriptors,
+    /// Whether a point is found in enough other images.
+    is_part: Vec<bool>,
+    /// Matches by the descriptors that they depend on.
+    known: Vec<Known>,
+}
+
+impl<'a> Held<'a> {
+    /// Holds out every `nth` image of those with features in `path`, a folder of photos or a file.
+    /// Makes the descriptor of every point from its keypoints in the other images.
+    ///
+    /// # Errors
+    /// If `path` cannot be read, or too few images of the map have features.
+    pub fn open(
+        path: &Path,
+        nth: usize,
+        cameras: &'a Cameras,
+        original: &'a Original<3>,
+        progress: &dyn Progress,
+    ) -> Result<Self, crate::Error> {
+        let source = FeatureSource::open(path, &Extraction::default())?.with_turn(Turn::AsStored);
+        let names = source.names();
+        let images: Vec<(usize, usize)> = (0..cameras.views.len())
+            .filter_map(|at| {
+                let name = String::from_utf8_lossy(&cameras.images[at].0);
+                Some((at, names.binary_search_by(|other| (**other).cmp(&*name)).ok()?))
+            })
+            .collect();
+        let positions = original.reveal().positions();
+        let read = |&(at, number): &(usize, usize)| {
+            let features = source.get(number)?;
+            let view = &cameras.views[at];
+            let camera = &cameras.images[at].1;
+            let lens = Lens::try_new(camera.model.name, &camera.params)?;
+            let Some(descriptors) = features.descriptors else {
+                return Err(Error::new("features", "descriptors", "none").into());
+            };
+            let photo = Photo::new(view, &lens, &features.keypoints, descriptors, positions);
+            Ok::<_, crate::Error>((at, photo))
+        };
+        let mut photos = Vec::new();
+        for found in images.par_iter().map(read).collect::<Vec<_>>() {
+            match found {
+                Ok(photo) => photos.push(photo),
+                Err(error) => progress.say(&format!("note: not localized: {error}")),
+            }
+        }
+        photos.sort_by(|(a, _), (b, _)| cameras.images[*a].0.cmp(&cameras.images[*b].0));
+        let is_held = |at: usize| at % nth == nth / 2;
+        let n_held = (0..photos.len()).filter(|&at| is_held(at)).count();
+        if n_held == 0 || photos.len() - n_held < FEWEST_OTHERS {
+            let expected = format!("features of at least {} images of the map", nth.max(3));
+            let found = photos.len().to_string();
+            return Err(unlift_io::Error::new(path, "", expected, found).into());
+        }
+        let dim = photos[0].1.descriptors.dim();
+        if let Some((_, other)) = photos.iter().find(|(_, photo)| photo.descriptors.dim() != dim) {
+            let found = other.descriptors.dim().to_string();
+            let expected = format!("{dim} values per descriptor in every image");
+            return Err(unlift_io::Error::new(path, "", expected, found).into());
+        }
+        let mut held = vec![false; cameras.views.len()];
+        let (mut queries, mut sums) = (Vec::new(), vec![0.0_f32; positions.len() * dim]);
+        let mut found = vec![0; positions.len()];
+        let is_bytes = matches!(photos[0].1.descriptors.values(), Values::U8(_));
+        for (number, (at, photo)) in photos.into_iter().enumerate() {
+            if is_held(number) {
+                held[at] = true;
+                queries.push(photo.query(&cameras.views[at]));
+                continue;
+            }
+            let unit = Unit32::of(&photo.descriptors, 0..photo.descriptors.len());
+            for (point, keypoint) in photo.of_points {
+                found[point] += 1;
+                let sum = &mut sums[point * dim..][..dim];
+                sum.iter_mut().zip(unit.row(keypoint)).for_each(|(sum, x)| *sum += x);
+            }
+        }
+        let is_part: Vec<bool> = found.iter().map(|&n| n >= FEWEST_OTHERS).collect();
+        let parts: Vec<usize> = (0..positions.len()).filter(|&row| is_part[row]).collect();
+        if parts.is_empty() {
+            let expected = "keypoints at the projections of the map's points";
+            return Err(unlift_io::Error::new(path, "", expected, "none").into());
+        }
+        // Mitigations learn from all rows, so the other rows have the same distribution.
+        let row = |row: usize| if is_part[row] { row } else { parts[row % parts.len()] };
+        let scaled = (0..positions.len()).flat_map(|at| {
+            let sum = &sums[row(at) * dim..][..dim];
+            let length = sum.iter().map(|x| x * x).sum::<f32>().sqrt();
+            let scale = if is_bytes { 512.0 } else { 1.0 } / length.max(1e-12);
+            sum.iter().map(move |x| x * scale)
+        });
+        let values = match is_bytes {
+            // A cast saturates.
+            true => Values::U8(scaled.map(|x| x.round() as u8).collect()),
+            false => Values::F32(scaled.collect()),
+        };
+        let others = (0..held.len()).filter(|&at| !held[at]).map(|at| &cameras.views[at]);
+        let descriptors = Descriptors::try_new(values, dim)?;
+        let others = others.collect();
+        Ok(Self { original, others, queries, descriptors, is_part, known: Vec::new() })
+    }
+
+    /// Returns a note about the map and the images.
+    pub fn note(&self) -> String {
+        let n = self.is_part.iter().filter(|part| **part).count();
+        format!(
+            "localization: {} images are held out; {n} of {} points are found in at least {FEWEST_OTHERS} other images",
+            self.queries.len(),
+            self.is_part.len()
+        )
+    }
+
+    /// Returns the problems of all images with the map in the clear.
+    pub fn unprotected(&mut self) -> Vec<Problem> {
+        let pairs = self.pairs_in_the_clear();
+        let positions = self.original.reveal().positions();
+        self.problems(&pairs, |_, query, (keypoint, row)| {
+            Some(Match::Point { place: query.places[keypoint], point: positions[row] })
+        })
+    }
+
+    /// Returns the problems of all images with the map that `scheme` protects under `key`.
+    ///
+    /// # Errors
+    /// If the scheme cannot hide the map.
+    pub fn with_map(&mut self, scheme: &dyn Scheme<3>, key: &Key) -> Result<Vec<Problem>, Error> {
+        let (released, secret) = obfuscate(scheme, self.original, Some(&self.descriptors), key)?;
+        let secret = secret.by_descriptor_row();
+        let rows = secret.hidden().iter().enumerate().map(|(row, id)| (id.index(), row));
+        let mut rows: Vec<(usize, usize)> =
+            rows.filter(|(point, _)| self.is_part[*point]).collect();
+        rows.sort_unstable();
+        let descriptors = released.descriptors().unwrap_or(&self.descriptors);
+        let unit = Unit32::of(descriptors, rows.iter().map(|(_, row)| *row));
+        let pairs = self.pairs(rows.iter().map(|(point, _)| *point).collect(), unit);
+        let free = by_original(&released, &secret, self.is_part.len());
+        let positions = self.original.reveal().positions();
+        Ok(self.problems(&pairs, |_, query, (keypoint, row)| {
+            let (place, point) = (query.places[keypoint], positions[row]);
+            match free[row] {
+                Free::Nowhere => Some(Match::Point { place, point }),
+                Free::Along(direction) => Some(Match::MapLine { place, point, direction }),
+                Free::More => None,
+            }
+        }))
+    }
+
+    /// Returns the problems of all images, whose keypoints `scheme` protects, with the map in the
+    /// clear.
+    ///
+    /// # Errors
+    /// If the scheme cannot hide the keypoints of an image.
+    pub fn with_queries(
+        &mut self,
+        scheme: &dyn Scheme<2>,
+        key: &Key,
+    ) -> Result<Vec<Problem>, Error> {
+        let hide = |(number, query): (usize, &Query)| {
+            let keypoints = PointSet::try_new(query.places.clone(), Unit::Pixel)?;
+            let original = Original::within(keypoints, query.bounds()?)?;
+            let key = key.of_item(Stage::Image, number as u64);
+            let (released, secret) = obfuscate(scheme, &original, None, &key)?;
+            Ok(by_original(&released, &secret, query.places.len()))
+        };
+        let free: Vec<Vec<Free<2>>> =
+            self.queries.iter().enumerate().map(hide).collect::<Result<_, Error>>()?;
+        let pairs = self.pairs_in_the_clear();
+        let positions = self.original.reveal().positions();
+        Ok(self.problems(&pairs, |number, query, (keypoint, row)| {
+            let (place, point) = (query.places[keypoint], positions[row]);
+            match free[number][keypoint] {
+                Free::Nowhere => Some(Match::Point { place, point }),
+                Free::Along(direction) => Some(Match::ImageLine { place, direction, point }),
+                Free::More => None,
+            }
+        }))
+    }
+
+    fn pairs_in_the_clear(&mut self) -> Arc<Vec<Vec<Pair>>> {
+        let rows: Vec<usize> = (0..self.is_part.len()).filter(|&row| self.is_part[row]).collect();
+        let unit = Unit32::of(&self.descriptors, rows.iter().copied());
+        self.pairs(rows, unit)
+    }
+
+    /// Returns the matches of every image with the points `rows`, whose descriptors are `unit`.
+    fn pairs(&mut self, rows: Vec<usize>, unit: Unit32) -> Arc<Vec<Vec<Pair>>> {
+        let known = self.known.iter().find(|(of, same, _)| *of == rows && *same == unit);
+        if let Some((.., pairs)) = known {
+            return Arc::clone(pairs);
+        }
+        let of = |query: &Query| {
+            let matched = mutual(&query.descriptors, &unit);
+            matched.into_iter().map(|(keypoint, at)| (keypoint, rows[at])).collect()
+        };
+        let pairs: Arc<Vec<Vec<Pair>>> = Arc::new(self.queries.par_iter().map(of).collect());
+        self.known.push((rows, unit, Arc::clone(&pairs)));
+        pairs
+    }
+
+    /// Returns the problem of every image; `fixed` returns what a match fixes.
+    fn problems(
+        &self,
+        pairs: &[Vec<Pair>],
+        fixed: impl Fn(usize, &Query, Pair) -> Option<Match> + Sync,
+    ) -> Vec<Problem> {
+        let positions = self.original.reveal().positions();
+        let of = |(number, query): (usize, &Query)| {
+            let pairs = &pairs[number];
+            let is_right = |&&(keypoint, row): &&Pair| {
+                let place = query.view.project(&positions[row]);
+                place.is_some_and(|p| distance(&p, &query.places[keypoint]) <= NEAR)
+            };
+            let start = self.most_similar(pairs).map(|similar| {
+                let points = pairs.iter().map(|(_, row)| &positions[*row]);
+                let mut away: Vec<f64> = points.map(|p| distance(p, &similar.center)).collect();
+                let (rotation, center) = (similar.rotation, similar.center);
+                let view = View { rotation, center, ..query.view.clone() };
+                (view, REACH * median(&mut away))
+            });
+            Problem {
+                truth: query.view.clone(),
+                start,
+                n_pairs: pairs.len(),
+                n_right: pairs.iter().filter(is_right).count(),
+                matches: pairs.iter().filter_map(|&pair| fixed(number, query, pair)).collect(),
+            }
+        };
+        self.queries.iter().enumerate().map(of).collect()
+    }
+
+    /// Returns the other image that observes most of the matched points, as retrieval would.
+    fn most_similar(&self, pairs: &[Pair]) -> Option<&View> {
+        if pairs.is_empty() {
+            return None;
+        }
+        let mut is_matched = vec![false; self.is_part.len()];
+        pairs.iter().for_each(|(_, row)| is_matched[*row] = true);
+        let shared =
+            |view: &View| view.observed.iter().filter(|&&row| is_matched[row as usize]).count();
+        // Of equal ones, the first.
+        self.others.iter().copied().rev().max_by_key(|view| shared(view))
+    }
+}
+
+/// The pose problem of one held-out image.
+pub struct Problem {
+    /// The image with its true pose.
+    pub truth: View,
+    /// The matches, as far as they fix the pose.
+    pub matches: Vec<Match>,
+    /// The pose of the most similar other image, and the standard deviation of further starts.
+    start: Option<(View, f64)>,
+    n_pairs: usize,
+    /// Matches within 3 px of the true projection.
+    n_right: usize,
+}
+
+/// The result of one held-out image.
+pub struct Located {
+    n_pairs: usize,
+    n_right: usize,
+    /// Errors of the center and of the rotation in degrees; `None` without an estimate.
+    error: Option<(f64, f64)>,
+}
+
+impl Problem {
+    /// Estimates the pose and returns its errors: of the center, and of the rotation in degrees.
+    pub fn solve(&self, seed: u64) -> Option<(f64, f64)> {
+        let (start, reach) = self.start.as_ref()?;
+        let (found, _) = estimate(start, &self.matches, *reach, seed)?;
+        Some(found.pose_distance(&self.truth))
+    }
+}
+
+/// Estimates the poses of all images.
+pub fn locate(problems: &[Problem], seed: u64) -> Vec<Located> {
+    let of = |(number, problem): (usize, &Problem)| Located {
+        n_pairs: problem.n_pairs,
+        n_right: problem.n_right,
+        error: problem.solve(seed.wrapping_add(number as u64)),
+    };
+    problems.par_iter().enumerate().map(of).collect()
+}
+
+/// Returns the free direction of each of `n` originals; those that are not released count as
+/// unknown.
+fn by_original<const D: usize>(released: &Released<D>, secret: &Secret, n: usize) -> Vec<Free<D>> {
+    let mut free = vec![Free::More; n];
+    for (id, direction) in secret.hidden().iter().zip(free_directions(released, secret)) {
+        free[id.index()] = direction;
+    }
+    free
+}
+
+/// Summarizes the results of all images beside the unprotected ones. `limits` are pairs of errors
+/// with their names.
+pub fn summary(
+    located: &[Located],
+    unprotected: &[Located],
+    limits: &[(String, f64, f64)],
+) -> HeldOut {
+    let middle = |of: &[Located], value: &dyn Fn(&Located) -> f64| {
+        let mut values: Vec<f64> = of.iter().map(value).collect();
+        values.sort_unstable_by(f64::total_cmp);
+        // The upper one of an even number.
+        values.get(values.len() / 2).copied().unwrap_or(f64::INFINITY)
+    };
+    let center = |one: &Located| one.error.map_or(f64::INFINITY, |(center, _)| center);
+    let angle = |one: &Located| one.error.map_or(f64::INFINITY, |(_, angle)| angle);
+    let finite = |value: f64| Some(value).filter(|value| value.is_finite());
+    let error = middle(located, &center);
+    let recall = |(name, most, angle_most): &(String, f64, f64)| {
+        let within = |one: &&Located| center(one) <= *most && angle(one) <= *angle_most;
+        let n = located.iter().filter(within).count();
+        (name.clone(), 100.0 * n as f64 / located.len().max(1) as f64)
+    };
+    HeldOut {
+        n_images: located.len() as u64,
+        right_matches: middle(located, &|one| one.n_right as f64),
+        matches: middle(located, &|one| one.n_pairs as f64),
+        center_error: finite(error),
+        rotation_error_degrees: finite(middle(located, &angle)),
+        multiple: finite(error / middle(unprotected, &center)),
+        recall_percent: limits.iter().map(recall).collect(),
+    }
+}
+
+/// A photo of the map with its features.
+struct Photo {
+    /// Keypoints in pixels of the pinhole, and their rows among `descriptors`.
+    places: Vec<([f64; 2], u32)>,
+    descriptors: Descriptors,
+    /// Points that the photo observes, with the row of the keypoint of each.
+    of_points: Vec<(usize, usize)>,
+}
+
+impl Photo {
+    fn new(
+        view: &View,
+        lens: &Lens,
+        keypoints: &[[f64; 2]],
+        descriptors: Descriptors,
+        positions: &[[f64; 3]],
+    ) -> Self {
+        // Buckets of the size of the search radius.
+        let cell = |p: &[f64; 2]| p.map(|x| (x / NEAR).floor() as i64);
+        let mut buckets: std::collections::HashMap<[i64; 2], Vec<usize>> = Default::default();
+        for (row, place) in keypoints.iter().enumerate() {
+            buckets.entry(cell(place)).or_default().push(row);
+        }
+        let nearest = |place: &[f64; 2]| {
+            let [x, y] = cell(place);
+            let near = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| [x + dx, y + dy]));
+            let rows = near.filter_map(|cell| buckets.get(&cell)).flatten().copied();
+            let rows = rows.map(|row| (squared_distance(&keypoints[row], place), row));
+            let nearest = rows.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))?;
+            (nearest.0 <= NEAR * NEAR).then_some(nearest.1)
+        };
+        let of_points = view.observed.iter().filter_map(|&row| {
+            let place = lens.project(view.in_camera(&positions[row as usize]))?;
+            Some((row as usize, nearest(&place)?))
+        });
+        let of_points = of_points.collect();
+        let flat = |(row, place): (usize, &[f64; 2])| {
+            let flat = lens.undistort(*place)?;
+            let place = [0, 1].map(|c| view.focal[c] * flat[c] + view.principal[c]);
+            let is_inside = (0..2).all(|c| (0.0..=view.size[c]).contains(&place[c]));
+            is_inside.then_some((place, row as u32))
+        };
+        let places = keypoints.iter().enumerate().filter_map(flat).collect();
+        Self { places, descriptors, of_points }
+    }
+
+    fn query(self, view: &View) -> Query {
+        let rows = self.places.iter().map(|(_, row)| *row as usize);
+        let descriptors = Unit32::of(&self.descriptors, rows);
+        let places = self.places.iter().map(|(place, _)| *place).collect();
+        // Pose estimation copies the view in every step.
+        let view = View { observed: Vec::new(), ..view.clone() };
+        Query { view, places, descriptors }
+    }
+}
+
+impl Query {
+    fn bounds(&self) -> Result<Bounds<2>, Error> {
+        Bounds::try_new([0.0; 2], self.view.size)
+    }
+}
+
+impl Unit32 {
+    fn of(descriptors: &Descriptors, rows: impl Iterator<Item = usize>) -> Self {
+        let dim = descriptors.dim();
+        let (mut values, mut one) = (Vec::new(), vec![0.0; dim]);
+        for row in rows {
+            descriptors.read_row(row, &mut one);
+            let length = one.iter().map(|x| x * x).sum::<f32>().sqrt();
+            let scale = if length > 0.0 { 1.0 / length } else { 0.0 };
+            values.extend(one.iter().map(|x| x * scale));
+        }
+        Self { dim, values }
+    }
+
+    fn len(&self) -> usize {
+        self.values.len() / self.dim
+    }
+
+    fn row(&self, at: usize) -> &[f32] {
+        &self.values[at * self.dim..][..self.dim]
+    }
+}
+
+/// Returns an inner product in a fixed order of eight partial sums.
+fn inner(a: &[f32], b: &[f32]) -> f32 {
+    let mut sums = [0.0_f32; 8];
+    for (a, b) in a.chunks_exact(8).zip(b.chunks_exact(8)) {
+        (0..8).for_each(|c| sums[c] += a[c] * b[c]);
+    }
+    let rest = a.len() / 8 * 8;
+    let tail: f32 = a[rest..].iter().zip(&b[rest..]).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f32>() + tail
+}
+
+/// Rows of one side that are compared with a block of the other at a time, so that both stay in the
+/// cache.
+const BLOCK: usize = 64;
+
+/// Returns the mutually most similar rows that pass the ratio test.
+fn mutual(a: &Unit32, b: &Unit32) -> Vec<Pair> {
+    // Most similar row and the two largest similarities.
+    let mut of_a = vec![(usize::MAX, -2.0_f32, -2.0_f32); a.len()];
+    let mut of_b = vec![(usize::MAX, -2.0_f32); b.len()];
+    for from in (0..b.len()).step_by(BLOCK) {
+        let block = from..(from + BLOCK).min(b.len());
+        for (i, best) in of_a.iter_mut().enumerate() {
+            for j in block.clone() {
+                let similar = inner(a.row(i), b.row(j));
+                if similar > best.1 {
+                    *best = (j, similar, best.1);
+                } else if similar > best.2 {
+                    best.2 = similar;
+                }
+                if similar > of_b[j].1 {
+                    of_b[j] = (i, similar);
+                }
+            }
+        }
+    }
+    let apart = |similar: f32| (2.0 - 2.0 * similar).max(0.0).sqrt();
+    let passes = |(i, &(j, first, second)): (usize, &(usize, f32, f32))| {
+        let is_mutual = j != usize::MAX && of_b[j].0 == i;
+        // Withheld descriptors are zero.
+        (is_mutual && first > 0.0 && apart(first) < RATIO * apart(second)).then_some((i, j))
+    };
+    of_a.iter().enumerate().filter_map(passes).collect()
+}

@@ -1,0 +1,219 @@
+//! Localization with the cameras of a map: what every scheme costs.
+
+#[cfg(feature = "networks")]
+pub mod held_out;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use unlift::audit::Plan;
+use unlift::localization::{Localization, PoseError, View, unprotected, with_map, with_queries};
+use unlift::obfuscate::{SCHEMES, SchemeOptions, obfuscate};
+use unlift::seed::Key;
+use unlift::truth::Original;
+use unlift_io::read::colmap;
+use unlift_report::document::{self as report, UNPROTECTED};
+
+use crate::Error;
+use crate::progress::Progress;
+
+/// Localization in an audit.
+#[derive(Clone, Debug)]
+pub struct Localize<'a> {
+    /// The cameras of the map.
+    pub cameras: &'a Cameras,
+    /// Photos or features of the images: also localizes held-out images. Every image with an
+    /// index that is half of the number modulo the number is held out.
+    pub held_out: Option<(PathBuf, usize)>,
+}
+
+/// The cameras of a map in the unit of an audit.
+#[derive(Clone, Debug, Default)]
+pub struct Cameras {
+    /// The images that observe points of the map.
+    pub views: Vec<View>,
+    /// Name and camera of each view, as in the model.
+    pub images: Vec<(Vec<u8>, colmap::Camera)>,
+    /// Number of images that observe each point.
+    pub tracks: Arc<[u32]>,
+    /// Number of images that are left out: their camera is a panorama, or has no focal length.
+    pub left_out: usize,
+}
+
+impl Cameras {
+    /// Reads the cameras and tracks of the COLMAP model in `model`. `rows` are the points of the
+    /// audit among the points of the model; lengths are multiplied by `scale`. Returns no views if
+    /// the points have no tracks.
+    ///
+    /// # Errors
+    /// If a file of the model cannot be read.
+    pub fn read(model: &Path, rows: &[u32], scale: f64) -> Result<Self, Error> {
+        let named = |name: &str| {
+            let files = ["bin", "txt"].map(|end| model.join(format!("{name}.{end}")));
+            files.into_iter().find(|file| file.is_file())
+        };
+        let (Some(file), Some(_), Some(_)) = (named("points3D"), named("images"), named("cameras"))
+        else {
+            return Ok(Self::default());
+        };
+        let (cameras, images) = colmap::read_views(model)?;
+        let points = colmap::read_points(&file, true)?;
+        let Some(tracks) = points.tracks else { return Ok(Self::default()) };
+        let mut observed: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        let mut lengths = Vec::with_capacity(rows.len());
+        for (at, &row) in rows.iter().enumerate() {
+            let mut of_point: Vec<u32> =
+                tracks.row(row as usize).iter().map(|observation| observation.0).collect();
+            // A track may contain two keypoints of an image; both show the same point.
+            of_point.sort_unstable();
+            of_point.dedup();
+            lengths.push(of_point.len() as u32);
+            of_point.into_iter().for_each(|id| observed.entry(id).or_default().push(at as u32));
+        }
+        let mut found = Self { tracks: lengths.into(), ..Self::default() };
+        for image in &images {
+            let Some(observed) = observed.remove(&image.id) else { continue };
+            let camera = image.camera(&cameras);
+            let pinhole = camera.and_then(|camera| Some((camera, camera.pinhole()?)));
+            let Some((camera, (focal, principal))) = pinhole else {
+                found.left_out += 1;
+                continue;
+            };
+            found.images.push((image.name.clone(), camera.clone()));
+            found.views.push(View {
+                rotation: image.rotation,
+                center: image.center.map(|x| x * scale),
+                focal,
+                principal,
+                size: [camera.width_px as f64, camera.height_px as f64],
+                observed,
+            });
+        }
+        Ok(found)
+    }
+}
+
+impl Cameras {
+    /// Returns a note about images that are left out.
+    pub(crate) fn note(&self) -> Option<String> {
+        (self.left_out > 0).then(|| {
+            let n = self.left_out;
+            format!("localization: {n} images are left out: their cameras have no focal length")
+        })
+    }
+}
+
+/// Returns the accuracy under every scheme of `plan` and under every scheme on queries, after that
+/// of the map itself, and notes. Empty without views.
+///
+/// # Errors
+/// If a scheme cannot hide the keypoints of an image, or features cannot be read.
+pub(crate) fn of_schemes(
+    localize: &Localize<'_>,
+    original: &Original<3>,
+    plan: &Plan<3>,
+    progress: &dyn Progress,
+) -> Result<(Vec<report::Localization>, Vec<String>), Error> {
+    let views: &[View] = &localize.cameras.views;
+    if views.is_empty() {
+        return Ok(Default::default());
+    }
+    let positions = original.reveal().positions();
+    let base = unprotected(views, positions);
+    let row = |scheme: &str, errors: &[Option<PoseError>]| {
+        let found = Localization::of(errors, &base);
+        let finite = |value: f64| Some(value).filter(|value| value.is_finite());
+        report::Localization {
+            scheme: scheme.to_owned(),
+            of_queries: false,
+            multiple: finite(found.multiple),
+            center_error: finite(found.center),
+            rotation_error_degrees: finite(found.rotation_degrees),
+            failed_percent: found.failed_percent,
+            changes_descriptors: false,
+            held_out: None,
+        }
+    };
+    let key = Key::from_seed(plan.seed);
+    let mut rows = vec![row(UNPROTECTED, &base)];
+    for scheme in &plan.schemes {
+        // A scheme that cannot hide the map is among those that were not audited.
+        let Ok((released, secret)) = obfuscate(&**scheme, original, None, &key) else { continue };
+        let errors = with_map(views, positions, &released, &secret);
+        let changes_descriptors = scheme.changes_descriptors();
+        rows.push(report::Localization { changes_descriptors, ..row(scheme.name(), &errors) });
+    }
+    let options = SchemeOptions::usual(unlift::Unit::Pixel);
+    for scheme in SCHEMES.iter().filter_map(|entry| entry.of_dimension::<2>(&options)) {
+        let errors = with_queries(views, positions, &*scheme, &key)?;
+        rows.push(report::Localization { of_queries: true, ..row(scheme.name(), &errors) });
+    }
+    let notes = match &localize.held_out {
+        None => Vec::new(),
+        Some((path, nth)) => {
+            let of = (localize.cameras, original, plan);
+            vec![hold_out(path, *nth, of, &mut rows, progress)?]
+        }
+    };
+    Ok((rows, notes))
+}
+
+/// Adds what was measured on held-out images to every row, and returns a note about them.
+#[cfg(feature = "networks")]
+fn hold_out(
+    path: &Path,
+    nth: usize,
+    (cameras, original, plan): (&Cameras, &Original<3>, &Plan<3>),
+    rows: &mut [report::Localization],
+    progress: &dyn Progress,
+) -> Result<String, Error> {
+    let mut held = held_out::Held::open(path, nth, cameras, original, progress)?;
+    let note = held.note();
+    progress.say(&format!("note: {note}"));
+    let (key, seed) = (Key::from_seed(plan.seed), plan.seed);
+    let base = held_out::locate(&held.unprotected(), seed);
+    let limits: Vec<(String, f64, f64)> = match original.reveal().unit() {
+        unlift::Unit::Meter => [(0.05, 5.0), (0.25, 2.0), (0.5, 5.0)]
+            .map(|(m, angle)| (format!("{:.0} cm, {angle} deg", 100.0 * m), m, angle))
+            .to_vec(),
+        // Without a scale, multiples of the unprotected bound.
+        _ => {
+            let bound = rows[0].center_error.unwrap_or(0.0);
+            [10.0, 30.0, 100.0]
+                .map(|times| (format!("{times} times the bound, 5 deg"), times * bound, 5.0))
+                .to_vec()
+        }
+    };
+    let options = SchemeOptions::usual(unlift::Unit::Pixel);
+    let n_rows = rows.len();
+    for (at, row) in rows.iter_mut().enumerate() {
+        progress.show(at, n_rows, &format!("localization, {}", row.scheme));
+        let on_queries = || {
+            let mut schemes = SCHEMES.iter().filter_map(|entry| entry.of_dimension::<2>(&options));
+            schemes.find(|scheme| scheme.name() == row.scheme)
+        };
+        let problems = match row.of_queries {
+            true => on_queries().map(|scheme| held.with_queries(&*scheme, &key)).transpose()?,
+            false => {
+                let scheme = plan.schemes.iter().find(|scheme| scheme.name() == row.scheme);
+                scheme.map(|scheme| held.with_map(&**scheme, &key)).transpose()?
+            }
+        };
+        let located = problems.map(|problems| held_out::locate(&problems, seed));
+        let located = located.as_ref().unwrap_or(&base);
+        row.held_out = Some(held_out::summary(located, &base, &limits));
+    }
+    Ok(note)
+}
+
+#[cfg(not(feature = "networks"))]
+fn hold_out(
+    _: &Path,
+    _: usize,
+    _: (&Cameras, &Original<3>, &Plan<3>),
+    _: &mut [report::Localization],
+    _: &dyn Progress,
+) -> Result<String, Error> {
+    Err(Error::request("--localize: expected a build with the feature networks, found one without"))
+}

@@ -1,0 +1,205 @@
+//! Localization in audits of a COLMAP model: bound, held-out images, gates.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use unlift::Descriptors;
+use unlift::Unit;
+use unlift::audit::Plan;
+use unlift::descriptors::Values;
+use unlift::obfuscate::{Mitigated, Mitigation, Scheme, SchemeOptions, scheme};
+use unlift::recover::Builtin;
+use unlift::seed::{Draws, Stage};
+use unlift_audit::localization::Localize;
+use unlift_audit::{Audited, Gate, Job, Preparation, Prepared, maps};
+use unlift_io::features::{FeatureWriter, ImageFeatures};
+use unlift_report::document::Localization;
+
+const N_IMAGES: u32 = 12;
+const FOCAL: f64 = 500.0;
+const DIM: usize = 32;
+
+/// Returns the rotation and the center of an image: cameras on a line, which look along +y.
+fn pose(image: u32) -> ([[f64; 3]; 3], [f64; 3]) {
+    let center = [1.5 + 0.2 * f64::from(image), 0.4 + 0.05 * f64::from(image % 3), 1.2];
+    ([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]], center)
+}
+
+/// Writes a COLMAP model of random points, and features of its images with noise of half a pixel and
+/// similar descriptors.
+fn write(folder: &Path) {
+    let mut draws = Draws::new(4, Stage::Shapes, 0);
+    let mut point = |_| [draws.between(0.0, 5.0), draws.between(3.0, 5.0), draws.between(0.0, 2.5)];
+    let points: Vec<[f64; 3]> = (0..1_500).map(&mut point).collect();
+    let (mut images, mut text) = (String::new(), String::new());
+    let mut keypoints: Vec<Vec<([f64; 2], usize)>> = Vec::new();
+    for image in 0..N_IMAGES {
+        let (rotation, center) = pose(image);
+        let mut draws = Draws::new(1, Stage::Shapes, image.into());
+        let mut seen = Vec::new();
+        for (row, point) in points.iter().enumerate() {
+            let away: [f64; 3] = std::array::from_fn(|c| point[c] - center[c]);
+            let x = rotation.map(|row| (0..3).map(|c| row[c] * away[c]).sum::<f64>());
+            let place = [FOCAL * x[0] / x[2] + 320.0, FOCAL * x[1] / x[2] + 240.0];
+            if x[2] > 0.5 && (1.0..639.0).contains(&place[0]) && (1.0..479.0).contains(&place[1]) {
+                seen.push((place.map(|p| p - 0.5 + 0.3 * draws.normal()), row));
+            }
+        }
+        // A quarter turn about x, and t = -R c.
+        let half = 0.5_f64.sqrt();
+        let t = rotation.map(|row| -(0..3).map(|c| row[c] * center[c]).sum::<f64>());
+        writeln!(
+            images,
+            "{} {half} {half} 0 0 {} {} {} 1 {image:02}.jpg\n",
+            image + 1,
+            t[0],
+            t[1],
+            t[2]
+        )
+        .unwrap();
+        keypoints.push(seen);
+    }
+    for (row, point) in points.iter().enumerate() {
+        let [x, y, z] = point;
+        write!(text, "{} {x} {y} {z} 0 0 0 0.5", row + 1).unwrap();
+        for (image, seen) in keypoints.iter().enumerate() {
+            if let Some(at) = seen.iter().position(|(_, of)| *of == row) {
+                write!(text, " {} {at}", image + 1).unwrap();
+            }
+        }
+        text.push('\n');
+    }
+    std::fs::write(folder.join("cameras.txt"), "1 PINHOLE 640 480 500 500 320 240\n").unwrap();
+    std::fs::write(folder.join("images.txt"), images).unwrap();
+    std::fs::write(folder.join("points3D.txt"), text).unwrap();
+    let mut writer = FeatureWriter::create(&folder.join("features.h5")).unwrap();
+    for (image, seen) in keypoints.iter().enumerate() {
+        let mut draws = Draws::new(2, Stage::Shapes, image as u64);
+        let values = seen.iter().flat_map(|(_, row)| {
+            let mut own = Draws::new(3, Stage::Shapes, *row as u64);
+            let noisy = |_| (own.normal() + 0.2 * draws.normal()) as f32;
+            (0..DIM).map(noisy).collect::<Vec<f32>>()
+        });
+        let descriptors = Descriptors::try_new(Values::F32(values.collect()), DIM).unwrap();
+        let image = ImageFeatures {
+            name: format!("{image:02}.jpg"),
+            size: Some([640, 480]),
+            keypoints: seen.iter().map(|(place, _)| *place).collect(),
+            descriptors: Some(descriptors),
+            ..ImageFeatures::default()
+        };
+        writer.append(&image).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+fn open(folder: &Path) -> (unlift_io::read::Input, Prepared) {
+    let preparation = Preparation { scale: Some(1.0), k: 20, ..Preparation::default() };
+    maps::open(folder, None, &preparation).unwrap()
+}
+
+fn audit(folder: &Path, mitigate: &[&str], gates: &[&str], held_out: bool) -> Audited {
+    let (input, prepared) = open(folder);
+    let named = |name: &&str| {
+        scheme(name).unwrap().of_dimension::<3>(&SchemeOptions::usual(Unit::Meter)).unwrap()
+    };
+    let mut schemes: Vec<Arc<dyn Scheme<3>>> = ["olc", "plane"].iter().map(named).collect();
+    schemes.extend(mitigate.iter().map(|text| {
+        let mitigation = Mitigation::parse(text).unwrap();
+        let tracks = Some(Arc::clone(&prepared.cameras.tracks));
+        Arc::new(Mitigated::new(named(&"olc"), mitigation, tracks)) as Arc<dyn Scheme<3>>
+    }));
+    let plan = Plan {
+        schemes,
+        k: 20,
+        inlier_ratios: vec![0.5],
+        solvers: vec![Arc::new(Builtin::Consensus)],
+        records_alone: false,
+        ..Plan::new(Unit::Meter)
+    };
+    let held_out = held_out.then(|| (folder.join("features.h5"), 4));
+    let job = Job {
+        plan,
+        gates: gates.iter().map(|text| Gate::parse(text).unwrap()).collect(),
+        localize: Some(Localize { cameras: &prepared.cameras, held_out }),
+        ..Job::new(folder, &input, &prepared, &folder.join("out"), Instant::now()).unwrap()
+    };
+    maps::find(job, None).unwrap()
+}
+
+fn of<'a>(audited: &'a Audited, scheme: &str) -> &'a Localization {
+    audited.document.localization.iter().find(|one| one.scheme == scheme).expect(scheme)
+}
+
+#[test]
+fn an_audit_of_a_model_with_tracks_says_what_protection_costs() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path());
+    let gates = ["olc:localization<=2.0", "olc:localization<=1.1", "plane:localization<=5"];
+    let audited = audit(folder.path(), &["thin:1/4", "bits:2"], &gates, false);
+    audited.document.check().unwrap();
+    let names: Vec<&str> =
+        audited.document.localization.iter().map(|one| one.scheme.as_str()).collect();
+    let all = ["none", "olc", "plane", "olc_thin4", "olc_bits2", "lines2d", "cp2d", "dcl2d"];
+    assert_eq!(names, all);
+    assert_eq!(of(&audited, "none").multiple, Some(1.0));
+    // One row of two per match costs about the root of two; a quarter of the points twice that.
+    let olc = of(&audited, "olc").multiple.unwrap();
+    let thin = of(&audited, "olc_thin4").multiple.unwrap();
+    assert!((1.2..1.8).contains(&olc), "{olc}");
+    assert!((1.8..2.3).contains(&(thin / olc)), "{thin}, {olc}");
+    let plane = of(&audited, "plane");
+    assert_eq!((plane.multiple, plane.failed_percent), (None, 100.0));
+    assert!(of(&audited, "olc_bits2").is_unknown());
+    let passed: Vec<bool> = audited.document.gates.iter().map(|gate| gate.passed).collect();
+    assert_eq!(passed, [true, false, false]);
+    let reason = audited.document.gates[2].reason.as_deref();
+    assert_eq!(reason, Some("plane: most images do not localize"));
+    // Names and poses of images do not appear.
+    let page = audited.page(true).unwrap();
+    assert!(page.contains("What protection costs") && !page.contains("03.jpg"));
+    assert!(page.contains("olc_bits2: its descriptors are changed"));
+}
+
+#[test]
+fn held_out_images_are_localized() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path());
+    let audited = audit(folder.path(), &["bits:1"], &["all:localization<=4"], true);
+    audited.document.check().unwrap();
+    let held_out = |scheme: &str| of(&audited, scheme).held_out.as_ref().unwrap();
+    let none = held_out("none");
+    assert_eq!((none.n_images, none.multiple), (3, Some(1.0)));
+    assert!(none.right_matches > 0.9 * none.matches && none.matches > 100.0, "{none:?}");
+    // Noise of 0.4 px over some hundred points 3 m away.
+    assert!(none.center_error.unwrap() < 0.01, "{none:?}");
+    for scheme in ["olc", "lines2d", "olc_bits1"] {
+        let one = held_out(scheme);
+        assert!(one.center_error.unwrap() < 0.02, "{scheme}: {one:?}");
+        assert_eq!(one.recall_percent["5 cm, 5 deg"], 100.0, "{scheme}");
+    }
+    assert!(held_out("plane").center_error.is_none());
+    assert!(held_out("olc_bits1").matches < held_out("olc").matches);
+    // The plane does not localize, so a gate on all schemes fails.
+    assert!(!audited.document.gates[0].passed);
+}
+
+#[test]
+fn a_model_without_tracks_is_silent_and_a_gate_on_it_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path());
+    std::fs::remove_file(folder.path().join("images.txt")).unwrap();
+    let (input, prepared) = open(folder.path());
+    assert!(prepared.cameras.views.is_empty());
+    let gates = vec![Gate::parse("olc:localization<=2").unwrap()];
+    let job = Job {
+        gates,
+        ..Job::new(folder.path(), &input, &prepared, &folder.path().join("out"), Instant::now())
+            .unwrap()
+    };
+    let error = maps::find(job, None).err().unwrap().to_string();
+    let expected = "--gate olc:localization<=2: expected a COLMAP model with cameras and tracks, not in tiles, found none";
+    assert_eq!(error, expected);
+}

@@ -1,0 +1,126 @@
+//! What protection costs: chart, sentence, table, gates and comparisons.
+
+use unlift_report::compare::compare;
+use unlift_report::document::{Document, GateResult, HeldOut, Localization};
+use unlift_report::{RenderOptions, gate_lines, junit, render, sarif, text_table};
+
+use crate::sample;
+
+fn one(scheme: &str, multiple: Option<f64>) -> Localization {
+    Localization {
+        scheme: scheme.to_owned(),
+        of_queries: false,
+        multiple,
+        center_error: multiple.map(|x| 0.0005 * x),
+        rotation_error_degrees: multiple,
+        failed_percent: if multiple.is_some() { 0.0 } else { 100.0 },
+        changes_descriptors: false,
+        held_out: None,
+    }
+}
+
+/// The sample audit with localization; `olc` leaks little if `protects`.
+fn document(protects: bool) -> Document {
+    let mut document = sample::document(true);
+    for row in document.results.iter_mut().filter(|row| row.scheme == "olc" && protects) {
+        row.recovered_percent.values_mut().for_each(|x| *x = 10.0);
+        row.blind_percent.values_mut().for_each(|x| *x = 5.0);
+        row.records_alone_percent = None;
+        row.records_alone_by = None;
+    }
+    let query = Localization { of_queries: true, ..one("lines2d", Some(1.4)) };
+    document.localization = vec![
+        one("none", Some(1.0)),
+        one("olc", Some(1.4)),
+        one("ppl", Some(1.6)),
+        one("plane", None),
+        query,
+    ];
+    document
+}
+
+fn page(document: &Document) -> String {
+    render(document, None, &RenderOptions::default()).unwrap()
+}
+
+#[test]
+fn the_sentence_names_what_protects_at_a_small_cost() {
+    let none = page(&document(false));
+    let said = "No scheme tried here keeps an attacker below 20\u{a0}% at a localization error within twice the unprotected one.";
+    assert!(none.contains(said));
+    let some = page(&document(true));
+    assert!(some.contains("olc keeps the attacks tried here below 20\u{a0}%"));
+    assert!(some.contains("A better attack may recover more."));
+    // The audit of a map without tracks has no chart.
+    assert!(!page(&sample::document(true)).contains("id=\"cost\""));
+}
+
+#[test]
+fn the_chart_has_a_dot_per_scheme_and_the_table_a_row() {
+    let page = page(&document(true));
+    assert!(page.contains("<title>olc: 10.0 % come back, 1.4 times the unprotected error</title>"));
+    assert!(page.contains("most cameras do not localize</title>"));
+    assert!(page.contains("table-cost") && page.contains("the query"));
+    let text = text_table(&document(true));
+    assert!(text.contains("does not localize") && text.contains("1.4x"), "{text}");
+}
+
+#[test]
+fn changed_descriptors_have_no_known_cost_without_held_out_images() {
+    let mut document = document(true);
+    document.localization[1].changes_descriptors = true;
+    assert_eq!(document.localization[1].cost(), None);
+    let text = page(&document);
+    assert!(text.contains("No scheme with both figures keeps"), "an unknown cost is not small");
+    assert!(text.contains("olc: its descriptors are changed"));
+    document.localization[1].held_out = Some(HeldOut {
+        n_images: 10,
+        right_matches: 300.0,
+        matches: 400.0,
+        center_error: Some(0.001),
+        rotation_error_degrees: Some(0.03),
+        multiple: Some(3.5),
+        recall_percent: [("5 cm, 5 deg".to_owned(), 90.0)].into_iter().collect(),
+    });
+    assert_eq!(document.localization[1].cost(), Some(3.5));
+    assert!(page(&document).contains("300 of 400"));
+    let same = Document::from_json(&document.to_json().unwrap()).unwrap();
+    assert_eq!(same.localization, document.localization);
+}
+
+#[test]
+fn gates_on_localization_speak_of_multiples() {
+    let mut document = document(true);
+    document.gates = vec![GateResult {
+        gate: "ppl:localization<=1.5".to_owned(),
+        found_percent: Some(1.6),
+        of: Some("ppl, bound".to_owned()),
+        bound_percent: 1.5,
+        passed: false,
+        reason: None,
+    }];
+    let line =
+        "gate ppl:localization<=1.5: FAILED, found 1.60 times the unprotected error: ppl, bound\n";
+    assert_eq!(gate_lines(&document), line);
+    let said = "1.6 times the unprotected localization error, at most 1.5 times may be; ppl, bound";
+    for text in [page(&document), junit(&document), sarif(&document, None)] {
+        assert!(text.contains(said), "{text}");
+    }
+}
+
+#[test]
+fn a_larger_localization_error_fails_a_comparison() {
+    let (old, mut new) = (document(true), document(true));
+    new.localization[1].multiple = Some(1.5);
+    assert!(compare(&old, &new, None).unwrap().passed, "within a tenth");
+    new.localization[1].multiple = Some(1.7);
+    new.localization[2].multiple = None;
+    let found = compare(&old, &new, None).unwrap();
+    let worse: Vec<&str> = found.costs_more.iter().map(|one| one.scheme.as_str()).collect();
+    assert_eq!(worse, ["olc", "ppl"]);
+    assert!(!found.passed && found.summary().ends_with("; 2 localize less precisely"));
+    new.localization.clear();
+    let unknown = compare(&old, &new, None).unwrap();
+    assert!(!unknown.passed && unknown.costs_more[0].new_multiple.is_none());
+    assert!(compare(&new, &old, None).unwrap().passed, "the old audit did not measure it");
+}

@@ -1,0 +1,477 @@
+//! Localization: how precisely a camera can be placed with a protected map or a protected query.
+//!
+//! Every protected map exists to localize cameras, so localization accuracy is the price of
+//! protection. This module computes the information bound: the covariance of a pose that is
+//! estimated from all true matches of an image, at the true pose, with noise of one pixel per
+//! coordinate. It needs no solver and no random starts.
+//!
+//! A match of a point with a keypoint gives two rows of the reprojection Jacobian. A record along
+//! which the point can move gives one row, along the normal of the record's image: the other
+//! direction is free. A plane gives none. The covariance is the inverse of the sum of the outer
+//! products of all rows.
+
+mod estimate;
+
+pub use estimate::{INLIER, Match, estimate};
+
+use nalgebra::{Matrix6, SymmetricEigen, Vector6};
+use rayon::prelude::*;
+
+use crate::geometry::frame::Bounds;
+use crate::geometry::vector::{dot, sub, widen};
+use crate::obfuscate::{Scheme, obfuscate};
+use crate::released::{Obfuscation, Released};
+use crate::seed::{Key, Stage};
+use crate::truth::{Original, Secret};
+use crate::{Error, PointSet, Unit};
+
+/// Largest condition number of a pose that counts as determined.
+const MOST_CONDITION: f64 = 1e12;
+
+/// An image with its pose and the points that it observes.
+///
+/// The camera is a pinhole. Observations of other cameras must be undistorted. The bound takes them
+/// at the true projections, so it needs no keypoints.
+#[derive(Clone, Debug, PartialEq)]
+pub struct View {
+    /// Rotation from the map to the camera: a point `x` is at `rotation (x - center)`. Camera axes
+    /// point right, down and forward.
+    pub rotation: [[f64; 3]; 3],
+    /// Camera center, in the unit of the points.
+    pub center: [f64; 3],
+    /// Focal lengths in pixels.
+    pub focal: [f64; 2],
+    /// Principal point in pixels.
+    pub principal: [f64; 2],
+    /// Width and height of the image in pixels.
+    pub size: [f64; 2],
+    /// Rows of the points that the image observes.
+    pub observed: Vec<u32>,
+}
+
+/// Standard deviations of a pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseError {
+    /// Deviation of the camera center, in the unit of the points: the root of the trace.
+    pub center: f64,
+    /// Deviation of the rotation in degrees: the root of the trace.
+    pub rotation_degrees: f64,
+}
+
+/// Accuracy of localization over many images.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Localization {
+    /// Median error of the camera center, in the unit of the points. Infinite if most images do not
+    /// localize.
+    pub center: f64,
+    /// Median error of the rotation in degrees.
+    pub rotation_degrees: f64,
+    /// Median over images of the error of the center as a multiple of the unprotected one.
+    pub multiple: f64,
+    /// Percentage of images that do not localize.
+    pub failed_percent: f64,
+}
+
+impl Localization {
+    /// Summarizes the errors of images beside the unprotected ones; `None` is an image that does
+    /// not localize. Images that do not localize even without protection have no multiple.
+    pub fn of(errors: &[Option<PoseError>], unprotected: &[Option<PoseError>]) -> Self {
+        let value = |of: fn(&PoseError) -> f64| {
+            let value = |error: &Option<PoseError>| error.as_ref().map_or(f64::INFINITY, of);
+            upper_median(errors.iter().map(value).collect())
+        };
+        let multiples = errors.iter().zip(unprotected).filter_map(|(error, base)| {
+            let base = base.as_ref()?;
+            Some(error.map_or(f64::INFINITY, |error| error.center / base.center))
+        });
+        let failed = errors.iter().filter(|error| error.is_none()).count();
+        Self {
+            center: value(|error| error.center),
+            rotation_degrees: value(|error| error.rotation_degrees),
+            multiple: upper_median(multiples.collect()),
+            failed_percent: 100.0 * failed as f64 / errors.len().max(1) as f64,
+        }
+    }
+}
+
+/// Returns the median, the upper one of an even number: a figure must not err toward accuracy.
+/// Without values, it is infinite.
+fn upper_median(mut values: Vec<f64>) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::INFINITY)
+}
+
+/// The directions in which a record leaves its hidden point free.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Free<const D: usize> {
+    /// None: the point is known.
+    Nowhere,
+    /// One direction: the point lies on a known line.
+    Along([f64; D]),
+    /// Two directions in space, or an unknown one.
+    More,
+}
+
+/// Returns the free direction of the point in every slot, by the family of its record. The swapped
+/// axis of axis candidates counts as known, because a match can be verified under each axis.
+pub fn free_directions<const D: usize>(released: &Released<D>, secret: &Secret) -> Vec<Free<D>> {
+    let n = released.n_slots();
+    let record = |slot: usize| slot / released.slots_per_record();
+    match released.obfuscation() {
+        Obfuscation::Lines(lines) => {
+            (0..n).map(|slot| Free::Along(widen(&lines.direction()[record(slot)]))).collect()
+        }
+        Obfuscation::Rays(rays) => {
+            (0..n).map(|slot| Free::Along(widen(&rays.direction()[record(slot)]))).collect()
+        }
+        // In an image, an axis-parallel line; in space, a plane.
+        Obfuscation::AxisPlanes(planes) if D == 2 => {
+            let along = |slot: usize| unit_vector(1 - usize::from(planes.axis()[record(slot)]));
+            (0..n).map(|slot| Free::Along(along(slot))).collect()
+        }
+        Obfuscation::AxisPlanes(_) => vec![Free::More; n],
+        Obfuscation::AxisCandidates(_) => match secret.swapped_axis() {
+            Some(axes) => axes.iter().map(|&a| Free::Along(unit_vector(a.into()))).collect(),
+            None => vec![Free::More; n],
+        },
+    }
+}
+
+fn unit_vector<const D: usize>(axis: usize) -> [f64; D] {
+    std::array::from_fn(|c| f64::from(u8::from(c == axis)))
+}
+
+/// Returns the errors of all `views` with the points themselves.
+pub fn unprotected(views: &[View], positions: &[[f64; 3]]) -> Vec<Option<PoseError>> {
+    let of = |view: &View| {
+        let known = view.observed.iter().map(|&row| (positions[row as usize], ImageLine::Point));
+        view.pose_error(known)
+    };
+    views.par_iter().map(of).collect()
+}
+
+/// Returns the errors of all `views` with a protected map and keypoints in the clear. Points that
+/// the scheme left out give no rows.
+pub fn with_map(
+    views: &[View],
+    positions: &[[f64; 3]],
+    released: &Released<3>,
+    secret: &Secret,
+) -> Vec<Option<PoseError>> {
+    let mut free = vec![Free::More; positions.len()];
+    for (hidden, direction) in secret.hidden().iter().zip(free_directions(released, secret)) {
+        free[hidden.index()] = direction;
+    }
+    let of = |view: &View| {
+        let known = view.observed.iter().filter_map(|&row| {
+            let position = positions[row as usize];
+            let line = match free[row as usize] {
+                Free::Nowhere => ImageLine::Point,
+                Free::Along(direction) => ImageLine::Along(view.image_of(&position, &direction)?),
+                Free::More => return None,
+            };
+            Some((position, line))
+        });
+        view.pose_error(known)
+    };
+    views.par_iter().map(of).collect()
+}
+
+/// Returns the errors of all `views` with a map in the clear and keypoints that `scheme` protects.
+///
+/// # Errors
+/// If the scheme cannot hide the keypoints of an image.
+pub fn with_queries(
+    views: &[View],
+    positions: &[[f64; 3]],
+    scheme: &dyn Scheme<2>,
+    key: &Key,
+) -> Result<Vec<Option<PoseError>>, Error> {
+    let of = |(number, view): (usize, &View)| {
+        let inside = |row: &u32| {
+            let place = view.project(&positions[*row as usize])?;
+            let is_inside = (0..2).all(|c| (0.0..=view.size[c]).contains(&place[c]));
+            is_inside.then_some((*row, place))
+        };
+        let (rows, places): (Vec<u32>, Vec<[f64; 2]>) =
+            view.observed.iter().filter_map(inside).unzip();
+        if rows.is_empty() {
+            return Ok(None);
+        }
+        let keypoints = PointSet::try_new(places, Unit::Pixel)?;
+        let original = Original::within(keypoints, Bounds::try_new([0.0; 2], view.size)?)?;
+        let key = key.of_item(Stage::Image, number as u64);
+        let (released, secret) = obfuscate(scheme, &original, None, &key)?;
+        let free = free_directions(&released, &secret);
+        let known = secret.hidden().iter().zip(free).filter_map(|(hidden, free)| {
+            let line = match free {
+                Free::Nowhere => ImageLine::Point,
+                Free::Along(direction) => ImageLine::Along(direction),
+                Free::More => return None,
+            };
+            Some((positions[rows[hidden.index()] as usize], line))
+        });
+        Ok(view.pose_error(known))
+    };
+    views.par_iter().enumerate().map(of).collect()
+}
+
+/// What a match fixes in the image.
+#[derive(Clone, Copy, Debug)]
+enum ImageLine {
+    /// Both coordinates.
+    Point,
+    /// The distance from a line with this direction.
+    Along([f64; 2]),
+}
+
+impl View {
+    /// Returns the place of a point in the camera's frame.
+    pub fn in_camera(&self, point: &[f64; 3]) -> [f64; 3] {
+        let away = sub(point, &self.center);
+        self.rotation.map(|row| dot(&row, &away))
+    }
+
+    /// Projects a point into the image, in pixels; `None` behind the camera.
+    pub fn project(&self, point: &[f64; 3]) -> Option<[f64; 2]> {
+        let x = self.in_camera(point);
+        let on = |c: usize| self.focal[c] * x[c] / x[2] + self.principal[c];
+        (x[2] > 0.0).then(|| [on(0), on(1)])
+    }
+
+    /// Returns the derivative of the projection of `x`, in the camera's frame, by `x`.
+    fn slopes(&self, x: &[f64; 3]) -> [[f64; 3]; 2] {
+        let [fx, fy] = self.focal;
+        let z = x[2];
+        [[fx / z, 0.0, -fx * x[0] / (z * z)], [0.0, fy / z, -fy * x[1] / (z * z)]]
+    }
+
+    /// Returns the direction in the image of a line through `point`; `None` behind the camera.
+    fn image_of(&self, point: &[f64; 3], direction: &[f64; 3]) -> Option<[f64; 2]> {
+        let x = self.in_camera(point);
+        let turned = self.rotation.map(|row| dot(&row, direction));
+        (x[2] > 0.0).then(|| self.slopes(&x).map(|row| dot(&row, &turned)))
+    }
+
+    /// Returns the deviations of the pose from matches of known points; `None` if they do not
+    /// determine it.
+    ///
+    /// The pose is perturbed from the left: `dx = w x x + dt` in the camera's frame.
+    fn pose_error(
+        &self,
+        matches: impl Iterator<Item = ([f64; 3], ImageLine)>,
+    ) -> Option<PoseError> {
+        let mut information = Matrix6::zeros();
+        let (mut depths, mut n) = (0.0, 0.0);
+        for (point, line) in matches {
+            let x = self.in_camera(&point);
+            if x[2] <= 0.0 {
+                continue;
+            }
+            (depths, n) = (depths + x[2], n + 1.0);
+            let rows = self.slopes(&x).map(|j| {
+                let by_rotation = [
+                    x[1] * j[2] - x[2] * j[1],
+                    x[2] * j[0] - x[0] * j[2],
+                    x[0] * j[1] - x[1] * j[0],
+                ];
+                Vector6::new(by_rotation[0], by_rotation[1], by_rotation[2], j[0], j[1], j[2])
+            });
+            match line {
+                ImageLine::Point => {
+                    rows.iter().for_each(|row| information += row * row.transpose());
+                }
+                ImageLine::Along(direction) => {
+                    let length = libm::hypot(direction[0], direction[1]);
+                    // A line toward the camera is a point in the image, which gives no normal.
+                    if length > 0.0 {
+                        let row = (rows[1] * direction[0] - rows[0] * direction[1]) / length;
+                        information += row * row.transpose();
+                    }
+                }
+            }
+        }
+        // Translations count in units of the mean depth, so that the condition number does not
+        // depend on the unit of the map.
+        let depth = depths / n;
+        if n == 0.0 {
+            return None;
+        }
+        let scale = Matrix6::from_diagonal(&Vector6::new(1.0, 1.0, 1.0, depth, depth, depth));
+        let eigen = SymmetricEigen::new(scale * information * scale);
+        let (least, most) = (eigen.eigenvalues.min(), eigen.eigenvalues.max());
+        if least <= 0.0 || most / least > MOST_CONDITION || most.is_nan() {
+            return None;
+        }
+        let variance = |c: usize| {
+            let of = |k: usize| eigen.eigenvectors[(c, k)].powi(2) / eigen.eigenvalues[k];
+            (0..6).map(of).sum::<f64>()
+        };
+        let root = |from: usize| (from..from + 3).map(variance).sum::<f64>().sqrt();
+        Some(PoseError { center: depth * root(3), rotation_degrees: root(0).to_degrees() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::obfuscate::{SCHEMES, SchemeOptions};
+    use crate::released::Rays;
+    use crate::{OriginalId, synthetic};
+
+    fn view(focal: f64, n: usize) -> View {
+        View {
+            rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            center: [0.0; 3],
+            focal: [focal; 2],
+            principal: [320.0, 240.0],
+            size: [640.0, 480.0],
+            observed: (0..n as u32).collect(),
+        }
+    }
+
+    /// Four points at depth `z` in a cross of radius `a`: the normal equations decouple and have a
+    /// closed form.
+    #[test]
+    fn the_covariance_of_a_cross_of_points_is_the_analytic_one() {
+        let (f, a, z) = (500.0, 0.7, 3.0);
+        let points = [[a, 0.0, z], [-a, 0.0, z], [0.0, a, z], [0.0, -a, z]];
+        let error = unprotected(&[view(f, 4)], &points)[0].unwrap();
+        let q = a * a / (z * z);
+        let across = (2.0 + 2.0 * q + q * q) * z * z / (2.0 * f * f * q * q);
+        let along = z.powi(4) / (4.0 * f * f * a * a);
+        let center = (2.0 * across + along).sqrt();
+        let rotation = (2.0 / (f * f * q * q) + z * z / (4.0 * f * f * a * a)).sqrt();
+        assert!((error.center / center - 1.0).abs() < 1e-9, "{error:?}, {center}");
+        assert!((error.rotation_degrees / rotation.to_degrees() - 1.0).abs() < 1e-9);
+        // Three points are enough for point matches, two are not.
+        assert!(unprotected(&[view(f, 3)], &points)[0].is_some());
+        assert_eq!(unprotected(&[view(f, 2)], &points), [None]);
+    }
+
+    /// A quarter of a furnished room, seen from its middle.
+    fn room() -> (View, Original<3>) {
+        let points = synthetic::room(1, 3_000).points;
+        let middle = [0, 1].map(|c| points.iter().map(|p| p[c]).sum::<f64>() / 3_000.0);
+        // Forward is +y of the room, down is -z.
+        let rotation = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]];
+        let base = View { rotation, center: [middle[0], middle[1] - 1.0, 1.5], ..view(500.0, 0) };
+        let seen = |row: &u32| {
+            let place = base.project(&points[*row as usize]);
+            place.is_some_and(|place| (0..2).all(|c| (0.0..base.size[c]).contains(&place[c])))
+        };
+        let observed: Vec<u32> = (0..points.len() as u32).filter(seen).collect();
+        assert!(observed.len() > 200);
+        let original = Original::new(PointSet::try_new(points, Unit::Meter).unwrap());
+        (View { observed, ..base }, original)
+    }
+
+    /// Returns the multiple of every built-in scheme; infinite if the view does not localize.
+    fn multiples(scale: f64) -> Vec<(&'static str, f64)> {
+        let (view, original) = room();
+        let unit = Unit::Meter;
+        let points = original.reveal().scaled(scale, unit).unwrap();
+        let view = View { center: view.center.map(|x| x * scale), ..view };
+        let (original, views) = (Original::new(points), [view]);
+        let positions = original.reveal().positions();
+        let base = unprotected(&views, positions);
+        let (key, options) = (Key::from_seed(0), SchemeOptions { voxel: 0.5 * scale });
+        let of = |entry: &crate::obfuscate::Entry| {
+            let errors =
+                match (entry.of_dimension::<3>(&options), entry.of_dimension::<2>(&options)) {
+                    (Some(scheme), _) => {
+                        let (released, secret) =
+                            obfuscate(&*scheme, &original, None, &key).unwrap();
+                        with_map(&views, positions, &released, &secret)
+                    }
+                    (None, Some(scheme)) => {
+                        with_queries(&views, positions, &*scheme, &key).unwrap()
+                    }
+                    (None, None) => panic!("{} has no dimension", entry.name),
+                };
+            (entry.name, Localization::of(&errors, &base).multiple)
+        };
+        SCHEMES.iter().map(of).collect()
+    }
+
+    #[test]
+    fn one_row_per_match_costs_about_the_root_of_two() {
+        let found = multiples(1.0);
+        let of = |name| found.iter().find(|(scheme, _)| *scheme == name).unwrap().1;
+        assert_eq!(of("plane"), f64::INFINITY);
+        for name in ["olc", "lines2d", "cp2d"] {
+            assert!((1.3..1.6).contains(&of(name)), "{name}: {}", of(name));
+        }
+        for (name, multiple) in found {
+            assert!(multiple > 1.2, "{name}: {multiple}");
+        }
+    }
+
+    #[test]
+    fn multiples_do_not_depend_on_the_unit() {
+        for ((name, one), (_, other)) in multiples(1.0).into_iter().zip(multiples(1000.0)) {
+            assert!(one == other || (one / other - 1.0).abs() < 1e-3, "{name}: {one}, {other}");
+        }
+    }
+
+    #[test]
+    fn rays_from_one_center_do_not_localize() {
+        let (view, original) = room();
+        let positions = original.reveal().positions();
+        let n = positions.len();
+        let center = [0.5, 9.0, 1.0];
+        let directions: Vec<[f64; 3]> = positions.iter().map(|p| sub(p, &center)).collect();
+        let rays = Rays::try_new(&[center], vec![0; n], &directions).unwrap();
+        let released =
+            Released::try_new(Obfuscation::Rays(rays), 1, [0.0; 3], Unit::Meter, None).unwrap();
+        let hidden = (0..n).map(OriginalId::from_index).collect();
+        let secret = Secret::try_new(hidden, None, (0..n as u32).collect(), vec![], n).unwrap();
+        assert_eq!(with_map(&[view], positions, &released, &secret), [None]);
+    }
+
+    /// An own scheme needs no code for localization: the family of its records decides.
+    #[test]
+    fn an_own_scheme_has_the_rows_of_its_family() {
+        let (view, original) = room();
+        let scheme: Arc<dyn Scheme<3>> = Arc::new(Vertical);
+        let (released, secret) = obfuscate(&*scheme, &original, None, &Key::from_seed(0)).unwrap();
+        let free = free_directions(&released, &secret);
+        assert!(free.iter().all(|free| *free == Free::Along([0.0, 0.0, 1.0])));
+        let error = with_map(&[view], original.reveal().positions(), &released, &secret)[0];
+        // The height of the camera is free, because all lines are vertical.
+        assert_eq!(error, None);
+    }
+
+    #[derive(Debug)]
+    struct Vertical;
+
+    impl Scheme<3> for Vertical {
+        fn name(&self) -> &str {
+            "vertical"
+        }
+
+        fn lift(
+            &self,
+            points: &[[f64; 3]],
+            _: Option<&Bounds<3>>,
+            _: &Key,
+        ) -> Result<crate::obfuscate::Lifted<3>, Error> {
+            let up = vec![[0.0, 0.0, 1.0]; points.len()];
+            let lines = crate::released::Lines::through(points, &up)?;
+            Ok(crate::obfuscate::Lifted::one_each(Obfuscation::Lines(lines)))
+        }
+    }
+
+    #[test]
+    fn medians_count_lost_images_as_infinite() {
+        let error = |center| Some(PoseError { center, rotation_degrees: 1.0 });
+        let base = [error(1.0), error(1.0), error(1.0), error(1.0)];
+        let found = Localization::of(&[error(2.0), None, error(3.0), None], &base);
+        assert_eq!((found.center, found.multiple), (f64::INFINITY, f64::INFINITY));
+        assert_eq!(found.failed_percent, 50.0);
+        let found = Localization::of(&[error(2.0), error(5.0), error(3.0), None], &base);
+        assert_eq!((found.center, found.multiple), (5.0, 5.0));
+    }
+}

@@ -1,0 +1,116 @@
+"""The tables of costs in docs/benchmarks.md: what comes back, and how well a camera can still be placed.
+
+Used by make_benchmarks.py; standard library only.
+"""
+import json, os, pathlib, subprocess, tempfile
+
+SCHEMES = ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp"]
+QUERIES = ["lines2d", "cp2d", "dcl2d"]
+MITIGATIONS = ["thin:1/4", "thin:1/16", "thin:tracks:1/4", "noise:0.05", "noise:0.1", "bits:2", "bits:1", "pca:32", "drop:0.5",
+               "thin:1/4,bits:1"]
+
+
+def features(program, photos, kind, out):
+    options = [] if kind == "sift" else ["--min-score", "0.02"]
+    subprocess.run([program, "features", photos, "--type", kind, "--as-stored", "--quiet", "--out", out, *options], check=True)
+
+
+def audit(program, shared, scene, features, source, mitigate):
+    with tempfile.TemporaryDirectory() as out:
+        scale = [] if scene == "castle" else ["--scale", "1"]
+        command = [program, "audit", "map", shared / "data" / scene / "model", *scale,
+                   "--descriptors", shared / "data" / scene / "descriptors.bin", "--neighbors", source, "--solver", "joint",
+                   "--no-records-alone", "--localize", features, "--hold-out", "4", "--quiet", "--out", f"{out}/audit"]
+        for one in mitigate:
+            command += ["--mitigate", one]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        return json.loads(pathlib.Path(out, "audit/audit.json").read_text())
+
+
+def number(value, form="{:.2f}"):
+    return "no pose" if value is None else form.format(value)
+
+
+def bound(documents):
+    yield "Error of the camera center by the bound, as a multiple of the unprotected one (median over images)."
+    yield ""
+    yield "| map | unprotected | " + " | ".join(SCHEMES + QUERIES) + " |"
+    yield "|" + " --- |" * (2 + len(SCHEMES + QUERIES))
+    for name, document in documents.items():
+        rows = {row["scheme"]: row for row in document["localization"]}
+        none = rows["none"]
+        unit = "{:.2f} mm" if document["input"]["scale_m_per_unit"] else "{:.4f} x"
+        center = unit.format(none["center_error"] * (1000 if "mm" in unit else 1))
+        cells = [f"{center}, {none['rotation_error_degrees']:.4f}°"]
+        for scheme in SCHEMES + QUERIES:
+            row = rows[scheme]
+            failed = row["failed_percent"]
+            cells.append(number(row["multiple"]) + (f" ({failed:.0f} % fail)" if 0 < failed < 100 else ""))
+        yield f"| {name} | " + " | ".join(cells) + " |"
+    yield ""
+
+
+def held_out(documents):
+    yield "Held-out images: median error of the camera center and of the rotation, and images within the limits, in percent."
+    yield ""
+    for name, document in documents.items():
+        rows = [row for row in document["localization"] if row["scheme"] in ["none", *SCHEMES, *QUERIES]]
+        first = rows[0]["held_out"]
+        limits = list(first["recall_percent"])
+        yield f"{name}: {first['n_images']} images; {first['right_matches']:.0f} of {first['matches']:.0f} matches are right (medians)."
+        yield ""
+        yield "| scheme | center | rotation | times unprotected | " + " | ".join(limits) + " |"
+        yield "|" + " --- |" * (4 + len(limits))
+        for row in rows:
+            found = row["held_out"]
+            center = number(found["center_error"], "{:.4f}")
+            angle = number(found["rotation_error_degrees"], "{:.3f}°")
+            recalls = [f"{found['recall_percent'][limit]:.0f}" for limit in limits]
+            yield f"| `{row['scheme']}` | {center} | {angle} | {number(found['multiple'])} | " + " | ".join(recalls) + " |"
+        yield ""
+
+
+def mitigations(documents):
+    yield "Mitigations: points within the first threshold, in percent of the released points / of all points, and the error of the camera"
+    yield "center of held-out images as a multiple of the unprotected one."
+    yield ""
+    for name, document in documents.items():
+        cost = {row["scheme"]: row["held_out"]["multiple"] for row in document["localization"]}
+        within = list(document["results"][0]["recovered_percent"])[0]
+        leak = {}
+        for row in document["results"]:
+            percent = max(row["recovered_percent"][within], row["blind_percent"][within])
+            of_all = percent * row["n_points"] / (row["n_points"] + sum(row["dropped"].values()))
+            leak[row["scheme"]] = max(leak.get(row["scheme"], (0, 0)), (percent, of_all))
+        yield f"{name}, lists by `{document['results'][0]['neighbors']}`, within {within}:"
+        yield ""
+        yield "| mitigation | " + " | ".join(SCHEMES) + " |"
+        yield "|" + " --- |" * (1 + len(SCHEMES))
+        named = document["options"].get("mitigate", [])
+        for text in [None, *named]:
+            cells = []
+            for scheme in SCHEMES:
+                key = scheme if text is None else f"{scheme}_{text}"
+                if key not in leak:
+                    cells.append("-")
+                    continue
+                released, of_all = leak[key]
+                said = f"{released:.1f}" if text is None or of_all > 0.97 * released else f"{released:.1f} / {of_all:.1f}"
+                cells.append(f"{said}, {number(cost[key])}")
+            yield f"| {'none' if text is None else f'`{text}`'} | " + " | ".join(cells) + " |"
+        yield ""
+
+
+def tables(program, shared):
+    documents = {}
+    with tempfile.TemporaryDirectory() as folder:
+        made = {}
+        for name, scene, photos, kind, source in [("RedKitchen", "redkitchen", "redkitchen", "sift", "learned"),
+                                                  ("RedKitchen, ALIKED", "redkitchen-aliked", "redkitchen", "aliked", "learned"),
+                                                  ("Castle", "castle", "castle", "sift", "learned")]:
+            made = f"{folder}/{scene}.h5"
+            features(program, shared / "data" / photos / "images", kind, made)
+            documents[name] = audit(program, shared, scene, made, source, MITIGATIONS)
+            if keep := os.environ.get("KEEP"):
+                pathlib.Path(keep, f"{scene}.json").write_text(json.dumps(documents[name]))
+    return ["", *bound(documents), *held_out(documents), *mitigations(documents)]
