@@ -9,7 +9,6 @@ use unlift::Error;
 /// Number of angles tested for the fold of a model: 0.03 degrees apart.
 const TRIED: usize = 6000;
 
-
 /// The distortion of a camera model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {

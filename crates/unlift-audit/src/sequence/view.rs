@@ -153,7 +153,8 @@ impl Model {
             .ok_or(("a camera with less than 180 degrees".to_owned(), "a wider one".to_owned()))?;
         let (mut kept, mut places) = (Vec::new(), Vec::new());
         for (row, &keypoint) in features.keypoints.iter().enumerate() {
-            if let Some(place) = undistorted(lens, keypoint).filter(|place| bounds.contains(place)) {
+            if let Some(place) = undistorted(lens, keypoint).filter(|place| bounds.contains(place))
+            {
                 kept.push(row as u32);
                 places.push(place);
             }
