@@ -125,10 +125,10 @@ pub fn perform(mut job: SequenceJob<'_>, out: OutputSet) -> Result<(Finished, Us
     }
     notes.iter().for_each(|note| steps.say(&format!("note: {note}")));
     job.plan.neighbors = sources(&job.queries);
-    check_gates(&job.gates, &job.plan)?;
+    check_gates(&job.gates, &job.plan, false)?;
     let mut inversions = Vec::new();
     let (rows, seconds) = rows(&job, &views, &mut inversions)?;
-    let gates = gate_results(&job.gates, &job.plan, &rows, &[], &[])?;
+    let gates = gate_results(&job.gates, &job.plan, &rows, &[], &[], &[])?;
     let provenance = Provenance {
         notes,
         input: described(&job, &input, &views, used)?,
