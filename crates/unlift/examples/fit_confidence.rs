@@ -5,7 +5,7 @@
 //! mv constants.rs crates/unlift-attack/src/recover/confidence/ && cargo fmt
 //! ```
 //!
-//! `joint` recovers every scheme, noise model and ratio in rooms and other shapes of several sizes.
+//! `joint` and `ranking` recover every scheme, noise model and ratio in rooms and other shapes of several sizes.
 //! Some are stretched, so that density falls with distance, as outdoors. Damped Newton steps
 //! maximize the likelihood of "the error is within t" for thresholds t around the typical distance
 //! of the K-th neighbor. The constants are identical on every machine and for any number of
@@ -18,7 +18,9 @@ use unlift::geometry::knn::Knn;
 use unlift::geometry::vector::{distance, median};
 use unlift::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
 use unlift::obfuscate::{Entry, SCHEMES, SchemeOptions, obfuscate};
-use unlift::recover::{Cues, N_KINDS, N_TERMS, RecoverOptions, centered, recover_and_look, terms};
+use unlift::recover::{
+    Builtin, Cues, N_KINDS, N_TERMS, RecoverOptions, centered, recover_and_look, terms,
+};
 use unlift::seed::Key;
 use unlift::synthetic::{Shape, shape};
 use unlift::truth::Original;
@@ -66,6 +68,21 @@ const RATIOS: [(Noise, &[f64]); 3] = [
 const SLOTS: usize = 400;
 
 fn main() -> Result<(), Error> {
+    let mut text = String::from(
+        "//! Constants of confidence, printed by `cargo run --release -p unlift --example fit_confidence`.\n\n\
+         // A fitted weight may resemble a mathematical constant.\n\
+         #![allow(clippy::approx_constant)]\n\n\
+         use crate::recover::confidence::{Constants, Model};\n",
+    );
+    for solver in [Builtin::Joint, Builtin::Ranking] {
+        text += &constants(solver, &rows(solver)?);
+    }
+    print!("{text}");
+    Ok(())
+}
+
+/// Recovers all scenes by `solver`. Returns rows per kind of records.
+fn rows(solver: Builtin) -> Result<Vec<Vec<Row>>, Error> {
     let mut rows: Vec<Vec<Row>> = (0..N_KINDS).map(|_| Vec::new()).collect();
     for scene in SCENES {
         let original = Original::new(points(&scene)?);
@@ -75,14 +92,13 @@ fn main() -> Result<(), Error> {
         };
         let for_maps = SCHEMES.iter().filter(|entry| entry.in_3d.is_some());
         for entry in for_maps {
-            eprintln!("{} {}, {}", scene.shape.name(), scene.seed, entry.name);
-            for (kind, row) in of_scheme(&original, entry, scene.k, typical)? {
+            eprintln!("{}: {} {}, {}", solver.name(), scene.shape.name(), scene.seed, entry.name);
+            for (kind, row) in of_scheme(solver, &original, entry, scene.k, typical)? {
                 rows[kind].push(row);
             }
         }
     }
-    print!("{}", constants(&rows));
-    Ok(())
+    Ok(rows)
 }
 
 fn points(scene: &Scene) -> Result<PointSet<3>, Error> {
@@ -96,6 +112,7 @@ fn points(scene: &Scene) -> Result<PointSet<3>, Error> {
 
 /// Returns the rows of one scheme in one scene, each with the kind of its records.
 fn of_scheme(
+    solver: Builtin,
     original: &Original<3>,
     entry: &Entry,
     k: usize,
@@ -113,7 +130,7 @@ fn of_scheme(
         for &ratio in ratios {
             let lists = near.lists(ratio, &outliers, 0)?;
             let options = RecoverOptions { seed: 1, ..RecoverOptions::default() };
-            let (recovered, seen) = recover_and_look(&released, &lists, &options)?;
+            let (recovered, seen) = recover_and_look(solver, &released, &lists, &options)?;
             let every = recovered.n_slots().div_ceil(SLOTS).max(1);
             for slot in (0..recovered.n_slots()).step_by(every) {
                 if let Some(position) = recovered.position(slot) {
@@ -128,7 +145,7 @@ fn of_scheme(
     Ok(rows)
 }
 
-fn constants(rows: &[Vec<Row>]) -> String {
+fn constants(solver: Builtin, rows: &[Vec<Row>]) -> String {
     let all: Vec<[f32; N_TERMS]> = rows.iter().flatten().map(|row| terms(&row.cues)).collect();
     let n = all.len() as f64;
     let mean: Vec<f64> =
@@ -147,31 +164,21 @@ fn constants(rows: &[Vec<Row>]) -> String {
             fit(rows, terms)
         })
         .collect();
-    let mut text = String::from(
-        "//! Constants of confidence, printed by `cargo run --release -p unlift --example fit_confidence`.\n\n\
-         // A fitted weight may look like a constant of mathematics.\n\
-         #![allow(clippy::approx_constant)]\n\n\
-         use super::model::{Model, N_KINDS, N_TERMS};\n\n",
-    );
     let list =
         |values: &[f32]| values.iter().map(|x| format!("{x:.3e}")).collect::<Vec<_>>().join(", ");
+    let mut text = String::new();
     let _ = writeln!(
         text,
-        "/// Means of terms.\npub(super) const CENTER: [f32; N_TERMS] = [{}];\n",
-        list(&center)
+        "\npub(super) static {}: Constants = Constants {{",
+        solver.name().to_uppercase()
     );
-    let _ = writeln!(
-        text,
-        "/// Standard deviations of terms.\npub(super) const SPREAD: [f32; N_TERMS] = [{}];\n",
-        list(&spread)
-    );
-    let _ = writeln!(text, "/// Per kind of records.");
-    let _ = writeln!(text, "pub(super) const MODELS: [Model; N_KINDS] = [");
+    let _ = writeln!(text, "center: [{}],\nspread: [{}],", list(&center), list(&spread));
+    let _ = writeln!(text, "models: [");
     for fitted in &models {
         eprintln!("{} rows, mean negative log-likelihood {:.4}", fitted.n, fitted.loss);
         let (found, scale) = (list(&fitted.found), list(&fitted.scale));
         let _ = writeln!(text, "Model {{ found: [{found}], scale: [{scale}] }},");
     }
-    let _ = writeln!(text, "];");
+    let _ = writeln!(text, "] }};");
     text
 }

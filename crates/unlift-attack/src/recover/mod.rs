@@ -19,6 +19,7 @@ mod consensus;
 mod delta;
 mod exact;
 mod joint;
+mod layout;
 mod map;
 mod model;
 mod options;
@@ -136,18 +137,19 @@ fn with_start<const D: usize>(
     Ok((recovered, start))
 }
 
-/// Recovers by [`Builtin::Joint`] and also returns the features of confidence, to fit its model.
+/// Recovers by `solver` and also returns the features of confidence, to fit its model.
 ///
 /// # Errors
 /// When options are out of range, or the lists do not have one row per slot.
 #[doc(hidden)]
 pub fn recover_and_look<const D: usize>(
+    solver: Builtin,
     released: &Released<D>,
     lists: &Neighborhoods,
     options: &RecoverOptions,
 ) -> Result<(Recovered<D>, Seen), Error> {
     let solve: Solve<D> = SOLVE.of()?;
-    solve(Builtin::Joint, released, lists, options, true)
+    solve(solver, released, lists, options, true)
 }
 
 type Solve<const D: usize> = fn(

@@ -16,7 +16,7 @@ use crate::recover::ransac::Ransac;
 use crate::recover::records_alone::{self, Placement};
 use crate::recover::result::{Estimate, Recovered, TrialCounts, Unknown};
 use crate::recover::solver::Builtin;
-use crate::recover::{confidence, consensus, delta, exact, joint, ranking};
+use crate::recover::{confidence, consensus, delta, exact, joint, layout, ranking};
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, Fingerprint};
 
@@ -153,7 +153,15 @@ impl<'a, const D: usize> Problem<'a, D> {
                 let (delta, seed) = (self.delta as f32, self.options.seed);
                 let found = joint::recover(family, graph, delta, seed, start);
                 match self.solver {
-                    Builtin::Ranking => ranking::recover(family, self.lists, delta, seed, found),
+                    Builtin::Ranking => {
+                        let found = match family {
+                            Family::Lines { rows, .. } if family.has_regions() => {
+                                layout::recover(rows, self.lists, found)
+                            }
+                            _ => found,
+                        };
+                        ranking::recover(family, self.lists, delta, seed, found)
+                    }
                     _ => found,
                 }
             }
@@ -203,7 +211,7 @@ impl<'a, const D: usize> Problem<'a, D> {
             return nothing(recovered, unknown);
         }
         let solved = Solved { estimates, unsettled: &unsettled, delta: self.delta as f32 };
-        let (sure, seen) = confidence::predict(family, graph, self.released, &solved);
+        let (sure, seen) = confidence::predict(self.solver, family, graph, self.released, &solved);
         let recovered = match unknown {
             Some(unknown) => recovered.without_confidence(unknown),
             None => recovered.with_confidence(sure)?,

@@ -1,6 +1,6 @@
 //! Confidence: the probability that an estimate is right, predicted without ground truth.
 //!
-//! After joint recovery, `cues.rs` measures around every slot how much better than by chance estimates and records agree. A logistic
+//! After joint recovery and after ranking, `cues.rs` measures around every slot how much better than by chance estimates and records agree. A logistic
 //! model turns these cues into the probability that the right place was found and into a scale of its error. Its constants
 //! were fitted on synthetic rooms (`examples/fit_confidence.rs`), never on a real map.
 
@@ -13,7 +13,7 @@ use crate::ListsBy;
 use crate::geometry::flatness::flatness;
 use crate::geometry::vector::widen;
 use crate::neighbors::Neighborhoods;
-use crate::recover::confidence::constants::{CENTER, MODELS, SPREAD};
+use crate::recover::confidence::constants::{JOINT, RANKING};
 use crate::recover::confidence::cues::{Cues, N_CUES, Seen, Solved};
 use crate::recover::map::family::{Family, Settings};
 use crate::recover::map::graph::Graph;
@@ -29,15 +29,17 @@ pub(super) fn not_asked<const D: usize>(
     options: &RecoverOptions,
 ) -> Option<Unknown> {
     match solver {
-        Builtin::Joint if !options.confidence => Some(Unknown::NotAsked),
-        Builtin::Joint if !Settings::of_dimension::<D>().confidence => Some(Unknown::OfImages),
-        Builtin::Joint => None,
+        Builtin::Joint | Builtin::Ranking if !options.confidence => Some(Unknown::NotAsked),
+        Builtin::Joint | Builtin::Ranking => {
+            (!Settings::of_dimension::<D>().confidence).then_some(Unknown::OfImages)
+        }
         _ => Some(Unknown::OtherSolver),
     }
 }
 
-/// Predicts the confidence of every slot after joint recovery; also returns the cues.
+/// Predicts the confidence of every slot after `solver`; also returns the cues.
 pub(super) fn predict<const D: usize>(
+    solver: Builtin,
     family: &Family<'_, D>,
     graph: &Graph,
     released: &Released<D>,
@@ -61,8 +63,9 @@ pub(super) fn predict<const D: usize>(
         Obfuscation::AxisPlanes(_) => 3,
         Obfuscation::AxisCandidates(_) => 4,
     };
+    let constants = if solver == Builtin::Ranking { &RANKING } else { &JOINT };
     let of_slot = |(estimate, cues): (&Estimate<D>, &Cues)| match estimate.status {
-        Status::Ok => predict_slot(&MODELS[kind], cues, radius),
+        Status::Ok => predict_slot(constants, kind, cues, radius),
         _ => Confidence::LOST,
     };
     let sure = solved.estimates.par_iter().zip(&cues).map(of_slot).collect();
@@ -70,8 +73,10 @@ pub(super) fn predict<const D: usize>(
 }
 
 /// Predicts the confidence of one slot from its cues. Errors are in units of `radius`.
-fn predict_slot(model: &Model, cues: &Cues, radius: f32) -> Confidence {
-    let terms = centered(terms(cues), &CENTER, &SPREAD);
+fn predict_slot(constants: &Constants, kind: usize, cues: &Cues, radius: f32) -> Confidence {
+    let Constants { center, spread, models } = constants;
+    let model = &models[kind];
+    let terms = centered(terms(cues), center, spread);
     let sum =
         |weights: &[f32; N_TERMS]| -> f32 { terms.iter().zip(weights).map(|(t, w)| t * w).sum() };
     let scale = libm::expf(sum(&model.scale).clamp(-12.0, 12.0)) * radius;
@@ -133,6 +138,16 @@ pub const N_TERMS: usize = 1 + N_CUES + N_PRODUCTS;
 
 /// Terms are clipped at this many standard deviations, because the fit saw no others.
 const FARTHEST: f32 = 4.0;
+
+/// What the fit found for one solver.
+pub(super) struct Constants {
+    /// Means of the terms.
+    pub(super) center: [f32; N_TERMS],
+    /// Standard deviations of the terms.
+    pub(super) spread: [f32; N_TERMS],
+    /// Per kind of records.
+    pub(super) models: [Model; N_KINDS],
+}
 
 /// Weights of the terms for one kind of records.
 pub(super) struct Model {

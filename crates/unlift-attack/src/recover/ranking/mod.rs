@@ -36,11 +36,14 @@ use surroundings::{Group, NEAR, Surroundings};
 const ITERATIONS: usize = 5;
 /// Softness `s`.
 const SOFTNESS: f32 = 0.06;
+/// Number of iterations that search far; the others search near. Groups are made again in each of them.
+const FAR_ITERATIONS: usize = 2;
 /// Steps along the record, in radii.
 const LINE_STEPS: [Lanes; 2] = [
     [0.0, 0.5, -0.5, 0.21, -0.21, 0.09, -0.09, 0.04],
     [0.12, -0.12, 0.05, -0.05, 0.022, -0.022, 0.01, -0.01],
 ];
+const NEAR_LINE_STEPS: [Lanes; 1] = [[0.0, 0.2, -0.2, 0.08, -0.08, 0.03, -0.03, 0.012]];
 const PLANE_STEPS: [Lanes; 4] = [
     [0.0, 0.5, -0.5, 0.25, -0.25, 0.12, -0.12, 0.05],
     [0.3, -0.3, 0.15, -0.15, 0.07, -0.07, 0.03, -0.03],
@@ -110,9 +113,14 @@ fn iterate<const D: usize, P: Pieces<D>>(
         Some(_) => LEAST_RATIO_OF_SOURCES,
     };
     let listers = Listers::new(lists, n / pieces.slots_per_record());
-    let mut radius = vec![0.0; n];
+    let mut around = Surroundings::default();
     for iteration in 0..ITERATIONS {
-        let Some(around) = Surroundings::new(&estimates, lists, radius) else { return estimates };
+        if iteration < FAR_ITERATIONS {
+            let Some(new) = Surroundings::new(&estimates, lists) else { return estimates };
+            around = new;
+        } else {
+            around.update(&estimates, lists);
+        }
         let inlier_ratio = inlier_ratio(pieces, lists, &estimates, &around);
         if inlier_ratio < least_ratio {
             return estimates;
@@ -164,19 +172,18 @@ fn iterate<const D: usize, P: Pieces<D>>(
                 }
             }
         }
-        radius = around.radius;
     }
     estimates
 }
 
 /// Slots that list each record.
-struct Listers {
+pub(super) struct Listers {
     offsets: Vec<usize>,
     slots: Vec<u32>,
 }
 
 impl Listers {
-    fn new(lists: &Neighborhoods, n_records: usize) -> Self {
+    pub(super) fn new(lists: &Neighborhoods, n_records: usize) -> Self {
         let mut offsets = vec![0; n_records + 1];
         for record in lists.records() {
             offsets[record.index() + 1] += 1;
@@ -194,7 +201,7 @@ impl Listers {
         Self { offsets, slots }
     }
 
-    fn of(&self, record: usize) -> &[u32] {
+    pub(super) fn of(&self, record: usize) -> &[u32] {
         &self.slots[self.offsets[record]..self.offsets[record + 1]]
     }
 }
@@ -471,7 +478,11 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         let is_lost = (n_near as f32) < LOST * self.inlier_ratio * self.lists.of(slot).len() as f32;
         let axis = usize::from(old.axis);
         let mut best = Best { score: f32::NEG_INFINITY, x: old.position, axis };
-        let rounds: &[Lanes] = if P::NORMAL { &PLANE_STEPS } else { &LINE_STEPS };
+        let rounds: &[Lanes] = match P::NORMAL {
+            true => &PLANE_STEPS,
+            false if self.iteration < FAR_ITERATIONS => &LINE_STEPS,
+            false => &NEAR_LINE_STEPS,
+        };
         for steps in rounds {
             let from = Best { axis, ..best };
             self.search(slot, (&old.position, from), steps, &mut draws, terms, &mut best);

@@ -15,8 +15,6 @@ pub(super) const NEAR: f32 = 1.6;
 const COVERED: f32 = 1.45;
 /// Number of slots in a group.
 const GROUP: usize = 16;
-/// Largest reach of a member of a group, as a multiple of the smallest.
-const WIDEST: f64 = 1.6;
 /// Largest number of estimates near a group, as a multiple of the length of lists.
 const MOST_NEAR: usize = 16;
 /// Largest number of passes that look for a radius.
@@ -30,6 +28,7 @@ pub(super) struct Group {
 }
 
 /// The estimates around every slot.
+#[derive(Default)]
 pub(super) struct Surroundings {
     /// Distance within which as many estimates lie as the list of the slot is long; 0 for slots without estimate or list.
     pub(super) radius: Vec<f32>,
@@ -39,11 +38,10 @@ pub(super) struct Surroundings {
 }
 
 impl Surroundings {
-    /// Returns `None` if no slot has an estimate. `before` are the radii in the iteration before, or 0.
+    /// Returns `None` if no slot has an estimate.
     pub(super) fn new<const D: usize>(
         estimates: &[Estimate<D>],
         lists: &Neighborhoods,
-        before: Vec<f32>,
     ) -> Option<Self> {
         let is_known = |slot: &u32| estimates[*slot as usize].status == Status::Ok;
         let slots: Vec<u32> = (0..estimates.len() as u32).filter(is_known).collect();
@@ -51,8 +49,7 @@ impl Surroundings {
         let points: Vec<[f64; D]> = slots.iter().map(point).collect();
         let tree = Knn::new(&points).ok()?;
         let mean_length = lists.records().len() / estimates.len();
-        let (tree, points, slots, before) = (&tree, &points, &slots, &before);
-        let grouping = Grouping { tree, points, slots, lists, before, mean_length };
+        let grouping = Grouping { tree: &tree, points: &points, slots: &slots, lists, mean_length };
         let groups = |near: &mut Near<D>, rows: &[u32]| {
             let mut groups = Vec::new();
             grouping.add(rows, near, &mut groups);
@@ -69,6 +66,34 @@ impl Surroundings {
             groups.push(group);
         }
         Some(Self { radius, groups, group_of })
+    }
+
+    /// Computes the radii again after small moves. The groups stay.
+    pub(super) fn update<const D: usize>(
+        &mut self,
+        estimates: &[Estimate<D>],
+        lists: &Neighborhoods,
+    ) {
+        let before = &self.radius;
+        let radii = |near: &mut Near<D>, group: &Group| -> Vec<f32> {
+            near.clear();
+            for &slot in &group.near {
+                near.add(slot, estimates[slot as usize].position);
+            }
+            let radius = |&slot: &u32| {
+                let slot = slot as usize;
+                let (x, wanted) = (estimates[slot].position, lists.of(slot).len() + 1);
+                let radius = Radius { near: &mut *near, x, wanted, most: COVERED * before[slot] };
+                dispatch(radius).unwrap_or(before[slot])
+            };
+            group.members.iter().map(radius).collect()
+        };
+        let found: Vec<Vec<f32>> = self.groups.par_iter().map_init(Near::default, radii).collect();
+        for (group, radii) in self.groups.iter().zip(found) {
+            for (&slot, radius) in group.members.iter().zip(radii) {
+                self.radius[slot as usize] = radius;
+            }
+        }
     }
 }
 
@@ -87,58 +112,57 @@ impl<const D: usize> Default for Near<D> {
     }
 }
 
+impl<const D: usize> Near<D> {
+    fn clear(&mut self) {
+        self.slots.clear();
+        self.x.iter_mut().for_each(Vec::clear);
+    }
+
+    #[inline(always)]
+    fn add(&mut self, slot: u32, x: [f32; D]) {
+        self.slots.push(slot);
+        (0..D).for_each(|c| self.x[c].push(x[c]));
+    }
+}
+
 /// What groups are made from.
 struct Grouping<'a, const D: usize> {
     tree: &'a Knn<'a, D>,
     points: &'a [[f64; D]],
     slots: &'a [u32],
     lists: &'a Neighborhoods,
-    before: &'a [f32],
     mean_length: usize,
 }
 
 impl<const D: usize> Grouping<'_, D> {
     /// Adds the group of `rows`, with the radius of each slot. Slots that do not fit get groups of their own.
     fn add(&self, rows: &[u32], near: &mut Near<D>, groups: &mut Vec<(Group, Vec<f32>)>) {
-        let Self { tree, points, slots, lists, before, mean_length } = *self;
+        let Self { tree, points, slots, lists, mean_length } = *self;
         let middle: [f64; D] = std::array::from_fn(|c| {
             let mut column: Vec<f64> = rows.iter().map(|&row| points[row as usize][c]).collect();
             let middle = column.len() / 2;
             *column.select_nth_unstable_by(middle, f64::total_cmp).1
         });
         let away = |row: u32| squared_distance(&middle, &points[row as usize]).sqrt();
-        let before = |row: u32| f64::from(before[slots[row as usize] as usize]);
-        let mut typical = 0.0;
-        if rows.iter().any(|&row| before(row) == 0.0) {
-            tree.nearest_to(middle, mean_length + 1, &mut near.found);
-            typical = near.found.last().map_or(0.0, |last| 1.25 * last.0.sqrt());
-        }
-        let reach = |row: u32| {
-            let before = before(row);
-            away(row) + f64::from(NEAR) * if before == 0.0 { typical } else { before }
-        };
-        // A group has one size: the others follow.
-        let mut rows = rows.to_vec();
-        rows.sort_by(|&a, &b| reach(a).total_cmp(&reach(b)));
-        let most = WIDEST * reach(rows[0]);
-        let rest = rows.split_off(rows.partition_point(|&row| reach(row) <= most).max(1));
+        tree.nearest_to(middle, mean_length + 1, &mut near.found);
+        let typical = near.found.last().map_or(0.0, |last| 1.25 * last.0.sqrt());
+        let farthest = rows.iter().map(|&row| away(row)).fold(0.0, f64::max);
         let is_one = rows.len() == 1;
         let most = MOST_NEAR * mean_length;
-        let mut within = reach(rows[rows.len() - 1]);
+        let mut within = farthest + f64::from(NEAR) * typical;
         let (mut members, mut radii) = (Vec::new(), Vec::new());
         loop {
-            near.slots.clear();
-            near.x.iter_mut().for_each(Vec::clear);
+            near.clear();
             dispatch(Within { grouping: self, middle: &middle, within, near: &mut *near });
             let is_crowded = near.slots.len() > most;
             if is_crowded && is_one {
-                tree.nearest_to(middle, most, &mut near.found);
-                near.slots.clear();
-                near.x.iter_mut().for_each(Vec::clear);
-                for &(_, row) in &near.found {
-                    near.slots.push(slots[row as usize]);
-                    (0..D).for_each(|c| near.x[c].push(points[row as usize][c] as f32));
+                let mut found = std::mem::take(&mut near.found);
+                tree.nearest_to(middle, most, &mut found);
+                near.clear();
+                for &(_, row) in &found {
+                    near.add(slots[row as usize], points[row as usize].map(|x| x as f32));
                 }
+                near.found = found;
             }
             let is_all = near.slots.len() == slots.len() || (is_crowded && is_one);
             for &row in rows.iter().filter(|_| is_one || !is_crowded) {
@@ -167,13 +191,10 @@ impl<const D: usize> Grouping<'_, D> {
             groups.push((Group { members: members.clone(), near }, radii));
         }
         let is_left = |row: &u32| !members.contains(&slots[*row as usize]);
-        let left: Vec<u32> = rows.into_iter().filter(is_left).collect();
+        let left: Vec<u32> = rows.iter().copied().filter(is_left).collect();
         // If no slot fits, the group is halved.
         let parts = if members.is_empty() { left.len().div_ceil(2) } else { left.len().max(1) };
         left.chunks(parts).for_each(|rows| self.add(rows, near, groups));
-        if !rest.is_empty() {
-            self.add(&rest, near, groups);
-        }
     }
 }
 
@@ -192,8 +213,7 @@ impl<const D: usize> Kernel for Within<'_, '_, D> {
     fn run(self) {
         let Self { grouping: Grouping { tree, slots, .. }, middle, within, near } = self;
         tree.within(middle, (within * within, usize::MAX), |row, x| {
-            near.slots.push(slots[row as usize]);
-            (0..D).for_each(|c| near.x[c].push(x[c] as f32));
+            near.add(slots[row as usize], x.map(|x| x as f32));
         });
     }
 }
