@@ -53,8 +53,7 @@ fn a_usual_audit_has_a_row_for_what_joint_recovery_starts_from() {
     for (row, seconds) in usual.rows.iter().zip(&usual.seconds.rows) {
         let is_start = row.solver == "joint-start";
         assert_eq!(seconds.recover == 0.0, is_start, "no run of its own");
-        let is_joint = row.solver == "joint";
-        let reason = if is_joint { Unknown::SmallMap } else { Unknown::OtherSolver };
+        let reason = if is_start { Unknown::OtherSolver } else { Unknown::SmallMap };
         assert_eq!(row.sure_unknown, Some(reason));
         assert!(row.reliability.is_none());
     }

@@ -1,5 +1,5 @@
 //! Ranking with perfect lists: longer lists give smaller errors, and errors are smaller than those
-//! of joint recovery.
+//! of joint recovery, also for rays from anchors, where a layout of the neighbors is the start.
 
 use unlift::recover::{Builtin, RecoverOptions, recover};
 
@@ -32,4 +32,11 @@ fn errors_fall<const D: usize>(scheme: &str) {
 fn longer_lists_give_smaller_errors() {
     ["olc", "ppl", "plane", "cp"].into_iter().for_each(errors_fall::<3>);
     errors_fall::<2>("lines2d");
+}
+
+#[test]
+fn neighbors_place_points_on_rays_from_anchors() {
+    let [joint, ranking] =
+        [Builtin::Joint, Builtin::Ranking].map(|solver| median_error::<2>("dcl2d", solver, 20));
+    assert!(ranking < 0.5 * joint, "{ranking}, joint {joint}");
 }
