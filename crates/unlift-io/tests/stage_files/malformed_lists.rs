@@ -187,7 +187,7 @@ fn truth() {
         (
             "dropped",
             texts([None, None, Some("bored")]),
-            ", row 2: expected one of odd_point, coincident_pair, rejected_pair, on_center, other, as slot is null, found bored",
+            ", row 2: expected one of odd_point, coincident_pair, rejected_pair, on_center, thinned, other, as slot is null, found bored",
         ),
         (
             "dropped",

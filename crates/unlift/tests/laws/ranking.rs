@@ -3,11 +3,15 @@
 
 use unlift::recover::{Builtin, RecoverOptions, recover};
 
-use crate::maps::{hide, room};
+use crate::maps::{hide, room, uniform};
 
 /// Returns the median error of all slots, from perfect lists of `k` records.
-fn median_error<const D: usize>(scheme: &str, solver: Builtin, k: usize) -> f64 {
-    let hidden = hide::<D>(unlift::obfuscate::scheme(scheme).unwrap(), &room(3, 1_500), 3);
+fn median_error<const D: usize>(
+    (scheme, points): (&str, &[[f64; D]]),
+    solver: Builtin,
+    k: usize,
+) -> f64 {
+    let hidden = hide::<D>(unlift::obfuscate::scheme(scheme).unwrap(), points, 3);
     let lists = hidden.lists(k, 1.0, 3);
     let recovered = recover(&hidden.released, &lists, &solver, &RecoverOptions::default()).unwrap();
     let error = |slot: usize| {
@@ -21,9 +25,11 @@ fn median_error<const D: usize>(scheme: &str, solver: Builtin, k: usize) -> f64 
 }
 
 fn errors_fall<const D: usize>(scheme: &str) {
-    let [short, long] = [6, 40].map(|k| median_error::<D>(scheme, Builtin::Ranking, k));
+    let points = room::<D>(3, 1_500);
+    let error = |solver, k| median_error((scheme, &points), solver, k);
+    let [short, long] = [6, 40].map(|k| error(Builtin::Ranking, k));
     assert!(long < short, "{scheme}: {short}, {long}");
-    let joint = median_error::<D>(scheme, Builtin::Joint, 40);
+    let joint = error(Builtin::Joint, 40);
     // Measured: 0.22 times the error of joint recovery or less.
     assert!(long < 0.3 * joint, "{scheme}: {long}, joint {joint}");
 }
@@ -36,7 +42,9 @@ fn longer_lists_give_smaller_errors() {
 
 #[test]
 fn neighbors_place_points_on_rays_from_anchors() {
-    let [joint, ranking] =
-        [Builtin::Joint, Builtin::Ranking].map(|solver| median_error::<2>("dcl2d", solver, 20));
-    assert!(ranking < 0.5 * joint, "{ranking}, joint {joint}");
+    let points = uniform::<2>(3, 1_500);
+    let [joint, ranking] = [Builtin::Joint, Builtin::Ranking]
+        .map(|solver| median_error(("dcl2d", &points), solver, 20));
+    // Measured: 0.76 times the error. Photos of RedKitchen: half.
+    assert!(ranking < 0.9 * joint, "{ranking}, joint {joint}");
 }
