@@ -111,12 +111,12 @@ pub(crate) fn next_steps(document: &Document, cards: &[Card]) -> Vec<String> {
     let has_file = document.options.get("descriptors").is_some_and(|given| !given.is_null());
     let mut steps = Vec::new();
     if sequence::is_sequence(document) {
-        steps.extend(sequence::sentences(document));
         steps.push(
             "Mitigate and measure again: send fewer queries, or withhold the pose. Fewer views of \
              a point give an attacker less to work with."
                 .to_owned(),
         );
+        steps.extend(sequence::sentences(document));
         return steps;
     }
     if !with_descriptors {

@@ -19,11 +19,14 @@ pub(crate) fn sentences(document: &Document) -> Vec<String> {
         let parts: Vec<String> = rows
             .filter_map(|row| {
                 let share = row.recovered_percent.get(&typed)?;
-                Some(format!("{} % after {} queries", words::percent(*share), row.k))
+                Some(format!("after {} queries {} %", row.k, words::percent(*share)))
             })
             .collect();
-        let scheme = scheme.to_uppercase();
-        format!("Under {scheme}, came back within {typed} px: {}.", words::list(&parts))
+        let shares = words::capital(&words::list(&parts));
+        format!(
+            "{shares} of the keypoints came back within {typed} px ({}).",
+            scheme.to_uppercase()
+        )
     };
     tables::schemes(document).into_iter().map(sentence).collect()
 }

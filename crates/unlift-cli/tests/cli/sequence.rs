@@ -74,7 +74,7 @@ fn keypoints_come_back_by_the_number_of_queries() {
     let (stdout, stderr) = place.ends(line, 0);
     assert!(stderr.contains("6 images: no rows for [9] queries"), "{stderr}");
     assert!(
-        stdout.contains("Under LINES2D, came back within 10 px: 0.0 % after 2 queries"),
+        stdout.contains("After 2 queries 0.0 %, "),
         "{stdout}"
     );
     let document = place.json("a/audit.json");
