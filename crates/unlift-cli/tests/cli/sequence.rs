@@ -73,10 +73,7 @@ fn keypoints_come_back_by_the_number_of_queries() {
     let line = "audit sequence model f.h5 --queries 2,3,5,9 --schemes lines2d,cp2d --out a";
     let (stdout, stderr) = place.ends(line, 0);
     assert!(stderr.contains("6 images: no rows for [9] queries"), "{stderr}");
-    assert!(
-        stdout.contains("After 2 queries 0.0 %, "),
-        "{stdout}"
-    );
+    assert!(stdout.contains("After 2 queries 0.0 %, "), "{stdout}");
     let document = place.json("a/audit.json");
     let share = |scheme: &str, neighbors: &str| {
         let mut rows = document["results"].as_array().unwrap().iter();
