@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::attack::{self, Basis};
+use crate::columns::align;
 use crate::document::{Document, Localization, UNPROTECTED};
 use crate::tables::{self, Class, Table, column};
 use crate::{verdict, words};
@@ -11,7 +12,7 @@ use crate::{verdict, words};
 const LEAK: f64 = 20.0;
 /// The largest localization error that counts as small, as a multiple of the unprotected one.
 const COST: f64 = 2.0;
-/// Of more dots, only those on the Pareto front are named.
+/// If the chart has more dots than this, only dots on the Pareto front have a name beside them.
 const MOST_NAMES: usize = 20;
 /// Size of the chart's plot in its own units.
 const SIZE: [f64; 2] = [560.0, 300.0];
@@ -303,5 +304,5 @@ pub(crate) fn text(document: &Document) -> String {
     let of_map = document.localization.iter().filter(|one| !one.of_queries);
     let rows: Vec<Vec<String>> = [head.to_vec()].into_iter().chain(of_map.map(lines)).collect();
     let said = chart(document).map(|chart| chart.sentence).unwrap_or_default();
-    format!("\n{}{said}\n", crate::text::align(&rows, &[0, 3]))
+    format!("\n{}{said}\n", align(&rows, &[0, 3]))
 }

@@ -1,9 +1,9 @@
 //! Results of several queries with known poses, by the number of queries.
 
 use crate::attack;
+use crate::columns::align;
 use crate::document::{Document, Row};
 use crate::tables;
-use crate::text::align;
 use crate::words;
 
 /// Returns whether the document is of a sequence.

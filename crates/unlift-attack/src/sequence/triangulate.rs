@@ -3,6 +3,8 @@
 //! A line of an image back-projects to a plane through the camera center. Three planes meet in a point, and further ones check it. A
 //! record of axis candidates is one of two lines, so that every subset of three views has eight solutions and a fourth view decides.
 
+use crate::geometry::vector::{distance, dot};
+
 /// A plane `n . x + d = 0`, scaled such that `(n . x + d) / depth` is the distance of the projection of `x` from a line, in pixels.
 type Plane = [f64; 4];
 
@@ -131,7 +133,7 @@ pub fn triangulate(sights: &[Sight], noise_px: f64) -> Option<Fit> {
         }
         let Some((place, _)) = first.project(x, f64::INFINITY) else { continue };
         // Hypotheses near a refined one would end there.
-        let near = |(_, fit): &(f64, Fit)| apart(&fit.place, &place) < 0.5 * APART * noise_px;
+        let near = |(_, fit): &(f64, Fit)| distance(&fit.place, &place) < 0.5 * APART * noise_px;
         if fits.iter().any(near) {
             continue;
         }
@@ -140,14 +142,9 @@ pub fn triangulate(sights: &[Sight], noise_px: f64) -> Option<Fit> {
     let at = (0..fits.len()).min_by(|&a, &b| fits[a].0.total_cmp(&fits[b].0))?;
     let (least, mut fit) = fits[at];
     let others =
-        fits.iter().filter(|(_, other)| apart(&other.place, &fit.place) > APART * noise_px);
+        fits.iter().filter(|(_, other)| distance(&other.place, &fit.place) > APART * noise_px);
     fit.lead = others.map(|(cost, _)| cost - least).fold(f64::INFINITY, f64::min);
     Some(fit)
-}
-
-fn apart(a: &[f64; 2], b: &[f64; 2]) -> f64 {
-    let [u, v] = [a[0] - b[0], a[1] - b[1]];
-    (u * u + v * v).sqrt()
 }
 
 /// Sum of squared distances in units of `noise_px`; a view that disagrees counts as a miss.
@@ -183,10 +180,6 @@ fn solve(rows: [[f64; 3]; 3], right: [f64; 3]) -> Option<[f64; 3]> {
 
 fn cross(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// Least squares in pixels with weights that fall with the distance, from `x`. Returns the cost and the fit.
