@@ -1,13 +1,15 @@
-//! Arguments of `audit map`, `audit images`, `audit released` and `check`.
+//! Arguments of `audit map`, `audit images`, `audit sequence`, `audit released` and `check`.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::Args;
+use serde_json::{Map, Value, json};
 use unlift::audit::Threshold;
 use unlift::neighbors::oracle::Noise;
 use unlift::obfuscate::{Entry, Mitigation};
 use unlift::recover::{Builtin, Delta};
+use unlift_audit::images::extraction::Wanted;
 use unlift_audit::{Gate, OutlierFilter};
 use unlift_nn::DescriptorKind;
 
@@ -276,6 +278,47 @@ pub struct AuditMapArgs {
     pub attack: AttackArgs,
 }
 
+/// Which features are extracted from photos.
+#[derive(Debug, Args)]
+pub struct ExtractionArgs {
+    /// Features to extract from photos: sift, aliked, or superpoint, whose weights you supply (see
+    /// unlift models) [default: sift]
+    #[arg(long, value_name = "TYPE", value_parser = values::feature_type, help_heading = "Input")]
+    pub features: Option<DescriptorKind>,
+    /// Number of features per photo. aliked and superpoint keep the N best. sift keeps whole
+    /// scales, the coarsest first, and stops after the scale that exceeds N, so it may return more
+    /// than N [default: sift 8192, aliked 2048, superpoint 4096]
+    #[arg(long, value_parser = values::count, value_name = "N", help_heading = "Input")]
+    pub max_features: Option<NonZeroUsize>,
+    /// Keep only keypoints whose score exceeds SCORE; not for sift [default: aliked 0.2, superpoint
+    /// 0.005]
+    #[arg(long, value_name = "SCORE", value_parser = values::score, help_heading = "Input")]
+    pub min_score: Option<f32>,
+}
+
+impl ExtractionArgs {
+    /// Returns what is asked of the extraction.
+    pub fn wanted(&self) -> Wanted {
+        Wanted {
+            option: "--features",
+            kind: self.features,
+            max_features: self.max_features,
+            min_score: self.min_score,
+            ..Wanted::default()
+        }
+    }
+
+    /// Adds the options that were given to those of the report.
+    pub fn record(&self, options: &mut Map<String, Value>) {
+        let mut record = |name: &str, value: Option<Value>| {
+            options.extend(value.map(|value| (name.to_owned(), value)));
+        };
+        record("features", self.features.map(|kind| json!(kind.name())));
+        record("max_features", self.max_features.map(|most| json!(most.get())));
+        record("min_score", self.min_score.map(|score| json!(score)));
+    }
+}
+
 /// Options of `audit images`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -298,19 +341,8 @@ pub struct AuditImagesArgs {
     /// A folder of photos, hloc's features.h5, or a COLMAP database.db
     #[arg(value_name = "PATH")]
     pub path: PathBuf,
-    /// Features to extract from photos: sift, aliked, or superpoint, whose weights you supply (see
-    /// unlift models) [default: sift]
-    #[arg(long, value_name = "TYPE", value_parser = values::feature_type, help_heading = "Input")]
-    pub features: Option<DescriptorKind>,
-    /// Number of features per photo. aliked and superpoint keep the N best. sift keeps whole
-    /// scales, the coarsest first, and stops after the scale that exceeds N, so it may return more
-    /// than N [default: sift 8192, aliked 2048, superpoint 4096]
-    #[arg(long, value_parser = values::count, value_name = "N", help_heading = "Input")]
-    pub max_features: Option<NonZeroUsize>,
-    /// Keep only keypoints whose score exceeds SCORE; not for sift [default: aliked 0.2, superpoint
-    /// 0.005]
-    #[arg(long, value_name = "SCORE", value_parser = values::score, help_heading = "Input")]
-    pub min_score: Option<f32>,
+    #[command(flatten)]
+    pub extraction: ExtractionArgs,
     /// Use at most N images, evenly spaced by name
     #[arg(long, value_parser = values::count, value_name = "N", help_heading = "Input")]
     pub max_images: Option<NonZeroUsize>,
@@ -396,17 +428,8 @@ pub struct AuditSequenceArgs {
     /// A folder of photos, hloc's features.h5, or a COLMAP database.db
     #[arg(value_name = "PATH")]
     pub path: PathBuf,
-    /// Features to extract from photos: sift, aliked, or superpoint, whose weights you supply (see
-    /// unlift models) [default: sift]
-    #[arg(long, value_name = "TYPE", value_parser = values::feature_type, help_heading = "Input")]
-    pub features: Option<DescriptorKind>,
-    /// Number of features per photo, as in unlift audit images
-    #[arg(long, value_parser = values::count, value_name = "N", help_heading = "Input")]
-    pub max_features: Option<NonZeroUsize>,
-    /// Keep only keypoints whose score exceeds SCORE; not for sift [default: aliked 0.2, superpoint
-    /// 0.005]
-    #[arg(long, value_name = "SCORE", value_parser = values::score, help_heading = "Input")]
-    pub min_score: Option<f32>,
+    #[command(flatten)]
+    pub extraction: ExtractionArgs,
     /// Meters per unit of MODEL, for --poses
     #[arg(long, value_name = "FACTOR", value_parser = values::scale, help_heading = "Input")]
     pub scale: Option<f64>,

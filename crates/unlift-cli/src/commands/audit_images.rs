@@ -11,7 +11,7 @@ use unlift::{Descriptors, Unit};
 use unlift_audit::images::FeatureSource;
 use unlift_audit::images::audit::{ImagesJob, Used, perform};
 use unlift_audit::images::choice;
-use unlift_audit::images::extraction::{Wanted, sample};
+use unlift_audit::images::extraction::sample;
 use unlift_audit::images::stream::Needs;
 use unlift_audit::inversion::Inversion;
 use unlift_audit::{Finished, Shown, open_audit};
@@ -152,14 +152,7 @@ fn extraction(args: &AuditImagesArgs, plan: &Plan<2>) -> anyhow::Result<Extracti
     if args.photos.is_some() && args.path.is_dir() {
         return Err(usage("--photos: expected with a file of features, found a folder of photos"));
     }
-    let wanted = Wanted {
-        option: "--features",
-        kind: args.features,
-        max_features: args.max_features,
-        min_score: args.min_score,
-        ..Wanted::default()
-    };
-    let extraction = wanted.extraction(&args.path)?;
+    let extraction = args.extraction.wanted().extraction(&args.path)?;
     if let (true, Some(rows)) = (args.path.is_dir(), sample(&extraction)) {
         plan.own_sources().try_for_each(|source| check_fit(source, &rows))?;
     }
@@ -224,15 +217,7 @@ fn check_descriptors(
 /// Returns the options that change the images, for the report.
 fn more_options(args: &AuditImagesArgs) -> Map<String, serde_json::Value> {
     let mut options = Map::new();
-    if let Some(kind) = args.features {
-        options.insert("features".into(), json!(kind.name()));
-    }
-    if let Some(most) = args.max_features {
-        options.insert("max_features".into(), json!(most.get()));
-    }
-    if let Some(score) = args.min_score {
-        options.insert("min_score".into(), json!(score));
-    }
+    args.extraction.record(&mut options);
     if let Some(most) = args.max_images {
         options.insert("max_images".into(), json!(most.get()));
     }

@@ -7,7 +7,6 @@ use serde_json::{Map, json};
 use unlift::Unit;
 use unlift::audit::{Plan, Threshold};
 use unlift::obfuscate::SchemeOptions;
-use unlift_audit::images::extraction::Wanted;
 use unlift_audit::images::{FeatureSource, choice};
 use unlift_audit::inversion::Inversion;
 use unlift_audit::sequence::{PoseError, SequenceJob, perform};
@@ -47,15 +46,9 @@ pub fn audit(args: &AuditSequenceArgs) -> anyhow::Result<Finished> {
     let gate_files = GateFiles::check(&args.result, &rules)?;
     let out = open_audit(&args.result.out, rules, shown, &Stderr)?;
     let finished = with_threads(args.run.threads, || {
-        let wanted = Wanted {
-            option: "--features",
-            kind: args.features,
-            max_features: args.max_features,
-            min_score: args.min_score,
-            ..Wanted::default()
-        };
         // A model is of the photos as they are stored.
-        let source = FeatureSource::open(&args.path, &wanted.extraction(&args.path)?)?;
+        let source =
+            FeatureSource::open(&args.path, &args.extraction.wanted().extraction(&args.path)?)?;
         let source = source.with_turn(Turn::AsStored);
         let inversion = inversion(args, &source)?;
         if let Some(note) = source.passed_over() {
@@ -139,14 +132,6 @@ fn pose_error(args: &AuditSequenceArgs) -> anyhow::Result<Option<PoseError>> {
 fn options(args: &AuditSequenceArgs) -> Map<String, serde_json::Value> {
     let mut options = Map::new();
     options.insert("model".into(), json!(args.model.display().to_string()));
-    if let Some(kind) = args.features {
-        options.insert("features".into(), json!(kind.name()));
-    }
-    if let Some(most) = args.max_features {
-        options.insert("max_features".into(), json!(most.get()));
-    }
-    if let Some(score) = args.min_score {
-        options.insert("min_score".into(), json!(score));
-    }
+    args.extraction.record(&mut options);
     options
 }
