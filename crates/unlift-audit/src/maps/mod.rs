@@ -259,6 +259,13 @@ fn find_with(
         Some(file) => Error::from(unlift_io::Error::core(file, error)),
         None => Error::from(error),
     };
+    // Localization comes first: wrong features are reported before the long attacks.
+    let (localization, said) = match localize {
+        Some(localize) => {
+            localization::of_schemes(localize, job.original, &job.plan, job.progress)?
+        }
+        None => Default::default(),
+    };
     let whole = (job.original, job.descriptors);
     let cut = |asked: Tiles| asked.of(job.original.reveal().positions(), job.up);
     let cut = job.tiles.map(cut).transpose()?;
@@ -304,12 +311,6 @@ fn find_with(
         job.progress.say(&format!("note: {note}"));
     }
     let (rows, missing) = (&outcome.rows, &outcome.not_audited);
-    let (localization, said) = match localize {
-        Some(localize) => {
-            localization::of_schemes(localize, job.original, &job.plan, job.progress)?
-        }
-        None => Default::default(),
-    };
     doubts.notes.extend(said);
     let gates = gate_results(&job.gates, &job.plan, rows, missing, &doubts.of_rows, &localization)?;
     let mut options = job.options;
