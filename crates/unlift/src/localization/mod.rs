@@ -409,6 +409,30 @@ mod tests {
         }
     }
 
+    /// Figures of this version. They change only if a scheme, its directions or the bound changes.
+    #[test]
+    fn multiples_of_the_room_are_as_before() {
+        let golden: [(&str, f64); 10] = [
+            ("olc", 1.4338500),
+            ("ppl", 1.5411735),
+            ("ppl+", 1.5441189),
+            ("ray", 1.7362557),
+            ("ray-voxel", 1.8347860),
+            ("plane", f64::INFINITY),
+            ("cp", 1.4357801),
+            ("lines2d", 1.3952610),
+            ("cp2d", 1.4062133),
+            ("dcl2d", 2.1644814),
+        ];
+        let found = multiples(1.0);
+        assert_eq!(found.len(), golden.len());
+        for ((name, multiple), (expected, golden)) in found.into_iter().zip(golden) {
+            assert_eq!(name, expected);
+            let same = multiple == golden || (multiple / golden - 1.0).abs() < 1e-6;
+            assert!(same, "{name}: {multiple}, expected {golden}");
+        }
+    }
+
     #[test]
     fn multiples_do_not_depend_on_the_unit() {
         for ((name, one), (_, other)) in multiples(1.0).into_iter().zip(multiples(1000.0)) {
