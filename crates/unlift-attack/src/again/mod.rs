@@ -308,16 +308,11 @@ fn same_coordinate(a: &Flats, b: &Flats, records: &[(usize, usize)]) -> f64 {
             Some(plane) => (plane, b.swapped.get(other)?),
             None => (b.planes.get(other)?, a.swapped.get(own)?),
         };
-        Some(((point[plane.0] - plane.1).abs(), point[plane.0].abs()))
+        Some((point[plane.0] - plane.1).abs())
     };
-    let (mut differences, sizes): (Vec<f64>, Vec<f64>) =
-        records.iter().filter_map(difference).unzip();
-    if differences.is_empty() {
-        return 0.0;
-    }
+    let mut differences: Vec<f64> = records.iter().filter_map(difference).collect();
     differences.sort_unstable_by(f64::total_cmp);
-    let largest = sizes.into_iter().fold(0.0, f64::max);
-    (6.0 * quantile(&differences, 0.33)).max(ROUNDING * largest)
+    if differences.is_empty() { 0.0 } else { 10.0 * quantile(&differences, 0.33) }
 }
 
 /// Judges all links together. `usual` is the length of a distance of 1; `other` returns the record of the second release.

@@ -5,7 +5,7 @@
 //! was swapped along one axis in both releases, three or more points share values in a cycle, which tells who is whose partner
 //! (docs/decisions/sequence.md). So one answer decides many, and few stay open: those go where points are denser.
 
-use super::{Place, ROUNDING};
+use super::Place;
 use crate::geometry::knn::Knn;
 use crate::geometry::vector::quantile;
 
@@ -86,16 +86,15 @@ pub(super) fn solve(a: &[[f64; 3]], b: &[[f64; 3]], records: &[(usize, usize)]) 
     places
 }
 
-/// Returns the largest difference of coordinates that agree: the smallest one of most records is rounding or noise.
+/// Returns the largest difference of coordinates that agree: the smallest one of most records is rounding or noise. It is zero if both
+/// releases have the same frame.
 fn same(a: &[[f64; 3]], b: &[[f64; 3]], records: &[(usize, usize)]) -> f64 {
     let least = |&(own, other): &(usize, usize)| {
         (0..3).map(|c| (a[own][c] - b[other][c]).abs()).fold(f64::INFINITY, f64::min)
     };
     let mut least: Vec<f64> = records.iter().map(least).collect();
     least.sort_unstable_by(f64::total_cmp);
-    let largest = a.as_flattened().iter().map(|x| x.abs()).fold(0.0, f64::max);
-    let noise = if least.is_empty() { 0.0 } else { quantile(&least, 0.5) };
-    (6.0 * noise).max(ROUNDING * largest)
+    if least.is_empty() { 0.0 } else { 10.0 * quantile(&least, 0.5) }
 }
 
 /// Returns the only row of `values`, sorted with rows, within `same` of `value`.

@@ -4,6 +4,8 @@
 const ROUNDS: usize = 50;
 /// Least noise, as a share of the usual distance.
 const LEAST: f64 = 1e-12;
+/// Most noise, as a share of the usual distance, at which right links stand out.
+const MOST: f64 = 0.1;
 
 /// Returns the probability of each link and the noise of the right ones. A distance of 1 is usual of wrong links.
 ///
@@ -33,6 +35,10 @@ pub(super) fn trust(distances: &[f64]) -> (Vec<f64>, f64) {
         }
         scale = (squares / sum).sqrt().max(LEAST);
         share = (sum / distances.len() as f64).clamp(0.001, 0.999);
+    }
+    if scale > MOST {
+        // Nothing stands out from wrong links.
+        found.fill(0.0);
     }
     (found, scale)
 }
