@@ -67,7 +67,7 @@ def table(document):
     for scheme in document["options"]["schemes"]:
         row = rows[scheme, "again"]
         sure = f"{row['sure_percent']:.1f}"
-        if row["sure_correct_percent"] is not None:
+        if row.get("sure_correct_percent") is not None:
             sure += f", {row['sure_correct_percent']:.1f}"
         cells = [scheme, shares(row), shares(rows.get((scheme, "again-geometry"))), f"{row['metrics']['linked_percent']:.1f}",
                  f"{100 * row['inlier_ratio']:.1f}", sure, f"{row['blind_percent'][thresholds[0]]:.1f}"]

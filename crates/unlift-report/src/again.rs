@@ -13,16 +13,17 @@ pub(crate) fn is_again(document: &Document) -> bool {
 pub(crate) fn sentences(document: &Document) -> Vec<String> {
     let typed = tables::headline_threshold(document).unwrap_or_default();
     let sentence = |scheme: &str| {
-        let rows = document.results.iter().filter(|row| row.scheme == scheme);
+        let rows = || document.results.iter().filter(|row| row.scheme == scheme);
         let share = |row: &Row| row.recovered_percent.get(&typed).copied().unwrap_or(0.0);
-        let row = rows.max_by(|a, b| share(a).total_cmp(&share(b)))?;
+        let row = rows().max_by(|a, b| share(a).total_cmp(&share(b)))?;
         let mut text = format!(
             "From two releases under {}, {} % of the points came back {}.",
             scheme.to_uppercase(),
             words::percent(share(row)),
             words::within(&typed, row.unit)
         );
-        let open = row.metrics.get("open_percent").copied().unwrap_or(0.0);
+        let described = rows().find(|row| row.neighbors == attack::AGAIN).unwrap_or(row);
+        let open = described.metrics.get("open_percent").copied().unwrap_or(0.0);
         if open >= 0.05 {
             text.push_str(&format!(
                 " Of {} %, both records are known, but leave a line or more.",

@@ -44,6 +44,8 @@ struct Flats {
     planes: Vec<(usize, f64)>,
     /// Points with swapped coordinates.
     swapped: Vec<[f64; 3]>,
+    /// The origin of the release in this frame.
+    shift: [f64; 3],
 }
 
 impl Flats {
@@ -88,7 +90,14 @@ impl Flats {
                 swapped.iter().flat_map(axes).collect()
             }
         };
-        Self { lines, per_record, planes, swapped }
+        Self { lines, per_record, planes, swapped, shift }
+    }
+
+    /// Returns the size that few swapped coordinates exceed.
+    fn size(&self) -> f64 {
+        let mut sizes: Vec<f64> = self.swapped.as_flattened().iter().map(|x| x.abs()).collect();
+        sizes.sort_unstable_by(f64::total_cmp);
+        if sizes.is_empty() { 0.0 } else { quantile(&sizes, 0.99) }
     }
 
     fn of(&self, record: usize) -> &[Line] {
@@ -252,8 +261,10 @@ struct Linked {
 
 /// Places the points of linked records.
 fn places([a, b]: &[Flats; 2], records: &[(usize, usize)]) -> Vec<Place> {
+    // Releases with the same origin store equal coordinates in equal bytes.
+    let rounding = if b.shift == [0.0; 3] { 0.0 } else { ROUNDING * a.size().max(b.size()) };
     if !a.swapped.is_empty() && !b.swapped.is_empty() {
-        return swaps::solve(&a.swapped, &b.swapped, records);
+        return swaps::solve(&a.swapped, &b.swapped, records, rounding);
     }
     let middle = [0, 1, 2].map(|axis| {
         let of_axis = a.planes.iter().chain(&b.planes).filter(|plane| plane.0 == axis);
@@ -261,7 +272,7 @@ fn places([a, b]: &[Flats; 2], records: &[(usize, usize)]) -> Vec<Place> {
         offsets.sort_unstable_by(f64::total_cmp);
         if offsets.is_empty() { 0.0 } else { quantile(&offsets, 0.5) }
     });
-    let same = same_coordinate(a, b, records);
+    let same = same_coordinate(a, b, records).max(rounding);
     let place = |&(own, other): &(usize, usize)| {
         match (a.planes.get(own), b.planes.get(other)) {
             (None, None) => {

@@ -48,9 +48,14 @@ struct Cycle {
 
 const MISSING: usize = usize::MAX;
 
-/// Places the points of linked records `(row of a, row of b)`.
-pub(super) fn solve(a: &[[f64; 3]], b: &[[f64; 3]], records: &[(usize, usize)]) -> Vec<Place> {
-    let same = same(a, b, records);
+/// Places the points of linked records `(row of a, row of b)`. `rounding` is the largest usual difference of equal coordinates.
+pub(super) fn solve(
+    a: &[[f64; 3]],
+    b: &[[f64; 3]],
+    records: &[(usize, usize)],
+    rounding: f64,
+) -> Vec<Place> {
+    let same = same(a, b, records).max(rounding);
     let node = |&(own, other): &(usize, usize)| {
         let (a, b) = (a[own], b[other]);
         let axes = (0..3).filter(|&c| (a[c] - b[c]).abs() > same).collect();

@@ -44,7 +44,8 @@ fn two_releases_give_points_back() {
     let document = place.json("a/audit.json");
     let rows = document["results"].as_array().unwrap();
     let row = |scheme: &str, neighbors: &str| {
-        let is_it = |row: &&serde_json::Value| row["scheme"] == scheme && row["neighbors"] == neighbors;
+        let is_it =
+            |row: &&serde_json::Value| row["scheme"] == scheme && row["neighbors"] == neighbors;
         rows.iter().find(is_it).unwrap_or_else(|| panic!("{scheme} {neighbors}"))
     };
     let share = |row: &serde_json::Value| row["recovered_percent"]["0.10"].as_f64().unwrap();
