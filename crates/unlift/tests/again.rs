@@ -132,7 +132,8 @@ fn a_changed_map_gives_back_what_did_not_change() {
     let mut draws = Draws::new(7, Stage::Synthetic, 0);
     let mut changed = points();
     changed.truncate(N - N / 10);
-    changed[..N / 10].iter_mut().for_each(|p| p[0] += draws.between(0.5, 1.0));
+    let moved = changed[..N / 10].iter_mut();
+    moved.for_each(|p| p.iter_mut().for_each(|x| *x += draws.between(0.5, 1.0)));
     let (first, second) = (original(points()), original(changed));
     // A point whose partner changed may stay open.
     for (name, least) in [("olc", 78.0), ("ppl", 74.0), ("cp", 65.0)] {
