@@ -88,10 +88,13 @@ impl Links {
         };
         let new: Vec<Vec<u32>> = of_slots.iter().map(inverse).collect();
         let moved = |&(query, slot): &(u32, u32)| (query, new[query as usize][slot as usize]);
-        let of_query = |(links, of): (&Vec<Vec<(u32, u32)>>, &Vec<u32>)| {
-            of.iter().map(|&old| links[old as usize].iter().map(moved).collect()).collect()
-        };
-        Self { of_slot: self.of_slot.iter().zip(of_slots).map(of_query).collect() }
+        let mut links = Self::none(of_slots.iter().map(Vec::len));
+        for (query, of) in of_slots.iter().enumerate() {
+            for (links, &old) in links.of_slot[query].iter_mut().zip(of) {
+                *links = self.of_slot[query][old as usize].iter().map(moved).collect();
+            }
+        }
+        links
     }
 
     fn none(n_slots: impl IntoIterator<Item = usize>) -> Self {
