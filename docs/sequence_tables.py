@@ -17,7 +17,7 @@ POSES = ["perturbed:1,0.1", "perturbed:5,0.5"]
 def audit(program, shared, model, photos, *options):
     with tempfile.TemporaryDirectory() as out:
         data = shared / "data"
-        command = [program, "audit", "sequence", data / model / "model", data / photos / "images", "--quiet",
+        command = [program, "audit", "sequence", data / model / "model", data / photos / "images", "--quiet", "--queries", "3,5,10,20",
                    "--out", f"{out}/audit", *options]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         return json.loads(pathlib.Path(out, "audit/audit.json").read_text())
@@ -40,74 +40,50 @@ def numbers(document):
     return sorted({row["k"] for row in document["results"]})
 
 
-def shares(document):
-    """Percent of all keypoints, with links by descriptors [by the model's tracks]."""
+def cell(own, true):
+    """Percent within 10 px of all keypoints; of those that the model tracks [with its tracks]; sure ones, how many are right."""
+    of, right = "tracked_within_10_percent", own.get("sure_correct_percent")
+    sure = f"{own['sure_percent']:.1f}" + (f", {right:.1f}" if right is not None else "")
+    return f"{own['recovered_percent']['10']:.1f}; {own['metrics'][of]:.1f} [{true['metrics'][of]:.1f}]; {sure}"
+
+
+def lines(scene, document):
+    """The rows of one scene."""
     rows = by_queries(document)
-    yield from head(["queries", *SCHEMES])
-    for n in numbers(document):
-        cells = [f"{percents(rows[s, f'sequence@{n}'])} [{percents(rows[s, f'tracks@{n}'])}]" for s in SCHEMES]
-        yield f"| {n} | " + " | ".join(cells) + " |"
+    for n in [n for n in numbers(document) if n >= 3]:
+        own, true = ([rows[s, f"{by}@{n}"] for s in SCHEMES] for by in ("sequence", "tracks"))
+        metrics, right = own[0]["metrics"], 100 * own[0]["inlier_ratio"]
+        cells = [f"{metrics['tracked_percent']:.0f}", f"{metrics['linked_percent']:.0f}, {right:.0f}", *map(cell, own, true)]
+        yield f"| {scene} | {n} | " + " | ".join(cells) + " |"
 
 
-def linked(document):
-    """Percent within 10 px among the keypoints that the model's tracks link, by descriptors and by these tracks."""
-    rows = by_queries(document)
-    yield from head(["queries", "tracked", "linked", "right", *SCHEMES])
-    for n in numbers(document):
-        if n < 3:
-            continue
-        own = [rows[s, f"sequence@{n}"] for s in SCHEMES]
-        true = [rows[s, f"tracks@{n}"] for s in SCHEMES]
-        of = "tracked_within_10_percent"
-        cells = [f"{a['metrics'][of]:.1f} of {b['metrics'][of]:.1f}" for a, b in zip(own, true)]
-        share = [f"{own[0]['metrics'][name]:.1f}" for name in ("tracked_percent", "linked_percent")]
-        yield f"| {n} | " + " | ".join([*share, f"{100 * own[0]['inlier_ratio']:.0f}", *cells]) + " |"
-
-
-def sure(document):
-    rows = by_queries(document)
-    yield from head(["queries", *SCHEMES])
-    for n in numbers(document):
-        cells = []
-        for scheme in SCHEMES:
-            row = rows[scheme, f"sequence@{n}"]
-            right = row.get("sure_correct_percent")
-            cells.append(f"{row['sure_percent']:.1f}" + (f", {right:.1f} right" if right is not None else ""))
-        if n >= 3:
-            yield f"| {n} | " + " | ".join(cells) + " |"
-
-
-def section(scene, features, document, off):
-    """The tables of one scene; `off` has the documents with perturbed poses by their option."""
-    images, points = document["input"]["images"]["used"], document["input"]["n_points"]
-    yield from [f"### {scene}, {features}: {images} images, {points:,} keypoints", "",
-                "Percent of all keypoints within 5 / 10 / 25 px, with links by descriptors [by the model's tracks]:", "",
-                *shares(document), "",
-                "Percent within 10 px among the keypoints that the model tracks in three or more of the views: with links by descriptors, of "
-                "that with these tracks. Tracked and linked keypoints are in percent of all; right links, in percent of those that the "
-                "model knows:", "", *linked(document), "",
-                "Keypoints that the attacker is sure of (90 % within 5 px), in percent, and how many percent of these are right:", "",
-                *sure(document), ""]
-    if off:
-        yield from ["With an error of the poses, percent of all keypoints within 5 / 10 / 25 px:", "",
-                    *head(["cm, degrees", "queries", *SCHEMES])]
-        for poses, document in off.items():
-            rows = by_queries(document)
-            for n in [n for n in numbers(document) if n >= 5]:
-                cells = [percents(rows[s, f"sequence@{n}"]) for s in SCHEMES]
-                yield f"| {poses.split(':')[1].replace(',', ', ')} | {n} | " + " | ".join(cells) + " |"
-        yield ""
+def off(documents):
+    """The table with perturbed poses, by their option."""
+    yield from ["RedKitchen, ALIKED, with an error of the poses, percent of all keypoints within 5 / 10 / 25 px:", "",
+                *head(["cm, degrees", "queries", *SCHEMES])]
+    for poses, document in documents.items():
+        rows = by_queries(document)
+        for n in [n for n in numbers(document) if n >= 5]:
+            cells = [percents(rows[s, f"sequence@{n}"]) for s in SCHEMES]
+            yield f"| {poses.split(':')[1].replace(',', ', ')} | {n} | " + " | ".join(cells) + " |"
+    yield ""
 
 
 def tables(program, shared):
-    lines = []
-    for scene, features, model, photos, options in SCENES:
-        document = audit(program, shared, model, photos, *options)
-        off = {}
-        if model == "redkitchen-aliked":
-            off = {poses: audit(program, shared, model, photos, *options, "--scale", "1", "--poses", poses) for poses in POSES}
-        lines += section(scene, features, document, off)
-    return lines
+    found = []
+    for kind in ("SIFT", "ALIKED"):
+        rows, names = [], []
+        for scene, features, model, photos, options in SCENES:
+            if features.startswith(kind):
+                document = audit(program, shared, model, photos, *options)
+                images, points = document["input"]["images"]["used"], document["input"]["n_points"]
+                names.append(f"{scene} ({images} images, {points:,} keypoints)")
+                rows += lines(scene, document)
+        found += [f"{kind}, " + " and ".join(names) + ":", "",
+                  *head(["scene", "queries", "tracked", "linked, right", *SCHEMES]), *rows, ""]
+    scene, features, model, photos, options = SCENES[1]
+    found += off({poses: audit(program, shared, model, photos, *options, "--scale", "1", "--poses", poses) for poses in POSES})
+    return found
 
 
 if __name__ == "__main__":

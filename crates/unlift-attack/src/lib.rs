@@ -32,6 +32,7 @@
 //! audits are in the crate `unlift`, which re-exports this one.
 
 mod about;
+pub mod again;
 #[doc(hidden)]
 pub mod compiled;
 mod density;

@@ -45,6 +45,7 @@
 //! | `scans` | Maps in E57; LAS and PCD need no feature. |
 //! | `parquet` | Stage files: lists of [`by_point`], and [`Journal`]. |
 
+pub mod again;
 mod audited;
 mod checked;
 mod clouds;

@@ -115,6 +115,12 @@ pub fn scheme(text: &str) -> Result<&'static Entry, String> {
     Err(format!("expected one of {}, found {text}{note}", names.join(", ")))
 }
 
+/// Parses `olc`, the same scheme twice, or `olc/cp`, two different ones.
+pub fn scheme_pair(text: &str) -> Result<[&'static Entry; 2], String> {
+    let (a, b) = text.split_once('/').unwrap_or((text, text));
+    Ok([scheme(a)?, scheme(b)?])
+}
+
 pub fn image_scheme(text: &str) -> Result<&'static Entry, String> {
     let of_images = |entry: &&Entry| entry.in_2d.is_some();
     match SCHEMES.iter().filter(of_images).find(|entry| entry.name == text) {

@@ -74,6 +74,20 @@ pub(crate) fn basis_of(neighbors: &str, solver: &str) -> Option<Basis> {
 const SEQUENCE: &str = "sequence@";
 const TRACKS: &str = "tracks@";
 
+/// Sources of two releases: links by descriptors, and by geometry alone.
+pub(crate) const AGAIN: &str = "again";
+const AGAIN_GEOMETRY: &str = "again-geometry";
+
+/// Returns whether a row is of two releases.
+pub(crate) fn is_again(neighbors: &str) -> bool {
+    [AGAIN, AGAIN_GEOMETRY].contains(&neighbors)
+}
+
+/// Returns whether a row needs no lists of neighbors, because it intersects several releases.
+pub(crate) fn intersects(neighbors: &str) -> bool {
+    is_again(neighbors) || queries(neighbors).is_some()
+}
+
 /// Returns the number of queries of a row of a sequence, as text.
 pub(crate) fn queries(neighbors: &str) -> Option<&str> {
     neighbors.strip_prefix(SEQUENCE).or_else(|| neighbors.strip_prefix(TRACKS))
@@ -115,6 +129,8 @@ pub(crate) fn plain_source(neighbors: &str, oracle_noise: Option<&str>) -> Strin
         ("similarity", _) => "neighbors by descriptor similarity".to_owned(),
         ("learned", _) => "neighbors by a learned network".to_owned(),
         ("geometric", _) => "neighbors by record geometry".to_owned(),
+        (AGAIN, _) => "two releases, linked by descriptors".to_owned(),
+        (AGAIN_GEOMETRY, _) => "two releases, linked by geometry".to_owned(),
         (own, _) if own.starts_with(TRACKS) => {
             format!("{} queries with known poses and tracks", &own[TRACKS.len()..])
         }
@@ -147,7 +163,7 @@ pub(crate) fn name(row: &Row) -> String {
     if !has_neighborhoods(row) {
         return records_alone(Some(&row.solver));
     }
-    if queries(&row.neighbors).is_some() {
+    if intersects(&row.neighbors) {
         return plain_source(&row.neighbors, None);
     }
     // The attacker chooses the length of its own lists, and the share of right neighbors depends on it.

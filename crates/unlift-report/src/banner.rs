@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::attack::Basis;
 use crate::cards::{Card, Finding, Level, Refusal};
 use crate::document::{Document, LengthUnit, Row};
-use crate::{sequence, tables, words};
+use crate::{again, sequence, tables, words};
 
 /// The verdict on a whole audit in a few lines.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -117,6 +117,15 @@ pub(crate) fn next_steps(document: &Document, cards: &[Card]) -> Vec<String> {
                 .to_owned(),
         );
         steps.extend(sequence::sentences(document));
+        return steps;
+    }
+    if again::is_again(document) {
+        steps.push(
+            "Publish a map once. To publish a new version, hide new and changed points only, and \
+             keep the records of the others."
+                .to_owned(),
+        );
+        steps.extend(again::sentences(document));
         return steps;
     }
     if !with_descriptors {

@@ -114,6 +114,7 @@ pub fn render(
         subject: subject(&document),
         gates: gates(&document),
         published: page_data.has_published(),
+        has_lists: !document.results.iter().all(|row| attack::intersects(&row.neighbors)),
         judged: document
             .results
             .iter()
@@ -188,6 +189,8 @@ struct Page<'a> {
     subject: Subject,
     gates: Option<Gates>,
     published: bool,
+    /// Whether any attack uses lists of neighbors.
+    has_lists: bool,
     /// Whether any row has stated probabilities, or a reason why not.
     judged: bool,
     tables: Vec<Table>,

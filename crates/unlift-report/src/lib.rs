@@ -27,6 +27,7 @@
 //! # }
 //! ```
 
+mod again;
 mod attack;
 mod banner;
 mod cards;

@@ -3,7 +3,7 @@
 use crate::columns::align;
 use crate::document::{Bound, Document, LengthUnit, Row, STRONGEST};
 use crate::verdict::Verdict;
-use crate::{attack, cost, sequence, tables, tiles, verdict, words};
+use crate::{again, attack, cost, sequence, tables, tiles, verdict, words};
 
 /// Returns the verdict in two lines, then a table with a few lines per scheme, the worst first: every source tried, the
 /// records alone, and the oracle at the headline inlier ratio. Columns are the percentages within each threshold, a
@@ -18,6 +18,10 @@ pub fn text_table(document: &Document) -> String {
     if sequence::is_sequence(document) {
         let sentences = sequence::sentences(document).join("\n");
         return format!("{}\n{sentences}\n\n{}", banner.headline, sequence::table(document));
+    }
+    if again::is_again(document) {
+        let sentences = again::sentences(document).join("\n");
+        return format!("{}\n{sentences}\n\n{}", banner.headline, again::table(document));
     }
     let mut head = ["scheme", "neighbors by", "true", "solver"].map(str::to_owned).to_vec();
     head.extend(thresholds.iter().map(|typed| format!("{typed} {}", unit(document))));

@@ -10,7 +10,7 @@ use crate::attack::{self, Basis, Given};
 use crate::banner::{Banner, banner, next_steps};
 use crate::cards::{Card, Finding, Level, Refusal};
 use crate::document::{Bound, BreakEven, Document, Row};
-use crate::{sequence, tables, words};
+use crate::{tables, words};
 
 /// The oracle's headline is its tested inlier ratio nearest to this one.
 const HEADLINE_RATIO: f64 = 0.5;
@@ -175,6 +175,9 @@ fn when(basis: Basis, row: &Row) -> String {
         Basis::Released if attack::queries(&row.neighbors).is_some() => {
             "Today, from released queries and their poses".to_owned()
         }
+        Basis::Released if attack::is_again(&row.neighbors) => {
+            "Today, from two releases of the map".to_owned()
+        }
         Basis::Released => "Today, from the released data alone".to_owned(),
         Basis::Given => "With neighbors from a given file".to_owned(),
         Basis::Oracle if attack::queries(&row.neighbors).is_some() => {
@@ -207,14 +210,14 @@ fn baselines(
     let adds: Vec<String> = by_source(document, scheme)
         .into_iter()
         // Solvers without neighborhoods do not show what lists add.
-        .filter(|row| attack::has_neighborhoods(row))
+        .filter(|row| attack::has_neighborhoods(row) && !attack::intersects(&row.neighbors))
         .map(|row| {
             let source = attack::plain_source(&row.neighbors, row.oracle_noise.as_deref());
             let source = source.trim_start_matches("neighbors ");
             format!("{} ({source})", added(share(row, typed) - floor))
         })
         .collect();
-    match adds.is_empty() || sequence::is_sequence(document) {
+    match adds.is_empty() {
         true => without,
         false => format!("{without} Lists of neighbors add {}.", words::list(&adds)),
     }

@@ -116,7 +116,7 @@
   const firstTold = (told.find((row) => row.given === data.first_given) ?? told[0])?.given ?? data.first_given;
   const sheets = [...document.querySelectorAll(".sheet")];
   const parts = [
-    [rows.length, curves],
+    [at("curve-controls"), curves],
     [rows.length, () => chart(at("error-controls"), at("chart-errors"), rows, errors)],
     [judged.length, () => once(at("certainty"), () => chart(at("reliability-controls"), at("chart-reliability"), judged, reliability, firstTold))],
     [data.scene, scene],

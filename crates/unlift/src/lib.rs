@@ -61,7 +61,7 @@ pub mod truth;
 pub use truth::OriginalId;
 pub use unlift_attack::{
     About, Descriptors, Error, ErrorKind, Fingerprint, ListsBy, OneLine, PointSet, RecordId,
-    RowOrder, Unit, descriptors, geometry, is_obeyed, points, recover, released, sequence,
+    RowOrder, Unit, again, descriptors, geometry, is_obeyed, points, recover, released, sequence,
 };
 #[doc(hidden)]
 pub use unlift_attack::{compiled, simd};

@@ -9,6 +9,7 @@ mod compare;
 mod dense;
 mod geometric;
 mod kind;
+mod mutual;
 mod neighborhoods;
 mod overlap;
 mod rows;
@@ -20,15 +21,15 @@ pub mod sources;
 mod tiles;
 mod walk;
 
-pub(crate) use compare::Likeness;
+pub(crate) use compare::MOST_ROWS;
 pub use dense::{Dense, dense, usual};
 pub(crate) use geometric::geometric_by;
 pub use geometric::{Geometric, geometric};
 pub use kind::DescriptorKind;
+pub(crate) use mutual::{Blocks, mutual};
 pub use neighborhoods::Neighborhoods;
 pub use overlap::{Overlap, REACHES, overlap};
 pub use scored::{Part, Scores, scored};
-pub(crate) use similarity::Cosine;
 pub use similarity::{Similarity, similarity};
 #[doc(hidden)]
 pub use source::lacks_descriptors;

@@ -86,7 +86,10 @@ pub struct Cosine {
     pub counts: bool,
 }
 
-/// Descriptors of unit length, as rows and, transposed, as columns.
+/// Adjacent columns, whose sums fit in registers.
+const PANEL: usize = 16;
+
+/// Descriptors of unit length, as rows and, transposed, as columns in panels of [`PANEL`]: a panel fits in the fastest cache.
 pub struct Units {
     dim: usize,
     rows: Vec<f32>,
@@ -110,7 +113,7 @@ impl Likeness for Cosine {
             for (c, &x) in row.iter().enumerate() {
                 let value = (f64::from(x) / norm) as f32;
                 rows[at * dim + c] = value;
-                columns[c * BLOCK + at] = value;
+                columns[at / PANEL * PANEL * dim + c * PANEL + at % PANEL] = value;
             }
         }
         Units { dim, rows, columns }
@@ -140,27 +143,26 @@ impl Kernel for Product<'_> {
 
     #[inline(always)]
     fn run(self) {
-        // The sums of 4 rows by 16 columns fit in registers.
         const ROWS: usize = 4;
-        const COLUMNS: usize = 16;
         let dim = self.dim;
-        for i in (0..BLOCK).step_by(ROWS) {
-            let rows: [&[f32]; ROWS] =
-                std::array::from_fn(|r| &self.rows[(i + r) * dim..(i + r + 1) * dim]);
-            for j in (0..BLOCK).step_by(COLUMNS) {
-                let mut sums = [[0.0f32; COLUMNS]; ROWS];
-                for (c, line) in self.columns.chunks_exact(BLOCK).enumerate() {
-                    let column = &line[j..j + COLUMNS];
-                    for (sums, row) in sums.iter_mut().zip(&rows) {
-                        let value = row[c];
-                        for (sum, &x) in sums.iter_mut().zip(column) {
-                            *sum += value * x;
-                        }
+        for (j, panel) in self.columns.chunks_exact(PANEL * dim).enumerate() {
+            for i in (0..BLOCK).step_by(ROWS) {
+                let [a, b, c, d]: [&[f32]; ROWS] =
+                    std::array::from_fn(|r| &self.rows[(i + r) * dim..(i + r + 1) * dim]);
+                // Written out without a check of bounds, else sums stay in memory and the loop is scalar.
+                let mut sums = [[0.0f32; PANEL]; ROWS];
+                let (columns, _) = panel.as_chunks::<PANEL>();
+                for ((((column, &a), &b), &c), &d) in columns.iter().zip(a).zip(b).zip(c).zip(d) {
+                    for l in 0..PANEL {
+                        sums[0][l] += a * column[l];
+                        sums[1][l] += b * column[l];
+                        sums[2][l] += c * column[l];
+                        sums[3][l] += d * column[l];
                     }
                 }
                 for (r, sums) in sums.iter().enumerate() {
-                    let at = (i + r) * BLOCK + j;
-                    self.products[at..at + COLUMNS].copy_from_slice(sums);
+                    let at = (i + r) * BLOCK + j * PANEL;
+                    self.products[at..at + PANEL].copy_from_slice(sums);
                 }
             }
         }

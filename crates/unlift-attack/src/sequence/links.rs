@@ -5,9 +5,8 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::Query;
-use crate::neighbors::{Cosine, Likeness};
-use crate::simd::BLOCK;
-use crate::{Descriptors, Error};
+use crate::Error;
+use crate::neighbors::{Blocks, mutual};
 
 /// A mutual nearest neighbor is a link if its distance is below this share of the distance of the second nearest. Geometry rejects wrong
 /// links later, so that a strict ratio would only lose right ones (docs/decisions/sequence.md).
@@ -40,27 +39,18 @@ impl Links {
             let what = format!("descriptors of query {at}");
             return Err(Error::new(what, expected, described[at].dim().to_string()));
         }
-        let cosine = Cosine { counts: false };
-        let blocks: Vec<Vec<_>> =
-            described.par_iter().map(|descriptors| blocks(&cosine, descriptors)).collect();
+        let blocks: Vec<Blocks> = described.par_iter().map(|rows| Blocks::new(rows)).collect();
         let pairs: Vec<(usize, usize)> = (0..queries.len())
             .flat_map(|a| (a + 1..queries.len().min(a + reach)).map(move |b| (a, b)))
             .filter(|&(a, b)| queries[a].camera.looks_like(&queries[b].camera))
             .collect();
-        let scratch = || vec![0.0f32; BLOCK * BLOCK];
-        let found: Vec<Vec<(u32, u32)>> = pairs
-            .par_iter()
-            .with_max_len(1)
-            .map_init(scratch, |scores, &(a, b)| {
-                let mut nearest = [described[a], described[b]].map(|of| vec![NONE; of.len()]);
-                let [rows, columns] = &mut nearest;
-                compare(&cosine, (&blocks[a], rows), (&blocks[b], columns), scores);
-                mutual(rows, columns)
-            })
-            .collect();
+        let of_pair = |&(a, b): &(usize, usize)| mutual(&blocks[a], &blocks[b]);
+        let found: Vec<_> = pairs.par_iter().with_max_len(1).map(of_pair).collect();
         let mut links = Self::none(queries.iter().map(|query| query.released.n_slots()));
         for (&(a, b), found) in pairs.iter().zip(&found) {
-            found.iter().for_each(|&(row, column)| links.link((a as u32, row), (b as u32, column)));
+            for &(row, column, _) in found.iter().filter(|pair| pair.2 < RATIO * RATIO) {
+                links.link((a as u32, row), (b as u32, column));
+            }
         }
         Ok(links)
     }
@@ -79,6 +69,29 @@ impl Links {
             track.sort_unstable();
             for (at, &a) in track.iter().enumerate() {
                 track[at + 1..].iter().filter(|b| b.0 != a.0).for_each(|&b| links.link(a, b));
+            }
+        }
+        links
+    }
+
+    /// Returns these links for other releases of the same keypoints. `of_slots` has, per query, the slot of each new slot in the
+    /// release of these links.
+    ///
+    /// # Panics
+    /// When a slot is out of range or a slot has no new one.
+    #[must_use]
+    pub fn reordered(&self, of_slots: &[Vec<u32>]) -> Self {
+        let inverse = |of: &Vec<u32>| {
+            let mut new = vec![0; of.len()];
+            of.iter().enumerate().for_each(|(slot, &old)| new[old as usize] = slot as u32);
+            new
+        };
+        let new: Vec<Vec<u32>> = of_slots.iter().map(inverse).collect();
+        let moved = |&(query, slot): &(u32, u32)| (query, new[query as usize][slot as usize]);
+        let mut links = Self::none(of_slots.iter().map(Vec::len));
+        for (query, of) in of_slots.iter().enumerate() {
+            for (links, &old) in links.of_slot[query].iter_mut().zip(of) {
+                *links = self.of_slot[query][old as usize].iter().map(moved).collect();
             }
         }
         links
@@ -123,52 +136,4 @@ impl Links {
         found.sort_unstable();
         found
     }
-}
-
-/// The nearest descriptor and its score, and the score of the second nearest.
-type Nearest = (u32, f32, f32);
-const NONE: Nearest = (u32::MAX, f32::NEG_INFINITY, f32::NEG_INFINITY);
-
-fn blocks(cosine: &Cosine, descriptors: &Descriptors) -> Vec<<Cosine as Likeness>::Block> {
-    let slots: Vec<u32> = (0..descriptors.len() as u32).collect();
-    slots.chunks(BLOCK).map(|slots| cosine.block(descriptors, slots)).collect()
-}
-
-type Side<'a> = (&'a [<Cosine as Likeness>::Block], &'a mut [Nearest]);
-
-/// Finds the nearest column of every row and the nearest row of every column.
-fn compare(cosine: &Cosine, (a, rows): Side<'_>, (b, columns): Side<'_>, scores: &mut [f32]) {
-    for (i, (own, rows)) in a.iter().zip(rows.chunks_mut(BLOCK)).enumerate() {
-        for (j, (other, columns)) in b.iter().zip(columns.chunks_mut(BLOCK)).enumerate() {
-            cosine.scores(own, other, scores);
-            for (r, (row, scores)) in rows.iter_mut().zip(scores.chunks_exact(BLOCK)).enumerate() {
-                for (c, (column, &score)) in columns.iter_mut().zip(scores).enumerate() {
-                    keep(row, (j * BLOCK + c) as u32, score);
-                    keep(column, (i * BLOCK + r) as u32, score);
-                }
-            }
-        }
-    }
-}
-
-#[inline(always)]
-fn keep(nearest: &mut Nearest, at: u32, score: f32) {
-    if score > nearest.1 {
-        *nearest = (at, score, nearest.1);
-    } else if score > nearest.2 {
-        nearest.2 = score;
-    }
-}
-
-fn mutual(rows: &[Nearest], columns: &[Nearest]) -> Vec<(u32, u32)> {
-    // The squared distance of unit vectors is 2 - 2 cos.
-    let stands_out = |(_, first, second): &Nearest| {
-        1.0 - first.min(1.0) < RATIO * RATIO * (1.0 - second.max(-1.0))
-    };
-    let of_row = |(row, nearest): (usize, &Nearest)| {
-        let column = columns.get(nearest.0 as usize)?;
-        let both = column.0 as usize == row && stands_out(nearest) && stands_out(column);
-        both.then_some((row as u32, nearest.0))
-    };
-    rows.iter().enumerate().filter_map(of_row).collect()
 }

@@ -15,10 +15,10 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 pub use links::Links;
-use triangulate::{Fit, Sight, triangulate};
+use triangulate::{Fit, MISS, MOST_HYPOTHESES, Sight, triangulate};
 
 use crate::geometry::frame::Bounds;
-use crate::geometry::vector::{dot, median, widen};
+use crate::geometry::vector::{dot, median, sub, widen};
 use crate::recover::{Confidence, Estimate, Recovered, Status};
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, RowOrder, Unit};
@@ -131,6 +131,8 @@ const FIRST_NOISE_PX: f64 = 5.0;
 const LEAST_NOISE_PX: f64 = 1.0;
 /// Largest noise assumed, in pixels. With more, every line would agree.
 const MOST_NOISE_PX: f64 = 12.0;
+/// Side of an image of unknown size, in pixels.
+const USUAL_SIDE_PX: f64 = 600.0;
 /// Planes that meet in a point.
 const LEAST_VIEWS: usize = 3;
 /// Tracks with at least this many agreeing views show the noise.
@@ -191,8 +193,12 @@ pub fn recover(
         None => Estimate::lost(Status::NoSupport),
     };
     let estimates: Vec<Estimate<2>> = fits.iter().map(estimate).collect();
+    let side = own.released.bounds().map_or(USUAL_SIDE_PX, |bounds| {
+        let [width, height] = sub(&bounds.high, &bounds.low);
+        (width * height).sqrt()
+    });
     let confidence = fits.iter().map(|(n_views, fit)| match fit {
-        Some(fit) => confidence(fit, *n_views, is_pair, noise_px),
+        Some(fit) => confidence(fit, *n_views, is_pair, (noise_px, side)),
         None => Confidence::LOST,
     });
     let about =
@@ -209,14 +215,27 @@ pub fn recover(
     })
 }
 
-/// Predicts whether a fit is right and its error, from the views that agree and disagree. Constants are rounded from the shares observed
-/// on RedKitchen (docs/decisions/sequence.md).
-fn confidence(fit: &Fit, n_views: usize, is_pair: bool, noise_px: f64) -> Confidence {
-    let agree = fit.n_agree as f64 - 3.0;
-    let disagree = (n_views - fit.n_agree.min(n_views)) as f64;
-    let logit = if is_pair { 0.8 } else { 1.5 } + 1.3 * agree - 1.2 * libm::log1p(disagree);
-    let chance = |logit: f64| 1.0 / (1.0 + libm::exp(-logit));
-    let found = chance(logit) * chance(0.5 * fit.lead);
+/// Predicts whether a fit is right, and its error. A fit is right if more views agree than chance would give: wrong lines pass near the
+/// point, too, and the best of many hypotheses is chosen. Constants are rounded from a fit on RedKitchen (docs/decisions/sequence.md).
+fn confidence(
+    fit: &Fit,
+    n_views: usize,
+    is_pair: bool,
+    (noise_px, side): (f64, f64),
+) -> Confidence {
+    let n_lines = if is_pair { 2.0 } else { 1.0 };
+    // Probability that a wrong record passes within the distance that counts as agreement.
+    let chance = (n_lines * 2.0 * MISS * noise_px / side).min(0.5);
+    let (n, agree) = ((n_views - 3) as f64, fit.n_agree.clamp(3, n_views) as f64 - 3.0);
+    let ln_choose =
+        |n: f64, k: f64| libm::lgamma(n + 1.0) - libm::lgamma(k + 1.0) - libm::lgamma(n - k + 1.0);
+    let others = n_views as f64 - 1.0;
+    let tried =
+        (0.5 * others * (others - 1.0) * n_lines * n_lines * n_lines).min(MOST_HYPOTHESES as f64);
+    // Logarithm of the number of hypotheses on which as many views would agree by chance.
+    let surprise = -agree * libm::log(chance) - ln_choose(n, agree) - libm::log(tried);
+    let logit = -0.3 + 0.42 * surprise.min(40.0) + 0.05 * fit.lead.min(30.0);
+    let found = 1.0 / (1.0 + libm::exp(-logit));
     // `noise_px` is twice the residual, and the median of an error is two thirds of its deviation.
     Confidence { found: found as f32, scale: (0.33 * noise_px * fit.condition) as f32 }
 }

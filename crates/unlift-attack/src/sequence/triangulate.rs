@@ -85,13 +85,13 @@ pub struct Fit {
 }
 
 /// Most hypotheses of three records.
-const MOST_HYPOTHESES: usize = 240;
+pub(super) const MOST_HYPOTHESES: usize = 240;
 /// Hypotheses that are refined.
 const REFINED: usize = 5;
 /// Steps of refinement.
 const STEPS: usize = 8;
 /// Distance that counts as a miss, in units of the noise.
-const MISS: f64 = 3.0;
+pub(super) const MISS: f64 = 3.0;
 /// Two solutions are at different places if they are farther apart in the first view than this, in units of the noise.
 const APART: f64 = 5.0;
 

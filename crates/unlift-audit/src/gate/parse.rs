@@ -106,7 +106,7 @@ fn solver_name(text: &str) -> Option<&'static str> {
 
 fn source_name(text: &str) -> Option<String> {
     match text.trim() {
-        name @ (ORACLE | "file") => Some(name.to_owned()),
+        name @ (ORACLE | "file" | "again" | "again-geometry") => Some(name.to_owned()),
         name if name.split_once('@').is_some_and(|(name, _)| SEQUENCES.contains(&name)) => {
             Some(name.to_owned())
         }

@@ -209,7 +209,7 @@ fn rows(
     let mut seconds = Seconds::default();
     let mut rows = Vec::new();
     let reach = job.queries.iter().copied().max().unwrap_or(0);
-    let mut known: Vec<(Vec<Query>, Links)> = Vec::new();
+    let mut known: Option<(Vec<Secret>, Links)> = None;
     let total = job.plan.schemes.len() * job.queries.len() * 2;
     for scheme in &job.plan.schemes {
         let started = Instant::now();
@@ -217,15 +217,22 @@ fn rows(
         seconds.obfuscate += started.elapsed().as_secs_f64();
         job.progress.show(rows.len(), total, &format!("{}, linking queries", scheme.name()));
         let started = Instant::now();
-        // Links depend on descriptors and cameras only, and some schemes release the same descriptors.
-        let same = known.iter().position(|(of, _)| have_same_descriptors(of, &queries));
+        // Links depend on descriptors and cameras only.
+        let same = known.as_ref().and_then(|(of, links)| {
+            let orders = (!scheme.changes_descriptors()).then(|| orders(of, &secrets)).flatten()?;
+            Some(links.reordered(&orders))
+        });
         let links = match same {
-            Some(at) => &known[at].1,
+            Some(links) => links,
             None => {
-                known.push((queries.clone(), Links::by_descriptors(&queries, reach)?));
-                &known[known.len() - 1].1
+                let links = Links::by_descriptors(&queries, reach)?;
+                if !scheme.changes_descriptors() {
+                    known = Some((secrets.clone(), links.clone()));
+                }
+                links
             }
         };
+        let links = &links;
         seconds.neighbors += started.elapsed().as_secs_f64();
         let tracks = tracks(views, &secrets);
         let hidden = Hidden { views, queries, secrets };
@@ -269,8 +276,18 @@ fn hide(
     Ok(hidden?.into_iter().unzip())
 }
 
-fn have_same_descriptors(a: &[Query], b: &[Query]) -> bool {
-    a.iter().map(|a| a.released.descriptors()).eq(b.iter().map(|b| b.released.descriptors()))
+/// Returns, per query, the slot under `known` of each slot under `secrets`; `None` if they do not hide
+/// the same keypoints.
+fn orders(known: &[Secret], secrets: &[Secret]) -> Option<Vec<Vec<u32>>> {
+    let of_query = |(known, secret): (&Secret, &Secret)| {
+        let mut slots = vec![u32::MAX; known.n_originals()];
+        for (slot, original) in known.hidden().iter().enumerate() {
+            slots[original.index()] = slot as u32;
+        }
+        let of: Vec<u32> = secret.hidden().iter().map(|original| slots[original.index()]).collect();
+        (known.n_slots() == secret.n_slots() && !of.contains(&u32::MAX)).then_some(of)
+    };
+    known.iter().zip(secrets).map(of_query).collect()
 }
 
 /// Links the slots that hide keypoints of the same point of the model.

@@ -189,14 +189,16 @@ impl Model {
             let away = [0, 1, 2].map(|c| self.positions[row as usize][c] - image.center[c]);
             let x = image.rotation.map(|r| (0..3).map(|c| r[c] * away[c]).sum::<f64>());
             let Some(place) = lens.project(x) else { continue };
-            let distance = |at: usize| {
+            let distance2 = |at: usize| {
                 let [u, v] = features.keypoints[kept[at] as usize];
-                (u - place[0]).hypot(v - place[1])
+                (u - place[0]) * (u - place[0]) + (v - place[1]) * (v - place[1])
             };
-            let nearest = (0..kept.len()).min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
-            let Some(at) = nearest.filter(|&at| distance(at) <= SHOWS_PX) else { continue };
-            if shows[at].is_none_or(|(other, _)| distance(at) < other) {
-                shows[at] = Some((distance(at), row));
+            let nearest = (0..kept.len()).min_by(|&a, &b| distance2(a).total_cmp(&distance2(b)));
+            let Some(at) = nearest.filter(|&at| distance2(at) <= SHOWS_PX * SHOWS_PX) else {
+                continue;
+            };
+            if shows[at].is_none_or(|(other, _)| distance2(at) < other) {
+                shows[at] = Some((distance2(at), row));
             }
         }
         shows.into_iter().map(|shown| shown.map(|(_, row)| row)).collect()

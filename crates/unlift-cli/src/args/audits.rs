@@ -1,4 +1,4 @@
-//! Arguments of `audit map`, `audit images`, `audit sequence`, `audit released` and `check`.
+//! Arguments of `audit map`, `audit images`, `audit sequence`, `audit again`, `audit released` and `check`.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -461,6 +461,66 @@ pub struct AuditSequenceArgs {
     /// Folder of the photos for --invert, if PATH is a file
     #[arg(long, value_name = "DIR", help_heading = "Result", requires = "invert")]
     pub photos: Option<PathBuf>,
+    #[command(flatten)]
+    pub result: ResultArgs,
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+/// Options of `audit again`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  unlift audit again PROJECT PROJECT --scale 1 --descriptors PROJECT/database.db
+  unlift audit again cloud.ply cloud.ply --schemes olc,cp,olc/cp
+  unlift audit again OLD NEW --descriptors OLD/database.db --descriptors-of-b NEW/database.db
+  unlift audit again PROJECT PROJECT --scale 1 --gate 'olc:again-geometry:0.10<=20'
+
+Each release hides its map under its own key. The two records of a point meet in it: two lines in a
+point, a line and a plane in a point, two planes of different axes in a line. The figures are about
+the points of A.
+
+The row again links records by their descriptors: mutual nearest neighbors whose records meet. The
+row again-geometry links lines that meet, without descriptors.
+
+In a gate, SOURCE is again or again-geometry.
+
+Exit codes: 0 done, 1 a gate failed, 2 wrong usage, 3 bad input.")]
+pub struct AuditAgainArgs {
+    /// The map of the first release: any PATH of unlift audit map
+    #[arg(value_name = "A")]
+    pub a: PathBuf,
+    /// The map of the second release, in the same frame; A again, or a later version of it
+    #[arg(value_name = "B")]
+    pub b: PathBuf,
+    /// Meters per unit of both maps. Without it, lengths are multiples of the median distance from a
+    /// point of A to its 50th nearest neighbor
+    #[arg(long, value_name = "METERS_PER_UNIT", value_parser = values::scale, help_heading = "Input")]
+    pub scale: Option<f64>,
+    /// File with the descriptors of the points of A, as for unlift audit map
+    #[arg(long, value_name = "FILE", help_heading = "Input")]
+    pub descriptors: Option<PathBuf>,
+    /// File with the descriptors of the points of B [default: --descriptors, if A and B are the same
+    /// path]
+    #[arg(long, value_name = "FILE", help_heading = "Input", requires = "descriptors")]
+    pub descriptors_of_b: Option<PathBuf>,
+    /// Random seed of the first release; the second one has the next
+    #[arg(long, value_name = "INTEGER", default_value_t = 0, help_heading = "Input")]
+    pub seed: u64,
+    /// Schemes of both releases, separated by commas: olc hides both under olc, olc/cp the second
+    /// one under cp [default: every scheme with itself]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::scheme_pair,
+          help_heading = "Attack")]
+    pub schemes: Vec<[&'static Entry; 2]>,
+    /// Skip the baseline "records alone", the best attack on the first release only, without
+    /// descriptors. It takes most of the time
+    #[arg(long, help_heading = "Attack")]
+    pub no_records_alone: bool,
+    /// Largest errors at which a point counts as recovered, separated by commas [default: 0.10,0.25
+    /// (meters) with --scale, otherwise 1.0,2.5 (multiples, see --scale)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold,
+          help_heading = "Result")]
+    pub thresholds: Vec<Threshold>,
     #[command(flatten)]
     pub result: ResultArgs,
     #[command(flatten)]

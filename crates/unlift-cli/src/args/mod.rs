@@ -15,8 +15,8 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use crate::values;
 
 pub use audits::{
-    AttackArgs, AuditImagesArgs, AuditMapArgs, AuditReleasedArgs, AuditSequenceArgs, CheckArgs,
-    MapArgs, ResultArgs,
+    AttackArgs, AuditAgainArgs, AuditImagesArgs, AuditMapArgs, AuditReleasedArgs,
+    AuditSequenceArgs, CheckArgs, MapArgs, ResultArgs,
 };
 pub use images::{FeaturesArgs, InvertArgs, MetricsArgs};
 pub use program::{CompletionsArgs, DemoArgs, DoctorArgs, ManArgs, ModelsArgs};
@@ -177,6 +177,8 @@ pub enum AuditCommand {
     Released(Box<AuditReleasedArgs>),
     /// Audit several images with known poses: report how many keypoints they give away together
     Sequence(Box<AuditSequenceArgs>),
+    /// Audit a map that is released twice: report how many points both releases give away together
+    Again(Box<AuditAgainArgs>),
 }
 
 /// Kinds of benchmarks.

@@ -1,6 +1,7 @@
 //! The commands, one file each.
 
 mod about;
+mod audit_again;
 mod audit_images;
 mod audit_map;
 mod audit_released;
@@ -42,6 +43,7 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Audit(AuditCommand::Images(args)) => audit_images::run(&args),
         Command::Audit(AuditCommand::Released(args)) => audit_released::run(&args),
         Command::Audit(AuditCommand::Sequence(args)) => audit_sequence::run(&args),
+        Command::Audit(AuditCommand::Again(args)) => audit_again::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Obfuscate(args) => with_threads(None, || obfuscate::run(&args)),
         Command::Neighbors(NeighborsCommand::Oracle(args)) => {

@@ -34,6 +34,7 @@ pub use measure::measure;
 pub use not_audited::NotAudited;
 pub use observer::{Cell, Counts, Measure, Observer, Recovery, Silent};
 pub use plan::{NeighborsBy, Plan, PointNeighbors, Variant};
+pub use records_alone::records_alone;
 pub use released::{run_released, scheme_called};
 pub use row::{Alone, Distinct, PERCENTILES, Repeats, Row};
 pub use run::{Outcome, run};

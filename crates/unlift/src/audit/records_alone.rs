@@ -11,7 +11,10 @@ use crate::released::Released;
 use crate::truth::{Original, Secret};
 
 /// Runs and measures all attacks on the records alone. Omits those that place no point of `hidden`.
-pub(super) fn records_alone<const D: usize>(
+///
+/// # Errors
+/// When the arguments do not belong together.
+pub fn records_alone<const D: usize>(
     (released, secret): &(Released<D>, Secret),
     original: &Original<D>,
     plan: &Plan<D>,

@@ -14,7 +14,7 @@ use unlift_report::gate_found;
 
 use self::config::Entry;
 use super::common::all_could_be;
-use super::{audit_images, audit_map, audit_released, audit_sequence};
+use super::{audit_again, audit_images, audit_map, audit_released, audit_sequence};
 use crate::args::{AuditCommand, CheckArgs, Cli, Command, ResultArgs};
 use crate::exit::{self, Outcome, usage};
 use crate::output::print;
@@ -93,6 +93,7 @@ fn result(audit: &AuditCommand) -> &ResultArgs {
         AuditCommand::Images(args) => &args.result,
         AuditCommand::Released(args) => &args.result,
         AuditCommand::Sequence(args) => &args.result,
+        AuditCommand::Again(args) => &args.result,
     }
 }
 
@@ -102,6 +103,7 @@ fn result_mut(audit: &mut AuditCommand) -> &mut ResultArgs {
         AuditCommand::Images(args) => &mut args.result,
         AuditCommand::Released(args) => &mut args.result,
         AuditCommand::Sequence(args) => &mut args.result,
+        AuditCommand::Again(args) => &mut args.result,
     }
 }
 
@@ -123,6 +125,7 @@ fn inputs(audit: &AuditCommand) -> Vec<&Path> {
         AuditCommand::Images(args) => audit_images::inputs(args),
         AuditCommand::Released(args) => audit_released::inputs(args),
         AuditCommand::Sequence(args) => audit_sequence::inputs(args),
+        AuditCommand::Again(args) => audit_again::inputs(args),
     }
 }
 
@@ -165,6 +168,7 @@ fn perform(audit: &AuditCommand) -> anyhow::Result<Finished> {
         AuditCommand::Map(args) => audit_map::audit(args),
         AuditCommand::Released(args) => audit_released::audit(args),
         AuditCommand::Sequence(args) => audit_sequence::audit(args),
+        AuditCommand::Again(args) => audit_again::audit(args),
         AuditCommand::Images(args) => {
             let (finished, used) = audit_images::audit(args)?;
             all_could_be("used", &args.path, used.used, used.unusable)?;

@@ -1,0 +1,169 @@
+//! Places where lines and half-lines meet, and a search for lines that nearly meet.
+
+use rayon::prelude::*;
+
+use crate::geometry::vector::{along, dot, sub};
+use crate::simd::{self, Kernel};
+
+/// A line, or a half-line from `point`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Line {
+    point: [f64; 3],
+    direction: [f64; 3],
+    is_ray: bool,
+}
+
+/// The place where a line is nearest to another one.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Meet {
+    /// The place, on the first line.
+    pub point: [f64; 3],
+    /// Distance between the lines.
+    pub miss: f64,
+    /// Sine of the angle between them.
+    pub sine: f64,
+}
+
+/// Smallest sine of the angle between lines that fix a point.
+const LEAST_SINE: f64 = 1e-5;
+/// Centers of rays that are closer, as a share of their distance from the origin, are one: both releases compute them from the points.
+const ONE_CENTER: f64 = 1e-4;
+
+impl Line {
+    pub fn new(point: [f64; 3], direction: [f64; 3], is_ray: bool) -> Self {
+        Self { point, direction, is_ray }
+    }
+
+    /// Returns where this line is nearest to `other`; `None` if they are nearly parallel, or only meet behind the start of a ray.
+    pub fn meet(&self, other: &Self) -> Option<Meet> {
+        let normal = cross(&self.direction, &other.direction);
+        let sine2 = dot(&normal, &normal);
+        if sine2 < LEAST_SINE * LEAST_SINE {
+            return None;
+        }
+        let between = sub(&other.point, &self.point);
+        let own = dot(&cross(&between, &other.direction), &normal) / sine2;
+        let others = dot(&cross(&between, &self.direction), &normal) / sine2;
+        // Rays from one center meet there, whatever they hide.
+        let apart2 = dot(&between, &between) / dot(&self.point, &self.point);
+        let is_one_center = self.is_ray && other.is_ray && apart2 < ONE_CENTER * ONE_CENTER;
+        let is_behind = (self.is_ray && own <= 0.0) || (other.is_ray && others <= 0.0);
+        let meets = !is_one_center && !is_behind;
+        let point = along(&self.point, own, &self.direction);
+        let sine = sine2.sqrt();
+        meets.then(|| Meet { point, miss: dot(&between, &normal).abs() / sine, sine })
+    }
+
+    /// Returns where this line crosses the plane `x[axis] = at`, and the error along it per error of the plane.
+    pub fn cross(&self, axis: usize, at: f64) -> Option<([f64; 3], f64)> {
+        let slope = self.direction[axis];
+        let t = (at - self.point[axis]) / slope;
+        let is_met = slope.abs() > LEAST_SINE && !(self.is_ray && t <= 0.0);
+        is_met.then(|| (along(&self.point, t, &self.direction), 1.0 / slope.abs()))
+    }
+}
+
+/// Returns the line of a record that meets the other record best, and where.
+pub(super) fn nearest(own: &[Line], others: &[Line]) -> Option<(usize, Meet)> {
+    let pairs =
+        own.iter().enumerate().flat_map(|(at, line)| others.iter().map(move |o| (at, line, o)));
+    let meets = pairs.filter_map(|(at, line, other)| Some((at, line.meet(other)?)));
+    meets.min_by(|a, b| a.1.miss.total_cmp(&b.1.miss))
+}
+
+fn cross(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// Nearest lines that are kept per record.
+pub(super) const KEPT: usize = 8;
+/// Lines that are compared at once.
+const LANES: usize = 16;
+
+/// A line that passes a record.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Near {
+    pub miss: f64,
+    /// Row of the record's line.
+    pub own: u32,
+    /// Row of the other line.
+    pub other: u32,
+}
+
+/// Returns the [`KEPT`] lines of `others` that pass each record of `per_record` lines most closely, nearest first.
+pub(super) fn search(lines: &[Line], per_record: usize, others: &[Line]) -> Vec<Vec<Near>> {
+    let columns = Columns::new(others);
+    let of_record = |(record, own): (usize, &[Line])| {
+        let mut near: Vec<Near> = Vec::with_capacity(KEPT + 1);
+        for (at, line) in own.iter().enumerate() {
+            let (line, own) = (*line, (record * per_record + at) as u32);
+            simd::dispatch(Pass { line, own, others, columns: &columns, near: &mut near });
+        }
+        near
+    };
+    lines.par_chunks(per_record).enumerate().map(of_record).collect()
+}
+
+/// Points and directions in columns, filled up with lines that pass far away.
+struct Columns([Vec<f64>; 6]);
+
+impl Columns {
+    fn new(lines: &[Line]) -> Self {
+        let n = lines.len().next_multiple_of(LANES);
+        let column = |value: &dyn Fn(&Line) -> f64| {
+            let mut column: Vec<f64> = lines.iter().map(value).collect();
+            column.resize(n, f64::NAN);
+            column
+        };
+        Self(std::array::from_fn(|c| match c {
+            0..3 => column(&|line| line.point[c]),
+            _ => column(&|line| line.direction[c - 3]),
+        }))
+    }
+}
+
+/// Compares one line with all others.
+struct Pass<'a> {
+    line: Line,
+    own: u32,
+    others: &'a [Line],
+    columns: &'a Columns,
+    near: &'a mut Vec<Near>,
+}
+
+impl Kernel for Pass<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { line, own, others, columns: Columns(columns), near } = self;
+        let ([px, py, pz], [dx, dy, dz]) = (line.point, line.direction);
+        let mut limit2 = limit2(near);
+        for first in (0..columns[0].len()).step_by(LANES) {
+            let [x, y, z, u, v, w] = std::array::from_fn(|c| &columns[c][first..first + LANES]);
+            let mut above = [0.0f64; LANES];
+            for l in 0..LANES {
+                let (nx, ny, nz) =
+                    (dy * w[l] - dz * v[l], dz * u[l] - dx * w[l], dx * v[l] - dy * u[l]);
+                let between = (x[l] - px) * nx + (y[l] - py) * ny + (z[l] - pz) * nz;
+                above[l] = between * between - limit2 * (nx * nx + ny * ny + nz * nz);
+            }
+            if !above.iter().any(|&above| above < 0.0) {
+                continue;
+            }
+            for (l, _) in above.iter().enumerate().filter(|(_, above)| **above < 0.0) {
+                let other = (first + l) as u32;
+                let Some(meet) = line.meet(&others[other as usize]) else { continue };
+                let at = near.partition_point(|near| near.miss <= meet.miss);
+                near.insert(at, Near { miss: meet.miss, own, other });
+                near.truncate(KEPT);
+            }
+            limit2 = self::limit2(near);
+        }
+    }
+}
+
+/// Returns the squared distance below which a line is kept.
+fn limit2(near: &[Near]) -> f64 {
+    if near.len() < KEPT { f64::MAX } else { near[KEPT - 1].miss * near[KEPT - 1].miss }
+}

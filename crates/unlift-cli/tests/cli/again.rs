@@ -1,0 +1,90 @@
+//! `unlift audit again`: two maps in, rows by links out.
+
+use std::fs;
+
+use crate::common::Place;
+
+const N_POINTS: usize = 300;
+
+/// Returns a number in [0, 1) for any index.
+fn random(at: usize) -> f64 {
+    (at as f64 * 0.754_877_666 + 0.1).fract()
+}
+
+/// Creates a map in `a.csv`, a version without its last tenth in `b.csv`, and descriptors of both.
+fn maps() -> Place {
+    let place = Place::empty();
+    let point = |at: usize| {
+        let [x, y, z] = [0, 1, 2].map(|c| random(3 * at * at % 7907 + c * 131 + at));
+        format!("{},{},{}\n", 5.0 * x, 4.0 * y, 3.0 * z)
+    };
+    for (name, n) in [("a", N_POINTS), ("b", N_POINTS - N_POINTS / 10)] {
+        let points: String = (0..n).map(point).collect();
+        fs::write(place.path(&format!("{name}.csv")), format!("x,y,z\n{points}")).unwrap();
+        let header = |n: usize| [n as u64].map(u64::to_le_bytes).concat();
+        let mut bytes = b"P3DESC01".to_vec();
+        bytes.extend(header(n));
+        bytes.extend(8u32.to_le_bytes());
+        bytes.extend(1u32.to_le_bytes());
+        (0..n as u64).for_each(|row| bytes.extend(row.to_le_bytes()));
+        bytes.extend((0..8 * n).map(|at| (random(at * at % 7919 + at) * 255.0) as u8));
+        fs::write(place.path(&format!("{name}.bin")), bytes).unwrap();
+    }
+    place
+}
+
+#[test]
+fn two_releases_give_points_back() {
+    let place = maps();
+    let line = "audit again a.csv a.csv --scale 1 --descriptors a.bin --schemes olc,plane,olc/cp \
+                --no-records-alone --out a";
+    let (stdout, _) = place.ends(line, 0);
+    assert!(stdout.contains("From two releases under OLC, 100.0 % of the points"), "{stdout}");
+    assert!(stdout.contains("not audited: plane, again-geometry"), "{stdout}");
+    let document = place.json("a/audit.json");
+    let rows = document["results"].as_array().unwrap();
+    let row = |scheme: &str, neighbors: &str| {
+        let is_it =
+            |row: &&serde_json::Value| row["scheme"] == scheme && row["neighbors"] == neighbors;
+        rows.iter().find(is_it).unwrap_or_else(|| panic!("{scheme} {neighbors}"))
+    };
+    let share = |row: &serde_json::Value| row["recovered_percent"]["0.10"].as_f64().unwrap();
+    assert_eq!(rows.len(), 5);
+    for (scheme, by) in [("olc", "again"), ("olc", "again-geometry"), ("olc/cp", "again")] {
+        assert!(share(row(scheme, by)) > 97.0, "{scheme} {by}");
+        assert!(row(scheme, by)["inlier_ratio"].as_f64() > Some(0.99), "{scheme} {by}");
+    }
+    let open = row("plane", "again")["metrics"]["open_percent"].as_f64();
+    assert!(open > Some(99.0), "{open:?}");
+    // The same seed gives the same figures for any number of threads.
+    place.ends(&line.replace("--out a", "--threads 1 --out b"), 0);
+    assert_eq!(place.json("b/audit.json")["results"], document["results"]);
+}
+
+#[test]
+fn what_is_gone_in_the_second_map_does_not_come_back() {
+    let place = maps();
+    let audit = "audit again a.csv b.csv --scale 1 --schemes olc --no-records-alone --force";
+    let stderr = place.complains(&format!("{audit} --descriptors a.bin"), 2);
+    assert!(stderr.contains("--descriptors-of-b: expected with --descriptors"), "{stderr}");
+    place.ends(&format!("{audit} --descriptors a.bin --descriptors-of-b b.bin --out a"), 0);
+    let document = place.json("a/audit.json");
+    for row in document["results"].as_array().unwrap() {
+        let share = row["recovered_percent"]["0.10"].as_f64().unwrap();
+        assert!((85.0..=93.0).contains(&share), "{}: {share}", row["neighbors"]);
+    }
+    let (_, stderr) = place.ends(audit, 0);
+    assert!(stderr.contains("links by geometry only"), "{stderr}");
+}
+
+#[test]
+fn a_gate_names_the_links() {
+    let place = maps();
+    let audit = "audit again a.csv a.csv --scale 1 --schemes olc --no-records-alone --force";
+    let (stdout, _) = place.ends(&format!("{audit} --gate olc:again-geometry:0.10<=20"), 1);
+    assert!(stdout.contains("olc:again-geometry:0.10<=20"), "{stdout}");
+    let stderr = place.complains(&format!("{audit} --gate olc:again:0.10<=20"), 2);
+    assert!(stderr.contains("neighbors: expected one of again-geometry, found again"), "{stderr}");
+    let stderr = place.complains("audit again a.csv a.csv --schemes olc/xyz", 2);
+    assert!(stderr.contains("expected one of olc, ppl"), "{stderr}");
+}
