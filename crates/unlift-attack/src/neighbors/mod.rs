@@ -4,6 +4,7 @@
 //! [`sources::SOURCES`] lists the sources of this crate.
 
 mod alike;
+mod bearings;
 mod best;
 mod compare;
 mod dense;
@@ -11,6 +12,7 @@ mod geometric;
 mod kind;
 mod neighborhoods;
 mod overlap;
+mod protected;
 mod rows;
 mod scored;
 mod sets;
@@ -20,6 +22,7 @@ pub mod sources;
 mod tiles;
 mod walk;
 
+pub use bearings::support;
 pub(crate) use compare::Likeness;
 pub use dense::{Dense, dense, usual};
 pub(crate) use geometric::geometric_by;

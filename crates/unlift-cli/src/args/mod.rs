@@ -16,7 +16,7 @@ use crate::values;
 
 pub use audits::{
     AttackArgs, AuditImagesArgs, AuditMapArgs, AuditReleasedArgs, AuditSequenceArgs, CheckArgs,
-    MapArgs, ResultArgs,
+    MapArgs, ProtectArgs, ResultArgs,
 };
 pub use images::{FeaturesArgs, InvertArgs, MetricsArgs};
 pub use program::{CompletionsArgs, DemoArgs, DoctorArgs, ManArgs, ModelsArgs};

@@ -1,0 +1,346 @@
+//! Protected descriptors: affine subspaces, or sets of words, in place of plain descriptors.
+//!
+//! A protected map has no plain descriptor. Sources that compare plain descriptors read the attacker's
+//! [`guess`](ProtectedDescriptors::guess), which is computed from released and public data alone.
+
+use std::sync::{Arc, OnceLock};
+
+use rayon::prelude::*;
+
+use crate::descriptors::Values;
+use crate::{Descriptors, Error};
+
+/// Largest dimension of a subspace.
+pub const MOST_DIRECTIONS: usize = 8;
+/// A public descriptor lies on a subspace if its squared distance to it is below this.
+const ON_SUBSPACE: f32 = 1e-4;
+/// Added to the diagonal of a system, so that subspaces with a common direction have a distance, too.
+const RIDGE: f64 = 1e-5;
+
+/// Descriptors as a protected map releases them, one row per slot.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProtectedDescriptors {
+    rule: Rule,
+    /// The released numbers of each row: the foot and the basis of a subspace, or the numbers of words.
+    rows: Descriptors,
+    /// Unit-length descriptors that owner and attacker know: the database of adversarial directions, or the vocabulary.
+    public: Option<Arc<Descriptors>>,
+    /// Whether the plain descriptors were bytes, as SIFT.
+    bytes: bool,
+    guess: OnceLock<Descriptors>,
+}
+
+/// The rule that protects descriptors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Rule {
+    /// An affine subspace of dimension `m` through a unit-length descriptor.
+    Subspace {
+        /// Dimension.
+        m: usize,
+    },
+    /// `m` words of a public vocabulary. They contain the nearest word of the descriptor with a probability that is larger by the
+    /// factor `exp(epsilon)` than that of any other word, relative to chance.
+    Words {
+        /// Number of words.
+        m: usize,
+        /// Privacy budget.
+        epsilon: f64,
+    },
+}
+
+impl ProtectedDescriptors {
+    /// Creates rows from what is released. A subspace is its point nearest to the origin and `m` orthonormal directions, `(m + 1) x dim`
+    /// values. A set of words is `m` ascending numbers from 0.
+    ///
+    /// # Errors
+    /// When a row has another number of values than the rule, a value is not finite, or a word is not in the vocabulary.
+    pub fn try_new(
+        rule: Rule,
+        rows: Vec<Vec<f32>>,
+        public: Option<Arc<Descriptors>>,
+        bytes: bool,
+    ) -> Result<Self, Error> {
+        let wrong = |expected: String, found: usize| {
+            Error::new("protected descriptors", expected, found.to_string())
+        };
+        let width = rows.first().map_or(1, Vec::len);
+        if let Some(at) =
+            rows.iter().position(|row| row.len() != width || row.iter().any(|x| !x.is_finite()))
+        {
+            return Err(wrong(format!("{width} finite values per row"), at));
+        }
+        // Few rows may be equal, such as sets of words.
+        let rows = Descriptors::unchecked(Values::F32(rows.concat()), width.max(1));
+        match (rule, &public) {
+            (Rule::Subspace { m }, _) if m == 0 || m > MOST_DIRECTIONS => {
+                return Err(wrong(format!("1 to {MOST_DIRECTIONS} directions"), m));
+            }
+            (Rule::Subspace { m }, _) if !rows.dim().is_multiple_of(m + 1) => {
+                return Err(wrong(format!("a multiple of {} values per row", m + 1), rows.dim()));
+            }
+            (Rule::Subspace { m }, Some(public)) if rows.dim() / (m + 1) != public.dim() => {
+                let expected = format!("directions of {} values", public.dim());
+                return Err(wrong(expected, rows.dim() / (m + 1)));
+            }
+            (Rule::Words { m, .. }, _) if rows.dim() != m => {
+                return Err(wrong(format!("{m} words per row"), rows.dim()));
+            }
+            (Rule::Words { .. }, public) => {
+                let n = public.as_ref().map_or(0, |words| words.len());
+                let mut row = vec![0.0; rows.dim()];
+                for at in 0..rows.len() {
+                    rows.read_row(at, &mut row);
+                    if let Some(word) = row.iter().find(|word| !(0.0..n as f32).contains(*word)) {
+                        return Err(wrong(format!("words below {n}"), *word as usize));
+                    }
+                }
+            }
+            _ => {}
+        }
+        Ok(Self { rule, rows, public, bytes, guess: OnceLock::new() })
+    }
+
+    /// Returns the rule.
+    pub fn rule(&self) -> Rule {
+        self.rule
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether there are no rows.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Number of values of a plain descriptor.
+    pub fn dim(&self) -> usize {
+        match (self.rule, &self.public) {
+            (Rule::Subspace { m }, _) => self.rows.dim() / (m + 1),
+            (Rule::Words { .. }, Some(words)) => words.dim(),
+            (Rule::Words { .. }, None) => 0,
+        }
+    }
+
+    /// The released numbers.
+    pub fn rows(&self) -> &Descriptors {
+        &self.rows
+    }
+
+    /// The public descriptors that the rule uses, if any.
+    pub fn public(&self) -> Option<&Descriptors> {
+        self.public.as_deref()
+    }
+
+    /// Returns the rows `order[0], order[1], ...`.
+    #[must_use]
+    pub fn select(&self, order: &[u32]) -> Self {
+        let (rows, public) = (self.rows.select(order), self.public.clone());
+        Self { rule: self.rule, rows, public, bytes: self.bytes, guess: OnceLock::new() }
+    }
+
+    /// Returns the similarity of every row of `rows` to a plain unit-length descriptor: 1 minus half of the squared distance to the
+    /// subspace, or the largest cosine with a word of the set. Both are at most 1, as a cosine.
+    pub fn similarities(&self, plain: &[f32], rows: &[u32]) -> Vec<f32> {
+        let dim = plain.len();
+        let mut row = vec![0.0; self.rows.dim()];
+        match (self.rule, &self.public) {
+            (Rule::Subspace { .. }, _) => {
+                let square = inner(plain, plain);
+                let mut of = |&at: &u32| {
+                    self.rows.read_row(at as usize, &mut row);
+                    let (foot, basis) = row.split_at(dim);
+                    let along = basis.chunks_exact(dim).map(|u| inner(u, plain).powi(2));
+                    let apart = square + inner(foot, foot) - 2.0 * inner(foot, plain);
+                    1.0 - (apart - along.sum::<f32>()).max(0.0) / 2.0
+                };
+                rows.iter().map(&mut of).collect()
+            }
+            (Rule::Words { .. }, Some(words)) => {
+                let to_words: Vec<f32> = unit_rows(words).map(|word| inner(&word, plain)).collect();
+                let mut of = |&at: &u32| {
+                    self.rows.read_row(at as usize, &mut row);
+                    row.iter().map(|&word| to_words[word as usize]).fold(-1.0, f32::max)
+                };
+                rows.iter().map(&mut of).collect()
+            }
+            (Rule::Words { .. }, None) => vec![0.0; rows.len()],
+        }
+    }
+
+    /// Returns the plain descriptors that an attacker infers, in the scale of the plain ones. A row is one point of its subspace, or the
+    /// mean of its words.
+    ///
+    /// A subspace intersects the unit sphere in a sphere around its foot. Public descriptors on it, at distance 0, are adversarial
+    /// directions; they are excluded, and the point opposite to them is the guess. Without such, the guess is the foot: random
+    /// directions are nearly orthogonal to the descriptor, which is therefore nearly the point nearest to the origin.
+    pub fn guess(&self) -> &Descriptors {
+        self.guess.get_or_init(|| {
+            let dim = self.dim();
+            let known: Vec<Vec<f32>> = self.public.iter().flat_map(|it| unit_rows(it)).collect();
+            let of = |at: usize| {
+                let mut row = vec![0.0; self.rows.dim()];
+                self.rows.read_row(at, &mut row);
+                match self.rule {
+                    Rule::Subspace { .. } => opposite(&row, dim, &known),
+                    Rule::Words { .. } => {
+                        let words = row.iter().map(|&word| &known[word as usize]);
+                        let mut mean = vec![0.0; dim];
+                        words.for_each(|word| add(&mut mean, word, 1.0));
+                        mean
+                    }
+                }
+            };
+            let rows: Vec<Vec<f32>> = (0..self.len()).into_par_iter().map(of).collect();
+            let scaled = rows.into_iter().flat_map(|mut row| {
+                if self.bytes {
+                    row.iter_mut().for_each(|x| *x = x.max(0.0));
+                }
+                let length = inner(&row, &row).sqrt().max(1e-12);
+                let scale = if self.bytes { 512.0 } else { 1.0 } / length;
+                row.into_iter().map(move |x| x * scale)
+            });
+            let values = match self.bytes {
+                // A cast saturates.
+                true => Values::U8(scaled.map(|x| x.round() as u8).collect()),
+                false => Values::F32(scaled.collect()),
+            };
+            Descriptors::unchecked(values, dim)
+        })
+    }
+
+    /// Returns the distance between the subspaces of two rows, and the point halfway between their nearest points; `None` for words.
+    /// Two releases of one descriptor meet in it.
+    pub fn meeting(&self, at: usize, other: &Self, other_at: usize) -> Option<(f64, Vec<f64>)> {
+        let (Rule::Subspace { m }, Rule::Subspace { m: n }) = (self.rule, other.rule) else {
+            return None;
+        };
+        let dim = self.dim();
+        let read = |of: &Self, at: usize| {
+            let mut row = vec![0.0; of.rows.dim()];
+            of.rows.read_row(at, &mut row);
+            row
+        };
+        let (a, b) = (read(self, at), read(other, other_at));
+        let along = |x: &[f32], y: &[f32]| f64::from(inner(x, y));
+        let mut pair = Pair::default();
+        for i in 0..m {
+            pair.own[i] = along(&a[(i + 1) * dim..][..dim], &b[..dim]);
+            for j in 0..n {
+                pair.both[i][j] = along(&a[(i + 1) * dim..][..dim], &b[(j + 1) * dim..][..dim]);
+            }
+        }
+        (0..n).for_each(|j| pair.other[j] = along(&b[(j + 1) * dim..][..dim], &a[..dim]));
+        let (s, t) = pair.nearest(m, n);
+        let point = |row: &[f32], along: &[f64]| -> Vec<f64> {
+            let at = |c: usize| {
+                let moved = along.iter().enumerate();
+                let moved = moved.map(|(i, s)| s * f64::from(row[(i + 1) * dim + c]));
+                f64::from(row[c]) + moved.sum::<f64>()
+            };
+            (0..dim).map(at).collect()
+        };
+        let (p, q) = (point(&a, &s[..m]), point(&b, &t[..n]));
+        let apart = p.iter().zip(&q).map(|(p, q)| (p - q).powi(2)).sum::<f64>().sqrt();
+        Some((apart, p.iter().zip(&q).map(|(p, q)| (p + q) / 2.0).collect()))
+    }
+}
+
+/// Inner products of two subspaces: of the directions of each with the foot of the other, and of all directions.
+#[derive(Default)]
+struct Pair {
+    own: [f64; MOST_DIRECTIONS],
+    other: [f64; MOST_DIRECTIONS],
+    both: [[f64; MOST_DIRECTIONS]; MOST_DIRECTIONS],
+}
+
+impl Pair {
+    /// Returns the coordinates of the nearest points of both subspaces. Bases are orthonormal and orthogonal to their feet, so the
+    /// system of `m + n` unknowns shrinks to `n`: `(I - G^T G) t = e + G^T c` with `c = U f'`, `e = V f`.
+    #[inline(always)]
+    pub fn nearest(&self, m: usize, n: usize) -> ([f64; MOST_DIRECTIONS], [f64; MOST_DIRECTIONS]) {
+        let g = &self.both;
+        let mut matrix = [[0.0; MOST_DIRECTIONS]; MOST_DIRECTIONS];
+        let mut t = [0.0; MOST_DIRECTIONS];
+        for j in 0..n {
+            t[j] = self.other[j] + (0..m).map(|i| g[i][j] * self.own[i]).sum::<f64>();
+            for k in 0..=j {
+                let square = (0..m).map(|i| g[i][j] * g[i][k]).sum::<f64>();
+                matrix[j][k] = f64::from(u8::from(j == k)) * (1.0 + RIDGE) - square;
+            }
+        }
+        // Cholesky; the ridge keeps pivots positive.
+        for j in 0..n {
+            for k in 0..=j {
+                let known = (0..k).map(|l| matrix[j][l] * matrix[k][l]).sum::<f64>();
+                let left = matrix[j][k] - known;
+                matrix[j][k] =
+                    if j == k { left.max(RIDGE / 2.0).sqrt() } else { left / matrix[k][k] };
+            }
+            t[j] = (t[j] - (0..j).map(|l| matrix[j][l] * t[l]).sum::<f64>()) / matrix[j][j];
+        }
+        for j in (0..n).rev() {
+            t[j] = (t[j] - (j + 1..n).map(|l| matrix[l][j] * t[l]).sum::<f64>()) / matrix[j][j];
+        }
+        let mut s = [0.0; MOST_DIRECTIONS];
+        for i in 0..m {
+            s[i] = self.own[i] + (0..n).map(|j| g[i][j] * t[j]).sum::<f64>();
+        }
+        (s, t)
+    }
+}
+
+/// Returns the point of a subspace on the unit sphere that is opposite to the `known` descriptors on it.
+fn opposite(row: &[f32], dim: usize, known: &[Vec<f32>]) -> Vec<f32> {
+    let (foot, basis) = row.split_at(dim);
+    let square = inner(foot, foot);
+    let mut away = vec![0.0; dim];
+    for known in known {
+        // A unit vector on the subspace has this inner product with the foot.
+        if (inner(known, foot) - square).abs() > ON_SUBSPACE {
+            continue;
+        }
+        let along = basis.chunks_exact(dim).map(|u| inner(u, known).powi(2)).sum::<f32>();
+        if 1.0 - square - along < ON_SUBSPACE {
+            add(&mut away, known, 1.0);
+            add(&mut away, foot, -1.0);
+        }
+    }
+    let length = inner(&away, &away).sqrt();
+    let mut guess = foot.to_vec();
+    if length > 0.0 {
+        add(&mut guess, &away, -(1.0 - square).max(0.0).sqrt() / length);
+    }
+    guess
+}
+
+fn add(to: &mut [f32], row: &[f32], times: f32) {
+    to.iter_mut().zip(row).for_each(|(to, x)| *to += times * x);
+}
+
+/// Returns the rows of a matrix, brought to length 1.
+pub fn unit_rows(descriptors: &Descriptors) -> impl Iterator<Item = Vec<f32>> {
+    (0..descriptors.len()).map(|at| {
+        let mut row = vec![0.0; descriptors.dim()];
+        descriptors.read_row(at, &mut row);
+        let length = inner(&row, &row).sqrt();
+        if length > 0.0 {
+            row.iter_mut().for_each(|x| *x /= length);
+        }
+        row
+    })
+}
+
+/// Returns an inner product in a fixed order of eight partial sums.
+#[inline(always)]
+pub fn inner(a: &[f32], b: &[f32]) -> f32 {
+    let mut sums = [0.0_f32; 8];
+    for (a, b) in a.chunks_exact(8).zip(b.chunks_exact(8)) {
+        (0..8).for_each(|c| sums[c] += a[c] * b[c]);
+    }
+    let rest = a.len() / 8 * 8;
+    let tail: f32 = a[rest..].iter().zip(&b[rest..]).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f32>() + tail
+}
