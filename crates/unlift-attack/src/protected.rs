@@ -8,6 +8,7 @@ use std::sync::{Arc, OnceLock};
 use rayon::prelude::*;
 
 use crate::descriptors::Values;
+use crate::simd::{self, Kernel};
 use crate::{Descriptors, Error};
 
 /// Largest dimension of a subspace.
@@ -18,7 +19,7 @@ const ON_SUBSPACE: f32 = 1e-4;
 const RIDGE: f64 = 1e-5;
 
 /// Descriptors as a protected map releases them, one row per slot.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct ProtectedDescriptors {
     rule: Rule,
     /// The released numbers of each row: the foot and the basis of a subspace, or the numbers of words.
@@ -28,6 +29,14 @@ pub struct ProtectedDescriptors {
     /// Whether the plain descriptors were bytes, as SIFT.
     bytes: bool,
     guess: OnceLock<Descriptors>,
+}
+
+impl PartialEq for ProtectedDescriptors {
+    /// Compares what is released; the guess follows from it.
+    fn eq(&self, other: &Self) -> bool {
+        let of = |one: &Self| (one.rule, one.bytes);
+        of(self) == of(other) && self.rows == other.rows && self.public == other.public
+    }
 }
 
 /// The rule that protects descriptors.
@@ -63,7 +72,9 @@ impl ProtectedDescriptors {
         let wrong = |expected: String, found: usize| {
             Error::new("protected descriptors", expected, found.to_string())
         };
-        let width = rows.first().map_or(1, Vec::len);
+        let (Rule::Subspace { m } | Rule::Words { m, .. }) = rule;
+        let least = if matches!(rule, Rule::Words { .. }) { m } else { m + 1 };
+        let width = rows.first().map_or(least, Vec::len);
         if let Some(at) =
             rows.iter().position(|row| row.len() != width || row.iter().any(|x| !x.is_finite()))
         {
@@ -78,7 +89,9 @@ impl ProtectedDescriptors {
             (Rule::Subspace { m }, _) if !rows.dim().is_multiple_of(m + 1) => {
                 return Err(wrong(format!("a multiple of {} values per row", m + 1), rows.dim()));
             }
-            (Rule::Subspace { m }, Some(public)) if rows.dim() / (m + 1) != public.dim() => {
+            (Rule::Subspace { m }, Some(public))
+                if !rows.is_empty() && rows.dim() / (m + 1) != public.dim() =>
+            {
                 let expected = format!("directions of {} values", public.dim());
                 return Err(wrong(expected, rows.dim() / (m + 1)));
             }
@@ -141,33 +154,16 @@ impl ProtectedDescriptors {
         Self { rule: self.rule, rows, public, bytes: self.bytes, guess: OnceLock::new() }
     }
 
-    /// Returns the similarity of every row of `rows` to a plain unit-length descriptor: 1 minus half of the squared distance to the
-    /// subspace, or the largest cosine with a word of the set. Both are at most 1, as a cosine.
-    pub fn similarities(&self, plain: &[f32], rows: &[u32]) -> Vec<f32> {
-        let dim = plain.len();
-        let mut row = vec![0.0; self.rows.dim()];
-        match (self.rule, &self.public) {
-            (Rule::Subspace { .. }, _) => {
-                let square = inner(plain, plain);
-                let mut of = |&at: &u32| {
-                    self.rows.read_row(at as usize, &mut row);
-                    let (foot, basis) = row.split_at(dim);
-                    let along = basis.chunks_exact(dim).map(|u| inner(u, plain).powi(2));
-                    let apart = square + inner(foot, foot) - 2.0 * inner(foot, plain);
-                    1.0 - (apart - along.sum::<f32>()).max(0.0) / 2.0
-                };
-                rows.iter().map(&mut of).collect()
-            }
-            (Rule::Words { .. }, Some(words)) => {
-                let to_words: Vec<f32> = unit_rows(words).map(|word| inner(&word, plain)).collect();
-                let mut of = |&at: &u32| {
-                    self.rows.read_row(at as usize, &mut row);
-                    row.iter().map(|&word| to_words[word as usize]).fold(-1.0, f32::max)
-                };
-                rows.iter().map(&mut of).collect()
-            }
-            (Rule::Words { .. }, None) => vec![0.0; rows.len()],
-        }
+    /// Returns the similarity of every row to a plain unit-length descriptor: 1 minus half of the squared distance to the subspace, or
+    /// the largest cosine with a word of the set. Both are at most 1, as a cosine.
+    pub fn similarities(&self, plain: &[f32]) -> Vec<f32> {
+        let Values::F32(rows) = self.rows.values() else { return vec![0.0; self.len()] };
+        let words = match self.public.as_deref().map(Descriptors::values) {
+            Some(Values::F32(words)) => &words[..],
+            _ => &[],
+        };
+        let width = self.rows.dim();
+        simd::dispatch(Similarities { rule: self.rule, rows, width, words, plain })
     }
 
     /// Returns the plain descriptors that an attacker infers, in the scale of the plain ones. A row is one point of its subspace, or the
@@ -245,6 +241,54 @@ impl ProtectedDescriptors {
         let (p, q) = (point(&a, &s[..m]), point(&b, &t[..n]));
         let apart = p.iter().zip(&q).map(|(p, q)| (p - q).powi(2)).sum::<f64>().sqrt();
         Some((apart, p.iter().zip(&q).map(|(p, q)| (p + q) / 2.0).collect()))
+    }
+}
+
+/// The loop of [`ProtectedDescriptors::similarities`]. Public descriptors have unit length.
+struct Similarities<'a> {
+    rule: Rule,
+    rows: &'a [f32],
+    width: usize,
+    words: &'a [f32],
+    plain: &'a [f32],
+}
+
+impl Kernel for Similarities<'_> {
+    type Output = Vec<f32>;
+
+    #[inline(always)]
+    fn run(self) -> Vec<f32> {
+        let (dim, plain) = (self.plain.len(), self.plain);
+        let rows = self.rows.chunks_exact(self.width);
+        let mut similar = Vec::with_capacity(rows.len());
+        match self.rule {
+            Rule::Subspace { .. } => {
+                let square = inner(plain, plain);
+                for row in rows {
+                    let (foot, basis) = row.split_at(dim);
+                    let mut apart = square + inner(foot, foot) - 2.0 * inner(foot, plain);
+                    for direction in basis.chunks_exact(dim) {
+                        let along = inner(direction, plain);
+                        apart -= along * along;
+                    }
+                    similar.push(1.0 - apart.max(0.0) / 2.0);
+                }
+            }
+            Rule::Words { .. } => {
+                let mut to_words = Vec::with_capacity(self.words.len() / dim.max(1));
+                for word in self.words.chunks_exact(dim) {
+                    to_words.push(inner(word, plain));
+                }
+                for row in rows {
+                    let mut best = -1.0_f32;
+                    for &word in row {
+                        best = best.max(to_words[word as usize]);
+                    }
+                    similar.push(best);
+                }
+            }
+        }
+        similar
     }
 }
 

@@ -54,7 +54,14 @@ struct Unit32 {
 type Pair = (usize, usize);
 
 /// The rows of a map, their descriptors, and the matches of every image with them.
-type Known = (Vec<usize>, Unit32, Arc<Vec<Vec<Pair>>>);
+type Known = (Vec<usize>, Compared, Arc<Vec<Vec<Pair>>>);
+
+/// Descriptors of a map that keypoints are compared with.
+#[derive(PartialEq)]
+enum Compared {
+    Plain(Unit32),
+    Protected(ProtectedDescriptors),
+}
 
 /// A map that was made without some images, and these images.
 pub struct Held<'a> {
@@ -197,27 +204,17 @@ impl<'a> Held<'a> {
             rows.filter(|(point, _)| self.is_part[*point]).collect();
         rows.sort_unstable();
         let points: Vec<usize> = rows.iter().map(|(point, _)| *point).collect();
-        let pairs = match released.protected() {
-            None => {
-                let descriptors = released.descriptors().unwrap_or(&self.descriptors);
-                self.pairs(points, Unit32::of(descriptors, rows.iter().map(|(_, row)| *row)))
+        let rows = rows.iter().map(|(_, row)| *row);
+        let compared = match released.protected() {
+            Some(all) => {
+                Compared::Protected(all.select(&rows.map(|row| row as u32).collect::<Vec<_>>()))
             }
-            Some(protected) => {
-                let rows: Vec<u32> = rows.iter().map(|(_, row)| *row as u32).collect();
-                let of = |query: &Query| {
-                    let mut best = Best::new(query.descriptors.len(), rows.len());
-                    for i in 0..query.descriptors.len() {
-                        let similar = protected.similarities(query.descriptors.row(i), &rows);
-                        similar.into_iter().enumerate().for_each(|(j, x)| best.offer(i, j, x));
-                    }
-                    best.pairs(has_ties(protected))
-                        .into_iter()
-                        .map(|(i, j)| (i, points[j]))
-                        .collect()
-                };
-                Arc::new(self.queries.par_iter().map(of).collect())
+            None => {
+                let all = released.descriptors().unwrap_or(&self.descriptors);
+                Compared::Plain(Unit32::of(all, rows))
             }
         };
+        let pairs = self.pairs(points, compared);
         let free = by_original(&released, &secret, self.is_part.len());
         let positions = self.original.reveal().positions();
         Ok(self.problems(&pairs, |_, query, (keypoint, row)| {
@@ -254,9 +251,9 @@ impl<'a> Held<'a> {
             let plain = Values::F32(query.descriptors.values.clone());
             let protected =
                 protection.protect(&Descriptors::try_new(plain, query.descriptors.dim)?, &key)?;
-            let (rows, mut best) = ((0..n as u32).collect::<Vec<_>>(), Best::new(n, map.len()));
+            let mut best = Best::new(n, map.len());
             for j in 0..map.len() {
-                let similar = protected.similarities(map.row(j), &rows);
+                let similar = protected.similarities(map.row(j));
                 similar.into_iter().enumerate().for_each(|(i, x)| best.offer(i, j, x));
             }
             let pairs = best.pairs(has_ties(&protected)).into_iter();
@@ -282,21 +279,31 @@ impl<'a> Held<'a> {
     fn pairs_in_the_clear(&mut self) -> Arc<Vec<Vec<Pair>>> {
         let rows: Vec<usize> = (0..self.is_part.len()).filter(|&row| self.is_part[row]).collect();
         let unit = Unit32::of(&self.descriptors, rows.iter().copied());
-        self.pairs(rows, unit)
+        self.pairs(rows, Compared::Plain(unit))
     }
 
-    /// Returns the matches of every image with the points `rows`, whose descriptors are `unit`.
-    fn pairs(&mut self, rows: Vec<usize>, unit: Unit32) -> Arc<Vec<Vec<Pair>>> {
-        let known = self.known.iter().find(|(of, same, _)| *of == rows && *same == unit);
+    /// Returns the matches of every image with the points `rows`, whose descriptors are `compared`.
+    fn pairs(&mut self, rows: Vec<usize>, compared: Compared) -> Arc<Vec<Vec<Pair>>> {
+        let known = self.known.iter().find(|(of, same, _)| *of == rows && *same == compared);
         if let Some((.., pairs)) = known {
             return Arc::clone(pairs);
         }
         let of = |query: &Query| {
-            let matched = mutual(&query.descriptors, &unit);
+            let matched = match &compared {
+                Compared::Plain(unit) => mutual(&query.descriptors, unit),
+                Compared::Protected(protected) => {
+                    let mut best = Best::new(query.descriptors.len(), protected.len());
+                    for i in 0..query.descriptors.len() {
+                        let similar = protected.similarities(query.descriptors.row(i));
+                        similar.into_iter().enumerate().for_each(|(j, x)| best.offer(i, j, x));
+                    }
+                    best.pairs(has_ties(protected))
+                }
+            };
             matched.into_iter().map(|(keypoint, at)| (keypoint, rows[at])).collect()
         };
         let pairs: Arc<Vec<Vec<Pair>>> = Arc::new(self.queries.par_iter().map(of).collect());
-        self.known.push((rows, unit, Arc::clone(&pairs)));
+        self.known.push((rows, compared, Arc::clone(&pairs)));
         pairs
     }
 
