@@ -131,10 +131,10 @@ pub struct ProtectArgs {
     /// an attacker infers
     #[arg(long, value_name = "RULE", value_parser = values::protection)]
     pub protect_descriptors: Vec<Protection>,
-    /// Photos or features whose descriptors owner and attacker know: the database of adversarial
+    /// Folder of photos, or file of features, whose descriptors owner and attacker know: the database of adversarial
     /// directions, and the source of words. Never use those of the map itself [default: the two
     /// photos of unlift demo]
-    #[arg(long, value_name = "PHOTOS|FEATURES", requires = "protect_descriptors")]
+    #[arg(long, value_name = "PATH", requires = "protect_descriptors")]
     pub public_descriptors: Option<PathBuf>,
 }
 
@@ -195,7 +195,7 @@ Examples:
   unlift audit map PROJECT --neighbors lists-by-point.parquet --solver joint,ransac
   unlift audit map PROJECT --descriptors PROJECT/database.db --neighbors oracle --neighbors overlap
   unlift audit map PROJECT --scale 1 --gate 'ppl:localization<=2.0' --mitigate thin:1/4
-  unlift audit map PROJECT --descriptors d.npy --neighbors descriptors --protect-descriptors subspace:2
+  unlift audit map PROJECT --descriptors d.npy --neighbors overlap --protect-descriptors subspace:2
   unlift audit map PROJECT --share-safe --json
   unlift audit map PROJECT --scale 1 --gate 'all@0.5:0.10<=20' --junit gates.xml --sarif gates.sarif
 
