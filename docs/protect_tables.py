@@ -50,9 +50,10 @@ def both(program, data, scene, photos, kind, sources):
     return {**first, "results": first["results"] + others["results"]}
 
 
-def images_audit(program, data, photos, kind, source):
+def images_audit(program, data, photos, kind):
+    more = ["--neighbors", "overlap"] if kind == "sift" else []
     return run([program, "audit", "images", data / photos / "images", "--features", kind, "--max-images", "10", "--schemes",
-                ",".join(QUERIES), "--neighbors", source, "--solver", "joint", *protect([])])
+                ",".join(QUERIES), "--neighbors", "similarity", *more, "--solver", "joint", *protect([])])
 
 
 def sphere_audit(program, data, scene, source):
@@ -150,7 +151,7 @@ def tables(program, shared):
         lines += [*leak(name, document, SCHEMES), *queries(name, document)]
     for name, photos, kind in [("RedKitchen, SIFT", "redkitchen", "sift"), ("RedKitchen, ALIKED", "redkitchen", "aliked"),
                                ("Castle, SIFT", "castle", "sift"), ("Castle, ALIKED", "castle", "aliked")]:
-        document = kept(f"protect-images-{photos}-{kind}", lambda: images_audit(program, data, photos, kind, "similarity" if kind == "aliked" else "overlap"))
+        document = kept(f"protect-images-{photos}-{kind}", lambda: images_audit(program, data, photos, kind))
         lines += leak(f"Keypoints of 10 photos, {name}", document, QUERIES)
     found = {name: kept(f"sphere-{scene}", lambda: sphere_audit(program, data, scene, source))
              for name, scene, source in [("RedKitchen, SIFT", "redkitchen", "overlap"),

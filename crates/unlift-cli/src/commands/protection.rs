@@ -72,9 +72,10 @@ fn public(
     let mut values = Vec::new();
     for at in 0..source.names().len() {
         let Some(found) = source.get(at)?.descriptors else { continue };
-        if found.dim() != kind.dim() {
-            let expected = format!("descriptors of {} values", kind.dim());
-            return Err(unlift_io::Error::new(path, "", expected, found.dim().to_string()).into());
+        let is = DescriptorKind::of(&found, "--public-descriptors")?;
+        if is != kind {
+            let expected = format!("descriptors of {}", kind.name());
+            return Err(unlift_io::Error::new(path, "", expected, is.name()).into());
         }
         let mut row = vec![0.0; found.dim()];
         for at in 0..found.len() {
