@@ -15,8 +15,6 @@ use crate::{Descriptors, Error};
 pub const MOST_DIRECTIONS: usize = 8;
 /// A public descriptor lies on a subspace if its squared distance to it is below this.
 const ON_SUBSPACE: f32 = 1e-4;
-/// Added to the diagonal of a system, so that subspaces with a common direction have a distance, too.
-const RIDGE: f64 = 1e-5;
 
 /// Descriptors as a protected map releases them, one row per slot.
 #[derive(Clone, Debug)]
@@ -206,42 +204,6 @@ impl ProtectedDescriptors {
             Descriptors::unchecked(values, dim)
         })
     }
-
-    /// Returns the distance between the subspaces of two rows, and the point halfway between their nearest points; `None` for words.
-    /// Two releases of one descriptor meet in it.
-    pub fn meeting(&self, at: usize, other: &Self, other_at: usize) -> Option<(f64, Vec<f64>)> {
-        let (Rule::Subspace { m }, Rule::Subspace { m: n }) = (self.rule, other.rule) else {
-            return None;
-        };
-        let dim = self.dim();
-        let read = |of: &Self, at: usize| {
-            let mut row = vec![0.0; of.rows.dim()];
-            of.rows.read_row(at, &mut row);
-            row
-        };
-        let (a, b) = (read(self, at), read(other, other_at));
-        let along = |x: &[f32], y: &[f32]| f64::from(inner(x, y));
-        let mut pair = Pair::default();
-        for i in 0..m {
-            pair.own[i] = along(&a[(i + 1) * dim..][..dim], &b[..dim]);
-            for j in 0..n {
-                pair.both[i][j] = along(&a[(i + 1) * dim..][..dim], &b[(j + 1) * dim..][..dim]);
-            }
-        }
-        (0..n).for_each(|j| pair.other[j] = along(&b[(j + 1) * dim..][..dim], &a[..dim]));
-        let (s, t) = pair.nearest(m, n);
-        let point = |row: &[f32], along: &[f64]| -> Vec<f64> {
-            let at = |c: usize| {
-                let moved = along.iter().enumerate();
-                let moved = moved.map(|(i, s)| s * f64::from(row[(i + 1) * dim + c]));
-                f64::from(row[c]) + moved.sum::<f64>()
-            };
-            (0..dim).map(at).collect()
-        };
-        let (p, q) = (point(&a, &s[..m]), point(&b, &t[..n]));
-        let apart = p.iter().zip(&q).map(|(p, q)| (p - q).powi(2)).sum::<f64>().sqrt();
-        Some((apart, p.iter().zip(&q).map(|(p, q)| (p + q) / 2.0).collect()))
-    }
 }
 
 /// The loop of [`ProtectedDescriptors::similarities`]. Public descriptors have unit length.
@@ -289,50 +251,6 @@ impl Kernel for Similarities<'_> {
             }
         }
         similar
-    }
-}
-
-/// Inner products of two subspaces: of the directions of each with the foot of the other, and of all directions.
-#[derive(Default)]
-struct Pair {
-    own: [f64; MOST_DIRECTIONS],
-    other: [f64; MOST_DIRECTIONS],
-    both: [[f64; MOST_DIRECTIONS]; MOST_DIRECTIONS],
-}
-
-impl Pair {
-    /// Returns the coordinates of the nearest points of both subspaces. Bases are orthonormal and orthogonal to their feet, so the
-    /// system of `m + n` unknowns shrinks to `n`: `(I - G^T G) t = e + G^T c` with `c = U f'`, `e = V f`.
-    #[inline(always)]
-    pub fn nearest(&self, m: usize, n: usize) -> ([f64; MOST_DIRECTIONS], [f64; MOST_DIRECTIONS]) {
-        let g = &self.both;
-        let mut matrix = [[0.0; MOST_DIRECTIONS]; MOST_DIRECTIONS];
-        let mut t = [0.0; MOST_DIRECTIONS];
-        for j in 0..n {
-            t[j] = self.other[j] + (0..m).map(|i| g[i][j] * self.own[i]).sum::<f64>();
-            for k in 0..=j {
-                let square = (0..m).map(|i| g[i][j] * g[i][k]).sum::<f64>();
-                matrix[j][k] = f64::from(u8::from(j == k)) * (1.0 + RIDGE) - square;
-            }
-        }
-        // Cholesky; the ridge keeps pivots positive.
-        for j in 0..n {
-            for k in 0..=j {
-                let known = (0..k).map(|l| matrix[j][l] * matrix[k][l]).sum::<f64>();
-                let left = matrix[j][k] - known;
-                matrix[j][k] =
-                    if j == k { left.max(RIDGE / 2.0).sqrt() } else { left / matrix[k][k] };
-            }
-            t[j] = (t[j] - (0..j).map(|l| matrix[j][l] * t[l]).sum::<f64>()) / matrix[j][j];
-        }
-        for j in (0..n).rev() {
-            t[j] = (t[j] - (j + 1..n).map(|l| matrix[l][j] * t[l]).sum::<f64>()) / matrix[j][j];
-        }
-        let mut s = [0.0; MOST_DIRECTIONS];
-        for i in 0..m {
-            s[i] = self.own[i] + (0..n).map(|j| g[i][j] * t[j]).sum::<f64>();
-        }
-        (s, t)
     }
 }
 
