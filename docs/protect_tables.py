@@ -65,7 +65,7 @@ def sphere_audit(program, data, scene, source):
 def strongest(document, scheme):
     """The row of a scheme that recovers most within the first threshold, and that share."""
     rows = [row for row in document["results"] if row["scheme"] == scheme]
-    first = list(rows[0]["recovered_percent"])[-2 if rows[0]["unit"] == "pixel" else 0]
+    first = list(rows[0]["recovered_percent"])[-2 if rows[0]["unit"] in ("px", "pixel") else 0]
     share = lambda row: max(row["recovered_percent"][first], row["blind_percent"][first])
     return max(rows, key=share), max(map(share, rows))
 
@@ -80,7 +80,7 @@ def names(document, schemes):
 
 def leak(name, document, schemes):
     held = {row["scheme"]: row.get("held_out") for row in document.get("localization", [])}
-    within = list(document["results"][0]["recovered_percent"])[-2 if document["results"][0]["unit"] == "pixel" else 0]
+    within = list(document["results"][0]["recovered_percent"])[-2 if document["results"][0]["unit"] in ("px", "pixel") else 0]
     heads = ["descriptors", "true in lists", *(f"`{scheme}`" for scheme in schemes)]
     if any(held.values()):
         heads += ["right matches", "error", "placed"]
@@ -103,7 +103,7 @@ def leak(name, document, schemes):
 
 def queries(name, document):
     """Localization with protected queries and the map in the clear."""
-    held = {row["scheme"]: row["held_out"] for row in document["localization"] if row["of_queries"]}
+    held = {row["scheme"]: row["held_out"] for row in document["localization"] if row.get("of_queries")}
     yield f"{name}, protected queries, error of the camera center (images placed within the first limit):"
     yield ""
     yield "| descriptors of the query | " + " | ".join(f"`{scheme}`" for scheme in QUERIES) + " |"
