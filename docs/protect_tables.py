@@ -97,7 +97,7 @@ def leak(name, document, schemes):
             error = "no pose" if found["multiple"] is None else f"{found['multiple']:.1f}"
             recall = list(found["recall_percent"].values())
             cells += [f"{found['right_matches']:.0f} of {found['matches']:.0f}", error, f"{recall[0]:.0f} / {recall[1]:.0f} / {recall[2]:.0f} %"]
-        yield "| " + " | ".join(cells) + " |"
+        yield "| " + " | ".join(cells + ["-"] * (len(heads) - len(cells))) + " |"
     yield ""
 
 
