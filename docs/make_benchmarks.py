@@ -16,6 +16,7 @@ or parts of them, named after the folder; each tells on stderr how long it took 
     sequence    5 min    several queries with known poses
     again       5 min    a map released twice
     cost       20 min    leak and localization accuracy side by side, with mitigations
+    protect    30 min    protected descriptors and sphere clouds
 
 `± s` is the standard deviation over seeds, where it exceeds 0.5. Needs the scenes (SHARED/data) and the paper's tables (SHARED/paper/tables);
 standard library only. Everything between the begin and end markers of the two files is replaced.
@@ -26,6 +27,7 @@ import again_tables
 import cost_tables
 import image_tables
 import picture_tables
+import protect_tables
 import sequence_tables
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -398,9 +400,14 @@ def what_protection_costs():
     put(ROOT / "docs/benchmarks.md", "cost", cost_tables.tables(ROOT / "target/release/unlift", SHARED))
 
 
+def protected():
+    put(ROOT / "docs/benchmarks.md", "protect", protect_tables.tables(ROOT / "target/release/unlift", SHARED))
+
+
 def main():
     sections = {"accuracy": accuracy, "low": below_a_tenth, "noise": noise, "own": own, "alone": alone, "large": large,
-                "images": images, "pictures": pictures, "sequence": sequence, "again": again, "cost": what_protection_costs}
+                "images": images, "pictures": pictures, "sequence": sequence, "again": again, "cost": what_protection_costs,
+                "protect": protected}
     for name in sys.argv[2:] or sections:
         started = time.monotonic()
         sections[name]()

@@ -66,6 +66,11 @@ impl Descriptors {
         Ok(Self { values, dim, colors: None })
     }
 
+    /// Creates a matrix from values that are known to be finite and to fill its rows.
+    pub(crate) fn unchecked(values: Values, dim: usize) -> Self {
+        Self { values, dim, colors: None }
+    }
+
     /// Adds the color (red, green, blue) of each point. Attacks do not use it, pictures do.
     ///
     /// # Errors

@@ -123,7 +123,7 @@ fn audit(folder: &Path, mitigate: &[&str], gates: &[&str], held_out: bool) -> Au
     let job = Job {
         plan,
         gates: gates.iter().map(|text| Gate::parse(text).unwrap()).collect(),
-        localize: Some(Localize { cameras: &prepared.cameras, held_out }),
+        localize: Some(Localize { cameras: &prepared.cameras, held_out, protections: Vec::new() }),
         ..Job::new(folder, &input, &prepared, &folder.join("out"), Instant::now()).unwrap()
     };
     maps::find(job, None).unwrap()

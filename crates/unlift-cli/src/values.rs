@@ -7,7 +7,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use unlift::audit::Threshold;
 use unlift::neighbors::oracle::Noise;
 use unlift::neighbors::sources::Named;
-use unlift::obfuscate::{Entry, Mitigation, SCHEMES};
+use unlift::obfuscate::{Entry, Mitigation, Protection, SCHEMES};
 use unlift::recover::{Builtin, Delta};
 use unlift_audit::{OutlierFilter, sources};
 use unlift_nn::DescriptorKind;
@@ -107,12 +107,7 @@ pub fn scheme_name(text: &str) -> Result<String, String> {
 }
 
 pub fn scheme(text: &str) -> Result<&'static Entry, String> {
-    if let Some(entry) = all_schemes().into_iter().find(|entry| entry.name == text) {
-        return Ok(entry);
-    }
-    let note = if any_scheme(text).is_ok() { " (for images only)" } else { "" };
-    let names: Vec<&str> = all_schemes().iter().map(|entry| entry.name).collect();
-    Err(format!("expected one of {}, found {text}{note}", names.join(", ")))
+    of_dimension(text, |entry| entry.in_3d.is_some(), " (for images only)")
 }
 
 /// Parses `olc`, the same scheme twice, or `olc/cp`, two different ones.
@@ -122,14 +117,22 @@ pub fn scheme_pair(text: &str) -> Result<[&'static Entry; 2], String> {
 }
 
 pub fn image_scheme(text: &str) -> Result<&'static Entry, String> {
-    let of_images = |entry: &&Entry| entry.in_2d.is_some();
-    match SCHEMES.iter().filter(of_images).find(|entry| entry.name == text) {
-        Some(entry) => Ok(entry),
-        None => {
-            let names: Vec<&str> = SCHEMES.iter().filter(of_images).map(|e| e.name).collect();
-            Err(format!("expected one of {}, found {text}", names.join(", ")))
-        }
+    of_dimension(text, |entry| entry.in_2d.is_some(), " (for maps only)")
+}
+
+/// Returns the scheme called `text`, also one that is audited only on request.
+fn of_dimension(
+    text: &str,
+    fits: impl Fn(&Entry) -> bool,
+    otherwise: &str,
+) -> Result<&'static Entry, String> {
+    if let Some(entry) = unlift::obfuscate::all().find(|entry| entry.name == text && fits(entry)) {
+        return Ok(entry);
     }
+    let note = if any_scheme(text).is_ok() { otherwise } else { "" };
+    let fitting = unlift::obfuscate::all().filter(|entry| fits(entry));
+    let names: Vec<&str> = fitting.map(|entry| entry.name).collect();
+    Err(format!("expected one of {}, found {text}{note}", names.join(", ")))
 }
 
 /// Parses a solver for images, which must use lists: in the plane all lines intersect, so records
@@ -159,6 +162,10 @@ pub fn all_schemes() -> Vec<&'static Entry> {
 
 pub fn mitigation(text: &str) -> Result<Mitigation, String> {
     Mitigation::parse(text).map_err(|error| expected(&error))
+}
+
+pub fn protection(text: &str) -> Result<Protection, String> {
+    Protection::parse(text).map_err(|error| expected(&error))
 }
 
 pub fn solver(text: &str) -> Result<Builtin, String> {
@@ -327,8 +334,8 @@ mod tests {
              expected a number from 0 to 1, found 1.5\n\
              expected auto or a number above 0, found wide\n\
              expected NEIGHBORS,RATIO with both above 0 (for example 20,2.0), found 20\n\
-             expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, found pppl\n\
-             expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, found cp2d (for images only)\n\
+             expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, sphere, sphere-half, sphere-quarter, found pppl\n\
+             expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, sphere, sphere-half, sphere-quarter, found cp2d (for images only)\n\
              expected one of joint, ranking, joint-start, consensus, ransac, density, tomography, found magic\n\
              expected one of uniform, near, clustered, found white\n\
              expected one of sift, aliked, superpoint, found SIFT\n\

@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::attack::Basis;
 use crate::cards::{Card, Finding, Level, Refusal};
 use crate::document::{Document, LengthUnit, Row};
-use crate::{again, sequence, tables, words};
+use crate::{again, sequence, tables, verdict, words};
 
 /// The verdict on a whole audit in a few lines.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -45,6 +45,16 @@ pub(crate) fn banner(document: &Document, cards: &[Card], refusals: &[Refusal]) 
             (Level::Gray, "No scheme was tested.".to_owned(), nothing.to_owned())
         }
     };
+    let bearings: Vec<String> =
+        cards.iter().filter_map(|card| verdict::bearings(document, &card.scheme)).collect();
+    let (level, headline) = match level {
+        // Few recovered points do not mean that little is seen.
+        Level::Gray if !bearings.is_empty() => {
+            (Level::Orange, "Bearings of points are published.".to_owned())
+        }
+        level => (level, headline),
+    };
+    let sentence = bearings.into_iter().chain([sentence]).collect::<Vec<_>>().join(" ");
     Banner { level, headline, sentence, every, unknown }
 }
 

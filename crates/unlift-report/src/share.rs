@@ -11,8 +11,25 @@ const NAMING_OPTIONS: [&str; 9] =
     ["descriptors", "input", "inverter_sha256", "map", "model", "out", "path", "photos", "show"];
 
 /// The schemes of unlift. A reason from another scheme or source may contain anything: a line of data, a path.
-const SCHEMES: [&str; 10] =
-    ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp", "lines2d", "cp2d", "dcl2d"];
+const SCHEMES: [&str; 17] = [
+    "olc",
+    "ppl",
+    "ppl+",
+    "ray",
+    "ray-voxel",
+    "plane",
+    "cp",
+    "lines2d",
+    "cp2d",
+    "dcl2d",
+    "sphere",
+    "sphere-half",
+    "sphere-quarter",
+    "lines2d-gravity",
+    "dcl2d-horizontal",
+    "dcl2d-near",
+    "dcl2d-far",
+];
 const SOURCES: [&str; 7] =
     ["oracle", "file", "similarity", "overlap", "descriptors", "geometric", "learned"];
 const OWN_FAILED: &str = "its own function failed";

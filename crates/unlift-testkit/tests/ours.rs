@@ -1,21 +1,22 @@
 //! Property tests of all built-in implementations, and of some with bugs.
 
+use unlift::descriptors::Values;
 use unlift::geometry::frame::Bounds;
 use unlift::neighbors::oracle::{TrueNeighbors, search};
 use unlift::neighbors::sources::SOURCES;
 use unlift::neighbors::{Needs, Neighborhoods, Source};
 use unlift::obfuscate::olc::Olc;
-use unlift::obfuscate::{Lifted, SCHEMES, Scheme, SchemeOptions};
+use unlift::obfuscate::{Lifted, Protected, Protection, Scheme, SchemeOptions, all};
 use unlift::recover::{Builtin, RecoverOptions, Recovered, Solver};
 use unlift::released::{Lines, Obfuscation, Released};
-use unlift::seed::Key;
-use unlift::{Error, Unit};
+use unlift::seed::{Draws, Key, Stage};
+use unlift::{Descriptors, Error, Unit};
 use unlift_testkit::{described_map, scheme_laws, solver_laws, source_laws};
 
 #[test]
 fn our_schemes() {
     let options = SchemeOptions::usual(Unit::Meter);
-    for entry in SCHEMES {
+    for entry in all() {
         if let Some(scheme) = entry.of_dimension::<3>(&options) {
             scheme_laws(&*scheme);
         }
@@ -30,6 +31,26 @@ fn our_sources() {
     let (_, released, _) = described_map(&Olc, 300);
     for source in SOURCES.iter().filter_map(|entry| entry.of_dimension::<3>()) {
         source_laws(&*source, &released);
+    }
+}
+
+fn protected(text: &str) -> Protected<3> {
+    let mut draws = Draws::new(1, Stage::Shapes, 0);
+    let bytes = (0..200 * 128).map(|_| draws.below(120) as u8).collect();
+    let public = Descriptors::try_new(Values::U8(bytes), 128).unwrap();
+    let protection = Protection::parse(text).unwrap().with_public(&public).unwrap();
+    Protected::new(std::sync::Arc::new(Olc), protection)
+}
+
+#[test]
+fn our_sources_on_protected_descriptors() {
+    for text in ["subspace:2:random", "subspace:4", "subspace:2:adversarial", "ldp:16,2,6"] {
+        let scheme = protected(text);
+        scheme_laws(&scheme);
+        let (_, released, _) = described_map(&scheme, 200);
+        for source in SOURCES.iter().filter_map(|entry| entry.of_dimension::<3>()) {
+            source_laws(&*source, &released);
+        }
     }
 }
 

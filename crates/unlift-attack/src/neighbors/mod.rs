@@ -4,6 +4,7 @@
 //! [`sources::SOURCES`] lists the sources of this crate.
 
 mod alike;
+mod bearings;
 mod best;
 mod compare;
 mod dense;
@@ -12,6 +13,7 @@ mod kind;
 mod mutual;
 mod neighborhoods;
 mod overlap;
+mod protected;
 mod rows;
 mod scored;
 mod sets;
@@ -21,7 +23,8 @@ pub mod sources;
 mod tiles;
 mod walk;
 
-pub(crate) use compare::MOST_ROWS;
+pub use bearings::support;
+pub(crate) use compare::{Likeness, MOST_ROWS};
 pub use dense::{Dense, dense, usual};
 pub(crate) use geometric::geometric_by;
 pub use geometric::{Geometric, geometric};

@@ -35,6 +35,18 @@ impl<'a> Rows<'a> {
         let descriptors = released.descriptors().ok_or_else(|| {
             Error::new("released map", "descriptors, which this source compares", "none")
         })?;
+        Self::of_map(descriptors, released, k)
+    }
+
+    /// Creates the rows of a released map from a matrix with a row per slot, for lists of `k` records.
+    ///
+    /// # Errors
+    /// When `k` is 0, or there are fewer than `k` other records.
+    pub fn of_map<const D: usize>(
+        descriptors: &'a Descriptors,
+        released: &Released<D>,
+        k: usize,
+    ) -> Result<Self, Error> {
         let n_records = released.n_records();
         if k == 0 || n_records < k + 1 {
             let expected = format!("between 1 and {} (other records)", n_records.saturating_sub(1));

@@ -2,6 +2,7 @@
 
 use super::Neighborhoods;
 use super::compare::{Likeness, MOST_ROWS, note, search};
+use super::protected::Shared;
 use super::rows::Rows;
 use super::source::{Needs, Source};
 use super::walk::{self, Walk};
@@ -20,6 +21,9 @@ pub const WALK: Walk = Walk { steps: 2, decay: 0.2 };
 /// For learned descriptors, which see a large area around their point, it lists the records that a short walk over the most similar
 /// ones reaches. The score is the logarithm of the discounted probability to be reached.
 ///
+/// Subspaces are compared by the [guess](crate::ProtectedDescriptors::guess) of their descriptors, sets of words by the
+/// likelihood that both contain the word of one descriptor.
+///
 /// The search is exact up to 131,072 slots (`MOST_ROWS`). In a larger map, each block of descriptors is compared with the blocks
 /// that have the most similar means.
 ///
@@ -29,15 +33,30 @@ pub fn similarity<const D: usize>(
     released: &Released<D>,
     k: usize,
 ) -> Result<Neighborhoods, Error> {
-    let mut rows = Rows::new(released, k)?;
+    let counts = released.descriptors().is_some_and(are_learned);
+    let protected = released.protected();
+    match protected.and_then(|protected| Some((protected, Shared::new(protected, counts)?))) {
+        Some((protected, shared)) => {
+            ranked_by(&shared, Rows::of_map(protected.rows(), released, k)?, k)
+        }
+        None => ranked_by(&Cosine { counts }, Rows::new(released, k)?, k),
+    }
+}
+
+/// Lists the best records by a likeness; a walk over the best ones if it counts scores.
+fn ranked_by<L: Likeness>(
+    likeness: &L,
+    mut rows: Rows<'_>,
+    k: usize,
+) -> Result<Neighborhoods, Error> {
     let enough = rows.enough_for(k);
-    if !are_learned(rows.descriptors) {
-        let found = search(&Cosine { counts: false }, &mut rows, enough, MOST_ROWS)?;
+    if !likeness.counts() {
+        let found = search(likeness, &mut rows, enough, MOST_ROWS)?;
         let ranked: Vec<_> = found.into_iter().map(|found| found.best).collect();
         return rows.lists(&ranked, k);
     }
     let most = enough.max(walk::CANDIDATES);
-    let found = search(&Cosine { counts: true }, &mut rows, most, MOST_ROWS)?;
+    let found = search(likeness, &mut rows, most, MOST_ROWS)?;
     let ranked = walk::standardized(&found);
     rows.lists(&walk::walk(&ranked, &rows.records, enough, WALK), k)
 }

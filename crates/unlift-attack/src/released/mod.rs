@@ -18,7 +18,7 @@ pub use obfuscation::Obfuscation;
 pub use rays::Rays;
 
 use crate::geometry::frame::Bounds;
-use crate::{Descriptors, Error, Fingerprint, Unit};
+use crate::{Descriptors, Error, Fingerprint, ProtectedDescriptors, Unit};
 
 /// A released map: all that an attacker sees.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,6 +28,7 @@ pub struct Released<const D: usize> {
     origin: [f64; D],
     unit: Unit,
     descriptors: Option<Descriptors>,
+    protected: Option<ProtectedDescriptors>,
     bounds: Option<Bounds<D>>,
     fingerprint: Fingerprint,
 }
@@ -68,6 +69,7 @@ impl<const D: usize> Released<D> {
             origin,
             unit,
             descriptors,
+            protected: None,
             bounds: None,
             fingerprint,
         };
@@ -75,9 +77,28 @@ impl<const D: usize> Released<D> {
     }
 
     fn hashed(&self) -> Fingerprint {
-        let Self { obfuscation, slots_per_record, origin, unit, descriptors, bounds, .. } = self;
+        let Self { obfuscation, slots_per_record, origin, unit, bounds, .. } = self;
         let frame = (*origin, *unit, *bounds);
-        fingerprint::of(obfuscation, *slots_per_record, frame, descriptors.as_ref())
+        let rows = self.protected.as_ref().map(ProtectedDescriptors::rows);
+        fingerprint::of(obfuscation, *slots_per_record, frame, rows.or(self.descriptors.as_ref()))
+    }
+
+    /// Releases protected descriptors in place of plain ones, one row per slot.
+    ///
+    /// # Errors
+    /// When there is not one row per slot.
+    pub fn with_protected(self, protected: ProtectedDescriptors) -> Result<Self, Error> {
+        if protected.len() != self.n_slots() {
+            let expected = format!("{} rows, one per slot", self.n_slots());
+            return Err(Error::new("descriptors", expected, protected.len().to_string()));
+        }
+        let bare = Self { descriptors: None, protected: Some(protected), ..self };
+        Ok(Self { fingerprint: bare.hashed(), ..bare })
+    }
+
+    /// Protected descriptors, one row per slot, if the map has them.
+    pub fn protected(&self) -> Option<&ProtectedDescriptors> {
+        self.protected.as_ref()
     }
 
     /// Sets the box that contains all hidden points, in the map's frame; for an image it is the image itself.
@@ -131,8 +152,9 @@ impl<const D: usize> Released<D> {
         self.unit
     }
 
-    /// Descriptors, one row per slot, in random order within a record.
+    /// Descriptors, one row per slot, in random order within a record. Of a map with protected ones, these are the attacker's
+    /// [guess](ProtectedDescriptors::guess).
     pub fn descriptors(&self) -> Option<&Descriptors> {
-        self.descriptors.as_ref()
+        self.descriptors.as_ref().or_else(|| Some(self.protected.as_ref()?.guess()))
     }
 }

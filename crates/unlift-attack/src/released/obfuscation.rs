@@ -44,6 +44,12 @@ impl<const D: usize> Obfuscation<D> {
         }
     }
 
+    /// Whether the records are bearings from one center. All meet there, so neighbors say nothing about ranges, but whoever stands in
+    /// the center sees the scene.
+    pub fn is_bearings(&self) -> bool {
+        matches!(self, Self::Rays(rays) if rays.centers().len() == 1)
+    }
+
     /// Name of the family in files.
     pub fn family(&self) -> &'static str {
         match self {

@@ -52,6 +52,8 @@ pub enum Stage {
     Mitigation = 24,
     /// Starts of pose estimation.
     Localization = 25,
+    /// Subspaces and sets of words in place of descriptors.
+    Protection = 26,
 }
 
 /// A source of random bits: a [`Counter`], or the owner's cipher.

@@ -10,10 +10,11 @@ use unlift::geometry::frame::Bounds;
 use unlift::geometry::vector::{distance, median, squared_distance};
 use unlift::localization::{Free, Match, View, estimate, free_directions};
 use unlift::obfuscate::{Scheme, obfuscate};
+use unlift::protected::{Rule, inner};
 use unlift::released::Released;
 use unlift::seed::{Key, Stage};
 use unlift::truth::{Original, Secret};
-use unlift::{Descriptors, Error, PointSet, Unit};
+use unlift::{Descriptors, Error, PointSet, ProtectedDescriptors, Unit};
 use unlift_features::Extraction;
 use unlift_features::load::Turn;
 use unlift_invert::Lens;
@@ -53,7 +54,14 @@ struct Unit32 {
 type Pair = (usize, usize);
 
 /// The rows of a map, their descriptors, and the matches of every image with them.
-type Known = (Vec<usize>, Unit32, Arc<Vec<Vec<Pair>>>);
+type Known = (Vec<usize>, Compared, Arc<Vec<Vec<Pair>>>);
+
+/// Descriptors of a map that keypoints are compared with.
+#[derive(PartialEq)]
+enum Compared {
+    Plain(Unit32),
+    Protected(ProtectedDescriptors),
+}
 
 /// A map that was made without some images, and these images.
 pub struct Held<'a> {
@@ -195,9 +203,18 @@ impl<'a> Held<'a> {
         let mut rows: Vec<(usize, usize)> =
             rows.filter(|(point, _)| self.is_part[*point]).collect();
         rows.sort_unstable();
-        let descriptors = released.descriptors().unwrap_or(&self.descriptors);
-        let unit = Unit32::of(descriptors, rows.iter().map(|(_, row)| *row));
-        let pairs = self.pairs(rows.iter().map(|(point, _)| *point).collect(), unit);
+        let points: Vec<usize> = rows.iter().map(|(point, _)| *point).collect();
+        let rows = rows.iter().map(|(_, row)| *row);
+        let compared = match released.protected() {
+            Some(all) => {
+                Compared::Protected(all.select(&rows.map(|row| row as u32).collect::<Vec<_>>()))
+            }
+            None => {
+                let all = released.descriptors().unwrap_or(&self.descriptors);
+                Compared::Plain(Unit32::of(all, rows))
+            }
+        };
+        let pairs = self.pairs(points, compared);
         let free = by_original(&released, &secret, self.is_part.len());
         let positions = self.original.reveal().positions();
         Ok(self.problems(&pairs, |_, query, (keypoint, row)| {
@@ -220,16 +237,34 @@ impl<'a> Held<'a> {
         scheme: &dyn Scheme<2>,
         key: &Key,
     ) -> Result<Vec<Problem>, Error> {
+        let mut pairs = self.pairs_in_the_clear();
+        let points: Vec<usize> = (0..self.is_part.len()).filter(|&row| self.is_part[row]).collect();
+        let map = Unit32::of(&self.descriptors, points.iter().copied());
         let hide = |(number, query): (usize, &Query)| {
+            let n = query.places.len();
             let keypoints = PointSet::try_new(query.places.clone(), Unit::Pixel)?;
             let original = Original::within(keypoints, query.bounds()?)?;
             let key = key.of_item(Stage::Image, number as u64);
             let (released, secret) = obfuscate(scheme, &original, None, &key)?;
-            Ok(by_original(&released, &secret, query.places.len()))
+            let free = by_original(&released, &secret, n);
+            let Some(protection) = scheme.protection() else { return Ok((free, None)) };
+            let plain = Values::F32(query.descriptors.values.clone());
+            let protected =
+                protection.protect(&Descriptors::try_new(plain, query.descriptors.dim)?, &key)?;
+            let mut best = Best::new(n, map.len());
+            for j in 0..map.len() {
+                let similar = protected.similarities(map.row(j));
+                similar.into_iter().enumerate().for_each(|(i, x)| best.offer(i, j, x));
+            }
+            let pairs = best.pairs(has_ties(&protected)).into_iter();
+            Ok((free, Some(pairs.map(|(i, j)| (i, points[j])).collect::<Vec<_>>())))
         };
-        let free: Vec<Vec<Free<2>>> =
-            self.queries.iter().enumerate().map(hide).collect::<Result<_, Error>>()?;
-        let pairs = self.pairs_in_the_clear();
+        let hidden = self.queries.par_iter().enumerate().map(hide);
+        let (free, of_protected): (Vec<Vec<Free<2>>>, Vec<_>) =
+            hidden.collect::<Result<Vec<_>, Error>>()?.into_iter().unzip();
+        if let Some(own) = of_protected.into_iter().collect::<Option<Vec<_>>>() {
+            pairs = Arc::new(own);
+        }
         let positions = self.original.reveal().positions();
         Ok(self.problems(&pairs, |number, query, (keypoint, row)| {
             let (place, point) = (query.places[keypoint], positions[row]);
@@ -244,21 +279,31 @@ impl<'a> Held<'a> {
     fn pairs_in_the_clear(&mut self) -> Arc<Vec<Vec<Pair>>> {
         let rows: Vec<usize> = (0..self.is_part.len()).filter(|&row| self.is_part[row]).collect();
         let unit = Unit32::of(&self.descriptors, rows.iter().copied());
-        self.pairs(rows, unit)
+        self.pairs(rows, Compared::Plain(unit))
     }
 
-    /// Returns the matches of every image with the points `rows`, whose descriptors are `unit`.
-    fn pairs(&mut self, rows: Vec<usize>, unit: Unit32) -> Arc<Vec<Vec<Pair>>> {
-        let known = self.known.iter().find(|(of, same, _)| *of == rows && *same == unit);
+    /// Returns the matches of every image with the points `rows`, whose descriptors are `compared`.
+    fn pairs(&mut self, rows: Vec<usize>, compared: Compared) -> Arc<Vec<Vec<Pair>>> {
+        let known = self.known.iter().find(|(of, same, _)| *of == rows && *same == compared);
         if let Some((.., pairs)) = known {
             return Arc::clone(pairs);
         }
         let of = |query: &Query| {
-            let matched = mutual(&query.descriptors, &unit);
+            let matched = match &compared {
+                Compared::Plain(unit) => mutual(&query.descriptors, unit),
+                Compared::Protected(protected) => {
+                    let mut best = Best::new(query.descriptors.len(), protected.len());
+                    for i in 0..query.descriptors.len() {
+                        let similar = protected.similarities(query.descriptors.row(i));
+                        similar.into_iter().enumerate().for_each(|(j, x)| best.offer(i, j, x));
+                    }
+                    best.pairs(has_ties(protected))
+                }
+            };
             matched.into_iter().map(|(keypoint, at)| (keypoint, rows[at])).collect()
         };
         let pairs: Arc<Vec<Vec<Pair>>> = Arc::new(self.queries.par_iter().map(of).collect());
-        self.known.push((rows, unit, Arc::clone(&pairs)));
+        self.known.push((rows, compared, Arc::clone(&pairs)));
         pairs
     }
 
@@ -474,47 +519,62 @@ impl Unit32 {
     }
 }
 
-/// Returns an inner product in a fixed order of eight partial sums.
-fn inner(a: &[f32], b: &[f32]) -> f32 {
-    let mut sums = [0.0_f32; 8];
-    for (a, b) in a.chunks_exact(8).zip(b.chunks_exact(8)) {
-        (0..8).for_each(|c| sums[c] += a[c] * b[c]);
-    }
-    let rest = a.len() / 8 * 8;
-    let tail: f32 = a[rest..].iter().zip(&b[rest..]).map(|(a, b)| a * b).sum();
-    sums.iter().sum::<f32>() + tail
-}
-
 /// Rows of one side that are compared with a block of the other at a time, so that both stay in the
 /// cache.
 const BLOCK: usize = 64;
 
 /// Returns the mutually most similar rows that pass the ratio test.
 fn mutual(a: &Unit32, b: &Unit32) -> Vec<Pair> {
-    // Most similar row and the two largest similarities.
-    let mut of_a = vec![(usize::MAX, -2.0_f32, -2.0_f32); a.len()];
-    let mut of_b = vec![(usize::MAX, -2.0_f32); b.len()];
+    let mut best = Best::new(a.len(), b.len());
     for from in (0..b.len()).step_by(BLOCK) {
-        let block = from..(from + BLOCK).min(b.len());
-        for (i, best) in of_a.iter_mut().enumerate() {
-            for j in block.clone() {
-                let similar = inner(a.row(i), b.row(j));
-                if similar > best.1 {
-                    *best = (j, similar, best.1);
-                } else if similar > best.2 {
-                    best.2 = similar;
-                }
-                if similar > of_b[j].1 {
-                    of_b[j] = (i, similar);
-                }
+        for i in 0..a.len() {
+            for j in from..(from + BLOCK).min(b.len()) {
+                best.offer(i, j, inner(a.row(i), b.row(j)));
             }
         }
     }
-    let apart = |similar: f32| (2.0 - 2.0 * similar).max(0.0).sqrt();
-    let passes = |(i, &(j, first, second)): (usize, &(usize, f32, f32))| {
-        let is_mutual = j != usize::MAX && of_b[j].0 == i;
-        // Withheld descriptors are zero.
-        (is_mutual && first > 0.0 && apart(first) < RATIO * apart(second)).then_some((i, j))
-    };
-    of_a.iter().enumerate().filter_map(passes).collect()
+    best.pairs(false)
+}
+
+/// Sets of words that contain a word are equally similar to it, so the ratio test would reject all.
+fn has_ties(protected: &ProtectedDescriptors) -> bool {
+    matches!(protected.rule(), Rule::Words { .. })
+}
+
+/// The most similar row of the other side, for the rows of both sides.
+struct Best {
+    /// Most similar row and the two largest similarities.
+    of_a: Vec<(usize, f32, f32)>,
+    of_b: Vec<(usize, f32)>,
+}
+
+impl Best {
+    fn new(n_a: usize, n_b: usize) -> Self {
+        Self { of_a: vec![(usize::MAX, -2.0, -2.0); n_a], of_b: vec![(usize::MAX, -2.0); n_b] }
+    }
+
+    /// Adds a pair; of equal ones, the first counts.
+    fn offer(&mut self, i: usize, j: usize, similar: f32) {
+        let best = &mut self.of_a[i];
+        if similar > best.1 {
+            *best = (j, similar, best.1);
+        } else if similar > best.2 {
+            best.2 = similar;
+        }
+        if similar > self.of_b[j].1 {
+            self.of_b[j] = (i, similar);
+        }
+    }
+
+    /// Returns the mutual pairs that pass the ratio test; all mutual ones if there are `ties`.
+    fn pairs(&self, ties: bool) -> Vec<Pair> {
+        let apart = |similar: f32| (2.0 - 2.0 * similar).max(0.0).sqrt();
+        let passes = |(i, &(j, first, second)): (usize, &(usize, f32, f32))| {
+            let is_mutual = j != usize::MAX && self.of_b[j].0 == i;
+            let stands_out = ties || apart(first) < RATIO * apart(second);
+            // Withheld descriptors are zero.
+            (is_mutual && first > 0.0 && stands_out).then_some((i, j))
+        };
+        self.of_a.iter().enumerate().filter_map(passes).collect()
+    }
 }

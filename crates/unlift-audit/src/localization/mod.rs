@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use unlift::audit::Plan;
 use unlift::localization::{Localization, PoseError, View, unprotected, with_map, with_queries};
-use unlift::obfuscate::{SCHEMES, SchemeOptions, obfuscate};
+use unlift::obfuscate::{Protected, Protection, SCHEMES, Scheme, SchemeOptions, obfuscate};
 use unlift::seed::Key;
 use unlift::truth::Original;
 use unlift_io::read::colmap;
@@ -26,6 +26,21 @@ pub struct Localize<'a> {
     /// Photos or features of the images: also localizes held-out images. Every image with an
     /// index that is half of the number modulo the number is held out.
     pub held_out: Option<(PathBuf, usize)>,
+    /// Protections of the descriptors of queries, each with every scheme on keypoints.
+    pub protections: Vec<Protection>,
+}
+
+impl Localize<'_> {
+    /// Returns all schemes on keypoints, and each under every protection.
+    fn query_schemes(&self) -> Vec<Arc<dyn Scheme<2>>> {
+        let options = SchemeOptions::usual(unlift::Unit::Pixel);
+        let plain = || SCHEMES.iter().filter_map(|entry| entry.of_dimension::<2>(&options));
+        let under = |one: &Protection| {
+            let with = |scheme| Arc::new(Protected::new(scheme, one.clone())) as Arc<dyn Scheme<2>>;
+            plain().map(with).collect::<Vec<_>>()
+        };
+        plain().chain(self.protections.iter().flat_map(under)).collect()
+    }
 }
 
 /// The cameras of a map in the unit of an audit.
@@ -144,16 +159,18 @@ pub(crate) fn of_schemes(
         let changes_descriptors = scheme.changes_descriptors();
         rows.push(report::Localization { changes_descriptors, ..row(scheme.name(), &errors) });
     }
-    let options = SchemeOptions::usual(unlift::Unit::Pixel);
-    for scheme in SCHEMES.iter().filter_map(|entry| entry.of_dimension::<2>(&options)) {
-        let errors = with_queries(views, positions, &*scheme, &key)?;
-        rows.push(report::Localization { of_queries: true, ..row(scheme.name(), &errors) });
+    let queries = localize.query_schemes();
+    for scheme in &queries {
+        let errors = with_queries(views, positions, &**scheme, &key)?;
+        let changes_descriptors = scheme.changes_descriptors();
+        let row = row(scheme.name(), &errors);
+        rows.push(report::Localization { of_queries: true, changes_descriptors, ..row });
     }
     let notes = match &localize.held_out {
         None => Vec::new(),
         Some((path, nth)) => {
             let of = (localize.cameras, original, plan);
-            vec![hold_out(path, *nth, of, &mut rows, progress)?]
+            vec![hold_out(path, *nth, of, &queries, &mut rows, progress)?]
         }
     };
     Ok((rows, notes))
@@ -165,6 +182,7 @@ fn hold_out(
     path: &Path,
     nth: usize,
     (cameras, original, plan): (&Cameras, &Original<3>, &Plan<3>),
+    queries: &[Arc<dyn Scheme<2>>],
     rows: &mut [report::Localization],
     progress: &dyn Progress,
 ) -> Result<String, Error> {
@@ -185,16 +203,14 @@ fn hold_out(
                 .to_vec()
         }
     };
-    let options = SchemeOptions::usual(unlift::Unit::Pixel);
     let n_rows = rows.len();
     for (at, row) in rows.iter_mut().enumerate() {
         progress.show(at, n_rows, &format!("localization, {}", row.scheme));
-        let on_queries = || {
-            let mut schemes = SCHEMES.iter().filter_map(|entry| entry.of_dimension::<2>(&options));
-            schemes.find(|scheme| scheme.name() == row.scheme)
-        };
         let problems = match row.of_queries {
-            true => on_queries().map(|scheme| held.with_queries(&*scheme, &key)).transpose()?,
+            true => {
+                let scheme = queries.iter().find(|scheme| scheme.name() == row.scheme);
+                scheme.map(|scheme| held.with_queries(&**scheme, &key)).transpose()?
+            }
             false => {
                 let scheme = plan.schemes.iter().find(|scheme| scheme.name() == row.scheme);
                 scheme.map(|scheme| held.with_map(&**scheme, &key)).transpose()?
@@ -212,6 +228,7 @@ fn hold_out(
     _: &Path,
     _: usize,
     _: (&Cameras, &Original<3>, &Plan<3>),
+    _: &[Arc<dyn Scheme<2>>],
     _: &mut [report::Localization],
     _: &dyn Progress,
 ) -> Result<String, Error> {

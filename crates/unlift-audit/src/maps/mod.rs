@@ -105,7 +105,11 @@ impl<'a> Job<'a> {
             original: &prepared.original,
             descriptors: prepared.descriptors.as_ref(),
             hidden: None,
-            localize: Some(Localize { cameras: &prepared.cameras, held_out: None }),
+            localize: Some(Localize {
+                cameras: &prepared.cameras,
+                held_out: None,
+                protections: Vec::new(),
+            }),
             cameras: input.cameras.iter().map(|c| c.map(|x| x * scale)).collect(),
             up: input.up,
             plan: Plan::new(points.unit()).for_map(points.len(), USUAL_K),

@@ -7,7 +7,7 @@ use clap::Args;
 use serde_json::{Map, Value, json};
 use unlift::audit::Threshold;
 use unlift::neighbors::oracle::Noise;
-use unlift::obfuscate::{Entry, Mitigation};
+use unlift::obfuscate::{Entry, Mitigation, Protection};
 use unlift::recover::{Builtin, Delta};
 use unlift_audit::images::extraction::Wanted;
 use unlift_audit::{Gate, OutlierFilter};
@@ -120,6 +120,38 @@ pub struct SolverArgs {
     pub no_records_alone: bool,
 }
 
+/// Protection of descriptors.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Attack")]
+pub struct ProtectArgs {
+    /// Also audit every scheme with protected descriptors; repeatable. subspace:2 releases a plane
+    /// through each descriptor (CVPR 2021), with half of its directions towards public descriptors;
+    /// also subspace:4:random or :adversarial. ldp:256,2,8 releases 2 of 256 public words, which
+    /// contain the nearest one with a probability for epsilon = 8 (ICCV 2023). Sources read what
+    /// an attacker infers
+    #[arg(long, value_name = "RULE", value_parser = values::protection)]
+    pub protect_descriptors: Vec<Protection>,
+    /// Folder of photos, or file of features, whose descriptors owner and attacker know: the database of adversarial
+    /// directions, and the source of words. Never use those of the map itself [default: the two
+    /// photos of unlift demo]
+    #[arg(long, value_name = "PATH", requires = "protect_descriptors")]
+    pub public_descriptors: Option<PathBuf>,
+}
+
+impl ProtectArgs {
+    /// Adds the options that were given to those of the report.
+    pub fn record(&self, options: &mut Map<String, Value>) {
+        if !self.protect_descriptors.is_empty() {
+            let names: Vec<String> =
+                self.protect_descriptors.iter().map(Protection::name).collect();
+            options.insert("protect_descriptors".into(), json!(names));
+            let public =
+                if self.public_descriptors.is_some() { "given" } else { "photos of the demo" };
+            options.insert("public_descriptors".into(), json!(public));
+        }
+    }
+}
+
 /// Input options that `audit map` and `obfuscate` share.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Input")]
@@ -163,6 +195,7 @@ Examples:
   unlift audit map PROJECT --neighbors lists-by-point.parquet --solver joint,ransac
   unlift audit map PROJECT --descriptors PROJECT/database.db --neighbors oracle --neighbors overlap
   unlift audit map PROJECT --scale 1 --gate 'ppl:localization<=2.0' --mitigate thin:1/4
+  unlift audit map PROJECT --descriptors d.npy --neighbors overlap --protect-descriptors subspace:2
   unlift audit map PROJECT --share-safe --json
   unlift audit map PROJECT --scale 1 --gate 'all@0.5:0.10<=20' --junit gates.xml --sarif gates.sarif
 
@@ -207,6 +240,8 @@ pub struct AuditMapArgs {
     /// components; drop:0.5 withholds half of the descriptors
     #[arg(long, value_name = "STEPS", value_parser = values::mitigation, help_heading = "Attack")]
     pub mitigate: Vec<Mitigation>,
+    #[command(flatten)]
+    pub protect: ProtectArgs,
     #[command(flatten)]
     pub solvers: SolverArgs,
     /// Source of the attacker's lists of neighbors; repeatable. oracle, a test tool, makes lists
@@ -358,6 +393,8 @@ pub struct AuditImagesArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_scheme,
           help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
+    #[command(flatten)]
+    pub protect: ProtectArgs,
     /// Recovery methods, separated by commas or repeated: ranking (the strongest: also uses which
     /// keypoints are not in a list), joint (faster), joint-start (the first pass of joint),
     /// consensus (each keypoint from its own list), ransac (the attack of Chelani et al. 2025)

@@ -16,7 +16,7 @@ use crate::values;
 
 pub use audits::{
     AttackArgs, AuditAgainArgs, AuditImagesArgs, AuditMapArgs, AuditReleasedArgs,
-    AuditSequenceArgs, CheckArgs, MapArgs, ResultArgs,
+    AuditSequenceArgs, CheckArgs, MapArgs, ProtectArgs, ResultArgs,
 };
 pub use images::{FeaturesArgs, InvertArgs, MetricsArgs};
 pub use program::{CompletionsArgs, DemoArgs, DoctorArgs, ManArgs, ModelsArgs};

@@ -4,7 +4,7 @@ use clap_complete::generate;
 use clap_mangen::Man;
 use serde_json::json;
 use unlift::OneLine;
-use unlift::obfuscate::SCHEMES;
+use unlift::obfuscate::{ON_REQUEST, all};
 use unlift::simd::instructions;
 use unlift_audit::total_bytes;
 use unlift_nn::{Entry, Folders, MODELS, Place};
@@ -15,15 +15,20 @@ use crate::output::print;
 
 pub fn schemes() -> anyhow::Result<Outcome> {
     let mut text = String::new();
-    for scheme in SCHEMES {
+    for scheme in all() {
         let meant_for = match (scheme.in_3d, scheme.in_2d) {
             (Some(_), Some(_)) => "maps and images",
             (Some(_), None) => "maps",
             (None, _) => "images",
         };
+        let request = if ON_REQUEST.iter().any(|entry| entry.name == scheme.name) {
+            ", on request"
+        } else {
+            ""
+        };
         let facts = scheme.facts;
         text.push_str(&format!(
-            "{}\n  for          {meant_for}\n  rule         {}\n  hidden       {}\n  publication  {}\n  patents      {}\n",
+            "{}\n  for          {meant_for}{request}\n  rule         {}\n  hidden       {}\n  publication  {}\n  patents      {}\n",
             scheme.name, facts.summary, facts.hidden, facts.source, facts.patents
         ));
     }

@@ -23,6 +23,7 @@ use super::common::{all_could_be, with_threads};
 use super::gate_files::GateFiles;
 use super::painter::{kind, painter};
 use super::plan::{attack, check_about, check_fit, own, solvers, summary, thresholds, with_attack};
+use super::protection::{protected, protections};
 use crate::args::AuditImagesArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
@@ -43,6 +44,7 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
 /// Returns the input paths, which must not be overwritten.
 pub fn inputs(args: &AuditImagesArgs) -> Vec<&Path> {
     let others = args.photos.as_deref().into_iter().chain(args.inverter.as_deref());
+    let others = others.chain(args.protect.public_descriptors.as_deref());
     [args.path.as_path()].into_iter().chain(others).collect()
 }
 
@@ -68,7 +70,8 @@ pub fn audit(args: &AuditImagesArgs) -> anyhow::Result<(Option<Finished>, Used)>
         let names = source.names();
         let chosen = choice::evenly(names.len(), args.max_images.map(|n| n.get()));
         check_photos(args, &source, &chosen)?;
-        let first = check_descriptors(&source, &chosen, &plan, args.invert)?;
+        let protects = !args.protect.protect_descriptors.is_empty();
+        let first = check_descriptors(&source, &chosen, &plan, (args.invert, protects))?;
         let inversion = match painted {
             Some(photos) => {
                 let kind = match source {
@@ -80,6 +83,13 @@ pub fn audit(args: &AuditImagesArgs) -> anyhow::Result<(Option<Finished>, Used)>
             }
             None => None,
         };
+        let own = || match source {
+            FeatureSource::Folder(_) => Ok(extraction.kind()),
+            _ => kind("--protect-descriptors", first.as_ref()),
+        };
+        let protections = protections(&args.protect, own)?;
+        let protected = protected(&protections, &plan.schemes);
+        plan.schemes.extend(protected);
         plan.measures.extend(inversion.iter().map(|one| Arc::clone(one) as Arc<dyn Measure<2>>));
         let progress = Progress::new(args.run.quiet);
         let show = match args.show.as_slice() {
@@ -190,10 +200,10 @@ fn check_descriptors(
     source: &FeatureSource,
     chosen: &[usize],
     plan: &Plan<2>,
-    invert: bool,
+    (invert, protects): (bool, bool),
 ) -> anyhow::Result<Option<Descriptors>> {
     // Extracted features always have descriptors.
-    let wanted = invert || Needs::of_plan(plan).descriptors();
+    let wanted = invert || protects || Needs::of_plan(plan).descriptors();
     if matches!(source, FeatureSource::Folder(_)) || !wanted {
         return Ok(None);
     }
@@ -218,6 +228,7 @@ fn check_descriptors(
 fn more_options(args: &AuditImagesArgs) -> Map<String, serde_json::Value> {
     let mut options = Map::new();
     args.extraction.record(&mut options);
+    args.protect.record(&mut options);
     if let Some(most) = args.max_images {
         options.insert("max_images".into(), json!(most.get()));
     }

@@ -7,7 +7,7 @@ use std::time::Instant;
 use indexmap::IndexMap;
 use serde_json::{Map, Value, json};
 use unlift::audit::{Measure, Plan};
-use unlift::obfuscate::{Mitigated, Mitigation, Scheme, SchemeOptions};
+use unlift::obfuscate::{Mitigated, Mitigation, Protection, Scheme, SchemeOptions};
 use unlift_audit::inversion::MapInversion;
 use unlift_audit::localization::Localize;
 use unlift_audit::maps::{Tiles, perform};
@@ -23,6 +23,7 @@ use super::common::{open_map, this_program, with_threads};
 use super::gate_files::GateFiles;
 use super::painter::{kind, painter};
 use super::plan::{attack, neighbors, solvers, summary, thresholds, with_attack};
+use super::protection::{protected, protections};
 use crate::args::AuditMapArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
@@ -63,7 +64,9 @@ pub fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
         if args.colors {
             notes.push("pictures assume that the obfuscated map keeps the points' colors".into());
         }
-        let mut plan = plan(args, &prepared, &input, (&mut notes, &mut doubts))?;
+        let protections = protected_by(args, &prepared)?;
+        let said = (&mut notes, &mut doubts);
+        let mut plan = plan(args, (&prepared, &input), &protections, said)?;
         plan.measures.extend(inversion.iter().map(|one| Arc::clone(one) as Arc<dyn Measure<3>>));
         let mut job = Job {
             plan,
@@ -86,7 +89,7 @@ pub fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
                 return Err(usage(format!("--localize: {expected}, found none")));
             }
             let held_out = Some((features.clone(), args.hold_out.get()));
-            job.localize = Some(Localize { cameras: &prepared.cameras, held_out });
+            job.localize = Some(Localize { cameras: &prepared.cameras, held_out, protections });
         }
         job.input.other_sha256 = others(args)?;
         beside.check()?;
@@ -131,14 +134,25 @@ fn inversion(
 pub fn inputs(args: &AuditMapArgs) -> Vec<&Path> {
     let beside = beside(args).map(|(_, path)| path);
     let of_pictures = args.photos.iter().chain(&args.inverter).chain(&args.localize);
+    let of_pictures = of_pictures.chain(&args.protect.public_descriptors);
     let of_pictures = of_pictures.map(PathBuf::as_path);
     [args.path.as_path()].into_iter().chain(beside).chain(of_pictures).collect()
 }
 
+/// Returns the protections of descriptors, if requested.
+fn protected_by(args: &AuditMapArgs, prepared: &Prepared) -> anyhow::Result<Vec<Protection>> {
+    if let (Some(one), None) = (args.protect.protect_descriptors.first(), &prepared.descriptors) {
+        let expected = "expected descriptors (--descriptors FILE), found none";
+        return Err(usage(format!("--protect-descriptors {}: {expected}", one.name())));
+    }
+    let own = || kind("--protect-descriptors", prepared.descriptors.as_ref());
+    protections(&args.protect, own)
+}
+
 fn plan(
     args: &AuditMapArgs,
-    prepared: &Prepared,
-    input: &read::Input,
+    (prepared, input): (&Prepared, &read::Input),
+    protections: &[Protection],
     (notes, doubts): (&mut Vec<String>, &mut Vec<String>),
 ) -> anyhow::Result<Plan<3>> {
     let k = usize::from(args.map.k);
@@ -158,7 +172,9 @@ fn plan(
     let options = SchemeOptions::usual(unit);
     let mut schemes: Vec<Arc<dyn Scheme<3>>> =
         entries.iter().filter_map(|entry| entry.of_dimension(&options)).collect();
-    schemes.extend(mitigated(args, &schemes, prepared)?);
+    let mitigated = mitigated(args, &schemes, prepared)?;
+    schemes
+        .extend(mitigated.into_iter().chain(protected(protections, &schemes)).collect::<Vec<_>>());
     let thresholds = thresholds(&args.thresholds, &usual)?;
     let points = prepared.original.reveal();
     let typed = !args.thresholds.is_empty();
@@ -238,6 +254,7 @@ fn more_options(args: &AuditMapArgs) -> Map<String, Value> {
         let names: Vec<String> = args.mitigate.iter().map(Mitigation::name).collect();
         options.insert("mitigate".into(), json!(names));
     }
+    args.protect.record(&mut options);
     if args.localize.is_some() {
         options.insert("hold_out".into(), json!(args.hold_out.get()));
     }

@@ -23,6 +23,7 @@ mod obfuscate;
 mod painter;
 mod paper;
 mod plan;
+mod protection;
 mod recover;
 mod split;
 mod table;

@@ -57,7 +57,8 @@ impl<'a> ImageWriter<'a> {
     /// # Errors
     /// When its family or type of descriptors differs from the first image, or the disk fails.
     pub fn released(&mut self, name: &str, released: &Released<2>) -> Result<(), Error> {
-        self.append(name, released::written(released))
+        let written = released::written(&self.path, released)?;
+        self.append(name, written)
     }
 
     /// Adds the ground truth of an image.

@@ -23,12 +23,18 @@ const MOST_VALUES: u64 = 1 << 16;
 /// It contains nothing of the ground truth: no ids, names or times.
 ///
 /// # Errors
-/// When the file cannot be written.
+/// When the file cannot be written, or the map has protected descriptors, for which there is no format.
 pub fn write_released<const D: usize>(path: &Path, released: &Released<D>) -> Result<(), Error> {
-    write_table((path, Access::Usual), &written(released))
+    write_table((path, Access::Usual), &written(path, released)?)
 }
 
-pub(super) fn written<const D: usize>(released: &Released<D>) -> Written<'_> {
+pub(super) fn written<'a, const D: usize>(
+    path: &Path,
+    released: &'a Released<D>,
+) -> Result<Written<'a>, Error> {
+    if released.protected().is_some() {
+        return Err(Error::new(path, "", "a map with plain descriptors", "protected descriptors"));
+    }
     let obfuscation = released.obfuscation();
     let per_record = released.slots_per_record();
     let mut meta = new_meta(Kind::Released);
@@ -85,7 +91,7 @@ pub(super) fn written<const D: usize>(released: &Released<D>) -> Written<'_> {
             }
         }
     }
-    written
+    Ok(written)
 }
 
 fn vectors<'a, const D: usize>(written: &mut Written<'a>, prefix: &str, rows: &'a [[f32; D]]) {

@@ -14,7 +14,7 @@ use super::plan::Plan;
 use super::records_alone::records_alone;
 use super::row::{Alone, Row};
 use super::solved::Solved;
-use crate::evaluate::{Accuracy, blind, distinct_weights, joined, reference};
+use crate::evaluate::{Accuracy, bearings, blind, distinct_weights, joined, reference};
 use crate::geometry::knn::Knn;
 use crate::neighbors::oracle::Noise;
 use crate::obfuscate::{Scheme, obfuscate};
@@ -186,6 +186,7 @@ pub(super) fn attack<const D: usize>(
             };
             row.records_alone.clone_from(&alone);
             row.metrics.extend(made.ratio_at_k.map(|ratio| (RATIO_AT_K.to_owned(), ratio)));
+            row.metrics.extend(bearings(&hidden.0, original, secret, &made.lists));
             let weights = places(owned, secret);
             if owned.may_be_small() {
                 row.fill_distinct(&accuracy, &baseline, &weights, &plan.thresholds);

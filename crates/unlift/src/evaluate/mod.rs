@@ -1,6 +1,7 @@
 //! Evaluation of recovered positions against the ground truth.
 
 mod accuracy;
+mod bearings;
 mod blind;
 mod distinct;
 mod join;
@@ -9,6 +10,7 @@ mod reference;
 mod reliability;
 
 pub use accuracy::{Accuracy, evaluate};
+pub use bearings::bearings;
 pub use blind::blind;
 pub use distinct::distinct_weights;
 pub use join::joined;

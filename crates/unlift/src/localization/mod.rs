@@ -121,6 +121,9 @@ pub fn free_directions<const D: usize>(released: &Released<D>, secret: &Secret) 
         Obfuscation::Lines(lines) => {
             (0..n).map(|slot| Free::Along(widen(&lines.direction()[record(slot)]))).collect()
         }
+        // All bearings meet in the center, so the distance of a camera from it stays free. Decoys would
+        // seem to fix it.
+        bearings if bearings.is_bearings() => vec![Free::More; n],
         Obfuscation::Rays(rays) => {
             (0..n).map(|slot| Free::Along(widen(&rays.direction()[record(slot)]))).collect()
         }
@@ -452,6 +455,13 @@ mod tests {
             Released::try_new(Obfuscation::Rays(rays), 1, [0.0; 3], Unit::Meter, None).unwrap();
         let hidden = (0..n).map(OriginalId::from_index).collect();
         let secret = Secret::try_new(hidden, None, (0..n as u32).collect(), vec![], n).unwrap();
+        assert_eq!(with_map(&[view.clone()], positions, &released, &secret), [None]);
+        // Decoys do not help.
+        let scheme = crate::obfuscate::scheme("sphere")
+            .unwrap()
+            .of_dimension::<3>(&SchemeOptions::usual(Unit::Meter));
+        let (released, secret) =
+            obfuscate(&*scheme.unwrap(), &original, None, &Key::from_seed(0)).unwrap();
         assert_eq!(with_map(&[view], positions, &released, &secret), [None]);
     }
 

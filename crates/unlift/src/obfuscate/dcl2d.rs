@@ -9,6 +9,8 @@
 //!   height, is the one recommended.
 //! - A keypoint on the split belongs to the right half.
 //! - A keypoint on its anchor has no line and is dropped.
+//! - The variants split the image at half of the height, or put the anchors at half or at twice the
+//!   distance, around the center of the image.
 //! - The line reveals its anchor, and so the half with its keypoint. It is therefore released as a
 //!   ray from the anchor.
 
@@ -23,9 +25,15 @@ use crate::seed::Key;
 
 /// Dual convergent lines.
 #[derive(Clone, Copy, Debug)]
-pub struct Dcl2d;
+pub struct Dcl2d {
+    name: &'static str,
+    /// Axis along which the image is halved: 0 for left and right halves.
+    across: usize,
+    /// Distance of the anchors, as a multiple of the length of the split.
+    distance: f64,
+}
 
-/// Registry entry.
+/// The recommended anchors.
 pub const ENTRY: Entry = Entry {
     name: "dcl2d",
     facts: Facts {
@@ -34,13 +42,40 @@ pub const ENTRY: Entry = Entry {
         hidden: "the range from the anchor (1 of 2 coordinates)",
         patents: "none found",
     },
-    in_2d: Some(|_| Arc::new(Dcl2d)),
+    in_2d: Some(|_| Arc::new(Dcl2d { name: "dcl2d", across: 0, distance: 1.0 })),
+    in_3d: None,
+};
+
+/// Upper and lower halves.
+pub const HORIZONTAL: Entry = Entry {
+    name: "dcl2d-horizontal",
+    facts: Facts {
+        summary: "as dcl2d, with an upper and a lower half and anchors at the sides",
+        ..ENTRY.facts
+    },
+    in_2d: Some(|_| Arc::new(Dcl2d { name: "dcl2d-horizontal", across: 1, distance: 1.0 })),
+    in_3d: None,
+};
+
+/// Anchors within the image.
+pub const NEAR: Entry = Entry {
+    name: "dcl2d-near",
+    facts: Facts { summary: "as dcl2d, with anchors at half the distance", ..ENTRY.facts },
+    in_2d: Some(|_| Arc::new(Dcl2d { name: "dcl2d-near", across: 0, distance: 0.5 })),
+    in_3d: None,
+};
+
+/// Anchors outside the image.
+pub const FAR: Entry = Entry {
+    name: "dcl2d-far",
+    facts: Facts { summary: "as dcl2d, with anchors at twice the distance", ..ENTRY.facts },
+    in_2d: Some(|_| Arc::new(Dcl2d { name: "dcl2d-far", across: 0, distance: 2.0 })),
     in_3d: None,
 };
 
 impl Scheme<2> for Dcl2d {
     fn name(&self) -> &str {
-        ENTRY.name
+        self.name
     }
 
     fn facts(&self) -> Facts {
@@ -56,13 +91,21 @@ impl Scheme<2> for Dcl2d {
         let Some(image) = bounds else {
             return Err(Error::new("image size", "known: anchors lie on its border", "none"));
         };
-        let split = image.center()[0];
-        let anchors = [[split, image.low[1]], [split, image.high[1]]];
-        let mut lifted = rays_from(&anchors, points, |_, point| usize::from(point[0] >= split))?;
+        let (across, along) = (self.across, 1 - self.across);
+        let (center, half) = (image.center(), (image.high[along] - image.low[along]) / 2.0);
+        let split = center[across];
+        let anchor = |side: f64| {
+            let mut anchor = center;
+            anchor[along] += side * self.distance * half;
+            anchor
+        };
+        let anchors = [anchor(-1.0), anchor(1.0)];
+        let chosen = |_, point: &[f64; 2]| usize::from(point[across] >= split);
+        let mut lifted = rays_from(&anchors, points, chosen)?;
         if let Obfuscation::Rays(rays) = lifted.obfuscation {
-            let left = Bounds { low: image.low, high: [split, image.high[1]] };
-            let right = Bounds { low: [split, image.low[1]], high: image.high };
-            lifted.obfuscation = Obfuscation::Rays(rays.with_regions(vec![left, right])?);
+            let (mut first, mut second) = (*image, *image);
+            (first.high[across], second.low[across]) = (split, split);
+            lifted.obfuscation = Obfuscation::Rays(rays.with_regions(vec![first, second])?);
         }
         Ok(lifted)
     }

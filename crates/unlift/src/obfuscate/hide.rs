@@ -63,22 +63,20 @@ pub fn obfuscate<const D: usize>(
             kept.push(axes[from as usize]);
         }
     }
-    let released_descriptors = descriptors.map(|descriptors| {
-        // Released row r holds the descriptor of the original whose slot was given row r.
-        let mut source = vec![0; hidden.len()];
-        for (slot, &row) in descriptor_row.iter().enumerate() {
-            source[row as usize] = hidden[slot].0;
-        }
-        descriptors.select(&source)
-    });
-    let released = Released::try_new(
-        lifted.obfuscation.select(&order),
-        slots,
-        origin,
-        points.unit(),
-        released_descriptors,
-    )?
-    .with_bounds(bounds);
+    // Released row r holds the descriptor of the original whose slot was given row r.
+    let mut source = vec![0; hidden.len()];
+    for (slot, &row) in descriptor_row.iter().enumerate() {
+        source[row as usize] = hidden[slot].0;
+    }
+    let protect = |rows| scheme.protection().map(|one| one.protect(rows, key)).transpose();
+    let protected = descriptors.map(protect).transpose()?.flatten();
+    let plain = descriptors.filter(|_| protected.is_none()).map(|rows| rows.select(&source));
+    let records = lifted.obfuscation.select(&order);
+    let mut released = Released::try_new(records, slots, origin, points.unit(), plain)?;
+    if let Some(protected) = protected {
+        released = released.with_protected(protected.select(&source))?;
+    }
+    let released = released.with_bounds(bounds);
     let secret =
         Secret::try_new(hidden, swapped_axis, descriptor_row, lifted.dropped, points.len())?;
     let secret = secret.of_map(Some(released.fingerprint()), slots)?;

@@ -2,6 +2,11 @@
 //!
 //! It applies `olc` in the plane, with a uniform angle. The image size is released, so a hidden
 //! point lies on a chord. Scale and orientation of keypoints are not released.
+//!
+//! The variant `lines2d-gravity` uses the line through the image of the gravity direction, as
+//! proposed for structure from motion. Images have no gravity here, so the camera is assumed to be
+//! upright and tilted down by 15 degrees, with a focal length of 1.2 times the longer side. All
+//! lines then meet in one point below the image.
 
 use std::sync::Arc;
 
@@ -9,6 +14,8 @@ use super::olc::Olc;
 use super::scheme::{Entry, Facts, Lifted, Scheme};
 use crate::Error;
 use crate::geometry::frame::Bounds;
+use crate::geometry::vector::sub;
+use crate::released::{Lines, Obfuscation};
 use crate::seed::Key;
 
 /// Random lines through keypoints.
@@ -27,6 +34,52 @@ pub const ENTRY: Entry = Entry {
     in_2d: Some(|_| Arc::new(Lines2d)),
     in_3d: None,
 };
+
+/// Lines through the image of the gravity direction.
+#[derive(Clone, Copy, Debug)]
+pub struct Gravity;
+
+/// Registry entry of the variant.
+pub const GRAVITY: Entry = Entry {
+    name: "lines2d-gravity",
+    facts: Facts {
+        summary: "the line through a keypoint and the image of the gravity direction",
+        source: "Geppert et al., Privacy Preserving Structure-from-Motion, ECCV 2020",
+        hidden: "the position along the line (1 of 2 coordinates)",
+        patents: "none found",
+    },
+    in_2d: Some(|_| Arc::new(Gravity)),
+    in_3d: None,
+};
+
+/// Focal length over the tangent of the assumed tilt, in longer sides of the image.
+const BELOW: f64 = 1.2 / 0.267_949;
+
+impl Scheme<2> for Gravity {
+    fn name(&self) -> &str {
+        GRAVITY.name
+    }
+
+    fn facts(&self) -> Facts {
+        GRAVITY.facts
+    }
+
+    fn lift(
+        &self,
+        points: &[[f64; 2]],
+        bounds: Option<&Bounds<2>>,
+        _: &Key,
+    ) -> Result<Lifted<2>, Error> {
+        let Some(image) = bounds else {
+            return Err(Error::new("image size", "known: gravity points below it", "none"));
+        };
+        let [width, height] = sub(&image.high, &image.low);
+        let [x, y] = image.center();
+        let below = [x, y + BELOW * width.max(height)];
+        let directions: Vec<[f64; 2]> = points.iter().map(|p| sub(&below, p)).collect();
+        Ok(Lifted::one_each(Obfuscation::Lines(Lines::through(points, &directions)?)))
+    }
+}
 
 impl Scheme<2> for Lines2d {
     fn name(&self) -> &str {

@@ -7,6 +7,7 @@ mod hide;
 mod kmeans;
 mod mitigate;
 mod pairs;
+mod protect;
 mod scheme;
 mod size;
 
@@ -20,9 +21,11 @@ pub mod ppl;
 pub mod ppl_plus;
 pub mod ray;
 pub mod ray_voxel;
+pub mod sphere;
 
 pub use hide::obfuscate;
 pub use mitigate::{Mitigated, Mitigation};
+pub use protect::{Protected, Protection};
 pub use scheme::{Build, Entry, Facts, Lifted, Scheme, SchemeOptions};
 
 use crate::Error;
@@ -42,13 +45,30 @@ pub const SCHEMES: &[Entry] = &[
     dcl2d::ENTRY,
 ];
 
+/// Built-in schemes that are audited only on request: their records meet in one point, so lists of
+/// neighbors say little about them, or they vary a scheme of [`SCHEMES`].
+pub const ON_REQUEST: &[Entry] = &[
+    sphere::ENTRY,
+    sphere::HALF,
+    sphere::QUARTER,
+    lines2d::GRAVITY,
+    dcl2d::HORIZONTAL,
+    dcl2d::NEAR,
+    dcl2d::FAR,
+];
+
+/// Returns all built-in schemes.
+pub fn all() -> impl Iterator<Item = &'static Entry> {
+    SCHEMES.iter().chain(ON_REQUEST)
+}
+
 /// Returns the built-in scheme called `name`.
 ///
 /// # Errors
 /// When there is no such scheme; the message lists all.
 pub fn scheme(name: &str) -> Result<&'static Entry, Error> {
-    SCHEMES.iter().find(|entry| entry.name == name).ok_or_else(|| {
-        let names: Vec<&str> = SCHEMES.iter().map(|entry| entry.name).collect();
+    all().find(|entry| entry.name == name).ok_or_else(|| {
+        let names: Vec<&str> = all().map(|entry| entry.name).collect();
         Error::new("scheme", format!("one of {}", names.join(", ")), name)
     })
 }

@@ -4,6 +4,7 @@ use std::any::Any;
 use std::fmt::Debug;
 use std::sync::Arc;
 
+use super::protect::Protection;
 use crate::geometry::frame::Bounds;
 use crate::released::Obfuscation;
 use crate::seed::Key;
@@ -118,6 +119,11 @@ pub trait Scheme<const D: usize>: Debug + Send + Sync {
     ) -> Result<Option<Descriptors>, Error> {
         let _ = (descriptors, key);
         Ok(None)
+    }
+
+    /// Returns the protection under which descriptors are released, if there is one.
+    fn protection(&self) -> Option<&Protection> {
+        None
     }
 
     /// Returns true if the scheme changes descriptors, so that fewer keypoints find their points.

@@ -1,0 +1,308 @@
+//! Protected descriptors: affine subspaces, or sets of words, in place of plain descriptors.
+//!
+//! A protected map has no plain descriptor. Sources that compare plain descriptors read the attacker's
+//! [`guess`](ProtectedDescriptors::guess), which is computed from released and public data alone.
+
+use std::sync::{Arc, OnceLock};
+
+use rayon::prelude::*;
+
+use crate::descriptors::Values;
+use crate::simd::{self, Kernel};
+use crate::{Descriptors, Error};
+
+/// Largest dimension of a subspace.
+pub const MOST_DIRECTIONS: usize = 8;
+/// A public descriptor lies on a subspace if its squared distance to it is below this.
+const ON_SUBSPACE: f32 = 1e-4;
+
+/// Descriptors as a protected map releases them, one row per slot.
+#[derive(Clone, Debug)]
+pub struct ProtectedDescriptors {
+    rule: Rule,
+    /// The released numbers of each row: the foot and the basis of a subspace, or the numbers of words.
+    rows: Descriptors,
+    /// Unit-length descriptors that owner and attacker know: the database of adversarial directions, or the vocabulary.
+    public: Option<Arc<Descriptors>>,
+    /// Whether the plain descriptors were bytes, as SIFT.
+    bytes: bool,
+    guess: OnceLock<Descriptors>,
+}
+
+impl PartialEq for ProtectedDescriptors {
+    /// Compares what is released; the guess follows from it.
+    fn eq(&self, other: &Self) -> bool {
+        let of = |one: &Self| (one.rule, one.bytes);
+        of(self) == of(other) && self.rows == other.rows && self.public == other.public
+    }
+}
+
+/// The rule that protects descriptors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Rule {
+    /// An affine subspace of dimension `m` through a unit-length descriptor.
+    Subspace {
+        /// Dimension.
+        m: usize,
+    },
+    /// `m` words of a public vocabulary. They contain the nearest word of the descriptor with a probability that is larger by the
+    /// factor `exp(epsilon)` than that of any other word, relative to chance.
+    Words {
+        /// Number of words.
+        m: usize,
+        /// Privacy budget.
+        epsilon: f64,
+    },
+}
+
+impl ProtectedDescriptors {
+    /// Creates rows from what is released. A subspace is its point nearest to the origin and `m` orthonormal directions, `(m + 1) x dim`
+    /// values. A set of words is `m` ascending numbers from 0.
+    ///
+    /// # Errors
+    /// When a row has another number of values than the rule, a value is not finite, or a word is not in the vocabulary.
+    pub fn try_new(
+        rule: Rule,
+        rows: Vec<Vec<f32>>,
+        public: Option<Arc<Descriptors>>,
+        bytes: bool,
+    ) -> Result<Self, Error> {
+        let wrong = |expected: String, found: usize| {
+            Error::new("protected descriptors", expected, found.to_string())
+        };
+        let (Rule::Subspace { m } | Rule::Words { m, .. }) = rule;
+        let least = if matches!(rule, Rule::Words { .. }) { m } else { m + 1 };
+        let width = rows.first().map_or(least, Vec::len);
+        if let Some(at) =
+            rows.iter().position(|row| row.len() != width || row.iter().any(|x| !x.is_finite()))
+        {
+            return Err(wrong(format!("{width} finite values per row"), at));
+        }
+        // Few rows may be equal, such as sets of words.
+        let rows = Descriptors::unchecked(Values::F32(rows.concat()), width.max(1));
+        match (rule, &public) {
+            (Rule::Subspace { m }, _) if m == 0 || m > MOST_DIRECTIONS => {
+                return Err(wrong(format!("1 to {MOST_DIRECTIONS} directions"), m));
+            }
+            (Rule::Subspace { m }, _) if !rows.dim().is_multiple_of(m + 1) => {
+                return Err(wrong(format!("a multiple of {} values per row", m + 1), rows.dim()));
+            }
+            (Rule::Subspace { m }, Some(public))
+                if !rows.is_empty() && rows.dim() / (m + 1) != public.dim() =>
+            {
+                let expected = format!("directions of {} values", public.dim());
+                return Err(wrong(expected, rows.dim() / (m + 1)));
+            }
+            (Rule::Words { m, .. }, _) if rows.dim() != m => {
+                return Err(wrong(format!("{m} words per row"), rows.dim()));
+            }
+            (Rule::Words { .. }, public) => {
+                let n = public.as_ref().map_or(0, |words| words.len());
+                let mut row = vec![0.0; rows.dim()];
+                for at in 0..rows.len() {
+                    rows.read_row(at, &mut row);
+                    if let Some(word) = row.iter().find(|word| !(0.0..n as f32).contains(*word)) {
+                        return Err(wrong(format!("words below {n}"), *word as usize));
+                    }
+                }
+            }
+            _ => {}
+        }
+        Ok(Self { rule, rows, public, bytes, guess: OnceLock::new() })
+    }
+
+    /// Returns the rule.
+    pub fn rule(&self) -> Rule {
+        self.rule
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether there are no rows.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Number of values of a plain descriptor.
+    pub fn dim(&self) -> usize {
+        match (self.rule, &self.public) {
+            (Rule::Subspace { m }, _) => self.rows.dim() / (m + 1),
+            (Rule::Words { .. }, Some(words)) => words.dim(),
+            (Rule::Words { .. }, None) => 0,
+        }
+    }
+
+    /// The released numbers.
+    pub fn rows(&self) -> &Descriptors {
+        &self.rows
+    }
+
+    /// The public descriptors that the rule uses, if any.
+    pub fn public(&self) -> Option<&Descriptors> {
+        self.public.as_deref()
+    }
+
+    /// Returns the rows `order[0], order[1], ...`.
+    #[must_use]
+    pub fn select(&self, order: &[u32]) -> Self {
+        let (rows, public) = (self.rows.select(order), self.public.clone());
+        Self { rule: self.rule, rows, public, bytes: self.bytes, guess: OnceLock::new() }
+    }
+
+    /// Returns the similarity of every row to a plain unit-length descriptor: 1 minus half of the squared distance to the subspace, or
+    /// the largest cosine with a word of the set. Both are at most 1, as a cosine.
+    pub fn similarities(&self, plain: &[f32]) -> Vec<f32> {
+        let Values::F32(rows) = self.rows.values() else { return vec![0.0; self.len()] };
+        let words = match self.public.as_deref().map(Descriptors::values) {
+            Some(Values::F32(words)) => &words[..],
+            _ => &[],
+        };
+        let width = self.rows.dim();
+        simd::dispatch(Similarities { rule: self.rule, rows, width, words, plain })
+    }
+
+    /// Returns the plain descriptors that an attacker infers, in the scale of the plain ones. A row is one point of its subspace, or the
+    /// mean of its words.
+    ///
+    /// A subspace intersects the unit sphere in a sphere around its foot. Public descriptors on it, at distance 0, are adversarial
+    /// directions; they are excluded, and the point opposite to them is the guess. Without such, the guess is the foot: random
+    /// directions are nearly orthogonal to the descriptor, which is therefore nearly the point nearest to the origin.
+    pub fn guess(&self) -> &Descriptors {
+        self.guess.get_or_init(|| {
+            let dim = self.dim();
+            let known: Vec<Vec<f32>> = self.public.iter().flat_map(|it| unit_rows(it)).collect();
+            let of = |at: usize| {
+                let mut row = vec![0.0; self.rows.dim()];
+                self.rows.read_row(at, &mut row);
+                match self.rule {
+                    Rule::Subspace { .. } => opposite(&row, dim, &known),
+                    Rule::Words { .. } => {
+                        let words = row.iter().map(|&word| &known[word as usize]);
+                        let mut mean = vec![0.0; dim];
+                        words.for_each(|word| add(&mut mean, word, 1.0));
+                        mean
+                    }
+                }
+            };
+            let rows: Vec<Vec<f32>> = (0..self.len()).into_par_iter().map(of).collect();
+            let scaled = rows.into_iter().flat_map(|mut row| {
+                if self.bytes {
+                    row.iter_mut().for_each(|x| *x = x.max(0.0));
+                }
+                let length = inner(&row, &row).sqrt().max(1e-12);
+                let scale = if self.bytes { 512.0 } else { 1.0 } / length;
+                row.into_iter().map(move |x| x * scale)
+            });
+            let values = match self.bytes {
+                // A cast saturates.
+                true => Values::U8(scaled.map(|x| x.round() as u8).collect()),
+                false => Values::F32(scaled.collect()),
+            };
+            Descriptors::unchecked(values, dim)
+        })
+    }
+}
+
+/// The loop of [`ProtectedDescriptors::similarities`]. Public descriptors have unit length.
+struct Similarities<'a> {
+    rule: Rule,
+    rows: &'a [f32],
+    width: usize,
+    words: &'a [f32],
+    plain: &'a [f32],
+}
+
+impl Kernel for Similarities<'_> {
+    type Output = Vec<f32>;
+
+    #[inline(always)]
+    fn run(self) -> Vec<f32> {
+        let (dim, plain) = (self.plain.len(), self.plain);
+        let rows = self.rows.chunks_exact(self.width);
+        let mut similar = Vec::with_capacity(rows.len());
+        match self.rule {
+            Rule::Subspace { .. } => {
+                let square = inner(plain, plain);
+                for row in rows {
+                    let (foot, basis) = row.split_at(dim);
+                    let mut apart = square + inner(foot, foot) - 2.0 * inner(foot, plain);
+                    for direction in basis.chunks_exact(dim) {
+                        let along = inner(direction, plain);
+                        apart -= along * along;
+                    }
+                    similar.push(1.0 - apart.max(0.0) / 2.0);
+                }
+            }
+            Rule::Words { .. } => {
+                let mut to_words = Vec::with_capacity(self.words.len() / dim.max(1));
+                for word in self.words.chunks_exact(dim) {
+                    to_words.push(inner(word, plain));
+                }
+                for row in rows {
+                    let mut best = -1.0_f32;
+                    for &word in row {
+                        best = best.max(to_words[word as usize]);
+                    }
+                    similar.push(best);
+                }
+            }
+        }
+        similar
+    }
+}
+
+/// Returns the point of a subspace on the unit sphere that is opposite to the `known` descriptors on it.
+fn opposite(row: &[f32], dim: usize, known: &[Vec<f32>]) -> Vec<f32> {
+    let (foot, basis) = row.split_at(dim);
+    let square = inner(foot, foot);
+    let mut away = vec![0.0; dim];
+    for known in known {
+        // A unit vector on the subspace has this inner product with the foot.
+        if (inner(known, foot) - square).abs() > ON_SUBSPACE {
+            continue;
+        }
+        let along = basis.chunks_exact(dim).map(|u| inner(u, known).powi(2)).sum::<f32>();
+        if 1.0 - square - along < ON_SUBSPACE {
+            add(&mut away, known, 1.0);
+            add(&mut away, foot, -1.0);
+        }
+    }
+    let length = inner(&away, &away).sqrt();
+    let mut guess = foot.to_vec();
+    if length > 0.0 {
+        add(&mut guess, &away, -(1.0 - square).max(0.0).sqrt() / length);
+    }
+    guess
+}
+
+fn add(to: &mut [f32], row: &[f32], times: f32) {
+    to.iter_mut().zip(row).for_each(|(to, x)| *to += times * x);
+}
+
+/// Returns the rows of a matrix, brought to length 1.
+pub fn unit_rows(descriptors: &Descriptors) -> impl Iterator<Item = Vec<f32>> {
+    (0..descriptors.len()).map(|at| {
+        let mut row = vec![0.0; descriptors.dim()];
+        descriptors.read_row(at, &mut row);
+        let length = inner(&row, &row).sqrt();
+        if length > 0.0 {
+            row.iter_mut().for_each(|x| *x /= length);
+        }
+        row
+    })
+}
+
+/// Returns an inner product in a fixed order of eight partial sums.
+#[inline(always)]
+pub fn inner(a: &[f32], b: &[f32]) -> f32 {
+    let mut sums = [0.0_f32; 8];
+    for (a, b) in a.chunks_exact(8).zip(b.chunks_exact(8)) {
+        (0..8).for_each(|c| sums[c] += a[c] * b[c]);
+    }
+    let rest = a.len() / 8 * 8;
+    let tail: f32 = a[rest..].iter().zip(&b[rest..]).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f32>() + tail
+}

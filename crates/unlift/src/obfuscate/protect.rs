@@ -1,0 +1,533 @@
+//! Protection of descriptors: what a map releases in place of plain descriptors.
+//!
+//! A protection with a scheme is itself a scheme ([`Protected`]), as with mitigations. Its name is
+//! the scheme's, followed by the rule: `ppl_subspace2`, `ppl_ldp256.2.8`.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::scheme::{Facts, Lifted, Scheme};
+use crate::descriptors::Values;
+use crate::geometry::frame::Bounds;
+use crate::protected::{MOST_DIRECTIONS, ProtectedDescriptors, Rule, inner, unit_rows};
+use crate::seed::{Draws, Key, Stage};
+use crate::{Descriptors, Error};
+
+/// Directions of a subspace.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Directions {
+    Random,
+    /// Towards random entries of the public database.
+    Adversarial,
+    /// Half towards entries, the others random.
+    Hybrid,
+}
+
+/// A rule that protects descriptors, and the public descriptors that it uses.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Protection {
+    rule: Rule,
+    directions: Directions,
+    /// Number of words of the vocabulary; 0 for subspaces.
+    n_words: usize,
+    public: Option<Arc<Descriptors>>,
+}
+
+const FORMS: &str = "subspace:M, subspace:M:random, subspace:M:adversarial, subspace:M:hybrid or ldp:WORDS,M,EPSILON";
+/// Largest vocabulary: Lloyd's algorithm takes a minute.
+const MOST_WORDS: usize = 1 << 14;
+/// Number of rounds of Lloyd's algorithm.
+const ROUNDS: usize = 20;
+/// Largest number of descriptors per word that Lloyd's algorithm reads.
+const MOST_PER_WORD: usize = 64;
+/// A direction is shorter than this if it lies in the span of the earlier ones.
+const SHORTEST: f64 = 1e-6;
+
+impl Protection {
+    /// Parses `subspace:2`, `subspace:4:adversarial` or `ldp:256,2,8`. Subspaces are hybrid unless
+    /// stated.
+    ///
+    /// # Errors
+    /// If the text has another form, or a number is out of range.
+    pub fn parse(text: &str) -> Result<Self, Error> {
+        let wrong = || Error::new("protection", FORMS, text);
+        let (name, rest) = text.trim().split_once(':').ok_or_else(wrong)?;
+        let found = match name {
+            "subspace" => {
+                let (m, how) = rest.split_once(':').unwrap_or((rest, "hybrid"));
+                let directions = match how {
+                    "random" => Directions::Random,
+                    "adversarial" => Directions::Adversarial,
+                    "hybrid" => Directions::Hybrid,
+                    _ => return Err(wrong()),
+                };
+                let least = if directions == Directions::Hybrid { 2 } else { 1 };
+                let m = m.parse().ok().filter(|m| (least..=MOST_DIRECTIONS).contains(m));
+                m.map(|m| (Rule::Subspace { m }, directions, 0))
+            }
+            "ldp" => {
+                let parts: Vec<&str> = rest.split(',').map(str::trim).collect();
+                let [words, m, epsilon] = parts[..] else { return Err(wrong()) };
+                let n_words = words.parse().ok().filter(|n| (2..=MOST_WORDS).contains(n));
+                let m = m.parse().ok().filter(|&m: &usize| m > 0 && Some(m) < n_words);
+                let epsilon = epsilon.parse().ok().filter(|x: &f64| *x > 0.0 && *x <= 100.0);
+                let words = n_words.zip(m).zip(epsilon);
+                words.map(|((n, m), epsilon)| (Rule::Words { m, epsilon }, Directions::Random, n))
+            }
+            _ => None,
+        };
+        let (rule, directions, n_words) = found.ok_or_else(wrong)?;
+        Ok(Self { rule, directions, n_words, public: None })
+    }
+
+    /// Returns the name in rows: letters, digits, `_` and `.`.
+    pub fn name(&self) -> String {
+        match (self.rule, self.directions) {
+            (Rule::Subspace { m }, Directions::Hybrid) => format!("subspace{m}"),
+            (Rule::Subspace { m }, Directions::Random) => format!("subspace{m}.random"),
+            (Rule::Subspace { m }, Directions::Adversarial) => format!("subspace{m}.adversarial"),
+            (Rule::Words { m, epsilon }, _) => format!("ldp{}.{m}.{epsilon}", self.n_words),
+        }
+    }
+
+    /// Returns true if the rule uses public descriptors.
+    pub fn needs_public(&self) -> bool {
+        self.n_words > 0 || self.directions != Directions::Random
+    }
+
+    /// Sets the public descriptors, which owner and attacker know: the database of adversarial
+    /// directions, or the descriptors from which the vocabulary is learned by k-means.
+    ///
+    /// # Errors
+    /// If there are too few.
+    pub fn with_public(self, public: &Descriptors) -> Result<Self, Error> {
+        let rows: Vec<Vec<f32>> = unit_rows(public).filter(|row| inner(row, row) > 0.5).collect();
+        let least = self.n_words.max(2 * MOST_DIRECTIONS);
+        if rows.len() < least {
+            let expected = format!("at least {least} for {}", self.name());
+            return Err(Error::new("public descriptors", expected, rows.len().to_string()));
+        }
+        let rows = if self.n_words > 0 { words(&rows, self.n_words) } else { rows };
+        let public = Descriptors::try_new(Values::F32(rows.concat()), public.dim())?;
+        Ok(Self { public: Some(Arc::new(public)), ..self })
+    }
+
+    /// Protects every row of `descriptors`.
+    ///
+    /// # Errors
+    /// If public descriptors are missing or have another number of values.
+    pub fn protect(
+        &self,
+        descriptors: &Descriptors,
+        key: &Key,
+    ) -> Result<ProtectedDescriptors, Error> {
+        let dim = descriptors.dim();
+        let wrong = |found: String| {
+            let expected = format!("public descriptors of {dim} values for {}", self.name());
+            Error::new("protection", expected, found)
+        };
+        match &self.public {
+            None if self.needs_public() => return Err(wrong("none".into())),
+            Some(public) if public.dim() != dim => return Err(wrong(public.dim().to_string())),
+            _ if dim < 2 * MOST_DIRECTIONS => {
+                let expected = format!("descriptors of at least {} values", 2 * MOST_DIRECTIONS);
+                return Err(Error::new("protection", expected, dim.to_string()));
+            }
+            _ => {}
+        }
+        let known: Vec<Vec<f32>> = self.public.iter().flat_map(|rows| unit_rows(rows)).collect();
+        let key = key.stage(Stage::Protection);
+        let plain: Vec<Vec<f32>> = unit_rows(descriptors).collect();
+        let of = |(row, plain): (usize, &Vec<f32>)| {
+            let mut draws = key.draws(row as u64);
+            match self.rule {
+                Rule::Subspace { m } => self.subspace(m, plain, &known, &mut draws),
+                Rule::Words { m, epsilon } => {
+                    subset(nearest(plain, &known), m, epsilon, known.len(), &mut draws)
+                }
+            }
+        };
+        let rows: Vec<Vec<f32>> = plain.par_iter().enumerate().map(of).collect();
+        let bytes = matches!(descriptors.values(), Values::U8(_));
+        ProtectedDescriptors::try_new(self.rule, rows, self.public.clone(), bytes)
+    }
+
+    /// Returns the foot of a random subspace through `plain`, and an orthonormal basis.
+    ///
+    /// Both depend on the subspace alone: the foot is its point nearest to the origin, and the
+    /// basis is turned at random. Directions as drawn would show on which line the descriptor lies.
+    fn subspace<B: crate::seed::Bits>(
+        &self,
+        m: usize,
+        plain: &[f32],
+        known: &[Vec<f32>],
+        draws: &mut Draws<B>,
+    ) -> Vec<f32> {
+        let dim = plain.len();
+        let n_adversarial = match self.directions {
+            Directions::Random => 0,
+            Directions::Adversarial => m,
+            Directions::Hybrid => m / 2,
+        };
+        let plain: Vec<f64> = plain.iter().map(|&x| x.into()).collect();
+        let mut basis: Vec<Vec<f64>> = Vec::with_capacity(m);
+        let mut tries = 0;
+        while basis.len() < m {
+            tries += 1;
+            // A database may have too few different entries.
+            let towards = basis.len() < n_adversarial && tries <= 16 * m;
+            let mut direction: Vec<f64> = match towards {
+                true => {
+                    let entry = &known[draws.below(known.len() as u64) as usize];
+                    entry.iter().zip(&plain).map(|(&v, d)| f64::from(v) - d).collect()
+                }
+                false => (0..dim).map(|_| draws.normal()).collect(),
+            };
+            if orthonormalize(&mut direction, &basis) {
+                basis.push(direction);
+            }
+        }
+        let mut turned: Vec<Vec<f64>> = Vec::with_capacity(m);
+        while turned.len() < m {
+            let mut direction = vec![0.0; dim];
+            for along in &basis {
+                let weight = draws.normal();
+                direction.iter_mut().zip(along).for_each(|(to, x)| *to += weight * x);
+            }
+            if orthonormalize(&mut direction, &turned) {
+                turned.push(direction);
+            }
+        }
+        let mut foot = plain;
+        remove(&mut foot, &turned);
+        [foot].iter().chain(&turned).flatten().map(|&x| x as f32).collect()
+    }
+}
+
+/// Makes `direction` orthogonal to `basis` and brings it to length 1; false if nothing remains.
+fn orthonormalize(direction: &mut [f64], basis: &[Vec<f64>]) -> bool {
+    let length = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let before = length(direction);
+    remove(direction, basis);
+    let after = length(direction);
+    if after <= SHORTEST * before.max(SHORTEST) {
+        return false;
+    }
+    direction.iter_mut().for_each(|x| *x /= after);
+    true
+}
+
+/// Removes the components along `basis`, twice for the sake of rounding.
+fn remove(from: &mut [f64], basis: &[Vec<f64>]) {
+    for along in basis.iter().chain(basis) {
+        let by: f64 = from.iter().zip(along).map(|(x, u)| x * u).sum();
+        from.iter_mut().zip(along).for_each(|(x, u)| *x -= by * u);
+    }
+}
+
+/// Draws `m` of `n` words, ascending: `own` is among them with probability
+/// `m e^epsilon / (m e^epsilon + n - m)`, and the others are uniform (the subset mechanism).
+fn subset<B: crate::seed::Bits>(
+    own: usize,
+    m: usize,
+    epsilon: f64,
+    n: usize,
+    draws: &mut Draws<B>,
+) -> Vec<f32> {
+    let contains = 1.0 / (1.0 + (n - m) as f64 / m as f64 * libm::exp(-epsilon));
+    let mut words = Vec::with_capacity(m);
+    if draws.unit() < contains {
+        words.push(own);
+    }
+    while words.len() < m {
+        let word = draws.below(n as u64) as usize;
+        if word != own && !words.contains(&word) {
+            words.push(word);
+        }
+    }
+    words.sort_unstable();
+    words.into_iter().map(|word| word as f32).collect()
+}
+
+/// Returns the row with the largest inner product; the first of equals.
+fn nearest(plain: &[f32], rows: &[Vec<f32>]) -> usize {
+    let mut best = (0, f32::NEG_INFINITY);
+    for (at, row) in rows.iter().enumerate() {
+        let product = inner(plain, row);
+        if product > best.1 {
+            best = (at, product);
+        }
+    }
+    best.0
+}
+
+/// Returns `n` unit-length words by spherical k-means with a fixed seed, which everyone can repeat.
+fn words(rows: &[Vec<f32>], n: usize) -> Vec<Vec<f32>> {
+    let mut draws = Draws::new(0, Stage::KMeans, n as u64);
+    let mut order: Vec<usize> = (0..rows.len()).collect();
+    draws.shuffle(&mut order);
+    order.truncate(n * MOST_PER_WORD);
+    let mut words: Vec<Vec<f32>> = order[..n].iter().map(|&at| rows[at].clone()).collect();
+    for _ in 0..ROUNDS {
+        let of: Vec<usize> = order.par_iter().map(|&at| nearest(&rows[at], &words)).collect();
+        let mut sums = vec![vec![0.0_f32; rows[0].len()]; n];
+        for (&at, &word) in order.iter().zip(&of) {
+            sums[word].iter_mut().zip(&rows[at]).for_each(|(sum, x)| *sum += x);
+        }
+        for (word, sum) in words.iter_mut().zip(sums) {
+            let length = inner(&sum, &sum).sqrt();
+            // A word without descriptors stays.
+            if length > 0.0 {
+                *word = sum.into_iter().map(|x| x / length).collect();
+            }
+        }
+    }
+    words
+}
+
+/// A scheme that releases protected descriptors.
+#[derive(Clone, Debug)]
+pub struct Protected<const D: usize> {
+    scheme: Arc<dyn Scheme<D>>,
+    protection: Protection,
+    name: String,
+}
+
+impl<const D: usize> Protected<D> {
+    /// Creates the scheme.
+    pub fn new(scheme: Arc<dyn Scheme<D>>, protection: Protection) -> Self {
+        let name = format!("{}_{}", scheme.name(), protection.name());
+        Self { scheme, protection, name }
+    }
+}
+
+impl<const D: usize> Scheme<D> for Protected<D> {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn facts(&self) -> Facts {
+        self.scheme.facts()
+    }
+
+    fn parameters(&self) -> Vec<(&'static str, f64)> {
+        self.scheme.parameters()
+    }
+
+    fn lift(
+        &self,
+        points: &[[f64; D]],
+        bounds: Option<&Bounds<D>>,
+        key: &Key,
+    ) -> Result<Lifted<D>, Error> {
+        self.scheme.lift(points, bounds, key)
+    }
+
+    fn descriptors(
+        &self,
+        descriptors: &Descriptors,
+        key: &Key,
+    ) -> Result<Option<Descriptors>, Error> {
+        self.scheme.descriptors(descriptors, key)
+    }
+
+    fn changes_descriptors(&self) -> bool {
+        true
+    }
+
+    fn protection(&self) -> Option<&Protection> {
+        Some(&self.protection)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+
+    use super::*;
+    use crate::obfuscate::{obfuscate, olc::Olc, ppl::Ppl};
+    use crate::truth::Original;
+    use crate::{PointSet, Unit, synthetic};
+
+    const DIM: usize = 64;
+
+    /// Nonnegative descriptors around a common mean, as SIFT.
+    fn descriptors(n: usize, seed: u64) -> Descriptors {
+        let mut draws = Draws::new(seed, Stage::Shapes, 0);
+        let values = (0..n * DIM).map(|_| (60.0 + 30.0 * draws.normal()).clamp(0.0, 255.0) as u8);
+        Descriptors::try_new(Values::U8(values.collect()), DIM).unwrap()
+    }
+
+    fn protected(text: &str, of: &Descriptors, seed: u64) -> ProtectedDescriptors {
+        let protection =
+            Protection::parse(text).unwrap().with_public(&descriptors(300, 9)).unwrap();
+        protection.protect(of, &Key::from_seed(seed)).unwrap()
+    }
+
+    fn cosine(a: &[f32], b: &[f32]) -> f32 {
+        inner(a, b) / (inner(a, a) * inner(b, b)).sqrt()
+    }
+
+    #[test]
+    fn names_are_plain_and_wrong_text_is_told() {
+        let name = |text| Protection::parse(text).unwrap().name();
+        assert_eq!(name("subspace:2"), "subspace2");
+        assert_eq!(name("subspace:4:random"), "subspace4.random");
+        assert_eq!(name("ldp:256,2,8"), "ldp256.2.8");
+        let wrong = ["", "subspace", "subspace:0", "subspace:1", "subspace:9", "subspace:2:odd"];
+        for wrong in wrong.into_iter().chain(["ldp:256", "ldp:4,4,1", "ldp:4,1,0", "noise:0.1"]) {
+            let error = Protection::parse(wrong).unwrap_err().to_string();
+            assert_eq!(error, format!("protection: expected {FORMS}, found {wrong}"));
+        }
+        let few = Protection::parse("ldp:400,2,8").unwrap().with_public(&descriptors(300, 9));
+        let expected = "public descriptors: expected at least 400 for ldp400.2.8, found 300";
+        assert_eq!(few.unwrap_err().to_string(), expected);
+        let none = Protection::parse("subspace:2").unwrap();
+        let error = none.protect(&descriptors(5, 1), &Key::from_seed(0)).unwrap_err().to_string();
+        let expected = "public descriptors of 64 values for subspace2";
+        assert_eq!(error, format!("protection: expected {expected}, found none"));
+    }
+
+    #[test]
+    fn a_subspace_contains_its_descriptor_and_does_not_show_it() {
+        let plain = descriptors(40, 1);
+        for text in ["subspace:2:random", "subspace:3", "subspace:4:adversarial"] {
+            let made = protected(text, &plain, 2);
+            let Rule::Subspace { m } = made.rule() else { panic!("{text}") };
+            for (at, plain) in unit_rows(&plain).enumerate() {
+                let similar = made.similarities(&plain)[at];
+                assert!((similar - 1.0).abs() < 1e-5, "{text}: {similar}");
+                let mut row = vec![0.0; (m + 1) * DIM];
+                made.rows().read_row(at, &mut row);
+                let parts: Vec<&[f32]> = row.chunks(DIM).collect();
+                for (i, one) in parts.iter().enumerate() {
+                    for (j, other) in parts[..=i].iter().enumerate().skip(1) {
+                        let unit = if i == j { 1.0 } else { 0.0 };
+                        assert!((inner(one, other) - unit).abs() < 1e-5, "{text}");
+                    }
+                }
+                // No direction is the one from the descriptor to an entry.
+                for entry in made.public().map(unit_rows).into_iter().flatten() {
+                    let towards: Vec<f32> =
+                        entry.iter().zip(&plain).map(|(entry, plain)| entry - plain).collect();
+                    let along = |part: &&[f32]| cosine(part, &towards).abs() > 0.9999;
+                    assert!(!parts[1..].iter().any(|part| along(part)), "{text}");
+                }
+            }
+        }
+    }
+
+    /// Returns the distance of two subspaces, and the point halfway between their nearest points.
+    fn meeting(
+        one: &ProtectedDescriptors,
+        other: &ProtectedDescriptors,
+        rows: [usize; 2],
+    ) -> (f64, DVector<f64>) {
+        let parts = |of: &ProtectedDescriptors, at: usize| {
+            let mut row = vec![0.0; of.rows().dim()];
+            of.rows().read_row(at, &mut row);
+            let row = DMatrix::from_iterator(DIM, row.len() / DIM, row.into_iter().map(f64::from));
+            (row.column(0).into_owned(), row.remove_column(0))
+        };
+        let ((f, u), (g, v)) = (parts(one, rows[0]), parts(other, rows[1]));
+        let m = u.ncols();
+        let both =
+            DMatrix::from_fn(DIM, 2 * m, |r, c| if c < m { u[(r, c)] } else { -v[(r, c - m)] });
+        let at = both.svd(true, true).solve(&(&g - &f), 1e-9).unwrap();
+        let (p, q) = (f + u * at.rows(0, m), g + v * at.rows(m, m));
+        ((&p - &q).norm(), (p + q) / 2.0)
+    }
+
+    #[test]
+    fn two_releases_of_one_descriptor_meet_in_it() {
+        let plain = descriptors(20, 1);
+        for text in ["subspace:2:random", "subspace:4:random", "subspace:4:adversarial"] {
+            let (one, other) = (protected(text, &plain, 2), protected(text, &plain, 3));
+            for (at, plain) in unit_rows(&plain).enumerate() {
+                let (apart, place) = meeting(&one, &other, [at, at]);
+                let plain = DVector::from_iterator(DIM, plain.into_iter().map(f64::from));
+                let off = (place - plain).norm();
+                assert!(apart < 1e-3 && off < 5e-3, "{text}: {apart}, {off}");
+            }
+            let (apart, _) = meeting(&one, &other, [0, 1]);
+            assert!(apart > 0.05, "{text}: {apart}");
+        }
+    }
+
+    #[test]
+    fn the_guess_is_near_the_descriptor() {
+        let plain = descriptors(60, 1);
+        let guessed = |text: &str| {
+            let made = protected(text, &plain, 2);
+            let guess: Vec<_> = unit_rows(made.guess()).collect();
+            assert!(matches!(made.guess().values(), Values::U8(_)));
+            let pairs = unit_rows(&plain).zip(&guess);
+            pairs.map(|(plain, guess)| f64::from(cosine(&plain, guess))).sum::<f64>() / 60.0
+        };
+        // A random direction removes a 64th of the squared length.
+        assert!(guessed("subspace:2:random") > 0.97);
+        // Entries of the database on a subspace are excluded.
+        let of_mean = {
+            let rows: Vec<_> = unit_rows(&plain).collect();
+            let mean: Vec<f32> = (0..DIM).map(|c| rows.iter().map(|row| row[c]).sum()).collect();
+            rows.iter().map(|row| f64::from(cosine(row, &mean))).sum::<f64>() / 60.0
+        };
+        for text in ["subspace:2", "subspace:2:adversarial", "subspace:4:adversarial"] {
+            let guessed = guessed(text);
+            assert!(guessed > 0.95 && guessed > of_mean, "{text}: {guessed}, {of_mean}");
+        }
+    }
+
+    #[test]
+    fn sets_contain_the_nearest_word_as_often_as_the_rule_says() {
+        let (n, m, epsilon) = (20_000, 3, 2.0);
+        let mut inside = 0;
+        let mut others = [0_u32; 10];
+        for item in 0..n {
+            let mut draws = Draws::new(1, Stage::Shapes, item);
+            let words = subset(7, m, epsilon, 10, &mut draws);
+            assert!(words.windows(2).all(|pair| pair[0] < pair[1]) && words.len() == m);
+            inside += u32::from(words.contains(&7.0));
+            words.iter().for_each(|&word| others[word as usize] += 1);
+        }
+        let e = libm::exp(epsilon);
+        let expected = 3.0 * e / (3.0 * e + 7.0);
+        assert!((f64::from(inside) / n as f64 - expected).abs() < 0.01);
+        // The other words are equally likely.
+        let other = (3.0 - expected) / 9.0;
+        for (word, count) in others.into_iter().enumerate().filter(|(word, _)| *word != 7) {
+            assert!((f64::from(count) / n as f64 - other).abs() < 0.01, "{word}");
+        }
+    }
+
+    #[test]
+    fn a_released_map_has_no_plain_descriptor() {
+        let points = PointSet::try_new(synthetic::room(1, 200).points, Unit::Meter).unwrap();
+        let (original, plain) = (Original::new(points), descriptors(200, 1));
+        let public = descriptors(300, 9);
+        let schemes: [Arc<dyn Scheme<3>>; 2] = [Arc::new(Olc), Arc::new(Ppl)];
+        for (scheme, text) in
+            schemes.iter().flat_map(|one| ["subspace:2", "ldp:16,2,4"].map(|text| (one, text)))
+        {
+            let protection = Protection::parse(text).unwrap().with_public(&public).unwrap();
+            let scheme = Protected::new(Arc::clone(scheme), protection);
+            let hide = |seed| obfuscate(&scheme, &original, Some(&plain), &Key::from_seed(seed));
+            let (released, secret) = hide(0).unwrap();
+            let by_row = secret.by_descriptor_row();
+            let (protected, guess) =
+                (released.protected().unwrap(), released.descriptors().unwrap());
+            let rows: Vec<_> = unit_rows(&plain).collect();
+            let mut guessed = unit_rows(guess).zip(by_row.hidden());
+            assert!(guessed.all(|(guess, id)| guess != rows[id.index()]));
+            if text.starts_with("subspace") {
+                for (row, id) in by_row.hidden().iter().enumerate() {
+                    let similar = protected.similarities(&rows[id.index()])[row];
+                    assert!((similar - 1.0).abs() < 1e-4, "{similar}");
+                }
+            }
+            assert_eq!(hide(0).unwrap().0, released);
+            assert_ne!(hide(1).unwrap().0.fingerprint(), released.fingerprint());
+        }
+    }
+}

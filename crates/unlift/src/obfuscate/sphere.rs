@@ -1,0 +1,142 @@
+//! Scheme `sphere`: the bearing of every point from the center of the map, among decoys.
+//!
+//! The center is the mean of all points. A share of the points keeps its bearing. The other records
+//! are decoys: the bearing of a withheld point with Gaussian noise on each component, brought to
+//! length 1, and the descriptor of that point, so that the number of records stays. In the secret, a
+//! decoy stands for the point that it withholds; its ray does not pass through it.
+//!
+//! The published code confirms the center and the shares 1/2, 1/3 and 1/4. It reads maps with
+//! decoys and does not make them: the variance of the noise and the source of a decoy's descriptor
+//! are assumptions.
+
+use std::sync::Arc;
+
+use super::ray::rays_from;
+use super::scheme::{Entry, Facts, Lifted, Scheme};
+use crate::geometry::frame::Bounds;
+use crate::released::{Obfuscation, Rays};
+use crate::seed::{Key, Stage};
+use crate::{Error, OriginalId};
+
+/// Sphere clouds.
+#[derive(Clone, Copy, Debug)]
+pub struct Sphere {
+    name: &'static str,
+    /// Share of the points that keep their bearing.
+    kept: f64,
+}
+
+/// Variance of the noise of a decoy, per component of its unit direction.
+const VARIANCE: f64 = 0.1;
+
+/// A third of the bearings is real.
+pub const ENTRY: Entry = Entry {
+    name: "sphere",
+    facts: Facts {
+        summary: "the bearing of a point from the center of the map; two thirds are decoys",
+        source: "Moon et al., Depth-Guided Privacy-Preserving Visual Localization Using 3D Sphere Clouds, BMVC 2024",
+        hidden: "the range from the center (1 of 3 coordinates)",
+        patents: "PCT application declared by its authors",
+    },
+    in_2d: None,
+    in_3d: Some(|_| Arc::new(Sphere { name: "sphere", kept: 1.0 / 3.0 })),
+};
+
+/// Half of the bearings are real.
+pub const HALF: Entry = Entry {
+    name: "sphere-half",
+    facts: Facts {
+        summary: "the bearing of a point from the center of the map; half are decoys",
+        ..ENTRY.facts
+    },
+    in_2d: None,
+    in_3d: Some(|_| Arc::new(Sphere { name: "sphere-half", kept: 0.5 })),
+};
+
+/// A quarter of the bearings is real.
+pub const QUARTER: Entry = Entry {
+    name: "sphere-quarter",
+    facts: Facts {
+        summary: "the bearing of a point from the center of the map; three quarters are decoys",
+        ..ENTRY.facts
+    },
+    in_2d: None,
+    in_3d: Some(|_| Arc::new(Sphere { name: "sphere-quarter", kept: 0.25 })),
+};
+
+impl Scheme<3> for Sphere {
+    fn name(&self) -> &str {
+        self.name
+    }
+
+    fn facts(&self) -> Facts {
+        ENTRY.facts
+    }
+
+    fn parameters(&self) -> Vec<(&'static str, f64)> {
+        vec![("share of real bearings", self.kept)]
+    }
+
+    fn lift(
+        &self,
+        points: &[[f64; 3]],
+        _: Option<&Bounds<3>>,
+        key: &Key,
+    ) -> Result<Lifted<3>, Error> {
+        let n = points.len();
+        if n < 2 {
+            return Err(Error::new("points", "at least 2", n.to_string()));
+        }
+        let center: [f64; 3] =
+            std::array::from_fn(|c| points.iter().map(|p| p[c]).sum::<f64>() / n as f64);
+        let mut lifted = rays_from(&[center], points, |_, _| 0)?;
+        let Obfuscation::Rays(rays) = &lifted.obfuscation else { return Ok(lifted) };
+        let order = key.draws(Stage::Scheme, 0).permutation(n);
+        let mut is_decoy = vec![true; n];
+        let n_kept = (self.kept * n as f64).round() as usize;
+        order[..n_kept].iter().for_each(|&row| is_decoy[row as usize] = false);
+        let noise = key.stage(Stage::Scheme);
+        let moved = |(direction, &OriginalId(row)): (&[f32; 3], &OriginalId)| {
+            let direction = direction.map(f64::from);
+            if !is_decoy[row as usize] {
+                return direction;
+            }
+            let mut draws = noise.draws(1 + u64::from(row));
+            direction.map(|x| x + VARIANCE.sqrt() * draws.normal())
+        };
+        let directions: Vec<[f64; 3]> =
+            rays.direction().iter().zip(&lifted.hidden).map(moved).collect();
+        let centers: Vec<[f64; 3]> = rays.centers().iter().map(|c| c.map(f64::from)).collect();
+        let rays = Rays::try_new(&centers, rays.center().to_vec(), &directions)?;
+        lifted.obfuscation = Obfuscation::Rays(rays);
+        Ok(lifted)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluate::{away_from_own, farthest_for_rounding};
+    use crate::obfuscate::obfuscate;
+    use crate::truth::Original;
+    use crate::{PointSet, Unit, synthetic};
+
+    #[test]
+    fn the_share_of_real_bearings_is_that_of_the_scheme() {
+        let points = PointSet::try_new(synthetic::room(1, 900).points, Unit::Meter).unwrap();
+        let original = Original::new(points);
+        for (entry, kept) in [(&ENTRY, 1.0 / 3.0), (&HALF, 0.5), (&QUARTER, 0.25)] {
+            let scheme =
+                (entry.in_3d.unwrap())(&crate::obfuscate::SchemeOptions::usual(Unit::Meter));
+            let (released, secret) =
+                obfuscate(&*scheme, &original, None, &Key::from_seed(0)).unwrap();
+            assert_eq!(secret.n_slots(), original.len());
+            let most = farthest_for_rounding(&released, &original, &secret);
+            let away = away_from_own(&released, &original, &secret);
+            let real = away.iter().filter(|&&away| away <= most).count();
+            assert_eq!(real, (kept * original.len() as f64).round() as usize, "{}", entry.name);
+            let (other, _) = obfuscate(&*scheme, &original, None, &Key::from_seed(1)).unwrap();
+            assert_ne!(other.fingerprint(), released.fingerprint());
+        }
+    }
+}
