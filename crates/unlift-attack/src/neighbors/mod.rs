@@ -24,7 +24,7 @@ mod tiles;
 mod walk;
 
 pub use bearings::support;
-pub(crate) use compare::{Likeness, MOST_ROWS};
+pub(crate) use compare::MOST_ROWS;
 pub use dense::{Dense, dense, usual};
 pub(crate) use geometric::geometric_by;
 pub use geometric::{Geometric, geometric};

@@ -455,7 +455,7 @@ mod tests {
             Released::try_new(Obfuscation::Rays(rays), 1, [0.0; 3], Unit::Meter, None).unwrap();
         let hidden = (0..n).map(OriginalId::from_index).collect();
         let secret = Secret::try_new(hidden, None, (0..n as u32).collect(), vec![], n).unwrap();
-        assert_eq!(with_map(&[view.clone()], positions, &released, &secret), [None]);
+        assert_eq!(with_map(std::slice::from_ref(&view), positions, &released, &secret), [None]);
         // Decoys do not help.
         let scheme = crate::obfuscate::scheme("sphere")
             .unwrap()

@@ -412,7 +412,7 @@ mod tests {
                     let towards: Vec<f32> =
                         entry.iter().zip(&plain).map(|(entry, plain)| entry - plain).collect();
                     let along = |part: &&[f32]| cosine(part, &towards).abs() > 0.9999;
-                    assert!(!parts[1..].iter().any(|part| along(part)), "{text}");
+                    assert!(!parts[1..].iter().any(along), "{text}");
                 }
             }
         }
