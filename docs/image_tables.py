@@ -71,10 +71,6 @@ def scene(name, document, paper, solvers):
     errors = [of["dcl2d", ratio]["median_error"] for ratio in FEWER]
     told = " / ".join("lost" if e is None else f"{e:.0f}" for e in errors)
     yield f"`ranking`, In {ratios}: `cp2d` exactly {exact} %; median error of `dcl2d` {told} px, blind {rows[-1]['blind_median_error']:.0f}."
-    if paper:
-        run = document["run"]
-        yield (f"Cost: {run['seconds']['total']:.1f} s for {rows[0]['n_points']:,} keypoints, {run['threads']} threads, peak "
-               f"{run['peak_memory_bytes'] / 2**20:.0f} MiB.")
     yield ""
 
 
@@ -90,7 +86,7 @@ def published_row(paper, trained_on):
     trained = []
     for scheme in SCHEMES:
         known = [paper.get((scheme, "estimated", t)) for t in SHOWN]
-        trained.append(" / ".join(known) if all(known) else "-")
+        trained.append(" / ".join(x or "-" for x in known) if any(known) else "-")
     return f"| paper, 7-Scenes, {trained_on} | a network | - | " + " | ".join(trained) + " |"
 
 

@@ -98,7 +98,7 @@ fn scheme(document: &Document, name: &str, thresholds: &[String]) -> SchemeChoic
     };
     SchemeChoice {
         name: name.to_owned(),
-        title: words::scheme_title(name).to_owned(),
+        title: words::scheme_title(name),
         slot: slot(document, name),
         blind: thresholds.iter().map(blind).collect(),
         alone: thresholds.iter().map(|typed| Some(alone(typed)?.0)).collect(),

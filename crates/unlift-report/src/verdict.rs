@@ -35,7 +35,7 @@ pub(crate) fn verdict(document: &Document) -> Verdict {
     let whole = document.not_audited.iter().filter(|refused| refused.neighbors.is_none());
     let refusals = whole.map(|refused| Refusal {
         scheme: refused.scheme.clone(),
-        title: words::scheme_title(&refused.scheme).to_owned(),
+        title: words::scheme_title(&refused.scheme),
         reason: refused.reason.clone(),
     });
     let refusals: Vec<Refusal> = refusals.collect();
@@ -160,7 +160,7 @@ fn card(document: &Document, scheme: &str) -> Option<Card> {
     let points = words::points(any.unit);
     Some(Card {
         scheme: scheme.to_owned(),
-        title: words::scheme_title(scheme).to_owned(),
+        title: words::scheme_title(scheme),
         rule: words::scheme_rule(scheme),
         findings,
         baselines: bearings(document, scheme)

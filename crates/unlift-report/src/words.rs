@@ -2,9 +2,11 @@
 
 use crate::document::LengthUnit;
 
-/// Returns the title of a scheme; an unknown scheme keeps its name.
-pub(crate) fn scheme_title(scheme: &str) -> &str {
-    match scheme {
+/// Returns the title of a scheme, with its changes to the map: `olc_thin4` is "Random lines, thin4". An
+/// unknown scheme keeps its name.
+pub(crate) fn scheme_title(scheme: &str) -> String {
+    let (base, changes) = scheme.split_once('_').unwrap_or((scheme, ""));
+    let title = match base {
         "olc" => "Random lines",
         "ppl" => "Paired-point lines",
         "ppl+" => "Paired-point lines, plane-aware",
@@ -22,7 +24,11 @@ pub(crate) fn scheme_title(scheme: &str) -> &str {
         "sphere" => "Sphere cloud, a third of the bearings real",
         "sphere-half" => "Sphere cloud, half of the bearings real",
         "sphere-quarter" => "Sphere cloud, a quarter of the bearings real",
-        other => other,
+        _ => return scheme.to_owned(),
+    };
+    match changes {
+        "" => title.to_owned(),
+        _ => format!("{title}, {}", changes.replace('_', ", ")),
     }
 }
 
