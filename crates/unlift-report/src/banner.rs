@@ -45,11 +45,11 @@ pub(crate) fn banner(document: &Document, cards: &[Card], refusals: &[Refusal]) 
             (Level::Gray, "No scheme was tested.".to_owned(), nothing.to_owned())
         }
     };
-    let bearings: Vec<String> =
-        cards.iter().filter_map(|card| verdict::bearings(document, &card.scheme)).collect();
+    let mut bearings = cards.iter().filter_map(|card| verdict::bearings(document, &card.scheme));
+    let bearings = bearings.next();
     let (level, headline) = match level {
         // Few recovered points do not mean that little is seen.
-        Level::Gray if !bearings.is_empty() => {
+        Level::Gray if bearings.is_some() => {
             (Level::Orange, "Bearings of points are published.".to_owned())
         }
         level => (level, headline),
@@ -155,7 +155,7 @@ pub(crate) fn next_steps(document: &Document, cards: &[Card]) -> Vec<String> {
                 .to_owned(),
         );
     }
-    steps.extend(least(cards));
+    steps.extend(least(document, cards));
     if with_descriptors && !document.results.iter().any(has_pictures) {
         steps.push("See what an attacker sees: add `--invert` and the photos.".to_owned());
     }
@@ -178,11 +178,14 @@ fn has_pictures(row: &Row) -> bool {
     row.metrics.contains_key("ssim")
 }
 
-fn least(cards: &[Card]) -> Option<String> {
+/// Returns which scheme leaks least. Schemes that publish bearings do not count: what they show is not the points that came back.
+fn least(document: &Document, cards: &[Card]) -> Option<String> {
+    let hides = |card: &&Card| verdict::bearings(document, &card.scheme).is_none();
+    let cards: Vec<&Card> = cards.iter().filter(hides).collect();
     let share = |card: &Card| card.today().or(card.finding(Basis::Oracle).map(|f| f.recovered));
     let known = cards.iter().filter(|card| card.today().is_some()).count();
     let comparable = cards.iter().filter(|card| known == 0 || card.today().is_some());
-    let card = comparable.reduce(|a, b| if share(b) < share(a) { b } else { a })?;
+    let card = comparable.copied().reduce(|a, b| if share(b) < share(a) { b } else { a })?;
     if cards.len() < 2 {
         return None;
     }

@@ -112,6 +112,16 @@ fn what_to_do_next_names_what_was_not_tried_and_what_leaks_least() {
 }
 
 #[test]
+fn published_bearings_lead_the_verdict_and_never_count_as_the_least_leak() {
+    let mut document = sample::document(true);
+    for row in document.results.iter_mut().filter(|row| row.scheme == "ppl+") {
+        row.metrics.insert("real_bearings_percent".to_owned(), 33.3);
+    }
+    assert!(verdict(&document).contains("schemes. PPL+ publishes bearings: whoever stands"));
+    assert!(!said(&document).contains("PPL+ leaks least"));
+}
+
+#[test]
 fn terminal_and_page_say_the_same_numbers() {
     for document in [sample::document(true), sample::mixed(true), sample::images()] {
         let (page, text) = (said(&document), text_table(&document));
