@@ -7,7 +7,7 @@
 //! - Two lines, or two rays from different centers, meet in the point. Wrong pairs pass each other.
 //! - A line and a plane always meet in one point.
 //! - Two planes of different axes leave a line, two of one axis leave the plane. Two rays from one center leave the ray.
-//! - Two points with swapped coordinates differ in the swapped ones, and the records of their partners tell which is right ([`swaps`]).
+//! - Two points with swapped coordinates differ in the swapped ones, and the records of their partners tell which is right (`swaps`).
 
 mod meet;
 mod swaps;
