@@ -6,6 +6,7 @@ use unlift::RecordId;
 use unlift::neighbors::Neighborhoods;
 use unlift::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
 use unlift::obfuscate::{Entry, olc, ppl};
+use unlift::recover::{Builtin, RecoverOptions, recover};
 
 use crate::maps::*;
 
@@ -181,4 +182,21 @@ fn a_map_without_a_ring_is_told() {
         "inlier ratio 0.5 at K = 10: expected at least 5 records that are between the 2K-th and \
          the 10K-th nearest, found 3"
     );
+}
+
+/// Ranking trusts that records which are not listed are far. Where wrong entries are near, too, it would lose.
+#[test]
+fn ranking_keeps_joint_estimates_where_wrong_entries_are_near() {
+    let oracle = Oracle::new(&olc::ENTRY);
+    let positions = |noise, ratio| {
+        [Builtin::Joint, Builtin::Ranking].map(|solver| {
+            let (released, lists) = (&oracle.hidden.released, oracle.lists(noise, ratio, 1));
+            let recovered = recover(released, &lists, &solver, &RecoverOptions::default()).unwrap();
+            recovered.positions().to_vec()
+        })
+    };
+    let [joint, ranking] = positions(Noise::Near, 0.2);
+    assert_eq!(joint, ranking);
+    let [joint, ranking] = positions(Noise::Uniform, 0.2);
+    assert_ne!(joint, ranking);
 }
