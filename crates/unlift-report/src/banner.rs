@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::attack::Basis;
 use crate::cards::{Card, Finding, Level, Refusal};
 use crate::document::{Document, LengthUnit, Row};
-use crate::{again, sequence, tables, verdict, words};
+use crate::{again, bearings, sequence, tables, words};
 
 /// The verdict on a whole audit in a few lines.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -45,8 +45,7 @@ pub(crate) fn banner(document: &Document, cards: &[Card], refusals: &[Refusal]) 
             (Level::Gray, "No scheme was tested.".to_owned(), nothing.to_owned())
         }
     };
-    let mut bearings = cards.iter().filter_map(|card| verdict::bearings(document, &card.scheme));
-    let bearings = bearings.next();
+    let bearings = cards.iter().find_map(|card| bearings::said(document, &card.scheme));
     let (level, headline) = match level {
         // Few recovered points do not mean that little is seen.
         Level::Gray if bearings.is_some() => {
@@ -180,7 +179,7 @@ fn has_pictures(row: &Row) -> bool {
 
 /// Returns which scheme leaks least. Schemes that publish bearings do not count: what they show is not the points that came back.
 fn least(document: &Document, cards: &[Card]) -> Option<String> {
-    let hides = |card: &&Card| verdict::bearings(document, &card.scheme).is_none();
+    let hides = |card: &&Card| bearings::said(document, &card.scheme).is_none();
     let cards: Vec<&Card> = cards.iter().filter(hides).collect();
     let share = |card: &Card| card.today().or(card.finding(Basis::Oracle).map(|f| f.recovered));
     let known = cards.iter().filter(|card| card.today().is_some()).count();

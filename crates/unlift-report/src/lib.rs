@@ -30,6 +30,7 @@
 mod again;
 mod attack;
 mod banner;
+mod bearings;
 mod cards;
 mod check;
 mod choices;

@@ -10,7 +10,7 @@ use crate::attack::{self, Basis, Given};
 use crate::banner::{Banner, banner, next_steps};
 use crate::cards::{Card, Finding, Level, Refusal};
 use crate::document::{Bound, BreakEven, Document, Row};
-use crate::{tables, words};
+use crate::{bearings, tables, words};
 
 /// The oracle's headline is its tested inlier ratio nearest to this one.
 const HEADLINE_RATIO: f64 = 0.5;
@@ -163,7 +163,7 @@ fn card(document: &Document, scheme: &str) -> Option<Card> {
         title: words::scheme_title(scheme),
         rule: words::scheme_rule(scheme),
         findings,
-        baselines: bearings(document, scheme)
+        baselines: bearings::said(document, scheme)
             .into_iter()
             .chain([baselines(document, scheme, typed, alone)])
             .collect::<Vec<_>>()
@@ -189,30 +189,6 @@ fn when(basis: Basis, row: &Row) -> String {
         }
         Basis::Oracle => words::capital(&words::if_known(row.inlier_ratio)),
     }
-}
-
-/// Returns what a scheme that publishes bearings shows; `None` for others. Recovered points say nothing about it: all bearings
-/// meet in the center, so no attack finds ranges, but directions are released as they are.
-pub(crate) fn bearings(document: &Document, scheme: &str) -> Option<String> {
-    let rows = document.results.iter().filter(|row| row.scheme == scheme);
-    let of = |name: &str| {
-        let values = rows.clone().filter_map(|row| row.metrics.get(name).copied());
-        values.max_by(f64::total_cmp)
-    };
-    let real = words::percent(of("real_bearings_percent")?);
-    let name = scheme.to_uppercase();
-    let said = format!(
-        "{name} publishes bearings: whoever stands in the center sees the scene. {real} % of the bearings are real"
-    );
-    Some(match of("decoys_area") {
-        Some(area) => {
-            let order = words::percent(100.0 * area);
-            format!(
-                "{said}; descriptors put a decoy below a real one in {order} % of pairs (50 % by chance)."
-            )
-        }
-        None => format!("{said}."),
-    })
 }
 
 /// Returns what the two baselines recover, and what lists of neighbors add to the larger one: "A blind guess recovers

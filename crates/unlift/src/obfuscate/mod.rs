@@ -8,6 +8,7 @@ mod kmeans;
 mod mitigate;
 mod pairs;
 mod protect;
+mod protected;
 mod scheme;
 mod size;
 
@@ -25,7 +26,8 @@ pub mod sphere;
 
 pub use hide::obfuscate;
 pub use mitigate::{Mitigated, Mitigation};
-pub use protect::{Protected, Protection};
+pub use protect::Protection;
+pub use protected::Protected;
 pub use scheme::{Build, Entry, Facts, Lifted, Scheme, SchemeOptions};
 
 use crate::Error;

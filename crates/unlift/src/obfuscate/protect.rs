@@ -1,15 +1,13 @@
 //! Protection of descriptors: what a map releases in place of plain descriptors.
 //!
-//! A protection with a scheme is itself a scheme ([`Protected`]), as with mitigations. Its name is
-//! the scheme's, followed by the rule: `ppl_subspace2`, `ppl_ldp256.2.8`.
+//! A protection with a scheme is itself a scheme ([`Protected`](super::Protected)), as with
+//! mitigations. Its name is the scheme's, followed by the rule: `ppl_subspace2`, `ppl_ldp256.2.8`.
 
 use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::scheme::{Facts, Lifted, Scheme};
 use crate::descriptors::Values;
-use crate::geometry::frame::Bounds;
 use crate::protected::{MOST_DIRECTIONS, ProtectedDescriptors, Rule, inner, unit_rows};
 use crate::seed::{Draws, Key, Stage};
 use crate::{Descriptors, Error};
@@ -286,67 +284,12 @@ fn words(rows: &[Vec<f32>], n: usize) -> Vec<Vec<f32>> {
     words
 }
 
-/// A scheme that releases protected descriptors.
-#[derive(Clone, Debug)]
-pub struct Protected<const D: usize> {
-    scheme: Arc<dyn Scheme<D>>,
-    protection: Protection,
-    name: String,
-}
-
-impl<const D: usize> Protected<D> {
-    /// Creates the scheme.
-    pub fn new(scheme: Arc<dyn Scheme<D>>, protection: Protection) -> Self {
-        let name = format!("{}_{}", scheme.name(), protection.name());
-        Self { scheme, protection, name }
-    }
-}
-
-impl<const D: usize> Scheme<D> for Protected<D> {
-    fn name(&self) -> &str {
-        &self.name
-    }
-
-    fn facts(&self) -> Facts {
-        self.scheme.facts()
-    }
-
-    fn parameters(&self) -> Vec<(&'static str, f64)> {
-        self.scheme.parameters()
-    }
-
-    fn lift(
-        &self,
-        points: &[[f64; D]],
-        bounds: Option<&Bounds<D>>,
-        key: &Key,
-    ) -> Result<Lifted<D>, Error> {
-        self.scheme.lift(points, bounds, key)
-    }
-
-    fn descriptors(
-        &self,
-        descriptors: &Descriptors,
-        key: &Key,
-    ) -> Result<Option<Descriptors>, Error> {
-        self.scheme.descriptors(descriptors, key)
-    }
-
-    fn changes_descriptors(&self) -> bool {
-        true
-    }
-
-    fn protection(&self) -> Option<&Protection> {
-        Some(&self.protection)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use nalgebra::{DMatrix, DVector};
 
     use super::*;
-    use crate::obfuscate::{obfuscate, olc::Olc, ppl::Ppl};
+    use crate::obfuscate::{Protected, Scheme, obfuscate, olc::Olc, ppl::Ppl};
     use crate::truth::Original;
     use crate::{PointSet, Unit, synthetic};
 
