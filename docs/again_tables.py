@@ -56,12 +56,14 @@ def changed(shared, scene, folder, noise):
     return folder / "changed.csv", folder / "changed.bin"
 
 
-def table(document):
+def table(document, links=True):
+    """The rows of a document; `links` adds how many points are linked, and how many links are right."""
     thresholds = list(document["options"]["thresholds"])
     unit = " m" if document["results"][0]["unit"] == "meter" else ""
     within = " / ".join(thresholds) + unit
-    yield f"| schemes | within {within} | by geometry alone | linked | right | sure, right | blind |"
-    yield "|" + " --- |" * 7
+    columns = ["linked", "right"] if links else []
+    yield "| " + " | ".join(["schemes", f"within {within}", "by geometry alone", *columns, "sure, right", "blind"]) + " |"
+    yield "|" + " --- |" * (5 + len(columns))
     rows = {(row["scheme"], row["neighbors"]): row for row in document["results"]}
     shares = lambda row: " / ".join(f"{x:.1f}" for x in row["recovered_percent"].values()) if row else "-"
     for scheme in document["options"]["schemes"]:
@@ -69,9 +71,16 @@ def table(document):
         sure = f"{row['sure_percent']:.1f}"
         if row.get("sure_correct_percent") is not None:
             sure += f", {row['sure_correct_percent']:.1f}"
-        cells = [scheme, shares(row), shares(rows.get((scheme, "again-geometry"))), f"{row['metrics']['linked_percent']:.1f}",
-                 f"{100 * row['inlier_ratio']:.1f}", sure, f"{row['blind_percent'][thresholds[0]]:.1f}"]
+        linked = [f"{row['metrics']['linked_percent']:.1f}", f"{100 * row['inlier_ratio']:.1f}"] if links else []
+        cells = [scheme, shares(row), shares(rows.get((scheme, "again-geometry"))), *linked, sure, f"{row['blind_percent'][thresholds[0]]:.1f}"]
         yield "| " + " | ".join(cells) + " |"
+
+
+def links_line(document):
+    """States which links by descriptors exist and are right, over all rows of a document."""
+    rows = [row for row in document["results"] if row["neighbors"] == "again"]
+    linked, right = min(row["metrics"]["linked_percent"] for row in rows), min(row["inlier_ratio"] for row in rows)
+    return f"Linked by descriptors: at least {linked:.1f} %, of which at least {100 * right:.1f} % are right."
 
 
 def tables(program, shared):
@@ -80,18 +89,18 @@ def tables(program, shared):
         model, descriptors = shared / "data" / scene / "model", shared / "data" / scene / "descriptors.bin"
         yield f"### {name}, released twice"
         yield ""
-        yield from table(audit(program, model, model, [descriptors], *options))
-        yield ""
+        document = audit(program, model, model, [descriptors], *options)
+        yield from [*table(document, links=False), "", links_line(document), ""]
         if scene != "redkitchen":
             continue
         yield f"{name} under two different schemes:"
         yield ""
-        yield from table(audit(program, model, model, [descriptors], *options, "--schemes", ",".join(MIXED)))
-        yield ""
-        for noise, text in [(0, "exact"), (0.005, "with an error of 5 mm")]:
+        document = audit(program, model, model, [descriptors], *options, "--schemes", ",".join(MIXED))
+        yield from [*table(document, links=False), "", links_line(document), ""]
+        for noise, text in [(0, "is unchanged"), (0.005, "has an error of 5 mm")]:
             with tempfile.TemporaryDirectory() as folder:
                 later, of_later = changed(shared, scene, pathlib.Path(folder), noise)
-                yield f"{name} and a later version, of which a tenth is gone and a tenth has moved by half a meter; the rest is {text}:"
+                yield f"{name} and a later version: a tenth of the points is gone, a tenth has moved by half a meter, the rest {text}:"
                 yield ""
                 document = audit(program, model, later, [descriptors, of_later], *options, "--schemes", ",".join(CHANGED))
                 yield from table(document)

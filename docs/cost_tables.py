@@ -34,7 +34,7 @@ def number(value, form="{:.2f}"):
 
 
 def bound(documents):
-    yield "Error of the camera center by the bound, as a multiple of the unprotected one (median over images)."
+    yield "The bound: error of the camera center as a multiple of the unprotected one (median over images)."
     yield ""
     yield "| map | unprotected | " + " | ".join(SCHEMES + QUERIES) + " |"
     yield "|" + " --- |" * (2 + len(SCHEMES + QUERIES))
@@ -53,28 +53,32 @@ def bound(documents):
 
 
 def held_out(documents):
-    yield "Held-out images: median error of the camera center and of the rotation, and images within the limits, in percent."
+    schemes = ["none", *SCHEMES, *QUERIES]
+    found = {name: {row["scheme"]: row["held_out"] for row in document["localization"]} for name, document in documents.items()}
+    yield "Held-out images: median errors of the camera center and of the rotation, and the first as a multiple of the unprotected one."
     yield ""
-    for name, document in documents.items():
-        rows = [row for row in document["localization"] if row["scheme"] in ["none", *SCHEMES, *QUERIES]]
-        first = rows[0]["held_out"]
-        limits = list(first["recall_percent"])
-        yield f"{name}: {first['n_images']} images; {first['right_matches']:.0f} of {first['matches']:.0f} matches are right (medians)."
-        yield ""
-        yield "| scheme | center | rotation | times unprotected | " + " | ".join(limits) + " |"
-        yield "|" + " --- |" * (4 + len(limits))
-        for row in rows:
-            found = row["held_out"]
-            center = number(found["center_error"], "{:.4f}")
-            angle = number(found["rotation_error_degrees"], "{:.3f}°")
-            recalls = [f"{found['recall_percent'][limit]:.0f}" for limit in limits]
-            yield f"| `{row['scheme']}` | {center} | {angle} | {number(found['multiple'])} | " + " | ".join(recalls) + " |"
-        yield ""
+    yield "| scheme | " + " | ".join(documents) + " |"
+    yield "|" + " --- |" * (1 + len(documents))
+    for scheme in schemes:
+        cells = []
+        for rows in found.values():
+            row = rows[scheme]
+            known = f"{number(row['center_error'], '{:.4f}')}, {number(row['rotation_error_degrees'], '{:.3f}°')}, {number(row['multiple'])}"
+            cells.append("no pose" if row["multiple"] is None else known)
+        yield f"| `{scheme}` | " + " | ".join(cells) + " |"
+    yield ""
+    for name, rows in found.items():
+        first = rows["none"]
+        recalls = {scheme: " / ".join(f"{x:.0f}" for x in rows[scheme]["recall_percent"].values()) for scheme in schemes}
+        missed = [f"`{scheme}` ({text} %)" for scheme, text in recalls.items() if text != "100 / 100 / 100"]
+        yield (f"- {name}: {first['n_images']} images; {first['right_matches']:.0f} of {first['matches']:.0f} matches are right (medians). Within "
+               f"{' / '.join(first['recall_percent'])}: all images, except under {' and '.join(missed)}.")
+    yield ""
 
 
 def mitigations(documents):
-    yield "Mitigations: points within the first threshold, in percent of the released points / of all points, and the error of the camera"
-    yield "center of held-out images as a multiple of the unprotected one."
+    yield "Mitigations: recovered percent of the released points / of all points, and the error of the camera center of held-out images as a multiple"
+    yield "of the unprotected one."
     yield ""
     for name, document in documents.items():
         cost = {row["scheme"]: row["held_out"]["multiple"] for row in document["localization"]}
@@ -85,7 +89,8 @@ def mitigations(documents):
             percent = max(row["recovered_percent"][within], row["blind_percent"][within])
             of_all = percent * row["n_points"] / (row["n_points"] + sum(row["dropped"].values()))
             leak[row["scheme"]] = max(leak.get(row["scheme"], (0, 0)), (percent, of_all))
-        yield f"{name}, the stronger of the lists by {' and '.join(sources)}, within {within}:"
+        better = ", whichever recovers more" if len(sources) > 1 else ""
+        yield f"{name}, lists by {' or '.join(sources)}{better}, within {within}:"
         yield ""
         yield "| mitigation | " + " | ".join(SCHEMES) + " |"
         yield "|" + " --- |" * (1 + len(SCHEMES))

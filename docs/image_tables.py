@@ -64,7 +64,7 @@ def scene(name, document, paper, solvers):
     yield from [f"### {name}", ""]
     for solver in solvers:
         first = solver == solvers[0]
-        yield from [f"`{solver}`:", "", *by_ratio(rows, solver, paper, RATIOS if first and paper else FEWER, first), ""]
+        yield from [f"`{solver}`:", "", *by_ratio(rows, solver, paper if first else {}, RATIOS if first and paper else FEWER, first), ""]
     of = {(r["scheme"], r["inlier_ratio"]): r for r in rows if r["solver"] == "ranking"}
     ratios = " / ".join(map(str, FEWER))
     exact = " / ".join(f"{of['cp2d', ratio]['exact_percent']:.1f}" for ratio in FEWER)
@@ -95,8 +95,7 @@ def tables(program, shared):
     paper, data = published(shared), shared / "data"
     oracle = ["--solver", ",".join(SOLVERS)]
     own = [x for source in SOURCES for x in ("--neighbors", source)]
-    yield from ["Percent within 5 / 10 / 25 px over all keypoints, K = 20, uniform oracle noise, seed 0; in brackets the paper's mean over",
-                "7-Scenes.", ""]
+    yield from ["Percent of all keypoints within 5 / 10 / 25 px, seed 0; in brackets the paper's mean over 7-Scenes.", ""]
     rows = []
     for name, short, images, known in (("RedKitchen, 40 photos of 640 x 480", "RedKitchen, SIFT", "redkitchen/images", paper),
                                        ("Castle, features-sift.h5", "Castle, SIFT", "castle/features-sift.h5", {})):
@@ -111,7 +110,7 @@ def tables(program, shared):
         rows += without_oracle(f"{place}, {kept}", found, ["learned", "similarity"])
     rows.append(published_row(published(shared, "superpoint"), "SuperPoint"))
     yield from ["### Neighborhoods from descriptors alone", "",
-                "\"Right\" is the share of listed keypoints among the true 20 nearest. ALIKED: the best 2,048 keypoints, or those of a score above",
-                "0.2. The paper's network saw 97,000 images of ScanNet.", ""]
+                "*Right* is the share of listed keypoints among the true 20 nearest. ALIKED: the best 2,048 keypoints, or all with a score above 0.2.",
+                "The paper trained its network on 97,000 images of ScanNet.", ""]
     yield from head(["photos", "neighbors by", "right, %", *SCHEMES])
     yield from [*rows, ""]

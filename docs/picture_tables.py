@@ -80,6 +80,6 @@ def tables(program, shared):
                 solid += table(f"{name}, {kind}" + (" and colors" if colors else ""), document, SOLID, beside)
                 true[-1] += f"{'<br>with colors ' if colors else ''}{baseline(document, SOLID[0], beside)}"
             true[-1] += " |"
-    yield from ["SSIM / LPIPS, means over the photos (RedKitchen 40, Castle 11) at half their size; in brackets the paper's SSIM on 7-Scenes",
-                "(another network, full size).", "", "Images:", "", *head(FLAT), *flat, "", "Maps as their cameras see them:", "", *head(SOLID),
+    yield from ["SSIM / LPIPS, means over the photos at half their size; in brackets the paper's SSIM on 7-Scenes (another network, full size).", "",
+                "Images:", "", *head(FLAT), *flat, "", "Maps as their cameras see them:", "", *head(SOLID),
                 *solid, "", "True points, SSIM / PSNR / LPIPS:", "", "| of | images | map |", "| --- | --- | --- |", *true, ""]
