@@ -80,7 +80,7 @@ def held_out(documents):
 
 def mitigations(documents):
     yield "Mitigations: recovered percent of the released points / of all points, and the error of the camera center of held-out images as a multiple"
-    yield "of the unprotected one."
+    yield "of the unprotected one (`-`: no pose)."
     yield ""
     for name, document in documents.items():
         cost = {row["scheme"]: row["held_out"]["multiple"] for row in document["localization"]}
@@ -106,7 +106,7 @@ def mitigations(documents):
                     continue
                 released, of_all = leak[key]
                 said = f"{released:.1f}" if text is None or of_all > 0.97 * released else f"{released:.1f} / {of_all:.1f}"
-                cells.append(f"{said}, {number(cost[key])}")
+                cells.append(f"{said}, {'-' if cost[key] is None else number(cost[key])}")
             yield f"| {'none' if text is None else f'`{text}`'} | " + " | ".join(cells) + " |"
         yield ""
 

@@ -78,12 +78,20 @@ def names(document, schemes):
         yield f"`{one}`", {scheme: f"{scheme}_{one}" for scheme in schemes}
 
 
+def error_of(found):
+    """The error of held-out images, and the percentage placed within the first limit if not all are."""
+    if found["multiple"] is None:
+        return "no pose"
+    placed = list(found["recall_percent"].values())[0]
+    return f"{found['multiple']:.1f}" + (f" ({placed:.0f} %)" if placed < 99.5 else "")
+
+
 def leak(name, document, schemes):
     held = {row["scheme"]: row.get("held_out") for row in document.get("localization", [])}
     within = list(document["results"][0]["recovered_percent"])[-2 if document["results"][0]["unit"] in ("px", "pixel") else 0]
-    heads = ["descriptors", "true in lists", *(f"`{scheme}`" for scheme in schemes)]
+    heads = ["descriptors", "true in lists, %", *(f"`{scheme}`" for scheme in schemes)]
     if any(held.values()):
-        heads += ["right matches", "error", "placed"]
+        heads += ["right matches", "error"]
     yield f"{name}, within {within}:"
     yield ""
     yield "| " + " | ".join(heads) + " |"
@@ -91,12 +99,10 @@ def leak(name, document, schemes):
     for text, variant in names(document, schemes):
         best = [strongest(document, variant[scheme]) for scheme in schemes]
         row, _ = best[0]
-        cells = [text, f"{100 * row['inlier_ratio']:.1f} % (`{row['neighbors']}`)", *(f"{share:.1f}" for _, share in best)]
+        cells = [text, f"{100 * row['inlier_ratio']:.1f} `{row['neighbors']}`", *(f"{share:.1f}" for _, share in best)]
         found = held.get(variant[schemes[0]])
         if found:
-            error = "no pose" if found["multiple"] is None else f"{found['multiple']:.1f}"
-            recall = list(found["recall_percent"].values())
-            cells += [f"{found['right_matches']:.0f} of {found['matches']:.0f}", error, f"{recall[0]:.0f} %"]
+            cells += [f"{found['right_matches']:.0f} of {found['matches']:.0f}", error_of(found)]
         yield "| " + " | ".join(cells + ["-"] * (len(heads) - len(cells))) + " |"
     yield ""
 
@@ -105,7 +111,7 @@ def queries(documents):
     """Localization with protected queries and the map in the clear, all maps in one table."""
     held = {name: {row["scheme"]: row["held_out"] for row in document["localization"] if row.get("of_queries")}
             for name, document in documents.items()}
-    yield "Protected queries and a plain map, error (images placed):"
+    yield "Protected queries and a plain map, error:"
     yield ""
     yield "| descriptors of the query | " + " | ".join(f"{name}, `{scheme}`" for name in held for scheme in QUERIES) + " |"
     yield "|" + " --- |" * (1 + len(held) * len(QUERIES))
@@ -114,23 +120,21 @@ def queries(documents):
         cells = []
         for of_map in held.values():
             for scheme in QUERIES:
-                found = of_map[variant[scheme]]
-                error = "no pose" if found["multiple"] is None else f"{found['multiple']:.1f}"
-                cells.append(f"{error} ({list(found['recall_percent'].values())[0]:.0f} %)")
+                cells.append(error_of(of_map[variant[scheme]]))
         yield f"| {text} | " + " | ".join(cells) + " |"
     yield ""
 
 
 def spheres(documents):
-    yield "| map | scheme | real bearings | true in lists | decoys: precision / recall | area |"
+    yield "| map | scheme | real bearings, % | true in lists, % | decoys: precision / recall, % | area |"
     yield "|" + " --- |" * 6
     most = 0.0
     for name, document in documents.items():
         for row in document["results"]:
             metric = row["metrics"]
             most = max(most, list(row["recovered_percent"].values())[0])
-            yield (f"| {name} | `{row['scheme']}` | {metric['real_bearings_percent']:.0f} % | {100 * row['inlier_ratio']:.0f} % | "
-                   f"{metric['decoys_precision_percent']:.0f} / {metric['decoys_recall_percent']:.0f} % | {metric['decoys_area']:.3f} |")
+            yield (f"| {name} | `{row['scheme']}` | {metric['real_bearings_percent']:.0f} | {100 * row['inlier_ratio']:.0f} | "
+                   f"{metric['decoys_precision_percent']:.0f} / {metric['decoys_recall_percent']:.0f} | {metric['decoys_area']:.3f} |")
     yield ""
     yield f"Points within the first threshold: at most {most:.1f} %."
     yield ""
