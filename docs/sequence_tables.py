@@ -69,19 +69,53 @@ def off(documents):
     yield ""
 
 
+def lists(scenes):
+    """The table with lists of neighbors within each query, by scene; and keypoints that the service's map does not have."""
+    yield from ["Links by descriptors, alone -> combined with lists of neighbors within each query (`--neighbors descriptors`), and the combined "
+                "figure for keypoints that show no point of the map [their share]; percent within 10 px:", "",
+                *head(["scene", "queries", *SCHEMES, "new things: " + ", ".join(SCHEMES) + " [share]"])]
+    for scene, document in scenes.items():
+        rows = by_queries(document)
+        for n in [n for n in numbers(document) if n >= 3]:
+            alone, both = ([rows[s, f"{by}@{n}"] for s in SCHEMES] for by in ("sequence", "sequence+lists"))
+            cells = [f"{a['recovered_percent']['10']:.1f} -> {b['recovered_percent']['10']:.1f}" for a, b in zip(alone, both)]
+            new = [b["metrics"]["new_within_10_percent"] for b in both]
+            cells.append(", ".join(f"{x:.1f}" for x in new) + f" [{both[0]['metrics']['new_percent']:.0f}]")
+            yield f"| {scene} | {n} | " + " | ".join(cells) + " |"
+    yield ""
+
+
+def defended(documents):
+    """The table with changed descriptors, by their option."""
+    yield from ["RedKitchen, ALIKED, with Gaussian noise on the unit descriptors of each query, percent of all keypoints within 10 px:", "",
+                *head(["noise", "queries", "links right", *SCHEMES])]
+    for name, document in documents:
+        rows = by_queries(document)
+        for n in [n for n in numbers(document) if n >= 5]:
+            cells = [rows[s + name, f"sequence@{n}"] for s in SCHEMES]
+            right = f"{100 * cells[0]['inlier_ratio']:.0f}"
+            yield f"| {name[6:] or 'none'} | {n} | {right} | " + " | ".join(f"{c['recovered_percent']['10']:.1f}" for c in cells) + " |"
+    yield ""
+
+
 def tables(program, shared):
-    found = []
+    found, with_lists = [], {}
     for kind in ("SIFT", "ALIKED"):
         rows, names = [], []
         for scene, features, model, photos, options in SCENES:
             if features.startswith(kind):
-                document = audit(program, shared, model, photos, *options)
+                lists_too = ["--neighbors", "descriptors"] if kind == "ALIKED" else []
+                document = audit(program, shared, model, photos, *options, *lists_too)
+                with_lists |= {scene: document} if lists_too else {}
                 images, points = document["input"]["images"]["used"], document["input"]["n_points"]
                 names.append(f"{scene} ({images} images, {points:,} keypoints)")
                 rows += lines(scene, document)
         found += [f"{kind}, " + " and ".join(names) + ":", "",
                   *head(["scene", "queries", "tracked", "linked, right", *SCHEMES]), *rows, ""]
+    found += lists(with_lists)
     scene, features, model, photos, options = SCENES[1]
+    noisy = audit(program, shared, model, photos, *options, "--mitigate", "noise:0.05", "--mitigate", "noise:0.1")
+    found += defended((name, noisy) for name in ["", "_noise0.05", "_noise0.1"])
     found += off({poses: audit(program, shared, model, photos, *options, "--scale", "1", "--poses", poses) for poses in POSES})
     return found
 

@@ -156,6 +156,22 @@ pub fn image_source(text: &str) -> Result<NeighborSource, String> {
     })
 }
 
+/// Parses a source of lists that needs no ground truth.
+pub fn own_image_source(text: &str) -> Result<Named, String> {
+    match image_source(text)? {
+        NeighborSource::Own(named) => Ok(named),
+        _ => Err(format!("expected a source that reads released data, found {text}")),
+    }
+}
+
+/// Parses a change to the descriptors of single images.
+pub fn image_mitigation(text: &str) -> Result<Mitigation, String> {
+    match mitigation(text)? {
+        mitigation if mitigation.fits_images() => Ok(mitigation),
+        _ => Err(format!("expected noise:DEVIATION, bits:N or drop:SHARE, found {text}")),
+    }
+}
+
 pub fn all_schemes() -> Vec<&'static Entry> {
     SCHEMES.iter().filter(|entry| entry.in_3d.is_some()).collect()
 }
@@ -190,6 +206,14 @@ pub fn positive(text: &str) -> Result<f64, String> {
 pub fn scale(text: &str) -> Result<f64, String> {
     positive(text)
         .map_err(|_| format!("expected meters per unit of the map, a number above 0, found {text}"))
+}
+
+/// Parses a share below 1.
+pub fn share(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if (0.0..1.0).contains(&value) => Ok(value),
+        _ => Err(format!("expected a number from 0 to below 1, found {text}")),
+    }
 }
 
 pub fn ratio(text: &str) -> Result<f64, String> {

@@ -72,6 +72,7 @@ pub(crate) fn basis_of(neighbors: &str, solver: &str) -> Option<Basis> {
 
 /// Sources of a sequence, before the number of queries: links by descriptors, and by true tracks.
 const SEQUENCE: &str = "sequence@";
+pub(crate) const SEQUENCE_AND_LISTS: &str = "sequence+lists@";
 const TRACKS: &str = "tracks@";
 
 /// Sources of two releases: links by descriptors, and by geometry alone.
@@ -90,7 +91,7 @@ pub(crate) fn intersects(neighbors: &str) -> bool {
 
 /// Returns the number of queries of a row of a sequence, as text.
 pub(crate) fn queries(neighbors: &str) -> Option<&str> {
-    neighbors.strip_prefix(SEQUENCE).or_else(|| neighbors.strip_prefix(TRACKS))
+    [SEQUENCE, SEQUENCE_AND_LISTS, TRACKS].iter().find_map(|by| neighbors.strip_prefix(by))
 }
 
 pub(crate) fn has_neighborhoods(row: &Row) -> bool {
@@ -133,6 +134,10 @@ pub(crate) fn plain_source(neighbors: &str, oracle_noise: Option<&str>) -> Strin
         (AGAIN_GEOMETRY, _) => "two releases, linked by geometry".to_owned(),
         (own, _) if own.starts_with(TRACKS) => {
             format!("{} queries with known poses and tracks", &own[TRACKS.len()..])
+        }
+        (own, _) if own.starts_with(SEQUENCE_AND_LISTS) => {
+            let n = &own[SEQUENCE_AND_LISTS.len()..];
+            format!("{n} queries with known poses, and neighbors by descriptors")
         }
         (own, _) if own.starts_with(SEQUENCE) => {
             format!("{} queries with known poses", &own[SEQUENCE.len()..])

@@ -14,6 +14,9 @@ const LEAK: f64 = 20.0;
 const COST: f64 = 2.0;
 /// If the chart has more dots than this, only dots on the Pareto front have a name beside them.
 const MOST_NAMES: usize = 20;
+/// Width of a letter and height of a line of a name, in units of the chart.
+const LETTER: f64 = 6.5;
+const LINE: f64 = 11.0;
 /// Size of the chart's plot in its own units.
 const SIZE: [f64; 2] = [560.0, 300.0];
 
@@ -133,15 +136,23 @@ pub(crate) fn chart(document: &Document) -> Option<Chart> {
     let mut dots: Vec<Dot> = Vec::new();
     for point in &points {
         let at = [x(point.cost), y(point.leak)];
-        let near = |dot: &&Dot| {
-            let [x, y] = [0, 1].map(|c| (dot.at[c] - at[c]).abs());
-            !dot.name.is_empty() && x < 70.0 && y < 11.0
-        };
-        let shift = 11.0 * dots.iter().filter(near).count() as f64;
         // The titles name all dots.
         let is_named = points.len() <= MOST_NAMES || best(point);
+        let name = if is_named { point.one.scheme.clone() } else { String::new() };
+        // The nearest height at which the name overlaps no other one.
+        let overlaps = |shift: f64, dot: &Dot| {
+            let [dx, dy] = [dot.at[0] - at[0], dot.at[1] + dot.shift - at[1] - shift];
+            let width = if dx < 0.0 { dot.name.len() } else { name.len() } as f64 * LETTER;
+            !dot.name.is_empty() && dx.abs() < width + LINE && dy.abs() < LINE
+        };
+        let fits = |shift: &f64| {
+            let inside = (0.0..=SIZE[1]).contains(&(at[1] + shift));
+            inside && !dots.iter().any(|dot| overlaps(*shift, dot))
+        };
+        let shifts = (0..=dots.len()).map(|lines| LINE * lines as f64);
+        let shift = shifts.flat_map(|shift| [shift, -shift]).find(fits).unwrap_or(0.0);
         dots.push(Dot {
-            name: if is_named { point.one.scheme.clone() } else { String::new() },
+            name,
             title: title(point),
             at: at.map(|x| (10.0 * x).round() / 10.0),
             best: best(point),

@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::attack::{self, Basis, Given, basis_of};
 use crate::document::Document;
 use crate::pictures::ReleasedView;
-use crate::{tables, verdict};
+use crate::{sequence, tables, verdict};
 
 /// One photo and the pictures painted from its keypoints. All pictures are JPEGs of one size.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -113,6 +113,8 @@ struct Boxed {
 #[derive(Debug, Serialize)]
 struct SheetRow {
     scheme: String,
+    /// Whether `main` has one picture per number of queries, ascending.
+    by_queries: bool,
     main: Vec<Shown>,
     others: Vec<Shown>,
 }
@@ -183,15 +185,21 @@ pub(crate) fn strongest<'a>(
 
 fn sheet(document: &Document, inversion: &Inversion) -> Sheet {
     let schemes = tables::distinct(inversion.views.iter().map(|view| view.scheme.as_str()));
+    let by_queries = sequence::is_sequence(document);
     let rows = schemes.into_iter().map(|scheme| {
-        let main: Vec<&InvertedView> = [Basis::Released, Basis::Given, Basis::Oracle]
-            .into_iter()
-            .filter_map(|basis| strongest(document, inversion, scheme, basis))
-            .collect();
+        let of_bases = || {
+            let bases = [Basis::Released, Basis::Given, Basis::Oracle].into_iter();
+            bases.filter_map(|basis| strongest(document, inversion, scheme, basis)).collect()
+        };
+        let main: Vec<&InvertedView> = match by_queries {
+            true => inversion.views.iter().filter(|view| view.scheme == scheme).collect(),
+            false => of_bases(),
+        };
         let is_main = |view: &InvertedView| main.iter().any(|other| std::ptr::eq(*other, view));
         let others = inversion.views.iter().filter(|view| view.scheme == scheme && !is_main(view));
         SheetRow {
             scheme: scheme.to_owned(),
+            by_queries,
             others: others.map(|view| shown(inversion, view)).collect(),
             main: main.into_iter().map(|view| shown(inversion, view)).collect(),
         }

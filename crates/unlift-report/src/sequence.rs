@@ -11,11 +11,15 @@ pub(crate) fn is_sequence(document: &Document) -> bool {
     document.results.iter().any(|row| attack::queries(&row.neighbors).is_some())
 }
 
-/// Returns one sentence per scheme: what came back after each number of queries, with links by descriptors.
+/// Returns one sentence per scheme: what came back after each number of queries, from released data alone. Where lists of
+/// neighbors are used, too, these rows count.
 pub(crate) fn sentences(document: &Document) -> Vec<String> {
     let typed = tables::headline_threshold(document).unwrap_or_default();
+    let has_lists = document.results.iter().any(uses_lists);
     let sentence = |scheme: &str| {
-        let rows = document.results.iter().filter(|row| row.scheme == scheme && !is_tracks(row));
+        let is_counted =
+            |row: &&Row| row.scheme == scheme && !is_tracks(row) && uses_lists(row) == has_lists;
+        let rows = document.results.iter().filter(is_counted);
         let parts: Vec<String> = rows
             .filter_map(|row| {
                 let share = row.recovered_percent.get(&typed)?;
@@ -37,19 +41,26 @@ pub(crate) fn table(document: &Document) -> String {
     let headline = tables::headline_threshold(document).unwrap_or_default();
     let mut head = ["scheme", "queries", "links by", "right"].map(str::to_owned).to_vec();
     head.extend(thresholds.iter().map(|typed| format!("{typed} px")));
-    head.extend(["blind", "linked", "of linked", "tracked", "of tracked"].map(str::to_owned));
+    head.extend(
+        ["blind", "linked", "of linked", "tracked", "of tracked", "new", "of new"]
+            .map(str::to_owned),
+    );
     let mut lines = vec![head];
     for row in &document.results {
         let percent = |value: Option<&f64>| match value {
             Some(value) => format!("{} %", words::percent(*value)),
             None => "-".to_owned(),
         };
-        let by = if is_tracks(row) { "tracks" } else { "descriptors" };
+        let by = match row {
+            _ if is_tracks(row) => "tracks",
+            _ if uses_lists(row) => "descriptors, lists",
+            _ => "descriptors",
+        };
         let right = format!("{} %", words::ratio_percent(row.inlier_ratio));
         let mut cells = vec![row.scheme.clone(), row.k.to_string(), by.to_owned(), right];
         cells.extend(thresholds.iter().map(|typed| percent(row.recovered_percent.get(typed))));
         cells.push(percent(row.blind_percent.get(&headline)));
-        for of in ["linked", "tracked"] {
+        for of in ["linked", "tracked", "new"] {
             cells.push(percent(row.metrics.get(&format!("{of}_percent"))));
             cells.push(percent(row.metrics.get(&format!("{of}_within_{headline}_percent"))));
         }
@@ -59,9 +70,15 @@ pub(crate) fn table(document: &Document) -> String {
     text.push_str(&format!(
         "right: share of the links that the model confirms, where it knows both keypoints\n\
          linked: keypoints linked in three or more views; tracked: by the model's tracks\n\
-         blind, of linked, of tracked: within {headline} px\n"
+         lists: neighbors within each query, made from its descriptors\n\
+         new: keypoints that show no point of the service's map\n\
+         blind, of linked, of tracked, of new: within {headline} px\n"
     ));
     text
+}
+
+fn uses_lists(row: &Row) -> bool {
+    row.neighbors.starts_with(attack::SEQUENCE_AND_LISTS)
 }
 
 fn is_tracks(row: &Row) -> bool {

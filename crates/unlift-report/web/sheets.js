@@ -20,6 +20,14 @@
     return scheme ? `${scheme.textContent}, ${label}` : label;
   }
 
+  /** Adds a slider to a scheme with one picture per number of queries. */
+  function steps(row, choose) {
+    const shots = [...row.querySelectorAll("button.shot")];
+    const range = element("input", { type: "range", min: "0", max: String(shots.length - 1), value: "0", "aria-label": "Number of queries" });
+    range.addEventListener("input", () => choose(shots[range.value]));
+    row.querySelector("h3").after(element("label", { class: "steps" }, "fewer queries ", range, " more queries"));
+  }
+
   /** Adds the photo with a picture over it to a sheet; pictures become buttons. */
   function wipe(sheet) {
     const [photo, ...shots] = sheet.querySelectorAll(".shot");
@@ -42,6 +50,7 @@
       button.addEventListener("click", () => choose(button));
       shot.replaceWith(button);
     }
+    for (const row of sheet.querySelectorAll("[data-by-queries]")) steps(row, choose);
     move();
     sheet.querySelector(".strip").after(box, hint);
   }

@@ -117,6 +117,23 @@ pub fn recover_with_start<const D: usize>(
     with_start(released, lists, options)
 }
 
+/// Recovers by joint recovery and ranking from known positions of some slots. Positions that are more likely right than wrong, by
+/// the confidence in `known`, stay as they are.
+///
+/// # Errors
+/// When options are out of range, the lists do not have one row per slot, or `known` belongs to another map.
+pub fn recover_from<const D: usize>(
+    known: &Recovered<D>,
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    options: &RecoverOptions,
+) -> Result<Recovered<D>, Error> {
+    released.fingerprint().expect(known.about().map)?;
+    let problem = Problem::new(released, lists, Builtin::Ranking, options)?;
+    let start = problem.solve(0..problem.n_slots());
+    problem.finish(problem.run_from(known, start), false).map(|(recovered, _)| recovered)
+}
+
 type WithStart<const D: usize> = fn(
     &Released<D>,
     &Neighborhoods,

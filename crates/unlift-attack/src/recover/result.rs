@@ -403,6 +403,19 @@ impl<const D: usize> Recovered<D> {
         self.confidence().map(|rows| rows[slot].probability_within(threshold))
     }
 
+    /// Returns the estimate of `slot` if it is more likely right than wrong.
+    pub(crate) fn sure_estimate(&self, slot: usize) -> Option<Estimate<D>> {
+        let found = self.confidence()?.get(slot)?.found;
+        (self.status[slot] == Status::Ok && found > 0.5).then(|| Estimate {
+            position: self.position[slot],
+            status: Status::Ok,
+            support: self.support[slot],
+            axis: self.axis().map_or(0, |axis| axis[slot]),
+            // How much likelier right than wrong, in nats.
+            evidence: libm::logf(found / (1.0 - found).max(f32::EPSILON)),
+        })
+    }
+
     /// Adds the confidence of every slot.
     ///
     /// # Errors

@@ -19,7 +19,8 @@ use triangulate::{Fit, MISS, MOST_HYPOTHESES, Sight, triangulate};
 
 use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{dot, median, sub, widen};
-use crate::recover::{Confidence, Estimate, Recovered, Status};
+use crate::neighbors::Neighborhoods;
+use crate::recover::{Confidence, Estimate, RecoverOptions, Recovered, Status, recover_from};
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, RowOrder, Unit};
 
@@ -213,6 +214,21 @@ pub fn recover(
         condition: fits.iter().map(condition).collect(),
         noise_px,
     })
+}
+
+/// Recovers the keypoints of a query also from its lists of neighbors. `known` has the positions that [`recover`] found; those that
+/// are more likely right than wrong stay as they are.
+///
+/// # Errors
+/// When the lists do not have one row per slot, or the arguments are of different queries.
+pub fn with_lists(
+    known: &Recovered<2>,
+    query: &Query,
+    lists: &Neighborhoods,
+    seed: u64,
+) -> Result<Recovered<2>, Error> {
+    let options = RecoverOptions { seed, ..RecoverOptions::default() };
+    recover_from(known, &query.released, lists, &options)
 }
 
 /// Predicts whether a fit is right, and its error. A fit is right if more views agree than chance would give: wrong lines pass near the

@@ -86,7 +86,7 @@ fn localization(typed: &str, scheme: &str, bound: &str) -> Result<Gate, String> 
 
 const ORACLE: &str = "oracle";
 /// Sources of `audit sequence`, with the number of queries behind an `@`.
-const SEQUENCES: [&str; 2] = ["sequence", "tracks"];
+const SEQUENCES: [&str; 3] = ["sequence", "sequence+lists", "tracks"];
 
 /// Counts the names left of `<=`: all parts before the first number. Without a number, all known
 /// names, so that the next part is reported as a wrong threshold.

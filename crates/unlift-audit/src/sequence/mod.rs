@@ -10,6 +10,7 @@ mod view;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -17,10 +18,11 @@ use serde_json::{Map, Value, json};
 use unlift::audit::staged::{Pooled, key_of};
 use unlift::audit::{NeighborsBy, Plan, PointNeighbors, Row, Seconds};
 use unlift::evaluate::evaluate;
+use unlift::neighbors::{Neighborhoods, Source, of_what_there_is};
 use unlift::obfuscate::{Scheme, obfuscate};
 use unlift::recover::Recovered;
 use unlift::seed::Key;
-use unlift::sequence::{Links, Query, recover};
+use unlift::sequence::{Links, Query, recover, with_lists};
 use unlift::truth::Secret;
 use unlift_io::atomic::OutputSet;
 use unlift_io::hash::{hash_file, hash_files};
@@ -50,6 +52,10 @@ pub struct SequenceJob<'a> {
     pub path: &'a Path,
     /// The plan: schemes, thresholds and seed count.
     pub plan: Plan<2>,
+    /// Makes lists of neighbors within each query, which the attacker combines with the other queries, if wanted.
+    pub lists: Option<Arc<dyn Source<2>>>,
+    /// The share of the model's points that the service's map does not have.
+    pub held_out_share: f64,
     /// Numbers of queries to attack with, ascending.
     pub queries: Vec<usize>,
     /// The error that is added to the poses.
@@ -76,6 +82,8 @@ pub struct SequenceJob<'a> {
 const SOLVER: &str = "triangulation";
 /// Links that the attacker makes from descriptors.
 const SEQUENCE: &str = "sequence";
+/// The same links, combined with lists of neighbors within the query.
+const WITH_LISTS: &str = "sequence+lists";
 /// Links that the model's tracks give: the oracle.
 const TRACKS: &str = "tracks";
 /// A line of each of three views meets the others in a point.
@@ -98,7 +106,9 @@ pub fn perform(mut job: SequenceJob<'_>, out: OutputSet) -> Result<(Finished, Us
     let pose_error = job.pose_error.map(|error| (error, job.plan.seed));
     let (mut views, mut unusable) = (Vec::new(), job.source.refused().len());
     job.source.refused().iter().for_each(|error| steps.say(&error.to_string()));
-    for view in Model::read(folder)?.views((job.source, job.path), pose_error) {
+    let model = Model::read(folder)?;
+    let is_new = model.held_out(job.held_out_share);
+    for view in model.views((job.source, job.path), pose_error) {
         match view {
             Ok(view) => views.push(view),
             Err(error) => {
@@ -124,10 +134,10 @@ pub fn perform(mut job: SequenceJob<'_>, out: OutputSet) -> Result<(Finished, Us
         notes.push(format!("{} images: no rows for {too_many:?} queries", views.len()));
     }
     notes.iter().for_each(|note| steps.say(&format!("note: {note}")));
-    job.plan.neighbors = sources(&job.queries);
+    job.plan.neighbors = sources(&job.queries, job.lists.is_some());
     check_gates(&job.gates, &job.plan, false)?;
     let mut inversions = Vec::new();
-    let (rows, seconds) = rows(&job, &views, &mut inversions)?;
+    let (rows, seconds) = rows(&job, (&views, &is_new), &mut inversions)?;
     let gates = gate_results(&job.gates, &job.plan, &rows, &[], &[], &[])?;
     let provenance = Provenance {
         notes,
@@ -147,8 +157,9 @@ pub fn perform(mut job: SequenceJob<'_>, out: OutputSet) -> Result<(Finished, Us
 }
 
 /// Names the sources of the rows, for gates.
-fn sources(queries: &[usize]) -> Vec<NeighborsBy<2>> {
-    let names = queries.iter().flat_map(|n| [SEQUENCE, TRACKS].map(|by| format!("{by}@{n}")));
+fn sources(queries: &[usize], with_lists: bool) -> Vec<NeighborsBy<2>> {
+    let kinds = || [SEQUENCE, TRACKS].into_iter().chain(with_lists.then_some(WITH_LISTS));
+    let names = queries.iter().flat_map(|n| kinds().map(move |by| format!("{by}@{n}")));
     let given = |name| {
         let (offsets, neighbors, scores) = (Vec::new(), Vec::new(), None);
         NeighborsBy::Given(PointNeighbors { name, offsets, neighbors, scores })
@@ -163,6 +174,10 @@ fn options(job: &SequenceJob<'_>) -> Map<String, Value> {
     options.insert("schemes".into(), json!(schemes));
     options.insert("thresholds".into(), json!(thresholds));
     options.insert("queries".into(), json!(job.queries));
+    if job.held_out_share > 0.0 {
+        options.insert("held_out_share".into(), json!(job.held_out_share));
+    }
+    options.extend(job.lists.as_ref().map(|by| ("lists".to_owned(), json!(by.name()))));
     if let Some(error) = job.pose_error {
         options.insert("pose_error_distance".into(), json!(error.distance));
         options.insert("pose_error_angle_deg".into(), json!(error.angle_deg));
@@ -203,14 +218,14 @@ fn described(
 /// Hides the views under each scheme and attacks them with each number of queries.
 fn rows(
     job: &SequenceJob<'_>,
-    views: &[View],
+    (views, is_new): (&[View], &[bool]),
     inversions: &mut Vec<Sheet>,
 ) -> Result<(Vec<Row>, Seconds), Error> {
     let mut seconds = Seconds::default();
     let mut rows = Vec::new();
     let reach = job.queries.iter().copied().max().unwrap_or(0);
     let mut known: Option<(Vec<Secret>, Links)> = None;
-    let total = job.plan.schemes.len() * job.queries.len() * 2;
+    let total = job.plan.schemes.len() * job.plan.neighbors.len();
     for scheme in &job.plan.schemes {
         let started = Instant::now();
         let (queries, secrets) = hide(&**scheme, views, job.plan.seed)?;
@@ -235,9 +250,12 @@ fn rows(
         let links = &links;
         seconds.neighbors += started.elapsed().as_secs_f64();
         let tracks = tracks(views, &secrets);
-        let hidden = Hidden { views, queries, secrets };
+        let hidden = Hidden { views, is_new, queries, secrets };
+        let lists = job.lists.as_deref().map(|by| hidden.lists(by, job.plan.seed)).transpose()?;
+        let kinds = [(SEQUENCE, links, None), (TRACKS, &tracks, None)];
+        let combined = lists.as_ref().map(|lists| (WITH_LISTS, links, Some(lists)));
         for &n in &job.queries {
-            for (by, links) in [(SEQUENCE, links), (TRACKS, &tracks)] {
+            for (by, links, lists) in kinds.into_iter().chain(combined) {
                 if !job.progress.goes_on() {
                     return Err(Error::request(
                         "audit: expected to run to the end, found a request to stop",
@@ -246,7 +264,7 @@ fn rows(
                 let what = format!("{}, {n} queries, links by {by}", scheme.name());
                 job.progress.show(rows.len(), total, &what);
                 let started = Instant::now();
-                let row = hidden.row(links, &tracks, n, &job.plan)?;
+                let row = hidden.row((links, &tracks, lists), n, &job.plan)?;
                 seconds.recover += started.elapsed().as_secs_f64();
                 let (scheme, neighbors) = (scheme.name().to_owned(), format!("{by}@{n}"));
                 let row = Row { scheme, neighbors, k: n, solver: SOLVER.to_owned(), ..row };
@@ -306,6 +324,8 @@ fn tracks(views: &[View], secrets: &[Secret]) -> Links {
 /// Protected views with their secrets.
 struct Hidden<'a> {
     views: &'a [View],
+    /// Whether each point of the model is unknown to the service.
+    is_new: &'a [bool],
     queries: Vec<Query>,
     secrets: Vec<Secret>,
 }
@@ -335,6 +355,8 @@ struct Shares {
     linked: Share,
     /// Keypoints that the model's tracks link so.
     tracked: Share,
+    /// Keypoints that show no point of the service's map.
+    new: Share,
     /// Links of which the model knows both keypoints.
     right: Share,
 }
@@ -344,6 +366,7 @@ impl Shares {
         let pairs = [
             (&mut self.linked, &more.linked),
             (&mut self.tracked, &more.tracked),
+            (&mut self.new, &more.new),
             (&mut self.right, &more.right),
         ];
         for (to, more) in pairs {
@@ -354,16 +377,28 @@ impl Shares {
 }
 
 impl Hidden<'_> {
+    /// Makes the lists of neighbors within each query.
+    fn lists(
+        &self,
+        source: &dyn Source<2>,
+        seed: u64,
+    ) -> Result<Vec<Neighborhoods>, unlift::Error> {
+        let of_query = |query: &Query| {
+            source.supports(&query.released)?;
+            of_what_there_is(source, &query.released, seed)
+        };
+        self.queries.iter().map(of_query).collect()
+    }
+
     /// Attacks every query with the `n` consecutive queries around it.
     fn row(
         &self,
-        links: &Links,
-        tracks: &Links,
+        by: (&Links, &Links, Option<&Vec<Neighborhoods>>),
         n: usize,
         plan: &Plan<2>,
     ) -> Result<Row, unlift::Error> {
         let headline = plan.thresholds[plan.headline].value;
-        let of_query = |query| self.of_query(links, tracks, (query, n), headline);
+        let of_query = |query| self.of_query(by, (query, n), headline, plan.seed);
         let queries = (0..self.views.len()).into_par_iter().with_max_len(1);
         let found = queries.map(of_query).collect::<Result<Vec<_>, unlift::Error>>()?;
         let mut pooled = Pooled::new(&plan.thresholds);
@@ -382,6 +417,8 @@ impl Hidden<'_> {
             (format!("linked_within_{label}_percent"), all.linked.percent()),
             ("tracked_percent".to_owned(), of_all(&all.tracked)),
             (format!("tracked_within_{label}_percent"), all.tracked.percent()),
+            ("new_percent".to_owned(), of_all(&all.new)),
+            (format!("new_within_{label}_percent"), all.new.percent()),
         ]);
         row.inlier_ratio = all.right.percent() / 100.0;
         Ok(row)
@@ -390,13 +427,17 @@ impl Hidden<'_> {
     /// Attacks `query` with the `n` queries around it.
     fn of_query(
         &self,
-        links: &Links,
-        tracks: &Links,
+        (links, tracks, lists): (&Links, &Links, Option<&Vec<Neighborhoods>>),
         (query, n): (usize, usize),
         headline: f64,
+        seed: u64,
     ) -> Result<(Recovered<2>, Shares), unlift::Error> {
         let window = self.window(query, n);
-        let solved = recover(&self.queries, links, query, window.clone())?;
+        let mut solved = recover(&self.queries, links, query, window.clone())?;
+        if let Some(lists) = lists {
+            let (query, lists) = (&self.queries[query], &lists[query]);
+            solved.recovered = with_lists(&solved.recovered, query, lists, seed)?;
+        }
         let original = &self.views[query].original;
         let accuracy = evaluate(&solved.recovered, original, &self.secrets[query])?;
         let mut shares = Shares::default();
@@ -408,7 +449,11 @@ impl Hidden<'_> {
             if 1 + tracks.track(query, slot, &window).len() >= LEAST_VIEWS {
                 shares.tracked.count(is_within);
             }
-            let Some(point) = self.point(query, slot) else { continue };
+            let point = self.point(query, slot);
+            if point.is_none_or(|point| self.is_new[point as usize]) {
+                shares.new.count(is_within);
+            }
+            let Some(point) = point else { continue };
             for (other, at) in links.track(query, slot, &window) {
                 if let Some(other) = self.point(other as usize, at as usize) {
                     shares.right.count(point == other);

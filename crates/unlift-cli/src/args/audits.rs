@@ -7,6 +7,7 @@ use clap::Args;
 use serde_json::{Map, Value, json};
 use unlift::audit::Threshold;
 use unlift::neighbors::oracle::Noise;
+use unlift::neighbors::sources::Named;
 use unlift::obfuscate::{Entry, Mitigation, Protection};
 use unlift::recover::{Builtin, Delta};
 use unlift_audit::images::extraction::Wanted;
@@ -467,6 +468,12 @@ pub struct AuditSequenceArgs {
     pub path: PathBuf,
     #[command(flatten)]
     pub extraction: ExtractionArgs,
+    /// Let this fraction of MODEL's points, at one end of its longest side, be unknown to the
+    /// service, as new things in the place are. Keypoints that show none of the other points are
+    /// also counted apart
+    #[arg(long, value_name = "FRACTION", value_parser = values::share, default_value_t = 0.0,
+          help_heading = "Input")]
+    pub held_out_share: f64,
     /// Meters per unit of MODEL, for --poses
     #[arg(long, value_name = "FACTOR", value_parser = values::scale, help_heading = "Input")]
     pub scale: Option<f64>,
@@ -482,6 +489,16 @@ pub struct AuditSequenceArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::queries,
           default_value = "2,3,5,10,20", help_heading = "Attack")]
     pub queries: Vec<usize>,
+    /// Also combine the queries with lists of neighbors within each of them, which this source
+    /// makes: descriptors, similarity, overlap or learned (see unlift audit images)
+    #[arg(long, value_name = "SOURCE", value_parser = values::own_image_source,
+          help_heading = "Attack")]
+    pub neighbors: Option<Named>,
+    /// Also audit every scheme after this change to the descriptors of each query: noise:DEVIATION,
+    /// bits:N or drop:SHARE (see unlift audit map); repeat for alternatives
+    #[arg(long, value_name = "STEPS", value_parser = values::image_mitigation,
+          help_heading = "Attack")]
+    pub mitigate: Vec<Mitigation>,
     /// Add an error to each pose, as localization has it: CM centimeters in a random direction and
     /// a turn by DEG degrees [default: the poses of MODEL]
     #[arg(long, value_name = "perturbed:CM,DEG", value_parser = values::poses,

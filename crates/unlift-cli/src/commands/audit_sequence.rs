@@ -1,12 +1,14 @@
 //! `unlift audit sequence`: audits several queries with known poses.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 use serde_json::{Map, json};
 use unlift::Unit;
 use unlift::audit::{Plan, Threshold};
-use unlift::obfuscate::SchemeOptions;
+use unlift::neighbors::sources::Named;
+use unlift::obfuscate::{Mitigated, Mitigation, Scheme, SchemeOptions};
 use unlift_audit::images::{FeatureSource, choice};
 use unlift_audit::inversion::Inversion;
 use unlift_audit::sequence::{PoseError, SequenceJob, perform};
@@ -63,6 +65,8 @@ pub fn audit(args: &AuditSequenceArgs) -> anyhow::Result<Finished> {
             source: &source,
             path: &args.path,
             plan,
+            lists: args.neighbors.as_ref().map(Named::of_dimension).transpose()?,
+            held_out_share: args.held_out_share,
             queries,
             pose_error,
             options: options(args),
@@ -104,7 +108,7 @@ fn inversion(
 
 fn plan(args: &AuditSequenceArgs) -> anyhow::Result<Plan<2>> {
     let usual = Plan::new(Unit::Pixel);
-    let schemes = match args.schemes.as_slice() {
+    let mut schemes = match args.schemes.as_slice() {
         [] => usual.schemes.clone(),
         given => {
             let options = SchemeOptions::usual(Unit::Pixel);
@@ -112,6 +116,11 @@ fn plan(args: &AuditSequenceArgs) -> anyhow::Result<Plan<2>> {
             entries.iter().filter_map(|entry| entry.of_dimension(&options)).collect()
         }
     };
+    let mitigated = args.mitigate.iter().flat_map(|mitigation| {
+        let of = |scheme| Arc::new(Mitigated::new(scheme, mitigation.clone(), None)) as Arc<_>;
+        schemes.iter().cloned().map(of)
+    });
+    schemes.extend(mitigated.collect::<Vec<Arc<dyn Scheme<2>>>>());
     let of = |label: &str, value: f64| Threshold { label: label.to_owned(), value };
     let few = Plan { thresholds: vec![of("5", 5.0), of("10", 10.0), of("25", 25.0)], ..usual };
     let thresholds = thresholds(&args.thresholds, &few)?;
@@ -132,6 +141,10 @@ fn pose_error(args: &AuditSequenceArgs) -> anyhow::Result<Option<PoseError>> {
 fn options(args: &AuditSequenceArgs) -> Map<String, serde_json::Value> {
     let mut options = Map::new();
     options.insert("model".into(), json!(args.model.display().to_string()));
+    if !args.mitigate.is_empty() {
+        let names: Vec<String> = args.mitigate.iter().map(Mitigation::name).collect();
+        options.insert("mitigate".into(), json!(names));
+    }
     args.extraction.record(&mut options);
     options
 }

@@ -123,6 +123,31 @@ fn wrong_poses_give_less_back() {
 }
 
 #[test]
+fn lists_new_things_and_changed_descriptors_have_rows_of_their_own() {
+    let place = walk();
+    let audit = "audit sequence model f.h5 --queries 2,5 --schemes lines2d --thresholds 5";
+    let audit =
+        format!("{audit} --neighbors similarity --held-out-share 0.25 --mitigate noise:0.5");
+    place.ends(&format!("{audit} --gate lines2d:sequence+lists@5:5<=100"), 0);
+    let document = place.json("unlift-audit/audit.json");
+    let row = |scheme: &str, neighbors: &str| {
+        let mut rows = document["results"].as_array().unwrap().iter();
+        rows.find(|row| row["scheme"] == scheme && row["neighbors"] == neighbors).unwrap()
+    };
+    let share = |scheme, neighbors| row(scheme, neighbors)["recovered_percent"]["5"].as_f64();
+    let alone = share("lines2d", "sequence@5").unwrap();
+    // These descriptors say nothing about neighbors, so lists must not move what the queries fix.
+    assert!(share("lines2d", "sequence+lists@5").unwrap() >= alone);
+    assert!(share("lines2d_noise0.5", "sequence@5").unwrap() < alone - 20.0);
+    let new = row("lines2d", "sequence@5")["metrics"]["new_percent"].as_f64().unwrap();
+    assert!((20.0..30.0).contains(&new), "{new}");
+    let stderr = place.complains("audit sequence model f.h5 --mitigate thin:1/4", 2);
+    assert!(stderr.contains("expected noise:DEVIATION, bits:N or drop:SHARE"), "{stderr}");
+    let stderr = place.complains("audit sequence model f.h5 --neighbors oracle", 2);
+    assert!(stderr.contains("expected a source that reads released data"), "{stderr}");
+}
+
+#[test]
 fn inputs_that_do_not_fit_are_named() {
     let place = walk();
     fs::write(place.path("model/cameras.txt"), "1 SIMPLE_PINHOLE 320 240 500 160 120\n").unwrap();

@@ -58,6 +58,12 @@ impl Mitigation {
         self.steps.iter().any(|step| !matches!(step, Step::Thin { .. }))
     }
 
+    /// Returns true if every step fits single images: it keeps all points, and learns no components from
+    /// them, which would differ between images.
+    pub fn fits_images(&self) -> bool {
+        !self.steps.iter().any(|step| matches!(step, Step::Thin { .. } | Step::Pca(_)))
+    }
+
     /// Returns the name in rows: letters, digits, `_` and `.`.
     pub fn name(&self) -> String {
         let name = |step: &Step| match step {
