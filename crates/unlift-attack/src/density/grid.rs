@@ -270,23 +270,4 @@ mod tests {
             assert_eq!(seen, span.len(), "{direction:?}");
         }
     }
-
-    #[test]
-    fn smoothing_keeps_the_mass() {
-        let mut grid = Grid::even([0.0; 3], 1.0, [4, 3, 5]);
-        grid.mass.fill(0.0);
-        grid.mass[0] = 8.0;
-        grid.smooth();
-        assert!((grid.mass.iter().sum::<f32>() - 8.0).abs() < 1e-5);
-        assert_eq!(grid.mass[0], 8.0 * 0.75 * 0.75 * 0.75);
-        assert_eq!(grid.mass[1], 8.0 * 0.25 * 0.75 * 0.75);
-    }
-
-    #[test]
-    fn bounds_leave_the_tails_out() {
-        let mut grid = Grid::even([0.0; 3], 1.0, [10, 1, 1]);
-        grid.mass = vec![0.1, 0.0, 0.0, 4.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.1];
-        let (low, high) = grid.bounds(0.02);
-        assert_eq!((low[0], high[0]), (2.0, 6.0));
-    }
 }

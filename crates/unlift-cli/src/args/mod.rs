@@ -20,7 +20,7 @@ pub use audits::{
 };
 pub use images::{FeaturesArgs, InvertArgs, MetricsArgs};
 pub use program::{CompletionsArgs, DemoArgs, DoctorArgs, ManArgs, ModelsArgs};
-pub use results::{BenchRecoverArgs, CompareArgs, PaperArgs, TableArgs};
+pub use results::{CompareArgs, PaperArgs, TableArgs};
 pub use stages::{
     EvaluateArgs, ExportArgs, FindArgs, NeighborsCommand, ObfuscateArgs, OracleArgs, RecoverArgs,
     SplitArgs,
@@ -85,7 +85,7 @@ fn numbers_may_be_negative(command: clap::Command) -> clap::Command {
 const GROUPS: [(&str, &str); 3] = [
     ("Audits", "demo audit check compare table"),
     ("Stages", "obfuscate neighbors recover evaluate export split features invert metrics"),
-    ("Tools", "paper bench schemes models doctor completions man help"),
+    ("Tools", "paper schemes models doctor completions man help"),
 ];
 
 /// Lists the commands under the headings of `GROUPS`, because clap has one heading for all commands.
@@ -145,9 +145,6 @@ pub enum Command {
     Metrics(MetricsArgs),
     /// Reproduce the paper's tables on its datasets, next to the published numbers
     Paper(PaperArgs),
-    /// Measure the time of recovery, next to the published time
-    #[command(subcommand)]
-    Bench(BenchCommand),
     /// List the schemes: how they hide points, what stays hidden, publication, patents
     Schemes,
     /// List the networks: purpose, license, hash, owner, and whether they are installed
@@ -179,13 +176,6 @@ pub enum AuditCommand {
     Sequence(Box<AuditSequenceArgs>),
     /// Audit a map that is released twice: report how many points both releases give away together
     Again(Box<AuditAgainArgs>),
-}
-
-/// Kinds of benchmarks.
-#[derive(Debug, Subcommand)]
-pub enum BenchCommand {
-    /// Measure the time of recovery, next to the published time
-    Recover(BenchRecoverArgs),
 }
 
 #[cfg(test)]

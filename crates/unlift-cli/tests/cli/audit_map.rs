@@ -5,19 +5,6 @@ use crate::common::Place;
 const QUICK: &str = "--k 10 --schemes olc,ppl --inlier-ratios 1,0.5";
 
 #[test]
-fn results_are_the_same_bytes_for_any_number_of_threads() {
-    let place = Place::with_room(700);
-    let results = |threads: usize| {
-        let options = format!("{QUICK} --solver consensus,ransac --threads {threads}");
-        place.ends(&format!("audit map room.csv {options} --out t{threads}"), 0);
-        let document = place.json(&format!("t{threads}/audit.json"));
-        assert_eq!(document["results"].as_array().map(Vec::len), Some(8));
-        (document["results"].to_string(), document["break_even"].to_string())
-    };
-    assert_eq!(results(1), results(8));
-}
-
-#[test]
 fn without_a_scale_no_centimeter_appears() {
     let place = Place::with_room(700);
     let (text, _) = place.ends(&format!("audit map room.csv {QUICK} --out a"), 0);
@@ -116,22 +103,4 @@ fn a_thinned_map_is_told() {
     );
     let (_, stderr) = place.ends(&format!("{audit} --max-points 400"), 0);
     assert!(!stderr.contains("--max-points"), "{stderr}");
-}
-
-#[test]
-fn a_bench_tells_seconds_of_every_ratio_and_solver() {
-    let place = Place::with_room(700);
-    let line = "bench recover --points 900 --map room.csv --k 10 --inlier-ratios 1,0.5 \
-                --solver consensus,ransac";
-    let (text, _) = place.ends(line, 0);
-    assert!(text.starts_with("ppl: 900 points, K = 10"), "{text}");
-    assert_eq!(text.matches("consensus").count() + text.matches("ransac").count(), 4, "{text}");
-    let json = place.prints(&format!("{line} --json"), 0);
-    assert_eq!((json["n_points"].as_u64(), json["k"].as_u64()), (Some(900), Some(10)));
-    let rows = json["rows"].as_array().expect("rows");
-    assert_eq!(rows.len(), 4);
-    let is_timed = |row: &serde_json::Value| {
-        row["seconds"].as_f64() > Some(0.0) && row["published_seconds"].is_null()
-    };
-    assert!(rows.iter().all(is_timed), "{json}");
 }

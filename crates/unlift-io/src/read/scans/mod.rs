@@ -1,6 +1,5 @@
 //! Reads positions from point clouds of scanners.
 
-#[cfg_attr(not(feature = "scans"), path = "../../absent/e57.rs")]
 pub mod e57;
 pub mod las;
 mod lzf;
