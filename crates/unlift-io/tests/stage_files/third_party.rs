@@ -1,10 +1,8 @@
 //! Tests files written by pyarrow (tests/data/third_party.py).
 
 use std::path::{Path, PathBuf};
-use unlift::RecordId;
 use unlift::descriptors::Values;
-use unlift::recover::Status;
-use unlift::released::{Lines, Obfuscation};
+use unlift::released::Obfuscation;
 use unlift_io::stage;
 
 fn data() -> PathBuf {
