@@ -133,7 +133,7 @@ pub enum Command {
     Recover(RecoverArgs),
     /// Compare recovered points with the original points
     Evaluate(EvaluateArgs),
-    /// Convert released, recovered or original points to PLY, OBJ, COLMAP or nerfstudio
+    /// Convert released, recovered or original points to PLY, OBJ or COLMAP
     Export(ExportArgs),
     /// Split a Parquet file into parts that other programs, such as Spark, read in parallel
     Split(SplitArgs),
