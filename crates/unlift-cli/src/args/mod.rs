@@ -18,7 +18,7 @@ pub use audits::{
     AttackArgs, AuditAgainArgs, AuditImagesArgs, AuditMapArgs, AuditReleasedArgs,
     AuditSequenceArgs, CheckArgs, MapArgs, ProtectArgs, ResultArgs,
 };
-pub use images::{FeaturesArgs, InvertArgs, MetricsArgs};
+pub use images::{FeaturesArgs, InvertArgs};
 pub use program::{CompletionsArgs, DemoArgs, DoctorArgs, ManArgs, ModelsArgs};
 pub use results::{CompareArgs, PaperArgs, TableArgs};
 pub use stages::{
@@ -84,7 +84,7 @@ fn numbers_may_be_negative(command: clap::Command) -> clap::Command {
 /// The commands under each heading of `unlift --help`.
 const GROUPS: [(&str, &str); 3] = [
     ("Audits", "demo audit check compare table"),
-    ("Stages", "obfuscate neighbors recover evaluate export split features invert metrics"),
+    ("Stages", "obfuscate neighbors recover evaluate export split features invert"),
     ("Tools", "paper schemes models doctor completions man help"),
 ];
 
@@ -141,8 +141,6 @@ pub enum Command {
     Features(FeaturesArgs),
     /// Paint pictures from descriptors and the positions of keypoints or recovered points
     Invert(InvertArgs),
-    /// Compare pictures by SSIM, PSNR and LPIPS
-    Metrics(MetricsArgs),
     /// Reproduce the paper's tables on its datasets, next to the published numbers
     Paper(PaperArgs),
     /// List the schemes: how they hide points, what stays hidden, publication, patents

@@ -16,7 +16,6 @@ mod features;
 mod gate_files;
 mod image_stages;
 mod invert;
-mod metrics;
 mod neighbors;
 mod obfuscate;
 mod painter;
@@ -59,7 +58,6 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Paper(args) => paper::run(&args),
         Command::Features(args) => features::run(&args),
         Command::Invert(args) => invert::run(&args),
-        Command::Metrics(args) => with_threads(None, || metrics::run(&args)),
         Command::Schemes => about::schemes(),
         Command::Models(args) => about::models(&args),
         Command::Doctor(args) => about::doctor(&args),
