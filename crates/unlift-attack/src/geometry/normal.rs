@@ -26,24 +26,3 @@ pub fn local_normal(
     let column = eigen.eigenvectors.column(least);
     Some([column[0], column[1], column[2]])
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn points_of_a_tilted_plane_give_its_normal() {
-        // x + 2 y + 2 z = 0, unit normal (1, 2, 2) / 3.
-        let on_plane = |a: f64, b: f64| [2.0 * a, -a - b, b];
-        let neighbors = (0..20).map(|i| on_plane(f64::from(i % 5) - 2.0, f64::from(i / 5) - 1.5));
-        let normal = local_normal(&[0.0; 3], neighbors).unwrap();
-        let along = (normal[0] + 2.0 * normal[1] + 2.0 * normal[2]) / 3.0;
-        assert!((along.abs() - 1.0).abs() < 1e-12, "{normal:?}");
-    }
-
-    #[test]
-    fn collinear_points_have_no_normal() {
-        let neighbors = (1..9).map(|i| [f64::from(i), 2.0 * f64::from(i), 0.0]);
-        assert_eq!(local_normal(&[0.0; 3], neighbors), None);
-    }
-}

@@ -400,12 +400,4 @@ mod tests {
         portable(Map { columns: &columns, of, out: &mut plain });
         assert_eq!(fast, plain);
     }
-
-    #[test]
-    fn nearest_takes_the_smallest_and_counts_ties_by_place() {
-        let (mut near, reach) = nearest(&[4.0, f32::INFINITY, 1.0, 4.0, 0.0], 3);
-        near.sort_unstable();
-        assert_eq!((&near[..], reach), (&[0, 2, 4][..], 2.0));
-        assert_eq!(nearest(&[], 3), (Vec::new(), f32::INFINITY));
-    }
 }
