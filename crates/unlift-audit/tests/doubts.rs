@@ -12,7 +12,7 @@ use unlift::released::Released;
 use unlift::seed::Key;
 use unlift::truth::{Original, Secret};
 use unlift::{PointSet, Unit};
-use unlift_audit::{Audited, Error, Gate, Job, Preparation, Prepared, Quiet, maps, prepare};
+use unlift_audit::{Audited, Error, Gate, Job, Preparation, Prepared, maps, prepare};
 
 const N: usize = 1500;
 

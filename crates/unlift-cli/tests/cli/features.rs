@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use image::{GrayImage, ImageFormat, Luma};
+use image::{GrayImage, ImageFormat};
 use unlift::descriptors::Values;
 use unlift_io::features::{FeatureSource, ImageFeatures};
 
