@@ -1,6 +1,6 @@
 //! Malformed point clouds and paths.
 
-use super::{Row, alone, appended, fixture, patched, row};
+use super::{Row, alone, fixture, patched, row};
 
 #[rustfmt::skip] // One row per line.
 pub fn ply() -> Vec<Row> {

@@ -114,7 +114,8 @@ fn equivariance_of_joint_recovery() {
 /// records. But nearly all points are recovered at the same place.
 fn order_of_records_hardly_matters<const D: usize>(name: &str, scheme: &Entry) {
     let hidden = hide::<D>(scheme, &room(35, 2000), 7);
-    let (released, lists, per) = (&hidden.released, hidden.lists(30, 0.6, 7), hidden.released.slots_per_record());
+    let (released, lists, per) =
+        (&hidden.released, hidden.lists(30, 0.6, 7), hidden.released.slots_per_record());
     let mut draws = Draws::new(3, Stage::Synthetic, 0);
     let order = shuffled(released.n_records(), &mut draws);
     let written = again(released.obfuscation(), &order, &mut draws);
