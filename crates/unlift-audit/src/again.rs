@@ -139,7 +139,7 @@ pub fn perform(mut job: AgainJob<'_>, out: OutputSet) -> Result<Finished, Error>
             scale_m_per_unit: (points.unit() == Unit::Meter).then_some(scale),
             unit_in_map_units: Some(first.1.unit_in_map_units),
             other_sha256: ordered([("second".to_owned(), hash_input(&second.0)?)]),
-            images: None,
+            ..Input::default()
         },
         options,
         notes: job.doubts.iter().chain(&job.notes).cloned().collect(),

@@ -34,7 +34,7 @@ impl Clouds {
         let originals: Vec<[f64; 3]> =
             cell.original.reveal().positions().iter().map(in_map).collect();
         if self.schemes.is_empty() {
-            write_points(&stage(out, "original.ply")?, &originals, None)?;
+            write_points(&stage(out, "original.ply")?, &originals)?;
         }
         let scheme = &cell.row.scheme;
         if !self.schemes.contains(scheme) {
@@ -81,7 +81,7 @@ impl Clouds {
                     std::array::from_fn(|c| (f64::from(p[c]) + origin[c]) * scale)
                 };
                 let points: Vec<[f64; 3]> = candidates.position().iter().map(place).collect();
-                write_points(&stage(out, &format!("{scheme}-obfuscated.ply"))?, &points, None)
+                write_points(&stage(out, &format!("{scheme}-obfuscated.ply"))?, &points)
             }
             Obfuscation::AxisPlanes(_) => Ok(()),
         }

@@ -81,7 +81,6 @@ fn doubts(offsets: &[u64], neighbors: &[u32], prepared: &Prepared) -> Vec<String
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::localization::Cameras;
     use unlift::truth::Original;
     use unlift::{PointSet, Unit};
 
@@ -90,15 +89,7 @@ mod tests {
         let n = 200;
         let points = (0..n).map(|i| [0.1 * i as f64, 0.0, 0.0]).collect();
         let points = PointSet::try_new(points, Unit::Meter).unwrap();
-        let prepared = Prepared {
-            original: Original::new(points),
-            descriptors: None,
-            unit_in_map_units: 1.0,
-            rows: (0..n as u32).collect(),
-            cameras: Cameras::default(),
-            notes: Vec::new(),
-            doubts: Vec::new(),
-        };
+        let prepared = Prepared::of(Original::new(points));
         let offsets: Vec<u64> = (0..=n).map(|point| (point * length) as u64).collect();
         let row = |point: usize| (1..=length).map(move |step| (point * factor + step) % n);
         let neighbors: Vec<u32> = (0..n).flat_map(row).map(|other| other as u32).collect();

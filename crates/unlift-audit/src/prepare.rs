@@ -62,6 +62,16 @@ pub struct Prepared {
     pub doubts: Vec<String>,
 }
 
+impl Prepared {
+    /// Takes points that are in the unit of the audit, without descriptors and cameras.
+    pub fn of(original: Original<3>) -> Self {
+        let rows = (0..original.len() as u32).collect();
+        let (cameras, notes, doubts) = Default::default();
+        let (descriptors, unit_in_map_units) = (None, 1.0);
+        Self { original, descriptors, unit_in_map_units, rows, cameras, notes, doubts }
+    }
+}
+
 /// Filters, thins out and scales `positions` and `descriptors`. Owned positions that are all kept
 /// are not copied, because large maps need the memory.
 ///
@@ -115,9 +125,8 @@ pub fn prepare<'a>(
     let points = PointSet::try_new(kept, unit)?;
     let points = if factor == 1.0 { points } else { points.scaled(factor, unit)? };
     let descriptors = descriptors.map(|all| all.select(&rows));
-    let original = Original::new(points);
-    let (cameras, doubts) = (Cameras::default(), Vec::new());
-    Ok(Prepared { original, descriptors, unit_in_map_units, rows, cameras, notes, doubts })
+    let prepared = Prepared::of(Original::new(points));
+    Ok(Prepared { descriptors, unit_in_map_units, rows, notes, ..prepared })
 }
 
 /// Returns the median over all points of the distance to the `k`-th nearest other point.

@@ -3,7 +3,6 @@
 
 use std::sync::Arc;
 
-use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use unlift::audit::{Plan, Threshold};
@@ -13,9 +12,7 @@ use unlift::released::Released;
 use unlift::seed::Key;
 use unlift::truth::{Original, Secret};
 use unlift::{PointSet, Unit};
-use unlift_audit::localization::Cameras;
-use unlift_audit::{Audited, Error, Gate, Job, Preparation, Prepared, Quiet, maps, prepare};
-use unlift_report::document::Input;
+use unlift_audit::{Audited, Error, Gate, Job, Preparation, Prepared, maps, prepare};
 
 const N: usize = 1500;
 
@@ -48,36 +45,12 @@ fn audit(
     gate: &str,
 ) -> Result<Audited, Error> {
     let job = Job {
-        original: &prepared.original,
-        descriptors: None,
         hidden,
-        localize: None,
-        cameras: Vec::new(),
-        up: None,
         plan,
-        input: Input {
-            path: None,
-            sha256: None,
-            n_points: prepared.original.len() as u64,
-            scale_m_per_unit: Some(1.0),
-            unit_in_map_units: Some(1.0),
-            other_sha256: Default::default(),
-            images: None,
-        },
-        options: Default::default(),
         notes: prepared.notes.clone(),
         doubts: prepared.doubts.clone(),
         gates: vec![Gate::parse(gate).expect("a gate")],
-        out: PathBuf::from(Path::new("none")),
-        unit_in_map_units: 1.0,
-        tiles: None,
-        write_clouds: false,
-        share_safe: false,
-        inversion: None,
-        journal: None,
-        progress: &Quiet,
-        command: None,
-        started: Instant::now(),
+        ..Job::of(&prepared.original, Instant::now())
     };
     maps::find(job, None)
 }
@@ -188,17 +161,7 @@ fn a_unit_that_is_only_stated_is_no_protection() {
     let points = room().iter().map(|point| point.map(|x| 1000.0 * x)).collect();
     let points = PointSet::try_new(points, Unit::KthNeighbor).expect("points");
     let original = Original::new(points);
-    let rows = (0..N as u32).collect();
-    let (notes, doubts) = Default::default();
-    let prepared = Prepared {
-        original,
-        descriptors: None,
-        unit_in_map_units: 1.0,
-        rows,
-        cameras: Cameras::default(),
-        notes,
-        doubts,
-    };
+    let prepared = Prepared::of(original);
     let options = SchemeOptions::usual(Unit::KthNeighbor);
     let olc = scheme("olc").expect("olc").of_dimension::<3>(&options).expect("in 3D");
     let hidden = obfuscate(&*olc, &prepared.original, None, &Key::from_seed(1)).expect("hidden");

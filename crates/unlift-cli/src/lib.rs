@@ -7,7 +7,6 @@ mod commands;
 mod exit;
 mod interrupt;
 mod output;
-mod pace;
 mod progress;
 mod stderr;
 mod values;

@@ -1,14 +1,14 @@
 //! Progress on stderr for work of more than a second: a bar on a terminal, otherwise a line per
 //! minute. `--quiet` disables both.
 
+use std::fmt::Write;
 use std::io::IsTerminal;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use unlift::OneLine;
 
-use crate::pace::Pace;
 use crate::stderr::tell;
 
 /// Work that takes less time shows no progress.
@@ -17,16 +17,14 @@ const PATIENCE: Duration = Duration::from_secs(1);
 const TICK: Duration = Duration::from_millis(500);
 /// Shortest interval between lines in a log.
 const LINES: Duration = Duration::from_secs(60);
-/// Steps of a bar per item, so that it moves within items.
-const PARTS: f64 = 1000.0;
+/// Steps of a bar per item, so that it moves within items. Fractions are rounded to them.
+const PARTS: u64 = 1_000_000;
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Shown {
     Nothing,
-    /// A bar, with its draw target.
-    Bar(fn() -> ProgressDrawTarget),
-    /// Lines, with the time of the last one.
-    Lines(Duration),
+    Bar,
+    Lines,
 }
 
 /// Progress over countable items; removed when dropped.
@@ -35,15 +33,10 @@ pub struct Progress(Steps);
 /// A handle with which any thread can report progress.
 #[derive(Clone)]
 pub struct Steps {
-    started: Instant,
-    state: Arc<Mutex<State>>,
-    bar: ProgressBar,
-}
-
-struct State {
-    pace: Pace,
     shown: Shown,
-    what: String,
+    bar: ProgressBar,
+    /// Time of the last line in a log.
+    told: Arc<Mutex<Instant>>,
 }
 
 impl Progress {
@@ -51,53 +44,48 @@ impl Progress {
     pub fn new(quiet: bool) -> Self {
         Self::with(match (quiet, std::io::stderr().is_terminal()) {
             (true, _) => Shown::Nothing,
-            (false, true) => Shown::Bar(ProgressDrawTarget::stderr),
-            (false, false) => Shown::Lines(Duration::ZERO),
+            (false, true) => Shown::Bar,
+            (false, false) => Shown::Lines,
         })
     }
 
     fn with(shown: Shown) -> Self {
-        let started = Instant::now();
-        let state =
-            Arc::new(Mutex::new(State { pace: Pace::default(), shown, what: String::new() }));
-        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
-        let template = "{bar:30} {status} {wide_msg}";
-        let style = ProgressStyle::with_template(template).expect("the template is ours");
-        let of_bar = Arc::clone(&state);
-        bar.set_style(style.with_key(
-            "status",
-            move |_: &ProgressState, text: &mut dyn std::fmt::Write| {
-                // A failed write only loses the status.
-                let _ = write!(text, "{}", lock(&of_bar).pace.status(started.elapsed()));
-            },
-        ));
-        if let Shown::Bar(target) = shown {
+        // A hidden bar still counts and estimates.
+        let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::hidden());
+        let style = ProgressStyle::with_template("{bar:30} {status} {wide_msg}");
+        let style = style.expect("the template is ours");
+        bar.set_style(style.with_key("status", |state: &ProgressState, text: &mut dyn Write| {
+            // A failed write only loses the status.
+            let _ = text.write_str(&status(state.pos(), state.len(), state.eta()));
+        }));
+        if shown == Shown::Bar {
             // In a thread, because the first step may take a minute.
             let bar = bar.downgrade();
             std::thread::spawn(move || {
                 std::thread::sleep(PATIENCE);
                 let bar = bar.upgrade().filter(|bar| !bar.is_finished());
                 if let Some(bar) = bar {
-                    bar.set_draw_target(target());
+                    bar.set_draw_target(ProgressDrawTarget::stderr());
                     bar.enable_steady_tick(TICK);
                 }
             });
         }
-        Self(Steps { started, state, bar })
+        Self(Steps { shown, bar, told: Arc::new(Mutex::new(Instant::now())) })
     }
 
     /// Sets `done` of `total` items as finished; `what` is the next item.
     pub fn show(&self, done: usize, total: usize, what: &str) {
-        self.0.tell(what, |pace, now| pace.set(done as f64, total, now));
+        let bar = &self.0.bar;
+        bar.set_length(total as u64 * PARTS);
+        // Fractions that threads added may already exceed `done`.
+        bar.set_position(bar.position().max(done as u64 * PARTS));
+        self.0.tell(what);
     }
 
     /// Ends this progress and starts that of further work.
     pub fn again(&self) -> Self {
         self.0.bar.finish_and_clear();
-        Self::with(match lock(&self.0.state).shown {
-            Shown::Lines(_) => Shown::Lines(Duration::ZERO),
-            shown => shown,
-        })
+        Self::with(self.0.shown)
     }
 
     /// Prints a line on stderr without breaking the bar.
@@ -107,6 +95,16 @@ impl Progress {
 
     pub fn steps(&self) -> Steps {
         self.0.clone()
+    }
+}
+
+/// Formats parts of items: `12/40, 3 minutes left`, without the time while it is not known.
+fn status(parts: u64, of: Option<u64>, left: Duration) -> String {
+    let total = of.unwrap_or(0) / PARTS;
+    let done = ((parts + PARTS / 1000) / PARTS).min(total);
+    match left.as_secs() {
+        0 => format!("{done}/{total}"),
+        _ => format!("{done}/{total}, {} left", HumanDuration(left)),
     }
 }
 
@@ -149,7 +147,8 @@ impl Drop for Progress {
 impl Steps {
     /// Adds a fraction of an item; `what` is the current item, unless it is empty.
     pub fn add(&self, share: f64, what: &str) {
-        self.tell(what, |pace, now| pace.add(share, now));
+        self.bar.inc((share * PARTS as f64).round() as u64);
+        self.tell(what);
     }
 
     /// Prints a line on stderr without breaking the bar.
@@ -157,36 +156,19 @@ impl Steps {
         self.bar.suspend(|| tell(line));
     }
 
-    fn tell(&self, what: &str, step: impl FnOnce(&mut Pace, Duration)) {
-        let now = self.started.elapsed();
-        let mut state = lock(&self.state);
-        step(&mut state.pace, now);
+    fn tell(&self, what: &str) {
         if !what.is_empty() {
-            state.what = OneLine(what).to_string();
+            self.bar.set_message(OneLine(what).to_string());
         }
-        let State { pace, shown, what } = &mut *state;
-        match shown {
-            Shown::Nothing => {}
-            Shown::Lines(last) => {
-                if now.saturating_sub(*last) >= LINES {
-                    *last = now;
-                    tell(format_args!("unlift: {}: {what}", pace.status(now)));
-                }
-            }
-            Shown::Bar(_) => {
-                let (pace, what) = (pace.clone(), what.clone());
-                // Drawing the bar locks the state.
-                drop(state);
-                self.bar.set_length((pace.total() as f64 * PARTS) as u64);
-                self.bar.set_message(what);
-                self.bar.set_position((pace.done() * PARTS) as u64);
+        if self.shown == Shown::Lines {
+            let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+            if told.elapsed() >= LINES {
+                *told = Instant::now();
+                let status = status(self.bar.position(), self.bar.length(), self.bar.eta());
+                tell(format_args!("unlift: {status}: {}", self.bar.message()));
             }
         }
     }
-}
-
-fn lock(state: &Mutex<State>) -> MutexGuard<'_, State> {
-    state.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// An activity indicator for work whose steps cannot be counted; removed when dropped. Without a
@@ -245,44 +227,6 @@ fn tell_each(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use indicatif::TermLike;
-    use std::io;
-
-    static DRAWN: Mutex<Vec<String>> = Mutex::new(Vec::new());
-
-    #[derive(Debug)]
-    struct Paper;
-
-    impl TermLike for Paper {
-        fn width(&self) -> u16 {
-            100
-        }
-        fn move_cursor_up(&self, _: usize) -> io::Result<()> {
-            Ok(())
-        }
-        fn move_cursor_down(&self, _: usize) -> io::Result<()> {
-            Ok(())
-        }
-        fn move_cursor_right(&self, _: usize) -> io::Result<()> {
-            Ok(())
-        }
-        fn move_cursor_left(&self, _: usize) -> io::Result<()> {
-            Ok(())
-        }
-        fn write_line(&self, text: &str) -> io::Result<()> {
-            self.write_str(text)
-        }
-        fn write_str(&self, text: &str) -> io::Result<()> {
-            DRAWN.lock().unwrap().push(text.to_owned());
-            Ok(())
-        }
-        fn clear_line(&self) -> io::Result<()> {
-            Ok(())
-        }
-        fn flush(&self) -> io::Result<()> {
-            Ok(())
-        }
-    }
 
     #[test]
     fn work_that_cannot_be_counted_says_that_it_goes_on_until_it_ends() {
@@ -297,37 +241,19 @@ mod tests {
     }
 
     #[test]
-    fn what_is_at_work_is_said_also_where_only_a_share_is_told() {
-        let progress = Progress::with(Shown::Lines(Duration::ZERO));
-        progress.show(0, 4, "a.jpg");
-        progress.steps().add(0.5, "");
-        assert_eq!(lock(&progress.0.state).what, "a.jpg");
-    }
-
-    fn wait_until(done: impl Fn() -> bool) {
-        let started = Instant::now();
-        while !done() {
-            // A busy machine may take a while.
-            assert!(started.elapsed() < Duration::from_secs(20), "{:?}", DRAWN.lock().unwrap());
-            std::thread::sleep(Duration::from_millis(20));
-        }
-    }
-
-    #[test]
-    fn a_bar_counts_tells_what_is_left_and_moves_at_least_once_a_second() {
-        let progress = Progress::with(Shown::Bar(|| {
-            ProgressDrawTarget::term_like_with_hz(Box::new(Paper), 20)
-        }));
-        let frames = || DRAWN.lock().unwrap().clone();
-        progress.show(0, 4, "a.jpg");
-        assert_eq!(frames(), [""; 0], "too early");
-        // The bar appears and moves without further steps.
-        wait_until(|| frames().iter().any(|f| f.contains("0/4") && f.contains("a.jpg")));
-        let steps = progress.steps();
-        std::thread::spawn(move || steps.add(1.0, "b.jpg")).join().unwrap();
-        wait_until(|| frames().iter().any(|f| f.contains("1/4") && f.contains("left b.jpg")));
-        let before = frames().len();
-        std::thread::sleep(Duration::from_secs(1));
-        assert!(frames().len() > before, "no step was made, and nothing moved");
+    fn parts_of_items_add_up_and_never_exceed_them() {
+        let progress = Progress::with(Shown::Lines);
+        let bar = &progress.0.bar;
+        let said = || status(bar.position(), bar.length(), Duration::ZERO);
+        progress.show(0, 2, "a.jpg");
+        (0..2).for_each(|_| progress.steps().add(1.0 / 3.0, ""));
+        assert_eq!((said(), bar.message()), ("0/2".to_owned(), "a.jpg".to_owned()));
+        progress.steps().add(1.0 / 3.0, "b.jpg");
+        assert_eq!((said(), bar.message()), ("1/2".to_owned(), "b.jpg".to_owned()));
+        (0..2).for_each(|_| progress.steps().add(1.0, ""));
+        progress.show(1, 2, "");
+        assert_eq!(said(), "2/2");
+        let minutes = status(3 * PARTS, Some(4 * PARTS), Duration::from_secs(150));
+        assert_eq!(minutes, "3/4, 3 minutes left");
     }
 }

@@ -51,11 +51,6 @@ pub fn count(text: &str) -> Result<NonZeroUsize, String> {
     whole(text, MOST)
 }
 
-/// Parses the number of points of a synthetic map; the maximum needs hundreds of gigabytes.
-pub fn made_points(text: &str) -> Result<NonZeroUsize, String> {
-    whole(text, 1_000_000_000)
-}
-
 /// Parses a whole number from 1 to `most`.
 fn whole(text: &str, most: usize) -> Result<NonZeroUsize, String> {
     let number = text.trim().parse::<NonZeroUsize>().ok().filter(|number| number.get() <= most);
@@ -393,9 +388,7 @@ mod tests {
             assert_eq!(threads(text), Err(expected));
         }
         let huge = u64::MAX.to_string();
-        assert!(
-            count("4294967296").is_err() && count(&huge).is_err() && made_points(&huge).is_err()
-        );
+        assert!(count("4294967296").is_err() && count(&huge).is_err());
         assert!(outlier_filter(&format!("{huge},1")).is_err());
     }
 

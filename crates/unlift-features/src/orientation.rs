@@ -153,17 +153,6 @@ mod tests {
     use crate::image::GrayImage;
 
     #[test]
-    fn weights_are_a_gaussian_about_the_place() {
-        let mut row = Vec::new();
-        weights(20, 0.3, 5.0, &mut row);
-        assert_eq!(row.len(), 41);
-        for (i, &weight) in row.iter().enumerate() {
-            let d = i as f64 - 20.0 + 0.3;
-            assert!((f64::from(weight) - (-d * d / 50.0).exp()).abs() < 1e-6);
-        }
-    }
-
-    #[test]
     fn a_ramp_points_uphill_whichever_way() {
         // Avoids borders of two bins, where both are equally high and neither is a peak.
         for degrees in (2..360).step_by(7).filter(|degrees| degrees % 10 != 0) {

@@ -31,11 +31,9 @@ fn points_are_read_back_by_our_reader() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("points.ply");
     let points = [[1.0, 2.0, 3.0], [-0.1, 1e-9, 4e6]];
-    for colors in [None, Some(&[[1, 2, 3], [4, 5, 6]][..])] {
-        clouds::write_points(&path, &points, colors).unwrap();
-        assert_eq!(unlift_io::read::open(&path).unwrap().positions, points);
-    }
-    clouds::write_points(&path, &[[1.0, 2.0]], None).unwrap();
+    clouds::write_points(&path, &points).unwrap();
+    assert_eq!(unlift_io::read::open(&path).unwrap().positions, points);
+    clouds::write_points(&path, &[[1.0, 2.0]]).unwrap();
     assert_eq!(unlift_io::read::open(&path).unwrap().positions, [[1.0, 2.0, 0.0]], "in the plane");
 }
 
@@ -75,10 +73,9 @@ fn what_is_not_finite_or_not_as_long_is_refused() {
     let nan = [0.0, f64::NAN, 0.0];
     for (result, line) in [
         (
-            clouds::write_points(&path, &[nan], None),
+            clouds::write_points(&path, &[nan]),
             "point 0: expected finite coordinates, found [0.0, NaN, 0.0]",
         ),
-        (clouds::write_points(&path, &[[0.0; 3]], Some(&[])), "expected 1 colors, found 0"),
         (clouds::write_recovered(&path, &[Some([0.0; 3])], &[], 1.0), "expected 1 errors, found 0"),
         (
             clouds::write_lines(&path, &[[[0.0; 3], nan]]),

@@ -1,6 +1,5 @@
 //! Audits of maps.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -47,10 +46,7 @@ pub fn audit(
     let notes = map.notes.iter().cloned().chain(notes).collect();
     let found = work::run(py, asked.threads, Some(stop), move || {
         let job = Job {
-            original: &prepared.original,
             descriptors: prepared.descriptors.as_ref(),
-            hidden: None,
-            localize: None,
             cameras,
             up,
             plan,
@@ -59,16 +55,10 @@ pub fn audit(
             notes,
             doubts: prepared.doubts.iter().cloned().chain(doubt).collect(),
             gates,
-            out: PathBuf::new(),
             unit_in_map_units: prepared.unit_in_map_units,
             tiles,
-            write_clouds: false,
-            share_safe: false,
-            inversion: None,
-            journal: None,
             progress: &*progress,
-            command: None,
-            started,
+            ..Job::of(&prepared.original, started)
         };
         find(job, None)
     });

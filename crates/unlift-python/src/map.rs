@@ -80,13 +80,11 @@ impl Map {
             let sha256 = Some(hash_positions(&rows));
             let prepared = prepare(rows, given.as_ref(), &preparation)?;
             let input = Input {
-                path: None,
                 sha256,
                 n_points: prepared.original.len() as u64,
                 scale_m_per_unit: scale,
                 unit_in_map_units: Some(prepared.unit_in_map_units),
-                other_sha256: Default::default(),
-                images: None,
+                ..Input::default()
             };
             let zeros = prepared.descriptors.as_ref().and_then(maps::zeros);
             let notes = prepared.notes.iter().cloned().chain(zeros).collect();

@@ -66,7 +66,7 @@ pub struct Document {
 }
 
 /// The audited input.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Input {
     /// Path of the map, as typed; `None` in a share-safe document.
     pub path: Option<String>,

@@ -26,28 +26,6 @@ pub struct PublishedCurve {
 /// `published_2d.csv`: the columns of [`TABLE`] for keypoints of images, threshold in pixels.
 const TABLE_2D: &str = include_str!("../published_2d.csv");
 
-/// `published_seconds.csv`: scheme, points, K, inlier ratio, seconds. Source: supplementary table
-/// "runtime" of the same paper; 64 cores.
-const SECONDS: &str = include_str!("../published_seconds.csv");
-
-/// Returns the published seconds of recovery on 64 cores; `None` if this case was not published.
-pub fn published_seconds(
-    scheme: &str,
-    n_points: usize,
-    k: usize,
-    inlier_ratio: f64,
-) -> Option<f64> {
-    SECONDS.lines().skip(1).find_map(|line| {
-        let cells: Vec<&str> = line.split(',').collect();
-        let [name, points, neighbors, ratio, seconds] = cells[..] else { return None };
-        let same = name == scheme
-            && points.parse() == Ok(n_points)
-            && neighbors.parse() == Ok(k)
-            && ratio.parse() == Ok(inlier_ratio);
-        same.then(|| seconds.parse().ok()).flatten()
-    })
-}
-
 /// Returns all published curves of maps, in the order of the table.
 pub fn published_3d() -> Vec<PublishedCurve> {
     curves(TABLE)
@@ -124,15 +102,6 @@ mod tests {
             let ratios: Vec<f64> = curve.points.iter().map(|point| point.0).collect();
             assert_eq!(ratios, [1.0, 0.75, 0.5, 0.3, 0.2, 0.1], "{curve:?}");
         }
-    }
-
-    #[test]
-    fn seconds_are_as_printed() {
-        assert_eq!(published_seconds("ppl", 700_000, 50, 0.1), Some(1080.0));
-        assert_eq!(published_seconds("ppl", 100_000, 50, 1.0), Some(8.0));
-        assert_eq!(published_seconds("olc", 700_000, 50, 0.1), None);
-        assert_eq!(published_seconds("ppl", 700_000, 20, 0.1), None);
-        assert_eq!(SECONDS.lines().count(), 16);
     }
 
     #[test]

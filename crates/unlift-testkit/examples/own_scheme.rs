@@ -8,7 +8,7 @@ use std::sync::Arc;
 use unlift::audit::{Plan, Silent, run};
 use unlift::geometry::frame::Bounds;
 use unlift::obfuscate::olc::Olc;
-use unlift::obfuscate::{Facts, Lifted, Scheme};
+use unlift::obfuscate::{Lifted, Scheme};
 use unlift::released::{Lines, Obfuscation};
 use unlift::seed::{Key, Stage};
 use unlift::truth::Original;
@@ -24,10 +24,6 @@ struct Tilted {
 impl Scheme<3> for Tilted {
     fn name(&self) -> &str {
         "tilted"
-    }
-
-    fn facts(&self) -> Facts {
-        Facts { summary: "a nearly upright line through every point", ..Facts::default() }
     }
 
     fn parameters(&self) -> Vec<(&'static str, f64)> {

@@ -64,23 +64,3 @@ impl Best {
 pub fn higher_first(a: &(f32, u32), b: &(f32, u32)) -> std::cmp::Ordering {
     b.0.total_cmp(&a.0).then(a.1.cmp(&b.1))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_order_of_the_stream_does_not_matter() {
-        let entries: Vec<(f32, u32)> = (0..200).map(|id| ((id * 37 % 23) as f32, id)).collect();
-        let keep = |entries: &mut dyn Iterator<Item = &(f32, u32)>| {
-            let mut best = Best::new(10);
-            entries.for_each(|&(score, id)| best.push(score, id));
-            best.into_sorted()
-        };
-        let forth = keep(&mut entries.iter());
-        assert_eq!(forth, keep(&mut entries.iter().rev()));
-        let mut all = entries.clone();
-        all.sort_unstable_by(higher_first);
-        assert_eq!(forth, all[..10]);
-    }
-}

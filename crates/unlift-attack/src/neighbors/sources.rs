@@ -193,25 +193,10 @@ mod tests {
     }
 
     #[test]
-    fn unknown_names_are_told() {
-        let message = Named::parse("overlap+similarity").unwrap_err().to_string();
-        let expected = "source: expected one of similarity, overlap, geometric";
-        assert_eq!(message, format!("{expected}, found overlap+similarity"));
-    }
-
-    #[test]
     fn only_large_maps_with_descriptors_call_for_a_note() {
         let note = |name: &str, n| Named::parse(name).unwrap().of_dimension::<3>().unwrap().note(n);
         assert!(note("similarity", MOST_ROWS + 1).unwrap().starts_with("similarity: of more"));
         assert_eq!(note("overlap", MOST_ROWS), None);
         assert_eq!(note("geometric", MOST_ROWS + 1), None);
-    }
-
-    #[test]
-    fn every_name_is_one_word_of_its_own() {
-        for (at, entry) in SOURCES.iter().enumerate() {
-            assert!(entry.name.chars().all(|c| c.is_ascii_lowercase()), "{}", entry.name);
-            assert!(SOURCES[..at].iter().all(|other| other.name != entry.name));
-        }
     }
 }

@@ -357,32 +357,6 @@ mod tests {
     use crate::seed::{Draws, Stage};
     use crate::simd::portable;
 
-    fn votes(modes: &[(f64, usize)], strays: usize) -> Vec<f64> {
-        let mut draws = Draws::new(8, Stage::Synthetic, 0);
-        let mut votes: Vec<f64> = (0..strays).map(|_| draws.between(-10.0, 10.0)).collect();
-        for &(middle, n) in modes {
-            votes.extend((0..n).map(|_| middle + 0.1 * draws.normal()));
-        }
-        votes
-    }
-
-    #[test]
-    fn one_mode_is_found_among_strays() {
-        let t = mode(&mut votes(&[(3.0, 150)], 350)).unwrap();
-        assert!((t - 3.0).abs() < 0.1, "{t}");
-        assert_eq!(mode(&mut []), None);
-        assert_eq!(mode(&mut [2.0]), Some(2.0));
-        assert_eq!(mode(&mut [2.0; 40]), Some(2.0));
-    }
-
-    #[test]
-    fn two_modes_are_found_among_strays() {
-        let [a, b] = two_modes(&mut votes(&[(4.0, 200), (-2.0, 300)], 500)).unwrap();
-        assert!((a + 2.0).abs() < 0.2 && (b - 4.0).abs() < 0.2, "{a} {b}");
-        assert_eq!(two_modes(&mut []), None);
-        assert_eq!(two_modes(&mut [2.0; 9]), Some([2.0; 2]));
-    }
-
     fn lines(n: usize) -> Vec<FeasibleLine> {
         let mut draws = Draws::new(4, Stage::Synthetic, 0);
         let line = |_| FeasibleLine {
@@ -425,13 +399,5 @@ mod tests {
         let fast = columns.map(of);
         portable(Map { columns: &columns, of, out: &mut plain });
         assert_eq!(fast, plain);
-    }
-
-    #[test]
-    fn nearest_takes_the_smallest_and_counts_ties_by_place() {
-        let (mut near, reach) = nearest(&[4.0, f32::INFINITY, 1.0, 4.0, 0.0], 3);
-        near.sort_unstable();
-        assert_eq!((&near[..], reach), (&[0, 2, 4][..], 2.0));
-        assert_eq!(nearest(&[], 3), (Vec::new(), f32::INFINITY));
     }
 }

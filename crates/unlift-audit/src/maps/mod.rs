@@ -21,7 +21,7 @@ use unlift_report::scene::Scene3d;
 use crate::Error;
 use crate::audited::{Audited, Finished};
 use crate::clouds::Clouds;
-use crate::document::{self, Provenance, ordered};
+use crate::document::{self, Provenance};
 use crate::doubts::{Spread, doubts};
 use crate::gate::{Gate, check_gates, gate_results};
 use crate::inversion::MapInversion;
@@ -101,10 +101,9 @@ impl<'a> Job<'a> {
     ) -> Result<Self, Error> {
         let points = prepared.original.reveal();
         let scale = 1.0 / prepared.unit_in_map_units;
+        let job = Self::of(&prepared.original, started);
         Ok(Self {
-            original: &prepared.original,
             descriptors: prepared.descriptors.as_ref(),
-            hidden: None,
             localize: Some(Localize {
                 cameras: &prepared.cameras,
                 held_out: None,
@@ -112,22 +111,39 @@ impl<'a> Job<'a> {
             }),
             cameras: input.cameras.iter().map(|c| c.map(|x| x * scale)).collect(),
             up: input.up,
-            plan: Plan::new(points.unit()).for_map(points.len(), USUAL_K),
             input: Input {
                 path: Some(path.display().to_string()),
                 sha256: Some(hash_input(input)?),
-                n_points: prepared.original.len() as u64,
                 scale_m_per_unit: (points.unit() == Unit::Meter).then_some(scale),
                 unit_in_map_units: Some(prepared.unit_in_map_units),
-                other_sha256: ordered([]),
-                images: None,
+                ..job.input
             },
-            options: serde_json::Map::new(),
             notes: prepared.notes.clone(),
             doubts: prepared.doubts.clone(),
-            gates: Vec::new(),
             out: out.to_owned(),
             unit_in_map_units: prepared.unit_in_map_units,
+            ..job
+        })
+    }
+
+    /// Creates the default audit of points in memory, without output folder.
+    pub fn of(original: &'a Original<3>, started: Instant) -> Self {
+        let points = original.reveal();
+        Self {
+            original,
+            descriptors: None,
+            hidden: None,
+            localize: None,
+            cameras: Vec::new(),
+            up: None,
+            plan: Plan::new(points.unit()).for_map(points.len(), USUAL_K),
+            input: Input { n_points: points.len() as u64, ..Input::default() },
+            options: serde_json::Map::new(),
+            notes: Vec::new(),
+            doubts: Vec::new(),
+            gates: Vec::new(),
+            out: PathBuf::new(),
+            unit_in_map_units: 1.0,
             tiles: None,
             write_clouds: false,
             share_safe: false,
@@ -136,7 +152,7 @@ impl<'a> Job<'a> {
             progress: &Quiet,
             command: None,
             started,
-        })
+        }
     }
 }
 

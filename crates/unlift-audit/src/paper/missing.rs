@@ -64,7 +64,7 @@ pub fn elsewhere(dataset: Dataset) -> Vec<&'static str> {
     match dataset {
         Dataset::SevenScenes => vec![
             "table 7, SuperPoint: unlift audit map, with a map that hloc makes of SuperPoint features",
-            "table 14 (seconds): unlift bench recover",
+            "table 14 (seconds): cargo bench -p unlift --bench recover -- points=700000 schemes=ppl",
             "table 15 (objects): objects_found in the rows of audits with pictures",
         ],
         Dataset::TwelveScenes => vec![

@@ -1,4 +1,4 @@
-//! Arguments of `features`, `invert` and `metrics`.
+//! Arguments of `features` and `invert`.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -118,25 +118,4 @@ pub struct InvertArgs {
     /// Replace files of the same names that unlift did not write
     #[arg(long)]
     pub force: bool,
-}
-
-/// Options of `metrics`.
-#[derive(Debug, Args)]
-#[command(after_help = "\
-SSIM is computed as in scikit-image with default options (7 x 7 windows, mean over the colors). PSNR
-is in dB. LPIPS is version 0.1 with SqueezeNet. In folders, pictures of the same name are compared;
-extensions are ignored. If a picture has twice the size of the other, it is halved first.
-
-Examples:
-  unlift metrics photo.jpg picture.png
-  unlift metrics photos pictures --json")]
-pub struct MetricsArgs {
-    /// A picture, or a folder of pictures
-    pub a: PathBuf,
-    /// Another picture of the same, half or twice the size, or a folder of such pictures
-    pub b: PathBuf,
-    /// Print JSON with ssim, psnr and lpips in place of the text. For folders, these are means;
-    /// `pictures` has the values of each picture
-    #[arg(long)]
-    pub json: bool,
 }

@@ -18,9 +18,9 @@ pub use audits::{
     AttackArgs, AuditAgainArgs, AuditImagesArgs, AuditMapArgs, AuditReleasedArgs,
     AuditSequenceArgs, CheckArgs, MapArgs, ProtectArgs, ResultArgs,
 };
-pub use images::{FeaturesArgs, InvertArgs, MetricsArgs};
+pub use images::{FeaturesArgs, InvertArgs};
 pub use program::{CompletionsArgs, DemoArgs, DoctorArgs, ManArgs, ModelsArgs};
-pub use results::{BenchRecoverArgs, CompareArgs, PaperArgs, TableArgs};
+pub use results::{CompareArgs, PaperArgs, TableArgs};
 pub use stages::{
     EvaluateArgs, ExportArgs, FindArgs, NeighborsCommand, ObfuscateArgs, OracleArgs, RecoverArgs,
     SplitArgs,
@@ -84,8 +84,8 @@ fn numbers_may_be_negative(command: clap::Command) -> clap::Command {
 /// The commands under each heading of `unlift --help`.
 const GROUPS: [(&str, &str); 3] = [
     ("Audits", "demo audit check compare table"),
-    ("Stages", "obfuscate neighbors recover evaluate export split features invert metrics"),
-    ("Tools", "paper bench schemes models doctor completions man help"),
+    ("Stages", "obfuscate neighbors recover evaluate export split features invert"),
+    ("Tools", "paper schemes models doctor completions man help"),
 ];
 
 /// Lists the commands under the headings of `GROUPS`, because clap has one heading for all commands.
@@ -133,7 +133,7 @@ pub enum Command {
     Recover(RecoverArgs),
     /// Compare recovered points with the original points
     Evaluate(EvaluateArgs),
-    /// Convert released, recovered or original points to PLY, OBJ, COLMAP or nerfstudio
+    /// Convert released, recovered or original points to PLY, OBJ or COLMAP
     Export(ExportArgs),
     /// Split a Parquet file into parts that other programs, such as Spark, read in parallel
     Split(SplitArgs),
@@ -141,13 +141,8 @@ pub enum Command {
     Features(FeaturesArgs),
     /// Paint pictures from descriptors and the positions of keypoints or recovered points
     Invert(InvertArgs),
-    /// Compare pictures by SSIM, PSNR and LPIPS
-    Metrics(MetricsArgs),
     /// Reproduce the paper's tables on its datasets, next to the published numbers
     Paper(PaperArgs),
-    /// Measure the time of recovery, next to the published time
-    #[command(subcommand)]
-    Bench(BenchCommand),
     /// List the schemes: how they hide points, what stays hidden, publication, patents
     Schemes,
     /// List the networks: purpose, license, hash, owner, and whether they are installed
@@ -181,18 +176,9 @@ pub enum AuditCommand {
     Again(Box<AuditAgainArgs>),
 }
 
-/// Kinds of benchmarks.
-#[derive(Debug, Subcommand)]
-pub enum BenchCommand {
-    /// Measure the time of recovery, next to the published time
-    Recover(BenchRecoverArgs),
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::values::NeighborSource;
-    use unlift::recover::{Builtin, Delta};
     use unlift_audit::OutlierFilter;
 
     fn audit(arguments: &[&str]) -> Result<AuditMapArgs, clap::Error> {
@@ -204,31 +190,11 @@ mod tests {
     }
 
     #[test]
-    fn the_definition_is_consistent() {
-        Cli::command().debug_assert();
-    }
-
-    #[test]
     fn every_command_is_in_one_group() {
         let mut command = Cli::command();
         command.build();
         let known = command.get_subcommands().map(clap::Command::get_name);
         assert!(known.eq(GROUPS.iter().flat_map(|(_, names)| names.split(' '))));
-    }
-
-    #[test]
-    fn defaults_are_those_of_the_documentation() {
-        let args = audit(&[]).unwrap();
-        assert_eq!((args.map.k, args.map.seed, args.attack.repeats), (50, None, 1));
-        assert!(args.solvers.solver.is_empty() && !args.solvers.no_records_alone);
-        assert_eq!((args.attack.delta, args.map.outlier_filter), (Delta::Auto, None));
-        assert_eq!(args.neighbors, [NeighborSource::Oracle]);
-        assert!(
-            args.attack.inlier_ratios.is_empty()
-                && args.attack.oracle_noise.is_empty()
-                && args.attack.source_k.is_none()
-        );
-        assert!(args.schemes.is_empty() && args.thresholds.is_empty());
     }
 
     #[test]
@@ -243,15 +209,6 @@ mod tests {
             let error = audit(&[option, "-1"]).unwrap_err().to_string();
             assert!(error.contains(expected), "{option}: {error}");
         }
-    }
-
-    #[test]
-    fn lists_are_split_at_commas_and_repeated_options_add_up() {
-        let args =
-            audit(&["--solver", "consensus", "--solver", "ransac", "--schemes=ppl+,cp"]).unwrap();
-        assert_eq!(args.solvers.solver, [Builtin::Consensus, Builtin::Ransac]);
-        let names: Vec<&str> = args.schemes.iter().map(|scheme| scheme.name).collect();
-        assert_eq!(names, ["ppl+", "cp"]);
     }
 
     #[test]

@@ -1,12 +1,10 @@
-//! Arguments of `table`, `compare`, `paper` and `bench`.
+//! Arguments of `table`, `compare` and `paper`.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::Args;
 use unlift::audit::Threshold;
-use unlift::obfuscate::Entry;
-use unlift::recover::{Builtin, Delta};
 use unlift_audit::paper::{Dataset, Part};
 use unlift_report::export::TableFormat;
 
@@ -178,62 +176,4 @@ pub struct PaperArgs {
     /// Show no progress on stderr
     #[arg(long)]
     pub quiet: bool,
-}
-
-/// Options of `bench recover`.
-#[derive(Debug, Args)]
-#[command(after_help = "\
-unlift measures the time to compute positions, as the paper does. An audit also computes the
-probability that each position is correct; --confidence includes that time. The output also has the
-peak memory of the whole run.
-
-Examples:
-  unlift bench recover --points 700000 --scheme ppl
-  unlift bench recover --points 100000 --scheme plane --map PROJECT --solver joint,ransac --json
-
-The output includes the paper's time (64 cores) if the paper measured the same scheme, K, inlier
-ratio (fraction of true neighbors) and number of points. It measured ppl with K = 50 and 100000,
-300000 or 700000 points.")]
-pub struct BenchRecoverArgs {
-    /// Number of points of the map
-    #[arg(long, value_parser = values::made_points, value_name = "N", default_value = "700000")]
-    pub points: NonZeroUsize,
-    /// Map to measure on. If it has more than --points points, unlift takes a random subset; if
-    /// fewer, unlift puts copies of it, with slightly moved points, side by side [default: the room
-    /// of the demo]
-    #[arg(long, value_name = "PATH")]
-    pub map: Option<PathBuf>,
-    /// Scheme that hides the points (unlift schemes lists them)
-    #[arg(long, value_name = "SCHEME", value_parser = values::scheme, default_value = "ppl")]
-    pub scheme: &'static Entry,
-    /// Entries per list of neighbors (K); there is a list per hidden point
-    #[arg(long, value_name = "K", default_value = "50",
-          value_parser = clap::value_parser!(u16).range(1..))]
-    pub k: u16,
-    /// Fractions of true neighbors in the lists, separated by commas; each is measured
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::ratio,
-          default_value = "1,0.5,0.3,0.2,0.1")]
-    pub inlier_ratios: Vec<f64>,
-    /// Recovery methods, separated by commas or repeated. With lists of neighbors: joint,
-    /// ranking, joint-start, consensus, ransac. Without lists, from the records alone (what a scheme
-    /// releases in place of points): density, tomography. See unlift recover --help
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
-          default_value = "joint")]
-    pub solver: Vec<Builtin>,
-    /// A listed record supports a position if it passes within this distance of it, in the unit of
-    /// the map; auto computes the distance from the released records and the lists
-    #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
-    pub delta: Delta,
-    /// Also compute the probability that each position is correct, as an audit does
-    #[arg(long)]
-    pub confidence: bool,
-    /// Random seed
-    #[arg(long, value_name = "INTEGER", default_value_t = 0)]
-    pub seed: u64,
-    /// Number of threads [default: one per core]
-    #[arg(long, value_parser = values::threads, value_name = "N")]
-    pub threads: Option<NonZeroUsize>,
-    /// Print JSON in place of the table
-    #[arg(long)]
-    pub json: bool,
 }

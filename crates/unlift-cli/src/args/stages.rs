@@ -236,18 +236,16 @@ pub struct SplitArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 The ending of --out decides the format:
-  .ply             points
-  .obj             released lines or rays, drawn as segments
-  transforms.json  cameras for nerfstudio, and the points in sparse_pc.ply beside it
-  no ending        a folder with a COLMAP model in text (cameras.txt, images.txt, points3D.txt)
+  .ply       points
+  .obj       released lines or rays, drawn as segments
+  no ending  a folder with a COLMAP model in text (cameras.txt, images.txt, points3D.txt)
 
 A file that shows points is as private as the map.
 
 Examples:
   unlift export back.parquet --scale 1 --out back.ply
   unlift export hidden/released.parquet --scale 1 --out lines.obj
-  unlift export back.parquet --scale 1 --cameras PROJECT --out back-model
-  unlift export back.parquet --scale 1 --cameras PROJECT --out back-nerf/transforms.json")]
+  unlift export back.parquet --scale 1 --cameras PROJECT --out back-model")]
 pub struct ExportArgs {
     /// A released, recovered or truth file of a map (Parquet)
     #[arg(value_name = "FILE")]
@@ -260,7 +258,7 @@ pub struct ExportArgs {
     #[arg(long, value_name = "METERS", value_parser = values::scale)]
     pub scale: Option<f64>,
     /// A COLMAP model or project of the same map. Its cameras and images are copied to the exported
-    /// model or transforms.json
+    /// model
     #[arg(long, value_name = "PROJECT")]
     pub cameras: Option<PathBuf>,
     /// Replace files of the same name that unlift did not write

@@ -7,7 +7,6 @@ use serde_json::{Map, json};
 use unlift::audit::{Plan, scheme_called};
 use unlift::released::Released;
 use unlift::truth::Secret;
-use unlift_audit::localization::Cameras;
 use unlift_audit::maps::{self, perform};
 use unlift_audit::{Finished, Job, Prepared, Shown, check_thresholds, open_audit, ordered};
 use unlift_io::atomic::Rules;
@@ -56,12 +55,7 @@ pub fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
         let mut doubts = Vec::new();
         let plan = plan(args, &name, &prepared, &hidden.0, (&mut notes, &mut doubts))?;
         let job = Job {
-            original: &prepared.original,
-            descriptors: None,
             hidden: Some(&hidden),
-            localize: None,
-            cameras: Vec::new(),
-            up: None,
             plan,
             notes,
             doubts,
@@ -72,15 +66,11 @@ pub fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
             ),
             gates: args.result.gate.clone(),
             out: args.result.out.clone(),
-            unit_in_map_units: 1.0,
-            tiles: None,
             write_clouds: args.write_clouds,
-            inversion: None,
-            journal: None,
             share_safe: args.result.share_safe,
             progress: &progress,
             command: Some(command_line()),
-            started,
+            ..Job::of(&prepared.original, started)
         };
         Ok(perform(job, out)?)
     })?;
@@ -130,17 +120,8 @@ fn open(args: &AuditReleasedArgs) -> anyhow::Result<(Prepared, (Released<3>, Sec
     let slots = secret.slots_per_record();
     let secret = secret.of_map(Some(released.fingerprint()), slots);
     let secret = secret.map_err(|error| unlift_io::Error::core(&args.truth, error))?;
-    let rows = (0..original.len() as u32).collect();
     let notes = released.descriptors().and_then(maps::zeros).into_iter().collect();
-    let prepared = Prepared {
-        original,
-        descriptors: None,
-        unit_in_map_units: 1.0,
-        rows,
-        cameras: Cameras::default(),
-        notes,
-        doubts: Vec::new(),
-    };
+    let prepared = Prepared { notes, ..Prepared::of(original) };
     Ok((prepared, (released, secret)))
 }
 
@@ -222,9 +203,7 @@ fn provenance(args: &AuditReleasedArgs, prepared: &Prepared, seen: &Seen) -> any
         path: Some(args.released.display().to_string()),
         sha256,
         n_points: prepared.original.len() as u64,
-        scale_m_per_unit: None,
-        unit_in_map_units: None,
         other_sha256: ordered(others),
-        images: None,
+        ..Input::default()
     })
 }

@@ -119,10 +119,7 @@ fn map(progress: &Part<'_>, out: &Path, room: &unlift_demo::Mapped) -> anyhow::R
     let mut options = Map::new();
     options.insert("room".into(), json!({ "seed": SEED }));
     let job = Job {
-        original: &original,
         descriptors: Some(&room.descriptors),
-        hidden: None,
-        localize: None,
         cameras: room.cameras.clone(),
         up: Some([0.0, 0.0, 1.0]),
         plan: Plan {
@@ -136,23 +133,13 @@ fn map(progress: &Part<'_>, out: &Path, room: &unlift_demo::Mapped) -> anyhow::R
             n_points: original.len() as u64,
             scale_m_per_unit: Some(1.0),
             unit_in_map_units: Some(1.0),
-            other_sha256: Default::default(),
-            images: None,
+            ..Input::default()
         },
         options,
-        notes: Vec::new(),
-        doubts: Vec::new(),
-        gates: Vec::new(),
         out: out.to_owned(),
-        unit_in_map_units: 1.0,
-        tiles: None,
-        write_clouds: false,
-        inversion: None,
-        journal: None,
-        share_safe: false,
         progress,
         command: Some(command_line()),
-        started,
+        ..Job::of(&original, started)
     };
     Ok(find_map(job, None)?)
 }

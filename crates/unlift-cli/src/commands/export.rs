@@ -8,8 +8,8 @@ use unlift::{OneLine, Unit};
 use unlift_audit::{check_file, refused};
 use unlift_io::atomic::{Access, Kind, OutputSet, Rules};
 use unlift_io::clouds::{
-    NERFSTUDIO_CLOUD, Segment, record_segments, write_cameras, write_images, write_lines,
-    write_model_points, write_points, write_transforms,
+    Segment, record_segments, write_cameras, write_images, write_lines, write_model_points,
+    write_points,
 };
 use unlift_io::read::{self, colmap};
 use unlift_io::stage::{Kind as Stage, peek, read_recovered, read_released, read_truth};
@@ -17,9 +17,6 @@ use unlift_io::stage::{Kind as Stage, peek, read_recovered, read_released, read_
 use crate::args::ExportArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::print;
-
-/// File name of nerfstudio's cameras.
-const TRANSFORMS: &str = "transforms.json";
 
 enum Shown {
     /// A row per slot or original; `None` for lost points.
@@ -43,11 +40,10 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<Outcome> {
             let shown = scaled(args, read(&args.path)?)?;
             cloud(args, ending, &shown)?
         }
-        Some("json") => transforms(args, rules)?,
         Some(_) if !args.out.is_dir() => {
             let found = OneLine(args.out.display());
             return Err(usage(format!(
-                "--out: expected a name that ends in .ply, .obj or transforms.json, or a folder without an ending, found {found}"
+                "--out: expected a name that ends in .ply or .obj, or a folder without an ending, found {found}"
             )));
         }
         _ => model(args, rules)?,
@@ -64,7 +60,7 @@ fn cloud(args: &ExportArgs, ending: Option<&str>, shown: &Shown) -> anyhow::Resu
     match (ending, shown) {
         (Some("ply"), Shown::Points(points)) => {
             let points: Vec<[f64; 3]> = points.iter().flatten().copied().collect();
-            write_points(&args.out, &points, None)?;
+            write_points(&args.out, &points)?;
             Ok(format!("{} points", points.len()))
         }
         (Some("obj"), Shown::Segments(segments)) => {
@@ -99,35 +95,6 @@ fn model(args: &ExportArgs, rules: Rules) -> anyhow::Result<String> {
     out.commit()?;
     let n = points.iter().flatten().count();
     Ok(format!("a model of {n} points, {} cameras and {} images", cameras.len(), images.len()))
-}
-
-/// Writes nerfstudio's cameras and a point cloud.
-fn transforms(args: &ExportArgs, rules: Rules) -> anyhow::Result<String> {
-    let name = args.out.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-    if name != TRANSFORMS {
-        let expected = format!("expected {TRANSFORMS}, as nerfstudio calls it");
-        return Err(usage(format!("--out: {expected}, found {}", OneLine(args.out.display()))));
-    }
-    let Some(project) = &args.cameras else {
-        return Err(usage("--cameras: expected with --out transforms.json, found none"));
-    };
-    let folder = args.out.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let first = [(TRANSFORMS, Kind::Transforms), (NERFSTUDIO_CLOUD, Kind::Cloud)];
-    let folder = folder.unwrap_or(Path::new("."));
-    let mut out = OutputSet::create(folder, rules, Access::Private, &first).map_err(refused)?;
-    let Shown::Points(points) = scaled(args, read(&args.path)?)? else {
-        let found = "lines or rays";
-        let error = unlift_io::Error::new(&args.path, "", "points, for nerfstudio", found);
-        return Err(advise(error, "--out NAME.obj"));
-    };
-    let (cameras, images) = views(project)?;
-    let points: Vec<[f64; 3]> = points.into_iter().flatten().collect();
-    let [json, cloud] = first.map(|(name, kind)| out.stage(name, kind));
-    write_transforms(&json?, &cameras, &images).map_err(|error| error.at(&args.out))?;
-    // Points are gray, because nerfstudio requires colors.
-    write_points(&cloud?, &points, Some(&vec![[128; 3]; points.len()]))?;
-    out.commit()?;
-    Ok(format!("{} points and {} images", points.len(), images.len()))
 }
 
 fn views(project: &Path) -> anyhow::Result<(Vec<colmap::Camera>, Vec<colmap::Image>)> {

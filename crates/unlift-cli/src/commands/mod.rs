@@ -6,7 +6,6 @@ mod audit_images;
 mod audit_map;
 mod audit_released;
 mod audit_sequence;
-mod bench;
 mod check;
 mod common;
 mod compare;
@@ -17,7 +16,6 @@ mod features;
 mod gate_files;
 mod image_stages;
 mod invert;
-mod metrics;
 mod neighbors;
 mod obfuscate;
 mod painter;
@@ -30,7 +28,7 @@ mod table;
 
 use common::with_threads;
 
-use crate::args::{AuditCommand, BenchCommand, Command, NeighborsCommand};
+use crate::args::{AuditCommand, Command, NeighborsCommand};
 use crate::exit::Outcome;
 
 /// Runs one command.
@@ -58,10 +56,8 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Table(args) => table::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Paper(args) => paper::run(&args),
-        Command::Bench(BenchCommand::Recover(args)) => bench::recovery(&args),
         Command::Features(args) => features::run(&args),
         Command::Invert(args) => invert::run(&args),
-        Command::Metrics(args) => with_threads(None, || metrics::run(&args)),
         Command::Schemes => about::schemes(),
         Command::Models(args) => about::models(&args),
         Command::Doctor(args) => about::doctor(&args),

@@ -32,24 +32,19 @@ fn points_and_lines_come_back_in_every_form_and_on_the_map() {
     let room = unlift::synthetic::room(1, 400).points;
     for (more, name, said) in [
         ("", "truth.ply", "400 points, in truth.ply\n"),
-        ("", "model", "a model of 400 points, 0 cameras and 0 images, in model\n"),
-        (
-            "--cameras project",
-            "nerf/transforms.json",
-            "400 points and 1 images, in nerf/transforms.json\n",
-        ),
+        ("--cameras project", "model", "a model of 400 points, 1 cameras and 1 images, in model\n"),
     ] {
         // Files of unlift are replaced.
         for _ in 0..2 {
             let line = format!("export hidden/truth.parquet --scale 0.5 {more} --out {name}");
             assert_eq!(place.ends(&line, 0).0, said);
         }
-        let read = positions(&place, name.trim_end_matches("/transforms.json"));
+        let read = positions(&place, name);
         assert_eq!(read.len(), room.len(), "{name}");
         assert!(read.iter().zip(&room).all(|(a, b)| distance(a, b) < 1e-9), "{name}");
     }
-    let nerf = read::open(&place.path("nerf")).expect("a map");
-    assert_eq!((nerf.format, nerf.cameras), ("nerfstudio", vec![[1.0, 2.0, -3.0]]));
+    let model = read::open(&place.path("model")).expect("a map");
+    assert_eq!(model.cameras, [[1.0, 2.0, -3.0]]);
     // Without `--scale` lengths are those of the file, in meters: half as many as units.
     place.ends("export hidden/truth.parquet --out meters.ply", 0);
     assert!(distance(&positions(&place, "meters.ply")[7], &room[7].map(|x| 0.5 * x)) < 1e-9);
@@ -68,7 +63,6 @@ fn what_cannot_be_shown_is_told_and_what_is_not_ours_stays() {
     let place = recovered("plane");
     place.write("mine.ply", "mine");
     place.write("mine/points3D.txt", "# mine");
-    place.write("nerf/transforms.json", "{\"frames\": []}");
     let before = place.files();
     for (line, code, expected) in [
         ("hidden/released.parquet --out planes.obj", 3, "found planes, which have no end"),
@@ -79,23 +73,8 @@ fn what_cannot_be_shown_is_told_and_what_is_not_ours_stays() {
         (
             "back.parquet --out x.stl",
             2,
-            "--out: expected a name that ends in .ply, .obj or transforms.json, or a folder without an ending, \
+            "--out: expected a name that ends in .ply or .obj, or a folder without an ending, \
              found x.stl",
-        ),
-        (
-            "back.parquet --out other.json",
-            2,
-            "--out: expected transforms.json, as nerfstudio calls it, found other.json",
-        ),
-        (
-            "back.parquet --out transforms.json",
-            2,
-            "--cameras: expected with --out transforms.json, found none",
-        ),
-        (
-            "back.parquet --cameras room.csv --out nerf/transforms.json",
-            2,
-            "expected nothing, or cameras for nerfstudio",
         ),
         (
             "back.parquet --out mine.ply",

@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use image::{GrayImage, ImageFormat, Luma};
+use image::{GrayImage, ImageFormat};
 use unlift::descriptors::Values;
 use unlift_io::features::{FeatureSource, ImageFeatures};
 
@@ -86,21 +86,6 @@ fn photos_are_turned_unless_they_are_to_be_left_as_stored() {
     middle("copy.h5", false);
     // The blobs are rotated by 180 degrees about the middle of 128 x 96 pixels.
     assert!((a[0] + b[0] - 127.0).abs() < 3.0 && (a[1] + b[1] - 95.0).abs() < 3.0, "{a:?} {b:?}");
-}
-
-#[test]
-fn keypoints_are_in_the_convention_of_hloc() {
-    let place = Place::empty();
-    // A blob with its middle at the pixel in column 30 and row 34.
-    let blob = GrayImage::from_fn(64, 64, |x, y| {
-        let (dx, dy) = (f64::from(x) - 30.0, f64::from(y) - 34.0);
-        Luma([(255.0 * (-(dx * dx + dy * dy) / 50.0).exp()) as u8])
-    });
-    fs::create_dir(place.path("blob")).unwrap();
-    blob.save(place.path("blob/a.png")).unwrap();
-    place.ends("features blob", 0);
-    let [x, y] = all(&place, "features.h5")[0].keypoints[0];
-    assert!((x - 30.0).abs() < 0.1 && (y - 34.0).abs() < 0.1, "({x}, {y})");
 }
 
 #[test]

@@ -42,25 +42,6 @@ fn a_gate_may_name_a_solver_and_a_source_and_decides_the_exit_code() {
 }
 
 #[test]
-fn the_gain_of_a_gate_is_over_the_larger_baseline() {
-    let place = Place::with_room(700);
-    let audit = "audit map room.csv --scale 1 --k 10 --schemes olc --inlier-ratios 0.5 --out a \
-                 --gate olc:0.25:gain<=100";
-    for (more, baseline) in [("", "records_alone_percent"), ("--no-records-alone", "blind_percent")]
-    {
-        place.ends(&format!("{audit} {more}"), 0);
-        let document = place.json("a/audit.json");
-        let of = |field: &str| rows(&document)[0][field]["0.25"].as_f64();
-        let is_larger =
-            of("records_alone_percent").is_none_or(|alone| Some(alone) > of("blind_percent"));
-        assert!(is_larger, "lines of a room give more than a guess: {document}");
-        let gain = largest(&document, "", "", "") - of(baseline).expect(baseline);
-        let found = document["gates"][0]["found_percent"].as_f64().unwrap();
-        assert!((found - gain).abs() < 1e-3, "{found}, {gain} over {baseline}");
-    }
-}
-
-#[test]
 fn a_scheme_that_the_map_does_not_allow_is_told_and_no_gate_on_it_holds() {
     let place = Place::empty();
     let spread = |i: usize| [((i * 7919) % 1000) as f64, ((i * 104_729) % 997) as f64, 1.0];
@@ -87,20 +68,6 @@ fn a_scheme_that_the_map_does_not_allow_is_told_and_no_gate_on_it_holds() {
     let begin =
         "unlift: flat.csv: schemes: expected one that can be applied to this map, found none";
     assert!(alone.starts_with(begin) && !place.path("b").exists(), "{alone}");
-}
-
-#[test]
-fn lists_that_cannot_be_made_at_some_ratios_cost_these_rows() {
-    let place = Place::with_room(60);
-    let line = "audit map room.csv --schemes olc --inlier-ratios 1,0.3,0.1 --no-records-alone";
-    place.ends(&format!("{line} --out a"), 0);
-    let document = place.json("a/audit.json");
-    assert_eq!(rows(&document).len(), 4);
-    let missing = document["not_audited"].as_array().expect("ratios");
-    let is_told = |one: &Value| {
-        one["neighbors"] == "oracle" && one["reason"].as_str().unwrap().starts_with("at 0.")
-    };
-    assert!(!missing.is_empty() && missing.iter().all(is_told), "{missing:?}");
 }
 
 /// No gate holds for a file that declares fewer points than it has, or for a map whose scale is a

@@ -1,4 +1,4 @@
-//! `unlift invert`, `unlift metrics` and `--invert`.
+//! `unlift invert` and `--invert`.
 
 use std::fs;
 
@@ -134,48 +134,4 @@ fn keypoints_and_what_came_back_are_painted_to_files() {
         place.ends(&format!("invert {released} --recovered back.parquet --out back"), 0);
     assert_eq!(stdout, "3 pictures, in back\n");
     assert_eq!(size("back/d.webp.png"), (64, 48));
-}
-
-#[test]
-fn pictures_and_folders_of_them_have_three_figures() {
-    let place = Place::empty();
-    for (at, name) in ["a/one.png", "a/two.png", "b/one.jpg", "b/more.png"].iter().enumerate() {
-        place.write_photo(name, at as u32);
-    }
-    fs::copy(place.path("a/two.png"), place.path("b/two.png")).unwrap();
-    place.write("text.png", "not a picture");
-    fs::create_dir(place.path("empty")).unwrap();
-
-    let found = place.prints("metrics a/one.png b/one.jpg --json", 0);
-    let figure = |name: &str| found[name].as_f64().unwrap();
-    assert!((-1.0..1.0).contains(&figure("ssim")) && (1.0..60.0).contains(&figure("psnr")));
-    assert!((0.0..1.5).contains(&figure("lpips")), "{found}");
-    let (text, _) = place.ends("metrics a/one.png b/one.jpg", 0);
-    assert!(text.contains(&format!("SSIM  {:.4}\n", figure("ssim"))), "{text}");
-    // Equal pictures have no PSNR.
-    let equal = place.prints("metrics a/one.png a/one.png --json", 0);
-    assert_eq!((equal["ssim"].as_f64(), equal["lpips"].as_f64()), (Some(1.0), Some(0.0)));
-    assert!(equal["psnr"].is_null());
-
-    let folders = place.prints("metrics a b --json", 0);
-    let pictures = folders["pictures"].as_array().unwrap();
-    let names: Vec<&str> = pictures.iter().filter_map(|one| one["name"].as_str()).collect();
-    assert_eq!(names, ["one", "two"]);
-    let mean = (pictures[0]["ssim"].as_f64().unwrap() + 1.0) / 2.0;
-    assert!((folders["ssim"].as_f64().unwrap() - mean).abs() < 1e-12);
-    let (table, stderr) = place.ends("metrics a b", 0);
-    assert!(table.lines().last().unwrap().starts_with("mean"), "{table}");
-    assert_eq!(stderr, "unlift: b/more.png: no picture of this name in a\n");
-    for (line, code, expected) in [
-        (
-            "a b/one.jpg",
-            2,
-            "a and b/one.jpg: expected two pictures or two folders, found one of each",
-        ),
-        ("text.png a/one.png", 3, "text.png: expected a JPEG, PNG or WebP image, found text"),
-        ("a empty", 3, "a: expected pictures of the same names as in empty, found none"),
-    ] {
-        let told = place.complains(&format!("metrics {line}"), code);
-        assert!(told.ends_with(&format!("unlift: {expected}\n")), "{told}");
-    }
 }

@@ -91,7 +91,6 @@ fn no_name_reaches_the_terminal_as_it_is() {
         &["audit", "images", odd, "--inlier-ratios", "1", "--out", &folder, "--json"],
         &["audit", "images", odd, "--inlier-ratios", "1", "--out", &folder],
         &["invert", odd, "--out", "pictures"],
-        &["metrics", odd, "pictures"],
         &["schemes", odd],
         &["features", "gone", &format!("--{odd}")],
         &["audit", "map", odd, "--out", odd],

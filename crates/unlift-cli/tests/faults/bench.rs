@@ -1,229 +1,226 @@
-//! A workplace with small inputs for every command, and runs in a folder of their own.
+//! A workplace with small inputs for every command, and the content of its output folder.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::Read;
-use std::os::unix::process::ExitStatusExt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
-use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use crate::commands::{Case, Writes};
+use serde_json::Value;
+
 use crate::common::Place;
-use crate::full;
-use crate::tree::{Tree, differing};
 
-const POINTS: usize = 1500;
-/// A run that takes longer hangs.
-const PATIENCE: Duration = Duration::from_secs(3600);
-
-/// Inputs are in `in`; `work`, the working directory of runs, contains only their outputs.
-pub struct Bench {
-    place: Place,
-    inputs: &'static Tree,
+/// A command line in two variants that write to the same places.
+#[derive(Debug)]
+pub struct Case {
+    /// `{}` stands for the variant: a seed, or a part of the name of an input.
+    line: &'static str,
+    /// True for independent files; false for one file, or files that belong together.
+    pub is_each: bool,
 }
 
-static NONE: Tree = Tree::new();
-static INPUTS: OnceLock<Tree> = OnceLock::new();
-/// Undisturbed results by the name of the case, computed once for all tests.
-static KNOWN: Mutex<Option<HashMap<&str, Arc<Known>>>> = Mutex::new(None);
+const fn whole(line: &'static str) -> Case {
+    Case { line, is_each: false }
+}
+
+/// Commands that write, one for each kind of output.
+pub const CASES: [Case; 9] = [
+    whole("obfuscate ../in/room.csv --scheme ppl --k 10 --seed {} --out out"),
+    whole("obfuscate ../in/features2.h5 --scheme dcl2d --k 8 --seed {} --out out"),
+    whole(
+        "neighbors oracle ../in/hidden2/truth.parquet --inlier-ratio 0.5 --k 10 --seed {} \
+         --out lists.parquet",
+    ),
+    whole(
+        "recover ../in/hidden{}/released.parquet --neighbors ../in/hidden{}/lists.parquet \
+         --out back.parquet",
+    ),
+    whole(
+        "recover ../in/images{}/released.parquet --neighbors ../in/images{}/lists.parquet \
+         --out back.parquet",
+    ),
+    whole("features ../in/photos{} --out f.h5"),
+    whole(
+        "audit map ../in/room.csv --k 10 --schemes olc --inlier-ratios 1 --seed {} \
+         --write-clouds --out out",
+    ),
+    whole(
+        "audit images ../in/features2.h5 --photos ../in/photos2 --invert --max-images 1 \
+         --schemes lines2d --inlier-ratios 0.5 --k 8 --solver joint-start --seed {} --out out",
+    ),
+    Case { line: "invert ../in/photos{} --out pictures", is_each: true },
+];
+
+impl Case {
+    pub fn line(&self, variant: u8) -> String {
+        self.line.replace("{}", &variant.to_string())
+    }
+}
+
+/// Inputs are in `in`; `work`, the working directory of runs, contains only their outputs.
+pub struct Bench(Place);
 
 /// Outputs of the undisturbed runs of a case.
 pub struct Known {
-    pub new: Tree,
-    /// Output of the earlier run.
+    /// Output of the first variant, as an earlier run left it.
     pub old: Tree,
+    pub new: Tree,
     pub took: Duration,
 }
 
 #[derive(Debug)]
 pub struct Ended {
     pub code: Option<i32>,
-    pub signal: Option<i32>,
     pub stderr: String,
 }
 
 impl Bench {
+    /// Makes maps, photos, features and the outputs of the stages, each twice.
     pub fn new() -> Self {
-        let place = Place::empty();
-        fs::create_dir(place.path("work")).unwrap();
-        let bench = Self { place, inputs: INPUTS.get_or_init(inputs) };
-        bench.restore_inputs();
+        let bench = Self(Place::empty());
+        fs::create_dir(bench.0.path("work")).unwrap();
+        bench.0.write_points("in/room.csv", &unlift::synthetic::room(1, 1500).points);
+        for which in [1, 2] {
+            for (at, name) in ["a.png", "b/c.jpg", "d.webp"].into_iter().enumerate() {
+                bench.0.write_photo(&format!("in/photos{which}/{name}"), at as u32 + 5 * which);
+            }
+            let (hidden, images) = (format!("../in/hidden{which}"), format!("../in/images{which}"));
+            let features = format!("../in/features{which}.h5");
+            let hide = format!("--seed {which} --out");
+            bench.succeeds(&format!("features ../in/photos{which} --out {features}"));
+            bench.succeeds(&format!("obfuscate {features} --scheme cp2d --k 8 {hide} {images}"));
+            bench
+                .succeeds(&format!("obfuscate ../in/room.csv --scheme ppl --k 10 {hide} {hidden}"));
+            for (of, k) in [(&hidden, 10), (&images, 8)] {
+                let oracle = format!("neighbors oracle {of}/truth.parquet --inlier-ratio 1");
+                bench.succeeds(&format!("{oracle} --k {k} --out {of}/lists.parquet"));
+            }
+        }
         bench
     }
 
-    pub fn path(&self, name: &str) -> PathBuf {
-        self.place.path(name)
+    pub fn work(&self) -> PathBuf {
+        self.0.path("work")
     }
 
-    /// Returns the undisturbed results of a case; only the full version runs slow cases.
-    pub fn known(&self, case: &'static Case) -> Arc<Known> {
-        // Results stay valid if another test failed.
-        let mut all = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-        let all = all.get_or_insert_default();
-        if let Some(known) = all.get(case.name) {
-            return Arc::clone(known);
-        }
-        let of = |line: &str| {
+    pub fn known(&self, case: &Case) -> Known {
+        let started = Instant::now();
+        let [old, new] = [1, 2].map(|variant| {
             self.begin(None);
-            let started = Instant::now();
-            self.succeeds(line);
-            (self.tree(), started.elapsed())
-        };
-        let (old, took) = of(&case.earlier());
-        let known = match case.is_slow && !full() {
-            true => Known { new: Tree::default(), old, took },
-            false => {
-                let (new, took) = of(&case.line());
-                Known { new, old, took }
-            }
-        };
-        let are_two = known.new != known.old;
-        assert_eq!(are_two, case.writes != Writes::Nothing, "{}: two variants", case.name);
-        let known = Arc::new(known);
-        all.insert(case.name, Arc::clone(&known));
-        known
+            self.succeeds(&case.line(variant));
+            self.tree()
+        });
+        assert!(old != new, "{case:?}: two variants");
+        Known { old, new, took: started.elapsed() / 2 }
     }
 
     /// Empties the output folder, or restores the output of an earlier run in it.
     pub fn begin(&self, earlier: Option<&Tree>) {
-        fs::remove_dir_all(self.path("work")).unwrap();
-        fs::create_dir(self.path("work")).unwrap();
+        fs::remove_dir_all(self.work()).unwrap();
+        fs::create_dir(self.work()).unwrap();
         if let Some(earlier) = earlier {
-            earlier.put(&self.path("work"));
+            earlier.put(&self.work());
         }
     }
 
-    pub fn restore_inputs(&self) {
-        let _ = fs::remove_dir_all(self.path("in"));
-        self.inputs.put(&self.path("in"));
-    }
-
-    pub fn inputs_are_whole(&self) -> bool {
-        Tree::of(&self.path("in")) == *self.inputs
-    }
-
-    /// Returns the output folder of a run that ended.
     pub fn tree(&self) -> Tree {
-        Tree::of(&self.path("work")).settled()
+        Tree::of(&self.work())
     }
 
     /// Starts a run, in a shell that first runs `before` if given.
     pub fn start(&self, before: Option<&str>, line: &str) -> Child {
-        let program = self.place.program([]);
+        let program = self.0.program([]);
         let mut command = match before {
             None => program,
             Some(before) => {
                 let mut shell = Command::new("sh");
-                // A core dump is no output.
-                shell.args(["-c", &format!("ulimit -c 0; {before}")]).arg(program.get_program());
+                let line = format!("{before} || exit 99; exec \"$0\" \"$@\"");
+                shell.args(["-c", &line]).arg(program.get_program());
                 shell
             }
         };
-        command
-            .args(line.split_whitespace())
-            .current_dir(self.path("work"))
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("the program starts")
+        command.args(line.split_whitespace()).current_dir(self.work()).stdin(Stdio::null());
+        command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("the program starts")
     }
 
-    pub fn run(&self, before: Option<&str>, line: &str) -> Ended {
-        finish(self.start(before, line), line)
-    }
-
-    pub fn succeeds(&self, line: &str) -> Ended {
-        let ended = self.run(None, line);
+    pub fn succeeds(&self, line: &str) {
+        let ended = finish(self.start(None, line));
         assert_eq!(ended.code, Some(0), "{line}: {ended:?}");
-        ended
-    }
-
-    /// Plants unfinished files of a dead run wherever this case may leave some.
-    fn plant(&self, case: &Case, output: &Tree) {
-        let files = output.names().filter(|name| !name.ends_with('/'));
-        let folders: BTreeSet<&str> = files
-            .map(|name| match case.writes {
-                Writes::Each => name.rsplit_once('/'),
-                // Files that belong together are built in one folder.
-                Writes::Nothing | Writes::Whole => name.split_once('/'),
-            })
-            .map(|parts| parts.map_or("", |(folder, _)| folder))
-            .collect();
-        for folder in folders {
-            let folder = self.path("work").join(folder);
-            fs::create_dir_all(&folder).unwrap();
-            fs::write(folder.join(".x.unlift-0aZ9xy.partial"), "half").unwrap();
-        }
     }
 
     /// Checks that the next run of a case succeeds with the undisturbed output and without
-    /// unfinished files. After a slow case the next run is its quick variant, at the same place.
-    pub fn goes_on(&self, case: &'static Case, what: &str) {
-        let known = self.known(case);
-        let (line, expected) = match case.is_slow {
-            true => (case.earlier(), &known.old),
-            false => (case.line(), &known.new),
-        };
-        self.plant(case, expected);
-        let ended = self.run(None, &line);
-        let left = self.tree();
-        let is_whole = ended.code == Some(0) && left == *expected;
-        assert!(is_whole, "{}, after {what}: {ended:?}, {}", case.name, differing(&left, expected));
+    /// unfinished files.
+    pub fn goes_on(&self, case: &Case, known: &Known, what: &str) {
+        let ended = finish(self.start(None, &case.line(2)));
+        let is_whole = ended.code == Some(0) && self.tree() == known.new;
+        assert!(is_whole, "{what}: {ended:?}, {:?}", self.tree().differing(&known.new));
     }
 }
 
-pub fn finish(mut child: Child, line: &str) -> Ended {
-    let started = Instant::now();
-    let status = loop {
-        if let Some(status) = child.try_wait().expect("a state") {
-            break status;
-        }
-        if started.elapsed() > PATIENCE {
-            child.kill().expect("it can be killed");
-            panic!("{line}: it hangs");
-        }
-        sleep(Duration::from_micros(300));
-    };
-    let mut stderr = Vec::new();
-    child.stderr.take().expect("a pipe").read_to_end(&mut stderr).expect("what was said");
-    let stderr = String::from_utf8_lossy(&stderr).into_owned();
-    Ended { code: status.code(), signal: status.signal(), stderr }
+pub fn finish(mut child: Child) -> Ended {
+    let mut stderr = String::new();
+    child.stderr.take().expect("a pipe").read_to_string(&mut stderr).expect("what was said");
+    Ended { code: child.wait().expect("a state").code(), stderr }
 }
 
-/// Makes maps, photos, features and the outputs of the stages, each twice.
-fn inputs() -> Tree {
-    let bench = Bench { place: Place::empty(), inputs: &NONE };
-    let place = &bench.place;
-    let points = |seed| unlift::synthetic::room(seed, POINTS).points;
-    fs::create_dir(place.path("in")).unwrap();
-    fs::create_dir(place.path("work")).unwrap();
-    place.write_points("in/room.csv", &points(1));
-    place.write_points("in/other.csv", &points(2));
-    for which in [1, 2] {
-        for (at, name) in ["a.png", "b/c.jpg", "d.webp"].into_iter().enumerate() {
-            place.write_photo(&format!("in/photos{which}/{name}"), at as u32 + 5 * which);
+/// Files below a folder by relative path, without what differs between two runs of one command.
+#[derive(Clone, Default, PartialEq, Eq)]
+pub struct Tree(pub BTreeMap<String, Vec<u8>>);
+
+impl Tree {
+    /// Reads a folder, which others may be changing.
+    fn of(root: &Path) -> Self {
+        let (mut tree, mut waiting) = (Self::default(), vec![root.to_owned()]);
+        while let Some(folder) = waiting.pop() {
+            for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+                let path = entry.path();
+                if path.is_dir() {
+                    waiting.push(path);
+                } else if let Ok(bytes) = fs::read(&path) {
+                    let name = path.strip_prefix(root).unwrap().to_string_lossy().into_owned();
+                    let bytes = settled(&name, bytes);
+                    tree.0.insert(name, bytes);
+                }
+            }
+        }
+        tree
+    }
+
+    fn put(&self, root: &Path) {
+        for (name, bytes) in &self.0 {
+            let path = root.join(name);
+            fs::create_dir_all(path.parent().expect("a folder")).unwrap();
+            fs::write(path, bytes).unwrap();
         }
     }
-    for which in [1, 2] {
-        let (hidden, images) = (format!("../in/hidden{which}"), format!("../in/images{which}"));
-        let features = format!("../in/features{which}.h5");
-        let mut lines = vec![
-            format!("features ../in/photos{which} --out {features}"),
-            format!("obfuscate {features} --scheme cp2d --k 8 --seed {which} --out {images}"),
-            format!("obfuscate ../in/room.csv --scheme ppl --k 10 --seed {which} --out {hidden}"),
-        ];
-        for (of, k) in [(&hidden, 10), (&images, 8)] {
-            let lists = format!("{of}/lists.parquet");
-            let oracle = format!("neighbors oracle {of}/truth.parquet --inlier-ratio 1 --k {k}");
-            lines.push(format!("{oracle} --out {lists}"));
-            let recover = format!("recover {of}/released.parquet --neighbors {lists}");
-            lines.push(format!("{recover} --out {of}/back.parquet"));
-        }
-        lines.iter().for_each(|line| _ = bench.succeeds(line));
+
+    pub fn has_partial(&self) -> bool {
+        self.0.keys().any(|name| name.contains(".unlift-") && name.contains(".partial"))
     }
-    Tree::of(&bench.path("in"))
+
+    /// Returns the paths at which two trees differ.
+    pub fn differing(&self, other: &Self) -> Vec<&str> {
+        self.0.keys().filter(|&name| self.0.get(name) != other.0.get(name)).map(|s| &**s).collect()
+    }
+}
+
+/// Removes the duration and the memory of a run.
+fn settled(name: &str, bytes: Vec<u8>) -> Vec<u8> {
+    if name.ends_with("audit.json")
+        && let Ok(mut value) = serde_json::from_slice::<Value>(&bytes)
+        && let Some(run) = value["run"].as_object_mut()
+    {
+        run.retain(|name, _| !["seconds", "peak_memory_bytes"].contains(&name.as_str()));
+        return value.to_string().into_bytes();
+    }
+    if name.ends_with("report.html") {
+        let text = String::from_utf8_lossy(&bytes);
+        let (before, rest) = text.split_once("Seconds by stage.").unwrap_or((&text, ""));
+        let rest = rest.split_once("</table>").map_or(rest, |(_, rest)| rest);
+        let lines = before.lines().chain(rest.lines());
+        let kept: Vec<&str> = lines.filter(|line| !line.contains("<dt>this run</dt>")).collect();
+        return kept.join("\n").into_bytes();
+    }
+    bytes
 }

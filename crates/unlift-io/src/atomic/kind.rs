@@ -24,8 +24,6 @@ pub enum Kind {
     Cloud,
     /// A text file of a COLMAP model whose first line is `MODEL_MARK`.
     Model,
-    /// Cameras for nerfstudio: an object with a string `unlift` and a list `frames`.
-    Transforms,
     /// An HDF5 file with `FEATURES_MARK` after the superblock.
     Features,
     /// A PNG whose first text chunk names unlift, as written by [`marked_picture`].
@@ -82,9 +80,6 @@ impl Kind {
             }
             Self::Cloud => begins(path, &CLOUD_MARKS),
             Self::Model => begins(path, &[MODEL_MARK]),
-            Self::Transforms => {
-                is_json(path, |map| map["unlift"].is_string() && map["frames"].is_array())
-            }
             Self::Features => has_at(path, SUPERBLOCK, FEATURES_MARK),
             Self::Picture => has_at(path, PNG_HEAD, PICTURE_MARK),
             Self::Junit => begins(path, &[JUNIT_MARK]),
@@ -106,7 +101,6 @@ impl fmt::Display for Kind {
             Self::Manifest => f.write_str("a manifest of parts"),
             Self::Cloud => f.write_str("a cloud"),
             Self::Model => f.write_str("a model"),
-            Self::Transforms => f.write_str("cameras for nerfstudio"),
             Self::Features => f.write_str("features"),
             Self::Picture => f.write_str("a picture"),
             Self::Junit => f.write_str("gates as JUnit XML"),
@@ -144,10 +138,9 @@ mod tests {
     use std::fs;
 
     /// Stage files, features, models and pictures are tested elsewhere.
-    const OURS: [(Kind, &str); 10] = [
+    const OURS: [(Kind, &str); 9] = [
         (Kind::AuditJson, r#"{"unlift": "0.1.0", "schema": 1, "results": []}"#),
         (Kind::Manifest, r#"{"unlift": {}, "parts": []}"#),
-        (Kind::Transforms, r#"{"unlift": "0.1.0", "frames": []}"#),
         (Kind::Sarif, r#"{"version": "2", "runs": [{"tool": {"driver": {"name": "unlift"}}}]}"#),
         (Kind::Page, "<!doctype html>\n<head><meta name=\"generator\" content=\"unlift\">"),
         (Kind::Junit, "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"unlift\" t"),
@@ -180,7 +173,7 @@ mod tests {
             fs::write(&path, content).unwrap();
             assert!(kind.is_at(&path), "{kind}");
         }
-        crate::clouds::write_points(&path, &[[1.0, 2.0, 3.0]], None).unwrap();
+        crate::clouds::write_points(&path, &[[1.0, 2.0, 3.0]]).unwrap();
         assert!(Kind::Cloud.is_at(&path));
         crate::clouds::write_lines(&path, &[[[0.0; 3], [1.0; 3]]]).unwrap();
         assert!(Kind::Cloud.is_at(&path));

@@ -2,7 +2,6 @@
 
 mod colmap;
 mod color;
-mod nerfstudio;
 mod obj;
 mod ply;
 mod segments;
@@ -13,7 +12,6 @@ use crate::Error;
 
 pub use colmap::{write_cameras, write_images, write_model_points};
 pub use color::error_color;
-pub use nerfstudio::{NERFSTUDIO_CLOUD, write_transforms};
 pub use obj::write_lines;
 pub use ply::{write_points, write_recovered};
 pub use segments::{Segment, record_segments};

@@ -8,40 +8,23 @@ use std::path::Path;
 
 /// Writes `points` `(n, D)` as binary little-endian PLY.
 ///
-/// The columns are `double x, y, z` (z is 0 in 2D), and `uchar red, green, blue` if `colors` `(n,
-/// 3)` are given.
+/// The columns are `double x, y, z` (z is 0 in 2D).
 ///
 /// # Errors
-/// When a coordinate is not finite, `colors` has another length, or the file cannot be written.
-pub fn write_points<const D: usize>(
-    path: &Path,
-    points: &[[f64; D]],
-    colors: Option<&[[u8; 3]]>,
-) -> Result<(), Error> {
-    if let Some(colors) = colors
-        && colors.len() != points.len()
-    {
-        let expected = format!("{} colors", points.len());
-        return Err(Error::new(path, "", expected, colors.len().to_string()));
-    }
+/// When a coordinate is not finite, or the file cannot be written.
+pub fn write_points<const D: usize>(path: &Path, points: &[[f64; D]]) -> Result<(), Error> {
     for (row, point) in points.iter().enumerate() {
         finite(path, ("point", row), &[*point])?;
     }
     atomic::write_file(path, Access::Private, |w| {
-        header(w, points.len(), colors.is_some(), false)?;
-        for (row, point) in points.iter().enumerate() {
-            coordinates(w, point)?;
-            if let Some(colors) = colors {
-                w.write_all(&colors[row])?;
-            }
-        }
-        Ok(())
+        header(w, points.len(), "")?;
+        points.iter().try_for_each(|point| coordinates(w, point))
     })
 }
 
 /// Writes recovered points as PLY, colored by their `errors` (distance to the original).
 ///
-/// The columns are those of [`write_points`], then `float error`. Lost points (`None`) are omitted.
+/// The columns are those of [`write_points`], then `uchar red, green, blue, float error`. Lost points (`None`) are omitted.
 /// Colors are those of [`error_color`] with `full_scale`, in the unit of the points.
 ///
 /// # Errors
@@ -63,7 +46,7 @@ pub fn write_recovered<const D: usize>(
     }
     let n_found = points.iter().flatten().count();
     atomic::write_file(path, Access::Private, |w| {
-        header(w, n_found, true, true)?;
+        header(w, n_found, COLOR_AND_ERROR)?;
         for (point, &error) in points.iter().zip(errors) {
             if let Some(point) = point {
                 coordinates(w, point)?;
@@ -75,21 +58,16 @@ pub fn write_recovered<const D: usize>(
     })
 }
 
-fn header(w: &mut impl Write, n: usize, colored: bool, with_error: bool) -> io::Result<()> {
+const COLOR_AND_ERROR: &str =
+    "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float error\n";
+
+fn header(w: &mut impl Write, n: usize, more: &str) -> io::Result<()> {
     write!(w, "ply\nformat binary_little_endian 1.0\ncomment {CLOUD_COMMENT}\n")?;
     writeln!(w, "element vertex {n}")?;
     for axis in ["x", "y", "z"] {
         writeln!(w, "property double {axis}")?;
     }
-    if colored {
-        for color in ["red", "green", "blue"] {
-            writeln!(w, "property uchar {color}")?;
-        }
-    }
-    if with_error {
-        writeln!(w, "property float error")?;
-    }
-    writeln!(w, "end_header")
+    writeln!(w, "{more}end_header")
 }
 
 fn coordinates<const D: usize>(w: &mut impl Write, point: &[f64; D]) -> io::Result<()> {

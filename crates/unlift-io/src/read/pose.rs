@@ -27,15 +27,3 @@ pub fn scaled_rotation([w, x, y, z]: [f64; 4]) -> ([[f64; 3]; 3], f64) {
 pub const DOWNWARD: [f64; 3] = [0.0, -1.0, 0.0];
 /// Up in the frame of a camera whose y axis points up.
 pub const UPWARD: [f64; 3] = [0.0, 1.0, 0.0];
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_center_is_where_the_pose_maps_to_zero() {
-        let quarter = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
-        let (center, up) = camera(&quarter, &[1.0, 2.0, 3.0], DOWNWARD);
-        assert_eq!((center, up), ([-2.0, 1.0, -3.0], [-1.0, 0.0, 0.0]));
-    }
-}

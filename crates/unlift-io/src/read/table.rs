@@ -339,20 +339,3 @@ impl Form {
         ))
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_are_found_in_comments() {
-        let of = |comment: &str, n| {
-            let names = names(comment.as_bytes(), n);
-            names.iter().map(|name| String::from_utf8_lossy(name).into_owned()).collect::<Vec<_>>()
-        };
-        assert_eq!(of("id x y z", 4), ["id", "x", "y", "z"]);
-        assert_eq!(of("columns: X [m], Y [m], Z [m]", 3), ["X", "Y", "Z"]);
-        assert_eq!(of("X,Y,Z", 6), ["X", "Y", "Z"]);
-        assert_eq!(of("point id\tx\ty\tz", 4), ["point id", "x", "y", "z"]);
-    }
-}

@@ -3,8 +3,8 @@
     python3 crates/unlift-io/tests/data/third_party.py
 
 The map: 12 points on a grid, a line through each (records in reverse order, so that nothing hangs
-on order); neighborhoods are all other records. docs/formats.md writes the first two files alike, and its
-snippets are run where pyarrow is installed.
+on order); neighborhoods are all other records. The snippets of docs/formats.md write the plain kinds,
+and are run where pyarrow is installed.
 """
 import os
 import pathlib
@@ -13,26 +13,16 @@ import numpy as np
 
 points = np.array([[x, y, z] for x in range(3) for y in range(2) for z in range(2)], float)
 towards = np.random.default_rng(0).normal(size=points.shape)
-foot, direction = points[::-1], towards[::-1]
-records = [[r for r in range(len(foot)) if r != own] for own in range(len(foot))]
+records = [[r for r in range(len(points)) if r != own] for own in range(len(points))]
 
 folder = pathlib.Path(__file__).parent / "third_party"
 folder.mkdir(exist_ok=True)
 os.chdir(folder)
 import json, pyarrow as pa, pyarrow.parquet as pq
-meta = {"kind": "released", "version": 1, "family": "lines", "dimension": 3, "unit": "m",
-        "slots_per_record": 1, "origin": [0.0, 0.0, 0.0]}
-columns = {f"foot_{a}": foot[:, i] for i, a in enumerate("xyz")}
-columns |= {f"direction_{a}": direction[:, i] for i, a in enumerate("xyz")}
-pq.write_table(pa.table(columns).replace_schema_metadata({"unlift": json.dumps(meta)}), "map.parquet")
-meta = {"kind": "neighborhoods", "version": 1}
-lists = pa.table({"slot": range(len(records)), "records": records})
-pq.write_table(lists.replace_schema_metadata({"unlift": json.dumps(meta)}), "neighborhoods.parquet")
-
-# The same in other types: 64-bit, large and fixed-size lists, a dictionary, columns we do not know,
-# rows out of order, no metadata.
-extra = pa.array(["a"] * len(foot)).dictionary_encode()
-descriptor = pa.FixedSizeListArray.from_arrays(pa.array(range(4 * len(foot)), pa.int16()), 4)
+# Types that our own writer does not use: 64-bit, large and fixed-size lists, a dictionary, columns we
+# do not know, rows out of order, no metadata.
+extra = pa.array(["a"] * len(points)).dictionary_encode()
+descriptor = pa.FixedSizeListArray.from_arrays(pa.array(range(4 * len(points)), pa.int16()), 4)
 rays = {"center": pa.array([0, 1] * 6, pa.int64()), "name": extra, "descriptor": descriptor}
 rays |= {f"direction_{a}": pa.array(towards[:, i].astype(np.float32)) for i, a in enumerate("xyz")}
 meta = {"kind": "released", "version": 1, "family": "rays", "dimension": 3, "unit": "kth_neighbor",
@@ -49,6 +39,3 @@ lists = pa.table({"point": [5, 0], "neighbors": [[4, 3], [2, 1]]})
 pq.write_table(lists, "points.parquet")
 pq.write_table(lists, "zstd.parquet", compression="zstd")
 pq.write_table(lists, "gzip.parquet", compression="gzip")
-meta = {"kind": "recovered", "version": 1, "dimension": 2, "unit": "px"}
-found = pa.table({"x": pa.array([1.5, None], pa.float32()), "y": pa.array([2.5, None], pa.float32())})
-pq.write_table(found.replace_schema_metadata({"unlift": json.dumps(meta)}), "found.parquet")

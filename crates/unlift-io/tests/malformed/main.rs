@@ -84,7 +84,6 @@ fn shown(dir: &Path, error: &unlift_io::Error) -> String {
 fn every_malformed_file_is_refused_with_its_line() {
     let tables = [
         colmap::binary(),
-        colmap::last_record_cuts(),
         colmap::text(),
         clouds::ply(),
         clouds::tables(),

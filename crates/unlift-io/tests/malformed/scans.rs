@@ -49,7 +49,6 @@ pub fn las() -> Vec<Row> {
     let file = || made::las(2, 20);
     let las = |what, bytes: Vec<u8>, line| alone(what, "a.las", bytes, line);
     vec![
-        las("empty", vec![], "a.las: header (byte 0): expected 179 bytes of the header, found end of file"),
         las("another file", vec![b'x'; 200],
             "a.las: header (byte 0): expected \"LASF\", as every LAS file begins, found \"xxxx\""),
         las("version 2", patched(file(), 24, &[2]), "a.las: header (byte 0): expected LAS 1.0 to 1.4, found 2.2"),
@@ -61,11 +60,8 @@ pub fn las() -> Vec<Row> {
             "a.las: header (byte 0): expected points of at least 34 bytes, as format 3 has them, found 20"),
         las("points in the head", patched(file(), 96, &[0; 4]),
             "a.las: header (byte 0): expected points after the header of 179 bytes, found at byte 0"),
-        las("count of 10^9", patched(file(), 107, &1_000_000_000u32.to_le_bytes()),
-            "a.las: header (byte 287): expected 1000000000 points, 20 bytes each, found 60 bytes"),
         las("count of 10^18", patched(made::las(4, 20), 247, &MANY),
             "a.las: header (byte 435): expected 1000000000000000000 points, 20 bytes each, found 60 bytes"),
-        las("NaN", patched(file(), 131, &f64::NAN.to_le_bytes()), "a.las: expected a point with a place, found 3 without one"),
         las("no points", patched(file(), 107, &[0; 4]), "a.las: expected at least one point, found none"),
     ]
 }
@@ -87,7 +83,6 @@ pub fn pcd() -> Vec<Row> {
         pcd("another file", "solid cube\n".into(), "a.pcd:1: expected a line of a PCD header, found \"solid cube\""),
         pcd("unknown form", head("", "", "zip"),
             "a.pcd:11: expected DATA ascii, binary or binary_compressed, found \"DATA zip\""),
-        pcd("size 3", head("SIZE 4", "SIZE 3", "ascii"), "a.pcd:4: expected sizes of 1, 2, 4 or 8, found \"SIZE 3 4 8 4 2\""),
         pcd("fewer types", head("TYPE F U F F I", "TYPE F U", "ascii"),
             "a.pcd: header: expected as many FIELDS as SIZE, TYPE and COUNT, found 5, 5, 2 and 5"),
         pcd("no z", head("FIELDS x rgb y z", "FIELDS x rgb y w", "ascii"),
@@ -102,19 +97,12 @@ pub fn pcd() -> Vec<Row> {
             "a.pcd: header: expected at most 0 points (by the size of the file), found 1000000000000000000"),
         pcd("ascii: too few", head("", "", "ascii") + "0.00 1 0.00 0.00 1 2\n# and that is all of it\n",
             "a.pcd:14: expected point 2 of 2, found end of file"),
-        pcd("ascii: too many", head("POINTS 2", "POINTS 1", "ascii") + "0 1 0 0 1 2\n0 1 0 0 1 2\n",
-            "a.pcd:13: expected end of file after 1 points, found \"0 1 0 0 1 2\""),
-        pcd("ascii: five values", head("POINTS 2", "POINTS 1", "ascii") + "0 1 0 0 1234\n",
-            "a.pcd:12: expected 6 values of point 1, found 5"),
         pcd("ascii: not a number", head("POINTS 2", "POINTS 1", "ascii") + "zero 1 0 0 1 2\n",
             "a.pcd:12: expected a number for a coordinate, found \"zero\""),
-        pcd("nothing has a place", head("POINTS 2", "POINTS 1", "ascii") + "nan 1 nan nan 1 2\n",
-            "a.pcd: expected a point with a place, found 1 without one"),
         pcd("no points, each of 2^62 bytes", head("COUNT 1 1 1 1 2", "COUNT 1 1000000000000000000 1 1 2", "binary").replace("POINTS 2", "POINTS 0"),
             "a.pcd: expected at least one point, found none"),
         alone("binary: count of 10^18", "a.pcd", binary("1000000000000000000", 24),
             "a.pcd: header (byte 205): expected 1000000000000000000 points, 24 bytes each, found 24 bytes"),
-        alone("binary: cut", "a.pcd", binary("2", 47), "a.pcd: header (byte 187): expected 2 points, 24 bytes each, found 47 bytes"),
         alone("compressed: another size", "a.pcd", packed(size - 1, &[0, 0]),
             "a.pcd: header (byte 202): expected 2 points, 24 bytes each, found 47 bytes"),
         alone("compressed: damaged", "a.pcd", packed(size, &[0, 0]),

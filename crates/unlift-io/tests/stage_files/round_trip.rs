@@ -148,21 +148,6 @@ fn a_map_without_records() {
 }
 
 #[test]
-fn an_origin_comes_back_bit_by_bit() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("far.parquet");
-    for seed in 0..200 {
-        let mut draws = maps::draws(seed);
-        let scale = [1e-300, 1e-3, 1.0, 1e6, 1e300][seed as usize % 5];
-        let origin = std::array::from_fn(|_| draws.normal() * scale);
-        let none = Obfuscation::AxisCandidates(AxisCandidates::<3>::try_new(&[]).unwrap());
-        let released = Released::try_new(none, 1, origin, Unit::Meter, None).unwrap();
-        stage::write_released(&path, &released).unwrap();
-        assert_eq!(stage::read_released::<3>(&path).unwrap().origin(), origin);
-    }
-}
-
-#[test]
 fn a_released_file_says_nothing_of_its_source() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("secret-project-name.parquet");

@@ -1,10 +1,8 @@
 //! Tests files written by pyarrow (tests/data/third_party.py).
 
 use std::path::{Path, PathBuf};
-use unlift::RecordId;
 use unlift::descriptors::Values;
-use unlift::recover::Status;
-use unlift::released::{Lines, Obfuscation};
+use unlift::released::Obfuscation;
 use unlift_io::stage;
 
 fn data() -> PathBuf {
@@ -13,31 +11,6 @@ fn data() -> PathBuf {
 
 fn file(name: &str) -> PathBuf {
     data().join("third_party").join(name)
-}
-
-#[test]
-fn lines_and_neighborhoods_of_the_documented_example() {
-    let released = stage::read_released::<3>(&file("map.parquet")).unwrap();
-    assert_eq!((released.n_records(), released.origin()), (12, [0.0; 3]));
-    let Obfuscation::Lines(lines) = released.obfuscation() else {
-        panic!("{} is not lines", released.obfuscation().family());
-    };
-    // In normal form, through the points.
-    let widen = |rows: &[[f32; 3]]| -> Vec<_> { rows.iter().map(|r| r.map(f64::from)).collect() };
-    let again = Lines::through(&widen(lines.foot()), &widen(lines.direction())).unwrap();
-    assert_eq!(*lines, again);
-    for (row, (foot, direction)) in lines.foot().iter().zip(lines.direction()).enumerate() {
-        let hidden = 11 - row as u32;
-        let point = [hidden / 4, hidden / 2 % 2, hidden % 2].map(|x| x as f32);
-        let from_foot: [f32; 3] = std::array::from_fn(|c| point[c] - foot[c]);
-        let along: f32 = (0..3).map(|c| from_foot[c] * direction[c]).sum();
-        for c in 0..3 {
-            assert!((from_foot[c] - along * direction[c]).abs() < 1e-5);
-        }
-    }
-    let lists = stage::read_neighborhoods(&file("neighborhoods.parquet"), 12, 1).unwrap();
-    assert_eq!(lists.of(11).len(), 11);
-    assert_eq!(lists.of(2)[..3], [0, 1, 3].map(RecordId));
 }
 
 #[test]
@@ -86,11 +59,4 @@ fn zstd_is_read_and_another_compression_is_named() {
     let line =
         "gzip.parquet: column neighbors: expected no compression, Snappy or zstd, found GZIP";
     assert!(error.ends_with(line), "{error}");
-}
-
-#[test]
-fn recovered_points_with_coordinates_only() {
-    let recovered = stage::read_recovered::<2>(&file("found.parquet")).unwrap();
-    assert_eq!(recovered.status(), [Status::Ok, Status::NoSupport]);
-    assert_eq!((recovered.position(0), recovered.position(1)), (Some([1.5, 2.5]), None));
 }

@@ -119,42 +119,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_crossing_is_interpolated() {
-        let curve = [(1.0, 90.0), (0.5, 70.0), (0.3, 40.0), (0.1, 10.0)];
-        let (ratio, bound) = crossing(&curve).unwrap();
-        assert!((ratio - (0.5 - 0.2 * 20.0 / 30.0)).abs() < 1e-12);
-        assert_eq!(bound, Bound::Interpolated);
-    }
-
-    #[test]
-    fn curves_that_do_not_cross_give_bounds() {
-        assert_eq!(crossing(&[(1.0, 90.0), (0.1, 60.0)]), Some((0.1, Bound::BelowTested)));
-        assert_eq!(crossing(&[(1.0, 40.0), (0.1, 10.0)]), Some((1.0, Bound::AboveTested)));
+    fn the_lowest_crossing_of_half_counts() {
+        use Bound::{AboveTested, BelowTested, Interpolated};
+        for (curve, expected) in [
+            (
+                &[(1.0, 90.0), (0.5, 70.0), (0.3, 40.0), (0.1, 10.0)][..],
+                (0.5 - 0.4 / 3.0, Interpolated),
+            ),
+            (&[(1.0, 90.0), (0.1, 60.0)], (0.1, BelowTested)),
+            (&[(1.0, 40.0), (0.1, 10.0)], (1.0, AboveTested)),
+            // `ray-voxel` by `consensus` on a real map: the highest ratio gives a smaller share.
+            (&[(1.0, 48.1), (0.75, 52.3), (0.5, 50.0)], (0.5, BelowTested)),
+            (&[(1.0, 48.1), (0.75, 52.3), (0.5, 50.0), (0.3, 40.0)], (0.5, Interpolated)),
+            (&[(1.0, 90.0), (0.75, 49.0), (0.5, 60.0), (0.3, 40.0)], (0.4, Interpolated)),
+            // A share that is no number hides no other.
+            (&[(1.0, f64::NAN), (0.5, 60.0), (0.3, 40.0)], (0.4, Interpolated)),
+        ] {
+            let (ratio, bound) = crossing(curve).unwrap();
+            assert!((ratio - expected.0).abs() < 1e-12, "{curve:?}: {ratio}");
+            assert_eq!(bound, expected.1, "{curve:?}");
+        }
         assert_eq!(crossing(&[]), None);
-    }
-
-    /// Shares of `ray-voxel` by `consensus` on a real map: the highest ratio gives a smaller share
-    /// than a lower one.
-    #[test]
-    fn every_tested_ratio_counts_not_only_the_highest() {
-        let curve = [(1.0, 48.1), (0.75, 52.3), (0.5, 50.0)];
-        assert_eq!(crossing(&curve), Some((0.5, Bound::BelowTested)));
-        let (ratio, bound) =
-            crossing(&[(1.0, 48.1), (0.75, 52.3), (0.5, 50.0), (0.3, 40.0)]).unwrap();
-        assert_eq!((ratio, bound), (0.5, Bound::Interpolated));
-    }
-
-    #[test]
-    fn the_lowest_of_several_crossings_counts() {
-        let curve = [(1.0, 90.0), (0.75, 49.0), (0.5, 60.0), (0.3, 40.0)];
-        let (ratio, bound) = crossing(&curve).unwrap();
-        assert!((ratio - 0.4).abs() < 1e-12, "{ratio}");
-        assert_eq!(bound, Bound::Interpolated);
-    }
-
-    #[test]
-    fn a_share_that_is_no_number_hides_no_other() {
-        let curve = [(1.0, f64::NAN), (0.5, 60.0), (0.3, 40.0)];
-        assert!((crossing(&curve).unwrap().0 - 0.4).abs() < 1e-12);
     }
 }

@@ -8,7 +8,7 @@ use super::run::{Outcome, every_cell};
 use crate::Error;
 use crate::evaluate::belongs;
 use crate::geometry::frame::Bounds;
-use crate::obfuscate::{Facts, Lifted, Scheme};
+use crate::obfuscate::{Lifted, Scheme};
 use crate::released::Released;
 use crate::seed::Key;
 use crate::truth::{Original, Secret};
@@ -22,10 +22,6 @@ struct Unknown {
 impl<const D: usize> Scheme<D> for Unknown {
     fn name(&self) -> &str {
         &self.name
-    }
-
-    fn facts(&self) -> Facts {
-        Facts { summary: "records of another program", ..Facts::default() }
     }
 
     fn lift(&self, _: &[[f64; D]], _: Option<&Bounds<D>>, _: &Key) -> Result<Lifted<D>, Error> {

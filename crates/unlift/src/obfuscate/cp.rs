@@ -31,10 +31,6 @@ impl<const D: usize> Scheme<D> for Cp {
         ENTRY.name
     }
 
-    fn facts(&self) -> Facts {
-        ENTRY.facts
-    }
-
     fn lift(
         &self,
         points: &[[f64; D]],

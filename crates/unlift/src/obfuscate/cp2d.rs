@@ -32,10 +32,6 @@ impl Scheme<2> for Cp2d {
         ENTRY.name
     }
 
-    fn facts(&self) -> Facts {
-        ENTRY.facts
-    }
-
     fn lift(
         &self,
         points: &[[f64; 2]],

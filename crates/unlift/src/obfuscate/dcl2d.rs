@@ -78,10 +78,6 @@ impl Scheme<2> for Dcl2d {
         self.name
     }
 
-    fn facts(&self) -> Facts {
-        ENTRY.facts
-    }
-
     fn lift(
         &self,
         points: &[[f64; 2]],

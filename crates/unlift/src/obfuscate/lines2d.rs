@@ -60,10 +60,6 @@ impl Scheme<2> for Gravity {
         GRAVITY.name
     }
 
-    fn facts(&self) -> Facts {
-        GRAVITY.facts
-    }
-
     fn lift(
         &self,
         points: &[[f64; 2]],
@@ -84,10 +80,6 @@ impl Scheme<2> for Gravity {
 impl Scheme<2> for Lines2d {
     fn name(&self) -> &str {
         ENTRY.name
-    }
-
-    fn facts(&self) -> Facts {
-        ENTRY.facts
     }
 
     fn lift(

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
-use super::scheme::{Facts, Lifted, Scheme};
+use super::scheme::{Lifted, Scheme};
 use crate::descriptors::Values;
 use crate::geometry::frame::Bounds;
 use crate::seed::{Key, Stage};
@@ -262,10 +262,6 @@ impl<const D: usize> Mitigated<D> {
 impl<const D: usize> Scheme<D> for Mitigated<D> {
     fn name(&self) -> &str {
         &self.name
-    }
-
-    fn facts(&self) -> Facts {
-        self.scheme.facts()
     }
 
     fn parameters(&self) -> Vec<(&'static str, f64)> {

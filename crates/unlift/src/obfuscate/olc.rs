@@ -32,10 +32,6 @@ impl<const D: usize> Scheme<D> for Olc {
         ENTRY.name
     }
 
-    fn facts(&self) -> Facts {
-        ENTRY.facts
-    }
-
     fn lift(
         &self,
         points: &[[f64; D]],

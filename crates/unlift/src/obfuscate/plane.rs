@@ -31,10 +31,6 @@ impl Scheme<3> for Plane {
         ENTRY.name
     }
 
-    fn facts(&self) -> Facts {
-        ENTRY.facts
-    }
-
     fn lift(
         &self,
         points: &[[f64; 3]],

@@ -36,10 +36,6 @@ impl Scheme<3> for Ppl {
         ENTRY.name
     }
 
-    fn facts(&self) -> Facts {
-        ENTRY.facts
-    }
-
     fn lift(
         &self,
         points: &[[f64; 3]],

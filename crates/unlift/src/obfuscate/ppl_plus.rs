@@ -47,10 +47,6 @@ impl Scheme<3> for PplPlus {
         ENTRY.name
     }
 
-    fn facts(&self) -> Facts {
-        ENTRY.facts
-    }
-
     fn lift(
         &self,
         points: &[[f64; 3]],

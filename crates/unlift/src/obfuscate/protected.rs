@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::protect::Protection;
-use super::scheme::{Facts, Lifted, Scheme};
+use super::scheme::{Lifted, Scheme};
 use crate::geometry::frame::Bounds;
 use crate::seed::Key;
 use crate::{Descriptors, Error};
@@ -27,10 +27,6 @@ impl<const D: usize> Protected<D> {
 impl<const D: usize> Scheme<D> for Protected<D> {
     fn name(&self) -> &str {
         &self.name
-    }
-
-    fn facts(&self) -> Facts {
-        self.scheme.facts()
     }
 
     fn parameters(&self) -> Vec<(&'static str, f64)> {

@@ -34,10 +34,6 @@ impl Scheme<3> for RayVoxel {
         ENTRY.name
     }
 
-    fn facts(&self) -> Facts {
-        ENTRY.facts
-    }
-
     fn parameters(&self) -> Vec<(&'static str, f64)> {
         vec![("voxel", self.voxel)]
     }

@@ -80,11 +80,6 @@ pub trait Scheme<const D: usize>: Debug + Send + Sync {
     /// Returns the name in rows, gates and reports: one word, unique in a plan.
     fn name(&self) -> &str;
 
-    /// Returns facts about the scheme.
-    fn facts(&self) -> Facts {
-        Facts::default()
-    }
-
     /// Returns the parameters by name, for reports. Lengths are in the unit of the points.
     fn parameters(&self) -> Vec<(&'static str, f64)> {
         Vec::new()

@@ -69,10 +69,6 @@ impl Scheme<3> for Sphere {
         self.name
     }
 
-    fn facts(&self) -> Facts {
-        ENTRY.facts
-    }
-
     fn parameters(&self) -> Vec<(&'static str, f64)> {
         vec![("share of real bearings", self.kept)]
     }

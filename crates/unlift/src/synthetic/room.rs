@@ -152,39 +152,3 @@ fn side_by_side(widths: [f64; 3], from: f64, to: f64, draws: &mut Draws) -> [f64
     }
     starts
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_surface_lies_in_the_room() {
-        for seed in 0..20 {
-            let scene = furnished(seed);
-            for surface in &scene.surfaces {
-                for (s, t) in [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0)] {
-                    let p = surface.at(s, t);
-                    for (x, size) in p.iter().zip(scene.size) {
-                        let inside = -0.01..size + 0.01;
-                        assert!(inside.contains(x), "seed {seed}: {surface:?}");
-                    }
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn pieces_along_a_wall_do_not_overlap() {
-        let mut draws = draws(5, Purpose::Layout, 0);
-        for _ in 0..100 {
-            let widths = [1.9, 1.1, 0.5];
-            let starts = side_by_side(widths, 0.08, 4.7, &mut draws);
-            for i in 0..3 {
-                for j in 0..3 {
-                    assert!(i == j || starts[i] + widths[i] <= starts[j] || starts[j] < starts[i]);
-                }
-                assert!(starts[i] >= 0.08 && starts[i] + widths[i] <= 4.7 + 1e-9);
-            }
-        }
-    }
-}

@@ -40,34 +40,3 @@ pub fn tiled(base: &[[f64; 3]], n_points: usize, seed: u64) -> Vec<[f64; 3]> {
         })
         .collect()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_part_and_the_whole_are_the_map_itself() {
-        let base: Vec<[f64; 3]> = (0..50).map(|i| [f64::from(i), 0.0, 0.0]).collect();
-        assert!(tiled(&base, 20, 1).iter().all(|p| base.contains(p)));
-        let mut whole = tiled(&base, 50, 1);
-        whole.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
-        assert_eq!(whole, base);
-        assert!(tiled(&[], 5, 1).is_empty());
-    }
-
-    #[test]
-    fn copies_lie_side_by_side_and_differ() {
-        let base = crate::synthetic::room(0, 400).points;
-        let points = tiled(&base, 1600, 3);
-        assert_eq!(points, tiled(&base, 1600, 3));
-        let (first, others) = points.split_at(400);
-        assert!(others.iter().all(|p| !first.contains(p)));
-        let extent = |points: &[[f64; 3]], c: usize| {
-            let mut column: Vec<f64> = points.iter().map(|p| p[c]).collect();
-            column.sort_unstable_by(f64::total_cmp);
-            quantile(&column, 0.95) - quantile(&column, 0.05)
-        };
-        let stretch: [f64; 3] = std::array::from_fn(|c| extent(&points, c) / extent(first, c));
-        assert!(stretch[0] > 1.7 && stretch[1] > 1.7 && stretch[2] < 1.1, "{stretch:?}");
-    }
-}

@@ -70,20 +70,6 @@ fn density_determinism() {
     over_schemes!(threads_change_no_byte);
 }
 
-/// Points on a wall are recovered from random lines (67.2 and 67.8 %; tomography 68 or 69 with six
-/// other keys).
-#[test]
-fn a_wall_comes_back_from_random_lines() {
-    let mut draws = Draws::new(2, Stage::Synthetic, 0);
-    let wall: Vec<[f64; 3]> =
-        (0..2000).map(|_| [draws.between(0.0, 2.0), 0.5, draws.between(0.0, 2.0)]).collect();
-    let hidden = hide::<3>(scheme("olc").unwrap(), &wall, 1);
-    for (solver, least) in [(Builtin::Density, 65.1), (Builtin::Tomography, 65.7)] {
-        let percent = percent_within(&hidden, &alone(&hidden.released, solver), 0.1);
-        assert!(percent >= least, "{solver:?}: {percent}");
-    }
-}
-
 /// Floors are shares within 25 cm, at most two points below the measured ones. No attack on
 /// candidates is published, so none is tested.
 #[test]

@@ -74,10 +74,11 @@ fn known_positions_stay_and_place_their_neighbors() {
     };
     let about =
         About { map: Some(released.fingerprint()), order: RowOrder::Slots, ..About::default() };
-    let known = Recovered::try_new(&estimates, false, None, released.origin(), released.unit(), 1.0)
-        .and_then(|known| known.with_confidence((0..estimates.len()).map(sure).collect()))
-        .unwrap()
-        .with_about(about);
+    let known =
+        Recovered::try_new(&estimates, false, None, released.origin(), released.unit(), 1.0)
+            .and_then(|known| known.with_confidence((0..estimates.len()).map(sure).collect()))
+            .unwrap()
+            .with_about(about);
     let with = recover_from(&known, released, &lists, &options).unwrap();
     let without = recover(released, &lists, &Builtin::Ranking, &options).unwrap();
     let median = |recovered: &Recovered<2>| {

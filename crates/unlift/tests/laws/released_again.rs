@@ -19,7 +19,7 @@ const MOST: f64 = 4.0;
 const LITTLE: f64 = 0.01;
 
 /// Returns the old position of each new record.
-fn shuffled(n: usize, draws: &mut Draws) -> Vec<usize> {
+pub fn shuffled(n: usize, draws: &mut Draws) -> Vec<usize> {
     let mut order: Vec<usize> = (0..n).collect();
     for at in (1..n).rev() {
         order.swap(at, draws.below(at as u64 + 1) as usize);
@@ -28,7 +28,7 @@ fn shuffled(n: usize, draws: &mut Draws) -> Vec<usize> {
 }
 
 /// Returns the records in `order`, each in another form.
-fn again<const D: usize>(
+pub fn again<const D: usize>(
     records: &Obfuscation<D>,
     order: &[usize],
     draws: &mut Draws,
@@ -75,7 +75,7 @@ fn again<const D: usize>(
     }
 }
 
-fn lists_again(lists: &Neighborhoods, order: &[usize], per: usize) -> Neighborhoods {
+pub fn lists_again(lists: &Neighborhoods, order: &[usize], per: usize) -> Neighborhoods {
     let mut new_of = vec![0; order.len()];
     order.iter().enumerate().for_each(|(new, &old)| new_of[old] = new as u32);
     let slots = order.iter().flat_map(|&old| (0..per).map(move |at| old * per + at));

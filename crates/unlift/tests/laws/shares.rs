@@ -4,11 +4,12 @@
 use unlift::evaluate::{blind, evaluate};
 use unlift::obfuscate::Entry;
 use unlift::recover::{Builtin, RecoverOptions};
-use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
+use unlift::released::Released;
 use unlift::seed::{Draws, Stage};
 use unlift::{About, RowOrder};
 
 use crate::maps::*;
+use crate::released_again::{again, lists_again, shuffled};
 
 /// Returns the shares within 1 and 2.5 units of `scale` with automatic options.
 fn shares<const D: usize>(
@@ -109,53 +110,21 @@ fn equivariance_of_joint_recovery() {
     over_schemes!(shifted_and_scaled_maps_leak_the_same, Builtin::Joint, 0.5);
 }
 
-/// Returns the records in another order, each with the same slots; `None` for records with regions
-/// or voxels.
-fn in_order<const D: usize>(released: &Released<D>, order: &[u32]) -> Option<Released<D>> {
-    let wide = |rows: &[[f32; D]]| -> Vec<[f64; D]> {
-        order.iter().map(|&at| rows[at as usize].map(f64::from)).collect()
-    };
-    let obfuscation = match released.obfuscation() {
-        Obfuscation::Lines(lines) => Obfuscation::Lines(
-            Lines::through(&wide(lines.foot()), &wide(lines.direction())).unwrap(),
-        ),
-        Obfuscation::Rays(rays) if rays.regions().is_none() && rays.voxel().is_none() => {
-            let centers: Vec<[f64; D]> = rays.centers().iter().map(|c| c.map(f64::from)).collect();
-            let center = order.iter().map(|&at| rays.center()[at as usize]).collect();
-            Obfuscation::Rays(Rays::try_new(&centers, center, &wide(rays.direction())).unwrap())
-        }
-        Obfuscation::Rays(_) => return None,
-        Obfuscation::AxisPlanes(planes) => {
-            let axis = order.iter().map(|&at| planes.axis()[at as usize]).collect();
-            let offset = |&at: &u32| f64::from(planes.offset()[at as usize]);
-            let offset: Vec<f64> = order.iter().map(offset).collect();
-            Obfuscation::AxisPlanes(AxisPlanes::try_new(axis, &offset).unwrap())
-        }
-        Obfuscation::AxisCandidates(candidates) => Obfuscation::AxisCandidates(
-            AxisCandidates::try_new(&wide(candidates.position())).unwrap(),
-        ),
-    };
-    let (per, origin, unit) = (released.slots_per_record(), released.origin(), released.unit());
-    let released_again = Released::try_new(obfuscation, per, origin, unit, None).unwrap();
-    Some(released_again.with_bounds(released.bounds()))
-}
-
 /// Joint recovery uses samples and takes turns by slot number, so results depend on the order of
 /// records. But nearly all points are recovered at the same place.
 fn order_of_records_hardly_matters<const D: usize>(name: &str, scheme: &Entry) {
     let hidden = hide::<D>(scheme, &room(35, 2000), 7);
-    let (lists, per) = (hidden.lists(30, 0.6, 7), hidden.released.slots_per_record());
-    let order = Draws::new(3, Stage::Synthetic, 0).permutation(hidden.released.n_records());
-    let Some(released) = in_order(&hidden.released, &order) else { return };
-    let mut place = vec![0u32; order.len()];
-    order.iter().enumerate().for_each(|(to, &from)| place[from as usize] = to as u32);
-    let old_slot = |slot: usize| order[slot / per] as usize * per + slot % per;
-    let rows: Vec<Vec<u32>> = (0..released.n_slots())
-        .map(|slot| lists.of(old_slot(slot)).iter().map(|r| place[r.index()]).collect())
-        .collect();
+    let (released, lists, per) =
+        (&hidden.released, hidden.lists(30, 0.6, 7), hidden.released.slots_per_record());
+    let mut draws = Draws::new(3, Stage::Synthetic, 0);
+    let order = shuffled(released.n_records(), &mut draws);
+    let written = again(released.obfuscation(), &order, &mut draws);
+    let anew = Released::try_new(written, per, released.origin(), released.unit(), None);
+    let anew = anew.unwrap().with_bounds(released.bounds());
+    let old_slot = |slot: usize| order[slot / per] * per + slot % per;
     let options = joint();
-    let before = solve(&hidden.released, &lists, options);
-    let after = solve(&released, &hidden.lists_of(&rows), options);
+    let before = solve(released, &lists, options);
+    let after = solve(&anew, &lists_again(&lists, &order, per), options);
     let is_same = |slot: usize| {
         let (a, b) = (before.position(old_slot(slot)), after.position(slot));
         let off = |(a, b): ([f64; D], [f64; D])| (0..D).all(|c| (a[c] - b[c]).abs() < 0.25);

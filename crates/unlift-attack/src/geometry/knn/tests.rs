@@ -58,14 +58,6 @@ fn equals_brute_force_at_every_size_and_density() {
     }
 }
 
-#[test]
-fn coincident_points_are_found_by_row() {
-    let points = [[1.0, 2.0, 3.0]; 200];
-    let mut found = Vec::new();
-    Knn::new(&points).unwrap().nearest(100, 3, &mut found);
-    assert_eq!(found, [(0.0, 0), (0.0, 1), (0.0, 2)]);
-}
-
 /// Depth cameras write (0, 0, 0) for missing points, so that thousands coincide.
 #[test]
 fn piles_are_as_if_every_point_was_looked_at() {
@@ -113,15 +105,6 @@ fn values_per_row_come_in_the_order_of_rows() {
     let mut order = knn.spatial_order().to_vec();
     order.sort_unstable();
     assert_eq!(order, [0, 1, 2]);
-}
-
-#[test]
-fn fewer_points_than_asked_for() {
-    let points = [[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]];
-    let knn = Knn::new(&points).unwrap();
-    let mut found = Vec::new();
-    knn.nearest(0, 50, &mut found);
-    assert_eq!(found, vec![(1.0, 1), (9.0, 2)]);
 }
 
 #[test]

@@ -152,33 +152,4 @@ mod tests {
             assert_eq!(turned.cells.len(), still.cells.len());
         }
     }
-
-    #[test]
-    fn shifts_keep_the_cells_that_both_patches_have() {
-        let all = Hypotheses::new();
-        let cells: Vec<usize> = all
-            .pairs
-            .iter()
-            .filter(|p| all.turned[p.turned].turn == 0)
-            .map(|p| all.turned[p.turned].cells.len())
-            .collect();
-        assert_eq!(cells.iter().filter(|&&n| n == 16).count(), 1);
-        assert_eq!(cells.iter().filter(|&&n| n == 12).count(), 4);
-        assert_eq!(cells.iter().min(), Some(&6));
-    }
-
-    #[test]
-    fn a_quarter_turn_moves_whole_cells() {
-        // Turned by 90 degrees from x towards y, the first row becomes the last column.
-        let made_of = sources(3, 2, [0, 0]).unwrap();
-        let (cell, _) = made_of.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
-        assert_eq!(cell, 0);
-    }
-
-    #[test]
-    fn an_eighth_of_a_turn_loses_the_corners() {
-        let kept = |cell| sources(cell, 1, [0, 0]).is_some();
-        let lost: Vec<usize> = (0..CELLS).filter(|&cell| !kept(cell)).collect();
-        assert_eq!(lost, [0, 3, 12, 15]);
-    }
 }

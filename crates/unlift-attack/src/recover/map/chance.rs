@@ -357,32 +357,7 @@ pub(crate) fn ray_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use crate::recover::map::lines::{MOST_CHANCE, evidence};
-
-    /// Returns ln P(X >= n) for X ~ Bin(k, p), by summation.
-    fn ln_tail(n: usize, k: usize, p: f64) -> f64 {
-        let mut term = (1.0 - p).powi(k as i32);
-        let mut tail = 0.0;
-        for x in 0..=k {
-            if x >= n {
-                tail += term;
-            }
-            term *= (k - x) as f64 / (x + 1) as f64 * p / (1.0 - p);
-        }
-        tail.ln()
-    }
-
-    #[test]
-    fn evidence_bounds_the_binomial_tail_and_orders_like_it() {
-        for (n, p) in [(26, 0.4), (4, 0.005), (10, 0.035), (50, 0.2), (1, 0.005), (49, 0.5)] {
-            let evidence = f64::from(evidence(n as f32, 50.0, p as f32));
-            // Chernoff: P(X >= n) <= exp(-k KL), tight up to a polynomial factor.
-            assert!(evidence <= -ln_tail(n, 50, p) + 1e-3, "n {n} p {p}");
-            assert!(evidence >= -ln_tail(n, 50, p) - 4.0, "n {n} p {p}");
-        }
-        // 26 votes with 20 expected by chance are much more probable than 4 with 0.25 expected.
-        assert!(evidence(26.0, 50.0, 0.4) < evidence(4.0, 50.0, 0.005));
-    }
+    use crate::recover::map::lines::{MOST_CHANCE, evidence, ln};
 
     #[test]
     fn evidence_is_near_the_exact_bound() {
@@ -399,17 +374,6 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    fn no_evidence_at_or_below_chance() {
-        assert_eq!(evidence(0.0, 50.0, 0.005), 0.0);
-        assert_eq!(evidence(10.0, 50.0, 0.2), 0.0);
-    }
-}
-
-#[cfg(test)]
-mod lanes_tests {
-    use crate::recover::map::lines::ln;
 
     #[test]
     fn logarithm_is_near_the_exact_one() {

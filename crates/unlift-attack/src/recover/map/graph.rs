@@ -417,13 +417,4 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    fn nobody_has_no_edges() {
-        for n in [0, 1] {
-            let none = Neighborhoods::try_new(vec![0; n + 1], Vec::new(), None, n, 1).unwrap();
-            let graph = Graph::new(&none, 1);
-            assert_eq!((graph.n_slots(), graph.len()), (n, 0));
-        }
-    }
 }
