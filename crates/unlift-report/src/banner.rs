@@ -147,7 +147,7 @@ pub(crate) fn next_steps(document: &Document, cards: &[Card]) -> Vec<String> {
              neighbors, and no attack here used them.",
             if images { "keypoints" } else { "points" }
         ));
-    } else if !tried("learned") {
+    } else if !tried("learned") && !tried("descriptors") {
         steps.push(
             "Try the stronger attack: add `--neighbors learned`, a network that finds neighbors \
              from SIFT or ALIKED descriptors."
@@ -158,15 +158,20 @@ pub(crate) fn next_steps(document: &Document, cards: &[Card]) -> Vec<String> {
     if with_descriptors && !document.results.iter().any(has_pictures) {
         steps.push("See what an attacker sees: add `--invert` and the photos.".to_owned());
     }
-    steps.push(
-        "Mitigate and measure again: release fewer points, or no descriptors. Both give an attacker \
-         less to work with."
-            .to_owned(),
-    );
+    if images {
+        steps.push("Mitigate and measure again: extract fewer keypoints.".to_owned());
+    } else if document.options.get("mitigate").is_none() {
+        steps.push(
+            "Mitigate and measure again: add `--mitigate thin:1/4` or `--mitigate drop:0.5`, and \
+             `--localize` to see what that costs."
+                .to_owned(),
+        );
+    }
     if document.gates.is_empty() {
         let typed = tables::headline_threshold(document).unwrap_or_default();
+        let ratio = if tried("oracle") { "@0.5" } else { "" };
         steps.push(format!(
-            "Test it in your build: `--gate 'all@0.5:{typed}<=20'` fails if more than 20 % \
+            "Test it in your build: `--gate 'all{ratio}:{typed}<=20'` fails if more than 20 % \
              comes back."
         ));
     }
@@ -197,5 +202,15 @@ fn least(document: &Document, cards: &[Card]) -> Option<String> {
         })
         .collect();
     let name = card.scheme.to_uppercase();
-    Some(format!("Of the schemes tried, {name} leaks least: {}.", shares.join(", ")))
+    let cost =
+        document.localization.iter().find(|one| one.scheme == card.scheme && !one.of_queries);
+    let cost = cost.filter(|one| !one.is_unknown()).map(|one| match one.cost() {
+        Some(cost) => {
+            let times = words::significant(cost, 3);
+            format!(" Its localization error is {times} times the unprotected one.")
+        }
+        None => " Most cameras cannot be placed with it.".to_owned(),
+    });
+    let cost = cost.unwrap_or_default();
+    Some(format!("Of the schemes tried, {name} leaks least: {}.{cost}", shares.join(", ")))
 }

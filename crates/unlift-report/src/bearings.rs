@@ -20,7 +20,7 @@ pub(crate) fn said(document: &Document, scheme: &str) -> Option<String> {
         Some(area) => {
             let order = words::percent(100.0 * area);
             format!(
-                "{said}; descriptors put a decoy below a real one in {order} % of pairs (50 % by chance)."
+                "{said}; by descriptors, an attacker tells a decoy from a real bearing in {order} % of pairs (50 % would be chance)."
             )
         }
         None => format!("{said}."),

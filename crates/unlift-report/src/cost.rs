@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::attack::{self, Basis};
 use crate::columns::align;
-use crate::document::{Document, Localization, UNPROTECTED};
+use crate::document::{Document, FEWEST_HELD_OUT, Localization, UNPROTECTED};
 use crate::tables::{self, Class, Table, column};
 use crate::{verdict, words};
 
@@ -17,6 +17,8 @@ const MOST_NAMES: usize = 20;
 /// Width of a letter and height of a line of a name, in units of the chart.
 const LETTER: f64 = 6.5;
 const LINE: f64 = 11.0;
+/// Room for names on the right of the plot.
+const MARGIN: f64 = 50.0;
 /// Size of the chart's plot in its own units.
 const SIZE: [f64; 2] = [560.0, 300.0];
 
@@ -34,6 +36,8 @@ pub(crate) struct Chart {
     /// The corners of the Pareto front.
     pub front: String,
     pub ticks: Vec<Tick>,
+    /// The right edge and the upper edge of the area of low leak and low error.
+    pub target: [f64; 2],
     /// Where images stop to localize, if a scheme's do.
     pub edge: Option<f64>,
     /// Schemes that are not drawn, and why.
@@ -46,6 +50,8 @@ pub(crate) struct Dot {
     pub title: String,
     pub at: [f64; 2],
     pub best: bool,
+    /// Whether the name is left of the dot.
+    pub is_left: bool,
     /// Vertical shift of the name, so that names of near dots do not overlap.
     pub shift: f64,
 }
@@ -87,7 +93,7 @@ fn points(document: &Document) -> (Vec<Point<'_>>, Vec<String>) {
     for one in document.localization.iter().filter(of_map) {
         match leak(document, &one.scheme, basis) {
             _ if one.is_unknown() => missing.push(format!(
-                "{}: its descriptors are changed, so the bound does not tell the cost",
+                "{}: its descriptors are changed, so only {FEWEST_HELD_OUT} or more held-out images tell the cost",
                 one.scheme
             )),
             None => missing.push(format!("{}: this attack was not tried on it", one.scheme)),
@@ -106,12 +112,12 @@ pub(crate) fn chart(document: &Document) -> Option<Chart> {
         return None;
     }
     let finite = points.iter().map(|point| point.cost).filter(|cost| cost.is_finite());
-    let most = finite.fold(COST, f64::max) * 1.15;
+    let (least, most) = finite.fold((0.5, COST), |(a, b), cost| (cost.min(a), cost.max(b)));
+    let (least, most) = (least / 1.05, most * 1.15);
     let fails = points.iter().any(|point| point.cost.is_infinite());
     let width = if fails { 0.86 * SIZE[0] } else { SIZE[0] };
     let x = |cost: f64| match cost.is_finite() {
-        // Held-out images may by chance do better than without protection.
-        true => width * (cost.max(0.5) / 0.5).ln() / (most / 0.5).ln(),
+        true => width * (cost / least).ln() / (most / least).ln(),
         false => 0.93 * SIZE[0],
     };
     let y = |leak: f64| SIZE[1] * (1.0 - leak / 100.0);
@@ -139,11 +145,18 @@ pub(crate) fn chart(document: &Document) -> Option<Chart> {
         // The titles name all dots.
         let is_named = points.len() <= MOST_NAMES || best(point);
         let name = if is_named { point.one.scheme.clone() } else { String::new() };
+        // Names that would leave the chart are left of their dots.
+        let is_left = at[0] + span(&name) > SIZE[0] + MARGIN;
+        let side = |is_left: bool, x: f64, name: &str| match is_left {
+            true => [x - span(name), x],
+            false => [x, x + span(name)],
+        };
         // The nearest height at which the name overlaps no other one.
         let overlaps = |shift: f64, dot: &Dot| {
-            let [dx, dy] = [dot.at[0] - at[0], dot.at[1] + dot.shift - at[1] - shift];
-            let width = if dx < 0.0 { dot.name.len() } else { name.len() } as f64 * LETTER;
-            !dot.name.is_empty() && dx.abs() < width + LINE && dy.abs() < LINE
+            let [a, b] = side(is_left, at[0], &name);
+            let [c, d] = side(dot.is_left, dot.at[0], &dot.name);
+            let apart = (dot.at[1] + dot.shift - at[1] - shift).abs();
+            !dot.name.is_empty() && a < d && c < b && apart < LINE
         };
         let fits = |shift: &f64| {
             let inside = (0.0..=SIZE[1]).contains(&(at[1] + shift));
@@ -156,12 +169,13 @@ pub(crate) fn chart(document: &Document) -> Option<Chart> {
             title: title(point),
             at: at.map(|x| (10.0 * x).round() / 10.0),
             best: best(point),
+            is_left,
             shift,
         });
     }
-    let steps = [0.5, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0];
-    let ticks = steps.into_iter().filter(|&cost| cost <= most);
-    let held_out = points.iter().any(|point| point.one.held_out.is_some());
+    let steps = [0.05, 0.1, 0.2, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0];
+    let ticks = steps.into_iter().filter(|&cost| (least..=most).contains(&cost));
+    let held_out = points.iter().any(|point| point.one.measured().is_some());
     Some(Chart {
         sentence: sentence(&points, &missing),
         leak: match basis(document) {
@@ -178,9 +192,15 @@ pub(crate) fn chart(document: &Document) -> Option<Chart> {
         dots,
         front: corners.join(" "),
         ticks: ticks.map(|cost| Tick { at: x(cost), text: format!("{cost}×") }).collect(),
+        target: [x(COST), y(LEAK)],
         edge: fails.then_some(width),
         missing,
     })
+}
+
+/// Returns the width of a name and of its distance from the dot.
+fn span(name: &str) -> f64 {
+    LINE + LETTER * name.len() as f64
 }
 
 /// Returns the height of the last corner.
@@ -265,9 +285,9 @@ pub(crate) fn table(document: &Document) -> Option<Table> {
             leak.map_or_else(none, words::percent),
             leak.map_or_else(none, |leak| words::percent(leak * released)),
             if one.changes_descriptors { none() } else { said(one.multiple, 3) },
-            length(one.center_error),
-            said(one.rotation_error_degrees, 3),
-            words::percent(one.failed_percent),
+            if one.changes_descriptors { none() } else { length(one.center_error) },
+            if one.changes_descriptors { none() } else { said(one.rotation_error_degrees, 3) },
+            if one.changes_descriptors { none() } else { words::percent(one.failed_percent) },
         ];
         if held_out.is_some() {
             let own = one.held_out.as_ref();
@@ -293,7 +313,10 @@ pub(crate) fn table(document: &Document) -> Option<Table> {
 /// Returns lines for the terminal, or an empty text.
 pub(crate) fn text(document: &Document) -> String {
     let lines = |one: &Localization| {
-        let held_out = if one.held_out.is_some() { "held-out images" } else { "bound" };
+        let held_out = match one.measured() {
+            Some(found) => format!("{} held-out images", found.n_images),
+            None => "bound".to_owned(),
+        };
         let cost = match one.cost() {
             Some(cost) => format!("{}x", words::significant(cost, 3)),
             None if one.is_unknown() => "not known".to_owned(),
@@ -302,11 +325,11 @@ pub(crate) fn text(document: &Document) -> String {
         let leak = leak(document, &one.scheme, basis(document)).filter(|_| !one.of_queries);
         let leak = leak.map_or("-".to_owned(), |leak| format!("{} %", words::percent(leak)));
         // This percentage is of the bound.
-        let failed = match one.held_out {
+        let failed = match one.measured() {
             Some(_) => "-".to_owned(),
             None => format!("{} %", words::percent(one.failed_percent)),
         };
-        vec![one.scheme.clone(), leak, cost, held_out.to_owned(), failed]
+        vec![one.scheme.clone(), leak, cost, held_out, failed]
     };
     if document.localization.is_empty() {
         return String::new();

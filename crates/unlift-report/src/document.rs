@@ -306,19 +306,27 @@ pub struct HeldOut {
 /// The value of [`Localization::scheme`] for the map without protection.
 pub const UNPROTECTED: &str = "none";
 
+/// The smallest number of held-out images whose median tells schemes apart.
+pub const FEWEST_HELD_OUT: u64 = 10;
+
 impl Localization {
-    /// Returns the error as a multiple of the unprotected one: as measured on held-out images, else
-    /// by the bound. `None` if cameras do not localize, or if the bound does not tell.
+    /// Returns the figures of held-out images if there are at least [`FEWEST_HELD_OUT`] of them.
+    pub fn measured(&self) -> Option<&HeldOut> {
+        self.held_out.as_ref().filter(|found| found.n_images >= FEWEST_HELD_OUT)
+    }
+
+    /// Returns the error as a multiple of the unprotected one: as [measured](Self::measured), else by
+    /// the bound. `None` if cameras do not localize, or if the bound does not tell.
     pub fn cost(&self) -> Option<f64> {
-        match &self.held_out {
-            Some(held_out) => held_out.multiple,
+        match self.measured() {
+            Some(found) => found.multiple,
             None => self.multiple.filter(|_| !self.changes_descriptors),
         }
     }
 
     /// Returns true if what localization costs under this scheme was not measured.
     pub fn is_unknown(&self) -> bool {
-        self.held_out.is_none() && self.changes_descriptors
+        self.measured().is_none() && self.changes_descriptors
     }
 }
 

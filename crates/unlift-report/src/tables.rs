@@ -294,12 +294,26 @@ pub(crate) fn choices(document: &Document) -> Option<Table> {
 pub(crate) fn metrics(document: &Document) -> Option<Table> {
     let names = document.results.iter().flat_map(|row| row.metrics.keys());
     let names = distinct(names.filter(|name| !is_of_pictures(name)));
-    let heads = figures(names.iter().map(|name| name.as_str()));
+    let heads = figures(names.iter().map(|name| metric_head(name)));
     let table = Table::of_results(document, ("metrics", "Further measures."), heads, |row| {
         let text = |name: &&String| known(row.metrics.get(*name), |x| words::significant(*x, 3));
         Some(names.iter().map(text).collect())
     });
     table.if_any()
+}
+
+/// Returns the head of a metric's column.
+fn metric_head(name: &str) -> String {
+    match name {
+        "real_bearings_percent" => "real bearings, %".to_owned(),
+        "decoys_precision_percent" => "bearings called decoys that are decoys, %".to_owned(),
+        "decoys_recall_percent" => "decoys called decoys, %".to_owned(),
+        "decoys_area" => "pairs of a decoy and a real bearing told apart, share".to_owned(),
+        _ => match name.strip_suffix("_percent") {
+            Some(name) => format!("{}, %", name.replace('_', " ")),
+            None => name.replace('_', " "),
+        },
+    }
 }
 
 pub(crate) fn trials(document: &Document) -> Option<Table> {

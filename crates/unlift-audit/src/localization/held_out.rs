@@ -18,7 +18,7 @@ use unlift::{Descriptors, Error, PointSet, ProtectedDescriptors, Unit};
 use unlift_features::Extraction;
 use unlift_features::load::Turn;
 use unlift_invert::Lens;
-use unlift_report::document::HeldOut;
+use unlift_report::document::{FEWEST_HELD_OUT, HeldOut};
 
 use super::Cameras;
 use crate::images::FeatureSource;
@@ -176,10 +176,16 @@ impl<'a> Held<'a> {
     /// Returns a note about the map and the images.
     pub fn note(&self) -> String {
         let n = self.is_part.iter().filter(|part| **part).count();
+        let (n_images, n_points) = (self.queries.len(), self.is_part.len());
+        let few = match (n_images as u64) < FEWEST_HELD_OUT {
+            true => format!(
+                " (fewer than {FEWEST_HELD_OUT} tell no schemes apart, so the bound counts)"
+            ),
+            false => String::new(),
+        };
         format!(
-            "localization: {} images are held out; {n} of {} points are found in at least {FEWEST_OTHERS} other images",
-            self.queries.len(),
-            self.is_part.len()
+            "localization: images held out: {n_images}{few}; the map without them has {n} of {n_points} points, \
+             those that at least {FEWEST_OTHERS} other images see"
         )
     }
 

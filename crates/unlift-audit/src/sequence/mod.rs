@@ -22,7 +22,7 @@ use unlift::neighbors::{Neighborhoods, Source, of_what_there_is};
 use unlift::obfuscate::{Scheme, obfuscate};
 use unlift::recover::Recovered;
 use unlift::seed::Key;
-use unlift::sequence::{Links, Query, recover, with_lists};
+use unlift::sequence::{Links, Query, Solved, recover, with_lists};
 use unlift::truth::Secret;
 use unlift_io::atomic::OutputSet;
 use unlift_io::hash::{hash_file, hash_files};
@@ -264,12 +264,14 @@ fn rows(
                 let what = format!("{}, {n} queries, links by {by}", scheme.name());
                 job.progress.show(rows.len(), total, &what);
                 let started = Instant::now();
-                let row = hidden.row((links, &tracks, lists), n, &job.plan)?;
+                let attack = Attack { links, lists, n, seed: job.plan.seed };
+                let row = hidden.row(&attack, &tracks, &job.plan)?;
                 seconds.recover += started.elapsed().as_secs_f64();
                 let (scheme, neighbors) = (scheme.name().to_owned(), format!("{by}@{n}"));
                 let row = Row { scheme, neighbors, k: n, solver: SOLVER.to_owned(), ..row };
-                if let (Some(inversion), SEQUENCE) = (job.inversion, by) {
-                    pictures::paint(inversion, (&hidden, links), &row, job.progress, inversions)?;
+                let strongest = if combined.is_some() { WITH_LISTS } else { SEQUENCE };
+                if let Some(inversion) = job.inversion.filter(|_| by == strongest) {
+                    pictures::paint(inversion, (&hidden, &attack), &row, job.progress, inversions)?;
                 }
                 rows.push(row);
             }
@@ -328,6 +330,15 @@ struct Hidden<'a> {
     is_new: &'a [bool],
     queries: Vec<Query>,
     secrets: Vec<Secret>,
+}
+
+/// An attack on each query by the `n` consecutive queries around it.
+struct Attack<'a> {
+    links: &'a Links,
+    /// Lists of neighbors within each query, if they are used.
+    lists: Option<&'a Vec<Neighborhoods>>,
+    n: usize,
+    seed: u64,
 }
 
 /// A number of keypoints or links, and how many of them are right.
@@ -390,15 +401,15 @@ impl Hidden<'_> {
         self.queries.iter().map(of_query).collect()
     }
 
-    /// Attacks every query with the `n` consecutive queries around it.
+    /// Attacks every query. `tracks` says which links are right.
     fn row(
         &self,
-        by: (&Links, &Links, Option<&Vec<Neighborhoods>>),
-        n: usize,
+        attack: &Attack<'_>,
+        tracks: &Links,
         plan: &Plan<2>,
     ) -> Result<Row, unlift::Error> {
         let headline = plan.thresholds[plan.headline].value;
-        let of_query = |query| self.of_query(by, (query, n), headline, plan.seed);
+        let of_query = |query| self.of_query(attack, tracks, query, headline);
         let queries = (0..self.views.len()).into_par_iter().with_max_len(1);
         let found = queries.map(of_query).collect::<Result<Vec<_>, unlift::Error>>()?;
         let mut pooled = Pooled::new(&plan.thresholds);
@@ -424,20 +435,26 @@ impl Hidden<'_> {
         Ok(row)
     }
 
-    /// Attacks `query` with the `n` queries around it.
+    /// Attacks `query`.
+    fn solve(&self, attack: &Attack<'_>, query: usize) -> Result<Solved, unlift::Error> {
+        let mut solved = recover(&self.queries, attack.links, query, self.window(query, attack.n))?;
+        if let Some(lists) = attack.lists {
+            let own = &self.queries[query];
+            solved.recovered = with_lists(&solved.recovered, own, &lists[query], attack.seed)?;
+        }
+        Ok(solved)
+    }
+
+    /// Attacks `query` and counts what comes back within `headline`.
     fn of_query(
         &self,
-        (links, tracks, lists): (&Links, &Links, Option<&Vec<Neighborhoods>>),
-        (query, n): (usize, usize),
+        attack: &Attack<'_>,
+        tracks: &Links,
+        query: usize,
         headline: f64,
-        seed: u64,
     ) -> Result<(Recovered<2>, Shares), unlift::Error> {
-        let window = self.window(query, n);
-        let mut solved = recover(&self.queries, links, query, window.clone())?;
-        if let Some(lists) = lists {
-            let (query, lists) = (&self.queries[query], &lists[query]);
-            solved.recovered = with_lists(&solved.recovered, query, lists, seed)?;
-        }
+        let window = self.window(query, attack.n);
+        let solved = self.solve(attack, query)?;
         let original = &self.views[query].original;
         let accuracy = evaluate(&solved.recovered, original, &self.secrets[query])?;
         let mut shares = Shares::default();
@@ -454,7 +471,7 @@ impl Hidden<'_> {
                 shares.new.count(is_within);
             }
             let Some(point) = point else { continue };
-            for (other, at) in links.track(query, slot, &window) {
+            for (other, at) in attack.links.track(query, slot, &window) {
                 if let Some(other) = self.point(other as usize, at as usize) {
                     shares.right.count(point == other);
                 }

@@ -1,11 +1,10 @@
 //! Pictures of what comes back of a few queries, one per scheme and number of queries.
 
 use unlift::audit::Row;
-use unlift::sequence::{Links, recover};
 use unlift_invert::Points;
 use unlift_report::inversions::Inversion as Sheet;
 
-use super::Hidden;
+use super::{Attack, Hidden};
 use crate::Error;
 use crate::images::choice;
 use crate::inversion::{Inversion, NEAR_PX, weight};
@@ -18,7 +17,7 @@ const SHOWN: usize = 3;
 /// cannot be used are reported once.
 pub(super) fn paint(
     inversion: &Inversion,
-    (hidden, links): (&Hidden<'_>, &Links),
+    (hidden, attack): (&Hidden<'_>, &Attack<'_>),
     row: &Row,
     progress: &dyn Progress,
     sheets: &mut Vec<Sheet>,
@@ -33,7 +32,7 @@ pub(super) fn paint(
         });
         let places: Vec<[f32; 2]> =
             view.original.reveal().positions().iter().map(|&place| view.in_photo(place)).collect();
-        let solved = recover(&hidden.queries, links, query, hidden.window(query, row.k))?;
+        let solved = hidden.solve(attack, query)?;
         let recovered = &solved.recovered;
         let slots = 0..recovered.n_slots();
         let place = |slot| recovered.position(slot).map_or([f32::NAN; 2], |p| view.in_photo(p));

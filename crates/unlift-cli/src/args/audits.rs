@@ -116,7 +116,8 @@ pub struct SolverArgs {
           help_heading = "Attack")]
     pub solver: Vec<Builtin>,
     /// Skip the baseline "records alone", the best attack that uses only the records, without
-    /// descriptors; it may make lists from them. It often takes most of the time
+    /// descriptors; it may make lists from them. It often takes most of the time. Without it, figures
+    /// may be too low
     #[arg(long, help_heading = "Attack")]
     pub no_records_alone: bool,
 }

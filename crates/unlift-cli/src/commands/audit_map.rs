@@ -149,6 +149,9 @@ fn protected_by(args: &AuditMapArgs, prepared: &Prepared) -> anyhow::Result<Vec<
     protections(&args.protect, own)
 }
 
+const NO_RECORDS_ALONE: &str =
+    "--no-records-alone: the attack on the records alone was not tried; it may recover more";
+
 fn plan(
     args: &AuditMapArgs,
     (prepared, input): (&Prepared, &read::Input),
@@ -156,6 +159,9 @@ fn plan(
     (notes, doubts): (&mut Vec<String>, &mut Vec<String>),
 ) -> anyhow::Result<Plan<3>> {
     let k = usize::from(args.map.k);
+    if args.solvers.no_records_alone {
+        notes.push(NO_RECORDS_ALONE.to_owned());
+    }
     let unit = prepared.original.reveal().unit();
     let n_points = prepared.original.len();
     let at_once = args.tile_points.map_or(n_points, |most| n_points.min(most.get()));

@@ -58,7 +58,7 @@ fn known_positions_stay_and_place_their_neighbors() {
     let hidden = hide::<2>(unlift::obfuscate::scheme("dcl2d").unwrap(), &points, 3);
     let (lists, released) = (hidden.lists(20, 0.8, 3), &hidden.released);
     let options = RecoverOptions::default();
-    let is_known = |slot: usize| slot % 3 == 0;
+    let is_known = |slot: usize| slot.is_multiple_of(3);
     let position = |slot: usize| hidden.local(slot).map(|x| x as f32);
     let estimate = |slot: usize| match is_known(slot) {
         true => {
