@@ -449,6 +449,7 @@ Examples:
   unlift audit sequence PROJECT photos
   unlift audit sequence PROJECT PROJECT/database.db --queries 3,5,10 --schemes dcl2d
   unlift audit sequence PROJECT photos --features aliked --gate 'dcl2d:sequence@5:10<=20'
+  unlift audit sequence PROJECT photos --features aliked --neighbors descriptors --invert
   unlift audit sequence PROJECT photos --poses perturbed:5,0.5 --scale 1
 
 Every image is a query that hides its keypoints on its own. A service knows the pose of each query.
@@ -457,7 +458,7 @@ queries give keypoints back without neighbors. The attack links keypoints by the
 
 The row sequence@5 attacks each image with the five consecutive images around it, in the order of
 their names. The row tracks@5 links them by the tracks of MODEL instead: what better links would
-give.
+give. With --neighbors, the row sequence+lists@5 also uses lists of neighbors within each image.
 
 Exit codes: 0 done, 1 a gate failed, 2 wrong usage, 3 bad input.")]
 pub struct AuditSequenceArgs {
