@@ -163,7 +163,7 @@ pub fn own_image_source(text: &str) -> Result<Named, String> {
 pub fn image_mitigation(text: &str) -> Result<Mitigation, String> {
     match mitigation(text)? {
         mitigation if mitigation.fits_images() => Ok(mitigation),
-        _ => Err(format!("expected noise:DEVIATION, bits:N or drop:SHARE, found {text}")),
+        _ => Err(format!("expected noise:DEVIATION or drop:SHARE, found {text}")),
     }
 }
 

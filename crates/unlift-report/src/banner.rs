@@ -120,6 +120,13 @@ pub(crate) fn next_steps(document: &Document, cards: &[Card]) -> Vec<String> {
     let has_file = document.options.get("descriptors").is_some_and(|given| !given.is_null());
     let mut steps = Vec::new();
     if sequence::is_sequence(document) {
+        if !document.results.iter().any(sequence::uses_lists) {
+            steps.push(
+                "Try the stronger attack: add `--neighbors descriptors`, which also uses lists of \
+                 neighbors within each query."
+                    .to_owned(),
+            );
+        }
         steps.push(
             "Mitigate and measure again: send fewer queries, or withhold the pose. Fewer views of \
              a point give an attacker less to work with."
@@ -161,15 +168,16 @@ pub(crate) fn next_steps(document: &Document, cards: &[Card]) -> Vec<String> {
     if images {
         steps.push("Mitigate and measure again: extract fewer keypoints.".to_owned());
     } else if document.options.get("mitigate").is_none() {
-        steps.push(
-            "Mitigate and measure again: add `--mitigate thin:1/4` or `--mitigate drop:0.5`, and \
-             `--localize` to see what that costs."
-                .to_owned(),
-        );
+        let drop = if has_file { " or `--mitigate drop:0.5`" } else { "" };
+        let localizes =
+            !document.localization.is_empty() && !document.options.contains_key("hold_out");
+        let cost = if localizes { ", and `--localize PHOTOS` to see what that costs" } else { "" };
+        steps.push(format!("Mitigate and measure again: add `--mitigate thin:1/4`{drop}{cost}."));
     }
     if document.gates.is_empty() {
         let typed = tables::headline_threshold(document).unwrap_or_default();
-        let ratio = if tried("oracle") { "@0.5" } else { "" };
+        let half = |row: &Row| row.neighbors == "oracle" && row.inlier_ratio == 0.5;
+        let ratio = if document.results.iter().any(half) { "@0.5" } else { "" };
         steps.push(format!(
             "Test it in your build: `--gate 'all{ratio}:{typed}<=20'` fails if more than 20 % \
              comes back."

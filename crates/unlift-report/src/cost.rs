@@ -17,6 +17,8 @@ const MOST_NAMES: usize = 20;
 /// Width of a letter and height of a line of a name, in units of the chart.
 const LETTER: f64 = 6.5;
 const LINE: f64 = 11.0;
+/// Smallest error of the axis, as a multiple.
+const LEAST: f64 = 0.05;
 /// Room for names on the right of the plot.
 const MARGIN: f64 = 50.0;
 /// Size of the chart's plot in its own units.
@@ -111,13 +113,13 @@ pub(crate) fn chart(document: &Document) -> Option<Chart> {
     if points.is_empty() {
         return None;
     }
-    let finite = points.iter().map(|point| point.cost).filter(|cost| cost.is_finite());
+    let finite = points.iter().map(|point| point.cost.max(LEAST)).filter(|cost| cost.is_finite());
     let (least, most) = finite.fold((0.5, COST), |(a, b), cost| (cost.min(a), cost.max(b)));
     let (least, most) = (least / 1.05, most * 1.15);
     let fails = points.iter().any(|point| point.cost.is_infinite());
     let width = if fails { 0.86 * SIZE[0] } else { SIZE[0] };
     let x = |cost: f64| match cost.is_finite() {
-        true => width * (cost / least).ln() / (most / least).ln(),
+        true => width * (cost.max(LEAST) / least).ln() / (most / least).ln(),
         false => 0.93 * SIZE[0],
     };
     let y = |leak: f64| SIZE[1] * (1.0 - leak / 100.0);

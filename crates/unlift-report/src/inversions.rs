@@ -141,9 +141,13 @@ pub(crate) fn sheets(document: &Document, inversions: &[Inversion]) -> (Vec<Shee
     }
     while size(&sheets) > BUDGET_BYTES {
         let rows = sheets.iter_mut().flat_map(|sheet| &mut sheet.rows);
-        let longest = rows.max_by_key(|row| row.others.len());
-        if longest.and_then(|row| row.others.pop()).is_none() {
-            break;
+        // One picture of each scheme stays.
+        let more = |row: &&mut SheetRow| {
+            row.others.len() + (row.main.len() - 1) * usize::from(row.by_queries)
+        };
+        let Some(longest) = rows.filter(|row| more(row) > 0).max_by_key(more) else { break };
+        if longest.others.pop().is_none() {
+            longest.main.remove(0);
         }
         left_out += 1;
     }

@@ -23,8 +23,10 @@
   /** Adds a slider to a scheme with one picture per number of queries. */
   function steps(row, choose) {
     const shots = [...row.querySelectorAll("button.shot")];
+    if (shots.length < 2) return;
     const range = element("input", { type: "range", min: "0", max: String(shots.length - 1), value: "0", "aria-label": "Number of queries" });
     range.addEventListener("input", () => choose(shots[range.value]));
+    shots.forEach((shot, at) => shot.addEventListener("click", () => { range.value = at; }));
     row.querySelector("h3").after(element("label", { class: "steps" }, "fewer queries ", range, " more queries"));
   }
 

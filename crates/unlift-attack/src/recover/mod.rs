@@ -118,7 +118,8 @@ pub fn recover_with_start<const D: usize>(
 }
 
 /// Recovers by joint recovery and ranking from known positions of some slots. Positions that are more likely right than wrong, by
-/// the confidence in `known`, stay as they are.
+/// the confidence in `known`, stay as they are, except that exact constraints may move them to exact coordinates. The result has
+/// no confidence.
 ///
 /// # Errors
 /// When options are out of range, the lists do not have one row per slot, or `known` belongs to another map.
@@ -129,9 +130,9 @@ pub fn recover_from<const D: usize>(
     options: &RecoverOptions,
 ) -> Result<Recovered<D>, Error> {
     released.fingerprint().expect(known.about().map)?;
-    let problem = Problem::new(released, lists, Builtin::Ranking, options)?;
+    let problem = Problem::new(released, lists, Builtin::Ranking, options)?.with_known(known);
     let start = problem.solve(0..problem.n_slots());
-    problem.finish(problem.run_from(known, start), false).map(|(recovered, _)| recovered)
+    problem.finish(problem.run_joint(start), false).map(|(recovered, _)| recovered)
 }
 
 type WithStart<const D: usize> = fn(

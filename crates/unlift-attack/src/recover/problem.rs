@@ -33,6 +33,8 @@ pub(super) struct Problem<'a, const D: usize> {
     delta: f64,
     records: Records<'a, D>,
     trials: TrialCounts,
+    /// Per slot, the position that is known, if any. Empty if none is.
+    known: Vec<Option<Estimate<D>>>,
 }
 
 enum Records<'a, const D: usize> {
@@ -84,7 +86,21 @@ impl<'a, const D: usize> Problem<'a, D> {
             | Builtin::Ransac => Self::listed(released, lists, solver, options, model)?,
         };
         let trials = TrialCounts::default();
-        Ok(Self { released, map, lists, solver, options: *options, delta, records, trials })
+        let (options, known) = (*options, Vec::new());
+        Ok(Self { released, map, lists, solver, options, delta, records, trials, known })
+    }
+
+    /// Fixes the positions that are more likely right than wrong, by the confidence in `known`.
+    pub(super) fn with_known(self, known: &Recovered<D>) -> Self {
+        Self { known: (0..self.n_slots()).map(|slot| known.sure_estimate(slot)).collect(), ..self }
+    }
+
+    /// Puts the known positions back.
+    fn fixed(&self, mut estimates: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
+        for (estimate, known) in estimates.iter_mut().zip(&self.known) {
+            *estimate = known.unwrap_or(*estimate);
+        }
+        estimates
     }
 
     fn listed(
@@ -150,51 +166,33 @@ impl<'a, const D: usize> Problem<'a, D> {
     }
 
     /// Returns the estimates of all slots after joint recovery from `start`, and after ranking if that is the solver; for other
-    /// solvers, `start`.
+    /// solvers, `start`. Known positions stay as they are.
     pub(super) fn run_joint(&self, start: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
         match &self.records {
             Records::Listed { family, graph: Some(graph), .. } if self.iterates() => {
                 let (delta, seed) = (self.delta as f32, self.options.seed);
-                let found = joint::recover(family, graph, delta, seed, start);
+                let rounds = if self.known.is_empty() { 1 } else { ROUNDS };
+                let found = (0..rounds).fold(self.fixed(start), |found, _| {
+                    self.fixed(joint::recover(family, graph, delta, seed, found))
+                });
                 match self.solver {
                     Builtin::Ranking => {
                         let found = match family {
-                            Family::Lines { rows, .. } if family.has_regions() => {
+                            // Known positions tell the layout better.
+                            Family::Lines { rows, .. }
+                                if family.has_regions() && self.known.is_empty() =>
+                            {
                                 layout::recover(rows, self.lists, found)
                             }
                             _ => found,
                         };
-                        ranking::recover(family, self.lists, delta, seed, found)
+                        self.fixed(ranking::recover(family, self.lists, delta, seed, found))
                     }
                     _ => found,
                 }
             }
             _ => start,
         }
-    }
-
-    /// Returns the estimates of all slots after joint recovery and ranking from `start`, in which the positions that are likely by
-    /// `known` stay fixed. Without lists, returns `start`.
-    pub(super) fn run_from(
-        &self,
-        known: &Recovered<D>,
-        start: Vec<Estimate<D>>,
-    ) -> Vec<Estimate<D>> {
-        let Records::Listed { family, graph: Some(graph), .. } = &self.records else {
-            return start;
-        };
-        let (delta, seed) = (self.delta as f32, self.options.seed);
-        let fixed = |mut estimates: Vec<Estimate<D>>| {
-            for (slot, estimate) in estimates.iter_mut().enumerate() {
-                *estimate = known.sure_estimate(slot).unwrap_or(*estimate);
-            }
-            estimates
-        };
-        let mut estimates = fixed(start);
-        for _ in 0..ROUNDS {
-            estimates = fixed(joint::recover(family, graph, delta, seed, estimates));
-        }
-        fixed(ranking::recover(family, self.lists, delta, seed, estimates))
     }
 
     /// Applies exact constraints to the last estimates and adds confidence. Also returns the features of confidence;

@@ -12,7 +12,7 @@
 //! points. `SCHEME:localization<=MULTIPLE` fails if the error of localization exceeds the
 //! unprotected one by more than this factor. Numbers are compared by value, so `0.1` matches the threshold `0.10`. No name of a
 //! solver or a source is a number, so the first number after the scheme is the threshold.
-//! `sequence@5` and `tracks@5` are sources: `dcl2d:sequence@5:10<=20` bounds what comes back from
+//! `sequence@5`, `sequence+lists@5` and `tracks@5` are sources: `dcl2d:sequence@5:10<=20` bounds what comes back from
 //! five queries, `olc:again:0.10<=20` what comes back from two releases of a map.
 
 mod parse;

@@ -3,7 +3,7 @@
 use unlift::Unit;
 use unlift::audit::{NotAudited, Plan, REFERENCE, Row, Threshold};
 use unlift::neighbors::oracle::Noise;
-use unlift_report::document::{GateResult, Localization, UNPROTECTED};
+use unlift_report::document::{FEWEST_HELD_OUT, GateResult, Localization, UNPROTECTED};
 
 use super::{Candidate, Figure, Gate};
 use crate::Error;
@@ -132,6 +132,15 @@ pub fn gate_results<const D: usize>(
     gates.iter().map(result).collect()
 }
 
+/// Returns the localization error that a gate compares, as a multiple. Few held-out images may fail a gate that the bound passes,
+/// because the bound assumes that all matches are found.
+fn cost_of_gate(one: &Localization) -> Option<f64> {
+    match (&one.held_out, one.measured()) {
+        (Some(few), None) => Some(one.cost()?.max(few.multiple?)),
+        _ => one.cost(),
+    }
+}
+
 /// Returns the result of a gate on localization. A scheme without a finite error fails it.
 fn of_localization(
     gate: &Gate,
@@ -144,7 +153,7 @@ fn of_localization(
     let all: Vec<&Localization> = localization.iter().filter(of_map).collect();
     let missing = not_audited.iter().find(|one| one.neighbors.is_none() && covered(&one.scheme));
     let worst = all.iter().max_by(|a, b| {
-        let cost = |one: &Localization| one.cost().unwrap_or(f64::INFINITY);
+        let cost = |one: &Localization| cost_of_gate(one).unwrap_or(f64::INFINITY);
         cost(a).total_cmp(&cost(b))
     });
     let reason = match (worst, missing) {
@@ -153,16 +162,20 @@ fn of_localization(
         }
         (None, None) => Some("localization was not measured".to_owned()),
         (Some(one), None) if one.is_unknown() => Some(format!(
-            "{} changes descriptors, so its cost is not known without held-out images",
+            "{} changes descriptors, so its cost is not known without {FEWEST_HELD_OUT} or more held-out images",
             one.scheme
         )),
-        (Some(one), None) if one.cost().is_none() => {
+        (Some(one), None) if cost_of_gate(one).is_none() => {
             Some(format!("{}: most images do not localize", one.scheme))
         }
         (Some(_), None) => None,
     };
-    let found_percent = worst.and_then(|one| one.cost());
-    let by = |one: &Localization| if one.held_out.is_some() { "held-out images" } else { "bound" };
+    let found_percent = worst.and_then(|one| cost_of_gate(one));
+    let by = |one: &Localization| match (&one.held_out, one.measured()) {
+        (_, Some(_)) => "held-out images",
+        (Some(_), None) => "the larger of the bound and few held-out images",
+        (None, None) => "bound",
+    };
     GateResult {
         gate: gate.typed.clone(),
         found_percent,

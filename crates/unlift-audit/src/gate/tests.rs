@@ -181,6 +181,8 @@ fn a_sequence_is_named_with_its_number_of_queries() {
         (Some("dcl2d"), Some("sequence@5"))
     );
     assert_eq!((gate.inlier_ratio, gate.threshold, gate.bound_percent), (None, 10.0, 20.0));
+    let gate = Gate::parse("dcl2d:sequence+lists@5:10<=20").unwrap();
+    assert_eq!(gate.source.as_deref(), Some("sequence+lists@5"));
     let gate = Gate::parse("all:tracks@20:5:gain<=1").unwrap();
     assert_eq!((gate.source.as_deref(), gate.figure), (Some("tracks@20"), Figure::Gain));
 }

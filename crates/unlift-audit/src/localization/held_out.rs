@@ -179,7 +179,7 @@ impl<'a> Held<'a> {
         let (n_images, n_points) = (self.queries.len(), self.is_part.len());
         let few = match (n_images as u64) < FEWEST_HELD_OUT {
             true => format!(
-                " (fewer than {FEWEST_HELD_OUT} tell no schemes apart, so the bound counts)"
+                " (fewer than {FEWEST_HELD_OUT} do not tell schemes apart, so only the bound counts)"
             ),
             false => String::new(),
         };
@@ -436,7 +436,7 @@ pub fn summary(
         matches: middle(located, &|one| one.n_pairs as f64),
         center_error: finite(error),
         rotation_error_degrees: finite(middle(located, &angle)),
-        multiple: finite(error / middle(unprotected, &center)),
+        multiple: finite(error / middle(unprotected, &center)).filter(|multiple| *multiple > 0.0),
         recall_percent: limits.iter().map(recall).collect(),
     }
 }

@@ -248,10 +248,10 @@ fn rows(
             }
         };
         let links = &links;
-        seconds.neighbors += started.elapsed().as_secs_f64();
         let tracks = tracks(views, &secrets);
         let hidden = Hidden { views, is_new, queries, secrets };
         let lists = job.lists.as_deref().map(|by| hidden.lists(by, job.plan.seed)).transpose()?;
+        seconds.neighbors += started.elapsed().as_secs_f64();
         let kinds = [(SEQUENCE, links, None), (TRACKS, &tracks, None)];
         let combined = lists.as_ref().map(|lists| (WITH_LISTS, links, Some(lists)));
         for &n in &job.queries {
@@ -354,8 +354,8 @@ impl Share {
         self.right += usize::from(is_right);
     }
 
-    fn percent(&self) -> f64 {
-        100.0 * self.right as f64 / self.n.max(1) as f64
+    fn percent(&self) -> Option<f64> {
+        (self.n > 0).then(|| 100.0 * self.right as f64 / self.n as f64)
     }
 }
 
@@ -394,11 +394,11 @@ impl Hidden<'_> {
         source: &dyn Source<2>,
         seed: u64,
     ) -> Result<Vec<Neighborhoods>, unlift::Error> {
-        let of_query = |query: &Query| {
-            source.supports(&query.released)?;
-            of_what_there_is(source, &query.released, seed)
+        let of_query = |(query, view): (&Query, &View)| {
+            let lists = of_what_there_is(source, &query.released, seed);
+            lists.map_err(|error| error.within(&view.name))
         };
-        self.queries.iter().map(of_query).collect()
+        self.queries.iter().zip(self.views).map(of_query).collect()
     }
 
     /// Attacks every query. `tracks` says which links are right.
@@ -423,15 +423,13 @@ impl Hidden<'_> {
         let mut row = pooled.row().ok_or_else(missing)?;
         let of_all = |share: &Share| 100.0 * share.n as f64 / row.n_points.max(1) as f64;
         let label = &plan.thresholds[plan.headline].label;
-        row.metrics.extend([
-            ("linked_percent".to_owned(), of_all(&all.linked)),
-            (format!("linked_within_{label}_percent"), all.linked.percent()),
-            ("tracked_percent".to_owned(), of_all(&all.tracked)),
-            (format!("tracked_within_{label}_percent"), all.tracked.percent()),
-            ("new_percent".to_owned(), of_all(&all.new)),
-            (format!("new_within_{label}_percent"), all.new.percent()),
-        ]);
-        row.inlier_ratio = all.right.percent() / 100.0;
+        for (name, share) in [("linked", &all.linked), ("tracked", &all.tracked), ("new", &all.new)]
+        {
+            row.metrics.insert(format!("{name}_percent"), of_all(share));
+            let within = share.percent().map(|of| (format!("{name}_within_{label}_percent"), of));
+            row.metrics.extend(within);
+        }
+        row.inlier_ratio = all.right.percent().unwrap_or(0.0) / 100.0;
         Ok(row)
     }
 

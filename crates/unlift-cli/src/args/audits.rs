@@ -116,8 +116,8 @@ pub struct SolverArgs {
           help_heading = "Attack")]
     pub solver: Vec<Builtin>,
     /// Skip the baseline "records alone", the best attack that uses only the records, without
-    /// descriptors; it may make lists from them. It often takes most of the time. Without it, figures
-    /// may be too low
+    /// descriptors; it may make lists from them. It often takes most of the time. Without
+    /// the baseline, figures may be too low
     #[arg(long, help_heading = "Attack")]
     pub no_records_alone: bool,
 }
@@ -470,9 +470,9 @@ pub struct AuditSequenceArgs {
     pub path: PathBuf,
     #[command(flatten)]
     pub extraction: ExtractionArgs,
-    /// Let this fraction of MODEL's points, at one end of its longest side, be unknown to the
-    /// service, as new things in the place are. Keypoints that show none of the other points are
-    /// also counted apart
+    /// Count this fraction of MODEL's points, at one end of its longest axis, as unknown to the
+    /// service, as new things in the place are. The columns "new" are about keypoints that show no
+    /// point of MODEL, or an unknown one
     #[arg(long, value_name = "FRACTION", value_parser = values::share, default_value_t = 0.0,
           help_heading = "Input")]
     pub held_out_share: f64,
@@ -496,8 +496,8 @@ pub struct AuditSequenceArgs {
     #[arg(long, value_name = "SOURCE", value_parser = values::own_image_source,
           help_heading = "Attack")]
     pub neighbors: Option<Named>,
-    /// Also audit every scheme after this change to the descriptors of each query: noise:DEVIATION,
-    /// bits:N or drop:SHARE (see unlift audit map); repeat for alternatives
+    /// Also audit every scheme after this change to the descriptors of each query: noise:DEVIATION
+    /// or drop:SHARE (see unlift audit map); repeat for alternatives
     #[arg(long, value_name = "STEPS", value_parser = values::image_mitigation,
           help_heading = "Attack")]
     pub mitigate: Vec<Mitigation>,

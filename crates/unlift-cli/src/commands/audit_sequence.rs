@@ -116,7 +116,8 @@ fn plan(args: &AuditSequenceArgs) -> anyhow::Result<Plan<2>> {
             entries.iter().filter_map(|entry| entry.of_dimension(&options)).collect()
         }
     };
-    let mitigated = args.mitigate.iter().flat_map(|mitigation| {
+    let mitigations = distinct(args.mitigate.clone(), |a, b| a.name() == b.name());
+    let mitigated = mitigations.iter().flat_map(|mitigation| {
         let of = |scheme| Arc::new(Mitigated::new(scheme, mitigation.clone(), None)) as Arc<_>;
         schemes.iter().cloned().map(of)
     });

@@ -192,9 +192,10 @@ pub fn compare(
 /// Returns the schemes of the old audit that localize less precisely in the new one, or whose
 /// error is no longer known.
 fn costs_more(old: &Document, new: &Document) -> Vec<CostsMore> {
-    let held_out = |document: &Document| document.localization.iter().all(|o| o.held_out.is_some());
+    let held_out =
+        |document: &Document| document.localization.iter().all(|o| o.measured().is_some());
     let both = held_out(old) && held_out(new);
-    let multiple = |one: &Localization| match &one.held_out {
+    let multiple = |one: &Localization| match one.measured() {
         Some(held_out) if both => held_out.multiple,
         _ => one.multiple.filter(|_| !one.changes_descriptors),
     };

@@ -58,10 +58,10 @@ impl Mitigation {
         self.steps.iter().any(|step| !matches!(step, Step::Thin { .. }))
     }
 
-    /// Returns true if every step fits single images: it keeps all points, and learns no components from
-    /// them, which would differ between images.
+    /// Returns true if every step fits single images: it keeps all points and learns nothing from them,
+    /// which would differ between images.
     pub fn fits_images(&self) -> bool {
-        !self.steps.iter().any(|step| matches!(step, Step::Thin { .. } | Step::Pca(_)))
+        self.steps.iter().all(|step| matches!(step, Step::Noise(_) | Step::Drop(_)))
     }
 
     /// Returns the name in rows: letters, digits, `_` and `.`.
