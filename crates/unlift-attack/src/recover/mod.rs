@@ -118,8 +118,7 @@ pub fn recover_with_start<const D: usize>(
 }
 
 /// Recovers by joint recovery and ranking from known positions of some slots. Positions that are more likely right than wrong, by
-/// the confidence in `known`, stay as they are, except that exact constraints may move them to exact coordinates. The result has
-/// no confidence.
+/// the confidence in `known`, stay as they are until exact constraints apply (`cp2d`). The result has no confidence.
 ///
 /// # Errors
 /// When options are out of range, the lists do not have one row per slot, or `known` belongs to another map.
@@ -130,9 +129,11 @@ pub fn recover_from<const D: usize>(
     options: &RecoverOptions,
 ) -> Result<Recovered<D>, Error> {
     released.fingerprint().expect(known.about().map)?;
-    let problem = Problem::new(released, lists, Builtin::Ranking, options)?.with_known(known);
-    let start = problem.solve(0..problem.n_slots());
-    problem.finish(problem.run_joint(start), false).map(|(recovered, _)| recovered)
+    let problem = Problem::new(released, lists, Builtin::Ranking, options)?;
+    let slots = 0..problem.n_slots();
+    let known: Vec<_> = slots.clone().map(|slot| known.sure_estimate(slot)).collect();
+    let estimates = problem.run_joint(problem.solve(slots), &known);
+    problem.finish(estimates, false).map(|(recovered, _)| recovered)
 }
 
 type WithStart<const D: usize> = fn(
@@ -150,7 +151,7 @@ fn with_start<const D: usize>(
 ) -> Result<(Recovered<D>, Recovered<D>), Error> {
     let problem = Problem::new(released, lists, Builtin::Joint, options)?;
     let start = problem.solve(0..problem.n_slots());
-    let (recovered, _) = problem.finish(problem.run_joint(start.clone()), false)?;
+    let (recovered, _) = problem.finish(problem.run_joint(start.clone(), &[]), false)?;
     let start = problem.finish_start(start, &recovered)?;
     Ok((recovered, start))
 }
@@ -189,5 +190,5 @@ fn solve<const D: usize>(
 ) -> Result<(Recovered<D>, Seen), Error> {
     let problem = Problem::new(released, lists, solver, options)?;
     let start = problem.solve(0..problem.n_slots());
-    problem.finish(problem.run_joint(start), want_features)
+    problem.finish(problem.run_joint(start, &[]), want_features)
 }

@@ -33,8 +33,6 @@ pub(super) struct Problem<'a, const D: usize> {
     delta: f64,
     records: Records<'a, D>,
     trials: TrialCounts,
-    /// Per slot, the position that is known, if any. Empty if none is.
-    known: Vec<Option<Estimate<D>>>,
 }
 
 enum Records<'a, const D: usize> {
@@ -86,21 +84,7 @@ impl<'a, const D: usize> Problem<'a, D> {
             | Builtin::Ransac => Self::listed(released, lists, solver, options, model)?,
         };
         let trials = TrialCounts::default();
-        let (options, known) = (*options, Vec::new());
-        Ok(Self { released, map, lists, solver, options, delta, records, trials, known })
-    }
-
-    /// Fixes the positions that are more likely right than wrong, by the confidence in `known`.
-    pub(super) fn with_known(self, known: &Recovered<D>) -> Self {
-        Self { known: (0..self.n_slots()).map(|slot| known.sure_estimate(slot)).collect(), ..self }
-    }
-
-    /// Puts the known positions back.
-    fn fixed(&self, mut estimates: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
-        for (estimate, known) in estimates.iter_mut().zip(&self.known) {
-            *estimate = known.unwrap_or(*estimate);
-        }
-        estimates
+        Ok(Self { released, map, lists, solver, options: *options, delta, records, trials })
     }
 
     fn listed(
@@ -166,27 +150,37 @@ impl<'a, const D: usize> Problem<'a, D> {
     }
 
     /// Returns the estimates of all slots after joint recovery from `start`, and after ranking if that is the solver; for other
-    /// solvers, `start`. Known positions stay as they are.
-    pub(super) fn run_joint(&self, start: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
+    /// solvers, `start`. Estimates that are `known`, per slot, stay as they are; the list is empty if none is known.
+    pub(super) fn run_joint(
+        &self,
+        start: Vec<Estimate<D>>,
+        known: &[Option<Estimate<D>>],
+    ) -> Vec<Estimate<D>> {
+        let fixed = |mut estimates: Vec<Estimate<D>>| {
+            for (estimate, known) in estimates.iter_mut().zip(known) {
+                *estimate = known.unwrap_or(*estimate);
+            }
+            estimates
+        };
         match &self.records {
             Records::Listed { family, graph: Some(graph), .. } if self.iterates() => {
                 let (delta, seed) = (self.delta as f32, self.options.seed);
-                let rounds = if self.known.is_empty() { 1 } else { ROUNDS };
-                let found = (0..rounds).fold(self.fixed(start), |found, _| {
-                    self.fixed(joint::recover(family, graph, delta, seed, found))
+                let rounds = if known.is_empty() { 1 } else { ROUNDS };
+                let found = (0..rounds).fold(fixed(start), |found, _| {
+                    fixed(joint::recover(family, graph, delta, seed, found))
                 });
                 match self.solver {
                     Builtin::Ranking => {
                         let found = match family {
                             // Known positions tell the layout better.
                             Family::Lines { rows, .. }
-                                if family.has_regions() && self.known.is_empty() =>
+                                if family.has_regions() && known.is_empty() =>
                             {
                                 layout::recover(rows, self.lists, found)
                             }
                             _ => found,
                         };
-                        self.fixed(ranking::recover(family, self.lists, delta, seed, found))
+                        fixed(ranking::recover(family, self.lists, delta, seed, found))
                     }
                     _ => found,
                 }
@@ -278,7 +272,7 @@ impl<'a, const D: usize> Problem<'a, D> {
         let mut settled = self.settle(estimates);
         if self.iterates() {
             for _ in 0..exact::joint_reruns(self.released) {
-                settled = self.settle(self.run_joint(settled));
+                settled = self.settle(self.run_joint(settled, &[]));
             }
         }
         settled

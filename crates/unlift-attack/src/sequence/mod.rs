@@ -217,7 +217,7 @@ pub fn recover(
 }
 
 /// Recovers the keypoints of a query also from its lists of neighbors. `known` has the positions that [`recover`] found; those that
-/// are more likely right than wrong stay as they are, up to exact constraints. The result has no confidence.
+/// are more likely right than wrong stay as they are until exact constraints apply. The result has no confidence.
 ///
 /// # Errors
 /// When the lists do not have one row per slot, or the arguments are of different queries.

@@ -122,7 +122,7 @@ fn protected_descriptors_and_bearings_are_audited() {
         .iter()
         .filter_map(|r| r["scheme"].as_str())
         .collect();
-    assert!(schemes.contains(&"olc_subspace:2:random"), "{schemes:?}");
+    assert!(schemes.contains(&"olc_subspace2.random"), "{schemes:?}");
     let (stdout, _) = place.ends(&format!("{audit} --schemes sphere --out s"), 0);
     assert!(stdout.contains("bearing"), "{stdout}");
     let stderr = place.complains(&format!("{audit} --protect-descriptors subspace:0"), 2);

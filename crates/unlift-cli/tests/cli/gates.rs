@@ -90,6 +90,8 @@ fn no_gate_holds_on_figures_that_are_doubtful() {
         assert!(text.lines().any(|line| line.starts_with("gate ") && line.contains("FAILED")));
         let document = place.json("a/audit.json");
         assert_eq!(document["gates"][0]["passed"], false);
-        assert!(document["notes"][0].as_str().is_some_and(|said| said.starts_with(note)));
+        let mut notes =
+            document["notes"].as_array().unwrap().iter().filter_map(|said| said.as_str());
+        assert!(notes.any(|said| said.starts_with(note)));
     }
 }
