@@ -137,10 +137,10 @@
     // Labels of thresholds alternate between two lines above the plot, so that near ones do not overlap.
     data.thresholds.filter(({ value }) => value > 0).forEach(({ label, value }, at) => {
       const upright = line(label, [[value, 0], [value, 100]], 4, { dash: "dotted", width: 1, mark: "none" });
-      series.push({ ...upright, silent: true, endLabel: { show: true, formatter: label, color: css("--soft"), fontSize: 11, align: "center", verticalAlign: "bottom", offset: [-5, at % 2 ? -4 : -18] } });
+      series.push({ ...upright, silent: true, endLabel: { show: true, formatter: label, color: css("--soft"), fontSize: 11, align: "center", verticalAlign: "bottom", offset: [-5, at % 2 ? -4 : -20] } });
     });
     draw(node, {
-      ...baseOption({ right: 26, top: 40 }),
+      ...baseOption({ right: 26, top: 44 }),
       tooltip: itemTooltip((item) => `${item.seriesName}: ${item.value[1].toFixed(1)} % within ${length(item.value[0], data.unit)}`),
       xAxis: axis({ type: "log", ...below("error", (v) => length(v, data.unit)), min: smallest > 0 && isFinite(smallest) ? 10 ** Math.floor(Math.log10(smallest)) : undefined }),
       yAxis: percentAxis({}),
