@@ -203,14 +203,6 @@ pub fn scale(text: &str) -> Result<f64, String> {
         .map_err(|_| format!("expected meters per unit of the map, a number above 0, found {text}"))
 }
 
-/// Parses a share below 1.
-pub fn share(text: &str) -> Result<f64, String> {
-    match text.trim().parse::<f64>() {
-        Ok(value) if (0.0..1.0).contains(&value) => Ok(value),
-        _ => Err(format!("expected a number from 0 to below 1, found {text}")),
-    }
-}
-
 pub fn ratio(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),

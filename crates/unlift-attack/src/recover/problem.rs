@@ -172,7 +172,7 @@ impl<'a, const D: usize> Problem<'a, D> {
                 match self.solver {
                     Builtin::Ranking => {
                         let found = match family {
-                            // Known positions tell the layout better.
+                            // With known positions, a layout of the whole image is not needed.
                             Family::Lines { rows, .. }
                                 if family.has_regions() && known.is_empty() =>
                             {

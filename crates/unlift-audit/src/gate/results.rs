@@ -185,3 +185,41 @@ fn of_localization(
         reason,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use unlift_report::document::HeldOut;
+
+    use super::*;
+
+    #[test]
+    fn few_held_out_images_fail_a_gate_but_never_pass_one() {
+        let gate = Gate::parse("olc:localization<=2").unwrap();
+        let passes = |multiple: Option<f64>, n_images: u64, bound: f64| {
+            let held_out = HeldOut {
+                n_images,
+                right_matches: 50.0,
+                matches: 60.0,
+                center_error: multiple,
+                rotation_error_degrees: multiple,
+                multiple,
+                recall_percent: Default::default(),
+            };
+            let one = Localization {
+                scheme: "olc".to_owned(),
+                of_queries: false,
+                multiple: Some(bound),
+                center_error: Some(bound),
+                rotation_error_degrees: Some(bound),
+                failed_percent: 0.0,
+                changes_descriptors: false,
+                held_out: Some(held_out),
+            };
+            of_localization(&gate, &[one], &[]).passed
+        };
+        assert!(passes(Some(1.0), 3, 1.5));
+        assert!(!passes(Some(3.0), 3, 1.5) && !passes(None, 3, 1.5));
+        assert!(!passes(Some(1.0), 3, 2.5), "the bound holds, whatever few images say");
+        assert!(passes(Some(1.0), 10, 2.5), "ten images count alone");
+    }
+}

@@ -436,6 +436,7 @@ pub fn summary(
         matches: middle(located, &|one| one.n_pairs as f64),
         center_error: finite(error),
         rotation_error_degrees: finite(middle(located, &angle)),
+        // If most unprotected images have no pose, the quotient is 0, which would look precise.
         multiple: finite(error / middle(unprotected, &center)).filter(|multiple| *multiple > 0.0),
         recall_percent: limits.iter().map(recall).collect(),
     }

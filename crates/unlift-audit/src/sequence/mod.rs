@@ -82,7 +82,7 @@ pub struct SequenceJob<'a> {
 const SOLVER: &str = "triangulation";
 /// Links that the attacker makes from descriptors.
 const SEQUENCE: &str = "sequence";
-/// The same links, combined with lists of neighbors within the query.
+/// Links that the attacker makes from descriptors, combined with lists of neighbors within each query.
 const WITH_LISTS: &str = "sequence+lists";
 /// Links that the model's tracks give: the oracle.
 const TRACKS: &str = "tracks";

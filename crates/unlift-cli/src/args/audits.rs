@@ -473,7 +473,7 @@ pub struct AuditSequenceArgs {
     /// Count this fraction of MODEL's points, at one end of its longest axis, as unknown to the
     /// service, as new things in the place are. The columns "new" are about keypoints that show no
     /// point of MODEL, or an unknown one
-    #[arg(long, value_name = "FRACTION", value_parser = values::share, default_value_t = 0.0,
+    #[arg(long, value_name = "FRACTION", value_parser = values::ratio, default_value_t = 0.0,
           help_heading = "Input")]
     pub held_out_share: f64,
     /// Meters per unit of MODEL, for --poses

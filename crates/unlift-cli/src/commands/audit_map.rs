@@ -7,7 +7,7 @@ use std::time::Instant;
 use indexmap::IndexMap;
 use serde_json::{Map, Value, json};
 use unlift::audit::{Measure, Plan};
-use unlift::obfuscate::{Mitigated, Mitigation, Protection, Scheme, SchemeOptions};
+use unlift::obfuscate::{Mitigation, Protection, Scheme, SchemeOptions};
 use unlift_audit::inversion::MapInversion;
 use unlift_audit::localization::Localize;
 use unlift_audit::maps::{Tiles, perform};
@@ -23,7 +23,7 @@ use super::common::{open_map, this_program, with_threads};
 use super::gate_files::GateFiles;
 use super::painter::{kind, painter};
 use super::plan::{attack, neighbors, solvers, summary, thresholds, with_attack};
-use super::protection::{protected, protections};
+use super::protection::{self, protected, protections};
 use crate::args::AuditMapArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
@@ -218,7 +218,6 @@ fn mitigated(
     prepared: &Prepared,
 ) -> anyhow::Result<Vec<Arc<dyn Scheme<3>>>> {
     let tracks = Some(&prepared.cameras.tracks).filter(|tracks| !tracks.is_empty());
-    let mut all: Vec<Arc<dyn Scheme<3>>> = Vec::new();
     for mitigation in &args.mitigate {
         let name = mitigation.name();
         if mitigation.needs_tracks() && (tracks.is_none() || args.tile_points.is_some()) {
@@ -229,12 +228,8 @@ fn mitigated(
             let expected = "expected descriptors (--descriptors FILE)";
             return Err(usage(format!("--mitigate {name}: {expected}, found none")));
         }
-        all.extend(schemes.iter().map(|scheme| {
-            let (scheme, tracks) = (Arc::clone(scheme), tracks.cloned());
-            Arc::new(Mitigated::new(scheme, mitigation.clone(), tracks)) as Arc<dyn Scheme<3>>
-        }));
     }
-    Ok(all)
+    Ok(protection::mitigated(&args.mitigate, schemes, tracks))
 }
 
 /// Returns the files that are read beside the map, by their role.

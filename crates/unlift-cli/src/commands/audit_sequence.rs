@@ -1,14 +1,13 @@
 //! `unlift audit sequence`: audits several queries with known poses.
 
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Instant;
 
 use serde_json::{Map, json};
 use unlift::Unit;
 use unlift::audit::{Plan, Threshold};
 use unlift::neighbors::sources::Named;
-use unlift::obfuscate::{Mitigated, Mitigation, Scheme, SchemeOptions};
+use unlift::obfuscate::{Mitigation, SchemeOptions};
 use unlift_audit::images::{FeatureSource, choice};
 use unlift_audit::inversion::Inversion;
 use unlift_audit::sequence::{PoseError, SequenceJob, perform};
@@ -20,6 +19,7 @@ use super::common::with_threads;
 use super::gate_files::GateFiles;
 use super::painter::{kind, painter};
 use super::plan::{summary, thresholds};
+use super::protection::mitigated;
 use crate::args::AuditSequenceArgs;
 use crate::exit::{Outcome, usage};
 use crate::output::{command_line, print};
@@ -117,11 +117,7 @@ fn plan(args: &AuditSequenceArgs) -> anyhow::Result<Plan<2>> {
         }
     };
     let mitigations = distinct(args.mitigate.clone(), |a, b| a.name() == b.name());
-    let mitigated = mitigations.iter().flat_map(|mitigation| {
-        let of = |scheme| Arc::new(Mitigated::new(scheme, mitigation.clone(), None)) as Arc<_>;
-        schemes.iter().cloned().map(of)
-    });
-    schemes.extend(mitigated.collect::<Vec<Arc<dyn Scheme<2>>>>());
+    schemes.extend(mitigated(&mitigations, &schemes, None));
     let of = |label: &str, value: f64| Threshold { label: label.to_owned(), value };
     let few = Plan { thresholds: vec![of("5", 5.0), of("10", 10.0), of("25", 25.0)], ..usual };
     let thresholds = thresholds(&args.thresholds, &few)?;

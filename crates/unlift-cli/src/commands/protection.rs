@@ -1,4 +1,4 @@
-//! Protected descriptors of an audit, and the public descriptors that they use.
+//! Mitigations and protected descriptors of an audit, and the public descriptors that these use.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 use tempfile::tempdir;
 use unlift::Descriptors;
 use unlift::descriptors::Values;
-use unlift::obfuscate::{Protected, Protection, Scheme};
+use unlift::obfuscate::{Mitigated, Mitigation, Protected, Protection, Scheme};
 use unlift_audit::images::FeatureSource;
 use unlift_audit::images::extraction::Wanted;
 use unlift_features::Extraction;
@@ -41,6 +41,19 @@ pub fn protections(
         false => Ok(one),
     };
     Ok(asked.into_iter().map(with).collect::<Result<_, _>>()?)
+}
+
+/// Returns `schemes` under every mitigation. `tracks` is the number of images that observe each point, if known.
+pub fn mitigated<const D: usize>(
+    mitigations: &[Mitigation],
+    schemes: &[Arc<dyn Scheme<D>>],
+    tracks: Option<&Arc<[u32]>>,
+) -> Vec<Arc<dyn Scheme<D>>> {
+    let with = |one: &Mitigation, scheme: &Arc<dyn Scheme<D>>| {
+        let mitigated = Mitigated::new(Arc::clone(scheme), one.clone(), tracks.cloned());
+        Arc::new(mitigated) as Arc<dyn Scheme<D>>
+    };
+    mitigations.iter().flat_map(|one| schemes.iter().map(move |scheme| with(one, scheme))).collect()
 }
 
 /// Returns `schemes` under every protection.

@@ -86,6 +86,11 @@ fn changed_descriptors_have_no_known_cost_without_held_out_images() {
     assert!(page(&document).contains("300 of 400"));
     let same = Document::from_json(&document.to_json().unwrap()).unwrap();
     assert_eq!(same.localization, document.localization);
+    let one = &mut document.localization[1];
+    one.held_out.as_mut().unwrap().n_images = 9;
+    assert!(one.is_unknown() && one.cost().is_none(), "nine held-out images are too few");
+    one.changes_descriptors = false;
+    assert_eq!(one.cost(), one.multiple, "the bound counts instead");
 }
 
 #[test]
