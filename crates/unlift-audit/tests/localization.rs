@@ -9,7 +9,7 @@ use unlift::Descriptors;
 use unlift::Unit;
 use unlift::audit::Plan;
 use unlift::descriptors::Values;
-use unlift::obfuscate::{Mitigated, Mitigation, Scheme, SchemeOptions, scheme};
+use unlift::obfuscate::{Change, Changed, Mitigation, Scheme, SchemeOptions, scheme};
 use unlift::recover::Builtin;
 use unlift::seed::{Draws, Stage};
 use unlift_audit::localization::Localize;
@@ -109,7 +109,8 @@ fn audit(folder: &Path, mitigate: &[&str], gates: &[&str], held_out: bool) -> Au
     schemes.extend(mitigate.iter().map(|text| {
         let mitigation = Mitigation::parse(text).unwrap();
         let tracks = Some(Arc::clone(&prepared.cameras.tracks));
-        Arc::new(Mitigated::new(named(&"olc"), mitigation, tracks)) as Arc<dyn Scheme<3>>
+        Arc::new(Changed::new(named(&"olc"), Change::Mitigation(mitigation, tracks)))
+            as Arc<dyn Scheme<3>>
     }));
     let plan = Plan {
         schemes,

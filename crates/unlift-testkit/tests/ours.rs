@@ -6,7 +6,7 @@ use unlift::neighbors::oracle::{TrueNeighbors, search};
 use unlift::neighbors::sources::SOURCES;
 use unlift::neighbors::{Needs, Neighborhoods, Source};
 use unlift::obfuscate::olc::Olc;
-use unlift::obfuscate::{Lifted, Protected, Protection, Scheme, SchemeOptions, all};
+use unlift::obfuscate::{Change, Changed, Lifted, Protection, Scheme, SchemeOptions, all};
 use unlift::recover::{Builtin, RecoverOptions, Recovered, Solver};
 use unlift::released::{Lines, Obfuscation, Released};
 use unlift::seed::{Draws, Key, Stage};
@@ -34,12 +34,12 @@ fn our_sources() {
     }
 }
 
-fn protected(text: &str) -> Protected<3> {
+fn protected(text: &str) -> Changed<3> {
     let mut draws = Draws::new(1, Stage::Shapes, 0);
     let bytes = (0..200 * 128).map(|_| draws.below(120) as u8).collect();
     let public = Descriptors::try_new(Values::U8(bytes), 128).unwrap();
     let protection = Protection::parse(text).unwrap().with_public(&public).unwrap();
-    Protected::new(std::sync::Arc::new(Olc), protection)
+    Changed::new(std::sync::Arc::new(Olc), Change::Protection(protection))
 }
 
 #[test]

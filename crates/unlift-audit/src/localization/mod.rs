@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use unlift::audit::Plan;
 use unlift::localization::{Localization, PoseError, View, unprotected, with_map, with_queries};
-use unlift::obfuscate::{Protected, Protection, SCHEMES, Scheme, SchemeOptions, obfuscate};
+use unlift::obfuscate::{Change, Changed, Protection, SCHEMES, Scheme, SchemeOptions, obfuscate};
 use unlift::seed::Key;
 use unlift::truth::Original;
 use unlift_io::read::colmap;
@@ -34,12 +34,11 @@ impl Localize<'_> {
     /// Returns all schemes on keypoints, and each under every protection.
     fn query_schemes(&self) -> Vec<Arc<dyn Scheme<2>>> {
         let options = SchemeOptions::usual(unlift::Unit::Pixel);
-        let plain = || SCHEMES.iter().filter_map(|entry| entry.of_dimension::<2>(&options));
-        let under = |one: &Protection| {
-            let with = |scheme| Arc::new(Protected::new(scheme, one.clone())) as Arc<dyn Scheme<2>>;
-            plain().map(with).collect::<Vec<_>>()
-        };
-        plain().chain(self.protections.iter().flat_map(under)).collect()
+        let mut schemes: Vec<_> =
+            SCHEMES.iter().filter_map(|entry| entry.of_dimension(&options)).collect();
+        let changes = self.protections.iter().cloned().map(Change::Protection);
+        schemes.extend(Changed::all(&schemes, &changes.collect::<Vec<_>>()));
+        schemes
     }
 }
 

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use serde_json::{Map, json};
 use unlift::audit::{Measure, NeighborsBy, Plan};
-use unlift::obfuscate::SchemeOptions;
+use unlift::obfuscate::{Change, Changed, SchemeOptions};
 use unlift::{Descriptors, Unit};
 use unlift_audit::images::FeatureSource;
 use unlift_audit::images::audit::{ImagesJob, Used, perform};
@@ -23,7 +23,7 @@ use super::common::{all_could_be, with_threads};
 use super::gate_files::GateFiles;
 use super::painter::{kind, painter};
 use super::plan::{attack, check_about, check_fit, own, solvers, summary, thresholds, with_attack};
-use super::protection::{protected, protections};
+use super::protection::protections;
 use crate::args::AuditImagesArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
@@ -88,8 +88,8 @@ pub fn audit(args: &AuditImagesArgs) -> anyhow::Result<(Option<Finished>, Used)>
             _ => kind("--protect-descriptors", first.as_ref()),
         };
         let protections = protections(&args.protect, own)?;
-        let protected = protected(&protections, &plan.schemes);
-        plan.schemes.extend(protected);
+        let changes: Vec<Change> = protections.into_iter().map(Change::Protection).collect();
+        plan.schemes.extend(Changed::all(&plan.schemes, &changes));
         plan.measures.extend(inversion.iter().map(|one| Arc::clone(one) as Arc<dyn Measure<2>>));
         let progress = Progress::new(args.run.quiet);
         let show = match args.show.as_slice() {

@@ -7,7 +7,7 @@ use std::time::Instant;
 use indexmap::IndexMap;
 use serde_json::{Map, Value, json};
 use unlift::audit::{Measure, Plan};
-use unlift::obfuscate::{Mitigation, Protection, Scheme, SchemeOptions};
+use unlift::obfuscate::{Change, Changed, Mitigation, Protection, Scheme, SchemeOptions};
 use unlift_audit::inversion::MapInversion;
 use unlift_audit::localization::Localize;
 use unlift_audit::maps::{Tiles, perform};
@@ -23,7 +23,7 @@ use super::common::{open_map, this_program, with_threads};
 use super::gate_files::GateFiles;
 use super::painter::{kind, painter};
 use super::plan::{attack, neighbors, solvers, summary, thresholds, with_attack};
-use super::protection::{self, protected, protections};
+use super::protection::protections;
 use crate::args::AuditMapArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
@@ -178,9 +178,9 @@ fn plan(
     let options = SchemeOptions::usual(unit);
     let mut schemes: Vec<Arc<dyn Scheme<3>>> =
         entries.iter().filter_map(|entry| entry.of_dimension(&options)).collect();
-    let mitigated = mitigated(args, &schemes, prepared)?;
-    schemes
-        .extend(mitigated.into_iter().chain(protected(protections, &schemes)).collect::<Vec<_>>());
+    let mut changes = mitigations(args, prepared)?;
+    changes.extend(protections.iter().cloned().map(Change::Protection));
+    schemes.extend(Changed::all(&schemes, &changes));
     let thresholds = thresholds(&args.thresholds, &usual)?;
     let points = prepared.original.reveal();
     let typed = !args.thresholds.is_empty();
@@ -211,12 +211,8 @@ fn plan(
     })
 }
 
-/// Returns `schemes` under every mitigation of the command line.
-fn mitigated(
-    args: &AuditMapArgs,
-    schemes: &[Arc<dyn Scheme<3>>],
-    prepared: &Prepared,
-) -> anyhow::Result<Vec<Arc<dyn Scheme<3>>>> {
+/// Returns the mitigations of the command line.
+fn mitigations(args: &AuditMapArgs, prepared: &Prepared) -> anyhow::Result<Vec<Change>> {
     let tracks = Some(&prepared.cameras.tracks).filter(|tracks| !tracks.is_empty());
     for mitigation in &args.mitigate {
         let name = mitigation.name();
@@ -229,7 +225,8 @@ fn mitigated(
             return Err(usage(format!("--mitigate {name}: {expected}, found none")));
         }
     }
-    Ok(protection::mitigated(&args.mitigate, schemes, tracks))
+    let with = |one: &Mitigation| Change::Mitigation(one.clone(), tracks.cloned());
+    Ok(args.mitigate.iter().map(with).collect())
 }
 
 /// Returns the files that are read beside the map, by their role.

@@ -7,7 +7,7 @@ use serde_json::{Map, json};
 use unlift::Unit;
 use unlift::audit::{Plan, Threshold};
 use unlift::neighbors::sources::Named;
-use unlift::obfuscate::{Mitigation, SchemeOptions};
+use unlift::obfuscate::{Change, Changed, Mitigation, SchemeOptions};
 use unlift_audit::images::{FeatureSource, choice};
 use unlift_audit::inversion::Inversion;
 use unlift_audit::sequence::{PoseError, SequenceJob, perform};
@@ -19,7 +19,6 @@ use super::common::with_threads;
 use super::gate_files::GateFiles;
 use super::painter::{kind, painter};
 use super::plan::{summary, thresholds};
-use super::protection::mitigated;
 use crate::args::AuditSequenceArgs;
 use crate::exit::{Outcome, usage};
 use crate::output::{command_line, print};
@@ -117,7 +116,9 @@ fn plan(args: &AuditSequenceArgs) -> anyhow::Result<Plan<2>> {
         }
     };
     let mitigations = distinct(args.mitigate.clone(), |a, b| a.name() == b.name());
-    schemes.extend(mitigated(&mitigations, &schemes, None));
+    let changes: Vec<Change> =
+        mitigations.into_iter().map(|one| Change::Mitigation(one, None)).collect();
+    schemes.extend(Changed::all(&schemes, &changes));
     let of = |label: &str, value: f64| Threshold { label: label.to_owned(), value };
     let few = Plan { thresholds: vec![of("5", 5.0), of("10", 10.0), of("25", 25.0)], ..usual };
     let thresholds = thresholds(&args.thresholds, &few)?;

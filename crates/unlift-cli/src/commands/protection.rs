@@ -1,12 +1,11 @@
-//! Mitigations and protected descriptors of an audit, and the public descriptors that these use.
+//! Protected descriptors of an audit, and the public descriptors that they use.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use tempfile::tempdir;
 use unlift::Descriptors;
 use unlift::descriptors::Values;
-use unlift::obfuscate::{Mitigated, Mitigation, Protected, Protection, Scheme};
+use unlift::obfuscate::Protection;
 use unlift_audit::images::FeatureSource;
 use unlift_audit::images::extraction::Wanted;
 use unlift_features::Extraction;
@@ -41,30 +40,6 @@ pub fn protections(
         false => Ok(one),
     };
     Ok(asked.into_iter().map(with).collect::<Result<_, _>>()?)
-}
-
-/// Returns `schemes` under every mitigation. `tracks` is the number of images that observe each point, if known.
-pub fn mitigated<const D: usize>(
-    mitigations: &[Mitigation],
-    schemes: &[Arc<dyn Scheme<D>>],
-    tracks: Option<&Arc<[u32]>>,
-) -> Vec<Arc<dyn Scheme<D>>> {
-    let with = |one: &Mitigation, scheme: &Arc<dyn Scheme<D>>| {
-        let mitigated = Mitigated::new(Arc::clone(scheme), one.clone(), tracks.cloned());
-        Arc::new(mitigated) as Arc<dyn Scheme<D>>
-    };
-    mitigations.iter().flat_map(|one| schemes.iter().map(move |scheme| with(one, scheme))).collect()
-}
-
-/// Returns `schemes` under every protection.
-pub fn protected<const D: usize>(
-    protections: &[Protection],
-    schemes: &[Arc<dyn Scheme<D>>],
-) -> Vec<Arc<dyn Scheme<D>>> {
-    let with = |one: &Protection, scheme: &Arc<dyn Scheme<D>>| {
-        Arc::new(Protected::new(Arc::clone(scheme), one.clone())) as Arc<dyn Scheme<D>>
-    };
-    protections.iter().flat_map(|one| schemes.iter().map(move |scheme| with(one, scheme))).collect()
 }
 
 /// Reads all descriptors of photos or of a file of features.

@@ -1,18 +1,13 @@
 //! Mitigations: simple changes to a map before a scheme hides it.
 //!
-//! A mitigation with a scheme is itself a scheme ([`Mitigated`]), so audits, gates and reports
-//! need nothing more. Its name is the scheme's, followed by its steps: `ppl_thin4_bits2`.
-
-use std::sync::Arc;
+//! A mitigation with a scheme is itself a scheme ([`Changed`](super::Changed)). Its name is the
+//! scheme's, followed by its steps: `ppl_thin4_bits2`.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
-use super::scheme::{Lifted, Scheme};
 use crate::descriptors::Values;
-use crate::geometry::frame::Bounds;
 use crate::seed::{Key, Stage};
-use crate::truth::{DropReason, Dropped};
-use crate::{Descriptors, Error, OriginalId};
+use crate::{Descriptors, Error};
 
 /// One change to a map.
 #[derive(Clone, Debug, PartialEq)]
@@ -79,7 +74,12 @@ impl Mitigation {
 
     /// Returns the rows that stay, ascending. `tracks` is the number of images that observe each
     /// point.
-    fn kept(&self, n: usize, tracks: Option<&[u32]>, key: &Key) -> Result<Vec<u32>, Error> {
+    pub(super) fn kept(
+        &self,
+        n: usize,
+        tracks: Option<&[u32]>,
+        key: &Key,
+    ) -> Result<Vec<u32>, Error> {
         let mut rows: Vec<u32> = (0..n as u32).collect();
         for (at, step) in self.steps.iter().enumerate() {
             let Step::Thin { keep, by_tracks } = step else { continue };
@@ -99,7 +99,11 @@ impl Mitigation {
     }
 
     /// Returns the changed descriptors. Bytes stay bytes; floats get their original length back.
-    fn descriptors(&self, descriptors: &Descriptors, key: &Key) -> Result<Descriptors, Error> {
+    pub(super) fn descriptors(
+        &self,
+        descriptors: &Descriptors,
+        key: &Key,
+    ) -> Result<Descriptors, Error> {
         let (n, dim) = (descriptors.len(), descriptors.dim());
         let mut lengths = vec![0.0; n];
         let mut values = vec![0.0_f64; n * dim];
@@ -238,80 +242,17 @@ fn project(values: &mut [f64], dim: usize, most: usize) -> Result<(), Error> {
     Ok(())
 }
 
-/// A scheme that hides a mitigated map.
-#[derive(Clone, Debug)]
-pub struct Mitigated<const D: usize> {
-    scheme: Arc<dyn Scheme<D>>,
-    mitigation: Mitigation,
-    tracks: Option<Arc<[u32]>>,
-    name: String,
-}
-
-impl<const D: usize> Mitigated<D> {
-    /// Creates the scheme. `tracks` is the number of images that observe each point, if known.
-    pub fn new(
-        scheme: Arc<dyn Scheme<D>>,
-        mitigation: Mitigation,
-        tracks: Option<Arc<[u32]>>,
-    ) -> Self {
-        let name = format!("{}_{}", scheme.name(), mitigation.name());
-        Self { scheme, mitigation, tracks, name }
-    }
-}
-
-impl<const D: usize> Scheme<D> for Mitigated<D> {
-    fn name(&self) -> &str {
-        &self.name
-    }
-
-    fn parameters(&self) -> Vec<(&'static str, f64)> {
-        self.scheme.parameters()
-    }
-
-    fn lift(
-        &self,
-        points: &[[f64; D]],
-        bounds: Option<&Bounds<D>>,
-        key: &Key,
-    ) -> Result<Lifted<D>, Error> {
-        let kept = self.mitigation.kept(points.len(), self.tracks.as_deref(), key)?;
-        let thinned: Vec<[f64; D]> = kept.iter().map(|&row| points[row as usize]).collect();
-        let mut lifted = self.scheme.lift(&thinned, bounds, key)?;
-        let original = |id: OriginalId| OriginalId(kept[id.index()]);
-        lifted.hidden.iter_mut().for_each(|id| *id = original(*id));
-        lifted.dropped.iter_mut().for_each(|one| one.original = original(one.original));
-        let mut is_kept = vec![false; points.len()];
-        kept.iter().for_each(|&row| is_kept[row as usize] = true);
-        let out = (0..points.len()).filter(|&row| !is_kept[row]).map(OriginalId::from_index);
-        let out = out.map(|original| Dropped { original, reason: DropReason::Thinned });
-        lifted.dropped.extend(out);
-        Ok(lifted)
-    }
-
-    fn descriptors(
-        &self,
-        descriptors: &Descriptors,
-        key: &Key,
-    ) -> Result<Option<Descriptors>, Error> {
-        let changes = self.mitigation.changes_descriptors();
-        changes.then(|| self.mitigation.descriptors(descriptors, key)).transpose()
-    }
-
-    fn changes_descriptors(&self) -> bool {
-        self.mitigation.changes_descriptors()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::obfuscate::{obfuscate, olc::Olc};
-    use crate::truth::Original;
+    use crate::obfuscate::{Change, Changed, Scheme, obfuscate, olc::Olc};
+    use crate::truth::{DropReason, Original};
     use crate::{PointSet, Unit, synthetic};
 
-    fn mitigated(text: &str, tracks: Option<Vec<u32>>) -> Mitigated<3> {
+    fn mitigated(text: &str, tracks: Option<Vec<u32>>) -> Changed<3> {
         let mitigation = Mitigation::parse(text).unwrap();
-        Mitigated::new(Arc::new(Olc), mitigation, tracks.map(Into::into))
+        let change = Change::Mitigation(mitigation, tracks.map(Into::into));
+        Changed::new(std::sync::Arc::new(Olc), change)
     }
 
     fn random_descriptors(n: usize, dim: usize) -> Descriptors {

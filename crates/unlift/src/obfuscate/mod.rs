@@ -3,12 +3,12 @@
 //! A scheme, built-in or custom, implements only its rule ([`Scheme::lift`]). This module does the
 //! rest for all: origin, normal form, order of records, slots and descriptors.
 
+mod changed;
 mod hide;
 mod kmeans;
 mod mitigate;
 mod pairs;
 mod protect;
-mod protected;
 mod scheme;
 mod size;
 
@@ -24,10 +24,10 @@ pub mod ray;
 pub mod ray_voxel;
 pub mod sphere;
 
+pub use changed::{Change, Changed};
 pub use hide::obfuscate;
-pub use mitigate::{Mitigated, Mitigation};
+pub use mitigate::Mitigation;
 pub use protect::Protection;
-pub use protected::Protected;
 pub use scheme::{Build, Entry, Facts, Lifted, Scheme, SchemeOptions};
 
 use crate::Error;

@@ -1,7 +1,7 @@
 //! Protection of descriptors: what a map releases in place of plain descriptors.
 //!
-//! A protection with a scheme is itself a scheme ([`Protected`](super::Protected)), as with
-//! mitigations. Its name is the scheme's, followed by the rule: `ppl_subspace2`, `ppl_ldp256.2.8`.
+//! A protection with a scheme is itself a scheme ([`Changed`](super::Changed)). Its name is the
+//! scheme's, followed by the rule: `ppl_subspace2`, `ppl_ldp256.2.8`.
 
 use std::sync::Arc;
 
@@ -289,7 +289,7 @@ mod tests {
     use nalgebra::{DMatrix, DVector};
 
     use super::*;
-    use crate::obfuscate::{Protected, Scheme, obfuscate, olc::Olc, ppl::Ppl};
+    use crate::obfuscate::{Change, Changed, Scheme, obfuscate, olc::Olc, ppl::Ppl};
     use crate::truth::Original;
     use crate::{PointSet, Unit, synthetic};
 
@@ -454,7 +454,7 @@ mod tests {
             schemes.iter().flat_map(|one| ["subspace:2", "ldp:16,2,4"].map(|text| (one, text)))
         {
             let protection = Protection::parse(text).unwrap().with_public(&public).unwrap();
-            let scheme = Protected::new(Arc::clone(scheme), protection);
+            let scheme = Changed::new(Arc::clone(scheme), Change::Protection(protection));
             let hide = |seed| obfuscate(&scheme, &original, Some(&plain), &Key::from_seed(seed));
             let (released, secret) = hide(0).unwrap();
             let by_row = secret.by_descriptor_row();

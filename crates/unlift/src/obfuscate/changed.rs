@@ -1,0 +1,110 @@
+//! A scheme with a mitigation or a protection of descriptors.
+
+use std::sync::Arc;
+
+use super::mitigate::Mitigation;
+use super::protect::Protection;
+use super::scheme::{Lifted, Scheme};
+use crate::geometry::frame::Bounds;
+use crate::seed::Key;
+use crate::truth::{DropReason, Dropped};
+use crate::{Descriptors, Error, OriginalId};
+
+/// A change of what a scheme releases.
+#[derive(Clone, Debug)]
+pub enum Change {
+    /// Changes of the map before the scheme hides it, and the number of images that observe each
+    /// point, if known.
+    Mitigation(Mitigation, Option<Arc<[u32]>>),
+    /// Protected descriptors in place of plain ones.
+    Protection(Protection),
+}
+
+/// A scheme with a change. It is itself a scheme, so audits, gates and reports need nothing more.
+#[derive(Clone, Debug)]
+pub struct Changed<const D: usize> {
+    scheme: Arc<dyn Scheme<D>>,
+    change: Change,
+    name: String,
+}
+
+impl<const D: usize> Changed<D> {
+    /// Creates the scheme. Its name is the scheme's, followed by that of the change.
+    pub fn new(scheme: Arc<dyn Scheme<D>>, change: Change) -> Self {
+        let of_change = match &change {
+            Change::Mitigation(mitigation, _) => mitigation.name(),
+            Change::Protection(protection) => protection.name(),
+        };
+        Self { name: format!("{}_{of_change}", scheme.name()), scheme, change }
+    }
+
+    /// Returns every scheme under every change.
+    pub fn all(schemes: &[Arc<dyn Scheme<D>>], changes: &[Change]) -> Vec<Arc<dyn Scheme<D>>> {
+        let with = |change: &Change| {
+            let of = |scheme: &Arc<_>| Self::new(Arc::clone(scheme), change.clone());
+            schemes.iter().map(|scheme| Arc::new(of(scheme)) as Arc<_>).collect::<Vec<_>>()
+        };
+        changes.iter().flat_map(with).collect()
+    }
+}
+
+impl<const D: usize> Scheme<D> for Changed<D> {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn parameters(&self) -> Vec<(&'static str, f64)> {
+        self.scheme.parameters()
+    }
+
+    fn lift(
+        &self,
+        points: &[[f64; D]],
+        bounds: Option<&Bounds<D>>,
+        key: &Key,
+    ) -> Result<Lifted<D>, Error> {
+        let Change::Mitigation(mitigation, tracks) = &self.change else {
+            return self.scheme.lift(points, bounds, key);
+        };
+        let kept = mitigation.kept(points.len(), tracks.as_deref(), key)?;
+        let thinned: Vec<[f64; D]> = kept.iter().map(|&row| points[row as usize]).collect();
+        let mut lifted = self.scheme.lift(&thinned, bounds, key)?;
+        let original = |id: OriginalId| OriginalId(kept[id.index()]);
+        lifted.hidden.iter_mut().for_each(|id| *id = original(*id));
+        lifted.dropped.iter_mut().for_each(|one| one.original = original(one.original));
+        let mut is_kept = vec![false; points.len()];
+        kept.iter().for_each(|&row| is_kept[row as usize] = true);
+        let out = (0..points.len()).filter(|&row| !is_kept[row]).map(OriginalId::from_index);
+        let out = out.map(|original| Dropped { original, reason: DropReason::Thinned });
+        lifted.dropped.extend(out);
+        Ok(lifted)
+    }
+
+    fn descriptors(
+        &self,
+        descriptors: &Descriptors,
+        key: &Key,
+    ) -> Result<Option<Descriptors>, Error> {
+        match &self.change {
+            Change::Mitigation(mitigation, _) if mitigation.changes_descriptors() => {
+                mitigation.descriptors(descriptors, key).map(Some)
+            }
+            Change::Mitigation(..) => Ok(None),
+            Change::Protection(_) => self.scheme.descriptors(descriptors, key),
+        }
+    }
+
+    fn changes_descriptors(&self) -> bool {
+        match &self.change {
+            Change::Mitigation(mitigation, _) => mitigation.changes_descriptors(),
+            Change::Protection(_) => true,
+        }
+    }
+
+    fn protection(&self) -> Option<&Protection> {
+        match &self.change {
+            Change::Mitigation(..) => None,
+            Change::Protection(protection) => Some(protection),
+        }
+    }
+}
