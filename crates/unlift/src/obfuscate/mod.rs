@@ -47,8 +47,8 @@ pub const SCHEMES: &[Entry] = &[
     dcl2d::ENTRY,
 ];
 
-/// Built-in schemes that are audited only on request: their records meet in one point, so lists of
-/// neighbors say little about them, or they vary a scheme of [`SCHEMES`].
+/// Built-in schemes that are audited only on request: their records meet in one point, so crossings
+/// give no position, or they vary a scheme of [`SCHEMES`].
 pub const ON_REQUEST: &[Entry] = &[
     sphere::ENTRY,
     sphere::HALF,
