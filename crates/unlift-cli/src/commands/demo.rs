@@ -128,7 +128,7 @@ fn map(progress: &Part<'_>, out: &Path, room: &unlift_demo::Mapped) -> anyhow::R
             ..Plan::new(Unit::Meter).for_map(original.len(), 50)
         },
         input: Input {
-            path: Some("the map of a made-up room".to_owned()),
+            path: Some("The map of a made-up room".to_owned()),
             sha256: Some(sha256),
             n_points: original.len() as u64,
             scale_m_per_unit: Some(1.0),
