@@ -4,7 +4,9 @@ Used by make_benchmarks.py; standard library only. Alone, it prints the tables:
 
     python3 docs/protect_tables.py target/release/unlift ../shared
 """
-import json, os, pathlib, subprocess, sys, tempfile
+import json, os, pathlib, struct, subprocess, sys, tempfile
+
+import again_tables
 
 PROTECTIONS = ["subspace:2", "subspace:4", "ldp:256,2,8"]
 MITIGATIONS = ["noise:0.1", "bits:1"]
@@ -140,6 +142,22 @@ def spheres(documents):
     yield ""
 
 
+def two_spheres(program, data):
+    """RedKitchen and its lower 80 % along x, which have centers 0.4 m apart."""
+    scene = data / "redkitchen"
+    dim, kind, rows = again_tables.described(scene / "descriptors.bin")
+    points = again_tables.points(scene / "model")
+    bound = sorted(place[0] for _, place in points)[len(points) * 4 // 5]
+    kept = [(id_, place) for id_, place in points if place[0] < bound]
+    with tempfile.TemporaryDirectory() as folder:
+        part, descriptors = pathlib.Path(folder, "part.csv"), pathlib.Path(folder, "part.bin")
+        part.write_text("x,y,z\n" + "".join(",".join(map(repr, place)) + "\n" for _, place in kept))
+        descriptors.write_bytes(b"P3DESC01" + struct.pack("<QII", len(kept), dim, kind) + struct.pack(f"<{len(kept)}Q", *range(len(kept)))
+                                + b"".join(rows[id_] for id_, _ in kept))
+        return again_tables.audit(program, scene / "model", part, [scene / "descriptors.bin", descriptors], "--scale", "1",
+                                  "--schemes", "sphere,sphere-half,sphere-quarter")
+
+
 def tables(program, shared):
     data = pathlib.Path(shared).resolve() / "data"
     keep = os.environ.get("KEEP")
@@ -168,7 +186,9 @@ def tables(program, shared):
     found = {name: kept(f"sphere-{scene}", lambda: sphere_audit(program, data, scene, source))
              for name, scene, source in [("RedKitchen, SIFT", "redkitchen", "overlap"),
                                          ("RedKitchen, ALIKED", "redkitchen-aliked", "similarity"), ("Castle, SIFT", "castle", "overlap")]}
-    return lines + ["Sphere clouds:", "", *spheres(found)]
+    twice = kept("sphere-twice", lambda: two_spheres(program, data))
+    return lines + ["Sphere clouds:", "", *spheres(found), "Two sphere clouds of RedKitchen, SIFT, of all points and of the lower 80 % along x:", "",
+                    *again_tables.table(twice), ""]
 
 
 if __name__ == "__main__":
