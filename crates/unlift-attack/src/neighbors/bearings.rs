@@ -5,6 +5,8 @@ use crate::released::{Obfuscation, Released};
 
 /// Bearings within this angle support each other: the noise of decoys is three times as large.
 const NEARBY: f64 = 0.1;
+/// Support from which on a record counts as real, as a multiple of that by chance.
+pub const REAL: f64 = 1.5;
 /// Rounds in which records with more support count more.
 const ROUNDS: usize = 4;
 

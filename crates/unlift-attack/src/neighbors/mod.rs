@@ -23,7 +23,7 @@ pub mod sources;
 mod tiles;
 mod walk;
 
-pub use bearings::support;
+pub use bearings::{REAL, support};
 pub(crate) use compare::MOST_ROWS;
 pub use dense::{Dense, dense, usual};
 pub(crate) use geometric::geometric_by;

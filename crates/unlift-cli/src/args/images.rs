@@ -92,7 +92,8 @@ pub struct InvertArgs {
     /// unlift models) [default: sift]
     #[arg(long, value_name = "TYPE", value_parser = values::feature_type)]
     pub features: Option<DescriptorKind>,
-    /// Output file of unlift recover for PATH; required if PATH is a released.parquet
+    /// Output file of unlift recover for PATH; required if PATH is a released.parquet. Without it,
+    /// unlift paints six views from the center of a sphere cloud
     #[arg(long, value_name = "FILE")]
     pub recovered: Option<PathBuf>,
     /// COLMAP model with the cameras from which to paint the map; only if PATH is a released map

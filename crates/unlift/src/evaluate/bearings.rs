@@ -1,12 +1,9 @@
 //! How many decoys among bearings an attacker tells from real ones.
 
 use super::{away_from_own, farthest_for_rounding};
-use crate::neighbors::{Neighborhoods, support};
+use crate::neighbors::{Neighborhoods, REAL, support};
 use crate::released::Released;
 use crate::truth::{Original, Secret};
-
-/// Support at which a record counts as real, as a multiple of that by chance.
-const REAL: f64 = 1.5;
 
 /// Returns figures on bearings from one center, by name; empty for other records.
 ///
