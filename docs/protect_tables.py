@@ -158,6 +158,20 @@ def two_spheres(program, data):
                                   "--schemes", "sphere,sphere-half,sphere-quarter")
 
 
+def views(data):
+    """Views from the center of sphere clouds beside those of all true points."""
+    root = pathlib.Path(__file__).resolve().parent.parent
+    yield "| map | `sphere` | `sphere-half` | `sphere-quarter` | one color |"
+    yield "|" + " --- |" * 5
+    for name, scene in [("RedKitchen, SIFT", "redkitchen"), ("RedKitchen, ALIKED", "redkitchen-aliked"), ("Castle, SIFT", "castle")]:
+        command = ["cargo", "run", "--release", "--quiet", "-p", "unlift-audit", "--example", "sphere_views", "--",
+                   data / scene / "model", data / scene / "descriptors.bin"]
+        lines = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, cwd=root).stdout.splitlines()
+        rows = [line.split() for line in lines]
+        yield f"| {name} | " + " | ".join(f"{row[1]} / {row[2]}" for row in rows) + f" | {rows[0][3]} / {rows[0][4]} |"
+    yield ""
+
+
 def tables(program, shared):
     data = pathlib.Path(shared).resolve() / "data"
     keep = os.environ.get("KEEP")
@@ -188,7 +202,7 @@ def tables(program, shared):
                                          ("RedKitchen, ALIKED", "redkitchen-aliked", "similarity"), ("Castle, SIFT", "castle", "overlap")]}
     twice = kept("sphere-twice", lambda: two_spheres(program, data))
     return lines + ["Sphere clouds:", "", *spheres(found), "Two sphere clouds of RedKitchen, SIFT, of all points and of the lower 80 % along x:", "",
-                    *again_tables.table(twice), ""]
+                    *again_tables.table(twice), "", "Views from the center, SSIM / LPIPS beside those of all true points:", "", *views(data)]
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::geometry::vector::{along, dot, sub};
+use crate::geometry::vector::{along, cross, dot, sub};
 use crate::simd::{self, Kernel};
 
 /// A line, or a half-line from `point`.
@@ -69,10 +69,6 @@ pub(super) fn nearest(own: &[Line], others: &[Line]) -> Option<(usize, Meet)> {
         own.iter().enumerate().flat_map(|(at, line)| others.iter().map(move |o| (at, line, o)));
     let meets = pairs.filter_map(|(at, line, other)| Some((at, line.meet(other)?)));
     meets.min_by(|a, b| a.1.miss.total_cmp(&b.1.miss))
-}
-
-fn cross(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// Nearest lines that are kept per record.

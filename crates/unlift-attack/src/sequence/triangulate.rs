@@ -3,7 +3,7 @@
 //! A line of an image back-projects to a plane through the camera center. Three planes meet in a point, and further ones check it. A
 //! record of axis candidates is one of two lines, so that every subset of three views has eight solutions and a fourth view decides.
 
-use crate::geometry::vector::{distance, dot};
+use crate::geometry::vector::{cross, distance, dot};
 
 /// A plane `n . x + d = 0`, scaled such that `(n . x + d) / depth` is the distance of the projection of `x` from a line, in pixels.
 type Plane = [f64; 4];
@@ -176,10 +176,6 @@ fn solve(rows: [[f64; 3]; 3], right: [f64; 3]) -> Option<[f64; 3]> {
         return None;
     }
     Some(std::array::from_fn(|i| (right[0] * bc[i] + right[1] * ca[i] + right[2] * ab[i]) / det))
-}
-
-fn cross(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// Least squares in pixels with weights that fall with the distance, from `x`. Returns the cost and the fit.

@@ -1,5 +1,6 @@
 //! Pictures that a network makes from recovered points, and their similarity to the photos.
 
+mod bearings;
 mod images;
 mod maps;
 
@@ -18,6 +19,7 @@ use unlift_report::inversions::{InvertedView, Likeness, Object, Painted};
 
 use crate::document::given;
 
+pub use bearings::{on_bearings, six_views};
 pub use images::Inversion;
 pub use maps::{MapInversion, view};
 

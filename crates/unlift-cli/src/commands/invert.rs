@@ -8,15 +8,12 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 use unlift::OneLine;
-use unlift::neighbors::{REAL, Similarity, Source, support};
-use unlift::recover::Recovered;
-use unlift::released::{Obfuscation, Released};
+use unlift::released::Released;
 use unlift_audit::images::extraction::Wanted;
 use unlift_audit::images::{FeatureSource, choice};
-use unlift_audit::inversion::{Painter, view};
+use unlift_audit::inversion::{Painter, on_bearings, six_views, view};
 use unlift_audit::refused;
 use unlift_features::{ColorImage, preview};
-use unlift_invert::{Lens, View};
 use unlift_io::Error;
 use unlift_io::atomic::{
     Access, Kind, OutputSet, Rules, make_folders, marked_picture, sweep, write_file,
@@ -48,14 +45,16 @@ pub fn run(args: &InvertArgs) -> anyhow::Result<Outcome> {
             (Some(recovered), _) if has_images(&args.path)? => images(&to, recovered)?,
             (Some(recovered), _) => map(&to, recovered)?,
             (None, Some(Stage::Released)) => {
-                let none = || usage("--recovered: expected what came back of PATH, found none");
-                if has_images(&args.path)? {
-                    return Err(none());
+                let map =
+                    if has_images(&args.path)? { None } else { Some(read_released(&args.path)?) };
+                match map.filter(|released| released.obfuscation().is_bearings()) {
+                    Some(released) => bearings(&to, &released)?,
+                    None => {
+                        return Err(usage(
+                            "--recovered: expected what came back of PATH, found none",
+                        ));
+                    }
                 }
-                let released = read_released::<3>(&args.path)?;
-                let Obfuscation::Rays(rays) = released.obfuscation() else { return Err(none()) };
-                let &[center] = rays.centers() else { return Err(none()) };
-                bearings(&to, &released, center, rays.direction())?
             }
             (None, _) => keypoints(&to)?,
         };
@@ -240,43 +239,13 @@ fn map(to: &Target<'_>, recovered: &Path) -> anyhow::Result<usize> {
     })
 }
 
-/// Camera axes right, down and forward of the six views from a center.
-const SIX_VIEWS: [(&str, [[f64; 3]; 3]); 6] = [
-    ("front", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
-    ("right", [[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]),
-    ("back", [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]]),
-    ("left", [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]),
-    ("up", [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
-    ("down", [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
-];
-/// Side of these views in pixels. They have an angle of 90 degrees.
-const SIDE: f64 = 640.0;
-
-/// Paints six views from the center of a sphere cloud: its directions are released. Records that look
-/// like decoys are left out.
-fn bearings(
-    to: &Target<'_>,
-    released: &Released<3>,
-    center: [f32; 3],
-    directions: &[[f32; 3]],
-) -> anyhow::Result<usize> {
+/// Paints six views from the center of bearings, such as a sphere cloud: directions are released, so
+/// nothing needs to be recovered.
+fn bearings(to: &Target<'_>, released: &Released<3>) -> anyhow::Result<usize> {
     let of_map = |error| Error::core(&to.args.path, error);
     let painter = to.painter(kind("PATH", released.descriptors())?)?;
-    let source: &dyn Source<3> = &Similarity;
-    let lists = source.lists(released, source.k(released), 0).map_err(of_map)?;
-    let support = support(released, &lists).unwrap_or_default();
-    let on_sphere = |(direction, support): (&[f32; 3], &f64)| match *support < REAL {
-        true => [f32::NAN; 3],
-        false => std::array::from_fn(|c| center[c] + direction[c]),
-    };
-    let positions: Vec<[f32; 3]> = directions.iter().zip(&support).map(on_sphere).collect();
-    let seen = Recovered::from_positions(released, &lists, &positions).map_err(of_map)?;
-    let center = std::array::from_fn(|c| released.origin()[c] + f64::from(center[c]));
-    let middle = (SIDE - 1.0) / 2.0;
-    let lens = Lens::try_new("SIMPLE_PINHOLE", &[SIDE / 2.0, middle, middle]).map_err(of_map)?;
-    each(to, &SIX_VIEWS, |(name, rotation)| {
-        let size = [SIDE as usize; 2];
-        let view = View { center, rotation: *rotation, lens: lens.clone(), size };
-        Ok(((*name).to_owned(), painter.map(&view, released, &seen).map_err(of_map)?))
+    let seen = on_bearings(released).map_err(of_map)?;
+    each(to, &six_views(released).map_err(of_map)?, |(name, view)| {
+        Ok(((*name).to_owned(), painter.map(view, released, &seen).map_err(of_map)?))
     })
 }
