@@ -108,7 +108,7 @@ fn photos(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
     let (found, _) = find_images(job)?;
     let mut found = found.ok_or_else(|| anyhow::anyhow!("demo: the photos could not be read"))?;
     // The temporary path is meaningless.
-    found.document.input.path = Some("two photos of the demo".to_owned());
+    found.document.input.path = Some("Two photos of the demo".to_owned());
     Ok(found)
 }
 
