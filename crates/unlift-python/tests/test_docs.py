@@ -27,7 +27,7 @@ def test_the_readme(tmp_path, monkeypatch):
     usual = unlift.audit
     monkeypatch.setattr(unlift, "audit", lambda m, **more: usual(m, **(more | {"solvers": ["consensus"], "inlier_ratios": [0.5]})))
     blocks = re.findall(r"```python\n(.*?)```", README.read_text(), re.S)
-    assert len(blocks) == 4
+    assert len(blocks) == 3
     keypoints = np.random.default_rng(2).uniform(0, [639, 479], (200, 2))
     waves = np.sin(keypoints / 90 @ np.random.default_rng(3).uniform(-2, 2, (2, 128)))
     names = {"keypoints": keypoints, "sift": (60 + 55 * waves).astype(np.uint8)}
