@@ -4,7 +4,6 @@
 //! arrays, paths ──> Map ──> obfuscate ──> Hidden { Released, Truth }
 //!                    │          Released ──> neighbors ──> Neighborhoods ──> recover ──> Recovered ──> evaluate
 //!                    └──> audit (schemes and sources may be functions) ──> Report
-//!                                    Released, Neighborhoods ──prepare──> Model ──solve_part, join──> Recovered
 //! arrays by name, paths ──> audit_images (as above) ────────────────────────┘
 //! ```
 //!
@@ -28,7 +27,6 @@ mod lists;
 mod map;
 mod obfuscate;
 mod own;
-mod parts;
 mod plan;
 mod records;
 mod recovered;
@@ -60,8 +58,6 @@ mod _unlift {
     use super::map::{Map, read};
     #[pymodule_export]
     use super::obfuscate::obfuscate;
-    #[pymodule_export]
-    use super::parts::{Model, prepare};
     #[pymodule_export]
     use super::records::{Candidates, Lines, Planes, Rays, Records};
     #[pymodule_export]

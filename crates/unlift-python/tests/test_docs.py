@@ -13,7 +13,7 @@ import unlift
 README = pathlib.Path(__file__).parents[1] / "README.md"
 
 
-@pytest.mark.parametrize("name", ["unlift", "unlift.neighbors", "unlift.parts", "unlift.testing", "unlift._plugins"])
+@pytest.mark.parametrize("name", ["unlift", "unlift.neighbors", "unlift.testing", "unlift._plugins"])
 def test_examples_of_modules(name):
     found = doctest.testmod(importlib.import_module(name))
     assert found.attempted > 0 and found.failed == 0

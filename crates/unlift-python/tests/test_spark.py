@@ -93,26 +93,6 @@ def test_images_on_a_cluster_give_the_rows_of_one_machine(spark):
     )
 
 
-def test_a_map_on_a_cluster_is_the_map_of_one_machine(spark, tmp_path: pathlib.Path):
-    points = np.random.default_rng(5).uniform(0, 4, (3000, 3))
-    hidden = unlift.obfuscate(unlift.Map(points, scale=1.0), "ppl", seed=1)
-    lists = unlift.neighbors.oracle(hidden, 0.3, k=20)
-    hidden.released.save(tmp_path / "released.parquet")
-    model = unlift.prepare(hidden, lists)
-    frame = spark.createDataFrame(unlift.parts.table(lists)).repartition(5)
-    found = unlift.spark.recover(frame, str(tmp_path / "released.parquet"), model, n_parts=4)
-    assert found.rdd.getNumPartitions() == 4
-    back = unlift.parts.join(found.toArrow().to_batches(), hidden, model)
-    whole = unlift.recover(hidden, lists, solver="consensus")
-    back.save(tmp_path / "parts")
-    whole.save(tmp_path / "whole")
-    assert (tmp_path / "parts").read_bytes() == (tmp_path / "whole").read_bytes()
-    # Parts that Spark writes are read directly.
-    frame.write.parquet(str(tmp_path / "lists"))
-    again = unlift.Neighborhoods.read(tmp_path / "lists", hidden)
-    assert (again.records == lists.records).all() and (again.offsets == lists.offsets).all()
-
-
 def test_tiles_are_those_of_one_machine_though_an_executor_is_killed(spark, tmp_path: pathlib.Path):
     points, each = np.random.default_rng(1).uniform(0, (20, 10, 4), (N_MAPS * 6000, 3)), 6000
     np.save(tmp_path / "city.npy", points)

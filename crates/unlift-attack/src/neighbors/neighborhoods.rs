@@ -63,33 +63,6 @@ impl Neighborhoods {
         Self { offsets, records, scores: None, about: About::default() }
     }
 
-    /// Creates the lists of consecutive slots from `first` on, one fewer than `offsets` has entries. The lists of all other slots are
-    /// empty. `map` is the number of records of the map and of slots per record.
-    ///
-    /// # Errors
-    /// When [`try_new`](Self::try_new) fails, or the map has fewer slots.
-    pub fn of_slots(
-        first: usize,
-        offsets: &[u64],
-        records: Vec<RecordId>,
-        scores: Option<Vec<f32>>,
-        map: (usize, usize),
-    ) -> Result<Self, Error> {
-        let (n_records, slots_per_record) = map;
-        let n_slots = n_records * slots_per_record;
-        let after = n_slots.checked_sub(first).and_then(|n| (n + 1).checked_sub(offsets.len()));
-        let Some(after) = after else {
-            let expected = format!("lists within {n_slots} slots");
-            let found = format!("{} from slot {first} on", offsets.len().saturating_sub(1));
-            return Err(Error::new("neighborhoods", expected, found));
-        };
-        let mut all = Vec::with_capacity(n_slots + 1);
-        all.resize(first, 0);
-        all.extend_from_slice(offsets);
-        all.resize(all.len() + after, records.len() as u64);
-        Self::try_new(all, records, scores, n_records, slots_per_record)
-    }
-
     /// Sets the released map and the row order of the lists.
     #[must_use]
     pub fn with_about(self, about: About) -> Self {

@@ -1,14 +1,12 @@
 //! Assignment of the two descriptors of a paired line to its two points (supplement B).
 
-use std::ops::Range;
-
 use rayon::prelude::*;
 
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
 use crate::released::Released;
 
-/// Per slot of `records`, the released descriptor row that belongs to it (supplement B); `None` unless records have two slots and
+/// Per slot, the released descriptor row that belongs to it (supplement B); `None` unless records have two slots and
 /// descriptors.
 ///
 /// The cheaper of the two assignments wins. The cost of a descriptor and a list is the sum of the distances from the descriptor to
@@ -16,7 +14,6 @@ use crate::released::Released;
 pub(super) fn descriptor_rows<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
-    records: Range<usize>,
 ) -> Option<Vec<u32>> {
     let descriptors = released.descriptors().filter(|_| released.slots_per_record() == 2)?;
     let cost = |row: usize, slot: usize| {
@@ -33,5 +30,5 @@ pub(super) fn descriptor_rows<const D: usize>(
         let first = if is_straight { [a, b] } else { [b, a] };
         first.map(|row| row as u32)
     };
-    Some(records.into_par_iter().flat_map_iter(rows_of).collect())
+    Some((0..released.n_records()).into_par_iter().flat_map_iter(rows_of).collect())
 }

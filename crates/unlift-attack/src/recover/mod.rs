@@ -8,10 +8,9 @@
 //! 3. `consensus`, `joint` and `ranking`: our solvers. `ransac` and `published_density`: published attacks, for comparison.
 //! 4. `delta`: the choice of the distance that decides support.
 //! 5. `exact`: coordinates that a rule of the scheme fixes. `confidence`: the probability that an estimate is right.
-//! 6. `model`: what consensus learns of a whole map. `problem`: solves a map at once, or in parts by consensus.
-//!    `records_alone`: attacks without neighborhoods.
+//! 6. `problem`: solves a map. `records_alone`: attacks without neighborhoods.
 //!
-//! [`recover`] runs the whole attack. [`prepare`] learns a [`Model`], with which other processes solve parts of a map.
+//! [`recover`] runs the whole attack.
 
 mod assignment;
 mod confidence;
@@ -21,7 +20,6 @@ mod exact;
 mod joint;
 mod layout;
 mod map;
-mod model;
 mod options;
 mod problem;
 mod published_density;
@@ -35,9 +33,7 @@ mod solver;
 pub use confidence::cues::{Cues, Seen};
 #[doc(hidden)]
 pub use confidence::{N_KINDS, N_TERMS, centered, terms};
-pub use model::Model;
 pub use options::{Delta, RecoverOptions};
-pub use problem::Part;
 pub use records_alone::records_alone;
 pub use result::{Confidence, Estimate, Recovered, Status, TrialHistogram, Unknown};
 pub use solver::{Builtin, Solver};
@@ -48,16 +44,15 @@ use crate::neighbors::Neighborhoods;
 use crate::released::Released;
 use problem::{Problem, check_lists};
 
-/// Learns the [`Model`] that consensus needs, from `released` and all of its `lists`.
-///
-/// # Errors
-/// When options are out of range, or the lists do not have one row per slot.
-pub fn prepare<const D: usize>(
-    released: &Released<D>,
+/// Learns the chance that a random listed record passes near a place, as consensus does. Returns a function of the center of a ray,
+/// the place (relative to the released origin) and delta; `None` for planes.
+#[doc(hidden)]
+pub fn chance<'a, const D: usize>(
+    released: &'a Released<D>,
     lists: &Neighborhoods,
-    options: &RecoverOptions,
-) -> Result<Model<D>, Error> {
-    Problem::new(released, lists, Builtin::Consensus, options)?.model()
+) -> impl Fn(usize, &[f32; D], f32) -> Option<f32> + 'a {
+    let family = map::family::Family::new(released, lists);
+    move |group, x, delta| family.chance_at(group, x, delta)
 }
 
 /// Recovers the hidden points of `released` from `lists` by `solver`: the map `R` of Eq. (3).
@@ -130,9 +125,8 @@ pub fn recover_from<const D: usize>(
 ) -> Result<Recovered<D>, Error> {
     released.fingerprint().expect(known.about().map)?;
     let problem = Problem::new(released, lists, Builtin::Ranking, options)?;
-    let slots = 0..problem.n_slots();
-    let known: Vec<_> = slots.clone().map(|slot| known.sure_estimate(slot)).collect();
-    let estimates = problem.run_joint(problem.solve(slots), &known);
+    let known: Vec<_> = (0..problem.n_slots()).map(|slot| known.sure_estimate(slot)).collect();
+    let estimates = problem.run_joint(problem.solve(), &known);
     problem.finish(estimates, false).map(|(recovered, _)| recovered)
 }
 
@@ -150,7 +144,7 @@ fn with_start<const D: usize>(
     options: &RecoverOptions,
 ) -> Result<(Recovered<D>, Recovered<D>), Error> {
     let problem = Problem::new(released, lists, Builtin::Joint, options)?;
-    let start = problem.solve(0..problem.n_slots());
+    let start = problem.solve();
     let (recovered, _) = problem.finish(problem.run_joint(start.clone(), &[]), false)?;
     let start = problem.finish_start(start, &recovered)?;
     Ok((recovered, start))
@@ -189,6 +183,6 @@ fn solve<const D: usize>(
     want_features: bool,
 ) -> Result<(Recovered<D>, Seen), Error> {
     let problem = Problem::new(released, lists, solver, options)?;
-    let start = problem.solve(0..problem.n_slots());
+    let start = problem.solve();
     problem.finish(problem.run_joint(start, &[]), want_features)
 }

@@ -1,7 +1,5 @@
 //! One recovery problem: a released map, its lists, a solver and its options; and the steps that solve it.
 
-use std::ops::Range;
-
 use crate::density::{Peaks, tomography};
 use crate::neighbors::Neighborhoods;
 use crate::recover::assignment::descriptor_rows;
@@ -9,7 +7,6 @@ use crate::recover::confidence::cues::{Seen, Solved};
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
 use crate::recover::map::lists::Slots;
-use crate::recover::model::Model;
 use crate::recover::options::{Delta, RecoverOptions};
 use crate::recover::published_density::published;
 use crate::recover::ransac::Ransac;
@@ -49,7 +46,7 @@ enum Records<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Problem<'a, D> {
-    /// Prepares the problem and learns everything that a [`Model`] holds.
+    /// Prepares the problem.
     /// Fails when options are out of range, or the lists belong to another map.
     pub(super) fn new(
         released: &'a Released<D>,
@@ -57,22 +54,10 @@ impl<'a, const D: usize> Problem<'a, D> {
         solver: Builtin,
         options: &RecoverOptions,
     ) -> Result<Self, Error> {
-        Self::make(released, lists, solver, options, None)
-    }
-
-    /// Prepares the problem like [`new`](Self::new). With a `model`, nothing is learned, and `lists` may be a part of all lists.
-    fn make(
-        released: &'a Released<D>,
-        lists: &'a Neighborhoods,
-        solver: Builtin,
-        options: &RecoverOptions,
-        model: Option<&Model<D>>,
-    ) -> Result<Self, Error> {
         check_lists(released, lists)?;
         options.check()?;
         let map = released.fingerprint();
         map.expect(lists.about().map)?;
-        map.expect(model.map(|model| model.map)).map_err(|error| error.within("model"))?;
         let at_peaks = |peaks: Peaks| (records_alone::delta(&peaks), Records::Alone(peaks));
         let (delta, records) = match solver {
             Builtin::Density => at_peaks(published(released)),
@@ -81,7 +66,7 @@ impl<'a, const D: usize> Problem<'a, D> {
             | Builtin::Joint
             | Builtin::JointStart
             | Builtin::Ranking
-            | Builtin::Ransac => Self::listed(released, lists, solver, options, model)?,
+            | Builtin::Ransac => Self::listed(released, lists, solver, options),
         };
         let trials = TrialCounts::default();
         Ok(Self { released, map, lists, solver, options: *options, delta, records, trials })
@@ -92,54 +77,39 @@ impl<'a, const D: usize> Problem<'a, D> {
         lists: &'a Neighborhoods,
         solver: Builtin,
         options: &RecoverOptions,
-        model: Option<&Model<D>>,
-    ) -> Result<(f64, Records<'a, D>), Error> {
-        let family = Family::new(released, lists, model.map(|model| model.chance.clone()))?;
+    ) -> (f64, Records<'a, D>) {
+        let family = Family::new(released, lists);
         // Joint recovery reads lists in both directions from its start on.
         let is_joint = matches!(solver, Builtin::Joint | Builtin::JointStart | Builtin::Ranking);
         let graph = is_joint.then(|| Graph::new(lists, released.slots_per_record()));
         let single = graph.as_ref().filter(|_| released.slots_per_record() == 1);
         let both_ways = single.map(Graph::neighborhoods);
-        let delta = match (model, options.delta) {
-            (Some(model), _) => model.delta,
-            (None, Delta::Fixed(delta)) => delta,
-            (None, Delta::Auto) => {
+        let delta = match options.delta {
+            Delta::Fixed(delta) => delta,
+            Delta::Auto => {
                 let used = both_ways.as_ref().unwrap_or(lists);
                 delta::learn(released, &family, (used, lists), is_joint, options.seed)
             }
         };
-        Ok((delta, Records::Listed { family, graph, both_ways }))
-    }
-
-    /// Fails when the solver does not read lists.
-    pub(super) fn model(&self) -> Result<Model<D>, Error> {
-        let Records::Listed { family, .. } = &self.records else {
-            return Err(Error::new(
-                "solver of parts",
-                Builtin::Consensus.name(),
-                self.solver.name(),
-            ));
-        };
-        let (map, delta, chance) = (self.map, self.delta, family.chance());
-        Ok(Model { options: self.options, about: self.about(), map, delta, chance })
+        (delta, Records::Listed { family, graph, both_ways })
     }
 
     pub(super) fn n_slots(&self) -> usize {
         self.released.n_slots()
     }
 
-    /// Returns the estimates of `slots`, in order. For joint recovery these are the estimates it starts from.
-    pub(super) fn solve(&self, slots: Range<usize>) -> Vec<Estimate<D>> {
+    /// Returns the estimates of all slots. For joint recovery these are the estimates it starts from.
+    pub(super) fn solve(&self) -> Vec<Estimate<D>> {
         let (lists, delta) = (self.lists, self.delta as f32);
         match &self.records {
-            Records::Alone(peaks) => Placement::new(self.released, lists, peaks).solve(slots),
+            Records::Alone(peaks) => Placement::new(self.released, lists, peaks).solve(),
             Records::Listed { family, .. } if self.solver == Builtin::Ransac => {
                 let (seed, trials) = (self.options.seed, &self.trials);
-                Ransac { family, lists, delta, seed, trials }.solve(slots)
+                Ransac { family, lists, delta, seed, trials }.solve()
             }
             Records::Listed { family, both_ways, .. } => {
                 let lists = both_ways.as_ref().unwrap_or(lists);
-                consensus::solve(family, lists, delta, &Slots::range(slots))
+                consensus::solve(family, lists, delta, &Slots::all(lists.n_slots()))
             }
         }
     }
@@ -194,18 +164,7 @@ impl<'a, const D: usize> Problem<'a, D> {
     /// Fails when there is not one estimate per slot.
     pub(super) fn finish(
         &self,
-        estimates: Vec<Estimate<D>>,
-        want_features: bool,
-    ) -> Result<(Recovered<D>, Seen), Error> {
-        let rows = descriptor_rows(self.released, self.lists, 0..self.released.n_records());
-        self.finish_with(estimates, rows, want_features)
-    }
-
-    /// Finishes like [`finish`](Self::finish), with a given assignment of descriptors.
-    fn finish_with(
-        &self,
         unsettled: Vec<Estimate<D>>,
-        descriptor_row: Option<Vec<u32>>,
         want_features: bool,
     ) -> Result<(Recovered<D>, Seen), Error> {
         if unsettled.len() != self.n_slots() {
@@ -215,6 +174,7 @@ impl<'a, const D: usize> Problem<'a, D> {
         // Most schemes have no exact constraints: do not copy all estimates for them.
         let settled = self.is_settled().then(|| self.settled(unsettled.clone()));
         let estimates = settled.as_ref().unwrap_or(&unsettled);
+        let descriptor_row = descriptor_rows(self.released, self.lists);
         let trials = (self.solver == Builtin::Ransac).then(|| self.trials.histogram());
         let recovered = self.in_columns(estimates, descriptor_row)?.with_trials(trials);
         let nothing = |recovered: Recovered<D>, unknown: Unknown| {
@@ -296,16 +256,6 @@ impl<'a, const D: usize> Problem<'a, D> {
     }
 }
 
-/// Rejects rays from centers with regions: consensus compares each of them with all others of its center.
-fn check_anchors<const D: usize>(released: &Released<D>) -> Result<(), Error> {
-    match released.obfuscation() {
-        Obfuscation::Rays(rays) if rays.regions().is_some() => {
-            Err(Error::new("records of parts", "such as say nothing about others", "anchors"))
-        }
-        _ => Ok(()),
-    }
-}
-
 /// Rejects lists that do not fit the map.
 pub(super) fn check_lists<const D: usize>(
     released: &Released<D>,
@@ -322,70 +272,4 @@ pub(super) fn check_lists<const D: usize>(
         return Err(Error::new("neighborhoods", expected, record.0.to_string()));
     }
     Ok(())
-}
-
-// Consensus in parts, each with its own lists only: for the machines of a cluster.
-
-/// Estimates of a contiguous range of slots.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Part<const D: usize> {
-    /// An estimate per slot.
-    pub estimates: Vec<Estimate<D>>,
-    /// Per slot, the row of its descriptor, if records have two slots and descriptors.
-    pub descriptor_row: Option<Vec<u32>>,
-}
-
-impl<const D: usize> Model<D> {
-    /// Solves `slots` of `released` by consensus. `lists` are those of these slots, made by [`Neighborhoods::of_slots`]; no other
-    /// lists matter. Every call reads all records, so parts should be large.
-    ///
-    /// # Errors
-    /// When the model belongs to another map, records are rays from centers with regions (which are compared with each other), or `slots`
-    /// is out of range or splits a record.
-    pub fn solve_part(
-        &self,
-        released: &Released<D>,
-        lists: &Neighborhoods,
-        slots: Range<usize>,
-    ) -> Result<Part<D>, Error> {
-        check_anchors(released)?;
-        let per_record = released.slots_per_record();
-        let is_there = slots.start <= slots.end && slots.end <= released.n_slots();
-        if !is_there || slots.start % per_record + slots.end % per_record > 0 {
-            let expected = format!("a range of whole records, {per_record} slots each");
-            return Err(Error::new("slots", expected, format!("{slots:?}")));
-        }
-        let estimates =
-            Problem::make(released, lists, Builtin::Consensus, &self.options, Some(self))?
-                .solve(slots.clone());
-        let records = slots.start / per_record..slots.end / per_record;
-        let descriptor_row = descriptor_rows(released, lists, records);
-        Ok(Part { estimates, descriptor_row })
-    }
-
-    /// Joins `parts`, in the order of their slots, to the recovered map. The result equals that of
-    /// [`recover`](crate::recover::recover) bit for bit.
-    ///
-    /// # Errors
-    /// When the map is not the one of the model, or the parts do not cover all slots.
-    pub fn join(
-        &self,
-        released: &Released<D>,
-        parts: impl IntoIterator<Item = Part<D>>,
-    ) -> Result<Recovered<D>, Error> {
-        check_anchors(released)?;
-        let (mut estimates, mut rows) = (Vec::new(), Vec::new());
-        for part in parts {
-            estimates.extend(part.estimates);
-            rows.extend(part.descriptor_row.into_iter().flatten());
-        }
-        let none = Neighborhoods::unchecked(vec![0; released.n_slots() + 1], Vec::new());
-        let lists = none.with_about(self.about);
-        let has_rows = released.slots_per_record() == 2 && released.descriptors().is_some();
-        let problem =
-            Problem::make(released, &lists, Builtin::Consensus, &self.options, Some(self))?;
-        problem
-            .finish_with(estimates, has_rows.then_some(rows), false)
-            .map(|(recovered, _)| recovered)
-    }
 }

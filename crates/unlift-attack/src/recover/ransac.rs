@@ -5,7 +5,6 @@
 //! without replacement, 99 % confidence) and is at most 10,000. The paper does not give the sample size: here it is two records per
 //! unknown coordinate (for planes, one may be drawn twice).
 
-use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use rayon::prelude::*;
@@ -34,12 +33,12 @@ pub(crate) struct Ransac<'a, const D: usize> {
 }
 
 impl<const D: usize> Ransac<'_, D> {
-    pub(crate) fn solve(&self, slots: Range<usize>) -> Vec<Estimate<D>> {
+    pub(crate) fn solve(&self) -> Vec<Estimate<D>> {
         let axes = match self.family {
             Family::Candidates { rows, .. } => vote(rows, self.lists),
             Family::Lines { .. } | Family::Planes { .. } => Vec::new(),
         };
-        solve_chunks(&Slots::range(slots), Scratch::default, |scratch, first, out| {
+        solve_chunks(&Slots::all(self.lists.n_slots()), Scratch::default, |scratch, first, out| {
             for (at, estimate) in out.iter_mut().enumerate() {
                 let slot = first + at;
                 let (solved, trials) = dispatch(Slot { ransac: self, axes: &axes, slot, scratch });

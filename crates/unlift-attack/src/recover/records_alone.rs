@@ -1,6 +1,5 @@
 //! Attacks on the released records alone, without neighborhoods and descriptors.
 
-use std::ops::Range;
 
 use rayon::prelude::*;
 
@@ -48,7 +47,7 @@ pub fn records_alone<const D: usize>(
 /// Returns the positions of `peaks`. For paired lines, the order of the two points is unknown.
 fn at<const D: usize>(released: &Released<D>, peaks: &Peaks) -> Result<Recovered<D>, Error> {
     let none = Neighborhoods::unchecked(vec![0; released.n_slots() + 1], Vec::new());
-    let estimates = Placement::new(released, &none, peaks).solve(0..released.n_slots());
+    let estimates = Placement::new(released, &none, peaks).solve();
     let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
     let (origin, unit) = (released.origin(), released.unit());
     let delta = delta(peaks);
@@ -83,7 +82,7 @@ impl<'a, const D: usize> Placement<'a, D> {
         Self { rows, slots_per_record: released.slots_per_record(), lists, peaks }
     }
 
-    pub(super) fn solve(&self, slots: Range<usize>) -> Vec<Estimate<D>> {
+    pub(super) fn solve(&self) -> Vec<Estimate<D>> {
         let reach = delta(self.peaks) as f32;
         let place = |slot: usize| {
             let is_crossed = self.slots_per_record == 2 && self.is_crossed(slot);
@@ -95,7 +94,7 @@ impl<'a, const D: usize> Placement<'a, D> {
             }
             estimate
         };
-        slots.into_par_iter().map(place).collect()
+        (0..self.lists.n_slots()).into_par_iter().map(place).collect()
     }
 
     fn peak(&self, slot: usize) -> Estimate<D> {

@@ -312,7 +312,7 @@ impl<const D: usize> Recovered<D> {
             Estimate { position, status: Status::Ok, support: 0, axis: axis as u8, evidence: 0.0 }
         };
         let estimates: Vec<Estimate<D>> = positions.iter().enumerate().map(estimate).collect();
-        let rows = descriptor_rows(released, lists, 0..released.n_records());
+        let rows = descriptor_rows(released, lists);
         let (origin, unit) = (released.origin(), released.unit());
         let about = About { map: Some(released.fingerprint()), ..lists.about() };
         Self::try_new(&estimates, candidates.is_some(), rows, origin, unit, 0.0)

@@ -23,7 +23,6 @@ pub use program::{CompletionsArgs, DemoArgs, DoctorArgs, ManArgs, ModelsArgs};
 pub use results::{CompareArgs, PaperArgs, TableArgs};
 pub use stages::{
     EvaluateArgs, ExportArgs, FindArgs, NeighborsCommand, ObfuscateArgs, OracleArgs, RecoverArgs,
-    SplitArgs,
 };
 
 /// Measure how much of a privacy-preserving ("obfuscated") map or image an attacker recovers
@@ -84,7 +83,7 @@ fn numbers_may_be_negative(command: clap::Command) -> clap::Command {
 /// The commands under each heading of `unlift --help`.
 const GROUPS: [(&str, &str); 3] = [
     ("Audits", "demo audit check compare table"),
-    ("Stages", "obfuscate neighbors recover evaluate export split features invert"),
+    ("Stages", "obfuscate neighbors recover evaluate export features invert"),
     ("Tools", "paper schemes models doctor completions man help"),
 ];
 
@@ -135,8 +134,6 @@ pub enum Command {
     Evaluate(EvaluateArgs),
     /// Convert released, recovered or original points to PLY, OBJ or COLMAP
     Export(ExportArgs),
-    /// Split a Parquet file into parts that other programs, such as Spark, read in parallel
-    Split(SplitArgs),
     /// Write keypoints and descriptors of photos (or a COLMAP database) in hloc's format
     Features(FeaturesArgs),
     /// Paint pictures from descriptors and the positions of keypoints or recovered points

@@ -1,4 +1,4 @@
-//! Arguments of the stages, and of `split` and `export`.
+//! Arguments of the stages, and of `export`.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -203,33 +203,6 @@ pub struct EvaluateArgs {
     /// Print the results as JSON, with the fields of a row of audit.json
     #[arg(long)]
     pub json: bool,
-}
-
-/// Options of `split`.
-#[derive(Debug, Args)]
-#[command(after_help = "\
-The parts are part-000000.parquet and so on, in the order of the rows. _manifest.json holds the
-metadata of FILE and the number of rows and bytes of each part. unlift and other programs that read
-Parquet read the folder in place of FILE. unlift also reads a folder that another program wrote,
-with or without _manifest.json.
-
-Examples:
-  unlift split hidden/released.parquet --out hidden/released
-  unlift split lists --rows 100000 --out lists-in-parts")]
-pub struct SplitArgs {
-    /// A Parquet file that obfuscate, neighbors or recover wrote, or a folder of such parts
-    #[arg(value_name = "FILE")]
-    pub path: PathBuf,
-    /// Number of rows per part. An odd number is increased by one, to keep the two points of a
-    /// record in one part
-    #[arg(long, value_name = "N", default_value_t = 1 << 20, value_parser = value_parser!(u64).range(1..=u64::from(u32::MAX)))]
-    pub rows: u64,
-    /// Folder for the parts
-    #[arg(long, value_name = "FOLDER")]
-    pub out: PathBuf,
-    /// Replace files of the same names that unlift did not write
-    #[arg(long)]
-    pub force: bool,
 }
 
 /// Options of `export`.

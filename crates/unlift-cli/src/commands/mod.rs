@@ -23,7 +23,6 @@ mod paper;
 mod plan;
 mod protection;
 mod recover;
-mod split;
 mod table;
 
 use common::with_threads;
@@ -52,7 +51,6 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Recover(args) => recover::run(&args),
         Command::Evaluate(args) => with_threads(None, || evaluate::run(&args)),
         Command::Export(args) => export::run(&args),
-        Command::Split(args) => split::run(&args),
         Command::Table(args) => table::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Paper(args) => paper::run(&args),

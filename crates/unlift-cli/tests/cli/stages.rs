@@ -142,42 +142,6 @@ fn the_stages_of_images_print_the_row_of_the_audit() {
     }
 }
 
-/// Every command accepts a folder of parts; other tests check that parts equal the whole file.
-#[test]
-fn parts_are_what_the_file_is() {
-    let place = place();
-    chain(&place, "p", "ray", 1);
-    let parts =
-        |file: &str, out: &str| place.ends(&format!("split p{file} --rows 99 --out p{out}"), 0).0;
-    let told = parts("-lists", "/lists");
-    assert_eq!(told, "neighborhoods of slots: 400 rows in 4 parts, in p/lists\n");
-    for (file, out) in
-        [("/released.parquet", "/released"), ("/truth.parquet", "/truth"), ("-back", "/back")]
-    {
-        parts(file, out);
-    }
-    place.ends("recover p/released --neighbors p/lists --seed 1 --out p/again", 0);
-    assert!(place.bytes("p/again") == place.bytes("p-back"));
-    let evaluate = |back: &str, truth: &str| {
-        place.ends(&format!("evaluate {back} --truth {truth} --released p/released.parquet"), 0).0
-    };
-    assert_eq!(evaluate("p/back", "p/truth"), evaluate("p-back", "p/truth.parquet"));
-    let audit = |ending: &str| {
-        let line =
-            format!("audit released p/released{ending} --truth p/truth{ending} --name x --k 10");
-        place.prints(&format!("{line} --inlier-ratios 0.5 --seed 1 --json --out audit"), 0)["results"].clone()
-    };
-    assert_eq!(audit(""), audit(".parquet"));
-    fs::remove_file(place.path("p/lists/part-000003.parquet")).unwrap();
-    let told = place.complains("recover p/released --neighbors p/lists --out none", 3);
-    let expected = "expected part-000003.parquet, as in _manifest.json, found no such file\n";
-    assert!(told.ends_with(expected), "{told}");
-    // A place that cannot be written is reported before the work.
-    let refused = place.complains("split p-lists --rows 300 --out p/truth", 2);
-    assert!(refused.contains("expected a folder without other parts"), "{refused}");
-    place.ends("split p/released/_manifest.json --out p/none", 3);
-}
-
 #[test]
 fn files_of_another_map_are_refused() {
     let place = place();

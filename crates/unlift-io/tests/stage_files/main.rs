@@ -7,7 +7,6 @@ mod lenient;
 mod malformed;
 mod malformed_lists;
 mod maps;
-mod parts;
 mod python;
 mod round_trip;
 mod tables;

@@ -23,7 +23,7 @@ Images are keypoints in pixels, by name of the image:
 
 from __future__ import annotations
 
-from . import fleet, neighbors, parts, testing, viewer
+from . import fleet, neighbors, testing, viewer
 from ._audits import Features, audit, audit_images
 from ._plugins import scheme, source
 from ._report import Report, Table
@@ -38,7 +38,6 @@ from ._unlift import (
     Hidden,
     Lines,
     Map,
-    Model,
     Neighborhoods,
     Planes,
     Rays,
@@ -50,7 +49,6 @@ from ._unlift import (
     __version__,
     evaluate,
     obfuscate,
-    prepare,
     read,
     recover,
 )
@@ -67,7 +65,6 @@ __all__ = [
     "Hidden",
     "Lines",
     "Map",
-    "Model",
     "Neighborhoods",
     "Planes",
     "Rays",
@@ -85,8 +82,6 @@ __all__ = [
     "fleet",
     "neighbors",
     "obfuscate",
-    "parts",
-    "prepare",
     "read",
     "recover",
     "scheme",

@@ -22,7 +22,6 @@ __all__ = [
     "Hidden",
     "Lines",
     "Map",
-    "Model",
     "Neighborhoods",
     "Planes",
     "Rays",
@@ -44,7 +43,6 @@ __all__ = [
     "find",
     "obfuscate",
     "oracle",
-    "prepare",
     "read",
     "recover",
 ]
@@ -248,35 +246,6 @@ def recover(
     threads: int | None = None,
 ) -> Recovered: ...
 
-@final
-class Model:
-    @staticmethod
-    def from_bytes(bytes: bytes) -> Model: ...
-    def to_bytes(self) -> bytes: ...
-    @property
-    def delta(self) -> float: ...
-    def solve_part(
-        self,
-        released: Released | Hidden,
-        first: int,
-        offsets: npt.ArrayLike,
-        records: npt.ArrayLike,
-        *,
-        threads: int | None = None,
-    ) -> dict[str, npt.NDArray[Any] | None]: ...
-    def join(
-        self, released: Released | Hidden, columns: dict[str, npt.NDArray[Any] | None]
-    ) -> Recovered: ...
-
-def prepare(
-    released: Released | Hidden,
-    lists: Neighborhoods,
-    *,
-    delta: float | None = None,
-    seed: int = 0,
-    exact_constraints: bool = True,
-    threads: int | None = None,
-) -> Model: ...
 def evaluate(
     recovered: Recovered, truth: Truth | Hidden, *, thresholds: list[float | str] | None = None
 ) -> dict[str, Any]: ...

@@ -4,10 +4,6 @@
     rows = unlift.spark.audit_maps(tasks.repartition(8), schemes=["olc", "ppl"], inlier_ratios=[0.5])
     rows.where("recovered_percent['0.10'] > 20").show()
 
-A recovery of one map whose neighbor lists are spread over the cluster (`unlift split` cuts a file into a folder of parts):
-
-    found = unlift.spark.recover(spark.read.parquet("lists"), "released.parquet", model)
-
 Every executor needs this package. If an executor fails, Spark runs its tasks again, with the same rows as result.
 """
 
@@ -16,14 +12,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from . import fleet, parts
-from ._unlift import Model, Released
+from . import fleet
 
 if TYPE_CHECKING:
     import pyarrow as _pa  # type: ignore[import-untyped,unused-ignore]
     from pyspark.sql import DataFrame as _DataFrame  # type: ignore[import-not-found,unused-ignore]
 
-__all__ = ["audit_images", "audit_maps", "recover"]
+__all__ = ["audit_images", "audit_maps"]
 
 
 def audit_maps(maps: _DataFrame, **options: Any) -> _DataFrame:
@@ -42,33 +37,6 @@ def audit_images(images: _DataFrame, **options: Any) -> _DataFrame:
     options: those of `unlift.audit_images`. `threads` is 1 by default.
     """
     return _over(images, "audit_images", options)
-
-
-def recover(lists: _DataFrame, released: str, model: Model, *, n_parts: int | None = None) -> _DataFrame:
-    """Runs `unlift.parts.recover` on every part of `lists`.
-
-    lists: a DataFrame with the columns `slot` and `records`, in any order and partitions.
-    released: the path of the released map, which every executor must be able to read.
-    model: the result of `unlift.prepare` for this map and all of its lists.
-    n_parts: number of parts. Default: Spark's number of shuffle partitions. Each part reads all records once.
-
-    `unlift.parts.join(found.toArrow().to_batches(), ..)` turns the rows into the result of `unlift.recover`.
-    """
-    from pyspark.sql import functions
-
-    # Both points of a line through two points are solved together.
-    record = functions.floor(functions.col("slot") / Released.read(released).slots_per_record)
-    ranged = lists.repartitionByRange(record) if n_parts is None else lists.repartitionByRange(n_parts, record)
-    learned = model.to_bytes()
-
-    def of_partition(batches: Iterator[_pa.RecordBatch]) -> Iterator[_pa.RecordBatch]:
-        from unlift import Model, Released, parts
-
-        given = [batch for batch in batches if len(batch)]
-        if given:
-            yield from parts.recover(given, Released.read(released), Model.from_bytes(learned), threads=1)
-
-    return ranged.mapInArrow(of_partition, _spec(parts.COLUMNS))
 
 
 def _spec(columns: dict[str, str]) -> str:

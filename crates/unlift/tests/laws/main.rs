@@ -22,7 +22,6 @@ mod gauge;
 mod leaks;
 mod maps;
 mod noise;
-mod parts;
 mod pins;
 mod ranking;
 mod records;

@@ -5,7 +5,7 @@ mod brute;
 
 use brute::{Choice, Line, candidate_options, line_options, window_options};
 use unlift::neighbors::Neighborhoods;
-use unlift::recover::{Builtin, Delta, Model, RecoverOptions, Recovered, Status, prepare, recover};
+use unlift::recover::{Builtin, Delta, RecoverOptions, Recovered, Status, chance, recover};
 use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
 use unlift::seed::{Draws, Stage};
 use unlift::{Error, RecordId, Unit};
@@ -62,11 +62,14 @@ fn lists(n: usize, draws: &mut Draws) -> Neighborhoods {
 
 const N: usize = 400;
 
+/// The chance at a place, for slots of a center.
+type Chance<'a> = dyn Fn(usize, &[f64; 3]) -> f64 + 'a;
+
 fn check(
     what: &str,
     obfuscation: Result<Obfuscation<3>, Error>,
     delta: f64,
-    judge: impl Fn(usize, &[usize], &Recovered<3>, &Model<3>) -> Result<f64, String>,
+    judge: impl Fn(usize, &[usize], &Recovered<3>, &Chance<'_>) -> Result<f64, String>,
 ) {
     let mut draws = Draws::new(SEED, Stage::Synthetic, 2);
     let neighborhoods = lists(N, &mut draws);
@@ -78,13 +81,17 @@ fn check(
         confidence: false,
         ..RecoverOptions::default()
     };
-    let model = prepare(&released, &neighborhoods, &options).unwrap();
+    let learned = chance(&released, &neighborhoods);
+    let chance = |group: usize, x: &[f64; 3]| {
+        let x = x.map(|x| x as f32);
+        f64::from(learned(group, &x, delta as f32).expect("chance is a field"))
+    };
     let solved = recover(&released, &neighborhoods, &Builtin::Consensus, &options).unwrap();
     let mut wrong = Vec::new();
     for slot in 0..N {
         let listed: Vec<usize> = neighborhoods.of(slot).iter().map(|r| r.index()).collect();
         let (status, found) = (solved.status()[slot], f64::from(solved.evidence()[slot]));
-        match judge(slot, &listed, &solved, &model) {
+        match judge(slot, &listed, &solved, &chance) {
             Ok(evidence) if status == Status::Ok => {
                 let off = (evidence - found).abs();
                 assert!(off <= 1e-3 * (1.0 + evidence), "{what}: evidence is {off} off");
@@ -97,18 +104,14 @@ fn check(
     assert!(wrong.len() * 200 <= N, "{what}: {} of {N} differ, {:?}", wrong.len(), wrong.first());
 }
 
-fn chance_at(model: &Model<3>, group: usize, x: &[f64; 3]) -> f64 {
-    f64::from(model.chance(group, &x.map(|x| x as f32)).expect("chance is a field"))
-}
-
 fn widen(position: &[f32; 3]) -> Vec<f64> {
     position.iter().map(|&x| f64::from(x)).collect()
 }
 
 fn lines_equal_their_twin(rows: &[Line], obfuscation: Obfuscation<3>, what: &str, delta: f64) {
-    check(what, Ok(obfuscation), delta, |slot, listed, solved, model| {
+    check(what, Ok(obfuscation), delta, |slot, listed, solved, chance| {
         let group = usize::from(rows[slot].2.unwrap_or(0));
-        let chance = |x: &[f64; 3]| chance_at(model, group, x);
+        let chance = |x: &[f64; 3]| chance(group, x);
         let options = line_options(rows, slot, listed, delta, chance);
         if solved.status()[slot] != Status::Ok {
             return none_left(&options);
@@ -162,8 +165,8 @@ fn candidates_equal_their_twin() {
     let rows: Vec<[f64; 3]> = candidates.position().iter().map(|p| p.map(f64::from)).collect();
     for delta in [0.02, 0.1, 0.4] {
         let obfuscation = Obfuscation::AxisCandidates(candidates.clone());
-        check("candidates", Ok(obfuscation), delta, |slot, listed, solved, model| {
-            let chance = |x: &[f64; 3]| chance_at(model, 0, x);
+        check("candidates", Ok(obfuscation), delta, |slot, listed, solved, chance| {
+            let chance = |x: &[f64; 3]| chance(0, x);
             let options = candidate_options(&rows, slot, listed, delta, chance);
             if solved.status()[slot] != Status::Ok {
                 return none_left(&options);

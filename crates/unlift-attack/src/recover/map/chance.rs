@@ -6,10 +6,8 @@
 
 use rayon::prelude::*;
 
-use crate::Error;
 use crate::geometry::vector::{along, dot, median, sub, widen};
 use crate::neighbors::Neighborhoods;
-use crate::recover::map::bytes::Reader;
 use crate::recover::map::grid::Grid;
 use crate::recover::map::lines::{LineRow, MOST_CHANCE};
 use crate::recover::map::places::trimmed_box;
@@ -42,17 +40,6 @@ impl<const D: usize> ChanceField<D> {
             *value = (value.max(FLOOR * mean) * scale).max(f32::MIN_POSITIVE);
         }
         Self { grid }
-    }
-
-    pub(crate) fn write(&self, to: &mut Vec<u8>) {
-        self.grid.write(to);
-    }
-
-    /// Reads the field that [`write`](Self::write) appended.
-    /// Fails when the bytes are not a field.
-    pub(crate) fn read(from: &mut Reader<'_>) -> Result<Self, Error> {
-        // The grid of a box without extent along an axis may have more cells than asked for.
-        Grid::read(from, 8 * CELLS).map(|grid| Self { grid })
     }
 
     /// Returns the density at a typical place: the mean over places weighted by density.
@@ -127,10 +114,6 @@ pub(crate) fn of_lines<const D: usize>(
 /// Returns the number of centers up to the last one that has a ray; `None` for lines.
 fn n_groups<const D: usize>(rows: &[LineRow<D>]) -> Option<u32> {
     rows.iter().filter(|row| row.is_ray()).map(|row| row.group + 1).max()
-}
-
-pub(crate) fn n_fields<const D: usize>(rows: &[LineRow<D>]) -> usize {
-    n_groups(rows).unwrap_or(1) as usize
 }
 
 /// Adds the lengths of some records, each as often as it is listed, to a grid.
@@ -220,19 +203,6 @@ pub(crate) struct CandidateField<const D: usize> {
 }
 
 impl<const D: usize> CandidateField<D> {
-    pub(crate) fn write(&self, to: &mut Vec<u8>) {
-        self.along.iter().for_each(|field| field.write(to));
-    }
-
-    /// Reads the fields that [`write`](Self::write) appended.
-    /// Fails when the bytes are not one field per axis.
-    pub(crate) fn read(from: &mut Reader<'_>) -> Result<Self, Error> {
-        let fields = (0..D).map(|_| ChanceField::read(from)).collect::<Result<Vec<_>, _>>()?;
-        let along =
-            fields.try_into().map_err(|_| Error::new("model", "a field per axis", "others"))?;
-        Ok(Self { along })
-    }
-
     /// Returns the chance that a random record passes within `delta` of a typical place.
     pub(crate) fn typical_chance(&self, delta: f32) -> f32 {
         let tubes = self.tubes(delta);

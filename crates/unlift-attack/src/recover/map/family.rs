@@ -1,9 +1,8 @@
 //! A released map prepared for solving, with one row per record.
 
-use crate::Error;
 use crate::neighbors::Neighborhoods;
 use crate::recover::map::chance::{
-    self, CandidateField, ChanceField, interquartile_range, line_extent, n_fields, ray_extent, tube,
+    self, CandidateField, ChanceField, interquartile_range, line_extent, ray_extent, tube,
 };
 use crate::recover::map::lines::{LineRow, from_lines, from_rays};
 use crate::recover::map::planes::SortedPlanes;
@@ -20,60 +19,36 @@ pub(crate) enum Family<'a, const D: usize> {
     Candidates { rows: &'a [[f32; D]], chance: CandidateField<D> },
 }
 
-/// The chance that a random listed record passes near a place, learned before any slot is solved.
-#[derive(Clone, Debug)]
-pub(crate) enum Chance<const D: usize> {
-    /// One field for lines, or one per center of rays.
-    Lines(Vec<ChanceField<D>>),
-    /// Nothing, because offsets of planes are counted exactly.
-    Planes,
-    /// One field per axis.
-    Candidates(CandidateField<D>),
-}
-
 impl<'a, const D: usize> Family<'a, D> {
-    /// Prepares the records of `released`. Without a learned `chance`, learns it from `lists`.
-    /// Fails when `chance` belongs to other records.
-    pub(crate) fn new(
-        released: &'a Released<D>,
-        lists: &Neighborhoods,
-        chance: Option<Chance<D>>,
-    ) -> Result<Self, Error> {
+    /// Prepares the records of `released`, and learns their chance from `lists`.
+    pub(crate) fn new(released: &'a Released<D>, lists: &Neighborhoods) -> Self {
         let slots_per_record = released.slots_per_record();
-        match (released.obfuscation(), chance) {
-            (Obfuscation::Lines(_) | Obfuscation::Rays(_), None) => {
+        match released.obfuscation() {
+            Obfuscation::Lines(_) | Obfuscation::Rays(_) => {
                 let rows = line_rows(released);
                 let chance = chance::of_lines(&rows, lists, slots_per_record);
-                Ok(Self::Lines { rows, slots_per_record, chance })
+                Self::Lines { rows, slots_per_record, chance }
             }
-            (Obfuscation::Lines(_) | Obfuscation::Rays(_), Some(Chance::Lines(chance))) => {
-                let rows = line_rows(released);
-                let expected = n_fields(&rows);
-                if chance.len() != expected {
-                    let expected = format!("{expected} fields of chance");
-                    return Err(Error::new("model", expected, chance.len().to_string()));
-                }
-                Ok(Self::Lines { rows, slots_per_record, chance })
+            Obfuscation::AxisPlanes(planes) => {
+                Self::Planes { planes, sorted: SortedPlanes::new(planes) }
             }
-            (Obfuscation::AxisPlanes(planes), None | Some(Chance::Planes)) => {
-                Ok(Self::Planes { planes, sorted: SortedPlanes::new(planes) })
-            }
-            (Obfuscation::AxisCandidates(candidates), None) => {
+            Obfuscation::AxisCandidates(candidates) => {
                 let rows = candidates.position();
-                Ok(Self::Candidates { rows, chance: chance::of_candidates(rows, lists) })
+                Self::Candidates { rows, chance: chance::of_candidates(rows, lists) }
             }
-            (Obfuscation::AxisCandidates(candidates), Some(Chance::Candidates(chance))) => {
-                Ok(Self::Candidates { rows: candidates.position(), chance })
-            }
-            _ => Err(Error::new("model", "one of these records", "one of another family")),
         }
     }
 
-    pub(crate) fn chance(&self) -> Chance<D> {
+    /// Chance that a random listed record passes within `delta` of `x`. For rays, the slot belongs to the center `group`; other
+    /// records ignore it. `None` for planes, whose offsets are counted exactly.
+    pub(crate) fn chance_at(&self, group: usize, x: &[f32; D], delta: f32) -> Option<f32> {
         match self {
-            Self::Lines { chance, .. } => Chance::Lines(chance.clone()),
-            Self::Planes { .. } => Chance::Planes,
-            Self::Candidates { chance, .. } => Chance::Candidates(chance.clone()),
+            Self::Lines { chance, .. } => {
+                let field = chance.get(group).or(chance.first());
+                field.map(|field| field.at(x, tube(D, delta)))
+            }
+            Self::Planes { .. } => None,
+            Self::Candidates { chance, .. } => Some(chance.at(x, &chance.tubes(delta))),
         }
     }
 

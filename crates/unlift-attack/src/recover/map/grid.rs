@@ -1,7 +1,5 @@
 //! A dense grid over the box of a map, and the density of estimates on it.
 
-use crate::Error;
-use crate::recover::map::bytes::{Reader, put};
 use crate::recover::map::graph::record_of;
 use crate::recover::map::places::Places;
 
@@ -54,30 +52,6 @@ impl<const D: usize> Grid<D> {
         let side = |c: usize| (((high[c] - low[c]) / cell).ceil() as usize).clamp(1, 1 << 20);
         let dims: [usize; D] = std::array::from_fn(side);
         Self::new(low, cell, dims, vec![0.0; dims.iter().product()])
-    }
-
-    pub(crate) fn write(&self, to: &mut Vec<u8>) {
-        put(to, &self.low);
-        put(to, &[self.cell]);
-        self.dims.iter().for_each(|&n| to.extend((n as u64).to_le_bytes()));
-        put(to, &self.values);
-    }
-
-    /// Reads the grid that [`write`](Self::write) appended.
-    /// Fails when the bytes are not a grid of at most `most` cells.
-    pub(crate) fn read(from: &mut Reader<'_>, most: usize) -> Result<Self, Error> {
-        let mut dims = [0; D];
-        let box_of = from.f32s(D + 1)?;
-        for n in &mut dims {
-            *n = from.count(most)?.max(1);
-        }
-        let cell = box_of[D];
-        let n_cells = dims.iter().try_fold(1usize, |all, &n| all.checked_mul(n));
-        let Some(n_cells) = n_cells.filter(|&n| n <= most && cell > 0.0) else {
-            let expected = format!("a grid of at most {most} cells");
-            return Err(Error::new("model", expected, format!("{dims:?}")));
-        };
-        Ok(Self::new(std::array::from_fn(|c| box_of[c]), cell, dims, from.f32s(n_cells)?))
     }
 
     /// Returns the sides of the box, in whole cells.

@@ -1,7 +1,5 @@
 //! Chunks of slots, and mixed lists, which measure chance.
 
-use std::ops::Range;
-
 use rayon::prelude::*;
 
 use crate::RecordId;
@@ -20,8 +18,8 @@ pub(crate) struct Slots {
 }
 
 impl Slots {
-    pub(crate) fn range(slots: Range<usize>) -> Self {
-        Self { n: slots.len(), firsts: slots.step_by(CHUNK).collect() }
+    pub(crate) fn all(n: usize) -> Self {
+        Self { n, firsts: (0..n).step_by(CHUNK).collect() }
     }
 
     /// Creates the slots of some `chunks`, in ascending order, of a map of `n_slots`.

@@ -4,7 +4,6 @@
 //! feasible line (`lines`, `planes`); the chance that a random record passes near a place (`chance`); all of these for one map
 //! (`family`); lists and the neighborhood graph (`lists`, `graph`); estimates per slot and feasible sets (`places`, `pieces`).
 
-pub(crate) mod bytes;
 pub(crate) mod chance;
 pub(crate) mod family;
 pub(crate) mod graph;
