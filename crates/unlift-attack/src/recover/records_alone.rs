@@ -1,6 +1,5 @@
 //! Attacks on the released records alone, without neighborhoods and descriptors.
 
-
 use rayon::prelude::*;
 
 use crate::density::{Peaks, tomography};
