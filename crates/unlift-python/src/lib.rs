@@ -21,7 +21,6 @@ mod files;
 mod heard;
 mod hidden;
 mod images;
-mod json;
 mod laws;
 mod lists;
 mod map;
@@ -31,7 +30,6 @@ mod plan;
 mod records;
 mod recovered;
 mod report;
-mod rows;
 mod work;
 
 use pyo3::prelude::*;
@@ -64,8 +62,6 @@ mod _unlift {
     use super::recovered::{Recovered, evaluate, recover};
     #[pymodule_export]
     use super::report::Report;
-    #[pymodule_export]
-    use super::rows::Rows;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -15,7 +15,6 @@ use crate::arrays::{to_array, to_rows};
 use crate::errors::{raised, wrong};
 use crate::files::save;
 use crate::hidden::{Hidden, released_of, truth_of};
-use crate::json::as_python;
 use crate::lists::Neighborhoods;
 use crate::own::{Raised, solver_of};
 use crate::plan::{delta, thresholds};
@@ -170,5 +169,6 @@ pub fn evaluate<'py>(
         Ok::<_, unlift::Error>((row, notes))
     })?;
     let figures = unlift_audit::evaluated(&row, &thresholds, &notes).map_err(raised)?;
-    Ok(as_python(py, &figures)?.cast_into::<PyDict>()?)
+    let figures = py.import("json")?.call_method1("loads", (figures.to_string(),))?;
+    Ok(figures.cast_into::<PyDict>()?)
 }

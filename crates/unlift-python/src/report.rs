@@ -1,44 +1,31 @@
 //! Results of an audit.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use pyo3::prelude::*;
-use serde_json::Value;
 use unlift_audit::{Audited, Quiet, Shown, open_audit};
 use unlift_io::atomic::Rules;
 
 use crate::errors::raised;
 use crate::files::refused;
-use crate::json::as_python;
-use crate::rows::Rows;
 
 /// Results of an audit: numbers, and a page that shows them.
-#[pyclass(frozen, module = "unlift")]
-pub struct Report(Audited);
+#[pyclass(frozen, subclass, module = "unlift")]
+pub struct Report(Arc<Audited>);
 
 impl Report {
     pub fn of(found: Audited) -> Self {
-        Self(found)
-    }
-
-    fn value(&self, share_safe: bool) -> PyResult<Value> {
-        let text = self.json(share_safe)?;
-        serde_json::from_str(&text).map_err(raised)
+        Self(Arc::new(found))
     }
 }
 
 #[pymethods]
 impl Report {
-    /// One row per scheme, source, inlier ratio and solver.
-    #[getter]
-    fn rows(&self) -> PyResult<Rows> {
-        Ok(Rows::of(self.value(false)?["results"].as_array().map_or(&[][..], Vec::as_slice)))
-    }
-
-    /// All numbers, as in `audit.json`.
-    #[getter]
-    fn document<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        as_python(py, &self.value(false)?)
+    /// Adds to a report of the native module what Python adds.
+    #[new]
+    fn new(native: &Bound<'_, Self>) -> Self {
+        Self(Arc::clone(&native.get().0))
     }
 
     /// True if every gate held and every image could be used.

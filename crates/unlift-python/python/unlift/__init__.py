@@ -23,7 +23,7 @@ Images are keypoints in pixels, by name of the image:
 
 from __future__ import annotations
 
-from . import fleet, neighbors, testing, viewer
+from . import fleet, neighbors, testing
 from ._audits import Features, audit, audit_images
 from ._plugins import scheme, source
 from ._report import Report, Table
@@ -87,5 +87,4 @@ __all__ = [
     "scheme",
     "source",
     "testing",
-    "viewer",
 ]

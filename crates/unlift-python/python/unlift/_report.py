@@ -3,59 +3,75 @@
 from __future__ import annotations
 
 import html
+import json
 import math
-import os
-import pathlib
+from collections.abc import Iterator
 from typing import Any
 
 from ._unlift import Report as _Report
-from ._unlift import Rows, UnliftError
+from ._unlift import UnliftError
 
 #: Height of the page in a notebook, in pixels.
 HEIGHT = 720
 #: The most rows that a table shows in a notebook.
 ROWS = 100
+#: The names in the CSV of values by threshold, percentile or measure.
+IN_CSV = {
+    **dict.fromkeys(
+        ("recovered_percent", "recovered_std", "blind_percent", "blind_std", "records_alone_percent", "records_alone_by"),
+        "{}_within_{}",
+    ),
+    "error_percentiles": "error_percentile_{1}",
+    "metrics": "metric_{1}",
+}
 
 
 class Table:
-    """The rows of an audit as an Arrow table, one column per number: `polars.DataFrame(table)`, `pyarrow.table(table)`, DuckDB."""
+    """The rows of an audit as columns: `polars.DataFrame(table.to_dict())`, `table.to_pandas()`, `pyarrow.table(table)`."""
 
-    def __init__(self, rows: Rows) -> None:
-        self._rows = rows
+    def __init__(self, rows: list[dict[str, Any]]) -> None:
+        self._columns: dict[str, list[Any]] = {}
+        self._n = len(rows)
+        for at, row in enumerate(rows):
+            for name, value in _flat(row):
+                self._columns.setdefault(name, [None] * self._n)[at] = value
 
     @property
     def columns(self) -> list[str]:
         """The names of the columns, as in the CSV of `unlift table` (`recovered_percent_within_0.10`).
 
-        Columns that the CSV lacks have their names of `audit.json`, with a dot between the levels.
+        Columns that the CSV lacks have their names of `audit.json`, with a dot between the levels (`lost.no_neighbors`).
         """
-        return self._rows.columns
+        return list(self._columns)
 
     def __len__(self) -> int:
-        return len(self._rows)
+        return self._n
 
     def __getitem__(self, column: str) -> list[Any]:
-        return self._rows[column]
+        return self._columns[column]
 
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> object:
-        return self._rows.__arrow_c_stream__(requested_schema)
+        """Exports the table to polars and DuckDB by means of pyarrow."""
+        import pyarrow  # type: ignore[import-untyped,unused-ignore]
+
+        return pyarrow.table(self._columns).__arrow_c_stream__(requested_schema)
 
     def to_dict(self) -> dict[str, list[Any]]:
         """Returns a dict of columns."""
-        return {column: self._rows[column] for column in self.columns}
+        return dict(self._columns)
 
     def to_pandas(self) -> Any:
         """Returns a pandas DataFrame."""
         import pandas  # type: ignore[import-not-found,import-untyped,unused-ignore]
 
-        return pandas.DataFrame(self.to_dict())
+        return pandas.DataFrame(self._columns)
 
     def __repr__(self) -> str:
-        return repr(self._rows).replace("Rows", "Table")
+        return f"<unlift.Table: {self._n} rows of {len(self._columns)} columns>"
 
     def _repr_html_(self) -> str:
         """Returns the first rows for a notebook, without empty columns."""
-        shown = {name: values for name, values in self.to_dict().items() if any(value is not None for value in values)}
+        shown = {name: values for name, values in self._columns.items() if any(value is not None for value in values)}
         heads = "".join(f"<th>{html.escape(name)}</th>" for name in shown)
         rows = "".join(
             "<tr>" + "".join(f"<td>{_cell(values[at])}</td>" for values in shown.values()) + "</tr>"
@@ -65,43 +81,33 @@ class Table:
         return f"<table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table>{more}"
 
 
-class Report:
-    """The results of an audit: numbers, and a page that shows them."""
+def _flat(row: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yields the values of a row of `audit.json` by their names in the CSV."""
+    for name, value in row.items():
+        if name == "dropped":
+            yield "n_dropped", sum(value.values())
+        if name == "std" and value is not None:
+            yield from _flat({f"{of.removesuffix('_percent')}_std": spread for of, spread in value.items()})
+        elif isinstance(value, dict):
+            for key, within in value.items():
+                yield IN_CSV.get(name, "{}.{}").format(name, key), within
+        else:
+            yield name, value
 
-    def __init__(self, found: _Report) -> None:
-        self._found = found
+
+class Report(_Report):
+    """The results of an audit: numbers, and a page that shows them."""
 
     @property
     def rows(self) -> Table:
         """A table with one row per scheme, source, inlier ratio and solver."""
-        return Table(self._found.rows)
+        return Table(self.document["results"])
 
     @property
     def document(self) -> dict[str, Any]:
         """All numbers, as in `audit.json`."""
-        return self._found.document
-
-    @property
-    def passed(self) -> bool:
-        """True if every gate held and every image could be used."""
-        return self._found.passed
-
-    def json(self, *, share_safe: bool = False) -> str:
-        """Returns the text of `audit.json`; with `share_safe`, without paths, names and errors of your functions."""
-        return self._found.json(share_safe=share_safe)
-
-    def html(self, *, share_safe: bool = False) -> str:
-        """Returns the page as one self-contained file; with `share_safe`, numbers only."""
-        return self._found.html(share_safe=share_safe)
-
-    def save(
-        self, out: str | os.PathLike[str], *, share_safe: bool = False, force: bool = False
-    ) -> pathlib.Path:
-        """Writes `report.html` and `audit.json` into the folder `out`, both or none, and returns the path of the page.
-
-        share_safe: write numbers only, no points. force: also replace files that unlift did not write.
-        """
-        return self._found.save(os.fspath(out), share_safe=share_safe, force=force)
+        document: dict[str, Any] = json.loads(self.json())
+        return document
 
     def plot(self, threshold: str | float | None = None, ax: Any = None) -> Any:
         """Draws the recovered share over the inlier ratio, a curve per scheme by its strongest solver, and returns the axes.
@@ -133,12 +139,6 @@ class Report:
         ax.set(xlabel="inlier ratio", ylabel=f"recovered within {threshold} {rows[0]['unit']} (%)", ylim=(0, 100))
         ax.legend()
         return ax
-
-    def __str__(self) -> str:
-        return str(self._found)
-
-    def __repr__(self) -> str:
-        return repr(self._found)
 
     def show(self) -> Any:
         """Returns the whole page with points for a notebook, which stores them. Needs IPython."""

@@ -7,7 +7,7 @@ from typing import Any, final
 
 import numpy as np
 import numpy.typing as npt
-from typing_extensions import disjoint_base
+from typing_extensions import Self, disjoint_base
 
 _Path = str | os.PathLike[str]
 
@@ -29,7 +29,6 @@ __all__ = [
     "Recovered",
     "Released",
     "Report",
-    "Rows",
     "Truth",
     "UnliftError",
     "__version__",
@@ -250,20 +249,9 @@ def evaluate(
     recovered: Recovered, truth: Truth | Hidden, *, thresholds: list[float | str] | None = None
 ) -> dict[str, Any]: ...
 
-@final
-class Rows:
-    def __len__(self) -> int: ...
-    @property
-    def columns(self) -> list[str]: ...
-    def __getitem__(self, name: str, /) -> list[Any]: ...
-    def __arrow_c_stream__(self, requested_schema: object | None = None) -> object: ...
-
-@final
+@disjoint_base
 class Report:
-    @property
-    def rows(self) -> Rows: ...
-    @property
-    def document(self) -> dict[str, Any]: ...
+    def __new__(cls, native: Report) -> Self: ...
     @property
     def passed(self) -> bool: ...
     def json(self, *, share_safe: bool = False) -> str: ...
