@@ -1,4 +1,4 @@
-//! NumPy arrays in and out. Shapes and types are checked. Input is copied, because the work may
+//! NumPy arrays in and out, and errors about them. Shapes and types are checked. Input is copied, because the work may
 //! outlive the call; output is not.
 
 use std::fmt::Display;
@@ -11,7 +11,22 @@ use pyo3::types::PyDict;
 use unlift::descriptors::Values;
 use unlift::{Descriptors, OneLine};
 
-use crate::errors::{raised, wrong};
+pyo3::create_exception!(
+    unlift,
+    UnliftError,
+    PyValueError,
+    "An error in an argument, a file or a map: one line that names it, what was expected and what was found."
+);
+
+/// Returns an exception with the message `error`.
+pub fn raised(error: impl Display) -> PyErr {
+    PyErr::new::<UnliftError, _>(error.to_string())
+}
+
+/// Returns an exception about an argument.
+pub fn wrong(name: &str, expected: impl Display, found: impl Display) -> PyErr {
+    raised(format!("{name}: expected {expected}, found {found}"))
+}
 
 /// Numbers: NumPy's kinds, and their name in errors.
 const NUMBERS: (&str, &str) = ("fiu", "numbers");
@@ -63,7 +78,7 @@ pub fn rows<const D: usize>(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Ve
         [_, columns] if *columns == D => {
             Ok(array.readonly().as_slice()?.as_chunks::<D>().0.to_vec())
         }
-        shape => Err(wrong(name, format!("an array of shape (n, {D})"), told(shape))),
+        shape => Err(wrong(name, format!("an array of shape (n, {D})"), shape_text(shape))),
     }
 }
 
@@ -83,7 +98,7 @@ pub fn numbers(name: &str, given: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<
 pub fn column(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     match numbers(name, given)? {
         (values, shape) if shape.len() == 1 => Ok(values),
-        (_, shape) => Err(wrong(name, "an array of shape (n,)", told(&shape))),
+        (_, shape) => Err(wrong(name, "an array of shape (n,)", shape_text(&shape))),
     }
 }
 
@@ -114,7 +129,7 @@ fn within<T: Element + Copy + Display + TryInto<i64>>(
     if !dims.contains(&shape.len()) {
         let axes: Vec<String> = dims.iter().map(usize::to_string).collect();
         let expected = format!("an array of {} axes", axes.join(" or "));
-        return Err(wrong(name, expected, told(&shape)));
+        return Err(wrong(name, expected, shape_text(&shape)));
     }
     let one = |&value: &T| match value.try_into() {
         Ok(index) if range.contains(&index) => Ok(index),
@@ -159,7 +174,7 @@ pub fn descriptors(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Descriptors
         return Err(wrong(name, format!("an array of {what}"), format!("one of {dtype}")));
     };
     let [_, dim] = shape[..] else {
-        return Err(wrong(name, "an array of shape (n, dim)", told(&shape)));
+        return Err(wrong(name, "an array of shape (n, dim)", shape_text(&shape)));
     };
     Descriptors::try_new(values, dim).map_err(|error| match error.what() {
         "descriptors" => wrong(name, error.expected(), error.found()),
@@ -169,7 +184,7 @@ pub fn descriptors(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Descriptors
 }
 
 /// Formats a shape as NumPy does: `(3, 4)`.
-pub fn told(shape: &[usize]) -> String {
+pub fn shape_text(shape: &[usize]) -> String {
     let sides: Vec<String> = shape.iter().map(usize::to_string).collect();
     match sides.as_slice() {
         [side] => format!("({side},)"),

@@ -7,13 +7,30 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use unlift::released::{self, Obfuscation};
 use unlift::truth::{Original, Secret};
-use unlift_audit::Prepared;
+use unlift_audit::{Prepared, check_file_of};
+use unlift_io::atomic;
 use unlift_io::stage::{Kind, read_released, read_truth, write_released, write_truth};
 
-use crate::arrays::{to_array, to_descriptors, to_rows};
-use crate::either::{Either, of_either};
-use crate::errors::{raised, wrong};
-use crate::files::save;
+use crate::arrays::{raised, to_array, to_descriptors, to_rows, wrong};
+
+/// A value of an image (2D) or of a map (3D).
+#[derive(Clone, Debug)]
+pub enum Either<I, M> {
+    Image(I),
+    Map(M),
+}
+
+/// Evaluates `$made` with `$one` as the content of `$either`.
+macro_rules! of_either {
+    ($either:expr, $one:ident => $made:expr) => {
+        match $either {
+            $crate::hidden::Either::Image($one) => $made,
+            $crate::hidden::Either::Map($one) => $made,
+        }
+    };
+}
+
+pub(crate) use of_either;
 
 /// Everything that an attacker sees of a map or an image.
 #[pyclass(frozen, module = "unlift")]
@@ -282,4 +299,23 @@ pub fn truth_of(given: &Bound<'_, PyAny>) -> PyResult<Truth> {
         let found = given.get_type().to_string();
         wrong("truth", "a Truth or a Hidden", found)
     })
+}
+
+/// Writes a stage file of `kind` to `path` by `write`; with `force`, also over foreign files.
+pub fn save(
+    py: Python<'_>,
+    (path, force): (PathBuf, bool),
+    kind: Kind,
+    write: impl FnOnce(&Path) -> Result<(), unlift_io::Error> + Send,
+) -> PyResult<()> {
+    py.detach(|| {
+        let rules = atomic::Rules::new([], force);
+        check_file_of("path", &path, atomic::Kind::Stage(kind), &rules).map_err(refused)?;
+        write(&path).map_err(raised)
+    })
+}
+
+/// Renames the option that an error advises to its Python name.
+pub fn refused(error: unlift_audit::Error) -> PyErr {
+    raised(error.to_string().replace("--force", "force=True").replace("--out", "out"))
 }

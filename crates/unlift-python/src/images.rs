@@ -3,18 +3,17 @@
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyString, PyTuple};
+use pyo3::types::PyString;
 use unlift::OneLine;
 use unlift_audit::Error;
 use unlift_audit::images::InMemory;
 use unlift_io::features::ImageFeatures;
 
-use crate::arrays::{column, descriptors, rows};
-use crate::calls;
-use crate::errors::{UnliftError, raised, wrong};
+use crate::arrays::{UnliftError, descriptors, raised, rows, wrong};
 use crate::own::Raised;
+use crate::threads;
 
-const KEYS: [&str; 5] = ["keypoints", "width", "height", "descriptors", "scores"];
+const KEYS: [&str; 4] = ["keypoints", "width", "height", "descriptors"];
 
 /// Source of images.
 pub enum Images {
@@ -23,15 +22,15 @@ pub enum Images {
 }
 
 impl Images {
-    /// Accepts a path, a mapping of names to arrays, or pairs of both.
+    /// Accepts a path, or a mapping of names to arrays.
     pub fn of(given: &Bound<'_, PyAny>, by: &Raised) -> PyResult<Self> {
         if let Ok(path) = given.extract::<PathBuf>() {
             return Ok(Self::Path(path));
         }
-        let by_name = match is_mapping(given)? {
-            true => given.clone(),
-            false => pairs(given)?.into_any(),
-        };
+        if !is_mapping(given)? {
+            return Err(wrong("images", "a path, or a dict of names to arrays", given.get_type()));
+        }
+        let by_name = given.clone();
         let mut names = Vec::new();
         for name in by_name.call_method0("keys")?.try_iter()? {
             names.push(name_of(&name?)?);
@@ -41,7 +40,7 @@ impl Images {
         let get = move |at: usize| {
             let (stop, name) = (by.stop(), &keys[at]);
             let place = place(name);
-            let features = calls::attached(&stop, |py| {
+            let features = threads::attached(&stop, |py| {
                 let given = by_name.bind(py).get_item(name);
                 let features = given.and_then(|given| features_of(&place, &given));
                 // The user's mapping may fail to read an image.
@@ -80,29 +79,6 @@ fn name_of(name: &Bound<'_, PyAny>) -> PyResult<String> {
     text.extract()
 }
 
-/// Converts pairs of a name and arrays to a dict. All pairs are read, because an audit must know
-/// every name first; arrays are not copied.
-fn pairs<'py>(given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
-    let expected = "a path, a dict of names to arrays, or pairs of both";
-    let by_name = PyDict::new(given.py());
-    let Ok(items) = given.try_iter() else {
-        return Err(wrong("images", expected, given.get_type()));
-    };
-    for item in items {
-        let item = item?;
-        let both = item.cast::<PyTuple>().ok().filter(|both| both.len() == 2);
-        let Some(both) = both else {
-            return Err(wrong("images", expected, item.get_type()));
-        };
-        let name = name_of(&both.get_item(0)?)?;
-        if by_name.contains(&name)? {
-            return Err(wrong("images", "each name once", format!("{name} again")));
-        }
-        by_name.set_item(name, both.get_item(1)?)?;
-    }
-    Ok(by_name)
-}
-
 /// Converts the dict of one image to features.
 fn features_of(place: &str, given: &Bound<'_, PyAny>) -> PyResult<ImageFeatures> {
     if !is_mapping(given)? {
@@ -122,7 +98,7 @@ fn features_of(place: &str, given: &Bound<'_, PyAny>) -> PyResult<ImageFeatures>
         Ok(Some(given.get_item(key)?).filter(|item| !item.is_none()))
     };
     let needed = |key: &str| -> PyResult<Bound<'_, PyAny>> {
-        let [least @ .., _, _] = &KEYS;
+        let [least @ .., _] = &KEYS;
         let found = || wrong(place, least.join(", "), format!("no {key}"));
         item(key)?.ok_or_else(found)
     };
@@ -135,24 +111,18 @@ fn features_of(place: &str, given: &Bound<'_, PyAny>) -> PyResult<ImageFeatures>
         side.ok_or_else(|| wrong(&at(place, key), expected, OneLine(told_as(&given))))
     };
     let size = [side("width")?, side("height")?];
-    let per_keypoint = |key: &str, found: usize| match found == n {
-        true => Ok(()),
-        false => Err(wrong(&at(place, key), format!("{n} rows, one per keypoint"), found)),
-    };
     let descriptors = match item("descriptors")? {
         Some(given) => {
-            let rows = descriptors(&at(place, "descriptors"), &given)?;
-            per_keypoint("descriptors", rows.len())?;
+            let (rows, place) =
+                (descriptors(&at(place, "descriptors"), &given)?, at(place, "descriptors"));
+            if rows.len() != n {
+                return Err(wrong(&place, format!("{n} rows, one per keypoint"), rows.len()));
+            }
             Some(rows)
         }
         None => None,
     };
-    let scores = item("scores")?.map(|given| column(&at(place, "scores"), &given)).transpose()?;
-    if let Some(scores) = &scores {
-        per_keypoint("scores", scores.len())?;
-    }
-    let scores = scores.map(|scores| scores.into_iter().map(|score| score as f32).collect());
-    Ok(ImageFeatures { size: Some(size), keypoints, descriptors, scores, ..Default::default() })
+    Ok(ImageFeatures { size: Some(size), keypoints, descriptors, ..Default::default() })
 }
 
 fn at(place: &str, key: &str) -> String {

@@ -12,28 +12,27 @@
 
 mod arrays;
 mod audit;
-mod audit_images;
-mod calls;
-mod command_line;
-mod either;
-mod errors;
-mod files;
-mod heard;
 mod hidden;
 mod images;
-mod laws;
 mod lists;
 mod map;
-mod obfuscate;
 mod own;
-mod plan;
 mod records;
 mod recovered;
 mod report;
-mod work;
+mod threads;
+
+use std::ffi::OsString;
+use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use unlift::recover::Builtin;
+
+/// Runs the command line `words` and returns the exit code. `program` is the file of this module.
+#[pyfunction]
+fn command_line(py: Python<'_>, program: PathBuf, words: Vec<OsString>) -> u8 {
+    py.detach(|| unlift_cli::run(program, words))
+}
 
 /// The native module.
 #[pymodule]
@@ -41,21 +40,17 @@ mod _unlift {
     use pyo3::prelude::*;
 
     #[pymodule_export]
-    use super::audit::audit;
+    use super::audit::{audit, audit_images};
     #[pymodule_export]
-    use super::audit_images::audit_images;
-    #[pymodule_export]
-    use super::command_line::command_line;
+    use super::command_line;
     #[pymodule_export]
     use super::hidden::{Hidden, Released, Truth};
     #[pymodule_export]
-    use super::laws::{check_scheme, check_solver, check_source};
-    #[pymodule_export]
     use super::lists::{Neighborhoods, find, oracle};
     #[pymodule_export]
-    use super::map::{Map, read};
+    use super::map::{Map, obfuscate, read};
     #[pymodule_export]
-    use super::obfuscate::obfuscate;
+    use super::own::{check_scheme, check_solver, check_source};
     #[pymodule_export]
     use super::records::{Candidates, Lines, Planes, Rays, Records};
     #[pymodule_export]
@@ -65,25 +60,24 @@ mod _unlift {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        super::calls::register(module)?;
+        super::threads::register(module)?;
         super::names(module)
     }
 }
 
 /// Adds the version, and the names that arguments accept.
 fn names(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    let (all_schemes, all_sources) = (unlift::obfuscate::SCHEMES, unlift_audit::sources::all());
-    let schemes = all_schemes.iter().filter(|entry| entry.in_2d.is_some());
-    module.add("IMAGE_SCHEMES", schemes.map(|entry| entry.name).collect::<Vec<_>>())?;
-    let sources = all_sources.iter().filter(|entry| entry.in_2d.is_some());
-    module.add("IMAGE_SOURCES", sources.map(|entry| entry.name).collect::<Vec<_>>())?;
-    let solvers = Builtin::FROM_LISTS.map(|solver| solver.name()).to_vec();
-    module.add("IMAGE_SOLVERS", solvers)?;
-    let schemes = all_schemes.iter().filter(|entry| entry.in_3d.is_some());
-    let sources = all_sources.iter().filter(|entry| entry.in_3d.is_some());
-    module.add("UnliftError", module.py().get_type::<errors::UnliftError>())?;
+    let (schemes, sources) = (unlift::obfuscate::SCHEMES, unlift_audit::sources::all());
+    let of_images = schemes.iter().filter(|entry| entry.in_2d.is_some());
+    module.add("IMAGE_SCHEMES", of_images.map(|entry| entry.name).collect::<Vec<_>>())?;
+    let of_images = sources.iter().filter(|entry| entry.in_2d.is_some());
+    module.add("IMAGE_SOURCES", of_images.map(|entry| entry.name).collect::<Vec<_>>())?;
+    module.add("IMAGE_SOLVERS", Builtin::FROM_LISTS.map(|solver| solver.name()).to_vec())?;
+    let of_maps = schemes.iter().filter(|entry| entry.in_3d.is_some());
+    module.add("SCHEMES", of_maps.map(|entry| entry.name).collect::<Vec<_>>())?;
+    let of_maps = sources.iter().filter(|entry| entry.in_3d.is_some());
+    module.add("SOURCES", of_maps.map(|entry| entry.name).collect::<Vec<_>>())?;
+    module.add("UnliftError", module.py().get_type::<arrays::UnliftError>())?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    module.add("SCHEMES", schemes.map(|entry| entry.name).collect::<Vec<_>>())?;
-    module.add("SOURCES", sources.map(|entry| entry.name).collect::<Vec<_>>())?;
     module.add("SOLVERS", Builtin::ALL.map(|solver| solver.name()).to_vec())
 }

@@ -14,12 +14,9 @@ use unlift::{About, RecordId, RowOrder};
 use unlift_audit::sources;
 use unlift_io::stage::{Kind, read_neighborhoods, write_neighborhoods};
 
-use crate::arrays::{numbers, to_array, told, whole};
-use crate::either::of_either;
-use crate::errors::{raised, wrong};
-use crate::files::save;
-use crate::hidden::{Hidden, released_of};
-use crate::work;
+use crate::arrays::{numbers, raised, shape_text, to_array, whole, wrong};
+use crate::hidden::{Hidden, of_either, released_of, save};
+use crate::threads;
 
 /// For every hidden point, a list of records that probably hide its nearest neighbors, likeliest
 /// first.
@@ -105,12 +102,12 @@ fn lists_of<const D: usize>(
     let (rows, shape) = whole("records", records, &[2], -1..=n as i64 - 1)?;
     if shape[0] != n_slots {
         let expected = format!("an array of shape ({n_slots}, k), one row per hidden point");
-        return Err(wrong("records", expected, told(&shape)));
+        return Err(wrong("records", expected, shape_text(&shape)));
     }
     let scores = match scores.map(|scores| numbers("scores", scores)).transpose()? {
         Some((_, found)) if found != shape => {
-            let expected = format!("the shape of the records, {}", told(&shape));
-            return Err(wrong("scores", expected, told(&found)));
+            let expected = format!("the shape of the records, {}", shape_text(&shape));
+            return Err(wrong("scores", expected, shape_text(&found)));
         }
         scores => scores.map(|(values, _)| values),
     };
@@ -191,7 +188,7 @@ pub fn find(
 ) -> PyResult<Neighborhoods> {
     let released = released_of(released)?.of_map()?;
     let source = named(source, k)?.of_dimension::<3>().map_err(raised)?;
-    let lists = work::run(py, threads, None, move || {
+    let lists = threads::run(py, threads, None, move || {
         source.supports(&released)?;
         source.lists(&released, source.k(&released), seed)
     })?;
@@ -213,7 +210,7 @@ pub fn oracle(
     let (released, truth) = hidden.parts();
     let slots_per_record = released.clone().of_map()?.slots_per_record();
     let truth = truth.clone();
-    let lists = work::run(py, None, None, move || {
+    let lists = threads::run(py, None, None, move || {
         let knn = search(truth.original())?;
         let near = TrueNeighbors::new(&knn, &truth.secret, slots_per_record, k)?;
         let outliers = Outliers::new(noise, &near, &knn, &truth.secret, seed)?;

@@ -1,17 +1,21 @@
-//! Maps, from files or arrays.
+//! Maps, from files or arrays, and hiding of maps under schemes of unlift or of the user.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use unlift_audit::{OutlierFilter, Preparation, Prepared, check_scale, maps, prepare};
+use unlift::audit::check_laws;
+use unlift::obfuscate::{Scheme, SchemeOptions, obfuscate as hide, scheme};
+use unlift::seed::Key;
+use unlift_audit::{Preparation, Prepared, check_scale, maps, prepare};
 use unlift_io::hash::{hash_file, hash_input, hash_positions};
 use unlift_io::seen::Seen;
 use unlift_report::document::Input;
 
-use crate::arrays::{descriptors, rows, to_array, to_descriptors, to_rows};
-use crate::errors::wrong;
-use crate::work;
+use crate::arrays::{descriptors, raised, rows, to_array, to_descriptors, to_rows, wrong};
+use crate::hidden::{Hidden, Released, Truth};
+use crate::own::{OwnScheme, Raised};
+use crate::threads;
 
 /// Points to audit, with optional descriptors. Lengths are in meters with a scale, else in median
 /// distances to the K-th neighbor.
@@ -32,7 +36,6 @@ fn preparation(
     scale: Option<f64>,
     k: usize,
     max_points: Option<usize>,
-    outlier_filter: Option<(usize, f64)>,
     seed: u64,
 ) -> PyResult<Preparation> {
     if let Some(scale) = scale.filter(|scale| !(scale.is_finite() && *scale > 0.0)) {
@@ -41,23 +44,13 @@ fn preparation(
     if k == 0 {
         return Err(wrong("k", "at least 1", k));
     }
-    let outlier_filter =
-        outlier_filter.map(|(neighbors, std_ratio)| OutlierFilter { neighbors, std_ratio });
-    let is_usable = |filter: &OutlierFilter| {
-        filter.neighbors > 0 && filter.std_ratio.is_finite() && filter.std_ratio > 0.0
-    };
-    if let Some(filter) = outlier_filter.filter(|filter| !is_usable(filter)) {
-        let found = format!("({}, {})", filter.neighbors, filter.std_ratio);
-        return Err(wrong("outlier_filter", "(neighbors, ratio), both above 0", found));
-    }
-    Ok(Preparation { scale, k, outlier_filter, max_points, seed, ..Preparation::default() })
+    Ok(Preparation { scale, k, max_points, seed, ..Preparation::default() })
 }
 
 #[pymethods]
 impl Map {
     #[new]
-    #[pyo3(signature = (positions, descriptors=None, *, scale=None, k=50, max_points=None, outlier_filter=None, seed=0))]
-    #[allow(clippy::too_many_arguments)]
+    #[pyo3(signature = (positions, descriptors=None, *, scale=None, k=50, max_points=None, seed=0))]
     fn new(
         py: Python<'_>,
         positions: &Bound<'_, PyAny>,
@@ -65,17 +58,16 @@ impl Map {
         scale: Option<f64>,
         k: usize,
         max_points: Option<usize>,
-        outlier_filter: Option<(usize, f64)>,
         seed: u64,
     ) -> PyResult<Self> {
-        let preparation = preparation(scale, k, max_points, outlier_filter, seed)?;
+        let preparation = preparation(scale, k, max_points, seed)?;
         let given = descriptors.map(|given| self::descriptors("descriptors", given)).transpose()?;
         let rows = rows("positions", positions)?;
         if let Some(given) = given.as_ref().filter(|given| given.len() != rows.len()) {
             let expected = format!("{} rows, one per point", rows.len());
             return Err(wrong("descriptors", expected, given.len()));
         }
-        work::run(py, None, None, move || {
+        threads::run(py, None, None, move || {
             check_scale(&rows, scale)?;
             let sha256 = Some(hash_positions(&rows));
             let prepared = prepare(rows, given.as_ref(), &preparation)?;
@@ -145,8 +137,7 @@ impl Map {
 
 /// Reads a map: a COLMAP model or project, PLY, NPY or a table.
 #[pyfunction]
-#[pyo3(signature = (path, *, descriptors=None, scale=None, k=50, max_points=None, outlier_filter=None, seed=0))]
-#[allow(clippy::too_many_arguments)]
+#[pyo3(signature = (path, *, descriptors=None, scale=None, k=50, max_points=None, seed=0))]
 pub fn read(
     py: Python<'_>,
     path: PathBuf,
@@ -154,11 +145,10 @@ pub fn read(
     scale: Option<f64>,
     k: usize,
     max_points: Option<usize>,
-    outlier_filter: Option<(usize, f64)>,
     seed: u64,
 ) -> PyResult<Map> {
-    let preparation = preparation(scale, k, max_points, outlier_filter, seed)?;
-    work::run(py, None, None, move || {
+    let preparation = preparation(scale, k, max_points, seed)?;
+    threads::run(py, None, None, move || {
         let beside = Seen::new(&descriptors);
         let (input, prepared) = maps::open(&path, descriptors.as_deref(), &preparation)?;
         let sha256 = Some(hash_input(&input)?);
@@ -184,4 +174,50 @@ pub fn read(
             prepared: Arc::new(prepared),
         })
     })
+}
+
+/// Returns the scheme for `given`, a name or a function.
+pub fn scheme_of<const D: usize>(
+    given: &Bound<'_, PyAny>,
+    options: &SchemeOptions,
+    raised_by: &Raised,
+) -> PyResult<Arc<dyn Scheme<D>>>
+where
+    OwnScheme: Scheme<D>,
+{
+    let Ok(name) = given.extract::<String>() else {
+        return Ok(Arc::new(OwnScheme::new(given, raised_by)?));
+    };
+    let entry = scheme(&name).map_err(raised)?;
+    let subjects = if D == 2 { "images" } else { "maps" };
+    let expected = format!("one that is defined on {subjects}");
+    entry.of_dimension::<D>(options).ok_or_else(|| wrong("scheme", expected, name))
+}
+
+/// Hides a map under a scheme, a name or a function. Without a seed it uses a fresh key, for maps
+/// that are released. Never release a map made with a seed: whoever guesses the seed can restore
+/// the order of the records and, under `cp`, the points.
+#[pyfunction]
+#[pyo3(signature = (map, scheme, *, seed=None))]
+pub fn obfuscate(
+    py: Python<'_>,
+    map: &Map,
+    scheme: &Bound<'_, PyAny>,
+    seed: Option<u64>,
+) -> PyResult<Hidden> {
+    let by = Raised::default();
+    let unit = map.prepared.original.reveal().unit();
+    let scheme = scheme_of::<3>(scheme, &SchemeOptions::usual(unit), &by)?;
+    let key = seed.map_or_else(Key::fresh, |seed| Ok(Key::from_seed(seed))).map_err(raised)?;
+    let prepared = Arc::clone(&map.prepared);
+    let hidden = threads::run(py, None, Some(by.stop()), move || {
+        let (original, descriptors) = (&prepared.original, prepared.descriptors.as_ref());
+        let (released, secret) = hide(&*scheme, original, descriptors, &key)?;
+        check_laws(&*scheme, original, &key, (&released, &secret))
+            .map_err(|error| error.within(scheme.name()))?;
+        Ok::<_, unlift::Error>((released, secret))
+    });
+    let (released, secret) = hidden.map_err(|error| by.as_cause_of(py, error))?;
+    let truth = Truth::of(Arc::clone(&map.prepared), secret);
+    Ok(Hidden::of(Released::from(released), truth))
 }

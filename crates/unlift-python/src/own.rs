@@ -1,11 +1,13 @@
-//! Schemes, sources and solvers that are Python functions.
+//! Schemes, sources and solvers that are Python functions, and property tests of them.
 
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use pyo3::exceptions::PyAssertionError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use unlift::geometry::frame::Bounds;
+use unlift::guard::caught;
 use unlift::neighbors::{Needs, Neighborhoods, Source};
 use unlift::obfuscate::{Lifted, Scheme};
 use unlift::recover::{Builtin, RecoverOptions, Recovered, Solver};
@@ -13,12 +15,11 @@ use unlift::released::Released;
 use unlift::seed::{Key, Stage};
 use unlift::{Error, OneLine};
 
-use crate::arrays::{rows, to_rows};
-use crate::calls;
-use crate::errors::{raised, wrong};
-use crate::hidden::Released as PyReleased;
+use crate::arrays::{raised, rows, to_rows, wrong};
+use crate::hidden::{Released as PyReleased, released_of};
 use crate::lists::{self, Neighborhoods as PyNeighborhoods};
 use crate::records::{Hiding, InDimension, hiding};
+use crate::threads;
 
 /// Exceptions of user functions, and a flag that prevents further calls.
 #[derive(Clone, Debug, Default)]
@@ -94,7 +95,7 @@ impl Function {
     fn made<T>(&self, make: impl FnOnce(Python<'_>) -> PyResult<T>) -> Result<T, Error> {
         let Self { name, raised, .. } = self;
         let made =
-            calls::attached(&raised.stop, |py| make(py).map_err(|error| raised.keep(py, error)));
+            threads::attached(&raised.stop, |py| make(py).map_err(|error| raised.keep(py, error)));
         let made = made.unwrap_or_else(|| Err("an interrupt".to_owned()));
         made.map_err(|found| Error::new(name, "records, lists or positions", found))
     }
@@ -253,4 +254,58 @@ where
         Ok(name) => Ok(Arc::new(Builtin::from_name(&name).map_err(raised)?)),
         Err(_) => Ok(Arc::new(OwnSolver::new(given, raised_by)?)),
     }
+}
+
+/// Runs `laws`; a failure becomes an AssertionError with the property, the points and the result.
+fn kept(py: Python<'_>, by: &Raised, laws: impl FnOnce() + Send + 'static) -> PyResult<()> {
+    let result = threads::run(py, None, Some(by.stop()), move || Ok::<_, String>(caught(laws)))?;
+    result.map_err(|text| by.as_cause_of(py, PyAssertionError::new_err(text)))
+}
+
+/// Checks that a scheme hides every point, on its record, by its key alone, and in an order that
+/// reveals nothing.
+///
+/// It calls the scheme with 0, 1, 2, 3, 7, 120, 200, 300, 301, 600 and 700 points: of a made-up
+/// room, at random, many in one place; with `images`, keypoints `(n, 2)`. A scheme may refuse
+/// points by an exception, except 200, 600 and 700 points of a room.
+#[pyfunction]
+#[pyo3(signature = (scheme, *, images=false))]
+pub fn check_scheme(py: Python<'_>, scheme: &Bound<'_, PyAny>, images: bool) -> PyResult<()> {
+    let by = Raised::default();
+    let scheme = OwnScheme::new(scheme, &by)?;
+    kept(py, &by, move || match images {
+        true => unlift_testkit::scheme_laws::<2>(&scheme),
+        false => unlift_testkit::scheme_laws::<3>(&scheme),
+    })
+}
+
+/// Checks that a source returns a list for every hidden point of `released`, of records of this
+/// map, by its seed alone.
+///
+/// It calls the source three times.
+#[pyfunction]
+pub fn check_source(
+    py: Python<'_>,
+    source: &Bound<'_, PyAny>,
+    released: &Bound<'_, PyAny>,
+) -> PyResult<()> {
+    let (by, released) = (Raised::default(), released_of(released)?.of_map()?);
+    let source = OwnSource::new(source, &by)?;
+    kept(py, &by, move || unlift_testkit::source_laws::<3>(&source, &released))
+}
+
+/// Checks that a solver returns a row for every hidden point of `released`, and the same positions
+/// again.
+///
+/// It calls the solver three times, the last time with empty lists.
+#[pyfunction]
+pub fn check_solver(
+    py: Python<'_>,
+    solver: &Bound<'_, PyAny>,
+    released: &Bound<'_, PyAny>,
+    lists: &PyNeighborhoods,
+) -> PyResult<()> {
+    let (by, released) = (Raised::default(), released_of(released)?.of_map()?);
+    let (solver, lists) = (OwnSolver::new(solver, &by)?, Arc::clone(&lists.0));
+    kept(py, &by, move || unlift_testkit::solver_laws::<3>(&solver, &released, &lists))
 }

@@ -9,9 +9,8 @@ use unlift::released::{
 use unlift::truth::{DropReason, Dropped};
 use unlift::{Error, OriginalId};
 
-use crate::arrays::{column, indices, is_of_pairs, rows, told};
-use crate::either::{Either, of_either};
-use crate::errors::{raised, wrong};
+use crate::arrays::{column, indices, is_of_pairs, raised, rows, shape_text, wrong};
+use crate::hidden::{Either, of_either};
 
 /// Records, and the points that they hide; `None` means one point each, in order.
 #[derive(Clone)]
@@ -34,7 +33,7 @@ impl<const D: usize> Hiding<D> {
             let most = if matches!(obfuscation, Obfuscation::Lines(_)) { 2 } else { 1 };
             if shape[0] != n || !(1..=most).contains(&slots_per_record) {
                 let expected = format!("one row per record ({n}), of at most {most} points");
-                return Err(wrong("hidden", expected, told(&shape)));
+                return Err(wrong("hidden", expected, shape_text(&shape)));
             }
             rows = Some(of);
         }

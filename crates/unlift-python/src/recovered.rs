@@ -11,14 +11,12 @@ use unlift::recover::{Builtin, RecoverOptions, Recovered as Found, recover as so
 use unlift_audit::Checked;
 use unlift_io::stage::{Kind, read_recovered, write_recovered};
 
-use crate::arrays::{to_array, to_rows};
-use crate::errors::{raised, wrong};
-use crate::files::save;
-use crate::hidden::{Hidden, released_of, truth_of};
+use crate::arrays::{raised, to_array, to_rows, wrong};
+use crate::audit::{delta, thresholds};
+use crate::hidden::{Hidden, released_of, save, truth_of};
 use crate::lists::Neighborhoods;
 use crate::own::{Raised, solver_of};
-use crate::plan::{delta, thresholds};
-use crate::work;
+use crate::threads;
 
 /// Recovered points of a map: a position for every hidden point, or the reason why there is none.
 #[pyclass(frozen, module = "unlift")]
@@ -103,7 +101,7 @@ impl Recovered {
 /// in `SOLVERS` or a function; default: "joint". `confidence=False` skips the computation of
 /// `probability_within`.
 #[pyfunction]
-#[pyo3(signature = (released, lists, *, solver=None, delta=None, seed=0, exact_constraints=true, confidence=true, threads=None))]
+#[pyo3(signature = (released, lists, *, solver=None, delta=None, seed=0, confidence=true, threads=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn recover(
     py: Python<'_>,
@@ -112,13 +110,19 @@ pub fn recover(
     solver: Option<&Bound<'_, PyAny>>,
     delta: Option<f64>,
     seed: u64,
-    exact_constraints: bool,
     confidence: bool,
     threads: Option<usize>,
 ) -> PyResult<Recovered> {
     let released = released_of(released)?.of_map()?;
-    let (by, options) = (Raised::default(), options(delta, seed, exact_constraints)?);
-    let options = RecoverOptions { confidence, ..options };
+    let (by, options) = (
+        Raised::default(),
+        RecoverOptions {
+            delta: self::delta(delta)?,
+            seed,
+            confidence,
+            ..RecoverOptions::default()
+        },
+    );
     let solver = match solver {
         Some(given) => solver_of::<3>(given, &by)?,
         None => Arc::new(Builtin::Joint),
@@ -129,18 +133,8 @@ pub fn recover(
     }
     let lists = Arc::clone(&lists.0);
     let work = move || solve(&released, &lists, &*solver, &options);
-    let found = work::run(py, threads, Some(by.stop()), work);
+    let found = threads::run(py, threads, Some(by.stop()), work);
     Ok(Recovered(Arc::new(found.map_err(|error| by.as_cause_of(py, error))?)))
-}
-
-/// Converts arguments to options of recovery.
-pub fn options(delta: Option<f64>, seed: u64, exact_constraints: bool) -> PyResult<RecoverOptions> {
-    Ok(RecoverOptions {
-        delta: self::delta(delta)?,
-        seed,
-        exact_constraints,
-        ..RecoverOptions::default()
-    })
 }
 
 /// Compares recovered points with the truth; returns a dict like a row of an audit. With a Hidden
@@ -159,7 +153,7 @@ pub fn evaluate<'py>(
     let usual = Plan::<3>::new(truth.original().reveal().unit()).thresholds;
     let thresholds = self::thresholds(thresholds, &usual)?;
     let (recovered, asked) = (Arc::clone(&recovered.0), thresholds.clone());
-    let (row, notes) = work::run(py, None, None, move || {
+    let (row, notes) = threads::run(py, None, None, move || {
         let (original, secret) = (truth.original(), &truth.secret);
         let mut checked = Checked::default();
         checked.add(&recovered, original, secret, released.as_deref())?;

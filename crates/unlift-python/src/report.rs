@@ -7,8 +7,8 @@ use pyo3::prelude::*;
 use unlift_audit::{Audited, Quiet, Shown, open_audit};
 use unlift_io::atomic::Rules;
 
-use crate::errors::raised;
-use crate::files::refused;
+use crate::arrays::raised;
+use crate::hidden::refused;
 
 /// Results of an audit: numbers, and a page that shows them.
 #[pyclass(frozen, subclass, module = "unlift")]

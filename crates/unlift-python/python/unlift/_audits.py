@@ -45,16 +45,14 @@ class _Keypoints(TypedDict):
 
 
 class Features(_Keypoints, total=False):
-    """The keypoints of one image, and optional descriptors and scores.
+    """The keypoints of one image, and optional descriptors.
 
     keypoints: `(n, 2)`, x and y in pixels; the middle of the first pixel is (0, 0), as in hloc (COLMAP: (0.5, 0.5)).
     width, height: size of the image in pixels.
     descriptors: `(n, d)` uint8 or floats, a row per keypoint, or None; files of hloc hold the transpose.
-    scores: `(n,)`, from the extractor, or None; no result depends on them.
     """
 
     descriptors: npt.ArrayLike | None
-    scores: npt.ArrayLike | None
 
 
 class Named(Protocol):
@@ -74,13 +72,10 @@ def audit(
     solvers: Sequence[Solver] | Solver | None = None,
     thresholds: Iterable[float | str] | str | None = None,
     k: int = 50,
-    source_k: int | None = None,
     tile_points: int | None = None,
     tile: int | None = None,
     delta: float | None = None,
-    exact_constraints: bool = True,
     records_alone: bool = True,
-    reference: bool = False,
     seed: int = 0,
     repeats: int = 1,
     gates: Sequence[str] | str = (),
@@ -98,12 +93,11 @@ def audit(
         Neighborhoods, and a `numpy.random.Generator` if it has a third parameter. It returns positions `(n_slots, 3)` relative to
         `released.origin`; a row of NaN means that the point was not recovered.
     thresholds: errors up to which a point counts as recovered, in the unit of the map. Strings are kept as written.
-    k: number of true neighbors per point. source_k: records per list of a named source. Default: the source chooses.
+    k: number of true neighbors per point.
     tile_points: cut a large map into tiles of at most this many points, and audit each as a map of its own. tile: audit only the tile
         with this number, from 0, for tasks on a cluster.
     delta: distance up to which a neighbor supports a position. Default: the attack chooses.
-    exact_constraints: whether to use rules that tie records together.
-    records_alone: whether to attack maps without neighbor lists, too. reference: also attack with the true positions of neighbors.
+    records_alone: whether to attack maps without neighbor lists, too.
     seed: random seed. repeats: number of seeds; results are means over them.
     gates: bounds, such as "olc@0.5:0.10<=20"; `Report.passed` is True if all hold.
     threads: number of threads; no result depends on it.
@@ -112,7 +106,7 @@ def audit(
     If a scheme or source of your own fails, or a scheme fails a property test, it has no row and a warning names it. Raises UnliftError
     for a wrong argument, or if no scheme has a row. KeyboardInterrupt takes effect at once.
     """
-    asked = _asked(
+    options = _options(
         schemes=schemes,
         neighbors=neighbors,
         inlier_ratios=inlier_ratios,
@@ -120,19 +114,16 @@ def audit(
         solvers=solvers,
         thresholds=thresholds,
         k=k,
-        source_k=source_k,
         tile_points=tile_points,
         tile=tile,
         delta=delta,
-        exact_constraints=exact_constraints,
         records_alone=records_alone,
-        reference=reference,
         seed=seed,
         repeats=repeats,
         gates=gates,
         threads=threads,
     )
-    report = Report(_told(lambda tell: _audit(map, asked, tell), progress, "row"))
+    report = Report(_run(lambda tell: _audit(map, options, tell), progress, "row"))
     for one in report.document.get("not_audited") or []:
         if one["scheme"] not in SCHEMES or one.get("neighbors") not in (None, "oracle", *SOURCES):
             by = f" with neighbors by {one['neighbors']}" if one.get("neighbors") else ""
@@ -141,13 +132,12 @@ def audit(
 
 
 def audit_images(
-    images: str | os.PathLike[str] | Named | Mapping[str, Features] | Iterable[tuple[str, Features]],
+    images: str | os.PathLike[str] | Named | Mapping[str, Features],
     schemes: Sequence[Scheme] | Scheme | None = None,
     neighbors: Sequence[Source] | Source = ("oracle",),
     *,
     features: str | None = None,
     max_features: int | None = None,
-    min_score: float | None = None,
     max_images: int | None = None,
     show: Sequence[str] | str | None = None,
     photos: str | os.PathLike[str] | None = None,
@@ -156,10 +146,7 @@ def audit_images(
     solvers: Sequence[Solver] | Solver | None = None,
     thresholds: Iterable[float | str] | str | None = None,
     k: int = 20,
-    source_k: int | None = None,
     delta: float | None = None,
-    exact_constraints: bool = True,
-    reference: bool = False,
     seed: int = 0,
     repeats: int = 1,
     gates: Sequence[str] | str = (),
@@ -168,16 +155,15 @@ def audit_images(
 ) -> Report:
     """Hides the keypoints of `images` under each of `schemes`, attacks them with each of `neighbors`, and reports how many come back.
 
-    images: a dict of names to `Features` (dicts of arrays), or pairs of both; or a path, as for `unlift audit images`: a folder of
+    images: a dict of names to `Features` (dicts of arrays), or a path, as for `unlift audit images`: a folder of
         photos, features of hloc (.h5), a database of COLMAP. The same features under the same names give rows that are
         byte-identical to those of the command line.
         To save memory, give an object with `keys()` and `[name]` that reads images from a disk. It is called from other threads
-        when an image is needed, a few images ahead, and again for those that the page draws. Pairs are all read before the audit
-        begins, because it goes by sorted names; their arrays are not copied until then.
+        when an image is needed, a few images ahead, and again for those that the page draws.
     schemes: names in `IMAGE_SCHEMES`, or functions (`scheme`) of keypoints `(n, 2)` in pixels from the middle of the image, to
         Lines, Rays or Candidates of two columns. Default: all names. Arguments that take several items also take one.
     neighbors: "oracle", names in `IMAGE_SOURCES`, or functions (`source`).
-    features: what to extract from photos: "sift", "aliked", "superpoint". max_features: how many. min_score: least score.
+    features: what to extract from photos: "sift", "aliked", "superpoint". max_features: how many.
     max_images: use at most this many, evenly spaced over their sorted names.
     show: names of images to draw; none if empty. Default: those with the least, the median and the most recovered keypoints.
     photos: the folder of photos to draw, if `images` is not one.
@@ -190,7 +176,7 @@ def audit_images(
     Raises UnliftError for wrong arrays; the message names the image, what was expected and what was found. If an image of a path cannot
     be used, a warning names it, the audit leaves it out, and `Report.passed` is False. KeyboardInterrupt takes effect at once.
     """
-    asked = _asked(
+    options = _options(
         schemes=schemes,
         neighbors=neighbors,
         inlier_ratios=inlier_ratios,
@@ -198,27 +184,20 @@ def audit_images(
         solvers=solvers,
         thresholds=thresholds,
         k=k,
-        source_k=source_k,
-        tile_points=None,
-        tile=None,
         delta=delta,
-        exact_constraints=exact_constraints,
-        records_alone=True,
-        reference=reference,
         seed=seed,
         repeats=repeats,
         gates=gates,
         threads=threads,
         features=features,
         max_features=max_features,
-        min_score=min_score,
         max_images=max_images,
         photos=None if photos is None else os.fspath(photos),
         show=show,
     )
-    found: tuple[_Report, list[str]] = _told(lambda tell: _audit_images(images, asked, tell), progress, "image")
-    report, said = found
-    for line in said:
+    native: tuple[_Report, list[str]] = _run(lambda tell: _audit_images(images, options, tell), progress, "image")
+    report, messages = native
+    for line in messages:
         warnings.warn(line, stacklevel=2)
     return Report(report)
 
@@ -228,7 +207,7 @@ def _several(given: Any) -> list[Any]:
     return [given] if isinstance(given, str) or callable(given) else list(given)
 
 
-def _asked(**options: Any) -> dict[str, Any]:
+def _options(**options: Any) -> dict[str, Any]:
     """Returns the options in the form that the native module takes."""
     return {
         name: _several(given) if name in SEVERAL and given is not None else given
@@ -236,7 +215,7 @@ def _asked(**options: Any) -> dict[str, Any]:
     }
 
 
-def _told(
+def _run(
     audit: Callable[[Callable[[int, int, str], object] | None], T],
     progress: bool | Callable[[int, int, str], object],
     unit: str,

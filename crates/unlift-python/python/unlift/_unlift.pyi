@@ -67,7 +67,6 @@ class Map:
         scale: float | None = None,
         k: int = 50,
         max_points: int | None = None,
-        outlier_filter: tuple[int, float] | None = None,
         seed: int = 0,
     ) -> Map: ...
     def __len__(self) -> int: ...
@@ -91,7 +90,6 @@ def read(
     scale: float | None = None,
     k: int = 50,
     max_points: int | None = None,
-    outlier_filter: tuple[int, float] | None = None,
     seed: int = 0,
 ) -> Map: ...
 
@@ -240,7 +238,6 @@ def recover(
     solver: str | Callable[..., Any] | None = None,
     delta: float | None = None,
     seed: int = 0,
-    exact_constraints: bool = True,
     confidence: bool = True,
     threads: int | None = None,
 ) -> Recovered: ...
@@ -259,10 +256,10 @@ class Report:
     def save(self, out: _Path, *, share_safe: bool = False, force: bool = False) -> pathlib.Path: ...
 
 def audit(
-    map: Map, asked: dict[str, Any], tell: Callable[[int, int, str], object] | None
+    map: Map, options: dict[str, Any], tell: Callable[[int, int, str], object] | None
 ) -> Report: ...
 def audit_images(
-    images: Any, asked: dict[str, Any], tell: Callable[[int, int, str], object] | None
+    images: Any, options: dict[str, Any], tell: Callable[[int, int, str], object] | None
 ) -> tuple[Report, list[str]]: ...
 def check_scheme(scheme: Callable[..., Records], *, images: bool = False) -> None:
     """Checks that a scheme hides every point, on its record, by its key alone, and in an order that reveals nothing.

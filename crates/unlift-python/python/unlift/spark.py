@@ -39,10 +39,6 @@ def audit_images(images: _DataFrame, **options: Any) -> _DataFrame:
     return _over(images, "audit_images", options)
 
 
-def _spec(columns: dict[str, str]) -> str:
-    return ", ".join(f"{name} {of}" for name, of in columns.items())
-
-
 def _over(items: _DataFrame, by: str, options: dict[str, Any]) -> _DataFrame:
     options = {"threads": 1, **options}
 
@@ -52,4 +48,5 @@ def _over(items: _DataFrame, by: str, options: dict[str, Any]) -> _DataFrame:
         rows: Iterator[_pa.RecordBatch] = getattr(here, by)(batches, **options)
         return rows
 
-    return items.mapInArrow(of_partition, _spec(fleet.ROWS))
+    columns = ", ".join(f"{name} {of}" for name, of in fleet.ROWS.items())
+    return items.mapInArrow(of_partition, columns)
