@@ -18,8 +18,6 @@ pub struct Inversion {
     pub size: [u32; 2],
     /// The photo.
     pub photo: Vec<u8>,
-    /// Objects that a detector found in the photo.
-    pub objects: Vec<Object>,
     /// The picture painted from the true keypoints.
     pub baseline: Painted,
     /// What each scheme releases, in pixels of the photo.
@@ -35,28 +33,6 @@ pub struct Painted {
     pub jpeg: Vec<u8>,
     /// Its similarity to the photo.
     pub likeness: Likeness,
-    /// Objects that a detector found in it.
-    pub objects: Vec<Object>,
-}
-
-/// An everyday object that a detector found in a picture.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Object {
-    /// Its class, for example `chair`.
-    pub class: String,
-    /// Left, top, right and bottom as fractions of the picture's sides; may be outside 0 to 1.
-    pub sides: [f32; 4],
-}
-
-impl Object {
-    /// Returns whether `other` is this object: the same class, and intersection over union of at least one half.
-    fn is(&self, other: &Self) -> bool {
-        let [a, b] = [self.sides, other.sides];
-        let side = |low: f32, high: f32| (high - low).max(0.0);
-        let area = |s: [f32; 4]| side(s[0], s[2]) * side(s[1], s[3]);
-        let common = side(a[0].max(b[0]), a[2].min(b[2])) * side(a[1].max(b[1]), a[3].min(b[3]));
-        self.class == other.class && common >= 0.5 * (area(a) + area(b) - common)
-    }
 }
 
 /// The similarity of a picture to the photo.
@@ -102,15 +78,6 @@ pub(crate) struct Sheet {
 }
 
 #[derive(Debug, Serialize)]
-struct Boxed {
-    class: String,
-    left: f32,
-    top: f32,
-    width: f32,
-    height: f32,
-}
-
-#[derive(Debug, Serialize)]
 struct SheetRow {
     scheme: String,
     /// Whether `main` has one picture per number of queries, ascending.
@@ -124,7 +91,6 @@ struct Shown {
     label: String,
     said: String,
     source: String,
-    boxes: Vec<Boxed>,
 }
 
 /// Maximal number of bytes for all pictures of the page.
@@ -204,41 +170,24 @@ fn sheet(document: &Document, inversion: &Inversion) -> Sheet {
         SheetRow {
             scheme: scheme.to_owned(),
             by_queries,
-            others: others.map(|view| shown(inversion, view)).collect(),
-            main: main.into_iter().map(|view| shown(inversion, view)).collect(),
+            others: others.map(shown).collect(),
+            main: main.into_iter().map(shown).collect(),
         }
     });
     Sheet {
         name: inversion.name.clone(),
         photo: source(&inversion.photo),
-        baseline: painted(inversion, &inversion.baseline, "without protection".to_owned()),
+        baseline: painted(&inversion.baseline, "without protection".to_owned()),
         rows: rows.collect(),
     }
 }
 
-fn shown(inversion: &Inversion, view: &InvertedView) -> Shown {
-    painted(inversion, &view.painted, attack::without_solver(&view.given, &view.solver))
+fn shown(view: &InvertedView) -> Shown {
+    painted(&view.painted, attack::without_solver(&view.given, &view.solver))
 }
 
-fn painted(inversion: &Inversion, painted: &Painted, label: String) -> Shown {
-    Shown {
-        label,
-        said: painted.likeness.said(),
-        source: source(&painted.jpeg),
-        boxes: found_again(&inversion.objects, &painted.objects),
-    }
-}
-
-/// Returns the boxes of objects that were found in the photo and again in the picture. A box in the picture alone is
-/// no evidence.
-fn found_again(photo: &[Object], picture: &[Object]) -> Vec<Boxed> {
-    let again = picture.iter().filter(|object| photo.iter().any(|one| one.is(object)));
-    let boxed = |object: &Object| {
-        let [left, top, right, bottom] = object.sides.map(|side| 100.0 * side.clamp(0.0, 1.0));
-        let class = object.class.clone();
-        Boxed { class, left, top, width: right - left, height: bottom - top }
-    };
-    again.map(boxed).collect()
+fn painted(painted: &Painted, label: String) -> Shown {
+    Shown { label, said: painted.likeness.said(), source: source(&painted.jpeg) }
 }
 
 pub(crate) fn source(jpeg: &[u8]) -> String {
@@ -278,15 +227,5 @@ mod tests {
         assert_eq!(of(&[inversion(40_000), inversion(40_000)]), (vec![40], 40));
         let (few, left_out) = of(&[inversion(200_000)]);
         assert!(few[0] > 4 && few[0] + left_out == 40, "{few:?}");
-    }
-
-    #[test]
-    fn only_objects_that_are_found_again_have_boxes() {
-        let object = |class: &str, sides| Object { class: class.into(), sides };
-        let photo = [object("cat", [0.0, 0.0, 0.5, 0.5])];
-        let of = |found: Object| found_again(&photo, &[found]).len();
-        assert_eq!(of(object("cat", [0.0, 0.0, 0.5, 0.4])), 1);
-        assert_eq!(of(object("bed", [0.0, 0.0, 0.5, 0.5])), 0, "another class");
-        assert_eq!(of(object("cat", [0.25, 0.0, 0.75, 0.5])), 0, "a third in common");
     }
 }

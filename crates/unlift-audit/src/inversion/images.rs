@@ -11,7 +11,7 @@ use unlift_features::preview::jpeg_of;
 use unlift_invert::{Detection, Points};
 use unlift_report::inversions::Inversion as Sheet;
 
-use super::{Judged, Painter, SHOWN, boxed, figures, needed, painted, shown, size};
+use super::{Judged, Painter, SHOWN, figures, needed, painted, shown, size};
 
 /// A photo at the size of its pictures, and the baseline of its true points.
 struct Truth {
@@ -96,7 +96,6 @@ impl Inversion {
     ) -> Result<(), Error> {
         if sheet.photo.is_empty() {
             sheet.photo = jpeg_of(&truth.photo, SHOWN)?;
-            sheet.objects = boxed(&truth.objects, &truth.photo);
             sheet.baseline = painted(&truth.picture, &truth.baseline)?;
         }
         let judged = self.painter.judge(picture, &truth.photo, &truth.objects)?;

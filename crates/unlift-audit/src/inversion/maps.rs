@@ -18,7 +18,7 @@ use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::pictures::{Marks, ReleasedView};
 use unlift_report::scene::{SceneBox, Shapes};
 
-use super::{Judged, Painter, SHOWN, boxed, figures, needed, painted, shown};
+use super::{Judged, Painter, SHOWN, figures, needed, painted, shown};
 use crate::progress::Progress;
 use crate::scene::{near, shapes};
 
@@ -147,7 +147,6 @@ impl MapInversion {
                 sheet.name.clone_from(&seen.name);
                 sheet.size = seen.view.size.map(|side| side as u32);
                 sheet.photo = jpeg_of(&seen.photo, SHOWN)?;
-                sheet.objects = boxed(&seen.objects, &seen.photo);
                 sheet.baseline = painted(painted_of_truth, baseline)?;
             }
             if let Some((shapes, middle)) = &records {

@@ -15,7 +15,7 @@ use unlift_features::preview::jpeg_of;
 use unlift_invert::{
     CLASSES, Detection, Detector, Inverter, Lpips, Metrics, Points, Projection, View,
 };
-use unlift_report::inversions::{InvertedView, Likeness, Object, Painted};
+use unlift_report::inversions::{InvertedView, Likeness, Painted};
 
 use crate::document::given;
 
@@ -55,7 +55,6 @@ pub struct Painter {
 #[derive(Clone, Debug)]
 struct Judged {
     metrics: Metrics,
-    objects: Vec<Detection>,
     /// The class of every object of the photo, and whether it is found in the picture.
     found: Vec<(usize, bool)>,
 }
@@ -169,7 +168,7 @@ impl Painter {
             seen.iter().any(|one| one.class == object.class && one.overlap(object) >= SAME)
         };
         let found = objects.iter().map(|object| (object.class, again(object))).collect();
-        Ok(Judged { metrics, objects: seen, found })
+        Ok(Judged { metrics, found })
     }
 }
 
@@ -216,18 +215,7 @@ fn painted(picture: &ColorImage, judged: &Judged) -> Result<Painted, Error> {
     Ok(Painted {
         jpeg: jpeg_of(picture, SHOWN)?,
         likeness: Likeness { ssim: judged.metrics.ssim, lpips: judged.metrics.lpips },
-        objects: boxed(&judged.objects, picture),
     })
-}
-
-fn boxed(objects: &[Detection], picture: &ColorImage) -> Vec<Object> {
-    let size = [picture.width(), picture.height()].map(|side| side as f32);
-    let share = |object: &Detection| std::array::from_fn(|at| object.sides[at] / size[at % 2]);
-    let boxed = |object: &Detection| Object {
-        class: CLASSES[object.class].to_owned(),
-        sides: share(object),
-    };
-    objects.iter().map(boxed).collect()
 }
 
 fn needed(descriptors: Option<&Descriptors>) -> Result<&Descriptors, Error> {

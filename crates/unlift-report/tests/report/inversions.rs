@@ -1,7 +1,7 @@
 //! Tests of painted pictures on the page.
 
 use unlift_report::document::{Document, Row};
-use unlift_report::inversions::{Inversion, InvertedView, Likeness, Object, Painted};
+use unlift_report::inversions::{Inversion, InvertedView, Likeness, Painted};
 use unlift_report::{Given, RenderOptions, render};
 
 use crate::sample;
@@ -26,10 +26,6 @@ fn document() -> Document {
     document
 }
 
-fn object(class: &str) -> Object {
-    Object { class: class.into(), sides: [0.25, -0.5, 0.75, 0.5] }
-}
-
 fn inversion(document: &Document, ssim: impl Fn(&Row) -> f64) -> Inversion {
     let view = |row: &Row| InvertedView {
         scheme: row.scheme.clone(),
@@ -37,7 +33,6 @@ fn inversion(document: &Document, ssim: impl Fn(&Row) -> f64) -> Inversion {
         solver: row.solver.clone(),
         painted: Painted {
             jpeg: vec![1],
-            objects: vec![object("chair"), object("bed")],
             likeness: Likeness { ssim: ssim(row), lpips: 0.3 },
         },
     };
@@ -45,7 +40,6 @@ fn inversion(document: &Document, ssim: impl Fn(&Row) -> f64) -> Inversion {
     Inversion {
         name: picture.name,
         size: picture.size,
-        objects: vec![object("chair")],
         baseline: Painted { likeness: Likeness { ssim: 0.5, lpips: 0.2 }, ..Painted::default() },
         released: picture.released,
         views: document.results.iter().map(view).collect(),
@@ -111,14 +105,6 @@ fn only_the_strongest_attacks_are_shown_at_first() {
     assert!(main.contains("known neighbors, 50 % right"));
     let (others, _) = others.split_once("</details>").expect("an end");
     assert_eq!(others.matches("<img").count(), 5);
-}
-
-#[test]
-fn boxes_are_of_objects_that_are_found_again() {
-    let document = document();
-    let found = page(&document, vec![inversion(&document, |_| 0.4)], false);
-    let frame = "style=\"left:25.0%;top:0.0%;width:50.0%;height:50.0%\"><b>chair</b>";
-    assert!(found.contains(frame) && !found.contains("<b>bed</b>"), "{found}");
 }
 
 #[test]
