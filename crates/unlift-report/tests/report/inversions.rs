@@ -31,10 +31,7 @@ fn inversion(document: &Document, ssim: impl Fn(&Row) -> f64) -> Inversion {
         scheme: row.scheme.clone(),
         given: Given::of(row),
         solver: row.solver.clone(),
-        painted: Painted {
-            jpeg: vec![1],
-            likeness: Likeness { ssim: ssim(row), lpips: 0.3 },
-        },
+        painted: Painted { jpeg: vec![1], likeness: Likeness { ssim: ssim(row), lpips: 0.3 } },
     };
     let picture = sample::picture();
     Inversion {
