@@ -2,7 +2,7 @@
 """Compares our SIFT with pycolmap's (the oracle) and OpenCV's: what is found, and how fast.
 
     pip install pycolmap opencv-python-headless numpy
-    cargo build --release -p unlift-features --no-default-features --example features
+    cargo build --release -p unlift-vision --example features
     python3 docs/compare_sift.py IMAGE... [--max-features N] [--no-speed]
 
 A keypoint of one is found by the other if there is one within 1 pixel whose scale has a ratio below 1.1

@@ -146,10 +146,11 @@ pub fn stages(bytes: &[u8]) {
 
 /// Decodes a photo.
 pub fn photo(bytes: &[u8]) {
-    if let Ok(image) = unlift_features::load::decode(bytes, "a photo") {
+    if let Ok(image) = unlift_vision::features::load::decode(bytes, "a photo") {
         assert!(image.width() > 0 && image.height() > 0);
         let path = file("p.jpg", bytes);
-        let color = unlift_features::load::read_color(&path).expect("as it was read in gray");
+        let color =
+            unlift_vision::features::load::read_color(&path).expect("as it was read in gray");
         assert_eq!([color.width(), color.height()], [image.width(), image.height()]);
     }
 }
@@ -167,6 +168,6 @@ pub fn document(bytes: &[u8]) {
 /// Loads a network of a user, whose file has no hash.
 pub fn network(bytes: &[u8]) {
     let path = file("n.onnx", bytes);
-    let entry = unlift_nn::entry("superpoint").expect("an entry");
-    let _ = unlift_nn::Network::read(&path, entry);
+    let entry = unlift_vision::network::entry("superpoint").expect("an entry");
+    let _ = unlift_vision::network::Network::read(&path, entry);
 }

@@ -1,6 +1,6 @@
 """ALIKED (aliked-n16rot) as one ONNX file that `unlift` carries.
 
-    python export/aliked.py aliked_n16rot.safetensors ../crates/unlift-nn/models/aliked-n16rot
+    python export/aliked.py aliked_n16rot.safetensors ../crates/unlift-vision/models/aliked-n16rot
 
 Written from the paper (Zhao et al., "ALIKED: A Lighter Keypoint and Descriptor Extraction Network via
 Deformable Transformation", 2023) and the names of the published weights. The file holds three networks

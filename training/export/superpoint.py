@@ -6,7 +6,7 @@
 The weights (https://github.com/magicleap/SuperPointPretrainedNetwork) are for non-commercial research and may not be
 passed on, so neither they nor the file made of them are in this repository. The second form makes a narrow network of
 seeded random weights, and what the steps below find on a made-up image: the fixture of
-`cargo test -p unlift-features --test features superpoint`.
+`cargo test -p unlift-vision --test vision superpoint`.
 
 Written from the paper (DeTone, Malisiewicz, Rabinovich: "SuperPoint: Self-Supervised Interest Point Detection and
 Description", CVPR workshops 2018) and the names of the published weights:

@@ -1,6 +1,6 @@
 """Holds photos and keypoints on a device and makes batches of crops there, so that no step waits for the CPU.
 
-`batches.py FILE` writes the golden file of a test in Rust: `../../crates/unlift-invert/tests/data/feature-image.safetensors`.
+`batches.py FILE` writes the golden file of a test in Rust: `../../crates/unlift-vision/tests/data/feature-image.safetensors`.
 """
 
 import pathlib
@@ -60,7 +60,7 @@ def channels(descriptors: torch.Tensor, colors: torch.Tensor | None, known: torc
 
 
 def feature_image(places, values, weights, of, n: int, size: tuple[int, int]) -> torch.Tensor:
-    """Returns feature images (n, c + 3, height / 4, width / 4) of `size` (width, height), as `unlift_invert` makes them.
+    """Returns feature images (n, c + 3, height / 4, width / 4) of `size` (width, height), as `unlift-vision` makes them.
 
     `places` (k, 2) are in pixels, the corner of the first pixel at (0, 0); `values` (k, c) are those of `channels`; `weights` (k,)
     are from 0 to 1; `of` (k,) is the image of each point. A cell has the weighted means of its points' values and places inside

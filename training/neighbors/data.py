@@ -1,4 +1,4 @@
-"""Crops as `cargo run --release -p unlift-features --example training_crops` writes them, in batches.
+"""Crops as `cargo run --release -p unlift-vision --example training_crops` writes them, in batches.
 
 `data.py FOLDER SPLIT` prints the photos of a folder that its SOURCES.csv counts to a split: a list for that program.
 """

@@ -48,7 +48,7 @@ pub mod recover;
 pub mod released;
 pub mod seed;
 pub mod sequence;
-// Not part of the interface: `unlift-features` compiles its loops through it, so that all `unsafe` stays here.
+// Not part of the interface: `unlift-vision` compiles its loops through it, so that all `unsafe` stays here.
 #[doc(hidden)]
 pub mod simd;
 

@@ -20,7 +20,7 @@ const BY_DESCRIPTORS: SourceEntry = SourceEntry {
 pub fn all() -> Vec<&'static SourceEntry> {
     let all = sources::SOURCES.iter();
     #[cfg(feature = "networks")]
-    let all = all.chain(unlift_nn::SOURCES);
+    let all = all.chain(unlift_vision::network::SOURCES);
     all.chain([&BY_DESCRIPTORS]).collect()
 }
 
@@ -44,8 +44,8 @@ struct ByDescriptors;
 fn best<const D: usize>(descriptors: Option<&Descriptors>) -> Box<dyn Source<D>> {
     let takes = |source: &dyn Source<D>| descriptors.is_some_and(|some| source.takes(some).is_ok());
     #[cfg(feature = "networks")]
-    if takes(&unlift_nn::Learned::default()) {
-        return Box::new(unlift_nn::Learned::default());
+    if takes(&unlift_vision::network::Learned::default()) {
+        return Box::new(unlift_vision::network::Learned::default());
     }
     if takes(&Overlap) { Box::new(Overlap) } else { Box::new(Similarity) }
 }

@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use unlift_audit::{Journal, Preparation, Quiet, by_point, prepare, sources};
-use unlift_features::{AlikedOptions, Extraction, Extractor, SuperPointOptions};
+use unlift_vision::features::{AlikedOptions, Extraction, Extractor, SuperPointOptions};
 
 fn line<T, E: ToString>(result: Result<T, E>) -> String {
     result.err().expect("an error").to_string()

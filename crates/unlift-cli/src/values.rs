@@ -10,7 +10,7 @@ use unlift::neighbors::sources::Named;
 use unlift::obfuscate::{Entry, Mitigation, Protection, SCHEMES};
 use unlift::recover::{Builtin, Delta};
 use unlift_audit::{OutlierFilter, sources};
-use unlift_nn::DescriptorKind;
+use unlift_vision::network::DescriptorKind;
 
 /// Source of neighbor lists.
 #[derive(Clone, Debug, PartialEq)]

@@ -26,7 +26,7 @@ use rayon::prelude::*;
 use unlift::synthetic::vectors::{add, scale};
 use unlift::synthetic::{self, Sheet};
 use unlift::{Descriptors, Error};
-use unlift_features::Sift;
+use unlift_vision::features::Sift;
 
 use crate::light::Lights;
 use crate::pinhole::Pinhole;

@@ -3,7 +3,7 @@
 use unlift::descriptors::Values;
 use unlift::synthetic::Sheet;
 use unlift::{Descriptors, Error};
-use unlift_features::Features;
+use unlift_vision::features::Features;
 
 use crate::pinhole::Pinhole;
 use crate::raster::{Facing, NONE, Seen};

@@ -2,7 +2,7 @@
 
 use unlift::Error;
 use unlift::synthetic::Sheet;
-use unlift_features::ColorImage;
+use unlift_vision::features::ColorImage;
 
 use crate::light::Lights;
 use crate::material::{Shade, shade};

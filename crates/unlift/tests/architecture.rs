@@ -12,28 +12,14 @@ const CRATES: &[(&str, &[&str])] = &[
     ("unlift-attack", &[]),
     ("unlift", &["unlift-attack"]),
     ("unlift-io", &["unlift"]),
-    ("unlift-nn", &["unlift"]),
-    ("unlift-features", &["unlift", "unlift-nn"]),
+    ("unlift-vision", &["unlift"]),
     ("unlift-report", &[]),
     ("unlift-testkit", &["unlift"]),
-    ("unlift-invert", &["unlift", "unlift-nn", "unlift-features"]),
-    ("unlift-demo", &["unlift", "unlift-features", "unlift-invert"]),
-    (
-        "unlift-audit",
-        &["unlift", "unlift-io", "unlift-nn", "unlift-features", "unlift-invert", "unlift-report"],
-    ),
+    ("unlift-demo", &["unlift", "unlift-vision"]),
+    ("unlift-audit", &["unlift", "unlift-io", "unlift-vision", "unlift-report"]),
     (
         "unlift-cli",
-        &[
-            "unlift",
-            "unlift-audit",
-            "unlift-demo",
-            "unlift-io",
-            "unlift-nn",
-            "unlift-features",
-            "unlift-invert",
-            "unlift-report",
-        ],
+        &["unlift", "unlift-audit", "unlift-demo", "unlift-io", "unlift-vision", "unlift-report"],
     ),
 ];
 

@@ -6,7 +6,7 @@ use std::path::Path;
 use unlift::Descriptors;
 use unlift::descriptors::Values;
 use unlift::neighbors::DescriptorKind;
-use unlift_features::{AlikedOptions, Extraction, SiftOptions, SuperPointOptions};
+use unlift_vision::features::{AlikedOptions, Extraction, SiftOptions, SuperPointOptions};
 
 use crate::Error;
 

@@ -4,11 +4,13 @@ use std::path::{Path, PathBuf};
 
 use unlift::Descriptors;
 use unlift::descriptors::Values;
-use unlift_features::load::Turn;
-use unlift_features::{Extraction, Extractor, Features, Found as FoundFeatures, LearnedFeatures};
 use unlift_io::Error;
 use unlift_io::features::{ImageFeatures, round_to_half};
 use unlift_io::seen::Seen;
+use unlift_vision::features::load::Turn;
+use unlift_vision::features::{
+    Extraction, Extractor, Features, Found as FoundFeatures, LearnedFeatures,
+};
 
 /// File name endings of photos. The format is detected from the bytes.
 const ENDINGS: [&str; 6] = ["jpg", "jpeg", "jpe", "jfif", "png", "webp"];

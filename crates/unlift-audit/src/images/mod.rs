@@ -13,9 +13,9 @@ pub mod stream;
 
 use std::path::Path;
 
-use unlift_features::Extraction;
-use unlift_features::load::Turn;
 use unlift_io::features::{self, ImageFeatures};
+use unlift_vision::features::Extraction;
+use unlift_vision::features::load::Turn;
 
 use crate::Error;
 
@@ -25,7 +25,7 @@ pub use in_memory::InMemory;
 /// Images by name, read one at a time. Threads can share it; it holds the names only.
 ///
 /// To read all images in parallel, in order and in constant memory, call `in_order` of
-/// `unlift-features` over the indices of [`names`](Self::names), with `get` as its work.
+/// `unlift-vision` over the indices of [`names`](Self::names), with `get` as its work.
 pub enum FeatureSource {
     /// Photos, whose features are extracted on request.
     Folder(Folder),

@@ -5,7 +5,7 @@ use unlift::Error;
 use unlift::neighbors::{REAL, Similarity, Source, support};
 use unlift::recover::Recovered;
 use unlift::released::{Obfuscation, Rays, Released};
-use unlift_invert::{Lens, View};
+use unlift_vision::pictures::{Lens, View};
 
 /// Names of the views, with the camera axes right, down and forward.
 const SIX: [(&str, [[f64; 3]; 3]); 6] = [

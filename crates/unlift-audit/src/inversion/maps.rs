@@ -9,14 +9,14 @@ use rayon::prelude::*;
 use unlift::Error;
 use unlift::audit::{Cell, Measure, Row};
 use unlift::geometry::frame::rounded_origin;
-use unlift_features::ColorImage;
-use unlift_features::load::{Turn, read_color_with};
-use unlift_features::preview::jpeg_of;
-use unlift_invert::{Detection, Lens, View};
 use unlift_io::read::colmap;
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::pictures::{Marks, ReleasedView};
 use unlift_report::scene::{SceneBox, Shapes};
+use unlift_vision::features::ColorImage;
+use unlift_vision::features::load::{Turn, read_color_with};
+use unlift_vision::features::preview::jpeg_of;
+use unlift_vision::pictures::{Detection, Lens, View};
 
 use super::{Judged, Painter, SHOWN, figures, needed, painted, shown};
 use crate::progress::Progress;

@@ -10,12 +10,12 @@ use unlift::audit::Row;
 use unlift::recover::Recovered;
 use unlift::released::Released;
 use unlift::{Descriptors, Error, RowOrder};
-use unlift_features::ColorImage;
-use unlift_features::preview::jpeg_of;
-use unlift_invert::{
+use unlift_report::inversions::{InvertedView, Likeness, Painted};
+use unlift_vision::features::ColorImage;
+use unlift_vision::features::preview::jpeg_of;
+use unlift_vision::pictures::{
     CLASSES, Detection, Detector, Inverter, Lpips, Metrics, Points, Projection, View,
 };
-use unlift_report::inversions::{InvertedView, Likeness, Painted};
 
 use crate::document::given;
 
@@ -276,7 +276,7 @@ mod tests {
     use unlift::recover::{Estimate, Status};
     use unlift::released::{Lines, Obfuscation};
     use unlift::{About, Unit};
-    use unlift_invert::Lens;
+    use unlift_vision::pictures::Lens;
 
     use super::*;
 

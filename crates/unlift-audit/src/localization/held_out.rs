@@ -15,10 +15,10 @@ use unlift::released::Released;
 use unlift::seed::{Key, Stage};
 use unlift::truth::{Original, Secret};
 use unlift::{Descriptors, Error, PointSet, ProtectedDescriptors, Unit};
-use unlift_features::Extraction;
-use unlift_features::load::Turn;
-use unlift_invert::Lens;
 use unlift_report::document::{FEWEST_HELD_OUT, HeldOut};
+use unlift_vision::features::Extraction;
+use unlift_vision::features::load::Turn;
+use unlift_vision::pictures::Lens;
 
 use super::Cameras;
 use crate::images::FeatureSource;

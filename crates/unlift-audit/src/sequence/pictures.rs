@@ -1,8 +1,8 @@
 //! Pictures of what comes back of a few queries, one per scheme and number of queries.
 
 use unlift::audit::Row;
-use unlift_invert::Points;
 use unlift_report::inversions::Inversion as Sheet;
+use unlift_vision::pictures::Points;
 
 use super::{Attack, Hidden};
 use crate::Error;

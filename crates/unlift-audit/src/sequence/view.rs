@@ -9,10 +9,10 @@ use unlift::seed::{Draws, Stage};
 use unlift::sequence::Camera;
 use unlift::truth::Original;
 use unlift::{Descriptors, PointSet, Unit};
-use unlift_invert::Lens;
 use unlift_io::Error;
 use unlift_io::features::ImageFeatures;
 use unlift_io::read::colmap::{self, Image};
+use unlift_vision::pictures::Lens;
 
 use crate::images::FeatureSource;
 

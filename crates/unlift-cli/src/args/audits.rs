@@ -12,7 +12,7 @@ use unlift::obfuscate::{Entry, Mitigation, Protection};
 use unlift::recover::{Builtin, Delta};
 use unlift_audit::images::extraction::Wanted;
 use unlift_audit::{Gate, OutlierFilter};
-use unlift_nn::DescriptorKind;
+use unlift_vision::network::DescriptorKind;
 
 use crate::values::{self, NeighborSource};
 

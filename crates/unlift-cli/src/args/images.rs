@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::Args;
-use unlift_nn::DescriptorKind;
+use unlift_vision::network::DescriptorKind;
 
 use crate::values;
 

@@ -7,7 +7,7 @@ use unlift::OneLine;
 use unlift::obfuscate::{ON_REQUEST, all};
 use unlift::simd::instructions;
 use unlift_audit::total_bytes;
-use unlift_nn::{Entry, Folders, MODELS, Place};
+use unlift_vision::network::{Entry, Folders, MODELS, Place};
 
 use crate::args::{Cli, CompletionsArgs, DoctorArgs, ManArgs, ModelsArgs};
 use crate::exit::{Outcome, usage};

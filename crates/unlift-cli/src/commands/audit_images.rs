@@ -15,9 +15,9 @@ use unlift_audit::images::extraction::sample;
 use unlift_audit::images::stream::Needs;
 use unlift_audit::inversion::Inversion;
 use unlift_audit::{Finished, Shown, open_audit};
-use unlift_features::Extraction;
 use unlift_io::atomic::Rules;
 use unlift_io::{Error, read};
+use unlift_vision::features::Extraction;
 
 use super::common::{all_could_be, with_threads};
 use super::gate_files::GateFiles;

@@ -12,8 +12,8 @@ use unlift_audit::images::{FeatureSource, choice};
 use unlift_audit::inversion::Inversion;
 use unlift_audit::sequence::{PoseError, SequenceJob, perform};
 use unlift_audit::{Finished, Shown, open_audit};
-use unlift_features::load::Turn;
 use unlift_io::atomic::Rules;
+use unlift_vision::features::load::Turn;
 
 use super::common::with_threads;
 use super::gate_files::GateFiles;

@@ -17,12 +17,12 @@ use unlift_audit::images::choice::headline;
 use unlift_audit::inversion::Inversion;
 use unlift_audit::maps::find as find_map;
 use unlift_audit::{Audited, FIGURES, Job, PAGE, refused};
-use unlift_features::{AlikedOptions, Extraction};
 use unlift_io::atomic::{Access, Kind, OutputSet, Rules};
 use unlift_io::hash::hash_positions;
-use unlift_nn::{DescriptorKind, Learned};
 use unlift_report::Shares;
 use unlift_report::document::Input;
+use unlift_vision::features::{AlikedOptions, Extraction};
+use unlift_vision::network::{DescriptorKind, Learned};
 
 use super::common::with_threads;
 use super::painter::painter;

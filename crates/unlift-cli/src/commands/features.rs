@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use unlift::OneLine;
-use unlift_features::Extraction;
-use unlift_features::batch::in_order;
-use unlift_features::load::Turn;
 use unlift_io::Error;
 use unlift_io::atomic::{Kind, Rules};
 use unlift_io::features::{FeatureWriter, ImageFeatures};
+use unlift_vision::features::Extraction;
+use unlift_vision::features::batch::in_order;
+use unlift_vision::features::load::Turn;
 
 use super::common::{all_could_be, with_threads};
 use crate::args::FeaturesArgs;

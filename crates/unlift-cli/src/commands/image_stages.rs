@@ -13,10 +13,10 @@ use unlift::released::Released;
 use unlift::seed::Key;
 use unlift::truth::{Original, Secret};
 use unlift::{About, Unit};
-use unlift_features::Extraction;
 use unlift_io::Error;
 use unlift_io::atomic::{Access, Kind, OutputFile, OutputSet, Rules};
 use unlift_io::stage::{ImageFile, ImageRows, ImageWriter, Kind as Stage};
+use unlift_vision::features::Extraction;
 
 use super::common::{RELEASED, TRUTH, expect_slots, same_map};
 use crate::args::{EvaluateArgs, ObfuscateArgs, OracleArgs};

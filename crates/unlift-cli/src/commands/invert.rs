@@ -13,7 +13,6 @@ use unlift_audit::images::extraction::Wanted;
 use unlift_audit::images::{FeatureSource, choice};
 use unlift_audit::inversion::{Painter, on_bearings, six_views, view};
 use unlift_audit::refused;
-use unlift_features::{ColorImage, preview};
 use unlift_io::Error;
 use unlift_io::atomic::{
     Access, Kind, OutputSet, Rules, make_folders, marked_picture, sweep, write_file,
@@ -22,7 +21,8 @@ use unlift_io::read::colmap;
 use unlift_io::stage::{
     ImageFile, Kind as Stage, declared_kind, has_images, read_recovered, read_released,
 };
-use unlift_nn::DescriptorKind;
+use unlift_vision::features::{ColorImage, preview};
+use unlift_vision::network::DescriptorKind;
 
 use super::common::{all_could_be, same_map, with_threads};
 use super::painter::{kind, painter};

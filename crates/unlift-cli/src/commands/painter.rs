@@ -4,8 +4,8 @@ use std::path::Path;
 
 use unlift::Descriptors;
 use unlift_audit::inversion::Painter;
-use unlift_invert::Inverter;
-use unlift_nn::DescriptorKind;
+use unlift_vision::network::DescriptorKind;
+use unlift_vision::pictures::Inverter;
 
 use crate::exit::usage;
 

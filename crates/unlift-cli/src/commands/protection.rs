@@ -8,8 +8,8 @@ use unlift::descriptors::Values;
 use unlift::obfuscate::Protection;
 use unlift_audit::images::FeatureSource;
 use unlift_audit::images::extraction::Wanted;
-use unlift_features::Extraction;
-use unlift_nn::DescriptorKind;
+use unlift_vision::features::Extraction;
+use unlift_vision::network::DescriptorKind;
 
 use crate::args::ProtectArgs;
 use crate::values::distinct;

@@ -89,7 +89,7 @@ fn a_network_of_ones_own_paints_what_the_program_has_none_for() {
         let missing = stderr.contains("inverter-superpoint.onnx: expected in ");
         assert!(missing && stderr.contains("training/inversion"), "{stderr}");
     }
-    let models = concat!(env!("CARGO_MANIFEST_DIR"), "/../unlift-nn/models");
+    let models = concat!(env!("CARGO_MANIFEST_DIR"), "/../unlift-vision/models");
     let other =
         format!("invert photos --inverter {models}/lpips-squeeze/lpips-squeeze.onnx --out x");
     let told = place.complains(&other, 3);

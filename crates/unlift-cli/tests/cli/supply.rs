@@ -78,7 +78,7 @@ fn no_crate_is_compiled_twice_unless_others_ask_for_it() {
 #[test]
 fn the_program_holds_every_network_once() {
     let program = std::fs::read(env!("CARGO_BIN_EXE_unlift")).expect("the program");
-    for entry in unlift_nn::MODELS.iter() {
+    for entry in unlift_vision::network::MODELS.iter() {
         let Some(network) = entry.carried else { continue };
         let middle = network.len() / 2;
         let sample = &network[middle..middle + 64];

@@ -5,7 +5,7 @@ use std::time::Instant;
 use serde_json::json;
 use unlift::audit::{Measure, NeighborsBy, Plan};
 use unlift::{Descriptors, Unit};
-use unlift_features::Extraction;
+use unlift_vision::features::Extraction;
 
 use super::run::{Run, of_scene};
 use crate::images::audit::{ImagesJob, perform};

@@ -6,7 +6,7 @@ use serde_json::json;
 use unlift::Unit;
 use unlift::audit::{Measure, Plan};
 use unlift_io::read;
-use unlift_nn::DescriptorKind;
+use unlift_vision::network::DescriptorKind;
 
 use super::run::{Run, of_scene};
 use crate::inversion::MapInversion;

@@ -2,10 +2,10 @@ use std::path::PathBuf;
 
 use serde_json::{Map, Value, json};
 use unlift::audit::Threshold;
-use unlift_features::{Extraction, Extractor, SiftOptions, SuperPointOptions};
-use unlift_invert::Inverter;
-use unlift_nn::DescriptorKind;
 use unlift_report::printed::{Measured, Printed, printed};
+use unlift_vision::features::{Extraction, Extractor, SiftOptions, SuperPointOptions};
+use unlift_vision::network::DescriptorKind;
+use unlift_vision::pictures::Inverter;
 
 use crate::inversion::Painter;
 use crate::paper::compared::OfScene;

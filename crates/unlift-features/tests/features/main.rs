@@ -1,7 +1,0 @@
-//! Features of photos: SIFT, ALIKED and SuperPoint.
-
-mod aliked;
-mod learned;
-mod load;
-mod sift;
-mod superpoint;

@@ -1,0 +1,177 @@
+//! ALIKED: sub-pixel keypoints, and descriptors from sample positions that the network chooses for
+//! each keypoint.
+//!
+//! Source: Zhao et al., "ALIKED: A Lighter Keypoint and Descriptor Extraction Network via
+//! Deformable Transformation", IEEE TIM 2023; the weights are the authors' aliked-n16rot.
+
+use unlift::Error;
+
+use super::LearnedFeatures;
+use super::levels::{DIM, Levels};
+use super::maxima::{Scores, Wanted};
+use crate::features::color::ColorImage;
+use crate::network::{Network, Tensor};
+
+const MODEL: &str = "aliked-n16rot";
+/// The network halves an image five times.
+const MULTIPLE: usize = 32;
+/// Radius in pixels of the window that determines the sub-pixel position, and in which there is no
+/// other keypoint.
+const RADIUS: usize = 2;
+/// Softmax temperature of the sub-pixel position; with a smaller one the best score decides more.
+const TEMPERATURE: f32 = 0.1;
+/// Sample positions of a descriptor.
+const SAMPLES: usize = 16;
+/// Pixels around a keypoint from which the network computes these positions.
+const PATCH: usize = 9;
+/// Keypoints that are described at a time: 13 MB.
+const BATCH: usize = 1024;
+
+/// Options of ALIKED. The defaults are COLMAP's.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AlikedOptions {
+    /// Maximum number of features, the best ones; default 2048.
+    pub max_features: usize,
+    /// Score that a keypoint must exceed, 0 to 1; default 0.2.
+    pub min_score: f32,
+    /// Longest side in pixels, default 1600. Larger images are downsized; keypoints are in pixels
+    /// of the original image.
+    pub max_image_size: usize,
+}
+
+impl Default for AlikedOptions {
+    fn default() -> Self {
+        Self { max_features: 2048, min_score: 0.2, max_image_size: 1600 }
+    }
+}
+
+/// The extractor.
+pub struct Aliked {
+    network: Network,
+    options: AlikedOptions,
+}
+
+impl Aliked {
+    /// Creates an extractor with these options.
+    ///
+    /// # Errors
+    /// If a field is out of range (the error names the first one), or a file that replaces the
+    /// embedded model cannot be loaded.
+    pub fn try_new(options: AlikedOptions) -> Result<Self, Error> {
+        super::check(options.max_features, options.min_score, options.max_image_size)?;
+        Ok(Self { network: Network::load(MODEL)?, options })
+    }
+
+    /// Extracts the features of an image. Uses about 330 bytes of memory per pixel after
+    /// downsizing.
+    ///
+    /// # Errors
+    /// If the network returns other shapes.
+    pub fn extract(&self, image: &ColorImage) -> Result<LearnedFeatures, Error> {
+        let small = image.fitted(self.options.max_image_size);
+        let seen = small.as_ref().unwrap_or(image);
+        let (scores, levels) = self.dense(seen)?;
+        let wanted = Wanted {
+            radius: RADIUS,
+            border: RADIUS,
+            min_score: self.options.min_score,
+            most: self.options.max_features,
+        };
+        let places: Vec<[f32; 2]> =
+            scores.maxima(&wanted).into_iter().map(|pixel| refined(&scores, pixel)).collect();
+        let mut descriptors = Vec::with_capacity(places.len() * DIM);
+        for places in places.chunks(BATCH) {
+            descriptors.extend(self.describe(&levels, places)?);
+        }
+        let scores = places.iter().map(|&place| scores.at(place)).collect();
+        let keypoints = places.into_iter().map(|place| image.unshrunk(seen, place)).collect();
+        Ok(LearnedFeatures { keypoints, scores, descriptors, dim: DIM })
+    }
+
+    /// Returns the scores of all pixels, and the maps from which descriptors are made.
+    fn dense(&self, image: &ColorImage) -> Result<(Scores, Levels), Error> {
+        let size = [image.width(), image.height()];
+        let padded = size.map(|side| side.next_multiple_of(MULTIPLE));
+        let padding = [0, 1].map(|side| (padded[side] - size[side]) / 2);
+        let inner = |at: usize, side: usize| at.saturating_sub(padding[side]).min(size[side] - 1);
+        let [width, height] = padded;
+        let mut planes = vec![0.0; 3 * width * height];
+        for y in 0..height {
+            for x in 0..width {
+                let colors = image.pixel(inner(x, 0), inner(y, 1));
+                for (channel, value) in colors.into_iter().enumerate() {
+                    planes[(channel * height + y) * width + x] = f32::from(value) / 255.0;
+                }
+            }
+        }
+        let input = Tensor::try_new(&[1, 3, height, width], planes)?;
+        let outputs = ["score", "level1", "level2", "level3", "level4"];
+        let [score, a, b, c, d] = self.network.run(vec![("image", input)], outputs)?;
+        let rows = score.values().chunks_exact(width).skip(padding[1]).take(size[1]);
+        let values = rows.flat_map(|row| &row[padding[0]..padding[0] + size[0]]).copied().collect();
+        let scores = Scores { width: size[0], height: size[1], values };
+        Ok((scores, Levels::new([a, b, c, d], padding, size)))
+    }
+
+    /// Returns the descriptors at these positions, one after the other.
+    fn describe(&self, levels: &Levels, places: &[[f32; 2]]) -> Result<Vec<f32>, Error> {
+        let n = places.len();
+        let mut patches = vec![0.0; n * PATCH * DIM];
+        for (place, patch) in places.iter().zip(patches.chunks_exact_mut(PATCH * DIM)) {
+            let [x, y] = place.map(|at| at as isize);
+            for (at, out) in patch.chunks_exact_mut(DIM).enumerate() {
+                levels.pixel(x + at as isize % 3 - 1, y + at as isize / 3 - 1, out);
+            }
+        }
+        let patches = Tensor::try_new(&[n, PATCH, DIM], patches)?;
+        let [offsets] = self.network.run(vec![("patch", patches)], ["offsets"])?;
+        let most = levels.size[0].max(levels.size[1]) as f32 / 4.0;
+        let mut samples = vec![0.0; n * SAMPLES * DIM];
+        let of_each = samples.chunks_exact_mut(SAMPLES * DIM);
+        let offsets = offsets.values().chunks_exact(2 * SAMPLES);
+        for (([x, y], offsets), samples) in places.iter().zip(offsets).zip(of_each) {
+            for (at, out) in samples.chunks_exact_mut(DIM).enumerate() {
+                let [across, down] = [offsets[at], offsets[SAMPLES + at]];
+                levels.between(x + across.clamp(-most, most), y + down.clamp(-most, most), out);
+            }
+        }
+        let samples = Tensor::try_new(&[n, SAMPLES, DIM], samples)?;
+        let [descriptors] = self.network.run(vec![("samples", samples)], ["descriptors"])?;
+        Ok(descriptors.into_values())
+    }
+}
+
+/// Returns the sub-pixel position of a keypoint: the mean of the pixels around it, weighted by the
+/// softmax of their scores.
+fn refined(scores: &Scores, [x, y]: [usize; 2]) -> [f32; 2] {
+    let side = 2 * RADIUS + 1;
+    let around = |at: usize| {
+        let [dx, dy] = [at % side, at / side];
+        (scores.values[(y + dy - RADIUS) * scores.width + x + dx - RADIUS], [dx, dy])
+    };
+    let best = (0..side * side).map(|at| around(at).0).fold(f32::MIN, f32::max);
+    let (mut sum, mut moved) = (0.0, [0.0; 2]);
+    for (score, offset) in (0..side * side).map(around) {
+        let weight = libm::expf((score - best) / TEMPERATURE);
+        sum += weight;
+        for (moved, offset) in moved.iter_mut().zip(offset) {
+            *moved += weight * (offset as f32 - RADIUS as f32);
+        }
+    }
+    [x as f32 + moved[0] / sum, y as f32 + moved[1] / sum]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_keypoint_lies_where_the_scores_around_it_have_their_middle() {
+        let mut values = vec![0.0; 7 * 7];
+        (values[3 * 7 + 3], values[3 * 7 + 4]) = (1.0, 1.0);
+        let scores = Scores { width: 7, height: 7, values };
+        let [x, y] = refined(&scores, [3, 3]);
+        // The other 23 pixels have weight exp(-10) each.
+        assert!((x - 3.5).abs() < 1e-3 && (y - 3.0).abs() < 1e-3, "({x}, {y})");
+    }
+}

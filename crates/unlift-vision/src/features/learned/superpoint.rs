@@ -1,0 +1,147 @@
+//! SuperPoint: keypoints on pixels, descriptors interpolated between cells of 8 x 8 pixels.
+//!
+//! Source: DeTone, Malisiewicz, Rabinovich, "SuperPoint: Self-Supervised Interest Point Detection
+//! and Description", CVPR workshops 2018. Its license forbids distributing the weights: users
+//! supply them, converted to ONNX by `training/export/superpoint.py`.
+
+use unlift::Error;
+
+use super::LearnedFeatures;
+use super::maxima::{Scores, Wanted, corners};
+use crate::features::color::ColorImage;
+use crate::network::{Network, Tensor};
+
+const MODEL: &str = "superpoint";
+/// Side of a cell in pixels.
+const CELL: usize = 8;
+/// Radius in pixels around a keypoint without other keypoints; also the width of the border without
+/// keypoints.
+const RADIUS: usize = 4;
+
+/// Options of SuperPoint. The defaults are hloc's.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SuperPointOptions {
+    /// Maximum number of features, the best ones; default 4096.
+    pub max_features: usize,
+    /// Score that a keypoint must exceed, 0 to 1; default 0.005.
+    pub min_score: f32,
+    /// Longest side in pixels, default 1600. Larger images are downsized; keypoints are in pixels
+    /// of the original image.
+    pub max_image_size: usize,
+}
+
+impl Default for SuperPointOptions {
+    fn default() -> Self {
+        Self { max_features: 4096, min_score: 0.005, max_image_size: 1600 }
+    }
+}
+
+/// The extractor.
+pub struct SuperPoint {
+    network: Network,
+    options: SuperPointOptions,
+}
+
+impl SuperPoint {
+    /// Creates an extractor with these options and the user's weights.
+    ///
+    /// # Errors
+    /// If a field is out of range (the error names the first one), or the model is missing (the
+    /// error names its folder).
+    pub fn try_new(options: SuperPointOptions) -> Result<Self, Error> {
+        Self::of_network(Network::load(MODEL)?, options)
+    }
+
+    /// Creates an extractor with a network that has the inputs and outputs of SuperPoint.
+    ///
+    /// # Errors
+    /// If a field is out of range; the error names the first one.
+    pub fn of_network(network: Network, options: SuperPointOptions) -> Result<Self, Error> {
+        super::check(options.max_features, options.min_score, options.max_image_size)?;
+        Ok(Self { network, options })
+    }
+
+    /// Returns the SHA-256 of the network's file.
+    pub fn sha256(&self) -> &str {
+        self.network.sha256()
+    }
+
+    /// Extracts the features of an image.
+    ///
+    /// # Errors
+    /// If the network returns other shapes.
+    pub fn extract(&self, image: &ColorImage) -> Result<LearnedFeatures, Error> {
+        let small = image.fitted(self.options.max_image_size);
+        let seen = small.as_ref().unwrap_or(image);
+        if seen.width().min(seen.height()) < CELL {
+            return Ok(LearnedFeatures::default());
+        }
+        let pixels = (0..seen.width() * seen.height())
+            .map(|at| gray(seen.pixel(at % seen.width(), at / seen.width())));
+        let input = Tensor::try_new(&[1, 1, seen.height(), seen.width()], pixels.collect())?;
+        let [score, coarse] = self.network.run(vec![("image", input)], ["score", "coarse"])?;
+        let &[_, height, width] = score.shape() else {
+            let found = format!("{:?}", score.shape());
+            return Err(Error::new(MODEL, "scores of shape (1, any, any)", found));
+        };
+        if coarse.shape()[..3] != [1, height / CELL, width / CELL] || height < CELL || width < CELL
+        {
+            let expected =
+                format!("descriptors of cells of {CELL} pixels of ({height}, {width}) scores");
+            return Err(Error::new(MODEL, expected, format!("{:?}", coarse.shape())));
+        }
+        let scores = Scores { width, height, values: score.into_values() };
+        let wanted = Wanted {
+            radius: RADIUS,
+            border: RADIUS,
+            min_score: self.options.min_score,
+            most: self.options.max_features,
+        };
+        let places = scores.maxima(&wanted);
+        let dim = coarse.shape().last().copied().unwrap_or(0);
+        let mut descriptors = vec![0.0; places.len() * dim];
+        for (&place, out) in places.iter().zip(descriptors.chunks_exact_mut(dim)) {
+            describe(&coarse, place, [width, height], out);
+        }
+        Ok(LearnedFeatures {
+            keypoints: places
+                .iter()
+                .map(|&[x, y]| image.unshrunk(seen, [x as f64, y as f64]))
+                .collect(),
+            scores: places.iter().map(|&[x, y]| scores.values[y * width + x]).collect(),
+            descriptors,
+            dim,
+        })
+    }
+}
+
+/// Converts to gray in 0..1 with the weights of Rec. 601, as OpenCV does.
+fn gray([red, green, blue]: [u8; 3]) -> f32 {
+    let [red, green, blue] = [red, green, blue].map(f32::from);
+    (0.299 * red + 0.587 * green + 0.114 * blue).round() / 255.0
+}
+
+/// Interpolates the descriptor of a pixel from the four cells around it, and normalizes it to
+/// length 1.
+///
+/// A cell's descriptor is at its middle. Pixels are scaled to cells as in the authors' code, by
+/// slightly less than eight.
+fn describe(coarse: &Tensor, place: [usize; 2], size: [usize; 2], out: &mut [f32]) {
+    let dim = out.len();
+    let cells = [coarse.shape()[2], coarse.shape()[1]];
+    let [x, y] = [0, 1].map(|side| {
+        let middle = (CELL as f32 - 1.0) / 2.0;
+        let share = (place[side] as f32 - middle) / (size[side] as f32 - (CELL as f32 + 1.0) / 2.0);
+        share * (cells[side] - 1) as f32
+    });
+    for ([x, y], weight) in corners(x, y) {
+        if !(0..cells[0] as isize).contains(&x) || !(0..cells[1] as isize).contains(&y) {
+            continue;
+        }
+        let at = (y as usize * cells[0] + x as usize) * dim;
+        let cell = &coarse.values()[at..at + dim];
+        out.iter_mut().zip(cell).for_each(|(out, value)| *out += weight * value);
+    }
+    let length = out.iter().map(|value| value * value).sum::<f32>().sqrt().max(1e-12);
+    out.iter_mut().for_each(|value| *value /= length);
+}

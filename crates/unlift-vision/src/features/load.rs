@@ -1,0 +1,213 @@
+//! Decodes photos to gray values or colors.
+
+use std::fs;
+use std::io::{self, Cursor};
+use std::path::Path;
+
+use ::image::metadata::Orientation;
+use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use unlift::Error;
+
+use crate::features::color::ColorImage;
+use crate::features::image::GrayImage;
+
+/// The readable formats, for errors.
+const KINDS: &str = "a JPEG, PNG or WebP image";
+/// Maximum number of pixels of a photo: 16384 x 16384. A header can declare any size in a few
+/// bytes.
+const MOST_PIXELS: u64 = 1 << 28;
+/// Maximum number of pixels per byte of a JPEG: every block of 8 x 8 pixels takes a bit. A file
+/// beyond it is truncated or of one color, but decoders fill in missing blocks.
+const JPEG_PIXELS_PER_BYTE: u64 = 512;
+/// Maximum number of pixels per byte of other formats: PNG compresses by at most 1032. WebP has no
+/// bound, but photos need a hundred times as many bytes.
+const OTHER_PIXELS_PER_BYTE: u64 = 1032;
+/// Number of pixels allowed for any file size, 4096 x 4096: black frames exist.
+const FREE_PIXELS: u64 = 1 << 24;
+/// Bytes that a decoder may allocate besides pixels.
+const BESIDE_PIXELS: u64 = 32 << 20;
+/// Bytes that a decoder may allocate per pixel: four channels of 16 bits.
+const PIXEL_BYTES: u64 = 8;
+
+/// Use of a photo's EXIF orientation. Keypoints are in pixels of the turned photo.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Turn {
+    /// Turned by the EXIF orientation.
+    Upright,
+    /// Not turned, as in COLMAP and hloc.
+    AsStored,
+}
+
+/// Reads the photo at `path`, upright, as gray values. The format is detected from the bytes.
+///
+/// # Errors
+/// One line with the path, if the file does not exist, is not JPEG, PNG or WebP, is truncated, or
+/// has more than 2^28 pixels or more than its size allows.
+pub fn read(path: &Path) -> Result<GrayImage, Error> {
+    gray(&photo(path, Turn::Upright)?)
+}
+
+/// Reads the photo at `path`, upright, in colors.
+///
+/// # Errors
+/// See [`read`].
+pub fn read_color(path: &Path) -> Result<ColorImage, Error> {
+    read_color_with(path, Turn::Upright)
+}
+
+/// Reads the photo at `path` in colors.
+///
+/// # Errors
+/// See [`read`].
+pub fn read_color_with(path: &Path, turn: Turn) -> Result<ColorImage, Error> {
+    let photo = photo(path, turn)?;
+    let (width, height) = (photo.width() as usize, photo.height() as usize);
+    ColorImage::try_new(width, height, photo.into_rgb8().into_raw())
+}
+
+pub(crate) fn read_with(path: &Path, turn: Turn) -> Result<GrayImage, Error> {
+    gray(&photo(path, turn)?)
+}
+
+pub(crate) fn photo(path: &Path, turn: Turn) -> Result<DynamicImage, Error> {
+    let (bytes, name) = bytes_of(path)?;
+    let (mut photo, orientation) = decoded(&bytes, &name)?;
+    if turn == Turn::Upright {
+        photo.apply_orientation(orientation);
+    }
+    Ok(photo)
+}
+
+/// Returns the bytes of a file, and its name in errors.
+fn bytes_of(path: &Path) -> Result<(Vec<u8>, String), Error> {
+    let name = path.display().to_string();
+    let bytes = read_regular(path)
+        .map_err(|error| Error::new(name.escape_debug().to_string(), KINDS, error.to_string()))?;
+    Ok((bytes, name))
+}
+
+/// Pipes, sockets and devices may never end, or never begin. Of a folder, the system says so.
+fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
+    let metadata = fs::metadata(path)?;
+    if !metadata.is_file() && !metadata.is_dir() {
+        return Err(io::Error::other("a pipe, a socket or a device"));
+    }
+    fs::read(path)
+}
+
+/// Decodes the bytes of a photo in a file called `name`, upright, as gray values.
+///
+/// # Errors
+/// See [`read`].
+pub fn decode(bytes: &[u8], name: &str) -> Result<GrayImage, Error> {
+    let (mut photo, orientation) = decoded(bytes, name)?;
+    photo.apply_orientation(orientation);
+    gray(&photo)
+}
+
+/// Decodes a photo as stored, and its orientation.
+fn decoded(bytes: &[u8], name: &str) -> Result<(DynamicImage, Orientation), Error> {
+    // Escaping keeps the error in one line.
+    let wrong = |expected: &str, found: String| {
+        Error::new(name.escape_debug().to_string(), expected, found.escape_debug().to_string())
+    };
+    let format = match ::image::guess_format(bytes) {
+        Ok(format @ (ImageFormat::Jpeg | ImageFormat::Png | ImageFormat::WebP)) => format,
+        _ => return Err(wrong(KINDS, kind(bytes))),
+    };
+    let kind = label(format);
+    if format == ImageFormat::Jpeg && !has_end(bytes) {
+        return Err(wrong("a whole JPEG image", "one that is cut off".to_owned()));
+    }
+    let whole = format!("a whole {kind} image");
+    let broken = |error: ::image::ImageError| wrong(&whole, error.to_string());
+    let most = most_pixels(format, bytes.len() as u64);
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+    // Limits memory by the size in a PNG's header, because a color profile can inflate a thousand
+    // times.
+    let declared = bytes.get(16..24).filter(|_| format == ImageFormat::Png).map(|sides| {
+        let side =
+            |at: usize| u64::from(u32::from_be_bytes(std::array::from_fn(|byte| sides[at + byte])));
+        side(0).saturating_mul(side(4))
+    });
+    let mut limits = Limits::no_limits();
+    limits.max_alloc = Some(declared.map_or(most, |n| n.min(most)) * PIXEL_BYTES + BESIDE_PIXELS);
+    reader.limits(limits);
+    let mut decoder = reader.into_decoder().map_err(broken)?;
+    let (width, height) = decoder.dimensions();
+    let found = u64::from(width) * u64::from(height);
+    if found > most {
+        let of =
+            if found > MOST_PIXELS { String::new() } else { format!(" in {} bytes", bytes.len()) };
+        let most = if found > MOST_PIXELS { MOST_PIXELS } else { most };
+        return Err(wrong(&format!("at most {most} pixels{of}"), format!("{width} x {height}")));
+    }
+    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+    Ok((DynamicImage::from_decoder(decoder).map_err(broken)?, orientation))
+}
+
+/// Returns the maximum number of pixels of a photo of `n_bytes` bytes.
+fn most_pixels(format: ImageFormat, n_bytes: u64) -> u64 {
+    let per_byte = match format {
+        ImageFormat::Jpeg => JPEG_PIXELS_PER_BYTE,
+        _ => OTHER_PIXELS_PER_BYTE,
+    };
+    n_bytes.saturating_mul(per_byte).clamp(FREE_PIXELS, MOST_PIXELS)
+}
+
+/// Converts to gray values as COLMAP does: rounded to bytes, weights of Rec. 709, transparency
+/// ignored.
+fn gray(photo: &DynamicImage) -> Result<GrayImage, Error> {
+    let (width, height) = (photo.width() as usize, photo.height() as usize);
+    if !photo.color().has_color() {
+        return GrayImage::from_bytes(width, height, photo.to_luma8().as_raw());
+    }
+    let mut bytes = Vec::with_capacity(width * height);
+    let colors = photo.to_rgb8();
+    bytes.extend(colors.pixels().map(|pixel| {
+        let [red, green, blue] = pixel.0.map(f32::from);
+        (0.2126 * red + 0.7152 * green + 0.0722 * blue).round() as u8
+    }));
+    GrayImage::from_bytes(width, height, &bytes)
+}
+
+fn kind(bytes: &[u8]) -> String {
+    if bytes.is_empty() {
+        return "an empty file".to_owned();
+    }
+    if let Ok(format) = ::image::guess_format(bytes) {
+        return format!("a {} image", label(format));
+    }
+    let start = &bytes[..bytes.len().min(512)];
+    let printable = |byte: &u8| !byte.is_ascii_control() || byte.is_ascii_whitespace();
+    if start.iter().all(printable) && start.utf8_chunks().count() == 1 {
+        return "text".to_owned();
+    }
+    let first: Vec<String> = bytes.iter().take(4).map(|byte| format!("{byte:02x}")).collect();
+    format!("a file that starts with {}", first.join(" "))
+}
+
+fn label(format: ImageFormat) -> String {
+    match format {
+        ImageFormat::WebP => "WebP".to_owned(),
+        format => format!("{format:?}").to_uppercase(),
+    }
+}
+
+/// Returns true if a JPEG has an end marker after its first scan. Decoders fill missing parts with
+/// gray. The end marker of a thumbnail in the header does not count.
+fn has_end(bytes: &[u8]) -> bool {
+    const SCAN: u8 = 0xda;
+    let mut at = 2;
+    while let Some(&[0xff, marker, high, low]) = bytes.get(at..at + 4) {
+        match marker {
+            // Fill bytes may precede a marker.
+            0xff => at += 1,
+            _ => at += 2 + usize::from(u16::from_be_bytes([high, low])),
+        }
+        if marker == SCAN {
+            break;
+        }
+    }
+    bytes.get(at..).is_some_and(|rest| rest.windows(2).any(|pair| pair == [0xff, 0xd9]))
+}

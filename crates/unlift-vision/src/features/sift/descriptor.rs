@@ -1,0 +1,300 @@
+//! SIFT descriptors: 4 x 4 histograms of gradient directions around a keypoint.
+
+use std::f64::consts::TAU;
+
+use unlift::simd::{Kernel, dispatch};
+
+use super::gradient::{Gradients, TURN};
+use super::orientation::{Place, weights};
+use super::plane::{Plane, lanes};
+
+/// Directions of a histogram.
+pub(crate) const BINS: usize = 8;
+/// Histograms in a row and in a column.
+pub(crate) const CELLS: usize = 4;
+/// Values of a descriptor.
+pub(crate) const LENGTH: usize = CELLS * CELLS * BINS;
+
+/// Side of a histogram in scales of the keypoint.
+const MAGNIFICATION: f64 = 3.0;
+/// Standard deviation of the window, in sides of a histogram.
+const WINDOW: f64 = 2.0;
+/// Cells in a row with a rim: pixels near the outer edge also vote for cells outside.
+const RIM: usize = CELLS + 2;
+/// Allocated cells; a power of two, so that indices need no bounds check.
+const ROOM: usize = 64;
+/// Pixels computed together.
+const BLOCK: usize = 16;
+
+#[derive(Default)]
+pub(crate) struct Desk {
+    pub(crate) weights: [Vec<f32>; 2],
+}
+
+/// Returns unnormalized histograms of the pixels around `place`, rotated by `angle` radians: value
+/// `(row * 4 + column) * 8 + direction`. Lowe 2004, Sec. 6.1.
+pub(crate) fn describe(
+    gradients: &mut Gradients,
+    level: &Plane,
+    place: Place,
+    angle: f64,
+    desk: &mut Desk,
+) -> [f32; LENGTH] {
+    let side = MAGNIFICATION * place.sigma;
+    // Half the diagonal of the cells, with half a cell of rim.
+    let radius = (std::f64::consts::SQRT_2 * side * (CELLS + 1) as f64 / 2.0 + 0.5) as usize;
+    let (column, row) = place.pixel();
+    let shift = (column as f64 - place.x, row as f64 - place.y);
+    weights(radius, shift.0, WINDOW * side, &mut desk.weights[0]);
+    weights(radius, shift.1, WINDOW * side, &mut desk.weights[1]);
+    // Blocks read beyond the last pixel of a row.
+    desk.weights[0].resize(2 * radius + 1 + BLOCK, 0.0);
+    // Gradients at the border are one-sided, so they are omitted.
+    let rows = row.saturating_sub(radius).max(1)..(row + radius + 1).min(level.height - 1);
+    let columns = column.saturating_sub(radius).max(1)..(column + radius + 1).min(level.width - 1);
+    gradients.prepare(level, rows.clone());
+    let (sin, cos) = libm::sincos(angle);
+    let frame = Frame { sin: sin / side, cos: cos / side, turn: (angle * 8.0 / TAU) as f32 };
+    let first = (column as f64 - radius as f64, row as f64 - radius as f64);
+    let votes = Votes { gradients, place, frame, rows, columns, first, weights: &desk.weights };
+    let cells = dispatch(votes);
+    let mut histograms = [0.0; LENGTH];
+    for (at, bins) in histograms.as_chunks_mut::<BINS>().0.iter_mut().enumerate() {
+        *bins = cells[(at / CELLS + 1) * RIM + at % CELLS + 1];
+    }
+    histograms
+}
+
+/// The transform from pixels to cells and directions.
+#[derive(Clone, Copy)]
+struct Frame {
+    /// Sine and cosine of the orientation, divided by the side of a cell.
+    sin: f64,
+    cos: f64,
+    /// The orientation in eighths of a turn.
+    turn: f32,
+}
+
+impl Frame {
+    /// Returns the range of offsets from the middle, in pixels along a row, that the histograms
+    /// cover, for a row `dy` below the middle. It skips the half of the bounding box that is
+    /// outside.
+    #[inline(always)]
+    fn covered(self, dy: f64) -> (f64, f64) {
+        let half = (CELLS + 1) as f64 / 2.0;
+        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+        for (slope, at) in [(self.cos, self.sin * dy), (-self.sin, self.cos * dy)] {
+            if slope.abs() > 1e-12 {
+                let ends = ((-half - at) / slope, (half - at) / slope);
+                low = low.max(ends.0.min(ends.1));
+                high = high.min(ends.0.max(ends.1));
+            } else if at.abs() >= half {
+                high = f64::NEG_INFINITY;
+            }
+        }
+        (low, high)
+    }
+}
+
+struct Votes<'a> {
+    gradients: &'a Gradients,
+    place: Place,
+    frame: Frame,
+    rows: std::ops::Range<usize>,
+    columns: std::ops::Range<usize>,
+    /// The pixel of the first weights; may be outside the image.
+    first: (f64, f64),
+    weights: &'a [Vec<f32>; 2],
+}
+
+/// The votes of some pixels: cell, direction and weight in each of four cells.
+struct Block {
+    cell: [u32; BLOCK],
+    direction: [f32; BLOCK],
+    shares: [[f32; BLOCK]; 4],
+}
+
+impl Kernel for Votes<'_> {
+    type Output = [[f32; BINS]; ROOM];
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let Self { gradients, place, frame, rows, columns, first, weights } = self;
+        let mut cells = [[0.0; BINS]; ROOM];
+        for y in rows {
+            let dy = y as f64 - place.y;
+            let (low, high) = frame.covered(dy);
+            let low = libm::ceil(low + place.x).max(columns.start as f64);
+            let end = (libm::floor(high + place.x) + 1.0).min(columns.end as f64);
+            if low >= end {
+                continue;
+            }
+            let (low, end) = (low as usize, end as usize);
+            let down = weights[1][(y as f64 - first.1) as usize];
+            let across = &weights[0][(low as f64 - first.0) as usize..];
+            let (lengths, angles) = (gradients.length.row(y), gradients.angle.row(y));
+            for at in (low..end).step_by(BLOCK) {
+                let dx = (at as f64 - place.x) as f32;
+                let block = Block::new(
+                    frame,
+                    (dx, dy as f32),
+                    lanes(lengths, at),
+                    lanes(angles, at),
+                    lanes(across, at - low),
+                    down,
+                );
+                for i in 0..(end - at).min(BLOCK) {
+                    block.vote(i, &mut cells);
+                }
+            }
+        }
+        cells
+    }
+}
+
+impl Block {
+    /// Computes the votes of the pixels from offset `(dx, dy)` on; `across` and `down` are their
+    /// weights.
+    #[inline(always)]
+    fn new(
+        frame: Frame,
+        (dx, dy): (f32, f32),
+        lengths: [f32; BLOCK],
+        angles: [f32; BLOCK],
+        across: [f32; BLOCK],
+        down: f32,
+    ) -> Self {
+        // The largest value whose cell is inside the rim.
+        const END: f32 = 4.999_999_5;
+        let (sin, cos) = (frame.sin as f32, frame.cos as f32);
+        let middle = (CELLS + 1) as f32 / 2.0;
+        let mut block =
+            Self { cell: [0; BLOCK], direction: [0.0; BLOCK], shares: [[0.0; BLOCK]; 4] };
+        for i in 0..BLOCK {
+            let dx = dx + i as f32;
+            let column = (cos * dx + sin * dy + middle).clamp(0.0, END);
+            let row = (cos * dy - sin * dx + middle).clamp(0.0, END);
+            let (right, below) = (column - column.floor(), row - row.floor());
+            // The last bits of a sum with 2^23 contain the integer; a cast would not be vectorized.
+            let cell = row.floor() * RIM as f32 + column.floor();
+            block.cell[i] = (cell + 8_388_608.0).to_bits();
+            let turned = angles[i] - frame.turn;
+            block.direction[i] = if turned < 0.0 { turned + TURN } else { turned };
+            let vote = lengths[i] * across[i] * down;
+            let (above, below) = (vote * (1.0 - below), vote * below);
+            block.shares[0][i] = above * (1.0 - right);
+            block.shares[1][i] = above * right;
+            block.shares[2][i] = below * (1.0 - right);
+            block.shares[3][i] = below * right;
+        }
+        block
+    }
+
+    /// Adds pixel `i` to the two nearest directions of its four cells.
+    #[inline(always)]
+    fn vote(&self, i: usize, cells: &mut [[f32; BINS]; ROOM]) {
+        const DIRECTIONS: [f32; BINS] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+        // All eight directions at once: linear weights around the direction, with wrap-around.
+        let mut share = [0.0; BINS];
+        for (share, direction) in share.iter_mut().zip(DIRECTIONS) {
+            let away = (self.direction[i] - direction).abs();
+            *share = (1.0 - away).max(0.0) + (away - 7.0).max(0.0);
+        }
+        let first = self.cell[i] as usize;
+        for (cell, shares) in [0, 1, RIM, RIM + 1].into_iter().zip(&self.shares) {
+            let bins = &mut cells[(first + cell) % ROOM];
+            for (bin, share) in bins.iter_mut().zip(share) {
+                *bin += shares[i] * share;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::features::image::GrayImage;
+
+    fn level(value: impl Fn(f64, f64) -> f64) -> Plane {
+        let pixels = (0..101 * 101).map(|i| value((i % 101) as f64, (i / 101) as f64) as f32);
+        let mut level = Plane::default();
+        level.copy(&GrayImage::try_new(101, 101, pixels.collect()).unwrap());
+        level
+    }
+
+    fn histograms(level: &Plane, place: Place, angle: f64) -> [f32; LENGTH] {
+        let mut gradients = Gradients::default();
+        gradients.reset(level);
+        describe(&mut gradients, level, place, angle, &mut Desk::default())
+    }
+
+    /// Computes the definition, pixel by pixel over the whole box.
+    fn plain(level: &Plane, place: Place, angle: f64) -> Vec<f64> {
+        let mut gradients = Gradients::default();
+        gradients.reset(level);
+        gradients.prepare(level, 0..level.height);
+        let side = 3.0 * place.sigma;
+        let mut bins = vec![0.0; LENGTH];
+        for y in 1..level.height - 1 {
+            for x in 1..level.width - 1 {
+                let (dx, dy) = (x as f64 - place.x, y as f64 - place.y);
+                let (sin, cos) = angle.sin_cos();
+                let (nx, ny) = ((cos * dx + sin * dy) / side, (cos * dy - sin * dx) / side);
+                let turned = f64::from(gradients.angle.at(x, y)) - angle * 8.0 / TAU;
+                let window = (-(nx * nx + ny * ny) / 8.0).exp();
+                for row in 0..CELLS {
+                    for column in 0..CELLS {
+                        let share = (1.0 - (nx - column as f64 + 1.5).abs()).max(0.0)
+                            * (1.0 - (ny - row as f64 + 1.5).abs()).max(0.0);
+                        for bin in 0..BINS {
+                            let away = (turned - bin as f64).rem_euclid(8.0);
+                            let share = share * (1.0 - away.min(8.0 - away)).max(0.0);
+                            bins[(row * CELLS + column) * BINS + bin] +=
+                                share * window * f64::from(gradients.length.at(x, y));
+                        }
+                    }
+                }
+            }
+        }
+        bins
+    }
+
+    #[test]
+    fn histograms_are_the_plain_sum_inside_and_at_borders() {
+        let level = level(|x, y| (x * 0.31).sin() * (y * 0.17 + 0.02 * x).cos());
+        for (x, y, angle) in
+            [(50.2, 49.6, 0.0), (51.0, 40.3, 2.2), (3.2, 98.7, 5.5), (97.9, 2.0, 4.0)]
+        {
+            let place = Place { x, y, sigma: 2.7 };
+            let expected = plain(&level, place, angle);
+            let most = expected.iter().fold(0.0_f64, |most, &bin| most.max(bin));
+            for (bin, (&found, expected)) in
+                histograms(&level, place, angle).iter().zip(expected).enumerate()
+            {
+                assert!((f64::from(found) - expected).abs() < 1e-4 * most, "{x}, {y}: bin {bin}");
+            }
+        }
+    }
+
+    #[test]
+    fn both_twins_give_the_same_bits() {
+        let level = level(|x, y| (x * 0.31).sin() * (y * 0.17 + 0.02 * x).cos());
+        let mut gradients = Gradients::default();
+        gradients.reset(&level);
+        gradients.prepare(&level, 0..101);
+        let mut row = Vec::new();
+        weights(20, 0.0, 10.0, &mut row);
+        row.resize(60, 0.0);
+        let rows = [row.clone(), row];
+        let votes = || Votes {
+            gradients: &gradients,
+            place: Place { x: 50.0, y: 50.0, sigma: 2.0 },
+            frame: Frame { sin: 0.1, cos: 0.12, turn: 0.9 },
+            rows: 30..71,
+            columns: 30..71,
+            first: (30.0, 30.0),
+            weights: &rows,
+        };
+        assert_eq!(votes().run(), dispatch(votes()));
+    }
+}

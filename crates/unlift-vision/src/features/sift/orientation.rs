@@ -1,0 +1,185 @@
+//! Orientations of a keypoint: peaks of a histogram of gradient directions.
+
+use std::f64::consts::TAU;
+
+use unlift::simd::{Kernel, dispatch};
+
+use super::gradient::{Gradients, TURN};
+use super::plane::Plane;
+
+/// Maximum number of orientations of a keypoint.
+pub(crate) const MOST: usize = 4;
+/// Bins of the histogram.
+const BINS: usize = 36;
+/// Standard deviation of the window, in scales of the keypoint.
+const WINDOW: f64 = 1.5;
+/// Number of times that the histogram is averaged with its neighbors.
+const SMOOTHED: usize = 6;
+/// Minimum height of a peak, as a share of the highest.
+const SHARE: f32 = 0.8;
+
+/// A position in an octave: pixels of the octave, the middle of the first pixel at 0.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    pub(crate) x: f64,
+    pub(crate) y: f64,
+    pub(crate) sigma: f64,
+}
+
+impl Place {
+    pub(crate) fn pixel(self) -> (usize, usize) {
+        ((self.x + 0.5) as usize, (self.y + 0.5) as usize)
+    }
+}
+
+/// Computes Gaussian weights of a row or column of pixels: `exp(-(i - radius + shift)^2 / (2
+/// sigma^2))`.
+///
+/// Quotients of neighboring weights are geometric, so each needs two multiplications. Windows are
+/// products of weights for x and y, so no pixel needs an exponential.
+pub(crate) fn weights(radius: usize, shift: f64, sigma: f64, into: &mut Vec<f32>) {
+    let falloff = 0.5 / (sigma * sigma);
+    let first = shift - radius as f64;
+    let mut weight = libm::exp(-falloff * first * first);
+    let mut quotient = libm::exp(-falloff * (2.0 * first + 1.0));
+    let change = libm::exp(-2.0 * falloff);
+    into.clear();
+    for _ in 0..2 * radius + 1 {
+        into.push(weight as f32);
+        weight *= quotient;
+        quotient *= change;
+    }
+}
+
+/// Returns the orientations of `place`, in radians within `0..TAU`, in the order of their bins, and
+/// their number. Lowe 2004, Sec. 5, with a smoothed histogram and linear votes.
+pub(crate) fn orientations(
+    gradients: &mut Gradients,
+    level: &Plane,
+    place: Place,
+    weights: &mut [Vec<f32>; 2],
+) -> ([f64; MOST], usize) {
+    let window = WINDOW * place.sigma;
+    let radius = ((3.0 * window) as usize).max(1);
+    let (column, row) = place.pixel();
+    let shift = (column as f64 - place.x, row as f64 - place.y);
+    self::weights(radius, shift.0, window, &mut weights[0]);
+    self::weights(radius, shift.1, window, &mut weights[1]);
+    let rows = row.saturating_sub(radius)..(row + radius + 1).min(level.height);
+    gradients.prepare(level, rows);
+    let mut histogram = dispatch(Votes { gradients, place, radius, shift, weights });
+    for _ in 0..SMOOTHED {
+        histogram = std::array::from_fn(|bin| {
+            (histogram[(bin + BINS - 1) % BINS] + histogram[bin] + histogram[(bin + 1) % BINS])
+                / 3.0
+        });
+    }
+    peaks(&histogram)
+}
+
+struct Votes<'a> {
+    gradients: &'a Gradients,
+    place: Place,
+    radius: usize,
+    shift: (f64, f64),
+    weights: &'a [Vec<f32>; 2],
+}
+
+impl Kernel for Votes<'_> {
+    type Output = [f32; BINS];
+
+    #[inline(always)]
+    fn run(self) -> [f32; BINS] {
+        let Self { gradients, place, radius, shift, weights } = self;
+        let (column, row) = place.pixel();
+        let (width, height) = (gradients.length.width, gradients.length.height);
+        let reach = (radius * radius) as f64 + 0.6;
+        // Bins -1 and 36 have their own places here and are added to the last and first bin below.
+        let mut histogram = [0.0_f32; BINS + 2];
+        for y in row.saturating_sub(radius)..(row + radius + 1).min(height) {
+            let dy = y as f64 - row as f64 + shift.1;
+            let half = libm::sqrt((reach - dy * dy).max(0.0));
+            // Integer pixels within the circle around the middle pixel.
+            let middle = column as f64 - shift.0;
+            let low =
+                libm::ceil(middle - half).max(column as f64 - radius as f64).max(0.0) as usize;
+            let high = libm::floor(middle + half).min((column + radius) as f64) as usize;
+            let end = (high + 1).min(width);
+            if low >= end {
+                continue;
+            }
+            let lengths = &gradients.length.row(y)[low..end];
+            let angles = &gradients.angle.row(y)[low..end];
+            let across = &weights[0][low + radius - column..];
+            let down = weights[1][y + radius - row];
+            for ((&length, &angle), &across) in lengths.iter().zip(angles).zip(across) {
+                // Bin centers are at one half; one is added because bins are stored with offset
+                // one.
+                let at = angle * (BINS as f32 / TURN) + 0.5;
+                let bin = at as usize;
+                let (part, vote) = (at - bin as f32, length * across * down);
+                let bin = bin.min(BINS);
+                histogram[bin] += (1.0 - part) * vote;
+                histogram[bin + 1] += part * vote;
+            }
+        }
+        let mut bins: [f32; BINS] = std::array::from_fn(|bin| histogram[bin + 1]);
+        bins[BINS - 1] += histogram[0];
+        bins[0] += histogram[BINS + 1];
+        bins
+    }
+}
+
+/// Finds the peaks of a histogram, each moved to the vertex of the parabola through its neighbors.
+fn peaks(histogram: &[f32; BINS]) -> ([f64; MOST], usize) {
+    let highest = histogram.iter().fold(0.0_f32, |most, &value| most.max(value));
+    let (mut angles, mut found) = ([0.0; MOST], 0);
+    for (bin, &here) in histogram.iter().enumerate() {
+        let before = histogram[(bin + BINS - 1) % BINS];
+        let after = histogram[(bin + 1) % BINS];
+        if found < MOST && here > SHARE * highest && here > before && here > after {
+            let (here, before, after) = (f64::from(here), f64::from(before), f64::from(after));
+            let offset = -0.5 * (after - before) / (after + before - 2.0 * here);
+            angles[found] = TAU * (bin as f64 + offset + 0.5) / BINS as f64;
+            found += 1;
+        }
+    }
+    (angles, found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::features::image::GrayImage;
+
+    #[test]
+    fn a_ramp_points_uphill_whichever_way() {
+        // Avoids borders of two bins, where both are equally high and neither is a peak.
+        for degrees in (2..360).step_by(7).filter(|degrees| degrees % 10 != 0) {
+            let (sin, cos) = f64::from(degrees).to_radians().sin_cos();
+            let value = |i: usize| (cos * (i % 41) as f64 + sin * (i / 41) as f64) as f32;
+            let image = GrayImage::try_new(41, 41, (0..41 * 41).map(value).collect()).unwrap();
+            let (mut level, mut gradients) = (Plane::default(), Gradients::default());
+            level.copy(&image);
+            gradients.reset(&level);
+            let place = Place { x: 20.2, y: 19.7, sigma: 2.0 };
+            let (angles, found) =
+                orientations(&mut gradients, &level, place, &mut Default::default());
+            assert_eq!(found, 1);
+            let off = (angles[0].to_degrees() - f64::from(degrees)).rem_euclid(360.0);
+            assert!(off.min(360.0 - off) < 1.5, "{degrees}: {}", angles[0].to_degrees());
+        }
+    }
+
+    #[test]
+    fn peaks_below_the_share_are_dropped_and_four_kept() {
+        let mut histogram = [0.0; BINS];
+        (histogram[0], histogram[10], histogram[20]) = (1.0, 0.81, 0.79);
+        let (angles, found) = peaks(&histogram);
+        assert_eq!(found, 2);
+        assert!((angles[0] - TAU * 0.5 / 36.0).abs() < 1e-9);
+        assert!((angles[1] - TAU * 10.5 / 36.0).abs() < 1e-9);
+        assert_eq!(peaks(&[0.0; BINS]).1, 0);
+        assert_eq!(peaks(&std::array::from_fn(|bin| (bin % 2) as f32)).1, MOST);
+    }
+}

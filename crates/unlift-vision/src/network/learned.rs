@@ -1,0 +1,136 @@
+//! The source `learned`: a network scores all pairs of descriptors of a set.
+
+use std::sync::{Arc, OnceLock};
+
+use unlift::descriptors::Values;
+use unlift::neighbors::sources::SourceEntry;
+use unlift::neighbors::{
+    DescriptorKind, Needs, Neighborhoods, Overlap, Part, Similarity, Source, dense, scored,
+};
+use unlift::released::Released;
+use unlift::{Descriptors, Error};
+
+use super::Network;
+use super::tensor::Tensor;
+
+const NAME: &str = "learned";
+
+/// The sources that need a network, in addition to [`unlift::neighbors::sources::SOURCES`].
+pub const SOURCES: &[SourceEntry] = &[SourceEntry {
+    name: NAME,
+    summary: "records that a network trained on photos scores as near; SIFT or ALIKED descriptors",
+    in_2d: Some(|| Arc::new(Learned::default())),
+    in_3d: Some(|| Arc::new(Learned::default())),
+}];
+
+/// Lists the `k` records that a network scores highest by their descriptors, directly or over a
+/// short walk: [`scored`] with a network of `training/neighbors`. Its inputs include training-free
+/// scores: overlap of patches (SIFT) or similarity of descriptors (learned ones).
+///
+/// The descriptors choose the network: SIFT, 128 floats that are not SIFT (taken for ALIKED), or
+/// 256 floats (SuperPoint, whose network users train themselves).
+///
+/// Source: Sec. 5 and supplement E, where positions are not known either; pair scores, the loss and
+/// the walk are ours.
+#[derive(Clone, Debug, Default)]
+pub struct Learned {
+    network: Option<Arc<Network>>,
+}
+
+/// Weight of a standard deviation of learned descriptors' cosines beside the network's scores. The
+/// network finds the nearest twenty but does not order them; similarity does
+/// (docs/decisions/sources.md).
+const LIKENESS: f32 = 0.2;
+
+fn model(kind: DescriptorKind) -> &'static str {
+    match kind {
+        DescriptorKind::Sift => "neighbors-sift",
+        DescriptorKind::Aliked => "neighbors-aliked",
+        DescriptorKind::SuperPoint => "neighbors-superpoint",
+    }
+}
+
+fn network(kind: DescriptorKind) -> Result<&'static Network, Error> {
+    static LOADED: [OnceLock<Result<Network, Error>>; DescriptorKind::ALL.len()] =
+        [const { OnceLock::new() }; DescriptorKind::ALL.len()];
+    let loaded = LOADED[kind as usize].get_or_init(|| Network::load(model(kind)));
+    loaded.as_ref().map_err(Error::clone)
+}
+
+impl Learned {
+    /// Creates the source with a given network: inputs `descriptors` (n, dim) of unit length and
+    /// `pairs` (reaches, n, n) of [`dense`], output `scores` (n, n).
+    pub fn with(network: Arc<Network>) -> Self {
+        Self { network: Some(network) }
+    }
+
+    fn network(&self, descriptors: &Descriptors) -> Result<&Network, Error> {
+        match &self.network {
+            Some(network) => Ok(network),
+            None => network(DescriptorKind::of(descriptors, NAME)?),
+        }
+    }
+}
+
+impl<const D: usize> Source<D> for Learned {
+    fn name(&self) -> &str {
+        NAME
+    }
+
+    fn needs(&self) -> Needs {
+        Needs::Descriptors
+    }
+
+    fn k(&self, released: &Released<D>) -> usize {
+        // Images have fewer keypoints, so only the first of a ranking are near.
+        match released.descriptors().map(|some| DescriptorKind::of(some, NAME)) {
+            Some(Ok(DescriptorKind::Sift)) | None => Source::<D>::k(&Overlap, released),
+            Some(_) if D == 2 => 7,
+            Some(_) => Source::<D>::k(&Similarity, released),
+        }
+    }
+
+    fn lists(&self, released: &Released<D>, k: usize, _: u64) -> Result<Neighborhoods, Error> {
+        scored(released, k, &|part| scores(self.network(&part.descriptors)?, part))
+    }
+
+    fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
+        self.network(descriptors).map(|_| ())
+    }
+
+    fn note(&self, n_slots: usize) -> Option<String> {
+        // Large maps are split into sets with the training-free source.
+        Source::<D>::note(&Overlap, n_slots)
+    }
+}
+
+fn scores(network: &Network, part: &Part) -> Result<Vec<f32>, Error> {
+    let set = &part.descriptors;
+    let n = set.len();
+    let descriptors = Tensor::try_new(&[n, set.dim()], of_unit_length(set))?;
+    let pairs = dense(set, part.usual.as_deref())?;
+    let (reaches, pairs) = (pairs.reaches(), pairs.into_scores());
+    let likeness = if reaches == 1 { pairs.clone() } else { Vec::new() };
+    let pairs = Tensor::try_new(&[reaches, n, n], pairs)?;
+    let [scores] = network.run(vec![("descriptors", descriptors), ("pairs", pairs)], ["scores"])?;
+    if scores.shape() != [n, n] {
+        let found = format!("{:?}", scores.shape());
+        return Err(Error::new("learned neighbors", format!("scores of shape ({n}, {n})"), found));
+    }
+    let mut scores = scores.into_values();
+    scores.iter_mut().zip(likeness).for_each(|(score, alike)| *score += LIKENESS * alike);
+    Ok(scores)
+}
+
+fn of_unit_length(descriptors: &Descriptors) -> Vec<f32> {
+    let mut values = match descriptors.values() {
+        Values::U8(values) => values.iter().map(|&x| f32::from(x)).collect(),
+        Values::F32(values) => values.clone(),
+    };
+    for row in values.chunks_exact_mut(descriptors.dim()) {
+        let squares = row.iter().map(|&x| f64::from(x) * f64::from(x));
+        let norm = squares.sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+        row.iter_mut().for_each(|x| *x = (f64::from(*x) / norm) as f32);
+    }
+    values
+}

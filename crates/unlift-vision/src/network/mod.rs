@@ -1,0 +1,337 @@
+//! Learned networks: the list of models, their files, and how to run them.
+//!
+//! ```text
+//! name ──> registry ──> folders, or what the program carries ──> hash, ports ──> Network ──> run
+//! ```
+//!
+//! A *model* is a file in ONNX, a *network* is a loaded model. [`MODELS`] lists all models: some
+//! are embedded in the program, others are supplied by the user. Inputs and outputs are
+//! [`Tensor`]s, which the users of a network make and read.
+//!
+//! ```
+//! use unlift_vision::network::{Network, Tensor};
+//!
+//! let network = Network::load("aliked-n16rot")?;
+//! let image = Tensor::try_new(&[1, 3, 32, 32], vec![0.5; 3 * 32 * 32])?;
+//! let [score] = network.run(vec![("image", image)], ["score"])?;
+//! assert_eq!(score.shape(), [1, 1, 32, 32]);
+//! # Ok::<(), unlift::Error>(())
+//! ```
+
+pub mod file;
+mod folders;
+mod learned;
+mod registry;
+mod tensor;
+mod wire;
+
+use std::borrow::Cow;
+use std::fmt;
+use std::path::Path;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread;
+
+use rten::{
+    Dimension, ModelOptions, NodeId, OpRegistry, RunOptions, ThreadPool, Value, op_registry,
+};
+use rten_tensor::prelude::*;
+use sha2::{Digest, Sha256};
+use unlift::Error;
+use unlift::guard::{caught, told};
+
+pub use folders::{Folders, Place, VARIABLE};
+pub use learned::{Learned, SOURCES};
+pub use registry::{Entry, MODELS, Port, entry};
+pub use tensor::Tensor;
+pub use unlift::neighbors::DescriptorKind;
+
+/// A loaded model. Threads can share it and call [`run`](Self::run) at the same time.
+pub struct Network {
+    /// Name in errors: a path, or the name of an embedded model.
+    place: String,
+    sha256: String,
+    // Boxed, because it has half a kilobyte and networks are fields of small enums.
+    model: Box<rten::Model>,
+    /// The model's outputs and their shapes.
+    outputs: &'static [Port],
+    /// Idle pools of one thread each, one per concurrent call.
+    idle: Mutex<Vec<Arc<ThreadPool>>>,
+}
+
+impl fmt::Debug for Network {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Network")
+            .field("place", &self.place)
+            .field("sha256", &self.sha256)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Network {
+    /// Loads the model `name` of [`MODELS`] from the place where
+    /// [`Folders::of_process`] finds it.
+    ///
+    /// # Errors
+    /// If there is no such name, the model is missing, its hash differs, it is not ONNX, or it has
+    /// other inputs and outputs.
+    pub fn load(name: &str) -> Result<Self, Error> {
+        Self::load_from(&Folders::of_process(), entry(name)?)
+    }
+
+    /// Loads the model of `entry` from given folders.
+    ///
+    /// # Errors
+    /// See [`load`](Self::load).
+    pub fn load_from(folders: &Folders, entry: &Entry) -> Result<Self, Error> {
+        match (folders.find(entry)?, entry.carried) {
+            (Some(Place::File(path)), _) => Self::read(&path, entry),
+            (Some(Place::Carried), Some(bytes)) => {
+                let all = OpRegistry::with_all_ops;
+                Self::from_bytes(Cow::Borrowed(bytes), (entry.name, entry), all)
+            }
+            _ => Err(folders.missing(entry)),
+        }
+    }
+
+    /// Loads the model in the file `path`, as `entry` describes it.
+    ///
+    /// # Errors
+    /// See [`load`](Self::load); also if the file cannot be read.
+    pub fn read(path: &Path, entry: &Entry) -> Result<Self, Error> {
+        Self::read_with(path, entry, OpRegistry::with_all_ops)
+    }
+
+    /// Loads a model from an untrusted file, as `entry` describes it. Only plain operators are
+    /// allowed, whose results are about as large as their inputs or the file, so that a small file
+    /// cannot use unlimited memory or time.
+    ///
+    /// # Errors
+    /// See [`read`](Self::read); also if it has other operators.
+    pub fn read_plain(path: &Path, entry: &Entry) -> Result<Self, Error> {
+        Self::read_with(path, entry, plain_operators)
+    }
+
+    fn read_with(path: &Path, entry: &Entry, operators: fn() -> OpRegistry) -> Result<Self, Error> {
+        let place = path.display().to_string().escape_debug().to_string();
+        let bytes = file::bytes(path)
+            .map_err(|error| Error::new(place.clone(), "a model in ONNX", error.to_string()))?;
+        Self::from_bytes(Cow::Owned(bytes), (&place, entry), operators)
+    }
+
+    fn from_bytes(
+        bytes: Cow<'static, [u8]>,
+        (place, entry): (&str, &Entry),
+        operators: fn() -> OpRegistry,
+    ) -> Result<Self, Error> {
+        let sha256: String = Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect();
+        if let Some(expected) = entry.sha256
+            && sha256 != expected
+        {
+            return Err(Error::new(place, format!("SHA-256 {expected}"), sha256));
+        }
+        wire::check(&bytes).map_err(|found| Error::new(place, "a model in ONNX", found))?;
+        let model = aside(|| {
+            let mut options = ModelOptions::with_ops(operators());
+            // Uses twice the memory of the weights, but a tenth of the time.
+            options.prepack_weights(true);
+            match bytes {
+                Cow::Borrowed(bytes) => options.load_static_slice(bytes),
+                Cow::Owned(bytes) => options.load(bytes),
+            }
+        });
+        let refused = |found: &str| Error::new(place, "a model in ONNX", one_line(found));
+        let model = model.map_err(|panic| refused(&panic))?;
+        let model = model.map_err(|error| refused(&error.to_string()))?;
+        let network = Self {
+            place: place.to_owned(),
+            sha256,
+            model: Box::new(model),
+            outputs: entry.outputs,
+            idle: Mutex::new(Vec::new()),
+        };
+        network.check(entry.inputs, network.model.input_ids(), "input")?;
+        network.check(entry.outputs, network.model.output_ids(), "output")?;
+        Ok(network)
+    }
+
+    /// Returns the SHA-256 of the file, in hexadecimal.
+    pub fn sha256(&self) -> &str {
+        &self.sha256
+    }
+
+    /// Runs the part of the network from `inputs` to `outputs`, given by name, on one thread.
+    ///
+    /// Callers process several pictures or maps in parallel, so results do not depend on the number
+    /// of threads. They may differ in the last bits between machines with other vector
+    /// instructions.
+    ///
+    /// # Errors
+    /// If the network has no such name, a shape does not fit, or an output is not an array of
+    /// floats.
+    pub fn run<const N: usize>(
+        &self,
+        inputs: Vec<(&str, Tensor)>,
+        outputs: [&str; N],
+    ) -> Result<[Tensor; N], Error> {
+        let found = self.run_all(inputs, &outputs)?;
+        let fewer = |found: Vec<Tensor>| {
+            Error::new(&*self.place, format!("{N} outputs"), found.len().to_string())
+        };
+        found.try_into().map_err(fewer)
+    }
+
+    /// Runs the network like [`run`](Self::run), with any number of outputs.
+    ///
+    /// # Errors
+    /// See [`run`](Self::run).
+    pub fn run_all(
+        &self,
+        inputs: Vec<(&str, Tensor)>,
+        outputs: &[&str],
+    ) -> Result<Vec<Tensor>, Error> {
+        let wrong =
+            |expected: &str, found: &str| Error::new(&*self.place, expected, one_line(found));
+        let id = |name: &str| {
+            self.model.find_node(name).ok_or_else(|| wrong("a value of the network", name))
+        };
+        let mut given = Vec::with_capacity(inputs.len());
+        for (name, tensor) in inputs {
+            let shape = tensor.shape().to_vec();
+            let value = Value::from_shape(&shape, tensor.into_values())
+                .map_err(|error| wrong("a tensor", &error.to_string()))?;
+            given.push((id(name)?, value.into()));
+        }
+        let asked = outputs.iter().map(|name| id(name)).collect::<Result<Vec<_>, _>>()?;
+        let pool = self.idle().pop().unwrap_or_else(|| Arc::new(ThreadPool::with_num_threads(1)));
+        let options = RunOptions::default().with_thread_pool(Some(Arc::clone(&pool)));
+        let result = aside(|| self.model.run(given, &asked, Some(options)));
+        let result = result.map_err(|panic| wrong("a network that runs", &panic))?;
+        self.idle().push(pool);
+        let values = result.map_err(|error| wrong("inputs that fit", &error.to_string()))?;
+        let tensors = values.into_iter().zip(outputs).map(|(value, name)| match value {
+            Value::FloatTensor(tensor) => {
+                let shape = tensor.shape().to_vec();
+                // The declared shapes of a file may be wrong.
+                let port = self.outputs.iter().find(|port| port.name == *name);
+                if let Some(port) = port.filter(|port| !port.takes(&shape)) {
+                    return Err(wrong(&format!("an output {port}"), &format!("{shape:?}")));
+                }
+                Tensor::try_new(&shape, tensor.into_data())
+            }
+            _ => Err(wrong("floats", name)),
+        });
+        tensors.collect()
+    }
+
+    fn idle(&self) -> MutexGuard<'_, Vec<Arc<ThreadPool>>> {
+        // The list stays valid if another thread panics.
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Checks that the file has these inputs or outputs, with these shapes.
+    fn check(&self, ports: &[Port], ids: &[NodeId], kind: &str) -> Result<(), Error> {
+        for port in ports {
+            let info = ids.iter().filter_map(|&id| self.model.node_info(id));
+            let found = info.into_iter().find(|info| info.name() == Some(port.name));
+            let expected = || format!("an {kind} {port}");
+            let wrong = |found: String| Error::new(&*self.place, expected(), found);
+            let Some(found) = found else {
+                let names = ids.iter().filter_map(|&id| self.model.node_info(id)?.name());
+                let names: Vec<&str> = names.collect();
+                return Err(wrong(format!("{kind}s {}", one_line(&names.join(", ")))));
+            };
+            // Exporters may omit shapes of outputs; `run` checks the actual ones.
+            let Some(shape) = found.shape() else { continue };
+            let fits = shape.len() == port.shape.len()
+                && shape.iter().zip(port.shape).all(|(side, expected)| match (side, expected) {
+                    (Dimension::Fixed(side), Some(expected)) => side == expected,
+                    (Dimension::Fixed(_), None) => false,
+                    (Dimension::Symbolic(_), expected) => kind == "output" || expected.is_none(),
+                });
+            if !fits {
+                return Err(wrong(one_line(&format!("{shape:?}"))));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Operators for untrusted networks: no loops, and none that fills a shape given as a value.
+fn plain_operators() -> OpRegistry {
+    op_registry!(
+        Abs,
+        Add,
+        AveragePool,
+        BatchNormalization,
+        Cast,
+        Clip,
+        Concat,
+        Conv,
+        ConvTranspose,
+        DepthToSpace,
+        Div,
+        Elu,
+        Equal,
+        Erf,
+        Exp,
+        Flatten,
+        Gather,
+        Gelu,
+        Gemm,
+        GlobalAveragePool,
+        Greater,
+        HardSigmoid,
+        HardSwish,
+        Identity,
+        InstanceNormalization,
+        LayerNormalization,
+        LeakyRelu,
+        Less,
+        Log,
+        MatMul,
+        Max,
+        MaxPool,
+        Min,
+        Mul,
+        Neg,
+        Pad,
+        Pow,
+        PRelu,
+        ReduceL2,
+        ReduceMax,
+        ReduceMean,
+        ReduceSum,
+        Relu,
+        Reshape,
+        Resize,
+        Shape,
+        Sigmoid,
+        Slice,
+        Softmax,
+        Softplus,
+        Split,
+        Sqrt,
+        Squeeze,
+        Sub,
+        Tanh,
+        Transpose,
+        Unsqueeze,
+        Where
+    )
+}
+
+/// Runs `work`, which waits for a pool of rten, on its own thread. A waiting rayon thread would
+/// start other work in the meantime: more pictures in memory, or work that needs the network that
+/// is being loaded. A panic of rten becomes an error with its message.
+fn aside<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, String> {
+    thread::scope(|scope| {
+        let done = scope.spawn(|| caught(work)).join();
+        done.unwrap_or_else(|panic| Err(told(&*panic)))
+    })
+    .map_err(|panic| format!("one that fails ({panic})"))
+}
+
+/// Returns text of other libraries in one line, with control characters escaped.
+fn one_line(text: &str) -> String {
+    text.lines().map(str::trim).collect::<Vec<_>>().join(" ").escape_debug().to_string()
+}

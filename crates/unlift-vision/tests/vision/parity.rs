@@ -1,0 +1,71 @@
+//! Metrics and detections, compared with scikit-image, the official LPIPS and YOLOX.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+use unlift_vision::features::load::read_color;
+use unlift_vision::pictures::{CLASSES, Detection, Detector, Lpips, Metrics};
+
+/// Returns `../shared` and the reference file `name` in it; `None` with a message if it is missing.
+fn reference(name: &str) -> Option<(PathBuf, Value)> {
+    let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
+    let path = shared.join("reference").join(name);
+    let Ok(text) = fs::read_to_string(&path) else {
+        eprintln!("{} is not here: skipped", path.display());
+        return None;
+    };
+    Some((shared, serde_json::from_str(&text).unwrap()))
+}
+
+#[test]
+fn metrics_are_those_of_others() {
+    let Some((shared, reference)) = reference("image_metrics.json") else { return };
+    let lpips = Lpips::try_new().unwrap();
+    let pairs = reference["pairs"].as_object().unwrap();
+    assert!(pairs.len() >= 6);
+    for (name, pair) in pairs {
+        let read = |side: &str| {
+            read_color(&shared.join("reference").join(pair[side].as_str().unwrap())).unwrap()
+        };
+        let found = Metrics::of(&read("a"), &read("b"), &lpips).unwrap();
+        let apart = |key: &str, found: f64| (found - pair[key].as_f64().unwrap()).abs();
+        assert!(apart("ssim_rgb_uniform7", found.ssim) < 1e-9, "{name}: {found:?}");
+        assert!(apart("psnr_db", found.psnr) < 1e-9, "{name}: {found:?}");
+        assert!(apart("lpips_squeeze", found.lpips) < 1e-5, "{name}: {found:?}");
+    }
+}
+
+#[test]
+fn detections_are_those_of_others() {
+    let Some((shared, reference)) = reference("yolox_nano_reference.json") else { return };
+    let detector = Detector::try_new().unwrap();
+    for result in reference["results"].as_array().unwrap() {
+        let picture = read_color(&shared.join(result["image"].as_str().unwrap())).unwrap();
+        let found = detector.find(&picture, 0.1).unwrap();
+        let expected: Vec<Detection> = result["detections"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|one| {
+                let number = |value: &Value| value.as_f64().unwrap() as f32;
+                let sides = one["box_xyxy"].as_array().unwrap();
+                let class = one["class_id"].as_u64().unwrap() as usize;
+                assert_eq!(CLASSES[class], one["label"].as_str().unwrap());
+                let sides = [0, 1, 2, 3].map(|at| number(&sides[at]));
+                Detection { class, score: number(&one["score"]), sides }
+            })
+            .collect();
+        // Another JPEG decoder gives slightly different pixels, so only scores clearly above the
+        // threshold are compared.
+        for (these, those) in [(&found, &expected), (&expected, &found)] {
+            for one in these.iter().filter(|one| one.score > 0.15) {
+                let same =
+                    |other: &&Detection| other.class == one.class && other.overlap(one) > 0.9;
+                let other = those.iter().find(same).unwrap_or_else(|| panic!("{one:?}"));
+                assert!((other.score - one.score).abs() < 0.03, "{one:?} and {other:?}");
+            }
+        }
+        assert!(!expected.is_empty());
+    }
+}

@@ -1,0 +1,251 @@
+//! SIFT on synthetic images with known keypoints.
+
+use std::f32::consts::{FRAC_PI_2, TAU};
+
+use rayon::prelude::*;
+use unlift_vision::features::{Features, GrayImage, Keypoint, Sift, SiftOptions};
+
+/// An image of Gaussian blobs `(x, y, sigma, height)`, in COLMAP's pixel convention.
+fn blobs(width: usize, height: usize, blobs: &[(f32, f32, f32, f32)]) -> GrayImage {
+    let value = |i: usize| {
+        let (x, y) = ((i % width) as f32 + 0.5, (i / width) as f32 + 0.5);
+        let blob = |&(at_x, at_y, sigma, height): &(f32, f32, f32, f32)| {
+            let (dx, dy) = ((x - at_x) / sigma, (y - at_y) / sigma);
+            height * (-0.5 * (dx * dx + dy * dy)).exp()
+        };
+        0.4 + blobs.iter().map(blob).sum::<f32>()
+    };
+    GrayImage::try_new(width, height, (0..width * height).map(value).collect()).unwrap()
+}
+
+/// Creates a substitute for a photo: many blobs of all sizes, the same on every machine, scaled by
+/// `zoom`.
+fn scene(width: usize, height: usize, zoom: usize) -> GrayImage {
+    let spots: Vec<_> = (0..width * height / 150)
+        .map(|i| {
+            // Fractional parts of multiples of irrational numbers are evenly distributed.
+            let part = |by: f64| (i as f64 * by).fract() as f32;
+            let (x, y) = (part(0.754_877_666_2), part(0.569_840_290_9));
+            let sigma = 1.0 + 5.0 * part(0.618_033_988_7) * part(0.414_213_562_4);
+            let zoom = zoom as f32;
+            let (x, y) = (x * width as f32 * zoom, y * height as f32 * zoom);
+            (x, y, sigma * zoom, 0.6 * part(0.302_775_637_7) - 0.3)
+        })
+        .collect();
+    blobs(zoom * width, zoom * height, &spots)
+}
+
+/// Rotates the image by 90 degrees so that `(x, y)` moves to `(height - y, x)`.
+fn turned(image: &GrayImage) -> GrayImage {
+    let (width, height) = (image.height(), image.width());
+    let value = |i: usize| image.row(width - 1 - i % width)[i / width];
+    GrayImage::try_new(width, height, (0..width * height).map(value).collect()).unwrap()
+}
+
+fn unit(descriptor: &[u8; 128]) -> Vec<f32> {
+    let length = descriptor.iter().map(|&byte| f32::from(byte).powi(2)).sum::<f32>().sqrt();
+    descriptor.iter().map(|&byte| f32::from(byte) / length).collect()
+}
+
+fn distance(a: &[u8; 128], b: &[u8; 128]) -> f32 {
+    unit(a).iter().zip(unit(b)).map(|(a, b)| (a - b).powi(2)).sum::<f32>().sqrt()
+}
+
+/// Returns the share of `expected` that `features` contains within half a pixel, 5 % of scale, 5
+/// degrees and a descriptor distance of 0.1.
+fn share(features: &Features, expected: &Features) -> f64 {
+    let near = |a: &Keypoint, b: &Keypoint| {
+        let turn = (a.orientation - b.orientation).rem_euclid(TAU);
+        (a.x - b.x).hypot(a.y - b.y) < 0.5
+            && (a.scale / b.scale).ln().abs() < 0.05
+            && turn.min(TAU - turn) < 5_f32.to_radians()
+    };
+    let rows = || features.keypoints.iter().zip(&features.descriptors);
+    let found = expected.keypoints.iter().zip(&expected.descriptors).filter(|(keypoint, bytes)| {
+        rows().any(|(other, others)| near(keypoint, other) && distance(bytes, others) < 0.1)
+    });
+    found.count() as f64 / expected.keypoints.len() as f64
+}
+
+fn only(features: &Features, pass: impl Fn(&Keypoint) -> bool) -> Features {
+    let rows = features.keypoints.iter().zip(&features.descriptors);
+    let (keypoints, descriptors) = rows.filter(|row| pass(row.0)).unzip();
+    Features { keypoints, descriptors }
+}
+
+#[test]
+fn a_blob_gives_a_keypoint_at_its_center_with_its_scale() {
+    // At smoothing s the middle of the blob has 1 / (sigma^2 + s^2 - 0.25) of its height times
+    // sigma^2, because photos are assumed to be smoothed by 0.5. The difference to k s, where k is
+    // the step of levels, is largest at s^2 = (sigma^2 - 0.25) / k.
+    let step = 2_f32.powf(1.0 / 3.0);
+    for (sigma, contrast) in [(1.5, 0.4_f32), (2.6, -0.35), (4.0, 0.4), (7.0, -0.3), (10.0, 0.4)] {
+        // Not midway between pixels of any octave, where two are equally high.
+        for (x, y) in [(60.3, 70.1), (63.2, 57.9)] {
+            let image = blobs(128, 128, &[(x, y, sigma, contrast)]);
+            let features = Sift::default().extract(&image);
+            let best = features
+                .keypoints
+                .iter()
+                .min_by(|a, b| (a.x - x).hypot(a.y - y).total_cmp(&(b.x - x).hypot(b.y - y)))
+                .unwrap_or_else(|| panic!("nothing at sigma {sigma}"));
+            assert!((best.x - x).hypot(best.y - y) < 0.03 * sigma, "sigma {sigma}: {best:?}");
+            let expected = ((sigma * sigma - 0.25) / step).sqrt();
+            assert!((best.scale / expected - 1.0).abs() < 0.05, "sigma {sigma}: {best:?}");
+        }
+    }
+}
+
+#[test]
+fn turning_the_image_turns_keypoints_and_keeps_descriptors() {
+    // Halving keeps every second pixel: the same ones of the rotated image if sides are 8 n + 1.
+    let image = scene(161, 121, 1);
+    // All orientations, because the first two depend on where directions are counted from.
+    let options = SiftOptions { max_orientations: 4, ..SiftOptions::default() };
+    let sift = Sift::try_new(options).unwrap();
+    let (upright, mut expected) = (sift.extract(&image), sift.extract(&turned(&image)));
+    assert!(upright.keypoints.len() > 100, "{}", upright.keypoints.len());
+    // Inverse: (x', y') = (height - y, x), and directions by a quarter turn.
+    for keypoint in &mut expected.keypoints {
+        (keypoint.x, keypoint.y) = (keypoint.y, image.height() as f32 - keypoint.x);
+        keypoint.orientation -= FRAC_PI_2;
+    }
+    // Doubling repeats the last pixel, so borders differ.
+    let kept = only(&expected, |keypoint| {
+        let rim = 12.0 * keypoint.scale;
+        // Round blobs may have more than the four kept directions.
+        let twins = expected.keypoints.iter().filter(|other| other.x == keypoint.x).count();
+        let inside = keypoint.x.min(161.0 - keypoint.x).min(keypoint.y).min(121.0 - keypoint.y);
+        inside > rim && twins < 4
+    });
+    assert!(kept.keypoints.len() > 50, "{}", kept.keypoints.len());
+    assert!(share(&upright, &kept) > 0.99, "{}", share(&upright, &kept));
+}
+
+#[test]
+fn a_larger_image_has_the_same_features_at_larger_scales() {
+    let sift = Sift::default();
+    // The finest features differ, because the first doubling is linear.
+    let small = only(&sift.extract(&scene(160, 120, 1)), |keypoint| keypoint.scale > 2.0);
+    let mut large = sift.extract(&scene(160, 120, 2));
+    for keypoint in &mut large.keypoints {
+        (keypoint.x, keypoint.y, keypoint.scale) =
+            (0.5 * keypoint.x, 0.5 * keypoint.y, 0.5 * keypoint.scale);
+    }
+    assert!(small.keypoints.len() > 50);
+    assert!(share(&large, &small) > 0.75, "{} of {}", share(&large, &small), small.keypoints.len());
+}
+
+#[test]
+fn nothing_to_see_gives_nothing() {
+    let sift = Sift::default();
+    for (width, height) in [(1, 1), (1, 40), (2, 2), (3, 3), (5, 7), (16, 9), (64, 64)] {
+        let flat = GrayImage::try_new(width, height, vec![0.5; width * height]).unwrap();
+        assert_eq!(sift.extract(&flat), Features::default(), "{width} x {height}");
+        // Noise in an image of any size must not fail.
+        let value = |i: usize| ((i * 7919) % 13) as f32 / 13.0;
+        let noise = (0..width * height).map(value).collect();
+        let features = sift.extract(&GrayImage::try_new(width, height, noise).unwrap());
+        assert_eq!(features.keypoints.len(), features.descriptors.len());
+    }
+}
+
+#[test]
+fn features_are_kept_from_the_coarsest_level_on_and_levels_whole() {
+    let image = scene(256, 256, 1);
+    let all = Sift::default().extract(&image);
+    let mut last = all.keypoints.len();
+    let mut fewer = 0;
+    for max_features in [400, 200, 100, 50, 10, 1] {
+        let options = SiftOptions { max_features, ..SiftOptions::default() };
+        let some = Sift::try_new(options).unwrap().extract(&image);
+        let n = some.keypoints.len();
+        // The coarsest features, unchanged, in the same order, and at least the requested number.
+        assert_eq!(some.keypoints, all.keypoints[all.keypoints.len() - n..]);
+        assert_eq!(some.descriptors, all.descriptors[all.descriptors.len() - n..]);
+        assert!(n > max_features && n <= last, "{max_features}: {n}");
+        fewer += usize::from(n < last);
+        last = n;
+    }
+    assert!(fewer >= 3, "levels are dropped one by one");
+}
+
+#[test]
+fn orientations_are_as_many_as_asked() {
+    let image = scene(128, 128, 1);
+    let extract = |max_orientations, upright| {
+        let options = SiftOptions { max_orientations, upright, ..SiftOptions::default() };
+        Sift::try_new(options).unwrap().extract(&image).keypoints
+    };
+    let (one, two, upright) = (extract(1, false), extract(2, false), extract(2, true));
+    assert!(two.len() > one.len());
+    assert!(one.iter().all(|keypoint| two.contains(keypoint)));
+    assert!(upright.iter().all(|keypoint| keypoint.orientation == 0.0));
+    let places =
+        |keypoints: &[Keypoint]| keypoints.iter().map(|k| (k.x, k.y, k.scale)).collect::<Vec<_>>();
+    let mut distinct = places(&two);
+    distinct.dedup();
+    assert_eq!(distinct, places(&one));
+    assert_eq!(places(&upright), places(&one));
+}
+
+#[test]
+fn an_image_that_is_too_large_is_shrunk_and_keypoints_are_not() {
+    let image = blobs(200, 150, &[(80.5, 70.5, 8.0, 0.4)]);
+    let options = SiftOptions { max_image_size: 100, ..SiftOptions::default() };
+    let features = Sift::try_new(options).unwrap().extract(&image);
+    let best = features.keypoints[0];
+    assert!((best.x - 80.5).hypot(best.y - 70.5) < 0.5, "{best:?}");
+    assert!((best.scale / 8.0 - 1.0).abs() < 0.15, "{best:?}");
+}
+
+#[test]
+fn the_same_bytes_for_any_number_of_threads_and_in_used_buffers() {
+    let images: Vec<_> = [(90, 70), (64, 100), (33, 31), (120, 80)]
+        .into_iter()
+        .cycle()
+        .take(12)
+        .map(|(width, height)| scene(width, height, 1))
+        .collect();
+    let fresh: Vec<_> = images.iter().map(|image| Sift::default().extract(image)).collect();
+    for threads in [1, 4] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let sift = Sift::default();
+        let found: Vec<_> =
+            pool.install(|| images.par_iter().map(|image| sift.extract(image)).collect());
+        assert!(found == fresh, "{threads} threads");
+    }
+}
+
+#[test]
+fn features_are_the_same_bits_everywhere() {
+    // Values that are exact on every machine: discs on a checkerboard.
+    let value = |i: usize| {
+        let (x, y) = (i % 150, i / 150);
+        let (dx, dy) = ((x % 29).abs_diff(14), (y % 23).abs_diff(11));
+        let disc = dx * dx + dy * dy < 20 + (x / 29) * 9 + (y / 23) * 5;
+        u8::from(disc) * 90 + 60 + ((x * x / 70 + y * 3) % 64) as u8
+    };
+    let bytes: Vec<u8> = (0..150 * 110).map(value).collect();
+    let image = GrayImage::from_bytes(150, 110, &bytes).unwrap();
+    let features = Sift::default().extract(&image);
+    // FNV-1a over all bytes.
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    let mut mix = |byte: u8| hash = (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
+    for keypoint in &features.keypoints {
+        for value in [keypoint.x, keypoint.y, keypoint.scale, keypoint.orientation] {
+            value.to_le_bytes().into_iter().for_each(&mut mix);
+        }
+    }
+    features.descriptors.iter().flatten().for_each(|&byte| mix(byte));
+    assert_eq!((features.keypoints.len(), hash), (117, 15_136_636_572_972_869_078));
+}
+
+#[test]
+fn any_number_of_levels_finds_something() {
+    for levels in 1..=8 {
+        let options = SiftOptions { levels, doubled: levels % 2 == 0, ..SiftOptions::default() };
+        let features = Sift::try_new(options).unwrap().extract(&scene(64, 48, 1));
+        assert!(!features.keypoints.is_empty(), "{levels} levels");
+    }
+}
