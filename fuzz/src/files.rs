@@ -146,11 +146,11 @@ pub fn stages(bytes: &[u8]) {
 
 /// Decodes a photo.
 pub fn photo(bytes: &[u8]) {
-    if let Ok(image) = unlift_vision::features::load::decode(bytes, "a photo") {
+    if let Ok(image) = unlift_vision::features::photo::decode(bytes, "a photo") {
         assert!(image.width() > 0 && image.height() > 0);
         let path = file("p.jpg", bytes);
         let color =
-            unlift_vision::features::load::read_color(&path).expect("as it was read in gray");
+            unlift_vision::features::photo::read_color(&path).expect("as it was read in gray");
         assert_eq!([color.width(), color.height()], [image.width(), image.height()]);
     }
 }

@@ -15,7 +15,8 @@ use unlift::recover::Recovered;
 use unlift::seed::Key;
 use unlift_audit::inversion::{Painter, on_bearings, six_views};
 use unlift_audit::{Preparation, maps};
-use unlift_vision::pictures::{ColorImage, Inverter, Lpips, Metrics};
+use unlift_vision::features::ColorImage;
+use unlift_vision::pictures::{Inverter, Lpips, Metrics};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);

@@ -11,7 +11,7 @@ use std::time::Instant;
 
 use unlift::Descriptors;
 use unlift::descriptors::Values;
-use unlift_vision::features::{Aliked, AlikedOptions, ColorImage, Sift, SiftOptions, load};
+use unlift_vision::features::{Aliked, AlikedOptions, ColorImage, Sift, SiftOptions, photo};
 use unlift_vision::network::DescriptorKind;
 use unlift_vision::pictures::{Detector, Inverter, Lpips, Points, feature_image, psnr, ssim};
 
@@ -138,7 +138,7 @@ fn photos(folder: &Path) -> Vec<ColorImage> {
     if paths.is_empty() {
         return vec![waves()];
     }
-    paths.iter().take(MOST).map(|path| load::read_color(path).unwrap()).collect()
+    paths.iter().take(MOST).map(|path| photo::read_color(path).unwrap()).collect()
 }
 
 /// Creates a synthetic photo with keypoints.

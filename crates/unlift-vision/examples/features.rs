@@ -13,9 +13,9 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use unlift_vision::features::batch::in_order;
+use unlift_vision::features::in_order;
 use unlift_vision::features::{
-    Aliked, AlikedOptions, Features, LearnedFeatures, Sift, SiftOptions, load,
+    Aliked, AlikedOptions, Features, LearnedFeatures, Sift, SiftOptions, photo,
 };
 
 #[derive(Default)]
@@ -66,13 +66,13 @@ fn run() -> Result<(), Box<dyn Error>> {
             let mut of = SiftOptions::default();
             of.max_features = options.max_features.unwrap_or(of.max_features);
             let sift = Sift::try_new(of)?;
-            extract(&options, load::read, |image| Ok(raw(&sift.extract(image))))
+            extract(&options, photo::read, |image| Ok(raw(&sift.extract(image))))
         }
         "aliked" => {
             let mut of = AlikedOptions::default();
             of.max_features = options.max_features.unwrap_or(of.max_features);
             let aliked = Aliked::try_new(of)?;
-            extract(&options, load::read_color, |image| Ok(raw_learned(&aliked.extract(image)?)))
+            extract(&options, photo::read_color, |image| Ok(raw_learned(&aliked.extract(image)?)))
         }
         _ => Err(format!("--type: expected sift or aliked, found {kind:?}").into()),
     }

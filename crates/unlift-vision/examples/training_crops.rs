@@ -20,7 +20,7 @@ use unlift::Descriptors;
 use unlift::descriptors::Values;
 use unlift::neighbors::{dense, usual};
 use unlift::seed::{Draws, Stage};
-use unlift_vision::features::batch::in_order;
+use unlift_vision::features::in_order;
 use unlift_vision::features::{
     AlikedOptions, Extraction, Extractor, Found, SiftOptions, SuperPointOptions,
 };

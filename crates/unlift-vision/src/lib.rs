@@ -8,3 +8,16 @@
 pub mod features;
 pub mod network;
 pub mod pictures;
+
+use std::path::Path;
+use std::{fs, io};
+
+/// Reads all bytes of a file. Pipes, sockets and devices are refused, because reading them may never
+/// end; of a folder, the system returns an error.
+fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
+    let metadata = fs::metadata(path)?;
+    if !metadata.is_file() && !metadata.is_dir() {
+        return Err(io::Error::other("a pipe, a socket or a device"));
+    }
+    fs::read(path)
+}

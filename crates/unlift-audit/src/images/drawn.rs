@@ -60,7 +60,7 @@ pub fn drawn(
             (_, Some(photos)) => photos.join(&picture.name),
             (_, None) => continue,
         };
-        match unlift_vision::features::preview::jpeg(&photo, PREVIEW, job.source.turn()) {
+        match unlift_vision::features::photo::jpeg(&photo, PREVIEW, job.source.turn()) {
             Ok(jpeg) => picture.photo = Some(jpeg),
             Err(error) => job.progress.say(&format!("note: {error}")),
         }

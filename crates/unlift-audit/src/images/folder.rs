@@ -7,7 +7,7 @@ use unlift::descriptors::Values;
 use unlift_io::Error;
 use unlift_io::features::{ImageFeatures, round_to_half};
 use unlift_io::seen::Seen;
-use unlift_vision::features::load::Turn;
+use unlift_vision::features::photo::Turn;
 use unlift_vision::features::{
     Extraction, Extractor, Features, Found as FoundFeatures, LearnedFeatures,
 };

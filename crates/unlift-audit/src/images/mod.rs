@@ -15,7 +15,7 @@ use std::path::Path;
 
 use unlift_io::features::{self, ImageFeatures};
 use unlift_vision::features::Extraction;
-use unlift_vision::features::load::Turn;
+use unlift_vision::features::photo::Turn;
 
 use crate::Error;
 

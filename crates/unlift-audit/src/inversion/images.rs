@@ -7,8 +7,8 @@ use unlift::audit::{Cell, Counts, Measure, Row};
 use unlift::{Descriptors, Error};
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_vision::features::ColorImage;
-use unlift_vision::features::load::{Turn, read_color_with};
-use unlift_vision::features::preview::jpeg_of;
+use unlift_vision::features::photo::jpeg_of;
+use unlift_vision::features::photo::{Turn, read_color_with};
 use unlift_vision::pictures::{Detection, Points};
 
 use super::{Judged, Painter, SHOWN, figures, needed, painted, shown, size};

@@ -14,8 +14,8 @@ use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::pictures::{Marks, ReleasedView};
 use unlift_report::scene::{SceneBox, Shapes};
 use unlift_vision::features::ColorImage;
-use unlift_vision::features::load::{Turn, read_color_with};
-use unlift_vision::features::preview::jpeg_of;
+use unlift_vision::features::photo::jpeg_of;
+use unlift_vision::features::photo::{Turn, read_color_with};
 use unlift_vision::pictures::{Detection, Lens, View};
 
 use super::{Judged, Painter, SHOWN, figures, needed, painted, shown};

@@ -12,7 +12,7 @@ use unlift::released::Released;
 use unlift::{Descriptors, Error, RowOrder};
 use unlift_report::inversions::{InvertedView, Likeness, Painted};
 use unlift_vision::features::ColorImage;
-use unlift_vision::features::preview::jpeg_of;
+use unlift_vision::features::photo::jpeg_of;
 use unlift_vision::pictures::{
     CLASSES, Detection, Detector, Inverter, Lpips, Metrics, Points, Projection, View,
 };

@@ -17,7 +17,7 @@ use unlift::truth::{Original, Secret};
 use unlift::{Descriptors, Error, PointSet, ProtectedDescriptors, Unit};
 use unlift_report::document::{FEWEST_HELD_OUT, HeldOut};
 use unlift_vision::features::Extraction;
-use unlift_vision::features::load::Turn;
+use unlift_vision::features::photo::Turn;
 use unlift_vision::pictures::Lens;
 
 use super::Cameras;

@@ -13,7 +13,7 @@ use unlift_audit::inversion::Inversion;
 use unlift_audit::sequence::{PoseError, SequenceJob, perform};
 use unlift_audit::{Finished, Shown, open_audit};
 use unlift_io::atomic::Rules;
-use unlift_vision::features::load::Turn;
+use unlift_vision::features::photo::Turn;
 
 use super::common::with_threads;
 use super::gate_files::GateFiles;

@@ -7,8 +7,8 @@ use unlift_io::Error;
 use unlift_io::atomic::{Kind, Rules};
 use unlift_io::features::{FeatureWriter, ImageFeatures};
 use unlift_vision::features::Extraction;
-use unlift_vision::features::batch::in_order;
-use unlift_vision::features::load::Turn;
+use unlift_vision::features::in_order;
+use unlift_vision::features::photo::Turn;
 
 use super::common::{all_could_be, with_threads};
 use crate::args::FeaturesArgs;

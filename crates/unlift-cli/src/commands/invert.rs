@@ -21,7 +21,7 @@ use unlift_io::read::colmap;
 use unlift_io::stage::{
     ImageFile, Kind as Stage, declared_kind, has_images, read_recovered, read_released,
 };
-use unlift_vision::features::{ColorImage, preview};
+use unlift_vision::features::{ColorImage, photo};
 use unlift_vision::network::DescriptorKind;
 
 use super::common::{all_could_be, same_map, with_threads};
@@ -100,7 +100,7 @@ impl Target<'_> {
     }
 
     fn write(&self, file: &Path, picture: &ColorImage) -> anyhow::Result<()> {
-        let bytes = marked_picture(&preview::png_of(picture)?);
+        let bytes = marked_picture(&photo::png_of(picture)?);
         write_file(file, Access::Private, |out| std::io::Write::write_all(out, &bytes))?;
         self.painted.fetch_add(1, Ordering::Relaxed);
         Ok(())

@@ -1,17 +1,15 @@
-//! Extracts features of any kind from a photo in a file.
+//! Extracts features of any kind from a photo in a file, and works on many photos in parallel.
 
 use std::path::Path;
 
+use rayon::prelude::*;
 use unlift::Error;
 use unlift::neighbors::DescriptorKind;
 
-use crate::features::color::ColorImage;
-use crate::features::learned::{
-    Aliked, AlikedOptions, LearnedFeatures, SuperPoint, SuperPointOptions,
-};
-use crate::features::load::{self, Turn};
-use crate::features::sift::SiftOptions;
-use crate::features::sift::{Features, Sift};
+use super::image::ColorImage;
+use super::learned::{Aliked, AlikedOptions, LearnedFeatures, SuperPoint, SuperPointOptions};
+use super::photo::{self, Turn};
+use super::sift::{Features, Sift, SiftOptions};
 
 /// Smallest side of an image that can have an extremum.
 const LEAST_SIDE: usize = 3;
@@ -112,11 +110,11 @@ impl Extractor {
     /// Extracts the features of the photo at `path`.
     ///
     /// # Errors
-    /// See [`load::read`]; also if a side has fewer than 3 pixels.
+    /// See [`photo::read`]; also if a side has fewer than 3 pixels.
     pub fn read(&self, path: &Path) -> Result<Photo, Error> {
         let (size, noise_px, found) = match &self.of {
             Of::Sift(sift) => {
-                let image = load::read_with(path, self.turn)?;
+                let image = photo::read_with(path, self.turn)?;
                 let size = large_enough(path, [image.width(), image.height()])?;
                 (size, DETECTION_NOISE, Found::Sift(sift.extract(&image)))
             }
@@ -144,7 +142,7 @@ impl Extractor {
 }
 
 fn color(path: &Path, turn: Turn) -> Result<(ColorImage, [usize; 2]), Error> {
-    let image = load::read_color_with(path, turn)?;
+    let image = photo::read_color_with(path, turn)?;
     let size = large_enough(path, [image.width(), image.height()])?;
     Ok((image, size))
 }
@@ -157,4 +155,64 @@ fn large_enough(path: &Path, size: [usize; 2]) -> Result<[usize; 2], Error> {
         return Err(Error::new(name.escape_debug().to_string(), expected, found));
     }
     Ok(size)
+}
+
+/// Items per thread that are processed before results are passed on.
+const PER_THREAD: usize = 8;
+
+/// Calls `work` on all items in parallel, and `sink` on the results, one at a time and in order.
+///
+/// At most 8 items per thread are in memory at once. Runs on rayon's current pool. Ends with the
+/// first error of `sink`.
+///
+/// # Errors
+/// Those of `sink`.
+///
+/// ```
+/// use unlift_vision::features::in_order;
+///
+/// let mut squares = Vec::new();
+/// in_order(&[1, 2, 3], |n| n * n, |at, square| {
+///     squares.push((at, square));
+///     Ok::<(), std::convert::Infallible>(())
+/// })?;
+/// assert_eq!(squares, [(0, 1), (1, 4), (2, 9)]);
+/// # Ok::<(), std::convert::Infallible>(())
+/// ```
+pub fn in_order<T: Sync, R: Send, E>(
+    items: &[T],
+    work: impl Fn(&T) -> R + Sync,
+    mut sink: impl FnMut(usize, R) -> Result<(), E>,
+) -> Result<(), E> {
+    let size = PER_THREAD * rayon::current_num_threads();
+    for (chunk, items) in items.chunks(size).enumerate() {
+        // One item per job, because photos differ in cost.
+        let results: Vec<R> = items.par_iter().with_max_len(1).map(&work).collect();
+        for (at, result) in results.into_iter().enumerate() {
+            sink(chunk * size + at, result)?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_come_in_order_and_a_failing_sink_ends_it() {
+        let items: Vec<usize> = (0..1000).collect();
+        let mut seen = Vec::new();
+        let result = in_order(
+            &items,
+            |item| item * 2,
+            |at, value| {
+                assert_eq!(value, 2 * at);
+                seen.push(at);
+                if at == 500 { Err("full") } else { Ok(()) }
+            },
+        );
+        assert_eq!(result, Err("full"));
+        assert_eq!(seen, items[..501]);
+    }
 }

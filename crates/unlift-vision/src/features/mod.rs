@@ -5,8 +5,8 @@
 //! photo ──> ColorImage ──> network ──> maxima ──> descriptors ──> LearnedFeatures
 //! ```
 //!
-//! [`read`](load::read) decodes a photo, [`Sift`] or [`Aliked`] extracts features,
-//! [`in_order`](batch::in_order) processes many photos in constant memory. [`Extractor`] extracts
+//! [`read`](photo::read) decodes a photo, [`Sift`] or [`Aliked`] extracts features,
+//! [`in_order`] processes many photos in constant memory. [`Extractor`] extracts
 //! any kind of features. The same image gives the same bytes for any number of threads.
 //!
 //! ```
@@ -24,18 +24,13 @@
 //! # Ok::<(), unlift::Error>(())
 //! ```
 
-pub mod batch;
-mod color;
 mod extractor;
-mod fit;
 mod image;
 mod learned;
-pub mod load;
-pub mod preview;
+pub mod photo;
 mod sift;
 
-pub use color::ColorImage;
-pub use extractor::{Extraction, Extractor, Found, Photo};
-pub use image::GrayImage;
+pub use extractor::{Extraction, Extractor, Found, Photo, in_order};
+pub use image::{ColorImage, GrayImage};
 pub use learned::{Aliked, AlikedOptions, LearnedFeatures, SuperPoint, SuperPointOptions};
 pub use sift::{Features, Keypoint, Sift, SiftOptions};

@@ -10,8 +10,7 @@ use unlift::neighbors::{
 use unlift::released::Released;
 use unlift::{Descriptors, Error};
 
-use super::Network;
-use super::tensor::Tensor;
+use super::{Network, Tensor};
 
 const NAME: &str = "learned";
 

@@ -18,12 +18,8 @@
 //! # Ok::<(), unlift::Error>(())
 //! ```
 
-pub mod file;
-mod folders;
 mod learned;
 mod registry;
-mod tensor;
-mod wire;
 
 use std::borrow::Cow;
 use std::fmt;
@@ -31,19 +27,54 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
-use rten::{
-    Dimension, ModelOptions, NodeId, OpRegistry, RunOptions, ThreadPool, Value, op_registry,
-};
+use rten::{Dimension, ModelOptions, NodeId, RunOptions, ThreadPool, Value};
 use rten_tensor::prelude::*;
 use sha2::{Digest, Sha256};
 use unlift::Error;
 use unlift::guard::{caught, told};
 
-pub use folders::{Folders, Place, VARIABLE};
+use crate::read_regular;
+
 pub use learned::{Learned, SOURCES};
-pub use registry::{Entry, MODELS, Port, entry};
-pub use tensor::Tensor;
+pub use registry::{Entry, Folders, MODELS, Place, Port, VARIABLE, entry};
 pub use unlift::neighbors::DescriptorKind;
+
+/// An array of floats, row-major.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tensor {
+    shape: Vec<usize>,
+    values: Vec<f32>,
+}
+
+impl Tensor {
+    /// Creates an array with this shape.
+    ///
+    /// # Errors
+    /// If the shape needs another number of values.
+    pub fn try_new(shape: &[usize], values: Vec<f32>) -> Result<Self, Error> {
+        let asked = shape.iter().try_fold(1_usize, |product, &side| product.checked_mul(side));
+        if asked != Some(values.len()) {
+            let expected = format!("values of the shape {shape:?}");
+            return Err(Error::new("tensor", expected, format!("{} values", values.len())));
+        }
+        Ok(Self { shape: shape.to_vec(), values })
+    }
+
+    /// Returns the lengths of the sides, outermost first.
+    pub fn shape(&self) -> &[usize] {
+        &self.shape
+    }
+
+    /// Returns all values, row-major.
+    pub fn values(&self) -> &[f32] {
+        &self.values
+    }
+
+    /// Returns all values and consumes the tensor.
+    pub fn into_values(self) -> Vec<f32> {
+        self.values
+    }
+}
 
 /// A loaded model. Threads can share it and call [`run`](Self::run) at the same time.
 pub struct Network {
@@ -86,8 +117,7 @@ impl Network {
         match (folders.find(entry)?, entry.carried) {
             (Some(Place::File(path)), _) => Self::read(&path, entry),
             (Some(Place::Carried), Some(bytes)) => {
-                let all = OpRegistry::with_all_ops;
-                Self::from_bytes(Cow::Borrowed(bytes), (entry.name, entry), all)
+                Self::from_bytes(Cow::Borrowed(bytes), entry.name, entry)
             }
             _ => Err(folders.missing(entry)),
         }
@@ -98,40 +128,21 @@ impl Network {
     /// # Errors
     /// See [`load`](Self::load); also if the file cannot be read.
     pub fn read(path: &Path, entry: &Entry) -> Result<Self, Error> {
-        Self::read_with(path, entry, OpRegistry::with_all_ops)
-    }
-
-    /// Loads a model from an untrusted file, as `entry` describes it. Only plain operators are
-    /// allowed, whose results are about as large as their inputs or the file, so that a small file
-    /// cannot use unlimited memory or time.
-    ///
-    /// # Errors
-    /// See [`read`](Self::read); also if it has other operators.
-    pub fn read_plain(path: &Path, entry: &Entry) -> Result<Self, Error> {
-        Self::read_with(path, entry, plain_operators)
-    }
-
-    fn read_with(path: &Path, entry: &Entry, operators: fn() -> OpRegistry) -> Result<Self, Error> {
         let place = path.display().to_string().escape_debug().to_string();
-        let bytes = file::bytes(path)
+        let bytes = read_regular(path)
             .map_err(|error| Error::new(place.clone(), "a model in ONNX", error.to_string()))?;
-        Self::from_bytes(Cow::Owned(bytes), (&place, entry), operators)
+        Self::from_bytes(Cow::Owned(bytes), &place, entry)
     }
 
-    fn from_bytes(
-        bytes: Cow<'static, [u8]>,
-        (place, entry): (&str, &Entry),
-        operators: fn() -> OpRegistry,
-    ) -> Result<Self, Error> {
+    fn from_bytes(bytes: Cow<'static, [u8]>, place: &str, entry: &Entry) -> Result<Self, Error> {
         let sha256: String = Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect();
         if let Some(expected) = entry.sha256
             && sha256 != expected
         {
             return Err(Error::new(place, format!("SHA-256 {expected}"), sha256));
         }
-        wire::check(&bytes).map_err(|found| Error::new(place, "a model in ONNX", found))?;
         let model = aside(|| {
-            let mut options = ModelOptions::with_ops(operators());
+            let mut options = ModelOptions::with_all_ops();
             // Uses twice the memory of the weights, but a tenth of the time.
             options.prepack_weights(true);
             match bytes {
@@ -254,70 +265,6 @@ impl Network {
         }
         Ok(())
     }
-}
-
-/// Operators for untrusted networks: no loops, and none that fills a shape given as a value.
-fn plain_operators() -> OpRegistry {
-    op_registry!(
-        Abs,
-        Add,
-        AveragePool,
-        BatchNormalization,
-        Cast,
-        Clip,
-        Concat,
-        Conv,
-        ConvTranspose,
-        DepthToSpace,
-        Div,
-        Elu,
-        Equal,
-        Erf,
-        Exp,
-        Flatten,
-        Gather,
-        Gelu,
-        Gemm,
-        GlobalAveragePool,
-        Greater,
-        HardSigmoid,
-        HardSwish,
-        Identity,
-        InstanceNormalization,
-        LayerNormalization,
-        LeakyRelu,
-        Less,
-        Log,
-        MatMul,
-        Max,
-        MaxPool,
-        Min,
-        Mul,
-        Neg,
-        Pad,
-        Pow,
-        PRelu,
-        ReduceL2,
-        ReduceMax,
-        ReduceMean,
-        ReduceSum,
-        Relu,
-        Reshape,
-        Resize,
-        Shape,
-        Sigmoid,
-        Slice,
-        Softmax,
-        Softplus,
-        Split,
-        Sqrt,
-        Squeeze,
-        Sub,
-        Tanh,
-        Transpose,
-        Unsqueeze,
-        Where
-    )
 }
 
 /// Runs `work`, which waits for a pool of rten, on its own thread. A waiting rayon thread would

@@ -1,10 +1,146 @@
+//! Feature images, made from positions and descriptors, and the network that paints them.
+
 use std::path::Path;
+
+use unlift::{Descriptors, Error};
 
 use crate::features::ColorImage;
 use crate::network::{DescriptorKind, Entry, Network, Tensor, entry};
-use unlift::{Descriptors, Error};
 
-use crate::pictures::feature_image::{Points, feature_image};
+/// Side of a cell in pixels.
+pub const CELL: usize = 4;
+/// Channels after those of the descriptor and the color: the position inside the cell (two), and
+/// the weight.
+const PLACE: usize = 3;
+/// Channels of the color: red, green, blue, and whether it is known.
+const COLOR: usize = 4;
+
+/// Points of one image.
+#[derive(Clone, Copy, Debug)]
+pub struct Points<'a> {
+    /// Positions `(n, 2)` in pixels, the middle of the first pixel at (0, 0).
+    pub places: &'a [[f32; 2]],
+    /// Descriptors of any length, with colors or without.
+    pub descriptors: &'a Descriptors,
+    /// Confidence of each point, 0 to 1.
+    pub weights: &'a [f32],
+    /// Distances from the camera, if known: then the nearest point of a cell replaces the mean.
+    pub depths: Option<&'a [f32]>,
+}
+
+impl Points<'_> {
+    fn check(&self) -> Result<(), Error> {
+        let n = self.places.len();
+        let depths = self.depths.map_or(n, <[f32]>::len);
+        for (what, rows) in [
+            ("descriptors", self.descriptors.len()),
+            ("weights", self.weights.len()),
+            ("depths", depths),
+        ] {
+            if rows != n {
+                return Err(Error::new(what, format!("{n}, one per point"), rows.to_string()));
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the cell of point `at` in an image of `size` pixels, and the position inside it from
+    /// -1 to 1. `None` outside the image and without weight.
+    fn cell(&self, at: usize, size: [usize; 2]) -> Option<([usize; 2], [f32; 2])> {
+        // Shifts the corner of the first pixel to (0, 0), where the first cell begins.
+        let place = self.places[at].map(|x| x + 0.5);
+        let inside = (0..2).all(|c| place[c] >= 0.0 && place[c] < size[c] as f32);
+        // NaN fails every comparison.
+        let trusted = self.weights[at] > 0.0;
+        if !inside || !trusted {
+            return None;
+        }
+        let place = place.map(|x| x / CELL as f32);
+        let cell = place.map(|x| x as usize);
+        Some((cell, [0, 1].map(|c| 2.0 * (place[c] - cell[c] as f32) - 1.0)))
+    }
+}
+
+/// Same limit as for photos; a network needs a gigabyte for this size.
+const MOST_PIXELS: usize = 1 << 24;
+
+/// Rejects implausible sizes, because files may contain any.
+pub(crate) fn check_size([width, height]: [usize; 2]) -> Result<(), Error> {
+    let sides = 2..=1 << 24;
+    if sides.contains(&width) && sides.contains(&height) && width * height <= MOST_PIXELS {
+        return Ok(());
+    }
+    let found = format!("{width} x {height}");
+    Err(Error::new("image size", "at least 2 x 2 and at most 16777216 pixels", found))
+}
+
+/// Makes the feature image of points in an image of `size` (width, height) pixels, in cells of
+/// [`CELL`] pixels: `(1, columns + 3, height, width)`, or `(1, columns + 7, height, width)` with
+/// `colored`.
+///
+/// Channels: the descriptor (of unit length, times the root of its columns); with `colored`, red,
+/// green and blue from -2 to 2, and 1 if they are known; the position inside the cell from -1 to 1;
+/// the weight. Several points in a cell give their weighted mean and the
+/// largest weight; with depths, the nearest point. Cells without points are zero.
+///
+/// # Errors
+/// If the columns of `points` differ in length, a side has less than 2 pixels, or the image has
+/// more than 2^24 pixels.
+pub fn feature_image(
+    points: &Points<'_>,
+    size: [usize; 2],
+    colored: bool,
+) -> Result<Tensor, Error> {
+    points.check()?;
+    check_size(size)?;
+    let dim = points.descriptors.dim();
+    let colors = points.descriptors.colors().filter(|_| colored);
+    let columns = dim + if colored { COLOR } else { 0 };
+    let [width, height] = size.map(|side| side.div_ceil(CELL));
+    let plane = width * height;
+    let mut values = vec![0.0; (columns + PLACE) * plane];
+    let mut total = vec![0.0_f32; plane];
+    let mut nearest = vec![f32::INFINITY; plane];
+    let mut row = vec![0.0; columns + 2];
+    for at in 0..points.places.len() {
+        let Some((cell, inside)) = points.cell(at, size) else { continue };
+        let (cell, mut weight) = (cell[1] * width + cell[0], points.weights[at]);
+        if let Some(depths) = points.depths {
+            let nearer = depths[at] < nearest[cell];
+            if !nearer {
+                continue;
+            }
+            nearest[cell] = depths[at];
+            // Removes farther points of the cell.
+            (0..=columns + 2).for_each(|channel| values[channel * plane + cell] = 0.0);
+            total[cell] = 0.0;
+        }
+        points.descriptors.read_row(at, &mut row[..dim]);
+        let length = row[..dim].iter().map(|x| x * x).sum::<f32>().sqrt();
+        let scale = (dim as f32).sqrt() / length.max(1e-12);
+        row[..dim].iter_mut().for_each(|x| *x *= scale);
+        if let Some(colors) = colors {
+            let [red, green, blue] = colors[at].map(|byte| 4.0 * (f32::from(byte) / 255.0 - 0.5));
+            row[dim..columns].copy_from_slice(&[red, green, blue, 1.0]);
+        }
+        row[columns..].copy_from_slice(&inside);
+        for (channel, value) in row.iter().enumerate() {
+            values[channel * plane + cell] += weight * value;
+        }
+        total[cell] += weight;
+        let largest = &mut values[(columns + 2) * plane + cell];
+        weight = weight.max(*largest);
+        *largest = weight;
+    }
+    for channel in values.chunks_exact_mut(plane).take(columns + 2) {
+        for (value, total) in channel.iter_mut().zip(&total) {
+            if *total > 0.0 {
+                *value /= total;
+            }
+        }
+    }
+    Tensor::try_new(&[1, columns + PLACE, height, width], values)
+}
 
 /// A network trained to make pictures from points and their descriptors.
 #[derive(Debug)]
@@ -29,7 +165,7 @@ impl Inverter {
     /// If the file cannot be read, or has other inputs and outputs.
     pub fn read(path: &Path, kind: DescriptorKind) -> Result<Self, Error> {
         let entry = Entry { sha256: None, ..*entry(model(kind))? };
-        Ok(Self { kind, network: Network::read_plain(path, &entry)? })
+        Ok(Self { kind, network: Network::read(path, &entry)? })
     }
 
     /// Returns the SHA-256 of the model, in hexadecimal.

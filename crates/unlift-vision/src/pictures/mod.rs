@@ -9,24 +9,12 @@
 //! Pictures are [`ColorImage`]s, so metrics compare values rounded to bytes. Positions are in
 //! pixels with the middle of the first pixel at (0, 0), as everywhere in unlift.
 
-mod compared;
+mod camera;
 mod detect;
-mod feature_image;
 mod inverter;
-mod lens;
-mod lpips;
-mod projection;
-mod psnr;
-mod sizes;
-mod ssim;
+mod metrics;
 
-pub use crate::features::ColorImage;
-pub use compared::Metrics;
+pub use camera::{Lens, Projection, View};
 pub use detect::{CLASSES, Detection, Detector};
-pub use feature_image::{CELL, Points, feature_image};
-pub use inverter::Inverter;
-pub use lens::Lens;
-pub use lpips::Lpips;
-pub use projection::{Projection, View};
-pub use psnr::psnr;
-pub use ssim::ssim;
+pub use inverter::{CELL, Inverter, Points, feature_image};
+pub use metrics::{Lpips, Metrics, psnr, ssim};

@@ -1,60 +1,201 @@
-//! Inlier ratios of `learned` on a photo outside the training data.
+//! ALIKED and SuperPoint, compared with the authors' code, and on synthetic images.
 
 use std::path::Path;
+use std::process::Command;
 
-use unlift::descriptors::Values;
-use unlift::geometry::frame::Bounds;
-use unlift::neighbors::oracle::{self, TrueNeighbors};
-use unlift::neighbors::{Overlap, Similarity, Source};
-use unlift::obfuscate::lines2d::Lines2d;
-use unlift::obfuscate::obfuscate;
-use unlift::seed::Key;
-use unlift::truth::Original;
-use unlift::{Descriptors, PointSet, Unit};
-use unlift_vision::features::{AlikedOptions, Extraction, Extractor, Found};
-use unlift_vision::network::Learned;
+use safetensors::SafeTensors;
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+use unlift_vision::features::{
+    Aliked, AlikedOptions, ColorImage, LearnedFeatures, SuperPoint, SuperPointOptions, photo,
+};
+use unlift_vision::network::{Entry, Network, Port, entry};
 
-const K: usize = 20;
+use crate::{floats, shared};
 
-/// Returns the inlier ratio among the first K entries of every list, by `learned` and by `other`;
-/// `None` without the photo.
-fn ratios(extraction: &Extraction, other: &dyn Source<2>) -> Option<[f64; 2]> {
-    let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    let photo = shared.join("data/redkitchen/images/frame-000500.color.jpg");
-    if !photo.is_file() {
-        eprintln!("{} is not here: skipped", photo.display());
-        return None;
+fn aliked(options: AlikedOptions) -> Aliked {
+    Aliked::try_new(options).unwrap()
+}
+
+fn flat(width: usize, height: usize, level: u8) -> ColorImage {
+    ColorImage::try_new(width, height, vec![level; 3 * width * height]).unwrap()
+}
+
+fn waves(width: usize, height: usize) -> ColorImage {
+    let value = |at: usize| {
+        let (x, y, channel) = ((at / 3 % width) as f32, (at / 3 / width) as f32, (at % 3) as f32);
+        let wave = (x / 5.0 + channel).sin() * (y / 7.0).cos() + (x * y / 90.0).sin();
+        (127.0 + 60.0 * wave) as u8
+    };
+    ColorImage::try_new(width, height, (0..3 * width * height).map(value).collect()).unwrap()
+}
+
+/// Returns the share of the reference's keypoints that are found within 0.05 pixels, and the share
+/// of these whose descriptor has a cosine above 0.999 and whose score is the same.
+fn parity(found: &LearnedFeatures, reference: [&[f32]; 3]) -> (f64, f64) {
+    let [places, descriptors, scores] = reference;
+    let (mut near, mut alike) = (0, 0);
+    let expected = places.as_chunks::<2>().0.iter().zip(descriptors.chunks_exact(found.dim));
+    for (([x, y], descriptor), score) in expected.zip(scores) {
+        let distance =
+            |at: &usize| (found.keypoints[*at][0] - x).hypot(found.keypoints[*at][1] - y);
+        let nearest = (0..found.keypoints.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let Some(at) = nearest.filter(|at| distance(at) < 0.05) else { continue };
+        near += 1;
+        let own = &found.descriptors[at * found.dim..(at + 1) * found.dim];
+        let cosine: f32 = own.iter().zip(descriptor).map(|(a, b)| a * b).sum();
+        alike += u32::from(cosine > 0.999 && (found.scores[at] - score).abs() < 1e-3);
     }
-    let photo = Extractor::try_new(extraction).unwrap().read(&photo).unwrap();
-    let (places, values, dim) = match photo.found {
-        Found::Sift(found) => {
-            let places: Vec<_> = found.keypoints.iter().map(|k| [k.x - 0.5, k.y - 0.5]).collect();
-            (places, Values::U8(found.descriptors.concat()), 128)
-        }
-        Found::Learned(found) => (found.keypoints, Values::F32(found.descriptors), found.dim),
-    };
-    let points = places.iter().map(|place| place.map(f64::from)).collect();
-    let points = PointSet::try_new(points, Unit::Pixel).unwrap();
-    let high = photo.size.map(|side| side as f64 - 0.5);
-    let original = Original::within(points, Bounds::try_new([-0.5; 2], high).unwrap()).unwrap();
-    let descriptors = Descriptors::try_new(values, dim).unwrap();
-    let key = Key::from_seed(1);
-    let (released, secret) = obfuscate(&Lines2d, &original, Some(&descriptors), &key).unwrap();
-    let search = oracle::search(&original).unwrap();
-    let near = TrueNeighbors::new(&search, &secret, 1, K).unwrap();
-    let ratio = |source: &dyn Source<2>| {
-        near.measured_inlier_ratio(&source.lists(&released, K, 0).unwrap())
-    };
-    Some([ratio(&Learned::default()), ratio(other)])
+    let n = places.len() as f64 / 2.0;
+    (f64::from(near) / n, f64::from(alike) / f64::from(near.max(1)))
+}
+
+/// Decodes the photo with Pillow, as for the reference; `None` if Python or Pillow is missing.
+fn by_pillow(path: &Path) -> Option<ColorImage> {
+    let program = "import sys; from PIL import Image; \
+                   Image.open(sys.argv[1]).convert('RGB').save(sys.stdout.buffer, 'PPM')";
+    let run = Command::new("python3").args(["-c", program]).arg(path).output().ok()?;
+    let mut lines = run.stdout.splitn(4, |&byte| byte == b'\n');
+    let (_, size, _) = (lines.next()?, lines.next()?, lines.next()?);
+    let sides = str::from_utf8(size).ok()?.split(' ').map(|side| side.parse().ok());
+    let sides: Vec<usize> = sides.collect::<Option<_>>()?;
+    ColorImage::try_new(sides[0], sides[1], lines.next()?.to_vec()).ok()
 }
 
 #[test]
-fn the_network_names_more_neighbors_than_patches_and_likeness_do() {
-    let aliked = Extraction::Aliked(AlikedOptions { min_score: 0.02, ..Default::default() });
-    let kinds: [(_, &dyn Source<2>, f64); 2] =
-        [(Extraction::default(), &Overlap, 0.03), (aliked, &Similarity, 0.2)];
-    for (extraction, other, more) in kinds {
-        let Some([learned, others]) = ratios(&extraction, other) else { return };
-        assert!(learned > others + more, "learned {learned:.3}, {} {others:.3}", other.name());
+fn features_of_aliked_are_those_of_the_authors_code() {
+    let Some(path) = shared("reference/aliked_n16rot.safetensors") else { return };
+    let bytes = std::fs::read(path).unwrap();
+    let file = SafeTensors::deserialize(&bytes).unwrap();
+    let (_, header) = SafeTensors::read_metadata(&bytes).unwrap();
+    let meta: Value = serde_json::from_str(&header.metadata().as_ref().unwrap()["meta"]).unwrap();
+    let aliked = aliked(AlikedOptions { max_features: 5000, ..AlikedOptions::default() });
+    for (at, image) in meta["images"].as_array().unwrap().iter().enumerate() {
+        let path = shared(image["path"].as_str().unwrap()).unwrap();
+        let [places, descriptors, scores] = ["keypoints", "descriptors", "scores"]
+            .map(|name| floats(&file, &format!("{at}.{name}")));
+        let reference = [&places[..], &descriptors, &scores];
+        let own = photo::read_color(&path).unwrap();
+        let pixels = file.tensor(&format!("{at}.pixels_sha")).unwrap();
+        let same = |image: &ColorImage| Sha256::digest(image.pixels())[..] == *pixels.data();
+        let exact = if same(&own) { Some(own.clone()) } else { by_pillow(&path).filter(same) };
+        match exact {
+            Some(exact) => {
+                let found = aliked.extract(&exact).unwrap();
+                let n = image["n_keypoints"].as_u64().unwrap() as usize;
+                // A score at the threshold may be above it after rounding.
+                assert!(found.keypoints.len().abs_diff(n) <= 1, "{at}: {n} keypoints expected");
+                let (near, alike) = parity(&found, reference);
+                assert!(near >= 0.99 && alike >= 0.99, "{at}: {near}, {alike}");
+            }
+            None => eprintln!("image {at}: Pillow, which has the reference's pixels, is missing"),
+        }
+        // Another decoder's pixels differ slightly, and more where colors are subsampled.
+        let (near, _) = parity(&aliked.extract(&own).unwrap(), reference);
+        assert!(near >= 0.8, "{at}: {near}");
+    }
+}
+
+#[test]
+fn options_choose_the_best_and_sizes_are_undone() {
+    let image = waves(200, 136);
+    let low = || AlikedOptions { min_score: 0.05, ..AlikedOptions::default() };
+    let all = aliked(low()).extract(&image).unwrap();
+    let n = all.keypoints.len();
+    assert!(n > 30, "{n}");
+    assert_eq!((all.scores.len(), all.descriptors.len()), (n, n * 128));
+    for descriptor in all.descriptors.chunks_exact(128) {
+        let length: f32 = descriptor.iter().map(|value| value * value).sum();
+        assert!((length - 1.0).abs() < 1e-4);
+    }
+    let few = aliked(AlikedOptions { max_features: 7, ..low() }).extract(&image).unwrap();
+    assert_eq!(few.keypoints, all.keypoints[..7]);
+    let half = aliked(AlikedOptions { max_image_size: 100, ..low() }).extract(&image).unwrap();
+    let right = half.keypoints.iter().filter(|[x, _]| *x > 110.0).count();
+    assert!(right > 0, "keypoints are in pixels of the image as it was given");
+}
+
+#[test]
+fn threads_do_not_change_a_byte() {
+    let image = waves(96, 64);
+    let aliked = aliked(AlikedOptions { min_score: 0.05, ..AlikedOptions::default() });
+    let alone = aliked.extract(&image).unwrap();
+    std::thread::scope(|scope| {
+        for _ in 0..6 {
+            scope.spawn(|| assert_eq!(aliked.extract(&image).unwrap(), alone));
+        }
+    });
+}
+
+#[test]
+fn images_without_structure_have_no_features() {
+    let (aliked, superpoint) = (aliked(AlikedOptions::default()), narrow_superpoint());
+    for (width, height) in [(1, 1), (5, 3), (7, 100), (1, 200), (8, 8), (64, 64), (97, 33)] {
+        for level in [0, 128, 255] {
+            let n = aliked.extract(&flat(width, height, level)).unwrap().keypoints.len();
+            assert_eq!(n, 0, "{width} x {height}, {level}");
+        }
+        // Random weights find something in large flat images.
+        if width.min(height) <= 8 {
+            let n = superpoint.extract(&flat(width, height, 0)).unwrap().keypoints.len();
+            assert_eq!(n, 0, "{width} x {height}");
+        }
+    }
+}
+
+#[test]
+fn options_out_of_range_are_named() {
+    let usual = AlikedOptions::default;
+    for (options, expected) in [
+        (
+            AlikedOptions { max_features: 0, ..usual() },
+            "max_features: expected at least 1, found 0",
+        ),
+        (
+            AlikedOptions { min_score: f32::NAN, ..usual() },
+            "min_score: expected 0 to below 1, found NaN",
+        ),
+        (
+            AlikedOptions { max_image_size: 0, ..usual() },
+            "max_image_size: expected 1 to 65536, found 0",
+        ),
+    ] {
+        assert_eq!(Aliked::try_new(options).err().unwrap().to_string(), expected);
+    }
+}
+
+/// Creates an extractor with seeded random weights, whose descriptors have 16 values.
+/// `python export/superpoint.py --random FOLDER` makes the folder of data.
+fn narrow_superpoint() -> SuperPoint {
+    const OUTPUTS: &[Port] = &[
+        Port { name: "score", shape: &[Some(1), None, None] },
+        Port { name: "coarse", shape: &[Some(1), None, None, Some(16)] },
+    ];
+    let narrow = Entry { outputs: OUTPUTS, ..*entry("superpoint").unwrap() };
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/superpoint-random");
+    let network = Network::read(&path.join("superpoint.onnx"), &narrow).unwrap();
+    SuperPoint::of_network(network, SuperPointOptions::default()).unwrap()
+}
+
+#[test]
+fn features_of_superpoint_are_those_of_the_export_script() {
+    let golden = include_bytes!("../data/superpoint-random/golden.safetensors");
+    let golden = SafeTensors::deserialize(golden).unwrap();
+    let image = golden.tensor("image").unwrap();
+    let (height, width) = (image.shape()[0], image.shape()[1]);
+    let colors = image.data().iter().flat_map(|&gray| [gray; 3]).collect();
+    let image = ColorImage::try_new(width, height, colors).unwrap();
+    let found = narrow_superpoint().extract(&image).unwrap();
+    let keypoints = floats(&golden, "keypoints");
+    assert!(keypoints.len() > 100, "{}", keypoints.len());
+    assert_eq!(found.keypoints.as_flattened(), keypoints, "pixels, so exactly the same");
+    for (name, values, tolerance) in
+        [("scores", &found.scores, 1e-5), ("descriptors", &found.descriptors, 1e-4)]
+    {
+        let expected = floats(&golden, name);
+        assert_eq!(values.len(), expected.len());
+        for (value, expected) in values.iter().zip(expected) {
+            assert!((value - expected).abs() < tolerance, "{name}: {value} and {expected}");
+        }
     }
 }

@@ -1,14 +1,30 @@
 //! Networks, features of photos, and pictures from keypoints.
 
-mod aliked;
-mod feature_images;
-mod golden;
+mod camera;
+mod inverter;
+mod learned;
 mod learned_features;
-mod learned_source;
-mod lenses;
-mod load;
+mod metrics;
 mod network;
-mod parity;
-mod projections;
+mod photo;
 mod sift;
-mod superpoint;
+
+use std::path::{Path, PathBuf};
+
+use safetensors::SafeTensors;
+
+/// Returns a file of the evaluation data beside the repository; `None` with a message if it is
+/// missing.
+fn shared(name: &str) -> Option<PathBuf> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared").join(name);
+    if !path.exists() {
+        eprintln!("{} is missing: skipped", path.display());
+        return None;
+    }
+    Some(path)
+}
+
+fn floats(file: &SafeTensors, name: &str) -> Vec<f32> {
+    let values = file.tensor(name).unwrap().data().as_chunks::<4>().0;
+    values.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect()
+}

@@ -111,7 +111,7 @@ mod tests {
     const ALL: Wanted = Wanted { radius: 1, border: 0, min_score: 0.0, most: 100 };
 
     #[test]
-    fn what_a_maximum_hides_may_hide_nothing_itself() {
+    fn a_suppressed_score_suppresses_none() {
         // 5 suppresses 4, and so 3 is a maximum of the rest; 2 is beside it.
         let row = scores(4, &[0.5, 0.4, 0.3, 0.2]);
         assert_eq!(row.maxima(&ALL), [[0, 0], [2, 0]]);
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn a_score_between_pixels_is_weighted_and_nothing_outside() {
+    fn scores_between_pixels_are_weighted_and_zero_outside() {
         let map = scores(2, &[0.0, 1.0, 2.0, 3.0]);
         assert_eq!(map.at([0.5, 0.5]), 1.5);
         assert_eq!(map.at([1.0, 1.0]), 3.0);

@@ -6,7 +6,6 @@
 //! ```
 
 mod aliked;
-mod levels;
 mod maxima;
 mod superpoint;
 

@@ -8,7 +8,7 @@ use unlift::Error;
 
 use super::LearnedFeatures;
 use super::maxima::{Scores, Wanted, corners};
-use crate::features::color::ColorImage;
+use crate::features::ColorImage;
 use crate::network::{Network, Tensor};
 
 const MODEL: &str = "superpoint";

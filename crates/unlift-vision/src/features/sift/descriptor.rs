@@ -1,4 +1,5 @@
-//! SIFT descriptors: 4 x 4 histograms of gradient directions around a keypoint.
+//! SIFT descriptors: 4 x 4 histograms of gradient directions around a keypoint, and the 128 bytes
+//! that COLMAP stores.
 
 use std::f64::consts::TAU;
 
@@ -6,7 +7,7 @@ use unlift::simd::{Kernel, dispatch};
 
 use super::gradient::{Gradients, TURN};
 use super::orientation::{Place, weights};
-use super::plane::{Plane, lanes};
+use super::scale_space::{Plane, lanes};
 
 /// Directions of a histogram.
 pub(crate) const BINS: usize = 8;
@@ -210,23 +211,57 @@ impl Block {
     }
 }
 
+/// Maximum value of a normalized descriptor, which limits the effect of a strong edge.
+const LARGEST: f32 = 0.2;
+/// Length of a descriptor in bytes.
+const SCALE: f32 = 512.0;
+
+/// Quantizes a descriptor: unit length, values clamped to 0.2, unit length again, then the root of
+/// its shares (RootSIFT, Arandjelovic and Zisserman 2012) times 512.
+///
+/// The order of directions is reversed, as in Lowe's program. All zeros stay zeros.
+pub(crate) fn quantize(mut histograms: [f32; LENGTH]) -> [u8; LENGTH] {
+    normalize(&mut histograms);
+    for value in &mut histograms {
+        *value = value.min(LARGEST);
+    }
+    normalize(&mut histograms);
+    let sum = sum(&histograms, |value| value);
+    let mut bytes = [0; LENGTH];
+    if sum > 0.0 {
+        let cells = histograms.as_chunks::<BINS>().0.iter();
+        for (from, to) in cells.zip(bytes.as_chunks_mut::<BINS>().0) {
+            for (direction, value) in from.iter().enumerate() {
+                let root = (value / sum).sqrt();
+                to[(BINS - direction) % BINS] = (SCALE * root + 0.5) as u8;
+            }
+        }
+    }
+    bytes
+}
+
+fn normalize(values: &mut [f32; LENGTH]) {
+    let length = sum(values, |value| value * value).sqrt() + f32::EPSILON;
+    for value in values {
+        *value /= length;
+    }
+}
+
+/// Sums in a fixed order that compiles to eight lanes.
+fn sum(values: &[f32; LENGTH], of: impl Fn(f32) -> f32) -> f32 {
+    let mut lanes = [0.0; BINS];
+    for chunk in values.as_chunks::<BINS>().0 {
+        for (lane, &value) in lanes.iter_mut().zip(chunk) {
+            *lane += of(value);
+        }
+    }
+    lanes.iter().sum()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::features::image::GrayImage;
-
-    fn level(value: impl Fn(f64, f64) -> f64) -> Plane {
-        let pixels = (0..101 * 101).map(|i| value((i % 101) as f64, (i / 101) as f64) as f32);
-        let mut level = Plane::default();
-        level.copy(&GrayImage::try_new(101, 101, pixels.collect()).unwrap());
-        level
-    }
-
-    fn histograms(level: &Plane, place: Place, angle: f64) -> [f32; LENGTH] {
-        let mut gradients = Gradients::default();
-        gradients.reset(level);
-        describe(&mut gradients, level, place, angle, &mut Desk::default())
-    }
+    use crate::features::GrayImage;
 
     /// Computes the definition, pixel by pixel over the whole box.
     fn plain(level: &Plane, place: Place, angle: f64) -> Vec<f64> {
@@ -261,40 +296,37 @@ mod tests {
 
     #[test]
     fn histograms_are_the_plain_sum_inside_and_at_borders() {
-        let level = level(|x, y| (x * 0.31).sin() * (y * 0.17 + 0.02 * x).cos());
+        let value = |x: f64, y: f64| ((x * 0.31).sin() * (y * 0.17 + 0.02 * x).cos()) as f32;
+        let pixels = (0..101 * 101).map(|i| value((i % 101) as f64, (i / 101) as f64));
+        let mut level = Plane::default();
+        level.copy(&GrayImage::try_new(101, 101, pixels.collect()).unwrap());
         for (x, y, angle) in
             [(50.2, 49.6, 0.0), (51.0, 40.3, 2.2), (3.2, 98.7, 5.5), (97.9, 2.0, 4.0)]
         {
             let place = Place { x, y, sigma: 2.7 };
             let expected = plain(&level, place, angle);
             let most = expected.iter().fold(0.0_f64, |most, &bin| most.max(bin));
-            for (bin, (&found, expected)) in
-                histograms(&level, place, angle).iter().zip(expected).enumerate()
-            {
-                assert!((f64::from(found) - expected).abs() < 1e-4 * most, "{x}, {y}: bin {bin}");
+            let mut gradients = Gradients::default();
+            gradients.reset(&level);
+            let bins = describe(&mut gradients, &level, place, angle, &mut Desk::default());
+            for (at, (&bin, expected)) in bins.iter().zip(expected).enumerate() {
+                assert!((f64::from(bin) - expected).abs() < 1e-4 * most, "{x}, {y}: bin {at}");
             }
         }
     }
 
     #[test]
-    fn both_twins_give_the_same_bits() {
-        let level = level(|x, y| (x * 0.31).sin() * (y * 0.17 + 0.02 * x).cos());
-        let mut gradients = Gradients::default();
-        gradients.reset(&level);
-        gradients.prepare(&level, 0..101);
-        let mut row = Vec::new();
-        weights(20, 0.0, 10.0, &mut row);
-        row.resize(60, 0.0);
-        let rows = [row.clone(), row];
-        let votes = || Votes {
-            gradients: &gradients,
-            place: Place { x: 50.0, y: 50.0, sigma: 2.0 },
-            frame: Frame { sin: 0.1, cos: 0.12, turn: 0.9 },
-            rows: 30..71,
-            columns: 30..71,
-            first: (30.0, 30.0),
-            weights: &rows,
-        };
-        assert_eq!(votes().run(), dispatch(votes()));
+    fn bytes_are_roots_of_clamped_shares_with_directions_reversed() {
+        // 64 equal values: each an equal share, 512 sqrt(1 / 64) = 64.
+        let mut histograms: [f32; LENGTH] = std::array::from_fn(|i| 3.0 * (i % 2) as f32);
+        histograms.swap(0, 1);
+        let bytes = quantize(histograms);
+        assert_eq!(bytes[..8], [64, 64, 0, 64, 0, 64, 0, 0]);
+        assert_eq!(bytes[8..16], [0, 64, 0, 64, 0, 64, 0, 64]);
+        let mut histograms = [1.0; LENGTH];
+        histograms[0] = 1e6;
+        let bytes = quantize(histograms);
+        assert!(bytes[0] == 255 && bytes[1..].iter().all(|&byte| byte < 2));
+        assert_eq!(quantize([0.0; LENGTH]), [0; LENGTH]);
     }
 }

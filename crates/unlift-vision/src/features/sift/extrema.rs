@@ -1,8 +1,8 @@
-//! Extrema of a difference of levels among their 26 neighbors.
+//! Extrema of a difference of levels among their 26 neighbors, refined between pixels and levels.
 
 use unlift::simd::{Kernel, dispatch};
 
-use super::plane::{Plane, lanes};
+use super::scale_space::{Plane, lanes};
 
 /// Pixels compared together.
 const BLOCK: usize = 16;
@@ -125,42 +125,197 @@ fn peaks(levels: &[&[f32]; 4], across: &[&[f32]; 4], at: usize, least: f32) -> u
     peaks
 }
 
+/// Number of fits at most, each at the pixel that the previous one moved to.
+const MOVES: usize = 5;
+/// An offset beyond this moves to the neighbor.
+const FAR: f64 = 0.6;
+/// An offset beyond this belongs to another extremum.
+const TOO_FAR: f64 = 1.5;
+
+/// An extremum of the differences, in pixels of its octave.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Peak {
+    /// Column, the middle of the first pixel at 0.
+    pub(crate) x: f64,
+    /// Row, the middle of the first pixel at 0.
+    pub(crate) y: f64,
+    /// Offset from the middle difference, in levels.
+    pub(crate) level: f64,
+}
+
+/// Returns the extremum of the quadratic through the samples around `(x, y)`.
+///
+/// `None` if its contrast is not above `peak`, its principal curvatures have a ratio above `edge`
+/// or opposite signs, or it is too far away. `level` is the number of the middle difference, and
+/// `levels` the largest allowed level. Lowe 2004, Sec. 4; moves and limits as VLFeat documents
+/// them.
+pub(crate) fn refine(
+    differences: Differences<'_>,
+    (mut x, mut y): (usize, usize),
+    (level, levels): (usize, usize),
+    peak: f64,
+    edge: f64,
+) -> Option<Peak> {
+    let (width, height) = (differences.0[0].width, differences.0[0].height);
+    let mut shape = Shape::at(differences, x, y);
+    let mut offset = shape.offset();
+    for _ in 1..MOVES {
+        let (to_x, to_y) = (moved(x, offset[0], width), moved(y, offset[1], height));
+        if (to_x, to_y) == (x, y) {
+            break;
+        }
+        (x, y) = (to_x, to_y);
+        shape = Shape::at(differences, x, y);
+        offset = shape.offset();
+    }
+    let [dx, dy, ds] = offset;
+    let found = Peak { x: x as f64 + dx, y: y as f64 + dy, level: ds };
+    let value = shape.value + 0.5 * dot(shape.slope, offset);
+    let inside = (0.0..=(width - 1) as f64).contains(&found.x)
+        && (0.0..=(height - 1) as f64).contains(&found.y)
+        && (0.0..=levels as f64).contains(&(level as f64 + ds));
+    let near = offset.iter().all(|offset| offset.abs() < TOO_FAR);
+    let roundness = shape.roundness();
+    let round = roundness >= 0.0 && roundness < (edge + 1.0) * (edge + 1.0) / edge;
+    (value.abs() > peak && round && near && inside).then_some(found)
+}
+
+/// Returns the pixel where the refinement continues; border pixels are excluded.
+fn moved(at: usize, offset: f64, length: usize) -> usize {
+    if offset > FAR && at + 2 < length {
+        at + 1
+    } else if offset < -FAR && at > 1 {
+        at - 1
+    } else {
+        at
+    }
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Value and derivatives along x, y and level, by central differences.
+struct Shape {
+    value: f64,
+    slope: [f64; 3],
+    curvature: [[f64; 3]; 3],
+}
+
+impl Shape {
+    fn at(differences: Differences<'_>, x: usize, y: usize) -> Self {
+        let at = |dx: isize, dy: isize, ds: isize| {
+            let (x, y) = (x.wrapping_add_signed(dx), y.wrapping_add_signed(dy));
+            f64::from(differences.at(1_usize.wrapping_add_signed(ds), x, y))
+        };
+        let value = at(0, 0, 0);
+        let twice = |a: f64, b: f64| a + b - 2.0 * value;
+        let mixed = |a: f64, b: f64, c: f64, d: f64| 0.25 * (a + b - c - d);
+        let xx = twice(at(1, 0, 0), at(-1, 0, 0));
+        let yy = twice(at(0, 1, 0), at(0, -1, 0));
+        let ss = twice(at(0, 0, 1), at(0, 0, -1));
+        let xy = mixed(at(1, 1, 0), at(-1, -1, 0), at(-1, 1, 0), at(1, -1, 0));
+        let xs = mixed(at(1, 0, 1), at(-1, 0, -1), at(-1, 0, 1), at(1, 0, -1));
+        let ys = mixed(at(0, 1, 1), at(0, -1, -1), at(0, -1, 1), at(0, 1, -1));
+        Self {
+            value,
+            slope: [
+                0.5 * (at(1, 0, 0) - at(-1, 0, 0)),
+                0.5 * (at(0, 1, 0) - at(0, -1, 0)),
+                0.5 * (at(0, 0, 1) - at(0, 0, -1)),
+            ],
+            curvature: [[xx, xy, xs], [xy, yy, ys], [xs, ys, ss]],
+        }
+    }
+
+    /// Returns where the slope vanishes; no offset if the curvature is singular.
+    fn offset(&self) -> [f64; 3] {
+        solve(self.curvature, self.slope.map(|slope| -slope)).unwrap_or([0.0; 3])
+    }
+
+    /// Returns squared trace over determinant of the curvature in the image: `(r + 1)^2 / r` for a
+    /// ratio `r` of principal curvatures, negative for opposite signs.
+    fn roundness(&self) -> f64 {
+        let [[xx, xy, _], [_, yy, _], _] = self.curvature;
+        (xx + yy) * (xx + yy) / (xx * yy - xy * xy)
+    }
+}
+
+/// Pivots below this count as zero.
+const SINGULAR: f64 = 1e-10;
+
+fn solve(mut a: [[f64; 3]; 3], mut b: [f64; 3]) -> Option<[f64; 3]> {
+    for j in 0..3 {
+        let pivot =
+            (j..3).fold(j, |best, i| if a[i][j].abs() > a[best][j].abs() { i } else { best });
+        if a[pivot][j].abs() < SINGULAR {
+            return None;
+        }
+        a.swap(j, pivot);
+        b.swap(j, pivot);
+        let row = a[j];
+        for i in j + 1..3 {
+            let factor = a[i][j] / row[j];
+            for (value, from) in a[i].iter_mut().zip(row) {
+                *value -= factor * from;
+            }
+            b[i] -= factor * b[j];
+        }
+    }
+    for j in (0..3).rev() {
+        for k in j + 1..3 {
+            b[j] -= a[j][k] * b[k];
+        }
+        b[j] /= a[j][j];
+    }
+    Some(b)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::features::image::GrayImage;
+    use crate::features::GrayImage;
 
-    /// Creates four levels whose middle difference is `middle`, and whose other differences are
-    /// flat.
-    fn levels(width: usize, height: usize, middle: impl Fn(usize, usize) -> f32) -> [Plane; 4] {
+    /// Levels whose differences are a quadratic with its maximum, 1, at `(x, y, s)`, `s` from the
+    /// middle.
+    fn paraboloid(top: [f64; 3], bend: [f64; 3]) -> [Plane; 4] {
+        let (width, height) = (24, 20);
         let mut levels: [Plane; 4] = Default::default();
+        let mut pixels = vec![0.0; width * height];
         for (at, level) in levels.iter_mut().enumerate() {
-            let value = |i: usize| if at < 2 { 0.0 } else { middle(i % width, i / width) };
-            let pixels = (0..width * height).map(value).collect();
-            level.copy(&GrayImage::try_new(width, height, pixels).unwrap());
+            level.copy(&GrayImage::try_new(width, height, pixels.clone()).unwrap());
+            for (i, pixel) in pixels.iter_mut().enumerate() {
+                let from = [(i % width) as f64, (i / width) as f64, at as f64 - 1.0];
+                let drop = |d: usize| bend[d] * (from[d] - top[d]) * (from[d] - top[d]);
+                *pixel += (1.0 - drop(0) - drop(1) - drop(2)) as f32;
+            }
         }
         levels
     }
 
     #[test]
-    fn extrema_of_both_signs_are_found_inside_only() {
-        let spots =
-            [(1, 1, 1.0), (17, 5, -1.0), (38, 8, 0.5), (0, 4, 1.0), (39, 6, 1.0), (20, 9, 1.0)];
-        let value =
-            |x, y| spots.iter().find(|spot| (spot.0, spot.1) == (x, y)).map_or(0.0, |spot| spot.2);
-        let levels = levels(40, 10, value);
-        let mut found = vec![(9, 9)];
-        Differences(&levels).extrema(0.1, &mut found);
-        assert_eq!(found, [(1, 1), (17, 5), (38, 8)]);
-        Differences(&levels).extrema(0.7, &mut found);
-        assert_eq!(found, [(1, 1), (17, 5)]);
+    fn a_quadratic_is_refined_exactly_even_from_a_neighboring_pixel() {
+        let levels = paraboloid([10.3, 8.8, 0.2], [0.01, 0.012, 0.02]);
+        for start in [(10, 9), (9, 8), (11, 10), (13, 9)] {
+            let peak = refine(Differences(&levels), start, (1, 5), 0.5, 10.0).unwrap();
+            assert!((peak.x - 10.3).abs() < 1e-3, "{peak:?}");
+            assert!((peak.y - 8.8).abs() < 1e-3, "{peak:?}");
+            assert!((peak.level - 0.2).abs() < 1e-3, "{peak:?}");
+        }
     }
 
     #[test]
-    fn equal_neighbors_are_no_extremum() {
-        let levels = levels(20, 9, |x, y| if (8..10).contains(&x) && y == 4 { 1.0 } else { 0.0 });
-        let mut found = Vec::new();
-        Differences(&levels).extrema(0.1, &mut found);
-        assert!(found.is_empty());
+    fn faint_long_and_far_extrema_are_refused() {
+        let found = |levels: &[Plane; 4], start, peak| {
+            refine(Differences(levels), start, (1, 5), peak, 10.0).is_some()
+        };
+        let round = paraboloid([10.0, 9.0, 0.0], [0.01, 0.01, 0.02]);
+        assert!(found(&round, (10, 9), 0.99));
+        assert!(!found(&round, (10, 9), 1.01), "faint");
+        assert!(found(&paraboloid([10.0, 9.0, 0.0], [0.01, 0.09, 0.02]), (10, 9), 0.1));
+        assert!(!found(&paraboloid([10.0, 9.0, 0.0], [0.01, 0.11, 0.02]), (10, 9), 0.1), "edge");
+        assert!(!found(&paraboloid([10.0, 9.0, 0.0], [0.01, -0.02, 0.02]), (10, 9), 0.1), "saddle");
+        assert!(!found(&paraboloid([10.0, 9.0, 1.6], [0.01, 0.01, 0.02]), (10, 9), 0.1), "level");
+        assert!(!found(&paraboloid([19.0, 9.0, 0.0], [0.01, 0.01, 0.02]), (10, 9), 0.1), "column");
     }
 }

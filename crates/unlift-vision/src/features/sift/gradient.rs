@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use unlift::simd::{Kernel, dispatch};
 
-use super::plane::{Plane, lanes};
+use super::scale_space::{Plane, lanes};
 
 const BLOCK: usize = 16;
 /// Eighths in a full turn: angles are in units of descriptor bins, `0..=8`.
@@ -102,46 +102,4 @@ fn polar(x: f32, y: f32) -> (f32, f32) {
     let angle = if x < 0.0 { 4.0 - angle } else { angle };
     let angle = if y < 0.0 { TURN - angle } else { angle };
     (length, angle)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::features::image::GrayImage;
-
-    #[test]
-    fn directions_are_right_all_around() {
-        for step in 0..720 {
-            let turn = f64::from(step) / 720.0;
-            let (sin, cos) = (turn * std::f64::consts::TAU).sin_cos();
-            let (length, angle) = polar(3.0 * cos as f32, 3.0 * sin as f32);
-            assert!((length - 3.0).abs() < 1e-5);
-            let off = (f64::from(angle) / 8.0 - turn).rem_euclid(1.0);
-            assert!(off.min(1.0 - off) * 360.0 < 0.6, "{turn} turns: {angle}");
-            assert!((0.0..=TURN).contains(&angle));
-        }
-        assert_eq!(polar(0.0, 0.0).0, 0.0);
-        assert!(polar(0.0, 0.0).1.is_finite());
-    }
-
-    #[test]
-    fn a_ramp_has_the_same_gradient_everywhere() {
-        let (width, height) = (37, 5);
-        let value = |i: usize| (3 * (i % width) + 4 * (i / width)) as f32;
-        let image = GrayImage::try_new(width, height, (0..width * height).map(value).collect());
-        let mut level = Plane::default();
-        level.copy(&image.unwrap());
-        let mut gradients = Gradients::default();
-        gradients.reset(&level);
-        gradients.prepare(&level, 1..3);
-        assert_eq!(gradients.ready, [false, true, true, false, false]);
-        gradients.prepare(&level, 0..height);
-        let expected = polar(3.0, 4.0);
-        for y in 0..height {
-            for x in 0..width {
-                let found = (gradients.length.at(x, y), gradients.angle.at(x, y));
-                assert_eq!(found, expected, "{x}, {y}");
-            }
-        }
-    }
 }

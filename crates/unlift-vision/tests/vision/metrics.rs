@@ -1,25 +1,22 @@
 //! Metrics and detections, compared with scikit-image, the official LPIPS and YOLOX.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde_json::Value;
-use unlift_vision::features::load::read_color;
+use unlift_vision::features::photo::read_color;
 use unlift_vision::pictures::{CLASSES, Detection, Detector, Lpips, Metrics};
 
-/// Returns `../shared` and the reference file `name` in it; `None` with a message if it is missing.
+use crate::shared;
+
+/// Reads a reference file, and returns the folder of the evaluation data with it.
 fn reference(name: &str) -> Option<(PathBuf, Value)> {
-    let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    let path = shared.join("reference").join(name);
-    let Ok(text) = fs::read_to_string(&path) else {
-        eprintln!("{} is not here: skipped", path.display());
-        return None;
-    };
-    Some((shared, serde_json::from_str(&text).unwrap()))
+    let path = shared(&format!("reference/{name}"))?;
+    Some((shared("")?, serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()))
 }
 
 #[test]
-fn metrics_are_those_of_others() {
+fn metrics_are_those_of_scikit_image_and_lpips() {
     let Some((shared, reference)) = reference("image_metrics.json") else { return };
     let lpips = Lpips::try_new().unwrap();
     let pairs = reference["pairs"].as_object().unwrap();
@@ -37,7 +34,7 @@ fn metrics_are_those_of_others() {
 }
 
 #[test]
-fn detections_are_those_of_others() {
+fn detections_are_those_of_yolox() {
     let Some((shared, reference)) = reference("yolox_nano_reference.json") else { return };
     let detector = Detector::try_new().unwrap();
     for result in reference["results"].as_array().unwrap() {

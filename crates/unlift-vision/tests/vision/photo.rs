@@ -4,7 +4,7 @@ use std::io::Cursor;
 use std::path::PathBuf;
 
 use image::{DynamicImage, ImageFormat, Rgb, RgbImage};
-use unlift_vision::features::load::{decode, read, read_color};
+use unlift_vision::features::photo::{decode, read, read_color};
 
 fn colors(width: u32, height: u32) -> RgbImage {
     RgbImage::from_fn(width, height, |x, y| Rgb([(7 * x) as u8, (5 * y) as u8, (3 * x + y) as u8]))
@@ -63,7 +63,7 @@ fn photos_are_turned_upright() {
 }
 
 #[test]
-fn what_is_no_photo_gives_one_clear_line() {
+fn a_file_that_is_no_photo_gives_one_line() {
     let expected = "expected a JPEG, PNG or WebP image, found";
     assert_eq!(text(b"", "a.jpg"), format!("a.jpg: {expected} an empty file"));
     assert_eq!(text(b"Dear Sir,\n", "a.jpg"), format!("a.jpg: {expected} text"));
@@ -76,7 +76,7 @@ fn what_is_no_photo_gives_one_clear_line() {
 }
 
 #[test]
-fn a_photo_that_is_cut_off_gives_one_clear_line() {
+fn a_truncated_photo_gives_one_line() {
     let image = DynamicImage::from(colors(200, 150));
     let jpeg = encode(&image, ImageFormat::Jpeg);
     for end in [3, 30, jpeg.len() / 3, jpeg.len() - 2] {
@@ -105,7 +105,7 @@ fn a_photo_that_is_cut_off_gives_one_clear_line() {
 }
 
 #[test]
-fn a_header_that_claims_too_much_is_refused_before_memory_is_taken() {
+fn a_header_with_too_many_pixels_is_refused_before_memory_is_allocated() {
     let mut png = encode(&DynamicImage::from(colors(8, 8)), ImageFormat::Png);
     // Width and height of the header, and its checksum (CRC-32).
     png[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 1, 0, 0]);
@@ -123,7 +123,7 @@ fn a_header_that_claims_too_much_is_refused_before_memory_is_taken() {
 
 /// Decoders fill in what a JPEG lacks: 2^28 gray pixels from 700 bytes, for seconds.
 #[test]
-fn a_header_that_claims_more_than_its_bytes_can_hold_is_refused() {
+fn a_header_with_more_pixels_than_its_bytes_can_hold_is_refused() {
     let mut jpeg = encode(&DynamicImage::from(colors(8, 8)), ImageFormat::Jpeg);
     let frame = jpeg.windows(2).position(|pair| pair == [0xff, 0xc0]).unwrap();
     jpeg[frame + 5..frame + 9].copy_from_slice(&[0x40, 0, 0x40, 0]);

@@ -1,15 +1,18 @@
-//! Decodes photos to gray values or colors.
+//! Photos: decoding to gray values or colors, and small encoded images for reports.
 
-use std::fs;
-use std::io::{self, Cursor};
+use std::io::Cursor;
 use std::path::Path;
 
+use ::image::codecs::jpeg::JpegEncoder;
+use ::image::imageops::FilterType;
 use ::image::metadata::Orientation;
-use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use ::image::{
+    DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits, Rgb, RgbImage,
+};
 use unlift::Error;
 
-use crate::features::color::ColorImage;
-use crate::features::image::GrayImage;
+use super::image::{ColorImage, GrayImage};
+use crate::read_regular;
 
 /// The readable formats, for errors.
 const KINDS: &str = "a JPEG, PNG or WebP image";
@@ -86,15 +89,6 @@ fn bytes_of(path: &Path) -> Result<(Vec<u8>, String), Error> {
     Ok((bytes, name))
 }
 
-/// Pipes, sockets and devices may never end, or never begin. Of a folder, the system says so.
-fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
-    let metadata = fs::metadata(path)?;
-    if !metadata.is_file() && !metadata.is_dir() {
-        return Err(io::Error::other("a pipe, a socket or a device"));
-    }
-    fs::read(path)
-}
-
 /// Decodes the bytes of a photo in a file called `name`, upright, as gray values.
 ///
 /// # Errors
@@ -111,7 +105,7 @@ fn decoded(bytes: &[u8], name: &str) -> Result<(DynamicImage, Orientation), Erro
     let wrong = |expected: &str, found: String| {
         Error::new(name.escape_debug().to_string(), expected, found.escape_debug().to_string())
     };
-    let format = match ::image::guess_format(bytes) {
+    let format = match image::guess_format(bytes) {
         Ok(format @ (ImageFormat::Jpeg | ImageFormat::Png | ImageFormat::WebP)) => format,
         _ => return Err(wrong(KINDS, kind(bytes))),
     };
@@ -120,7 +114,7 @@ fn decoded(bytes: &[u8], name: &str) -> Result<(DynamicImage, Orientation), Erro
         return Err(wrong("a whole JPEG image", "one that is cut off".to_owned()));
     }
     let whole = format!("a whole {kind} image");
-    let broken = |error: ::image::ImageError| wrong(&whole, error.to_string());
+    let broken = |error: image::ImageError| wrong(&whole, error.to_string());
     let most = most_pixels(format, bytes.len() as u64);
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     // Limits memory by the size in a PNG's header, because a color profile can inflate a thousand
@@ -175,7 +169,7 @@ fn kind(bytes: &[u8]) -> String {
     if bytes.is_empty() {
         return "an empty file".to_owned();
     }
-    if let Ok(format) = ::image::guess_format(bytes) {
+    if let Ok(format) = image::guess_format(bytes) {
         return format!("a {} image", label(format));
     }
     let start = &bytes[..bytes.len().min(512)];
@@ -210,4 +204,57 @@ fn has_end(bytes: &[u8]) -> bool {
         }
     }
     bytes.get(at..).is_some_and(|rest| rest.windows(2).any(|pair| pair == [0xff, 0xd9]))
+}
+
+/// JPEG quality, of 100: recognizable, and small enough to embed.
+const QUALITY: u8 = 72;
+
+/// Encodes the photo at `path` as a color JPEG, downsized so that no side exceeds `longest` pixels,
+/// without metadata.
+///
+/// # Errors
+/// See [`read`].
+pub fn jpeg(path: &Path, longest: u32, turn: Turn) -> Result<Vec<u8>, Error> {
+    let photo = photo(path, turn)?;
+    let photo = match photo.width().max(photo.height()) > longest {
+        true => photo.resize(longest, longest, FilterType::Triangle),
+        false => photo,
+    };
+    encoded(&photo.to_rgb8()).map_err(|error| {
+        let name = path.display().to_string();
+        Error::new(name, "a photo that can be downsized", error.to_string())
+    })
+}
+
+/// Encodes an image as JPEG, downsized so that no side exceeds `longest` pixels.
+///
+/// # Errors
+/// If a side still has more than 65,535 pixels.
+pub fn jpeg_of(image: &ColorImage, longest: usize) -> Result<Vec<u8>, Error> {
+    let small = image.fitted(longest);
+    encoded(&buffer(small.as_ref().unwrap_or(image)))
+        .map_err(|error| Error::new("picture", "at most 65535 pixels a side", error.to_string()))
+}
+
+/// Encodes an image as PNG.
+///
+/// # Errors
+/// If encoding fails.
+pub fn png_of(image: &ColorImage) -> Result<Vec<u8>, Error> {
+    let mut bytes = Cursor::new(Vec::new());
+    buffer(image)
+        .write_to(&mut bytes, ImageFormat::Png)
+        .map_err(|error| Error::new("picture", "one that fits a PNG", error.to_string()))?;
+    Ok(bytes.into_inner())
+}
+
+fn buffer(image: &ColorImage) -> RgbImage {
+    let (width, height) = (image.width() as u32, image.height() as u32);
+    RgbImage::from_fn(width, height, |x, y| Rgb(image.pixel(x as usize, y as usize)))
+}
+
+fn encoded(image: &RgbImage) -> Result<Vec<u8>, ImageError> {
+    let mut bytes = Vec::new();
+    image.write_with_encoder(JpegEncoder::new_with_quality(&mut bytes, QUALITY))?;
+    Ok(bytes)
 }

@@ -1,13 +1,57 @@
-//! Structural similarity.
-//!
-//! Source: Wang et al., "Image Quality Assessment: From Error Visibility to Structural Similarity",
-//! IEEE TIP 2004, with the defaults of scikit-image, which inversion papers use: uniform windows,
-//! sample covariance.
+//! Similarity of a picture and its photo: SSIM, PSNR and LPIPS.
 
-use crate::features::ColorImage;
 use unlift::Error;
 
-use crate::pictures::sizes::check_sizes;
+use crate::features::ColorImage;
+use crate::network::{Network, Tensor};
+
+/// Similarity metrics of a picture and its photo.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Metrics {
+    /// Structural similarity, 1 for equal pictures.
+    pub ssim: f64,
+    /// Peak signal-to-noise ratio in dB; infinite for equal pictures.
+    pub psnr: f64,
+    /// Learned perceptual distance, 0 for equal pictures.
+    pub lpips: f64,
+}
+
+impl Metrics {
+    /// Computes all metrics of `a` and `b`; they are symmetric.
+    ///
+    /// # Errors
+    /// If the pictures differ in size, or a side has less than 16 pixels.
+    pub fn of(a: &ColorImage, b: &ColorImage, lpips: &Lpips) -> Result<Self, Error> {
+        Ok(Self { ssim: ssim(a, b)?, psnr: psnr(a, b)?, lpips: lpips.distance(a, b)? })
+    }
+}
+
+/// Checks that two pictures have the same size, with at least `least` pixels per side.
+pub(crate) fn check_sizes(a: &ColorImage, b: &ColorImage, least: usize) -> Result<(), Error> {
+    let size = |image: &ColorImage| format!("{} x {}", image.width(), image.height());
+    if (a.width(), a.height()) != (b.width(), b.height()) {
+        let expected = format!("another picture of {} pixels", size(a));
+        return Err(Error::new("pictures", expected, format!("one of {}", size(b))));
+    }
+    if a.width().min(a.height()) < least {
+        let expected = format!("pictures of at least {least} x {least} pixels");
+        return Err(Error::new("pictures", expected, size(a)));
+    }
+    Ok(())
+}
+
+/// Returns the peak signal-to-noise ratio `10 log10(255^2 / MSE)` in dB, with the mean over all pixels and colors; infinite for
+/// equal pictures.
+///
+/// # Errors
+/// If the pictures differ in size.
+pub fn psnr(a: &ColorImage, b: &ColorImage) -> Result<f64, Error> {
+    check_sizes(a, b, 1)?;
+    let square = |(&a, &b): (&u8, &u8)| u64::from(a.abs_diff(b)).pow(2);
+    let sum: u64 = a.pixels().iter().zip(b.pixels()).map(square).sum();
+    let mean = sum as f64 / a.pixels().len() as f64;
+    Ok(10.0 * libm::log10(255.0 * 255.0 / mean))
+}
 
 const WINDOW: usize = 7;
 const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);
@@ -59,6 +103,10 @@ impl Sums {
 /// Returns the mean structural similarity over all windows of 7 x 7 pixels inside the pictures, and
 /// over the colors.
 ///
+/// Source: Wang et al., "Image Quality Assessment: From Error Visibility to Structural Similarity",
+/// IEEE TIP 2004, with the defaults of scikit-image, which inversion papers use: uniform windows,
+/// sample covariance.
+///
 /// # Errors
 /// If the pictures differ in size, or a side has less than 7 pixels.
 pub fn ssim(a: &ColorImage, b: &ColorImage) -> Result<f64, Error> {
@@ -91,6 +139,48 @@ pub fn ssim(a: &ColorImage, b: &ColorImage) -> Result<f64, Error> {
     Ok(total / (3 * (width + 1 - WINDOW) * (height + 1 - WINDOW)) as f64)
 }
 
+const MODEL: &str = "lpips-squeeze";
+/// Smallest side; pooling leaves nothing of smaller pictures.
+const LEAST: usize = 16;
+
+/// The network of the learned perceptual distance (LPIPS); threads can share it.
+///
+/// Source: Zhang et al., "The Unreasonable Effectiveness of Deep Features as a Perceptual Metric",
+/// CVPR 2018: version 0.1 on SqueezeNet 1.1, as in the paper's tables.
+#[derive(Debug)]
+pub struct Lpips {
+    network: Network,
+}
+
+impl Lpips {
+    /// Loads the embedded model, or the file that replaces it.
+    ///
+    /// # Errors
+    /// If the replacing file cannot be loaded.
+    pub fn try_new() -> Result<Self, Error> {
+        Ok(Self { network: Network::load(MODEL)? })
+    }
+
+    /// Returns the distance of two pictures: 0 for equal ones, about 0.7 for unrelated ones. Uses
+    /// about a kilobyte of memory per pixel.
+    ///
+    /// # Errors
+    /// If the pictures differ in size, or a side has less than 16 pixels.
+    pub fn distance(&self, a: &ColorImage, b: &ColorImage) -> Result<f64, Error> {
+        check_sizes(a, b, LEAST)?;
+        let inputs = vec![("a", tensor(a)?), ("b", tensor(b)?)];
+        let [distance] = self.network.run(inputs, ["distance"])?;
+        Ok(f64::from(distance.values()[0]))
+    }
+}
+
+/// Returns planes (1, 3, height, width) with values from 0 to 1.
+fn tensor(image: &ColorImage) -> Result<Tensor, Error> {
+    let plane = |color: usize| image.pixels().iter().skip(color).step_by(3);
+    let values = (0..3).flat_map(plane).map(|&value| f32::from(value) / 255.0).collect();
+    Tensor::try_new(&[1, 3, image.height(), image.width()], values)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -100,15 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_pictures_are_alike_and_inverted_ones_are_not() {
-        let a = picture(19, 11, |at| (at * 37 % 256) as u8);
-        let inverted = picture(19, 11, |at| 255 - (at * 37 % 256) as u8);
-        assert_eq!(ssim(&a, &a).unwrap(), 1.0);
-        assert!(ssim(&a, &inverted).unwrap() < 0.0);
-    }
-
-    #[test]
-    fn windows_that_slide_say_what_windows_summed_one_by_one_say() {
+    fn sliding_windows_give_what_separate_windows_give() {
         let a = picture(13, 10, |at| (at * at % 251) as u8);
         let b = picture(13, 10, |at| (at * 29 % 241) as u8);
         let mut total = 0.0;
@@ -121,10 +203,11 @@ mod tests {
             total += window.similarity();
         }
         assert!((ssim(&a, &b).unwrap() - total / 84.0).abs() < 1e-12);
+        assert_eq!(ssim(&a, &a).unwrap(), 1.0);
     }
 
     #[test]
-    fn what_cannot_be_compared_is_said() {
+    fn pictures_that_cannot_be_compared_are_one_line() {
         let text = |a: &ColorImage, b: &ColorImage| ssim(a, b).unwrap_err().to_string();
         let a = picture(8, 8, |_| 3);
         assert_eq!(
