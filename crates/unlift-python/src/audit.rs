@@ -20,7 +20,7 @@ use unlift_audit::images::extraction::{Wanted, sample};
 use unlift_audit::images::stream::Needs;
 use unlift_audit::maps::{Tiles, find};
 use unlift_audit::{Error, Gate, Job, Prepared, check_thresholds, sources};
-use unlift_nn::DescriptorKind;
+use unlift_vision::network::DescriptorKind;
 
 use crate::arrays::{raised, wrong};
 use crate::images::Images;
