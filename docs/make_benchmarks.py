@@ -353,24 +353,21 @@ def sequence():
 
 
 def again():
-    model, lines = DATA / "redkitchen/model", []
-    for title, schemes in (("### RedKitchen, released twice", []),
-                           ("RedKitchen under two different schemes:", ["olc/ppl", "olc/plane", "olc/cp", "ray/olc", "ray/plane", "plane/cp", "cp/plane"])):
-        document = unlift("again", model, model, *METERS, "--descriptors", DATA / "redkitchen/descriptors.bin", "--no-records-alone",
-                          *(["--schemes", ",".join(schemes)] if schemes else []))
-        of = {(row["scheme"], row["neighbors"]): row for row in document["results"]}
-        thresholds = list(document["options"]["thresholds"])
-        lines += [title, "", *head("schemes", f"within {'/'.join(thresholds)}", "by geometry alone", "sure, right", "blind")]
-        for scheme in document["options"]["schemes"]:
-            row, geometry = of[scheme, "again"], of.get((scheme, "again-geometry"))
-            right = row.get("sure_correct_percent")
-            lines.append(line(scheme, percents(row["recovered_percent"], thresholds),
-                              percents(geometry["recovered_percent"], thresholds) if geometry else "-",
-                              f"{row['sure_percent']:.1f}" + (f", {right:.1f}" if right is not None else ""), f"{row['blind_percent'][thresholds[0]]:.1f}"))
-        rows = [row for row in document["results"] if row["neighbors"] == "again"]
-        linked, right = min(row["metrics"]["linked_percent"] for row in rows), 100 * min(row["inlier_ratio"] for row in rows)
-        lines += ["", f"Linked by descriptors: at least {linked:.1f} %, of which at least {right:.1f} % are right.", ""]
-    put("docs/benchmarks.md", "again", lines)
+    model = DATA / "redkitchen/model"
+    document = unlift("again", model, model, *METERS, "--descriptors", DATA / "redkitchen/descriptors.bin", "--no-records-alone")
+    of = {(row["scheme"], row["neighbors"]): row for row in document["results"]}
+    thresholds = list(document["options"]["thresholds"])
+    lines = ["RedKitchen:", "", *head("schemes", f"within {'/'.join(thresholds)}", "by geometry alone", "sure, right", "blind")]
+    for scheme in document["options"]["schemes"]:
+        row, geometry = of[scheme, "again"], of.get((scheme, "again-geometry"))
+        right = row.get("sure_correct_percent")
+        lines.append(line(scheme, percents(row["recovered_percent"], thresholds),
+                          percents(geometry["recovered_percent"], thresholds) if geometry else "-",
+                          f"{row['sure_percent']:.1f}" + (f", {right:.1f}" if right is not None else ""), f"{row['blind_percent'][thresholds[0]]:.1f}"))
+    rows = [row for row in document["results"] if row["neighbors"] == "again"]
+    linked, right = min(row["metrics"]["linked_percent"] for row in rows), 100 * min(row["inlier_ratio"] for row in rows)
+    put("docs/benchmarks.md", "again", [
+        *lines, "", f"Linked by descriptors: at least {linked:.1f} %, of which at least {right:.1f} % are right.", ""])
 
 
 def cost():
