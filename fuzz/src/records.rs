@@ -24,7 +24,6 @@ fn of<const D: usize>(bytes: &mut Bytes<'_>) {
     };
     let options = RecoverOptions {
         delta,
-        exact_constraints: bytes.byte().is_multiple_of(2),
         ..RecoverOptions::default()
     };
     let solver = Builtin::ALL[usize::from(solver) % Builtin::ALL.len()];

@@ -55,7 +55,6 @@ pub fn options<const D: usize>(plan: &Plan<D>, more: Map<String, Value>) -> Map<
         Delta::Fixed(delta) => json!(delta),
     };
     options.insert("delta".into(), delta);
-    options.insert("exact_constraints".into(), json!(plan.exact_constraints));
     options.insert("thresholds".into(), json!(labels));
     options.insert("repeats".into(), json!(plan.repeats));
     options.extend(more);

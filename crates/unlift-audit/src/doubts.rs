@@ -3,7 +3,7 @@
 //! beside the verdict, and no gate holds with one.
 
 use unlift::Unit;
-use unlift::audit::{Plan, REFERENCE, Row, Threshold};
+use unlift::audit::{Plan, Row, Threshold};
 use unlift::evaluate::away_from_own;
 use unlift::geometry::knn::Knn;
 use unlift::released::Released;
@@ -69,8 +69,7 @@ pub(crate) fn doubts(
         let of_tiles = tile_rows.iter().flatten().filter(|of_tile| of_tile.is_same_cell(row));
         let mut deltas = std::iter::once(row).chain(of_tiles).map(|row| row.delta);
         let unusual = deltas
-            .find(|&delta| delta > 0.0 && !(NARROW * low..=WIDE * high).contains(&delta))
-            .filter(|_| row.solver != REFERENCE);
+            .find(|&delta| delta > 0.0 && !(NARROW * low..=WIDE * high).contains(&delta));
         let of_delta = unusual.map(|delta| {
             format!(
                 "{}: delta, {}, is far from the usual distance to the K-th neighbor, {} to {}: recovery may be too low \

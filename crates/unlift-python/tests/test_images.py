@@ -263,7 +263,6 @@ def with_b(**change):
         (lambda i: quick(i, features="orb"), "features: expected one of sift, aliked, superpoint, found orb"),
         (lambda i: quick(i, min_score=2.0), "min_score: expected a number from 0 to below 1, found 2"),
         (lambda i: quick(FIXTURES / "features-latest.h5", max_features=5), "^max_features: expected with a folder of photos, found a file"),
-        (lambda i: quick(i, source_k=5), "source_k: expected neighbors with a source of unlift's, found only oracle"),
         (lambda i: quick(i, neighbors="overlap"), "inlier_ratios: expected neighbors with \"oracle\", found only overlap"),
         (lambda i: quick(i, gates=["olc:10<=3"]), "olc"),
     ],

@@ -18,16 +18,13 @@ pub struct RecoverOptions {
     pub delta: Delta,
     /// The attacker's random seed, for null samples and random trials.
     pub seed: u64,
-    /// Whether to use rules of a scheme that fix coordinates: values that `cp` exchanged are still in the map, and `ray-voxel`
-    /// excludes every other voxel along a ray.
-    pub exact_constraints: bool,
     /// Whether to compute the probability that each recovered point is right; it takes a few microseconds per point.
     pub confidence: bool,
 }
 
 impl Default for RecoverOptions {
     fn default() -> Self {
-        Self { delta: Delta::Auto, seed: 0, exact_constraints: true, confidence: true }
+        Self { delta: Delta::Auto, seed: 0, confidence: true }
     }
 }
 

@@ -4,7 +4,7 @@ use crate::density::{Peaks, tomography};
 use crate::neighbors::Neighborhoods;
 use crate::recover::assignment::descriptor_rows;
 use crate::recover::confidence::cues::{Seen, Solved};
-use crate::recover::map::family::Family;
+use crate::recover::map::family::{Family, Settings};
 use crate::recover::map::graph::Graph;
 use crate::recover::map::lists::Slots;
 use crate::recover::options::{Delta, RecoverOptions};
@@ -171,8 +171,8 @@ impl<'a, const D: usize> Problem<'a, D> {
             let expected = format!("{}, one per slot", self.n_slots());
             return Err(Error::new("estimates", expected, unsettled.len().to_string()));
         }
-        // Most schemes have no exact constraints: do not copy all estimates for them.
-        let settled = self.is_settled().then(|| self.settled(unsettled.clone()));
+        let reruns = if self.iterates() { Settings::of_dimension::<D>().joint_reruns } else { 0 };
+        let settled = self.settled(&unsettled, reruns);
         let estimates = settled.as_ref().unwrap_or(&unsettled);
         let descriptor_row = descriptor_rows(self.released, self.lists);
         let trials = (self.solver == Builtin::Ransac).then(|| self.trials.histogram());
@@ -208,34 +208,23 @@ impl<'a, const D: usize> Problem<'a, D> {
         last: &Recovered<D>,
     ) -> Result<Recovered<D>, Error> {
         let rows = last.descriptor_row().map(<[u32]>::to_vec);
-        let recovered = self.in_columns(&self.settle(start), rows)?;
+        let settled = self.settled(&start, 0);
+        let recovered = self.in_columns(settled.as_ref().unwrap_or(&start), rows)?;
         Ok(recovered.without_confidence(Unknown::OtherSolver))
     }
 
-    /// Whether exact constraints apply. The paper's sampling loop stays as published.
-    fn is_settled(&self) -> bool {
-        let asked = self.options.exact_constraints && self.solver != Builtin::Ransac;
-        let listed = matches!(self.records, Records::Listed { .. });
-        asked && listed && exact::can_settle(self.released)
-    }
-
-    /// Moves estimates to where exact constraints allow them to be.
-    fn settle(&self, estimates: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
-        match self.is_settled() {
-            true => exact::settle(self.released, estimates, self.delta),
-            false => estimates,
+    /// Applies exact constraints, if the family has any, and repeats joint recovery from the result where that helps. The paper's
+    /// sampling loop stays as published.
+    fn settled(&self, estimates: &[Estimate<D>], reruns: usize) -> Option<Vec<Estimate<D>>> {
+        if self.solver == Builtin::Ransac || matches!(self.records, Records::Alone(_)) {
+            return None;
         }
-    }
-
-    /// Applies exact constraints, and repeats joint recovery from the result where that helps.
-    fn settled(&self, estimates: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
-        let mut settled = self.settle(estimates);
-        if self.iterates() {
-            for _ in 0..exact::joint_reruns(self.released) {
-                settled = self.settle(self.run_joint(settled, &[]));
-            }
+        let settle = |estimates: &[_]| exact::settle(self.released, estimates, self.delta);
+        let mut settled = settle(estimates)?;
+        for _ in 0..reruns {
+            settled = settle(&self.run_joint(settled, &[]))?;
         }
-        settled
+        Some(settled)
     }
 
     /// Puts estimates in columns, with the rows of descriptors where they are known.

@@ -34,7 +34,6 @@ pub(super) fn of<const D: usize>(
             f32s(&mut hasher, rays.centers().as_flattened());
             hasher.update(rays.center());
             f32s(&mut hasher, rays.direction().as_flattened());
-            f64s(&mut hasher, rays.voxel().as_slice());
             rays.regions().into_iter().flatten().for_each(|region| corners(&mut hasher, region));
         }
         Obfuscation::AxisPlanes(planes) => {

@@ -10,7 +10,6 @@ pub struct Rays<const D: usize> {
     centers: Vec<[f32; D]>,
     center: Vec<u8>,
     direction: Vec<[f32; D]>,
-    voxel: Option<f64>,
     regions: Option<Vec<Bounds<D>>>,
 }
 
@@ -49,7 +48,7 @@ impl<const D: usize> Rays<D> {
                 Ok(finite_f32(unit_direction(d, row)?, "direction", row)?.map(|x| x + 0.0))
             })
             .collect::<Result<_, Error>>()?;
-        Ok(Self { centers, center, direction, voxel: None, regions: None })
+        Ok(Self { centers, center, direction, regions: None })
     }
 
     /// Returns the rows `order[0], order[1], ...`.
@@ -58,26 +57,8 @@ impl<const D: usize> Rays<D> {
             centers: self.centers.clone(),
             center: super::normal_form::rows(&self.center, order),
             direction: super::normal_form::rows(&self.direction, order),
-            voxel: self.voxel,
             regions: self.regions.clone(),
         }
-    }
-
-    /// Declares that the parity of a voxel grid with this edge decides the center of each ray. The edge is a public parameter of the
-    /// scheme; the origin of the grid is not published.
-    ///
-    /// # Errors
-    /// When `edge` is not a positive length.
-    pub fn with_voxel(self, edge: f64) -> Result<Self, Error> {
-        if !(edge.is_finite() && edge > 0.0) {
-            return Err(Error::new("voxel", "a positive length", edge.to_string()));
-        }
-        Ok(Self { voxel: Some(edge), ..self })
-    }
-
-    /// Edge of the voxels whose parity decides the centers, in the unit of the map, if declared.
-    pub fn voxel(&self) -> Option<f64> {
-        self.voxel
     }
 
     /// Declares that the region of a point decides its center. `regions` has, per center, the box of its points, relative to the released

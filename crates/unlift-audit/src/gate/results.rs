@@ -1,7 +1,7 @@
 //! Results of gates, and a check that each gate applies to a row.
 
 use unlift::Unit;
-use unlift::audit::{NotAudited, Plan, REFERENCE, Row, Threshold};
+use unlift::audit::{NotAudited, Plan, Row, Threshold};
 use unlift::neighbors::oracle::Noise;
 use unlift_report::document::{FEWEST_HELD_OUT, GateResult, Localization, UNPROTECTED};
 
@@ -14,8 +14,7 @@ fn candidates<'a, const D: usize>(
     rows: &'a [Row],
 ) -> Vec<(Candidate<'a>, &'a Row, usize)> {
     let mut candidates = Vec::new();
-    // The reference is not an attack.
-    for row in rows.iter().filter(|row| row.solver != REFERENCE) {
+    for row in rows {
         for (at, threshold) in plan.thresholds.iter().enumerate() {
             let candidate = Candidate {
                 scheme: &row.scheme,

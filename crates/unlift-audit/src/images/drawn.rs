@@ -43,7 +43,7 @@ pub fn drawn(
     let numbers: Vec<usize> = wanted.iter().map(|(at, _)| *at).collect();
     let mut plan = job.plan.clone();
     plan.solvers.truncate(1);
-    (plan.repeats, plan.reference) = (1, false);
+    plan.repeats = 1;
     let needs = Needs::of_plan(&plan);
     // The album makes the pictures itself.
     plan.measures.clear();

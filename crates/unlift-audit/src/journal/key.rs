@@ -23,7 +23,7 @@ pub(super) fn key(program: &str, recovery: &Recovery<'_, 3>) -> String {
     }
     let delta = if let Delta::Fixed(delta) = options.delta { delta } else { 0.0 };
     hasher.add(solver.name().as_bytes());
-    hasher.add(&[0, u8::from(options.exact_constraints), u8::from(options.confidence)]);
+    hasher.add(&[0, u8::from(options.confidence)]);
     hasher.add(&delta.to_le_bytes());
     hasher.add(&options.seed.to_le_bytes());
     hasher.hex()
@@ -73,7 +73,6 @@ mod tests {
         let lists = lists(1, None);
         keys.push(of(&lists, &RecoverOptions { seed: 1, ..usual }));
         keys.push(of(&lists, &RecoverOptions { delta: Delta::Fixed(0.5), ..usual }));
-        keys.push(of(&lists, &RecoverOptions { exact_constraints: false, ..usual }));
         keys.push(of(&lists, &RecoverOptions { confidence: false, ..usual }));
         let n = keys.len();
         keys.sort();

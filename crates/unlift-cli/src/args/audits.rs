@@ -34,20 +34,6 @@ pub struct AttackArgs {
     #[arg(long, help_heading = EXPERIMENTS, value_name = "LIST", value_delimiter = ',',
           value_parser = values::noise)]
     pub oracle_noise: Vec<Noise>,
-    /// Make the attack weaker: do not use the public rule of a scheme to narrow down positions (cp:
-    /// the true coordinate is in another record; ray-voxel: the voxel of a point decides the center
-    /// of its ray)
-    #[arg(long, help_heading = EXPERIMENTS)]
-    pub no_exact_constraints: bool,
-    /// Add a row per scheme for an attacker who already has the positions of three true neighbors
-    /// of every point
-    #[arg(long, help_heading = EXPERIMENTS)]
-    pub reference: bool,
-    /// Number of records per list, for sources other than the oracle [default: chosen by each
-    /// source]
-    #[arg(long, help_heading = EXPERIMENTS, value_name = "K",
-          value_parser = clap::value_parser!(u16).range(1..))]
-    pub source_k: Option<u16>,
     /// A listed record supports a position if it passes within this distance of it, in the unit of
     /// the audit; auto computes the distance from the released records and the lists
     #[arg(long, help_heading = EXPERIMENTS, value_name = "auto|VALUE",

@@ -156,11 +156,6 @@ pub struct RecoverArgs {
     /// tomography (stronger)
     #[arg(long, value_name = "SOLVER", value_parser = values::solver, default_value = "joint")]
     pub solver: Builtin,
-    /// Make the attack weaker: do not use the public rule of a scheme to narrow down positions (cp:
-    /// the true coordinate is in another record; ray-voxel: the voxel of a point decides the center
-    /// of its ray)
-    #[arg(long)]
-    pub no_exact_constraints: bool,
     /// A listed record supports a position if it passes within this distance of it, in the unit of
     /// the map; auto computes the distance from the released records and the lists
     #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]

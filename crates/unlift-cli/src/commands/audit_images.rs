@@ -22,7 +22,7 @@ use unlift_vision::features::Extraction;
 use super::common::{all_could_be, with_threads};
 use super::gate_files::GateFiles;
 use super::painter::{kind, painter};
-use super::plan::{attack, check_about, check_fit, own, solvers, summary, thresholds, with_attack};
+use super::plan::{attack, check_about, check_fit, solvers, summary, thresholds};
 use super::protection::protections;
 use crate::args::AuditImagesArgs;
 use crate::exit::{Outcome, advise, usage};
@@ -105,7 +105,7 @@ pub fn audit(args: &AuditImagesArgs) -> anyhow::Result<(Option<Finished>, Used)>
             show,
             chosen,
             plan,
-            options: with_attack(more_options(args), &args.attack),
+            options: more_options(args),
             gates: args.result.gate.clone(),
             photos: args.photos.clone(),
             out: args.result.out.clone(),
@@ -128,7 +128,7 @@ fn plan(args: &AuditImagesArgs) -> anyhow::Result<Plan<2>> {
     let mut sources = Vec::new();
     for source in distinct(args.neighbors.clone(), |a, b| a == b) {
         match source {
-            NeighborSource::Own(named) => sources.push(own(named, &args.attack)?),
+            NeighborSource::Own(named) => sources.push(NeighborsBy::Source(named.of_dimension()?)),
             NeighborSource::Oracle | NeighborSource::File(_) => sources.push(NeighborsBy::Oracle),
         }
     }

@@ -22,7 +22,7 @@ use unlift_io::seen::Seen;
 use super::common::{open_map, this_program, with_threads};
 use super::gate_files::GateFiles;
 use super::painter::{kind, painter};
-use super::plan::{attack, neighbors, solvers, summary, thresholds, with_attack};
+use super::plan::{attack, neighbors, solvers, summary, thresholds};
 use super::protection::protections;
 use crate::args::AuditMapArgs;
 use crate::exit::{Outcome, advise, usage};
@@ -74,7 +74,7 @@ pub fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
             journal: journal(args, &progress)?,
             notes,
             doubts,
-            options: with_attack(more_options(args), &args.attack),
+            options: more_options(args),
             gates: result.gate.clone(),
             tiles: args.tile_points.map(|most| Tiles { most: most.get(), only: None }),
             write_clouds: args.write_clouds,

@@ -18,7 +18,7 @@ use unlift_report::document::Input;
 
 use super::common::{expect_slots, same_map, with_threads};
 use super::gate_files::GateFiles;
-use super::plan::{attack, neighbors, solvers, summary, thresholds, with_attack};
+use super::plan::{attack, neighbors, solvers, summary, thresholds};
 use crate::args::AuditReleasedArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
@@ -60,10 +60,7 @@ pub fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
             notes,
             doubts,
             input: provenance(args, &prepared, &seen)?,
-            options: with_attack(
-                Map::from_iter([("released".to_owned(), json!(true))]),
-                &args.attack,
-            ),
+            options: Map::from_iter([("released".to_owned(), json!(true))]),
             gates: args.result.gate.clone(),
             out: args.result.out.clone(),
             write_clouds: args.write_clouds,

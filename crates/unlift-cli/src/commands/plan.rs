@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use unlift::audit::{NeighborsBy, Plan, Threshold};
 use unlift::neighbors::sources::Named;
 use unlift::neighbors::{Needs, Source};
@@ -23,17 +23,9 @@ pub fn attack<const D: usize>(args: &AttackArgs, usual: Plan<D>) -> Plan<D> {
     if !args.oracle_noise.is_empty() {
         plan.oracle_noise = distinct(args.oracle_noise.clone(), |a, b| a == b);
     }
-    plan.reference = args.reference;
     plan.delta = args.delta;
-    plan.exact_constraints = !args.no_exact_constraints;
     plan.repeats = args.repeats;
     plan
-}
-
-/// Adds the options of the attack that are not in the plan, for the report.
-pub fn with_attack(mut options: Map<String, Value>, args: &AttackArgs) -> Map<String, Value> {
-    options.extend(args.source_k.map(|k| ("source_k".to_owned(), json!(k))));
-    options
 }
 
 /// Returns the requested solvers, each once, or the default.
@@ -61,15 +53,6 @@ pub fn thresholds<const D: usize>(
     Ok(thresholds.to_vec())
 }
 
-/// Returns a source other than the oracle, with the requested length of lists.
-pub fn own<const D: usize>(named: Named, args: &AttackArgs) -> anyhow::Result<NeighborsBy<D>> {
-    let named = match args.source_k {
-        Some(k) => named.with_k(usize::from(k)),
-        None => named,
-    };
-    Ok(NeighborsBy::Source(named.of_dimension()?))
-}
-
 /// Returns the sources of an audit of a map, each once, and checks that options and descriptors fit
 /// them. The file had `n_read` points. Notes for the user are added to `notes`; `lacking` makes the
 /// error of a source without descriptors.
@@ -87,7 +70,7 @@ pub fn neighbors(
                 NeighborsBy::Given(by_point(&path, prepared, n_read, notes)?)
             }
             NeighborSource::Own(named) => {
-                let by = own(named, args)?;
+                let by = NeighborsBy::Source(named.of_dimension()?);
                 if let Some(source) = by.source() {
                     match descriptors {
                         Some(descriptors) => check_fit(source, descriptors)?,
@@ -146,12 +129,6 @@ pub fn check_about<const D: usize>(
                 "{option}: expected with --neighbors oracle, found only {found}"
             )));
         }
-    }
-    if args.source_k.is_some() && !sources.iter().any(|by| by.source().is_some()) {
-        let found = names();
-        return Err(usage(format!(
-            "--source-k: expected with a source that makes its own lists, found only {found}"
-        )));
     }
     Ok(())
 }

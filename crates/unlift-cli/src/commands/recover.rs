@@ -49,7 +49,6 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
     let options = RecoverOptions {
         delta: args.delta,
         seed: args.seed,
-        exact_constraints: !args.no_exact_constraints,
         ..RecoverOptions::default()
     };
     if has_images(&args.released)? {

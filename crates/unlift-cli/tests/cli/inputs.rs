@@ -74,12 +74,6 @@ fn what_cannot_be_meant_is_refused_with_a_way_out() {
         ),
         ("room.csv --neighbors overlap --descriptors d.bin --inlier-ratios 0.5", 2, overlap, ""),
         ("room.csv --neighbors overlap --descriptors d.bin --oracle-noise near", 2, overlap, ""),
-        (
-            "room.csv --source-k 7",
-            2,
-            "--source-k: expected with a source that makes its own lists, found only oracle",
-            "",
-        ),
     ] {
         let told = place.complains(&format!("audit map {line} {QUICK}"), code);
         assert!(told.contains(expected), "{line}: {told}");

@@ -51,9 +51,6 @@ pub(super) fn written<'a, const D: usize>(
         let centers = rays.centers().iter();
         let centers: Vec<Vec<f64>> = centers.map(|c| c.map(f64::from).to_vec()).collect();
         meta.insert("centers".into(), json!(centers));
-        if let Some(edge) = rays.voxel() {
-            meta.insert("voxel".into(), json!(edge));
-        }
         if let Some(regions) = rays.regions() {
             let regions: Vec<Value> = regions.iter().map(corners).collect();
             meta.insert("regions".into(), json!(regions));
@@ -218,10 +215,6 @@ fn read_rays<const D: usize>(table: &Table<'_>) -> Result<Obfuscation<D>, Error>
     })?;
     let [direction] = read_vectors(table, ["direction_"])?;
     let rays = Rays::try_new(&centers, center, &direction);
-    let rays = match table.meta().number("voxel")? {
-        Some(edge) => rays.and_then(|rays| rays.with_voxel(edge)),
-        None => rays,
-    };
     let rays = match table.meta().regions::<D>()? {
         Some(regions) => rays.and_then(|rays| rays.with_regions(regions)),
         None => rays,

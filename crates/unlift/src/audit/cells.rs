@@ -7,14 +7,14 @@ use super::clock::Clock;
 use super::clock::RowSeconds;
 use super::laws::check_laws;
 use super::lists::Lists;
-use super::measure::{measure, unmeasured};
+use super::measure::measure;
 use super::not_audited::NotAudited;
 use super::observer::{Cell, Counts, Observer};
 use super::plan::Plan;
 use super::records_alone::records_alone;
-use super::row::{Alone, Row};
+use super::row::Row;
 use super::solved::Solved;
-use crate::evaluate::{Accuracy, bearings, blind, distinct_weights, joined, reference};
+use crate::evaluate::{Accuracy, bearings, blind, distinct_weights, joined};
 use crate::geometry::knn::Knn;
 use crate::neighbors::oracle::Noise;
 use crate::obfuscate::{Scheme, obfuscate};
@@ -225,17 +225,6 @@ pub(super) fn attack<const D: usize>(
             each(observer, None, Some(finished));
         }
     }
-    if plan.reference {
-        let (row, accuracy) = reference_row(scheme, hidden, owned, &baseline, plan, alone);
-        let weights = places(owned, &hidden.1);
-        let seconds = RowSeconds::default();
-        let (accuracy, baseline, weights) = (&accuracy, &baseline, &weights[..]);
-        each(
-            observer,
-            None,
-            Some(Finished { row, accuracy, baseline, weights, whole: &[], n_listed: 0, seconds }),
-        );
-    }
     Ok(missing)
 }
 
@@ -243,32 +232,3 @@ pub(super) fn attack<const D: usize>(
 fn places<const D: usize>(owned: &Owned<'_, D>, secret: &Secret) -> Vec<f64> {
     if owned.may_be_small() { distinct_weights(owned.original, secret) } else { Vec::new() }
 }
-
-/// Returns the row of an attacker with three true neighbors of every point and their positions.
-fn reference_row<const D: usize>(
-    scheme: &str,
-    (released, secret): &(Released<D>, Secret),
-    owned: &Owned<'_, D>,
-    baseline: &Accuracy,
-    plan: &Plan<D>,
-    alone: Vec<Alone>,
-) -> (Row, Accuracy) {
-    let mut row = Row {
-        scheme: scheme.to_owned(),
-        neighbors: REFERENCE.to_owned(),
-        inlier_ratio: 1.0,
-        k: 3,
-        solver: REFERENCE.to_owned(),
-        ..unmeasured(released.unit(), secret)
-    };
-    let accuracy = reference(released, owned.original, secret, owned.search);
-    row.fill(&accuracy, Some(baseline), &plan.thresholds);
-    row.records_alone = alone;
-    if owned.may_be_small() {
-        row.fill_distinct(&accuracy, baseline, &places(owned, secret), &plan.thresholds);
-    }
-    (row, accuracy)
-}
-
-/// Name of the reference attacker, in place of a source and of a solver.
-pub const REFERENCE: &str = "reference";

@@ -26,7 +26,6 @@ pub mod staged;
 mod threshold;
 
 pub use break_even::{Bound, BreakEven, STRONGEST, break_even};
-pub use cells::REFERENCE;
 pub use clock::{RowSeconds, Seconds};
 pub use laws::check_laws;
 pub use many::{Item, Watcher, run_many};

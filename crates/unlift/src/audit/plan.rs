@@ -90,12 +90,8 @@ pub struct Plan<const D: usize> {
     pub solvers: Vec<Arc<dyn Solver<D>>>,
     /// If true, maps are also attacked by records alone, the second baseline.
     pub records_alone: bool,
-    /// If true, each scheme gets a row of an attacker with the positions of true neighbors.
-    pub reference: bool,
     /// Distance within which a listed record supports a position.
     pub delta: Delta,
-    /// If true, coordinates that a rule of the scheme fixes are set exactly.
-    pub exact_constraints: bool,
     /// Additional figures besides errors.
     pub measures: Vec<Arc<dyn Measure<D>>>,
     /// Errors below which a point counts as recovered.
@@ -140,9 +136,7 @@ impl<const D: usize> Plan<D> {
                 Arc::new(Builtin::JointStart),
             ],
             records_alone: true,
-            reference: false,
             delta: Delta::Auto,
-            exact_constraints: true,
             measures: Vec::new(),
             thresholds: thresholds.iter().copied().map(threshold).collect(),
             headline: if of_images { 2 } else { 0 },
@@ -203,7 +197,7 @@ impl<const D: usize> Plan<D> {
 
     /// Returns the number of rows per scheme.
     pub fn rows_per_scheme(&self) -> usize {
-        self.variants().len() * self.solvers.len() + usize::from(self.reference)
+        self.variants().len() * self.solvers.len()
     }
 
     /// Checks the plan for a single map.

@@ -20,8 +20,7 @@ pub fn records_alone<const D: usize>(
     plan: &Plan<D>,
     seed: u64,
 ) -> Result<Vec<Alone>, Error> {
-    let exact_constraints = plan.exact_constraints;
-    let options = RecoverOptions { seed, exact_constraints, ..RecoverOptions::default() };
+    let options = RecoverOptions { seed, ..RecoverOptions::default() };
     let mut found = Vec::new();
     for (name, recovered) in recover::records_alone(released, &options)? {
         if (0..recovered.n_slots()).any(|slot| recovered.position(slot).is_some()) {

@@ -69,7 +69,6 @@ impl<'a, const D: usize> Solved<'a, D> {
         RecoverOptions {
             delta: self.plan.delta,
             seed: self.seed,
-            exact_constraints: self.plan.exact_constraints,
             ..RecoverOptions::default()
         }
     }

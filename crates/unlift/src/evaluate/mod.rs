@@ -6,7 +6,6 @@ mod blind;
 mod distinct;
 mod join;
 mod plausible;
-mod reference;
 mod reliability;
 
 pub use accuracy::{Accuracy, evaluate};
@@ -17,5 +16,4 @@ pub use join::joined;
 pub use plausible::{
     are_strangers, away_from_own, belongs, farthest_for_rounding, nearer_to_own, recovered_away,
 };
-pub use reference::reference;
 pub use reliability::{BINS, Bin, Reliability, SURE, reliability};

@@ -54,13 +54,9 @@ impl Scheme<3> for RayVoxel {
             low = std::array::from_fn(|c| low[c].min(point[c]));
         }
         let start = low.map(|x| x - 0.5 * self.voxel);
-        let mut lifted = from_centers(points, key, |_, point| {
+        from_centers(points, key, |_, point| {
             let cell = |c: usize| ((point[c] - start[c]) / self.voxel).floor();
             (0..3).map(|c| cell(c).rem_euclid(2.0) as usize).sum::<usize>() % 2
-        })?;
-        if let Obfuscation::Rays(rays) = lifted.obfuscation {
-            lifted.obfuscation = Obfuscation::Rays(rays.with_voxel(self.voxel)?);
-        }
-        Ok(lifted)
+        })
     }
 }

@@ -52,14 +52,10 @@ pub fn again<const D: usize>(
             let directions: Vec<_> =
                 order.iter().map(|&old| wide(&rays.direction()[old])).collect();
             let again = Rays::try_new(&centers, center, &directions).unwrap();
-            let again = match rays.regions() {
+            Obfuscation::Rays(match rays.regions() {
                 Some(regions) => {
                     again.with_regions(regions.iter().rev().copied().collect()).unwrap()
                 }
-                None => again,
-            };
-            Obfuscation::Rays(match rays.voxel() {
-                Some(edge) => again.with_voxel(edge).unwrap(),
                 None => again,
             })
         }
