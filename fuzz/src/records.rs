@@ -22,10 +22,7 @@ fn of<const D: usize>(bytes: &mut Bytes<'_>) {
         0 => Delta::Fixed(bytes.number()),
         _ => Delta::Auto,
     };
-    let options = RecoverOptions {
-        delta,
-        ..RecoverOptions::default()
-    };
+    let options = RecoverOptions { delta, ..RecoverOptions::default() };
     let solver = Builtin::ALL[usize::from(solver) % Builtin::ALL.len()];
     let Ok(recovered) = recover(&released, &lists, &solver, &options) else { return };
     assert_eq!(recovered.n_slots(), released.n_slots());

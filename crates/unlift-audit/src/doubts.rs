@@ -68,8 +68,8 @@ pub(crate) fn doubts(
     for row in rows {
         let of_tiles = tile_rows.iter().flatten().filter(|of_tile| of_tile.is_same_cell(row));
         let mut deltas = std::iter::once(row).chain(of_tiles).map(|row| row.delta);
-        let unusual = deltas
-            .find(|&delta| delta > 0.0 && !(NARROW * low..=WIDE * high).contains(&delta));
+        let unusual =
+            deltas.find(|&delta| delta > 0.0 && !(NARROW * low..=WIDE * high).contains(&delta));
         let of_delta = unusual.map(|delta| {
             format!(
                 "{}: delta, {}, is far from the usual distance to the K-th neighbor, {} to {}: recovery may be too low \

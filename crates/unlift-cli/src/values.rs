@@ -345,8 +345,8 @@ mod tests {
              expected a number from 0 to 1, found 1.5\n\
              expected auto or a number above 0, found wide\n\
              expected NEIGHBORS,RATIO with both above 0 (for example 20,2.0), found 20\n\
-             expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, sphere, sphere-half, sphere-quarter, found pppl\n\
-             expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, sphere, sphere-half, sphere-quarter, found cp2d (for images only)\n\
+             expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, sphere, found pppl\n\
+             expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, sphere, found cp2d (for images only)\n\
              expected one of joint, ranking, joint-start, consensus, ransac, density, tomography, found magic\n\
              expected one of uniform, near, clustered, found white\n\
              expected one of sift, aliked, superpoint, found SIFT\n\

@@ -11,7 +11,7 @@ const NAMING_OPTIONS: [&str; 9] =
     ["descriptors", "input", "inverter_sha256", "map", "model", "out", "path", "photos", "show"];
 
 /// The schemes of unlift. A reason from another scheme or source may contain anything: a line of data, a path.
-const SCHEMES: [&str; 17] = [
+const SCHEMES: [&str; 12] = [
     "olc",
     "ppl",
     "ppl+",
@@ -23,12 +23,7 @@ const SCHEMES: [&str; 17] = [
     "cp2d",
     "dcl2d",
     "sphere",
-    "sphere-half",
-    "sphere-quarter",
     "lines2d-gravity",
-    "dcl2d-horizontal",
-    "dcl2d-near",
-    "dcl2d-far",
 ];
 const SOURCES: [&str; 7] =
     ["oracle", "file", "similarity", "overlap", "descriptors", "geometric", "learned"];

@@ -17,13 +17,8 @@ pub(crate) fn scheme_title(scheme: &str) -> String {
         "lines2d" => "Random lines in the image",
         "cp2d" => "Coordinate permutation in the image",
         "dcl2d" => "Dual convergent lines",
-        "dcl2d-horizontal" => "Dual convergent lines, upper and lower half",
-        "dcl2d-near" => "Dual convergent lines, anchors at half the distance",
-        "dcl2d-far" => "Dual convergent lines, anchors at twice the distance",
         "lines2d-gravity" => "Lines along gravity in the image",
         "sphere" => "Sphere cloud, a third of the bearings real",
-        "sphere-half" => "Sphere cloud, half of the bearings real",
-        "sphere-quarter" => "Sphere cloud, a quarter of the bearings real",
         _ => return scheme.to_owned(),
     };
     match changes {
@@ -46,15 +41,11 @@ pub(crate) fn scheme_rule(scheme: &str) -> &'static str {
         "cp" => "Two points swap one coordinate.",
         "lines2d" => "Each keypoint becomes a line of random direction through it.",
         "cp2d" => "Two keypoints swap one of their two coordinates.",
-        "dcl2d" | "dcl2d-horizontal" | "dcl2d-near" | "dcl2d-far" => {
-            "Each keypoint becomes a ray from the anchor of its half of the image."
-        }
+        "dcl2d" => "Each keypoint becomes a ray from the anchor of its half of the image.",
         "lines2d-gravity" => {
             "Each keypoint becomes the line through it and the image of the gravity direction."
         }
-        "sphere" | "sphere-half" | "sphere-quarter" => {
-            "Each point becomes its bearing from the center of the map, among decoys."
-        }
+        "sphere" => "Each point becomes its bearing from the center of the map, among decoys.",
         _ => "",
     }
 }

@@ -29,10 +29,6 @@ mod records_alone;
 mod result;
 mod solver;
 
-#[doc(hidden)]
-pub use confidence::cues::{Cues, Seen};
-#[doc(hidden)]
-pub use confidence::{N_KINDS, N_TERMS, centered, terms};
 pub use options::{Delta, RecoverOptions};
 pub use records_alone::records_alone;
 pub use result::{Confidence, Estimate, Recovered, Status, TrialHistogram, Unknown};
@@ -90,7 +86,7 @@ impl<const D: usize> Solver<D> for Builtin {
         options: &RecoverOptions,
     ) -> Result<Recovered<D>, Error> {
         let solve: Solve<D> = SOLVE.of()?;
-        solve(*self, released, lists, options, false).map(|(recovered, _)| recovered)
+        solve(*self, released, lists, options)
     }
 
     fn reads_lists(&self) -> bool {
@@ -126,8 +122,7 @@ pub fn recover_from<const D: usize>(
     released.fingerprint().expect(known.about().map)?;
     let problem = Problem::new(released, lists, Builtin::Ranking, options)?;
     let known: Vec<_> = (0..problem.n_slots()).map(|slot| known.sure_estimate(slot)).collect();
-    let estimates = problem.run_joint(problem.solve(), &known);
-    problem.finish(estimates, false).map(|(recovered, _)| recovered)
+    problem.finish(problem.run_joint(problem.solve(), &known))
 }
 
 type WithStart<const D: usize> = fn(
@@ -145,33 +140,13 @@ fn with_start<const D: usize>(
 ) -> Result<(Recovered<D>, Recovered<D>), Error> {
     let problem = Problem::new(released, lists, Builtin::Joint, options)?;
     let start = problem.solve();
-    let (recovered, _) = problem.finish(problem.run_joint(start.clone(), &[]), false)?;
+    let recovered = problem.finish(problem.run_joint(start.clone(), &[]))?;
     let start = problem.finish_start(start, &recovered)?;
     Ok((recovered, start))
 }
 
-/// Recovers by `solver` and also returns the features of confidence, to fit its model.
-///
-/// # Errors
-/// When options are out of range, or the lists do not have one row per slot.
-#[doc(hidden)]
-pub fn recover_and_look<const D: usize>(
-    solver: Builtin,
-    released: &Released<D>,
-    lists: &Neighborhoods,
-    options: &RecoverOptions,
-) -> Result<(Recovered<D>, Seen), Error> {
-    let solve: Solve<D> = SOLVE.of()?;
-    solve(solver, released, lists, options, true)
-}
-
-type Solve<const D: usize> = fn(
-    Builtin,
-    &Released<D>,
-    &Neighborhoods,
-    &RecoverOptions,
-    bool,
-) -> Result<(Recovered<D>, Seen), Error>;
+type Solve<const D: usize> =
+    fn(Builtin, &Released<D>, &Neighborhoods, &RecoverOptions) -> Result<Recovered<D>, Error>;
 
 static SOLVE: Both<Solve<2>, Solve<3>> = Both(solve::<2>, solve::<3>);
 
@@ -180,9 +155,7 @@ fn solve<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
     options: &RecoverOptions,
-    want_features: bool,
-) -> Result<(Recovered<D>, Seen), Error> {
+) -> Result<Recovered<D>, Error> {
     let problem = Problem::new(released, lists, solver, options)?;
-    let start = problem.solve();
-    problem.finish(problem.run_joint(start, &[]), want_features)
+    problem.finish(problem.run_joint(problem.solve(), &[]))
 }

@@ -3,7 +3,7 @@
 use crate::density::{Peaks, tomography};
 use crate::neighbors::Neighborhoods;
 use crate::recover::assignment::descriptor_rows;
-use crate::recover::confidence::cues::{Seen, Solved};
+use crate::recover::confidence::cues::Solved;
 use crate::recover::map::family::{Family, Settings};
 use crate::recover::map::graph::Graph;
 use crate::recover::map::lists::Slots;
@@ -159,14 +159,9 @@ impl<'a, const D: usize> Problem<'a, D> {
         }
     }
 
-    /// Applies exact constraints to the last estimates and adds confidence. Also returns the features of confidence;
-    /// `want_features` computes them even if the map gets no confidence.
+    /// Applies exact constraints to the last estimates and adds confidence.
     /// Fails when there is not one estimate per slot.
-    pub(super) fn finish(
-        &self,
-        unsettled: Vec<Estimate<D>>,
-        want_features: bool,
-    ) -> Result<(Recovered<D>, Seen), Error> {
+    pub(super) fn finish(&self, unsettled: Vec<Estimate<D>>) -> Result<Recovered<D>, Error> {
         if unsettled.len() != self.n_slots() {
             let expected = format!("{}, one per slot", self.n_slots());
             return Err(Error::new("estimates", expected, unsettled.len().to_string()));
@@ -177,26 +172,23 @@ impl<'a, const D: usize> Problem<'a, D> {
         let descriptor_row = descriptor_rows(self.released, self.lists);
         let trials = (self.solver == Builtin::Ransac).then(|| self.trials.histogram());
         let recovered = self.in_columns(estimates, descriptor_row)?.with_trials(trials);
-        let nothing = |recovered: Recovered<D>, unknown: Unknown| {
-            Ok((recovered.without_confidence(unknown), Seen::NOTHING))
-        };
         if let Some(unknown) = confidence::not_asked::<D>(self.solver, &self.options) {
-            return nothing(recovered, unknown);
+            return Ok(recovered.without_confidence(unknown));
         }
         let Records::Listed { family, graph: Some(graph), .. } = &self.records else {
-            return nothing(recovered, Unknown::OtherSolver);
+            return Ok(recovered.without_confidence(Unknown::OtherSolver));
         };
-        let unknown = confidence::unknown(self.released, self.lists, estimates);
-        if let (Some(unknown), false) = (unknown, want_features) {
-            return nothing(recovered, unknown);
+        if let Some(unknown) = confidence::unknown(self.released, self.lists, estimates) {
+            return Ok(recovered.without_confidence(unknown));
         }
         let solved = Solved { estimates, unsettled: &unsettled, delta: self.delta as f32 };
-        let (sure, seen) = confidence::predict(self.solver, family, graph, self.released, &solved);
-        let recovered = match unknown {
-            Some(unknown) => recovered.without_confidence(unknown),
-            None => recovered.with_confidence(sure)?,
-        };
-        Ok((recovered, seen))
+        recovered.with_confidence(confidence::predict(
+            self.solver,
+            family,
+            graph,
+            self.released,
+            &solved,
+        ))
     }
 
     /// Finishes the estimates that joint recovery starts from, as [`Builtin::JointStart`] does. Takes the assignment of descriptors

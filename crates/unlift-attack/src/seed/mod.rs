@@ -42,8 +42,6 @@ pub enum Stage {
     Image = 13,
     /// The wrong places that look like a patch of a map.
     OracleLookAlikes = 20,
-    /// Copies of a map side by side, for measurements.
-    Tiling = 21,
     /// Simple shapes, to test attacks on.
     Shapes = 22,
     /// Steps that ranking tries.

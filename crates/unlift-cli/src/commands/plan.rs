@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 use unlift::audit::{NeighborsBy, Plan, Threshold};
-use unlift::neighbors::sources::Named;
 use unlift::neighbors::{Needs, Source};
 use unlift::recover::{Builtin, Solver};
 use unlift::{Descriptors, ErrorKind};

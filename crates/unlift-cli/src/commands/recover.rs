@@ -46,11 +46,8 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
     let rules = Rules::new([args.released.as_path(), &args.neighbors], args.force);
     let kind = Kind::Stage(Stage::Recovered);
     check_file(&args.out, kind, &rules)?;
-    let options = RecoverOptions {
-        delta: args.delta,
-        seed: args.seed,
-        ..RecoverOptions::default()
-    };
+    let options =
+        RecoverOptions { delta: args.delta, seed: args.seed, ..RecoverOptions::default() };
     if has_images(&args.released)? {
         return images(args, &options, &rules);
     }

@@ -191,10 +191,6 @@ impl<'a> Meta<'a> {
         })
     }
 
-    pub(super) fn number(&self, key: &str) -> Result<Option<f64>, Error> {
-        self.given(key, "a number", Value::as_f64)
-    }
-
     /// Returns a number of at least 0, by default 0.
     pub(super) fn number_or_0(&self, key: &str) -> Result<f64, Error> {
         let number = self

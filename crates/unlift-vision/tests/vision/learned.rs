@@ -8,7 +8,7 @@ use unlift::descriptors::Values;
 use unlift::geometry::frame::Bounds;
 use unlift::neighbors::oracle::{self, TrueNeighbors};
 use unlift::neighbors::{Overlap, Similarity, Source};
-use unlift::obfuscate::lines2d::Lines2d;
+use unlift::obfuscate::olc::Olc;
 use unlift::obfuscate::obfuscate;
 use unlift::obfuscate::olc::Olc;
 use unlift::obfuscate::ppl::Ppl;
@@ -119,7 +119,7 @@ fn the_network_names_more_neighbors_than_its_inputs_do() {
         let original = Original::within(points, bounds).unwrap();
         let descriptors = Descriptors::try_new(values, 128).unwrap();
         let key = Key::from_seed(1);
-        let (released, secret) = obfuscate(&Lines2d, &original, Some(&descriptors), &key).unwrap();
+        let (released, secret) = obfuscate(&Olc, &original, Some(&descriptors), &key).unwrap();
         let search = oracle::search(&original).unwrap();
         let near = TrueNeighbors::new(&search, &secret, 1, K).unwrap();
         let ratio = |source: &dyn Source<2>| {

@@ -66,11 +66,7 @@ impl<'a, const D: usize> Solved<'a, D> {
     }
 
     fn options(&self) -> RecoverOptions {
-        RecoverOptions {
-            delta: self.plan.delta,
-            seed: self.seed,
-            ..RecoverOptions::default()
-        }
+        RecoverOptions { delta: self.plan.delta, seed: self.seed, ..RecoverOptions::default() }
     }
 
     fn recovery<'b>(

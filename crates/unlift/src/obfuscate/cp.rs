@@ -1,8 +1,8 @@
-//! Scheme `cp`: random pairs exchange one coordinate.
+//! Scheme `cp`: random pairs exchange one coordinate. In images it is `cp2d`, for each image separately.
 
 use std::sync::Arc;
 
-use super::pairs::random_pairs;
+use super::ppl::random_pairs;
 use super::scheme::{Entry, Facts, Lifted, Scheme};
 use crate::Error;
 use crate::geometry::frame::Bounds;
@@ -26,9 +26,20 @@ pub const ENTRY: Entry = Entry {
     in_3d: Some(|_| Arc::new(Cp)),
 };
 
+/// Registry entry in images.
+pub const CP2D: Entry = Entry {
+    name: "cp2d",
+    facts: Facts {
+        summary: "random pairs of keypoints exchange one random coordinate",
+        ..ENTRY.facts
+    },
+    in_2d: Some(|_| Arc::new(Cp)),
+    in_3d: None,
+};
+
 impl<const D: usize> Scheme<D> for Cp {
     fn name(&self) -> &str {
-        ENTRY.name
+        if D == 2 { CP2D.name } else { ENTRY.name }
     }
 
     fn lift(

@@ -9,8 +9,6 @@
 //!   height, is the one recommended.
 //! - A keypoint on the split belongs to the right half.
 //! - A keypoint on its anchor has no line and is dropped.
-//! - The variants split the image at half of the height, or put the anchors at half or at twice the
-//!   distance, around the center of the image.
 //! - The line reveals its anchor, and so the half with its keypoint. It is therefore released as a
 //!   ray from the anchor.
 
@@ -25,15 +23,9 @@ use crate::seed::Key;
 
 /// Dual convergent lines.
 #[derive(Clone, Copy, Debug)]
-pub struct Dcl2d {
-    name: &'static str,
-    /// Axis along which the image is halved: 0 for left and right halves.
-    across: usize,
-    /// Distance of the anchors, as a multiple of the length of the split.
-    distance: f64,
-}
+pub struct Dcl2d;
 
-/// The recommended anchors.
+/// Registry entry.
 pub const ENTRY: Entry = Entry {
     name: "dcl2d",
     facts: Facts {
@@ -42,40 +34,13 @@ pub const ENTRY: Entry = Entry {
         hidden: "the range from the anchor (1 of 2 coordinates)",
         patents: "none found",
     },
-    in_2d: Some(|_| Arc::new(Dcl2d { name: "dcl2d", across: 0, distance: 1.0 })),
-    in_3d: None,
-};
-
-/// Upper and lower halves.
-pub const HORIZONTAL: Entry = Entry {
-    name: "dcl2d-horizontal",
-    facts: Facts {
-        summary: "as dcl2d, with an upper and a lower half and anchors at the sides",
-        ..ENTRY.facts
-    },
-    in_2d: Some(|_| Arc::new(Dcl2d { name: "dcl2d-horizontal", across: 1, distance: 1.0 })),
-    in_3d: None,
-};
-
-/// Anchors within the image.
-pub const NEAR: Entry = Entry {
-    name: "dcl2d-near",
-    facts: Facts { summary: "as dcl2d, with anchors at half the distance", ..ENTRY.facts },
-    in_2d: Some(|_| Arc::new(Dcl2d { name: "dcl2d-near", across: 0, distance: 0.5 })),
-    in_3d: None,
-};
-
-/// Anchors outside the image.
-pub const FAR: Entry = Entry {
-    name: "dcl2d-far",
-    facts: Facts { summary: "as dcl2d, with anchors at twice the distance", ..ENTRY.facts },
-    in_2d: Some(|_| Arc::new(Dcl2d { name: "dcl2d-far", across: 0, distance: 2.0 })),
+    in_2d: Some(|_| Arc::new(Dcl2d)),
     in_3d: None,
 };
 
 impl Scheme<2> for Dcl2d {
     fn name(&self) -> &str {
-        self.name
+        ENTRY.name
     }
 
     fn lift(
@@ -87,20 +52,14 @@ impl Scheme<2> for Dcl2d {
         let Some(image) = bounds else {
             return Err(Error::new("image size", "known: anchors lie on its border", "none"));
         };
-        let (across, along) = (self.across, 1 - self.across);
-        let (center, half) = (image.center(), (image.high[along] - image.low[along]) / 2.0);
-        let split = center[across];
-        let anchor = |side: f64| {
-            let mut anchor = center;
-            anchor[along] += side * self.distance * half;
-            anchor
-        };
-        let anchors = [anchor(-1.0), anchor(1.0)];
-        let chosen = |_, point: &[f64; 2]| usize::from(point[across] >= split);
+        let center = image.center();
+        let half = (image.high[1] - image.low[1]) / 2.0;
+        let anchors = [-1.0, 1.0].map(|side| [center[0], center[1] + side * half]);
+        let chosen = |_, point: &[f64; 2]| usize::from(point[0] >= center[0]);
         let mut lifted = rays_from(&anchors, points, chosen)?;
         if let Obfuscation::Rays(rays) = lifted.obfuscation {
             let (mut first, mut second) = (*image, *image);
-            (first.high[across], second.low[across]) = (split, split);
+            (first.high[0], second.low[0]) = (center[0], center[0]);
             lifted.obfuscation = Obfuscation::Rays(rays.with_regions(vec![first, second])?);
         }
         Ok(lifted)

@@ -1,4 +1,4 @@
-//! Obfuscation: computes released records and a secret from originals. One scheme per file.
+//! Obfuscation: computes released records and a secret from originals. Schemes that share a rule share a file.
 //!
 //! A scheme, built-in or custom, implements only its rule ([`Scheme::lift`]). This module does the
 //! rest for all: origin, normal form, order of records, slots and descriptors.
@@ -7,21 +7,16 @@ mod changed;
 mod hide;
 mod kmeans;
 mod mitigate;
-mod pairs;
 mod protect;
 mod scheme;
 mod size;
 
 pub mod cp;
-pub mod cp2d;
 pub mod dcl2d;
-pub mod lines2d;
 pub mod olc;
 pub mod plane;
 pub mod ppl;
-pub mod ppl_plus;
 pub mod ray;
-pub mod ray_voxel;
 pub mod sphere;
 
 pub use changed::{Change, Changed};
@@ -37,27 +32,18 @@ use crate::Error;
 pub const SCHEMES: &[Entry] = &[
     olc::ENTRY,
     ppl::ENTRY,
-    ppl_plus::ENTRY,
+    ppl::PLUS,
     ray::ENTRY,
-    ray_voxel::ENTRY,
+    ray::VOXEL,
     plane::ENTRY,
     cp::ENTRY,
-    lines2d::ENTRY,
-    cp2d::ENTRY,
+    olc::LINES2D,
+    cp::CP2D,
     dcl2d::ENTRY,
 ];
 
-/// Built-in schemes that are audited only on request: their records meet in one point, so crossings
-/// give no position, or they vary a scheme of [`SCHEMES`].
-pub const ON_REQUEST: &[Entry] = &[
-    sphere::ENTRY,
-    sphere::HALF,
-    sphere::QUARTER,
-    lines2d::GRAVITY,
-    dcl2d::HORIZONTAL,
-    dcl2d::NEAR,
-    dcl2d::FAR,
-];
+/// Built-in schemes that are audited only on request: their records meet in one point, so crossings give no position.
+pub const ON_REQUEST: &[Entry] = &[sphere::ENTRY, olc::GRAVITY];
 
 /// Returns all built-in schemes.
 pub fn all() -> impl Iterator<Item = &'static Entry> {

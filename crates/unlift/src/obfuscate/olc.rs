@@ -1,4 +1,7 @@
-//! Scheme `olc`: a uniformly random line through every point.
+//! Schemes of lines through single points: `olc`, a uniformly random line through every point of a map; `lines2d`, the same in images;
+//! and `lines2d-gravity`.
+//!
+//! The size of an image is released, so a hidden keypoint lies on a chord. Scale and orientation of keypoints are not released.
 
 use std::sync::Arc;
 
@@ -7,10 +10,11 @@ use rayon::prelude::*;
 use super::scheme::{Entry, Facts, Lifted, Scheme};
 use crate::Error;
 use crate::geometry::frame::Bounds;
+use crate::geometry::vector::sub;
 use crate::released::{Lines, Obfuscation};
 use crate::seed::{Key, Stage};
 
-/// Random lines ("oriented line clouds").
+/// Random lines ("oriented line clouds"); in images, `lines2d`.
 #[derive(Clone, Copy, Debug)]
 pub struct Olc;
 
@@ -27,9 +31,22 @@ pub const ENTRY: Entry = Entry {
     in_3d: Some(|_| Arc::new(Olc)),
 };
 
+/// Registry entry in images.
+pub const LINES2D: Entry = Entry {
+    name: "lines2d",
+    facts: Facts {
+        summary: "a random line through every keypoint",
+        source: "Speciale et al., Privacy Preserving Image Queries for Camera Localization, ICCV 2019",
+        hidden: "the position along the line (1 of 2 coordinates)",
+        patents: "US 10,839,556, Microsoft",
+    },
+    in_2d: Some(|_| Arc::new(Olc)),
+    in_3d: None,
+};
+
 impl<const D: usize> Scheme<D> for Olc {
     fn name(&self) -> &str {
-        ENTRY.name
+        if D == 2 { LINES2D.name } else { ENTRY.name }
     }
 
     fn lift(
@@ -41,6 +58,50 @@ impl<const D: usize> Scheme<D> for Olc {
         let key = key.stage(Stage::Scheme);
         let direction = |row: usize| key.draws(row as u64).direction();
         let directions: Vec<[f64; D]> = (0..points.len()).into_par_iter().map(direction).collect();
+        Ok(Lifted::one_each(Obfuscation::Lines(Lines::through(points, &directions)?)))
+    }
+}
+
+/// Lines through the image of the gravity direction, as proposed for structure from motion. Images have no gravity here, so the camera
+/// is assumed to be upright and tilted down by 15 degrees, with a focal length of 1.2 times the longer side. All lines then meet in one
+/// point below the image.
+#[derive(Clone, Copy, Debug)]
+pub struct Gravity;
+
+/// Registry entry of the variant.
+pub const GRAVITY: Entry = Entry {
+    name: "lines2d-gravity",
+    facts: Facts {
+        summary: "the line through a keypoint and the image of the gravity direction",
+        source: "Geppert et al., Privacy Preserving Structure-from-Motion, ECCV 2020",
+        hidden: "the position along the line (1 of 2 coordinates)",
+        patents: "none found",
+    },
+    in_2d: Some(|_| Arc::new(Gravity)),
+    in_3d: None,
+};
+
+/// Focal length over the tangent of the assumed tilt, in longer sides of the image.
+const BELOW: f64 = 1.2 / 0.267_949;
+
+impl Scheme<2> for Gravity {
+    fn name(&self) -> &str {
+        GRAVITY.name
+    }
+
+    fn lift(
+        &self,
+        points: &[[f64; 2]],
+        bounds: Option<&Bounds<2>>,
+        _: &Key,
+    ) -> Result<Lifted<2>, Error> {
+        let Some(image) = bounds else {
+            return Err(Error::new("image size", "known: gravity points below it", "none"));
+        };
+        let [width, height] = sub(&image.high, &image.low);
+        let [x, y] = image.center();
+        let below = [x, y + BELOW * width.max(height)];
+        let directions: Vec<[f64; 2]> = points.iter().map(|p| sub(&below, p)).collect();
         Ok(Lifted::one_each(Obfuscation::Lines(Lines::through(points, &directions)?)))
     }
 }

@@ -1,11 +1,15 @@
-//! Scheme `ppl`: a line through each pair of a random pairing.
+//! Schemes of lines through pairs of points: `ppl`, a random pairing, and `ppl+`, which avoids lines within local surfaces.
+//!
+//! The published code of `ppl+` takes the normal from a row of the wrong matrix, so it depends on the orientation of the map. This
+//! implementation follows the paper: the normal is the direction of least spread of the neighbors.
 
 use std::sync::Arc;
 
-use super::pairs::{drop_pairs, pair_again, random_pairs, refused_last};
 use super::scheme::{Entry, Facts, Lifted, Scheme};
 use crate::geometry::frame::Bounds;
-use crate::geometry::vector::{squared_distance, sub};
+use crate::geometry::knn::Knn;
+use crate::geometry::normal::local_normal;
+use crate::geometry::vector::{dot, squared_distance, sub};
 use crate::released::{Lines, Obfuscation};
 use crate::seed::{Cipher, Draws, Key, Stage};
 use crate::truth::{DropReason, Dropped};
@@ -51,7 +55,7 @@ impl Scheme<3> for Ppl {
 }
 
 /// Returns true if two points are far enough apart to define a line in `f64`.
-pub(super) fn apart(points: &[[f64; 3]], pair: &[OriginalId; 2]) -> bool {
+fn apart(points: &[[f64; 3]], pair: &[OriginalId; 2]) -> bool {
     let [a, b] = pair.map(|id| points[id.index()]);
     let size2 = a.iter().chain(&b).map(|x| x * x).fold(0.0, f64::max);
     squared_distance(&a, &b) > size2 * 1e-24
@@ -78,7 +82,7 @@ fn separate(
     dropped
 }
 
-pub(super) fn lines_through(
+fn lines_through(
     points: &[[f64; 3]],
     pairs: &[[OriginalId; 2]],
     dropped: Vec<Dropped>,
@@ -93,4 +97,140 @@ pub(super) fn lines_through(
         swapped_axis: None,
         dropped,
     })
+}
+
+/// Paired-point lifting with plane rejection.
+#[derive(Clone, Copy, Debug)]
+pub struct PplPlus;
+
+/// Registry entry of `ppl+`.
+pub const PLUS: Entry = Entry {
+    name: "ppl+",
+    facts: Facts {
+        summary: "as ppl, but no line lies within the local surface of its first point",
+        patents: "as ppl",
+        ..ENTRY.facts
+    },
+    in_2d: None,
+    in_3d: Some(|_| Arc::new(PplPlus)),
+};
+
+const MAX_ROUNDS: usize = 1000;
+/// Re-pairing ends when fewer pairs than this are refused.
+const FEW_PAIRS: usize = 10;
+/// Re-pairing stalls after this many rounds, if this many rounds in a row changed nothing.
+const STALL: (usize, usize) = (100, 50);
+/// sin(20 degrees). A line is refused if its angle to the surface is at most 20 degrees.
+const SIN_20_DEGREES: f64 = 0.342_020_143_325_668_7;
+
+impl Scheme<3> for PplPlus {
+    fn name(&self) -> &str {
+        PLUS.name
+    }
+
+    fn lift(
+        &self,
+        points: &[[f64; 3]],
+        _: Option<&Bounds<3>>,
+        key: &Key,
+    ) -> Result<Lifted<3>, Error> {
+        let normals = normals(points)?;
+        let on_surface = |pair: &[OriginalId; 2]| {
+            let [a, b] = pair.map(|id| points[id.index()]);
+            let along = sub(&b, &a);
+            normals[pair[0].index()].is_some_and(|normal| {
+                dot(&along, &normal).abs() <= SIN_20_DEGREES * dot(&along, &along).sqrt()
+            })
+        };
+        let mut draws = key.draws(Stage::Scheme, 0);
+        let (mut pairs, mut dropped) = random_pairs(points.len(), &mut draws);
+        let accept = |pair: &[OriginalId; 2]| apart(points, pair) && !on_surface(pair);
+        let mut refused = refused_last(&mut pairs, accept);
+        let mut unchanged = 0;
+        for round in 1..=MAX_ROUNDS {
+            if refused < FEW_PAIRS {
+                break;
+            }
+            let before = refused;
+            refused = pair_again(&mut pairs, refused, &mut draws, accept);
+            unchanged = if refused == before { unchanged + 1 } else { 0 };
+            if round > STALL.0 && unchanged >= STALL.1 {
+                break;
+            }
+        }
+        let kept = pairs.len() - refused;
+        for pair in pairs.drain(kept..) {
+            let coincident = !apart(points, &pair);
+            let reason =
+                if coincident { DropReason::CoincidentPair } else { DropReason::RejectedPair };
+            dropped.extend(drop_pairs(&[pair], reason));
+        }
+        lines_through(points, &pairs, dropped)
+    }
+}
+
+/// Returns for each point the normal of the surface through its K = min(1 % of the points, 100)
+/// nearest neighbors, with K even and at least 4.
+fn normals(points: &[[f64; 3]]) -> Result<Vec<Option<[f64; 3]>>, Error> {
+    if points.is_empty() {
+        return Ok(Vec::new());
+    }
+    let k = (points.len() / 100).clamp(4, 100) & !1;
+    let knn = Knn::new(points)?;
+    Ok(knn.per_row(k, |row, found| {
+        local_normal(&points[row], found.iter().map(|&(_, at)| points[at as usize]))
+    }))
+}
+
+/// Returns a uniformly random pairing of `0..n`: consecutive entries of a random permutation. The
+/// point that remains for odd `n` is random, too; in published code it is the last of the file.
+pub(super) fn random_pairs(
+    n: usize,
+    draws: &mut Draws<Cipher>,
+) -> (Vec<[OriginalId; 2]>, Vec<Dropped>) {
+    let order = draws.permutation(n);
+    let (pairs, odd) = order.as_chunks::<2>();
+    let pairs = pairs.iter().map(|pair| pair.map(OriginalId)).collect();
+    let dropped = odd
+        .iter()
+        .map(|&id| Dropped { original: OriginalId(id), reason: DropReason::OddPoint })
+        .collect();
+    (pairs, dropped)
+}
+
+/// Pairs the points of the last `refused` pairs again. Returns the number of pairs that `accept`
+/// still refuses and moves them to the end.
+fn pair_again(
+    pairs: &mut [[OriginalId; 2]],
+    refused: usize,
+    draws: &mut Draws<Cipher>,
+    accept: impl Fn(&[OriginalId; 2]) -> bool,
+) -> usize {
+    let start = pairs.len() - refused;
+    let mut pool: Vec<OriginalId> = pairs[start..].as_flattened().to_vec();
+    draws.shuffle(&mut pool);
+    let (mut accepted, mut still_refused) = (Vec::new(), Vec::new());
+    for pair in pool.as_chunks::<2>().0 {
+        if accept(pair) { accepted.push(*pair) } else { still_refused.push(*pair) }
+    }
+    for (at, pair) in accepted.iter().chain(&still_refused).enumerate() {
+        pairs[start + at] = *pair;
+    }
+    still_refused.len()
+}
+
+/// Moves the pairs that `accept` refuses to the end and returns their number.
+fn refused_last(
+    pairs: &mut Vec<[OriginalId; 2]>,
+    accept: impl Fn(&[OriginalId; 2]) -> bool,
+) -> usize {
+    let (accepted, refused): (Vec<_>, Vec<_>) = pairs.iter().copied().partition(|p| accept(p));
+    pairs.clear();
+    pairs.extend(accepted);
+    pairs.extend(&refused);
+    refused.len()
+}
+
+fn drop_pairs(pairs: &[[OriginalId; 2]], reason: DropReason) -> Vec<Dropped> {
+    pairs.as_flattened().iter().map(|&original| Dropped { original, reason }).collect()
 }

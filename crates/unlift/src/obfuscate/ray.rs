@@ -1,4 +1,5 @@
-//! Scheme `ray`: a half-line from one of two centers, chosen at random for every point.
+//! Schemes of half-lines from one of two centers, which is chosen at random for every point (`ray`) or by a checkerboard of voxels
+//! (`ray-voxel`).
 
 use std::sync::Arc;
 
@@ -47,8 +48,59 @@ impl Scheme<3> for Ray {
     }
 }
 
+/// Ray clouds, voxel variant.
+#[derive(Clone, Copy, Debug)]
+pub struct RayVoxel {
+    /// Edge of a voxel, in the unit of the points.
+    pub voxel: f64,
+}
+
+/// Registry entry of `ray-voxel`.
+pub const VOXEL: Entry = Entry {
+    name: "ray-voxel",
+    facts: Facts {
+        summary: "as ray, the center given by the parity of the point's voxel",
+        patents: "as ray",
+        ..ENTRY.facts
+    },
+    in_2d: None,
+    in_3d: Some(|options| Arc::new(RayVoxel { voxel: options.voxel })),
+};
+
+impl Scheme<3> for RayVoxel {
+    fn name(&self) -> &str {
+        VOXEL.name
+    }
+
+    fn parameters(&self) -> Vec<(&'static str, f64)> {
+        vec![("voxel", self.voxel)]
+    }
+
+    fn lift(
+        &self,
+        points: &[[f64; 3]],
+        _: Option<&Bounds<3>>,
+        key: &Key,
+    ) -> Result<Lifted<3>, Error> {
+        if !(self.voxel.is_finite() && self.voxel > 0.0) {
+            return Err(Error::new("voxel", "a positive length", self.voxel.to_string()));
+        }
+        // The grid starts half a voxel below the smallest coordinates, as in the authors' code
+        // (Open3D).
+        let mut low = [f64::INFINITY; 3];
+        for point in points {
+            low = std::array::from_fn(|c| low[c].min(point[c]));
+        }
+        let start = low.map(|x| x - 0.5 * self.voxel);
+        from_centers(points, key, |_, point| {
+            let cell = |c: usize| ((point[c] - start[c]) / self.voxel).floor();
+            (0..3).map(|c| cell(c).rem_euclid(2.0) as usize).sum::<usize>() % 2
+        })
+    }
+}
+
 /// Returns rays from two k-means centers to every point. `choose` returns the center of a row.
-pub(super) fn from_centers(
+fn from_centers(
     points: &[[f64; 3]],
     key: &Key,
     choose: impl Fn(usize, &[f64; 3]) -> usize,

@@ -5,7 +5,7 @@
 //! length 1, and the descriptor of that point, so that the number of records stays. In the secret, a
 //! decoy stands for the point that it withholds; its ray does not pass through it.
 //!
-//! The published code confirms the center and the shares 1/2, 1/3 and 1/4. It reads maps with
+//! The published code confirms the center and the share. It reads maps with
 //! decoys and does not make them: the variance of the noise and the source of a decoy's descriptor
 //! are assumptions.
 
@@ -20,16 +20,14 @@ use crate::{Error, OriginalId};
 
 /// Sphere clouds.
 #[derive(Clone, Copy, Debug)]
-pub struct Sphere {
-    name: &'static str,
-    /// Share of the points that keep their bearing.
-    kept: f64,
-}
+pub struct Sphere;
 
+/// Share of the points that keep their bearing.
+const KEPT: f64 = 1.0 / 3.0;
 /// Variance of the noise of a decoy, per component of its unit direction.
 const VARIANCE: f64 = 0.1;
 
-/// A third of the bearings is real.
+/// Registry entry.
 pub const ENTRY: Entry = Entry {
     name: "sphere",
     facts: Facts {
@@ -39,38 +37,16 @@ pub const ENTRY: Entry = Entry {
         patents: "PCT application declared by its authors",
     },
     in_2d: None,
-    in_3d: Some(|_| Arc::new(Sphere { name: "sphere", kept: 1.0 / 3.0 })),
-};
-
-/// Half of the bearings are real.
-pub const HALF: Entry = Entry {
-    name: "sphere-half",
-    facts: Facts {
-        summary: "the bearing of a point from the center of the map; half are decoys",
-        ..ENTRY.facts
-    },
-    in_2d: None,
-    in_3d: Some(|_| Arc::new(Sphere { name: "sphere-half", kept: 0.5 })),
-};
-
-/// A quarter of the bearings is real.
-pub const QUARTER: Entry = Entry {
-    name: "sphere-quarter",
-    facts: Facts {
-        summary: "the bearing of a point from the center of the map; three quarters are decoys",
-        ..ENTRY.facts
-    },
-    in_2d: None,
-    in_3d: Some(|_| Arc::new(Sphere { name: "sphere-quarter", kept: 0.25 })),
+    in_3d: Some(|_| Arc::new(Sphere)),
 };
 
 impl Scheme<3> for Sphere {
     fn name(&self) -> &str {
-        self.name
+        ENTRY.name
     }
 
     fn parameters(&self) -> Vec<(&'static str, f64)> {
-        vec![("share of real bearings", self.kept)]
+        vec![("share of real bearings", KEPT)]
     }
 
     fn lift(
@@ -89,7 +65,7 @@ impl Scheme<3> for Sphere {
         let Obfuscation::Rays(rays) = &lifted.obfuscation else { return Ok(lifted) };
         let order = key.draws(Stage::Scheme, 0).permutation(n);
         let mut is_decoy = vec![true; n];
-        let n_kept = (self.kept * n as f64).round() as usize;
+        let n_kept = (KEPT * n as f64).round() as usize;
         order[..n_kept].iter().for_each(|&row| is_decoy[row as usize] = false);
         let noise = key.stage(Stage::Scheme);
         let moved = |(direction, &OriginalId(row)): (&[f32; 3], &OriginalId)| {
@@ -121,18 +97,12 @@ mod tests {
     fn the_share_of_real_bearings_is_that_of_the_scheme() {
         let points = PointSet::try_new(synthetic::room(1, 900).points, Unit::Meter).unwrap();
         let original = Original::new(points);
-        for (entry, kept) in [(&ENTRY, 1.0 / 3.0), (&HALF, 0.5), (&QUARTER, 0.25)] {
-            let scheme =
-                (entry.in_3d.unwrap())(&crate::obfuscate::SchemeOptions::usual(Unit::Meter));
-            let (released, secret) =
-                obfuscate(&*scheme, &original, None, &Key::from_seed(0)).unwrap();
-            assert_eq!(secret.n_slots(), original.len());
-            let most = farthest_for_rounding(&released, &original, &secret);
-            let away = away_from_own(&released, &original, &secret);
-            let real = away.iter().filter(|&&away| away <= most).count();
-            assert_eq!(real, (kept * original.len() as f64).round() as usize, "{}", entry.name);
-            let (other, _) = obfuscate(&*scheme, &original, None, &Key::from_seed(1)).unwrap();
-            assert_ne!(other.fingerprint(), released.fingerprint());
-        }
+        let (released, secret) = obfuscate(&Sphere, &original, None, &Key::from_seed(0)).unwrap();
+        assert_eq!(secret.n_slots(), original.len());
+        let most = farthest_for_rounding(&released, &original, &secret);
+        let away = away_from_own(&released, &original, &secret);
+        assert_eq!(away.iter().filter(|&&away| away <= most).count(), 300);
+        let (other, _) = obfuscate(&Sphere, &original, None, &Key::from_seed(1)).unwrap();
+        assert_ne!(other.fingerprint(), released.fingerprint());
     }
 }

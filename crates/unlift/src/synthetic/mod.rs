@@ -14,7 +14,6 @@ mod sampling;
 mod shapes;
 mod surfaces;
 mod texture;
-mod tiled;
 pub mod vectors;
 mod views;
 
@@ -23,7 +22,6 @@ use vectors::rotate;
 pub use sampling::{COINCIDENT_SHARE, OUTLIER_SHARE};
 pub use shapes::{Shape, keypoints, shape};
 pub use texture::{Material, Sheet};
-pub use tiled::tiled;
 pub use views::Camera;
 
 /// Number of points of the demo's room.

@@ -6,6 +6,7 @@ use unlift::recover::{Builtin, RecoverOptions, Recovered, Status};
 use unlift::released::{Lines, Obfuscation, Released};
 use unlift::seed::{Draws, Stage};
 
+use crate::degenerate::statuses;
 use crate::maps::*;
 
 const ALONE: [Builtin; 2] = [Builtin::Density, Builtin::Tomography];
@@ -44,30 +45,6 @@ fn percent_within(hidden: &Hidden<3>, recovered: &Recovered<3>, reach: f64) -> f
         within += if per == 2 { hits(&[0, 1]).max(hits(&[1, 0])) } else { hits(&[0]) };
     }
     100.0 * within as f64 / hidden.released.n_slots() as f64
-}
-
-fn threads_change_no_byte<const D: usize>(name: &str, scheme: &Entry) {
-    let released = hide::<D>(scheme, &room(5, 500), 5).released;
-    let run = || {
-        let mut bytes: Vec<u8> =
-            ALONE.iter().flat_map(|&solver| recovered_bytes(&alone(&released, solver))).collect();
-        if let Ok(lists) = geometric(&released, 10) {
-            bytes.extend(lists.records().iter().flat_map(|r| r.0.to_le_bytes()));
-            let scores = lists.scores().unwrap_or_default();
-            bytes.extend(scores.iter().flat_map(|x| x.to_bits().to_le_bytes()));
-        }
-        bytes
-    };
-    let on = |threads| {
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(run)
-    };
-    let one = on(1);
-    assert!(one == on(2) && one == on(8), "{name}: threads changed a byte");
-}
-
-#[test]
-fn density_determinism() {
-    over_schemes!(threads_change_no_byte);
 }
 
 /// Floors are shares within 25 cm, at most two points below the measured ones. No attack on
@@ -162,17 +139,8 @@ fn odd_maps_are_answered<const D: usize>(name: &str, scheme: &Entry) {
     let maps = [piles(3, 1, 40, 0.0), piles(3, 2, 40, 1e-7), uniform(3, 2), uniform(3, 9), far];
     for points in maps {
         let Ok(hidden) = try_hide::<D>(scheme, &points, 0.5, 1) else { continue };
-        for solver in ALONE {
-            let recovered = alone(&hidden.released, solver);
-            for slot in 0..recovered.n_slots() {
-                let ok = recovered.status()[slot] == Status::Ok;
-                let position = recovered.positions()[slot];
-                assert_eq!(ok, position.iter().all(|x| x.is_finite()), "{name}: {position:?}");
-                let evidence = recovered.evidence()[slot];
-                assert!(evidence >= 0.0 && evidence.is_finite(), "{name}: {evidence}");
-            }
-            assert!(recovered.delta().is_finite() && recovered.delta() > 0.0, "{name}");
-        }
+        let options = ALONE.map(|solver| (solver, RecoverOptions::default()));
+        statuses(name, &hidden.released, &empty_lists(&hidden.released), &options);
         if let Ok(lists) = geometric(&hidden.released, 5) {
             assert_eq!(lists.n_slots(), hidden.released.n_slots(), "{name}");
         }

@@ -1,5 +1,5 @@
-//! Property tests over all schemes (STYLE.md, rule 13): each runs on every entry of the registry,
-//! in every dimension of the scheme. New schemes are tested automatically.
+//! Tests of the library. Property tests over all schemes (STYLE.md, rule 13) run on every entry of the registry, in every dimension of
+//! the scheme, so that new schemes are tested automatically.
 
 /// Runs `law(name, scheme, arguments..)` on every scheme in every dimension.
 macro_rules! over_schemes {
@@ -15,10 +15,17 @@ macro_rules! over_schemes {
     };
 }
 
+mod again;
+mod architecture;
+mod audit;
+mod confidence;
 mod degenerate;
 mod density;
 mod exact;
+mod extremes;
 mod gauge;
+mod golden;
+mod images;
 mod leaks;
 mod maps;
 mod noise;
@@ -29,4 +36,5 @@ mod recovery;
 mod released_again;
 mod secrets;
 mod shares;
-mod start;
+mod small_maps;
+mod sources;

@@ -172,11 +172,8 @@ fn bounded_influence<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
         .collect();
     let without: Vec<Vec<u32>> =
         agreeing.iter().map(|row| row.iter().skip(1).copied().collect()).collect();
-    let options = RecoverOptions {
-        delta: Delta::Fixed(DELTA),
-        seed: 3,
-        ..RecoverOptions::default()
-    };
+    let options =
+        RecoverOptions { delta: Delta::Fixed(DELTA), seed: 3, ..RecoverOptions::default() };
     let options = (Builtin::Consensus, options);
     let lists = hidden.lists_of(&without);
     let alone = solve(&hidden.released, &lists, options);

@@ -1,4 +1,4 @@
-//! Constants of confidence, printed by `cargo run --release -p unlift --example fit_confidence`.
+//! Constants of confidence. They were fitted by the example fit_confidence of crate `unlift`, last in commit a3140846.
 
 // A fitted weight may resemble a mathematical constant.
 #![allow(clippy::approx_constant)]

@@ -23,26 +23,10 @@ const LEAST_RATIO: f32 = 1e-3;
 const RADII: usize = 1 << 14;
 
 /// Number of cues.
-pub const N_CUES: usize = 20;
+pub(super) const N_CUES: usize = 20;
 
 /// The cues of one slot, in the order in which the model was fitted.
-pub type Cues = [f32; N_CUES];
-
-/// The features of confidence of a recovered map.
-#[derive(Clone, Debug)]
-pub struct Seen {
-    /// Cues per slot.
-    pub cues: Vec<Cues>,
-    /// Typical radius of clusters, in the unit of the map; errors scale with it.
-    pub radius: f64,
-    /// Kind of records, below [`N_KINDS`](super::N_KINDS); each has its own model.
-    pub kind: usize,
-}
-
-impl Seen {
-    /// The value where features were not computed.
-    pub(crate) const NOTHING: Self = Self { cues: Vec::new(), radius: 1.0, kind: 0 };
-}
+pub(super) type Cues = [f32; N_CUES];
 
 pub(crate) struct Solved<'a, const D: usize> {
     pub(crate) estimates: &'a [Estimate<D>],

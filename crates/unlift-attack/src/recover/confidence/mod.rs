@@ -2,7 +2,7 @@
 //!
 //! After joint recovery and after ranking, `cues.rs` measures around every slot how much better than by chance estimates and records agree. A logistic
 //! model turns these cues into the probability that the right place was found and into a scale of its error. Its constants
-//! were fitted on synthetic rooms (`examples/fit_confidence.rs`), never on a real map.
+//! were fitted on synthetic rooms, never on a real map.
 
 mod constants;
 pub(super) mod cues;
@@ -14,7 +14,7 @@ use crate::geometry::flatness::flatness;
 use crate::geometry::vector::widen;
 use crate::neighbors::Neighborhoods;
 use crate::recover::confidence::constants::{JOINT, RANKING};
-use crate::recover::confidence::cues::{Cues, N_CUES, Seen, Solved};
+use crate::recover::confidence::cues::{Cues, N_CUES, Solved};
 use crate::recover::map::family::{Family, Settings};
 use crate::recover::map::graph::Graph;
 use crate::recover::map::pieces::{CandidatePieces, LinePieces, PlanePieces};
@@ -37,14 +37,14 @@ pub(super) fn not_asked<const D: usize>(
     }
 }
 
-/// Predicts the confidence of every slot after `solver`; also returns the cues.
+/// Predicts the confidence of every slot after `solver`.
 pub(super) fn predict<const D: usize>(
     solver: Builtin,
     family: &Family<'_, D>,
     graph: &Graph,
     released: &Released<D>,
     solved: &Solved<'_, D>,
-) -> (Vec<Confidence>, Seen) {
+) -> Vec<Confidence> {
     let (cues, radius) = match family {
         Family::Lines { rows, slots_per_record, chance } => {
             let pieces = LinePieces::new(rows, *slots_per_record, chance, solved.delta);
@@ -68,8 +68,7 @@ pub(super) fn predict<const D: usize>(
         Status::Ok => predict_slot(constants, kind, cues, radius),
         _ => Confidence::LOST,
     };
-    let sure = solved.estimates.par_iter().zip(&cues).map(of_slot).collect();
-    (sure, Seen { cues, radius: f64::from(radius), kind })
+    solved.estimates.par_iter().zip(&cues).map(of_slot).collect()
 }
 
 /// Predicts the confidence of one slot from its cues. Errors are in units of `radius`.
@@ -129,12 +128,12 @@ fn twins<const D: usize>(rays: &Rays<D>) -> f64 {
 }
 
 /// Kinds of records with separate models: lines, paired lines, rays, axis planes, axis candidates.
-pub const N_KINDS: usize = 5;
+const N_KINDS: usize = 5;
 
 const N_PRODUCTS: usize = 27;
 
 /// Number of terms: the constant, the cues and the products.
-pub const N_TERMS: usize = 1 + N_CUES + N_PRODUCTS;
+const N_TERMS: usize = 1 + N_CUES + N_PRODUCTS;
 
 /// Terms are clipped at this many standard deviations, because the fit saw no others.
 const FARTHEST: f32 = 4.0;
@@ -206,7 +205,7 @@ fn products(cues: &Cues) -> [f32; N_PRODUCTS] {
 }
 
 /// Returns the constant, the cues and their products, not yet centered.
-pub fn terms(cues: &Cues) -> [f32; N_TERMS] {
+fn terms(cues: &Cues) -> [f32; N_TERMS] {
     let mut terms = [1.0; N_TERMS];
     terms[1..=N_CUES].copy_from_slice(cues);
     terms[1 + N_CUES..].copy_from_slice(&products(cues));
@@ -214,7 +213,7 @@ pub fn terms(cues: &Cues) -> [f32; N_TERMS] {
 }
 
 /// Centers, scales and clips terms; the constant stays 1.
-pub fn centered(terms: [f32; N_TERMS], center: &[f32], spread: &[f32]) -> [f32; N_TERMS] {
+fn centered(terms: [f32; N_TERMS], center: &[f32], spread: &[f32]) -> [f32; N_TERMS] {
     let far = |at: usize| ((terms[at] - center[at]) / spread[at]).clamp(-FARTHEST, FARTHEST);
     std::array::from_fn(|at| if at == 0 { 1.0 } else { far(at) })
 }

@@ -13,8 +13,8 @@ use unlift::truth::{Original, Secret};
 use unlift::{About, ListsBy, PointSet, Unit};
 
 /// Returns a room and its median distance to the 50th neighbor.
-fn scene(seed: u64, n: usize, scale: f64) -> (Original<3>, f64) {
-    let points: Vec<[f64; 3]> = room(seed, n).points.iter().map(|p| p.map(|x| scale * x)).collect();
+fn scene(seed: u64, n: usize) -> (Original<3>, f64) {
+    let points = room(seed, n).points;
     let typical = median(&mut Knn::new(&points).unwrap().kth_distances(50));
     (Original::new(PointSet::try_new(points, Unit::Meter).unwrap()), typical)
 }
@@ -44,7 +44,7 @@ fn off_diagonal(reliability: &Reliability) -> f64 {
 }
 
 fn judge(solver: Builtin, schemes: &[&str], cases: &[(Noise, f64)]) -> Reliability {
-    let scene = scene(207, 6_000, 1.0);
+    let scene = scene(207, 6_000);
     let mut all: Option<Reliability> = None;
     for name in schemes {
         for &case in cases {
@@ -83,73 +83,8 @@ fn what_is_said_comes_true_as_often_as_said() {
 }
 
 #[test]
-fn the_unit_of_the_map_changes_nothing() {
-    let (small, large) = (scene(208, 5_200, 1.0), scene(208, 5_200, 7.3));
-    for name in ["olc", "cp"] {
-        let case = (Noise::Uniform, 0.3);
-        let (a, _) = recovered(&small, name, Builtin::Joint, case);
-        let (b, _) = recovered(&large, name, Builtin::Joint, case);
-        let off = (0..a.n_slots()).filter(|&slot| {
-            let p = a.probability_within(slot, small.1).unwrap();
-            let q = b.probability_within(slot, large.1).unwrap();
-            (p - q).abs() > 0.01
-        });
-        // Rounding moves a few slots to another place: 0.1 % with this key, up to 2 % with others.
-        let off = off.count();
-        assert!(off * 50 < a.n_slots(), "{name}: {off} of {}", a.n_slots());
-    }
-}
-
-#[test]
-fn threads_change_no_bit() {
-    let scene = scene(209, 5_200, 1.0);
-    let on = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let run = |case| pool.install(|| recovered(&scene, "ppl", Builtin::Joint, case).0);
-        [(Noise::Uniform, 0.3), (Noise::Clustered, 0.3)].map(|case| {
-            let found = run(case);
-            let bits = found.confidence().unwrap().iter();
-            bits.map(|c| (c.found.to_bits(), c.scale.to_bits())).collect::<Vec<_>>()
-        })
-    };
-    assert_eq!(on(1), on(3));
-}
-
-#[test]
-fn lost_points_are_given_no_chance() {
-    let lost = unlift::recover::Confidence::LOST;
-    assert_eq!(lost.probability_within(1e9), 0.0);
-    let half = unlift::recover::Confidence { found: 0.8, scale: 0.1 };
-    assert!((half.probability_within(0.1) - 0.4).abs() < 1e-6);
-    assert!(half.probability_within(0.2) > half.probability_within(0.1));
-}
-
-#[test]
-fn crowds_that_do_not_list_back_are_not_believed() {
-    let sure_percent = |case| judge(Builtin::Joint, &["plane"], &[case]).sure_percent();
-    let of_good = sure_percent((Noise::Uniform, 0.3));
-    let of_shared = sure_percent((Noise::Clustered, 0.2));
-    assert!(of_good > 67.0, "sure of {of_good} % where lists are good");
-    // Measured: 0.
-    assert!(of_shared < 2.0, "sure of {of_shared} % where wrong entries share a place");
-}
-
-#[test]
-fn crowds_that_do_not_list_back_are_not_followed() {
-    let scene = scene(207, 6_000, 1.0);
-    // Two points below the measured share, and above that of an attack that followed the shared
-    // places (89, 75, 72).
-    for (name, least) in [("olc", 90.9), ("ppl", 84.3), ("ray", 79.7)] {
-        let (recovered, secret) = recovered(&scene, name, Builtin::Joint, (Noise::Clustered, 0.15));
-        let accuracy = evaluate(&recovered, &scene.0, &secret).unwrap();
-        let percent = accuracy.percent_within(scene.1);
-        assert!(percent > least, "{name}: {percent} %");
-    }
-}
-
-#[test]
 fn nothing_is_said_where_nothing_was_fitted() {
-    let small = scene(210, 2_000, 1.0);
+    let small = scene(210, 2_000);
     for (solver, why) in [
         (Builtin::Joint, Unknown::SmallMap),
         (Builtin::Ranking, Unknown::SmallMap),
@@ -167,7 +102,7 @@ fn nothing_is_said_where_nothing_was_fitted() {
 /// were reported as sure, of which 59 % were correct.
 #[test]
 fn lists_that_do_not_come_from_the_oracle_say_nothing_about_certainty() {
-    let (original, typical) = scene(3, 3_000, 1.0);
+    let (original, typical) = scene(3, 3_000);
     let knn = oracle::search(&original).unwrap();
     let scheme = scheme("olc").unwrap().of_dimension(&SchemeOptions { voxel: typical }).unwrap();
     let (released, secret) = obfuscate(&*scheme, &original, None, &Key::from_seed(7)).unwrap();

@@ -100,26 +100,6 @@ fn the_best_attack_on_the_records_alone_is_the_second_baseline() {
 }
 
 #[test]
-fn the_second_baseline_is_averaged_over_seeds() {
-    let (room, mut plan) = (room(600), plan(&["olc"]));
-    let of = |plan: &Plan<3>| audit(&room, plan).rows[0].records_alone.clone();
-    let first = of(&plan);
-    plan.seed = 1;
-    let second = of(&plan);
-    (plan.seed, plan.repeats) = (0, 2);
-    // The attacker's seed increases with the repeat. Of the attacks on records alone, only the
-    // choice of delta uses it.
-    let mean = of(&plan);
-    let tomography = |all: &[unlift::audit::Alone]| {
-        all.iter().find(|alone| alone.name == "tomography").unwrap().percent.clone()
-    };
-    for (at, percent) in tomography(&mean).iter().enumerate() {
-        let expected = (tomography(&first)[at] + tomography(&second)[at]) / 2.0;
-        assert!((percent - expected).abs() < 1e-9);
-    }
-}
-
-#[test]
 fn break_even_takes_the_strongest_attack_at_every_ratio() {
     let (room, mut plan) = (room(600), plan(&["olc", "cp"]));
     (plan.records_alone, plan.inlier_ratios) = (false, vec![0.5, 0.1]);

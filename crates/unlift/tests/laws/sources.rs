@@ -135,36 +135,6 @@ fn of_name(name: &str) -> Arc<dyn Source<3>> {
 }
 
 #[test]
-fn lists_have_k_other_records_each_once_also_for_paired_lines() {
-    for slots_per_record in [1, 2] {
-        let map = released(&random_map(200), slots_per_record);
-        for source in sources() {
-            // `try_new` rejects the own record and repeats.
-            let lists = source.lists(&map, 6, 0).unwrap();
-            assert_eq!(lists.n_slots(), 200);
-            for slot in 0..200 {
-                assert_eq!(lists.of(slot).len(), 6, "{} {slot}", source.name());
-            }
-            assert!(lists.scores().is_some(), "{}", source.name());
-        }
-    }
-}
-
-#[test]
-fn the_same_bytes_for_any_number_of_threads() {
-    let map = released(&random_map(420), 2);
-    for source in sources() {
-        let on = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| source.lists(&map, 6, 0).unwrap())
-        };
-        let one = on(1);
-        assert_eq!(one, on(2), "{}", source.name());
-        assert_eq!(one, on(8), "{}", source.name());
-    }
-}
-
-#[test]
 fn permuting_records_permutes_lists() {
     let rows = random_map(260);
     let mut order: Vec<u32> = (0..260).collect();

@@ -65,20 +65,6 @@ fn the_default_plan_takes_all_2d_schemes() {
     assert_eq!(Plan::<3>::new(Unit::Meter).schemes.len(), 7);
 }
 
-#[test]
-fn keypoints_come_back() {
-    let outcome = run(&[image_of("a", keypoints(1, 900, 20))], &plan());
-    let row = |name: &str| outcome.rows.iter().find(|row| row.scheme == name).unwrap();
-    for name in ["lines2d", "cp2d"] {
-        let row = row(name);
-        assert!(row.recovered_percent[3] > 85.0, "{name}: {:?}", row.recovered_percent);
-        assert!(row.blind_percent[3] < 30.0, "{name}: {:?}", row.blind_percent);
-        assert!(row.reliability.is_none());
-    }
-    assert!(row("cp2d").exact_percent.unwrap() > 20.0);
-    assert!(row("lines2d").exact_percent.is_none());
-}
-
 /// The pooled row of one image equals its own row. That of two images lies between theirs.
 #[test]
 fn rows_are_pooled_over_keypoints() {

@@ -1,0 +1,98 @@
+//! Audits of maps at the limits of geometry and of numbers: counted losses or a reason, never a
+//! NaN, never "sure" of wrong positions.
+
+use std::sync::Arc;
+
+use unlift::audit::{Outcome, Plan, Silent, run};
+use unlift::recover::Builtin;
+use unlift::seed::{Draws, Stage};
+use unlift::truth::Original;
+use unlift::{PointSet, Unit, synthetic};
+
+/// Audits all schemes with `joint` and `consensus`.
+fn audit(points: Vec<[f64; 3]>, k: usize) -> Outcome {
+    let original = Original::new(PointSet::try_new(points, Unit::Meter).unwrap());
+    let mut plan = Plan::new(Unit::Meter);
+    plan.inlier_ratios = vec![1.0, 0.3];
+    plan.solvers = vec![Arc::new(Builtin::Joint), Arc::new(Builtin::Consensus)];
+    plan.records_alone = false;
+    plan.k = k;
+    run(&original, None, &plan, &mut Silent).unwrap()
+}
+
+/// Checks conditions that hold for any map.
+fn check(what: &str, outcome: Outcome) {
+    let schemes = outcome.rows.iter().map(|row| row.scheme.as_str());
+    let refused = outcome.not_audited.iter().map(|not| not.scheme.as_str());
+    let mut audited: Vec<&str> = schemes.chain(refused).collect();
+    audited.sort_unstable();
+    audited.dedup();
+    assert_eq!(
+        audited.len(),
+        Plan::<3>::new(Unit::Meter).schemes.len(),
+        "{what}: a scheme is missing"
+    );
+    for row in &outcome.rows {
+        let cell = format!("{what}: {} {} at {}", row.scheme, row.solver, row.inlier_ratio);
+        assert!(row.delta.is_finite() && row.delta > 0.0, "{cell}: delta {}", row.delta);
+        let shares = row.recovered_percent.iter().chain(&row.blind_percent);
+        let mut shares = shares.chain(&row.axis_accuracy_percent).chain(&row.exact_percent);
+        assert!(shares.all(|share| (0.0..=100.0).contains(share)), "{cell}: {row:?}");
+        let mut errors = row.error_percentiles.iter().flatten().chain(&row.blind_median_error);
+        assert!(errors.all(|error| error.is_finite() && *error >= 0.0), "{cell}: {row:?}");
+        assert!(row.lost.values().sum::<usize>() <= row.n_points * 2, "{cell}: {row:?}");
+        let Some(reliability) = &row.reliability else { continue };
+        let sure = reliability.sure;
+        assert!(sure.expected.is_finite(), "{cell}: {sure:?}");
+        if sure.n * 100 >= reliability.n_points && sure.n >= 20 {
+            let right = 100.0 * sure.within as f64 / sure.n as f64;
+            assert!(right >= 85.0, "{cell}: sure of {}, of which {right:.0} % are right", sure.n);
+        }
+    }
+}
+
+fn room(n: usize) -> Vec<[f64; 3]> {
+    synthetic::room(5, n).points
+}
+
+fn moved(points: Vec<[f64; 3]>, by: f64) -> Vec<[f64; 3]> {
+    points.into_iter().map(|p| p.map(|x| x + by)).collect()
+}
+
+fn draws() -> Draws {
+    Draws::new(11, Stage::Synthetic, 77)
+}
+
+#[test]
+fn points_that_fall_together_are_not_counted_as_sure() {
+    let mut draws = draws();
+    let mut points = room(600);
+    while points.len() < 6_000 {
+        points.push(points[draws.below(600) as usize]);
+    }
+    check("90 % duplicates", audit(points, 20));
+    check("all equal", audit(vec![[1.0, 2.0, 3.0]; 300], 20));
+}
+
+#[test]
+fn flat_and_thin_maps_are_audited_or_refused_with_a_reason() {
+    let mut draws = draws();
+    let mut unit = || draws.between(0.0, 5.0);
+    check("on a line", audit((0..2_000).map(|_| [unit(), 0.0, 0.0]).collect(), 20));
+    check("on a plane", audit((0..2_000).map(|_| [unit(), unit(), 0.0]).collect(), 20));
+    check("on a slanted line", audit((0..2_000).map(|_| [unit(); 3]).collect(), 20));
+}
+
+#[test]
+fn two_far_clusters_do_not_make_anybody_sure() {
+    let mut points = room(3_000);
+    points.extend(moved(room(3_000), 1e5));
+    check("two far clusters", audit(points, 20));
+}
+
+#[test]
+fn tiny_maps_and_lists_as_long_as_the_map_are_audited() {
+    for n in [2, 3, 5, 40] {
+        check(&format!("{n} points"), audit(room(n), n - 1));
+    }
+}
