@@ -10,7 +10,6 @@ use unlift::neighbors::oracle::{self, TrueNeighbors};
 use unlift::neighbors::{Overlap, Similarity, Source};
 use unlift::obfuscate::obfuscate;
 use unlift::obfuscate::olc::Olc;
-use unlift::obfuscate::olc::Olc;
 use unlift::obfuscate::ppl::Ppl;
 use unlift::released::Released;
 use unlift::seed::Key;
