@@ -7,9 +7,8 @@ mod audit_map;
 mod audit_released;
 mod audit_sequence;
 mod check;
-mod common;
+pub mod common;
 mod compare;
-mod demo;
 mod evaluate;
 mod export;
 mod features;
@@ -18,7 +17,7 @@ mod image_stages;
 mod invert;
 mod neighbors;
 mod obfuscate;
-mod painter;
+pub mod painter;
 mod paper;
 mod plan;
 mod protection;
@@ -28,6 +27,7 @@ mod table;
 use common::with_threads;
 
 use crate::args::{AuditCommand, Command, NeighborsCommand};
+use crate::demo;
 use crate::exit::Outcome;
 
 /// Runs one command.

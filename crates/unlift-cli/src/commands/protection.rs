@@ -12,10 +12,8 @@ use unlift_vision::features::Extraction;
 use unlift_vision::network::DescriptorKind;
 
 use crate::args::ProtectArgs;
+use crate::demo;
 use crate::values::distinct;
-
-/// Features of a photo of the demo: more than the default, because there are two photos only.
-const MIN_SCORE: f32 = 0.02;
 
 /// Returns the protections of the command line. `kind` is that of the descriptors that they protect.
 pub fn protections(
@@ -31,8 +29,8 @@ pub fn protections(
         Some(path) => public(path, kind, None)?,
         None => {
             let folder = tempdir()?;
-            unlift_demo::write_photos(folder.path())?;
-            public(folder.path(), kind, Some(MIN_SCORE))?
+            demo::write_photos(folder.path())?;
+            public(folder.path(), kind, Some(demo::MIN_SCORE))?
         }
     };
     let with = |one: Protection| match one.needs_public() {

@@ -14,18 +14,13 @@ mod sampling;
 mod shapes;
 mod surfaces;
 mod texture;
-pub mod vectors;
+mod vectors;
 mod views;
 
 use vectors::rotate;
 
-pub use sampling::{COINCIDENT_SHARE, OUTLIER_SHARE};
 pub use shapes::{Shape, keypoints, shape};
-pub use texture::{Material, Sheet};
 pub use views::Camera;
-
-/// Number of points of the demo's room.
-pub const DEFAULT_N_POINTS: usize = 20_000;
 
 /// Tangent of half the angle (17.06 degrees) between walls and axes. Real maps are not aligned with
 /// their walls, and axis-wise schemes must not benefit from alignment.
@@ -38,8 +33,6 @@ pub struct Room {
     pub points: Vec<[f64; 3]>,
     /// Cameras of the photos, in the order of the walk.
     pub cameras: Vec<Camera>,
-    /// Visible surfaces.
-    pub sheets: Vec<Sheet>,
 }
 
 /// Creates the room of `seed` with `n_points` points. Size (about 5 x 4 x 2.6 m), arrangement,
@@ -65,8 +58,7 @@ pub fn room(seed: u64, n_points: usize) -> Room {
         camera.center = in_frame(camera.center);
         camera.look = rotate(yaw, camera.look);
     }
-    let sheets = scene.surfaces.iter().map(|surface| surface.in_frame(middle, yaw)).collect();
-    Room { points, cameras, sheets }
+    Room { points, cameras }
 }
 
 #[cfg(test)]
@@ -75,7 +67,7 @@ mod tests {
 
     #[test]
     fn bits_are_pinned() {
-        // A change here changes every published figure of the demo.
+        // A change here changes every published figure of this room.
         let sum = room(0, 300)
             .points
             .iter()

@@ -57,11 +57,8 @@ fn storage_wall(scene: &mut Scene, wall: &Place, length: f64, draws: &mut Draws)
     let widths = [draws.between(1.5, 1.9), draws.between(0.85, 1.1), draws.between(0.4, 0.5)];
     let starts = side_by_side(widths, 0.08, length - 0.08, draws);
     let at = |i: usize| straight(wall, starts[i]);
-    scene.begin_piece();
     piece::bookshelf(scene, &at(0), widths[0], draws);
-    scene.begin_piece();
     piece::tall_cabinet(scene, &at(1), widths[1], draws);
-    scene.begin_piece();
     piece::plant(scene, &wall.then([starts[2] + 0.5 * widths[2], 0.3, 0.0], [1.0, 0.0]), draws);
 }
 
@@ -70,13 +67,9 @@ fn door_wall(scene: &mut Scene, wall: &Place, length: f64, draws: &mut Draws) {
     let widths = [draws.between(1.4, 1.8), 0.95, 0.45];
     let starts = side_by_side(widths, 0.08, length - 0.08, draws);
     let at = |i: usize| straight(wall, starts[i]);
-    scene.begin_piece();
     piece::sideboard(scene, &at(0), widths[0], draws);
-    scene.begin_piece();
     piece::pictures(scene, &at(0), widths[0], 1.35, draws);
-    scene.begin_piece();
     piece::door(scene, &at(1), widths[1]);
-    scene.begin_piece();
     piece::floor_lamp(scene, &wall.then([starts[2] + 0.22, 0.28, 0.0], [1.0, 0.0]), draws);
 }
 
@@ -85,9 +78,7 @@ fn desk_wall(scene: &mut Scene, wall: &Place, length: f64, draws: &mut Draws) {
     let width = draws.between(1.2, 1.6);
     let start = draws.between(CORNER, length - CORNER - width);
     let place = straight(wall, start);
-    scene.begin_piece();
     piece::window(scene, wall, 0.5 * length, draws);
-    scene.begin_piece();
     piece::desk(scene, &place, width, draws);
     let chair = [0.5 * width, 0.95, 0.0];
     // Turns the chair by 180 degrees (half angle 90 degrees), so that it faces the desk.
@@ -98,9 +89,7 @@ fn sofa_wall(scene: &mut Scene, wall: &Place, length: f64, draws: &mut Draws) {
     let width = draws.between(1.7, 2.0);
     let start = draws.between(CORNER, length - CORNER - width);
     let place = straight(wall, start);
-    scene.begin_piece();
     piece::sofa(scene, &place, width, draws);
-    scene.begin_piece();
     piece::pictures(scene, &place, width, 1.3, draws);
 }
 
@@ -115,9 +104,7 @@ fn dining(scene: &mut Scene, size: [f64; 3], draws: &mut Draws) {
         turn: turn(draws.between(-0.06, 0.06)),
     };
     let (length, depth) = (draws.between(1.25, 1.6), draws.between(0.75, 0.9));
-    scene.begin_piece();
     piece::rug(scene, &middle, draws);
-    scene.begin_piece();
     piece::table(scene, &middle, length, depth, draws);
     for (x, side) in [(-0.25, -1.0), (0.25, -1.0), (-0.25, 1.0), (0.25, 1.0)] {
         // Chairs differ in distance and are not quite straight.
@@ -127,7 +114,6 @@ fn dining(scene: &mut Scene, size: [f64; 3], draws: &mut Draws) {
         let place = middle.then([x * length + draws.between(-0.05, 0.05), y, 0.0], towards);
         piece::chair(scene, &place, draws);
     }
-    scene.begin_piece();
     piece::pendant(scene, &middle, size[2]);
 }
 

@@ -7,10 +7,10 @@ use super::views::{Camera, MANY_VIEWS, Track, track};
 use crate::seed::Draws;
 
 /// Share of points that are exact copies of another point.
-pub const COINCIDENT_SHARE: f64 = 0.03;
+pub(super) const COINCIDENT_SHARE: f64 = 0.03;
 
 /// Share of points that lie far from any surface.
-pub const OUTLIER_SHARE: f64 = 0.015;
+const OUTLIER_SHARE: f64 = 0.015;
 
 /// Minimum number of photos that see a point.
 const MIN_VIEWS: usize = 2;

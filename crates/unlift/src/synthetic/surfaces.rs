@@ -77,18 +77,11 @@ pub(super) struct Scene {
     pub(super) size: [f64; 3],
     pub(super) surfaces: Vec<Surface>,
     blockers: Vec<Blocker>,
-    n_pieces: u32,
-    n_parts: u32,
 }
 
 impl Scene {
     pub(super) fn new(size: [f64; 3]) -> Self {
-        Self { size, surfaces: Vec::new(), blockers: Vec::new(), n_pieces: 0, n_parts: 0 }
-    }
-
-    /// Starts a piece: surfaces added from here on have one piece number.
-    pub(super) fn begin_piece(&mut self) {
-        self.n_pieces += 1;
+        Self { size, surfaces: Vec::new(), blockers: Vec::new() }
     }
 
     /// Returns true if a box occludes `point` from `camera`.
@@ -120,11 +113,10 @@ impl Scene {
         outline: Outline,
         texture: Texture,
     ) {
-        self.n_parts += 1;
         self.face(place, [corner, u, v], outline, texture);
     }
 
-    /// Adds a surface of the current part.
+    /// Adds a surface with a corner and two sides.
     fn face(
         &mut self,
         place: &Place,
@@ -138,8 +130,6 @@ impl Scene {
             v: place.direction(v),
             outline,
             texture,
-            piece: self.n_pieces,
-            part: self.n_parts,
         });
     }
 
@@ -168,7 +158,6 @@ impl Scene {
         let [w, d, h] = sub(high, low);
         let (x, y, z) = ([w, 0.0, 0.0], [0.0, d, 0.0], [0.0, 0.0, h]);
         let (right, front, top) = (add(low, x), add(low, y), add(low, z));
-        self.n_parts += 1;
         let mut add = |sides| self.face(place, sides, Outline::Full, texture);
         add([front, z, x]);
         add([top, x, y]);
@@ -202,7 +191,6 @@ impl Scene {
         }
         // Edges between the twelve sides are not visible edges of the object.
         let side = Texture { outline: texture.outline / 8.0, ..texture };
-        self.n_parts += 1;
         for pair in on_circle.windows(2) {
             let foot = |p: [f64; 2]| add(middle, [radius * p[0], radius * p[1], 0.0]);
             let lean = [

@@ -15,7 +15,6 @@ const CRATES: &[(&str, &[&str])] = &[
     ("unlift-vision", &["unlift"]),
     ("unlift-report", &[]),
     ("unlift-testkit", &["unlift"]),
-    ("unlift-demo", &["unlift", "unlift-vision"]),
     ("unlift-audit", &["unlift", "unlift-io", "unlift-vision", "unlift-report"]),
     (
         "unlift-cli",

@@ -3,14 +3,15 @@
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
+use std::{fs, io};
 
 use serde_json::{Map, json};
 use tempfile::tempdir;
 use unlift::audit::{Measure, NeighborsBy, Plan};
-use unlift::neighbors::Overlap;
+use unlift::neighbors::Geometric;
 use unlift::recover::Builtin;
 use unlift::truth::Original;
-use unlift::{PointSet, Unit};
+use unlift::{PointSet, Unit, synthetic};
 use unlift_audit::images::FeatureSource;
 use unlift_audit::images::audit::{ImagesJob, find as find_images};
 use unlift_audit::images::choice::headline;
@@ -24,27 +25,41 @@ use unlift_report::document::Input;
 use unlift_vision::features::{AlikedOptions, Extraction};
 use unlift_vision::network::{DescriptorKind, Learned};
 
-use super::common::with_threads;
-use super::painter::painter;
 use crate::args::DemoArgs;
+use crate::commands::common::with_threads;
+use crate::commands::painter::painter;
 use crate::exit::Outcome;
 use crate::output::{command_line, print, table};
 use crate::progress::Progress;
 
+/// Seed of the synthetic room.
 const SEED: u64 = 0;
+/// Number of points of its map.
+const N_POINTS: usize = 5_000;
 /// Inlier ratios of the oracle for the map.
 const RATIOS: [f64; 2] = [0.5, 0.1];
-/// Minimum score of keypoints of the photos. It is low, because each scene has only one photo.
-const MIN_SCORE: f32 = 0.02;
+/// Minimum score of keypoints of the photos. It is low, because there are only two photos.
+pub const MIN_SCORE: f32 = 0.02;
 /// Page and JSON file of the photos; the map has the audit's usual names.
-const PHOTOS: [&str; 2] = ["photos.html", "photos.json"];
+const OF_PHOTOS: [&str; 2] = ["photos.html", "photos.json"];
+
+/// File names and bytes of the two photos: JPEG, CC0. photos/README.md lists the authors.
+static PHOTOS: [(&str, &[u8]); 2] = [
+    ("cat.jpg", include_bytes!("photos/cat.jpg")),
+    ("coffee.jpg", include_bytes!("photos/coffee.jpg")),
+];
+
+/// Writes the two photos into a folder.
+pub fn write_photos(folder: &Path) -> io::Result<()> {
+    PHOTOS.iter().try_for_each(|(name, bytes)| fs::write(folder.join(name), bytes))
+}
 
 pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
     let files = [
         (PAGE, Kind::Page),
         (FIGURES, Kind::AuditJson),
-        (PHOTOS[0], Kind::Page),
-        (PHOTOS[1], Kind::AuditJson),
+        (OF_PHOTOS[0], Kind::Page),
+        (OF_PHOTOS[1], Kind::AuditJson),
     ];
     let rules = Rules::new([], args.force);
     let mut out = OutputSet::create(&args.out, rules, Access::Private, &files).map_err(refused)?;
@@ -52,14 +67,11 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
         let bar = Progress::new(args.quiet);
         bar.show(0, PARTS, "");
         let photos = photos(&Part::new(&bar, "attacking two protected photos", 40.0), &args.out)?;
-        let mapping = Part::new(&bar, "mapping a made-up room", 30.0);
-        let room = unlift_demo::room(SEED)?;
-        mapping.finish();
-        let map = map(&Part::new(&bar, "attacking the protected map", 30.0), &args.out, &room)?;
-        photos.stage(&mut out, PHOTOS, false)?;
+        let map = map(&Part::new(&bar, "attacking a protected map", 60.0), &args.out)?;
+        photos.stage(&mut out, OF_PHOTOS, false)?;
         let (of_photos, of_map) = (photos.shares(), map.shares());
         let title = "Two photos: a cat and a cup of coffee";
-        let map = map.opening_with(&photos, title, PHOTOS[0]);
+        let map = map.opening_with(&photos, title, OF_PHOTOS[0]);
         let finished = map.write(out, &args.out, false)?;
         Ok(said(of_photos, of_map, &finished.report))
     })?;
@@ -70,7 +82,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
 fn photos(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
     let started = Instant::now();
     let folder = tempdir()?;
-    unlift_demo::write_photos(folder.path())?;
+    write_photos(folder.path())?;
     let options = AlikedOptions { min_score: MIN_SCORE, ..AlikedOptions::default() };
     let source = FeatureSource::open(folder.path(), &Extraction::Aliked(options))?;
     let painter = painter(DescriptorKind::Aliked, None)?;
@@ -112,18 +124,18 @@ fn photos(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
     Ok(found)
 }
 
-fn map(progress: &Part<'_>, out: &Path, room: &unlift_demo::Mapped) -> anyhow::Result<Audited> {
+fn map(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
     let started = Instant::now();
+    let room = synthetic::room(SEED, N_POINTS);
     let sha256 = hash_positions(&room.points);
-    let original = Original::new(PointSet::try_new(room.points.clone(), Unit::Meter)?);
+    let original = Original::new(PointSet::try_new(room.points, Unit::Meter)?);
     let mut options = Map::new();
     options.insert("room".into(), json!({ "seed": SEED }));
     let job = Job {
-        descriptors: Some(&room.descriptors),
-        cameras: room.cameras.clone(),
+        cameras: room.cameras.iter().map(|camera| camera.center).collect(),
         up: Some([0.0, 0.0, 1.0]),
         plan: Plan {
-            neighbors: vec![NeighborsBy::Oracle, NeighborsBy::Source(Arc::new(Overlap))],
+            neighbors: vec![NeighborsBy::Oracle, NeighborsBy::Source(Arc::new(Geometric))],
             inlier_ratios: RATIOS.to_vec(),
             ..Plan::new(Unit::Meter).for_map(original.len(), 50)
         },
@@ -193,10 +205,6 @@ impl<'a> Part<'a> {
         items.0 = items.0.min(items.1 as f64);
         let share = (items.0 / items.1 as f64 - before).max(0.0);
         unlift_audit::Progress::add(self.bar, share * self.weight, self.words);
-    }
-
-    fn finish(&self) {
-        self.step(|items| items.0 = items.1 as f64);
     }
 }
 
