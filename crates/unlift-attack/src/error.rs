@@ -1,8 +1,7 @@
-//! The error of the library: an argument with a wrong value.
+//! The error of the library, an argument with a wrong value, and text of unknown origin as one harmless line.
 
 use std::fmt;
-
-use crate::line::OneLine;
+use std::fmt::{Display, Write};
 
 /// The kind of an [`Error`], for callers that handle some kinds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,3 +81,58 @@ impl fmt::Display for Error {
 }
 
 impl std::error::Error for Error {}
+
+/// Displays text as one line, with everything escaped that a terminal would obey.
+///
+/// Names of files and images may contain a newline that fakes a second line, a sequence that sets the window title or clears the
+/// screen, or a mark that changes the direction of text. Escaped text stays as it is.
+///
+/// ```
+/// # use unlift_attack::OneLine;
+/// assert_eq!(OneLine("a\u{1b}[2J\u{202e}gpj.ü\n").to_string(), r"a\u{1b}[2J\u{202e}gpj.ü\n");
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct OneLine<T>(pub T);
+
+/// Whether a terminal or a reader of lines interprets `c`: C0, C1 and DEL, marks of direction, separators of lines.
+#[must_use]
+pub fn is_obeyed(c: char) -> bool {
+    let directs = matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2066}'..='\u{2069}');
+    // The separators of lines and paragraphs and five marks of direction.
+    c.is_control() || directs || matches!(c, '\u{2028}'..='\u{202e}')
+}
+
+impl<T: Display> Display for OneLine<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(Escaped(f), "{}", self.0)
+    }
+}
+
+struct Escaped<'a, 'b>(&'a mut fmt::Formatter<'b>);
+
+impl Write for Escaped<'_, '_> {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        text.chars().try_for_each(|c| match is_obeyed(c) {
+            true => write!(self.0, "{}", c.escape_default()),
+            false => self.0.write_char(c),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_terminal_obeys_is_escaped_and_nothing_else() {
+        let obeyed = "\0\t\n\r\x1b\x7f\u{80}\u{85}\u{9b}\u{61c}\u{200e}\u{200f}\u{2028}\u{2029}\
+                      \u{202a}\u{202e}\u{2066}\u{2069}";
+        for c in obeyed.chars() {
+            let line = OneLine(format!("a{c}b")).to_string();
+            assert!(line.starts_with("a\\") && !line.contains(c), "{line}");
+            assert_eq!(OneLine(&line).to_string(), line);
+        }
+        let kept = "b/ü d.webp 'x' \"y\" \\ 画像 \u{2027}\u{202f}\u{2065}\u{206a}";
+        assert_eq!(OneLine(kept).to_string(), kept);
+    }
+}

@@ -1,13 +1,13 @@
 //! Comparison of descriptors block by block: memory grows with the number of rows, not of pairs.
 
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 use std::sync::Mutex;
 
 use rayon::prelude::*;
 
-use super::best::{Best, Found};
+use super::alike;
 use super::rows::Rows;
-use super::tiles::{Pairs, Tile};
-use super::{alike, tiles};
 use crate::simd::BLOCK;
 use crate::{Descriptors, Error};
 
@@ -70,7 +70,7 @@ pub fn search<L: Likeness>(
     let all = Pairs::all(n_blocks.div_ceil(BLOCK));
     let alike = compare(likeness, &of_blocks, PARTNERS, (&all, None));
     let every = rows.len().div_ceil(USUAL);
-    Ok(compare(likeness, rows, most, (&tiles::chosen(&alike), Some(every))))
+    Ok(compare(likeness, rows, most, (&chosen(&alike), Some(every))))
 }
 
 /// Compares rows according to `pairs`; each row keeps its `most` best partners of other records. Mean and deviation come from all
@@ -253,5 +253,236 @@ impl<'a> Met<'a> {
     }
 }
 
+/// The result of comparing a row with others.
+#[derive(Clone, Debug, Default)]
+pub struct Found {
+    /// The best rows of other records, best first; equal scores in row order.
+    pub best: Vec<(f32, u32)>,
+    /// Mean of the scores with rows of other records; 0 unless they were counted.
+    pub mean: f64,
+    /// Standard deviation of these scores; 0 unless they were counted.
+    pub deviation: f64,
+}
+
+/// Keeps the entries with the highest scores, and among equal scores those with the lowest ids. The result depends on the set
+/// of entries alone.
+#[derive(Clone, Debug)]
+pub struct Best {
+    most: usize,
+    floor: f32,
+    entries: Vec<(f32, u32)>,
+}
+
+impl Best {
+    /// Keeps at most `most` entries.
+    pub fn new(most: usize) -> Self {
+        Self { most, floor: f32::NEG_INFINITY, entries: Vec::new() }
+    }
+
+    /// Entries with a lower score can no longer be kept.
+    #[inline(always)]
+    pub fn floor(&self) -> f32 {
+        self.floor
+    }
+
+    /// Adds an entry; each id at most once.
+    #[inline]
+    pub fn push(&mut self, score: f32, id: u32) {
+        self.entries.push((score, id));
+        if self.entries.len() >= 2 * self.most.max(8) {
+            self.shrink();
+        }
+    }
+
+    fn shrink(&mut self) {
+        if self.most == 0 {
+            self.entries.clear();
+            self.floor = f32::INFINITY;
+        } else if self.entries.len() > self.most {
+            self.entries.select_nth_unstable_by(self.most - 1, higher_first);
+            self.entries.truncate(self.most);
+            self.floor = self.entries[self.most - 1].0;
+        }
+    }
+
+    /// Returns the kept entries, highest score first, equal scores by id.
+    pub fn into_sorted(mut self) -> Vec<(f32, u32)> {
+        self.shrink();
+        self.entries.sort_unstable_by(higher_first);
+        self.entries
+    }
+}
+
+/// Order of results: by score, high to low, then by id.
+pub fn higher_first(a: &(f32, u32), b: &(f32, u32)) -> std::cmp::Ordering {
+    b.0.total_cmp(&a.0).then(a.1.cmp(&b.1))
+}
+
+/// Blocks in memory at a time if only some pairs are compared.
+const HELD: usize = 256;
+
+/// Pairs of blocks, grouped in tiles.
+pub struct Pairs {
+    tiles: Vec<Tile>,
+}
+
+/// Pairs with a range of blocks, which stay in memory meanwhile.
+pub struct Tile {
+    /// The blocks in memory.
+    pub held: Range<usize>,
+    /// The blocks that are compared with them.
+    pub meetings: Vec<Meetings>,
+}
+
+/// One block and the held blocks that it is compared with.
+pub struct Meetings {
+    /// Index of the block.
+    pub block: u32,
+    /// Held blocks.
+    pub with: Vec<u32>,
+}
+
+impl Pairs {
+    /// Returns all pairs of `n` blocks.
+    pub fn all(n: usize) -> Self {
+        // Each list starts with the block itself and descends, so that parallel threads work on different blocks.
+        let with = |block: u32| (0..=block).rev().collect();
+        let meetings = (0..n as u32).rev().map(|block| Meetings { block, with: with(block) });
+        Self { tiles: vec![Tile { held: 0..n, meetings: meetings.collect() }] }
+    }
+
+    /// The tiles, in order.
+    pub fn tiles(&self) -> &[Tile] {
+        &self.tiles
+    }
+}
+
+/// Returns the pairs of every block with itself and with the most similar blocks.
+pub fn chosen(alike: &[Found]) -> Pairs {
+    let n = alike.len();
+    // Each pair is stored under its lower index.
+    let mut pairs: Vec<BTreeSet<u32>> =
+        (0..n as u32).map(|block| BTreeSet::from([block])).collect();
+    for (block, found) in alike.iter().enumerate() {
+        for &(_, other) in &found.best {
+            let other = other as usize;
+            pairs[block.min(other)].insert(block.max(other) as u32);
+        }
+    }
+    let tiles = (0..n).step_by(HELD).map(|first| {
+        let held = first..(first + HELD).min(n);
+        let mut meetings: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        for a in held.clone() {
+            for &b in &pairs[a] {
+                meetings.entry(b).or_default().push(a as u32);
+            }
+        }
+        let meetings = meetings.into_iter().map(|(block, with)| Meetings { block, with }).collect();
+        Tile { held, meetings }
+    });
+    Pairs { tiles: tiles.collect() }
+}
+
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::*;
+    use crate::descriptors::Values;
+    use crate::neighbors::overlap::Patches;
+    use crate::neighbors::similarity::Cosine;
+    use crate::seed::{Draws, Stage};
+
+    /// `n` rows around random middles, about six to each.
+    fn crowds(n: usize, dim: usize) -> Descriptors {
+        let mut draws = Draws::new(4, Stage::Synthetic, 0);
+        let mut middles = || (0..dim).map(|_| draws.between(20.0, 120.0)).collect::<Vec<f64>>();
+        let middles: Vec<Vec<f64>> = (0..n.div_ceil(6)).map(|_| middles()).collect();
+        let mut draws = Draws::new(5, Stage::Synthetic, 0);
+        let values = (0..n).flat_map(|row| {
+            let noise: Vec<f64> = (0..dim).map(|_| 6.0 * draws.normal()).collect();
+            let middle = &middles[row % middles.len()];
+            middle
+                .iter()
+                .zip(noise)
+                .map(|(x, noise)| (x + noise).clamp(0.0, 255.0) as u8)
+                .collect::<Vec<u8>>()
+        });
+        Descriptors::try_new(Values::U8(values.collect()), dim).unwrap()
+    }
+
+    /// What every slot found: slots instead of rows.
+    fn found<L: Likeness>(
+        likeness: &L,
+        descriptors: &Descriptors,
+        most: usize,
+        exact: usize,
+    ) -> Vec<Vec<(f32, u32)>> {
+        let mut rows = Rows::of_all(descriptors);
+        let found = search(likeness, &mut rows, most, exact).unwrap();
+        let mut by_slot = vec![Vec::new(); rows.len()];
+        for (found, &slot) in found.into_iter().zip(&rows.slots) {
+            by_slot[slot as usize] = found
+                .best
+                .into_iter()
+                .map(|(score, row)| (score, rows.slots[row as usize]))
+                .collect();
+        }
+        by_slot
+    }
+
+    /// The share of `right` that is in `found`.
+    fn recall(found: &[Vec<(f32, u32)>], right: &[Vec<(f32, u32)>]) -> f64 {
+        let slots = |list: &[(f32, u32)]| list.iter().map(|&(_, slot)| slot).collect::<Vec<u32>>();
+        let in_both: usize = found
+            .iter()
+            .zip(right)
+            .map(|(found, right)| {
+                let found = slots(found);
+                slots(right).iter().filter(|slot| found.contains(slot)).count()
+            })
+            .sum();
+        in_both as f64 / right.iter().map(Vec::len).sum::<usize>() as f64
+    }
+
+    #[test]
+    fn few_blocks_all_meet() {
+        let descriptors = crowds(1_500, 128);
+        const { assert!(1_500 < BLOCK * PARTNERS) };
+        let scores = |found: Vec<Vec<(f32, u32)>>| -> Vec<Vec<f32>> {
+            found.iter().map(|list| list.iter().map(|&(score, _)| score).collect()).collect()
+        };
+        let cosines = |exact| scores(found(&Cosine { counts: false }, &descriptors, 10, exact));
+        assert_eq!(cosines(0), cosines(MOST_ROWS));
+        let patches = Patches::of(&descriptors).unwrap();
+        let overlaps = |exact| scores(found(&patches, &descriptors, 10, exact));
+        assert_eq!(overlaps(0), overlaps(MOST_ROWS));
+    }
+
+    #[test]
+    fn of_many_blocks_those_meet_that_look_alike() {
+        let descriptors = crowds(30_000, 16);
+        let n_blocks = 30_000usize.div_ceil(BLOCK);
+        assert!(n_blocks > 3 * PARTNERS, "a third of the blocks");
+        let right = found(&Cosine { counts: false }, &descriptors, 5, MOST_ROWS);
+        let some = found(&Cosine { counts: false }, &descriptors, 5, 0);
+        let recall = recall(&some, &right);
+        assert!(recall >= 0.9, "{recall}");
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+        assert_eq!(pool.install(|| found(&Cosine { counts: false }, &descriptors, 5, 0)), some);
+    }
+
+    #[test]
+    fn usual_scores_are_those_of_all_rows() {
+        let descriptors = crowds(6_000, 128);
+        let patches = Patches::of(&descriptors).unwrap();
+        let rows = Rows::of_all(&descriptors);
+        let all = Pairs::all(rows.len().div_ceil(BLOCK));
+        let exact = compare(&patches, &rows, 1, (&all, None));
+        let sampled = compare(&patches, &rows, 1, (&all, Some(3)));
+        for (exact, sampled) in exact.iter().zip(&sampled) {
+            let off = (exact.mean - sampled.mean).abs() / exact.deviation;
+            assert!(off < 0.2, "{off}");
+            let ratio = sampled.deviation / exact.deviation;
+            assert!((0.9..1.1).contains(&ratio), "{ratio}");
+        }
+    }
+}

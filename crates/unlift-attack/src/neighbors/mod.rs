@@ -5,7 +5,6 @@
 
 mod alike;
 mod bearings;
-mod best;
 mod compare;
 mod dense;
 mod geometric;
@@ -16,11 +15,9 @@ mod overlap;
 mod protected;
 mod rows;
 mod scored;
-mod sets;
 mod similarity;
 mod source;
 pub mod sources;
-mod tiles;
 mod walk;
 
 pub use bearings::{REAL, support};

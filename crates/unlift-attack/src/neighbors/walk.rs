@@ -4,8 +4,7 @@
 
 use rayon::prelude::*;
 
-use super::best::Found;
-use super::best::{Best, higher_first};
+use super::compare::{Best, Found, higher_first};
 
 /// Number of edges per row.
 const EDGES: usize = 6;

@@ -1,22 +1,15 @@
 //! Released maps: the records, which are all that an attacker sees.
 //!
-//! One file per record family. Every family stores `f32` columns relative to a published origin in a normal form, so that moving an
+//! Every family of records stores `f32` columns relative to a published origin in a normal form, so that moving an
 //! original along its own record changes no stored byte.
 
-mod axis_candidates;
-mod axis_planes;
-mod fingerprint;
-mod lines;
-mod normal_form;
-mod obfuscation;
-mod rays;
+mod records;
 
-pub use axis_candidates::AxisCandidates;
-pub use axis_planes::AxisPlanes;
-pub use lines::Lines;
-pub use obfuscation::Obfuscation;
-pub use rays::Rays;
+use sha2::{Digest, Sha256};
 
+pub use records::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays};
+
+use crate::descriptors::Values;
 use crate::geometry::frame::Bounds;
 use crate::{Descriptors, Error, Fingerprint, ProtectedDescriptors, Unit};
 
@@ -76,11 +69,58 @@ impl<const D: usize> Released<D> {
         Ok(Self { fingerprint: bare.hashed(), ..bare })
     }
 
+    /// Returns the first 16 bytes of the SHA-256 of all map data, in normal form and relative to its origin. It covers only what an
+    /// attacker has, so it may be in every file made from the map.
     fn hashed(&self) -> Fingerprint {
         let Self { obfuscation, slots_per_record, origin, unit, bounds, .. } = self;
-        let frame = (*origin, *unit, *bounds);
         let rows = self.protected.as_ref().map(ProtectedDescriptors::rows);
-        fingerprint::of(obfuscation, *slots_per_record, frame, rows.or(self.descriptors.as_ref()))
+        let descriptors = rows.or(self.descriptors.as_ref());
+        let mut hasher = Sha256::new();
+        hasher.update(format!(
+            "unlift released 1, {D}D, {} {} of {}, {}\n",
+            obfuscation.len(),
+            obfuscation.family(),
+            slots_per_record,
+            unit.name()
+        ));
+        f64s(&mut hasher, origin);
+        match obfuscation {
+            Obfuscation::Lines(lines) => {
+                f32s(&mut hasher, lines.foot().as_flattened());
+                f32s(&mut hasher, lines.direction().as_flattened());
+            }
+            Obfuscation::Rays(rays) => {
+                hasher.update([rays.centers().len() as u8]);
+                f32s(&mut hasher, rays.centers().as_flattened());
+                hasher.update(rays.center());
+                f32s(&mut hasher, rays.direction().as_flattened());
+                rays.regions()
+                    .into_iter()
+                    .flatten()
+                    .for_each(|region| corners(&mut hasher, region));
+            }
+            Obfuscation::AxisPlanes(planes) => {
+                hasher.update(planes.axis());
+                f32s(&mut hasher, planes.offset());
+            }
+            Obfuscation::AxisCandidates(candidates) => {
+                f32s(&mut hasher, candidates.position().as_flattened());
+            }
+        }
+        if let Some(bounds) = bounds {
+            hasher.update("bounds");
+            corners(&mut hasher, bounds);
+        }
+        // A file of a map without records has no descriptors.
+        if let Some(descriptors) = descriptors.filter(|_| !obfuscation.is_empty()) {
+            hasher.update(format!("descriptors of {}", descriptors.dim()));
+            match descriptors.values() {
+                Values::U8(values) => hasher.update(values),
+                Values::F32(values) => f32s(&mut hasher, values),
+            }
+        }
+        let hash = hasher.finalize();
+        Fingerprint(std::array::from_fn(|at| hash[at]))
     }
 
     /// Releases protected descriptors in place of plain ones, one row per slot.
@@ -157,4 +197,21 @@ impl<const D: usize> Released<D> {
     pub fn descriptors(&self) -> Option<&Descriptors> {
         self.descriptors.as_ref().or_else(|| Some(self.protected.as_ref()?.guess()))
     }
+}
+
+fn corners<const D: usize>(hasher: &mut Sha256, bounds: &Bounds<D>) {
+    f64s(hasher, &bounds.low);
+    f64s(hasher, &bounds.high);
+}
+
+fn f32s(hasher: &mut Sha256, values: &[f32]) {
+    // In pieces, because descriptors of a large map take hundreds of megabytes.
+    for piece in values.chunks(1 << 10) {
+        let bytes: Vec<u8> = piece.iter().flat_map(|x| x.to_le_bytes()).collect();
+        hasher.update(&bytes);
+    }
+}
+
+fn f64s(hasher: &mut Sha256, values: &[f64]) {
+    values.iter().for_each(|x| hasher.update(x.to_le_bytes()));
 }

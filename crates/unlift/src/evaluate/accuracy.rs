@@ -1,13 +1,12 @@
-//! Shares of recovered points, and error percentiles.
+//! Errors of a recovery: which original belongs to each row, shares within a threshold, percentiles, and weights of coincident points.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use crate::geometry::vector::{distance, sub};
 use crate::recover::{Recovered, Status};
 use crate::truth::{Original, Secret};
 use crate::{Error, OriginalId, RowOrder};
-
-use super::joined;
 
 /// Errors of a recovery. Shares are of *all* released points; a point that was not recovered is a
 /// miss.
@@ -172,6 +171,66 @@ impl Accuracy {
         let rank = ((percent / 100.0 * n as f64).ceil() as usize).clamp(1, n.max(1));
         self.sorted.get(rank - 1).copied().filter(|error| error.is_finite())
     }
+}
+
+/// Returns `secret` with slots in the row order of `recovered`.
+///
+/// - [`RowOrder::Slots`][]: unchanged;
+/// - [`RowOrder::DescriptorRows`]: by [`Secret::by_descriptor_row`];
+/// - [`RowOrder::Either`] and [`RowOrder::Unstated`]: each record's two points in the order with
+///   the smaller error, because an attacker without descriptors cannot know it. The published
+///   attacks on paired lines are evaluated this way.
+pub fn joined<'a, const D: usize>(
+    recovered: &Recovered<D>,
+    original: &Original<D>,
+    secret: &'a Secret,
+) -> Cow<'a, Secret> {
+    if secret.slots_per_record() < 2 {
+        return Cow::Borrowed(secret);
+    }
+    match recovered.about().order {
+        RowOrder::Slots => Cow::Borrowed(secret),
+        RowOrder::DescriptorRows => Cow::Owned(secret.by_descriptor_row()),
+        RowOrder::Either | RowOrder::Unstated => {
+            Cow::Owned(in_better_order(recovered, original, &secret.by_descriptor_row()))
+        }
+    }
+}
+
+/// Returns `secret` with the two points of every record in the order with the smaller error.
+fn in_better_order<const D: usize>(
+    recovered: &Recovered<D>,
+    original: &Original<D>,
+    secret: &Secret,
+) -> Secret {
+    let positions = original.reveal().positions();
+    let error = |slot: usize, of: usize| {
+        recovered
+            .position(slot)
+            .map_or(0.0, |position| distance(&position, &positions[secret.hidden()[of].index()]))
+    };
+    secret.exchanged(|first| {
+        let second = first + 1;
+        error(first, second) + error(second, first) < error(first, first) + error(second, second)
+    })
+}
+
+/// Returns for each slot 1 / the number of slots whose points have exactly the same place.
+///
+/// With these weights every place counts once. They sum to the number of places.
+pub fn distinct_weights<const D: usize>(original: &Original<D>, secret: &Secret) -> Vec<f64> {
+    let positions = original.reveal().positions();
+    let place = |slot: &usize| {
+        // Adding 0.0 turns -0.0 into 0.0.
+        positions[secret.hidden()[*slot].index()].map(|x| (x + 0.0).to_bits())
+    };
+    let mut order: Vec<usize> = (0..secret.n_slots()).collect();
+    order.sort_unstable_by_key(place);
+    let mut weights = vec![1.0; order.len()];
+    for twins in order.chunk_by(|a, b| place(a) == place(b)) {
+        twins.iter().for_each(|&slot| weights[slot] = 1.0 / twins.len() as f64);
+    }
+    weights
 }
 
 #[cfg(test)]

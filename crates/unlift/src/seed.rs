@@ -1,4 +1,4 @@
-//! Keys: the randomness that hides points, as 256-bit keys and streams of a cipher.
+//! Random numbers as a function of a seed, and keys for the randomness that hides points: 256 bits, and streams of a cipher.
 //!
 //! **Why a cipher.** Part of a scheme's draws is released with the map: a line of `olc` is three
 //! draws, axis and partners of `cp` are two. A generator whose state follows from its output would
@@ -17,7 +17,8 @@ use chacha20::ChaCha20Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
 
 use crate::Error;
-use unlift_attack::seed::{Bits, Draws, Stage};
+
+pub use unlift_attack::seed::*;
 
 /// A 256-bit key for all random numbers that hide a map. It is part of the secret and is not
 /// printed.
