@@ -286,8 +286,6 @@ fn words(rows: &[Vec<f32>], n: usize) -> Vec<Vec<f32>> {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{DMatrix, DVector};
-
     use super::*;
     use crate::obfuscate::{Change, Changed, Scheme, obfuscate, olc::Olc, ppl::Ppl};
     use crate::truth::Original;
@@ -358,43 +356,6 @@ mod tests {
                     assert!(!parts[1..].iter().any(along), "{text}");
                 }
             }
-        }
-    }
-
-    /// Returns the distance of two subspaces, and the point halfway between their nearest points.
-    fn meeting(
-        one: &ProtectedDescriptors,
-        other: &ProtectedDescriptors,
-        rows: [usize; 2],
-    ) -> (f64, DVector<f64>) {
-        let parts = |of: &ProtectedDescriptors, at: usize| {
-            let mut row = vec![0.0; of.rows().dim()];
-            of.rows().read_row(at, &mut row);
-            let row = DMatrix::from_iterator(DIM, row.len() / DIM, row.into_iter().map(f64::from));
-            (row.column(0).into_owned(), row.remove_column(0))
-        };
-        let ((f, u), (g, v)) = (parts(one, rows[0]), parts(other, rows[1]));
-        let m = u.ncols();
-        let both =
-            DMatrix::from_fn(DIM, 2 * m, |r, c| if c < m { u[(r, c)] } else { -v[(r, c - m)] });
-        let at = both.svd(true, true).solve(&(&g - &f), 1e-9).unwrap();
-        let (p, q) = (f + u * at.rows(0, m), g + v * at.rows(m, m));
-        ((&p - &q).norm(), (p + q) / 2.0)
-    }
-
-    #[test]
-    fn two_releases_of_one_descriptor_meet_in_it() {
-        let plain = descriptors(20, 1);
-        for text in ["subspace:2:random", "subspace:4:random", "subspace:4:adversarial"] {
-            let (one, other) = (protected(text, &plain, 2), protected(text, &plain, 3));
-            for (at, plain) in unit_rows(&plain).enumerate() {
-                let (apart, place) = meeting(&one, &other, [at, at]);
-                let plain = DVector::from_iterator(DIM, plain.into_iter().map(f64::from));
-                let off = (place - plain).norm();
-                assert!(apart < 1e-3 && off < 5e-3, "{text}: {apart}, {off}");
-            }
-            let (apart, _) = meeting(&one, &other, [0, 1]);
-            assert!(apart > 0.05, "{text}: {apart}");
         }
     }
 

@@ -154,20 +154,6 @@ fn a_changed_map_gives_back_what_did_not_change() {
 }
 
 #[test]
-fn noise_between_releases_moves_points_no_farther() {
-    let mut draws = Draws::new(8, Stage::Synthetic, 0);
-    let noisy = points().into_iter().map(|p| p.map(|x| x + draws.between(-0.005, 0.005)));
-    let (first, second) = (original(points()), original(noisy.collect()));
-    // Points at random places do not tell which of two coordinates was swapped.
-    for (name, least) in [("olc", 95.0), ("ppl", 95.0), ("cp", 35.0)] {
-        let ((a, secret), (b, _)) = (hide(name, &first, 1), hide(name, &second, 2));
-        let solved = by_descriptors(&a, &b).unwrap();
-        let near = evaluate(&solved.recovered, &first, &secret).unwrap().percent_within(0.1);
-        assert!(near > least, "{name}: {near} %");
-    }
-}
-
-#[test]
 fn the_number_of_threads_changes_no_bit() {
     let original = original(points());
     let (a, b) = (hide("ppl", &original, 1).0, hide("olc", &original, 2).0);
