@@ -1,9 +1,7 @@
 //! Pieces of furniture. The origin of a piece is the left end of its back if it stands along a wall
 //! (`x` along the wall, `y` into the room), otherwise its middle.
 
-use super::objects;
-use super::surfaces::{Faces, Place, Scene};
-use super::texture::{Outline, Texture};
+use super::surfaces::{Faces, Outline, Place, Scene, Texture, turn};
 use crate::seed::Draws;
 
 /// Adds a bookshelf, 1.8 to 2.1 m high, filled with books and boxes.
@@ -31,13 +29,13 @@ pub(super) fn bookshelf(scene: &mut Scene, place: &Place, width: f64, draws: &mu
             for i in 0..n_bays {
                 let x = i as f64 * bay + BOARD;
                 let shelf = place.then([x, 0.0, z + BOARD], [1.0, 0.0]);
-                objects::shelf_row(scene, &shelf, bay - BOARD, pitch - BOARD, DEPTH, draws);
+                shelf_row(scene, &shelf, bay - BOARD, pitch - BOARD, DEPTH, draws);
             }
         }
     }
     let top = place.then([0.0, 0.0, 0.08 + height - 0.1 + BOARD], [1.0, 0.0]);
     let count = 1 + draws.below(3) as usize;
-    objects::scatter(scene, &top, [0.1, 0.06], [width - 0.1, DEPTH], count, draws);
+    scatter(scene, &top, [0.1, 0.06], [width - 0.1, DEPTH], count, draws);
 }
 
 /// Adds a cabinet with two doors, up to 2 m high.
@@ -56,7 +54,7 @@ pub(super) fn tall_cabinet(scene: &mut Scene, place: &Place, width: f64, draws: 
     }
     let top = place.then([0.0, 0.0, height], [1.0, 0.0]);
     let count = 1 + draws.below(3) as usize;
-    objects::scatter(scene, &top, [0.05, 0.05], [width - 0.05, depth - 0.05], count, draws);
+    scatter(scene, &top, [0.05, 0.05], [width - 0.05, depth - 0.05], count, draws);
 }
 
 /// Adds a low cabinet with drawers, and objects on top.
@@ -79,7 +77,7 @@ pub(super) fn sideboard(scene: &mut Scene, place: &Place, width: f64, draws: &mu
     }
     let top = place.then([0.0, 0.0, height], [1.0, 0.0]);
     let count = 4 + draws.below(3) as usize;
-    objects::scatter(scene, &top, [0.05, 0.05], [width - 0.05, depth - 0.03], count, draws);
+    scatter(scene, &top, [0.05, 0.05], [width - 0.05, depth - 0.03], count, draws);
 }
 
 /// Adds a desk with a screen, a keyboard and objects.
@@ -95,11 +93,11 @@ pub(super) fn desk(scene: &mut Scene, place: &Place, width: f64, draws: &mut Dra
     scene.block(place, [0.04, 0.05, 0.3], drawers, Faces::All, Texture::WOOD);
     let surface = place.then([0.0, 0.0, height], [1.0, 0.0]);
     let x = draws.between(0.35, width - 0.65);
-    objects::screen(scene, &surface.then([x, 0.14, 0.0], [1.0, 0.0]));
+    screen(scene, &surface.then([x, 0.14, 0.0], [1.0, 0.0]));
     let keyboard = ([x - 0.1, 0.36, 0.0], [x + 0.33, 0.5, 0.02]);
     scene.block(&surface, keyboard.0, keyboard.1, Faces::Standing, Texture::PRINT);
-    objects::scatter(scene, &surface, [0.02, 0.05], [x - 0.12, depth - 0.05], 2, draws);
-    objects::scatter(scene, &surface, [x + 0.48, 0.05], [width - 0.02, depth - 0.05], 2, draws);
+    scatter(scene, &surface, [0.02, 0.05], [x - 0.12, depth - 0.05], 2, draws);
+    scatter(scene, &surface, [x + 0.48, 0.05], [width - 0.02, depth - 0.05], 2, draws);
 }
 
 pub(super) fn sofa(scene: &mut Scene, place: &Place, width: f64, draws: &mut Draws) {
@@ -162,7 +160,7 @@ pub(super) fn table(scene: &mut Scene, place: &Place, length: f64, depth: f64, d
     scene.shell(place, runner.0, runner.1, Faces::FrontAndTop, Texture::PATTERN);
     let surface = place.then([0.0, 0.0, height + 0.003], [1.0, 0.0]);
     let count = 6 + draws.below(4) as usize;
-    objects::scatter(scene, &surface, [0.06 - x, 0.05 - y], [x - 0.06, y - 0.05], count, draws);
+    scatter(scene, &surface, [0.06 - x, 0.05 - y], [x - 0.06, y - 0.05], count, draws);
 }
 
 pub(super) fn rug(scene: &mut Scene, place: &Place, draws: &mut Draws) {
@@ -193,8 +191,8 @@ pub(super) fn plant(scene: &mut Scene, place: &Place, draws: &mut Draws) {
     for _ in 0..50 {
         let out: [f64; 3] = draws.direction();
         let reach = draws.between(0.06, 0.26);
-        let leaf = [out[0] * reach, out[1] * reach, 0.68 + out[2] * 1.6 * reach];
-        objects::leaf(scene, place, leaf, draws.between(0.06, 0.13), draws);
+        let place_of_leaf = [out[0] * reach, out[1] * reach, 0.68 + out[2] * 1.6 * reach];
+        leaf(scene, place, place_of_leaf, draws.between(0.06, 0.13), draws);
     }
 }
 
@@ -255,5 +253,156 @@ pub(super) fn window(scene: &mut Scene, wall: &Place, middle: f64, draws: &mut D
     for x in [-0.38, 2.0 * half + 0.02] {
         let (low, high) = ([x, 0.03, -0.75], [x + 0.36, 0.1, height + 0.1]);
         scene.block(&place, low, high, Faces::Standing, Texture::FABRIC);
+    }
+}
+
+/// Places up to `count` random objects on the rectangle from `low` to `high` (at `z = 0` of
+/// `place`), at most one per grid cell, so that they do not overlap.
+pub(super) fn scatter(
+    scene: &mut Scene,
+    place: &Place,
+    low: [f64; 2],
+    high: [f64; 2],
+    count: usize,
+    draws: &mut Draws,
+) {
+    /// Side of a cell, and largest width of an object, in meters.
+    const CELL: f64 = 0.22;
+    let fits = |c: usize| ((high[c] - low[c]) / CELL) as usize;
+    let (columns, rows) = (fits(0), fits(1));
+    let cells = draws.permutation(columns * rows);
+    for &cell in cells.iter().take(count) {
+        let (column, row) = (cell as usize % columns, cell as usize / columns);
+        let pitch = |c: usize, n: usize| (high[c] - low[c]) / n as f64;
+        let at = [
+            low[0] + (column as f64 + 0.5) * pitch(0, columns),
+            low[1] + (row as f64 + 0.5) * pitch(1, rows),
+            0.0,
+        ];
+        let small = turn(draws.between(-0.3, 0.3));
+        thing(scene, &place.then(at, small), draws);
+    }
+}
+
+/// Adds a random object within a square of 20 cm.
+fn thing(scene: &mut Scene, place: &Place, draws: &mut Draws) {
+    match draws.below(7) {
+        0 => {
+            let height = draws.between(0.08, 0.11);
+            scene.tube(place, [0.0; 3], 0.04, 0.042, height, Texture::PRINT);
+        }
+        1 => {
+            let height = draws.between(0.15, 0.28);
+            scene.tube(place, [0.0; 3], 0.045, 0.075, height, Texture::PATTERN);
+            flowers(scene, place, height, draws);
+        }
+        2 => pile_of_books(scene, place, draws),
+        3 => {
+            scene.tube(place, [0.0; 3], 0.05, 0.095, 0.07, Texture::PATTERN);
+        }
+        4 => {
+            let (x, y) = (draws.between(0.05, 0.09), draws.between(0.03, 0.08));
+            let high = [x, y, draws.between(0.1, 0.26)];
+            scene.block(place, [-x, -y, 0.0], high, Faces::Standing, Texture::PRINT);
+        }
+        5 => {
+            // Framed photo that leans back.
+            let (w, h) = (draws.between(0.1, 0.18), draws.between(0.12, 0.2));
+            let lean = [0.0, -0.25 * h, h];
+            let corner = [-0.5 * w, 0.02, 0.0];
+            scene.sheet(place, corner, lean, [w, 0.0, 0.0], Texture::PRINT);
+        }
+        _ => {
+            // Open magazine.
+            let high = [0.1, 0.08, 0.01];
+            scene.block(place, [-0.1, -0.08, 0.0], high, Faces::Standing, Texture::PRINT);
+        }
+    }
+}
+
+fn pile_of_books(scene: &mut Scene, place: &Place, draws: &mut Draws) {
+    let mut z = 0.0;
+    for _ in 0..2 + draws.below(4) {
+        let high =
+            [draws.between(0.07, 0.1), draws.between(0.05, 0.08), z + draws.between(0.015, 0.04)];
+        scene.block(place, [-high[0], -high[1], z], high, Faces::Standing, Texture::PRINT);
+        z = high[2];
+    }
+}
+
+fn flowers(scene: &mut Scene, place: &Place, height: f64, draws: &mut Draws) {
+    for _ in 0..10 {
+        let out: [f64; 3] = draws.direction();
+        let at = [0.07 * out[0], 0.07 * out[1], height + 0.1 + 0.07 * out[2]];
+        leaf(scene, place, at, 0.045, draws);
+    }
+}
+
+/// Adds a leaf of side `size` around `at`, in random direction, visible from both sides.
+pub(super) fn leaf(scene: &mut Scene, place: &Place, at: [f64; 3], size: f64, draws: &mut Draws) {
+    let u: [f64; 3] = draws.direction();
+    let other: [f64; 3] = draws.direction();
+    let (u, v) = (u.map(|x| x * size), other.map(|x| 0.5 * x * size));
+    let corner = std::array::from_fn(|c| at[c] - 0.5 * (u[c] + v[c]));
+    scene.sheet(place, corner, u, v, Texture::LEAVES);
+    scene.sheet(place, corner, v, u, Texture::LEAVES);
+}
+
+/// Adds a computer screen with its foot, 53 cm wide.
+pub(super) fn screen(scene: &mut Scene, place: &Place) {
+    let foot = ([0.0, -0.05, 0.0], [0.25, 0.1, 0.015]);
+    scene.block(place, foot.0, foot.1, Faces::Standing, Texture::SMOOTH);
+    let neck = ([0.1, 0.0, 0.015], [0.15, 0.03, 0.15]);
+    scene.block(place, neck.0, neck.1, Faces::Standing, Texture::SMOOTH);
+    let panel = ([-0.14, 0.03, 0.12], [0.39, 0.06, 0.45]);
+    scene.block(place, panel.0, panel.1, Faces::All, Texture::SMOOTH);
+    let (u, v) = ([0.0, 0.0, 0.31], [0.51, 0.0, 0.0]);
+    // Windows and text on the screen.
+    scene.sheet(place, [-0.13, 0.061, 0.13], u, v, Texture::PATTERN);
+}
+
+/// Adds a row of books, boxes and vases, `width` wide, below height `clear`, with fronts near
+/// `depth`.
+pub(super) fn shelf_row(
+    scene: &mut Scene,
+    place: &Place,
+    width: f64,
+    clear: f64,
+    depth: f64,
+    draws: &mut Draws,
+) {
+    let mut x = draws.between(0.0, 0.04);
+    loop {
+        let kind = draws.below(20);
+        let w = match kind {
+            0 => draws.between(0.05, 0.15),
+            1 => draws.between(0.18, 0.3),
+            2 => 0.14,
+            _ => draws.between(0.018, 0.05),
+        };
+        if x + w > width {
+            break;
+        }
+        match kind {
+            // Gap.
+            0 => {}
+            // Storage box.
+            1 => {
+                let high = [x + w, depth - 0.02, clear * draws.between(0.5, 0.8)];
+                scene.block(place, [x, 0.08, 0.0], high, Faces::Standing, Texture::PATTERN);
+            }
+            2 => {
+                let height = clear * draws.between(0.4, 0.75);
+                let middle = [x + 0.07, depth - 0.1, 0.0];
+                scene.tube(place, middle, 0.045, 0.06, height, Texture::PATTERN);
+            }
+            // Book; its neighbors hide the covers.
+            _ => {
+                let front = depth - draws.between(0.015, 0.06);
+                let high = [x + w - 0.001, front, clear * draws.between(0.62, 0.93)];
+                scene.shell(place, [x, 0.08, 0.0], high, Faces::FrontAndTop, Texture::PRINT);
+            }
+        }
+        x += w;
     }
 }

@@ -1,26 +1,22 @@
 //! Procedural maps: a furnished room in meters, and other shapes, for experiments without real
 //! data.
 //!
-//! [`room`] furnishes a room (`room.rs`, `furniture.rs`, `objects.rs`), moves cameras through it
-//! and samples visible surfaces (`views.rs`, `sampling.rs`) like structure from motion: dense on
+//! [`room`] furnishes a room (`room.rs`, `furniture.rs`), moves cameras through it
+//! and samples visible surfaces (`sampling.rs`) like structure from motion: dense on
 //! texture, sparse on plain walls, noisier with distance, with far outliers and coincident points.
 //! Only `+ - * /` and `sqrt` are used, so results are bit-identical on all platforms.
 
 mod furniture;
-mod objects;
-mod purpose;
 mod room;
 mod sampling;
 mod shapes;
 mod surfaces;
-mod texture;
-mod vectors;
-mod views;
 
-use vectors::rotate;
+use crate::seed::{Draws, Stage};
+use surfaces::{rotate, turn};
 
+pub use sampling::Camera;
 pub use shapes::{Shape, keypoints, shape};
-pub use views::Camera;
 
 /// Tangent of half the angle (17.06 degrees) between walls and axes. Real maps are not aligned with
 /// their walls, and axis-wise schemes must not benefit from alignment.
@@ -44,11 +40,11 @@ pub struct Room {
 /// ```
 pub fn room(seed: u64, n_points: usize) -> Room {
     let scene = room::furnished(seed);
-    let mut cameras = views::walk(seed, &scene);
+    let mut cameras = sampling::walk(seed, &scene);
     let mut points = sampling::points(seed, n_points, &scene, &cameras);
 
     let middle = [0.5 * scene.size[0], 0.5 * scene.size[1], 0.0];
-    let yaw = vectors::turn(HALF_YAW_TANGENT);
+    let yaw = turn(HALF_YAW_TANGENT);
     let in_frame =
         |p: [f64; 3]| rotate(yaw, [p[0] - middle[0], p[1] - middle[1], p[2] - middle[2]]);
     for point in &mut points {
@@ -59,6 +55,21 @@ pub fn room(seed: u64, n_points: usize) -> Room {
         camera.look = rotate(yaw, camera.look);
     }
     Room { points, cameras }
+}
+
+/// Purpose of a stream of random numbers.
+#[derive(Clone, Copy)]
+enum Purpose {
+    Layout = 0,
+    Texture = 1,
+    Walk = 2,
+    Copies = 3,
+    Order = 4,
+    FirstPoint = 16,
+}
+
+fn draws(seed: u64, purpose: Purpose, item: usize) -> Draws {
+    Draws::new(seed, Stage::Synthetic, purpose as u64 + item as u64)
 }
 
 #[cfg(test)]

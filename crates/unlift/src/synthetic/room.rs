@@ -1,10 +1,10 @@
 //! Layout of the room: walls, floor, ceiling, and positions of furniture.
 
 use super::furniture as piece;
-use super::purpose::{Purpose, draws};
+use super::surfaces::Texture;
+use super::surfaces::turn;
 use super::surfaces::{Faces, Place, Scene};
-use super::texture::Texture;
-use super::vectors::turn;
+use super::{Purpose, draws};
 use crate::seed::Draws;
 
 /// Free space at the ends of a short wall, for the furniture of the long walls.

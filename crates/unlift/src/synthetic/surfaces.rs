@@ -1,8 +1,5 @@
 //! Textured surfaces of a scene, and boxes that occlude them.
 
-use super::texture::{Outline, Surface, Texture};
-use super::vectors::{Turn, add, norm, rotate, scale, sub, turn};
-
 /// Position and rotation of a piece. Its axes are: right along a wall (x), into the room (y), up
 /// (z).
 #[derive(Clone, Copy, Debug)]
@@ -212,4 +209,131 @@ impl Scene {
             high: add(middle, [inner, inner, height]),
         });
     }
+}
+
+/// Relative density of the features that a detector finds on a surface.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Texture {
+    /// Points per square meter, everywhere.
+    pub(super) even: f64,
+    /// Points per meter of outline.
+    pub(super) outline: f64,
+    /// Patches (stains, prints, knots) per square meter.
+    pub(super) patches: f64,
+    /// Points per patch.
+    pub(super) per_patch: f64,
+    /// Standard deviation of a patch, in meters.
+    pub(super) patch_radius: f64,
+}
+
+impl Texture {
+    const fn new([even, outline, patches, per_patch, patch_radius]: [f64; 5]) -> Self {
+        Self { even, outline, patches, per_patch, patch_radius }
+    }
+
+    pub(super) const PAINT: Self = Self::new([1.5, 2.5, 0.4, 16.0, 0.03]);
+    pub(super) const SMOOTH: Self = Self::new([10.0, 18.0, 1.5, 22.0, 0.025]);
+    pub(super) const WOOD: Self = Self::new([22.0, 24.0, 7.0, 36.0, 0.03]);
+    pub(super) const FLOOR: Self = Self::new([5.0, 3.0, 1.5, 24.0, 0.04]);
+    pub(super) const FABRIC: Self = Self::new([45.0, 14.0, 8.0, 50.0, 0.035]);
+    pub(super) const PATTERN: Self = Self::new([150.0, 50.0, 26.0, 80.0, 0.035]);
+    pub(super) const PRINT: Self = Self::new([2_100.0, 70.0, 150.0, 26.0, 0.016]);
+    pub(super) const LEAVES: Self = Self::new([2_000.0, 150.0, 0.0, 0.0, 0.02]);
+    pub(super) const GLASS: Self = Self::new([6.0, 60.0, 0.0, 0.0, 0.02]);
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Outline {
+    /// Whole parallelogram.
+    Full,
+    /// Ellipse that touches the middle of each edge.
+    Ellipse,
+}
+
+/// Flat surface, visible from the side of its normal `u x v`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Surface {
+    pub(super) corner: [f64; 3],
+    pub(super) u: [f64; 3],
+    pub(super) v: [f64; 3],
+    pub(super) outline: Outline,
+    pub(super) texture: Texture,
+}
+
+impl Surface {
+    /// Returns the point at `(s, t)`, both 0 to 1.
+    pub(super) fn at(&self, s: f64, t: f64) -> [f64; 3] {
+        add(self.corner, add(scale(self.u, s), scale(self.v, t)))
+    }
+
+    /// Returns true if `(s, t)` lies on the surface.
+    pub(super) fn holds(&self, s: f64, t: f64) -> bool {
+        let within = (0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t);
+        match self.outline {
+            Outline::Full => within,
+            Outline::Ellipse => {
+                let (x, y) = (2.0 * s - 1.0, 2.0 * t - 1.0);
+                x * x + y * y <= 1.0
+            }
+        }
+    }
+
+    pub(super) fn normal(&self) -> [f64; 3] {
+        let n = cross(self.u, self.v);
+        scale(n, 1.0 / norm(n))
+    }
+
+    /// Returns the area in square meters.
+    pub(super) fn area(&self) -> f64 {
+        let full = norm(cross(self.u, self.v));
+        match self.outline {
+            Outline::Full => full,
+            // pi / 4; three digits are enough for a density.
+            Outline::Ellipse => 0.785 * full,
+        }
+    }
+}
+
+/// Cosine and sine of a rotation about `z`.
+pub(super) type Turn = [f64; 2];
+
+/// Returns the rotation whose half angle has the tangent `t`. `sin` and `cos` differ between
+/// platforms, this does not.
+pub(super) fn turn(t: f64) -> Turn {
+    let norm = 1.0 + t * t;
+    [(1.0 - t * t) / norm, 2.0 * t / norm]
+}
+
+pub(super) fn rotate([cos, sin]: Turn, v: [f64; 3]) -> [f64; 3] {
+    [cos * v[0] - sin * v[1], sin * v[0] + cos * v[1], v[2]]
+}
+
+/// Returns a + b.
+pub(super) fn add(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| a[c] + b[c])
+}
+
+/// Returns a - b.
+pub(super) fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| a[c] - b[c])
+}
+
+/// Returns s a.
+pub(super) fn scale(a: [f64; 3], s: f64) -> [f64; 3] {
+    a.map(|x| x * s)
+}
+
+/// Returns the dot product.
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Returns the length.
+pub(super) fn norm(a: [f64; 3]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// Returns a x b.
+pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
