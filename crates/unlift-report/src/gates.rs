@@ -22,9 +22,6 @@ pub(crate) struct GateWords {
     pub word: &'static str,
     /// "88.7 % came back, at most 20 % may; olc, oracle at 0.50, joint, recovered within 0.10 m".
     pub said: String,
-    /// "at most 20 % may come back".
-    #[serde(skip)]
-    pub allowed: String,
 }
 
 pub(crate) fn gates(document: &Document) -> Option<Gates> {
@@ -78,15 +75,13 @@ pub(crate) fn is_of_localization(gate: &GateResult) -> bool {
 
 pub(crate) fn in_words(gate: &GateResult) -> GateWords {
     let bound = words::significant(gate.bound_percent, 4);
-    let (unit, verb, whole) = match gate.gate.contains(":gain") {
+    let (unit, verb) = match gate.gate.contains(":gain") {
         _ if is_of_localization(gate) => {
-            let whole = "the localization error may become";
-            (" times", ("the unprotected localization error", "may be"), whole)
+            (" times", ("the unprotected localization error", "may be"))
         }
-        true => (" percentage points", ("were gained", "may be"), "may be gained"),
-        false => (" %", ("came back", "may"), "may come back"),
+        true => (" percentage points", ("were gained", "may be")),
+        false => (" %", ("came back", "may")),
     };
-    let allowed = format!("at most {bound}{unit} {whole}");
     let found = gate.found_percent.map(|found| {
         let found = beside(found, gate.bound_percent);
         format!("{found}{unit} {}, at most {bound}{unit} {}", verb.0, verb.1)
@@ -95,7 +90,7 @@ pub(crate) fn in_words(gate: &GateResult) -> GateWords {
     let word = if gate.passed { "PASS" } else { "FAIL" };
     let said = [Some(found), gate.of.clone(), gate.reason.clone()];
     let said: Vec<String> = said.into_iter().flatten().collect();
-    GateWords { gate: gate.gate.clone(), passed: gate.passed, word, said: said.join("; "), allowed }
+    GateWords { gate: gate.gate.clone(), passed: gate.passed, word, said: said.join("; ") }
 }
 
 /// Returns `found` with one decimal, or more if needed to stay on its side of `bound`: 20.04 must not become
@@ -118,14 +113,6 @@ mod tests {
             "gate": text, "found_percent": found_percent, "bound_percent": bound_percent, "passed": passed
         }))
         .expect("a gate")
-    }
-
-    #[test]
-    fn what_a_gate_allows_is_a_sentence_of_its_own() {
-        let allowed = |text| in_words(&gate(text, 1.0, 20.0)).allowed;
-        assert_eq!(allowed("all:0.10<=20"), "at most 20 % may come back");
-        let gain = "at most 20 percentage points may be gained";
-        assert_eq!(allowed("all:0.10:gain<=20"), gain);
     }
 
     #[test]

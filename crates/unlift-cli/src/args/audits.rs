@@ -56,9 +56,6 @@ pub struct ResultArgs {
     /// Also write the results of the gates as JUnit XML, for GitLab, Jenkins and others
     #[arg(long, value_name = "FILE", requires = "gate")]
     pub junit: Option<PathBuf>,
-    /// Also write the failed gates as SARIF 2.1.0, for GitHub
-    #[arg(long, value_name = "FILE", requires = "gate")]
-    pub sarif: Option<PathBuf>,
     /// Folder for report.html, audit.json and point clouds; other files in it stay
     #[arg(long, value_name = "DIR", default_value = "unlift-audit")]
     pub out: PathBuf,
@@ -71,10 +68,6 @@ pub struct ResultArgs {
     /// Print a summary as JSON in place of the table
     #[arg(long)]
     pub json: bool,
-    /// For `check`: the configuration file, relative to the working directory, and the line of the
-    /// audit in it.
-    #[arg(skip)]
-    pub asked_at: Option<(String, usize)>,
 }
 
 /// Options of the run.
@@ -185,7 +178,7 @@ Examples:
   unlift audit map PROJECT --scale 1 --gate 'ppl:localization<=2.0' --mitigate thin:1/4
   unlift audit map PROJECT --descriptors d.npy --neighbors overlap --protect-descriptors subspace:2
   unlift audit map PROJECT --share-safe --json
-  unlift audit map PROJECT --scale 1 --gate 'all@0.5:0.10<=20' --junit gates.xml --sarif gates.sarif
+  unlift audit map PROJECT --scale 1 --gate 'all@0.5:0.10<=20' --junit gates.xml
 
 Gates: SCHEME[:SOLVER][:SOURCE][@RATIO]:THRESHOLD[:gain]<=PERCENT
 

@@ -70,6 +70,5 @@ fn outputs_of_the_configuration_are_what_builds_pick_up() {
     for line in config.lines().filter(|line| line.starts_with("out ") || line.contains("junit =")) {
         assert!(line.contains("= \"audits/"), "{line}");
     }
-    assert!(example("github-action.yml").contains("sarif_file: audits\n"));
     assert!(example("gitlab-ci.yml").contains("junit: audits/*.xml\n"));
 }

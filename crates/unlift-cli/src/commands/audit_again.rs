@@ -11,7 +11,7 @@ use unlift_audit::{Finished, Preparation, Shown, check_thresholds, open_audit};
 use unlift_io::atomic::Rules;
 
 use super::common::with_threads;
-use super::gate_files::GateFiles;
+use super::gate_files::GateFile;
 use super::plan::{summary, thresholds};
 use crate::args::AuditAgainArgs;
 use crate::exit::{Outcome, usage};
@@ -36,7 +36,7 @@ pub fn audit(args: &AuditAgainArgs) -> anyhow::Result<Finished> {
     let started = Instant::now();
     let rules = Rules::new(inputs(args), args.result.force);
     let shown = if args.result.share_safe { Shown::Figures } else { Shown::Points };
-    let gate_files = GateFiles::check(&args.result, &rules)?;
+    let gate_file = GateFile::check(&args.result, &rules)?;
     let out = open_audit(&args.result.out, rules, shown, &Stderr)?;
     let finished = with_threads(args.run.threads, || {
         let maps = maps(args)?;
@@ -82,7 +82,7 @@ pub fn audit(args: &AuditAgainArgs) -> anyhow::Result<Finished> {
         };
         Ok(perform(job, out)?)
     })?;
-    gate_files.write(&finished)?;
+    gate_file.write(&finished)?;
     Ok(finished)
 }
 

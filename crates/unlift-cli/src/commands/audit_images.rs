@@ -20,7 +20,7 @@ use unlift_io::{Error, read};
 use unlift_vision::features::Extraction;
 
 use super::common::{all_could_be, with_threads};
-use super::gate_files::GateFiles;
+use super::gate_files::GateFile;
 use super::painter::{kind, painter};
 use super::plan::{attack, check_about, check_fit, solvers, summary, thresholds};
 use super::protection::protections;
@@ -55,7 +55,7 @@ pub fn audit(args: &AuditImagesArgs) -> anyhow::Result<(Option<Finished>, Used)>
     let painted = painted(args)?;
     let rules = Rules::new(inputs(args), args.result.force);
     let shown = if args.result.share_safe { Shown::Figures } else { Shown::Points };
-    let gate_files = GateFiles::check(&args.result, &rules)?;
+    let gate_file = GateFile::check(&args.result, &rules)?;
     let out = open_audit(&args.result.out, rules, shown, &Stderr)?;
     let (finished, used) = with_threads(args.run.threads, || {
         let extraction = extraction(args, &plan)?;
@@ -118,7 +118,7 @@ pub fn audit(args: &AuditImagesArgs) -> anyhow::Result<(Option<Finished>, Used)>
         Ok(perform(job, out)?)
     })?;
     if let Some(finished) = &finished {
-        gate_files.write(finished)?;
+        gate_file.write(finished)?;
     }
     Ok((finished, used))
 }

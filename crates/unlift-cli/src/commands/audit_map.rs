@@ -20,7 +20,7 @@ use unlift_io::read;
 use unlift_io::seen::Seen;
 
 use super::common::{open_map, this_program, with_threads};
-use super::gate_files::GateFiles;
+use super::gate_files::GateFile;
 use super::painter::{kind, painter};
 use super::plan::{attack, neighbors, solvers, summary, thresholds};
 use super::protection::protections;
@@ -52,7 +52,7 @@ pub fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
         (false, false) => Shown::Points,
     };
     let rules = Rules::new(inputs(args), args.result.force);
-    let gate_files = GateFiles::check(&args.result, &rules)?;
+    let gate_file = GateFile::check(&args.result, &rules)?;
     let out = open_audit(&args.result.out, rules, shown, &Stderr)?;
     let beside = Seen::of_stages(beside(args).map(|(_, path)| path));
     let finished = with_threads(args.run.threads, || {
@@ -95,7 +95,7 @@ pub fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
         beside.check()?;
         Ok(perform(job, out)?)
     })?;
-    gate_files.write(&finished)?;
+    gate_file.write(&finished)?;
     Ok(finished)
 }
 

@@ -17,7 +17,7 @@ use unlift_io::stage::{has_images, part_files, read_released, read_truth, scheme
 use unlift_report::document::Input;
 
 use super::common::{expect_slots, same_map, with_threads};
-use super::gate_files::GateFiles;
+use super::gate_files::GateFile;
 use super::plan::{attack, neighbors, solvers, summary, thresholds};
 use crate::args::AuditReleasedArgs;
 use crate::exit::{Outcome, advise, usage};
@@ -45,7 +45,7 @@ pub fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
     let inputs = inputs(args);
     let seen = Seen::of_stages(inputs.iter().copied());
     let rules = Rules::new(inputs, args.result.force);
-    let gate_files = GateFiles::check(&args.result, &rules)?;
+    let gate_file = GateFile::check(&args.result, &rules)?;
     let out = open_audit(&args.result.out, rules, shown, &Stderr)?;
     let finished = with_threads(args.run.threads, || {
         let name = name(args)?;
@@ -71,7 +71,7 @@ pub fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
         };
         Ok(perform(job, out)?)
     })?;
-    gate_files.write(&finished)?;
+    gate_file.write(&finished)?;
     Ok(finished)
 }
 

@@ -16,7 +16,7 @@ use unlift_io::atomic::Rules;
 use unlift_vision::features::photo::Turn;
 
 use super::common::with_threads;
-use super::gate_files::GateFiles;
+use super::gate_files::GateFile;
 use super::painter::{kind, painter};
 use super::plan::{summary, thresholds};
 use crate::args::AuditSequenceArgs;
@@ -44,7 +44,7 @@ pub fn audit(args: &AuditSequenceArgs) -> anyhow::Result<Finished> {
     let pose_error = pose_error(args)?;
     let rules = Rules::new(inputs(args), args.result.force);
     let shown = if args.result.share_safe { Shown::Figures } else { Shown::Points };
-    let gate_files = GateFiles::check(&args.result, &rules)?;
+    let gate_file = GateFile::check(&args.result, &rules)?;
     let out = open_audit(&args.result.out, rules, shown, &Stderr)?;
     let finished = with_threads(args.run.threads, || {
         // A model is of the photos as they are stored.
@@ -79,7 +79,7 @@ pub fn audit(args: &AuditSequenceArgs) -> anyhow::Result<Finished> {
         };
         Ok(perform(job, out)?.0)
     })?;
-    gate_files.write(&finished)?;
+    gate_file.write(&finished)?;
     Ok(finished)
 }
 

@@ -47,27 +47,6 @@ fn every_audit_is_a_line_and_paths_are_relative_to_the_configuration() {
 }
 
 #[test]
-fn gates_point_to_the_configuration() {
-    let place = place(&format!(
-        "[[map]]\npath = \"room.csv\"\n{QUICK}\n[[map]]\npath = \"room.csv\"\n{QUICK}\
-         gate = [\"all@0.5:1.0<=1\"]\nout = \"audits/office\"\njunit = \"audits/office.xml\"\n\
-         sarif = \"more/office.sarif\"\nshare-safe = true\n"
-    ));
-    let absolute = place.path("ci/unlift.toml").display().to_string();
-    for config in ["ci/unlift.toml", &absolute] {
-        place.ends(&format!("check {config} --quiet"), 1);
-        assert!(place.path("ci/audits/office.xml").is_file());
-        let log = place.json("ci/more/office.sarif");
-        let result = &log["runs"][0]["results"][0];
-        let at = &result["locations"][0]["physicalLocation"];
-        assert_eq!(at["artifactLocation"]["uri"], "ci/unlift.toml");
-        assert_eq!(at["region"]["startLine"], 8);
-        let said = result["message"]["text"].as_str().unwrap();
-        assert!(said.contains("; olc, oracle at 0.50, joint, recovered within 1.0 x"), "{said}");
-    }
-}
-
-#[test]
 fn an_audit_that_cannot_run_does_not_keep_the_others() {
     let place = Place::with_room(400);
     // The configuration has a default path.
@@ -126,7 +105,7 @@ fn no_audit_writes_over_another_or_over_what_is_read() {
     wrong.push((format!("map = [{one}, {one}]\n"), expected.to_owned()));
     let images = "[[images]]\npath = \"photos\"\nout = \"images\"\n";
     for (key, file) in
-        [("junit", "unlift.toml"), ("sarif", "photos/a.jpg"), ("junit", "./room.csv")]
+        [("junit", "unlift.toml"), ("junit", "photos/a.jpg"), ("junit", "./room.csv")]
     {
         let more = format!("gate = \"all:1.0<=100\"\n{key} = \"{file}\"\nforce = true\n{images}");
         let expected = format!("[[map]]: {key}: expected a file that is not read, found {file}");

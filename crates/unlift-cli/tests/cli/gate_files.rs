@@ -1,5 +1,5 @@
-//! `--junit` and `--sarif`: files beside the audit that replace nothing else. Other tests check
-//! their content.
+//! `--junit`: a file beside the audit that replaces nothing else. Other tests check
+//! its content.
 
 use std::fs;
 
@@ -10,7 +10,7 @@ const AUDIT: &str =
 const GATES: &str = "--gate all@0.5:0.25<=100 --gate olc:0.25<=1 --gate ppl:0.25:gain<=1";
 
 #[test]
-fn gates_are_test_cases_and_rules() {
+fn gates_are_test_cases() {
     let place = Place::with_room(500);
     fs::create_dir(place.path("my maps")).unwrap();
     fs::rename(place.path("room.csv"), place.path("my maps/room.csv")).unwrap();
@@ -18,7 +18,7 @@ fn gates_are_test_cases_and_rules() {
     #[cfg(unix)]
     std::os::unix::fs::symlink("my maps", place.path("maps+")).unwrap();
     let audit = AUDIT.replace("room.csv", "maps+/room.csv");
-    place.ends(&format!("{audit} {GATES} --junit gates.xml --sarif gates.sarif"), 1);
+    place.ends(&format!("{audit} {GATES} --junit gates.xml"), 1);
     let junit = place.text("gates.xml");
     for part in [
         "<testsuite name=\"maps+/room.csv\" tests=\"3\" failures=\"2\" errors=\"0\"",
@@ -27,18 +27,9 @@ fn gates_are_test_cases_and_rules() {
     ] {
         assert!(junit.contains(part), "{part}\n{junit}");
     }
-    let run = &place.json("gates.sarif")["runs"][0];
-    let results = run["results"].as_array().unwrap();
-    let failed: Vec<_> = results.iter().map(|result| &result["ruleId"]).collect();
-    assert_eq!(failed, ["olc:0.25<=1", "ppl:0.25:gain<=1"]);
-    let uri = &results[0]["locations"][0]["physicalLocation"]["artifactLocation"]["uri"];
-    assert_eq!(uri, "maps%2B/room.csv");
-    assert_eq!(run["automationDetails"]["id"], "unlift/maps%2B/room.csv/");
     // Files of a share-safe audit do not name the map.
-    place.ends(&format!("{audit} {GATES} --junit g.xml --sarif g.sarif --share-safe"), 1);
-    for name in ["g.xml", "g.sarif"] {
-        assert!(!place.text(name).contains("room"), "{name}");
-    }
+    place.ends(&format!("{audit} {GATES} --junit g.xml --share-safe"), 1);
+    assert!(!place.text("g.xml").contains("room"));
 }
 
 #[test]
@@ -46,14 +37,11 @@ fn images_that_cannot_be_used_are_an_error_beside_the_gates() {
     let place = Place::with_photos(&["a.jpg", "b.png"]);
     place.write("photos/c.png", "no picture");
     let line = "audit images photos --schemes cp2d --inlier-ratios 1 --k 5 --quiet --out a";
-    place.ends(&format!("{line} --gate cp2d:10<=100 --junit g.xml --sarif g.sarif"), 3);
+    place.ends(&format!("{line} --gate cp2d:10<=100 --junit g.xml"), 3);
     let said = "1 of 3 images could not be used, and are in no figure";
     let junit = place.text("g.xml");
     assert!(junit.contains("failures=\"0\" errors=\"1\""), "{junit}");
     assert!(junit.contains(&format!("<error message=\"{said}\"")), "{junit}");
-    let invocation = &place.json("g.sarif")["runs"][0]["invocations"][0];
-    assert_eq!(invocation["executionSuccessful"], false);
-    assert_eq!(invocation["toolExecutionNotifications"][0]["message"]["text"], said);
 }
 
 #[test]
@@ -73,7 +61,6 @@ fn files_of_gates_replace_their_own_kind_and_nothing_else() {
             "--junit room.csv --force",
             "--junit: room.csv: expected a file that is not read, found the input room.csv".to_owned(),
         ),
-        ("--junit g --sarif ./g", format!("--sarif: ./g: {own} --junit")),
         // Over the report of the same run.
         ("--junit a/report.html --force", format!("--junit: a/report.html: {own} --out")),
     ] {
@@ -85,7 +72,7 @@ fn files_of_gates_replace_their_own_kind_and_nothing_else() {
     assert!(told.contains("--gate <GATE>"), "without a gate it would say that all held: {told}");
     for _ in 0..2 {
         // Missing folders are created, as for the report.
-        place.ends(&format!("{line} --junit g.xml --sarif new/er/g.sarif"), 0);
-        assert!(place.path("new/er/g.sarif").is_file());
+        place.ends(&format!("{line} --junit new/er/g.xml"), 0);
+        assert!(place.path("new/er/g.xml").is_file());
     }
 }

@@ -30,8 +30,6 @@ pub enum Kind {
     Picture,
     /// JUnit XML whose root element is named unlift.
     Junit,
-    /// SARIF whose first run is by unlift.
-    Sarif,
     /// A table of figures: CSV with the columns of `TABLE_MARKS`, or LaTeX or Markdown with a
     /// comment that names unlift.
     Table,
@@ -83,9 +81,6 @@ impl Kind {
             Self::Features => has_at(path, SUPERBLOCK, FEATURES_MARK),
             Self::Picture => has_at(path, PNG_HEAD, PICTURE_MARK),
             Self::Junit => begins(path, &[JUNIT_MARK]),
-            Self::Sarif => is_json(path, |log| {
-                log["version"].is_string() && log["runs"][0]["tool"]["driver"]["name"] == "unlift"
-            }),
             Self::Table => begins(path, &TABLE_MARKS),
             Self::Curves => begins(path, &[CURVES_MARK]),
         }
@@ -104,7 +99,6 @@ impl fmt::Display for Kind {
             Self::Features => f.write_str("features"),
             Self::Picture => f.write_str("a picture"),
             Self::Junit => f.write_str("gates as JUnit XML"),
-            Self::Sarif => f.write_str("gates as SARIF"),
             Self::Table => f.write_str("a table"),
             Self::Curves => f.write_str("curves"),
         }
@@ -138,10 +132,9 @@ mod tests {
     use std::fs;
 
     /// Stage files, features, models and pictures are tested elsewhere.
-    const OURS: [(Kind, &str); 9] = [
+    const OURS: [(Kind, &str); 8] = [
         (Kind::AuditJson, r#"{"unlift": "0.1.0", "schema": 1, "results": []}"#),
         (Kind::Manifest, r#"{"unlift": {}, "parts": []}"#),
-        (Kind::Sarif, r#"{"version": "2", "runs": [{"tool": {"driver": {"name": "unlift"}}}]}"#),
         (Kind::Page, "<!doctype html>\n<head><meta name=\"generator\" content=\"unlift\">"),
         (Kind::Junit, "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"unlift\" t"),
         (Kind::Curves, "<?xml version=\"1.0\" encoding=\"UTF-8\"?><!-- unlift curves --><svg>"),

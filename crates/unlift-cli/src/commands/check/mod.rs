@@ -31,8 +31,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<Outcome> {
     let place = |entry: &Entry| at(entry.line, &format!("[[{}]]", entry.kind));
     let mut audits = Vec::new();
     for entry in &entries {
-        let mut audit = parsed(entry).map_err(|what| usage(format!("{}: {what}", place(entry))))?;
-        result_mut(&mut audit).asked_at = Some((in_repository(&args.config), entry.line));
+        let audit = parsed(entry).map_err(|what| usage(format!("{}: {what}", place(entry))))?;
         audits.push((entry, audit));
     }
     // All paths are relative to the configuration.
@@ -97,28 +96,6 @@ fn result(audit: &AuditCommand) -> &ResultArgs {
     }
 }
 
-fn result_mut(audit: &mut AuditCommand) -> &mut ResultArgs {
-    match audit {
-        AuditCommand::Map(args) => &mut args.result,
-        AuditCommand::Images(args) => &mut args.result,
-        AuditCommand::Released(args) => &mut args.result,
-        AuditCommand::Sequence(args) => &mut args.result,
-        AuditCommand::Again(args) => &mut args.result,
-    }
-}
-
-/// Returns the path of the configuration within its repository, for files that are shown to others.
-fn in_repository(config: &Path) -> String {
-    let here = std::env::current_dir().ok();
-    let within = here.and_then(|here| config.strip_prefix(here).ok());
-    let named = match within {
-        Some(within) => within,
-        None if config.is_absolute() => config.file_name().map_or(config, Path::new),
-        None => config.strip_prefix(".").unwrap_or(config),
-    };
-    named.display().to_string()
-}
-
 fn inputs(audit: &AuditCommand) -> Vec<&Path> {
     match audit {
         AuditCommand::Map(args) => audit_map::inputs(args),
@@ -139,7 +116,7 @@ fn apart(
     let mut taken: Vec<(PathBuf, usize)> = Vec::new();
     for (at, (entry, audit)) in audits.iter().enumerate() {
         let result = result(audit);
-        let files = [("junit", &result.junit), ("sarif", &result.sarif)];
+        let files = [("junit", &result.junit)];
         let files = files.into_iter().filter_map(|(key, path)| Some((key, path.as_ref()?, None)));
         let own = [PAGE, FIGURES].map(|name| ("out", &result.out, Some(name)));
         for (key, path, name) in own.into_iter().chain(files) {
