@@ -85,7 +85,6 @@ pub use given::by_point;
 pub use journal::Journal;
 pub use lengths::{Extent, SaidOfLengths, check_scale, check_thresholds};
 pub use maps::Job;
-pub use memory::{peak_bytes, total_bytes};
 pub use outputs::{FIGURES, PAGE, Shown, check_file, check_file_of, open_audit, refused};
 pub use prepare::{OutlierFilter, Preparation, Prepared, prepare};
 pub use progress::{Progress, Quiet};

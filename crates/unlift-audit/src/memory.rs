@@ -1,11 +1,6 @@
 /// Returns the peak resident memory of this process in bytes, if the system reports it (Linux).
-pub fn peak_bytes() -> Option<u64> {
+pub(crate) fn peak_bytes() -> Option<u64> {
     kibibytes(&std::fs::read_to_string("/proc/self/status").ok()?, "VmHWM:")
-}
-
-/// Returns the memory of this machine in bytes, if the system reports it (Linux).
-pub fn total_bytes() -> Option<u64> {
-    kibibytes(&std::fs::read_to_string("/proc/meminfo").ok()?, "MemTotal:")
 }
 
 /// Reads the number of kibibytes after `name`, and returns bytes.

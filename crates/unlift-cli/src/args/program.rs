@@ -44,16 +44,6 @@ pub struct ModelsArgs {
     pub json: bool,
 }
 
-/// Options of `doctor`.
-#[derive(Debug, Args)]
-#[command(after_help = "\
-Paste the output into a bug report. It names no folders or files, and unlift sends nothing.")]
-pub struct DoctorArgs {
-    /// Print a JSON object in place of the text
-    #[arg(long)]
-    pub json: bool,
-}
-
 /// Options of `completions`.
 #[derive(Debug, Args)]
 #[command(after_help = "\

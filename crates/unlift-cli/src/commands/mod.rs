@@ -58,7 +58,6 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Invert(args) => invert::run(&args),
         Command::Schemes => about::schemes(),
         Command::Models(args) => about::models(&args),
-        Command::Doctor(args) => about::doctor(&args),
         Command::Completions(args) => about::completions(&args),
         Command::Man(args) => about::man(&args),
     }

@@ -1,4 +1,4 @@
-//! Help, completions, manual pages and `doctor`.
+//! Help, completions, and manual pages.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ fn help_is_part_of_the_interface() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/snapshots");
     let commands = ",demo,audit map,audit images,audit released,audit sequence,audit again,check,obfuscate,neighbors oracle,neighbors find,\
                     recover,evaluate,export,table,compare,paper,features,invert,schemes,\
-                    models,doctor,completions,man";
+                    models,completions,man";
     for command in commands.split(',') {
         let (text, _) = place.ends(&format!("{command} --help"), 0);
         let name = if command.is_empty() { "unlift" } else { command }.replace(' ', "-");
@@ -38,19 +38,6 @@ fn every_command_has_a_manual_page_and_every_shell_completes() {
         let script = place.ends(&format!("completions {shell}"), 0).0;
         assert!(script.contains("oracle-noise") && script.contains("unlift"), "{shell}");
     }
-}
-
-#[test]
-fn the_doctor_tells_what_a_report_of_a_defect_needs() {
-    let place = Place::empty();
-    let text = place.ends("doctor", 0).0;
-    let names: Vec<&str> = text.lines().filter_map(|line| line.split_whitespace().next()).collect();
-    assert_eq!(names, ["version", "instructions", "threads", "memory", "models", "browser"]);
-    let object = place.prints("doctor --json", 0);
-    assert!(object["threads"].as_u64() > Some(0));
-    let n_models = |name: &str| object[name].as_array().map_or(0, Vec::len);
-    assert!(n_models("models") > 0 && n_models("models_missing") > 0, "{object}");
-    assert!(object["version"].as_str().is_some_and(|v| v.starts_with(env!("CARGO_PKG_VERSION"))));
 }
 
 /// `NO_COLOR` disables colors (clap, indicatif). This test has no terminal, so it only checks
