@@ -19,7 +19,7 @@ pub use audits::{
     AuditSequenceArgs, CheckArgs, MapArgs, ProtectArgs, ResultArgs,
 };
 pub use images::{FeaturesArgs, InvertArgs};
-pub use program::{CompletionsArgs, DemoArgs, ManArgs, ModelsArgs};
+pub use program::{CompletionsArgs, DemoArgs, ModelsArgs};
 pub use results::{CompareArgs, PaperArgs, TableArgs};
 pub use stages::{
     EvaluateArgs, ExportArgs, FindArgs, NeighborsCommand, ObfuscateArgs, OracleArgs, RecoverArgs,
@@ -84,7 +84,7 @@ fn numbers_may_be_negative(command: clap::Command) -> clap::Command {
 const GROUPS: [(&str, &str); 3] = [
     ("Audits", "demo audit check compare table"),
     ("Stages", "obfuscate neighbors recover evaluate export features invert"),
-    ("Tools", "paper schemes models completions man help"),
+    ("Tools", "paper schemes models completions help"),
 ];
 
 /// Lists the commands under the headings of `GROUPS`, because clap has one heading for all commands.
@@ -146,8 +146,6 @@ pub enum Command {
     Models(ModelsArgs),
     /// Print a completion script for a shell
     Completions(CompletionsArgs),
-    /// Print the manual page of unlift or of one command
-    Man(ManArgs),
 }
 
 /// Kinds of audits.

@@ -56,15 +56,3 @@ pub struct CompletionsArgs {
     #[arg(value_name = "SHELL", value_enum)]
     pub shell: Shell,
 }
-
-/// Options of `man`.
-#[derive(Debug, Args)]
-#[command(after_help = "\
-Examples:
-  unlift man | man -l -
-  unlift man audit map > unlift-audit-map.1")]
-pub struct ManArgs {
-    /// A command and its subcommand, for example audit map
-    #[arg(value_name = "COMMAND")]
-    pub command: Vec<String>,
-}

@@ -1,14 +1,13 @@
-//! Commands about the program: schemes, models, completions, man.
+//! Commands about the program: schemes, models, completions.
 
 use clap_complete::generate;
-use clap_mangen::Man;
 use serde_json::json;
 use unlift::OneLine;
 use unlift::obfuscate::{ON_REQUEST, all};
 use unlift_vision::network::{Entry, Folders, MODELS, Place};
 
-use crate::args::{Cli, CompletionsArgs, ManArgs, ModelsArgs};
-use crate::exit::{Outcome, usage};
+use crate::args::{Cli, CompletionsArgs, ModelsArgs};
+use crate::exit::Outcome;
 use crate::output::print;
 
 pub fn schemes() -> anyhow::Result<Outcome> {
@@ -78,30 +77,5 @@ pub fn completions(args: &CompletionsArgs) -> anyhow::Result<Outcome> {
     let mut script = Vec::new();
     generate(args.shell, &mut Cli::definition(), NAME, &mut script);
     print(&String::from_utf8(script)?)?;
-    Ok(Outcome::Done)
-}
-
-pub fn man(args: &ManArgs) -> anyhow::Result<Outcome> {
-    let mut found = Cli::definition();
-    // `build` adds the global options.
-    found.build();
-    let mut name = NAME.to_owned();
-    for word in &args.command {
-        let Some(next) = found.find_subcommand(word) else {
-            let names = found.get_subcommands().map(clap::Command::get_name);
-            let names: Vec<&str> = names.filter(|name| *name != "help").collect();
-            return Err(match names.as_slice() {
-                [] => usage(format!("{name}: expected no further command, found {word}")),
-                names => {
-                    usage(format!("{name}: expected one of {}, found {word}", names.join(", ")))
-                }
-            });
-        };
-        name = format!("{name} {word}");
-        found = next.clone();
-    }
-    let mut page = Vec::new();
-    Man::new(found).render(&mut page)?;
-    print(&String::from_utf8(page)?)?;
     Ok(Outcome::Done)
 }

@@ -59,6 +59,5 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Schemes => about::schemes(),
         Command::Models(args) => about::models(&args),
         Command::Completions(args) => about::completions(&args),
-        Command::Man(args) => about::man(&args),
     }
 }

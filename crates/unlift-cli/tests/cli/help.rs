@@ -1,4 +1,4 @@
-//! Help, completions, and manual pages.
+//! Help and completions.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ fn help_is_part_of_the_interface() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/snapshots");
     let commands = ",demo,audit map,audit images,audit released,audit sequence,audit again,check,obfuscate,neighbors oracle,neighbors find,\
                     recover,evaluate,export,table,compare,paper,features,invert,schemes,\
-                    models,completions,man";
+                    models,completions";
     for command in commands.split(',') {
         let (text, _) = place.ends(&format!("{command} --help"), 0);
         let name = if command.is_empty() { "unlift" } else { command }.replace(' ', "-");
@@ -25,15 +25,8 @@ fn help_is_part_of_the_interface() {
 }
 
 #[test]
-fn every_command_has_a_manual_page_and_every_shell_completes() {
+fn every_shell_completes() {
     let place = Place::empty();
-    for command in ["", "demo", "audit map", "neighbors find", "man"] {
-        let page = place.ends(&format!("man {command}"), 0).0;
-        let name = format!("unlift {command}").trim().replace(' ', "\\-");
-        assert!(page.contains(&format!(".SH NAME\n{name} ")), "{command}: {page}");
-    }
-    let stderr = place.complains("man audit maps", 2);
-    assert!(stderr.starts_with("unlift: unlift audit: expected one of map, images"), "{stderr}");
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
         let script = place.ends(&format!("completions {shell}"), 0).0;
         assert!(script.contains("oracle-noise") && script.contains("unlift"), "{shell}");
