@@ -19,7 +19,7 @@ pub enum Outcome {
 }
 
 /// Exit code for a wrong command line, as in clap.
-pub const USAGE: u8 = 2;
+const USAGE: u8 = 2;
 /// Exit code for files that cannot be read, written or used, even a single image of many, and for a
 /// stdout that cannot be written. A place that cannot be written is found before the work starts;
 /// on the command line it is a usage error, see [`unlift_audit::check_file`].
@@ -91,7 +91,7 @@ pub fn finish(result: anyhow::Result<Outcome>) -> u8 {
     }
 }
 
-pub fn lines(error: &anyhow::Error) -> Vec<String> {
+fn lines(error: &anyhow::Error) -> Vec<String> {
     let of_audit = |error: &anyhow::Error| {
         let error = error.downcast_ref::<unlift_audit::Error>();
         error.and_then(|error| error.advice().map(str::to_owned))
@@ -106,7 +106,7 @@ pub fn line(error: &anyhow::Error) -> String {
     format!("unlift: {error:#}")
 }
 
-pub fn code(error: &anyhow::Error) -> u8 {
+fn code(error: &anyhow::Error) -> u8 {
     if let Some(advised) = error.downcast_ref::<Advised>() {
         return code(&advised.error);
     }

@@ -58,7 +58,7 @@ pub fn gate_lines(document: &Document) -> String {
 }
 
 /// Returns the figure found for a gate, its attack, and the reason if the gate failed for another reason.
-pub fn gate_found(gate: &GateResult) -> String {
+fn gate_found(gate: &GateResult) -> String {
     let of = gate.of.as_ref().map_or_else(String::new, |of| format!(": {of}"));
     let found = gate.found_percent.map(|found| match is_of_localization(gate) {
         true => format!("found {found:.2} times the unprotected error{of}"),

@@ -68,7 +68,7 @@ pub use attack::Given;
 pub use columns::align;
 pub use document::Document;
 pub use error::Error;
-pub use gates::{gate_found, gate_lines};
+pub use gates::gate_lines;
 pub use html::render;
 pub use junit::junit;
 pub use opening::Opening;

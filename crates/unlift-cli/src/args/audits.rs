@@ -1,4 +1,4 @@
-//! Arguments of `audit map`, `audit images`, `audit sequence`, `audit again`, `audit released` and `check`.
+//! Arguments of `audit map`, `audit images`, `audit sequence`, `audit again` and `audit released`.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -626,37 +626,4 @@ pub struct AuditReleasedArgs {
     // Last, because headings stand in the order of their first options.
     #[command(flatten)]
     pub attack: AttackArgs,
-}
-
-/// Options of `check`.
-#[derive(Debug, Args)]
-#[command(after_help = "\
-A configuration has one table per audit: [[map]], [[images]] or [[released]]. A table has a path and
-the long options of unlift audit map, images or released; only --json is not allowed. A list is an
-array, or a string with commas. Paths are relative to the configuration file.
-
-  [[map]]
-  path = \"maps/office\"
-  scale = 1
-  schemes = [\"ppl\", \"ppl+\"]
-  gate = [\"all@0.5:0.10<=20\"]
-  out = \"audits/office\"
-  junit = \"audits/office.xml\"
-  share-safe = true
-
-All audits run, even if some fail. unlift prints one line per audit.
-
-Examples:
-  unlift check
-  unlift check ci/unlift.toml --quiet
-
-Exit codes: 0 done, 1 a gate failed, 2 wrong usage or a wrong configuration, 3 bad input. The
-largest code of all audits counts.")]
-pub struct CheckArgs {
-    /// A configuration file
-    #[arg(value_name = "CONFIG", default_value = "unlift.toml")]
-    pub config: PathBuf,
-    /// Show no progress on stderr
-    #[arg(long)]
-    pub quiet: bool,
 }

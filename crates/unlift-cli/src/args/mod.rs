@@ -1,8 +1,6 @@
 //! The command line as types; `values.rs` parses the strings.
 
 mod audits;
-#[cfg(test)]
-mod examples;
 mod images;
 mod program;
 mod results;
@@ -16,7 +14,7 @@ use crate::values;
 
 pub use audits::{
     AttackArgs, AuditAgainArgs, AuditImagesArgs, AuditMapArgs, AuditReleasedArgs,
-    AuditSequenceArgs, CheckArgs, MapArgs, ProtectArgs, ResultArgs,
+    AuditSequenceArgs, MapArgs, ProtectArgs, ResultArgs,
 };
 pub use images::{FeaturesArgs, InvertArgs};
 pub use program::{CompletionsArgs, DemoArgs, ModelsArgs};
@@ -36,7 +34,6 @@ Examples:
   unlift demo                                  protect and attack two photos and a map
   unlift audit map PROJECT/sparse/0 --scale 1  audit a COLMAP map that is in meters
   unlift audit images photos                   audit the keypoints of photos
-  unlift check                                 run all audits of unlift.toml, for CI
   unlift schemes                               list the schemes
 
 Exit codes: 0 done, 1 a gate failed, 2 wrong usage, 3 bad input.
@@ -82,7 +79,7 @@ fn numbers_may_be_negative(command: clap::Command) -> clap::Command {
 
 /// The commands under each heading of `unlift --help`.
 const GROUPS: [(&str, &str); 3] = [
-    ("Audits", "demo audit check compare table"),
+    ("Audits", "demo audit compare table"),
     ("Stages", "obfuscate neighbors recover evaluate export features invert"),
     ("Tools", "paper schemes models completions help"),
 ];
@@ -117,8 +114,6 @@ pub enum Command {
     /// Audit a map, images or your own scheme: measure how much an attack recovers
     #[command(subcommand)]
     Audit(AuditCommand),
-    /// Run all audits of a configuration file, unlift.toml
-    Check(CheckArgs),
     /// Compare two audits, and fail if the later one leaks more
     Compare(CompareArgs),
     /// Print the results of an audit as a table for a paper, or draw them as curves
@@ -179,6 +174,26 @@ mod tests {
         match Cli::read(line)?.command {
             Command::Audit(AuditCommand::Map(args)) => Ok(*args),
             other => panic!("{other:?}"),
+        }
+    }
+
+    /// The command lines of `docs/examples` parse, and build the version that builds this crate.
+    #[test]
+    fn examples_are_command_lines() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/examples");
+        for name in ["github-action.yml", "gitlab-ci.yml", "Dockerfile"] {
+            let text = std::fs::read_to_string(folder.join(name)).expect(name);
+            let image = format!("rust:{}-", env!("CARGO_PKG_RUST_VERSION"));
+            assert_eq!(text.contains("rust:"), text.contains(&image), "{name}");
+            let lines = text.lines().filter_map(|line| line.split_once("unlift audit "));
+            let mut n = 0;
+            for (_, line) in lines {
+                let words = line.split(' ').map(|word| word.trim_matches('\''));
+                let read = Cli::read(["unlift", "audit"].into_iter().chain(words));
+                read.unwrap_or_else(|error| panic!("{name}: {line}: {error}"));
+                n += 1;
+            }
+            assert_eq!(n, 1, "{name}");
         }
     }
 

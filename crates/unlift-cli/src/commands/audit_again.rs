@@ -26,13 +26,13 @@ pub fn run(args: &AuditAgainArgs) -> anyhow::Result<Outcome> {
 }
 
 /// Returns the input paths, which must not be overwritten.
-pub fn inputs(args: &AuditAgainArgs) -> Vec<&Path> {
+fn inputs(args: &AuditAgainArgs) -> Vec<&Path> {
     let descriptors = [&args.descriptors, &args.descriptors_of_b].into_iter().flatten();
     [&args.a, &args.b].into_iter().chain(descriptors).map(|path| path.as_path()).collect()
 }
 
 /// Audits two releases and writes the results.
-pub fn audit(args: &AuditAgainArgs) -> anyhow::Result<Finished> {
+fn audit(args: &AuditAgainArgs) -> anyhow::Result<Finished> {
     let started = Instant::now();
     let rules = Rules::new(inputs(args), args.result.force);
     let shown = if args.result.share_safe { Shown::Figures } else { Shown::Points };

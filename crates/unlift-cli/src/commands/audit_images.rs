@@ -42,14 +42,14 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
 }
 
 /// Returns the input paths, which must not be overwritten.
-pub fn inputs(args: &AuditImagesArgs) -> Vec<&Path> {
+fn inputs(args: &AuditImagesArgs) -> Vec<&Path> {
     let others = args.photos.as_deref().into_iter().chain(args.inverter.as_deref());
     let others = others.chain(args.protect.public_descriptors.as_deref());
     [args.path.as_path()].into_iter().chain(others).collect()
 }
 
 /// Audits images and writes the results; returns no results if no image can be used.
-pub fn audit(args: &AuditImagesArgs) -> anyhow::Result<(Option<Finished>, Used)> {
+fn audit(args: &AuditImagesArgs) -> anyhow::Result<(Option<Finished>, Used)> {
     let started = Instant::now();
     let mut plan = plan(args)?;
     let painted = painted(args)?;

@@ -44,7 +44,7 @@ pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
 }
 
 /// Audits a map and writes the results.
-pub fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
+fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
     let started = Instant::now();
     let shown = match (args.result.share_safe, args.write_clouds) {
         (true, _) => Shown::Figures,
@@ -131,7 +131,7 @@ fn inversion(
 }
 
 /// Returns the input paths, which must not be overwritten.
-pub fn inputs(args: &AuditMapArgs) -> Vec<&Path> {
+fn inputs(args: &AuditMapArgs) -> Vec<&Path> {
     let beside = beside(args).map(|(_, path)| path);
     let of_pictures = args.photos.iter().chain(&args.inverter).chain(&args.localize);
     let of_pictures = of_pictures.chain(&args.protect.public_descriptors);

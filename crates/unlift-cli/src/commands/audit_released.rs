@@ -35,7 +35,7 @@ pub fn run(args: &AuditReleasedArgs) -> anyhow::Result<Outcome> {
 }
 
 /// Audits released records and writes the results.
-pub fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
+fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
     let started = Instant::now();
     let shown = match (args.result.share_safe, args.write_clouds) {
         (true, _) => Shown::Figures,
@@ -76,7 +76,7 @@ pub fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
 }
 
 /// Returns the input paths, which must not be overwritten.
-pub fn inputs(args: &AuditReleasedArgs) -> Vec<&Path> {
+fn inputs(args: &AuditReleasedArgs) -> Vec<&Path> {
     let stages = [args.released.as_path(), &args.truth].into_iter();
     stages.chain(args.descriptors.as_deref()).chain(lists(args)).collect()
 }

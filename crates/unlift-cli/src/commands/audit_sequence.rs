@@ -33,12 +33,12 @@ pub fn run(args: &AuditSequenceArgs) -> anyhow::Result<Outcome> {
 }
 
 /// Returns the input paths, which must not be overwritten.
-pub fn inputs(args: &AuditSequenceArgs) -> Vec<&Path> {
+fn inputs(args: &AuditSequenceArgs) -> Vec<&Path> {
     vec![&args.model, &args.path]
 }
 
 /// Audits a sequence and writes the results.
-pub fn audit(args: &AuditSequenceArgs) -> anyhow::Result<Finished> {
+fn audit(args: &AuditSequenceArgs) -> anyhow::Result<Finished> {
     let started = Instant::now();
     let plan = plan(args)?;
     let pose_error = pose_error(args)?;

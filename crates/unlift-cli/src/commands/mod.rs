@@ -6,7 +6,6 @@ mod audit_images;
 mod audit_map;
 mod audit_released;
 mod audit_sequence;
-mod check;
 pub mod common;
 mod compare;
 mod evaluate;
@@ -42,7 +41,6 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Audit(AuditCommand::Released(args)) => audit_released::run(&args),
         Command::Audit(AuditCommand::Sequence(args)) => audit_sequence::run(&args),
         Command::Audit(AuditCommand::Again(args)) => audit_again::run(&args),
-        Command::Check(args) => check::run(&args),
         Command::Obfuscate(args) => with_threads(None, || obfuscate::run(&args)),
         Command::Neighbors(NeighborsCommand::Oracle(args)) => {
             with_threads(None, || neighbors::oracle(&args))

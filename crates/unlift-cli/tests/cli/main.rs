@@ -5,7 +5,6 @@ mod common;
 
 mod again;
 mod audit_map;
-mod check;
 mod compare;
 mod corpus;
 mod export;

@@ -65,7 +65,7 @@ impl Rules {
     }
 
     /// Returns the input that is the same file as `target`, under any path.
-    pub fn input_at(&self, target: &Path) -> Option<&Path> {
+    fn input_at(&self, target: &Path) -> Option<&Path> {
         let files = self.files.get_or_init(|| files(&self.inputs));
         files.get(&identity(target)?).map(PathBuf::as_path)
     }
