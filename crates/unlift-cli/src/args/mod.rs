@@ -17,7 +17,7 @@ pub use audits::{
     AuditSequenceArgs, MapArgs, ProtectArgs, ResultArgs,
 };
 pub use images::{FeaturesArgs, InvertArgs};
-pub use program::{CompletionsArgs, DemoArgs, ModelsArgs};
+pub use program::{DemoArgs, ModelsArgs};
 pub use results::{CompareArgs, PaperArgs, TableArgs};
 pub use stages::{
     EvaluateArgs, ExportArgs, FindArgs, NeighborsCommand, ObfuscateArgs, OracleArgs, RecoverArgs,
@@ -81,7 +81,7 @@ fn numbers_may_be_negative(command: clap::Command) -> clap::Command {
 const GROUPS: [(&str, &str); 3] = [
     ("Audits", "demo audit compare table"),
     ("Stages", "obfuscate neighbors recover evaluate export features invert"),
-    ("Tools", "paper schemes models completions help"),
+    ("Tools", "paper schemes models help"),
 ];
 
 /// Lists the commands under the headings of `GROUPS`, because clap has one heading for all commands.
@@ -139,8 +139,6 @@ pub enum Command {
     Schemes,
     /// List the networks: purpose, license, hash, owner, and whether they are installed
     Models(ModelsArgs),
-    /// Print a completion script for a shell
-    Completions(CompletionsArgs),
 }
 
 /// Kinds of audits.

@@ -4,7 +4,6 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::Args;
-use clap_complete::Shell;
 
 use crate::values;
 
@@ -42,17 +41,4 @@ pub struct ModelsArgs {
     /// Print a JSON list in place of the text
     #[arg(long)]
     pub json: bool,
-}
-
-/// Options of `completions`.
-#[derive(Debug, Args)]
-#[command(after_help = "\
-Examples:
-  unlift completions bash > ~/.local/share/bash-completion/completions/unlift
-  unlift completions zsh > ~/.zfunc/_unlift
-  unlift completions fish > ~/.config/fish/completions/unlift.fish")]
-pub struct CompletionsArgs {
-    /// Name of the shell
-    #[arg(value_name = "SHELL", value_enum)]
-    pub shell: Shell,
 }

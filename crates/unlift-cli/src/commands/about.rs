@@ -1,12 +1,11 @@
-//! Commands about the program: schemes, models, completions.
+//! Commands about the program: schemes and models.
 
-use clap_complete::generate;
 use serde_json::json;
 use unlift::OneLine;
 use unlift::obfuscate::{ON_REQUEST, all};
 use unlift_vision::network::{Entry, Folders, MODELS, Place};
 
-use crate::args::{Cli, CompletionsArgs, ModelsArgs};
+use crate::args::ModelsArgs;
 use crate::exit::Outcome;
 use crate::output::print;
 
@@ -69,13 +68,4 @@ fn here(place: Option<&Place>, folders: &Folders, entry: &Entry) -> String {
         Some(Place::File(path)) => OneLine(path.display()).to_string(),
         None => format!("no: {}", OneLine(folders.missing(entry))),
     }
-}
-
-const NAME: &str = "unlift";
-
-pub fn completions(args: &CompletionsArgs) -> anyhow::Result<Outcome> {
-    let mut script = Vec::new();
-    generate(args.shell, &mut Cli::definition(), NAME, &mut script);
-    print(&String::from_utf8(script)?)?;
-    Ok(Outcome::Done)
 }

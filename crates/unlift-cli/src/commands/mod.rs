@@ -56,6 +56,5 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Invert(args) => invert::run(&args),
         Command::Schemes => about::schemes(),
         Command::Models(args) => about::models(&args),
-        Command::Completions(args) => about::completions(&args),
     }
 }

@@ -1,4 +1,4 @@
-//! Help and completions.
+//! Help.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ fn help_is_part_of_the_interface() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/snapshots");
     let commands = ",demo,audit map,audit images,audit released,audit sequence,audit again,obfuscate,neighbors oracle,neighbors find,\
                     recover,evaluate,export,table,compare,paper,features,invert,schemes,\
-                    models,completions";
+                    models";
     for command in commands.split(',') {
         let (text, _) = place.ends(&format!("{command} --help"), 0);
         let name = if command.is_empty() { "unlift" } else { command }.replace(' ', "-");
@@ -21,15 +21,6 @@ fn help_is_part_of_the_interface() {
         let kept = std::fs::read_to_string(&file).expect("a snapshot (UPDATE_SNAPSHOTS=1)");
         assert_eq!(text, kept, "{command}: UPDATE_SNAPSHOTS=1 re-blesses");
         assert!(text.lines().all(|line| line.chars().count() <= 100), "{command}");
-    }
-}
-
-#[test]
-fn every_shell_completes() {
-    let place = Place::empty();
-    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
-        let script = place.ends(&format!("completions {shell}"), 0).0;
-        assert!(script.contains("oracle-noise") && script.contains("unlift"), "{shell}");
     }
 }
 
