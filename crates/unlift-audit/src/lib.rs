@@ -39,7 +39,7 @@
 //!
 //! | feature | compiles |
 //! | --- | --- |
-//! | `networks` | Learned features, the source `learned`, pictures ([`inversion`]), `paper` and `sequence`. |
+//! | `networks` | Learned features, the source `learned`, pictures ([`inversion`]) and `sequence`. |
 //! | `hdf5` | hloc's HDF5 files of features; writing them needs no feature. |
 //! | `sqlite` | COLMAP's `database.db`. |
 //! | `scans` | Maps in E57; LAS and PCD need no feature. |
@@ -66,8 +66,6 @@ pub mod localization;
 pub mod maps;
 mod memory;
 mod outputs;
-#[cfg(feature = "networks")]
-pub mod paper;
 mod prepare;
 mod progress;
 mod scene;

@@ -51,7 +51,6 @@ mod options;
 mod page_data;
 pub mod paper;
 pub mod pictures;
-pub mod printed;
 mod round;
 pub mod scene;
 mod sequence;

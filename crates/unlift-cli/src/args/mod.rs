@@ -18,7 +18,7 @@ pub use audits::{
 };
 pub use images::{FeaturesArgs, InvertArgs};
 pub use program::{DemoArgs, ModelsArgs};
-pub use results::{CompareArgs, PaperArgs, TableArgs};
+pub use results::{CompareArgs, TableArgs};
 pub use stages::{
     EvaluateArgs, ExportArgs, FindArgs, NeighborsCommand, ObfuscateArgs, OracleArgs, RecoverArgs,
 };
@@ -81,7 +81,7 @@ fn numbers_may_be_negative(command: clap::Command) -> clap::Command {
 const GROUPS: [(&str, &str); 3] = [
     ("Audits", "demo audit compare table"),
     ("Stages", "obfuscate neighbors recover evaluate export features invert"),
-    ("Tools", "paper schemes models help"),
+    ("Tools", "schemes models help"),
 ];
 
 /// Lists the commands under the headings of `GROUPS`, because clap has one heading for all commands.
@@ -133,8 +133,6 @@ pub enum Command {
     Features(FeaturesArgs),
     /// Paint pictures from descriptors and the positions of keypoints or recovered points
     Invert(InvertArgs),
-    /// Reproduce the paper's tables on its datasets, next to the published numbers
-    Paper(PaperArgs),
     /// List the schemes: how they hide points, what stays hidden, publication, patents
     Schemes,
     /// List the networks: purpose, license, hash, owner, and whether they are installed

@@ -16,8 +16,7 @@ mod image_stages;
 mod invert;
 mod neighbors;
 mod obfuscate;
-pub mod painter;
-mod paper;
+mod painter;
 mod plan;
 mod protection;
 mod recover;
@@ -51,7 +50,6 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Export(args) => export::run(&args),
         Command::Table(args) => table::run(&args),
         Command::Compare(args) => compare::run(&args),
-        Command::Paper(args) => paper::run(&args),
         Command::Features(args) => features::run(&args),
         Command::Invert(args) => invert::run(&args),
         Command::Schemes => about::schemes(),

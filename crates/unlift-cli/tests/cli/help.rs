@@ -9,7 +9,7 @@ fn help_is_part_of_the_interface() {
     let place = Place::empty();
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/snapshots");
     let commands = ",demo,audit map,audit images,audit released,audit sequence,audit again,obfuscate,neighbors oracle,neighbors find,\
-                    recover,evaluate,export,table,compare,paper,features,invert,schemes,\
+                    recover,evaluate,export,table,compare,features,invert,schemes,\
                     models";
     for command in commands.split(',') {
         let (text, _) = place.ends(&format!("{command} --help"), 0);

@@ -5,6 +5,7 @@ mod common;
 
 mod again;
 mod audit_map;
+mod claims;
 mod compare;
 mod corpus;
 mod export;
@@ -20,7 +21,6 @@ mod journal;
 mod layouts;
 mod models;
 mod outputs;
-mod paper;
 mod readme;
 mod released;
 mod sequence;
