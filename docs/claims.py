@@ -237,7 +237,7 @@ def main():
     parser.add_argument("--work", type=pathlib.Path, default=pathlib.Path("unlift-claims"), help="folder for the audits")
     parser.add_argument("--out", type=pathlib.Path, help="also write the table to this CSV file")
     options = parser.parse_args()
-    paper = list(figures())
+    paper = sorted(figures(), key=lambda figure: figure.table)
     if options.list:
         for table, title in sorted(set(TABLES.values())):
             of = [f.dataset for f in paper if f.table == table]
