@@ -22,7 +22,10 @@ fn the_papers_figures_stand_beside_ours() {
         said(&python.args(["--unlift", env!("CARGO_BIN_EXE_unlift")]).output().unwrap())
     };
     let (text, stderr) = claims("d --table 1,7 --images 2 --out claims.csv --work o");
-    assert!(stderr.contains("not here: fire, heads, office, pumpkin, redkitchen, stairs: "), "{stderr}");
+    assert!(
+        stderr.contains("not here: fire, heads, office, pumpkin, redkitchen, stairs: "),
+        "{stderr}"
+    );
     let map = place.json("o/chess/map-sift-oracle/audit.json");
     assert_eq!(map["input"]["scale_m_per_unit"], 2.0);
     let images = place.json("o/chess/images-sift-oracle/audit.json");
@@ -43,6 +46,8 @@ fn the_papers_figures_stand_beside_ours() {
         assert!((ours[2] - expected).abs() < 0.1 && ours[0] == 1.0, "{line}: {expected}");
     }
     assert_eq!(text.lines().count(), table.lines().count());
-    assert!(claims("--list").0.contains("table 13: density attacks on maps: 12-scenes; 18 figures"));
+    assert!(
+        claims("--list").0.contains("table 13: density attacks on maps: 12-scenes; 18 figures")
+    );
     assert!(claims("o").1.contains("expected folders of scenes in o, or --scale"));
 }

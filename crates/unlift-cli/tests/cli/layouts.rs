@@ -36,54 +36,11 @@ pub fn seven_scenes(place: &Place, scene: &str, n: usize) -> Vec<String> {
     names
 }
 
-/// Creates a scene of 12-Scenes with `n` frames, of which the first `n_test` are for tests.
-pub fn twelve_scenes(place: &Place, scene: &str, n_test: usize, n: usize) {
-    let split = format!(
-        "sequence0 [frames={n_test}] [start=0 ; end={}]\nsequence1 [frames={}] [start={n_test} ; end={}]\n",
-        n_test - 1,
-        n - n_test,
-        n - 1
-    );
-    place.write(&format!("{scene}/split.txt"), split);
-    for at in 0..n {
-        place.write_photo(&format!("{scene}/data/frame-{at:06}.color.jpg"), at as u32);
-        place.write(&format!("{scene}/data/frame-{at:06}.pose.txt"), pose(at));
-    }
-}
-
-/// Creates a scene of Cambridge Landmarks with these test photos, 2048 pixels wide, and a VisualSFM
-/// map.
-pub fn cambridge(place: &Place, scene: &str, names: &[&str]) {
-    let head = "Visual Landmark Dataset V1\nImageFile, Camera Position [X Y Z W P Q R]\n\n";
-    let (mut list, mut nvm) = (head.to_owned(), format!("NVM_V3\n\n{}\n", names.len()));
-    for (at, name) in names.iter().enumerate() {
-        let path = format!("{scene}/{name}");
-        place.write_photo(&path, at as u32);
-        let photo = image::open(place.path(&path)).unwrap();
-        photo.resize_exact(2048, 96, image::imageops::Nearest).save(place.path(&path)).unwrap();
-        let [x, y, z] = center(at);
-        list += &format!("{name} {x} {y} {z} 1 0 0 0\n");
-        nvm += &format!("{} 500 1 0 0 0 {x} {y} {z} 0 0\n", name.replace(".png", ".jpg"));
-    }
-    place.write(&format!("{scene}/dataset_test.txt"), list);
-    nvm += &format!("\n{N_POINTS}\n");
-    for [x, y, z] in synthetic::room(1, N_POINTS).points {
-        nvm += &format!("{x} {y} {z} 0 0 0 0\n");
-    }
-    place.write(&format!("{scene}/reconstruction.nvm"), nvm + "\n0\n");
-}
-
 /// Creates a COLMAP model of a room in `folder`; a unit is `unit` meters. All images see all
 /// points.
 pub fn model(place: &Place, folder: &str, names: &[String], unit: f64) {
     let points = synthetic::room(1, N_POINTS).points;
     write_model(place, folder, (names, [128, 96]), (&points, unit), |_, _| true);
-}
-
-/// Creates the database of such a model.
-pub fn database(place: &Place, name: &str, names: &[String]) {
-    let points = synthetic::room(1, N_POINTS).points;
-    write_database(&place.path(name), names, &points, |_, _| true);
 }
 
 /// Creates a COLMAP project of a room in `root`, with photos: each of 600 points is seen by two of
