@@ -16,7 +16,7 @@ mod image_stages;
 mod invert;
 mod neighbors;
 mod obfuscate;
-mod painter;
+pub mod painter;
 mod plan;
 mod protection;
 mod recover;
