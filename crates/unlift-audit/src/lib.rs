@@ -43,7 +43,7 @@
 //! | `hdf5` | hloc's HDF5 files of features; writing them needs no feature. |
 //! | `sqlite` | COLMAP's `database.db`. |
 //! | `scans` | Maps in E57; LAS and PCD need no feature. |
-//! | `parquet` | Stage files: lists of [`by_point`], and [`Journal`]. |
+//! | `parquet` | Stage files: lists of [`by_point`]. |
 
 pub mod again;
 mod audited;
@@ -59,8 +59,6 @@ mod given;
 pub mod images;
 #[cfg_attr(not(feature = "networks"), path = "absent/inversion.rs")]
 pub mod inversion;
-#[cfg_attr(not(feature = "parquet"), path = "absent/journal.rs")]
-mod journal;
 mod lengths;
 pub mod localization;
 pub mod maps;
@@ -80,7 +78,6 @@ pub use document::{evaluated, ordered, row};
 pub use error::Error;
 pub use gate::{Candidate, Figure, Gate};
 pub use given::by_point;
-pub use journal::Journal;
 pub use lengths::{Extent, SaidOfLengths, check_scale, check_thresholds};
 pub use maps::Job;
 pub use outputs::{FIGURES, PAGE, Shown, check_file, check_file_of, open_audit, refused};

@@ -4,8 +4,8 @@
 
 use std::path::Path;
 
-use unlift_audit::{Journal, Preparation, Quiet, by_point, prepare, sources};
-use unlift_vision::features::{AlikedOptions, Extraction, Extractor, SuperPointOptions};
+use unlift_audit::{Preparation, by_point, prepare, sources};
+use unlift_features::{AlikedOptions, Extraction, Extractor, SuperPointOptions};
 
 fn line<T, E: ToString>(result: Result<T, E>) -> String {
     result.err().expect("an error").to_string()
@@ -37,12 +37,6 @@ fn the_error_about_what_needs_a_feature_names_it() {
             "audit",
             "parquet",
             line(by_point(lists, &prepared, points.len(), &mut Vec::new())),
-        ),
-        (
-            "--journal: kept",
-            "audit",
-            "parquet",
-            line(Journal::open(Path::new("kept"), String::new(), &Quiet)),
         ),
     ];
     for (what, package, feature, found) in found {

@@ -25,7 +25,6 @@ use crate::document::{self, Provenance};
 use crate::doubts::{Spread, doubts};
 use crate::gate::{Gate, check_gates, gate_results};
 use crate::inversion::MapInversion;
-use crate::journal::Journal;
 use crate::lengths::{check_lengths_of_gates, check_scale};
 use crate::localization::{self, Cameras, Localize};
 use crate::prepare::{Preparation, Prepared, prepare};
@@ -67,7 +66,7 @@ pub struct Job<'a> {
     /// Length of the audit's unit in map units. Clouds are written in map units.
     pub unit_in_map_units: f64,
     /// Hides and attacks each tile as a map of its own. Then the page shows only where the map
-    /// leaks most, and no journal is kept.
+    /// leaks most.
     pub tiles: Option<Tiles>,
     /// Also writes clouds.
     pub write_clouds: bool,
@@ -75,9 +74,6 @@ pub struct Job<'a> {
     pub share_safe: bool,
     /// Makes pictures of recovered points; the plan measures with it, too.
     pub inversion: Option<Arc<MapInversion>>,
-    /// Keeps recovered points until the audit is complete and resumes from them. [`perform`] clears
-    /// it at the end.
-    pub journal: Option<Journal<'a>>,
     /// Receives the progress.
     pub progress: &'a dyn Progress,
     /// The command line, for the record.
@@ -148,7 +144,6 @@ impl<'a> Job<'a> {
             write_clouds: false,
             share_safe: false,
             inversion: None,
-            journal: None,
             progress: &Quiet,
             command: None,
             started,
@@ -243,31 +238,16 @@ pub fn zeros(descriptors: &Descriptors) -> Option<String> {
 }
 
 /// Runs the job and writes its files, all or none.
-pub fn perform(mut job: Job<'_>, mut out: OutputSet) -> Result<Finished, Error> {
+pub fn perform(job: Job<'_>, mut out: OutputSet) -> Result<Finished, Error> {
     let (folder, share_safe) = (job.out.clone(), job.share_safe);
-    let mut journal = job.journal.take();
-    let finished =
-        find_with(job, journal.as_mut(), Some(&mut out))?.write(out, &folder, share_safe)?;
-    if let Some(journal) = journal {
-        journal.finish();
-    }
-    Ok(finished)
+    find(job, Some(&mut out))?.write(out, &folder, share_safe)
 }
 
 /// Runs the job without writing page and figures. Clouds are staged in `out`, if given.
 ///
 /// # Errors
 /// If the plan does not fit the map, a gate or a cloud fails, or `progress` stops the audit.
-pub fn find(mut job: Job<'_>, out: Option<&mut OutputSet>) -> Result<Audited, Error> {
-    let mut journal = job.journal.take();
-    find_with(job, journal.as_mut(), out)
-}
-
-fn find_with(
-    job: Job<'_>,
-    journal: Option<&mut Journal<'_>>,
-    out: Option<&mut OutputSet>,
-) -> Result<Audited, Error> {
+pub fn find(job: Job<'_>, out: Option<&mut OutputSet>) -> Result<Audited, Error> {
     let localize = job.localize.as_ref().filter(|_| job.tiles.is_none());
     let localizes = localize.is_some_and(|localize| !localize.cameras.views.is_empty());
     check_gates(&job.gates, &job.plan, localizes)?;
@@ -289,16 +269,16 @@ fn find_with(
     let whole = (job.original, job.descriptors);
     let cut = |asked: Tiles| asked.of(job.original.reveal().positions(), job.up);
     let cut = job.tiles.map(cut).transpose()?;
-    let Ran { outcome, scene, curves, sheets, tile_rows, note } = match &cut {
+    let Ran { outcome, scene, curves, sheets, tile_rows } = match &cut {
         Some(tiles) => {
             let found = tiles::run(whole, tiles, &job.plan, job.progress)
                 .map_err(|error| of_file(error).advise("a larger --tile-points"))?;
             let (tile_rows, curves) = (found.rows, found.curves.shares());
             let outcome = found.outcome;
-            Ran { outcome, scene: None, curves, sheets: Vec::new(), tile_rows, note: None }
+            Ran { outcome, scene: None, curves, sheets: Vec::new(), tile_rows }
         }
         None => {
-            let mut watcher = watcher(&job, journal, out);
+            let mut watcher = watcher(&job, out);
             let outcome = match job.hidden {
                 None => run(whole.0, whole.1, &job.plan, &mut watcher)
                     .map_err(|error| of_file(error).advise("a smaller --k, or fewer --schemes"))?,
@@ -310,9 +290,8 @@ fn find_with(
                 return Err(error);
             }
             let scene = watcher.pictures.map(|p| p.into_scene(&job.cameras, job.up));
-            let note = watcher.journal.as_ref().and_then(|journal| journal.note());
             let (curves, sheets) = (watcher.curves, watcher.sheets);
-            Ran { outcome, scene, curves, sheets, tile_rows: Vec::new(), note }
+            Ran { outcome, scene, curves, sheets, tile_rows: Vec::new() }
         }
     };
     let spread = match &cut {
@@ -326,7 +305,6 @@ fn find_with(
         (&job.plan, &outcome.rows, &tile_rows),
         &job.doubts,
     );
-    doubts.notes.extend(note);
     for note in doubts.notes.iter().filter(|note| !job.doubts.contains(note)) {
         job.progress.say(&format!("note: {note}"));
     }
@@ -376,19 +354,16 @@ struct Ran {
     curves: Vec<(Row, Vec<(f64, f64)>)>,
     sheets: Vec<Sheet>,
     tile_rows: Vec<Vec<Row>>,
-    note: Option<String>,
 }
 
 /// Creates the observer of the cells of `job`.
-fn watcher<'a, 'j>(
+fn watcher<'a>(
     job: &Job<'a>,
-    journal: Option<&'a mut Journal<'j>>,
     out: Option<&'a mut OutputSet>,
-) -> Watcher<'a, 'j> {
+) -> Watcher<'a> {
     let drawn = drawn(&job.plan);
     let n_views = job.plan.schemes.len() * job.plan.variants().len() * drawn.len();
     Watcher {
-        journal,
         progress: job.progress,
         pictures: (!job.share_safe).then(|| Pictures::new(job.original, &job.plan, n_views)),
         curves: Vec::new(),

@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
-use unlift::audit::{Cell, Observer, Plan, Recovery, Row};
-use unlift::recover::{Builtin, Recovered};
+use unlift::audit::{Cell, Observer, Plan, Row};
+use unlift::recover::Builtin;
 use unlift_io::atomic::OutputSet;
 use unlift_report::ErrorCdf;
 use unlift_report::inversions::Inversion as Sheet;
@@ -10,13 +10,11 @@ use crate::Error;
 use crate::clouds::Clouds;
 use crate::curves::curve_errors;
 use crate::inversion::MapInversion;
-use crate::journal::Journal;
 use crate::progress::Progress;
 use crate::scene::Pictures;
 
 /// Reports progress and collects what the page draws.
-pub(super) struct Watcher<'a, 'j> {
-    pub(super) journal: Option<&'a mut Journal<'j>>,
+pub(super) struct Watcher<'a> {
     pub(super) progress: &'a dyn Progress,
     pub(super) pictures: Option<Pictures>,
     pub(super) curves: Vec<(Row, Vec<(f64, f64)>)>,
@@ -48,17 +46,7 @@ pub fn curves_of(cells: Vec<(Row, Vec<(f64, f64)>)>, rows: &[Row]) -> Vec<ErrorC
     cells.into_iter().filter_map(curve).collect()
 }
 
-impl Observer for Watcher<'_, '_> {
-    fn recall(&mut self, recovery: &Recovery<'_>) -> Option<Recovered<3>> {
-        self.journal.as_mut()?.recall(recovery)
-    }
-
-    fn keep(&mut self, recovery: &Recovery<'_>, recovered: &Recovered<3>) {
-        if let Some(journal) = &mut self.journal {
-            journal.keep(recovery, recovered);
-        }
-    }
-
+impl Observer for Watcher<'_> {
     fn progress(&mut self, done: usize, total: usize, what: &str) {
         self.progress.show(done, total, what);
     }

@@ -276,15 +276,11 @@ pub struct AuditMapArgs {
     /// needs the memory of one tile, and the report shows which tiles leak most. Recommended beyond
     /// a few million points
     #[arg(long, value_parser = values::count, value_name = "N", help_heading = "Run",
-          conflicts_with_all = ["invert", "write_clouds", "journal"])]
+          conflicts_with_all = ["invert", "write_clouds"])]
     pub tile_points: Option<NonZeroUsize>,
     /// Also write the original, obfuscated and recovered point clouds (PLY, OBJ)
     #[arg(long, help_heading = "Result", conflicts_with = "share_safe")]
     pub write_clouds: bool,
-    /// Keep recovered points in this folder until the audit is done. If the audit is interrupted,
-    /// repeat the command to resume it with the same results. The folder is as private as the map
-    #[arg(long, value_name = "DIR", help_heading = "Run")]
-    pub journal: Option<PathBuf>,
     #[command(flatten)]
     pub result: ResultArgs,
     #[command(flatten)]

@@ -11,15 +11,13 @@ use unlift::obfuscate::{Change, Changed, Mitigation, Protection, Scheme, SchemeO
 use unlift_audit::inversion::MapInversion;
 use unlift_audit::localization::Localize;
 use unlift_audit::maps::{Tiles, perform};
-use unlift_audit::{
-    Finished, Job, Journal, Prepared, Shown, check_thresholds, open_audit, sources,
-};
+use unlift_audit::{Finished, Job, Prepared, Shown, check_thresholds, open_audit, sources};
 use unlift_io::atomic::Rules;
 use unlift_io::hash::hash_stage;
 use unlift_io::read;
 use unlift_io::seen::Seen;
 
-use super::common::{open_map, this_program, with_threads};
+use super::common::{open_map, with_threads};
 use super::gate_files::GateFile;
 use super::painter::{kind, painter};
 use super::plan::{attack, neighbors, solvers, summary, thresholds};
@@ -71,7 +69,6 @@ fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
         let mut job = Job {
             plan,
             inversion,
-            journal: journal(args, &progress)?,
             notes,
             doubts,
             options: more_options(args),
@@ -97,12 +94,6 @@ fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
     })?;
     gate_file.write(&finished)?;
     Ok(finished)
-}
-
-/// Opens the journal, if requested; it is valid for this build only.
-fn journal<'a>(args: &AuditMapArgs, progress: &'a Progress) -> anyhow::Result<Option<Journal<'a>>> {
-    let Some(folder) = &args.journal else { return Ok(None) };
-    Ok(Some(Journal::open(folder, this_program()?, progress)?))
 }
 
 /// Returns the painter of pictures, if requested.

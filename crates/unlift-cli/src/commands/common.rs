@@ -22,14 +22,6 @@ pub const RELEASED: &str = "released.parquet";
 /// File name of the truth, which only the owner has.
 pub const TRUTH: &str = "truth.parquet";
 
-/// Returns a hash of this program's file; other builds may recover different bits.
-///
-/// # Errors
-/// If the file cannot be read.
-pub fn this_program() -> anyhow::Result<String> {
-    Ok(hash_file(&crate::call().program)?)
-}
-
 /// Runs `work` on `threads` threads (default: all cores). rayon's global pool would panic if the
 /// system refuses threads.
 pub fn with_threads<T: Send>(

@@ -17,7 +17,6 @@ mod images;
 mod inputs;
 mod invert;
 #[cfg(unix)]
-mod journal;
 mod layouts;
 mod models;
 mod outputs;

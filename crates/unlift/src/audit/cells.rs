@@ -159,7 +159,7 @@ pub(super) fn attack<const D: usize>(
             }
             let what = format!("{scheme} at {:.2} {source}, {}", made.ratio, solver.name());
             each(observer, Some(what), None);
-            let (recovered, took) = match solved.by(at, observer) {
+            let (recovered, took) = match solved.by(at) {
                 // The failure of a custom solver costs only its own rows.
                 Err(error) if Builtin::of(&**solver).is_none() && !owned.may_be_small() => {
                     let error = error.within(&format!("solver {}", solver.name()));

@@ -31,7 +31,7 @@ pub use laws::check_laws;
 pub use many::{Item, Watcher, run_many};
 pub use measure::measure;
 pub use not_audited::NotAudited;
-pub use observer::{Cell, Counts, Measure, Observer, Recovery, Silent};
+pub use observer::{Cell, Counts, Measure, Observer, Silent};
 pub use plan::{NeighborsBy, Plan, PointNeighbors, Variant};
 pub use records_alone::records_alone;
 pub use released::{run_released, scheme_called};

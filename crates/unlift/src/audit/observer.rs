@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use super::row::Row;
 use crate::evaluate::Accuracy;
 use crate::neighbors::Neighborhoods;
-use crate::recover::{RecoverOptions, Recovered, Solver};
+use crate::recover::Recovered;
 use crate::released::Released;
 use crate::truth::{Original, Secret};
 use crate::{Descriptors, Error};
@@ -37,19 +37,6 @@ pub struct Cell<'a, const D: usize = 3> {
     pub accuracy: &'a Accuracy,
 }
 
-/// All inputs that determine recovered points.
-#[derive(Clone, Copy, Debug)]
-pub struct Recovery<'a, const D: usize = 3> {
-    /// Released map.
-    pub released: &'a Released<D>,
-    /// Lists.
-    pub lists: &'a Neighborhoods,
-    /// The solver.
-    pub solver: &'a dyn Solver<D>,
-    /// Options of the recovery.
-    pub options: &'a RecoverOptions,
-}
-
 /// Receives progress and rows of an audit, and can stop it.
 pub trait Observer<const D: usize = 3> {
     /// Called when `done` of `total` cells are finished; `what` comes next.
@@ -65,18 +52,6 @@ pub trait Observer<const D: usize = 3> {
     /// Called for each finished cell.
     fn cell(&mut self, cell: &Cell<'_, D>) {
         let _ = cell;
-    }
-
-    /// Returns the stored result of an identical recovery. If `None`, the audit recovers now and
-    /// calls [`keep`](Self::keep).
-    fn recall(&mut self, recovery: &Recovery<'_, D>) -> Option<Recovered<D>> {
-        let _ = recovery;
-        None
-    }
-
-    /// Called with each new result, to store it.
-    fn keep(&mut self, recovery: &Recovery<'_, D>, recovered: &Recovered<D>) {
-        let _ = (recovery, recovered);
     }
 }
 
