@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use unlift_io::atomic::{Access, Kind, OutputFile, OutputSet, Rules, sweep};
+use unlift_io::atomic::{Access, Kind, OutputFile, OutputSet, Rules};
 
 use crate::clouds;
 use crate::{Error, Progress};
@@ -17,8 +17,8 @@ pub fn refused(error: unlift_io::Error) -> Error {
     Error::request(format!("--out: {error}"))
 }
 
-/// Checks that the file `path` may be written, and returns its path with links resolved. Deletes
-/// temporary files of crashed runs beside it. Call it before and after the work.
+/// Checks that the file `path` may be written, and returns its absolute place with links resolved.
+/// Call it before and after the work.
 ///
 /// Like [`open_audit`] for folders, it reports a place that cannot be written as an error of the
 /// command line.
@@ -34,12 +34,10 @@ pub fn check_file_of(
     rules: &Rules,
 ) -> Result<PathBuf, Error> {
     let refused = |error: unlift_io::Error| Error::request(format!("{option}: {error}"));
-    let target = rules.check(path, kind).map_err(refused)?;
+    let place = rules.check(path, kind).map_err(refused)?;
     // Permissions alone do not show whether a file can be written.
     drop(OutputFile::create(path, Access::Private).map_err(refused)?);
-    let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty());
-    sweep(folder.unwrap_or(Path::new(".")));
-    Ok(target)
+    Ok(place)
 }
 
 /// The contents of an audit's output.

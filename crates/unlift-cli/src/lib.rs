@@ -6,7 +6,6 @@ mod args;
 mod commands;
 mod demo;
 mod exit;
-mod interrupt;
 mod output;
 mod progress;
 mod stderr;
@@ -35,7 +34,6 @@ fn call() -> &'static Call {
 /// Call it once per process: it handles signals, and later calls would run the first command line.
 pub fn run(program: PathBuf, words: Vec<OsString>) -> u8 {
     let _ = CALL.set(Call { program, words });
-    interrupt::watch();
     match args::Cli::read(call().words.iter().cloned()) {
         Ok(cli) => {
             if let Some(bytes) = cli.memory_limit {

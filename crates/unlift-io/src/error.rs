@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 
 use unlift::OneLine;
 
-use crate::atomic::final_place;
 
 /// The place of an error in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -82,10 +81,9 @@ impl Error {
         Self { path: path.into(), kind: Kind::Read(source) }
     }
 
-    /// Creates an error for a `path` that cannot be written. A temporary path is replaced by its
-    /// final place.
+    /// Creates an error for a `path` that cannot be written.
     pub fn write(path: impl Into<PathBuf>, source: io::Error) -> Self {
-        Self { path: final_place(path.into()), kind: Kind::Write(source) }
+        Self { path: path.into(), kind: Kind::Write(source) }
     }
 
     /// Creates an error for values from `path` that the core library refused.

@@ -132,11 +132,6 @@ impl Folder {
         })
     }
 
-    pub(crate) fn settings(&self) -> String {
-        let sha256 = self.extractor.sha256().unwrap_or_default();
-        format!("{:?} {:?} {sha256}", self.extraction, self.turn)
-    }
-
     /// Returns the options of the extraction.
     pub fn extraction(&self) -> &Extraction {
         &self.extraction

@@ -7,7 +7,6 @@ pub mod extraction;
 mod folder;
 mod in_memory;
 mod job;
-pub mod parts;
 mod pictures;
 pub mod stream;
 

@@ -24,7 +24,7 @@ use crate::progress::Stderr;
 use unlift_audit::Progress as _;
 use unlift_audit::images::FeatureSource;
 use unlift_audit::images::stream::{Needs, Stream, Tally};
-use unlift_audit::{Checked, check_file};
+use unlift_audit::Checked;
 
 /// Images in memory per thread.
 const AT_WORK: usize = 2;
@@ -313,7 +313,7 @@ fn write<T: Send, U: Send>(
     })?;
     writer.finish()?;
     // Check again, because another program may have written a file here.
-    check_file(out, Kind::Stage(kind), rules)?;
+    rules.check(out, Kind::Stage(kind))?;
     output.commit()?;
     Ok(counts)
 }

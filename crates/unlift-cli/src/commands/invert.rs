@@ -1,10 +1,8 @@
 //! `unlift invert`: paints pictures from keypoints, recovered keypoints, a recovered map, or bearings.
 
-use std::collections::BTreeSet;
 use std::num::NonZeroUsize;
 use std::path::{Component, Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 use unlift::OneLine;
@@ -15,7 +13,7 @@ use unlift_audit::inversion::{Painter, on_bearings, six_views, view};
 use unlift_audit::refused;
 use unlift_io::Error;
 use unlift_io::atomic::{
-    Access, Kind, OutputSet, Rules, make_folders, marked_picture, sweep, write_file,
+    Access, Kind, OutputSet, Rules, make_folders, marked_picture, write_file,
 };
 use unlift_io::read::colmap;
 use unlift_io::stage::{
@@ -40,7 +38,7 @@ pub fn run(args: &InvertArgs) -> anyhow::Result<Outcome> {
         let rules = Rules::new(inputs.into_iter().flatten().map(PathBuf::as_path), args.force);
         // Only checks that files can be written there.
         drop(OutputSet::create(&args.out, rules.clone(), Access::Private, &[]).map_err(refused)?);
-        let to = Target { args, rules, painted: AtomicUsize::new(0), swept: Mutex::default() };
+        let to = Target { args, rules, painted: AtomicUsize::new(0) };
         let unusable = match (&args.recovered, declared_kind(&args.path)) {
             (Some(recovered), _) if has_images(&args.path)? => images(&to, recovered)?,
             (Some(recovered), _) => map(&to, recovered)?,
@@ -68,8 +66,6 @@ struct Target<'a> {
     args: &'a InvertArgs,
     rules: Rules,
     painted: AtomicUsize,
-    /// Folders in which unfinished files of earlier runs were removed.
-    swept: Mutex<BTreeSet<PathBuf>>,
 }
 
 impl Target<'_> {
@@ -91,10 +87,6 @@ impl Target<'_> {
         let file = PathBuf::from(file);
         if let Some(folder) = file.parent() {
             make_folders(folder, Access::Private)?;
-            let mut swept = self.swept.lock().unwrap_or_else(PoisonError::into_inner);
-            if swept.insert(folder.to_owned()) {
-                sweep(folder);
-            }
         }
         Ok(self.rules.check(&file, Kind::Picture)?)
     }

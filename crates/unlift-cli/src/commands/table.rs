@@ -12,7 +12,6 @@ use crate::args::TableArgs;
 use crate::exit::{Outcome, usage};
 use crate::output::print;
 use crate::stderr;
-use unlift_io::atomic::place_of;
 
 pub fn run(args: &TableArgs) -> anyhow::Result<Outcome> {
     let rules = Rules::new([args.audit.as_path()], args.force);
@@ -21,7 +20,7 @@ pub fn run(args: &TableArgs) -> anyhow::Result<Outcome> {
         [("--out", &args.out, Kind::Table), ("--curves", &args.curves, Kind::Curves)]
     {
         let Some(path) = path else { continue };
-        let target = place_of(&check_file_of(option, path, kind, &rules)?);
+        let target = check_file_of(option, path, kind, &rules)?;
         if taken.contains(&target) {
             let path = path.display();
             return Err(usage(format!(

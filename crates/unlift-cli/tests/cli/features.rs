@@ -1,5 +1,4 @@
-//! `unlift features`: photos and files in, one complete file out, unusable images named. `faults`
-//! tests interrupts.
+//! `unlift features`: photos and files in, one complete file out, unusable images named.
 
 use std::fs;
 use std::path::Path;
@@ -8,7 +7,7 @@ use image::{GrayImage, ImageFormat};
 use unlift::descriptors::Values;
 use unlift_io::features::{FeatureSource, ImageFeatures};
 
-use crate::common::{Place, photo};
+use crate::common::Place;
 
 fn photos() -> Place {
     Place::with_photos(&["a.png", "b/c.jpg", "b/ü d.webp"])
@@ -173,56 +172,6 @@ fn what_cannot_be_used_at_all_leaves_no_file() {
         assert_eq!(stderr.lines().last(), Some(&*format!("unlift: {expected}")));
     }
     assert_eq!(place.names(""), ["bad", "empty", "photos"]);
-}
-
-/// An earlier run left parts. One was damaged, and one is of another photo with the same name,
-/// length and time: both are extracted again.
-#[cfg(unix)]
-#[test]
-fn a_part_that_does_not_fit_is_made_again() {
-    let place = photos();
-    photo(7).save(place.path("other.jpg")).unwrap();
-    let (name, other) = ("photos/b/c.jpg", place.bytes("other.jpg"));
-    let first = place.bytes(name);
-    let put = |bytes: &[u8]| {
-        let mut padded = bytes.to_vec();
-        padded.resize(first.len().max(other.len()) + 10, 0);
-        place.write(name, padded);
-        let file = fs::File::options().write(true).open(place.path(name)).unwrap();
-        file.set_modified(std::time::UNIX_EPOCH).unwrap();
-    };
-    put(&first);
-    place.ends("features photos --out whole.h5", 0);
-    // There is room for each part but not for all of them, in blocks of 512 bytes, so the parts are
-    // left.
-    let blocks = place.bytes("whole.h5").len() / 512 * 2 / 3;
-    let stopped =
-        place.shell(&format!("ulimit -f {blocks}; exec unlift features photos --out again.h5"));
-    assert_eq!(stopped.status.code(), Some(3));
-    let parts = place.names("again.h5.parts");
-    assert_eq!(parts.len(), 3);
-    // This position lies among the descriptors.
-    let damaged = format!("again.h5.parts/{}", parts[1]);
-    let mut bytes = place.bytes(&damaged);
-    let middle = bytes.len() / 2;
-    bytes[middle..middle + 60].iter_mut().for_each(|byte| *byte ^= 1);
-    place.write(&damaged, bytes);
-    let kept = fs::read_dir(place.path("again.h5.parts")).unwrap();
-    fs::create_dir(place.path("kept")).unwrap();
-    for part in kept.map(|part| part.unwrap()) {
-        fs::copy(part.path(), place.path("kept").join(part.file_name())).unwrap();
-    }
-    let (stdout, _) = place.ends("features photos --out again.h5", 0);
-    assert!(stdout.contains(" (2 images of an earlier run), "), "{stdout}");
-    assert!(place.bytes("again.h5") == place.bytes("whole.h5"));
-    assert!(!place.path("again.h5.parts").exists());
-
-    fs::rename(place.path("kept"), place.path("again.h5.parts")).unwrap();
-    put(&other);
-    place.ends("features photos --out again.h5 --force", 0);
-    place.ends("features photos --out fresh.h5", 0);
-    assert!(place.bytes("again.h5") == place.bytes("fresh.h5"));
-    assert!(place.bytes("again.h5") != place.bytes("whole.h5"));
 }
 
 #[test]
