@@ -33,17 +33,6 @@
 //! ```
 //!
 //! The schemes, sources and measures of the plan may be your own; see `unlift`.
-//!
-//! Each feature compiles other crates. All are on by default. Without a feature, the error about
-//! what needs it names the feature.
-//!
-//! | feature | compiles |
-//! | --- | --- |
-//! | `networks` | Learned features, the source `learned`, pictures ([`inversion`]) and `sequence`. |
-//! | `hdf5` | hloc's HDF5 files of features; writing them needs no feature. |
-//! | `sqlite` | COLMAP's `database.db`. |
-//! | `scans` | Maps in E57; LAS and PCD need no feature. |
-//! | `parquet` | Stage files: lists of [`by_point`]. |
 
 pub mod again;
 mod audited;
@@ -54,10 +43,8 @@ mod document;
 mod doubts;
 mod error;
 mod gate;
-#[cfg_attr(not(feature = "parquet"), path = "absent/given.rs")]
 mod given;
 pub mod images;
-#[cfg_attr(not(feature = "networks"), path = "absent/inversion.rs")]
 pub mod inversion;
 mod lengths;
 pub mod localization;
@@ -67,7 +54,6 @@ mod outputs;
 mod prepare;
 mod progress;
 mod scene;
-#[cfg(feature = "networks")]
 pub mod sequence;
 pub mod sources;
 mod tiles;

@@ -19,9 +19,7 @@ const BY_DESCRIPTORS: SourceEntry = SourceEntry {
 /// Returns all sources.
 pub fn all() -> Vec<&'static SourceEntry> {
     let all = sources::SOURCES.iter();
-    #[cfg(feature = "networks")]
-    let all = all.chain(unlift_vision::network::SOURCES);
-    all.chain([&BY_DESCRIPTORS]).collect()
+    all.chain(unlift_vision::network::SOURCES).chain([&BY_DESCRIPTORS]).collect()
 }
 
 /// Returns the source called `name`.
@@ -29,10 +27,6 @@ pub fn all() -> Vec<&'static SourceEntry> {
 /// # Errors
 /// If there is none; the error lists the names.
 pub fn named(name: &str) -> Result<Named, Error> {
-    if cfg!(not(feature = "networks")) && name.trim() == "learned" {
-        let expected = "unlift-audit with the feature `networks`";
-        return Err(Error::new("source learned", expected, "a build without it"));
-    }
     Named::parse_among(name, &all())
 }
 
@@ -43,7 +37,6 @@ struct ByDescriptors;
 
 fn best<const D: usize>(descriptors: Option<&Descriptors>) -> Box<dyn Source<D>> {
     let takes = |source: &dyn Source<D>| descriptors.is_some_and(|some| source.takes(some).is_ok());
-    #[cfg(feature = "networks")]
     if takes(&unlift_vision::network::Learned::default()) {
         return Box::new(unlift_vision::network::Learned::default());
     }

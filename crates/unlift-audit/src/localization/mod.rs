@@ -1,6 +1,5 @@
 //! Localization with the cameras of a map: what every scheme costs.
 
-#[cfg(feature = "networks")]
 pub mod held_out;
 
 use std::collections::BTreeMap;
@@ -176,7 +175,6 @@ pub(crate) fn of_schemes(
 }
 
 /// Adds what was measured on held-out images to every row, and returns a note about them.
-#[cfg(feature = "networks")]
 fn hold_out(
     path: &Path,
     nth: usize,
@@ -220,16 +218,4 @@ fn hold_out(
         row.held_out = Some(held_out::summary(located, &base, &limits));
     }
     Ok(note)
-}
-
-#[cfg(not(feature = "networks"))]
-fn hold_out(
-    _: &Path,
-    _: usize,
-    _: (&Cameras, &Original<3>, &Plan<3>),
-    _: &[Arc<dyn Scheme<2>>],
-    _: &mut [report::Localization],
-    _: &dyn Progress,
-) -> Result<String, Error> {
-    Err(Error::request("--localize: expected a build with the feature networks, found one without"))
 }

@@ -44,7 +44,7 @@ impl GateFile {
     /// Writes the file atomically, readable by all users.
     pub fn write(&self, finished: &Finished) -> anyhow::Result<()> {
         let Some(path) = &self.path else { return Ok(()) };
-                check_file_of(OPTION, path, Kind::Junit, &self.rules)?;
+        check_file_of(OPTION, path, Kind::Junit, &self.rules)?;
         let text = junit(&finished.document);
         write_file(path, Access::Usual, |w| w.write_all(text.as_bytes()))?;
         Ok(())

@@ -7,27 +7,22 @@ use std::time::Instant;
 
 use unlift::audit::{NeighborsBy, Plan};
 use unlift::neighbors::Geometric;
-use unlift::obfuscate::{SchemeOptions, scheme};
 use unlift::recover::Builtin;
 use unlift::{Unit, synthetic};
 use unlift_audit::maps::{Tiles, find};
 use unlift_audit::{Job, Preparation, prepare};
 use unlift_io::read;
 
+use crate::{schemes, write_map};
+
 fn audit(only: Option<usize>, threads: usize) -> unlift_audit::Audited {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("room.csv");
-    let points = synthetic::room(4, 2_000).points;
-    let lines = points.iter().map(|[x, y, z]| format!("{x},{y},{z}\n"));
-    std::fs::write(&path, lines.collect::<String>()).unwrap();
+    let path = write_map(folder.path(), &synthetic::room(4, 2_000).points);
     let input = read::open(&path).unwrap();
     let preparation = Preparation { scale: Some(1.0), ..Preparation::default() };
     let prepared = prepare(&input.positions, None, &preparation).unwrap();
-    let named = |name: &str| {
-        scheme(name).unwrap().of_dimension::<3>(&SchemeOptions::usual(Unit::Meter)).unwrap()
-    };
     let plan = Plan {
-        schemes: vec![named("ppl"), named("plane")],
+        schemes: schemes(&["ppl", "plane"], Unit::Meter),
         neighbors: vec![NeighborsBy::Oracle, NeighborsBy::Source(Arc::new(Geometric))],
         inlier_ratios: vec![0.5],
         solvers: Builtin::list(&[Builtin::Joint]),

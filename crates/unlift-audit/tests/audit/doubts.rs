@@ -2,17 +2,18 @@
 //! was of another map.
 
 use std::sync::Arc;
-
 use std::time::Instant;
 
 use unlift::audit::{Plan, Threshold};
-use unlift::obfuscate::{SchemeOptions, obfuscate, scheme};
+use unlift::obfuscate::obfuscate;
 use unlift::recover::{Builtin, Delta};
 use unlift::released::Released;
 use unlift::seed::Key;
 use unlift::truth::{Original, Secret};
 use unlift::{PointSet, Unit};
 use unlift_audit::{Audited, Error, Gate, Job, Preparation, Prepared, maps, prepare};
+
+use crate::schemes;
 
 const N: usize = 1500;
 
@@ -27,9 +28,8 @@ fn prepared(points: &[[f64; 3]]) -> Prepared {
 
 fn plan(names: &[&str]) -> Plan<3> {
     let usual = Plan::new(Unit::Meter);
-    let is_asked = |name: &str| names.contains(&name);
     Plan {
-        schemes: usual.schemes.iter().filter(|s| is_asked(s.name())).cloned().collect(),
+        schemes: schemes(names, Unit::Meter),
         inlier_ratios: vec![0.5],
         k: 20,
         solvers: vec![Arc::new(Builtin::Joint)],
@@ -140,9 +140,8 @@ fn a_gate_that_no_attack_could_break_is_refused() {
 #[test]
 fn a_truth_in_another_scale_is_no_protection() {
     let prepared_truth = prepared(&room());
-    let options = SchemeOptions::usual(Unit::Meter);
-    let olc = scheme("olc").expect("olc").of_dimension::<3>(&options).expect("in 3D");
-    let hide = |original| obfuscate(&*olc, original, None, &Key::from_seed(1)).expect("hidden");
+    let olc = &schemes(&["olc"], Unit::Meter)[0];
+    let hide = |original| obfuscate(&**olc, original, None, &Key::from_seed(1)).expect("hidden");
     let right = hide(&prepared_truth.original);
     let found = audit(&prepared_truth, Some(&right), plan(&["olc"]), "olc:0.10<=100");
     assert!(found.expect("an audit").document.gates[0].passed);
@@ -160,11 +159,9 @@ fn a_truth_in_another_scale_is_no_protection() {
 fn a_unit_that_is_only_stated_is_no_protection() {
     let points = room().iter().map(|point| point.map(|x| 1000.0 * x)).collect();
     let points = PointSet::try_new(points, Unit::KthNeighbor).expect("points");
-    let original = Original::new(points);
-    let prepared = Prepared::of(original);
-    let options = SchemeOptions::usual(Unit::KthNeighbor);
-    let olc = scheme("olc").expect("olc").of_dimension::<3>(&options).expect("in 3D");
-    let hidden = obfuscate(&*olc, &prepared.original, None, &Key::from_seed(1)).expect("hidden");
+    let prepared = Prepared::of(Original::new(points));
+    let olc = &schemes(&["olc"], Unit::KthNeighbor)[0];
+    let hidden = obfuscate(&**olc, &prepared.original, None, &Key::from_seed(1)).expect("hidden");
     let plan =
         Plan { thresholds: vec![Threshold::parse("2.5").expect("a threshold")], ..plan(&["olc"]) };
     let found = audit(&prepared, Some(&hidden), plan, "olc:2.5<=20").expect("an audit");

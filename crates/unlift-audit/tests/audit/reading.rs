@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use unlift::audit::Plan;
@@ -10,16 +10,13 @@ use unlift::synthetic::room;
 use unlift_audit::{Gate, Job, Preparation, maps};
 use unlift_report::Document;
 
-/// A table of a room in which every `every`th point has no position.
-fn table(every: usize) -> String {
-    room(1, 400).points.iter().enumerate().fold(String::new(), |mut text, (at, [x, y, z])| {
-        match at % every {
-            0 => writeln!(text, "{x},nan,{z}"),
-            _ => writeln!(text, "{x},{y},{z}"),
-        }
-        .expect("text");
-        text
-    })
+use crate::write_map;
+
+/// Writes a room in which every `every`th point has no position.
+fn room_with_gaps(folder: &Path, every: usize) -> PathBuf {
+    let mut points = room(1, 400).points;
+    points.iter_mut().step_by(every).for_each(|point| point[1] = f64::NAN);
+    write_map(folder, &points)
 }
 
 fn audit(map: &Path) -> Document {
@@ -35,14 +32,11 @@ fn audit(map: &Path) -> Document {
 #[test]
 fn points_that_are_left_out_are_counted_and_many_of_them_let_no_gate_hold() {
     let dir = tempfile::tempdir().unwrap();
-    let map = dir.path().join("map.csv");
-    fs::write(&map, table(50)).unwrap();
-    let document = audit(&map);
+    let document = audit(&room_with_gaps(dir.path(), 50));
     assert_eq!(document.notes[0], "8 of 400 points have no place");
     assert_eq!((document.input.n_points, document.gates[0].passed), (392, true));
 
-    fs::write(&map, table(10)).unwrap();
-    let document = audit(&map);
+    let document = audit(&room_with_gaps(dir.path(), 10));
     let doubt = "40 of 400 points have no place: what is audited is not the whole map";
     assert!(document.notes.iter().any(|note| note == doubt), "{:?}", document.notes);
     assert!(!document.gates[0].passed);
@@ -52,8 +46,7 @@ fn points_that_are_left_out_are_counted_and_many_of_them_let_no_gate_hold() {
 #[test]
 fn rows_are_those_of_the_file() {
     let dir = tempfile::tempdir().unwrap();
-    let map = dir.path().join("map.csv");
-    fs::write(&map, table(50)).unwrap();
+    let map = room_with_gaps(dir.path(), 50);
     let all = Preparation { k: 10, ..Preparation::default() };
     let rows = maps::open(&map, None, &all).unwrap().1.rows;
     let expected: Vec<u32> = (0..400).filter(|row| row % 50 != 0).collect();
@@ -61,48 +54,6 @@ fn rows_are_those_of_the_file() {
     let some = Preparation { max_points: Some(100), ..all };
     let rows = maps::open(&map, None, &some).unwrap().1.rows;
     assert!(rows.len() == 100 && rows.is_sorted() && rows.iter().all(|row| row % 50 != 0));
-}
-
-/// LAS of a room with coordinates in degrees, or projected.
-fn las(system: &[u8]) -> Vec<u8> {
-    let points = room(1, 400).points;
-    let mut file = vec![0; 227];
-    let mut put = |at: usize, bytes: &[u8]| file[at..at + bytes.len()].copy_from_slice(bytes);
-    put(0, b"LASF");
-    put(24, &[1, 2]);
-    put(94, &227u16.to_le_bytes());
-    put(96, &(227 + 54 + system.len() as u32).to_le_bytes());
-    put(100, &1u32.to_le_bytes());
-    put(105, &20u16.to_le_bytes());
-    put(107, &(points.len() as u32).to_le_bytes());
-    (0..3).for_each(|axis| put(131 + 8 * axis, &1e-4_f64.to_le_bytes()));
-    let mut record = [0; 54];
-    record[2..17].copy_from_slice(b"LASF_Projection");
-    record[18..20].copy_from_slice(&2112u16.to_le_bytes());
-    record[20..22].copy_from_slice(&(system.len() as u16).to_le_bytes());
-    file.extend(record);
-    file.extend(system);
-    for point in points {
-        point.iter().for_each(|x| file.extend(((x * 1e4) as i32).to_le_bytes()));
-        file.extend([0; 8]);
-    }
-    file
-}
-
-#[test]
-fn degrees_are_refused_with_a_scale_and_let_no_gate_hold() {
-    let dir = tempfile::tempdir().unwrap();
-    let map = dir.path().join("map.las");
-    fs::write(&map, las(b"GEOGCS[\"WGS 84\",UNIT[\"degree\",0.017]]")).unwrap();
-    let meters = Preparation { scale: Some(1.0), k: 10, ..Preparation::default() };
-    let line = maps::open(&map, None, &meters).unwrap_err().to_string();
-    assert!(line.contains("--scale 1: expected a map with lengths, found degrees"), "{line}");
-    let document = audit(&map);
-    let reason = document.gates[0].reason.as_deref().unwrap_or_default();
-    assert!(!document.gates[0].passed && reason.starts_with("coordinates are degrees"), "{reason}");
-    fs::write(&map, las(b"PROJCS[\"UTM\",GEOGCS[\"WGS 84\"]]")).unwrap();
-    maps::open(&map, None, &meters).unwrap();
-    assert!(audit(&map).gates[0].passed);
 }
 
 #[test]

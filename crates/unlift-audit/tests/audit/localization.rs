@@ -9,13 +9,15 @@ use unlift::Descriptors;
 use unlift::Unit;
 use unlift::audit::Plan;
 use unlift::descriptors::Values;
-use unlift::obfuscate::{Change, Changed, Mitigation, Scheme, SchemeOptions, scheme};
+use unlift::obfuscate::{Change, Changed, Mitigation};
 use unlift::recover::Builtin;
 use unlift::seed::{Draws, Stage};
 use unlift_audit::localization::Localize;
 use unlift_audit::{Audited, Gate, Job, Preparation, Prepared, maps};
 use unlift_io::features::{FeatureWriter, ImageFeatures};
 use unlift_report::document::Localization;
+
+use crate::schemes;
 
 const N_IMAGES: u32 = 12;
 const FOCAL: f64 = 500.0;
@@ -102,16 +104,13 @@ fn open(folder: &Path) -> (unlift_io::read::Input, Prepared) {
 
 fn audit(folder: &Path, mitigate: &[&str], gates: &[&str], held_out: bool) -> Audited {
     let (input, prepared) = open(folder);
-    let named = |name: &&str| {
-        scheme(name).unwrap().of_dimension::<3>(&SchemeOptions::usual(Unit::Meter)).unwrap()
-    };
-    let mut schemes: Vec<Arc<dyn Scheme<3>>> = ["olc", "plane"].iter().map(named).collect();
-    schemes.extend(mitigate.iter().map(|text| {
-        let mitigation = Mitigation::parse(text).unwrap();
+    let mut schemes = schemes(&["olc", "plane"], Unit::Meter);
+    let change = |text: &&str| {
         let tracks = Some(Arc::clone(&prepared.cameras.tracks));
-        Arc::new(Changed::new(named(&"olc"), Change::Mitigation(mitigation, tracks)))
-            as Arc<dyn Scheme<3>>
-    }));
+        Change::Mitigation(Mitigation::parse(text).unwrap(), tracks)
+    };
+    let changes: Vec<Change> = mitigate.iter().map(change).collect();
+    schemes.extend(Changed::all(&schemes[..1], &changes));
     let plan = Plan {
         schemes,
         k: 20,

@@ -12,10 +12,9 @@ use unlift::recover::Builtin;
 use unlift::{Descriptors, Unit};
 use unlift_audit::images::audit::{ImagesJob, Used, find, perform};
 use unlift_audit::images::{FeatureSource, InMemory};
-use unlift_audit::{Audited, Error, Gate, Quiet, Shown, open_audit};
+use unlift_audit::{Audited, Error, Quiet, Shown, open_audit};
 use unlift_io::atomic::Rules;
 use unlift_io::features::{FeatureWriter, ImageFeatures};
-use unlift_vision::features::Extraction;
 
 const NAMES: [&str; 5] = ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "e.jpg"];
 
@@ -142,32 +141,4 @@ fn a_mistake_in_memory_ends_the_audit_in_a_line() {
     let images = in_memory(|_| Err(Error::request("images: gone")));
     let gone = find(job(&images, Path::new("images"))).expect_err("an error");
     assert!(gone.is_request() && gone.to_string() == "images: gone");
-}
-
-#[test]
-fn images_that_change_under_the_audit_are_said() {
-    let place = tempfile::tempdir().expect("a temporary folder");
-    let path = place.path().join("features.h5");
-    let write = |path: &Path, first: usize| {
-        let mut writer = FeatureWriter::create(path).expect("a file");
-        (first..NAMES.len()).for_each(|at| writer.append(&image(at)).expect("an image"));
-        writer.finish().expect("a file");
-    };
-    write(&path, 0);
-    let file = FeatureSource::open(&path, &Extraction::default()).expect("features");
-    let gated = |source| ImagesJob {
-        gates: vec![Gate::parse("lines2d:25<=100").expect("a gate")],
-        ..job(source, &path)
-    };
-    let audit = found(find(gated(&file)).expect("an audit"));
-    assert!(audit.document.notes.is_empty() && audit.document.gates[0].passed);
-    let other = place.path().join("other.h5");
-    write(&other, 1);
-    fs::rename(other, &path).expect("another file of the name");
-    let audit = found(find(gated(&file)).expect("an audit"));
-    let gate = &audit.document.gates[0];
-    let said =
-        "input: changed since reading began: figures, hash and pictures may be of different files";
-    assert!(!gate.passed && gate.reason.as_deref() == Some(said), "{gate:?}");
-    assert_eq!(audit.document.notes, [said]);
 }
