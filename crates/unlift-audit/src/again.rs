@@ -27,7 +27,7 @@ use unlift_io::read;
 use unlift_report::RenderOptions;
 use unlift_report::document::Input;
 
-use crate::audited::{Audited, Finished};
+use crate::outputs::{Audited, Finished};
 use crate::document::{self, Found, Provenance, ordered};
 use crate::gate::{Gate, check_gates, gate_results};
 use crate::lengths::check_lengths_of_gates;

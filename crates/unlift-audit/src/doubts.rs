@@ -73,7 +73,7 @@ pub(crate) fn doubts(
         let of_delta = unusual.map(|delta| {
             format!(
                 "{}: delta, {}, is far from the usual distance to the K-th neighbor, {} to {}: recovery may be too low \
-                 (try --delta, --outlier-filter, or separate parts of the map)",
+                 (try --delta, or separate parts of the map)",
                 row.scheme,
                 in_unit(delta, unit),
                 short(low),

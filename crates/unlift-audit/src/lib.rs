@@ -10,7 +10,7 @@
 //!
 //! use unlift::Unit;
 //! use unlift::audit::Plan;
-//! use unlift_audit::{Gate, Job, Preparation, Quiet, Shown, maps, open_audit};
+//! use unlift_audit::{Gate, Job, Preparation, maps, open_audit};
 //! use unlift_io::atomic::Rules;
 //!
 //! # fn main() -> Result<(), unlift_audit::Error> {
@@ -18,7 +18,7 @@
 //! let preparation = Preparation { scale: Some(1.0), ..Preparation::default() };
 //! let (input, prepared) = maps::open(path, None, &preparation)?;
 //! let out = Path::new("audit");
-//! let files = open_audit(out, Rules::new([path], false), Shown::Points, &Quiet)?;
+//! let files = open_audit(out, Rules::new([path], false), false)?;
 //! let finished = maps::perform(
 //!     Job {
 //!         plan: Plan::new(Unit::Meter).for_map(prepared.original.len(), 50),
@@ -35,9 +35,7 @@
 //! The schemes, sources and measures of the plan may be your own; see `unlift`.
 
 pub mod again;
-mod audited;
 mod checked;
-mod clouds;
 mod curves;
 mod document;
 mod doubts;
@@ -58,7 +56,6 @@ pub mod sequence;
 pub mod sources;
 mod tiles;
 
-pub use audited::{Audited, Finished};
 pub use checked::Checked;
 pub use document::{evaluated, ordered, row};
 pub use error::Error;
@@ -66,6 +63,8 @@ pub use gate::{Candidate, Figure, Gate};
 pub use given::by_point;
 pub use lengths::{Extent, SaidOfLengths, check_scale, check_thresholds};
 pub use maps::Job;
-pub use outputs::{FIGURES, PAGE, Shown, check_file, check_file_of, open_audit, refused};
-pub use prepare::{OutlierFilter, Preparation, Prepared, prepare};
+pub use outputs::{
+    Audited, FIGURES, Finished, PAGE, check_file, check_file_of, open_audit, refused,
+};
+pub use prepare::{Preparation, Prepared, prepare};
 pub use progress::{Progress, Quiet};

@@ -1,11 +1,16 @@
 //! Output files: checked before anything is computed; only files that unlift wrote are replaced.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use unlift_io::atomic::{Access, Kind, OutputFile, OutputSet, Rules};
+use unlift::OneLine;
+use unlift_io::atomic::{Access, Kind, OutputFile, OutputSet, Rules, write_file};
+use unlift_report::scene::Scene3d;
+use unlift_report::{
+    Document, Opening, RenderOptions, Shares, gate_lines, render, shares, text_table,
+};
 
-use crate::clouds;
-use crate::{Error, Progress};
+use crate::Error;
 
 /// File name of the page of an audit.
 pub const PAGE: &str = "report.html";
@@ -40,53 +45,102 @@ pub fn check_file_of(
     Ok(place)
 }
 
-/// The contents of an audit's output.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shown {
-    /// Figures.
-    Figures,
-    /// Figures, and points in the page.
-    Points,
-    /// Figures, points in the page, and clouds.
-    Clouds,
-}
-
-/// Opens the output folder of an audit.
-pub fn open_audit(
-    out: &Path,
-    rules: Rules,
-    shown: Shown,
-    progress: &dyn Progress,
-) -> Result<OutputSet, Error> {
-    let access = if shown == Shown::Figures { Access::Usual } else { Access::Private };
-    let earlier = clouds::earlier(out);
-    let mut first = vec![(PAGE, Kind::Page), (FIGURES, Kind::AuditJson)];
-    match shown {
-        Shown::Clouds => first.extend(earlier.iter().map(|name| (name.as_str(), Kind::Cloud))),
-        Shown::Figures if !earlier.is_empty() => {
-            let folder = out.join(clouds::FOLDER);
-            let what = "clouds of an earlier audit show points and are kept";
-            progress.say(&format!("note: {}: {what}", folder.display()));
-        }
-        Shown::Figures | Shown::Points => {}
-    }
+/// Opens the output folder of an audit. If the results may be shared, others can read it.
+pub fn open_audit(out: &Path, rules: Rules, share_safe: bool) -> Result<OutputSet, Error> {
+    let access = if share_safe { Access::Usual } else { Access::Private };
+    let first = [(PAGE, Kind::Page), (FIGURES, Kind::AuditJson)];
     OutputSet::create(out, rules, access, &first).map_err(refused)
 }
 
-/// Stages a page and its figures under these names in `out`. They appear when `out` is committed.
-pub fn stage_audit(
-    out: &mut OutputSet,
-    [page_name, figures_name]: [&str; 2],
-    [page, figures]: [&str; 2],
-    share_safe: bool,
-) -> Result<(), unlift_io::Error> {
-    let access = if share_safe { Access::Usual } else { Access::Private };
-    let files = [(page_name, Kind::Page, page), (figures_name, Kind::AuditJson, figures)];
-    for (name, kind, text) in files {
-        let staged = out.stage(name, kind)?;
-        unlift_io::atomic::write_file(&staged, access, |w| {
-            std::io::Write::write_all(w, text.as_bytes())
-        })?;
+/// The results of an audit, before they are written.
+#[derive(Clone, Debug)]
+pub struct Audited {
+    /// The figures.
+    pub document: Document,
+    pub(crate) scene: Option<Scene3d>,
+    pub(crate) drawn: RenderOptions,
+}
+
+/// A written audit.
+pub struct Finished {
+    /// The figures, as written.
+    pub document: Document,
+    /// The path of the report.
+    pub report: PathBuf,
+}
+
+impl Audited {
+    /// Renders the self-contained page.
+    ///
+    /// # Errors
+    /// If rendering fails.
+    pub fn page(&self, share_safe: bool) -> Result<String, Error> {
+        let options = RenderOptions { share_safe, ..self.drawn.clone() };
+        Ok(render(&self.document, self.scene.as_ref(), &options)?)
     }
-    Ok(())
+
+    /// Returns the recovered shares of every scheme, the largest first.
+    pub fn shares(&self) -> Vec<Shares> {
+        shares(&self.document, &self.drawn.inversions)
+    }
+
+    /// Puts the verdict and pictures of `other` at the top of this audit's page, under `title`.
+    /// `details` is a link to the page of `other`.
+    #[must_use]
+    pub fn opening_with(mut self, other: &Self, title: &str, details: &str) -> Self {
+        let inversions = &other.drawn.inversions;
+        self.drawn.opening = Some(Opening::titled(&other.document, inversions, title, details));
+        self
+    }
+
+    /// Stages page and figures under `names` in `out`. They appear when `out` is committed.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn stage(
+        &self,
+        out: &mut OutputSet,
+        names: [&str; 2],
+        share_safe: bool,
+    ) -> Result<Document, Error> {
+        let page = self.page(share_safe)?;
+        let document = if share_safe { self.document.share_safe() } else { self.document.clone() };
+        let access = if share_safe { Access::Usual } else { Access::Private };
+        let texts = [(Kind::Page, page), (Kind::AuditJson, document.to_json()?)];
+        for (name, (kind, text)) in names.into_iter().zip(texts) {
+            write_file(&out.stage(name, kind)?, access, |w| w.write_all(text.as_bytes()))?;
+        }
+        Ok(document)
+    }
+
+    /// Writes page and figures to `folder`, for which `out` was opened: both or none. With
+    /// `share_safe` they contain figures only.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn write(
+        &self,
+        mut out: OutputSet,
+        folder: &Path,
+        share_safe: bool,
+    ) -> Result<Finished, Error> {
+        let document = self.stage(&mut out, [PAGE, FIGURES], share_safe)?;
+        out.commit()?;
+        Ok(Finished { document, report: folder.join(PAGE) })
+    }
+}
+
+impl Finished {
+    /// Returns true if every gate held.
+    pub fn passed(&self) -> bool {
+        self.document.gates.iter().all(|gate| gate.passed)
+    }
+
+    /// Returns the short table, the results of the gates and the path of the report.
+    pub fn text(&self) -> String {
+        let mut text = text_table(&self.document);
+        text.push_str(&gate_lines(&self.document));
+        text.push_str(&format!("\nreport: {}\n", OneLine(self.report.display())));
+        text
+    }
 }

@@ -9,15 +9,6 @@ use unlift::{Descriptors, Error, ErrorKind, PointSet, Unit};
 
 use crate::localization::Cameras;
 
-/// Statistical outlier removal.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OutlierFilter {
-    /// Number of neighbors whose mean distance is compared.
-    pub neighbors: usize,
-    /// A point is removed if its mean distance exceeds the mean by this many standard deviations.
-    pub std_ratio: f64,
-}
-
 /// Options for the points of a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Preparation {
@@ -26,9 +17,7 @@ pub struct Preparation {
     pub scale: Option<f64>,
     /// The K of that unit.
     pub k: usize,
-    /// Statistical outlier removal, the first step.
-    pub outlier_filter: Option<OutlierFilter>,
-    /// Size of the random subset, the second step.
+    /// Size of the random subset.
     pub max_points: Option<usize>,
     /// Seed of the subset.
     pub seed: u64,
@@ -39,7 +28,7 @@ pub struct Preparation {
 /// All points, in the unit of the median distance to the 50th neighbor.
 impl Default for Preparation {
     fn default() -> Self {
-        Self { scale: None, k: 50, outlier_filter: None, max_points: None, seed: 0, colors: false }
+        Self { scale: None, k: 50, max_points: None, seed: 0, colors: false }
     }
 }
 
@@ -72,7 +61,7 @@ impl Prepared {
     }
 }
 
-/// Filters, thins out and scales `positions` and `descriptors`. Owned positions that are all kept
+/// Thins out and scales `positions` and `descriptors`. Owned positions that are all kept
 /// are not copied, because large maps need the memory.
 ///
 /// # Errors
@@ -85,15 +74,6 @@ pub fn prepare<'a>(
     let positions = positions.into();
     let (n_read, mut notes) = (positions.len(), Vec::new());
     let mut rows: Vec<u32> = (0..n_read as u32).collect();
-    if let Some(filter) = preparation.outlier_filter {
-        rows = without_outliers(&positions, filter)?;
-        let n = n_read - rows.len();
-        if n > 0 {
-            notes.push(format!(
-                "--outlier-filter: {n} of {n_read} points are left out of the audit"
-            ));
-        }
-    }
     if let Some(most) = preparation.max_points
         && rows.len() > most
     {
@@ -141,24 +121,6 @@ fn median_kth_distance(points: &[[f64; 3]], k: usize) -> Result<f64, Error> {
     Err(Error::new(what, "more than 0 (points that do not coincide)", median.to_string()))
 }
 
-/// Returns the rows whose mean distance to their nearest neighbors is usual.
-fn without_outliers(points: &[[f64; 3]], filter: OutlierFilter) -> Result<Vec<u32>, Error> {
-    let n = filter.neighbors;
-    if points.len() <= n {
-        let expected = format!("more than {n} for the outlier filter");
-        let error = Error::new("points", expected, points.len().to_string());
-        return Err(error.of_kind(ErrorKind::TooFewPoints));
-    }
-    let knn = Knn::new(points)?;
-    let means = knn.per_row(n, |_, found| {
-        found.iter().map(|(squared, _)| squared.sqrt()).sum::<f64>() / n as f64
-    });
-    let mean = means.iter().sum::<f64>() / means.len() as f64;
-    let variance = means.iter().map(|m| (m - mean) * (m - mean)).sum::<f64>() / means.len() as f64;
-    let limit = mean + filter.std_ratio * variance.sqrt();
-    Ok((0..points.len() as u32).filter(|&row| means[row as usize] <= limit).collect())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -166,7 +128,6 @@ mod tests {
     const PLAIN: Preparation = Preparation {
         scale: None,
         k: 2,
-        outlier_filter: None,
         max_points: None,
         seed: 0,
         colors: false,
@@ -223,16 +184,9 @@ mod tests {
     }
 
     #[test]
-    fn the_filter_drops_the_far_point_and_the_subset_keeps_order() {
-        let mut points = line(30);
-        points.push([500.0, 0.0, 0.0]);
-        let filter = Some(OutlierFilter { neighbors: 3, std_ratio: 2.0 });
-        let prepared =
-            prepare(&points, None, &Preparation { outlier_filter: filter, ..PLAIN }).unwrap();
-        assert_eq!(prepared.rows, (0..30).collect::<Vec<u32>>());
-        assert_eq!(prepared.notes, ["--outlier-filter: 1 of 31 points are left out of the audit"]);
-        let prepared =
-            prepare(&points, None, &Preparation { max_points: Some(10), ..PLAIN }).unwrap();
+    fn a_subset_keeps_the_order() {
+        let some = Preparation { max_points: Some(10), ..PLAIN };
+        let prepared = prepare(line(30), None, &some).unwrap();
         assert_eq!(prepared.rows.len(), 10);
         assert!(prepared.rows.is_sorted());
     }

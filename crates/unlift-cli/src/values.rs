@@ -9,7 +9,7 @@ use unlift::neighbors::oracle::Noise;
 use unlift::neighbors::sources::Named;
 use unlift::obfuscate::{Entry, Mitigation, Protection, SCHEMES};
 use unlift::recover::{Builtin, Delta};
-use unlift_audit::{OutlierFilter, sources};
+use unlift_audit::sources;
 use unlift_vision::network::DescriptorKind;
 
 /// Source of neighbor lists.
@@ -272,19 +272,6 @@ pub fn poses(text: &str) -> Result<(f64, f64), String> {
     Ok((size(cm)?, size(angle)?))
 }
 
-/// Parses `NEIGHBORS,RATIO`, for example `20,2.0`.
-pub fn outlier_filter(text: &str) -> Result<OutlierFilter, String> {
-    let fields = text.split_once(',').and_then(|(neighbors, std_ratio)| {
-        Some((count(neighbors).ok()?.get(), positive(std_ratio).ok()?))
-    });
-    match fields {
-        Some((neighbors, std_ratio)) => Ok(OutlierFilter { neighbors, std_ratio }),
-        _ => Err(format!(
-            "expected NEIGHBORS,RATIO with both above 0 (for example 20,2.0), found {text}"
-        )),
-    }
-}
-
 /// Removes items that repeat an earlier one, because an audit has one row per combination.
 pub fn distinct<T>(items: Vec<T>, same: impl Fn(&T, &T) -> bool) -> Vec<T> {
     let mut kept: Vec<T> = Vec::with_capacity(items.len());
@@ -330,7 +317,6 @@ mod tests {
             threshold("-1").unwrap_err(),
             ratio("1.5").unwrap_err(),
             delta("wide").unwrap_err(),
-            outlier_filter("20").unwrap_err(),
             scheme("pppl").unwrap_err(),
             scheme("cp2d").unwrap_err(),
             solver("magic").unwrap_err(),
@@ -381,7 +367,6 @@ mod tests {
         }
         let huge = u64::MAX.to_string();
         assert!(count("4294967296").is_err() && count(&huge).is_err());
-        assert!(outlier_filter(&format!("{huge},1")).is_err());
     }
 
     #[test]

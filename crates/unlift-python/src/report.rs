@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use unlift_audit::{Audited, Quiet, Shown, open_audit};
+use unlift_audit::{Audited, Quiet, open_audit};
 use unlift_io::atomic::Rules;
 
 use crate::arrays::raised;
@@ -62,8 +62,7 @@ impl Report {
         force: bool,
     ) -> PyResult<PathBuf> {
         py.detach(|| {
-            let shown = if share_safe { Shown::Figures } else { Shown::Points };
-            let files = open_audit(&out, Rules::new([], force), shown, &Quiet).map_err(refused)?;
+            let files = open_audit(&out, Rules::new([], force), share_safe).map_err(refused)?;
             Ok(self.0.write(files, &out, share_safe).map_err(raised)?.report)
         })
     }

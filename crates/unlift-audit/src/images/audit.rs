@@ -15,7 +15,7 @@ use super::drawn::drawn;
 pub use super::job::ImagesJob;
 use super::stream::{Needs, Stream, Tally};
 use crate::Error;
-use crate::audited::{Audited, Finished};
+use crate::outputs::{Audited, Finished};
 use crate::curves::Curves;
 use crate::document::{self, Found, Provenance};
 use crate::gate::{check_gates, gate_results};

@@ -19,8 +19,7 @@ use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::scene::Scene3d;
 
 use crate::Error;
-use crate::audited::{Audited, Finished};
-use crate::clouds::Clouds;
+use crate::outputs::{Audited, Finished};
 use crate::document::{self, Provenance};
 use crate::doubts::{Spread, doubts};
 use crate::gate::{Gate, check_gates, gate_results};
@@ -63,13 +62,9 @@ pub struct Job<'a> {
     pub gates: Vec<Gate>,
     /// The output folder.
     pub out: PathBuf,
-    /// Length of the audit's unit in map units. Clouds are written in map units.
-    pub unit_in_map_units: f64,
     /// Hides and attacks each tile as a map of its own. Then the page shows only where the map
     /// leaks most.
     pub tiles: Option<Tiles>,
-    /// Also writes clouds.
-    pub write_clouds: bool,
     /// Writes figures only.
     pub share_safe: bool,
     /// Makes pictures of recovered points; the plan measures with it, too.
@@ -117,7 +112,6 @@ impl<'a> Job<'a> {
             notes: prepared.notes.clone(),
             doubts: prepared.doubts.clone(),
             out: out.to_owned(),
-            unit_in_map_units: prepared.unit_in_map_units,
             ..job
         })
     }
@@ -139,9 +133,7 @@ impl<'a> Job<'a> {
             doubts: Vec::new(),
             gates: Vec::new(),
             out: PathBuf::new(),
-            unit_in_map_units: 1.0,
             tiles: None,
-            write_clouds: false,
             share_safe: false,
             inversion: None,
             progress: &Quiet,
@@ -238,16 +230,16 @@ pub fn zeros(descriptors: &Descriptors) -> Option<String> {
 }
 
 /// Runs the job and writes its files, all or none.
-pub fn perform(job: Job<'_>, mut out: OutputSet) -> Result<Finished, Error> {
+pub fn perform(job: Job<'_>, out: OutputSet) -> Result<Finished, Error> {
     let (folder, share_safe) = (job.out.clone(), job.share_safe);
-    find(job, Some(&mut out))?.write(out, &folder, share_safe)
+    find(job)?.write(out, &folder, share_safe)
 }
 
-/// Runs the job without writing page and figures. Clouds are staged in `out`, if given.
+/// Runs the job and writes nothing.
 ///
 /// # Errors
-/// If the plan does not fit the map, a gate or a cloud fails, or `progress` stops the audit.
-pub fn find(job: Job<'_>, out: Option<&mut OutputSet>) -> Result<Audited, Error> {
+/// If the plan does not fit the map, a gate fails, or `progress` stops the audit.
+pub fn find(job: Job<'_>) -> Result<Audited, Error> {
     let localize = job.localize.as_ref().filter(|_| job.tiles.is_none());
     let localizes = localize.is_some_and(|localize| !localize.cameras.views.is_empty());
     check_gates(&job.gates, &job.plan, localizes)?;
@@ -278,7 +270,7 @@ pub fn find(job: Job<'_>, out: Option<&mut OutputSet>) -> Result<Audited, Error>
             Ran { outcome, scene: None, curves, sheets: Vec::new(), tile_rows }
         }
         None => {
-            let mut watcher = watcher(&job, out);
+            let mut watcher = watcher(&job);
             let outcome = match job.hidden {
                 None => run(whole.0, whole.1, &job.plan, &mut watcher)
                     .map_err(|error| of_file(error).advise("a smaller --k, or fewer --schemes"))?,
@@ -357,10 +349,7 @@ struct Ran {
 }
 
 /// Creates the observer of the cells of `job`.
-fn watcher<'a>(
-    job: &Job<'a>,
-    out: Option<&'a mut OutputSet>,
-) -> Watcher<'a> {
+fn watcher<'a>(job: &Job<'a>) -> Watcher<'a> {
     let drawn = drawn(&job.plan);
     let n_views = job.plan.schemes.len() * job.plan.variants().len() * drawn.len();
     Watcher {
@@ -368,9 +357,6 @@ fn watcher<'a>(
         pictures: (!job.share_safe).then(|| Pictures::new(job.original, &job.plan, n_views)),
         curves: Vec::new(),
         drawn,
-        clouds: out
-            .filter(|_| job.write_clouds)
-            .map(|out| (Clouds::new(job.unit_in_map_units), out)),
         thresholds: job.plan.thresholds.iter().map(|t| t.value).collect(),
         inversion: job.inversion.clone(),
         sheets: match (&job.inversion, job.share_safe) {

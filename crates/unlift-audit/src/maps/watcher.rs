@@ -2,12 +2,10 @@ use std::sync::Arc;
 
 use unlift::audit::{Cell, Observer, Plan, Row};
 use unlift::recover::Builtin;
-use unlift_io::atomic::OutputSet;
 use unlift_report::ErrorCdf;
 use unlift_report::inversions::Inversion as Sheet;
 
 use crate::Error;
-use crate::clouds::Clouds;
 use crate::curves::curve_errors;
 use crate::inversion::MapInversion;
 use crate::progress::Progress;
@@ -19,7 +17,6 @@ pub(super) struct Watcher<'a> {
     pub(super) pictures: Option<Pictures>,
     pub(super) curves: Vec<(Row, Vec<(f64, f64)>)>,
     pub(super) drawn: Vec<String>,
-    pub(super) clouds: Option<(Clouds, &'a mut OutputSet)>,
     pub(super) thresholds: Vec<f64>,
     pub(super) inversion: Option<Arc<MapInversion>>,
     /// One sheet for each of the first cameras.
@@ -65,9 +62,6 @@ impl Observer for Watcher<'_> {
         if let (Some(pictures), true) = (&mut self.pictures, self.drawn.contains(&cell.row.solver))
         {
             pictures.add(cell);
-        }
-        if let (Some((clouds, out)), None) = (&mut self.clouds, &self.failed) {
-            self.failed = clouds.write(out, cell, most).err().map(Error::from);
         }
         if let (Some(inversion), true, None) =
             (&self.inversion, self.drawn.contains(&cell.row.solver), &self.failed)

@@ -34,7 +34,7 @@ use unlift_report::inversions::Inversion as Sheet;
 use self::view::Model;
 pub use self::view::{PoseError, View};
 use crate::Error;
-use crate::audited::{Audited, Finished};
+use crate::outputs::{Audited, Finished};
 use crate::document::{self, Found, Provenance};
 use crate::gate::{Gate, check_gates, gate_results};
 use crate::images::FeatureSource;

@@ -52,7 +52,7 @@ fn audit(
         gates: vec![Gate::parse(gate).expect("a gate")],
         ..Job::of(&prepared.original, Instant::now())
     };
-    maps::find(job, None)
+    maps::find(job)
 }
 
 /// Returns the doubt with which the only gate does not hold. The notes contain it, too.

@@ -12,7 +12,7 @@ use unlift::recover::Builtin;
 use unlift::{Descriptors, Unit};
 use unlift_audit::images::audit::{ImagesJob, Used, find, perform};
 use unlift_audit::images::{FeatureSource, InMemory};
-use unlift_audit::{Audited, Error, Quiet, Shown, open_audit};
+use unlift_audit::{Audited, Error, Quiet, open_audit};
 use unlift_io::atomic::Rules;
 use unlift_io::features::{FeatureWriter, ImageFeatures};
 
@@ -97,7 +97,7 @@ fn images_in_memory_have_the_figures_of_a_file() {
 
     // Finding and writing in one call gives the same page.
     let out = place.path().join("audit");
-    let files = open_audit(&out, Rules::new([], false), Shown::Points, &Quiet).expect("a folder");
+    let files = open_audit(&out, Rules::new([], false), false).expect("a folder");
     let (finished, _) =
         perform(ImagesJob { out: out.clone(), ..job(&memory, Path::new("images")) }, files)
             .expect("an audit");

@@ -126,7 +126,7 @@ fn audit(folder: &Path, mitigate: &[&str], gates: &[&str], held_out: bool) -> Au
         localize: Some(Localize { cameras: &prepared.cameras, held_out, protections: Vec::new() }),
         ..Job::new(folder, &input, &prepared, &folder.join("out"), Instant::now()).unwrap()
     };
-    maps::find(job, None).unwrap()
+    maps::find(job).unwrap()
 }
 
 fn of<'a>(audited: &'a Audited, scheme: &str) -> &'a Localization {
@@ -199,7 +199,7 @@ fn a_model_without_tracks_is_silent_and_a_gate_on_it_is_told() {
         ..Job::new(folder.path(), &input, &prepared, &folder.path().join("out"), Instant::now())
             .unwrap()
     };
-    let error = maps::find(job, None).err().unwrap().to_string();
+    let error = maps::find(job).err().unwrap().to_string();
     let expected = "--gate olc:localization<=2: expected a COLMAP model with cameras and tracks, not in tiles, found none";
     assert_eq!(error, expected);
 }

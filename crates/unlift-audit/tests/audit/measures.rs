@@ -10,7 +10,7 @@ use unlift::geometry::frame::Bounds;
 use unlift::recover::Builtin;
 use unlift::truth::Original;
 use unlift::{Error, PointSet, Unit};
-use unlift_audit::{Error as AuditError, Finished, Job, Preparation, Quiet, Shown};
+use unlift_audit::{Error as AuditError, Finished, Job, Preparation};
 use unlift_audit::{maps, open_audit};
 use unlift_io::atomic::Rules;
 use unlift_report::Document;
@@ -44,7 +44,7 @@ fn audit(folder: &Path) -> Result<Finished, AuditError> {
         ..usual
     };
     let out = folder.join("audit");
-    let files = open_audit(&out, Rules::new([map.as_path()], false), Shown::Points, &Quiet)?;
+    let files = open_audit(&out, Rules::new([map.as_path()], false), false)?;
     let job = Job { plan, ..Job::new(&map, &input, &prepared, &out, Instant::now())? };
     maps::perform(job, files)
 }

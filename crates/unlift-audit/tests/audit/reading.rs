@@ -26,7 +26,7 @@ fn audit(map: &Path) -> Document {
     let mut plan = Plan { k: 10, inlier_ratios: vec![0.5], ..job.plan.clone() };
     plan.schemes.retain(|scheme| scheme.name() == "olc");
     let gates = vec![Gate::parse("olc:1.0<=100").expect("a gate")];
-    maps::find(Job { plan, gates, ..job }, None).expect("an audit").document
+    maps::find(Job { plan, gates, ..job }).expect("an audit").document
 }
 
 #[test]

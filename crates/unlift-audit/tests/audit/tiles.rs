@@ -32,7 +32,7 @@ fn audit(only: Option<usize>, threads: usize) -> unlift_audit::Audited {
     let job = Job::new(&path, &input, &prepared, Path::new("unused"), Instant::now()).unwrap();
     let job = Job { plan, tiles: Some(Tiles { most: 600, only }), ..job };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    pool.install(|| find(job, None)).unwrap()
+    pool.install(|| find(job)).unwrap()
 }
 
 #[test]

@@ -11,7 +11,7 @@ use unlift::neighbors::sources::Named;
 use unlift::obfuscate::{Entry, Mitigation, Protection};
 use unlift::recover::{Builtin, Delta};
 use unlift_audit::images::extraction::Wanted;
-use unlift_audit::{Gate, OutlierFilter};
+use unlift_audit::Gate;
 use unlift_vision::network::DescriptorKind;
 
 use crate::values::{self, NeighborSource};
@@ -56,7 +56,7 @@ pub struct ResultArgs {
     /// Also write the results of the gates as JUnit XML, for GitLab, Jenkins and others
     #[arg(long, value_name = "FILE", requires = "gate")]
     pub junit: Option<PathBuf>,
-    /// Folder for report.html, audit.json and point clouds; other files in it stay
+    /// Folder for report.html and audit.json; other files in it stay
     #[arg(long, value_name = "DIR", default_value = "unlift-audit")]
     pub out: PathBuf,
     /// Replace files of the same name that unlift did not write
@@ -149,11 +149,6 @@ pub struct MapArgs {
     /// Use a random subset of at most N points
     #[arg(long, value_parser = values::count, value_name = "N")]
     pub max_points: Option<NonZeroUsize>,
-    /// Leave out isolated points: those whose mean distance to their NEIGHBORS nearest points
-    /// exceeds the average by more than RATIO standard deviations [without a value: 20,2.0]
-    #[arg(long, value_name = "NEIGHBORS,RATIO", value_parser = values::outlier_filter,
-          num_args = 0..=1, require_equals = true, default_missing_value = "20,2.0")]
-    pub outlier_filter: Option<OutlierFilter>,
     /// Number of nearest neighbors of a point that count as true neighbors (K). Without --scale,
     /// the median distance to the K-th neighbor is the unit of length
     #[arg(long, value_name = "K", default_value = "50",
@@ -276,11 +271,8 @@ pub struct AuditMapArgs {
     /// needs the memory of one tile, and the report shows which tiles leak most. Recommended beyond
     /// a few million points
     #[arg(long, value_parser = values::count, value_name = "N", help_heading = "Run",
-          conflicts_with_all = ["invert", "write_clouds"])]
+          conflicts_with = "invert")]
     pub tile_points: Option<NonZeroUsize>,
-    /// Also write the original, obfuscated and recovered point clouds (PLY, OBJ)
-    #[arg(long, help_heading = "Result", conflicts_with = "share_safe")]
-    pub write_clouds: bool,
     #[command(flatten)]
     pub result: ResultArgs,
     #[command(flatten)]
@@ -612,9 +604,6 @@ pub struct AuditReleasedArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold,
           help_heading = "Result")]
     pub thresholds: Vec<Threshold>,
-    /// Also write the original, obfuscated and recovered point clouds (PLY, OBJ)
-    #[arg(long, help_heading = "Result", conflicts_with = "share_safe")]
-    pub write_clouds: bool,
     #[command(flatten)]
     pub result: ResultArgs,
     #[command(flatten)]

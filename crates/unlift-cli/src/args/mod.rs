@@ -163,7 +163,6 @@ pub enum AuditCommand {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use unlift_audit::OutlierFilter;
 
     fn audit(arguments: &[&str]) -> Result<AuditMapArgs, clap::Error> {
         let line = ["unlift", "audit", "map", "PATH"].iter().chain(arguments);
@@ -216,25 +215,10 @@ mod tests {
     }
 
     #[test]
-    fn the_outlier_filter_has_a_default_when_named() {
-        let filter = |arguments: &[&str]| audit(arguments).unwrap().map.outlier_filter;
-        let usual = OutlierFilter { neighbors: 20, std_ratio: 2.0 };
-        assert_eq!(filter(&["--outlier-filter"]), Some(usual));
-        let strict = OutlierFilter { neighbors: 8, std_ratio: 1.5 };
-        assert_eq!(filter(&["--outlier-filter=8,1.5"]), Some(strict));
-    }
-
-    #[test]
     fn the_memory_limit_may_stand_before_or_after_the_command() {
         let read = |line: [&str; 4]| Cli::read(line).unwrap().memory_limit;
         assert_eq!(read(["unlift", "--memory-limit", "2GB", "schemes"]), Some(2_000_000_000));
         assert_eq!(read(["unlift", "schemes", "--memory-limit", "512MiB"]), Some(512 << 20));
         assert_eq!(Cli::read(["unlift", "schemes"]).unwrap().memory_limit, None);
-    }
-
-    #[test]
-    fn private_clouds_and_a_shareable_report_exclude_each_other() {
-        let error = audit(&["--write-clouds", "--share-safe"]).unwrap_err();
-        assert_eq!(error.exit_code(), 2);
     }
 }

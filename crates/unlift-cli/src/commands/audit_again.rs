@@ -7,7 +7,7 @@ use serde_json::{Map, json};
 use unlift::audit::Plan;
 use unlift::obfuscate::SchemeOptions;
 use unlift_audit::again::{AgainJob, Maps, open, perform};
-use unlift_audit::{Finished, Preparation, Shown, check_thresholds, open_audit};
+use unlift_audit::{Finished, Preparation, check_thresholds, open_audit};
 use unlift_io::atomic::Rules;
 
 use super::common::with_threads;
@@ -16,7 +16,7 @@ use super::plan::{summary, thresholds};
 use crate::args::AuditAgainArgs;
 use crate::exit::{Outcome, usage};
 use crate::output::{command_line, print};
-use crate::progress::{Progress, Spinner, Stderr};
+use crate::progress::{Progress, Spinner};
 use crate::values::{all_schemes, distinct};
 
 pub fn run(args: &AuditAgainArgs) -> anyhow::Result<Outcome> {
@@ -35,9 +35,8 @@ fn inputs(args: &AuditAgainArgs) -> Vec<&Path> {
 fn audit(args: &AuditAgainArgs) -> anyhow::Result<Finished> {
     let started = Instant::now();
     let rules = Rules::new(inputs(args), args.result.force);
-    let shown = if args.result.share_safe { Shown::Figures } else { Shown::Points };
     let gate_file = GateFile::check(&args.result, &rules)?;
-    let out = open_audit(&args.result.out, rules, shown, &Stderr)?;
+    let out = open_audit(&args.result.out, rules, args.result.share_safe)?;
     let finished = with_threads(args.run.threads, || {
         let maps = maps(args)?;
         let (first, second) = (&maps.first.1, maps.second.as_ref().map(|(_, second)| second));

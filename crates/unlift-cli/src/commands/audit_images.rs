@@ -14,7 +14,7 @@ use unlift_audit::images::choice;
 use unlift_audit::images::extraction::sample;
 use unlift_audit::images::stream::Needs;
 use unlift_audit::inversion::Inversion;
-use unlift_audit::{Finished, Shown, open_audit};
+use unlift_audit::{Finished, open_audit};
 use unlift_io::atomic::Rules;
 use unlift_io::{Error, read};
 use unlift_vision::features::Extraction;
@@ -27,7 +27,7 @@ use super::protection::protections;
 use crate::args::AuditImagesArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
-use crate::progress::{Progress, Stderr};
+use crate::progress::Progress;
 use crate::stderr;
 use crate::values::{NeighborSource, distinct};
 
@@ -54,9 +54,8 @@ fn audit(args: &AuditImagesArgs) -> anyhow::Result<(Option<Finished>, Used)> {
     let mut plan = plan(args)?;
     let painted = painted(args)?;
     let rules = Rules::new(inputs(args), args.result.force);
-    let shown = if args.result.share_safe { Shown::Figures } else { Shown::Points };
     let gate_file = GateFile::check(&args.result, &rules)?;
-    let out = open_audit(&args.result.out, rules, shown, &Stderr)?;
+    let out = open_audit(&args.result.out, rules, args.result.share_safe)?;
     let (finished, used) = with_threads(args.run.threads, || {
         let extraction = extraction(args, &plan)?;
         let source = FeatureSource::open(&args.path, &extraction).map_err(|error| {

@@ -11,7 +11,7 @@ use unlift::obfuscate::{Change, Changed, Mitigation, Protection, Scheme, SchemeO
 use unlift_audit::inversion::MapInversion;
 use unlift_audit::localization::Localize;
 use unlift_audit::maps::{Tiles, perform};
-use unlift_audit::{Finished, Job, Prepared, Shown, check_thresholds, open_audit, sources};
+use unlift_audit::{Finished, Job, Prepared, check_thresholds, open_audit, sources};
 use unlift_io::atomic::Rules;
 use unlift_io::hash::hash_stage;
 use unlift_io::read;
@@ -25,7 +25,7 @@ use super::protection::protections;
 use crate::args::AuditMapArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
-use crate::progress::{Progress, Stderr};
+use crate::progress::Progress;
 use crate::values::{NeighborSource, all_schemes, distinct};
 
 /// Schemes of `--quick`: the best-known one, and one that hides two points per record.
@@ -44,14 +44,9 @@ pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
 /// Audits a map and writes the results.
 fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
     let started = Instant::now();
-    let shown = match (args.result.share_safe, args.write_clouds) {
-        (true, _) => Shown::Figures,
-        (false, true) => Shown::Clouds,
-        (false, false) => Shown::Points,
-    };
     let rules = Rules::new(inputs(args), args.result.force);
     let gate_file = GateFile::check(&args.result, &rules)?;
-    let out = open_audit(&args.result.out, rules, shown, &Stderr)?;
+    let out = open_audit(&args.result.out, rules, args.result.share_safe)?;
     let beside = Seen::of_stages(beside(args).map(|(_, path)| path));
     let finished = with_threads(args.run.threads, || {
         let (input, prepared) = open_map(&args.path, &args.map, args.colors, args.run.quiet)?;
@@ -74,7 +69,6 @@ fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
             options: more_options(args),
             gates: result.gate.clone(),
             tiles: args.tile_points.map(|most| Tiles { most: most.get(), only: None }),
-            write_clouds: args.write_clouds,
             share_safe: result.share_safe,
             progress: &progress,
             command: Some(command_line()),
@@ -253,10 +247,6 @@ fn more_options(args: &AuditMapArgs) -> Map<String, Value> {
         if args.colors {
             options.insert("colors".into(), json!(true));
         }
-    }
-    if let Some(filter) = args.map.outlier_filter {
-        let value = json!({ "neighbors": filter.neighbors, "std_ratio": filter.std_ratio });
-        options.insert("outlier_filter".into(), value);
     }
     options
 }

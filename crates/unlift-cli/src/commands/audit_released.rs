@@ -8,7 +8,7 @@ use unlift::audit::{Plan, scheme_called};
 use unlift::released::Released;
 use unlift::truth::Secret;
 use unlift_audit::maps::{self, perform};
-use unlift_audit::{Finished, Job, Prepared, Shown, check_thresholds, open_audit, ordered};
+use unlift_audit::{Finished, Job, Prepared, check_thresholds, open_audit, ordered};
 use unlift_io::atomic::Rules;
 use unlift_io::hash::{hash_file, hash_files, hash_stage};
 use unlift_io::read::{self, Input as Points};
@@ -22,7 +22,7 @@ use super::plan::{attack, neighbors, solvers, summary, thresholds};
 use crate::args::AuditReleasedArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
-use crate::progress::{Progress, Stderr};
+use crate::progress::Progress;
 use crate::values::{self, NeighborSource};
 
 /// Name of a scheme without a name.
@@ -37,16 +37,11 @@ pub fn run(args: &AuditReleasedArgs) -> anyhow::Result<Outcome> {
 /// Audits released records and writes the results.
 fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
     let started = Instant::now();
-    let shown = match (args.result.share_safe, args.write_clouds) {
-        (true, _) => Shown::Figures,
-        (false, true) => Shown::Clouds,
-        (false, false) => Shown::Points,
-    };
     let inputs = inputs(args);
     let seen = Seen::of_stages(inputs.iter().copied());
     let rules = Rules::new(inputs, args.result.force);
     let gate_file = GateFile::check(&args.result, &rules)?;
-    let out = open_audit(&args.result.out, rules, shown, &Stderr)?;
+    let out = open_audit(&args.result.out, rules, args.result.share_safe)?;
     let finished = with_threads(args.run.threads, || {
         let name = name(args)?;
         let (prepared, hidden) = open(args)?;
@@ -63,7 +58,6 @@ fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
             options: Map::from_iter([("released".to_owned(), json!(true))]),
             gates: args.result.gate.clone(),
             out: args.result.out.clone(),
-            write_clouds: args.write_clouds,
             share_safe: args.result.share_safe,
             progress: &progress,
             command: Some(command_line()),

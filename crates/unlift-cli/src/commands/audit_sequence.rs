@@ -11,7 +11,7 @@ use unlift::obfuscate::{Change, Changed, Mitigation, SchemeOptions};
 use unlift_audit::images::{FeatureSource, choice};
 use unlift_audit::inversion::Inversion;
 use unlift_audit::sequence::{PoseError, SequenceJob, perform};
-use unlift_audit::{Finished, Shown, open_audit};
+use unlift_audit::{Finished, open_audit};
 use unlift_io::atomic::Rules;
 use unlift_vision::features::photo::Turn;
 
@@ -22,7 +22,7 @@ use super::plan::{summary, thresholds};
 use crate::args::AuditSequenceArgs;
 use crate::exit::{Outcome, usage};
 use crate::output::{command_line, print};
-use crate::progress::{Progress, Stderr};
+use crate::progress::Progress;
 use crate::stderr;
 use crate::values::distinct;
 
@@ -43,9 +43,8 @@ fn audit(args: &AuditSequenceArgs) -> anyhow::Result<Finished> {
     let plan = plan(args)?;
     let pose_error = pose_error(args)?;
     let rules = Rules::new(inputs(args), args.result.force);
-    let shown = if args.result.share_safe { Shown::Figures } else { Shown::Points };
     let gate_file = GateFile::check(&args.result, &rules)?;
-    let out = open_audit(&args.result.out, rules, shown, &Stderr)?;
+    let out = open_audit(&args.result.out, rules, args.result.share_safe)?;
     let finished = with_threads(args.run.threads, || {
         // A model is of the photos as they are stored.
         let source =

@@ -62,7 +62,6 @@ pub fn open_map(
     let preparation = Preparation {
         scale: args.scale,
         k: usize::from(args.k),
-        outlier_filter: args.outlier_filter,
         max_points: args.max_points.map(NonZeroUsize::get),
         seed: args.seed.unwrap_or(0),
         colors,

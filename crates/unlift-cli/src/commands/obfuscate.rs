@@ -67,7 +67,6 @@ fn images(args: &ObfuscateArgs, mut out: OutputSet) -> anyhow::Result<Outcome> {
         ("--scale", map.scale.is_some()),
         ("--descriptors", map.descriptors.is_some()),
         ("--max-points", map.max_points.is_some()),
-        ("--outlier-filter", map.outlier_filter.is_some()),
     ] {
         if given {
             let name = args.scheme.name;
