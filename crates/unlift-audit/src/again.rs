@@ -27,12 +27,12 @@ use unlift_io::read;
 use unlift_report::RenderOptions;
 use unlift_report::document::Input;
 
-use crate::outputs::{Audited, Finished};
+use crate::Progress;
 use crate::document::{self, Found, Provenance, ordered};
+use crate::doubts::check_lengths_of_gates;
 use crate::gate::{Gate, check_gates, gate_results};
-use crate::lengths::check_lengths_of_gates;
+use crate::outputs::{Audited, Finished};
 use crate::prepare::{Preparation, Prepared};
-use crate::progress::Progress;
 use crate::{Error, maps};
 
 /// The solver of all rows.

@@ -3,7 +3,7 @@
 
 use unlift::audit::{Cell, Observer, Row};
 
-use crate::progress::Progress;
+use crate::Progress;
 
 const CURVE_POINTS: i32 = 80;
 

@@ -109,7 +109,7 @@ pub fn document<const D: usize>(
         run: report::Run {
             command: provenance.command,
             threads: rayon::current_num_threads() as u32,
-            peak_memory_bytes: crate::memory::peak_bytes(),
+            peak_memory_bytes: peak_bytes(),
             seconds: report::Seconds {
                 total: provenance.started.elapsed().as_secs_f64(),
                 rows: rows.collect(),
@@ -328,4 +328,12 @@ fn break_even(row: &audit::BreakEven) -> report::BreakEven {
 /// Collects pairs into an ordered map.
 pub fn ordered<V>(pairs: impl IntoIterator<Item = (String, V)>) -> IndexMap<String, V> {
     pairs.into_iter().collect()
+}
+
+/// Returns the peak resident memory of this process in bytes, if the system reports it (Linux).
+pub fn peak_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    kibibytes.checked_mul(1024)
 }

@@ -35,36 +35,144 @@
 //! The schemes, sources and measures of the plan may be your own; see `unlift`.
 
 pub mod again;
-mod checked;
 mod curves;
 mod document;
 mod doubts;
-mod error;
 mod gate;
-mod given;
 pub mod images;
 pub mod inversion;
-mod lengths;
 pub mod localization;
 pub mod maps;
-mod memory;
 mod outputs;
 mod prepare;
-mod progress;
 mod scene;
 pub mod sequence;
 pub mod sources;
 mod tiles;
 
-pub use checked::Checked;
+pub use document::peak_bytes;
 pub use document::{evaluated, ordered, row};
-pub use error::Error;
+pub use doubts::{Checked, SaidOfLengths, check_scale, check_thresholds};
 pub use gate::{Candidate, Figure, Gate};
-pub use given::by_point;
-pub use lengths::{Extent, SaidOfLengths, check_scale, check_thresholds};
 pub use maps::Job;
 pub use outputs::{
     Audited, FIGURES, Finished, PAGE, check_file, check_file_of, open_audit, refused,
 };
-pub use prepare::{Preparation, Prepared, prepare};
-pub use progress::{Progress, Quiet};
+pub use prepare::{Preparation, Prepared, by_point, prepare};
+
+use std::fmt;
+
+/// An error of an audit.
+#[derive(Debug)]
+pub struct Error {
+    fault: Fault,
+    advice: Option<String>,
+}
+
+#[derive(Debug)]
+enum Fault {
+    /// The request cannot be carried out.
+    Request(String),
+    /// A file cannot be read, used or written.
+    Input(Box<dyn std::error::Error + Send + Sync>),
+}
+
+impl Error {
+    /// Creates an error of the request, not of a file.
+    pub fn request(message: impl Into<String>) -> Self {
+        Self { fault: Fault::Request(message.into()), advice: None }
+    }
+
+    fn input(error: impl std::error::Error + Send + Sync + 'static) -> Self {
+        Self { fault: Fault::Input(Box::new(error)), advice: None }
+    }
+
+    /// Adds advice: what the user could try instead.
+    #[must_use]
+    pub fn advise(self, advice: impl Into<String>) -> Self {
+        Self { advice: Some(advice.into()), ..self }
+    }
+
+    /// Returns true if the request is wrong, not a file.
+    pub fn is_request(&self) -> bool {
+        matches!(self.fault, Fault::Request(_))
+    }
+
+    /// Returns what the user could try instead.
+    pub fn advice(&self) -> Option<&str> {
+        self.advice.as_deref()
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.fault {
+            Fault::Request(message) => f.write_str(message),
+            Fault::Input(error) => {
+                write!(f, "{error}")?;
+                let mut source = error.source();
+                while let Some(error) = source {
+                    write!(f, ": {error}")?;
+                    source = error.source();
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+impl std::error::Error for Error {}
+
+impl From<unlift::Error> for Error {
+    fn from(error: unlift::Error) -> Self {
+        Self::input(error)
+    }
+}
+
+impl From<unlift_io::Error> for Error {
+    fn from(error: unlift_io::Error) -> Self {
+        Self::input(error)
+    }
+}
+
+impl From<unlift_report::Error> for Error {
+    fn from(error: unlift_report::Error) -> Self {
+        Self::input(error)
+    }
+}
+
+impl From<serde_json::Error> for Error {
+    fn from(error: serde_json::Error) -> Self {
+        Self::input(error)
+    }
+}
+
+/// Receives the progress of an audit, from any thread.
+pub trait Progress: Send + Sync {
+    /// Reports that `done` of `total` items are finished and that `what` comes next.
+    fn show(&self, done: usize, total: usize, what: &str) {
+        let _ = (done, total, what);
+    }
+
+    /// Reports that another share of an item is finished. `what` is the current step, or empty.
+    fn add(&self, share: f64, what: &str) {
+        let _ = (share, what);
+    }
+
+    /// Passes a note to the user.
+    fn say(&self, line: &str) {
+        let _ = line;
+    }
+
+    /// Returns whether the work continues. The audit calls it between cells; on false, it ends with
+    /// an error and writes nothing.
+    fn goes_on(&self) -> bool {
+        true
+    }
+}
+
+/// A progress receiver that ignores everything.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Quiet;
+
+impl Progress for Quiet {}

@@ -4,8 +4,8 @@ use unlift::audit::{self, Item, Outcome, Plan, Row, run_many};
 use unlift::truth::Original;
 use unlift::{Descriptors, Error, PointSet};
 
+use crate::Progress;
 use crate::curves::Curves;
-use crate::progress::Progress;
 
 /// A part of a map: a box in plan view that overlaps no other tile.
 #[derive(Clone, Debug, PartialEq)]

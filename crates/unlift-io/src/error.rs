@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 
 use unlift::OneLine;
 
-
 /// The place of an error in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {

@@ -15,12 +15,12 @@ use super::drawn::drawn;
 pub use super::job::ImagesJob;
 use super::stream::{Needs, Stream, Tally};
 use crate::Error;
-use crate::outputs::{Audited, Finished};
+use crate::Progress;
 use crate::curves::Curves;
 use crate::document::{self, Found, Provenance};
 use crate::gate::{check_gates, gate_results};
 use crate::maps::curves_of;
-use crate::progress::Progress;
+use crate::outputs::{Audited, Finished};
 
 /// The numbers of used and unusable images.
 #[derive(Clone, Copy, Debug)]

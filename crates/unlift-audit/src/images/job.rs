@@ -6,9 +6,9 @@ use serde_json::{Map, Value};
 use unlift::audit::Plan;
 
 use super::FeatureSource;
+use crate::Progress;
 use crate::gate::Gate;
 use crate::inversion::Inversion;
-use crate::progress::Progress;
 
 /// The inputs of an audit of images.
 pub struct ImagesJob<'a> {

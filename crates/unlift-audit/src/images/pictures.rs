@@ -9,9 +9,9 @@ use unlift_report::pictures::{
     GRAPH_NEIGHBORS, Graph, Marks, Picture, RecoveredView, ReleasedView,
 };
 
+use crate::Progress;
 use crate::document::given;
 use crate::inversion::Inversion;
-use crate::progress::Progress;
 
 /// Collects the pictures of all audited images, in their order.
 pub struct Album<'a> {

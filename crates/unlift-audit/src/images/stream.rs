@@ -17,7 +17,7 @@ use unlift_io::features::ImageFeatures;
 use unlift_io::hash::hash_features;
 
 use super::FeatureSource;
-use crate::progress::Progress;
+use crate::Progress;
 
 const PER_THREAD: usize = 2;
 

@@ -19,7 +19,7 @@ use unlift_vision::features::photo::{Turn, read_color_with};
 use unlift_vision::pictures::{Detection, Lens, View};
 
 use super::{Judged, Painter, SHOWN, figures, needed, painted, shown};
-use crate::progress::Progress;
+use crate::Progress;
 use crate::scene::{near, shapes};
 
 /// Smallest side of a picture for which the metrics are defined.

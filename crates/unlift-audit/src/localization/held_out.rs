@@ -21,8 +21,8 @@ use unlift_vision::features::photo::Turn;
 use unlift_vision::pictures::Lens;
 
 use super::Cameras;
+use crate::Progress;
 use crate::images::FeatureSource;
-use crate::progress::Progress;
 
 /// A keypoint belongs to a point that its image observes if it is this near to the projection, in
 /// pixels. Right matches have the same limit.

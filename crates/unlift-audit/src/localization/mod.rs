@@ -15,7 +15,7 @@ use unlift_io::read::colmap;
 use unlift_report::document::{self as report, UNPROTECTED};
 
 use crate::Error;
-use crate::progress::Progress;
+use crate::Progress;
 
 /// Localization in an audit.
 #[derive(Clone, Debug)]

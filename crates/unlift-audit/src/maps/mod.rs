@@ -19,18 +19,18 @@ use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::scene::Scene3d;
 
 use crate::Error;
-use crate::outputs::{Audited, Finished};
 use crate::document::{self, Provenance};
 use crate::doubts::{Spread, doubts};
+use crate::doubts::{check_lengths_of_gates, check_scale};
 use crate::gate::{Gate, check_gates, gate_results};
 use crate::inversion::MapInversion;
-use crate::lengths::{check_lengths_of_gates, check_scale};
 use crate::localization::{self, Cameras, Localize};
+use crate::outputs::{Audited, Finished};
 use crate::prepare::{Preparation, Prepared, prepare};
-use crate::progress::{Progress, Quiet};
 use crate::scene::Pictures;
 use crate::tiles;
 pub use crate::tiles::{Tile, Tiles};
+use crate::{Progress, Quiet};
 pub use watcher::curves_of;
 use watcher::{Watcher, drawn};
 

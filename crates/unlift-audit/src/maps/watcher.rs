@@ -6,9 +6,9 @@ use unlift_report::ErrorCdf;
 use unlift_report::inversions::Inversion as Sheet;
 
 use crate::Error;
+use crate::Progress;
 use crate::curves::curve_errors;
 use crate::inversion::MapInversion;
-use crate::progress::Progress;
 use crate::scene::Pictures;
 
 /// Reports progress and collects what the page draws.

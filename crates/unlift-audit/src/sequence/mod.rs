@@ -34,13 +34,13 @@ use unlift_report::inversions::Inversion as Sheet;
 use self::view::Model;
 pub use self::view::{PoseError, View};
 use crate::Error;
-use crate::outputs::{Audited, Finished};
+use crate::Progress;
 use crate::document::{self, Found, Provenance};
 use crate::gate::{Gate, check_gates, gate_results};
 use crate::images::FeatureSource;
 use crate::images::audit::Used;
 use crate::inversion::Inversion;
-use crate::progress::Progress;
+use crate::outputs::{Audited, Finished};
 
 /// The inputs of an audit of a sequence.
 pub struct SequenceJob<'a> {

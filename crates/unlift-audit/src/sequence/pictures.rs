@@ -6,9 +6,9 @@ use unlift_vision::pictures::Points;
 
 use super::{Attack, Hidden};
 use crate::Error;
+use crate::Progress;
 use crate::images::choice;
 use crate::inversion::{Inversion, NEAR_PX, weight};
-use crate::progress::Progress;
 
 /// Number of queries with pictures.
 const SHOWN: usize = 3;

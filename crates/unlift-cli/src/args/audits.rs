@@ -10,7 +10,6 @@ use unlift::neighbors::oracle::Noise;
 use unlift::neighbors::sources::Named;
 use unlift::obfuscate::{Entry, Mitigation, Protection};
 use unlift::recover::{Builtin, Delta};
-use unlift_audit::images::extraction::Wanted;
 use unlift_audit::Gate;
 use unlift_vision::network::DescriptorKind;
 

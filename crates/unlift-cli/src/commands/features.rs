@@ -14,9 +14,9 @@ use crate::args::FeaturesArgs;
 use crate::exit::{Outcome, line, usage};
 use crate::output::print;
 use crate::progress::Progress;
+use unlift_audit::check_file;
 use unlift_audit::images::extraction::Wanted;
 use unlift_audit::images::{FeatureSource, is_photo};
-use unlift_audit::check_file;
 
 #[derive(Default)]
 struct Tally {

@@ -21,10 +21,10 @@ use unlift_vision::features::Extraction;
 use super::common::{RELEASED, TRUTH, expect_slots, same_map};
 use crate::args::{EvaluateArgs, ObfuscateArgs, OracleArgs};
 use crate::progress::Stderr;
+use unlift_audit::Checked;
 use unlift_audit::Progress as _;
 use unlift_audit::images::FeatureSource;
 use unlift_audit::images::stream::{Needs, Stream, Tally};
-use unlift_audit::Checked;
 
 /// Images in memory per thread.
 const AT_WORK: usize = 2;
