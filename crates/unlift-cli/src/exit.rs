@@ -5,9 +5,9 @@ use std::fmt;
 use unlift::{OneLine, is_obeyed};
 
 use crate::args::Cli;
-use crate::call;
 use crate::output::printed;
 use crate::stderr::tell;
+use crate::words;
 
 /// The result of a command that completed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,7 +63,7 @@ pub fn advise(error: impl Into<anyhow::Error>, advice: impl Into<String>) -> any
 /// Prints help or a usage error, and returns the exit code.
 pub fn told(told: clap::Error) -> u8 {
     // clap's message quotes the command line: parse it again without terminal control characters.
-    let words = call().words.iter().map(|word| OneLine(word.display()).to_string());
+    let words = words().iter().map(|word| OneLine(word.display()).to_string());
     let told = Cli::read(words).err().unwrap_or(told);
     let text = told.render().to_string();
     if !told.use_stderr() {

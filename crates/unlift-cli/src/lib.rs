@@ -12,29 +12,22 @@ mod stderr;
 mod values;
 
 use std::ffi::OsString;
-use std::path::PathBuf;
 use std::sync::OnceLock;
 
-/// How the program was called.
-struct Call {
-    program: PathBuf,
-    words: Vec<OsString>,
-}
+static WORDS: OnceLock<Vec<OsString>> = OnceLock::new();
 
-static CALL: OnceLock<Call> = OnceLock::new();
-
-/// Returns how the program was called. Before [`run`], the program has no name and no words.
-fn call() -> &'static Call {
-    CALL.get_or_init(|| Call { program: PathBuf::new(), words: Vec::new() })
+/// Returns the words of the command line, none before [`run`].
+fn words() -> &'static [OsString] {
+    WORDS.get().map_or(&[], Vec::as_slice)
 }
 
 /// Runs the command line `words`, of which the first is the name of the program, and returns the
-/// exit code. `program` is the file whose hash identifies this build.
+/// exit code.
 ///
-/// Call it once per process: it handles signals, and later calls would run the first command line.
-pub fn run(program: PathBuf, words: Vec<OsString>) -> u8 {
-    let _ = CALL.set(Call { program, words });
-    match args::Cli::read(call().words.iter().cloned()) {
+/// Call it once per process: later calls would run the first command line.
+pub fn run(words: Vec<OsString>) -> u8 {
+    let words = WORDS.get_or_init(|| words);
+    match args::Cli::read(words.iter().cloned()) {
         Ok(cli) => {
             if let Some(bytes) = cli.memory_limit {
                 unlift_io::input::limit_memory(bytes);

@@ -3,6 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let program = std::env::current_exe().unwrap_or_default();
-    unlift_cli::run(program, std::env::args_os().collect()).into()
+    unlift_cli::run(std::env::args_os().collect()).into()
 }

@@ -48,7 +48,7 @@ pub fn table(rows: &[Vec<String>], left: &[usize]) -> String {
 
 /// Returns the command line, quoted for a shell.
 pub fn command_line() -> String {
-    let words = crate::call().words.iter().skip(1).map(|word| quoted(&word.to_string_lossy()));
+    let words = crate::words().iter().skip(1).map(|word| quoted(&word.to_string_lossy()));
     ["unlift".to_owned()].into_iter().chain(words).collect::<Vec<_>>().join(" ")
 }
 

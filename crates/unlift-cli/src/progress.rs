@@ -82,19 +82,9 @@ impl Progress {
         self.0.tell(what);
     }
 
-    /// Ends this progress and starts that of further work.
-    pub fn again(&self) -> Self {
-        self.0.bar.finish_and_clear();
-        Self::with(self.0.shown)
-    }
-
     /// Prints a line on stderr without breaking the bar.
     pub fn say(&self, line: &str) {
         self.0.say(line);
-    }
-
-    pub fn steps(&self) -> Steps {
-        self.0.clone()
     }
 }
 
@@ -246,11 +236,11 @@ mod tests {
         let bar = &progress.0.bar;
         let said = || status(bar.position(), bar.length(), Duration::ZERO);
         progress.show(0, 2, "a.jpg");
-        (0..2).for_each(|_| progress.steps().add(1.0 / 3.0, ""));
+        (0..2).for_each(|_| progress.0.add(1.0 / 3.0, ""));
         assert_eq!((said(), bar.message()), ("0/2".to_owned(), "a.jpg".to_owned()));
-        progress.steps().add(1.0 / 3.0, "b.jpg");
+        progress.0.add(1.0 / 3.0, "b.jpg");
         assert_eq!((said(), bar.message()), ("1/2".to_owned(), "b.jpg".to_owned()));
-        (0..2).for_each(|_| progress.steps().add(1.0, ""));
+        (0..2).for_each(|_| progress.0.add(1.0, ""));
         progress.show(1, 2, "");
         assert_eq!(said(), "2/2");
         let minutes = status(3 * PARTS, Some(4 * PARTS), Duration::from_secs(150));

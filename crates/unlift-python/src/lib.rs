@@ -23,15 +23,14 @@ mod report;
 mod threads;
 
 use std::ffi::OsString;
-use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use unlift::recover::Builtin;
 
-/// Runs the command line `words` and returns the exit code. `program` is the file of this module.
+/// Runs the command line `words` and returns the exit code.
 #[pyfunction]
-fn command_line(py: Python<'_>, program: PathBuf, words: Vec<OsString>) -> u8 {
-    py.detach(|| unlift_cli::run(program, words))
+fn command_line(py: Python<'_>, words: Vec<OsString>) -> u8 {
+    py.detach(|| unlift_cli::run(words))
 }
 
 /// The native module.

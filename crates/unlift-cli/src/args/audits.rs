@@ -11,6 +11,7 @@ use unlift::neighbors::sources::Named;
 use unlift::obfuscate::{Entry, Mitigation, Protection};
 use unlift::recover::{Builtin, Delta};
 use unlift_audit::Gate;
+use unlift_audit::images::extraction::Wanted;
 use unlift_vision::network::DescriptorKind;
 
 use crate::values::{self, NeighborSource};

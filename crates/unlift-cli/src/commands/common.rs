@@ -10,7 +10,6 @@ use unlift::released::Released;
 use unlift::truth::Secret;
 use unlift_audit::{Preparation, Prepared, maps};
 use unlift_io::Error;
-use unlift_io::hash::hash_file;
 use unlift_io::read::Input;
 use unlift_report::Document;
 

@@ -153,7 +153,7 @@ fn map(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
         command: Some(command_line()),
         ..Job::of(&original, started)
     };
-    Ok(find_map(job, None)?)
+    Ok(find_map(job)?)
 }
 
 /// Formats a short summary for users who do not know the schemes.

@@ -282,5 +282,5 @@ def check_source(source: Callable[..., Any], released: Released | Hidden) -> Non
     It calls the source three times.
     """
 
-def command_line(program: _Path, words: list[str]) -> int:
+def command_line(words: list[str]) -> int:
     """Runs the command line `words`, of which the first is the name of the program, and returns the exit code."""
