@@ -117,12 +117,11 @@ pub fn audit(
             notes,
             doubts: prepared.doubts.iter().cloned().chain(doubt).collect(),
             gates,
-            unit_in_map_units: prepared.unit_in_map_units,
             tiles,
             progress: &*progress,
             ..Job::of(&prepared.original, started)
         };
-        find(job, None)
+        find(job)
     });
     if let Some(error) = watcher.failed() {
         return Err(error);

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use unlift_audit::{Audited, Quiet, open_audit};
+use unlift_audit::{Audited, open_audit};
 use unlift_io::atomic::Rules;
 
 use crate::arrays::raised;
