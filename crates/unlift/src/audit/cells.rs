@@ -3,26 +3,24 @@
 
 use std::time::Instant;
 
-use super::clock::Clock;
-use super::clock::RowSeconds;
-use super::laws::check_laws;
 use super::lists::Lists;
-use super::measure::measure;
-use super::not_audited::NotAudited;
 use super::observer::{Cell, Counts, Observer};
-use super::plan::Plan;
-use super::records_alone::records_alone;
-use super::row::Row;
-use super::solved::Solved;
-use crate::evaluate::{Accuracy, bearings, blind, distinct_weights, joined};
+use super::plan::{Plan, Threshold, key_of, oracle_seed};
+use super::row::{Alone, Row, measure};
+use super::run::{Clock, NotAudited, RowSeconds, told};
+use crate::evaluate::{
+    Accuracy, away_from_own, bearings, belongs, blind, distinct_weights, evaluate,
+    farthest_for_rounding, joined,
+};
 use crate::geometry::knn::Knn;
+use crate::neighbors::Neighborhoods;
 use crate::neighbors::oracle::Noise;
-use crate::obfuscate::{Scheme, obfuscate};
-use crate::recover::Builtin;
+use crate::obfuscate::{Scheme, all, obfuscate};
+use crate::recover::{Builtin, RecoverOptions, Recovered, Solver, recover, recover_with_start};
 use crate::released::Released;
 use crate::seed::Key;
 use crate::truth::{Original, Secret};
-use crate::{Descriptors, Error, ErrorKind};
+use crate::{Descriptors, Error, ErrorKind, recover};
 
 /// [Metric](Row::metrics) of an attacker's own lists: the inlier ratio with as many true neighbors
 /// as the lists have records.
@@ -231,4 +229,185 @@ pub(super) fn attack<const D: usize>(
 /// Returns weights with which distinct places count once; empty for maps.
 fn places<const D: usize>(owned: &Owned<'_, D>, secret: &Secret) -> Vec<f64> {
     if owned.may_be_small() { distinct_weights(owned.original, secret) } else { Vec::new() }
+}
+
+/// A released map with lists, on which the solvers of a plan run in order.
+pub(super) struct Solved<'a, const D: usize> {
+    plan: &'a Plan<D>,
+    released: &'a Released<D>,
+    lists: &'a Neighborhoods,
+    seed: u64,
+    /// Estimates that joint recovery started from, kept for the solver `joint-start`.
+    start: Option<Recovered<D>>,
+}
+
+impl<'a, const D: usize> Solved<'a, D> {
+    pub(super) fn new(
+        plan: &'a Plan<D>,
+        (released, lists): (&'a Released<D>, &'a Neighborhoods),
+        seed: u64,
+    ) -> Self {
+        Self { plan, released, lists, seed, start: None }
+    }
+
+    /// Returns the result of the solver numbered `at`, and its seconds.
+    ///
+    /// # Errors
+    /// Returns the errors of [`recover`].
+    pub(super) fn by(&mut self, at: usize) -> Result<(Recovered<D>, f64), Error> {
+        let (solver, started) = (&*self.plan.solvers[at], Instant::now());
+        let is = |builtin, solver: &dyn Solver<D>| Builtin::of(solver) == Some(builtin);
+        if let Some(kept) = self.start.take_if(|_| is(Builtin::JointStart, solver)) {
+            return Ok((kept, 0.0));
+        }
+        let options =
+            RecoverOptions { delta: self.plan.delta, seed: self.seed, ..RecoverOptions::default() };
+        let mut later = self.plan.solvers[at..].iter();
+        let with_start =
+            is(Builtin::Joint, solver) && later.any(|later| is(Builtin::JointStart, &**later));
+        let recovered = if with_start {
+            let (joint, start) = recover_with_start(self.released, self.lists, &options)?;
+            self.start = Some(start);
+            joint
+        } else {
+            recover(self.released, self.lists, solver, &options)?
+        };
+        Ok((recovered, started.elapsed().as_secs_f64()))
+    }
+}
+
+/// Runs and measures all attacks on the records alone. Omits those that place no point of `hidden`.
+///
+/// # Errors
+/// When the arguments do not belong together.
+pub fn records_alone<const D: usize>(
+    (released, secret): &(Released<D>, Secret),
+    original: &Original<D>,
+    plan: &Plan<D>,
+    seed: u64,
+) -> Result<Vec<Alone>, Error> {
+    let options = RecoverOptions { seed, ..RecoverOptions::default() };
+    let mut found = Vec::new();
+    for (name, recovered) in recover::records_alone(released, &options)? {
+        if (0..recovered.n_slots()).any(|slot| recovered.position(slot).is_some()) {
+            let accuracy = evaluate(&recovered, original, secret)?;
+            found.push(Alone { name, percent: within(&accuracy, &plan.thresholds) });
+        }
+    }
+    Ok(found)
+}
+
+fn within(accuracy: &Accuracy, thresholds: &[Threshold]) -> Vec<f64> {
+    thresholds.iter().map(|t| accuracy.percent_within(t.value)).collect()
+}
+
+/// Result of one map or image.
+#[derive(Default)]
+pub(super) struct Rows {
+    /// One row per scheme, source, noise model, inlier ratio and solver, in this order; means over
+    /// repeats.
+    pub(super) rows: Vec<Row>,
+    /// Seconds per row, summed over repeats.
+    pub(super) seconds: Vec<RowSeconds>,
+    pub(super) not_audited: Vec<NotAudited>,
+}
+
+/// Computes the rows of `owned`. Calls `finished` with every row of every repeat.
+///
+/// # Errors
+/// Returns the errors of [`cells`].
+pub(super) fn of_item<const D: usize>(
+    owned: &Owned<'_, D>,
+    plan: &Plan<D>,
+    clock: &mut Clock,
+    observer: &mut dyn Observer<D>,
+    finished: &mut dyn FnMut(&Finished<'_>),
+) -> Result<Rows, Error> {
+    let per_scheme = plan.rows_per_scheme();
+    let total = per_scheme * plan.schemes.len() * plan.repeats as usize;
+    let (mut found, mut done) = (Rows::default(), 0);
+    for scheme in &plan.schemes {
+        let mut by_repeat: Vec<Vec<(Row, RowSeconds)>> = Vec::new();
+        let mut missing: Vec<NotAudited> = Vec::new();
+        let n_before = found.rows.len();
+        for repeat in 0..plan.repeats {
+            let (key, oracle_seed) = seeds(plan.seed.wrapping_add(u64::from(repeat)), owned.name);
+            let run = Run { plan, scheme: scheme.name(), repeat, oracle_seed };
+            let (mut of_repeat, before) = (Vec::new(), done);
+            let hide = (&**scheme, &key);
+            let lacking = cells(owned, &run, hide, clock, observer, |observer, what, one| {
+                if let Some(what) = what {
+                    observer.progress(done, total, &what);
+                }
+                if let Some(one) = one {
+                    finished(&one);
+                    of_repeat.push((one.row, one.seconds));
+                    done += 1;
+                }
+            })?;
+            done = before + per_scheme;
+            by_repeat.push(of_repeat);
+            for one in lacking {
+                if !missing.iter().any(|other| other.is_same_cell(&one)) {
+                    missing.push(one);
+                }
+            }
+        }
+        for (row, _) in &by_repeat[0] {
+            let same = by_repeat.iter().map(|rows| rows.iter().find(|(r, _)| r.is_same_cell(row)));
+            // A mean over only the seeds that succeeded would be biased.
+            let Some(same) = same.collect::<Option<Vec<_>>>() else { continue };
+            let mut seconds = RowSeconds::default();
+            same.iter().for_each(|(_, more)| seconds.add(more));
+            found.seconds.push(seconds);
+            found
+                .rows
+                .push(Row::mean(&same.iter().map(|(row, _)| row.clone()).collect::<Vec<_>>()));
+        }
+        found.not_audited.extend(told(missing, found.rows.len() > n_before));
+    }
+    observer.progress(done, total, "done");
+    Ok(found)
+}
+
+fn seeds(seed: u64, name: Option<&str>) -> (Key, u64) {
+    let key = Key::from_seed(seed);
+    match name {
+        None => (key, seed),
+        Some(name) => (key_of(&key, name), oracle_seed(seed, name)),
+    }
+}
+
+/// Checks two laws of schemes for what a scheme made of `original` under `key`: every hidden point
+/// lies on its own record, and the same key gives the same map.
+///
+/// Little can be recovered from a scheme with a bug, so a report would wrongly call it safe. Tests
+/// check the built-in schemes; custom schemes are applied a second time here.
+///
+/// # Errors
+/// The first law that does not hold.
+pub fn check_laws<const D: usize>(
+    scheme: &dyn Scheme<D>,
+    original: &Original<D>,
+    key: &Key,
+    (released, secret): (&Released<D>, &Secret),
+) -> Result<(), Error> {
+    belongs(original, released, secret)?;
+    if all().any(|entry| entry.name == scheme.name()) {
+        return Ok(());
+    }
+    let away = away_from_own(released, original, secret);
+    let farthest = away.iter().copied().fold(0.0, f64::max);
+    let most = farthest_for_rounding(released, original, secret);
+    // Bearings may have decoys, and nothing is recovered from them in any case.
+    if farthest > most && !released.obfuscation().is_bearings() {
+        let off = away.iter().filter(|&&away| away > most).count();
+        let found = format!("{off} of {} away from them, by up to {farthest:.2e}", away.len());
+        return Err(Error::new("hidden points", "on their own records", found));
+    }
+    let (again, secret_again) = obfuscate(scheme, original, None, key)?;
+    if again.obfuscation() != released.obfuscation() || secret_again.hidden() != secret.hidden() {
+        return Err(Error::new("records", "the same for the same key", "different ones"));
+    }
+    Ok(())
 }

@@ -4,11 +4,11 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::observer::Measure;
-use super::threshold::Threshold;
 use crate::neighbors::oracle::Noise;
 use crate::neighbors::{Needs, Source, lacks_descriptors};
 use crate::obfuscate::{SCHEMES, Scheme, SchemeOptions};
 use crate::recover::{Builtin, Delta, Solver};
+use crate::seed::{Draws, Key, Stage};
 use crate::{Error, ErrorKind, Unit};
 
 /// Neighbors of every original, by row, from any source that the owner chooses.
@@ -291,4 +291,44 @@ fn check_names<'a>(what: &str, names: impl Iterator<Item = &'a str>) -> Result<(
         }
     }
     Ok(())
+}
+
+/// An error below which a point counts as recovered.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Threshold {
+    /// Text as the user typed it; the key in reports.
+    pub label: String,
+    /// Value in the unit of the points.
+    pub value: f64,
+}
+
+impl Threshold {
+    /// Parses a positive number and keeps its text.
+    ///
+    /// # Errors
+    /// When `text` is not a positive number.
+    pub fn parse(text: &str) -> Result<Self, Error> {
+        match text.trim().parse::<f64>() {
+            Ok(value) if value.is_finite() && value > 0.0 => {
+                Ok(Self { label: text.trim().to_owned(), value })
+            }
+            _ => Err(Error::new("threshold", "a positive number", format!("{text:?}"))),
+        }
+    }
+}
+
+/// Returns the key of the image `name` in a set with the key `key`.
+pub fn key_of(key: &Key, name: &str) -> Key {
+    key.of_item(Stage::Image, hash(name))
+}
+
+/// Returns the oracle's seed for the image `name` in a run with `seed`.
+pub fn oracle_seed(seed: u64, name: &str) -> u64 {
+    Draws::new(seed, Stage::Image, hash(name)).bits()
+}
+
+/// Hashes `name` with 64-bit FNV-1a.
+fn hash(name: &str) -> u64 {
+    let step = |h: u64, byte: u8| (h ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3);
+    name.bytes().fold(0xCBF2_9CE4_8422_2325, step)
 }

@@ -1,16 +1,16 @@
 //! Stages of an audit of images for callers that process files one image at a time, with the same
 //! seeds, lists and sums.
 
-pub use super::chance::{key_of, oracle_seed};
+pub use super::plan::{key_of, oracle_seed};
 
 use super::cells::Finished;
-use super::clock::RowSeconds;
 use super::lists::Lists;
-use super::measure::measure;
+use super::many::Pool;
+use super::plan::Threshold;
 use super::plan::{NeighborsBy, Plan, Variant};
-use super::pool::Pool;
 use super::row::Row;
-use super::threshold::Threshold;
+use super::row::measure;
+use super::run::RowSeconds;
 use crate::evaluate::{blind, distinct_weights};
 use crate::neighbors::Neighborhoods;
 use crate::neighbors::oracle::{self, Noise};
