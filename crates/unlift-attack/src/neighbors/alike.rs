@@ -126,15 +126,4 @@ mod tests {
         let means = means(&descriptors, &order).unwrap();
         assert_eq!((means.len(), means.dim()), (8, 8));
     }
-
-    #[test]
-    fn rows_that_are_all_the_same_keep_their_order() {
-        let mut values = vec![7u8; 4 * 300];
-        values[0] = 8;
-        let descriptors = Descriptors::try_new(Values::U8(values), 4).unwrap();
-        let slots: Vec<u32> = (0..300).collect();
-        let order = order(&descriptors, &slots);
-        assert_eq!(order.len(), 300);
-        assert!(order.iter().filter(|&&slot| slot > 0).is_sorted());
-    }
 }

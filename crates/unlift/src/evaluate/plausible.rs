@@ -255,10 +255,11 @@ fn area(support: &[f64], decoy: &[bool]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::neighbors::oracle::{self, TrueNeighbors};
     use crate::obfuscate::olc::Olc;
     use crate::obfuscate::{SchemeOptions, obfuscate, sphere};
     use crate::seed::Key;
-    use crate::{PointSet, RecordId, Unit, synthetic};
+    use crate::{PointSet, Unit, synthetic};
 
     #[test]
     fn areas_count_ties_half() {
@@ -272,19 +273,10 @@ mod tests {
     fn true_neighbors_tell_decoys() {
         let points = PointSet::try_new(synthetic::room(1, 600).points, Unit::Meter).unwrap();
         let original = Original::new(points);
+        let search = oracle::search(&original).unwrap();
         let lists = |secret: &Secret| {
-            let positions = original.reveal().positions();
-            let place = |slot: usize| positions[secret.hidden()[slot].index()];
-            let n = secret.n_slots();
-            let of = |slot: usize| {
-                let mut others: Vec<usize> = (0..n).filter(|&other| other != slot).collect();
-                let away =
-                    |other: usize| crate::geometry::vector::distance(&place(slot), &place(other));
-                others.sort_by(|&a, &b| away(a).total_cmp(&away(b)));
-                others.into_iter().take(12).map(RecordId::from_index).collect::<Vec<_>>()
-            };
-            let offsets = (0..=n as u64).map(|slot| 12 * slot).collect();
-            Neighborhoods::try_new(offsets, (0..n).flat_map(of).collect(), None, n, 1).unwrap()
+            let near = TrueNeighbors::new(&search, secret, 1, 12).unwrap();
+            near.at_inlier_ratio(1.0, 0).unwrap()
         };
         let scheme = (sphere::ENTRY.in_3d.unwrap())(&SchemeOptions::usual(Unit::Meter));
         let (released, secret) = obfuscate(&*scheme, &original, None, &Key::from_seed(0)).unwrap();

@@ -156,22 +156,6 @@ fn clustered_outliers_are_shared_by_neighbors_and_lie_in_two_far_places() {
 }
 
 #[test]
-fn lists_of_every_model_are_the_same_on_any_number_of_threads() {
-    for scheme in SCHEMES {
-        let on = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| {
-                let oracle = Oracle::new(scheme);
-                Noise::ALL.map(|noise| oracle.lists(noise, 0.3, 6))
-            })
-        };
-        let one = on(1);
-        assert!(on(2) == one && on(8) == one);
-        assert!(one[0] != one[1] && one[1] != one[2] && one[0] != one[2]);
-    }
-}
-
-#[test]
 fn a_map_without_a_ring_is_told() {
     let hidden = hide::<3>(&olc::ENTRY, &room(17, 2 * K + 4), 5);
     let oracle = Oracle { near: hidden.near(K), hidden };

@@ -333,29 +333,3 @@ mod tests {
         }
     }
 }
-
-#[cfg(test)]
-mod crowding_tests {
-    use super::*;
-
-    #[test]
-    fn sparse_cells_look_wider_and_dense_ones_do_not() {
-        let mut grid = Grid::<2>::over([0.0; 2], [64.0; 2], 64 * 64);
-        // A dense corner, and one estimate far from it.
-        for x in 0..8 {
-            for y in 0..8 {
-                grid.spread(&[x as f32 + 0.5, y as f32 + 0.5], 1.0);
-            }
-        }
-        grid.spread(&[40.5, 40.5], 1.0);
-        grid.smooth(1);
-        let before = grid.clone();
-        look_wider(&mut grid, ENOUGH);
-        let (dense, lone, beside) =
-            (grid.index(&[4.5, 4.5]), grid.index(&[40.5, 40.5]), grid.index(&[44.5, 40.5]));
-        assert_eq!(grid.values[dense], before.values[dense]);
-        assert!(before.values[beside] == 0.0 && grid.values[beside] > 0.0);
-        assert!(grid.values[lone] >= grid.values[beside]);
-        assert!(grid.values[lone] < grid.values[dense]);
-    }
-}
