@@ -11,15 +11,13 @@
 
 mod meet;
 mod swaps;
-mod trust;
 
 use crate::geometry::vector::{dot, quantile, sub, widen};
 use crate::neighbors::{Blocks, MOST_ROWS, mutual};
 use crate::recover::{Confidence, Estimate, Recovered, Status};
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, RowOrder};
-use meet::{Line, Meet, Near};
-use trust::trust;
+use meet::{Line, Meet, Near, trust};
 
 /// Points of the first release, recovered with the second one.
 #[derive(Clone, Debug)]

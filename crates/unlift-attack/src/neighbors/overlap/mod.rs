@@ -4,17 +4,18 @@
 //! hypothesis counts. A short walk over the best matches reaches neighbors whose patches do not overlap.
 
 mod hypotheses;
-mod patches;
 
-pub use patches::{Patches, check};
+use hypotheses::{BINS, CELLS, Cell, DIM, Hypotheses, Version};
 
-use super::Neighborhoods;
-use super::compare::{MOST_ROWS, note, search};
+use super::compare::{Likeness, MOST_ROWS, note, search};
 use super::rows::Rows;
 use super::source::{Needs, Source};
-use super::walk::{self, Walk};
+use super::walk::Walk;
+use super::{Neighborhoods, walk};
+use crate::descriptors::Values;
 use crate::released::Released;
-use crate::{Descriptors, Error};
+use crate::simd::BLOCK;
+use crate::{Descriptors, Error, ErrorKind, simd};
 
 /// Number of classes of shifts: 0 cells, 1 cell, more.
 pub const REACHES: usize = 3;
@@ -68,4 +69,182 @@ impl<const D: usize> Source<D> for Overlap {
     fn note(&self, n_slots: usize) -> Option<String> {
         note("overlap", n_slots)
     }
+}
+
+/// Length of a version as a vector of bytes. Rounding adds less than half of the square root of [`DIM`], so that a product of two is
+/// at most 133 x 133.
+const LENGTH: f32 = 127.0;
+
+/// Least norm of shared cells. With a smaller one, blank parts (at the border of an image) would match each other.
+const NORM_FLOOR: f32 = 0.05;
+
+/// Compares patches by their overlap.
+pub struct Patches {
+    hypotheses: Hypotheses,
+}
+
+/// The versions of [`BLOCK`] patches, one after another, about 10 KB per patch. Rows beyond the last patch are zero.
+pub struct Block {
+    turned: Vec<u8>,
+    still: Vec<i8>,
+}
+
+/// Rejects descriptors that are not SIFT: 128 columns of bytes or of floats that are not negative, with any norm.
+///
+/// # Errors
+/// States what a SIFT descriptor is, and what was found.
+pub fn check(descriptors: &Descriptors) -> Result<(), Error> {
+    let wrong = |found: String| {
+        let expected = "SIFT descriptors (128 values each, none negative)";
+        Err(Error::new("descriptors for overlap", expected, found).of_kind(ErrorKind::Descriptors))
+    };
+    if descriptors.dim() != DIM {
+        return wrong(format!("{} values each", descriptors.dim()));
+    }
+    if let Values::F32(values) = descriptors.values()
+        && let Some(value) = values.iter().find(|&&x| x < 0.0)
+    {
+        return wrong(format!("values like {value}"));
+    }
+    Ok(())
+}
+
+impl Patches {
+    /// Creates the comparison for patches of `descriptors`.
+    ///
+    /// # Errors
+    /// When they are not SIFT, see [`check`].
+    pub fn of(descriptors: &Descriptors) -> Result<Self, Error> {
+        check(descriptors)?;
+        Ok(Self { hypotheses: Hypotheses::new() })
+    }
+}
+
+impl Likeness for Patches {
+    /// Scores are integers.
+    const STEP: f32 = 1.0;
+    type Block = Block;
+
+    fn block(&self, descriptors: &Descriptors, slots: &[u32]) -> Block {
+        Block::new(&self.hypotheses, descriptors, slots)
+    }
+
+    /// Computes the best cosine of shared cells over all hypotheses, as a product of bytes.
+    fn scores(&self, a: &Block, b: &Block, scores: &mut [f32]) {
+        self.best(a, b, |_| true, scores);
+    }
+}
+
+impl Patches {
+    /// Computes the best cosine over the hypotheses whose shift `counts`.
+    pub fn best(&self, a: &Block, b: &Block, counts: impl Fn(usize) -> bool, scores: &mut [f32]) {
+        let mut forth = vec![0i16; BLOCK * BLOCK];
+        let mut back = forth.clone();
+        let turned = starts(&self.hypotheses.turned);
+        let still = starts(&self.hypotheses.still);
+        for pair in self.hypotheses.pairs.iter().filter(|pair| counts(pair.shift)) {
+            let depth = self.hypotheses.turned[pair.turned].cells.len() * BINS;
+            let left = turned[pair.turned]..turned[pair.turned] + BLOCK * depth;
+            let right = still[pair.still]..still[pair.still] + BLOCK * depth;
+            let product = |left: &[u8], right: &[i8], best: &mut [i16]| {
+                simd::raise_to_products(left, right, depth, best);
+            };
+            product(&a.turned[left.clone()], &b.still[right.clone()], &mut forth);
+            if pair.both_ways {
+                product(&b.turned[left], &a.still[right], &mut back);
+            }
+        }
+        for i in 0..BLOCK {
+            for j in 0..BLOCK {
+                scores[i * BLOCK + j] = f32::from(forth[i * BLOCK + j].max(back[j * BLOCK + i]));
+            }
+        }
+    }
+}
+
+/// Returns the start of each version within a block.
+fn starts(versions: &[Version]) -> Vec<usize> {
+    let step = |at: &mut usize, version: &Version| {
+        let start = *at;
+        *at += version.cells.len() * BINS * BLOCK;
+        Some(start)
+    };
+    versions.iter().scan(0, step).collect()
+}
+
+impl Block {
+    fn new(hypotheses: &Hypotheses, descriptors: &Descriptors, slots: &[u32]) -> Self {
+        let length = |versions: &[Version]| -> usize {
+            versions.iter().map(|version| version.cells.len() * BINS * BLOCK).sum()
+        };
+        let mut block = Self {
+            turned: vec![0; length(&hypotheses.turned)],
+            still: vec![0; length(&hypotheses.still)],
+        };
+        let mut bytes = [0u8; DIM];
+        for (row, &slot) in slots.iter().enumerate() {
+            let squares = squares(descriptors, slot as usize);
+            let mut start = 0;
+            for version in &hypotheses.turned {
+                let depth = version.cells.len() * BINS;
+                quantize(&squares, version, &mut bytes);
+                let at = start + row * depth;
+                block.turned[at..at + depth].copy_from_slice(&bytes[..depth]);
+                start += BLOCK * depth;
+            }
+            let mut start = 0;
+            for version in &hypotheses.still {
+                let depth = version.cells.len() * BINS;
+                quantize(&squares, version, &mut bytes);
+                for (at, &byte) in bytes[..depth].iter().enumerate() {
+                    block.still[start + simd::packed(row, at, depth)] = byte as i8;
+                }
+                start += BLOCK * depth;
+            }
+        }
+        block
+    }
+}
+
+/// Returns the gradient histogram behind a RootSIFT descriptor: the squares of its values, with sum 1.
+fn squares(descriptors: &Descriptors, slot: usize) -> [[f32; BINS]; CELLS] {
+    let range = slot * DIM..(slot + 1) * DIM;
+    let mut squares = [0.0f32; DIM];
+    match descriptors.values() {
+        Values::U8(v) => {
+            for (square, &x) in squares.iter_mut().zip(&v[range]) {
+                *square = f32::from(x) * f32::from(x);
+            }
+        }
+        Values::F32(v) => {
+            let largest = v[range.clone()].iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+            for (square, &x) in squares.iter_mut().zip(&v[range]) {
+                *square = (x / largest) * (x / largest);
+            }
+        }
+    }
+    let sum: f32 = squares.iter().sum::<f32>().max(f32::MIN_POSITIVE);
+    std::array::from_fn(|cell| std::array::from_fn(|bin| squares[cell * BINS + bin] / sum))
+}
+
+/// Converts a version of a patch to bytes. Histograms are mixed before the square root.
+fn quantize(squares: &[[f32; BINS]; CELLS], version: &Version, bytes: &mut [u8; DIM]) {
+    let mut mixed = [0.0f32; DIM];
+    for (cell, mixed) in version.cells.iter().zip(mixed.chunks_exact_mut(BINS)) {
+        for bin in 0..BINS {
+            // Orientations of a descriptor turn in the opposite sense of the grid.
+            mixed[(bin + BINS - version.turn) % BINS] = mix(squares, cell, bin);
+        }
+    }
+    let depth = version.cells.len() * BINS;
+    let norm = mixed[..depth].iter().sum::<f32>().sqrt().max(NORM_FLOOR);
+    let scale = LENGTH * version.root_weight / norm;
+    for (byte, &value) in bytes[..depth].iter_mut().zip(&mixed) {
+        *byte = (value.sqrt() * scale).round() as u8;
+    }
+}
+
+#[inline(always)]
+fn mix(squares: &[[f32; BINS]; CELLS], cell: &Cell, bin: usize) -> f32 {
+    cell.iter().map(|&(from, share)| squares[usize::from(from)][bin] * share).sum()
 }

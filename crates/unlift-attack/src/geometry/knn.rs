@@ -1,0 +1,680 @@
+//! Exact K nearest neighbors. Ties are ordered by row.
+//!
+//! The search tree is a balanced k-d tree. Points are stored leaf by leaf, one column per coordinate, so that a leaf takes a few vector
+//! instructions, and queries in [`spatial_order`](Knn::spatial_order) find their neighbors in the cache. The index of a node
+//! determines its place in the columns, so only boxes are stored.
+//!
+//! A query first searches the smallest node around its point that holds enough others. The K-th distance found there is an upper bound.
+//! Then it takes every point within that bound, so that no tie is missed. Queries of all rows run leaf by leaf ([`solve`]).
+
+use rayon::prelude::*;
+
+use crate::Error;
+use crate::geometry::vector::squared_distance;
+use crate::simd::{Kernel, dispatch};
+
+/// Largest number of points per leaf.
+const LEAF: usize = 16;
+/// Nodes with fewer points are split without parallelism.
+const ALONE: usize = 1 << 14;
+
+/// A search tree over points, which are identified by row.
+pub struct Knn<'a, const D: usize> {
+    points: &'a [[f64; D]],
+    /// Number of levels below the root: there are `2^depth` leaves.
+    depth: u32,
+    /// Boxes of the nodes: the root is 1, the halves of node `i` are `2 i` and `2 i + 1`.
+    boxes: Vec<Bounds<D>>,
+    /// Coordinates in leaf order.
+    columns: [Vec<f64>; D],
+    /// Row at each place of the leaf order.
+    rows: Vec<u32>,
+    /// Place of each row.
+    places: Vec<u32>,
+}
+
+#[derive(Clone, Copy)]
+struct Bounds<const D: usize> {
+    low: [f64; D],
+    high: [f64; D],
+}
+
+impl<const D: usize> Bounds<D> {
+    const EMPTY: Self = Self { low: [f64::INFINITY; D], high: [f64::NEG_INFINITY; D] };
+
+    fn and(mut self, other: &Self) -> Self {
+        for c in 0..D {
+            self.low[c] = self.low[c].min(other.low[c]);
+            self.high[c] = self.high[c].max(other.high[c]);
+        }
+        self
+    }
+
+    fn of(points: impl Iterator<Item = [f64; D]>) -> Self {
+        points.fold(Self::EMPTY, |all, p| all.and(&Self { low: p, high: p }))
+    }
+
+    /// Returns a lower bound, rounding included, of the squared distance from `query` to any point inside: every operation is that of the
+    /// distance itself, and each rounds monotonically.
+    #[inline(always)]
+    fn squared_distance(&self, query: &[f64; D]) -> f64 {
+        let mut sum = 0.0;
+        for (c, x) in query.iter().enumerate() {
+            let gap = (self.low[c] - x).max(x - self.high[c]).max(0.0);
+            sum += gap * gap;
+        }
+        sum
+    }
+}
+
+impl<'a, const D: usize> Knn<'a, D> {
+    /// Creates a tree over `points`.
+    ///
+    /// # Errors
+    /// When there are no points, more than 2^32 of them, or one is not finite.
+    pub fn new(points: &'a [[f64; D]]) -> Result<Self, Error> {
+        let n = points.len();
+        if n == 0 || u32::try_from(n).is_err() {
+            return Err(Error::new("points", "1 to 4294967295 of them", n.to_string()));
+        }
+        if let Some(at) = points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+            let what = format!("point {at}");
+            return Err(Error::new(what, "finite coordinates", format!("{:?}", points[at])));
+        }
+        let depth = n.div_ceil(LEAF).next_power_of_two().trailing_zeros();
+        let mut items: Vec<([f64; D], u32)> = points.iter().copied().zip(0..).collect();
+        split(&mut items, depth, &|leaf| (leaf * n) >> depth, 0);
+        let columns = std::array::from_fn(|c| items.iter().map(|item| item.0[c]).collect());
+        let rows: Vec<u32> = items.iter().map(|item| item.1).collect();
+        let mut places = vec![0; n];
+        for (place, &row) in rows.iter().enumerate() {
+            places[row as usize] = place as u32;
+        }
+        let n_leaves = 1usize << depth;
+        let mut boxes = vec![Bounds::EMPTY; 2 * n_leaves];
+        for leaf in 0..n_leaves {
+            let places = (leaf * n) >> depth..((leaf + 1) * n) >> depth;
+            boxes[n_leaves + leaf] = Bounds::of(items[places].iter().map(|item| item.0));
+        }
+        for node in (1..n_leaves).rev() {
+            boxes[node] = boxes[2 * node].and(&boxes[2 * node + 1]);
+        }
+        Ok(Self { points, depth, boxes, columns, rows, places })
+    }
+
+    /// Returns all rows in an order in which near rows are adjacent; queries in this order are fastest.
+    pub fn spatial_order(&self) -> &[u32] {
+        &self.rows
+    }
+
+    /// Returns all rows in patches of near ones: the box is split along its longest side until a patch holds at most `most` rows (but a
+    /// leaf is never split).
+    pub fn patches(&self, most: usize) -> Vec<&[u32]> {
+        let n = self.rows.len();
+        let fits = |level: &u32| n.div_ceil(1 << level) <= most.max(1);
+        let level = (0..self.depth).find(fits).unwrap_or(self.depth);
+        (1usize << level..2 << level).map(|node| &self.rows[self.range(node)]).collect()
+    }
+
+    /// Finds the `k` nearest other rows of `row` (or all, if there are fewer) as (squared distance, row), sorted, into `found`.
+    pub fn nearest(&self, row: usize, k: usize, found: &mut Vec<(f64, u32)>) {
+        let place = self.places[row] as usize;
+        self.search(self.points[row], Some(place), k, found);
+    }
+
+    /// Finds the `k` nearest rows of any position, in the same form.
+    pub fn nearest_to(&self, position: [f64; D], k: usize, found: &mut Vec<(f64, u32)>) {
+        self.search(position, None, k, found);
+    }
+
+    /// Calls `of(row, point)` for all points whose squared distance to a position is at most `bound`; of coinciding points, at least for
+    /// the `most` with the lowest rows.
+    #[inline(always)]
+    pub fn within(
+        &self,
+        position: &[f64; D],
+        (bound, most): (f64, usize),
+        mut of: impl FnMut(u32, [f64; D]),
+    ) {
+        self.leaves_within(position, (bound, most), usize::MAX, |places| {
+            for place in places {
+                let point = std::array::from_fn(|c| self.columns[c][place]);
+                if squared_distance(position, &point) <= bound {
+                    of(self.rows[place], point);
+                }
+            }
+        });
+    }
+
+    fn search(&self, query: [f64; D], own: Option<usize>, k: usize, found: &mut Vec<(f64, u32)>) {
+        found.clear();
+        if k == 0 {
+            return;
+        }
+        // A row starts from its own leaf; another position walks down the tree.
+        let leaf = match own {
+            Some(place) => self.leaf_of(place),
+            None => self.leaf_towards(&query),
+        };
+        let own = own.map_or(u32::MAX, |place| place as u32);
+        dispatch(Search { tree: self, query, own, leaf, k, found: &mut *found });
+        if found.len() > k {
+            found.select_nth_unstable_by_key(k - 1, canonical);
+            found.truncate(k);
+        }
+        found.sort_unstable_by_key(canonical);
+    }
+
+    fn leaf_towards(&self, query: &[f64; D]) -> usize {
+        let mut node = 1;
+        for _ in 0..self.depth {
+            let [a, b] = [2 * node, 2 * node + 1].map(|n| self.boxes[n].squared_distance(query));
+            node = 2 * node + usize::from(b < a);
+        }
+        node - (1 << self.depth)
+    }
+
+    /// Calls `take` with the places of every leaf within the squared distance `bound`, except those below node `but`; of coinciding points,
+    /// with at least the `most` that have the lowest rows.
+    #[inline(always)]
+    fn leaves_within(
+        &self,
+        query: &[f64; D],
+        (bound, most): (f64, usize),
+        but: usize,
+        mut take: impl FnMut(std::ops::Range<usize>),
+    ) {
+        let mut stack = [0usize; usize::BITS as usize];
+        let mut height = 1;
+        stack[0] = 1;
+        while height > 0 {
+            height -= 1;
+            let node = stack[height];
+            if node == but {
+                continue;
+            }
+            if node >> self.depth != 0 || self.is_pile(node) {
+                take(self.lowest(node, most));
+                continue;
+            }
+            for half in [2 * node, 2 * node + 1] {
+                if self.boxes[half].squared_distance(query) <= bound {
+                    stack[height] = half;
+                    height += 1;
+                }
+            }
+        }
+    }
+
+    /// Whether all points of a node coincide.
+    #[inline(always)]
+    fn is_pile(&self, node: usize) -> bool {
+        self.boxes[node].low == self.boxes[node].high
+    }
+
+    /// Returns the places of a node. If its points coincide, returns only the leaves that hold the `most` lowest rows, because at equal
+    /// distances no others can be among the nearest.
+    #[inline(always)]
+    fn lowest(&self, node: usize, most: usize) -> std::ops::Range<usize> {
+        let all = self.range(node);
+        if all.len() <= most || !self.is_pile(node) {
+            return all;
+        }
+        // In such a node rows ascend from leaf to leaf.
+        let last = self.leaf_of(all.start + most.max(1) - 1);
+        all.start..self.range((1 << self.depth) + last).end
+    }
+
+    /// Returns the leaf of a place.
+    #[inline(always)]
+    fn leaf_of(&self, place: usize) -> usize {
+        (((place + 1) << self.depth) - 1) / self.rows.len()
+    }
+
+    /// Returns the places of a node.
+    #[inline(always)]
+    fn range(&self, node: usize) -> std::ops::Range<usize> {
+        let level = usize::BITS - 1 - node.leading_zeros();
+        let below = self.depth - level;
+        let first = (node << below) - (1 << self.depth);
+        let n = self.rows.len();
+        (first * n) >> self.depth..((first + (1 << below)) * n) >> self.depth
+    }
+}
+
+/// Packs distance and row into one integer. The bits of nonnegative numbers are ordered as the numbers are.
+#[inline(always)]
+fn canonical(&(squared, row): &(f64, u32)) -> u128 {
+    (u128::from(squared.to_bits()) << 32) | u128::from(row)
+}
+
+/// Sorts `items`, the leaves from `first` on, into leaf order: splits along the longest side, `depth` times. `starts` returns the
+/// first place of a leaf.
+fn split<const D: usize>(
+    items: &mut [([f64; D], u32)],
+    depth: u32,
+    starts: &(impl Fn(usize) -> usize + Sync),
+    first: usize,
+) {
+    if depth == 0 {
+        return;
+    }
+    let bounds = Bounds::of(items.iter().map(|item| item.0));
+    let side = |c: usize| bounds.high[c] - bounds.low[c];
+    let longest = (1..D).fold(0, |best, c| if side(c) > side(best) { c } else { best });
+    let middle = first + (1 << (depth - 1));
+    let at = starts(middle) - starts(first);
+    if at < items.len() && side(longest) == 0.0 {
+        items.select_nth_unstable_by_key(at, |item| item.1);
+    } else if at < items.len() {
+        items.select_nth_unstable_by(at, |a, b| {
+            a.0[longest].total_cmp(&b.0[longest]).then(a.1.cmp(&b.1))
+        });
+    }
+    let alone = items.len() < ALONE;
+    let (left, right) = items.split_at_mut(at);
+    if alone {
+        split(left, depth - 1, starts, first);
+        split(right, depth - 1, starts, middle);
+    } else {
+        rayon::join(
+            || split(left, depth - 1, starts, first),
+            || split(right, depth - 1, starts, middle),
+        );
+    }
+}
+
+/// Finds all points within the K-th distance, and a few more, unordered.
+struct Search<'a, 'b, const D: usize> {
+    tree: &'a Knn<'b, D>,
+    query: [f64; D],
+    /// The query's own place, which is no neighbor.
+    own: u32,
+    leaf: usize,
+    k: usize,
+    found: &'a mut Vec<(f64, u32)>,
+}
+
+impl<const D: usize> Kernel for Search<'_, '_, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { tree, query, own, leaf, k, found } = self;
+        let n_leaves = 1usize << tree.depth;
+        // The smallest node with so many others that their K-th distance is near the true one.
+        let mut near = n_leaves + leaf;
+        while near > 1 && tree.range(near).len() < 2 * k + 1 {
+            near /= 2;
+        }
+        // Extend to all points that coincide with these. The lowest rows suffice: one more than k, as the point itself may be one.
+        while near > 1 && tree.is_pile(near / 2) {
+            near /= 2;
+        }
+        let most = k + 1;
+        take(tree, &query, own, tree.lowest(near, most), f64::INFINITY, found);
+        if near == 1 {
+            return;
+        }
+        let bound = found.select_nth_unstable_by_key(k - 1, canonical).1.0;
+        found.retain(|item| item.0 <= bound);
+        tree.leaves_within(&query, (bound, most), near, |places| {
+            take(tree, &query, own, places, bound, found);
+        });
+    }
+}
+
+/// Appends the points at `places` within the squared distance `bound` of `query`.
+#[inline(always)]
+fn take<const D: usize>(
+    tree: &Knn<'_, D>,
+    query: &[f64; D],
+    own: u32,
+    places: std::ops::Range<usize>,
+    bound: f64,
+    found: &mut Vec<(f64, u32)>,
+) {
+    let mut at = places.start;
+    while at < places.end {
+        let end = places.end.min(at + LEAF);
+        let mut squared = [0.0; LEAF];
+        // The order of operations equals that of `vector::squared_distance`, so the bits are equal.
+        for (column, center) in tree.columns.iter().zip(query) {
+            for (sum, x) in squared.iter_mut().zip(&column[at..end]) {
+                let d = center - x;
+                *sum += d * d;
+            }
+        }
+        for (place, &distance) in (at..end).zip(&squared) {
+            if distance <= bound && place as u32 != own {
+                found.push((distance, tree.rows[place]));
+            }
+        }
+        at = end;
+    }
+}
+
+impl<const D: usize> Knn<'_, D> {
+    /// Calls `of(row, its k nearest, entry)` for every row, with `entries` in spatial order. It is several times faster than single
+    /// queries. The nearest are other rows, as (squared distance, row), nearest first.
+    ///
+    /// # Panics
+    /// When there is not one entry per row.
+    pub fn each<T: Send>(
+        &self,
+        k: usize,
+        entries: &mut [T],
+        of: impl Fn(usize, &[(f64, u32)], &mut T) + Sync,
+    ) {
+        assert_eq!(entries.len(), self.rows.len(), "one entry per row");
+        let mut rest = entries;
+        let mut leaves = Vec::with_capacity(1 << self.depth);
+        for leaf in 0..1 << self.depth {
+            let (entries, others) = rest.split_at_mut(self.range((1 << self.depth) + leaf).len());
+            leaves.push((leaf, entries));
+            rest = others;
+        }
+        leaves.into_par_iter().for_each_init(Scratch::new, |scratch, (leaf, entries)| {
+            solve(self, leaf, k, scratch, |at, row, found| of(row, found, &mut entries[at]));
+        });
+    }
+
+    /// Returns `of(row, its k nearest)` for every row, in the order of rows, see [`each`](Self::each).
+    pub fn per_row<T: Clone + Send>(
+        &self,
+        k: usize,
+        of: impl Fn(usize, &[(f64, u32)]) -> T + Sync,
+    ) -> Vec<T> {
+        let mut by_place: Vec<Option<T>> = vec![None; self.rows.len()];
+        self.each(k, &mut by_place, |row, found, entry| *entry = Some(of(row, found)));
+        self.places.iter().filter_map(|&place| by_place[place as usize].take()).collect()
+    }
+
+    /// Returns the distance of every row to its `k`-th nearest other row (to the last one in small sets).
+    pub fn kth_distances(&self, k: usize) -> Vec<f64> {
+        self.per_row(k, |_, found| found.last().map_or(0.0, |last| last.0.sqrt()))
+    }
+}
+
+/// Factor for rounding of distances, with a wide margin. A larger bound costs time but stays exact.
+const SLACK: f64 = 1.0 + 1e-9;
+/// Largest width of a leaf, as a multiple of the neighborhood's.
+const WIDEST: f64 = 1.5;
+/// Largest number of points beyond those wanted that are sorted.
+const MOST_SURPLUS: usize = 6;
+/// Largest number of passes that narrow the bound.
+const MOST_PASSES: usize = 12;
+
+/// Buffers of one thread.
+struct Scratch<const D: usize> {
+    columns: [Vec<f64>; D],
+    rows: Vec<u32>,
+    squared: Vec<f64>,
+    keys: Vec<u64>,
+    found: Vec<(f64, u32)>,
+}
+
+impl<const D: usize> Scratch<D> {
+    fn new() -> Self {
+        Self {
+            columns: std::array::from_fn(|_| Vec::new()),
+            rows: Vec::new(),
+            squared: Vec::new(),
+            keys: Vec::new(),
+            found: Vec::new(),
+        }
+    }
+}
+
+/// Calls `of(index within the leaf, row, its k nearest)` for every point of `leaf`.
+fn solve<const D: usize>(
+    tree: &Knn<'_, D>,
+    leaf: usize,
+    k: usize,
+    scratch: &mut Scratch<D>,
+    mut of: impl FnMut(usize, usize, &[(f64, u32)]),
+) {
+    let places = tree.range((1 << tree.depth) + leaf);
+    let bounds = &tree.boxes[(1 << tree.depth) + leaf];
+    let middle: [f64; D] =
+        std::array::from_fn(|c| bounds.low[c] + 0.5 * (bounds.high[c] - bounds.low[c]));
+    let squared = |place: usize| squared_distance(&middle, &tree.points[tree.rows[place] as usize]);
+    let width = places.clone().map(squared).fold(0.0, f64::max).sqrt();
+    tree.nearest_to(middle, k + 1, &mut scratch.found);
+    let reach = match scratch.found.last() {
+        Some(last) if scratch.found.len() > k => last.0.sqrt(),
+        _ => f64::INFINITY,
+    };
+    // The points of a leaf that is much wider than a neighborhood share few neighbors.
+    if width > WIDEST * reach || reach == f64::INFINITY {
+        for (at, place) in places.enumerate() {
+            let row = tree.rows[place] as usize;
+            tree.nearest(row, k, &mut scratch.found);
+            of(at, row, &scratch.found);
+        }
+        return;
+    }
+    gather(tree, &middle, ((reach + 2.0 * width) * SLACK, k + 1), scratch);
+    let bound = (reach + width) * SLACK;
+    for (at, place) in places.enumerate() {
+        let row = tree.rows[place];
+        let query = tree.points[row as usize];
+        let bound = bound * bound + f64::MIN_POSITIVE;
+        dispatch(Query { query, row, k, bound, scratch: &mut *scratch });
+        scratch.keys.sort_unstable();
+        let low = low_bits(&scratch.rows);
+        scratch.found.clear();
+        scratch.found.extend(scratch.keys.iter().map(|key| {
+            let at = (key & low) as usize;
+            (scratch.squared[at], scratch.rows[at])
+        }));
+        if !scratch.found.is_sorted_by_key(canonical) {
+            scratch.found.sort_unstable_by_key(canonical);
+        }
+        scratch.found.truncate(k);
+        of(at, row as usize, &scratch.found);
+    }
+}
+
+/// Copies every point within `radius` of `middle` to the columns of `scratch`; of coinciding points, at least the `most` with the
+/// lowest rows.
+fn gather<const D: usize>(
+    tree: &Knn<'_, D>,
+    middle: &[f64; D],
+    (radius, most): (f64, usize),
+    scratch: &mut Scratch<D>,
+) {
+    let bound = radius * radius + f64::MIN_POSITIVE;
+    scratch.rows.clear();
+    scratch.columns.iter_mut().for_each(Vec::clear);
+    tree.within(middle, (bound, most), |row, point| {
+        scratch.columns.iter_mut().zip(point).for_each(|(column, x)| column.push(x));
+        scratch.rows.push(row);
+    });
+}
+
+/// Returns the mask of the bits that number the candidates.
+#[inline(always)]
+fn low_bits(candidates: &[u32]) -> u64 {
+    candidates.len().next_power_of_two() as u64 - 1
+}
+
+/// Leaves in `keys` the k nearest candidates and a few more, unordered. A key is the squared distance as an integer, with the
+/// lowest bits replaced by the candidate's index. Integers sort twice as fast as pairs; where the remaining bits tie, the order
+/// is repaired afterwards.
+struct Query<'a, const D: usize> {
+    query: [f64; D],
+    row: u32,
+    k: usize,
+    /// A squared distance within which k others lie.
+    bound: f64,
+    scratch: &'a mut Scratch<D>,
+}
+
+impl<const D: usize> Kernel for Query<'_, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Scratch { columns, rows, squared, keys, .. } = self.scratch;
+        squared.clear();
+        squared.resize(rows.len(), 0.0);
+        // The order of operations equals that of `vector::squared_distance`, so the bits are equal.
+        for (column, center) in columns.iter().zip(&self.query) {
+            for (sum, x) in squared.iter_mut().zip(column) {
+                let d = center - x;
+                *sum += d * d;
+            }
+        }
+        // The point itself is among the candidates.
+        let bound = narrowed(squared, self.bound, self.k + 1);
+        let low = low_bits(rows);
+        keys.clear();
+        for (at, (&squared, &row)) in squared.iter().zip(rows.iter()).enumerate() {
+            if squared <= bound && row != self.row {
+                keys.push((squared.to_bits() & !low) | at as u64);
+            }
+        }
+    }
+}
+
+/// Returns a bound of at most `high` within which at least `wanted` of `squared` lie, and few more. On surfaces, the number of points is
+/// nearly proportional to the squared distance, so guesses converge fast. Ties may prevent that, which only costs time.
+#[inline(always)]
+fn narrowed(squared: &[f64], mut high: f64, wanted: usize) -> f64 {
+    let within = |bound: f64| squared.iter().map(|&s| u64::from(s <= bound)).sum::<u64>() as usize;
+    let (mut low, mut below) = (0.0, 0);
+    let mut above = within(high);
+    for _ in 0..MOST_PASSES {
+        if above <= wanted + MOST_SURPLUS {
+            break;
+        }
+        // Aim for the middle of the allowed surplus.
+        let share = (wanted + MOST_SURPLUS / 2 - below) as f64 / (above - below) as f64;
+        let guess = low + (high - low) * share;
+        let count = within(guess);
+        if count >= wanted {
+            (high, above) = (guess, count);
+        } else {
+            (low, below) = (guess, count);
+        }
+    }
+    high
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Knn, canonical};
+    use crate::geometry::vector::squared_distance;
+    use crate::seed::{Draws, Stage};
+
+    fn brute_force<const D: usize>(
+        points: &[[f64; D]],
+        query: &[f64; D],
+        skip: Option<usize>,
+        k: usize,
+    ) -> Vec<(f64, u32)> {
+        let mut all: Vec<(f64, u32)> = (0..points.len())
+            .filter(|&other| Some(other) != skip)
+            .map(|other| (squared_distance(query, &points[other]), other as u32))
+            .collect();
+        all.sort_unstable_by_key(canonical);
+        all.truncate(k);
+        all
+    }
+
+    fn compare<const D: usize>(points: &[[f64; D]]) {
+        let knn = Knn::new(points).unwrap();
+        let mut found = Vec::new();
+        for row in 0..points.len() {
+            for k in [1, 7, 50] {
+                knn.nearest(row, k, &mut found);
+                assert_eq!(found, brute_force(points, &points[row], Some(row), k), "{row}, k {k}");
+            }
+        }
+        for k in [1, 7, 50] {
+            let all = knn.per_row(k, |_, found| found.to_vec());
+            for (row, found) in all.iter().enumerate() {
+                assert_eq!(found, &brute_force(points, &points[row], Some(row), k), "{row}, k {k}");
+            }
+        }
+    }
+
+    #[test]
+    fn equals_brute_force_with_many_ties() {
+        let mut draws = Draws::new(5, Stage::Synthetic, 0);
+        // A coarse lattice: most distances tie, many points coincide.
+        let lattice: Vec<[f64; 3]> =
+            (0..800).map(|_| std::array::from_fn(|_| draws.below(6) as f64)).collect();
+        compare(&lattice);
+    }
+
+    #[test]
+    fn equals_brute_force_at_every_size_and_density() {
+        for n in [2, 23, 24, 25, 48, 49, 97, 300, 1000] {
+            let mut draws = Draws::new(n, Stage::Synthetic, 0);
+            // Cubing makes the middle a million times denser than the border.
+            let mut points = |_| std::array::from_fn(|_| draws.between(-1.0, 1.0).powi(3) * 1e3);
+            compare(&(0..n).map(&mut points).collect::<Vec<[f64; 3]>>());
+            let flat: Vec<[f64; 2]> =
+                (0..n).map(&mut points).map(|p: [f64; 3]| [p[0], p[1]]).collect();
+            compare(&flat);
+        }
+    }
+
+    /// Depth cameras write (0, 0, 0) for missing points, so that thousands coincide.
+    #[test]
+    fn piles_are_as_if_every_point_was_looked_at() {
+        let mut draws = Draws::new(3, Stage::Synthetic, 0);
+        for share in [0.3, 0.9] {
+            let points: Vec<[f64; 3]> = (0..900)
+                .map(|row| match draws.unit() < share {
+                    // Zeros of both signs are equal.
+                    true => [if row % 2 == 0 { 0.0 } else { -0.0 }, 0.0, 0.0],
+                    false => std::array::from_fn(|_| draws.between(-1.0, 1.0)),
+                })
+                .collect();
+            compare(&points);
+        }
+    }
+
+    #[test]
+    fn points_at_one_place_cost_no_more_than_others() {
+        let points = vec![[1.0; 3]; 200_000];
+        let knn = Knn::new(&points).unwrap();
+        let sums = knn.per_row(50, |_, found| found.iter().map(|item| item.1).sum::<u32>());
+        assert_eq!(sums[199_999], (0..50).sum::<u32>());
+        let mut found = Vec::new();
+        (0..points.len()).for_each(|row| knn.nearest(row, 50, &mut found));
+    }
+
+    #[test]
+    fn any_position_can_ask() {
+        let mut draws = Draws::new(9, Stage::Synthetic, 0);
+        let points: Vec<[f64; 3]> =
+            (0..700).map(|_| std::array::from_fn(|_| draws.normal())).collect();
+        let knn = Knn::new(&points).unwrap();
+        let mut found = Vec::new();
+        for _ in 0..200 {
+            let query = std::array::from_fn(|_| 3.0 * draws.normal());
+            knn.nearest_to(query, 20, &mut found);
+            assert_eq!(found, brute_force(&points, &query, None, 20));
+        }
+    }
+
+    #[test]
+    fn values_per_row_come_in_the_order_of_rows() {
+        let points = [[0.0, 0.0], [5.0, 0.0], [1.0, 0.0]];
+        let knn = Knn::new(&points).unwrap();
+        assert_eq!(knn.kth_distances(1), [1.0, 4.0, 1.0]);
+        let mut order = knn.spatial_order().to_vec();
+        order.sort_unstable();
+        assert_eq!(order, [0, 1, 2]);
+    }
+
+    #[test]
+    fn no_points_and_no_numbers_are_refused() {
+        assert!(Knn::<3>::new(&[]).is_err());
+        assert!(Knn::new(&[[0.0, f64::NAN]]).is_err());
+    }
+}
