@@ -5,7 +5,7 @@
 //! determines its place in the columns, so only boxes are stored.
 //!
 //! A query first searches the smallest node around its point that holds enough others. The K-th distance found there is an upper bound.
-//! Then it takes every point within that bound, so that no tie is missed. Queries of all rows run leaf by leaf ([`solve`]).
+//! Then it takes every point within that bound, so that no tie is missed. Queries of all rows run leaf by leaf (`solve`).
 
 use rayon::prelude::*;
 
