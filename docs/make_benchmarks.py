@@ -17,8 +17,7 @@ or some sections of them, named after the folder; each prints on stderr how long
     cost       15 min    leak and localization accuracy side by side, with mitigations
     protect    20 min    protected descriptors and sphere clouds
 
-`± s` is the standard deviation over seeds, where it exceeds 0.5. Needs the scenes (SHARED/data) and the paper's tables (SHARED/paper/tables);
-standard library only. Everything between the begin and end markers of the two files is replaced.
+`± s` is the standard deviation over seeds, where it exceeds 0.5. Needs the scenes (SHARED/data); standard library only. Everything between the begin and end markers of the two files is replaced.
 """
 import array, csv, json, math, pathlib, random, struct, subprocess, sys, tempfile, time
 
@@ -66,7 +65,7 @@ def extract(photos, kind, out):
 
 
 def published(name):
-    with open(SHARED / f"paper/tables/{name}.csv") as lines:
+    with open(ROOT / f"docs/paper/{name}.csv") as lines:
         return list(csv.DictReader(lines))
 
 
