@@ -1,6 +1,6 @@
 """Draws pages/pictures: for each scheme a made-up scene, what unlift releases of it, and what comes back.
 
-    python3 docs/guide/make_pictures.py            # draws; needs unlift, matplotlib, pyarrow, and the program (UNLIFT_PROGRAM)
+    python3 docs/guide/make_pictures.py            # draws; needs unlift, matplotlib, and the program (UNLIFT_PROGRAM)
     python3 docs/guide/make_pictures.py --check    # compares the shares beside the pictures with those of today; draws nothing
 """
 
@@ -71,8 +71,6 @@ def of_map(scheme: str) -> dict:
 
 def of_image(scheme: str) -> dict:
     """Attacks a scheme for images by the program, with keypoints in a COLMAP database."""
-    import pyarrow.parquet as pq
-
     def unlift(*arguments: str) -> str:
         run = subprocess.run([PROGRAM, *arguments], check=True, capture_output=True, text=True, cwd=folder)
         return run.stdout
@@ -90,28 +88,24 @@ def of_image(scheme: str) -> dict:
             db.execute("insert into keypoints values (1, ?, 2, ?)", [len(data), data.tobytes()])
         db.close()
         unlift("obfuscate", "database.db", "--scheme", scheme, "--seed", str(SEED), "--out", "hidden")
-        ratio = ["--inlier-ratio", str(RATIO), "--k", "20", "--seed", str(SEED)]
-        unlift("neighbors", "oracle", "hidden/truth.parquet", *ratio, "--out", "lists.parquet")
-        unlift("recover", "hidden/released.parquet", "--neighbors", "lists.parquet", "--seed", str(SEED), "--out", "back.parquet")
-        told = json.loads(unlift("evaluate", "back.parquet", "--truth", "hidden/truth.parquet", "--thresholds", "10,25", "--json"))
+        oracle = ["--source", "oracle", "--truth", "hidden/truth.npz", "--inlier-ratio", str(RATIO), "--k", "20"]
+        unlift("neighbors", "hidden/released.npz", *oracle, "--seed", str(SEED), "--out", "lists.npz")
+        unlift("recover", "hidden/released.npz", "--neighbors", "lists.npz", "--seed", str(SEED), "--out", "back.npz")
+        told = json.loads(unlift("evaluate", "back.npz", "--truth", "hidden/truth.npz", "--thresholds", "10,25", "--json"))
         rows = told["results"][0] if "results" in told else told
-        tables = {name: pq.read_table(os.path.join(folder, name)) for name in ("hidden/released.parquet", "hidden/truth.parquet", "back.parquet")}
-    released, truth, back = tables.values()
-    file = json.loads(released.schema.metadata[b"unlift"])
-    meta = file | (json.loads(released["image_meta"][0].as_py()) if "image_meta" in released.column_names else {})
-    origin = np.array(meta["origin"])
-    pair = lambda table, name: np.stack([table[f"{name}{axis}"].to_numpy() for axis in "xy"], 1)  # noqa: E731
-    truth = truth.filter(truth["slot"].is_valid()).sort_by("slot")
-    columns = {}
-    if "foot_x" in released.column_names:
-        columns["foot"] = pair(released, "foot_") + origin
-    if "direction_x" in released.column_names:
-        columns["direction"] = pair(released, "direction_")
-    if "center" in released.column_names:
-        columns |= {"center": released["center"].to_numpy(), "centers": np.array(meta["centers"]) + origin}
-    if file["family"] == "axis_candidates":
-        columns["position"] = pair(released, "" if "x" in released.column_names else "position_") + origin
-    return {"family": file["family"], "columns": columns, "originals": pair(truth, ""), "recovered": pair(back, ""), "shares": rows["recovered_percent"]}
+        released, truth, back = (arrays(os.path.join(folder, name)) for name in ("hidden/released.npz", "hidden/truth.npz", "back.npz"))
+    origin = released.get("origin", np.zeros(2))
+    columns = {name: released[name] for name in ("foot", "direction", "center", "centers", "position") if name in released}
+    columns = {name: c + origin if name in ("foot", "centers", "position") else c for name, c in columns.items()}
+    originals = truth["position"][np.argsort(truth["slot"])][-np.sum(truth["slot"] >= 0):]
+    family = "axis_candidates" if "position" in columns else "rays" if "centers" in columns else "lines"
+    return {"family": family, "columns": columns, "originals": originals, "recovered": back["position"], "shares": rows["recovered_percent"]}
+
+
+def arrays(path: str) -> dict[str, np.ndarray]:
+    """Returns the arrays of the one image of a stage file."""
+    with np.load(path) as file:
+        return {name.removeprefix("house.png/"): file[name] for name in file.files}
 
 
 def seen(points: np.ndarray) -> np.ndarray:
