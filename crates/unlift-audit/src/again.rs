@@ -12,7 +12,7 @@ use std::time::Instant;
 use serde_json::{Map, Value, json};
 use unlift::Unit;
 use unlift::again::{Solved, by_descriptors, by_geometry};
-use unlift::audit::{NeighborsBy, NotAudited, Plan, PointNeighbors, Row, Seconds};
+use unlift::audit::{NotAudited, Plan, Row, Seconds};
 use unlift::audit::{measure, records_alone, scheme_called};
 use unlift::evaluate::{blind, joined};
 use unlift::geometry::knn::Knn;
@@ -28,12 +28,12 @@ use unlift_report::RenderOptions;
 use unlift_report::document::Input;
 
 use crate::Progress;
-use crate::document::{self, Found, Provenance, ordered};
+use crate::document::{self, Found, Provenance, names, only_named, ordered};
 use crate::doubts::check_lengths_of_gates;
 use crate::gate::{Gate, check_gates, gate_results};
 use crate::outputs::{Audited, Finished};
 use crate::prepare::{Preparation, Prepared};
-use crate::{Error, maps};
+use crate::{Error, check_stop, maps};
 
 /// The solver of all rows.
 const SOLVER: &str = "intersection";
@@ -111,7 +111,7 @@ pub fn perform(mut job: AgainJob<'_>, out: OutputSet) -> Result<Finished, Error>
     let described = first.1.descriptors.is_some() && second.1.descriptors.is_some();
     job.plan.schemes = job.pairs.iter().map(|pair| scheme_called(&name(pair))).collect();
     let sources = if described { &[AGAIN, GEOMETRY][..] } else { &[GEOMETRY] };
-    job.plan.neighbors = sources.iter().map(|by| given((*by).to_owned())).collect();
+    job.plan.neighbors = sources.iter().map(|by| only_named((*by).to_owned())).collect();
     check_gates(&job.gates, &job.plan, false)?;
     check_lengths_of_gates(first.1.original.reveal(), &job.gates)?;
     if !described {
@@ -124,10 +124,7 @@ pub fn perform(mut job: AgainJob<'_>, out: OutputSet) -> Result<Finished, Error>
     let doubts = vec![job.doubts.first().cloned(); rows.len()];
     let gates = gate_results(&job.gates, &job.plan, &rows, &not_audited, &doubts, &[])?;
     let mut options = job.options.clone();
-    let names: Vec<&str> = job.plan.schemes.iter().map(|scheme| scheme.name()).collect();
-    let thresholds: Vec<&str> = job.plan.thresholds.iter().map(|t| t.label.as_str()).collect();
-    options.insert("schemes".into(), json!(names));
-    options.insert("thresholds".into(), json!(thresholds));
+    options.extend(names(&job.plan));
     options.insert("records_alone".into(), json!(job.plan.records_alone));
     let points = first.1.original.reveal();
     let scale = 1.0 / first.1.unit_in_map_units;
@@ -154,11 +151,6 @@ pub fn perform(mut job: AgainJob<'_>, out: OutputSet) -> Result<Finished, Error>
     audited.write(out, &job.out, job.share_safe)
 }
 
-fn given(name: String) -> NeighborsBy<3> {
-    let (offsets, neighbors, scores) = (Vec::new(), Vec::new(), None);
-    NeighborsBy::Given(PointNeighbors { name, offsets, neighbors, scores })
-}
-
 /// Returns the name of a pair of schemes: `olc`, or `olc/cp` for two different ones.
 fn name([a, b]: &[Arc<dyn Scheme<3>>; 2]) -> String {
     if a.name() == b.name() { a.name().to_owned() } else { format!("{}/{}", a.name(), b.name()) }
@@ -180,8 +172,7 @@ fn rows(
         let scheme = name(pair);
         let show = |what: &str| {
             job.progress.show(at * sources.len(), total, &format!("{scheme}, {what}"));
-            let stopped = "audit: expected to run to the end, found a request to stop";
-            if job.progress.goes_on() { Ok(()) } else { Err(Error::request(stopped)) }
+            check_stop(job.progress)
         };
         show("two releases")?;
         let started = Instant::now();

@@ -2,6 +2,7 @@
 //! number of items.
 
 use unlift::audit::{Cell, Observer, Row};
+use unlift_report::ErrorCdf;
 
 use crate::Progress;
 
@@ -80,4 +81,14 @@ impl<const D: usize> Observer<D> for Curves<'_> {
         let n = cell.accuracy.n_points();
         self.curves.push(Curve { cell: cell.row.clone(), within, n });
     }
+}
+
+/// Returns the curve of every row of `rows` that has one.
+pub fn curves_of(cells: Vec<(Row, Vec<(f64, f64)>)>, rows: &[Row]) -> Vec<ErrorCdf> {
+    let curve = |(cell, points): (Row, Vec<(f64, f64)>)| {
+        // A cell that failed under another seed has no row.
+        let row = rows.iter().position(|row| row.is_same_cell(&cell))?;
+        Some(ErrorCdf { row, points })
+    };
+    cells.into_iter().filter_map(curve).collect()
 }

@@ -5,7 +5,7 @@ use std::time::Instant;
 use indexmap::IndexMap;
 use serde_json::{Map, Value, json};
 use unlift::Unit;
-use unlift::audit::{self, NeighborsBy, NotAudited, Plan, Row, Threshold};
+use unlift::audit::{self, NeighborsBy, NotAudited, Plan, PointNeighbors, Row, Threshold};
 use unlift::recover::Delta;
 use unlift_report::Given;
 use unlift_report::document as report;
@@ -59,6 +59,20 @@ pub fn options<const D: usize>(plan: &Plan<D>, more: Map<String, Value>) -> Map<
     options.insert("repeats".into(), json!(plan.repeats));
     options.extend(more);
     options
+}
+
+/// Returns the names of the plan's schemes and thresholds as recorded options.
+pub fn names<const D: usize>(plan: &Plan<D>) -> Map<String, Value> {
+    let schemes: Vec<&str> = plan.schemes.iter().map(|scheme| scheme.name()).collect();
+    let thresholds: Vec<&str> = plan.thresholds.iter().map(|t| t.label.as_str()).collect();
+    let named = [("schemes", json!(schemes)), ("thresholds", json!(thresholds))];
+    named.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+}
+
+/// Returns a source without lists, so that gates know the name of rows that an audit makes itself.
+pub fn only_named<const D: usize>(name: String) -> NeighborsBy<D> {
+    let (offsets, neighbors, scores) = (Vec::new(), Vec::new(), None);
+    NeighborsBy::Given(PointNeighbors { name, offsets, neighbors, scores })
 }
 
 /// The results of an audit of a map or of images.

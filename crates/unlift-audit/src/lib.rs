@@ -171,6 +171,12 @@ pub trait Progress: Send + Sync {
     }
 }
 
+/// Returns an error if the user asked to stop.
+fn check_stop(progress: &dyn Progress) -> Result<(), Error> {
+    let stopped = "audit: expected to run to the end, found a request to stop";
+    if progress.goes_on() { Ok(()) } else { Err(Error::request(stopped)) }
+}
+
 /// A progress receiver that ignores everything.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Quiet;

@@ -16,6 +16,7 @@ const PARTIAL: &str = ".unlift-partial";
 pub(crate) const CLOUD_COMMENT: &str = "unlift";
 /// The first line of each file of a COLMAP model.
 pub(crate) const MODEL_MARK: &str = "# unlift model";
+const MODEL_MARKS: &[&[u8]] = &[MODEL_MARK.as_bytes()];
 /// A mark after the superblock of an HDF5 file. No HDF5 structure refers to it.
 pub(crate) const FEATURES_MARK: &[u8; 32] = b"unlift features, format 1\0\0\0\0\0\0\0";
 /// A PNG chunk: length, the text "Software: unlift", checksum.
@@ -43,7 +44,6 @@ pub enum Kind {
     Features,
     Picture,
     Junit,
-    Manifest,
     Table,
     Curves,
 }
@@ -57,11 +57,10 @@ impl Kind {
             Self::Page => ("a report", 1024, &[b"<meta name=\"generator\" content=\"unlift\">"]),
             Self::Stage(_) => ("a stage file of this kind", 0, &[]),
             Self::Cloud => ("a cloud", 40, &[b"\ncomment unlift\n", b"# unlift\n"]),
-            Self::Model => ("a model", 0, &[b"# unlift model"]),
+            Self::Model => ("a model", 0, MODEL_MARKS),
             Self::Features => ("features", 96, &[FEATURES_MARK]),
             Self::Picture => ("a picture", 33, &[PICTURE_MARK]),
             Self::Junit => ("gates as JUnit XML", 40, &[b"<testsuites name=\"unlift\""]),
-            Self::Manifest => ("a manifest of parts", 0, &[b"{"]),
             Self::Table => ("a table", 0, &[b"scheme,neighbors,", b"% unlift ", b"<!-- unlift "]),
             Self::Curves => ("curves", 40, &[b"<!-- unlift "]),
         }

@@ -5,7 +5,6 @@
 //! model, features ──> views ──obfuscate──> queries ──Links──> recover ──> rows by number of queries
 //! ```
 
-mod pictures;
 mod view;
 
 use std::ops::Range;
@@ -16,7 +15,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use unlift::audit::staged::{Pooled, key_of};
-use unlift::audit::{NeighborsBy, Plan, PointNeighbors, Row, Seconds};
+use unlift::audit::{NeighborsBy, Plan, Row, Seconds};
 use unlift::evaluate::evaluate;
 use unlift::neighbors::{Neighborhoods, Source, of_what_there_is};
 use unlift::obfuscate::{Scheme, obfuscate};
@@ -30,17 +29,18 @@ use unlift_io::read;
 use unlift_report::RenderOptions;
 use unlift_report::document::{ImageCounts, Input};
 use unlift_report::inversions::Inversion as Sheet;
+use unlift_vision::pictures::Points;
 
 use self::view::Model;
 pub use self::view::{PoseError, View};
-use crate::Error;
 use crate::Progress;
-use crate::document::{self, Found, Provenance};
+use crate::document::{self, Found, Provenance, names, only_named};
 use crate::gate::{Gate, check_gates, gate_results};
-use crate::images::FeatureSource;
 use crate::images::audit::Used;
-use crate::inversion::Inversion;
+use crate::images::{FeatureSource, choice};
+use crate::inversion::{Inversion, NEAR_PX, weight};
 use crate::outputs::{Audited, Finished};
+use crate::{Error, check_stop};
 
 /// The inputs of an audit of a sequence.
 pub struct SequenceJob<'a> {
@@ -160,19 +160,12 @@ pub fn perform(mut job: SequenceJob<'_>, out: OutputSet) -> Result<(Finished, Us
 fn sources(queries: &[usize], with_lists: bool) -> Vec<NeighborsBy<2>> {
     let kinds = || [SEQUENCE, TRACKS].into_iter().chain(with_lists.then_some(WITH_LISTS));
     let names = queries.iter().flat_map(|n| kinds().map(move |by| format!("{by}@{n}")));
-    let given = |name| {
-        let (offsets, neighbors, scores) = (Vec::new(), Vec::new(), None);
-        NeighborsBy::Given(PointNeighbors { name, offsets, neighbors, scores })
-    };
-    names.map(given).collect()
+    names.map(only_named).collect()
 }
 
 fn options(job: &SequenceJob<'_>) -> Map<String, Value> {
-    let schemes: Vec<&str> = job.plan.schemes.iter().map(|scheme| scheme.name()).collect();
-    let thresholds: Vec<&str> = job.plan.thresholds.iter().map(|t| t.label.as_str()).collect();
     let mut options = job.options.clone();
-    options.insert("schemes".into(), json!(schemes));
-    options.insert("thresholds".into(), json!(thresholds));
+    options.extend(names(&job.plan));
     options.insert("queries".into(), json!(job.queries));
     if job.held_out_share > 0.0 {
         options.insert("held_out_share".into(), json!(job.held_out_share));
@@ -256,11 +249,7 @@ fn rows(
         let combined = lists.as_ref().map(|lists| (WITH_LISTS, links, Some(lists)));
         for &n in &job.queries {
             for (by, links, lists) in kinds.into_iter().chain(combined) {
-                if !job.progress.goes_on() {
-                    return Err(Error::request(
-                        "audit: expected to run to the end, found a request to stop",
-                    ));
-                }
+                check_stop(job.progress)?;
                 let what = format!("{}, {n} queries, links by {by}", scheme.name());
                 job.progress.show(rows.len(), total, &what);
                 let started = Instant::now();
@@ -271,7 +260,7 @@ fn rows(
                 let row = Row { scheme, neighbors, k: n, solver: SOLVER.to_owned(), ..row };
                 let strongest = if combined.is_some() { WITH_LISTS } else { SEQUENCE };
                 if let Some(inversion) = job.inversion.filter(|_| by == strongest) {
-                    pictures::paint(inversion, (&hidden, &attack), &row, job.progress, inversions)?;
+                    paint(inversion, (&hidden, &attack), &row, job.progress, inversions)?;
                 }
                 rows.push(row);
             }
@@ -488,4 +477,44 @@ impl Hidden<'_> {
     fn point(&self, query: usize, slot: usize) -> Option<u32> {
         self.views[query].shows[self.secrets[query].hidden()[slot].index()]
     }
+}
+
+/// Number of queries with pictures.
+const SHOWN: usize = 3;
+
+/// Paints what `row` recovers of a few queries, and adds the pictures to their sheets. Photos that
+/// cannot be used are reported once.
+fn paint(
+    inversion: &Inversion,
+    (hidden, attack): (&Hidden<'_>, &Attack<'_>),
+    row: &Row,
+    progress: &dyn Progress,
+    sheets: &mut Vec<Sheet>,
+) -> Result<(), Error> {
+    for query in choice::evenly(hidden.views.len(), Some(SHOWN)) {
+        let view = &hidden.views[query];
+        let at = sheets.iter().position(|sheet| sheet.name == view.name);
+        let at = at.unwrap_or_else(|| {
+            let size = view.size.map(|side| side as u32);
+            sheets.push(Sheet { name: view.name.clone(), size, ..Sheet::default() });
+            sheets.len() - 1
+        });
+        let places: Vec<[f32; 2]> =
+            view.original.reveal().positions().iter().map(|&place| view.in_photo(place)).collect();
+        let solved = hidden.solve(attack, query)?;
+        let recovered = &solved.recovered;
+        let slots = 0..recovered.n_slots();
+        let place = |slot| recovered.position(slot).map_or([f32::NAN; 2], |p| view.in_photo(p));
+        let found: Vec<[f32; 2]> = slots.clone().map(place).collect();
+        let weights: Vec<f32> = slots.map(|slot| weight(recovered, slot, NEAR_PX)).collect();
+        let Some(descriptors) = hidden.queries[query].released.descriptors() else { continue };
+        let points = Points { places: &found, descriptors, weights: &weights, depths: None };
+        let original = (&places[..], &view.descriptors);
+        let name = (view.name.as_str(), view.size);
+        let added = inversion.add_keypoints(name, original, &points, row, &mut sheets[at]);
+        if let Err(error) = added {
+            progress.say(&format!("note: not painted: {error}"));
+        }
+    }
+    Ok(())
 }

@@ -1,12 +1,11 @@
 //! Audits of a prepared map, as `audit map` and `demo` run them.
 
-mod watcher;
-
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use unlift::audit::{Outcome, Plan, Row, run, run_released};
+use unlift::audit::{Cell, Observer, Outcome, Plan, Row, run, run_released};
+use unlift::recover::Builtin;
 use unlift::released::Released;
 use unlift::truth::{Original, Secret};
 use unlift::{Descriptors, ErrorKind, Unit};
@@ -19,6 +18,7 @@ use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::scene::Scene3d;
 
 use crate::Error;
+use crate::curves::{curve_errors, curves_of};
 use crate::document::{self, Provenance};
 use crate::doubts::{Spread, doubts};
 use crate::doubts::{check_lengths_of_gates, check_scale};
@@ -31,8 +31,6 @@ use crate::scene::Pictures;
 use crate::tiles;
 pub use crate::tiles::{Tile, Tiles};
 use crate::{Progress, Quiet};
-pub use watcher::curves_of;
-use watcher::{Watcher, drawn};
 
 /// The inputs of an audit.
 pub struct Job<'a> {
@@ -366,5 +364,68 @@ fn watcher<'a>(job: &Job<'a>) -> Watcher<'a> {
             _ => Vec::new(),
         },
         failed: None,
+    }
+}
+
+/// Reports progress and collects what the page draws.
+struct Watcher<'a> {
+    progress: &'a dyn Progress,
+    pictures: Option<Pictures>,
+    curves: Vec<(Row, Vec<(f64, f64)>)>,
+    drawn: Vec<String>,
+    thresholds: Vec<f64>,
+    inversion: Option<Arc<MapInversion>>,
+    /// One sheet for each of the first cameras.
+    sheets: Vec<Sheet>,
+    failed: Option<Error>,
+}
+
+/// Returns the names of the solvers whose points are drawn. `joint-start` is not drawn beside
+/// `joint`.
+fn drawn<const D: usize>(plan: &Plan<D>) -> Vec<String> {
+    let hides_start = plan.has_solver(Builtin::Joint);
+    let solvers = plan.solvers.iter();
+    let drawn = solvers.filter(|s| !hides_start || Builtin::of(&***s) != Some(Builtin::JointStart));
+    drawn.map(|solver| solver.name().to_owned()).collect()
+}
+
+impl Observer for Watcher<'_> {
+    fn progress(&mut self, done: usize, total: usize, what: &str) {
+        self.progress.show(done, total, what);
+    }
+
+    fn goes_on(&self) -> bool {
+        self.progress.goes_on()
+    }
+
+    fn cell(&mut self, cell: &Cell<'_>) {
+        if cell.repeat > 0 {
+            return;
+        }
+        let most = self.thresholds.iter().copied().fold(0.0, f64::max);
+        let points = curve_errors(most).map(|at| (at, cell.accuracy.percent_within(at))).collect();
+        self.curves.push((cell.row.clone(), points));
+        if let (Some(pictures), true) = (&mut self.pictures, self.drawn.contains(&cell.row.solver))
+        {
+            pictures.add(cell);
+        }
+        if let (Some(inversion), true, None) =
+            (&self.inversion, self.drawn.contains(&cell.row.solver), &self.failed)
+        {
+            self.failed = inversion.add(cell, &mut self.sheets).err().map(Error::from);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_joint_starts_from_is_drawn_only_by_itself() {
+        let mut plan = Plan::<3>::new(unlift::Unit::Meter);
+        assert_eq!(drawn(&plan), ["ranking", "joint"]);
+        plan.solvers = vec![Arc::new(Builtin::JointStart), Arc::new(Builtin::Ransac)];
+        assert_eq!(drawn(&plan), ["joint-start", "ransac"]);
     }
 }
