@@ -54,11 +54,9 @@ pub fn hash_files<P: AsRef<Path>>(paths: &[P]) -> Result<String, Error> {
 /// Returns [`hash_files`] of the files of a map that was read.
 ///
 /// # Errors
-/// When a file cannot be read, or has changed since it was first read.
+/// When a file cannot be read.
 pub fn hash_input(input: &Input) -> Result<String, Error> {
-    let hash = hash_files(&input.files)?;
-    input.seen.check()?;
-    Ok(hash)
+    hash_files(&input.files)
 }
 
 /// Returns the hash of a stage file, or [`hash_files`] of a folder of parts.

@@ -51,7 +51,6 @@ mod guard;
 pub mod hash;
 pub mod input;
 pub mod read;
-pub mod seen;
 #[cfg_attr(not(feature = "parquet"), path = "absent/stage.rs")]
 pub mod stage;
 

@@ -9,7 +9,6 @@ use unlift::obfuscate::{Scheme, SchemeOptions, obfuscate as hide, scheme};
 use unlift::seed::Key;
 use unlift_audit::{Preparation, Prepared, check_scale, maps, prepare};
 use unlift_io::hash::{hash_file, hash_input, hash_positions};
-use unlift_io::seen::Seen;
 use unlift_report::document::Input;
 
 use crate::arrays::{descriptors, raised, rows, to_array, to_descriptors, to_rows, wrong};
@@ -149,7 +148,6 @@ pub fn read(
 ) -> PyResult<Map> {
     let preparation = preparation(scale, k, max_points, seed)?;
     threads::run(py, None, None, move || {
-        let beside = Seen::new(&descriptors);
         let (input, prepared) = maps::open(&path, descriptors.as_deref(), &preparation)?;
         let sha256 = Some(hash_input(&input)?);
         let unit = prepared.unit_in_map_units;
@@ -157,7 +155,6 @@ pub fn read(
         if let Some(file) = &descriptors {
             other_sha256.insert("descriptors".to_owned(), hash_file(file)?);
         }
-        beside.check()?;
         Ok::<_, unlift_audit::Error>(Map {
             input: Input {
                 path: Some(path.display().to_string()),

@@ -9,7 +9,6 @@ use serde_json::{Map, Value};
 use unlift::audit::{self, Outcome, Plan, Row, run_many};
 use unlift_io::atomic::OutputSet;
 use unlift_io::hash::{hash_file, hash_files, hash_list};
-use unlift_io::seen::Seen;
 use unlift_report::RenderOptions;
 use unlift_report::document::{ImageCounts, ImageFigures, Input};
 use unlift_report::inversions::Inversion as Inverted;
@@ -95,7 +94,6 @@ pub fn find(job: ImagesJob<'_>) -> Result<(Option<Audited>, Used), Error> {
         steps.say(&error.to_string());
     }
     let of = (job.source, job.path);
-    let beside = beside(&job);
     let needs = Needs::of_plan(&job.plan);
     let images = Stream::new(of, &job.chosen, needs, &tally, steps);
     let outcome = run_many(images, &job.plan, &mut watcher)?;
@@ -118,13 +116,7 @@ pub fn find(job: ImagesJob<'_>) -> Result<(Option<Audited>, Used), Error> {
     if let Some(doubt) = &doubt {
         steps.say(&format!("note: {doubt}"));
     }
-    // Photos are read several times: for figures, for pictures and for their hash.
-    let changed = job.source.changed(&tally.used).or_else(|| beside.changed(0..beside.len()));
-    if let Some(path) = changed {
-        steps.say(&format!("note: {}: {CHANGED}", path.display()));
-    }
-    let changed = changed.map(|_| format!("input: {CHANGED}"));
-    let mut notes: Vec<String> = doubt.into_iter().chain(changed).collect();
+    let mut notes: Vec<String> = doubt.into_iter().collect();
     let doubts = vec![notes.first().cloned(); outcome.rows.len()];
     if let Some(moved) = tally.moved() {
         steps.say(&format!("note: {moved}"));
@@ -154,21 +146,6 @@ pub fn find(job: ImagesJob<'_>) -> Result<(Option<Audited>, Used), Error> {
         ..RenderOptions::default()
     };
     Ok((Some(Audited { document, scene: None, drawn }), used))
-}
-
-/// The doubt if a file of an image has changed.
-const CHANGED: &str =
-    "changed since reading began: figures, hash and pictures may be of different files";
-
-/// Returns the photos of the images if the source is a file.
-fn beside(job: &ImagesJob<'_>) -> Seen {
-    let names = job.source.names();
-    let of_folder = |folder: &Path| -> Vec<PathBuf> {
-        let paths = job.chosen.iter().map(|&at| folder.join(&names[at]));
-        // Missing photos are reported as not painted.
-        paths.filter(|path| path.is_file()).collect()
-    };
-    Seen::new(job.photos.as_deref().map(of_folder).unwrap_or_default())
 }
 
 fn input(job: &ImagesJob<'_>, tally: &Tally, outcome: &Outcome) -> Result<Input, Error> {

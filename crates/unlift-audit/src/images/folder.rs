@@ -6,7 +6,6 @@ use unlift::Descriptors;
 use unlift::descriptors::Values;
 use unlift_io::Error;
 use unlift_io::features::{ImageFeatures, round_to_half};
-use unlift_io::seen::Seen;
 use unlift_vision::features::photo::Turn;
 use unlift_vision::features::{
     Extraction, Extractor, Features, Found as FoundFeatures, LearnedFeatures,
@@ -36,8 +35,6 @@ pub struct Folder {
     extraction: Extraction,
     names: Vec<String>,
     paths: Vec<PathBuf>,
-    /// The state of the files before any of them was read.
-    seen: Seen,
     refused: Vec<Error>,
     passed_over: Option<String>,
 }
@@ -70,9 +67,8 @@ impl Folder {
         found.photos.sort_unstable();
         let (names, paths): (_, Vec<PathBuf>) = found.photos.into_iter().unzip();
         let (extraction, refused) = (extraction.clone(), found.refused);
-        let seen = Seen::new(&paths);
         let turn = Turn::Upright;
-        Ok(Self { extractor, turn, extraction, names, paths, seen, refused, passed_over })
+        Ok(Self { extractor, turn, extraction, names, paths, refused, passed_over })
     }
 
     /// Returns how photos are turned before extraction.
@@ -104,11 +100,6 @@ impl Folder {
     /// Returns the path of photo `at`.
     pub fn path(&self, at: usize) -> &Path {
         &self.paths[at]
-    }
-
-    /// Returns one of the photos `which` that has changed since the folder was opened.
-    pub fn changed(&self, which: &[usize]) -> Option<&Path> {
-        self.seen.changed(which.iter().copied())
     }
 
     /// Extracts the features of photo `at`.

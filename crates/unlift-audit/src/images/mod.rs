@@ -87,15 +87,6 @@ impl FeatureSource {
         }
     }
 
-    /// Returns a file of the images `which` that has changed since it was opened.
-    pub fn changed(&self, which: &[usize]) -> Option<&Path> {
-        match self {
-            Self::Folder(folder) => folder.changed(which),
-            Self::File(file) => file.changed(),
-            Self::InMemory(_) => None,
-        }
-    }
-
     /// Reads the features of image `at` of [`names`](Self::names).
     ///
     /// # Errors

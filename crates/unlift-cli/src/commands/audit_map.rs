@@ -15,7 +15,6 @@ use unlift_audit::{Finished, Job, Prepared, check_thresholds, open_audit, source
 use unlift_io::atomic::Rules;
 use unlift_io::hash::hash_stage;
 use unlift_io::read;
-use unlift_io::seen::Seen;
 
 use super::common::{open_map, with_threads};
 use super::gate_files::GateFile;
@@ -47,7 +46,6 @@ fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
     let rules = Rules::new(inputs(args), args.result.force);
     let gate_file = GateFile::check(&args.result, &rules)?;
     let out = open_audit(&args.result.out, rules, args.result.share_safe)?;
-    let beside = Seen::of_stages(beside(args).map(|(_, path)| path));
     let finished = with_threads(args.run.threads, || {
         let (input, prepared) = open_map(&args.path, &args.map, args.colors, args.run.quiet)?;
         let progress = Progress::new(args.run.quiet);
@@ -83,7 +81,6 @@ fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
             job.localize = Some(Localize { cameras: &prepared.cameras, held_out, protections });
         }
         job.input.other_sha256 = others(args)?;
-        beside.check()?;
         Ok(perform(job, out)?)
     })?;
     gate_file.write(&finished)?;

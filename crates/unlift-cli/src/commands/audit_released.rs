@@ -12,7 +12,6 @@ use unlift_audit::{Finished, Job, Prepared, check_thresholds, open_audit, ordere
 use unlift_io::atomic::Rules;
 use unlift_io::hash::{hash_file, hash_files, hash_stage};
 use unlift_io::read::{self, Input as Points};
-use unlift_io::seen::Seen;
 use unlift_io::stage::{has_images, part_files, read_released, read_truth, scheme_name};
 use unlift_report::document::Input;
 
@@ -37,9 +36,7 @@ pub fn run(args: &AuditReleasedArgs) -> anyhow::Result<Outcome> {
 /// Audits released records and writes the results.
 fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
     let started = Instant::now();
-    let inputs = inputs(args);
-    let seen = Seen::of_stages(inputs.iter().copied());
-    let rules = Rules::new(inputs, args.result.force);
+    let rules = Rules::new(inputs(args), args.result.force);
     let gate_file = GateFile::check(&args.result, &rules)?;
     let out = open_audit(&args.result.out, rules, args.result.share_safe)?;
     let finished = with_threads(args.run.threads, || {
@@ -54,7 +51,7 @@ fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
             plan,
             notes,
             doubts,
-            input: provenance(args, &prepared, &seen)?,
+            input: provenance(args, &prepared)?,
             options: Map::from_iter([("released".to_owned(), json!(true))]),
             gates: args.result.gate.clone(),
             out: args.result.out.clone(),
@@ -180,7 +177,7 @@ fn plan(
     })
 }
 
-fn provenance(args: &AuditReleasedArgs, prepared: &Prepared, seen: &Seen) -> anyhow::Result<Input> {
+fn provenance(args: &AuditReleasedArgs, prepared: &Prepared) -> anyhow::Result<Input> {
     let mut others = vec![("truth".to_owned(), hash_stage(&args.truth)?)];
     if let Some(path) = &args.descriptors {
         others.push(("descriptors".to_owned(), hash_file(path)?));
@@ -189,7 +186,6 @@ fn provenance(args: &AuditReleasedArgs, prepared: &Prepared, seen: &Seen) -> any
         others.push(("neighbors".to_owned(), hash_stage(path)?));
     }
     let sha256 = Some(hash_files(&part_files(&args.released)?)?);
-    seen.check()?;
     Ok(Input {
         path: Some(args.released.display().to_string()),
         sha256,

@@ -32,7 +32,6 @@ use std::path::Path;
 use crate::error::Error;
 use crate::input;
 use crate::read::lines::quoted;
-use crate::seen::Seen;
 
 pub use hloc::decode;
 pub use image::{ImageFeatures, round_to_half};
@@ -43,7 +42,6 @@ pub use writer::{FeatureWriter, encode};
 /// Several threads may call [`get`](Self::get) at once.
 pub struct FeatureSource {
     kind: Kind,
-    seen: Seen,
 }
 
 enum Kind {
@@ -60,7 +58,6 @@ impl FeatureSource {
     /// # Errors
     /// When the file cannot be read, is of another format, is truncated, or contains no image.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        let seen = Seen::new([path]);
         let (file, len) = input::open(path)?;
         let mut start = Vec::new();
         file_start(&file, &mut start).map_err(|e| Error::read(path, e))?;
@@ -76,7 +73,7 @@ impl FeatureSource {
                 return Err(Error::new(path, "", expected, found));
             }
         };
-        let source = Self { kind, seen };
+        let source = Self { kind };
         if source.names().is_empty() {
             return Err(Error::new(path, "", "at least one image", "none"));
         }
@@ -89,11 +86,6 @@ impl FeatureSource {
             Kind::Hloc(file) => file.is_upright(),
             Kind::Colmap(_) => false,
         }
-    }
-
-    /// Returns the path of the file if it has changed since it was opened.
-    pub fn changed(&self) -> Option<&Path> {
-        self.seen.changed([0])
     }
 
     /// One error for each entry of the file that is not an image.

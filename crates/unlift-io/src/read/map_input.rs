@@ -2,8 +2,6 @@
 
 use std::path::PathBuf;
 
-use crate::seen::Seen;
-
 /// A map as it was read, in the units of its file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Input {
@@ -25,9 +23,6 @@ pub struct Input {
     pub up: Option<[f64; 3]>,
     /// All files that were read, for hashes in a report.
     pub files: Vec<PathBuf>,
-    /// Size and time of the input files before they were read, to detect changes. Files that
-    /// another file names are not included.
-    pub seen: Seen,
     /// The format, as shown to users: `COLMAP binary`, `ply ascii`.
     pub format: &'static str,
     /// Notes for readers of the results, one line each.

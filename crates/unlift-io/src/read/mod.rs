@@ -26,7 +26,6 @@ pub use map_input::Input;
 
 use crate::error::Error;
 use crate::input;
-use crate::seen::Seen;
 use models::Model;
 
 /// Reads the map at `path`.
@@ -40,12 +39,7 @@ use models::Model;
 /// When nothing readable is there, a file is malformed, or no point has finite coordinates.
 pub fn open(path: &Path) -> Result<Input, Error> {
     let metadata = std::fs::metadata(path).map_err(|e| Error::read(path, e))?;
-    let input = if metadata.is_dir() {
-        folder(path)?
-    } else {
-        let seen = Seen::new([path]);
-        Input { seen, ..file(path)? }
-    };
+    let input = if metadata.is_dir() { folder(path)? } else { file(path)? };
     let input = input.settle();
     if input.positions.is_empty() {
         let file = input.files.last().map_or(path, PathBuf::as_path);
@@ -145,10 +139,7 @@ fn colmap_points(path: &Path) -> Result<Input, Error> {
 fn folder(path: &Path) -> Result<Input, Error> {
     let Some(model) = Model::find(path)? else {
         return match others::in_folder(path) {
-            Some(other) => {
-                let seen = Seen::new([&other]);
-                Ok(Input { seen, ..file(&other)? })
-            }
+            Some(other) => file(&other),
             None => Err(Error::new(path, "", models::EXPECTED, "none")),
         };
     };
@@ -174,7 +165,6 @@ fn colmap_model(model: &Model) -> Result<Input, Error> {
     let rigs = present("rigs");
     let frames = present("frames");
     input.files.push(model.points.clone());
-    input.seen = Seen::new(&input.files);
 
     // An audit needs nothing from these files, so their errors are notes.
     let mut told = |error: Error| input.notes.push(error.to_string());
