@@ -70,11 +70,8 @@ fn a_place_that_cannot_be_written_is_an_error_of_the_command_line() {
         assert_eq!(stderr.lines().count(), 1, "{line}: {stderr}");
     }
     std::os::unix::fs::symlink("gone/features.h5", place.path("link.h5")).unwrap();
-    assert_eq!(
-        place.complains("features photos --out link.h5", 2),
-        "unlift: --out: link.h5: expected a file, a folder, or nothing, found a link to \
-         gone/features.h5, which does not exist\n"
-    );
+    let stderr = place.complains("features photos --out link.h5", 2);
+    assert!(stderr.starts_with("unlift: --out: link.h5: cannot write: "), "{stderr}");
 }
 
 #[test]
