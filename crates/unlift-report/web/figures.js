@@ -65,8 +65,8 @@
     legend("overview-legend", [...schemeEntries(data.schemes), ...sourceEntries(data), ["without lists of neighbors", css("--soft"), "dotted", "none"]]);
   }
 
-  /** Draws one chart per scheme: all solvers, the attacker's own sources, the paper's curve, both baselines. */
-  function multiples(node, data, { threshold: t, source, dataset }) {
+  /** Draws one chart per scheme: all solvers, the attacker's own sources, both baselines. */
+  function multiples(node, data, { threshold: t, source }) {
     const own = ownSources(data);
     const solvers = distinct(data.rows.filter((row) => row.attack && groupOf(data, row) === "oracle").map((row) => row.solver));
     const thin = { width: 1.5, mark: "none" };
@@ -90,11 +90,6 @@
         shown.push(index);
         series.push(mark(name, place(row, t), scheme.slot, sourceMark(own, sourceOf(data, row)), 11));
       }
-      for (const paper of data.published) {
-        if (paper.dataset !== dataset || paper.scheme !== scheme.name || paper.threshold !== t) continue;
-        const points = rising(paper.points.map(([ratio, percent]) => [ratio * 100, percent]));
-        series.push(line("the paper", points, scheme.slot, { ...thin, dash: "dashed" }));
-      }
       series.push(line("blind guess", across(scheme.blind[t]), scheme.slot, { ...thin, dash: "dotted" }));
       series.push(line(scheme.alone_by, across(scheme.alone[t]), scheme.slot, { ...thin, dash: DASH_DOT }));
       draw(figure.querySelector(".chart"), {
@@ -108,7 +103,6 @@
     const ink = css("--ink");
     const entries = solvers.map((solver, at) => [`solver ${data.solvers[solver]}`, ink, "solid", SOLVER_MARKS[at % SOLVER_MARKS.length]]);
     entries.push(...sourceEntries(data));
-    if (data.published.length) entries.push([`the paper, on ${dataset}`, ink, "dashed", "none"]);
     entries.push(["blind guess", ink, "dotted", "none"]);
     if (data.schemes.some((scheme) => scheme.alone[t] !== null)) entries.push(["records alone", ink, "dashdot", "none"]);
     legend("multiples-legend", entries);

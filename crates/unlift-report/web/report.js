@@ -15,8 +15,7 @@
     const oracle = rows.filter((row) => row.attack && data.givens[row.given].group === "oracle");
     const sources = distinct(oracle.map((row) => data.givens[row.given].source));
     const solvers = distinct(oracle.map((row) => row.solver));
-    const datasets = distinct(data.published.map((curve) => curve.dataset));
-    const state = { threshold: data.headline, solver: solvers.length > 1 ? STRONGEST : solvers[0] ?? STRONGEST, source: sources[0], dataset: datasets[0] };
+    const state = { threshold: data.headline, solver: solvers.length > 1 ? STRONGEST : solvers[0] ?? STRONGEST, source: sources[0] };
     const folded = at("by-scheme");
     const redraw = () => {
       overview(at("chart-overview"), data, state);
@@ -30,7 +29,6 @@
       single(form, state, "solver", "Solver", all, redraw);
     }
     single(form, state, "source", "Neighbors", options(sources, (source) => data.givens.find((given) => given.source === source).name), redraw);
-    single(form, state, "dataset", "Curves of the paper, on", options(datasets, String), redraw);
     redraw();
     redraws.push(redraw);
   }
@@ -118,7 +116,7 @@
   const parts = [
     [at("curve-controls"), curves],
     [rows.length, () => chart(at("error-controls"), at("chart-errors"), rows, errors)],
-    [judged.length, () => once(at("certainty"), () => chart(at("reliability-controls"), at("chart-reliability"), judged, reliability, firstTold))],
+    [at("certainty"), () => once(at("certainty"), () => chart(at("reliability-controls"), at("chart-reliability"), judged, reliability, firstTold))],
     [data.scene, scene],
     [data.pictures.length, pictures],
     [sheets.length, () => chosen(sheets)],

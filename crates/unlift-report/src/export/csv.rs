@@ -1,7 +1,7 @@
 //! Every row of `results` as CSV (RFC 4180), for scripts and spreadsheets.
 
 use crate::document::{ByThreshold, Document, Row};
-use crate::tables::distinct;
+use crate::page::tables::distinct;
 
 /// Returns all rows, with a column per figure, or per threshold of `within` if a figure depends on it. Unknown cells are empty.
 pub(super) fn csv(document: &Document, within: &[String]) -> String {

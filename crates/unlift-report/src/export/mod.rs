@@ -1,14 +1,18 @@
-//! Figures for papers and for other programs: tables as CSV, LaTeX and Markdown, curves as SVG.
+//! Figures for papers and for other programs: tables as CSV, LaTeX and Markdown, curves as SVG, gates as JUnit XML, and the table
+//! of the terminal.
 
 mod csv;
 mod curves;
 mod grid;
-mod typeset;
+mod junit;
+mod text;
 
 use crate::document::Document;
-use crate::tables;
+use crate::page::tables;
 
 pub use curves::curves;
+pub use junit::junit;
+pub use text::text_table;
 
 /// The format of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,7 +39,36 @@ pub fn table(document: &Document, format: TableFormat, only: Option<&str>) -> St
     };
     match format {
         TableFormat::Csv => csv::csv(document, &within),
-        TableFormat::Latex => typeset::latex(document, &grid::grid(document, &within)),
-        TableFormat::Markdown => typeset::markdown(document, &grid::grid(document, &within)),
+        TableFormat::Latex => grid::latex(document, &grid::grid(document, &within)),
+        TableFormat::Markdown => grid::markdown(document, &grid::grid(document, &within)),
+    }
+}
+
+/// Escapes `text` for content and quoted attributes. Characters that XML 1.0 does not allow become U+FFFD.
+pub(crate) fn escaped(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            // Unescaped, they would become spaces in attributes.
+            '\t' | '\n' | '\r' => out.push_str(&format!("&#{};", u32::from(c))),
+            '\0'..='\x1f' | '\u{fffe}' | '\u{ffff}' => out.push('\u{fffd}'),
+            _ => out.push(c),
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_xml_would_read_as_its_own_is_escaped() {
+        assert_eq!(escaped("a<b> & \"c\""), "a&lt;b&gt; &amp; &quot;c&quot;");
+        assert_eq!(escaped("ü\n\x1b"), "ü&#10;\u{fffd}");
     }
 }

@@ -1,11 +1,7 @@
-//! Tests of `audit.json`, the page and the files of gates, without a browser.
+//! Tests of `audit.json`, the page, the files of gates, and the page in a browser.
 
-#[path = "../sample/mod.rs"]
-mod sample;
-
-mod cost;
+mod browser;
 mod document;
-mod gate_files;
-mod inversions;
 mod page;
-mod schema;
+mod parts;
+mod sample;

@@ -1,0 +1,589 @@
+//! The structs of `audit.json`, schema 1.
+//!
+//! `results` has one row per (scheme, neighbors, oracle noise, inlier ratio, K, solver). Only [`Run`]
+//! holds what differs between runs (seconds, memory, threads, command line), so `results` are
+//! byte-identical for the same input, options and seed.
+
+mod check;
+mod share;
+
+use indexmap::IndexMap;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+
+/// The schema that this build writes and reads.
+pub const SCHEMA: u32 = 1;
+
+/// Percentages by threshold, as typed by the user and in that order.
+pub type ByThreshold = IndexMap<String, f64>;
+
+/// The value of [`BreakEven::solver`] for the strongest attack at every inlier ratio.
+pub const STRONGEST: &str = "strongest";
+
+/// Numbers of points by reason.
+pub type ByReason = IndexMap<String, u64>;
+
+/// A whole audit: the content of `audit.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Document {
+    /// Version of the program that wrote the document.
+    pub unlift: String,
+    /// Version of the format, [`SCHEMA`].
+    pub schema: u32,
+    /// The audited input.
+    pub input: Input,
+    /// The options that decide the results, by their long names without dashes.
+    pub options: serde_json::Map<String, serde_json::Value>,
+    /// The random seed.
+    pub seed: u64,
+    /// The figures, one row per combination that was tried.
+    pub results: Vec<Row>,
+    /// Schemes and sources that could not be audited; their figures must not look like small ones.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub not_audited: Vec<NotAudited>,
+    /// Notes for readers of the figures: only a part of the map was audited, unusual lengths, empty lists.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
+    /// The smallest inlier ratio at which half of the points come back, per scheme, noise and solver.
+    pub break_even: Vec<BreakEven>,
+    /// How precisely a camera can be placed under every scheme; the first entry is the map without
+    /// protection. Empty unless the map has cameras and tracks.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub localization: Vec<Localization>,
+    /// The user's gates and their results; empty if there were none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub gates: Vec<GateResult>,
+    /// Every used image, in the order of names; empty for maps.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub images: Vec<ImageFigures>,
+    /// Every tile of a large map, in the order of cutting; empty for other audits.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tiles: Vec<TileFigures>,
+    /// The data that differ between runs.
+    pub run: Run,
+}
+
+/// The audited input.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Input {
+    /// Path of the map, as typed; `None` in a share-safe document.
+    pub path: Option<String>,
+    /// SHA-256 over the map's files, in lowercase hexadecimal; `None` in a share-safe document.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sha256: Option<String>,
+    /// Points read from the map, before a scheme drops some.
+    pub n_points: u64,
+    /// Declared scale in meters per map unit, if any.
+    pub scale_m_per_unit: Option<f64>,
+    /// Length of one unit of this document in the map's own units: `1 / scale` with a scale, else
+    /// the median distance to the K-th nearest neighbor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit_in_map_units: Option<f64>,
+    /// SHA-256 of further files that were read, by role (`descriptors`, `neighbors`).
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub other_sha256: IndexMap<String, String>,
+    /// Counts of images; `None` for maps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub images: Option<ImageCounts>,
+}
+
+/// A scheme, or one source of neighborhoods for a scheme, that could not be audited.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct NotAudited {
+    /// The scheme's user-facing name.
+    pub scheme: String,
+    /// The source, as in [`Row::neighbors`]; absent if the whole scheme has no row.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub neighbors: Option<String>,
+    /// The reason: what was expected and what was found.
+    pub reason: String,
+}
+
+/// The unit of every length in a row: thresholds, delta, errors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum LengthUnit {
+    /// Meters, by the declared scale.
+    #[serde(rename = "m")]
+    Meter,
+    /// The median distance of an original to its K-th nearest neighbor; used without a scale.
+    #[serde(rename = "kth_neighbor")]
+    KthNeighbor,
+    /// Pixels; used for audits of images.
+    #[serde(rename = "px")]
+    Pixel,
+}
+
+/// The figures of one (scheme, neighbors, oracle noise, inlier ratio, K, solver).
+///
+/// With repeats, the figures are means over the repeats and [`Row::std`] holds their spread.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// The scheme's user-facing name, for example `ppl+`.
+    pub scheme: String,
+    /// The source of the neighborhoods: `oracle`, `file`, or the name of a source.
+    pub neighbors: String,
+    /// How the oracle chose the wrong neighbors: `uniform`, `near` or `clustered`; `None` for other
+    /// sources.
+    pub oracle_noise: Option<String>,
+    /// Share of true neighbors: as requested for the oracle, measured for other sources.
+    pub inlier_ratio: f64,
+    /// Neighbors per hidden point.
+    pub k: u32,
+    /// `joint`, `ranking`, `joint-start`, `consensus`, `ransac`, `density` or `tomography`.
+    pub solver: String,
+    /// Delta in `unit`; `None` if it was chosen per point.
+    pub delta: Option<f64>,
+    /// The unit of all lengths in this row.
+    pub unit: LengthUnit,
+    /// Points released under the scheme, the base of all percentages.
+    pub n_points: u64,
+    /// Released points without a position after recovery; they count as misses.
+    pub n_lost: u64,
+    /// `n_lost` by reason.
+    pub lost: ByReason,
+    /// Points that the scheme did not release, by reason.
+    pub dropped: ByReason,
+    /// Percent of the released points recovered within each threshold.
+    pub recovered_percent: ByThreshold,
+    /// Percent recovered by a blind guess from one record at a time.
+    pub blind_percent: ByThreshold,
+    /// Percent recovered by the best attack on the released records alone, per threshold; equal in all rows of a
+    /// scheme, absent without such an attack.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub records_alone_percent: Option<ByThreshold>,
+    /// The attack behind `records_alone_percent`, with the same keys: `tomography`, `density` or `geometric, joint`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub records_alone_by: Option<IndexMap<String, String>>,
+    /// Percent of points whose swapped axis was identified correctly (`cp` only).
+    pub axis_accuracy_percent: Option<f64>,
+    /// Percent of points whose coordinates all equal the published values (`cp`, `cp2d` only).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exact_percent: Option<f64>,
+    /// Percent of descriptors assigned to the right point of their line (`ppl`, `ppl+` only).
+    pub assignment_accuracy_percent: Option<f64>,
+    /// Figures of added measures, by name; each has its own unit.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub metrics: IndexMap<String, f64>,
+    /// Median error over the released points, in `unit`; lost points count as infinitely far, and `None` is infinite.
+    pub median_error: Option<f64>,
+    /// Median error of a blind guess; absent in documents of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blind_median_error: Option<f64>,
+    /// Percentiles (`50`, `75`, `90`, `95`, `99`) of the error, as in `median_error`.
+    pub error_percentiles: IndexMap<String, Option<f64>>,
+    /// Percent of the released points that the attacker estimates to be within the smallest threshold with a
+    /// probability of at least 90 %; `None` if unknown.
+    #[serde(default)]
+    pub sure_percent: Option<f64>,
+    /// Why `sure_percent` is not known; absent if it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sure_unknown: Option<String>,
+    /// Percent of these points that are within the smallest threshold; absent without such points.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sure_correct_percent: Option<f64>,
+    /// Ten bins of the attacker's estimated probability, from 0 to 1, over recovered points.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reliability: Option<Vec<ReliabilityBin>>,
+    /// Histogram of RANSAC's trials per point: (largest number of trials in the bin, points in it).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ransac_trials: Option<Vec<(u64, u64)>>,
+    /// Number of runs with different seeds.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub repeats: u32,
+    /// Standard deviations over the repeats; `None` for a single run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub std: Option<Spread>,
+    /// Shares over distinct places (images only).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distinct: Option<Distinct>,
+}
+
+/// A bin of points with similar estimated probability, over all repeats.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReliabilityBin {
+    /// The mean estimated probability, 0 to 1; `None` without points.
+    pub predicted: Option<f64>,
+    /// The share of points within the smallest threshold; `None` without points.
+    pub observed: Option<f64>,
+    /// Points in the bin.
+    pub n: u64,
+}
+
+/// Standard deviations of a row's figures over its repeats.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Spread {
+    /// Deviation of [`Row::recovered_percent`], in percentage points.
+    pub recovered_percent: ByThreshold,
+    /// Deviation of [`Row::blind_percent`], in percentage points.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub blind_percent: ByThreshold,
+    /// Deviation of [`Row::median_error`], in the row's unit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub median_error: Option<f64>,
+}
+
+/// The smallest inlier ratio at which half of the points come back within a threshold.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BreakEven {
+    /// The scheme's user-facing name.
+    pub scheme: String,
+    /// The solver's name, or [`STRONGEST`] if several attacks ran.
+    pub solver: String,
+    /// How the oracle chose the wrong neighbors, as in [`Row::oracle_noise`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub oracle_noise: Option<String>,
+    /// The threshold as typed.
+    pub threshold: String,
+    /// The ratio: interpolated, or the smallest or largest tested one; see [`BreakEven::bound`].
+    pub inlier_ratio: Option<f64>,
+    /// How the ratio relates to the tested ratios.
+    pub bound: Bound,
+}
+
+/// The relation of a break-even ratio to the tested ratios.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Bound {
+    /// Between two tested ratios, by linear interpolation.
+    Interpolated,
+    /// Half comes back even at the smallest tested ratio, so the true value is at most this.
+    BelowTested,
+    /// Half does not come back at any tested ratio.
+    AboveTested,
+}
+
+/// The accuracy of localization under a scheme: medians over the images of the map.
+///
+/// These figures are an information bound: all true matches of an image, at the true pose, with
+/// noise of 1 px. Errors are standard deviations. A value is `None` if at least half of the images
+/// do not localize.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Localization {
+    /// The scheme's user-facing name; [`UNPROTECTED`] for the map without protection.
+    pub scheme: String,
+    /// Whether the scheme protects keypoints of queries; else it protects the map.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub of_queries: bool,
+    /// Error of the camera center, as a multiple of the unprotected one: the median over images.
+    pub multiple: Option<f64>,
+    /// Error of the camera center, in the unit of the rows.
+    pub center_error: Option<f64>,
+    /// Error of the rotation in degrees.
+    pub rotation_error_degrees: Option<f64>,
+    /// Percent of the images that do not localize.
+    pub failed_percent: f64,
+    /// Whether the scheme changes descriptors. The bound does not include matching, so it does not
+    /// tell what this costs.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub changes_descriptors: bool,
+    /// What was measured on images that were held out; `None` if it was not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<HeldOut>,
+}
+
+/// The accuracy of localization of images that the map was made without.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct HeldOut {
+    /// Number of held-out images.
+    pub n_images: u64,
+    /// Median number of matches within 3 px of the true projection.
+    pub right_matches: f64,
+    /// Median number of matches.
+    pub matches: f64,
+    /// Median error of the camera center, in the unit of the rows. `None` if at least half of the
+    /// images have no pose.
+    pub center_error: Option<f64>,
+    /// Median error of the rotation in degrees.
+    pub rotation_error_degrees: Option<f64>,
+    /// The median error of the center as a multiple of the unprotected one.
+    pub multiple: Option<f64>,
+    /// Percent of the images within limits of both errors, by limit: `5 cm, 5 deg`.
+    pub recall_percent: ByThreshold,
+}
+
+/// The value of [`Localization::scheme`] for the map without protection.
+pub const UNPROTECTED: &str = "none";
+
+/// The smallest number of held-out images whose median tells schemes apart.
+pub const FEWEST_HELD_OUT: u64 = 10;
+
+impl Localization {
+    /// Returns the figures of held-out images if there are at least [`FEWEST_HELD_OUT`] of them.
+    pub fn measured(&self) -> Option<&HeldOut> {
+        self.held_out.as_ref().filter(|found| found.n_images >= FEWEST_HELD_OUT)
+    }
+
+    /// Returns the error as a multiple of the unprotected one: as [measured](Self::measured), else by
+    /// the bound. `None` if cameras do not localize, or if the bound does not tell.
+    pub fn cost(&self) -> Option<f64> {
+        match self.measured() {
+            Some(found) => found.multiple,
+            None => self.multiple.filter(|_| !self.changes_descriptors),
+        }
+    }
+
+    /// Returns true if what localization costs under this scheme was not measured.
+    pub fn is_unknown(&self) -> bool {
+        self.measured().is_none() && self.changes_descriptors
+    }
+}
+
+/// A gate of the user and its result.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct GateResult {
+    /// The gate as typed, for example `ppl@0.5:0.10<=20`.
+    pub gate: String,
+    /// The figure that was compared, in percent (or percentage points for a gain over the larger
+    /// baseline, or multiples for localization); `None` if it is not known or infinite.
+    pub found_percent: Option<f64>,
+    /// The attack behind the figure: scheme, source and ratio, solver, distance.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub of: Option<String>,
+    /// The bound of the figure.
+    pub bound_percent: f64,
+    /// Whether every figure is known and keeps the bound.
+    pub passed: bool,
+    /// Why the gate failed although no figure exceeds the bound, for example what was not audited.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+}
+
+/// The data that differ between runs.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Run {
+    /// The command line, ready to paste into a shell; `None` in a share-safe document.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub command: Option<String>,
+    /// Worker threads.
+    pub threads: u32,
+    /// Peak resident memory of the process, if known.
+    pub peak_memory_bytes: Option<u64>,
+    /// Wall time.
+    pub seconds: Seconds,
+}
+
+/// Wall times of a run.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Seconds {
+    /// The whole run.
+    pub total: f64,
+    /// Seconds by stage, per row of `results` in the same order.
+    pub rows: Vec<IndexMap<String, f64>>,
+    /// Seconds by stage over the whole run.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub stages: IndexMap<String, f64>,
+}
+
+/// Counts of the images of an audit.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ImageCounts {
+    /// Images in the folder or file.
+    pub found: u64,
+    /// Images that were used, neither left out by choice nor unusable.
+    pub used: u64,
+    /// Images that could not be used; stderr had the reasons.
+    pub unusable: u64,
+    /// Used images with at most K keypoints; their lists are shorter than K.
+    pub too_small: u64,
+}
+
+/// Shares over distinct places, each counted once. About a fifth of an image's keypoints lie exactly on
+/// another one.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Distinct {
+    /// Number of places.
+    pub n_places: u64,
+    /// Percent of the places recovered within each threshold.
+    pub recovered_percent: ByThreshold,
+    /// Percent of the places recovered by a blind guess.
+    pub blind_percent: ByThreshold,
+}
+
+/// The figures of one tile.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct TileFigures {
+    /// The lowest and the highest corner of its points in plan view, in the unit of the audit, without a fiftieth of the points on
+    /// every side; `None` in a share-safe document.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bounds: Option<[[f64; 2]; 2]>,
+    /// Number of its points.
+    pub n_points: u64,
+    /// Percent recovered within each threshold; one per row of `results`, in the same order.
+    pub recovered_percent: Vec<ByThreshold>,
+}
+
+/// The figures of one image.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct ImageFigures {
+    /// The image's name; `None` in a share-safe document.
+    pub name: Option<String>,
+    /// Number of keypoints.
+    pub n_points: u64,
+    /// Figures per row of `results`, in the same order; empty for an image without keypoints.
+    pub rows: Vec<ImageRow>,
+}
+
+/// The figures of one image in one row of `results`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct ImageRow {
+    /// Percent of the image's keypoints recovered within each threshold.
+    pub recovered_percent: ByThreshold,
+    /// Percent of the distinct places of the image recovered within each threshold.
+    pub distinct_percent: ByThreshold,
+    /// Share of true neighbors in this image: as requested for the oracle, else measured.
+    pub inlier_ratio: f64,
+    /// Median error in pixels; `None` if half of the keypoints or more are lost.
+    pub median_error: Option<f64>,
+}
+
+impl Row {
+    /// Returns the larger baseline within `threshold` (as typed): a blind guess, or the best attack on the records
+    /// alone. Neighborhoods add what exceeds it.
+    pub fn baseline_percent(&self, threshold: &str) -> Option<f64> {
+        let alone = self.records_alone_percent.as_ref().and_then(|map| map.get(threshold));
+        let blind = self.blind_percent.get(threshold);
+        blind.into_iter().chain(alone).copied().reduce(f64::max)
+    }
+}
+
+fn one() -> u32 {
+    1
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
+fn is_one(value: &u32) -> bool {
+    *value == 1
+}
+
+impl Document {
+    /// Returns the text of `audit.json`, indented, with measured numbers rounded to [`SIGNIFICANT_DIGITS`].
+    ///
+    /// `options` and `input.scale_m_per_unit` are numbers of the user and keep every digit.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Invalid`] if a rule of the format is broken, see [`Document::check`].
+    pub fn to_json(&self) -> Result<String, Error> {
+        self.check()?;
+        let mut value = serde_json::to_value(self)?;
+        for field in ["results", "break_even", "gates", "images", "tiles", "run"] {
+            if let Some(part) = value.get_mut(field) {
+                round_floats(part);
+            }
+        }
+        if let Some(unit) = value.pointer_mut("/input/unit_in_map_units") {
+            round_floats(unit);
+        }
+        let mut text = serde_json::to_string_pretty(&value)?;
+        text.push('\n');
+        Ok(text)
+    }
+
+    /// Reads the text of an `audit.json`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Schema`] for another schema, [`Error::Json`] for text that is not such a document,
+    /// [`Error::Invalid`] if a rule of the format is broken.
+    pub fn from_json(text: &str) -> Result<Self, Error> {
+        let value: serde_json::Value = serde_json::from_str(text)?;
+        // A later schema would fail with an unclear error about a missing field.
+        if let Some(found) = value.get("schema").and_then(serde_json::Value::as_u64)
+            && found != u64::from(SCHEMA)
+        {
+            return Err(Error::Schema { expected: SCHEMA, found });
+        }
+        let document: Self = serde_json::from_value(value)?;
+        document.check()?;
+        Ok(document)
+    }
+}
+
+/// Significant decimal digits of every measured number in `audit.json`.
+///
+/// Six digits resolve a micron in a meter, far below any threshold and far above the rounding noise
+/// of sums.
+pub const SIGNIFICANT_DIGITS: usize = 6;
+
+/// Rounds `value` to [`SIGNIFICANT_DIGITS`]; zero and non-finite values stay unchanged.
+pub(crate) fn round(value: f64) -> f64 {
+    if value == 0.0 || !value.is_finite() {
+        return value;
+    }
+    // Rounding through decimal text is exact; `(value * 10^n).round() / 10^n` leaves a tail of
+    // nines.
+    format!("{value:.*e}", SIGNIFICANT_DIGITS - 1).parse().unwrap_or(value)
+}
+
+/// Returns `value` as JSON, with numbers rounded as in `audit.json`.
+///
+/// # Errors
+/// Fails if `value` cannot be JSON.
+pub fn rounded(value: &impl Serialize) -> serde_json::Result<Value> {
+    let mut value = serde_json::to_value(value)?;
+    round_floats(&mut value);
+    Ok(value)
+}
+
+/// Rounds every float in `value`; integers keep all digits.
+pub(crate) fn round_floats(value: &mut Value) {
+    match value {
+        Value::Number(number) if number.is_f64() => {
+            if let Some(rounded) = number.as_f64().map(round).and_then(serde_json::Number::from_f64)
+            {
+                *number = rounded;
+            }
+        }
+        Value::Array(items) => items.iter_mut().for_each(round_floats),
+        Value::Object(fields) => fields.values_mut().for_each(round_floats),
+        _ => {}
+    }
+}
+
+/// An error in reading, checking or writing an audit's files.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The text is not an `audit.json` of this schema.
+    #[error("audit.json: {0}")]
+    Json(#[from] serde_json::Error),
+    /// The page could not be rendered.
+    #[error("report.html: {0}")]
+    Template(#[from] minijinja::Error),
+    /// The document was written by another version of the format.
+    #[error("audit.json: expected schema {expected}, found {found}")]
+    Schema {
+        /// The schema this build reads.
+        expected: u32,
+        /// The schema the text declares.
+        found: u64,
+    },
+    /// A field breaks a rule of the format, for example a NaN or a repeated row.
+    #[error("audit.json: {place}: expected {expected}, found {found}")]
+    Invalid {
+        /// Where in the document, for example `results[3].recovered_percent["0.10"]`.
+        place: String,
+        /// The rule of the format.
+        expected: String,
+        /// The value found.
+        found: String,
+    },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn six_digits_are_kept_at_any_magnitude() {
+        assert_eq!(round(1.234_567_89), 1.234_57);
+        assert_eq!(round(89.123_456_7), 89.123_5);
+        assert_eq!(round(1.234_567_89e-9), 1.234_57e-9);
+        assert_eq!(round(-0.1 - 0.2), -0.3);
+        assert_eq!(round(0.0), 0.0);
+    }
+}

@@ -1,0 +1,378 @@
+//! The page: one file that loads nothing and shows all numbers without script.
+
+pub(crate) mod cost;
+pub(crate) mod curves;
+pub(crate) mod gates;
+pub mod inversions;
+pub mod pictures;
+pub mod scene;
+pub(crate) mod tables;
+pub(crate) mod tiles;
+pub(crate) mod verdict;
+
+use minijinja::{AutoEscape, Environment, UndefinedBehavior};
+use minijinja::value::Serde;
+use serde::Serialize;
+
+use crate::{Error, attack, words};
+use crate::document::{Document, ImageCounts, LengthUnit};
+use crate::page::curves::{Findings, findings, page_data};
+use crate::page::gates::{Gates, gates};
+use crate::page::inversions::{Exhibit, Inversion, Sheet, exhibits, sheets};
+use crate::page::pictures::Picture;
+use crate::page::scene::{Scene3d, encode};
+use crate::page::tables::Table;
+use crate::page::tiles::{HeatMap, heat_maps};
+use crate::page::verdict::{Verdict, verdict};
+
+/// The templates, by the names under which they include each other.
+const TEMPLATES: [(&str, &str); 11] = [
+    ("report.html", include_str!("../../template/report.html")),
+    ("terms.html", include_str!("../../template/terms.html")),
+    ("gates.html", include_str!("../../template/gates.html")),
+    ("verdict.html", include_str!("../../template/verdict.html")),
+    ("figures.html", include_str!("../../template/figures.html")),
+    ("inversions.html", include_str!("../../template/inversions.html")),
+    ("pictures.html", include_str!("../../template/pictures.html")),
+    ("cost.html", include_str!("../../template/cost.html")),
+    ("tiles.html", include_str!("../../template/tiles.html")),
+    ("tables.html", include_str!("../../template/tables.html")),
+    ("notes.html", include_str!("../../template/notes.html")),
+];
+const STYLE: [&str; 2] =
+    [include_str!("../../template/style.css"), include_str!("../../template/figures.css")];
+const BUNDLE: &str = include_str!("../../web/vendor/bundle.min.js");
+const SCRIPTS: [&str; 8] = [
+    include_str!("../../web/choices.js"),
+    include_str!("../../web/charts.js"),
+    include_str!("../../web/figures.js"),
+    include_str!("../../web/scene.js"),
+    include_str!("../../web/pictures.js"),
+    include_str!("../../web/sheets.js"),
+    include_str!("../../web/tables.js"),
+    include_str!("../../web/report.js"),
+];
+
+/// Draws `document` as one self-contained HTML page below 10 MB.
+///
+/// With [`RenderOptions::share_safe`] the scene and pictures are ignored and names are withheld, whatever the
+/// document holds.
+///
+/// # Errors
+///
+/// [`Error::Invalid`] or [`Error::Schema`] when the document breaks a rule of its format,
+/// [`Error::Template`] when the page cannot be rendered (a bug of this crate).
+pub fn render(
+    document: &Document,
+    scene: Option<&Scene3d>,
+    options: &RenderOptions,
+) -> Result<String, Error> {
+    document.check()?;
+    let document = if options.share_safe { document.share_safe() } else { document.clone() };
+    let scene = scene.filter(|scene| !options.share_safe && !scene.originals.is_empty());
+    let error_unit = tables::thresholds(&document).first().and_then(|typed| typed.parse().ok());
+    let encoded = scene.map(|scene| encode(scene, &document.results, error_unit.unwrap_or(1.0)));
+    // A view without points or without recovered points would be empty.
+    let encoded = encoded.filter(|scene| scene.n_drawn > 0 && !scene.views.is_empty());
+    let mut blocks = encoded.as_ref().map(|scene| scene.blocks.clone()).unwrap_or_default();
+    let shown = if options.share_safe { &[] } else { options.pictures.as_slice() };
+    let within = tables::headline_threshold(&document).and_then(|typed| typed.parse().ok());
+    let pictures = pictures::encode(shown, within.unwrap_or(10.0), &mut blocks);
+    let page_data = page_data(&document, encoded.as_ref(), &pictures, options);
+    let data = serde_json::to_string(&page_data)?;
+    let options_text: Vec<(String, String)> =
+        document.options.iter().map(|(name, value)| (name.clone(), plain(value))).collect();
+    let table_list = [
+        Some(tables::recovered(&document)),
+        Some(tables::baselines(&document)),
+        cost::table(&document),
+        tables::distinct_places(&document),
+        tiles::table(&document),
+        tables::likeness(&document),
+        tables::objects(&document),
+        Some(tables::errors(&document)),
+        tables::break_even(&document),
+    ];
+    let loss_list =
+        [Some(tables::losses(&document)), tables::choices(&document), tables::trials(&document)];
+
+    let shown = if options.share_safe { &[] } else { options.inversions.as_slice() };
+    let (drawn, sheets_left_out) = sheets(&document, shown);
+    let opening = options.opening.clone().filter(|_| !options.share_safe);
+    let own = Opening::of(&document, shown);
+    let oracle = document.results.iter();
+    let oracle = oracle.filter(|row| attack::basis(row) == Some(attack::Basis::Oracle));
+    let page = Page {
+        style: STYLE,
+        bundle: BUNDLE,
+        scripts: SCRIPTS,
+        data: script_text(&data),
+        blocks: &blocks,
+        pictures: pictures.len(),
+        findings: findings(&document),
+        parts: opening.into_iter().chain([own]).collect(),
+        sheets: drawn,
+        sheets_left_out,
+        heat_maps: heat_maps(&document),
+        cost: cost::chart(&document),
+        scene: encoded.as_ref().map(|scene| SceneWords {
+            n_points: words::thousands(scene.n_points),
+            n_drawn: words::thousands(scene.n_drawn as u64),
+            whole: scene.n_drawn as u64 >= scene.n_points,
+        }),
+        share_safe: options.share_safe,
+        subject: subject(&document),
+        gates: gates(&document),
+        has_curves: tables::distinct(oracle.map(|row| row.inlier_ratio)).len() > 1,
+        judged: page_data.has_reliability(),
+        tables: table_list.into_iter().flatten().collect(),
+        losses: loss_list.into_iter().flatten().collect(),
+        times: tables::times(&document),
+        options: options_text,
+        command: document.run.command.as_deref(),
+        sha256: document.input.sha256.as_deref(),
+        other_sha256: document.input.other_sha256.iter().collect(),
+        seconds: words::seconds(document.run.seconds.total),
+        memory: document.run.peak_memory_bytes.map(words::bytes),
+        not_audited: document
+            .not_audited
+            .iter()
+            .map(|one| {
+                let source = one.neighbors.as_deref().map(|by| attack::plain_source(by, None));
+                (&one.scheme, source, &one.reason)
+            })
+            .collect(),
+        notes: &document.notes,
+        document: &document,
+    };
+    let mut env = environment();
+    // A non-breaking space keeps a figure and its unit on one line.
+    env.add_filter("tied", |text: String| {
+        [" %", " cm", " px"]
+            .iter()
+            .fold(text, |text, unit| text.replace(unit, &unit.replace(' ', "\u{a0}")))
+    });
+    env.add_filter("coded", coded);
+    for (name, source) in TEMPLATES {
+        env.add_template(name, source)?;
+    }
+    Ok(env.get_template("report.html")?.render(Serde(&page))?.replace(turns, "\u{fffd}"))
+}
+
+/// Returns an environment that escapes text and fails on undefined names.
+pub(crate) fn environment() -> Environment<'static> {
+    let mut env = Environment::new();
+    env.set_undefined_behavior(UndefinedBehavior::Strict);
+    env.set_auto_escape_callback(|_| AutoEscape::Html);
+    env
+}
+
+/// Returns whether a character changes the direction of text; a name may contain one.
+fn turns(c: char) -> bool {
+    matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+#[derive(Debug, Serialize)]
+struct Page<'a> {
+    style: [&'static str; 2],
+    bundle: &'static str,
+    scripts: [&'static str; 8],
+    /// JSON for the script; free of `<`.
+    data: String,
+    blocks: &'a [String],
+    scene: Option<SceneWords>,
+    pictures: usize,
+    /// The verdict of this audit, after that of another audit if there is one.
+    parts: Vec<Opening>,
+    findings: Findings,
+    sheets: Vec<Sheet>,
+    /// Number of pictures that were left out to keep the page small.
+    sheets_left_out: usize,
+    heat_maps: Vec<HeatMap>,
+    cost: Option<cost::Chart>,
+    share_safe: bool,
+    subject: Subject,
+    gates: Option<Gates>,
+    /// Whether known neighbors were tried at several shares of right ones.
+    has_curves: bool,
+    /// Whether any row has estimated probabilities.
+    judged: bool,
+    tables: Vec<Table>,
+    losses: Vec<Table>,
+    times: Option<Table>,
+    options: Vec<(String, String)>,
+    command: Option<&'a str>,
+    sha256: Option<&'a str>,
+    other_sha256: Vec<(&'a String, &'a String)>,
+    seconds: String,
+    memory: Option<String>,
+    not_audited: Vec<(&'a String, Option<String>, &'a String)>,
+    notes: &'a [String],
+    document: &'a Document,
+}
+
+fn coded(text: &str) -> minijinja::Value {
+    let escaped = text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+    let parts = escaped.split('`').enumerate();
+    let parts = parts.map(|(at, part)| match at % 2 {
+        1 => format!("<code>{part}</code>"),
+        _ => part.to_owned(),
+    });
+    minijinja::Value::from_safe_string(parts.collect())
+}
+
+#[derive(Debug, Serialize)]
+struct SceneWords {
+    n_points: String,
+    n_drawn: String,
+    whole: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Subject {
+    /// The last telling part of the path; the whole path is in the last section.
+    name: Option<String>,
+    n_points: String,
+    metric: bool,
+    kind: &'static str,
+    points: &'static str,
+    images: Option<String>,
+    unit: String,
+    kth: String,
+    usual_distance: &'static str,
+}
+
+fn subject(document: &Document) -> Subject {
+    let input = &document.input;
+    // The oracle uses the K of the audit; other sources choose their own.
+    let oracle = document.results.iter().find(|row| row.neighbors == "oracle");
+    let typed = document.options.get("k").and_then(serde_json::Value::as_u64);
+    let k = oracle.map(|row| row.k).or(typed.and_then(|k| u32::try_from(k).ok())).unwrap_or(50);
+    let of = document.results.first().map_or(LengthUnit::Meter, |row| row.unit);
+    let metric = of != LengthUnit::KthNeighbor;
+    let unit = match (metric, input.scale_m_per_unit, input.unit_in_map_units) {
+        (true, ..) if of == LengthUnit::Pixel => "Lengths are in pixels.".to_owned(),
+        (true, Some(scale), _) => {
+            format!("Meters, by the declared scale of {scale} m per map unit.")
+        }
+        (true, None, _) => "Meters.".to_owned(),
+        (false, _, Some(unit)) => {
+            format!("Here it is {} map units.", words::significant(unit, 4))
+        }
+        (false, _, None) => String::new(),
+    };
+    let name = input.path.as_deref().map(short_name);
+    Subject {
+        name,
+        n_points: words::thousands(input.n_points),
+        metric,
+        kind: if of == LengthUnit::Pixel { "images" } else { "map" },
+        points: words::points(of),
+        images: input.images.as_ref().map(images_text),
+        unit,
+        kth: words::ordinal(k),
+        usual_distance: words::USUAL_DISTANCE,
+    }
+}
+
+fn images_text(counts: &ImageCounts) -> String {
+    let count = words::thousands;
+    let mut text = match counts.found == counts.used {
+        true => format!("{} images.", count(counts.used)),
+        false => format!("{} of {} images.", count(counts.used), count(counts.found)),
+    };
+    if counts.unusable > 0 {
+        text.push_str(&format!(" {} could not be used.", count(counts.unusable)));
+    }
+    if counts.too_small > 0 {
+        let (n, few) = (count(counts.too_small), "had fewer keypoints than requested neighbors");
+        text.push_str(&format!(" {n} {few}, and were attacked with fewer."));
+    }
+    text
+}
+
+/// Returns the part of a path that names the map: `room` of `maps/room/sparse/0`.
+fn short_name(path: &str) -> String {
+    let says_little = |part: &&str| {
+        matches!(*part, "" | "." | ".." | "sparse" | "model" | "dense" | "colmap")
+            || part.bytes().all(|byte| byte.is_ascii_digit())
+    };
+    let mut parts = path.split(['/', '\\']).rev().filter(|part| !part.is_empty());
+    let name = parts.clone().find(|part| !says_little(part)).or_else(|| parts.next());
+    name.unwrap_or(path).to_owned()
+}
+
+fn plain(value: &serde_json::Value) -> String {
+    match value {
+        serde_json::Value::String(text) => text.clone(),
+        serde_json::Value::Array(items) => items.iter().map(plain).collect::<Vec<_>>().join(", "),
+        serde_json::Value::Null => "none".to_owned(),
+        other => other.to_string(),
+    }
+}
+
+/// Returns JSON that can be inside a script element, because it contains no `<`.
+fn script_text(json: &str) -> String {
+    json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026")
+}
+
+/// Options of the page.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct RenderOptions {
+    /// Leaves out everything but figures: no points, paths, names, command line.
+    pub share_safe: bool,
+    /// Error curves finer than the percentiles of the document; may be empty.
+    pub error_cdf: Vec<ErrorCdf>,
+    /// Images to draw, at most [`MOST_PICTURES`](crate::pictures::MOST_PICTURES); empty for maps.
+    pub pictures: Vec<Picture>,
+    /// Pictures that a network painted from recovered points.
+    pub inversions: Vec<Inversion>,
+    /// The verdict on another audit, at the top of the page.
+    pub opening: Option<Opening>,
+}
+
+/// The error curve of one row of the results.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ErrorCdf {
+    /// Index into [`Document::results`].
+    pub row: usize,
+    /// (error in the row's unit, percent of the released points within it), ascending; a hundred
+    /// points suffice.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// The opening of a page: the verdict on an audit, and its pictures if it has any.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Opening {
+    title: Option<String>,
+    details: Option<String>,
+    verdict: Verdict,
+    exhibits: Vec<Exhibit>,
+    notes: Vec<String>,
+    images: bool,
+}
+
+impl Opening {
+    pub(crate) fn of(document: &Document, inversions: &[Inversion]) -> Self {
+        Self {
+            title: None,
+            details: None,
+            verdict: verdict(document),
+            exhibits: exhibits(document, inversions),
+            notes: document.notes.clone(),
+            images: document.results.first().is_some_and(|row| row.unit == LengthUnit::Pixel),
+        }
+    }
+
+    /// Returns the opening of another audit under a title; `details` is a link to that audit's own
+    /// page.
+    pub fn titled(
+        document: &Document,
+        inversions: &[Inversion],
+        title: &str,
+        details: &str,
+    ) -> Self {
+        let (title, details) = (Some(title.to_owned()), Some(details.to_owned()));
+        Self { title, details, ..Self::of(document, inversions) }
+    }
+}

@@ -1,0 +1,381 @@
+//! Chosen images on the page: photo, keypoints, released records and recovered keypoints.
+//!
+//! Positions are in pixels. The center of the first pixel is `(0, 0)`, so an image of width `w` spans
+//! `-0.5` to `w - 0.5`.
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+
+use crate::{attack, words};
+use crate::page::scene::subsample;
+
+pub use crate::attack::Given;
+
+/// Maximal number of images on a page, which stays below 10 MB.
+pub const MOST_PICTURES: usize = 12;
+/// Number of neighbors per keypoint in a graph.
+pub const GRAPH_NEIGHBORS: usize = 5;
+
+/// An image of the page.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Picture {
+    /// The image's name.
+    pub name: String,
+    /// The reason for its choice, for example `worst`; may be empty.
+    pub note: String,
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// The photo as a small JPEG; `None` draws a gray frame.
+    pub photo: Option<Vec<u8>>,
+    /// True positions of the `n` keypoints.
+    pub keypoints: Vec<[f32; 2]>,
+    /// Released records, one entry per scheme.
+    pub released: Vec<ReleasedView>,
+    /// Recovered keypoints, one entry per attack.
+    pub views: Vec<RecoveredView>,
+    /// Graphs of neighbors, one per kind of neighborhoods.
+    pub graphs: Vec<Graph>,
+}
+
+/// The released records of one scheme.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReleasedView {
+    /// The scheme's user-facing name.
+    pub scheme: String,
+    /// The records, one per keypoint of [`Picture::keypoints`] in the same order.
+    pub marks: Marks,
+}
+
+/// Records as drawn; `None` if a keypoint was not released.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Marks {
+    /// Lines clipped to the image.
+    Lines(Vec<Option<[[f32; 2]; 2]>>),
+    /// Half-lines from an anchor (the first end) to the border of their part of the image.
+    Rays(Vec<Option<[[f32; 2]; 2]>>),
+    /// Published points with one coordinate of another keypoint.
+    Points(Vec<Option<[f32; 2]>>),
+}
+
+/// The keypoints recovered under one scheme, from one kind of neighborhoods.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecoveredView {
+    /// The scheme's user-facing name.
+    pub scheme: String,
+    /// The neighborhoods.
+    pub given: Given,
+    /// The solver's name.
+    pub solver: String,
+    /// Recovered positions, one per keypoint of [`Picture::keypoints`]; `None` if it is lost or was not
+    /// released.
+    pub recovered: Vec<Option<[f32; 2]>>,
+}
+
+/// A graph of neighborhoods: per keypoint up to [`GRAPH_NEIGHBORS`] neighbors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Graph {
+    /// The neighborhoods.
+    pub given: Given,
+    /// True positions of the neighbors, per keypoint of [`Picture::keypoints`].
+    pub neighbors: Vec<Vec<[f32; 2]>>,
+}
+
+/// Maximal number of bytes of all pictures without their photos, before base64.
+const BUDGET_BYTES: usize = 3_600_000;
+/// The position of a point that is not drawn. Others are 0..=65534 across the image.
+const NOT_DRAWN: u16 = u16::MAX;
+const BYTES_PER_POINT: usize = 2 * size_of::<u16>();
+
+#[derive(Debug, serde::Serialize)]
+pub(crate) struct EncodedPicture {
+    name: String,
+    note: String,
+    size: [u32; 2],
+    photo: Option<usize>,
+    said: String,
+    keypoints: usize,
+    short_px: f32,
+    released: Vec<EncodedMarks>,
+    views: Vec<EncodedView>,
+    graphs: Vec<EncodedGraph>,
+}
+
+#[derive(Debug, serde::Serialize)]
+struct EncodedMarks {
+    scheme: String,
+    kind: &'static str,
+    block: usize,
+}
+
+#[derive(Debug, serde::Serialize)]
+struct EncodedView {
+    scheme: String,
+    /// The key of the neighborhoods, equal in all pictures.
+    given: String,
+    label: String,
+    solver: String,
+    block: usize,
+    said: String,
+    #[serde(skip)]
+    share: f64,
+    #[serde(skip)]
+    own: bool,
+}
+
+#[derive(Debug, serde::Serialize)]
+struct EncodedGraph {
+    given: String,
+    said: String,
+    /// Neighbors per keypoint; shorter lists are padded with points that are not drawn.
+    k: usize,
+    block: usize,
+}
+
+/// Returns the key of the neighborhoods that are shown first: those made by the attacker that recover
+/// most of the first picture.
+pub(crate) fn first_choice(pictures: &[EncodedPicture]) -> Option<&str> {
+    let own = pictures.first()?.views.iter().filter(|view| view.own);
+    own.max_by(|a, b| a.share.total_cmp(&b.share)).map(|view| view.given.as_str())
+}
+
+/// Edges below this fraction of the smaller side are short, as in the paper's figures.
+const SHORT_SHARE: f32 = 0.1;
+
+/// Encodes up to [`MOST_PICTURES`] pictures and appends their blocks to `blocks`. Keypoints are thinned
+/// to keep the budget. Shares within `within` pixels are over all released keypoints.
+pub(crate) fn encode(
+    pictures: &[Picture],
+    within: f64,
+    blocks: &mut Vec<String>,
+) -> Vec<EncodedPicture> {
+    let pictures = &pictures[..pictures.len().min(MOST_PICTURES)];
+    let each = BUDGET_BYTES / pictures.len().max(1);
+    pictures.iter().map(|picture| one(picture, each, within, blocks)).collect()
+}
+
+fn one(picture: &Picture, budget: usize, within: f64, blocks: &mut Vec<String>) -> EncodedPicture {
+    let points = 1
+        + 2 * picture.released.len()
+        + picture.views.len()
+        + GRAPH_NEIGHBORS * picture.graphs.len();
+    let most = budget / (BYTES_PER_POINT * points);
+    let chosen = subsample(picture.keypoints.len(), most, 0);
+    let short_px = SHORT_SHARE * picture.size[0].min(picture.size[1]) as f32;
+    let place = |point: Option<[f32; 2]>| quantize(picture.size, point);
+    let mut push = |bytes: Vec<u8>| {
+        blocks.push(STANDARD.encode(bytes));
+        blocks.len() - 1
+    };
+    let photo = picture.photo.as_ref().map(|jpeg| push(jpeg.clone()));
+    let keypoints = push(chosen.iter().flat_map(|&i| place(Some(picture.keypoints[i]))).collect());
+    let released = picture.released.iter().map(|view| {
+        let ends = |segments: &[Option<[[f32; 2]; 2]>]| -> Vec<u8> {
+            let both = |&i: &usize| {
+                let segment = segments.get(i).copied().flatten();
+                [0, 1].map(|end| place(segment.map(|segment| segment[end])))
+            };
+            chosen.iter().flat_map(both).flatten().collect()
+        };
+        let (kind, bytes) = match &view.marks {
+            Marks::Lines(all) => ("lines", ends(all)),
+            Marks::Rays(all) => ("rays", ends(all)),
+            Marks::Points(all) => ("points", at(all, &chosen, place)),
+        };
+        EncodedMarks { scheme: view.scheme.clone(), kind, block: push(bytes) }
+    });
+    let released = released.collect();
+    let views = picture.views.iter().map(|view| {
+        let (share, said) = recovered_said(picture, view, within);
+        EncodedView {
+            scheme: view.scheme.clone(),
+            given: key(&view.given),
+            label: view.given.label(),
+            solver: view.solver.clone(),
+            block: push(at(&view.recovered, &chosen, place)),
+            said,
+            share,
+            own: !attack::is_oracle(&view.given.neighbors),
+        }
+    });
+    let views = views.collect();
+    let graphs = picture.graphs.iter().map(|graph| {
+        let listed = |&i: &usize| {
+            let of = graph.neighbors.get(i).map(Vec::as_slice).unwrap_or_default();
+            (0..GRAPH_NEIGHBORS).flat_map(|at| place(of.get(at).copied())).collect::<Vec<u8>>()
+        };
+        let block = push(chosen.iter().flat_map(listed).collect());
+        let said = graph_said(picture, graph, short_px);
+        EncodedGraph { given: key(&graph.given), said, k: GRAPH_NEIGHBORS, block }
+    });
+    let graphs = graphs.collect();
+    EncodedPicture {
+        name: picture.name.clone(),
+        note: picture.note.clone(),
+        size: picture.size,
+        photo,
+        said: picture_said(picture, chosen.len()),
+        keypoints,
+        short_px,
+        released,
+        views,
+        graphs,
+    }
+}
+
+fn at(
+    all: &[Option<[f32; 2]>],
+    chosen: &[usize],
+    place: impl Fn(Option<[f32; 2]>) -> [u8; BYTES_PER_POINT],
+) -> Vec<u8> {
+    chosen.iter().flat_map(|&i| place(all.get(i).copied().flatten())).collect()
+}
+
+/// Encodes a position as a little-endian u16 pair, 0..=65534 across the image; points outside move to
+/// the border.
+fn quantize(size: [u32; 2], point: Option<[f32; 2]>) -> [u8; BYTES_PER_POINT] {
+    let steps = |c: usize| {
+        let share = (point?[c] + 0.5) / size[c].max(1) as f32;
+        share.is_finite().then(|| (share.clamp(0.0, 1.0) * f32::from(NOT_DRAWN - 1)).round() as u16)
+    };
+    let [x, y] = match (steps(0), steps(1)) {
+        (Some(x), Some(y)) => [x, y].map(u16::to_le_bytes),
+        _ => [NOT_DRAWN; 2].map(u16::to_le_bytes),
+    };
+    [x[0], x[1], y[0], y[1]]
+}
+
+/// Returns the key of neighborhoods, without a measured ratio, which differs between images.
+fn key(given: &Given) -> String {
+    let source = attack::source(&given.neighbors, given.oracle_noise.as_deref());
+    match attack::is_oracle(&given.neighbors) {
+        true => format!("{source} {}", given.inlier_ratio),
+        false => source,
+    }
+}
+
+/// Returns a sentence: "frame-1.jpg, 640 x 480 px, 2,113 keypoints, 900 of them drawn".
+fn picture_said(picture: &Picture, drawn: usize) -> String {
+    let count = |n: usize| words::thousands(n as u64);
+    let [w, h] = picture.size;
+    let n = picture.keypoints.len();
+    let some = if drawn < n { format!(", {} of them drawn", count(drawn)) } else { String::new() };
+    format!("{}, {w} x {h} px, {} keypoints{some}", picture.name, count(n))
+}
+
+/// Returns the share of the released keypoints, drawn or not, and a sentence: "81.3 % within 10 px
+/// (blue), the others orange; 3 lost".
+fn recovered_said(picture: &Picture, view: &RecoveredView, within: f64) -> (f64, String) {
+    let released = picture.released.iter().find(|one| one.scheme == view.scheme);
+    let is_released = |i: usize| match released.map(|one| &one.marks) {
+        Some(Marks::Lines(all) | Marks::Rays(all)) => all.get(i).is_some_and(Option::is_some),
+        Some(Marks::Points(all)) => all.get(i).is_some_and(Option::is_some),
+        None => true,
+    };
+    let (mut n, mut hits, mut lost) = (0u64, 0u64, 0u64);
+    for (i, truth) in picture.keypoints.iter().enumerate().filter(|(i, _)| is_released(*i)) {
+        n += 1;
+        match view.recovered.get(i).copied().flatten() {
+            Some(found) if distance(found, *truth) <= within => hits += 1,
+            Some(_) => {}
+            None => lost += 1,
+        }
+    }
+    let share = 100.0 * hits as f64 / n.max(1) as f64;
+    let lost = if lost > 0 { format!("; {} lost", words::thousands(lost)) } else { String::new() };
+    let (percent, within) = (words::percent(share), words::significant(within, 3));
+    (share, format!("{percent} % within {within} px (blue), the others orange{lost}"))
+}
+
+/// Returns a sentence: "the first five neighbors of each keypoint; 45.1 % of the edges are shorter than
+/// 48 px (green), the others red".
+fn graph_said(picture: &Picture, graph: &Graph, short_px: f32) -> String {
+    let (mut n, mut short) = (0u64, 0u64);
+    for (from, neighbors) in picture.keypoints.iter().zip(&graph.neighbors) {
+        for to in neighbors.iter().take(GRAPH_NEIGHBORS) {
+            n += 1;
+            short += u64::from(distance(*from, *to) < f64::from(short_px));
+        }
+    }
+    let share = words::percent(100.0 * short as f64 / n.max(1) as f64);
+    let reach = words::significant(f64::from(short_px), 3);
+    format!(
+        "the first five neighbors of each keypoint; {share} % of the edges are shorter than {reach} px (green), the others red"
+    )
+}
+
+fn distance(a: [f32; 2], b: [f32; 2]) -> f64 {
+    f64::from(a[0] - b[0]).hypot(f64::from(a[1] - b[1]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_corners_of_an_image_are_the_ends_of_the_scale() {
+        let ends = |point| {
+            let [a, b, c, d] = quantize([640, 480], point);
+            [u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d])]
+        };
+        assert_eq!(ends(Some([-0.5, -0.5])), [0, 0]);
+        assert_eq!(ends(Some([639.5, 479.5])), [65534, 65534]);
+        assert_eq!(ends(Some([9000.0, 239.5])), [65534, 32767]);
+        assert_eq!(ends(None), [65535, 65535]);
+        assert_eq!(ends(Some([f32::NAN, 0.0])), [65535, 65535]);
+    }
+
+    #[test]
+    fn a_budget_thins_keypoints_out() {
+        let keypoints = vec![[1.0, 2.0]; 1000];
+        let picture = Picture { size: [9, 9], keypoints, ..Picture::default() };
+        let mut blocks = Vec::new();
+        let encoded = one(&picture, 400, 10.0, &mut blocks);
+        assert_eq!(encoded.said, ", 9 x 9 px, 1,000 keypoints, 100 of them drawn");
+        assert_eq!(STANDARD.decode(&blocks[0]).unwrap().len(), 400);
+    }
+
+    #[test]
+    fn shares_are_of_all_released_keypoints() {
+        let picture = Picture {
+            size: [100, 50],
+            keypoints: vec![[0.0, 0.0]; 5],
+            released: vec![ReleasedView {
+                scheme: "cp2d".into(),
+                marks: Marks::Points(vec![
+                    Some([1.0, 1.0]),
+                    Some([1.0, 1.0]),
+                    None,
+                    Some([2.0; 2]),
+                    Some([3.0; 2]),
+                ]),
+            }],
+            ..Picture::default()
+        };
+        let view = RecoveredView {
+            scheme: "cp2d".into(),
+            given: Given::default(),
+            solver: "joint".into(),
+            recovered: vec![Some([3.0, 4.0]), Some([30.0, 4.0]), None, None, Some([5.0, 0.0])],
+        };
+        let (_, said) = recovered_said(&picture, &view, 5.0);
+        assert_eq!(said, "50.0 % within 5 px (blue), the others orange; 1 lost");
+        let graph = Graph {
+            given: Given::default(),
+            neighbors: vec![vec![[3.0, 0.0], [5.0, 0.0]]],
+        };
+        let said = graph_said(&picture, &graph, 5.0);
+        assert!(said.contains("50.0 % of the edges are shorter than 5 px"), "{said}");
+    }
+
+    #[test]
+    fn own_lists_of_all_images_are_one_choice() {
+        let given = |neighbors: &str, inlier_ratio| Given {
+            neighbors: neighbors.into(),
+            oracle_noise: None,
+            inlier_ratio,
+        };
+        assert_eq!(key(&given("overlap", 0.18)), key(&given("overlap", 0.2)));
+        assert_ne!(key(&given("oracle", 0.18)), key(&given("oracle", 0.2)));
+        assert_eq!(given("overlap", 0.183).label(), "neighbors by descriptor overlap, 18 % right");
+    }
+}

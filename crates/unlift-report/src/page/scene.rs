@@ -1,0 +1,621 @@
+//! The data of the page's 3D view: originals, obfuscations and recovered points.
+//!
+//! All positions are in the document's unit (meters, or usual distances to the K-th neighbor), relative to an origin
+//! near the map: large coordinates (10^6) must be centered before they become `f32`.
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+
+use crate::words;
+use crate::attack::Given;
+use crate::document::Row;
+
+/// The whole 3D view.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Scene3d {
+    /// Originals `(n, 3)` after thinning, see [`subsample`] and [`points_within_budget`].
+    pub originals: Vec<[f32; 3]>,
+    /// Number of originals before thinning.
+    pub n_points: u64,
+    /// Centers of the cameras `(m, 3)`; may be empty.
+    pub cameras: Vec<[f32; 3]>,
+    /// The up direction; `None` is +z.
+    pub up: Option<[f32; 3]>,
+    /// Released records, at most one entry per scheme.
+    pub obfuscations: Vec<ObfuscationView>,
+    /// Recovered points, at most one entry per row of the results.
+    pub views: Vec<View>,
+}
+
+/// The points recovered under one scheme, from one kind of neighborhoods, by one solver.
+#[derive(Debug, Clone, PartialEq)]
+pub struct View {
+    /// The scheme's user-facing name.
+    pub scheme: String,
+    /// The neighborhoods, as in the row of the results.
+    pub given: Given,
+    /// The solver's name.
+    pub solver: String,
+    /// Recovered positions `(n, 3)`, aligned with [`Scene3d::originals`]; NaN if a point is lost or was
+    /// not released.
+    pub recovered: Vec<[f32; 3]>,
+}
+
+/// Released records of one scheme; a sample is enough for the drawing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ObfuscationView {
+    /// The scheme's user-facing name.
+    pub scheme: String,
+    /// The records as drawn.
+    pub shapes: Shapes,
+    /// Number of records, drawn or not.
+    pub n_records: u64,
+    /// Indices in [`Scene3d::originals`] of points that the scheme did not release.
+    pub withheld: Vec<usize>,
+}
+
+/// Records as drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Shapes {
+    /// Lines and rays clipped to the scene, see [`SceneBox::clip_line`] and [`SceneBox::clip_ray`].
+    Segments(Vec<[[f32; 3]; 2]>),
+    /// Planes as outlined rectangles, see [`SceneBox::axis_patch`].
+    Patches(Vec<[[f32; 3]; 4]>),
+    /// Published points (with one swapped coordinate, for `cp`).
+    Points(Vec<[f32; 3]>),
+}
+
+impl Shapes {
+    /// Returns the number of shapes.
+    pub fn len(&self) -> usize {
+        match self {
+            Shapes::Segments(shapes) => shapes.len(),
+            Shapes::Patches(shapes) => shapes.len(),
+            Shapes::Points(shapes) => shapes.len(),
+        }
+    }
+
+    /// Returns whether there are no shapes.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// Maximal number of bytes of the 3D view. With the libraries (about 1.1 MB), tables and curves the page
+/// stays below 10 MB.
+pub const SCENE_BUDGET_BYTES: usize = 6_000_000;
+
+/// Maximal number of lines or planes drawn per scheme.
+const MAX_SHAPES: usize = 1_500;
+/// Maximal number of points drawn for a scheme that publishes points.
+const MAX_SHAPE_POINTS: usize = 6_000;
+const MAX_CAMERAS: usize = 5_000;
+
+const BYTES_PER_POINT: usize = 3 * size_of::<u16>();
+const BYTES_PER_RECOVERED: usize = BYTES_PER_POINT + 1;
+const BYTES_PER_PATCH: usize = 4 * BYTES_PER_POINT;
+const BYTES_PER_BLOCK: usize = 200;
+
+/// The position of a point that is not drawn: lost, not released, or outside the box. Others are 0..=65534.
+const NOT_DRAWN: u16 = u16::MAX;
+/// The error byte of a point that is lost or not released.
+const LOST: u8 = u8::MAX;
+/// Errors are stored as `log10(error / first threshold)`, from -3 to 3, in 0..=254.
+const ERROR_DECADES: f32 = 3.0;
+
+/// Returns the maximal number of points for `n_views` views and `n_schemes` schemes within
+/// [`SCENE_BUDGET_BYTES`].
+pub fn points_within_budget(n_views: usize, n_schemes: usize) -> usize {
+    let shapes = (MAX_SHAPES * BYTES_PER_PATCH).max(MAX_SHAPE_POINTS * BYTES_PER_POINT);
+    let blocks = (n_views + n_schemes + 2) * BYTES_PER_BLOCK;
+    let fixed = n_schemes * shapes + MAX_CAMERAS * BYTES_PER_POINT;
+    let budget = SCENE_BUDGET_BYTES.saturating_sub(blocks) / 4 * 3;
+    budget.saturating_sub(fixed) / (BYTES_PER_POINT + n_views * BYTES_PER_RECOVERED)
+}
+
+#[derive(Debug, serde::Serialize)]
+pub(crate) struct Encoded {
+    pub low: [f32; 3],
+    pub high: [f32; 3],
+    pub up: [f32; 3],
+    pub n_points: u64,
+    pub n_drawn: usize,
+    pub originals_said: String,
+    pub n_cameras: usize,
+    /// The first viewpoint: a camera of the map.
+    pub eye: Option<[f32; 3]>,
+    pub error_unit: f32,
+    pub obfuscations: Vec<EncodedShapes>,
+    pub views: Vec<EncodedView>,
+    /// Base64 blocks; the fields above refer to them by index.
+    #[serde(skip)]
+    pub blocks: Vec<String>,
+}
+
+#[derive(Debug, serde::Serialize)]
+pub(crate) struct EncodedShapes {
+    pub scheme: String,
+    pub kind: &'static str,
+    pub count: usize,
+    pub block: usize,
+    pub said: String,
+}
+
+#[derive(Debug, serde::Serialize)]
+pub(crate) struct EncodedView {
+    pub row: usize,
+    pub block: usize,
+    pub drawn: usize,
+    pub said: String,
+}
+
+/// Returns the camera in the box that is farthest from its middle, because it sees most of the scene.
+fn eye(bounds: &SceneBox, cameras: &[[f32; 3]]) -> Option<[f32; 3]> {
+    let middle: [f32; 3] = std::array::from_fn(|c| 0.5 * (bounds.low[c] + bounds.high[c]));
+    let far = |camera: &[f32; 3]| (0..3).map(|c| (camera[c] - middle[c]).powi(2)).sum::<f32>();
+    let within = cameras.iter().filter(|&&camera| is_drawn(bounds, camera));
+    within.copied().max_by(|a, b| far(a).total_cmp(&far(b)))
+}
+
+/// Encodes `scene`, thinned further if it exceeds the budget. Errors are relative to `error_unit`, the
+/// first threshold. Leaves out views without a row in `rows`, and further views of one row.
+///
+/// Block 0 holds the originals, block 1 the cameras.
+pub(crate) fn encode(scene: &Scene3d, rows: &[Row], error_unit: f32) -> Encoded {
+    let bounds = SceneBox::robust(&scene.originals);
+    let max = points_within_budget(scene.views.len(), scene.obfuscations.len());
+    let chosen = subsample(scene.originals.len(), max, 0);
+    let mut blocks = Vec::new();
+    let mut push = |bytes: Vec<u8>| {
+        blocks.push(STANDARD.encode(bytes));
+        blocks.len() - 1
+    };
+
+    let originals = || chosen.iter().map(|&i| scene.originals[i]);
+    push(positions(&bounds, originals()));
+    let n_outside = originals().filter(|&point| !is_drawn(&bounds, point)).count();
+    let cameras = subsample(scene.cameras.len(), MAX_CAMERAS, 0);
+    push(positions(&bounds, cameras.iter().map(|&i| scene.cameras[i])));
+
+    let mut obfuscations = Vec::new();
+    for ObfuscationView { scheme, shapes, n_records, .. } in &scene.obfuscations {
+        let (kind, bytes, count) = encode_shapes(&bounds, shapes);
+        let said = shapes_said(shapes, count, *n_records);
+        let block = push(bytes);
+        obfuscations.push(EncodedShapes { scheme: scheme.clone(), kind, count, block, said });
+    }
+    let mut views: Vec<EncodedView> = Vec::new();
+    for view in &scene.views {
+        let Some(row) = row_of(rows, view).filter(|&row| views.iter().all(|v| v.row != row)) else {
+            continue;
+        };
+        let withheld = scene.obfuscations.iter().find(|one| one.scheme == view.scheme);
+        let withheld = withheld.map_or(&[][..], |one| &one.withheld);
+        let (bytes, fate) = encode_view(&bounds, scene, view, withheld, &chosen, error_unit);
+        let block = push(bytes);
+        views.push(EncodedView { row, block, drawn: fate.drawn, said: fate.said() });
+    }
+    Encoded {
+        low: bounds.low,
+        high: bounds.high,
+        up: scene.up.unwrap_or([0.0, 0.0, 1.0]),
+        n_points: scene.n_points.max(scene.originals.len() as u64),
+        n_drawn: chosen.len(),
+        originals_said: Fate {
+            drawn: chosen.len() - n_outside,
+            outside: n_outside,
+            ..Fate::default()
+        }
+        .said(),
+        n_cameras: cameras.len(),
+        eye: eye(&bounds, &scene.cameras),
+        error_unit,
+        obfuscations,
+        views,
+        blocks,
+    }
+}
+
+fn row_of(rows: &[Row], view: &View) -> Option<usize> {
+    rows.iter().position(|row| {
+        row.scheme == view.scheme
+            && row.solver == view.solver
+            && Given::of(row).same_choice(&view.given)
+    })
+}
+
+fn encode_view(
+    bounds: &SceneBox,
+    scene: &Scene3d,
+    view: &View,
+    withheld: &[usize],
+    chosen: &[usize],
+    error_unit: f32,
+) -> (Vec<u8>, Fate) {
+    let recovered = |i: usize| view.recovered.get(i).copied().unwrap_or([f32::NAN; 3]);
+    let mut bytes = positions(bounds, chosen.iter().map(|&i| recovered(i)));
+    let mut fate = Fate::default();
+    for &i in chosen {
+        let error = distance(recovered(i), scene.originals[i]);
+        match () {
+            () if is_drawn(bounds, recovered(i)) => fate.drawn += 1,
+            () if !error.is_nan() => fate.outside += 1,
+            () if withheld.contains(&i) => fate.withheld += 1,
+            () => fate.lost += 1,
+        }
+        bytes.push(error_byte(error / error_unit));
+    }
+    (bytes, fate)
+}
+
+fn is_drawn(bounds: &SceneBox, point: [f32; 3]) -> bool {
+    quantize(bounds, point) != [NOT_DRAWN; 3]
+}
+
+fn encode_shapes(bounds: &SceneBox, shapes: &Shapes) -> (&'static str, Vec<u8>, usize) {
+    let max = if matches!(shapes, Shapes::Points(_)) { MAX_SHAPE_POINTS } else { MAX_SHAPES };
+    let chosen = subsample(shapes.len(), max, 0);
+    let count = chosen.len();
+    let chosen = chosen.into_iter();
+    match shapes {
+        Shapes::Segments(all) => {
+            ("segments", positions(bounds, chosen.flat_map(|i| all[i])), count)
+        }
+        Shapes::Patches(all) => ("patches", positions(bounds, chosen.flat_map(|i| all[i])), count),
+        Shapes::Points(all) => ("points", positions(bounds, chosen.map(|i| all[i])), count),
+    }
+}
+
+/// Encodes positions as little-endian u16 triples, 0..=65534 across the box.
+fn positions(bounds: &SceneBox, points: impl Iterator<Item = [f32; 3]>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for point in points {
+        for value in quantize(bounds, point) {
+            bytes.extend_from_slice(&value.to_le_bytes());
+        }
+    }
+    bytes
+}
+
+fn quantize(bounds: &SceneBox, point: [f32; 3]) -> [u16; 3] {
+    let mut cells = [0; 3];
+    for axis in 0..3 {
+        let share = (point[axis] - bounds.low[axis]) / (bounds.high[axis] - bounds.low[axis]);
+        // Ends of clipped lines lie on the box only up to rounding.
+        if !(-1e-4..=1.0001).contains(&share) {
+            return [NOT_DRAWN; 3];
+        }
+        cells[axis] = (share.clamp(0.0, 1.0) * f32::from(NOT_DRAWN - 1)).round() as u16;
+    }
+    cells
+}
+
+fn error_byte(relative: f32) -> u8 {
+    if relative.is_nan() {
+        return LOST;
+    }
+    let share = (relative.max(1e-9).log10() / ERROR_DECADES).clamp(-1.0, 1.0) * 0.5 + 0.5;
+    (share * f32::from(LOST - 1)).round() as u8
+}
+
+fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f32>().sqrt()
+}
+
+/// Counts of the points of one pane; each point is counted once.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+struct Fate {
+    drawn: usize,
+    withheld: usize,
+    lost: usize,
+    outside: usize,
+}
+
+impl Fate {
+    /// Returns a sentence: "3,861 of 3,895 points drawn; 34 not released".
+    fn said(&self) -> String {
+        let count = |n: usize| words::thousands(n as u64);
+        let all = self.drawn + self.withheld + self.lost + self.outside;
+        let others = [
+            (self.withheld, "not released"),
+            (self.lost, "lost"),
+            (self.outside, "outside the box"),
+        ];
+        let others: Vec<String> = others
+            .into_iter()
+            .filter(|(n, _)| *n > 0)
+            .map(|(n, what)| format!("{} {what}", count(n)))
+            .collect();
+        if others.is_empty() {
+            return format!("{} points drawn", count(all));
+        }
+        let drawn = match self.drawn {
+            0 => format!("None of {}", count(all)),
+            n => format!("{} of {}", count(n), count(all)),
+        };
+        format!("{drawn} points drawn; {}", others.join(", "))
+    }
+}
+
+/// Returns a sentence: "1,500 of 3,895 lines drawn".
+fn shapes_said(shapes: &Shapes, drawn: usize, n_records: u64) -> String {
+    let what = match shapes {
+        Shapes::Segments(_) => "lines",
+        Shapes::Patches(_) => "planes",
+        Shapes::Points(_) => "points",
+    };
+    let all = words::thousands(n_records.max(drawn as u64));
+    match drawn as u64 >= n_records {
+        true => format!("{all} {what} drawn"),
+        false => format!("{} of {all} {what} drawn", words::thousands(drawn as u64)),
+    }
+}
+
+/// An axis-aligned box.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SceneBox {
+    /// Smallest corner.
+    pub low: [f32; 3],
+    /// Largest corner.
+    pub high: [f32; 3],
+}
+
+impl SceneBox {
+    /// Returns the box from the 1st to the 99th percentile of each coordinate, widened by a tenth
+    /// of its longest side. Percentiles exclude far outliers, which would shrink the scene to a
+    /// dot.
+    ///
+    /// Ignores non-finite coordinates; without points it starts from the unit cube about the
+    /// origin.
+    pub fn robust(points: &[[f32; 3]]) -> Self {
+        let mut low = [-0.5; 3];
+        let mut high = [0.5; 3];
+        for axis in 0..3 {
+            let mut values: Vec<f32> =
+                points.iter().map(|p| p[axis]).filter(|x| x.is_finite()).collect();
+            if values.is_empty() {
+                continue;
+            }
+            values.sort_unstable_by(f32::total_cmp);
+            let last = values.len() - 1;
+            low[axis] = values[last / 100];
+            high[axis] = values[last - last / 100];
+        }
+        let longest = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f32::max);
+        let margin = if longest > 0.0 { 0.1 * longest } else { 0.5 };
+        for axis in 0..3 {
+            low[axis] -= margin;
+            high[axis] += margin;
+        }
+        Self { low, high }
+    }
+
+    /// Returns the part in the box of the line through `point` along `direction`; `None` if the
+    /// line misses the box or `direction` is zero.
+    pub fn clip_line(&self, point: [f32; 3], direction: [f32; 3]) -> Option<[[f32; 3]; 2]> {
+        self.clip(point, direction, f32::NEG_INFINITY)
+    }
+
+    /// Returns the part in the box of the half-line from `center`, like [`SceneBox::clip_line`].
+    pub fn clip_ray(&self, center: [f32; 3], direction: [f32; 3]) -> Option<[[f32; 3]; 2]> {
+        self.clip(center, direction, 0.0)
+    }
+
+    fn clip(&self, point: [f32; 3], direction: [f32; 3], from: f32) -> Option<[[f32; 3]; 2]> {
+        let (mut near, mut far) = (from, f32::INFINITY);
+        for axis in 0..3 {
+            let (low, high) = (self.low[axis] - point[axis], self.high[axis] - point[axis]);
+            if direction[axis] == 0.0 {
+                if low > 0.0 || high < 0.0 {
+                    return None;
+                }
+                continue;
+            }
+            let (a, b) = (low / direction[axis], high / direction[axis]);
+            near = near.max(a.min(b));
+            far = far.min(a.max(b));
+        }
+        if !near.is_finite() || !far.is_finite() || near >= far {
+            return None;
+        }
+        let at = |t: f32| std::array::from_fn(|axis| point[axis] + t * direction[axis]);
+        Some([at(near), at(far)])
+    }
+
+    /// Returns the rectangle of the plane `coordinate[axis] == offset` in the box; `None` if it is
+    /// outside.
+    pub fn axis_patch(&self, axis: usize, offset: f32) -> Option<[[f32; 3]; 4]> {
+        if !(self.low[axis]..=self.high[axis]).contains(&offset) {
+            return None;
+        }
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        let corner = |a: f32, b: f32| {
+            let mut point = [offset; 3];
+            point[u] = a;
+            point[v] = b;
+            point
+        };
+        Some([
+            corner(self.low[u], self.low[v]),
+            corner(self.high[u], self.low[v]),
+            corner(self.high[u], self.high[v]),
+            corner(self.low[u], self.high[v]),
+        ])
+    }
+}
+
+/// Returns at most `max` of the indices `0..n`, ascending, chosen by a hash of the index and
+/// `seed`. The choice is equal on every machine and independent of the order of a map file.
+pub fn subsample(n: usize, max: usize, seed: u64) -> Vec<usize> {
+    if n <= max {
+        return (0..n).collect();
+    }
+    let mut keyed: Vec<(u64, usize)> = (0..n).map(|i| (mix(seed, i as u64), i)).collect();
+    if max == 0 {
+        return Vec::new();
+    }
+    keyed.select_nth_unstable(max - 1);
+    keyed.truncate(max);
+    let mut indices: Vec<usize> = keyed.into_iter().map(|(_, i)| i).collect();
+    indices.sort_unstable();
+    indices
+}
+
+fn mix(seed: u64, counter: u64) -> u64 {
+    let mut z = seed.wrapping_add(counter.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ (z >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene(n: usize, n_views: usize) -> Scene3d {
+        let originals: Vec<[f32; 3]> =
+            (0..n).map(|i| [i as f32, (i * 7 % 13) as f32, 0.5]).collect();
+        let view = |at: usize| View {
+            scheme: "olc".into(),
+            given: given(at),
+            solver: "consensus".into(),
+            recovered: originals.clone(),
+        };
+        let patch = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        let shapes = Shapes::Patches(vec![patch; n]);
+        let plane = ObfuscationView {
+            scheme: "plane".into(),
+            shapes,
+            n_records: n as u64,
+            withheld: Vec::new(),
+        };
+        Scene3d {
+            cameras: originals.clone(),
+            n_points: n as u64,
+            obfuscations: vec![plane; 7],
+            views: (0..n_views).map(view).collect(),
+            up: None,
+            originals,
+        }
+    }
+
+    fn given(at: usize) -> Given {
+        Given { neighbors: format!("source-{at}"), oracle_noise: None, inlier_ratio: 0.5 }
+    }
+
+    fn row(at: usize) -> Row {
+        let text = r#"{"scheme": "olc", "neighbors": "", "oracle_noise": null, "inlier_ratio": 0.25, "k": 50,
+            "solver": "consensus", "delta": null, "unit": "m", "n_points": 9, "n_lost": 0, "lost": {},
+            "dropped": {}, "recovered_percent": {}, "blind_percent": {}, "axis_accuracy_percent": null,
+            "assignment_accuracy_percent": null, "median_error": null, "error_percentiles": {}}"#;
+        let row: Row = serde_json::from_str(text).expect("a row");
+        Row { neighbors: given(at).neighbors, ..row }
+    }
+
+    #[test]
+    fn the_budget_holds_for_any_number_of_points_and_views() {
+        for (n, n_views) in [(0, 0), (10, 1), (60_000, 7), (20_000, 84), (300, 3_000)] {
+            let rows: Vec<Row> = (0..n_views).map(row).collect();
+            let encoded = encode(&scene(n, n_views), &rows, 0.1);
+            assert_eq!(encoded.views.len(), n_views);
+            let bytes: usize =
+                encoded.blocks.iter().map(|block| block.len() + BYTES_PER_BLOCK).sum();
+            assert!(bytes <= SCENE_BUDGET_BYTES, "{n} points, {n_views} views: {bytes} bytes");
+            assert_eq!(encoded.n_drawn, n.min(points_within_budget(n_views, 7)));
+        }
+        assert!(points_within_budget(42, 7) > 8_000, "a usual audit shows a real cloud");
+        assert_eq!(points_within_budget(usize::MAX / 1_000, 7), 0);
+    }
+
+    #[test]
+    fn views_are_of_rows_whatever_their_measured_ratio() {
+        // The row's ratio is a mean over repeats, that of the view of one run.
+        let encoded = encode(&scene(9, 3), &[row(2), row(0)], 0.1);
+        assert_eq!(encoded.views.iter().map(|view| view.row).collect::<Vec<_>>(), [1, 0]);
+    }
+
+    #[test]
+    fn every_point_is_counted_once() {
+        let mut scene = scene(9, 1);
+        scene.obfuscations[0].scheme = "olc".into();
+        scene.obfuscations[0].withheld = vec![3];
+        scene.views[0].recovered[3] = [f32::NAN; 3];
+        scene.views[0].recovered[4] = [f32::NAN; 3];
+        scene.views[0].recovered[5] = [1e6; 3];
+        let view = &encode(&scene, &[row(0)], 0.1).views[0];
+        assert_eq!(view.drawn, 6);
+        assert_eq!(view.said, "6 of 9 points drawn; 1 not released, 1 lost, 1 outside the box");
+    }
+
+    #[test]
+    fn a_position_survives_to_a_ten_thousandth_of_the_box() {
+        let bounds = SceneBox { low: [-5.0, 0.0, 10.0], high: [5.0, 1.0, 30.0] };
+        let cells = quantize(&bounds, [1.234, 0.5, 12.0]);
+        for (axis, expected) in [1.234, 0.5, 12.0].into_iter().enumerate() {
+            let side = bounds.high[axis] - bounds.low[axis];
+            let found = bounds.low[axis] + f32::from(cells[axis]) / 65534.0 * side;
+            assert!((found - expected).abs() < 1e-4 * side);
+        }
+        assert_eq!(quantize(&bounds, [f32::NAN; 3]), [NOT_DRAWN; 3]);
+        assert_eq!(quantize(&bounds, [9.0, 0.5, 12.0]), [NOT_DRAWN; 3]);
+    }
+
+    #[test]
+    fn errors_are_log_scaled_and_lost_points_stand_apart() {
+        assert_eq!(error_byte(f32::NAN), LOST);
+        assert_eq!(error_byte(1.0), 127);
+        assert_eq!(error_byte(0.0), 0);
+        assert_eq!(error_byte(f32::INFINITY), 254);
+    }
+
+    #[test]
+    fn a_pane_without_points_says_why() {
+        let fate = Fate { lost: 3_895, ..Fate::default() };
+        assert_eq!(fate.said(), "None of 3,895 points drawn; 3,895 lost");
+        assert_eq!(Fate { drawn: 4_000, ..Fate::default() }.said(), "4,000 points drawn");
+    }
+
+    #[test]
+    fn shapes_are_a_sample() {
+        let lines = Shapes::Segments(Vec::new());
+        assert_eq!(shapes_said(&lines, 1_500, 3_895), "1,500 of 3,895 lines drawn");
+        assert_eq!(shapes_said(&lines, 9, 9), "9 lines drawn");
+    }
+
+    const CUBE: SceneBox = SceneBox { low: [-1.0; 3], high: [1.0; 3] };
+
+    #[test]
+    fn a_line_ends_at_the_faces() {
+        let segment = CUBE.clip_line([0.0, 0.5, 0.0], [2.0, 0.0, 0.0]).unwrap();
+        assert_eq!(segment, [[-1.0, 0.5, 0.0], [1.0, 0.5, 0.0]]);
+        assert_eq!(CUBE.clip_line([0.0, 2.0, 0.0], [1.0, 0.0, 0.0]), None);
+        assert_eq!(CUBE.clip_line([0.0; 3], [0.0; 3]), None);
+    }
+
+    #[test]
+    fn a_ray_starts_at_its_center_or_at_a_face() {
+        assert_eq!(CUBE.clip_ray([0.0; 3], [0.0, 0.0, 1.0]).unwrap()[0], [0.0; 3]);
+        assert_eq!(CUBE.clip_ray([0.0, 0.0, -5.0], [0.0, 0.0, 1.0]).unwrap()[0], [0.0, 0.0, -1.0]);
+        assert_eq!(CUBE.clip_ray([0.0, 0.0, 5.0], [0.0, 0.0, 1.0]), None);
+    }
+
+    #[test]
+    fn outliers_do_not_stretch_the_box() {
+        let mut points: Vec<[f32; 3]> = (0..1000).map(|i| [i as f32 / 1000.0; 3]).collect();
+        points.push([1e6, -1e6, f32::NAN]);
+        let scene = SceneBox::robust(&points);
+        assert!(scene.low.iter().all(|&x| (-0.2..0.0).contains(&x)), "{scene:?}");
+        assert!(scene.high.iter().all(|&x| (1.0..1.2).contains(&x)), "{scene:?}");
+    }
+
+    #[test]
+    fn a_subsample_is_deterministic_and_of_the_asked_size() {
+        let chosen = subsample(10_000, 100, 7);
+        assert_eq!(chosen.len(), 100);
+        assert!(chosen.windows(2).all(|pair| pair[0] < pair[1]));
+        assert_eq!(chosen, subsample(10_000, 100, 7));
+        assert_ne!(chosen, subsample(10_000, 100, 8));
+        assert_eq!(subsample(3, 100, 0), [0, 1, 2]);
+        assert!(subsample(3, 0, 0).is_empty());
+    }
+}

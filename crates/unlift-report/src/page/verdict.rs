@@ -1,0 +1,645 @@
+//! The verdict on every scheme by the strongest attack tried: first from the released data alone, then with
+//! known neighbors. The worst scheme comes first. The word "safe" never appears, because an audit shows what
+//! the tried attacks recover, and others may recover more.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::{attack, views, words};
+use crate::attack::{Basis, Given};
+use crate::document::{Bound, BreakEven, Document, LengthUnit, Row};
+use crate::page::{inversions, tables};
+use crate::page::inversions::Inversion;
+
+/// The oracle's headline is its tested inlier ratio nearest to this one.
+const HEADLINE_RATIO: f64 = 0.5;
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Verdict {
+    pub banner: Banner,
+    pub cards: Vec<Card>,
+    pub refusals: Vec<Refusal>,
+    pub steps: Vec<String>,
+}
+
+/// Judges every scheme by its strongest attacks, for the headline threshold.
+pub(crate) fn verdict(document: &Document) -> Verdict {
+    let schemes = tables::schemes(document).into_iter();
+    let mut cards: Vec<Card> = schemes.filter_map(|scheme| card(document, scheme)).collect();
+    // The sort is stable, so equal shares keep the document's order.
+    cards.sort_by(|a, b| {
+        let ((a, a_then), (b, b_then)) = (a.badness(), b.badness());
+        b.total_cmp(&a).then(b_then.total_cmp(&a_then))
+    });
+    let whole = document.not_audited.iter().filter(|refused| refused.neighbors.is_none());
+    let refusals = whole.map(|refused| Refusal {
+        scheme: refused.scheme.clone(),
+        title: words::scheme_title(&refused.scheme),
+        reason: refused.reason.clone(),
+    });
+    let refusals: Vec<Refusal> = refusals.collect();
+    let (banner, steps) = (banner(document, &cards, &refusals), next_steps(document, &cards));
+    Verdict { banner, cards, refusals, steps }
+}
+
+pub(crate) fn share(row: &Row, typed: &str) -> f64 {
+    row.recovered_percent.get(typed).copied().unwrap_or(0.0)
+}
+
+/// Returns the row of `scheme` with the largest share on this basis; for the oracle, among the rows whose
+/// ratio is nearest to [`HEADLINE_RATIO`].
+pub(crate) fn strongest<'a>(document: &'a Document, scheme: &str, basis: Basis) -> Option<&'a Row> {
+    let typed = tables::headline_threshold(document)?;
+    let away = |row: &Row| match basis {
+        Basis::Oracle => (row.inlier_ratio - HEADLINE_RATIO).abs(),
+        Basis::Released | Basis::Given => 0.0,
+    };
+    let rows = document.results.iter().filter(|row| row.scheme == scheme);
+    rows.filter(|row| attack::basis(row) == Some(basis)).min_by(|a, b| {
+        away(a).total_cmp(&away(b)).then(share(b, &typed).total_cmp(&share(a, &typed)))
+    })
+}
+
+/// Returns the row that recovers most of `scheme` within `typed` from these neighborhoods; of equal ones the first.
+pub(crate) fn strongest_given<'a>(
+    document: &'a Document,
+    scheme: &str,
+    given: &Given,
+    typed: &str,
+) -> Option<&'a Row> {
+    let share = |row: &Row| row.recovered_percent.get(typed).copied().unwrap_or(-1.0);
+    let mut best: Option<&Row> = None;
+    for row in &document.results {
+        let is_rival = row.scheme == scheme
+            && attack::basis(row).is_some()
+            && Given::of(row).same_choice(given);
+        if is_rival && best.is_none_or(|best| share(row) > share(best)) {
+            best = Some(row);
+        }
+    }
+    best
+}
+
+/// Returns the strongest row of every source of `scheme`: most recovered first, the oracle last.
+pub(crate) fn by_source<'a>(document: &'a Document, scheme: &str) -> Vec<&'a Row> {
+    let typed = tables::headline_threshold(document).unwrap_or_default();
+    let mut best: BTreeMap<&str, &Row> = BTreeMap::new();
+    for row in document.results.iter().filter(|row| row.scheme == scheme) {
+        if matches!(attack::basis(row), Some(Basis::Released | Basis::Given)) {
+            let so_far = best.entry(&row.neighbors).or_insert(row);
+            if share(row, &typed) > share(so_far, &typed) {
+                *so_far = row;
+            }
+        }
+    }
+    let mut rows: Vec<&Row> = best.into_values().collect();
+    rows.sort_by(|a, b| share(b, &typed).total_cmp(&share(a, &typed)));
+    rows.extend(strongest(document, scheme, Basis::Oracle));
+    rows
+}
+
+/// Returns the percentage by the records alone within `typed`, the best of the scheme's rows, and the attack's
+/// name.
+pub(crate) fn records_alone<'a>(
+    document: &'a Document,
+    scheme: &str,
+    typed: &str,
+) -> Option<(f64, Option<&'a str>)> {
+    let rows = document.results.iter().filter(|row| row.scheme == scheme);
+    let shares = rows.filter_map(|row| {
+        let percent = *row.records_alone_percent.as_ref()?.get(typed)?;
+        let by = row.records_alone_by.as_ref().and_then(|by| by.get(typed));
+        Some((percent, by.map(String::as_str)))
+    });
+    shares.max_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+fn card(document: &Document, scheme: &str) -> Option<Card> {
+    let typed = &tables::headline_threshold(document)?;
+    let alone = records_alone(document, scheme, typed);
+    let blind = |row: &Row| row.blind_percent.get(typed).copied().unwrap_or(0.0);
+    // A baseline that recovers more than the row replaces it.
+    let without = |row: &Row| match alone {
+        Some((percent, by)) if percent >= blind(row) => {
+            (percent, attack::records_alone(by), "records alone".to_owned())
+        }
+        _ => (blind(row), "a blind guess".to_owned(), "a blind guess".to_owned()),
+    };
+    let found = |basis, row: &Row, own: Option<f64>| {
+        let (floor, by, briefly) = without(row);
+        let (recovered, by, briefly) = match own {
+            Some(own) if own >= floor => (own, attack::name(row), attack::briefly(row)),
+            _ => (floor, by, briefly),
+        };
+        let (percent, level) = (words::percent(recovered), Level::of(recovered));
+        Finding { basis, when: when(basis, row), recovered, percent, level, by, briefly, floor }
+    };
+    let of = |basis| {
+        let row = strongest(document, scheme, basis)?;
+        Some(found(basis, row, Some(share(row, typed))))
+    };
+    let any = document.results.iter().find(|row| row.scheme == scheme)?;
+    let mut findings: Vec<Finding> =
+        [Basis::Released, Basis::Given, Basis::Oracle].into_iter().filter_map(of).collect();
+    // Baselines need only the released data, so they are attacks of today.
+    let (floor, ..) = without(any);
+    let tells = alone.is_some() || Level::of(floor) > Level::Gray;
+    if tells && findings.iter().all(|finding| finding.basis != Basis::Released) {
+        findings.insert(0, found(Basis::Released, any, None));
+    }
+    if findings.is_empty() {
+        return None;
+    }
+    let has_today = findings.iter().any(|finding| finding.basis == Basis::Released);
+    let refused = document.not_audited.iter().filter(|refused| refused.scheme == scheme);
+    let refused = refused.filter_map(|refused| {
+        let source = attack::plain_source(refused.neighbors.as_deref()?, None);
+        Some(format!("Not tried with {source}: {}.", refused.reason.trim_end_matches('.')))
+    });
+    let points = words::points(any.unit);
+    Some(Card {
+        scheme: scheme.to_owned(),
+        title: words::scheme_title(scheme),
+        rule: words::scheme_rule(scheme),
+        findings,
+        baselines: bearings_sentence(document, scheme)
+            .into_iter()
+            .chain([baselines(document, scheme, typed, alone)])
+            .collect::<Vec<_>>()
+            .join(" "),
+        break_even: lowest(document, scheme, typed).map(|point| break_even(point, points)),
+        untried_today: !has_today,
+        refused: refused.collect(),
+    })
+}
+
+fn when(basis: Basis, row: &Row) -> String {
+    match basis {
+        Basis::Released if attack::queries(&row.neighbors).is_some() => {
+            "Today, from released queries and their poses".to_owned()
+        }
+        Basis::Released if attack::is_again(&row.neighbors) => {
+            "Today, from two releases of the map".to_owned()
+        }
+        Basis::Released => "Today, from the released data alone".to_owned(),
+        Basis::Given => "With neighbors from a given file".to_owned(),
+        Basis::Oracle if attack::queries(&row.neighbors).is_some() => {
+            "With links by the tracks of the model alone".to_owned()
+        }
+        Basis::Oracle => words::capital(&words::if_known(row.inlier_ratio)),
+    }
+}
+
+/// Returns what the two baselines recover, and what lists of neighbors add to the larger one: "A blind guess recovers
+/// 8.1 %, the released records alone 65.2 %. Lists of neighbors add 21.3 percentage points (by descriptor
+/// overlap)."
+fn baselines(
+    document: &Document,
+    scheme: &str,
+    typed: &str,
+    alone: Option<(f64, Option<&str>)>,
+) -> String {
+    let rows = document.results.iter().filter(|row| row.scheme == scheme);
+    let blind = rows.filter_map(|row| row.blind_percent.get(typed).copied());
+    let blind = blind.max_by(f64::total_cmp).unwrap_or(0.0);
+    let guess = format!("A blind guess recovers {} %", words::percent(blind));
+    let (without, floor) = match alone {
+        Some((percent, _)) => {
+            let records = words::percent(percent);
+            (format!("{guess}, the released records alone {records} %."), percent.max(blind))
+        }
+        None => (format!("{guess}."), blind),
+    };
+    let adds: Vec<String> = by_source(document, scheme)
+        .into_iter()
+        // Solvers without neighborhoods do not show what lists add.
+        .filter(|row| attack::has_neighborhoods(row) && !attack::intersects(&row.neighbors))
+        .map(|row| {
+            let source = attack::plain_source(&row.neighbors, row.oracle_noise.as_deref());
+            let source = source.trim_start_matches("neighbors ");
+            format!("{} ({source})", added(share(row, typed) - floor))
+        })
+        .collect();
+    match adds.is_empty() {
+        true => without,
+        false => format!("{without} Lists of neighbors add {}.", words::list(&adds)),
+    }
+}
+
+/// Returns a gain over a baseline in words; `nothing` only if it is not positive.
+fn added(gain: f64) -> String {
+    match gain {
+        0.05.. => format!("{} percentage points", words::percent(gain)),
+        _ if gain > 0.0 => "less than 0.1 percentage points".to_owned(),
+        _ => "nothing".to_owned(),
+    }
+}
+
+fn lowest<'a>(document: &'a Document, scheme: &str, typed: &str) -> Option<&'a BreakEven> {
+    let rank = |point: &BreakEven| match (point.bound, point.inlier_ratio) {
+        (Bound::BelowTested, ratio) => (0, ratio.unwrap_or(0.0)),
+        (Bound::Interpolated, ratio) => (1, ratio.unwrap_or(1.0)),
+        (Bound::AboveTested, ratio) => (2, ratio.unwrap_or(1.0)),
+    };
+    let of = |point: &&BreakEven| point.scheme == scheme && point.threshold == typed;
+    document.break_even.iter().filter(of).min_by(|a, b| {
+        let ((a, a_ratio), (b, b_ratio)) = (rank(a), rank(b));
+        a.cmp(&b).then(a_ratio.total_cmp(&b_ratio))
+    })
+}
+
+fn break_even(point: &BreakEven, points: &str) -> String {
+    match (point.bound, point.inlier_ratio.map(words::ratio_percent)) {
+        (Bound::Interpolated, Some(ratio)) => {
+            format!(
+                "Half of the {points} come back as soon as {ratio} % of the neighbors are right."
+            )
+        }
+        (Bound::BelowTested, Some(ratio)) => {
+            format!(
+                "Half of the {points} come back even when only {ratio} % of the neighbors are right, the smallest share tested."
+            )
+        }
+        (Bound::AboveTested, Some(ratio)) => {
+            format!(
+                "Less than half of the {points} came back, even with {ratio} % of the neighbors right, the largest share tested."
+            )
+        }
+        (_, None) => {
+            format!(
+                "Less than half of the {points} came back at every tested share of right neighbors."
+            )
+        }
+    }
+}
+
+/// The severity of a share of recovered points. It alone decides colors on the page.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Level {
+    /// Less than a fifth came back. There is no green, because another attack may recover more.
+    Gray,
+    /// A fifth or more came back.
+    Orange,
+    /// Half or more came back.
+    Red,
+}
+
+impl Level {
+    pub(crate) fn of(percent: f64) -> Self {
+        match percent {
+            50.0.. => Self::Red,
+            20.0.. => Self::Orange,
+            _ => Self::Gray,
+        }
+    }
+}
+
+/// The verdict on one scheme.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Card {
+    pub scheme: String,
+    pub title: String,
+    pub rule: &'static str,
+    /// One finding per kind of attack that ran: from released data alone, with given lists, with known
+    /// neighbors.
+    pub findings: Vec<Finding>,
+    pub baselines: String,
+    pub break_even: Option<String>,
+    /// Whether no attack from the released data alone was tried on this scheme.
+    pub untried_today: bool,
+    /// A sentence per source that could not be tried on the scheme, with the reason.
+    pub refused: Vec<String>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Finding {
+    #[serde(skip)]
+    pub basis: Basis,
+    /// "Today, from the released data alone".
+    pub when: String,
+    pub recovered: f64,
+    pub percent: String,
+    pub level: Level,
+    /// The attack: "neighbors by descriptor overlap, 35 listed, 11 % of them right, solver joint".
+    pub by: String,
+    #[serde(skip)]
+    pub briefly: String,
+    pub floor: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Refusal {
+    pub scheme: String,
+    pub title: String,
+    pub reason: String,
+}
+
+impl Card {
+    pub(crate) fn finding(&self, basis: Basis) -> Option<&Finding> {
+        self.findings.iter().find(|finding| finding.basis == basis)
+    }
+
+    /// Returns the percentage recovered from the released data alone; `None` if that was not tried.
+    pub(crate) fn today(&self) -> Option<f64> {
+        self.finding(Basis::Released).map(|finding| finding.recovered)
+    }
+
+    /// Returns the sort key of a card: the share from released data alone, then the larger other share;
+    /// -1 if not tried.
+    pub(crate) fn badness(&self) -> (f64, f64) {
+        let share = |basis| self.finding(basis).map_or(-1.0, |finding| finding.recovered);
+        (share(Basis::Released), share(Basis::Oracle).max(share(Basis::Given)))
+    }
+}
+
+/// The verdict on a whole audit in a few lines.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Banner {
+    pub level: Level,
+    /// "Not protected."
+    pub headline: String,
+    /// What the strongest attack recovers, and from which data.
+    pub sentence: String,
+    /// What known neighbors would give away under every scheme, so that schemes not named above do not look
+    /// fine.
+    pub every: Option<String>,
+    pub unknown: Option<String>,
+}
+
+pub(crate) fn banner(document: &Document, cards: &[Card], refusals: &[Refusal]) -> Banner {
+    let names: Vec<String> = refusals.iter().map(|one| one.scheme.to_uppercase()).collect();
+    let unknown = (!refusals.is_empty())
+        .then(|| format!("Not audited, so nothing is known: {}.", words::list(&names)));
+    let today = worst(cards, Basis::Released);
+    let known = worst(cards, Basis::Given).or_else(|| worst(cards, Basis::Oracle));
+    // The model may have fewer tracks than an attacker finds links.
+    let every = every(cards).filter(|_| !views::is_sequence(document));
+    let (level, headline, sentence) = match (today, known) {
+        (Some(found), _) => {
+            let level = Level::of(found.1.recovered);
+            (level, headline(level, cards), attack_sentence(document, found))
+        }
+        // An untested attack may succeed, so known neighbors decide the color.
+        (None, Some(found)) => {
+            let level = Level::of(found.1.recovered).min(Level::Orange);
+            let headline = "Not tested: what an attacker recovers from the released data alone.";
+            (level, headline.to_owned(), attack_sentence(document, found))
+        }
+        (None, None) => {
+            let nothing = "Nothing is known about this protection.";
+            (Level::Gray, "No scheme was tested.".to_owned(), nothing.to_owned())
+        }
+    };
+    let bearings = cards.iter().find_map(|card| bearings_sentence(document, &card.scheme));
+    let (level, headline) = match level {
+        // Few recovered points do not mean that little is seen.
+        Level::Gray if bearings.is_some() => {
+            (Level::Orange, "Bearings of points are published.".to_owned())
+        }
+        level => (level, headline),
+    };
+    let sentence = bearings.into_iter().chain([sentence]).collect::<Vec<_>>().join(" ");
+    Banner { level, headline, sentence, every, unknown }
+}
+
+/// Returns a sentence on what every scheme would give back with known neighbors, if several were tried so.
+fn every(cards: &[Card]) -> Option<String> {
+    let known: Option<Vec<&Finding>> =
+        cards.iter().map(|card| card.finding(Basis::Oracle)).collect();
+    let known = known.filter(|known| known.len() > 1)?;
+    let least = known.into_iter().reduce(|a, b| if b.recovered < a.recovered { b } else { a })?;
+    let (when, percent) = (&least.when, &least.percent);
+    Some(format!("{when}, every scheme tried would give back {percent} % or more."))
+}
+
+fn worst(cards: &[Card], basis: Basis) -> Option<(&Card, &Finding)> {
+    let found = cards.iter().filter_map(|card| Some((card, card.finding(basis)?)));
+    found.reduce(|a, b| if b.1.recovered > a.1.recovered { b } else { a })
+}
+
+fn headline(level: Level, cards: &[Card]) -> String {
+    let at_level = |card: &&Card| card.today().is_some_and(|percent| Level::of(percent) >= level);
+    let (n, of) = (cards.iter().filter(at_level).count(), cards.len());
+    let under = match (n, of) {
+        (_, 1) => String::new(),
+        (2, 2) => " under either scheme".to_owned(),
+        (n, of) if n == of => format!(" under any of the {of} schemes"),
+        (n, of) => format!(" under {n} of {of} schemes"),
+    };
+    match level {
+        Level::Red => format!("Not protected{under}."),
+        Level::Orange => format!("Badly protected{under}."),
+        Level::Gray => "No attack tried here recovers much.".to_owned(),
+    }
+}
+
+fn attack_sentence(document: &Document, (card, finding): (&Card, &Finding)) -> String {
+    let typed = tables::headline_threshold(document).unwrap_or_default();
+    let unit = document.results.first().map_or(LengthUnit::Meter, |row| row.unit);
+    let of = match unit {
+        LengthUnit::Pixel => "the keypoints of these images",
+        LengthUnit::Meter | LengthUnit::KthNeighbor => "the points of this map",
+    };
+    let what = format!("{} % of {of} {}", finding.percent, words::within(&typed, unit));
+    let by = format!("{}, {}", card.scheme.to_uppercase(), finding.briefly);
+    match finding.basis {
+        Basis::Released => {
+            let from = finding.when.trim_start_matches("Today, ");
+            format!("An attacker recovers {what} today, {from} ({by}).")
+        }
+        Basis::Given => format!("An attacker recovers {what} with given neighbors ({by})."),
+        Basis::Oracle => {
+            let known = finding.when.to_lowercase();
+            format!("An attacker would recover {what} {known} ({by}).")
+        }
+    }
+}
+
+const BY_DESCRIPTORS: [&str; 4] = ["similarity", "overlap", "descriptors", "learned"];
+
+/// Returns the next steps, the most urgent first. Options of the command line are in back quotes.
+pub(crate) fn next_steps(document: &Document, cards: &[Card]) -> Vec<String> {
+    let images = document.results.first().is_some_and(|row| row.unit == LengthUnit::Pixel);
+    let tried = |name: &str| document.results.iter().any(|row| row.neighbors.contains(name));
+    let with_descriptors = BY_DESCRIPTORS.iter().any(|name| tried(name));
+    let has_file = document.options.get("descriptors").is_some_and(|given| !given.is_null());
+    let mut steps = Vec::new();
+    if views::is_sequence(document) {
+        if !document.results.iter().any(views::uses_lists) {
+            steps.push(
+                "Try the stronger attack: add `--neighbors descriptors`, which also uses lists of \
+                 neighbors within each query."
+                    .to_owned(),
+            );
+        }
+        steps.push(
+            "Mitigate and measure again: send fewer queries, or withhold the pose. Fewer views of \
+             a point give an attacker less to work with."
+                .to_owned(),
+        );
+        steps.extend(views::sequence_sentences(document));
+        return steps;
+    }
+    if views::is_again(document) {
+        steps.push(
+            "Publish a map once. To publish a new version, hide new and changed points only, and \
+             keep the records of the others."
+                .to_owned(),
+        );
+        steps.extend(views::again_sentences(document));
+        return steps;
+    }
+    if !with_descriptors {
+        let options = match images || has_file {
+            true => "`--neighbors descriptors`",
+            false => "`--descriptors FILE --neighbors descriptors`",
+        };
+        steps.push(format!(
+            "Try the stronger attack: add {options}. Descriptors show an attacker which {} are \
+             neighbors, and no attack here used them.",
+            if images { "keypoints" } else { "points" }
+        ));
+    } else if !tried("learned") && !tried("descriptors") {
+        steps.push(
+            "Try the stronger attack: add `--neighbors learned`, a network that finds neighbors \
+             from SIFT or ALIKED descriptors."
+                .to_owned(),
+        );
+    }
+    steps.extend(least(document, cards));
+    if with_descriptors && !document.results.iter().any(has_pictures) {
+        steps.push("See what an attacker sees: add `--invert` and the photos.".to_owned());
+    }
+    if images {
+        steps.push("Mitigate and measure again: extract fewer keypoints.".to_owned());
+    } else if document.options.get("mitigate").is_none() {
+        let drop = if has_file { " or `--mitigate drop:0.5`" } else { "" };
+        let localizes =
+            !document.localization.is_empty() && !document.options.contains_key("hold_out");
+        let cost = if localizes { ", and `--localize PHOTOS` to see what that costs" } else { "" };
+        steps.push(format!("Mitigate and measure again: add `--mitigate thin:1/4`{drop}{cost}."));
+    }
+    if document.gates.is_empty() {
+        let typed = tables::headline_threshold(document).unwrap_or_default();
+        let half = |row: &Row| row.neighbors == "oracle" && row.inlier_ratio == 0.5;
+        let ratio = if document.results.iter().any(half) { "@0.5" } else { "" };
+        steps.push(format!(
+            "Test it in your build: `--gate 'all{ratio}:{typed}<=20'` fails if more than 20 % \
+             comes back."
+        ));
+    }
+    steps
+}
+
+fn has_pictures(row: &Row) -> bool {
+    row.metrics.contains_key("ssim")
+}
+
+/// Returns which scheme leaks least. Schemes that publish bearings do not count: what they show is not the points that came back.
+fn least(document: &Document, cards: &[Card]) -> Option<String> {
+    let hides = |card: &&Card| bearings_sentence(document, &card.scheme).is_none();
+    let cards: Vec<&Card> = cards.iter().filter(hides).collect();
+    let share = |card: &Card| card.today().or(card.finding(Basis::Oracle).map(|f| f.recovered));
+    let known = cards.iter().filter(|card| card.today().is_some()).count();
+    let comparable = cards.iter().filter(|card| known == 0 || card.today().is_some());
+    let card = comparable.copied().reduce(|a, b| if share(b) < share(a) { b } else { a })?;
+    if cards.len() < 2 {
+        return None;
+    }
+    let shares: Vec<String> = [Basis::Released, Basis::Oracle]
+        .iter()
+        .filter_map(|&basis| card.finding(basis))
+        .map(|found| match found.basis {
+            Basis::Released => format!("{} % today", found.percent),
+            _ => format!("{} % {}", found.percent, found.when.to_lowercase()),
+        })
+        .collect();
+    let name = card.scheme.to_uppercase();
+    let cost =
+        document.localization.iter().find(|one| one.scheme == card.scheme && !one.of_queries);
+    let cost = cost.filter(|one| !one.is_unknown()).map(|one| match one.cost() {
+        Some(cost) => {
+            let times = words::significant(cost, 3);
+            format!(" Its localization error is {times} times the unprotected one.")
+        }
+        None => " Most cameras cannot be placed with it.".to_owned(),
+    });
+    let cost = cost.unwrap_or_default();
+    Some(format!("Of the schemes tried, {name} leaks least: {}.{cost}", shares.join(", ")))
+}
+
+/// Returns what a scheme that publishes bearings shows; `None` for others. Recovered points say nothing about it: all bearings
+/// meet in the center, so no attack finds ranges, but directions are released as they are.
+pub(crate) fn bearings_sentence(document: &Document, scheme: &str) -> Option<String> {
+    let rows = document.results.iter().filter(|row| row.scheme == scheme);
+    let of = |name: &str| {
+        let values = rows.clone().filter_map(|row| row.metrics.get(name).copied());
+        values.max_by(f64::total_cmp)
+    };
+    let real = words::percent(of("real_bearings_percent")?);
+    let name = scheme.to_uppercase();
+    let text = format!(
+        "{name} publishes bearings: whoever stands in the center sees the scene. {real} % of the bearings are real"
+    );
+    Some(match of("decoys_area") {
+        Some(area) => {
+            let order = words::percent(100.0 * area);
+            format!(
+                "{text}; by descriptors, an attacker tells a decoy from a real bearing in {order} % of pairs (50 % would be chance)."
+            )
+        }
+        None => format!("{text}."),
+    })
+}
+
+/// The share of one scheme recovered within the headline threshold by the strongest attacks tried.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shares {
+    /// The scheme's user-facing name.
+    pub scheme: String,
+    /// The scheme's title.
+    pub title: String,
+    /// Percent from the released data alone; `None` if no such attack was tried.
+    pub today: Option<f64>,
+    /// Percent with known neighbors, at the tested inlier ratio nearest to one half; `None` without an
+    /// oracle.
+    pub known: Option<f64>,
+    /// How many pictures can be rebuilt from the released data alone; `None` if no picture was painted.
+    pub pictures: Option<String>,
+}
+
+/// Returns the shares of every scheme, the worst first, as at the top of the page.
+pub fn shares(document: &Document, inversions: &[Inversion]) -> Vec<Shares> {
+    let of = |card: Card| Shares {
+        today: card.today(),
+        known: card.finding(Basis::Oracle).map(|finding| finding.recovered),
+        pictures: inversions::pictures_said(document, inversions, &card.scheme),
+        scheme: card.scheme,
+        title: card.title,
+    };
+    verdict(document).cards.into_iter().map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_added_only_where_nothing_is() {
+        for gain in (-10_000..=10_000).map(|hundredth| f64::from(hundredth) / 100.0) {
+            assert_eq!(added(gain) == "nothing", gain <= 0.0, "{gain}");
+        }
+        assert_eq!(added(0.04), "less than 0.1 percentage points");
+        assert_eq!(added(87.99), "88.0 percentage points");
+    }
+
+    #[test]
+    fn levels_rise_with_the_share() {
+        let levels = [0.0, 19.99, 20.0, 49.99, 50.0, 100.0].map(Level::of);
+        let [gray, orange, red] = [Level::Gray, Level::Orange, Level::Red];
+        assert_eq!(levels, [gray, gray, orange, orange, red, red]);
+        assert!(levels.is_sorted());
+    }
+}
