@@ -2,12 +2,8 @@
 
 import json
 import os
-import pathlib
 import shutil
-import signal
 import subprocess
-import threading
-import time
 
 import numpy as np
 import pytest
@@ -15,7 +11,6 @@ import pytest
 import unlift
 
 PROGRAM = os.environ.get("UNLIFT_PROGRAM") or shutil.which("unlift")
-SHARED = pathlib.Path(__file__).parents[4] / "shared" / "data" / "redkitchen"
 
 
 @pytest.fixture
@@ -62,20 +57,6 @@ def test_figures_are_those_of_the_command_line(points, tmp_path):
     )
     assert read.document["input"]["sha256"] == cli["input"]["sha256"]
     assert figures(read.document) == figures(cli)
-
-
-@pytest.mark.skipif(PROGRAM is None or not SHARED.exists(), reason="the command line or the scene is not here")
-def test_a_real_scene_from_arrays_gives_the_same_rows(tmp_path):
-    model = tmp_path / "model"
-    line = [PROGRAM, "audit", "map", SHARED / "model", "--descriptors", SHARED / "descriptors.bin", "--scale", "1", "--max-points", "5000"]
-    line += "--schemes ppl --neighbors overlap --solver consensus --quiet --out".split() + [tmp_path / "cli"]
-    subprocess.run(line, check=True, capture_output=True)
-    cli = json.loads((tmp_path / "cli" / "audit.json").read_text())
-    whole = unlift.read(SHARED / "model", descriptors=SHARED / "descriptors.bin", scale=1.0)
-    arrays = unlift.Map(whole.positions, whole.descriptors, scale=1.0, max_points=5000)
-    report = unlift.audit(arrays, ["ppl"], ["overlap"], solvers=["consensus"])
-    assert json.dumps(report.document["results"]) == json.dumps(cli["results"])
-    assert not model.exists()
 
 
 def test_a_scheme_is_a_function(small):
@@ -196,15 +177,6 @@ def test_what_a_function_raises_is_the_cause(small):
         cheap(small, [careless])
 
 
-def test_a_scheme_of_ones_own_that_fails_is_told_when_the_audit_returns(small):
-    def broken(points):
-        raise KeyError("mine")
-
-    with pytest.warns(UserWarning, match="broken was not audited: .*mine"):
-        report = cheap(small, ["olc", broken], gates=["all:0.10<=100"])
-    assert report.rows["scheme"] == ["olc"] and not report.passed
-
-
 def test_progress_is_told_and_may_stop(small):
     told = []
     cheap(small, ["olc", "cp"], progress=lambda done, total, what: told.append((done, total, what)))
@@ -216,19 +188,6 @@ def test_progress_is_told_and_may_stop(small):
 
     with pytest.raises(RuntimeError, match="enough"):
         cheap(small, ["olc", "cp"], progress=stop)
-
-
-def test_an_interrupt_ends_the_wait_within_a_second():
-    points = np.random.default_rng(1).uniform(0, 9, (60_000, 3))
-    large = unlift.Map(points, scale=1.0)
-    # Background processes of a shell ignore interrupts from their start.
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    started = time.monotonic()
-    timer = threading.Timer(1.0, lambda: os.kill(os.getpid(), signal.SIGINT))
-    timer.start()
-    with pytest.raises(KeyboardInterrupt):
-        unlift.audit(large)
-    assert time.monotonic() - started < 30
 
 
 def test_reports_are_saved_and_tables_read_by_others(small, tmp_path):

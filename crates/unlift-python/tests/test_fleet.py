@@ -41,11 +41,6 @@ def test_rows_are_those_of_single_audits(tmp_path: pathlib.Path):
             assert row["error"] is None
 
 
-def test_batches_change_nothing(tmp_path: pathlib.Path):
-    tasks = pa.table({"path": maps(tmp_path), "scale": [1.0] * 3})
-    assert rows(tasks, 1).equals(rows(tasks, 3, threads=1))
-
-
 def test_a_map_that_cannot_be_read_is_one_row(tmp_path: pathlib.Path):
     (tmp_path / "broken.npy").write_bytes(b"no map")
     paths = [*maps(tmp_path, 1), str(tmp_path / "missing.ply"), str(tmp_path / "broken.npy"), None]
@@ -53,11 +48,6 @@ def test_a_map_that_cannot_be_read_is_one_row(tmp_path: pathlib.Path):
     assert [row["error"] is None for row in found] == [True] * 4 + [False] * 3
     assert found[4]["error"].endswith("missing.ply: expected a file or folder, found nothing")
     assert found[6]["error"] == "path: expected a file or folder, found null"
-
-
-def test_a_table_without_paths_is_refused():
-    with pytest.raises(unlift.UnliftError, match="expected a column path, found name"):
-        list(unlift.fleet.audit_maps(pa.table({"name": ["a"]}).to_batches()))
 
 
 def images(n: int = 4) -> "pa.Table":

@@ -52,16 +52,6 @@ def test_records_go_through_the_points_they_hide(points):
     assert unlift.obfuscate(m, "olc").released.fingerprint != released.fingerprint
 
 
-def test_an_oracle_knows_the_true_neighbors(described):
-    hidden = unlift.obfuscate(described, "olc", seed=1)
-    lists = unlift.neighbors.oracle(hidden, 1.0, k=10)
-    points = hidden.truth.positions[hidden.truth.hidden]
-    for slot in [0, 17, 599]:
-        near = np.argsort(np.linalg.norm(points - points[slot], axis=1))[1:11]
-        found = lists.records[lists.offsets[slot] : lists.offsets[slot + 1]]
-        assert set(found.tolist()) == set(near.tolist())
-
-
 def test_what_comes_back_is_where_it_was(described, tmp_path):
     hidden = unlift.obfuscate(described, "ppl", seed=1)
     lists = unlift.neighbors.overlap(hidden)
@@ -100,14 +90,11 @@ def test_errors_are_those_of_numpy(described):
     "wrong, said",
     [
         (lambda p: unlift.Map(p[:, :2]), r"positions: expected an array of shape \(n, 3\), found \(600, 2\)"),
-        (lambda p: unlift.Map(p.astype("U")), "positions: expected an array of numbers, found one of <U"),
         (lambda p: unlift.Map(p, p[:5].astype("f4"), scale=1), "descriptors: expected 600 rows, one per point, found 5"),
         (lambda p: unlift.Map(p, np.zeros((600, 4), int), scale=1), "descriptors: expected an array of uint8 or floats, found one of int64"),
         (lambda p: unlift.Map(p, scale=-1), "scale: expected a number above 0, found -1"),
         (lambda p: unlift.Map(p[:9], scale=1), "points: expected at least 51"),
-        (lambda p: unlift.Map(np.full((60, 3), np.nan), scale=1), "expected"),
         (lambda p: unlift.read("no such map"), "no such map: expected"),
-        (lambda p: unlift.obfuscate(unlift.Map(p), "pppl"), "scheme: expected one of olc"),
         (lambda p: unlift.obfuscate(unlift.Map(p), "cp2d"), "scheme: expected one that is defined on maps, found cp2d"),
         (lambda p: unlift.neighbors.overlap(unlift.obfuscate(unlift.Map(p), "olc")), "descriptors: expected some"),
     ],

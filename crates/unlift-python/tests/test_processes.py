@@ -19,7 +19,7 @@ def use():
     waves = np.sin(points @ np.random.default_rng(8).uniform(-2, 2, (3, 128)))
     path = f"{PATH}.{os.getpid()}.npy"
     np.save(path, points)
-    unlift.read(path, scale=1.0, outlier_filter=(20, 2.0))
+    unlift.read(path, scale=1.0)
     m = unlift.Map(points, (60 + 55 * waves).astype(np.uint8))
     hidden = unlift.obfuscate(m, "ppl", seed=1)
     lists = unlift.neighbors.oracle(hidden, 0.5, k=20)
@@ -101,21 +101,6 @@ with fork.Pool(1) as pool:
     assert out == f"300\n300\n{expected}\n", err
 
 
-@pytest.mark.skipif(not pathlib.Path("/proc/self/task").exists(), reason="nothing tells the threads")
-def test_no_thread_is_left_behind(tmp_path):
-    code = USE + """
-import time
-before = len(os.listdir("/proc/self/task"))
-use()
-until = time.monotonic() + 20
-while len(os.listdir("/proc/self/task")) > before and time.monotonic() < until:
-    time.sleep(0.05)
-print(len(os.listdir("/proc/self/task")) - before)
-"""
-    out, err = ended(python(tmp_path, code), 150)
-    assert out == "0\n", err
-
-
 SLOW = """
 import sys, time
 import numpy as np, unlift
@@ -134,8 +119,7 @@ else:
 """
 
 
-@pytest.mark.parametrize("what", ["audit", "obfuscate", "check_scheme"])
-@pytest.mark.parametrize("body", ["while True: pass", "time.sleep(2)"])
+@pytest.mark.parametrize("what, body", [("audit", "while True: pass"), ("obfuscate", "time.sleep(2)"), ("check_scheme", "while True: pass")])
 def test_an_interrupt_in_a_function_ends_the_process_in_order(tmp_path, what, body):
     process = python(tmp_path, SLOW.format(body=body), what)
     assert process.stdout.readline() == "called\n"
@@ -149,34 +133,6 @@ def test_an_interrupt_in_a_function_ends_the_process_in_order(tmp_path, what, bo
     assert out == "", "no function is called again"
 
 
-def test_an_interrupt_ends_the_function_of_a_session_that_goes_on(tmp_path):
-    code = """
-import time
-import numpy as np, unlift
-
-n = 0
-
-def slow(points):
-    global n
-    print("called", flush=True)
-    while True:
-        n += 1
-
-try:
-    unlift.audit(unlift.Map(np.random.default_rng(1).uniform(0, 4, (300, 3)), scale=1.0), [slow, "olc"])
-except KeyboardInterrupt:
-    time.sleep(1)
-    before = n
-    time.sleep(0.5)
-    print(n == before, flush=True)
-"""
-    process = python(tmp_path, code)
-    assert process.stdout.readline() == "called\n"
-    process.send_signal(signal.SIGINT)
-    out, err = ended(process, 60)
-    assert out == "True\n" and process.returncode == 0, err
-
-
 def test_a_second_interrupt_waits_for_no_function(tmp_path):
     process = python(tmp_path, SLOW.format(body="time.sleep(30)"), "audit")
     assert process.stdout.readline() == "called\n"
@@ -188,25 +144,6 @@ def test_a_second_interrupt_waits_for_no_function(tmp_path):
     assert "KeyboardInterrupt" in err and process.returncode == -signal.SIGINT and time.monotonic() - started < 5, err
 
 
-def test_an_interrupt_ends_obfuscate(tmp_path):
-    code = """
-import time
-import numpy as np, unlift
-m = unlift.Map(np.random.default_rng(1).uniform(0, 4, (1_500_000, 3)), scale=1.0)
-print("ready", flush=True)
-unlift.obfuscate(m, "ppl+", seed=1)
-print("done", flush=True)
-"""
-    process = python(tmp_path, code)
-    assert process.stdout.readline() == "ready\n"
-    started = time.monotonic()
-    time.sleep(0.3)
-    process.send_signal(signal.SIGINT)
-    out, err = ended(process, 120)
-    assert "KeyboardInterrupt" in err and out == "", err
-    assert time.monotonic() - started < 5
-
-
 IMAGES = """
 import numpy as np, unlift
 
@@ -214,24 +151,6 @@ def image(at):
     keypoints = np.random.default_rng(at).uniform(0, [1599, 1199], (4000, 2))
     return {"keypoints": keypoints, "width": 1600, "height": 1200}
 """
-
-
-def test_an_interrupt_ends_an_audit_of_images_within_a_second(tmp_path):
-    code = IMAGES + """
-images = {f"{at:03}": image(at) for at in range(200)}
-unlift.audit_images(images, progress=lambda done, total, what: print(done, flush=True))
-"""
-    process = python(tmp_path, code)
-    assert process.stdout.readline() == "0\n"
-    time.sleep(0.5)
-    started = time.monotonic()
-    process.send_signal(signal.SIGINT)
-    # The interpreter ends after the wait.
-    process.stdout.read()
-    assert time.monotonic() - started < 5
-    _, err = ended(process, 60)
-    assert err.rstrip().endswith("KeyboardInterrupt") and "panicked" not in err, err
-    assert process.returncode == -signal.SIGINT
 
 
 def test_an_interrupt_ends_the_function_that_looks_up_images(tmp_path):
@@ -258,20 +177,3 @@ unlift.audit_images(Slow())
     _, err = ended(process, 60)
     assert err.rstrip().endswith("KeyboardInterrupt") and "panicked" not in err, err
     assert process.returncode == -signal.SIGINT and time.monotonic() - started < 8
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
-def test_a_forked_child_audits_images_as_its_parent_does(tmp_path):
-    code = IMAGES + """
-import multiprocessing
-
-def use():
-    images = {"a": image(1), "b": image(2)}
-    return unlift.audit_images(images, "lines2d", inlier_ratios=[0.5], solvers="consensus").rows["recovered_percent_within_5"]
-
-first = use()
-with multiprocessing.get_context("fork").Pool(1) as pool:
-    print(pool.apply_async(use).get(timeout=60) == first)
-"""
-    out, err = ended(python(tmp_path, code), 150)
-    assert out == "True\n", err

@@ -74,25 +74,6 @@ def test_a_cluster_gives_the_rows_of_one_machine(spark, tmp_path: pathlib.Path):
     assert on(spark, rows) == sorted(alone(rows), key=lambda row: row["item"])
 
 
-def test_images_on_a_cluster_give_the_rows_of_one_machine(spark):
-    random = np.random.default_rng(1)
-    rows = [
-        (f"{at}.jpg", random.uniform(0, (319, 239), (60 + at, 2)).reshape(-1).tolist(), random.bytes((60 + at) * 8), 320, 240)
-        for at in range(20)
-    ]
-    rows.append(("odd.jpg", [1.0], None, 320, 240))
-    columns = "name string, keypoints array<float>, descriptors binary, width int, height int"
-    options = {"schemes": ["lines2d"], "neighbors": ["similarity"], "k": 10}
-    frame = spark.createDataFrame(rows, columns).repartition(4)
-    found = [row.asDict() for row in unlift.spark.audit_images(frame, **options).collect()]
-    table = pa.Table.from_pylist([dict(zip(("name", "keypoints", "descriptors", "width", "height"), row)) for row in rows])
-    batches = list(unlift.fleet.audit_images(table.to_batches(), threads=1, **options))
-    expected = [{**row, **of_maps(row)} for row in pa.Table.from_batches(batches).to_pylist()]
-    assert sorted(found, key=lambda row: (row["item"], row["solver"] or "")) == sorted(
-        expected, key=lambda row: (row["item"], row["solver"] or "")
-    )
-
-
 def test_tiles_are_those_of_one_machine_though_an_executor_is_killed(spark, tmp_path: pathlib.Path):
     points, each = np.random.default_rng(1).uniform(0, (20, 10, 4), (N_MAPS * 6000, 3)), 6000
     np.save(tmp_path / "city.npy", points)

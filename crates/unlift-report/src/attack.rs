@@ -1,7 +1,7 @@
 //! The lists of neighbors behind an attack: their source and quality, or none at all.
 
-use crate::words;
 use crate::document::Row;
+use crate::words;
 
 /// A kind of neighborhoods (lists of neighbors): their source and quality.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -1,9 +1,9 @@
 //! Results from several releases of the same points: queries with known poses, and a map that was released twice.
 
-use crate::{attack, words};
 use crate::document::{Document, LengthUnit, Row};
 use crate::page::tables;
 use crate::words::align;
+use crate::{attack, words};
 
 /// Returns whether the document is of a sequence.
 pub(crate) fn is_sequence(document: &Document) -> bool {

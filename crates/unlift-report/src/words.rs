@@ -256,26 +256,4 @@ mod tests {
         assert_eq!(within("0.10", LengthUnit::Meter), "within 10 cm");
         assert_eq!(within("10", LengthUnit::Pixel), "within 10 px");
     }
-
-    #[test]
-    fn ratios_read_as_words_or_percent() {
-        assert_eq!(if_known(0.5), "if half of the neighbors were known");
-        assert_eq!(if_known(0.3), "if 30 % of the neighbors were known");
-        assert_eq!(ratio_percent(0.071), "7.1");
-        assert_eq!([0.989, 0.9963, 0.9999, 1.0].map(ratio_percent), ["99", "99.6", "99.9", "100"]);
-    }
-
-    #[test]
-    fn lists_end_with_an_and() {
-        let said =
-            |n| list(&["a", "b", "c"][..n].iter().map(|x| (*x).to_owned()).collect::<Vec<_>>());
-        assert_eq!([0, 1, 2, 3].map(said), ["", "a", "a and b", "a, b and c"]);
-    }
-
-    #[test]
-    fn counts_are_grouped() {
-        assert_eq!(thousands(7), "7");
-        assert_eq!(thousands(21_149), "21,149");
-        assert_eq!(thousands(1_000_000), "1,000,000");
-    }
 }

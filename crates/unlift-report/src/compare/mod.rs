@@ -3,9 +3,9 @@
 use minijinja::value::Serde;
 use serde::Serialize;
 
-use crate::{Error, attack, words};
 use crate::document::{Document, LengthUnit, Localization, Row};
 use crate::page::{environment, tables};
+use crate::{Error, attack, words};
 
 /// The old and the new figure of one attack, scheme and threshold.
 #[derive(Debug, Clone, PartialEq, Serialize)]

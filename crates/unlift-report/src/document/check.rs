@@ -1,7 +1,9 @@
 //! The rules of `audit.json` that its types cannot express.
 
 use crate::Error;
-use crate::document::{ByThreshold, Document, ImageFigures, Localization, Row, SCHEMA, TileFigures};
+use crate::document::{
+    ByThreshold, Document, ImageFigures, Localization, Row, SCHEMA, TileFigures,
+};
 
 impl Document {
     /// Checks the rules of the format: the schema, one row per combination, finite numbers,

@@ -11,7 +11,6 @@ use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-
 /// The schema that this build writes and reads.
 pub const SCHEMA: u32 = 1;
 

@@ -1,10 +1,10 @@
 //! The cells of a table for a paper: a row per scheme, a column per kind of neighborhoods.
 
-use crate::{attack, words};
 use crate::document::Document;
-use crate::page::{tables, verdict};
 use crate::page::curves::{Choices, GivenChoice};
 use crate::page::tables::percent_cell;
+use crate::page::{tables, verdict};
+use crate::{attack, words};
 
 pub(super) struct Grid {
     pub caption: String,

@@ -1,10 +1,10 @@
 //! The short table for a terminal.
 
-use crate::{attack, views, words};
 use crate::document::{Bound, Document, LengthUnit, Row, STRONGEST};
-use crate::page::{cost, tables, tiles, verdict};
 use crate::page::verdict::Verdict;
+use crate::page::{cost, tables, tiles, verdict};
 use crate::words::align;
+use crate::{attack, views, words};
 
 /// Returns the verdict in two lines, then a table with a few lines per scheme, the worst first: every source tried, the
 /// records alone, and the oracle at the headline inlier ratio. Columns are the percentages within each threshold, a

@@ -2,12 +2,12 @@
 
 use serde::Serialize;
 
-use crate::{attack, words};
 use crate::attack::Basis;
 use crate::document::{Document, FEWEST_HELD_OUT, Localization, UNPROTECTED};
-use crate::page::{tables, verdict};
 use crate::page::tables::{Class, Table, column};
+use crate::page::{tables, verdict};
 use crate::words::align;
+use crate::{attack, words};
 
 /// A scheme counts as protecting if the strongest attack tried recovers less than this, in percent.
 const LEAK: f64 = 20.0;

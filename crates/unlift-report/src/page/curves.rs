@@ -4,12 +4,12 @@ use std::collections::HashSet;
 
 use serde::Serialize;
 
-use crate::{attack, words};
 use crate::attack::{Basis, Given};
 use crate::document::{Document, LengthUnit, Row};
-use crate::page::{RenderOptions, tables, verdict};
 use crate::page::pictures::{EncodedPicture, first_choice};
 use crate::page::scene::Encoded;
+use crate::page::{RenderOptions, tables, verdict};
+use crate::{attack, words};
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Findings {

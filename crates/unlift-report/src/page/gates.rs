@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use crate::words;
 use crate::document::{Document, GateResult};
+use crate::words;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Gates {

@@ -4,12 +4,12 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
 
-use crate::{attack, views, words};
 use crate::attack::{Basis, Given, basis_of};
 use crate::document::{Document, Row};
-use crate::page::{tables, verdict};
 use crate::page::pictures::{Marks, ReleasedView};
 use crate::page::verdict::Level;
+use crate::page::{tables, verdict};
+use crate::{attack, views, words};
 
 /// One photo and the pictures painted from its keypoints. All pictures are JPEGs of one size.
 #[derive(Debug, Clone, Default, PartialEq)]

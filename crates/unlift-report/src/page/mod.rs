@@ -10,11 +10,10 @@ pub(crate) mod tables;
 pub(crate) mod tiles;
 pub(crate) mod verdict;
 
-use minijinja::{AutoEscape, Environment, UndefinedBehavior};
 use minijinja::value::Serde;
+use minijinja::{AutoEscape, Environment, UndefinedBehavior};
 use serde::Serialize;
 
-use crate::{Error, attack, words};
 use crate::document::{Document, ImageCounts, LengthUnit};
 use crate::page::curves::{Findings, findings, page_data};
 use crate::page::gates::{Gates, gates};
@@ -24,6 +23,7 @@ use crate::page::scene::{Scene3d, encode};
 use crate::page::tables::Table;
 use crate::page::tiles::{HeatMap, heat_maps};
 use crate::page::verdict::{Verdict, verdict};
+use crate::{Error, attack, words};
 
 /// The templates, by the names under which they include each other.
 const TEMPLATES: [(&str, &str); 11] = [

@@ -6,9 +6,9 @@
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
-use crate::words;
 use crate::attack::Given;
 use crate::document::Row;
+use crate::words;
 
 /// The whole 3D view.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -528,13 +528,6 @@ mod tests {
     }
 
     #[test]
-    fn views_are_of_rows_whatever_their_measured_ratio() {
-        // The row's ratio is a mean over repeats, that of the view of one run.
-        let encoded = encode(&scene(9, 3), &[row(2), row(0)], 0.1);
-        assert_eq!(encoded.views.iter().map(|view| view.row).collect::<Vec<_>>(), [1, 0]);
-    }
-
-    #[test]
     fn every_point_is_counted_once() {
         let mut scene = scene(9, 1);
         scene.obfuscations[0].scheme = "olc".into();
@@ -547,50 +540,7 @@ mod tests {
         assert_eq!(view.said, "6 of 9 points drawn; 1 not released, 1 lost, 1 outside the box");
     }
 
-    #[test]
-    fn a_position_survives_to_a_ten_thousandth_of_the_box() {
-        let bounds = SceneBox { low: [-5.0, 0.0, 10.0], high: [5.0, 1.0, 30.0] };
-        let cells = quantize(&bounds, [1.234, 0.5, 12.0]);
-        for (axis, expected) in [1.234, 0.5, 12.0].into_iter().enumerate() {
-            let side = bounds.high[axis] - bounds.low[axis];
-            let found = bounds.low[axis] + f32::from(cells[axis]) / 65534.0 * side;
-            assert!((found - expected).abs() < 1e-4 * side);
-        }
-        assert_eq!(quantize(&bounds, [f32::NAN; 3]), [NOT_DRAWN; 3]);
-        assert_eq!(quantize(&bounds, [9.0, 0.5, 12.0]), [NOT_DRAWN; 3]);
-    }
-
-    #[test]
-    fn errors_are_log_scaled_and_lost_points_stand_apart() {
-        assert_eq!(error_byte(f32::NAN), LOST);
-        assert_eq!(error_byte(1.0), 127);
-        assert_eq!(error_byte(0.0), 0);
-        assert_eq!(error_byte(f32::INFINITY), 254);
-    }
-
-    #[test]
-    fn a_pane_without_points_says_why() {
-        let fate = Fate { lost: 3_895, ..Fate::default() };
-        assert_eq!(fate.said(), "None of 3,895 points drawn; 3,895 lost");
-        assert_eq!(Fate { drawn: 4_000, ..Fate::default() }.said(), "4,000 points drawn");
-    }
-
-    #[test]
-    fn shapes_are_a_sample() {
-        let lines = Shapes::Segments(Vec::new());
-        assert_eq!(shapes_said(&lines, 1_500, 3_895), "1,500 of 3,895 lines drawn");
-        assert_eq!(shapes_said(&lines, 9, 9), "9 lines drawn");
-    }
-
     const CUBE: SceneBox = SceneBox { low: [-1.0; 3], high: [1.0; 3] };
-
-    #[test]
-    fn a_line_ends_at_the_faces() {
-        let segment = CUBE.clip_line([0.0, 0.5, 0.0], [2.0, 0.0, 0.0]).unwrap();
-        assert_eq!(segment, [[-1.0, 0.5, 0.0], [1.0, 0.5, 0.0]]);
-        assert_eq!(CUBE.clip_line([0.0, 2.0, 0.0], [1.0, 0.0, 0.0]), None);
-        assert_eq!(CUBE.clip_line([0.0; 3], [0.0; 3]), None);
-    }
 
     #[test]
     fn a_ray_starts_at_its_center_or_at_a_face() {
@@ -606,16 +556,5 @@ mod tests {
         let scene = SceneBox::robust(&points);
         assert!(scene.low.iter().all(|&x| (-0.2..0.0).contains(&x)), "{scene:?}");
         assert!(scene.high.iter().all(|&x| (1.0..1.2).contains(&x)), "{scene:?}");
-    }
-
-    #[test]
-    fn a_subsample_is_deterministic_and_of_the_asked_size() {
-        let chosen = subsample(10_000, 100, 7);
-        assert_eq!(chosen.len(), 100);
-        assert!(chosen.windows(2).all(|pair| pair[0] < pair[1]));
-        assert_eq!(chosen, subsample(10_000, 100, 7));
-        assert_ne!(chosen, subsample(10_000, 100, 8));
-        assert_eq!(subsample(3, 100, 0), [0, 1, 2]);
-        assert!(subsample(3, 0, 0).is_empty());
     }
 }

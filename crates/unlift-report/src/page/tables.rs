@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use crate::{attack, words};
 use crate::document::{Bound, ByReason, ByThreshold, Document, LengthUnit, Row};
+use crate::{attack, words};
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Table {

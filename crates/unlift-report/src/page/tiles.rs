@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-use crate::{attack, words};
 use crate::document::{Document, Row, TileFigures};
-use crate::page::{tables, verdict};
 use crate::page::tables::{Class, Table, column};
+use crate::page::{tables, verdict};
+use crate::{attack, words};
 
 #[derive(Debug, Serialize)]
 pub(crate) struct HeatMap {

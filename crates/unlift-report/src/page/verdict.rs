@@ -6,11 +6,11 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::{attack, views, words};
 use crate::attack::{Basis, Given};
 use crate::document::{Bound, BreakEven, Document, LengthUnit, Row};
-use crate::page::{inversions, tables};
 use crate::page::inversions::Inversion;
+use crate::page::{inversions, tables};
+use crate::{attack, views, words};
 
 /// The oracle's headline is its tested inlier ratio nearest to this one.
 const HEADLINE_RATIO: f64 = 0.5;

@@ -23,7 +23,8 @@ fn evaluate(page: &str, width: u32, scripts: bool, expression: &str) -> Option<V
     let named = std::env::var_os("CHROMIUM").map(PathBuf::from);
     let path = std::env::var_os("PATH").unwrap_or_default();
     let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
-    let installed = NAMES.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name)));
+    let installed =
+        NAMES.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name)));
     let Some(program) = named.or_else(|| installed.into_iter().find(|file| file.is_file())) else {
         println!("skipped: no chromium on the PATH; CHROMIUM names one");
         return None;
@@ -54,17 +55,34 @@ fn evaluate(page: &str, width: u32, scripts: bool, expression: &str) -> Option<V
     std::fs::write(&file, wrapper).expect("a file");
     let run = Command::new(program)
         .arg(format!("--user-data-dir={}", folder.join("profile").display()))
-        .args(["--headless", "--no-sandbox", "--disable-dev-shm-usage", "--no-first-run", "--disable-background-networking"])
-        .args(["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--window-size=1400,1000"])
+        .args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-dev-shm-usage",
+            "--no-first-run",
+            "--disable-background-networking",
+        ])
+        .args([
+            "--use-gl=angle",
+            "--use-angle=swiftshader",
+            "--enable-unsafe-swiftshader",
+            "--window-size=1400,1000",
+        ])
         .args(["--virtual-time-budget=60000", "--dump-dom"])
         .arg(format!("file://{}", file.display()))
         .output()
         .expect("the browser runs");
     std::fs::remove_dir_all(&folder).expect("the folder is ours");
     let text = String::from_utf8_lossy(&run.stdout);
-    let (_, result) = text.split_once("<pre>").unwrap_or_else(|| panic!("no result: {}", &text[..text.len().min(2_000)]));
+    let (_, result) = text
+        .split_once("<pre>")
+        .unwrap_or_else(|| panic!("no result: {}", &text[..text.len().min(2_000)]));
     let result = result.split_once("</pre>").expect("an end").0;
-    let result = result.replace("&lt;", "<").replace("&gt;", ">").replace("&nbsp;", "\u{a0}").replace("&amp;", "&");
+    let result = result
+        .replace("&lt;", "<")
+        .replace("&gt;", ">")
+        .replace("&nbsp;", "\u{a0}")
+        .replace("&amp;", "&");
     let result: Value = serde_json::from_str(&result).expect("JSON");
     assert_eq!(result["complaints"], json!([]), "{expression}");
     assert_eq!(result["sideways"], json!(false), "the page scrolls sideways at {width} px");
@@ -140,8 +158,11 @@ fn charts_show_the_rows_that_are_chosen() {
     let document = sample::mixed(true);
     for chart in ["error", "reliability"] {
         let id = if chart == "error" { "errors" } else { chart };
-        let show = format!("() => [document.getElementById('chart-{id}').dataset.rows, document.getElementById('{id}-shown').textContent]");
-        let walk = format!("unfold().then(() => {WALK}('{chart}-controls', ['given', 'solver'], {show}))");
+        let show = format!(
+            "() => [document.getElementById('chart-{id}').dataset.rows, document.getElementById('{id}-shown').textContent]"
+        );
+        let walk =
+            format!("unfold().then(() => {WALK}('{chart}-controls', ['given', 'solver'], {show}))");
         let Some(seen) = evaluate(&page(&document, None), 1280, true, &walk) else { return };
         let seen = seen.as_array().expect("choices");
         // Six ratios of the oracle, overlap and geometric, by two solvers.
@@ -170,7 +191,9 @@ fn curves_tables_and_canvas_are_drawn_without_complaints_or_network() {
         [...document.querySelectorAll('.chart')].filter(c => c.querySelectorAll('svg path').length < 10).length,
         root.dataset.scene, +root.dataset.scenePoints > 3000])";
     for width in [1280, 390] {
-        let Some(found) = evaluate(&page(&document, Some(&scene)), width, true, drawn) else { return };
+        let Some(found) = evaluate(&page(&document, Some(&scene)), width, true, drawn) else {
+            return;
+        };
         assert_eq!(found, json!([10, 0, "drawn", true]));
     }
     // The drawing buffer is lost after the frame, so it is read in the same turn as the drawing.
@@ -188,7 +211,8 @@ fn curves_tables_and_canvas_are_drawn_without_complaints_or_network() {
     assert!(found.as_f64().is_some_and(|lit| lit > 5_000.0), "{found} pixels are lit");
     let options = RenderOptions { share_safe: true, ..RenderOptions::default() };
     let safe = render(&document, Some(&scene), &options).expect("a page");
-    let shown = "[document.querySelectorAll('.chart svg').length > 0, document.querySelector('canvas')]";
+    let shown =
+        "[document.querySelectorAll('.chart svg').length > 0, document.querySelector('canvas')]";
     assert_eq!(evaluate(&safe, 1280, true, shown), Some(json!([true, null])));
 }
 
@@ -224,7 +248,8 @@ fn the_page_can_be_read_without_script_and_its_tables_be_sorted_with_it() {
         return [...table.tBodies[0].rows].map(r => +r.cells[6].textContent);
     }))";
     let found = evaluate(&page(&sample::document(true), None), 1280, true, sort);
-    let [falling, rising]: [Vec<f64>; 2] = serde_json::from_value(found.expect("a browser")).unwrap();
+    let [falling, rising]: [Vec<f64>; 2] =
+        serde_json::from_value(found.expect("a browser")).unwrap();
     assert!(falling.len() == 84 && falling.is_sorted_by(|a, b| a >= b), "{falling:?}");
     assert!(rising.is_sorted());
 }
@@ -264,12 +289,20 @@ const SHAPE: &str = "unfold().then(() => {
 #[test]
 fn pages_keep_their_shape_on_a_laptop_and_on_a_phone() {
     let [mixed, no_scale] = [true, false].map(sample::mixed);
-    let pages = [("mixed", mixed), ("no scale", no_scale), ("images", sample::images()), ("crowded", crowded())];
+    let pages = [
+        ("mixed", mixed),
+        ("no scale", no_scale),
+        ("images", sample::images()),
+        ("crowded", crowded()),
+    ];
     for (name, document) in pages {
         for width in [1280, 390] {
             let Some(found) = evaluate(&page(&document, None), width, true, SHAPE) else { return };
             assert_eq!(found["bad"], json!([]), "{name}, {width} px");
-            assert!(width < 1280 || name == "crowded" || found["cut"] == json!([]), "{name}: {found}");
+            assert!(
+                width < 1280 || name == "crowded" || found["cut"] == json!([]),
+                "{name}: {found}"
+            );
         }
     }
 }

@@ -1,8 +1,8 @@
-//! Tests of `audit.json`: round trip, stable text, and the rules of the format.
+//! Tests of `audit.json` (round trip, stable text, rules of the format, schema) and of gates as JUnit XML.
 
-use serde_json::Value;
-use unlift_report::document::{GateResult, NotAudited};
-use unlift_report::{Document, Error, RenderOptions, render};
+use serde_json::{Value, json};
+use unlift_report::document::{GateResult, ImageCounts, NotAudited, Spread};
+use unlift_report::{Document, Error, RenderOptions, junit, render};
 
 use crate::sample;
 
@@ -49,22 +49,11 @@ fn a_document_survives_its_text() {
     assert!(row.recovered_percent.keys().eq(["0.250", "0.10"]));
     assert_eq!((&read.not_audited, &read.gates), (&document.not_audited, &document.gates));
     assert_eq!(read.notes, document.notes);
-    let page = render(&document, None, &RenderOptions::default()).unwrap();
-    assert!(page.contains("id=\"table-metrics\"") && page.contains("<td>7</td>"));
 }
 
 #[test]
-fn documents_of_before_are_read_and_those_of_later_ones_refused() {
+fn documents_of_later_versions_are_refused() {
     let text = sample::document(true).to_json().unwrap();
-    let mut value: Value = serde_json::from_str(&text).unwrap();
-    for row in value["results"].as_array_mut().unwrap() {
-        for field in ["records_alone_percent", "records_alone_by", "sure_percent"] {
-            row.as_object_mut().unwrap().remove(field);
-        }
-    }
-    let read = Document::from_json(&value.to_string()).unwrap();
-    assert_eq!((read.not_audited.len(), read.results[0].sure_percent), (0, None));
-    assert_eq!(read.results[0].records_alone_percent, None);
     let later = text.replace("\"schema\": 1", "\"schema\": 7");
     let error = Document::from_json(&later).unwrap_err();
     assert!(matches!(error, Error::Schema { expected: 1, found: 7 }), "{error}");
@@ -168,4 +157,147 @@ fn what_others_say_of_why_they_failed_is_kept_back() {
     assert_eq!(reasons.collect::<Vec<_>>(), expected);
     assert_eq!(safe.gates[0].reason.as_deref(), Some("mine was not audited"));
     assert_eq!(safe.notes, ["(withheld)", "5 of 9 descriptors"]);
+}
+
+/// The text was validated by the schema of Jenkins (`junit-10.xsd`).
+#[test]
+fn gates_are_test_cases() {
+    let mut document = sample::document(true);
+    document.gates[0].of = Some("olc, \"oracle\" at 0.50".into());
+    document.input.path = Some("maps/room <1>".into());
+    document.input.images = Some(ImageCounts { found: 3, used: 2, unusable: 1, too_small: 0 });
+    let expected = r#"<?xml version="1.0" encoding="UTF-8"?>
+<testsuites name="unlift" tests="3" failures="1" errors="1" time="41.700">
+  <testsuite name="maps/room &lt;1&gt;" tests="3" failures="1" errors="1" skipped="0" time="41.700">
+    <testcase name="ppl@0.5:0.10&lt;=20" classname="unlift.ppl">
+      <failure message="89.1 % came back, at most 20 % may; olc, &quot;oracle&quot; at 0.50" type="gate">ppl@0.5:0.10&lt;=20: 89.1 % came back, at most 20 % may; olc, &quot;oracle&quot; at 0.50</failure>
+    </testcase>
+    <testcase name="plane@0.1:0.10&lt;=20" classname="unlift.plane">
+      <system-out>11.8 % came back, at most 20 % may</system-out>
+    </testcase>
+    <testcase name="images" classname="unlift.input">
+      <error message="1 of 3 images could not be used, and are in no figure" type="input">1 of 3 images could not be used, and are in no figure</error>
+    </testcase>
+  </testsuite>
+</testsuites>
+"#;
+    assert_eq!(junit(&document), expected);
+}
+
+/// Returns the places where `value` breaks `schema`, which uses few keywords; others are rejected.
+fn breaks(root: &Value, schema: &Value, value: &Value, place: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    let is = |name: &Value| match name.as_str().expect("a type is a name") {
+        "object" => value.is_object(),
+        "array" => value.is_array(),
+        "string" => value.is_string(),
+        "boolean" => value.is_boolean(),
+        "null" => value.is_null(),
+        "number" => value.is_number(),
+        "integer" => value.is_u64() || value.is_i64(),
+        other => panic!("unknown type {other}"),
+    };
+    let bound = |rule: &Value| rule.as_f64().expect("a number");
+    let number = |test: &dyn Fn(f64) -> bool| value.as_f64().is_none_or(test);
+    let length = |test: &dyn Fn(f64) -> bool| value.as_array().is_none_or(|x| test(x.len() as f64));
+    for (keyword, rule) in schema.as_object().expect("a schema is an object") {
+        let kept = match keyword.as_str() {
+            "$schema" | "title" | "$defs" | "properties" => true,
+            "$ref" => {
+                let target = root.pointer(&rule.as_str().expect("a path")[1..]);
+                found.extend(breaks(root, target.expect("a known $ref"), value, place));
+                true
+            }
+            "type" => rule.as_array().map_or_else(|| is(rule), |types| types.iter().any(is)),
+            "const" => value == rule,
+            "enum" => rule.as_array().expect("a list").contains(value),
+            "minimum" => number(&|x| x >= bound(rule)),
+            "maximum" => number(&|x| x <= bound(rule)),
+            "exclusiveMinimum" => number(&|x| x > bound(rule)),
+            "minItems" => length(&|x| x >= bound(rule)),
+            "maxItems" => length(&|x| x <= bound(rule)),
+            "required" => {
+                let mut names = rule.as_array().expect("a list").iter();
+                names.all(|name| value.get(name.as_str().expect("a name")).is_some())
+            }
+            "items" => {
+                for (i, item) in value.as_array().into_iter().flatten().enumerate() {
+                    found.extend(breaks(root, rule, item, &format!("{place}[{i}]")));
+                }
+                true
+            }
+            "additionalProperties" => true,
+            other => panic!("the schema uses {other}, which this test does not check"),
+        };
+        if !kept {
+            found.push(format!("{place}: {keyword} {rule}, found {value}"));
+        }
+    }
+    let more = schema.get("additionalProperties");
+    for (name, field) in value.as_object().into_iter().flatten() {
+        let place = format!("{place}.{name}");
+        match schema.get("properties").and_then(|properties| properties.get(name)).or(more) {
+            Some(Value::Bool(false)) => found.push(format!("{place}: unknown")),
+            Some(rule) if rule.is_object() => found.extend(breaks(root, rule, field, &place)),
+            _ => {}
+        }
+    }
+    found
+}
+
+fn schema() -> Value {
+    serde_json::from_str(include_str!("../../audit.schema.json")).expect("the schema is JSON")
+}
+
+fn check(document: &Document) -> Vec<String> {
+    let value = serde_json::from_str(&document.to_json().expect("a valid document")).unwrap();
+    breaks(&schema(), &schema(), &value, "audit")
+}
+
+#[test]
+fn documents_keep_the_schema() {
+    assert_eq!(check(&sample::document(true)), Vec::<String>::new());
+    assert_eq!(check(&sample::document(false).share_safe()), Vec::<String>::new());
+    assert_eq!(check(&sample::images()), Vec::<String>::new());
+    assert_eq!(check(&sample::images().share_safe()), Vec::<String>::new());
+    let mut full = sample::document(true);
+    full.results[0].repeats = 3;
+    full.results[0].std = Some(Spread { median_error: Some(0.1), ..Spread::default() });
+    full.results[0].delta = None;
+    full.results[0].metrics.insert("faces found".into(), 0.25);
+    (full.results[1].sure_percent, full.results[1].sure_unknown) = (None, Some("few".into()));
+    let missing = NotAudited { scheme: "star".into(), neighbors: None, reason: "flat".into() };
+    full.not_audited =
+        vec![NotAudited { neighbors: Some("geometric".into()), ..missing.clone() }, missing];
+    full.gates[0].passed = false;
+    (full.gates[0].found_percent, full.gates[0].reason) = (None, Some("not audited".into()));
+    full.run.seconds.stages.insert("read".into(), 0.5);
+    full.input.other_sha256.insert("descriptors".into(), "00".into());
+    assert_eq!(check(&full), Vec::<String>::new());
+}
+
+#[test]
+fn the_schema_refuses_what_the_format_refuses() {
+    let text = sample::document(true).to_json().unwrap();
+    let valid: Value = serde_json::from_str(&text).unwrap();
+    let spoil = |pointer: &str, with: Value| {
+        let mut value = valid.clone();
+        *value.pointer_mut(pointer).expect("the place exists") = with;
+        breaks(&schema(), &schema(), &value, "audit").len()
+    };
+    assert_eq!(spoil("/results/0/unit", json!("cm")), 1);
+    assert_eq!(spoil("/results/0/recovered_percent/0.10", json!(101)), 1);
+    assert_eq!(spoil("/results/0/n_lost", json!(-1)), 1);
+    assert_eq!(spoil("/schema", json!(2)), 1);
+    assert_eq!(spoil("/run", json!({})), 1);
+}
+
+#[test]
+fn the_example_of_the_documentation_is_a_document() {
+    let docs = include_str!("../../../../docs/formats.md");
+    let (_, rest) = docs.split_once("## audit.json").expect("its section");
+    let (_, rest) = rest.split_once("```json\n").expect("an example");
+    let (example, _) = rest.split_once("```").expect("an end");
+    let document = Document::from_json(example).expect("a valid example");
+    assert_eq!(check(&document), Vec::<String>::new());
 }

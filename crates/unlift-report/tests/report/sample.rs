@@ -128,7 +128,8 @@ pub fn mixed(metric: bool) -> Document {
     let half: Vec<Row> =
         document.results.iter().filter(|row| row.inlier_ratio == 0.5).cloned().collect();
     for row in half {
-        let s = SCHEMES.iter().position(|scheme| *scheme == row.scheme).expect("one of them") as f64;
+        let s =
+            SCHEMES.iter().position(|scheme| *scheme == row.scheme).expect("one of them") as f64;
         let weaker = if row.solver == "ransac" { 3.0 } else { 0.0 };
         let mut own = |neighbors: &str, inlier_ratio, shares: [f64; 2]| {
             let mut row = row.clone();
@@ -137,7 +138,10 @@ pub fn mixed(metric: bool) -> Document {
             // Half of the points or more are lost, so no percentile is known.
             row.median_error = None;
             row.error_percentiles.values_mut().for_each(|error| *error = None);
-            row.recovered_percent.values_mut().zip(shares).for_each(|(value, share)| *value = share);
+            row.recovered_percent
+                .values_mut()
+                .zip(shares)
+                .for_each(|(value, share)| *value = share);
             document.results.push(row);
         };
         let falling = 4.5 * s + weaker;
@@ -169,7 +173,11 @@ pub fn scene(document: &Document, n: usize) -> Scene3d {
         let some = originals.iter().take(1_500);
         let shapes = match scheme {
             "plane" => Shapes::Patches(
-                some.step_by(10).map(|p| [[p[0], 0.0, 0.0], [p[0], 4.5, 0.0], [p[0], 4.5, 2.6], [p[0], 0.0, 2.6]]).collect(),
+                some.step_by(10)
+                    .map(|p| {
+                        [[p[0], 0.0, 0.0], [p[0], 4.5, 0.0], [p[0], 4.5, 2.6], [p[0], 0.0, 2.6]]
+                    })
+                    .collect(),
             ),
             "cp" => Shapes::Points(originals.iter().map(|p| [p[0], p[1], 1.3]).collect()),
             _ => Shapes::Segments(some.map(|p| [[p[0], 0.0, p[2]], [p[0], 4.5, p[2]]]).collect()),
@@ -226,7 +234,8 @@ pub fn images() -> Document {
         median_error: Some(3.25),
     };
     let rows: Vec<ImageRow> = document.results.iter().map(of_row).collect();
-    let image = |name: &str| ImageFigures { name: Some(name.into()), n_points: 10_574, rows: rows.clone() };
+    let image =
+        |name: &str| ImageFigures { name: Some(name.into()), n_points: 10_574, rows: rows.clone() };
     document.images = vec![image("kitchen/secret.jpg"), image("b.jpg")];
     document
 }

@@ -1,0 +1,241 @@
+//! Tests of what some audits have besides the verdict: the cost of protection, and painted pictures.
+
+use unlift_report::compare::compare;
+use unlift_report::document::{Document, GateResult, HeldOut, Localization, Row};
+use unlift_report::inversions::{Inversion, InvertedView, Likeness, Painted};
+use unlift_report::{Given, RenderOptions, gate_lines, junit, render, text_table};
+
+use crate::sample;
+
+fn one(scheme: &str, multiple: Option<f64>) -> Localization {
+    Localization {
+        scheme: scheme.to_owned(),
+        of_queries: false,
+        multiple,
+        center_error: multiple.map(|x| 0.0005 * x),
+        rotation_error_degrees: multiple,
+        failed_percent: if multiple.is_some() { 0.0 } else { 100.0 },
+        changes_descriptors: false,
+        held_out: None,
+    }
+}
+
+/// The sample audit with localization; `olc` leaks little if `protects`.
+fn document(protects: bool) -> Document {
+    let mut document = sample::document(true);
+    for row in document.results.iter_mut().filter(|row| row.scheme == "olc" && protects) {
+        row.recovered_percent.values_mut().for_each(|x| *x = 10.0);
+        row.blind_percent.values_mut().for_each(|x| *x = 5.0);
+        row.records_alone_percent = None;
+        row.records_alone_by = None;
+    }
+    let query = Localization { of_queries: true, ..one("lines2d", Some(1.4)) };
+    document.localization = vec![
+        one("none", Some(1.0)),
+        one("olc", Some(1.4)),
+        one("ppl", Some(1.6)),
+        one("plane", None),
+        query,
+    ];
+    document
+}
+
+fn page(document: &Document) -> String {
+    render(document, None, &RenderOptions::default()).unwrap()
+}
+
+#[test]
+fn the_sentence_names_what_protects_at_a_small_cost() {
+    let none = page(&document(false));
+    let said = "No scheme tried here keeps an attacker below 20\u{a0}% at a localization error within twice the unprotected one.";
+    assert!(none.contains(said));
+    let some = page(&document(true));
+    assert!(some.contains("olc keeps the attacks tried here below 20\u{a0}%"));
+    assert!(some.contains("A better attack may recover more."));
+    // The audit of a map without tracks has no chart.
+    assert!(!page(&sample::document(true)).contains("id=\"cost\""));
+}
+
+#[test]
+fn the_chart_has_a_dot_per_scheme_and_the_table_a_row() {
+    let page = page(&document(true));
+    assert!(page.contains("<title>olc: 10.0 % come back, 1.4 times the unprotected error</title>"));
+    assert!(page.contains("most cameras do not localize</title>"));
+    assert!(page.contains("table-cost") && page.contains("the query"));
+    let text = text_table(&document(true));
+    assert!(text.contains("does not localize") && text.contains("1.4x"), "{text}");
+}
+
+#[test]
+fn changed_descriptors_have_no_known_cost_without_held_out_images() {
+    let mut document = document(true);
+    document.localization[1].changes_descriptors = true;
+    assert_eq!(document.localization[1].cost(), None);
+    let text = page(&document);
+    assert!(text.contains("No scheme with both figures keeps"), "an unknown cost is not small");
+    assert!(text.contains("olc: its descriptors are changed"));
+    document.localization[1].held_out = Some(HeldOut {
+        n_images: 10,
+        right_matches: 300.0,
+        matches: 400.0,
+        center_error: Some(0.001),
+        rotation_error_degrees: Some(0.03),
+        multiple: Some(3.5),
+        recall_percent: [("5 cm, 5 deg".to_owned(), 90.0)].into_iter().collect(),
+    });
+    assert_eq!(document.localization[1].cost(), Some(3.5));
+    assert!(page(&document).contains("300 of 400"));
+    let same = Document::from_json(&document.to_json().unwrap()).unwrap();
+    assert_eq!(same.localization, document.localization);
+    let one = &mut document.localization[1];
+    one.held_out.as_mut().unwrap().n_images = 9;
+    assert!(one.is_unknown() && one.cost().is_none(), "nine held-out images are too few");
+    one.changes_descriptors = false;
+    assert_eq!(one.cost(), one.multiple, "the bound counts instead");
+}
+
+#[test]
+fn gates_on_localization_speak_of_multiples() {
+    let mut document = document(true);
+    document.gates = vec![GateResult {
+        gate: "ppl:localization<=1.5".to_owned(),
+        found_percent: Some(1.6),
+        of: Some("ppl, bound".to_owned()),
+        bound_percent: 1.5,
+        passed: false,
+        reason: None,
+    }];
+    let line =
+        "gate ppl:localization<=1.5: FAILED, found 1.60 times the unprotected error: ppl, bound\n";
+    assert_eq!(gate_lines(&document), line);
+    let said = "1.6 times the unprotected localization error, at most 1.5 times may be; ppl, bound";
+    for text in [page(&document), junit(&document)] {
+        assert!(text.contains(said), "{text}");
+    }
+}
+
+#[test]
+fn a_larger_localization_error_fails_a_comparison() {
+    let (old, mut new) = (document(true), document(true));
+    new.localization[1].multiple = Some(1.5);
+    assert!(compare(&old, &new, None).unwrap().passed, "within a tenth");
+    new.localization[1].multiple = Some(1.7);
+    new.localization[2].multiple = None;
+    let found = compare(&old, &new, None).unwrap();
+    let worse: Vec<&str> = found.costs_more.iter().map(|one| one.scheme.as_str()).collect();
+    assert_eq!(worse, ["olc", "ppl"]);
+    assert!(!found.passed && found.summary().ends_with("; 2 localize less precisely"));
+    new.localization.clear();
+    let unknown = compare(&old, &new, None).unwrap();
+    assert!(!unknown.passed && unknown.costs_more[0].new_multiple.is_none());
+    assert!(compare(&new, &old, None).unwrap().passed, "the old audit did not measure it");
+}
+
+/// Returns an audit of images, with rows by an attacker's own lists for both schemes.
+fn painted_document() -> Document {
+    let mut document = sample::images();
+    for (row, ssim) in document.results.iter_mut().zip([0.48, 0.33].into_iter().cycle()) {
+        row.metrics.insert("ssim".into(), ssim);
+        row.metrics.insert("ssim_baseline".into(), 0.5);
+        row.metrics.insert("objects_found".into(), 0.2);
+        row.metrics.insert("objects_found_of_tv".into(), 0.25);
+        row.metrics.insert("objects_found_of_tv_baseline".into(), 0.75);
+    }
+    for scheme in ["lines2d", "cp2d"] {
+        let mut row = document.results.iter().find(|row| row.scheme == scheme).unwrap().clone();
+        (row.neighbors, row.oracle_noise, row.inlier_ratio) = ("overlap".into(), None, 0.2);
+        document.results.push(row);
+    }
+    // Rows of images must match the results in number, or be absent.
+    document.images.iter_mut().for_each(|image| image.rows.clear());
+    document
+}
+
+fn inversion(document: &Document, ssim: impl Fn(&Row) -> f64) -> Inversion {
+    let view = |row: &Row| InvertedView {
+        scheme: row.scheme.clone(),
+        given: Given::of(row),
+        solver: row.solver.clone(),
+        painted: Painted { jpeg: vec![1], likeness: Likeness { ssim: ssim(row), lpips: 0.3 } },
+    };
+    let picture = sample::picture();
+    Inversion {
+        name: picture.name,
+        size: picture.size,
+        baseline: Painted { likeness: Likeness { ssim: 0.5, lpips: 0.2 }, ..Painted::default() },
+        released: picture.released,
+        views: document.results.iter().map(view).collect(),
+        ..Inversion::default()
+    }
+}
+
+fn painted_page(document: &Document, inversions: Vec<Inversion>, share_safe: bool) -> String {
+    let options = RenderOptions { inversions, share_safe, ..RenderOptions::default() };
+    render(document, None, &options).expect("a page")
+}
+
+#[test]
+fn the_page_begins_with_what_an_attacker_paints_from_the_released_data() {
+    let document = painted_document();
+    let ssim = |row: &Row| if row.neighbors == "overlap" { 0.48 } else { 0.2 };
+    let found = painted_page(&document, vec![inversion(&document, ssim)], false);
+    let rebuilt =
+        "<strong>An attacker can rebuild the picture.</strong> From the released data alone, ";
+    let not = "<strong>The picture does not come back well by this attack.</strong> If half of the neighbors were known: ";
+    let (first, second) = (found.find(rebuilt), found.find(not));
+    assert!(first.is_some() && first < second, "{found}");
+    assert!(found.contains(
+        "% of the keypoints come back within 10\u{a0}px (LINES2D, neighbors by descriptor overlap)."
+    ));
+    assert!(found.contains("What the service receives") && found.contains("<path d=\"M"));
+    assert!(!found.to_lowercase().contains("worse picture"));
+    let safe = painted_page(&document, vec![inversion(&document, ssim)], true);
+    assert!(!safe.contains("class=\"exhibit") && !safe.contains("src=\"data:image/jpeg"));
+}
+
+#[test]
+fn a_picture_that_was_poor_without_protection_is_called_so() {
+    let document = painted_document();
+    let mut poor = inversion(&document, |_| 0.4);
+    let said = "Even from the true points this network paints a poor picture (similarity to the photo: SSIM 0.43 of 1).";
+    assert!(
+        !painted_page(&document, vec![poor.clone()], false).contains("Even from the true points")
+    );
+    poor.baseline.likeness.ssim = 0.43;
+    assert!(painted_page(&document, vec![poor], false).contains(said));
+}
+
+#[test]
+fn two_photos_show_two_schemes() {
+    let document = painted_document();
+    let all = || inversion(&document, |_| 0.48);
+    let found = painted_page(&document, vec![all(), all(), all()], false);
+    assert_eq!(found.matches("<div class=\"exhibit").count(), 3);
+    assert!(
+        found.contains("(LINES2D, neighbors by descriptor overlap)")
+            && found.contains("(CP2D, neighbors by descriptor overlap)")
+    );
+}
+
+#[test]
+fn only_the_strongest_attacks_are_shown_at_first() {
+    let document = painted_document();
+    let found = painted_page(&document, vec![inversion(&document, |_| 0.4)], false);
+    let (_, section) = found.split_once("id=\"inversions\"").expect("pictures");
+    let (_, row) = section.split_once("<h3>LINES2D</h3>").expect("a scheme");
+    let (main, others) = row.split_once("<details>").expect("the others are folded away");
+    assert_eq!(main.matches("<img").count(), 2, "released data alone, and half of the neighbors");
+    assert!(main.contains("neighbors by descriptor overlap, 20 % right"));
+    assert!(main.contains("known neighbors, 50 % right"));
+    let (others, _) = others.split_once("</details>").expect("an end");
+    assert_eq!(others.matches("<img").count(), 5);
+}
+
+#[test]
+fn figures_of_pictures_are_in_tables() {
+    let found = painted_page(&painted_document(), Vec::new(), false);
+    assert!(found.contains("tv, %"), "{found}");
+    assert!(found.contains("<td>0.480</td><td>0.020</td>"), "{found}");
+    assert!(!found.contains("ssim_baseline"));
+    assert!(found.contains("<td>75.0</td>") && found.contains("<td>25.0</td>"));
+}
