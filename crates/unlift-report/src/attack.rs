@@ -39,8 +39,6 @@ impl Given {
     }
 }
 
-/// The solver and source of a row that is no attack: it uses the true places of true neighbors.
-const REFERENCE: &str = "reference";
 const WITHOUT_NEIGHBORS: [&str; 2] = ["density", "tomography"];
 
 /// The data behind an attack.
@@ -54,19 +52,18 @@ pub(crate) enum Basis {
     Oracle,
 }
 
-/// Returns the basis of a row; `None` if it is no attack.
-pub(crate) fn basis(row: &Row) -> Option<Basis> {
+/// Returns the basis of a row.
+pub(crate) fn basis(row: &Row) -> Basis {
     basis_of(&row.neighbors, &row.solver)
 }
 
-pub(crate) fn basis_of(neighbors: &str, solver: &str) -> Option<Basis> {
+pub(crate) fn basis_of(neighbors: &str, solver: &str) -> Basis {
     match neighbors {
-        _ if solver == REFERENCE => None,
-        _ if !looks_at_neighbors(solver) => Some(Basis::Released),
-        "oracle" => Some(Basis::Oracle),
-        name if name.starts_with(TRACKS) => Some(Basis::Oracle),
-        "file" => Some(Basis::Given),
-        _ => Some(Basis::Released),
+        _ if !looks_at_neighbors(solver) => Basis::Released,
+        "oracle" => Basis::Oracle,
+        name if name.starts_with(TRACKS) => Basis::Oracle,
+        "file" => Basis::Given,
+        _ => Basis::Released,
     }
 }
 
@@ -148,9 +145,6 @@ pub(crate) fn plain_source(neighbors: &str, oracle_noise: Option<&str>) -> Strin
 
 /// Returns the label of neighborhoods on the page: `known neighbors, 50 % right`.
 pub(crate) fn neighborhoods(neighbors: &str, oracle_noise: Option<&str>, ratio: f64) -> String {
-    if neighbors == REFERENCE {
-        return "reference: true neighbors at their true places".to_owned();
-    }
     let source = plain_source(neighbors, oracle_noise);
     format!("{source}, {} % right", words::ratio_percent(ratio))
 }
@@ -173,7 +167,7 @@ pub(crate) fn name(row: &Row) -> String {
     }
     // The attacker chooses the length of its own lists, and the share of right neighbors depends on it.
     let given = match basis(row) {
-        Some(Basis::Released | Basis::Given) => {
+        Basis::Released | Basis::Given => {
             let (source, right) =
                 (plain_source(&row.neighbors, None), words::ratio_percent(row.inlier_ratio));
             format!("{source}, {} listed, {right} % of them right", row.k)
@@ -205,20 +199,5 @@ mod tests {
         assert!(!oracle.same_choice(&given("oracle", Some("near"), 0.5)));
         assert!(!oracle.same_choice(&given("oracle", None, 0.3)));
         assert!(!oracle.same_choice(&given("overlap", None, 0.5)));
-    }
-
-    #[test]
-    fn neighborhoods_have_the_name_of_their_source() {
-        assert_eq!(neighborhoods("oracle", Some("uniform"), 0.5), "known neighbors, 50 % right");
-        assert_eq!(neighborhoods("oracle", None, 0.5), "known neighbors, 50 % right");
-        assert_eq!(
-            neighborhoods("oracle", Some("near"), 0.1),
-            "known neighbors, wrong ones near, 10 % right"
-        );
-        assert_eq!(
-            neighborhoods("overlap", None, 0.113),
-            "neighbors by descriptor overlap, 11 % right"
-        );
-        assert_eq!(neighborhoods("file", None, 0.2), "neighbors from a file, 20 % right");
     }
 }

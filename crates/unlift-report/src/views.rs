@@ -84,7 +84,7 @@ pub(crate) fn uses_lists(row: &Row) -> bool {
 }
 
 fn is_tracks(row: &Row) -> bool {
-    attack::basis(row) == Some(attack::Basis::Oracle)
+    attack::basis(row) == attack::Basis::Oracle
 }
 
 /// Returns whether the document is of two releases.

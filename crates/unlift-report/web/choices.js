@@ -21,7 +21,6 @@ window.Unlift = window.Unlift || {};
     released: "Today, from the released data alone",
     given: "Given lists of neighbors",
     oracle: "If this share of neighbors were known",
-    reference: "No attack, for comparison",
   };
 
   /** Makes a row of buttons, one of which is chosen. Options are {value, label}. */

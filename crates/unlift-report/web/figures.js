@@ -11,11 +11,11 @@
 
   const groupOf = (data, row) => data.givens[row.given].group;
   const sourceOf = (data, row) => data.givens[row.given].source;
-  const isPicked = (row, solver, t) => row.attack && (solver === STRONGEST ? row.strongest[t] : row.solver === solver);
+  const isPicked = (row, solver, t) => solver === STRONGEST ? row.strongest[t] : row.solver === solver;
 
   /** Returns the sources of single marks: their ratio is measured, so they have no curve. */
   const ownSources = (data) =>
-    distinct(data.rows.filter((row) => row.attack && groupOf(data, row) !== "oracle").map((row) => sourceOf(data, row)));
+    distinct(data.rows.filter((row) => groupOf(data, row) !== "oracle").map((row) => sourceOf(data, row)));
 
   const nameOf = (data, source) => data.givens.find((given) => given.source === source).name;
   const sourceMark = (own, source) => SOURCE_MARKS[own.indexOf(source) % SOURCE_MARKS.length];
@@ -68,7 +68,7 @@
   /** Draws one chart per scheme: all solvers, the attacker's own sources, both baselines. */
   function multiples(node, data, { threshold: t, source }) {
     const own = ownSources(data);
-    const solvers = distinct(data.rows.filter((row) => row.attack && groupOf(data, row) === "oracle").map((row) => row.solver));
+    const solvers = distinct(data.rows.filter((row) => groupOf(data, row) === "oracle").map((row) => row.solver));
     const thin = { width: 1.5, mark: "none" };
     data.schemes.forEach((scheme, s) => {
       let figure = node.children[s];

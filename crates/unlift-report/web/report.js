@@ -12,7 +12,7 @@
 
   function curves() {
     const form = at("curve-controls");
-    const oracle = rows.filter((row) => row.attack && data.givens[row.given].group === "oracle");
+    const oracle = rows.filter((row) => data.givens[row.given].group === "oracle");
     const sources = distinct(oracle.map((row) => data.givens[row.given].source));
     const solvers = distinct(oracle.map((row) => row.solver));
     const state = { threshold: data.headline, solver: solvers.length > 1 ? STRONGEST : solvers[0] ?? STRONGEST, source: sources[0] };

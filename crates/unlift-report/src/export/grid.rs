@@ -19,8 +19,7 @@ const NOT_AUDITED: &str = "not audited";
 /// `within`.
 pub(super) fn grid(document: &Document, within: &[String]) -> Grid {
     let choices = Choices::of(document);
-    let givens: Vec<&GivenChoice> =
-        choices.givens.iter().filter(|given| given.group != "reference").collect();
+    let givens: Vec<&GivenChoice> = choices.givens.iter().collect();
     let all = tables::thresholds(document);
     let joined = |cell: &dyn Fn(&str) -> String| {
         within.iter().map(|typed| cell(typed)).collect::<Vec<_>>().join(" / ")

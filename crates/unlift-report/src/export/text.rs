@@ -39,7 +39,7 @@ pub fn text_table(document: &Document) -> String {
             });
         for row in rows {
             let share = verdict::share(row, &headline);
-            let is_oracle = attack::basis(row) == Some(attack::Basis::Oracle);
+            let is_oracle = attack::basis(row) == attack::Basis::Oracle;
             if let Some((_, cells)) = alone.take_if(|(alone, _)| is_oracle || *alone > share) {
                 lines.push(cells);
             }
@@ -119,7 +119,7 @@ fn unit(document: &Document) -> &'static str {
 fn break_even(document: &Document, row: &Row, typed: &str) -> String {
     let noise = |noise: &Option<String>| noise.clone().unwrap_or_else(|| "uniform".to_owned());
     let mut points = document.break_even.iter().filter(|point| {
-        attack::basis(row) == Some(attack::Basis::Oracle)
+        attack::basis(row) == attack::Basis::Oracle
             && point.scheme == row.scheme
             && (point.solver == row.solver || point.solver == STRONGEST)
             && noise(&point.oracle_noise) == noise(&row.oracle_noise)

@@ -85,7 +85,7 @@ fn leak(document: &Document, scheme: &str, basis: Basis) -> Option<f64> {
 }
 
 fn basis(document: &Document) -> Basis {
-    let own = |row| attack::basis(row) == Some(Basis::Released);
+    let own = |row| attack::basis(row) == Basis::Released;
     if document.results.iter().any(own) { Basis::Released } else { Basis::Oracle }
 }
 

@@ -33,7 +33,7 @@ fn curves(document: &Document) -> String {
     let points = document.results.first().map_or("points", |row| words::points(row.unit));
     let usual = format!("How many {points} come back, by the share of right neighbors");
     let Some(typed) = tables::headline_threshold(document) else { return usual };
-    let oracle = || document.results.iter().filter(|row| attack::basis(row) == Some(Basis::Oracle));
+    let oracle = || document.results.iter().filter(|row| attack::basis(row) == Basis::Oracle);
     let share = |row: &Row| verdict::share(row, &typed);
     let at = |ratio: f64| {
         let rows = oracle().filter(move |row| row.inlier_ratio == ratio);
@@ -143,7 +143,6 @@ struct RowData {
     /// The label of this row's neighborhoods: `neighbors by descriptor overlap, 11 % right`.
     label: String,
     ratio: f64,
-    attack: bool,
     strongest: Vec<bool>,
     recovered: Vec<Option<f64>>,
     errors: Vec<(f64, f64)>,
@@ -191,7 +190,6 @@ pub(crate) fn page_data<'a>(
             solver: choices.solver(&row.solver)?,
             label: given.label(),
             ratio: row.inlier_ratio,
-            attack: attack::basis(row).is_some(),
             strongest: thresholds.iter().map(|typed| is_strongest(document, row, typed)).collect(),
             recovered: by_threshold(&row.recovered_percent),
             errors: cdf.map_or_else(|| percentile_points(row), |cdf| cdf.points.clone()),
@@ -259,7 +257,7 @@ pub(crate) struct SchemeChoice {
 pub(crate) struct GivenChoice {
     /// `known neighbors, 50 % right`, `neighbors by descriptor overlap, 9 to 12 % right`.
     pub label: String,
-    /// The group in a menu: `released`, `given`, `oracle` or `reference` (no attack).
+    /// The group in a menu: `released`, `given` or `oracle`.
     pub group: &'static str,
     /// The source: one curve of the oracle's ratios, or one mark of another source.
     pub source: String,
@@ -331,7 +329,6 @@ fn scheme(document: &Document, name: &str, thresholds: &[String]) -> SchemeChoic
 
 fn group(row: &Row) -> &'static str {
     match row.neighbors.as_str() {
-        _ if attack::basis(row).is_none() => "reference",
         "oracle" => "oracle",
         "file" => "given",
         _ => "released",

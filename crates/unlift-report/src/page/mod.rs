@@ -101,7 +101,7 @@ pub fn render(
     let opening = options.opening.clone().filter(|_| !options.share_safe);
     let own = Opening::of(&document, shown);
     let oracle = document.results.iter();
-    let oracle = oracle.filter(|row| attack::basis(row) == Some(attack::Basis::Oracle));
+    let oracle = oracle.filter(|row| attack::basis(row) == attack::Basis::Oracle);
     let page = Page {
         style: STYLE,
         bundle: BUNDLE,

@@ -312,19 +312,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_corners_of_an_image_are_the_ends_of_the_scale() {
-        let ends = |point| {
-            let [a, b, c, d] = quantize([640, 480], point);
-            [u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d])]
-        };
-        assert_eq!(ends(Some([-0.5, -0.5])), [0, 0]);
-        assert_eq!(ends(Some([639.5, 479.5])), [65534, 65534]);
-        assert_eq!(ends(Some([9000.0, 239.5])), [65534, 32767]);
-        assert_eq!(ends(None), [65535, 65535]);
-        assert_eq!(ends(Some([f32::NAN, 0.0])), [65535, 65535]);
-    }
-
-    #[test]
     fn shares_are_of_all_released_keypoints() {
         let picture = Picture {
             size: [100, 50],

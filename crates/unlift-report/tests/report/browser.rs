@@ -154,36 +154,6 @@ fn every_choice_of_the_view_names_its_source_and_shows_points_or_words() {
 }
 
 #[test]
-fn charts_show_the_rows_that_are_chosen() {
-    let document = sample::mixed(true);
-    for chart in ["error", "reliability"] {
-        let id = if chart == "error" { "errors" } else { chart };
-        let show = format!(
-            "() => [document.getElementById('chart-{id}').dataset.rows, document.getElementById('{id}-shown').textContent]"
-        );
-        let walk =
-            format!("unfold().then(() => {WALK}('{chart}-controls', ['given', 'solver'], {show}))");
-        let Some(seen) = evaluate(&page(&document, None), 1280, true, &walk) else { return };
-        let seen = seen.as_array().expect("choices");
-        // Six ratios of the oracle, overlap and geometric, by two solvers.
-        assert_eq!(seen.len(), 8 * 2, "{chart}");
-        for choice in seen {
-            let chosen = choice[0][0].as_str().expect("a label");
-            let said = choice[1][1].as_str().expect("a text");
-            assert!(said.starts_with(&format!("Shown: {chosen}, solver ")), "{said}");
-            let is_geometric = chosen.contains("geometry");
-            assert_eq!(said.contains("Not tried with these: plane."), is_geometric, "{said}");
-            let rows = choice[1][0].as_str().expect("rows").split(' ');
-            let rows: Vec<usize> = rows.map(|row| row.parse().expect("a row")).collect();
-            assert_eq!(rows.len(), if is_geometric { 6 } else { 7 });
-            let source = |label: &str| label.split(',').next().map(str::to_owned);
-            let of_source = |&row: &usize| source(&given(&document, row)) == source(chosen);
-            assert!(rows.iter().all(of_source), "{chosen}");
-        }
-    }
-}
-
-#[test]
 fn curves_tables_and_canvas_are_drawn_without_complaints_or_network() {
     let document = sample::document(true);
     let scene = sample::scene(&document, 4_000);

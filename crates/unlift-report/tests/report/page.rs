@@ -136,17 +136,6 @@ fn terminal_and_page_say_the_same_numbers() {
 }
 
 #[test]
-fn a_solver_that_needs_no_neighborhoods_is_an_attack_of_today() {
-    let mut document = sample::document(true);
-    let mut row = document.results[0].clone();
-    (row.solver, row.inlier_ratio) = ("tomography".into(), 0.5);
-    row.recovered_percent[0] = 72.5;
-    document.results.push(row);
-    document.run.seconds.rows.clear();
-    assert!(verdict(&document).contains("72.5 % records alone (tomography)"));
-}
-
-#[test]
 fn what_could_not_be_audited_is_said_and_never_reads_as_little() {
     let mut document = sample::document(true);
     document.results.retain(|row| row.scheme != "ppl+");
@@ -211,19 +200,6 @@ fn names_are_escaped_everywhere() {
     let text = page(&document, Some(&scene), false);
     assert!(!text.contains("alert(1)</script>"));
     assert_eq!(text.matches("<script").count(), before);
-}
-
-#[test]
-fn the_terminal_table_is_short_and_worst_first() {
-    let table = text_table(&sample::document(true));
-    let lines: Vec<&str> = table.lines().collect();
-    // Two lines of verdict, an empty line, the head, a line per scheme and per records alone (not for planes), and two
-    // notes.
-    assert_eq!(lines.len(), 4 + 7 + 6 + 2);
-    assert!(table.contains("\nblind, break-even: within 0.10 m\n"), "{table}");
-    assert!(lines[4].starts_with("olc  ") && lines[4].contains("58.6 %"), "{table}");
-    assert!(lines[5].starts_with("olc  ") && lines[5].contains("92.3 %"), "{table}");
-    assert!(lines[3..].iter().all(|line| line.len() <= 100));
 }
 
 #[test]

@@ -194,30 +194,6 @@ fn the_page_begins_with_what_an_attacker_paints_from_the_released_data() {
 }
 
 #[test]
-fn a_picture_that_was_poor_without_protection_is_called_so() {
-    let document = painted_document();
-    let mut poor = inversion(&document, |_| 0.4);
-    let said = "Even from the true points this network paints a poor picture (similarity to the photo: SSIM 0.43 of 1).";
-    assert!(
-        !painted_page(&document, vec![poor.clone()], false).contains("Even from the true points")
-    );
-    poor.baseline.likeness.ssim = 0.43;
-    assert!(painted_page(&document, vec![poor], false).contains(said));
-}
-
-#[test]
-fn two_photos_show_two_schemes() {
-    let document = painted_document();
-    let all = || inversion(&document, |_| 0.48);
-    let found = painted_page(&document, vec![all(), all(), all()], false);
-    assert_eq!(found.matches("<div class=\"exhibit").count(), 3);
-    assert!(
-        found.contains("(LINES2D, neighbors by descriptor overlap)")
-            && found.contains("(CP2D, neighbors by descriptor overlap)")
-    );
-}
-
-#[test]
 fn only_the_strongest_attacks_are_shown_at_first() {
     let document = painted_document();
     let found = painted_page(&document, vec![inversion(&document, |_| 0.4)], false);
