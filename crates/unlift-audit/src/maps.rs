@@ -150,8 +150,8 @@ const USUAL_K: usize = 50;
 /// and doubts about the input are in the result.
 ///
 /// # Errors
-/// If a file cannot be read, if a scale is given and coordinates are not lengths, if the scale
-/// makes lengths meaningless, or if too few points are left.
+/// If a file cannot be read, if the scale makes lengths meaningless, or if too few points are
+/// left.
 pub fn open(
     path: &Path,
     descriptors: Option<&Path>,
@@ -163,12 +163,6 @@ pub fn open(
         let error = Error::from(error);
         if is_other { error.advise(way_out) } else { error }
     })?;
-    if let (true, Some(scale)) = (input.is_geographic, preparation.scale) {
-        let error = format!(
-            "--scale {scale}: expected a map with lengths, found degrees of longitude and latitude"
-        );
-        return Err(Error::request(error).advise("a map that is projected, in meters"));
-    }
     check_scale(&input.positions, preparation.scale)?;
     let mut rows = descriptors.map(|file| read::descriptors(file, &input)).transpose()?;
     if preparation.colors {

@@ -90,16 +90,8 @@ impl Error {
         Self { path: path.into(), kind: Kind::Core(source) }
     }
 
-    /// `path` needs a reader that was not compiled.
-    #[cfg(not(all(feature = "hdf5", feature = "sqlite", feature = "scans", feature = "parquet")))]
-    pub(crate) fn needs_feature(path: impl Into<PathBuf>, feature: &str) -> Self {
-        let expected = format!("unlift-io with the feature `{feature}`");
-        Self::new(path, "", expected, "a build without it")
-    }
-
     /// Adds a prefix to the place of the error: `images.parquet: image a.jpg, column x: expected
     /// ...`.
-    #[cfg_attr(not(feature = "parquet"), expect(dead_code))]
     pub(crate) fn within(self, what: &str) -> Self {
         let kind = match self.kind {
             Kind::Content { place: Place::Whole, expected, found } => {

@@ -30,20 +30,9 @@
 //! # Ok(())
 //! # }
 //! ```
-//!
-//! Each feature compiles the crates that read one group of formats. All are on by default. Without
-//! a feature, the error about such a file names the feature.
-//!
-//! | feature | reads |
-//! | --- | --- |
-//! | `hdf5` | Features of images in hloc's HDF5 files; writing them needs no feature. |
-//! | `sqlite` | COLMAP's `database.db`. |
-//! | `scans` | E57; LAS and PCD need no feature. |
-//! | `parquet` | Stage files, which it also writes: without it, the functions of [`stage`] do not exist. |
 
 pub mod atomic;
 pub mod clouds;
-#[cfg_attr(not(feature = "sqlite"), path = "absent/database.rs")]
 mod database;
 mod error;
 pub mod features;
@@ -51,7 +40,6 @@ mod guard;
 pub mod hash;
 pub mod input;
 pub mod read;
-#[cfg_attr(not(feature = "parquet"), path = "absent/stage.rs")]
 pub mod stage;
 
 pub use error::{Error, Place};

@@ -54,18 +54,11 @@ fn maps_are_read_as_their_makers_meant_them() {
         ("f09-ply-lists/faces_first.ply", 300, 0, 1e-4, ""),
         ("f09-ply-lists/views.ply", 300, 0, 1e-4, ""),
         ("f09-ply-lists/views_ascii.ply", 300, 0, 1e-4, ""),
-        ("f10-integers/int.pcd", 300, 0, 0.51, ""),
-        ("f10-integers/short.pcd", 300, 0, 0.51, ""),
         ("f10-integers/short.ply", 300, 0, 0.51, ""),
-        ("f11-pcd-spelling/columns.pcd", 300, 0, 1e-4, ""),
-        ("f11-pcd-spelling/commas.pcd", 300, 0, 1e-4, ""),
-        ("f11-pcd-spelling/lower_type.pcd", 300, 0, 1e-4, ""),
-        ("f11-pcd-spelling/upper_fields.pcd", 300, 0, 1e-4, ""),
         ("f12-ply-in-model/sparse/0", 300, 2, 1e-4, "points3D.ply: read"),
         ("f12-ply-in-model/dense-project", 300, 2, 1e-4, ""),
         ("f17-count-line/comment_count.xyz", 300, 0, 1e-4, ""),
         ("f17-count-line/count.xyz", 300, 0, 1e-4, ""),
-        ("f18-packed-splats/compressed.ply", 300, 0, 0.02, "only their centers are read"),
     ];
     for &(name, n, n_cameras, tolerance, note) in rows {
         let Input { positions, cameras, notes, doubts, .. } =

@@ -194,8 +194,8 @@ to the map fails.
 
 Exit codes: 0 done, 1 a gate failed, 2 wrong usage, 3 bad input.")]
 pub struct AuditMapArgs {
-    /// A COLMAP model or project folder, a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler
-    /// or NVM, or a .ply, .csv, .xyz, .txt, .asc, .pts, .npy, .npz, .las, .pcd, .e57 or .splat file
+    /// A COLMAP model or project folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply,
+    /// .csv, .xyz, .txt, .asc, .pts, .npy, .npz or .splat file
     #[arg(value_name = "PATH")]
     pub path: PathBuf,
     #[command(flatten)]

@@ -31,18 +31,6 @@ impl Bytes {
         Ok(Self::continuing(path, BufReader::new(file), 0, len))
     }
 
-    /// Reads the rest and returns true if it is at most 64 KiB of zeros, which PCL's writer
-    /// appends.
-    pub fn is_padding(&mut self) -> Result<bool, Error> {
-        let n = self.remaining();
-        if n > 1 << 16 {
-            return Ok(false);
-        }
-        let mut rest = vec![0; n as usize];
-        self.fill(&mut rest, "data after the points")?;
-        Ok(rest.iter().all(|&byte| byte == 0))
-    }
-
     /// Creates a reader of a file of `len` bytes of which `at` were already read.
     pub fn continuing(path: &Path, reader: BufReader<File>, at: u64, len: u64) -> Self {
         Self { path: path.to_owned(), reader, part: Part::Header, value_at: at, at, len }

@@ -29,8 +29,6 @@ pub struct Input {
     pub notes: Vec<String>,
     /// Reasons why results may be wrong. No gate holds with one.
     pub doubts: Vec<String>,
-    /// True if the file states that coordinates are degrees of longitude and latitude.
-    pub is_geographic: bool,
     /// The folder of the COLMAP model, if the input is one.
     pub model: Option<PathBuf>,
     /// The COLMAP database of the project, if one is found.
@@ -94,9 +92,6 @@ impl Input {
         {
             let of = self.positions.len();
             notes.push(format!("{n} of {of} points are at exactly one place, {place:?}"));
-        }
-        if self.is_geographic {
-            self.doubts.push("coordinates are degrees, not lengths: project them first".to_owned());
         }
         notes.append(&mut self.notes);
         self.notes = notes;

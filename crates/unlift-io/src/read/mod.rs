@@ -14,7 +14,6 @@ mod others;
 mod ply;
 mod pose;
 mod scalar;
-mod scans;
 mod table;
 mod undeclared;
 
@@ -31,8 +30,8 @@ use models::Model;
 /// Reads the map at `path`.
 ///
 /// `path` is a COLMAP model folder, a project folder that contains one (of several, the one with
-/// the most points), a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or VisualSFM (NVM),
-/// or a point cloud; `EXPECTED` lists the extensions. Points whose coordinates are not finite are
+/// the most points), a map of OpenSfM, nerfstudio, Bundler or VisualSFM (NVM), or a point cloud;
+/// `EXPECTED` lists the extensions. Points whose coordinates are not finite are
 /// left out and counted.
 ///
 /// # Errors
@@ -58,22 +57,38 @@ pub fn is_project(path: &Path) -> bool {
     path.is_dir() && (matches!(Model::find(path), Ok(Some(_))) || others::in_folder(path).is_some())
 }
 
-const EXPECTED: &str = "a COLMAP folder, a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or NVM, or a .ply, \
-                        .csv, .xyz, .txt, .asc, .pts, .npy, .npz, .las, .pcd, .e57 or .splat file";
+const EXPECTED: &str = "a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, \
+                        .txt, .asc, .pts, .npy, .npz or .splat file";
 
-/// Describes an unsupported file, and how to convert it.
-fn not_read(extension: &str) -> String {
-    let more = match extension {
-        "" => return "a file without extension".to_owned(),
-        "laz" => " (convert it: pdal translate IN.laz OUT.las)",
-        "h5" | "hdf5" => {
-            " (features of images: use unlift audit images, or --descriptors with a COLMAP model)"
-        }
-        "spz" | "ksplat" | "sog" => " (export it as .ply)",
-        "abc" => " (convert it to .sfm with ConvertSfMFormat of Meshroom)",
-        _ => "",
+/// Files that are not read, by extension or file name, and how to convert them.
+const CONVERSIONS: [(&str, &str); 12] = [
+    ("las", "convert it: CloudCompare -O in.las -SAVE_CLOUDS, or pdal translate in.las out.ply"),
+    ("laz", "convert it: CloudCompare -O in.laz -SAVE_CLOUDS, or pdal translate in.laz out.ply"),
+    ("e57", "convert it: CloudCompare -O in.e57 -SAVE_CLOUDS, or pdal translate in.e57 out.ply"),
+    ("pcd", "convert it: CloudCompare -O in.pcd -SAVE_CLOUDS, or Open3D"),
+    ("sfm_data.json", "export the map of OpenMVG to COLMAP: openMVG_main_openMVG2Colmap"),
+    ("sfm", "export the map of Meshroom to COLMAP: aliceVision_exportColmap"),
+    ("abc", "export the map of Meshroom to COLMAP: aliceVision_exportColmap"),
+    ("spz", "export it as .ply"),
+    ("ksplat", "export it as .ply"),
+    ("sog", "export it as .ply"),
+    ("h5", FEATURES),
+    ("hdf5", FEATURES),
+];
+const FEATURES: &str =
+    "features of images: use unlift audit images, or --descriptors with a COLMAP model";
+
+/// Returns the error for a file of a format that is not read.
+fn not_read(path: &Path) -> Error {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let found = match &*extension {
+        "" => "a file without extension".to_owned(),
+        extension => format!("a .{extension} file"),
     };
-    format!("a .{extension} file{more}")
+    let conversion = CONVERSIONS.iter().find(|(known, _)| *known == extension || *known == name);
+    let found = conversion.map_or(found.clone(), |(_, how)| format!("{found} ({how})"));
+    Error::new(path, "", EXPECTED, found)
 }
 
 fn table_of(path: &Path) -> Result<Input, Error> {
@@ -113,13 +128,11 @@ fn file(path: &Path) -> Result<Input, Error> {
         (_, "csv" | "xyz" | "txt" | "asc" | "pts") => table_of(path)?,
         (_, "npy") => npy::positions(path)?,
         (_, "npz") => npz::positions(path)?,
-        (_, "las") => scans::las::read(path)?,
-        (_, "pcd") => scans::pcd::read(path)?,
-        (_, "e57") => scans::e57::read(path)?,
-        (_, "json" | "sfm") => others::json::read(path)?,
+        ("sfm_data", "json") => return Err(not_read(path)),
+        (_, "json") => others::json::read(path)?,
         (_, "out") => others::bundler::read(path)?,
         (_, "nvm") => others::nvm::read(path)?,
-        (_, other) => return Err(Error::new(path, "", EXPECTED, not_read(other))),
+        _ => return Err(not_read(path)),
     };
     input.files.insert(0, path.to_owned());
     Ok(input)

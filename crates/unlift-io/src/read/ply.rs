@@ -84,11 +84,10 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     let vertex = header.elements.iter().position(|e| e.name == b"vertex");
     let vertex = vertex.ok_or_else(|| refuse("an element vertex".to_owned()))?;
     let element = &header.elements[vertex];
-    let packed = element.find(["packed_position"]);
-    let axes = element.find(["x", "y", "z"]);
-    if let (Err(name), Err(_)) = (&axes, &packed) {
-        return Err(refuse(format!("a property {name} in element vertex")));
-    }
+    let axes = element.find(["x", "y", "z"]).map_err(|name| match element.find(["packed_position"]) {
+        Ok(_) => Error::new(path, "header", "x, y and z", "packed splats (export them unpacked)"),
+        Err(_) => refuse(format!("a property {name} in element vertex")),
+    })?;
     let mut rows = match header.encoding {
         Encoding::Ascii => {
             lines.expect_room(element.count, "vertices", element.properties.len() as u64)?;
@@ -96,28 +95,12 @@ pub fn read(path: &Path) -> Result<Input, Error> {
         }
         encoding => Rows::Binary(lines.into_bytes(), encoding == Encoding::Big),
     };
-    let mut boxes = Vec::new();
     for before in &header.elements[..vertex] {
-        match before.find(BOX).ok().filter(|_| axes.is_err()) {
-            Some(sides) => boxes = rows.read(before, sides)?,
-            None => drop(rows.read(before, [])?),
-        }
+        rows.read(before, [])?;
     }
-    let positions = match (axes, packed) {
-        (Ok(axes), _) => rows.read(element, axes)?,
-        (Err(_), Ok(packed)) => {
-            if (boxes.len() as u64).saturating_mul(PER_BOX) < element.count {
-                let expected = format!("an element chunk, a row per {PER_BOX} packed splats");
-                return Err(Error::new(path, "header", expected, boxes.len().to_string()));
-            }
-            let all = rows.read(element, packed)?.into_iter().enumerate();
-            all.map(|(at, [packed])| unpacked(packed as u32, &boxes[at / PER_BOX as usize]))
-                .collect()
-        }
-        (Err(_), Err(_)) => Vec::new(),
-    };
+    let positions = rows.read(element, axes)?;
     let more = rows.more(element, &header.elements[vertex + 1..])?;
-    let is_splat = element.find(["opacity", "scale_0", "rot_0"]).is_ok() || axes.is_err();
+    let is_splat = element.find(["opacity", "scale_0", "rot_0"]).is_ok();
     Ok(Input {
         positions,
         format: match header.encoding {
@@ -132,19 +115,6 @@ pub fn read(path: &Path) -> Result<Input, Error> {
 }
 
 const SPLATS: &str = "Gaussian splats: only their centers are read";
-/// The number of packed splats that share a box, and the corners of that box.
-const PER_BOX: u64 = 256;
-const BOX: [&str; 6] = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"];
-
-/// Decodes a center in 11, 10 and 11 bits of a box, as PlayCanvas packs it.
-fn unpacked(packed: u32, sides: &[f64; 6]) -> [f64; 3] {
-    let parts = [(packed >> 21, 2047), (packed >> 11 & 1023, 1023), (packed & 2047, 2047)];
-    std::array::from_fn(|axis| {
-        let (low, high, (part, of)) = (sides[axis], sides[axis + 3], parts[axis]);
-        low + (high - low) * f64::from(part) / f64::from(of)
-    })
-}
-
 /// Reads the centers of splats in antimatter15's format: 32 bytes each, which begin with three
 /// floats.
 pub fn splats(path: &Path) -> Result<Input, Error> {

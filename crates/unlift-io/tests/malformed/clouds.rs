@@ -118,10 +118,10 @@ pub fn paths() -> Vec<Row> {
         row("empty folder", vec![("project/", vec![])], "project",
             "project: expected points3D.bin or points3D.txt in it, or in sparse, model, models, colmap/sparse or a numbered folder of these, found none"),
         alone("unknown extension", "a.laz", "LASF",
-            "a.laz: expected a COLMAP folder, a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .asc, .pts, .npy, .npz, .las, .pcd, .e57 or .splat file, found a .laz file (convert it: pdal translate IN.laz OUT.las)"),
+            "a.laz: expected a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .asc, .pts, .npy, .npz or .splat file, found a .laz file (convert it: CloudCompare -O in.laz -SAVE_CLOUDS, or pdal translate in.laz out.ply)"),
         alone("images given by themselves", "images.bin", "",
             "images.bin: expected a file with points, found another file of a COLMAP model (give its folder)"),
         alone("a database", "database.db", "SQLite format 3",
-            "database.db: expected a COLMAP folder, a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .asc, .pts, .npy, .npz, .las, .pcd, .e57 or .splat file, found a .db file"),
+            "database.db: expected a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .asc, .pts, .npy, .npz or .splat file, found a .db file"),
     ]
 }

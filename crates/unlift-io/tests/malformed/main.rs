@@ -4,7 +4,6 @@
 mod clouds;
 mod colmap;
 mod descriptors;
-mod scans;
 mod sweeps;
 
 use std::fs;
@@ -89,9 +88,6 @@ fn every_malformed_file_is_refused_with_its_line() {
         clouds::tables(),
         clouds::arrays(),
         clouds::paths(),
-        scans::las(),
-        scans::pcd(),
-        scans::e57(),
     ];
     for row in tables.into_iter().flatten() {
         let dir = tempfile::tempdir().unwrap();

@@ -6,7 +6,6 @@ mod habits;
 mod models;
 mod others;
 mod places;
-mod scans;
 
 use std::fs;
 use std::path::{Path, PathBuf};

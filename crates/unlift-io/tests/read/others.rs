@@ -87,55 +87,6 @@ fn opensfm(points: &[[f64; 3]]) -> String {
     )
 }
 
-/// Three views, two of them with a pose.
-fn openmvg() -> String {
-    let poses: Vec<String> = (0..2)
-        .map(|at| {
-            let rows = ROTATIONS[at].map(|row| array(&row)).join(", ");
-            format!(
-                r#"{{"key": {at}, "value": {{"rotation": [{rows}], "center": {}}}}}"#,
-                array(&CENTERS[at])
-            )
-        })
-        .collect();
-    let points = POINTS.map(|point| {
-        format!(
-            r#"{{"key": 7, "value": {{"X": {}, "observations": [{{"key": 0}}]}}}}"#,
-            array(&point)
-        )
-    });
-    format!(
-        r#"{{"sfm_data_version": "0.3", "root_path": "photos", "views": [{{"key": 0}}, {{"key": 1}}, {{"key": 2}}], "intrinsics": [],
-           "extrinsics": [{}], "structure": [{}], "control_points": []}}"#,
-        poses.join(", "),
-        points.join(", ")
-    )
-}
-
-/// Numbers are strings, and matrices are column-major.
-fn meshroom() -> String {
-    let text = |values: &[f64]| {
-        format!("[{}]", values.iter().map(|x| format!("\"{x}\"")).collect::<Vec<_>>().join(", "))
-    };
-    let poses: Vec<String> = (0..2)
-        .map(|at| {
-            let r = &ROTATIONS[at];
-            let columns: Vec<f64> = (0..3).flat_map(|c| r.map(|row| row[c])).collect();
-            let (rotation, center) = (text(&columns), text(&CENTERS[at]));
-            format!(r#"{{"poseId": "{at}", "pose": {{"transform": {{"rotation": {rotation}, "center": {center}}}, "locked": "0"}}}}"#)
-        })
-        .collect();
-    let points = POINTS.map(|point| {
-        format!(r#"{{"landmarkId": "3", "color": ["1", "2", "3"], "X": {}}}"#, text(&point))
-    });
-    format!(
-        r#"{{"version": ["1", "2", "0"], "featuresFolders": [""], "views": [{{"viewId": "0"}}, {{"viewId": "1"}}],
-           "intrinsics": [], "poses": [{}], "structure": [{}]}}"#,
-        poses.join(", "),
-        points.join(", ")
-    )
-}
-
 fn nerfstudio(cloud: &str) -> String {
     let frames: Vec<String> = (0..2)
         .map(|at| {
@@ -192,17 +143,13 @@ fn every_form_gives_the_same_points_and_cameras() {
     let input = read::open(&put("sfm/reconstruction.json", &several)).unwrap();
     same(&input, "OpenSfM");
     assert_eq!(input.notes, ["read, the largest of 2 reconstructions (3 points)"]);
-    let input = read::open(&put("mvg/sfm_data.json", &openmvg())).unwrap();
-    same(&input, "OpenMVG");
-    assert_eq!(input.notes, ["1 of 3 cameras have no place"]);
-    same(&read::open(&put("scene.sfm", &meshroom())).unwrap(), "Meshroom");
     same(&read::open(&put("map.json", &opensfm(&POINTS))).unwrap(), "OpenSfM");
     put("nerf/sparse_pc.ply", &ply());
     let input = read::open(&put("nerf/transforms.json", &nerfstudio("\"sparse_pc.ply\""))).unwrap();
     same(&input, "nerfstudio");
     assert_eq!(input.files.len(), 2);
     for (name, format) in
-        [("bundler", "Bundler"), ("sfm", "OpenSfM"), ("mvg", "OpenMVG"), ("nerf", "nerfstudio")]
+        [("bundler", "Bundler"), ("sfm", "OpenSfM"), ("nerf", "nerfstudio")]
     {
         assert!(read::is_project(&folder.path().join(name)));
         same(&read::open(&folder.path().join(name)).unwrap(), format);
@@ -241,7 +188,7 @@ fn what_is_wrong_is_told_with_its_line() {
         ("[{\"id\": 0, \"position\": [1, 2, 3]}]", "JSON with id, position"),
         ("{\"images\": [], \"categories\": [], \"points\": [[1, 2]]}", ""),
     ] {
-        let expected = "a.json: expected a map of OpenSfM, OpenMVG, Meshroom or nerfstudio, found ";
+        let expected = "a.json: expected a map of OpenSfM or nerfstudio, found ";
         let line = line("a.json", text);
         assert!(line == format!("{expected}{found}") || found.is_empty(), "{line}");
     }
@@ -263,7 +210,7 @@ fn what_is_wrong_is_told_with_its_line() {
     assert!(line("transforms.json", &nerfstudio("\"none.ply\"")).contains("none.ply: expected"));
     assert!(
         line("a.laz", "LASF")
-            .contains("found a .laz file (convert it: pdal translate IN.laz OUT.las)")
+            .contains("or pdal translate in.laz out.ply)")
     );
     assert!(read::open(Path::new("no such folder")).is_err());
 }

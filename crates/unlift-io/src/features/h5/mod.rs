@@ -4,14 +4,11 @@
 //! the whole file in memory, or rewrites a group's list of names at every addition, which is
 //! quadratic in images.
 
-#[cfg(all(test, feature = "hdf5"))]
+#[cfg(test)]
 mod hostile;
-#[cfg(feature = "hdf5")]
 mod links;
 mod messages;
-#[cfg_attr(not(feature = "hdf5"), path = "../../absent/hdf5.rs")]
 mod read;
-#[cfg(feature = "hdf5")]
 mod source;
 mod tree;
 mod write;

@@ -1,5 +1,5 @@
-//! Reads maps in JSON as a stream, distinguished by their keys: OpenSfM, OpenMVG's `sfm_data.json`,
-//! Meshroom's `.sfm`, nerfstudio's `transforms.json`.
+//! Reads maps in JSON as a stream, distinguished by their keys: OpenSfM's `reconstruction.json` and
+//! nerfstudio's `transforms.json`.
 
 use std::fmt;
 use std::io::{self, BufRead, BufReader, Read};
@@ -45,25 +45,22 @@ pub fn read(path: &Path) -> Result<Input, Error> {
         };
         return Err(Error::new(path, "", MAPS, found));
     };
-    let Object { mut found, n_views, cloud, .. } = object;
+    let Object { mut found, cloud, .. } = object;
     found.format = format;
     if n > 1 {
         let points = found.positions.len();
         found.notes.push(format!("read, the largest of {n} reconstructions ({points} points)"));
     }
     if found.positions.is_empty() && format != "nerfstudio" {
-        let expected = "points (Meshroom: convert the .abc file with ConvertSfMFormat; OpenMVG: the file of the reconstruction)";
-        return Err(Error::new(path, "", expected, "only cameras"));
+        return Err(Error::new(path, "", "points", "only cameras"));
     }
-    let n_poses = found.cameras.len() + found.n_unplaced;
-    found.n_unplaced += n_views.saturating_sub(n_poses);
     if format == "nerfstudio" {
         with_cloud(path, &mut found, cloud)?;
     }
     Ok(found)
 }
 
-const MAPS: &str = "a map of OpenSfM, OpenMVG, Meshroom or nerfstudio";
+const MAPS: &str = "a map of OpenSfM or nerfstudio";
 
 /// A reader that replaces `NaN` and `Infinity`, which other programs write, by an empty string.
 struct Strict<R> {
@@ -153,7 +150,6 @@ enum Top {
 struct Object {
     names: Vec<String>,
     found: Input,
-    n_views: usize,
     cloud: Option<PathBuf>,
 }
 
@@ -162,10 +158,6 @@ impl Object {
         let has = |name: &str| self.names.iter().any(|its| its == name);
         Some(match () {
             () if has("frames") => "nerfstudio",
-            () if has("sfm_data_version") => "OpenMVG",
-            () if has("views") && ["structure", "poses", "intrinsics"].into_iter().any(has) => {
-                "Meshroom"
-            }
             () if has("shots") && has("points") => "OpenSfM",
             () => return None,
         })
@@ -231,36 +223,6 @@ struct Point {
     coordinates: [Number; 3],
 }
 
-/// A point of OpenMVG (in its `value`) or of Meshroom.
-#[derive(Deserialize)]
-struct Landmark {
-    value: Option<Box<Landmark>>,
-    #[serde(rename = "X")]
-    place: Option<[Number; 3]>,
-}
-
-#[derive(Deserialize)]
-struct Extrinsic {
-    value: Pose<[[Number; 3]; 3]>,
-}
-
-#[derive(Deserialize)]
-struct Pose<R> {
-    rotation: R,
-    center: [Number; 3],
-}
-
-#[derive(Deserialize)]
-struct PoseOfView {
-    pose: Option<Transform>,
-}
-
-#[derive(Deserialize)]
-struct Transform {
-    /// Column-major.
-    transform: Pose<[Number; 9]>,
-}
-
 #[derive(Deserialize)]
 struct Frame {
     /// The pose from camera (y is up) to world.
@@ -282,15 +244,10 @@ fn rotation(vector: [f64; 3]) -> [[f64; 3]; 3] {
     })
 }
 
-/// Returns center and up direction of a camera with `x_cam = R (x - center)` and y down.
-fn turned(rotation: &[[f64; 3]; 3], center: [f64; 3]) -> ([f64; 3], [f64; 3]) {
-    (center, camera(rotation, &[0.0; 3], DOWNWARD).1)
-}
-
 impl Object {
     /// Reads the value of the last key in `names`.
     fn take<'de, A: MapAccess<'de>>(&mut self, json: &mut A) -> Result<(), A::Error> {
-        let Self { names, found, n_views, cloud } = self;
+        let Self { names, found, cloud } = self;
         match names.last().map_or("", String::as_str) {
             "shots" => {
                 json.next_value_seed(Items::new(|Shot { rotation: vector, translation }| {
@@ -301,22 +258,6 @@ impl Object {
             "points" => json.next_value_seed(Items::new(|Point { coordinates }| {
                 found.positions.push(numbers(coordinates));
             })),
-            "structure" => json.next_value_seed(Items::new(|landmark: Landmark| {
-                let place = landmark.value.map_or(landmark.place, |value| value.place);
-                found.positions.push(place.map_or([f64::NAN; 3], numbers));
-            })),
-            "extrinsics" => json.next_value_seed(Items::new(|Extrinsic { value }| {
-                let rotation = value.rotation.map(numbers);
-                found.camera(Some(turned(&rotation, numbers(value.center))));
-            })),
-            "poses" => json.next_value_seed(Items::new(|PoseOfView { pose }| {
-                found.camera(pose.map(|Transform { transform }| {
-                    let columns = numbers(transform.rotation);
-                    let row = |row: usize| std::array::from_fn(|c| columns[3 * c + row]);
-                    turned(&std::array::from_fn(row), numbers(transform.center))
-                }));
-            })),
-            "views" => json.next_value_seed(Items::new(|_: IgnoredAny| *n_views += 1)),
             "frames" => json.next_value_seed(Items::new(|frame: Frame| {
                 let mut rows = frame.transform_matrix.into_iter().map(numbers);
                 let rows: [_; 3] = std::array::from_fn(|_| rows.next().unwrap_or([f64::NAN; 4]));

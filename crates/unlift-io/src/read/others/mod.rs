@@ -7,11 +7,10 @@ pub mod nvm;
 use std::path::{Path, PathBuf};
 
 /// The files to look for in a folder without a COLMAP model, in this order.
-const IN_FOLDERS: [&str; 6] = [
+const IN_FOLDERS: [&str; 5] = [
     "reconstruction.json",
     "opensfm/reconstruction.json",
     "transforms.json",
-    "sfm_data.json",
     "bundle.out",
     "bundle/bundle.out",
 ];
