@@ -10,15 +10,13 @@ use std::fs::{self, DirBuilder, File, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
-use crate::{Error, stage};
+use crate::{Error, features, stage};
 
 const PARTIAL: &str = ".unlift-partial";
 pub(crate) const CLOUD_COMMENT: &str = "unlift";
 /// The first line of each file of a COLMAP model.
 pub(crate) const MODEL_MARK: &str = "# unlift model";
 const MODEL_MARKS: &[&[u8]] = &[MODEL_MARK.as_bytes()];
-/// A mark after the superblock of an HDF5 file. No HDF5 structure refers to it.
-pub(crate) const FEATURES_MARK: &[u8; 32] = b"unlift features, format 1\0\0\0\0\0\0\0";
 /// A PNG chunk: length, the text "Software: unlift", checksum.
 const PICTURE_MARK: &[u8; 27] = b"\0\0\0\x0ftEXtSoftware\0unlift\xfe\xc8\xcb\xd5";
 
@@ -58,7 +56,7 @@ impl Kind {
             Self::Stage(_) => ("a stage file of this kind", 0, &[]),
             Self::Cloud => ("a cloud", 40, &[b"\ncomment unlift\n", b"# unlift\n"]),
             Self::Model => ("a model", 0, MODEL_MARKS),
-            Self::Features => ("features", 96, &[FEATURES_MARK]),
+            Self::Features => ("features", 0, &[]),
             Self::Picture => ("a picture", 33, &[PICTURE_MARK]),
             Self::Junit => ("gates as JUnit XML", 40, &[b"<testsuites name=\"unlift\""]),
             Self::Table => ("a table", 0, &[b"scheme,neighbors,", b"% unlift ", b"<!-- unlift "]),
@@ -68,8 +66,10 @@ impl Kind {
 
     /// Returns true if the file at `path` is of this kind, and false if it cannot be read.
     pub fn is_at(self, path: &Path) -> bool {
-        if let Self::Stage(kind) = self {
-            return stage::declared_kind(path) == Some(kind);
+        match self {
+            Self::Stage(kind) => return stage::declared_kind(path) == Some(kind),
+            Self::Features => return features::is_ours(path),
+            _ => {}
         }
         let (mut head, (_, max_offset, marks)) = (Vec::new(), self.marks());
         let _ = File::open(path).and_then(|file| file.take(2048).read_to_end(&mut head));
@@ -189,6 +189,11 @@ impl OutputFile {
     /// The path as the caller gave it, for errors.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// The path of the unfinished file, for writers that open it by themselves.
+    pub(crate) fn partial(&self) -> &Path {
+        &self.partial
     }
 
     /// The buffered writer of the unfinished file.

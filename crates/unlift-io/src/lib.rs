@@ -33,7 +33,6 @@
 
 pub mod atomic;
 pub mod clouds;
-mod database;
 mod error;
 pub mod features;
 mod guard;

@@ -1,20 +1,17 @@
-//! Exports of points and lines for other programs.
+//! Exports of points and lines for other programs: PLY, OBJ and COLMAP models in text.
 
 mod colmap;
-mod color;
-mod obj;
-mod ply;
-mod segments;
 
+use std::io::{self, Write};
 use std::path::Path;
 
+use unlift::geometry::frame::Bounds;
+use unlift::released::{Obfuscation, Released};
+
 use crate::Error;
+use crate::atomic::{self, Access, CLOUD_COMMENT};
 
 pub use colmap::{write_cameras, write_images, write_model_points};
-pub use color::error_color;
-pub use obj::write_lines;
-pub use ply::{write_points, write_recovered};
-pub use segments::{Segment, record_segments};
 
 /// Returns an error if a coordinate of the `row`-th `what` is not finite.
 fn finite<const D: usize, const N: usize>(
@@ -27,4 +24,233 @@ fn finite<const D: usize, const N: usize>(
     }
     let found = if N == 1 { format!("{:?}", points[0]) } else { format!("{points:?}") };
     Err(Error::new(path, format!("{what} {row}"), "finite coordinates", found))
+}
+
+/// Writes `points` `(n, D)` as binary little-endian PLY.
+///
+/// The columns are `double x, y, z` (z is 0 in 2D).
+///
+/// # Errors
+/// When a coordinate is not finite, or the file cannot be written.
+pub fn write_points<const D: usize>(path: &Path, points: &[[f64; D]]) -> Result<(), Error> {
+    for (row, point) in points.iter().enumerate() {
+        finite(path, ("point", row), &[*point])?;
+    }
+    atomic::write_file(path, Access::Private, |w| {
+        header(w, points.len(), "")?;
+        points.iter().try_for_each(|point| coordinates(w, point))
+    })
+}
+
+/// Writes recovered points as PLY, colored by their `errors` (distance to the original).
+///
+/// The columns are those of [`write_points`], then `uchar red, green, blue, float error`. Lost points (`None`) are omitted.
+/// Colors are those of [`error_color`] with `full_scale`, in the unit of the points.
+///
+/// # Errors
+/// When a coordinate is not finite, `errors` has another length, or the file cannot be written.
+pub fn write_recovered<const D: usize>(
+    path: &Path,
+    points: &[Option<[f64; D]>],
+    errors: &[f64],
+    full_scale: f64,
+) -> Result<(), Error> {
+    if errors.len() != points.len() {
+        let expected = format!("{} errors", points.len());
+        return Err(Error::new(path, "", expected, errors.len().to_string()));
+    }
+    for (row, point) in points.iter().enumerate() {
+        if let Some(point) = point {
+            finite(path, ("point", row), &[*point])?;
+        }
+    }
+    let n_found = points.iter().flatten().count();
+    atomic::write_file(path, Access::Private, |w| {
+        header(w, n_found, COLOR_AND_ERROR)?;
+        for (point, &error) in points.iter().zip(errors) {
+            if let Some(point) = point {
+                coordinates(w, point)?;
+                w.write_all(&error_color(error, full_scale))?;
+                w.write_all(&(error as f32).to_le_bytes())?;
+            }
+        }
+        Ok(())
+    })
+}
+
+const COLOR_AND_ERROR: &str =
+    "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float error\n";
+
+fn header(w: &mut impl Write, n: usize, more: &str) -> io::Result<()> {
+    write!(w, "ply\nformat binary_little_endian 1.0\ncomment {CLOUD_COMMENT}\n")?;
+    writeln!(w, "element vertex {n}")?;
+    for axis in ["x", "y", "z"] {
+        writeln!(w, "property double {axis}")?;
+    }
+    writeln!(w, "{more}end_header")
+}
+
+fn coordinates<const D: usize>(w: &mut impl Write, point: &[f64; D]) -> io::Result<()> {
+    for axis in 0..3 {
+        w.write_all(&point.get(axis).copied().unwrap_or(0.0).to_le_bytes())?;
+    }
+    Ok(())
+}
+
+/// Writes `segments` as an OBJ file: two `v` records and one `l` record each. In 2D, z is 0.
+///
+/// # Errors
+/// When a coordinate is not finite, or the file cannot be written.
+pub fn write_lines<const D: usize>(path: &Path, segments: &[Segment<D>]) -> Result<(), Error> {
+    for (row, segment) in segments.iter().enumerate() {
+        finite(path, ("segment", row), segment)?;
+    }
+    atomic::write_file(path, Access::Private, |w| {
+        writeln!(w, "# {CLOUD_COMMENT}")?;
+        for (row, segment) in segments.iter().enumerate() {
+            for end in segment {
+                let [x, y, z] = std::array::from_fn(|c| end.get(c).copied().unwrap_or(0.0));
+                writeln!(w, "v {x} {y} {z}")?;
+            }
+            writeln!(w, "l {} {}", 2 * row + 1, 2 * row + 2)?;
+        }
+        Ok(())
+    })
+}
+
+/// Viridis (matplotlib, CC0) at nine even steps: perceptually uniform, also for color-blind
+/// readers.
+const VIRIDIS: [[u8; 3]; 9] = [
+    [0x44, 0x01, 0x54],
+    [0x47, 0x2d, 0x7b],
+    [0x3b, 0x52, 0x8b],
+    [0x2c, 0x72, 0x8e],
+    [0x21, 0x91, 0x8c],
+    [0x28, 0xae, 0x80],
+    [0x5e, 0xc9, 0x62],
+    [0xad, 0xdc, 0x30],
+    [0xfd, 0xe7, 0x25],
+];
+
+/// Returns the color of an error, by interpolation of viridis: dark violet at 0, green at half of
+/// `full_scale`, yellow from `full_scale` on and for NaN.
+pub fn error_color(error: f64, full_scale: f64) -> [u8; 3] {
+    let last = VIRIDIS.len() - 1;
+    let share = error / full_scale;
+    if share.is_nan() || share >= 1.0 {
+        return VIRIDIS[last];
+    }
+    let at = share.max(0.0) * last as f64;
+    let step = (at as usize).min(last - 1);
+    let part = at - step as f64;
+    std::array::from_fn(|c| {
+        let (low, high) = (f64::from(VIRIDIS[step][c]), f64::from(VIRIDIS[step + 1][c]));
+        (low + part * (high - low)).round() as u8
+    })
+}
+
+/// The two ends of a line segment.
+pub type Segment<const D: usize> = [[f64; D]; 2];
+
+/// Returns the segments of the released lines or rays inside the box from `low` to `high`, in
+/// record order.
+///
+/// Coordinates are in the map's frame (the origin is added). Records that miss the box are left
+/// out. Other families have no segments.
+pub fn record_segments<const D: usize>(
+    released: &Released<D>,
+    low: &[f64; D],
+    high: &[f64; D],
+) -> Vec<Segment<D>> {
+    let origin = released.origin();
+    let placed = |p: [f32; D]| -> [f64; D] { std::array::from_fn(|c| f64::from(p[c]) + origin[c]) };
+    match released.obfuscation() {
+        Obfuscation::Lines(lines) => lines
+            .foot()
+            .iter()
+            .zip(lines.direction())
+            .filter_map(|(&f, d)| clip(&placed(f), &d.map(f64::from), LINE, (low, high)))
+            .collect(),
+        Obfuscation::Rays(rays) => rays
+            .center()
+            .iter()
+            .zip(rays.direction())
+            .filter_map(|(&c, d)| {
+                let center = placed(rays.centers()[usize::from(c)]);
+                clip(&center, &d.map(f64::from), RAY, (low, high))
+            })
+            .collect(),
+        Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => Vec::new(),
+    }
+}
+
+/// The start of a line and of a ray, in lengths of the direction.
+const LINE: f64 = f64::NEG_INFINITY;
+const RAY: f64 = 0.0;
+
+/// Returns the segment of the line or ray through `point` along `direction` inside the box, or
+/// `None` if it misses the box, only touches it, or has no direction.
+fn clip<const D: usize>(
+    point: &[f64; D],
+    direction: &[f64; D],
+    start: f64,
+    (low, high): (&[f64; D], &[f64; D]),
+) -> Option<Segment<D>> {
+    let bounds = Bounds { low: *low, high: *high };
+    let finite = |row: &[f64; D]| row.iter().all(|x| x.is_finite());
+    let is_box = low.iter().zip(high).all(|(low, high)| low <= high);
+    let (from, to) = bounds.clip(point, direction)?;
+    let from = from.max(start);
+    if !(from < to && is_box && finite(point) && finite(direction)) {
+        return None;
+    }
+    // Rounding may leave the box by an ulp.
+    let at = |t: f64| std::array::from_fn(|c| (point[c] + t * direction[c]).clamp(low[c], high[c]));
+    Some([at(from), at(to)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ramp_runs_from_violet_to_yellow_and_odd_values_have_a_color() {
+        let [violet, green, yellow] = [0, 4, 8].map(|step| VIRIDIS[step]);
+        for (error, full_scale, color) in [
+            (0.0, 0.25, violet),
+            (0.125, 0.25, green),
+            (0.25, 0.25, yellow),
+            (99.0, 0.25, yellow),
+            (f64::NAN, 1.0, yellow),
+            (-1.0, 1.0, violet),
+            (0.0, 0.0, yellow),
+        ] {
+            assert_eq!(error_color(error, full_scale), color, "{error} of {full_scale}");
+        }
+    }
+
+    const LOW: [f64; 3] = [0.0; 3];
+    const HIGH: [f64; 3] = [1.0, 2.0, 3.0];
+
+    #[test]
+    fn what_is_within_the_box_stays() {
+        let (x, y, nan) = ([1.0, -1.0, 0.0], [0.0, 1.0, 0.0], [f64::NAN, 0.0, 1.0]);
+        let full = Some([[0.5, 0.0, 1.0], [0.5, 2.0, 1.0]]);
+        for (point, direction, start, expected) in [
+            // A line ends on faces of the box, and a ray starts at its center.
+            ([0.5, 9.0, 1.0], y, LINE, full),
+            ([0.5, 1.0, 1.0], y, RAY, Some([[0.5, 1.0, 1.0], [0.5, 2.0, 1.0]])),
+            ([0.5, 9.0, 1.0], y, RAY, None),
+            // Lines that miss the box, touch it, or have no direction.
+            ([5.0, 5.0, 5.0], y, LINE, None),
+            ([1.0, 2.0, 0.0], x, LINE, None),
+            ([0.5; 3], [0.0; 3], LINE, None),
+            ([0.5; 3], nan, LINE, None),
+        ] {
+            assert_eq!(clip(&point, &direction, start, (&LOW, &HIGH)), expected, "{point:?}");
+        }
+        for high in [[1.0, -1.0, 1.0], [f64::NAN; 3]] {
+            assert_eq!(clip(&[0.5; 3], &y, LINE, (&LOW, &high)), None, "no box");
+        }
+    }
 }

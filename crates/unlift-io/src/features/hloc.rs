@@ -1,116 +1,445 @@
-//! Reads features in hloc's layout: a group per image, an array per kind of feature.
+//! Reads and writes features in hloc's layout: an HDF5 group per image, an array per kind of
+//! feature.
 
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
+use half::f16;
+use hdf5_pure::{
+    AttrValue, DType, Dataset, DatasetBuilder, Datatype, DatatypeByteOrder, File,
+    FileAccessProperties, FileBuilder, FileCreateProperties, FileLocking, FloatingPointLayout,
+    Group, MemoryStrategy, MetadataCacheConfig, ReadSeekSource, Source, SyncPolicy,
+};
 use unlift::Descriptors;
 use unlift::descriptors::Values;
 
-use super::h5::{Array, FeatureStore, Numbers, shape_text, transposed};
-use super::image::ImageFeatures;
-use super::writer::UPRIGHT;
-use crate::atomic::Kind;
+use super::ImageFeatures;
+use crate::atomic::{Access, OutputFile};
 use crate::error::Error;
+use crate::guard::without_panic;
+use crate::input::{self, Budget};
+use crate::read::lines::quoted;
 
-pub(super) struct Hloc(FeatureStore);
+/// The maximum depth of groups, because links may form cycles.
+const MAX_DEPTH: usize = 64;
+/// Bytes of headers that are kept, because a header is read in a dozen pieces.
+const CACHE: usize = 1 << 20;
+/// An attribute of `keypoints`: 1 if they are in pixels of upright photos, else 0.
+const UPRIGHT: &str = "upright";
+const UNCERTAINTY: &str = "uncertainty";
+
+/// An open HDF5 file of features, which is read one array at a time.
+pub(super) struct Hloc {
+    path: PathBuf,
+    budget: Budget,
+    /// Paths of all groups that contain arrays directly, sorted by bytes.
+    names: Vec<String>,
+    /// Open handles: finding a group by path searches all names of the groups above it.
+    groups: Vec<Group>,
+    /// Errors about links that lead to no group.
+    broken: Vec<Error>,
+}
 
 impl Hloc {
+    /// Opens `path` and finds its groups.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        let store = FeatureStore::open(path)?;
+        let file = Self::groups_of(path)?;
         let wrong = |found: &str| {
             let expected = "a group per image with keypoints and descriptors";
             Err(Error::new(path, "", expected, found))
         };
-        if store.paths().is_empty() && !store.alone().is_empty() {
-            return wrong("arrays outside any group");
-        }
-        let first = if store.paths().is_empty() { Vec::new() } else { store.names(0)? };
-        let has = |name: &str| first.iter().any(|its| its == name);
+        let first = if file.names.is_empty() { Vec::new() } else { file.arrays(0)? };
+        let has = |name: &str| first.iter().any(|array| array == name);
         match () {
-            () if has("keypoints") => Ok(Self(store)),
+            () if has("keypoints") => Ok(file),
             () if has("matches0") || has("matches") => wrong("matches of pairs of images"),
             () if has("global_descriptor") => wrong("global descriptors of whole images"),
-            () => Ok(Self(store)),
+            () => Ok(file),
         }
+    }
+
+    fn groups_of(path: &Path) -> Result<Self, Error> {
+        let (_, len) = input::open(path)?;
+        let mut all = Self {
+            path: path.to_owned(),
+            budget: Budget::new(path, len),
+            names: Vec::new(),
+            groups: Vec::new(),
+            broken: Vec::new(),
+        };
+        let (mut groups, broken) = all.step("", "", || {
+            let wrong = |error: hdf5_pure::Error| {
+                Error::new(path, "", "a whole HDF5 file", error.to_string())
+            };
+            let source = ReadSeekSource::new(input::open(path)?.0);
+            let cached =
+                FileAccessProperties::new().with_metadata_cache(MetadataCacheConfig::new(CACHE));
+            let file = File::from_source_with_options(source.map_err(|e| wrong(e.into()))?, cached);
+            let file = file.map_err(wrong)?;
+            let whole = file.superblock().eof_address;
+            if whole > len {
+                let expected = format!("a whole HDF5 file of {whole} bytes");
+                return Err(Error::new(path, "", expected, format!("{len} bytes")));
+            }
+            all.list(&file)
+        })?;
+        groups.sort_unstable_by(|(a, _), (b, _)| a.cmp(b));
+        (all.names, all.groups) = groups.into_iter().unzip();
+        all.broken = broken;
+        Ok(all)
+    }
+
+    /// Lists all groups that contain arrays directly, and errors about broken links.
+    fn list(&self, file: &File) -> Result<(Vec<(String, Group)>, Vec<Error>), Error> {
+        let (mut found, mut broken) = (Vec::new(), Vec::new());
+        let raw = ReadSeekSource::new(input::open(&self.path)?.0)
+            .map_err(|error| self.refuse("", "", error.into()))?;
+        let root = Some(file.superblock().root_group_address);
+        let mut waiting = vec![(String::new(), file.root(), root, 0)];
+        while let Some((path, group, address, depth)) = waiting.pop() {
+            if depth > MAX_DEPTH {
+                let place = format!("group {}", quoted(path.as_bytes()));
+                let expected = format!("groups nested at most {MAX_DEPTH} deep");
+                return Err(Error::new(&self.path, place, expected, "deeper ones, or a cycle"));
+            }
+            let refuse = |error| self.refuse(&path, "", error);
+            let links = address.and_then(|at| links(&raw, at)).unwrap_or_default();
+            let arrays = group.datasets().map_err(refuse)?;
+            let within = |name: &str| match &*path {
+                "" => name.to_owned(),
+                path => format!("{path}/{name}"),
+            };
+            for (name, inside) in group.iter_groups().map_err(refuse)? {
+                let hard = links.iter().find_map(|(link, target)| match target {
+                    Target::Object(address) if *link == name => Some(*address),
+                    _ => None,
+                });
+                waiting.push((within(&name), inside, hard, depth + 1));
+            }
+            // The library skips links by path.
+            for (name, target) in &links {
+                let (target, text) = match target {
+                    Target::Object(_) => continue,
+                    Target::Path(to) => {
+                        let from = if to.starts_with('/') { &file.root() } else { &group };
+                        (from.group(to).ok(), format!("a link to {}", quoted(to.as_bytes())))
+                    }
+                    Target::Elsewhere => (None, "a link to another file".to_owned()),
+                };
+                match target {
+                    Some(target) => waiting.push((within(name), target, None, depth + 1)),
+                    None => {
+                        let expected = "features of an image";
+                        broken.push(self.error(&within(name), "", expected, text));
+                    }
+                }
+            }
+            if path.is_empty() && waiting.is_empty() && !arrays.is_empty() {
+                let expected = "a group per image with keypoints and descriptors";
+                return Err(Error::new(&self.path, "", expected, "arrays outside any group"));
+            }
+            if !path.is_empty() && !arrays.is_empty() {
+                found.push((path, group));
+            }
+        }
+        Ok((found, broken))
+    }
+
+    /// Runs `step` and turns a panic of the library into an error.
+    fn step<T>(
+        &self,
+        image: &str,
+        array: &str,
+        step: impl FnOnce() -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        let damaged = || Err(self.error(image, array, "readable HDF5", "damaged data"));
+        without_panic(step).unwrap_or_else(damaged)
     }
 
     pub fn refused(&self) -> &[Error] {
-        self.0.broken()
+        &self.broken
     }
 
     pub fn names(&self) -> &[String] {
-        self.0.paths()
+        &self.names
     }
 
     pub fn is_upright(&self) -> bool {
-        !self.0.paths().is_empty() && is_upright(&self.0, 0).unwrap_or(false)
+        !self.names.is_empty() && self.attribute(0, UPRIGHT).is_ok_and(|value| value == Some(1.0))
+    }
+
+    fn arrays(&self, at: usize) -> Result<Vec<String>, Error> {
+        let image = &self.names[at];
+        let mut names = self.step(image, "", || {
+            self.groups[at].datasets().map_err(|error| self.refuse(image, "", error))
+        })?;
+        names.sort_unstable();
+        Ok(names)
+    }
+
+    fn array(&self, at: usize, name: &str) -> Result<Array, Error> {
+        let image = &self.names[at];
+        self.step(image, name, || {
+            let refuse = |error| self.refuse(image, name, error);
+            let dataset = self.groups[at].dataset(name).map_err(refuse)?;
+            let shape = dataset.shape().map_err(refuse)?;
+            let count = shape.iter().fold(1u64, |n, &side| n.saturating_mul(side));
+            // A header can declare any size. Values are widened to eight bytes at most.
+            self.budget.admit(self.place(image, name), count.saturating_mul(8))?;
+            let values = numbers(&dataset, count).map_err(refuse)?;
+            let Some(values) = values else {
+                let expected = "floats of 16, 32 or 64 bits, or integers";
+                return Err(self.error(image, name, expected, "another type"));
+            };
+            Ok(Array { shape, values })
+        })
+    }
+
+    /// Returns an attribute of the keypoints of image `at`.
+    fn attribute(&self, at: usize, key: &str) -> Result<Option<f64>, Error> {
+        let (image, name) = (&self.names[at], "keypoints");
+        self.step(image, name, || {
+            let refuse = |error| self.refuse(image, name, error);
+            let dataset = self.groups[at].dataset(name).map_err(refuse)?;
+            let attributes = dataset.attrs().map_err(refuse)?;
+            Ok(attributes.get(key).and_then(AttrValue::as_f64))
+        })
     }
 
     pub fn get(&self, at: usize) -> Result<ImageFeatures, Error> {
-        image(&self.0, at)
+        let name = &self.names[at];
+        let present = self.arrays(at)?;
+        let has = |array: &str| present.iter().any(|name| name == array);
+        let optional = |array: &str| has(array).then(|| self.array(at, array)).transpose();
+        let wrong = |array: &'static str| {
+            move |(expected, found): Wrong| self.error(name, array, expected, found)
+        };
+        let Some(places) = optional("keypoints")? else {
+            let found = format!("only {}", present.join(", "));
+            return Err(self.error(name, "", "an array keypoints", found));
+        };
+        let keypoints = keypoints(&places).map_err(wrong("keypoints"))?;
+        let n = keypoints.len();
+        let per_keypoint = |array: &str| -> Result<Option<Vec<f32>>, Error> {
+            let Some(values) = optional(array)? else { return Ok(None) };
+            if values.shape != [n as u64] && values.shape != [n as u64, 1] {
+                let expected = format!("one value per keypoint, ({n},)");
+                return Err(self.error(name, array, expected, shape_text(&values.shape)));
+            }
+            Ok(Some(values.values.to_f64().into_iter().map(|value| value as f32).collect()))
+        };
+        let descriptors = optional("descriptors")?.map(|array| descriptors(array, n));
+        let size = optional("image_size")?.map(|array| size(&array));
+        Ok(ImageFeatures {
+            name: name.to_owned(),
+            size: size.transpose().map_err(wrong("image_size"))?,
+            descriptors: descriptors.transpose().map_err(wrong("descriptors"))?,
+            scores: per_keypoint("scores")?,
+            scales: per_keypoint("scales")?,
+            orientations_deg: per_keypoint("oris")?,
+            uncertainty_px: self.attribute(at, UNCERTAINTY)?,
+            upright: self.attribute(at, UPRIGHT)? == Some(1.0),
+            keypoints,
+            photo: None,
+        })
+    }
+
+    fn refuse(&self, image: &str, array: &str, error: hdf5_pure::Error) -> Error {
+        self.error(image, array, "readable HDF5", error.to_string())
+    }
+
+    fn error(
+        &self,
+        image: &str,
+        array: &str,
+        expected: impl Into<String>,
+        found: impl Into<String>,
+    ) -> Error {
+        Error::new(&self.path, self.place(image, array), expected, found)
+    }
+
+    fn place(&self, image: &str, array: &str) -> String {
+        match (image, array) {
+            ("", _) => String::new(),
+            (_, "") => format!("image {}", quoted(image.as_bytes())),
+            _ => format!("image {}, {array}", quoted(image.as_bytes())),
+        }
     }
 }
 
-/// Reads the one image of a file that [`encode`](super::encode) made.
+/// Where a link of a group leads.
+enum Target {
+    /// The address of an object.
+    Object(u64),
+    /// A path in the file.
+    Path(String),
+    Elsewhere,
+}
+
+/// Returns names and targets of the links in the object header at `address`, which the library
+/// skips if they are paths. `None` for groups that list their links elsewhere: those of the old
+/// form, and large ones.
 ///
-/// # Errors
-/// When `path` cannot be read, or does not contain exactly the image `name`.
-pub fn decode(path: &Path, name: &str) -> Result<ImageFeatures, Error> {
-    let store = FeatureStore::open(path)?;
-    match store.paths() {
-        [only] if only == name => image(&store, 0),
-        other => {
-            let found = format!("{} images", other.len());
-            Err(Error::new(path, "", format!("only the image {name}"), found))
+/// Source: HDF5 File Format Specification 3.0, IV.A (object headers), IV.A.2.g (the link message).
+fn links(file: &impl Source, address: u64) -> Option<Vec<(String, Target)>> {
+    const LINK: u8 = 0x06;
+    const CONTINUATION: u8 = 0x10;
+    let read = |at: u64, n: u64| file.read_exact_at(at, usize::try_from(n).ok()?).ok();
+    let start = read(address, 6)?;
+    if !start.starts_with(b"OHDR") {
+        return None;
+    }
+    let flags = start[5];
+    let before = 6 + if flags & 0x20 != 0 { 16 } else { 0 } + if flags & 0x10 != 0 { 4 } else { 0 };
+    let width = 1 << (flags & 3);
+    // A flag states that messages have numbers.
+    let head = if flags & 4 != 0 { 6 } else { 4 };
+    let first = address.checked_add(before + width)?;
+    let mut blocks = vec![(first, number(&read(first - width, width)?))];
+    let mut links = Vec::new();
+    let mut at = 0;
+    while let Some(&(start, size)) = blocks.get(at) {
+        let block = read(start, size)?;
+        let mut rest = &block[..];
+        while let Some((message, behind)) = rest.split_at_checked(head) {
+            let Some((body, next)) = behind.split_at_checked(number(&message[1..3]) as usize)
+            else {
+                break;
+            };
+            rest = next;
+            match message[0] {
+                LINK => links.extend(link(body)),
+                CONTINUATION if body.len() >= 16 && blocks.len() < MAX_DEPTH => {
+                    // The block is between a signature and a checksum.
+                    let (at, size) = (number(&body[..8]), number(&body[8..16]));
+                    blocks.push((at.checked_add(4)?, size.checked_sub(8)?));
+                }
+                _ => {}
+            }
+        }
+        at += 1;
+    }
+    Some(links)
+}
+
+fn link(body: &[u8]) -> Option<(String, Target)> {
+    let flags = *body.get(1)?;
+    let mut rest = &body[2..];
+    let mut take = |n: usize| {
+        let (part, behind) = rest.split_at_checked(n)?;
+        rest = behind;
+        Some(part)
+    };
+    let kind = if flags & 8 != 0 { take(1)?[0] } else { 0 };
+    // The order of creation, and the character set.
+    take(if flags & 4 != 0 { 8 } else { 0 } + usize::from(flags & 0x10 != 0))?;
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let n = number(take(1 << (flags & 3))?) as usize;
+    let name = text(take(n)?);
+    let target = match kind {
+        0 => Target::Object(number(take(8)?)),
+        1 => {
+            let n = number(take(2)?) as usize;
+            Target::Path(text(take(n)?))
+        }
+        _ => Target::Elsewhere,
+    };
+    Some((name, target))
+}
+
+fn number(bytes: &[u8]) -> u64 {
+    bytes.iter().rev().fold(0, |number, &byte| number << 8 | u64::from(byte))
+}
+
+/// The values of an array, row-major.
+enum Numbers {
+    U8(Vec<u8>),
+    F32(Vec<f32>),
+    F64(Vec<f64>),
+    I64(Vec<i64>),
+}
+
+struct Array {
+    shape: Vec<u64>,
+    values: Numbers,
+}
+
+impl Numbers {
+    fn len(&self) -> usize {
+        match self {
+            Self::U8(values) => values.len(),
+            Self::F32(values) => values.len(),
+            Self::F64(values) => values.len(),
+            Self::I64(values) => values.len(),
+        }
+    }
+
+    fn to_f64(&self) -> Vec<f64> {
+        match self {
+            Self::U8(values) => values.iter().map(|&x| f64::from(x)).collect(),
+            Self::F32(values) => values.iter().map(|&x| f64::from(x)).collect(),
+            Self::F64(values) => values.clone(),
+            Self::I64(values) => values.iter().map(|&x| x as f64).collect(),
         }
     }
 }
 
-/// unlift's first version wrote upright features without this attribute.
-fn is_upright(store: &FeatureStore, at: usize) -> Result<bool, Error> {
-    let number = |key: &str| store.number(at, "keypoints", key);
-    Ok(match number(UPRIGHT)? {
-        Some(upright) => upright != 0.0,
-        None => number("uncertainty")?.is_some() && Kind::Features.is_at(store.path()),
-    })
+/// The IEEE float of 16 bits, which hloc stores.
+const HALF: FloatingPointLayout = FloatingPointLayout {
+    bit_offset: 0,
+    bit_precision: 16,
+    exponent_location: 10,
+    exponent_size: 5,
+    mantissa_location: 0,
+    mantissa_size: 10,
+    exponent_bias: 15,
+};
+
+/// Reads `count` floats of 16, 32 or 64 bits, or integers. Returns `None` for other types.
+fn numbers(dataset: &Dataset, count: u64) -> Result<Option<Numbers>, hdf5_pure::Error> {
+    let dtype = dataset.dtype()?;
+    Ok(Some(match dtype {
+        DType::U8 if count == 0 => Numbers::U8(Vec::new()),
+        _ if count == 0 => Numbers::F32(Vec::new()),
+        DType::F32 => Numbers::F32(dataset.read_f32()?),
+        DType::F64 => Numbers::F64(dataset.read_f64()?),
+        DType::U8 => Numbers::U8(dataset.read_u8()?),
+        DType::I8 | DType::I16 | DType::I32 | DType::I64 => Numbers::I64(dataset.read_i64()?),
+        DType::U16 | DType::U32 | DType::U64 => Numbers::I64(dataset.read_i64()?),
+        _ => {
+            let order = match dataset.datatype()? {
+                Datatype::FloatingPoint { size: 2, byte_order, layout: HALF } => byte_order,
+                _ => return Ok(None),
+            };
+            let from = match order {
+                DatatypeByteOrder::LittleEndian => f16::from_le_bytes,
+                DatatypeByteOrder::BigEndian => f16::from_be_bytes,
+                _ => return Ok(None),
+            };
+            let bytes = dataset.read_raw()?;
+            Numbers::F32(bytes.as_chunks().0.iter().map(|&half| from(half).to_f32()).collect())
+        }
+    }))
 }
 
-fn image(store: &FeatureStore, at: usize) -> Result<ImageFeatures, Error> {
-    let name = &store.paths()[at][..];
-    let present = store.names(at)?;
-    let has = |array: &str| present.iter().any(|name| name == array);
-    let optional = |array: &str| has(array).then(|| store.array(at, array)).transpose();
-    let Some(places) = optional("keypoints")? else {
-        let found = format!("only {}", present.join(", "));
-        return Err(store.error(name, "", "an array keypoints", found));
-    };
-    let keypoints = keypoints(&places)
-        .map_err(|(expected, found)| store.error(name, "keypoints", expected, found))?;
-    let n = keypoints.len();
-    let per_keypoint = |array: &str| -> Result<Option<Vec<f32>>, Error> {
-        let Some(values) = optional(array)? else { return Ok(None) };
-        if values.shape != [n as u64] && values.shape != [n as u64, 1] {
-            let expected = format!("one value per keypoint, ({n},)");
-            return Err(store.error(name, array, expected, shape_text(&values.shape)));
+fn transposed<T: Copy>(values: &[T], rows: usize) -> Vec<T> {
+    let columns = values.len().checked_div(rows).unwrap_or(0);
+    let mut transposed = Vec::with_capacity(values.len());
+    for column in 0..columns {
+        transposed.extend((0..rows).map(|row| values[row * columns + column]));
+    }
+    transposed
+}
+
+/// Formats a shape like NumPy: `(128, 40)`.
+fn shape_text(shape: &[u64]) -> String {
+    match shape {
+        [n] => format!("({n},)"),
+        _ => {
+            let sides: Vec<String> = shape.iter().map(u64::to_string).collect();
+            format!("({})", sides.join(", "))
         }
-        Ok(Some(values.values.to_f64().into_iter().map(|value| value as f32).collect()))
-    };
-    let descriptors = optional("descriptors")?.map(|array| descriptors(array, n)).transpose();
-    Ok(ImageFeatures {
-        name: name.to_owned(),
-        size: optional("image_size")?
-            .map(|array| size(&array))
-            .transpose()
-            .map_err(|(expected, found)| store.error(name, "image_size", expected, found))?,
-        descriptors: descriptors
-            .map_err(|(expected, found)| store.error(name, "descriptors", expected, found))?,
-        scores: per_keypoint("scores")?,
-        scales: per_keypoint("scales")?,
-        orientations_deg: per_keypoint("oris")?,
-        uncertainty_px: store.number(at, "keypoints", "uncertainty")?,
-        upright: is_upright(store, at)?,
-        keypoints,
-        photo: None,
-    })
+    }
 }
 
 /// The expected and the found value.
@@ -125,8 +454,7 @@ fn keypoints(array: &Array) -> Result<Vec<[f64; 2]>, Wrong> {
         _ => return Err(("shape (N, 2)".to_owned(), shape_text(&array.shape))),
     };
     let values = array.values.to_f64();
-    let rows = values.chunks_exact(columns).map(|row| [row[0], row[1]]);
-    let rows: Vec<[f64; 2]> = rows.collect();
+    let rows: Vec<[f64; 2]> = values.chunks_exact(columns).map(|row| [row[0], row[1]]).collect();
     match rows.iter().position(|row| !row.iter().all(|value| value.is_finite())) {
         None => Ok(rows),
         Some(at) => Err((
@@ -150,25 +478,24 @@ fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
         }
         _ => return Err((expected(), shape_text(&array.shape))),
     };
-    let floats = |values: Vec<f32>| Values::F32(transposed(&values, dim));
+    let floats = |values: &[f32]| Values::F32(transposed(values, dim));
     let values = match array.values {
         Numbers::U8(bytes) => Values::U8(transposed(&bytes, dim)),
-        Numbers::F16(halves) => floats(halves.iter().map(|half| half.to_f32()).collect()),
-        Numbers::F32(values) => floats(values),
-        Numbers::F64(doubles) => floats(doubles.iter().map(|&value| value as f32).collect()),
+        Numbers::F32(values) => floats(&values),
+        Numbers::F64(doubles) => {
+            floats(&doubles.iter().map(|&value| value as f32).collect::<Vec<_>>())
+        }
         Numbers::I64(_) => {
             return Err(("floats, or unsigned bytes".to_owned(), "other integers".to_owned()));
         }
     };
-    Descriptors::try_new(values, dim)
-        .map_err(|error| (error.expected().to_owned(), describe(&error)))
-}
-
-fn describe(error: &unlift::Error) -> String {
-    match error.what() {
-        "descriptors" => error.found().to_owned(),
-        place => format!("{} ({place})", error.found()),
-    }
+    Descriptors::try_new(values, dim).map_err(|error| {
+        let found = match error.what() {
+            "descriptors" => error.found().to_owned(),
+            place => format!("{} ({place})", error.found()),
+        };
+        (error.expected().to_owned(), found)
+    })
 }
 
 fn size(array: &Array) -> Result<[u32; 2], Wrong> {
@@ -188,4 +515,262 @@ fn size(array: &Array) -> Result<[u32; 2], Wrong> {
         };
         ("width and height in pixels".to_owned(), found)
     })
+}
+
+/// An attribute of the root group of files that unlift writes.
+const WRITER: &str = "written_by";
+
+/// Returns true if unlift wrote the HDF5 file at `path`.
+pub(crate) fn is_ours(path: &Path) -> bool {
+    let is_ours = || {
+        let attributes = File::open_streaming(path).ok()?.root().attrs().ok()?;
+        Some(attributes.get(WRITER)?.as_str() == Some("unlift"))
+    };
+    without_panic(is_ours).flatten().unwrap_or(false)
+}
+
+/// A feature file in hloc's layout that is written image by image, and moved to its place when it
+/// is complete.
+///
+/// Each image is a group with `keypoints` `(N, 2)` and, if present, `descriptors` `(D, N)`,
+/// `scores`, `scales` and `oris` `(N,)` and `image_size` `(2,)`; see `docs/formats.md`. Names and
+/// at most 64 MiB of values stay in memory. The same images in the same order give the same bytes.
+pub struct FeatureWriter {
+    output: OutputFile,
+    file: File,
+    images: BTreeSet<String>,
+    folders: BTreeSet<String>,
+    /// Bytes since the last commit.
+    staged: usize,
+}
+
+const MAX_STAGED: usize = 64 << 20;
+
+impl FeatureWriter {
+    /// Starts the feature file `path`.
+    ///
+    /// # Errors
+    /// When no file can be written there.
+    pub fn create(path: &Path) -> Result<Self, Error> {
+        let output = OutputFile::create(path, Access::Usual)?;
+        // `output` holds a lock already.
+        let access = FileAccessProperties::new()
+            .with_locking(FileLocking::Disabled)
+            .with_memory_strategy(MemoryStrategy::Bounded)
+            .with_sync_policy(SyncPolicy::OnClose);
+        let file =
+            File::create_with_options(output.partial(), FileCreateProperties::new(), access);
+        let file = file.and_then(|file| {
+            file.root().set_attr(WRITER, AttrValue::AsciiString("unlift".to_owned()))?;
+            Ok(file)
+        });
+        let file = file.map_err(|error| failed(path, error))?;
+        let (images, folders) = (BTreeSet::new(), BTreeSet::new());
+        Ok(Self { output, file, images, folders, staged: 0 })
+    }
+
+    /// Checks that an image can be written.
+    ///
+    /// # Errors
+    /// When a part of the name is empty, `.` or `..`, the name exists, contains or is inside
+    /// another image, or a column has not one row per keypoint.
+    pub fn check(&self, image: &ImageFeatures) -> Result<(), Error> {
+        check(image, self.output.path())?;
+        let name = &image.name;
+        if self.images.contains(name)
+            || self.folders.contains(name)
+            || folders(name).any(|folder| self.images.contains(folder))
+        {
+            let found = "one that exists already, or contains or is inside another image";
+            let place = format!("image {}", quoted(name.as_bytes()));
+            return Err(Error::new(self.output.path(), place, "a new name", found));
+        }
+        Ok(())
+    }
+
+    /// Writes one image.
+    ///
+    /// # Errors
+    /// When [`check`](Self::check) fails, or the disk fails.
+    pub fn append(&mut self, image: &ImageFeatures) -> Result<(), Error> {
+        self.check(image)?;
+        self.stage(image).map_err(|error| failed(self.output.path(), error))
+    }
+
+    fn stage(&mut self, image: &ImageFeatures) -> Result<(), hdf5_pure::Error> {
+        let root = self.file.root();
+        for folder in folders(&image.name) {
+            if self.folders.insert(folder.to_owned()) {
+                root.create_group(folder)?;
+            }
+        }
+        self.images.insert(image.name.clone());
+        let columns = columns(image);
+        self.staged += columns.iter().map(|column| column.bytes.len()).sum::<usize>();
+        root.create_group_with(&image.name, |group| {
+            for column in columns {
+                group.create_dataset(column.name, |dataset| column.fill(dataset));
+            }
+        })?;
+        if self.staged > MAX_STAGED {
+            self.file.commit()?;
+            self.staged = 0;
+        }
+        Ok(())
+    }
+
+    /// Moves the file to its place.
+    ///
+    /// # Errors
+    /// When the disk fails. No temporary file is left then.
+    pub fn finish(self) -> Result<(), Error> {
+        let Self { output, file, .. } = self;
+        let written = file.commit().and_then(|()| file.close());
+        written.map_err(|error| failed(output.path(), error))?;
+        output.commit()
+    }
+}
+
+fn failed(path: &Path, error: hdf5_pure::Error) -> Error {
+    let source = match error {
+        hdf5_pure::Error::Io(source) => source,
+        other => std::io::Error::other(other.to_string()),
+    };
+    Error::write(path, source)
+}
+
+/// The folders above an image, the outermost first.
+fn folders(name: &str) -> impl Iterator<Item = &str> {
+    name.match_indices('/').map(|(at, _)| &name[..at])
+}
+
+/// The name of the group in files of one image.
+const ONLY: &str = "image";
+
+/// Returns the bytes of a file with one image, without its name.
+///
+/// # Errors
+/// When [`FeatureWriter::append`] would fail. Errors name `path`.
+pub fn encode(image: &ImageFeatures, path: &Path) -> Result<Vec<u8>, Error> {
+    check(image, path)?;
+    let mut builder = FileBuilder::new();
+    let mut group = builder.create_group(ONLY);
+    for column in columns(image) {
+        let name = column.name;
+        column.fill(group.create_dataset(name));
+    }
+    builder.add_group(group.finish());
+    builder.finish().map_err(|error| failed(path, error))
+}
+
+/// Reads the one image of a file that [`encode`] made, and names it.
+///
+/// # Errors
+/// When `path` cannot be read, or does not contain exactly one image.
+pub fn decode(path: &Path, name: &str) -> Result<ImageFeatures, Error> {
+    let file = Hloc::groups_of(path)?;
+    match file.names() {
+        [_] => Ok(ImageFeatures { name: name.to_owned(), ..file.get(0)? }),
+        names => Err(Error::new(path, "", "one image", names.len().to_string())),
+    }
+}
+
+fn check(image: &ImageFeatures, path: &Path) -> Result<(), Error> {
+    let place = || format!("image {}", quoted(image.name.as_bytes()));
+    let parts = || image.name.split('/');
+    if parts().any(|part| part.is_empty() || part == "." || part == ".." || part.contains('\0')) {
+        let expected = "a name whose parts are not empty, . or ..";
+        return Err(Error::new(path, place(), expected, quoted(image.name.as_bytes())));
+    }
+    let depth = parts().count();
+    if depth > MAX_DEPTH {
+        let expected = format!("a name of at most {MAX_DEPTH} parts");
+        return Err(Error::new(path, place(), expected, depth.to_string()));
+    }
+    let n = image.keypoints.len();
+    let columns = [
+        ("descriptors", image.descriptors.as_ref().map(|rows| rows.len())),
+        ("scores", image.scores.as_ref().map(Vec::len)),
+        ("scales", image.scales.as_ref().map(Vec::len)),
+        ("oris", image.orientations_deg.as_ref().map(Vec::len)),
+    ];
+    for (name, len) in columns {
+        if let Some(len) = len.filter(|&len| len != n) {
+            let place = format!("{}, {name}", place());
+            return Err(Error::new(path, place, format!("{n}, one per keypoint"), len.to_string()));
+        }
+    }
+    Ok(())
+}
+
+/// An array to write.
+struct Column {
+    name: &'static str,
+    shape: Vec<u64>,
+    datatype: Datatype,
+    bytes: Vec<u8>,
+    attributes: Vec<(&'static str, f64)>,
+}
+
+impl Column {
+    fn fill(self, dataset: &mut DatasetBuilder) {
+        let count = self.shape.iter().product();
+        dataset.with_raw_data(self.datatype, self.bytes, count).with_shape(&self.shape);
+        for (name, value) in self.attributes {
+            dataset.set_attr(name, AttrValue::F64(value));
+        }
+    }
+}
+
+/// The arrays of an image, in hloc's types.
+fn columns(image: &ImageFeatures) -> Vec<Column> {
+    let n = image.keypoints.len() as u64;
+    let column = |name, shape: &[u64], datatype, bytes| Column {
+        name,
+        shape: shape.to_vec(),
+        datatype,
+        bytes,
+        attributes: Vec::new(),
+    };
+    let floats = |values: &[f32]| values.iter().flat_map(|x| x.to_le_bytes()).collect();
+    let single = hdf5_pure::make_f32_type;
+    let places: Vec<f32> = image.keypoints.iter().flatten().map(|&value| value as f32).collect();
+    let mut attributes = vec![(UPRIGHT, f64::from(image.upright))];
+    attributes.extend(image.uncertainty_px.map(|value| (UNCERTAINTY, value)));
+    let keypoints = column("keypoints", &[n, 2], single(), floats(&places));
+    let mut columns = vec![Column { attributes, ..keypoints }];
+    if let Some(rows) = &image.descriptors {
+        let (datatype, bytes) = match rows.values() {
+            Values::U8(values) => (hdf5_pure::make_u8_type(), transposed(values, rows.len())),
+            Values::F32(values) => match halves(values) {
+                Some(halves) => {
+                    let half = Datatype::FloatingPoint {
+                        size: 2,
+                        byte_order: DatatypeByteOrder::LittleEndian,
+                        layout: HALF,
+                    };
+                    let halves = transposed(&halves, rows.len());
+                    (half, halves.iter().flat_map(|x| x.to_le_bytes()).collect())
+                }
+                None => (single(), floats(&transposed(values, rows.len()))),
+            },
+        };
+        columns.push(column("descriptors", &[rows.dim() as u64, n], datatype, bytes));
+    }
+    let per_keypoint =
+        [("scores", &image.scores), ("scales", &image.scales), ("oris", &image.orientations_deg)];
+    for (name, values) in per_keypoint {
+        columns.extend(values.as_ref().map(|values| column(name, &[n], single(), floats(values))));
+    }
+    if let Some(size) = image.size {
+        let bytes = size.iter().flat_map(|&side| i64::from(side).to_le_bytes()).collect();
+        columns.push(column("image_size", &[2], hdf5_pure::make_i64_type(), bytes));
+    }
+    columns
+}
+
+/// Converts `values` to half floats, as hloc stores descriptors of networks, if all are exact.
+fn halves(values: &[f32]) -> Option<Vec<f16>> {
+    let exact = |&value: &f32| Some(f16::from_f32(value)).filter(|half| half.to_f32() == value);
+    values.iter().map(exact).collect()
 }

@@ -17,25 +17,67 @@
 //! # Ok::<(), unlift_io::Error>(())
 //! ```
 
-mod colmap;
-mod h5;
+pub(crate) mod database;
 mod hloc;
-mod image;
-#[cfg(test)]
-mod malformed;
-mod writer;
 
 use std::fs::File;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+use half::f16;
+use unlift::Descriptors;
 
 use crate::error::Error;
 use crate::input;
 use crate::read::lines::quoted;
 
-pub use hloc::decode;
-pub use image::{ImageFeatures, round_to_half};
-pub use writer::{FeatureWriter, encode};
+pub(crate) use hloc::is_ours;
+pub use hloc::{FeatureWriter, decode, encode};
+
+/// Features of one image, independent of the file format.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ImageFeatures {
+    /// Path relative to the folder of photos, with slashes.
+    pub name: String,
+    /// Width and height in pixels.
+    pub size: Option<[u32; 2]>,
+    /// `n` finite coordinates `(x, y)` in pixels. The center of the first pixel is `(0, 0)`.
+    pub keypoints: Vec<[f64; 2]>,
+    /// `(n, dim)` descriptors: bytes are RootSIFT times 512, floats are from a network. `None` when
+    /// the source has none; see [`described`](Self::described).
+    pub descriptors: Option<Descriptors>,
+    /// `n` confidences of the detector.
+    pub scores: Option<Vec<f32>>,
+    /// `n` scales in pixels.
+    pub scales: Option<Vec<f32>>,
+    /// `n` orientations in degrees, from x to y.
+    pub orientations_deg: Option<Vec<f32>>,
+    /// Standard deviation of a keypoint's position in pixels, as stated by the detector.
+    pub uncertainty_px: Option<f64>,
+    /// True if keypoints are in pixels of the photo rotated upright by its EXIF orientation. COLMAP
+    /// and hloc use the photo as stored.
+    pub upright: bool,
+    /// The path of the photo, if the source is a folder of photos.
+    pub photo: Option<PathBuf>,
+}
+
+impl ImageFeatures {
+    /// Returns the descriptors.
+    ///
+    /// # Errors
+    /// When there are none: one line that names `source` (the file) and the image.
+    pub fn described(&self, source: &Path) -> Result<&Descriptors, Error> {
+        let place = || format!("image {}", quoted(self.name.as_bytes()));
+        let missing = || Error::new(source, place(), "descriptors", "none");
+        self.descriptors.as_ref().ok_or_else(missing)
+    }
+}
+
+/// Rounds descriptors of a network to half floats, as hloc stores them, so that memory and files
+/// have equal values.
+pub fn round_to_half(values: &mut [f32]) {
+    values.iter_mut().for_each(|value| *value = f16::from_f32(*value).to_f32());
+}
 
 /// An open file of features that is read one image at a time.
 ///
@@ -46,7 +88,7 @@ pub struct FeatureSource {
 
 enum Kind {
     Hloc(hloc::Hloc),
-    Colmap(colmap::Colmap),
+    Colmap(database::Colmap),
 }
 
 const SQLITE: &[u8; 8] = b"SQLite f";
@@ -60,10 +102,10 @@ impl FeatureSource {
     pub fn open(path: &Path) -> Result<Self, Error> {
         let (file, len) = input::open(path)?;
         let mut start = Vec::new();
-        file_start(&file, &mut start).map_err(|e| Error::read(path, e))?;
+        File::take(file, 8).read_to_end(&mut start).map_err(|e| Error::read(path, e))?;
         let kind = match start.first_chunk() {
             Some(HDF5) => Kind::Hloc(hloc::Hloc::open(path)?),
-            Some(SQLITE) => Kind::Colmap(colmap::Colmap::open(path)?),
+            Some(SQLITE) => Kind::Colmap(database::Colmap::open(path)?),
             _ => {
                 let expected = "features in HDF5, or a COLMAP database (SQLite)";
                 let found = match len {
@@ -117,8 +159,4 @@ impl FeatureSource {
             Kind::Colmap(database) => database.get(at),
         }
     }
-}
-
-fn file_start(file: &File, start: &mut Vec<u8>) -> std::io::Result<usize> {
-    file.take(8).read_to_end(start)
 }

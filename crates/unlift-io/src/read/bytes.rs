@@ -1,8 +1,10 @@
-//! Reads binary files.
+//! Reads binary files and their numbers.
 
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
+
+use half::f16;
 
 use crate::error::{Error, Place};
 use crate::input::{self, Budget};
@@ -43,14 +45,6 @@ impl Bytes {
 
     pub fn room<T>(&self, place: impl Into<Place> + Clone, n: u64) -> Result<Vec<T>, Error> {
         Budget::new(&self.path, self.len).room(place, n)
-    }
-
-    pub fn admit(&self, place: &str, bytes: u64) -> Result<(), Error> {
-        Budget::new(&self.path, self.len).admit(place, bytes)
-    }
-
-    pub fn at(&self) -> u64 {
-        self.at
     }
 
     pub fn remaining(&self) -> u64 {
@@ -178,15 +172,6 @@ impl Bytes {
         self.check_count(count, what, bytes_each)
     }
 
-    /// Reads a `u32` count like [`count`](Self::count).
-    pub fn count_u32(&mut self, what: &str, bytes_each: u64) -> Result<u64, Error> {
-        if self.remaining() < 4 {
-            self.check(4, &format!("the number of {what}"))?;
-        }
-        let count = self.u32(what)?;
-        self.check_count(u64::from(count), what, bytes_each)
-    }
-
     fn check_count(&self, count: u64, what: &str, bytes_each: u64) -> Result<u64, Error> {
         let left = self.remaining();
         let most = left / bytes_each;
@@ -207,6 +192,93 @@ impl Bytes {
             0 => Ok(()),
             1 => Err(self.error_ahead("end of file", "1 more byte")),
             n => Err(self.error_ahead("end of file", format!("{n} more bytes"))),
+        }
+    }
+}
+
+/// The type of a number in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Scalar {
+    /// `f`, `i` or `u`.
+    kind: u8,
+    size: usize,
+}
+
+impl Scalar {
+    pub const U8: Self = Self { kind: b'u', size: 1 };
+    pub const F16: Self = Self { kind: b'f', size: 2 };
+    pub const F32: Self = Self { kind: b'f', size: 4 };
+    pub const F64: Self = Self { kind: b'f', size: 8 };
+
+    /// Returns a type by its size in bytes and kind: `f` float, `i` signed, `u` unsigned, in either
+    /// case.
+    pub fn of_kind(kind: u8, size: u64) -> Option<Self> {
+        let kind = kind.to_ascii_lowercase();
+        let sizes: &[u64] = match kind {
+            b'i' | b'u' => &[1, 2, 4, 8],
+            b'f' => &[2, 4, 8],
+            _ => return None,
+        };
+        sizes.contains(&size).then_some(Self { kind, size: size as usize })
+    }
+
+    pub fn size(self) -> usize {
+        self.size
+    }
+
+    /// Reads a number from the first [`size`](Self::size) `bytes`, big-endian if `big` is set.
+    pub fn read(self, bytes: &[u8], big: bool) -> f64 {
+        let mut little = [0; 8];
+        little[..self.size].copy_from_slice(&bytes[..self.size]);
+        if big {
+            little[..self.size].reverse();
+        }
+        let [a, b, c, d, ..] = little;
+        match (self.kind, self.size) {
+            (b'u', _) => u64::from_le_bytes(little) as f64,
+            (b'i', size) => {
+                let unused = 64 - 8 * size;
+                (i64::from_le_bytes(little) << unused >> unused) as f64
+            }
+            (_, 2) => f64::from(f16::from_le_bytes([a, b])),
+            (_, 4) => f64::from(f32::from_le_bytes([a, b, c, d])),
+            _ => f64::from_le_bytes(little),
+        }
+    }
+}
+
+/// A number in a row of bytes: its offset and type.
+#[derive(Clone, Copy, Debug)]
+pub struct Field {
+    pub at: usize,
+    pub scalar: Scalar,
+}
+
+impl Field {
+    pub fn of(self, row: &[u8], big: bool) -> f64 {
+        self.scalar.read(&row[self.at..self.at + self.scalar.size()], big)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn integers_keep_their_sign_in_either_order() {
+        for (kind, bytes, expected) in [
+            (b'i', &[0xfe][..], -2.0),
+            (b'u', &[0xfe], 254.0),
+            (b'I', &[0xd4, 0xfe], -300.0),
+            (b'u', &[0xd4, 0xfe], 65236.0),
+            (b'i', &[0xff; 4], -1.0),
+            (b'U', &[0xff, 0xff, 0xff, 0x7f], 2147483647.0),
+            (b'i', &[0xff; 8], -1.0),
+            (b'u', &[0, 0, 0, 0, 0, 0, 0, 0x80], 9223372036854775808.0),
+        ] {
+            let scalar = Scalar::of_kind(kind, bytes.len() as u64).unwrap();
+            let reversed: Vec<u8> = bytes.iter().rev().copied().collect();
+            assert_eq!([scalar.read(bytes, false), scalar.read(&reversed, true)], [expected; 2]);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The result of all readers of maps.
+//! The result of all readers of maps, and poses of cameras.
 
 use std::path::PathBuf;
 
@@ -119,4 +119,72 @@ pub(crate) fn most_at_one_place(positions: &[[f64; 3]]) -> Option<(usize, [f64; 
     // Two positions may have the same hash.
     let n = positions.iter().filter(|position| bits(position) == bits(&place)).count();
     Some((n, place))
+}
+
+/// Returns a doubt if `more` points follow the `n` declared ones.
+pub(crate) fn undeclared(n: u64, more: u64) -> Option<String> {
+    (more > 0).then(|| {
+        format!("{n} points are declared, and {more} more seem to follow, which are not read: results are about a part of the map")
+    })
+}
+
+/// Returns the center `-R^T t` of a camera with the pose `x_cam = R x + t`, and the direction
+/// `up_cam` of its frame in the world.
+pub fn camera(
+    rotation: &[[f64; 3]; 3],
+    translation: &[f64; 3],
+    up_cam: [f64; 3],
+) -> ([f64; 3], [f64; 3]) {
+    let transposed = |v: &[f64; 3]| -> [f64; 3] {
+        std::array::from_fn(|c| (0..3).map(|row| rotation[row][c] * v[row]).sum())
+    };
+    (transposed(translation).map(|x| -x), transposed(&up_cam))
+}
+
+/// Returns the rotation of a quaternion (w, x, y, z) times its squared norm, and the squared norm.
+pub fn scaled_rotation([w, x, y, z]: [f64; 4]) -> ([[f64; 3]; 3], f64) {
+    let rows = [
+        [w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z],
+    ];
+    (rows, w * w + x * x + y * y + z * z)
+}
+
+/// Up in the frame of a camera whose y axis points down.
+pub const DOWNWARD: [f64; 3] = [0.0, -1.0, 0.0];
+/// Up in the frame of a camera whose y axis points up.
+pub const UPWARD: [f64; 3] = [0.0, 1.0, 0.0];
+
+/// Returns the center `-R^T t` and the rotation `R` of a camera with the pose `x_cam = R x + t`,
+/// given as a quaternion (w, x, y, z) and `t`. Not finite for a zero quaternion.
+pub(super) fn center_and_rotation(quaternion: [f64; 4], t: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
+    // Divides by the squared norm, because files contain norms such as 0.9999999.
+    let (r, norm2) = scaled_rotation(quaternion);
+    let c: [f64; 3] =
+        std::array::from_fn(|j| -(r[0][j] * t[0] + r[1][j] * t[1] + r[2][j] * t[2]) / norm2);
+    (c, r.map(|row| row.map(|x| x / norm2)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn center_is_where_the_pose_maps_to_zero() {
+        // A rotation by 90 degrees about z: x_cam = (-y, x, z) + t.
+        let half = 0.5_f64.sqrt();
+        let (c, rotation) = center_and_rotation([half, 0.0, 0.0, half], [1.0, 2.0, 3.0]);
+        for (found, expected) in c.iter().zip([-2.0, 1.0, -3.0]) {
+            assert!((found - expected).abs() < 1e-12, "{c:?}");
+        }
+        let turned = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+        for (found, expected) in rotation.iter().flatten().zip(turned.iter().flatten()) {
+            assert!((found - expected).abs() < 1e-12, "{rotation:?}");
+        }
+        assert!(center_and_rotation([0.0; 4], [1.0, 2.0, 3.0]).0.iter().all(|x| x.is_nan()));
+        assert!(
+            center_and_rotation([1.0, 0.0, 0.0, 0.0], [f64::NAN; 3]).0.iter().all(|x| x.is_nan())
+        );
+    }
 }

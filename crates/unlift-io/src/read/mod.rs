@@ -1,21 +1,18 @@
 //! Reads maps in many formats as positions, ids and camera centers.
 
+mod bundler;
 pub(crate) mod bytes;
 pub mod colmap;
-mod columns;
-mod database;
 mod descriptors;
+mod json;
 pub(crate) mod lines;
 mod map_input;
 mod models;
 mod npy;
 mod npz;
-mod others;
+mod nvm;
 mod ply;
-mod pose;
-mod scalar;
 mod table;
-mod undeclared;
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -54,7 +51,7 @@ pub fn open(path: &Path) -> Result<Input, Error> {
 
 /// Returns true if `path` is a folder in which [`open`] finds a map.
 pub fn is_project(path: &Path) -> bool {
-    path.is_dir() && (matches!(Model::find(path), Ok(Some(_))) || others::in_folder(path).is_some())
+    path.is_dir() && (matches!(Model::find(path), Ok(Some(_))) || other_in_folder(path).is_some())
 }
 
 const EXPECTED: &str = "a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, \
@@ -89,6 +86,19 @@ fn not_read(path: &Path) -> Error {
     let conversion = CONVERSIONS.iter().find(|(known, _)| *known == extension || *known == name);
     let found = conversion.map_or(found.clone(), |(_, how)| format!("{found} ({how})"));
     Error::new(path, "", EXPECTED, found)
+}
+
+/// The files to look for in a folder without a COLMAP model, in this order.
+const OTHERS_IN_FOLDERS: [&str; 5] = [
+    "reconstruction.json",
+    "opensfm/reconstruction.json",
+    "transforms.json",
+    "bundle.out",
+    "bundle/bundle.out",
+];
+
+fn other_in_folder(path: &Path) -> Option<PathBuf> {
+    OTHERS_IN_FOLDERS.map(|name| path.join(name)).into_iter().find(|file| file.is_file())
 }
 
 fn table_of(path: &Path) -> Result<Input, Error> {
@@ -129,9 +139,9 @@ fn file(path: &Path) -> Result<Input, Error> {
         (_, "npy") => npy::positions(path)?,
         (_, "npz") => npz::positions(path)?,
         ("sfm_data", "json") => return Err(not_read(path)),
-        (_, "json") => others::json::read(path)?,
-        (_, "out") => others::bundler::read(path)?,
-        (_, "nvm") => others::nvm::read(path)?,
+        (_, "json") => json::read(path)?,
+        (_, "out") => bundler::read(path)?,
+        (_, "nvm") => nvm::read(path)?,
         _ => return Err(not_read(path)),
     };
     input.files.insert(0, path.to_owned());
@@ -151,7 +161,7 @@ fn colmap_points(path: &Path) -> Result<Input, Error> {
 
 fn folder(path: &Path) -> Result<Input, Error> {
     let Some(model) = Model::find(path)? else {
-        return match others::in_folder(path) {
+        return match other_in_folder(path) {
             Some(other) => file(&other),
             None => Err(Error::new(path, "", models::EXPECTED, "none")),
         };
@@ -175,20 +185,11 @@ fn colmap_model(model: &Model) -> Result<Input, Error> {
     };
     let cameras = present("cameras");
     let images = present("images");
-    let rigs = present("rigs");
-    let frames = present("frames");
     input.files.push(model.points.clone());
 
-    // An audit needs nothing from these files, so their errors are notes.
-    let mut told = |error: Error| input.notes.push(error.to_string());
-    let cameras = cameras.and_then(|path| colmap::read_cameras(&path).map_err(&mut told).ok());
-    for check in
-        [rigs.map(|path| colmap::check_rigs(&path)), frames.map(|path| colmap::check_frames(&path))]
-    {
-        if let Some(Err(error)) = check {
-            told(error);
-        }
-    }
+    // An audit of points needs nothing from the cameras, so their errors are notes.
+    let note = |error: Error| input.notes.push(error.to_string());
+    let cameras = cameras.and_then(|path| colmap::read_cameras(&path).map_err(note).ok());
     if let Some(path) = images {
         let images = colmap::read_images(&path)?;
         let without = |image: &&colmap::Image| {

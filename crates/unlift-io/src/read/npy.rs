@@ -6,10 +6,8 @@ use std::path::Path;
 
 use unlift::descriptors::Values;
 
-use super::bytes::Bytes;
-use super::columns::{Field, axes};
-use super::lines::{number, quoted};
-use super::scalar::Scalar;
+use super::bytes::{Bytes, Field, Scalar};
+use super::lines::{axes, number, quoted};
 use crate::error::Error;
 use crate::read::map_input::Input;
 

@@ -2,13 +2,10 @@
 
 use std::path::Path;
 
-use super::bytes::Bytes;
-use super::columns::{Field, coordinate, is_called};
-use super::lines::{Lines, number, quoted, words};
-use super::scalar::Scalar;
-use super::undeclared::undeclared;
+use super::bytes::{Bytes, Field, Scalar};
+use super::lines::{Lines, coordinate, is_called, number, quoted, words};
+use super::map_input::{Input, undeclared};
 use crate::error::Error;
-use crate::read::map_input::Input;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Encoding {
@@ -84,10 +81,13 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     let vertex = header.elements.iter().position(|e| e.name == b"vertex");
     let vertex = vertex.ok_or_else(|| refuse("an element vertex".to_owned()))?;
     let element = &header.elements[vertex];
-    let axes = element.find(["x", "y", "z"]).map_err(|name| match element.find(["packed_position"]) {
-        Ok(_) => Error::new(path, "header", "x, y and z", "packed splats (export them unpacked)"),
-        Err(_) => refuse(format!("a property {name} in element vertex")),
-    })?;
+    let axes =
+        element.find(["x", "y", "z"]).map_err(|name| match element.find(["packed_position"]) {
+            Ok(_) => {
+                Error::new(path, "header", "x, y and z", "packed splats (export them unpacked)")
+            }
+            Err(_) => refuse(format!("a property {name} in element vertex")),
+        })?;
     let mut rows = match header.encoding {
         Encoding::Ascii => {
             lines.expect_room(element.count, "vertices", element.properties.len() as u64)?;

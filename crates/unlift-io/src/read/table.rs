@@ -2,10 +2,9 @@
 
 use std::path::Path;
 
-use super::columns::{axes, coordinate, is_called, plain};
-use super::lines::{Lines, number, quoted, words};
+use super::lines::{Lines, axes, coordinate, is_called, number, plain, quoted, words};
+use super::map_input::Input;
 use crate::error::Error;
-use crate::read::map_input::Input;
 
 /// The separator of values. The first line decides it for the whole file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

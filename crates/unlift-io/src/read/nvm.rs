@@ -2,12 +2,9 @@
 
 use std::path::Path;
 
+use super::lines::{Lines, coordinates, number, quoted, words};
+use super::map_input::{DOWNWARD, Input, camera, scaled_rotation, undeclared};
 use crate::error::Error;
-use crate::read::columns::coordinates;
-use crate::read::lines::{Lines, number, quoted, words};
-use crate::read::map_input::Input;
-use crate::read::pose::{DOWNWARD, camera, scaled_rotation};
-use crate::read::undeclared::undeclared;
 
 fn count(lines: &Lines, what: &str) -> Result<u64, Error> {
     number(lines.line()).ok_or_else(|| lines.error(what, quoted(lines.line())))

@@ -1,13 +1,13 @@
 //! Tests maps of other programs: two cameras and three points, in each format.
 
 use std::fs;
-use std::path::Path;
 
 use unlift_io::read::{self, Input};
 
+use super::{POINTS, open, refused};
+
 /// The first camera looks along z. The second is rotated by 90 degrees about its viewing direction.
 const CENTERS: [[f64; 3]; 2] = [[0.0, 0.0, -5.0], [1.0, 2.0, -5.0]];
-const POINTS: [[f64; 3]; 3] = [[0.5, -1.25, 3.0], [1e3, 2.0, -0.0625], [0.1, 0.2, 0.3]];
 
 /// `x_cam = R x + t` with y down: `R` row by row, and `t = -R c`.
 const ROTATIONS: [[[f64; 3]; 3]; 2] = [
@@ -29,7 +29,7 @@ fn array(values: &[f64]) -> String {
     format!("[{}]", values.iter().map(f64::to_string).collect::<Vec<_>>().join(", "))
 }
 
-fn bundler() -> String {
+pub fn bundler() -> String {
     let mut text = "# Bundle file v0.3\n3 3\n".to_owned();
     for (at, rotation) in ROTATIONS.iter().enumerate() {
         text += "500 0.01 0\n";
@@ -49,7 +49,7 @@ fn bundler() -> String {
     text
 }
 
-fn nvm() -> String {
+pub fn nvm() -> String {
     let half = 0.5_f64.sqrt();
     let quaternions = [[1.0, 0.0, 0.0, 0.0], [half, 0.0, 0.0, half]];
     let mut text = "NVM_V3 \n\n2\n".to_owned();
@@ -64,7 +64,7 @@ fn nvm() -> String {
     text + "\n\n0\n\n#the last part of NVM file points to the PLY files\n0\n"
 }
 
-fn opensfm(points: &[[f64; 3]]) -> String {
+pub fn opensfm(points: &[[f64; 3]]) -> String {
     // A rotation by 90 degrees about z, as axis times angle.
     let vectors = [[0.0; 3], [0.0, 0.0, std::f64::consts::FRAC_PI_2]];
     let shots: Vec<String> = (0..2)
@@ -148,9 +148,7 @@ fn every_form_gives_the_same_points_and_cameras() {
     let input = read::open(&put("nerf/transforms.json", &nerfstudio("\"sparse_pc.ply\""))).unwrap();
     same(&input, "nerfstudio");
     assert_eq!(input.files.len(), 2);
-    for (name, format) in
-        [("bundler", "Bundler"), ("sfm", "OpenSfM"), ("nerf", "nerfstudio")]
-    {
+    for (name, format) in [("bundler", "Bundler"), ("sfm", "OpenSfM"), ("nerf", "nerfstudio")] {
         assert!(read::is_project(&folder.path().join(name)));
         same(&read::open(&folder.path().join(name)).unwrap(), format);
     }
@@ -158,13 +156,7 @@ fn every_form_gives_the_same_points_and_cameras() {
 
 #[test]
 fn what_is_wrong_is_told_with_its_line() {
-    let folder = tempfile::tempdir().unwrap();
-    let line = |name: &str, text: &str| {
-        let path = folder.path().join(name);
-        fs::write(&path, text).unwrap();
-        let error = read::open(&path).unwrap_err().to_string();
-        error.replace(&format!("{}/", folder.path().display()), "")
-    };
+    let line = |name: &str, text: &str| refused(name, text);
     assert_eq!(
         line("a.out", "what else is called so\n"),
         "a.out:1: expected numbers of cameras and points, as Bundler writes them, found \"what else is called so\""
@@ -208,24 +200,6 @@ fn what_is_wrong_is_told_with_its_line() {
             .contains("a point cloud beside the cameras, found none")
     );
     assert!(line("transforms.json", &nerfstudio("\"none.ply\"")).contains("none.ply: expected"));
-    assert!(
-        line("a.laz", "LASF")
-            .contains("or pdal translate in.laz out.ply)")
-    );
-    assert!(read::open(Path::new("no such folder")).is_err());
-}
-
-/// Returns the doubts of a file, and of the file that declares fewer points, with `few` instead of
-/// `all`.
-fn doubts(name: &str, text: String, all: &str, few: &str) -> [Vec<String>; 2] {
-    assert!(text.contains(all), "{text}");
-    let less = text.replacen(all, few, 1);
-    [text, less].map(|text| {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(name);
-        fs::write(&path, text).unwrap();
-        read::open(&path).unwrap().doubts
-    })
 }
 
 #[test]
@@ -238,8 +212,30 @@ fn files_with_more_points_than_they_declare_are_doubted() {
         ("a.ply", ply, "vertex 3", "vertex 2"),
     ] {
         let told = "2 points are declared, and 1 more seem to follow, which are not read: results are about a part of the map";
-        let [whole, less] = doubts(name, text, all, few);
-        assert!(whole.is_empty(), "{name}: {whole:?}");
-        assert_eq!(less, [told], "{name}");
+        assert!(open(name, &text).doubts.is_empty(), "{name}");
+        assert_eq!(open(name, text.replacen(all, few, 1)).doubts, [told], "{name}");
+    }
+}
+
+/// Python writes NaN and Infinity, which JSON does not allow.
+#[test]
+fn json_with_numbers_that_are_none_has_points_left_out() {
+    let point = |x: &str| format!(r#"{{"coordinates": [{x}, 2.0, 3.0]}}"#);
+    let points: Vec<String> = ["1.0", "NaN", "-1.5", "Infinity", "-Infinity", "4.0"]
+        .iter()
+        .enumerate()
+        .map(|(at, x)| format!("\"{at} NaN \\\" I\": {}", point(x)))
+        .collect();
+    let text = format!(r#"[{{"shots": {{}}, "points": {{{}}}}}]"#, points.join(", "));
+    let input = open("reconstruction.json", text);
+    assert_eq!(input.positions, [[1.0, 2.0, 3.0], [-1.5, 2.0, 3.0], [4.0, 2.0, 3.0]]);
+}
+
+#[test]
+fn json_of_others_is_told() {
+    for other in [r#"{"points": [[1, 2, 3]]}"#, r#"{"frames": [{}]}"#] {
+        let line = refused("a.json", other);
+        assert!(line.contains("a map of OpenSfM or nerfstudio"), "{line}");
+        assert!(line.contains("found other JSON ("), "{line}");
     }
 }

@@ -1,7 +1,7 @@
 //! Tests real maps, if they are present: sums by pycolmap and NumPy, and neighborhoods from
 //! descriptors.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use unlift::descriptors::Values;
@@ -18,74 +18,48 @@ use unlift::truth::Original;
 use unlift::{PointSet, Unit};
 use unlift_io::read;
 
+use super::{close, shared, total};
+
 fn dataset(name: &str) -> Option<PathBuf> {
-    let data = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data");
-    let path = Path::new(data).join(name);
-    if !path.is_dir() {
-        eprintln!("skipped: the data set {name} is not beside the repository");
-        return None;
-    }
-    Some(path)
+    shared(&format!("data/{name}"))
 }
 
-struct Expected {
-    n: usize,
-    n_cameras: usize,
-    id_sum: u64,
-    sum: [f64; 3],
-    camera_sum: [f64; 3],
-    descriptor_sum: u64,
-}
+/// Points, cameras, sums of ids, of points, of centers, and of bytes of descriptors.
+type Totals = (usize, usize, u64, [f64; 3], [f64; 3], u64);
 
-fn check(name: &str, expected: &Expected) {
-    let Some(path) = dataset(name) else { return };
-    let input = read::open(&path).unwrap();
-    assert_eq!(input.positions.len(), expected.n);
-    assert_eq!(input.cameras.len(), expected.n_cameras);
-    assert_eq!(input.ids.iter().sum::<u64>(), expected.id_sum);
-    for axis in 0..3 {
-        let sum = |rows: &[[f64; 3]]| rows.iter().map(|p| p[axis]).sum::<f64>();
+#[test]
+fn real_maps_are_read_as_pycolmap_reads_them() {
+    let kitchen: Totals = (
+        21_149,
+        114,
+        457_420_110,
+        [-14724.929303410438, -6123.789441610717, 51644.81699450455],
+        [-43.05353627242874, -31.937187957432283, 90.64668314637804],
+        88_317_746,
+    );
+    let castle: Totals = (
+        6_224,
+        11,
+        19_826_437,
+        [-19920.427404514652, 2174.7605237991306, 63821.610508611295],
+        [-2.9480235564438795, 0.6448085497825612, 3.522803738595307],
+        27_924_921,
+    );
+    for (name, (n, n_cameras, ids, positions, centers, bytes)) in
+        [("redkitchen", kitchen), ("castle", castle)]
+    {
+        let Some(path) = dataset(name) else { continue };
+        let input = read::open(&path).unwrap();
+        assert_eq!((input.positions.len(), input.cameras.len()), (n, n_cameras));
+        assert_eq!(input.ids.iter().sum::<u64>(), ids);
         // Sums of 10^4 doubles of size 10 in another order differ in the last bits only.
-        assert!((sum(&input.positions) - expected.sum[axis]).abs() < 1e-6);
-        assert!((sum(&input.cameras) - expected.camera_sum[axis]).abs() < 1e-9);
+        close(total(&input.positions), positions, 1e-6);
+        close(total(&input.cameras), centers, 1e-9);
+        let descriptors = read::descriptors(&path.join("descriptors.bin"), &input).unwrap();
+        assert_eq!((descriptors.len(), descriptors.dim()), (n, 128));
+        let Values::U8(values) = descriptors.values() else { panic!("bytes expected") };
+        assert_eq!(values.iter().map(|&byte| u64::from(byte)).sum::<u64>(), bytes);
     }
-    let descriptors = read::descriptors(&path.join("descriptors.bin"), &input).unwrap();
-    assert_eq!((descriptors.len(), descriptors.dim()), (expected.n, 128));
-    let Values::U8(bytes) = descriptors.values() else {
-        panic!("bytes expected");
-    };
-    let sum: u64 = bytes.iter().map(|&b| u64::from(b)).sum();
-    assert_eq!(sum, expected.descriptor_sum);
-}
-
-#[test]
-fn redkitchen_reads_as_pycolmap_reads_it() {
-    check(
-        "redkitchen",
-        &Expected {
-            n: 21_149,
-            n_cameras: 114,
-            id_sum: 457_420_110,
-            sum: [-14724.929303410438, -6123.789441610717, 51644.81699450455],
-            camera_sum: [-43.05353627242874, -31.937187957432283, 90.64668314637804],
-            descriptor_sum: 88_317_746,
-        },
-    );
-}
-
-#[test]
-fn castle_reads_as_pycolmap_reads_it() {
-    check(
-        "castle",
-        &Expected {
-            n: 6_224,
-            n_cameras: 11,
-            id_sum: 19_826_437,
-            sum: [-19920.427404514652, 2174.7605237991306, 63821.610508611295],
-            camera_sum: [-2.9480235564438795, 0.6448085497825612, 3.522803738595307],
-            descriptor_sum: 27_924_921,
-        },
-    );
 }
 
 #[test]

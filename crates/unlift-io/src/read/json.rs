@@ -9,11 +9,10 @@ use std::path::{Component, Path, PathBuf};
 use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, de};
 
+use super::map_input::{DOWNWARD, Input, camera};
+use super::ply;
 use crate::error::{Error, Place};
 use crate::input;
-use crate::read::map_input::Input;
-use crate::read::ply;
-use crate::read::pose::{DOWNWARD, camera};
 
 /// Reads points and cameras of the largest reconstruction.
 pub fn read(path: &Path) -> Result<Input, Error> {
@@ -164,7 +163,7 @@ impl Object {
     }
 }
 
-/// A number, possibly written as a string. A missing one is NaN.
+/// A number. A missing one is NaN.
 struct Number(f64);
 
 impl<'de> Deserialize<'de> for Number {
@@ -194,12 +193,10 @@ impl<'de> Deserialize<'de> for Number {
             }
 
             fn visit_str<E: de::Error>(self, value: &str) -> Result<f64, E> {
-                // Strings may begin with a space. An empty one replaces NaN (`Strict`).
-                match value.trim() {
+                // An empty string replaces NaN (`Strict`).
+                match value {
                     "" => Ok(f64::NAN),
-                    value => value
-                        .parse()
-                        .map_err(|_| E::invalid_value(de::Unexpected::Str(value), &self)),
+                    value => Err(E::invalid_value(de::Unexpected::Str(value), &self)),
                 }
             }
         }

@@ -2,12 +2,9 @@
 
 use std::path::Path;
 
+use super::lines::{Lines, coordinate, number, quoted, words};
+use super::map_input::{Input, UPWARD, camera, undeclared};
 use crate::error::Error;
-use crate::read::columns::coordinate;
-use crate::read::lines::{Lines, number, quoted, words};
-use crate::read::map_input::Input;
-use crate::read::pose::{UPWARD, camera};
-use crate::read::undeclared::undeclared;
 
 fn numbers<const N: usize>(lines: &Lines, what: &str) -> Result<[f64; N], Error> {
     let mut values = [0.0; N];

@@ -1,0 +1,504 @@
+//! Reads COLMAP models: `cameras`, `images` and `points3D`, as `.bin` or `.txt`.
+//!
+//! Models of COLMAP 3.12 and later also have `rigs` and `frames`, which repeat the poses of
+//! `images`. They are not read.
+//!
+//! Source: COLMAP's documentation, "Output Format".
+
+use std::path::Path;
+
+use super::bytes::Bytes;
+use super::lines::{Lines, coordinates, number, quoted, words};
+use super::map_input::center_and_rotation;
+use crate::error::Error;
+
+/// A camera model as files store it. Audits of points do not need its projection.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CameraModel {
+    /// The id in binary files and databases.
+    pub id: i32,
+    /// The name in text files.
+    pub name: &'static str,
+    /// The number of parameters.
+    pub n_params: usize,
+}
+
+const fn model(id: i32, name: &'static str, n_params: usize) -> CameraModel {
+    CameraModel { id, name, n_params }
+}
+
+/// All models of COLMAP 4.2. Row `i` has id `i`.
+pub const CAMERA_MODELS: [CameraModel; 18] = [
+    model(0, "SIMPLE_PINHOLE", 3),
+    model(1, "PINHOLE", 4),
+    model(2, "SIMPLE_RADIAL", 4),
+    model(3, "RADIAL", 5),
+    model(4, "OPENCV", 8),
+    model(5, "OPENCV_FISHEYE", 8),
+    model(6, "FULL_OPENCV", 12),
+    model(7, "FOV", 5),
+    model(8, "SIMPLE_RADIAL_FISHEYE", 4),
+    model(9, "RADIAL_FISHEYE", 5),
+    model(10, "THIN_PRISM_FISHEYE", 12),
+    model(11, "RAD_TAN_THIN_PRISM_FISHEYE", 16),
+    model(12, "SIMPLE_DIVISION", 4),
+    model(13, "DIVISION", 5),
+    model(14, "SIMPLE_FISHEYE", 3),
+    model(15, "FISHEYE", 4),
+    model(16, "EUCM", 6),
+    model(17, "EQUIRECTANGULAR", 2),
+];
+
+impl CameraModel {
+    /// Returns the model with this id.
+    pub fn from_id(id: i32) -> Option<&'static Self> {
+        CAMERA_MODELS.get(usize::try_from(id).ok()?)
+    }
+
+    /// Returns true if the first parameter is the focal length in both directions.
+    pub fn has_one_focal(&self) -> bool {
+        self.name.starts_with("SIMPLE_") || self.name.starts_with("RADIAL")
+    }
+
+    /// Returns the model with this name.
+    pub fn from_name(name: &[u8]) -> Option<&'static Self> {
+        CAMERA_MODELS.iter().find(|m| m.name.as_bytes() == name)
+    }
+}
+
+/// A camera, shared by any number of images.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Camera {
+    /// The id that images refer to.
+    pub id: u32,
+    /// The camera model.
+    pub model: &'static CameraModel,
+    /// Width of the images in pixels.
+    pub width_px: u64,
+    /// Height of the images in pixels.
+    pub height_px: u64,
+    /// The `model.n_params` parameters, in the order of COLMAP's documentation.
+    pub params: Vec<f64>,
+}
+
+impl Camera {
+    /// Returns focal lengths and principal point in pixels; `None` for a panorama, which has none.
+    pub fn pinhole(&self) -> Option<([f64; 2], [f64; 2])> {
+        if self.model.name == "EQUIRECTANGULAR" {
+            return None;
+        }
+        let first = if self.model.has_one_focal() { 1 } else { 2 };
+        let value = |at: usize| self.params.get(at).copied();
+        let focal = [value(0)?, value(first - 1)?];
+        let principal = [value(first)?, value(first + 1)?];
+        let all = [focal, principal].concat();
+        let usable = all.iter().all(|x| x.is_finite()) && focal.iter().all(|&f| f > 0.0);
+        usable.then_some((focal, principal))
+    }
+}
+
+/// A registered image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    /// The id that tracks refer to. A database may use other ids for the same names.
+    pub id: u32,
+    /// The path below the image folder, as bytes of the file. It may not be UTF-8.
+    pub name: Vec<u8>,
+    /// The id of its camera.
+    pub camera_id: u32,
+    /// The camera center in the world, in units of the model. Not finite if the file has no pose.
+    pub center: [f64; 3],
+    /// The rotation from world to camera: a world point `x` is at `rotation (x - center)`. Camera
+    /// axes point right, down and forward.
+    pub rotation: [[f64; 3]; 3],
+    /// The number of 2D points, triangulated or not.
+    pub n_points2d: u64,
+}
+
+impl Image {
+    /// Finds the camera of this image in `cameras`, which are sorted by id.
+    pub fn camera<'a>(&self, cameras: &'a [Camera]) -> Option<&'a Camera> {
+        cameras
+            .binary_search_by_key(&self.camera_id, |camera| camera.id)
+            .ok()
+            .map(|at| &cameras[at])
+    }
+
+    /// The unit vector in the world that points up in the photo.
+    pub fn up(&self) -> [f64; 3] {
+        self.rotation[1].map(|x| -x)
+    }
+}
+
+/// The points of a model, sorted by id.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Points {
+    /// Ids `(n,)`, ascending and unique.
+    pub ids: Vec<u64>,
+    /// Coordinates `(n, 3)` in units of the model. Not finite if the file has no position.
+    pub positions: Vec<[f64; 3]>,
+    /// Colors `(n, 3)`: red, green, blue.
+    pub colors: Vec<[u8; 3]>,
+    /// The observations of each point, if requested.
+    pub tracks: Option<Tracks>,
+}
+
+/// The 2D points that observe each point: row `i` is `observations[offsets[i]..offsets[i + 1]]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tracks {
+    /// Offsets `(n + 1,)`, ascending from 0.
+    pub offsets: Vec<usize>,
+    /// Image id and index of the 2D point in that image.
+    pub observations: Vec<(u32, u32)>,
+}
+
+impl Tracks {
+    pub(super) fn new() -> Self {
+        Self { offsets: vec![0], observations: Vec::new() }
+    }
+
+    /// Returns the observations of the point in `row`.
+    ///
+    /// # Panics
+    /// When there is no such row.
+    pub fn row(&self, row: usize) -> &[(u32, u32)] {
+        &self.observations[self.offsets[row]..self.offsets[row + 1]]
+    }
+}
+
+fn is_text(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("txt"))
+}
+
+/// Reads `cameras.bin` or `cameras.txt`, sorted by id.
+///
+/// # Errors
+/// When the file cannot be read, is malformed, names an unknown camera model or repeats an id.
+pub fn read_cameras(path: &Path) -> Result<Vec<Camera>, Error> {
+    let mut cameras = if is_text(path) { text_cameras(path)? } else { binary_cameras(path)? };
+    cameras.sort_by_key(|c| c.id);
+    refuse_repeated(path, "camera", cameras.iter().map(|c| u64::from(c.id)))?;
+    Ok(cameras)
+}
+
+/// Reads `images.bin` or `images.txt`, sorted by id.
+///
+/// # Errors
+/// When the file cannot be read, is malformed or repeats an id.
+pub fn read_images(path: &Path) -> Result<Vec<Image>, Error> {
+    let mut images = if is_text(path) { text_images(path)? } else { binary_images(path)? };
+    images.sort_by_key(|i| i.id);
+    refuse_repeated(path, "image", images.iter().map(|i| u64::from(i.id)))?;
+    Ok(images)
+}
+
+/// Reads the cameras and images of the model in the folder `model`, in the form that
+/// [`super::open`] reads.
+///
+/// # Errors
+/// When [`read_cameras`] or [`read_images`] fails, or an image names a missing camera or has no
+/// pose.
+pub fn read_views(model: &Path) -> Result<(Vec<Camera>, Vec<Image>), Error> {
+    let extension = if model.join("images.bin").is_file() { "bin" } else { "txt" };
+    let cameras = read_cameras(&model.join(format!("cameras.{extension}")))?;
+    let path = model.join(format!("images.{extension}"));
+    let images = read_images(&path)?;
+    for image in &images {
+        let wrong = |expected: String, found| {
+            Err(Error::new(&path, format!("image {}", image.id), expected, found))
+        };
+        if image.camera(&cameras).is_none() {
+            let expected = format!("the id of a camera in cameras.{extension}");
+            return wrong(expected, image.camera_id.to_string());
+        }
+        if image.center.iter().any(|x| !x.is_finite()) {
+            return wrong("a finite pose".to_owned(), "none".to_owned());
+        }
+    }
+    Ok((cameras, images))
+}
+
+/// Reads `points3D.bin` or `points3D.txt`, sorted by id. Tracks are read only if `with_tracks` is
+/// set.
+///
+/// # Errors
+/// When the file cannot be read, is malformed or repeats an id.
+pub fn read_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
+    let points = if is_text(path) {
+        text_points(path, with_tracks)?
+    } else {
+        binary_points(path, with_tracks)?
+    };
+    let points = sorted(points);
+    refuse_repeated(path, "point", points.ids.iter().copied())?;
+    Ok(points)
+}
+
+fn refuse_repeated(
+    path: &Path,
+    what: &str,
+    ascending: impl Iterator<Item = u64>,
+) -> Result<(), Error> {
+    let mut last = None;
+    for id in ascending {
+        if last == Some(id) {
+            let place = format!("{what} {id}");
+            return Err(Error::new(path, place, "each id once", "it again"));
+        }
+        last = Some(id);
+    }
+    Ok(())
+}
+
+/// Older COLMAP versions write points in the order of a hash map.
+fn sorted(points: Points) -> Points {
+    if points.ids.is_sorted() {
+        return points;
+    }
+    let mut order: Vec<usize> = (0..points.ids.len()).collect();
+    order.sort_by_key(|&row| points.ids[row]);
+    let tracks = points.tracks.map(|tracks| {
+        let mut sorted = Tracks::new();
+        for &row in &order {
+            sorted.observations.extend_from_slice(tracks.row(row));
+            sorted.offsets.push(sorted.observations.len());
+        }
+        sorted
+    });
+    Points {
+        ids: order.iter().map(|&row| points.ids[row]).collect(),
+        positions: order.iter().map(|&row| points.positions[row]).collect(),
+        colors: order.iter().map(|&row| points.colors[row]).collect(),
+        tracks,
+    }
+}
+
+/// The smallest size of each record in bytes, which limits a declared count.
+const CAMERA_BYTES: u64 = 4 + 4 + 8 + 8 + 2 * 8;
+const IMAGE_BYTES: u64 = 4 + 7 * 8 + 4 + 1 + 8;
+const POINT2D_BYTES: u64 = 8 + 8 + 8;
+const POINT3D_BYTES: u64 = 8 + 3 * 8 + 3 + 8 + 8;
+const OBSERVATION_BYTES: u64 = 4 + 4;
+
+fn binary_cameras(path: &Path) -> Result<Vec<Camera>, Error> {
+    let mut bytes = Bytes::open(path)?;
+    let n = bytes.count("cameras", CAMERA_BYTES)?;
+    let mut cameras = Vec::with_capacity(n as usize);
+    for number in 1..=n {
+        bytes.record(number);
+        let id = bytes.u32("camera id")?;
+        let model_id = bytes.i32("camera model")?;
+        let Some(model) = CameraModel::from_id(model_id) else {
+            let expected = format!("a camera model of COLMAP (0 to 17) for camera {id}");
+            return Err(bytes.error(expected, model_id.to_string()));
+        };
+        let width_px = bytes.u64("width")?;
+        let height_px = bytes.u64("height")?;
+        let params = (0..model.n_params)
+            .map(|_| Ok(bytes.doubles::<1>("a parameter")?[0]))
+            .collect::<Result<_, Error>>()?;
+        cameras.push(Camera { id, model, width_px, height_px, params });
+    }
+    bytes.end()?;
+    Ok(cameras)
+}
+
+fn binary_images(path: &Path) -> Result<Vec<Image>, Error> {
+    let mut bytes = Bytes::open(path)?;
+    let n = bytes.count("images", IMAGE_BYTES)?;
+    let mut images = Vec::with_capacity(n as usize);
+    for number in 1..=n {
+        bytes.record(number);
+        let id = bytes.u32("image id")?;
+        let rotation = bytes.doubles("rotation")?;
+        let translation = bytes.doubles("translation")?;
+        let (center, rotation) = center_and_rotation(rotation, translation);
+        let camera_id = bytes.u32("camera id")?;
+        let name = bytes.zero_terminated("image name")?;
+        let n_points2d = bytes.count("2D points", POINT2D_BYTES)?;
+        bytes.skip(n_points2d * POINT2D_BYTES, "2D points")?;
+        images.push(Image { id, name, camera_id, center, rotation, n_points2d });
+    }
+    bytes.end()?;
+    Ok(images)
+}
+
+fn binary_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
+    let mut bytes = Bytes::open(path)?;
+    let n = bytes.count("points", POINT3D_BYTES)? as usize;
+    let mut ids = Vec::with_capacity(n);
+    let mut positions = Vec::with_capacity(n);
+    let mut colors = Vec::with_capacity(n);
+    let mut tracks = with_tracks.then(Tracks::new);
+    for number in 1..=n as u64 {
+        bytes.record(number);
+        let id = bytes.u64("point id")?;
+        let position = bytes.doubles::<3>("coordinates")?;
+        let mut color = [0; 3];
+        bytes.fill(&mut color, "color")?;
+        bytes.skip(8, "reprojection error")?;
+        let n_observations = bytes.count("observations", OBSERVATION_BYTES)?;
+        if let Some(tracks) = &mut tracks {
+            for _ in 0..n_observations {
+                let image_id = bytes.u32("image id")?;
+                tracks.observations.push((image_id, bytes.u32("2D point")?));
+            }
+            tracks.offsets.push(tracks.observations.len());
+        } else {
+            bytes.skip(n_observations * OBSERVATION_BYTES, "observations")?;
+        }
+        ids.push(id);
+        positions.push(position);
+        colors.push(color);
+    }
+    bytes.end()?;
+    Ok(Points { ids, positions, colors, tracks })
+}
+
+fn next<'a, T: std::str::FromStr>(
+    lines: &Lines,
+    words: &mut impl Iterator<Item = &'a [u8]>,
+    what: &str,
+) -> Result<T, Error> {
+    let word = words.next().ok_or_else(|| lines.error(what, "end of line"))?;
+    number(word).ok_or_else(|| lines.error(what, quoted(word)))
+}
+
+fn text_cameras(path: &Path) -> Result<Vec<Camera>, Error> {
+    let mut lines = Lines::open(path)?;
+    let mut cameras = Vec::new();
+    while lines.advance_to_data()? {
+        let mut words = words(lines.line());
+        let id = next(&lines, &mut words, "a camera id")?;
+        let name = words.next().unwrap_or_default();
+        let Some(model) = CameraModel::from_name(name) else {
+            let expected = format!("a camera model of COLMAP for camera {id}");
+            return Err(lines.error(expected, quoted(name)));
+        };
+        let width_px = next(&lines, &mut words, "a width in pixels")?;
+        let height_px = next(&lines, &mut words, "a height in pixels")?;
+        let params: Vec<f64> = words
+            .map(|word| number(word).ok_or_else(|| lines.error("a parameter", quoted(word))))
+            .collect::<Result<_, _>>()?;
+        if params.len() != model.n_params {
+            let expected = format!("{} parameters of {}", model.n_params, model.name);
+            return Err(lines.error(expected, params.len().to_string()));
+        }
+        cameras.push(Camera { id, model, width_px, height_px, params });
+    }
+    Ok(cameras)
+}
+
+fn text_images(path: &Path) -> Result<Vec<Image>, Error> {
+    let mut lines = Lines::open(path)?;
+    let mut images = Vec::new();
+    while lines.advance_to_data()? {
+        let mut words = words(lines.line());
+        let id = next(&lines, &mut words, "an image id")?;
+        let rotation = coordinates(&lines, &mut words, "a rotation (4 numbers)")?;
+        let translation = coordinates(&lines, &mut words, "a translation (3 numbers)")?;
+        let (center, rotation) = center_and_rotation(rotation, translation);
+        let camera_id = next(&lines, &mut words, "a camera id")?;
+        drop(words);
+        let name = after_words(lines.line(), 9).to_vec();
+        if name.is_empty() {
+            return Err(lines.error("an image name", "end of line"));
+        }
+        // The line of 2D points may be empty, and some tools omit it after the last image.
+        let n_words = if lines.advance()? { self::words(lines.line()).count() } else { 0 };
+        if !n_words.is_multiple_of(3) {
+            let expected = "2D points of 3 numbers (x, y, point id)";
+            return Err(lines.error(expected, format!("{n_words} numbers")));
+        }
+        images.push(Image {
+            id,
+            name,
+            camera_id,
+            center,
+            rotation,
+            n_points2d: n_words as u64 / 3,
+        });
+    }
+    Ok(images)
+}
+
+/// Returns the rest of a line after `n` words. Names may contain spaces.
+fn after_words(mut line: &[u8], n: usize) -> &[u8] {
+    for _ in 0..n {
+        let end = line.iter().position(u8::is_ascii_whitespace);
+        line = line[end.unwrap_or(line.len())..].trim_ascii_start();
+    }
+    line
+}
+
+fn text_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
+    let mut lines = Lines::open(path)?;
+    let mut points = Points { tracks: with_tracks.then(Tracks::new), ..Points::default() };
+    while lines.advance_to_data()? {
+        let mut words = words(lines.line());
+        let id: u64 = next(&lines, &mut words, "a point id")?;
+        let position = coordinates::<3>(&lines, &mut words, "3 coordinates")?;
+        let color = coordinates::<3>(&lines, &mut words, "a color (3 numbers)")?;
+        coordinates::<1>(&lines, &mut words, "a reprojection error")?;
+        if let Some(tracks) = &mut points.tracks {
+            while let Some(word) = words.next() {
+                let image_id =
+                    number(word).ok_or_else(|| lines.error("an image id", quoted(word)))?;
+                let index = next(&lines, &mut words, "the index of a 2D point")?;
+                tracks.observations.push((image_id, index));
+            }
+            tracks.offsets.push(tracks.observations.len());
+        } else {
+            let n_words = words.count();
+            if !n_words.is_multiple_of(2) {
+                let expected = "observations of 2 numbers (image id, 2D point)";
+                return Err(lines.error(expected, format!("{n_words} numbers")));
+            }
+        }
+        points.ids.push(id);
+        points.positions.push(position);
+        // A cast saturates.
+        points.colors.push(color.map(|x| x as u8));
+    }
+    Ok(points)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn row_is_id() {
+        for (row, model) in CAMERA_MODELS.iter().enumerate() {
+            assert_eq!(CameraModel::from_id(row as i32), Some(model));
+            assert_eq!(CameraModel::from_name(model.name.as_bytes()).unwrap().id, row as i32);
+        }
+        assert_eq!(CameraModel::from_id(-1), None);
+    }
+
+    #[test]
+    fn unsorted_points_are_sorted_with_their_tracks() {
+        let points = Points {
+            ids: vec![7, 2],
+            positions: vec![[7.0; 3], [2.0; 3]],
+            colors: vec![[7; 3], [2; 3]],
+            tracks: Some(Tracks {
+                offsets: vec![0, 2, 3],
+                observations: vec![(7, 0), (7, 1), (2, 0)],
+            }),
+        };
+        let sorted = sorted(points);
+        assert_eq!(sorted.ids, [2, 7]);
+        assert_eq!(sorted.positions, [[2.0; 3], [7.0; 3]]);
+        assert_eq!(sorted.colors, [[2; 3], [7; 3]]);
+        let tracks = sorted.tracks.unwrap();
+        assert_eq!(tracks.row(0), [(2, 0)]);
+        assert_eq!(tracks.row(1), [(7, 0), (7, 1)]);
+    }
+
+    #[test]
+    fn names_keep_their_spaces() {
+        assert_eq!(after_words(b"1 2  a b.jpg", 2), b"a b.jpg");
+        assert_eq!(after_words(b"1 2", 2), b"");
+    }
+}

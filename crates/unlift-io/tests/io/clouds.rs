@@ -1,0 +1,479 @@
+//! Tests point clouds: PLY, tables and arrays in every form, files that deviate from their format
+//! in common ways, and exports.
+
+use std::fs;
+
+use half::f16;
+use unlift::Unit;
+use unlift::released::{Lines, Obfuscation, Rays, Released};
+use unlift_io::{clouds, read};
+
+use super::{POINTS, close, data, npy, open, refused, total, write};
+
+fn ply(encoding: &str, real: &str, row: impl Fn(&mut Vec<u8>, [f64; 3])) -> Vec<u8> {
+    let mut file = format!(
+        "ply\nformat {encoding} 1.0\ncomment made by hand\nelement camera 1\nproperty short id\n\
+         element vertex 3\nproperty uchar red\nproperty {real} x\nproperty {real} y\n\
+         property {real} z\nproperty int label\nelement face 1\n\
+         property list uchar int vertex_indices\nend_header\n"
+    )
+    .into_bytes();
+    match encoding {
+        "ascii" => file.extend(b"7\n"),
+        _ => file.extend([0, 7]),
+    }
+    for point in POINTS {
+        row(&mut file, point);
+    }
+    match encoding {
+        "ascii" => file.extend(b"3 0 1 0\n"),
+        _ => file.extend([1, 0, 0, 0, 0]),
+    }
+    file
+}
+
+#[test]
+fn ply_reads_the_same_in_every_form() {
+    type Row = fn(&mut Vec<u8>, [f64; 3]);
+    fn binary(file: &mut Vec<u8>, values: impl Iterator<Item = Vec<u8>>) {
+        file.push(255);
+        values.for_each(|v| file.extend(v));
+        file.extend([1, 2, 3, 4]);
+    }
+    let forms: [(&str, &str, Row); 6] = [
+        ("ascii", "float", |f, [x, y, z]| {
+            f.extend(format!("255 {x} {y} {z:e} 4\n").bytes());
+        }),
+        ("ascii", "double", |f, [x, y, z]| {
+            f.extend(format!("255\t{x}  {y} {z} -4 \r\n").bytes());
+        }),
+        ("binary_little_endian", "float", |f, p| {
+            binary(f, p.iter().map(|&x| (x as f32).to_le_bytes().to_vec()));
+        }),
+        ("binary_little_endian", "float64", |f, p| {
+            binary(f, p.iter().map(|x| x.to_le_bytes().to_vec()));
+        }),
+        ("binary_big_endian", "float32", |f, p| {
+            binary(f, p.iter().map(|&x| (x as f32).to_be_bytes().to_vec()));
+        }),
+        ("binary_big_endian", "double", |f, p| {
+            binary(f, p.iter().map(|x| x.to_be_bytes().to_vec()));
+        }),
+    ];
+    for (encoding, real, row) in forms {
+        let (_dir, path) = write("a.PLY", ply(encoding, real, row));
+        let input = read::open(&path).unwrap();
+        assert_eq!(input.positions, POINTS, "{encoding} {real}");
+        assert_eq!(input.ids, [0, 1, 2]);
+        assert_eq!(input.format, format!("ply {}", encoding.replace('_', " ")));
+    }
+}
+
+#[test]
+fn ply_written_by_pycolmap_holds_the_model() {
+    let cloud = read::open(&data("cloud.ply")).unwrap();
+    let model = read::open(&data("rig-bin")).unwrap();
+    assert_eq!(cloud.positions.len(), 8);
+    // In `float`: 16 times the rounding error of the largest coordinate, 15.
+    close(total(&cloud.positions), total(&model.positions), 1e-5);
+}
+
+#[test]
+fn arrays_read_the_same_in_every_form() {
+    let expected: Vec<[f64; 3]> =
+        (0..4).map(|row| std::array::from_fn(|column| (3 * row + column) as f64 / 8.0)).collect();
+    for name in ["f8.npy", "f4-big-endian.npy", "f8-fortran.npy"] {
+        assert_eq!(read::open(&data(name)).unwrap().positions, expected, "{name}");
+    }
+}
+
+/// What a table is read as: [`POINTS`] without or with a doubt, or the end of its error line.
+enum Read {
+    Points,
+    Doubted(&'static str),
+    Refused(&'static str),
+}
+
+#[test]
+#[rustfmt::skip] // One row per line.
+fn tables_are_read_as_intended_or_refused_with_a_reason() {
+    use Read::{Doubted, Points, Refused};
+    // Names, the text before the points, and a row, in which i is the number of the row and e is z with an exponent.
+    let any = &["a.csv", "a.xyz", "a.TXT"][..];
+    const POSES: &str = "found a trajectory, poses of cameras";
+    let rows = [
+        (any, "", "x,y,z", Points),
+        (any, "", "x, y, e, 17, rd", Points),
+        (any, "", "x;y;z\r", Points),
+        (any, "", "x y   z\n", Points),
+        (any, "# x y z\n// X,Y,Z\n", "  x\ty\tz", Points),
+        (any, "id,Z,\"Y\",x\n", "7,z,y,x\n# between", Points),
+        (any, "name\tx\ty\tz\n", "\tx\ty\tz", Points),
+        (any, "X Y Z R G B\n", "x y z 1 2 3", Points),
+        (any, "\u{feff}x;y;z\n", "x;y;z", Points),
+        // Comments name the columns.
+        (any, "# id x y z\n", "i x y z", Points),
+        (any, "//ID X Y Z\n", "i x y z", Points),
+        (any, "# made by hand\n# columns: id X[m] Y[m] Z[m]\n# 3 rows\n", "i x y z", Points),
+        (any, "# nx,ny,nz,x,y,z\n", "0,0,1,x,y,z", Points),
+        (any, "# the x y z of my room\n", "x y z", Points),
+        (any, "# made by hand in an hour or so\n", "x y z", Points),
+        (any, "# my first room\n", "x y z", Doubted("columns: the first three are read as")),
+        (any, "# id east north up\n", "i x y z", Refused("columns named x, y and z, found \"id east north up\"")),
+        (any, "# time lat lon\n", "i x y z", Refused("columns named x, y and z, found \"time lat lon\"")),
+        (any, "# id x y z label\n", "i x y z", Refused("5 columns, as a comment names them, found \"id x y z label\"")),
+        (any, "# lat lon alt\n", "x y z", Refused("columns named x, y and z, found \"lat lon alt\"")),
+        // A count before the points.
+        (&["a.pts", "a.asc"], "3\n", "x y z -100 1 2 3", Points),
+        (&["a.pts", "a.asc"], "//X Y Z\n3\n", "x y z", Points),
+        (&["a.pts"], "4\n", "x y z", Refused(":4: expected 4 points, as declared in the line before them, found 3 up to here")),
+        // Trajectories.
+        (any, "", "i x y z 0 0 0.6 0.8", Refused(POSES)),
+        (any, "#timestamp tx ty tz qx qy qz qw\n", "i x y z 0 0 0.6 0.8", Refused(POSES)),
+        (any, "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []\n", "i,x,y,z,0,0,0.6,0.8", Refused(POSES)),
+        (any, "", "1 0 0 x 0 1 0 y 0 0 1 z", Refused(POSES)),
+        // `points3D.txt` of other programs is a table. A damaged row of COLMAP must not be read as a point.
+        (&["points3D.txt"], "", "x y z", Points),
+        (&["points3D.txt"], "", "x, y, z", Points),
+        (&["points3D.txt"], "", "1 x y z", Refused("points3D.txt:1: expected a color (3 numbers), found end of line")),
+    ];
+    for (names, head, row, read) in rows {
+        let mut text = head.to_owned();
+        for (at, [x, y, z]) in POINTS.into_iter().enumerate() {
+            for letter in row.chars() {
+                match letter {
+                    'i' => text += &at.to_string(),
+                    'x' => text += &x.to_string(),
+                    'y' => text += &y.to_string(),
+                    'z' => text += &z.to_string(),
+                    'e' if row.contains("y, e") => text += &format!("{z:e}"),
+                    other => text.push(other),
+                }
+            }
+            text.push('\n');
+        }
+        for name in names {
+            let (_dir, path) = write(name, &text);
+            match (read::open(&path), &read) {
+                (Ok(map), Points) => assert_eq!((&map.positions[..], &map.doubts[..]), (&POINTS[..], &[][..]), "{text}"),
+                (Ok(map), Doubted(doubt)) => assert!(map.positions == POINTS && map.doubts[0].starts_with(doubt), "{:?}", map.doubts),
+                (Err(error), Refused(end)) => assert!(error.to_string().ends_with(end), "{error}: {text}"),
+                (found, _) => panic!("{text}: {found:?}"),
+            }
+        }
+    }
+    let numbered: String = (1..=20).map(|at| format!("{at} 0.5 {at} 3\n")).collect();
+    assert!(refused("a.xyz", numbered).ends_with("found the row number in the first column"));
+}
+
+#[test]
+fn points_of_colmap_are_known_under_any_name() {
+    let text = fs::read_to_string(data("rig-txt/points3D.txt")).unwrap();
+    let expected = read::open(&data("rig-txt")).unwrap();
+    let rows: String = text
+        .lines()
+        .filter(|line| !line.starts_with('#'))
+        .map(|line| format!("{line}\n"))
+        .collect();
+    for text in [text, rows] {
+        let input = open("cloud.txt", text);
+        assert_eq!((input.format, &input.ids), ("COLMAP points", &expected.ids));
+        assert_eq!(input.positions, expected.positions);
+    }
+    let images = fs::read(data("rig-txt/images.txt")).unwrap();
+    assert!(refused("poses.txt", images).ends_with("found a trajectory, poses of cameras"));
+}
+
+#[test]
+fn points_without_a_place_are_left_out_and_counted() {
+    for none in ["nan", "-inf", "NaN", "-nan(ind)", "1.#QNAN", ""] {
+        let mut text = "x,y,z\n".to_owned();
+        for at in 0..40 {
+            text +=
+                &if at == 7 { format!("1,{none},3\n") } else { format!("{at},{at},{}\n", at * at) };
+        }
+        let input = open("a.csv", text);
+        assert_eq!((input.positions.len(), input.n_rows()), (39, 40), "{none}");
+        assert_eq!((input.ids[6], input.ids[7], input.left_out), (6, 8, vec![7]));
+        assert_eq!(input.notes, ["1 of 40 points have no place"]);
+        assert!(input.doubts.is_empty());
+    }
+    // More than 5 % of the points are a doubt.
+    let input = open("a.xyz", "nan 1 2\n3 4 5\n6 7 8\n");
+    assert_eq!(input.doubts, ["1 of 3 points have no place: what is audited is not the whole map"]);
+}
+
+#[test]
+fn many_points_at_one_place_are_told() {
+    let text: String = (0..30)
+        .map(|at| if at % 2 == 0 { "0 -0.0 0\n".to_owned() } else { format!("{at} 1 2\n") })
+        .collect();
+    assert_eq!(
+        open("a.xyz", text).notes,
+        ["15 of 30 points are at exactly one place, [0.0, -0.0, 0.0]"]
+    );
+}
+
+#[test]
+fn a_file_that_was_not_fetched_is_told() {
+    let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 179\n";
+    for name in ["a.ply", "a.pts"] {
+        let line = refused(name, pointer);
+        assert!(line.ends_with("found a pointer of Git LFS (run git lfs pull)"), "{line}");
+    }
+}
+
+fn binary_ply(vertex: &str, rows: &[u8]) -> Vec<u8> {
+    let head = format!("ply\nformat binary_little_endian 1.0\n{vertex}end_header\n");
+    [head.as_bytes(), rows].concat()
+}
+
+#[test]
+fn ply_may_have_lists_and_integers_anywhere() {
+    let head = "element face 2\nproperty list uchar int vertex_indices\nproperty uchar flag\n\
+                element vertex 3\nproperty list ushort float before\nproperty short X\nproperty list uchar uchar between\n\
+                property uint Y\nproperty char Z\n";
+    let mut rows = vec![3, 0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0, 9, 0, 9];
+    for at in 0..3u8 {
+        rows.extend(u16::from(at).to_le_bytes());
+        rows.extend(vec![7; 4 * usize::from(at)]);
+        rows.extend((-300 - i16::from(at)).to_le_bytes());
+        rows.push(2 - at);
+        rows.extend(vec![7; usize::from(2 - at)]);
+        rows.extend((70_000 + u32::from(at)).to_le_bytes());
+        rows.push(-(5 + at as i8) as u8);
+    }
+    let expected: Vec<[f64; 3]> =
+        (0..3).map(|at| at as f64).map(|at| [-300.0 - at, 70_000.0 + at, -5.0 - at]).collect();
+    assert_eq!(open("a.ply", binary_ply(head, &rows)).positions, expected);
+    let text = format!(
+        "ply\nformat ascii 1.0\n{head}end_header\n3 0 1 2 9\n0 9\n0 -300 2 7 7 70000 -5\n1 7.5 -301 1 7 70001 -6\n2 7.5 7.5 -302 0 70002 -7\n"
+    );
+    assert_eq!(open("a.ply", &text).positions, expected);
+    let line = refused("a.ply", text.replace("0 70002", "3 70002"));
+    assert_eq!(line, "a.ply:17: expected 10 values of vertex 3, found 7");
+    let endless = binary_ply(
+        "element vertex 1\nproperty float x\nproperty float y\nproperty float z\nproperty list uint int far\n",
+        &[0xff; 16],
+    );
+    assert!(refused("a.ply", endless).contains("bytes of a list, found end of file"));
+}
+
+#[test]
+fn of_splats_the_centers_are_read() {
+    let names = ["x", "y", "z", "f_dc_0", "opacity", "scale_0", "rot_0"]
+        .map(|name| format!("property float {name}\n"));
+    let rows: Vec<u8> = POINTS
+        .iter()
+        .flat_map(|&[x, y, z]| [x, y, z, 0.0, 1.0, 1.0, 1.0])
+        .flat_map(|x| (x as f32).to_le_bytes())
+        .collect();
+    let splats = binary_ply(&format!("element vertex 3\n{}", names.concat()), &rows);
+    let flat: Vec<u8> = POINTS
+        .iter()
+        .flat_map(|point| {
+            let mut splat: Vec<u8> = point.iter().flat_map(|&x| (x as f32).to_le_bytes()).collect();
+            splat.resize(32, 1);
+            splat
+        })
+        .collect();
+    for (name, bytes) in [("a.ply", splats), ("a.splat", flat)] {
+        let input = open(name, bytes);
+        assert_eq!((&input.positions[..], input.notes.len()), (&POINTS[..], 1));
+        assert_eq!(input.notes, ["Gaussian splats: only their centers are read"]);
+    }
+}
+
+/// It must not allocate memory of that size.
+#[test]
+fn a_file_with_holes_is_one_line() {
+    let head = "ply\nformat binary_little_endian 1.0\nelement vertex 200000000000\nproperty float x\n\
+                property float y\nproperty float z\nend_header\n";
+    let (_dir, path) = write("a.ply", head);
+    let file = fs::OpenOptions::new().write(true).open(&path).unwrap();
+    // Some file systems do not support such files.
+    if file.set_len(head.len() as u64 + 12 * 200_000_000_000).is_ok() {
+        let error = read::open(&path).unwrap_err().to_string();
+        assert!(error.contains("expected data that fits into memory, found "), "{error}");
+    }
+}
+
+fn bytes<const N: usize>(
+    values: impl IntoIterator<Item = f64>,
+    of: impl Fn(f64) -> [u8; N],
+) -> Vec<u8> {
+    values.into_iter().flat_map(of).collect()
+}
+
+#[test]
+fn arrays_may_have_more_columns_or_names() {
+    let f4 = |x: f64| (x as f32).to_le_bytes();
+    let six = bytes(POINTS.iter().flat_map(|&[x, y, z]| [x, y, z, 1.0, 2.0, 3.0]), f4);
+    let input = open("a.npy", npy("'<f4'", "(3, 6)", &six));
+    assert_eq!(input.positions, POINTS);
+    assert_eq!(input.notes, ["the first 3 of 6 columns are read as x, y and z"]);
+    let halves = bytes([0.5, 1.0, 2.0], |x| f16::from_f64(x).to_le_bytes());
+    assert_eq!(open("a.npy", npy("'<f2'", "(1, 3)", &halves)).positions, [[0.5, 1.0, 2.0]]);
+    let whole = bytes([-5.0, 1e6, 2.0], |x| (x as i64).to_le_bytes());
+    assert_eq!(open("a.npy", npy("'<i8'", "(1, 3)", &whole)).positions, [[-5.0, 1e6, 2.0]]);
+
+    let rows: Vec<u8> = POINTS
+        .iter()
+        .flat_map(|&[x, y, z]| {
+            let mut row = vec![9, 9, 9];
+            row.extend((z as f32).to_be_bytes());
+            row.extend(x.to_le_bytes());
+            row.extend([0; 8]);
+            row.extend((y as f32).to_le_bytes());
+            row
+        })
+        .collect();
+    let descr = "[('rgb', '|u1', (3,)), ('Z', '>f4'), ('x', '<f8'), ('', '|V4'), ('s', '<U1'), ('y', '<f4')]";
+    assert_eq!(open("a.npy", npy(descr, "(3,)", &rows)).positions, POINTS);
+    let descr = "[('id', '<i4'), ('xyz', '<f4', (3,))]";
+    let rows: Vec<u8> =
+        POINTS.iter().flat_map(|point| [vec![1, 0, 0, 0], bytes(*point, f4)].concat()).collect();
+    assert_eq!(open("a.npy", npy(descr, "(3,)", &rows)).positions, POINTS);
+    let numbered = bytes((0..10).flat_map(|row| [f64::from(row), 5.0, 6.0, 7.0]), f4);
+    assert!(refused("a.npy", npy("'<f4'", "(10, 4)", &numbered)).ends_with("found the row number"));
+    assert!(
+        refused("a.npy", npy("[('a', '<f4')]", "(1,)", &[0; 4]))
+            .contains("fields of numbers called x, y and z")
+    );
+    assert!(
+        refused("a.npy", npy("'<f4'", "(10, 128)", &[]))
+            .contains("expected an array of shape (n, 3)")
+    );
+}
+
+fn archive(arrays: &[(&str, Vec<u8>)]) -> Vec<u8> {
+    use std::io::Write;
+    use zip::write::{SimpleFileOptions, ZipWriter};
+    let mut out = ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    for (at, (name, bytes)) in arrays.iter().enumerate() {
+        let method = [zip::CompressionMethod::Stored, zip::CompressionMethod::Deflated][at % 2];
+        let options = SimpleFileOptions::default().compression_method(method);
+        out.start_file(format!("{name}.npy"), options).unwrap();
+        out.write_all(bytes).unwrap();
+    }
+    out.finish().unwrap().into_inner()
+}
+
+#[test]
+fn the_points_of_an_archive_are_found() {
+    let points = npy("'<f8'", "(3, 3)", &bytes(POINTS.concat(), f64::to_le_bytes));
+    let other = npy("'<f8'", "(2, 128)", &[0; 2048]);
+    assert_eq!(
+        open("a.npz", archive(&[("descriptors", other.clone()), ("arr_0", points.clone())]))
+            .positions,
+        POINTS
+    );
+    let input = open("a.npz", archive(&[("colors", points.clone()), ("xyz", points.clone())]));
+    assert_eq!(
+        (&input.positions[..], &input.notes[..]),
+        (&POINTS[..], &["read, the array \"xyz\" of 2".to_owned()][..])
+    );
+    let line = refused("a.npz", archive(&[("a", points.clone()), ("b", points)]));
+    assert!(line.ends_with("found \"a\", \"b\""), "{line}");
+    assert!(refused("a.npz", archive(&[("d", other)])).ends_with("found \"d\""));
+    assert!(refused("a.npz", b"PK\x03\x04").contains("expected an archive of NumPy arrays"));
+}
+
+/// OpenSfM stores position, size and angle of keypoints beside their descriptors.
+#[test]
+fn an_archive_of_features_is_no_map() {
+    let array = |shape: [usize; 2]| {
+        npy("'<f4'", &format!("({}, {})", shape[0], shape[1]), &vec![0; 4 * shape[0] * shape[1]])
+    };
+    for arrays in [
+        [("points", [30, 4]), ("descriptors", [30, 128])],
+        [("points", [30, 3]), ("OPENSFM_FEATURES_VERSION", [1, 1])],
+        [("keypoints", [30, 3]), ("scores", [30, 1])],
+    ] {
+        let line = refused("a.npz", archive(&arrays.map(|(name, shape)| (name, array(shape)))));
+        assert_eq!(line, "a.npz: expected points of a map, found features of an image");
+    }
+}
+
+#[test]
+fn recovered_points_are_colored_and_lost_ones_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("recovered.ply");
+    let points = [Some([1.0, 2.0, 3.0]), None, Some([4e6, 5.0, 6.0])];
+    clouds::write_recovered(&path, &points, &[0.0, f64::NAN, 1.0], 0.5).unwrap();
+    let header = "ply\nformat binary_little_endian 1.0\ncomment unlift\nelement vertex 2\n\
+        property double x\nproperty double y\nproperty double z\n\
+        property uchar red\nproperty uchar green\nproperty uchar blue\n\
+        property float error\nend_header\n";
+    let mut expected = header.as_bytes().to_vec();
+    for (point, color, error) in
+        [([1.0, 2.0, 3.0], [0x44, 0x01, 0x54], 0.0), ([4e6, 5.0, 6.0], [0xfd, 0xe7, 0x25], 1.0)]
+    {
+        expected.extend(point.iter().flat_map(|x: &f64| x.to_le_bytes()));
+        expected.extend(color);
+        expected.extend((error as f32).to_le_bytes());
+    }
+    assert_eq!(fs::read(&path).unwrap(), expected);
+}
+
+#[test]
+fn points_are_read_back_by_our_reader() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("points.ply");
+    let points = [[1.0, 2.0, 3.0], [-0.1, 1e-9, 4e6]];
+    clouds::write_points(&path, &points).unwrap();
+    assert_eq!(unlift_io::read::open(&path).unwrap().positions, points);
+    clouds::write_points(&path, &[[1.0, 2.0]]).unwrap();
+    assert_eq!(unlift_io::read::open(&path).unwrap().positions, [[1.0, 2.0, 0.0]], "in the plane");
+}
+
+#[test]
+fn lines_are_pairs_of_vertices() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("lines.obj");
+    let segments = [[[0.0, 0.5, 1.0], [1.0, 2.0, 3.0]], [[0.1, 0.0, 0.0], [4e6, 0.0, 0.0]]];
+    clouds::write_lines(&path, &segments).unwrap();
+    let expected = "# unlift\nv 0 0.5 1\nv 1 2 3\nl 1 2\nv 0.1 0 0\nv 4000000 0 0\nl 3 4\n";
+    assert_eq!(fs::read_to_string(&path).unwrap(), expected);
+}
+
+#[test]
+fn records_are_clipped_in_the_frame_of_the_map() {
+    let origin = [1e6, 0.0, 0.0];
+    let (low, high) = ([1e6 - 1.0, -1.0, -1.0], [1e6 + 1.0, 1.0, 1.0]);
+    let along = [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0]];
+    let lines = Lines::through(&[[0.5, 0.0, 0.0], [2.0, 0.0, 0.0]], &along).unwrap();
+    let released =
+        |obfuscation| Released::try_new(obfuscation, 1, origin, Unit::Meter, None).unwrap();
+    assert_eq!(
+        clouds::record_segments(&released(Obfuscation::Lines(lines)), &low, &high),
+        [[[1e6 + 0.5, 0.0, -1.0], [1e6 + 0.5, 0.0, 1.0]]]
+    );
+    let rays = Rays::try_new(&[[0.0; 3]], vec![0], &along[..1]).unwrap();
+    assert_eq!(
+        clouds::record_segments(&released(Obfuscation::Rays(rays)), &low, &high),
+        [[[1e6, 0.0, 0.0], [1e6, 0.0, 1.0]]]
+    );
+}
+
+#[test]
+fn what_is_not_finite_or_not_as_long_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a");
+    let nan = [0.0, f64::NAN, 0.0];
+    for (result, line) in [
+        (
+            clouds::write_points(&path, &[nan]),
+            "point 0: expected finite coordinates, found [0.0, NaN, 0.0]",
+        ),
+        (clouds::write_recovered(&path, &[Some([0.0; 3])], &[], 1.0), "expected 1 errors, found 0"),
+        (
+            clouds::write_lines(&path, &[[[0.0; 3], nan]]),
+            "segment 0: expected finite coordinates, found [[0.0, 0.0, 0.0], [0.0, NaN, 0.0]]",
+        ),
+    ] {
+        let found = result.unwrap_err().to_string();
+        assert!(found.ends_with(&format!("a: {line}")), "{found}");
+    }
+    assert!(!path.exists());
+}

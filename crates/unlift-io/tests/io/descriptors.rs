@@ -1,0 +1,354 @@
+//! Tests descriptors of the points of a map.
+
+use std::fs;
+
+use half::f16;
+use unlift::Descriptors;
+use unlift::descriptors::Values;
+use unlift_io::features::{FeatureWriter, ImageFeatures};
+use unlift_io::read::{self, Input, colmap};
+
+use super::malformed::{MANY, appended, fixture, patched};
+use super::{data, npy, shown, write};
+
+#[test]
+fn descriptors_through_the_tracks_are_those_of_the_binary_form() {
+    let input = read::open(&data("project")).unwrap();
+    let joined = read::descriptors(&data("project/descriptors.bin"), &input).unwrap();
+    assert_eq!((joined.len(), joined.dim()), (6, 128));
+    let mean = read::descriptors(input.database.as_ref().unwrap(), &input).unwrap();
+    assert_eq!(mean, joined);
+}
+
+#[test]
+fn descriptors_follow_the_ids_of_the_input() {
+    let all = read::open(&data("project")).unwrap();
+    let some = Input {
+        ids: vec![all.ids[4], all.ids[1]],
+        positions: vec![all.positions[4], all.positions[1]],
+        ..all.clone()
+    };
+    for file in ["descriptors.bin", "database.db", "floats.db"] {
+        let path = data("project").join(file);
+        let expected = read::descriptors(&path, &all).unwrap().select(&[4, 1]);
+        assert_eq!(read::descriptors(&path, &some).unwrap(), expected, "{file}");
+    }
+}
+
+fn row(id: u32, at: u32) -> [f32; 3] {
+    [id as f32, at as f32 - 2.0, 1.0]
+}
+
+/// Writes hloc's features of the images of the project. The image `odd` has an extra keypoint.
+fn features(path: &std::path::Path, odd: &str) {
+    let images = colmap::read_images(&data("project/sparse/0/images.bin")).unwrap();
+    let mut writer = FeatureWriter::create(path).unwrap();
+    for image in images {
+        let name = String::from_utf8(image.name).unwrap();
+        let n = image.n_points2d as u32 + u32::from(name == odd);
+        let values = (0..n).flat_map(|at| row(image.id, at)).collect();
+        let descriptors = Some(Descriptors::try_new(Values::F32(values), 3).unwrap());
+        let keypoints = (0..n).map(|at| [f64::from(at), 1.0]).collect();
+        writer
+            .append(&ImageFeatures { name, keypoints, descriptors, ..Default::default() })
+            .unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+#[test]
+fn features_of_hloc_are_descriptors_of_the_points_that_they_made() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("features.h5");
+    let input = read::open(&data("project")).unwrap();
+    features(&path, "");
+    let found = read::descriptors(&path, &input).unwrap();
+    let points = colmap::read_points(&data("project/sparse/0/points3D.bin"), true).unwrap();
+    let tracks = points.tracks.unwrap();
+    let mut of_point = [0.0; 3];
+    for at in 0..points.ids.len() {
+        let rows = || tracks.row(at).iter().map(|&(id, index)| row(id, index));
+        let sum: [f32; 3] = std::array::from_fn(|c| rows().map(|row| row[c]).sum());
+        let length = sum.iter().map(|x| x * x).sum::<f32>().sqrt();
+        found.read_row(at, &mut of_point);
+        super::close(of_point.map(f64::from), sum.map(|x| f64::from(x / length)), 1e-6);
+    }
+    features(&path, "küche/ä 0.jpg");
+    let line = read::descriptors(&path, &input).unwrap_err().to_string();
+    let told = "keypoints, as the model has, found";
+    assert!(line.contains("küche/ä 0.jpg") && line.contains(told), "{line}");
+    let cloud = read::open(&data("cloud.ply")).unwrap();
+    let line = read::descriptors(&path, &cloud).unwrap_err().to_string();
+    let told = "whose tracks lead to images, found ply binary little endian points";
+    assert!(line.ends_with(told), "{line}");
+}
+
+/// The descriptors of the project as floats of norm 1, exact in half floats.
+fn unit_floats(input: &Input) -> Vec<f32> {
+    let bytes = read::descriptors(&data("project/descriptors.bin"), input).unwrap();
+    let Values::U8(bytes) = bytes.values() else { panic!("bytes expected") };
+    bytes.iter().map(|&byte| f32::from(byte) / 512.0).collect()
+}
+
+fn p3desc(ids: &[u64], dtype: u32) -> Vec<u8> {
+    let mut file = b"P3DESC01".to_vec();
+    file.extend((ids.len() as u64).to_le_bytes());
+    file.extend(128u32.to_le_bytes());
+    file.extend(dtype.to_le_bytes());
+    ids.iter().for_each(|id| file.extend(id.to_le_bytes()));
+    file
+}
+
+#[test]
+fn binary_descriptors_may_be_floats_of_16_or_32_bits() {
+    let input = read::open(&data("project")).unwrap();
+    let floats = unit_floats(&input);
+    for dtype in [2, 3] {
+        // An extra point, and another order of rows: points are joined by id.
+        let mut file = p3desc(&[1000, 11, 9, 6, 4, 3, 2], dtype);
+        let rows = std::iter::once(&[0.5; 128][..]).chain(floats.chunks(128).rev());
+        for value in rows.flatten() {
+            match dtype {
+                2 => file.extend(f16::from_f32(*value).to_le_bytes()),
+                _ => file.extend(value.to_le_bytes()),
+            }
+        }
+        let (_dir, path) = write("d.bin", file);
+        let read = read::descriptors(&path, &input).unwrap();
+        assert_eq!(read.values(), &Values::F32(floats.clone()), "512ths of bytes fit a half");
+    }
+}
+
+#[test]
+fn arrays_of_descriptors_have_a_row_per_point_in_its_order() {
+    let all = read::open(&data("project")).unwrap();
+    let floats = unit_floats(&all);
+    let expected = Values::F32(floats.clone());
+    let bytes = |of: fn(f32) -> Vec<u8>| floats.iter().flat_map(|&x| of(x)).collect::<Vec<u8>>();
+    for (descr, values) in [
+        ("<f2", bytes(|x| f16::from_f32(x).to_le_bytes().to_vec())),
+        (">f2", bytes(|x| f16::from_f32(x).to_be_bytes().to_vec())),
+        ("<f4", bytes(|x| x.to_le_bytes().to_vec())),
+        (">f8", bytes(|x| f64::from(x).to_be_bytes().to_vec())),
+    ] {
+        let (_dir, path) = write("d.npy", npy(&format!("'{descr}'"), "(6, 128)", &values));
+        assert_eq!(read::descriptors(&path, &all).unwrap().values(), &expected, "{descr}");
+    }
+    let columns = (0..128).flat_map(|c| floats.chunks(128).map(move |row| row[c]));
+    let columns: Vec<u8> = columns.flat_map(f32::to_le_bytes).collect();
+    let by_columns = npy("'<f4'", "(6, 128)", &columns);
+    let at = by_columns.windows(5).position(|word| word == b"False").unwrap();
+    let (_dir, path) = write("d.npy", patched(by_columns, at, b"True "));
+    assert_eq!(read::descriptors(&path, &all).unwrap().values(), &expected, "by columns");
+    let of_bytes = read::descriptors(&data("project/descriptors.bin"), &all).unwrap();
+    let Values::U8(values) = of_bytes.values() else { panic!("bytes expected") };
+    let (_dir, path) = write("d.npy", npy("'|u1'", "(6, 128)", values));
+    assert_eq!(read::descriptors(&path, &all).unwrap(), of_bytes);
+}
+
+#[test]
+fn float_descriptors_keep_their_type_and_get_norm_1() {
+    let input = read::open(&data("project")).unwrap();
+    let floats = read::descriptors(&data("project/floats.db"), &input).unwrap();
+    assert_eq!((floats.len(), floats.dim()), (6, 4));
+    let Values::F32(values) = floats.values() else {
+        panic!("floats expected");
+    };
+    for row in values.chunks(4) {
+        let norm2: f32 = row.iter().map(|x| x * x).sum();
+        // Four values rounded to 24 bits.
+        assert!((norm2 - 1.0).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn a_database_without_types_is_read_as_bytes() {
+    let dir = tempfile::tempdir().unwrap();
+    // A URI would misread this name.
+    let path = dir.path().join("a?b#c%20 d.db");
+    fs::copy(data("project/database.db"), &path).unwrap();
+    let database = rusqlite::Connection::open(&path).unwrap();
+    database.execute_batch("ALTER TABLE descriptors DROP COLUMN type").unwrap();
+    database.close().unwrap();
+    let input = read::open(&data("project")).unwrap();
+    let expected = read::descriptors(&data("project/descriptors.bin"), &input).unwrap();
+    assert_eq!(read::descriptors(&path, &input).unwrap(), expected);
+    let left: Vec<_> = fs::read_dir(dir.path()).unwrap().collect();
+    assert_eq!(left.len(), 1, "reading writes no journal: {left:?}");
+}
+
+#[test]
+fn a_database_in_write_ahead_mode_is_read_whole() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("database.db");
+    fs::copy(data("project/database.db"), &path).unwrap();
+    let writer = rusqlite::Connection::open(&path).unwrap();
+    writer
+        .execute_batch(
+            "PRAGMA journal_mode=WAL; UPDATE images SET name = 'gone' WHERE image_id = 1",
+        )
+        .unwrap();
+    let input = read::open(&data("project")).unwrap();
+    let error = read::descriptors(&path, &input).unwrap_err().to_string();
+    assert!(error.contains("no such image"), "the journal counts: {error}");
+}
+
+/// The file contains uncommitted rows, and the journal beside it the rows to restore.
+#[test]
+fn a_database_with_a_transaction_that_was_not_done_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("database.db");
+    fs::copy(data("project/database.db"), &path).unwrap();
+    let writer = rusqlite::Connection::open(&path).unwrap();
+    let begin = "PRAGMA journal_mode=DELETE; PRAGMA cache_size=2; BEGIN; UPDATE images SET name = name || 'x'; \
+                 CREATE TABLE pad(x);";
+    writer.execute_batch(begin).unwrap();
+    for _ in 0..20 {
+        writer.execute_batch("INSERT INTO pad VALUES(zeroblob(4000))").unwrap();
+    }
+    // Copies during the transaction.
+    let killed = dir.path().join("killed.db");
+    fs::copy(&path, &killed).unwrap();
+    fs::copy(dir.path().join("database.db-journal"), dir.path().join("killed.db-journal")).unwrap();
+    drop(writer);
+    let input = read::open(&data("project")).unwrap();
+    let error = read::descriptors(&killed, &input).unwrap_err().to_string();
+    assert!(!error.contains('\n') && error.contains("killed.db: "), "{error}");
+    assert!(read::descriptors(&path, &input).is_ok(), "what was taken back");
+}
+
+#[test]
+fn descriptors_are_of_the_points_that_have_a_place() {
+    let (_dir, path) = write("a.xyz", "0 0 1\nnan 0 1\n0 2 1\n3 0 1\n");
+    let input = read::open(&path).unwrap();
+    let (_dir, path) = write("d.npy", npy("'|u1'", "(4, 2)", &[1, 2, 3, 4, 5, 6, 7, 8]));
+    let descriptors = read::descriptors(&path, &input).unwrap();
+    assert_eq!(descriptors.values(), &unlift::descriptors::Values::U8(vec![1, 2, 5, 6, 7, 8]));
+}
+
+/// The bytes of a file, or a statement that is run on the database.
+enum Wrong {
+    Bytes(Vec<u8>),
+    Sql(&'static str),
+}
+
+/// Descriptors of the six points of the project, of a float type, whose values are all `value`.
+fn floats(dtype: u8, value: &[u8]) -> Vec<u8> {
+    let good = fixture("project/descriptors.bin");
+    let header = patched(good[..24 + 6 * 8].to_vec(), 20, &[dtype]);
+    appended(header, &value.repeat(6 * 128))
+}
+
+#[test]
+#[rustfmt::skip] // One row per line.
+fn every_malformed_file_of_descriptors_is_refused_with_its_line() {
+    let good = fixture("project/descriptors.bin");
+    let input = read::open(&data("project")).unwrap();
+    let n = good.len();
+    let bytes = |what, bytes, line| (what, Wrong::Bytes(bytes), line);
+    let sql = |what, statement, line| (what, Wrong::Sql(statement), line);
+    let zeros = appended(good[..n - 6 * 128].to_vec(), &[0; 6 * 128]);
+    let rows: Vec<(&str, Wrong, &str)> = vec![
+        bytes("empty", vec![],
+            "d: expected a file that begins with P3DESC01, a NumPy array (.npy), a COLMAP database (SQLite) or hloc's features (HDF5), found an empty file"),
+        bytes("another form", b"\x89HDF\r\n\x1a\n".to_vec(),
+            "d: expected a whole HDF5 file, found HDF5 format error: unexpected EOF: need 9 bytes, have 8"),
+        bytes("cut in the ids", good[..40].to_vec(),
+            "d: header (byte 8): expected at most 3 for the number of descriptors (24 bytes are left), found 6"),
+        bytes("cut in the values", good[..n - 1].to_vec(),
+            "d: header (byte 24): expected 6 ids and rows of 128 bytes, found 815 bytes"),
+        bytes("count of 10^18", patched(good.clone(), 8, &MANY),
+            "d: header (byte 8): expected at most 103 for the number of descriptors (824 bytes are left), found 1000000000000000000"),
+        bytes("dimension of 2^32 - 1", patched(good.clone(), 16, &[255; 4]),
+            "d: header (byte 24): expected 6 ids and rows of 4294967295 bytes, found 816 bytes"),
+        bytes("unknown type", patched(good.clone(), 20, &[4]),
+            "d: header (byte 20): expected type 1 (u8), 2 (float16) or 3 (float32), found 4"),
+        bytes("bytes said to be halves", patched(good.clone(), 20, &[2]),
+            "d: header (byte 24): expected 6 ids and rows of 256 bytes, found 816 bytes"),
+        bytes("half that is not finite", floats(2, &f16::INFINITY.to_le_bytes()),
+            "d: point 2, value 0: expected a finite value, found inf"),
+        bytes("halves that are all the same", floats(2, &f16::ONE.to_le_bytes()),
+            "d: descriptors: expected real descriptors, found the same row for every point (dummies)"),
+        bytes("floats that are all zero", floats(3, &[0; 4]),
+            "d: descriptors: expected real descriptors, found only zeros (dummies)"),
+        bytes("id of a point missing", patched(good.clone(), 24 + 8, &[100]),
+            "d: point 3: expected a descriptor, found none among 6"),
+        bytes("dummies", zeros, "d: descriptors: expected real descriptors, found only zeros (dummies)"),
+        bytes("a database cut short", fixture("project/database.db")[..100].to_vec(),
+            "d: table images: expected a COLMAP database, found database disk image is malformed"),
+        sql("a database without images", "PRAGMA foreign_keys=0; DROP TABLE images",
+            "d: table images: expected a COLMAP database, found no such table: images"),
+        sql("an image under another name", "UPDATE images SET name = 'x' WHERE name = 'i2.jpg'",
+            "d: image \"i2.jpg\": expected this image of the model, found no such image"),
+        sql("an image without descriptors", "DELETE FROM descriptors WHERE image_id = 1",
+            "d: image \"i3.jpg\": expected descriptors, found none"),
+        sql("fewer descriptors than keypoints", "UPDATE descriptors SET rows = 2, data = substr(data, 1, 256)",
+            "d: image \"küche/ä 0.jpg\": expected a descriptor for keypoint 2, found 2 descriptors"),
+        sql("a blob cut short", "UPDATE descriptors SET data = substr(data, 1, 1000)",
+            "d: image \"küche/ä 0.jpg\": expected 8 descriptors of 128 bytes, found 1000 bytes"),
+        sql("negative rows", "UPDATE descriptors SET rows = -8",
+            "d: image \"küche/ä 0.jpg\": expected sizes of descriptors, found -8 x 128"),
+        sql("text for rows", "UPDATE descriptors SET rows = 'many'",
+            "d: table descriptors: expected a COLMAP database, found Invalid column type Text at index: 0, name: rows"),
+        sql("two kinds in one database", "UPDATE descriptors SET type = 1 WHERE image_id = 1",
+            "d: image \"i3.jpg\": expected 128 bytes each, as in other images, found 32 floats"),
+        sql("NaN in a database", "UPDATE descriptors SET type = 1, cols = 4, data = x'0000c07f0000c07f0000c07f0000c07f0000c07f0000c07f0000c07f0000c07f'",
+            "d: descriptor 0, value 0: expected a finite value, found NaN"),
+    ];
+    let array = |what, array, line| (what, Wrong::Bytes(array), line);
+    let rows = rows.into_iter().chain([
+        array("an array of positions", npy("'<f8'", "(6,)", &[0; 48]),
+            "d: header (byte 10): expected an array of shape (6, dimension), a row per point, found \"(6,)\""),
+        array("a column per point", npy("'|u1'", "(4, 6)", &[7; 24]),
+            "d: header (byte 10): expected an array of shape (6, dimension), a row per point, \
+             found \"(4, 6)\", rows and columns exchanged"),
+        array("integers", npy("'<i4'", "(6, 1)", &[7; 24]),
+            "d: header (byte 10): expected bytes, or floats of 2, 4 or 8 bytes (u1, f2, f4, f8), found \"<i4\""),
+        array("an array cut short", npy("'<f2'", "(6, 4)", &[7; 47]),
+            "d: header (byte 128): expected 6 rows of 8 bytes, found 47 bytes"),
+        array("2^62 columns", npy("'<f8'", "(6, 4611686018427387904)", &[7; 24]),
+            "d: header (byte 128): expected 6 rows of too many bytes, found 24 bytes"),
+        array("a double that no float holds", npy("'<f8'", "(6, 1)", &[1e300f64.to_le_bytes(); 6].concat()),
+            "d: header (byte 128): expected a finite value (as a float of 4 bytes) in row 0, found 1e300"),
+        array("65537 columns", npy("'|u1'", "(6, 65537)", &[7; 6 * 65537]),
+            "d: descriptors: expected at most 65536 values each, found 65537"),
+    ]);
+    for (what, wrong, line) in rows {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("d");
+        match wrong {
+            Wrong::Bytes(bytes) => fs::write(&path, bytes).unwrap(),
+            Wrong::Sql(statement) => {
+                fs::write(&path, fixture("project/database.db")).unwrap();
+                let database = rusqlite::Connection::open(&path).unwrap();
+                database.execute_batch(statement).unwrap();
+                database.close().unwrap();
+            }
+        }
+        let error = read::descriptors(&path, &input).expect_err(what);
+        assert_eq!(shown(dir.path(), &error), line, "{what}");
+    }
+}
+
+#[test]
+fn descriptors_need_a_database_or_a_model_that_fit() {
+    let cloud = read::open(&data("f8.npy")).unwrap();
+    let database = data("project/database.db");
+    let error = read::descriptors(&database, &cloud).unwrap_err();
+    assert_eq!(
+        shown(&data(""), &error),
+        "project/database.db: expected a COLMAP model, whose tracks lead to images, found npy points"
+    );
+}
+
+/// Without rows, any dimension matches the file size. It must not allocate memory, here 17 TB.
+#[test]
+fn a_dimension_without_rows_takes_no_memory() {
+    let dir = tempfile::tempdir().unwrap();
+    let header = patched(fixture("project/descriptors.bin")[..24].to_vec(), 8, &[0; 8]);
+    let path = dir.path().join("d");
+    fs::write(&path, patched(header, 16, &[255, 255, 255, 255, 3])).unwrap();
+    let input = read::Input { ids: (0..1000).collect(), ..read::Input::default() };
+    let error = read::descriptors(&path, &input).unwrap_err();
+    assert_eq!(shown(dir.path(), &error), "d: point 0: expected a descriptor, found none among 0");
+}

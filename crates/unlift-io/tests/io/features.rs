@@ -1,0 +1,346 @@
+//! Tests features of images: files of h5py and pycolmap, round trips, and malformed files.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use hdf5_pure::{DatasetBuilder, FileBuilder};
+use unlift::Descriptors;
+use unlift::descriptors::Values;
+use unlift_io::features::{FeatureSource, FeatureWriter, ImageFeatures, decode, encode};
+
+use super::{data, shared, shown, write};
+
+fn bytes(image: &ImageFeatures) -> &[u8] {
+    match image.descriptors.as_ref().map(Descriptors::values) {
+        Some(Values::U8(values)) => values,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn floats(image: &ImageFeatures) -> &[f32] {
+    match image.descriptors.as_ref().map(Descriptors::values) {
+        Some(Values::F32(values)) => values,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn made(name: &str, n: usize) -> ImageFeatures {
+    let values = |factor: f32| (0..n).map(|at| factor * at as f32).collect();
+    let descriptors = (0..n * 128).map(|at| (at * 7 % 251) as u8).collect();
+    ImageFeatures {
+        name: name.to_owned(),
+        size: Some([640, 480]),
+        keypoints: (0..n).map(|at| [at as f64 * 1.5, 480.0 - at as f64 / 4.0]).collect(),
+        descriptors: Some(Descriptors::try_new(Values::U8(descriptors), 128).unwrap()),
+        scores: Some(values(0.5)),
+        scales: Some(values(2.0)),
+        orientations_deg: Some(values(-3.0)),
+        uncertainty_px: Some(1.25),
+        upright: n.is_multiple_of(2),
+        photo: None,
+    }
+}
+
+fn all(path: &Path) -> Vec<ImageFeatures> {
+    let source = FeatureSource::open(path).unwrap();
+    (0..source.names().len()).map(|at| source.get(at).unwrap()).collect()
+}
+
+#[test]
+fn files_of_h5py_are_read_in_every_type_and_form() {
+    for file in ["features-latest.h5", "features-earliest.h5"] {
+        let source = FeatureSource::open(&data(file)).unwrap();
+        assert_eq!(source.names(), ["big ü.png", "db/half.jpg", "db/seq/double.jpg"], "{file}");
+        let [big, half, double] = [0, 1, 2].map(|at| source.get(at).unwrap());
+        assert_eq!(big.keypoints, [[1.0, 2.0], [3.0, 4.0]]);
+        assert_eq!((bytes(&big), big.size), (&[1, 3, 5, 2, 4, 6][..], Some([10, 20])));
+        assert_eq!((&big.scores, big.uncertainty_px), (&None, None));
+        assert_eq!(half.keypoints, [[1.5, 2.25], [3.0, 4.0], [100.0, 50.0]]);
+        let rows = [0.0, 0.375, 0.75, 1.125, 0.125, 0.5, 0.875, 1.25, 0.25, 0.625, 1.0, 1.375];
+        assert_eq!(floats(&half), rows);
+        assert_eq!(half.scores, Some(vec![0.5, 0.25, 0.125]));
+        assert_eq!((half.size, half.uncertainty_px), (Some([640, 480]), Some(1.5)));
+        assert_eq!(double.keypoints, [[0.1, 0.2], [0.3, 0.4]]);
+        assert_eq!(floats(&double), [0.0, 2.0, 4.0, 6.0, 1.0, 3.0, 5.0, 7.0]);
+        assert_eq!(double.size, None);
+    }
+}
+
+#[test]
+fn what_is_written_is_read_again_and_the_bytes_are_the_same() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("features.h5");
+    // More names than a node of the tree holds, at several depths.
+    let mut images: Vec<ImageFeatures> =
+        (0..700).map(|at| made(&format!("seq{}/ü {at}.jpg", at % 2), at % 4)).collect();
+    images.push(made("at the top.png", 300));
+    images.push(ImageFeatures { name: "a/b/c/bare".to_owned(), ..ImageFeatures::default() });
+    let mut written = Vec::new();
+    for _ in 0..2 {
+        let mut writer = FeatureWriter::create(&path).unwrap();
+        images.iter().for_each(|image| writer.append(image).unwrap());
+        writer.finish().unwrap();
+        written.push(fs::read(&path).unwrap());
+    }
+    assert_eq!(written[0], written[1]);
+    images.sort_by(|a, b| a.name.cmp(&b.name));
+    assert_eq!(all(&path), images);
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1, "no temporary file");
+}
+
+#[test]
+fn a_file_appears_when_it_is_finished() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("features.h5");
+    let mut writer = FeatureWriter::create(&path).unwrap();
+    writer.append(&made("a.jpg", 3)).unwrap();
+    assert!(!path.exists());
+    drop(writer);
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn one_image_is_a_file_of_its_own() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("part");
+    fs::write(&path, encode(&made("a/b.jpg", 5), &path).unwrap()).unwrap();
+    assert_eq!(decode(&path, "a/b.jpg").unwrap(), made("a/b.jpg", 5));
+}
+
+#[test]
+fn names_and_columns_that_do_not_fit_are_refused() {
+    let path = Path::new("f.h5");
+    let line = |image: &ImageFeatures| encode(image, path).unwrap_err().to_string();
+    assert_eq!(
+        line(&made("a//b", 1)),
+        "f.h5: image \"a//b\": expected a name whose parts are not empty, . or .., found \"a//b\""
+    );
+    let short = ImageFeatures { scores: Some(vec![1.0]), ..made("a", 2) };
+    assert_eq!(line(&short), "f.h5: image \"a\", scores: expected 2, one per keypoint, found 1");
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = FeatureWriter::create(&dir.path().join("f.h5")).unwrap();
+    writer.append(&made(&format!("{}x.jpg", "b/".repeat(63)), 2)).unwrap();
+    writer.append(&made("a/b", 1)).unwrap();
+    for name in ["a/b", "a/b/c", "a"] {
+        let error = writer.append(&made(name, 1)).unwrap_err().to_string();
+        assert!(error.contains("expected a new name"), "{name}: {error}");
+    }
+    // A name of 20,000 folders overflowed the stack.
+    for n in [65, 20_000] {
+        let line = line(&made(&format!("{}x.jpg", "a/".repeat(n - 1)), 2));
+        assert!(
+            line.ends_with(&format!("expected a name of at most 64 parts, found {n}")),
+            "{line}"
+        );
+    }
+}
+
+fn database(columns: usize) -> (tempfile::TempDir, PathBuf) {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("database.db");
+    fs::copy(data("project/database.db"), &path).unwrap();
+    let database = rusqlite::Connection::open(&path).unwrap();
+    let row = [10.5f32, 20.25, 3.0, 4.0, -4.0, 3.0];
+    let row = if columns == 4 { [10.5, 20.25, 5.0, 1.0, 0.0, 0.0] } else { row };
+    let blob: Vec<u8> = row[..columns].iter().flat_map(|x| x.to_le_bytes()).collect();
+    let insert = "INSERT INTO keypoints SELECT image_id, 8, ?1, ?2 FROM images";
+    database.execute(insert, rusqlite::params![columns as i64, blob.repeat(8)]).unwrap();
+    database.close().unwrap();
+    (dir, path)
+}
+
+#[test]
+fn databases_come_in_the_same_convention() {
+    for columns in [2, 4, 6] {
+        let (_dir, path) = database(columns);
+        let images = all(&path);
+        let names: Vec<&str> = images.iter().map(|image| &*image.name).collect();
+        assert_eq!(names, ["i2.jpg", "i3.jpg", "küche/ä 0.jpg"]);
+        let image = &images[2];
+        assert_eq!((&image.keypoints, image.size), (&vec![[10.0, 19.75]; 8], Some([640, 480])));
+        assert_eq!(bytes(image).len(), 8 * 128);
+        let shape = |values: &Option<Vec<f32>>| values.as_ref().map(|values| values[7]);
+        let expected = match columns {
+            2 => (None, None),
+            4 => (Some(5.0), Some(1f32.to_degrees())),
+            _ => (Some(5.0), Some((-4f32).atan2(3.0).to_degrees())),
+        };
+        assert_eq!((shape(&image.scales), shape(&image.orientations_deg)), expected);
+    }
+}
+
+#[test]
+fn a_database_in_floats_is_read_as_floats() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("database.db");
+    fs::copy(data("project/floats.db"), &path).unwrap();
+    let database = rusqlite::Connection::open(&path).unwrap();
+    let insert = "INSERT INTO keypoints SELECT image_id, 8, 2, zeroblob(64) FROM images";
+    database.execute_batch(insert).unwrap();
+    database.close().unwrap();
+    let images = all(&path);
+    assert!(images.iter().all(|image| floats(image).len() == 8 * 4));
+    assert_eq!(images[0].keypoints[0], [-0.5, -0.5]);
+}
+
+#[test]
+fn real_features_make_the_round_trip() {
+    for (name, n_images, n_keypoints) in
+        [("features-sift.h5", 6, 13_202), ("features-sift-f16.h5", 1, 1404)]
+    {
+        let Some(path) = shared(&format!("data/redkitchen/{name}")) else { continue };
+        let images = all(&path);
+        let total: usize = images.iter().map(|image| image.keypoints.len()).sum();
+        assert_eq!((images.len(), total), (n_images, n_keypoints));
+        let (size, uncertainty) = (images[0].size, images[0].uncertainty_px);
+        assert_eq!((size, uncertainty), (Some([640, 480]), Some(1.0)));
+        let dir = tempfile::tempdir().unwrap();
+        let copy = dir.path().join("copy.h5");
+        let mut writer = FeatureWriter::create(&copy).unwrap();
+        images.iter().for_each(|image| writer.append(image).unwrap());
+        writer.finish().unwrap();
+        assert_eq!(all(&copy), images);
+    }
+}
+
+/// A name, a shape, and a function that adds the values.
+type Array<'a> = (&'a str, &'a [u64], &'a dyn Fn(&mut DatasetBuilder));
+
+/// Returns a file with the image `a.jpg`, which has these arrays, and the valid image `b.jpg`.
+fn file(arrays: &[Array<'_>]) -> Vec<u8> {
+    let mut builder = FileBuilder::new();
+    for (image, arrays) in [("a.jpg", arrays), ("b.jpg", &[KEYPOINTS, DESCRIPTORS])] {
+        let mut group = builder.create_group(image);
+        for (name, shape, fill) in arrays {
+            let dataset = group.create_dataset(name);
+            fill(dataset);
+            dataset.with_shape(shape);
+        }
+        builder.add_group(group.finish());
+    }
+    builder.finish().unwrap()
+}
+
+const KEYPOINTS: Array<'static> =
+    ("keypoints", &[3, 2], &|to| drop(to.with_f32_data(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0])));
+const DESCRIPTORS: Array<'static> = ("descriptors", &[4, 3], &|to| {
+    to.with_u8_data(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
+});
+
+/// Returns the error line about the file or its first image, or `good`.
+fn line(bytes: &[u8]) -> String {
+    let (dir, path) = write("f", bytes);
+    let first = FeatureSource::open(&path).and_then(|source| {
+        if let Some(at) = source.names().iter().position(|name| name == "b.jpg") {
+            assert_eq!(source.get(at).unwrap().keypoints.len(), 3);
+        }
+        source.get(0)?.described(&path).map(drop)
+    });
+    first.map_or_else(|error| shown(dir.path(), &error), |()| "good".to_owned())
+}
+
+#[test]
+#[rustfmt::skip] // One row per line.
+fn every_malformed_file_of_features_is_refused_with_its_line() {
+    let floats = |name, shape: &'static [u64], value: f32| -> (&str, &[u64], Box<dyn Fn(&mut DatasetBuilder)>) {
+        let n = shape.iter().product::<u64>() as usize;
+        let values: Vec<f32> = (0..n).map(|at| value * (at + 1) as f32).collect();
+        (name, shape, Box::new(move |to| drop(to.with_f32_data(&values))))
+    };
+    // `a.jpg` has this array, and keypoints and descriptors unless it is one of them.
+    let with = |(name, shape, fill): (&str, &[u64], Box<dyn Fn(&mut DatasetBuilder)>)| {
+        let others = [KEYPOINTS, DESCRIPTORS].into_iter().filter(|array| array.0 != name);
+        file(&others.chain([(name, shape, &*fill)]).collect::<Vec<_>>())
+    };
+    let good = file(&[KEYPOINTS, DESCRIPTORS]);
+    let rows: Vec<(&str, Vec<u8>, &str)> = vec![
+        ("good", good.clone(), "good"),
+        ("empty", vec![], "f: expected features in HDF5, or a COLMAP database (SQLite), found an empty file"),
+        ("text", b"hello\nworld".to_vec(),
+            "f: expected features in HDF5, or a COLMAP database (SQLite), found a file that begins with \"hello\\nwo\""),
+        ("no image", FileBuilder::new().finish().unwrap(), "f: expected at least one image, found none"),
+        ("no keypoints", file(&[DESCRIPTORS]), "f: image \"a.jpg\": expected an array keypoints, found only descriptors"),
+        ("global descriptors", file(&[("global_descriptor", &[2], &|to| drop(to.with_f32_data(&[0.5, 1.0])))]),
+            "f: expected a group per image with keypoints and descriptors, found global descriptors of whole images"),
+        ("no descriptors", file(&[KEYPOINTS]), "f: image \"a.jpg\": expected descriptors, found none"),
+        ("keypoints in one column", with(floats("keypoints", &[3, 1], 1.0)),
+            "f: image \"a.jpg\", keypoints: expected shape (N, 2), found (3, 1)"),
+        ("flat keypoints", with(floats("keypoints", &[6], 1.0)),
+            "f: image \"a.jpg\", keypoints: expected shape (N, 2), found (6,)"),
+        ("infinite", with(floats("keypoints", &[3, 2], f32::INFINITY)),
+            "f: image \"a.jpg\", keypoints: expected finite coordinates in row 0, found (inf, inf)"),
+        ("(N, D)", with(floats("descriptors", &[3, 4], 0.5)),
+            "f: image \"a.jpg\", descriptors: expected shape (D, N) with N = 3, one column per keypoint, found (3, 4), rows and columns exchanged"),
+        ("another number of descriptors", with(floats("descriptors", &[4, 5], 0.5)),
+            "f: image \"a.jpg\", descriptors: expected shape (D, N) with N = 3, one column per keypoint, found (4, 5)"),
+        ("flat descriptors", with(floats("descriptors", &[12], 0.5)),
+            "f: image \"a.jpg\", descriptors: expected shape (D, N) with N = 3, one column per keypoint, found (12,)"),
+        ("dummies", with(floats("descriptors", &[4, 3], 0.0)),
+            "f: image \"a.jpg\", descriptors: expected real descriptors, found only zeros (dummies)"),
+        ("NaN in descriptors", with(floats("descriptors", &[4, 3], f32::NAN)),
+            "f: image \"a.jpg\", descriptors: expected a finite value, found NaN (descriptor 0, value 0)"),
+        ("wide integers", with(("descriptors", &[4, 3], Box::new(|to| drop(to.with_i64_data(&[7; 12]))))),
+            "f: image \"a.jpg\", descriptors: expected floats, or unsigned bytes, found other integers"),
+        ("scores of others", with(floats("scores", &[2], 0.5)),
+            "f: image \"a.jpg\", scores: expected one value per keypoint, (3,), found (2,)"),
+        ("a size of one side", with(floats("image_size", &[1], 5.0)),
+            "f: image \"a.jpg\", image_size: expected width and height in pixels, found (1,)"),
+        ("a negative size", with(floats("image_size", &[2], -1.0)),
+            "f: image \"a.jpg\", image_size: expected width and height in pixels, found -1 and -2"),
+    ];
+    for (what, bytes, expected) in rows {
+        assert_eq!(line(&bytes), expected, "{what}");
+    }
+    let cut = line(&good[..good.len() - 1]);
+    assert_eq!(cut, format!("f: expected a whole HDF5 file of {} bytes, found {} bytes", good.len(), good.len() - 1));
+}
+
+#[test]
+#[rustfmt::skip] // One row per line.
+fn every_malformed_database_is_refused_with_its_line() {
+    let fixture = data("project/database.db");
+    let filled = "INSERT INTO keypoints SELECT image_id, 8, 2, zeroblob(64) FROM images; ";
+    let rows = [
+        ("good", "", "good"),
+        ("no keypoints", "DELETE FROM keypoints", "f: image \"i2.jpg\": expected keypoints, found none"),
+        ("no descriptors", "DELETE FROM descriptors", "f: image \"i2.jpg\": expected descriptors, found none"),
+        ("no table of keypoints", "DROP TABLE keypoints", "f: table keypoints: expected a COLMAP database, found no such table: keypoints"),
+        ("no image", "PRAGMA foreign_keys=0; DELETE FROM images", "f: expected at least one image, found none"),
+        ("three columns", "UPDATE keypoints SET cols = 3, data = zeroblob(96)",
+            "f: image \"i2.jpg\": expected keypoints of 2, 4 or 6 columns, found 3 columns"),
+        ("cut off", "UPDATE keypoints SET data = zeroblob(60)",
+            "f: image \"i2.jpg\": expected 8 keypoints of 8 bytes, found 60 bytes"),
+        ("columns of 2^62", "UPDATE keypoints SET cols = 4611686018427387904",
+            "f: image \"i2.jpg\": expected sizes of keypoints, found 8 x 4611686018427387904"),
+        ("NaN", "UPDATE keypoints SET rows = 1, data = x'000000000000c07f'",
+            "f: image \"i2.jpg\": expected a finite number in keypoint 0, found NaN"),
+        ("other numbers", "UPDATE keypoints SET rows = 7, data = zeroblob(56)",
+            "f: image \"i2.jpg\": expected 7 descriptors, one per keypoint, found 8"),
+        ("dummies", "UPDATE descriptors SET data = zeroblob(1024)",
+            "f: image \"i2.jpg\": expected real descriptors, found only zeros (dummies)"),
+        ("without features", "UPDATE keypoints SET rows = 0, cols = 0, data = x''; UPDATE descriptors SET rows = 0, cols = 0, data = NULL", "good"),
+        ("a view that never ends", "DROP TABLE keypoints; CREATE VIEW keypoints AS WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c) \
+            SELECT x AS image_id, 1 AS rows, 2 AS cols, zeroblob(8) AS data FROM c",
+            "f: table keypoints: expected a table, found a view"),
+        ("a view of images", "PRAGMA foreign_keys=0; ALTER TABLE images RENAME TO i; CREATE VIEW Images AS SELECT * FROM i",
+            "f: table images: expected a table, found a view"),
+        ("a virtual table", "DROP TABLE descriptors; CREATE VIRTUAL TABLE descriptors USING fts3(rows, cols, data)",
+            "f: table descriptors: expected a table, found a virtual table"),
+        ("blobs that are computed", "DROP TABLE keypoints; CREATE TABLE keypoints (image_id, rows, cols, data AS (zeroblob(900000000))); \
+            INSERT INTO keypoints SELECT image_id, 112500000, 2 FROM images",
+            "f: table keypoints: expected a COLMAP database, found string or blob too big"),
+        ("names that are computed", "PRAGMA foreign_keys=0; DROP TABLE images; CREATE TABLE images (image_id, camera_id, name AS (printf('%.100000000c%d', 'x', image_id))); \
+            INSERT INTO images VALUES (1, 1), (2, 1), (3, 1)",
+            "f: table images: expected at most 256 MiB in memory of a file of 19 KiB, found 286.1 MiB"),
+        ("without a camera", "PRAGMA foreign_keys=0; DELETE FROM cameras", "good"),
+    ];
+    for (what, statement, expected) in rows {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("f");
+        fs::copy(&fixture, &path).unwrap();
+        let database = rusqlite::Connection::open(&path).unwrap();
+        database.execute_batch(&format!("{filled}{statement}")).unwrap();
+        database.close().unwrap();
+        assert_eq!(line(&fs::read(&path).unwrap()), expected, "{what}");
+    }
+}

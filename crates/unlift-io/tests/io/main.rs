@@ -1,0 +1,84 @@
+//! Tests readers of maps, descriptors and features, and exports of clouds.
+
+mod clouds;
+mod descriptors;
+mod features;
+mod field;
+mod malformed;
+mod models;
+mod others;
+mod real_maps;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use tempfile::TempDir;
+use unlift_io::read::{self, Input};
+
+const POINTS: [[f64; 3]; 3] = [[0.5, -1.25, 3.0], [1000.0, 2.0, -0.0625], [0.125, 0.25, 0.375]];
+
+fn data(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
+}
+
+fn write(name: &str, contents: impl AsRef<[u8]>) -> (TempDir, PathBuf) {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join(name);
+    fs::write(&path, contents).unwrap();
+    (dir, path)
+}
+
+/// Opens a map with this name and content.
+fn open(name: &str, contents: impl AsRef<[u8]>) -> Input {
+    let (_dir, path) = write(name, contents);
+    read::open(&path).unwrap()
+}
+
+/// Returns the error line of a map with this name and content.
+fn refused(name: &str, contents: impl AsRef<[u8]>) -> String {
+    let (dir, path) = write(name, contents);
+    shown(dir.path(), &read::open(&path).unwrap_err())
+}
+
+/// Returns the line of an error about a file in `dir`, with its path relative to `dir`.
+fn shown(dir: &Path, error: &unlift_io::Error) -> String {
+    let line = error.to_string();
+    let line = line.strip_prefix(dir.to_str().unwrap()).expect("errors begin with the path");
+    line.trim_start_matches(['/', '\\']).to_owned()
+}
+
+fn copy_folder(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for file in fs::read_dir(from).unwrap().map(Result::unwrap) {
+        if file.path().is_file() {
+            fs::copy(file.path(), to.join(file.file_name())).unwrap();
+        }
+    }
+}
+
+fn total(rows: &[[f64; 3]]) -> [f64; 3] {
+    std::array::from_fn(|axis| rows.iter().map(|p| p[axis]).sum())
+}
+
+fn close(found: [f64; 3], expected: [f64; 3], tolerance: f64) {
+    let near = |(a, b): (f64, f64)| (a - b).abs() <= tolerance;
+    let all = found.into_iter().zip(expected).all(near);
+    assert!(all, "{found:?}, expected {expected:?}");
+}
+
+/// Returns a file beside the repository, or `None` with a message.
+fn shared(name: &str) -> Option<PathBuf> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared").join(name);
+    if !path.exists() {
+        println!("skipped: shared/{name} is not beside the repository");
+        return None;
+    }
+    Some(path)
+}
+
+/// An `.npy` file.
+fn npy(descr: &str, shape: &str, values: &[u8]) -> Vec<u8> {
+    let text = format!("{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}}}");
+    let text = format!("{text:117}\n");
+    [b"\x93NUMPY\x01\0\x76\0".as_slice(), text.as_bytes(), values].concat()
+}

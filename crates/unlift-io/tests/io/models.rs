@@ -1,0 +1,215 @@
+//! Tests COLMAP models, binary and text, and where they are found.
+
+use std::fs;
+use std::path::Path;
+
+use unlift_io::read::{self, colmap};
+
+use super::{close, copy_folder, data, total, write};
+
+#[test]
+fn binary_and_text_models_are_equal() {
+    let (bin, txt) = (data("rig-bin"), data("rig-txt"));
+    let file = |folder: &Path, name: &str, e: &str| folder.join(format!("{name}.{e}"));
+    let cameras = colmap::read_cameras(&file(&bin, "cameras", "bin")).unwrap();
+    assert_eq!(cameras, colmap::read_cameras(&file(&txt, "cameras", "txt")).unwrap());
+    let ids: Vec<i32> = cameras.iter().map(|c| c.model.id).collect();
+    assert_eq!(ids, (0..18).collect::<Vec<_>>(), "one camera of every model");
+
+    let images = colmap::read_images(&file(&bin, "images", "bin")).unwrap();
+    assert_eq!(images, colmap::read_images(&file(&txt, "images", "txt")).unwrap());
+    assert_eq!(images[0].name, "küche/ä 0.jpg".as_bytes());
+    assert_eq!(images[0].n_points2d, 4);
+
+    let points = colmap::read_points(&file(&bin, "points3D", "bin"), true).unwrap();
+    let same = colmap::read_points(&file(&txt, "points3D", "txt"), true).unwrap();
+    assert_eq!(points, same);
+    assert_eq!(points.ids, [1, 3, 5, 7, 12, 44, 900, 1 << 40]);
+    assert_eq!(points.tracks.unwrap().row(1), [(2, 1), (3, 0), (4, 0)]);
+}
+
+#[test]
+fn model_folders_open_with_centers_ids_and_files() {
+    let bin = read::open(&data("rig-bin")).unwrap();
+    let txt = read::open(&data("rig-txt")).unwrap();
+    assert_eq!(bin.positions, txt.positions);
+    assert_eq!(bin.cameras, txt.cameras);
+    assert_eq!((bin.format, txt.format), ("COLMAP binary", "COLMAP text"));
+    assert_eq!((bin.files.len(), txt.files.len()), (3, 3), "without rigs and frames");
+    assert_eq!((&bin.notes, &txt.notes), (&vec![], &vec![]));
+    assert_eq!((bin.database, bin.positions.len()), (None, 8));
+    // pycolmap: `image.projection_center()` of image 20, the last; the sum of `point3D.xyz`.
+    let center = [-0.18425494062287595, 0.11058267526290974, 0.11110621415901362];
+    close(*bin.cameras.last().unwrap(), center, 1e-12);
+    let sum = [-14.46619668331794, -9.942024018235283, -17.581669871119047];
+    close(total(&bin.positions), sum, 1e-12);
+}
+
+#[test]
+fn names_need_not_be_utf8() {
+    let bytes = fs::read(data("project/sparse/0/images.bin")).unwrap();
+    let name = "küche/ä 0.jpg".as_bytes();
+    let at = bytes.windows(name.len()).position(|w| w == name).unwrap();
+    let mut bytes = bytes;
+    bytes[at] = 0xff;
+    let (_dir, path) = write("images.bin", bytes);
+    let images = colmap::read_images(&path).unwrap();
+    assert_eq!(images[0].name[0], 0xff);
+}
+
+#[test]
+fn text_models_may_have_no_2d_points_and_windows_line_ends() {
+    let text = "# c\r\n1 1 0 0 0 1 2 3 1 a b.jpg\r\n\r\n2 1 0 0 0 4 5 6 1 c.jpg\r\n";
+    let (_dir, path) = write("images.txt", text);
+    let images = colmap::read_images(&path).unwrap();
+    assert_eq!(images[0].name, b"a b.jpg");
+    assert_eq!(images[0].center, [-1.0, -2.0, -3.0]);
+    assert_eq!((images[1].name.as_slice(), images[1].n_points2d), (&b"c.jpg"[..], 0));
+}
+
+#[test]
+fn a_project_folder_leads_to_its_model_and_database() {
+    let project = data("project");
+    let input = read::open(&project).unwrap();
+    assert_eq!(input.ids, [2, 3, 4, 6, 9, 11]);
+    assert_eq!(input.cameras.len(), 3);
+    assert_eq!(input.model, Some(project.join("sparse/0")));
+    assert_eq!(input.database, Some(project.join("database.db")));
+    assert_eq!(input.files.len(), 3, "the classic layout: {:?}", input.files);
+    let direct = read::open(&project.join("sparse/0")).unwrap();
+    assert_eq!(direct.positions, input.positions);
+    let alone = read::open(&project.join("sparse/0/points3D.bin")).unwrap();
+    assert_eq!((&alone.positions, &alone.ids), (&input.positions, &input.ids));
+}
+
+#[test]
+fn what_lies_beside_the_model_is_noted_or_ignored() {
+    let dir = tempfile::tempdir().unwrap();
+    for (from, to) in [("rig-bin", "sparse/0"), ("rig-txt", "sparse/0"), ("rig-bin", "sparse/1")] {
+        copy_folder(&data(from), &dir.path().join(to));
+    }
+    let input = read::open(dir.path()).unwrap();
+    assert_eq!(input.format, "COLMAP binary");
+    let notes = input.notes.join("\n");
+    let notes = notes.replace(dir.path().to_str().unwrap(), "");
+    assert_eq!(
+        notes.replace('\\', "/"),
+        "points3D.txt: not read, because points3D.bin exists\n\
+         sparse/0: read, the largest of 2 models (8 points)\n\
+         sparse/1: another model (8 points), give its path to read it"
+    );
+}
+
+#[test]
+fn models_are_found_where_programs_put_them() {
+    for place in [
+        "",
+        "0",
+        "sparse",
+        "sparse/0",
+        "sparse/3",
+        "model",
+        "models/0",
+        "models/2",
+        "colmap",
+        "colmap/sparse",
+        "colmap/sparse/0",
+    ] {
+        for (fixture, format) in [("rig-bin", "COLMAP binary"), ("rig-txt", "COLMAP text")] {
+            let dir = tempfile::tempdir().unwrap();
+            copy_folder(&data(fixture), &dir.path().join(place));
+            let input = read::open(dir.path()).unwrap();
+            assert_eq!((input.format, input.positions.len()), (format, 8), "{place}");
+            assert_eq!(input.model, Some(dir.path().join(place)), "{place}");
+            assert_eq!(input.notes, [""; 0], "{place}");
+        }
+    }
+}
+
+#[test]
+fn of_several_models_the_largest_is_read_and_told() {
+    // hloc leaves models that it did not choose, and COLMAP models that it could not merge.
+    let dir = tempfile::tempdir().unwrap();
+    copy_folder(&data("project/sparse/0"), &dir.path().join("sparse/0"));
+    copy_folder(&data("rig-txt"), &dir.path().join("sparse/10"));
+    copy_folder(&data("project/sparse/0"), &dir.path().join("models/2"));
+    fs::create_dir_all(dir.path().join("sparse/11")).unwrap();
+    let input = read::open(dir.path()).unwrap();
+    assert_eq!((input.format, input.positions.len()), ("COLMAP text", 8));
+    assert_eq!(
+        input.notes,
+        [
+            "sparse/10: read, the largest of 3 models (8 points)",
+            "sparse/0: another model (6 points), give its path to read it",
+            "models/2: another model (6 points), give its path to read it",
+        ]
+    );
+    // The folder that was named has priority, even if its model is smaller: hloc's best model is
+    // there.
+    copy_folder(&data("project/sparse/0"), &dir.path().join(""));
+    let input = read::open(dir.path()).unwrap();
+    assert_eq!(input.positions.len(), 6);
+    assert_eq!(
+        input.notes[0],
+        "the model of the folder itself: read, the first of 4 models (6 points)"
+    );
+}
+
+#[test]
+fn the_database_of_a_project_is_found_from_its_model_as_well() {
+    for (project, model, database) in [
+        ("", "sparse/0", "database.db"),
+        ("", "colmap/sparse/0", "colmap/database.db"),
+        ("sparse/0", "sparse/0", "database.db"),
+        ("sparse", "sparse", "database.db"),
+    ] {
+        let dir = tempfile::tempdir().unwrap();
+        copy_folder(&data("project/sparse/0"), &dir.path().join(model));
+        fs::copy(data("project/database.db"), dir.path().join(database)).unwrap();
+        let input = read::open(&dir.path().join(project)).unwrap();
+        let found = fs::canonicalize(input.database.unwrap()).unwrap();
+        assert_eq!(found, fs::canonicalize(dir.path().join(database)).unwrap(), "{model}");
+    }
+}
+
+#[test]
+fn cameras_are_not_needed_for_points() {
+    for (file, from, to, note) in [
+        (
+            "cameras.txt",
+            "SIMPLE_PINHOLE",
+            "SPHERICAL",
+            "expected a camera model of COLMAP for camera",
+        ),
+        // A pose with NaN, and one of zeros.
+        ("images.txt", "\n3 0.2448454332437206 ", "\n3 nan ", "1 of 20 cameras have no place"),
+        (
+            "images.txt",
+            "\n2 0.69121825575770734 0.46875053236901132 0.54926565388881932 -0.028240091521257206",
+            "\n2 0 0 0 0",
+            "1 of 20 cameras have no place",
+        ),
+    ] {
+        let dir = tempfile::tempdir().unwrap();
+        for name in ["cameras.txt", "images.txt", "points3D.txt"] {
+            let text = fs::read_to_string(data("rig-txt").join(name)).unwrap();
+            let text = if name == file { text.replace(from, to) } else { text };
+            fs::write(dir.path().join(name), text).unwrap();
+        }
+        let input = read::open(dir.path()).unwrap();
+        assert_eq!((input.positions.len(), input.cameras.len() + input.n_unplaced), (8, 20));
+        assert!(input.notes.len() == 1 && input.notes[0].contains(note), "{:?}", input.notes);
+    }
+}
+
+#[test]
+fn models_of_undistorted_images_are_found_where_there_is_no_other() {
+    for place in ["dense/0/sparse", "dense/sparse"] {
+        let dir = tempfile::tempdir().unwrap();
+        copy_folder(&data("project/sparse/0"), &dir.path().join(place));
+        assert_eq!(read::open(dir.path()).unwrap().model, Some(dir.path().join(place)));
+        copy_folder(&data("project/sparse/0"), &dir.path().join("sparse/0"));
+        let input = read::open(dir.path()).unwrap();
+        assert_eq!((input.model, input.notes), (Some(dir.path().join("sparse/0")), vec![]));
+    }
+}
