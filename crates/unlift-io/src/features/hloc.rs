@@ -277,42 +277,46 @@ enum Target {
 }
 
 /// Returns names and targets of the links in the object header at `address`, which the library
-/// skips if they are paths. `None` for groups that list their links elsewhere: those of the old
-/// form, and large ones.
+/// skips if they are paths. Groups that list their links elsewhere, those of the old form and large
+/// ones, have none.
 ///
 /// Source: HDF5 File Format Specification 3.0, IV.A (object headers), IV.A.2.g (the link message).
 fn links(file: &impl Source, address: u64) -> Option<Vec<(String, Target)>> {
-    const LINK: u8 = 0x06;
-    const CONTINUATION: u8 = 0x10;
+    const LINK: u64 = 0x06;
+    const CONTINUATION: u64 = 0x10;
     let read = |at: u64, n: u64| file.read_exact_at(at, usize::try_from(n).ok()?).ok();
-    let start = read(address, 6)?;
-    if !start.starts_with(b"OHDR") {
-        return None;
-    }
-    let flags = start[5];
-    let before = 6 + if flags & 0x20 != 0 { 16 } else { 0 } + if flags & 0x10 != 0 { 4 } else { 0 };
-    let width = 1 << (flags & 3);
-    // A flag states that messages have numbers.
-    let head = if flags & 4 != 0 { 6 } else { 4 };
-    let first = address.checked_add(before + width)?;
-    let mut blocks = vec![(first, number(&read(first - width, width)?))];
-    let mut links = Vec::new();
-    let mut at = 0;
+    let start = read(address, 16)?;
+    let is_new = start.starts_with(b"OHDR");
+    let flags = if is_new { start[5] } else { 0 };
+    let first = if is_new {
+        let before =
+            6 + if flags & 0x20 != 0 { 16 } else { 0 } + if flags & 0x10 != 0 { 4 } else { 0 };
+        let width = 1 << (flags & 3);
+        (address + before + width, number(&read(address + before, width)?))
+    } else {
+        (address + 16, number(&start[8..12]))
+    };
+    // Bytes of the type of a message, and of all before its body. A flag states that messages have
+    // numbers.
+    let (kind, head) = match is_new {
+        true => (1, if flags & 4 != 0 { 6 } else { 4 }),
+        false => (2, 8),
+    };
+    let (mut blocks, mut at, mut links) = (vec![first], 0, Vec::new());
     while let Some(&(start, size)) = blocks.get(at) {
         let block = read(start, size)?;
         let mut rest = &block[..];
         while let Some((message, behind)) = rest.split_at_checked(head) {
-            let Some((body, next)) = behind.split_at_checked(number(&message[1..3]) as usize)
-            else {
-                break;
-            };
+            let size = number(&message[kind..kind + 2]) as usize;
+            let Some((body, next)) = behind.split_at_checked(size) else { break };
             rest = next;
-            match message[0] {
+            match number(&message[..kind]) {
                 LINK => links.extend(link(body)),
                 CONTINUATION if body.len() >= 16 && blocks.len() < MAX_DEPTH => {
-                    // The block is between a signature and a checksum.
                     let (at, size) = (number(&body[..8]), number(&body[8..16]));
-                    blocks.push((at.checked_add(4)?, size.checked_sub(8)?));
+                    // New blocks are between a signature and a checksum.
+                    let extra = if is_new { 4 } else { 0 };
+                    blocks.push((at.checked_add(extra)?, size.checked_sub(2 * extra)?));
                 }
                 _ => {}
             }
@@ -536,8 +540,9 @@ pub(crate) fn is_ours(path: &Path) -> bool {
 /// `scores`, `scales` and `oris` `(N,)` and `image_size` `(2,)`; see `docs/formats.md`. Names and
 /// at most 64 MiB of values stay in memory. The same images in the same order give the same bytes.
 pub struct FeatureWriter {
-    output: OutputFile,
+    // Dropped before `output`, which removes the file that it has open.
     file: File,
+    output: OutputFile,
     images: BTreeSet<String>,
     folders: BTreeSet<String>,
     /// Bytes since the last commit.
@@ -566,7 +571,7 @@ impl FeatureWriter {
         });
         let file = file.map_err(|error| failed(path, error))?;
         let (images, folders) = (BTreeSet::new(), BTreeSet::new());
-        Ok(Self { output, file, images, folders, staged: 0 })
+        Ok(Self { file, output, images, folders, staged: 0 })
     }
 
     /// Checks that an image can be written.

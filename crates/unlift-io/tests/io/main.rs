@@ -76,9 +76,10 @@ fn shared(name: &str) -> Option<PathBuf> {
     Some(path)
 }
 
-/// An `.npy` file.
+/// An `.npy` file. Its values begin at byte 128 unless the type is long.
 fn npy(descr: &str, shape: &str, values: &[u8]) -> Vec<u8> {
     let text = format!("{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}}}");
     let text = format!("{text:117}\n");
-    [b"\x93NUMPY\x01\0\x76\0".as_slice(), text.as_bytes(), values].concat()
+    let length = (text.len() as u16).to_le_bytes();
+    [b"\x93NUMPY\x01\0", &length[..], text.as_bytes(), values].concat()
 }

@@ -184,7 +184,7 @@ fn what_is_wrong_is_told_with_its_line() {
         let line = line("a.json", text);
         assert!(line == format!("{expected}{found}") || found.is_empty(), "{line}");
     }
-    let text = format!("[{}]", opensfm(&POINTS).replace("[0.1, 0.2, 0.3]", "[0.1, 0.2]"));
+    let text = format!("[{}]", opensfm(&POINTS).replace("[0.125, 0.25, 0.375]", "[0.125, 0.25]"));
     assert!(line("b.json", &text).contains("invalid length 2, expected an array of length 3"));
     assert!(line("c.json", "[").contains("EOF while parsing"));
     let deep = format!("[{{\"x\": {}1{}}}]", "[".repeat(500), "]".repeat(500));
