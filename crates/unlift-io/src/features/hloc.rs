@@ -563,8 +563,7 @@ impl FeatureWriter {
             .with_locking(FileLocking::Disabled)
             .with_memory_strategy(MemoryStrategy::Bounded)
             .with_sync_policy(SyncPolicy::OnClose);
-        let file =
-            File::create_with_options(output.partial(), FileCreateProperties::new(), access);
+        let file = File::create_with_options(output.partial(), FileCreateProperties::new(), access);
         let file = file.and_then(|file| {
             file.root().set_attr(WRITER, AttrValue::AsciiString("unlift".to_owned()))?;
             Ok(file)

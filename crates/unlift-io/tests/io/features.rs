@@ -221,8 +221,9 @@ fn file(arrays: &[Array<'_>]) -> Vec<u8> {
     builder.finish().unwrap()
 }
 
-const KEYPOINTS: Array<'static> =
-    ("keypoints", &[3, 2], &|to| drop(to.with_f32_data(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0])));
+const KEYPOINTS: Array<'static> = ("keypoints", &[3, 2], &|to| {
+    to.with_f32_data(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+});
 const DESCRIPTORS: Array<'static> = ("descriptors", &[4, 3], &|to| {
     to.with_u8_data(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
 });
@@ -245,7 +246,7 @@ fn every_malformed_file_of_features_is_refused_with_its_line() {
     let floats = |name, shape: &'static [u64], value: f32| -> (&str, &[u64], Box<dyn Fn(&mut DatasetBuilder)>) {
         let n = shape.iter().product::<u64>() as usize;
         let values: Vec<f32> = (0..n).map(|at| value * (at + 1) as f32).collect();
-        (name, shape, Box::new(move |to| drop(to.with_f32_data(&values))))
+        (name, shape, Box::new(move |to| { to.with_f32_data(&values); }))
     };
     // `a.jpg` has this array, and keypoints and descriptors unless it is one of them.
     let with = |(name, shape, fill): (&str, &[u64], Box<dyn Fn(&mut DatasetBuilder)>)| {
@@ -260,7 +261,7 @@ fn every_malformed_file_of_features_is_refused_with_its_line() {
             "f: expected features in HDF5, or a COLMAP database (SQLite), found a file that begins with \"hello\\nwo\""),
         ("no image", FileBuilder::new().finish().unwrap(), "f: expected at least one image, found none"),
         ("no keypoints", file(&[DESCRIPTORS]), "f: image \"a.jpg\": expected an array keypoints, found only descriptors"),
-        ("global descriptors", file(&[("global_descriptor", &[2], &|to| drop(to.with_f32_data(&[0.5, 1.0])))]),
+        ("global descriptors", file(&[("global_descriptor", &[2], &|to| { to.with_f32_data(&[0.5, 1.0]); })]),
             "f: expected a group per image with keypoints and descriptors, found global descriptors of whole images"),
         ("no descriptors", file(&[KEYPOINTS]), "f: image \"a.jpg\": expected descriptors, found none"),
         ("keypoints in one column", with(floats("keypoints", &[3, 1], 1.0)),
@@ -279,7 +280,7 @@ fn every_malformed_file_of_features_is_refused_with_its_line() {
             "f: image \"a.jpg\", descriptors: expected real descriptors, found only zeros (dummies)"),
         ("NaN in descriptors", with(floats("descriptors", &[4, 3], f32::NAN)),
             "f: image \"a.jpg\", descriptors: expected a finite value, found NaN (descriptor 0, value 0)"),
-        ("wide integers", with(("descriptors", &[4, 3], Box::new(|to| drop(to.with_i64_data(&[7; 12]))))),
+        ("wide integers", with(("descriptors", &[4, 3], Box::new(|to| { to.with_i64_data(&[7; 12]); }))),
             "f: image \"a.jpg\", descriptors: expected floats, or unsigned bytes, found other integers"),
         ("scores of others", with(floats("scores", &[2], 0.5)),
             "f: image \"a.jpg\", scores: expected one value per keypoint, (3,), found (2,)"),
