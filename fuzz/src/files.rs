@@ -25,15 +25,8 @@ fn file(name: &str, bytes: &[u8]) -> PathBuf {
 
 /// Reads a point cloud. The first byte chooses the format.
 pub fn points(bytes: &[u8]) {
-    const NAMES: [&str; 7] = [
-        "p.ply",
-        "p.csv",
-        "p.xyz",
-        "p.txt",
-        "p.npy",
-        "points3D.bin",
-        "points3D.txt",
-    ];
+    const NAMES: [&str; 7] =
+        ["p.ply", "p.csv", "p.xyz", "p.txt", "p.npy", "points3D.bin", "points3D.txt"];
     let mut bytes = Bytes(bytes);
     let name = NAMES[usize::from(bytes.byte()) % NAMES.len()];
     let path = file(name, bytes.0);
