@@ -37,8 +37,8 @@ struct ByDescriptors;
 
 fn best<const D: usize>(descriptors: Option<&Descriptors>) -> Box<dyn Source<D>> {
     let takes = |source: &dyn Source<D>| descriptors.is_some_and(|some| source.takes(some).is_ok());
-    if takes(&unlift_vision::network::Learned::default()) {
-        return Box::new(unlift_vision::network::Learned::default());
+    if takes(&unlift_vision::network::Learned) {
+        return Box::new(unlift_vision::network::Learned);
     }
     if takes(&Overlap) { Box::new(Overlap) } else { Box::new(Similarity) }
 }

@@ -97,7 +97,7 @@ fn named(extractor: &Extractor, photo: &Path) -> Result<Option<Shares>, unlift::
         Ok(Some(near.measured_inlier_ratio(&source.lists(&released, K, 0)?)))
     };
     let plain = Some(near.measured_inlier_ratio(&cosines(&released)?));
-    let shares = [plain, by(&Similarity)?, by(&Overlap)?, by(&Learned::default())?];
+    let shares = [plain, by(&Similarity)?, by(&Overlap)?, by(&Learned)?];
     Ok(Some((places.len(), shares)))
 }
 

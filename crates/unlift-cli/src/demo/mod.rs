@@ -90,7 +90,7 @@ fn photos(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
     let inversion = Arc::new(inversion);
     let usual = Plan::new(Unit::Pixel);
     let plan = Plan {
-        neighbors: vec![NeighborsBy::Source(Arc::new(Learned::default()))],
+        neighbors: vec![NeighborsBy::Source(Arc::new(Learned))],
         // Pictures are painted of every solver.
         solvers: vec![Arc::new(Builtin::Ranking)],
         k: 20,

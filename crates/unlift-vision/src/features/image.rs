@@ -2,7 +2,6 @@
 
 use std::ops::Deref;
 
-use image::buffer::ConvertBuffer;
 use image::imageops::{FilterType, resize};
 use image::{ImageBuffer, Luma, Pixel, Rgb};
 use unlift::Error;
@@ -129,17 +128,6 @@ impl ColorImage {
     pub fn pixel(&self, x: usize, y: usize) -> [u8; 3] {
         let at = 3 * (y * self.width + x);
         [self.pixels[at], self.pixels[at + 1], self.pixels[at + 2]]
-    }
-
-    /// Converts the image to gray values, as [`read`](super::photo::read) does.
-    ///
-    /// # Errors
-    /// Never: the length of the pixels was checked.
-    pub fn gray(&self) -> Result<GrayImage, Error> {
-        let (width, height) = (self.width as u32, self.height as u32);
-        let pixels = ImageBuffer::<Rgb<u8>, &[u8]>::from_raw(width, height, &self.pixels);
-        let luma: Option<image::GrayImage> = pixels.map(|pixels| pixels.convert());
-        GrayImage::from_bytes(self.width, self.height, luma.unwrap_or_default().as_raw())
     }
 
     /// Halves the image: every pixel is the mean of four. An odd last row or column is omitted.

@@ -18,8 +18,8 @@ const NAME: &str = "learned";
 pub const SOURCES: &[SourceEntry] = &[SourceEntry {
     name: NAME,
     summary: "records that a network trained on photos scores as near; SIFT or ALIKED descriptors",
-    in_2d: Some(|| Arc::new(Learned::default())),
-    in_3d: Some(|| Arc::new(Learned::default())),
+    in_2d: Some(|| Arc::new(Learned)),
+    in_3d: Some(|| Arc::new(Learned)),
 }];
 
 /// Lists the `k` records that a network scores highest by their descriptors, directly or over a
@@ -31,10 +31,8 @@ pub const SOURCES: &[SourceEntry] = &[SourceEntry {
 ///
 /// Source: Sec. 5 and supplement E, where positions are not known either; pair scores, the loss and
 /// the walk are ours.
-#[derive(Clone, Debug, Default)]
-pub struct Learned {
-    network: Option<Arc<Network>>,
-}
+#[derive(Clone, Copy, Debug)]
+pub struct Learned;
 
 /// Weight of a standard deviation of learned descriptors' cosines beside the network's scores. The
 /// network finds the nearest twenty but does not order them; similarity does
@@ -49,26 +47,12 @@ fn model(kind: DescriptorKind) -> &'static str {
     }
 }
 
-fn network(kind: DescriptorKind) -> Result<&'static Network, Error> {
+fn network(descriptors: &Descriptors) -> Result<&'static Network, Error> {
     static LOADED: [OnceLock<Result<Network, Error>>; DescriptorKind::ALL.len()] =
         [const { OnceLock::new() }; DescriptorKind::ALL.len()];
+    let kind = DescriptorKind::of(descriptors, NAME)?;
     let loaded = LOADED[kind as usize].get_or_init(|| Network::load(model(kind)));
     loaded.as_ref().map_err(Error::clone)
-}
-
-impl Learned {
-    /// Creates the source with a given network: inputs `descriptors` (n, dim) of unit length and
-    /// `pairs` (reaches, n, n) of [`dense`], output `scores` (n, n).
-    pub fn with(network: Arc<Network>) -> Self {
-        Self { network: Some(network) }
-    }
-
-    fn network(&self, descriptors: &Descriptors) -> Result<&Network, Error> {
-        match &self.network {
-            Some(network) => Ok(network),
-            None => network(DescriptorKind::of(descriptors, NAME)?),
-        }
-    }
 }
 
 impl<const D: usize> Source<D> for Learned {
@@ -90,11 +74,11 @@ impl<const D: usize> Source<D> for Learned {
     }
 
     fn lists(&self, released: &Released<D>, k: usize, _: u64) -> Result<Neighborhoods, Error> {
-        scored(released, k, &|part| scores(self.network(&part.descriptors)?, part))
+        scored(released, k, &|part| scores(network(&part.descriptors)?, part))
     }
 
     fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
-        self.network(descriptors).map(|_| ())
+        network(descriptors).map(|_| ())
     }
 
     fn note(&self, n_slots: usize) -> Option<String> {

@@ -36,7 +36,7 @@ use unlift::guard::{caught, told};
 use crate::read_regular;
 
 pub use learned::{Learned, SOURCES};
-pub use registry::{Entry, Folders, MODELS, Place, Port, VARIABLE, entry};
+pub use registry::{Entry, Folders, MODELS, Place, Port, entry};
 pub use unlift::neighbors::DescriptorKind;
 
 /// An array of floats, row-major.

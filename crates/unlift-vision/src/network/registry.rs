@@ -210,7 +210,7 @@ pub static MODELS: &[Entry] = &[
 ];
 
 /// The environment variable that names a folder of models.
-pub const VARIABLE: &str = "UNLIFT_MODELS";
+const VARIABLE: &str = "UNLIFT_MODELS";
 
 /// Folders that are searched for models before the embedded ones.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -40,7 +40,7 @@ fn slow_floats(n: usize, dim: usize) -> Descriptors {
 fn the_laws_of_sources_hold_for_every_kind_of_descriptors() {
     let floats = line(&slow_floats(300, 128));
     for released in [described_map(&Olc, 300).1, described_map(&Ppl, 300).1, floats] {
-        source_laws(&Learned::default(), &released);
+        source_laws(&Learned, &released);
     }
 }
 
@@ -53,14 +53,14 @@ fn a_blank_descriptor_is_near_none_and_spoils_nothing() {
     };
     let bytes = (0..3200).flat_map(|at| (0..128).map(move |bin| byte(at, bin))).collect();
     let descriptors = Descriptors::try_new(Values::U8(bytes), 128).unwrap();
-    let lists = Learned::default().lists(&line(&descriptors), 5, 0).unwrap();
+    let lists = Learned.lists(&line(&descriptors), 5, 0).unwrap();
     assert_eq!(lists.longest(), 5);
 }
 
 #[test]
 fn descriptors_without_a_network_are_refused() {
     let takes = |dim| {
-        let result = Source::<3>::takes(&Learned::default(), &slow_floats(5, dim));
+        let result = Source::<3>::takes(&Learned, &slow_floats(5, dim));
         result.map_err(|error| error.to_string())
     };
     assert_eq!(
@@ -88,10 +88,10 @@ fn many_maps_may_request_the_network_at_once() {
     }
     let maps: Vec<_> = (0..6).map(|at| described_map(&Olc, 60 + at).1).collect();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
-    let lists = |map: &Released<3>| Learned::default().lists(map, 5, 0);
+    let lists = |map: &Released<3>| Learned.lists(map, 5, 0);
     let together: Vec<_> = pool.install(|| maps.par_iter().map(lists).collect());
     for (lists, map) in together.iter().zip(&maps) {
-        assert_eq!(lists.as_ref(), Learned::default().lists(map, 5, 0).as_ref());
+        assert_eq!(lists.as_ref(), Learned.lists(map, 5, 0).as_ref());
     }
 }
 
@@ -124,7 +124,7 @@ fn the_network_names_more_neighbors_than_its_inputs_do() {
         let ratio = |source: &dyn Source<2>| {
             near.measured_inlier_ratio(&source.lists(&released, K, 0).unwrap())
         };
-        let (learned, plain) = (ratio(&Learned::default()), (ratio(plain), plain.name()));
+        let (learned, plain) = (ratio(&Learned), (ratio(plain), plain.name()));
         assert!(learned > plain.0 + gain, "learned {learned:.3}, {} {:.3}", plain.1, plain.0);
     }
 }

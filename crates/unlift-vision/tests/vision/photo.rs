@@ -1,7 +1,7 @@
 //! Photos that can be read, turned photos, and files that are not photos.
 
 use std::io::Cursor;
-use std::path::PathBuf;
+use std::path::Path;
 
 use image::{DynamicImage, ImageFormat, Rgb, RgbImage};
 use unlift_vision::features::photo::{decode, read, read_color};
@@ -137,14 +137,6 @@ fn a_header_with_more_pixels_than_its_bytes_can_hold_is_refused() {
     }
 }
 
-#[cfg(unix)]
-#[test]
-fn a_device_is_no_photo() {
-    let error = read(&PathBuf::from("/dev/zero")).unwrap_err().to_string();
-    let found = "expected a JPEG, PNG or WebP image, found a pipe, a socket or a device";
-    assert_eq!(error, format!("/dev/zero: {found}"));
-}
-
 #[test]
 fn files_are_read_by_content_and_missing_ones_named() {
     let folder = tempfile::tempdir().unwrap();
@@ -156,15 +148,11 @@ fn files_are_read_by_content_and_missing_ones_named() {
     std::fs::write(&path, "text").unwrap();
     let error = read_color(&path).unwrap_err().to_string();
     assert!(error.ends_with("png.jpg: expected a JPEG, PNG or WebP image, found text"), "{error}");
-    let error = read(&PathBuf::from("nowhere/photo.jpg")).unwrap_err().to_string();
+    let error = read(Path::new("nowhere/photo.jpg")).unwrap_err().to_string();
     assert!(error.starts_with("nowhere/photo.jpg: expected a JPEG, PNG or WebP image, found "));
     assert!(read(folder.path()).is_err());
-}
-
-#[test]
-fn a_single_pixel_is_a_photo() {
-    for format in [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::WebP] {
-        let gray = decode(&encode(&DynamicImage::from(colors(1, 1)), format), "dot").unwrap();
-        assert_eq!((gray.width(), gray.height()), (1, 1));
+    if cfg!(unix) {
+        let error = read(Path::new("/dev/zero")).unwrap_err().to_string();
+        assert!(error.ends_with("found a pipe, a socket or a device"), "{error}");
     }
 }

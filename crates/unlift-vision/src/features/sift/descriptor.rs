@@ -261,59 +261,6 @@ fn sum(values: &[f32; LENGTH], of: impl Fn(f32) -> f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::features::GrayImage;
-
-    /// Computes the definition, pixel by pixel over the whole box.
-    fn plain(level: &Plane, place: Place, angle: f64) -> Vec<f64> {
-        let mut gradients = Gradients::default();
-        gradients.reset(level);
-        gradients.prepare(level, 0..level.height);
-        let side = 3.0 * place.sigma;
-        let mut bins = vec![0.0; LENGTH];
-        for y in 1..level.height - 1 {
-            for x in 1..level.width - 1 {
-                let (dx, dy) = (x as f64 - place.x, y as f64 - place.y);
-                let (sin, cos) = angle.sin_cos();
-                let (nx, ny) = ((cos * dx + sin * dy) / side, (cos * dy - sin * dx) / side);
-                let turned = f64::from(gradients.angle.at(x, y)) - angle * 8.0 / TAU;
-                let window = (-(nx * nx + ny * ny) / 8.0).exp();
-                for row in 0..CELLS {
-                    for column in 0..CELLS {
-                        let share = (1.0 - (nx - column as f64 + 1.5).abs()).max(0.0)
-                            * (1.0 - (ny - row as f64 + 1.5).abs()).max(0.0);
-                        for bin in 0..BINS {
-                            let away = (turned - bin as f64).rem_euclid(8.0);
-                            let share = share * (1.0 - away.min(8.0 - away)).max(0.0);
-                            bins[(row * CELLS + column) * BINS + bin] +=
-                                share * window * f64::from(gradients.length.at(x, y));
-                        }
-                    }
-                }
-            }
-        }
-        bins
-    }
-
-    #[test]
-    fn histograms_are_the_plain_sum_inside_and_at_borders() {
-        let value = |x: f64, y: f64| ((x * 0.31).sin() * (y * 0.17 + 0.02 * x).cos()) as f32;
-        let pixels = (0..101 * 101).map(|i| value((i % 101) as f64, (i / 101) as f64));
-        let mut level = Plane::default();
-        level.copy(&GrayImage::try_new(101, 101, pixels.collect()).unwrap());
-        for (x, y, angle) in
-            [(50.2, 49.6, 0.0), (51.0, 40.3, 2.2), (3.2, 98.7, 5.5), (97.9, 2.0, 4.0)]
-        {
-            let place = Place { x, y, sigma: 2.7 };
-            let expected = plain(&level, place, angle);
-            let most = expected.iter().fold(0.0_f64, |most, &bin| most.max(bin));
-            let mut gradients = Gradients::default();
-            gradients.reset(&level);
-            let bins = describe(&mut gradients, &level, place, angle, &mut Desk::default());
-            for (at, (&bin, expected)) in bins.iter().zip(expected).enumerate() {
-                assert!((f64::from(bin) - expected).abs() < 1e-4 * most, "{x}, {y}: bin {at}");
-            }
-        }
-    }
 
     #[test]
     fn bytes_are_roots_of_clamped_shares_with_directions_reversed() {

@@ -294,17 +294,6 @@ mod tests {
     }
 
     #[test]
-    fn a_quadratic_is_refined_exactly_even_from_a_neighboring_pixel() {
-        let levels = paraboloid([10.3, 8.8, 0.2], [0.01, 0.012, 0.02]);
-        for start in [(10, 9), (9, 8), (11, 10), (13, 9)] {
-            let peak = refine(Differences(&levels), start, (1, 5), 0.5, 10.0).unwrap();
-            assert!((peak.x - 10.3).abs() < 1e-3, "{peak:?}");
-            assert!((peak.y - 8.8).abs() < 1e-3, "{peak:?}");
-            assert!((peak.level - 0.2).abs() < 1e-3, "{peak:?}");
-        }
-    }
-
-    #[test]
     fn faint_long_and_far_extrema_are_refused() {
         let found = |levels: &[Plane; 4], start, peak| {
             refine(Differences(levels), start, (1, 5), peak, 10.0).is_some()

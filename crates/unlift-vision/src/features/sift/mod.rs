@@ -17,6 +17,15 @@ use gradient::Gradients;
 use orientation::Place;
 use scale_space::{Ladder, Octave};
 
+/// Maximum number of octaves, with the doubled one.
+const OCTAVES: usize = 4;
+/// Levels of scale in an octave.
+const LEVELS: usize = 3;
+/// Minimum contrast of a keypoint, as a difference of gray values in `0..1`.
+const MIN_CONTRAST: f64 = 0.02 / 3.0;
+/// Maximum ratio of principal curvatures; keypoints above it are on edges.
+const MAX_EDGE_RATIO: f64 = 10.0;
+
 /// Options of SIFT. The defaults are COLMAP's.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SiftOptions {
@@ -28,66 +37,11 @@ pub struct SiftOptions {
     pub max_image_size: usize,
     /// Doubles the image first, which finds the finest features (COLMAP: first octave -1).
     pub doubled: bool,
-    /// Maximum number of octaves, with the doubled one; default 4.
-    pub octaves: usize,
-    /// Levels of scale in an octave; default 3.
-    pub levels: usize,
-    /// Minimum contrast of a keypoint, as a difference of gray values in `0..1`; default 0.02 / 3.
-    pub peak_threshold: f64,
-    /// Maximum ratio of principal curvatures, default 10; keypoints above it are on edges.
-    pub edge_threshold: f64,
-    /// Maximum number of keypoints per position, each with its own orientation; default 2.
-    pub max_orientations: usize,
-    /// Sets all orientations to zero.
-    pub upright: bool,
 }
 
 impl Default for SiftOptions {
     fn default() -> Self {
-        Self {
-            max_features: 8192,
-            max_image_size: 3200,
-            doubled: true,
-            octaves: 4,
-            levels: 3,
-            peak_threshold: 0.02 / 3.0,
-            edge_threshold: 10.0,
-            max_orientations: 2,
-            upright: false,
-        }
-    }
-}
-
-impl SiftOptions {
-    /// Checks that every value is in its range.
-    ///
-    /// # Errors
-    /// If a field is out of range; the error names the first one.
-    pub fn check(&self) -> Result<(), Error> {
-        let whole: [(&str, usize, usize, usize); 5] = [
-            ("max_features", self.max_features, 1, usize::MAX),
-            ("max_image_size", self.max_image_size, 1, 1 << 16),
-            ("octaves", self.octaves, 1, 16),
-            ("levels", self.levels, 1, 16),
-            ("max_orientations", self.max_orientations, 1, orientation::MOST),
-        ];
-        for (name, value, least, most) in whole {
-            if !(least..=most).contains(&value) {
-                let expected = match most {
-                    usize::MAX => format!("at least {least}"),
-                    _ => format!("{least} to {most}"),
-                };
-                return Err(Error::new(name, expected, value.to_string()));
-            }
-        }
-        let real =
-            [("peak_threshold", self.peak_threshold), ("edge_threshold", self.edge_threshold)];
-        for (name, value) in real {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(Error::new(name, "a positive number", value.to_string()));
-            }
-        }
-        Ok(())
+        Self { max_features: 8192, max_image_size: 3200, doubled: true }
     }
 }
 
@@ -158,14 +112,20 @@ impl Sift {
     /// Creates an extractor with `options`.
     ///
     /// # Errors
-    /// If [`SiftOptions::check`] fails.
+    /// If a field is out of range; the error names the first one.
     pub fn try_new(options: SiftOptions) -> Result<Self, Error> {
-        options.check()?;
+        let SiftOptions { max_features, max_image_size, .. } = options;
+        if max_features == 0 {
+            return Err(Error::new("max_features", "at least 1", "0"));
+        }
+        if !(1..=1 << 16).contains(&max_image_size) {
+            return Err(Error::new("max_image_size", "1 to 65536", max_image_size.to_string()));
+        }
         Ok(Self::unchecked(options))
     }
 
     fn unchecked(options: SiftOptions) -> Self {
-        Self { ladder: Ladder::new(&options), options, idle: Mutex::default() }
+        Self { ladder: Ladder::new(options.doubled), options, idle: Mutex::default() }
     }
 
     /// Extracts the features of `image`, in its pixels even if it is downsized.
@@ -238,12 +198,12 @@ impl Sift {
         let mut levels = Vec::new();
         workspace.octave.start(image, self.options.doubled, &self.ladder);
         let mut pixel = if self.options.doubled { 0.5 } else { 1.0 };
-        for octave in 0..self.options.octaves {
+        for octave in 0..OCTAVES {
             if octave > 0 {
                 workspace.octave.next(&self.ladder);
                 pixel *= 2.0;
             }
-            for level in 1..=self.options.levels {
+            for level in 1..=LEVELS {
                 if level > 1 {
                     workspace.octave.step(level - 1, &self.ladder);
                 }
@@ -266,13 +226,12 @@ impl Sift {
     fn find(&self, level: usize, workspace: &mut Workspace) {
         let Workspace { octave, extrema, places, .. } = workspace;
         let differences = Differences(octave.levels());
-        let SiftOptions { peak_threshold, edge_threshold, levels, .. } = self.options;
-        differences.extrema(peak_threshold, extrema);
+        differences.extrema(MIN_CONTRAST, extrema);
         places.clear();
         places.extend(extrema.iter().filter_map(|&(x, y)| {
-            let range = (level, levels + 2);
+            let range = (level, LEVELS + 2);
             let at = (x as usize, y as usize);
-            let peak = refine(differences, at, range, peak_threshold, edge_threshold)?;
+            let peak = refine(differences, at, range, MIN_CONTRAST, MAX_EDGE_RATIO)?;
             let sigma = self.ladder.sigma(level as f64 + peak.level);
             Some(Place { x: peak.x, y: peak.y, sigma })
         }));
@@ -286,11 +245,9 @@ impl Sift {
         gradients.reset(level);
         let mut features = Features::default();
         for &place in places.iter() {
-            let (angles, found) = match self.options.upright {
-                true => ([0.0; orientation::MOST], 1),
-                false => orientation::orientations(gradients, level, place, &mut desk.weights),
-            };
-            for &angle in &angles[..found.min(self.options.max_orientations)] {
+            let (angles, n_peaks) =
+                orientation::orientations(gradients, level, place, &mut desk.weights);
+            for &angle in &angles[..n_peaks] {
                 features.keypoints.push(keypoint(place, angle, pixel));
                 let histograms = descriptor::describe(gradients, level, place, angle, desk);
                 features.descriptors.push(quantize(histograms));
@@ -307,24 +264,5 @@ fn keypoint(place: Place, angle: f64, pixel: f64) -> Keypoint {
         y: (place.y * pixel + 0.5) as f32,
         scale: (place.sigma * pixel) as f32,
         orientation: if angle > PI { angle - TAU } else { angle } as f32,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_wrong_option_is_named() {
-        let text = |options: SiftOptions| options.check().unwrap_err().to_string();
-        let defaults = SiftOptions::default;
-        assert_eq!(
-            text(SiftOptions { max_orientations: 5, ..defaults() }),
-            "max_orientations: expected 1 to 4, found 5"
-        );
-        assert_eq!(
-            text(SiftOptions { edge_threshold: f64::NAN, ..defaults() }),
-            "edge_threshold: expected a positive number, found NaN"
-        );
     }
 }

@@ -7,8 +7,8 @@ use unlift::simd::{Kernel, dispatch};
 use super::gradient::{Gradients, TURN};
 use super::scale_space::Plane;
 
-/// Maximum number of orientations of a keypoint.
-pub(crate) const MOST: usize = 4;
+/// Maximum number of keypoints per position, each with its own orientation.
+const MAX_ORIENTATIONS: usize = 2;
 /// Bins of the histogram.
 const BINS: usize = 36;
 /// Standard deviation of the window, in scales of the keypoint.
@@ -58,7 +58,7 @@ pub(crate) fn orientations(
     level: &Plane,
     place: Place,
     weights: &mut [Vec<f32>; 2],
-) -> ([f64; MOST], usize) {
+) -> ([f64; MAX_ORIENTATIONS], usize) {
     let window = WINDOW * place.sigma;
     let radius = ((3.0 * window) as usize).max(1);
     let (column, row) = place.pixel();
@@ -131,13 +131,13 @@ impl Kernel for Votes<'_> {
 }
 
 /// Finds the peaks of a histogram, each moved to the vertex of the parabola through its neighbors.
-fn peaks(histogram: &[f32; BINS]) -> ([f64; MOST], usize) {
+fn peaks(histogram: &[f32; BINS]) -> ([f64; MAX_ORIENTATIONS], usize) {
     let highest = histogram.iter().fold(0.0_f32, |most, &value| most.max(value));
-    let (mut angles, mut found) = ([0.0; MOST], 0);
+    let (mut angles, mut found) = ([0.0; MAX_ORIENTATIONS], 0);
     for (bin, &here) in histogram.iter().enumerate() {
         let before = histogram[(bin + BINS - 1) % BINS];
         let after = histogram[(bin + 1) % BINS];
-        if found < MOST && here > SHARE * highest && here > before && here > after {
+        if found < MAX_ORIENTATIONS && here > SHARE * highest && here > before && here > after {
             let (here, before, after) = (f64::from(here), f64::from(before), f64::from(after));
             let offset = -0.5 * (after - before) / (after + before - 2.0 * here);
             angles[found] = TAU * (bin as f64 + offset + 0.5) / BINS as f64;
@@ -152,7 +152,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn peaks_below_the_share_are_dropped_and_four_kept() {
+    fn peaks_below_the_share_are_dropped_and_two_kept() {
         let mut histogram = [0.0; BINS];
         (histogram[0], histogram[10], histogram[20]) = (1.0, 0.81, 0.79);
         let (angles, n) = peaks(&histogram);
@@ -160,6 +160,6 @@ mod tests {
         assert!((angles[0] - TAU * 0.5 / 36.0).abs() < 1e-9);
         assert!((angles[1] - TAU * 10.5 / 36.0).abs() < 1e-9);
         assert_eq!(peaks(&[0.0; BINS]).1, 0);
-        assert_eq!(peaks(&std::array::from_fn(|bin| (bin % 2) as f32)).1, MOST);
+        assert_eq!(peaks(&std::array::from_fn(|bin| (bin % 2) as f32)).1, MAX_ORIENTATIONS);
     }
 }

@@ -2,7 +2,7 @@
 
 use unlift::simd::{Kernel, dispatch};
 
-use super::SiftOptions;
+use super::LEVELS;
 use crate::features::GrayImage;
 
 /// Values per step of a vector loop.
@@ -219,25 +219,24 @@ pub(crate) struct Ladder {
     first: Gaussian,
     /// From each level to the next.
     steps: Vec<Gaussian>,
-    levels: usize,
 }
 
 impl Ladder {
-    pub(crate) fn new(options: &SiftOptions) -> Self {
-        let ratio = libm::exp2(1.0 / options.levels as f64);
-        let nominal = if options.doubled { 2.0 * NOMINAL } else { NOMINAL };
+    pub(crate) fn new(doubled: bool) -> Self {
+        let ratio = libm::exp2(1.0 / LEVELS as f64);
+        let nominal = if doubled { 2.0 * NOMINAL } else { NOMINAL };
         let first = libm::sqrt(FIRST * FIRST - nominal * nominal);
         let step = FIRST * libm::sqrt(ratio * ratio - 1.0);
-        let steps = (0..options.levels + 2)
-            .map(|level| Gaussian::new(step * libm::exp2(level as f64 / options.levels as f64)))
+        let steps = (0..LEVELS + 2)
+            .map(|level| Gaussian::new(step * libm::exp2(level as f64 / LEVELS as f64)))
             .collect();
-        Self { first: Gaussian::new(first), steps, levels: options.levels }
+        Self { first: Gaussian::new(first), steps }
     }
 
     /// Returns the smoothing at `level`, in pixels of the octave; level 1 is the first one with
     /// keypoints.
     pub(crate) fn sigma(&self, level: f64) -> f64 {
-        FIRST * libm::exp2(level / self.levels as f64)
+        FIRST * libm::exp2(level / LEVELS as f64)
     }
 }
 
