@@ -161,10 +161,12 @@ class Run:
         """Runs one audit and keeps the strongest figure for each of the paper's."""
         out = self.options.work / scene / f"{command[0]}-{figures[0].features}-{figures[0].points}"
         thresholds = sorted({f.measure for f in figures if not isinstance(f.measure, str)}) or [0.1 if command[0] == "map" else 10.0]
-        command = ["audit", *command, "--thresholds", ",".join(f"{t * factor:.6g}" for t in thresholds), "--out", out, "--json",
+        command = ["audit", *command, "--thresholds", ",".join(f"{t * factor:.6g}" for t in thresholds), "--out", out, "--quiet",
                    "--schemes", ",".join(sorted({f.scheme for f in figures} - {"none"}))]
         ratios = sorted({f.ratio for f in figures if f.ratio}, reverse=True) or [1]
-        rows = json.loads(self.run(*command, "--inlier-ratios", ",".join(map(str, ratios))))["results"]
+        (out / "audit.json").unlink(missing_ok=True)
+        self.run(*command, "--inlier-ratios", ",".join(map(str, ratios)))
+        rows = json.loads((out / "audit.json").read_text())["results"]
         for figure in figures:
             values = [value for row in rows if (value := self.value(row, figure, factor)) is not None]
             if values:
@@ -181,11 +183,9 @@ class Run:
         return row["recovered_percent"][f"{figure.measure * factor:.6g}"]
 
     def run(self, *command):
-        """Runs unlift and returns what it prints. Some photos that cannot be used (exit code 3) do not end an audit."""
-        done = subprocess.run([str(word) for word in (self.options.unlift, *command)], stdout=subprocess.PIPE, text=True)
-        if done.returncode and not done.stdout:
+        """Runs unlift. Some photos that cannot be used (exit code 3) do not end an audit."""
+        if subprocess.run([str(word) for word in (self.options.unlift, *command)], stdout=subprocess.DEVNULL).returncode not in (0, 3):
             raise ValueError(f"unlift {command[0]} failed, as said above")
-        return done.stdout
 
     def attempt(self, what, work, *arguments):
         """Runs `work`; other scenes go on if it fails."""
@@ -217,7 +217,7 @@ class Run:
             (work / "photos" / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(photos / name, work / "photos" / name)
         file = work / f"{features}.h5"
-        self.run("features", work / "photos", "--type", features, "--out", file, *(["--max-image-size", side] if side else []))
+        self.run("features", work / "photos", "--features", features, "--out", file, *(["--max-image-size", side] if side else []))
         own = any(f.points == "estimated" for f in figures)
         sources = ["oracle", *(["descriptors"] if own else []), *(["learned"] if own and features == "sift" else [])]
         paint = ["--invert"] if any(isinstance(f.measure, str) for f in figures) else []

@@ -57,7 +57,7 @@ def each(option, values):
 
 def extract(photos, kind, out):
     fewer = [] if kind == "sift" else ["--min-score", "0.02"]
-    command = [PROGRAM, "features", DATA / photos / "images", "--type", kind, "--as-stored", "--quiet", "--out", out, *fewer]
+    command = [PROGRAM, "features", DATA / photos / "images", "--features", kind, "--as-stored", "--quiet", "--out", out, *fewer]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
 

@@ -61,20 +61,20 @@ pub fn advise(error: impl Into<anyhow::Error>, advice: impl Into<String>) -> any
 }
 
 /// Prints help or a usage error, and returns the exit code.
-pub fn told(told: clap::Error) -> u8 {
+pub fn refused(error: clap::Error) -> u8 {
     // clap's message quotes the command line: parse it again without terminal control characters.
     let words = words().iter().map(|word| OneLine(word.display()).to_string());
-    let told = Cli::read(words).err().unwrap_or(told);
-    let text = told.render().to_string();
-    if !told.use_stderr() {
+    let error = Cli::read(words).err().unwrap_or(error);
+    let text = error.render().to_string();
+    if !error.use_stderr() {
         // Help is a result and goes to stdout, in clap's colors.
-        return finish(printed(told.print()).map(|()| Outcome::Done));
+        return finish(printed(error.print()).map(|()| Outcome::Done));
     }
     if text.chars().any(|c| c != '\n' && is_obeyed(c)) {
         text.lines().for_each(tell);
     } else {
         // A message that cannot be written is dropped.
-        let _ = told.print();
+        let _ = error.print();
     }
     USAGE
 }

@@ -28,12 +28,7 @@ fn words() -> &'static [OsString] {
 pub fn run(words: Vec<OsString>) -> u8 {
     let words = WORDS.get_or_init(|| words);
     match args::Cli::read(words.iter().cloned()) {
-        Ok(cli) => {
-            if let Some(bytes) = cli.memory_limit {
-                unlift_io::input::limit_memory(bytes);
-            }
-            exit::finish(commands::run(cli.command))
-        }
-        Err(told) => exit::told(told),
+        Ok(cli) => exit::finish(commands::run(cli.command)),
+        Err(error) => exit::refused(error),
     }
 }

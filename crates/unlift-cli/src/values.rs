@@ -1,14 +1,15 @@
 //! Parses option values; gates are parsed by `unlift_audit::Gate`.
 
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use clap::builder::{PossibleValuesParser, TypedValueParser};
-use unlift::audit::Threshold;
+use unlift::Unit;
+use unlift::audit::{Plan, Threshold};
 use unlift::neighbors::oracle::Noise;
 use unlift::neighbors::sources::Named;
-use unlift::obfuscate::{Entry, Mitigation, Protection, SCHEMES};
-use unlift::recover::{Builtin, Delta};
+use unlift::obfuscate::{Entry, Mitigation, Protection, SCHEMES, Scheme, SchemeOptions};
+use unlift::recover::Builtin;
 use unlift_audit::sources;
 use unlift_vision::network::DescriptorKind;
 
@@ -23,38 +24,25 @@ pub enum NeighborSource {
     File(PathBuf),
 }
 
-/// Returns a parser that maps each name to its value. Errors and shell completions list all names.
-pub fn one_of<T: Clone + Send + Sync + 'static, const N: usize>(
-    names: [(&'static str, T); N],
-) -> impl TypedValueParser<Value = T> {
-    PossibleValuesParser::new(names.clone().map(|(name, _)| name)).map(move |typed: String| {
-        let known = names.iter().find(|(name, _)| *name == typed);
-        known.expect("the parser takes no other name").1.clone()
-    })
+impl NeighborSource {
+    /// Returns the files among `sources`.
+    pub fn files(sources: &[Self]) -> impl Iterator<Item = &Path> {
+        sources.iter().filter_map(|source| match source {
+            Self::File(path) => Some(path.as_path()),
+            Self::Oracle | Self::Own(_) => None,
+        })
+    }
 }
 
 pub fn feature_type(text: &str) -> Result<DescriptorKind, String> {
     DescriptorKind::from_name(text).map_err(|error| expected(&error))
 }
 
-/// Maximum number of threads: more than machines have cores, and few enough to start.
-const MOST_THREADS: usize = 512;
-/// Maximum number of points, images or features: stage files number rows with 32 bits.
-const MOST: usize = u32::MAX as usize;
-
-pub fn threads(text: &str) -> Result<NonZeroUsize, String> {
-    whole(text, MOST_THREADS)
-}
-
-/// Parses a number of points, images or features.
+/// Parses a number of points, images or features. Stage files number rows with 32 bits.
 pub fn count(text: &str) -> Result<NonZeroUsize, String> {
-    whole(text, MOST)
-}
-
-/// Parses a whole number from 1 to `most`.
-fn whole(text: &str, most: usize) -> Result<NonZeroUsize, String> {
-    let number = text.trim().parse::<NonZeroUsize>().ok().filter(|number| number.get() <= most);
-    number.ok_or_else(|| format!("expected a whole number from 1 to {most}, found {text}"))
+    const MAX: usize = u32::MAX as usize;
+    let number = text.trim().parse::<NonZeroUsize>().ok().filter(|number| number.get() <= MAX);
+    number.ok_or_else(|| format!("expected a whole number from 1 to {MAX}, found {text}"))
 }
 
 /// Parses a score in `0..1`.
@@ -63,28 +51,6 @@ pub fn score(text: &str) -> Result<f32, String> {
         Ok(value) if (0.0..1.0).contains(&value) => Ok(value),
         _ => Err(format!("expected a number from 0 to below 1, found {text}")),
     }
-}
-
-/// Parses a size: a whole number and a unit of 1000 (kB, MB, GB) or 1024 (KiB, MiB, GiB).
-pub fn size(text: &str) -> Result<u64, String> {
-    const UNITS: [(&str, u64); 8] = [
-        ("", 1),
-        ("B", 1),
-        ("KB", 1000),
-        ("MB", 1_000_000),
-        ("GB", 1_000_000_000),
-        ("KIB", 1 << 10),
-        ("MIB", 1 << 20),
-        ("GIB", 1 << 30),
-    ];
-    let trimmed = text.trim();
-    let end = trimmed.find(|c: char| !c.is_ascii_digit()).unwrap_or(trimmed.len());
-    let (number, unit) = trimmed.split_at(end);
-    let unit = unit.trim().to_ascii_uppercase();
-    let unit = UNITS.into_iter().find(|(name, _)| *name == unit);
-    let bytes = unit.and_then(|(_, bytes)| number.parse::<u64>().ok()?.checked_mul(bytes));
-    let wrong = || format!("expected a size above 0 like 2GB or 512MiB, found {text}");
-    bytes.filter(|bytes| *bytes > 0).ok_or_else(wrong)
 }
 
 pub fn any_scheme(text: &str) -> Result<&'static Entry, String> {
@@ -215,23 +181,6 @@ pub fn threshold(text: &str) -> Result<Threshold, String> {
     Threshold::parse(text).map_err(|_| format!("expected a number above 0, found {text}"))
 }
 
-/// Parses a tolerance in percentage points.
-pub fn points(text: &str) -> Result<f64, String> {
-    match text.trim().parse::<f64>() {
-        Ok(value) if (0.0..=100.0).contains(&value) => Ok(value),
-        _ => Err(format!("expected a number of percentage points from 0 to 100, found {text}")),
-    }
-}
-
-pub fn delta(text: &str) -> Result<Delta, String> {
-    if text.trim() == "auto" {
-        return Ok(Delta::Auto);
-    }
-    let value =
-        positive(text).map_err(|_| format!("expected auto or a number above 0, found {text}"));
-    value.map(Delta::Fixed)
-}
-
 pub fn neighbor_source(text: &str) -> Result<NeighborSource, String> {
     match text {
         "" => Err("expected oracle, a source or a file".to_owned()),
@@ -250,8 +199,16 @@ pub fn neighbor_source(text: &str) -> Result<NeighborSource, String> {
     }
 }
 
+/// Parses the name of a source.
+pub fn any_source(text: &str) -> Result<NeighborSource, String> {
+    match text {
+        "oracle" => Ok(NeighborSource::Oracle),
+        name => own_source(name).map(NeighborSource::Own),
+    }
+}
+
 /// Parses a source other than the oracle.
-pub fn own_source(text: &str) -> Result<Named, String> {
+fn own_source(text: &str) -> Result<Named, String> {
     sources::named(text).map_err(|error| expected(&error))
 }
 
@@ -272,6 +229,16 @@ pub fn poses(text: &str) -> Result<(f64, f64), String> {
     Ok((size(cm)?, size(angle)?))
 }
 
+/// Returns the requested schemes for images, each once, or the default.
+pub fn image_schemes(given: &[&'static Entry], usual: &Plan<2>) -> Vec<Arc<dyn Scheme<2>>> {
+    if given.is_empty() {
+        return usual.schemes.clone();
+    }
+    let options = SchemeOptions::usual(Unit::Pixel);
+    let entries = distinct(given.to_vec(), |a, b| a.name == b.name);
+    entries.iter().filter_map(|entry| entry.of_dimension(&options)).collect()
+}
+
 /// Removes items that repeat an earlier one, because an audit has one row per combination.
 pub fn distinct<T>(items: Vec<T>, same: impl Fn(&T, &T) -> bool) -> Vec<T> {
     let mut kept: Vec<T> = Vec::with_capacity(items.len());
@@ -288,24 +255,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sizes_have_units_of_1000_or_1024() {
-        let table = [
-            ("17", 17),
-            ("2GB", 2_000_000_000),
-            ("512 MiB", 512 << 20),
-            ("3kb", 3000),
-            ("1GiB", 1 << 30),
-        ];
-        for (text, bytes) in table {
-            assert_eq!(size(text), Ok(bytes), "{text}");
-        }
-        for text in ["", "0", "GB", "-1", "1.5GB", "2 TB", "99999999999GiB"] {
-            let expected = format!("expected a size above 0 like 2GB or 512MiB, found {text}");
-            assert_eq!(size(text), Err(expected));
-        }
-    }
-
-    #[test]
     fn thresholds_keep_how_they_were_typed() {
         let threshold = threshold(" 0.10").unwrap();
         assert_eq!(threshold, Threshold { label: "0.10".to_owned(), value: 0.1 });
@@ -316,7 +265,6 @@ mod tests {
         let texts = [
             threshold("-1").unwrap_err(),
             ratio("1.5").unwrap_err(),
-            delta("wide").unwrap_err(),
             scheme("pppl").unwrap_err(),
             scheme("cp2d").unwrap_err(),
             solver("magic").unwrap_err(),
@@ -329,7 +277,6 @@ mod tests {
             texts.join("\n"),
             "expected a number above 0, found -1\n\
              expected a number from 0 to 1, found 1.5\n\
-             expected auto or a number above 0, found wide\n\
              expected NEIGHBORS,RATIO with both above 0 (for example 20,2.0), found 20\n\
              expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, sphere, found pppl\n\
              expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, sphere, found cp2d (for images only)\n\
@@ -360,13 +307,11 @@ mod tests {
     #[test]
     fn whole_numbers_have_bounds() {
         let number = |n: usize| Ok(NonZeroUsize::new(n).unwrap());
-        assert_eq!([threads("512"), count(" 4294967295"), count("1")], [512, MOST, 1].map(number));
-        for text in ["0", "-1", "1.5", "x", "", "513"] {
-            let expected = format!("expected a whole number from 1 to 512, found {text}");
-            assert_eq!(threads(text), Err(expected));
+        assert_eq!([count(" 4294967295"), count("1")], [4_294_967_295, 1].map(number));
+        for text in ["0", "-1", "1.5", "x", "", "4294967296", "18446744073709551615"] {
+            let expected = format!("expected a whole number from 1 to 4294967295, found {text}");
+            assert_eq!(count(text), Err(expected));
         }
-        let huge = u64::MAX.to_string();
-        assert!(count("4294967296").is_err() && count(&huge).is_err());
     }
 
     #[test]

@@ -111,7 +111,7 @@ impl Rules {
         }
         if place.exists() && !self.force && !kind.is_at(&place) {
             let name = kind.marks().0;
-            let expected = format!("nothing, or {name} of an earlier run (else --force)");
+            let expected = format!("nothing, or {name} of an earlier run");
             return Err(Error::new(path, "", expected, "another file"));
         }
         Ok(place)
@@ -366,7 +366,7 @@ mod tests {
         let other = set("{\n  \"unlift\": \"1\"}").unwrap();
         fs::write(out.join("audit.json"), "mine").unwrap();
         let error = other.commit().unwrap_err().to_string();
-        let rule = "expected nothing, or an audit.json of an earlier run (else --force), found another file";
+        let rule = "expected nothing, or an audit.json of an earlier run, found another file";
         assert!(error.ends_with(rule), "{error}");
         assert_eq!(entries(&out), ["audit.json"]);
         assert!(set("").is_err());

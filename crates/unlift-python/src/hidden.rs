@@ -317,5 +317,5 @@ pub fn save(
 
 /// Renames the option that an error advises to its Python name.
 pub fn refused(error: unlift_audit::Error) -> PyErr {
-    raised(error.to_string().replace("--force", "force=True").replace("--out", "out"))
+    raised(error.to_string().replace("--out", "out"))
 }

@@ -1,28 +1,55 @@
-//! Arguments of `audit map`, `audit images`, `audit sequence`, `audit again` and `audit released`.
+//! Arguments of the five audits. What several audits share is a struct of its own.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, value_parser};
 use serde_json::{Map, Value, json};
 use unlift::audit::Threshold;
 use unlift::neighbors::oracle::Noise;
 use unlift::neighbors::sources::Named;
 use unlift::obfuscate::{Entry, Mitigation, Protection};
-use unlift::recover::{Builtin, Delta};
+use unlift::recover::Builtin;
 use unlift_audit::Gate;
 use unlift_audit::images::extraction::Wanted;
 use unlift_vision::network::DescriptorKind;
 
 use crate::values::{self, NeighborSource};
 
-/// Heading of options that few audits need.
-const EXPERIMENTS: &str = "For experiments";
+/// Options of every audit.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Result")]
+pub struct AuditArgs {
+    /// Largest errors at which a point counts as recovered, separated by commas [default: in meters
+    /// 0.10,0.25; in pixels 1,5,10,25 or, for a sequence, 5,10,25; without a scale 1.0,2.5 multiples
+    /// of the median distance to the K-th nearest neighbor]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold)]
+    pub thresholds: Vec<Threshold>,
+    /// Fail with exit code 1 if an attack recovers more than this; repeatable. Syntax: see Gates in
+    /// unlift audit map --help
+    #[arg(long, value_name = "GATE", value_parser = Gate::parse)]
+    pub gate: Vec<Gate>,
+    /// Also write the results of the gates as JUnit XML, for GitHub, GitLab, Jenkins and others
+    #[arg(long, value_name = "FILE", requires = "gate")]
+    pub junit: Option<PathBuf>,
+    /// Folder for report.html and audit.json; other files in it stay
+    #[arg(long, value_name = "DIR", default_value = "unlift-audit")]
+    pub out: PathBuf,
+    /// Write only numbers, which you can show to others: no points, paths, names or hashes
+    #[arg(long)]
+    pub share_safe: bool,
+    /// Show no progress on stderr
+    #[arg(long)]
+    pub quiet: bool,
+    /// Random seed; the second release of unlift audit again has the next one
+    #[arg(long, value_name = "INTEGER", default_value_t = 0)]
+    pub seed: u64,
+}
 
-/// Options of the attacker.
+/// Options of the oracle's lists, and of repeats.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Attack")]
-pub struct AttackArgs {
+pub struct OracleArgs {
     /// Inlier ratios of the oracle's lists (fractions of true nearest neighbors), separated by
     /// commas [default: 1,0.75,0.5,0.3,0.2,0.1]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::ratio)]
@@ -31,73 +58,38 @@ pub struct AttackArgs {
     /// records), near (random records between the (2 x K)-th and the (10 x K)-th nearest),
     /// clustered (nearby points share the same few wrong places, as happens where descriptors look
     /// alike) [default: uniform]
-    #[arg(long, help_heading = EXPERIMENTS, value_name = "LIST", value_delimiter = ',',
-          value_parser = values::noise)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::noise)]
     pub oracle_noise: Vec<Noise>,
-    /// A listed record supports a position if it passes within this distance of it, in the unit of
-    /// the audit; auto computes the distance from the released records and the lists
-    #[arg(long, help_heading = EXPERIMENTS, value_name = "auto|VALUE",
-          value_parser = values::delta, default_value = "auto")]
-    pub delta: Delta,
     /// Average the results over N random seeds
-    #[arg(long, value_name = "N", default_value = "1",
-          value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = value_parser!(u32).range(1..=10_000))]
     pub repeats: u32,
 }
 
-/// Options of the results.
+/// Sources and solvers of audits of maps.
 #[derive(Clone, Debug, Args)]
-#[command(next_help_heading = "Result")]
-pub struct ResultArgs {
-    /// Fail with exit code 1 if an attack recovers more than this; repeatable. Syntax: see Gates in
-    /// unlift audit map --help
-    #[arg(long, value_name = "GATE", value_parser = Gate::parse)]
-    pub gate: Vec<Gate>,
-    /// Also write the results of the gates as JUnit XML, for GitLab, Jenkins and others
-    #[arg(long, value_name = "FILE", requires = "gate")]
-    pub junit: Option<PathBuf>,
-    /// Folder for report.html and audit.json; other files in it stay
-    #[arg(long, value_name = "DIR", default_value = "unlift-audit")]
-    pub out: PathBuf,
-    /// Replace files of the same name that unlift did not write
-    #[arg(long)]
-    pub force: bool,
-    /// Write only numbers, which you can show to others: no points, paths, names or hashes
-    #[arg(long)]
-    pub share_safe: bool,
-    /// Print a summary as JSON in place of the table
-    #[arg(long)]
-    pub json: bool,
-}
-
-/// Options of the run.
-#[derive(Clone, Debug, Args)]
-#[command(next_help_heading = "Run")]
-pub struct RunArgs {
-    /// Number of threads; results do not depend on it [default: one per core]
-    #[arg(long, value_parser = values::threads, value_name = "N")]
-    pub threads: Option<NonZeroUsize>,
-    /// Show no progress on stderr
-    #[arg(long)]
-    pub quiet: bool,
-}
-
-/// Options of recovery and baselines for maps.
-#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Attack")]
 pub struct SolverArgs {
+    /// Source of the attacker's lists of neighbors; repeatable. oracle, a test tool, makes lists
+    /// from the original points, with a chosen fraction of true neighbors. The others make lists
+    /// from the released map: descriptors (the best one for the descriptors), similarity (any
+    /// descriptors), overlap (SIFT), learned (a network, for SIFT or ALIKED), geometric (places
+    /// where many records meet; no descriptors). FILE has a list of neighbors per original point
+    /// (docs/formats.md)
+    #[arg(long, value_name = "oracle|SOURCE|FILE", value_parser = values::neighbor_source,
+          default_value = "oracle")]
+    pub neighbors: Vec<NeighborSource>,
     /// Recovery methods, separated by commas or repeated. With lists of neighbors: ranking (the
     /// strongest: also uses which points are not in a list), joint (faster), joint-start (the first
     /// pass of joint), consensus (each point from its own list), ransac (the attack of Chelani et
     /// al. 2025). Without lists, from the records alone (what a scheme releases in place of
     /// points): density (published attacks), tomography (stronger) [default:
     /// ranking,joint,joint-start; also consensus if the map has fewer than 150 x K points]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
-          help_heading = "Attack")]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver)]
     pub solver: Vec<Builtin>,
     /// Skip the baseline "records alone", the best attack that uses only the records, without
-    /// descriptors; it may make lists from them. It often takes most of the time. Without
-    /// the baseline, figures may be too low
-    #[arg(long, help_heading = "Attack")]
+    /// descriptors; it may make lists from them. It often takes most of the time. Without the
+    /// baseline, figures may be too low
+    #[arg(long)]
     pub no_records_alone: bool,
 }
 
@@ -112,9 +104,9 @@ pub struct ProtectArgs {
     /// an attacker infers
     #[arg(long, value_name = "RULE", value_parser = values::protection)]
     pub protect_descriptors: Vec<Protection>,
-    /// Folder of photos, or file of features, whose descriptors owner and attacker know: the database of adversarial
-    /// directions, and the source of words. Never use those of the map itself [default: the two
-    /// photos of unlift demo]
+    /// Folder of photos, or file of features, whose descriptors owner and attacker know: the
+    /// database of adversarial directions, and the source of words. Never use those of the map
+    /// itself [default: the two photos of unlift demo]
     #[arg(long, value_name = "PATH", requires = "protect_descriptors")]
     pub public_descriptors: Option<PathBuf>,
 }
@@ -133,170 +125,51 @@ impl ProtectArgs {
     }
 }
 
-/// Input options that `audit map` and `obfuscate` share.
+/// Options of painted pictures.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Input")]
-pub struct MapArgs {
-    /// Meters per unit of the map. Without it, lengths are multiples of the median distance from a
-    /// point to its K-th nearest neighbor (see --k)
-    #[arg(long, value_name = "METERS_PER_UNIT", value_parser = values::scale)]
-    pub scale: Option<f64>,
-    /// File with the descriptors of the points: the COLMAP database.db or hloc features.h5 from
-    /// which the model was made, a .npy array with a row per point (for a COLMAP model, by
-    /// ascending point id), or a file in unlift's format P3DESC01 (docs/formats.md)
-    #[arg(long, value_name = "FILE")]
-    pub descriptors: Option<PathBuf>,
-    /// Use a random subset of at most N points
-    #[arg(long, value_parser = values::count, value_name = "N")]
-    pub max_points: Option<NonZeroUsize>,
-    /// Number of nearest neighbors of a point that count as true neighbors (K). Without --scale,
-    /// the median distance to the K-th neighbor is the unit of length
-    #[arg(long, value_name = "K", default_value = "50",
-          value_parser = clap::value_parser!(u16).range(1..))]
-    pub k: u16,
-    /// Random seed [default: 0 for audits, a fresh 256-bit key for obfuscate]
-    #[arg(long, value_name = "INTEGER")]
-    pub seed: Option<u64>,
+#[command(next_help_heading = "Result")]
+pub struct PaintArgs {
+    /// Paint pictures from the recovered points, and compare them with the photos by SSIM, PSNR and
+    /// LPIPS. For a map, needs --photos and a COLMAP model with descriptors. --invert=FILE paints
+    /// with your own network (ONNX), as the scripts in the repository's folder training/inversion
+    /// write it
+    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
+    pub invert: Option<Option<PathBuf>>,
+    /// Folder of the photos, if PATH is a map or a file. unlift applies the EXIF orientation of the
+    /// photos only if PATH states that its keypoints refer to upright photos, as the output of
+    /// unlift features does without --as-stored
+    #[arg(long, value_name = "DIR")]
+    pub photos: Option<PathBuf>,
 }
 
-/// Options of `audit map`.
-#[derive(Debug, Args)]
-#[command(after_help = "\
-Examples:
-  unlift audit map PROJECT --scale 1
-  unlift audit map PROJECT --scale 1 --quick
-  unlift audit map cloud.ply --schemes ppl,ppl+ --inlier-ratios 1,0.5 --out ppl-audit
-  unlift audit map PROJECT --scale 1 --gate 'ppl@0.5:0.10<=20' --gate 'all:0.25:gain<=30'
-  unlift audit map cloud.ply --descriptors d.npy --neighbors overlap --gate 'all:overlap:1.0<=20'
-  unlift audit map PROJECT --neighbors lists-by-point.parquet --solver joint,ransac
-  unlift audit map PROJECT --descriptors PROJECT/database.db --neighbors oracle --neighbors overlap
-  unlift audit map PROJECT --scale 1 --gate 'ppl:localization<=2.0' --mitigate thin:1/4
-  unlift audit map PROJECT --descriptors d.npy --neighbors overlap --protect-descriptors subspace:2
-  unlift audit map PROJECT --share-safe --json
-  unlift audit map PROJECT --scale 1 --gate 'all@0.5:0.10<=20' --junit gates.xml
+impl PaintArgs {
+    /// Returns the user's network and photos, which must not be overwritten.
+    pub fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
+        self.network().into_iter().chain(&self.photos)
+    }
 
-Gates: SCHEME[:SOLVER][:SOURCE][@RATIO]:THRESHOLD[:gain]<=PERCENT
-
-A gate fails if more than PERCENT of the points are recovered within THRESHOLD, one of --thresholds.
-SCHEME may be all. SOLVER, SOURCE and RATIO limit the gate to some attacks; without them, it covers
-all attacks. SOURCE is a value of --neighbors, or the word \"file\" for lists from a FILE. The
-strongest attack counts.
-
-A gate without SOLVER and SOURCE also covers the two baselines: blind (a guess from one record at a
-time) and records alone (see --no-records-alone). With :gain, a gate fails if an attack exceeds the
-larger baseline by more than PERCENT percentage points.
-
-SCHEME:localization<=MULTIPLE bounds the error of localization, as a multiple of that without
-protection. It needs a COLMAP model with tracks.
-
-A gate that matches nothing in the audit is a usage error. A gate on a scheme that cannot be applied
-to the map fails.
-
-Exit codes: 0 done, 1 a gate failed, 2 wrong usage, 3 bad input.")]
-pub struct AuditMapArgs {
-    /// A COLMAP model or project folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply,
-    /// .csv, .xyz, .txt, .asc, .pts, .npy, .npz or .splat file
-    #[arg(value_name = "PATH")]
-    pub path: PathBuf,
-    #[command(flatten)]
-    pub map: MapArgs,
-    /// Run a small audit: the schemes olc (a random line through each point) and ppl (one line
-    /// through two points), with the oracle at inlier ratio 0.5 and, if there are descriptors, the
-    /// source similarity
-    #[arg(long, conflicts_with_all = ["schemes", "inlier_ratios", "neighbors"], help_heading = "Attack")]
-    pub quick: bool,
-    /// Schemes to audit, separated by commas (unlift schemes lists them) [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::scheme,
-          help_heading = "Attack")]
-    pub schemes: Vec<&'static Entry>,
-    /// Also audit every scheme after these changes to the map; separate steps by commas, repeat for
-    /// alternatives. thin:1/4 keeps a random quarter of the points, thin:tracks:1/4 those that most
-    /// images observe; noise:0.1 adds Gaussian noise of this standard deviation to each value of
-    /// unit-length descriptors; bits:2 rounds each value to 2 bits; pca:32 keeps 32 principal
-    /// components; drop:0.5 withholds half of the descriptors
-    #[arg(long, value_name = "STEPS", value_parser = values::mitigation, help_heading = "Attack")]
-    pub mitigate: Vec<Mitigation>,
-    #[command(flatten)]
-    pub protect: ProtectArgs,
-    #[command(flatten)]
-    pub solvers: SolverArgs,
-    /// Source of the attacker's lists of neighbors; repeatable. oracle, a test tool, makes lists
-    /// from the original points, with a chosen fraction of true neighbors. The others make lists
-    /// from the released map: descriptors (the best one for the descriptors),
-    /// similarity (any descriptors), overlap (SIFT), learned (a network, for SIFT or ALIKED),
-    /// geometric (places where many records meet; no descriptors). FILE has a list of neighbors per
-    /// point (docs/formats.md)
-    #[arg(long, value_name = "oracle|SOURCE|FILE", value_parser = values::neighbor_source,
-          default_value = "oracle", help_heading = "Attack")]
-    pub neighbors: Vec<NeighborSource>,
-    /// Largest errors at which a point counts as recovered, separated by commas [default: 0.10,0.25
-    /// (meters) with --scale, otherwise 1.0,2.5 (multiples, see --scale)]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold,
-          help_heading = "Result")]
-    pub thresholds: Vec<Threshold>,
-    /// From the recovered points, paint the views of the map's cameras, and compare them with the
-    /// photos by SSIM, PSNR and LPIPS. Needs --photos and a COLMAP model with descriptors
-    #[arg(long, help_heading = "Result", requires = "photos")]
-    pub invert: bool,
-    /// ONNX file of the network that paints, as written by the scripts in the repository's folder
-    /// training/inversion [default: the network for these descriptors, see unlift models]
-    #[arg(long, value_name = "FILE", help_heading = "Result", requires = "invert")]
-    pub inverter: Option<PathBuf>,
-    /// Folder of the map's photos, to compare with the painted pictures
-    #[arg(long, value_name = "DIR", help_heading = "Result", requires = "invert")]
-    pub photos: Option<PathBuf>,
-    /// Paint with the colors of the points. Assumes that the obfuscated map keeps the colors of the
-    /// COLMAP model beside the descriptors. Only the network for SIFT uses them
-    #[arg(long, help_heading = "Result", requires = "invert")]
-    pub colors: bool,
-    /// Compare with at most N photos, evenly spaced by name
-    #[arg(long, value_parser = values::count, value_name = "N", default_value = "12", help_heading = "Result")]
-    pub max_photos: NonZeroUsize,
-    /// Also localize held-out images of the map. The folder has its photos (SIFT features are
-    /// extracted), or the file their features (see unlift features --as-stored). The map is made
-    /// without the held-out images, with new descriptors; their keypoints are matched with it by
-    /// descriptors, and the pose is estimated from the matches. Needs a COLMAP model with tracks
-    #[arg(
-        long,
-        value_name = "PHOTOS|FEATURES",
-        help_heading = "Result",
-        conflicts_with = "tile_points"
-    )]
-    pub localize: Option<PathBuf>,
-    /// Hold out one image of N
-    #[arg(long, value_parser = values::count, value_name = "N", default_value = "10",
-          help_heading = "Result", requires = "localize")]
-    pub hold_out: NonZeroUsize,
-    /// Cut a large map into tiles of at most N points and audit each tile as a separate map. This
-    /// needs the memory of one tile, and the report shows which tiles leak most. Recommended beyond
-    /// a few million points
-    #[arg(long, value_parser = values::count, value_name = "N", help_heading = "Run",
-          conflicts_with = "invert")]
-    pub tile_points: Option<NonZeroUsize>,
-    #[command(flatten)]
-    pub result: ResultArgs,
-    #[command(flatten)]
-    pub run: RunArgs,
-    // Last, because headings stand in the order of their first options.
-    #[command(flatten)]
-    pub attack: AttackArgs,
+    /// Returns the file of the user's network.
+    pub fn network(&self) -> Option<&PathBuf> {
+        self.invert.as_ref().and_then(Option::as_ref)
+    }
 }
 
 /// Which features are extracted from photos.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Input")]
 pub struct ExtractionArgs {
     /// Features to extract from photos: sift, aliked, or superpoint, whose weights you supply (see
     /// unlift models) [default: sift]
-    #[arg(long, value_name = "TYPE", value_parser = values::feature_type, help_heading = "Input")]
+    #[arg(long, value_name = "TYPE", value_parser = values::feature_type)]
     pub features: Option<DescriptorKind>,
     /// Number of features per photo. aliked and superpoint keep the N best. sift keeps whole
     /// scales, the coarsest first, and stops after the scale that exceeds N, so it may return more
     /// than N [default: sift 8192, aliked 2048, superpoint 4096]
-    #[arg(long, value_parser = values::count, value_name = "N", help_heading = "Input")]
+    #[arg(long, value_parser = values::count, value_name = "N")]
     pub max_features: Option<NonZeroUsize>,
     /// Keep only keypoints whose score exceeds SCORE; not for sift [default: aliked 0.2, superpoint
     /// 0.005]
-    #[arg(long, value_name = "SCORE", value_parser = values::score, help_heading = "Input")]
+    #[arg(long, value_name = "SCORE", value_parser = values::score)]
     pub min_score: Option<f32>,
 }
 
@@ -323,6 +196,115 @@ impl ExtractionArgs {
     }
 }
 
+/// Input options that `audit map` and `obfuscate` share.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Input")]
+pub struct MapArgs {
+    /// Meters per unit of the map. Without it, lengths are multiples of the median distance from a
+    /// point to its K-th nearest neighbor (see --k)
+    #[arg(long, value_name = "METERS_PER_UNIT", value_parser = values::scale)]
+    pub scale: Option<f64>,
+    /// File with the descriptors of the points: the COLMAP database.db or hloc features.h5 from
+    /// which the model was made, a .npy array with a row per point (for a COLMAP model, by
+    /// ascending point id), or a file in unlift's format P3DESC01 (docs/formats.md)
+    #[arg(long, value_name = "FILE")]
+    pub descriptors: Option<PathBuf>,
+    /// Use a random subset of at most N points
+    #[arg(long, value_parser = values::count, value_name = "N")]
+    pub max_points: Option<NonZeroUsize>,
+    /// Number of nearest neighbors of a point that count as true neighbors (K)
+    #[arg(long, value_name = "K", default_value = "50", value_parser = value_parser!(u16).range(1..))]
+    pub k: u16,
+}
+
+/// Options of `audit map`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  unlift audit map PROJECT --scale 1
+  unlift audit map PROJECT --scale 1 --quick
+  unlift audit map cloud.ply --schemes ppl,ppl+ --inlier-ratios 1,0.5 --out ppl-audit
+  unlift audit map PROJECT --scale 1 --gate 'ppl@0.5:0.10<=20' --gate 'all:0.25:gain<=30'
+  unlift audit map cloud.ply --descriptors d.npy --neighbors overlap --gate 'all:overlap:1.0<=20'
+  unlift audit map PROJECT --descriptors PROJECT/database.db --neighbors oracle --neighbors overlap
+  unlift audit map PROJECT --scale 1 --gate 'ppl:localization<=2.0' --mitigate thin:1/4
+  unlift audit map PROJECT --descriptors d.npy --neighbors overlap --protect-descriptors subspace:2
+  unlift audit map PROJECT --scale 1 --gate 'all@0.5:0.10<=20' --junit gates.xml --share-safe
+
+Gates: SCHEME[:SOLVER][:SOURCE][@RATIO]:THRESHOLD[:gain]<=PERCENT
+
+A gate fails if more than PERCENT of the points are recovered within THRESHOLD, one of --thresholds.
+SCHEME may be all. SOLVER, SOURCE and RATIO limit the gate to some attacks; without them, it covers
+all attacks. SOURCE is a value of --neighbors, or the word \"file\" for lists from a FILE. The
+strongest attack counts.
+
+A gate without SOLVER and SOURCE also covers the two baselines: blind (a guess from one record at a
+time) and records alone (see --no-records-alone). With :gain, a gate fails if an attack exceeds the
+larger baseline by more than PERCENT percentage points.
+
+SCHEME:localization<=MULTIPLE bounds the error of localization, as a multiple of that without
+protection. It needs a COLMAP model with tracks.
+
+A gate that matches nothing in the audit is a usage error. A gate on a scheme that cannot be applied
+to the map fails.")]
+pub struct AuditMapArgs {
+    /// A COLMAP model or project folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply,
+    /// .csv, .xyz, .txt, .asc, .pts, .npy, .npz or .splat file
+    #[arg(value_name = "PATH")]
+    pub path: PathBuf,
+    #[command(flatten)]
+    pub map: MapArgs,
+    /// Run a small audit: the schemes olc (a random line through each point) and ppl (one line
+    /// through two points), with the oracle at inlier ratio 0.5 and, if there are descriptors, the
+    /// source similarity
+    #[arg(long, conflicts_with_all = ["schemes", "inlier_ratios", "neighbors"], help_heading = "Attack")]
+    pub quick: bool,
+    /// Schemes to audit, separated by commas (unlift schemes lists them) [default: all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::scheme,
+          help_heading = "Attack")]
+    pub schemes: Vec<&'static Entry>,
+    #[command(flatten)]
+    pub solvers: SolverArgs,
+    #[command(flatten)]
+    pub oracle: OracleArgs,
+    /// Also audit every scheme after these changes to the map; separate steps by commas, repeat for
+    /// alternatives. thin:1/4 keeps a random quarter of the points, thin:tracks:1/4 those that most
+    /// images observe; noise:0.1 adds Gaussian noise of this standard deviation to each value of
+    /// unit-length descriptors; bits:2 rounds each value to 2 bits; pca:32 keeps 32 principal
+    /// components; drop:0.5 withholds half of the descriptors
+    #[arg(long, value_name = "STEPS", value_parser = values::mitigation, help_heading = "Attack")]
+    pub mitigate: Vec<Mitigation>,
+    #[command(flatten)]
+    pub protect: ProtectArgs,
+    /// Cut a large map into tiles of at most N points and audit each tile as a separate map. This
+    /// needs the memory of one tile, and the report shows which tiles leak most. Recommended beyond
+    /// a few million points
+    #[arg(long, value_parser = values::count, value_name = "N", help_heading = "Attack",
+          conflicts_with_all = ["invert", "localize"])]
+    pub tile_points: Option<NonZeroUsize>,
+    #[command(flatten)]
+    pub paint: PaintArgs,
+    /// Paint with the colors of the points. Assumes that the obfuscated map keeps the colors of the
+    /// COLMAP model beside the descriptors. Only the network for SIFT uses them
+    #[arg(long, help_heading = "Result", requires = "invert")]
+    pub colors: bool,
+    /// Compare pictures with at most N photos, evenly spaced by name
+    #[arg(long, value_parser = values::count, value_name = "N", default_value = "12", help_heading = "Result")]
+    pub max_images: NonZeroUsize,
+    /// Also localize held-out images of the map. The folder has its photos (SIFT features are
+    /// extracted), or the file their features (see unlift features --as-stored). The map is made
+    /// without the held-out images, with new descriptors; their keypoints are matched with it by
+    /// descriptors, and the pose is estimated from the matches. Needs a COLMAP model with tracks
+    #[arg(long, value_name = "PHOTOS|FEATURES", help_heading = "Result")]
+    pub localize: Option<PathBuf>,
+    /// Hold out one image of N
+    #[arg(long, value_parser = values::count, value_name = "N", default_value = "10",
+          help_heading = "Result", requires = "localize")]
+    pub hold_out: NonZeroUsize,
+    #[command(flatten)]
+    pub audit: AuditArgs,
+}
+
 /// Options of `audit images`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -332,15 +314,13 @@ Examples:
   unlift audit images PROJECT/database.db --max-images 100 --schemes lines2d --inlier-ratios 1,0.5
   unlift audit images photos --neighbors oracle --neighbors similarity --neighbors overlap
   unlift audit images photos --features aliked --neighbors descriptors
-  unlift audit images photos --gate 'cp2d@0.5:10<=20' --share-safe --json
+  unlift audit images photos --gate 'cp2d@0.5:10<=20' --share-safe
 
 Photos are JPEG, PNG or WebP files at any depth of the folder. unlift features --help explains how
 features are extracted. Results cover the keypoints of all images. Lengths are in pixels.
 
-If an image cannot be used, unlift prints a line on stderr, counts the image in audit.json, and
-audits the others.
-
-Exit codes: 0 done, 1 a gate failed, 2 wrong usage, 3 bad input (at least one image).")]
+If an image cannot be used, unlift prints a line on stderr, counts the image in audit.json, audits
+the others, and ends with exit code 3.")]
 pub struct AuditImagesArgs {
     /// A folder of photos, hloc's features.h5, or a COLMAP database.db
     #[arg(value_name = "PATH")]
@@ -352,61 +332,31 @@ pub struct AuditImagesArgs {
     pub max_images: Option<NonZeroUsize>,
     /// Number of nearest neighbors of a keypoint that count as true neighbors (K)
     #[arg(long, value_name = "K", default_value = "20", help_heading = "Input",
-          value_parser = clap::value_parser!(u16).range(1..))]
+          value_parser = value_parser!(u16).range(1..))]
     pub k: u16,
-    /// Random seed
-    #[arg(long, value_name = "INTEGER", default_value_t = 0, help_heading = "Input")]
-    pub seed: u64,
     /// Schemes to audit, separated by commas (unlift schemes lists them) [default:
     /// lines2d,cp2d,dcl2d]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_scheme,
           help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
-    #[command(flatten)]
-    pub protect: ProtectArgs,
-    /// Recovery methods, separated by commas or repeated: ranking (the strongest: also uses which
-    /// keypoints are not in a list), joint (faster), joint-start (the first pass of joint),
-    /// consensus (each keypoint from its own list), ransac (the attack of Chelani et al. 2025)
-    /// [default: ranking,joint,joint-start]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_solver,
-          help_heading = "Attack")]
-    pub solver: Vec<Builtin>,
-    /// Source of the attacker's lists of neighbors; repeatable. oracle, a test tool, makes lists
-    /// from the original keypoints, with a chosen fraction of true neighbors. The others make lists
-    /// from the released descriptors: descriptors (the best one for the descriptors), similarity
-    /// (any descriptors), overlap (SIFT), learned (a network, for SIFT or ALIKED)
+    /// Source of the attacker's lists of neighbors; repeatable: oracle, descriptors, similarity,
+    /// overlap or learned (see unlift audit map)
     #[arg(long, value_name = "oracle|SOURCE", value_parser = values::image_source,
           default_value = "oracle", help_heading = "Attack")]
     pub neighbors: Vec<NeighborSource>,
-    /// Largest errors, in pixels, at which a keypoint counts as recovered, separated by commas
-    /// [default: 1,5,10,25]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold,
-          help_heading = "Result")]
-    pub thresholds: Vec<Threshold>,
-    /// Draw this image in the report; repeatable [default: the images with the lowest, the median
-    /// and the highest percentage recovered]
-    #[arg(long, value_name = "NAME", help_heading = "Result", conflicts_with = "share_safe")]
-    pub show: Vec<String>,
-    /// Folder of the photos if PATH is a file, for drawings and for --invert. unlift applies the
-    /// EXIF orientation of the photos only if PATH states that its keypoints refer to upright
-    /// photos, as the output of unlift features does without --as-stored
-    #[arg(long, value_name = "DIR", help_heading = "Result")]
-    pub photos: Option<PathBuf>,
-    /// Paint pictures from the recovered keypoints, and compare them with the photos by SSIM, PSNR
-    /// and LPIPS
-    #[arg(long, help_heading = "Result")]
-    pub invert: bool,
-    /// ONNX file of the network that paints, as written by the scripts in the repository's folder
-    /// training/inversion [default: the network for these descriptors, see unlift models]
-    #[arg(long, value_name = "FILE", help_heading = "Result", requires = "invert")]
-    pub inverter: Option<PathBuf>,
+    /// Recovery methods, separated by commas or repeated: ranking, joint, joint-start, consensus or
+    /// ransac (see unlift audit map) [default: ranking,joint,joint-start]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_solver,
+          help_heading = "Attack")]
+    pub solver: Vec<Builtin>,
     #[command(flatten)]
-    pub result: ResultArgs,
+    pub oracle: OracleArgs,
     #[command(flatten)]
-    pub run: RunArgs,
-    // Last, because headings stand in the order of their first options.
+    pub protect: ProtectArgs,
     #[command(flatten)]
-    pub attack: AttackArgs,
+    pub paint: PaintArgs,
+    #[command(flatten)]
+    pub audit: AuditArgs,
 }
 
 /// Options of `audit sequence`.
@@ -425,9 +375,7 @@ queries give keypoints back without neighbors. The attack links keypoints by the
 
 The row sequence@5 attacks each image with the five consecutive images around it, in the order of
 their names. The row tracks@5 links them by the tracks of MODEL instead: what better links would
-give. With --neighbors, the row sequence+lists@5 also uses lists of neighbors within each image.
-
-Exit codes: 0 done, 1 a gate failed, 2 wrong usage, 3 bad input.")]
+give. With --neighbors, the row sequence+lists@5 also uses lists of neighbors within each image.")]
 pub struct AuditSequenceArgs {
     /// A COLMAP project or model with the poses of the images
     #[arg(value_name = "MODEL")]
@@ -437,18 +385,9 @@ pub struct AuditSequenceArgs {
     pub path: PathBuf,
     #[command(flatten)]
     pub extraction: ExtractionArgs,
-    /// Count this fraction of MODEL's points, at one end of its longest axis, as unknown to the
-    /// service, as new things in the place are. The columns "new" are about keypoints that show no
-    /// point of MODEL, or an unknown one
-    #[arg(long, value_name = "FRACTION", value_parser = values::ratio, default_value_t = 0.0,
-          help_heading = "Input")]
-    pub held_out_share: f64,
     /// Meters per unit of MODEL, for --poses
-    #[arg(long, value_name = "FACTOR", value_parser = values::scale, help_heading = "Input")]
+    #[arg(long, value_name = "METERS_PER_UNIT", value_parser = values::scale, help_heading = "Input")]
     pub scale: Option<f64>,
-    /// Random seed
-    #[arg(long, value_name = "INTEGER", default_value_t = 0, help_heading = "Input")]
-    pub seed: u64,
     /// Schemes to audit, separated by commas (unlift schemes lists them) [default:
     /// lines2d,cp2d,dcl2d]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_scheme,
@@ -459,7 +398,7 @@ pub struct AuditSequenceArgs {
           default_value = "2,3,5,10,20", help_heading = "Attack")]
     pub queries: Vec<usize>,
     /// Also combine the queries with lists of neighbors within each of them, which this source
-    /// makes: descriptors, similarity, overlap or learned (see unlift audit images)
+    /// makes: descriptors, similarity, overlap or learned (see unlift audit map)
     #[arg(long, value_name = "SOURCE", value_parser = values::own_image_source,
           help_heading = "Attack")]
     pub neighbors: Option<Named>,
@@ -473,21 +412,10 @@ pub struct AuditSequenceArgs {
     #[arg(long, value_name = "perturbed:CM,DEG", value_parser = values::poses,
           help_heading = "Attack")]
     pub poses: Option<(f64, f64)>,
-    /// Largest errors, in pixels, at which a keypoint counts as recovered, separated by commas
-    /// [default: 5,10,25]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold,
-          help_heading = "Result")]
-    pub thresholds: Vec<Threshold>,
-    /// Paint pictures of three images from the keypoints recovered with each number of queries
-    #[arg(long, help_heading = "Result", conflicts_with = "share_safe")]
-    pub invert: bool,
-    /// Folder of the photos for --invert, if PATH is a file
-    #[arg(long, value_name = "DIR", help_heading = "Result", requires = "invert")]
-    pub photos: Option<PathBuf>,
     #[command(flatten)]
-    pub result: ResultArgs,
+    pub paint: PaintArgs,
     #[command(flatten)]
-    pub run: RunArgs,
+    pub audit: AuditArgs,
 }
 
 /// Options of `audit again`.
@@ -496,7 +424,7 @@ pub struct AuditSequenceArgs {
 Examples:
   unlift audit again PROJECT PROJECT --scale 1 --descriptors PROJECT/database.db
   unlift audit again cloud.ply cloud.ply --schemes olc,cp,olc/cp
-  unlift audit again OLD NEW --descriptors OLD/database.db --descriptors-of-b NEW/database.db
+  unlift audit again OLD NEW --descriptors OLD/database.db --descriptors NEW/database.db
   unlift audit again PROJECT PROJECT --scale 1 --gate 'olc:again-geometry:0.10<=20'
 
 Each release hides its map under its own key. The two records of a point meet in it: two lines in a
@@ -506,9 +434,7 @@ the points of A.
 The row again links records by their descriptors: mutual nearest neighbors whose records meet. The
 row again-geometry links lines that meet, without descriptors.
 
-In a gate, SOURCE is again or again-geometry.
-
-Exit codes: 0 done, 1 a gate failed, 2 wrong usage, 3 bad input.")]
+In a gate, SOURCE is again or again-geometry.")]
 pub struct AuditAgainArgs {
     /// The map of the first release: any PATH of unlift audit map
     #[arg(value_name = "A")]
@@ -520,16 +446,10 @@ pub struct AuditAgainArgs {
     /// point of A to its 50th nearest neighbor
     #[arg(long, value_name = "METERS_PER_UNIT", value_parser = values::scale, help_heading = "Input")]
     pub scale: Option<f64>,
-    /// File with the descriptors of the points of A, as for unlift audit map
+    /// File with the descriptors of the points of A, as for unlift audit map; give the option again
+    /// for those of B, if A and B are different paths
     #[arg(long, value_name = "FILE", help_heading = "Input")]
-    pub descriptors: Option<PathBuf>,
-    /// File with the descriptors of the points of B [default: --descriptors, if A and B are the same
-    /// path]
-    #[arg(long, value_name = "FILE", help_heading = "Input", requires = "descriptors")]
-    pub descriptors_of_b: Option<PathBuf>,
-    /// Random seed of the first release; the second one has the next
-    #[arg(long, value_name = "INTEGER", default_value_t = 0, help_heading = "Input")]
-    pub seed: u64,
+    pub descriptors: Vec<PathBuf>,
     /// Schemes of both releases, separated by commas: olc hides both under olc, olc/cp the second
     /// one under cp [default: every scheme with itself]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::scheme_pair,
@@ -539,15 +459,8 @@ pub struct AuditAgainArgs {
     /// descriptors. It takes most of the time
     #[arg(long, help_heading = "Attack")]
     pub no_records_alone: bool,
-    /// Largest errors at which a point counts as recovered, separated by commas [default: 0.10,0.25
-    /// (meters) with --scale, otherwise 1.0,2.5 (multiples, see --scale)]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold,
-          help_heading = "Result")]
-    pub thresholds: Vec<Threshold>,
     #[command(flatten)]
-    pub result: ResultArgs,
-    #[command(flatten)]
-    pub run: RunArgs,
+    pub audit: AuditArgs,
 }
 
 /// Options of `audit released`.
@@ -556,25 +469,23 @@ pub struct AuditAgainArgs {
 Examples:
   unlift audit released mine.parquet --truth truth.parquet --name mine
   unlift audit released mine.parquet --truth truth.parquet --neighbors oracle --neighbors geometric
-  unlift audit released mine.parquet --truth truth.parquet --gate 'all@0.5:0.10<=20' --json
+  unlift audit released mine.parquet --truth truth.parquet --gate 'all@0.5:0.10<=20'
 
 A record is what a scheme publishes in place of a point: a line, a ray, an axis-parallel plane, or a
-point that swapped one coordinate with another point. Write two Parquet files: the records, which an
-attacker sees, and the truth, which assigns each original point to its record. docs/formats.md shows
-how, with pyarrow.
+point that swapped one coordinate with another point. Write two Parquet files: the records,
+which an attacker sees, and the truth, which assigns each original point to its record.
+docs/formats.md shows how.
 
-In a gate, SCHEME is the name of your scheme, or all.
-
-Exit codes: 0 done, 1 a gate failed, 2 wrong usage, 3 bad input.")]
+In a gate, SCHEME is the name of your scheme, or all.")]
 pub struct AuditReleasedArgs {
-    /// A Parquet file with the records of your scheme: what an attacker sees
+    /// A file with the records of your scheme: what an attacker sees
     #[arg(value_name = "RELEASED")]
     pub released: PathBuf,
-    /// A Parquet file with the original points and, for each, the record that hides it
+    /// A file with the original points and, for each, the record that hides it
     #[arg(long, value_name = "TRUTH", help_heading = "Input")]
     pub truth: PathBuf,
-    /// Name of the scheme in the results [default: the value of "scheme" in the metadata of
-    /// RELEASED, otherwise "released"]
+    /// Name of the scheme in the results [default: the value of "scheme" in RELEASED, otherwise
+    /// "released"]
     #[arg(long, value_name = "NAME", value_parser = values::scheme_name, help_heading = "Input")]
     pub name: Option<String>,
     /// Descriptors of the original points, if RELEASED has none: a .npy array with a row per point,
@@ -583,32 +494,12 @@ pub struct AuditReleasedArgs {
     pub descriptors: Option<PathBuf>,
     /// Number of nearest neighbors of a point that count as true neighbors (K)
     #[arg(long, value_name = "K", default_value = "50", help_heading = "Input",
-          value_parser = clap::value_parser!(u16).range(1..))]
+          value_parser = value_parser!(u16).range(1..))]
     pub k: u16,
-    /// Random seed of the oracle and the attacker
-    #[arg(long, value_name = "INTEGER", default_value_t = 0, help_heading = "Input")]
-    pub seed: u64,
     #[command(flatten)]
     pub solvers: SolverArgs,
-    /// Source of the attacker's lists of neighbors; repeatable. oracle, a test tool, makes lists
-    /// from the original points, with a chosen fraction of true neighbors. The others make lists
-    /// from RELEASED: descriptors (the best one for the descriptors), similarity (any descriptors),
-    /// overlap (SIFT), learned (a network, for SIFT or ALIKED), geometric (places where many
-    /// records meet; no descriptors). FILE has a list of neighbors per original point
-    /// (docs/formats.md)
-    #[arg(long, value_name = "oracle|SOURCE|FILE", value_parser = values::neighbor_source,
-          default_value = "oracle", help_heading = "Attack")]
-    pub neighbors: Vec<NeighborSource>,
-    /// Largest errors at which a point counts as recovered, separated by commas [default: 0.10,0.25
-    /// in meters, 1.0,2.5 in other units]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold,
-          help_heading = "Result")]
-    pub thresholds: Vec<Threshold>,
     #[command(flatten)]
-    pub result: ResultArgs,
+    pub oracle: OracleArgs,
     #[command(flatten)]
-    pub run: RunArgs,
-    // Last, because headings stand in the order of their first options.
-    #[command(flatten)]
-    pub attack: AttackArgs,
+    pub audit: AuditArgs,
 }

@@ -1,26 +1,19 @@
 //! The command line as types; `values.rs` parses the strings.
 
 mod audits;
-mod images;
-mod program;
-mod results;
 mod stages;
 
 use std::ffi::OsString;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use crate::values;
-
 pub use audits::{
-    AttackArgs, AuditAgainArgs, AuditImagesArgs, AuditMapArgs, AuditReleasedArgs,
-    AuditSequenceArgs, MapArgs, ProtectArgs, ResultArgs,
+    AuditAgainArgs, AuditArgs, AuditImagesArgs, AuditMapArgs, AuditReleasedArgs, AuditSequenceArgs,
+    MapArgs, OracleArgs, PaintArgs, ProtectArgs,
 };
-pub use images::{FeaturesArgs, InvertArgs};
-pub use program::{DemoArgs, ModelsArgs};
-pub use results::{CompareArgs, TableArgs};
 pub use stages::{
-    EvaluateArgs, ExportArgs, FindArgs, NeighborsCommand, ObfuscateArgs, OracleArgs, RecoverArgs,
+    CompareArgs, DemoArgs, EvaluateArgs, ExportArgs, FeaturesArgs, InvertArgs, NeighborsArgs,
+    ObfuscateArgs, RecoverArgs, TableArgs,
 };
 
 /// Measure how much of a privacy-preserving ("obfuscated") map or image an attacker recovers
@@ -37,13 +30,10 @@ Examples:
   unlift schemes                               list the schemes
 
 Exit codes: 0 done, 1 a gate failed, 2 wrong usage, 3 bad input.
-Recovered points are as private as the original map."
+unlift replaces only files that it wrote. RAYON_NUM_THREADS=N limits the number of threads; results
+do not depend on it. Recovered points are as private as the original map."
 )]
 pub struct Cli {
-    /// Limit the memory for decoding one input, for example 2GB [default: 64 times its size, at
-    /// least 256 MiB]
-    #[arg(long, value_name = "SIZE", global = true, value_parser = values::size)]
-    pub memory_limit: Option<u64>,
     /// The command.
     #[command(subcommand)]
     pub command: Command,
@@ -120,9 +110,8 @@ pub enum Command {
     Table(TableArgs),
     /// Hide the points of a map, or the keypoints of images, with one scheme
     Obfuscate(ObfuscateArgs),
-    /// Make lists of neighbors of the hidden points, from original or from released data
-    #[command(subcommand)]
-    Neighbors(NeighborsCommand),
+    /// Make lists of neighbors of the hidden points from released data, or from the truth
+    Neighbors(NeighborsArgs),
     /// Recover hidden points from a released file and lists of neighbors
     Recover(RecoverArgs),
     /// Compare recovered points with the original points
@@ -136,7 +125,11 @@ pub enum Command {
     /// List the schemes: how they hide points, what stays hidden, publication, patents
     Schemes,
     /// List the networks: purpose, license, hash, owner, and whether they are installed
-    Models(ModelsArgs),
+    #[command(after_help = "\
+unlift looks for a network in the folder that the environment variable UNLIFT_MODELS names, then in
+XDG_DATA_HOME/unlift/models (~/.local/share/unlift/models by default), then in the program itself.
+It refuses a file whose hash differs from the listed one.")]
+    Models,
 }
 
 /// Kinds of audits.
@@ -162,42 +155,29 @@ pub enum AuditCommand {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+    use std::path::Path;
+
     use super::*;
 
-    fn audit(arguments: &[&str]) -> Result<AuditMapArgs, clap::Error> {
-        let line = ["unlift", "audit", "map", "PATH"].iter().chain(arguments);
-        match Cli::read(line)?.command {
-            Command::Audit(AuditCommand::Map(args)) => Ok(*args),
-            other => panic!("{other:?}"),
-        }
+    /// Adds the names of all commands without subcommands, and of all options.
+    fn names(command: &clap::Command, leaves: &mut usize, options: &mut BTreeSet<String>) {
+        options.extend(command.get_arguments().filter_map(|arg| Some(arg.get_long()?.to_owned())));
+        let inner: Vec<_> = command.get_subcommands().filter(|c| c.get_name() != "help").collect();
+        *leaves += usize::from(inner.is_empty());
+        inner.into_iter().for_each(|command| names(command, leaves, options));
     }
 
-    /// The command lines of `docs/examples` parse, and build the version that builds this crate.
+    /// The command line stays small enough to be read.
     #[test]
-    fn examples_are_command_lines() {
-        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/examples");
-        for name in ["github-action.yml", "gitlab-ci.yml", "Dockerfile"] {
-            let text = std::fs::read_to_string(folder.join(name)).expect(name);
-            let image = format!("rust:{}-", env!("CARGO_PKG_RUST_VERSION"));
-            assert_eq!(text.contains("rust:"), text.contains(&image), "{name}");
-            let lines = text.lines().filter_map(|line| line.split_once("unlift audit "));
-            let mut n = 0;
-            for (_, line) in lines {
-                let words = line.split(' ').map(|word| word.trim_matches('\''));
-                let read = Cli::read(["unlift", "audit"].into_iter().chain(words));
-                read.unwrap_or_else(|error| panic!("{name}: {line}: {error}"));
-                n += 1;
-            }
-            assert_eq!(n, 1, "{name}");
-        }
-    }
-
-    #[test]
-    fn every_command_is_in_one_group() {
+    fn commands_and_options_are_few_and_every_command_is_in_one_group() {
         let mut command = Cli::command();
         command.build();
         let known = command.get_subcommands().map(clap::Command::get_name);
         assert!(known.eq(GROUPS.iter().flat_map(|(_, names)| names.split(' '))));
+        let (mut leaves, mut options) = (0, BTreeSet::new());
+        names(&command, &mut leaves, &mut options);
+        assert!(leaves <= 17 && options.len() <= 45, "{leaves} commands, {options:?}");
     }
 
     #[test]
@@ -206,19 +186,27 @@ mod tests {
             ("--scale", "meters per unit of the map, a number above 0, found -1"),
             ("--thresholds", "expected a number above 0, found -1"),
             ("--inlier-ratios", "expected a number from 0 to 1, found -1"),
-            ("--delta", "expected auto or a number above 0, found -1"),
             ("--k", "-1 is not in 1..=65535"),
         ] {
-            let error = audit(&[option, "-1"]).unwrap_err().to_string();
-            assert!(error.contains(expected), "{option}: {error}");
+            let error = Cli::read(["unlift", "audit", "map", "PATH", option, "-1"]).unwrap_err();
+            assert!(error.to_string().contains(expected), "{option}: {error}");
         }
     }
 
+    /// The command lines of `docs/examples` parse, and build the version that builds this crate.
     #[test]
-    fn the_memory_limit_may_stand_before_or_after_the_command() {
-        let read = |line: [&str; 4]| Cli::read(line).unwrap().memory_limit;
-        assert_eq!(read(["unlift", "--memory-limit", "2GB", "schemes"]), Some(2_000_000_000));
-        assert_eq!(read(["unlift", "schemes", "--memory-limit", "512MiB"]), Some(512 << 20));
-        assert_eq!(Cli::read(["unlift", "schemes"]).unwrap().memory_limit, None);
+    fn examples_are_command_lines() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/examples");
+        for name in ["github-action.yml", "gitlab-ci.yml", "Dockerfile"] {
+            let text = std::fs::read_to_string(folder.join(name)).expect(name);
+            let image = format!("rust:{}-", env!("CARGO_PKG_RUST_VERSION"));
+            assert_eq!(text.contains("rust:"), text.contains(&image), "{name}");
+            let lines = text.lines().filter_map(|line| line.split_once("unlift audit "));
+            let lines: Vec<&str> = lines.map(|(_, line)| line).collect();
+            assert_eq!(lines.len(), 1, "{name}");
+            let words = lines[0].split(' ').map(|word| word.trim_matches('\''));
+            let read = Cli::read(["unlift", "audit"].into_iter().chain(words));
+            read.unwrap_or_else(|error| panic!("{name}: {error}"));
+        }
     }
 }

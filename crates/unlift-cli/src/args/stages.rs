@@ -1,17 +1,34 @@
-//! Arguments of the stages, and of `export`.
+//! Arguments of the stages, of comparisons and tables, and of the demo.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use clap::{Args, Subcommand};
+use clap::{Args, value_parser};
 use unlift::audit::Threshold;
 use unlift::neighbors::oracle::Noise;
-use unlift::neighbors::sources::Named;
 use unlift::obfuscate::Entry;
-use unlift::recover::{Builtin, Delta};
+use unlift::recover::Builtin;
 
-use super::audits::MapArgs;
-use crate::values;
+use super::audits::{ExtractionArgs, MapArgs};
+use crate::values::{self, NeighborSource};
+
+/// Options of `demo`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  unlift demo
+  unlift demo --out /tmp/demo
+
+unlift protects two photos and the map of a made-up room with ten published schemes, attacks what a
+service would receive, and shows what is recovered. The demo needs no input.")]
+pub struct DemoArgs {
+    /// Folder for report.html, photos.html and their JSON files; other files in it stay
+    #[arg(long, value_name = "DIR", default_value = "unlift-demo")]
+    pub out: PathBuf,
+    /// Show no progress on stderr
+    #[arg(long)]
+    pub quiet: bool,
+}
 
 /// Options of `obfuscate`.
 #[derive(Debug, Args)]
@@ -21,8 +38,8 @@ Examples:
   unlift obfuscate PROJECT --scheme olc --descriptors PROJECT/database.db --out hidden
   unlift obfuscate features.h5 --scheme dcl2d --out hidden-images
 
-released.parquet is what an attacker sees: records (such as lines) in place of points. truth.parquet
-holds the original points; keep it private.
+released.parquet is what an attacker sees: records (such as lines) in place of points.
+truth.parquet holds the original points; keep it private.
 
 All random choices come from a fresh 256-bit key, which unlift does not store. --seed replaces this
 key, for experiments. Never release a map made with --seed: whoever guesses the seed can restore the
@@ -31,8 +48,8 @@ order of the records and, under cp, the points.
 Release a map only once. From two releases with descriptors, an attacker can match the two records
 of each point, which intersect in the point.")]
 pub struct ObfuscateArgs {
-    /// A map: a COLMAP model or project folder, a .ply, .csv or .npy file, or another format of
-    /// unlift audit map. Or images: a folder of photos, hloc's features.h5, or a COLMAP database.db
+    /// A map, any PATH of unlift audit map. Or images: a folder of photos, hloc's features.h5, or a
+    /// COLMAP database.db
     #[arg(value_name = "PATH")]
     pub path: PathBuf,
     /// Scheme that hides the points (unlift schemes lists them). Schemes for images need images
@@ -41,27 +58,14 @@ pub struct ObfuscateArgs {
     /// Folder for released.parquet and truth.parquet; other files in it stay
     #[arg(long, value_name = "DIR", default_value = "unlift-obfuscated")]
     pub out: PathBuf,
-    /// Replace files of the same name that unlift did not write
-    #[arg(long)]
-    pub force: bool,
     #[command(flatten)]
     pub map: MapArgs,
+    /// Random seed, for experiments [default: a fresh 256-bit key]
+    #[arg(long, value_name = "INTEGER")]
+    pub seed: Option<u64>,
 }
 
-/// Ways to make lists of neighbors.
-#[derive(Debug, Subcommand)]
-#[command(after_help = "\
-Examples:
-  unlift neighbors oracle hidden/truth.parquet --inlier-ratio 0.5 --out lists.parquet
-  unlift neighbors find hidden/released.parquet --source overlap --out lists.parquet")]
-pub enum NeighborsCommand {
-    /// Make lists of neighbors from the original points, with a chosen fraction of true neighbors
-    Oracle(OracleArgs),
-    /// Make lists of neighbors from a released file alone, as an attacker can
-    Find(FindArgs),
-}
-
-/// Options of `neighbors find`.
+/// Options of `neighbors`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Sources:
@@ -70,116 +74,76 @@ Sources:
   overlap      points whose patches overlap, according to their SIFT descriptors
   learned      points that a network finds, from SIFT or ALIKED descriptors
   geometric    points near places where many records meet; maps only; needs no descriptors
+  oracle       a chosen fraction of true nearest neighbors, from --truth: for experiments
 
 Examples:
-  unlift neighbors find hidden/released.parquet --source overlap --out lists.parquet
-  unlift neighbors find hidden/released.parquet --source geometric --k 20")]
-pub struct FindArgs {
+  unlift neighbors hidden/released.parquet --source overlap --out neighborhoods.parquet
+  unlift neighbors hidden/released.parquet --source oracle --truth hidden/truth.parquet \\
+      --inlier-ratio 0.5")]
+pub struct NeighborsArgs {
     /// The released.parquet of a map or of images
-    #[arg(value_name = "OBFUSCATED")]
+    #[arg(value_name = "RELEASED")]
     pub released: PathBuf,
     /// Method that makes the lists, see Sources below
-    #[arg(long, value_name = "SOURCE", value_parser = values::own_source)]
-    pub source: Named,
-    /// Number of records per list; a record is what a scheme publishes in place of points [default:
-    /// chosen by the source]
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "SOURCE", value_parser = values::any_source)]
+    pub source: NeighborSource,
+    /// For the oracle: the truth.parquet that belongs to RELEASED
+    #[arg(long, value_name = "TRUTH", requires = "inlier_ratio")]
+    pub truth: Option<PathBuf>,
+    /// For the oracle: fraction of each list that consists of true nearest neighbors, from 0 to 1:
+    /// round(RATIO x K) of K entries
+    #[arg(long, value_name = "RATIO", value_parser = values::ratio, requires = "truth")]
+    pub inlier_ratio: Option<f64>,
+    /// For the oracle: wrong entries of the lists, uniform, near or clustered (see unlift audit map)
+    #[arg(long, value_name = "MODEL", value_parser = values::noise, default_value = "uniform")]
+    pub oracle_noise: Noise,
+    /// Number of records per list; there is a list per hidden point [default: 50 for the oracle,
+    /// otherwise chosen by the source]
+    #[arg(long, value_name = "K", value_parser = value_parser!(u16).range(1..))]
     pub k: Option<u16>,
     /// Random seed
     #[arg(long, value_name = "INTEGER", default_value_t = 0)]
     pub seed: u64,
-    /// Number of threads; results do not depend on it [default: one per core]
-    #[arg(long, value_parser = values::threads, value_name = "N")]
-    pub threads: Option<NonZeroUsize>,
     /// File to write
     #[arg(long, value_name = "FILE", default_value = "neighborhoods.parquet")]
     pub out: PathBuf,
-    /// Replace files of the same name that unlift did not write
-    #[arg(long)]
-    pub force: bool,
-}
-
-/// Options of `neighbors oracle`.
-#[derive(Debug, Args)]
-#[command(after_help = "\
-Example:
-  unlift neighbors oracle hidden/truth.parquet --inlier-ratio 0.5 --out lists.parquet")]
-pub struct OracleArgs {
-    /// The truth.parquet that unlift obfuscate wrote
-    #[arg(value_name = "TRUTH")]
-    pub truth: PathBuf,
-    /// The released.parquet that belongs to TRUTH [default: the one in the folder of TRUTH]
-    #[arg(long, value_name = "FILE")]
-    pub released: Option<PathBuf>,
-    /// Fraction of each list that consists of true nearest neighbors, from 0 to 1: round(RATIO x K)
-    /// of K entries
-    #[arg(long, value_name = "RATIO", value_parser = values::ratio)]
-    pub inlier_ratio: f64,
-    /// Wrong entries of the lists: uniform (random records), near (random records between the (2 x
-    /// K)-th and the (10 x K)-th nearest), clustered (nearby points share the same few wrong
-    /// places, as happens where descriptors look alike)
-    #[arg(long, value_name = "MODEL", value_parser = values::noise, default_value = "uniform")]
-    pub oracle_noise: Noise,
-    /// Entries per list (K); there is a list per hidden point
-    #[arg(long, value_name = "K", default_value = "50",
-          value_parser = clap::value_parser!(u16).range(1..))]
-    pub k: u16,
-    /// Random seed
-    #[arg(long, value_name = "INTEGER", default_value_t = 0)]
-    pub seed: u64,
-    /// File to write
-    #[arg(long, value_name = "FILE", default_value = "neighborhoods.parquet")]
-    pub out: PathBuf,
-    /// Replace files of the same name that unlift did not write
-    #[arg(long)]
-    pub force: bool,
 }
 
 /// Options of `recover`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  unlift recover hidden/released.parquet --neighbors lists.parquet --out back.parquet")]
+  unlift recover hidden/released.parquet --neighbors neighborhoods.parquet --out recovered.parquet")]
 pub struct RecoverArgs {
     /// The released.parquet of a map or of images
-    #[arg(value_name = "OBFUSCATED")]
+    #[arg(value_name = "RELEASED")]
     pub released: PathBuf,
-    /// File with lists of neighbors, written by unlift neighbors find, unlift neighbors oracle or
-    /// your own program (docs/formats.md). density and tomography compute positions without the
-    /// lists and need them only to tell apart the two points of a line
+    /// File with lists of neighbors, written by unlift neighbors or your own program
+    /// (docs/formats.md). density and tomography compute positions without the lists and need them
+    /// only to tell apart the two points of a line
     #[arg(long, value_name = "FILE")]
     pub neighbors: PathBuf,
-    /// Recovery method. With lists of neighbors: joint, ranking (stronger and slower: also uses
-    /// which points are not in a list), joint-start (the first pass of joint), consensus (each
-    /// point from its own list), ransac (the attack of Chelani et al. 2025). Without lists, from
-    /// the records alone (what a scheme releases in place of points): density (published attacks),
-    /// tomography (stronger)
+    /// Recovery method: ranking, joint, joint-start, consensus, ransac, density or tomography (see
+    /// unlift audit map)
     #[arg(long, value_name = "SOLVER", value_parser = values::solver, default_value = "joint")]
     pub solver: Builtin,
-    /// A listed record supports a position if it passes within this distance of it, in the unit of
-    /// the map; auto computes the distance from the released records and the lists
-    #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
-    pub delta: Delta,
     /// Random seed
     #[arg(long, value_name = "INTEGER", default_value_t = 0)]
     pub seed: u64,
-    /// Number of threads; results do not depend on it [default: one per core]
-    #[arg(long, value_parser = values::threads, value_name = "N")]
-    pub threads: Option<NonZeroUsize>,
     /// File to write
     #[arg(long, value_name = "FILE", default_value = "recovered.parquet")]
     pub out: PathBuf,
-    /// Replace files of the same name that unlift did not write
-    #[arg(long)]
-    pub force: bool,
 }
 
 /// Options of `evaluate`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  unlift evaluate back.parquet --truth hidden/truth.parquet
-  unlift evaluate back.parquet --truth hidden/truth.parquet --thresholds 0.05,0.10 --json")]
+  unlift evaluate recovered.parquet --truth hidden/truth.parquet
+  unlift evaluate recovered.parquet --truth hidden/truth.parquet --thresholds 0.05,0.10 --json
+
+If released.parquet is in the folder of TRUTH, unlift also guesses from one record at a time, as a
+baseline.")]
 pub struct EvaluateArgs {
     /// Recovered points that unlift recover wrote
     #[arg(value_name = "RECOVERED")]
@@ -187,10 +151,6 @@ pub struct EvaluateArgs {
     /// The truth.parquet that unlift obfuscate wrote
     #[arg(long, value_name = "TRUTH")]
     pub truth: PathBuf,
-    /// The released.parquet that belongs to TRUTH, for the baseline that guesses from one record at
-    /// a time [default: the one in the folder of TRUTH]
-    #[arg(long, value_name = "FILE")]
-    pub released: Option<PathBuf>,
     /// Largest errors at which a point counts as recovered, separated by commas [default: 0.10,0.25
     /// in meters, 1,5,10,25 in pixels, 1.0,2.5 in other units]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold)]
@@ -211,11 +171,11 @@ The ending of --out decides the format:
 A file that shows points is as private as the map.
 
 Examples:
-  unlift export back.parquet --scale 1 --out back.ply
+  unlift export recovered.parquet --scale 1 --out back.ply
   unlift export hidden/released.parquet --scale 1 --out lines.obj
-  unlift export back.parquet --scale 1 --cameras PROJECT --out back-model")]
+  unlift export recovered.parquet --scale 1 --cameras PROJECT --out back-model")]
 pub struct ExportArgs {
-    /// A released, recovered or truth file of a map (Parquet)
+    /// A released, recovered or truth file of a map
     #[arg(value_name = "FILE")]
     pub path: PathBuf,
     /// File or folder to write; its ending decides the format, see below
@@ -223,13 +183,153 @@ pub struct ExportArgs {
     pub out: PathBuf,
     /// Meters per unit of the map, as given to unlift obfuscate. The output then has the
     /// coordinates of the map [default: coordinates as in FILE]
-    #[arg(long, value_name = "METERS", value_parser = values::scale)]
+    #[arg(long, value_name = "METERS_PER_UNIT", value_parser = values::scale)]
     pub scale: Option<f64>,
     /// A COLMAP model or project of the same map. Its cameras and images are copied to the exported
     /// model
     #[arg(long, value_name = "PROJECT")]
     pub cameras: Option<PathBuf>,
-    /// Replace files of the same name that unlift did not write
+}
+
+/// Options of `features`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  unlift features photos --out features.h5
+  unlift features photos --max-features 2048
+  unlift features photos --features aliked --out features.h5
+  unlift features PROJECT/database.db --out features.h5
+
+Photos are JPEG, PNG or WebP files at any depth of the folder. Images are named by their path in the
+folder. sift computes the features of COLMAP: RootSIFT descriptors times 512, as bytes. aliked and
+superpoint compute descriptors of length 1, as floats. If IMAGES is a file, its features are copied.
+
+Photos are turned upright by their EXIF orientation, and keypoints are in pixels of the upright
+photo. The output file states this: the attribute \"upright\" of its keypoints is 1. COLMAP and hloc
+do not turn photos: use --as-stored for them.
+
+If an image cannot be used, unlift prints a line on stderr, writes the others, and ends
+with exit code 3.")]
+pub struct FeaturesArgs {
+    /// A folder of photos, hloc's features.h5, or a COLMAP database.db
+    #[arg(value_name = "IMAGES")]
+    pub images: PathBuf,
+    /// HDF5 file to write, in hloc's layout
+    #[arg(long, value_name = "FILE", default_value = "features.h5")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub extraction: ExtractionArgs,
+    /// Leave photos as they are stored, as COLMAP and hloc do. Without this option, photos are
+    /// turned upright by their EXIF orientation
     #[arg(long)]
-    pub force: bool,
+    pub as_stored: bool,
+    /// Shrink photos whose longer side exceeds PIXELS; keypoints stay in pixels of the original
+    /// photo [default: sift 3200, others 1600]
+    #[arg(long, value_name = "PIXELS", value_parser = value_parser!(u32).range(16..=65536))]
+    pub max_image_size: Option<u32>,
+    /// Show no progress on stderr
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// Options of `invert`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+unlift writes one PNG per image, half as large as the image. The picture of a.jpg is a.jpg.png.
+unlift models lists the networks.
+
+Examples:
+  unlift invert photos --out pictures
+  unlift invert hidden/released.parquet recovered.parquet --out pictures
+  unlift invert hidden/released.parquet recovered.parquet --cameras MODEL --scale 1")]
+pub struct InvertArgs {
+    /// A folder of photos, hloc's features.h5, a COLMAP database.db, or the released.parquet of a map
+    /// or of images
+    #[arg(value_name = "PATH")]
+    pub path: PathBuf,
+    /// Output file of unlift recover for PATH; required if PATH is a released.parquet. Without it,
+    /// unlift paints six views from the center of a sphere cloud
+    #[arg(value_name = "RECOVERED")]
+    pub recovered: Option<PathBuf>,
+    /// Features to extract from photos: sift, aliked, or superpoint, whose weights you supply (see
+    /// unlift models) [default: sift]
+    #[arg(long, value_name = "TYPE", value_parser = values::feature_type)]
+    pub features: Option<unlift_vision::network::DescriptorKind>,
+    /// COLMAP model with the cameras from which to paint the map; only if PATH is a released map
+    #[arg(long, value_name = "MODEL", requires = "recovered", requires = "scale")]
+    pub cameras: Option<PathBuf>,
+    /// The --scale given to unlift obfuscate: units of the released map per unit of MODEL
+    #[arg(long, value_name = "SCALE", value_parser = values::positive, requires = "cameras")]
+    pub scale: Option<f64>,
+    /// Paint at most N images: evenly spaced by name or, if PATH is a released.parquet of images, the
+    /// first N
+    #[arg(long, value_parser = values::count, value_name = "N")]
+    pub max_images: Option<NonZeroUsize>,
+    /// Folder for the pictures
+    #[arg(long, value_name = "DIR", default_value = "unlift-pictures")]
+    pub out: PathBuf,
+}
+
+/// Options of `table`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The ending of --out decides the format:
+  .md   a table in Markdown, as is printed without --out
+  .tex  a table in LaTeX, for the package booktabs
+  .csv  every row of audit.json, with a column per value
+  .svg  curves: the percentage that the strongest attack recovers, against the inlier ratio
+
+A table has a row per scheme. Its columns are the inlier ratios of the oracle (the fraction of true
+neighbors in its lists), the other sources of neighbors, and the two baselines. A cell has the
+percentage that the strongest attack recovers, at each threshold. To convert curves to PDF, use
+rsvg-convert -f pdf -o curves.pdf curves.svg, or Inkscape.
+
+Examples:
+  unlift table unlift-audit/audit.json
+  unlift table unlift-audit/audit.json --thresholds 0.10 --out table.tex
+  unlift table unlift-audit/audit.json --out curves.svg")]
+pub struct TableArgs {
+    /// The audit.json of an audit
+    #[arg(value_name = "AUDIT.json")]
+    pub audit: PathBuf,
+    /// Show only this threshold (the error up to which a point counts as recovered), one of the
+    /// audit's --thresholds. By default, tables show all thresholds, and curves show one: the first
+    /// or, for images, the one nearest to 10 pixels
+    #[arg(long, value_name = "T", value_parser = values::threshold)]
+    pub thresholds: Option<Threshold>,
+    /// Write to this file in place of stdout; its ending decides the format, see below
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+/// Options of `compare`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Two results are compared if they have the same scheme, source of neighbors, noise (--oracle-noise),
+number of neighbors K, solver and threshold and, for the oracle, the same inlier ratio. Baselines
+are compared by scheme and threshold. Rows that only one of the audits has are listed.
+
+The comparison fails (exit code 1) if a result of the later audit is larger by more than twice its
+standard deviation over --repeats, or by more than 2 percentage points without --repeats. It also
+fails if a scheme of the earlier audit has no comparable result in the later one, or if a source of
+the earlier audit could not be used in the later one.
+
+Audits in different units or with different thresholds are refused (exit code 3).
+
+Examples:
+  unlift compare before/audit.json unlift-audit/audit.json
+  unlift compare before/audit.json unlift-audit/audit.json --out compared")]
+pub struct CompareArgs {
+    /// The audit.json of the earlier audit
+    #[arg(value_name = "OLD.json")]
+    pub old: PathBuf,
+    /// The audit.json of the later audit
+    #[arg(value_name = "NEW.json")]
+    pub new: PathBuf,
+    /// Also write a page, compare.html, to this folder; other files in it stay
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print the comparison as JSON in place of the text
+    #[arg(long)]
+    pub json: bool,
 }

@@ -1,6 +1,6 @@
 //! `unlift audit map`: audits a map.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -11,19 +11,17 @@ use unlift::obfuscate::{Change, Changed, Mitigation, Protection, Scheme, SchemeO
 use unlift_audit::inversion::MapInversion;
 use unlift_audit::localization::Localize;
 use unlift_audit::maps::{Tiles, perform};
-use unlift_audit::{Finished, Job, Prepared, check_thresholds, open_audit, sources};
-use unlift_io::atomic::Rules;
+use unlift_audit::{Job, Prepared, sources};
 use unlift_io::hash::hash_stage;
 use unlift_io::read;
 
-use super::common::{open_map, with_threads};
-use super::gate_files::GateFile;
-use super::painter::{kind, painter};
-use super::plan::{attack, neighbors, solvers, summary, thresholds};
-use super::protection::protections;
+use super::audits::{
+    self, kind, map_thresholds, neighbors, painter, protections, solvers, with_oracle,
+};
+use super::common::open_map;
 use crate::args::AuditMapArgs;
 use crate::exit::{Outcome, advise, usage};
-use crate::output::{command_line, print};
+use crate::output::command_line;
 use crate::progress::Progress;
 use crate::values::{NeighborSource, all_schemes, distinct};
 
@@ -33,31 +31,19 @@ const QUICK_RATIO: f64 = 0.5;
 /// Source of `--quick`: the fastest one, for any descriptors.
 const QUICK_SOURCE: &str = "similarity";
 
-pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
-    let json = args.result.json;
-    let finished = audit(&args)?;
-    print(&if json { summary(&finished)? } else { finished.text() })?;
-    Ok(if finished.passed() { Outcome::Done } else { Outcome::GateFailed })
-}
-
-/// Audits a map and writes the results.
-fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
+pub fn run(args: &AuditMapArgs) -> anyhow::Result<Outcome> {
     let started = Instant::now();
-    let rules = Rules::new(inputs(args), args.result.force);
-    let gate_file = GateFile::check(&args.result, &rules)?;
-    let out = open_audit(&args.result.out, rules, args.result.share_safe)?;
-    let finished = with_threads(args.run.threads, || {
-        let (input, prepared) = open_map(&args.path, &args.map, args.colors, args.run.quiet)?;
-        let progress = Progress::new(args.run.quiet);
-        let (path, result) = (&args.path, &args.result);
+    audits::perform(&args.audit, inputs(args), |out| {
+        let (input, prepared) =
+            open_map(&args.path, &args.map, args.audit.seed, args.colors, args.audit.quiet)?;
+        let progress = Progress::new(args.audit.quiet);
         let inversion = inversion(args, &prepared, &input, &progress)?;
         let (mut notes, mut doubts) = (prepared.notes.clone(), prepared.doubts.clone());
         if args.colors {
             notes.push("pictures assume that the obfuscated map keeps the points' colors".into());
         }
         let protections = protected_by(args, &prepared)?;
-        let said = (&mut notes, &mut doubts);
-        let mut plan = plan(args, (&prepared, &input), &protections, said)?;
+        let mut plan = plan(args, (&prepared, &input), &protections, (&mut notes, &mut doubts))?;
         plan.measures.extend(inversion.iter().map(|one| Arc::clone(one) as Arc<dyn Measure<3>>));
         let mut job = Job {
             plan,
@@ -65,26 +51,25 @@ fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
             notes,
             doubts,
             options: more_options(args),
-            gates: result.gate.clone(),
+            gates: args.audit.gate.clone(),
             tiles: args.tile_points.map(|most| Tiles { most: most.get(), only: None }),
-            share_safe: result.share_safe,
+            share_safe: args.audit.share_safe,
             progress: &progress,
             command: Some(command_line()),
-            ..Job::new(path, &input, &prepared, &result.out, started)?
+            ..Job::new(&args.path, &input, &prepared, &args.audit.out, started)?
         };
         if let Some(features) = &args.localize {
-            if prepared.cameras.views.is_empty() || args.tile_points.is_some() {
-                let expected = "expected a COLMAP model with cameras and tracks, not in tiles";
+            if prepared.cameras.views.is_empty() {
+                let expected = "expected a COLMAP model with cameras and tracks";
                 return Err(usage(format!("--localize: {expected}, found none")));
             }
             let held_out = Some((features.clone(), args.hold_out.get()));
             job.localize = Some(Localize { cameras: &prepared.cameras, held_out, protections });
         }
-        job.input.other_sha256 = others(args)?;
-        Ok(perform(job, out)?)
-    })?;
-    gate_file.write(&finished)?;
-    Ok(finished)
+        let hashes = beside(args).map(|(name, path)| Ok((name.to_owned(), hash_stage(path)?)));
+        job.input.other_sha256 = hashes.collect::<anyhow::Result<IndexMap<_, _>>>()?;
+        Ok(Some(perform(job, out)?))
+    })
 }
 
 /// Returns the painter of pictures, if requested.
@@ -94,7 +79,12 @@ fn inversion(
     input: &read::Input,
     progress: &Progress,
 ) -> anyhow::Result<Option<Arc<MapInversion>>> {
-    let (true, Some(photos)) = (args.invert, &args.photos) else { return Ok(None) };
+    if args.paint.invert.is_none() {
+        return Ok(None);
+    }
+    let Some(photos) = &args.paint.photos else {
+        return Err(usage("--invert: expected --photos, the folder of the map's photos"));
+    };
     let Some(model) = &input.model else {
         return Err(usage("--invert: expected a COLMAP model with cameras, found only points"));
     };
@@ -102,23 +92,21 @@ fn inversion(
         return Err(usage("--invert: expected descriptors (--descriptors FILE), found none"));
     };
     let kind = kind("--invert", Some(descriptors))?;
-    let painter = painter(kind, args.inverter.as_deref())?;
+    let painter = painter(kind, args.paint.network())?;
     if args.colors && !painter.takes_colors() {
         let found = format!("those of {}", kind.name());
         return Err(usage(format!("--colors: expected SIFT descriptors, found {found}")));
     }
     let scale = 1.0 / prepared.unit_in_map_units;
-    let most = args.max_photos.get();
-    Ok(Some(Arc::new(MapInversion::open(painter, model, photos, scale, most, progress)?)))
+    let max_images = args.max_images.get();
+    Ok(Some(Arc::new(MapInversion::open(painter, model, photos, scale, max_images, progress)?)))
 }
 
 /// Returns the input paths, which must not be overwritten.
 fn inputs(args: &AuditMapArgs) -> Vec<&Path> {
     let beside = beside(args).map(|(_, path)| path);
-    let of_pictures = args.photos.iter().chain(&args.inverter).chain(&args.localize);
-    let of_pictures = of_pictures.chain(&args.protect.public_descriptors);
-    let of_pictures = of_pictures.map(PathBuf::as_path);
-    [args.path.as_path()].into_iter().chain(beside).chain(of_pictures).collect()
+    let more = args.paint.inputs().chain(&args.localize).chain(&args.protect.public_descriptors);
+    [args.path.as_path()].into_iter().chain(beside).chain(more.map(|path| path.as_path())).collect()
 }
 
 /// Returns the protections of descriptors, if requested.
@@ -147,13 +135,13 @@ fn plan(
     let unit = prepared.original.reveal().unit();
     let n_points = prepared.original.len();
     let at_once = args.tile_points.map_or(n_points, |most| n_points.min(most.get()));
-    let usual = Plan::new(unit).for_map(at_once, k);
+    let usual = with_oracle(&args.oracle, Plan::new(unit).for_map(at_once, k));
     let mut entries = if args.schemes.is_empty() { all_schemes() } else { args.schemes.clone() };
-    let mut asked = args.neighbors.clone();
+    let mut requested = args.solvers.neighbors.clone();
     if args.quick {
         entries.retain(|entry| QUICK_SCHEMES.contains(&entry.name));
         if prepared.descriptors.is_some() {
-            asked.push(NeighborSource::Own(sources::named(QUICK_SOURCE)?));
+            requested.push(NeighborSource::Own(sources::named(QUICK_SOURCE)?));
         }
     }
     let entries = distinct(entries, |a, b| a.name == b.name);
@@ -163,14 +151,7 @@ fn plan(
     let mut changes = mitigations(args, prepared)?;
     changes.extend(protections.iter().cloned().map(Change::Protection));
     schemes.extend(Changed::all(&schemes, &changes));
-    let thresholds = thresholds(&args.thresholds, &usual)?;
-    let points = prepared.original.reveal();
-    let typed = !args.thresholds.is_empty();
-    let said = check_thresholds(points.positions(), points.unit(), &thresholds, typed)?;
-    notes.extend(said.note);
-    doubts.extend(said.doubt);
-    let asked = (&*asked, &args.attack);
-    let descriptors = prepared.descriptors.as_ref();
+    let thresholds = map_thresholds(&args.audit, prepared, &usual, (notes, doubts))?;
     let lacking = |text: String| {
         let error = usage(format!("{text} (--descriptors FILE), found none"));
         match &input.database {
@@ -178,17 +159,18 @@ fn plan(
             None => error,
         }
     };
-    let usual = attack(&args.attack, usual);
     let inlier_ratios = if args.quick { vec![QUICK_RATIO] } else { usual.inlier_ratios.clone() };
+    let descriptors = prepared.descriptors.as_ref();
+    let requested = (requested.as_slice(), &args.oracle);
     Ok(Plan {
-        neighbors: neighbors(asked, (prepared, descriptors), lacking, (input.n_rows(), notes))?,
+        neighbors: neighbors(requested, (prepared, descriptors), lacking, (input.n_rows(), notes))?,
         inlier_ratios,
         schemes,
         k,
         solvers: solvers(&args.solvers.solver, &usual),
         records_alone: !args.solvers.no_records_alone,
         thresholds,
-        seed: args.map.seed.unwrap_or(0),
+        seed: args.audit.seed,
         ..usual
     })
 }
@@ -213,15 +195,8 @@ fn mitigations(args: &AuditMapArgs, prepared: &Prepared) -> anyhow::Result<Vec<C
 
 /// Returns the files that are read beside the map, by their role.
 fn beside(args: &AuditMapArgs) -> impl Iterator<Item = (&'static str, &Path)> {
-    let lists = args.neighbors.iter().filter_map(|source| match source {
-        NeighborSource::File(path) => Some(("neighbors", path.as_path())),
-        NeighborSource::Oracle | NeighborSource::Own(_) => None,
-    });
+    let lists = NeighborSource::files(&args.solvers.neighbors).map(|path| ("neighbors", path));
     args.map.descriptors.iter().map(|path| ("descriptors", path.as_path())).chain(lists)
-}
-
-fn others(args: &AuditMapArgs) -> anyhow::Result<IndexMap<String, String>> {
-    beside(args).map(|(name, path)| Ok((name.to_owned(), hash_stage(path)?))).collect()
 }
 
 /// Returns the options that change the points, for the report.
@@ -238,9 +213,9 @@ fn more_options(args: &AuditMapArgs) -> Map<String, Value> {
     if args.localize.is_some() {
         options.insert("hold_out".into(), json!(args.hold_out.get()));
     }
-    if args.invert {
+    if args.paint.invert.is_some() {
         options.insert("invert".into(), json!(true));
-        options.insert("max_photos".into(), json!(args.max_photos.get()));
+        options.insert("max_images".into(), json!(args.max_images.get()));
         if args.colors {
             options.insert("colors".into(), json!(true));
         }

@@ -8,19 +8,17 @@ use unlift::audit::{Plan, scheme_called};
 use unlift::released::Released;
 use unlift::truth::Secret;
 use unlift_audit::maps::{self, perform};
-use unlift_audit::{Finished, Job, Prepared, check_thresholds, open_audit, ordered};
-use unlift_io::atomic::Rules;
+use unlift_audit::{Job, Prepared, ordered};
 use unlift_io::hash::{hash_file, hash_files, hash_stage};
 use unlift_io::read::{self, Input as Points};
 use unlift_io::stage::{has_images, part_files, read_released, read_truth, scheme_name};
 use unlift_report::document::Input;
 
-use super::common::{expect_slots, same_map, with_threads};
-use super::gate_files::GateFile;
-use super::plan::{attack, neighbors, solvers, summary, thresholds};
+use super::audits::{self, map_thresholds, neighbors, solvers, with_oracle};
+use super::common::{expect_slots, same_map};
 use crate::args::AuditReleasedArgs;
 use crate::exit::{Outcome, advise, usage};
-use crate::output::{command_line, print};
+use crate::output::command_line;
 use crate::progress::Progress;
 use crate::values::{self, NeighborSource};
 
@@ -28,21 +26,11 @@ use crate::values::{self, NeighborSource};
 const UNNAMED: &str = "released";
 
 pub fn run(args: &AuditReleasedArgs) -> anyhow::Result<Outcome> {
-    let finished = audit(args)?;
-    print(&if args.result.json { summary(&finished)? } else { finished.text() })?;
-    Ok(if finished.passed() { Outcome::Done } else { Outcome::GateFailed })
-}
-
-/// Audits released records and writes the results.
-fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
     let started = Instant::now();
-    let rules = Rules::new(inputs(args), args.result.force);
-    let gate_file = GateFile::check(&args.result, &rules)?;
-    let out = open_audit(&args.result.out, rules, args.result.share_safe)?;
-    let finished = with_threads(args.run.threads, || {
+    audits::perform(&args.audit, inputs(args), |out| {
         let name = name(args)?;
         let (prepared, hidden) = open(args)?;
-        let progress = Progress::new(args.run.quiet);
+        let progress = Progress::new(args.audit.quiet);
         let mut notes = prepared.notes.clone();
         let mut doubts = Vec::new();
         let plan = plan(args, &name, &prepared, &hidden.0, (&mut notes, &mut doubts))?;
@@ -53,30 +41,22 @@ fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
             doubts,
             input: provenance(args, &prepared)?,
             options: Map::from_iter([("released".to_owned(), json!(true))]),
-            gates: args.result.gate.clone(),
-            out: args.result.out.clone(),
-            share_safe: args.result.share_safe,
+            gates: args.audit.gate.clone(),
+            out: args.audit.out.clone(),
+            share_safe: args.audit.share_safe,
             progress: &progress,
             command: Some(command_line()),
             ..Job::of(&prepared.original, started)
         };
-        Ok(perform(job, out)?)
-    })?;
-    gate_file.write(&finished)?;
-    Ok(finished)
+        Ok(Some(perform(job, out)?))
+    })
 }
 
 /// Returns the input paths, which must not be overwritten.
 fn inputs(args: &AuditReleasedArgs) -> Vec<&Path> {
     let stages = [args.released.as_path(), &args.truth].into_iter();
-    stages.chain(args.descriptors.as_deref()).chain(lists(args)).collect()
-}
-
-fn lists(args: &AuditReleasedArgs) -> impl Iterator<Item = &Path> {
-    args.neighbors.iter().filter_map(|source| match source {
-        NeighborSource::File(path) => Some(path.as_path()),
-        NeighborSource::Oracle | NeighborSource::Own(_) => None,
-    })
+    let lists = NeighborSource::files(&args.solvers.neighbors);
+    stages.chain(args.descriptors.as_deref()).chain(lists).collect()
 }
 
 /// Returns the name of the scheme, from `--name` or from the file.
@@ -153,27 +133,20 @@ fn plan(
 ) -> anyhow::Result<Plan<3>> {
     let (k, points) = (usize::from(args.k), prepared.original.reveal());
     let usual = Plan::new(points.unit()).for_map(prepared.original.len(), k);
-    let thresholds = thresholds(&args.thresholds, &usual)?;
-    let typed = !args.thresholds.is_empty();
-    let said = check_thresholds(points.positions(), points.unit(), &thresholds, typed)?;
-    notes.extend(said.note);
-    doubts.extend(said.doubt);
-    let asked = (&*args.neighbors, &args.attack);
+    let usual = with_oracle(&args.oracle, usual);
+    let thresholds = map_thresholds(&args.audit, prepared, &usual, (notes, doubts))?;
+    let requested = (&*args.solvers.neighbors, &args.oracle);
     let lacking = |text: String| usage(format!("{text} in the released map, found none"));
+    let map = (prepared, released.descriptors());
     Ok(Plan {
-        neighbors: neighbors(
-            asked,
-            (prepared, released.descriptors()),
-            lacking,
-            (points.len(), notes),
-        )?,
+        neighbors: neighbors(requested, map, lacking, (points.len(), notes))?,
         schemes: vec![scheme_called(name)],
         k,
         solvers: solvers(&args.solvers.solver, &usual),
         records_alone: !args.solvers.no_records_alone,
         thresholds,
-        seed: args.seed,
-        ..attack(&args.attack, usual)
+        seed: args.audit.seed,
+        ..usual
     })
 }
 
@@ -182,7 +155,7 @@ fn provenance(args: &AuditReleasedArgs, prepared: &Prepared) -> anyhow::Result<I
     if let Some(path) = &args.descriptors {
         others.push(("descriptors".to_owned(), hash_file(path)?));
     }
-    for path in lists(args) {
+    for path in NeighborSource::files(&args.solvers.neighbors) {
         others.push(("neighbors".to_owned(), hash_stage(path)?));
     }
     let sha256 = Some(hash_files(&part_files(&args.released)?)?);

@@ -1,60 +1,51 @@
 //! `unlift audit sequence`: audits several queries with known poses.
 
-use std::path::Path;
 use std::time::Instant;
 
 use serde_json::{Map, json};
 use unlift::Unit;
 use unlift::audit::{Plan, Threshold};
 use unlift::neighbors::sources::Named;
-use unlift::obfuscate::{Change, Changed, Mitigation, SchemeOptions};
+use unlift::obfuscate::{Change, Changed, Mitigation};
 use unlift_audit::images::{FeatureSource, choice};
 use unlift_audit::inversion::Inversion;
 use unlift_audit::sequence::{PoseError, SequenceJob, perform};
-use unlift_audit::{Finished, open_audit};
-use unlift_io::atomic::Rules;
 use unlift_vision::features::photo::Turn;
 
-use super::common::with_threads;
-use super::gate_files::GateFile;
-use super::painter::{kind, painter};
-use super::plan::{summary, thresholds};
+use super::audits::{self, kind, painter, photos_of_images, thresholds};
 use crate::args::AuditSequenceArgs;
 use crate::exit::{Outcome, usage};
-use crate::output::{command_line, print};
+use crate::output::command_line;
 use crate::progress::Progress;
 use crate::stderr;
-use crate::values::distinct;
+use crate::values::{distinct, image_schemes};
 
 pub fn run(args: &AuditSequenceArgs) -> anyhow::Result<Outcome> {
-    let finished = audit(args)?;
-    print(&if args.result.json { summary(&finished)? } else { finished.text() })?;
-    Ok(if finished.passed() { Outcome::Done } else { Outcome::GateFailed })
-}
-
-/// Returns the input paths, which must not be overwritten.
-fn inputs(args: &AuditSequenceArgs) -> Vec<&Path> {
-    vec![&args.model, &args.path]
-}
-
-/// Audits a sequence and writes the results.
-fn audit(args: &AuditSequenceArgs) -> anyhow::Result<Finished> {
     let started = Instant::now();
     let plan = plan(args)?;
     let pose_error = pose_error(args)?;
-    let rules = Rules::new(inputs(args), args.result.force);
-    let gate_file = GateFile::check(&args.result, &rules)?;
-    let out = open_audit(&args.result.out, rules, args.result.share_safe)?;
-    let finished = with_threads(args.run.threads, || {
+    if args.paint.invert.is_some() && args.audit.share_safe {
+        return Err(usage("--invert: expected without --share-safe, as pictures show the place"));
+    }
+    let photos = photos_of_images(&args.paint, &args.path)?;
+    let inputs = [&args.model, &args.path].into_iter().chain(args.paint.inputs());
+    audits::perform(&args.audit, inputs.map(|path| path.as_path()).collect(), |out| {
+        let extraction = args.extraction.wanted().extraction(&args.path)?;
         // A model is of the photos as they are stored.
-        let source =
-            FeatureSource::open(&args.path, &args.extraction.wanted().extraction(&args.path)?)?;
-        let source = source.with_turn(Turn::AsStored);
-        let inversion = inversion(args, &source)?;
+        let source = FeatureSource::open(&args.path, &extraction)?.with_turn(Turn::AsStored);
+        let inversion = match photos {
+            Some(photos) => {
+                let all: Vec<usize> = (0..source.names().len()).collect();
+                let first = source.first(&all).and_then(|first| first.descriptors);
+                let painter = painter(kind("--invert", first.as_ref())?, args.paint.network())?;
+                Some(Inversion::new(painter, photos, source.turn()))
+            }
+            None => None,
+        };
         if let Some(note) = source.passed_over() {
             stderr::note(note);
         }
-        let progress = Progress::new(args.run.quiet);
+        let progress = Progress::new(args.audit.quiet);
         let mut queries = args.queries.clone();
         queries.sort_unstable();
         queries.dedup();
@@ -64,65 +55,34 @@ fn audit(args: &AuditSequenceArgs) -> anyhow::Result<Finished> {
             path: &args.path,
             plan,
             lists: args.neighbors.as_ref().map(Named::of_dimension).transpose()?,
-            held_out_share: args.held_out_share,
+            held_out_share: 0.0,
             queries,
             pose_error,
             options: options(args),
-            gates: args.result.gate.clone(),
+            gates: args.audit.gate.clone(),
             inversion: inversion.as_ref(),
-            out: args.result.out.clone(),
-            share_safe: args.result.share_safe,
+            out: args.audit.out.clone(),
+            share_safe: args.audit.share_safe,
             progress: &progress,
             command: Some(command_line()),
             started,
         };
-        Ok(perform(job, out)?.0)
-    })?;
-    gate_file.write(&finished)?;
-    Ok(finished)
-}
-
-/// Returns what paints, if pictures are requested.
-fn inversion(
-    args: &AuditSequenceArgs,
-    source: &FeatureSource,
-) -> anyhow::Result<Option<Inversion>> {
-    if !args.invert {
-        return Ok(None);
-    }
-    let photos = match (&args.photos, args.path.is_dir()) {
-        (Some(photos), _) => photos,
-        (None, true) => &args.path,
-        (None, false) => {
-            let expected = "--invert: expected --photos, as PATH is no folder of photos";
-            return Err(usage(expected));
-        }
-    };
-    let all: Vec<usize> = (0..source.names().len()).collect();
-    let first = source.first(&all).and_then(|first| first.descriptors);
-    let painter = painter(kind("--invert", first.as_ref())?, None)?;
-    Ok(Some(Inversion::new(painter, photos, source.turn())))
+        Ok(Some(perform(job, out)?.0))
+    })
 }
 
 fn plan(args: &AuditSequenceArgs) -> anyhow::Result<Plan<2>> {
     let usual = Plan::new(Unit::Pixel);
-    let mut schemes = match args.schemes.as_slice() {
-        [] => usual.schemes.clone(),
-        given => {
-            let options = SchemeOptions::usual(Unit::Pixel);
-            let entries = distinct(given.to_vec(), |a, b| a.name == b.name);
-            entries.iter().filter_map(|entry| entry.of_dimension(&options)).collect()
-        }
-    };
+    let mut schemes = image_schemes(&args.schemes, &usual);
     let mitigations = distinct(args.mitigate.clone(), |a, b| a.name() == b.name());
     let changes: Vec<Change> =
         mitigations.into_iter().map(|one| Change::Mitigation(one, None)).collect();
     schemes.extend(Changed::all(&schemes, &changes));
     let of = |label: &str, value: f64| Threshold { label: label.to_owned(), value };
     let few = Plan { thresholds: vec![of("5", 5.0), of("10", 10.0), of("25", 25.0)], ..usual };
-    let thresholds = thresholds(&args.thresholds, &few)?;
+    let thresholds = thresholds(&args.audit.thresholds, &few)?;
     let headline = choice::headline(&thresholds);
-    Ok(Plan { schemes, thresholds, headline, seed: args.seed, ..few })
+    Ok(Plan { schemes, thresholds, headline, seed: args.audit.seed, ..few })
 }
 
 /// Returns the error of the poses in units of the model.

@@ -5,9 +5,9 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 
 use anyhow::anyhow;
-use unlift::Fingerprint;
 use unlift::released::Released;
 use unlift::truth::Secret;
+use unlift::{Fingerprint, OneLine};
 use unlift_audit::{Preparation, Prepared, maps};
 use unlift_io::Error;
 use unlift_io::read::Input;
@@ -21,14 +21,10 @@ pub const RELEASED: &str = "released.parquet";
 /// File name of the truth, which only the owner has.
 pub const TRUTH: &str = "truth.parquet";
 
-/// Runs `work` on `threads` threads (default: all cores). rayon's global pool would panic if the
-/// system refuses threads.
-pub fn with_threads<T: Send>(
-    threads: Option<NonZeroUsize>,
-    work: impl FnOnce() -> anyhow::Result<T> + Send,
-) -> anyhow::Result<T> {
-    let n = threads.map_or(0, NonZeroUsize::get);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build();
+/// Runs `work` on `RAYON_NUM_THREADS` threads (default: all cores). rayon's global pool would panic
+/// if the system refuses threads.
+pub fn with_threads<T: Send>(work: impl FnOnce() -> anyhow::Result<T> + Send) -> anyhow::Result<T> {
+    let pool = rayon::ThreadPoolBuilder::new().build();
     let pool = pool.map_err(|error| anyhow!("cannot start threads: {error}"))?;
     pool.install(work)
 }
@@ -54,6 +50,7 @@ pub fn same_map(
 pub fn open_map(
     path: &Path,
     args: &MapArgs,
+    seed: u64,
     colors: bool,
     quiet: bool,
 ) -> anyhow::Result<(Input, Prepared)> {
@@ -62,8 +59,9 @@ pub fn open_map(
         scale: args.scale,
         k: usize::from(args.k),
         max_points: args.max_points.map(NonZeroUsize::get),
-        seed: args.seed.unwrap_or(0),
+        seed,
         colors,
+        ..Preparation::default()
     };
     Ok(maps::open(path, args.descriptors.as_deref(), &preparation)?)
 }
@@ -97,10 +95,10 @@ pub fn read_document(path: &Path) -> anyhow::Result<Document> {
     let (mut file, _) = unlift_io::input::open(path)?;
     file.read_to_string(&mut text).map_err(|error| Error::read(path, error))?;
     Document::from_json(&text).map_err(|error| {
-        let said = error.to_string();
+        let text = error.to_string();
         // The path names the file already.
-        let said = said.strip_prefix("audit.json: ").unwrap_or(&said);
-        anyhow::anyhow!("{}: {}", unlift::OneLine(path.display()), unlift::OneLine(said))
+        let text = text.strip_prefix("audit.json: ").unwrap_or(&text);
+        anyhow!("{}: {}", OneLine(path.display()), OneLine(text))
     })
 }
 

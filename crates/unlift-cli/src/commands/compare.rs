@@ -23,13 +23,13 @@ pub fn run(args: &CompareArgs) -> anyhow::Result<Outcome> {
     let access = if named { Access::Private } else { Access::Usual };
     let out = match &args.out {
         Some(out) => {
-            let rules = Rules::new([args.old.as_path(), args.new.as_path()], args.force);
+            let rules = Rules::new([args.old.as_path(), args.new.as_path()], false);
             let files = OutputSet::create(out, rules, access, &[(PAGE, Kind::Page)]);
             Some((out, files.map_err(refused)?))
         }
         None => None,
     };
-    let comparison = compare(&old, &new, args.tolerance).map_err(|wrong| {
+    let comparison = compare(&old, &new, None).map_err(|wrong| {
         let expected = format!("{}, as in {}", wrong.expected, args.old.display());
         Error::new(&args.new, wrong.place, expected, wrong.found)
     })?;

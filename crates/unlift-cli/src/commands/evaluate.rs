@@ -39,7 +39,7 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
         .map_err(|error| unlift_io::Error::core(&args.recovered, error))?;
     let mut notes = notes(recovered.about(), secret.slots_per_record());
     notes.extend(check(args, &checked, &thresholds, unit)?);
-    told(args, &row, &thresholds, &notes)
+    report(args, &row, &thresholds, &notes)
 }
 
 fn images(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
@@ -51,7 +51,7 @@ fn images(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     let Evaluated { row, about, checked } = evaluate_all(args, released.as_deref(), &thresholds)?;
     let mut notes = notes(about, 1);
     notes.extend(check(args, &checked, &thresholds, Unit::Pixel)?);
-    told(args, &row, &thresholds, &notes)
+    report(args, &row, &thresholds, &notes)
 }
 
 /// Returns notes on results that may be wrong; an error if the files do not belong together.
@@ -65,12 +65,17 @@ fn check(
         let error = unlift_io::Error::core(&args.recovered, error).into();
         match released_path(args) {
             Some(_) => error,
-            None => advise(error, "--released FILE: records identify a map better than points"),
+            None => advise(
+                error,
+                format!(
+                    "put {RELEASED} beside the truth: records identify a map better than points"
+                ),
+            ),
         }
     })
 }
 
-fn told(
+fn report(
     args: &EvaluateArgs,
     row: &Row,
     thresholds: &[Threshold],
@@ -87,11 +92,9 @@ fn told(
     Ok(Outcome::Done)
 }
 
-/// Returns the path of the released map, for the blind baseline: `--released`, or the file beside
-/// the truth if it exists.
+/// Returns the path of the released map beside the truth, for the blind baseline, if it exists.
 fn released_path(args: &EvaluateArgs) -> Option<PathBuf> {
-    let beside = Some(args.truth.with_file_name(RELEASED)).filter(|path: &PathBuf| path.exists());
-    args.released.clone().or(beside)
+    Some(args.truth.with_file_name(RELEASED)).filter(|path| path.exists())
 }
 
 fn released(args: &EvaluateArgs, secret: &Secret) -> anyhow::Result<Option<Released<3>>> {

@@ -26,7 +26,7 @@ enum Shown {
 
 pub fn run(args: &ExportArgs) -> anyhow::Result<Outcome> {
     let inputs = [Some(args.path.as_path()), args.cameras.as_deref()];
-    let rules = Rules::new(inputs.into_iter().flatten(), args.force);
+    let rules = Rules::new(inputs.into_iter().flatten(), false);
     let ending = args.out.extension().map(|ending| ending.to_ascii_lowercase());
     let ending = ending.as_ref().map(|ending| ending.to_string_lossy());
     let ending = ending.as_deref();

@@ -9,7 +9,7 @@ use unlift_vision::features::Extraction;
 use unlift_vision::features::in_order;
 use unlift_vision::features::photo::Turn;
 
-use super::common::{all_could_be, with_threads};
+use super::common::all_could_be;
 use crate::args::FeaturesArgs;
 use crate::exit::{Outcome, line, usage};
 use crate::output::print;
@@ -26,25 +26,23 @@ struct Tally {
 }
 
 pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
-    let rules = Rules::new([args.images.as_path()], args.force);
+    let rules = Rules::new([args.images.as_path()], false);
     let target = check_file(&args.out, Kind::Features, &rules)?;
     check_no_photo(&args.images, &target)?;
     let extraction = extraction(args)?;
-    let tally = with_threads(args.threads, || {
-        let turn = if args.as_stored { Turn::AsStored } else { Turn::Upright };
-        let source = FeatureSource::open(&args.images, &extraction)?.with_turn(turn);
-        let mut progress = Progress::new(args.quiet);
-        let mut tally = Tally::default();
-        if let Some(note) = source.passed_over() {
-            progress.say(&format!("unlift: note: {note}"));
-        }
-        for error in source.refused() {
-            tally.failed += 1;
-            progress.say(&line(&anyhow::anyhow!("{error}")));
-        }
-        write(&source, (args, &rules), &mut tally, &mut progress)?;
-        Ok(tally)
-    })?;
+    let turn = if args.as_stored { Turn::AsStored } else { Turn::Upright };
+    let source = FeatureSource::open(&args.images, &extraction)?.with_turn(turn);
+    let mut progress = Progress::new(args.quiet);
+    let mut tally = Tally::default();
+    if let Some(note) = source.passed_over() {
+        progress.say(&format!("unlift: note: {note}"));
+    }
+    for error in source.refused() {
+        tally.failed += 1;
+        progress.say(&line(&anyhow::anyhow!("{error}")));
+    }
+    write(&source, (args, &rules), &mut tally, &mut progress)?;
+    drop(progress);
     if tally.images > 0 {
         let (images, features) = (tally.images, tally.features);
         let out = OneLine(args.out.display());
@@ -70,14 +68,7 @@ fn check_no_photo(images: &Path, target: &Path) -> anyhow::Result<()> {
 }
 
 fn extraction(args: &FeaturesArgs) -> anyhow::Result<Extraction> {
-    let wanted = Wanted {
-        option: "--type",
-        kind: args.kind,
-        max_features: args.max_features,
-        min_score: args.min_score,
-        max_image_size: args.max_image_size,
-        first_octave: args.first_octave,
-    };
+    let wanted = Wanted { max_image_size: args.max_image_size, ..args.extraction.wanted() };
     if args.as_stored && args.images.is_file() {
         return Err(usage("--as-stored: expected with a folder of photos, found a file"));
     }

@@ -19,7 +19,8 @@ use unlift_io::stage::{ImageFile, ImageRows, ImageWriter, Kind as Stage};
 use unlift_vision::features::Extraction;
 
 use super::common::{RELEASED, TRUTH, expect_slots, same_map};
-use crate::args::{EvaluateArgs, ObfuscateArgs, OracleArgs};
+use super::neighbors::Oracle;
+use crate::args::{EvaluateArgs, NeighborsArgs, ObfuscateArgs};
 use crate::progress::Stderr;
 use unlift_audit::Checked;
 use unlift_audit::Progress as _;
@@ -115,17 +116,22 @@ pub fn hide(args: &ObfuscateArgs, key: &Key, out: &mut OutputSet) -> anyhow::Res
     Ok(counts)
 }
 
-/// Writes the oracle's lists for all images of `args.truth` to `args.out`, if `rules` allow it.
-pub fn list_by_oracle(args: &OracleArgs, released: &Path, rules: &Rules) -> anyhow::Result<Counts> {
-    let mut pairs = Pairs::open(&args.truth, Some(released))?;
-    let how = (args.oracle_noise, args.inlier_ratio, usize::from(args.k));
+/// Writes the oracle's lists for all images to `args.out`, if `rules` allow it.
+pub fn list_by_oracle(
+    args: &NeighborsArgs,
+    oracle: &Oracle<'_>,
+    rules: &Rules,
+) -> anyhow::Result<Counts> {
+    let mut pairs = Pairs::open(oracle.truth, Some(&args.released))?;
+    let how = (args.oracle_noise, oracle.inlier_ratio, oracle.k);
     let work = |pair: Pair| {
         let Pair { name, original, secret, released } = pair;
         let Some(released) = released else { return Ok(None) };
         let seed = oracle_seed(args.seed, &name);
         let lists = oracle_lists(&original, &(released, secret), how, seed);
-        let of_image =
-            |error: unlift::Error| Error::core(&args.truth, error.within(&format!("image {name}")));
+        let of_image = |error: unlift::Error| {
+            Error::core(oracle.truth, error.within(&format!("image {name}")))
+        };
         let lists = lists.map_err(of_image)?;
         Ok(Some((name, lists)))
     };

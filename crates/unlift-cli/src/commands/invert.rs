@@ -9,7 +9,7 @@ use unlift::OneLine;
 use unlift::released::Released;
 use unlift_audit::images::extraction::Wanted;
 use unlift_audit::images::{FeatureSource, choice};
-use unlift_audit::inversion::{Painter, on_bearings, six_views, view};
+use unlift_audit::inversion::{on_bearings, six_views, view};
 use unlift_audit::refused;
 use unlift_io::Error;
 use unlift_io::atomic::{Access, Kind, OutputSet, Rules, make_folders, marked_picture, write_file};
@@ -20,8 +20,8 @@ use unlift_io::stage::{
 use unlift_vision::features::{ColorImage, photo};
 use unlift_vision::network::DescriptorKind;
 
-use super::common::{all_could_be, same_map, with_threads};
-use super::painter::{kind, painter};
+use super::audits::{kind, painter};
+use super::common::{all_could_be, same_map};
 use crate::args::InvertArgs;
 use crate::exit::{Outcome, line, usage};
 use crate::output::print;
@@ -31,33 +31,28 @@ use crate::stderr;
 const AT_WORK: usize = 2;
 
 pub fn run(args: &InvertArgs) -> anyhow::Result<Outcome> {
-    with_threads(args.threads, || {
-        let inputs = [Some(&args.path), args.recovered.as_ref(), args.cameras.as_ref()];
-        let rules = Rules::new(inputs.into_iter().flatten().map(PathBuf::as_path), args.force);
-        // Only checks that files can be written there.
-        drop(OutputSet::create(&args.out, rules.clone(), Access::Private, &[]).map_err(refused)?);
-        let to = Target { args, rules, painted: AtomicUsize::new(0) };
-        let unusable = match (&args.recovered, declared_kind(&args.path)) {
-            (Some(recovered), _) if has_images(&args.path)? => images(&to, recovered)?,
-            (Some(recovered), _) => map(&to, recovered)?,
-            (None, Some(Stage::Released)) => {
-                let map =
-                    if has_images(&args.path)? { None } else { Some(read_released(&args.path)?) };
-                match map.filter(|released| released.obfuscation().is_bearings()) {
-                    Some(released) => bearings(&to, &released)?,
-                    None => {
-                        return Err(usage(
-                            "--recovered: expected what came back of PATH, found none",
-                        ));
-                    }
+    let inputs = [Some(&args.path), args.recovered.as_ref(), args.cameras.as_ref()];
+    let rules = Rules::new(inputs.into_iter().flatten().map(PathBuf::as_path), false);
+    // Only checks that files can be written there.
+    drop(OutputSet::create(&args.out, rules.clone(), Access::Private, &[]).map_err(refused)?);
+    let to = Target { args, rules, painted: AtomicUsize::new(0) };
+    let unusable = match (&args.recovered, declared_kind(&args.path)) {
+        (Some(recovered), _) if has_images(&args.path)? => images(&to, recovered)?,
+        (Some(recovered), _) => map(&to, recovered)?,
+        (None, Some(Stage::Released)) => {
+            let map = if has_images(&args.path)? { None } else { Some(read_released(&args.path)?) };
+            match map.filter(|released| released.obfuscation().is_bearings()) {
+                Some(released) => bearings(&to, &released)?,
+                None => {
+                    return Err(usage("RECOVERED: expected what came back of PATH, found none"));
                 }
             }
-            (None, _) => keypoints(&to)?,
-        };
-        let (painted, out) = (to.painted.into_inner(), OneLine(args.out.display()));
-        print(&format!("{painted} pictures, in {out}\n"))?;
-        all_could_be("painted", &args.path, painted, unusable)
-    })
+        }
+        (None, _) => keypoints(&to)?,
+    };
+    let (painted, out) = (to.painted.into_inner(), OneLine(args.out.display()));
+    print(&format!("{painted} pictures, in {out}\n"))?;
+    all_could_be("painted", &args.path, painted, unusable)
 }
 
 struct Target<'a> {
@@ -67,10 +62,6 @@ struct Target<'a> {
 }
 
 impl Target<'_> {
-    fn painter(&self, kind: DescriptorKind) -> anyhow::Result<Painter> {
-        painter(kind, self.args.inverter.as_deref())
-    }
-
     /// Returns the path of the picture of image `name`, which may contain folders.
     fn file(&self, name: &str) -> anyhow::Result<PathBuf> {
         let relative = Path::new(name);
@@ -131,7 +122,7 @@ fn keypoints(to: &Target<'_>) -> anyhow::Result<usize> {
         // Errors of single images are reported when they are painted.
         _ => kind("PATH", source.first(&chosen).and_then(|image| image.descriptors).as_ref())?,
     };
-    let painter = &to.painter(kind)?;
+    let painter = &painter(kind, None)?;
     each(to, &chosen, |&at| {
         let image = source.get(at)?;
         let place = || format!("image {}", image.name.escape_debug());
@@ -161,7 +152,7 @@ fn kind_of_images(path: &Path) -> anyhow::Result<DescriptorKind> {
 /// Paints from the recovered keypoints of released images.
 fn images(to: &Target<'_>, recovered: &Path) -> anyhow::Result<usize> {
     let path = &to.args.path;
-    let painter = &to.painter(kind_of_images(path)?)?;
+    let painter = &painter(kind_of_images(path)?, None)?;
     let mut released = ImageFile::open(path, Stage::Released)?;
     let mut found = ImageFile::open(recovered, Stage::Recovered)?;
     let (mut unusable, mut at_work) = (0, Vec::new());
@@ -203,7 +194,7 @@ fn map(to: &Target<'_>, recovered: &Path) -> anyhow::Result<usize> {
     };
     let scale = args.scale.unwrap_or(1.0);
     let released = read_released::<3>(path)?;
-    let painter = to.painter(kind("PATH", released.descriptors())?)?;
+    let painter = painter(kind("PATH", released.descriptors())?, None)?;
     let came_back = read_recovered::<3>(recovered)?;
     same_map(recovered, came_back.about().map, path, Some(released.fingerprint()))?;
     let (cameras, mut images) = colmap::read_views(model)?;
@@ -233,7 +224,7 @@ fn map(to: &Target<'_>, recovered: &Path) -> anyhow::Result<usize> {
 /// nothing needs to be recovered.
 fn bearings(to: &Target<'_>, released: &Released<3>) -> anyhow::Result<usize> {
     let of_map = |error| Error::core(&to.args.path, error);
-    let painter = to.painter(kind("PATH", released.descriptors())?)?;
+    let painter = painter(kind("PATH", released.descriptors())?, None)?;
     let seen = on_bearings(released).map_err(of_map)?;
     each(to, &six_views(released).map_err(of_map)?, |(name, view)| {
         Ok(((*name).to_owned(), painter.map(view, released, &seen).map_err(of_map)?))

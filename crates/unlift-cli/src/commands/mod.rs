@@ -6,25 +6,22 @@ mod audit_images;
 mod audit_map;
 mod audit_released;
 mod audit_sequence;
+pub mod audits;
 pub mod common;
 mod compare;
 mod evaluate;
 mod export;
 mod features;
-mod gate_files;
 mod image_stages;
 mod invert;
 mod neighbors;
 mod obfuscate;
-pub mod painter;
-mod plan;
-mod protection;
 mod recover;
 mod table;
 
 use common::with_threads;
 
-use crate::args::{AuditCommand, Command, NeighborsCommand};
+use crate::args::{AuditCommand, Command};
 use crate::demo;
 use crate::exit::Outcome;
 
@@ -35,24 +32,21 @@ use crate::exit::Outcome;
 pub fn run(command: Command) -> anyhow::Result<Outcome> {
     match command {
         Command::Demo(args) => demo::run(&args),
-        Command::Audit(AuditCommand::Map(args)) => audit_map::run(*args),
+        Command::Audit(AuditCommand::Map(args)) => audit_map::run(&args),
         Command::Audit(AuditCommand::Images(args)) => audit_images::run(&args),
         Command::Audit(AuditCommand::Released(args)) => audit_released::run(&args),
         Command::Audit(AuditCommand::Sequence(args)) => audit_sequence::run(&args),
         Command::Audit(AuditCommand::Again(args)) => audit_again::run(&args),
-        Command::Obfuscate(args) => with_threads(None, || obfuscate::run(&args)),
-        Command::Neighbors(NeighborsCommand::Oracle(args)) => {
-            with_threads(None, || neighbors::oracle(&args))
-        }
-        Command::Neighbors(NeighborsCommand::Find(args)) => neighbors::find(&args),
-        Command::Recover(args) => recover::run(&args),
-        Command::Evaluate(args) => with_threads(None, || evaluate::run(&args)),
-        Command::Export(args) => export::run(&args),
-        Command::Table(args) => table::run(&args),
         Command::Compare(args) => compare::run(&args),
-        Command::Features(args) => features::run(&args),
-        Command::Invert(args) => invert::run(&args),
+        Command::Table(args) => table::run(&args),
+        Command::Obfuscate(args) => with_threads(|| obfuscate::run(&args)),
+        Command::Neighbors(args) => with_threads(|| neighbors::run(&args)),
+        Command::Recover(args) => with_threads(|| recover::run(&args)),
+        Command::Evaluate(args) => with_threads(|| evaluate::run(&args)),
+        Command::Export(args) => export::run(&args),
+        Command::Features(args) => with_threads(|| features::run(&args)),
+        Command::Invert(args) => with_threads(|| invert::run(&args)),
         Command::Schemes => about::schemes(),
-        Command::Models(args) => about::models(&args),
+        Command::Models => about::models(),
     }
 }

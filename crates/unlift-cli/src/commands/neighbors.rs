@@ -1,130 +1,139 @@
-//! `unlift neighbors`: makes neighbor lists from the truth, or from released data alone.
+//! `unlift neighbors`: makes neighbor lists from released data alone, or by the oracle.
 
 use std::path::Path;
 
 use unlift::neighbors::oracle::{Outliers, TrueNeighbors, search};
-use unlift::neighbors::{Needs, Source};
+use unlift::neighbors::sources::Named;
+use unlift::neighbors::{Needs, Neighborhoods, Source};
 use unlift::released::Released;
 use unlift::{Error, OneLine};
 use unlift_io::atomic::{Kind, Rules};
 use unlift_io::stage::{Kind as Stage, has_images, read_released, read_truth, write_neighborhoods};
 
-use super::common::{RELEASED, expect_slots, same_map, with_threads};
-use super::image_stages::{list_by_oracle, list_by_source};
-use crate::args::{FindArgs, OracleArgs};
+use super::common::{expect_slots, same_map};
+use super::image_stages::{Counts, list_by_oracle, list_by_source};
+use crate::args::NeighborsArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::print;
 use crate::progress::Spinner;
 use crate::stderr;
+use crate::values::NeighborSource;
 use unlift_audit::check_file;
 
-/// Makes lists at one inlier ratio.
-pub fn oracle(args: &OracleArgs) -> anyhow::Result<Outcome> {
-    let beside = || args.truth.with_file_name(RELEASED);
-    let released_path = args.released.clone().unwrap_or_else(beside);
-    let rules = Rules::new([args.truth.as_path(), &released_path], args.force);
-    let kind = Kind::Stage(Stage::Neighborhoods);
-    check_file(&args.out, kind, &rules)?;
-    let k = usize::from(args.k);
-    let listed = |n: usize| {
-        let out = OneLine(args.out.display());
-        print(&format!(
-            "{n} neighborhoods of {k} at inlier ratio {}, in {out}\n",
-            args.inlier_ratio
-        ))
-    };
-    if has_images(&args.truth)? {
-        let alive = Spinner::new("searching neighbors");
-        let counts = list_by_oracle(args, &released_path, &rules)
-            .map_err(|error| without_released(error, args, &released_path))?;
-        drop(alive);
-        listed(counts.slots)?;
-        return Ok(Outcome::Done);
-    }
-    let (original, secret) = read_truth::<3>(&args.truth)?;
-    // Only the released map has the number of points per record.
-    let released = read_released::<3>(&released_path)
-        .map_err(|error| without_released(error.into(), args, &released_path))?;
-    same_map(&released_path, Some(released.fingerprint()), &args.truth, secret.map())?;
-    expect_slots(&released_path, &released, &secret)?;
-    let alive = Spinner::new("searching neighbors");
-    let core = |error| unlift_io::Error::core(&args.truth, error);
-    let knn = search(&original).map_err(core)?;
-    let near = TrueNeighbors::new(&knn, &secret, released.slots_per_record(), k).map_err(core)?;
-    let outliers = Outliers::new(args.oracle_noise, &near, &knn, &secret, args.seed);
-    let lists = near.lists(args.inlier_ratio, &outliers.map_err(core)?, args.seed).map_err(core)?;
-    check_file(&args.out, kind, &rules)?;
-    write_neighborhoods(&args.out, &lists)?;
-    drop(alive);
-    listed(lists.n_slots())?;
-    Ok(Outcome::Done)
+/// Entries of the oracle's lists, by default.
+const K: u16 = 50;
+
+/// What the oracle needs.
+pub struct Oracle<'a> {
+    pub truth: &'a Path,
+    pub inlier_ratio: f64,
+    pub k: usize,
 }
 
-/// Adds advice to `error` if there is no released map beside the truth.
-fn without_released(error: anyhow::Error, args: &OracleArgs, path: &Path) -> anyhow::Error {
-    match args.released {
-        None if !path.exists() => advise(error, "--released FILE"),
-        _ => error,
-    }
-}
-
-/// Makes lists as an attacker does.
-pub fn find(args: &FindArgs) -> anyhow::Result<Outcome> {
-    let rules = Rules::new([args.released.as_path()], args.force);
+pub fn run(args: &NeighborsArgs) -> anyhow::Result<Outcome> {
+    let inputs = [Some(args.released.as_path()), args.truth.as_deref()];
+    let rules = Rules::new(inputs.into_iter().flatten(), false);
     let kind = Kind::Stage(Stage::Neighborhoods);
     check_file(&args.out, kind, &rules)?;
     let images = has_images(&args.released)?;
-    let named = match args.k {
-        Some(k) => args.source.clone().with_k(usize::from(k)),
-        None => args.source.clone(),
+    let alive = Spinner::new("finding neighbors");
+    let (made, name) = match (&args.source, args.truth.as_deref(), args.inlier_ratio) {
+        (NeighborSource::Own(named), None, _) => {
+            let named = named.clone();
+            let named = args.k.map_or(named.clone(), |k| named.with_k(usize::from(k)));
+            (by_source(args, &named, images, &rules)?, named.name().to_owned())
+        }
+        (NeighborSource::Oracle, Some(truth), Some(inlier_ratio)) => {
+            let k = usize::from(args.k.unwrap_or(K));
+            let oracle = Oracle { truth, inlier_ratio, k };
+            let made = match images {
+                true => Made::Written(list_by_oracle(args, &oracle, &rules)?),
+                false => Made::Lists(by_oracle(args, &oracle)?),
+            };
+            (made, format!("oracle at inlier ratio {inlier_ratio}"))
+        }
+        (NeighborSource::Own(named), Some(_), _) => {
+            let name = named.name();
+            return Err(usage(format!("--truth: expected with --source oracle, found {name}")));
+        }
+        _ => return Err(usage("--source oracle: expected --truth and --inlier-ratio, found none")),
     };
+    let (n, longest) = match made {
+        Made::Written(counts) => (counts.slots, counts.longest),
+        Made::Lists(lists) => {
+            check_file(&args.out, kind, &rules)?;
+            write_neighborhoods(&args.out, &lists)?;
+            (lists.n_slots(), lists.longest())
+        }
+    };
+    drop(alive);
+    let out = OneLine(args.out.display());
+    print(&format!("{n} neighborhoods of up to {longest} by {name}, in {out}\n"))?;
+    Ok(Outcome::Done)
+}
+
+/// The lists of a map, or what was written for images.
+enum Made {
+    Lists(Neighborhoods),
+    Written(Counts),
+}
+
+/// Makes lists as an attacker does.
+fn by_source(
+    args: &NeighborsArgs,
+    named: &Named,
+    images: bool,
+    rules: &Rules,
+) -> anyhow::Result<Made> {
     if images {
         let source = named.of_dimension::<2>().map_err(|_| {
             usage(format!("--source {}: expected with a map, found images", named.name()))
         })?;
-        let alive = Spinner::new("finding neighbors");
-        let counts = with_threads(args.threads, || {
-            list_by_source(&args.released, &*source, args.seed, (&args.out, &rules))
-        })?;
-        drop(alive);
-        return listed(counts.slots, counts.longest, args);
+        let out = (args.out.as_path(), rules);
+        return Ok(Made::Written(list_by_source(&args.released, &*source, args.seed, out)?));
     }
     let released = read_released::<3>(&args.released)?;
     let source = named.of_dimension::<3>()?;
-    check_own(&*source, &released)
+    check_source(&*source, &released)
         .map_err(|error| advise(unlift_io::Error::core(&args.released, error.0), error.1))?;
     if let Some(note) = source.note(released.n_slots()) {
         stderr::note(note);
     }
-    let alive = Spinner::new("finding neighbors");
-    let lists = with_threads(args.threads, || {
-        let lists = source.lists(&released, source.k(&released), args.seed);
-        Ok(lists.map_err(|error| unlift_io::Error::core(&args.released, error))?)
-    })?;
-    check_file(&args.out, kind, &rules)?;
-    write_neighborhoods(&args.out, &lists)?;
-    drop(alive);
-    listed(lists.n_slots(), lists.longest(), args)
-}
-
-fn listed(n: usize, k: usize, args: &FindArgs) -> anyhow::Result<Outcome> {
-    let (name, out) = (args.source.name(), OneLine(args.out.display()));
-    print(&format!("{n} neighborhoods of up to {k} by {name}, in {out}\n"))?;
-    Ok(Outcome::Done)
+    let lists = source.lists(&released, source.k(&released), args.seed);
+    Ok(Made::Lists(lists.map_err(|error| unlift_io::Error::core(&args.released, error))?))
 }
 
 /// Returns an error, with advice, if the released map lacks what a source needs.
-fn check_own(source: &dyn Source<3>, released: &Released<3>) -> Result<(), (Error, &'static str)> {
+fn check_source(
+    source: &dyn Source<3>,
+    released: &Released<3>,
+) -> Result<(), (Error, &'static str)> {
     match released.descriptors() {
         None if source.needs() == Needs::Descriptors => {
             let what = format!("descriptors for {}", source.name());
-            let way_out =
+            let advice =
                 "--source geometric, or hide the map with unlift obfuscate --descriptors FILE";
-            Err((Error::new(what, "some in the released map", "none"), way_out))
+            Err((Error::new(what, "some in the released map", "none"), advice))
         }
         None => Ok(()),
         Some(descriptors) => source
             .takes(descriptors)
             .map_err(|error| (error, "--source similarity, which takes descriptors of any kind")),
     }
+}
+
+/// Makes the lists of a map at one inlier ratio.
+fn by_oracle(args: &NeighborsArgs, oracle: &Oracle<'_>) -> anyhow::Result<Neighborhoods> {
+    let (original, secret) = read_truth::<3>(oracle.truth)?;
+    // Only the released map has the number of points per record.
+    let released = read_released::<3>(&args.released)?;
+    same_map(&args.released, Some(released.fingerprint()), oracle.truth, secret.map())?;
+    expect_slots(&args.released, &released, &secret)?;
+    let lists = || {
+        let knn = search(&original)?;
+        let near = TrueNeighbors::new(&knn, &secret, released.slots_per_record(), oracle.k)?;
+        let outliers = Outliers::new(args.oracle_noise, &near, &knn, &secret, args.seed)?;
+        near.lists(oracle.inlier_ratio, &outliers, args.seed)
+    };
+    Ok(lists().map_err(|error| unlift_io::Error::core(oracle.truth, error))?)
 }

@@ -21,14 +21,14 @@ const GUESSABLE: &str = "unlift: note: whoever guesses the --seed can restore th
 pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
     let inputs = [args.path.as_path()].into_iter().chain(args.map.descriptors.as_deref());
     let files = [(RELEASED, Kind::Stage(Stage::Released)), (TRUTH, Kind::Stage(Stage::Truth))];
-    let rules = Rules::new(inputs, args.force);
+    let rules = Rules::new(inputs, false);
     let mut out = OutputSet::create(&args.out, rules, Access::Private, &files).map_err(refused)?;
     let name = args.scheme.name;
     let unit = if args.map.scale.is_some() { Unit::Meter } else { Unit::KthNeighbor };
     let Some(scheme) = args.scheme.of_dimension::<3>(&SchemeOptions::usual(unit)) else {
         return images(args, out);
     };
-    let (_, prepared) = open_map(&args.path, &args.map, false, false)?;
+    let (_, prepared) = open_map(&args.path, &args.map, args.seed.unwrap_or(0), false, false)?;
     for note in prepared.doubts.iter().chain(&prepared.notes) {
         Stderr.say(&format!("note: {note}"));
     }
@@ -51,7 +51,7 @@ pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
 
 /// Returns the key that all randomness comes from.
 fn key(args: &ObfuscateArgs) -> anyhow::Result<Key> {
-    Ok(match args.map.seed {
+    Ok(match args.seed {
         Some(seed) => {
             stderr::tell(GUESSABLE);
             Key::from_seed(seed)

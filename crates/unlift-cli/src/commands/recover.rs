@@ -10,7 +10,7 @@ use unlift_io::stage::{
     Kind as Stage, has_images, read_neighborhoods, read_released, write_recovered,
 };
 
-use super::common::{same_map, with_threads};
+use super::common::same_map;
 use super::image_stages::recover_all;
 use crate::args::RecoverArgs;
 use crate::exit::Outcome;
@@ -43,11 +43,10 @@ fn notes(offsets: &[u64], about: About, slots_per_record: usize) -> Vec<String> 
 }
 
 pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
-    let rules = Rules::new([args.released.as_path(), &args.neighbors], args.force);
+    let rules = Rules::new([args.released.as_path(), &args.neighbors], false);
     let kind = Kind::Stage(Stage::Recovered);
     check_file(&args.out, kind, &rules)?;
-    let options =
-        RecoverOptions { delta: args.delta, seed: args.seed, ..RecoverOptions::default() };
+    let options = RecoverOptions { seed: args.seed, ..RecoverOptions::default() };
     if has_images(&args.released)? {
         return images(args, &options, &rules);
     }
@@ -60,10 +59,8 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
     for note in notes(lists.offsets(), lists.about(), released.slots_per_record()) {
         alive.say(&format!("unlift: note: {}: {note}", args.neighbors.display()));
     }
-    let recovered = with_threads(args.threads, || {
-        let result = recover(&released, &lists, &args.solver, &options);
-        Ok(result.map_err(|error| unlift_io::Error::core(&args.released, error))?)
-    })?;
+    let recovered = recover(&released, &lists, &args.solver, &options);
+    let recovered = recovered.map_err(|error| unlift_io::Error::core(&args.released, error))?;
     check_file(&args.out, kind, &rules)?;
     write_recovered(&args.out, &recovered)?;
     drop(alive);
@@ -90,11 +87,8 @@ fn images(args: &RecoverArgs, options: &RecoverOptions, rules: &Rules) -> anyhow
             }
         }
     };
-    let counts = with_threads(args.threads, || {
-        let (files, out) =
-            ((args.released.as_path(), args.neighbors.as_path()), args.out.as_path());
-        recover_all(files, (args.solver, options), (out, rules), note)
-    })?;
+    let files = (args.released.as_path(), args.neighbors.as_path());
+    let counts = recover_all(files, (args.solver, options), (&args.out, rules), note)?;
     drop(alive);
     print(&format!(
         "{} of {} keypoints of {} images have a position, in {}\n",

@@ -1,11 +1,10 @@
 //! `unlift table`: prints the results of an audit as a table or curves.
 
 use std::io::Write;
-use std::path::Path;
 
-use unlift_audit::check_file_of;
+use unlift_audit::check_file;
 use unlift_io::atomic::{Access, Kind, Rules, write_file};
-use unlift_report::export::{curves, table, thresholds};
+use unlift_report::export::{TableFormat, curves, table, thresholds};
 
 use super::common::read_document;
 use crate::args::TableArgs;
@@ -14,54 +13,51 @@ use crate::output::print;
 use crate::stderr;
 
 pub fn run(args: &TableArgs) -> anyhow::Result<Outcome> {
-    let rules = Rules::new([args.audit.as_path()], args.force);
-    let mut taken = Vec::new();
-    for (option, path, kind) in
-        [("--out", &args.out, Kind::Table), ("--curves", &args.curves, Kind::Curves)]
-    {
-        let Some(path) = path else { continue };
-        let target = check_file_of(option, path, kind, &rules)?;
-        if taken.contains(&target) {
-            let path = path.display();
-            return Err(usage(format!(
-                "{option}: {path}: expected a file of its own, found that of --out"
-            )));
+    let ending = args.out.as_ref().map(|out| {
+        let ending = out.extension().unwrap_or_default();
+        ending.to_string_lossy().to_ascii_lowercase()
+    });
+    let (format, kind) = match ending.as_deref() {
+        None | Some("md") => (Some(TableFormat::Markdown), Kind::Table),
+        Some("tex") => (Some(TableFormat::Latex), Kind::Table),
+        Some("csv") => (Some(TableFormat::Csv), Kind::Table),
+        Some("svg") => (None, Kind::Curves),
+        Some(_) => {
+            let expected = "--out: expected a name that ends in .md, .tex, .csv or .svg";
+            let found = args.out.iter().map(|out| out.display().to_string()).collect::<String>();
+            return Err(usage(format!("{expected}, found {found}")));
         }
-        taken.push(target);
+    };
+    let rules = Rules::new([args.audit.as_path()], false);
+    if let Some(path) = &args.out {
+        check_file(path, kind, &rules)?;
     }
     let document = read_document(&args.audit)?;
     let known = thresholds(&document);
-    let only = args.threshold.as_ref().map(|asked| {
-        let same = |typed: &&String| typed.parse::<f64>().is_ok_and(|value| value == asked.value);
+    let only = args.thresholds.as_ref().map(|requested| {
+        let same =
+            |typed: &&String| typed.parse::<f64>().is_ok_and(|value| value == requested.value);
         known.iter().find(same).map(String::as_str).ok_or_else(|| {
-            let (known, found) = (known.join(", "), &asked.label);
-            usage(format!("--threshold: expected one of {known}, as in the audit, found {found}"))
+            let (known, found) = (known.join(", "), &requested.label);
+            usage(format!("--thresholds: expected one of {known}, as in the audit, found {found}"))
         })
     });
     let only = only.transpose()?;
-    let drawing = match &args.curves {
-        Some(_) => Some(curves(&document, only).ok_or_else(|| {
-            usage("--curves: expected an audit with rows by the oracle, found none")
-        })?),
-        None => None,
+    let text = match format {
+        Some(format) => table(&document, format, only),
+        None => curves(&document, only).ok_or_else(|| {
+            usage("--out: expected an audit with rows by the oracle, for curves, found none")
+        })?,
     };
-    let text = table(&document, args.format, only);
     // A table does not show schemes that were not audited.
-    for refused in &document.not_audited {
-        let by = refused.neighbors.as_ref().map(|by| format!(" by {by}")).unwrap_or_default();
-        stderr::note(format_args!("not audited: {}{by}: {}", refused.scheme, refused.reason));
-    }
-    if let (Some(path), Some(drawing)) = (&args.curves, &drawing) {
-        write(path, drawing)?;
+    for missing in &document.not_audited {
+        let by = missing.neighbors.as_ref().map(|by| format!(" by {by}")).unwrap_or_default();
+        stderr::note(format_args!("not audited: {}{by}: {}", missing.scheme, missing.reason));
     }
     match &args.out {
-        Some(path) => write(path, &text)?,
+        // All users may read it.
+        Some(path) => write_file(path, Access::Usual, |w| w.write_all(text.as_bytes()))?,
         None => print(&text)?,
     }
     Ok(Outcome::Done)
-}
-
-/// Writes a file that all users may read.
-fn write(path: &Path, text: &str) -> anyhow::Result<()> {
-    Ok(write_file(path, Access::Usual, |w| w.write_all(text.as_bytes()))?)
 }

@@ -26,8 +26,8 @@ use unlift_vision::features::{AlikedOptions, Extraction};
 use unlift_vision::network::{DescriptorKind, Learned};
 
 use crate::args::DemoArgs;
+use crate::commands::audits::painter;
 use crate::commands::common::with_threads;
-use crate::commands::painter::painter;
 use crate::exit::Outcome;
 use crate::output::{command_line, print, table};
 use crate::progress::Progress;
@@ -61,9 +61,9 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
         (OF_PHOTOS[0], Kind::Page),
         (OF_PHOTOS[1], Kind::AuditJson),
     ];
-    let rules = Rules::new([], args.force);
+    let rules = Rules::new([], false);
     let mut out = OutputSet::create(&args.out, rules, Access::Private, &files).map_err(refused)?;
-    let text = with_threads(args.threads, || {
+    let text = with_threads(|| {
         let bar = Progress::new(args.quiet);
         bar.show(0, PARTS, "");
         let photos = photos(&Part::new(&bar, "attacking two protected photos", 40.0), &args.out)?;

@@ -57,17 +57,18 @@ fn two_releases_give_points_back() {
     let open = row("plane", "again")["metrics"]["open_percent"].as_f64();
     assert!(open > Some(99.0), "{open:?}");
     // The same seed gives the same figures for any number of threads.
-    place.ends(&line.replace("--out a", "--threads 1 --out b"), 0);
+    place
+        .ends(&line.replace("--out a", "--out b").replace("audit", "RAYON_NUM_THREADS=1 audit"), 0);
     assert_eq!(place.json("b/audit.json")["results"], document["results"]);
 }
 
 #[test]
 fn what_is_gone_in_the_second_map_does_not_come_back() {
     let place = maps();
-    let audit = "audit again a.csv b.csv --scale 1 --schemes olc --no-records-alone --force";
+    let audit = "audit again a.csv b.csv --scale 1 --schemes olc --no-records-alone";
     let stderr = place.complains(&format!("{audit} --descriptors a.bin"), 2);
-    assert!(stderr.contains("--descriptors-of-b: expected with --descriptors"), "{stderr}");
-    place.ends(&format!("{audit} --descriptors a.bin --descriptors-of-b b.bin --out a"), 0);
+    assert!(stderr.contains("--descriptors: expected one file for A and one for B"), "{stderr}");
+    place.ends(&format!("{audit} --descriptors a.bin --descriptors b.bin --out a"), 0);
     let document = place.json("a/audit.json");
     for row in document["results"].as_array().unwrap() {
         let share = row["recovered_percent"]["0.10"].as_f64().unwrap();
@@ -75,16 +76,4 @@ fn what_is_gone_in_the_second_map_does_not_come_back() {
     }
     let (_, stderr) = place.ends(audit, 0);
     assert!(stderr.contains("links by geometry only"), "{stderr}");
-}
-
-#[test]
-fn a_gate_names_the_links() {
-    let place = maps();
-    let audit = "audit again a.csv a.csv --scale 1 --schemes olc --no-records-alone --force";
-    let (stdout, _) = place.ends(&format!("{audit} --gate olc:again-geometry:0.10<=20"), 1);
-    assert!(stdout.contains("olc:again-geometry:0.10<=20"), "{stdout}");
-    let stderr = place.complains(&format!("{audit} --gate olc:again:0.10<=20"), 2);
-    assert!(stderr.contains("neighbors: expected one of again-geometry, found again"), "{stderr}");
-    let stderr = place.complains("audit again a.csv a.csv --schemes olc/xyz", 2);
-    assert!(stderr.contains("expected one of olc, ppl"), "{stderr}");
 }

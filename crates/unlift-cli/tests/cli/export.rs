@@ -9,7 +9,7 @@ fn recovered(scheme: &str) -> Place {
     let place = Place::with_room(400);
     let hide = "obfuscate room.csv --scale 0.5 --seed 1 --k 10 --out hidden --scheme";
     place.ends(&format!("{hide} {scheme}"), 0);
-    let lists = "neighbors oracle hidden/truth.parquet --inlier-ratio 1 --k 10 --out lists.parquet";
+    let lists = "neighbors hidden/released.parquet --source oracle --truth hidden/truth.parquet --inlier-ratio 1 --k 10 --out lists.parquet";
     place.ends(lists, 0);
     place.ends("recover hidden/released.parquet --neighbors lists.parquet --out back.parquet", 0);
     place

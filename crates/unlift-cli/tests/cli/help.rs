@@ -8,7 +8,7 @@ use crate::common::Place;
 fn help_is_part_of_the_interface() {
     let place = Place::empty();
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/snapshots");
-    let commands = ",demo,audit map,audit images,audit released,audit sequence,audit again,obfuscate,neighbors oracle,neighbors find,\
+    let commands = ",demo,audit map,audit images,audit released,audit sequence,audit again,obfuscate,neighbors,\
                     recover,evaluate,export,table,compare,features,invert,schemes,\
                     models";
     for command in commands.split(',') {

@@ -87,9 +87,9 @@ fn photos_become_pooled_rows_rows_per_image_and_pictures() {
 #[test]
 fn neither_threads_nor_where_features_come_from_change_a_byte() {
     let place = features();
-    place.ends("features photos --type aliked --min-score 0.05 --out learned.h5", 0);
-    let figures = |line: &str| {
-        place.ends(&format!("audit images {line} --solver joint,ransac --out t"), 0);
+    place.ends("features photos --features aliked --min-score 0.05 --out learned.h5", 0);
+    let figures = |threads: &str, line: &str| {
+        place.ends(&format!("{threads} audit images {line} --solver joint,ransac --out t"), 0);
         let mut document = place.json("t/audit.json");
         let page = place.text("t/report.html");
         let data = page.split("id=\"block-").nth(1).unwrap().split("</script>").next().unwrap();
@@ -97,32 +97,13 @@ fn neither_threads_nor_where_features_come_from_change_a_byte() {
         ["run", "input", "options"].iter().for_each(|&field| _ = fields.remove(field));
         (document.to_string(), data.to_owned())
     };
-    let one = figures(&format!("photos {QUICK} --threads 1"));
-    assert_eq!(one, figures(&format!("photos {QUICK} --threads 2")));
-    assert_eq!(one, figures(&format!("f.h5 {QUICK} --threads 2 --photos photos")));
+    let one = figures("RAYON_NUM_THREADS=1", &format!("photos {QUICK}"));
+    assert_eq!(one, figures("RAYON_NUM_THREADS=2", &format!("photos {QUICK}")));
+    assert_eq!(one, figures("", &format!("f.h5 {QUICK} --photos photos")));
     let usual = "--k 5 --inlier-ratios 1 --neighbors oracle --neighbors similarity";
-    let of_photos = figures(&format!("photos --features aliked --min-score 0.05 {usual}"));
+    let of_photos = figures("", &format!("photos --features aliked --min-score 0.05 {usual}"));
     assert_eq!(place.json("t/audit.json")["options"]["features"], "aliked");
-    assert_eq!(of_photos, figures(&format!("learned.h5 --photos photos {usual}")));
-}
-
-#[test]
-fn a_file_without_photos_has_frames_and_chosen_images_are_shown() {
-    let place = features();
-    write_changed(&place, "bare.h5", |image| image.descriptors = None);
-    let page = |line: &str| {
-        place.ends(&format!("audit images {line} {QUICK} --show b.png --out a"), 0);
-        let page = place.text("a/report.html");
-        assert!(page.contains("\"name\":\"b.png\"") && !page.contains("\"name\":\"a.png\""));
-        assert!(!page.contains("/9j/"));
-        // Only the requested sources are drawn.
-        ["known neighbors", "neighbors by descriptors", "neighbors by descriptor overlap"]
-            .map(|source| page.contains(&format!("\"label\":\"{source}, ")))
-    };
-    assert_eq!(page("f.h5"), [true, false, false]);
-    assert_eq!(page("f.h5 --neighbors oracle --neighbors descriptors"), [true, true, false]);
-    // The oracle needs only keypoints.
-    assert_eq!(page("bare.h5"), [true, false, false]);
+    assert_eq!(of_photos, figures("", &format!("learned.h5 --photos photos {usual}")));
 }
 
 #[test]
@@ -150,24 +131,6 @@ fn broken_images_are_named_counted_and_left_out() {
 }
 
 #[test]
-fn images_of_other_kinds_are_told() {
-    let place = photos();
-    for name in
-        ["photos/a.HEIC", "photos/b.heic", "photos/c/d.tiff", "photos/.e.heic", "raw/1.heic"]
-    {
-        place.write(name, "");
-    }
-    let note =
-        "unlift: note: photos: passed over 2 .heic, 1 .tiff: only JPEG, PNG and WebP are read\n";
-    for line in ["audit images photos --k 10 --max-images 1 --out a", "features photos --out f.h5"]
-    {
-        assert_eq!(place.ends(line, 0).1, note);
-    }
-    let stderr = place.complains("features raw --out g.h5", 3);
-    assert_eq!(stderr, "unlift: raw: expected JPEG, PNG or WebP photos, found only 1 .heic\n");
-}
-
-#[test]
 fn what_cannot_be_audited_is_one_line() {
     let place = features();
     fs::create_dir(place.path("empty")).unwrap();
@@ -181,7 +144,6 @@ fn what_cannot_be_audited_is_one_line() {
     for (line, code, expected) in [
         ("empty", 3, "empty: expected JPEG, PNG or WebP photos, found none"),
         ("nothing", 3, "nothing: expected a file or folder, found nothing"),
-        ("f.h5 --show x.png", 2, "--show: expected an image of f.h5, found x.png"),
         (
             "f.h5 --max-features 9",
             2,
@@ -211,33 +173,4 @@ fn what_cannot_be_audited_is_one_line() {
     assert!(told.starts_with("unlift: --neighbors overlap: expected "), "{told}");
     assert!(!place.path("unlift-audit").exists());
     place.ends("audit images floats.h5 --k 10 --neighbors similarity --out a", 0);
-}
-
-/// Schemes and attacks depend on the declared size: with doubled sides a third of the points of
-/// `dcl2d` comes back.
-#[test]
-fn a_declared_size_that_is_too_large_lets_no_gate_hold() {
-    let place = features();
-    let gate = format!("{QUICK} --schemes dcl2d,cp2d --gate all:25<=100 --share-safe");
-    place.ends(&format!("audit images f.h5 {gate} --out right"), 0);
-    let right = place.json("right/audit.json");
-    assert!(right["notes"].is_null(), "{}", right["notes"]);
-    for factor in [2, 10] {
-        write_changed(&place, "wide.h5", |image| {
-            image.size = image.size.map(|size| size.map(|side| factor * side));
-        });
-        place.ends(&format!("audit images wide.h5 {gate} --out wide"), 1);
-        let wide = place.json("wide/audit.json");
-        let reason = wide["gates"][0]["reason"].as_str().expect("a reason");
-        assert!(reason.starts_with("sizes: keypoints fill"), "{reason}");
-        assert_eq!(wide["notes"][0], reason);
-        // These solvers attack schemes that publish coordinates.
-        let of = |document: &Value| {
-            let rows = document["results"].as_array().expect("rows").iter();
-            let found = rows.filter(|row| row["scheme"] == "cp2d" && row["solver"] == "joint");
-            found.map(|row| row["recovered_percent"]["25"].as_f64().unwrap()).sum::<f64>()
-        };
-        assert!((of(&wide) - of(&right)).abs() < 5.0, "{} {}", of(&wide), of(&right));
-        fs::remove_file(place.path("wide.h5")).unwrap();
-    }
 }

@@ -88,62 +88,11 @@ fn what_cannot_be_meant_is_refused_with_a_way_out() {
 }
 
 #[test]
-fn similarity_takes_descriptors_of_any_kind_and_overlap_those_of_sift() {
-    let place = Place::with_room(700);
-    npy(&place, "learned.npy", "<f2", 64, |bytes, value| {
-        // A half-precision float: sign, 5 bits of exponent, 10 of mantissa; rounding does not
-        // matter here.
-        let bits = value.to_bits();
-        let exponent = ((bits >> 23) & 0xff) as i32 - 112;
-        let half = match exponent {
-            1.. => (bits >> 16 & 0x8000) | (exponent as u32) << 10 | (bits >> 13 & 0x3ff),
-            _ => 0,
-        };
-        bytes.extend((half as u16).to_le_bytes());
-    });
-    npy(&place, "sift.npy", "<f4", 128, |bytes, value| bytes.extend(value.abs().to_le_bytes()));
-    for (file, source) in [("learned.npy", "similarity"), ("sift.npy", "overlap")] {
-        let line = format!("audit map room.csv --descriptors {file} --neighbors {source} {QUICK}");
-        place.ends(&line, 0);
-    }
-    let hide = "obfuscate room.csv --scheme olc --k 10 --descriptors";
-    assert_eq!(place.ends(&format!("{hide} learned.npy --out hidden"), 0).1, "");
-    let wrong =
-        "SIFT descriptors (128 values each, none negative), found 64 values each\n  try: --";
-    for (line, code, expected) in [
-        (
-            "audit map room.csv --descriptors learned.npy --neighbors overlap",
-            2,
-            format!("--neighbors overlap: expected {wrong}neighbors similarity, "),
-        ),
-        (
-            "neighbors find hidden/released.parquet --source overlap",
-            3,
-            format!(
-                "hidden/released.parquet: descriptors for overlap: expected {wrong}source similarity, "
-            ),
-        ),
-    ] {
-        let told = place.complains(line, code);
-        let expected = format!("unlift: {expected}which takes descriptors of any kind\n");
-        assert_eq!(told, expected);
-    }
-    // Zeros mark points without a descriptor: their lists are worse, which is no protection.
-    let mut bytes = place.bytes("learned.npy");
-    let n = bytes.len();
-    bytes[n - 2 * 2 * 64..].fill(0);
-    place.write("partial.npy", bytes);
-    let note =
-        "unlift: note: 2 of 700 descriptors are all zero and give an attacker no information\n";
-    assert_eq!(place.ends(&format!("{hide} partial.npy --out hidden2"), 0).1, note);
-}
-
-#[test]
 fn descriptors_that_are_missing_are_told_with_where_they_are() {
     let place = Place::with_room(100);
     place.ends("obfuscate room.csv --scheme olc --k 10 --out hidden", 0);
     assert_eq!(
-        place.complains("neighbors find hidden/released.parquet --source overlap", 3),
+        place.complains("neighbors hidden/released.parquet --source overlap", 3),
         "unlift: hidden/released.parquet: descriptors for overlap: expected some in the released map, \
          found none\n  try: --source geometric, or hide the map with unlift obfuscate --descriptors FILE\n"
     );
@@ -152,23 +101,4 @@ fn descriptors_that_are_missing_are_told_with_where_they_are() {
     let line = format!("audit map {} --k 3 --neighbors overlap", project.display());
     let advice = format!("\n  try: --descriptors {}\n", project.join("database.db").display());
     assert!(place.complains(&line, 2).ends_with(&advice));
-}
-
-#[test]
-fn which_of_several_models_was_read_is_told() {
-    let place = Place::empty();
-    for (fixture, folder) in [("project/sparse/0", "p/sparse/0"), ("rig-bin", "p/models/1")] {
-        for file in fs::read_dir(data(fixture)).unwrap().map(|file| file.unwrap()) {
-            let name = format!("{folder}/{}", file.file_name().display());
-            place.write(&name, fs::read(file.path()).unwrap());
-        }
-    }
-    let told = place.complains("audit images p/sparse/0", 3);
-    assert!(told.ends_with("found none\n  try: unlift audit map, as this is a map\n"), "{told}");
-    let told = "unlift: note: models/1: read, the largest of 2 models (8 points)\n\
-                unlift: note: sparse/0: another model (6 points), give its path to read it\n";
-    let audit = "audit map p --schemes olc --k 3 --inlier-ratios 1 --out a";
-    for line in [audit, "obfuscate p --scheme olc --k 3 --out hidden"] {
-        assert_eq!(place.ends(line, 0).1, told);
-    }
 }

@@ -10,7 +10,6 @@ mod compare;
 mod corpus;
 mod export;
 mod features;
-mod gate_files;
 mod gates;
 mod help;
 mod images;

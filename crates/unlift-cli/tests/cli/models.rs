@@ -1,7 +1,5 @@
 //! `unlift models`, and missing models.
 
-use serde_json::Value;
-
 use crate::common::{Place, said};
 
 /// Runs a line with this folder of models and without those of the user; returns stdout and stderr.
@@ -14,38 +12,20 @@ fn with_models(place: &Place, folder: &str, line: &str, code: i32) -> (String, S
 }
 
 #[test]
-fn models_are_listed_with_where_they_are() {
-    let place = Place::empty();
+fn models_are_listed_and_a_missing_or_another_one_is_one_line() {
+    let place = Place::with_photos(&["a.png"]);
     let (stdout, _) = with_models(&place, "", "models", 0);
     assert!(stdout.contains("aliked-n16rot\n") && stdout.contains("  here     in the program\n"));
     let missing = "  here     no: superpoint.onnx: expected in data/unlift/models \
                    (https://github.com/magicleap/SuperPointPretrainedNetwork), found nothing\n";
     assert!(stdout.contains(missing), "{stdout}");
-    let (stdout, _) = with_models(&place, "", "models --json", 0);
-    let list: Vec<Value> = serde_json::from_str(&stdout).unwrap();
-    let named = |here: bool| {
-        let of = list.iter().filter(|model| model["here"] == here && model["carried"] == here);
-        of.map(|model| model["name"].as_str().unwrap()).collect::<Vec<_>>().join(" ")
-    };
-    let carried = "aliked-n16rot inverter-aliked inverter-sift lpips-squeeze neighbors-aliked neighbors-sift yolox-nano";
-    assert_eq!(named(true), carried);
-    assert_eq!(named(false), "inverter-superpoint neighbors-superpoint superpoint");
-    for model in &list {
-        let has_hash = model["sha256"].as_str().map(str::len) == Some(64);
-        assert!(has_hash || model["here"] == false, "{model}");
-    }
-}
-
-#[test]
-fn a_model_that_is_missing_or_another_one_is_one_line() {
-    let place = Place::with_photos(&["a.png"]);
     place.write("aliked-n16rot.onnx", "another");
     for (folder, kind, expected) in [
         ("", "superpoint", "superpoint.onnx: expected in data/unlift/models (https://github.com/"),
         (".", "aliked", "./aliked-n16rot.onnx: expected SHA-256 "),
         ("nowhere", "aliked", "UNLIFT_MODELS: expected a folder, found nowhere\n"),
     ] {
-        let line = format!("features photos --type {kind}");
+        let line = format!("features photos --features {kind}");
         let (_, stderr) = with_models(&place, folder, &line, 3);
         let is_one = stderr.lines().count() == 1;
         assert!(stderr.starts_with(&format!("unlift: {expected}")) && is_one, "{stderr}");

@@ -18,12 +18,13 @@ fn files_of_others_survive() {
         place.write("site/audit.json", foreign);
         assert_eq!(
             place.complains(&format!("audit map room.csv {QUICK} --out site"), 2),
-            "unlift: --out: site/audit.json: expected nothing, or an audit.json of an earlier run \
-             (else --force), found another file\n"
+            "unlift: --out: site/audit.json: expected nothing, or an audit.json of an earlier run, \
+             found another file\n"
         );
         assert_eq!(place.text("site/audit.json"), foreign);
     }
-    for more in ["--force", "", "--share-safe"] {
+    fs::remove_file(place.path("site/audit.json")).unwrap();
+    for more in ["", "--share-safe"] {
         place.ends(&format!("audit map room.csv {QUICK} --out site {more}"), 0);
         assert_eq!(place.text("site/src/app.ts"), "precious");
     }
@@ -41,7 +42,9 @@ fn inputs_are_never_written_over() {
         .unwrap();
     place.ends("obfuscate room.csv --scheme olc --k 10 --out x", 0);
     let truth = place.names("x").into_iter().find(|name| name.starts_with("truth")).unwrap();
-    let oracle = format!("neighbors oracle x/{truth} --inlier-ratio 1 --k 10 --out");
+    let released = truth.replace("truth", "released");
+    let oracle =
+        format!("neighbors x/{released} --source oracle --truth x/{truth} --inlier-ratio 1 --out");
     let before = place.bytes(&format!("x/{truth}"));
     let mut lines = vec![
         "features database.db --out database.db".to_owned(),
@@ -54,10 +57,8 @@ fn inputs_are_never_written_over() {
         lines.push("features database.db --out soft.h5".to_owned());
     }
     for line in lines {
-        for force in ["", " --force"] {
-            let told = place.complains(&format!("{line}{force}"), 2);
-            assert!(told.contains("expected a file that is not read, found the input"), "{told}");
-        }
+        let told = place.complains(&line, 2);
+        assert!(told.contains("expected a file that is not read, found the input"), "{told}");
     }
     assert_eq!(place.bytes(&format!("x/{truth}")), before);
 }

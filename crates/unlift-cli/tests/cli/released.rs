@@ -51,7 +51,8 @@ fn a_scheme_written_in_python_gets_rows_page_and_gates() {
 
     let audit = "audit released mine.parquet --truth truth.parquet --k 10";
     let gates = "--inlier-ratios 1,0.5,0.1 --gate numpy-lines@0.1:0.25<=100 --gate all@1:0.25<=5";
-    let found = place.prints(&format!("{audit} {gates} --out a --json"), 1);
+    place.ends(&format!("{audit} {gates} --out a"), 1);
+    let found = place.json("a/audit.json");
     let rows = found["results"].as_array().unwrap();
     // Three ratios; ranking, joint, joint-start and, because the map is small, consensus.
     assert_eq!(rows.len(), 12);
@@ -72,7 +73,8 @@ fn a_scheme_written_in_python_gets_rows_page_and_gates() {
     assert!(page.contains("numpy-lines") && page.contains("<canvas"), "no page of numpy-lines");
 
     // With another name, and lists from the records alone.
-    let found = place.prints(&format!("{audit} --name own --neighbors geometric --json"), 0);
+    place.ends(&format!("{audit} --name own --neighbors geometric --out a"), 0);
+    let found = place.json("a/audit.json");
     assert!(found["results"].as_array().unwrap().iter().all(|row| row["scheme"] == "own"));
     for (more, expected) in [
         ("--gate olc@1:0.25<=5", "scheme: expected one of numpy-lines, found olc"),
@@ -127,10 +129,13 @@ fn the_rows_are_those_of_an_audit_of_the_map() {
         let hide = "obfuscate room.csv --scale 1 --k 10 --seed 7 --out hidden --scheme";
         place.ends(&format!("{hide} {scheme}"), 0);
         for sources in sources {
-            let options = format!("--k 10 --seed 7 {sources} --json");
-            let ours = place.prints(&format!("{released} --name {scheme} {options}"), 0);
-            let map = format!("audit map room.csv --scale 1 --schemes {scheme} {options}");
-            let map = place.prints(&map, 0);
+            let options = format!("--k 10 --seed 7 {sources}");
+            let audited = |line: String| {
+                place.ends(&format!("{line} {options} --out a"), 0);
+                place.json("a/audit.json")
+            };
+            let ours = audited(format!("{released} --name {scheme}"));
+            let map = audited(format!("audit map room.csv --scale 1 --schemes {scheme}"));
             assert_eq!(ours["results"], map["results"], "{scheme} {sources}");
             assert_eq!(ours["break_even"], map["break_even"], "{scheme} {sources}");
             let rows = ours["results"].as_array().unwrap();

@@ -89,19 +89,9 @@ fn keypoints_come_back_by_the_number_of_queries() {
     }
     assert_eq!(document["results"].as_array().unwrap().len(), 2 * 3 * 2);
     // The same seed gives the same figures for any number of threads.
-    place.ends(&line.replace("--out a", "--threads 1 --out b"), 0);
+    place
+        .ends(&line.replace("--out a", "--out b").replace("audit", "RAYON_NUM_THREADS=1 audit"), 0);
     assert_eq!(place.json("b/audit.json")["results"], document["results"]);
-}
-
-#[test]
-fn a_gate_names_a_number_of_queries() {
-    let place = walk();
-    let audit = "audit sequence model f.h5 --queries 3,5 --schemes lines2d --force";
-    place.ends(&format!("{audit} --gate lines2d:sequence@3:10<=100"), 0);
-    let (stdout, _) = place.ends(&format!("{audit} --gate lines2d:sequence@5:10<=20"), 1);
-    assert!(stdout.contains("lines2d:sequence@5:10<=20"), "{stdout}");
-    let stderr = place.complains(&format!("{audit} --gate lines2d:sequence@4:10<=20"), 2);
-    assert!(stderr.contains("expected one of sequence@3, tracks@3, sequence@5"), "{stderr}");
 }
 
 #[test]
@@ -123,11 +113,10 @@ fn wrong_poses_give_less_back() {
 }
 
 #[test]
-fn lists_new_things_and_changed_descriptors_have_rows_of_their_own() {
+fn lists_and_changed_descriptors_have_rows_of_their_own() {
     let place = walk();
     let audit = "audit sequence model f.h5 --queries 2,5 --schemes lines2d --thresholds 5";
-    let audit =
-        format!("{audit} --neighbors similarity --held-out-share 0.25 --mitigate noise:0.5");
+    let audit = format!("{audit} --neighbors similarity --mitigate noise:0.5");
     place.ends(&format!("{audit} --gate lines2d:sequence+lists@5:5<=100"), 0);
     let document = place.json("unlift-audit/audit.json");
     let row = |scheme: &str, neighbors: &str| {
@@ -139,26 +128,8 @@ fn lists_new_things_and_changed_descriptors_have_rows_of_their_own() {
     // These descriptors say nothing about neighbors, so lists must not move what the queries fix.
     assert!(share("lines2d", "sequence+lists@5").unwrap() >= alone);
     assert!(share("lines2d_noise0.5", "sequence@5").unwrap() < alone - 20.0);
-    let new = row("lines2d", "sequence@5")["metrics"]["new_percent"].as_f64().unwrap();
-    assert!((20.0..30.0).contains(&new), "{new}");
     let stderr = place.complains("audit sequence model f.h5 --mitigate thin:1/4", 2);
     assert!(stderr.contains("expected noise:DEVIATION or drop:SHARE"), "{stderr}");
     let stderr = place.complains("audit sequence model f.h5 --neighbors oracle", 2);
     assert!(stderr.contains("expected a source that reads released data"), "{stderr}");
-}
-
-#[test]
-fn inputs_that_do_not_fit_are_named() {
-    let place = walk();
-    fs::write(place.path("model/cameras.txt"), "1 SIMPLE_PINHOLE 320 240 500 160 120\n").unwrap();
-    let stderr = place.complains("audit sequence model f.h5", 3);
-    let expected =
-        "f.h5: image 0.png: expected 320 x 240 pixels, as its camera in the model, found 640 x 480";
-    assert!(stderr.contains(expected), "{stderr}");
-    assert!(stderr.contains("expected at least 2 images that are in model, found 0"), "{stderr}");
-    fs::write(place.path("cloud.csv"), "x,y,z\n0,0,0\n1,0,0\n0,1,0\n").unwrap();
-    let stderr = place.complains("audit sequence cloud.csv f.h5", 3);
-    assert!(stderr.contains("expected a COLMAP model, which has the poses"), "{stderr}");
-    let stderr = place.complains("audit sequence model f.h5 --queries 1", 2);
-    assert!(stderr.contains("expected a whole number from 2, found 1"), "{stderr}");
 }

@@ -4,13 +4,6 @@
 use std::fs;
 
 use serde_json::Value;
-use unlift::About;
-use unlift::recover::{Estimate, Recovered};
-use unlift::truth::Original;
-use unlift_io::stage::{
-    read_neighborhoods, read_recovered, read_truth, write_neighborhoods, write_recovered,
-    write_truth,
-};
 
 use crate::common::Place;
 
@@ -27,7 +20,9 @@ fn place() -> Place {
 fn chain(place: &Place, name: &str, scheme: &str, seed: u32) {
     let map = "room.csv --scale 1 --k 10 --descriptors d.bin";
     place.ends(&format!("obfuscate {map} --scheme {scheme} --seed {seed} --out {name}"), 0);
-    let oracle = format!("neighbors oracle {name}/truth.parquet --k 10 --inlier-ratio 0.5");
+    let oracle = format!(
+        "neighbors {name}/released.parquet --source oracle --truth {name}/truth.parquet --k 10 --inlier-ratio 0.5"
+    );
     place.ends(&format!("{oracle} --seed {seed} --out {name}-lists"), 0);
     let truth = place.path(name).join("truth.parquet");
     fs::rename(&truth, place.path("away")).unwrap();
@@ -56,11 +51,11 @@ fn the_stages_print_the_row_of_the_audit() {
     for scheme in ["ppl", "cp"] {
         chain(&place, "hidden", scheme, 7);
         let map = "room.csv --scale 1 --k 10 --descriptors d.bin --seed 7";
-        let audit =
-            place.prints(&format!("audit map {map} --schemes {scheme} {sources} --json"), 0);
+        place.ends(&format!("audit map {map} --schemes {scheme} {sources} --out a"), 0);
+        let audit = place.json("a/audit.json");
         for (source, n_listed) in [("oracle", 10), ("overlap", 35), ("geometric", 50)] {
             if source != "oracle" {
-                let find = format!("neighbors find hidden/released.parquet --source {source}");
+                let find = format!("neighbors hidden/released.parquet --source {source}");
                 let (told, _) = place.ends(&format!("{find} --seed 7 --out hidden-lists"), 0);
                 let expected = format!(
                     "{POINTS} neighborhoods of up to {n_listed} by {source}, in hidden-lists\n"
@@ -91,7 +86,7 @@ fn the_stages_print_the_row_of_the_audit() {
     }
     let mut files = std::collections::BTreeSet::new();
     for noise in ["uniform", "near", "clustered"] {
-        let line = "neighbors oracle hidden/truth.parquet --k 10 --inlier-ratio 0.5 --out lists";
+        let line = "neighbors hidden/released.parquet --source oracle --truth hidden/truth.parquet --k 10 --inlier-ratio 0.5 --out lists";
         place.ends(&format!("{line} --oracle-noise {noise}"), 0);
         files.insert(place.bytes("lists"));
     }
@@ -106,17 +101,18 @@ fn the_stages_of_images_print_the_row_of_the_audit() {
     for scheme in ["lines2d", "cp2d", "dcl2d"] {
         place.ends(&format!("obfuscate f.h5 --scheme {scheme} --seed 7 --out hidden"), 0);
         let sources = "--inlier-ratios 0.5 --neighbors oracle --neighbors overlap --solver joint";
-        let audit =
-            format!("audit images f.h5 --k 10 --seed 7 --schemes {scheme} {sources} --json");
-        for row in place.prints(&audit, 0)["results"].as_array().expect("rows") {
+        let audit = format!("audit images f.h5 --k 10 --seed 7 --schemes {scheme} {sources}");
+        place.ends(&format!("{audit} --out a"), 0);
+        for row in place.json("a/audit.json")["results"].as_array().expect("rows") {
             let lists = match row["neighbors"].as_str() {
-                Some("oracle") => "oracle hidden/truth.parquet --k 10 --inlier-ratio 0.5",
-                _ => "find hidden/released.parquet --source overlap --threads 1",
+                Some("oracle") => "oracle --truth hidden/truth.parquet --k 10 --inlier-ratio 0.5",
+                _ => "overlap",
             };
-            place.ends(&format!("neighbors {lists} --seed 7 --out lists"), 0);
+            let line = format!("neighbors hidden/released.parquet --source {lists} --seed 7");
+            place.ends(&format!("{line} --out lists"), 0);
             let recover = "recover hidden/released.parquet --neighbors lists --seed 7";
-            place.ends(&format!("{recover} --threads 1 --out one"), 0);
-            place.ends(&format!("{recover} --threads 2 --out back"), 0);
+            place.ends(&format!("RAYON_NUM_THREADS=1 {recover} --out one"), 0);
+            place.ends(&format!("RAYON_NUM_THREADS=2 {recover} --out back"), 0);
             assert!(place.bytes("one") == place.bytes("back"), "{scheme}");
             let staged = place.prints("evaluate back --truth hidden/truth.parquet --json", 0);
             assert!(staged["sure_unknown"].is_string(), "{scheme}");
@@ -132,7 +128,7 @@ fn the_stages_of_images_print_the_row_of_the_audit() {
             "--scale: expected with a map, found lines2d, which hides images\n",
         ),
         (
-            "neighbors find hidden/released.parquet --source geometric",
+            "neighbors hidden/released.parquet --source geometric",
             2,
             "--source geometric: expected with a map, found images\n",
         ),
@@ -151,17 +147,12 @@ fn files_of_another_map_are_refused() {
     for (line, file, of) in [
         ("evaluate one-back --truth two/truth.parquet", "one-back", "two/truth.parquet"),
         (
-            "evaluate one-back --truth one/truth.parquet --released two/released.parquet",
-            "two/released.parquet",
-            "one/truth.parquet",
-        ),
-        (
             "recover one/released.parquet --neighbors two-lists --out x",
             "two-lists",
             "one/released.parquet",
         ),
         (
-            "neighbors oracle one/truth.parquet --released two/released.parquet --inlier-ratio 1 --out x",
+            "neighbors two/released.parquet --source oracle --truth one/truth.parquet --inlier-ratio 1 --out x",
             "two/released.parquet",
             "one/truth.parquet",
         ),
@@ -171,85 +162,5 @@ fn files_of_another_map_are_refused() {
         assert!(stderr.starts_with(&format!("unlift: {file}: fingerprint: expected ")), "{stderr}");
         assert!(stderr.contains(&expected) && stderr.lines().count() == 1, "{stderr}");
         assert!(!place.path("x").exists(), "{line}");
-    }
-}
-
-/// A file without a fingerprint is accepted with a note, unless its positions fit another map
-/// better.
-#[test]
-fn files_that_do_not_say_are_taken_with_a_note() {
-    let place = place();
-    chain(&place, "one", "ppl", 1);
-    chain(&place, "two", "ppl", 2);
-    let lists = read_neighborhoods(&place.path("one-lists"), POINTS / 2, 2).unwrap();
-    write_neighborhoods(&place.path("bare-lists"), &lists.with_about(About::default())).unwrap();
-    let recover = "recover one/released.parquet --neighbors bare-lists --out bare-back --seed 1";
-    let (_, stderr) = place.ends(recover, 0);
-    assert!(
-        stderr.contains("unlift: note: bare-lists: does not name its released map"),
-        "{stderr}"
-    );
-    assert!(stderr.contains("does not state what its rows are counted by"), "{stderr}");
-
-    let back = read_recovered::<3>(&place.path("one-back")).unwrap();
-    write_recovered(&place.path("bare-back"), &back.with_about(About::default())).unwrap();
-    let (stdout, stderr) = place.ends("evaluate bare-back --truth one/truth.parquet --json", 0);
-    assert_eq!(stderr.lines().count(), 2, "{stderr}");
-    let bare: Value = serde_json::from_str(&stdout).unwrap();
-    let stated = place.prints("evaluate one-back --truth one/truth.parquet --json", 0);
-    for threshold in ["0.10", "0.25"] {
-        let share = |row: &Value| row["recovered_percent"][threshold].as_f64().unwrap();
-        assert!(share(&bare) >= share(&stated), "{threshold}");
-    }
-    let stderr = place.complains("evaluate bare-back --truth two/truth.parquet", 3);
-    let start = "unlift: bare-back: positions: expected nearer to their own records or points than to those of others";
-    assert!(stderr.starts_with(start), "{stderr}");
-}
-
-/// Files with reordered rows or a scaled truth have the right fingerprint, but almost nothing would
-/// come back.
-#[test]
-fn what_does_not_belong_together_is_not_believed_for_its_fingerprint() {
-    let place = place();
-    for scheme in ["olc", "ppl", "plane", "cp"] {
-        chain(&place, "of", scheme, 1);
-        let (_, stderr) = place.ends("evaluate of-back --truth of/truth.parquet", 0);
-        assert_eq!(stderr, "", "{scheme}");
-
-        let back = read_recovered::<3>(&place.path("of-back")).unwrap();
-        let (n, origin, unit) = (back.n_slots(), back.origin(), back.unit());
-        // Reordering all rows is an error; reordering a fifth of them is a note.
-        for (name, code) in [("rolled", 3), ("some", 0)] {
-            let moves = |slot: usize| name == "rolled" || slot % 20 < 4;
-            let of = |slot: usize| if moves(slot) { (slot + 8) % n } else { slot };
-            let estimates: Vec<Estimate<3>> =
-                (0..n).map(|slot| estimate(&back, of(slot))).collect();
-            let moved = Recovered::try_new(&estimates, false, None, origin, unit, 0.1).unwrap();
-            write_recovered(&place.path(name), &moved.with_about(back.about())).unwrap();
-            let line = format!("evaluate {name} --truth of/truth.parquet --json");
-            let (stdout, stderr) = place.ends(&line, code);
-            assert!(stderr.contains("their own records"), "{scheme}, {name}: {stderr}");
-            assert_eq!(stdout.contains("their own records"), code == 0, "{scheme}: {stdout}");
-        }
-
-        let (original, secret) = read_truth::<3>(&place.path("of/truth.parquet")).unwrap();
-        let larger = original.reveal().scaled(1.3, original.reveal().unit()).unwrap();
-        write_truth(&place.path("larger"), &Original::new(larger), &secret).unwrap();
-        let line = "evaluate of-back --truth larger --released of/released.parquet";
-        let (_, stderr) = place.ends(line, 0);
-        let is_told = stderr.contains("truth: ") && stderr.contains("away from their own records");
-        assert!(is_told, "{stderr}");
-    }
-}
-
-fn estimate(of: &Recovered<3>, slot: usize) -> Estimate<3> {
-    let origin = of.origin();
-    let position = of.position(slot).unwrap_or([f64::NAN; 3]);
-    Estimate {
-        position: std::array::from_fn(|axis| (position[axis] - origin[axis]) as f32),
-        status: of.status()[slot],
-        support: of.support()[slot],
-        axis: 0,
-        evidence: of.evidence()[slot],
     }
 }

@@ -104,10 +104,17 @@ impl Place {
         found
     }
 
-    /// Returns a command that runs the program with these words in the folder.
+    /// Returns a command that runs the program with these words in the folder;
+    /// `RAYON_NUM_THREADS=N` may be one of them.
     pub fn program<'a>(&self, words: impl IntoIterator<Item = &'a str>) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_unlift"));
-        command.args(words).current_dir(self.0.path());
+        for word in words {
+            match word.strip_prefix("RAYON_NUM_THREADS=") {
+                Some(threads) => command.env("RAYON_NUM_THREADS", threads),
+                None => command.arg(word),
+            };
+        }
+        command.current_dir(self.0.path());
         command
     }
 
