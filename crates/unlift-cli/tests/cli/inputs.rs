@@ -10,20 +10,6 @@ fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../unlift-io/tests/data").join(name)
 }
 
-/// Writes an array of `descr` with `dim` values for each point of `room.csv`; near rows have
-/// similar descriptors.
-fn npy(place: &Place, name: &str, descr: &str, dim: usize, write: impl Fn(&mut Vec<u8>, f32)) {
-    let header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': (700, {dim}), }}");
-    let mut bytes = b"\x93NUMPY\x01\0\x76\0".to_vec();
-    bytes.extend(format!("{header:117}\n").bytes());
-    for row in 0..700 {
-        for column in 0..dim {
-            write(&mut bytes, (row as f32 / 20.0 + (column * column) as f32).sin());
-        }
-    }
-    place.write(name, bytes);
-}
-
 const QUICK: &str = "--k 10 --schemes olc --quiet --out a";
 
 /// Errors are one line, with a line of advice if there is any, and come before any work.

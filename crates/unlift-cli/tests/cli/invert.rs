@@ -1,11 +1,5 @@
 //! `unlift invert` and `--invert`.
 
-use std::fs;
-
-use unlift::Descriptors;
-use unlift::descriptors::Values;
-use unlift_io::features::{FeatureWriter, ImageFeatures};
-
 use crate::common::Place;
 
 const CHEAP: &str = "--schemes lines2d --inlier-ratios 0.5 --solver joint-start --k 8";
