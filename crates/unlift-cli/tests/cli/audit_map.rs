@@ -22,42 +22,6 @@ fn a_shareable_report_names_nothing() {
     }
 }
 
-#[test]
-fn every_noise_model_has_rows_and_break_even_ratios_of_its_own() {
-    let place = Place::with_room(700);
-    let quick = "--k 10 --schemes olc,ppl --inlier-ratios 1,0.3 --solver joint --quiet --out audit";
-    let noise = "--oracle-noise uniform,near --oracle-noise clustered,near";
-    place.ends(&format!("audit map room.csv --scale 1 {quick} {noise}"), 0);
-    let audit = place.json("audit/audit.json");
-    let results = audit["results"].as_array().expect("rows");
-    assert_eq!(results.len(), 2 * 3 * 2);
-    for rows in results.chunks(6) {
-        let names: Vec<&str> = rows.iter().filter_map(|row| row["oracle_noise"].as_str()).collect();
-        assert_eq!(names, ["uniform", "uniform", "near", "near", "clustered", "clustered"]);
-        // Without outliers the noise models do not differ.
-        for other in [2, 4] {
-            assert_eq!(rows[0]["recovered_percent"], rows[other]["recovered_percent"]);
-            assert_ne!(rows[1]["recovered_percent"], rows[other + 1]["recovered_percent"]);
-        }
-    }
-    let points = audit["break_even"].as_array().expect("ratios");
-    // A blind guess, which has a ratio of its own, may be the strongest.
-    let by_joint = points.iter().filter(|point| point["solver"] == "joint");
-    let noises: Vec<&str> = by_joint.filter_map(|p| p["oracle_noise"].as_str()).collect();
-    assert_eq!(noises, ["uniform", "near", "clustered", "uniform", "near", "clustered"]);
-    let page = place.text("audit/report.html");
-    for noise in ["clustered", "near"] {
-        assert!(
-            page.contains(&format!("known neighbors, wrong ones {noise}, 30 % right")),
-            "{noise}"
-        );
-    }
-    // The rows with uniform noise equal those of an audit without `--oracle-noise`.
-    place.ends(&format!("audit map room.csv --scale 1 {quick}"), 0);
-    let usual = place.json("audit/audit.json");
-    assert_eq!(usual["results"].as_array().unwrap()[..2], results[..2]);
-}
-
 /// `--quick` audits two schemes at one ratio, and one source if there are descriptors.
 #[test]
 fn a_first_look_is_two_schemes_and_the_attack_on_what_is_released() {

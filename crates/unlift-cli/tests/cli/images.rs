@@ -85,28 +85,6 @@ fn photos_become_pooled_rows_rows_per_image_and_pictures() {
 }
 
 #[test]
-fn neither_threads_nor_where_features_come_from_change_a_byte() {
-    let place = features();
-    place.ends("features photos --features aliked --min-score 0.05 --out learned.h5", 0);
-    let figures = |threads: &str, line: &str| {
-        place.ends(&format!("{threads} audit images {line} --solver joint,ransac --out t"), 0);
-        let mut document = place.json("t/audit.json");
-        let page = place.text("t/report.html");
-        let data = page.split("id=\"block-").nth(1).unwrap().split("</script>").next().unwrap();
-        let fields = document.as_object_mut().unwrap();
-        ["run", "input", "options"].iter().for_each(|&field| _ = fields.remove(field));
-        (document.to_string(), data.to_owned())
-    };
-    let one = figures("RAYON_NUM_THREADS=1", &format!("photos {QUICK}"));
-    assert_eq!(one, figures("RAYON_NUM_THREADS=2", &format!("photos {QUICK}")));
-    assert_eq!(one, figures("", &format!("f.h5 {QUICK} --photos photos")));
-    let usual = "--k 5 --inlier-ratios 1 --neighbors oracle --neighbors similarity";
-    let of_photos = figures("", &format!("photos --features aliked --min-score 0.05 {usual}"));
-    assert_eq!(place.json("t/audit.json")["options"]["features"], "aliked");
-    assert_eq!(of_photos, figures("", &format!("learned.h5 --photos photos {usual}")));
-}
-
-#[test]
 fn broken_images_are_named_counted_and_left_out() {
     let place = photos();
     place.write("photos/text.jpg", "no photo");

@@ -1,12 +1,7 @@
 //! `unlift audit released`: records of another program, audited end to end.
 
-use std::fs;
 use std::process::Command;
-use std::sync::Arc;
 
-use arrow_array::types::UInt32Type;
-use arrow_array::{ArrayRef, ListArray, RecordBatch, UInt32Array};
-use parquet::arrow::ArrowWriter;
 use unlift_io::stage::{read_truth, write_truth};
 
 use crate::common::Place;
@@ -84,84 +79,6 @@ fn a_scheme_written_in_python_gets_rows_page_and_gates() {
         let told = place.complains(&format!("{audit} {more} --out c"), 2);
         assert!(told.contains(expected) && !place.path("c").exists(), "{told}");
     }
-}
-
-/// Writes lists of the `k` nearest points for the first `n` points, as another program would.
-fn write_lists(place: &Place, name: &str, points: &[[f64; 3]], n: usize, k: usize) {
-    let near = |at: usize| {
-        let off = |other: &u32| {
-            let point = points[*other as usize];
-            (0..3).map(|c| (point[c] - points[at][c]).powi(2)).sum::<f64>()
-        };
-        let mut others: Vec<u32> = (0..points.len() as u32).filter(|&p| p as usize != at).collect();
-        others.sort_by(|a, b| off(a).total_cmp(&off(b)));
-        Some(others.into_iter().take(k).map(Some).collect::<Vec<_>>())
-    };
-    let neighbors = ListArray::from_iter_primitive::<UInt32Type, _, _>((0..n).map(near));
-    let point = UInt32Array::from_iter_values(0..n as u32);
-    let columns: [(&str, ArrayRef); 2] =
-        [("point", Arc::new(point)), ("neighbors", Arc::new(neighbors))];
-    let batch = RecordBatch::try_from_iter(columns).unwrap();
-    let file = fs::File::create(place.path(name)).unwrap();
-    let mut writer = ArrowWriter::try_new(file, batch.schema(), None).unwrap();
-    writer.write(&batch).unwrap();
-    writer.close().unwrap();
-}
-
-/// Released maps of unlift have the rows of `audit map`, also with lists by original in a file, and
-/// with descriptors of the originals.
-#[test]
-fn the_rows_are_those_of_an_audit_of_the_map() {
-    let place = Place::with_room(400);
-    let points = unlift::synthetic::room(1, 400).points;
-    write_lists(&place, "lists.parquet", &points, 400, 10);
-    place.write_descriptors("d.bin", &points, 32);
-    let released = "audit released hidden/released.parquet --truth hidden/truth.parquet";
-    let made = "--inlier-ratios 0.5 --neighbors oracle --neighbors geometric";
-    let (given, described) =
-        ("--neighbors lists.parquet", "--descriptors d.bin --neighbors similarity");
-    for (scheme, sources) in [
-        ("ppl", &[made, given, described][..]),
-        ("cp", &[made, given]),
-        ("ray", &[made]),
-        ("olc", &[given]),
-    ] {
-        let hide = "obfuscate room.csv --scale 1 --k 10 --seed 7 --out hidden --scheme";
-        place.ends(&format!("{hide} {scheme}"), 0);
-        for sources in sources {
-            let options = format!("--k 10 --seed 7 {sources}");
-            let audited = |line: String| {
-                place.ends(&format!("{line} {options} --out a"), 0);
-                place.json("a/audit.json")
-            };
-            let ours = audited(format!("{released} --name {scheme}"));
-            let map = audited(format!("audit map room.csv --scale 1 --schemes {scheme}"));
-            assert_eq!(ours["results"], map["results"], "{scheme} {sources}");
-            assert_eq!(ours["break_even"], map["break_even"], "{scheme} {sources}");
-            let rows = ours["results"].as_array().unwrap();
-            let is_described =
-                *sources != described || rows[0]["assignment_accuracy_percent"].is_f64();
-            assert!(is_described, "{}", rows[0]);
-            for row in rows.iter().filter(|row| row["neighbors"] == "file") {
-                // All entries are true, except a partner on the same line.
-                assert!(row["inlier_ratio"].as_f64() > Some(0.9), "{scheme}: {row}");
-                let percent = |of: &str| row[of]["0.25"].as_f64().unwrap();
-                assert!(percent("recovered_percent") > 2.0 * percent("blind_percent"), "{row}");
-            }
-        }
-    }
-    // Points without a row have no neighbors, and a note says so.
-    write_lists(&place, "few.parquet", &points, 300, 10);
-    let (_, stderr) =
-        place.ends(&format!("{released} --k 10 --neighbors few.parquet --out few"), 0);
-    assert!(stderr.contains("note: lists: 100 of 400 points have no neighbors"), "{stderr}");
-    // Lists of a larger map name points that this one lacks.
-    let more = unlift::synthetic::room(1, 401).points;
-    write_lists(&place, "other.parquet", &more, 401, 10);
-    let line = format!("{released} --k 10 --neighbors other.parquet --out other");
-    let told = place.complains(&line, 3);
-    assert!(told.starts_with("unlift: other.parquet: ") && told.lines().count() == 1, "{told}");
-    assert!(!place.path("other").exists());
 }
 
 /// The truth of another map is an error, because almost nothing would come back, which reads as

@@ -95,24 +95,6 @@ fn keypoints_come_back_by_the_number_of_queries() {
 }
 
 #[test]
-fn wrong_poses_give_less_back() {
-    let place = walk();
-    let audit = "audit sequence model f.h5 --queries 5 --schemes lines2d";
-    let share = |options: &str, out: &str| {
-        place.ends(&format!("{audit} {options} --out {out}"), 0);
-        let document = place.json(&format!("{out}/audit.json"));
-        document["results"][0]["recovered_percent"]["5"].as_f64().unwrap()
-    };
-    let exact = share("", "a");
-    let wrong = share("--poses perturbed:5,0.5 --scale 1", "b");
-    assert!(wrong < exact - 20.0, "{wrong} of {exact}");
-    let stderr = place.complains(&format!("{audit} --poses perturbed:5,0.5"), 2);
-    assert!(stderr.contains("expected --scale, meters per unit of the model"), "{stderr}");
-    let stderr = place.complains(&format!("{audit} --poses exact"), 2);
-    assert!(stderr.contains("expected perturbed:CM,DEG"), "{stderr}");
-}
-
-#[test]
 fn lists_and_changed_descriptors_have_rows_of_their_own() {
     let place = walk();
     let audit = "audit sequence model f.h5 --queries 2,5 --schemes lines2d --thresholds 5";
