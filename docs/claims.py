@@ -242,7 +242,7 @@ def main():
         for table, title in sorted(set(TABLES.values())):
             of = [f.dataset for f in paper if f.table == table]
             print(f"table {table:2}: {title}: {', '.join(sorted(set(of)))}; {len(of)} figures")
-        return print("table  2 is a part of 7 and 9. table 14 (seconds): cargo bench -p unlift --bench recover. table 15 (objects):\n"
+        return print("table  2 is a part of 7 and 9. table 14 (seconds): docs/benchmarks.md. table 15 (objects):\n"
                      "objects_found in the results of audits with --invert")
     root = options.folder or fail("expected the folder of a dataset, or --list")
     tables = {int(t) for t in options.table.split(",")} if options.table else {t for t, _ in TABLES.values()}
