@@ -79,7 +79,7 @@ def published_images(feature):
     table = {}
     for row in published("geometric_2d") + published("end_to_end_2d"):
         if (row["dataset"], row["feature"], row.get("metric", "recovered_percent")) == ("7-scenes", feature, "recovered_percent"):
-            ratio = float(row["inlier_ratio"]) if "inlier_ratio" in row else row["neighborhood"]
+            ratio = row.get("neighborhood") or float(row["inlier_ratio"])
             table[row["scheme"], ratio, row["threshold_px"]] = row.get("recovered_percent") or row.get("value")
     return table
 
