@@ -314,7 +314,7 @@ def pictures():
     for kind, scene, options in (("SIFT", "redkitchen", []), ("ALIKED", "redkitchen-aliked", ["--features", "aliked"])):
         name, papers = f"RedKitchen, {kind}", [published_ssim(d) if kind == "SIFT" else {} for d in "23"]
         of_images = unlift("images", photos, *options, *attack)
-        of_map = unlift("map", DATA / scene / "model", *METERS, "--descriptors", DATA / scene / "descriptors.bin", "--photos", photos,
+        of_map = unlift("map", DATA / scene / "model", *METERS, "--descriptors", DATA / scene / "descriptors.bin", "--photos", photos, "--max-images", "40",
                         "--schemes", ",".join(FEWER_SCHEMES), "--no-records-alone", *attack)
         flat += lines(name, of_images, IMAGE_SCHEMES, papers[0])
         solid += lines(name, of_map, FEWER_SCHEMES, papers[1])
