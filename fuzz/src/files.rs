@@ -83,9 +83,9 @@ pub fn features(bytes: &[u8]) {
     }
 }
 
-/// Reads a Parquet file between stages as every kind.
+/// Reads a stage file as every kind.
 pub fn stages(bytes: &[u8]) {
-    let path = file("s.parquet", bytes);
+    let path = file("s.npz", bytes);
     let _ = stage::peek(&path);
     let _ = stage::scheme_name(&path);
     if let Ok(released) = stage::read_released::<3>(&path) {

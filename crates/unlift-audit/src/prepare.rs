@@ -147,7 +147,7 @@ pub fn by_point(
     for &row in &prepared.rows {
         let start = lists.offsets()[row as usize] as usize;
         for (at, &neighbor) in lists.of(row as usize).iter().enumerate() {
-            if let Some(kept) = kept_as[neighbor as usize] {
+            if let Some(kept) = kept_as[neighbor.index()] {
                 neighbors.push(kept);
                 if let (Some(scores), Some(all)) = (&mut scores, lists.scores()) {
                     scores.push(all[start + at]);

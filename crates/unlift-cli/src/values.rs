@@ -298,8 +298,8 @@ mod tests {
             let several = neighbor_source(names).unwrap_err();
             assert!(several.starts_with("expected one source (repeat the option"), "{several}");
         }
-        let file = NeighborSource::File("lists,overlapping.parquet".into());
-        assert_eq!(neighbor_source("lists,overlapping.parquet"), Ok(file));
+        let file = NeighborSource::File("lists,overlapping.npz".into());
+        assert_eq!(neighbor_source("lists,overlapping.npz"), Ok(file));
         let file = NeighborSource::File("./lists,overlap".into());
         assert_eq!(neighbor_source("./lists,overlap"), Ok(file));
     }

@@ -90,7 +90,7 @@ impl Error {
         Self { path: path.into(), kind: Kind::Core(source) }
     }
 
-    /// Adds a prefix to the place of the error: `images.parquet: image a.jpg, column x: expected
+    /// Adds a prefix to the place of the error: `images.npz: image a.jpg, column x: expected
     /// ...`.
     pub(crate) fn within(self, what: &str) -> Self {
         let kind = match self.kind {

@@ -4,7 +4,7 @@ use unlift::guard::caught;
 
 /// Runs `step` and returns `None` if it panics, without a message.
 ///
-/// `parquet` 59.3 still panics for some damaged pages and footers. `hdf5-pure` is guarded, too.
+/// `hdf5-pure` panics for some damaged files.
 pub(crate) fn without_panic<T>(step: impl FnOnce() -> T) -> Option<T> {
     caught(step).ok()
 }

@@ -4,7 +4,6 @@ use crate::Error;
 use crate::features::ImageFeatures;
 use crate::input;
 use crate::read::Input;
-use crate::stage::part_files;
 use sha2::{Digest, Sha256};
 use std::io::Read;
 use std::path::Path;
@@ -57,14 +56,6 @@ pub fn hash_files<P: AsRef<Path>>(paths: &[P]) -> Result<String, Error> {
 /// When a file cannot be read.
 pub fn hash_input(input: &Input) -> Result<String, Error> {
     hash_files(&input.files)
-}
-
-/// Returns the hash of a stage file, or [`hash_files`] of a folder of parts.
-///
-/// # Errors
-/// When a file cannot be read.
-pub fn hash_stage(path: &Path) -> Result<String, Error> {
-    if path.is_dir() { hash_files(&part_files(path)?) } else { hash_file(path) }
 }
 
 /// Combines names and hashes like [`hash_files`], also for data that is not in files.

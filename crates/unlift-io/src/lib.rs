@@ -18,9 +18,9 @@
 //!
 //! // The released data is public. The owner keeps the ground truth.
 //! let (released, secret) = obfuscate(&Olc, &original, None, &Key::from_seed(0))?;
-//! stage::write_released(&folder.join("released.parquet"), &released)?;
-//! stage::write_truth(&folder.join("truth.parquet"), &original, &secret)?;
-//! let read_again = stage::read_released::<3>(&folder.join("released.parquet"))?;
+//! stage::write_released(&folder.join("released.npz"), &released)?;
+//! stage::write_truth(&folder.join("truth.npz"), &original, &secret)?;
+//! let read_again = stage::read_released::<3>(&folder.join("released.npz"))?;
 //! assert_eq!(read_again.fingerprint(), released.fingerprint());
 //!
 //! // An error about bad input is one line.

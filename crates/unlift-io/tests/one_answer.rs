@@ -69,22 +69,22 @@ fn staged<const D: usize>(
 ) -> Vec<Row> {
     let path = |name: &str| folder.join(name);
     let (released, secret) = obfuscate(scheme, original, Some(descriptors), key).unwrap();
-    stage::write_released(&path("released.parquet"), &released).unwrap();
-    stage::write_truth(&path("truth.parquet"), original, &secret).unwrap();
+    stage::write_released(&path("released.npz"), &released).unwrap();
+    stage::write_truth(&path("truth.npz"), original, &secret).unwrap();
     drop((released, secret));
     let mut rows = Vec::new();
     for variant in &plan.variants() {
         let lists = lists::<D>(folder, variant, plan, owner);
-        stage::write_neighborhoods(&path("lists.parquet"), &lists).unwrap();
+        stage::write_neighborhoods(&path("lists.npz"), &lists).unwrap();
         for solver in &plan.solvers {
-            let released = stage::read_released::<D>(&path("released.parquet")).unwrap();
+            let released = stage::read_released::<D>(&path("released.npz")).unwrap();
             let (n, slots) = (released.n_records(), released.slots_per_record());
-            let lists = stage::read_neighborhoods(&path("lists.parquet"), n, slots).unwrap();
+            let lists = stage::read_neighborhoods(&path("lists.npz"), n, slots).unwrap();
             let options = RecoverOptions { seed: SEED, ..RecoverOptions::default() };
             let recovered = recover(&released, &lists, &**solver, &options).unwrap();
-            stage::write_recovered(&path("back.parquet"), &recovered).unwrap();
-            let back = stage::read_recovered::<D>(&path("back.parquet")).unwrap();
-            let (original, secret) = stage::read_truth::<D>(&path("truth.parquet")).unwrap();
+            stage::write_recovered(&path("back.npz"), &recovered).unwrap();
+            let back = stage::read_recovered::<D>(&path("back.npz")).unwrap();
+            let (original, secret) = stage::read_truth::<D>(&path("truth.npz")).unwrap();
             let baseline = blind(&released, &original, &secret);
             let measured =
                 measure(&back, &original, &secret, Some(&baseline), &plan.thresholds).unwrap();
@@ -100,8 +100,8 @@ fn lists<const D: usize>(
     plan: &Plan<D>,
     owner: u64,
 ) -> Neighborhoods {
-    let released = stage::read_released::<D>(&folder.join("released.parquet")).unwrap();
-    let (original, secret) = stage::read_truth::<D>(&folder.join("truth.parquet")).unwrap();
+    let released = stage::read_released::<D>(&folder.join("released.npz")).unwrap();
+    let (original, secret) = stage::read_truth::<D>(&folder.join("truth.npz")).unwrap();
     let slots = secret.slots_per_record();
     match variant.by {
         NeighborsBy::Source(source) => source.lists(&released, source.k(&released), SEED).unwrap(),
@@ -245,8 +245,8 @@ fn many_images_in_one_file() {
         for (row, source) in audited.rows.iter().zip(["oracle", "overlap"]) {
             let mut truth = OutputFile::create(&path("truth"), Access::Private).unwrap();
             let mut released = OutputFile::create(&path("released"), Access::Usual).unwrap();
-            let mut truths = ImageWriter::start(&mut truth, Kind::Truth);
-            let mut maps = ImageWriter::start(&mut released, Kind::Released);
+            let mut truths = ImageWriter::start(&mut truth);
+            let mut maps = ImageWriter::start(&mut released);
             for (name, original, descriptors) in &images {
                 let key = key_of(&Key::from_seed(SEED), name);
                 let hidden =
@@ -263,7 +263,7 @@ fn many_images_in_one_file() {
             let mut truths = ImageFile::open(&truth, Kind::Truth).unwrap();
             let mut maps = ImageFile::open(&released, Kind::Released).unwrap();
             let mut output = OutputFile::create(&path("lists"), Access::Private).unwrap();
-            let mut lists = ImageWriter::start(&mut output, Kind::Neighborhoods);
+            let mut lists = ImageWriter::start(&mut output);
             while let Some(rows) = truths.next_image().unwrap() {
                 let name = rows.name().to_owned();
                 let (original, secret) = rows.truth().unwrap();
@@ -286,7 +286,7 @@ fn many_images_in_one_file() {
             let mut lists = ImageFile::open(&lists, Kind::Neighborhoods).unwrap();
             let mut maps = ImageFile::open(&released, Kind::Released).unwrap();
             let mut output = OutputFile::create(&path("back"), Access::Private).unwrap();
-            let mut back = ImageWriter::start(&mut output, Kind::Recovered);
+            let mut back = ImageWriter::start(&mut output);
             while let Some(rows) = maps.next_image().unwrap() {
                 let name = rows.name().to_owned();
                 let map = rows.released().unwrap();

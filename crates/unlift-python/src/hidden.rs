@@ -61,13 +61,13 @@ impl Released {
 
 #[pymethods]
 impl Released {
-    /// Reads a released map (Parquet).
+    /// Reads a released map (`.npz`).
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         py.detach(|| read_released::<3>(&path)).map(Self::from).map_err(raised)
     }
 
-    /// Writes the released map (Parquet), as `unlift obfuscate` does. Replaces other files only
+    /// Writes the released map (`.npz`), as `unlift obfuscate` does. Replaces other files only
     /// with `force`.
     #[pyo3(signature = (path, *, force=false))]
     fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
@@ -206,14 +206,14 @@ impl Truth {
 
 #[pymethods]
 impl Truth {
-    /// Reads a truth file (Parquet).
+    /// Reads a truth file (`.npz`).
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let (original, secret) = py.detach(|| read_truth::<3>(&path)).map_err(raised)?;
         Ok(Self { of: Whose::File(Arc::new(original)), secret: Arc::new(secret) })
     }
 
-    /// Writes the truth (Parquet), as `unlift obfuscate` does, readable only by you. Replaces other
+    /// Writes the truth (`.npz`), as `unlift obfuscate` does, readable only by you. Replaces other
     /// files only with `force`.
     #[pyo3(signature = (path, *, force=false))]
     fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {

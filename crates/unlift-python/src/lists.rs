@@ -46,7 +46,7 @@ impl Neighborhoods {
         Ok(Self(Arc::new(lists?)))
     }
 
-    /// Reads lists of `released` (Parquet).
+    /// Reads lists of `released` (`.npz`).
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf, released: &Bound<'_, PyAny>) -> PyResult<Self> {
         let of = released_of(released)?.of_map()?;
@@ -54,7 +54,7 @@ impl Neighborhoods {
         Ok(Self(Arc::new(lists.map_err(raised)?)))
     }
 
-    /// Writes the lists (Parquet), as `unlift neighbors` does. Replaces other files only with
+    /// Writes the lists (`.npz`), as `unlift neighbors` does. Replaces other files only with
     /// `force`.
     #[pyo3(signature = (path, *, force=false))]
     fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {

@@ -24,14 +24,14 @@ pub struct Recovered(pub Arc<Found<3>>);
 
 #[pymethods]
 impl Recovered {
-    /// Reads recovered points (Parquet).
+    /// Reads recovered points (`.npz`).
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let found = py.detach(|| read_recovered::<3>(&path)).map_err(raised)?;
         Ok(Self(Arc::new(found)))
     }
 
-    /// Writes the points (Parquet), as `unlift recover` does. Replaces other files only with
+    /// Writes the points (`.npz`), as `unlift recover` does. Replaces other files only with
     /// `force`.
     #[pyo3(signature = (path, *, force=false))]
     fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {

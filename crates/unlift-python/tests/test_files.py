@@ -21,9 +21,9 @@ def parts():
 
 @pytest.mark.parametrize("name", ["released", "truth", "lists", "recovered"])
 def test_what_is_not_of_its_kind_stays(parts, name, tmp_path):
-    part, path = parts[name], tmp_path / "x.parquet"
+    part, path = parts[name], tmp_path / "x.npz"
     path.write_text("mine")
-    with pytest.raises(unlift.UnliftError, match=r"x.parquet: expected nothing, or .*, found another file"):
+    with pytest.raises(unlift.UnliftError, match=r"x.npz: expected nothing, or .*, found another file"):
         part.save(path)
     assert path.read_text() == "mine"
     other = parts["truth" if name == "lists" else "lists"]
@@ -37,12 +37,12 @@ def test_what_is_not_of_its_kind_stays(parts, name, tmp_path):
     part.save(path)
     with pytest.raises(unlift.UnliftError, match="expected a file, found a folder"):
         part.save(tmp_path, force=True)
-    assert [entry.name for entry in tmp_path.iterdir()] == ["x.parquet"]
+    assert [entry.name for entry in tmp_path.iterdir()] == ["x.npz"]
 
 
 @pytest.mark.skipif(os.name == "nt", reason="modes are those of Unix")
 def test_the_truth_is_for_its_owner_alone(parts, tmp_path):
-    path = tmp_path / "t.parquet"
+    path = tmp_path / "t.npz"
     parts["lists"].save(path)
     path.chmod(0o666)
     parts["truth"].save(path, force=True)

@@ -62,14 +62,14 @@ def test_what_comes_back_is_where_it_was(described, tmp_path):
     assert back.status.count("ok") == np.isfinite(back.positions).all(1).sum()
     # Files equal those of the command line.
     for name, part in [("r", hidden.released), ("t", hidden.truth), ("l", lists), ("b", back)]:
-        part.save(tmp_path / f"{name}.parquet")
-    read = unlift.Released.read(tmp_path / "r.parquet")
+        part.save(tmp_path / f"{name}.npz")
+    read = unlift.Released.read(tmp_path / "r.npz")
     assert read.fingerprint == hidden.released.fingerprint
-    lists = unlift.Neighborhoods.read(tmp_path / "l.parquet", read)
+    lists = unlift.Neighborhoods.read(tmp_path / "l.npz", read)
     again = unlift.recover(read, lists)
     np.testing.assert_array_equal(again.positions, back.positions)
-    truth = unlift.Truth.read(tmp_path / "t.parquet")
-    kept = unlift.Recovered.read(tmp_path / "b.parquet")
+    truth = unlift.Truth.read(tmp_path / "t.npz")
+    kept = unlift.Recovered.read(tmp_path / "b.npz")
     alone = unlift.evaluate(kept, truth)
     assert alone["recovered_percent"] == figures["recovered_percent"]
     assert "blind_percent" not in alone

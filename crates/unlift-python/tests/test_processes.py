@@ -28,8 +28,8 @@ def use():
     back = unlift.recover(hidden, lists, solver="consensus")
     found = unlift.evaluate(back, hidden)
     for part, more in [(hidden.released, []), (hidden.truth, []), (lists, [hidden]), (back, [])]:
-        part.save(f"{path}.parquet", force=True)
-        type(part).read(f"{path}.parquet", *more)
+        part.save(f"{path}.npz", force=True)
+        type(part).read(f"{path}.npz", *more)
 
     @unlift.scheme
     def upright(points):

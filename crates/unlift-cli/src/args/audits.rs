@@ -467,12 +467,12 @@ pub struct AuditAgainArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  unlift audit released mine.parquet --truth truth.parquet --name mine
-  unlift audit released mine.parquet --truth truth.parquet --neighbors oracle --neighbors geometric
-  unlift audit released mine.parquet --truth truth.parquet --gate 'all@0.5:0.10<=20'
+  unlift audit released mine.npz --truth truth.npz --name mine
+  unlift audit released mine.npz --truth truth.npz --neighbors oracle --neighbors geometric
+  unlift audit released mine.npz --truth truth.npz --gate 'all@0.5:0.10<=20'
 
 A record is what a scheme publishes in place of a point: a line, a ray, an axis-parallel plane, or a
-point that swapped one coordinate with another point. Write two Parquet files: the records,
+point that swapped one coordinate with another point. Write two NumPy archives: the records,
 which an attacker sees, and the truth, which assigns each original point to its record.
 docs/formats.md shows how.
 

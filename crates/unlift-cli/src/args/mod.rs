@@ -138,7 +138,7 @@ It refuses a file whose hash differs from the listed one.")]
 Examples:
   unlift audit map PROJECT --scale 1
   unlift audit images photos
-  unlift audit released mine.parquet --truth truth.parquet")]
+  unlift audit released mine.npz --truth truth.npz")]
 pub enum AuditCommand {
     /// Audit a 3D map: hide its points, attack the result, and report how many are recovered
     // Boxed, because it is ten times larger than the other commands.

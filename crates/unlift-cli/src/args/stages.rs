@@ -38,8 +38,8 @@ Examples:
   unlift obfuscate PROJECT --scheme olc --descriptors PROJECT/database.db --out hidden
   unlift obfuscate features.h5 --scheme dcl2d --out hidden-images
 
-released.parquet is what an attacker sees: records (such as lines) in place of points.
-truth.parquet holds the original points; keep it private.
+released.npz is what an attacker sees: records (such as lines) in place of points.
+truth.npz holds the original points; keep it private.
 
 All random choices come from a fresh 256-bit key, which unlift does not store. --seed replaces this
 key, for experiments. Never release a map made with --seed: whoever guesses the seed can restore the
@@ -55,7 +55,7 @@ pub struct ObfuscateArgs {
     /// Scheme that hides the points (unlift schemes lists them). Schemes for images need images
     #[arg(long, value_name = "SCHEME", value_parser = values::any_scheme)]
     pub scheme: &'static Entry,
-    /// Folder for released.parquet and truth.parquet; other files in it stay
+    /// Folder for released.npz and truth.npz; other files in it stay
     #[arg(long, value_name = "DIR", default_value = "unlift-obfuscated")]
     pub out: PathBuf,
     #[command(flatten)]
@@ -77,17 +77,17 @@ Sources:
   oracle       a chosen fraction of true nearest neighbors, from --truth: for experiments
 
 Examples:
-  unlift neighbors hidden/released.parquet --source overlap --out neighborhoods.parquet
-  unlift neighbors hidden/released.parquet --source oracle --truth hidden/truth.parquet \\
+  unlift neighbors hidden/released.npz --source overlap --out neighborhoods.npz
+  unlift neighbors hidden/released.npz --source oracle --truth hidden/truth.npz \\
       --inlier-ratio 0.5")]
 pub struct NeighborsArgs {
-    /// The released.parquet of a map or of images
+    /// The released.npz of a map or of images
     #[arg(value_name = "RELEASED")]
     pub released: PathBuf,
     /// Method that makes the lists, see Sources below
     #[arg(long, value_name = "SOURCE", value_parser = values::any_source)]
     pub source: NeighborSource,
-    /// For the oracle: the truth.parquet that belongs to RELEASED
+    /// For the oracle: the truth.npz that belongs to RELEASED
     #[arg(long, value_name = "TRUTH", requires = "inlier_ratio")]
     pub truth: Option<PathBuf>,
     /// For the oracle: fraction of each list that consists of true nearest neighbors, from 0 to 1:
@@ -105,7 +105,7 @@ pub struct NeighborsArgs {
     #[arg(long, value_name = "INTEGER", default_value_t = 0)]
     pub seed: u64,
     /// File to write
-    #[arg(long, value_name = "FILE", default_value = "neighborhoods.parquet")]
+    #[arg(long, value_name = "FILE", default_value = "neighborhoods.npz")]
     pub out: PathBuf,
 }
 
@@ -113,9 +113,9 @@ pub struct NeighborsArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  unlift recover hidden/released.parquet --neighbors neighborhoods.parquet --out recovered.parquet")]
+  unlift recover hidden/released.npz --neighbors neighborhoods.npz --out recovered.npz")]
 pub struct RecoverArgs {
-    /// The released.parquet of a map or of images
+    /// The released.npz of a map or of images
     #[arg(value_name = "RELEASED")]
     pub released: PathBuf,
     /// File with lists of neighbors, written by unlift neighbors or your own program
@@ -131,7 +131,7 @@ pub struct RecoverArgs {
     #[arg(long, value_name = "INTEGER", default_value_t = 0)]
     pub seed: u64,
     /// File to write
-    #[arg(long, value_name = "FILE", default_value = "recovered.parquet")]
+    #[arg(long, value_name = "FILE", default_value = "recovered.npz")]
     pub out: PathBuf,
 }
 
@@ -139,16 +139,16 @@ pub struct RecoverArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  unlift evaluate recovered.parquet --truth hidden/truth.parquet
-  unlift evaluate recovered.parquet --truth hidden/truth.parquet --thresholds 0.05,0.10 --json
+  unlift evaluate recovered.npz --truth hidden/truth.npz
+  unlift evaluate recovered.npz --truth hidden/truth.npz --thresholds 0.05,0.10 --json
 
-If released.parquet is in the folder of TRUTH, unlift also guesses from one record at a time, as a
+If released.npz is in the folder of TRUTH, unlift also guesses from one record at a time, as a
 baseline.")]
 pub struct EvaluateArgs {
     /// Recovered points that unlift recover wrote
     #[arg(value_name = "RECOVERED")]
     pub recovered: PathBuf,
-    /// The truth.parquet that unlift obfuscate wrote
+    /// The truth.npz that unlift obfuscate wrote
     #[arg(long, value_name = "TRUTH")]
     pub truth: PathBuf,
     /// Largest errors at which a point counts as recovered, separated by commas [default: 0.10,0.25
@@ -171,9 +171,9 @@ The ending of --out decides the format:
 A file that shows points is as private as the map.
 
 Examples:
-  unlift export recovered.parquet --scale 1 --out back.ply
-  unlift export hidden/released.parquet --scale 1 --out lines.obj
-  unlift export recovered.parquet --scale 1 --cameras PROJECT --out back-model")]
+  unlift export recovered.npz --scale 1 --out back.ply
+  unlift export hidden/released.npz --scale 1 --out lines.obj
+  unlift export recovered.npz --scale 1 --cameras PROJECT --out back-model")]
 pub struct ExportArgs {
     /// A released, recovered or truth file of a map
     #[arg(value_name = "FILE")]
@@ -240,14 +240,14 @@ unlift models lists the networks.
 
 Examples:
   unlift invert photos --out pictures
-  unlift invert hidden/released.parquet recovered.parquet --out pictures
-  unlift invert hidden/released.parquet recovered.parquet --cameras MODEL --scale 1")]
+  unlift invert hidden/released.npz recovered.npz --out pictures
+  unlift invert hidden/released.npz recovered.npz --cameras MODEL --scale 1")]
 pub struct InvertArgs {
-    /// A folder of photos, hloc's features.h5, a COLMAP database.db, or the released.parquet of a map
+    /// A folder of photos, hloc's features.h5, a COLMAP database.db, or the released.npz of a map
     /// or of images
     #[arg(value_name = "PATH")]
     pub path: PathBuf,
-    /// Output file of unlift recover for PATH; required if PATH is a released.parquet. Without it,
+    /// Output file of unlift recover for PATH; required if PATH is a released.npz. Without it,
     /// unlift paints six views from the center of a sphere cloud
     #[arg(value_name = "RECOVERED")]
     pub recovered: Option<PathBuf>,
@@ -261,7 +261,7 @@ pub struct InvertArgs {
     /// The --scale given to unlift obfuscate: units of the released map per unit of MODEL
     #[arg(long, value_name = "SCALE", value_parser = values::positive, requires = "cameras")]
     pub scale: Option<f64>,
-    /// Paint at most N images: evenly spaced by name or, if PATH is a released.parquet of images, the
+    /// Paint at most N images: evenly spaced by name or, if PATH is a released.npz of images, the
     /// first N
     #[arg(long, value_parser = values::count, value_name = "N")]
     pub max_images: Option<NonZeroUsize>,

@@ -12,7 +12,7 @@ use unlift_audit::inversion::MapInversion;
 use unlift_audit::localization::Localize;
 use unlift_audit::maps::{Tiles, perform};
 use unlift_audit::{Job, Prepared, sources};
-use unlift_io::hash::hash_stage;
+use unlift_io::hash::hash_file;
 use unlift_io::read;
 
 use super::audits::{
@@ -66,7 +66,7 @@ pub fn run(args: &AuditMapArgs) -> anyhow::Result<Outcome> {
             let held_out = Some((features.clone(), args.hold_out.get()));
             job.localize = Some(Localize { cameras: &prepared.cameras, held_out, protections });
         }
-        let hashes = beside(args).map(|(name, path)| Ok((name.to_owned(), hash_stage(path)?)));
+        let hashes = beside(args).map(|(name, path)| Ok((name.to_owned(), hash_file(path)?)));
         job.input.other_sha256 = hashes.collect::<anyhow::Result<IndexMap<_, _>>>()?;
         Ok(Some(perform(job, out)?))
     })

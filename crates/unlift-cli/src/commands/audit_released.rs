@@ -9,9 +9,9 @@ use unlift::released::Released;
 use unlift::truth::Secret;
 use unlift_audit::maps::{self, perform};
 use unlift_audit::{Job, Prepared, ordered};
-use unlift_io::hash::{hash_file, hash_files, hash_stage};
+use unlift_io::hash::{hash_file, hash_files};
 use unlift_io::read::{self, Input as Points};
-use unlift_io::stage::{has_images, part_files, read_released, read_truth, scheme_name};
+use unlift_io::stage::{has_images, read_released, read_truth, scheme_name};
 use unlift_report::document::Input;
 
 use super::audits::{self, map_thresholds, neighbors, solvers, with_oracle};
@@ -151,14 +151,14 @@ fn plan(
 }
 
 fn provenance(args: &AuditReleasedArgs, prepared: &Prepared) -> anyhow::Result<Input> {
-    let mut others = vec![("truth".to_owned(), hash_stage(&args.truth)?)];
+    let mut others = vec![("truth".to_owned(), hash_file(&args.truth)?)];
     if let Some(path) = &args.descriptors {
         others.push(("descriptors".to_owned(), hash_file(path)?));
     }
     for path in NeighborSource::files(&args.solvers.neighbors) {
-        others.push(("neighbors".to_owned(), hash_stage(path)?));
+        others.push(("neighbors".to_owned(), hash_file(path)?));
     }
-    let sha256 = Some(hash_files(&part_files(&args.released)?)?);
+    let sha256 = Some(hash_files(&[&args.released])?);
     Ok(Input {
         path: Some(args.released.display().to_string()),
         sha256,

@@ -17,9 +17,9 @@ use crate::args::MapArgs;
 use crate::exit::Outcome;
 use crate::progress::Spinner;
 
-pub const RELEASED: &str = "released.parquet";
+pub const RELEASED: &str = "released.npz";
 /// File name of the truth, which only the owner has.
-pub const TRUTH: &str = "truth.parquet";
+pub const TRUTH: &str = "truth.npz";
 
 /// Runs `work` on `RAYON_NUM_THREADS` threads (default: all cores). rayon's global pool would panic
 /// if the system refuses threads.

@@ -109,15 +109,15 @@ fn views(project: &Path) -> anyhow::Result<(Vec<colmap::Camera>, Vec<colmap::Ima
 
 /// Reads the file at `path`, and returns its content and its unit.
 fn read(path: &Path) -> anyhow::Result<(Shown, Unit)> {
-    let header = peek(path)?;
+    let (kind, dimension) = peek(path)?;
     let wrong = |found: &str| {
         let expected = "a released, recovered or truth file of a map";
         Err(unlift_io::Error::new(path, "", expected, found).into())
     };
-    if header.dimension == Some(2) {
+    if dimension == Some(2) {
         return wrong("one of images");
     }
-    match header.kind {
+    match kind {
         Stage::Released => {
             let released = read_released::<3>(path)?;
             let origin = released.origin();

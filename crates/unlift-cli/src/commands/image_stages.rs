@@ -85,8 +85,8 @@ pub fn hide(args: &ObfuscateArgs, key: &Key, out: &mut OutputSet) -> anyhow::Res
     };
     let mut truth = staged(out, TRUTH, Stage::Truth, Access::Private)?;
     let mut released = staged(out, RELEASED, Stage::Released, Access::Usual)?;
-    let mut truths = ImageWriter::start(&mut truth, Stage::Truth);
-    let mut maps = ImageWriter::start(&mut released, Stage::Released);
+    let mut truths = ImageWriter::start(&mut truth);
+    let mut maps = ImageWriter::start(&mut released);
     let mut counts = Counts::default();
     each(
         || Ok(images.next().transpose()?),
@@ -310,7 +310,7 @@ fn write<T: Send, U: Send>(
     mut add: impl FnMut(&mut ImageWriter<'_>, &mut Counts, &str, &U) -> Result<(), Error>,
 ) -> anyhow::Result<Counts> {
     let mut output = OutputFile::create(out, Access::Private)?;
-    let mut writer = ImageWriter::start(&mut output, kind);
+    let mut writer = ImageWriter::start(&mut output);
     let mut counts = Counts::default();
     each(next, work, |made| {
         let Some((name, made)) = made else { return Ok(()) };

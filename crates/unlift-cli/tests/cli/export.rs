@@ -9,9 +9,9 @@ fn recovered(scheme: &str) -> Place {
     let place = Place::with_room(400);
     let hide = "obfuscate room.csv --scale 0.5 --seed 1 --k 10 --out hidden --scheme";
     place.ends(&format!("{hide} {scheme}"), 0);
-    let lists = "neighbors hidden/released.parquet --source oracle --truth hidden/truth.parquet --inlier-ratio 1 --k 10 --out lists.parquet";
+    let lists = "neighbors hidden/released.npz --source oracle --truth hidden/truth.npz --inlier-ratio 1 --k 10 --out lists.npz";
     place.ends(lists, 0);
-    place.ends("recover hidden/released.parquet --neighbors lists.parquet --out back.parquet", 0);
+    place.ends("recover hidden/released.npz --neighbors lists.npz --out back.npz", 0);
     place
 }
 
@@ -36,7 +36,7 @@ fn points_and_lines_come_back_in_every_form_and_on_the_map() {
     ] {
         // Files of unlift are replaced.
         for _ in 0..2 {
-            let line = format!("export hidden/truth.parquet --scale 0.5 {more} --out {name}");
+            let line = format!("export hidden/truth.npz --scale 0.5 {more} --out {name}");
             assert_eq!(place.ends(&line, 0).0, said);
         }
         let read = positions(&place, name);
@@ -46,13 +46,13 @@ fn points_and_lines_come_back_in_every_form_and_on_the_map() {
     let model = read::open(&place.path("model")).expect("a map");
     assert_eq!(model.cameras, [[1.0, 2.0, -3.0]]);
     // Without `--scale` lengths are those of the file, in meters: half as many as units.
-    place.ends("export hidden/truth.parquet --out meters.ply", 0);
+    place.ends("export hidden/truth.npz --out meters.ply", 0);
     assert!(distance(&positions(&place, "meters.ply")[7], &room[7].map(|x| 0.5 * x)) < 1e-9);
 
-    place.ends("export back.parquet --scale 0.5 --out back.ply", 0);
+    place.ends("export back.npz --scale 0.5 --out back.ply", 0);
     let is_near = |p: &&[f64; 3]| room.iter().any(|q| distance(p, q) < 0.5);
     assert!(positions(&place, "back.ply").iter().filter(is_near).count() > 300);
-    let (told, _) = place.ends("export hidden/released.parquet --scale 0.5 --out lines.obj", 0);
+    let (told, _) = place.ends("export hidden/released.npz --scale 0.5 --out lines.obj", 0);
     let n: usize = told.split(' ').next().and_then(|n| n.parse().ok()).expect("a number");
     let text = place.text("lines.obj");
     assert!(n > 300 && text.lines().filter(|line| line.starts_with("l ")).count() == n, "{told}");
@@ -65,27 +65,19 @@ fn what_cannot_be_shown_is_told_and_what_is_not_ours_stays() {
     place.write("mine/points3D.txt", "# mine");
     let before = place.files();
     for (line, code, expected) in [
-        ("hidden/released.parquet --out planes.obj", 3, "found planes, which have no end"),
-        ("lists.parquet --out lists.ply", 3, "found neighborhoods"),
-        ("back.parquet --out back.obj", 3, "expected lines or rays, as --out is .obj"),
-        ("back.parquet --cameras room.csv --out back", 3, "expected a COLMAP model with cameras"),
-        ("back.parquet --cameras room.csv --out back.ply", 2, "--cameras: expected a folder"),
+        ("hidden/released.npz --out planes.obj", 3, "found planes, which have no end"),
+        ("lists.npz --out lists.ply", 3, "found neighborhoods"),
+        ("back.npz --out back.obj", 3, "expected lines or rays, as --out is .obj"),
+        ("back.npz --cameras room.csv --out back", 3, "expected a COLMAP model with cameras"),
+        ("back.npz --cameras room.csv --out back.ply", 2, "--cameras: expected a folder"),
         (
-            "back.parquet --out x.stl",
+            "back.npz --out x.stl",
             2,
             "--out: expected a name that ends in .ply or .obj, or a folder without an ending, \
              found x.stl",
         ),
-        (
-            "back.parquet --out mine.ply",
-            2,
-            "mine.ply: expected nothing, or a cloud of an earlier run",
-        ),
-        (
-            "back.parquet --out mine",
-            2,
-            "points3D.txt: expected nothing, or a model of an earlier run",
-        ),
+        ("back.npz --out mine.ply", 2, "mine.ply: expected nothing, or a cloud of an earlier run"),
+        ("back.npz --out mine", 2, "points3D.txt: expected nothing, or a model of an earlier run"),
     ] {
         let stderr = place.complains(&format!("export {line}"), code);
         assert!(stderr.contains(expected), "{line}: {stderr}");

@@ -30,7 +30,12 @@ fn what_cannot_be_meant_is_refused_with_a_way_out() {
             "found none",
             "the folder of a COLMAP model or project; for photos, unlift audit images",
         ),
-        ("room.csv --neighbors room.csv", 3, "room.csv: expected a Parquet file", ""),
+        (
+            "room.csv --neighbors room.csv",
+            3,
+            "room.csv: expected an archive of NumPy arrays (.npz), found another file",
+            "",
+        ),
         ("room.csv --scale -1", 2, number, ""),
         ("room.csv --scale 0", 2, number, ""),
         ("room.csv --scale inf", 2, number, ""),
@@ -78,8 +83,8 @@ fn descriptors_that_are_missing_are_told_with_where_they_are() {
     let place = Place::with_room(100);
     place.ends("obfuscate room.csv --scheme olc --k 10 --out hidden", 0);
     assert_eq!(
-        place.complains("neighbors hidden/released.parquet --source overlap", 3),
-        "unlift: hidden/released.parquet: descriptors for overlap: expected some in the released map, \
+        place.complains("neighbors hidden/released.npz --source overlap", 3),
+        "unlift: hidden/released.npz: descriptors for overlap: expected some in the released map, \
          found none\n  try: --source geometric, or hide the map with unlift obfuscate --descriptors FILE\n"
     );
     // Six points suffice, because the error comes before any attack.

@@ -47,14 +47,14 @@ fn keypoints_and_what_came_back_are_painted_to_files() {
 
     place.ends("features photos --out features.h5", 0);
     place.ends("obfuscate features.h5 --scheme cp2d --out hidden", 0);
-    let released = "hidden/released.parquet";
+    let released = "hidden/released.npz";
     assert_eq!(
         place.complains(&format!("invert {released} --out y"), 2),
         "unlift: RECOVERED: expected what came back of PATH, found none\n"
     );
-    place.ends(&format!("neighbors {released} --source overlap --out lists.parquet"), 0);
-    place.ends(&format!("recover {released} --neighbors lists.parquet --out back.parquet"), 0);
-    let (stdout, _) = place.ends(&format!("invert {released} back.parquet --out back"), 0);
+    place.ends(&format!("neighbors {released} --source overlap --out lists.npz"), 0);
+    place.ends(&format!("recover {released} --neighbors lists.npz --out back.npz"), 0);
+    let (stdout, _) = place.ends(&format!("invert {released} back.npz --out back"), 0);
     assert_eq!(stdout, "3 pictures, in back\n");
     assert_eq!(size("back/d.webp.png"), (64, 48));
 }

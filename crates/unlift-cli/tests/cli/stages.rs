@@ -21,12 +21,12 @@ fn chain(place: &Place, name: &str, scheme: &str, seed: u32) {
     let map = "room.csv --scale 1 --k 10 --descriptors d.bin";
     place.ends(&format!("obfuscate {map} --scheme {scheme} --seed {seed} --out {name}"), 0);
     let oracle = format!(
-        "neighbors {name}/released.parquet --source oracle --truth {name}/truth.parquet --k 10 --inlier-ratio 0.5"
+        "neighbors {name}/released.npz --source oracle --truth {name}/truth.npz --k 10 --inlier-ratio 0.5"
     );
     place.ends(&format!("{oracle} --seed {seed} --out {name}-lists"), 0);
-    let truth = place.path(name).join("truth.parquet");
+    let truth = place.path(name).join("truth.npz");
     fs::rename(&truth, place.path("away")).unwrap();
-    let recover = format!("recover {name}/released.parquet --neighbors {name}-lists");
+    let recover = format!("recover {name}/released.npz --neighbors {name}-lists");
     place.ends(&format!("{recover} --seed {seed} --out {name}-back"), 0);
     fs::rename(place.path("away"), truth).unwrap();
 }
@@ -55,17 +55,16 @@ fn the_stages_print_the_row_of_the_audit() {
         let audit = place.json("a/audit.json");
         for (source, n_listed) in [("oracle", 10), ("overlap", 35), ("geometric", 50)] {
             if source != "oracle" {
-                let find = format!("neighbors hidden/released.parquet --source {source}");
+                let find = format!("neighbors hidden/released.npz --source {source}");
                 let (told, _) = place.ends(&format!("{find} --seed 7 --out hidden-lists"), 0);
                 let expected = format!(
                     "{POINTS} neighborhoods of up to {n_listed} by {source}, in hidden-lists\n"
                 );
                 assert_eq!(told, expected);
-                let recover = "recover hidden/released.parquet --neighbors hidden-lists --seed 7";
+                let recover = "recover hidden/released.npz --neighbors hidden-lists --seed 7";
                 place.ends(&format!("{recover} --out hidden-back"), 0);
             }
-            let staged =
-                place.prints("evaluate hidden-back --truth hidden/truth.parquet --json", 0);
+            let staged = place.prints("evaluate hidden-back --truth hidden/truth.npz --json", 0);
             let rows = audit["results"].as_array().expect("rows");
             // A source may also have rows of other solvers.
             let row = rows.iter().find(|r| r["neighbors"] == source && r["solver"] == "joint");
@@ -86,7 +85,7 @@ fn the_stages_print_the_row_of_the_audit() {
     }
     let mut files = std::collections::BTreeSet::new();
     for noise in ["uniform", "near", "clustered"] {
-        let line = "neighbors hidden/released.parquet --source oracle --truth hidden/truth.parquet --k 10 --inlier-ratio 0.5 --out lists";
+        let line = "neighbors hidden/released.npz --source oracle --truth hidden/truth.npz --k 10 --inlier-ratio 0.5 --out lists";
         place.ends(&format!("{line} --oracle-noise {noise}"), 0);
         files.insert(place.bytes("lists"));
     }
@@ -105,30 +104,30 @@ fn the_stages_of_images_print_the_row_of_the_audit() {
         place.ends(&format!("{audit} --out a"), 0);
         for row in place.json("a/audit.json")["results"].as_array().expect("rows") {
             let lists = match row["neighbors"].as_str() {
-                Some("oracle") => "oracle --truth hidden/truth.parquet --k 10 --inlier-ratio 0.5",
+                Some("oracle") => "oracle --truth hidden/truth.npz --k 10 --inlier-ratio 0.5",
                 _ => "overlap",
             };
-            let line = format!("neighbors hidden/released.parquet --source {lists} --seed 7");
+            let line = format!("neighbors hidden/released.npz --source {lists} --seed 7");
             place.ends(&format!("{line} --out lists"), 0);
-            let recover = "recover hidden/released.parquet --neighbors lists --seed 7";
+            let recover = "recover hidden/released.npz --neighbors lists --seed 7";
             place.ends(&format!("RAYON_NUM_THREADS=1 {recover} --out one"), 0);
             place.ends(&format!("RAYON_NUM_THREADS=2 {recover} --out back"), 0);
             assert!(place.bytes("one") == place.bytes("back"), "{scheme}");
-            let staged = place.prints("evaluate back --truth hidden/truth.parquet --json", 0);
+            let staged = place.prints("evaluate back --truth hidden/truth.npz --json", 0);
             assert!(staged["sure_unknown"].is_string(), "{scheme}");
             assert_eq!(as_staged(row, &staged), staged, "{scheme}");
         }
     }
     place.ends("obfuscate f.h5 --scheme lines2d --seed 8 --out other", 0);
     for (line, code, expected) in [
-        ("evaluate back --truth other/truth.parquet", 3, "back: fingerprint: expected "),
+        ("evaluate back --truth other/truth.npz", 3, "back: fingerprint: expected "),
         (
             "obfuscate f.h5 --scheme lines2d --scale 1 --out x",
             2,
             "--scale: expected with a map, found lines2d, which hides images\n",
         ),
         (
-            "neighbors hidden/released.parquet --source geometric",
+            "neighbors hidden/released.npz --source geometric",
             2,
             "--source geometric: expected with a map, found images\n",
         ),
@@ -145,16 +144,12 @@ fn files_of_another_map_are_refused() {
     // Both maps have the same number of points and records.
     chain(&place, "two", "ppl", 2);
     for (line, file, of) in [
-        ("evaluate one-back --truth two/truth.parquet", "one-back", "two/truth.parquet"),
+        ("evaluate one-back --truth two/truth.npz", "one-back", "two/truth.npz"),
+        ("recover one/released.npz --neighbors two-lists --out x", "two-lists", "one/released.npz"),
         (
-            "recover one/released.parquet --neighbors two-lists --out x",
-            "two-lists",
-            "one/released.parquet",
-        ),
-        (
-            "neighbors two/released.parquet --source oracle --truth one/truth.parquet --inlier-ratio 1 --out x",
-            "two/released.parquet",
-            "one/truth.parquet",
+            "neighbors two/released.npz --source oracle --truth one/truth.npz --inlier-ratio 1 --out x",
+            "two/released.npz",
+            "one/truth.npz",
         ),
     ] {
         let stderr = place.complains(line, 3);

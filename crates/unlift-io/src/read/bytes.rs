@@ -1,7 +1,7 @@
 //! Reads binary files and their numbers.
 
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use half::f16;
@@ -11,9 +11,9 @@ use crate::input::{self, Budget};
 
 /// A little-endian reader of binary files. It checks declared sizes against the remaining bytes,
 /// and errors name the current part of the file and the byte.
-pub(crate) struct Bytes {
+pub(crate) struct Bytes<R = BufReader<File>> {
     path: PathBuf,
-    reader: BufReader<File>,
+    reader: R,
     part: Part,
     value_at: u64,
     at: u64,
@@ -24,6 +24,8 @@ pub(crate) struct Bytes {
 enum Part {
     Header,
     Record(u64),
+    /// An array of an archive.
+    Array(String),
     End,
 }
 
@@ -33,9 +35,25 @@ impl Bytes {
         Ok(Self::continuing(path, BufReader::new(file), 0, len))
     }
 
+    pub fn skip(&mut self, bytes: u64, what: &str) -> Result<(), Error> {
+        self.check(bytes, what)?;
+        let offset = i64::try_from(bytes).expect("bounded by the size of the file");
+        self.reader.seek_relative(offset).map_err(|e| Error::read(&self.path, e))?;
+        self.value_at = self.at;
+        self.at += bytes;
+        Ok(())
+    }
+}
+
+impl<R: Read> Bytes<R> {
     /// Creates a reader of a file of `len` bytes of which `at` were already read.
-    pub fn continuing(path: &Path, reader: BufReader<File>, at: u64, len: u64) -> Self {
+    pub fn continuing(path: &Path, reader: R, at: u64, len: u64) -> Self {
         Self { path: path.to_owned(), reader, part: Part::Header, value_at: at, at, len }
+    }
+
+    /// Creates a reader of the array `name` of an archive, `len` bytes long when unpacked.
+    pub fn of_array(path: &Path, reader: R, name: &str, len: u64) -> Self {
+        Self { part: Part::Array(name.to_owned()), ..Self::continuing(path, reader, 0, len) }
     }
 
     /// Makes later errors name record `number`, counted from 1.
@@ -62,9 +80,12 @@ impl Bytes {
     }
 
     fn error_at(&self, at: u64, expected: impl Into<String>, found: impl Into<String>) -> Error {
-        let what = match self.part {
+        let what = match &self.part {
             Part::Header => "header".to_owned(),
             Part::Record(number) => format!("record {number}"),
+            Part::Array(name) => {
+                return Error::new(&self.path, format!("array {name}"), expected, found);
+            }
             Part::End => "end".to_owned(),
         };
         Error::new(&self.path, Place::Byte { what, at }, expected, found)
@@ -97,18 +118,29 @@ impl Bytes {
     pub fn fill(&mut self, buffer: &mut [u8], what: &str) -> Result<(), Error> {
         self.check(buffer.len() as u64, what)?;
         self.value_at = self.at;
-        self.reader.read_exact(buffer).map_err(|e| Error::read(&self.path, e))?;
+        self.reader.read_exact(buffer).map_err(|source| self.unreadable(source))?;
         self.at += buffer.len() as u64;
         Ok(())
     }
 
-    pub fn skip(&mut self, bytes: u64, what: &str) -> Result<(), Error> {
-        self.check(bytes, what)?;
-        let offset = i64::try_from(bytes).expect("bounded by the size of the file");
-        self.reader.seek_relative(offset).map_err(|e| Error::read(&self.path, e))?;
-        self.value_at = self.at;
-        self.at += bytes;
-        Ok(())
+    fn unreadable(&self, source: io::Error) -> Error {
+        match &self.part {
+            // An archive detects damage by checksums.
+            Part::Array(name) => {
+                let place = format!("array {name}");
+                Error::new(&self.path, place, "undamaged data", source.to_string())
+            }
+            _ => Error::read(&self.path, source),
+        }
+    }
+
+    /// Checks that an array ends here, where its checksum is compared.
+    pub fn end_of_array(&mut self) -> Result<(), Error> {
+        match self.reader.read(&mut [0]) {
+            Ok(0) => Ok(()),
+            Ok(_) => Err(self.error_ahead("the declared size", "a larger one")),
+            Err(source) => Err(self.unreadable(source)),
+        }
     }
 
     fn array<const N: usize>(&mut self, what: &str) -> Result<[u8; N], Error> {
@@ -224,6 +256,10 @@ impl Scalar {
 
     pub fn size(self) -> usize {
         self.size
+    }
+
+    pub fn is_whole(self) -> bool {
+        self.kind != b'f'
     }
 
     /// Reads a number from the first [`size`](Self::size) `bytes`, big-endian if `big` is set.

@@ -2,6 +2,7 @@
 //!
 //! Our own reader: few types are needed, and a header that declares 2^62 rows must be an error.
 
+use std::io::Read;
 use std::path::Path;
 
 use unlift::descriptors::Values;
@@ -30,7 +31,10 @@ pub fn positions(path: &Path) -> Result<Input, Error> {
     of_points(&mut Bytes::open(path)?, "npy")
 }
 
-pub(super) fn of_points(bytes: &mut Bytes, format: &'static str) -> Result<Input, Error> {
+pub(super) fn of_points<R: Read>(
+    bytes: &mut Bytes<R>,
+    format: &'static str,
+) -> Result<Input, Error> {
     let header = Header::read(bytes)?;
     let mut found = Input { format, ..Input::default() };
     let (rows, layout) = match header.points() {
@@ -45,7 +49,7 @@ pub(super) fn of_points(bytes: &mut Bytes, format: &'static str) -> Result<Input
         }
         None => return Err(bytes.error("an array of shape (n, 3)", header.shape_text())),
     };
-    let (columns, fortran) = match layout {
+    let columns = match layout {
         Layout::Rows { fields, size } => {
             check_size(bytes, rows, Some(size))?;
             let mut row = vec![0; size as usize];
@@ -55,13 +59,13 @@ pub(super) fn of_points(bytes: &mut Bytes, format: &'static str) -> Result<Input
             }
             return Ok(found);
         }
-        Layout::Matrix { columns } => (columns, header.fortran(bytes)?),
+        Layout::Matrix { columns } => columns,
     };
-    let Some((scalar, big)) = header.scalar() else { return Ok(found) };
-    let array = Array { scalar, big, fortran, rows, columns };
-    array.check(bytes)?;
+    let Some(numbers) = header.numbers(bytes)? else { return Ok(found) };
+    numbers.check(bytes)?;
     found.positions = vec![[0.0; 3]; rows as usize];
-    array.read(bytes, |_, row, column, value| {
+    numbers.read(bytes, |_, at, value| {
+        let (row, column) = (at / columns as usize, at % columns as usize);
         if column < 3 {
             found.positions[row][column] = value;
         }
@@ -118,11 +122,11 @@ pub fn descriptors(path: &Path, counts: [usize; 2]) -> Result<(Values, usize), E
     let mut bytes = Bytes::open(path)?;
     let header = Header::read(&mut bytes)?;
     let known = [Scalar::U8, Scalar::F16, Scalar::F32, Scalar::F64];
-    let Some((scalar, big)) = header.scalar().filter(|(scalar, _)| known.contains(scalar)) else {
+    let numbers = header.numbers(&bytes)?.filter(|numbers| known.contains(&numbers.scalar));
+    let Some(numbers) = numbers else {
         let expected = "bytes, or floats of 2, 4 or 8 bytes (u1, f2, f4, f8)";
         return Err(header.wrong_type(&bytes, expected));
     };
-    let fortran = header.fortran(&bytes)?;
     let (rows, columns) = match header.sides() {
         Some([rows, columns]) if counts.contains(&(rows as usize)) && columns > 0 => {
             (rows, columns)
@@ -139,66 +143,81 @@ pub fn descriptors(path: &Path, counts: [usize; 2]) -> Result<(Values, usize), E
             return Err(bytes.error(expected, found));
         }
     };
-    let array = Array { scalar, big, fortran, rows, columns };
-    array.check(&bytes)?;
+    numbers.check(&bytes)?;
     let (n, dim) = (rows as usize, columns as usize);
-    if scalar == Scalar::U8 {
+    if numbers.scalar == Scalar::U8 {
         let mut values = vec![0; n * dim];
-        array.read(&mut bytes, |_, row, column, value| {
-            values[row * dim + column] = value as u8;
+        numbers.read(&mut bytes, |_, at, value| {
+            values[at] = value as u8;
             Ok(())
         })?;
         return Ok((Values::U8(values), dim));
     }
     let mut values = vec![0.0; n * dim];
-    array.read(&mut bytes, |bytes, row, column, value| {
+    numbers.read(&mut bytes, |bytes, at, value| {
         let single = value as f32;
         if !single.is_finite() {
-            let expected = format!("a finite value (as a float of 4 bytes) in row {row}");
+            let expected = format!("a finite value (as a float of 4 bytes) in row {}", at / dim);
             return Err(bytes.error(expected, format!("{value:e}")));
         }
-        values[row * dim + column] = single;
+        values[at] = single;
         Ok(())
     })?;
     Ok((Values::F32(values), dim))
 }
 
-/// A matrix whose values come next in the file.
-struct Array {
-    scalar: Scalar,
+/// Numbers whose values come next in the file.
+pub(crate) struct Numbers {
+    pub scalar: Scalar,
+    pub shape: Vec<u64>,
     big: bool,
     fortran: bool,
-    rows: u64,
-    columns: u64,
 }
 
-impl Array {
-    fn check(&self, bytes: &Bytes) -> Result<(), Error> {
-        check_size(bytes, self.rows, self.columns.checked_mul(self.scalar.size() as u64))
+impl Numbers {
+    /// Checks that exactly the declared values remain.
+    pub fn check<R: Read>(&self, bytes: &Bytes<R>) -> Result<(), Error> {
+        let (rows, rest) = self.shape.split_first().unwrap_or((&1, &[]));
+        let size = self.scalar.size() as u64;
+        check_size(bytes, *rows, rest.iter().try_fold(size, |all, &side| all.checked_mul(side)))
     }
 
-    /// Calls `each` with row, column and value of every number, in the order of the file.
-    fn read(
+    /// Calls `each` with every number and its index in the order of rows, after
+    /// [`check`](Self::check).
+    pub fn read<R: Read>(
         &self,
-        bytes: &mut Bytes,
-        mut each: impl FnMut(&Bytes, usize, usize, f64) -> Result<(), Error>,
+        bytes: &mut Bytes<R>,
+        mut each: impl FnMut(&Bytes<R>, usize, f64) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        let (rows, columns) = (self.rows as usize, self.columns as usize);
-        let (outer, inner) = if self.fortran { (columns, rows) } else { (rows, columns) };
-        let mut buffer = [0; 8];
-        let buffer = &mut buffer[..self.scalar.size()];
-        for o in 0..outer {
-            for i in 0..inner {
-                bytes.fill(buffer, "values")?;
-                let (row, column) = if self.fortran { (i, o) } else { (o, i) };
-                each(bytes, row, column, self.scalar.read(buffer, self.big))?;
+        const CHUNK: usize = 1 << 13;
+        let size = self.scalar.size();
+        let n = self.shape.iter().product::<u64>() as usize;
+        let mut buffer = vec![0; size * CHUNK.min(n)];
+        for first in (0..n).step_by(CHUNK) {
+            let buffer = &mut buffer[..size * CHUNK.min(n - first)];
+            bytes.fill(buffer, "values")?;
+            for (at, value) in (first..).zip(buffer.chunks_exact(size)) {
+                let at = if self.fortran { self.row_major(at) } else { at };
+                each(bytes, at, self.scalar.read(value, self.big))?;
             }
         }
-        Ok(())
+        bytes.end_of_array()
+    }
+
+    /// Converts an index in the order of columns to one in the order of rows.
+    fn row_major(&self, mut at: usize) -> usize {
+        let mut stride = self.shape.iter().product::<u64>() as usize;
+        let mut index = 0;
+        for &side in &self.shape {
+            stride /= side as usize;
+            index += at % side as usize * stride;
+            at /= side as usize;
+        }
+        index
     }
 }
 
-fn check_size(bytes: &Bytes, rows: u64, row: Option<u64>) -> Result<(), Error> {
+fn check_size<R: Read>(bytes: &Bytes<R>, rows: u64, row: Option<u64>) -> Result<(), Error> {
     if row.and_then(|row| rows.checked_mul(row)) == Some(bytes.remaining()) {
         return Ok(());
     }
@@ -208,10 +227,10 @@ fn check_size(bytes: &Bytes, rows: u64, row: Option<u64>) -> Result<(), Error> {
 }
 
 /// The header of an array: a Python dictionary with three keys.
-pub(super) struct Header(Vec<u8>);
+pub(crate) struct Header(Vec<u8>);
 
 impl Header {
-    pub(super) fn read(bytes: &mut Bytes) -> Result<Self, Error> {
+    pub fn read<R: Read>(bytes: &mut Bytes<R>) -> Result<Self, Error> {
         let mut magic = [0; 8];
         bytes.fill(&mut magic, "magic and version")?;
         if &magic[..6] != MAGIC {
@@ -251,12 +270,17 @@ impl Header {
         Some(text[..end].trim())
     }
 
-    fn type_text(&self) -> &[u8] {
+    pub fn type_text(&self) -> &[u8] {
         self.value("descr").unwrap_or_default().trim_matches(['\'', '"']).as_bytes()
     }
 
     fn scalar(&self) -> Option<(Scalar, bool)> {
         stored(std::str::from_utf8(self.type_text()).ok()?)
+    }
+
+    /// Returns true if this is an array of integers.
+    pub fn is_whole(&self) -> bool {
+        self.scalar().is_some_and(|(scalar, _)| scalar.is_whole())
     }
 
     fn is_structured(&self) -> bool {
@@ -303,12 +327,12 @@ impl Header {
         ))
     }
 
-    fn wrong_type(&self, bytes: &Bytes, expected: &str) -> Error {
+    fn wrong_type<R: Read>(&self, bytes: &Bytes<R>, expected: &str) -> Error {
         bytes.error(expected, quoted(self.type_text()))
     }
 
     /// Returns true if columns are contiguous, false if rows are.
-    fn fortran(&self, bytes: &Bytes) -> Result<bool, Error> {
+    fn fortran<R: Read>(&self, bytes: &Bytes<R>) -> Result<bool, Error> {
         match self.value("fortran_order") {
             Some("True") => Ok(true),
             Some("False") => Ok(false),
@@ -319,14 +343,25 @@ impl Header {
         }
     }
 
-    fn shape_text(&self) -> String {
+    pub fn shape_text(&self) -> String {
         quoted(self.value("shape").unwrap_or_default().as_bytes())
     }
 
-    fn sides(&self) -> Option<[u64; 2]> {
+    pub fn shape(&self) -> Option<Vec<u64>> {
         let inner = self.value("shape")?.strip_prefix('(')?.strip_suffix(')')?;
-        let mut parts = inner.split(',').map(str::trim);
-        let sides = [number(parts.next()?.as_bytes())?, number(parts.next()?.as_bytes())?];
-        parts.all(str::is_empty).then_some(sides)
+        let sides = inner.split(',').map(str::trim).filter(|side| !side.is_empty());
+        sides.map(|side| number(side.as_bytes())).collect()
+    }
+
+    fn sides(&self) -> Option<[u64; 2]> {
+        self.shape()?.try_into().ok()
+    }
+
+    /// Returns how the numbers are stored, or `None` if this is an array of something else.
+    pub fn numbers<R: Read>(&self, bytes: &Bytes<R>) -> Result<Option<Numbers>, Error> {
+        let Some(((scalar, big), shape)) = self.scalar().zip(self.shape()) else {
+            return Ok(None);
+        };
+        Ok(Some(Numbers { scalar, shape, big, fortran: self.fortran(bytes)? }))
     }
 }

@@ -1,10 +1,10 @@
-//! Reads positions from NumPy archives.
+//! NumPy archives: their arrays by name, and positions of a map.
 
-use std::io::{self, BufReader, Read, Seek};
-use std::path::Path;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
 
 use zip::ZipArchive;
-use zip::read::ZipFile;
 use zip::result::ZipError;
 
 use super::bytes::Bytes;
@@ -14,42 +14,101 @@ use crate::error::Error;
 use crate::guard::without_panic;
 use crate::input::{self, Budget};
 use crate::read::map_input::Input;
+use crate::stage;
+
+/// An open NumPy archive.
+#[derive(Debug)]
+pub(crate) struct Archive {
+    path: PathBuf,
+    zip: ZipArchive<BufReader<File>>,
+    budget: Budget,
+}
+
+impl Archive {
+    /// Opens the archive `path`.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        let (file, len) = input::open(path)?;
+        let mut file = BufReader::new(file);
+        let head = file.fill_buf().map_err(|source| Error::read(path, source))?;
+        let found = match head.get(..4).unwrap_or(head) {
+            b"" => "an empty file",
+            b"PAR1" => "a Parquet file, as earlier versions wrote",
+            head if head.starts_with(b"PK") => "",
+            _ => "another file",
+        };
+        let wrong =
+            |found: String| Error::new(path, "", "an archive of NumPy arrays (.npz)", found);
+        if !found.is_empty() {
+            return Err(wrong(found.to_owned()));
+        }
+        let zip = without_panic(|| ZipArchive::new(file));
+        let zip = zip.unwrap_or(Err(ZipError::InvalidArchive("a damaged one".into())));
+        let zip = zip.map_err(|error| wrong(cause(error)))?;
+        Ok(Self { path: path.to_owned(), zip, budget: Budget::new(path, len) })
+    }
+
+    /// The memory that decoding may use.
+    pub fn budget(&self) -> &Budget {
+        &self.budget
+    }
+
+    /// Returns index and name of each array, in the order of the archive.
+    pub fn arrays(&self) -> Result<Vec<(usize, String)>, Error> {
+        let mut arrays = Vec::new();
+        for (at, name) in self.zip.file_names().enumerate() {
+            let name = name.map_err(|error| {
+                Error::new(&self.path, format!("entry {at}"), "a name", cause(error))
+            })?;
+            arrays.extend(name.strip_suffix(".npy").map(|name| (at, name.to_owned())));
+        }
+        Ok(arrays)
+    }
+
+    /// Starts reading the entry at index `at`, the array `name`, and returns its size in bytes.
+    pub fn entry(&mut self, at: usize, name: &str) -> Result<(impl Read, u64), Error> {
+        let place = format!("array {name}");
+        let entry = self.zip.by_index(at).map_err(|error| {
+            Error::new(&self.path, &*place, "an array that is stored or deflated", cause(error))
+        })?;
+        let size = entry.size();
+        self.budget.admit(place, size)?;
+        Ok((entry, size))
+    }
+
+    fn array(&mut self, at: usize, name: &str) -> Result<Bytes<impl Read>, Error> {
+        let path = self.path.clone();
+        let (entry, size) = self.entry(at, name)?;
+        Ok(Bytes::of_array(&path, entry, name, size))
+    }
+}
+
+/// Describes an error of the archive, without the words that repeat its type.
+fn cause(error: ZipError) -> String {
+    match error {
+        ZipError::InvalidArchive(cause) => cause.into_owned(),
+        ZipError::UnsupportedArchive(cause) => cause.to_owned(),
+        other => other.to_string(),
+    }
+}
 
 /// Reads positions from the array of points in a NumPy archive. Several or none are an error.
 pub fn positions(path: &Path) -> Result<Input, Error> {
-    let damaged = || Error::new(path, "", "an archive of NumPy arrays", "a damaged one");
-    without_panic(|| in_archive(path)).unwrap_or_else(|| Err(damaged()))
-}
-
-fn in_archive(path: &Path) -> Result<Input, Error> {
-    /// The maximum size of an array header.
-    const HEADER: u64 = 1 << 16;
-    let (file, len) = input::open(path)?;
-    let wrong =
-        |error: ZipError| Error::new(path, "", "an archive of NumPy arrays", error.to_string());
-    let mut archive = ZipArchive::new(BufReader::new(file)).map_err(wrong)?;
-    // Arrays are unpacked into an anonymous temporary file, so that only headers are in memory.
-    let unpacked = |entry: ZipFile<'_, _>, most: u64| -> Result<Bytes, Error> {
-        let mut file = tempfile::tempfile().map_err(|error| Error::read(path, error))?;
-        let copied = io::copy(&mut entry.take(most), &mut file);
-        let n =
-            copied.and_then(|n| file.rewind().map(|()| n)).map_err(|error| wrong(error.into()))?;
-        Ok(Bytes::continuing(path, BufReader::new(file), 0, n))
-    };
-    let (mut all, mut fit) = (Vec::new(), Vec::new());
-    let mut n_columns = Vec::new();
-    for at in 0..archive.len() {
-        let entry = archive.by_index(at).map_err(wrong)?;
-        let name = entry.name().map_err(wrong)?;
-        let Some(name) = name.strip_suffix(".npy").map(str::to_owned) else { continue };
-        let header = unpacked(entry, HEADER).and_then(|mut bytes| Header::read(&mut bytes));
+    let mut archive = Archive::open(path)?;
+    let all = archive.arrays()?;
+    if all.iter().any(|(_, name)| name.rsplit('/').next() == Some("unlift")) {
+        let kind = stage::declared_kind(path).map(|kind| kind.to_string());
+        let found = kind.unwrap_or_else(|| "a stage file of unlift".to_owned());
+        return Err(Error::new(path, "", "points of a map", found));
+    }
+    let (mut fit, mut n_columns) = (Vec::new(), Vec::new());
+    for (at, name) in &all {
+        let header = archive.array(*at, name).and_then(|mut bytes| Header::read(&mut bytes));
         if let Some((_, layout)) = header.ok().and_then(|header| header.points()) {
             n_columns.push(if let Layout::Matrix { columns } = layout { columns } else { 3 });
-            fit.push((at, name.clone()));
+            fit.push((*at, &**name));
         }
-        all.push(name);
     }
-    let has = |start: &str| all.iter().any(|name| name.starts_with(start));
+    let has = |start: &str| all.iter().any(|(_, name)| name.starts_with(start));
     // Some programs store position, size and angle of keypoints in one array, beside descriptors.
     let beside_descriptors = has("descriptors") && n_columns.iter().all(|&n| n > 3);
     if has("keypoints") || has("OPENSFM_FEATURES") || beside_descriptors {
@@ -59,18 +118,16 @@ fn in_archive(path: &Path) -> Result<Input, Error> {
     if fit.iter().filter(|(_, name)| is_known(name)).count() == 1 {
         fit.retain(|(_, name)| is_known(name));
     }
-    let [(at, name)] = &fit[..] else {
-        let fit: Vec<String> = fit.into_iter().map(|(_, name)| name).collect();
+    let [(at, name)] = fit[..] else {
+        let fit: Vec<&str> = fit.into_iter().map(|(_, name)| name).collect();
+        let all: Vec<&str> = all.iter().map(|(_, name)| &**name).collect();
         let names = if fit.is_empty() { &all } else { &fit };
         let names: Vec<String> = names.iter().take(5).map(|name| quoted(name.as_bytes())).collect();
         let found = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
         let expected = "one array of points, (n, 3), or one that is called points or xyz";
         return Err(Error::new(path, "", expected, found));
     };
-    let entry = archive.by_index(*at).map_err(wrong)?;
-    let size = entry.size();
-    Budget::new(path, len).admit(&**name, size)?;
-    let mut found = of_points(&mut unpacked(entry, size)?, "npz")?;
+    let mut found = of_points(&mut archive.array(at, name)?, "npz")?;
     if all.len() > 1 {
         found.notes.push(format!("read, the array {} of {}", quoted(name.as_bytes()), all.len()));
     }

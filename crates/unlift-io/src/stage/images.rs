@@ -1,113 +1,112 @@
-//! Reads many images from one stage file.
+//! Stage files of many images: the arrays of an image are below its name, `a.jpg/foot`.
 
-use super::header::{Kind, Meta};
-use super::neighborhoods::neighborhoods_of;
-use super::pages::Stay;
-use super::parts::{Batches, Parts};
-use super::recovered::recovered_of;
-use super::released::released_of;
-use super::table::Table;
-use super::truth::truth_of;
-use crate::Error;
-use arrow_array::cast::AsArray;
-use arrow_array::{Array, RecordBatch};
 use std::collections::HashSet;
-use std::collections::hash_map::DefaultHasher;
-use std::hash::{Hash, Hasher};
-use std::path::Path;
+use std::fs::File;
+use std::io::{BufWriter, Read};
+use std::path::{Path, PathBuf};
+
+use serde_json::{Map, Value};
 use unlift::neighbors::Neighborhoods;
 use unlift::recover::Recovered;
 use unlift::released::Released;
 use unlift::truth::{Original, Secret};
 
-/// The column with the image of a row.
-pub(super) const IMAGE: &str = "image";
-/// The column with the metadata of an image, equal in all of its rows.
-pub(super) const IMAGE_META: &str = "image_meta";
+use super::arrays::Arrays;
+use super::lists::neighborhoods_of;
+use super::meta::{KEY, Meta, to_text};
+use super::recovered::recovered_of;
+use super::released::released_of;
+use super::truth::truth_of;
+use super::write::{Written, Zip};
+use super::{Kind, lists, recovered, released, truth};
+use crate::Error;
+use crate::atomic::OutputFile;
+use crate::read::npz::Archive;
 
-/// All columns that a stage file of images may have. Others are not decoded.
-const COLUMNS: &str = "image image_meta foot_x foot_y direction_x direction_y center axis offset x y descriptor \
-                       descriptor_0 descriptor_1 slot original swapped_axis descriptor_row dropped records scores \
-                       status support evidence found error_scale point neighbors";
-
-/// Returns true if the stage file `path` contains images: it has a column `image`.
-///
-/// # Errors
-/// When it is not a Parquet file.
-pub fn has_images(path: &Path) -> Result<bool, Error> {
-    Ok(Table::open(path)?.has(IMAGE))
-}
-
-/// A reader of a stage file of images, whose rows are contiguous. One image and a few thousand rows
-/// are in memory.
+/// A reader of a stage file of images. One image is in memory.
 pub struct ImageFile<'a> {
     path: &'a Path,
-    whole: Table<'a>,
-    kind: Kind,
-    batches: Batches,
-    n_taken: u64,
-    /// Hashes of the names so far, to detect rows that are not contiguous.
-    seen: HashSet<u64>,
+    archive: Archive,
+    /// The metadata of the file.
+    meta: Meta<'a>,
+    /// The images in reverse order, with the index and name of each array.
+    waiting: Vec<(String, Vec<(usize, String)>)>,
 }
 
-/// The rows of one image.
+/// The arrays of one image.
 pub struct ImageRows<'a> {
     name: String,
-    path: &'a Path,
-    meta: Meta<'a>,
-    held: Vec<RecordBatch>,
+    arrays: Arrays<'a>,
 }
 
 impl<'a> ImageFile<'a> {
     /// Opens `path`, a file of images of `kind`.
     ///
     /// # Errors
-    /// When it is not a stage file of this kind, or has no column `image`.
+    /// When it is not a stage file of this kind, has no images, or the arrays of an image do not
+    /// follow one another.
     pub fn open(path: &'a Path, kind: Kind) -> Result<Self, Error> {
-        let whole = Table::open_kind(path, kind)?;
-        if !whole.has(IMAGE) {
-            return Err(Error::new(path, format!("column {IMAGE}"), "text", "no such column"));
+        let meta = Arrays::open(path)?.meta().clone();
+        if let Some(found) = meta.kind()?.filter(|found| *found != kind) {
+            return Err(Error::new(path, "", kind.to_string(), found.to_string()));
         }
-        let parts = Parts::open(path)?;
-        let fields = parts.schema().fields().iter().enumerate();
-        let is_known = |name: &str| COLUMNS.split(' ').any(|known| known == name);
-        let known = fields.filter(|(_, field)| is_known(field.name()));
-        let roots: Vec<usize> = known.map(|(at, _)| at).collect();
-        let batches = parts.batches(&roots, Stay::Whole)?;
-        Ok(Self { path, whole, kind, batches, n_taken: 0, seen: HashSet::new() })
+        let archive = Archive::open(path)?;
+        let mut images: Vec<(String, Vec<(usize, String)>)> = Vec::new();
+        let mut names = HashSet::new();
+        for (at, name) in archive.arrays()? {
+            let Some((image, array)) = name.rsplit_once('/') else {
+                if name == KEY {
+                    continue;
+                }
+                let expected = "arrays below the names of images, as a.jpg/foot";
+                return Err(Error::new(path, "", expected, format!("array {name}")));
+            };
+            if images.last().is_none_or(|(last, _)| last != image) {
+                if !names.insert(image.to_owned()) {
+                    let found = format!("image {image} again");
+                    return Err(Error::new(path, "", "the arrays of each image together", found));
+                }
+                images.push((image.to_owned(), Vec::new()));
+            }
+            if let Some((_, arrays)) = images.last_mut() {
+                arrays.push((at, array.to_owned()));
+            }
+        }
+        if images.is_empty() {
+            return Err(Error::new(path, "", "arrays of images, as a.jpg/foot", "none"));
+        }
+        images.reverse();
+        Ok(Self { path, archive, meta, waiting: images })
     }
 
     /// Reads the next image. Returns `None` at the end.
     ///
     /// # Errors
-    /// When the file is damaged, a row names no image, or the rows of an image are not contiguous.
+    /// When the file is damaged, or an array is too large.
     pub fn next_image(&mut self) -> Result<Option<ImageRows<'a>>, Error> {
-        let Some(first) = self.rows()? else { return Ok(None) };
-        let name = self.name(&first, 0)?;
-        let mut hasher = DefaultHasher::new();
-        name.hash(&mut hasher);
-        if !self.seen.insert(hasher.finish()) {
-            let found = format!("{name} again");
-            return Err(self.wrong("contiguous rows of each image", found));
+        let Some((name, arrays)) = self.waiting.pop() else { return Ok(None) };
+        let of_image = |error: Error| error.within(&place(&name));
+        let mut held = Vec::with_capacity(arrays.len());
+        for (at, array) in arrays {
+            held.push((array.clone(), self.file(at, &array).map_err(of_image)?));
         }
-        let meta_text = self.meta_text(&first)?;
-        let meta = self.whole.meta().of_image(meta_text.as_deref());
-        let meta = meta.map_err(|error| error.within(&place(&name)))?;
-        let mut held = Vec::new();
-        let mut next = Some(first);
-        while let Some(rows) = next.take() {
-            let n = self.n_of(&rows, &name)?;
-            let is_whole = n == rows.num_rows();
-            self.n_taken += n as u64;
-            let rows = self.batches.take(rows, n);
-            if n > 0 {
-                held.push(rows);
-            }
-            if is_whole {
-                next = self.rows()?;
-            }
+        let budget = self.archive.budget().clone();
+        let arrays = Arrays::of_image(self.path, held, budget, &self.meta).map_err(of_image)?;
+        Ok(Some(ImageRows { name, arrays }))
+    }
+
+    /// Unpacks the entry at index `at`, the array `name`.
+    fn file(&mut self, at: usize, name: &str) -> Result<Vec<u8>, Error> {
+        let mut file: Vec<u8> = Vec::new();
+        let (entry, size) = self.archive.entry(at, name)?;
+        let read = entry.take(size.saturating_add(1)).read_to_end(&mut file);
+        let wrong =
+            |found: String| Error::new(self.path, format!("array {name}"), "undamaged data", found);
+        match read {
+            Ok(n) if n as u64 == size => Ok(file),
+            Ok(_) => Err(wrong(format!("another size than {size} bytes"))),
+            Err(source) => Err(wrong(source.to_string())),
         }
-        Ok(Some(ImageRows { name, path: self.path, meta, held }))
     }
 
     /// Reads the next image, which must be `name` as in the file `of`.
@@ -130,65 +129,15 @@ impl<'a> ImageFile<'a> {
     /// # Errors
     /// When one follows.
     pub fn expect_end(&mut self, of: &Path) -> Result<(), Error> {
-        match self.next_image()? {
+        match self.waiting.last() {
             None => Ok(()),
-            Some(rows) => {
+            Some((name, _)) => {
                 let expected = format!("no more images, as in {}", of.display());
-                Err(Error::new(self.path, "", expected, format!("image {}", rows.name)))
+                Err(Error::new(self.path, "", expected, format!("image {name}")))
             }
         }
-    }
-
-    /// The kind of the file.
-    pub fn kind(&self) -> Kind {
-        self.kind
-    }
-
-    fn rows(&mut self) -> Result<Option<RecordBatch>, Error> {
-        loop {
-            match self.batches.next()? {
-                Some(batch) if batch.num_rows() == 0 => {}
-                other => return Ok(other),
-            }
-        }
-    }
-
-    fn texts<'b>(&self, rows: &'b RecordBatch, name: &str) -> Result<Texts<'b>, Error> {
-        let Some(column) = rows.column_by_name(name) else { return Ok(None) };
-        if column.data_type().is_null() {
-            return Ok(None);
-        }
-        let found = || format!("type {}", column.data_type());
-        let texts = column.as_string_opt::<i32>();
-        let wrong = || Error::new(self.path, format!("column {name}"), "text", found());
-        texts.map(Some).ok_or_else(wrong)
-    }
-
-    fn name(&self, rows: &RecordBatch, row: usize) -> Result<String, Error> {
-        let names = self.texts(rows, IMAGE)?.filter(|names| names.is_valid(row));
-        let name = names.map(|names| names.value(row).to_owned());
-        name.ok_or_else(|| self.wrong("the name of an image", "null".to_owned()))
-    }
-
-    fn meta_text(&self, rows: &RecordBatch) -> Result<Option<String>, Error> {
-        let texts = self.texts(rows, IMAGE_META)?.filter(|texts| texts.is_valid(0));
-        Ok(texts.map(|texts| texts.value(0).to_owned()))
-    }
-
-    fn n_of(&self, rows: &RecordBatch, name: &str) -> Result<usize, Error> {
-        let names = self.texts(rows, IMAGE)?;
-        let is_other = |row: &usize| {
-            names.is_none_or(|names| names.is_null(*row) || names.value(*row) != name)
-        };
-        Ok((0..rows.num_rows()).find(is_other).unwrap_or(rows.num_rows()))
-    }
-
-    fn wrong(&self, expected: &str, found: String) -> Error {
-        Error::new(self.path, format!("column {IMAGE}, row {}", self.n_taken), expected, found)
     }
 }
-
-type Texts<'b> = Option<&'b arrow_array::StringArray>;
 
 fn place(name: &str) -> String {
     format!("image {name}")
@@ -226,7 +175,7 @@ impl ImageRows<'_> {
         n_records: usize,
         slots_per_record: usize,
     ) -> Result<Neighborhoods, Error> {
-        self.read(|table| neighborhoods_of(table, n_records, slots_per_record))
+        self.read(|arrays| neighborhoods_of(arrays, n_records, slots_per_record))
     }
 
     /// Returns the recovered points of the image.
@@ -234,11 +183,108 @@ impl ImageRows<'_> {
     /// # Errors
     /// When `read_recovered` would fail.
     pub fn recovered(self) -> Result<Recovered<2>, Error> {
-        self.read(|table| recovered_of(table, None))
+        self.read(|arrays| recovered_of(arrays, None))
     }
 
-    fn read<T>(self, read: impl FnOnce(&Table<'_>) -> Result<T, Error>) -> Result<T, Error> {
-        let table = Table::held(self.path, self.meta, self.held);
-        read(&table).map_err(|error| error.within(&place(&self.name)))
+    fn read<T>(self, read: impl FnOnce(&Arrays<'_>) -> Result<T, Error>) -> Result<T, Error> {
+        read(&self.arrays).map_err(|error| error.within(&place(&self.name)))
+    }
+}
+
+/// Metadata keys of the file. All others are stored per image.
+const OF_ALL: [&str; 5] = ["kind", "version", "unit", "family", "slots_per_record"];
+
+/// A writer of a stage file of images, into an [`OutputFile`] that the caller commits.
+///
+/// Nothing is kept in memory but names. The same images in the same order give the same bytes.
+/// Images without rows are not stored.
+pub struct ImageWriter<'a> {
+    path: PathBuf,
+    /// Until the first image decides the metadata of the file.
+    file: Option<&'a mut BufWriter<File>>,
+    started: Option<(Zip<'a>, Map<String, Value>)>,
+}
+
+impl<'a> ImageWriter<'a> {
+    /// Starts a file of images.
+    pub fn start(output: &'a mut OutputFile) -> Self {
+        let path = output.path().to_owned();
+        Self { path, file: Some(output.writer()), started: None }
+    }
+
+    /// Adds a released image.
+    ///
+    /// # Errors
+    /// When its family differs from the first image, or the disk fails.
+    pub fn released(&mut self, name: &str, released: &Released<2>) -> Result<(), Error> {
+        let written = released::written(&self.path, released)?;
+        self.append(name, written)
+    }
+
+    /// Adds the ground truth of an image.
+    ///
+    /// # Errors
+    /// When the secret does not belong to these points, or the disk fails.
+    pub fn truth(
+        &mut self,
+        name: &str,
+        original: &Original<2>,
+        secret: &Secret,
+    ) -> Result<(), Error> {
+        let written = truth::written(&self.path, original, secret);
+        let written = written.map_err(|error| error.within(&place(name)))?;
+        self.append(name, written)
+    }
+
+    /// Adds the neighborhoods of an image.
+    ///
+    /// # Errors
+    /// When the disk fails.
+    pub fn neighborhoods(&mut self, name: &str, lists: &Neighborhoods) -> Result<(), Error> {
+        self.append(name, lists::written(lists))
+    }
+
+    /// Adds the recovered points of an image.
+    ///
+    /// # Errors
+    /// When an evidence or delta is not finite, or the disk fails.
+    pub fn recovered(&mut self, name: &str, recovered: &Recovered<2>) -> Result<(), Error> {
+        let written = recovered::written(&self.path, recovered);
+        let written = written.map_err(|error| error.within(&place(name)))?;
+        self.append(name, written)
+    }
+
+    /// Completes the file. The caller must then commit its [`OutputFile`].
+    ///
+    /// # Errors
+    /// When no image had rows, or the disk fails.
+    pub fn finish(self) -> Result<(), Error> {
+        let Some((zip, _)) = self.started else {
+            return Err(Error::new(self.path, "", "an image with points", "none"));
+        };
+        zip.finish().map_err(|source| Error::write(&self.path, source))
+    }
+
+    fn append(&mut self, name: &str, written: Written<'_>) -> Result<(), Error> {
+        if written.n_rows == 0 {
+            return Ok(());
+        }
+        let failed = |source| Error::write(&self.path, source);
+        let (of_all, own): (Map<_, _>, Map<_, _>) =
+            written.meta.clone().into_iter().partition(|(key, _)| OF_ALL.contains(&key.as_str()));
+        if let Some(file) = self.file.take() {
+            let mut zip = Zip::new(file);
+            zip.text(KEY, &to_text(&of_all)).map_err(failed)?;
+            self.started = Some((zip, of_all.clone()));
+        }
+        let Some((zip, first)) = &mut self.started else { unreachable!("the first image starts") };
+        if *first != of_all {
+            let expected = "the family and unit of the first image";
+            return Err(Error::new(&self.path, place(name), expected, to_text(&of_all)));
+        }
+        if !own.is_empty() {
+            zip.text(&format!("{name}/{KEY}"), &to_text(&own)).map_err(failed)?;
+        }
+        zip.arrays(&format!("{name}/"), written).map_err(failed)
     }
 }

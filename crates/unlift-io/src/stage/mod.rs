@@ -1,41 +1,130 @@
-//! Stage files: the Parquet tables that commands exchange, each of one kind, or a folder of its
-//! parts.
+//! Stage files: the NumPy archives (`.npz`) that commands exchange, each of one kind, of a map or
+//! of many images.
 //!
-//! `docs/formats.md` describes them for writers in other languages. Released maps, neighborhoods
-//! and recovered points contain nothing of the ground truth: no ids, names or times of their
-//! source. Equal values make equal bytes.
+//! `docs/formats.md` describes them. Released maps, lists and recovered points contain nothing of
+//! the ground truth: no ids, names or times of their source. Equal values make equal bytes.
 //!
-//! Readers accept numbers of any width, lists of any type, null or NaN for missing values, and
-//! missing metadata and columns that can be inferred. Any other deviation is one line that names
-//! the file, the column and row (counted from 0), what was expected and what was found.
+//! Readers accept what `np.savez` and `np.savez_compressed` write: floats of any width, integers of
+//! any width, either order of memory and of bytes. Any deviation from the document is one line that
+//! names the file, the array and row (counted from 0), what was expected and what was found.
 
-mod column;
-mod file;
-mod footer;
-mod header;
-mod image_writer;
+mod arrays;
 mod images;
-mod manifest;
-mod neighborhoods;
-mod order;
-mod pages;
-mod parts;
-mod peek;
+mod lists;
+mod meta;
 mod recovered;
 mod released;
-mod table;
-mod thrift;
 mod truth;
 mod write;
 
-pub use header::Kind;
-pub use image_writer::ImageWriter;
-pub use images::{ImageFile, ImageRows, has_images};
-pub use neighborhoods::{
-    PointNeighborhoods, read_neighborhoods, read_point_neighborhoods, write_neighborhoods,
-};
-pub use parts::part_files;
-pub use peek::{Header, declared_kind, peek};
+use std::fmt;
+use std::path::Path;
+
+use crate::Error;
+use arrays::Arrays;
+
+pub use images::{ImageFile, ImageRows, ImageWriter};
+pub use lists::{read_neighborhoods, read_point_neighborhoods, write_neighborhoods};
 pub use recovered::{read_recovered, read_recovered_in, write_recovered};
 pub use released::{read_released, scheme_name, write_released};
 pub use truth::{read_truth, write_truth};
+
+/// The content of a stage file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// An obfuscated map: the attacker's side.
+    Released,
+    /// Originals and the secret of an obfuscation: the owner's side.
+    Truth,
+    /// Lists of records, one per slot.
+    Neighborhoods,
+    /// Lists of original points, one per point.
+    PointNeighborhoods,
+    /// Recovered points, one per slot.
+    Recovered,
+}
+
+impl Kind {
+    /// All kinds.
+    pub const ALL: [Kind; 5] = [
+        Self::Released,
+        Self::Truth,
+        Self::Neighborhoods,
+        Self::PointNeighborhoods,
+        Self::Recovered,
+    ];
+
+    /// The name used in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Released => "released",
+            Self::Truth => "truth",
+            Self::Neighborhoods => "neighborhoods",
+            Self::PointNeighborhoods => "point_neighborhoods",
+            Self::Recovered => "recovered",
+        }
+    }
+
+    /// Returns the kind with the name `name`, if there is one.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+
+    /// The arrays that a file of this kind may have, besides the metadata.
+    fn arrays(self) -> &'static [&'static str] {
+        match self {
+            Self::Released => &released::ARRAYS,
+            Self::Truth => &truth::ARRAYS,
+            Self::Neighborhoods => &["records", "scores"],
+            Self::PointNeighborhoods => &["neighbors", "scores"],
+            Self::Recovered => &recovered::ARRAYS,
+        }
+    }
+
+    /// Returns the kind that alone may have such arrays.
+    fn of_arrays<'a>(mut names: impl Iterator<Item = &'a str>) -> Option<Self> {
+        names.find_map(|name| {
+            let mut kinds = Self::ALL.into_iter().filter(|kind| kind.arrays().contains(&name));
+            kinds.next().filter(|_| kinds.next().is_none())
+        })
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Released => "a released map",
+            Self::Truth => "a truth file",
+            Self::Neighborhoods => "neighborhoods of slots",
+            Self::PointNeighborhoods => "neighborhoods of points",
+            Self::Recovered => "a file of recovered points",
+        })
+    }
+}
+
+/// Reads the kind and the dimension of the stage file `path`, which decide the reader and `D`.
+///
+/// The dimension is that of the space, 2 for images; `None` for lists of a map.
+///
+/// # Errors
+/// When the file is not a stage file of a known kind and version.
+pub fn peek(path: &Path) -> Result<(Kind, Option<u64>), Error> {
+    let arrays = Arrays::open(path)?;
+    let kind = arrays.kind()?;
+    let kind = kind.ok_or_else(|| Error::new(path, "", "a stage file of unlift", arrays.list()))?;
+    Ok((kind, arrays.dimension()?))
+}
+
+/// Returns true if the stage file `path` contains many images, below their names.
+///
+/// # Errors
+/// When it is not a NumPy archive.
+pub fn has_images(path: &Path) -> Result<bool, Error> {
+    Ok(Arrays::open(path)?.is_of_images())
+}
+
+/// Returns the kind that the metadata of the file at `path` declares, if it is a stage file and
+/// declares one.
+pub fn declared_kind(path: &Path) -> Option<Kind> {
+    Arrays::open(path).ok()?.meta().kind().ok()?
+}

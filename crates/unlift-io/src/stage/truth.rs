@@ -1,24 +1,22 @@
 //! The owner's file: originals, and the slot that hides each of them.
 
-use super::column::{Batch, Type, coordinate_names};
-use super::header::{Kind, insert_fingerprint, new_meta};
-use super::order::permutation;
-use super::table::Table;
-use super::write::{Written, write_table};
-use crate::Error;
-use crate::atomic::Access;
-use arrow_array::StringArray;
-use arrow_array::types::{Float64Type, UInt8Type, UInt32Type};
-use arrow_schema::DataType::Utf8;
-use arrow_schema::Field;
-use serde_json::json;
 use std::path::Path;
-use std::sync::Arc;
+
+use serde_json::json;
 use unlift::truth::{DropReason, Dropped, Original, Secret};
 use unlift::{OriginalId, PointSet};
 
-/// Writes the ground truth of an obfuscation, one row per original point: first the slots in order,
-/// then the dropped points with their reasons.
+use super::Kind;
+use super::arrays::{Arrays, NONE};
+use super::meta::{insert_fingerprint, new_meta};
+use super::write::{Written, write_file};
+use crate::Error;
+use crate::atomic::Access;
+
+pub(super) const ARRAYS: [&str; 5] =
+    ["position", "slot", "dropped", "swapped_axis", "descriptor_row"];
+
+/// Writes the ground truth of an obfuscation, one row per original point.
 ///
 /// # Errors
 /// When `secret` has another number of points, or the file cannot be written.
@@ -27,168 +25,157 @@ pub fn write_truth<const D: usize>(
     original: &Original<D>,
     secret: &Secret,
 ) -> Result<(), Error> {
-    write_table((path, Access::Private), &written(path, original, secret)?)
+    write_file(path, Access::Private, written(path, original, secret)?)
 }
 
 pub(super) fn written<'a, const D: usize>(
     path: &Path,
     original: &'a Original<D>,
-    secret: &'a Secret,
+    secret: &Secret,
 ) -> Result<Written<'a>, Error> {
     let points = original.reveal();
-    if points.len() != secret.n_originals() {
-        let expected = format!("{} originals, as in the secret", secret.n_originals());
+    let n = secret.n_originals();
+    if points.len() != n {
+        let expected = format!("{n} originals, as in the secret");
         return Err(Error::new(path, "", expected, points.len().to_string()));
     }
     let mut meta = new_meta(Kind::Truth);
-    meta.insert("dimension".into(), json!(D));
     meta.insert("unit".into(), json!(points.unit().name()));
     meta.insert("slots_per_record".into(), json!(secret.slots_per_record()));
     insert_fingerprint(&mut meta, secret.map());
-    let n_slots = secret.n_slots();
-    let dropped = secret.dropped().iter().map(|d| d.original);
-    let ids: Arc<[OriginalId]> = secret.hidden().iter().copied().chain(dropped).collect();
-    let slot = move |row: usize| (row < n_slots).then_some(row);
-    let mut written = Written::new(meta, points.len());
-    written.optional_numbers::<UInt32Type>("slot", move |row| slot(row).map(|slot| slot as u32));
-    let of_row = ids.clone();
-    written.numbers::<UInt32Type>("original", move |row| of_row[row].0);
-    for (axis, name) in coordinate_names::<D>("").into_iter().enumerate() {
-        let of_row = ids.clone();
-        let coordinate = move |row: usize| points.positions()[of_row[row].index()][axis];
-        written.numbers::<Float64Type>(name, coordinate);
+    let mut written = Written::new(meta, n);
+    written.vectors("position", points.positions());
+    // Returns a value of each slot in the order of originals, -1 for dropped ones.
+    let by_original = |of_slot: &dyn Fn(usize) -> i32| {
+        let mut values = vec![-1; n];
+        for (slot, original) in secret.hidden().iter().enumerate() {
+            values[original.index()] = of_slot(slot);
+        }
+        values.into_iter()
+    };
+    written.array("slot", &[n], by_original(&|slot| slot as i32));
+    if !secret.dropped().is_empty() {
+        let mut reasons = vec![0u8; n];
+        for dropped in secret.dropped() {
+            let code = DropReason::ALL.iter().position(|reason| *reason == dropped.reason);
+            reasons[dropped.original.index()] = 1 + code.unwrap_or_default() as u8;
+        }
+        written.array("dropped", &[n], reasons.into_iter());
     }
     if let Some(axes) = secret.swapped_axis() {
-        let axis = move |row| slot(row).map(|slot| axes[slot]);
-        written.optional_numbers::<UInt8Type>("swapped_axis", axis);
+        let axes = by_original(&|slot| axes[slot].into()).map(|axis| axis as i8);
+        written.array("swapped_axis", &[n], axes);
     }
-    let descriptor_row = move |row| slot(row).map(|slot| secret.descriptor_row()[slot]);
-    written.optional_numbers::<UInt32Type>("descriptor_row", descriptor_row);
-    written.column(Field::new("dropped", Utf8, true), move |rows| {
-        let reason = |row: usize| Some(secret.dropped()[row.checked_sub(n_slots)?].reason.name());
-        Arc::new(rows.map(reason).collect::<StringArray>())
-    });
+    if secret.slots_per_record() > 1 {
+        let rows = by_original(&|slot| secret.descriptor_row()[slot] as i32);
+        written.array("descriptor_row", &[n], rows);
+    }
     Ok(written)
 }
 
 /// Reads the ground truth of an obfuscation of dimension `D` (see [`peek`](super::peek)).
 ///
-/// Some columns are optional: `slot` and `original` if they equal the order of rows, `dropped` if
-/// every point is in a record, `descriptor_row` if records have one slot.
+/// Some arrays are optional: `slot` if the originals are in the order of slots, `dropped` if the
+/// reasons are unknown, `descriptor_row` if records have one slot.
 ///
 /// # Errors
 /// When the file differs from `docs/formats.md`.
 pub fn read_truth<const D: usize>(path: &Path) -> Result<(Original<D>, Secret), Error> {
-    truth_of(&Table::open_kind(path, Kind::Truth)?)
+    truth_of(&Arrays::open(path)?)
 }
 
-#[derive(Default)]
-struct Rows<const D: usize> {
-    originals: Vec<u32>,
-    positions: Vec<[f64; D]>,
-    /// The points that are in a record, in the order of rows.
-    slots: Vec<u32>,
-    hidden: Vec<OriginalId>,
-    axes: Vec<u8>,
-    descriptor_rows: Vec<Option<u32>>,
-    dropped: Vec<Dropped>,
-}
-
-pub(super) fn truth_of<const D: usize>(table: &Table<'_>) -> Result<(Original<D>, Secret), Error> {
-    let path = table.path();
-    let core = |source| table.refused(source);
-    table.expect_dimension::<D>()?;
-    let unit = table.unit::<D>(None)?;
-    let n_rows = table.n_rows();
-    let coordinates = coordinate_names::<D>("");
-    let optional = [
-        ("slot", Type::Integer),
-        ("original", Type::Integer),
-        ("descriptor_row", Type::Integer),
-        ("dropped", Type::Text),
-        ("swapped_axis", Type::Integer),
-    ];
-    let mut columns = table.present(&optional);
-    columns.extend(coordinates.iter().map(|name| (name.as_str(), Type::Float)));
-    let declared = table.meta().count("slots_per_record")?;
-    let with_axis = table.has("swapped_axis");
-    let paired = declared.is_some_and(|slots| slots > 1) || table.has("descriptor_row");
-    let mut rows = Rows::<D>::default();
-    table.read(&columns, |batch| {
-        batch.vectors(&coordinates, &mut rows.positions)?;
-        read_rows(table, batch, paired, &mut rows)
-    })?;
-    let Rows { originals, positions, slots, hidden, axes, descriptor_rows, dropped } = rows;
-    if let Some(&slot) = slots.iter().find(|&&slot| slot as usize >= slots.len()) {
-        let expected = format!("slots below {}, the number of slots", slots.len());
-        return Err(Error::new(path, "column slot", expected, slot.to_string()));
+pub(super) fn truth_of<const D: usize>(
+    arrays: &Arrays<'_>,
+) -> Result<(Original<D>, Secret), Error> {
+    arrays.expect(Kind::Truth)?;
+    let core = |source| arrays.refused(source);
+    let unit = arrays.unit::<D>(None)?;
+    let positions = arrays.vectors("position", None)?;
+    let n = positions.len();
+    // Returns the array `name` by original, or `None` if there is none.
+    let column = |name: &str, below: usize| match arrays.has(name) {
+        true => arrays.integers(name, [Some(n)], below, true).map(|(values, _)| Some(values)),
+        false => Ok(None),
+    };
+    let slot = column("slot", n)?.unwrap_or_else(|| (0..n as u32).collect());
+    let n_slots = slot.iter().filter(|&&slot| slot != NONE).count();
+    let mut hidden = vec![NONE; n_slots];
+    for (original, &slot) in slot.iter().enumerate().filter(|(_, slot)| **slot != NONE) {
+        match hidden.get_mut(slot as usize) {
+            Some(place) if *place == NONE => *place = original as u32,
+            Some(earlier) => {
+                let found = format!("{slot} as in row {earlier}");
+                return Err(arrays.wrong("slot", original, "each slot once", found));
+            }
+            None => {
+                let expected = format!("slots below {n_slots}, the number of slots");
+                return Err(arrays.wrong("slot", original, expected, slot.to_string()));
+            }
+        }
     }
-    let order = permutation(path, "slot", &slots)?;
-    let row_of = permutation(path, "original", &originals)?;
-    let positions = row_of.iter().map(|&row| positions[row as usize]).collect();
+    // Returns an array of a number per hidden point in the order of slots.
+    let by_slot = |name: &str, values: Vec<u32>| -> Result<Vec<u32>, Error> {
+        for (original, (value, slot)) in values.iter().zip(&slot).enumerate() {
+            if (*value == NONE) != (*slot == NONE) {
+                let (expected, found) = match *slot {
+                    NONE => ("-1, as there is no slot", value.to_string()),
+                    _ => ("a number, as there is a slot", "-1".to_owned()),
+                };
+                return Err(arrays.wrong(name, original, expected, found));
+            }
+        }
+        Ok(hidden.iter().map(|&original| values[original as usize]).collect())
+    };
+    let axes = column("swapped_axis", D)?.map(|axes| by_slot("swapped_axis", axes)).transpose()?;
+    let axes = axes.map(|axes| axes.into_iter().map(|axis| axis as u8).collect());
+    let slots = arrays.meta().slots_per_record()?;
+    let rows = match column("descriptor_row", n)? {
+        Some(rows) => by_slot("descriptor_row", rows)?,
+        None if slots == Some(2) => {
+            let expected = "the descriptor row of each point, as records have two slots";
+            return Err(Error::new(
+                arrays.path(),
+                "array descriptor_row",
+                expected,
+                "no such array",
+            ));
+        }
+        None => (0..n_slots as u32).collect(),
+    };
+    let dropped = dropped(arrays, &slot)?;
+    let hidden = hidden.into_iter().map(OriginalId).collect();
+    let secret = Secret::try_new(hidden, axes, rows, dropped, n).map_err(core)?;
+    // Crossed descriptor rows imply two slots.
+    let slots = slots.unwrap_or(secret.slots_per_record());
+    let secret = secret.of_map(arrays.meta().fingerprint()?, slots).map_err(core)?;
     let points = PointSet::try_new(positions, unit).map_err(core)?;
-    let own = |(slot, &at): (usize, &u32)| descriptor_rows[at as usize].unwrap_or(slot as u32);
-    let secret = Secret::try_new(
-        order.iter().map(|&at| hidden[at as usize]).collect(),
-        with_axis.then(|| order.iter().map(|&at| axes[at as usize]).collect()),
-        order.iter().enumerate().map(own).collect(),
-        dropped,
-        n_rows as usize,
-    );
-    let secret = secret.map_err(core)?;
-    // Earlier versions did not state the number of slots; crossed descriptor rows imply two.
-    let slots = declared.unwrap_or(secret.slots_per_record());
-    let secret = secret.of_map(table.meta().fingerprint()?, slots).map_err(core)?;
     Ok((Original::new(points), secret))
 }
 
-fn read_rows<const D: usize>(
-    table: &Table<'_>,
-    batch: &Batch<'_>,
-    paired: bool,
-    to: &mut Rows<D>,
-) -> Result<(), Error> {
-    let n_rows = table.n_rows();
-    let first = to.originals.len() as u32;
-    let originals = match table.has("original") {
-        true => batch.integers("original", n_rows)?,
-        false => (first..first + batch.len() as u32).collect(),
+/// Returns the originals without a slot, with their reasons.
+fn dropped(arrays: &Arrays<'_>, slot: &[u32]) -> Result<Vec<Dropped>, Error> {
+    let n = slot.len();
+    let reasons = match arrays.has("dropped") {
+        true => Some(arrays.integers("dropped", [Some(n)], 1 + DropReason::ALL.len(), false)?.0),
+        false => None,
     };
-    let slot = batch.optional_integers("slot", n_rows)?;
-    let descriptor_row = batch.optional_integers("descriptor_row", n_rows)?;
-    let axis = batch.optional_integers("swapped_axis", D as u64)?;
-    let reasons = batch.texts("dropped");
-    for (row, &id) in originals.iter().enumerate() {
-        let original = OriginalId(id);
-        // Without slots, points that were not dropped are in the order of slots.
-        let in_order =
-            (!table.has("slot") && reasons[row].is_none()).then_some(to.slots.len() as u32);
-        let Some(slot) = slot[row].or(in_order) else {
-            let reason = reasons[row].and_then(DropReason::from_name);
-            let names = || DropReason::ALL.map(DropReason::name).join(", ");
-            let reason = reason.ok_or_else(|| {
-                let expected = format!("one of {}, as slot is null", names());
-                batch.wrong("dropped", row, expected, reasons[row].unwrap_or("null"))
-            })?;
-            to.dropped.push(Dropped { original, reason });
-            continue;
+    let mut dropped = Vec::new();
+    for (original, &slot) in slot.iter().enumerate() {
+        let code = reasons.as_ref().map(|reasons| reasons[original] as usize);
+        let reason = match (slot, code) {
+            (NONE, None) => DropReason::Other,
+            (NONE, Some(0)) => {
+                let expected = "the code of a reason, as there is no slot";
+                return Err(arrays.wrong("dropped", original, expected, "0"));
+            }
+            (NONE, Some(code)) => DropReason::ALL[code - 1],
+            (_, None | Some(0)) => continue,
+            (_, Some(code)) => {
+                let expected = "0, as there is a slot";
+                return Err(arrays.wrong("dropped", original, expected, code.to_string()));
+            }
         };
-        if let Some(reason) = reasons[row] {
-            return Err(batch.wrong("dropped", row, "null, as there is a slot", reason));
-        }
-        let needed = |name: &str, value: Option<u32>| {
-            value.ok_or_else(|| batch.wrong(name, row, "a number, as there is a slot", "null"))
-        };
-        to.slots.push(slot);
-        to.hidden.push(original);
-        to.descriptor_rows.push(match paired {
-            true => Some(needed("descriptor_row", descriptor_row[row])?),
-            false => None,
-        });
-        if table.has("swapped_axis") {
-            to.axes.push(needed("swapped_axis", axis[row])? as u8);
-        }
+        dropped.push(Dropped { original: OriginalId(original as u32), reason });
     }
-    to.originals.extend(originals);
-    Ok(())
+    Ok(dropped)
 }

@@ -1,183 +1,218 @@
-//! Writes columns to a Parquet file.
+//! Writes arrays to a NumPy archive, one after the other.
 
-use super::header::to_text;
+use std::cell::RefCell;
+use std::fs::File;
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::path::Path;
+use std::rc::Rc;
+
+use serde_json::{Map, Value};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, System, ZipWriter};
+
+use super::meta::{KEY, to_text};
 use crate::Error;
 use crate::atomic::{self, Access};
-use arrow_array::types::ArrowPrimitiveType;
-use arrow_array::{ArrayRef, ListArray, PrimitiveArray, RecordBatch};
-use arrow_buffer::OffsetBuffer;
-use arrow_schema::{DataType, Field, Schema, SchemaRef};
-use parquet::arrow::ArrowWriter;
-use parquet::arrow::arrow_writer::ArrowWriterOptions;
-use parquet::basic::Compression;
-use parquet::errors::ParquetError;
-use parquet::file::metadata::KeyValue;
-use parquet::file::properties::{EnabledStatistics, WriterProperties};
-use parquet::schema::types::ColumnPath;
-use serde_json::{Map, Value};
-use std::io;
-use std::ops::Range;
-use std::path::Path;
-use std::sync::Arc;
 
-/// Rows that are converted at a time.
-const CHUNK_ROWS: usize = 1 << 14;
-
-/// The maximum number of rows of a row group, so that an engine can distribute groups to machines.
-pub(super) const GROUP_ROWS: usize = 1 << 20;
-
-/// The maximum size of a row group in bytes, because a group is in memory until it is complete.
-const GROUP_BYTES: usize = 256 << 20;
-
-/// A table to write. Equal values make equal bytes.
+/// Arrays with metadata. Equal values make equal bytes.
 pub(super) struct Written<'a> {
     pub(super) meta: Map<String, Value>,
     pub(super) n_rows: usize,
-    fields: Vec<Field>,
-    columns: Vec<Column<'a>>,
+    arrays: Vec<Array<'a>>,
 }
 
-/// A function that returns some rows of a column.
-type Column<'a> = Box<dyn Fn(Range<usize>) -> ArrayRef + 'a>;
+struct Array<'a> {
+    name: &'static str,
+    descr: &'static str,
+    shape: Vec<usize>,
+    /// The size of all values in bytes.
+    size: usize,
+    fill: Box<dyn FnOnce(&mut dyn Write) -> io::Result<()> + 'a>,
+}
+
+/// A number of an array.
+pub(super) trait Number {
+    const DESCR: &'static str;
+
+    fn put(self, to: &mut Vec<u8>);
+}
+
+macro_rules! numbers {
+    ($($number:ty: $descr:literal),*) => {$(
+        impl Number for $number {
+            const DESCR: &'static str = $descr;
+
+            fn put(self, to: &mut Vec<u8>) {
+                to.extend(self.to_le_bytes());
+            }
+        }
+    )*};
+}
+
+numbers!(u8: "|u1", i8: "|i1", u16: "<u2", i32: "<i4", f32: "<f4", f64: "<f8");
 
 impl<'a> Written<'a> {
     pub(super) fn new(meta: Map<String, Value>, n_rows: usize) -> Self {
-        Self { meta, n_rows, fields: Vec::new(), columns: Vec::new() }
+        Self { meta, n_rows, arrays: Vec::new() }
     }
 
-    pub(super) fn column(&mut self, field: Field, rows: impl Fn(Range<usize>) -> ArrayRef + 'a) {
-        self.fields.push(field);
-        self.columns.push(Box::new(rows));
-    }
-
-    pub(super) fn numbers<T: ArrowPrimitiveType>(
+    /// Adds an array of `shape` with `values` in the order of rows.
+    pub(super) fn array<T: Number>(
         &mut self,
-        name: impl Into<String>,
-        number: impl Fn(usize) -> T::Native + 'a,
+        name: &'static str,
+        shape: &[usize],
+        values: impl Iterator<Item = T> + 'a,
     ) {
-        self.column(Field::new(name, T::DATA_TYPE, false), move |rows| {
-            Arc::new(PrimitiveArray::<T>::from_iter_values(rows.map(&number)))
-        });
+        const CHUNK: usize = 1 << 16;
+        let size = shape.iter().product::<usize>() * size_of::<T>();
+        let fill = move |to: &mut dyn Write| {
+            let mut chunk = Vec::with_capacity(CHUNK);
+            for value in values {
+                value.put(&mut chunk);
+                if chunk.len() + size_of::<T>() > CHUNK {
+                    to.write_all(&chunk)?;
+                    chunk.clear();
+                }
+            }
+            to.write_all(&chunk)
+        };
+        let (shape, fill) = (shape.to_vec(), Box::new(fill));
+        self.arrays.push(Array { name, descr: T::DESCR, shape, size, fill });
     }
 
-    pub(super) fn optional_numbers<T: ArrowPrimitiveType>(
+    /// Adds an array of vectors.
+    pub(super) fn vectors<T: Number + Copy, const D: usize>(
         &mut self,
-        name: impl Into<String>,
-        number: impl Fn(usize) -> Option<T::Native> + 'a,
+        name: &'static str,
+        rows: &'a [[T; D]],
     ) {
-        self.column(Field::new(name, T::DATA_TYPE, true), move |rows| {
-            Arc::new(rows.map(&number).collect::<PrimitiveArray<T>>())
-        });
-    }
-
-    /// Adds a column of lists. `lists` returns the values of some rows, concatenated, and the
-    /// length of each list.
-    pub(super) fn lists<T: ArrowPrimitiveType>(
-        &mut self,
-        name: impl Into<String>,
-        lists: impl Fn(Range<usize>) -> (Vec<T::Native>, Vec<usize>) + 'a,
-    ) {
-        let of = Field::new("element", T::DATA_TYPE, false);
-        self.column(Field::new_list(name, of.clone(), false), move |rows| {
-            let (values, lengths) = lists(rows);
-            let values = Arc::new(PrimitiveArray::<T>::from_iter_values(values));
-            let offsets = OffsetBuffer::from_lengths(lengths);
-            Arc::new(ListArray::new(Arc::new(of.clone()), offsets, values, None))
-        });
-    }
-
-    pub(super) fn fields(&self) -> &[Field] {
-        &self.fields
-    }
-
-    pub(super) fn rows(&self, rows: &Range<usize>) -> Vec<ArrayRef> {
-        self.columns.iter().map(|column| column(rows.clone())).collect()
+        self.array(name, &[rows.len(), D], rows.as_flattened().iter().copied());
     }
 }
 
-pub(super) fn write_table(to: (&Path, Access), written: &Written<'_>) -> Result<(), Error> {
-    let properties = properties(to_text(written.meta.clone()), &written.fields, GROUP_ROWS);
-    let schema = Arc::new(Schema::new(written.fields.clone()));
-    let mut starts = (0..written.n_rows).step_by(CHUNK_ROWS);
-    write_batches(to, schema.clone(), properties, || {
-        let Some(start) = starts.next() else { return Ok(None) };
-        let rows = start..written.n_rows.min(start + CHUNK_ROWS);
-        let batch = RecordBatch::try_new(schema.clone(), written.rows(&rows));
-        batch.map(Some).map_err(|error| Error::write(to.0, io::Error::other(error)))
+/// Writes a stage file.
+pub(super) fn write_file(path: &Path, access: Access, written: Written<'_>) -> Result<(), Error> {
+    atomic::write_file(path, access, |file| {
+        let mut zip = Zip::new(file);
+        zip.text(KEY, &to_text(&written.meta))?;
+        zip.arrays("", written)?;
+        zip.finish()
     })
 }
 
-/// Writes rows from `next` until it returns `None`.
-pub(super) fn write_batches(
-    (path, access): (&Path, Access),
-    schema: SchemaRef,
-    properties: WriterProperties,
-    mut next: impl FnMut() -> Result<Option<RecordBatch>, Error>,
-) -> Result<(), Error> {
-    // An error of reading is returned as it is.
-    let mut unread = None;
-    let done = atomic::write_file(path, access, |file| {
-        let mut writer = writer(file, schema, properties).map_err(to_io)?;
-        loop {
-            match next() {
-                Ok(Some(batch)) => writer.write(&batch).map_err(to_io)?,
-                Ok(None) => break,
-                Err(error) => {
-                    unread = Some(error);
-                    return Err(io::Error::other("unread"));
-                }
-            }
-        }
-        writer.close().map(drop).map_err(to_io)
-    });
-    unread.map_or(done, Err)
+/// A writer of an archive.
+pub(super) struct Zip<'a> {
+    writer: ZipWriter<Target<'a>>,
+    error: FirstError,
 }
 
-pub(super) fn writer<W: io::Write + Send>(
-    file: W,
-    schema: SchemaRef,
-    properties: WriterProperties,
-) -> Result<ArrowWriter<W>, ParquetError> {
-    let options = ArrowWriterOptions::new()
-        .with_properties(properties)
-        .with_schema_root("schema".into())
-        .with_skip_arrow_metadata(true);
-    ArrowWriter::try_new_with_options(file, schema, options)
-}
+type FirstError = Rc<RefCell<Option<io::Error>>>;
 
-pub(super) fn properties(meta: String, fields: &[Field], group_rows: usize) -> WriterProperties {
-    let mut properties = WriterProperties::builder()
-        // A new version of the crate must not change bytes.
-        .set_created_by("unlift version 1".into())
-        .set_compression(Compression::SNAPPY)
-        .set_max_row_group_row_count(Some(group_rows))
-        .set_max_row_group_bytes(Some(GROUP_BYTES))
-        .set_statistics_enabled(EnabledStatistics::None)
-        .set_offset_index_disabled(true)
-        .set_dictionary_enabled(false)
-        .set_key_value_metadata(Some(vec![KeyValue::new(super::header::KEY.into(), meta)]));
-    for field in fields {
-        let name = field.name().clone();
-        // Parquet has no 8-bit type. A dictionary reduces bytes and names to a quarter.
-        let path = match field.data_type() {
-            DataType::UInt8 | DataType::Utf8 => vec![name],
-            DataType::List(of) if *of.data_type() == DataType::UInt8 => {
-                vec![name, "list".into(), "element".into()]
-            }
-            _ => continue,
-        };
-        properties = properties.set_column_dictionary_enabled(ColumnPath::new(path), true);
+impl<'a> Zip<'a> {
+    pub(super) fn new(file: &'a mut BufWriter<File>) -> Self {
+        let error = FirstError::default();
+        let target = Target { file, at: 0, end: 0, failed: false, error: error.clone() };
+        Self { writer: ZipWriter::new(target), error }
     }
-    properties.build()
+
+    /// Writes the text `name`, an array without dimensions.
+    pub(super) fn text(&mut self, name: &str, text: &str) -> io::Result<()> {
+        let letters: Vec<u8> = text.chars().flat_map(|c| u32::from(c).to_le_bytes()).collect();
+        let descr = format!("<U{}", letters.len() / 4);
+        self.start(name, &descr, &[], letters.len())?;
+        self.writer.write_all(&letters)?;
+        self.so_far()
+    }
+
+    /// Writes all arrays, with `prefix` before their names.
+    pub(super) fn arrays(&mut self, prefix: &str, written: Written<'_>) -> io::Result<()> {
+        for array in written.arrays {
+            let name = format!("{prefix}{}", array.name);
+            self.start(&name, array.descr, &array.shape, array.size)?;
+            (array.fill)(&mut self.writer)?;
+            self.so_far()?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn finish(self) -> io::Result<()> {
+        let Self { writer, error } = self;
+        writer.finish()?.flush()?;
+        error.take().map_or(Ok(()), Err)
+    }
+
+    fn so_far(&self) -> io::Result<()> {
+        self.error.take().map_or(Ok(()), Err)
+    }
+
+    /// Starts the array `name` with its header.
+    fn start(&mut self, name: &str, descr: &str, shape: &[usize], size: usize) -> io::Result<()> {
+        let sides = match shape {
+            [n] => format!("{n},"),
+            sides => sides.iter().map(usize::to_string).collect::<Vec<_>>().join(", "),
+        };
+        let text = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({sides}), }}");
+        // Magic, version and length take 10 bytes, the end of the line one.
+        let length = (text.len() + 11).next_multiple_of(64) - 10;
+        let mut header = b"\x93NUMPY\x01\x00".to_vec();
+        header.extend((length as u16).to_le_bytes());
+        header.extend(format!("{text:<width$}\n", width = length - 1).into_bytes());
+        let is_large = (header.len() + size) as u64 >= zip::ZIP64_BYTES_THR;
+        let options = SimpleFileOptions::default()
+            .compression_method(CompressionMethod::Stored)
+            .last_modified_time(DateTime::DEFAULT)
+            .system(System::Unix)
+            .large_file(is_large);
+        self.writer.start_file(format!("{name}.npy"), options)?;
+        self.writer.write_all(&header)
+    }
 }
 
-/// Extracts the I/O error, so that a full disk is reported as one.
-pub(super) fn to_io(error: ParquetError) -> io::Error {
-    match error {
-        ParquetError::External(source) => match source.downcast::<io::Error>() {
-            Ok(source) => *source,
-            Err(source) => io::Error::other(source),
-        },
-        other => io::Error::other(other),
+/// A file that keeps its first error instead of returning it: a `ZipWriter` that is dropped after an
+/// error tries again and prints.
+struct Target<'a> {
+    file: &'a mut BufWriter<File>,
+    at: u64,
+    end: u64,
+    failed: bool,
+    error: FirstError,
+}
+
+impl Target<'_> {
+    fn note(&mut self, step: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) {
+        let mut error = self.error.borrow_mut();
+        if !self.failed {
+            self.failed = step(self.file).map_err(|source| *error = Some(source)).is_err();
+        }
+    }
+}
+
+impl Write for Target<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.note(|file| file.write_all(bytes));
+        self.at += bytes.len() as u64;
+        self.end = self.end.max(self.at);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.note(|file| file.flush());
+        Ok(())
+    }
+}
+
+impl Seek for Target<'_> {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        let to = match to {
+            SeekFrom::Start(at) => Some(at),
+            SeekFrom::Current(by) => self.at.checked_add_signed(by),
+            SeekFrom::End(by) => self.end.checked_add_signed(by),
+        };
+        let to = to.ok_or(io::ErrorKind::InvalidInput)?;
+        if to != self.at {
+            self.note(|file| file.seek(SeekFrom::Start(to)).map(drop));
+            self.at = to;
+        }
+        Ok(to)
     }
 }

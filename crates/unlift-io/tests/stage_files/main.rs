@@ -1,13 +1,6 @@
 //! Tests stage files through the public API.
 
-mod damaged;
-mod document;
-mod hostile;
-mod lenient;
-mod malformed;
-mod malformed_lists;
 mod maps;
-mod python;
+mod numpy;
 mod round_trip;
-mod tables;
-mod third_party;
+mod strict;

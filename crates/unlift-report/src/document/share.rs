@@ -80,7 +80,7 @@ fn without_places(text: &mut String) {
 fn withhold(option: &str, value: &mut Value) {
     match value {
         Value::String(text) => {
-            // `--neighbors oracle+x` is a choice, `--neighbors lists.parquet` a file of the owner.
+            // `--neighbors oracle+x` is a choice, `--neighbors lists.npz` a file of the owner.
             let is_choice = |c: char| c.is_ascii_lowercase() || c == '+';
             let names = NAMING_OPTIONS.contains(&option)
                 || (option == "neighbors" && !text.chars().all(is_choice))

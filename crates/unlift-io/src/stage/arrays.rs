@@ -1,0 +1,374 @@
+//! Reads the arrays of one map, or of one image, by name.
+
+use std::cell::RefCell;
+use std::io::Read;
+use std::path::Path;
+
+use unlift::Unit;
+
+use super::Kind;
+use super::meta::{KEY, Meta};
+use crate::Error;
+use crate::input::Budget;
+use crate::read::bytes::Bytes;
+use crate::read::npy::Header;
+use crate::read::npz::Archive;
+
+/// Stands for -1, "none", in whole numbers.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// The longest metadata in bytes. It holds a few names and numbers.
+const MOST_TEXT: u64 = 1 << 16;
+
+/// The arrays of one map or image.
+pub(super) struct Arrays<'a> {
+    path: &'a Path,
+    names: Vec<String>,
+    held: Held,
+    budget: Budget,
+    meta: Meta<'a>,
+}
+
+enum Held {
+    /// Per name, the index in the archive.
+    Archive(RefCell<Archive>, Vec<usize>),
+    /// Per name, the file of the array.
+    Memory(Vec<Vec<u8>>),
+}
+
+impl<'a> Arrays<'a> {
+    /// Opens the file `path`.
+    pub(super) fn open(path: &'a Path) -> Result<Self, Error> {
+        let archive = Archive::open(path)?;
+        let budget = archive.budget().clone();
+        let (places, names) = archive.arrays()?.into_iter().unzip();
+        let meta = Meta::parse(path, None)?;
+        let held = Held::Archive(RefCell::new(archive), places);
+        let arrays = Self { path, names, held, budget, meta };
+        Ok(Self { meta: Meta::parse(path, arrays.text()?.as_deref())?, ..arrays })
+    }
+
+    /// Takes the arrays of one image of the file `path`, each with its name and its file.
+    pub(super) fn of_image(
+        path: &'a Path,
+        arrays: Vec<(String, Vec<u8>)>,
+        budget: Budget,
+        of_all: &Meta<'a>,
+    ) -> Result<Self, Error> {
+        let (names, files) = arrays.into_iter().unzip();
+        let arrays = Self { path, names, held: Held::Memory(files), budget, meta: of_all.clone() };
+        Ok(Self { meta: of_all.of_image(arrays.text()?.as_deref())?, ..arrays })
+    }
+
+    pub(super) fn path(&self) -> &'a Path {
+        self.path
+    }
+
+    pub(super) fn meta(&self) -> &Meta<'a> {
+        &self.meta
+    }
+
+    pub(super) fn has(&self, name: &str) -> bool {
+        self.names.iter().any(|known| known == name)
+    }
+
+    /// Lists the names for an error.
+    pub(super) fn list(&self) -> String {
+        match self.names.len() {
+            0 => "no array".to_owned(),
+            n => format!(
+                "arrays {}{}",
+                self.names[..n.min(5)].join(", "),
+                if n > 5 { ", .." } else { "" }
+            ),
+        }
+    }
+
+    /// The kind by the metadata, else by the arrays.
+    pub(super) fn kind(&self) -> Result<Option<Kind>, Error> {
+        let names =
+            self.names.iter().map(|name| name.rsplit_once('/').map_or(&**name, |name| name.1));
+        Ok(self.meta.kind()?.or_else(|| Kind::of_arrays(names)))
+    }
+
+    /// Checks that these are arrays of `kind` only. Ambiguous ones are taken for it.
+    pub(super) fn expect(&self, kind: Kind) -> Result<(), Error> {
+        let found = self.kind()?.unwrap_or(kind);
+        if found != kind {
+            return Err(Error::new(self.path, "", kind.to_string(), found.to_string()));
+        }
+        let is_unknown = |name: &&String| *name != KEY && !kind.arrays().contains(&name.as_str());
+        match self.names.iter().find(is_unknown) {
+            None => Ok(()),
+            Some(name) => {
+                let expected = format!("only {KEY}, {}", kind.arrays().join(", "));
+                Err(Error::new(self.path, format!("array {name}"), expected, "an unknown array"))
+            }
+        }
+    }
+
+    /// True for the file of many images.
+    pub(super) fn is_of_images(&self) -> bool {
+        self.names.iter().any(|name| name.contains('/'))
+    }
+
+    /// The number of coordinates of a place; `None` for lists.
+    pub(super) fn dimension(&self) -> Result<Option<u64>, Error> {
+        if self.is_of_images() {
+            return Ok(Some(2));
+        }
+        let mut shape = None;
+        for name in ["position", "direction", "origin"] {
+            if shape.is_none() && self.has(name) {
+                shape = self.file(name, |bytes| Ok(Header::read(bytes)?.shape()))?;
+            }
+        }
+        // Planes have no array with an entry per axis.
+        let of_planes = || match self.meta.unit() {
+            Ok(unit) if self.has("offset") => Some(if unit == Some(Unit::Pixel) { 2 } else { 3 }),
+            _ => None,
+        };
+        Ok(shape.and_then(|shape| shape.last().copied()).or_else(of_planes))
+    }
+
+    /// The unit of all lengths: as declared, else `usual`, else pixels in 2D.
+    pub(super) fn unit<const D: usize>(&self, usual: Option<Unit>) -> Result<Unit, Error> {
+        let in_plane = (D == 2).then_some(Unit::Pixel);
+        let unit = self.meta.unit()?.or(usual).or(in_plane);
+        unit.ok_or_else(|| self.meta.wrong_unit())
+    }
+
+    pub(super) fn refused(&self, source: unlift::Error) -> Error {
+        Error::core(self.path, source)
+    }
+
+    /// An error about row `row` of the array `name`.
+    pub(super) fn wrong(
+        &self,
+        name: &str,
+        row: usize,
+        expected: impl Into<String>,
+        found: impl Into<String>,
+    ) -> Error {
+        Error::new(self.path, format!("array {name}, row {row}"), expected, found)
+    }
+
+    /// Reads finite numbers, whose array has `sides`; `None` is any.
+    pub(super) fn floats<const N: usize>(
+        &self,
+        name: &str,
+        sides: [Option<usize>; N],
+    ) -> Result<(Vec<f64>, [usize; N]), Error> {
+        let finite = |x: f64| Some(x).filter(|x| x.is_finite());
+        self.numbers(name, sides, Class::Any, "a finite number", finite)
+    }
+
+    /// Reads a row of `D` finite numbers for each of `n` rows, or for any number of them.
+    pub(super) fn vectors<const D: usize>(
+        &self,
+        name: &str,
+        n: Option<usize>,
+    ) -> Result<Vec<[f64; D]>, Error> {
+        let (values, _) = self.floats(name, [n, Some(D)])?;
+        Ok(values.as_chunks().0.to_vec())
+    }
+
+    /// Reads `D` finite numbers.
+    pub(super) fn vector<const D: usize>(&self, name: &str) -> Result<[f64; D], Error> {
+        let (values, _) = self.floats(name, [Some(D)])?;
+        Ok(std::array::from_fn(|axis| values[axis]))
+    }
+
+    /// Reads one optional number per row as `f32`; without the array, `usual`.
+    pub(super) fn singles(
+        &self,
+        name: &str,
+        n: usize,
+        usual: f32,
+        (rule, holds): (&str, impl Fn(f64) -> bool),
+    ) -> Result<Vec<f32>, Error> {
+        if !self.has(name) {
+            return Ok(vec![usual; n]);
+        }
+        let single = |x: f64| Some(x as f32).filter(|_| holds(x));
+        Ok(self.numbers(name, [Some(n)], Class::Any, rule, single)?.0)
+    }
+
+    /// Reads whole numbers from 0 to `below - 1`, and -1 for [`NONE`] if `or_none`.
+    pub(super) fn integers<const N: usize>(
+        &self,
+        name: &str,
+        sides: [Option<usize>; N],
+        below: usize,
+        or_none: bool,
+    ) -> Result<(Vec<u32>, [usize; N]), Error> {
+        let none = if or_none { ", or -1 for none" } else { "" };
+        let rule = format!("a whole number below {below}{none}");
+        let below = (below as u64).min(u64::from(NONE)) as f64;
+        self.numbers(name, sides, Class::Whole, &rule, |x| match x {
+            -1.0 if or_none => Some(NONE),
+            x => (0.0..below).contains(&x).then_some(x as u32),
+        })
+    }
+
+    /// Reads integers from 0 to 255 as bytes, or finite floats.
+    pub(super) fn bytes_or_floats<const N: usize>(
+        &self,
+        name: &str,
+        sides: [Option<usize>; N],
+    ) -> Result<(Result<Vec<u8>, Vec<f32>>, [usize; N]), Error> {
+        let header = self.file(name, |bytes| Header::read(bytes))?;
+        if header.is_whole() {
+            let byte = |x: f64| (0.0..256.0).contains(&x).then_some(x as u8);
+            let rule = "a whole number below 256, or a float";
+            let (values, shape) = self.numbers(name, sides, Class::Whole, rule, byte)?;
+            return Ok((Ok(values), shape));
+        }
+        let single = |x: f64| Some(x as f32).filter(|x| x.is_finite());
+        let rule = "a finite number (as a float of 4 bytes)";
+        let (values, shape) = self.numbers(name, sides, Class::Any, rule, single)?;
+        Ok((Err(values), shape))
+    }
+
+    /// Reads numbers of `class` from the array `name` of `sides`, each converted by `convert`; a
+    /// `None` breaks `rule`.
+    pub(super) fn numbers<T: Copy + Default, const N: usize>(
+        &self,
+        name: &str,
+        sides: [Option<usize>; N],
+        class: Class,
+        rule: &str,
+        convert: impl Fn(f64) -> Option<T>,
+    ) -> Result<(Vec<T>, [usize; N]), Error> {
+        let wrong = |expected: &str, found: &str| {
+            Error::new(self.path, format!("array {name}"), expected, found)
+        };
+        if !self.has(name) {
+            return Err(wrong(&format!("an array of shape {}", shown(&sides)), "no such array"));
+        }
+        self.file(name, |bytes| {
+            let header = Header::read(bytes)?;
+            let kind = String::from_utf8_lossy(header.type_text()).into_owned();
+            let is_right = class == Class::Any || header.is_whole();
+            let Some(numbers) = header.numbers(bytes)?.filter(|_| is_right) else {
+                let expected = if class == Class::Any { "numbers" } else { "whole numbers" };
+                return Err(wrong(expected, &format!("dtype {kind}")));
+            };
+            let shape: Option<[usize; N]> = numbers
+                .shape
+                .iter()
+                .map(|&side| usize::try_from(side).ok())
+                .collect::<Option<Vec<_>>>()
+                .and_then(|shape| shape.try_into().ok());
+            let fits = |shape: &[usize; N]| {
+                shape.iter().zip(&sides).all(|(n, side)| side.is_none_or(|side| side == *n))
+            };
+            let Some(shape) = shape.filter(fits) else {
+                return Err(wrong(
+                    &format!("shape {}", shown(&sides)),
+                    &shape_text(&numbers.shape),
+                ));
+            };
+            numbers.check(bytes)?;
+            let n = shape.iter().product::<usize>();
+            let mut values = self.budget.room(format!("array {name}"), n as u64)?;
+            values.resize(n, T::default());
+            let per_row = (n / shape[0].max(1)).max(1);
+            numbers.read(bytes, |_, at, x| {
+                let wrong = || self.wrong(name, at / per_row, rule, format!("{x:?}"));
+                values[at] = convert(x).ok_or_else(wrong)?;
+                Ok(())
+            })?;
+            Ok((values, shape))
+        })
+    }
+
+    /// Reads the metadata.
+    fn text(&self) -> Result<Option<String>, Error> {
+        if !self.has(KEY) {
+            return Ok(None);
+        }
+        let wrong = |found: String| {
+            let expected = "a text without dimensions, as np.array(json.dumps(..))";
+            Error::new(self.path, format!("array {KEY}"), expected, found)
+        };
+        self.file(KEY, |bytes| {
+            let header = Header::read(bytes)?;
+            let kind = String::from_utf8_lossy(header.type_text()).into_owned();
+            if let Some(shape) = header.shape().filter(|shape| !shape.is_empty()) {
+                return Err(wrong(format!("shape {}", shape_text(&shape))));
+            }
+            let width = match kind.trim_start_matches(['<', '>', '|']).as_bytes().first() {
+                Some(b'U') => 4,
+                Some(b'S') => 1,
+                _ => return Err(wrong(format!("dtype {kind}"))),
+            };
+            let size = bytes.remaining();
+            if size > MOST_TEXT {
+                return Err(wrong(format!("{size} bytes")));
+            }
+            let mut text = vec![0; size as usize];
+            bytes.fill(&mut text, "text")?;
+            bytes.end_of_array()?;
+            let letter = |bytes: &[u8]| match *bytes {
+                [a] => Some(char::from(a)).filter(char::is_ascii),
+                [a, b, c, d] if kind.starts_with('>') => {
+                    char::from_u32(u32::from_be_bytes([a, b, c, d]))
+                }
+                [a, b, c, d] => char::from_u32(u32::from_le_bytes([a, b, c, d])),
+                _ => None,
+            };
+            let text: Option<String> = text.chunks(width).map(letter).collect();
+            let text = text.ok_or_else(|| wrong("bytes that are no text".to_owned()))?;
+            Ok(Some(text.trim_end_matches('\0').to_owned()))
+        })
+    }
+
+    /// Calls `read` with the file of the array `name`.
+    fn file<T>(
+        &self,
+        name: &str,
+        read: impl FnOnce(&mut Bytes<&mut dyn Read>) -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        let Some(at) = self.names.iter().position(|known| known == name) else {
+            return Err(Error::new(self.path, format!("array {name}"), "an array", "none"));
+        };
+        match &self.held {
+            Held::Archive(archive, places) => {
+                let mut archive = archive.borrow_mut();
+                let (mut entry, size) = archive.entry(places[at], name)?;
+                read(&mut Bytes::of_array(self.path, &mut entry, name, size))
+            }
+            Held::Memory(files) => {
+                let mut file = files[at].as_slice();
+                let size = file.len() as u64;
+                read(&mut Bytes::of_array(self.path, &mut file, name, size))
+            }
+        }
+    }
+}
+
+/// The numbers that an array may have.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Class {
+    Any,
+    Whole,
+}
+
+/// Formats an expected shape, with letters for sides of any length.
+fn shown(sides: &[Option<usize>]) -> String {
+    let letter = |(at, side): (usize, &Option<usize>)| match side {
+        Some(n) => n.to_string(),
+        None => ["n", "k", "d"][at.min(2)].to_owned(),
+    };
+    tuple(sides.iter().enumerate().map(letter))
+}
+
+fn shape_text(shape: &[u64]) -> String {
+    tuple(shape.iter().map(u64::to_string))
+}
+
+fn tuple(sides: impl Iterator<Item = String>) -> String {
+    let sides: Vec<String> = sides.collect();
+    format!("({}{})", sides.join(", "), if sides.len() == 1 { "," } else { "" })
+}

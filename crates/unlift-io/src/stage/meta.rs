@@ -1,0 +1,166 @@
+//! The metadata of a stage file: a JSON object in the text array `unlift`.
+
+use std::path::Path;
+
+use serde_json::{Map, Value, json};
+use unlift::{About, Fingerprint, ListsBy, RowOrder, Unit};
+
+use super::Kind;
+use crate::Error;
+
+/// The name of the array.
+pub(super) const KEY: &str = "unlift";
+
+/// The version that is written, and the only one that is read.
+const VERSION: u64 = 1;
+
+const KEYS: [&str; 10] = [
+    "kind",
+    "version",
+    "unit",
+    "family",
+    "scheme",
+    "fingerprint",
+    "rows_by",
+    "lists_by",
+    "slots_per_record",
+    "delta",
+];
+/// The reason why confidence is unknown.
+pub(super) const WHY_UNKNOWN: &str = "confidence_unknown";
+
+#[derive(Clone, Debug)]
+pub(super) struct Meta<'a> {
+    path: &'a Path,
+    object: Map<String, Value>,
+}
+
+impl<'a> Meta<'a> {
+    /// Parses `text`. `None` is an empty object.
+    pub(super) fn parse(path: &'a Path, text: Option<&str>) -> Result<Self, Error> {
+        let wrong = |found: String| Error::new(path, "metadata unlift", "a JSON object", found);
+        let object = match text.map(serde_json::from_str::<Value>) {
+            None => Map::new(),
+            Some(Ok(Value::Object(object))) => object,
+            Some(Ok(other)) => return Err(wrong(short(&other))),
+            Some(Err(error)) => return Err(wrong(error.to_string())),
+        };
+        if let Some(key) = object.keys().find(|key| !KEYS.contains(&&***key) && *key != WHY_UNKNOWN)
+        {
+            let expected = format!("only {} and {WHY_UNKNOWN}", KEYS.join(", "));
+            return Err(Error::new(path, "metadata unlift", expected, key));
+        }
+        Ok(Self { path, object })
+    }
+
+    /// Adds the metadata `text` of one image, which replaces that of the file.
+    pub(super) fn of_image(&self, text: Option<&str>) -> Result<Self, Error> {
+        let mut object = self.object.clone();
+        object.extend(Self::parse(self.path, text)?.object);
+        Ok(Self { path: self.path, object })
+    }
+
+    fn given<T>(
+        &self,
+        key: &str,
+        expected: impl Into<String>,
+        read: impl FnOnce(&Value) -> Option<T>,
+    ) -> Result<Option<T>, Error> {
+        let Some(value) = self.object.get(key) else { return Ok(None) };
+        read(value).map(Some).ok_or_else(|| self.wrong(key, expected))
+    }
+
+    pub(super) fn kind(&self) -> Result<Option<Kind>, Error> {
+        let is_known = |version: &Value| (version.as_u64() == Some(VERSION)).then_some(());
+        self.given("version", VERSION.to_string(), is_known)?;
+        let expected = format!("one of {}", Kind::ALL.map(Kind::name).join(", "));
+        self.given("kind", expected, |kind| Kind::from_name(kind.as_str()?))
+    }
+
+    pub(super) fn unit(&self) -> Result<Option<Unit>, Error> {
+        self.given("unit", UNITS, |unit| Unit::from_name(unit.as_str()?))
+    }
+
+    pub(super) fn wrong_unit(&self) -> Error {
+        self.wrong("unit", UNITS)
+    }
+
+    pub(super) fn fingerprint(&self) -> Result<Option<Fingerprint>, Error> {
+        let expected = "32 hexadecimal digits, the fingerprint of a released map";
+        self.given("fingerprint", expected, |value| Fingerprint::from_hex(value.as_str()?))
+    }
+
+    /// The released map, the order of rows, and the author of lists, as far as given.
+    pub(super) fn about(&self) -> Result<About, Error> {
+        let names = RowOrder::STATED.map(|order| order.name().unwrap_or_default());
+        let expected = format!("one of {}", names.join(", "));
+        let order =
+            self.given("rows_by", expected, |value| RowOrder::from_name(value.as_str()?))?;
+        let is_oracle =
+            |value: &Value| (value.as_str() == ListsBy::Oracle.name()).then_some(ListsBy::Oracle);
+        let lists_by = self.given("lists_by", "oracle, or no such key", is_oracle)?;
+        Ok(About {
+            map: self.fingerprint()?,
+            order: order.unwrap_or(RowOrder::Unstated),
+            lists_by: lists_by.unwrap_or(ListsBy::Unstated),
+        })
+    }
+
+    pub(super) fn text(&self, key: &str) -> Result<Option<&str>, Error> {
+        let Some(value) = self.object.get(key) else { return Ok(None) };
+        value.as_str().map(Some).ok_or_else(|| self.wrong(key, "text"))
+    }
+
+    /// The number of hidden points per record, 1 or 2.
+    pub(super) fn slots_per_record(&self) -> Result<Option<usize>, Error> {
+        let slots = |value: &Value| [1, 2].into_iter().find(|&n| value.as_u64() == Some(n as u64));
+        self.given("slots_per_record", "1 or 2", slots)
+    }
+
+    /// The distance that decided support, by default 0.
+    pub(super) fn delta(&self) -> Result<f64, Error> {
+        let number = |value: &Value| value.as_f64().filter(|&x| x >= 0.0);
+        Ok(self.given("delta", "a number of at least 0", number)?.unwrap_or(0.0))
+    }
+
+    pub(super) fn wrong(&self, key: &str, expected: impl Into<String>) -> Error {
+        let found = self.object.get(key).map_or("nothing".into(), short);
+        Error::new(self.path, format!("metadata unlift, {key}"), expected, found)
+    }
+}
+
+const UNITS: &str = "m, px or kth_neighbor";
+
+fn short(value: &Value) -> String {
+    let text = value.to_string();
+    match text.char_indices().nth(60) {
+        Some((at, _)) => format!("{}...", &text[..at]),
+        None => text,
+    }
+}
+
+pub(super) fn new_meta(kind: Kind) -> Map<String, Value> {
+    let mut object = Map::new();
+    object.insert("kind".into(), json!(kind.name()));
+    object.insert("version".into(), json!(VERSION));
+    object
+}
+
+pub(super) fn insert_fingerprint(meta: &mut Map<String, Value>, map: Option<Fingerprint>) {
+    meta.extend(map.map(|map| ("fingerprint".to_owned(), json!(map.to_string()))));
+}
+
+pub(super) fn insert_about(meta: &mut Map<String, Value>, about: About) {
+    insert_fingerprint(meta, about.map);
+    meta.extend(about.order.name().map(|name| ("rows_by".to_owned(), json!(name))));
+    meta.extend(about.lists_by.name().map(|name| ("lists_by".to_owned(), json!(name))));
+}
+
+/// Formats `meta` with sorted keys, so that equal values make equal bytes with any map type of
+/// `serde_json`.
+pub(super) fn to_text(meta: &Map<String, Value>) -> String {
+    let mut entries: Vec<String> =
+        meta.iter().map(|(key, value)| format!("{}: {value}", json!(key))).collect();
+    entries.sort();
+    format!("{{{}}}", entries.join(", "))
+}

@@ -1,0 +1,290 @@
+//! Malformed and damaged files: one line each, without a panic.
+
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+
+use crate::maps;
+use unlift::Unit;
+use unlift_io::Error;
+use unlift_io::stage::{self, ImageFile, Kind};
+use zip::write::{SimpleFileOptions, ZipWriter};
+
+/// Creates the file of an array.
+fn npy(descr: &str, shape: &str, bytes: &[u8]) -> Vec<u8> {
+    let text = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}\n");
+    let length = (text.len() as u16).to_le_bytes();
+    [b"\x93NUMPY\x01\x00", &length[..], text.as_bytes(), bytes].concat()
+}
+
+fn floats(shape: &str, values: &[f64]) -> Vec<u8> {
+    npy("<f8", shape, &values.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>())
+}
+
+fn whole(shape: &str, values: &[i64]) -> Vec<u8> {
+    npy("<i8", shape, &values.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>())
+}
+
+fn text(text: &str) -> Vec<u8> {
+    let letters: Vec<u8> = text.chars().flat_map(|c| u32::from(c).to_le_bytes()).collect();
+    npy(&format!("<U{}", letters.len() / 4), "()", &letters)
+}
+
+type Arrays = Vec<(&'static str, Vec<u8>)>;
+
+fn save(path: &Path, arrays: &Arrays) {
+    let mut archive = ZipWriter::new(fs::File::create(path).unwrap());
+    for (name, bytes) in arrays {
+        archive.start_file(format!("{name}.npy"), SimpleFileOptions::default()).unwrap();
+        archive.write_all(bytes).unwrap();
+    }
+    archive.finish().unwrap();
+}
+
+/// Returns the arrays with one replaced, added or, without bytes, removed.
+fn with(mut arrays: Arrays, name: &'static str, bytes: Vec<u8>) -> Arrays {
+    arrays.retain(|(old, _)| *old != name);
+    if !bytes.is_empty() {
+        arrays.push((name, bytes));
+    }
+    arrays
+}
+
+/// Checks that reading `arrays` fails with `expected` after the name of the file.
+fn refused<T>(arrays: &Arrays, read: impl Fn(&Path) -> Result<T, Error>, expected: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.npz");
+    save(&path, arrays);
+    let line = read(&path).err().expect(expected).to_string();
+    let line = line.replace(&format!("{}: ", path.display()), "");
+    assert_eq!(line, expected);
+}
+
+fn lines() -> Arrays {
+    vec![
+        ("unlift", text(r#"{"unit": "m"}"#)),
+        ("foot", floats("(2, 3)", &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0])),
+        ("direction", floats("(2, 3)", &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0])),
+    ]
+}
+
+#[test]
+#[rustfmt::skip] // One row per line.
+fn released_maps() {
+    let read = stage::read_released::<3>;
+    for (name, bytes, expected) in [
+        ("direction", vec![], "array direction: expected an array of shape (2, 3), found no such array"),
+        ("foot", vec![], "a released map, with one of the arrays foot, center, offset, position"),
+        ("direction", floats("(3, 3)", &[1.0; 9]), "array direction: expected shape (2, 3), found (3, 3)"),
+        ("foot", floats("(2, 2)", &[1.0; 4]), "array foot: expected shape (n, 3), found (2, 2)"),
+        ("foot", floats("(6,)", &[1.0; 6]), "array foot: expected shape (n, 3), found (6,)"),
+        ("foot", npy("<c8", "(2, 3)", &[0; 48]), "array foot: expected numbers, found dtype <c8"),
+        ("foot", npy("|O", "(2, 3)", &[0; 48]), "array foot: expected numbers, found dtype |O"),
+        ("foot", floats("(2, 3)", &[1.0; 5]), "array foot: expected 2 rows of 24 bytes, found 40 bytes"),
+        ("foot", floats("(2, 3)", &[1.0, 2.0, 3.0, 4.0, f64::NAN, 6.0]), "array foot, row 1: expected a finite number, found NaN"),
+        ("feet", floats("(1,)", &[1.0]), "array feet: expected only unlift, foot, direction, center, centers, regions, axis, offset, position, descriptor, origin, bounds, found an unknown array"),
+        ("records", whole("(2, 1)", &[1, 0]), "array records: expected only unlift, foot, direction, center, centers, regions, axis, offset, position, descriptor, origin, bounds, found an unknown array"),
+        ("descriptor", floats("(3, 2)", &[1.0; 6]), "array descriptor: expected shape (2, k), found (3, 2)"),
+        ("descriptor", whole("(2, 2)", &[0, 1, 2, 256]), "array descriptor, row 1: expected a whole number below 256, or a float, found 256.0"),
+        ("origin", floats("(2,)", &[0.0; 2]), "array origin: expected shape (3,), found (2,)"),
+        ("unlift", vec![], "metadata unlift, unit: expected m, px or kth_neighbor, found nothing"),
+        ("unlift", text("[1]"), "metadata unlift: expected a JSON object, found [1]"),
+        ("unlift", npy("<U2", "(1,)", &[0; 8]), "array unlift: expected a text without dimensions, as np.array(json.dumps(..)), found shape (1,)"),
+        ("unlift", floats("()", &[1.0]), "array unlift: expected a text without dimensions, as np.array(json.dumps(..)), found dtype <f8"),
+        ("unlift", text(r#"{"unit": "cm"}"#), "metadata unlift, unit: expected m, px or kth_neighbor, found \"cm\""),
+        ("unlift", text(r#"{"unit": "m", "slots": 2}"#), "metadata unlift: expected only kind, version, unit, family, scheme, fingerprint, rows_by, lists_by, slots_per_record, delta and confidence_unknown, found slots"),
+        ("unlift", text(r#"{"unit": "m", "version": 2}"#), "metadata unlift, version: expected 1, found 2"),
+        ("unlift", text(r#"{"unit": "m", "kind": "truth"}"#), "expected a released map, found a truth file"),
+        ("unlift", text(r#"{"unit": "m", "family": "rays"}"#), "array centers: expected an array of shape (n, 3), found no such array"),
+        ("unlift", text(r#"{"unit": "m", "family": "curves"}"#), "metadata unlift, family: expected one of lines, rays, axis_planes, axis_candidates, found \"curves\""),
+    ] {
+        let arrays = with(lines(), name, bytes);
+        if expected.starts_with("a released map") {
+            refused(&arrays, read, &format!("expected {expected}, found arrays unlift, direction"));
+        } else {
+            refused(&arrays, read, expected);
+        }
+    }
+    let stated = with(lines(), "unlift", text(r#"{"unit": "m", "fingerprint": "00112233445566778899aabbccddeeff"}"#));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.npz");
+    save(&path, &stated);
+    let line = read(&path).unwrap_err().to_string();
+    assert!(line.ends_with("or none (the file was changed), found \"00112233445566778899aabbccddeeff\""), "{line}");
+    let rays = |center: &[i64], centers: &str, values: &[f64]| vec![
+        ("unlift", text(r#"{"unit": "m"}"#)), ("centers", floats(centers, values)),
+        ("center", whole("(1,)", center)), ("direction", floats("(1, 3)", &[1.0; 3])),
+    ];
+    refused(&rays(&[1], "(1, 3)", &[0.0; 3]), read, "array center, row 0: expected a whole number below 1, found 1.0");
+    refused(&rays(&[0], "(0, 3)", &[]), read, "array centers: expected 1 to 255 rows, found 0 rows");
+    let planes = |axis: Vec<u8>| vec![
+        ("unlift", text(r#"{"unit": "m"}"#)), ("axis", axis), ("offset", floats("(1,)", &[1.0])),
+    ];
+    refused(&planes(whole("(1,)", &[3])), read, "array axis, row 0: expected a whole number below 3, found 3.0");
+    refused(&planes(floats("(1,)", &[1.0])), read, "array axis: expected whole numbers, found dtype <f8");
+}
+
+#[test]
+#[rustfmt::skip] // One row per line.
+fn lists() {
+    let lists = |values: &[i64]| vec![("records", whole("(3, 2)", values))];
+    let scores = |values: &[f64]| with(lists(&[1, 2, 0, -1, 0, 1]), "scores", floats("(3, 2)", values));
+    let read = |path: &Path| stage::read_neighborhoods(path, 3, 1);
+    for (arrays, expected) in [
+        (lists(&[1, 2, 0, 3, 0, 1]), "array records, row 1: expected a whole number below 3, or -1 for none, found 3.0"),
+        (lists(&[1, 2, 0, 1, 0, 1]), "array records, row 1: expected other records, found its own record 1"),
+        (lists(&[1, 1, 0, 2, 0, 1]), "array records, row 0: expected each record once, found record 1 twice"),
+        (vec![("records", whole("(2, 1)", &[1, 0]))], "array records: expected shape (3, k), found (2, 1)"),
+        (scores(&[1.0, 2.0, f64::NAN, 4.0, 5.0, 6.0]), "array scores, row 1: expected a score for each record, found NaN"),
+        (with(lists(&[1, 2, 0, -1, 0, 1]), "scores", floats("(3, 1)", &[1.0; 3])), "array scores: expected shape (3, 2), found (3, 1)"),
+        (vec![("neighbors", whole("(3, 1)", &[1, 2, 0]))], "expected neighborhoods of slots, found neighborhoods of points"),
+        (lines(), "expected neighborhoods of slots, found a released map"),
+    ] {
+        refused(&arrays, read, expected);
+    }
+    let read = |path: &Path| stage::read_point_neighborhoods(path, 3);
+    refused(&vec![("neighbors", whole("(3, 1)", &[1, 2, 2]))], read, "array neighbors, row 2: expected other points, found its own point 2");
+}
+
+#[test]
+#[rustfmt::skip] // One row per line.
+fn recovered_points() {
+    let position = || vec![("position", floats("(2, 2)", &[1.0, 2.0, f64::NAN, f64::NAN]))];
+    let read = stage::read_recovered::<2>;
+    for (name, bytes, expected) in [
+        ("position", floats("(1, 2)", &[1.0, f64::NAN]), "array position, row 0: expected 2 numbers, or 2 NaN if lost, found [1.0, NaN]"),
+        ("position", floats("(1, 2)", &[1.0, f64::INFINITY]), "array position, row 0: expected a number, or NaN if lost, found inf"),
+        ("position", floats("(1, 2)", &[1e300, 1.0]), "array position, row 0: expected numbers in the range of f32 about the origin, found [1e300, 1.0]"),
+        ("status", whole("(2,)", &[0, 0]), "array status, row 1: expected the code of a reason, as there is no position, found 0"),
+        ("status", whole("(2,)", &[1, 1]), "array status, row 0: expected 0, as there is a position, found 1"),
+        ("status", whole("(2,)", &[0, 4]), "array status, row 1: expected a whole number below 4, found 4.0"),
+        ("support", whole("(1,)", &[0]), "array support: expected shape (2,), found (1,)"),
+        ("evidence", floats("(2,)", &[0.0, f64::INFINITY]), "array evidence, row 1: expected a finite number, found inf"),
+        ("found", floats("(2,)", &[0.5, 0.5]), "array error_scale: expected an array of shape (2,), found no such array"),
+        ("axis", whole("(2,)", &[-1, -1]), "array axis, row 0: expected an axis, as there is a position, found -1"),
+        ("descriptor_row", whole("(2,)", &[0, 2]), "array descriptor_row, row 1: expected a whole number below 2, found 2.0"),
+        ("slot", whole("(2,)", &[0, 1]), "array slot: expected only unlift, position, status, support, evidence, found, error_scale, axis, descriptor_row, origin, found an unknown array"),
+    ] {
+        let expected = if name == "slot" { "expected a file of recovered points, found a truth file" } else { expected };
+        refused(&with(position(), name, bytes), read, expected);
+    }
+    let confident = |found: f64, scale: f64| with(with(position(), "found", floats("(2,)", &[found, f64::NAN])), "error_scale", floats("(2,)", &[scale, f64::NAN]));
+    refused(&confident(1.5, 0.1), read, "array found, row 0: expected a probability, found 1.5");
+    refused(&confident(f64::NAN, 0.1), read, "array found, row 0: expected a probability, found NaN");
+    refused(&confident(0.5, -1.0), read, "array error_scale, row 0: expected a length, found -1.0");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.npz");
+    save(&path, &position());
+    let line = stage::read_recovered_in::<3>(&path, Unit::Meter).unwrap_err().to_string();
+    assert!(line.ends_with("array position: expected shape (n, 3), found (2, 2)"), "{line}");
+}
+
+#[test]
+#[rustfmt::skip] // One row per line.
+fn truth() {
+    let position = || vec![
+        ("unlift", text(r#"{"unit": "m"}"#)), ("position", floats("(3, 3)", &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])),
+        ("slot", whole("(3,)", &[1, -1, 0])),
+    ];
+    let read = stage::read_truth::<3>;
+    for (name, bytes, expected) in [
+        ("slot", whole("(3,)", &[0, 0, -1]), "array slot, row 1: expected each slot once, found 0 as in row 0"),
+        ("slot", whole("(3,)", &[0, -1, 2]), "array slot, row 2: expected slots below 2, the number of slots, found 2"),
+        ("slot", whole("(2,)", &[0, 1]), "array slot: expected shape (3,), found (2,)"),
+        ("dropped", whole("(3,)", &[0, 0, 0]), "array dropped, row 1: expected the code of a reason, as there is no slot, found 0"),
+        ("dropped", whole("(3,)", &[6, 6, 0]), "array dropped, row 0: expected 0, as there is a slot, found 6"),
+        ("dropped", whole("(3,)", &[0, 7, 0]), "array dropped, row 1: expected a whole number below 7, found 7.0"),
+        ("swapped_axis", whole("(3,)", &[0, 1, 2]), "array swapped_axis, row 1: expected -1, as there is no slot, found 1"),
+        ("descriptor_row", whole("(3,)", &[-1, -1, 0]), "array descriptor_row, row 0: expected a number, as there is a slot, found -1"),
+        ("unlift", text(r#"{"unit": "m", "slots_per_record": 2}"#), "array descriptor_row: expected the descriptor row of each point, as records have two slots, found no such array"),
+        ("unlift", text(r#"{"unit": "m", "slots_per_record": 3}"#), "metadata unlift, slots_per_record: expected 1 or 2, found 3"),
+    ] {
+        refused(&with(position(), name, bytes), read, expected);
+    }
+}
+
+#[test]
+#[rustfmt::skip] // One row per line.
+fn images() {
+    let feet = || floats("(1, 2)", &[1.0, 2.0]);
+    let image = || vec![("a.jpg/foot", feet()), ("a.jpg/direction", feet()), ("b.jpg/foot", feet()), ("b.jpg/direction", feet())];
+    let all = |path: &Path| {
+        let mut images = ImageFile::open(path, Kind::Released)?;
+        while let Some(rows) = images.next_image()? {
+            rows.released()?;
+        }
+        Ok(())
+    };
+    refused(&with(image(), "b.jpg/direction", vec![]), all, "image b.jpg, array direction: expected an array of shape (1, 2), found no such array");
+    refused(&with(image(), "a.jpg/foot", feet()), all, "expected the arrays of each image together, found image a.jpg again");
+    refused(&with(image(), "foot", feet()), all, "expected arrays below the names of images, as a.jpg/foot, found array foot");
+    refused(&with(image(), "b.jpg/unlift", text("{")), all, "image b.jpg, metadata unlift: expected a JSON object, found EOF while parsing an object at line 1 column 1");
+    refused(&lines(), all, "expected arrays below the names of images, as a.jpg/foot, found array foot");
+    let next = |name: &'static str| move |path: &Path| ImageFile::open(path, Kind::Released)?.expect(name, Path::new("r.npz")).map(drop);
+    refused(&image(), next("b.jpg"), "expected image b.jpg, as in r.npz, found a.jpg");
+    let end = |path: &Path| ImageFile::open(path, Kind::Released)?.expect_end(Path::new("r.npz"));
+    refused(&image(), end, "expected no more images, as in r.npz, found image a.jpg");
+}
+
+#[test]
+fn maps_and_stage_files_are_not_confused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.npz");
+    stage::write_released(&path, &maps::released::<3>(1, 5)[0]).unwrap();
+    let line = unlift_io::read::open(&path).unwrap_err().to_string();
+    assert!(line.ends_with("a.npz: expected points of a map, found a released map"), "{line}");
+    save(&path, &vec![("points", floats("(1, 3)", &[1.0; 3]))]);
+    let line = stage::read_released::<3>(&path).unwrap_err().to_string();
+    assert!(line.ends_with("foot, center, offset, position, found arrays points"), "{line}");
+    for (bytes, found) in [
+        (&b""[..], "an empty file"),
+        (b"PAR1", "a Parquet file, as earlier versions wrote"),
+        (b"ply\nformat ascii 1.0\n", "another file"),
+    ] {
+        fs::write(&path, bytes).unwrap();
+        let line = stage::peek(&path).unwrap_err().to_string();
+        let expected = format!("a.npz: expected an archive of NumPy arrays (.npz), found {found}");
+        assert!(line.ends_with(&expected), "{line}");
+    }
+}
+
+/// An array that unpacks to more than the budget, from few bytes.
+#[test]
+fn an_array_that_nothing_stands_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.npz");
+    let n = 34_000_000;
+    save(&path, &vec![("records", npy("<i8", &format!("(1, {n})"), &vec![0; 8 * n]))]);
+    assert!(fs::metadata(&path).unwrap().len() < 1 << 20);
+    let line = stage::read_neighborhoods(&path, 1, 1).unwrap_err().to_string();
+    assert!(line.contains("array records: expected at most 256 MiB in memory of a file"), "{line}");
+}
+
+/// Changes and removes bytes: an error or another value, and a checksum notices changed data.
+#[test]
+fn damaged_files_are_an_error_of_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.npz");
+    stage::write_released(&path, &maps::released::<3>(3, 40)[2]).unwrap();
+    let bytes = fs::read(&path).unwrap();
+    let read = |bytes: &[u8]| {
+        fs::write(&path, bytes).unwrap();
+        let read = stage::read_released::<3>(&path);
+        if let Err(error) = &read {
+            assert!(!error.to_string().contains('\n'), "{error}");
+        }
+        read.is_ok()
+    };
+    let mut changed = bytes.clone();
+    let mut n_read = 0;
+    for at in (0..bytes.len()).step_by(1 + bytes.len() / 600) {
+        changed[at] ^= 0x40;
+        n_read += usize::from(read(&changed));
+        changed[at] = bytes[at];
+        assert!(!read(&bytes[..at]), "cut short after {at} bytes");
+        let rest = bytes.get(at + 36..).unwrap_or_default();
+        read(&[&bytes[..at], rest].concat());
+    }
+    // Only what nobody reads may change: times, permissions, padding.
+    assert!(n_read < 200, "{n_read}");
+}
