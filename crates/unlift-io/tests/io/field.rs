@@ -43,8 +43,8 @@ const MAPS: [(&str, usize, usize, &str); 29] = [
     ("hostile/maps/fewer-b.out", 100, 2, "100 points are declared, and 200 more seem to follow"),
     ("hostile/maps/fewer-m.nvm", 100, 2, "100 points are declared, and 200 more seem to follow"),
     ("hostile/maps/m.csv", 300, 0, ""),
-    ("turn4/04-again-other-frame/A", 300, 2, ""),
-    ("turn4/04-again-other-frame/B", 300, 2, ""),
+    ("turn4/04-again-other-frame/A", 1606, 24, ""),
+    ("turn4/04-again-other-frame/B", 1606, 24, ""),
 ];
 
 /// Input, and the end of the error line.
