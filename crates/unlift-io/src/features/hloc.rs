@@ -103,12 +103,21 @@ impl Hloc {
                 return Err(Error::new(&self.path, place, expected, "deeper ones, or a cycle"));
             }
             let refuse = |error| self.refuse(&path, "", error);
-            let links = address.and_then(|at| links(&raw, at)).unwrap_or_default();
-            let arrays = group.datasets().map_err(refuse)?;
             let within = |name: &str| match &*path {
                 "" => name.to_owned(),
                 path => format!("{path}/{name}"),
             };
+            let links = address.and_then(|at| links(&raw, at)).unwrap_or_default();
+            for (name, target) in &links {
+                if let Target::Unlistable(to) = target {
+                    let found = format!(
+                        "a link to {} in the old form (write it with libver=\"latest\" of h5py)",
+                        quoted(to.as_bytes())
+                    );
+                    return Err(self.error(&within(name), "", "features of an image", found));
+                }
+            }
+            let arrays = group.datasets().map_err(refuse)?;
             for (name, inside) in group.iter_groups().map_err(refuse)? {
                 let hard = links.iter().find_map(|(link, target)| match target {
                     Target::Object(address) if *link == name => Some(*address),
@@ -119,7 +128,7 @@ impl Hloc {
             // The library skips links by path.
             for (name, target) in &links {
                 let (target, text) = match target {
-                    Target::Object(_) => continue,
+                    Target::Object(_) | Target::Unlistable(_) => continue,
                     Target::Path(to) => {
                         let from = if to.starts_with('/') { &file.root() } else { &group };
                         (from.group(to).ok(), format!("a link to {}", quoted(to.as_bytes())))
@@ -273,17 +282,21 @@ enum Target {
     Object(u64),
     /// A path in the file.
     Path(String),
+    /// A path in the file, in a group of the old form, which the library cannot list.
+    Unlistable(String),
     Elsewhere,
 }
 
-/// Returns names and targets of the links in the object header at `address`, which the library
-/// skips if they are paths. Groups that list their links elsewhere, those of the old form and large
-/// ones, have none.
+/// Returns names and targets of the links of the group whose object header is at `address`. The
+/// library skips links by path, or fails on them. Large groups, which list their links in a
+/// separate heap, have none here.
 ///
-/// Source: HDF5 File Format Specification 3.0, IV.A (object headers), IV.A.2.g (the link message).
+/// Source: HDF5 File Format Specification 3.0, IV.A (object headers), IV.A.2.g (the link message),
+/// and III.A to III.D (groups of the old form).
 fn links(file: &impl Source, address: u64) -> Option<Vec<(String, Target)>> {
     const LINK: u64 = 0x06;
     const CONTINUATION: u64 = 0x10;
+    const SYMBOL_TABLE: u64 = 0x11;
     let read = |at: u64, n: u64| file.read_exact_at(at, usize::try_from(n).ok()?).ok();
     let start = read(address, 16)?;
     let is_new = start.starts_with(b"OHDR");
@@ -312,6 +325,9 @@ fn links(file: &impl Source, address: u64) -> Option<Vec<(String, Target)>> {
             rest = next;
             match number(&message[..kind]) {
                 LINK => links.extend(link(body)),
+                SYMBOL_TABLE if body.len() >= 16 => {
+                    links.extend(old_links(read, number(&body[..8]), number(&body[8..16]))?);
+                }
                 CONTINUATION if body.len() >= 16 && blocks.len() < MAX_DEPTH => {
                     let (at, size) = (number(&body[..8]), number(&body[8..16]));
                     // New blocks are between a signature and a checksum.
@@ -322,6 +338,38 @@ fn links(file: &impl Source, address: u64) -> Option<Vec<(String, Target)>> {
             }
         }
         at += 1;
+    }
+    Some(links)
+}
+
+/// Returns the links of a group of the old form with its tree and heap at these addresses.
+fn old_links(
+    read: impl Fn(u64, u64) -> Option<Vec<u8>>,
+    tree: u64,
+    heap: u64,
+) -> Option<Vec<(String, Target)>> {
+    let head = read(heap.checked_add(8)?, 24)?;
+    let texts = read(number(&head[16..]), number(&head[..8]))?;
+    let text = |at: &[u8]| {
+        let text = texts.get(number(at) as usize..)?.split(|&byte| byte == 0).next()?;
+        Some(String::from_utf8_lossy(text).into_owned())
+    };
+    let (mut waiting, mut links) = (vec![(tree, 0)], Vec::new());
+    while let Some((at, depth)) = waiting.pop() {
+        let head = read(at, 8)?;
+        for child in 0..number(&head[6..]) {
+            if head.starts_with(b"TREE") && depth < MAX_DEPTH {
+                let child = number(&read(at.checked_add(32 + 16 * child)?, 8)?);
+                waiting.push((child, depth + 1));
+            } else if head.starts_with(b"SNOD") {
+                let entry = read(at.checked_add(8 + 40 * child)?, 40)?;
+                let target = match number(&entry[16..20]) {
+                    2 => Target::Unlistable(text(&entry[24..28])?),
+                    _ => Target::Object(number(&entry[8..16])),
+                };
+                links.push((text(&entry[..8])?, target));
+            }
+        }
     }
     Some(links)
 }

@@ -345,3 +345,14 @@ fn every_malformed_database_is_refused_with_its_line() {
         assert_eq!(line(&fs::read(&path).unwrap()), expected, "{what}");
     }
 }
+
+/// h5py writes a soft link in this form by default.
+#[test]
+fn a_link_in_a_group_of_the_old_form_is_refused_with_a_way_out() {
+    let mut file = fs::read(data("features-earliest.h5")).unwrap();
+    let leaf = file.windows(4).position(|word| word == b"SNOD").unwrap();
+    // The kind of the first entry: a link, whose target is a text of the heap.
+    file[leaf + 8 + 16] = 2;
+    let line = line(&file);
+    assert!(line.ends_with("in the old form (write it with libver=\"latest\" of h5py)"), "{line}");
+}
