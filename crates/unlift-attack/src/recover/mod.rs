@@ -13,6 +13,7 @@
 //! [`recover`] runs the whole attack.
 
 mod assignment;
+mod beliefs;
 mod confidence;
 mod consensus;
 mod delta;

@@ -13,7 +13,7 @@ use crate::recover::ransac::Ransac;
 use crate::recover::records_alone::{self, Placement};
 use crate::recover::result::{Estimate, Recovered, TrialCounts, Unknown};
 use crate::recover::solver::Builtin;
-use crate::recover::{confidence, consensus, delta, exact, joint, layout, ranking};
+use crate::recover::{beliefs, confidence, consensus, delta, exact, joint, layout, ranking};
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, Fingerprint};
 
@@ -133,7 +133,7 @@ impl<'a, const D: usize> Problem<'a, D> {
             estimates
         };
         match &self.records {
-            Records::Listed { family, graph: Some(graph), .. } if self.iterates() => {
+            Records::Listed { family, graph: Some(graph), both_ways } if self.iterates() => {
                 let (delta, seed) = (self.delta as f32, self.options.seed);
                 let rounds = if known.is_empty() { 1 } else { ROUNDS };
                 let found = (0..rounds).fold(fixed(start), |found, _| {
@@ -150,7 +150,20 @@ impl<'a, const D: usize> Problem<'a, D> {
                             }
                             _ => found,
                         };
-                        fixed(ranking::recover(family, self.lists, delta, seed, found))
+                        let found = match ranking::recover(family, self.lists, delta, seed, found) {
+                            Ok(found) => found,
+                            // Beliefs are for maps with one slot per record: points of paired lines and of images lose as often
+                            // as they gain.
+                            Err(found)
+                                if D == 3
+                                    && both_ways.is_some()
+                                    && self.lists.scores().is_some() =>
+                            {
+                                beliefs::recover(family, graph, delta, seed, found)
+                            }
+                            Err(found) => found,
+                        };
+                        fixed(found)
                     }
                     _ => found,
                 }

@@ -46,6 +46,12 @@ pub enum Stage {
     Shapes = 22,
     /// Steps that ranking tries.
     Ranking = 23,
+    /// Which slots move in an iteration of beliefs.
+    Beliefs = 27,
+    /// Places that beliefs try for each slot.
+    BeliefProposals = 28,
+    /// Random pairs from which beliefs learn what is chance.
+    BeliefTables = 29,
     /// Points and descriptors that a mitigation changes.
     Mitigation = 24,
     /// Starts of pose estimation.

@@ -82,14 +82,15 @@ const LEAST_RATIO: f32 = 0.15;
 /// (0.9) gain up to 20 (docs/decisions/ranking.md).
 const LEAST_RATIO_OF_SOURCES: f32 = 0.75;
 
-/// Returns the estimates of all slots after ranking from `start`, the estimates of joint recovery.
+/// Returns the estimates of all slots after ranking from `start`, the estimates of joint recovery; `start` as an error if what lists do not
+/// name says too little.
 pub(crate) fn recover<const D: usize>(
     family: &Family<'_, D>,
     lists: &Neighborhoods,
     delta: f32,
     seed: u64,
     start: Vec<Estimate<D>>,
-) -> Vec<Estimate<D>> {
+) -> Result<Vec<Estimate<D>>, Vec<Estimate<D>>> {
     match family {
         Family::Lines { rows, slots_per_record, chance } => {
             iterate(&LinePieces::new(rows, *slots_per_record, chance, delta), lists, seed, start)
@@ -108,11 +109,11 @@ fn iterate<const D: usize, P: Pieces<D>>(
     lists: &Neighborhoods,
     seed: u64,
     mut estimates: Vec<Estimate<D>>,
-) -> Vec<Estimate<D>> {
+) -> Result<Vec<Estimate<D>>, Vec<Estimate<D>>> {
     let n = estimates.len();
     let mean_length = lists.records().len() as f32 / n.max(1) as f32;
     if (n as f32) < LEAST_LISTS * mean_length {
-        return estimates;
+        return Err(estimates);
     }
     let least_ratio = match lists.scores() {
         None => LEAST_RATIO,
@@ -122,7 +123,7 @@ fn iterate<const D: usize, P: Pieces<D>>(
     let mut around = Surroundings::default();
     for iteration in 0..ITERATIONS {
         if iteration < FAR_ITERATIONS {
-            let Some(new) = Surroundings::new(&estimates, lists) else { return estimates };
+            let Some(new) = Surroundings::new(&estimates, lists) else { return Err(estimates) };
             around = new;
         } else {
             around.update(&estimates, lists);
@@ -130,7 +131,7 @@ fn iterate<const D: usize, P: Pieces<D>>(
         let [near, farther] = shares_within(pieces, lists, &estimates, &around);
         let inlier_ratio = near.clamp(INLIER_RATIO.0, INLIER_RATIO.1);
         if inlier_ratio < least_ratio || farther > MOST_FARTHER * near {
-            return estimates;
+            return if iteration == 0 { Err(estimates) } else { Ok(estimates) };
         }
         let place = |(e, &radius): (&Estimate<D>, &f32)| {
             let inverse = if radius > 0.0 { 1.0 / (radius * radius) } else { 0.0 };
@@ -180,7 +181,7 @@ fn iterate<const D: usize, P: Pieces<D>>(
             }
         }
     }
-    estimates
+    Ok(estimates)
 }
 
 /// Slots that list each record.

@@ -1,0 +1,860 @@
+//! Beliefs: a few places per slot, each with the probability that it is the right one.
+//!
+//! Lists that a source makes from descriptors are unlike those of the oracle. Few entries are right, entries with better scores are right
+//! more often, and entries are wrong together, because records with similar descriptors list the same records. So the lists of a slot often
+//! support several places. This step starts from the estimates of joint recovery. In an iteration it
+//!
+//! 1. learns, for each class `c` of edges, the likelihood ratio `L_c(u)` of an edge between points at distance `u` against one between
+//!    points that are far apart (`tables`). The unit of `u` is a *width*, about the distance to the 50th nearest estimate;
+//! 2. learns the *temper*, an exponent below 1 for the evidence of edges that are wrong together (`temper`);
+//! 3. proposes places on the record of each slot, and scores each place `x` by
+//!    `temper * sum over edges j of ln(1 + sum over places y of j of w_y (L_c(|x - y|) - 1)) + 0.5 ln(0.05 + density(x)) + ln volume(x)`;
+//! 4. refines the best place, and keeps the best ones with weights proportional to `exp(score)`.
+//!
+//! The density counts the places of other slots within a width: points lie on surfaces. Places of the own slot do not count, because they
+//! would confirm themselves. The volume element is `range^2` for rays, which diverge; for axis candidates, it is the density of the values
+//! published on the axis that was exchanged. The first iteration moves all slots, the others a random half of them.
+//!
+//! The method is belief propagation with particles on the graph of lists, as in the localization of sensor networks (Ihler et al. 2005),
+//! without the division by messages sent before, which changed no figure. Figures are in docs/decisions/beliefs.md.
+
+use rayon::prelude::*;
+
+use crate::geometry::knn::Knn;
+use crate::recover::map::family::Family;
+use crate::recover::map::graph::{CLASSES, Graph, Side, either, side};
+use crate::recover::map::lines::ln;
+use crate::recover::map::lists::CHUNK;
+use crate::recover::map::pieces::{CandidatePieces, LinePieces, Piece, Pieces, PlanePieces};
+use crate::recover::map::places::{along_curve, distance2};
+use crate::recover::result::{Estimate, Status};
+use crate::seed::{Draws, Stage};
+
+const ITERATIONS: usize = 5;
+/// Largest number of places per slot.
+const PLACES: usize = 4;
+/// A width is the distance to this neighbor, counted among all slots.
+const WIDTH_NEIGHBOR: usize = 50;
+/// Bounds of the width of a place, as a multiple of the typical width.
+const WIDTHS: (f32, f32) = (0.3, 3.3);
+/// Maps with fewer slots than this many widths' worth of neighbors keep their estimates.
+const LEAST_SLOTS: usize = 4 * WIDTH_NEIGHBOR;
+/// Weight of an estimate of joint recovery: its least value, and what is added for the estimate with the most evidence.
+const START_WEIGHT: (f32, f32) = (0.24, 0.36);
+/// Weight of the density of places in the score, and the density of a place without neighbors.
+const DENSITY_WEIGHT: f32 = 0.5;
+const LEAST_DENSITY: f32 = 0.05;
+/// Radius of the kernel of that density, in typical widths. The kernel is about a normal distribution of a third of a width.
+const DENSITY_RADIUS: f32 = 0.91;
+/// Largest number of candidates per slot, shared by the pieces of its feasible set, and the part of them that edges propose.
+const CANDIDATES: usize = 40;
+const OF_EDGES: f32 = 0.67;
+/// An edge proposes a candidate if the squared distance of its place to the record is below this, in squared widths.
+const NEAR2: f32 = 2.0;
+/// Number of random places that are tried for candidates that no edge proposes, and their largest squared distance to the record.
+const PROPOSALS: usize = 300;
+const PROPOSAL_NEAR2: f32 = 0.3;
+/// Candidates are at least this far apart, in widths; kept places are farther apart than [`MERGED`] typical widths.
+const APART: f32 = 0.25;
+const MERGED: f32 = 0.3;
+/// Places of rays are at least this many typical widths away from their center, where all rays meet.
+const LEAST_RANGE: f32 = 1.5;
+/// The pattern search starts with this step, in typical widths, and ends below the second one, or after some changes of the step.
+const STEPS: (f32, f32) = (0.35, 0.04);
+const MAX_STEPS: usize = 15;
+/// Places with less weight are dropped.
+const LEAST_WEIGHT: f32 = 1e-3;
+
+/// Returns the estimates of all slots after beliefs from `start`, the estimates of joint recovery. Without enough slots, returns `start`.
+pub(super) fn recover<const D: usize>(
+    family: &Family<'_, D>,
+    graph: &Graph,
+    delta: f32,
+    seed: u64,
+    start: Vec<Estimate<D>>,
+) -> Vec<Estimate<D>> {
+    match family {
+        Family::Lines { rows, slots_per_record, chance } => {
+            iterate(&LinePieces::new(rows, *slots_per_record, chance, delta), graph, seed, start)
+        }
+        Family::Planes { planes, sorted } => {
+            iterate(&PlanePieces::new(planes, sorted, delta), graph, seed, start)
+        }
+        Family::Candidates { rows, chance } => {
+            iterate(&CandidatePieces::new(rows, chance, delta), graph, seed, start)
+        }
+    }
+}
+
+fn iterate<const D: usize, P: Pieces<D>>(
+    pieces: &P,
+    graph: &Graph,
+    seed: u64,
+    mut estimates: Vec<Estimate<D>>,
+) -> Vec<Estimate<D>> {
+    let n = estimates.len();
+    let n_known = estimates.iter().filter(|estimate| estimate.status == Status::Ok).count();
+    if n_known < LEAST_SLOTS {
+        return estimates;
+    }
+    let start = estimates.clone();
+    let marginals = Marginals::new(pieces, n);
+    let mut beliefs: Vec<Vec<Place<D>>> = start_weights(&estimates)
+        .into_iter()
+        .zip(&estimates)
+        .map(|(weight, estimate)| match estimate.status {
+            Status::Ok => vec![Place { x: estimate.position, piece: estimate.axis, weight }],
+            _ => Vec::new(),
+        })
+        .collect();
+    let mut typical = None;
+    let mut tables = None;
+    for iteration in 0..ITERATIONS {
+        let Some(places) = Places::new(&beliefs, &mut typical) else { return estimates };
+        let learned = Tables::learn(pieces, graph, &places, seed, tables.as_ref());
+        let temper = temper::learn(pieces, graph, &places, &learned, seed);
+        let proposals = proposals(&places, seed);
+        let points: Vec<[f64; D]> = places.places.iter().map(|p| p.x.map(f64::from)).collect();
+        let Ok(tree) = Knn::new(&points) else { return estimates };
+        let context = Context {
+            pieces,
+            graph,
+            places: &places,
+            tables: &learned,
+            temper,
+            proposals: &proposals,
+            tree: &tree,
+            marginals: &marginals,
+            seed,
+        };
+        let moves = |slot: &u32| {
+            let mut draws = Draws::new(seed, Stage::Beliefs, u64::from(*slot));
+            iteration == 0 || draws.below(2) as usize == iteration % 2
+        };
+        let slots: Vec<u32> = places.order.iter().copied().filter(moves).collect();
+        let updated: Vec<Vec<Option<Vec<Place<D>>>>> = slots
+            .par_chunks(CHUNK)
+            .map_init(Scratch::default, |scratch, slots| {
+                slots.iter().map(|&slot| context.update(slot as usize, scratch)).collect()
+            })
+            .collect();
+        for (slot, belief) in slots.into_iter().zip(updated.into_iter().flatten()) {
+            if let Some(belief) = belief {
+                let (slot, best) = (slot as usize, belief[0]);
+                let estimate = &mut estimates[slot];
+                (estimate.position, estimate.axis) = (best.x, best.piece);
+                estimate.status = Status::Ok;
+                beliefs[slot] = belief;
+            }
+        }
+        tables = Some(learned);
+    }
+    // Where both agree, the least squares of joint recovery are more precise than the kernel of the density.
+    let agreed = typical.unwrap_or(0.0).powi(2);
+    for (estimate, start) in estimates.iter_mut().zip(start) {
+        if start.status == Status::Ok && distance2(&start.position, &estimate.position) < agreed {
+            *estimate = start;
+        }
+    }
+    estimates
+}
+
+/// Returns the weight of each estimate of joint recovery, by the rank of its evidence.
+fn start_weights<const D: usize>(estimates: &[Estimate<D>]) -> Vec<f32> {
+    let mut order: Vec<usize> = (0..estimates.len()).collect();
+    order.sort_by(|&a, &b| estimates[a].evidence.total_cmp(&estimates[b].evidence));
+    let mut weights = vec![0.0; estimates.len()];
+    for (rank, slot) in order.into_iter().enumerate() {
+        weights[slot] = START_WEIGHT.0 + START_WEIGHT.1 * rank as f32 / estimates.len() as f32;
+    }
+    weights
+}
+
+/// A possible place of a slot, on a piece of its feasible set, and the probability that it is the right one.
+#[derive(Clone, Copy, Debug)]
+struct Place<const D: usize> {
+    x: [f32; D],
+    piece: u8,
+    weight: f32,
+}
+
+/// The places of all slots, the best one of each slot first.
+struct Places<const D: usize> {
+    places: Vec<Place<D>>,
+    /// Range of the places of each slot.
+    offsets: Vec<u32>,
+    /// Slot of each place.
+    slot: Vec<u32>,
+    /// Width at each place.
+    width: Vec<f32>,
+    /// The median width of the start, the unit of lengths that hold for the whole map.
+    typical: f32,
+    /// All slots, near ones after each other.
+    order: Vec<u32>,
+}
+
+impl<const D: usize> Places<D> {
+    /// Measures the width at every place. The first call sets the `typical` width. Returns `None` if no slot has a place, or most
+    /// places coincide.
+    fn new(beliefs: &[Vec<Place<D>>], typical: &mut Option<f32>) -> Option<Self> {
+        let (mut places, mut slot, mut offsets) = (Vec::new(), Vec::new(), vec![0]);
+        let mut best = Vec::new();
+        for (at, belief) in beliefs.iter().enumerate() {
+            best.extend(belief.first().map(|place| place.x.map(f64::from)));
+            places.extend(belief);
+            slot.resize(places.len(), at as u32);
+            offsets.push(places.len() as u32);
+        }
+        let tree = Knn::new(&best).ok()?;
+        let k = (WIDTH_NEIGHBOR * best.len() / beliefs.len()).max(8) + 1;
+        let measure = |found: &mut Vec<(f64, u32)>, place: &Place<D>| {
+            tree.nearest_to(place.x.map(f64::from), k, found);
+            found.last().map_or(0.0, |last| last.0.sqrt() as f32)
+        };
+        let mut width: Vec<f32> = places.par_iter().map_init(Vec::new, measure).collect();
+        let firsts = offsets.windows(2).filter(|range| range[0] < range[1]);
+        let mut of_best: Vec<f32> = firsts.map(|range| width[range[0] as usize]).collect();
+        let middle = of_best.len() / 2;
+        let median = *of_best.select_nth_unstable_by(middle, f32::total_cmp).1;
+        let typical = *typical.get_or_insert(median);
+        if !(median > 0.0 && typical.is_finite()) {
+            return None;
+        }
+        width.iter_mut().for_each(|w| *w = (*w / median).clamp(WIDTHS.0, WIDTHS.1) * typical);
+        let estimate = |belief: &Vec<Place<D>>| match belief.first() {
+            Some(place) => Estimate { position: place.x, status: Status::Ok, ..lost() },
+            None => lost(),
+        };
+        let estimates: Vec<Estimate<D>> = beliefs.iter().map(estimate).collect();
+        let order = along_curve(&crate::recover::map::places::Places::new(&estimates));
+        Some(Self { places, offsets, slot, width, typical, order })
+    }
+
+    fn n_slots(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    fn of(&self, slot: usize) -> std::ops::Range<usize> {
+        self.offsets[slot] as usize..self.offsets[slot + 1] as usize
+    }
+
+    /// Returns the best place of a slot, if it has any.
+    fn best(&self, slot: usize) -> Option<&Place<D>> {
+        self.places[self.of(slot)].first()
+    }
+
+    /// Returns the places at the end of an edge: those of one slot, or of both slots of a record.
+    fn at_end(&self, end: u32, class: u8, slots_per_record: usize) -> std::ops::Range<usize> {
+        let last = end as usize + usize::from(either(class, slots_per_record));
+        self.of(end as usize).start..self.of(last).end
+    }
+
+    /// Returns the distance between two places, in widths of the second one.
+    #[inline(always)]
+    fn distance(&self, from: &[f32; D], to: usize) -> f32 {
+        distance2(from, &self.places[to].x).sqrt() / self.width[to]
+    }
+}
+
+fn lost<const D: usize>() -> Estimate<D> {
+    Estimate::lost(Status::NoSupport)
+}
+
+/// Returns places that are likely right, in random order: what slots are near that no edge names.
+fn proposals<const D: usize>(places: &Places<D>, seed: u64) -> Vec<[f32; D]> {
+    let mut weights: Vec<f32> =
+        (0..places.n_slots()).filter_map(|slot| places.best(slot)).map(|p| p.weight).collect();
+    let low = 3 * weights.len() / 10;
+    let least = *weights.select_nth_unstable_by(low, f32::total_cmp).1;
+    let best = (0..places.n_slots()).filter_map(|slot| Some((slot, places.best(slot)?)));
+    let mut likely: Vec<(u64, [f32; D])> = best
+        .filter(|(_, place)| place.weight >= least)
+        .map(|(slot, p)| (Draws::new(seed, Stage::BeliefProposals, slot as u64).bits(), p.x))
+        .collect();
+    likely.sort_unstable_by_key(|entry| entry.0);
+    likely.into_iter().map(|(_, x)| x).collect()
+}
+
+/// The volume element of axis candidates: per slot and piece, the logarithm of the density of the values on the exchanged axis.
+struct Marginals(Vec<Vec<f32>>);
+
+impl Marginals {
+    /// Learns nothing for families whose feasible sets have one piece.
+    fn new<const D: usize, P: Pieces<D>>(pieces: &P, n: usize) -> Self {
+        if P::PER_SLOT == 1 {
+            return Self(Vec::new());
+        }
+        let of_axis = |axis: usize| {
+            let values: Vec<f32> =
+                (0..n).map(|slot| pieces.piece(slot, axis).through[axis]).collect();
+            let mut sorted = values.clone();
+            sorted.sort_unstable_by(f32::total_cmp);
+            let around = (n / 200).max(20);
+            let density = |value: &f32| {
+                let at = sorted.partition_point(|x| x < value);
+                let (low, high) = (at.saturating_sub(around), (at + around).min(n - 1));
+                let length = (sorted[high] - sorted[low]).max(f32::MIN_POSITIVE);
+                ln((high - low) as f32 / length)
+            };
+            values.iter().map(density).collect()
+        };
+        Self((0..P::PER_SLOT).map(of_axis).collect())
+    }
+
+    #[inline(always)]
+    fn at(&self, slot: usize, piece: usize) -> f32 {
+        self.0.get(piece).map_or(0.0, |column| column[slot])
+    }
+}
+
+/// Number of bins of the distance: up to the first bound, log-spaced up to the second one, and beyond.
+const BINS: usize = 16;
+const BIN_ENDS: (f32, f32) = (0.1, 6.0);
+/// Entries per unit of distance in a table, and their number.
+const PER_WIDTH: f32 = 20.0;
+const ENTRIES: usize = 121;
+/// Number of slots from which tables are learned, and of random slots that each is compared with.
+const SAMPLE: usize = 1 << 12;
+const RANDOM: usize = 30;
+/// Passes of expectation maximization: at first, and when tables are known.
+const PASSES: (usize, usize) = (6, 3);
+/// Number of random pairs that every class is given: a class with few edges says little.
+const PRIOR: f64 = 10.0;
+
+/// Likelihood ratios of edges by class and distance.
+struct Tables {
+    /// Per class, the distribution of the distance over bins.
+    bins: Vec<[f64; BINS]>,
+    /// Per class, `L_c(u) - 1` at multiples of `1 / PER_WIDTH`, relative to the last bin.
+    ratios: Vec<[f32; ENTRIES]>,
+}
+
+fn bin_of(u: f32) -> usize {
+    if u < BIN_ENDS.0 {
+        return 0;
+    }
+    if u >= BIN_ENDS.1 {
+        return BINS - 1;
+    }
+    let per_bin = ln(BIN_ENDS.1 / BIN_ENDS.0) / (BINS - 2) as f32;
+    (1 + (ln(u / BIN_ENDS.0) / per_bin) as usize).min(BINS - 2)
+}
+
+impl Tables {
+    /// Learns tables by expectation maximization. An edge says something about the distance if the places of both ends are right, which
+    /// has the probability of their weights; else its distance is unknown.
+    fn learn<const D: usize, P: Pieces<D>>(
+        pieces: &P,
+        graph: &Graph,
+        places: &Places<D>,
+        seed: u64,
+        before: Option<&Self>,
+    ) -> Self {
+        let slots_per_record = pieces.slots_per_record();
+        let every = places.n_slots().div_ceil(SAMPLE).max(1);
+        let sample: Vec<usize> = (0..places.n_slots()).step_by(every).collect();
+        // Pairs of places of a slot and of the end of an edge: their bin and the weight of both.
+        let pairs = |slot: usize, ends: std::ops::Range<usize>, share: f32| {
+            let pair = move |a: usize, b: usize| {
+                let weight = places.places[a].weight * places.places[b].weight * share;
+                (bin_of(places.distance(&places.places[a].x, b)), weight)
+            };
+            places.of(slot).flat_map(move |a| ends.clone().map(move |b| pair(a, b)))
+        };
+        let by_chance: Vec<[f64; BINS]> = sample
+            .par_chunks(CHUNK)
+            .map(|slots| {
+                let mut bins = [0.0; BINS];
+                for &slot in slots {
+                    let mut draws = Draws::new(seed, Stage::BeliefTables, slot as u64);
+                    for _ in 0..RANDOM {
+                        let other = draws.below(places.n_slots() as u64) as usize;
+                        if other != slot {
+                            for (bin, weight) in pairs(slot, places.of(other), 1.0) {
+                                bins[bin] += f64::from(weight);
+                            }
+                        }
+                    }
+                }
+                bins
+            })
+            .collect();
+        let mut chance = [1e-3; BINS];
+        for part in by_chance {
+            chance.iter_mut().zip(part).for_each(|(sum, x)| *sum += x);
+        }
+        let total: f64 = chance.iter().sum();
+        let chance = chance.map(|x| (x / total).max(1e-7));
+        let edges: Vec<Vec<(u8, Vec<(u8, f32)>)>> = sample
+            .par_chunks(CHUNK)
+            .map(|slots| {
+                let mut edges = Vec::new();
+                for &slot in slots {
+                    let (ends, classes) = graph.of(slot);
+                    for (&end, &class) in ends.iter().zip(classes) {
+                        let range = places.at_end(end, class, slots_per_record);
+                        let share = if either(class, slots_per_record) { 0.5 } else { 1.0 };
+                        let pairs: Vec<(u8, f32)> = pairs(slot, range, share)
+                            .map(|(bin, weight)| (bin as u8, weight))
+                            .collect();
+                        if !pairs.is_empty() {
+                            edges.push((class, pairs));
+                        }
+                    }
+                }
+                edges
+            })
+            .collect();
+        let first = || {
+            let near = std::array::from_fn(|bin| {
+                chance[bin] * (8.0 - 7.0 * bin as f64 / (BINS - 1) as f64)
+            });
+            vec![normalized(near); CLASSES]
+        };
+        let mut bins = before.map_or_else(first, |tables| tables.bins.clone());
+        for _ in 0..if before.is_none() { PASSES.0 } else { PASSES.1 } {
+            let ratios: Vec<[f64; BINS]> =
+                bins.iter().map(|f| std::array::from_fn(|bin| f[bin] / chance[bin])).collect();
+            let parts: Vec<Vec<[f64; BINS]>> = edges
+                .par_iter()
+                .map(|edges| {
+                    let mut sums = vec![[0.0; BINS]; CLASSES];
+                    for (class, pairs) in edges {
+                        let class = usize::from(*class);
+                        let known: f64 = pairs.iter().map(|pair| f64::from(pair.1)).sum();
+                        let unknown = (1.0 - known).max(0.0);
+                        let likelihood = |&(bin, weight): &(u8, f32)| {
+                            f64::from(weight) * ratios[class][usize::from(bin)]
+                        };
+                        let z = unknown + pairs.iter().map(likelihood).sum::<f64>();
+                        for pair in pairs {
+                            sums[class][usize::from(pair.0)] += likelihood(pair) / z;
+                        }
+                        for bin in 0..BINS {
+                            sums[class][bin] += unknown * bins[class][bin] / z;
+                        }
+                    }
+                    sums
+                })
+                .collect();
+            for class in 0..CLASSES {
+                let mut sum = chance.map(|share| PRIOR * share);
+                for part in &parts {
+                    sum.iter_mut().zip(part[class]).for_each(|(sum, x)| *sum += x);
+                }
+                bins[class] = normalized(sum);
+            }
+        }
+        let ratios = bins.iter().map(|f| interpolated(f, &chance)).collect();
+        Self { bins, ratios }
+    }
+
+    /// Returns `L_c(u) - 1`.
+    #[inline(always)]
+    fn at(&self, class: u8, u: f32) -> f32 {
+        let at = (u * PER_WIDTH).min((ENTRIES - 1) as f32);
+        let low = (at as usize).min(ENTRIES - 2);
+        let share = at - low as f32;
+        let table = &self.ratios[usize::from(class)];
+        table[low] * (1.0 - share) + table[low + 1] * share
+    }
+}
+
+fn normalized(bins: [f64; BINS]) -> [f64; BINS] {
+    let total: f64 = bins.iter().sum();
+    bins.map(|x| x / total)
+}
+
+/// Returns a table of likelihood ratios, less 1, from distributions over bins: linear in logarithms between the middles of bins.
+fn interpolated(bins: &[f64; BINS], chance: &[f64; BINS]) -> [f32; ENTRIES] {
+    let log_ratio: [f32; BINS] =
+        std::array::from_fn(|bin| libm::log(bins[bin].max(1e-12) / chance[bin]) as f32);
+    let step = libm::logf(BIN_ENDS.1 / BIN_ENDS.0) / (BINS - 2) as f32;
+    let start = libm::logf(BIN_ENDS.0);
+    let middle = |bin: usize| match bin {
+        0 => start - 0.36,
+        _ if bin == BINS - 1 => libm::logf(BIN_ENDS.1),
+        _ => start + (bin as f32 - 0.5) * step,
+    };
+    let logs: [f32; ENTRIES] = std::array::from_fn(|entry| {
+        let u = libm::logf((entry as f32).max(1.0) / PER_WIDTH);
+        let bin = (0..BINS).position(|bin| middle(bin) >= u).unwrap_or(BINS - 1);
+        if bin == 0 {
+            return log_ratio[0];
+        }
+        let share = ((u - middle(bin - 1)) / (middle(bin) - middle(bin - 1))).min(1.0);
+        log_ratio[bin - 1] * (1.0 - share) + log_ratio[bin] * share
+    });
+    logs.map(|x| libm::expf(x - logs[ENTRIES - 1]) - 1.0)
+}
+
+/// What an iteration reads.
+struct Context<'a, const D: usize, P> {
+    pieces: &'a P,
+    graph: &'a Graph,
+    places: &'a Places<D>,
+    tables: &'a Tables,
+    temper: f32,
+    proposals: &'a [[f32; D]],
+    /// All places, for their density.
+    tree: &'a Knn<'a, D>,
+    marginals: &'a Marginals,
+    seed: u64,
+}
+
+/// The place of a neighbor that is near a piece of the own feasible set.
+#[derive(Clone, Copy)]
+struct Near<const D: usize> {
+    x: [f32; D],
+    weight: f32,
+    inverse_width: f32,
+    class: u8,
+    /// Whether the next place belongs to the same edge.
+    goes_on: bool,
+}
+
+#[derive(Clone, Copy)]
+struct Candidate<const D: usize> {
+    x: [f32; D],
+    piece: usize,
+    score: f32,
+}
+
+/// Buffers of one thread: per piece, the places of neighbors that are near it, and the candidates.
+#[derive(Default)]
+struct Scratch<const D: usize> {
+    near: Vec<Vec<Near<D>>>,
+    candidates: Vec<Candidate<D>>,
+}
+
+impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
+    /// Returns the new places of `slot`, the best one first; `None` if there is no candidate.
+    fn update(&self, slot: usize, scratch: &mut Scratch<D>) -> Option<Vec<Place<D>>> {
+        let Scratch { near, candidates } = scratch;
+        near.resize_with(P::PER_SLOT, Vec::new);
+        candidates.clear();
+        for (piece, near) in near.iter_mut().enumerate() {
+            self.propose(slot, piece, near, candidates);
+        }
+        for place in &self.places.places[self.places.of(slot)] {
+            let piece = usize::from(place.piece);
+            candidates.push(Candidate { x: place.x, piece, score: 0.0 });
+        }
+        let mut best = 0;
+        for at in 0..candidates.len() {
+            let Candidate { x, piece, .. } = candidates[at];
+            candidates[at].score = self.score(slot, piece, &near[piece], &x);
+            if candidates[at].score > candidates[best].score {
+                best = at;
+            }
+        }
+        let refined = self.refine(slot, *candidates.get(best)?, near);
+        candidates.push(refined);
+        Some(self.kept(candidates, refined.score))
+    }
+
+    /// Fills `near` with the places of neighbors that are near a piece, and adds candidates on it.
+    fn propose(
+        &self,
+        slot: usize,
+        piece: usize,
+        near: &mut Vec<Near<D>>,
+        candidates: &mut Vec<Candidate<D>>,
+    ) {
+        let Self { pieces, places, tables, .. } = self;
+        let slots_per_record = pieces.slots_per_record();
+        let own = pieces.piece(slot, piece);
+        let first = candidates.len();
+        let room = CANDIDATES / P::PER_SLOT;
+        let of_edges = (room as f32 * OF_EDGES) as usize;
+        let partner = (slots_per_record == 2).then(|| places.best(slot ^ 1)).flatten();
+        near.clear();
+        let (ends, classes) = self.graph.of(slot);
+        for (&end, &class) in ends.iter().zip(classes) {
+            let from = near.len();
+            for at in places.at_end(end, class, slots_per_record) {
+                let (y, width) = (&places.places[at], places.width[at]);
+                let x = own.project(&y.x);
+                let d2 = distance2(&x, &y.x);
+                if d2 >= BIN_ENDS.1 * BIN_ENDS.1 * width * width || self.is_at_center(&own, &y.x) {
+                    continue;
+                }
+                // A slot that lists a paired line may mean its other point, if that is near.
+                let other = partner.filter(|_| side(class) == Side::Reverse).map_or(0.0, |other| {
+                    let ratio = tables.at(class, places.distance(&other.x, at));
+                    (other.weight * y.weight * ratio).max(0.0)
+                });
+                near.push(Near {
+                    x: y.x,
+                    weight: y.weight / (1.0 + other),
+                    inverse_width: 1.0 / width,
+                    class,
+                    goes_on: true,
+                });
+                if candidates.len() - first < of_edges && d2 < NEAR2 * width * width {
+                    add(candidates, first, x, piece, APART * width);
+                }
+            }
+            if near.len() > from
+                && let Some(last) = near.last_mut()
+            {
+                last.goes_on = false;
+            }
+        }
+        let item = (slot * P::PER_SLOT + piece) as u64;
+        let mut draws = Draws::new(self.seed, Stage::BeliefProposals, !item);
+        let start = draws.below(self.proposals.len() as u64) as usize;
+        let (before, after) = self.proposals.split_at(start);
+        let typical = places.typical;
+        for y in after.iter().chain(before).take(PROPOSALS) {
+            if candidates.len() - first >= room {
+                break;
+            }
+            let x = own.project(y);
+            if distance2(&x, y) < PROPOSAL_NEAR2 * typical * typical && !self.is_at_center(&own, &x)
+            {
+                add(candidates, first, x, piece, APART * typical);
+            }
+        }
+    }
+
+    /// Whether `x` is so close to the center of a ray that it is near all its rays.
+    #[inline(always)]
+    fn is_at_center(&self, own: &Piece<D>, x: &[f32; D]) -> bool {
+        let least = LEAST_RANGE * self.places.typical;
+        own.from_center && distance2(&own.through, x) < least * least
+    }
+
+    /// Returns the log-posterior of a place, up to a constant.
+    #[inline(always)]
+    fn score(&self, slot: usize, piece: usize, near: &[Near<D>], x: &[f32; D]) -> f32 {
+        let (mut sum, mut product, mut ratio) = (0.0, 1.0f32, 1.0f32);
+        for y in near {
+            let u = distance2(x, &y.x).sqrt() * y.inverse_width;
+            ratio += y.weight * self.tables.at(y.class, u);
+            if !y.goes_on {
+                product *= ratio.clamp(1e-6, 1e12);
+                ratio = 1.0;
+                if !(1e-12..1e12).contains(&product) {
+                    sum += ln(product);
+                    product = 1.0;
+                }
+            }
+        }
+        let evidence = self.temper * (sum + ln(product));
+        let own = self.pieces.piece(slot, piece);
+        let range = match own.from_center {
+            true => distance2(&own.through, x) / (self.places.typical * self.places.typical),
+            false => 1.0,
+        };
+        evidence
+            + DENSITY_WEIGHT * ln(LEAST_DENSITY + self.density(slot, x))
+            + 0.5 * (D - 1) as f32 * ln(range.max(1e-6))
+            + self.marginals.at(slot, piece)
+    }
+
+    /// Returns the weighted number of places of other slots around `x`.
+    #[inline(always)]
+    fn density(&self, slot: usize, x: &[f32; D]) -> f32 {
+        let radius = DENSITY_RADIUS * self.places.typical;
+        let (radius2, mut sum) = (radius * radius, 0.0);
+        self.tree.within(&x.map(f64::from), (f64::from(radius2), usize::MAX), |at, _| {
+            let at = at as usize;
+            if self.places.slot[at] as usize != slot {
+                let place = &self.places.places[at];
+                let closeness = (1.0 - distance2(&place.x, x) / radius2).max(0.0);
+                sum += place.weight * closeness.powi(4);
+            }
+        });
+        sum
+    }
+
+    /// Moves a candidate along its piece while that improves its score, in steps that become shorter.
+    fn refine(&self, slot: usize, start: Candidate<D>, near: &[Vec<Near<D>>]) -> Candidate<D> {
+        let (mut best, piece) = (start, start.piece);
+        let own = self.pieces.piece(slot, piece);
+        let along = self.pieces.direction(slot, piece);
+        // Directions of a plane are the axes other than its normal.
+        let free: Vec<[f32; D]> = match P::NORMAL {
+            true => (0..D)
+                .filter(|&axis| along[axis] == 0.0)
+                .map(|axis| std::array::from_fn(|c| if c == axis { 1.0 } else { 0.0 }))
+                .collect(),
+            false => vec![along],
+        };
+        let mut step = STEPS.0 * self.places.typical;
+        for _ in 0..MAX_STEPS {
+            if step < STEPS.1 * self.places.typical {
+                break;
+            }
+            let tried = free.iter().flat_map(|direction| [(direction, step), (direction, -step)]);
+            let better = tried
+                .map(|(direction, step)| {
+                    own.project(&std::array::from_fn(|c| best.x[c] + step * direction[c]))
+                })
+                .map(|x| Candidate { x, piece, score: self.score(slot, piece, &near[piece], &x) })
+                .find(|candidate| candidate.score > best.score);
+            match better {
+                Some(candidate) => best = candidate,
+                None => step *= 0.5,
+            }
+        }
+        best
+    }
+
+    /// Returns the best candidates as places, and adds the weights of candidates next to them.
+    fn kept(&self, candidates: &mut [Candidate<D>], best: f32) -> Vec<Place<D>> {
+        let share = |candidate: &Candidate<D>| libm::expf(candidate.score - best);
+        let total: f32 = candidates.iter().map(share).sum();
+        candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let merged = MERGED * self.places.typical;
+        let mut kept: Vec<Place<D>> = Vec::with_capacity(PLACES);
+        for candidate in candidates.iter() {
+            let weight = share(candidate) / total;
+            if weight < LEAST_WEIGHT && !kept.is_empty() {
+                break;
+            }
+            let is_near = |place: &Place<D>| distance2(&place.x, &candidate.x) < merged * merged;
+            if let Some(near) = kept.iter().position(is_near) {
+                kept[near].weight += weight;
+            } else if kept.len() < PLACES {
+                kept.push(Place { x: candidate.x, piece: candidate.piece as u8, weight });
+            }
+        }
+        kept
+    }
+}
+
+/// Adds a candidate unless one of the same piece, from index `first` on, is close.
+fn add<const D: usize>(
+    candidates: &mut Vec<Candidate<D>>,
+    first: usize,
+    x: [f32; D],
+    piece: usize,
+    apart: f32,
+) {
+    let is_close = |other: &Candidate<D>| (0..D).all(|c| (other.x[c] - x[c]).abs() < apart);
+    if !candidates[first..].iter().any(is_close) {
+        candidates.push(Candidate { x, piece, score: 0.0 });
+    }
+}
+
+mod temper {
+    //! The temper, learned from each slot's own record.
+    //!
+    //! The lists of a slot say where its point is, in space. Its record says so independently: a wrong place is near the record by chance
+    //! only. So the temper is the exponent under which the lists, without the record, predict best where the record passes. Entries that
+    //! are wrong together make it small; for the independent errors of the oracle it is about 1.
+
+    use super::*;
+
+    /// Tempers to choose from.
+    const TEMPERS: [f32; 7] = [0.14, 0.2, 0.28, 0.4, 0.56, 0.8, 1.0];
+    /// The largest temper counts whose mean log-likelihood is within this many nats of the best.
+    const TOLERANCE: f64 = 0.1;
+    /// Number of sampled slots, and of random records that measure how often a record passes by chance.
+    const SLOTS: usize = 2000;
+    const BY_CHANCE: usize = 150;
+    /// Largest number of places that are scored per slot.
+    const MOST_PLACES: usize = 100;
+    /// Probability that a list names the place at all.
+    const NAMED: f64 = 0.9;
+    /// Compared places are at least this many widths apart.
+    const SEPARATE: f32 = 2.0;
+
+    /// A place that a list names: the evidence of the other edges, and how often the own record passes it, against other records.
+    struct Named<const D: usize> {
+        x: [f32; D],
+        evidence: f32,
+        ratio: f64,
+    }
+
+    /// Returns the temper for these lists and tables.
+    pub(super) fn learn<const D: usize, P: Pieces<D>>(
+        pieces: &P,
+        graph: &Graph,
+        places: &Places<D>,
+        tables: &Tables,
+        seed: u64,
+    ) -> f32 {
+        let every = places.n_slots().div_ceil(SLOTS).max(1);
+        let sample: Vec<usize> = (0..places.n_slots()).step_by(every).collect();
+        let named: Vec<Vec<Named<D>>> = sample
+            .par_iter()
+            .map(|&slot| named(pieces, graph, places, tables, seed, slot))
+            .filter(|named| named.len() > 1)
+            .collect();
+        let fit = |temper: f32| -> f64 {
+            let of_slot = |named: &Vec<Named<D>>| {
+                let most = named.iter().map(|n| n.evidence).fold(f32::NEG_INFINITY, f32::max);
+                let (mut all, mut passed) = (0.0, 0.0);
+                for n in named {
+                    let p = libm::exp(f64::from(temper * (n.evidence - most)));
+                    all += p;
+                    passed += p * (1.0 - NAMED + NAMED * n.ratio);
+                }
+                libm::log(passed / all)
+            };
+            named.iter().map(of_slot).sum::<f64>() / named.len().max(1) as f64
+        };
+        let fits = TEMPERS.map(fit);
+        let best = fits.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let chosen = fits.iter().rposition(|&fit| fit > best - TOLERANCE);
+        TEMPERS[chosen.unwrap_or(0)]
+    }
+
+    /// Returns the places that the edges of `slot` lead to, far from each other, those with the most evidence first.
+    fn named<const D: usize, P: Pieces<D>>(
+        pieces: &P,
+        graph: &Graph,
+        places: &Places<D>,
+        tables: &Tables,
+        seed: u64,
+        slot: usize,
+    ) -> Vec<Named<D>> {
+        let slots_per_record = pieces.slots_per_record();
+        let (ends, classes) = graph.of(slot);
+        let best_at = |edge: usize| {
+            let range = places.at_end(ends[edge], classes[edge], slots_per_record);
+            range
+                .clone()
+                .max_by(|&a, &b| places.places[a].weight.total_cmp(&places.places[b].weight))
+        };
+        let width = places.typical;
+        let passes = |slot: usize, x: &[f32; D]| {
+            let near = |piece| distance2(&pieces.piece(slot, piece).project(x), x) < width * width;
+            (0..P::PER_SLOT).any(near)
+        };
+        let mut draws = Draws::new(seed, Stage::BeliefTables, !(slot as u64));
+        let others: Vec<usize> =
+            (0..BY_CHANCE).map(|_| draws.below(places.n_slots() as u64) as usize).collect();
+        let mut all: Vec<Named<D>> = (0..ends.len())
+            .filter_map(|edge| Some((edge, places.places[best_at(edge)?].x)))
+            .take(MOST_PLACES)
+            .map(|(edge, x)| {
+                let mut evidence = 0.0;
+                for other in (0..ends.len()).filter(|&other| other != edge) {
+                    let mut ratio = 1.0;
+                    for at in places.at_end(ends[other], classes[other], slots_per_record) {
+                        let weight = places.places[at].weight;
+                        ratio += weight * tables.at(classes[other], places.distance(&x, at));
+                    }
+                    evidence += ln(ratio.max(1e-6));
+                }
+                let by_chance = others.iter().filter(|&&other| passes(other, &x)).count();
+                let chance = (by_chance as f64 + 0.5) / (BY_CHANCE + 1) as f64;
+                let ratio = if passes(slot, &x) { 1.0 / chance } else { 0.0 };
+                Named { x, evidence, ratio }
+            })
+            .collect();
+        all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+        let mut kept: Vec<Named<D>> = Vec::new();
+        let apart = SEPARATE * width;
+        for named in all {
+            if kept.iter().all(|other| distance2(&other.x, &named.x) >= apart * apart) {
+                kept.push(named);
+            }
+        }
+        kept
+    }
+}
