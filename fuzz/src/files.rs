@@ -86,7 +86,7 @@ pub fn features(bytes: &[u8]) {
 /// Reads a stage file as every kind.
 pub fn stages(bytes: &[u8]) {
     let path = file("s.npz", bytes);
-    let _ = stage::peek(&path);
+    let _ = stage::kind(&path);
     let _ = stage::scheme_name(&path);
     if let Ok(released) = stage::read_released::<3>(&path) {
         assert!(released.n_slots() >= released.n_records());

@@ -12,7 +12,9 @@ use unlift_io::clouds::{
     write_points,
 };
 use unlift_io::read::{self, colmap};
-use unlift_io::stage::{Kind as Stage, peek, read_recovered, read_released, read_truth};
+use unlift_io::stage::{
+    Kind as Stage, has_images, kind, read_recovered, read_released, read_truth,
+};
 
 use crate::args::ExportArgs;
 use crate::exit::{Outcome, advise, usage};
@@ -109,12 +111,12 @@ fn views(project: &Path) -> anyhow::Result<(Vec<colmap::Camera>, Vec<colmap::Ima
 
 /// Reads the file at `path`, and returns its content and its unit.
 fn read(path: &Path) -> anyhow::Result<(Shown, Unit)> {
-    let (kind, dimension) = peek(path)?;
+    let kind = kind(path)?;
     let wrong = |found: &str| {
         let expected = "a released, recovered or truth file of a map";
         Err(unlift_io::Error::new(path, "", expected, found).into())
     };
-    if dimension == Some(2) {
+    if has_images(path)? {
         return wrong("one of images");
     }
     match kind {

@@ -107,30 +107,6 @@ impl<'a> Arrays<'a> {
         }
     }
 
-    /// True for the file of many images.
-    pub(super) fn is_of_images(&self) -> bool {
-        self.names.iter().any(|name| name.contains('/'))
-    }
-
-    /// The number of coordinates of a place; `None` for lists.
-    pub(super) fn dimension(&self) -> Result<Option<u64>, Error> {
-        if self.is_of_images() {
-            return Ok(Some(2));
-        }
-        let mut shape = None;
-        for name in ["position", "direction", "origin"] {
-            if shape.is_none() && self.has(name) {
-                shape = self.file(name, |bytes| Ok(Header::read(bytes)?.shape()))?;
-            }
-        }
-        // Planes have no array with an entry per axis.
-        let of_planes = || match self.meta.unit() {
-            Ok(unit) if self.has("offset") => Some(if unit == Some(Unit::Pixel) { 2 } else { 3 }),
-            _ => None,
-        };
-        Ok(shape.and_then(|shape| shape.last().copied()).or_else(of_planes))
-    }
-
     /// The unit of all lengths: as declared, else `usual`, else pixels in 2D.
     pub(super) fn unit<const D: usize>(&self, usual: Option<Unit>) -> Result<Unit, Error> {
         let in_plane = (D == 2).then_some(Unit::Pixel);
@@ -177,21 +153,6 @@ impl<'a> Arrays<'a> {
     pub(super) fn vector<const D: usize>(&self, name: &str) -> Result<[f64; D], Error> {
         let (values, _) = self.floats(name, [Some(D)])?;
         Ok(std::array::from_fn(|axis| values[axis]))
-    }
-
-    /// Reads one optional number per row as `f32`; without the array, `usual`.
-    pub(super) fn singles(
-        &self,
-        name: &str,
-        n: usize,
-        usual: f32,
-        (rule, holds): (&str, impl Fn(f64) -> bool),
-    ) -> Result<Vec<f32>, Error> {
-        if !self.has(name) {
-            return Ok(vec![usual; n]);
-        }
-        let single = |x: f64| Some(x as f32).filter(|_| holds(x));
-        Ok(self.numbers(name, [Some(n)], Class::Any, rule, single)?.0)
     }
 
     /// Reads whole numbers from 0 to `below - 1`, and -1 for [`NONE`] if `or_none`.

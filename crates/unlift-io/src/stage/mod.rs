@@ -21,6 +21,7 @@ use std::fmt;
 use std::path::Path;
 
 use crate::Error;
+use crate::read::npz::Archive;
 use arrays::Arrays;
 
 pub use images::{ImageFile, ImageRows, ImageWriter};
@@ -102,17 +103,14 @@ impl fmt::Display for Kind {
     }
 }
 
-/// Reads the kind and the dimension of the stage file `path`, which decide the reader and `D`.
-///
-/// The dimension is that of the space, 2 for images; `None` for lists of a map.
+/// Returns the kind of the stage file `path`, by its metadata or its arrays.
 ///
 /// # Errors
 /// When the file is not a stage file of a known kind and version.
-pub fn peek(path: &Path) -> Result<(Kind, Option<u64>), Error> {
+pub fn kind(path: &Path) -> Result<Kind, Error> {
     let arrays = Arrays::open(path)?;
     let kind = arrays.kind()?;
-    let kind = kind.ok_or_else(|| Error::new(path, "", "a stage file of unlift", arrays.list()))?;
-    Ok((kind, arrays.dimension()?))
+    kind.ok_or_else(|| Error::new(path, "", "a stage file of unlift", arrays.list()))
 }
 
 /// Returns true if the stage file `path` contains many images, below their names.
@@ -120,7 +118,7 @@ pub fn peek(path: &Path) -> Result<(Kind, Option<u64>), Error> {
 /// # Errors
 /// When it is not a NumPy archive.
 pub fn has_images(path: &Path) -> Result<bool, Error> {
-    Ok(Arrays::open(path)?.is_of_images())
+    Ok(Archive::open(path)?.arrays()?.iter().any(|(_, name)| name.contains('/')))
 }
 
 /// Returns the kind that the metadata of the file at `path` declares, if it is a stage file and

@@ -79,7 +79,7 @@ pub(super) fn written<'a, const D: usize>(
     Ok(written)
 }
 
-/// Reads recovered points of dimension `D` (see [`peek`](super::peek)).
+/// Reads recovered points of dimension `D`.
 ///
 /// Only `position` is required. Without `status`, a point is recovered, or without support if its
 /// coordinates are NaN; `support` and `evidence` default to 0. Confidence requires both of its
@@ -153,7 +153,13 @@ fn estimates<const D: usize>(
     let status = optional("status", Status::ALL.len(), false)?;
     let support = optional("support", 1 << 16, false)?;
     let axis = optional("axis", D, true)?;
-    let evidence = arrays.singles("evidence", n, 0.0, ("a finite number", f64::is_finite))?;
+    let evidence = match arrays.has("evidence") {
+        true => {
+            let single = |x: f64| Some(x as f32).filter(|x| x.is_finite());
+            arrays.numbers("evidence", [Some(n)], Class::Any, "a finite number", single)?.0
+        }
+        false => vec![0.0; n],
+    };
     let estimate = |(slot, position): (usize, &[f64; D])| {
         let is_found = !position[0].is_nan();
         if position.iter().any(|x| x.is_nan() == is_found) {

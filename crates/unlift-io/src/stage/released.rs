@@ -104,7 +104,7 @@ fn corners<const D: usize>(bounds: &Bounds<D>) -> impl Iterator<Item = f64> + us
     bounds.low.into_iter().chain(bounds.high)
 }
 
-/// Reads a released map of dimension `D` (see [`peek`](super::peek)).
+/// Reads a released map of dimension `D`.
 ///
 /// Directions need not have unit length, and feet need not be nearest to the origin: records are
 /// normalized.

@@ -73,7 +73,7 @@ pub(super) fn written<'a, const D: usize>(
     Ok(written)
 }
 
-/// Reads the ground truth of an obfuscation of dimension `D` (see [`peek`](super::peek)).
+/// Reads the ground truth of an obfuscation of dimension `D`.
 ///
 /// Some arrays are optional: `slot` if the originals are in the order of slots, `dropped` if the
 /// reasons are unknown, `descriptor_row` if records have one slot.

@@ -242,7 +242,7 @@ fn maps_and_stage_files_are_not_confused() {
         (b"ply\nformat ascii 1.0\n", "another file"),
     ] {
         fs::write(&path, bytes).unwrap();
-        let line = stage::peek(&path).unwrap_err().to_string();
+        let line = stage::kind(&path).unwrap_err().to_string();
         let expected = format!("a.npz: expected an archive of NumPy arrays (.npz), found {found}");
         assert!(line.ends_with(&expected), "{line}");
     }
