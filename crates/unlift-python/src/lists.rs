@@ -175,7 +175,7 @@ pub fn named(name: &str, k: Option<usize>) -> PyResult<Named> {
     Ok(if let Some(k) = k { named.with_k(k) } else { named })
 }
 
-/// Makes lists from released data alone, as `unlift neighbors find` does.
+/// Makes lists from released data alone, as `unlift neighbors` does.
 #[pyfunction]
 #[pyo3(signature = (released, source, *, k=None, seed=0, threads=None))]
 pub fn find(

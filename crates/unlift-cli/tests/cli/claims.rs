@@ -49,5 +49,5 @@ fn the_papers_figures_stand_beside_ours() {
     assert!(
         claims("--list").0.contains("table 13: density attacks on maps: 12-scenes; 18 figures")
     );
-    assert!(claims("o").1.contains("expected folders of scenes in o, or --scale"));
+    assert!(claims("empty").1.contains("expected folders of scenes in empty, or --scale"));
 }
