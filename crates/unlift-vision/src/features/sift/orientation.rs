@@ -146,20 +146,3 @@ fn peaks(histogram: &[f32; BINS]) -> ([f64; MAX_ORIENTATIONS], usize) {
     }
     (angles, found)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn peaks_below_the_share_are_dropped_and_two_kept() {
-        let mut histogram = [0.0; BINS];
-        (histogram[0], histogram[10], histogram[20]) = (1.0, 0.81, 0.79);
-        let (angles, n) = peaks(&histogram);
-        assert_eq!(n, 2);
-        assert!((angles[0] - TAU * 0.5 / 36.0).abs() < 1e-9);
-        assert!((angles[1] - TAU * 10.5 / 36.0).abs() < 1e-9);
-        assert_eq!(peaks(&[0.0; BINS]).1, 0);
-        assert_eq!(peaks(&std::array::from_fn(|bin| (bin % 2) as f32)).1, MAX_ORIENTATIONS);
-    }
-}
