@@ -90,7 +90,7 @@ fn a_blob_gives_a_keypoint_at_its_center_with_its_scale() {
 #[test]
 fn turning_the_image_turns_keypoints_and_keeps_descriptors() {
     // Halving keeps every second pixel: the same ones of the rotated image if sides are 8 n + 1.
-    let image = scene(161, 121);
+    let image = scene(321, 241);
     let sift = Sift::default();
     let (upright, mut expected) = (sift.extract(&image), sift.extract(&turned(&image)));
     assert!(upright.keypoints.len() > 100, "{}", upright.keypoints.len());
@@ -104,7 +104,7 @@ fn turning_the_image_turns_keypoints_and_keeps_descriptors() {
         let rim = 12.0 * keypoint.scale;
         // Which two of several orientations are kept depends on where directions are counted from.
         let twins = expected.keypoints.iter().filter(|other| other.x == keypoint.x).count();
-        let inside = keypoint.x.min(161.0 - keypoint.x).min(keypoint.y).min(121.0 - keypoint.y);
+        let inside = keypoint.x.min(321.0 - keypoint.x).min(keypoint.y).min(241.0 - keypoint.y);
         inside > rim && twins == 1
     };
     let rows = expected.keypoints.iter().zip(&expected.descriptors);
