@@ -18,17 +18,21 @@
 //! The method is belief propagation with particles on the graph of lists, as in the localization of sensor networks (Ihler et al. 2005),
 //! without the division by messages sent before, which changed no figure. Figures are in docs/decisions/beliefs.md.
 
+mod tables;
+mod temper;
+
 use rayon::prelude::*;
 
 use crate::geometry::knn::Knn;
 use crate::recover::map::family::Family;
-use crate::recover::map::graph::{CLASSES, Graph, Side, either, side};
+use crate::recover::map::graph::{Graph, Side, either, side};
 use crate::recover::map::lines::ln;
 use crate::recover::map::lists::CHUNK;
 use crate::recover::map::pieces::{CandidatePieces, LinePieces, Piece, Pieces, PlanePieces};
 use crate::recover::map::places::{along_curve, distance2};
 use crate::recover::result::{Estimate, Status};
 use crate::seed::{Draws, Stage};
+use tables::{BIN_ENDS, Tables};
 
 const ITERATIONS: usize = 5;
 /// Largest number of places per slot.
@@ -307,187 +311,6 @@ impl Marginals {
     }
 }
 
-/// Number of bins of the distance: up to the first bound, log-spaced up to the second one, and beyond.
-const BINS: usize = 16;
-const BIN_ENDS: (f32, f32) = (0.1, 6.0);
-/// Entries per unit of distance in a table, and their number.
-const PER_WIDTH: f32 = 20.0;
-const ENTRIES: usize = 121;
-/// Number of slots from which tables are learned, and of random slots that each is compared with.
-const SAMPLE: usize = 1 << 12;
-const RANDOM: usize = 30;
-/// Passes of expectation maximization: at first, and when tables are known.
-const PASSES: (usize, usize) = (6, 3);
-/// Number of random pairs that every class is given: a class with few edges says little.
-const PRIOR: f64 = 10.0;
-
-/// Likelihood ratios of edges by class and distance.
-struct Tables {
-    /// Per class, the distribution of the distance over bins.
-    bins: Vec<[f64; BINS]>,
-    /// Per class, `L_c(u) - 1` at multiples of `1 / PER_WIDTH`, relative to the last bin.
-    ratios: Vec<[f32; ENTRIES]>,
-}
-
-fn bin_of(u: f32) -> usize {
-    if u < BIN_ENDS.0 {
-        return 0;
-    }
-    if u >= BIN_ENDS.1 {
-        return BINS - 1;
-    }
-    let per_bin = ln(BIN_ENDS.1 / BIN_ENDS.0) / (BINS - 2) as f32;
-    (1 + (ln(u / BIN_ENDS.0) / per_bin) as usize).min(BINS - 2)
-}
-
-impl Tables {
-    /// Learns tables by expectation maximization. An edge says something about the distance if the places of both ends are right, which
-    /// has the probability of their weights; else its distance is unknown.
-    fn learn<const D: usize, P: Pieces<D>>(
-        pieces: &P,
-        graph: &Graph,
-        places: &Places<D>,
-        seed: u64,
-        before: Option<&Self>,
-    ) -> Self {
-        let slots_per_record = pieces.slots_per_record();
-        let every = places.n_slots().div_ceil(SAMPLE).max(1);
-        let sample: Vec<usize> = (0..places.n_slots()).step_by(every).collect();
-        // Pairs of places of a slot and of the end of an edge: their bin and the weight of both.
-        let pairs = |slot: usize, ends: std::ops::Range<usize>, share: f32| {
-            let pair = move |a: usize, b: usize| {
-                let weight = places.places[a].weight * places.places[b].weight * share;
-                (bin_of(places.distance(&places.places[a].x, b)), weight)
-            };
-            places.of(slot).flat_map(move |a| ends.clone().map(move |b| pair(a, b)))
-        };
-        let by_chance: Vec<[f64; BINS]> = sample
-            .par_chunks(CHUNK)
-            .map(|slots| {
-                let mut bins = [0.0; BINS];
-                for &slot in slots {
-                    let mut draws = Draws::new(seed, Stage::BeliefTables, slot as u64);
-                    for _ in 0..RANDOM {
-                        let other = draws.below(places.n_slots() as u64) as usize;
-                        if other != slot {
-                            for (bin, weight) in pairs(slot, places.of(other), 1.0) {
-                                bins[bin] += f64::from(weight);
-                            }
-                        }
-                    }
-                }
-                bins
-            })
-            .collect();
-        let mut chance = [1e-3; BINS];
-        for part in by_chance {
-            chance.iter_mut().zip(part).for_each(|(sum, x)| *sum += x);
-        }
-        let total: f64 = chance.iter().sum();
-        let chance = chance.map(|x| (x / total).max(1e-7));
-        let edges: Vec<Vec<(u8, Vec<(u8, f32)>)>> = sample
-            .par_chunks(CHUNK)
-            .map(|slots| {
-                let mut edges = Vec::new();
-                for &slot in slots {
-                    let (ends, classes) = graph.of(slot);
-                    for (&end, &class) in ends.iter().zip(classes) {
-                        let range = places.at_end(end, class, slots_per_record);
-                        let share = if either(class, slots_per_record) { 0.5 } else { 1.0 };
-                        let pairs: Vec<(u8, f32)> = pairs(slot, range, share)
-                            .map(|(bin, weight)| (bin as u8, weight))
-                            .collect();
-                        if !pairs.is_empty() {
-                            edges.push((class, pairs));
-                        }
-                    }
-                }
-                edges
-            })
-            .collect();
-        let first = || {
-            let near = std::array::from_fn(|bin| {
-                chance[bin] * (8.0 - 7.0 * bin as f64 / (BINS - 1) as f64)
-            });
-            vec![normalized(near); CLASSES]
-        };
-        let mut bins = before.map_or_else(first, |tables| tables.bins.clone());
-        for _ in 0..if before.is_none() { PASSES.0 } else { PASSES.1 } {
-            let ratios: Vec<[f64; BINS]> =
-                bins.iter().map(|f| std::array::from_fn(|bin| f[bin] / chance[bin])).collect();
-            let parts: Vec<Vec<[f64; BINS]>> = edges
-                .par_iter()
-                .map(|edges| {
-                    let mut sums = vec![[0.0; BINS]; CLASSES];
-                    for (class, pairs) in edges {
-                        let class = usize::from(*class);
-                        let known: f64 = pairs.iter().map(|pair| f64::from(pair.1)).sum();
-                        let unknown = (1.0 - known).max(0.0);
-                        let likelihood = |&(bin, weight): &(u8, f32)| {
-                            f64::from(weight) * ratios[class][usize::from(bin)]
-                        };
-                        let z = unknown + pairs.iter().map(likelihood).sum::<f64>();
-                        for pair in pairs {
-                            sums[class][usize::from(pair.0)] += likelihood(pair) / z;
-                        }
-                        for bin in 0..BINS {
-                            sums[class][bin] += unknown * bins[class][bin] / z;
-                        }
-                    }
-                    sums
-                })
-                .collect();
-            for class in 0..CLASSES {
-                let mut sum = chance.map(|share| PRIOR * share);
-                for part in &parts {
-                    sum.iter_mut().zip(part[class]).for_each(|(sum, x)| *sum += x);
-                }
-                bins[class] = normalized(sum);
-            }
-        }
-        let ratios = bins.iter().map(|f| interpolated(f, &chance)).collect();
-        Self { bins, ratios }
-    }
-
-    /// Returns `L_c(u) - 1`.
-    #[inline(always)]
-    fn at(&self, class: u8, u: f32) -> f32 {
-        let at = (u * PER_WIDTH).min((ENTRIES - 1) as f32);
-        let low = (at as usize).min(ENTRIES - 2);
-        let share = at - low as f32;
-        let table = &self.ratios[usize::from(class)];
-        table[low] * (1.0 - share) + table[low + 1] * share
-    }
-}
-
-fn normalized(bins: [f64; BINS]) -> [f64; BINS] {
-    let total: f64 = bins.iter().sum();
-    bins.map(|x| x / total)
-}
-
-/// Returns a table of likelihood ratios, less 1, from distributions over bins: linear in logarithms between the middles of bins.
-fn interpolated(bins: &[f64; BINS], chance: &[f64; BINS]) -> [f32; ENTRIES] {
-    let log_ratio: [f32; BINS] =
-        std::array::from_fn(|bin| libm::log(bins[bin].max(1e-12) / chance[bin]) as f32);
-    let step = libm::logf(BIN_ENDS.1 / BIN_ENDS.0) / (BINS - 2) as f32;
-    let start = libm::logf(BIN_ENDS.0);
-    let middle = |bin: usize| match bin {
-        0 => start - 0.36,
-        _ if bin == BINS - 1 => libm::logf(BIN_ENDS.1),
-        _ => start + (bin as f32 - 0.5) * step,
-    };
-    let logs: [f32; ENTRIES] = std::array::from_fn(|entry| {
-        let u = libm::logf((entry as f32).max(1.0) / PER_WIDTH);
-        let bin = (0..BINS).position(|bin| middle(bin) >= u).unwrap_or(BINS - 1);
-        if bin == 0 {
-            return log_ratio[0];
-        }
-        let share = ((u - middle(bin - 1)) / (middle(bin) - middle(bin - 1))).min(1.0);
-        log_ratio[bin - 1] * (1.0 - share) + log_ratio[bin] * share
-    });
-    logs.map(|x| libm::expf(x - logs[ENTRIES - 1]) - 1.0)
-}
-
 /// What an iteration reads.
 struct Context<'a, const D: usize, P> {
     pieces: &'a P,
@@ -736,125 +559,5 @@ fn add<const D: usize>(
     let is_close = |other: &Candidate<D>| (0..D).all(|c| (other.x[c] - x[c]).abs() < apart);
     if !candidates[first..].iter().any(is_close) {
         candidates.push(Candidate { x, piece, score: 0.0 });
-    }
-}
-
-mod temper {
-    //! The temper, learned from each slot's own record.
-    //!
-    //! The lists of a slot say where its point is, in space. Its record says so independently: a wrong place is near the record by chance
-    //! only. So the temper is the exponent under which the lists, without the record, predict best where the record passes. Entries that
-    //! are wrong together make it small; for the independent errors of the oracle it is about 1.
-
-    use super::*;
-
-    /// Tempers to choose from.
-    const TEMPERS: [f32; 7] = [0.14, 0.2, 0.28, 0.4, 0.56, 0.8, 1.0];
-    /// The largest temper counts whose mean log-likelihood is within this many nats of the best.
-    const TOLERANCE: f64 = 0.1;
-    /// Number of sampled slots, and of random records that measure how often a record passes by chance.
-    const SLOTS: usize = 2000;
-    const BY_CHANCE: usize = 150;
-    /// Largest number of places that are scored per slot.
-    const MOST_PLACES: usize = 100;
-    /// Probability that a list names the place at all.
-    const NAMED: f64 = 0.9;
-    /// Compared places are at least this many widths apart.
-    const SEPARATE: f32 = 2.0;
-
-    /// A place that a list names: the evidence of the other edges, and how often the own record passes it, against other records.
-    struct Named<const D: usize> {
-        x: [f32; D],
-        evidence: f32,
-        ratio: f64,
-    }
-
-    /// Returns the temper for these lists and tables.
-    pub(super) fn learn<const D: usize, P: Pieces<D>>(
-        pieces: &P,
-        graph: &Graph,
-        places: &Places<D>,
-        tables: &Tables,
-        seed: u64,
-    ) -> f32 {
-        let every = places.n_slots().div_ceil(SLOTS).max(1);
-        let sample: Vec<usize> = (0..places.n_slots()).step_by(every).collect();
-        let named: Vec<Vec<Named<D>>> = sample
-            .par_iter()
-            .map(|&slot| named(pieces, graph, places, tables, seed, slot))
-            .filter(|named| named.len() > 1)
-            .collect();
-        let fit = |temper: f32| -> f64 {
-            let of_slot = |named: &Vec<Named<D>>| {
-                let most = named.iter().map(|n| n.evidence).fold(f32::NEG_INFINITY, f32::max);
-                let (mut all, mut passed) = (0.0, 0.0);
-                for n in named {
-                    let p = libm::exp(f64::from(temper * (n.evidence - most)));
-                    all += p;
-                    passed += p * (1.0 - NAMED + NAMED * n.ratio);
-                }
-                libm::log(passed / all)
-            };
-            named.iter().map(of_slot).sum::<f64>() / named.len().max(1) as f64
-        };
-        let fits = TEMPERS.map(fit);
-        let best = fits.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let chosen = fits.iter().rposition(|&fit| fit > best - TOLERANCE);
-        TEMPERS[chosen.unwrap_or(0)]
-    }
-
-    /// Returns the places that the edges of `slot` lead to, far from each other, those with the most evidence first.
-    fn named<const D: usize, P: Pieces<D>>(
-        pieces: &P,
-        graph: &Graph,
-        places: &Places<D>,
-        tables: &Tables,
-        seed: u64,
-        slot: usize,
-    ) -> Vec<Named<D>> {
-        let slots_per_record = pieces.slots_per_record();
-        let (ends, classes) = graph.of(slot);
-        let best_at = |edge: usize| {
-            let range = places.at_end(ends[edge], classes[edge], slots_per_record);
-            range
-                .clone()
-                .max_by(|&a, &b| places.places[a].weight.total_cmp(&places.places[b].weight))
-        };
-        let width = places.typical;
-        let passes = |slot: usize, x: &[f32; D]| {
-            let near = |piece| distance2(&pieces.piece(slot, piece).project(x), x) < width * width;
-            (0..P::PER_SLOT).any(near)
-        };
-        let mut draws = Draws::new(seed, Stage::BeliefTables, !(slot as u64));
-        let others: Vec<usize> =
-            (0..BY_CHANCE).map(|_| draws.below(places.n_slots() as u64) as usize).collect();
-        let mut all: Vec<Named<D>> = (0..ends.len())
-            .filter_map(|edge| Some((edge, places.places[best_at(edge)?].x)))
-            .take(MOST_PLACES)
-            .map(|(edge, x)| {
-                let mut evidence = 0.0;
-                for other in (0..ends.len()).filter(|&other| other != edge) {
-                    let mut ratio = 1.0;
-                    for at in places.at_end(ends[other], classes[other], slots_per_record) {
-                        let weight = places.places[at].weight;
-                        ratio += weight * tables.at(classes[other], places.distance(&x, at));
-                    }
-                    evidence += ln(ratio.max(1e-6));
-                }
-                let by_chance = others.iter().filter(|&&other| passes(other, &x)).count();
-                let chance = (by_chance as f64 + 0.5) / (BY_CHANCE + 1) as f64;
-                let ratio = if passes(slot, &x) { 1.0 / chance } else { 0.0 };
-                Named { x, evidence, ratio }
-            })
-            .collect();
-        all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
-        let mut kept: Vec<Named<D>> = Vec::new();
-        let apart = SEPARATE * width;
-        for named in all {
-            if kept.iter().all(|other| distance2(&other.x, &named.x) >= apart * apart) {
-                kept.push(named);
-            }
-        }
-        kept
     }
 }

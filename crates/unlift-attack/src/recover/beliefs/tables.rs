@@ -1,0 +1,191 @@
+//! Likelihood ratios of edges by class and distance, learned from the current places by expectation maximization.
+
+use rayon::prelude::*;
+
+use super::Places;
+use crate::recover::map::graph::{CLASSES, Graph, either};
+use crate::recover::map::lines::ln;
+use crate::recover::map::lists::CHUNK;
+use crate::recover::map::pieces::Pieces;
+use crate::seed::{Draws, Stage};
+
+/// Number of bins of the distance: up to the first bound, log-spaced up to the second one, and beyond.
+const BINS: usize = 16;
+pub(super) const BIN_ENDS: (f32, f32) = (0.1, 6.0);
+/// Entries per unit of distance in a table, and their number.
+const PER_WIDTH: f32 = 20.0;
+const ENTRIES: usize = 121;
+/// Number of slots from which tables are learned, and of random slots that each is compared with.
+const SAMPLE: usize = 1 << 12;
+const RANDOM: usize = 30;
+/// Passes of expectation maximization: at first, and when tables are known.
+const PASSES: (usize, usize) = (6, 3);
+/// Number of random pairs that every class is given: a class with few edges says little.
+const PRIOR: f64 = 10.0;
+
+/// Likelihood ratios of edges by class and distance.
+pub(super) struct Tables {
+    /// Per class, the distribution of the distance over bins.
+    bins: Vec<[f64; BINS]>,
+    /// Per class, `L_c(u) - 1` at multiples of `1 / PER_WIDTH`, relative to the last bin.
+    ratios: Vec<[f32; ENTRIES]>,
+}
+
+fn bin_of(u: f32) -> usize {
+    if u < BIN_ENDS.0 {
+        return 0;
+    }
+    if u >= BIN_ENDS.1 {
+        return BINS - 1;
+    }
+    let per_bin = ln(BIN_ENDS.1 / BIN_ENDS.0) / (BINS - 2) as f32;
+    (1 + (ln(u / BIN_ENDS.0) / per_bin) as usize).min(BINS - 2)
+}
+
+impl Tables {
+    /// Learns tables by expectation maximization. An edge says something about the distance if the places of both ends are right, which
+    /// has the probability of their weights; else its distance is unknown.
+    pub(super) fn learn<const D: usize, P: Pieces<D>>(
+        pieces: &P,
+        graph: &Graph,
+        places: &Places<D>,
+        seed: u64,
+        before: Option<&Self>,
+    ) -> Self {
+        let slots_per_record = pieces.slots_per_record();
+        let every = places.n_slots().div_ceil(SAMPLE).max(1);
+        let sample: Vec<usize> = (0..places.n_slots()).step_by(every).collect();
+        // Pairs of places of a slot and of the end of an edge: their bin and the weight of both.
+        let pairs = |slot: usize, ends: std::ops::Range<usize>, share: f32| {
+            let pair = move |a: usize, b: usize| {
+                let weight = places.places[a].weight * places.places[b].weight * share;
+                (bin_of(places.distance(&places.places[a].x, b)), weight)
+            };
+            places.of(slot).flat_map(move |a| ends.clone().map(move |b| pair(a, b)))
+        };
+        let by_chance: Vec<[f64; BINS]> = sample
+            .par_chunks(CHUNK)
+            .map(|slots| {
+                let mut bins = [0.0; BINS];
+                for &slot in slots {
+                    let mut draws = Draws::new(seed, Stage::BeliefTables, slot as u64);
+                    for _ in 0..RANDOM {
+                        let other = draws.below(places.n_slots() as u64) as usize;
+                        if other != slot {
+                            for (bin, weight) in pairs(slot, places.of(other), 1.0) {
+                                bins[bin] += f64::from(weight);
+                            }
+                        }
+                    }
+                }
+                bins
+            })
+            .collect();
+        let mut chance = [1e-3; BINS];
+        for part in by_chance {
+            chance.iter_mut().zip(part).for_each(|(sum, x)| *sum += x);
+        }
+        let total: f64 = chance.iter().sum();
+        let chance = chance.map(|x| (x / total).max(1e-7));
+        let edges: Vec<Vec<(u8, Vec<(u8, f32)>)>> = sample
+            .par_chunks(CHUNK)
+            .map(|slots| {
+                let mut edges = Vec::new();
+                for &slot in slots {
+                    let (ends, classes) = graph.of(slot);
+                    for (&end, &class) in ends.iter().zip(classes) {
+                        let range = places.at_end(end, class, slots_per_record);
+                        let share = if either(class, slots_per_record) { 0.5 } else { 1.0 };
+                        let pairs: Vec<(u8, f32)> = pairs(slot, range, share)
+                            .map(|(bin, weight)| (bin as u8, weight))
+                            .collect();
+                        if !pairs.is_empty() {
+                            edges.push((class, pairs));
+                        }
+                    }
+                }
+                edges
+            })
+            .collect();
+        let first = || {
+            let near = std::array::from_fn(|bin| {
+                chance[bin] * (8.0 - 7.0 * bin as f64 / (BINS - 1) as f64)
+            });
+            vec![normalized(near); CLASSES]
+        };
+        let mut bins = before.map_or_else(first, |tables| tables.bins.clone());
+        for _ in 0..if before.is_none() { PASSES.0 } else { PASSES.1 } {
+            let ratios: Vec<[f64; BINS]> =
+                bins.iter().map(|f| std::array::from_fn(|bin| f[bin] / chance[bin])).collect();
+            let parts: Vec<Vec<[f64; BINS]>> = edges
+                .par_iter()
+                .map(|edges| {
+                    let mut sums = vec![[0.0; BINS]; CLASSES];
+                    for (class, pairs) in edges {
+                        let class = usize::from(*class);
+                        let known: f64 = pairs.iter().map(|pair| f64::from(pair.1)).sum();
+                        let unknown = (1.0 - known).max(0.0);
+                        let likelihood = |&(bin, weight): &(u8, f32)| {
+                            f64::from(weight) * ratios[class][usize::from(bin)]
+                        };
+                        let z = unknown + pairs.iter().map(likelihood).sum::<f64>();
+                        for pair in pairs {
+                            sums[class][usize::from(pair.0)] += likelihood(pair) / z;
+                        }
+                        for bin in 0..BINS {
+                            sums[class][bin] += unknown * bins[class][bin] / z;
+                        }
+                    }
+                    sums
+                })
+                .collect();
+            for class in 0..CLASSES {
+                let mut sum = chance.map(|share| PRIOR * share);
+                for part in &parts {
+                    sum.iter_mut().zip(part[class]).for_each(|(sum, x)| *sum += x);
+                }
+                bins[class] = normalized(sum);
+            }
+        }
+        let ratios = bins.iter().map(|f| interpolated(f, &chance)).collect();
+        Self { bins, ratios }
+    }
+
+    /// Returns `L_c(u) - 1`.
+    #[inline(always)]
+    pub(super) fn at(&self, class: u8, u: f32) -> f32 {
+        let at = (u * PER_WIDTH).min((ENTRIES - 1) as f32);
+        let low = (at as usize).min(ENTRIES - 2);
+        let share = at - low as f32;
+        let table = &self.ratios[usize::from(class)];
+        table[low] * (1.0 - share) + table[low + 1] * share
+    }
+}
+
+fn normalized(bins: [f64; BINS]) -> [f64; BINS] {
+    let total: f64 = bins.iter().sum();
+    bins.map(|x| x / total)
+}
+
+/// Returns a table of likelihood ratios, less 1, from distributions over bins: linear in logarithms between the middles of bins.
+fn interpolated(bins: &[f64; BINS], chance: &[f64; BINS]) -> [f32; ENTRIES] {
+    let log_ratio: [f32; BINS] =
+        std::array::from_fn(|bin| libm::log(bins[bin].max(1e-12) / chance[bin]) as f32);
+    let step = libm::logf(BIN_ENDS.1 / BIN_ENDS.0) / (BINS - 2) as f32;
+    let start = libm::logf(BIN_ENDS.0);
+    let middle = |bin: usize| match bin {
+        0 => start - 0.36,
+        _ if bin == BINS - 1 => libm::logf(BIN_ENDS.1),
+        _ => start + (bin as f32 - 0.5) * step,
+    };
+    let logs: [f32; ENTRIES] = std::array::from_fn(|entry| {
+        let u = libm::logf((entry as f32).max(1.0) / PER_WIDTH);
+        let bin = (0..BINS).position(|bin| middle(bin) >= u).unwrap_or(BINS - 1);
+        if bin == 0 {
+            return log_ratio[0];
+        }
+        let share = ((u - middle(bin - 1)) / (middle(bin) - middle(bin - 1))).min(1.0);
+        log_ratio[bin - 1] * (1.0 - share) + log_ratio[bin] * share
+    });
+    logs.map(|x| libm::expf(x - logs[ENTRIES - 1]) - 1.0)
+}

@@ -1,0 +1,123 @@
+//! The temper, learned from each slot's own record.
+//!
+//! The lists of a slot say where its point is, in space. Its record says so independently: a wrong place is near the record by chance
+//! only. So the temper is the exponent under which the lists, without the record, predict best where the record passes. Entries that
+//! are wrong together make it small; for the independent errors of the oracle it is about 1.
+
+use rayon::prelude::*;
+
+use super::Places;
+use super::tables::Tables;
+use crate::recover::map::graph::Graph;
+use crate::recover::map::lines::ln;
+use crate::recover::map::pieces::Pieces;
+use crate::recover::map::places::distance2;
+use crate::seed::{Draws, Stage};
+
+/// Tempers to choose from.
+const TEMPERS: [f32; 7] = [0.14, 0.2, 0.28, 0.4, 0.56, 0.8, 1.0];
+/// The largest temper counts whose mean log-likelihood is within this many nats of the best.
+const TOLERANCE: f64 = 0.1;
+/// Number of sampled slots, and of random records that measure how often a record passes by chance.
+const SLOTS: usize = 2000;
+const BY_CHANCE: usize = 150;
+/// Largest number of places that are scored per slot.
+const MOST_PLACES: usize = 100;
+/// Probability that a list names the place at all.
+const NAMED: f64 = 0.9;
+/// Compared places are at least this many widths apart.
+const SEPARATE: f32 = 2.0;
+
+/// A place that a list names: the evidence of the other edges, and how often the own record passes it, against other records.
+struct Named<const D: usize> {
+    x: [f32; D],
+    evidence: f32,
+    ratio: f64,
+}
+
+/// Returns the temper for these lists and tables.
+pub(super) fn learn<const D: usize, P: Pieces<D>>(
+    pieces: &P,
+    graph: &Graph,
+    places: &Places<D>,
+    tables: &Tables,
+    seed: u64,
+) -> f32 {
+    let every = places.n_slots().div_ceil(SLOTS).max(1);
+    let sample: Vec<usize> = (0..places.n_slots()).step_by(every).collect();
+    let named: Vec<Vec<Named<D>>> = sample
+        .par_iter()
+        .map(|&slot| named(pieces, graph, places, tables, seed, slot))
+        .filter(|named| named.len() > 1)
+        .collect();
+    let fit = |temper: f32| -> f64 {
+        let of_slot = |named: &Vec<Named<D>>| {
+            let most = named.iter().map(|n| n.evidence).fold(f32::NEG_INFINITY, f32::max);
+            let (mut all, mut passed) = (0.0, 0.0);
+            for n in named {
+                let p = libm::exp(f64::from(temper * (n.evidence - most)));
+                all += p;
+                passed += p * (1.0 - NAMED + NAMED * n.ratio);
+            }
+            libm::log(passed / all)
+        };
+        named.iter().map(of_slot).sum::<f64>() / named.len().max(1) as f64
+    };
+    let fits = TEMPERS.map(fit);
+    let best = fits.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let chosen = fits.iter().rposition(|&fit| fit > best - TOLERANCE);
+    TEMPERS[chosen.unwrap_or(0)]
+}
+
+/// Returns the places that the edges of `slot` lead to, far from each other, those with the most evidence first.
+fn named<const D: usize, P: Pieces<D>>(
+    pieces: &P,
+    graph: &Graph,
+    places: &Places<D>,
+    tables: &Tables,
+    seed: u64,
+    slot: usize,
+) -> Vec<Named<D>> {
+    let slots_per_record = pieces.slots_per_record();
+    let (ends, classes) = graph.of(slot);
+    let best_at = |edge: usize| {
+        let range = places.at_end(ends[edge], classes[edge], slots_per_record);
+        range.clone().max_by(|&a, &b| places.places[a].weight.total_cmp(&places.places[b].weight))
+    };
+    let width = places.typical;
+    let passes = |slot: usize, x: &[f32; D]| {
+        let near = |piece| distance2(&pieces.piece(slot, piece).project(x), x) < width * width;
+        (0..P::PER_SLOT).any(near)
+    };
+    let mut draws = Draws::new(seed, Stage::BeliefTables, !(slot as u64));
+    let others: Vec<usize> =
+        (0..BY_CHANCE).map(|_| draws.below(places.n_slots() as u64) as usize).collect();
+    let mut all: Vec<Named<D>> = (0..ends.len())
+        .filter_map(|edge| Some((edge, places.places[best_at(edge)?].x)))
+        .take(MOST_PLACES)
+        .map(|(edge, x)| {
+            let mut evidence = 0.0;
+            for other in (0..ends.len()).filter(|&other| other != edge) {
+                let mut ratio = 1.0;
+                for at in places.at_end(ends[other], classes[other], slots_per_record) {
+                    let weight = places.places[at].weight;
+                    ratio += weight * tables.at(classes[other], places.distance(&x, at));
+                }
+                evidence += ln(ratio.max(1e-6));
+            }
+            let by_chance = others.iter().filter(|&&other| passes(other, &x)).count();
+            let chance = (by_chance as f64 + 0.5) / (BY_CHANCE + 1) as f64;
+            let ratio = if passes(slot, &x) { 1.0 / chance } else { 0.0 };
+            Named { x, evidence, ratio }
+        })
+        .collect();
+    all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+    let mut kept: Vec<Named<D>> = Vec::new();
+    let apart = SEPARATE * width;
+    for named in all {
+        if kept.iter().all(|other| distance2(&other.x, &named.x) >= apart * apart) {
+            kept.push(named);
+        }
+    }
+    kept
+}
