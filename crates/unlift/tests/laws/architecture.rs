@@ -16,10 +16,7 @@ const CRATES: &[(&str, &[&str])] = &[
     ("unlift-report", &[]),
     ("unlift-testkit", &["unlift"]),
     ("unlift-audit", &["unlift", "unlift-io", "unlift-vision", "unlift-report"]),
-    (
-        "unlift-cli",
-        &["unlift", "unlift-audit", "unlift-demo", "unlift-io", "unlift-vision", "unlift-report"],
-    ),
+    ("unlift-cli", &["unlift", "unlift-audit", "unlift-io", "unlift-vision", "unlift-report"]),
 ];
 
 /// External dependencies allowed for the two core crates.
