@@ -35,8 +35,6 @@ pub struct Wanted {
     pub min_score: Option<f32>,
     /// `--max-image-size`.
     pub max_image_size: Option<u32>,
-    /// `--first-octave`.
-    pub first_octave: Option<i8>,
 }
 
 impl Wanted {
@@ -57,12 +55,9 @@ impl Wanted {
                 Extraction::Sift(SiftOptions {
                     max_features: max_features.unwrap_or(usual.max_features),
                     max_image_size: max_image_size.unwrap_or(usual.max_image_size),
-                    doubled: self.first_octave.map_or(usual.doubled, |octave| octave < 0),
-                    ..usual
                 })
             }
             DescriptorKind::Aliked => {
-                self.refuse("--first-octave", self.first_octave.is_some(), DescriptorKind::Sift)?;
                 let usual = AlikedOptions::default();
                 Extraction::Aliked(AlikedOptions {
                     max_features: max_features.unwrap_or(usual.max_features),
@@ -71,7 +66,6 @@ impl Wanted {
                 })
             }
             DescriptorKind::SuperPoint => {
-                self.refuse("--first-octave", self.first_octave.is_some(), DescriptorKind::Sift)?;
                 let usual = SuperPointOptions::default();
                 Extraction::SuperPoint(SuperPointOptions {
                     max_features: max_features.unwrap_or(usual.max_features),
@@ -92,7 +86,6 @@ impl Wanted {
             ("--max-features", self.max_features.is_some()),
             ("--min-score", self.min_score.is_some()),
             ("--max-image-size", self.max_image_size.is_some()),
-            ("--first-octave", self.first_octave.is_some()),
         ];
         match given.iter().find(|(_, given)| *given) {
             Some((name, _)) => {

@@ -35,13 +35,11 @@ pub struct SiftOptions {
     /// Longest side in pixels, default 3200. Larger images are downsized; keypoints are in pixels
     /// of the original image.
     pub max_image_size: usize,
-    /// Doubles the image first, which finds the finest features (COLMAP: first octave -1).
-    pub doubled: bool,
 }
 
 impl Default for SiftOptions {
     fn default() -> Self {
-        Self { max_features: 8192, max_image_size: 3200, doubled: true }
+        Self { max_features: 8192, max_image_size: 3200 }
     }
 }
 
@@ -114,7 +112,7 @@ impl Sift {
     /// # Errors
     /// If a field is out of range; the error names the first one.
     pub fn try_new(options: SiftOptions) -> Result<Self, Error> {
-        let SiftOptions { max_features, max_image_size, .. } = options;
+        let SiftOptions { max_features, max_image_size } = options;
         if max_features == 0 {
             return Err(Error::new("max_features", "at least 1", "0"));
         }
@@ -125,7 +123,7 @@ impl Sift {
     }
 
     fn unchecked(options: SiftOptions) -> Self {
-        Self { ladder: Ladder::new(options.doubled), options, idle: Mutex::default() }
+        Self { ladder: Ladder::new(), options, idle: Mutex::default() }
     }
 
     /// Extracts the features of `image`, in its pixels even if it is downsized.
@@ -196,8 +194,9 @@ impl Sift {
         wanted: impl Fn(usize, usize) -> bool,
     ) -> Vec<Level> {
         let mut levels = Vec::new();
-        workspace.octave.start(image, self.options.doubled, &self.ladder);
-        let mut pixel = if self.options.doubled { 0.5 } else { 1.0 };
+        workspace.octave.start(image, &self.ladder);
+        // The first octave is the doubled image (COLMAP: first octave -1), which has the finest features.
+        let mut pixel = 0.5;
         for octave in 0..OCTAVES {
             if octave > 0 {
                 workspace.octave.next(&self.ladder);

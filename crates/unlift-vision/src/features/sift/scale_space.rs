@@ -49,15 +49,6 @@ impl Plane {
         self.stride
     }
 
-    pub(crate) fn copy(&mut self, image: &GrayImage) {
-        self.reshape(image.width(), image.height());
-        for y in 0..self.height {
-            let (row, slack) = self.row_mut(y).split_at_mut(image.width());
-            row.copy_from_slice(image.row(y));
-            slack.fill(0.0);
-        }
-    }
-
     /// Doubles an image by linear interpolation; the last pixel is repeated. Pixel `i` moves to
     /// `2 i`.
     pub(crate) fn double(&mut self, image: &GrayImage) {
@@ -222,9 +213,10 @@ pub(crate) struct Ladder {
 }
 
 impl Ladder {
-    pub(crate) fn new(doubled: bool) -> Self {
+    pub(crate) fn new() -> Self {
         let ratio = libm::exp2(1.0 / LEVELS as f64);
-        let nominal = if doubled { 2.0 * NOMINAL } else { NOMINAL };
+        // The image is doubled.
+        let nominal = 2.0 * NOMINAL;
         let first = libm::sqrt(FIRST * FIRST - nominal * nominal);
         let step = FIRST * libm::sqrt(ratio * ratio - 1.0);
         let steps = (0..LEVELS + 2)
@@ -252,13 +244,9 @@ pub(crate) struct Octave {
 
 impl Octave {
     /// Computes the first four levels of the first octave.
-    pub(crate) fn start(&mut self, image: &GrayImage, doubled: bool, ladder: &Ladder) {
+    pub(crate) fn start(&mut self, image: &GrayImage, ladder: &Ladder) {
         let [level, .., spare] = &mut self.levels;
-        if doubled {
-            spare.double(image);
-        } else {
-            spare.copy(image);
-        }
+        spare.double(image);
         ladder.first.smooth(spare, level, &mut self.line);
         self.fill(ladder);
     }
