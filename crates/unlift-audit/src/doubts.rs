@@ -27,7 +27,7 @@ const SAMPLE: usize = 2000;
 const STRAY: f64 = 0.01;
 /// Usual median distance to the K-th neighbor in its own unit, whatever K the unit was made with.
 const UNIT: [f64; 2] = [0.2, 5.0];
-/// Lists are long if they name a larger share of the map than this (`tests/doubts.rs` states the
+/// Lists are long if they name a larger share of the map than this (`tests/audit/doubts.rs` states the
 /// cost).
 const LONG: f64 = 0.05;
 /// Lists of at most this length are never long.

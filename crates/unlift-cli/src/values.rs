@@ -277,7 +277,6 @@ mod tests {
             texts.join("\n"),
             "expected a number above 0, found -1\n\
              expected a number from 0 to 1, found 1.5\n\
-             expected NEIGHBORS,RATIO with both above 0 (for example 20,2.0), found 20\n\
              expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, sphere, found pppl\n\
              expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, sphere, found cp2d (for images only)\n\
              expected one of joint, ranking, joint-start, consensus, ransac, density, tomography, found magic\n\

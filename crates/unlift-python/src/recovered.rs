@@ -114,15 +114,8 @@ pub fn recover(
     threads: Option<usize>,
 ) -> PyResult<Recovered> {
     let released = released_of(released)?.of_map()?;
-    let (by, options) = (
-        Raised::default(),
-        RecoverOptions {
-            delta: self::delta(delta)?,
-            seed,
-            confidence,
-            ..RecoverOptions::default()
-        },
-    );
+    let (by, options) =
+        (Raised::default(), RecoverOptions { delta: self::delta(delta)?, seed, confidence });
     let solver = match solver {
         Some(given) => solver_of::<3>(given, &by)?,
         None => Arc::new(Builtin::Joint),

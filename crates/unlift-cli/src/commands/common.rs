@@ -61,7 +61,6 @@ pub fn open_map(
         max_points: args.max_points.map(NonZeroUsize::get),
         seed,
         colors,
-        ..Preparation::default()
     };
     Ok(maps::open(path, args.descriptors.as_deref(), &preparation)?)
 }

@@ -19,6 +19,7 @@
 
 pub(crate) mod database;
 mod hloc;
+mod links;
 
 use std::fs::File;
 use std::io::Read;

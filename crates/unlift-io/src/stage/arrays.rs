@@ -14,6 +14,9 @@ use crate::read::bytes::Bytes;
 use crate::read::npy::Header;
 use crate::read::npz::Archive;
 
+/// The values of an array that holds either bytes or floats.
+type BytesOrFloats = Result<Vec<u8>, Vec<f32>>;
+
 /// Stands for -1, "none", in whole numbers.
 pub(super) const NONE: u32 = u32::MAX;
 
@@ -177,7 +180,8 @@ impl<'a> Arrays<'a> {
         &self,
         name: &str,
         sides: [Option<usize>; N],
-    ) -> Result<(Result<Vec<u8>, Vec<f32>>, [usize; N]), Error> {
+    ) -> Result<(BytesOrFloats, [usize; N]), Error> {
+        #[expect(clippy::redundant_closure)] // a closure works for every lifetime of the bytes
         let header = self.file(name, |bytes| Header::read(bytes))?;
         if header.is_whole() {
             let byte = |x: f64| (0.0..256.0).contains(&x).then_some(x as u8);

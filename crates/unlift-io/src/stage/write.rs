@@ -21,13 +21,16 @@ pub(super) struct Written<'a> {
     arrays: Vec<Array<'a>>,
 }
 
+/// Writes the values of an array.
+type Fill<'a> = Box<dyn FnOnce(&mut dyn Write) -> io::Result<()> + 'a>;
+
 struct Array<'a> {
     name: &'static str,
     descr: &'static str,
     shape: Vec<usize>,
     /// The size of all values in bytes.
     size: usize,
-    fill: Box<dyn FnOnce(&mut dyn Write) -> io::Result<()> + 'a>,
+    fill: Fill<'a>,
 }
 
 /// A number of an array.

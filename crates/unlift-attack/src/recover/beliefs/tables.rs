@@ -87,7 +87,7 @@ impl Tables {
         }
         let total: f64 = chance.iter().sum();
         let chance = chance.map(|x| (x / total).max(1e-7));
-        let edges: Vec<Vec<(u8, Vec<(u8, f32)>)>> = sample
+        let edges: Vec<Vec<Edge>> = sample
             .par_chunks(CHUNK)
             .map(|slots| {
                 let mut edges = Vec::new();
@@ -100,7 +100,7 @@ impl Tables {
                             .map(|(bin, weight)| (bin as u8, weight))
                             .collect();
                         if !pairs.is_empty() {
-                            edges.push((class, pairs));
+                            edges.push(Edge { class, pairs });
                         }
                     }
                 }
@@ -121,7 +121,7 @@ impl Tables {
                 .par_iter()
                 .map(|edges| {
                     let mut sums = vec![[0.0; BINS]; CLASSES];
-                    for (class, pairs) in edges {
+                    for Edge { class, pairs } in edges {
                         let class = usize::from(*class);
                         let known: f64 = pairs.iter().map(|pair| f64::from(pair.1)).sum();
                         let unknown = (1.0 - known).max(0.0);
@@ -160,6 +160,12 @@ impl Tables {
         let table = &self.ratios[usize::from(class)];
         table[low] * (1.0 - share) + table[low + 1] * share
     }
+}
+
+/// An edge of the sample: its class, and the bin and the weight of each pair of places of its ends.
+struct Edge {
+    class: u8,
+    pairs: Vec<(u8, f32)>,
 }
 
 fn normalized(bins: [f64; BINS]) -> [f64; BINS] {
