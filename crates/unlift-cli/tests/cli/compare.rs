@@ -4,10 +4,10 @@ use serde_json::{Value, json};
 
 use crate::common::Place;
 
-/// Audits a room in `a`, and writes changed copies of its audit.json.
 /// A change to a document, with the name of its folder.
 type Change<'a> = (&'a str, &'a dyn Fn(&mut Value));
 
+/// Audits a room in `a`, and writes changed copies of its audit.json.
 fn audited(changes: &[Change<'_>]) -> Place {
     let place = Place::with_room(500);
     let audit = "audit map room.csv --scale 1 --k 10 --schemes olc,ppl --inlier-ratios 1,0.5 --neighbors \

@@ -10,6 +10,9 @@ use unlift_io::features::{FeatureSource, FeatureWriter, ImageFeatures, decode, e
 
 use super::{data, shared, shown, write};
 
+/// The name and the shape of an array, and what fills it.
+type Filled<'a> = (&'a str, &'a [u64], Box<dyn Fn(&mut DatasetBuilder)>);
+
 fn bytes(image: &ImageFeatures) -> &[u8] {
     match image.descriptors.as_ref().map(Descriptors::values) {
         Some(Values::U8(values)) => values,
@@ -243,13 +246,13 @@ fn line(bytes: &[u8]) -> String {
 #[test]
 #[rustfmt::skip] // One row per line.
 fn every_malformed_file_of_features_is_refused_with_its_line() {
-    let floats = |name, shape: &'static [u64], value: f32| -> (&str, &[u64], Box<dyn Fn(&mut DatasetBuilder)>) {
+    let floats = |name, shape: &'static [u64], value: f32| -> Filled<'_> {
         let n = shape.iter().product::<u64>() as usize;
         let values: Vec<f32> = (0..n).map(|at| value * (at + 1) as f32).collect();
         (name, shape, Box::new(move |to| { to.with_f32_data(&values); }))
     };
     // `a.jpg` has this array, and keypoints and descriptors unless it is one of them.
-    let with = |(name, shape, fill): (&str, &[u64], Box<dyn Fn(&mut DatasetBuilder)>)| {
+    let with = |(name, shape, fill): Filled<'_>| {
         let others = [KEYPOINTS, DESCRIPTORS].into_iter().filter(|array| array.0 != name);
         file(&others.chain([(name, shape, &*fill)]).collect::<Vec<_>>())
     };
