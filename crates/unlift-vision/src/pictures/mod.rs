@@ -6,7 +6,7 @@
 //! points of a map, a camera ──> projection ──┘                    photo ──┘
 //! ```
 //!
-//! Pictures are [`ColorImage`]s, so metrics compare values rounded to bytes. Positions are in
+//! Pictures are [`ColorImage`](crate::features::ColorImage)s, so metrics compare values rounded to bytes. Positions are in
 //! pixels with the middle of the first pixel at (0, 0), as everywhere in unlift.
 
 mod camera;
