@@ -166,7 +166,7 @@ const PER_THREAD: usize = 8;
 /// first error of `sink`.
 ///
 /// # Errors
-/// Those of `sink`.
+/// When `sink` returns an error.
 ///
 /// ```
 /// use unlift_vision::features::in_order;
