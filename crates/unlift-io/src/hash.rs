@@ -98,27 +98,6 @@ pub fn hash_positions(positions: &[[f64; 3]]) -> String {
     hex(hasher)
 }
 
-/// Returns the SHA-256 of `bytes`, as 64 hexadecimal digits.
-pub fn hash_bytes(bytes: &[u8]) -> String {
-    hex(Sha256::new_with_prefix(bytes))
-}
-
-/// Computes the SHA-256 of data that is added piece by piece.
-#[derive(Clone, Debug, Default)]
-pub struct Hasher(Sha256);
-
-impl Hasher {
-    /// Adds bytes.
-    pub fn add(&mut self, bytes: &[u8]) {
-        self.0.update(bytes);
-    }
-
-    /// Returns the hash, as 64 hexadecimal digits.
-    pub fn hex(self) -> String {
-        hex(self.0)
-    }
-}
-
 fn hex(hasher: Sha256) -> String {
     hasher.finalize().iter().map(|b| format!("{b:02x}")).collect()
 }

@@ -2,7 +2,6 @@
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use crate::error::{Error, Place};
 
@@ -35,20 +34,7 @@ const LEAST: u64 = 256 << 20;
 /// features hardly compress.
 const MULTIPLE: u64 = 64;
 
-static LIMIT: AtomicU64 = AtomicU64::new(u64::MAX);
-
-/// Sets the maximum memory in bytes for each input file that this process opens later.
-pub fn limit_memory(bytes: u64) {
-    LIMIT.store(bytes, Relaxed);
-}
-
-/// The limit set by [`limit_memory`], or `None`.
-pub fn limit() -> Option<u64> {
-    Some(LIMIT.load(Relaxed)).filter(|&bytes| bytes < u64::MAX)
-}
-
-/// The memory that decoding one file may use: 64 times its size, at least 256 MiB, and at most the
-/// limit of [`limit_memory`].
+/// The memory that decoding one file may use: 64 times its size, at least 256 MiB.
 #[derive(Clone, Debug)]
 pub struct Budget {
     path: PathBuf,
@@ -59,7 +45,7 @@ pub struct Budget {
 impl Budget {
     /// Creates the budget of the file `path` of `len` bytes.
     pub fn new(path: &Path, len: u64) -> Self {
-        let most = len.saturating_mul(MULTIPLE).max(LEAST).min(LIMIT.load(Relaxed));
+        let most = len.saturating_mul(MULTIPLE).max(LEAST);
         Self { path: path.to_owned(), len, most }
     }
 

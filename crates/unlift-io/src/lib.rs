@@ -35,7 +35,6 @@ pub mod atomic;
 pub mod clouds;
 mod error;
 pub mod features;
-mod guard;
 pub mod hash;
 pub mod input;
 pub mod read;

@@ -54,8 +54,6 @@ pub struct SequenceJob<'a> {
     pub plan: Plan<2>,
     /// Makes lists of neighbors within each query, which the attacker combines with the other queries, if wanted.
     pub lists: Option<Arc<dyn Source<2>>>,
-    /// The share of the model's points that the service's map does not have.
-    pub held_out_share: f64,
     /// Numbers of queries to attack with, ascending.
     pub queries: Vec<usize>,
     /// The error that is added to the poses.
@@ -107,7 +105,6 @@ pub fn perform(mut job: SequenceJob<'_>, out: OutputSet) -> Result<(Finished, Us
     let (mut views, mut unusable) = (Vec::new(), job.source.refused().len());
     job.source.refused().iter().for_each(|error| steps.say(&error.to_string()));
     let model = Model::read(folder)?;
-    let is_new = model.held_out(job.held_out_share);
     for view in model.views((job.source, job.path), pose_error) {
         match view {
             Ok(view) => views.push(view),
@@ -137,7 +134,7 @@ pub fn perform(mut job: SequenceJob<'_>, out: OutputSet) -> Result<(Finished, Us
     job.plan.neighbors = sources(&job.queries, job.lists.is_some());
     check_gates(&job.gates, &job.plan, false)?;
     let mut inversions = Vec::new();
-    let (rows, seconds) = rows(&job, (&views, &is_new), &mut inversions)?;
+    let (rows, seconds) = rows(&job, &views, &mut inversions)?;
     let gates = gate_results(&job.gates, &job.plan, &rows, &[], &[], &[])?;
     let provenance = Provenance {
         notes,
@@ -167,9 +164,6 @@ fn options(job: &SequenceJob<'_>) -> Map<String, Value> {
     let mut options = job.options.clone();
     options.extend(names(&job.plan));
     options.insert("queries".into(), json!(job.queries));
-    if job.held_out_share > 0.0 {
-        options.insert("held_out_share".into(), json!(job.held_out_share));
-    }
     options.extend(job.lists.as_ref().map(|by| ("lists".to_owned(), json!(by.name()))));
     if let Some(error) = job.pose_error {
         options.insert("pose_error_distance".into(), json!(error.distance));
@@ -211,7 +205,7 @@ fn described(
 /// Hides the views under each scheme and attacks them with each number of queries.
 fn rows(
     job: &SequenceJob<'_>,
-    (views, is_new): (&[View], &[bool]),
+    views: &[View],
     inversions: &mut Vec<Sheet>,
 ) -> Result<(Vec<Row>, Seconds), Error> {
     let mut seconds = Seconds::default();
@@ -242,7 +236,7 @@ fn rows(
         };
         let links = &links;
         let tracks = tracks(views, &secrets);
-        let hidden = Hidden { views, is_new, queries, secrets };
+        let hidden = Hidden { views, queries, secrets };
         let lists = job.lists.as_deref().map(|by| hidden.lists(by, job.plan.seed)).transpose()?;
         seconds.neighbors += started.elapsed().as_secs_f64();
         let kinds = [(SEQUENCE, links, None), (TRACKS, &tracks, None)];
@@ -315,8 +309,6 @@ fn tracks(views: &[View], secrets: &[Secret]) -> Links {
 /// Protected views with their secrets.
 struct Hidden<'a> {
     views: &'a [View],
-    /// Whether each point of the model is unknown to the service.
-    is_new: &'a [bool],
     queries: Vec<Query>,
     secrets: Vec<Secret>,
 }
@@ -454,7 +446,7 @@ impl Hidden<'_> {
                 shares.tracked.count(is_within);
             }
             let point = self.point(query, slot);
-            if point.is_none_or(|point| self.is_new[point as usize]) {
+            if point.is_none() {
                 shares.new.count(is_within);
             }
             let Some(point) = point else { continue };

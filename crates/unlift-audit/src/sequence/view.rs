@@ -97,22 +97,6 @@ impl Model {
         Ok(Self { lenses, images, positions: points.positions, shown })
     }
 
-    /// Returns, per point, whether it belongs to the `share` at the far end of the model's longest axis, by the range of 90 % of the
-    /// points. Points with equal coordinates go together.
-    pub fn held_out(&self, share: f64) -> Vec<bool> {
-        let axes = (0..3).map(|c| {
-            let mut values: Vec<f64> = self.positions.iter().map(|x| x[c]).collect();
-            values.sort_unstable_by(f64::total_cmp);
-            let at = |part: f64| values.get((part * values.len() as f64) as usize).copied();
-            // Few points are far outside.
-            let length = at(0.95).zip(at(0.05)).map_or(0.0, |(high, low)| high - low);
-            (length, c, at(1.0 - share).unwrap_or(f64::INFINITY))
-        });
-        let longest = axes.max_by(|a, b| a.0.total_cmp(&b.0));
-        let (_, axis, from) = longest.unwrap_or((0.0, 0, f64::INFINITY));
-        self.positions.iter().map(|x| x[axis] >= from).collect()
-    }
-
     /// Returns the views of all images that are in the model and in `source`, in the order of their
     /// names, and an error for each that cannot be used. `path` names the source in errors.
     pub fn views(

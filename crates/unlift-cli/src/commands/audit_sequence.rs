@@ -55,7 +55,6 @@ pub fn run(args: &AuditSequenceArgs) -> anyhow::Result<Outcome> {
             path: &args.path,
             plan,
             lists: args.neighbors.as_ref().map(Named::of_dimension).transpose()?,
-            held_out_share: 0.0,
             queries,
             pose_error,
             options: options(args),

@@ -29,7 +29,7 @@ pub fn run(args: &CompareArgs) -> anyhow::Result<Outcome> {
         }
         None => None,
     };
-    let comparison = compare(&old, &new, None).map_err(|wrong| {
+    let comparison = compare(&old, &new).map_err(|wrong| {
         let expected = format!("{}, as in {}", wrong.expected, args.old.display());
         Error::new(&args.new, wrong.place, expected, wrong.found)
     })?;

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use half::f16;
 use hdf5_pure::{
     AttrValue, DType, Dataset, DatasetBuilder, Datatype, DatatypeByteOrder, File,
-    FileAccessProperties, FileBuilder, FileCreateProperties, FileLocking, FloatingPointLayout,
-    Group, MemoryStrategy, MetadataCacheConfig, ReadSeekSource, SyncPolicy,
+    FileAccessProperties, FileCreateProperties, FileLocking, FloatingPointLayout, Group,
+    MemoryStrategy, MetadataCacheConfig, ReadSeekSource, SyncPolicy,
 };
 use unlift::Descriptors;
 use unlift::descriptors::Values;
@@ -17,9 +17,9 @@ use super::ImageFeatures;
 use super::links::{Target, links};
 use crate::atomic::{Access, OutputFile};
 use crate::error::Error;
-use crate::guard::without_panic;
 use crate::input::{self, Budget};
 use crate::read::lines::quoted;
+use unlift::guard::caught;
 
 /// Groups with arrays, by their paths.
 type Groups = Vec<(String, Group)>;
@@ -166,7 +166,7 @@ impl Hloc {
         step: impl FnOnce() -> Result<T, Error>,
     ) -> Result<T, Error> {
         let damaged = || Err(self.error(image, array, "readable HDF5", "damaged data"));
-        without_panic(step).unwrap_or_else(damaged)
+        caught(step).ok().unwrap_or_else(damaged)
     }
 
     pub fn refused(&self) -> &[Error] {
@@ -455,7 +455,7 @@ pub(crate) fn is_ours(path: &Path) -> bool {
         let attributes = File::open_streaming(path).ok()?.root().attrs().ok()?;
         Some(attributes.get(WRITER)?.as_str() == Some("unlift"))
     };
-    without_panic(is_ours).flatten().unwrap_or(false)
+    caught(is_ours).ok().flatten().unwrap_or(false)
 }
 
 /// A feature file in hloc's layout that is written image by image, and moved to its place when it
@@ -571,37 +571,6 @@ fn failed(path: &Path, error: hdf5_pure::Error) -> Error {
 /// The folders above an image, the outermost first.
 fn folders(name: &str) -> impl Iterator<Item = &str> {
     name.match_indices('/').map(|(at, _)| &name[..at])
-}
-
-/// The name of the group in files of one image.
-const ONLY: &str = "image";
-
-/// Returns the bytes of a file with one image, without its name.
-///
-/// # Errors
-/// When [`FeatureWriter::append`] would fail. Errors name `path`.
-pub fn encode(image: &ImageFeatures, path: &Path) -> Result<Vec<u8>, Error> {
-    check(image, path)?;
-    let mut builder = FileBuilder::new();
-    let mut group = builder.create_group(ONLY);
-    for column in columns(image) {
-        let name = column.name;
-        column.fill(group.create_dataset(name));
-    }
-    builder.add_group(group.finish());
-    builder.finish().map_err(|error| failed(path, error))
-}
-
-/// Reads the one image of a file that [`encode`] made, and names it.
-///
-/// # Errors
-/// When `path` cannot be read, or does not contain exactly one image.
-pub fn decode(path: &Path, name: &str) -> Result<ImageFeatures, Error> {
-    let file = Hloc::groups_of(path)?;
-    match file.names() {
-        [_] => Ok(ImageFeatures { name: name.to_owned(), ..file.get(0)? }),
-        names => Err(Error::new(path, "", "one image", names.len().to_string())),
-    }
 }
 
 fn check(image: &ImageFeatures, path: &Path) -> Result<(), Error> {

@@ -32,8 +32,8 @@ use crate::error::Error;
 use crate::input;
 use crate::read::lines::quoted;
 
+pub use hloc::FeatureWriter;
 pub(crate) use hloc::is_ours;
-pub use hloc::{FeatureWriter, decode, encode};
 
 /// Features of one image, independent of the file format.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -11,10 +11,10 @@ use super::bytes::Bytes;
 use super::lines::quoted;
 use super::npy::{Header, Layout, PLACES, of_points};
 use crate::error::Error;
-use crate::guard::without_panic;
 use crate::input::{self, Budget};
 use crate::read::map_input::Input;
 use crate::stage;
+use unlift::guard::caught;
 
 /// An open NumPy archive.
 #[derive(Debug)]
@@ -41,7 +41,7 @@ impl Archive {
         if !found.is_empty() {
             return Err(wrong(found.to_owned()));
         }
-        let zip = without_panic(|| ZipArchive::new(file));
+        let zip = caught(|| ZipArchive::new(file)).ok();
         let zip = zip.unwrap_or(Err(ZipError::InvalidArchive("a damaged one".into())));
         let zip = zip.map_err(|error| wrong(cause(error)))?;
         Ok(Self { path: path.to_owned(), zip, budget: Budget::new(path, len) })

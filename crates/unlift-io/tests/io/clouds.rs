@@ -396,27 +396,6 @@ fn an_archive_of_features_is_no_map() {
 }
 
 #[test]
-fn recovered_points_are_colored_and_lost_ones_left_out() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("recovered.ply");
-    let points = [Some([1.0, 2.0, 3.0]), None, Some([4e6, 5.0, 6.0])];
-    clouds::write_recovered(&path, &points, &[0.0, f64::NAN, 1.0], 0.5).unwrap();
-    let header = "ply\nformat binary_little_endian 1.0\ncomment unlift\nelement vertex 2\n\
-        property double x\nproperty double y\nproperty double z\n\
-        property uchar red\nproperty uchar green\nproperty uchar blue\n\
-        property float error\nend_header\n";
-    let mut expected = header.as_bytes().to_vec();
-    for (point, color, error) in
-        [([1.0, 2.0, 3.0], [0x44, 0x01, 0x54], 0.0), ([4e6, 5.0, 6.0], [0xfd, 0xe7, 0x25], 1.0)]
-    {
-        expected.extend(point.iter().flat_map(|x: &f64| x.to_le_bytes()));
-        expected.extend(color);
-        expected.extend((error as f32).to_le_bytes());
-    }
-    assert_eq!(fs::read(&path).unwrap(), expected);
-}
-
-#[test]
 fn points_are_read_back_by_our_reader() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("points.ply");
@@ -466,7 +445,6 @@ fn what_is_not_finite_or_not_as_long_is_refused() {
             clouds::write_points(&path, &[nan]),
             "point 0: expected finite coordinates, found [0.0, NaN, 0.0]",
         ),
-        (clouds::write_recovered(&path, &[Some([0.0; 3])], &[], 1.0), "expected 1 errors, found 0"),
         (
             clouds::write_lines(&path, &[[[0.0; 3], nan]]),
             "segment 0: expected finite coordinates, found [[0.0, 0.0, 0.0], [0.0, NaN, 0.0]]",

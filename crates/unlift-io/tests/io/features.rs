@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use hdf5_pure::{DatasetBuilder, FileBuilder};
 use unlift::Descriptors;
 use unlift::descriptors::Values;
-use unlift_io::features::{FeatureSource, FeatureWriter, ImageFeatures, decode, encode};
+use unlift_io::features::{FeatureSource, FeatureWriter, ImageFeatures};
 
 use super::{data, shared, shown, write};
 
@@ -103,25 +103,20 @@ fn a_file_appears_when_it_is_finished() {
 }
 
 #[test]
-fn one_image_is_a_file_of_its_own() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("part");
-    fs::write(&path, encode(&made("a/b.jpg", 5), &path).unwrap()).unwrap();
-    assert_eq!(decode(&path, "a/b.jpg").unwrap(), made("a/b.jpg", 5));
-}
-
-#[test]
 fn names_and_columns_that_do_not_fit_are_refused() {
-    let path = Path::new("f.h5");
-    let line = |image: &ImageFeatures| encode(image, path).unwrap_err().to_string();
-    assert_eq!(
-        line(&made("a//b", 1)),
-        "f.h5: image \"a//b\": expected a name whose parts are not empty, . or .., found \"a//b\""
-    );
-    let short = ImageFeatures { scores: Some(vec![1.0]), ..made("a", 2) };
-    assert_eq!(line(&short), "f.h5: image \"a\", scores: expected 2, one per keypoint, found 1");
     let dir = tempfile::tempdir().unwrap();
     let mut writer = FeatureWriter::create(&dir.path().join("f.h5")).unwrap();
+    let refused = |writer: &mut FeatureWriter, image: &ImageFeatures, line: &str| {
+        let error = writer.append(image).unwrap_err().to_string();
+        assert!(error.ends_with(line), "{error}");
+    };
+    refused(
+        &mut writer,
+        &made("a//b", 1),
+        "image \"a//b\": expected a name whose parts are not empty, . or .., found \"a//b\"",
+    );
+    let short = ImageFeatures { scores: Some(vec![1.0]), ..made("a", 2) };
+    refused(&mut writer, &short, "image \"a\", scores: expected 2, one per keypoint, found 1");
     writer.append(&made(&format!("{}x.jpg", "b/".repeat(63)), 2)).unwrap();
     writer.append(&made("a/b", 1)).unwrap();
     for name in ["a/b", "a/b/c", "a"] {
@@ -130,11 +125,8 @@ fn names_and_columns_that_do_not_fit_are_refused() {
     }
     // A name of 20,000 folders overflowed the stack.
     for n in [65, 20_000] {
-        let line = line(&made(&format!("{}x.jpg", "a/".repeat(n - 1)), 2));
-        assert!(
-            line.ends_with(&format!("expected a name of at most 64 parts, found {n}")),
-            "{line}"
-        );
+        let image = made(&format!("{}x.jpg", "a/".repeat(n - 1)), 2);
+        refused(&mut writer, &image, &format!("expected a name of at most 64 parts, found {n}"));
     }
 }
 

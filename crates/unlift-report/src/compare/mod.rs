@@ -60,7 +60,7 @@ pub struct CostsMore {
 pub struct Comparison {
     /// Largest difference, in percentage points, at which a figure counts as the same.
     pub tolerance_points: f64,
-    /// The origin of the tolerance: `asked`, `twice the spread of repeats` or `usual without repeats`.
+    /// The origin of the tolerance: `twice the spread of repeats` or `usual without repeats`.
     pub tolerance_is: &'static str,
     /// Whether nothing leaks more and nothing is lost.
     pub passed: bool,
@@ -92,7 +92,6 @@ pub struct Incomparable {
     pub found: String,
 }
 
-const ASKED: &str = "asked";
 /// Usual largest difference between seeds of one audit, in percentage points.
 const USUAL_TOLERANCE: f64 = 2.0;
 /// Growth of a localization error that counts as the same; random directions change it by some
@@ -103,15 +102,11 @@ const RECORDS_ALONE: &str = "records alone";
 /// Compares the figures of two audits. Rows match by scheme, source, noise, requested inlier ratio (a measured one is a result),
 /// K and solver. Baselines are compared per scheme.
 ///
-/// The default tolerance is twice the largest standard deviation over repeats in both audits, or 2 points without repeats.
+/// The tolerance is twice the largest standard deviation over repeats in both audits, or 2 points without repeats.
 ///
 /// # Errors
 /// Fails if units or thresholds differ, or if no row matches.
-pub fn compare(
-    old: &Document,
-    new: &Document,
-    tolerance_points: Option<f64>,
-) -> Result<Comparison, Incomparable> {
+pub fn compare(old: &Document, new: &Document) -> Result<Comparison, Incomparable> {
     let within = common_thresholds(old, new)?;
     let mut changes = Vec::new();
     let mut only_new = Vec::new();
@@ -157,10 +152,9 @@ pub fn compare(
         }
     }
     let lost = lost(old, new, &taken);
-    let (tolerance_points, tolerance_is) = match (tolerance_points, spread(old, new)) {
-        (Some(points), _) => (points, ASKED),
-        (None, Some(spread)) => ((200.0 * spread).ceil() / 100.0, "twice the spread of repeats"),
-        (None, None) => (USUAL_TOLERANCE, "usual without repeats"),
+    let (tolerance_points, tolerance_is) = match spread(old, new) {
+        Some(spread) => ((200.0 * spread).ceil() / 100.0, "twice the spread of repeats"),
+        None => (USUAL_TOLERANCE, "usual without repeats"),
     };
     // Rounding errors in the last bit must not fail a build.
     let beyond = tolerance_points + 1e-9;
@@ -353,13 +347,10 @@ impl Comparison {
     pub fn summary(&self) -> String {
         let count = self.more.len() + self.less.len() + self.same.len();
         let point = if self.tolerance_points == 1.0 { "point" } else { "points" };
-        let why = match self.tolerance_is {
-            ASKED => String::new(),
-            other => format!(" ({other})"),
-        };
         let mut text = format!(
-            "{count} figures compared, tolerance {} {point}{why}: {} leak more, {} less, {} as before",
+            "{count} figures compared, tolerance {} {point} ({}): {} leak more, {} less, {} as before",
             self.tolerance_points,
+            self.tolerance_is,
             self.more.len(),
             self.less.len(),
             self.same.len()
