@@ -14,7 +14,7 @@ use unlift::Descriptors;
 use unlift::descriptors::Values;
 
 use super::ImageFeatures;
-use super::links::{Target, links};
+use super::links::{MAX_DEPTH, Target, links};
 use crate::atomic::{Access, OutputFile};
 use crate::error::Error;
 use crate::input::{self, Budget};
@@ -24,8 +24,6 @@ use unlift::guard::caught;
 /// Groups with arrays, by their paths.
 type Groups = Vec<(String, Group)>;
 
-/// The maximum depth of groups, because links may form cycles.
-pub(super) const MAX_DEPTH: usize = 64;
 /// Bytes of headers that are kept, because a header is read in a dozen pieces.
 const CACHE: usize = 1 << 20;
 /// An attribute of `keypoints`: 1 if they are in pixels of upright photos, else 0.

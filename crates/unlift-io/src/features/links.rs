@@ -2,7 +2,8 @@
 
 use hdf5_pure::Source;
 
-use super::hloc::MAX_DEPTH;
+/// The maximum depth of groups, because links may form cycles.
+pub(super) const MAX_DEPTH: usize = 64;
 
 /// Where a link of a group leads.
 pub(super) enum Target {
