@@ -184,11 +184,16 @@ pub fn read_cameras(path: &Path) -> Result<Vec<Camera>, Error> {
 /// Reads `images.bin` or `images.txt`, sorted by id.
 ///
 /// # Errors
-/// When the file cannot be read, is malformed or repeats an id.
+/// When the file cannot be read, is malformed, or repeats an id or a name: names lead to features.
 pub fn read_images(path: &Path) -> Result<Vec<Image>, Error> {
     let mut images = if is_text(path) { text_images(path)? } else { binary_images(path)? };
     images.sort_by_key(|i| i.id);
     refuse_repeated(path, "image", images.iter().map(|i| u64::from(i.id)))?;
+    let mut names: Vec<&[u8]> = images.iter().map(|image| &*image.name).collect();
+    names.sort_unstable();
+    if let Some(twice) = names.windows(2).find(|two| two[0] == two[1]) {
+        return Err(Error::new(path, "", "each name once", format!("{} again", quoted(twice[0]))));
+    }
     Ok(images)
 }
 
@@ -494,6 +499,19 @@ mod tests {
         let tracks = sorted.tracks.unwrap();
         assert_eq!(tracks.row(0), [(2, 0)]);
         assert_eq!(tracks.row(1), [(7, 0), (7, 1)]);
+    }
+
+    #[test]
+    fn two_images_of_one_name_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("images.txt");
+        let line = |id: u32, name| format!("{id} 1 0 0 0 0 0 0 1 {name}\n\n");
+        std::fs::write(&path, line(1, "a.jpg") + &line(2, "b.jpg") + &line(3, "a.jpg")).unwrap();
+        let error = read_images(&path).unwrap_err().to_string();
+        assert!(
+            error.ends_with("images.txt: expected each name once, found \"a.jpg\" again"),
+            "{error}"
+        );
     }
 
     #[test]

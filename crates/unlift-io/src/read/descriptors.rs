@@ -142,7 +142,7 @@ type Stored = (Values, usize);
 /// Source: COLMAP's documentation, "Database Format".
 fn of_database(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     let database = Database::open(path)?;
-    mean(path, input, |image| {
+    mean(path, input, &tracks(path, input)?, |image| {
         let rows = database.descriptors(&image.name)?;
         Ok(match rows.kind {
             Kind::Bytes => (Values::U8(rows.data), rows.row_bytes),
@@ -159,7 +159,7 @@ fn of_database(path: &Path, input: &Input) -> Result<Descriptors, Error> {
 /// Keypoints must have the indices of the model's 2D points.
 fn of_features(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     let features = FeatureSource::open(path)?;
-    mean(path, input, |image| {
+    mean(path, input, &tracks(path, input)?, |image| {
         let wrong = |expected: String, found: String| {
             Error::new(path, format!("image {}", quoted(&image.name)), expected, found)
         };
@@ -175,13 +175,11 @@ fn of_features(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     })
 }
 
-/// Returns the mean over the observations of each point. `stored` reads the descriptors of an
-/// image.
-fn mean(
-    path: &Path,
-    input: &Input,
-    stored: impl Fn(&Image) -> Result<Stored, Error>,
-) -> Result<Descriptors, Error> {
+/// An image id, the index of a 2D point in it, and the row of the point in the input.
+type Observation = (u32, u32, usize);
+
+/// Returns the images of the model of `input` and the observations of its points by image.
+fn tracks(path: &Path, input: &Input) -> Result<(Vec<Image>, Vec<Observation>), Error> {
     let of_model = |file: &&std::path::PathBuf| {
         let is = |name: &str| file.file_name().is_some_and(|its| its == name);
         is("points3D.bin") || is("points3D.txt")
@@ -211,8 +209,21 @@ fn mean(
         observations.extend(track.iter().map(|&(image, index)| (image, index, out)));
     }
     observations.sort_unstable();
+    Ok((images, observations))
+}
 
-    let mut layout = None;
+/// Returns the mean over the observations of each point. `stored` reads the descriptors of an
+/// image.
+///
+/// # Errors
+/// Also when descriptors of one point are no more alike than those of others.
+fn mean(
+    path: &Path,
+    input: &Input,
+    (images, observations): &(Vec<Image>, Vec<Observation>),
+    stored: impl Fn(&Image) -> Result<Stored, Error>,
+) -> Result<Descriptors, Error> {
+    let (mut layout, mut alike) = (None, Alike::default());
     let mut sums: Vec<f64> = Vec::new();
     for seen in observations.chunk_by(|a, b| a.0 == b.0) {
         let id = seen[0].0;
@@ -236,19 +247,32 @@ fn mean(
             return wrong(expected, format!("{dim} {kind}"));
         }
         sums.resize(input.ids.len() * dim, 0.0);
-        for &(_, index, out) in seen {
+        let mut rows: Vec<f64> = Vec::with_capacity(seen.len() * dim);
+        for &(_, index, _) in seen {
             let index = index as usize;
             if index >= n {
                 let expected = format!("a descriptor for keypoint {index}");
                 return wrong(expected, format!("{n} descriptors"));
             }
             let row = index * dim..(index + 1) * dim;
-            let sums = &mut sums[out * dim..(out + 1) * dim];
             match &values {
-                Values::U8(values) => add(sums, &values[row]),
-                Values::F32(values) => add(sums, &values[row]),
+                Values::U8(values) => rows.extend(values[row].iter().map(|&x| f64::from(x))),
+                Values::F32(values) => rows.extend(values[row].iter().map(|&x| f64::from(x))),
             }
         }
+        let of_image = Alike::of(seen, &rows, &sums, dim);
+        if of_image.is_below(LEAST_ALIKE_IN_IMAGE) {
+            let (expected, found) = of_image.wrong();
+            return wrong(expected, found);
+        }
+        (alike.told, alike.n) = (alike.told + of_image.told, alike.n + of_image.n);
+        for (&(.., out), row) in seen.iter().zip(rows.chunks(dim)) {
+            sums[out * dim..][..dim].iter_mut().zip(row).for_each(|(sum, x)| *sum += x);
+        }
+    }
+    if alike.is_below(LEAST_ALIKE) {
+        let (expected, found) = alike.wrong();
+        return Err(Error::new(path, "", expected, found));
     }
     let (kind, dim) = layout.unwrap_or(("bytes", 1));
     let values = if kind == "bytes" {
@@ -263,8 +287,54 @@ fn mean(
     Descriptors::try_new(values, dim).map_err(|e| Error::core(path, e))
 }
 
-fn add<T: Copy + Into<f64>>(sums: &mut [f64], values: &[T]) {
-    sums.iter_mut().zip(values).for_each(|(sum, &value)| *sum += value.into());
+/// How often a descriptor is more like its own point in other images than like another point.
+#[derive(Default)]
+struct Alike {
+    told: f64,
+    n: usize,
+}
+
+/// Least share of descriptors, of all images and of one, that are more like their own point.
+/// Features of the model have 0.99 or more, those of another run or order 0.5 to 0.65 (the test below).
+const LEAST_ALIKE: f64 = 0.85;
+const LEAST_ALIKE_IN_IMAGE: f64 = 0.7;
+
+/// Fewer comparisons say nothing.
+const FEWEST: usize = 30;
+
+impl Alike {
+    /// Compares the observations `seen` of an image, with descriptors `rows`, with the `sums` of earlier images. The other
+    /// point is one of the same image.
+    fn of(seen: &[Observation], rows: &[f64], sums: &[f64], dim: usize) -> Self {
+        let own = |out: usize| &sums[out * dim..][..dim];
+        let known = |at: &usize| own(seen[*at].2).iter().any(|&x| x != 0.0);
+        let known: Vec<usize> = (0..seen.len()).filter(known).collect();
+        let like = |at: usize, out: usize| {
+            let dot: f64 = own(out).iter().zip(&rows[at * dim..]).map(|(a, b)| a * b).sum();
+            dot / own(out).iter().map(|x| x * x).sum::<f64>().sqrt()
+        };
+        let mut found = Self::default();
+        for (rank, &at) in known.iter().enumerate() {
+            let other = seen[known[(rank + known.len() / 2) % known.len()]].2;
+            if other != seen[at].2 {
+                let (of_own, of_other) = (like(at, seen[at].2), like(at, other));
+                found.told += if of_own == of_other { 0.5 } else { f64::from(of_own > of_other) };
+                found.n += 1;
+            }
+        }
+        found
+    }
+
+    /// Returns true if the share is smaller than `least`, beyond chance.
+    fn is_below(&self, least: f64) -> bool {
+        let n = self.n.max(1) as f64;
+        self.n >= FEWEST && self.told / n + 1.5 / n.sqrt() < least
+    }
+
+    fn wrong(&self) -> (String, String) {
+        let expected = "descriptors of the model's keypoints, more like their own point in other images than like another one".to_owned();
+        (expected, format!("{} of {} that are", self.told, self.n))
+    }
 }
 
 /// Scales every row to an L2 norm, so that a sum equals a mean.
@@ -273,6 +343,67 @@ fn normalize(rows: &mut [f64], dim: usize, norm: f64) {
         let length = row.iter().map(|x| x * x).sum::<f64>().sqrt();
         if length > 0.0 {
             row.iter_mut().for_each(|x| *x *= norm / length);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use unlift::seed::{Draws, Stage};
+
+    /// Ten wrong files of each map: all or every other image with rows shuffled, shifted or reversed, or with those of another
+    /// image.
+    #[test]
+    fn descriptors_of_real_maps_look_alike_within_tracks_unless_they_are_shuffled() {
+        for (scene, features) in [
+            ("castle", "features-sift.h5"),
+            ("redkitchen", "features-sift.h5"),
+            ("redkitchen-aliked", "features-aliked.h5"),
+        ] {
+            let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+            let path = shared.join(scene).join(features);
+            if !path.exists() {
+                println!("skipped: shared/data/{scene}/{features} is not beside the repository");
+                continue;
+            }
+            let input = crate::read::open(&shared.join(scene)).unwrap();
+            let source = FeatureSource::open(&path).unwrap();
+            let (images, mut seen) = tracks(&path, &input).unwrap();
+            let at = |image: &Image| {
+                source.names().iter().position(|name| name.as_bytes() == image.name)
+            };
+            let is_there =
+                |id: u32| images.iter().any(|image| image.id == id && at(image).is_some());
+            seen.retain(|one| is_there(one.0));
+            let model = (images.clone(), seen);
+            let all = (0..source.names().len()).map(|at| source.get(at).unwrap().descriptors);
+            let all: Vec<Descriptors> = all.map(Option::unwrap).collect();
+            for (every, kind) in [1, 2].iter().flat_map(|n| (0..6).map(move |kind| (n, kind))) {
+                let changed = |at: usize| {
+                    let (own, other) = (&all[at], &all[(at + 1) % all.len()]);
+                    let n = own.len() as u32;
+                    let mut rows: Vec<u32> = (0..n).collect();
+                    match if at % every == 0 { kind } else { 0 } {
+                        0 => {}
+                        1 => Draws::new(at as u64, Stage::Subset, 0).shuffle(&mut rows),
+                        2 => rows.rotate_left(1),
+                        3 => rows.rotate_right(1),
+                        4 => rows.reverse(),
+                        _ => rows.iter_mut().for_each(|row| *row %= other.len() as u32),
+                    }
+                    let own = if at % every == 0 && kind == 5 { other } else { own };
+                    own.select(&rows)
+                };
+                let changed: Vec<Descriptors> = (0..all.len()).map(changed).collect();
+                let found = mean(&path, &input, &model, |image| {
+                    let one = &changed[at(image).unwrap()];
+                    Ok((one.values().clone(), one.dim()))
+                });
+                let error = found.err().map_or(String::new(), |error| error.to_string());
+                let told = error.contains("more like their own point in other images");
+                assert_eq!(told, kind != 0, "{scene}, kind {kind} of every {every}: {error}");
+            }
         }
     }
 }
