@@ -379,12 +379,13 @@ mod tests {
             let model = (images.clone(), seen);
             let all = (0..source.names().len()).map(|at| source.get(at).unwrap().descriptors);
             let all: Vec<Descriptors> = all.map(Option::unwrap).collect();
-            for (every, kind) in [1, 2].iter().flat_map(|n| (0..6).map(move |kind| (n, kind))) {
+            for (&every, kind) in [1, 2].iter().flat_map(|n| (0..6).map(move |kind| (n, kind))) {
                 let changed = |at: usize| {
                     let (own, other) = (&all[at], &all[(at + 1) % all.len()]);
                     let n = own.len() as u32;
                     let mut rows: Vec<u32> = (0..n).collect();
-                    match if at % every == 0 { kind } else { 0 } {
+                    let kind = if at.is_multiple_of(every) { kind } else { 0 };
+                    match kind {
                         0 => {}
                         1 => Draws::new(at as u64, Stage::Subset, 0).shuffle(&mut rows),
                         2 => rows.rotate_left(1),
@@ -392,7 +393,7 @@ mod tests {
                         4 => rows.reverse(),
                         _ => rows.iter_mut().for_each(|row| *row %= other.len() as u32),
                     }
-                    let own = if at % every == 0 && kind == 5 { other } else { own };
+                    let own = if kind == 5 { other } else { own };
                     own.select(&rows)
                 };
                 let changed: Vec<Descriptors> = (0..all.len()).map(changed).collect();
