@@ -3,6 +3,8 @@
 //! A protection with a scheme is itself a scheme ([`Changed`](super::Changed)). Its name is the
 //! scheme's, followed by the rule: `ppl_subspace2`, `ppl_ldp256.2.8`.
 
+use std::collections::HashSet;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -30,6 +32,8 @@ pub struct Protection {
     /// Number of words of the vocabulary; 0 for subspaces.
     n_words: usize,
     public: Option<Arc<Descriptors>>,
+    /// Hashes of the rows of the public descriptors.
+    known: Arc<HashSet<u64>>,
 }
 
 const FORMS: &str = "subspace:M, subspace:M:random, subspace:M:adversarial, subspace:M:hybrid or ldp:WORDS,M,EPSILON";
@@ -39,6 +43,8 @@ const MOST_WORDS: usize = 1 << 14;
 const ROUNDS: usize = 20;
 /// Largest number of descriptors per word that Lloyd's algorithm reads.
 const MOST_PER_WORD: usize = 64;
+/// Largest share of the protected descriptors that public ones may equal.
+const MOST_OWN: f64 = 0.01;
 /// A direction is shorter than this if it lies in the span of the earlier ones.
 const SHORTEST: f64 = 1e-6;
 
@@ -76,7 +82,7 @@ impl Protection {
             _ => None,
         };
         let (rule, directions, n_words) = found.ok_or_else(wrong)?;
-        Ok(Self { rule, directions, n_words, public: None })
+        Ok(Self { rule, directions, n_words, public: None, known: Arc::default() })
     }
 
     /// Returns the name in rows: letters, digits, `_` and `.`.
@@ -106,15 +112,16 @@ impl Protection {
             let expected = format!("at least {least} for {}", self.name());
             return Err(Error::new("public descriptors", expected, rows.len().to_string()));
         }
+        let known = Arc::new(rows.iter().map(|row| hash(row)).collect());
         let rows = if self.n_words > 0 { words(&rows, self.n_words) } else { rows };
         let public = Descriptors::try_new(Values::F32(rows.concat()), public.dim())?;
-        Ok(Self { public: Some(Arc::new(public)), ..self })
+        Ok(Self { public: Some(Arc::new(public)), known, ..self })
     }
 
     /// Protects every row of `descriptors`.
     ///
     /// # Errors
-    /// If public descriptors are missing or have another number of values.
+    /// If public descriptors are missing, have another number of values or are those to protect.
     pub fn protect(
         &self,
         descriptors: &Descriptors,
@@ -137,6 +144,12 @@ impl Protection {
         let known: Vec<Vec<f32>> = self.public.iter().flat_map(|rows| unit_rows(rows)).collect();
         let key = key.stage(Stage::Protection);
         let plain: Vec<Vec<f32>> = unit_rows(descriptors).collect();
+        let (n, n_own) =
+            (plain.len(), plain.iter().filter(|row| self.known.contains(&hash(row))).count());
+        if n_own as f64 > MOST_OWN * n as f64 {
+            let found = format!("{n_own} of the {n} descriptors to protect among them");
+            return Err(Error::new("public descriptors", "those of other images", found));
+        }
         let of = |(row, plain): (usize, &Vec<f32>)| {
             let mut draws = key.draws(row as u64);
             match self.rule {
@@ -201,6 +214,12 @@ impl Protection {
         remove(&mut foot, &turned);
         [foot].iter().chain(&turned).flatten().map(|&x| x as f32).collect()
     }
+}
+
+fn hash(row: &[f32]) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    row.iter().for_each(|x| x.to_bits().hash(&mut hasher));
+    hasher.finish()
 }
 
 /// Makes `direction` orthogonal to `basis` and brings it to length 1; false if nothing remains.
@@ -432,6 +451,16 @@ mod tests {
             }
             assert_eq!(hide(0).unwrap().0, released);
             assert_ne!(hide(1).unwrap().0.fingerprint(), released.fingerprint());
+        }
+    }
+    #[test]
+    fn public_descriptors_that_are_the_protected_ones_are_refused() {
+        let of = descriptors(300, 9);
+        for text in ["subspace:2", "ldp:16,2,4"] {
+            let protection = Protection::parse(text).unwrap().with_public(&of).unwrap();
+            let error = protection.protect(&of, &Key::from_seed(0)).unwrap_err().to_string();
+            let said = "expected those of other images, found 300 of the 300";
+            assert!(error.contains(said), "{error}");
         }
     }
 }
