@@ -50,7 +50,8 @@ pub fn run(args: &CompareArgs) -> anyhow::Result<Outcome> {
 
 /// Formats the differences and the verdict.
 fn text(comparison: &Comparison, written: Option<PathBuf>) -> String {
-    let mut text = String::new();
+    let differs = |what: &String| format!("NOT COMPARED: {}\n", OneLine(what));
+    let mut text: String = comparison.different.iter().map(differs).collect();
     let changed = [(&comparison.more, "leaks more"), (&comparison.less, "leaks less")];
     if changed.iter().any(|(changes, _)| !changes.is_empty()) {
         let heads = ["scheme", "attack", "within", "old", "new", "points", ""];
@@ -60,9 +61,13 @@ fn text(comparison: &Comparison, written: Option<PathBuf>) -> String {
         }
         text.push_str(&table(&rows, &[1, 6]));
     }
-    for (rows, which) in [(&comparison.only_old, "old"), (&comparison.only_new, "new")] {
+    let only = [
+        (&comparison.only_old, "NOT COMPARED: only in the old audit"),
+        (&comparison.only_new, "only in the new audit"),
+    ];
+    for (rows, which) in only {
         for Unmatched { scheme, attack } in rows {
-            let said = format!("only in the {which} audit: {scheme}: {attack}");
+            let said = format!("{which}: {scheme}: {attack}");
             text.push_str(&format!("{}\n", OneLine(said)));
         }
     }

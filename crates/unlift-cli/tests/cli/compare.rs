@@ -64,6 +64,25 @@ fn what_leaks_more_or_is_out_of_view_fails() {
         assert!(text.contains(&format!("{tolerance}{expected}")), "{files}: {text}");
         assert_eq!(text.contains("OUT OF VIEW: ppl: no row"), files.contains("gone"), "{text}");
     }
+    let other: [Change<'_>; 4] = [
+        ("map.json", &|document| document["input"]["sha256"] = json!("0".repeat(64))),
+        ("scale.json", &|document| document["input"]["scale_m_per_unit"] = json!(4.0)),
+        ("database.json", &|document| {
+            document["input"]["other_sha256"] = json!({"descriptors": "0"})
+        }),
+        ("attack.json", &|document| rows(document).retain(|row| row["neighbors"] != "geometric")),
+    ];
+    for (name, change) in other {
+        let mut document = place.json("a/audit.json");
+        document["run"]["seconds"]["rows"] = json!([]);
+        document["input"]["other_sha256"] = json!({"descriptors": "1"});
+        place.write("was.json", document.to_string());
+        change(&mut document);
+        place.write(name, document.to_string());
+        let (text, _) = place.ends(&format!("compare was.json {name}"), 1);
+        assert!(text.starts_with("NOT COMPARED: "), "{name}: {text}");
+        assert!(text.contains("\nnot compared: "), "{name}: {text}");
+    }
     let compared = place.prints("compare old.json new.json --json --out c", 1);
     assert_eq!(compared["more"][0]["scheme"], "olc");
     let page = place.text("c/compare.html");

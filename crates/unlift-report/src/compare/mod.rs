@@ -62,8 +62,10 @@ pub struct Comparison {
     pub tolerance_points: f64,
     /// The origin of the tolerance: `twice the spread of repeats` or `usual without repeats`.
     pub tolerance_is: &'static str,
-    /// Whether nothing leaks more and nothing is lost.
+    /// Whether nothing leaks more, nothing is lost, and both audits are of the same inputs.
     pub passed: bool,
+    /// Inputs that differ, so that a smaller figure may say nothing.
+    pub different: Vec<String>,
     /// Figures that leak more, the largest difference first.
     pub more: Vec<Change>,
     /// Figures that leak less, the largest difference first.
@@ -165,11 +167,14 @@ pub fn compare(old: &Document, new: &Document) -> Result<Comparison, Incomparabl
     more.sort_by(|a, b| b.points.total_cmp(&a.points));
     less.sort_by(|a, b| a.points.total_cmp(&b.points));
     let costs_more = costs_more(old, new);
-    let passed = more.is_empty() && costs_more.is_empty() && lost.is_empty();
+    let different = different(old, new);
+    let like = different.is_empty() && only_old.is_empty() && lost.is_empty();
+    let passed = like && more.is_empty() && costs_more.is_empty();
     Ok(Comparison {
         tolerance_points,
         tolerance_is,
         passed,
+        different,
         more,
         less,
         same,
@@ -178,6 +183,34 @@ pub fn compare(old: &Document, new: &Document) -> Result<Comparison, Incomparabl
         only_old,
         only_new,
     })
+}
+
+/// Returns the inputs that differ. Share-safe audits have no hashes.
+fn different(old: &Document, new: &Document) -> Vec<String> {
+    let (a, b) = (&old.input, &new.input);
+    let mut found = Vec::new();
+    let mut expect = |what: &str, was: String, is: String| {
+        if was != is {
+            found.push(format!("{what}: {was} in the old audit, {is} in the new one"));
+        }
+    };
+    let scale = |scale: Option<f64>| scale.map_or("none".to_owned(), |scale| scale.to_string());
+    expect("points", a.n_points.to_string(), b.n_points.to_string());
+    expect("scale", scale(a.scale_m_per_unit), scale(b.scale_m_per_unit));
+    let both = a
+        .other_sha256
+        .iter()
+        .filter_map(|(role, was)| Some((role, was, b.other_sha256.get(role)?)));
+    for (role, was, is) in both.clone() {
+        expect(&format!("hash of the file of {role}"), was.clone(), is.clone());
+    }
+    // A scheme may release one truth in any number of files.
+    if let (Some(was), Some(is)) = (&a.sha256, &b.sha256)
+        && both.clone().all(|(role, ..)| role != "truth")
+    {
+        expect("hash of the map or images", was.clone(), is.clone());
+    }
+    found
 }
 
 /// Returns the schemes of the old audit that localize less precisely in the new one, or whose
@@ -347,8 +380,13 @@ impl Comparison {
     pub fn summary(&self) -> String {
         let count = self.more.len() + self.less.len() + self.same.len();
         let point = if self.tolerance_points == 1.0 { "point" } else { "points" };
+        let not = if self.different.is_empty() && self.only_old.is_empty() {
+            ""
+        } else {
+            "not compared: "
+        };
         let mut text = format!(
-            "{count} figures compared, tolerance {} {point} ({}): {} leak more, {} less, {} as before",
+            "{not}{count} figures compared, tolerance {} {point} ({}): {} leak more, {} less, {} as before",
             self.tolerance_points,
             self.tolerance_is,
             self.more.len(),
