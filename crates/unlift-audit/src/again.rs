@@ -29,11 +29,11 @@ use unlift_report::document::Input;
 
 use crate::Progress;
 use crate::document::{self, Found, Provenance, names, only_named, ordered};
-use crate::doubts::check_lengths_of_gates;
+use crate::doubts::{check_lengths_of_gates, sides_m, with_extent};
 use crate::gate::{Gate, check_gates, gate_results};
 use crate::outputs::{Audited, Finished};
 use crate::prepare::{Preparation, Prepared};
-use crate::{Error, check_stop, maps};
+use crate::{Error, check_stop, frames, maps};
 
 /// The solver of all rows.
 const SOLVER: &str = "intersection";
@@ -117,24 +117,28 @@ pub fn perform(mut job: AgainJob<'_>, out: OutputSet) -> Result<Finished, Error>
     if !described {
         job.notes.push("links by geometry only: both maps need descriptors for others".to_owned());
     }
+    if job.maps.second.is_some() {
+        job.doubts.extend(frames::doubt(&first.1, &second.1)?);
+    }
     for note in job.doubts.iter().chain(&job.notes) {
         job.progress.say(&format!("note: {note}"));
     }
     let (rows, not_audited, seconds) = rows(&job, [&first.1, &second.1], sources)?;
     let doubts = vec![job.doubts.first().cloned(); rows.len()];
-    let gates = gate_results(&job.gates, &job.plan, &rows, &not_audited, &doubts, &[])?;
+    let gates = gate_results(&job.gates, (&job.plan, false), &rows, &not_audited, &doubts, &[])?;
     let mut options = job.options.clone();
     options.extend(names(&job.plan));
     options.insert("records_alone".into(), json!(job.plan.records_alone));
     let points = first.1.original.reveal();
     let scale = 1.0 / first.1.unit_in_map_units;
-    let provenance = Provenance {
+    let mut provenance = Provenance {
         input: Input {
             path: Some(job.paths[0].display().to_string()),
             sha256: Some(hash_input(&first.0)?),
             n_points: points.len() as u64,
             scale_m_per_unit: (points.unit() == Unit::Meter).then_some(scale),
             unit_in_map_units: Some(first.1.unit_in_map_units),
+            extent_m: sides_m(points),
             other_sha256: ordered([("second".to_owned(), hash_input(&second.0)?)]),
             ..Input::default()
         },
@@ -144,6 +148,7 @@ pub fn perform(mut job: AgainJob<'_>, out: OutputSet) -> Result<Finished, Error>
         command: job.command,
         started: job.started,
     };
+    provenance.gates = with_extent(provenance.gates, &provenance.input);
     let found =
         Found { rows: &rows, not_audited: &not_audited, break_even: &[], seconds: &seconds };
     let document = document::document(&job.plan, &found, provenance);

@@ -4,12 +4,14 @@
 
 use unlift::audit::{Plan, Row, Threshold};
 use unlift::evaluate::{are_strangers, away_from_own, belongs, nearer_to_own, recovered_away};
+use unlift::geometry::frame::Bounds;
 use unlift::geometry::knn::Knn;
-use unlift::geometry::vector::median;
+use unlift::geometry::vector::{median, sub};
 use unlift::recover::Recovered;
 use unlift::released::Released;
 use unlift::truth::{Original, Secret};
-use unlift::{PointSet, Unit};
+use unlift::{Descriptors, PointSet, Unit};
+use unlift_report::document::{GateResult, Input};
 
 use crate::Error;
 use crate::gate::Gate;
@@ -154,6 +156,26 @@ fn not_its_own(
     stray_truth(&away, &plan.thresholds, released.unit())
 }
 
+/// Nothing is measured if the median distance of points from their own records is this many times that to the K-th neighbor.
+const APART: f64 = 4.0;
+
+/// Returns an error if most points of the ground truth are far from their own records.
+pub(crate) fn check_truth(
+    original: &Original<3>,
+    (released, secret): &(Released<3>, Secret),
+    spread: &Spread,
+) -> Result<(), unlift::Error> {
+    belongs(original, released, secret)?;
+    let (middle, unit) = (median(&mut away_from_own(released, original, secret)), released.unit());
+    let most = APART * spread.middle;
+    if middle <= most {
+        return Ok(());
+    }
+    let expected = format!("records within {} of their own points", in_unit(most, unit));
+    let found = format!("{}: not measured (another unit, scale or frame?)", in_unit(middle, unit));
+    Err(unlift::Error::new("truth", expected, found))
+}
+
 /// Returns a doubt about the ground truth, given the distances of points from their own records.
 pub(crate) fn stray_truth(away: &[f64], thresholds: &[Threshold], unit: Unit) -> Option<String> {
     let strays = strays(away, thresholds, unit)?;
@@ -194,6 +216,34 @@ fn mistaken_unit(unit: Unit, k: usize, middle: f64) -> Option<String> {
             short(middle)
         )
     })
+}
+
+/// Least share of points whose descriptor is more like that of the nearest point than like another one. Real maps have 0.71
+/// or more, those with shuffled rows a half.
+const LEAST_LIKE: f64 = 0.58;
+
+/// Returns a doubt if descriptors are not like those of the nearest points, as in another order of rows.
+pub fn unlike_neighbors(
+    points: &PointSet<3>,
+    descriptors: &Descriptors,
+) -> Result<Option<String>, unlift::Error> {
+    let (knn, n) = (Knn::new(points.positions())?, points.len());
+    let (mut found, mut told) = (Vec::new(), 0);
+    let rows = (0..n).step_by(n.div_ceil(SAMPLE).max(1));
+    let n_rows = rows.len();
+    for row in rows {
+        knn.nearest(row, 1, &mut found);
+        let like = |other: usize| descriptors.squared_distance(row, other);
+        let is_like = |near: &(f64, u32)| like(near.1 as usize) < like((row + n / 2) % n);
+        told += usize::from(found.first().is_some_and(is_like));
+    }
+    let (share, chance) = (told as f64 / n_rows.max(1) as f64, 1.5 / (n_rows.max(1) as f64).sqrt());
+    Ok((share + chance < LEAST_LIKE).then(|| {
+        format!(
+            "descriptors: {told} of {n_rows} are more like that of the nearest point than like another one, about as by \
+             chance: of another map, or in another order of rows?"
+        )
+    }))
 }
 
 fn in_unit(length: f64, unit: Unit) -> String {
@@ -279,6 +329,21 @@ impl Extent {
         let nearest = median(&mut Knn::new(points)?.kth_distances(1));
         Ok(Self { across: across(points), nearest })
     }
+}
+
+/// Returns the sides of the box around all points but the outer 1 % of each axis, if lengths are in meters.
+pub fn sides_m(points: &PointSet<3>) -> Option<[f64; 3]> {
+    let bounds = Bounds::quantiles(points.positions(), 0.01)?;
+    (points.unit() == Unit::Meter).then(|| sub(&bounds.high, &bounds.low))
+}
+
+/// Adds the extent of the map to what gates compare.
+pub(crate) fn with_extent(mut gates: Vec<GateResult>, input: &Input) -> Vec<GateResult> {
+    if let Some(extent) = input.extent() {
+        let of = gates.iter_mut().filter_map(|gate| gate.of.as_mut());
+        of.for_each(|of| of.push_str(&format!(", in a map of {extent}")));
+    }
+    gates
 }
 
 fn across(points: &[[f64; 3]]) -> f64 {

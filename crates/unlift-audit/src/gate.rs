@@ -16,10 +16,11 @@
 //! five queries, `olc:again:0.10<=20` what comes back from two releases of a map.
 
 use unlift::Unit;
-use unlift::audit::{NotAudited, Plan, Row, Threshold};
+use unlift::audit::{NeighborsBy, NotAudited, Plan, Row, Threshold};
+use unlift::neighbors::Needs;
 use unlift::neighbors::oracle::Noise;
 use unlift::recover::Builtin;
-use unlift_report::document::{FEWEST_HELD_OUT, GateResult, Localization, UNPROTECTED};
+use unlift_report::document::{FEWEST_HELD_OUT, GateResult, HeldOut, Localization, UNPROTECTED};
 
 use crate::{Error, sources};
 
@@ -381,11 +382,31 @@ pub fn check_gates<const D: usize>(
     }
 }
 
+/// Returns an attack that `plan` lacks although the gate covers it; `described` is true if the map has descriptors. True
+/// neighbors alone replace a source, as no source is better.
+fn untried<const D: usize>(gate: &Gate, plan: &Plan<D>, described: bool) -> Option<String> {
+    let all = gate.solver.is_none() && gate.source.is_none();
+    if D == 3 && all && gate.figure == Figure::Recovered && !plan.records_alone {
+        return Some("records alone were not tried, and no attack is named".to_owned());
+    }
+    let described = described || plan.own_sources().any(|by| by.needs() == Needs::Descriptors);
+    let is_best = |by: &NeighborsBy<D>| match by {
+        NeighborsBy::Oracle => plan.inlier_ratios.contains(&1.0),
+        by => by.name() == sources::BY_DESCRIPTORS.name,
+    };
+    let lacks = all && gate.inlier_ratio.is_none() && described;
+    (lacks && !plan.neighbors.iter().any(is_best)).then(|| {
+        let (best, named) = (sources::BY_DESCRIPTORS.name, "and no attack is named");
+        format!("--neighbors {best}, the best source, was not tried, {named}")
+    })
+}
+
 /// Returns the results of all gates. A gate fails if something it applies to was not audited, or if
-/// a row it applies to has a doubt; `doubts` has one entry per row, or is empty.
+/// a row it applies to has a doubt; `doubts` has one entry per row, or is empty. A gate that names no
+/// attack needs the best one of each kind; `described` is true if the map has descriptors.
 pub fn gate_results<const D: usize>(
     gates: &[Gate],
-    plan: &Plan<D>,
+    (plan, described): (&Plan<D>, bool),
     rows: &[Row],
     not_audited: &[NotAudited],
     doubts: &[Option<String>],
@@ -417,7 +438,9 @@ pub fn gate_results<const D: usize>(
             format!("{scheme}{with} was not audited: {}", missing.reason)
         });
         let keeps = found_percent.is_some_and(|found| gate.passes(found));
-        let reason = reason.or_else(|| doubt.filter(|_| keeps).map(|doubt| doubt.to_string()));
+        let doubt = doubt.map(|doubt| doubt.to_string());
+        let doubt = || doubt.or_else(|| untried(gate, plan, described));
+        let reason = reason.or_else(|| if keeps { doubt() } else { None });
         // A gate without a row must never count as held.
         if found_percent.is_none() && reason.is_none() {
             return Err(Error::request(format!(
@@ -452,6 +475,11 @@ fn of_localization(
         |one: &&Localization| !one.of_queries && one.scheme != UNPROTECTED && covered(&one.scheme);
     let all: Vec<&Localization> = localization.iter().filter(of_map).collect();
     let missing = not_audited.iter().find(|one| one.neighbors.is_none() && covered(&one.scheme));
+    // Within the widest limits.
+    let recall = |held: &HeldOut| held.recall_percent.values().copied().fold(0.0, f64::max);
+    let is_lost = |one: &Localization| {
+        one.scheme == UNPROTECTED && one.held_out.as_ref().is_some_and(|held| recall(held) < 50.0)
+    };
     let worst = all.iter().max_by(|a, b| {
         let cost = |one: &Localization| cost_of_gate(one).unwrap_or(f64::INFINITY);
         cost(a).total_cmp(&cost(b))
@@ -465,6 +493,9 @@ fn of_localization(
             "{} changes descriptors, so its cost is not known without {FEWEST_HELD_OUT} or more held-out images",
             one.scheme
         )),
+        (Some(_), None) if localization.iter().any(is_lost) => {
+            Some("most held-out images do not localize even without protection".to_owned())
+        }
         (Some(one), None) if cost_of_gate(one).is_none() => {
             Some(format!("{}: most images do not localize", one.scheme))
         }
@@ -488,8 +519,6 @@ fn of_localization(
 
 #[cfg(test)]
 mod tests {
-    use unlift_report::document::HeldOut;
-
     use super::*;
 
     fn row(scheme: &str, inlier_ratio: f64, recovered_percent: f64) -> Candidate<'_> {
@@ -696,7 +725,7 @@ mod tests {
     #[test]
     fn few_held_out_images_fail_a_gate_but_never_pass_one() {
         let gate = Gate::parse("olc:localization<=2").unwrap();
-        let passes = |multiple: Option<f64>, n_images: u64, bound: f64| {
+        let of = |multiple: Option<f64>, n_images: u64, bound: f64, recall: f64| {
             let held_out = HeldOut {
                 n_images,
                 right_matches: 50.0,
@@ -704,9 +733,9 @@ mod tests {
                 center_error: multiple,
                 rotation_error_degrees: multiple,
                 multiple,
-                recall_percent: Default::default(),
+                recall_percent: [("50 cm, 5 deg".to_owned(), recall)].into_iter().collect(),
             };
-            let one = Localization {
+            Localization {
                 scheme: "olc".to_owned(),
                 of_queries: false,
                 multiple: Some(bound),
@@ -715,9 +744,17 @@ mod tests {
                 failed_percent: 0.0,
                 changes_descriptors: false,
                 held_out: Some(held_out),
-            };
-            of_localization(&gate, &[one], &[]).passed
+            }
         };
+        let passes = |multiple: Option<f64>, n_images: u64, bound: f64| {
+            of_localization(&gate, &[of(multiple, n_images, bound, 100.0)], &[]).passed
+        };
+        for (recall, expected) in [(49.0, false), (51.0, true)] {
+            let scheme = UNPROTECTED.to_owned();
+            let base = Localization { scheme, ..of(Some(1.0), 10, 1.0, recall) };
+            let both = [base, of(Some(1.0), 10, 1.5, 10.0)];
+            assert_eq!(of_localization(&gate, &both, &[]).passed, expected, "{recall} %");
+        }
         assert!(passes(Some(1.0), 3, 1.5));
         assert!(!passes(Some(3.0), 3, 1.5) && !passes(None, 3, 1.5));
         assert!(!passes(Some(1.0), 3, 2.5), "the bound holds, whatever few images say");

@@ -38,6 +38,7 @@ pub mod again;
 mod curves;
 mod document;
 mod doubts;
+mod frames;
 mod gate;
 pub mod images;
 pub mod inversion;
@@ -52,7 +53,7 @@ mod tiles;
 
 pub use document::peak_bytes;
 pub use document::{evaluated, ordered, row};
-pub use doubts::{Checked, SaidOfLengths, check_scale, check_thresholds};
+pub use doubts::{Checked, SaidOfLengths, check_scale, check_thresholds, sides_m};
 pub use gate::{Candidate, Figure, Gate};
 pub use maps::Job;
 pub use outputs::{

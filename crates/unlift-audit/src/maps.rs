@@ -20,8 +20,10 @@ use unlift_report::scene::Scene3d;
 use crate::Error;
 use crate::curves::{curve_errors, curves_of};
 use crate::document::{self, Provenance};
-use crate::doubts::{Spread, doubts};
-use crate::doubts::{check_lengths_of_gates, check_scale};
+use crate::doubts::{
+    Spread, check_lengths_of_gates, check_scale, check_truth, doubts, sides_m, unlike_neighbors,
+    with_extent,
+};
 use crate::gate::{Gate, check_gates, gate_results};
 use crate::inversion::MapInversion;
 use crate::localization::{self, Cameras, Localize};
@@ -190,6 +192,10 @@ pub fn open(
     prepared.notes.extend(prepared.descriptors.as_ref().and_then(zeros));
     prepared.notes.splice(0..0, input.notes.iter().cloned());
     prepared.doubts.clone_from(&input.doubts);
+    if let Some(rows) = &prepared.descriptors {
+        let points = prepared.original.reveal();
+        prepared.doubts.extend(unlike_neighbors(points, rows)?);
+    }
     prepared.rows = rows_of_file(&prepared.rows, &input.left_out);
     Ok((input, prepared))
 }
@@ -253,6 +259,14 @@ pub fn find(job: Job<'_>) -> Result<Audited, Error> {
     let whole = (job.original, job.descriptors);
     let cut = |asked: Tiles| asked.of(job.original.reveal().positions(), job.up);
     let cut = job.tiles.map(cut).transpose()?;
+    let spread = match &cut {
+        Some(tiles) => Spread::of_tiles(job.original, tiles, job.plan.k),
+        None => Spread::of(job.original.reveal().positions(), job.plan.k),
+    };
+    let spread = spread.map_err(of_file)?;
+    if let Some(hidden) = job.hidden {
+        check_truth(job.original, hidden, &spread).map_err(of_file)?;
+    }
     let Ran { outcome, scene, curves, sheets, tile_rows } = match &cut {
         Some(tiles) => {
             let found = tiles::run(whole, tiles, &job.plan, job.progress)
@@ -278,11 +292,6 @@ pub fn find(job: Job<'_>) -> Result<Audited, Error> {
             Ran { outcome, scene, curves, sheets, tile_rows: Vec::new() }
         }
     };
-    let spread = match &cut {
-        Some(tiles) => Spread::of_tiles(job.original, tiles, job.plan.k),
-        None => Spread::of(job.original.reveal().positions(), job.plan.k),
-    };
-    let spread = spread.map_err(of_file)?;
     let mut doubts = doubts(
         (job.original, spread),
         job.hidden,
@@ -294,7 +303,18 @@ pub fn find(job: Job<'_>) -> Result<Audited, Error> {
     }
     let (rows, missing) = (&outcome.rows, &outcome.not_audited);
     doubts.notes.extend(said);
-    let gates = gate_results(&job.gates, &job.plan, rows, missing, &doubts.of_rows, &localization)?;
+    let of_hidden = job.hidden.is_some_and(|(released, _)| released.descriptors().is_some());
+    let described = job.descriptors.is_some() || of_hidden;
+    let gates = gate_results(
+        &job.gates,
+        (&job.plan, described),
+        rows,
+        missing,
+        &doubts.of_rows,
+        &localization,
+    )?;
+    let input = Input { extent_m: sides_m(job.original.reveal()), ..job.input };
+    let gates = with_extent(gates, &input);
     let mut options = job.options;
     if let Some(inversion) = &job.inversion {
         options.insert("inverter_sha256".into(), inversion.sha256().into());
@@ -305,7 +325,7 @@ pub fn find(job: Job<'_>) -> Result<Audited, Error> {
     }
     let options = document::options(&job.plan, options);
     let provenance = Provenance {
-        input: job.input,
+        input,
         options,
         notes: job.notes.into_iter().chain(doubts.notes).collect(),
         gates,

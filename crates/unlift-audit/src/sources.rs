@@ -9,7 +9,7 @@ use unlift::released::Released;
 use unlift::{Descriptors, Error};
 
 /// The source `descriptors`: the best one for the given descriptors.
-const BY_DESCRIPTORS: SourceEntry = SourceEntry {
+pub(crate) const BY_DESCRIPTORS: SourceEntry = SourceEntry {
     name: "descriptors",
     summary: "the best that descriptors allow: learned with a network for them, else overlap or similarity",
     in_2d: Some(|| Arc::new(ByDescriptors)),

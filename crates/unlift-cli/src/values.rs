@@ -229,6 +229,14 @@ pub fn poses(text: &str) -> Result<(f64, f64), String> {
     Ok((size(cm)?, size(angle)?))
 }
 
+/// Parses the longest side of a map in meters: `5..50`.
+pub fn extent(text: &str) -> Result<(f64, f64), String> {
+    let sides = text.split_once("..");
+    let range = sides.and_then(|(low, high)| Some((positive(low).ok()?, positive(high).ok()?)));
+    let range = range.filter(|(low, high)| low <= high);
+    range.ok_or_else(|| format!("expected LOW..HIGH in meters (for example 5..50), found {text}"))
+}
+
 /// Returns the requested schemes for images, each once, or the default.
 pub fn image_schemes(given: &[&'static Entry], usual: &Plan<2>) -> Vec<Arc<dyn Scheme<2>>> {
     if given.is_empty() {

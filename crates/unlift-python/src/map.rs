@@ -163,7 +163,7 @@ pub fn read(
                 scale_m_per_unit: scale,
                 unit_in_map_units: Some(unit),
                 other_sha256,
-                images: None,
+                ..Input::default()
             },
             cameras: input.cameras.iter().map(|center| center.map(|x| x / unit)).collect(),
             up: input.up,

@@ -47,7 +47,7 @@ def test_figures_are_those_of_the_command_line(points, tmp_path):
     )
     assert not report.passed
     lines = [line for line in done.stdout.splitlines() if line.startswith("gate ")]
-    assert lines[0].startswith("gate all:0.10<=1: FAILED, found ") and lines[0].endswith(", recovered within 0.10 m")
+    assert lines[0].startswith("gate all:0.10<=1: FAILED, found ") and ", recovered within 0.10 m, in a map of " in lines[0]
     assert lines == [line for line in str(report).splitlines() if line.startswith("gate ")]
     cli = json.loads((tmp_path / "cli" / "audit.json").read_text())
     assert figures(report.document) == figures(cli)

@@ -122,7 +122,7 @@ pub fn find(job: ImagesJob<'_>) -> Result<(Option<Audited>, Used), Error> {
         steps.say(&format!("note: {moved}"));
         notes.push(moved);
     }
-    let gates = gate_results(&job.gates, &job.plan, &outcome.rows, &[], &doubts, &[])?;
+    let gates = gate_results(&job.gates, (&job.plan, false), &outcome.rows, &[], &doubts, &[])?;
     let mut options = job.options;
     if let Some(inversion) = &job.inversion {
         options.insert("inverter_sha256".into(), inversion.sha256().into());
@@ -168,6 +168,7 @@ fn input(job: &ImagesJob<'_>, tally: &Tally, outcome: &Outcome) -> Result<Input,
         n_points: tally.n_points as u64,
         scale_m_per_unit: None,
         unit_in_map_units: None,
+        extent_m: None,
         other_sha256: Default::default(),
         images: Some(ImageCounts {
             found: (names.len() + job.source.refused().len()) as u64,

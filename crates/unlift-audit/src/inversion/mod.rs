@@ -68,11 +68,6 @@ impl Painter {
         Ok(Self { inverter, lpips: Lpips::try_new()?, detector: Detector::try_new()? })
     }
 
-    /// Returns true if pictures use the colors of points that have some.
-    pub fn takes_colors(&self) -> bool {
-        self.inverter.takes_colors()
-    }
-
     /// Makes the picture of keypoints `(n, 2)` in an image of `size` (width, height) pixels.
     ///
     /// # Errors

@@ -45,13 +45,13 @@ struct Query {
 
 /// Rows of unit length, or zero.
 #[derive(PartialEq)]
-struct Unit32 {
+pub(crate) struct Unit32 {
     dim: usize,
     values: Vec<f32>,
 }
 
 /// A match of a keypoint with a point, by their rows.
-type Pair = (usize, usize);
+pub(crate) type Pair = (usize, usize);
 
 /// The rows of a map, their descriptors, and the matches of every image with them.
 type Known = (Vec<usize>, Compared, Arc<Vec<Vec<Pair>>>);
@@ -82,7 +82,8 @@ impl<'a> Held<'a> {
     /// Makes the descriptor of every point from its keypoints in the other images.
     ///
     /// # Errors
-    /// If `path` cannot be read, or too few images of the map have features.
+    /// If `path` cannot be read, a photo does not have the size of its camera, or too few images of
+    /// the map have features.
     pub fn open(
         path: &Path,
         nth: usize,
@@ -102,18 +103,26 @@ impl<'a> Held<'a> {
         let read = |&(at, number): &(usize, usize)| {
             let features = source.get(number)?;
             let view = &cameras.views[at];
+            if let Some(size) = features.size.map(|size| size.map(f64::from))
+                && size != view.size
+            {
+                let of = |[width, height]: [f64; 2]| format!("{width} x {height}");
+                let expected = format!("{} pixels, as its camera in the model", of(view.size));
+                let place = format!("image {}", features.name.escape_debug());
+                return Ok((at, Err(unlift_io::Error::new(path, place, expected, of(size)))));
+            }
             let camera = &cameras.images[at].1;
             let lens = Lens::try_new(camera.model.name, &camera.params)?;
             let Some(descriptors) = features.descriptors else {
                 return Err(Error::new("features", "descriptors", "none").into());
             };
             let photo = Photo::new(view, &lens, &features.keypoints, descriptors, positions);
-            Ok::<_, crate::Error>((at, photo))
+            Ok::<_, crate::Error>((at, Ok(photo)))
         };
         let mut photos = Vec::new();
         for found in images.par_iter().map(read).collect::<Vec<_>>() {
             match found {
-                Ok(photo) => photos.push(photo),
+                Ok((at, photo)) => photos.push((at, photo?)),
                 Err(error) => progress.say(&format!("note: not localized: {error}")),
             }
         }
@@ -505,7 +514,7 @@ impl Query {
 }
 
 impl Unit32 {
-    fn of(descriptors: &Descriptors, rows: impl Iterator<Item = usize>) -> Self {
+    pub(crate) fn of(descriptors: &Descriptors, rows: impl Iterator<Item = usize>) -> Self {
         let dim = descriptors.dim();
         let (mut values, mut one) = (Vec::new(), vec![0.0; dim]);
         for row in rows {
@@ -531,7 +540,7 @@ impl Unit32 {
 const BLOCK: usize = 64;
 
 /// Returns the mutually most similar rows that pass the ratio test.
-fn mutual(a: &Unit32, b: &Unit32) -> Vec<Pair> {
+pub(crate) fn mutual(a: &Unit32, b: &Unit32) -> Vec<Pair> {
     let mut best = Best::new(a.len(), b.len());
     for from in (0..b.len()).step_by(BLOCK) {
         for i in 0..a.len() {

@@ -135,7 +135,7 @@ pub fn perform(mut job: SequenceJob<'_>, out: OutputSet) -> Result<(Finished, Us
     check_gates(&job.gates, &job.plan, false)?;
     let mut inversions = Vec::new();
     let (rows, seconds) = rows(&job, &views, &mut inversions)?;
-    let gates = gate_results(&job.gates, &job.plan, &rows, &[], &[], &[])?;
+    let gates = gate_results(&job.gates, (&job.plan, false), &rows, &[], &[], &[])?;
     let provenance = Provenance {
         notes,
         input: described(&job, &input, &views, used)?,
@@ -192,6 +192,7 @@ fn described(
         n_points: n_points as u64,
         scale_m_per_unit: None,
         unit_in_map_units: None,
+        extent_m: None,
         other_sha256: [("model".to_owned(), hash_files(&model.files)?)].into_iter().collect(),
         images: Some(ImageCounts {
             found: (job.source.names().len() + job.source.refused().len()) as u64,

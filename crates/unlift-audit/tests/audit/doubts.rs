@@ -5,12 +5,13 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use unlift::audit::{Plan, Threshold};
+use unlift::descriptors::Values;
 use unlift::obfuscate::obfuscate;
 use unlift::recover::{Builtin, Delta};
 use unlift::released::Released;
 use unlift::seed::Key;
 use unlift::truth::{Original, Secret};
-use unlift::{PointSet, Unit};
+use unlift::{Descriptors, PointSet, Unit};
 use unlift_audit::{Audited, Error, Gate, Job, Preparation, Prepared, maps, prepare};
 
 use crate::schemes;
@@ -67,7 +68,8 @@ fn reason(found: &Audited) -> &str {
 #[test]
 fn usual_maps_are_not_doubted() {
     let all = ["olc", "ppl", "ppl+", "ray", "plane", "cp"];
-    let found = audit(&prepared(&room()), None, plan(&all), "all:0.25<=100").expect("an audit");
+    let found =
+        audit(&prepared(&room()), None, plan(&all), "all:joint:0.25<=100").expect("an audit");
     assert_eq!(found.document.notes, Vec::<String>::new());
     assert!(found.document.gates[0].passed);
 }
@@ -143,10 +145,14 @@ fn a_truth_in_another_scale_is_no_protection() {
     let olc = &schemes(&["olc"], Unit::Meter)[0];
     let hide = |original| obfuscate(&**olc, original, None, &Key::from_seed(1)).expect("hidden");
     let right = hide(&prepared_truth.original);
-    let found = audit(&prepared_truth, Some(&right), plan(&["olc"]), "olc:0.10<=100");
+    let found = audit(&prepared_truth, Some(&right), plan(&["olc"]), "olc:joint:0.10<=100");
     assert!(found.expect("an audit").document.gates[0].passed);
-    let scaled = room().iter().map(|point| point.map(|x| 1.3 * x)).collect();
-    let scaled = Original::new(PointSet::try_new(scaled, Unit::Meter).expect("points"));
+    let by = |factor: f64| room().iter().map(|point| point.map(|x| factor * x)).collect();
+    let far = Original::new(PointSet::try_new(by(0.01), Unit::Meter).expect("points"));
+    let error = audit(&prepared_truth, Some(&hide(&far)), plan(&["olc"]), "olc:0.10<=20");
+    let error = error.expect_err("meters and centimeters").to_string();
+    assert!(error.contains("not measured"), "{error}");
+    let scaled = Original::new(PointSet::try_new(by(1.3), Unit::Meter).expect("points"));
     let wrong = hide(&scaled);
     let found = audit(&prepared_truth, Some(&wrong), plan(&["olc"]), "olc:0.10<=20");
     let found = found.expect("an audit");
@@ -166,4 +172,59 @@ fn a_unit_that_is_only_stated_is_no_protection() {
         Plan { thresholds: vec![Threshold::parse("2.5").expect("a threshold")], ..plan(&["olc"]) };
     let found = audit(&prepared, Some(&hidden), plan, "olc:2.5<=20").expect("an audit");
     assert!(reason(&found).starts_with("unit: expected a usual distance"), "{}", reason(&found));
+}
+
+#[test]
+fn a_gate_that_names_no_attack_needs_the_best_of_each_kind() {
+    let points = prepared(&room());
+    let said = |gate: &str, plan: Plan<3>, described: bool| {
+        let values = (0..N * 8).map(|at| (at * 37 % 101) as u8).collect();
+        let descriptors = Descriptors::try_new(Values::U8(values), 8).expect("descriptors");
+        let job = Job {
+            plan,
+            descriptors: described.then_some(&descriptors),
+            gates: vec![Gate::parse(gate).expect("a gate")],
+            ..Job::of(&points.original, Instant::now())
+        };
+        let gate = maps::find(job).expect("an audit").document.gates.remove(0);
+        assert_eq!(gate.passed, gate.reason.is_none());
+        gate.reason.unwrap_or_default()
+    };
+    let alone = || plan(&["olc"]);
+    for gate in ["olc:0.25<=100", "olc@0.5:0.25<=100"] {
+        let said = said(gate, alone(), false);
+        assert_eq!(said, "records alone were not tried, and no attack is named");
+    }
+    assert_eq!(said("olc:joint:0.25<=100", alone(), false), "");
+    let both = || Plan { records_alone: true, ..alone() };
+    let best = "--neighbors descriptors, the best source, was not tried, and no attack is named";
+    assert_eq!(said("olc:0.25<=100", both(), true), best);
+    assert_eq!(said("olc:0.25<=100", both(), false), "");
+    assert_eq!(said("olc@0.5:0.25<=100", both(), true), "");
+    assert_eq!(said("olc:0.25<=100", Plan { inlier_ratios: vec![1.0], ..both() }, true), "");
+}
+
+/// Descriptors that change slowly over the room, and the same in another order of rows.
+#[test]
+fn descriptors_in_another_order_are_doubted() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    let points = room();
+    let text: String = points.iter().map(|[x, y, z]| format!("{x} {y} {z}\n")).collect();
+    std::fs::write(at("map.xyz"), text).expect("written");
+    let doubts = |order: fn(usize) -> usize| {
+        let row = |at: usize| points[order(at)].map(|x| (40.0 * x).clamp(0.0, 250.0) as u8);
+        let header = format!("{{'descr': '|u1', 'fortran_order': False, 'shape': ({N}, 3), }}");
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend(118_u16.to_le_bytes());
+        bytes.extend(format!("{header:117}\n").into_bytes());
+        (0..N).for_each(|at| bytes.extend(row(at)));
+        std::fs::write(at("d.npy"), bytes).expect("written");
+        let preparation = Preparation { scale: Some(1.0), k: 20, ..Preparation::default() };
+        let map = maps::open(&at("map.xyz"), Some(&at("d.npy")), &preparation);
+        map.expect("a map").1.doubts
+    };
+    assert!(doubts(|at| at).is_empty());
+    let found = doubts(|at| at * 7 % N);
+    assert!(found[0].ends_with("of another map, or in another order of rows?"), "{found:?}");
 }

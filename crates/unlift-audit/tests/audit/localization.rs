@@ -13,7 +13,8 @@ use unlift::obfuscate::{Change, Changed, Mitigation};
 use unlift::recover::Builtin;
 use unlift::seed::{Draws, Stage};
 use unlift_audit::localization::Localize;
-use unlift_audit::{Audited, Gate, Job, Preparation, Prepared, maps};
+use unlift_audit::localization::held_out::Held;
+use unlift_audit::{Audited, Gate, Job, Preparation, Prepared, Quiet, maps};
 use unlift_io::features::{FeatureWriter, ImageFeatures};
 use unlift_report::document::Localization;
 
@@ -184,6 +185,19 @@ fn held_out_images_are_localized() {
     assert!(held_out("olc_bits1").matches < held_out("olc").matches);
     // The plane does not localize, so a gate on all schemes fails.
     assert!(!audited.document.gates[0].passed);
+}
+
+#[test]
+fn photos_of_another_size_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path());
+    let camera = "1 PINHOLE 1280 960 1000 1000 640 480\n";
+    std::fs::write(folder.path().join("cameras.txt"), camera).unwrap();
+    let (_, Prepared { cameras, original, .. }) = open(folder.path());
+    let features = folder.path().join("features.h5");
+    let error = Held::open(&features, 4, &cameras, &original, &Quiet).err().unwrap().to_string();
+    let expected = "expected 1280 x 960 pixels, as its camera in the model, found 640 x 480";
+    assert!(error.ends_with(expected), "{error}");
 }
 
 #[test]

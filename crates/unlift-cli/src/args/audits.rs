@@ -254,6 +254,10 @@ pub struct AuditMapArgs {
     pub path: PathBuf,
     #[command(flatten)]
     pub map: MapArgs,
+    /// Refuse a map whose longest side is not from LOW to HIGH meters, as with a wrong --scale
+    #[arg(long, value_name = "LOW..HIGH", value_parser = values::extent, requires = "scale",
+          help_heading = "Input")]
+    pub expect_extent: Option<(f64, f64)>,
     /// Run a small audit: the schemes olc (a random line through each point) and ppl (one line
     /// through two points), with the oracle at inlier ratio 0.5 and, if there are descriptors, the
     /// source similarity
@@ -284,10 +288,6 @@ pub struct AuditMapArgs {
     pub tile_points: Option<NonZeroUsize>,
     #[command(flatten)]
     pub paint: PaintArgs,
-    /// Paint with the colors of the points. Assumes that the obfuscated map keeps the colors of the
-    /// COLMAP model beside the descriptors. Only the network for SIFT uses them
-    #[arg(long, help_heading = "Result", requires = "invert")]
-    pub colors: bool,
     /// Compare pictures with at most N photos, evenly spaced by name
     #[arg(long, value_parser = values::count, value_name = "N", default_value = "12", help_heading = "Result")]
     pub max_images: NonZeroUsize,

@@ -11,9 +11,10 @@ use unlift::obfuscate::{Change, Changed, Mitigation, Protection, Scheme, SchemeO
 use unlift_audit::inversion::MapInversion;
 use unlift_audit::localization::Localize;
 use unlift_audit::maps::{Tiles, perform};
-use unlift_audit::{Job, Prepared, sources};
+use unlift_audit::{Job, Prepared, sides_m, sources};
 use unlift_io::hash::hash_file;
 use unlift_io::read;
+use unlift_report::document::Input;
 
 use super::audits::{
     self, kind, map_thresholds, neighbors, painter, protections, solvers, with_oracle,
@@ -34,14 +35,11 @@ const QUICK_SOURCE: &str = "similarity";
 pub fn run(args: &AuditMapArgs) -> anyhow::Result<Outcome> {
     let started = Instant::now();
     audits::perform(&args.audit, inputs(args), |out| {
-        let (input, prepared) =
-            open_map(&args.path, &args.map, args.audit.seed, args.colors, args.audit.quiet)?;
+        let (input, prepared) = open_map(&args.path, &args.map, args.audit.seed, args.audit.quiet)?;
         let progress = Progress::new(args.audit.quiet);
         let inversion = inversion(args, &prepared, &input, &progress)?;
+        check_extent(args, &prepared)?;
         let (mut notes, mut doubts) = (prepared.notes.clone(), prepared.doubts.clone());
-        if args.colors {
-            notes.push("pictures assume that the obfuscated map keeps the points' colors".into());
-        }
         let protections = protected_by(args, &prepared)?;
         let mut plan = plan(args, (&prepared, &input), &protections, (&mut notes, &mut doubts))?;
         plan.measures.extend(inversion.iter().map(|one| Arc::clone(one) as Arc<dyn Measure<3>>));
@@ -72,6 +70,19 @@ pub fn run(args: &AuditMapArgs) -> anyhow::Result<Outcome> {
     })
 }
 
+/// Returns an error if the map has another size than `--expect-extent`.
+fn check_extent(args: &AuditMapArgs, prepared: &Prepared) -> anyhow::Result<()> {
+    let extent_m = sides_m(prepared.original.reveal());
+    let (Some((low, high)), Some(sides)) = (args.expect_extent, extent_m) else { return Ok(()) };
+    if (low..=high).contains(&sides.into_iter().fold(0.0, f64::max)) {
+        return Ok(());
+    }
+    let input = Input { extent_m, scale_m_per_unit: args.map.scale, ..Input::default() };
+    let found = input.extent().unwrap_or_default();
+    let expected = format!("a longest side of {low} to {high} m");
+    Err(usage(format!("--expect-extent: expected {expected}, found {found}")))
+}
+
 /// Returns the painter of pictures, if requested.
 fn inversion(
     args: &AuditMapArgs,
@@ -93,10 +104,6 @@ fn inversion(
     };
     let kind = kind("--invert", Some(descriptors))?;
     let painter = painter(kind, args.paint.network())?;
-    if args.colors && !painter.takes_colors() {
-        let found = format!("those of {}", kind.name());
-        return Err(usage(format!("--colors: expected SIFT descriptors, found {found}")));
-    }
     let scale = 1.0 / prepared.unit_in_map_units;
     let max_images = args.max_images.get();
     Ok(Some(Arc::new(MapInversion::open(painter, model, photos, scale, max_images, progress)?)))
@@ -216,9 +223,6 @@ fn more_options(args: &AuditMapArgs) -> Map<String, Value> {
     if args.paint.invert.is_some() {
         options.insert("invert".into(), json!(true));
         options.insert("max_images".into(), json!(args.max_images.get()));
-        if args.colors {
-            options.insert("colors".into(), json!(true));
-        }
     }
     options
 }

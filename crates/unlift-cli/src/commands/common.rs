@@ -51,7 +51,6 @@ pub fn open_map(
     path: &Path,
     args: &MapArgs,
     seed: u64,
-    colors: bool,
     quiet: bool,
 ) -> anyhow::Result<(Input, Prepared)> {
     let _alive = Spinner::unless(quiet, "reading the map");
@@ -60,7 +59,7 @@ pub fn open_map(
         k: usize::from(args.k),
         max_points: args.max_points.map(NonZeroUsize::get),
         seed,
-        colors,
+        colors: false,
     };
     Ok(maps::open(path, args.descriptors.as_deref(), &preparation)?)
 }

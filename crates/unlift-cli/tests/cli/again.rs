@@ -77,3 +77,41 @@ fn what_is_gone_in_the_second_map_does_not_come_back() {
     let (_, stderr) = place.ends(audit, 0);
     assert!(stderr.contains("links by geometry only"), "{stderr}");
 }
+
+/// Every run of SfM chooses its own frame and scale.
+#[test]
+fn no_gate_holds_if_the_maps_are_in_other_frames_or_scales() {
+    let place = maps();
+    let text = place.text("a.csv");
+    let points: Vec<[f64; 3]> = text
+        .lines()
+        .skip(1)
+        .map(|line| {
+            let row: Vec<f64> = line.split(',').map(|x| x.parse().unwrap()).collect();
+            [row[0], row[1], row[2]]
+        })
+        .collect();
+    let audit = "audit again a.csv c.csv --scale 1 --schemes olc --no-records-alone --out a";
+    let gate = "--gate olc:again-geometry:0.10<=100";
+    let described = "--descriptors a.bin --descriptors a.bin";
+    for (change, expected) in [
+        (&(|p: [f64; 3]| p) as &dyn Fn([f64; 3]) -> [f64; 3], ""),
+        (
+            &|[x, y, z]| [-y, x + 2.0, z],
+            "after a turn of the first map by 90.0 degrees, a scale of 1.00 and",
+        ),
+        (
+            &|p| p.map(|x| 0.37 * x),
+            "after a turn of the first map by 0.0 degrees, a scale of 0.370 and",
+        ),
+    ] {
+        place.write_points("c.csv", &points.iter().map(|p| change(*p)).collect::<Vec<_>>());
+        let code = i32::from(!expected.is_empty());
+        let (text, stderr) = place.ends(&format!("{audit} {described} {gate}"), code);
+        assert!(text.contains(expected) && stderr.contains(expected), "{text} {stderr}");
+    }
+    let far: Vec<[f64; 3]> = points.iter().map(|p| p.map(|x| x + 20.0)).collect();
+    place.write_points("c.csv", &far);
+    let (text, _) = place.ends(&format!("{audit} {gate}"), 1);
+    assert!(text.contains("near 0 of 300 points of the first one"), "{text}");
+}

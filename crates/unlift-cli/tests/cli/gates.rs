@@ -67,7 +67,7 @@ fn no_gate_holds_on_a_scheme_that_the_map_does_not_allow() {
     place.write_points("flat.csv", &(0..400).map(spread).collect::<Vec<_>>());
     let audit =
         "audit map flat.csv --schemes olc,ppl+ --inlier-ratios 1,0.5 --no-records-alone --out a";
-    let gates = "--gate olc:1.0<=100 --gate ppl+:1.0<=100 --gate all@0.5:1.0<=100";
+    let gates = "--gate olc:oracle:1.0<=100 --gate ppl+:1.0<=100 --gate all@0.5:1.0<=100";
     let (text, _) = place.ends(&format!("{audit} {gates}"), 1);
     assert!(text.contains("gate ppl+:1.0<=100: FAILED, ppl+ was not audited: k:"), "{text}");
     let document = place.json("a/audit.json");

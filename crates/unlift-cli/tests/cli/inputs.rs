@@ -50,6 +50,13 @@ fn what_cannot_be_meant_is_refused_with_a_way_out() {
         ("room.csv --scale 1e-3", 2, "any guess would count as recovered", "another --scale"),
         ("room.csv --scale 1e5", 2, "no attack could come near", "another --scale"),
         ("room.csv --thresholds 1e9", 2, "unlift: --thresholds: expected a map larger", ""),
+        (
+            "room.csv --scale 1 --expect-extent 20..50",
+            2,
+            "a longest side of 20 to 50 m, found ",
+            "",
+        ),
+        ("room.csv --scale 1 --expect-extent 9", 2, "expected LOW..HIGH in meters", ""),
         // The gate has a threshold in meters, but the audit has no scale.
         (
             "room.csv --gate olc:0.10<=20",

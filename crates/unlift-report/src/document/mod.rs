@@ -11,6 +11,8 @@ use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::words;
+
 /// The schema that this build writes and reads.
 pub const SCHEMA: u32 = 1;
 
@@ -79,12 +81,24 @@ pub struct Input {
     /// the median distance to the K-th nearest neighbor.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit_in_map_units: Option<f64>,
+    /// Sides of the box around all points but the outer 1 % of each axis, in meters, if lengths are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub extent_m: Option<[f64; 3]>,
     /// SHA-256 of further files that were read, by role (`descriptors`, `neighbors`).
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub other_sha256: IndexMap<String, String>,
     /// Counts of images; `None` for maps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub images: Option<ImageCounts>,
+}
+
+impl Input {
+    /// Returns the size of the map and the scale that it follows from.
+    pub fn extent(&self) -> Option<String> {
+        let sides = self.extent_m?.map(|side| format!("{} m", words::significant(side, 3)));
+        let scale = self.scale_m_per_unit.map(|scale| format!(" at --scale {scale}"));
+        Some(sides.join(" x ") + &scale.unwrap_or_default())
+    }
 }
 
 /// A scheme, or one source of neighborhoods for a scheme, that could not be audited.
@@ -474,8 +488,10 @@ impl Document {
                 round_floats(part);
             }
         }
-        if let Some(unit) = value.pointer_mut("/input/unit_in_map_units") {
-            round_floats(unit);
+        for field in ["unit_in_map_units", "extent_m"] {
+            if let Some(length) = value.pointer_mut(&format!("/input/{field}")) {
+                round_floats(length);
+            }
         }
         let mut text = serde_json::to_string_pretty(&value)?;
         text.push('\n');

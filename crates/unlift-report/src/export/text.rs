@@ -15,14 +15,16 @@ pub fn text_table(document: &Document) -> String {
     let thresholds = tables::thresholds(document);
     let headline = tables::headline_threshold(document).unwrap_or_default();
     let Verdict { banner, cards, .. } = verdict::verdict(document);
+    let extent = document.input.extent().map(|extent| format!(" ({extent})"));
+    let first = banner.headline + &extent.unwrap_or_default();
 
     if views::is_sequence(document) {
         let sentences = views::sequence_sentences(document).join("\n");
-        return format!("{}\n{sentences}\n\n{}", banner.headline, views::sequence_table(document));
+        return format!("{first}\n{sentences}\n\n{}", views::sequence_table(document));
     }
     if views::is_again(document) {
         let sentences = views::again_sentences(document).join("\n");
-        return format!("{}\n{sentences}\n\n{}", banner.headline, views::again_table(document));
+        return format!("{first}\n{sentences}\n\n{}", views::again_table(document));
     }
     let mut head = ["scheme", "neighbors by", "true", "solver"].map(str::to_owned).to_vec();
     head.extend(thresholds.iter().map(|typed| format!("{typed} {}", unit(document))));
@@ -47,7 +49,7 @@ pub fn text_table(document: &Document) -> String {
         }
         lines.extend(alone.map(|(_, cells)| cells));
     }
-    let mut text = format!("{}\n{}\n\n", banner.headline, banner.sentence);
+    let mut text = format!("{first}\n{}\n\n", banner.sentence);
     text.push_str(&align(&lines, &[0, 1, 3]));
     if thresholds.len() > 1 {
         text.push_str(&format!("blind, break-even: within {headline} {}\n", unit(document)));

@@ -253,9 +253,10 @@ fn subject(document: &Document) -> Subject {
     let unit = match (metric, input.scale_m_per_unit, input.unit_in_map_units) {
         (true, ..) if of == LengthUnit::Pixel => "Lengths are in pixels.".to_owned(),
         (true, Some(scale), _) => {
-            format!("Meters, by the declared scale of {scale} m per map unit.")
+            let extent = input.extent().map(|extent| extent + ". ").unwrap_or_default();
+            format!("{extent}Meters, by the declared scale of {scale} m per map unit.")
         }
-        (true, None, _) => "Meters.".to_owned(),
+        (true, None, _) => format!("{} Meters.", input.extent().unwrap_or_default()),
         (false, _, Some(unit)) => {
             format!("Here it is {} map units.", words::significant(unit, 4))
         }
