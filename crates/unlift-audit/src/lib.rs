@@ -53,7 +53,9 @@ mod tiles;
 
 pub use document::peak_bytes;
 pub use document::{evaluated, ordered, row};
-pub use doubts::{Checked, SaidOfLengths, check_scale, check_thresholds, sides_m};
+pub use doubts::{
+    Checked, SaidOfLengths, check_scale, check_thresholds, sides_m, unlike_neighbors,
+};
 pub use gate::{Candidate, Figure, Gate};
 pub use maps::Job;
 pub use outputs::{

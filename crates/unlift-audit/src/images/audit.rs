@@ -122,7 +122,8 @@ pub fn find(job: ImagesJob<'_>) -> Result<(Option<Audited>, Used), Error> {
         steps.say(&format!("note: {moved}"));
         notes.push(moved);
     }
-    let gates = gate_results(&job.gates, (&job.plan, false), &outcome.rows, &[], &doubts, &[])?;
+    let plan = (&job.plan, tally.described);
+    let gates = gate_results(&job.gates, plan, &outcome.rows, &[], &doubts, &[])?;
     let mut options = job.options;
     if let Some(inversion) = &job.inversion {
         options.insert("inverter_sha256".into(), inversion.sha256().into());

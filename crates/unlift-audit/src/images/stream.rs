@@ -36,6 +36,8 @@ pub struct Tally {
     pub unusable: usize,
     /// Keypoints that were moved to the edge of their image.
     n_moved: usize,
+    /// Whether any image has descriptors.
+    pub described: bool,
     /// The part of the declared sizes that keypoints of any image fill, as a box in `[0, 1]`.
     filled: Option<Bounds<2>>,
 }
@@ -129,8 +131,8 @@ impl Needs {
     }
 }
 
-/// An image, its hash if it is in memory, and the number of its moved keypoints.
-type Ready = (Item<2>, Option<String>, usize);
+/// An image, its hash if it is in memory, the number of its moved keypoints, and whether it has descriptors.
+type Ready = (Item<2>, Option<String>, usize, bool);
 
 /// The images `chosen` of a source. Memory depends on the number of threads, not of images.
 pub struct Stream<'a> {
@@ -172,6 +174,7 @@ impl<'a> Stream<'a> {
                     let mut tally = self.tally.borrow_mut();
                     tally.fill(&image.0.original);
                     tally.n_moved += image.2;
+                    tally.described |= image.3;
                     drop(tally);
                     self.ready.push_back((at, Ok(image)));
                 }
@@ -195,7 +198,7 @@ impl Iterator for Stream<'_> {
             self.read_ahead();
         }
         let (at, ready) = self.ready.pop_front()?;
-        let (image, sha256, _) = match ready {
+        let (image, sha256, ..) = match ready {
             Ok(ready) => ready,
             Err(error) => return Some(Err(error)),
         };
@@ -243,8 +246,9 @@ fn image(
     let points = PointSet::try_new(keypoints, Unit::Pixel).map_err(of_image)?;
     let original = Original::within(points, bounds).map_err(of_image)?;
     // Descriptors use most of the memory of an image.
+    let described = features.descriptors.is_some();
     let descriptors = features.descriptors.filter(|_| needs.descriptors() || needs.whatever);
-    Ok((Item { name: features.name, original, descriptors }, sha256, n_moved))
+    Ok((Item { name: features.name, original, descriptors }, sha256, n_moved, described))
 }
 
 /// Returns what was expected of these features and what was found; `None` if nothing is missing. An

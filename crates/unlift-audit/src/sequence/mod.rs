@@ -121,6 +121,8 @@ pub fn perform(mut job: SequenceJob<'_>, out: OutputSet) -> Result<(Finished, Us
         let found = views.len().to_string();
         return Err(unlift_io::Error::new(job.path, "", expected, found).into());
     }
+    let wrong = |(expected, found)| unlift_io::Error::new(job.path, "", expected, found);
+    alike(&views, model.n_points()).map_err(wrong)?;
     let mut notes = Vec::new();
     let n_left_out: usize = views.iter().map(|view| view.n_left_out).sum();
     if n_left_out > 0 {
@@ -151,6 +153,23 @@ pub fn perform(mut job: SequenceJob<'_>, out: OutputSet) -> Result<(Finished, Us
     let drawn = RenderOptions { inversions, ..RenderOptions::default() };
     let audited = Audited { document, scene: None, drawn };
     Ok((audited.write(out, &job.out, job.share_safe)?, used))
+}
+
+/// Returns what was expected and found if keypoints that show one point have descriptors that are not alike.
+fn alike(views: &[View], n_points: usize) -> Result<(), (String, String)> {
+    let dim = views.first().map_or(0, |view| view.descriptors.dim());
+    let mut alike = read::Alike::new(n_points, dim);
+    for view in views.iter().filter(|view| view.descriptors.dim() == dim) {
+        let (mut points, mut rows, mut row) = (Vec::new(), Vec::new(), vec![0.0; dim]);
+        for (at, point) in view.shows.iter().enumerate() {
+            let Some(point) = point else { continue };
+            view.descriptors.read_row(at, &mut row);
+            points.push(*point as usize);
+            rows.extend(row.iter().map(|&x| f64::from(x)));
+        }
+        alike.add(&points, &rows)?;
+    }
+    alike.check()
 }
 
 /// Names the sources of the rows, for gates.

@@ -97,6 +97,11 @@ impl Model {
         Ok(Self { lenses, images, positions: points.positions, shown })
     }
 
+    /// Returns the number of points.
+    pub fn n_points(&self) -> usize {
+        self.positions.len()
+    }
+
     /// Returns the views of all images that are in the model and in `source`, in the order of their
     /// names, and an error for each that cannot be used. `path` names the source in errors.
     pub fn views(

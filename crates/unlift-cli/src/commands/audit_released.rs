@@ -8,7 +8,7 @@ use unlift::audit::{Plan, scheme_called};
 use unlift::released::Released;
 use unlift::truth::Secret;
 use unlift_audit::maps::{self, perform};
-use unlift_audit::{Job, Prepared, ordered};
+use unlift_audit::{Job, Prepared, ordered, unlike_neighbors};
 use unlift_io::hash::{hash_file, hash_files};
 use unlift_io::read::{self, Input as Points};
 use unlift_io::stage::{has_images, read_released, read_truth, scheme_name};
@@ -32,7 +32,7 @@ pub fn run(args: &AuditReleasedArgs) -> anyhow::Result<Outcome> {
         let (prepared, hidden) = open(args)?;
         let progress = Progress::new(args.audit.quiet);
         let mut notes = prepared.notes.clone();
-        let mut doubts = Vec::new();
+        let mut doubts = prepared.doubts.clone();
         let plan = plan(args, &name, &prepared, &hidden.0, (&mut notes, &mut doubts))?;
         let job = Job {
             hidden: Some(&hidden),
@@ -89,8 +89,21 @@ fn open(args: &AuditReleasedArgs) -> anyhow::Result<(Prepared, (Released<3>, Sec
     let secret = secret.of_map(Some(released.fingerprint()), slots);
     let secret = secret.map_err(|error| unlift_io::Error::core(&args.truth, error))?;
     let notes = released.descriptors().and_then(maps::zeros).into_iter().collect();
-    let prepared = Prepared { notes, ..Prepared::of(original) };
+    let mut prepared = Prepared { notes, ..Prepared::of(original) };
+    if let (Some(rows), Some(order)) = (released.descriptors(), rows_of_originals(&secret)) {
+        let points = prepared.original.reveal();
+        prepared.doubts.extend(unlike_neighbors(points, &rows.select(&order))?);
+    }
     Ok((prepared, (released, secret)))
+}
+
+/// Returns the descriptor row of every original, if all are hidden.
+fn rows_of_originals(secret: &Secret) -> Option<Vec<u32>> {
+    let mut rows = vec![None; secret.n_originals()];
+    for (slot, &row) in secret.descriptor_row().iter().enumerate() {
+        rows[secret.hidden()[slot].index()] = Some(row);
+    }
+    rows.into_iter().collect()
 }
 
 /// Returns the released map with the descriptors of `--descriptors`, if given.

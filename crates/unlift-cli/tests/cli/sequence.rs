@@ -5,7 +5,7 @@ use std::fs;
 
 use unlift::Descriptors;
 use unlift::descriptors::Values;
-use unlift_io::features::{FeatureWriter, ImageFeatures};
+use unlift_io::features::{FeatureSource, FeatureWriter, ImageFeatures};
 
 use crate::common::Place;
 
@@ -65,6 +65,23 @@ fn walk() -> Place {
     fs::write(place.path("model/images.txt"), images).unwrap();
     fs::write(place.path("model/cameras.txt"), "1 SIMPLE_PINHOLE 640 480 500 320 240\n").unwrap();
     place
+}
+
+#[test]
+fn features_in_another_order_are_refused() {
+    let place = walk();
+    let source = FeatureSource::open(&place.path("f.h5")).unwrap();
+    let mut writer = FeatureWriter::create(&place.path("g.h5")).unwrap();
+    for at in 0..source.names().len() {
+        let mut image = source.get(at).unwrap();
+        let n = image.keypoints.len() as u32;
+        let rows: Vec<u32> = (0..n).map(|row| (row + 17 * at as u32) % n).collect();
+        image.descriptors = image.descriptors.map(|all| all.select(&rows));
+        writer.append(&image).unwrap();
+    }
+    writer.finish().unwrap();
+    let stderr = place.complains("audit sequence model g.h5", 3);
+    assert!(stderr.contains("g.h5: expected descriptors of the model's keypoints"), "{stderr}");
 }
 
 #[test]

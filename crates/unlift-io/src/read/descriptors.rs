@@ -224,7 +224,6 @@ fn mean(
     stored: impl Fn(&Image) -> Result<Stored, Error>,
 ) -> Result<Descriptors, Error> {
     let (mut layout, mut alike) = (None, Alike::default());
-    let mut sums: Vec<f64> = Vec::new();
     for seen in observations.chunk_by(|a, b| a.0 == b.0) {
         let id = seen[0].0;
         let Ok(image) = images.binary_search_by_key(&id, |image| image.id) else {
@@ -246,7 +245,9 @@ fn mean(
             let expected = format!("{usual_dim} {usual_kind} each, as in other images");
             return wrong(expected, format!("{dim} {kind}"));
         }
-        sums.resize(input.ids.len() * dim, 0.0);
+        if alike.dim == 0 {
+            alike = Alike::new(input.ids.len(), dim);
+        }
         let mut rows: Vec<f64> = Vec::with_capacity(seen.len() * dim);
         for &(_, index, _) in seen {
             let index = index as usize;
@@ -260,20 +261,13 @@ fn mean(
                 Values::F32(values) => rows.extend(values[row].iter().map(|&x| f64::from(x))),
             }
         }
-        let of_image = Alike::of(seen, &rows, &sums, dim);
-        if of_image.is_below(LEAST_ALIKE_IN_IMAGE) {
-            let (expected, found) = of_image.wrong();
+        let points: Vec<usize> = seen.iter().map(|&(.., out)| out).collect();
+        if let Err((expected, found)) = alike.add(&points, &rows) {
             return wrong(expected, found);
         }
-        (alike.told, alike.n) = (alike.told + of_image.told, alike.n + of_image.n);
-        for (&(.., out), row) in seen.iter().zip(rows.chunks(dim)) {
-            sums[out * dim..][..dim].iter_mut().zip(row).for_each(|(sum, x)| *sum += x);
-        }
     }
-    if alike.is_below(LEAST_ALIKE) {
-        let (expected, found) = alike.wrong();
-        return Err(Error::new(path, "", expected, found));
-    }
+    alike.check().map_err(|(expected, found)| Error::new(path, "", expected, found))?;
+    let mut sums = alike.sums;
     let (kind, dim) = layout.unwrap_or(("bytes", 1));
     let values = if kind == "bytes" {
         normalize(&mut sums, dim, BYTE_NORM);
@@ -287,54 +281,80 @@ fn mean(
     Descriptors::try_new(values, dim).map_err(|e| Error::core(path, e))
 }
 
-/// How often a descriptor is more like its own point in other images than like another point.
+/// Counts how often a descriptor is more like its own point in earlier images than like another point.
 #[derive(Default)]
-struct Alike {
+pub struct Alike {
+    dim: usize,
+    /// Sum of the descriptors of each point.
+    sums: Vec<f64>,
     told: f64,
     n: usize,
 }
 
 /// Least share of descriptors, of all images and of one, that are more like their own point.
 /// Features of the model have 0.99 or more, those of another run or order 0.5 to 0.65 (the test below).
-const LEAST_ALIKE: f64 = 0.85;
+const LEAST_ALIKE: f64 = 0.8;
 const LEAST_ALIKE_IN_IMAGE: f64 = 0.7;
-
 /// Fewer comparisons say nothing.
 const FEWEST: usize = 30;
 
 impl Alike {
-    /// Compares the observations `seen` of an image, with descriptors `rows`, with the `sums` of earlier images. The other
-    /// point is one of the same image.
-    fn of(seen: &[Observation], rows: &[f64], sums: &[f64], dim: usize) -> Self {
-        let own = |out: usize| &sums[out * dim..][..dim];
-        let known = |at: &usize| own(seen[*at].2).iter().any(|&x| x != 0.0);
-        let known: Vec<usize> = (0..seen.len()).filter(known).collect();
-        let like = |at: usize, out: usize| {
-            let dot: f64 = own(out).iter().zip(&rows[at * dim..]).map(|(a, b)| a * b).sum();
-            dot / own(out).iter().map(|x| x * x).sum::<f64>().sqrt()
+    /// Creates the count of `n` points with descriptors of `dim` values.
+    pub fn new(n: usize, dim: usize) -> Self {
+        Self { dim, sums: vec![0.0; n * dim], ..Self::default() }
+    }
+
+    fn sum(&self, point: usize) -> &[f64] {
+        &self.sums[point * self.dim..][..self.dim]
+    }
+
+    /// Adds the descriptors `rows` of an image, which show `points`.
+    ///
+    /// # Errors
+    /// When too few are told apart from those of other points of the image: what was expected and found.
+    pub fn add(&mut self, points: &[usize], rows: &[f64]) -> Result<(), (String, String)> {
+        let known = |at: &usize| self.sum(points[*at]).iter().any(|&x| x != 0.0);
+        let known: Vec<usize> = (0..points.len()).filter(known).collect();
+        let like = |at: usize, point: usize| {
+            let sum = self.sum(point);
+            let dot: f64 = sum.iter().zip(&rows[at * self.dim..]).map(|(a, b)| a * b).sum();
+            dot / sum.iter().map(|x| x * x).sum::<f64>().sqrt()
         };
-        let mut found = Self::default();
+        let (mut told, mut n) = (0.0, 0);
         for (rank, &at) in known.iter().enumerate() {
-            let other = seen[known[(rank + known.len() / 2) % known.len()]].2;
-            if other != seen[at].2 {
-                let (of_own, of_other) = (like(at, seen[at].2), like(at, other));
-                found.told += if of_own == of_other { 0.5 } else { f64::from(of_own > of_other) };
-                found.n += 1;
+            let other = points[known[(rank + known.len() / 2) % known.len()]];
+            if other != points[at] {
+                let (of_own, of_other) = (like(at, points[at]), like(at, other));
+                told += if of_own == of_other { 0.5 } else { f64::from(of_own > of_other) };
+                n += 1;
             }
         }
-        found
+        check(told, n, LEAST_ALIKE_IN_IMAGE)?;
+        (self.told, self.n) = (self.told + told, self.n + n);
+        for (&point, row) in points.iter().zip(rows.chunks(self.dim)) {
+            let sum = &mut self.sums[point * self.dim..][..self.dim];
+            sum.iter_mut().zip(row).for_each(|(sum, x)| *sum += x);
+        }
+        Ok(())
     }
 
-    /// Returns true if the share is smaller than `least`, beyond chance.
-    fn is_below(&self, least: f64) -> bool {
-        let n = self.n.max(1) as f64;
-        self.n >= FEWEST && self.told / n + 1.5 / n.sqrt() < least
+    /// Checks the share of all images.
+    ///
+    /// # Errors
+    /// As [`add`](Self::add).
+    pub fn check(&self) -> Result<(), (String, String)> {
+        check(self.told, self.n, LEAST_ALIKE)
     }
+}
 
-    fn wrong(&self) -> (String, String) {
-        let expected = "descriptors of the model's keypoints, more like their own point in other images than like another one".to_owned();
-        (expected, format!("{} of {} that are", self.told, self.n))
+/// Returns an error if the share is smaller than `least`, beyond chance.
+fn check(told: f64, n: usize, least: f64) -> Result<(), (String, String)> {
+    let root = (n.max(1) as f64).sqrt();
+    if n < FEWEST || told / n as f64 + 1.5 / root >= least {
+        return Ok(());
     }
+    let expected = "descriptors of the model's keypoints, more like their own point in other images than like another one";
+    Err((expected.to_owned(), format!("{told} of {n} that are")))
 }
 
 /// Scales every row to an L2 norm, so that a sum equals a mean.

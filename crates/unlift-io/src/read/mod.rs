@@ -17,7 +17,7 @@ mod table;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-pub use descriptors::descriptors;
+pub use descriptors::{Alike, descriptors};
 pub use map_input::Input;
 
 use crate::error::Error;
