@@ -1,5 +1,7 @@
 //! Points for tests, and their distances to records.
 
+use unlift::geometry::frame::Bounds;
+use unlift::geometry::vector::{along, distance, dot, sub, widen};
 use unlift::released::Obfuscation;
 use unlift::seed::{Draws, Stage};
 
@@ -51,6 +53,20 @@ pub fn piles<const D: usize>(
         .collect()
 }
 
+/// Returns image bounds around `points`, in whole units of `step`.
+pub fn image_around<const D: usize>(points: &[[f64; D]], step: f64) -> Bounds<D> {
+    if points.is_empty() {
+        return Bounds { low: [0.0; D], high: [step; D] };
+    }
+    let column = |c: usize| points.iter().map(move |p| p[c]);
+    let low = |c: usize| column(c).fold(f64::INFINITY, f64::min);
+    let high = |c: usize| column(c).fold(f64::NEG_INFINITY, f64::max);
+    Bounds {
+        low: std::array::from_fn(|c| ((low(c) / step).floor() - 1.0) * step),
+        high: std::array::from_fn(|c| ((high(c) / step).ceil() + 1.0) * step),
+    }
+}
+
 /// Returns the distance of `point` to the feasible set of `record`.
 pub fn distance_to_record<const D: usize>(
     obfuscation: &Obfuscation<D>,
@@ -58,11 +74,9 @@ pub fn distance_to_record<const D: usize>(
     point: &[f64; D],
 ) -> f64 {
     let from_line = |through: &[f32; D], direction: &[f32; D], floor: f64| {
-        let offset: [f64; D] = std::array::from_fn(|c| point[c] - f64::from(through[c]));
-        let direction = direction.map(f64::from);
-        let t = (dot(&offset, &direction) / dot(&direction, &direction)).max(floor);
-        let miss: [f64; D] = std::array::from_fn(|c| offset[c] - t * direction[c]);
-        dot(&miss, &miss).sqrt()
+        let (through, direction) = (widen(through), widen(direction));
+        let t = dot(&sub(point, &through), &direction) / dot(&direction, &direction);
+        distance(point, &along(&through, t.max(floor), &direction))
     };
     match obfuscation {
         Obfuscation::Lines(lines) => {
@@ -77,22 +91,11 @@ pub fn distance_to_record<const D: usize>(
             (point[axis] - f64::from(planes.offset()[record])).abs()
         }
         Obfuscation::AxisCandidates(candidates) => {
-            let published = candidates.position()[record];
-            let off: [f64; D] = std::array::from_fn(|c| point[c] - f64::from(published[c]));
+            let off = sub(point, &widen(&candidates.position()[record]));
             let along = |axis: usize| {
                 (0..D).filter(|&c| c != axis).map(|c| off[c] * off[c]).sum::<f64>().sqrt()
             };
             (0..D).map(along).fold(f64::INFINITY, f64::min)
         }
     }
-}
-
-/// Returns the inner product.
-pub fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
-}
-
-/// Returns the Euclidean length.
-pub fn norm<const D: usize>(a: &[f64; D]) -> f64 {
-    dot(a, a).sqrt()
 }

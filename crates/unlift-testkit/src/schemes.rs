@@ -2,14 +2,14 @@
 
 use std::collections::BTreeSet;
 
-use unlift::geometry::frame::Bounds;
+use unlift::geometry::vector::sub;
 use unlift::obfuscate::{Scheme, obfuscate};
 use unlift::released::Released;
 use unlift::seed::Key;
 use unlift::truth::{Original, Secret};
 use unlift::{Error, PointSet, Unit};
 
-use crate::points::{distance_to_record, piles, room, uniform};
+use crate::{check_name, distance_to_record, image_around, on_threads, piles, room, uniform};
 
 /// Records are stored in `f32`: a few units in the last place of the largest coordinate, in meters.
 const TOLERANCE: f64 = 4e-6;
@@ -32,8 +32,7 @@ const MOST_IN_PLACE: f64 = 0.05;
 /// When a property does not hold.
 pub fn scheme_laws<const D: usize>(scheme: &dyn Scheme<D>) {
     let name = scheme.name();
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-+_.".contains(c);
-    assert!(!name.is_empty() && name.chars().all(is_plain), "{name:?} is not a plain name");
+    check_name(name);
     for n in [0, 1, 2, 3, 7] {
         accounts_for_all(scheme, &uniform(9, n));
         accounts_for_all(scheme, &piles(9, 1, n, 0.0));
@@ -56,23 +55,11 @@ fn hide<const D: usize>(
 ) -> Result<(Original<D>, Released<D>, Secret), Error> {
     let set = PointSet::try_new(points.to_vec(), Unit::Meter)?;
     let original = match D {
-        2 => Original::within(set, image(points))?,
+        2 => Original::within(set, image_around(points, 1.0))?,
         _ => Original::new(set),
     };
     let (released, secret) = obfuscate(scheme, &original, None, &Key::from_seed(seed))?;
     Ok((original, released, secret))
-}
-
-/// Returns image bounds around `points`, in whole units.
-fn image<const D: usize>(points: &[[f64; D]]) -> Bounds<D> {
-    if points.is_empty() {
-        return Bounds { low: [0.0; D], high: [1.0; D] };
-    }
-    let column = |c: usize| points.iter().map(move |p| p[c]);
-    Bounds {
-        low: std::array::from_fn(|c| column(c).fold(f64::INFINITY, f64::min).floor() - 1.0),
-        high: std::array::from_fn(|c| column(c).fold(f64::NEG_INFINITY, f64::max).ceil() + 1.0),
-    }
 }
 
 fn accounts_for_all<const D: usize>(scheme: &dyn Scheme<D>, points: &[[f64; D]]) {
@@ -100,8 +87,8 @@ fn points_lie_on_their_records<const D: usize>(
     }
     for (slot, id) in secret.hidden().iter().enumerate() {
         let point = original.reveal().positions()[id.index()];
-        let local: [f64; D] = std::array::from_fn(|c| point[c] - released.origin()[c]);
         let record = slot / released.slots_per_record();
+        let local = sub(&point, &released.origin());
         let off = distance_to_record(released.obfuscation(), record, &local);
         assert!(off <= tolerance, "{name}: the point of slot {slot} is {off} off its record");
     }
@@ -110,8 +97,8 @@ fn points_lie_on_their_records<const D: usize>(
 fn keys_decide_alone<const D: usize>(scheme: &dyn Scheme<D>) {
     let points = room(11, 700);
     let on = |threads: usize, seed: u64| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        let (_, released, secret) = pool.install(|| hide(scheme, &points, seed)).expect("a room");
+        let hidden = on_threads(threads, || hide(scheme, &points, seed));
+        let (_, released, secret) = hidden.expect("a room");
         (released, secret)
     };
     let (name, one) = (scheme.name(), on(1, 7));

@@ -4,6 +4,8 @@ use unlift::neighbors::Neighborhoods;
 use unlift::recover::{RecoverOptions, Recovered, Solver, recover};
 use unlift::released::Released;
 
+use crate::{check_name, on_threads};
+
 /// Checks all properties of a solver on a released map and its lists:
 ///
 /// 1. Its name is one plain word.
@@ -19,8 +21,7 @@ pub fn solver_laws<const D: usize>(
     lists: &Neighborhoods,
 ) {
     let name = solver.name();
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-+_.".contains(c);
-    assert!(!name.is_empty() && name.chars().all(is_plain), "{name:?} is not a plain name");
+    check_name(name);
     let recovered = on(1, solver, released, lists);
     assert_eq!(recovered.unit(), released.unit(), "{name}: wrong unit");
     assert_eq!(recovered.origin(), released.origin(), "{name}: wrong origin");
@@ -44,9 +45,8 @@ fn on<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
 ) -> Recovered<D> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     let options = RecoverOptions { seed: 1, ..RecoverOptions::default() };
-    let recovered = pool.install(|| recover(released, lists, solver, &options));
+    let recovered = on_threads(threads, || recover(released, lists, solver, &options));
     recovered.unwrap_or_else(|error| panic!("{} cannot recover the map: {error}", solver.name()))
 }
 

@@ -8,7 +8,7 @@ use unlift::seed::{Draws, Key, Stage};
 use unlift::truth::{Original, Secret};
 use unlift::{Descriptors, PointSet, Unit};
 
-use crate::points::room;
+use crate::{check_name, on_threads, room};
 
 /// Checks all properties of a source on a map that it supports:
 ///
@@ -24,8 +24,7 @@ use crate::points::room;
 /// When a property does not hold, or the source does not support the map.
 pub fn source_laws<const D: usize>(source: &dyn Source<D>, released: &Released<D>) {
     let name = source.name();
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-+_.".contains(c);
-    assert!(!name.is_empty() && name.chars().all(is_plain), "{name:?} is not a plain name");
+    check_name(name);
     assert!(source.k(released) > 0, "{name}: k is 0");
     if let Err(error) = source.supports(released) {
         panic!("{name} does not support this map: {error}");
@@ -48,8 +47,7 @@ fn on<const D: usize>(
     released: &Released<D>,
     k: usize,
 ) -> Neighborhoods {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-    let made = pool.install(|| source.lists(released, k, 1));
+    let made = on_threads(threads, || source.lists(released, k, 1));
     made.unwrap_or_else(|error| panic!("{} makes no lists: {error}", source.name()))
 }
 

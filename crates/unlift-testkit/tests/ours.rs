@@ -1,5 +1,7 @@
 //! Property tests of all built-in implementations, and of some with bugs.
 
+use std::sync::Arc;
+
 use unlift::descriptors::Values;
 use unlift::geometry::frame::Bounds;
 use unlift::neighbors::oracle::{TrueNeighbors, search};
@@ -28,26 +30,20 @@ fn our_schemes() {
 
 #[test]
 fn our_sources() {
-    let (_, released, _) = described_map(&Olc, 300);
-    for source in SOURCES.iter().filter_map(|entry| entry.of_dimension::<3>()) {
-        source_laws(&*source, &released);
-    }
-}
-
-fn protected(text: &str) -> Changed<3> {
     let mut draws = Draws::new(1, Stage::Shapes, 0);
     let bytes = (0..200 * 128).map(|_| draws.below(120) as u8).collect();
     let public = Descriptors::try_new(Values::U8(bytes), 128).unwrap();
-    let protection = Protection::parse(text).unwrap().with_public(&public).unwrap();
-    Changed::new(std::sync::Arc::new(Olc), Change::Protection(protection))
-}
-
-#[test]
-fn our_sources_on_protected_descriptors() {
-    for text in ["subspace:2:random", "subspace:4", "subspace:2:adversarial", "ldp:16,2,6"] {
-        let scheme = protected(text);
-        scheme_laws(&scheme);
-        let (_, released, _) = described_map(&scheme, 200);
+    let protected = ["subspace:2:random", "subspace:4", "subspace:2:adversarial", "ldp:16,2,6"];
+    for text in [None].into_iter().chain(protected.map(Some)) {
+        let (_, released, _) = match text {
+            None => described_map(&Olc, 300),
+            Some(text) => {
+                let protection = Protection::parse(text).unwrap().with_public(&public).unwrap();
+                let scheme = Changed::new(Arc::new(Olc), Change::Protection(protection));
+                scheme_laws(&scheme);
+                described_map(&scheme, 200)
+            }
+        };
         for source in SOURCES.iter().filter_map(|entry| entry.of_dimension::<3>()) {
             source_laws(&*source, &released);
         }
@@ -64,11 +60,12 @@ fn our_solvers() {
     }
 }
 
-/// A solver that returns results for half of the slots only.
+/// A solver, a scheme and a source with a bug each.
 #[derive(Debug)]
-struct Half;
+struct Wrong;
 
-impl Solver<3> for Half {
+/// It returns results for half of the slots only.
+impl Solver<3> for Wrong {
     fn name(&self) -> &str {
         "half"
     }
@@ -79,26 +76,14 @@ impl Solver<3> for Half {
         lists: &Neighborhoods,
         _: &RecoverOptions,
     ) -> Result<Recovered<3>, Error> {
-        let half = vec![[0.0; 3]; released.n_slots() / 2];
-        Recovered::from_positions(released, lists, &half)
+        Recovered::from_positions(released, lists, &vec![[0.0; 3]; released.n_slots() / 2])
     }
 }
 
-#[test]
-#[should_panic(expected = "positions: expected 300, one per slot, found 150")]
-fn a_solver_that_answers_for_some_slots_is_found_out() {
-    let (_, released, _) = described_map(&Olc, 300);
-    let lists = Neighborhoods::try_new(vec![0; 301], Vec::new(), None, 300, 1).unwrap();
-    solver_laws(&Half, &released, &lists);
-}
-
-/// A scheme that ignores the key: all lines have the same direction.
-#[derive(Debug)]
-struct Keyless;
-
-impl Scheme<3> for Keyless {
+/// Its lines pass 10 cm beside their points.
+impl Scheme<3> for Wrong {
     fn name(&self) -> &str {
-        "keyless"
+        "beside"
     }
 
     fn lift(
@@ -107,24 +92,14 @@ impl Scheme<3> for Keyless {
         _: Option<&Bounds<3>>,
         _: &Key,
     ) -> Result<Lifted<3>, Error> {
-        // 10 cm beside the point.
         let beside: Vec<[f64; 3]> = points.iter().map(|p| [p[0], p[1], p[2] + 0.1]).collect();
         let lines = Lines::through(&beside, &vec![[1.0, 0.0, 0.0]; points.len()])?;
         Ok(Lifted::one_each(Obfuscation::Lines(lines)))
     }
 }
 
-#[test]
-#[should_panic(expected = "off its record")]
-fn a_scheme_that_loses_its_points_is_found_out() {
-    scheme_laws(&Keyless);
-}
-
-/// A source whose lists state no map.
-#[derive(Debug)]
-struct Nameless;
-
-impl Source<3> for Nameless {
+/// Its lists state no map.
+impl Source<3> for Wrong {
     fn name(&self) -> &str {
         "nameless"
     }
@@ -144,8 +119,21 @@ impl Source<3> for Nameless {
 }
 
 #[test]
+#[should_panic(expected = "positions: expected 300, one per slot, found 150")]
+fn a_solver_that_answers_for_some_slots_is_found_out() {
+    let (_, released, _) = described_map(&Olc, 300);
+    let lists = Neighborhoods::try_new(vec![0; 301], Vec::new(), None, 300, 1).unwrap();
+    solver_laws(&Wrong, &released, &lists);
+}
+
+#[test]
+#[should_panic(expected = "off its record")]
+fn a_scheme_that_loses_its_points_is_found_out() {
+    scheme_laws(&Wrong);
+}
+
+#[test]
 #[should_panic(expected = "wrong map")]
 fn a_source_that_hides_its_map_is_found_out() {
-    let (_, released, _) = described_map(&Olc, 50);
-    source_laws(&Nameless, &released);
+    source_laws(&Wrong, &described_map(&Olc, 50).1);
 }

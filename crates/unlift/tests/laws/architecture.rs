@@ -116,6 +116,7 @@ fn files_can_be_read_in_one_sitting() {
     }
 }
 
+/// File names in comments and documents may omit leading folders.
 #[test]
 fn files_that_are_named_exist() {
     let root = Path::new(CORE).join("../..");
@@ -124,55 +125,29 @@ fn files_that_are_named_exist() {
     let from_root =
         |path: &PathBuf| path.strip_prefix(&root).unwrap().to_string_lossy().replace('\\', "/");
     let names: Vec<String> = files.iter().map(from_root).collect();
-    let read = |name: &&String| name.ends_with(".rs") || name.ends_with(".md");
-    let found: Vec<String> = names
-        .iter()
-        .filter(read)
-        .flat_map(|name| dangling(name, &fs::read_to_string(root.join(name)).unwrap(), &names))
-        .collect();
-    assert!(names.len() > 200 && found.is_empty(), "\n{}", found.join("\n"));
-}
-
-const ENDINGS: [&str; 4] = [".md", ".rs", ".py", ".svg"];
-
-/// Returns the comments of a Rust file, line by line, or all lines of any other file.
-fn prose<'a>(path: &str, text: &'a str) -> Vec<&'a str> {
-    let is_rust = path.ends_with(".rs");
-    let comment = |line: &'a str| {
-        // The slashes of a web address start no comment.
-        let mut starts = line.match_indices("//").filter(|&(at, _)| !line[..at].ends_with(':'));
-        starts.next().map_or("", |(at, _)| &line[at..])
+    let exists = |bare: &str| {
+        let folder = |file: &String| Some(file.strip_suffix(bare)?.to_owned());
+        names.iter().filter_map(folder).any(|at| at.is_empty() || at.ends_with('/'))
     };
-    text.lines().map(|line| if is_rust { comment(line) } else { line }).collect()
-}
-
-/// Returns the file names in `line`, without web addresses.
-fn named(line: &str) -> impl Iterator<Item = &str> {
     let of_path = |c: char| c.is_ascii_alphanumeric() || "_-./:".contains(c);
-    let runs = line.split(move |c| !of_path(c)).map(|run| run.trim_end_matches(['.', ':', '/']));
-    runs.filter(|run| {
-        let stem = ENDINGS.iter().find_map(|ending| run.strip_suffix(ending));
-        stem.is_some_and(|stem| !stem.is_empty() && !run.contains("://"))
-    })
-}
-
-/// Returns names in the prose of `path` that no file of the repository has, with their lines. A
-/// name may omit leading folders; `files` are paths from the root.
-fn dangling(path: &str, text: &str, files: &[String]) -> Vec<String> {
-    let exists = |name: &str| {
-        let mut bare = name;
-        while let Some(rest) = bare.strip_prefix("../").or_else(|| bare.strip_prefix("./")) {
-            bare = rest;
+    let endings = [".md", ".rs", ".py", ".svg"];
+    let mut missing = Vec::new();
+    for name in names.iter().filter(|name| name.ends_with(".rs") || name.ends_with(".md")) {
+        let text = fs::read_to_string(root.join(name)).unwrap();
+        for (at, line) in text.lines().enumerate() {
+            // The slashes of a web address start no comment.
+            let starts = |&(at, _): &(usize, &str)| !line[..at].ends_with(':');
+            let comment = line.match_indices("//").find(starts).map_or("", |(at, _)| &line[at..]);
+            let prose = if name.ends_with(".rs") { comment } else { line };
+            for run in prose.split(|c| !of_path(c)) {
+                let run = run.trim_end_matches(['.', ':', '/']);
+                let is_name = endings.iter().any(|&end| run.ends_with(end) && run != end);
+                let bare = run.trim_start_matches("../").trim_start_matches("./");
+                if is_name && !run.contains("://") && !exists(bare) {
+                    missing.push(format!("{name}:{}: there is no file {run}", at + 1));
+                }
+            }
         }
-        let is_it = |file: &String| {
-            file.strip_suffix(bare).is_some_and(|folder| folder.is_empty() || folder.ends_with('/'))
-        };
-        files.iter().any(is_it)
-    };
-    let lines = prose(path, text).into_iter().enumerate();
-    lines
-        .flat_map(|(at, line)| named(line).map(move |name| (at + 1, name)))
-        .filter(|(_, name)| !exists(name))
-        .map(|(at, name)| format!("{path}:{at}: there is no file {name}"))
-        .collect()
+    }
+    assert!(names.len() > 200 && missing.is_empty(), "\n{}", missing.join("\n"));
 }

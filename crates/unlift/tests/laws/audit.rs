@@ -1,50 +1,33 @@
 //! Tests of an audit: the strongest attack, two baselines, and parts that cannot be audited.
 
-use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 
-use unlift::audit::{Bound, NeighborsBy, Outcome, Plan, Row, Silent, run};
-use unlift::geometry::frame::Bounds;
-use unlift::neighbors::{Geometric, Neighborhoods};
-use unlift::obfuscate::{Lifted, Scheme, SchemeOptions, scheme};
-use unlift::recover::{Builtin, RecoverOptions, Recovered, Solver, Unknown};
-use unlift::released::{Lines, Obfuscation, Released};
-use unlift::seed::{Key, Stage};
-use unlift::truth::Original;
-use unlift::{Error, PointSet, Unit, synthetic};
+use unlift::audit::{Bound, NeighborsBy, break_even};
+use unlift::neighbors::Geometric;
+use unlift::obfuscate::Lifted;
 
-fn original(points: Vec<[f64; 3]>) -> Original<3> {
-    Original::new(PointSet::try_new(points, Unit::Meter).unwrap())
-}
+use crate::maps::{self, *};
+
+const OURS: [Builtin; 3] = [Builtin::Ranking, Builtin::Joint, Builtin::JointStart];
 
 fn room(n: usize) -> Original<3> {
     original(synthetic::room(3, n).points)
 }
 
-fn plan(schemes: &[&str]) -> Plan<3> {
-    let mut plan = Plan::new(Unit::Meter);
-    plan.schemes.retain(|scheme| schemes.contains(&scheme.name()));
-    plan.inlier_ratios = vec![0.5];
-    plan.k = 20;
-    plan
-}
-
-fn audit(original: &Original<3>, plan: &Plan<3>) -> Outcome {
-    run(original, None, plan, &mut Silent).unwrap()
+fn plan(schemes: &[&str], ratios: &[f64]) -> Plan<3> {
+    Plan { k: 20, ..maps::plan(Unit::Meter, schemes, ratios, &OURS) }
 }
 
 #[test]
 fn a_usual_audit_has_a_row_for_what_joint_recovery_starts_from() {
-    let (room, mut plan) = (room(900), plan(&["olc", "ppl", "ray", "cp"]));
-    plan.records_alone = false;
+    let (room, mut plan) = (room(900), plan(&["olc", "ppl", "ray", "cp"], &[0.5]));
+    plan.solvers = Plan::new(Unit::Meter).solvers;
     let usual = audit(&room, &plan);
     let solvers: Vec<&str> = usual.rows.iter().map(|row| &*row.solver).collect();
     assert_eq!(solvers, ["ranking", "joint", "joint-start"].repeat(4));
     // `joint-start` gives the same rows with and without `joint`, in either order.
-    for solvers in [
-        Builtin::list(&[Builtin::JointStart]),
-        Builtin::list(&[Builtin::JointStart, Builtin::Joint]),
-    ] {
-        plan.solvers = solvers;
+    for solvers in [&[Builtin::JointStart][..], &[Builtin::JointStart, Builtin::Joint]] {
+        plan.solvers = Builtin::list(solvers);
         for row in audit(&room, &plan).rows {
             assert!(usual.rows.contains(&row), "{} by {}", row.scheme, row.solver);
         }
@@ -60,8 +43,9 @@ fn a_usual_audit_has_a_row_for_what_joint_recovery_starts_from() {
 
 #[test]
 fn the_best_attack_on_the_records_alone_is_the_second_baseline() {
-    let (room, plan) = (room(3_000), plan(&["olc", "ppl", "plane", "cp"]));
-    let outcome = audit(&room, &plan);
+    let mut plan = plan(&["olc", "ppl", "plane", "cp"], &[0.5]);
+    plan.records_alone = true;
+    let outcome = audit(&room(3_000), &plan);
     assert!(outcome.seconds.records_alone > 0.0);
     for row in &outcome.rows {
         let best = |at: usize| row.best_alone(at).map(|(_, percent)| percent);
@@ -85,29 +69,35 @@ fn the_best_attack_on_the_records_alone_is_the_second_baseline() {
 
 #[test]
 fn break_even_takes_the_strongest_attack_at_every_ratio() {
-    let (room, mut plan) = (room(600), plan(&["olc", "cp"]));
-    (plan.records_alone, plan.inlier_ratios) = (false, vec![0.5, 0.1]);
+    let mut plan = plan(&["olc", "cp"], &[0.5, 0.1]);
     plan.solvers.push(Arc::new(Builtin::Ransac));
-    let outcome = audit(&room, &plan);
-    let mut rows = outcome.rows.clone();
+    let mut rows = audit(&room(600), &plan).rows;
     // Different solvers win at the two ratios.
-    for row in rows.iter_mut().filter(|row| row.scheme == "olc") {
-        row.recovered_percent[0] = match (&*row.solver, row.inlier_ratio) {
-            ("joint", 0.5) | ("ransac", 0.1) => 60.0,
-            _ => 40.0,
-        };
+    for row in &mut rows {
+        let wins = matches!((&*row.solver, row.inlier_ratio), ("joint", 0.5) | ("ransac", 0.1));
+        row.recovered_percent[0] = if wins { 60.0 } else { 40.0 };
+        row.blind_percent.fill(0.0);
     }
-    let found = unlift::audit::break_even(&plan, &rows);
-    let of =
-        |solver: &str| found.iter().find(|b| (&*b.scheme, &*b.solver) == ("olc", solver)).unwrap();
-    assert_eq!(of("strongest").inlier_ratio, 0.1, "half comes back at the lowest ratio");
-    assert!((of("joint").inlier_ratio - 0.3).abs() < 1e-12);
-    assert_eq!(found.len(), 2 * 5);
+    let of = |rows: &[Row], scheme: &str, solver: &str| {
+        let found = break_even(&plan, rows);
+        assert_eq!(found.len(), 2 * 5);
+        let it = found.iter().find(|b| (&*b.scheme, &*b.solver) == (scheme, solver)).unwrap();
+        (it.inlier_ratio, it.bound)
+    };
+    assert_eq!(of(&rows, "olc", "strongest").0, 0.1, "half comes back at the lowest ratio");
+    assert!((of(&rows, "olc", "joint").0 - 0.3).abs() < 1e-12);
+    // Regression: on a flat map the blind guess was better than every list, but break-even was "above".
+    for row in &mut rows {
+        (row.recovered_percent[0], row.blind_percent[0]) = (25.0, 96.0);
+    }
+    for scheme in ["olc", "cp"] {
+        assert_eq!(of(&rows, scheme, "strongest"), (0.1, Bound::BelowTested));
+        assert_eq!(of(&rows, scheme, "joint"), (0.5, Bound::AboveTested));
+    }
     plan.solvers = Builtin::list(&[Builtin::Joint]);
-    let mut by_joint = outcome.rows.clone();
-    by_joint.retain(|row| row.solver == "joint");
-    by_joint.iter_mut().for_each(|row| row.blind_percent.fill(0.0));
-    let alone = unlift::audit::break_even(&plan, &by_joint);
+    rows.retain(|row| row.solver == "joint");
+    rows.iter_mut().for_each(|row| row.blind_percent.fill(0.0));
+    let alone = break_even(&plan, &rows);
     assert!(alone.iter().all(|b| b.solver == "joint"), "one attack has no strongest");
 }
 
@@ -119,18 +109,15 @@ fn flat(n: usize) -> Original<3> {
 
 #[test]
 fn a_scheme_that_a_map_does_not_allow_is_told_and_the_audit_goes_on() {
-    let mut plan = Plan::new(Unit::Meter);
-    (plan.inlier_ratios, plan.records_alone) = (vec![1.0, 0.5], false);
+    let mut plan = maps::plan(Unit::Meter, &[], &[1.0, 0.5], &OURS);
     let outcome = audit(&flat(400), &plan);
-    let missing: Vec<&str> = outcome.not_audited.iter().map(|m| &*m.scheme).collect();
-    assert_eq!(missing, ["ppl+"], "{:?}", outcome.not_audited);
-    let told = &outcome.not_audited[0];
-    assert_eq!(told.neighbors, None, "the scheme itself");
-    assert!(told.reason.contains("ppl+ leaves out") && told.reason.contains("of 400"), "{told:?}");
-    assert!(outcome.rows.iter().all(|row| row.scheme != "ppl+"));
-    for scheme in plan.schemes.iter().filter(|scheme| scheme.name() != "ppl+") {
+    let [missing] = &outcome.not_audited[..] else { panic!("{:?}", outcome.not_audited) };
+    assert_eq!((&*missing.scheme, &missing.neighbors), ("ppl+", &None), "the scheme itself");
+    let reason = &missing.reason;
+    assert!(reason.contains("ppl+ leaves out") && reason.contains("of 400"), "{reason}");
+    for scheme in &plan.schemes {
         let n = outcome.rows.iter().filter(|row| row.scheme == scheme.name()).count();
-        assert_eq!(n, 6, "{}", scheme.name());
+        assert_eq!(n, if scheme.name() == "ppl+" { 0 } else { 6 }, "{}", scheme.name());
     }
     assert_eq!(outcome.rows.len(), outcome.seconds.rows.len());
 
@@ -143,74 +130,42 @@ fn a_scheme_that_a_map_does_not_allow_is_told_and_the_audit_goes_on() {
 
 #[test]
 fn a_source_without_lists_for_a_scheme_costs_its_rows_alone() {
-    let mut plan = plan(&["olc", "plane"]);
+    let mut plan = plan(&["olc", "plane"], &[0.5]);
     plan.neighbors.push(NeighborsBy::Source(Arc::new(Geometric)));
     plan.repeats = 2;
     let outcome = audit(&room(500), &plan);
-    let [missing] = outcome.not_audited.as_slice() else { panic!("{:?}", outcome.not_audited) };
+    let [missing] = &outcome.not_audited[..] else { panic!("{:?}", outcome.not_audited) };
     assert_eq!((&*missing.scheme, missing.neighbors.as_deref()), ("plane", Some("geometric")));
     assert!(missing.reason.ends_with("found planes"), "{}", missing.reason);
-    let of = |row: &Row| [&row.scheme, &row.neighbors, &row.solver].map(String::clone);
-    let rows: Vec<_> = outcome.rows.iter().map(of).collect();
-    let row = |scheme: &str, neighbors: &str, solver: &str| {
-        [scheme, neighbors, solver].map(str::to_owned)
-    };
-    let expected = [
-        row("olc", "oracle", "ranking"),
-        row("olc", "oracle", "joint"),
-        row("olc", "oracle", "joint-start"),
-        row("olc", "geometric", "ranking"),
-        row("olc", "geometric", "joint"),
-        row("olc", "geometric", "joint-start"),
-        row("plane", "oracle", "ranking"),
-        row("plane", "oracle", "joint"),
-        row("plane", "oracle", "joint-start"),
-    ];
-    assert_eq!(rows, expected);
+    let of = |row: &Row| format!("{} {} {}", row.scheme, row.neighbors, row.solver);
+    let expected = ["olc oracle", "olc geometric", "plane oracle"];
+    let expected = expected.iter().flat_map(|by| OURS.map(|of| format!("{by} {}", of.name())));
+    assert!(outcome.rows.iter().map(of).eq(expected));
 }
 
 #[test]
 fn a_map_too_small_for_wrong_neighbors_loses_these_rows_alone() {
-    let mut plan = plan(&["olc"]);
-    (plan.inlier_ratios, plan.k, plan.records_alone) = (vec![1.0, 0.1], 50, false);
+    let plan = Plan { k: 50, ..plan(&["olc"], &[1.0, 0.1]) };
     let outcome = audit(&room(60), &plan);
     assert!(outcome.rows.iter().all(|row| row.inlier_ratio == 1.0) && outcome.rows.len() == 3);
-    let [missing] = outcome.not_audited.as_slice() else { panic!("{:?}", outcome.not_audited) };
+    let [missing] = &outcome.not_audited[..] else { panic!("{:?}", outcome.not_audited) };
     assert_eq!((missing.inlier_ratio, missing.oracle_noise), (Some(0.1), Some("uniform")));
 }
 
-/// On a flat map the blind guess within a meter was better than every list, but break-even was
-/// reported as "above".
-#[test]
-fn what_needs_no_neighborhoods_counts_in_break_even() {
-    let mut plan = plan(&["ray", "cp"]);
-    (plan.records_alone, plan.inlier_ratios) = (false, vec![0.5, 0.1]);
-    plan.solvers = vec![Arc::new(Builtin::Joint)];
-    let mut rows = audit(&room(600), &plan).rows;
-    for row in &mut rows {
-        (row.recovered_percent[0], row.blind_percent[0]) = (25.0, 96.0);
-    }
-    let found = unlift::audit::break_even(&plan, &rows);
-    for scheme in ["ray", "cp"] {
-        let of = |solver: &str| {
-            let mut found = found.iter();
-            found.find(|b| b.scheme == scheme && b.solver == solver).unwrap()
-        };
-        assert_eq!(
-            (of("strongest").inlier_ratio, of("strongest").bound),
-            (0.1, Bound::BelowTested)
-        );
-        assert_eq!((of("joint").inlier_ratio, of("joint").bound), (0.5, Bound::AboveTested));
-    }
+/// A scheme with a bug.
+#[derive(Debug)]
+enum Wrong {
+    /// `olc` that reports the hidden points in another order.
+    Order,
+    /// Lines one meter beside their points.
+    Beside,
+    /// Other lines in every call.
+    Calls(AtomicU32),
 }
 
-/// `olc` with a bug: it reports the hidden points in the wrong order.
-#[derive(Debug)]
-struct Mistaken;
-
-impl Scheme<3> for Mistaken {
+impl Scheme<3> for Wrong {
     fn name(&self) -> &str {
-        "mistaken"
+        "wrong"
     }
 
     fn lift(
@@ -219,70 +174,40 @@ impl Scheme<3> for Mistaken {
         bounds: Option<&Bounds<3>>,
         key: &Key,
     ) -> Result<Lifted<3>, Error> {
-        let options = SchemeOptions::usual(Unit::Meter);
-        let olc = scheme("olc")?.of_dimension::<3>(&options).unwrap();
-        let mut lifted = olc.lift(points, bounds, key)?;
-        key.draws(Stage::Scheme, 1).shuffle(&mut lifted.hidden);
-        Ok(lifted)
-    }
-}
-
-/// Lines one meter beside their points, or different lines in every call if `off` is zero.
-#[derive(Debug, Default)]
-struct Beside {
-    off: f64,
-    calls: std::sync::atomic::AtomicU32,
-}
-
-impl Scheme<3> for Beside {
-    fn name(&self) -> &str {
-        "beside"
-    }
-
-    fn lift(
-        &self,
-        points: &[[f64; 3]],
-        _: Option<&Bounds<3>>,
-        _: &Key,
-    ) -> Result<Lifted<3>, Error> {
-        let call = self.calls.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-        let through: Vec<[f64; 3]> = points.iter().map(|p| [p[0], p[1] + self.off, p[2]]).collect();
-        let lines = Lines::through(&through, &vec![[1.0, 0.0, f64::from(call)]; points.len()])?;
+        let (off, turn) = match self {
+            Self::Order => {
+                let mut lifted = unlift::obfuscate::olc::Olc.lift(points, bounds, key)?;
+                key.draws(Stage::Scheme, 1).shuffle(&mut lifted.hidden);
+                return Ok(lifted);
+            }
+            Self::Beside => (1.0, 0),
+            Self::Calls(calls) => (0.0, calls.fetch_add(1, Ordering::Relaxed)),
+        };
+        let through: Vec<[f64; 3]> = points.iter().map(|p| [p[0], p[1] + off, p[2]]).collect();
+        let lines = Lines::through(&through, &vec![[1.0, 0.0, f64::from(turn)]; points.len()])?;
         Ok(Lifted::one_each(Obfuscation::Lines(lines)))
     }
 }
 
-/// Regression: almost nothing was recovered from such lines, so a gate held.
+/// Regression: almost nothing was recovered from such records, so a gate held.
 #[test]
 fn a_scheme_that_breaks_a_law_has_no_row() {
-    let room = room(600);
-    for (off, law) in
-        [(1.0, "on their own records, found 600 of 600"), (0.0, "the same for the same key")]
-    {
-        let mut plan = plan(&["olc"]);
-        plan.records_alone = false;
-        plan.schemes.push(Arc::new(Beside { off, ..Beside::default() }));
+    let room = room(900);
+    for (wrong, law) in [
+        (Wrong::Order, "points nearer to their own records"),
+        (Wrong::Beside, "on their own records, found 900 of 900"),
+        (Wrong::Calls(AtomicU32::new(0)), "the same for the same key"),
+    ] {
+        let mut plan = plan(&["olc"], &[0.5]);
+        plan.schemes.push(Arc::new(wrong));
         let outcome = audit(&room, &plan);
         assert!(outcome.rows.iter().all(|row| row.scheme == "olc"));
-        let missing = &outcome.not_audited[0];
-        assert!(missing.scheme == "beside" && missing.reason.contains(law), "{}", missing.reason);
+        let [missing] = &outcome.not_audited[..] else { panic!("{:?}", outcome.not_audited) };
+        assert!(missing.scheme == "wrong" && missing.reason.contains(law), "{}", missing.reason);
         plan.schemes.remove(0);
         let error = run(&room, None, &plan, &mut Silent).unwrap_err().to_string();
         assert!(error.contains(law), "{error}");
     }
-}
-
-/// Regression: almost nothing was recovered, so a gate held.
-#[test]
-fn a_scheme_whose_records_are_not_where_its_points_are_has_no_row() {
-    let (room, mut plan) = (room(900), plan(&["olc"]));
-    plan.records_alone = false;
-    plan.schemes.push(Arc::new(Mistaken));
-    let outcome = audit(&room, &plan);
-    assert!(outcome.rows.iter().all(|row| row.scheme == "olc"));
-    let [missing] = &outcome.not_audited[..] else { panic!("{:?}", outcome.not_audited) };
-    assert_eq!(missing.scheme, "mistaken");
-    assert!(missing.reason.contains("points nearer to their own records"), "{}", missing.reason);
 }
 
 /// A solver for lines only. It returns the foot of each line.
@@ -309,15 +234,14 @@ impl Solver<3> for AtFoot {
 
 #[test]
 fn a_solver_of_ones_own_has_rows_and_loses_those_that_it_fails_on() {
-    let mut plan = plan(&["olc", "plane"]);
-    plan.inlier_ratios = vec![0.5];
+    let mut plan = plan(&["olc", "plane"], &[0.5]);
     plan.solvers = vec![Arc::new(AtFoot("foot")), Arc::new(Builtin::Joint)];
     let outcome = audit(&room(400), &plan);
     let rows: Vec<[&str; 2]> =
         outcome.rows.iter().map(|row| [&*row.scheme, &*row.solver]).collect();
     assert_eq!(rows, [["olc", "foot"], ["olc", "joint"], ["plane", "joint"]]);
     assert_eq!(outcome.rows[0].sure_unknown, Some(Unknown::OtherSolver));
-    let [missing] = outcome.not_audited.as_slice() else { panic!("{:?}", outcome.not_audited) };
+    let [missing] = &outcome.not_audited[..] else { panic!("{:?}", outcome.not_audited) };
     assert_eq!((&*missing.scheme, missing.neighbors.as_deref()), ("plane", Some("oracle")));
     let expected = "solver foot: records: expected lines, found";
     assert!(missing.reason.starts_with(expected), "{}", missing.reason);

@@ -1,19 +1,10 @@
 //! Tests of audits of images: pooled rows, coincident keypoints, images with few keypoints.
 
-use std::sync::Arc;
-
-use unlift::audit::{
-    Item, NeighborsBy, Observer, Outcome, Plan, PointNeighbors, Row, Silent, Watcher, run_many,
-};
-use unlift::descriptors::Values;
-use unlift::geometry::frame::Bounds;
-use unlift::neighbors::oracle::Noise;
+use unlift::audit::{NeighborsBy, Observer, PointNeighbors, Watcher};
 use unlift::neighbors::sources::Named;
 use unlift::neighbors::{Overlap, Similarity};
-use unlift::recover::Builtin;
-use unlift::seed::{Draws, Stage};
-use unlift::truth::Original;
-use unlift::{Descriptors, Error, PointSet, Unit};
+
+use crate::maps::{self, *};
 
 const SIZE: [f64; 2] = [320.0, 240.0];
 
@@ -47,9 +38,7 @@ fn keypoints(seed: u64, n: usize, twins: u64) -> Vec<[f64; 2]> {
 }
 
 fn plan() -> Plan<2> {
-    let mut plan = Plan::new(Unit::Pixel);
-    plan.inlier_ratios = vec![1.0, 0.5];
-    plan
+    Plan { inlier_ratios: vec![1.0, 0.5], ..Plan::new(Unit::Pixel) }
 }
 
 fn run(images: &[Item<2>], plan: &Plan<2>) -> Outcome {
@@ -57,38 +46,43 @@ fn run(images: &[Item<2>], plan: &Plan<2>) -> Outcome {
     run_many(images, plan, &mut Silent).unwrap()
 }
 
-#[test]
-fn the_default_plan_takes_all_2d_schemes() {
-    let plan = Plan::<2>::new(Unit::Pixel);
-    let names: Vec<&str> = plan.schemes.iter().map(|s| s.name()).collect();
-    assert_eq!(names, ["lines2d", "cp2d", "dcl2d"]);
-    assert_eq!(Plan::<3>::new(Unit::Meter).schemes.len(), 7);
+/// Receives the rows of each image, and how far it was each time that the image told.
+#[derive(Default)]
+struct Each(Vec<(Vec<Row>, Heard)>);
+
+#[derive(Default)]
+struct Heard(Vec<(usize, usize)>);
+
+impl Observer<2> for Heard {
+    fn progress(&mut self, done: usize, total: usize, _: &str) {
+        self.0.push((done, total));
+    }
+}
+
+impl Watcher<2> for Each {
+    type OfItem = Heard;
+
+    fn begin(&mut self) -> Heard {
+        Heard::default()
+    }
+
+    fn item(&mut self, _: &str, rows: &[Row], heard: Heard) {
+        self.0.push((rows.to_vec(), heard));
+    }
 }
 
 /// The pooled row of one image equals its own row. That of two images lies between theirs.
 #[test]
 fn rows_are_pooled_over_keypoints() {
-    #[derive(Default)]
-    struct Each(Vec<Vec<Row>>);
-    impl Watcher<2> for Each {
-        type OfItem = Silent;
-
-        fn begin(&mut self) -> Silent {
-            Silent
-        }
-
-        fn item(&mut self, _: &str, rows: &[Row], _: Silent) {
-            self.0.push(rows.to_vec());
-        }
-    }
-    let mut plan = plan();
-    plan.repeats = 2;
+    let solvers = [Builtin::Joint, Builtin::JointStart];
+    let plan = maps::plan(Unit::Pixel, &[], &[1.0, 0.5], &solvers);
+    let plan = Plan { repeats: 2, ..plan };
     let images = [image_of("a", keypoints(1, 300, 20)), image_of("b", keypoints(2, 150, 0))];
     let mut each = Each::default();
     let all = images.iter().cloned().map(Ok::<_, Error>);
     let pooled = run_many(all, &plan, &mut each).unwrap().rows;
     for (at, row) in pooled.iter().enumerate() {
-        let [a, b] = [0, 1].map(|image: usize| &each.0[image][at]);
+        let [a, b] = [0, 1].map(|image: usize| &each.0[image].0[at]);
         assert_eq!(row.n_points, a.n_points + b.n_points);
         let (n, m) = (a.n_points as f64, b.n_points as f64);
         for c in 0..4 {
@@ -110,10 +104,7 @@ fn rows_are_pooled_over_keypoints() {
         rows.iter().map(|row| row.recovered_percent.clone()).collect()
     };
     assert_eq!(shares(&pooled), shares(&turned));
-    let on = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| run(&images, &plan).rows)
-    };
+    let on = |threads| on_threads(threads, || run(&images, &plan).rows);
     assert_eq!(on(1), on(3));
 }
 
@@ -121,10 +112,8 @@ fn rows_are_pooled_over_keypoints() {
 /// look protected.
 #[test]
 fn images_with_few_keypoints_are_attacked() {
-    let mut plan = plan();
-    plan.inlier_ratios = vec![1.0, 0.5, 0.1];
+    let mut plan = maps::plan(Unit::Pixel, &[], &[1.0, 0.5, 0.1], &Builtin::FROM_LISTS);
     plan.oracle_noise = Noise::ALL.to_vec();
-    plan.solvers = Builtin::list(&Builtin::FROM_LISTS);
     plan.neighbors.push(NeighborsBy::Source(Arc::new(Similarity)));
     for n in [4, 12, plan.k, plan.k + 3] {
         let outcome = run(&[image_of("few", keypoints(3, n, 0))], &plan);
@@ -145,55 +134,8 @@ fn images_with_few_keypoints_are_attacked() {
     }
 }
 
-/// An observer receives every row of every image when it is finished, not only when the next images
-/// begin.
-#[test]
-fn images_tell_how_far_they_are() {
-    #[derive(Default)]
-    struct Heard(Vec<(usize, usize)>);
-    impl Observer<2> for Heard {
-        fn progress(&mut self, done: usize, total: usize, _: &str) {
-            self.0.push((done, total));
-        }
-    }
-    #[derive(Default)]
-    struct All(Vec<Heard>);
-    impl Watcher<2> for All {
-        type OfItem = Heard;
-
-        fn begin(&mut self) -> Heard {
-            Heard::default()
-        }
-
-        fn item(&mut self, _: &str, _: &[Row], heard: Heard) {
-            self.0.push(heard);
-        }
-    }
-    let images = [
-        image_of("none", Vec::new()),
-        image_of("few", keypoints(1, 5, 0)),
-        image_of("some", keypoints(2, 150, 0)),
-    ];
-    let mut plan = plan();
-    plan.repeats = 2;
-    let mut all = All::default();
-    run_many(images.iter().cloned().map(Ok::<_, Error>), &plan, &mut all).unwrap();
-    let rows = plan.inlier_ratios.len() * plan.solvers.len() * plan.schemes.len() * 2;
-    for (image, Heard(heard)) in images.iter().zip(&all.0) {
-        let (last, total) = *heard.last().unwrap();
-        assert_eq!(last, total, "{}", image.name);
-        assert!(heard.is_sorted(), "{}: {heard:?}", image.name);
-        if !image.original.is_empty() {
-            let mut seen: Vec<usize> = heard.iter().map(|&(done, _)| done).collect();
-            seen.dedup();
-            assert_eq!(total, rows, "{}", image.name);
-            assert!(seen.len() > plan.inlier_ratios.len() * plan.schemes.len() * 2, "{seen:?}");
-        }
-    }
-}
-
 /// Images with no, one, two or few keypoints, all at one place or on one line: every keypoint is
-/// counted, if necessary as lost.
+/// counted, if necessary as lost. An observer receives every row of every image when it is finished, not only when the next images begin.
 #[test]
 fn images_with_hardly_any_keypoints_are_counted() {
     let line = |n: usize| (0..n).map(|i| [10.0 + 3.0 * i as f64, 50.0]).collect();
@@ -208,12 +150,21 @@ fn images_with_hardly_any_keypoints_are_counted() {
         image_of("one line", line(60)),
         image_of("enough", keypoints(5, 200, 20)),
     ];
-    let mut plan = plan();
-    plan.inlier_ratios = vec![1.0, 0.1];
-    plan.solvers = Builtin::list(&Builtin::FROM_LISTS);
+    let mut plan = maps::plan(Unit::Pixel, &[], &[1.0, 0.1], &Builtin::FROM_LISTS);
     plan.neighbors.push(NeighborsBy::Source(Arc::new(Similarity)));
     plan.neighbors.push(NeighborsBy::Source(Arc::new(Overlap)));
-    let outcome = run(&images, &plan);
+    let mut each = Each::default();
+    let all = images.iter().cloned().map(Ok::<_, Error>);
+    let outcome = run_many(all, &plan, &mut each).unwrap();
+    for (image, (_, Heard(heard))) in images.iter().zip(&each.0) {
+        let (last, total) = *heard.last().unwrap();
+        assert!(last == total && heard.is_sorted(), "{}: {heard:?}", image.name);
+        if image.original.len() > 2 {
+            assert_eq!(total, 3 * 4 * Builtin::FROM_LISTS.len(), "{}", image.name);
+            let seen: std::collections::BTreeSet<_> = heard.iter().collect();
+            assert!(seen.len() > 3 * 4, "{}: {seen:?}", image.name);
+        }
+    }
     assert_eq!((outcome.n_items, outcome.n_too_small), (9, 4));
     let n: usize = images.iter().map(|image| image.original.len()).sum();
     assert_eq!(outcome.rows.len(), 3 * 4 * Builtin::FROM_LISTS.len());
@@ -225,18 +176,6 @@ fn images_with_hardly_any_keypoints_are_counted() {
     }
     for image in &images {
         run(std::slice::from_ref(image), &plan);
-    }
-}
-
-/// Coincident keypoints agree exactly. This must not make delta collapse.
-#[test]
-fn twins_do_not_shrink_delta() {
-    for (name, twins) in [("lines2d", 0), ("lines2d", 35), ("cp2d", 0), ("cp2d", 35)] {
-        let mut plan = plan();
-        plan.schemes.retain(|scheme| scheme.name() == name);
-        let row = &run(&[image_of("twins", keypoints(6, 900, twins))], &plan).rows[1];
-        assert!((1.0..40.0).contains(&row.delta), "{name}, {twins} %: {}", row.delta);
-        assert!(row.recovered_percent[3] > 75.0, "{name}, {twins} %: {:?}", row.recovered_percent);
     }
 }
 

@@ -15,13 +15,11 @@ macro_rules! over_schemes {
     };
 }
 
-mod again;
+mod alone;
 mod architecture;
 mod audit;
 mod confidence;
 mod degenerate;
-mod density;
-mod exact;
 mod extremes;
 mod gauge;
 mod golden;
@@ -33,8 +31,7 @@ mod pins;
 mod ranking;
 mod records;
 mod recovery;
-mod released_again;
-mod secrets;
 mod shares;
 mod small_maps;
 mod sources;
+mod views;

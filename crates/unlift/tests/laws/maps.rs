@@ -1,35 +1,36 @@
-//! Maps, lists and bytes for property tests.
+//! Maps, lists, plans and bytes for all tests, and the names that most of them use.
 
-use proptest::prelude::ProptestConfig;
-use proptest::test_runner::RngSeed;
-use unlift::geometry::frame::Bounds;
-use unlift::neighbors::Neighborhoods;
-use unlift::neighbors::oracle::{self, TrueNeighbors};
-use unlift::obfuscate::{Entry, SchemeOptions, obfuscate};
-use unlift::recover::{Builtin, Delta, RecoverOptions, Recovered, recover};
-use unlift::released::{Obfuscation, Released};
-use unlift::seed::{Draws, Key, Stage};
-use unlift::truth::{Original, Secret};
-use unlift::{About, Error, PointSet, RecordId, RowOrder, Unit};
-pub use unlift_testkit::{distance_to_record, dot, norm, piles, room, uniform};
+pub use std::sync::Arc;
 
-const SEED: u64 = 25;
+pub use unlift::audit::{Item, Outcome, Plan, Row, Silent, run, run_many};
+pub use unlift::descriptors::Values;
+pub use unlift::evaluate::evaluate;
+pub use unlift::geometry::frame::Bounds;
+pub use unlift::geometry::knn::Knn;
+pub use unlift::geometry::vector::{along, distance, dot, median, sub, widen};
+pub use unlift::neighbors::Neighborhoods;
+pub use unlift::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
+pub use unlift::obfuscate::{Entry, Scheme, SchemeOptions, obfuscate};
+pub use unlift::recover::{
+    Builtin, Delta, RecoverOptions, Recovered, Solver, Status, Unknown, recover,
+};
+pub use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
+pub use unlift::seed::{Draws, Key, Stage};
+pub use unlift::truth::{Original, Secret};
+pub use unlift::{
+    About, Descriptors, Error, PointSet, RecordId, RowOrder, Unit, synthetic, synthetic::Shape,
+    synthetic::shape,
+};
+pub use unlift_testkit::{distance_to_record, image_around, on_threads, piles, room, uniform};
 
-/// Returns the configuration of property tests: `n` cases, equal in every run.
-///
-/// With `UNLIFT_RANDOM_TESTS=1` cases differ in every run; `PROPTEST_CASES` sets their number and
-/// `PROPTEST_RNG_SEED` their seed. A failure prints its arguments and writes no file.
-pub fn cases(n: u32) -> ProptestConfig {
-    let asked = ProptestConfig::default();
-    let is_set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
-    let of_asked = is_set("UNLIFT_RANDOM_TESTS") || is_set("PROPTEST_RNG_SEED");
-    ProptestConfig {
-        cases: if is_set("PROPTEST_CASES") { asked.cases } else { n },
-        rng_seed: if of_asked { asked.rng_seed } else { RngSeed::Fixed(SEED) },
-        failure_persistence: None,
-        max_shrink_iters: 0,
-        ..asked
-    }
+/// Returns `n` seeds, the same in every run. With `UNLIFT_RANDOM_TESTS=50`, 50 seeds that differ in every run; a failure prints them.
+pub fn seeds(n: usize) -> Vec<u64> {
+    let asked = std::env::var("UNLIFT_RANDOM_TESTS").ok().and_then(|n| n.parse().ok());
+    let now = std::time::UNIX_EPOCH.elapsed().unwrap().as_nanos() as u64;
+    let mut draws = Draws::new(if asked.is_some() { now } else { 25 }, Stage::Synthetic, 0);
+    let seeds = (0..asked.unwrap_or(n)).map(|_| draws.bits()).collect();
+    println!("seeds {seeds:?}");
+    seeds
 }
 
 /// A released map with its ground truth.
@@ -39,18 +40,19 @@ pub struct Hidden<const D: usize> {
     pub secret: Secret,
 }
 
-/// Returns image bounds around `points`, in whole voxels.
-fn image<const D: usize>(points: &[[f64; D]], voxel: f64) -> Bounds<D> {
-    let column = |c: usize| points.iter().map(move |p| p[c]);
-    let low = |c: usize| column(c).fold(f64::INFINITY, f64::min).min(f64::MAX);
-    let high = |c: usize| column(c).fold(f64::NEG_INFINITY, f64::max).max(f64::MIN);
-    if points.is_empty() {
-        return Bounds { low: [0.0; D], high: [voxel; D] };
-    }
-    Bounds {
-        low: std::array::from_fn(|c| ((low(c) / voxel).floor() - 1.0) * voxel),
-        high: std::array::from_fn(|c| ((high(c) / voxel).ceil() + 1.0) * voxel),
-    }
+/// Returns points in meters.
+pub fn original<const D: usize>(points: Vec<[f64; D]>) -> Original<D> {
+    Original::new(PointSet::try_new(points, Unit::Meter).unwrap())
+}
+
+/// Returns the entry of a scheme.
+pub fn entry(name: &str) -> &'static Entry {
+    unlift::obfuscate::scheme(name).unwrap()
+}
+
+/// Returns a source of the registry.
+pub fn source<const D: usize>(name: &str) -> Arc<dyn unlift::neighbors::Source<D>> {
+    unlift::neighbors::sources::Named::parse(name).unwrap().of_dimension().unwrap()
 }
 
 /// Hides `points` with voxels of size `voxel`. In 2D they are keypoints of an image.
@@ -62,7 +64,7 @@ pub fn try_hide<const D: usize>(
 ) -> Result<Hidden<D>, Error> {
     let set = PointSet::try_new(points.to_vec(), Unit::Meter)?;
     let original = match D {
-        2 => Original::within(set, image(points, voxel))?,
+        2 => Original::within(set, image_around(points, voxel))?,
         _ => Original::new(set),
     };
     let scheme = scheme.of_dimension(&SchemeOptions { voxel }).expect("defined there");
@@ -79,7 +81,7 @@ impl<const D: usize> Hidden<D> {
     /// Returns the original of `slot`, relative to the released origin.
     pub fn local(&self, slot: usize) -> [f64; D] {
         let point = self.original.reveal().positions()[self.secret.hidden()[slot].index()];
-        std::array::from_fn(|c| point[c] - self.released.origin()[c])
+        sub(&point, &self.released.origin())
     }
 
     /// Returns the true neighborhoods of size `k`.
@@ -98,9 +100,40 @@ impl<const D: usize> Hidden<D> {
         lists_of(rows, self.released.n_records(), self.released.slots_per_record())
     }
 
+    /// Returns lists of all records that hide at the place of a slot; `place` maps an original to
+    /// its place, if it counts.
+    pub fn lists_by_place(&self, place: impl Fn(usize) -> Option<usize>) -> Vec<Vec<u32>> {
+        let (n, per) = (self.released.n_slots(), self.released.slots_per_record());
+        let place = |slot: usize| place(self.secret.hidden()[slot].index());
+        let row = |slot: usize| {
+            let same = |&s: &usize| place(slot).is_some() && place(s) == place(slot);
+            let mut row: Vec<u32> = (0..n).filter(same).map(|s| (s / per) as u32).collect();
+            row.retain(|&record| record as usize != slot / per);
+            row.dedup();
+            row
+        };
+        (0..n).map(row).collect()
+    }
+
     /// Returns the distance of `point` (relative to the origin) to the feasible set of `record`.
     pub fn distance(&self, record: usize, point: &[f64; D]) -> f64 {
         distance_to_record(self.released.obfuscation(), record, point)
+    }
+
+    /// Returns the distance of the position of `slot` to its original; NaN if it is lost.
+    pub fn error(&self, recovered: &Recovered<D>, slot: usize) -> f64 {
+        distance(&widen(&recovered.positions()[slot]), &self.local(slot))
+    }
+
+    /// Returns the error of the median slot.
+    pub fn median_error(&self, recovered: &Recovered<D>) -> f64 {
+        let errors = (0..self.released.n_slots()).map(|slot| self.error(recovered, slot));
+        median(&mut errors.collect::<Vec<_>>())
+    }
+
+    /// Returns the percentage of slots that `recovered` places within `most`.
+    pub fn percent_within(&self, recovered: &Recovered<D>, most: f64) -> f64 {
+        evaluate(recovered, &self.original, &self.secret).unwrap().percent_within(most)
     }
 }
 
@@ -114,6 +147,15 @@ pub fn lists_of(rows: &[Vec<u32>], n_records: usize, slots_per_record: usize) ->
     }
     let lists = Neighborhoods::try_new(offsets, records, None, n_records, slots_per_record);
     lists.unwrap().with_about(About { map: None, order: RowOrder::Slots, ..About::default() })
+}
+
+/// Returns lists in which every record lists all others.
+pub fn everyone(n_records: usize, slots_per_record: usize) -> Neighborhoods {
+    let others = |slot: usize| {
+        (0..n_records as u32).filter(|&r| r as usize != slot / slots_per_record).collect()
+    };
+    let rows: Vec<_> = (0..n_records * slots_per_record).map(others).collect();
+    lists_of(&rows, n_records, slots_per_record)
 }
 
 /// Returns uniformly random lists of `k` records.
@@ -133,6 +175,26 @@ pub fn random_lists<const D: usize>(hidden: &Hidden<D>, k: usize, seed: u64) -> 
     hidden.lists_of(&(0..hidden.released.n_slots()).map(row).collect::<Vec<_>>())
 }
 
+/// Returns a plan for these schemes and solvers, without the attack on records alone. All schemes
+/// if none is named.
+pub fn plan<const D: usize>(
+    unit: Unit,
+    schemes: &[&str],
+    ratios: &[f64],
+    solvers: &[Builtin],
+) -> Plan<D> {
+    let mut plan = Plan::new(unit);
+    plan.schemes.retain(|scheme| schemes.is_empty() || schemes.contains(&scheme.name()));
+    (plan.inlier_ratios, plan.records_alone) = (ratios.to_vec(), false);
+    plan.solvers = Builtin::list(solvers);
+    plan
+}
+
+/// Audits a map.
+pub fn audit(original: &Original<3>, plan: &Plan<3>) -> Outcome {
+    run(original, None, plan, &mut Silent).unwrap()
+}
+
 /// A solver with its options.
 pub type Options = (Builtin, RecoverOptions);
 
@@ -141,15 +203,18 @@ pub fn joint() -> Options {
     (Builtin::Joint, RecoverOptions::default())
 }
 
+/// Returns the solvers that read lists with each of these deltas.
+pub fn options_with(deltas: &[Delta]) -> Vec<Options> {
+    let of = |&solver| {
+        let with = move |&delta| RecoverOptions { delta, seed: 3, ..RecoverOptions::default() };
+        deltas.iter().map(move |delta| (solver, with(delta)))
+    };
+    Builtin::FROM_LISTS.iter().flat_map(of).collect()
+}
+
 /// Returns the solvers that read lists, with automatic and fixed delta.
 pub fn all_options() -> Vec<Options> {
-    let mut options = Vec::new();
-    for solver in Builtin::FROM_LISTS {
-        for delta in [Delta::Fixed(0.1), Delta::Auto] {
-            options.push((solver, RecoverOptions { delta, seed: 3, ..RecoverOptions::default() }));
-        }
-    }
-    options
+    options_with(&[Delta::Fixed(0.1), Delta::Auto])
 }
 
 /// Runs recovery, which must not fail.
@@ -161,30 +226,82 @@ pub fn solve<const D: usize>(
     recover(released, lists, &solver, &options).unwrap()
 }
 
-fn push_rows<const D: usize>(bytes: &mut Vec<u8>, rows: &[[f32; D]]) {
-    bytes.extend(rows.as_flattened().iter().flat_map(|x| x.to_bits().to_le_bytes()));
+/// Returns random descriptors of `dim` values between -1 and 1.
+pub fn random_descriptors(seed: u64, n: usize, dim: usize) -> Descriptors {
+    let mut draws = Draws::new(seed, Stage::Synthetic, 0);
+    let values = (0..n * dim).map(|_| draws.between(-1.0, 1.0) as f32).collect();
+    Descriptors::try_new(Values::F32(values), dim).unwrap()
+}
+
+/// Returns the records in `order`. With draws, each is in another form: lines reversed and through another of their points, centers in
+/// another order.
+pub fn again<const D: usize>(
+    records: &Obfuscation<D>,
+    order: &[usize],
+    mut draws: Option<&mut Draws>,
+) -> Obfuscation<D> {
+    let rows = |of: &[[f32; D]]| order.iter().map(|&old| widen(&of[old])).collect::<Vec<_>>();
+    match records {
+        Obfuscation::Lines(lines) => {
+            let (mut points, mut directions) = (rows(lines.foot()), rows(lines.direction()));
+            for (point, direction) in points.iter_mut().zip(&mut directions) {
+                let Some(draws) = &mut draws else { break };
+                *point = along(point, draws.between(-3.0, 3.0), direction);
+                let turned = draws.below(2) == 0;
+                *direction = direction.map(|x| if turned { -x } else { x });
+            }
+            Obfuscation::Lines(Lines::through(&points, &directions).unwrap())
+        }
+        Obfuscation::Rays(rays) => {
+            let of =
+                |at: u8| if draws.is_some() { rays.centers().len() as u8 - 1 - at } else { at };
+            let center = order.iter().map(|&old| of(rays.center()[old])).collect();
+            let mut centers: Vec<_> = rays.centers().iter().map(widen).collect();
+            let mut regions = rays.regions().map(<[_]>::to_vec);
+            if draws.is_some() {
+                centers.reverse();
+                regions.iter_mut().for_each(|regions| regions.reverse());
+            }
+            let again = Rays::try_new(&centers, center, &rows(rays.direction())).unwrap();
+            Obfuscation::Rays(match regions {
+                Some(regions) => again.with_regions(regions).unwrap(),
+                None => again,
+            })
+        }
+        Obfuscation::AxisPlanes(planes) => {
+            let axis = order.iter().map(|&old| planes.axis()[old]).collect();
+            let offset: Vec<f64> = order.iter().map(|&old| planes.offset()[old].into()).collect();
+            Obfuscation::AxisPlanes(AxisPlanes::try_new(axis, &offset).unwrap())
+        }
+        Obfuscation::AxisCandidates(points) => {
+            Obfuscation::AxisCandidates(AxisCandidates::try_new(&rows(points.position())).unwrap())
+        }
+    }
+}
+
+/// Returns the map of other records with the same frame.
+pub fn released_of<const D: usize>(like: &Released<D>, records: Obfuscation<D>) -> Released<D> {
+    let (per, origin, unit) = (like.slots_per_record(), like.origin(), like.unit());
+    Released::try_new(records, per, origin, unit, None).unwrap().with_bounds(like.bounds())
+}
+
+fn bits(values: &[f32]) -> impl Iterator<Item = u8> + '_ {
+    values.iter().flat_map(|x| x.to_bits().to_le_bytes())
 }
 
 /// Returns every stored bit of a family of records.
 pub fn record_bytes<const D: usize>(obfuscation: &Obfuscation<D>) -> Vec<u8> {
-    let mut bytes = Vec::new();
+    let flat = |rows: &[[f32; D]]| bits(rows.as_flattened()).collect::<Vec<u8>>();
     match obfuscation {
-        Obfuscation::Lines(lines) => {
-            push_rows(&mut bytes, lines.foot());
-            push_rows(&mut bytes, lines.direction());
-        }
+        Obfuscation::Lines(lines) => [flat(lines.foot()), flat(lines.direction())].concat(),
         Obfuscation::Rays(rays) => {
-            push_rows(&mut bytes, rays.centers());
-            bytes.extend(rays.center());
-            push_rows(&mut bytes, rays.direction());
+            [flat(rays.centers()), rays.center().to_vec(), flat(rays.direction())].concat()
         }
         Obfuscation::AxisPlanes(planes) => {
-            bytes.extend(planes.axis());
-            bytes.extend(planes.offset().iter().flat_map(|x| x.to_bits().to_le_bytes()));
+            planes.axis().iter().copied().chain(bits(planes.offset())).collect()
         }
-        Obfuscation::AxisCandidates(candidates) => push_rows(&mut bytes, candidates.position()),
+        Obfuscation::AxisCandidates(candidates) => flat(candidates.position()),
     }
-    bytes
 }
 
 /// Returns every bit of a released map, without descriptors.
@@ -198,10 +315,10 @@ pub fn released_bytes<const D: usize>(released: &Released<D>) -> Vec<u8> {
 /// Returns every bit of a recovered map.
 pub fn recovered_bytes<const D: usize>(recovered: &Recovered<D>) -> Vec<u8> {
     let mut bytes = recovered.delta().to_bits().to_le_bytes().to_vec();
-    push_rows(&mut bytes, recovered.positions());
+    bytes.extend(bits(recovered.positions().as_flattened()));
     bytes.extend(recovered.status().iter().map(|&status| status as u8));
     bytes.extend(recovered.support().iter().flat_map(|x| x.to_le_bytes()));
-    bytes.extend(recovered.evidence().iter().flat_map(|x| x.to_bits().to_le_bytes()));
+    bytes.extend(bits(recovered.evidence()));
     bytes.extend(recovered.axis().unwrap_or_default());
     bytes
 }

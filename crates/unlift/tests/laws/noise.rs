@@ -2,11 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use unlift::RecordId;
-use unlift::neighbors::Neighborhoods;
-use unlift::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
-use unlift::obfuscate::{Entry, olc, ppl};
-use unlift::recover::{Builtin, RecoverOptions, recover};
+use unlift::geometry::vector::squared_distance;
+use unlift::obfuscate::{olc, ppl};
 
 use crate::maps::*;
 
@@ -35,63 +32,51 @@ impl Oracle {
         self.near.lists(ratio, &self.outliers(noise, seed), seed).unwrap()
     }
 
-    /// Returns all other records of a slot, nearest first, by brute force.
-    fn by_nearness(&self, slot: usize) -> Vec<RecordId> {
+    /// Returns the rank of every other record by its distance to a slot's point, by brute force.
+    fn ranks(&self, slot: usize) -> impl Fn(&RecordId) -> usize {
         let points = self.hidden.original.reveal().positions();
         let per = self.hidden.released.slots_per_record();
         let hidden = self.hidden.secret.hidden();
         let here = points[hidden[slot].index()];
-        let squared = |p: &[f64; 3]| (0..3).fold(0.0, |sum, c| sum + (here[c] - p[c]).powi(2));
-        let mut all: Vec<(f64, u32, RecordId)> = (0..hidden.len())
-            .filter(|&other| other / per != slot / per)
-            .map(|other| {
-                let id = hidden[other];
-                (squared(&points[id.index()]), id.0, RecordId::from_index(other / per))
-            })
-            .collect();
-        all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let key = |other: usize| {
+            (squared_distance(&here, &points[hidden[other].index()]), hidden[other].0)
+        };
+        let mut order: Vec<usize> =
+            (0..hidden.len()).filter(|other| other / per != slot / per).collect();
+        order.sort_by(|&a, &b| key(a).partial_cmp(&key(b)).unwrap());
         let mut seen = BTreeSet::new();
-        all.into_iter().map(|(.., record)| record).filter(|&r| seen.insert(r)).collect()
+        let records = order.into_iter().map(|other| RecordId::from_index(other / per));
+        let records: Vec<RecordId> = records.filter(|&r| seen.insert(r)).collect();
+        move |record| records.iter().position(|other| other == record).unwrap()
     }
 }
 
 #[test]
-fn every_model_keeps_the_share_and_the_same_true_neighbors() {
+fn every_model_keeps_the_share_the_same_true_neighbors_and_outliers() {
     for scheme in SCHEMES {
         let oracle = Oracle::new(scheme);
         let full = oracle.near.at_inlier_ratio(1.0, 3).unwrap();
-        for ratio in [0.0, 0.3, 0.5] {
-            let kept = |lists: &Neighborhoods, slot: usize| -> Vec<RecordId> {
-                lists.of(slot).iter().copied().filter(|r| full.of(slot).contains(r)).collect()
+        let split =
+            |lists: &Neighborhoods, slot: usize| -> (BTreeSet<RecordId>, BTreeSet<RecordId>) {
+                lists.of(slot).iter().partition(|&r| full.of(slot).contains(r))
             };
-            let uniform = oracle.near.at_inlier_ratio(ratio, 3).unwrap();
-            for noise in Noise::ALL {
-                let lists = oracle.lists(noise, ratio, 3);
+        for noise in Noise::ALL {
+            let mut higher = None;
+            for ratio in [0.6, 0.5, 0.3, 0.2, 0.0] {
+                let (lists, uniform) =
+                    (oracle.lists(noise, ratio, 3), oracle.near.at_inlier_ratio(ratio, 3).unwrap());
                 assert_eq!(oracle.near.measured_inlier_ratio(&lists), ratio, "{noise:?}");
                 for slot in 0..lists.n_slots() {
                     assert_eq!(lists.of(slot).len(), K);
-                    assert_eq!(kept(&lists, slot), kept(&uniform, slot), "{noise:?}, slot {slot}");
+                    let (right, wrong) = split(&lists, slot);
+                    assert_eq!(right, split(&uniform, slot).0, "{noise:?}, slot {slot}");
+                    // A lower ratio keeps fewer true neighbors, and the outliers of a higher one.
+                    let Some(higher) = &higher else { continue };
+                    let (more_right, fewer_wrong) = split(higher, slot);
+                    assert!(right.is_subset(&more_right), "{noise:?}, slot {slot}");
+                    assert!(fewer_wrong.is_subset(&wrong), "{noise:?}, slot {slot}");
                 }
-            }
-        }
-    }
-}
-
-#[test]
-fn a_lower_ratio_keeps_fewer_true_neighbors_and_more_of_the_same_outliers() {
-    for scheme in SCHEMES {
-        let oracle = Oracle::new(scheme);
-        let full = oracle.near.at_inlier_ratio(1.0, 4).unwrap();
-        for noise in Noise::ALL {
-            let (high, low) = (oracle.lists(noise, 0.6, 4), oracle.lists(noise, 0.2, 4));
-            for slot in 0..high.n_slots() {
-                let right = |r: &RecordId| full.of(slot).contains(r);
-                for record in high.of(slot).iter().filter(|r| !right(r)) {
-                    assert!(low.of(slot).contains(record), "{noise:?}, slot {slot}");
-                }
-                for record in low.of(slot).iter().filter(|r| right(r)) {
-                    assert!(high.of(slot).contains(record), "{noise:?}, slot {slot}");
-                }
+                higher = Some(lists);
             }
         }
     }
@@ -104,9 +89,8 @@ fn near_outliers_lie_between_the_2k_th_and_the_10k_th_nearest() {
         let lists = oracle.lists(Noise::Near, 0.0, 1);
         let mut ranks = BTreeSet::new();
         for slot in (0..lists.n_slots()).step_by(37) {
-            let order = oracle.by_nearness(slot);
-            for record in lists.of(slot) {
-                let rank = order.iter().position(|r| r == record).unwrap();
+            let rank = oracle.ranks(slot);
+            for rank in lists.of(slot).iter().map(rank) {
                 assert!((2 * K..10 * K).contains(&rank), "slot {slot}: rank {rank}");
                 ranks.insert(rank);
             }
@@ -125,31 +109,27 @@ fn clustered_outliers_are_shared_by_neighbors_and_lie_in_two_far_places() {
         // Share of a slot's outliers that a slot on its nearest listed records lists, too.
         let shared = |noise: Noise| {
             let lists = oracle.lists(noise, 0.0, 2);
-            let (mut both, mut all) = (0, 0);
-            for slot in 0..lists.n_slots() {
-                let best = nearest
-                    .of(slot)
-                    .iter()
-                    .flat_map(|r| (0..per).map(move |side| r.index() * per + side))
-                    .map(|other| {
-                        lists.of(slot).iter().filter(|r| lists.of(other).contains(r)).count()
-                    });
-                both += best.max().unwrap();
-                all += K;
-            }
-            both as f64 / all as f64
+            let both = |slot: usize| {
+                let others = nearest.of(slot).iter();
+                let others = others.flat_map(|r| (0..per).map(move |side| r.index() * per + side));
+                let both = others.map(|other| {
+                    lists.of(slot).iter().filter(|r| lists.of(other).contains(r)).count()
+                });
+                both.max().unwrap()
+            };
+            let both: usize = (0..lists.n_slots()).map(both).sum();
+            both as f64 / (K * lists.n_slots()) as f64
         };
         let (clustered, uniform) = (shared(Noise::Clustered), shared(Noise::Uniform));
         assert!(clustered > 0.5 && uniform < 0.25, "{clustered:.2} {uniform:.2}");
         // All outliers of a patch are the K records near either of two places.
         let lists = oracle.lists(Noise::Clustered, 0.0, 2);
-        let mut far = 0;
-        for slot in (0..lists.n_slots()).step_by(41) {
-            let order = oracle.by_nearness(slot);
-            let rank = |r: &RecordId| order.iter().position(|other| other == r).unwrap();
-            far += usize::from(lists.of(slot).iter().filter(|r| rank(r) >= 2 * K).count() == K);
-        }
-        let slots = lists.n_slots().div_ceil(41);
+        let slots: Vec<usize> = (0..lists.n_slots()).step_by(41).collect();
+        let is_far = |&&slot: &&usize| {
+            let rank = oracle.ranks(slot);
+            lists.of(slot).iter().all(|r| rank(r) >= 2 * K)
+        };
+        let (far, slots) = (slots.iter().filter(is_far).count(), slots.len());
         // A record of a pair may be near because of its other point.
         assert!(10 * far >= 8 * slots, "{far} of {slots}");
     }
@@ -174,9 +154,9 @@ fn ranking_keeps_joint_estimates_where_wrong_entries_are_near() {
     let oracle = Oracle::new(&olc::ENTRY);
     let positions = |noise, ratio| {
         [Builtin::Joint, Builtin::Ranking].map(|solver| {
-            let (released, lists) = (&oracle.hidden.released, oracle.lists(noise, ratio, 1));
-            let recovered = recover(released, &lists, &solver, &RecoverOptions::default()).unwrap();
-            recovered.positions().to_vec()
+            let lists = oracle.lists(noise, ratio, 1);
+            let options = (solver, RecoverOptions::default());
+            solve(&oracle.hidden.released, &lists, options).positions().to_vec()
         })
     };
     let [joint, ranking] = positions(Noise::Near, 0.2);

@@ -2,8 +2,7 @@
 //! only exact operations and a portable logarithm are used. After an intended change, copy the
 //! output of the failing test.
 
-use unlift::obfuscate::{Entry, SCHEMES};
-use unlift::recover::{Builtin, Delta, RecoverOptions};
+use unlift::obfuscate::SCHEMES;
 
 use crate::maps::*;
 
@@ -12,6 +11,12 @@ fn hash(bytes: &[u8]) -> u64 {
     bytes
         .iter()
         .fold(0xCBF2_9CE4_8422_2325, |h, &b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01B3))
+}
+
+/// Asserts the bytes, and prints what they are now.
+fn same<T: PartialEq + std::fmt::Debug>(found: &[T], pinned: &[T]) {
+    let rows: Vec<String> = found.iter().map(|row| format!("    {row:#x?},")).collect();
+    assert!(found == pinned, "the bytes are now (format the file)\n{}", rows.join("\n"));
 }
 
 /// (Scheme, hash of the released map, hash of its recovery by consensus).
@@ -28,23 +33,16 @@ const PINS: &[(&str, u64, u64)] = &[
 #[test]
 fn bytes_are_pinned() {
     let points = room::<3>(2026, 301);
-    let mut found = Vec::new();
-    for entry in SCHEMES {
-        if entry.in_3d.is_none() {
-            continue;
-        }
+    let of = |entry: &Entry| {
         let hidden = hide(entry, &points, 0);
+        let delta = Delta::Fixed(0.1);
+        let options = RecoverOptions { delta, seed: 0, ..RecoverOptions::default() };
         let lists = hidden.lists(20, 0.5, 0);
-        let options =
-            RecoverOptions { delta: Delta::Fixed(0.1), seed: 0, ..RecoverOptions::default() };
         let recovered = solve(&hidden.released, &lists, (Builtin::Consensus, options));
-        let hashes = (hash(&released_bytes(&hidden.released)), hash(&recovered_bytes(&recovered)));
-        found.push((entry.name, hashes.0, hashes.1));
-    }
-    let literal =
-        |(name, a, b): &(&str, u64, u64)| format!("    (\"{name}\", {a:#018x}, {b:#018x}),");
-    let printed: Vec<String> = found.iter().map(literal).collect();
-    assert!(found == PINS, "the bytes are now\n{}", printed.join("\n"));
+        (entry.name, hash(&released_bytes(&hidden.released)), hash(&recovered_bytes(&recovered)))
+    };
+    let in_3d = SCHEMES.iter().filter(|entry| entry.in_3d.is_some());
+    same(&in_3d.map(of).collect::<Vec<_>>(), PINS);
 }
 
 /// (Scheme, dimension, hash of joint recovery with automatic options).
@@ -61,26 +59,18 @@ const JOINT: &[(&str, usize, u64)] = &[
     ("dcl2d", 2, 0xbc91503f8c7f82d4),
 ];
 
-fn joint_bytes<const D: usize>(entry: &Entry) -> (&'static str, usize, u64) {
-    let hidden = hide::<D>(entry, &room(2027, 500), 0);
-    let lists = hidden.lists(20, 0.5, 0);
-    let recovered = solve(&hidden.released, &lists, joint());
-    (entry.name, D, hash(&recovered_bytes(&recovered)))
-}
-
 /// Joint recovery with automatic delta covers nearly all of `recover`: delta, consensus, graph,
 /// distribution of neighbors, iterations and exact constraints.
 #[test]
 fn bytes_of_joint_recovery_are_pinned() {
-    let mut found = Vec::new();
-    for entry in SCHEMES {
-        found.extend(entry.in_3d.map(|_| joint_bytes::<3>(entry)));
-        found.extend(entry.in_2d.map(|_| joint_bytes::<2>(entry)));
+    fn of<const D: usize>(entry: &Entry) -> (&'static str, usize, u64) {
+        let hidden = hide::<D>(entry, &room(2027, 500), 0);
+        let recovered = solve(&hidden.released, &hidden.lists(20, 0.5, 0), joint());
+        (entry.name, D, hash(&recovered_bytes(&recovered)))
     }
-    let literal =
-        |(name, d, bytes): &(&str, usize, u64)| format!("    (\"{name}\", {d}, {bytes:#018x}),");
-    let printed: Vec<String> = found.iter().map(literal).collect();
-    assert!(found == JOINT, "the bytes are now\n{}", printed.join("\n"));
+    let all =
+        |entry: &Entry| [entry.in_3d.map(|_| of::<3>(entry)), entry.in_2d.map(|_| of::<2>(entry))];
+    same(&SCHEMES.iter().flat_map(all).flatten().collect::<Vec<_>>(), JOINT);
 }
 
 /// (Scheme, hash of the confidence of each point).
@@ -96,18 +86,17 @@ const SURE: &[(&str, u64)] = &[
 #[test]
 fn bytes_of_confidence_are_pinned() {
     let points = room::<3>(2028, 2100);
-    let mut found = Vec::new();
-    for name in ["olc", "ppl", "ray", "plane", "cp"] {
-        let hidden = hide(unlift::obfuscate::scheme(name).unwrap(), &points, 0);
+    let of = |name: &'static str| {
+        let hidden = hide(entry(name), &points, 0);
         let recovered = solve(&hidden.released, &hidden.lists(20, 0.5, 0), joint());
         let rows = recovered.confidence().expect("a map of usual size");
         let bits = rows.iter().flat_map(|one| [one.found, one.scale].map(f32::to_bits));
-        found.push((name, hash(&bits.flat_map(u32::to_le_bytes).collect::<Vec<_>>())));
-    }
-    let literal = |(name, bytes): &(&str, u64)| format!("    (\"{name}\", {bytes:#018x}),");
-    let printed: Vec<String> = found.iter().map(literal).collect();
-    assert!(found == SURE, "the bytes are now\n{}", printed.join("\n"));
+        (name, hash(&bits.flat_map(u32::to_le_bytes).collect::<Vec<_>>()))
+    };
+    same(&FIVE.map(of), SURE);
 }
+
+const FIVE: [&str; 5] = ["olc", "ppl", "ray", "plane", "cp"];
 
 /// (Solver, hash of the hashes of its recoveries of five schemes).
 const BASELINES: &[(&str, u64)] = &[
@@ -121,25 +110,15 @@ const BASELINES: &[(&str, u64)] = &[
 #[test]
 fn bytes_of_other_solvers_are_pinned() {
     let points = room::<3>(2029, 300);
-    let mut found = Vec::new();
-    let others = [
-        Builtin::Ranking,
-        Builtin::JointStart,
-        Builtin::Ransac,
-        Builtin::Density,
-        Builtin::Tomography,
-    ];
-    for solver in others {
-        let of_scheme = |name: &str| {
-            let hidden = hide(unlift::obfuscate::scheme(name).unwrap(), &points, 0);
+    let of = |solver: Builtin| {
+        let hashes = FIVE.map(|name| {
+            let hidden = hide(entry(name), &points, 0);
             let options = RecoverOptions { seed: 4, ..RecoverOptions::default() };
             let recovered = solve(&hidden.released, &hidden.lists(20, 0.5, 0), (solver, options));
             hash(&recovered_bytes(&recovered)).to_le_bytes()
-        };
-        let hashes = ["olc", "ppl", "ray", "plane", "cp"].map(of_scheme);
-        found.push((solver.name(), hash(hashes.as_flattened())));
-    }
-    let literal = |(solver, bytes): &(&str, u64)| format!("    (\"{solver}\", {bytes:#018x}),");
-    let printed: Vec<String> = found.iter().map(literal).collect();
-    assert!(found == BASELINES, "the bytes are now\n{}", printed.join("\n"));
+        });
+        (solver.name(), hash(hashes.as_flattened()))
+    };
+    use Builtin::{Density, JointStart, Ranking, Ransac, Tomography};
+    same(&[Ranking, JointStart, Ransac, Density, Tomography].map(of), BASELINES);
 }

@@ -1,12 +1,9 @@
 //! Ranking with perfect lists: longer lists give smaller errors, and errors are smaller than those
 //! of joint recovery, also for rays from anchors, where a layout of the neighbors is the start.
 
-use unlift::recover::{
-    Builtin, Confidence, Estimate, RecoverOptions, Recovered, Status, recover, recover_from,
-};
-use unlift::{About, RowOrder};
+use unlift::recover::{Confidence, Estimate, recover_from};
 
-use crate::maps::{hide, room, uniform};
+use crate::maps::*;
 
 /// Returns the median error of all slots, from perfect lists of `k` records.
 fn median_error<const D: usize>(
@@ -14,17 +11,9 @@ fn median_error<const D: usize>(
     solver: Builtin,
     k: usize,
 ) -> f64 {
-    let hidden = hide::<D>(unlift::obfuscate::scheme(scheme).unwrap(), points, 3);
-    let lists = hidden.lists(k, 1.0, 3);
-    let recovered = recover(&hidden.released, &lists, &solver, &RecoverOptions::default()).unwrap();
-    let error = |slot: usize| {
-        let to = hidden.local(slot);
-        let from = recovered.positions()[slot];
-        (0..D).map(|c| (from[c] as f64 - to[c]).powi(2)).sum::<f64>().sqrt()
-    };
-    let mut errors: Vec<f64> = (0..recovered.n_slots()).map(error).collect();
-    errors.sort_unstable_by(f64::total_cmp);
-    errors[errors.len() / 2]
+    let hidden = hide::<D>(entry(scheme), points, 3);
+    let options = (solver, RecoverOptions::default());
+    hidden.median_error(&solve(&hidden.released, &hidden.lists(k, 1.0, 3), options))
 }
 
 fn errors_fall<const D: usize>(scheme: &str) {
@@ -54,8 +43,8 @@ fn neighbors_place_points_on_rays_from_anchors() {
 
 #[test]
 fn known_positions_stay_and_place_their_neighbors() {
-    let points = uniform::<2>(3, 1_500);
-    let hidden = hide::<2>(unlift::obfuscate::scheme("dcl2d").unwrap(), &points, 3);
+    let points = uniform::<2>(3, 600);
+    let hidden = hide::<2>(entry("dcl2d"), &points, 3);
     let (lists, released) = (hidden.lists(20, 0.8, 3), &hidden.released);
     let options = RecoverOptions::default();
     let is_known = |slot: usize| slot.is_multiple_of(3);
@@ -67,32 +56,25 @@ fn known_positions_stay_and_place_their_neighbors() {
         }
         false => Estimate::lost(Status::TooFewNeighbors),
     };
-    let estimates: Vec<Estimate<2>> = (0..released.n_slots()).map(estimate).collect();
     let sure = |slot: usize| match is_known(slot) {
         true => Confidence { found: 0.9, scale: 1.0 },
         false => Confidence::LOST,
     };
-    let about =
-        About { map: Some(released.fingerprint()), order: RowOrder::Slots, ..About::default() };
+    let slots = || 0..released.n_slots();
+    let estimates: Vec<Estimate<2>> = slots().map(estimate).collect();
+    let map = Some(released.fingerprint());
     let known =
         Recovered::try_new(&estimates, false, None, released.origin(), released.unit(), 1.0)
-            .and_then(|known| known.with_confidence((0..estimates.len()).map(sure).collect()))
+            .and_then(|known| known.with_confidence(slots().map(sure).collect()))
             .unwrap()
-            .with_about(about);
+            .with_about(About { map, order: RowOrder::Slots, ..About::default() });
     let with = recover_from(&known, released, &lists, &options).unwrap();
     let without = recover(released, &lists, &Builtin::Ranking, &options).unwrap();
-    let median = |recovered: &Recovered<2>| {
-        let unknown = (0..recovered.n_slots()).filter(|&slot| !is_known(slot));
-        let error = |slot: usize| {
-            let [x, y] = [0, 1].map(|c| recovered.positions()[slot][c] - position(slot)[c]);
-            x.hypot(y)
-        };
-        let mut errors: Vec<f32> = unknown.map(error).collect();
-        errors.sort_unstable_by(f32::total_cmp);
-        errors[errors.len() / 2]
-    };
-    let slots = (0..estimates.len()).filter(|&slot| is_known(slot));
-    assert!(slots.into_iter().all(|slot| with.positions()[slot] == position(slot)));
-    let [with, without] = [&with, &without].map(median);
+    let mut known = slots().filter(|&slot| is_known(slot));
+    assert!(known.all(|slot| with.positions()[slot] == position(slot)));
+    let [with, without] = [&with, &without].map(|recovered| {
+        let unknown = slots().filter(|&slot| !is_known(slot));
+        median(&mut unknown.map(|slot| hidden.error(recovered, slot)).collect::<Vec<_>>())
+    });
     assert!(with < 0.5 * without, "{with}, without {without}");
 }

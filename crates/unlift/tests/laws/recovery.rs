@@ -1,12 +1,6 @@
-//! Properties of recovery from lists: exact limit, bounded influence, order of entries, inputs.
+//! Properties of recovery from lists: exact limit, bounded influence, exact coordinates, order of entries, inputs.
 
-use proptest::prelude::*;
-use unlift::neighbors::Neighborhoods;
-use unlift::obfuscate::Entry;
-use unlift::recover::{Builtin, Delta, RecoverOptions, Status, recover};
-use unlift::released::{Obfuscation, Released};
-use unlift::seed::{Draws, Stage};
-use unlift::{PointSet, RecordId, Unit};
+use std::collections::BTreeSet;
 
 use crate::maps::*;
 
@@ -25,7 +19,7 @@ fn fixed_by<const D: usize>(
     let own = slot / hidden.released.slots_per_record();
     let listed = || lists.of(slot).iter().map(|record| record.index());
     let sine = |directions: &[[f32; D]], other: usize| {
-        let cosine = dot(&directions[own].map(f64::from), &directions[other].map(f64::from));
+        let cosine = dot(&widen(&directions[own]), &widen(&directions[other]));
         (1.0 - cosine * cosine).max(0.0).sqrt()
     };
     match hidden.released.obfuscation() {
@@ -44,9 +38,8 @@ fn fixed_by<const D: usize>(
             (0..D as u8).filter(free).all(|axis| said(axis) >= least).then_some(1.0)
         }
         Obfuscation::AxisCandidates(candidates) => {
-            let published = candidates.position()[own].map(f64::from);
-            let local = hidden.local(slot);
-            let off = norm(&std::array::from_fn::<f64, D, _>(|c| published[c] - local[c]));
+            let published = widen(&candidates.position()[own]);
+            let off = distance(&published, &hidden.local(slot));
             // Neighbors exchanged on the same axis agree with the published point, too.
             let there = listed().filter(|&r| hidden.distance(r, &published) <= 2.0 * delta).count();
             let clear = off > 2.0 * delta && 3 * there <= listed().count();
@@ -71,17 +64,8 @@ fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     // of 480 are determined in one of 30), so `cp` uses a larger one.
     let n_piles = if D == 3 && name == "cp" { 90 } else { 30 };
     let hidden = hide::<D>(scheme, &piles(seed, n_piles, COPIES, 0.0), seed);
-    let per = hidden.released.slots_per_record();
-    let pile = |slot: usize| hidden.secret.hidden()[slot].index() / COPIES;
     let n = hidden.released.n_slots();
-    let row = |slot: usize| {
-        let mut row: Vec<u32> =
-            (0..n).filter(|&s| pile(s) == pile(slot)).map(|s| (s / per) as u32).collect();
-        row.retain(|&record| record as usize != slot / per);
-        row.dedup();
-        row
-    };
-    let lists = hidden.lists_of(&(0..n).map(row).collect::<Vec<_>>());
+    let lists = hidden.lists_of(&hidden.lists_by_place(|id| Some(id / COPIES)));
     for options in all_options() {
         let recovered = solve(&hidden.released, &lists, options);
         let mut fixed = 0;
@@ -113,13 +97,10 @@ fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
             // Otherwise: a few units in the last place at 6 m, divided by the sine of the best
             // crossing.
             assert_eq!(status, Status::Ok, "{name}, {options:?}: slot {slot}");
-            let found = recovered.positions()[slot].map(f64::from);
-            let local = hidden.local(slot);
-            let off = norm(&std::array::from_fn::<f64, D, _>(|c| found[c] - local[c]));
+            let off = hidden.error(&recovered, slot);
             assert!(
                 off <= tolerance,
-                "{name}, {options:?}: slot {slot}, whose neighbors all lie where it does, is {off} away from there: at most {tolerance} \
-                 (sine of the best crossing {sine}, delta {delta})"
+                "{name}, {options:?}: slot {slot} is {off} away from its neighbors' place, more than {tolerance} (sine {sine})"
             );
         }
         // Coincident points share a voxel or region, and so a center: such rays never determine
@@ -158,18 +139,8 @@ fn bounded_influence<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     }
     let per = hidden.released.slots_per_record();
     let n = hidden.released.n_slots();
-    let near_pile = |slot: usize| hidden.secret.hidden()[slot].index() / COPIES;
     let is_far = |slot: usize| hidden.secret.hidden()[slot].index() >= PILES * COPIES;
-    let agreeing: Vec<Vec<u32>> = (0..n)
-        .map(|slot| {
-            let pile = near_pile(slot);
-            let same = |&s: &usize| !is_far(slot) && !is_far(s) && near_pile(s) == pile;
-            let mut row: Vec<u32> = (0..n).filter(same).map(|s| (s / per) as u32).collect();
-            row.retain(|&record| record as usize != slot / per);
-            row.dedup();
-            row
-        })
-        .collect();
+    let agreeing = hidden.lists_by_place(|id| (id < PILES * COPIES).then_some(id / COPIES));
     let without: Vec<Vec<u32>> =
         agreeing.iter().map(|row| row.iter().skip(1).copied().collect()).collect();
     let options =
@@ -185,7 +156,7 @@ fn bounded_influence<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
             continue;
         }
         assert_eq!(alone.status()[slot], Status::Ok, "{name}: slot {slot}");
-        let result = alone.positions()[slot].map(f64::from);
+        let result = widen(&alone.positions()[slot]);
         // A record is far if it passes far from the result, wherever its point is.
         let stranger = (0..200).map(|_| draws.below(n as u64) as usize).find(|&s| {
             let record = s / per;
@@ -233,80 +204,35 @@ fn order_tells_nothing<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     }
 }
 
-/// Recovery reads only the released map and the lists: copies of their columns give the same bytes.
-fn no_hidden_input<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
-    let hidden = hide::<D>(scheme, &room(seed, 300), seed);
-    let lists = hidden.lists(15, 0.6, seed);
-    for options in all_options() {
-        let first = recovered_bytes(&solve(&hidden.released, &lists, options));
-        let released = Released::try_new(
-            hidden.released.obfuscation().clone(),
-            hidden.released.slots_per_record(),
-            hidden.released.origin(),
-            hidden.released.unit(),
-            None,
-        )
-        .unwrap()
-        .with_bounds(hidden.released.bounds());
-        let copied = Neighborhoods::try_new(
-            lists.offsets().to_vec(),
-            lists.records().to_vec(),
-            None,
-            released.n_records(),
-            released.slots_per_record(),
-        )
-        .unwrap();
-        assert!(first == recovered_bytes(&solve(&released, &copied, options)), "{name}");
-    }
-    let Hidden { original, released, secret } = hidden;
-    let before = recovered_bytes(&solve(&released, &lists, joint()));
-    drop((original, secret));
-    let after = recovered_bytes(&solve(&released, &lists, joint()));
-    assert!(before == after, "{name}");
-}
-
 fn foreign_lists_are_refused<const D: usize>(name: &str, scheme: &Entry) {
     let one = hide::<D>(scheme, &room(1, 100), 1);
     let other = hide::<D>(scheme, &room(1, 160), 1);
-    let error = recover(
-        &one.released,
-        &other.lists(5, 1.0, 1),
-        &Builtin::Joint,
-        &RecoverOptions::default(),
-    );
-    assert!(error.unwrap_err().to_string().contains("one per slot"), "{name}");
+    let error = |lists: &Neighborhoods| {
+        let options = RecoverOptions::default();
+        recover(&one.released, lists, &Builtin::Joint, &options).unwrap_err().to_string()
+    };
+    assert!(error(&other.lists(5, 1.0, 1)).contains("one per slot"), "{name}");
     let n = one.released.n_slots();
     if one.released.n_records() < n {
         // The number of rows matches, but the map has one slot per record.
-        let next = (0..n).map(|slot| RecordId::from_index((slot + 1) % n)).collect();
-        let lists = Neighborhoods::try_new((0..=n as u64).collect(), next, None, n, 1).unwrap();
-        let error = recover(&one.released, &lists, &Builtin::Joint, &RecoverOptions::default());
-        assert!(error.unwrap_err().to_string().contains("records below"), "{name}");
+        let next: Vec<Vec<u32>> = (1..=n).map(|next| vec![(next % n) as u32]).collect();
+        assert!(error(&lists_of(&next, n, 1)).contains("records below"), "{name}");
     }
 }
 
-proptest! {
-    #![proptest_config(cases(3))]
+#[test]
+fn neighbors_at_the_original_give_it_back() {
+    seeds(3).into_iter().for_each(|seed| over_schemes!(exact_limit, seed));
+}
 
-    #[test]
-    fn neighbors_at_the_original_give_it_back(seed: u64) {
-        over_schemes!(exact_limit, seed);
-    }
+#[test]
+fn one_far_neighbor_moves_nothing() {
+    seeds(3).into_iter().for_each(|seed| over_schemes!(bounded_influence, seed));
+}
 
-    #[test]
-    fn one_far_neighbor_moves_nothing(seed: u64) {
-        over_schemes!(bounded_influence, seed);
-    }
-
-    #[test]
-    fn lists_are_sets(seed: u64) {
-        over_schemes!(order_tells_nothing, seed);
-    }
-
-    #[test]
-    fn records_and_lists_are_all_there_is(seed: u64) {
-        over_schemes!(no_hidden_input, seed);
-    }
+#[test]
+fn lists_are_sets() {
+    seeds(1).into_iter().for_each(|seed| over_schemes!(order_tells_nothing, seed));
 }
 
 #[test]
@@ -319,7 +245,43 @@ fn lists_belong_to_a_map() {
 /// distribution split a pile.
 #[test]
 fn rounding_is_no_distance() {
-    const SEED: u64 = 7_442_521_786_000_528_742;
-    let scheme = unlift::obfuscate::scheme("ppl+").unwrap();
-    exact_limit::<3>("ppl+", scheme, SEED);
+    exact_limit::<3>("ppl+", entry("ppl+"), 7_442_521_786_000_528_742);
+}
+
+/// Exchanged coordinates come back exactly: a slot that takes a coordinate which another slot publishes on that axis gives the other slot
+/// its own. Results are almost the same in another unit.
+#[test]
+fn exchanged_coordinates_come_back_exactly_and_from_a_partner() {
+    const N: usize = 4000;
+    let solved = |scale: f64| {
+        let points: Vec<[f64; 3]> = room(5, N).iter().map(|p| p.map(|x| x * scale)).collect();
+        let hidden = hide(entry("cp"), &points, 5);
+        let options = (Builtin::Joint, RecoverOptions { seed: 1, ..Default::default() });
+        let recovered = solve(&hidden.released, &hidden.lists(20, 1.0, 2), options);
+        (hidden, recovered)
+    };
+    let percent = |(hidden, found): &(Hidden<3>, Recovered<3>), most| {
+        let errors = (0..N).map(|slot| hidden.error(found, slot));
+        100.0 * errors.filter(|error| *error <= most).count() as f64 / N as f64
+    };
+    let (one, other) = (solved(1.0), solved(7.3));
+    // Measured: 18.6 %. Without partners it is at least four points less.
+    assert!(percent(&one, 1e-3) > 17.0, "{}", percent(&one, 1e-3));
+    for within in [1e-3, 0.1] {
+        let percent = [percent(&one, within), percent(&other, 7.3 * within)];
+        assert!((percent[0] - percent[1]).abs() < 1.0, "within {within}: {percent:?}");
+    }
+    let (hidden, found) = one;
+    let Obfuscation::AxisCandidates(records) = hidden.released.obfuscation() else {
+        panic!("cp releases candidates");
+    };
+    let axis = found.axis().unwrap();
+    let on_axis = |rows: &[[f32; 3]], slot: usize| rows[slot][usize::from(axis[slot])].to_bits();
+    let takes = |slot: usize| on_axis(found.positions(), slot);
+    let gives = |slot: usize| on_axis(records.position(), slot);
+    let published: BTreeSet<_> = (0..N).map(|s| (axis[s], gives(s))).collect();
+    let given: BTreeSet<_> = (0..N).map(|s| (axis[s], gives(s), takes(s))).collect();
+    let mut taken: Vec<_> = (0..N).map(|s| (axis[s], takes(s), gives(s))).collect();
+    taken.retain(|(axis, value, own)| value != own && published.contains(&(*axis, *value)));
+    assert!(taken.len() > N / 20 && taken.iter().all(|one| given.contains(one)));
 }

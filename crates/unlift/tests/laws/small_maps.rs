@@ -4,15 +4,7 @@
 //! Regression: on maps whose lists contain a large part of all records, joint recovery lost what
 //! its first pass, consensus, had found.
 
-use std::sync::Arc;
-
-use unlift::audit::{Plan, Silent, run};
-use unlift::geometry::knn::Knn;
-use unlift::geometry::vector::median;
-use unlift::recover::{Builtin, Delta};
-use unlift::synthetic::{Shape, shape};
-use unlift::truth::Original;
-use unlift::{PointSet, Unit};
+use crate::maps::{audit, *};
 
 /// Returns the percentages of `n` points within 1.0 and 2.5 typical distances, by joint recovery
 /// and by consensus.
@@ -21,12 +13,8 @@ fn both(of: Shape, n: usize, name: &str, ratio: f64) -> ([f64; 2], [f64; 2]) {
     let typical = median(&mut Knn::new(&points).unwrap().kth_distances(50));
     let points = points.iter().map(|p| p.map(|x| x / typical)).collect();
     let original = Original::new(PointSet::try_new(points, Unit::KthNeighbor).unwrap());
-    let mut plan = Plan::new(Unit::KthNeighbor);
-    plan.schemes.retain(|scheme| scheme.name() == name);
-    plan.inlier_ratios = vec![ratio];
-    plan.records_alone = false;
-    plan.solvers = vec![Arc::new(Builtin::Joint), Arc::new(Builtin::Consensus)];
-    let outcome = run(&original, None, &plan, &mut Silent).unwrap();
+    let solvers = [Builtin::Joint, Builtin::Consensus];
+    let outcome = audit(&original, &plan(Unit::KthNeighbor, &[name], &[ratio], &solvers));
     let percent = |solver: Builtin| {
         let row = outcome.rows.iter().find(|row| row.solver == solver.name()).unwrap();
         [row.recovered_percent[0], row.recovered_percent[1]]
@@ -57,11 +45,9 @@ fn joint_recovery_keeps_what_its_first_pass_found() {
 
 /// Returns the percentage within 0.25 m under `cp` for the given delta.
 fn cp(points: &[[f64; 3]], k: usize, delta: Delta) -> f64 {
-    let original = Original::new(PointSet::try_new(points.to_vec(), Unit::Meter).unwrap());
-    let mut plan = Plan { k, delta, records_alone: false, ..Plan::new(Unit::Meter) };
-    plan.schemes.retain(|scheme| scheme.name() == "cp");
-    (plan.inlier_ratios, plan.solvers) = (vec![0.3], Builtin::list(&[Builtin::Joint]));
-    run(&original, None, &plan, &mut Silent).unwrap().rows[0].recovered_percent[1]
+    let plan = plan(Unit::Meter, &["cp"], &[0.3], &[Builtin::Joint]);
+    let outcome = audit(&original(points.to_vec()), &Plan { k, delta, ..plan });
+    outcome.rows[0].recovered_percent[1]
 }
 
 /// Regression: exchanged coordinates agree exactly with those of their partners at any delta. On a

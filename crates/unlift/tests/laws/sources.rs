@@ -1,16 +1,9 @@
 //! Properties of all sources that compare descriptors, and of each source's purpose.
 
-use std::sync::Arc;
+use unlift::neighbors::sources::SOURCES;
+use unlift::neighbors::{Needs, Source, overlap, similarity};
 
-use unlift::descriptors::Values;
-use unlift::neighbors::oracle::{self, TrueNeighbors};
-use unlift::neighbors::sources::{Named, SOURCES};
-use unlift::neighbors::{Needs, Neighborhoods, Source, overlap, similarity};
-use unlift::obfuscate::{obfuscate, ppl::Ppl};
-use unlift::released::{Lines, Obfuscation, Released};
-use unlift::seed::{Draws, Key, Stage};
-use unlift::truth::Original;
-use unlift::{About, Descriptors, PointSet, RecordId, RowOrder, Unit};
+use crate::maps::*;
 
 /// Synthetic image patch around a keypoint: gradients, each with a place and a direction.
 struct Picture(Vec<([f64; 2], f64)>);
@@ -106,58 +99,42 @@ fn similarity_is_the_cosine() {
         dot(a, b) / (dot(a, a) * dot(b, b)).sqrt()
     };
     for slot in [0, 77, 149] {
-        let mut all: Vec<(f64, u32)> = (0..150)
-            .filter(|&other| other != slot)
-            .map(|other| (cosine(&rows[slot], &rows[other]), other as u32))
-            .collect();
-        all.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mut nearest: Vec<RecordId> = all[..10].iter().map(|&(_, id)| RecordId(id)).collect();
+        let cosine = |other: u32| cosine(&rows[slot], &rows[other as usize]);
+        let mut nearest: Vec<u32> = (0..150).filter(|&other| other as usize != slot).collect();
+        nearest.sort_by(|&a, &b| cosine(b).total_cmp(&cosine(a)));
+        let mut nearest: Vec<RecordId> = nearest[..10].iter().map(|&id| RecordId(id)).collect();
         nearest.sort_unstable();
         assert_eq!(lists.of(slot), nearest);
         for (record, score) in lists.of(slot).iter().zip(lists.scores_of(slot).unwrap()) {
             // Scores are sums of 128 products in `f32`.
-            let exact = cosine(&rows[slot], &rows[record.index()]);
-            assert!((f64::from(*score) - exact).abs() < 1e-5);
+            assert!((f64::from(*score) - cosine(record.0)).abs() < 1e-5);
         }
     }
 }
 
-/// Returns all sources that compare descriptors. Sources from records alone are tested with the
-/// density.
-fn sources() -> Vec<Arc<dyn Source<3>>> {
-    let names = SOURCES.iter().map(|entry| entry.name);
-    let sources = names.map(of_name);
-    sources.filter(|source| source.needs() == Needs::Descriptors).collect()
-}
-
-fn of_name(name: &str) -> Arc<dyn Source<3>> {
-    Named::parse(name).unwrap().of_dimension::<3>().unwrap()
+/// Returns all sources that compare descriptors. Sources from records alone are tested in `alone`.
+fn sources() -> impl Iterator<Item = Arc<dyn Source<3>>> {
+    let sources = SOURCES.iter().map(|entry| source::<3>(entry.name));
+    sources.filter(|source| source.needs() == Needs::Descriptors)
 }
 
 #[test]
 fn permuting_records_permutes_lists() {
     let rows = random_map(260);
-    let mut order: Vec<u32> = (0..260).collect();
-    Draws::new(5, Stage::Synthetic, 0).shuffle(&mut order);
+    let order = Draws::new(5, Stage::Synthetic, 0).permutation(260);
     let permuted: Vec<Vec<u8>> = order.iter().map(|&at| rows[at as usize].clone()).collect();
+    let listed = |lists: &Neighborhoods, slot: usize, name: &dyn Fn(u32) -> u32| {
+        let records = lists.of(slot).iter().map(|record| name(record.0));
+        let mut row: Vec<_> = records.zip(lists.scores_of(slot).unwrap().to_vec()).collect();
+        row.sort_unstable_by_key(|&(record, _)| record);
+        row
+    };
     for source in sources() {
         let plain = source.lists(&released(&rows, 1), 6, 0).unwrap();
         let other = source.lists(&released(&permuted, 1), 6, 0).unwrap();
         for (slot, &was) in order.iter().enumerate() {
-            let mut entries: Vec<(u32, f32)> = other
-                .of(slot)
-                .iter()
-                .zip(other.scores_of(slot).unwrap())
-                .map(|(record, &score)| (order[record.index()], score))
-                .collect();
-            entries.sort_unstable_by_key(|&(record, _)| record);
-            let expected: Vec<(u32, f32)> = plain
-                .of(was as usize)
-                .iter()
-                .map(|record| record.0)
-                .zip(plain.scores_of(was as usize).unwrap().iter().copied())
-                .collect();
-            assert_eq!(entries, expected, "{} {slot}", source.name());
+            let found = listed(&other, slot, &|record| order[record as usize]);
+            assert_eq!(found, listed(&plain, was as usize, &|record| record), "{}", source.name());
         }
     }
 }
@@ -165,25 +142,26 @@ fn permuting_records_permutes_lists() {
 #[test]
 fn what_cannot_be_compared_is_told_in_one_line() {
     let map = released(&random_map(9), 1);
-    let message = |map: &Released<3>, name: &str, k: usize| {
-        of_name(name).lists(map, k, 0).unwrap_err().to_string()
-    };
-    assert_eq!(
-        message(&map, "overlap", 9),
-        "overlap: k: expected between 1 and 8 (other records), found 9"
-    );
     let short = released(&[vec![1, 2, 3], vec![3, 2, 1], vec![0, 1, 0]], 1);
-    assert_eq!(
-        message(&short, "overlap", 1),
-        "overlap: descriptors for overlap: expected SIFT descriptors (128 values each, none negative), \
-         found 3 values each"
-    );
-    let (obfuscation, unit) = (short.obfuscation().clone(), short.unit());
-    let bare = Released::try_new(obfuscation, 1, [0.0; 3], unit, None).unwrap();
-    assert_eq!(
-        message(&bare, "similarity", 1),
-        "similarity: released map: expected descriptors, which this source compares, found none"
-    );
+    let bare = released_of(&short, short.obfuscation().clone());
+    for (map, name, k, message) in [
+        (&map, "overlap", 9, "overlap: k: expected between 1 and 8 (other records), found 9"),
+        (
+            &short,
+            "overlap",
+            1,
+            "overlap: descriptors for overlap: expected SIFT descriptors (128 values each, none negative), \
+             found 3 values each",
+        ),
+        (
+            &bare,
+            "similarity",
+            1,
+            "similarity: released map: expected descriptors, which this source compares, found none",
+        ),
+    ] {
+        assert_eq!(source::<3>(name).lists(map, k, 0).unwrap_err().to_string(), message);
+    }
 }
 
 #[test]
@@ -204,7 +182,7 @@ fn lists_say_what_they_are_about() {
     for slots_per_record in [1, 2] {
         let map = released(&random_map(200), slots_per_record);
         for name in SOURCES.iter().map(|entry| entry.name) {
-            let about = of_name(name).lists(&map, 6, 0).unwrap().about();
+            let about = source::<3>(name).lists(&map, 6, 0).unwrap().about();
             assert_eq!(about.map, Some(map.fingerprint()), "{name}");
             let order = match name {
                 "geometric" => RowOrder::Either,
@@ -215,13 +193,9 @@ fn lists_say_what_they_are_about() {
     }
 }
 
-/// Returns lists for a small K, of a room with paired lines.
+/// Returns true neighbors for a small K, of a room with paired lines.
 fn near(k: usize) -> TrueNeighbors {
-    let points = unlift::synthetic::room(2, 120).points;
-    let original = Original::new(PointSet::try_new(points, Unit::Meter).unwrap());
-    let (_, secret) = obfuscate(&Ppl, &original, None, &Key::from_seed(1)).unwrap();
-    let knn = oracle::search(&original).unwrap();
-    TrueNeighbors::new(&knn, &secret, secret.slots_per_record(), k).unwrap()
+    hide::<3>(entry("ppl"), &synthetic::room(2, 120).points, 1).near(k)
 }
 
 #[test]
@@ -237,9 +211,9 @@ fn a_ratio_above_zero_is_not_zero() {
 fn the_ratio_of_lists_in_either_order_is_that_of_the_better_one() {
     let near = near(9);
     let lists = near.at_inlier_ratio(1.0, 1).unwrap();
-    let records = (0..lists.n_slots()).flat_map(|slot| lists.of(slot ^ 1).to_vec()).collect();
-    let n = lists.n_slots() / 2;
-    let turned = Neighborhoods::try_new(lists.offsets().to_vec(), records, None, n, 2).unwrap();
+    let row = |slot: usize| lists.of(slot ^ 1).iter().map(|record| record.0).collect();
+    let rows: Vec<_> = (0..lists.n_slots()).map(row).collect();
+    let turned = lists_of(&rows, lists.n_slots() / 2, 2);
     let measured = |order| {
         let about = About { order, ..lists.about() };
         near.measured_inlier_ratio(&turned.clone().with_about(about))
