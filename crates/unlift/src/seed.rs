@@ -140,27 +140,33 @@ mod tests {
         // A change here changes every published figure. The values come from an independent
         // ChaCha20 in Python after the RFC: stage key = first half block of (key, stage), then
         // (stage key, item).
-        let take = |key: &Key, stage, item| {
+        let [zero, seven] = [0, 7].map(Key::from_seed);
+        let image = seven.of_item(Stage::Image, 1 << 40);
+        for (key, stage, item, [first, second, below, unit]) in [
+            (
+                &zero,
+                Stage::Scheme,
+                0,
+                [0xc449d82d52b1ee6d, 0xef6b294ef0e03d7a, 277, 0x3fe86b613406ebe6],
+            ),
+            (
+                &seven,
+                Stage::SlotOrder,
+                42,
+                [0x01c54f6c3e1024ac, 0x3d757401d663bba4, 910, 0x3fd95d0a8f48ff4e],
+            ),
+            (
+                &image,
+                Stage::Scheme,
+                3,
+                [0x32fbce5d3c631358, 0x870945d5248d60d9, 724, 0x3fe20ea632582814],
+            ),
+        ] {
             let mut draws = key.draws(stage, item);
-            [draws.bits(), draws.bits(), draws.below(1000), draws.unit().to_bits()]
-        };
-        assert_eq!(
-            take(&Key::from_seed(0), Stage::Scheme, 0),
-            [0xc449_d82d_52b1_ee6d, 0xef6b_294e_f0e0_3d7a, 277, 0x3fe8_6b61_3406_ebe6]
-        );
-        assert_eq!(
-            take(&Key::from_seed(7), Stage::SlotOrder, 42),
-            [0x01c5_4f6c_3e10_24ac, 0x3d75_7401_d663_bba4, 910, 0x3fd9_5d0a_8f48_ff4e]
-        );
-        let image = Key::from_seed(7).of_item(Stage::Image, 1 << 40);
-        assert_eq!(
-            take(&image, Stage::Scheme, 3),
-            [0x32fb_ce5d_3c63_1358, 0x8709_45d5_248d_60d9, 724, 0x3fe2_0ea6_3258_2814]
-        );
-        assert_eq!(
-            Key::from_seed(0).draws(Stage::Shuffle, 0).permutation(8),
-            [5, 1, 6, 2, 3, 0, 7, 4]
-        );
+            assert_eq!([draws.bits(), draws.bits()], [first, second]);
+            assert_eq!([draws.below(1000), draws.unit().to_bits()], [below, unit]);
+        }
+        assert_eq!(zero.draws(Stage::Shuffle, 0).permutation(8), [5, 1, 6, 2, 3, 0, 7, 4]);
     }
 
     #[test]

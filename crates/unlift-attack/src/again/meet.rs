@@ -207,25 +207,3 @@ pub(super) fn trust(distances: &[f64]) -> (Vec<f64>, f64) {
     }
     (found, scale)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::seed::{Draws, Stage};
-
-    #[test]
-    fn right_links_are_told_from_wrong_ones() {
-        for noise in [1e-7, 1e-4, 1e-2] {
-            let mut draws = Draws::new(1, Stage::Synthetic, 0);
-            let mut exponential = || -draws.between(1e-9, 1.0).ln();
-            let right: Vec<f64> = (0..700).map(|_| noise * exponential()).collect();
-            let wrong: Vec<f64> = (0..300).map(|_| exponential()).collect();
-            let (found, scale) = trust(&[right, wrong].concat());
-            assert!((0.2..2.0).contains(&(scale / noise)), "{scale} for {noise}");
-            let sure = |range: std::ops::Range<usize>| {
-                found[range].iter().filter(|&&found| found >= 0.9).count()
-            };
-            assert!(sure(0..700) > 650 && sure(700..1000) < 30, "{noise}");
-        }
-    }
-}

@@ -102,30 +102,3 @@ fn power_of_two_below(x: f64) -> f64 {
     // Clearing the mantissa is exact, unlike 2^floor(log2 x).
     f64::from_bits(x.to_bits() & 0x7FF0_0000_0000_0000)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_origin_follows_a_georeferenced_map() {
-        let points: Vec<[f64; 3]> =
-            (0..100).map(|i| [1e6 + f64::from(i) * 0.1, -5e6, 300.0 + f64::from(i % 7)]).collect();
-        let origin = rounded_origin(&points);
-        assert!((origin[0] - 1e6).abs() <= 10.0 && (origin[1] + 5e6).abs() <= 1.0, "{origin:?}");
-    }
-
-    #[test]
-    fn a_line_is_clipped_to_the_box() {
-        let bounds = Bounds { low: [0.0; 2], high: [2.0, 1.0] };
-        assert_eq!(bounds.clip(&[-1.0, 0.5], &[1.0, 0.0]), Some((1.0, 3.0)));
-        assert_eq!(bounds.clip(&[-1.0, 1.5], &[1.0, 0.0]), None);
-    }
-
-    #[test]
-    fn powers_of_two() {
-        assert_eq!(power_of_two_below(0.7), 0.5);
-        assert_eq!(power_of_two_below(8.0), 8.0);
-        assert_eq!(power_of_two_below(0.0), 1.0);
-    }
-}

@@ -568,49 +568,37 @@ mod tests {
     use crate::geometry::vector::squared_distance;
     use crate::seed::{Draws, Stage};
 
-    fn brute_force<const D: usize>(
-        points: &[[f64; D]],
-        query: &[f64; D],
-        skip: Option<usize>,
-        k: usize,
-    ) -> Vec<(f64, u32)> {
-        let mut all: Vec<(f64, u32)> = (0..points.len())
-            .filter(|&other| Some(other) != skip)
-            .map(|other| (squared_distance(query, &points[other]), other as u32))
-            .collect();
-        all.sort_unstable_by_key(canonical);
-        all.truncate(k);
-        all
-    }
-
+    /// Compares the neighbors of all rows, and of some places between them, with brute force.
     fn compare<const D: usize>(points: &[[f64; D]]) {
+        let brute_force = |query: &[f64; D], skip: usize, k: usize| {
+            let mut all: Vec<(f64, u32)> = (0..points.len())
+                .filter(|&other| other != skip)
+                .map(|other| (squared_distance(query, &points[other]), other as u32))
+                .collect();
+            all.sort_unstable_by_key(canonical);
+            all.truncate(k);
+            all
+        };
         let knn = Knn::new(points).unwrap();
         let mut found = Vec::new();
-        for row in 0..points.len() {
-            for k in [1, 7, 50] {
-                knn.nearest(row, k, &mut found);
-                assert_eq!(found, brute_force(points, &points[row], Some(row), k), "{row}, k {k}");
-            }
-        }
         for k in [1, 7, 50] {
             let all = knn.per_row(k, |_, found| found.to_vec());
-            for (row, found) in all.iter().enumerate() {
-                assert_eq!(found, &brute_force(points, &points[row], Some(row), k), "{row}, k {k}");
+            for (row, point) in points.iter().enumerate() {
+                let expected = brute_force(point, row, k);
+                assert_eq!(all[row], expected, "{row}, k {k}");
+                knn.nearest(row, k, &mut found);
+                assert_eq!(found, expected, "{row}, k {k}");
+                if row % 8 == 0 {
+                    let query = std::array::from_fn(|c| 0.7 * point[c] + 0.4 * points[row / 2][c]);
+                    knn.nearest_to(query, k, &mut found);
+                    assert_eq!(found, brute_force(&query, usize::MAX, k), "at {query:?}, k {k}");
+                }
             }
         }
     }
 
     #[test]
-    fn equals_brute_force_with_many_ties() {
-        let mut draws = Draws::new(5, Stage::Synthetic, 0);
-        // A coarse lattice: most distances tie, many points coincide.
-        let lattice: Vec<[f64; 3]> =
-            (0..800).map(|_| std::array::from_fn(|_| draws.below(6) as f64)).collect();
-        compare(&lattice);
-    }
-
-    #[test]
-    fn equals_brute_force_at_every_size_and_density() {
+    fn equals_brute_force_at_every_size_and_density_and_with_many_ties() {
         for n in [2, 23, 24, 25, 48, 49, 97, 300, 1000] {
             let mut draws = Draws::new(n, Stage::Synthetic, 0);
             // Cubing makes the middle a million times denser than the border.
@@ -620,21 +608,18 @@ mod tests {
                 (0..n).map(&mut points).map(|p: [f64; 3]| [p[0], p[1]]).collect();
             compare(&flat);
         }
-    }
-
-    /// Depth cameras write (0, 0, 0) for missing points, so that thousands coincide.
-    #[test]
-    fn piles_are_as_if_every_point_was_looked_at() {
-        let mut draws = Draws::new(3, Stage::Synthetic, 0);
+        // A coarse lattice: most distances tie, many points coincide.
+        let mut draws = Draws::new(5, Stage::Synthetic, 0);
+        let lattice = (0..800).map(|_| std::array::from_fn(|_| draws.below(6) as f64));
+        compare(&lattice.collect::<Vec<[f64; 3]>>());
+        // Depth cameras write (0, 0, 0) for missing points, so that thousands coincide.
         for share in [0.3, 0.9] {
-            let points: Vec<[f64; 3]> = (0..900)
-                .map(|row| match draws.unit() < share {
-                    // Zeros of both signs are equal.
-                    true => [if row % 2 == 0 { 0.0 } else { -0.0 }, 0.0, 0.0],
-                    false => std::array::from_fn(|_| draws.between(-1.0, 1.0)),
-                })
-                .collect();
-            compare(&points);
+            let point = |row| match draws.unit() < share {
+                // Zeros of both signs are equal.
+                true => [if row % 2 == 0 { 0.0 } else { -0.0 }, 0.0, 0.0],
+                false => std::array::from_fn(|_| draws.between(-1.0, 1.0)),
+            };
+            compare(&(0..900).map(point).collect::<Vec<[f64; 3]>>());
         }
     }
 
@@ -649,20 +634,6 @@ mod tests {
     }
 
     #[test]
-    fn any_position_can_ask() {
-        let mut draws = Draws::new(9, Stage::Synthetic, 0);
-        let points: Vec<[f64; 3]> =
-            (0..700).map(|_| std::array::from_fn(|_| draws.normal())).collect();
-        let knn = Knn::new(&points).unwrap();
-        let mut found = Vec::new();
-        for _ in 0..200 {
-            let query = std::array::from_fn(|_| 3.0 * draws.normal());
-            knn.nearest_to(query, 20, &mut found);
-            assert_eq!(found, brute_force(&points, &query, None, 20));
-        }
-    }
-
-    #[test]
     fn values_per_row_come_in_the_order_of_rows() {
         let points = [[0.0, 0.0], [5.0, 0.0], [1.0, 0.0]];
         let knn = Knn::new(&points).unwrap();
@@ -670,11 +641,6 @@ mod tests {
         let mut order = knn.spatial_order().to_vec();
         order.sort_unstable();
         assert_eq!(order, [0, 1, 2]);
-    }
-
-    #[test]
-    fn no_points_and_no_numbers_are_refused() {
-        assert!(Knn::<3>::new(&[]).is_err());
-        assert!(Knn::new(&[[0.0, f64::NAN]]).is_err());
+        assert!(Knn::<3>::new(&[]).is_err() && Knn::new(&[[0.0, f64::NAN]]).is_err());
     }
 }

@@ -93,37 +93,3 @@ pub fn means(descriptors: &Descriptors, slots: &[u32]) -> Result<Descriptors, Er
     let values: Vec<f32> = slots.par_chunks(BLOCK).flat_map_iter(mean).collect();
     Descriptors::try_new(Values::F32(values), descriptors.dim())
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::seed::{Draws, Stage};
-
-    #[test]
-    fn blocks_hold_rows_that_look_alike() {
-        // Eight kinds of rows, in random order.
-        let mut draws = Draws::new(1, Stage::Synthetic, 0);
-        let kinds: Vec<usize> = (0..8 * BLOCK).map(|_| draws.below(8) as usize).collect();
-        let values = kinds.iter().flat_map(|&kind| {
-            let noise: [u8; 8] = std::array::from_fn(|_| draws.below(20) as u8);
-            std::array::from_fn::<u8, 8, _>(|c| if c == kind { 200 } else { noise[c] })
-        });
-        let descriptors = Descriptors::try_new(Values::U8(values.collect()), 8).unwrap();
-        let slots: Vec<u32> = (0..kinds.len() as u32).collect();
-        let order = order(&descriptors, &slots);
-        let mut sorted = order.clone();
-        sorted.sort_unstable();
-        assert_eq!(sorted, slots);
-        // A split may cut through a kind, but a block holds only few kinds.
-        let n_kinds = |block: &[u32]| {
-            let mut kinds: Vec<usize> = block.iter().map(|&slot| kinds[slot as usize]).collect();
-            kinds.sort_unstable();
-            kinds.dedup();
-            kinds.len()
-        };
-        let mean = order.chunks(BLOCK).map(n_kinds).sum::<usize>() as f64 / 8.0;
-        assert!(mean <= 3.0, "{mean} kinds per block");
-        let means = means(&descriptors, &order).unwrap();
-        assert_eq!((means.len(), means.dim()), (8, 8));
-    }
-}

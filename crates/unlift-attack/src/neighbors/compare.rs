@@ -394,19 +394,12 @@ mod tests {
     /// `n` rows around random middles, about six to each.
     fn crowds(n: usize, dim: usize) -> Descriptors {
         let mut draws = Draws::new(4, Stage::Synthetic, 0);
-        let mut middles = || (0..dim).map(|_| draws.between(20.0, 120.0)).collect::<Vec<f64>>();
-        let middles: Vec<Vec<f64>> = (0..n.div_ceil(6)).map(|_| middles()).collect();
+        let mut middle = || (0..dim).map(|_| draws.between(20.0, 120.0)).collect::<Vec<f64>>();
+        let middles: Vec<Vec<f64>> = (0..n.div_ceil(6)).map(|_| middle()).collect();
         let mut draws = Draws::new(5, Stage::Synthetic, 0);
-        let values = (0..n).flat_map(|row| {
-            let noise: Vec<f64> = (0..dim).map(|_| 6.0 * draws.normal()).collect();
-            let middle = &middles[row % middles.len()];
-            middle
-                .iter()
-                .zip(noise)
-                .map(|(x, noise)| (x + noise).clamp(0.0, 255.0) as u8)
-                .collect::<Vec<u8>>()
-        });
-        Descriptors::try_new(Values::U8(values.collect()), dim).unwrap()
+        let rows = (0..n).flat_map(|row| &middles[row % middles.len()]);
+        let values = rows.map(|x| (x + 6.0 * draws.normal()).clamp(0.0, 255.0) as u8).collect();
+        Descriptors::try_new(Values::U8(values), dim).unwrap()
     }
 
     /// What every slot found: slots instead of rows.
@@ -420,41 +413,24 @@ mod tests {
         let found = search(likeness, &mut rows, most, exact).unwrap();
         let mut by_slot = vec![Vec::new(); rows.len()];
         for (found, &slot) in found.into_iter().zip(&rows.slots) {
-            by_slot[slot as usize] = found
-                .best
-                .into_iter()
-                .map(|(score, row)| (score, rows.slots[row as usize]))
-                .collect();
+            let best = found.best.into_iter();
+            by_slot[slot as usize] =
+                best.map(|(score, row)| (score, rows.slots[row as usize])).collect();
         }
         by_slot
-    }
-
-    /// The share of `right` that is in `found`.
-    fn recall(found: &[Vec<(f32, u32)>], right: &[Vec<(f32, u32)>]) -> f64 {
-        let slots = |list: &[(f32, u32)]| list.iter().map(|&(_, slot)| slot).collect::<Vec<u32>>();
-        let in_both: usize = found
-            .iter()
-            .zip(right)
-            .map(|(found, right)| {
-                let found = slots(found);
-                slots(right).iter().filter(|slot| found.contains(slot)).count()
-            })
-            .sum();
-        in_both as f64 / right.iter().map(Vec::len).sum::<usize>() as f64
     }
 
     #[test]
     fn few_blocks_all_meet() {
         let descriptors = crowds(1_500, 128);
         const { assert!(1_500 < BLOCK * PARTNERS) };
-        let scores = |found: Vec<Vec<(f32, u32)>>| -> Vec<Vec<f32>> {
-            found.iter().map(|list| list.iter().map(|&(score, _)| score).collect()).collect()
-        };
-        let cosines = |exact| scores(found(&Cosine { counts: false }, &descriptors, 10, exact));
-        assert_eq!(cosines(0), cosines(MOST_ROWS));
+        fn scores<L: Likeness>(likeness: &L, of: &Descriptors, exact: usize) -> Vec<f32> {
+            found(likeness, of, 10, exact).concat().into_iter().map(|(score, _)| score).collect()
+        }
+        let cosine = Cosine { counts: false };
+        assert_eq!(scores(&cosine, &descriptors, 0), scores(&cosine, &descriptors, MOST_ROWS));
         let patches = Patches::of(&descriptors).unwrap();
-        let overlaps = |exact| scores(found(&patches, &descriptors, 10, exact));
-        assert_eq!(overlaps(0), overlaps(MOST_ROWS));
+        assert_eq!(scores(&patches, &descriptors, 0), scores(&patches, &descriptors, MOST_ROWS));
     }
 
     #[test]
@@ -462,12 +438,18 @@ mod tests {
         let descriptors = crowds(30_000, 16);
         let n_blocks = 30_000usize.div_ceil(BLOCK);
         assert!(n_blocks > 3 * PARTNERS, "a third of the blocks");
-        let right = found(&Cosine { counts: false }, &descriptors, 5, MOST_ROWS);
-        let some = found(&Cosine { counts: false }, &descriptors, 5, 0);
-        let recall = recall(&some, &right);
+        let cosine = Cosine { counts: false };
+        let right = found(&cosine, &descriptors, 5, MOST_ROWS);
+        let some = found(&cosine, &descriptors, 5, 0);
+        let lists = some.iter().zip(&right);
+        let in_both = lists.map(|(found, right)| {
+            right.iter().filter(|right| found.iter().any(|found| found.1 == right.1)).count()
+        });
+        let n_both: usize = in_both.sum();
+        let recall = n_both as f64 / right.iter().map(Vec::len).sum::<usize>() as f64;
         assert!(recall >= 0.9, "{recall}");
         let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
-        assert_eq!(pool.install(|| found(&Cosine { counts: false }, &descriptors, 5, 0)), some);
+        assert_eq!(pool.install(|| found(&cosine, &descriptors, 5, 0)), some);
     }
 
     #[test]

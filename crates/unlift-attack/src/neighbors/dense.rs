@@ -174,41 +174,27 @@ mod tests {
     use crate::descriptors::Values;
     use crate::seed::{Draws, Stage};
 
-    fn patches(n: usize) -> Vec<[u8; 128]> {
-        let mut draws = Draws::new(3, Stage::Synthetic, 0);
-        (0..n).map(|_| std::array::from_fn(|_| draws.below(60) as u8)).collect()
-    }
-
-    fn scores(patches: &[[u8; 128]]) -> Dense {
-        dense(&Descriptors::try_new(Values::U8(patches.concat()), 128).unwrap(), None).unwrap()
-    }
-
     #[test]
     fn a_shifted_copy_is_found_at_its_reach() {
-        let mut all = patches(200);
+        let mut draws = Draws::new(3, Stage::Synthetic, 0);
+        let mut all: Vec<u8> = (0..200 * 128).map(|_| draws.below(60) as u8).collect();
         // Patch 150 shows the content of patch 3, one cell to the right.
-        for row in 0..4 {
-            for column in 0..3 {
-                let (from, to) = ((4 * row + column + 1) * 8, (4 * row + column) * 8);
-                let cell: [u8; 8] = all[3][from..from + 8].try_into().unwrap();
-                all[150][to..to + 8].copy_from_slice(&cell);
-            }
+        for cell in (0..4).flat_map(|row| [4 * row, 4 * row + 1, 4 * row + 2]) {
+            let from = 3 * 128 + (cell + 1) * 8;
+            all.copy_within(from..from + 8, 150 * 128 + cell * 8);
         }
-        let found = scores(&all);
-        let of = |reach: usize, i: usize, j: usize| found.scores()[(reach * 200 + i) * 200 + j];
-        assert!(of(1, 3, 150) > of(0, 3, 150) + 2.0 && of(1, 3, 150) > of(2, 3, 150) + 2.0);
-        let best = (0..200).max_by(|&a, &b| of(1, 3, a).total_cmp(&of(1, 3, b)));
+        let of = |values: &[u8]| Descriptors::try_new(Values::U8(values.to_vec()), 128).unwrap();
+        let found = dense(&of(&all), None).unwrap();
+        let score = |reach: usize, i: usize, j: usize| found.scores()[(reach * 200 + i) * 200 + j];
+        let shifted = score(1, 3, 150);
+        assert!(shifted > score(0, 3, 150) + 2.0 && shifted > score(2, 3, 150) + 2.0);
+        let best = (0..200).max_by(|&a, &b| score(1, 3, a).total_cmp(&score(1, 3, b)));
         assert_eq!(best, Some(150));
         for (i, j) in [(3, 150), (0, 199), (17, 17)] {
-            assert_eq!(of(2, i, j), of(2, j, i));
+            assert_eq!(score(2, i, j), score(2, j, i));
         }
-        assert_eq!(of(0, 17, 17), 0.0);
-    }
-
-    #[test]
-    fn one_patch_has_no_pairs() {
-        let one = Descriptors::try_new(Values::U8(patches(1).concat()), 128).unwrap();
-        let message = dense(&one, None).unwrap_err().to_string();
+        assert_eq!(score(0, 17, 17), 0.0);
+        let message = dense(&of(&all[..128]), None).unwrap_err().to_string();
         assert_eq!(message, "dense scores: expected 2 to 8192 descriptors, found 1");
     }
 
@@ -216,23 +202,21 @@ mod tests {
     fn others_than_sift_are_compared_by_cosine() {
         let mut draws = Draws::new(4, Stage::Synthetic, 0);
         let mut values: Vec<f32> = (0..40 * 16).map(|_| draws.between(-1.0, 1.0) as f32).collect();
-        let copied: Vec<f32> = values[..16].iter().map(|x| 3.0 * x).collect();
-        values[7 * 16..8 * 16].copy_from_slice(&copied);
+        for c in 0..16 {
+            values[7 * 16 + c] = 3.0 * values[c];
+        }
         let all = Descriptors::try_new(Values::F32(values), 16).unwrap();
         let found = dense(&all, None).unwrap();
         assert_eq!((found.n(), found.reaches()), (40, 1));
         let of = |i: usize, j: usize| found.scores()[i * 40 + j];
         let best = (1..40).max_by(|&a, &b| of(0, a).total_cmp(&of(0, b)));
-        assert_eq!(best, Some(7));
-        assert_eq!(of(0, 7), of(7, 0));
-        assert_eq!(of(9, 9), 0.0);
+        assert_eq!((best, of(0, 7), of(9, 9)), (Some(7), of(7, 0), 0.0));
         // Standardized scores of every row have mean 0, so all of them do.
         let mean = found.scores().iter().sum::<f32>() / 1600.0;
         assert!(mean.abs() < 1e-4, "{mean}");
         // Twice the deviation gives half the score.
-        let narrow = dense(&all, Some(&[(0.0, 1.0); 40])).unwrap();
-        let wide = dense(&all, Some(&[(0.0, 2.0); 40])).unwrap();
-        assert_eq!(narrow.scores()[7], 2.0 * wide.scores()[7]);
-        assert!((narrow.scores()[7] - 1.0).abs() < 1e-6);
+        let [narrow, wide] =
+            [1.0, 2.0].map(|by| dense(&all, Some(&[(0.0, by); 40])).unwrap().scores()[7]);
+        assert!(narrow == 2.0 * wide && (narrow - 1.0).abs() < 1e-6);
     }
 }

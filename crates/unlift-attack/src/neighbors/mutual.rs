@@ -188,36 +188,31 @@ mod tests {
     fn lanes_find_what_plain_comparison_finds() {
         let (a, b) = (random(1300, 1), random(301, 2));
         let (blocks_a, blocks_b) = (Blocks::new(&a), Blocks::new(&b));
-        let mut scores = vec![vec![0.0; b.len()]; a.len()];
+        let mut scores =
+            vec![vec![0.0; blocks_b.blocks.len() * BLOCK]; blocks_a.blocks.len() * BLOCK];
         let mut block = vec![0.0; BLOCK * BLOCK];
         for (i, own) in blocks_a.blocks.iter().enumerate() {
             for (j, other) in blocks_b.blocks.iter().enumerate() {
                 COSINE.scores(own, other, &mut block);
                 for (at, &score) in block.iter().enumerate() {
-                    let (row, column) = (i * BLOCK + at / BLOCK, j * BLOCK + at % BLOCK);
-                    if row < a.len() && column < b.len() {
-                        scores[row][column] = score;
-                    }
+                    scores[i * BLOCK + at / BLOCK][j * BLOCK + at % BLOCK] = score;
                 }
             }
         }
-        let nearest = |of: &mut dyn Iterator<Item = f32>| {
-            let mut all: Vec<(u32, f32)> = (0..).zip(of).collect();
-            all.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-            Nearest { at: all[0].0, first: all[0].1, second: all[1].1 }
+        let nearest = |of: &dyn Fn(usize) -> f32, n: usize| {
+            let mut all: Vec<usize> = (0..n).collect();
+            all.sort_by(|&a, &b| of(b).total_cmp(&of(a)).then(a.cmp(&b)));
+            Nearest { at: all[0] as u32, first: of(all[0]), second: of(all[1]) }
         };
-        let rows: Vec<Nearest> =
-            scores.iter().map(|row| nearest(&mut row.iter().copied())).collect();
-        let column = |c: usize| nearest(&mut scores.iter().map(|row| row[c]));
-        let columns: Vec<Nearest> = (0..b.len()).map(column).collect();
-        let plain: Vec<(u32, u32, f32)> = (0..a.len())
-            .filter(|&row| columns[rows[row].at as usize].at as usize == row)
-            .map(|row| {
-                let nearest = rows[row];
-                let ratio = nearest.ratio().max(columns[nearest.at as usize].ratio());
-                (row as u32, nearest.at, ratio)
-            })
-            .collect();
+        let columns: Vec<Nearest> =
+            (0..b.len()).map(|column| nearest(&|row| scores[row][column], a.len())).collect();
+        let pair = |row: usize| {
+            let own = nearest(&|column| scores[row][column], b.len());
+            let other = &columns[own.at as usize];
+            let ratio = own.ratio().max(other.ratio());
+            (other.at as usize == row).then_some((row as u32, own.at, ratio))
+        };
+        let plain: Vec<(u32, u32, f32)> = (0..a.len()).filter_map(pair).collect();
         assert_eq!(mutual(&blocks_a, &blocks_b), plain);
         assert!(plain.len() > 20, "{}", plain.len());
     }

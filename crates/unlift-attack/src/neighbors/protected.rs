@@ -105,35 +105,23 @@ mod tests {
         let mut draws = Draws::new(1, Stage::Shapes, 0);
         let words = (0..32 * 4).map(|_| draws.normal() as f32).collect();
         let words = crate::Descriptors::try_new(Values::F32(words), 4).unwrap();
+        let words = std::sync::Arc::new(words);
+        let of = |rows| {
+            let rule = Rule::Words { m: 2, epsilon: 4.0 };
+            ProtectedDescriptors::try_new(rule, rows, Some(words.clone()), false)
+        };
         // Word 0 is frequent.
         let rows = [[0, 1], [0, 2], [0, 3], [0, 4], [0, 5], [6, 7], [6, 8], [9, 10]];
-        let rows: Vec<Vec<f32>> = rows.iter().map(|row| row.map(|x| x as f32).to_vec()).collect();
-        let n = rows.len();
-        let rule = Rule::Words { m: 2, epsilon: 4.0 };
-        let made =
-            ProtectedDescriptors::try_new(rule, rows, Some(std::sync::Arc::new(words)), false);
-        let made = made.unwrap();
+        let made = of(rows.iter().map(|row| row.map(|x| x as f32).to_vec()).collect()).unwrap();
         let shared = Shared::new(&made, false).unwrap();
-        let block = shared.block(made.rows(), &(0..n as u32).collect::<Vec<_>>());
+        let block = shared.block(made.rows(), &(0..rows.len() as u32).collect::<Vec<_>>());
         let mut scores = vec![0.0; BLOCK * BLOCK];
         shared.scores(&block, &block, &mut scores);
-        let of = |i: usize, j: usize| scores[i * BLOCK + j];
-        assert!(
-            of(5, 6) > of(0, 1) && of(0, 1) > of(0, 7),
-            "{} {} {}",
-            of(5, 6),
-            of(0, 1),
-            of(0, 7)
-        );
-        assert_eq!(of(0, 5), of(5, 0));
-        let outside = vec![vec![1.0, 32.0]];
-        let error = ProtectedDescriptors::try_new(
-            rule,
-            outside,
-            made.public().cloned().map(Into::into),
-            false,
-        );
-        let expected = "protected descriptors: expected words below 32, found 32";
-        assert_eq!(error.unwrap_err().to_string(), expected);
+        let score = |i: usize, j: usize| scores[i * BLOCK + j];
+        let [rare, frequent, none] = [score(5, 6), score(0, 1), score(0, 7)];
+        assert!(rare > frequent && frequent > none, "{rare} {frequent} {none}");
+        assert_eq!(score(0, 5), score(5, 0));
+        let error = of(vec![vec![1.0, 32.0]]).unwrap_err().to_string();
+        assert_eq!(error, "protected descriptors: expected words below 32, found 32");
     }
 }

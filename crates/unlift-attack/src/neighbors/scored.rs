@@ -337,7 +337,7 @@ mod tests {
     use crate::released::{Lines, Obfuscation};
 
     /// Points along a closed curve, whose descriptors change slowly.
-    fn released(n: usize) -> Released<3> {
+    fn released(n: usize, is_sift: bool) -> Released<3> {
         let points: Vec<[f64; 3]> = (0..n).map(|i| [i as f64, 0.0, (i % 7) as f64]).collect();
         let lines = Lines::through(&points, &vec![[0.0, 1.0, 0.5]; n]).unwrap();
         let byte = |at: usize, bin: usize| {
@@ -345,8 +345,12 @@ mod tests {
             let wave = libm::sin(turn * (1 + bin % 9) as f64 + (bin * bin) as f64);
             (60.0 + 50.0 * wave) as u8
         };
-        let bytes = (0..n).flat_map(|at| (0..128).map(move |bin| byte(at, bin))).collect();
-        let descriptors = Descriptors::try_new(Values::U8(bytes), 128).unwrap();
+        let bytes = (0..n).flat_map(|at| (0..128).map(move |bin| byte(at, bin)));
+        let values = match is_sift {
+            true => Values::U8(bytes.collect()),
+            false => Values::F32(bytes.map(|byte| f32::from(byte) - 60.0).collect()),
+        };
+        let descriptors = Descriptors::try_new(values, 128).unwrap();
         let obfuscation = Obfuscation::Lines(lines);
         Released::try_new(obfuscation, 1, [0.0; 3], Unit::Meter, Some(descriptors)).unwrap()
     }
@@ -363,28 +367,6 @@ mod tests {
         Ok(pairs.map(score).collect())
     }
 
-    /// Fraction of entries at most `k / 2 + 3` steps away along the curve.
-    fn right(lists: &Neighborhoods, n: usize, k: usize) -> f64 {
-        let apart = |slot: usize, record: usize| {
-            let steps = slot.abs_diff(record);
-            steps.min(n - steps)
-        };
-        let near = |slot: usize| {
-            lists.of(slot).iter().filter(|record| apart(slot, record.index()) <= k / 2 + 3).count()
-        };
-        (0..n).map(near).sum::<usize>() as f64 / (n * k) as f64
-    }
-
-    #[test]
-    fn what_scores_call_near_is_listed_in_one_set_and_in_several() {
-        for n in [300, WHOLE + 500] {
-            let map = released(n);
-            let lists = scored(&map, 10, &alike).unwrap();
-            let right = right(&lists, n, 10);
-            assert!(right > 0.9, "{n} points: {right}");
-        }
-    }
-
     /// Scores of one set in which opposite points are near.
     fn opposite(part: &Part) -> Result<Vec<f32>, Error> {
         let n = part.descriptors.len();
@@ -392,34 +374,40 @@ mod tests {
         Ok((0..n * n).map(|at| near(at / n, at % n)).collect())
     }
 
+    /// Fraction of entries at most `k / 2 + 3` steps away along the curve.
+    fn right(lists: &Neighborhoods, n: usize, k: usize) -> f64 {
+        let is_near = |slot: usize, record: usize| {
+            let steps = slot.abs_diff(record);
+            steps.min(n - steps) <= k / 2 + 3
+        };
+        let near = |slot: usize| lists.of(slot).iter().filter(|r| is_near(slot, r.index())).count();
+        (0..n).map(near).sum::<usize>() as f64 / (n * k) as f64
+    }
+
     #[test]
-    fn scores_alone_decide_the_lists_of_others_than_sift() {
-        let sift = released(300);
-        let Values::U8(bytes) = sift.descriptors().unwrap().values() else { panic!("bytes") };
-        let signed = bytes.iter().map(|&byte| f32::from(byte) - 60.0).collect();
-        let descriptors = Descriptors::try_new(Values::F32(signed), 128).unwrap();
-        let map = Released::try_new(
-            sift.obfuscation().clone(),
-            1,
-            [0.0; 3],
-            Unit::Meter,
-            Some(descriptors),
-        );
-        let lists = scored(&map.unwrap(), 10, &opposite).unwrap();
-        let right = right(&lists, 300, 10);
+    fn what_scores_call_near_is_listed_in_one_set_and_in_several() {
+        for n in [300, WHOLE + 500] {
+            let right = right(&scored(&released(n, true), 10, &alike).unwrap(), n, 10);
+            assert!(right > 0.9, "{n} points: {right}");
+        }
+        // Scores alone decide the lists of others than SIFT.
+        let right = right(&scored(&released(300, false), 10, &opposite).unwrap(), 300, 10);
         assert!(right < 0.15, "{right}");
     }
 
     #[test]
     fn scores_that_are_none_are_refused() {
-        let message =
-            |scores: &Scores<'_>| scored(&released(20), 5, scores).unwrap_err().to_string();
-        let expected = "scores of pairs: expected 20 x 20 numbers, found";
-        assert_eq!(message(&|_| Ok(vec![0.0; 7])), format!("{expected} 7"));
-        assert_eq!(message(&|_| Ok(vec![f32::NAN; 400])), format!("{expected} NaN"));
-        assert_eq!(message(&|_| Ok(vec![f32::NEG_INFINITY; 400])), format!("{expected} -inf"));
+        let scored = |values: Vec<f32>| scored(&released(20, true), 5, &|_| Ok(values.clone()));
+        for (values, found) in [
+            (vec![0.0; 7], "7"),
+            (vec![f32::NAN; 400], "NaN"),
+            (vec![f32::NEG_INFINITY; 400], "-inf"),
+        ] {
+            let expected = format!("scores of pairs: expected 20 x 20 numbers, found {found}");
+            assert_eq!(scored(values).unwrap_err().to_string(), expected);
+        }
         let diagonal = (0..400).map(|at| if at % 21 == 0 { f32::NAN } else { 0.0 });
-        assert!(scored(&released(20), 5, &|_| Ok(diagonal.clone().collect())).is_ok());
+        assert!(scored(diagonal.collect()).is_ok());
     }
 
     #[test]
@@ -430,27 +418,20 @@ mod tests {
             let at = |step: usize, other: usize| (6.0 - step as f32 / 2.0, (other % n) as u32);
             (1..=4).flat_map(|step| [at(step, row + step), at(step, row + n - step)]).collect()
         };
-        let ranked: Vec<_> = (0..n).map(near).collect();
-        let sets = around(&ranked);
-        let mut with_all = vec![0; n];
-        for Set { rows, inner } in &sets {
-            assert!(rows.len() <= SIZE && rows.is_sorted_by(|a, b| a < b));
-            assert_eq!(rows.len(), inner.len());
-            for (&row, _) in rows.iter().zip(inner).filter(|(_, inner)| **inner) {
-                let all = ranked[row as usize].iter().all(|(_, other)| rows.contains(other));
-                with_all[row as usize] += usize::from(all);
+        let lonely = vec![Vec::new(); 1500];
+        for ranked in [(0..n).map(near).collect(), lonely] {
+            let sets = around(&ranked);
+            let mut with_all = vec![0; ranked.len()];
+            for Set { rows, inner } in &sets {
+                assert!(rows.len() <= SIZE && rows.is_sorted_by(|a, b| a < b));
+                assert_eq!(rows.len(), inner.len());
+                for (&row, _) in rows.iter().zip(inner).filter(|(_, inner)| **inner) {
+                    let all = ranked[row as usize].iter().all(|(_, other)| rows.contains(other));
+                    with_all[row as usize] += usize::from(all);
+                }
             }
+            assert!(with_all.iter().all(|&times| times == TIMES), "a row without its partners");
+            assert_eq!(sets.len(), TIMES * ranked.len().div_ceil(INNER));
         }
-        assert!(with_all.iter().all(|&times| times == TIMES), "a row without its partners");
-        assert_eq!(sets.len(), TIMES * n.div_ceil(INNER));
-    }
-
-    #[test]
-    fn rows_without_partners_fill_sets_nevertheless() {
-        let ranked = vec![Vec::new(); 1500];
-        let sets = around(&ranked);
-        assert_eq!(sets.len(), TIMES * 1500usize.div_ceil(INNER));
-        let middles: usize = sets.iter().flat_map(|set| &set.inner).filter(|inner| **inner).count();
-        assert_eq!(middles, TIMES * 1500);
     }
 }

@@ -166,35 +166,32 @@ mod tests {
     use crate::neighbors::compare::MOST_ROWS;
     use crate::released::{Lines, Obfuscation};
 
-    /// A map of two hidden points with these descriptors.
-    fn map(values: Values) -> Released<3> {
-        let lines = Lines::through(&[[0.0; 3], [1.0; 3]], &[[0.0, 1.0, 0.5]; 2]).unwrap();
-        let dim = match &values {
-            Values::U8(values) => values.len() / 2,
-            Values::F32(values) => values.len() / 2,
-        };
-        let descriptors = Descriptors::try_new(values, dim).unwrap();
-        let obfuscation = Obfuscation::Lines(lines);
-        Released::try_new(obfuscation, 1, [0.0; 3], Unit::Meter, Some(descriptors)).unwrap()
+    fn named(name: &str) -> Named {
+        Named::parse(name).unwrap()
     }
 
     #[test]
     fn lists_are_as_long_as_the_source_chooses_or_as_asked() {
-        let named = |name: &str| Named::parse(name).unwrap();
-        let (sift, learned) = (
-            map(Values::U8((0..=255).collect())),
-            map(Values::F32((0..256).map(|at| -(at as f32)).collect())),
-        );
-        let k = |named: Named, map: &Released<3>| named.of_dimension::<3>().unwrap().k(map);
-        assert_eq!(k(named("overlap"), &sift), 35);
-        assert_eq!(k(named("similarity"), &sift), 30);
-        assert_eq!(k(named("similarity"), &learned), 12);
-        assert_eq!(k(named("overlap").with_k(7), &sift), 7);
+        let sift = Values::U8((0..=255).collect());
+        let learned = Values::F32((0..256).map(|at| -(at as f32)).collect());
+        let [sift, learned] = [sift, learned].map(|values| {
+            let lines = Lines::through(&[[0.0; 3], [1.0; 3]], &[[0.0, 1.0, 0.5]; 2]).unwrap();
+            let descriptors = Some(Descriptors::try_new(values, 128).unwrap());
+            Released::try_new(Obfuscation::Lines(lines), 1, [0.0; 3], Unit::Meter, descriptors)
+        });
+        for (source, map, k) in [
+            (named("overlap"), &sift, 35),
+            (named("similarity"), &sift, 30),
+            (named("similarity"), &learned, 12),
+            (named("overlap").with_k(7), &sift, 7),
+        ] {
+            assert_eq!(source.of_dimension::<3>().unwrap().k(map.as_ref().unwrap()), k);
+        }
     }
 
     #[test]
     fn only_large_maps_with_descriptors_call_for_a_note() {
-        let note = |name: &str, n| Named::parse(name).unwrap().of_dimension::<3>().unwrap().note(n);
+        let note = |name: &str, n| named(name).of_dimension::<3>().unwrap().note(n);
         assert!(note("similarity", MOST_ROWS + 1).unwrap().starts_with("similarity: of more"));
         assert_eq!(note("overlap", MOST_ROWS), None);
         assert_eq!(note("geometric", MOST_ROWS + 1), None);

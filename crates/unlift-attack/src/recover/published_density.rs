@@ -357,7 +357,9 @@ mod tests {
     use crate::seed::{Draws, Stage};
     use crate::simd::portable;
 
-    fn lines(n: usize) -> Vec<FeasibleLine> {
+    /// Also on the same bits in vector and in portable code.
+    #[test]
+    fn distances_between_lines_are_the_least_over_their_points() {
         let mut draws = Draws::new(4, Stage::Synthetic, 0);
         let line = |_| FeasibleLine {
             through: std::array::from_fn(|_| draws.between(-3.0, 3.0) as f32),
@@ -366,13 +368,14 @@ mod tests {
             prior: 1.0,
             group: None,
         };
-        (0..n).map(line).collect()
-    }
-
-    #[test]
-    fn distances_between_lines_are_the_least_over_their_points() {
-        let lines = lines(40);
-        for other in &lines[1..] {
+        let lines: Vec<FeasibleLine> = (0..101).map(line).collect();
+        let columns = Columns::new(lines.iter().map(row));
+        let mut plain = vec![0.0; 101];
+        let of = |other: [f32; 6]| between(&lines[0], other);
+        portable(Map { columns: &columns, of, out: &mut plain });
+        assert_eq!(columns.map(of), plain);
+        assert_eq!(plain[0], f32::INFINITY);
+        for (other, squared) in lines.iter().zip(plain).skip(1) {
             // The nearest point of the first line, by golden-section search.
             let at = |t: f32| {
                 let FeasibleLine { through, direction, .. } = lines[0];
@@ -384,20 +387,8 @@ mod tests {
                 let (a, b) = (low + 0.382 * (high - low), low + 0.618 * (high - low));
                 if at(a) < at(b) { high = b } else { low = a }
             }
-            let (least, squared) = (at(0.5 * (low + high)), between(&lines[0], row(other)));
+            let least = at(0.5 * (low + high));
             assert!((least.sqrt() - squared.sqrt()).abs() < 2e-3, "{least} {squared}");
         }
-        assert_eq!(between(&lines[0], row(&lines[0])), f32::INFINITY);
-    }
-
-    #[test]
-    fn vector_and_portable_code_give_the_same_bits() {
-        let lines = lines(101);
-        let columns = Columns::new(lines.iter().map(row));
-        let mut plain = vec![0.0; 101];
-        let of = |other: [f32; 6]| between(&lines[7], other);
-        let fast = columns.map(of);
-        portable(Map { columns: &columns, of, out: &mut plain });
-        assert_eq!(fast, plain);
     }
 }

@@ -122,10 +122,7 @@ mod tests {
     fn the_lowest_crossing_of_half_counts() {
         use Bound::{AboveTested, BelowTested, Interpolated};
         for (curve, expected) in [
-            (
-                &[(1.0, 90.0), (0.5, 70.0), (0.3, 40.0), (0.1, 10.0)][..],
-                (0.5 - 0.4 / 3.0, Interpolated),
-            ),
+            (&[(1.0, 90.0), (0.5, 70.0), (0.3, 40.0)][..], (0.5 - 0.4 / 3.0, Interpolated)),
             (&[(1.0, 90.0), (0.1, 60.0)], (0.1, BelowTested)),
             (&[(1.0, 40.0), (0.1, 10.0)], (1.0, AboveTested)),
             // `ray-voxel` by `consensus` on a real map: the highest ratio gives a smaller share.

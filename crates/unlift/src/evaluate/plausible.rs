@@ -263,10 +263,9 @@ mod tests {
 
     #[test]
     fn areas_count_ties_half() {
-        let decoy = [true, true, false, false];
-        assert_eq!(area(&[1.0, 2.0, 3.0, 4.0], &decoy), 1.0);
-        assert_eq!(area(&[1.0, 1.0, 1.0, 1.0], &decoy), 0.5);
-        assert_eq!(area(&[3.0, 4.0, 1.0, 2.0], &decoy), 0.0);
+        for (scores, expected) in [([1, 2, 3, 4], 1.0), ([1, 1, 1, 1], 0.5), ([3, 4, 1, 2], 0.0)] {
+            assert_eq!(area(&scores.map(f64::from), &[true, true, false, false]), expected);
+        }
     }
 
     #[test]

@@ -220,65 +220,57 @@ fn refine(view: &mut View, matches: &[Match], weight: impl Fn(f64) -> f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::vector::along;
 
-    fn truth() -> View {
-        View {
+    #[test]
+    fn poses_are_found_among_wrong_matches() {
+        let truth = View {
             rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             center: [0.2, -0.1, 0.3],
             focal: [500.0, 510.0],
             principal: [320.0, 240.0],
             size: [640.0, 480.0],
             observed: Vec::new(),
-        }
-    }
-
-    /// 120 matches with half a pixel of noise, every third of them wrong.
-    fn matches(kind: &str) -> Vec<Match> {
-        let view = truth();
-        let mut draws = Draws::new(5, Stage::Shapes, 0);
-        (0..120)
-            .map(|at| {
+        };
+        // 120 matches with half a pixel of noise, every third of them wrong.
+        let matches = |kind: &str| -> Vec<Match> {
+            let mut draws = Draws::new(5, Stage::Shapes, 0);
+            let mut of = |at: usize| {
                 let point =
-                    [draws.between(-2.0, 2.0), draws.between(-1.5, 1.5), draws.between(3.0, 6.0)];
-                let mut place = view.project(&point).unwrap().map(|x| x + 0.5 * draws.normal());
-                if at % 3 == 0 {
-                    place = [draws.between(0.0, 640.0), draws.between(0.0, 480.0)];
+                    [(-2.0, 2.0), (-1.5, 1.5), (3.0, 6.0)].map(|(a, b)| draws.between(a, b));
+                let mut place = truth.project(&point).unwrap().map(|x| x + 0.5 * draws.normal());
+                if at.is_multiple_of(3) {
+                    place = truth.size.map(|side| draws.between(0.0, side));
                 }
                 match kind {
                     "point" => Match::Point { place, point },
                     "map" => {
                         let direction: [f64; 3] = draws.direction();
-                        let point = crate::geometry::vector::along(&point, 1.7, &direction);
-                        Match::MapLine { place, point, direction }
+                        Match::MapLine { place, point: along(&point, 1.7, &direction), direction }
                     }
                     _ => {
                         let direction: [f64; 2] = draws.direction();
-                        let place = crate::geometry::vector::along(&place, 90.0, &direction);
-                        Match::ImageLine { place, direction, point }
+                        Match::ImageLine {
+                            place: along(&place, 90.0, &direction),
+                            direction,
+                            point,
+                        }
                     }
                 }
-            })
-            .collect()
-    }
-
-    #[test]
-    fn poses_are_found_among_wrong_matches() {
-        let start = truth().moved(&[0.1, -0.15, 0.1, 0.4, -0.3, 0.3]);
+            };
+            (0..120).map(&mut of).collect()
+        };
+        let start = truth.moved(&[0.1, -0.15, 0.1, 0.4, -0.3, 0.3]);
         // Errors of lines are larger by about the root of two, and wrong matches of lines are
         // inliers more often.
         for (kind, most) in [("point", 0.01), ("map", 0.02), ("image", 0.02)] {
             let (found, inliers) = estimate(&start, &matches(kind), 0.3, 0).unwrap();
-            let (center, angle) = found.pose_distance(&truth());
+            let (center, angle) = found.pose_distance(&truth);
             assert!(center < most && angle < 0.3, "{kind}: {center} m, {angle} degrees");
             assert!((78..=95).contains(&inliers), "{kind}: {inliers}");
         }
         assert_eq!(estimate(&start, &matches("point")[..5], 0.3, 0), None);
-    }
-
-    #[test]
-    fn a_moved_view_has_the_stated_distance() {
-        let view = truth();
-        let (center, angle) = view.moved(&[0.0, 0.02, 0.0, 0.3, 0.0, -0.4]).pose_distance(&view);
+        let (center, angle) = truth.moved(&[0.0, 0.02, 0.0, 0.3, 0.0, -0.4]).pose_distance(&truth);
         assert!((center - 0.5).abs() < 1e-12 && (angle - 0.02_f64.to_degrees()).abs() < 1e-9);
     }
 }

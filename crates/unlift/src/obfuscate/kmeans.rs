@@ -109,25 +109,3 @@ fn nearest<const D: usize>(point: &[f64; D], centers: &[[f64; D]]) -> (usize, f6
     }
     best
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::seed::Draws;
-
-    #[test]
-    fn two_clouds_give_their_two_means() {
-        let mut draws = Draws::new(2, Stage::Synthetic, 0);
-        let mut points = Vec::new();
-        for center in [[-5.0, 1.0, 0.0], [7.0, 0.0, 2.0]] {
-            for _ in 0..500 {
-                points.push(center.map(|x: f64| x + draws.between(-1.0, 1.0)));
-            }
-        }
-        let centers = kmeans(&points, 2, 10, &Key::from_seed(0));
-        assert!(
-            (centers[0][0] + 5.0).abs() < 0.2 && (centers[1][0] - 7.0).abs() < 0.2,
-            "{centers:?}"
-        );
-    }
-}

@@ -255,12 +255,6 @@ mod tests {
         Changed::new(std::sync::Arc::new(Olc), change)
     }
 
-    fn random_descriptors(n: usize, dim: usize) -> Descriptors {
-        let key = Key::from_seed(3);
-        let values = (0..n * dim).map(|at| key.draws(Stage::Shapes, at as u64).normal() as f32);
-        Descriptors::try_new(Values::F32(values.collect()), dim).unwrap()
-    }
-
     #[test]
     fn names_are_plain_and_wrong_text_is_told() {
         let of = |text| mitigated(text, None).name().to_owned();
@@ -293,26 +287,29 @@ mod tests {
 
     #[test]
     fn descriptor_steps_do_what_they_say() {
-        let before = random_descriptors(200, 8);
-        let key = Key::from_seed(1);
-        let after = |text| mitigated(text, None).descriptors(&before, &key).unwrap().unwrap();
-        let row = |descriptors: &Descriptors, at| {
-            let mut row = vec![0.0; 8];
-            descriptors.read_row(at, &mut row);
-            row
+        let key = Key::from_seed(3);
+        let values = (0..1600).map(|at| key.draws(Stage::Shapes, at).normal() as f32).collect();
+        let before = Descriptors::try_new(Values::F32(values), 8).unwrap();
+        let rows = |of: &Descriptors| -> Vec<Vec<f32>> {
+            let mut rows = vec![vec![0.0; 8]; 200];
+            rows.iter_mut().enumerate().for_each(|(at, row)| of.read_row(at, row));
+            rows
         };
-        let dropped = after("drop:0.25");
-        let zeros = (0..200).filter(|&at| row(&dropped, at).iter().all(|&x| x == 0.0)).count();
+        let after = |text| {
+            let key = Key::from_seed(1);
+            rows(&mitigated(text, None).descriptors(&before, &key).unwrap().unwrap())
+        };
+        let zeros = after("drop:0.25").iter().filter(|row| row.iter().all(|&x| x == 0.0)).count();
         assert_eq!(zeros, 50);
         // Before lengths are restored, a column has two levels of each sign.
         let signs = after("bits:1");
-        assert!((0..200).all(|at| row(&signs, at).iter().all(|x| *x != 0.0)));
-        let cosine = |a: &[f32], b: &[f32]| {
+        assert!(signs.iter().flatten().all(|x| *x != 0.0));
+        let before = rows(&before);
+        let mean = |other: &[Vec<f32>]| {
             let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>();
-            dot(a, b) / (dot(a, a) * dot(b, b)).sqrt()
-        };
-        let mean = |other: &Descriptors| {
-            (0..200).map(|at| cosine(&row(&before, at), &row(other, at))).sum::<f32>() / 200.0
+            let cosine =
+                |(a, b): (&Vec<f32>, &Vec<f32>)| dot(a, b) / (dot(a, a) * dot(b, b)).sqrt();
+            before.iter().zip(other).map(cosine).sum::<f32>() / 200.0
         };
         // A direction in 8 dimensions keeps about sqrt(6/8) of its length in 6 components.
         let projected = mean(&after("pca:6"));

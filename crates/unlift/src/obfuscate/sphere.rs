@@ -84,25 +84,3 @@ impl Scheme<3> for Sphere {
         Ok(lifted)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::evaluate::{away_from_own, farthest_for_rounding};
-    use crate::obfuscate::obfuscate;
-    use crate::truth::Original;
-    use crate::{PointSet, Unit, synthetic};
-
-    #[test]
-    fn the_share_of_real_bearings_is_that_of_the_scheme() {
-        let points = PointSet::try_new(synthetic::room(1, 900).points, Unit::Meter).unwrap();
-        let original = Original::new(points);
-        let (released, secret) = obfuscate(&Sphere, &original, None, &Key::from_seed(0)).unwrap();
-        assert_eq!(secret.n_slots(), original.len());
-        let most = farthest_for_rounding(&released, &original, &secret);
-        let away = away_from_own(&released, &original, &secret);
-        assert_eq!(away.iter().filter(|&&away| away <= most).count(), 300);
-        let (other, _) = obfuscate(&Sphere, &original, None, &Key::from_seed(1)).unwrap();
-        assert_ne!(other.fingerprint(), released.fingerprint());
-    }
-}

@@ -136,20 +136,3 @@ fn sources(cell: usize, turn: usize, shift: [i32; 2]) -> Option<Cell> {
     }
     Some(result)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn eight_turns_of_21_shifts_without_inverse_copies() {
-        let all = Hypotheses::new();
-        assert_eq!(all.still.len(), 2 * 21);
-        assert_eq!(all.pairs.iter().filter(|p| !p.both_ways).count(), 4 * 21);
-        assert_eq!(all.pairs.iter().filter(|p| p.both_ways).count(), 2 * 21);
-        for pair in &all.pairs {
-            let (turned, still) = (&all.turned[pair.turned], &all.still[pair.still]);
-            assert_eq!(turned.cells.len(), still.cells.len());
-        }
-    }
-}

@@ -217,20 +217,3 @@ fn centered(terms: [f32; N_TERMS], center: &[f32], spread: &[f32]) -> [f32; N_TE
     let far = |at: usize| ((terms[at] - center[at]) / spread[at]).clamp(-FARTHEST, FARTHEST);
     std::array::from_fn(|at| if at == 0 { 1.0 } else { far(at) })
 }
-
-#[cfg(test)]
-mod tests {
-    use super::twins;
-    use crate::released::Rays;
-
-    #[test]
-    fn rays_in_the_same_place_from_the_same_center_are_twins() {
-        let centers = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]];
-        let up = [0.0, 0.0, 1.0];
-        let rays = |center: Vec<u8>, directions: Vec<[f64; 3]>| {
-            Rays::try_new(&centers, center, &directions).unwrap()
-        };
-        assert_eq!(twins(&rays(vec![0, 0, 0, 1], vec![up, up, [0.0, 1.0, 0.0], up])), 0.5);
-        assert_eq!(twins(&rays(vec![0, 1], vec![up, up])), 0.0);
-    }
-}

@@ -364,57 +364,58 @@ mod tests {
         Neighborhoods::try_new(offsets, records, Some(scores), n_records, slots_per_record).unwrap()
     }
 
-    /// Returns the edges of each slot, computed one by one.
-    fn expected(lists: &Neighborhoods, slots_per_record: usize) -> Vec<Vec<(u32, u8)>> {
-        let bounds = score_bounds(lists);
-        let class = |at| score_class(lists, &bounds, at);
-        let n_slots = lists.n_slots();
-        let mut named_by = vec![Vec::new(); n_slots / slots_per_record];
-        for slot in 0..n_slots {
-            for (at, record) in lists.of(slot).iter().enumerate() {
-                let entry = lists.offsets()[slot] as usize + at;
-                named_by[record.index()].push((slot, class(entry)));
+    /// Returns the edges of a slot, computed one by one.
+    fn expected(
+        lists: &Neighborhoods,
+        per: usize,
+        slot: usize,
+        of_score: &dyn Fn(usize) -> u8,
+    ) -> Vec<(u32, u8)> {
+        let class =
+            |side: Side, entry: usize| (side as usize * SCORE_CLASSES) as u8 + of_score(entry);
+        let entry = |slot: usize, at: usize| lists.offsets()[slot] as usize + at;
+        let own = RecordId::from_index(slot / per);
+        let place = |by: usize| Some((by, lists.of(by).iter().position(|&record| record == own)?));
+        let named_by: Vec<(usize, usize)> = (0..lists.n_slots()).filter_map(place).collect();
+        let most = 3 * lists.records().len().div_ceil(lists.n_slots());
+        let reverse = named_by.iter().step_by(named_by.len().div_ceil(most).max(1));
+        let list = lists.of(slot);
+        let mut edges = Vec::new();
+        for (at, record) in list.iter().enumerate() {
+            let is_mutual = reverse.clone().any(|by| by.0 / per == record.index());
+            let side = if is_mutual { Side::Mutual } else { Side::Forward };
+            edges.push((record.0 * per as u32, class(side, entry(slot, at))));
+        }
+        for &(by, at) in reverse {
+            if !list.contains(&RecordId::from_index(by / per)) {
+                edges.push((by as u32, class(Side::Reverse, entry(by, at))));
             }
         }
-        let most = 3 * lists.records().len().div_ceil(n_slots);
-        let edges = |slot: usize| {
-            let all = &named_by[slot / slots_per_record];
-            let reverse: Vec<_> = all.iter().step_by(all.len().div_ceil(most).max(1)).collect();
-            let list = lists.of(slot);
-            let mut edges = Vec::new();
-            for (at, record) in list.iter().enumerate() {
-                let is_mutual = reverse.iter().any(|by| by.0 / slots_per_record == record.index());
-                let side = if is_mutual { Side::Mutual } else { Side::Forward };
-                let of_score = class(lists.offsets()[slot] as usize + at);
-                edges.push((record.0 * slots_per_record as u32, (side, of_score)));
-            }
-            for &&(by, of_score) in &reverse {
-                if !list.contains(&RecordId::from_index(by / slots_per_record)) {
-                    edges.push((by as u32, (Side::Reverse, of_score)));
-                }
-            }
-            edges.sort_unstable_by_key(|edge| edge.0);
-            let class = |(side, of_score)| (side as usize * SCORE_CLASSES) as u8 + of_score;
-            edges.into_iter().map(|(end, of)| (end, class(of))).collect()
-        };
-        (0..n_slots).map(edges).collect()
+        edges.sort_unstable_by_key(|edge| edge.0);
+        edges
     }
 
     #[test]
     fn edges_are_those_found_one_by_one() {
-        for slots_per_record in [1, 2] {
-            let lists = lists(2 * BLOCK + 77, slots_per_record);
-            let expected = expected(&lists, slots_per_record);
-            for threads in [1, 3] {
+        for per in [1, 2] {
+            let lists = lists(2 * BLOCK + 77, per);
+            let on = |threads| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-                let graph = pool.install(|| Graph::new(&lists, slots_per_record));
-                assert_eq!(graph.len(), expected.iter().map(Vec::len).sum::<usize>());
-                for (slot, expected) in expected.iter().enumerate() {
-                    let (ends, class) = graph.of(slot);
+                pool.install(|| Graph::new(&lists, per))
+            };
+            let (one, three) = (on(1), on(3));
+            let bounds = score_bounds(&lists);
+            let of_score = |entry| score_class(&lists, &bounds, entry);
+            let mut n_edges = 0;
+            for slot in 0..lists.n_slots() {
+                let expected = expected(&lists, per, slot, &of_score);
+                n_edges += expected.len();
+                for (ends, class) in [one.of(slot), three.of(slot)] {
                     let found: Vec<_> = ends.iter().copied().zip(class.iter().copied()).collect();
-                    assert_eq!(&found, expected, "slot {slot}");
+                    assert_eq!(found, expected, "slot {slot}");
                 }
             }
+            assert_eq!([one.len(), three.len()], [n_edges; 2]);
         }
     }
 }

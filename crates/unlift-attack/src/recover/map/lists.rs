@@ -101,32 +101,3 @@ pub(crate) fn mixed(
     offsets.resize(lists.n_slots() + 1, records.len() as u64);
     Neighborhoods::unchecked(offsets, records)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::seed::{Draws, Stage};
-
-    #[test]
-    fn mixed_lists_name_others_and_each_once() {
-        // So few records that random draws often repeat.
-        let (n, k) = (60usize, 15usize);
-        let mut records = Vec::new();
-        for slot in 0..n {
-            let mut others: Vec<u32> = (0..n as u32).filter(|&r| r as usize != slot).collect();
-            Draws::new(5, Stage::Synthetic, slot as u64).shuffle(&mut others);
-            records.extend(others[..k].iter().map(|&r| RecordId(r)));
-        }
-        let offsets = (0..=n).map(|slot| (slot * k) as u64).collect();
-        let lists = Neighborhoods::try_new(offsets, records, None, n, 1).unwrap();
-        let mixed = mixed(&lists, Slots::chunks(&[0], n).iter(), 1);
-        for slot in 0..n {
-            let mut row: Vec<u32> = mixed.of(slot).iter().map(|r| r.0).collect();
-            assert_eq!(row.len(), k);
-            assert!(!row.contains(&(slot as u32)), "slot {slot} is listed for itself");
-            row.sort_unstable();
-            row.dedup();
-            assert_eq!(row.len(), k, "slot {slot} lists a record twice");
-        }
-    }
-}
