@@ -166,11 +166,7 @@ pub fn open(
         if is_other { error.advise(way_out) } else { error }
     })?;
     check_scale(&input.positions, preparation.scale)?;
-    let mut rows = descriptors.map(|file| read::descriptors(file, &input)).transpose()?;
-    if preparation.colors {
-        let colored = |rows: Descriptors| rows.with_colors(input.colors.clone());
-        rows = rows.map(colored).transpose().map_err(|e| unlift_io::Error::core(path, e))?;
-    }
+    let rows = descriptors.map(|file| read::descriptors(file, &input)).transpose()?;
     let mut prepared = prepare(&input.positions, rows.as_ref(), preparation).map_err(|error| {
         let few = error.kind() == ErrorKind::TooFewPoints && input.positions.len() > 2;
         let error = Error::from(unlift_io::Error::core(path, error));

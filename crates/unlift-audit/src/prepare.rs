@@ -25,14 +25,12 @@ pub struct Preparation {
     pub max_points: Option<usize>,
     /// Seed of the subset.
     pub seed: u64,
-    /// Also reads the colors of the points, which a COLMAP model has, for pictures.
-    pub colors: bool,
 }
 
 /// All points, in the unit of the median distance to the 50th neighbor.
 impl Default for Preparation {
     fn default() -> Self {
-        Self { scale: None, k: 50, max_points: None, seed: 0, colors: false }
+        Self { scale: None, k: 50, max_points: None, seed: 0 }
     }
 }
 
@@ -198,8 +196,7 @@ fn doubts(offsets: &[u64], neighbors: &[u32], prepared: &Prepared) -> Vec<String
 mod tests {
     use super::*;
 
-    const PLAIN: Preparation =
-        Preparation { scale: None, k: 2, max_points: None, seed: 0, colors: false };
+    const PLAIN: Preparation = Preparation { scale: None, k: 2, max_points: None, seed: 0 };
 
     /// Points 0.5 apart on a line; the second neighbor is 0.5 away except at the ends.
     fn line(n: usize) -> Vec<[f64; 3]> {

@@ -43,7 +43,7 @@ fn preparation(
     if k == 0 {
         return Err(wrong("k", "at least 1", k));
     }
-    Ok(Preparation { scale, k, max_points, seed, ..Preparation::default() })
+    Ok(Preparation { scale, k, max_points, seed })
 }
 
 #[pymethods]

@@ -1,7 +1,5 @@
 //! Notes and doubts about how a map was read, in its audit and in gates.
 
-use std::fmt::Write;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -54,38 +52,4 @@ fn rows_are_those_of_the_file() {
     let some = Preparation { max_points: Some(100), ..all };
     let rows = maps::open(&map, None, &some).unwrap().1.rows;
     assert!(rows.len() == 100 && rows.is_sorted() && rows.iter().all(|row| row % 50 != 0));
-}
-
-#[test]
-fn colors_stay_with_their_points() {
-    let dir = tempfile::tempdir().unwrap();
-    let (mut points, mut descriptors) = (String::new(), b"P3DESC01".to_vec());
-    let n = 200_usize;
-    let color = |row: usize| [row as u8, (row / 3) as u8, 255 - row as u8];
-    for ([x, y, z], row) in room(1, n).points.iter().zip(0..n) {
-        // The last words are an error and no track. One point has no position.
-        let y = if row == 20 { f64::NAN } else { *y };
-        let [red, green, blue] = color(row);
-        writeln!(points, "{} {x} {y} {z} {red} {green} {blue} 0.5", row + 1).unwrap();
-    }
-    descriptors.extend((n as u64).to_le_bytes());
-    descriptors.extend([128_u32, 1].map(u32::to_le_bytes).concat());
-    (0..n as u64).for_each(|row| descriptors.extend((row + 1).to_le_bytes()));
-    descriptors.extend((0..n * 128).map(|at| (at * 37 % 101) as u8));
-    let at = |name: &str| dir.path().join(name);
-    for (name, bytes) in [
-        ("cameras.txt", Vec::new()),
-        ("images.txt", Vec::new()),
-        ("points3D.txt", points.into_bytes()),
-        ("descriptors.bin", descriptors),
-    ] {
-        fs::write(at(name), bytes).unwrap();
-    }
-    let preparation =
-        Preparation { k: 5, max_points: Some(60), colors: true, ..Preparation::default() };
-    let prepared = maps::open(dir.path(), Some(&at("descriptors.bin")), &preparation).unwrap().1;
-    let expected: Vec<[u8; 3]> = prepared.rows.iter().map(|&row| color(row as usize)).collect();
-    assert_eq!(prepared.rows.len(), 60);
-    assert!(prepared.rows.iter().any(|&row| row > 20), "rows after the one that is left out");
-    assert_eq!(prepared.descriptors.unwrap().colors(), Some(&*expected));
 }

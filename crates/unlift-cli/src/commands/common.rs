@@ -59,7 +59,6 @@ pub fn open_map(
         k: usize::from(args.k),
         max_points: args.max_points.map(NonZeroUsize::get),
         seed,
-        colors: false,
     };
     Ok(maps::open(path, args.descriptors.as_deref(), &preparation)?)
 }
