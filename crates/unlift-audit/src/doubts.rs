@@ -529,13 +529,14 @@ mod tests {
         synthetic::room(0, 2000).points.iter().map(|p| p.map(|x| x * scale)).collect()
     }
 
-    fn thresholds(labels: &[&str]) -> Vec<Threshold> {
-        labels.iter().map(|label| Threshold::parse(label).unwrap()).collect()
-    }
-
-    fn told(scale: f64) -> Result<SaidOfLengths, String> {
-        let usual = thresholds(&["0.10", "0.25"]);
-        check_thresholds(&room(scale), Unit::Meter, &usual, false).map_err(|e| e.to_string())
+    fn checked(
+        scale: f64,
+        unit: Unit,
+        labels: [&str; 2],
+        typed: bool,
+    ) -> Result<SaidOfLengths, String> {
+        let thresholds = labels.map(|label| Threshold::parse(label).unwrap());
+        check_thresholds(&room(scale), unit, &thresholds, typed).map_err(|error| error.to_string())
     }
 
     #[test]
@@ -555,36 +556,26 @@ mod tests {
     }
 
     #[test]
-    fn a_map_within_the_smallest_threshold_is_refused() {
-        let error = told(0.01).unwrap_err();
+    fn thresholds_that_mean_nothing_for_a_map_are_refused_or_noted() {
+        let usual = |scale| checked(scale, Unit::Meter, ["0.10", "0.25"], false);
+        assert_eq!(usual(1.0), Ok(SaidOfLengths::default()));
+        let error = usual(0.01).unwrap_err();
         assert!(error.starts_with("--scale: expected a map larger than"), "{error}");
         assert!(error.ends_with("any guess would count as recovered"), "{error}");
         // The larger threshold alone gives a note.
-        let note = told(0.03).unwrap().note.unwrap();
+        let note = usual(0.03).unwrap().note.unwrap();
         assert!(note.contains("less than the threshold 0.25 m"), "{note}");
-        assert_eq!(told(1.0), Ok(SaidOfLengths::default()));
-    }
-
-    #[test]
-    fn points_too_far_apart_for_any_threshold_are_refused() {
-        let error = told(1_000.0).unwrap_err();
+        let error = usual(1_000.0).unwrap_err();
         assert!(error.contains("expected points less than 100 times"), "{error}");
-        let note = told(100.0).unwrap().doubt.unwrap();
-        assert!(note.ends_with("is --scale right?"), "{note}");
-    }
-
-    #[test]
-    fn thresholds_as_typed_are_checked_in_any_unit() {
-        let of = |labels: &[&str], typed| {
-            let thresholds = thresholds(labels);
-            check_thresholds(&room(20.0), Unit::KthNeighbor, &thresholds, typed)
-                .map_err(|error| error.to_string())
-        };
+        let doubt = usual(100.0).unwrap().doubt.unwrap();
+        assert!(doubt.ends_with("is --scale right?"), "{doubt}");
+        // Thresholds as typed are checked in any unit.
+        let of = |labels, typed| checked(20.0, Unit::KthNeighbor, labels, typed);
         for labels in [["1e300", "1e301"], ["1e-300", "1e-9"]] {
-            assert!(of(&labels, true).unwrap_err().starts_with("--thresholds: expected"));
-            assert_eq!(of(&labels, false), Ok(SaidOfLengths::default()));
+            assert!(of(labels, true).unwrap_err().starts_with("--thresholds: expected"));
+            assert_eq!(of(labels, false), Ok(SaidOfLengths::default()));
         }
-        assert_eq!(of(&["1.0", "2.5"], true), Ok(SaidOfLengths::default()));
+        assert_eq!(of(["1.0", "2.5"], true), Ok(SaidOfLengths::default()));
     }
 
     #[test]

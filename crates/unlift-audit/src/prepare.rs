@@ -204,25 +204,26 @@ mod tests {
     }
 
     #[test]
-    fn without_a_scale_the_unit_is_the_kth_neighbor() {
-        let prepared = prepare(line(9), None, &PLAIN).unwrap();
-        assert_eq!(prepared.unit_in_map_units, 0.5);
-        let points = prepared.original.reveal();
-        assert_eq!(points.unit(), Unit::KthNeighbor);
-        assert_eq!(points.positions()[3], [3.0, 0.0, 0.0]);
+    fn the_unit_is_the_kth_neighbor_or_with_a_scale_meters() {
+        for (scale, in_map_units, unit, third) in
+            [(None, 0.5, Unit::KthNeighbor, 3.0), (Some(4.0), 0.25, Unit::Meter, 6.0)]
+        {
+            let prepared = prepare(line(9), None, &Preparation { scale, ..PLAIN }).unwrap();
+            let points = prepared.original.reveal();
+            assert_eq!((prepared.unit_in_map_units, points.unit()), (in_map_units, unit));
+            assert_eq!(points.positions()[3], [third, 0.0, 0.0]);
+        }
+        let coincide = "median distance to neighbor 2: expected more than 0 (points that do not coincide), found 0";
+        for (points, expected) in [
+            (line(2), "points: expected at least 3 (K + 1), found 2"),
+            (vec![[1.0; 3]; 5], coincide),
+        ] {
+            assert_eq!(prepare(points, None, &PLAIN).unwrap_err().to_string(), expected);
+        }
     }
 
     #[test]
-    fn a_scale_gives_meters() {
-        let scaled = Preparation { scale: Some(4.0), ..PLAIN };
-        let prepared = prepare(line(9), None, &scaled).unwrap();
-        assert_eq!(prepared.unit_in_map_units, 0.25);
-        assert_eq!(prepared.original.reveal().positions()[3], [6.0, 0.0, 0.0]);
-        assert_eq!(prepared.original.reveal().unit(), Unit::Meter);
-    }
-
-    #[test]
-    fn points_that_are_handed_over_are_not_copied() {
+    fn points_that_are_handed_over_are_not_copied_and_a_subset_keeps_the_order() {
         let meters = Preparation { scale: Some(1.0), ..PLAIN };
         let points = line(9);
         let lent = prepare(&points, None, &meters).unwrap();
@@ -230,54 +231,28 @@ mod tests {
         let given = prepare(points, None, &meters).unwrap();
         assert_eq!(given.original.reveal().positions().as_ptr(), place);
         assert_eq!(given.original.reveal(), lent.original.reveal());
-    }
-
-    #[test]
-    fn too_few_points_are_told() {
-        let error = prepare(line(2), None, &PLAIN).unwrap_err();
-        assert_eq!(error.to_string(), "points: expected at least 3 (K + 1), found 2");
-    }
-
-    #[test]
-    fn coincident_points_have_no_unit() {
-        let error = prepare(&[[1.0; 3]; 5], None, &PLAIN).unwrap_err();
-        assert_eq!(
-            error.to_string(),
-            "median distance to neighbor 2: \
-             expected more than 0 (points that do not coincide), found 0"
-        );
-    }
-
-    #[test]
-    fn a_subset_keeps_the_order() {
         let some = Preparation { max_points: Some(10), ..PLAIN };
-        let prepared = prepare(line(30), None, &some).unwrap();
-        assert_eq!(prepared.rows.len(), 10);
-        assert!(prepared.rows.is_sorted());
-    }
-
-    /// Lists the next few of 200 points on a line; with a factor other than 1, other points.
-    fn doubts_about(factor: usize, length: usize) -> Vec<String> {
-        let n = 200;
-        let points = (0..n).map(|i| [0.1 * i as f64, 0.0, 0.0]).collect();
-        let points = PointSet::try_new(points, Unit::Meter).unwrap();
-        let prepared = Prepared::of(Original::new(points));
-        let offsets: Vec<u64> = (0..=n).map(|point| (point * length) as u64).collect();
-        let row = |point: usize| (1..=length).map(move |step| (point * factor + step) % n);
-        let neighbors: Vec<u32> = (0..n).flat_map(row).map(|other| other as u32).collect();
-        doubts(&offsets, &neighbors, &prepared)
+        let rows = prepare(line(30), None, &some).unwrap().rows;
+        assert!(rows.len() == 10 && rows.is_sorted());
     }
 
     #[test]
     fn lists_that_cannot_be_of_the_map_are_doubted() {
-        assert!(doubts_about(1, 5).is_empty());
-        let of_another = doubts_about(77, 5);
-        assert_eq!(of_another.len(), 1);
-        assert!(of_another[0].starts_with("lists: the neighbors in the file are no nearer than"));
-        let empty = doubts_about(1, 0);
-        assert_eq!(
-            empty,
-            ["lists: 200 of 200 points have no neighbors in the file, and count as lost"]
-        );
+        let n = 200;
+        let points = (0..n).map(|i| [0.1 * i as f64, 0.0, 0.0]).collect();
+        let points = PointSet::try_new(points, Unit::Meter).unwrap();
+        let prepared = Prepared::of(Original::new(points));
+        // The next few points; with a factor other than 1, other points.
+        let about = |factor: usize, length: usize| {
+            let offsets: Vec<u64> = (0..=n).map(|point| (point * length) as u64).collect();
+            let row = |point: usize| (1..=length).map(move |step| (point * factor + step) % n);
+            let neighbors: Vec<u32> = (0..n).flat_map(row).map(|other| other as u32).collect();
+            doubts(&offsets, &neighbors, &prepared).join("\n")
+        };
+        assert_eq!(about(1, 5), "");
+        let far = about(77, 5);
+        assert!(far.starts_with("lists: the neighbors in the file are no nearer than"), "{far}");
+        let empty = "lists: 200 of 200 points have no neighbors in the file, and count as lost";
+        assert_eq!(about(1, 0), empty);
     }
 }

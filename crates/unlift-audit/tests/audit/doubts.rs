@@ -24,7 +24,7 @@ fn room() -> Vec<[f64; 3]> {
 
 fn prepared(points: &[[f64; 3]]) -> Prepared {
     let preparation = Preparation { scale: Some(1.0), k: 20, ..Preparation::default() };
-    prepare(points, None, &preparation).expect("points")
+    prepare(points, None, &preparation).unwrap()
 }
 
 fn plan(names: &[&str]) -> Plan<3> {
@@ -50,7 +50,7 @@ fn audit(
         plan,
         notes: prepared.notes.clone(),
         doubts: prepared.doubts.clone(),
-        gates: vec![Gate::parse(gate).expect("a gate")],
+        gates: vec![Gate::parse(gate).unwrap()],
         ..Job::of(&prepared.original, Instant::now())
     };
     maps::find(job)
@@ -80,7 +80,7 @@ fn lists_that_are_long_for_a_map_are_said() {
     let points = prepared(&unlift::synthetic::room(1, 800).points);
     let within = |k: usize| {
         let found = audit(&points, None, Plan { k, ..plan(&["olc"]) }, "olc:0.25<=100");
-        let document = found.expect("an audit").document;
+        let document = found.unwrap().document;
         (document.results[0].recovered_percent["0.25"], document.notes)
     };
     let ((long, said), (short, nothing)) = (within(50), within(10));
@@ -89,48 +89,38 @@ fn lists_that_are_long_for_a_map_are_said() {
     assert!(nothing.is_empty(), "{nothing:?}");
 }
 
-/// Returns the share of `points` that is recovered under `scheme` within 0.25 m, in percent; there
-/// are no doubts.
-fn recovered(points: &[[f64; 3]], scheme: &str) -> f64 {
-    let gate = format!("{scheme}:0.25<=100");
-    let found = audit(&prepared(points), None, plan(&[scheme]), &gate).expect("an audit");
-    assert_eq!(found.document.notes, Vec::<String>::new());
-    found.document.results[0].recovered_percent["0.25"]
-}
-
 /// One of two centers is near the far point, so the distance of centers is not related to the map's
-/// size.
+/// size. The quartiles of all offsets of planes are those of neither part.
 #[test]
-fn a_far_point_is_no_protection() {
-    let mut points = room();
-    let usual = recovered(&points, "ray");
-    points[5] = [1e4, -1e4, 3e3];
-    let far = recovered(&points, "ray");
-    assert!(far > usual - 10.0, "{usual} {far}");
-}
-
-/// The quartiles of all offsets are those of neither part.
-#[test]
-fn parts_far_apart_are_no_protection() {
-    let points = room();
-    let mut along: Vec<f64> = points.iter().map(|point| point[0]).collect();
+fn far_points_and_parts_are_no_protection() {
+    let recovered = |points: &[[f64; 3]], scheme: &str| {
+        let gate = format!("{scheme}:0.25<=100");
+        let document = audit(&prepared(points), None, plan(&[scheme]), &gate).unwrap().document;
+        assert_eq!(document.notes, Vec::<String>::new());
+        document.results[0].recovered_percent["0.25"]
+    };
+    let (usual, mut far) = (room(), room());
+    far[5] = [1e4, -1e4, 3e3];
+    let mut along: Vec<f64> = usual.iter().map(|point| point[0]).collect();
     along.sort_by(f64::total_cmp);
     let away = |x: f64| if x < along[N / 2] { x } else { x + 1e3 };
-    let apart: Vec<_> = points.iter().map(|&[x, y, z]| [away(x), y, z]).collect();
-    let (usual, apart) = (recovered(&points, "plane"), recovered(&apart, "plane"));
-    assert!(apart > usual - 10.0, "{usual} {apart}");
+    let apart = usual.iter().map(|&[x, y, z]| [away(x), y, z]).collect();
+    for (points, scheme) in [(far, "ray"), (apart, "plane")] {
+        let [usual, other] = [&usual, &points].map(|points| recovered(points, scheme));
+        assert!(other > usual - 10.0, "{scheme}: {usual} {other}");
+    }
 }
 
 #[test]
 fn a_delta_of_nothing_is_no_protection() {
     let plan = Plan { delta: Delta::Fixed(1e-6), ..plan(&["olc"]) };
-    let found = audit(&prepared(&room()), None, plan, "olc:0.10<=50").expect("an audit");
+    let found = audit(&prepared(&room()), None, plan, "olc:0.10<=50").unwrap();
     assert!(reason(&found).contains("1.0e-6 m, is far from"), "{}", reason(&found));
 }
 
 #[test]
 fn a_gate_that_no_attack_could_break_is_refused() {
-    let thresholds = ["1e-6", "0.25"].map(|label| Threshold::parse(label).expect("a threshold"));
+    let thresholds = ["1e-6", "0.25"].map(|label| Threshold::parse(label).unwrap());
     let plan = Plan { thresholds: thresholds.to_vec(), ..plan(&["olc"]) };
     let error = audit(&prepared(&room()), None, plan, "olc:1e-6<=1").expect_err("an error");
     let error = error.to_string();
@@ -143,7 +133,7 @@ fn a_gate_that_no_attack_could_break_is_refused() {
 fn a_truth_in_another_scale_is_no_protection() {
     let prepared_truth = prepared(&room());
     let olc = &schemes(&["olc"], Unit::Meter)[0];
-    let hide = |original| obfuscate(&**olc, original, None, &Key::from_seed(1)).expect("hidden");
+    let hide = |original| obfuscate(&**olc, original, None, &Key::from_seed(1)).unwrap();
     let right = hide(&prepared_truth.original);
     let found = audit(&prepared_truth, Some(&right), plan(&["olc"]), "olc:joint:0.10<=100");
     assert!(found.expect("an audit").document.gates[0].passed);
@@ -155,7 +145,7 @@ fn a_truth_in_another_scale_is_no_protection() {
     let scaled = Original::new(PointSet::try_new(by(1.3), Unit::Meter).expect("points"));
     let wrong = hide(&scaled);
     let found = audit(&prepared_truth, Some(&wrong), plan(&["olc"]), "olc:0.10<=20");
-    let found = found.expect("an audit");
+    let found = found.unwrap();
     let told = format!("of {N} points are 0.100 m or more away from their own records");
     assert!(reason(&found).contains(&told), "{}", reason(&found));
 }
@@ -164,13 +154,12 @@ fn a_truth_in_another_scale_is_no_protection() {
 #[test]
 fn a_unit_that_is_only_stated_is_no_protection() {
     let points = room().iter().map(|point| point.map(|x| 1000.0 * x)).collect();
-    let points = PointSet::try_new(points, Unit::KthNeighbor).expect("points");
+    let points = PointSet::try_new(points, Unit::KthNeighbor).unwrap();
     let prepared = Prepared::of(Original::new(points));
     let olc = &schemes(&["olc"], Unit::KthNeighbor)[0];
-    let hidden = obfuscate(&**olc, &prepared.original, None, &Key::from_seed(1)).expect("hidden");
-    let plan =
-        Plan { thresholds: vec![Threshold::parse("2.5").expect("a threshold")], ..plan(&["olc"]) };
-    let found = audit(&prepared, Some(&hidden), plan, "olc:2.5<=20").expect("an audit");
+    let hidden = obfuscate(&**olc, &prepared.original, None, &Key::from_seed(1)).unwrap();
+    let plan = Plan { thresholds: vec![Threshold::parse("2.5").unwrap()], ..plan(&["olc"]) };
+    let found = audit(&prepared, Some(&hidden), plan, "olc:2.5<=20").unwrap();
     assert!(reason(&found).starts_with("unit: expected a usual distance"), "{}", reason(&found));
 }
 
