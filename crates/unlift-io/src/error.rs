@@ -185,38 +185,21 @@ mod tests {
     use super::*;
 
     #[test]
+    #[rustfmt::skip] // One row per line.
     fn every_kind_prints_one_line() {
         let core = || unlift::Error::new("point 3", "finite coordinates", "[NaN, 0.0, 0.0]");
         let byte = Place::Byte { what: "record 12".into(), at: 4711 };
         let io = |kind| io::Error::new(kind, "other\ntext");
         let table = [
-            (
-                Error::new("points.txt", Place::Line(17), "3 coordinates", "2"),
-                "points.txt:17: expected 3 coordinates, found 2",
-            ),
-            (
-                Error::new("points3D.bin", byte, "8 bytes", "end of file"),
-                "points3D.bin: record 12 (byte 4711): expected 8 bytes, found end of file",
-            ),
+            (Error::new("points.txt", Place::Line(17), "3 coordinates", "2"), "points.txt:17: expected 3 coordinates, found 2"),
+            (Error::new("points3D.bin", byte, "8 bytes", "end of file"), "points3D.bin: record 12 (byte 4711): expected 8 bytes, found end of file"),
             (Error::new("a.ply", "", "a number", "x\ny"), "a.ply: expected a number, found x\\ny"),
-            (
-                Error::read("a.ply", io(io::ErrorKind::NotFound)),
-                "a.ply: expected a file or folder, found nothing",
-            ),
-            (
-                Error::write("out", io(io::ErrorKind::FileTooLarge)),
-                "out: expected space to write, found a limit on the size of files",
-            ),
-            (
-                Error::new("a\u{202e}b", "c\u{9b}", "d", "e\u{2028}"),
-                "a\\u{202e}b: c\\u{9b}: expected d, found e\\u{2028}",
-            ),
+            (Error::read("a.ply", io(io::ErrorKind::NotFound)), "a.ply: expected a file or folder, found nothing"),
+            (Error::write("out", io(io::ErrorKind::FileTooLarge)), "out: expected space to write, found a limit on the size of files"),
+            (Error::new("a\u{202e}b", "c\u{9b}", "d", "e\u{2028}"), "a\\u{202e}b: c\\u{9b}: expected d, found e\\u{2028}"),
             (Error::read("a\nb", io(io::ErrorKind::Other)), "a\\nb: cannot read: other\\ntext"),
             (Error::write("out", io(io::ErrorKind::Other)), "out: cannot write: other\\ntext"),
-            (
-                Error::core("a.csv", core()),
-                "a.csv: point 3: expected finite coordinates, found [NaN, 0.0, 0.0]",
-            ),
+            (Error::core("a.csv", core()), "a.csv: point 3: expected finite coordinates, found [NaN, 0.0, 0.0]"),
         ];
         for (error, line) in table {
             assert_eq!(error.to_string(), line);

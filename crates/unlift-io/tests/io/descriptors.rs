@@ -8,30 +8,32 @@ use unlift::descriptors::Values;
 use unlift_io::features::{FeatureWriter, ImageFeatures};
 use unlift_io::read::{self, Input, colmap};
 
-use super::malformed::{MANY, appended, fixture, patched};
-use super::{data, npy, shown, write};
+use super::malformed::{MANY, appended, patched};
+use super::{data, fixture, npy, shown, write, write_database};
 
 #[test]
-fn descriptors_through_the_tracks_are_those_of_the_binary_form() {
-    let input = read::open(&data("project")).unwrap();
-    let joined = read::descriptors(&data("project/descriptors.bin"), &input).unwrap();
-    assert_eq!((joined.len(), joined.dim()), (6, 128));
-    let mean = read::descriptors(input.database.as_ref().unwrap(), &input).unwrap();
-    assert_eq!(mean, joined);
-}
-
-#[test]
-fn descriptors_follow_the_ids_of_the_input() {
+fn descriptors_follow_the_ids_of_the_input_in_every_form() {
     let all = read::open(&data("project")).unwrap();
     let some = Input {
         ids: vec![all.ids[4], all.ids[1]],
         positions: vec![all.positions[4], all.positions[1]],
         ..all.clone()
     };
+    let joined = read::descriptors(&data("project/descriptors.bin"), &all).unwrap();
+    assert_eq!((joined.len(), joined.dim()), (6, 128));
     for file in ["descriptors.bin", "database.db", "floats.db"] {
         let path = data("project").join(file);
-        let expected = read::descriptors(&path, &all).unwrap().select(&[4, 1]);
-        assert_eq!(read::descriptors(&path, &some).unwrap(), expected, "{file}");
+        let descriptors = read::descriptors(&path, &all).unwrap();
+        // Those through the tracks are those of the binary form.
+        assert!(file == "floats.db" || descriptors == joined);
+        assert_eq!(read::descriptors(&path, &some).unwrap(), descriptors.select(&[4, 1]), "{file}");
+    }
+    let floats = read::descriptors(&data("project/floats.db"), &all).unwrap();
+    assert_eq!((floats.len(), floats.dim()), (6, 4));
+    let Values::F32(values) = floats.values() else { panic!("floats expected") };
+    for row in values.chunks(4) {
+        // Norm 1: four values rounded to 24 bits.
+        assert!((row.iter().map(|x| x * x).sum::<f32>() - 1.0).abs() < 1e-6);
     }
 }
 
@@ -80,6 +82,11 @@ fn features_of_hloc_are_descriptors_of_the_points_that_they_made() {
     let cloud = read::open(&data("cloud.ply")).unwrap();
     let line = read::descriptors(&path, &cloud).unwrap_err().to_string();
     let told = "whose tracks lead to images, found ply binary little endian points";
+    assert!(line.ends_with(told), "{line}");
+    let array = read::open(&data("f8.npy")).unwrap();
+    let line = read::descriptors(&data("project/database.db"), &array).unwrap_err().to_string();
+    let told =
+        "database.db: expected a COLMAP model, whose tracks lead to images, found npy points";
     assert!(line.ends_with(told), "{line}");
 }
 
@@ -147,29 +154,12 @@ fn arrays_of_descriptors_have_a_row_per_point_in_its_order() {
 }
 
 #[test]
-fn float_descriptors_keep_their_type_and_get_norm_1() {
-    let input = read::open(&data("project")).unwrap();
-    let floats = read::descriptors(&data("project/floats.db"), &input).unwrap();
-    assert_eq!((floats.len(), floats.dim()), (6, 4));
-    let Values::F32(values) = floats.values() else {
-        panic!("floats expected");
-    };
-    for row in values.chunks(4) {
-        let norm2: f32 = row.iter().map(|x| x * x).sum();
-        // Four values rounded to 24 bits.
-        assert!((norm2 - 1.0).abs() < 1e-6);
-    }
-}
-
-#[test]
 fn a_database_without_types_is_read_as_bytes() {
     let dir = tempfile::tempdir().unwrap();
     // A URI would misread this name.
     let path = dir.path().join("a?b#c%20 d.db");
-    fs::copy(data("project/database.db"), &path).unwrap();
-    let database = rusqlite::Connection::open(&path).unwrap();
-    database.execute_batch("ALTER TABLE descriptors DROP COLUMN type").unwrap();
-    database.close().unwrap();
+    let drop = "ALTER TABLE descriptors DROP COLUMN type";
+    write_database(&path, "project/database.db", drop);
     let input = read::open(&data("project")).unwrap();
     let expected = read::descriptors(&data("project/descriptors.bin"), &input).unwrap();
     assert_eq!(read::descriptors(&path, &input).unwrap(), expected);
@@ -223,13 +213,7 @@ fn descriptors_are_of_the_points_that_have_a_place() {
     let input = read::open(&path).unwrap();
     let (_dir, path) = write("d.npy", npy("'|u1'", "(4, 2)", &[1, 2, 3, 4, 5, 6, 7, 8]));
     let descriptors = read::descriptors(&path, &input).unwrap();
-    assert_eq!(descriptors.values(), &unlift::descriptors::Values::U8(vec![1, 2, 5, 6, 7, 8]));
-}
-
-/// The bytes of a file, or a statement that is run on the database.
-enum Wrong {
-    Bytes(Vec<u8>),
-    Sql(&'static str),
+    assert_eq!(descriptors.values(), &Values::U8(vec![1, 2, 5, 6, 7, 8]));
 }
 
 /// Descriptors of the six points of the project, of a float type, whose values are all `value`.
@@ -245,100 +229,53 @@ fn every_malformed_file_of_descriptors_is_refused_with_its_line() {
     let good = fixture("project/descriptors.bin");
     let input = read::open(&data("project")).unwrap();
     let n = good.len();
-    let bytes = |what, bytes, line| (what, Wrong::Bytes(bytes), line);
-    let sql = |what, statement, line| (what, Wrong::Sql(statement), line);
+    let bytes = |what, bytes, line| (what, Ok::<Vec<u8>, &str>(bytes), line);
+    let sql = |what, statement, line| (what, Err(statement), line);
     let zeros = appended(good[..n - 6 * 128].to_vec(), &[0; 6 * 128]);
-    let rows: Vec<(&str, Wrong, &str)> = vec![
-        bytes("empty", vec![],
-            "d: expected a file that begins with P3DESC01, a NumPy array (.npy), a COLMAP database (SQLite) or hloc's features (HDF5), found an empty file"),
-        bytes("another form", b"\x89HDF\r\n\x1a\n".to_vec(),
-            "d: expected a whole HDF5 file, found HDF5 format error: unexpected EOF: need 9 bytes, have 8"),
-        bytes("cut in the ids", good[..40].to_vec(),
-            "d: header (byte 8): expected at most 3 for the number of descriptors (24 bytes are left), found 6"),
-        bytes("cut in the values", good[..n - 1].to_vec(),
-            "d: header (byte 24): expected 6 ids and rows of 128 bytes, found 815 bytes"),
-        bytes("count of 10^18", patched(good.clone(), 8, &MANY),
-            "d: header (byte 8): expected at most 103 for the number of descriptors (824 bytes are left), found 1000000000000000000"),
-        bytes("dimension of 2^32 - 1", patched(good.clone(), 16, &[255; 4]),
-            "d: header (byte 24): expected 6 ids and rows of 4294967295 bytes, found 816 bytes"),
-        bytes("unknown type", patched(good.clone(), 20, &[4]),
-            "d: header (byte 20): expected type 1 (u8), 2 (float16) or 3 (float32), found 4"),
-        bytes("bytes said to be halves", patched(good.clone(), 20, &[2]),
-            "d: header (byte 24): expected 6 ids and rows of 256 bytes, found 816 bytes"),
-        bytes("half that is not finite", floats(2, &f16::INFINITY.to_le_bytes()),
-            "d: point 2, value 0: expected a finite value, found inf"),
-        bytes("halves that are all the same", floats(2, &f16::ONE.to_le_bytes()),
-            "d: descriptors: expected real descriptors, found the same row for every point (dummies)"),
-        bytes("floats that are all zero", floats(3, &[0; 4]),
-            "d: descriptors: expected real descriptors, found only zeros (dummies)"),
-        bytes("id of a point missing", patched(good.clone(), 24 + 8, &[100]),
-            "d: point 3: expected a descriptor, found none among 6"),
+    // The bytes of a file, or a statement that is run on the database.
+    let rows = vec![
+        bytes("empty", vec![], "d: expected a file that begins with P3DESC01, a NumPy array (.npy), a COLMAP database (SQLite) or hloc's features (HDF5), found an empty file"),
+        bytes("another form", b"\x89HDF\r\n\x1a\n".to_vec(), "d: expected a whole HDF5 file, found HDF5 format error: unexpected EOF: need 9 bytes, have 8"),
+        bytes("cut in the ids", good[..40].to_vec(), "d: header (byte 8): expected at most 3 for the number of descriptors (24 bytes are left), found 6"),
+        bytes("cut in the values", good[..n - 1].to_vec(), "d: header (byte 24): expected 6 ids and rows of 128 bytes, found 815 bytes"),
+        bytes("count of 10^18", patched(good.clone(), 8, &MANY), "d: header (byte 8): expected at most 103 for the number of descriptors (824 bytes are left), found 1000000000000000000"),
+        bytes("dimension of 2^32 - 1", patched(good.clone(), 16, &[255; 4]), "d: header (byte 24): expected 6 ids and rows of 4294967295 bytes, found 816 bytes"),
+        bytes("unknown type", patched(good.clone(), 20, &[4]), "d: header (byte 20): expected type 1 (u8), 2 (float16) or 3 (float32), found 4"),
+        bytes("bytes said to be halves", patched(good.clone(), 20, &[2]), "d: header (byte 24): expected 6 ids and rows of 256 bytes, found 816 bytes"),
+        bytes("half that is not finite", floats(2, &f16::INFINITY.to_le_bytes()), "d: point 2, value 0: expected a finite value, found inf"),
+        bytes("halves that are all the same", floats(2, &f16::ONE.to_le_bytes()), "d: descriptors: expected real descriptors, found the same row for every point (dummies)"),
+        bytes("floats that are all zero", floats(3, &[0; 4]), "d: descriptors: expected real descriptors, found only zeros (dummies)"),
+        bytes("id of a point missing", patched(good.clone(), 24 + 8, &[100]), "d: point 3: expected a descriptor, found none among 6"),
         bytes("dummies", zeros, "d: descriptors: expected real descriptors, found only zeros (dummies)"),
-        bytes("a database cut short", fixture("project/database.db")[..100].to_vec(),
-            "d: table images: expected a COLMAP database, found database disk image is malformed"),
-        sql("a database without images", "PRAGMA foreign_keys=0; DROP TABLE images",
-            "d: table images: expected a COLMAP database, found no such table: images"),
-        sql("an image under another name", "UPDATE images SET name = 'x' WHERE name = 'i2.jpg'",
-            "d: image \"i2.jpg\": expected this image of the model, found no such image"),
-        sql("an image without descriptors", "DELETE FROM descriptors WHERE image_id = 1",
-            "d: image \"i3.jpg\": expected descriptors, found none"),
-        sql("fewer descriptors than keypoints", "UPDATE descriptors SET rows = 2, data = substr(data, 1, 256)",
-            "d: image \"küche/ä 0.jpg\": expected a descriptor for keypoint 2, found 2 descriptors"),
-        sql("a blob cut short", "UPDATE descriptors SET data = substr(data, 1, 1000)",
-            "d: image \"küche/ä 0.jpg\": expected 8 descriptors of 128 bytes, found 1000 bytes"),
-        sql("negative rows", "UPDATE descriptors SET rows = -8",
-            "d: image \"küche/ä 0.jpg\": expected sizes of descriptors, found -8 x 128"),
-        sql("text for rows", "UPDATE descriptors SET rows = 'many'",
-            "d: table descriptors: expected a COLMAP database, found Invalid column type Text at index: 0, name: rows"),
-        sql("two kinds in one database", "UPDATE descriptors SET type = 1 WHERE image_id = 1",
-            "d: image \"i3.jpg\": expected 128 bytes each, as in other images, found 32 floats"),
-        sql("NaN in a database", "UPDATE descriptors SET type = 1, cols = 4, data = x'0000c07f0000c07f0000c07f0000c07f0000c07f0000c07f0000c07f0000c07f'",
-            "d: descriptor 0, value 0: expected a finite value, found NaN"),
-    ];
-    let array = |what, array, line| (what, Wrong::Bytes(array), line);
-    let rows = rows.into_iter().chain([
-        array("an array of positions", npy("'<f8'", "(6,)", &[0; 48]),
-            "d: header (byte 10): expected an array of shape (6, dimension), a row per point, found \"(6,)\""),
-        array("a column per point", npy("'|u1'", "(4, 6)", &[7; 24]),
-            "d: header (byte 10): expected an array of shape (6, dimension), a row per point, \
+        bytes("a database cut short", fixture("project/database.db")[..100].to_vec(), "d: table images: expected a COLMAP database, found database disk image is malformed"),
+        sql("a database without images", "PRAGMA foreign_keys=0; DROP TABLE images", "d: table images: expected a COLMAP database, found no such table: images"),
+        sql("an image under another name", "UPDATE images SET name = 'x' WHERE name = 'i2.jpg'", "d: image \"i2.jpg\": expected this image of the model, found no such image"),
+        sql("an image without descriptors", "DELETE FROM descriptors WHERE image_id = 1", "d: image \"i3.jpg\": expected descriptors, found none"),
+        sql("fewer descriptors than keypoints", "UPDATE descriptors SET rows = 2, data = substr(data, 1, 256)", "d: image \"küche/ä 0.jpg\": expected a descriptor for keypoint 2, found 2 descriptors"),
+        sql("a blob cut short", "UPDATE descriptors SET data = substr(data, 1, 1000)", "d: image \"küche/ä 0.jpg\": expected 8 descriptors of 128 bytes, found 1000 bytes"),
+        sql("negative rows", "UPDATE descriptors SET rows = -8", "d: image \"küche/ä 0.jpg\": expected sizes of descriptors, found -8 x 128"),
+        sql("text for rows", "UPDATE descriptors SET rows = 'many'", "d: table descriptors: expected a COLMAP database, found Invalid column type Text at index: 0, name: rows"),
+        sql("two kinds in one database", "UPDATE descriptors SET type = 1 WHERE image_id = 1", "d: image \"i3.jpg\": expected 128 bytes each, as in other images, found 32 floats"),
+        sql("NaN in a database", "UPDATE descriptors SET type = 1, cols = 4, data = x'0000c07f0000c07f0000c07f0000c07f0000c07f0000c07f0000c07f0000c07f'", "d: descriptor 0, value 0: expected a finite value, found NaN"),
+        bytes("an array of positions", npy("'<f8'", "(6,)", &[0; 48]), "d: header (byte 10): expected an array of shape (6, dimension), a row per point, found \"(6,)\""),
+        bytes("a column per point", npy("'|u1'", "(4, 6)", &[7; 24]), "d: header (byte 10): expected an array of shape (6, dimension), a row per point, \
              found \"(4, 6)\", rows and columns exchanged"),
-        array("integers", npy("'<i4'", "(6, 1)", &[7; 24]),
-            "d: header (byte 10): expected bytes, or floats of 2, 4 or 8 bytes (u1, f2, f4, f8), found \"<i4\""),
-        array("an array cut short", npy("'<f2'", "(6, 4)", &[7; 47]),
-            "d: header (byte 128): expected 6 rows of 8 bytes, found 47 bytes"),
-        array("2^62 columns", npy("'<f8'", "(6, 4611686018427387904)", &[7; 24]),
-            "d: header (byte 128): expected 6 rows of too many bytes, found 24 bytes"),
-        array("a double that no float holds", npy("'<f8'", "(6, 1)", &[1e300f64.to_le_bytes(); 6].concat()),
-            "d: header (byte 128): expected a finite value (as a float of 4 bytes) in row 0, found 1e300"),
-        array("65537 columns", npy("'|u1'", "(6, 65537)", &[7; 6 * 65537]),
-            "d: descriptors: expected at most 65536 values each, found 65537"),
-    ]);
+        bytes("integers", npy("'<i4'", "(6, 1)", &[7; 24]), "d: header (byte 10): expected bytes, or floats of 2, 4 or 8 bytes (u1, f2, f4, f8), found \"<i4\""),
+        bytes("an array cut short", npy("'<f2'", "(6, 4)", &[7; 47]), "d: header (byte 128): expected 6 rows of 8 bytes, found 47 bytes"),
+        bytes("2^62 columns", npy("'<f8'", "(6, 4611686018427387904)", &[7; 24]), "d: header (byte 128): expected 6 rows of too many bytes, found 24 bytes"),
+        bytes("a double that no float holds", npy("'<f8'", "(6, 1)", &[1e300f64.to_le_bytes(); 6].concat()), "d: header (byte 128): expected a finite value (as a float of 4 bytes) in row 0, found 1e300"),
+        bytes("65537 columns", npy("'|u1'", "(6, 65537)", &[7; 6 * 65537]), "d: descriptors: expected at most 65536 values each, found 65537"),
+    ];
     for (what, wrong, line) in rows {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("d");
         match wrong {
-            Wrong::Bytes(bytes) => fs::write(&path, bytes).unwrap(),
-            Wrong::Sql(statement) => {
-                fs::write(&path, fixture("project/database.db")).unwrap();
-                let database = rusqlite::Connection::open(&path).unwrap();
-                database.execute_batch(statement).unwrap();
-                database.close().unwrap();
-            }
+            Ok(bytes) => fs::write(&path, bytes).unwrap(),
+            Err(statement) => write_database(&path, "project/database.db", statement),
         }
         let error = read::descriptors(&path, &input).expect_err(what);
         assert_eq!(shown(dir.path(), &error), line, "{what}");
     }
-}
-
-#[test]
-fn descriptors_need_a_database_or_a_model_that_fit() {
-    let cloud = read::open(&data("f8.npy")).unwrap();
-    let database = data("project/database.db");
-    let error = read::descriptors(&database, &cloud).unwrap_err();
-    assert_eq!(
-        shown(&data(""), &error),
-        "project/database.db: expected a COLMAP model, whose tracks lead to images, found npy points"
-    );
 }
 
 /// Without rows, any dimension matches the file size. It must not allocate memory, here 17 TB.

@@ -1,14 +1,14 @@
 //! Tests features of images: files of h5py and pycolmap, round trips, and malformed files.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use hdf5_pure::{DatasetBuilder, FileBuilder};
 use unlift::Descriptors;
 use unlift::descriptors::Values;
 use unlift_io::features::{FeatureSource, FeatureWriter, ImageFeatures};
 
-use super::{data, shared, shown, write};
+use super::{data, shared, shown, write, write_database};
 
 /// The name and the shape of an array, and what fills it.
 type Filled<'a> = (&'a str, &'a [u64], Box<dyn Fn(&mut DatasetBuilder)>);
@@ -78,28 +78,22 @@ fn what_is_written_is_read_again_and_the_bytes_are_the_same() {
         (0..700).map(|at| made(&format!("seq{}/ü {at}.jpg", at % 2), at % 4)).collect();
     images.push(made("at the top.png", 300));
     images.push(ImageFeatures { name: "a/b/c/bare".to_owned(), ..ImageFeatures::default() });
-    let mut written = Vec::new();
-    for _ in 0..2 {
-        let mut writer = FeatureWriter::create(&path).unwrap();
-        images.iter().for_each(|image| writer.append(image).unwrap());
-        writer.finish().unwrap();
-        written.push(fs::read(&path).unwrap());
-    }
-    assert_eq!(written[0], written[1]);
-    images.sort_by(|a, b| a.name.cmp(&b.name));
-    assert_eq!(all(&path), images);
-    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1, "no temporary file");
-}
-
-#[test]
-fn a_file_appears_when_it_is_finished() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("features.h5");
+    // A file appears when it is finished.
     let mut writer = FeatureWriter::create(&path).unwrap();
-    writer.append(&made("a.jpg", 3)).unwrap();
+    writer.append(&images[0]).unwrap();
     assert!(!path.exists());
     drop(writer);
     assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
+    let written = [0, 1].map(|_| {
+        let mut writer = FeatureWriter::create(&path).unwrap();
+        images.iter().for_each(|image| writer.append(image).unwrap());
+        writer.finish().unwrap();
+        fs::read(&path).unwrap()
+    });
+    assert!(written[0] == written[1]);
+    images.sort_by(|a, b| a.name.cmp(&b.name));
+    assert_eq!(all(&path), images);
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1, "no temporary file");
 }
 
 #[test]
@@ -130,49 +124,36 @@ fn names_and_columns_that_do_not_fit_are_refused() {
     }
 }
 
-fn database(columns: usize) -> (tempfile::TempDir, PathBuf) {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("database.db");
-    fs::copy(data("project/database.db"), &path).unwrap();
-    let database = rusqlite::Connection::open(&path).unwrap();
-    let row = [10.5f32, 20.25, 3.0, 4.0, -4.0, 3.0];
-    let row = if columns == 4 { [10.5, 20.25, 5.0, 1.0, 0.0, 0.0] } else { row };
-    let blob: Vec<u8> = row[..columns].iter().flat_map(|x| x.to_le_bytes()).collect();
-    let insert = "INSERT INTO keypoints SELECT image_id, 8, ?1, ?2 FROM images";
-    database.execute(insert, rusqlite::params![columns as i64, blob.repeat(8)]).unwrap();
-    database.close().unwrap();
-    (dir, path)
+/// Statement that gives each image 8 keypoints of this many columns.
+fn with_keypoints(columns: usize, row: &[f32]) -> String {
+    let hex: String =
+        row.iter().flat_map(|x| x.to_le_bytes()).map(|b| format!("{b:02x}")).collect();
+    let rows = hex.repeat(8);
+    format!("INSERT INTO keypoints SELECT image_id, 8, {columns}, x'{rows}' FROM images")
 }
 
 #[test]
 fn databases_come_in_the_same_convention() {
-    for columns in [2, 4, 6] {
-        let (_dir, path) = database(columns);
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("database.db");
+    let atan = (-4f32).atan2(3.0).to_degrees();
+    for (row, shape) in [
+        (&[10.5, 20.25][..], (None, None)),
+        (&[10.5, 20.25, 5.0, 1.0], (Some(5.0), Some(1f32.to_degrees()))),
+        (&[10.5, 20.25, 3.0, 4.0, -4.0, 3.0], (Some(5.0), Some(atan))),
+    ] {
+        write_database(&path, "project/database.db", &with_keypoints(row.len(), row));
         let images = all(&path);
         let names: Vec<&str> = images.iter().map(|image| &*image.name).collect();
         assert_eq!(names, ["i2.jpg", "i3.jpg", "küche/ä 0.jpg"]);
         let image = &images[2];
         assert_eq!((&image.keypoints, image.size), (&vec![[10.0, 19.75]; 8], Some([640, 480])));
         assert_eq!(bytes(image).len(), 8 * 128);
-        let shape = |values: &Option<Vec<f32>>| values.as_ref().map(|values| values[7]);
-        let expected = match columns {
-            2 => (None, None),
-            4 => (Some(5.0), Some(1f32.to_degrees())),
-            _ => (Some(5.0), Some((-4f32).atan2(3.0).to_degrees())),
-        };
-        assert_eq!((shape(&image.scales), shape(&image.orientations_deg)), expected);
+        let last = |values: &Option<Vec<f32>>| values.as_ref().map(|values| values[7]);
+        assert_eq!((last(&image.scales), last(&image.orientations_deg)), shape);
     }
-}
-
-#[test]
-fn a_database_in_floats_is_read_as_floats() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("database.db");
-    fs::copy(data("project/floats.db"), &path).unwrap();
-    let database = rusqlite::Connection::open(&path).unwrap();
-    let insert = "INSERT INTO keypoints SELECT image_id, 8, 2, zeroblob(64) FROM images";
-    database.execute_batch(insert).unwrap();
-    database.close().unwrap();
+    // A database in floats is read as floats.
+    write_database(&path, "project/floats.db", &with_keypoints(2, &[0.0, 0.0]));
     let images = all(&path);
     assert!(images.iter().all(|image| floats(image).len() == 8 * 4));
     assert_eq!(images[0].keypoints[0], [-0.5, -0.5]);
@@ -252,37 +233,23 @@ fn every_malformed_file_of_features_is_refused_with_its_line() {
     let rows: Vec<(&str, Vec<u8>, &str)> = vec![
         ("good", good.clone(), "good"),
         ("empty", vec![], "f: expected features in HDF5, or a COLMAP database (SQLite), found an empty file"),
-        ("text", b"hello\nworld".to_vec(),
-            "f: expected features in HDF5, or a COLMAP database (SQLite), found a file that begins with \"hello\\nwo\""),
+        ("text", b"hello\nworld".to_vec(), "f: expected features in HDF5, or a COLMAP database (SQLite), found a file that begins with \"hello\\nwo\""),
         ("no image", FileBuilder::new().finish().unwrap(), "f: expected at least one image, found none"),
         ("no keypoints", file(&[DESCRIPTORS]), "f: image \"a.jpg\": expected an array keypoints, found only descriptors"),
-        ("global descriptors", file(&[("global_descriptor", &[2], &|to| { to.with_f32_data(&[0.5, 1.0]); })]),
-            "f: expected a group per image with keypoints and descriptors, found global descriptors of whole images"),
+        ("global descriptors", file(&[("global_descriptor", &[2], &|to| { to.with_f32_data(&[0.5, 1.0]); })]), "f: expected a group per image with keypoints and descriptors, found global descriptors of whole images"),
         ("no descriptors", file(&[KEYPOINTS]), "f: image \"a.jpg\": expected descriptors, found none"),
-        ("keypoints in one column", with(floats("keypoints", &[3, 1], 1.0)),
-            "f: image \"a.jpg\", keypoints: expected shape (N, 2), found (3, 1)"),
-        ("flat keypoints", with(floats("keypoints", &[6], 1.0)),
-            "f: image \"a.jpg\", keypoints: expected shape (N, 2), found (6,)"),
-        ("infinite", with(floats("keypoints", &[3, 2], f32::INFINITY)),
-            "f: image \"a.jpg\", keypoints: expected finite coordinates in row 0, found (inf, inf)"),
-        ("(N, D)", with(floats("descriptors", &[3, 4], 0.5)),
-            "f: image \"a.jpg\", descriptors: expected shape (D, N) with N = 3, one column per keypoint, found (3, 4), rows and columns exchanged"),
-        ("another number of descriptors", with(floats("descriptors", &[4, 5], 0.5)),
-            "f: image \"a.jpg\", descriptors: expected shape (D, N) with N = 3, one column per keypoint, found (4, 5)"),
-        ("flat descriptors", with(floats("descriptors", &[12], 0.5)),
-            "f: image \"a.jpg\", descriptors: expected shape (D, N) with N = 3, one column per keypoint, found (12,)"),
-        ("dummies", with(floats("descriptors", &[4, 3], 0.0)),
-            "f: image \"a.jpg\", descriptors: expected real descriptors, found only zeros (dummies)"),
-        ("NaN in descriptors", with(floats("descriptors", &[4, 3], f32::NAN)),
-            "f: image \"a.jpg\", descriptors: expected a finite value, found NaN (descriptor 0, value 0)"),
-        ("wide integers", with(("descriptors", &[4, 3], Box::new(|to| { to.with_i64_data(&[7; 12]); }))),
-            "f: image \"a.jpg\", descriptors: expected floats, or unsigned bytes, found other integers"),
-        ("scores of others", with(floats("scores", &[2], 0.5)),
-            "f: image \"a.jpg\", scores: expected one value per keypoint, (3,), found (2,)"),
-        ("a size of one side", with(floats("image_size", &[1], 5.0)),
-            "f: image \"a.jpg\", image_size: expected width and height in pixels, found (1,)"),
-        ("a negative size", with(floats("image_size", &[2], -1.0)),
-            "f: image \"a.jpg\", image_size: expected width and height in pixels, found -1 and -2"),
+        ("keypoints in one column", with(floats("keypoints", &[3, 1], 1.0)), "f: image \"a.jpg\", keypoints: expected shape (N, 2), found (3, 1)"),
+        ("flat keypoints", with(floats("keypoints", &[6], 1.0)), "f: image \"a.jpg\", keypoints: expected shape (N, 2), found (6,)"),
+        ("infinite", with(floats("keypoints", &[3, 2], f32::INFINITY)), "f: image \"a.jpg\", keypoints: expected finite coordinates in row 0, found (inf, inf)"),
+        ("(N, D)", with(floats("descriptors", &[3, 4], 0.5)), "f: image \"a.jpg\", descriptors: expected shape (D, N) with N = 3, one column per keypoint, found (3, 4), rows and columns exchanged"),
+        ("another number of descriptors", with(floats("descriptors", &[4, 5], 0.5)), "f: image \"a.jpg\", descriptors: expected shape (D, N) with N = 3, one column per keypoint, found (4, 5)"),
+        ("flat descriptors", with(floats("descriptors", &[12], 0.5)), "f: image \"a.jpg\", descriptors: expected shape (D, N) with N = 3, one column per keypoint, found (12,)"),
+        ("dummies", with(floats("descriptors", &[4, 3], 0.0)), "f: image \"a.jpg\", descriptors: expected real descriptors, found only zeros (dummies)"),
+        ("NaN in descriptors", with(floats("descriptors", &[4, 3], f32::NAN)), "f: image \"a.jpg\", descriptors: expected a finite value, found NaN (descriptor 0, value 0)"),
+        ("wide integers", with(("descriptors", &[4, 3], Box::new(|to| { to.with_i64_data(&[7; 12]); }))), "f: image \"a.jpg\", descriptors: expected floats, or unsigned bytes, found other integers"),
+        ("scores of others", with(floats("scores", &[2], 0.5)), "f: image \"a.jpg\", scores: expected one value per keypoint, (3,), found (2,)"),
+        ("a size of one side", with(floats("image_size", &[1], 5.0)), "f: image \"a.jpg\", image_size: expected width and height in pixels, found (1,)"),
+        ("a negative size", with(floats("image_size", &[2], -1.0)), "f: image \"a.jpg\", image_size: expected width and height in pixels, found -1 and -2"),
     ];
     for (what, bytes, expected) in rows {
         assert_eq!(line(&bytes), expected, "{what}");
@@ -294,7 +261,6 @@ fn every_malformed_file_of_features_is_refused_with_its_line() {
 #[test]
 #[rustfmt::skip] // One row per line.
 fn every_malformed_database_is_refused_with_its_line() {
-    let fixture = data("project/database.db");
     let filled = "INSERT INTO keypoints SELECT image_id, 8, 2, zeroblob(64) FROM images; ";
     let rows = [
         ("good", "", "good"),
@@ -302,41 +268,27 @@ fn every_malformed_database_is_refused_with_its_line() {
         ("no descriptors", "DELETE FROM descriptors", "f: image \"i2.jpg\": expected descriptors, found none"),
         ("no table of keypoints", "DROP TABLE keypoints", "f: table keypoints: expected a COLMAP database, found no such table: keypoints"),
         ("no image", "PRAGMA foreign_keys=0; DELETE FROM images", "f: expected at least one image, found none"),
-        ("three columns", "UPDATE keypoints SET cols = 3, data = zeroblob(96)",
-            "f: image \"i2.jpg\": expected keypoints of 2, 4 or 6 columns, found 3 columns"),
-        ("cut off", "UPDATE keypoints SET data = zeroblob(60)",
-            "f: image \"i2.jpg\": expected 8 keypoints of 8 bytes, found 60 bytes"),
-        ("columns of 2^62", "UPDATE keypoints SET cols = 4611686018427387904",
-            "f: image \"i2.jpg\": expected sizes of keypoints, found 8 x 4611686018427387904"),
-        ("NaN", "UPDATE keypoints SET rows = 1, data = x'000000000000c07f'",
-            "f: image \"i2.jpg\": expected a finite number in keypoint 0, found NaN"),
-        ("other numbers", "UPDATE keypoints SET rows = 7, data = zeroblob(56)",
-            "f: image \"i2.jpg\": expected 7 descriptors, one per keypoint, found 8"),
-        ("dummies", "UPDATE descriptors SET data = zeroblob(1024)",
-            "f: image \"i2.jpg\": expected real descriptors, found only zeros (dummies)"),
+        ("three columns", "UPDATE keypoints SET cols = 3, data = zeroblob(96)", "f: image \"i2.jpg\": expected keypoints of 2, 4 or 6 columns, found 3 columns"),
+        ("cut off", "UPDATE keypoints SET data = zeroblob(60)", "f: image \"i2.jpg\": expected 8 keypoints of 8 bytes, found 60 bytes"),
+        ("columns of 2^62", "UPDATE keypoints SET cols = 4611686018427387904", "f: image \"i2.jpg\": expected sizes of keypoints, found 8 x 4611686018427387904"),
+        ("NaN", "UPDATE keypoints SET rows = 1, data = x'000000000000c07f'", "f: image \"i2.jpg\": expected a finite number in keypoint 0, found NaN"),
+        ("other numbers", "UPDATE keypoints SET rows = 7, data = zeroblob(56)", "f: image \"i2.jpg\": expected 7 descriptors, one per keypoint, found 8"),
+        ("dummies", "UPDATE descriptors SET data = zeroblob(1024)", "f: image \"i2.jpg\": expected real descriptors, found only zeros (dummies)"),
         ("without features", "UPDATE keypoints SET rows = 0, cols = 0, data = x''; UPDATE descriptors SET rows = 0, cols = 0, data = NULL", "good"),
         ("a view that never ends", "DROP TABLE keypoints; CREATE VIEW keypoints AS WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c) \
-            SELECT x AS image_id, 1 AS rows, 2 AS cols, zeroblob(8) AS data FROM c",
-            "f: table keypoints: expected a table, found a view"),
-        ("a view of images", "PRAGMA foreign_keys=0; ALTER TABLE images RENAME TO i; CREATE VIEW Images AS SELECT * FROM i",
-            "f: table images: expected a table, found a view"),
-        ("a virtual table", "DROP TABLE descriptors; CREATE VIRTUAL TABLE descriptors USING fts3(rows, cols, data)",
-            "f: table descriptors: expected a table, found a virtual table"),
+            SELECT x AS image_id, 1 AS rows, 2 AS cols, zeroblob(8) AS data FROM c", "f: table keypoints: expected a table, found a view"),
+        ("a view of images", "PRAGMA foreign_keys=0; ALTER TABLE images RENAME TO i; CREATE VIEW Images AS SELECT * FROM i", "f: table images: expected a table, found a view"),
+        ("a virtual table", "DROP TABLE descriptors; CREATE VIRTUAL TABLE descriptors USING fts3(rows, cols, data)", "f: table descriptors: expected a table, found a virtual table"),
         ("blobs that are computed", "DROP TABLE keypoints; CREATE TABLE keypoints (image_id, rows, cols, data AS (zeroblob(900000000))); \
-            INSERT INTO keypoints SELECT image_id, 112500000, 2 FROM images",
-            "f: table keypoints: expected a COLMAP database, found string or blob too big"),
+            INSERT INTO keypoints SELECT image_id, 112500000, 2 FROM images", "f: table keypoints: expected a COLMAP database, found string or blob too big"),
         ("names that are computed", "PRAGMA foreign_keys=0; DROP TABLE images; CREATE TABLE images (image_id, camera_id, name AS (printf('%.100000000c%d', 'x', image_id))); \
-            INSERT INTO images VALUES (1, 1), (2, 1), (3, 1)",
-            "f: table images: expected at most 256 MiB in memory of a file of 19 KiB, found 286.1 MiB"),
+            INSERT INTO images VALUES (1, 1), (2, 1), (3, 1)", "f: table images: expected at most 256 MiB in memory of a file of 19 KiB, found 286.1 MiB"),
         ("without a camera", "PRAGMA foreign_keys=0; DELETE FROM cameras", "good"),
     ];
     for (what, statement, expected) in rows {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("f");
-        fs::copy(&fixture, &path).unwrap();
-        let database = rusqlite::Connection::open(&path).unwrap();
-        database.execute_batch(&format!("{filled}{statement}")).unwrap();
-        database.close().unwrap();
+        write_database(&path, "project/database.db", &format!("{filled}{statement}"));
         assert_eq!(line(&fs::read(&path).unwrap()), expected, "{what}");
     }
 }

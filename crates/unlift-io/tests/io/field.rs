@@ -48,21 +48,13 @@ const MAPS: [(&str, usize, usize, &str); 29] = [
 ];
 
 /// Input, and the end of the error line.
+#[rustfmt::skip] // One row per line.
 const REFUSED: [(&str, &str); 8] = [
     ("f02-named-in-comment/trajectory.txt", "found a trajectory, poses of cameras"),
-    (
-        "f10-integers/int.pcd",
-        "found a .pcd file (convert it: CloudCompare -O in.pcd -SAVE_CLOUDS, or Open3D)",
-    ),
-    (
-        "hostile/maps/fewer-a.las",
-        "found a .las file (convert it: CloudCompare -O in.las -SAVE_CLOUDS, or pdal translate in.las out.ply)",
-    ),
+    ("f10-integers/int.pcd", "found a .pcd file (convert it: CloudCompare -O in.pcd -SAVE_CLOUDS, or Open3D)"),
+    ("hostile/maps/fewer-a.las", "found a .las file (convert it: CloudCompare -O in.las -SAVE_CLOUDS, or pdal translate in.las out.ply)"),
     ("f18-packed-splats/compressed.ply", "found packed splats (export them unpacked)"),
-    (
-        "hostile/maps/sparse-header.ply",
-        "expected 5000000000 rows of vertex, 12 bytes each, found 0 bytes",
-    ),
+    ("hostile/maps/sparse-header.ply", "expected 5000000000 rows of vertex, 12 bytes each, found 0 bytes"),
     ("turn4/12-small/bunny_8.pts", "found 9 up to here"),
     ("f15-other-h5/matches.h5", "found matches of pairs of images"),
     ("f15-other-h5/keypoints.h5", "found arrays outside any group"),

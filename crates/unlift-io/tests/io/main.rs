@@ -1,4 +1,4 @@
-//! Tests readers of maps, descriptors and features, and exports of clouds.
+//! Tests readers of maps, descriptors and features, stage files, and exports of clouds.
 
 mod clouds;
 mod descriptors;
@@ -8,17 +8,24 @@ mod malformed;
 mod models;
 mod others;
 mod real_maps;
+mod stages;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
+use unlift_io::atomic::{Access, OutputFile};
 use unlift_io::read::{self, Input};
+use unlift_io::stage::ImageWriter;
 
 const POINTS: [[f64; 3]; 3] = [[0.5, -1.25, 3.0], [1000.0, 2.0, -0.0625], [0.125, 0.25, 0.375]];
 
 fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
+}
+
+fn fixture(name: &str) -> Vec<u8> {
+    fs::read(data(name)).unwrap()
 }
 
 fn write(name: &str, contents: impl AsRef<[u8]>) -> (TempDir, PathBuf) {
@@ -56,6 +63,14 @@ fn copy_folder(from: &Path, to: &Path) {
     }
 }
 
+/// Copies a database of the fixtures to `path` and runs a statement on it.
+fn write_database(path: &Path, name: &str, statement: &str) {
+    fs::copy(data(name), path).unwrap();
+    let database = rusqlite::Connection::open(path).unwrap();
+    database.execute_batch(statement).unwrap();
+    database.close().unwrap();
+}
+
 fn total(rows: &[[f64; 3]]) -> [f64; 3] {
     std::array::from_fn(|axis| rows.iter().map(|p| p[axis]).sum())
 }
@@ -82,4 +97,27 @@ fn npy(descr: &str, shape: &str, values: &[u8]) -> Vec<u8> {
     let text = format!("{text:117}\n");
     let length = (text.len() as u16).to_le_bytes();
     [b"\x93NUMPY\x01\0", &length[..], text.as_bytes(), values].concat()
+}
+
+/// An `.npz` file; every second array is deflated.
+fn archive(arrays: &[(&str, Vec<u8>)]) -> Vec<u8> {
+    use std::io::Write;
+    use zip::write::{SimpleFileOptions, ZipWriter};
+    let mut out = ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    for (at, (name, bytes)) in arrays.iter().enumerate() {
+        let method = [zip::CompressionMethod::Deflated, zip::CompressionMethod::Stored][at % 2];
+        let options = SimpleFileOptions::default().compression_method(method);
+        out.start_file(format!("{name}.npy"), options).unwrap();
+        out.write_all(bytes).unwrap();
+    }
+    out.finish().unwrap().into_inner()
+}
+
+/// Writes a stage file of many images.
+fn write_images(path: &Path, fill: impl FnOnce(&mut ImageWriter<'_>)) {
+    let mut output = OutputFile::create(path, Access::Private).unwrap();
+    let mut images = ImageWriter::start(&mut output);
+    fill(&mut images);
+    images.finish().unwrap();
+    output.commit().unwrap();
 }

@@ -8,11 +8,7 @@ use std::path::{Path, PathBuf};
 use unlift_io::features::FeatureSource;
 use unlift_io::read;
 
-use super::{copy_folder, data, npy as array, refused, shown};
-
-pub fn fixture(name: &str) -> Vec<u8> {
-    fs::read(data(name)).unwrap()
-}
+use super::{copy_folder, data, fixture, npy as array, refused, shown};
 
 pub fn patched(mut file: Vec<u8>, at: usize, bytes: &[u8]) -> Vec<u8> {
     file[at..at + bytes.len()].copy_from_slice(bytes);
@@ -28,15 +24,11 @@ pub fn appended(mut file: Vec<u8>, bytes: &[u8]) -> Vec<u8> {
 pub const MANY: [u8; 8] = 1_000_000_000_000_000_000_u64.to_le_bytes();
 
 /// What is wrong, the files (or, ending in `/`, folders), the path to open, and the error line.
-type Row = (&'static str, Vec<(&'static str, Vec<u8>)>, &'static str, &'static str);
+type Row = (&'static str, Vec<(&'static str, Vec<u8>)>, &'static str, String);
 
-fn alone(
-    what: &'static str,
-    name: &'static str,
-    bytes: impl AsRef<[u8]>,
-    line: &'static str,
-) -> Row {
-    (what, vec![(name, bytes.as_ref().to_vec())], name, line)
+/// A file by itself; `line` follows its name.
+fn alone(what: &'static str, name: &'static str, bytes: impl AsRef<[u8]>, line: &str) -> Row {
+    (what, vec![(name, bytes.as_ref().to_vec())], name, format!("{name}{line}"))
 }
 
 fn made(dir: &Path, files: &[(&str, Vec<u8>)], open: &str) -> PathBuf {
@@ -52,16 +44,17 @@ fn made(dir: &Path, files: &[(&str, Vec<u8>)], open: &str) -> PathBuf {
 
 #[test]
 fn every_malformed_file_is_refused_with_its_line() {
-    let tables = [binary(), text(), ply(), tables(), arrays(), paths()];
-    for (what, files, open, line) in tables.into_iter().flatten() {
+    let all = [binary(), text(), ply(), tables(), arrays(), paths()];
+    for (what, files, open, line) in all.into_iter().flatten() {
         let dir = tempfile::tempdir().unwrap();
-        let error = read::open(&made(dir.path(), &files, open)).expect_err(what);
-        assert_eq!(shown(dir.path(), &error), line, "{what}");
-    }
-    for (what, files, open, line) in cameras() {
-        let dir = tempfile::tempdir().unwrap();
-        let notes = read::open(&made(dir.path(), &files, open)).expect(what).notes;
-        assert!(notes.iter().any(|note| note.ends_with(line)), "{what}: {notes:?}");
+        let path = made(dir.path(), &files, open);
+        // Errors in cameras are notes, because points do not need cameras.
+        if line.starts_with("cameras") {
+            let notes = read::open(&path).expect(what).notes;
+            assert!(notes.iter().any(|note| note.ends_with(&line)), "{what}: {notes:?}");
+        } else {
+            assert_eq!(shown(dir.path(), &read::open(&path).expect_err(what)), line, "{what}");
+        }
     }
 }
 
@@ -123,13 +116,11 @@ fn cut(name: &str, n: usize) -> Vec<u8> {
     model_file(name)[..n].to_vec()
 }
 
-fn in_model(what: &'static str, name: &'static str, bytes: Vec<u8>, line: &'static str) -> Row {
-    let mut files: Vec<_> = ["cameras.bin", "images.bin", "points3D.bin"]
-        .into_iter()
-        .map(|name| (name, model_file(name)))
-        .collect();
-    files.iter_mut().find(|f| f.0 == name).unwrap().1 = bytes;
-    (what, files, "", line)
+/// The model with other bytes in one file; `line` follows its name.
+fn in_model(what: &'static str, name: &'static str, bytes: Vec<u8>, line: &str) -> Row {
+    let names = ["cameras.bin", "images.bin", "points3D.bin"];
+    let file = |of| (of, if of == name { bytes.clone() } else { model_file(of) });
+    (what, names.map(file).to_vec(), "", format!("{name}{line}"))
 }
 
 /// Offsets in the files of the model: a count of 8 bytes, then records.
@@ -147,112 +138,51 @@ mod at {
 
 #[rustfmt::skip] // One row per line.
 fn binary() -> Vec<Row> {
-    let points = || model_file("points3D.bin");
-    let images = || model_file("images.bin");
-    let point_rows = [
-        ("empty", cut("points3D.bin", 0),
-            "points3D.bin: header (byte 0): expected 8 bytes of the number of points, found end of file"),
-        ("cut in the count", cut("points3D.bin", 5),
-            "points3D.bin: header (byte 0): expected 8 bytes of the number of points, found 5 bytes before the end of the file"),
-        ("count of 10^18", patched(points(), 0, &MANY),
-            "points3D.bin: header (byte 0): expected at most 8 for the number of points (426 bytes are left), found 1000000000000000000"),
-        ("track of 10^18", patched(points(), at::N_TRACK, &MANY),
-            "points3D.bin: record 1 (byte 51): expected at most 46 for the number of observations (375 bytes are left), found 1000000000000000000"),
-        ("trailing byte", appended(points(), b"x"),
-            "points3D.bin: end (byte 434): expected end of file, found 1 more byte"),
-        ("repeated id", patched(points(), at::POINT, &[3]),
-            "points3D.bin: point 3: expected each id once, found it again"),
-        ("text where binary is expected", b"# 3D point list\n1 0 0 0 0 0 0 0\n".to_vec(),
-            "points3D.bin: header (byte 0): expected binary data (the number of points), found text"),
-        ("no points", vec![0; 8], "points3D.bin: expected at least one point, found none"),
-    ];
-    let image_rows = [
-        ("empty", cut("images.bin", 0),
-            "images.bin: header (byte 0): expected 8 bytes of the number of images, found end of file"),
-        ("count of 10^18", patched(images(), 0, &MANY),
-            "images.bin: header (byte 0): expected at most 11 for the number of images (822 bytes are left), found 1000000000000000000"),
-        ("name without end", { let name_to_end = vec![b'a'; images().len() - at::NAME]; patched(images(), at::NAME, &name_to_end) },
-            "images.bin: record 1 (byte 72): expected a zero byte at the end of the image name, found end of file"),
-        ("repeated id", patched(images(), at::IMAGE, &[2]),
-            "images.bin: image 2: expected each id once, found it again"),
-    ];
-    let all = [
-        ("points3D.bin", point_rows.to_vec()),
-        ("images.bin", image_rows.to_vec()),
-    ];
-    all.into_iter()
-        .flat_map(|(name, rows)| {
-            rows.into_iter()
-                .map(move |(what, bytes, line)| in_model(what, name, bytes, line))
-        })
-        .collect()
+    let [points, images, cameras] = ["points3D.bin", "images.bin", "cameras.bin"].map(|name| move || model_file(name));
+    let name_to_end = vec![b'a'; images().len() - at::NAME];
+    vec![
+        in_model("empty", "points3D.bin", cut("points3D.bin", 0), ": header (byte 0): expected 8 bytes of the number of points, found end of file"),
+        in_model("cut in the count", "points3D.bin", cut("points3D.bin", 5), ": header (byte 0): expected 8 bytes of the number of points, found 5 bytes before the end of the file"),
+        in_model("count of 10^18", "points3D.bin", patched(points(), 0, &MANY), ": header (byte 0): expected at most 8 for the number of points (426 bytes are left), found 1000000000000000000"),
+        in_model("track of 10^18", "points3D.bin", patched(points(), at::N_TRACK, &MANY), ": record 1 (byte 51): expected at most 46 for the number of observations (375 bytes are left), found 1000000000000000000"),
+        in_model("trailing byte", "points3D.bin", appended(points(), b"x"), ": end (byte 434): expected end of file, found 1 more byte"),
+        in_model("repeated id", "points3D.bin", patched(points(), at::POINT, &[3]), ": point 3: expected each id once, found it again"),
+        in_model("text where binary is expected", "points3D.bin", b"# 3D point list\n1 0 0 0 0 0 0 0\n".to_vec(), ": header (byte 0): expected binary data (the number of points), found text"),
+        in_model("no points", "points3D.bin", vec![0; 8], ": expected at least one point, found none"),
+        in_model("empty", "images.bin", cut("images.bin", 0), ": header (byte 0): expected 8 bytes of the number of images, found end of file"),
+        in_model("count of 10^18", "images.bin", patched(images(), 0, &MANY), ": header (byte 0): expected at most 11 for the number of images (822 bytes are left), found 1000000000000000000"),
+        in_model("name without end", "images.bin", patched(images(), at::NAME, &name_to_end), ": record 1 (byte 72): expected a zero byte at the end of the image name, found end of file"),
+        in_model("repeated id", "images.bin", patched(images(), at::IMAGE, &[2]), ": image 2: expected each id once, found it again"),
+        in_model("empty", "cameras.bin", cut("cameras.bin", 0), ": header (byte 0): expected 8 bytes of the number of cameras, found end of file"),
+        in_model("unknown model", "cameras.bin", patched(cameras(), at::CAMERA_MODEL, &[99]), ": record 1 (byte 12): expected a camera model of COLMAP (0 to 17) for camera 1, found 99"),
+        in_model("longer model", "cameras.bin", patched(cameras(), at::CAMERA_MODEL, &[11]), ": record 1 (byte 64): expected 8 bytes of a parameter, found end of file"),
+        in_model("count of 10^18", "cameras.bin", patched(cameras(), 0, &MANY), ": header (byte 0): expected at most 1 for the number of cameras (56 bytes are left), found 1000000000000000000"),
+        in_model("parameters cut", "cameras.bin", cameras()[..at::PARAMS + 4 * 8 - 1].to_vec(), ": record 1 (byte 56): expected 8 bytes of a parameter, found 7 bytes before the end of the file"),
+    ]
 }
 
 #[rustfmt::skip] // One row per line.
 fn text() -> Vec<Row> {
-    let points = |what, text: &str, line| alone(what, "points3D.txt", text, line);
-    let model = |what, name, text: &str, line| {
-        let files = vec![
-            (name, text.as_bytes().to_vec()),
-            ("points3D.txt", b"1 0 0 0 0 0 0 0".to_vec()),
-        ];
-        (what, files, "", line)
+    let points = |what, text: &str, line: &str| alone(what, "points3D.txt", text, line);
+    let model = |what, name, text: &str, line: &str| {
+        let files = vec![(name, text.as_bytes().to_vec()), ("points3D.txt", b"1 0 0 0 0 0 0 0".to_vec())];
+        (what, files, "", format!("{name}{line}"))
     };
     let long = format!("1 0 0 {} 0 0 0 0", "9a".repeat(60));
     vec![
-        points("empty text", "", "points3D.txt: expected at least one point, found none"),
-        points("two coordinates", "# c\n1 2 3\n",
-            "points3D.txt:2: expected 3 coordinates, found end of line"),
-        points("not a number", "1 2 3 abc 0 0 0 0\n",
-            "points3D.txt:1: expected 3 coordinates, found \"abc\""),
-        points("long word", &long,
-            "points3D.txt:1: expected 3 coordinates, found \"9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a...\""),
-        points("NaN", "7 NaN 0 0 0 0 0 0
-", "points3D.txt: expected a point with a place, found 1 without one"),
-        points("no error", "7 0 0 0 0 0 0\n",
-            "points3D.txt:1: expected a reprojection error, found end of line"),
-        points("half an observation", "7 0 0 0 0 0 0 0 1 2 3\n",
-            "points3D.txt:1: expected observations of 2 numbers (image id, 2D point), found 3 numbers"),
-        points("binary where text is expected", "\u{6}\0\0\0\0\0\0\0\u{2}\0\0\n",
-            "points3D.txt:1: expected text, found binary data"),
-        model("pose cut", "images.txt", "1 1 0 0 0 1 2\n\n",
-            "images.txt:1: expected a translation (3 numbers), found end of line"),
-        model("2D points cut", "images.txt", "1 1 0 0 0 1 2 3 1 a.jpg\n1 2 3 4\n",
-            "images.txt:2: expected 2D points of 3 numbers (x, y, point id), found 4 numbers"),
+        points("empty text", "", ": expected at least one point, found none"),
+        points("two coordinates", "# c\n1 2 3\n", ":2: expected 3 coordinates, found end of line"),
+        points("not a number", "1 2 3 abc 0 0 0 0\n", ":1: expected 3 coordinates, found \"abc\""),
+        points("long word", &long, ":1: expected 3 coordinates, found \"9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a...\""),
+        points("NaN", "7 NaN 0 0 0 0 0 0\n", ": expected a point with a place, found 1 without one"),
+        points("no error", "7 0 0 0 0 0 0\n", ":1: expected a reprojection error, found end of line"),
+        points("half an observation", "7 0 0 0 0 0 0 0 1 2 3\n", ":1: expected observations of 2 numbers (image id, 2D point), found 3 numbers"),
+        points("binary where text is expected", "\u{6}\0\0\0\0\0\0\0\u{2}\0\0\n", ":1: expected text, found binary data"),
+        model("pose cut", "images.txt", "1 1 0 0 0 1 2\n\n", ":1: expected a translation (3 numbers), found end of line"),
+        model("2D points cut", "images.txt", "1 1 0 0 0 1 2 3 1 a.jpg\n1 2 3 4\n", ":2: expected 2D points of 3 numbers (x, y, point id), found 4 numbers"),
+        model("unknown camera model", "cameras.txt", "1 WIDE 640 480 1 2 3\n", ":1: expected a camera model of COLMAP for camera 1, found \"WIDE\""),
+        model("parameter missing", "cameras.txt", "1 PINHOLE 640 480 1 2 3\n", ":1: expected 4 parameters of PINHOLE, found 3"),
     ]
-}
-
-/// Errors in cameras are notes, because points do not need cameras.
-#[rustfmt::skip] // One row per line.
-fn cameras() -> Vec<Row> {
-    let cameras = || model_file("cameras.bin");
-    let camera_rows = [
-        ("empty", cut("cameras.bin", 0),
-            "cameras.bin: header (byte 0): expected 8 bytes of the number of cameras, found end of file"),
-        ("unknown model", patched(cameras(), at::CAMERA_MODEL, &[99]),
-            "cameras.bin: record 1 (byte 12): expected a camera model of COLMAP (0 to 17) for camera 1, found 99"),
-        ("longer model", patched(cameras(), at::CAMERA_MODEL, &[11]),
-            "cameras.bin: record 1 (byte 64): expected 8 bytes of a parameter, found end of file"),
-        ("count of 10^18", patched(cameras(), 0, &MANY),
-            "cameras.bin: header (byte 0): expected at most 1 for the number of cameras (56 bytes are left), found 1000000000000000000"),
-        ("parameters cut", cameras()[..at::PARAMS + 4 * 8 - 1].to_vec(),
-            "cameras.bin: record 1 (byte 56): expected 8 bytes of a parameter, found 7 bytes before the end of the file"),
-    ];
-    let text = |what, text: &str, line| {
-        let files = vec![
-            ("cameras.txt", text.as_bytes().to_vec()),
-            ("points3D.txt", b"1 0 0 0 0 0 0 0".to_vec()),
-        ];
-        (what, files, "", line)
-    };
-    let texts = vec![
-        text("unknown camera model", "1 WIDE 640 480 1 2 3\n",
-            "cameras.txt:1: expected a camera model of COLMAP for camera 1, found \"WIDE\""),
-        text("parameter missing", "1 PINHOLE 640 480 1 2 3\n",
-            "cameras.txt:1: expected 4 parameters of PINHOLE, found 3"),
-    ];
-    let binary = camera_rows.into_iter().map(|(what, bytes, line)| in_model(what, "cameras.bin", bytes, line));
-    binary.chain(texts).collect()
 }
 
 #[rustfmt::skip] // One row per line.
@@ -268,63 +198,46 @@ fn ply() -> Vec<Row> {
     let binary = |n: &str, body: &[u8]| {
         file("binary_little_endian", &format!("element vertex {n}\n{XYZ}"), body)
     };
-    let ply = |what, bytes: Vec<u8>, line| alone(what, "a.ply", bytes, line);
+    let ply = |what, bytes: Vec<u8>, line: &str| alone(what, "a.ply", bytes, line);
     let list = format!("element vertex 1\n{XYZ}property list uchar int seen\n");
     let list_before = format!("element face 1\nproperty list uchar int v\nelement vertex 1\n{XYZ}");
     vec![
-        ply("not a PLY file", b"solid cube\n".to_vec(),
-            "a.ply:1: expected \"ply\", as every PLY file begins, found \"solid cube\""),
-        ply("unknown format", file("binary", "", b""),
-            "a.ply:2: expected ascii, binary_little_endian or binary_big_endian, found \"binary\""),
-        ply("no vertices", file("ascii", "element face 1\n", b""),
-            "a.ply: header: expected an element vertex, found none"),
-        ply("unknown type", file("ascii", "element vertex 1\nproperty half x\n", b""),
-            "a.ply:4: expected the type of a property, found \"half\""),
-        ply("negative count", ascii("-1", ""), "a.ply:3: expected the number of elements, found \"-1\""),
-        ply("list in vertex: cut", file("ascii", &list, b"0 0 0 2 1
-"),
-            "a.ply:9: expected 6 values of vertex 1, found 5"),
-        ply("list before vertex: cut", file("binary_big_endian", &list_before, &[20; 13]),
-            "a.ply: record 1 (byte 154): expected 80 bytes of a list, found 12 bytes before the end of the file"),
-        ply("ascii: count of 10^18", ascii("1000000000000000000", "0 0 0\n"),
-            "a.ply: header: expected at most 1 vertices (by the size of the file), found 1000000000000000000"),
-        ply("ascii: too few vertices", ascii("3", "0.00 0.00 0.00\n1.00 1.00 1.00\n"),
-            "a.ply:10: expected vertex 3 of 3, found end of file"),
-        ply("ascii: too many vertices", ascii("1", "0 0 0\n1 1 1\n"),
-            "a.ply:9: expected end of file after 1 vertices, found \"1 1 1\""),
-        ply("ascii: not a number", ascii("1", "0 zero 0\n"),
-            "a.ply:8: expected a number for y, found \"zero\""),
-        ply("binary: count of 10^18", binary("1000000000000000000", &[0; 24]),
-            "a.ply: header (byte 133): expected 1000000000000000000 rows of vertex, 12 bytes each, found 24 bytes"),
-        ply("binary: too many vertices", binary("1", &[0; 24]),
-            "a.ply: end (byte 127): expected end of file, found 12 more bytes"),
-        ply("no points", binary("0", &[]), "a.ply: expected at least one point, found none"),
+        ply("not a PLY file", b"solid cube\n".to_vec(), ":1: expected \"ply\", as every PLY file begins, found \"solid cube\""),
+        ply("unknown format", file("binary", "", b""), ":2: expected ascii, binary_little_endian or binary_big_endian, found \"binary\""),
+        ply("no vertices", file("ascii", "element face 1\n", b""), ": header: expected an element vertex, found none"),
+        ply("unknown type", file("ascii", "element vertex 1\nproperty half x\n", b""), ":4: expected the type of a property, found \"half\""),
+        ply("negative count", ascii("-1", ""), ":3: expected the number of elements, found \"-1\""),
+        ply("list in vertex: cut", file("ascii", &list, b"0 0 0 2 1\n"), ":9: expected 6 values of vertex 1, found 5"),
+        ply("list before vertex: cut", file("binary_big_endian", &list_before, &[20; 13]), ": record 1 (byte 154): expected 80 bytes of a list, found 12 bytes before the end of the file"),
+        ply("ascii: count of 10^18", ascii("1000000000000000000", "0 0 0\n"), ": header: expected at most 1 vertices (by the size of the file), found 1000000000000000000"),
+        ply("ascii: too few vertices", ascii("3", "0.00 0.00 0.00\n1.00 1.00 1.00\n"), ":10: expected vertex 3 of 3, found end of file"),
+        ply("ascii: too many vertices", ascii("1", "0 0 0\n1 1 1\n"), ":9: expected end of file after 1 vertices, found \"1 1 1\""),
+        ply("ascii: not a number", ascii("1", "0 zero 0\n"), ":8: expected a number for y, found \"zero\""),
+        ply("binary: count of 10^18", binary("1000000000000000000", &[0; 24]), ": header (byte 133): expected 1000000000000000000 rows of vertex, 12 bytes each, found 24 bytes"),
+        ply("binary: too many vertices", binary("1", &[0; 24]), ": end (byte 127): expected end of file, found 12 more bytes"),
+        ply("no points", binary("0", &[]), ": expected at least one point, found none"),
     ]
 }
 
 #[rustfmt::skip] // One row per line.
 fn tables() -> Vec<Row> {
-    let csv = |what, text: &str, line| alone(what, "a.csv", text, line);
+    let csv = |what, text: &str, line: &str| alone(what, "a.csv", text, line);
     vec![
-        csv("empty", "", "a.csv: expected at least one point, found none"),
-        csv("two columns later", "1 2 3\n4 5\n", "a.csv:2: expected 3 coordinates, found 2"),
-        csv("not a number", "x,y,z\n1,2,3\n4,five,6\n", "a.csv:3: expected a number for y, found \"five\""),
-        csv("empty fields", "1,,3
-", "a.csv: expected a point with a place, found 1 without one"),
-        csv("decimal comma", "1,5;2;3\n", "a.csv:1: expected a number for x, found \"1,5\""),
-        csv("columns without y", "x,north,z\n1,2,3\n",
-            "a.csv:1: expected numbers, or columns named x, y and z, found \"x,north,z\""),
-        csv("row shorter than its header", "id,x,y,z\n1,2,3\n",
-            "a.csv:2: expected 4 columns up to z, found 3"),
-        alone("binary", "a.xyz", [b'1', 0, 200, 10], "a.xyz:1: expected text, found binary data"),
-        alone("control characters", "a.xyz", "1 2 \u{1b}[31m\n",
-            "a.xyz:1: expected a number for z, found \"\\u{1b}[31m\""),
+        csv("empty", "", ": expected at least one point, found none"),
+        csv("two columns later", "1 2 3\n4 5\n", ":2: expected 3 coordinates, found 2"),
+        csv("not a number", "x,y,z\n1,2,3\n4,five,6\n", ":3: expected a number for y, found \"five\""),
+        csv("empty fields", "1,,3\n", ": expected a point with a place, found 1 without one"),
+        csv("decimal comma", "1,5;2;3\n", ":1: expected a number for x, found \"1,5\""),
+        csv("columns without y", "x,north,z\n1,2,3\n", ":1: expected numbers, or columns named x, y and z, found \"x,north,z\""),
+        csv("row shorter than its header", "id,x,y,z\n1,2,3\n", ":2: expected 4 columns up to z, found 3"),
+        alone("binary", "a.xyz", [b'1', 0, 200, 10], ":1: expected text, found binary data"),
+        alone("control characters", "a.xyz", "1 2 \u{1b}[31m\n", ":1: expected a number for z, found \"\\u{1b}[31m\""),
     ]
 }
 
 #[rustfmt::skip] // One row per line.
 fn arrays() -> Vec<Row> {
-    let npy = |what, bytes: Vec<u8>, line| alone(what, "a.npy", bytes, line);
+    let npy = |what, bytes: Vec<u8>, line: &str| alone(what, "a.npy", bytes, line);
     let good = fixture("f8.npy");
     let of = |descr: &str, order: &str, shape: &str| {
         let mut bytes = array(descr, shape, &[0; 48]);
@@ -333,43 +246,28 @@ fn arrays() -> Vec<Row> {
         bytes
     };
     vec![
-        npy("empty", vec![],
-            "a.npy: header (byte 0): expected 8 bytes of magic and version, found end of file"),
-        npy("not NumPy", b"PK\x03\x04 an npz archive".to_vec(),
-            "a.npy: header (byte 0): expected a NumPy file, found \"PK\\u{3}\\u{4} a\""),
-        npy("unknown version", patched(good.clone(), 6, &[9]),
-            "a.npy: header (byte 0): expected NumPy format 1, 2 or 3, found 9"),
-        npy("header cut", good[..60].to_vec(),
-            "a.npy: header (byte 10): expected a header of 118 bytes, found 50 bytes"),
-        npy("data cut", good[..good.len() - 8].to_vec(),
-            "a.npy: header (byte 128): expected 4 rows of 24 bytes, found 88 bytes"),
-        npy("complex numbers", of("'<c8'", "False", "(2, 3)"),
-            "a.npy: header (byte 10): expected numbers, or fields called x, y and z, found \"<c8\""),
-        npy("records", of("[('x', '<f8')]", "False", "(2,)"),
-            "a.npy: header (byte 10): expected fields of numbers called x, y and z, found \"[('x', '<f8')]\""),
-        npy("two columns", of("'<f8'", "False", "(3, 2)"),
-            "a.npy: header (byte 10): expected an array of shape (n, 3), found \"(3, 2)\""),
-        npy("no order", of("'<f8'", "None", "(2, 3)"),
-            "a.npy: header (byte 10): expected fortran_order True or False, found \"None\""),
-        npy("2^62 rows", of("'<f8'", "False", "(4611686018427387904, 3)"),
-            "a.npy: header (byte 128): expected 4611686018427387904 rows of 24 bytes, found 48 bytes"),
-        npy("nothing in the header", [&b"\x93NUMPY\x01\0\x02\0{}"[..], &[0; 48]].concat(),
-            "a.npy: header (byte 10): expected numbers, or fields called x, y and z, found \"\""),
+        npy("empty", vec![], ": header (byte 0): expected 8 bytes of magic and version, found end of file"),
+        npy("not NumPy", b"PK\x03\x04 an npz archive".to_vec(), ": header (byte 0): expected a NumPy file, found \"PK\\u{3}\\u{4} a\""),
+        npy("unknown version", patched(good.clone(), 6, &[9]), ": header (byte 0): expected NumPy format 1, 2 or 3, found 9"),
+        npy("header cut", good[..60].to_vec(), ": header (byte 10): expected a header of 118 bytes, found 50 bytes"),
+        npy("data cut", good[..good.len() - 8].to_vec(), ": header (byte 128): expected 4 rows of 24 bytes, found 88 bytes"),
+        npy("complex numbers", of("'<c8'", "False", "(2, 3)"), ": header (byte 10): expected numbers, or fields called x, y and z, found \"<c8\""),
+        npy("records", of("[('x', '<f8')]", "False", "(2,)"), ": header (byte 10): expected fields of numbers called x, y and z, found \"[('x', '<f8')]\""),
+        npy("two columns", of("'<f8'", "False", "(3, 2)"), ": header (byte 10): expected an array of shape (n, 3), found \"(3, 2)\""),
+        npy("no order", of("'<f8'", "None", "(2, 3)"), ": header (byte 10): expected fortran_order True or False, found \"None\""),
+        npy("2^62 rows", of("'<f8'", "False", "(4611686018427387904, 3)"), ": header (byte 128): expected 4611686018427387904 rows of 24 bytes, found 48 bytes"),
+        npy("nothing in the header", [&b"\x93NUMPY\x01\0\x02\0{}"[..], &[0; 48]].concat(), ": header (byte 10): expected numbers, or fields called x, y and z, found \"\""),
     ]
 }
 
 #[rustfmt::skip] // One row per line.
 fn paths() -> Vec<Row> {
     vec![
-        ("missing", vec![], "nothing.ply", "nothing.ply: expected a file or folder, found nothing"),
-        ("empty folder", vec![("project/", vec![])], "project",
-            "project: expected points3D.bin or points3D.txt in it, or in sparse, model, models, colmap/sparse or a numbered folder of these, found none"),
-        alone("a dropped format", "a.laz", "LASF",
-            "a.laz: expected a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .asc, .pts, .npy, .npz or .splat file, found a .laz file (convert it: CloudCompare -O in.laz -SAVE_CLOUDS, or pdal translate in.laz out.ply)"),
-        alone("images given by themselves", "images.bin", "",
-            "images.bin: expected a file with points, found another file of a COLMAP model (give its folder)"),
-        alone("a database", "database.db", "SQLite format 3",
-            "database.db: expected a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .asc, .pts, .npy, .npz or .splat file, found a .db file"),
+        ("missing", vec![], "nothing.ply", "nothing.ply: expected a file or folder, found nothing".to_owned()),
+        ("empty folder", vec![("project/", vec![])], "project", "project: expected points3D.bin or points3D.txt in it, or in sparse, model, models, colmap/sparse or a numbered folder of these, found none".to_owned()),
+        alone("a dropped format", "a.laz", "LASF", ": expected a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .asc, .pts, .npy, .npz or .splat file, found a .laz file (convert it: CloudCompare -O in.laz -SAVE_CLOUDS, or pdal translate in.laz out.ply)"),
+        alone("images given by themselves", "images.bin", "", ": expected a file with points, found another file of a COLMAP model (give its folder)"),
+        alone("a database", "database.db", "SQLite format 3", ": expected a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .asc, .pts, .npy, .npz or .splat file, found a .db file"),
     ]
 }
 
@@ -421,9 +319,10 @@ fn bytes_of(folder: &str, name: &str) -> Vec<u8> {
 /// Reads an input. Errors must be one line. Returns true on success.
 fn reads(kind: Input, dir: &Path, path: &Path, map: &read::Input) -> bool {
     let result = match kind {
-        Input::Map | Input::Text if dir.join("points3D.bin").exists() => read::open(dir).map(drop),
-        Input::Map | Input::Text if dir.join("points3D.txt").exists() => read::open(dir).map(drop),
-        Input::Map | Input::Text => read::open(path).map(drop),
+        Input::Map | Input::Text => {
+            let is_model = ["points3D.bin", "points3D.txt"].iter().any(|of| dir.join(of).exists());
+            read::open(if is_model { dir } else { path }).map(drop)
+        }
         Input::Descriptors => read::descriptors(path, map).map(drop),
         Input::Features => FeatureSource::open(path).and_then(|source| {
             (0..source.names().len()).try_for_each(|at| source.get(at).map(drop))

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use unlift_io::read::{self, colmap};
 
-use super::{close, copy_folder, data, total, write};
+use super::{close, copy_folder, data, fixture, total, write};
 
 #[test]
 fn binary_and_text_models_are_equal() {
@@ -46,24 +46,20 @@ fn model_folders_open_with_centers_ids_and_files() {
 }
 
 #[test]
-fn names_need_not_be_utf8() {
-    let bytes = fs::read(data("project/sparse/0/images.bin")).unwrap();
+fn names_need_not_be_utf8_and_text_may_have_windows_line_ends_and_no_2d_points() {
+    let mut bytes = fixture("project/sparse/0/images.bin");
     let name = "küche/ä 0.jpg".as_bytes();
     let at = bytes.windows(name.len()).position(|w| w == name).unwrap();
-    let mut bytes = bytes;
     bytes[at] = 0xff;
     let (_dir, path) = write("images.bin", bytes);
-    let images = colmap::read_images(&path).unwrap();
-    assert_eq!(images[0].name[0], 0xff);
-}
-
-#[test]
-fn text_models_may_have_no_2d_points_and_windows_line_ends() {
+    assert_eq!(colmap::read_images(&path).unwrap()[0].name[0], 0xff);
     let text = "# c\r\n1 1 0 0 0 1 2 3 1 a b.jpg\r\n\r\n2 1 0 0 0 4 5 6 1 c.jpg\r\n";
     let (_dir, path) = write("images.txt", text);
     let images = colmap::read_images(&path).unwrap();
-    assert_eq!(images[0].name, b"a b.jpg");
-    assert_eq!(images[0].center, [-1.0, -2.0, -3.0]);
+    assert_eq!(
+        (images[0].name.as_slice(), images[0].center),
+        (&b"a b.jpg"[..], [-1.0, -2.0, -3.0])
+    );
     assert_eq!((images[1].name.as_slice(), images[1].n_points2d), (&b"c.jpg"[..], 0));
 }
 
@@ -83,38 +79,12 @@ fn a_project_folder_leads_to_its_model_and_database() {
 }
 
 #[test]
-fn what_lies_beside_the_model_is_noted_or_ignored() {
-    let dir = tempfile::tempdir().unwrap();
-    for (from, to) in [("rig-bin", "sparse/0"), ("rig-txt", "sparse/0"), ("rig-bin", "sparse/1")] {
-        copy_folder(&data(from), &dir.path().join(to));
-    }
-    let input = read::open(dir.path()).unwrap();
-    assert_eq!(input.format, "COLMAP binary");
-    let notes = input.notes.join("\n");
-    let notes = notes.replace(dir.path().to_str().unwrap(), "");
-    assert_eq!(
-        notes.replace('\\', "/"),
-        "points3D.txt: not read, because points3D.bin exists\n\
-         sparse/0: read, the largest of 2 models (8 points)\n\
-         sparse/1: another model (8 points), give its path to read it"
-    );
-}
-
-#[test]
 fn models_are_found_where_programs_put_them() {
-    for place in [
-        "",
-        "0",
-        "sparse",
-        "sparse/0",
-        "sparse/3",
-        "model",
-        "models/0",
-        "models/2",
-        "colmap",
-        "colmap/sparse",
-        "colmap/sparse/0",
-    ] {
+    let places =
+        ",0,sparse,sparse/0,sparse/3,model,models/0,models/2,colmap,colmap/sparse,colmap/sparse/0";
+    // Models of undistorted images are read where there is no other.
+    let undistorted = ["dense/0/sparse", "dense/sparse"];
+    for place in places.split(',').chain(undistorted) {
         for (fixture, format) in [("rig-bin", "COLMAP binary"), ("rig-txt", "COLMAP text")] {
             let dir = tempfile::tempdir().unwrap();
             copy_folder(&data(fixture), &dir.path().join(place));
@@ -122,37 +92,53 @@ fn models_are_found_where_programs_put_them() {
             assert_eq!((input.format, input.positions.len()), (format, 8), "{place}");
             assert_eq!(input.model, Some(dir.path().join(place)), "{place}");
             assert_eq!(input.notes, [""; 0], "{place}");
+            if undistorted.contains(&place) {
+                copy_folder(&data("project/sparse/0"), &dir.path().join("sparse/0"));
+                let input = read::open(dir.path()).unwrap();
+                assert_eq!((input.model, input.notes), (Some(dir.path().join("sparse/0")), vec![]));
+            }
         }
     }
 }
 
+/// hloc leaves models that it did not choose, and COLMAP models that it could not merge.
 #[test]
-fn of_several_models_the_largest_is_read_and_told() {
-    // hloc leaves models that it did not choose, and COLMAP models that it could not merge.
-    let dir = tempfile::tempdir().unwrap();
-    copy_folder(&data("project/sparse/0"), &dir.path().join("sparse/0"));
-    copy_folder(&data("rig-txt"), &dir.path().join("sparse/10"));
-    copy_folder(&data("project/sparse/0"), &dir.path().join("models/2"));
-    fs::create_dir_all(dir.path().join("sparse/11")).unwrap();
-    let input = read::open(dir.path()).unwrap();
-    assert_eq!((input.format, input.positions.len()), ("COLMAP text", 8));
-    assert_eq!(
-        input.notes,
-        [
-            "sparse/10: read, the largest of 3 models (8 points)",
-            "sparse/0: another model (6 points), give its path to read it",
-            "models/2: another model (6 points), give its path to read it",
-        ]
-    );
-    // The folder that was named has priority, even if its model is smaller: hloc's best model is
-    // there.
-    copy_folder(&data("project/sparse/0"), &dir.path().join(""));
-    let input = read::open(dir.path()).unwrap();
-    assert_eq!(input.positions.len(), 6);
-    assert_eq!(
-        input.notes[0],
-        "the model of the folder itself: read, the first of 4 models (6 points)"
-    );
+#[rustfmt::skip] // One row per line.
+fn of_several_models_the_largest_is_read_and_the_others_are_noted() {
+    let (small, large) = (data("project/sparse/0"), data("rig-txt"));
+    let beside = [
+        "points3D.txt: not read, because points3D.bin exists",
+        "sparse/0: read, the largest of 2 models (8 points)",
+        "sparse/1: another model (8 points), give its path to read it",
+    ];
+    let several = [
+        "sparse/10: read, the largest of 3 models (8 points)",
+        "sparse/0: another model (6 points), give its path to read it",
+        "models/2: another model (6 points), give its path to read it",
+    ];
+    let bin = data("rig-bin");
+    for (models, format, notes) in [
+        ([(&bin, "sparse/0"), (&large, "sparse/0"), (&bin, "sparse/1")], "COLMAP binary", beside),
+        ([(&small, "sparse/0"), (&large, "sparse/10"), (&small, "models/2")], "COLMAP text", several),
+    ] {
+        let dir = tempfile::tempdir().unwrap();
+        fs::create_dir_all(dir.path().join("sparse/11")).unwrap();
+        models.iter().for_each(|(from, to)| copy_folder(from, &dir.path().join(to)));
+        let input = read::open(dir.path()).unwrap();
+        assert_eq!((input.format, input.positions.len()), (format, 8));
+        let told = input.notes.join("\n").replace(dir.path().to_str().unwrap(), "");
+        assert_eq!(told.replace('\\', "/"), notes.join("\n"));
+        // The folder that was named has priority, even if its model is smaller: hloc's best model
+        // is there.
+        copy_folder(&small, dir.path());
+        let input = read::open(dir.path()).unwrap();
+        let told = format!(
+            "the model of the folder itself: read, the first of {} models (6 points)",
+            models.len() + usize::from(format == "COLMAP text")
+        );
+        assert_eq!(input.positions.len(), 6);
+        assert!(input.notes.contains(&told), "{:?}", input.notes);
+    }
 }
 
 #[test]
@@ -173,22 +159,13 @@ fn the_database_of_a_project_is_found_from_its_model_as_well() {
 }
 
 #[test]
+#[rustfmt::skip] // One row per line.
 fn cameras_are_not_needed_for_points() {
     for (file, from, to, note) in [
-        (
-            "cameras.txt",
-            "SIMPLE_PINHOLE",
-            "SPHERICAL",
-            "expected a camera model of COLMAP for camera",
-        ),
+        ("cameras.txt", "SIMPLE_PINHOLE", "SPHERICAL", "expected a camera model of COLMAP for camera"),
         // A pose with NaN, and one of zeros.
         ("images.txt", "\n3 0.2448454332437206 ", "\n3 nan ", "1 of 20 cameras have no place"),
-        (
-            "images.txt",
-            "\n2 0.69121825575770734 0.46875053236901132 0.54926565388881932 -0.028240091521257206",
-            "\n2 0 0 0 0",
-            "1 of 20 cameras have no place",
-        ),
+        ("images.txt", "\n2 0.69121825575770734 0.46875053236901132 0.54926565388881932 -0.028240091521257206", "\n2 0 0 0 0", "1 of 20 cameras have no place"),
     ] {
         let dir = tempfile::tempdir().unwrap();
         for name in ["cameras.txt", "images.txt", "points3D.txt"] {
@@ -199,17 +176,5 @@ fn cameras_are_not_needed_for_points() {
         let input = read::open(dir.path()).unwrap();
         assert_eq!((input.positions.len(), input.cameras.len() + input.n_unplaced), (8, 20));
         assert!(input.notes.len() == 1 && input.notes[0].contains(note), "{:?}", input.notes);
-    }
-}
-
-#[test]
-fn models_of_undistorted_images_are_found_where_there_is_no_other() {
-    for place in ["dense/0/sparse", "dense/sparse"] {
-        let dir = tempfile::tempdir().unwrap();
-        copy_folder(&data("project/sparse/0"), &dir.path().join(place));
-        assert_eq!(read::open(dir.path()).unwrap().model, Some(dir.path().join(place)));
-        copy_folder(&data("project/sparse/0"), &dir.path().join("sparse/0"));
-        let input = read::open(dir.path()).unwrap();
-        assert_eq!((input.model, input.notes), (Some(dir.path().join("sparse/0")), vec![]));
     }
 }

@@ -4,7 +4,7 @@ use std::fs;
 
 use unlift_io::read::{self, Input};
 
-use super::{POINTS, open, refused};
+use super::{POINTS, close, open, refused};
 
 /// The first camera looks along z. The second is rotated by 90 degrees about its viewing direction.
 const CENTERS: [[f64; 3]; 2] = [[0.0, 0.0, -5.0], [1.0, 2.0, -5.0]];
@@ -67,23 +67,19 @@ pub fn nvm() -> String {
 pub fn opensfm(points: &[[f64; 3]]) -> String {
     // A rotation by 90 degrees about z, as axis times angle.
     let vectors = [[0.0; 3], [0.0, 0.0, std::f64::consts::FRAC_PI_2]];
-    let shots: Vec<String> = (0..2)
-        .map(|at| {
-            let (r, t) = (array(&vectors[at]), array(&translation(at)));
-            format!(r#""{at}.jpg": {{"rotation": {r}, "translation": {t}, "camera": "v2", "gps": null}}"#)
-        })
-        .collect();
-    let points: Vec<String> = points
-        .iter()
-        .enumerate()
-        .map(|(at, point)| {
-            format!(r#""{}": {{"color": [1, 2, 3], "coordinates": {}}}"#, 90 - at, array(point))
-        })
-        .collect();
+    let shots = [0, 1].map(|at| {
+        let (r, t) = (array(&vectors[at]), array(&translation(at)));
+        format!(
+            r#""{at}.jpg": {{"rotation": {r}, "translation": {t}, "camera": "v2", "gps": null}}"#
+        )
+    });
+    let point = |(at, point): (usize, &[f64; 3])| {
+        format!(r#""{}": {{"color": [1, 2, 3], "coordinates": {}}}"#, 90 - at, array(point))
+    };
+    let points: Vec<String> = points.iter().enumerate().map(point).collect();
+    let (shots, points) = (shots.join(", "), points.join(", "));
     format!(
-        r#"{{"cameras": {{"v2": {{"k1": 0.0}}}}, "shots": {{{}}}, "points": {{{}}}}}"#,
-        shots.join(", "),
-        points.join(", ")
+        r#"{{"cameras": {{"v2": {{"k1": 0.0}}}}, "shots": {{{shots}}}, "points": {{{points}}}}}"#
     )
 }
 
@@ -102,26 +98,20 @@ fn nerfstudio(cloud: &str) -> String {
 }
 
 fn ply() -> String {
-    let rows: Vec<String> = POINTS.iter().map(|point| words(point)).collect();
-    format!(
-        "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\nend_header\n{}\n",
-        rows.join("\n")
-    )
+    let axes = ["x", "y", "z"].map(|axis| format!("property double {axis}\n")).concat();
+    let rows = POINTS.map(|point| words(&point) + "\n").concat();
+    format!("ply\nformat ascii 1.0\nelement vertex 3\n{axes}end_header\n{rows}")
 }
 
 fn same(input: &Input, format: &str) {
     assert_eq!((input.format, &input.positions[..]), (format, &POINTS[..]));
-    assert_eq!(input.ids, [0, 1, 2]);
-    assert_eq!(input.cameras.len(), 2);
-    for (found, expected) in input.cameras.iter().zip(CENTERS) {
-        assert!(
-            found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12),
-            "{format}: {found:?}"
-        );
-    }
-    let mean: [f64; 3] = std::array::from_fn(|c| (UP[0][c] + UP[1][c]) / 2.0_f64.sqrt());
-    let up = input.up.unwrap();
-    assert!(up.iter().zip(mean).all(|(a, b)| (a - b).abs() < 1e-12), "{format}: {up:?}");
+    assert_eq!((&input.ids[..], input.cameras.len()), (&[0, 1, 2][..], 2));
+    input.cameras.iter().zip(CENTERS).for_each(|(&camera, center)| close(camera, center, 1e-12));
+    close(
+        input.up.unwrap(),
+        std::array::from_fn(|c| (UP[0][c] + UP[1][c]) / 2.0_f64.sqrt()),
+        1e-12,
+    );
 }
 
 #[test]
@@ -155,51 +145,39 @@ fn every_form_gives_the_same_points_and_cameras() {
 }
 
 #[test]
-fn what_is_wrong_is_told_with_its_line() {
-    let line = |name: &str, text: &str| refused(name, text);
-    assert_eq!(
-        line("a.out", "what else is called so\n"),
-        "a.out:1: expected numbers of cameras and points, as Bundler writes them, found \"what else is called so\""
-    );
-    let cut: String = bundler().lines().take(16).collect::<Vec<_>>().join("\n");
-    assert_eq!(line("b.out", &cut), "b.out:17: expected camera 2, found end of file");
-    let endless = "1 18446744073709551615\n1 0 0\n1 0 0\n0 1 0\n0 0 1\n0 0 0\n";
-    assert_eq!(line("c.out", endless), "c.out:7: expected point 0, found end of file");
-    assert_eq!(
-        line("d.out", "0 1\n1 nan 2\n0 0 0\n0\n"),
-        "d.out: expected a point with a place, found 1 without one"
-    );
-    assert!(line("a.nvm", "NVM_V2\n").starts_with("a.nvm:1: expected NVM_V3"));
-    let cut = nvm().replace(" 0.1 0\n", "\n").replace("1 0 0 0 0 0 -5", "1 0 0 0 0 0");
-    assert!(
-        line("b.nvm", &cut)
-            .contains("camera 0: name, focal length, quaternion, center, distortion")
-    );
-    for (text, found) in [
-        ("{}", "JSON without names"),
-        ("[{\"id\": 0, \"position\": [1, 2, 3]}]", "JSON with id, position"),
-        ("{\"images\": [], \"categories\": [], \"points\": [[1, 2]]}", ""),
-    ] {
-        let expected = "a.json: expected a map of OpenSfM or nerfstudio, found ";
-        let line = line("a.json", text);
-        assert!(line == format!("{expected}{found}") || found.is_empty(), "{line}");
-    }
-    let text = format!("[{}]", opensfm(&POINTS).replace("[0.125, 0.25, 0.375]", "[0.125, 0.25]"));
-    assert!(line("b.json", &text).contains("invalid length 2, expected an array of length 3"));
-    assert!(line("c.json", "[").contains("EOF while parsing"));
+#[rustfmt::skip] // One row per line.
+fn every_malformed_file_is_refused_with_its_line() {
+    let cut = |text: String, n: usize| text.lines().take(n).collect::<Vec<_>>().join("\n");
     let deep = format!("[{{\"x\": {}1{}}}]", "[".repeat(500), "]".repeat(500));
-    // Unused values are skipped at any depth.
-    assert!(line("d.json", &deep).ends_with("found JSON with x"));
-    let text = nerfstudio("\"../elsewhere.ply\"");
-    assert_eq!(
-        line("transforms.json", &text),
-        "transforms.json: ply_file_path: expected a path within the folder, found ../elsewhere.ply"
-    );
-    assert!(
-        line("transforms.json", &nerfstudio("null"))
-            .contains("a point cloud beside the cameras, found none")
-    );
-    assert!(line("transforms.json", &nerfstudio("\"none.ply\"")).contains("none.ply: expected"));
+    let short = format!("[{}]", opensfm(&POINTS).replace("[0.125, 0.25, 0.375]", "[0.125, 0.25]"));
+    let no_distortion = nvm().replace(" 0.1 0\n", "\n").replace("1 0 0 0 0 0 -5", "1 0 0 0 0 0");
+    // The name, the content, and the error line, in which `…` is any text.
+    for (name, text, expected) in [
+        ("a.out", "what else is called so\n".into(), "a.out:1: expected numbers of cameras and points, as Bundler writes them, found \"what else is called so\""),
+        ("a.out", cut(bundler(), 16), "a.out:17: expected camera 2, found end of file"),
+        ("a.out", "1 18446744073709551615\n1 0 0\n1 0 0\n0 1 0\n0 0 1\n0 0 0\n".into(), "a.out:7: expected point 0, found end of file"),
+        ("a.out", "0 1\n1 nan 2\n0 0 0\n0\n".into(), "a.out: expected a point with a place, found 1 without one"),
+        ("a.nvm", "NVM_V2\n".into(), "a.nvm:1: expected NVM_V3…"),
+        ("a.nvm", no_distortion, "a.nvm:…camera 0: name, focal length, quaternion, center, distortion"),
+        ("a.json", "{}".into(), "a.json: expected a map of OpenSfM or nerfstudio, found JSON without names"),
+        ("a.json", "[{\"id\": 0, \"position\": [1, 2, 3]}]".into(), "a.json: expected a map of OpenSfM or nerfstudio, found JSON with id, position"),
+        ("a.json", "{\"images\": [], \"categories\": [], \"points\": [[1, 2]]}".into(), "a.json:1: expected a map of OpenSfM or nerfstudio, found …"),
+        ("a.json", r#"{"points": [[1, 2, 3]]}"#.into(), "a.json:1: expected a map of OpenSfM or nerfstudio, found other JSON (…"),
+        ("a.json", r#"{"frames": [{}]}"#.into(), "a.json:1: expected a map of OpenSfM or nerfstudio, found other JSON (…"),
+        ("a.json", short, "a.json:…invalid length 2, expected an array of length 3"),
+        ("a.json", "[".into(), "a.json:…EOF while parsing"),
+        // Unused values are skipped at any depth.
+        ("a.json", deep, "a.json:…found JSON with x"),
+        ("transforms.json", nerfstudio("\"../elsewhere.ply\""), "transforms.json: ply_file_path: expected a path within the folder, found ../elsewhere.ply"),
+        ("transforms.json", nerfstudio("null"), "transforms.json: …a point cloud beside the cameras, found none"),
+        ("transforms.json", nerfstudio("\"none.ply\""), "none.ply: expected…"),
+    ] {
+        let line = refused(name, &text);
+        match expected.split_once('…') {
+            Some((begin, end)) => assert!(line.starts_with(begin) && line.contains(end), "{text}: {line}"),
+            None => assert_eq!(line, expected, "{text}"),
+        }
+    }
 }
 
 #[test]
@@ -229,13 +207,4 @@ fn json_with_numbers_that_are_none_has_points_left_out() {
     let text = format!(r#"[{{"shots": {{}}, "points": {{{}}}}}]"#, points.join(", "));
     let input = open("reconstruction.json", text);
     assert_eq!(input.positions, [[1.0, 2.0, 3.0], [-1.5, 2.0, 3.0], [4.0, 2.0, 3.0]]);
-}
-
-#[test]
-fn json_of_others_is_told() {
-    for other in [r#"{"points": [[1, 2, 3]]}"#, r#"{"frames": [{}]}"#] {
-        let line = refused("a.json", other);
-        assert!(line.contains("a map of OpenSfM or nerfstudio"), "{line}");
-        assert!(line.contains("found other JSON ("), "{line}");
-    }
 }

@@ -3,11 +3,12 @@
 use std::path::Path;
 use std::process::Command;
 
-use crate::maps;
 use unlift::recover::Status;
 use unlift::truth::DropReason;
 use unlift::{RecordId, Unit};
 use unlift_io::stage::{self, ImageFile, Kind};
+
+use super::maps;
 
 /// The data that the document assumes: 12 points on a grid.
 const GIVEN: &str = r#"
@@ -117,18 +118,19 @@ np.savez_compressed("a.npz", **arrays)
         // Descriptors of floats stay floats, those of bytes become whole numbers.
         assert!(stage::read_released::<3>(&path).unwrap() == released);
     }
+    let rewritten = |write: &dyn Fn(&Path) -> Result<(), unlift_io::Error>| {
+        write(&path).unwrap();
+        run(folder.path(), rewrite).unwrap();
+    };
     let (original, secret) = maps::truth::<2>(2, 30);
-    stage::write_truth(&path, &original, &secret).unwrap();
-    run(folder.path(), rewrite);
+    rewritten(&|path| stage::write_truth(path, &original, &secret));
     let (read, read_secret) = stage::read_truth::<2>(&path).unwrap();
     assert_eq!((read.reveal(), read_secret.hidden()), (original.reveal(), secret.hidden()));
     let lists = maps::neighborhoods(2, 30, 2);
-    stage::write_neighborhoods(&path, &lists).unwrap();
-    run(folder.path(), rewrite);
+    rewritten(&|path| stage::write_neighborhoods(path, &lists));
     assert_eq!(stage::read_neighborhoods(&path, 30, 2).unwrap(), lists);
     let recovered = maps::recovered::<3>(1, 30);
-    stage::write_recovered(&path, &recovered).unwrap();
-    run(folder.path(), rewrite);
+    rewritten(&|path| stage::write_recovered(path, &recovered));
     let read = stage::read_recovered::<3>(&path).unwrap();
     assert_eq!((read.status(), read.evidence()), (recovered.status(), recovered.evidence()));
     assert!((0..30).all(|slot| read.position(slot) == recovered.position(slot)));

@@ -1,0 +1,177 @@
+//! Tests that files are read back equal, and that equal values make equal bytes.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use unlift::geometry::frame::Bounds;
+use unlift::neighbors::Neighborhoods;
+use unlift::obfuscate::{SCHEMES, SchemeOptions, obfuscate};
+use unlift::released::{AxisCandidates, Lines, Obfuscation, Released};
+use unlift::seed::Key;
+use unlift::truth::{Original, Secret};
+use unlift::{PointSet, RecordId, Unit};
+use unlift_io::Error;
+use unlift_io::stage::{self, ImageFile, Kind};
+
+use super::maps;
+use crate::write_images;
+
+/// Writes a value twice, which gives the same bytes, and returns the path of a file.
+fn written(folder: &Path, kind: Kind, write: impl Fn(&Path) -> Result<(), Error>) -> PathBuf {
+    let [a, b] = ["a.npz", "b.npz"].map(|name| folder.join(name));
+    write(&a).unwrap();
+    write(&b).unwrap();
+    assert!(fs::read(&a).unwrap() == fs::read(&b).unwrap(), "two files of one value differ");
+    assert_eq!((stage::kind(&a).unwrap(), stage::declared_kind(&a)), (kind, Some(kind)));
+    a
+}
+
+fn values_come_back<const D: usize>() {
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
+    for (seed, n) in [2, 3, 40, 20_000].into_iter().enumerate() {
+        let seed = seed as u64;
+        for released in maps::released::<D>(seed, n) {
+            let family = released.obfuscation().family();
+            let write = |path: &Path| stage::write_released(path, &released);
+            let path = written(folder, Kind::Released, write);
+            let read = stage::read_released::<D>(&path).unwrap();
+            assert!(read == released, "{family} of {n} records in {D}D");
+            // A released file says nothing of its source.
+            let text = String::from_utf8_lossy(&fs::read(&path).unwrap()).into_owned();
+            let leaks = [folder.file_name().unwrap().to_str().unwrap(), "original", "truth"];
+            assert!(n > 100 || !leaks.iter().any(|leak| text.contains(leak)), "{family}");
+        }
+
+        let (original, secret) = maps::truth::<D>(seed, n);
+        let write = |path: &Path| stage::write_truth(path, &original, &secret);
+        let path = written(folder, Kind::Truth, write);
+        let (read_original, read_secret) = stage::read_truth::<D>(&path).unwrap();
+        assert_eq!(read_original.reveal(), original.reveal());
+        // Dropped points come back in the order of originals.
+        let in_order = |secret: &Secret| {
+            let mut dropped = secret.dropped().to_vec();
+            dropped.sort_by_key(|dropped| dropped.original.0);
+            (secret.hidden().to_vec(), secret.map(), secret.slots_per_record(), dropped)
+        };
+        assert_eq!(in_order(&read_secret), in_order(&secret));
+        assert_eq!(read_secret.swapped_axis(), secret.swapped_axis());
+        assert_eq!(read_secret.descriptor_row(), secret.descriptor_row());
+
+        let recovered = maps::recovered::<D>(seed, n);
+        let write = |path: &Path| stage::write_recovered(path, &recovered);
+        let path = written(folder, Kind::Recovered, write);
+        let bytes = fs::read(&path).unwrap();
+        let read = stage::read_recovered::<D>(&path).unwrap();
+        // NaN is not equal to itself, so bytes are compared, and fields that are not stored.
+        stage::write_recovered(&path, &read).unwrap();
+        assert!(bytes == fs::read(&path).unwrap());
+        assert!((0..n).all(|slot| read.position(slot) == recovered.position(slot)));
+        for (a, b) in read.positions().iter().zip(recovered.positions()) {
+            assert_eq!(a.map(f32::to_bits), b.map(f32::to_bits));
+        }
+        assert_eq!(read.about(), recovered.about());
+        assert_eq!((read.delta(), read.unit()), (recovered.delta(), recovered.unit()));
+        assert_eq!((read.status(), read.support()), (recovered.status(), recovered.support()));
+        assert_eq!((read.axis(), read.evidence()), (recovered.axis(), recovered.evidence()));
+        assert_eq!(read.descriptor_row(), recovered.descriptor_row());
+    }
+}
+
+#[test]
+fn maps_truths_and_recovered_points_come_back() {
+    values_come_back::<2>();
+    values_come_back::<3>();
+}
+
+#[test]
+fn neighborhoods_come_back() {
+    let folder = tempfile::tempdir().unwrap();
+    for (seed, n) in [2, 3, 40, 1000].into_iter().enumerate() {
+        for slots in [1, 2] {
+            let lists = maps::neighborhoods(seed as u64, n, slots);
+            let write = |path: &Path| stage::write_neighborhoods(path, &lists);
+            let path = written(folder.path(), Kind::Neighborhoods, write);
+            assert_eq!(stage::read_neighborhoods(&path, n, slots).unwrap(), lists);
+        }
+    }
+}
+
+/// Public data about an image is released with it: without the image size, recovery has less
+/// information.
+#[test]
+fn released_images_keep_their_size() {
+    let folder = tempfile::tempdir().unwrap();
+    let bounds = Bounds::try_new([0.0, 0.0], [640.0, 480.1]).unwrap();
+    let keypoints: Vec<[f64; 2]> =
+        (0..90).map(|i| [7.1 * f64::from(i), 5.0 + 0.3 * f64::from(i * i % 1500)]).collect();
+    let points = PointSet::try_new(keypoints, Unit::Pixel).unwrap();
+    let original = Original::within(points, bounds).unwrap();
+    let options = SchemeOptions { voxel: 50.0 };
+    for scheme in SCHEMES.iter().filter_map(|entry| entry.of_dimension::<2>(&options)) {
+        let (released, _) = obfuscate(&*scheme, &original, None, &Key::from_seed(3)).unwrap();
+        assert!(released.bounds().is_some());
+        let write = |path: &Path| stage::write_released(path, &released);
+        let path = written(folder.path(), Kind::Released, write);
+        assert!(stage::read_released::<2>(&path).unwrap() == released, "{}", scheme.name());
+    }
+}
+
+#[test]
+fn a_map_without_records_comes_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("empty.npz");
+    let none = Obfuscation::AxisCandidates(AxisCandidates::<3>::try_new(&[]).unwrap());
+    let released = Released::try_new(none, 1, [0.0; 3], Unit::Meter, None).unwrap();
+    stage::write_released(&path, &released).unwrap();
+    assert_eq!(stage::read_released::<3>(&path).unwrap(), released);
+    let lists = Neighborhoods::try_new(vec![0], Vec::<RecordId>::new(), None, 0, 1).unwrap();
+    stage::write_neighborhoods(&path, &lists).unwrap();
+    assert_eq!(stage::read_neighborhoods(&path, 0, 1).unwrap(), lists);
+}
+
+#[test]
+fn a_secret_about_other_points_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, secret) = maps::truth::<3>(1, 10);
+    let points = PointSet::try_new(vec![[0.0; 3]; 2], Unit::Meter).unwrap();
+    let path = folder.path().join("truth.npz");
+    assert!(stage::write_truth(&path, &Original::new(points), &secret).is_err());
+    assert!(!path.exists());
+}
+
+/// Images with any name come back, in order; those without rows are not stored.
+#[test]
+fn images_come_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let in_pixels = |released: Released<2>| {
+        let (kept, slots) = (released.obfuscation().clone(), released.slots_per_record());
+        let descriptors = released.descriptors().cloned();
+        Released::try_new(kept, slots, released.origin(), Unit::Pixel, descriptors).unwrap()
+    };
+    let made = |seed: u64, n: usize, family: usize| {
+        in_pixels(maps::released::<2>(seed, n).swap_remove(family))
+    };
+    let names = ["a.jpg", "day/b \u{e9}.png", "../c", "/d\\e", "f.npy"];
+    let maps: Vec<Released<2>> = (0..names.len()).map(|at| made(at as u64, 7 + at, 0)).collect();
+    let none = Obfuscation::Lines(Lines::through(&[], &[]).unwrap());
+    let none = Released::<2>::try_new(none, 1, [0.0; 2], Unit::Pixel, None).unwrap();
+    let path = written(folder.path(), Kind::Released, |path| {
+        write_images(path, |images| {
+            images.released("none.jpg", &none).unwrap();
+            names.iter().zip(&maps).for_each(|(name, map)| images.released(name, map).unwrap());
+        });
+        Ok(())
+    });
+    let mut images = ImageFile::open(&path, Kind::Released).unwrap();
+    for (name, map) in names.iter().zip(&maps) {
+        let image = images.next_image().unwrap().unwrap();
+        assert_eq!(image.name(), *name);
+        assert!(image.released().unwrap() == *map, "{name}");
+    }
+    assert!(images.next_image().unwrap().is_none());
+    write_images(&path, |images| {
+        images.released("a", &maps[0]).unwrap();
+        assert!(images.released("b", &made(1, 5, 3)).is_err(), "another family");
+    });
+}
