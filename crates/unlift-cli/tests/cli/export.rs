@@ -59,6 +59,7 @@ fn points_and_lines_come_back_in_every_form_and_on_the_map() {
 }
 
 #[test]
+#[rustfmt::skip] // One row per line.
 fn what_cannot_be_shown_is_told_and_what_is_not_ours_stays() {
     let place = recovered("plane");
     place.write("mine.ply", "mine");
@@ -70,12 +71,7 @@ fn what_cannot_be_shown_is_told_and_what_is_not_ours_stays() {
         ("back.npz --out back.obj", 3, "expected lines or rays, as --out is .obj"),
         ("back.npz --cameras room.csv --out back", 3, "expected a COLMAP model with cameras"),
         ("back.npz --cameras room.csv --out back.ply", 2, "--cameras: expected a folder"),
-        (
-            "back.npz --out x.stl",
-            2,
-            "--out: expected a name that ends in .ply or .obj, or a folder without an ending, \
-             found x.stl",
-        ),
+        ("back.npz --out x.stl", 2, "--out: expected a name that ends in .ply or .obj, or a folder without an ending, found x.stl"),
         ("back.npz --out mine.ply", 2, "mine.ply: expected nothing, or a cloud of an earlier run"),
         ("back.npz --out mine", 2, "points3D.txt: expected nothing, or a model of an earlier run"),
     ] {

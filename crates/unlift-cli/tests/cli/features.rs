@@ -40,6 +40,7 @@ fn photos_become_one_file_that_is_the_same_for_any_number_of_threads() {
 }
 
 #[test]
+#[rustfmt::skip] // One row per line.
 fn options_are_those_of_the_extractor() {
     let place = photos();
     let count = |options: &str| {
@@ -53,19 +54,10 @@ fn options_are_those_of_the_extractor() {
     for (line, expected) in [
         ("photos --max-features 0", "expected a whole number from 1 to 4294967295, found 0"),
         ("photos --features orb", "expected one of sift, aliked, superpoint, found orb"),
-        (
-            "photos --min-score 0.1",
-            "unlift: --min-score: expected with --features aliked, found none",
-        ),
-        (
-            "features.h5 --max-features 9 --out x.h5",
-            "--max-features: expected with a folder of photos",
-        ),
+        ("photos --min-score 0.1", "unlift: --min-score: expected with --features aliked, found none"),
+        ("features.h5 --max-features 9 --out x.h5", "--max-features: expected with a folder of photos"),
         ("features.h5 --as-stored --out x.h5", "--as-stored: expected with a folder of photos"),
-        (
-            "features.h5 --features aliked --out x.h5",
-            "--features: expected with a folder of photos",
-        ),
+        ("features.h5 --features aliked --out x.h5", "--features: expected with a folder of photos"),
         ("photos --out photos", "unlift: --out: photos: expected a file, found a folder"),
         ("photos --out photos/new.jpg", "expected a name that is not read as a photo"),
     ] {

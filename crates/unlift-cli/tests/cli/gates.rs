@@ -5,6 +5,7 @@ use serde_json::Value;
 use crate::common::Place;
 
 #[test]
+#[rustfmt::skip] // One row per line.
 fn a_gate_may_name_a_solver_and_a_source_and_decides_the_exit_code() {
     let place = Place::with_room(700);
     let audit = "audit map room.csv --scale 1 --k 10 --schemes olc,ppl --inlier-ratios 0.5 \
@@ -36,22 +37,10 @@ fn a_gate_may_name_a_solver_and_a_source_and_decides_the_exit_code() {
     assert!(!place.text("new/gates.xml").contains("room"), "it does not name the map");
     place.write("theirs.xml", "<?xml version=\"1.0\"?><project/>");
     for (more, expected) in [
-        (
-            "--gate ppl:ransac:0.25<=1",
-            "--gate ppl:ransac:0.25<=1: solver: expected one of ranking, joint, joint-start",
-        ),
-        (
-            "--gate olc:0.25<=1 --junit theirs.xml",
-            "--junit: theirs.xml: expected nothing, or gates as JUnit XML",
-        ),
-        (
-            "--gate olc:0.25<=1 --junit room.csv",
-            "--junit: room.csv: expected a file that is not read",
-        ),
-        (
-            "--gate olc:0.25<=1 --junit a/report.html",
-            "--junit: a/report.html: expected nothing, or gates as JUnit XML",
-        ),
+        ("--gate ppl:ransac:0.25<=1", "--gate ppl:ransac:0.25<=1: solver: expected one of ranking, joint, joint-start"),
+        ("--gate olc:0.25<=1 --junit theirs.xml", "--junit: theirs.xml: expected nothing, or gates as JUnit XML"),
+        ("--gate olc:0.25<=1 --junit room.csv", "--junit: room.csv: expected a file that is not read"),
+        ("--gate olc:0.25<=1 --junit a/report.html", "--junit: a/report.html: expected nothing, or gates as JUnit XML"),
     ] {
         let told = place.complains(&format!("{audit} {more}"), 2);
         assert!(told.starts_with(&format!("unlift: {expected}")), "{told}");

@@ -109,6 +109,7 @@ fn broken_images_are_named_counted_and_left_out() {
 }
 
 #[test]
+#[rustfmt::skip] // One row per line.
 fn what_cannot_be_audited_is_one_line() {
     let place = features();
     fs::create_dir(place.path("empty")).unwrap();
@@ -122,23 +123,11 @@ fn what_cannot_be_audited_is_one_line() {
     for (line, code, expected) in [
         ("empty", 3, "empty: expected JPEG, PNG or WebP photos, found none"),
         ("nothing", 3, "nothing: expected a file or folder, found nothing"),
-        (
-            "f.h5 --max-features 9",
-            2,
-            "--max-features: expected with a folder of photos, found a file",
-        ),
-        (
-            "bare.h5 --neighbors similarity",
-            2,
-            "--neighbors similarity: expected descriptors, found none",
-        ),
+        ("f.h5 --max-features 9", 2, "--max-features: expected with a folder of photos, found a file"),
+        ("bare.h5 --neighbors similarity", 2, "--neighbors similarity: expected descriptors, found none"),
         ("floats.h5 --neighbors overlap", 2, wrong_kind),
         ("photos --thresholds 5,5.0", 2, "--thresholds: expected each once, found 5.0 again"),
-        (
-            "photos --neighbors overlap --inlier-ratios 0.5",
-            2,
-            "--inlier-ratios: expected with --neighbors oracle, found only overlap",
-        ),
+        ("photos --neighbors overlap --inlier-ratios 0.5", 2, "--inlier-ratios: expected with --neighbors oracle, found only overlap"),
     ] {
         let told = place.complains(&format!("audit images {line}"), code);
         assert_eq!(told, format!("unlift: {expected}\n"));

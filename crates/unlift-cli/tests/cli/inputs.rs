@@ -14,6 +14,7 @@ const QUICK: &str = "--k 10 --schemes olc --quiet --out a";
 
 /// Errors are one line, with a line of advice if there is any, and come before any work.
 #[test]
+#[rustfmt::skip] // One row per line.
 fn what_cannot_be_meant_is_refused_with_a_way_out() {
     let place = Place::with_room(700);
     place.write("two.xyz", "1 2 3\n4 5 6\n");
@@ -24,28 +25,13 @@ fn what_cannot_be_meant_is_refused_with_a_way_out() {
     for (line, code, expected, advice) in [
         ("nothing.ply", 3, "nothing.ply: expected a file or folder, found nothing", ""),
         ("two.xyz", 3, "two.xyz: points: expected at least 11 (K + 1), found 2", ""),
-        (
-            "empty",
-            3,
-            "found none",
-            "the folder of a COLMAP model or project; for photos, unlift audit images",
-        ),
-        (
-            "room.csv --neighbors room.csv",
-            3,
-            "room.csv: expected an archive of NumPy arrays (.npz), found another file",
-            "",
-        ),
+        ("empty", 3, "found none", "the folder of a COLMAP model or project; for photos, unlift audit images"),
+        ("room.csv --neighbors room.csv", 3, "room.csv: expected an archive of NumPy arrays (.npz), found another file", ""),
         ("room.csv --scale -1", 2, number, ""),
         ("room.csv --scale 0", 2, number, ""),
         ("room.csv --scale inf", 2, number, ""),
         ("room.csv --scale 1e999", 2, number, ""),
-        (
-            "room.csv --scale 1e-300",
-            2,
-            "units across, found 1e-300",
-            "--scale 1 for a map in meters",
-        ),
+        ("room.csv --scale 1e-300", 2, "units across, found 1e-300", "--scale 1 for a map in meters"),
         ("room.csv --scale 1e300", 2, "units across, found 1e300", "--scale 1 for a map in meters"),
         ("room.csv --scale 1e-3", 2, "any guess would count as recovered", "another --scale"),
         ("room.csv --scale 1e5", 2, "no attack could come near", "another --scale"),
@@ -58,18 +44,8 @@ fn what_cannot_be_meant_is_refused_with_a_way_out() {
         ),
         ("room.csv --scale 1 --expect-extent 9", 2, "expected LOW..HIGH in meters", ""),
         // The gate has a threshold in meters, but the audit has no scale.
-        (
-            "room.csv --gate olc:0.10<=20",
-            2,
-            "expected one of 1.0, 2.5, found 0.1",
-            "--scale and --thresholds, which change them",
-        ),
-        (
-            "room.csv --neighbors overlap",
-            2,
-            "--neighbors overlap: expected descriptors (--descriptors FILE), found none",
-            "",
-        ),
+        ("room.csv --gate olc:0.10<=20", 2, "expected one of 1.0, 2.5, found 0.1", "--scale and --thresholds, which change them"),
+        ("room.csv --neighbors overlap", 2, "--neighbors overlap: expected descriptors (--descriptors FILE), found none", ""),
         ("room.csv --neighbors overlap --descriptors d.bin --inlier-ratios 0.5", 2, overlap, ""),
         ("room.csv --neighbors overlap --descriptors d.bin --oracle-noise near", 2, overlap, ""),
     ] {

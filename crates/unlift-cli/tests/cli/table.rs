@@ -3,6 +3,7 @@
 use crate::common::Place;
 
 #[test]
+#[rustfmt::skip] // One row per line.
 fn the_ending_decides_what_is_written() {
     let place = Place::with_room(500);
     let audit =
@@ -52,27 +53,11 @@ fn the_ending_decides_what_is_written() {
         0,
     );
     for (line, code, expected) in [
-        (
-            "a/audit.json --out mine.csv",
-            2,
-            "--out: mine.csv: expected nothing, or a table of an earlier run",
-        ),
-        (
-            "a/audit.json --out t.pdf",
-            2,
-            "--out: expected a name that ends in .md, .tex, .csv or .svg, found t.pdf",
-        ),
-        (
-            "a/audit.json --thresholds 0.3",
-            2,
-            "--thresholds: expected one of 0.10, 0.25, as in the audit, found 0.3",
-        ),
+        ("a/audit.json --out mine.csv", 2, "--out: mine.csv: expected nothing, or a table of an earlier run"),
+        ("a/audit.json --out t.pdf", 2, "--out: expected a name that ends in .md, .tex, .csv or .svg, found t.pdf"),
+        ("a/audit.json --thresholds 0.3", 2, "--thresholds: expected one of 0.10, 0.25, as in the audit, found 0.3"),
         ("old.json", 3, "old.json: expected schema 1, found 9"),
-        (
-            "g/audit.json --out g.svg",
-            2,
-            "--out: expected an audit with rows by the oracle, for curves, found none",
-        ),
+        ("g/audit.json --out g.svg", 2, "--out: expected an audit with rows by the oracle, for curves, found none"),
     ] {
         let told = place.complains(&format!("table {line}"), code);
         assert!(told.starts_with(&format!("unlift: {expected}")), "{told}");

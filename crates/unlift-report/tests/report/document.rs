@@ -73,46 +73,20 @@ fn the_larger_baseline_counts() {
 }
 
 #[test]
+#[rustfmt::skip] // One row per line.
 fn a_broken_rule_names_its_place() {
     type Spoil = fn(&mut Document);
     let rules: [(Spoil, &str); 11] = [
-        (
-            |d| d.results[1].median_error = Some(f64::NAN),
-            "results[1].median_error: expected a finite number, found NaN",
-        ),
-        (
-            |d| _ = d.results[1].metrics.insert("faces".into(), f64::INFINITY),
-            "results[1].metrics[\"faces\"]: expected a finite number, found inf",
-        ),
-        (
-            |d| d.results[2].recovered_percent[0] = 100.5,
-            "results[2].recovered_percent[\"0.10\"]: expected a number from 0 to 100, found 100.5",
-        ),
-        (
-            |d| d.results[1] = d.results[0].clone(),
-            "results[1]: expected a combination of its own, found the combination of results[0] again",
-        ),
+        (|d| d.results[1].median_error = Some(f64::NAN), "results[1].median_error: expected a finite number, found NaN"),
+        (|d| _ = d.results[1].metrics.insert("faces".into(), f64::INFINITY), "results[1].metrics[\"faces\"]: expected a finite number, found inf"),
+        (|d| d.results[2].recovered_percent[0] = 100.5, "results[2].recovered_percent[\"0.10\"]: expected a number from 0 to 100, found 100.5"),
+        (|d| d.results[1] = d.results[0].clone(), "results[1]: expected a combination of its own, found the combination of results[0] again"),
         (|d| d.results[0].n_lost = 5, "results[0].lost: expected a sum of 5, found 12"),
-        (
-            |d| d.results[0].records_alone_by = None,
-            "results[0].records_alone_by: expected the thresholds 0.10, 0.25, found nothing",
-        ),
-        (
-            |d| d.results[0].records_alone_percent.as_mut().unwrap()[1] = 101.0,
-            "results[0].records_alone_percent[\"0.25\"]: expected a number from 0 to 100, found 101",
-        ),
-        (
-            |d| d.results[0].sure_unknown = Some("few".into()),
-            "results[0].sure_percent: expected null, as sure_unknown says \"few\", found 74.7",
-        ),
-        (
-            |d| (d.gates[1].passed, d.gates[1].found_percent) = (true, None),
-            "gates[1].passed: expected false where a figure is not known, found true",
-        ),
-        (
-            |d| d.not_audited.push(missing("olc", None, "no")),
-            "not_audited[0].scheme: expected a scheme without rows in results, found olc, which has rows",
-        ),
+        (|d| d.results[0].records_alone_by = None, "results[0].records_alone_by: expected the thresholds 0.10, 0.25, found nothing"),
+        (|d| d.results[0].records_alone_percent.as_mut().unwrap()[1] = 101.0, "results[0].records_alone_percent[\"0.25\"]: expected a number from 0 to 100, found 101"),
+        (|d| d.results[0].sure_unknown = Some("few".into()), "results[0].sure_percent: expected null, as sure_unknown says \"few\", found 74.7"),
+        (|d| (d.gates[1].passed, d.gates[1].found_percent) = (true, None), "gates[1].passed: expected false where a figure is not known, found true"),
+        (|d| d.not_audited.push(missing("olc", None, "no")), "not_audited[0].scheme: expected a scheme without rows in results, found olc, which has rows"),
         (
             |d| {
                 *d = sample::images();

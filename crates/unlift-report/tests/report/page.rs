@@ -280,18 +280,14 @@ fn every_figure_stands_in_a_table_and_what_must_be_known_beside_the_verdict() {
 
 /// The banner counts the schemes, and its color follows the share.
 #[test]
+#[rustfmt::skip] // One row per line.
 fn the_banner_says_how_bad_it_is() {
     for (schemes, color, expected) in [
         (&["olc"][..], "red", "Not protected. An attacker recovers 58.6 %"),
         (&["ray", "ray-voxel"], "orange", "Badly protected under either scheme."),
         (&["ppl", "cp"], "gray", "No attack tried here recovers much. An attacker recovers 16.2"),
         // An untested attack is no good result.
-        (
-            &["plane"],
-            "orange",
-            "Not tested: what an attacker recovers from the released data alone. An attacker would recover 83.7 % of \
-             the points of this map within 10 cm if half of the neighbors were known (PLANE, known neighbors).",
-        ),
+        (&["plane"], "orange", "Not tested: what an attacker recovers from the released data alone. An attacker would recover 83.7 % of the points of this map within 10 cm if half of the neighbors were known (PLANE, known neighbors)."),
     ] {
         let mut document = sample::document(true);
         document.results.retain(|row| schemes.contains(&row.scheme.as_str()));
