@@ -138,12 +138,12 @@ def by_solvers(rows, solvers, ratios):
 
 
 def accuracy():
-    kitchen = audit_map("redkitchen", "--repeats", "3", solvers=",".join(["ranking", *SOLVERS]), descriptors=True)
-    castle = audit_map("castle", "--repeats", "3", solvers="ranking,joint,consensus")["results"]
+    kitchen = audit_map("redkitchen", "--repeats", "3", solvers=",".join(SOLVERS), descriptors=True)
+    castle = audit_map("castle", "--repeats", "3", solvers="joint,consensus")["results"]
     rows, paper = kitchen["results"], published_maps()
 
     def strongest(ratios):
-        of = {(r["scheme"], r["inlier_ratio"]): r for r in rows if r["solver"] == "ranking"}
+        of = {(r["scheme"], r["inlier_ratio"]): r for r in rows if r["solver"] == "joint"}
         yield from head("In", *SCHEMES)
         for ratio in ratios:
             yield line(str(ratio), *(cell(of[s, ratio]) + known([paper.get((s, ratio, t)) for t in (0.10, 0.25)]) for s in SCHEMES))
@@ -156,23 +156,23 @@ def accuracy():
     guesses = {r["scheme"]: next(iter(r["blind_percent"].values())) for r in castle}
     put("docs/benchmarks.md", "accuracy", [
         "## RedKitchen (7-Scenes, 21,149 points, meters)", "",
-        "`ranking`, within 10 / 25 cm; in brackets the paper's mean over 7-Scenes (other maps, so compare trends):", "",
+        "`joint`, within 10 / 25 cm; in brackets the paper's mean over 7-Scenes (other maps, so compare trends):", "",
         *strongest([1.0, 0.5, 0.3, 0.2, 0.1]), "",
-        "`joint` / `consensus` / `ransac`, within 10 cm:", "", *by_solvers(rows, SOLVERS, [1.0, 0.5, 0.1]), "",
-        "Recovered exactly, with the value that another record publishes (`cp`, `ranking`), In 1.0 / 0.5 / 0.2 / 0.1: "
-        + column(rows, "ranking", "cp", "exact_percent").replace("/", " / ") + ".", "",
+        "`consensus` / `ransac`, within 10 cm:", "", *by_solvers(rows, SOLVERS[1:], [1.0, 0.5, 0.1]), "",
+        "Recovered exactly, with the value that another record publishes (`cp`), In 1.0 / 0.5 / 0.2 / 0.1: "
+        + column(rows, "joint", "cp", "exact_percent").replace("/", " / ") + ".", "",
         f"Break-even inlier ratio (half within 10 cm): below {min(RATIOS):.2f}, except {', '.join(exceptions)}.", "",
         "## Castle (6,224 points, no scale)", "",
-        "`ranking` / `joint` / `consensus`, within 1.0:", "", *by_solvers(castle, ["ranking", "joint", "consensus"], [1.0, 0.5, 0.1]),
+        "`joint` / `consensus`, within 1.0:", "", *by_solvers(castle, ["joint", "consensus"], [1.0, 0.5, 0.1]),
         line("blind", *(f"{guesses[s]:.1f}" for s in SCHEMES)), ""])
     put("README.md", "results", [*strongest([0.5, 0.1]), ""])
     put("docs/benchmarks.md", "confidence", [
-        "`ranking`, percent of all points that the attacker is 90 % sure to have within the smallest threshold / percent of these that are:", "",
+        "Percent of all points that the attacker is 90 % sure to have within the smallest threshold / percent of these that are:", "",
         *head("map", "In", *SCHEMES), *sure("RedKitchen", rows), *sure("Castle", castle), ""])
 
 
 def sure(name, rows):
-    of = {(r["scheme"], r["inlier_ratio"]): r for r in rows if r["solver"] == "ranking"}
+    of = {(r["scheme"], r["inlier_ratio"]): r for r in rows if r["solver"] == "joint"}
     for ratio in (1.0, 0.1):
         cells = []
         for scheme in SCHEMES:
@@ -183,11 +183,11 @@ def sure(name, rows):
 
 
 def noise():
-    rows = audit_map("redkitchen", "--oracle-noise", "near,clustered", solvers="ranking,consensus")["results"]
+    rows = audit_map("redkitchen", "--oracle-noise", "near,clustered", solvers="joint,consensus")["results"]
     shares = {(r["oracle_noise"], r["scheme"], r["solver"]): share(r) for r in rows if r["inlier_ratio"] == 0.1}
     put("docs/benchmarks.md", "noise", [
         *head("noise", "In", *SCHEMES),
-        *(line(kind, "0.1", *("/".join(f"{shares[kind, s, solver]:.0f}" for solver in ("ranking", "consensus")) for s in SCHEMES))
+        *(line(kind, "0.1", *("/".join(f"{shares[kind, s, solver]:.0f}" for solver in ("joint", "consensus")) for s in SCHEMES))
           for kind in ("near", "clustered")), ""])
 
 
@@ -262,7 +262,7 @@ def large():
 
 def images():
     photos, paper, thresholds = DATA / "redkitchen/images", published_images("sift"), ("5", "10", "25")
-    rows = unlift("images", photos, "--solver", "ranking,ransac")["results"]
+    rows = unlift("images", photos, "--solver", "joint,ransac")["results"]
     of = {(r["solver"], r["scheme"], r["inlier_ratio"]): r for r in rows if r.get("oracle_noise")}
 
     def by_ratio(solver, ratios, beside):
@@ -271,15 +271,15 @@ def images():
             yield line(str(ratio), *(percents(of[solver, s, ratio]["recovered_percent"])
                                      + known([beside.get((s, ratio, t)) for t in thresholds]) for s in IMAGE_SCHEMES))
 
-    exact = "/".join(f"{of['ranking', 'cp2d', ratio]['exact_percent']:.1f}" for ratio in (1.0, 0.5, 0.1)).replace("/", " / ")
-    errors = " / ".join(f"{of['ranking', 'dcl2d', ratio]['median_error']:.0f}" for ratio in (1.0, 0.5, 0.1))
+    exact = "/".join(f"{of['joint', 'cp2d', ratio]['exact_percent']:.1f}" for ratio in (1.0, 0.5, 0.1)).replace("/", " / ")
+    errors = " / ".join(f"{of['joint', 'dcl2d', ratio]['median_error']:.0f}" for ratio in (1.0, 0.5, 0.1))
     lines = []
     for name, given, options, sources, feature in (
             ("RedKitchen, SIFT", photos, [], ["learned", "overlap"], "sift"),
             ("Castle, SIFT", DATA / "castle/features-sift.h5", [], ["learned"], None),
             ("RedKitchen, ALIKED 2,048", photos, ["--features", "aliked", "--min-score", "0.02"], ["learned", "similarity"], None),
             ("Castle, ALIKED 2,048", DATA / "castle/images", ["--features", "aliked"], ["learned"], "superpoint")):
-        document = unlift("images", given, "--solver", "ranking", *options, *each("--neighbors", sources))
+        document = unlift("images", given, "--solver", "joint", *options, *each("--neighbors", sources))
         found = {(r["neighbors"], r["scheme"]): r for r in document["results"]}
         for source in sources:
             right = f"{100 * found[source, IMAGE_SCHEMES[0]]['inlier_ratio']:.1f}"
@@ -290,9 +290,9 @@ def images():
             lines.append(line(f"paper, 7-Scenes, {'SIFT' if feature == 'sift' else 'SuperPoint'}", "a network", "-", *cells))
     put("docs/benchmarks.md", "images", [
         "Percent of all keypoints within 5 / 10 / 25 px, seed 0; in brackets the paper's mean over 7-Scenes.", "",
-        "### RedKitchen, 40 photos of 640 x 480", "", *by_ratio("ranking", [1.0, 0.5, 0.3, 0.2, 0.1], paper),
-        line("blind", *(percents(of["ranking", s, 1.0]["blind_percent"]) for s in IMAGE_SCHEMES)), "", *by_ratio("ransac", [1.0, 0.5, 0.1], {}), "",
-        f"`ranking`, In 1.0 / 0.5 / 0.1: `cp2d` exactly {exact} %; median error of `dcl2d` {errors} px, blind {rows[-1]['blind_median_error']:.0f}.", "",
+        "### RedKitchen, 40 photos of 640 x 480", "", *by_ratio("joint", [1.0, 0.5, 0.3, 0.2, 0.1], paper),
+        line("blind", *(percents(of["joint", s, 1.0]["blind_percent"]) for s in IMAGE_SCHEMES)), "", *by_ratio("ransac", [1.0, 0.5, 0.1], {}), "",
+        f"In 1.0 / 0.5 / 0.1: `cp2d` exactly {exact} %; median error of `dcl2d` {errors} px, blind {rows[-1]['blind_median_error']:.0f}.", "",
         "### Neighborhoods from descriptors alone", "",
         "*Right* is the share of listed keypoints among the true 20 nearest. ALIKED: the best 2,048 keypoints.", "",
         *head("photos", "neighbors by", "right, %", *IMAGE_SCHEMES), *lines, ""])
@@ -300,7 +300,7 @@ def images():
 
 def pictures():
     photos, flat, solid, true = DATA / "redkitchen/images", [], [], []
-    attack = ["--inlier-ratios", "0.5", "--neighbors", "oracle", "--neighbors", "learned", "--invert", "--solver", "ranking", "--share-safe"]
+    attack = ["--inlier-ratios", "0.5", "--neighbors", "oracle", "--neighbors", "learned", "--invert", "--solver", "joint", "--share-safe"]
 
     def lines(name, document, schemes, paper):
         of = {(r["inlier_ratio"] if r["neighbors"] == "oracle" else "learned", r["scheme"]): r["metrics"] for r in document["results"]}

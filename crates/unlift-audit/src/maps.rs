@@ -358,13 +358,11 @@ struct Ran {
 
 /// Creates the observer of the cells of `job`.
 fn watcher<'a>(job: &Job<'a>) -> Watcher<'a> {
-    let drawn = drawn(&job.plan);
-    let n_views = job.plan.schemes.len() * job.plan.variants().len() * drawn.len();
+    let n_views = job.plan.schemes.len() * job.plan.rows_per_scheme();
     Watcher {
         progress: job.progress,
         pictures: (!job.share_safe).then(|| Pictures::new(job.original, &job.plan, n_views)),
         curves: Vec::new(),
-        drawn,
         thresholds: job.plan.thresholds.iter().map(|t| t.value).collect(),
         inversion: job.inversion.clone(),
         sheets: match (&job.inversion, job.share_safe) {
@@ -382,21 +380,11 @@ struct Watcher<'a> {
     progress: &'a dyn Progress,
     pictures: Option<Pictures>,
     curves: Vec<(Row, Vec<(f64, f64)>)>,
-    drawn: Vec<String>,
     thresholds: Vec<f64>,
     inversion: Option<Arc<MapInversion>>,
     /// One sheet for each of the first cameras.
     sheets: Vec<Sheet>,
     failed: Option<Error>,
-}
-
-/// Returns the names of the solvers whose points are drawn. `joint-start` is not drawn beside
-/// `joint`.
-fn drawn<const D: usize>(plan: &Plan<D>) -> Vec<String> {
-    let hides_start = plan.has_solver(Builtin::Joint);
-    let solvers = plan.solvers.iter();
-    let drawn = solvers.filter(|s| !hides_start || Builtin::of(&***s) != Some(Builtin::JointStart));
-    drawn.map(|solver| solver.name().to_owned()).collect()
 }
 
 impl Observer for Watcher<'_> {
@@ -415,27 +403,11 @@ impl Observer for Watcher<'_> {
         let most = self.thresholds.iter().copied().fold(0.0, f64::max);
         let points = curve_errors(most).map(|at| (at, cell.accuracy.percent_within(at))).collect();
         self.curves.push((cell.row.clone(), points));
-        if let (Some(pictures), true) = (&mut self.pictures, self.drawn.contains(&cell.row.solver))
-        {
+        if let Some(pictures) = &mut self.pictures {
             pictures.add(cell);
         }
-        if let (Some(inversion), true, None) =
-            (&self.inversion, self.drawn.contains(&cell.row.solver), &self.failed)
-        {
+        if let (Some(inversion), None) = (&self.inversion, &self.failed) {
             self.failed = inversion.add(cell, &mut self.sheets).err().map(Error::from);
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_joint_starts_from_is_drawn_only_by_itself() {
-        let mut plan = Plan::<3>::new(unlift::Unit::Meter);
-        assert_eq!(drawn(&plan), ["ranking", "joint"]);
-        plan.solvers = vec![Arc::new(Builtin::JointStart), Arc::new(Builtin::Ransac)];
-        assert_eq!(drawn(&plan), ["joint-start", "ransac"]);
     }
 }

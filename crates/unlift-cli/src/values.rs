@@ -100,8 +100,8 @@ fn of_dimension(
 /// alone reveal nothing.
 pub fn image_solver(text: &str) -> Result<Builtin, String> {
     let names = || Builtin::FROM_LISTS.map(|solver| solver.name()).join(", ");
-    let found = Builtin::FROM_LISTS.into_iter().find(|solver| solver.name() == text);
-    found.ok_or_else(|| format!("expected one of {}, found {text}", names()))
+    let of_lists = solver(text).ok().filter(|solver| Builtin::FROM_LISTS.contains(solver));
+    of_lists.ok_or_else(|| format!("expected one of {}, found {text}", names()))
 }
 
 pub fn image_source(text: &str) -> Result<NeighborSource, String> {
@@ -145,8 +145,13 @@ pub fn protection(text: &str) -> Result<Protection, String> {
     Protection::parse(text).map_err(|error| expected(&error))
 }
 
+/// Parses the name of a solver. Former names are read with a note.
 pub fn solver(text: &str) -> Result<Builtin, String> {
-    Builtin::from_name(text).map_err(|error| expected(&error))
+    let solver = Builtin::from_name(text).map_err(|error| expected(&error))?;
+    if solver.name() != text {
+        eprintln!("note: the solver {text} is called {} now", solver.name());
+    }
+    Ok(solver)
 }
 
 pub fn noise(text: &str) -> Result<Noise, String> {
@@ -287,7 +292,7 @@ mod tests {
              expected a number from 0 to 1, found 1.5\n\
              expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, sphere, found pppl\n\
              expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, sphere, found cp2d (for images only)\n\
-             expected one of joint, ranking, joint-start, consensus, ransac, density, tomography, found magic\n\
+             expected one of joint, consensus, ransac, density, tomography, found magic\n\
              expected one of uniform, near, clustered, found white\n\
              expected one of sift, aliked, superpoint, found SIFT\n\
              expected a number from 0 to below 1, found 1\n\

@@ -5,10 +5,11 @@
 //! 1. `options`: options of recovery. `assignment`: descriptors of paired lines. `result`: recovered positions. `solver`: the
 //!    trait [`Solver`], which you can implement.
 //! 2. `map`: the data that all solvers read. `Settings` in `map/family` holds every constant that differs between maps and images.
-//! 3. `consensus`, `joint` and `ranking`: our solvers. `ransac` and `published_density`: published attacks, for comparison.
+//! 3. `consensus`, `joint`, `layout`, `ranking` and `beliefs`: the steps of our attack. `ransac` and `published_density`: published
+//!    attacks, for comparison.
 //! 4. `delta`: the choice of the distance that decides support.
 //! 5. `exact`: coordinates that a rule of the scheme fixes. `confidence`: the probability that an estimate is right.
-//! 6. `problem`: solves a map. `records_alone`: attacks without neighborhoods.
+//! 6. `problem`: the steps in their order. `records_alone`: attacks without neighborhoods.
 //!
 //! [`recover`] runs the whole attack.
 
@@ -95,21 +96,7 @@ impl<const D: usize> Solver<D> for Builtin {
     }
 }
 
-/// Recovers by [`Builtin::Joint`] and also returns the estimates it starts from, which equal the result of
-/// [`Builtin::JointStart`] bit for bit.
-///
-/// # Errors
-/// When options are out of range, or the lists do not have one row per slot.
-pub fn recover_with_start<const D: usize>(
-    released: &Released<D>,
-    lists: &Neighborhoods,
-    options: &RecoverOptions,
-) -> Result<(Recovered<D>, Recovered<D>), Error> {
-    let with_start: WithStart<D> = WITH_START.of()?;
-    with_start(released, lists, options)
-}
-
-/// Recovers by joint recovery and ranking from known positions of some slots. Positions that are more likely right than wrong, by
+/// Recovers by [`Builtin::Joint`] from known positions of some slots. Positions that are more likely right than wrong, by
 /// the confidence in `known`, stay as they are until exact constraints apply (`cp2d`). The result has no confidence.
 ///
 /// # Errors
@@ -121,29 +108,9 @@ pub fn recover_from<const D: usize>(
     options: &RecoverOptions,
 ) -> Result<Recovered<D>, Error> {
     released.fingerprint().expect(known.about().map)?;
-    let problem = Problem::new(released, lists, Builtin::Ranking, options)?;
-    let known: Vec<_> = (0..problem.n_slots()).map(|slot| known.sure_estimate(slot)).collect();
-    problem.finish(problem.run_joint(problem.solve(), &known))
-}
-
-type WithStart<const D: usize> = fn(
-    &Released<D>,
-    &Neighborhoods,
-    &RecoverOptions,
-) -> Result<(Recovered<D>, Recovered<D>), Error>;
-
-static WITH_START: Both<WithStart<2>, WithStart<3>> = Both(with_start::<2>, with_start::<3>);
-
-fn with_start<const D: usize>(
-    released: &Released<D>,
-    lists: &Neighborhoods,
-    options: &RecoverOptions,
-) -> Result<(Recovered<D>, Recovered<D>), Error> {
     let problem = Problem::new(released, lists, Builtin::Joint, options)?;
-    let start = problem.solve();
-    let recovered = problem.finish(problem.run_joint(start.clone(), &[]))?;
-    let start = problem.finish_start(start, &recovered)?;
-    Ok((recovered, start))
+    let known: Vec<_> = (0..problem.n_slots()).map(|slot| known.sure_estimate(slot)).collect();
+    problem.finish(problem.joint(problem.start(), &known))
 }
 
 type Solve<const D: usize> =
@@ -158,5 +125,5 @@ fn solve<const D: usize>(
     options: &RecoverOptions,
 ) -> Result<Recovered<D>, Error> {
     let problem = Problem::new(released, lists, solver, options)?;
-    problem.finish(problem.run_joint(problem.solve(), &[]))
+    problem.finish(problem.joint(problem.start(), &[]))
 }

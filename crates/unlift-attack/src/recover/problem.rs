@@ -62,11 +62,9 @@ impl<'a, const D: usize> Problem<'a, D> {
         let (delta, records) = match solver {
             Builtin::Density => at_peaks(published(released)),
             Builtin::Tomography => at_peaks(tomography(released)),
-            Builtin::Consensus
-            | Builtin::Joint
-            | Builtin::JointStart
-            | Builtin::Ranking
-            | Builtin::Ransac => Self::listed(released, lists, solver, options),
+            Builtin::Consensus | Builtin::Joint | Builtin::Ransac => {
+                Self::listed(released, lists, solver, options)
+            }
         };
         let trials = TrialCounts::default();
         Ok(Self { released, map, lists, solver, options: *options, delta, records, trials })
@@ -80,7 +78,7 @@ impl<'a, const D: usize> Problem<'a, D> {
     ) -> (f64, Records<'a, D>) {
         let family = Family::new(released, lists);
         // Joint recovery reads lists in both directions from its start on.
-        let is_joint = matches!(solver, Builtin::Joint | Builtin::JointStart | Builtin::Ranking);
+        let is_joint = solver == Builtin::Joint;
         let graph = is_joint.then(|| Graph::new(lists, released.slots_per_record()));
         let single = graph.as_ref().filter(|_| released.slots_per_record() == 1);
         let both_ways = single.map(Graph::neighborhoods);
@@ -99,7 +97,7 @@ impl<'a, const D: usize> Problem<'a, D> {
     }
 
     /// Returns the estimates of all slots. For joint recovery these are the estimates it starts from.
-    pub(super) fn solve(&self) -> Vec<Estimate<D>> {
+    pub(super) fn start(&self) -> Vec<Estimate<D>> {
         let (lists, delta) = (self.lists, self.delta as f32);
         match &self.records {
             Records::Alone(peaks) => Placement::new(self.released, lists, peaks).solve(),
@@ -114,62 +112,44 @@ impl<'a, const D: usize> Problem<'a, D> {
         }
     }
 
-    /// Whether the solver continues with joint recovery after its start.
-    fn iterates(&self) -> bool {
-        matches!(self.solver, Builtin::Joint | Builtin::Ranking)
-    }
-
-    /// Returns the estimates of all slots after joint recovery from `start`, and after ranking if that is the solver; for other
-    /// solvers, `start`. Estimates that are `known`, per slot, stay as they are; the list is empty if none is known.
-    pub(super) fn run_joint(
+    /// Returns the estimates of all slots after joint recovery from `start`; for other solvers, `start`. Estimates that are `known`,
+    /// per slot, stay as they are; the list is empty if none is known.
+    pub(super) fn joint(
         &self,
         start: Vec<Estimate<D>>,
         known: &[Option<Estimate<D>>],
     ) -> Vec<Estimate<D>> {
-        let fixed = |mut estimates: Vec<Estimate<D>>| {
+        let Records::Listed { family, graph: Some(graph), both_ways } = &self.records else {
+            return start;
+        };
+        let (lists, delta, seed) = (self.lists, self.delta as f32, self.options.seed);
+        let restore = |mut estimates: Vec<Estimate<D>>| {
             for (estimate, known) in estimates.iter_mut().zip(known) {
                 *estimate = known.unwrap_or(*estimate);
             }
             estimates
         };
-        match &self.records {
-            Records::Listed { family, graph: Some(graph), both_ways } if self.iterates() => {
-                let (delta, seed) = (self.delta as f32, self.options.seed);
-                let rounds = if known.is_empty() { 1 } else { ROUNDS };
-                let found = (0..rounds).fold(fixed(start), |found, _| {
-                    fixed(joint::recover(family, graph, delta, seed, found))
-                });
-                match self.solver {
-                    Builtin::Ranking => {
-                        let found = match family {
-                            // With known positions, a layout of the whole image is not needed.
-                            Family::Lines { rows, .. }
-                                if family.has_regions() && known.is_empty() =>
-                            {
-                                layout::recover(rows, self.lists, found)
-                            }
-                            _ => found,
-                        };
-                        let found = match ranking::recover(family, self.lists, delta, seed, found) {
-                            Ok(found) => found,
-                            // Beliefs are for maps with one slot per record: points of paired lines and of images lose as often
-                            // as they gain.
-                            Err(found)
-                                if D == 3
-                                    && both_ways.is_some()
-                                    && self.lists.scores().is_some() =>
-                            {
-                                beliefs::recover(family, graph, delta, seed, found)
-                            }
-                            Err(found) => found,
-                        };
-                        fixed(found)
-                    }
-                    _ => found,
-                }
+        // All slots together: each by its neighbors' estimates.
+        let rounds = if known.is_empty() { 1 } else { ROUNDS };
+        let estimates = (0..rounds).fold(restore(start), |estimates, _| {
+            restore(joint::recover(family, graph, delta, seed, estimates))
+        });
+        // A layout of the whole image, which known positions replace.
+        let estimates = match family {
+            Family::Lines { rows, .. } if family.has_regions() && known.is_empty() => {
+                layout::recover(rows, lists, estimates)
             }
-            _ => start,
-        }
+            _ => estimates,
+        };
+        // The likeliest places under the whole lists; or under their entries alone, where what is not listed says too little. Beliefs
+        // are for maps with one slot per record: points of paired lines and of images lose as often as they gain.
+        let with_beliefs = D == 3 && both_ways.is_some() && lists.scores().is_some();
+        restore(match ranking::recover(family, lists, delta, seed, estimates) {
+            Err(estimates) if with_beliefs => {
+                beliefs::recover(family, graph, delta, seed, estimates)
+            }
+            Ok(estimates) | Err(estimates) => estimates,
+        })
     }
 
     /// Applies exact constraints to the last estimates and adds confidence.
@@ -179,8 +159,7 @@ impl<'a, const D: usize> Problem<'a, D> {
             let expected = format!("{}, one per slot", self.n_slots());
             return Err(Error::new("estimates", expected, unsettled.len().to_string()));
         }
-        let reruns = if self.iterates() { Settings::of_dimension::<D>().joint_reruns } else { 0 };
-        let settled = self.settled(&unsettled, reruns);
+        let settled = self.settled(&unsettled);
         let estimates = settled.as_ref().unwrap_or(&unsettled);
         let descriptor_row = descriptor_rows(self.released, self.lists);
         let trials = (self.solver == Builtin::Ransac).then(|| self.trials.histogram());
@@ -195,39 +174,21 @@ impl<'a, const D: usize> Problem<'a, D> {
             return Ok(recovered.without_confidence(unknown));
         }
         let solved = Solved { estimates, unsettled: &unsettled, delta: self.delta as f32 };
-        recovered.with_confidence(confidence::predict(
-            self.solver,
-            family,
-            graph,
-            self.released,
-            &solved,
-        ))
-    }
-
-    /// Finishes the estimates that joint recovery starts from, as [`Builtin::JointStart`] does. Takes the assignment of descriptors
-    /// from `last`.
-    /// Fails when there is not one estimate per slot.
-    pub(super) fn finish_start(
-        &self,
-        start: Vec<Estimate<D>>,
-        last: &Recovered<D>,
-    ) -> Result<Recovered<D>, Error> {
-        let rows = last.descriptor_row().map(<[u32]>::to_vec);
-        let settled = self.settled(&start, 0);
-        let recovered = self.in_columns(settled.as_ref().unwrap_or(&start), rows)?;
-        Ok(recovered.without_confidence(Unknown::OtherSolver))
+        recovered.with_confidence(confidence::predict(family, graph, self.released, &solved))
     }
 
     /// Applies exact constraints, if the family has any, and repeats joint recovery from the result where that helps. The paper's
     /// sampling loop stays as published.
-    fn settled(&self, estimates: &[Estimate<D>], reruns: usize) -> Option<Vec<Estimate<D>>> {
+    fn settled(&self, estimates: &[Estimate<D>]) -> Option<Vec<Estimate<D>>> {
         if self.solver == Builtin::Ransac || matches!(self.records, Records::Alone(_)) {
             return None;
         }
         let settle = |estimates: &[_]| exact::settle(self.released, estimates, self.delta);
         let mut settled = settle(estimates)?;
-        for _ in 0..reruns {
-            settled = settle(&self.run_joint(settled, &[]))?;
+        if self.solver == Builtin::Joint {
+            for _ in 0..Settings::of_dimension::<D>().joint_reruns {
+                settled = settle(&self.joint(settled, &[]))?;
+            }
         }
         Some(settled)
     }

@@ -7,8 +7,8 @@ use crate::neighbors::{Geometric, Neighborhoods, geometric_by};
 use crate::recover::map::lines::{LineRow, from_lines, from_rays};
 use crate::recover::map::lists::found;
 use crate::recover::options::RecoverOptions;
+use crate::recover::problem::Problem;
 use crate::recover::published_density::published;
-use crate::recover::recover_with_start;
 use crate::recover::result::{Estimate, Recovered, Status, stored_support};
 use crate::recover::solver::Builtin;
 use crate::released::{Obfuscation, Released};
@@ -36,9 +36,10 @@ pub fn records_alone<const D: usize>(
     // Planes and rays from one center have no geometric lists.
     if let Ok(lists) = geometric_by(released, Geometric::K, &peaks) {
         let options = RecoverOptions { confidence: false, ..*options };
-        let (joint, start) = recover_with_start(released, &lists, &options)?;
-        attacks.push(("geometric, joint", joint));
-        attacks.push(("geometric, joint-start", start));
+        let problem = Problem::new(released, &lists, Builtin::Joint, &options)?;
+        let start = problem.start();
+        attacks.push(("geometric, consensus", problem.finish(start.clone())?));
+        attacks.push(("geometric, joint", problem.finish(problem.joint(start, &[]))?));
     }
     Ok(attacks)
 }

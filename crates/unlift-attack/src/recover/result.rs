@@ -159,7 +159,7 @@ impl Unknown {
             Self::NotAsked => "confidence was not requested",
             Self::NotGiven => "the recovered points have no confidence values",
             Self::OfImages => "the confidence model was fitted on maps and not tested on images",
-            Self::OtherSolver => "only the solvers joint and ranking estimate confidence",
+            Self::OtherSolver => "only the solver joint estimates confidence",
             Self::RankedLists => {
                 "the confidence model was not fitted on lists that a source ranked"
             }

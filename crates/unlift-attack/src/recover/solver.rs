@@ -42,14 +42,9 @@ pub enum Builtin {
     /// On each slot's record, the position whose support is least probable by chance. The search is exact, and its cost does not
     /// depend on the inlier ratio.
     Consensus,
-    /// Consensus, then iterations that also use the estimates of neighbors.
+    /// Our strongest attack: consensus with lists in both directions, then all slots together from the estimates of their neighbors,
+    /// last the positions under which the whole lists are likeliest, also by what they do not name.
     Joint,
-    /// Joint recovery, then the positions under which the whole lists are likeliest: also what lists do not name is evidence. The most
-    /// accurate solver, and the slowest of ours.
-    Ranking,
-    /// The consensus pass that joint recovery starts from. It differs from [`Self::Consensus`]: its delta is narrower, and for
-    /// records with one slot it reads lists in both directions.
-    JointStart,
     /// The sampling loop of the paper (section 4), for comparison.
     Ransac,
     /// The published density attacks on the records alone (Chelani et al. 2021, Lee et al. 2023, Moon et al. 2024), for comparison.
@@ -62,39 +57,35 @@ pub enum Builtin {
 
 impl Builtin {
     /// All solvers, in the order of help texts.
-    pub const ALL: [Builtin; 7] = [
-        Self::Joint,
-        Self::Ranking,
-        Self::JointStart,
-        Self::Consensus,
-        Self::Ransac,
-        Self::Density,
-        Self::Tomography,
-    ];
+    pub const ALL: [Builtin; 5] =
+        [Self::Joint, Self::Consensus, Self::Ransac, Self::Density, Self::Tomography];
 
     /// The solvers that compute positions from lists. The others have no delta, and use lists only to decide which point of a
     /// paired line belongs to which slot.
-    pub const FROM_LISTS: [Builtin; 5] =
-        [Self::Joint, Self::Ranking, Self::JointStart, Self::Consensus, Self::Ransac];
+    pub const FROM_LISTS: [Builtin; 3] = [Self::Joint, Self::Consensus, Self::Ransac];
 
     /// Name of the solver on the command line.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Consensus => "consensus",
             Self::Joint => "joint",
-            Self::Ranking => "ranking",
-            Self::JointStart => "joint-start",
             Self::Ransac => "ransac",
             Self::Density => "density",
             Self::Tomography => "tomography",
         }
     }
 
-    /// Returns the solver called `name`.
+    /// Returns the solver called `name`. For one version, two former names are read: `ranking`, which is [`Self::Joint`] now, and
+    /// `joint-start`, of which [`Self::Consensus`] is left.
     ///
     /// # Errors
     /// When there is none. The message lists all names.
     pub fn from_name(name: &str) -> Result<Self, Error> {
+        let name = match name {
+            "ranking" => "joint",
+            "joint-start" => "consensus",
+            name => name,
+        };
         Self::ALL.into_iter().find(|solver| solver.name() == name).ok_or_else(|| {
             let names = Self::ALL.map(|solver| solver.name()).join(", ");
             Error::new("solver", format!("one of {names}"), name)
@@ -115,18 +106,16 @@ impl Builtin {
 
 #[cfg(test)]
 mod tests {
-    use super::Builtin::{
-        self, Consensus, Density, Joint, JointStart, Ranking, Ransac, Tomography,
-    };
+    use super::Builtin::{self, Consensus, Density, Joint, Ransac, Tomography};
 
     /// Property tests run over these two lists, so no solver may be missing. A new variant does not compile until it is here.
     #[test]
     fn lists_hold_every_solver() {
         let reads_lists = |solver: Builtin| match solver {
-            Joint | Ranking | JointStart | Consensus | Ransac => true,
+            Joint | Consensus | Ransac => true,
             Density | Tomography => false,
         };
-        let all = [Joint, Ranking, JointStart, Consensus, Ransac, Density, Tomography];
+        let all = [Joint, Consensus, Ransac, Density, Tomography];
         assert_eq!(Builtin::ALL, all);
         assert!(all.into_iter().filter(|&one| reads_lists(one)).eq(Builtin::FROM_LISTS));
     }

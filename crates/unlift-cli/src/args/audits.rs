@@ -78,12 +78,11 @@ pub struct SolverArgs {
     #[arg(long, value_name = "oracle|SOURCE|FILE", value_parser = values::neighbor_source,
           default_value = "oracle")]
     pub neighbors: Vec<NeighborSource>,
-    /// Recovery methods, separated by commas or repeated. With lists of neighbors: ranking (the
-    /// strongest: also uses which points are not in a list), joint (faster), joint-start (the first
-    /// pass of joint), consensus (each point from its own list), ransac (the attack of Chelani et
-    /// al. 2025). Without lists, from the records alone (what a scheme releases in place of
-    /// points): density (published attacks), tomography (stronger) [default:
-    /// ranking,joint,joint-start; also consensus if the map has fewer than 150 x K points]
+    /// Recovery methods, separated by commas or repeated. With lists of neighbors: joint (the
+    /// strongest), consensus (each point from its own list), ransac (the attack of Chelani et al.
+    /// 2025). Without lists, from the records alone (what a scheme releases in place of points):
+    /// density (published attacks), tomography (stronger) [default: joint; also consensus if the
+    /// map has fewer than 150 x K points]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver)]
     pub solver: Vec<Builtin>,
     /// Skip the baseline "records alone", the best attack that uses only the records, without
@@ -344,8 +343,8 @@ pub struct AuditImagesArgs {
     #[arg(long, value_name = "oracle|SOURCE", value_parser = values::image_source,
           default_value = "oracle", help_heading = "Attack")]
     pub neighbors: Vec<NeighborSource>,
-    /// Recovery methods, separated by commas or repeated: ranking, joint, joint-start, consensus or
-    /// ransac (see unlift audit map) [default: ranking,joint,joint-start]
+    /// Recovery methods, separated by commas or repeated: joint, consensus or ransac (see unlift
+    /// audit map) [default: joint]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_solver,
           help_heading = "Attack")]
     pub solver: Vec<Builtin>,

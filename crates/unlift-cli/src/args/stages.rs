@@ -123,8 +123,7 @@ pub struct RecoverArgs {
     /// only to tell apart the two points of a line
     #[arg(long, value_name = "FILE")]
     pub neighbors: PathBuf,
-    /// Recovery method: ranking, joint, joint-start, consensus, ransac, density or tomography (see
-    /// unlift audit map)
+    /// Recovery method: joint, consensus, ransac, density or tomography (see unlift audit map)
     #[arg(long, value_name = "SOLVER", value_parser = values::solver, default_value = "joint")]
     pub solver: Builtin,
     /// Random seed

@@ -92,7 +92,7 @@ fn photos(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
     let plan = Plan {
         neighbors: vec![NeighborsBy::Source(Arc::new(Learned))],
         // Pictures are painted of every solver.
-        solvers: vec![Arc::new(Builtin::Ranking)],
+        solvers: vec![Arc::new(Builtin::Joint)],
         k: 20,
         headline: headline(&usual.thresholds),
         measures: vec![Arc::clone(&inversion) as Arc<dyn Measure<2>>],

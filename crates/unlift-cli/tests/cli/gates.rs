@@ -12,12 +12,12 @@ fn a_gate_may_name_a_solver_and_a_source_and_decides_the_exit_code() {
                  --neighbors oracle --neighbors geometric --out a";
     let held = "--gate ppl:joint:oracle@0.5:0.25<=100 --gate ppl:geometric:0.25<=100";
     place.ends(&format!("{audit} {held}"), 0);
-    let line = format!("{audit} {held} --gate olc:joint-start:0.25<=0 --junit new/gates.xml");
+    let line = format!("{audit} {held} --gate olc:consensus:0.25<=0 --junit new/gates.xml");
     let (text, _) = place.ends(&line, 1);
-    assert!(text.contains("gate olc:joint-start:0.25<=0: FAILED"), "{text}");
+    assert!(text.contains("gate olc:consensus:0.25<=0: FAILED"), "{text}");
     let document = place.json("a/audit.json");
     for (at, (scheme, solver, source)) in
-        [("ppl", "joint", "oracle"), ("ppl", "", "geometric"), ("olc", "joint-start", "")]
+        [("ppl", "joint", "oracle"), ("ppl", "", "geometric"), ("olc", "consensus", "")]
             .into_iter()
             .enumerate()
     {
@@ -37,7 +37,7 @@ fn a_gate_may_name_a_solver_and_a_source_and_decides_the_exit_code() {
     assert!(!place.text("new/gates.xml").contains("room"), "it does not name the map");
     place.write("theirs.xml", "<?xml version=\"1.0\"?><project/>");
     for (more, expected) in [
-        ("--gate ppl:ransac:0.25<=1", "--gate ppl:ransac:0.25<=1: solver: expected one of ranking, joint, joint-start"),
+        ("--gate ppl:ransac:0.25<=1", "--gate ppl:ransac:0.25<=1: solver: expected one of joint, consensus"),
         ("--gate olc:0.25<=1 --junit theirs.xml", "--junit: theirs.xml: expected nothing, or gates as JUnit XML"),
         ("--gate olc:0.25<=1 --junit room.csv", "--junit: room.csv: expected a file that is not read"),
         ("--gate olc:0.25<=1 --junit a/report.html", "--junit: a/report.html: expected nothing, or gates as JUnit XML"),

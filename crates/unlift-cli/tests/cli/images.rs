@@ -45,8 +45,7 @@ fn photos_become_pooled_rows_rows_per_image_and_pictures() {
     let counts = &document["input"]["images"];
     assert_eq!((counts["found"].as_u64(), counts["used"].as_u64()), (Some(3), Some(3)));
     let rows = document["results"].as_array().expect("rows");
-    // Solvers are ranking, joint and joint-start.
-    assert_eq!(rows.len(), 3 * (2 + 2) * 3);
+    assert_eq!(rows.len(), 3 * (2 + 2));
     for row in rows {
         assert_eq!(row["unit"], "px");
         let keys: Vec<&String> = row["recovered_percent"].as_object().unwrap().keys().collect();

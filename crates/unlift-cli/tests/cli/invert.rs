@@ -2,7 +2,7 @@
 
 use crate::common::Place;
 
-const CHEAP: &str = "--schemes lines2d --inlier-ratios 0.5 --solver joint-start --k 8";
+const CHEAP: &str = "--schemes lines2d --inlier-ratios 0.5 --solver consensus --k 8";
 
 fn place() -> Place {
     Place::with_photos(&["a.png", "b/c.jpg", "d.webp"])

@@ -43,8 +43,8 @@ fn a_scheme_written_in_python_gets_rows_page_and_gates() {
     place.ends(&format!("{audit} {gates} --out a"), 1);
     let found = place.json("a/audit.json");
     let rows = found["results"].as_array().unwrap();
-    // Three ratios; ranking, joint, joint-start and, because the map is small, consensus.
-    assert_eq!(rows.len(), 12);
+    // Three ratios; joint and, because the map is small, consensus.
+    assert_eq!(rows.len(), 6);
     for row in rows {
         assert_eq!((&row["scheme"], &row["unit"]), (&"numpy-lines".into(), &"m".into()));
         let counts = (row["n_points"].as_u64(), row["dropped"]["other"].as_u64());

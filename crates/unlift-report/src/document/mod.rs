@@ -143,7 +143,7 @@ pub struct Row {
     pub inlier_ratio: f64,
     /// Neighbors per hidden point.
     pub k: u32,
-    /// `joint`, `ranking`, `joint-start`, `consensus`, `ransac`, `density` or `tomography`.
+    /// `joint`, `consensus`, `ransac`, `density` or `tomography`.
     pub solver: String,
     /// Delta in `unit`; `None` if it was chosen per point.
     pub delta: Option<f64>,

@@ -16,7 +16,7 @@ use crate::geometry::knn::Knn;
 use crate::neighbors::Neighborhoods;
 use crate::neighbors::oracle::Noise;
 use crate::obfuscate::{Scheme, all, obfuscate};
-use crate::recover::{Builtin, RecoverOptions, Recovered, Solver, recover, recover_with_start};
+use crate::recover::{Builtin, RecoverOptions, recover};
 use crate::released::Released;
 use crate::seed::Key;
 use crate::truth::{Original, Secret};
@@ -149,7 +149,8 @@ pub(super) fn attack<const D: usize>(
             made => made.map_err(of_scheme)?,
         };
         let making = started.elapsed().as_secs_f64();
-        let mut solved = Solved::new(plan, (&hidden.0, &made.lists), attacker);
+        let options =
+            RecoverOptions { delta: plan.delta, seed: attacker, ..RecoverOptions::default() };
         for (at, solver) in plan.solvers.iter().enumerate() {
             if !observer.goes_on() {
                 let error = Error::new("audit", "to run to the end", "a request to stop");
@@ -157,15 +158,17 @@ pub(super) fn attack<const D: usize>(
             }
             let what = format!("{scheme} at {:.2} {source}, {}", made.ratio, solver.name());
             each(observer, Some(what), None);
-            let (recovered, took) = match solved.by(at) {
+            let started = Instant::now();
+            let recovered = match recover(&hidden.0, &made.lists, &**solver, &options) {
                 // The failure of a custom solver costs only its own rows.
                 Err(error) if Builtin::of(&**solver).is_none() && !owned.may_be_small() => {
                     let error = error.within(&format!("solver {}", solver.name()));
                     missing.push(NotAudited::variant(scheme, variant, &error, &hidden.1));
                     continue;
                 }
-                solved => solved?,
+                recovered => recovered?,
             };
+            let took = started.elapsed().as_secs_f64();
             // All solvers share the lists. The first solver's row has the time of making them.
             let making = if at == 0 { making } else { 0.0 };
             clock.seconds.recover += took;
@@ -229,51 +232,6 @@ pub(super) fn attack<const D: usize>(
 /// Returns weights with which distinct places count once; empty for maps.
 fn places<const D: usize>(owned: &Owned<'_, D>, secret: &Secret) -> Vec<f64> {
     if owned.may_be_small() { distinct_weights(owned.original, secret) } else { Vec::new() }
-}
-
-/// A released map with lists, on which the solvers of a plan run in order.
-pub(super) struct Solved<'a, const D: usize> {
-    plan: &'a Plan<D>,
-    released: &'a Released<D>,
-    lists: &'a Neighborhoods,
-    seed: u64,
-    /// Estimates that joint recovery started from, kept for the solver `joint-start`.
-    start: Option<Recovered<D>>,
-}
-
-impl<'a, const D: usize> Solved<'a, D> {
-    pub(super) fn new(
-        plan: &'a Plan<D>,
-        (released, lists): (&'a Released<D>, &'a Neighborhoods),
-        seed: u64,
-    ) -> Self {
-        Self { plan, released, lists, seed, start: None }
-    }
-
-    /// Returns the result of the solver numbered `at`, and its seconds.
-    ///
-    /// # Errors
-    /// Returns the errors of [`recover`].
-    pub(super) fn by(&mut self, at: usize) -> Result<(Recovered<D>, f64), Error> {
-        let (solver, started) = (&*self.plan.solvers[at], Instant::now());
-        let is = |builtin, solver: &dyn Solver<D>| Builtin::of(solver) == Some(builtin);
-        if let Some(kept) = self.start.take_if(|_| is(Builtin::JointStart, solver)) {
-            return Ok((kept, 0.0));
-        }
-        let options =
-            RecoverOptions { delta: self.plan.delta, seed: self.seed, ..RecoverOptions::default() };
-        let mut later = self.plan.solvers[at..].iter();
-        let with_start =
-            is(Builtin::Joint, solver) && later.any(|later| is(Builtin::JointStart, &**later));
-        let recovered = if with_start {
-            let (joint, start) = recover_with_start(self.released, self.lists, &options)?;
-            self.start = Some(start);
-            joint
-        } else {
-            recover(self.released, self.lists, solver, &options)?
-        };
-        Ok((recovered, started.elapsed().as_secs_f64()))
-    }
 }
 
 /// Runs and measures all attacks on the records alone. Omits those that place no point of `hidden`.

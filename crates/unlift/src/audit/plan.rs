@@ -85,8 +85,7 @@ pub struct Plan<const D: usize> {
     /// True neighbors per slot, for the oracle and for the measured inlier ratio of an attacker's
     /// own lists. Given lists use the length of the longest list instead.
     pub k: usize,
-    /// Solvers, built-in or custom. [`Builtin::JointStart`] after [`Builtin::Joint`] costs no extra
-    /// run.
+    /// Solvers, built-in or custom.
     pub solvers: Vec<Arc<dyn Solver<D>>>,
     /// If true, maps are also attacked by records alone, the second baseline.
     pub records_alone: bool,
@@ -128,13 +127,7 @@ impl<const D: usize> Plan<D> {
             oracle_noise: vec![Noise::Uniform],
             inlier_ratios: vec![1.0, 0.75, 0.5, 0.3, 0.2, 0.1],
             k: if of_images { 20 } else { 50 },
-            // The strongest result counts. Only `joint` estimates its confidence, and `joint-start`
-            // costs no extra run.
-            solvers: vec![
-                Arc::new(Builtin::Ranking),
-                Arc::new(Builtin::Joint),
-                Arc::new(Builtin::JointStart),
-            ],
+            solvers: vec![Arc::new(Builtin::Joint)],
             records_alone: true,
             delta: Delta::Auto,
             measures: Vec::new(),

@@ -246,7 +246,7 @@ pub struct Seconds {
 pub struct RowSeconds {
     /// Making of its neighborhoods; 0 if another solver's row contains this time.
     pub neighbors: f64,
-    /// Recovery; 0 for `joint-start` after `joint`, whose row contains this time.
+    /// Recovery.
     pub recover: f64,
 }
 

@@ -8,7 +8,7 @@ use unlift::obfuscate::Lifted;
 
 use crate::maps::{self, *};
 
-const OURS: [Builtin; 3] = [Builtin::Ranking, Builtin::Joint, Builtin::JointStart];
+const OURS: [Builtin; 1] = [Builtin::Joint];
 
 fn room(n: usize) -> Original<3> {
     original(synthetic::room(3, n).points)
@@ -16,29 +16,6 @@ fn room(n: usize) -> Original<3> {
 
 fn plan(schemes: &[&str], ratios: &[f64]) -> Plan<3> {
     Plan { k: 20, ..maps::plan(Unit::Meter, schemes, ratios, &OURS) }
-}
-
-#[test]
-fn a_usual_audit_has_a_row_for_what_joint_recovery_starts_from() {
-    let (room, mut plan) = (room(900), plan(&["olc", "ppl", "ray", "cp"], &[0.5]));
-    plan.solvers = Plan::new(Unit::Meter).solvers;
-    let usual = audit(&room, &plan);
-    let solvers: Vec<&str> = usual.rows.iter().map(|row| &*row.solver).collect();
-    assert_eq!(solvers, ["ranking", "joint", "joint-start"].repeat(4));
-    // `joint-start` gives the same rows with and without `joint`, in either order.
-    for solvers in [&[Builtin::JointStart][..], &[Builtin::JointStart, Builtin::Joint]] {
-        plan.solvers = Builtin::list(solvers);
-        for row in audit(&room, &plan).rows {
-            assert!(usual.rows.contains(&row), "{} by {}", row.scheme, row.solver);
-        }
-    }
-    for (row, seconds) in usual.rows.iter().zip(&usual.seconds.rows) {
-        let is_start = row.solver == "joint-start";
-        assert_eq!(seconds.recover == 0.0, is_start, "no run of its own");
-        let reason = if is_start { Unknown::OtherSolver } else { Unknown::SmallMap };
-        assert_eq!(row.sure_unknown, Some(reason));
-        assert!(row.reliability.is_none());
-    }
 }
 
 #[test]
@@ -80,7 +57,7 @@ fn break_even_takes_the_strongest_attack_at_every_ratio() {
     }
     let of = |rows: &[Row], scheme: &str, solver: &str| {
         let found = break_even(&plan, rows);
-        assert_eq!(found.len(), 2 * 5);
+        assert_eq!(found.len(), 2 * 3);
         let it = found.iter().find(|b| (&*b.scheme, &*b.solver) == (scheme, solver)).unwrap();
         (it.inlier_ratio, it.bound)
     };
@@ -117,7 +94,7 @@ fn a_scheme_that_a_map_does_not_allow_is_told_and_the_audit_goes_on() {
     assert!(reason.contains("ppl+ leaves out") && reason.contains("of 400"), "{reason}");
     for scheme in &plan.schemes {
         let n = outcome.rows.iter().filter(|row| row.scheme == scheme.name()).count();
-        assert_eq!(n, if scheme.name() == "ppl+" { 0 } else { 6 }, "{}", scheme.name());
+        assert_eq!(n, if scheme.name() == "ppl+" { 0 } else { 2 }, "{}", scheme.name());
     }
     assert_eq!(outcome.rows.len(), outcome.seconds.rows.len());
 
@@ -147,7 +124,7 @@ fn a_source_without_lists_for_a_scheme_costs_its_rows_alone() {
 fn a_map_too_small_for_wrong_neighbors_loses_these_rows_alone() {
     let plan = Plan { k: 50, ..plan(&["olc"], &[1.0, 0.1]) };
     let outcome = audit(&room(60), &plan);
-    assert!(outcome.rows.iter().all(|row| row.inlier_ratio == 1.0) && outcome.rows.len() == 3);
+    assert!(outcome.rows.iter().all(|row| row.inlier_ratio == 1.0) && outcome.rows.len() == 1);
     let [missing] = &outcome.not_audited[..] else { panic!("{:?}", outcome.not_audited) };
     assert_eq!((missing.inlier_ratio, missing.oracle_noise), (Some(0.1), Some("uniform")));
 }

@@ -11,7 +11,6 @@ fn harsh_options() -> Vec<Options> {
 }
 
 /// Solvers that use lists in both directions.
-const BOTH_WAYS: [Builtin; 3] = [Builtin::Joint, Builtin::JointStart, Builtin::Ranking];
 
 /// Returns for each slot the number of records that it lists or that list its own.
 fn both_ways<const D: usize>(released: &Released<D>, lists: &Neighborhoods) -> Vec<usize> {
@@ -49,7 +48,7 @@ pub fn statuses<const D: usize>(
             let most = match options.0 {
                 // Attacks on the records alone count something else.
                 Builtin::Density | Builtin::Tomography => usize::MAX,
-                solver if BOTH_WAYS.contains(&solver) => both_ways,
+                Builtin::Joint => both_ways,
                 _ => lists.of(slot).len(),
             };
             let support = usize::from(recovered.support()[slot]);
@@ -84,7 +83,7 @@ fn short_lists<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
         let what = format!("{name}, lists of {length}");
         for (options, got) in statuses(&what, &hidden.released, &lists, harsh_options()) {
             // In both directions a slot with a list of one may have two neighbors.
-            if length == 0 || length == 1 && !BOTH_WAYS.contains(&options.0) {
+            if length == 0 || length == 1 && options.0 != Builtin::Joint {
                 let few = got.iter().all(|&status| status == Status::TooFewNeighbors);
                 assert!(few, "{what}, {options:?}: {got:?}");
             }

@@ -74,7 +74,7 @@ impl Watcher<2> for Each {
 /// The pooled row of one image equals its own row. That of two images lies between theirs.
 #[test]
 fn rows_are_pooled_over_keypoints() {
-    let solvers = [Builtin::Joint, Builtin::JointStart];
+    let solvers = [Builtin::Consensus, Builtin::Ransac];
     let plan = maps::plan(Unit::Pixel, &[], &[1.0, 0.5], &solvers);
     let plan = Plan { repeats: 2, ..plan };
     let images = [image_of("a", keypoints(1, 300, 20)), image_of("b", keypoints(2, 150, 0))];

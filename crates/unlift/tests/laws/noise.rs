@@ -147,20 +147,3 @@ fn a_map_without_a_ring_is_told() {
          the 10K-th nearest, found 3"
     );
 }
-
-/// Ranking trusts that records which are not listed are far. Where wrong entries are near, too, it would lose.
-#[test]
-fn ranking_keeps_joint_estimates_where_wrong_entries_are_near() {
-    let oracle = Oracle::new(&olc::ENTRY);
-    let positions = |noise, ratio| {
-        [Builtin::Joint, Builtin::Ranking].map(|solver| {
-            let lists = oracle.lists(noise, ratio, 1);
-            let options = (solver, RecoverOptions::default());
-            solve(&oracle.hidden.released, &lists, options).positions().to_vec()
-        })
-    };
-    let [joint, ranking] = positions(Noise::Near, 0.2);
-    assert_eq!(joint, ranking);
-    let [joint, ranking] = positions(Noise::Uniform, 0.2);
-    assert_ne!(joint, ranking);
-}

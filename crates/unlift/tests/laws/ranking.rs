@@ -1,5 +1,5 @@
-//! Ranking with perfect lists: longer lists give smaller errors, and errors are smaller than those
-//! of joint recovery, also for rays from anchors, where a layout of the neighbors is the start.
+//! Joint recovery with perfect lists: longer lists give smaller errors, and errors are smaller than
+//! those of consensus, also for rays from anchors, where a layout of the neighbors is the start.
 
 use unlift::recover::{Confidence, Estimate, recover_from};
 
@@ -19,11 +19,10 @@ fn median_error<const D: usize>(
 fn errors_fall<const D: usize>(scheme: &str) {
     let points = room::<D>(3, 1_500);
     let error = |solver, k| median_error((scheme, &points), solver, k);
-    let [short, long] = [6, 40].map(|k| error(Builtin::Ranking, k));
+    let [short, long] = [6, 40].map(|k| error(Builtin::Joint, k));
     assert!(long < short, "{scheme}: {short}, {long}");
-    let joint = error(Builtin::Joint, 40);
-    // Measured: 0.22 times the error of joint recovery or less.
-    assert!(long < 0.3 * joint, "{scheme}: {long}, joint {joint}");
+    let consensus = error(Builtin::Consensus, 40);
+    assert!(long < 0.3 * consensus, "{scheme}: {long}, consensus {consensus}");
 }
 
 #[test]
@@ -35,10 +34,9 @@ fn longer_lists_give_smaller_errors() {
 #[test]
 fn neighbors_place_points_on_rays_from_anchors() {
     let points = uniform::<2>(3, 1_500);
-    let [joint, ranking] = [Builtin::Joint, Builtin::Ranking]
+    let [consensus, joint] = [Builtin::Consensus, Builtin::Joint]
         .map(|solver| median_error(("dcl2d", &points), solver, 20));
-    // Measured: 0.76 times the error. Photos of RedKitchen: half.
-    assert!(ranking < 0.9 * joint, "{ranking}, joint {joint}");
+    assert!(joint < 0.9 * consensus, "{joint}, consensus {consensus}");
 }
 
 #[test]
@@ -69,7 +67,7 @@ fn known_positions_stay_and_place_their_neighbors() {
             .unwrap()
             .with_about(About { map, order: RowOrder::Slots, ..About::default() });
     let with = recover_from(&known, released, &lists, &options).unwrap();
-    let without = recover(released, &lists, &Builtin::Ranking, &options).unwrap();
+    let without = recover(released, &lists, &Builtin::Joint, &options).unwrap();
     let mut known = slots().filter(|&slot| is_known(slot));
     assert!(known.all(|slot| with.positions()[slot] == position(slot)));
     let [with, without] = [&with, &without].map(|recovered| {

@@ -89,9 +89,8 @@ fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
             }
             // A hidden coordinate takes the value of a partner, which may be one of a near pile.
             tolerance = tolerance.max(reach_of_partners(&hidden.released) * delta);
-            // Joint recovery, from which ranking starts, uses all estimates within reach, so a nearby
-            // pile has a small influence.
-            if [Builtin::Joint, Builtin::Ranking].contains(&options.0) {
+            // Joint recovery uses all estimates within reach, so a nearby pile has a small influence.
+            if options.0 == Builtin::Joint {
                 tolerance = tolerance.max(0.05 * delta);
             }
             // Otherwise: a few units in the last place at 6 m, divided by the sine of the best

@@ -1,6 +1,6 @@
 //! Confidence: the probability that an estimate is right, predicted without ground truth.
 //!
-//! After joint recovery and after ranking, `cues.rs` measures around every slot how much better than by chance estimates and records agree. A logistic
+//! After joint recovery, `cues.rs` measures around every slot how much better than by chance estimates and records agree. A logistic
 //! model turns these cues into the probability that the right place was found and into a scale of its error. Its constants
 //! were fitted on synthetic rooms, never on a real map.
 
@@ -13,7 +13,7 @@ use crate::ListsBy;
 use crate::geometry::flatness::flatness;
 use crate::geometry::vector::widen;
 use crate::neighbors::Neighborhoods;
-use crate::recover::confidence::constants::{JOINT, RANKING};
+use crate::recover::confidence::constants::CONSTANTS;
 use crate::recover::confidence::cues::{Cues, N_CUES, Solved};
 use crate::recover::map::family::{Family, Settings};
 use crate::recover::map::graph::Graph;
@@ -29,17 +29,14 @@ pub(super) fn not_asked<const D: usize>(
     options: &RecoverOptions,
 ) -> Option<Unknown> {
     match solver {
-        Builtin::Joint | Builtin::Ranking if !options.confidence => Some(Unknown::NotAsked),
-        Builtin::Joint | Builtin::Ranking => {
-            (!Settings::of_dimension::<D>().confidence).then_some(Unknown::OfImages)
-        }
+        Builtin::Joint if !options.confidence => Some(Unknown::NotAsked),
+        Builtin::Joint => (!Settings::of_dimension::<D>().confidence).then_some(Unknown::OfImages),
         _ => Some(Unknown::OtherSolver),
     }
 }
 
-/// Predicts the confidence of every slot after `solver`.
+/// Predicts the confidence of every slot.
 pub(super) fn predict<const D: usize>(
-    solver: Builtin,
     family: &Family<'_, D>,
     graph: &Graph,
     released: &Released<D>,
@@ -63,9 +60,8 @@ pub(super) fn predict<const D: usize>(
         Obfuscation::AxisPlanes(_) => 3,
         Obfuscation::AxisCandidates(_) => 4,
     };
-    let constants = if solver == Builtin::Ranking { &RANKING } else { &JOINT };
     let of_slot = |(estimate, cues): (&Estimate<D>, &Cues)| match estimate.status {
-        Status::Ok => predict_slot(constants, kind, cues, radius),
+        Status::Ok => predict_slot(&CONSTANTS, kind, cues, radius),
         _ => Confidence::LOST,
     };
     solved.estimates.par_iter().zip(&cues).map(of_slot).collect()
@@ -138,7 +134,7 @@ const N_TERMS: usize = 1 + N_CUES + N_PRODUCTS;
 /// Terms are clipped at this many standard deviations, because the fit saw no others.
 const FARTHEST: f32 = 4.0;
 
-/// What the fit found for one solver.
+/// What the fit found.
 pub(super) struct Constants {
     /// Means of the terms.
     pub(super) center: [f32; N_TERMS],
