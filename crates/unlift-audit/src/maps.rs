@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use unlift::audit::{Cell, Observer, Outcome, Plan, Row, run, run_released};
-use unlift::recover::Builtin;
 use unlift::released::Released;
 use unlift::truth::{Original, Secret};
 use unlift::{Descriptors, ErrorKind, Unit};

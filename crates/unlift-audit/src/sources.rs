@@ -64,6 +64,10 @@ impl<const D: usize> Source<D> for ByDescriptors {
         best::<D>(Some(descriptors)).takes(descriptors)
     }
 
+    fn reads_descriptors_alone(&self) -> bool {
+        true
+    }
+
     fn note(&self, n_slots: usize) -> Option<String> {
         Source::<D>::note(&Overlap, n_slots)
     }

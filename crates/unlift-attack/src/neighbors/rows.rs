@@ -11,6 +11,23 @@ fn records_of(slots: &[u32], slots_per_record: usize) -> Vec<u32> {
     slots.iter().map(|&slot| slot / slots_per_record as u32).collect()
 }
 
+/// Returns the rows of `descriptors` sorted by content; equal ones by their numbers.
+pub fn by_content(descriptors: &Descriptors) -> Vec<u32> {
+    let mut slots: Vec<u32> = (0..descriptors.len() as u32).collect();
+    let dim = descriptors.dim();
+    let row = |slot: u32| slot as usize * dim..(slot as usize + 1) * dim;
+    match descriptors.values() {
+        Values::U8(v) => {
+            slots.par_sort_unstable_by(|&a, &b| v[row(a)].cmp(&v[row(b)]).then(a.cmp(&b)));
+        }
+        Values::F32(v) => slots.par_sort_unstable_by(|&a, &b| {
+            let unequal = v[row(a)].iter().zip(&v[row(b)]).map(|(x, y)| x.total_cmp(y));
+            unequal.into_iter().find(|order| order.is_ne()).unwrap_or_else(|| a.cmp(&b))
+        }),
+    }
+    slots
+}
+
 /// Descriptor rows sorted by content. So sums and ties do not depend on the order of the released map: permuting its records permutes
 /// its lists, except for equal rows.
 #[derive(Debug)]
@@ -52,18 +69,7 @@ impl<'a> Rows<'a> {
             let expected = format!("between 1 and {} (other records)", n_records.saturating_sub(1));
             return Err(Error::new("k", expected, k.to_string()));
         }
-        let mut slots: Vec<u32> = (0..released.n_slots() as u32).collect();
-        let dim = descriptors.dim();
-        let row = |slot: u32| slot as usize * dim..(slot as usize + 1) * dim;
-        match descriptors.values() {
-            Values::U8(v) => {
-                slots.par_sort_unstable_by(|&a, &b| v[row(a)].cmp(&v[row(b)]).then(a.cmp(&b)));
-            }
-            Values::F32(v) => slots.par_sort_unstable_by(|&a, &b| {
-                let unequal = v[row(a)].iter().zip(&v[row(b)]).map(|(x, y)| x.total_cmp(y));
-                unequal.into_iter().find(|order| order.is_ne()).unwrap_or_else(|| a.cmp(&b))
-            }),
-        }
+        let slots = by_content(descriptors);
         let slots_per_record = released.slots_per_record();
         let records = records_of(&slots, slots_per_record);
         let about = About {

@@ -94,6 +94,10 @@ impl<const D: usize> Source<D> for Similarity {
         similarity(released, k)
     }
 
+    fn reads_descriptors_alone(&self) -> bool {
+        true
+    }
+
     fn note(&self, n_slots: usize) -> Option<String> {
         note("similarity", n_slots)
     }

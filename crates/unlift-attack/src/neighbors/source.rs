@@ -58,6 +58,12 @@ pub trait Source<const D: usize>: Debug + Send + Sync {
         }
     }
 
+    /// Whether lists follow from the descriptors alone, whatever their order, without the records and the seed. Then an audit makes
+    /// them once for all schemes that release the same descriptors ([`KeptLists`](super::KeptLists)).
+    fn reads_descriptors_alone(&self) -> bool {
+        false
+    }
+
     /// Returns a note for users about lists for `n_slots` hidden points, if there is one.
     fn note(&self, n_slots: usize) -> Option<String> {
         let _ = n_slots;

@@ -153,6 +153,10 @@ impl<const D: usize> Source<D> for Chosen<D> {
         self.source.supports(released).map_err(|error| error.within(self.name()))
     }
 
+    fn reads_descriptors_alone(&self) -> bool {
+        self.source.reads_descriptors_alone()
+    }
+
     fn note(&self, n_slots: usize) -> Option<String> {
         self.source.note(n_slots)
     }

@@ -81,6 +81,10 @@ impl<const D: usize> Source<D> for Learned {
         network(descriptors).map(|_| ())
     }
 
+    fn reads_descriptors_alone(&self) -> bool {
+        true
+    }
+
     fn note(&self, n_slots: usize) -> Option<String> {
         // Large maps are split into sets with the training-free source.
         Source::<D>::note(&Overlap, n_slots)

@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use super::lists::Lists;
+use super::lists::{Kept, Lists};
 use super::observer::{Cell, Counts, Observer};
 use super::plan::{Plan, Threshold, key_of, oracle_seed};
 use super::row::{Alone, Row, measure};
@@ -13,7 +13,6 @@ use crate::evaluate::{
     farthest_for_rounding, joined,
 };
 use crate::geometry::knn::Knn;
-use crate::neighbors::Neighborhoods;
 use crate::neighbors::oracle::Noise;
 use crate::obfuscate::{Scheme, all, obfuscate};
 use crate::recover::{Builtin, RecoverOptions, recover};
@@ -34,6 +33,8 @@ pub(super) struct Owned<'a, const D: usize> {
     /// The released map and its secret if the points are already hidden; no scheme is applied then.
     pub(super) hidden: Option<&'a (Released<D>, Secret)>,
     pub(super) search: &'a Knn<'a, D>,
+    /// Lists that do not depend on the scheme.
+    pub(super) kept: &'a Kept,
     /// Name of the item, if the audit has several.
     pub(super) name: Option<&'a str>,
 }
@@ -127,7 +128,8 @@ pub(super) fn attack<const D: usize>(
         false => Vec::new(),
     };
     let by_row = hidden.1.by_descriptor_row();
-    let mut sources = Lists::new(plan, owned.search, hidden, &by_row, (oracle_seed, attacker));
+    let mut sources =
+        Lists::new(plan, owned.search, hidden, &by_row, (oracle_seed, attacker), owned.kept);
     let mut missing = Vec::new();
     for variant in &plan.variants() {
         let source = match variant.noise {

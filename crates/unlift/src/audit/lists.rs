@@ -1,9 +1,11 @@
 //! Neighborhoods of one obfuscation, from every source of a plan.
 
+use std::cell::RefCell;
+
 use super::plan::{NeighborsBy, Plan, Variant};
 use crate::geometry::knn::Knn;
 use crate::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
-use crate::neighbors::{Neighborhoods, of_what_there_is};
+use crate::neighbors::{KeptLists, Neighborhoods, Source, of_what_there_is};
 use crate::released::Released;
 use crate::truth::Secret;
 use crate::{About, Error, RowOrder};
@@ -22,6 +24,34 @@ pub struct Made {
     pub ratio_at_k: Option<f64>,
 }
 
+/// Lists of sources that read descriptors alone, kept by the name of the source for further schemes and repeats.
+#[derive(Debug, Default)]
+pub struct Kept(RefCell<Vec<(String, KeptLists)>>);
+
+impl Kept {
+    /// Returns the lists of `source` for `released`: kept ones if they apply, else new ones.
+    fn lists<const D: usize>(
+        &self,
+        source: &dyn Source<D>,
+        released: &Released<D>,
+        seed: u64,
+    ) -> Result<Neighborhoods, Error> {
+        let make = || source.lists(released, source.k(released), seed);
+        if !source.reads_descriptors_alone() {
+            return make();
+        }
+        let mut kept = self.0.borrow_mut();
+        let of_source = kept.iter().find(|(name, _)| name == source.name());
+        if let Some((_, lists)) = of_source {
+            return lists.of(released).map_or_else(make, Ok);
+        }
+        let lists = make()?;
+        let new = KeptLists::new(released, &lists);
+        kept.extend(new.map(|new| (source.name().to_owned(), new)));
+        Ok(lists)
+    }
+}
+
 /// Makes lists for one obfuscation. Searches true neighborhoods on first use and keeps them.
 pub struct Lists<'a, const D: usize> {
     plan: &'a Plan<D>,
@@ -31,6 +61,7 @@ pub struct Lists<'a, const D: usize> {
     by_row: &'a Secret,
     /// Seeds of the oracle and of the attacker.
     seeds: (u64, u64),
+    kept: &'a Kept,
     near: Vec<((usize, bool), TrueNeighbors)>,
     /// Outliers of the last variant, and its K: variants with the same noise model are consecutive.
     outliers: Option<(usize, Outliers)>,
@@ -45,9 +76,11 @@ impl<'a, const D: usize> Lists<'a, D> {
         hidden: &'a (Released<D>, Secret),
         by_row: &'a Secret,
         seeds: (u64, u64),
+        kept: &'a Kept,
     ) -> Self {
         let (released, secret) = (&hidden.0, &hidden.1);
-        Self { plan, search, released, secret, by_row, seeds, near: Vec::new(), outliers: None }
+        let (near, outliers) = (Vec::new(), None);
+        Self { plan, search, released, secret, by_row, seeds, kept, near, outliers }
     }
 
     /// Makes the lists of one variant of the plan.
@@ -75,7 +108,7 @@ impl<'a, const D: usize> Lists<'a, D> {
                 // Lists of such sources are in the order of descriptor rows, not of slots.
                 source.supports(self.released)?;
                 let k = source.k(self.released);
-                let lists = source.lists(self.released, k, self.seeds.1)?;
+                let lists = self.kept.lists(&**source, self.released, self.seeds.1)?;
                 let ratio = self.near(self.plan.k, true)?.measured_inlier_ratio(&lists);
                 let ratio_at_k = Some(self.near(k, true)?.measured_inlier_ratio(&lists));
                 Ok(Made { lists, ratio, k, ratio_at_k })

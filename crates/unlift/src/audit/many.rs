@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::break_even::break_even;
 use super::cells::{Finished, Owned, Rows, of_item};
+use super::lists::Kept;
 use super::observer::{Observer, Silent};
 use super::plan::{Plan, Threshold};
 use super::row::{Alone, Distinct, PERCENTILES, Row};
@@ -185,7 +186,8 @@ fn one<const D: usize>(
     let search = sums.clock.time(|s| &mut s.search, || oracle::search(&item.original))?;
     let (original, descriptors) = (&item.original, item.descriptors.as_ref());
     let (hidden, name) = (None, Some(&*item.name));
-    let owned = Owned { original, descriptors, hidden, search: &search, name };
+    let owned =
+        Owned { original, descriptors, hidden, search: &search, kept: &Kept::default(), name };
     let mut pools: Vec<(Row, Vec<Pool>)> = Vec::new();
     let mut each = |finished: &Finished<'_>| {
         let mut pool = Pool::new(&finished.row, &plan.thresholds);

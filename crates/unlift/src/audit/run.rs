@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use super::break_even::{BreakEven, break_even};
 use super::cells::{Owned, Rows, of_item};
+use super::lists::Kept;
 use super::observer::Observer;
 use super::plan::{Plan, Variant};
 use super::row::Row;
@@ -86,7 +87,14 @@ pub(super) fn every_cell<const D: usize>(
 ) -> Result<Outcome, Error> {
     let mut clock = Clock::default();
     let search = clock.time(|s| &mut s.search, || oracle::search(original))?;
-    let owned = Owned { original, descriptors, hidden, search: &search, name: None };
+    let owned = Owned {
+        original,
+        descriptors,
+        hidden,
+        search: &search,
+        kept: &Kept::default(),
+        name: None,
+    };
     let Rows { rows, seconds, not_audited } =
         of_item(&owned, plan, &mut clock, observer, &mut |_| ())?;
     if let (true, Some(first)) = (rows.is_empty(), not_audited.first()) {

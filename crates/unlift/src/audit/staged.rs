@@ -4,7 +4,7 @@
 pub use super::plan::{key_of, oracle_seed};
 
 use super::cells::Finished;
-use super::lists::Lists;
+use super::lists::{Kept, Lists};
 use super::many::Pool;
 use super::plan::Threshold;
 use super::plan::{NeighborsBy, Plan, Variant};
@@ -35,7 +35,8 @@ pub fn oracle_lists(
     let by = &NeighborsBy::Oracle;
     let variant = Variant { by, noise: Some(noise), inlier_ratio: Some(ratio) };
     // The oracle's lists do not depend on the attacker's seed.
-    let mut lists = Lists::new(&plan, &search, hidden, &hidden.1, (seed, 0));
+    let kept = Kept::default();
+    let mut lists = Lists::new(&plan, &search, hidden, &hidden.1, (seed, 0), &kept);
     Ok(lists.make_of_what_there_is(&variant)?.lists)
 }
 

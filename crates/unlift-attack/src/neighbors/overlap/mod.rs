@@ -66,6 +66,10 @@ impl<const D: usize> Source<D> for Overlap {
         check(descriptors)
     }
 
+    fn reads_descriptors_alone(&self) -> bool {
+        true
+    }
+
     fn note(&self, n_slots: usize) -> Option<String> {
         note("overlap", n_slots)
     }

@@ -1,0 +1,112 @@
+//! Lists for several maps that release the same descriptors, each in its own order.
+
+use super::Neighborhoods;
+use super::rows::by_content;
+use crate::descriptors::Values;
+use crate::released::Released;
+use crate::{About, Descriptors, RecordId};
+
+/// Lists that a source has made from the descriptors of a map alone.
+///
+/// Schemes with one slot per record release the same descriptors, each in a random order. Sources that read nothing else order rows by
+/// content, so their lists for these maps are equal up to the numbers of records.
+#[derive(Clone, Debug)]
+pub struct KeptLists {
+    descriptors: Descriptors,
+    /// All slots, by the content of their descriptors.
+    slots: Vec<u32>,
+    lists: Neighborhoods,
+}
+
+impl KeptLists {
+    /// Keeps the lists of `released`; `None` for records with two slots and for protected descriptors, which differ between schemes.
+    pub fn new<const D: usize>(released: &Released<D>, lists: &Neighborhoods) -> Option<Self> {
+        let descriptors = released.descriptors().filter(|_| released.slots_per_record() == 1)?;
+        let (descriptors, slots) = (descriptors.clone(), by_content(descriptors));
+        Some(Self { descriptors, slots, lists: lists.clone() })
+    }
+
+    /// Returns the lists of another map; `None` if it does not release the same descriptors, one per record.
+    pub fn of<const D: usize>(&self, released: &Released<D>) -> Option<Neighborhoods> {
+        let descriptors = released.descriptors().filter(|_| released.slots_per_record() == 1)?;
+        let slots = by_content(descriptors);
+        let pairs = || self.slots.iter().zip(&slots);
+        if self.slots.len() != slots.len()
+            || self.descriptors.dim() != descriptors.dim()
+            || !pairs().all(|(&a, &b)| are_equal((&self.descriptors, a), (descriptors, b)))
+        {
+            return None;
+        }
+        let (mut from, mut to) = (vec![0; slots.len()], vec![0; slots.len()]);
+        for (&a, &b) in pairs() {
+            (from[b as usize], to[a as usize]) = (a as usize, b);
+        }
+        let (mut offsets, mut records) = (vec![0], Vec::new());
+        let mut scores = self.lists.scores().map(|_| Vec::new());
+        for slot in from {
+            records.extend(self.lists.of(slot).iter().map(|id| RecordId(to[id.index()])));
+            if let (Some(scores), Some(row)) = (&mut scores, self.lists.scores_of(slot)) {
+                scores.extend(row);
+            }
+            offsets.push(records.len() as u64);
+        }
+        let lists = Neighborhoods::try_new(offsets, records, scores, slots.len(), 1).ok()?;
+        Some(lists.with_about(About { map: Some(released.fingerprint()), ..self.lists.about() }))
+    }
+}
+
+/// Whether two rows hold the same values.
+fn are_equal((a, i): (&Descriptors, u32), (b, j): (&Descriptors, u32)) -> bool {
+    let row = |at: u32| at as usize * a.dim()..(at as usize + 1) * a.dim();
+    match (a.values(), b.values()) {
+        (Values::U8(a), Values::U8(b)) => a[row(i)] == b[row(j)],
+        (Values::F32(a), Values::F32(b)) => a[row(i)] == b[row(j)],
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::KeptLists;
+    use crate::descriptors::Values;
+    use crate::neighbors::{Overlap, Similarity, Source};
+    use crate::released::{AxisPlanes, Lines, Obfuscation, Released};
+    use crate::seed::{Draws, Stage};
+    use crate::{Descriptors, Unit};
+
+    const N: usize = 300;
+
+    /// Returns a map whose record `at` has the descriptor `order[at]` of `rows`.
+    fn map(rows: &[[u8; 128]], order: &[usize], obfuscation: Obfuscation<3>) -> Released<3> {
+        let values = order.iter().flat_map(|&at| rows[at]).collect();
+        let descriptors = Descriptors::try_new(Values::U8(values), 128).unwrap();
+        Released::try_new(obfuscation, 1, [0.0; 3], Unit::Meter, Some(descriptors)).unwrap()
+    }
+
+    #[test]
+    fn kept_lists_equal_those_of_the_map_alone() {
+        let mut draws = Draws::new(5, Stage::Synthetic, 1);
+        let mut rows = vec![[0u8; 128]; N];
+        rows.iter_mut().flatten().for_each(|value| *value = draws.below(90) as u8);
+        // Equal descriptors are ordered by their slots.
+        (rows[7], rows[8]) = (rows[100], rows[100]);
+        let direction = |at: usize| [(at as f64).sin(), (at as f64).cos(), 1.0];
+        let directions: Vec<[f64; 3]> = (0..N).map(direction).collect();
+        let lines = Lines::through(&vec![[0.0; 3]; N], &directions).unwrap();
+        let planes =
+            AxisPlanes::try_new(vec![0; N], &(0..N).map(|at| at as f64).collect::<Vec<_>>())
+                .unwrap();
+        let identity: Vec<usize> = (0..N).collect();
+        let shuffled: Vec<usize> = (0..N).map(|at| at * 77 % N).collect();
+        let a = map(&rows, &identity, Obfuscation::Lines(lines));
+        let b = map(&rows, &shuffled, Obfuscation::AxisPlanes(planes));
+        let sources: [&dyn Source<3>; 2] = [&Similarity, &Overlap];
+        for source in sources {
+            let kept = KeptLists::new(&a, &source.lists(&a, 12, 0).unwrap()).unwrap();
+            assert_eq!(kept.of(&b).unwrap(), source.lists(&b, 12, 0).unwrap(), "{}", source.name());
+        }
+        rows[3][5] += 1;
+        let kept = KeptLists::new(&a, &Similarity.lists(&a, 12, 0).unwrap()).unwrap();
+        assert_eq!(kept.of(&map(&rows, &shuffled, b.obfuscation().clone())), None);
+    }
+}
