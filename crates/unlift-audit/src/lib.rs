@@ -11,7 +11,7 @@
 //! use unlift::Unit;
 //! use unlift::audit::Plan;
 //! use unlift_audit::{Gate, Job, Preparation, maps, open_audit};
-//! use unlift_io::atomic::Rules;
+//! use unlift_io::outputs::Rules;
 //!
 //! # fn main() -> Result<(), unlift_audit::Error> {
 //! let (started, path) = (Instant::now(), Path::new("reconstruction/0"));

@@ -4,7 +4,8 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use unlift::OneLine;
-use unlift_io::atomic::{Access, Kind, OutputFile, OutputSet, Rules, write_file};
+use unlift_io::atomic::{Access, OutputFile, write_file};
+use unlift_io::outputs::{Kind, OutputSet, Rules};
 use unlift_report::scene::Scene3d;
 use unlift_report::{
     Document, Opening, RenderOptions, Shares, gate_lines, render, shares, text_table,

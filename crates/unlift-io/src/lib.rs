@@ -37,6 +37,7 @@ mod error;
 pub mod features;
 pub mod hash;
 pub mod input;
+pub mod outputs;
 pub mod read;
 pub mod stage;
 

@@ -8,7 +8,7 @@ use pyo3::types::PyDict;
 use unlift::released::{self, Obfuscation};
 use unlift::truth::{Original, Secret};
 use unlift_audit::{Prepared, check_file_of};
-use unlift_io::atomic;
+use unlift_io::outputs;
 use unlift_io::stage::{Kind, read_released, read_truth, write_released, write_truth};
 
 use crate::arrays::{raised, to_array, to_descriptors, to_rows, wrong};
@@ -309,8 +309,8 @@ pub fn save(
     write: impl FnOnce(&Path) -> Result<(), unlift_io::Error> + Send,
 ) -> PyResult<()> {
     py.detach(|| {
-        let rules = atomic::Rules::new([], force);
-        check_file_of("path", &path, atomic::Kind::Stage(kind), &rules).map_err(refused)?;
+        let rules = outputs::Rules::new([], force);
+        check_file_of("path", &path, outputs::Kind::Stage(kind), &rules).map_err(refused)?;
         write(&path).map_err(raised)
     })
 }

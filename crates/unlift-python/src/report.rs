@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use unlift_audit::{Audited, open_audit};
-use unlift_io::atomic::Rules;
+use unlift_io::outputs::Rules;
 
 use crate::arrays::raised;
 use crate::hidden::refused;

@@ -40,6 +40,7 @@ pub use document::{Document, Error, rounded};
 pub use export::{junit, text_table};
 pub use page::gates::gate_lines;
 pub use page::scene::Scene3d;
-pub use page::verdict::{Shares, shares};
-pub use page::{ErrorCdf, Opening, RenderOptions, inversions, pictures, render, scene};
+pub use page::{
+    ErrorCdf, Opening, RenderOptions, Shares, inversions, pictures, render, scene, shares,
+};
 pub use words::align;

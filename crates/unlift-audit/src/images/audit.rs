@@ -7,8 +7,8 @@ use std::time::Instant;
 
 use serde_json::{Map, Value};
 use unlift::audit::{self, Outcome, Plan, Row, run_many};
-use unlift_io::atomic::OutputSet;
 use unlift_io::hash::{hash_file, hash_files, hash_list};
+use unlift_io::outputs::OutputSet;
 use unlift_report::RenderOptions;
 use unlift_report::document::{ImageCounts, ImageFigures, Input};
 use unlift_report::inversions::Inversion as Inverted;

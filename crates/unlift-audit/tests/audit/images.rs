@@ -13,8 +13,8 @@ use unlift::{Descriptors, Unit};
 use unlift_audit::images::audit::{ImagesJob, Used, find, perform};
 use unlift_audit::images::{FeatureSource, InMemory};
 use unlift_audit::{Audited, Error, Quiet, open_audit};
-use unlift_io::atomic::Rules;
 use unlift_io::features::{FeatureWriter, ImageFeatures};
+use unlift_io::outputs::Rules;
 
 const NAMES: [&str; 5] = ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "e.jpg"];
 

@@ -12,7 +12,7 @@ use unlift::truth::Original;
 use unlift::{Error, PointSet, Unit};
 use unlift_audit::{Error as AuditError, Finished, Job, Preparation};
 use unlift_audit::{maps, open_audit};
-use unlift_io::atomic::Rules;
+use unlift_io::outputs::Rules;
 use unlift_report::Document;
 
 use crate::{schemes, write_map};

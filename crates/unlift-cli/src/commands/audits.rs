@@ -19,14 +19,15 @@ use unlift_audit::{
     FIGURES, Finished, PAGE, Prepared, by_point, check_file_of, check_thresholds, open_audit,
 };
 use unlift_io::Error;
-use unlift_io::atomic::{Access, Kind, OutputSet, Rules, make_folders, write_file};
+use unlift_io::atomic::{Access, make_folders, write_file};
+use unlift_io::outputs::{Kind, OutputSet, Rules};
 use unlift_report::junit;
 use unlift_vision::network::DescriptorKind;
 use unlift_vision::pictures::Inverter;
 
 use super::common::with_threads;
 use crate::args::{AuditArgs, OracleArgs, PaintArgs, ProtectArgs};
-use crate::demo;
+use crate::demo::photos;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::print;
 use crate::values::{NeighborSource, distinct};
@@ -217,8 +218,8 @@ pub fn protections(
         Some(path) => public(path, kind, None)?,
         None => {
             let folder = tempdir()?;
-            demo::write_photos(folder.path())?;
-            public(folder.path(), kind, Some(demo::MIN_SCORE))?
+            photos::write(folder.path())?;
+            public(folder.path(), kind, Some(photos::MIN_SCORE))?
         }
     };
     let with = |protection: Protection| match protection.needs_public() {

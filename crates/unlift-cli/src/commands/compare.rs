@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use unlift::OneLine;
 use unlift_audit::refused;
 use unlift_io::Error;
-use unlift_io::atomic::{Access, Kind, OutputSet, Rules, write_file};
+use unlift_io::atomic::{Access, write_file};
+use unlift_io::outputs::{Kind, OutputSet, Rules};
 use unlift_report::compare::{Change, Comparison, Unmatched, compare, page};
 
 use super::common::read_document;

@@ -6,11 +6,12 @@ use unlift::geometry::frame::Bounds;
 use unlift::released::{Obfuscation, Released};
 use unlift::{OneLine, Unit};
 use unlift_audit::{check_file, refused};
-use unlift_io::atomic::{Access, Kind, OutputSet, Rules};
+use unlift_io::atomic::Access;
 use unlift_io::clouds::{
     Segment, record_segments, write_cameras, write_images, write_lines, write_model_points,
     write_points,
 };
+use unlift_io::outputs::{Kind, OutputSet, Rules};
 use unlift_io::read::{self, colmap};
 use unlift_io::stage::{
     Kind as Stage, has_images, kind, read_recovered, read_released, read_truth,

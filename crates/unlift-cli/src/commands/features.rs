@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use unlift::OneLine;
-use unlift_io::atomic::{Kind, Rules};
 use unlift_io::features::{FeatureWriter, ImageFeatures};
+use unlift_io::outputs::{Kind, Rules};
 use unlift_vision::features::Extraction;
 use unlift_vision::features::in_order;
 use unlift_vision::features::photo::Turn;

@@ -14,7 +14,8 @@ use unlift::seed::Key;
 use unlift::truth::{Original, Secret};
 use unlift::{About, Unit};
 use unlift_io::Error;
-use unlift_io::atomic::{Access, Kind, OutputFile, OutputSet, Rules};
+use unlift_io::atomic::{Access, OutputFile};
+use unlift_io::outputs::{Kind, OutputSet, Rules};
 use unlift_io::stage::{ImageFile, ImageRows, ImageWriter, Kind as Stage};
 use unlift_vision::features::Extraction;
 

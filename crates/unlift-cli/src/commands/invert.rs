@@ -12,7 +12,8 @@ use unlift_audit::images::{FeatureSource, choice};
 use unlift_audit::inversion::{on_bearings, six_views, view};
 use unlift_audit::refused;
 use unlift_io::Error;
-use unlift_io::atomic::{Access, Kind, OutputSet, Rules, make_folders, marked_picture, write_file};
+use unlift_io::atomic::{Access, make_folders, write_file};
+use unlift_io::outputs::{Kind, OutputSet, Rules, marked_picture};
 use unlift_io::read::colmap;
 use unlift_io::stage::{
     ImageFile, Kind as Stage, declared_kind, has_images, read_recovered, read_released,

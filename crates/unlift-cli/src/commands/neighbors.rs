@@ -7,7 +7,7 @@ use unlift::neighbors::sources::Named;
 use unlift::neighbors::{Needs, Neighborhoods, Source};
 use unlift::released::Released;
 use unlift::{Error, OneLine};
-use unlift_io::atomic::{Kind, Rules};
+use unlift_io::outputs::{Kind, Rules};
 use unlift_io::stage::{Kind as Stage, has_images, read_released, read_truth, write_neighborhoods};
 
 use super::common::{expect_slots, same_map};

@@ -3,7 +3,8 @@
 use unlift::obfuscate::{SchemeOptions, obfuscate};
 use unlift::seed::Key;
 use unlift::{OneLine, Unit};
-use unlift_io::atomic::{Access, Kind, OutputSet, Rules};
+use unlift_io::atomic::Access;
+use unlift_io::outputs::{Kind, OutputSet, Rules};
 use unlift_io::stage::{Kind as Stage, write_released, write_truth};
 
 use super::common::{RELEASED, TRUTH, all_could_be, open_map};

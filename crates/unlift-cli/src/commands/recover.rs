@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use unlift::neighbors::Neighborhoods;
 use unlift::recover::{RecoverOptions, Status, recover};
 use unlift::{About, OneLine, RowOrder};
-use unlift_io::atomic::{Kind, Rules};
+use unlift_io::outputs::{Kind, Rules};
 use unlift_io::stage::{
     Kind as Stage, has_images, read_neighborhoods, read_released, write_recovered,
 };

@@ -3,7 +3,8 @@
 use std::io::Write;
 
 use unlift_audit::check_file;
-use unlift_io::atomic::{Access, Kind, Rules, write_file};
+use unlift_io::atomic::{Access, write_file};
+use unlift_io::outputs::{Kind, Rules};
 use unlift_report::export::{TableFormat, curves, table, thresholds};
 
 use super::common::read_document;

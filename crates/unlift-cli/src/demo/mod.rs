@@ -1,9 +1,10 @@
 //! `unlift demo`: protects and attacks two photos and a map, without data of the user.
 
+pub mod photos;
+
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
-use std::{fs, io};
 
 use serde_json::{Map, json};
 use tempfile::tempdir;
@@ -18,8 +19,9 @@ use unlift_audit::images::choice::headline;
 use unlift_audit::inversion::Inversion;
 use unlift_audit::maps::find as find_map;
 use unlift_audit::{Audited, FIGURES, Job, PAGE, refused};
-use unlift_io::atomic::{Access, Kind, OutputSet, Rules};
+use unlift_io::atomic::Access;
 use unlift_io::hash::hash_positions;
+use unlift_io::outputs::{Kind, OutputSet, Rules};
 use unlift_report::Shares;
 use unlift_report::document::Input;
 use unlift_vision::features::{AlikedOptions, Extraction};
@@ -38,21 +40,8 @@ const SEED: u64 = 0;
 const N_POINTS: usize = 5_000;
 /// Inlier ratios of the oracle for the map.
 const RATIOS: [f64; 2] = [0.5, 0.1];
-/// Minimum score of keypoints of the photos. It is low, because there are only two photos.
-pub const MIN_SCORE: f32 = 0.02;
 /// Page and JSON file of the photos; the map has the audit's usual names.
 const OF_PHOTOS: [&str; 2] = ["photos.html", "photos.json"];
-
-/// File names and bytes of the two photos: JPEG, CC0. photos/README.md lists the authors.
-static PHOTOS: [(&str, &[u8]); 2] = [
-    ("cat.jpg", include_bytes!("photos/cat.jpg")),
-    ("coffee.jpg", include_bytes!("photos/coffee.jpg")),
-];
-
-/// Writes the two photos into a folder.
-pub fn write_photos(folder: &Path) -> io::Result<()> {
-    PHOTOS.iter().try_for_each(|(name, bytes)| fs::write(folder.join(name), bytes))
-}
 
 pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
     let files = [
@@ -82,8 +71,8 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
 fn photos(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
     let started = Instant::now();
     let folder = tempdir()?;
-    write_photos(folder.path())?;
-    let options = AlikedOptions { min_score: MIN_SCORE, ..AlikedOptions::default() };
+    photos::write(folder.path())?;
+    let options = AlikedOptions { min_score: photos::MIN_SCORE, ..AlikedOptions::default() };
     let source = FeatureSource::open(folder.path(), &Extraction::Aliked(options))?;
     let painter = painter(DescriptorKind::Aliked, None)?;
     let inversion = Inversion::new(painter, folder.path(), source.turn());
@@ -100,7 +89,7 @@ fn photos(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
     };
     let mut record = Map::new();
     record.insert("features".into(), json!(DescriptorKind::Aliked.name()));
-    record.insert("min_score".into(), json!(MIN_SCORE));
+    record.insert("min_score".into(), json!(photos::MIN_SCORE));
     let job = ImagesJob {
         source: &source,
         path: folder.path(),

@@ -5,9 +5,10 @@
 use std::io::Write;
 use std::path::Path;
 
+use super::MODEL_MARK;
 use super::finite;
 use crate::Error;
-use crate::atomic::{self, Access, MODEL_MARK};
+use crate::atomic::{self, Access};
 use crate::read::colmap::{Camera, Image};
 
 /// Writes `cameras.txt`.

@@ -9,9 +9,14 @@ use unlift::geometry::frame::Bounds;
 use unlift::released::{Obfuscation, Released};
 
 use crate::Error;
-use crate::atomic::{self, Access, CLOUD_COMMENT};
+use crate::atomic::{self, Access};
 
 pub use colmap::{write_cameras, write_images, write_model_points};
+
+/// The comment of clouds of points and lines, by which their outputs are recognized.
+const CLOUD_COMMENT: &str = "unlift";
+/// The first line of each file of a COLMAP model, by which it is recognized.
+const MODEL_MARK: &str = "# unlift model";
 
 /// Returns an error if a coordinate of the `row`-th `what` is not finite.
 fn finite<const D: usize, const N: usize>(

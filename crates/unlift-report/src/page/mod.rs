@@ -22,7 +22,7 @@ use crate::page::pictures::Picture;
 use crate::page::scene::{Scene3d, encode};
 use crate::page::tables::Table;
 use crate::page::tiles::{HeatMap, heat_maps};
-use crate::page::verdict::{Verdict, verdict};
+use crate::page::verdict::{Card, Verdict, verdict};
 use crate::{Error, attack, words};
 
 /// The templates, by the names under which they include each other.
@@ -376,4 +376,32 @@ impl Opening {
         let (title, details) = (Some(title.to_owned()), Some(details.to_owned()));
         Self { title, details, ..Self::of(document, inversions) }
     }
+}
+
+/// The share of one scheme recovered within the headline threshold by the strongest attacks tried.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shares {
+    /// The scheme's user-facing name.
+    pub scheme: String,
+    /// The scheme's title.
+    pub title: String,
+    /// Percent from the released data alone; `None` if no such attack was tried.
+    pub today: Option<f64>,
+    /// Percent with known neighbors, at the tested inlier ratio nearest to one half; `None` without an
+    /// oracle.
+    pub known: Option<f64>,
+    /// How many pictures can be rebuilt from the released data alone; `None` if no picture was painted.
+    pub pictures: Option<String>,
+}
+
+/// Returns the shares of every scheme, the worst first, as at the top of the page.
+pub fn shares(document: &Document, inversions: &[Inversion]) -> Vec<Shares> {
+    let of = |card: Card| Shares {
+        today: card.today(),
+        known: card.finding(attack::Basis::Oracle).map(|finding| finding.recovered),
+        pictures: inversions::pictures_said(document, inversions, &card.scheme),
+        scheme: card.scheme,
+        title: card.title,
+    };
+    verdict(document).cards.into_iter().map(of).collect()
 }

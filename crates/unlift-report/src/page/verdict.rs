@@ -8,8 +8,7 @@ use serde::Serialize;
 
 use crate::attack::{Basis, Given};
 use crate::document::{Bound, BreakEven, Document, LengthUnit, Row};
-use crate::page::inversions::Inversion;
-use crate::page::{inversions, tables};
+use crate::page::tables;
 use crate::{attack, views, words};
 
 /// The oracle's headline is its tested inlier ratio nearest to this one.
@@ -590,34 +589,6 @@ pub(crate) fn bearings_sentence(document: &Document, scheme: &str) -> Option<Str
         }
         None => format!("{text}."),
     })
-}
-
-/// The share of one scheme recovered within the headline threshold by the strongest attacks tried.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Shares {
-    /// The scheme's user-facing name.
-    pub scheme: String,
-    /// The scheme's title.
-    pub title: String,
-    /// Percent from the released data alone; `None` if no such attack was tried.
-    pub today: Option<f64>,
-    /// Percent with known neighbors, at the tested inlier ratio nearest to one half; `None` without an
-    /// oracle.
-    pub known: Option<f64>,
-    /// How many pictures can be rebuilt from the released data alone; `None` if no picture was painted.
-    pub pictures: Option<String>,
-}
-
-/// Returns the shares of every scheme, the worst first, as at the top of the page.
-pub fn shares(document: &Document, inversions: &[Inversion]) -> Vec<Shares> {
-    let of = |card: Card| Shares {
-        today: card.today(),
-        known: card.finding(Basis::Oracle).map(|finding| finding.recovered),
-        pictures: inversions::pictures_said(document, inversions, &card.scheme),
-        scheme: card.scheme,
-        title: card.title,
-    };
-    verdict(document).cards.into_iter().map(of).collect()
 }
 
 #[cfg(test)]

@@ -1,0 +1,18 @@
+//! The two photos that are part of the program.
+
+use std::path::Path;
+use std::{fs, io};
+
+/// Minimum score of keypoints of the photos. It is low, because there are only two photos.
+pub const MIN_SCORE: f32 = 0.02;
+
+/// File names and bytes: JPEG, CC0. photos/README.md lists the authors.
+static PHOTOS: [(&str, &[u8]); 2] = [
+    ("cat.jpg", include_bytes!("photos/cat.jpg")),
+    ("coffee.jpg", include_bytes!("photos/coffee.jpg")),
+];
+
+/// Writes the two photos into a folder.
+pub fn write(folder: &Path) -> io::Result<()> {
+    PHOTOS.iter().try_for_each(|(name, bytes)| fs::write(folder.join(name), bytes))
+}
