@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 use std::io::IsTerminal;
-use std::sync::{Arc, Mutex, PoisonError, mpsc};
+use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
@@ -17,6 +17,8 @@ const PATIENCE: Duration = Duration::from_secs(1);
 const TICK: Duration = Duration::from_millis(500);
 /// Shortest interval between lines in a log.
 const LINES: Duration = Duration::from_secs(60);
+/// Seconds of a day, the longest time that is estimated.
+const A_DAY: f64 = 86_400.0;
 /// Steps of a bar per item, so that it moves within items. Fractions are rounded to them.
 const PARTS: u64 = 1_000_000;
 
@@ -33,10 +35,7 @@ pub struct Progress(Steps);
 /// A handle with which any thread can report progress.
 #[derive(Clone)]
 pub struct Steps {
-    shown: Shown,
     bar: ProgressBar,
-    /// Time of the last line in a log.
-    told: Arc<Mutex<Instant>>,
 }
 
 impl Progress {
@@ -56,21 +55,27 @@ impl Progress {
         let style = style.expect("the template is ours");
         bar.set_style(style.with_key("status", |state: &ProgressState, text: &mut dyn Write| {
             // A failed write only loses the status.
-            let _ = text.write_str(&status(state.pos(), state.len(), state.eta()));
+            let _ = text.write_str(&status(state.pos(), state.len(), state.elapsed()));
         }));
-        if shown == Shown::Bar {
-            // In a thread, because the first step may take a minute.
-            let bar = bar.downgrade();
+        if shown != Shown::Nothing {
+            // In a thread, because a step may take minutes.
+            let (bar, started) = (bar.downgrade(), Instant::now());
             std::thread::spawn(move || {
-                std::thread::sleep(PATIENCE);
-                let bar = bar.upgrade().filter(|bar| !bar.is_finished());
-                if let Some(bar) = bar {
-                    bar.set_draw_target(ProgressDrawTarget::stderr());
-                    bar.enable_steady_tick(TICK);
+                std::thread::sleep(if shown == Shown::Bar { PATIENCE } else { LINES });
+                while let Some(bar) = bar.upgrade().filter(|bar| !bar.is_finished()) {
+                    if shown == Shown::Bar {
+                        bar.set_draw_target(ProgressDrawTarget::stderr());
+                        bar.enable_steady_tick(TICK);
+                        return;
+                    }
+                    let status = status(bar.position(), bar.length(), started.elapsed());
+                    tell(format_args!("unlift: {status}: {}", bar.message()));
+                    drop(bar);
+                    std::thread::sleep(LINES);
                 }
             });
         }
-        Self(Steps { shown, bar, told: Arc::new(Mutex::new(Instant::now())) })
+        Self(Steps { bar })
     }
 
     /// Sets `done` of `total` items as finished; `what` is the next item.
@@ -88,13 +93,15 @@ impl Progress {
     }
 }
 
-/// Formats parts of items: `12/40, 3 minutes left`, without the time while it is not known.
-fn status(parts: u64, of: Option<u64>, left: Duration) -> String {
-    let total = of.unwrap_or(0) / PARTS;
-    let done = ((parts + PARTS / 1000) / PARTS).min(total);
-    match left.as_secs() {
-        0 => format!("{done}/{total}"),
-        _ => format!("{done}/{total}, {} left", HumanDuration(left)),
+/// Formats the share of parts that are done: `40 %, 3 minutes left`. The time is estimated from a tenth on, and only up to a day.
+fn status(parts: u64, of: Option<u64>, elapsed: Duration) -> String {
+    let share = parts as f64 / of.unwrap_or(0).max(1) as f64;
+    // The last item ends with the work itself.
+    let percent = ((100.0 * share + 1e-3) as u64).min(99);
+    let seconds = elapsed.as_secs_f64() * (1.0 - share) / share;
+    match share >= 0.1 && (1.0..=A_DAY).contains(&seconds) {
+        true => format!("{percent} %, {} left", HumanDuration(Duration::from_secs_f64(seconds))),
+        false => format!("{percent} %"),
     }
 }
 
@@ -149,14 +156,6 @@ impl Steps {
     fn tell(&self, what: &str) {
         if !what.is_empty() {
             self.bar.set_message(OneLine(what).to_string());
-        }
-        if self.shown == Shown::Lines {
-            let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
-            if told.elapsed() >= LINES {
-                *told = Instant::now();
-                let status = status(self.bar.position(), self.bar.length(), self.bar.eta());
-                tell(format_args!("unlift: {status}: {}", self.bar.message()));
-            }
         }
     }
 }
@@ -234,16 +233,25 @@ mod tests {
     fn parts_of_items_add_up_and_never_exceed_them() {
         let progress = Progress::with(Shown::Lines);
         let bar = &progress.0.bar;
-        let said = || status(bar.position(), bar.length(), Duration::ZERO);
+        let status_now = || status(bar.position(), bar.length(), Duration::ZERO);
         progress.show(0, 2, "a.jpg");
         (0..2).for_each(|_| progress.0.add(1.0 / 3.0, ""));
-        assert_eq!((said(), bar.message()), ("0/2".to_owned(), "a.jpg".to_owned()));
+        assert_eq!((status_now(), bar.message()), ("33 %".to_owned(), "a.jpg".to_owned()));
         progress.0.add(1.0 / 3.0, "b.jpg");
-        assert_eq!((said(), bar.message()), ("1/2".to_owned(), "b.jpg".to_owned()));
+        assert_eq!((status_now(), bar.message()), ("50 %".to_owned(), "b.jpg".to_owned()));
         (0..2).for_each(|_| progress.0.add(1.0, ""));
         progress.show(1, 2, "");
-        assert_eq!(said(), "2/2");
-        let minutes = status(3 * PARTS, Some(4 * PARTS), Duration::from_secs(150));
-        assert_eq!(minutes, "3/4, 3 minutes left");
+        assert_eq!(status_now(), "99 %");
+    }
+
+    /// Regression: a run of twelve minutes had 31 weeks, 8 years and 584942417355 years left.
+    #[test]
+    fn time_is_estimated_from_a_tenth_on_and_up_to_a_day() {
+        let status = |parts, seconds| status(parts, Some(100), Duration::from_secs(seconds));
+        assert_eq!(status(75, 450), "75 %, 3 minutes left");
+        assert_eq!(status(9, 60), "9 %");
+        assert_eq!(status(10, 100_000), "10 %");
+        assert_eq!(status(0, 60), "0 %");
+        assert_eq!(status(100, 60), "99 %");
     }
 }

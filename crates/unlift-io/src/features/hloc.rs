@@ -2,6 +2,7 @@
 //! feature.
 
 use std::collections::BTreeSet;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use half::f16;
@@ -61,7 +62,14 @@ impl Hloc {
     }
 
     fn groups_of(path: &Path) -> Result<Self, Error> {
-        let (_, len) = input::open(path)?;
+        let (mut file, len) = input::open(path)?;
+        let mut head = [0; 12];
+        let is_head = file.read_exact(&mut head).is_ok();
+        // Superblocks of version 3 say whether a writer has the file open.
+        if is_head && head[..4] == *b"\x89HDF" && head[8] == 3 && head[11] & 1 == 1 {
+            let found = "one that its writer did not close (h5clear -s FILE)";
+            return Err(Error::new(path, "", "a whole HDF5 file", found));
+        }
         let mut all = Self {
             path: path.to_owned(),
             budget: Budget::new(path, len),

@@ -14,10 +14,17 @@ use super::ply;
 use crate::error::{Error, Place};
 use crate::input;
 
+/// The mark that editors on Windows write first.
+const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
+
 /// Reads points and cameras of the largest reconstruction.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let (file, _) = input::open(path)?;
-    let mut json = serde_json::Deserializer::from_reader(Strict::new(BufReader::new(file)));
+    let mut file = BufReader::new(file);
+    if file.fill_buf().map_err(|error| Error::read(path, error))?.starts_with(BYTE_ORDER_MARK) {
+        file.consume(BYTE_ORDER_MARK.len());
+    }
+    let mut json = serde_json::Deserializer::from_reader(Strict::new(file));
     let found = Top::deserialize(&mut json).and_then(|found| json.end().map(|()| found));
     let top = found.map_err(|error| {
         if error.is_io() {
@@ -125,6 +132,13 @@ fn with_cloud(path: &Path, found: &mut Input, cloud: Option<PathBuf>) -> Result<
     let Some(cloud) = cloud else {
         let expected = "ply_file_path, a point cloud beside the cameras";
         return Err(Error::new(path, "", expected, "none"));
+    };
+    // nerfstudio on Windows writes backslashes.
+    let written = cloud.to_string_lossy();
+    let exists = path.with_file_name("").join(&cloud).exists();
+    let cloud = match written.contains('\\') && !exists {
+        true => PathBuf::from(written.replace('\\', "/")),
+        false => cloud,
     };
     // A file of unknown origin must not name files outside its folder.
     if !cloud.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir)) {

@@ -140,10 +140,18 @@ pub(crate) fn quoted(word: &[u8]) -> String {
 /// Finds the columns `x`, `y` and `z` among names, or returns the first missing one. Case, quotes
 /// and a unit in brackets are ignored.
 pub fn axes<'a>(names: impl Iterator<Item = &'a [u8]> + Clone) -> Result<[usize; 3], &'static str> {
-    let find = |axis: &'static str| {
-        names.clone().position(|name| is_called(name, axis.as_bytes())).ok_or(axis)
+    // ParaView numbers the columns of points.
+    let find = |axis: &'static str, numbered: [&str; 2]| {
+        let is_axis = |name: &[u8]| {
+            [axis, numbered[0], numbered[1]].iter().any(|known| is_called(name, known.as_bytes()))
+        };
+        names.clone().position(is_axis).ok_or(axis)
     };
-    Ok([find("x")?, find("y")?, find("z")?])
+    Ok([
+        find("x", ["Points:0", "Points_0"])?,
+        find("y", ["Points:1", "Points_1"])?,
+        find("z", ["Points:2", "Points_2"])?,
+    ])
 }
 
 pub fn is_called(name: &[u8], wanted: &[u8]) -> bool {
@@ -160,6 +168,8 @@ pub fn plain(name: &[u8]) -> &[u8] {
 
 /// Parses a coordinate. Common words for a missing value are NaN.
 pub fn coordinate(word: &[u8]) -> Option<f64> {
+    let quoted = word.strip_prefix(b"\"").and_then(|word| word.strip_suffix(b"\""));
+    let word = quoted.unwrap_or(word);
     const NONE: [&[u8]; 7] = [b"", b"null", b"none", b"na", b"n/a", b"nan(ind)", b"nan(snan)"];
     let none = |word: &[u8]| {
         let word = word.strip_prefix(b"-").unwrap_or(word);

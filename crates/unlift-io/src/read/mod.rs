@@ -58,11 +58,26 @@ const EXPECTED: &str = "a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler o
                         .txt, .asc, .pts, .npy, .npz or .splat file";
 
 /// Files that are not read, by extension or file name, and how to convert them.
-const CONVERSIONS: [(&str, &str); 12] = [
+const CONVERSIONS: [(&str, &str); 24] = [
     ("las", "convert it: CloudCompare -O in.las -SAVE_CLOUDS, or pdal translate in.las out.ply"),
     ("laz", "convert it: CloudCompare -O in.laz -SAVE_CLOUDS, or pdal translate in.laz out.ply"),
     ("e57", "convert it: CloudCompare -O in.e57 -SAVE_CLOUDS, or pdal translate in.e57 out.ply"),
     ("pcd", "convert it: CloudCompare -O in.pcd -SAVE_CLOUDS, or Open3D"),
+    ("ptx", "a grid of a scanner; convert it: CloudCompare -O in.ptx -SAVE_CLOUDS"),
+    (
+        "glb",
+        "a mesh or cloud as DUSt3R and MASt3R write it; convert it: trimesh or Blender, to .ply",
+    ),
+    ("gltf", "convert it: trimesh or Blender, to .ply"),
+    ("obj", "a mesh; convert it: CloudCompare -O in.obj -SAVE_CLOUDS"),
+    ("gz", "unpack it: gunzip"),
+    ("zip", "unpack it"),
+    ("xyzrgb", "name it .xyz"),
+    ("jpg", PHOTO),
+    ("jpeg", PHOTO),
+    ("png", PHOTO),
+    ("webp", PHOTO),
+    ("predictions.npz", "predictions of VGGT: give its COLMAP folder, which demo_colmap.py writes"),
     ("sfm_data.json", "export the map of OpenMVG to COLMAP: openMVG_main_openMVG2Colmap"),
     ("sfm", "export the map of Meshroom to COLMAP: aliceVision_exportColmap"),
     ("abc", "export the map of Meshroom to COLMAP: aliceVision_exportColmap"),
@@ -72,6 +87,7 @@ const CONVERSIONS: [(&str, &str); 12] = [
     ("h5", FEATURES),
     ("hdf5", FEATURES),
 ];
+const PHOTO: &str = "a photo: give its folder to unlift audit images";
 const FEATURES: &str =
     "features of images: use unlift audit images, or --descriptors with a COLMAP model";
 
@@ -137,6 +153,7 @@ fn file(path: &Path) -> Result<Input, Error> {
         (_, "splat") => ply::splats(path)?,
         (_, "csv" | "xyz" | "txt" | "asc" | "pts") => table_of(path)?,
         (_, "npy") => npy::positions(path)?,
+        ("predictions", "npz") => return Err(not_read(path)),
         (_, "npz") => npz::positions(path)?,
         ("sfm_data", "json") => return Err(not_read(path)),
         (_, "json") => json::read(path)?,

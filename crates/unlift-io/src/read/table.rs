@@ -67,7 +67,9 @@ pub fn read(path: &Path) -> Result<Option<Input>, Error> {
             }
             continue;
         }
-        if line.is_empty() {
+        // Spreadsheets write their separator into a line before the header.
+        let names_separator = format.is_none() && line.to_ascii_lowercase().starts_with(b"sep=");
+        if line.is_empty() || names_separator {
             continue;
         }
         let counts = positions.is_empty() || announced.is_some();

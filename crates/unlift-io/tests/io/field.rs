@@ -15,7 +15,7 @@ fn same(found: &[[f64; 3]], expected: &[[f64; 3]], n: usize, tolerance: f64) -> 
 }
 
 /// Input, number of points and of cameras, text of a note or of a doubt.
-const MAPS: [(&str, usize, usize, &str); 29] = [
+const MAPS: [(&str, usize, usize, &str); 35] = [
     ("f02-named-in-comment/hash_id_first.txt", 300, 0, ""),
     ("f02-named-in-comment/hash_normals_first.txt", 300, 0, ""),
     ("f02-named-in-comment/slash_colors_first.txt", 300, 0, ""),
@@ -45,17 +45,26 @@ const MAPS: [(&str, usize, usize, &str); 29] = [
     ("hostile/maps/m.csv", 300, 0, ""),
     ("turn4/04-again-other-frame/A", 1606, 24, ""),
     ("turn4/04-again-other-frame/B", 1606, 24, ""),
+    ("turn4/12-small/quoted.csv", 300, 0, ""),
+    ("turn4/12-small/paraview.csv", 300, 0, ""),
+    ("turn4/12-small/paraview_new.csv", 300, 0, ""),
+    ("turn4/12-small/excel_sep.csv", 300, 0, ""),
+    ("turn4/12-small/reconstruction.json", 300, 1, ""),
+    ("turn4/12-small/nerfstudio", 300, 1, ""),
 ];
 
 /// Input, and the end of the error line.
 #[rustfmt::skip] // One row per line.
-const REFUSED: [(&str, &str); 8] = [
+const REFUSED: [(&str, &str); 11] = [
     ("f02-named-in-comment/trajectory.txt", "found a trajectory, poses of cameras"),
     ("f10-integers/int.pcd", "found a .pcd file (convert it: CloudCompare -O in.pcd -SAVE_CLOUDS, or Open3D)"),
     ("hostile/maps/fewer-a.las", "found a .las file (convert it: CloudCompare -O in.las -SAVE_CLOUDS, or pdal translate in.las out.ply)"),
     ("f18-packed-splats/compressed.ply", "found packed splats (export them unpacked)"),
     ("hostile/maps/sparse-header.ply", "expected 5000000000 rows of vertex, 12 bytes each, found 0 bytes"),
     ("turn4/12-small/bunny_8.pts", "found 9 up to here"),
+    ("turn4/12-small/cloud.ptx", "found a .ptx file (a grid of a scanner; convert it: CloudCompare -O in.ptx -SAVE_CLOUDS)"),
+    ("turn4/12-small/cloud.xyzrgb", "found a .xyzrgb file (name it .xyz)"),
+    ("turn4/12-small/killed.h5", "found one that its writer did not close (h5clear -s FILE)"),
     ("f15-other-h5/matches.h5", "found matches of pairs of images"),
     ("f15-other-h5/keypoints.h5", "found arrays outside any group"),
 ];

@@ -505,6 +505,8 @@ impl Document {
     /// [`Error::Schema`] for another schema, [`Error::Json`] for text that is not such a document,
     /// [`Error::Invalid`] if a rule of the format is broken.
     pub fn from_json(text: &str) -> Result<Self, Error> {
+        // Editors on Windows write a byte order mark first.
+        let text = text.strip_prefix('\u{FEFF}').unwrap_or(text);
         let value: serde_json::Value = serde_json::from_str(text)?;
         // A later schema would fail with an unclear error about a missing field.
         if let Some(found) = value.get("schema").and_then(serde_json::Value::as_u64)

@@ -71,6 +71,27 @@ pub(super) struct Finished<'a> {
     pub(super) seconds: RowSeconds,
 }
 
+/// Progress of one scheme and repeat.
+pub(super) enum Step<'a> {
+    /// The work that begins.
+    Begins(String),
+    /// A part of the work has ended, in units of the cost of one recovery.
+    Ended(usize),
+    /// A row is finished.
+    Row(Finished<'a>),
+}
+
+/// Typical cost of attacks on the records alone, in recoveries.
+const ALONE_COST: usize = 4;
+/// Typical cost of the lists of one of the attacker's own sources, in recoveries.
+const LISTS_COST: usize = 4;
+
+/// Returns the cost of all cells of one scheme and repeat, in recoveries.
+fn cost<const D: usize>(plan: &Plan<D>) -> usize {
+    let alone = if plan.records_alone && D == 3 { ALONE_COST } else { 0 };
+    alone + plan.own_sources().count() * LISTS_COST + plan.rows_per_scheme()
+}
+
 /// Hides the points with `scheme` under `key` and computes every cell.
 ///
 /// # Errors
@@ -81,7 +102,7 @@ pub(super) fn cells<const D: usize>(
     (scheme, key): (&dyn Scheme<D>, &Key),
     clock: &mut Clock,
     observer: &mut dyn Observer<D>,
-    each: impl FnMut(&mut dyn Observer<D>, Option<String>, Option<Finished<'_>>),
+    each: impl FnMut(&mut dyn Observer<D>, Step<'_>),
 ) -> Result<Vec<NotAudited>, Error> {
     if let Some(hidden) = owned.hidden {
         return attack(owned, run, hidden, clock, observer, each);
@@ -100,7 +121,7 @@ pub(super) fn cells<const D: usize>(
 
 /// Computes every cell of one scheme and repeat for `hidden`, the released map and its secret.
 ///
-/// Calls `each` with a label before each step and with every finished row. Returns the cells
+/// Calls `each` with the progress and every finished row. Returns the cells
 /// without a row, for which a source or a custom solver failed.
 ///
 /// # Errors
@@ -112,7 +133,7 @@ pub(super) fn attack<const D: usize>(
     hidden: &(Released<D>, Secret),
     clock: &mut Clock,
     observer: &mut dyn Observer<D>,
-    mut each: impl FnMut(&mut dyn Observer<D>, Option<String>, Option<Finished<'_>>),
+    mut each: impl FnMut(&mut dyn Observer<D>, Step<'_>),
 ) -> Result<Vec<NotAudited>, Error> {
     let Run { plan, scheme, repeat, oracle_seed } = *run;
     let original = owned.original;
@@ -122,11 +143,13 @@ pub(super) fn attack<const D: usize>(
     let of_scheme = |error: Error| error.within(scheme);
     let baseline = clock.time(|s| &mut s.evaluate, || Ok(blind(&hidden.0, original, &hidden.1)))?;
     // In the plane all lines meet, so records alone contain no information.
-    let alone = match plan.records_alone && D == 3 {
-        true => clock
-            .time(|s| &mut s.records_alone, || records_alone(hidden, original, plan, attacker))?,
-        false => Vec::new(),
-    };
+    let mut alone = Vec::new();
+    if plan.records_alone && D == 3 {
+        each(observer, Step::Begins(format!("{scheme}, records alone")));
+        alone = clock
+            .time(|s| &mut s.records_alone, || records_alone(hidden, original, plan, attacker))?;
+        each(observer, Step::Ended(ALONE_COST));
+    }
     let by_row = hidden.1.by_descriptor_row();
     let mut sources =
         Lists::new(plan, owned.search, hidden, &by_row, (oracle_seed, attacker), owned.kept);
@@ -137,7 +160,7 @@ pub(super) fn attack<const D: usize>(
             None => variant.by.name().to_owned(),
         };
         let what = format!("{scheme}, neighbors by {}", variant.by.name());
-        each(observer, Some(what), None);
+        each(observer, Step::Begins(what));
         let started = Instant::now();
         let mut make = || match owned.may_be_small() {
             true => sources.make_of_what_there_is(variant),
@@ -151,6 +174,9 @@ pub(super) fn attack<const D: usize>(
             made => made.map_err(of_scheme)?,
         };
         let making = started.elapsed().as_secs_f64();
+        if variant.by.source().is_some() {
+            each(observer, Step::Ended(LISTS_COST));
+        }
         let options =
             RecoverOptions { delta: plan.delta, seed: attacker, ..RecoverOptions::default() };
         for (at, solver) in plan.solvers.iter().enumerate() {
@@ -159,7 +185,7 @@ pub(super) fn attack<const D: usize>(
                 return Err(error.of_kind(ErrorKind::Stopped));
             }
             let what = format!("{scheme} at {:.2} {source}, {}", made.ratio, solver.name());
-            each(observer, Some(what), None);
+            each(observer, Step::Begins(what));
             let started = Instant::now();
             let recovered = match recover(&hidden.0, &made.lists, &**solver, &options) {
                 // The failure of a custom solver costs only its own rows.
@@ -225,7 +251,8 @@ pub(super) fn attack<const D: usize>(
                 n_listed: made.lists.records().len(),
                 seconds: RowSeconds { neighbors: making, recover: took },
             };
-            each(observer, None, Some(finished));
+            each(observer, Step::Ended(1));
+            each(observer, Step::Row(finished));
         }
     }
     Ok(missing)
@@ -283,7 +310,7 @@ pub(super) fn of_item<const D: usize>(
     observer: &mut dyn Observer<D>,
     finished: &mut dyn FnMut(&Finished<'_>),
 ) -> Result<Rows, Error> {
-    let per_scheme = plan.rows_per_scheme();
+    let per_scheme = cost(plan);
     let total = per_scheme * plan.schemes.len() * plan.repeats as usize;
     let (mut found, mut done) = (Rows::default(), 0);
     for scheme in &plan.schemes {
@@ -295,14 +322,12 @@ pub(super) fn of_item<const D: usize>(
             let run = Run { plan, scheme: scheme.name(), repeat, oracle_seed };
             let (mut of_repeat, before) = (Vec::new(), done);
             let hide = (&**scheme, &key);
-            let lacking = cells(owned, &run, hide, clock, observer, |observer, what, one| {
-                if let Some(what) = what {
-                    observer.progress(done, total, &what);
-                }
-                if let Some(one) = one {
-                    finished(&one);
-                    of_repeat.push((one.row, one.seconds));
-                    done += 1;
+            let lacking = cells(owned, &run, hide, clock, observer, |observer, step| match step {
+                Step::Begins(what) => observer.progress(done, total, &what),
+                Step::Ended(cost) => done += cost,
+                Step::Row(row) => {
+                    finished(&row);
+                    of_repeat.push((row.row, row.seconds));
                 }
             })?;
             done = before + per_scheme;
