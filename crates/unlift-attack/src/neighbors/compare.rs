@@ -64,8 +64,8 @@ pub fn search<L: Likeness>(
     if rows.len() <= exact {
         return Ok(compare(likeness, rows, most, (&Pairs::all(n_blocks), None)));
     }
-    rows.reorder(alike::order(rows.descriptors, &rows.slots));
-    let means = alike::means(rows.descriptors, &rows.slots)?;
+    rows.reorder(alike::order(&rows.descriptors, &rows.slots));
+    let means = alike::means(&rows.descriptors, &rows.slots)?;
     let of_blocks = Rows::of_all(&means);
     let all = Pairs::all(n_blocks.div_ceil(BLOCK));
     let alike = compare(likeness, &of_blocks, PARTNERS, (&all, None));
@@ -90,7 +90,7 @@ fn compare<L: Likeness>(
         .collect();
     let block = |at: usize| {
         let end = rows.len().min((at + 1) * BLOCK);
-        likeness.block(rows.descriptors, &rows.slots[at * BLOCK..end])
+        likeness.block(&rows.descriptors, &rows.slots[at * BLOCK..end])
     };
     let counts = likeness.counts() && every.is_none();
     let usual = every.filter(|_| likeness.counts()).map(|every| Usual::new(likeness, rows, every));
@@ -150,7 +150,7 @@ impl<B> Usual<B> {
         let slots: Vec<u32> = rows.slots.iter().step_by(every).copied().collect();
         let records: Vec<u32> = rows.records.iter().step_by(every).copied().collect();
         let block = |(slots, records): (&[u32], &[u32])| {
-            (likeness.block(rows.descriptors, slots), records.to_vec())
+            (likeness.block(&rows.descriptors, slots), records.to_vec())
         };
         Self { blocks: slots.chunks(BLOCK).zip(records.chunks(BLOCK)).map(block).collect() }
     }

@@ -1,8 +1,11 @@
 //! Descriptor rows in a canonical order, and the conversion of rankings to lists of records.
 
+use std::borrow::Cow;
+
 use rayon::prelude::*;
 
 use super::Neighborhoods;
+use super::kind::comparable;
 use crate::descriptors::Values;
 use crate::released::Released;
 use crate::{About, Descriptors, Error, RecordId, RowOrder};
@@ -32,8 +35,8 @@ pub fn by_content(descriptors: &Descriptors) -> Vec<u32> {
 /// its lists, except for equal rows.
 #[derive(Debug)]
 pub struct Rows<'a> {
-    /// All descriptors, by slot.
-    pub descriptors: &'a Descriptors,
+    /// All descriptors, by slot, as they are compared.
+    pub descriptors: Cow<'a, Descriptors>,
     /// The slot of each row.
     pub slots: Vec<u32>,
     /// The record of each row.
@@ -52,7 +55,8 @@ impl<'a> Rows<'a> {
         let descriptors = released.descriptors().ok_or_else(|| {
             Error::new("released map", "descriptors, which this source compares", "none")
         })?;
-        Self::of_map(descriptors, released, k)
+        let rows = Self::of_map(descriptors, released, k)?;
+        Ok(Self { descriptors: comparable(descriptors), ..rows })
     }
 
     /// Creates the rows of a released map from a matrix with a row per slot, for lists of `k` records.
@@ -77,6 +81,7 @@ impl<'a> Rows<'a> {
             order: RowOrder::DescriptorRows,
             ..About::default()
         };
+        let descriptors = Cow::Borrowed(descriptors);
         Ok(Self { descriptors, slots, records, n_records, slots_per_record, about })
     }
 
@@ -84,7 +89,7 @@ impl<'a> Rows<'a> {
     pub fn of_all(descriptors: &'a Descriptors) -> Self {
         let slots: Vec<u32> = (0..descriptors.len() as u32).collect();
         Self {
-            descriptors,
+            descriptors: Cow::Borrowed(descriptors),
             records: slots.clone(),
             n_records: slots.len(),
             slots_per_record: 1,

@@ -54,7 +54,7 @@ pub fn scored<const D: usize>(
     let mut rows = Rows::new(released, k)?;
     let enough = rows.enough_for(k);
     let kept = enough.max(CANDIDATES);
-    let patches = Patches::of(rows.descriptors).ok();
+    let patches = Patches::of(&rows.descriptors).ok();
     let found = match &patches {
         Some(patches) => search(patches, &mut rows, kept, MOST_ROWS)?,
         None => search(&Cosine { counts: true }, &mut rows, kept, MOST_ROWS)?,

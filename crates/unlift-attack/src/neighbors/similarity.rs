@@ -16,7 +16,7 @@ use crate::{Descriptors, Error};
 pub const WALK: Walk = Walk { steps: 2, decay: 0.2 };
 
 /// Lists the `k` records with the most similar descriptors. The score is the cosine similarity; of a record with two
-/// descriptors, the larger one.
+/// descriptors, the larger one. SIFT without the root (L2 norm) is compared by its root, bit strings by their Hamming distance.
 ///
 /// For learned descriptors, which see a large area around their point, it lists the records that a short walk over the most similar
 /// ones reaches. The score is the logarithm of the discounted probability to be reached.

@@ -34,7 +34,7 @@ pub const WALK: Walk = Walk { steps: 5, decay: 0.7 };
 pub fn overlap<const D: usize>(released: &Released<D>, k: usize) -> Result<Neighborhoods, Error> {
     let mut rows = Rows::new(released, k)?;
     let enough = rows.enough_for(k);
-    let patches = Patches::of(rows.descriptors)?;
+    let patches = Patches::of(&rows.descriptors)?;
     let found = search(&patches, &mut rows, enough.max(walk::CANDIDATES), MOST_ROWS)?;
     let ranked = walk::standardized(&found);
     rows.lists(&walk::walk(&ranked, &rows.records, enough, WALK), k)
