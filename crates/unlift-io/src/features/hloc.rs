@@ -399,7 +399,7 @@ fn keypoints(array: &Array) -> Result<Vec<[f64; 2]>, Wrong> {
     }
 }
 
-/// Converts a `(D, N)` array to rows of `D` values.
+/// Converts a `(D, N)` array to rows of `D` values. A square array is `(N, D)` if its rows, but not its columns, have equal norms.
 fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
     let expected = || format!("shape (D, N) with N = {n}, one column per keypoint");
     let dim = match array.shape[..] {
@@ -413,8 +413,12 @@ fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
         }
         _ => return Err((expected(), shape_text(&array.shape))),
     };
-    let floats = |values: &[f32]| Values::F32(transposed(values, dim));
+    let is_rows = dim == n && has_equal_rows(&array.values.to_f64(), n);
+    let floats = |values: &[f32]| {
+        Values::F32(if is_rows { values.to_vec() } else { transposed(values, dim) })
+    };
     let values = match array.values {
+        Numbers::U8(bytes) if is_rows => Values::U8(bytes),
         Numbers::U8(bytes) => Values::U8(transposed(&bytes, dim)),
         Numbers::F32(values) => floats(&values),
         Numbers::F64(doubles) => {
@@ -431,6 +435,17 @@ fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
         };
         (error.expected().to_owned(), found)
     })
+}
+
+/// Returns whether the rows of a square matrix have more equal norms than its columns, by far.
+fn has_equal_rows(values: &[f64], n: usize) -> bool {
+    let spread = |at: &dyn Fn(usize, usize) -> usize| {
+        let norm2 = |i: usize| (0..n).map(|j| values[at(i, j)] * values[at(i, j)]).sum::<f64>();
+        let (sum, squares) =
+            (0..n).map(norm2).fold((0.0, 0.0), |(sum, squares), x| (sum + x, squares + x * x));
+        (squares * n as f64 / (sum * sum) - 1.0).max(0.0).sqrt()
+    };
+    4.0 * spread(&|i, j| i * n + j) < spread(&|i, j| j * n + i)
 }
 
 fn size(array: &Array) -> Result<[u32; 2], Wrong> {
@@ -677,4 +692,28 @@ fn columns(image: &ImageFeatures) -> Vec<Column> {
 fn halves(values: &[f32]) -> Option<Vec<f16>> {
     let exact = |&value: &f32| Some(f16::from_f32(value)).filter(|half| half.to_f32() == value);
     values.iter().map(exact).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn square_descriptors_are_rows_or_columns_by_their_norms() {
+        const N: usize = 64;
+        let mut rows: Vec<f32> = (0..N * N).map(|at| ((at * at) % 101) as f32 - 30.0).collect();
+        for row in rows.chunks_exact_mut(N) {
+            let norm = row.iter().map(|x| x * x).sum::<f32>().sqrt();
+            row.iter_mut().for_each(|x| *x /= norm);
+        }
+        let read = |values: Vec<f32>| {
+            let array = Array { shape: vec![N as u64; 2], values: Numbers::F32(values) };
+            descriptors(array, N).unwrap().values().clone()
+        };
+        assert_eq!(read(transposed(&rows, N)), Values::F32(rows.clone()));
+        assert_eq!(read(rows.clone()), Values::F32(rows));
+        // Without equal norms, the layout decides: (D, N).
+        let odd: Vec<f32> = (0..N * N).map(|at| at as f32).collect();
+        assert_eq!(read(transposed(&odd, N)), Values::F32(odd));
+    }
 }
