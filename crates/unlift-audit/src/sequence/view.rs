@@ -103,14 +103,14 @@ impl Model {
     }
 
     /// Returns the views of all images that are in the model and in `source`, in the order of their
-    /// names, and an error for each that cannot be used. `path` names the source in errors.
+    /// names (`2.jpg` before `10.jpg`), and an error for each that cannot be used. `path` names the source in errors.
     pub fn views(
         &self,
         (source, path): (&FeatureSource, &Path),
         pose_error: Option<(PoseError, u64)>,
     ) -> Vec<Result<View, crate::Error>> {
         let names = source.names();
-        let both: Vec<(usize, usize)> = names
+        let mut both: Vec<(usize, usize)> = names
             .iter()
             .enumerate()
             .filter_map(|(at, name)| {
@@ -120,6 +120,7 @@ impl Model {
                 Some((at, of.ok()?))
             })
             .collect();
+        both.sort_by_cached_key(|&(at, _)| natural(&names[at]));
         let view = |&(at, of): &(usize, usize)| {
             let features = source.get(at)?;
             let place = format!("image {}", features.name.escape_debug());
@@ -235,6 +236,27 @@ fn bounds(lens: &Lens, size: [f64; 2]) -> Option<Bounds<2>> {
     Bounds::try_new(low, high).ok()
 }
 
+/// Returns a key that sorts names as people count: `2.jpg` before `10.jpg`.
+///
+/// A run of digits becomes its length without zeros in front, and itself. Names that differ in such zeros alone stay in their order.
+fn natural(name: &str) -> Vec<(usize, &str)> {
+    let is_digit = |c: char| c.is_ascii_digit();
+    let mut parts = Vec::new();
+    let mut rest = name;
+    while let Some(first) = rest.chars().next() {
+        let end = if is_digit(first) {
+            rest.find(|c| !is_digit(c)).unwrap_or(rest.len())
+        } else {
+            first.len_utf8()
+        };
+        let (part, others) = rest.split_at(end);
+        let number = part.trim_start_matches('0');
+        parts.push(if is_digit(first) { (number.len(), number) } else { (usize::MAX, part) });
+        rest = others;
+    }
+    parts
+}
+
 type Pose = ([[f64; 3]; 3], [f64; 3]);
 
 /// Returns rotation and translation of an image, with the error that a service has.
@@ -262,4 +284,19 @@ fn turned(rotation: &[[f64; 3]; 3], axis: [f64; 3], angle: f64) -> [[f64; 3]; 3]
     std::array::from_fn(|r| {
         std::array::from_fn(|c| (0..3).map(|k| turn(r, k) * rotation[k][c]).sum())
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::natural;
+
+    #[test]
+    fn names_are_ordered_as_people_count() {
+        let ordered = ["a/2.jpg", "a/010.jpg", "a/11.jpg", "a/b1c9.png", "a/b1c10.png", "b/1.jpg"];
+        let mut names = ordered;
+        names.sort_unstable();
+        assert_ne!(names, ordered);
+        names.sort_by_cached_key(|name| natural(name));
+        assert_eq!(names, ordered);
+    }
 }
