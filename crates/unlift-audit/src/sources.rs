@@ -6,12 +6,12 @@ use std::sync::Arc;
 use unlift::neighbors::sources::{self, Named, SourceEntry};
 use unlift::neighbors::{Needs, Neighborhoods, Overlap, Similarity, Source};
 use unlift::released::Released;
-use unlift::{Descriptors, Error};
+use unlift::{Descriptors, Error, RecordId};
 
 /// The source `descriptors`: the best one for the given descriptors.
 pub(crate) const BY_DESCRIPTORS: SourceEntry = SourceEntry {
     name: "descriptors",
-    summary: "the best that descriptors allow: learned with a network for them, else overlap or similarity",
+    summary: "the best that descriptors allow: learned with a network for them, overlap or similarity",
     in_2d: Some(|| Arc::new(ByDescriptors)),
     in_3d: Some(|| Arc::new(ByDescriptors)),
 };
@@ -30,17 +30,44 @@ pub fn named(name: &str) -> Result<Named, Error> {
     Named::parse_among(name, &all())
 }
 
-/// Uses `learned` if there is a network for the descriptors, otherwise `overlap` for SIFT and
-/// `similarity` for others.
+/// Uses `learned` for SIFT. For other descriptors of a network's width, it uses `learned` or `similarity`, whose lists agree better with
+/// themselves, and `similarity` for all others.
 #[derive(Clone, Copy, Debug)]
 struct ByDescriptors;
 
-fn best<const D: usize>(descriptors: Option<&Descriptors>) -> Box<dyn Source<D>> {
+/// Factor by which lists by `similarity` must agree better with themselves than those of a network (docs/decisions/sources.md).
+const BETTER: f64 = 1.08;
+
+/// Returns the source for the kind of `descriptors`, and another one if the kind is a guess from their width.
+fn candidates<const D: usize>(
+    descriptors: Option<&Descriptors>,
+) -> (Box<dyn Source<D>>, Option<Similarity>) {
     let takes = |source: &dyn Source<D>| descriptors.is_some_and(|some| source.takes(some).is_ok());
-    if takes(&unlift_vision::network::Learned) {
-        return Box::new(unlift_vision::network::Learned);
+    match (takes(&unlift_vision::network::Learned), takes(&Overlap)) {
+        (true, is_sift) => {
+            (Box::new(unlift_vision::network::Learned), (!is_sift).then_some(Similarity))
+        }
+        (false, true) => (Box::new(Overlap), None),
+        (false, false) => (Box::new(Similarity), None),
     }
-    if takes(&Overlap) { Box::new(Overlap) } else { Box::new(Similarity) }
+}
+
+/// Returns how well lists agree with themselves: the share of entries that a list has in common with those of its entries, where only
+/// pairs that list each other count.
+fn agreement(lists: &Neighborhoods, slots_per_record: usize) -> f64 {
+    let (mut common, mut all) = (0, 0);
+    for slot in 0..lists.n_slots() {
+        let (own, record) = (lists.of(slot), RecordId((slot / slots_per_record) as u32));
+        let slots =
+            |id: &RecordId| id.index() * slots_per_record..(id.index() + 1) * slots_per_record;
+        for others in own.iter().flat_map(slots).map(|other| lists.of(other)) {
+            all += others.len();
+            if others.binary_search(&record).is_ok() {
+                common += others.iter().filter(|id| own.binary_search(id).is_ok()).count();
+            }
+        }
+    }
+    common as f64 / all.max(1) as f64
 }
 
 impl<const D: usize> Source<D> for ByDescriptors {
@@ -53,15 +80,20 @@ impl<const D: usize> Source<D> for ByDescriptors {
     }
 
     fn k(&self, released: &Released<D>) -> usize {
-        best(released.descriptors()).k(released)
+        candidates(released.descriptors()).0.k(released)
     }
 
     fn lists(&self, released: &Released<D>, k: usize, seed: u64) -> Result<Neighborhoods, Error> {
-        best(released.descriptors()).lists(released, k, seed)
+        let (first, other) = candidates(released.descriptors());
+        let lists = first.lists(released, k, seed)?;
+        let Some(other) = other else { return Ok(lists) };
+        let others = other.lists(released, k, seed)?;
+        let agreement = |lists| agreement(lists, released.slots_per_record());
+        Ok(if agreement(&others) > BETTER * agreement(&lists) { others } else { lists })
     }
 
     fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
-        best::<D>(Some(descriptors)).takes(descriptors)
+        candidates::<D>(Some(descriptors)).0.takes(descriptors)
     }
 
     fn reads_descriptors_alone(&self) -> bool {
@@ -76,6 +108,11 @@ impl<const D: usize> Source<D> for ByDescriptors {
 #[cfg(test)]
 mod tests {
     use unlift::descriptors::Values;
+    use unlift::obfuscate::{obfuscate, olc::Olc};
+    use unlift::seed::Key;
+    use unlift::truth::Original;
+    use unlift::{PointSet, Unit};
+    use unlift_vision::features::{AlikedOptions, Extraction, Extractor, Found};
 
     use super::*;
 
@@ -93,13 +130,38 @@ mod tests {
     fn the_best_source_follows_the_descriptors() {
         let best = |values: Values, dim: usize| {
             let descriptors = Descriptors::try_new(values, dim).unwrap();
-            best::<3>(Some(&descriptors)).name().to_owned()
+            let (first, other) = candidates::<3>(Some(&descriptors));
+            (first.name().to_owned(), other.is_some())
         };
         let floats =
             |dim: usize| Values::F32((0..dim * 8).map(|at| (at * 37 % 11) as f32 - 5.0).collect());
         let sift = Values::U8((0..128 * 8).map(|at| (at * 37 % 101) as u8).collect());
-        assert_eq!(best(sift, 128), "learned");
-        assert_eq!(best(floats(128), 128), "learned");
-        assert_eq!(best(floats(64), 64), "similarity");
+        assert_eq!(best(sift, 128), ("learned".to_owned(), false));
+        assert_eq!(best(floats(128), 128), ("learned".to_owned(), true));
+        assert_eq!(best(floats(64), 64), ("similarity".to_owned(), false));
+    }
+    #[test]
+    fn lists_that_agree_better_decide_between_aliked_and_others() {
+        let photo = "../unlift-cli/src/demo/photos/coffee.jpg".as_ref();
+        let aliked = Extraction::Aliked(AlikedOptions::default());
+        let photo = Extractor::try_new(&aliked).unwrap().read(photo).unwrap();
+        let Found::Learned(found) = photo.found else { panic!("no ALIKED") };
+        // A Hadamard matrix turns descriptors and keeps their distances, as if another network had made them.
+        let turned = found.descriptors.chunks_exact(128).flat_map(|row| {
+            let sign = |r: usize, c: usize| {
+                if (r & c).count_ones().is_multiple_of(2) { 1.0 } else { -1.0 }
+            };
+            (0..128).map(move |r| (0..128).map(|c| sign(r, c) * row[c]).sum::<f32>())
+        });
+        for (values, is_aliked) in [(found.descriptors.clone(), true), (turned.collect(), false)] {
+            let descriptors = Descriptors::try_new(Values::F32(values), 128).unwrap();
+            let points = (0..descriptors.len()).map(|at| [at as f64, (at % 7) as f64, 0.0]);
+            let original = Original::new(PointSet::try_new(points.collect(), Unit::Meter).unwrap());
+            let map = obfuscate(&Olc, &original, Some(&descriptors), &Key::from_seed(1)).unwrap().0;
+            let lists = |source: &dyn Source<3>| source.lists(&map, 7, 0).unwrap();
+            let expected: &dyn Source<3> =
+                if is_aliked { &unlift_vision::network::Learned } else { &Similarity };
+            assert_eq!(lists(&ByDescriptors), lists(expected));
+        }
     }
 }
