@@ -65,7 +65,7 @@ pub(crate) fn doubts(
     let share = plan.k as f64 / n_points.max(1) as f64;
     if plan.asks_oracle() && plan.k > SHORT && share > LONG {
         found.notes.push(format!(
-            "K = {} is {:.0} % of the map's points: such long lists lower recovery (try a smaller --k)",
+            "K = {} is {:.0} % of the map's points: such long lists may lower recovery (try a smaller --k)",
             plan.k,
             100.0 * share
         ));

@@ -4,6 +4,7 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::stderr::tell;
 use unlift::Unit;
 use unlift::audit::{Plan, Threshold};
 use unlift::neighbors::oracle::Noise;
@@ -149,7 +150,7 @@ pub fn protection(text: &str) -> Result<Protection, String> {
 pub fn solver(text: &str) -> Result<Builtin, String> {
     let solver = Builtin::from_name(text).map_err(|error| expected(&error))?;
     if solver.name() != text {
-        eprintln!("note: the solver {text} is called {} now", solver.name());
+        tell(format_args!("unlift: note: the solver {text} is called {} now", solver.name()));
     }
     Ok(solver)
 }

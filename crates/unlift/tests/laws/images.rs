@@ -74,8 +74,7 @@ impl Watcher<2> for Each {
 /// The pooled row of one image equals its own row. That of two images lies between theirs.
 #[test]
 fn rows_are_pooled_over_keypoints() {
-    let solvers = [Builtin::Consensus, Builtin::Ransac];
-    let plan = maps::plan(Unit::Pixel, &[], &[1.0, 0.5], &solvers);
+    let plan = maps::plan(Unit::Pixel, &[], &[1.0, 0.5], &[Builtin::Joint]);
     let plan = Plan { repeats: 2, ..plan };
     let images = [image_of("a", keypoints(1, 300, 20)), image_of("b", keypoints(2, 150, 0))];
     let mut each = Each::default();
@@ -160,7 +159,7 @@ fn images_with_hardly_any_keypoints_are_counted() {
         let (last, total) = *heard.last().unwrap();
         assert!(last == total && heard.is_sorted(), "{}: {heard:?}", image.name);
         if image.original.len() > 2 {
-            assert_eq!(total, 3 * 4 * Builtin::FROM_LISTS.len(), "{}", image.name);
+            assert!(total > 3 * 4 * Builtin::FROM_LISTS.len(), "{}: lists cost, too", image.name);
             let seen: std::collections::BTreeSet<_> = heard.iter().collect();
             assert!(seen.len() > 3 * 4, "{}: {seen:?}", image.name);
         }

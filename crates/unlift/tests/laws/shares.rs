@@ -67,10 +67,10 @@ fn equivariance() {
     over_schemes!(shifted_and_scaled_maps_leak_the_same, Builtin::Consensus, 0.25);
 }
 
-/// Differences grow over iterations. Measured: sixteen slots of `dcl2d`, three of any other scheme.
+/// Differences grow over iterations. Measured: twenty slots of `ppl+`, of 4,000.
 #[test]
 fn equivariance_of_joint_recovery() {
-    over_schemes!(shifted_and_scaled_maps_leak_the_same, Builtin::Joint, 0.5);
+    over_schemes!(shifted_and_scaled_maps_leak_the_same, Builtin::Joint, 1.0);
 }
 
 fn lists_again(lists: &Neighborhoods, order: &[usize], per: usize) -> Neighborhoods {
@@ -173,7 +173,8 @@ fn pairs_in_better_order_do_not_depend_on_the_order() {
     assert!(by_slot(&turned) < by_slot(&hidden.secret) - 10.0);
     let better = |secret| percent(RowOrder::Either, secret);
     assert_eq!(better(&turned), better(&hidden.secret));
-    assert!(better(&turned) >= by_slot(&hidden.secret));
+    // The order with the smaller sum of errors may lose a point at a threshold.
+    assert!(better(&turned) > by_slot(&hidden.secret) - 0.5);
     // An unstated row order gives at least the share of any order.
     let unstated = percent(RowOrder::Unstated, &turned);
     assert_eq!(unstated, percent(RowOrder::Unstated, &hidden.secret));

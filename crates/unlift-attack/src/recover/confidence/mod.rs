@@ -21,7 +21,7 @@ use crate::recover::map::pieces::{CandidatePieces, LinePieces, PlanePieces};
 use crate::recover::options::RecoverOptions;
 use crate::recover::result::{Confidence, Estimate, Status, Unknown};
 use crate::recover::solver::Builtin;
-use crate::released::{Obfuscation, Rays, Released};
+use crate::released::{Obfuscation, Released};
 
 /// Returns why confidence is not computed, if options, solver or dimension say so.
 pub(super) fn not_asked<const D: usize>(
@@ -84,7 +84,7 @@ const MOST_LISTED: f64 = 0.01;
 /// A map is flat if its smallest extent is at most this fraction of its largest one.
 const FLAT: f64 = 0.01;
 
-/// Points coincide if at least this fraction of all rays equals another ray. Different points hardly ever have equal rays.
+/// Points coincide if at least this fraction of all rays or planes equals another one. Different points hardly ever have equal ones.
 const COINCIDENT: f64 = 0.5;
 
 /// Returns why the model does not apply to maps recovered from `lists`, if so.
@@ -105,22 +105,30 @@ pub(crate) fn unknown<const D: usize>(
         Some(Unknown::GivenLists)
     } else if mean > MOST_LISTED * n_slots {
         Some(Unknown::SmallMap)
-    } else if matches!(released.obfuscation(), Obfuscation::Rays(rays) if twins(rays) >= COINCIDENT)
-    {
-        // Other records are drawn at random, so that coinciding points do not have equal records.
+    } else if twins(released.obfuscation()) >= COINCIDENT {
+        // Other records are drawn at random, so that coinciding points do not have equal lines or candidates.
         Some(Unknown::Coincident)
     } else {
         (flatness(&places()) <= FLAT).then_some(Unknown::Flat)
     }
 }
 
-/// Returns the fraction of rays that equal another ray bit for bit.
-fn twins<const D: usize>(rays: &Rays<D>) -> f64 {
-    let bits = |row: usize| (rays.center()[row], rays.direction()[row].map(f32::to_bits));
-    let mut rows: Vec<_> = (0..rays.len()).into_par_iter().map(bits).collect();
+/// Returns the fraction of rays or planes that equal another one bit for bit.
+fn twins<const D: usize>(obfuscation: &Obfuscation<D>) -> f64 {
+    let mut rows: Vec<(u8, [u32; D])> = match obfuscation {
+        Obfuscation::Rays(rays) => {
+            let directions = rays.direction().iter().map(|d| d.map(f32::to_bits));
+            rays.center().iter().copied().zip(directions).collect()
+        }
+        Obfuscation::AxisPlanes(planes) => {
+            let offsets = planes.offset().iter().map(|offset| [offset.to_bits(); D]);
+            planes.axis().iter().copied().zip(offsets).collect()
+        }
+        Obfuscation::Lines(_) | Obfuscation::AxisCandidates(_) => return 0.0,
+    };
     rows.par_sort_unstable();
     let same = rows.chunk_by(|a, b| a == b).map(<[_]>::len).filter(|&n| n > 1);
-    same.sum::<usize>() as f64 / rays.len().max(1) as f64
+    same.sum::<usize>() as f64 / rows.len().max(1) as f64
 }
 
 /// Kinds of records with separate models: lines, paired lines, rays, axis planes, axis candidates.
