@@ -78,7 +78,7 @@ pub(super) enum Step<'a> {
     /// A part of the work has ended, in units of the cost of one recovery.
     Ended(usize),
     /// A row is finished.
-    Row(Finished<'a>),
+    Row(Box<Finished<'a>>),
 }
 
 /// Typical cost of attacks on the records alone, in recoveries.
@@ -252,7 +252,7 @@ pub(super) fn attack<const D: usize>(
                 seconds: RowSeconds { neighbors: making, recover: took },
             };
             each(observer, Step::Ended(1));
-            each(observer, Step::Row(finished));
+            each(observer, Step::Row(Box::new(finished)));
         }
     }
     Ok(missing)
@@ -327,7 +327,8 @@ pub(super) fn of_item<const D: usize>(
                 Step::Ended(cost) => done += cost,
                 Step::Row(row) => {
                     finished(&row);
-                    of_repeat.push((row.row, row.seconds));
+                    let Finished { row, seconds, .. } = *row;
+                    of_repeat.push((row, seconds));
                 }
             })?;
             done = before + per_scheme;

@@ -10,8 +10,6 @@ fn harsh_options() -> Vec<Options> {
     [all_options(), options_with(&[1e-18, 1e-9, 1e9, 1e18].map(Delta::Fixed))].concat()
 }
 
-/// Solvers that use lists in both directions.
-
 /// Returns for each slot the number of records that it lists or that list its own.
 fn both_ways<const D: usize>(released: &Released<D>, lists: &Neighborhoods) -> Vec<usize> {
     let per = released.slots_per_record();
