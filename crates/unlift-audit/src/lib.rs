@@ -40,6 +40,7 @@ mod document;
 mod doubts;
 mod frames;
 mod gate;
+mod given_away;
 pub mod images;
 pub mod inversion;
 pub mod localization;
@@ -57,6 +58,7 @@ pub use doubts::{
     Checked, SaidOfLengths, check_scale, check_thresholds, sides_m, unlike_neighbors,
 };
 pub use gate::{Candidate, Figure, Gate};
+pub use given_away::read_from_file;
 pub use maps::Job;
 pub use outputs::{
     Audited, FIGURES, Finished, PAGE, check_file, check_file_of, open_audit, refused,

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use unlift::audit::{Cell, Observer, Outcome, Plan, Row, run, run_released};
+use unlift::audit::{Alone, Cell, Observer, Outcome, Plan, Row, run, run_released};
 use unlift::released::Released;
 use unlift::truth::{Original, Secret};
 use unlift::{Descriptors, ErrorKind, Unit};
@@ -24,6 +24,7 @@ use crate::doubts::{
     with_extent,
 };
 use crate::gate::{Gate, check_gates, gate_results};
+use crate::given_away::follows_places;
 use crate::inversion::MapInversion;
 use crate::localization::{self, Cameras, Localize};
 use crate::outputs::{Audited, Finished};
@@ -41,6 +42,8 @@ pub struct Job<'a> {
     pub descriptors: Option<&'a Descriptors>,
     /// The release and its secret, if the points are hidden already.
     pub hidden: Option<&'a (Released<3>, Secret)>,
+    /// An attack on values of the released file that its records do not contain.
+    pub read: Option<Alone>,
     /// The cameras that observe the points, for localization; not used with tiles.
     pub localize: Option<Localize<'a>>,
     /// Camera centers in the unit of the audit, for the 3D view.
@@ -122,6 +125,7 @@ impl<'a> Job<'a> {
             original,
             descriptors: None,
             hidden: None,
+            read: None,
             localize: None,
             cameras: Vec::new(),
             up: None,
@@ -262,7 +266,7 @@ pub fn find(job: Job<'_>) -> Result<Audited, Error> {
     if let Some(hidden) = job.hidden {
         check_truth(job.original, hidden, &spread).map_err(of_file)?;
     }
-    let Ran { outcome, scene, curves, sheets, tile_rows } = match &cut {
+    let Ran { mut outcome, scene, curves, sheets, tile_rows } = match &cut {
         Some(tiles) => {
             let found = tiles::run(whole, tiles, &job.plan, job.progress)
                 .map_err(|error| of_file(error).advise("a larger --tile-points"))?;
@@ -287,11 +291,21 @@ pub fn find(job: Job<'_>) -> Result<Audited, Error> {
             Ran { outcome, scene, curves, sheets, tile_rows: Vec::new() }
         }
     };
+    // Of values that are no better than a blind guess there is nothing to say.
+    let beats = |alone: &&Alone, row: &Row| {
+        alone.percent.iter().zip(&row.blind_percent).any(|(a, b)| a > b)
+    };
+    for row in &mut outcome.rows {
+        row.records_alone.extend(job.read.as_ref().filter(|alone| beats(alone, row)).cloned());
+    }
+    let followed = job.hidden.map(|hidden| follows_places(job.original, hidden));
+    let of_file: Vec<String> =
+        job.doubts.iter().cloned().chain(followed.into_iter().flatten()).collect();
     let mut doubts = doubts(
         (job.original, spread),
         job.hidden,
         (&job.plan, &outcome.rows, &tile_rows),
-        &job.doubts,
+        &of_file,
     );
     for note in doubts.notes.iter().filter(|note| !job.doubts.contains(note)) {
         job.progress.say(&format!("note: {note}"));

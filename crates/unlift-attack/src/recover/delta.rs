@@ -5,6 +5,7 @@
 //! minus the mean evidence of the same slots with mixed lists, made of entries of other slots' lists. Both means contain the
 //! effects of the number of places tried and of uneven density.
 
+use crate::geometry::frame::Bounds;
 use crate::neighbors::Neighborhoods;
 use crate::recover::consensus;
 use crate::recover::map::family::{Family, Settings};
@@ -79,7 +80,9 @@ pub(super) fn learn<const D: usize>(
     };
     let per_list = given.records().len() as f64 / given.n_slots().max(1) as f64;
     let share = per_list / released.n_records().max(1) as f64;
-    let least = LEAST_DELTA * spacing;
+    // The bounds of a map may be far wider than its points.
+    let of_bounds = !Settings::of_dimension::<D>().limits_by_share;
+    let least = if of_bounds { LEAST_DELTA * spacing } else { 0.0 };
     let chosen =
         choose(family, used, sharp.then_some(beyond_edge), (least, share), seed).unwrap_or(1.0);
     let least = least_of_candidates(family, share);
@@ -108,10 +111,17 @@ fn least_of_candidates<const D: usize>(family: &Family<'_, D>, share: f64) -> f6
     f64::max(above, of_flat)
 }
 
-/// Returns the spacing of points spread evenly over the known bounds; 0 without bounds. Axis candidates publish coordinates, which
-/// show whether the bounds are much larger than the range of the points.
+/// Returns the spacing of points spread evenly over the known bounds, or else over all regions; 0 without both. Axis candidates
+/// publish coordinates, which show whether the bounds are much larger than the range of the points.
 fn spacing<const D: usize>(released: &Released<D>) -> f64 {
-    let Some(bounds) = released.bounds() else { return 0.0 };
+    let of_regions = || match released.obfuscation() {
+        Obfuscation::Rays(rays) => {
+            let corners = rays.regions()?.iter().flat_map(|region| [region.low, region.high]);
+            Bounds::quantiles(&corners.collect::<Vec<_>>(), 0.0)
+        }
+        _ => None,
+    };
+    let Some(bounds) = released.bounds().or_else(of_regions) else { return 0.0 };
     let mut sides: [f64; D] = std::array::from_fn(|c| bounds.high[c] - bounds.low[c]);
     if let Obfuscation::AxisCandidates(candidates) = released.obfuscation() {
         for (c, side) in sides.iter_mut().enumerate() {

@@ -8,11 +8,13 @@ use unlift::audit::{Plan, Threshold};
 use unlift::descriptors::Values;
 use unlift::obfuscate::obfuscate;
 use unlift::recover::{Builtin, Delta};
-use unlift::released::Released;
-use unlift::seed::Key;
-use unlift::truth::{Original, Secret};
+use unlift::released::{Lines, Obfuscation, Released};
+use unlift::seed::{Key, Stage};
+use unlift::truth::{Original, OriginalId, Secret};
 use unlift::{Descriptors, PointSet, Unit};
-use unlift_audit::{Audited, Error, Gate, Job, Preparation, Prepared, maps, prepare};
+use unlift_audit::{
+    Audited, Error, Gate, Job, Preparation, Prepared, maps, prepare, read_from_file,
+};
 
 use crate::schemes;
 
@@ -215,4 +217,54 @@ fn descriptors_in_another_order_are_doubted() {
     assert!(doubts(|at| at).is_empty());
     let found = doubts(|at| at * 7 % N);
     assert!(found[0].ends_with("of another map, or in another order of rows?"), "{found:?}");
+}
+
+/// Lines of another program: feet that are the points, records in an order that follows places, and columns of descriptors.
+#[test]
+fn a_released_file_that_gives_places_away_is_no_protection() {
+    let (points, unit) = (prepared(&room()), Unit::Meter);
+    let places = points.original.reveal().positions();
+    let mut draws = Key::from_seed(3).draws(Stage::Scheme, 0);
+    let random = draws.permutation(N);
+    let mut sorted = random.clone();
+    sorted.sort_by(|&a, &b| places[a as usize][0].total_cmp(&places[b as usize][0]));
+    let mut said = |order: &[u32], described: bool, offset: f64| {
+        let directions: Vec<[f64; 3]> =
+            order.iter().map(|_| [0; 3].map(|_| draws.between(-1.0, 1.0))).collect();
+        let foot = |(&at, along): (&u32, &[f64; 3])| {
+            std::array::from_fn(|c| places[at as usize][c] + offset * along[c])
+        };
+        let feet: Vec<[f64; 3]> = order.iter().zip(&directions).map(foot).collect();
+        let lines = Obfuscation::Lines(Lines::through(&feet, &directions).unwrap());
+        let heights = order.iter().flat_map(|&at| [0.5, 3.0 * places[at as usize][2] as f32]);
+        let rows = Descriptors::try_new(Values::F32(heights.collect()), 2).unwrap();
+        let rows = described.then_some(rows);
+        let released = Released::try_new(lines, 1, [0.0; 3], unit, rows).unwrap();
+        let hidden = order.iter().map(|&at| OriginalId(at)).collect();
+        let rows = (0..N as u32).collect();
+        let secret = Secret::try_new(hidden, None, rows, Vec::new(), N).unwrap();
+        let secret = secret.of_map(Some(released.fingerprint()), 1).unwrap();
+        let plan = plan(&["olc"]);
+        let job = Job {
+            read: read_from_file(&[feet], (&points.original, &secret), &plan.thresholds),
+            hidden: Some(&(released, secret)),
+            plan,
+            gates: vec![Gate::parse("olc:joint:0.10<=100").unwrap()],
+            ..Job::of(&points.original, Instant::now())
+        };
+        let document = maps::find(job).unwrap().document;
+        let read = document.results[0].records_alone_percent.as_ref().map(|by| by["0.10"]);
+        let gate = &document.gates[0];
+        assert_eq!(
+            (gate.passed, &document.notes[..]),
+            (gate.reason.is_none(), gate.reason.as_slice())
+        );
+        (read, gate.reason.clone().unwrap_or_default())
+    };
+    assert_eq!(said(&random, false, 30.0), (None, String::new()));
+    assert_eq!(said(&random, false, 0.0), (Some(100.0), String::new()));
+    let (_, order) = said(&sorted, false, 30.0);
+    assert!(order.starts_with("order of records: after "), "{order}");
+    let (_, column) = said(&random, true, 30.0);
+    assert!(column.starts_with("descriptors: column 1 follows a coordinate"), "{column}");
 }

@@ -8,10 +8,10 @@ use unlift::audit::{Plan, scheme_called};
 use unlift::released::Released;
 use unlift::truth::Secret;
 use unlift_audit::maps::{self, perform};
-use unlift_audit::{Job, Prepared, ordered, unlike_neighbors};
+use unlift_audit::{Job, Prepared, ordered, read_from_file, unlike_neighbors};
 use unlift_io::hash::{hash_file, hash_files};
 use unlift_io::read::{self, Input as Points};
-use unlift_io::stage::{has_images, read_released, read_truth, scheme_name};
+use unlift_io::stage::{has_images, published_positions, read_released, read_truth, scheme_name};
 use unlift_report::document::Input;
 
 use super::audits::{self, map_thresholds, neighbors, solvers, with_oracle};
@@ -34,7 +34,9 @@ pub fn run(args: &AuditReleasedArgs) -> anyhow::Result<Outcome> {
         let mut notes = prepared.notes.clone();
         let mut doubts = prepared.doubts.clone();
         let plan = plan(args, &name, &prepared, &hidden.0, (&mut notes, &mut doubts))?;
+        let published = published_positions(&args.released)?;
         let job = Job {
+            read: read_from_file(&published, (&prepared.original, &hidden.1), &plan.thresholds),
             hidden: Some(&hidden),
             plan,
             notes,

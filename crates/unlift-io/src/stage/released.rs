@@ -125,6 +125,31 @@ pub fn scheme_name(path: &Path) -> Result<Option<String>, Error> {
     Ok(arrays.meta().text("scheme")?.map(str::to_owned))
 }
 
+/// Returns positions that the file at `path` publishes, one per record: those of its arrays as they are written, feet and centers,
+/// and these plus directions. Nothing of them is left in the normal form of [`read_released`].
+///
+/// # Errors
+/// When it is no released map of dimension `D`.
+pub fn published_positions<const D: usize>(path: &Path) -> Result<Vec<Vec<[f64; D]>>, Error> {
+    let arrays = Arrays::open(path)?;
+    let from: Vec<[f64; D]> = match family(&arrays)? {
+        "lines" => arrays.vectors("foot", None)?,
+        "rays" => {
+            let centers = arrays.vectors("centers", None)?;
+            let (center, _) = arrays.integers("center", [None], centers.len(), false)?;
+            center.into_iter().map(|center| centers[center as usize]).collect()
+        }
+        // The normal form keeps all values of these.
+        _ => return Ok(Vec::new()),
+    };
+    let direction = arrays.vectors("direction", Some(from.len()))?;
+    let origin = if arrays.has("origin") { arrays.vector("origin")? } else { [0.0; D] };
+    let plus = |a: &[f64; D], b: &[f64; D]| std::array::from_fn(|c| a[c] + b[c]);
+    let from: Vec<[f64; D]> = from.iter().map(|x| plus(x, &origin)).collect();
+    let to = from.iter().zip(&direction).map(|(x, along)| plus(x, along)).collect();
+    Ok(vec![from, to])
+}
+
 pub(super) fn released_of<const D: usize>(arrays: &Arrays<'_>) -> Result<Released<D>, Error> {
     let core = |source| arrays.refused(source);
     let meta = arrays.meta();

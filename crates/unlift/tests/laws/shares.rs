@@ -1,5 +1,7 @@
 //! Properties of shares of a whole map: equivariance, other forms of the same map, and random lists compared with the blind baseline.
 
+use std::collections::BTreeMap;
+
 use unlift::evaluate::blind;
 
 use crate::maps::*;
@@ -125,6 +127,70 @@ fn shares_do_not_depend_on_how_a_map_is_written<const D: usize>(name: &str, sche
 #[test]
 fn a_map_that_is_written_otherwise_gives_the_same_shares() {
     over_schemes!(shares_do_not_depend_on_how_a_map_is_written);
+}
+
+/// True metadata never lowers recovery by more than noise: the unit, tight and wide bounds, and the regions of rays.
+fn metadata_lowers_nothing<const D: usize>(name: &str, scheme: &Entry) {
+    const TIMES: u64 = 8;
+    let share = |hidden: &Hidden<D>, released: &Released<D>, lists: &Neighborhoods, solver| {
+        let recovered = solve(released, lists, (solver, RecoverOptions::default()));
+        let near = |&slot: &usize| hidden.error(&recovered, slot) <= 0.1;
+        (0..recovered.n_slots()).filter(near).count() as f64 / recovered.n_slots() as f64
+    };
+    let mut differences: BTreeMap<_, Vec<f64>> = BTreeMap::new();
+    for time in 0..TIMES {
+        let hidden = hide::<D>(scheme, &room(time, 800), 50 + time);
+        let about = About { map: None, order: RowOrder::Slots, ..About::default() };
+        let lists = hidden.lists(20, 0.6, time).with_about(about);
+        let whole = hidden.released.obfuscation();
+        let records = match whole {
+            Obfuscation::Rays(rays) => {
+                let [centers, directions] = [rays.centers(), rays.direction()]
+                    .map(|rows| rows.iter().map(widen).collect::<Vec<_>>());
+                Obfuscation::Rays(
+                    Rays::try_new(&centers, rays.center().to_vec(), &directions).unwrap(),
+                )
+            }
+            other => other.clone(),
+        };
+        let map = |records: &Obfuscation<D>, unit, bounds| {
+            let (per, origin) = (hidden.released.slots_per_record(), hidden.released.origin());
+            let map = Released::try_new(records.clone(), per, origin, unit, None).unwrap();
+            map.with_bounds(bounds)
+        };
+        let points = hidden.original.reveal().positions();
+        let tight = Bounds::quantiles(points, 0.0).unwrap();
+        let wide = Bounds { low: tight.low.map(|x| x - 60.0), high: tight.high.map(|x| x + 90.0) };
+        let meter = Unit::Meter;
+        for solver in Builtin::FROM_LISTS {
+            let of = |released: &Released<D>| share(&hidden, released, &lists, solver);
+            let bare = of(&map(&records, meter, None));
+            for (key, released) in [
+                ("unit", map(&records, Unit::KthNeighbor, None)),
+                ("bounds", map(&records, meter, Some(tight))),
+                ("wide bounds", map(&records, meter, Some(wide))),
+                ("regions", map(whole, meter, None)),
+                ("regions and bounds", map(whole, meter, Some(tight))),
+            ] {
+                let all = differences.entry((key, solver.name())).or_default();
+                all.push(of(&released) - bare);
+            }
+        }
+    }
+    for (key, differences) in &differences {
+        let n = TIMES as f64;
+        let mean = differences.iter().sum::<f64>() / n;
+        let variance = differences.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        println!("{name} in {D}D, {key:?}: {mean:.4} +- {:.4}", (variance / n).sqrt());
+        // As above.
+        let chance = 0.01 + 4.0 * (variance / n).sqrt();
+        assert!(mean > -chance, "{name} in {D}D, {key:?}: {differences:?}");
+    }
+}
+
+#[test]
+fn true_metadata_never_lowers_recovery() {
+    over_schemes!(metadata_lowers_nothing);
 }
 
 /// With random lists no solver exceeds the blind baseline by more than noise. The map has uniform

@@ -78,9 +78,12 @@ pub(super) fn recover<const D: usize>(
     start: Vec<Estimate<D>>,
 ) -> Vec<Estimate<D>> {
     match family {
-        Family::Lines { rows, slots_per_record, chance } => {
-            iterate(&LinePieces::new(rows, *slots_per_record, chance, delta), graph, seed, start)
-        }
+        Family::Lines { rows, slots_per_record, chance, has_regions } => iterate(
+            &LinePieces::new(rows, *slots_per_record, (chance, *has_regions), delta),
+            graph,
+            seed,
+            start,
+        ),
         Family::Planes { planes, sorted } => {
             iterate(&PlanePieces::new(planes, sorted, delta), graph, seed, start)
         }

@@ -43,8 +43,9 @@ pub(super) fn predict<const D: usize>(
     solved: &Solved<'_, D>,
 ) -> Vec<Confidence> {
     let (cues, radius) = match family {
-        Family::Lines { rows, slots_per_record, chance } => {
-            let pieces = LinePieces::new(rows, *slots_per_record, chance, solved.delta);
+        Family::Lines { rows, slots_per_record, chance, has_regions } => {
+            let pieces =
+                LinePieces::new(rows, *slots_per_record, (chance, *has_regions), solved.delta);
             cues::of_slots(&pieces, graph, solved)
         }
         Family::Planes { planes, sorted } => {

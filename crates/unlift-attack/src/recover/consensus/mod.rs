@@ -69,7 +69,7 @@ impl<const D: usize> Kernel for Chunk<'_, D> {
         for (at, estimate) in out.iter_mut().enumerate() {
             let slot = first + at;
             match family {
-                Family::Lines { rows, slots_per_record, chance } => {
+                Family::Lines { rows, slots_per_record, chance, .. } => {
                     prefetch_listed(lists, slot + 1, rows);
                     let own = &rows[slot / slots_per_record];
                     scratch.lines.gather(rows, lists.of(slot));

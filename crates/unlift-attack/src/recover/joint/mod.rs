@@ -58,8 +58,8 @@ pub(crate) fn recover<const D: usize>(
         return start;
     }
     match family {
-        Family::Lines { rows, slots_per_record, chance } => {
-            let pieces = LinePieces::new(rows, *slots_per_record, chance, delta);
+        Family::Lines { rows, slots_per_record, chance, has_regions } => {
+            let pieces = LinePieces::new(rows, *slots_per_record, (chance, *has_regions), delta);
             iterate(&Input::new(pieces, graph, delta, seed), start)
         }
         Family::Planes { planes, sorted } => {

@@ -11,8 +11,13 @@ use crate::released::{AxisPlanes, Obfuscation, Released};
 /// Records of one family in the form that solvers read.
 #[derive(Debug)]
 pub(crate) enum Family<'a, const D: usize> {
-    /// Lines with one or two slots each, or rays, which have a group.
-    Lines { rows: Vec<LineRow<D>>, slots_per_record: usize, chance: Vec<ChanceField<D>> },
+    /// Lines with one or two slots each, or rays, which have a group; `has_regions` if the centers of rays have regions.
+    Lines {
+        rows: Vec<LineRow<D>>,
+        slots_per_record: usize,
+        chance: Vec<ChanceField<D>>,
+        has_regions: bool,
+    },
     /// Axis planes, sorted by their offsets.
     Planes { planes: &'a AxisPlanes<D>, sorted: SortedPlanes },
     /// Axis candidates.
@@ -27,7 +32,8 @@ impl<'a, const D: usize> Family<'a, D> {
             Obfuscation::Lines(_) | Obfuscation::Rays(_) => {
                 let rows = line_rows(released);
                 let chance = chance::of_lines(&rows, lists, slots_per_record);
-                Self::Lines { rows, slots_per_record, chance }
+                let has_regions = matches!(released.obfuscation(), Obfuscation::Rays(rays) if rays.regions().is_some());
+                Self::Lines { rows, slots_per_record, chance, has_regions }
             }
             Obfuscation::AxisPlanes(planes) => {
                 Self::Planes { planes, sorted: SortedPlanes::new(planes) }
@@ -69,7 +75,7 @@ impl<'a, const D: usize> Family<'a, D> {
     /// Whether these are rays whose centers have regions. Such rays of one center meet only there, and rays of two centers do not meet.
     pub(crate) fn has_regions(&self) -> bool {
         match self {
-            Self::Lines { rows, .. } => rows.iter().any(|row| row.is_ray() && row.to.is_finite()),
+            Self::Lines { has_regions, .. } => *has_regions,
             Self::Planes { .. } | Self::Candidates { .. } => false,
         }
     }

@@ -94,10 +94,9 @@ impl<'a, const D: usize> LinePieces<'a, D> {
     pub(crate) fn new(
         rows: &'a [LineRow<D>],
         slots_per_record: usize,
-        chance: &'a [ChanceField<D>],
+        (chance, anchored): (&'a [ChanceField<D>], bool),
         delta: f32,
     ) -> Self {
-        let anchored = rows.iter().any(|row| row.is_ray() && row.to.is_finite());
         Self { rows, slots_per_record, chance, tube: tube(D, delta), anchored }
     }
 

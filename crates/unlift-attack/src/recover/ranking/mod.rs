@@ -92,9 +92,12 @@ pub(crate) fn recover<const D: usize>(
     start: Vec<Estimate<D>>,
 ) -> Result<Vec<Estimate<D>>, Vec<Estimate<D>>> {
     match family {
-        Family::Lines { rows, slots_per_record, chance } => {
-            iterate(&LinePieces::new(rows, *slots_per_record, chance, delta), lists, seed, start)
-        }
+        Family::Lines { rows, slots_per_record, chance, has_regions } => iterate(
+            &LinePieces::new(rows, *slots_per_record, (chance, *has_regions), delta),
+            lists,
+            seed,
+            start,
+        ),
         Family::Planes { planes, sorted } => {
             iterate(&PlanePieces::new(planes, sorted, delta), lists, seed, start)
         }

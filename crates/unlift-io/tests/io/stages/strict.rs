@@ -258,3 +258,12 @@ fn damaged_files_are_an_error_of_one_line() {
     // Only what nobody reads may change: times, permissions, padding.
     assert!(n_read < 200, "{n_read}");
 }
+
+/// Feet and directions as they are written, in the map's frame.
+#[test]
+fn published_positions_are_not_in_normal_form() {
+    let (_dir, path) = write("a.npz", archive(&with(lines(), "origin", floats("(3,)", &[9.0; 3]))));
+    let feet = [[10.0, 11.0, 12.0], [13.0, 14.0, 15.0]];
+    let ends = [[11.0, 11.0, 12.0], [13.0, 15.0, 15.0]];
+    assert_eq!(stage::published_positions::<3>(&path).unwrap(), [feet, ends]);
+}
