@@ -37,7 +37,7 @@ enum Records<'a, const D: usize> {
     Alone(Peaks),
     /// For solvers that read lists.
     Listed {
-        family: Family<'a, D>,
+        family: Box<Family<'a, D>>,
         /// For joint recovery: the edges of the lists in both directions.
         graph: Option<Graph>,
         /// The graph as lists, if records have one slot.
@@ -76,7 +76,7 @@ impl<'a, const D: usize> Problem<'a, D> {
         solver: Builtin,
         options: &RecoverOptions,
     ) -> (f64, Records<'a, D>) {
-        let family = Family::new(released, lists);
+        let family = Box::new(Family::new(released, lists));
         // Joint recovery reads lists in both directions from its start on.
         let is_joint = solver == Builtin::Joint;
         let graph = is_joint.then(|| Graph::new(lists, released.slots_per_record()));
@@ -135,7 +135,7 @@ impl<'a, const D: usize> Problem<'a, D> {
             restore(joint::recover(family, graph, delta, seed, estimates))
         });
         // A layout of the whole image, which known positions replace.
-        let estimates = match family {
+        let estimates = match &**family {
             Family::Lines { rows, .. } if family.has_regions() && known.is_empty() => {
                 layout::recover(rows, lists, estimates)
             }

@@ -140,15 +140,12 @@ fn what_is_said_about_a_real_map_comes_true() {
             eprintln!("{name}: said {said:.3}, was {was:.3}, {} points", bin.n);
             off += bin.n as f64 * (said - was).abs();
             points += bin.n as f64;
-            // The stated probability is never much too high (measured: by 0.029 for 660 points, of which a standard error is 0.018).
-            // It is too low in the middle, where few points are (by 0.082), and near 0.86 (by 0.071).
-            let standard_error = (was * (1.0 - was) / bin.n as f64).sqrt();
-            let least = -0.02 - standard_error;
-            let most = if said > 0.8 { 0.075 } else { 0.09 };
-            let off = was - said;
-            assert!((least..=most).contains(&off), "{name}: said {said:.3}, was {was:.3}");
+            // From 0.8 on, where nine tenths of the points are, stated probabilities are at most a little too low. In the middle they are
+            // too high (measured: by 0.122 at most, on RedKitchen at 0.55).
+            let bounds = if said > 0.8 { -0.02..=0.06 } else { -0.13..=0.06 };
+            assert!(bounds.contains(&(was - said)), "{name}: said {said:.3}, was {was:.3}");
         }
-        // Measured: 0.035 and 0.032.
-        assert!(off / points <= 0.037, "{name}: off by {:.3} in the mean", off / points);
+        // Measured: 0.015 and 0.017.
+        assert!(off / points <= 0.02, "{name}: off by {:.3} in the mean", off / points);
     }
 }

@@ -131,7 +131,7 @@ fn a_map_that_is_written_otherwise_gives_the_same_shares() {
 
 /// True metadata never lowers recovery by more than noise: the unit, tight and wide bounds, and the regions of rays.
 fn metadata_lowers_nothing<const D: usize>(name: &str, scheme: &Entry) {
-    const TIMES: u64 = 8;
+    const TIMES: u64 = 4;
     let share = |hidden: &Hidden<D>, released: &Released<D>, lists: &Neighborhoods, solver| {
         let recovered = solve(released, lists, (solver, RecoverOptions::default()));
         let near = |&slot: &usize| hidden.error(&recovered, slot) <= 0.1;
