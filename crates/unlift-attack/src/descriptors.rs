@@ -14,12 +14,11 @@ pub enum Values {
     F32(Vec<f32>),
 }
 
-/// A matrix `(rows, dim)` of descriptors, and the color of each point if the release keeps it.
+/// A matrix `(rows, dim)` of descriptors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Descriptors {
     values: Values,
     dim: usize,
-    colors: Option<Vec<[u8; 3]>>,
 }
 
 impl Descriptors {
@@ -63,29 +62,12 @@ impl Descriptors {
                 "the same row for every point (dummies)",
             ));
         }
-        Ok(Self { values, dim, colors: None })
+        Ok(Self { values, dim })
     }
 
     /// Creates a matrix from values that are known to be finite and to fill its rows.
     pub(crate) fn unchecked(values: Values, dim: usize) -> Self {
-        Self { values, dim, colors: None }
-    }
-
-    /// Adds the color (red, green, blue) of each point. Attacks do not use it, pictures do.
-    ///
-    /// # Errors
-    /// When there is not one color per row.
-    pub fn with_colors(self, colors: Vec<[u8; 3]>) -> Result<Self, Error> {
-        if colors.len() != self.len() {
-            let expected = format!("{}, one per descriptor", self.len());
-            return Err(Error::new("colors", expected, colors.len().to_string()));
-        }
-        Ok(Self { colors: Some(colors), ..self })
-    }
-
-    /// Colors of the points, `(rows, 3)`, if they are known.
-    pub fn colors(&self) -> Option<&[[u8; 3]]> {
-        self.colors.as_deref()
+        Self { values, dim }
     }
 
     /// Number of rows.
@@ -111,7 +93,7 @@ impl Descriptors {
         &self.values
     }
 
-    /// Returns the rows `order[0], order[1], ...` as a new matrix, with their colors.
+    /// Returns the rows `order[0], order[1], ...` as a new matrix.
     ///
     /// # Panics
     /// When an index is out of range.
@@ -127,8 +109,7 @@ impl Descriptors {
             Values::U8(v) => Values::U8(rows(v, self.dim, order)),
             Values::F32(v) => Values::F32(rows(v, self.dim, order)),
         };
-        let colors = self.colors.as_ref().map(|colors| rows(colors, 1, order));
-        Self { values, dim: self.dim, colors }
+        Self { values, dim: self.dim }
     }
 
     /// Copies row `at` to `row`, which has one value per column.

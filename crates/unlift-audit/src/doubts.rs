@@ -228,19 +228,20 @@ pub fn unlike_neighbors(
     descriptors: &Descriptors,
 ) -> Result<Option<String>, unlift::Error> {
     let (knn, n) = (Knn::new(points.positions())?, points.len());
-    let (mut found, mut told) = (Vec::new(), 0);
+    let (mut nearest, mut n_like) = (Vec::new(), 0);
     let rows = (0..n).step_by(n.div_ceil(SAMPLE).max(1));
     let n_rows = rows.len();
     for row in rows {
-        knn.nearest(row, 1, &mut found);
+        knn.nearest(row, 1, &mut nearest);
         let like = |other: usize| descriptors.squared_distance(row, other);
         let is_like = |near: &(f64, u32)| like(near.1 as usize) < like((row + n / 2) % n);
-        told += usize::from(found.first().is_some_and(is_like));
+        n_like += usize::from(nearest.first().is_some_and(is_like));
     }
-    let (share, chance) = (told as f64 / n_rows.max(1) as f64, 1.5 / (n_rows.max(1) as f64).sqrt());
+    let (share, chance) =
+        (n_like as f64 / n_rows.max(1) as f64, 1.5 / (n_rows.max(1) as f64).sqrt());
     Ok((share + chance < LEAST_LIKE).then(|| {
         format!(
-            "descriptors: {told} of {n_rows} are more like that of the nearest point than like another one, about as by \
+            "descriptors: {n_like} of {n_rows} are more like that of the nearest point than like another one, about as by \
              chance: of another map, or in another order of rows?"
         )
     }))

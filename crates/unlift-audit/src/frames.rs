@@ -32,17 +32,17 @@ pub(crate) fn doubt(first: &Prepared, second: &Prepared) -> Result<Option<String
         _ => Vec::new(),
     };
     if pairs.len() < FEWEST {
-        let mut found = Vec::new();
+        let mut nearest = Vec::new();
         let mut is_near = |row: &&usize| {
-            knn.nearest_to(a[**row], 1, &mut found);
-            found.first().is_some_and(|found| found.0.sqrt() <= near)
+            knn.nearest_to(a[**row], 1, &mut nearest);
+            nearest.first().is_some_and(|neighbor| neighbor.0.sqrt() <= near)
         };
         let n = rows.iter().filter(&mut is_near).count();
-        let said = format!(
+        let message = format!(
             "second map: near {n} of {} points of the first one: in another frame?",
             rows.len()
         );
-        return Ok((3 * n < rows.len()).then_some(said));
+        return Ok((3 * n < rows.len()).then_some(message));
     }
     let fits =
         |map: &Similar| pairs.iter().filter(|[p, q]| distance(&map.of(p), q) <= near).count();

@@ -23,9 +23,9 @@ pub fn read_from_file(
     let point = |slot: usize| &original.reveal().positions()[secret.hidden()[slot].index()];
     let columns: Vec<&[Vec<[f64; 3]>]> =
         if slots == 1 { published.chunks(1).collect() } else { vec![published] };
-    let within = |columns: &[Vec<[f64; 3]>], most: f64| {
+    let within = |columns: &[Vec<[f64; 3]>], threshold: f64| {
         let is_near = |&slot: &usize| {
-            columns.iter().any(|rows| distance(&rows[slot / slots], point(slot)) <= most)
+            columns.iter().any(|rows| distance(&rows[slot / slots], point(slot)) <= threshold)
         };
         let n = (0..secret.n_slots()).filter(is_near).count();
         100.0 * n as f64 / secret.n_slots().max(1) as f64
@@ -48,12 +48,12 @@ pub(crate) fn follows_places(
         let away = |by: usize| distance(record(*at), record(at + by));
         away(1) < away(n / 2)
     };
-    let told = (0..n).filter(nearer).count();
+    let n_nearer = (0..n).filter(nearer).count();
     // By chance a half; the margin is four standard deviations.
-    let is_ordered = told as f64 > 0.5 * n as f64 + 2.0 * (n as f64).sqrt();
+    let is_ordered = n_nearer as f64 > 0.5 * n as f64 + 2.0 * (n as f64).sqrt();
     let order = is_ordered.then(|| {
         format!(
-            "order of records: after {told} of {n} comes one nearer by than another, where half are so by chance: the order \
+            "order of records: after {n_nearer} of {n} comes one nearer by than another, where half are so by chance: the order \
              gives places away, and no attack uses it (release records in random order)"
         )
     });
@@ -73,12 +73,12 @@ fn columns(rows: &Descriptors, secret: &Secret, points: &[[f64; 3]]) -> Vec<Stri
         [0, 1, 2].map(|c| slots.clone().map(|s| points[secret.hidden()[s].index()][c]).collect());
     let follows =
         |column: &Vec<f64>| places.iter().any(|axis| correlation(column, axis).abs() > FOLLOWS);
-    let said = |at: usize| {
+    let doubt = |at: usize| {
         format!(
             "descriptors: column {at} follows a coordinate, and no attack uses it: leave it out"
         )
     };
-    (0..values.len()).filter(|&at| follows(&values[at])).map(said).collect()
+    (0..values.len()).filter(|&at| follows(&values[at])).map(doubt).collect()
 }
 
 /// Returns Pearson's correlation of two columns; 0 if one is constant.

@@ -108,6 +108,7 @@ impl<const D: usize> Source<D> for ByDescriptors {
 #[cfg(test)]
 mod tests {
     use unlift::descriptors::Values;
+    use unlift::neighbors::KeptLists;
     use unlift::obfuscate::{obfuscate, olc::Olc};
     use unlift::seed::Key;
     use unlift::truth::Original;
@@ -140,6 +141,24 @@ mod tests {
         assert_eq!(best(floats(128), 128), ("learned".to_owned(), true));
         assert_eq!(best(floats(64), 64), ("similarity".to_owned(), false));
     }
+
+    #[test]
+    fn kept_lists_of_a_network_equal_those_of_the_map_alone() {
+        let sift = Values::U8((0..128 * 200).map(|at: usize| (at * at % 97) as u8).collect());
+        let descriptors = Descriptors::try_new(sift, 128).unwrap();
+        let points = (0..200).map(|at| [f64::from(at), f64::from(at % 7), f64::from(at % 11)]);
+        let original = Original::new(PointSet::try_new(points.collect(), Unit::Meter).unwrap());
+        let [a, b] = [1, 2].map(|seed| {
+            obfuscate(&Olc, &original, Some(&descriptors), &Key::from_seed(seed)).unwrap().0
+        });
+        for name in ["learned", "descriptors"] {
+            let source = named(name).unwrap().of_dimension::<3>().unwrap();
+            let lists = |map| source.lists(map, 12, 0).unwrap();
+            assert_ne!(lists(&a), lists(&b), "{name}: records are in another order");
+            assert_eq!(KeptLists::new(&a, &lists(&a)).unwrap().of(&b), Some(lists(&b)), "{name}");
+        }
+    }
+
     #[test]
     fn lists_that_agree_better_decide_between_aliked_and_others() {
         let photo = "../unlift-cli/src/demo/photos/coffee.jpg".as_ref();

@@ -137,8 +137,6 @@ pub struct Points {
     pub ids: Vec<u64>,
     /// Coordinates `(n, 3)` in units of the model. Not finite if the file has no position.
     pub positions: Vec<[f64; 3]>,
-    /// Colors `(n, 3)`: red, green, blue.
-    pub colors: Vec<[u8; 3]>,
     /// The observations of each point, if requested.
     pub tracks: Option<Tracks>,
 }
@@ -273,7 +271,6 @@ fn sorted(points: Points) -> Points {
     Points {
         ids: order.iter().map(|&row| points.ids[row]).collect(),
         positions: order.iter().map(|&row| points.positions[row]).collect(),
-        colors: order.iter().map(|&row| points.colors[row]).collect(),
         tracks,
     }
 }
@@ -333,14 +330,12 @@ fn binary_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
     let n = bytes.count("points", POINT3D_BYTES)? as usize;
     let mut ids = Vec::with_capacity(n);
     let mut positions = Vec::with_capacity(n);
-    let mut colors = Vec::with_capacity(n);
     let mut tracks = with_tracks.then(Tracks::new);
     for number in 1..=n as u64 {
         bytes.record(number);
         let id = bytes.u64("point id")?;
         let position = bytes.doubles::<3>("coordinates")?;
-        let mut color = [0; 3];
-        bytes.fill(&mut color, "color")?;
+        bytes.skip(3, "color")?;
         bytes.skip(8, "reprojection error")?;
         let n_observations = bytes.count("observations", OBSERVATION_BYTES)?;
         if let Some(tracks) = &mut tracks {
@@ -354,10 +349,9 @@ fn binary_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
         }
         ids.push(id);
         positions.push(position);
-        colors.push(color);
     }
     bytes.end()?;
-    Ok(Points { ids, positions, colors, tracks })
+    Ok(Points { ids, positions, tracks })
 }
 
 fn next<'a, T: std::str::FromStr>(
@@ -443,7 +437,7 @@ fn text_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
         let mut words = words(lines.line());
         let id: u64 = next(&lines, &mut words, "a point id")?;
         let position = coordinates::<3>(&lines, &mut words, "3 coordinates")?;
-        let color = coordinates::<3>(&lines, &mut words, "a color (3 numbers)")?;
+        coordinates::<3>(&lines, &mut words, "a color (3 numbers)")?;
         coordinates::<1>(&lines, &mut words, "a reprojection error")?;
         if let Some(tracks) = &mut points.tracks {
             while let Some(word) = words.next() {
@@ -462,8 +456,6 @@ fn text_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
         }
         points.ids.push(id);
         points.positions.push(position);
-        // A cast saturates.
-        points.colors.push(color.map(|x| x as u8));
     }
     Ok(points)
 }
@@ -486,7 +478,6 @@ mod tests {
         let points = Points {
             ids: vec![7, 2],
             positions: vec![[7.0; 3], [2.0; 3]],
-            colors: vec![[7; 3], [2; 3]],
             tracks: Some(Tracks {
                 offsets: vec![0, 2, 3],
                 observations: vec![(7, 0), (7, 1), (2, 0)],
@@ -495,7 +486,6 @@ mod tests {
         let sorted = sorted(points);
         assert_eq!(sorted.ids, [2, 7]);
         assert_eq!(sorted.positions, [[2.0; 3], [7.0; 3]]);
-        assert_eq!(sorted.colors, [[2; 3], [7; 3]]);
         let tracks = sorted.tracks.unwrap();
         assert_eq!(tracks.row(0), [(2, 0)]);
         assert_eq!(tracks.row(1), [(7, 0), (7, 1)]);

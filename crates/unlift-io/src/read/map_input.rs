@@ -10,8 +10,6 @@ pub struct Input {
     pub positions: Vec<[f64; 3]>,
     /// Ids `(n,)`, ascending: those of COLMAP, else rows of the file, counted from 0.
     pub ids: Vec<u64>,
-    /// Colors `(n, 3)` of the points in a COLMAP model: red, green, blue. Otherwise empty.
-    pub colors: Vec<[u8; 3]>,
     /// Rows of points that are left out because a coordinate is not finite, among all points in the
     /// order of `positions`.
     pub left_out: Vec<u64>,
@@ -71,9 +69,8 @@ impl Input {
         let mut notes = Vec::new();
         if !self.left_out.is_empty() {
             let is_kept = |row: &u64| self.left_out.binary_search(row).is_err();
-            let (mut row, mut color) = (0.., 0..);
+            let mut row = 0..;
             self.ids.retain(|_| row.next().is_some_and(|row| is_kept(&row)));
-            self.colors.retain(|_| color.next().is_some_and(|row| is_kept(&row)));
             self.positions.retain(|position| position.iter().all(|x| x.is_finite()));
             let note = format!("{} of {n} points have no place", self.left_out.len());
             if self.left_out.len() as f64 > MOST_LEFT_OUT * n as f64 {

@@ -230,7 +230,7 @@ fn colmap_model(model: &Model) -> Result<Input, Error> {
         return Ok(input);
     }
     let points = colmap::read_points(&model.points, false)?;
-    (input.ids, input.positions, input.colors) = (points.ids, points.positions, points.colors);
+    (input.ids, input.positions) = (points.ids, points.positions);
     input.format = if extension == "bin" { "COLMAP binary" } else { "COLMAP text" };
     Ok(input)
 }

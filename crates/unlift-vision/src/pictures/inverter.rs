@@ -78,9 +78,8 @@ pub(crate) fn check_size([width, height]: [usize; 2]) -> Result<(), Error> {
 /// [`CELL`] pixels: `(1, columns + 3, height, width)`, or `(1, columns + 7, height, width)` with
 /// `colored`.
 ///
-/// Channels: the descriptor (of unit length, times the root of its columns); with `colored`, red,
-/// green and blue from -2 to 2, and 1 if they are known; the position inside the cell from -1 to 1;
-/// the weight. Several points in a cell give their weighted mean and the
+/// Channels: the descriptor (of unit length, times the root of its columns); with `colored`, four for
+/// the color of the point, which is not known; the position inside the cell from -1 to 1; the weight. Several points in a cell give their weighted mean and the
 /// largest weight; with depths, the nearest point. Cells without points are zero.
 ///
 /// # Errors
@@ -94,7 +93,6 @@ pub fn feature_image(
     points.check()?;
     check_size(size)?;
     let dim = points.descriptors.dim();
-    let colors = points.descriptors.colors().filter(|_| colored);
     let columns = dim + if colored { COLOR } else { 0 };
     let [width, height] = size.map(|side| side.div_ceil(CELL));
     let plane = width * height;
@@ -119,10 +117,6 @@ pub fn feature_image(
         let length = row[..dim].iter().map(|x| x * x).sum::<f32>().sqrt();
         let scale = (dim as f32).sqrt() / length.max(1e-12);
         row[..dim].iter_mut().for_each(|x| *x *= scale);
-        if let Some(colors) = colors {
-            let [red, green, blue] = colors[at].map(|byte| 4.0 * (f32::from(byte) / 255.0 - 0.5));
-            row[dim..columns].copy_from_slice(&[red, green, blue, 1.0]);
-        }
         row[columns..].copy_from_slice(&inside);
         for (channel, value) in row.iter().enumerate() {
             values[channel * plane + cell] += weight * value;
@@ -159,7 +153,7 @@ impl Inverter {
     }
 
     /// Loads an inverter from a file, as `training/inversion` exports it: input `features`, which
-    /// is a [`feature_image`] (with colors for SIFT), output `picture` `(1, 3, 2 h, 2 w)`.
+    /// is a [`feature_image`] (`colored` for SIFT), output `picture` `(1, 3, 2 h, 2 w)`.
     ///
     /// # Errors
     /// If the file cannot be read, or has other inputs and outputs.
@@ -173,11 +167,6 @@ impl Inverter {
         self.network.sha256()
     }
 
-    /// Returns true if the network uses the colors of points that have some.
-    pub fn takes_colors(&self) -> bool {
-        self.kind == DescriptorKind::Sift
-    }
-
     /// Makes the picture of points in an image of `size` (width, height) pixels, at half that size,
     /// rounded down.
     ///
@@ -186,7 +175,7 @@ impl Inverter {
     /// has less than 2 pixels, or the image has more than 2^24 pixels.
     pub fn invert(&self, points: &Points<'_>, size: [usize; 2]) -> Result<ColorImage, Error> {
         self.takes(points.descriptors)?;
-        let features = feature_image(points, size, self.takes_colors())?;
+        let features = feature_image(points, size, self.kind == DescriptorKind::Sift)?;
         let [picture] = self.network.run(vec![("features", features)], ["picture"])?;
         let size = size.map(|side| side / 2);
         match *picture.shape() {

@@ -30,14 +30,10 @@ impl Columns {
         let file = SafeTensors::deserialize(GOLDEN).unwrap();
         let places = floats(&file, "places");
         let weights = floats(&file, "weights");
-        let colors = file.tensor("colors").unwrap().data().as_chunks::<3>().0.to_vec();
         let values = Values::F32(floats(&file, "descriptors"));
         Self {
             places: places.as_chunks::<2>().0.iter().map(|xy| xy.map(|x| x - 0.5)).collect(),
-            descriptors: Descriptors::try_new(values, COLUMNS)
-                .unwrap()
-                .with_colors(colors)
-                .unwrap(),
+            descriptors: Descriptors::try_new(values, COLUMNS).unwrap(),
             depths: (0..weights.len()).map(|at| (at * 7 % 31) as f32 + 1.0).collect(),
             weights,
         }
@@ -58,15 +54,12 @@ fn check(values: &[f32], expected: &[f32]) {
 }
 
 #[test]
-fn the_feature_image_is_that_of_training_and_unknown_colors_are_zero() {
-    let mut columns = Columns::golden();
+fn the_feature_image_is_that_of_training_and_colors_are_zero() {
+    let columns = Columns::golden();
     let file = SafeTensors::deserialize(GOLDEN).unwrap();
     let plain = columns.image(false, false).unwrap();
     assert_eq!(plain.shape(), [1, COLUMNS + 3, 6, 8]);
     check(plain.values(), &floats(&file, "features"));
-    check(columns.image(false, true).unwrap().values(), &floats(&file, "features_colored"));
-    let values = columns.descriptors.values().clone();
-    columns.descriptors = Descriptors::try_new(values, COLUMNS).unwrap();
     let colorless = columns.image(false, true).unwrap();
     let (before, rest) = colorless.values().split_at(COLUMNS * PLANE);
     let (colors, after) = rest.split_at(4 * PLANE);

@@ -144,11 +144,7 @@ impl Mitigation {
             Values::U8(_) => Values::U8(values.iter().map(|x| x.round() as u8).collect()),
             Values::F32(_) => Values::F32(values.iter().map(|&x| x as f32).collect()),
         };
-        let changed = Descriptors::try_new(values, dim)?;
-        match descriptors.colors() {
-            Some(colors) => changed.with_colors(colors.to_vec()),
-            None => Ok(changed),
-        }
+        Descriptors::try_new(values, dim)
     }
 }
 
