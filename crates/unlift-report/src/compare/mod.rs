@@ -197,6 +197,9 @@ fn different(old: &Document, new: &Document) -> Vec<String> {
     let scale = |scale: Option<f64>| scale.map_or("none".to_owned(), |scale| scale.to_string());
     expect("points", a.n_points.to_string(), b.n_points.to_string());
     expect("scale", scale(a.scale_m_per_unit), scale(b.scale_m_per_unit));
+    if let (Some(was), Some(is)) = (a.size(), b.size()) {
+        expect("size", was, is);
+    }
     let both = a
         .other_sha256
         .iter()

@@ -93,11 +93,16 @@ pub struct Input {
 }
 
 impl Input {
-    /// Returns the size of the map and the scale that it follows from.
-    pub fn extent(&self) -> Option<String> {
+    /// Returns the size of the map: "15.9 m x 8.2 m x 3.1 m".
+    pub fn size(&self) -> Option<String> {
         let sides = self.extent_m?.map(|side| format!("{} m", words::significant(side, 3)));
+        Some(sides.join(" x "))
+    }
+
+    /// Returns the size of the map and the scale that it follows from: "15.9 m x 8.2 m x 3.1 m at --scale 1".
+    pub fn extent(&self) -> Option<String> {
         let scale = self.scale_m_per_unit.map(|scale| format!(" at --scale {scale}"));
-        Some(sides.join(" x ") + &scale.unwrap_or_default())
+        Some(self.size()? + &scale.unwrap_or_default())
     }
 }
 

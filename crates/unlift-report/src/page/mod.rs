@@ -252,11 +252,11 @@ fn subject(document: &Document) -> Subject {
     let metric = of != LengthUnit::KthNeighbor;
     let unit = match (metric, input.scale_m_per_unit, input.unit_in_map_units) {
         (true, ..) if of == LengthUnit::Pixel => "Lengths are in pixels.".to_owned(),
-        (true, Some(scale), _) => {
-            let extent = input.extent().map(|extent| extent + ". ").unwrap_or_default();
-            format!("{extent}Meters, by the declared scale of {scale} m per map unit.")
+        (true, scale, _) => {
+            let by =
+                scale.map(|scale| format!(", by the declared scale of {scale} m per map unit"));
+            input.size().unwrap_or("Meters".to_owned()) + &by.unwrap_or_default() + "."
         }
-        (true, None, _) => format!("{} Meters.", input.extent().unwrap_or_default()),
         (false, _, Some(unit)) => {
             format!("Here it is {} map units.", words::significant(unit, 4))
         }
