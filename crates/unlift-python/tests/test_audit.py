@@ -180,7 +180,7 @@ def test_what_a_function_raises_is_the_cause(small):
 def test_progress_is_told_and_may_stop(small):
     told = []
     cheap(small, ["olc", "cp"], progress=lambda done, total, what: told.append((done, total, what)))
-    assert told[-1][0] == told[-1][1] == 2 or told[-1][1] == 2
+    assert told[-1][0] == told[-1][1] >= 2
     assert all(isinstance(what, str) for _, _, what in told)
 
     def stop(done, total, what):
@@ -208,8 +208,9 @@ def test_reports_are_saved_and_tables_read_by_others(small, tmp_path):
     rows = report.rows._repr_html_()
     assert rows.startswith("<table>") and "<td>olc</td>" in rows and "<th>recovered_percent_within_0.10</th>" in rows
     if PROGRAM is not None:
-        csv = subprocess.run([PROGRAM, "table", tmp_path / "out" / "audit.json", "--format", "csv"], capture_output=True, text=True)
-        heads, cells = (line.split(",") for line in csv.stdout.splitlines()[:2])
+        csv = tmp_path / "rows.csv"
+        subprocess.run([PROGRAM, "table", tmp_path / "out" / "audit.json", "--out", csv], check=True, capture_output=True)
+        heads, cells = (line.split(",") for line in csv.read_text().splitlines()[:2])
         # Unknown values have no column; nor has a single repeat.
         known = {head for head, cell in zip(heads, cells) if cell} - {"repeats"}
         assert len(known) > 15 and known <= set(report.rows.columns)

@@ -75,9 +75,9 @@ def program(line, folder, code=0):
 def test_figures_are_those_of_the_command_line(images, tmp_path):
     database(tmp_path / "database.db", images)
     line = "audit images database.db --schemes lines2d,dcl2d --neighbors oracle --neighbors overlap --inlier-ratios 0.5,0.3"
-    line += " --k 10 --seed 7 --repeats 2 --gate all@0.5:10<=1 --show b.jpg --quiet --out cli"
+    line += " --k 10 --seed 7 --repeats 2 --gate all@0.5:10<=1 --quiet --out cli"
     cli = program(line, tmp_path, code=1)
-    options = {"inlier_ratios": [0.5, 0.3], "k": 10, "seed": 7, "repeats": 2, "gates": "all@0.5:10<=1", "show": "b.jpg"}
+    options = {"inlier_ratios": [0.5, 0.3], "k": 10, "seed": 7, "repeats": 2, "gates": "all@0.5:10<=1"}
     given = (["lines2d", "dcl2d"], ["oracle", "overlap"])
     of_arrays = unlift.audit_images(images, *given, **options)
     assert figures(of_arrays.document) == figures(cli) and not of_arrays.passed
@@ -205,13 +205,13 @@ def test_what_functions_and_mappings_raise_is_the_cause(images):
 def test_images_of_a_file_that_cannot_be_used_are_told_and_left_out(images, tmp_path):
     path = tmp_path / "database.db"
     database(path, images)
-    whole = quick(path, "lines2d", gates="lines2d:10<=100")
+    whole = quick(path, "lines2d", gates="lines2d:oracle:10<=100")
     assert whole.passed
     with sqlite3.connect(path) as base:
         base.execute("DELETE FROM keypoints WHERE image_id = 1")
     base.close()
     with pytest.warns(UserWarning, match="b.jpg.*expected keypoints, found none"):
-        some = quick(path, "lines2d", gates="lines2d:10<=100")
+        some = quick(path, "lines2d", gates="lines2d:oracle:10<=100")
     assert some.document["input"]["images"]["unusable"] == 1 and not some.passed
     assert [one["passed"] for one in some.document["gates"]] == [True]
     rest = {name: one for name, one in images.items() if name != "b.jpg"}

@@ -12,10 +12,8 @@ import unlift
 def report(tmp_path_factory):
     folder = tmp_path_factory.mktemp("secret")
     points = np.random.default_rng(7).uniform(0, 4, (300, 3))
-    # A note about reading names a file.
     text = "\n".join(f"{i} {x} {y} {z} 0 0 0 0" for i, (x, y, z) in enumerate(points))
     (folder / "points3D.txt").write_text(text)
-    (folder / "rigs.txt").write_text("secret\n")
 
     @unlift.scheme
     def failing(points):
@@ -26,7 +24,6 @@ def report(tmp_path_factory):
         raise KeyError("secret line")
 
     m = unlift.read(folder, scale=1.0)
-    assert any("secret" in note for note in m.notes)
     return unlift.audit(
         m, ["olc", failing], ["oracle", sourcing], inlier_ratios=[0.5], solvers=["consensus"], gates=["failing:0.10<=20"]
     )
