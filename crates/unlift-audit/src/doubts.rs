@@ -3,7 +3,9 @@
 //! beside the verdict, and no gate holds with one.
 
 use unlift::audit::{Plan, Row, Threshold};
-use unlift::evaluate::{are_strangers, away_from_own, belongs, nearer_to_own, recovered_away};
+use unlift::evaluate::{
+    are_strangers, away_from_own, belongs, is_noise, nearer_to_own, recovered_away,
+};
 use unlift::geometry::frame::Bounds;
 use unlift::geometry::knn::Knn;
 use unlift::geometry::vector::{median, sub};
@@ -14,7 +16,7 @@ use unlift::{Descriptors, PointSet, Unit};
 use unlift_report::document::{GateResult, Input};
 
 use crate::Error;
-use crate::gate::Gate;
+use crate::gate::{Gate, noise};
 use crate::tiles::Tile;
 
 /// Limits of delta, in multiples of the quartiles of the distance to the K-th neighbor; beyond them
@@ -93,7 +95,9 @@ pub(crate) fn doubts(
             found.notes.push(doubt.clone());
         }
         found.of_rows.push(of_map.clone().or(of_delta));
+        found.notes.extend(noise(row, f64::INFINITY));
     }
+    found.notes.dedup();
     found
 }
 
@@ -146,12 +150,15 @@ fn distances(points: &[[f64; 3]], k: usize, sample: usize) -> Result<Vec<f64>, u
     Ok((0..points.len()).step_by(every).map(kth).collect())
 }
 
-/// Returns a doubt if points of the ground truth are far from their released records.
+/// Returns a doubt if points of the ground truth are far from their released records, other than by a scheme's noise.
 fn not_its_own(
     original: &Original<3>,
     (released, secret): &(Released<3>, Secret),
     plan: &Plan<3>,
 ) -> Option<String> {
+    if is_noise(released, original, secret) {
+        return None;
+    }
     let away = away_from_own(released, original, secret);
     stray_truth(&away, &plan.thresholds, released.unit())
 }
@@ -168,7 +175,7 @@ pub(crate) fn check_truth(
     belongs(original, released, secret)?;
     let (middle, unit) = (median(&mut away_from_own(released, original, secret)), released.unit());
     let most = APART * spread.middle;
-    if middle <= most {
+    if middle <= most || is_noise(released, original, secret) {
         return Ok(());
     }
     let expected = format!("records within {} of their own points", in_unit(most, unit));
@@ -218,31 +225,34 @@ fn mistaken_unit(unit: Unit, k: usize, middle: f64) -> Option<String> {
     })
 }
 
-/// Least share of points whose descriptor is more like that of the nearest point than like another one. Real maps have 0.71
-/// or more, those with shuffled rows a half.
-const LEAST_LIKE: f64 = 0.58;
+/// Number of other points with which a nearest point is compared.
+const OTHERS: usize = 16;
+/// Fewer points say nothing.
+const FEWEST: f64 = 30.0;
 
-/// Returns a doubt if descriptors are not like those of the nearest points, as in another order of rows.
+/// Returns a doubt if descriptors are no more like those of the nearest points than like others, as in another order of rows.
 pub fn unlike_neighbors(
     points: &PointSet<3>,
     descriptors: &Descriptors,
 ) -> Result<Option<String>, unlift::Error> {
     let (knn, n) = (Knn::new(points.positions())?, points.len());
-    let (mut nearest, mut n_like) = (Vec::new(), 0);
-    let rows = (0..n).step_by(n.div_ceil(SAMPLE).max(1));
-    let n_rows = rows.len();
+    let (mut nearest, mut share, rows) =
+        (Vec::new(), 0.0, (0..n).step_by(n.div_ceil(SAMPLE).max(1)));
+    let n_rows = rows.len() as f64;
     for row in rows {
         knn.nearest(row, 1, &mut nearest);
         let like = |other: usize| descriptors.squared_distance(row, other);
-        let is_like = |near: &(f64, u32)| like(near.1 as usize) < like((row + n / 2) % n);
-        n_like += usize::from(nearest.first().is_some_and(is_like));
+        let near = nearest.first().map_or(f32::INFINITY, |near| like(near.1 as usize));
+        let others = (1..=OTHERS).map(|at| like((row + 1 + at * (n - 1) / (OTHERS + 1)) % n));
+        let more = |other: f32| if near == other { 0.5 } else { f64::from(near < other) };
+        share += others.map(more).sum::<f64>() / (OTHERS as f64 * n_rows);
     }
-    let (share, chance) =
-        (n_like as f64 / n_rows.max(1) as f64, 1.5 / (n_rows.max(1) as f64).sqrt());
-    Ok((share + chance < LEAST_LIKE).then(|| {
+    // The share of a point deviates by 0.3, so this is three deviations.
+    Ok((n_rows >= FEWEST && share < 0.5 + 0.9 / n_rows.sqrt()).then(|| {
         format!(
-            "descriptors: {n_like} of {n_rows} are more like that of the nearest point than like another one, about as by \
-             chance: of another map, or in another order of rows?"
+            "descriptors: {:.0} % are more like that of the nearest point than like another one, where 50 % are so by \
+             chance: of another map, or in another order of rows?",
+            100.0 * share
         )
     }))
 }

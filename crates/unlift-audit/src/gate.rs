@@ -17,11 +17,13 @@
 
 use unlift::Unit;
 use unlift::audit::{NeighborsBy, NotAudited, Plan, Row, Threshold};
+use unlift::evaluate::OFF_RECORD;
 use unlift::neighbors::Needs;
 use unlift::neighbors::oracle::Noise;
 use unlift::recover::Builtin;
 use unlift_report::document::{FEWEST_HELD_OUT, GateResult, HeldOut, Localization, UNPROTECTED};
 
+use crate::doubts::short;
 use crate::{Error, sources};
 
 /// A bound on a figure of an audit.
@@ -401,6 +403,22 @@ fn untried<const D: usize>(gate: &Gate, plan: &Plan<D>, described: bool) -> Opti
     })
 }
 
+/// Share of a threshold that noise of records may take. Attacks stay on records, and others may average noise away.
+const NOISE: f64 = 0.1;
+
+/// Returns a line about a row whose points are off their records, if that matters within `threshold`; always if it is infinite.
+pub(crate) fn noise(row: &Row, threshold: f64) -> Option<String> {
+    let off = *row.metrics.get(OFF_RECORD)?;
+    (!threshold.is_finite() || off > NOISE * threshold).then(|| {
+        format!(
+            "{}: half of the points are {} or more off their records, as by noise: an attack here stays on the records and \
+             keeps this error, but others may average it away",
+            row.scheme,
+            short(off)
+        )
+    })
+}
+
 /// Returns the results of all gates. A gate fails if something it applies to was not audited, or if
 /// a row it applies to has a doubt; `doubts` has one entry per row, or is empty. A gate that names no
 /// attack needs the best one of each kind; `described` is true if the map has descriptors.
@@ -438,7 +456,9 @@ pub fn gate_results<const D: usize>(
             format!("{scheme}{with} was not audited: {}", missing.reason)
         });
         let keeps = found_percent.is_some_and(|found| gate.passes(found));
-        let doubt = doubt.map(|doubt| doubt.to_string());
+        let mut covered = rows.iter().filter(|(candidate, ..)| gate.covers(candidate));
+        let of_noise = || covered.find_map(|(_, row, _)| noise(row, gate.threshold));
+        let doubt = doubt.map(|doubt| doubt.to_string()).or_else(of_noise);
         let doubt = || doubt.or_else(|| untried(gate, plan, described));
         let reason = reason.or_else(|| if keeps { doubt() } else { None });
         // A gate without a row must never count as held.

@@ -3,6 +3,7 @@
 
 use unlift::Descriptors;
 use unlift::audit::{Alone, Threshold};
+use unlift::evaluate::correlation;
 use unlift::geometry::vector::distance;
 use unlift::released::Released;
 use unlift::truth::{Original, Secret};
@@ -49,8 +50,8 @@ pub(crate) fn follows_places(
         away(1) < away(n / 2)
     };
     let n_nearer = (0..n).filter(nearer).count();
-    // By chance a half; the margin is four standard deviations.
-    let is_ordered = n_nearer as f64 > 0.5 * n as f64 + 2.0 * (n as f64).sqrt();
+    // By chance a half; the margin is five standard deviations.
+    let is_ordered = n_nearer as f64 > 0.5 * n as f64 + 2.5 * (n as f64).sqrt();
     let order = is_ordered.then(|| {
         format!(
             "order of records: after {n_nearer} of {n} comes one nearer by than another, where half are so by chance: the order \
@@ -79,14 +80,4 @@ fn columns(rows: &Descriptors, secret: &Secret, points: &[[f64; 3]]) -> Vec<Stri
         )
     };
     (0..values.len()).filter(|&at| follows(&values[at])).map(doubt).collect()
-}
-
-/// Returns Pearson's correlation of two columns; 0 if one is constant.
-fn correlation(a: &[f64], b: &[f64]) -> f64 {
-    let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len().max(1) as f64;
-    let off = |of: &[f64], mean: f64| -> Vec<f64> { of.iter().map(|x| x - mean).collect() };
-    let sum = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
-    let (a, b) = (off(a, mean(a)), off(b, mean(b)));
-    let spread = (sum(&a, &a) * sum(&b, &b)).sqrt();
-    if spread > 0.0 { sum(&a, &b) / spread } else { 0.0 }
 }

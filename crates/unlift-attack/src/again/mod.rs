@@ -13,7 +13,7 @@ mod meet;
 mod swaps;
 
 use crate::geometry::vector::{dot, quantile, sub, widen};
-use crate::neighbors::{Blocks, MOST_ROWS, mutual};
+use crate::neighbors::{Blocks, MOST_ROWS, comparable, mutual};
 use crate::recover::{Confidence, Estimate, Recovered, Status};
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, RowOrder};
@@ -161,7 +161,8 @@ pub fn by_descriptors(a: &Released<3>, b: &Released<3>) -> Result<Solved, Error>
         let expected = format!("{} columns, as in the first release", of_a.dim());
         return Err(Error::new("descriptors", expected, of_b.dim().to_string()));
     }
-    let pairs = mutual(&Blocks::new(&of_a), &Blocks::new(&of_b));
+    let both: Vec<Blocks> = comparable(&[&of_a, &of_b]).iter().map(|of| Blocks::new(of)).collect();
+    let pairs = mutual(&both[0], &both[1]);
     let per_record = [a, b].map(Released::slots_per_record);
     let records: Vec<(usize, usize)> = pairs
         .iter()

@@ -69,19 +69,25 @@ impl DescriptorKind {
     }
 }
 
-/// Returns descriptors as they are compared: the square roots of SIFT that is not RootSIFT, the bits of bit strings as 1 and -1, whose
-/// cosine follows from the Hamming distance, and others as they are.
-pub(crate) fn comparable(descriptors: &Descriptors) -> Cow<'_, Descriptors> {
-    let dim = descriptors.dim();
-    let (values, dim) = match descriptors.values() {
-        _ if lacks_root(descriptors) => (rows(descriptors).flatten().map(f32::sqrt).collect(), dim),
-        Values::U8(bytes) if are_bits(bytes, dim) => {
-            let bits = |&byte: &u8| (0..8).map(move |bit| f32::from(byte >> bit & 1) * 2.0 - 1.0);
-            (bytes.iter().flat_map(bits).collect(), 8 * dim)
+/// Returns sets of descriptors as they are compared, in the form that the largest set needs: the square roots of SIFT that is not
+/// RootSIFT, the bits of bit strings as 1 and -1, whose cosine follows from the Hamming distance, and others as they are.
+pub(crate) fn comparable<'a>(sets: &[&'a Descriptors]) -> Vec<Cow<'a, Descriptors>> {
+    let Some(largest) = sets.iter().max_by_key(|set| set.len()) else { return Vec::new() };
+    let lacks_root = lacks_root(largest);
+    let are_bits = matches!(largest.values(), Values::U8(bytes) if are_bits(bytes, largest.dim()));
+    let are_bytes = sets.iter().all(|set| matches!(set.values(), Values::U8(_)));
+    let bits = |&byte: &u8| (0..8).map(move |bit| f32::from(byte >> bit & 1) * 2.0 - 1.0);
+    let owned = |values, dim| Cow::Owned(Descriptors::unchecked(Values::F32(values), dim));
+    let of = |&set: &&'a Descriptors| match set.values() {
+        _ if lacks_root => {
+            owned(rows(set).flatten().map(|x| x.max(0.0).sqrt()).collect(), set.dim())
         }
-        _ => return Cow::Borrowed(descriptors),
+        Values::U8(bytes) if are_bits && are_bytes => {
+            owned(bytes.iter().flat_map(bits).collect(), 8 * set.dim())
+        }
+        _ => Cow::Borrowed(set),
     };
-    Cow::Owned(Descriptors::unchecked(Values::F32(values), dim))
+    sets.iter().map(of).collect()
 }
 
 /// Returns whether SIFT descriptors lack RootSIFT's square root.
@@ -108,7 +114,7 @@ fn rows(descriptors: &Descriptors) -> impl Iterator<Item = Vec<f32>> {
 
 /// Returns whether rows of bytes are bit strings (ORB, BRIEF, AKAZE): bits of all weights are about as often 1 as 0, and rows differ in
 /// length, from 0 and from the mean value. Numbers have rarely set high bits or rows of one length. Rows of 128 bytes are SIFT.
-fn are_bits(bytes: &[u8], dim: usize) -> bool {
+pub fn are_bits(bytes: &[u8], dim: usize) -> bool {
     let n = bytes.len() as f64;
     let is_balanced = |bit: u32| {
         let ones = bytes.iter().filter(|&&byte| byte >> bit & 1 == 1).count();
@@ -143,8 +149,8 @@ mod tests {
         let root = |x: &f32| x.sqrt();
         let of = |values: Vec<f32>| Descriptors::try_new(Values::F32(values), 128).unwrap();
         let [rooted, plain] = [of(plain.iter().map(root).collect()), of(plain)];
-        assert_eq!(*comparable(&plain), rooted);
-        assert_eq!(*comparable(&rooted), rooted);
+        assert_eq!(*comparable(&[&plain])[0], rooted);
+        assert_eq!(*comparable(&[&rooted])[0], rooted);
     }
 
     #[test]
@@ -155,13 +161,13 @@ mod tests {
         let of = |bytes: &[u8], dim| Descriptors::try_new(Values::U8(bytes.to_vec()), dim).unwrap();
         let (bits, low) = (bytes(256), bytes(90));
         for dim in [32, 64] {
-            let compared = comparable(&of(&bits, dim)).into_owned();
+            let compared = comparable(&[&of(&bits, dim)]).remove(0).into_owned();
             let all: u32 = (0..dim).map(|at| (bits[at] ^ bits[dim + at]).count_ones()).sum();
             assert_eq!(compared.dim(), 8 * dim);
             assert_eq!(compared.squared_distance(0, 1), 4.0 * all as f32);
-            assert_eq!(*comparable(&of(&low, dim)), of(&low, dim));
+            assert_eq!(*comparable(&[&of(&low, dim)])[0], of(&low, dim));
         }
-        assert_eq!(comparable(&of(&bits, 128)).dim(), 128);
+        assert_eq!(comparable(&[&of(&bits, 128)])[0].dim(), 128);
     }
 
     #[test]

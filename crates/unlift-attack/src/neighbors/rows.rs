@@ -56,7 +56,7 @@ impl<'a> Rows<'a> {
             Error::new("released map", "descriptors, which this source compares", "none")
         })?;
         let rows = Self::of_map(descriptors, released, k)?;
-        Ok(Self { descriptors: comparable(descriptors), ..rows })
+        Ok(Self { descriptors: comparable(&[descriptors]).remove(0), ..rows })
     }
 
     /// Creates the rows of a released map from a matrix with a row per slot, for lists of `k` records.

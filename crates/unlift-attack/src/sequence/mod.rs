@@ -15,8 +15,8 @@ use rayon::prelude::*;
 use triangulate::{Fit, MISS, MOST_HYPOTHESES, Sight, triangulate};
 
 use crate::geometry::frame::Bounds;
-use crate::geometry::vector::{dot, median, sub, widen};
-use crate::neighbors::{Blocks, Neighborhoods, mutual};
+use crate::geometry::vector::{distance, dot, median, sub, widen};
+use crate::neighbors::{Blocks, Neighborhoods, comparable, mutual};
 use crate::recover::{Confidence, Estimate, RecoverOptions, Recovered, Status, recover_from};
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, RowOrder, Unit};
@@ -213,19 +213,35 @@ pub fn recover(
     })
 }
 
-/// Recovers the keypoints of a query also from its lists of neighbors. `known` has the positions that [`recover`] found; those that
-/// are more likely right than wrong stay as they are until exact constraints apply. The result has no confidence.
+/// Positions of a sequence with at least this probability tell how often lists alone are right.
+const SURE: f32 = 0.9;
+/// Lists alone are right if they place a keypoint this near to a sure position, in pixels.
+const NEAR_PX: f64 = 10.0;
+
+/// Recovers the keypoints of a query also from its lists of neighbors. `known` has the positions that [`recover`] found, and `alone`
+/// those that lists alone give. Known positions that are more likely right than wrong, and than those of lists alone, stay as they are
+/// until exact constraints apply. The result has no confidence.
 ///
 /// # Errors
 /// When the lists do not have one row per slot, or the arguments are of different queries.
 pub fn with_lists(
     known: &Recovered<2>,
     query: &Query,
-    lists: &Neighborhoods,
+    (lists, alone): (&Neighborhoods, &Recovered<2>),
     seed: u64,
 ) -> Result<Recovered<2>, Error> {
+    let confidence = known.confidence().unwrap_or_default();
+    let is_sure = |slot: &usize| confidence[*slot].found >= SURE;
+    let sure: Vec<usize> = (0..confidence.len()).filter(is_sure).collect();
+    let is_right = |slot: &&usize| {
+        let both = known.position(**slot).zip(alone.position(**slot));
+        both.is_some_and(|(a, b)| distance(&a, &b) <= NEAR_PX)
+    };
+    let right = sure.iter().filter(is_right).count() as f32 / sure.len().max(1) as f32;
+    let kept = |row: &Confidence| if row.found > right { *row } else { Confidence::LOST };
+    let known = known.clone().with_confidence(confidence.iter().map(kept).collect())?;
     let options = RecoverOptions { seed, ..RecoverOptions::default() };
-    recover_from(known, &query.released, lists, &options)
+    recover_from(&known, &query.released, lists, &options)
 }
 
 /// Predicts whether a fit is right, and its error. A fit is right if more views agree than chance would give: wrong lines pass near the
@@ -284,6 +300,7 @@ impl Links {
             let what = format!("descriptors of query {at}");
             return Err(Error::new(what, expected, described[at].dim().to_string()));
         }
+        let described = comparable(&described);
         let blocks: Vec<Blocks> = described.par_iter().map(|rows| Blocks::new(rows)).collect();
         let pairs: Vec<(usize, usize)> = (0..queries.len())
             .flat_map(|a| (a + 1..queries.len().min(a + reach)).map(move |b| (a, b)))

@@ -19,7 +19,8 @@ use unlift::audit::{NeighborsBy, Plan, Row, Seconds};
 use unlift::evaluate::evaluate;
 use unlift::neighbors::{Neighborhoods, Source, of_what_there_is};
 use unlift::obfuscate::{Scheme, obfuscate};
-use unlift::recover::Recovered;
+use unlift::recover::recover as recover_map;
+use unlift::recover::{Builtin, RecoverOptions, Recovered};
 use unlift::seed::Key;
 use unlift::sequence::{Links, Query, Solved, recover, with_lists};
 use unlift::truth::Secret;
@@ -271,6 +272,13 @@ fn rows(
                 let row = hidden.row(&attack, &tracks, &job.plan)?;
                 seconds.recover += started.elapsed().as_secs_f64();
                 let (scheme, neighbors) = (scheme.name().to_owned(), format!("{by}@{n}"));
+                let share = |row: &Row| row.recovered_percent[job.plan.headline];
+                // Who has more queries can use fewer.
+                let of = |fewer: &&Row| {
+                    let is_same = fewer.neighbors.split('@').next() == Some(by);
+                    is_same && fewer.scheme == scheme && share(fewer) > share(&row)
+                };
+                let row = rows.iter().rfind(of).cloned().unwrap_or(row);
                 let row = Row { scheme, neighbors, k: n, solver: SOLVER.to_owned(), ..row };
                 let strongest = if combined.is_some() { WITH_LISTS } else { SEQUENCE };
                 if let Some(inversion) = job.inversion.filter(|_| by == strongest) {
@@ -337,7 +345,7 @@ struct Hidden<'a> {
 struct Attack<'a> {
     links: &'a Links,
     /// Lists of neighbors within each query, if they are used.
-    lists: Option<&'a Vec<Neighborhoods>>,
+    lists: Option<&'a Vec<(Neighborhoods, Recovered<2>)>>,
     n: usize,
     seed: u64,
 }
@@ -389,17 +397,22 @@ impl Shares {
 }
 
 impl Hidden<'_> {
-    /// Makes the lists of neighbors within each query.
+    /// Makes the lists of neighbors within each query, and the positions that they give alone.
     fn lists(
         &self,
         source: &dyn Source<2>,
         seed: u64,
-    ) -> Result<Vec<Neighborhoods>, unlift::Error> {
-        let of_query = |(query, view): (&Query, &View)| {
-            let lists = of_what_there_is(source, &query.released, seed);
-            lists.map_err(|error| error.within(&view.name))
+    ) -> Result<Vec<(Neighborhoods, Recovered<2>)>, unlift::Error> {
+        let options = RecoverOptions { seed, ..RecoverOptions::default() };
+        let both = |query: &Query| {
+            let lists = of_what_there_is(source, &query.released, seed)?;
+            let alone = recover_map(&query.released, &lists, &Builtin::Joint, &options)?;
+            Ok((lists, alone))
         };
-        self.queries.iter().zip(self.views).map(of_query).collect()
+        let of_query = |(query, view): (&Query, &View)| {
+            both(query).map_err(|error: unlift::Error| error.within(&view.name))
+        };
+        self.queries.par_iter().zip(self.views).with_max_len(1).map(of_query).collect()
     }
 
     /// Attacks every query. `tracks` says which links are right.
@@ -439,7 +452,8 @@ impl Hidden<'_> {
         let mut solved = recover(&self.queries, attack.links, query, self.window(query, attack.n))?;
         if let Some(lists) = attack.lists {
             let own = &self.queries[query];
-            solved.recovered = with_lists(&solved.recovered, own, &lists[query], attack.seed)?;
+            let (lists, alone) = &lists[query];
+            solved.recovered = with_lists(&solved.recovered, own, (lists, alone), attack.seed)?;
         }
         Ok(solved)
     }

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 use unlift::geometry::frame::Bounds;
+use unlift::geometry::vector::distance;
 use unlift::seed::{Draws, Stage};
 use unlift::sequence::Camera;
 use unlift::truth::Original;
@@ -102,15 +103,15 @@ impl Model {
         self.positions.len()
     }
 
-    /// Returns the views of all images that are in the model and in `source`, in the order of their
-    /// names (`2.jpg` before `10.jpg`), and an error for each that cannot be used. `path` names the source in errors.
+    /// Returns the views of all images that are in the model and in `source`, in the order of [`in_time`], and an error for each that
+    /// cannot be used. `path` names the source in errors.
     pub fn views(
         &self,
         (source, path): (&FeatureSource, &Path),
         pose_error: Option<(PoseError, u64)>,
     ) -> Vec<Result<View, crate::Error>> {
         let names = source.names();
-        let mut both: Vec<(usize, usize)> = names
+        let both: Vec<(usize, usize)> = names
             .iter()
             .enumerate()
             .filter_map(|(at, name)| {
@@ -120,7 +121,12 @@ impl Model {
                 Some((at, of.ok()?))
             })
             .collect();
-        both.sort_by_cached_key(|&(at, _)| natural(&names[at]));
+        let image = |&(at, of): &(usize, usize)| {
+            let image = &self.images[of];
+            (&*names[at], image.id, image.center)
+        };
+        let order = in_time(&both.iter().map(image).collect::<Vec<_>>());
+        let both: Vec<(usize, usize)> = order.into_iter().map(|at| both[at]).collect();
         let view = |&(at, of): &(usize, usize)| {
             let features = source.get(at)?;
             let place = format!("image {}", features.name.escape_debug());
@@ -236,6 +242,19 @@ fn bounds(lens: &Lens, size: [f64; 2]) -> Option<Bounds<2>> {
     Bounds::try_new(low, high).ok()
 }
 
+/// Orders images, each with its name, id and place, by their names as people count, or by their ids if the path of the camera is shorter
+/// so: ids follow a list of images or the time at which they were added.
+fn in_time(images: &[(&str, u32, [f64; 3])]) -> Vec<usize> {
+    let mut by_name: Vec<usize> = (0..images.len()).collect();
+    let mut by_id = by_name.clone();
+    by_name.sort_by_cached_key(|&at| natural(images[at].0));
+    by_id.sort_by_key(|&at| images[at].1);
+    let length = |order: &[usize]| -> f64 {
+        order.windows(2).map(|two| distance(&images[two[0]].2, &images[two[1]].2)).sum()
+    };
+    if length(&by_id) < length(&by_name) { by_id } else { by_name }
+}
+
 /// Returns a key that sorts names as people count: `2.jpg` before `10.jpg`.
 ///
 /// A run of digits becomes its length without zeros in front, and itself. Names that differ in such zeros alone stay in their order.
@@ -288,15 +307,19 @@ fn turned(rotation: &[[f64; 3]; 3], axis: [f64; 3], angle: f64) -> [[f64; 3]; 3]
 
 #[cfg(test)]
 mod tests {
-    use super::natural;
+    use super::in_time;
 
     #[test]
-    fn names_are_ordered_as_people_count() {
+    fn images_are_ordered_as_people_count_unless_ids_make_a_shorter_path() {
         let ordered = ["a/2.jpg", "a/010.jpg", "a/11.jpg", "a/b1c9.png", "a/b1c10.png", "b/1.jpg"];
-        let mut names = ordered;
-        names.sort_unstable();
-        assert_ne!(names, ordered);
-        names.sort_by_cached_key(|name| natural(name));
-        assert_eq!(names, ordered);
+        let of = |place: fn(usize) -> usize| {
+            let image =
+                |at: usize| (ordered[at], (at * 5 % 6) as u32, [place(at) as f64, 0.0, 0.0]);
+            let images: Vec<_> = [3, 0, 5, 1, 4, 2].map(image).to_vec();
+            in_time(&images).into_iter().map(|at| images[at].0).collect::<Vec<_>>()
+        };
+        assert_eq!(of(|at| at), ordered);
+        assert_eq!(of(|_| 0), ordered);
+        assert_eq!(of(|at| at * 5 % 6), [0, 5, 4, 3, 2, 1].map(|at| ordered[at]));
     }
 }

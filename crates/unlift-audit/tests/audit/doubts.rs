@@ -1,6 +1,7 @@
 //! Audits whose gates would hold without doubts, because the attack was weak or the ground truth
 //! was of another map.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -14,7 +15,9 @@ use unlift::truth::{Original, OriginalId, Secret};
 use unlift::{Descriptors, PointSet, Unit};
 use unlift_audit::{
     Audited, Error, Gate, Job, Preparation, Prepared, maps, prepare, read_from_file,
+    unlike_neighbors,
 };
+use unlift_io::read;
 
 use crate::schemes;
 
@@ -151,6 +154,25 @@ fn a_truth_in_another_scale_is_no_protection() {
     assert!(reason(&found).contains(&told), "{}", reason(&found));
 }
 
+/// A scheme that moves points before it hides them is measured. Its noise is part of the figures, which others may average away.
+#[test]
+fn noise_of_records_is_measured_and_no_protection() {
+    let truth = prepared(&room());
+    let mut draws = Key::from_seed(7).draws(Stage::Scheme, 1);
+    for (noise, held) in [(0.005, [true; 2]), (0.02, [false, true]), (0.5, [false; 2])] {
+        let moved = room().iter().map(|p| p.map(|x| x + noise * draws.normal())).collect();
+        let moved = Original::new(PointSet::try_new(moved, Unit::Meter).unwrap());
+        let olc = &schemes(&["olc"], Unit::Meter)[0];
+        let hidden = obfuscate(&**olc, &moved, None, &Key::from_seed(1)).unwrap();
+        for (threshold, held) in ["0.10", "0.25"].into_iter().zip(held) {
+            let gate = format!("olc:joint:{threshold}<=100");
+            let found = audit(&truth, Some(&hidden), plan(&["olc"]), &gate).unwrap();
+            assert_eq!(found.document.gates[0].passed, held, "{noise} {gate}");
+            assert!(held || reason(&found).contains("off their records, as by noise"));
+        }
+    }
+}
+
 /// Lengths in millimeters are declared as multiples of the distance to the K-th neighbor.
 #[test]
 fn a_unit_that_is_only_stated_is_no_protection() {
@@ -217,6 +239,30 @@ fn descriptors_in_another_order_are_doubted() {
     assert!(doubts(|at| at).is_empty());
     let found = doubts(|at| at * 7 % N);
     assert!(found[0].ends_with("of another map, or in another order of rows?"), "{found:?}");
+}
+
+/// Ten orders of the rows of each real scene. Of every part of a map, as filters leave it, the right order passes.
+#[test]
+fn descriptors_of_real_maps_are_told_from_those_in_another_order() {
+    for scene in ["castle", "fountain", "redkitchen", "redkitchen-aliked"] {
+        let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+        let Ok(map) = read::open(&shared.join(scene)) else {
+            println!("skipped: shared/data/{scene} is not beside the repository");
+            continue;
+        };
+        let all = read::descriptors(&shared.join(scene).join("descriptors.bin"), &map).unwrap();
+        for at in 0..10 {
+            let mut draws = Key::from_seed(at).draws(Stage::Subset, 0);
+            let mut order = draws.permutation(all.len());
+            order.truncate(all.len() >> (at % 4));
+            let place = |&row: &u32| map.positions[row as usize];
+            let points = PointSet::try_new(order.iter().map(place).collect(), Unit::Meter).unwrap();
+            let doubt = |order: &[u32]| unlike_neighbors(&points, &all.select(order)).unwrap();
+            assert_eq!(doubt(&order), None, "{scene}, part {at}");
+            draws.shuffle(&mut order);
+            assert!(doubt(&order).is_some(), "{scene}, part {at}");
+        }
+    }
 }
 
 /// Lines of another program: feet that are the points, records in an order that follows places, and columns of descriptors.

@@ -14,9 +14,15 @@ fn random(at: usize) -> f64 {
 /// Creates a map in `a.csv`, a version without its last tenth in `b.csv`, and descriptors of both.
 fn maps() -> Place {
     let place = Place::empty();
+    let place = |at: usize| [0, 1, 2].map(|c| random(3 * at * at % 7907 + c * 131 + at));
     let point = |at: usize| {
-        let [x, y, z] = [0, 1, 2].map(|c| random(3 * at * at % 7907 + c * 131 + at));
+        let [x, y, z] = place(at);
         format!("{},{},{}\n", 5.0 * x, 4.0 * y, 3.0 * z)
+    };
+    // Near points have similar descriptors.
+    let value = |at: usize| match at % 8 {
+        c @ 0..3 => (place(at / 8)[c] * 255.0) as u8,
+        _ => (random(at * at % 7919 + at) * 64.0) as u8,
     };
     for (name, n) in [("a", N_POINTS), ("b", N_POINTS - N_POINTS / 10)] {
         let points: String = (0..n).map(point).collect();
@@ -27,7 +33,7 @@ fn maps() -> Place {
         bytes.extend(8u32.to_le_bytes());
         bytes.extend(1u32.to_le_bytes());
         (0..n as u64).for_each(|row| bytes.extend(row.to_le_bytes()));
-        bytes.extend((0..8 * n).map(|at| (random(at * at % 7919 + at) * 255.0) as u8));
+        bytes.extend((0..8 * n).map(value));
         fs::write(place.path(&format!("{name}.bin")), bytes).unwrap();
     }
     place

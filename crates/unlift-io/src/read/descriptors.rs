@@ -8,6 +8,7 @@ use std::path::Path;
 
 use unlift::Descriptors;
 use unlift::descriptors::Values;
+use unlift::neighbors::are_bits;
 
 use super::bytes::{Bytes, Scalar};
 use super::colmap::{self, Image};
@@ -32,7 +33,7 @@ const HDF5: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
 ///   else in the order of the file;
 /// - a COLMAP `database.db`, or hloc's `features.h5`: a row is the mean of the descriptors in the
 ///   point's track, with images joined by name. Bytes are scaled to L2 norm 512, rounded and
-///   clipped to 0..=255; floats are scaled to norm 1.
+///   clipped to 0..=255; floats are scaled to norm 1. Of bit strings, a bit is that of most observations.
 ///
 /// # Errors
 /// When the file cannot be read, is malformed or of another format, lacks a point or an observation
@@ -223,7 +224,8 @@ fn mean(
     (images, observations): &(Vec<Image>, Vec<Observation>),
     stored: impl Fn(&Image) -> Result<Stored, Error>,
 ) -> Result<Descriptors, Error> {
-    let (mut layout, mut alike) = (None, Alike::default());
+    let (mut layout, mut alike, mut has_bits) = (None, Alike::default(), false);
+    let bits = |&byte: &u8| (0..8).map(move |bit| f64::from(byte >> bit & 1) * 2.0 - 1.0);
     for seen in observations.chunk_by(|a, b| a.0 == b.0) {
         let id = seen[0].0;
         let Ok(image) = images.binary_search_by_key(&id, |image| image.id) else {
@@ -246,7 +248,8 @@ fn mean(
             return wrong(expected, format!("{dim} {kind}"));
         }
         if alike.dim == 0 {
-            alike = Alike::new(input.ids.len(), dim);
+            has_bits = matches!(&values, Values::U8(bytes) if are_bits(bytes, dim));
+            alike = Alike::new(input.ids.len(), if has_bits { 8 * dim } else { dim });
         }
         let mut rows: Vec<f64> = Vec::with_capacity(seen.len() * dim);
         for &(_, index, _) in seen {
@@ -257,6 +260,7 @@ fn mean(
             }
             let row = index * dim..(index + 1) * dim;
             match &values {
+                Values::U8(values) if has_bits => rows.extend(values[row].iter().flat_map(bits)),
                 Values::U8(values) => rows.extend(values[row].iter().map(|&x| f64::from(x))),
                 Values::F32(values) => rows.extend(values[row].iter().map(|&x| f64::from(x))),
             }
@@ -269,7 +273,11 @@ fn mean(
     alike.check().map_err(|(expected, found)| Error::new(path, "", expected, found))?;
     let mut sums = alike.sums;
     let (kind, dim) = layout.unwrap_or(("bytes", 1));
-    let values = if kind == "bytes" {
+    let values = if has_bits {
+        let byte =
+            |bits: &[f64]| bits.iter().rev().fold(0, |byte, &x| byte << 1 | u8::from(x > 0.0));
+        Values::U8(sums.chunks_exact(8).map(byte).collect())
+    } else if kind == "bytes" {
         normalize(&mut sums, dim, BYTE_NORM);
         // Ties to even, like NumPy.
         let byte = |x: &f64| x.round_ties_even().clamp(0.0, 255.0) as u8;

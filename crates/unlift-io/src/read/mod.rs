@@ -113,6 +113,13 @@ const OTHERS_IN_FOLDERS: [&str; 5] = [
     "bundle/bundle.out",
 ];
 
+/// Folders in folders of other programs, and what to do.
+const FOLDERS: [(&str, &str); 3] = [
+    ("point_cloud", "3D Gaussian splats (give point_cloud/iteration_*/point_cloud.ply)"),
+    ("MeshroomCache", "a project of Meshroom (export it: aliceVision_exportColmap)"),
+    ("StructureFromMotion", "a cache of Meshroom (export it: aliceVision_exportColmap)"),
+];
+
 fn other_in_folder(path: &Path) -> Option<PathBuf> {
     OTHERS_IN_FOLDERS.map(|name| path.join(name)).into_iter().find(|file| file.is_file())
 }
@@ -180,7 +187,11 @@ fn folder(path: &Path) -> Result<Input, Error> {
     let Some(model) = Model::find(path)? else {
         return match other_in_folder(path) {
             Some(other) => file(&other),
-            None => Err(Error::new(path, "", models::EXPECTED, "none")),
+            None => {
+                let is_there = |(inside, _): &&(&str, &str)| path.join(inside).is_dir();
+                let found = FOLDERS.iter().find(is_there).map_or("none", |(_, found)| found);
+                Err(Error::new(path, "", models::EXPECTED, found))
+            }
         };
     };
     let mut input = colmap_model(&model)?;

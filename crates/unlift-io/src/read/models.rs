@@ -9,8 +9,17 @@ use crate::error::Error;
 use crate::input;
 
 /// Places of models, themselves or in numbered subfolders: COLMAP's `sparse`, hloc's `models` (its
-/// best model is in the folder itself), nerfstudio's `colmap/sparse`.
-const PLACES: [&str; 6] = ["", "sparse", "model", "models", "colmap", "colmap/sparse"];
+/// best model is in the folder itself), nerfstudio's `colmap/sparse`, ETH3D's.
+const PLACES: [&str; 8] = [
+    "",
+    "sparse",
+    "model",
+    "models",
+    "colmap",
+    "colmap/sparse",
+    "dslr_calibration_undistorted",
+    "rig_calibration_undistorted",
+];
 /// The place of undistorted models: `sparse` in it or in its numbered subfolders. They are read
 /// only if there is no other model.
 const UNDISTORTED: &str = "dense";

@@ -1,11 +1,14 @@
 //! Tests descriptors of the points of a map.
 
 use std::fs;
+use std::ops::Range;
+use std::path::Path;
 
 use half::f16;
 use unlift::Descriptors;
 use unlift::descriptors::Values;
-use unlift_io::features::{FeatureWriter, ImageFeatures};
+use unlift::seed::{Draws, Stage};
+use unlift_io::features::{FeatureWriter, ImageFeatures, round_to_half};
 use unlift_io::read::{self, Input, colmap};
 
 use super::malformed::{MANY, appended, patched};
@@ -42,7 +45,7 @@ fn row(id: u32, at: u32) -> [f32; 3] {
 }
 
 /// Writes hloc's features of the images of the project. The image `odd` has an extra keypoint.
-fn features(path: &std::path::Path, odd: &str) {
+fn features(path: &Path, odd: &str) {
     let images = colmap::read_images(&data("project/sparse/0/images.bin")).unwrap();
     let mut writer = FeatureWriter::create(path).unwrap();
     for image in images {
@@ -88,6 +91,105 @@ fn features_of_hloc_are_descriptors_of_the_points_that_they_made() {
     let told =
         "database.db: expected a COLMAP model, whose tracks lead to images, found npy points";
     assert!(line.ends_with(told), "{line}");
+}
+
+const N: usize = 60;
+
+/// Returns the point that a keypoint shows.
+fn point_of(image: usize, at: usize) -> usize {
+    (at + 7 * image) % N
+}
+
+/// Writes and reads a model of the images `kept` with `n_views` per track, and an image without keypoints.
+fn model(folder: &Path, kept: Range<usize>, n_views: usize) -> Input {
+    let (mut images, mut tracks) =
+        ("90 1 0 0 0 0 0 0 1 added.jpg\n\n".to_owned(), vec![String::new(); N]);
+    for image in kept.clone() {
+        images += &format!("{} 1 0 0 0 0 0 0 1 {image}.jpg\n", image + 1);
+        for at in 0..N {
+            let point = point_of(image, at);
+            let is_seen = (image + point) % kept.len() < n_views;
+            images += &format!("{at}.25 7 {} ", if is_seen { point as i64 + 1 } else { -1 });
+            tracks[point] +=
+                &(if is_seen { format!(" {} {at}", image + 1) } else { String::new() });
+        }
+        images += "\n";
+    }
+    let point = |(at, track): (usize, String)| format!("{} {at} 0 1 9 9 9 0{track}\n", at + 1);
+    let points: String = tracks.into_iter().enumerate().map(point).collect();
+    fs::write(folder.join("images.txt"), images).unwrap();
+    fs::write(folder.join("points3D.txt"), points).unwrap();
+    fs::write(folder.join("cameras.txt"), "1 PINHOLE 640 480 500 500 320 240\n").unwrap();
+    read::open(folder).unwrap()
+}
+
+/// Undistorted models have other cameras and places of keypoints, those of VGGSfM tracks of two images, others lack images of the
+/// database or have more.
+#[test]
+fn features_of_changed_models_pass_unless_they_are_in_another_order() {
+    let dir = tempfile::tempdir().unwrap();
+    for (kept, n_views) in [(0..8, 8), (0..8, 2), (2..5, 2), (1..8, 3)] {
+        let input = model(dir.path(), kept.clone(), n_views);
+        for is_wrong in [false, true] {
+            let row = |image: usize, at: usize| {
+                let point = if is_wrong { at } else { point_of(image, at) };
+                let draws = |of: usize| Draws::new(of as u64, Stage::Synthetic, 0);
+                let (mut of_place, mut noise) = (draws(point), draws(N + image * N + at));
+                let value = move |_| (of_place.normal() + 0.6 * noise.normal()) as f32;
+                (0..32).map(value).collect::<Vec<_>>()
+            };
+            let [h5, db] = ["f.h5", "f.db"].map(|name| dir.path().join(name));
+            let mut sql =
+                "PRAGMA foreign_keys=0; DELETE FROM images; DELETE FROM descriptors;".to_owned();
+            let mut writer = FeatureWriter::create(&h5).unwrap();
+            for image in 0..8 {
+                let mut values: Vec<f32> = (0..N).flat_map(|at| row(image, at)).collect();
+                let hex = |&x: &f32| format!("{:02x}", (60.0 * x) as u8);
+                let (id, hex): (_, String) = (50 - image, values.iter().map(hex).collect());
+                sql += &format!("INSERT INTO images VALUES({id}, '{image}.jpg', 1);");
+                sql += &format!("INSERT INTO descriptors VALUES({id}, 0, {N}, 32, x'{hex}');");
+                round_to_half(&mut values);
+                let descriptors = Descriptors::try_new(Values::F32(values), 32).ok();
+                let (name, keypoints) = (format!("{image}.jpg"), vec![[3.0, 4.0]; N]);
+                writer
+                    .append(&ImageFeatures { name, keypoints, descriptors, ..Default::default() })
+                    .unwrap();
+            }
+            writer.finish().unwrap();
+            write_database(&db, "project/database.db", &sql);
+            for path in [h5, db] {
+                let found = read::descriptors(&path, &input);
+                assert_eq!(
+                    found.is_err(),
+                    is_wrong,
+                    "{kept:?} {n_views} {path:?} {:?}",
+                    found.err()
+                );
+                fs::remove_file(path).unwrap();
+            }
+        }
+    }
+}
+
+/// The bits of a point are those of most of its observations.
+#[test]
+fn bit_strings_of_a_track_are_no_numbers() {
+    let dir = tempfile::tempdir().unwrap();
+    let input = model(dir.path(), 0..8, 8);
+    let mut draws = Draws::new(5, Stage::Synthetic, 0);
+    let bits: Vec<u8> = (0..32 * N).map(|_| draws.below(256) as u8).collect();
+    let mut sql = "PRAGMA foreign_keys=0; DELETE FROM images; DELETE FROM descriptors;".to_owned();
+    for image in 0..8 {
+        let wrong = |byte: usize| if byte % 8 == image { 0xf0 } else { 0 };
+        let byte = |(at, byte): (usize, usize)| bits[point_of(image, at) * 32 + byte] ^ wrong(byte);
+        let all = (0..N).flat_map(|at| (0..32).map(move |byte| (at, byte)));
+        let hex: String = all.map(byte).map(|x| format!("{x:02x}")).collect();
+        sql += &format!("INSERT INTO images VALUES({}, '{image}.jpg', 1);", image + 1);
+        sql += &format!("INSERT INTO descriptors VALUES({}, 0, {N}, 32, x'{hex}');", image + 1);
+    }
+    let path = dir.path().join("f.db");
+    write_database(&path, "project/database.db", &sql);
+    assert_eq!(read::descriptors(&path, &input).unwrap().values(), &Values::U8(bits));
 }
 
 /// The descriptors of the project as floats of norm 1, exact in half floats.

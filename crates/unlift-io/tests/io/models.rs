@@ -178,3 +178,29 @@ fn cameras_are_not_needed_for_points() {
         assert!(input.notes.len() == 1 && input.notes[0].contains(note), "{:?}", input.notes);
     }
 }
+
+#[test]
+fn what_other_programs_write_is_read_or_gets_a_line_that_helps() {
+    let dir = tempfile::tempdir().unwrap();
+    for (inside, told) in [
+        ("predictions.npz", "predictions of VGGT: give its COLMAP folder"),
+        ("map.ply.gz", "gunzip"),
+        ("scene.glb", "DUSt3R"),
+        (
+            "splats/point_cloud/iteration_7/point_cloud.ply",
+            "point_cloud/iteration_*/point_cloud.ply",
+        ),
+        ("project/MeshroomCache/Meshing/1", "aliceVision_exportColmap"),
+        ("cache/StructureFromMotion/1", "aliceVision_exportColmap"),
+    ] {
+        let file = dir.path().join(inside);
+        fs::create_dir_all(file.parent().unwrap()).unwrap();
+        fs::write(file, "x").unwrap();
+        let given = dir.path().join(inside.split('/').next().unwrap());
+        let error = read::open(&given).unwrap_err().to_string();
+        assert!(error.contains(told) && !error.contains('\n'), "{error}");
+    }
+    let eth = dir.path().join("courtyard");
+    copy_folder(&data("project/sparse/0"), &eth.join("dslr_calibration_undistorted"));
+    assert_eq!(read::open(&eth).unwrap().positions.len(), 6);
+}

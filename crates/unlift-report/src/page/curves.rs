@@ -225,6 +225,10 @@ fn percentile_points(row: &crate::document::Row) -> Vec<(f64, f64)> {
     for (typed, &percent) in &row.recovered_percent {
         points.extend(typed.parse().ok().map(|threshold: f64| (threshold, percent)));
     }
+    // As in measured curves, smaller errors are no different.
+    let thresholds = row.recovered_percent.keys().filter_map(|typed| typed.parse().ok());
+    let least = 0.01 * thresholds.fold(0.0, f64::max);
+    points.iter_mut().for_each(|point| point.0 = point.0.max(least));
     points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     points
 }

@@ -10,7 +10,7 @@ use super::row::{Alone, Row, measure};
 use super::run::{Clock, NotAudited, RowSeconds, told};
 use crate::evaluate::{
     Accuracy, away_from_own, bearings, belongs, blind, distinct_weights, evaluate,
-    farthest_for_rounding, joined,
+    farthest_for_rounding, is_noise, joined, off_record,
 };
 use crate::geometry::knn::Knn;
 use crate::neighbors::oracle::Noise;
@@ -216,6 +216,7 @@ pub(super) fn attack<const D: usize>(
             row.records_alone.clone_from(&alone);
             row.metrics.extend(made.ratio_at_k.map(|ratio| (RATIO_AT_K.to_owned(), ratio)));
             row.metrics.extend(bearings(&hidden.0, original, secret, &made.lists));
+            row.metrics.extend(off_record(&hidden.0, original, secret));
             let weights = places(owned, secret);
             if owned.may_be_small() {
                 row.fill_distinct(&accuracy, &baseline, &weights, &plan.thresholds);
@@ -385,8 +386,10 @@ pub fn check_laws<const D: usize>(
     let away = away_from_own(released, original, secret);
     let farthest = away.iter().copied().fold(0.0, f64::max);
     let most = farthest_for_rounding(released, original, secret);
-    // Bearings may have decoys, and nothing is recovered from them in any case.
-    if farthest > most && !released.obfuscation().is_bearings() {
+    // Bearings may have decoys, and nothing is recovered from them in any case. The error of a scheme with noise is measured.
+    let may_be_off =
+        || released.obfuscation().is_bearings() || is_noise(released, original, secret);
+    if farthest > most && !may_be_off() {
         let off = away.iter().filter(|&&away| away > most).count();
         let found = format!("{off} of {} away from them, by up to {farthest:.2e}", away.len());
         return Err(Error::new("hidden points", "on their own records", found));

@@ -1,7 +1,7 @@
 //! Plausibility checks: does data without a fingerprint belong to this map?
 
 use crate::Error;
-use crate::geometry::vector::{distance, dot, sub};
+use crate::geometry::vector::{along, distance, dot, median, sub};
 use crate::neighbors::{Neighborhoods, REAL, support};
 use crate::recover::Recovered;
 use crate::released::{Obfuscation, Released};
@@ -177,34 +177,101 @@ fn rounding<const D: usize>(obfuscation: &Obfuscation<D>, record: usize, point: 
     8.0 * f64::from(f32::EPSILON) * (size(point) + size(&held.map(f64::from)))
 }
 
-/// Returns the distance from `point`, relative to the released origin, to a record.
-fn to_record<const D: usize>(obfuscation: &Obfuscation<D>, record: usize, point: &[f64; D]) -> f64 {
-    let to_line = |from: [f32; D], direction: [f32; D], least: f64| {
+/// Returns the place of a record that is nearest to `point`, relative to the released origin.
+fn on_record<const D: usize>(
+    obfuscation: &Obfuscation<D>,
+    record: usize,
+    point: &[f64; D],
+) -> [f64; D] {
+    let on_line = |from: [f32; D], direction: [f32; D], least: f64| -> [f64; D] {
         let (from, direction) = (from.map(f64::from), direction.map(f64::from));
         let t = dot(&sub(point, &from), &direction).max(least);
-        distance(point, &std::array::from_fn(|axis| from[axis] + t * direction[axis]))
+        along(&from, t, &direction)
     };
     match obfuscation {
         Obfuscation::Lines(lines) => {
-            to_line(lines.foot()[record], lines.direction()[record], f64::NEG_INFINITY)
+            on_line(lines.foot()[record], lines.direction()[record], f64::NEG_INFINITY)
         }
         Obfuscation::Rays(rays) => {
             let center = rays.centers()[usize::from(rays.center()[record])];
-            to_line(center, rays.direction()[record], 0.0)
+            on_line(center, rays.direction()[record], 0.0)
         }
         Obfuscation::AxisPlanes(planes) => {
-            let axis = usize::from(planes.axis()[record]);
-            (point[axis] - f64::from(planes.offset()[record])).abs()
+            let (axis, mut place) = (usize::from(planes.axis()[record]), *point);
+            place[axis] = f64::from(planes.offset()[record]);
+            place
         }
         Obfuscation::AxisCandidates(candidates) => {
-            let published = candidates.position()[record];
-            let lines = (0..D).map(|axis| {
-                let direction = std::array::from_fn(|other| f32::from(u8::from(other == axis)));
-                to_line(published, direction, f64::NEG_INFINITY)
-            });
-            lines.fold(f64::INFINITY, f64::min)
+            let published = candidates.position()[record].map(f64::from);
+            let of_axis = |axis: usize| -> [f64; D] {
+                std::array::from_fn(|c| if c == axis { point[c] } else { published[c] })
+            };
+            let nearer =
+                |a: &[f64; D], b: &[f64; D]| distance(point, a).total_cmp(&distance(point, b));
+            (0..D).map(of_axis).min_by(nearer).expect("an axis")
         }
     }
+}
+
+fn to_record<const D: usize>(obfuscation: &Obfuscation<D>, record: usize, point: &[f64; D]) -> f64 {
+    distance(point, &on_record(obfuscation, record, point))
+}
+
+/// The metric of rows whose points are off their records as by [`is_noise`]: their median distance, in the unit of the map.
+pub const OFF_RECORD: &str = "off_record";
+/// Share of points nearer to their own records than to others, so that records clearly belong to the points.
+const CLEARLY: f64 = 0.75;
+
+/// Returns whether hidden points are off their records as by a scheme's noise: in directions that do not depend on the place. A wrong
+/// scale, frame or order of slots moves them by their places, or all alike.
+pub fn is_noise<const D: usize>(
+    released: &Released<D>,
+    original: &Original<D>,
+    secret: &Secret,
+) -> bool {
+    let n = secret.n_slots().min(released.n_slots());
+    let place = point_of(original, secret);
+    let (nearer, of) = nearer_to_own_record(released, n, &place);
+    let points = (0..n).filter_map(&place).map(|point| sub(&point, &released.origin()));
+    let points: Vec<[f64; D]> = points.collect();
+    let off = |(slot, point): (usize, &[f64; D])| {
+        sub(point, &on_record(released.obfuscation(), slot / released.slots_per_record(), point))
+    };
+    let off: Vec<[f64; D]> = points.iter().enumerate().map(off).collect();
+    let column = |rows: &[[f64; D]], c: usize| -> Vec<f64> { rows.iter().map(|x| x[c]).collect() };
+    // Five deviations of a correlation by chance; of few points less.
+    let most = (5.0 / (n.max(1) as f64).sqrt()).min(0.3);
+    let is_free = |c: usize| {
+        let own = column(&off, c);
+        let (sum, squares) = own.iter().fold((0.0, 0.0), |(s, q), x| (s + x, q + x * x));
+        let are_alike = sum * sum > most * most * squares * n as f64;
+        !are_alike && (0..D).all(|axis| correlation(&own, &column(&points, axis)).abs() <= most)
+    };
+    nearer as f64 >= CLEARLY * of as f64 && (0..D).all(is_free)
+}
+
+/// Returns the metric [`OFF_RECORD`] of a row, if rounding does not explain it.
+pub(crate) fn off_record<const D: usize>(
+    released: &Released<D>,
+    original: &Original<D>,
+    secret: &Secret,
+) -> Option<(String, f64)> {
+    let mut away = away_from_own(released, original, secret);
+    let middle = if away.is_empty() { 0.0 } else { median(&mut away) };
+    let is_off = middle > farthest_for_rounding(released, original, secret);
+    let is_noise =
+        is_off && !released.obfuscation().is_bearings() && is_noise(released, original, secret);
+    is_noise.then(|| (OFF_RECORD.to_owned(), middle))
+}
+
+/// Returns Pearson's correlation of two columns; 0 if one is constant.
+pub fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len().max(1) as f64;
+    let off = |of: &[f64], mean: f64| -> Vec<f64> { of.iter().map(|x| x - mean).collect() };
+    let sum = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+    let (a, b) = (off(a, mean(a)), off(b, mean(b)));
+    let spread = (sum(&a, &a) * sum(&b, &b)).sqrt();
+    if spread > 0.0 { sum(&a, &b) / spread } else { 0.0 }
 }
 
 /// Returns figures on bearings from one center, by name; empty for other records.
