@@ -125,7 +125,8 @@ pub fn perform(mut job: AgainJob<'_>, out: OutputSet) -> Result<Finished, Error>
     }
     let (rows, not_audited, seconds) = rows(&job, [&first.1, &second.1], sources)?;
     let doubts = vec![job.doubts.first().cloned(); rows.len()];
-    let gates = gate_results(&job.gates, (&job.plan, false), &rows, &not_audited, &doubts, &[])?;
+    let gates =
+        gate_results(&job.gates, (&job.plan, described), &rows, &not_audited, &doubts, &[])?;
     let mut options = job.options.clone();
     options.extend(names(&job.plan));
     options.insert("records_alone".into(), json!(job.plan.records_alone));

@@ -551,17 +551,9 @@ mod tests {
     }
 
     #[test]
-    fn scales_that_make_a_map_of_nothing_or_of_everything_are_refused() {
-        let points = room(1.0);
-        for scale in [1e-300, 1e-9, 1e10, 1e300] {
-            let error = check_scale(&points, Some(scale)).unwrap_err().to_string();
-            assert!(error.starts_with(&format!("--scale {scale:e}: expected")), "{error}");
-        }
-        for scale in [None, Some(1e-3), Some(1.0), Some(1000.0)] {
-            check_scale(&points, scale).unwrap();
-        }
+    fn the_extent_of_a_map_is_that_of_most_points() {
         // Georeferenced coordinates are large although the map is not; an outlier does not count.
-        let mut far: Vec<_> = points.iter().map(|p| p.map(|x| x + 5e6)).collect();
+        let mut far: Vec<_> = room(1.0).iter().map(|p| p.map(|x| x + 5e6)).collect();
         far.push([1e15; 3]);
         check_scale(&far, Some(1.0)).unwrap();
     }
@@ -570,14 +562,9 @@ mod tests {
     fn thresholds_that_mean_nothing_for_a_map_are_refused_or_noted() {
         let usual = |scale| checked(scale, Unit::Meter, ["0.10", "0.25"], false);
         assert_eq!(usual(1.0), Ok(SaidOfLengths::default()));
-        let error = usual(0.01).unwrap_err();
-        assert!(error.starts_with("--scale: expected a map larger than"), "{error}");
-        assert!(error.ends_with("any guess would count as recovered"), "{error}");
         // The larger threshold alone gives a note.
         let note = usual(0.03).unwrap().note.unwrap();
         assert!(note.contains("less than the threshold 0.25 m"), "{note}");
-        let error = usual(1_000.0).unwrap_err();
-        assert!(error.contains("expected points less than 100 times"), "{error}");
         let doubt = usual(100.0).unwrap().doubt.unwrap();
         assert!(doubt.ends_with("is --scale right?"), "{doubt}");
         // Thresholds as typed are checked in any unit.

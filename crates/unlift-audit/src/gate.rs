@@ -398,8 +398,8 @@ fn untried<const D: usize>(gate: &Gate, plan: &Plan<D>, described: bool) -> Opti
     };
     let lacks = all && gate.inlier_ratio.is_none() && described;
     (lacks && !plan.neighbors.iter().any(is_best)).then(|| {
-        let (best, named) = (sources::BY_DESCRIPTORS.name, "and no attack is named");
-        format!("--neighbors {best}, the best source, was not tried, {named}")
+        let best = sources::BY_DESCRIPTORS.name;
+        format!("neighbors by {best}, the best source, were not tried, and no attack is named")
     })
 }
 

@@ -41,6 +41,7 @@ use crate::images::audit::Used;
 use crate::images::{FeatureSource, choice};
 use crate::inversion::{Inversion, NEAR_PX, weight};
 use crate::outputs::{Audited, Finished};
+use crate::sources::BY_DESCRIPTORS;
 use crate::{Error, check_stop};
 
 /// The inputs of an audit of a sequence.
@@ -138,7 +139,8 @@ pub fn perform(mut job: SequenceJob<'_>, out: OutputSet) -> Result<(Finished, Us
     check_gates(&job.gates, &job.plan, false)?;
     let mut inversions = Vec::new();
     let (rows, seconds) = rows(&job, &views, &mut inversions)?;
-    let gates = gate_results(&job.gates, (&job.plan, false), &rows, &[], &[], &[])?;
+    let lacks_lists = job.lists.as_ref().is_none_or(|by| by.name() != BY_DESCRIPTORS.name);
+    let gates = gate_results(&job.gates, (&job.plan, lacks_lists), &rows, &[], &[], &[])?;
     let provenance = Provenance {
         notes,
         input: described(&job, &input, &views, used)?,

@@ -209,36 +209,11 @@ fn a_gate_that_names_no_attack_needs_the_best_of_each_kind() {
     }
     assert_eq!(said("olc:joint:0.25<=100", alone(), false), "");
     let both = || Plan { records_alone: true, ..alone() };
-    let best = "--neighbors descriptors, the best source, was not tried, and no attack is named";
+    let best = "neighbors by descriptors, the best source, were not tried, and no attack is named";
     assert_eq!(said("olc:0.25<=100", both(), true), best);
     assert_eq!(said("olc:0.25<=100", both(), false), "");
     assert_eq!(said("olc@0.5:0.25<=100", both(), true), "");
     assert_eq!(said("olc:0.25<=100", Plan { inlier_ratios: vec![1.0], ..both() }, true), "");
-}
-
-/// Descriptors that change slowly over the room, and the same in another order of rows.
-#[test]
-fn descriptors_in_another_order_are_doubted() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let at = |name: &str| folder.path().join(name);
-    let points = room();
-    let text: String = points.iter().map(|[x, y, z]| format!("{x} {y} {z}\n")).collect();
-    std::fs::write(at("map.xyz"), text).expect("written");
-    let doubts = |order: fn(usize) -> usize| {
-        let row = |at: usize| points[order(at)].map(|x| (40.0 * x).clamp(0.0, 250.0) as u8);
-        let header = format!("{{'descr': '|u1', 'fortran_order': False, 'shape': ({N}, 3), }}");
-        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-        bytes.extend(118_u16.to_le_bytes());
-        bytes.extend(format!("{header:117}\n").into_bytes());
-        (0..N).for_each(|at| bytes.extend(row(at)));
-        std::fs::write(at("d.npy"), bytes).expect("written");
-        let preparation = Preparation { scale: Some(1.0), k: 20, ..Preparation::default() };
-        let map = maps::open(&at("map.xyz"), Some(&at("d.npy")), &preparation);
-        map.expect("a map").1.doubts
-    };
-    assert!(doubts(|at| at).is_empty());
-    let found = doubts(|at| at * 7 % N);
-    assert!(found[0].ends_with("of another map, or in another order of rows?"), "{found:?}");
 }
 
 /// Ten orders of the rows of each real scene. Of every part of a map, as filters leave it, the right order passes.

@@ -1,7 +1,5 @@
 //! `unlift audit again`: two maps in, rows by links out.
 
-use std::fs;
-
 use crate::common::Place;
 
 const N_POINTS: usize = 300;
@@ -11,30 +9,20 @@ fn random(at: usize) -> f64 {
     (at as f64 * 0.754_877_666 + 0.1).fract()
 }
 
+fn points() -> Vec<[f64; 3]> {
+    let point = |at: usize| {
+        let [x, y, z] = [0, 1, 2].map(|c| random(3 * at * at % 7907 + c * 131 + at));
+        [5.0 * x, 4.0 * y, 3.0 * z]
+    };
+    (0..N_POINTS).map(point).collect()
+}
+
 /// Creates a map in `a.csv`, a version without its last tenth in `b.csv`, and descriptors of both.
 fn maps() -> Place {
-    let place = Place::empty();
-    let place = |at: usize| [0, 1, 2].map(|c| random(3 * at * at % 7907 + c * 131 + at));
-    let point = |at: usize| {
-        let [x, y, z] = place(at);
-        format!("{},{},{}\n", 5.0 * x, 4.0 * y, 3.0 * z)
-    };
-    // Near points have similar descriptors.
-    let value = |at: usize| match at % 8 {
-        c @ 0..3 => (place(at / 8)[c] * 255.0) as u8,
-        _ => (random(at * at % 7919 + at) * 64.0) as u8,
-    };
+    let (place, points) = (Place::empty(), points());
     for (name, n) in [("a", N_POINTS), ("b", N_POINTS - N_POINTS / 10)] {
-        let points: String = (0..n).map(point).collect();
-        fs::write(place.path(&format!("{name}.csv")), format!("x,y,z\n{points}")).unwrap();
-        let header = |n: usize| [n as u64].map(u64::to_le_bytes).concat();
-        let mut bytes = b"P3DESC01".to_vec();
-        bytes.extend(header(n));
-        bytes.extend(8u32.to_le_bytes());
-        bytes.extend(1u32.to_le_bytes());
-        (0..n as u64).for_each(|row| bytes.extend(row.to_le_bytes()));
-        bytes.extend((0..8 * n).map(value));
-        fs::write(place.path(&format!("{name}.bin")), bytes).unwrap();
+        place.write_points(&format!("{name}.csv"), &points[..n]);
+        place.write_descriptors(&format!("{name}.bin"), &points[..n], 128);
     }
     place
 }
@@ -87,16 +75,7 @@ fn what_is_gone_in_the_second_map_does_not_come_back() {
 /// Every run of SfM chooses its own frame and scale.
 #[test]
 fn no_gate_holds_if_the_maps_are_in_other_frames_or_scales() {
-    let place = maps();
-    let text = place.text("a.csv");
-    let points: Vec<[f64; 3]> = text
-        .lines()
-        .skip(1)
-        .map(|line| {
-            let row: Vec<f64> = line.split(',').map(|x| x.parse().unwrap()).collect();
-            [row[0], row[1], row[2]]
-        })
-        .collect();
+    let (place, points) = (maps(), points());
     let audit = "audit again a.csv c.csv --scale 1 --schemes olc --no-records-alone --out a";
     let gate = "--gate olc:again-geometry:0.10<=100";
     let described = "--descriptors a.bin --descriptors a.bin";

@@ -33,6 +33,11 @@ fn a_gate_may_name_a_solver_and_a_source_and_decides_the_exit_code() {
     let junit = place.text("new/gates.xml");
     let suite = "<testsuite name=\"room.csv\" tests=\"3\" failures=\"1\" errors=\"0\"";
     assert!(junit.contains(suite), "{junit}");
+    let mut points = unlift::synthetic::room(1, 700).points;
+    points.rotate_left(300);
+    place.write_descriptors("other.bin", &points, 128);
+    let (text, _) = place.ends(&format!("{audit} {held} --descriptors other.bin"), 1);
+    assert!(text.contains("of another map, or in another order of rows?"), "{text}");
     place.ends(&format!("{line} --share-safe"), 1);
     assert!(!place.text("new/gates.xml").contains("room"), "it does not name the map");
     place.write("theirs.xml", "<?xml version=\"1.0\"?><project/>");

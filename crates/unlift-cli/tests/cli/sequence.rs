@@ -117,6 +117,8 @@ fn lists_and_changed_descriptors_have_rows_of_their_own() {
     let audit = "audit sequence model f.h5 --queries 2,5 --schemes lines2d --thresholds 5";
     let audit = format!("{audit} --neighbors similarity --mitigate noise:0.5");
     place.ends(&format!("{audit} --gate lines2d:sequence+lists@5:5<=100"), 0);
+    let (text, _) = place.ends(&format!("{audit} --gate lines2d:5<=100"), 1);
+    assert!(text.contains("neighbors by descriptors, the best source, were not tried"), "{text}");
     let document = place.json("unlift-audit/audit.json");
     let row = |scheme: &str, neighbors: &str| {
         let mut rows = document["results"].as_array().unwrap().iter();
