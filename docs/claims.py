@@ -200,10 +200,10 @@ class Run:
         database = next((p for up in (model, *model.parents[:2]) if (p := up / "database.db").is_file()), None)
         if pictures and not database:
             self.problems.append(f"{scene}: pictures of the map need database.db of the COLMAP project")
-        common = ("map", model, "--scale", scale, "--k", K_OF_MAPS, "--no-records-alone")
+        common = ("map", model, "--scale", scale, "--k", K_OF_MAPS, "--full", "--neighbors", "oracle", "--no-records-alone")
         if oracle := [f for f in places if f.points == "oracle"] + (pictures if database else []):
             paint = ("--descriptors", database, "--invert", "--photos", photos) if pictures and database else ()
-            self.audit(scene, *common, *paint, figures=oracle)
+            self.audit(scene, *common, "--solver", "joint", *paint, figures=oracle)
         if density := [f for f in places if f.points == "density"]:
             self.audit(scene, *common, "--solver", "density", figures=density)
 

@@ -48,7 +48,8 @@ def unlift(*words):
 def audit_map(scene, *options, solvers="consensus,ransac", descriptors=False):
     scale = METERS if scene.startswith("redkitchen") else []
     given = ["--descriptors", DATA / scene / "descriptors.bin"] if descriptors else []
-    return unlift("map", DATA / scene / "model", *scale, *given, "--solver", solvers, "--no-records-alone", *options)
+    sources = [] if "--neighbors" in options else ["--neighbors", "oracle"]
+    return unlift("map", DATA / scene / "model", *scale, *given, "--full", "--solver", solvers, "--no-records-alone", *sources, *options)
 
 
 def each(option, values):
@@ -249,7 +250,7 @@ def tiled(path, n_points):
 def large():
     with tempfile.TemporaryDirectory() as folder:
         tiled(pathlib.Path(folder, "map.npy"), 700_000)
-        document = unlift("map", f"{folder}/map.npy", *METERS, "--solver", "joint", "--schemes", "olc,ppl,ray,plane,cp,ppl+", "--no-records-alone")
+        document = unlift("map", f"{folder}/map.npy", *METERS, "--full", "--solver", "joint", "--schemes", "olc,ppl,ray,plane,cp,ppl+", "--no-records-alone")
     run, by_scheme = document["run"], {}
     for row, spent in zip(document["results"], run["seconds"]["rows"]):
         by_scheme.setdefault(row["scheme"], []).append(spent["recover"])
@@ -262,7 +263,7 @@ def large():
 
 def images():
     photos, paper, thresholds = DATA / "redkitchen/images", published_images("sift"), ("5", "10", "25")
-    rows = unlift("images", photos, "--solver", "joint,ransac")["results"]
+    rows = unlift("images", photos, "--neighbors", "oracle", "--solver", "joint,ransac")["results"]
     of = {(r["solver"], r["scheme"], r["inlier_ratio"]): r for r in rows if r.get("oracle_noise")}
 
     def by_ratio(solver, ratios, beside):

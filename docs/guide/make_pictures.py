@@ -88,7 +88,7 @@ def of_image(scheme: str) -> dict:
             db.execute("insert into keypoints values (1, ?, 2, ?)", [len(data), data.tobytes()])
         db.close()
         unlift("obfuscate", "database.db", "--scheme", scheme, "--seed", str(SEED), "--out", "hidden")
-        oracle = ["--source", "oracle", "--truth", "hidden/truth.npz", "--inlier-ratio", str(RATIO), "--k", "20"]
+        oracle = ["--neighbors", "oracle", "--truth", "hidden/truth.npz", "--inlier-ratio", str(RATIO), "--k", "20"]
         unlift("neighbors", "hidden/released.npz", *oracle, "--seed", str(SEED), "--out", "lists.npz")
         unlift("recover", "hidden/released.npz", "--neighbors", "lists.npz", "--seed", str(SEED), "--out", "back.npz")
         told = json.loads(unlift("evaluate", "back.npz", "--truth", "hidden/truth.npz", "--thresholds", "10,25", "--json"))

@@ -169,7 +169,21 @@ pub fn open(
         if is_other { error.advise(way_out) } else { error }
     })?;
     check_scale(&input.positions, preparation.scale)?;
-    let rows = descriptors.map(|file| read::descriptors(file, &input)).transpose()?;
+    let (mut notes, mut doubts) = (input.notes.clone(), input.doubts.clone());
+    let (rows, file) = match descriptors {
+        Some(file) => (Some(read::descriptors(file, &input)?), Some(file.to_owned())),
+        None if preparation.beside => match beside(&input) {
+            Ok((rows, file)) => {
+                notes.push(format!("descriptors: {}, beside the model", file.display()));
+                (Some(rows), Some(file))
+            }
+            Err(reasons) => {
+                doubts.extend(reasons);
+                (None, None)
+            }
+        },
+        None => (None, None),
+    };
     let mut prepared = prepare(&input.positions, rows.as_ref(), preparation).map_err(|error| {
         let few = error.kind() == ErrorKind::TooFewPoints && input.positions.len() > 2;
         let error = Error::from(unlift_io::Error::core(path, error));
@@ -189,14 +203,28 @@ pub fn open(
         }
     }
     prepared.notes.extend(prepared.descriptors.as_ref().and_then(zeros));
-    prepared.notes.splice(0..0, input.notes.iter().cloned());
-    prepared.doubts.clone_from(&input.doubts);
+    prepared.notes.splice(0..0, notes);
+    prepared.doubts = doubts;
+    prepared.descriptors_file = file;
     if let Some(rows) = &prepared.descriptors {
         let points = prepared.original.reveal();
         prepared.doubts.extend(unlike_neighbors(points, rows)?);
     }
     prepared.rows = rows_of_file(&prepared.rows, &input.left_out);
     Ok((input, prepared))
+}
+
+/// Reads the first file beside the model of `input` that has the descriptors of its points; returns why none of
+/// them has.
+fn beside(input: &read::Input) -> Result<(Descriptors, PathBuf), Vec<String>> {
+    let mut reasons = Vec::new();
+    for file in &input.beside {
+        match read::descriptors(file, input) {
+            Ok(rows) => return Ok((rows, file.clone())),
+            Err(error) => reasons.push(format!("descriptors: {error}")),
+        }
+    }
+    Err(reasons)
 }
 
 /// Returns `rows` among all points of the file, which may contain points that the reader left out.

@@ -1,7 +1,7 @@
 //! Selects and scales the points of a file for an audit.
 
 use std::borrow::Cow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use unlift::audit::PointNeighbors;
 use unlift::geometry::knn::Knn;
@@ -23,6 +23,8 @@ pub struct Preparation {
     pub k: usize,
     /// Size of the random subset.
     pub max_points: Option<usize>,
+    /// Whether descriptors that lie beside a COLMAP model are read if no file of them is given.
+    pub beside: bool,
     /// Seed of the subset.
     pub seed: u64,
 }
@@ -30,7 +32,7 @@ pub struct Preparation {
 /// All points, in the unit of the median distance to the 50th neighbor.
 impl Default for Preparation {
     fn default() -> Self {
-        Self { scale: None, k: 50, max_points: None, seed: 0 }
+        Self { scale: None, k: 50, max_points: None, beside: false, seed: 0 }
     }
 }
 
@@ -41,6 +43,8 @@ pub struct Prepared {
     pub original: Original<3>,
     /// Descriptors, one row per point.
     pub descriptors: Option<Descriptors>,
+    /// The file that the descriptors were read from.
+    pub descriptors_file: Option<PathBuf>,
     /// Length of the unit of the audit in units of the file.
     pub unit_in_map_units: f64,
     /// Rows of the file that were kept, ascending.
@@ -58,8 +62,17 @@ impl Prepared {
     pub fn of(original: Original<3>) -> Self {
         let rows = (0..original.len() as u32).collect();
         let (cameras, notes, doubts) = Default::default();
-        let (descriptors, unit_in_map_units) = (None, 1.0);
-        Self { original, descriptors, unit_in_map_units, rows, cameras, notes, doubts }
+        let (descriptors, descriptors_file, unit_in_map_units) = (None, None, 1.0);
+        Self {
+            original,
+            descriptors,
+            descriptors_file,
+            unit_in_map_units,
+            rows,
+            cameras,
+            notes,
+            doubts,
+        }
     }
 }
 
@@ -196,7 +209,8 @@ fn doubts(offsets: &[u64], neighbors: &[u32], prepared: &Prepared) -> Vec<String
 mod tests {
     use super::*;
 
-    const PLAIN: Preparation = Preparation { scale: None, k: 2, max_points: None, seed: 0 };
+    const PLAIN: Preparation =
+        Preparation { scale: None, k: 2, max_points: None, beside: false, seed: 0 };
 
     /// Points 0.5 apart on a line; the second neighbor is 0.5 away except at the ends.
     fn line(n: usize) -> Vec<[f64; 3]> {

@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use unlift::audit::NeighborsBy;
 use unlift::neighbors::sources::{self, Named, SourceEntry};
 use unlift::neighbors::{Needs, Neighborhoods, Overlap, Similarity, Source};
 use unlift::released::Released;
@@ -28,6 +29,13 @@ pub fn all() -> Vec<&'static SourceEntry> {
 /// If there is none; the error lists the names.
 pub fn named(name: &str) -> Result<Named, Error> {
     Named::parse_among(name, &all())
+}
+
+/// Returns the sources of an audit of a map whose user names none: the attacker's best one, if there are descriptors, and the oracle.
+pub fn usual<const D: usize>(has_descriptors: bool) -> Vec<NeighborsBy<D>> {
+    let best =
+        has_descriptors.then(|| NeighborsBy::Source(Arc::new(ByDescriptors) as Arc<dyn Source<D>>));
+    best.into_iter().chain([NeighborsBy::Oracle]).collect()
 }
 
 /// Uses `learned` for SIFT. For other descriptors of a network's width, it uses `learned` or `similarity`, whose lists agree better with

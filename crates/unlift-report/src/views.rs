@@ -30,7 +30,7 @@ pub(crate) fn sequence_sentences(document: &Document) -> Vec<String> {
         let shares = words::capital(&words::list(&parts));
         format!(
             "{shares} of the keypoints came back within {typed} px ({}).",
-            scheme.to_uppercase()
+            words::scheme_name(scheme)
         )
     };
     tables::schemes(document).into_iter().map(sentence).collect()
@@ -101,7 +101,7 @@ pub(crate) fn again_sentences(document: &Document) -> Vec<String> {
         let row = rows().max_by(|a, b| share(a).total_cmp(&share(b)))?;
         let mut text = format!(
             "From two releases under {}, {} % of the points came back {}.",
-            scheme.to_uppercase(),
+            words::scheme_name(scheme),
             words::percent(share(row)),
             words::within(&typed, row.unit)
         );

@@ -27,6 +27,24 @@ pub(crate) fn scheme_title(scheme: &str) -> String {
     }
 }
 
+/// Returns the name of a scheme in a sentence: `OLC`; other people's names stay as they are.
+pub(crate) fn scheme_name(scheme: &str) -> String {
+    let base = scheme.split_once('_').map_or(scheme, |(base, _)| base);
+    if scheme_rule(base).is_empty() { scheme.to_owned() } else { scheme.to_uppercase() }
+}
+
+/// Returns a percentage as a part in words: "nearly half".
+pub(crate) fn part(percent: f64) -> &'static str {
+    match percent {
+        95.0.. => "nearly all",
+        55.0.. => "more than half",
+        50.0.. => "half",
+        45.0.. => "nearly half",
+        30.0.. => "a third or more",
+        _ => "a fifth or more",
+    }
+}
+
 /// Returns a sentence on what a scheme publishes in place of a point; empty for unknown schemes.
 pub(crate) fn scheme_rule(scheme: &str) -> &'static str {
     match scheme {

@@ -56,12 +56,8 @@ fn main() -> Result<(), Error> {
     let room = Original::new(PointSet::try_new(synthetic::room(1, 3_000).points, Unit::Meter)?);
     let plan = Plan {
         schemes: vec![Arc::new(Olc), Arc::new(Tilted { most: 0.5 })],
-        inlier_ratios: vec![0.5, 0.1],
-        ..Plan::new(Unit::Meter)
+        ..Plan::new(Unit::Meter).for_map(3_000, 50)
     };
-    // On small maps the audit adds a solver, as the command line does.
-    let k = plan.k;
-    let plan = plan.for_map(3_000, k);
     println!("scheme   right  within 0.10 and 0.25 m, by the strongest attack");
     let outcome = run(&room, None, &plan, &mut Silent)?;
     for scheme in &plan.schemes {

@@ -51,7 +51,7 @@ pub struct AuditArgs {
 #[command(next_help_heading = "Attack")]
 pub struct OracleArgs {
     /// Inlier ratios of the oracle's lists (fractions of true nearest neighbors), separated by
-    /// commas [default: 1,0.75,0.5,0.3,0.2,0.1]
+    /// commas [default: 0.5,0.1; for images 1,0.75,0.5,0.3,0.2,0.1]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::ratio)]
     pub inlier_ratios: Vec<f64>,
     /// Wrong entries of the oracle's lists, separated by commas or repeated: uniform (random
@@ -75,8 +75,8 @@ pub struct SolverArgs {
     /// descriptors), overlap (SIFT), learned (a network, for SIFT or ALIKED), geometric (places
     /// where many records meet; no descriptors). FILE has a list of neighbors per original point
     /// (docs/formats.md)
-    #[arg(long, value_name = "oracle|SOURCE|FILE", value_parser = values::neighbor_source,
-          default_value = "oracle")]
+    /// [default: descriptors, if there are any, and oracle]
+    #[arg(long, value_name = "oracle|SOURCE|FILE", value_parser = values::neighbor_source)]
     pub neighbors: Vec<NeighborSource>,
     /// Recovery methods, separated by commas or repeated. With lists of neighbors: joint (the
     /// strongest), consensus (each point from its own list), ransac (the attack of Chelani et al.
@@ -205,7 +205,8 @@ pub struct MapArgs {
     pub scale: Option<f64>,
     /// File with the descriptors of the points: the COLMAP database.db or hloc features.h5 from
     /// which the model was made, a .npy array with a row per point (for a COLMAP model, by
-    /// ascending point id), or a file in unlift's format P3DESC01 (docs/formats.md)
+    /// ascending point id), or a file in unlift's format P3DESC01 (docs/formats.md). Without it,
+    /// audit map uses the database or hloc's features beside the model
     #[arg(long, value_name = "FILE")]
     pub descriptors: Option<PathBuf>,
     /// Use a random subset of at most N points
@@ -262,6 +263,10 @@ pub struct AuditMapArgs {
     /// source similarity
     #[arg(long, conflicts_with_all = ["schemes", "inlier_ratios", "neighbors"], help_heading = "Attack")]
     pub quick: bool,
+    /// Run a large audit, as the paper's tables need it: the oracle at the inlier ratios
+    /// 1,0.75,0.5,0.3,0.2,0.1, and the solvers joint, consensus and ransac
+    #[arg(long, conflicts_with = "quick", help_heading = "Attack")]
+    pub full: bool,
     /// Schemes to audit, separated by commas (unlift schemes lists them) [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::scheme,
           help_heading = "Attack")]
@@ -339,9 +344,9 @@ pub struct AuditImagesArgs {
           help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
     /// Source of the attacker's lists of neighbors; repeatable: oracle, descriptors, similarity,
-    /// overlap or learned (see unlift audit map)
+    /// overlap or learned (see unlift audit map) [default: descriptors, if there are any, and oracle]
     #[arg(long, value_name = "oracle|SOURCE", value_parser = values::image_source,
-          default_value = "oracle", help_heading = "Attack")]
+          help_heading = "Attack")]
     pub neighbors: Vec<NeighborSource>,
     /// Recovery methods, separated by commas or repeated: joint, consensus or ransac (see unlift
     /// audit map) [default: joint]

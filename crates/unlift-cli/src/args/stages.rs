@@ -77,8 +77,8 @@ Sources:
   oracle       a chosen fraction of true nearest neighbors, from --truth: for experiments
 
 Examples:
-  unlift neighbors hidden/released.npz --source overlap --out neighborhoods.npz
-  unlift neighbors hidden/released.npz --source oracle --truth hidden/truth.npz \\
+  unlift neighbors hidden/released.npz --neighbors overlap --out neighborhoods.npz
+  unlift neighbors hidden/released.npz --neighbors oracle --truth hidden/truth.npz \\
       --inlier-ratio 0.5")]
 pub struct NeighborsArgs {
     /// The released.npz of a map or of images
@@ -86,7 +86,7 @@ pub struct NeighborsArgs {
     pub released: PathBuf,
     /// Method that makes the lists, see Sources below
     #[arg(long, value_name = "SOURCE", value_parser = values::any_source)]
-    pub source: NeighborSource,
+    pub neighbors: NeighborSource,
     /// For the oracle: the truth.npz that belongs to RELEASED
     #[arg(long, value_name = "TRUTH", requires = "inlier_ratio")]
     pub truth: Option<PathBuf>,

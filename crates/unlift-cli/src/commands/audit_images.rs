@@ -14,6 +14,7 @@ use unlift_audit::images::choice;
 use unlift_audit::images::extraction::sample;
 use unlift_audit::images::stream::Needs;
 use unlift_audit::inversion::Inversion;
+use unlift_audit::sources::usual as usual_sources;
 use unlift_io::{Error, read};
 use unlift_vision::features::Extraction;
 
@@ -48,7 +49,7 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
         }
         let chosen = choice::evenly(source.names().len(), args.max_images.map(|n| n.get()));
         check_photos(args, &source, &chosen)?;
-        let first = check_descriptors(args, &source, &chosen, &plan)?;
+        let first = check_descriptors(args, &source, &chosen, &mut plan)?;
         let kind_for = |option: &str| match source {
             FeatureSource::Folder(_) => Ok(extraction.kind()),
             _ => kind(option, first.as_ref()),
@@ -91,7 +92,10 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
 
 fn plan(args: &AuditImagesArgs) -> anyhow::Result<Plan<2>> {
     let usual = with_oracle(&args.oracle, Plan::new(Unit::Pixel));
-    let mut sources = Vec::new();
+    let mut sources = match &*args.neighbors {
+        [] => usual_sources(true),
+        _ => Vec::new(),
+    };
     for source in distinct(args.neighbors.clone(), |a, b| a == b) {
         sources.push(match source {
             NeighborSource::Own(named) => NeighborsBy::Source(named.of_dimension()?),
@@ -142,13 +146,14 @@ fn check_photos(
 }
 
 /// Checks the first image with keypoints for what the sources need, to get one error instead of one
-/// per image. Other errors of single images are reported when they are read. Returns the
-/// descriptors if they were read.
+/// per image. Other errors of single images are reported when they are read. Without descriptors, the
+/// sources of a plan that the user left open do without them. Returns the descriptors if they were
+/// read.
 fn check_descriptors(
     args: &AuditImagesArgs,
     source: &FeatureSource,
     chosen: &[usize],
-    plan: &Plan<2>,
+    plan: &mut Plan<2>,
 ) -> anyhow::Result<Option<Descriptors>> {
     let invert = args.paint.invert.is_some();
     let protects = !args.protect.protect_descriptors.is_empty();
@@ -158,6 +163,9 @@ fn check_descriptors(
         return Ok(None);
     }
     let Some(first) = source.first(chosen) else { return Ok(None) };
+    if args.neighbors.is_empty() && first.descriptors.is_none() {
+        plan.neighbors = usual_sources(false);
+    }
     if invert {
         kind("--invert", first.descriptors.as_ref())?;
     }

@@ -8,6 +8,7 @@ use indexmap::IndexMap;
 use serde_json::{Map, Value, json};
 use unlift::audit::{Measure, Plan};
 use unlift::obfuscate::{Change, Changed, Mitigation, Protection, Scheme, SchemeOptions};
+use unlift::recover::Builtin;
 use unlift_audit::inversion::MapInversion;
 use unlift_audit::localization::Localize;
 use unlift_audit::maps::{Tiles, perform};
@@ -21,7 +22,7 @@ use super::audits::{
 };
 use super::common::open_map;
 use crate::args::AuditMapArgs;
-use crate::exit::{Outcome, advise, usage};
+use crate::exit::{Outcome, usage};
 use crate::output::command_line;
 use crate::progress::Progress;
 use crate::values::{NeighborSource, all_schemes, distinct};
@@ -35,7 +36,12 @@ const QUICK_SOURCE: &str = "similarity";
 pub fn run(args: &AuditMapArgs) -> anyhow::Result<Outcome> {
     let started = Instant::now();
     audits::perform(&args.audit, inputs(args), |out| {
-        let (input, prepared) = open_map(&args.path, &args.map, args.audit.seed, args.audit.quiet)?;
+        let (input, prepared) = open_map(
+            &args.path,
+            &args.map,
+            uses_descriptors(args),
+            (args.audit.seed, args.audit.quiet),
+        )?;
         let progress = Progress::new(args.audit.quiet);
         let inversion = inversion(args, &prepared, &input, &progress)?;
         check_extent(args, &prepared)?;
@@ -64,7 +70,10 @@ pub fn run(args: &AuditMapArgs) -> anyhow::Result<Outcome> {
             let held_out = Some((features.clone(), args.hold_out.get()));
             job.localize = Some(Localize { cameras: &prepared.cameras, held_out, protections });
         }
-        let hashes = beside(args).map(|(name, path)| Ok((name.to_owned(), hash_file(path)?)));
+        let found = prepared.descriptors_file.as_deref().map(|path| ("descriptors", path));
+        let lists = NeighborSource::files(&args.solvers.neighbors).map(|path| ("neighbors", path));
+        let hashes = found.into_iter().chain(lists);
+        let hashes = hashes.map(|(name, path)| Ok((name.to_owned(), hash_file(path)?)));
         job.input.other_sha256 = hashes.collect::<anyhow::Result<IndexMap<_, _>>>()?;
         Ok(Some(perform(job, out)?))
     })
@@ -111,7 +120,8 @@ fn inversion(
 
 /// Returns the input paths, which must not be overwritten.
 fn inputs(args: &AuditMapArgs) -> Vec<&Path> {
-    let beside = beside(args).map(|(_, path)| path);
+    let beside = NeighborSource::files(&args.solvers.neighbors);
+    let beside = beside.chain(args.map.descriptors.as_deref());
     let more = args.paint.inputs().chain(&args.localize).chain(&args.protect.public_descriptors);
     [args.path.as_path()].into_iter().chain(beside).chain(more.map(|path| path.as_path())).collect()
 }
@@ -142,10 +152,16 @@ fn plan(
     let unit = prepared.original.reveal().unit();
     let n_points = prepared.original.len();
     let at_once = args.tile_points.map_or(n_points, |most| n_points.min(most.get()));
-    let usual = with_oracle(&args.oracle, Plan::new(unit).for_map(at_once, k));
+    let mut usual = Plan::new(unit).for_map(at_once, k);
+    if args.full {
+        usual.inlier_ratios = Plan::<3>::new(unit).inlier_ratios;
+        usual.solvers = Builtin::list(&[Builtin::Joint, Builtin::Consensus, Builtin::Ransac]);
+    }
+    let usual = with_oracle(&args.oracle, usual);
     let mut entries = if args.schemes.is_empty() { all_schemes() } else { args.schemes.clone() };
     let mut requested = args.solvers.neighbors.clone();
     if args.quick {
+        requested.push(NeighborSource::Oracle);
         entries.retain(|entry| QUICK_SCHEMES.contains(&entry.name));
         if prepared.descriptors.is_some() {
             requested.push(NeighborSource::Own(sources::named(QUICK_SOURCE)?));
@@ -159,16 +175,10 @@ fn plan(
     changes.extend(protections.iter().cloned().map(Change::Protection));
     schemes.extend(Changed::all(&schemes, &changes));
     let thresholds = map_thresholds(&args.audit, prepared, &usual, (notes, doubts))?;
-    let lacking = |text: String| {
-        let error = usage(format!("{text} (--descriptors FILE), found none"));
-        match &input.database {
-            Some(database) => advise(error, format!("--descriptors {}", database.display())),
-            None => error,
-        }
-    };
     let inlier_ratios = if args.quick { vec![QUICK_RATIO] } else { usual.inlier_ratios.clone() };
     let descriptors = prepared.descriptors.as_ref();
     let requested = (requested.as_slice(), &args.oracle);
+    let lacking = "(--descriptors FILE)";
     Ok(Plan {
         neighbors: neighbors(requested, (prepared, descriptors), lacking, (input.n_rows(), notes))?,
         inlier_ratios,
@@ -200,10 +210,18 @@ fn mitigations(args: &AuditMapArgs, prepared: &Prepared) -> anyhow::Result<Vec<C
     Ok(args.mitigate.iter().map(with).collect())
 }
 
-/// Returns the files that are read beside the map, by their role.
-fn beside(args: &AuditMapArgs) -> impl Iterator<Item = (&'static str, &Path)> {
-    let lists = NeighborSource::files(&args.solvers.neighbors).map(|path| ("neighbors", path));
-    args.map.descriptors.iter().map(|path| ("descriptors", path.as_path())).chain(lists)
+/// Returns true if the audit uses descriptors, which may lie beside the model.
+fn uses_descriptors(args: &AuditMapArgs) -> bool {
+    let needs = |source: &NeighborSource| match source {
+        NeighborSource::Own(named) => named.name() != "geometric",
+        NeighborSource::Oracle | NeighborSource::File(_) => false,
+    };
+    let neighbors = &args.solvers.neighbors;
+    neighbors.is_empty()
+        || neighbors.iter().any(needs)
+        || args.paint.invert.is_some()
+        || args.mitigate.iter().any(Mitigation::changes_descriptors)
+        || !args.protect.protect_descriptors.is_empty()
 }
 
 /// Returns the options that change the points, for the report.

@@ -151,10 +151,9 @@ fn plan(
     let usual = with_oracle(&args.oracle, usual);
     let thresholds = map_thresholds(&args.audit, prepared, &usual, (notes, doubts))?;
     let requested = (&*args.solvers.neighbors, &args.oracle);
-    let lacking = |text: String| usage(format!("{text} in the released map, found none"));
     let map = (prepared, released.descriptors());
     Ok(Plan {
-        neighbors: neighbors(requested, map, lacking, (points.len(), notes))?,
+        neighbors: neighbors(requested, map, "in the released map", (points.len(), notes))?,
         schemes: vec![scheme_called(name)],
         k,
         solvers: solvers(&args.solvers.solver, &usual),

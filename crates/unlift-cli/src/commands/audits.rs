@@ -130,15 +130,18 @@ pub fn map_thresholds(
 }
 
 /// Returns the sources of an audit of a map, each once, and checks that options and descriptors fit
-/// them. The file had `n_read` points. Notes for the user are added to `notes`; `lacking` makes the
-/// error of a source without descriptors.
+/// them. The file had `n_read` points. Notes for the user are added to `notes`; `lacking` says where
+/// descriptors are expected.
 pub fn neighbors(
     (requested, args): (&[NeighborSource], &OracleArgs),
     (prepared, descriptors): (&Prepared, Option<&Descriptors>),
-    lacking: impl Fn(String) -> anyhow::Error,
+    lacking: &str,
     (n_read, notes): (usize, &mut Vec<String>),
 ) -> anyhow::Result<Vec<NeighborsBy<3>>> {
-    let mut sources = Vec::new();
+    let mut sources = match requested {
+        [] => unlift_audit::sources::usual(descriptors.is_some()),
+        _ => Vec::new(),
+    };
     for source in distinct(requested.to_vec(), |a, b| a == b) {
         sources.push(match source {
             NeighborSource::Oracle => NeighborsBy::Oracle,
@@ -151,15 +154,17 @@ pub fn neighbors(
                     Some(descriptors) => check_fit(&*source, descriptors)?,
                     None if source.needs() == Needs::Descriptors => {
                         let name = source.name();
-                        return Err(lacking(format!("--neighbors {name}: expected descriptors")));
+                        let error = format!("--neighbors {name}: expected descriptors {lacking}");
+                        return Err(usage(format!("{error}, found none")));
                     }
                     None => {}
                 }
-                notes.extend(source.note(prepared.original.len()));
                 NeighborsBy::Source(source)
             }
         });
     }
+    let own = sources.iter().filter_map(NeighborsBy::source);
+    notes.extend(own.filter_map(|source| source.note(prepared.original.len())));
     let files = sources.iter().filter(|by| matches!(by, NeighborsBy::Given(_))).count();
     if files > 1 {
         return Err(usage(format!("--neighbors: expected at most one file, found {files}")));

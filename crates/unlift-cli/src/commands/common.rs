@@ -46,18 +46,19 @@ pub fn same_map(
     }
 }
 
-/// Reads and prepares a map, for `audit map` and `obfuscate`.
+/// Reads and prepares a map, for `audit map` and `obfuscate`. Descriptors that lie beside the model are read with `beside`.
 pub fn open_map(
     path: &Path,
     args: &MapArgs,
-    seed: u64,
-    quiet: bool,
+    beside: bool,
+    (seed, quiet): (u64, bool),
 ) -> anyhow::Result<(Input, Prepared)> {
     let _alive = Spinner::unless(quiet, "reading the map");
     let preparation = Preparation {
         scale: args.scale,
         k: usize::from(args.k),
         max_points: args.max_points.map(NonZeroUsize::get),
+        beside,
         seed,
     };
     Ok(maps::open(path, args.descriptors.as_deref(), &preparation)?)

@@ -37,7 +37,7 @@ pub fn run(args: &NeighborsArgs) -> anyhow::Result<Outcome> {
     check_file(&args.out, kind, &rules)?;
     let images = has_images(&args.released)?;
     let alive = Spinner::new("finding neighbors");
-    let (made, name) = match (&args.source, args.truth.as_deref(), args.inlier_ratio) {
+    let (made, name) = match (&args.neighbors, args.truth.as_deref(), args.inlier_ratio) {
         (NeighborSource::Own(named), None, _) => {
             let named = named.clone();
             let named = args.k.map_or(named.clone(), |k| named.with_k(usize::from(k)));
@@ -54,9 +54,13 @@ pub fn run(args: &NeighborsArgs) -> anyhow::Result<Outcome> {
         }
         (NeighborSource::Own(named), Some(_), _) => {
             let name = named.name();
-            return Err(usage(format!("--truth: expected with --source oracle, found {name}")));
+            return Err(usage(format!("--truth: expected with --neighbors oracle, found {name}")));
         }
-        _ => return Err(usage("--source oracle: expected --truth and --inlier-ratio, found none")),
+        _ => {
+            return Err(usage(
+                "--neighbors oracle: expected --truth and --inlier-ratio, found none",
+            ));
+        }
     };
     let (n, longest) = match made {
         Made::Written(counts) => (counts.slots, counts.longest),
@@ -87,7 +91,7 @@ fn by_source(
 ) -> anyhow::Result<Made> {
     if images {
         let source = named.of_dimension::<2>().map_err(|_| {
-            usage(format!("--source {}: expected with a map, found images", named.name()))
+            usage(format!("--neighbors {}: expected with a map, found images", named.name()))
         })?;
         let out = (args.out.as_path(), rules);
         return Ok(Made::Written(list_by_source(&args.released, &*source, args.seed, out)?));
@@ -112,13 +116,13 @@ fn check_source(
         None if source.needs() == Needs::Descriptors => {
             let what = format!("descriptors for {}", source.name());
             let advice =
-                "--source geometric, or hide the map with unlift obfuscate --descriptors FILE";
+                "--neighbors geometric, or hide the map with unlift obfuscate --descriptors FILE";
             Err((Error::new(what, "some in the released map", "none"), advice))
         }
         None => Ok(()),
-        Some(descriptors) => source
-            .takes(descriptors)
-            .map_err(|error| (error, "--source similarity, which takes descriptors of any kind")),
+        Some(descriptors) => source.takes(descriptors).map_err(|error| {
+            (error, "--neighbors similarity, which takes descriptors of any kind")
+        }),
     }
 }
 

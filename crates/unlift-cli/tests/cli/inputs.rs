@@ -66,13 +66,25 @@ fn descriptors_that_are_missing_are_told_with_where_they_are() {
     let place = Place::with_room(100);
     place.ends("obfuscate room.csv --scheme olc --k 10 --out hidden", 0);
     assert_eq!(
-        place.complains("neighbors hidden/released.npz --source overlap", 3),
+        place.complains("neighbors hidden/released.npz --neighbors overlap", 3),
         "unlift: hidden/released.npz: descriptors for overlap: expected some in the released map, \
-         found none\n  try: --source geometric, or hide the map with unlift obfuscate --descriptors FILE\n"
+         found none\n  try: --neighbors geometric, or hide the map with unlift obfuscate --descriptors FILE\n"
     );
-    // Six points suffice, because the error comes before any attack.
-    let project = data("project");
-    let line = format!("audit map {} --k 3 --neighbors overlap", project.display());
-    let advice = format!("\n  try: --descriptors {}\n", project.join("database.db").display());
-    assert!(place.complains(&line, 2).ends_with(&advice));
+    assert_eq!(
+        place.complains("audit map room.csv --k 10 --neighbors overlap", 2),
+        "unlift: --neighbors overlap: expected descriptors (--descriptors FILE), found none\n"
+    );
+}
+
+#[test]
+fn descriptors_beside_the_model_are_used_unless_only_the_oracle_is_wanted() {
+    let (place, project) = (Place::with_room(1), data("project"));
+    let database = project.join("database.db");
+    let note = format!("unlift: note: descriptors: {}, beside the model", database.display());
+    for (more, is_used) in [("", true), (" --neighbors oracle", false)] {
+        let line = format!("audit map {} --k 3 --schemes olc{more}", project.display());
+        assert_eq!(place.ends(&line, 0).1.contains(&note), is_used, "{more}");
+        let document = place.json("unlift-audit/audit.json");
+        assert_eq!(document["input"]["other_sha256"]["descriptors"].is_string(), is_used, "{more}");
+    }
 }

@@ -52,7 +52,7 @@ fn keypoints_and_what_came_back_are_painted_to_files() {
         place.complains(&format!("invert {released} --out y"), 2),
         "unlift: RECOVERED: expected what came back of PATH, found none\n"
     );
-    place.ends(&format!("neighbors {released} --source overlap --out lists.npz"), 0);
+    place.ends(&format!("neighbors {released} --neighbors overlap --out lists.npz"), 0);
     place.ends(&format!("recover {released} --neighbors lists.npz --out back.npz"), 0);
     let (stdout, _) = place.ends(&format!("invert {released} back.npz --out back"), 0);
     assert_eq!(stdout, "3 pictures, in back\n");

@@ -43,8 +43,9 @@ fn inputs_are_never_written_over() {
     place.ends("obfuscate room.csv --scheme olc --k 10 --out x", 0);
     let truth = place.names("x").into_iter().find(|name| name.starts_with("truth")).unwrap();
     let released = truth.replace("truth", "released");
-    let oracle =
-        format!("neighbors x/{released} --source oracle --truth x/{truth} --inlier-ratio 1 --out");
+    let oracle = format!(
+        "neighbors x/{released} --neighbors oracle --truth x/{truth} --inlier-ratio 1 --out"
+    );
     let before = place.bytes(&format!("x/{truth}"));
     let mut lines = vec![
         "features database.db --out database.db".to_owned(),

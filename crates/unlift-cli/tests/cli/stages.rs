@@ -25,7 +25,7 @@ fn chain(place: &Place, name: &str, scheme: &str, noise: &str, seed: u32) {
     let map = "room.csv --scale 1 --k 10 --descriptors d.bin";
     place.ends(&format!("obfuscate {map} --scheme {scheme} --seed {seed} --out {name}"), 0);
     let oracle = format!(
-        "neighbors {name}/released.npz --source oracle --truth {name}/truth.npz --k 10 --inlier-ratio 0.5 \
+        "neighbors {name}/released.npz --neighbors oracle --truth {name}/truth.npz --k 10 --inlier-ratio 0.5 \
          --oracle-noise {noise}"
     );
     place.ends(&format!("{oracle} --seed {seed} --out {name}-lists"), 0);
@@ -69,7 +69,7 @@ fn the_stages_print_the_row_of_the_audit() {
         for source in sources {
             let row = rows.iter().find(|row| row["neighbors"] == source).expect("a row");
             if source != "oracle" {
-                let find = format!("neighbors hidden/released.npz --source {source}");
+                let find = format!("neighbors hidden/released.npz --neighbors {source}");
                 let (told, _) = place.ends(&format!("{find} --seed 7 --out hidden-lists"), 0);
                 let expected = format!(" of up to {} by {source}, in hidden-lists\n", row["k"]);
                 assert!(told.ends_with(&expected), "{scheme}: {told}");
@@ -90,7 +90,7 @@ fn the_stages_print_the_row_of_the_audit() {
     }
     let mut files = std::collections::BTreeSet::new();
     for noise in noises {
-        let line = "neighbors hidden/released.npz --source oracle --truth hidden/truth.npz --k 10 --inlier-ratio 0.5 --out lists";
+        let line = "neighbors hidden/released.npz --neighbors oracle --truth hidden/truth.npz --k 10 --inlier-ratio 0.5 --out lists";
         place.ends(&format!("{line} --oracle-noise {noise}"), 0);
         files.insert(place.bytes("lists"));
     }
@@ -130,7 +130,7 @@ fn the_stages_of_images_print_the_row_of_the_audit() {
                 Some("oracle") => "oracle --truth hidden/truth.npz --k 10 --inlier-ratio 0.5",
                 _ => "overlap",
             };
-            let line = format!("neighbors hidden/released.npz --source {lists} --seed 7");
+            let line = format!("neighbors hidden/released.npz --neighbors {lists} --seed 7");
             place.ends(&format!("{line} --out lists"), 0);
             let recover = "recover hidden/released.npz --neighbors lists --seed 7";
             place.ends(&format!("RAYON_NUM_THREADS=1 {recover} --out one"), 0);
@@ -145,7 +145,7 @@ fn the_stages_of_images_print_the_row_of_the_audit() {
     for (line, code, expected) in [
         ("evaluate back --truth other/truth.npz", 3, "back: fingerprint: expected "),
         ("obfuscate f.h5 --scheme lines2d --scale 1 --out x", 2, "--scale: expected with a map, found lines2d, which hides images\n"),
-        ("neighbors hidden/released.npz --source geometric", 2, "--source geometric: expected with a map, found images\n"),
+        ("neighbors hidden/released.npz --neighbors geometric", 2, "--neighbors geometric: expected with a map, found images\n"),
     ] {
         let stderr = place.complains(line, code);
         assert!(stderr.starts_with(&format!("unlift: {expected}")), "{stderr}");
@@ -162,7 +162,7 @@ fn files_of_another_map_are_refused() {
     for (line, file, of) in [
         ("evaluate one-back --truth two/truth.npz", "one-back", "two/truth.npz"),
         ("recover one/released.npz --neighbors two-lists --out x", "two-lists", "one/released.npz"),
-        ("neighbors two/released.npz --source oracle --truth one/truth.npz --inlier-ratio 1 --out x", "two/released.npz", "one/truth.npz"),
+        ("neighbors two/released.npz --neighbors oracle --truth one/truth.npz --inlier-ratio 1 --out x", "two/released.npz", "one/truth.npz"),
     ] {
         let stderr = place.complains(line, 3);
         let expected = format!("that of the released map of {of}, found ");

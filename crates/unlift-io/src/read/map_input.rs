@@ -29,8 +29,8 @@ pub struct Input {
     pub doubts: Vec<String>,
     /// The folder of the COLMAP model, if the input is one.
     pub model: Option<PathBuf>,
-    /// The COLMAP database of the project, if one is found.
-    pub database: Option<PathBuf>,
+    /// Files beside a COLMAP model that may have its descriptors: a database, then hloc's features.
+    pub beside: Vec<PathBuf>,
 }
 
 /// The largest share of points without finite coordinates that is a note instead of a doubt.

@@ -195,7 +195,7 @@ fn folder(path: &Path) -> Result<Input, Error> {
         };
     };
     let mut input = colmap_model(&model)?;
-    input.database = models::database(path, &model.folder);
+    input.beside = models::beside(path, &model.folder);
     input.notes.extend(model.notes);
     Ok(input)
 }

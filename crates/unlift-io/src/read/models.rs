@@ -76,11 +76,26 @@ impl Model {
     }
 }
 
-/// Finds the database of the model `model` in `path`.
-pub(super) fn database(path: &Path, model: &Path) -> Option<PathBuf> {
+/// Finds the files beside the model `model` in `path` that may have its descriptors.
+pub(super) fn beside(path: &Path, model: &Path) -> Vec<PathBuf> {
     let above: &[&str] = if model == path { &DATABASES_ABOVE } else { &[] };
     let places = DATABASES.iter().chain(above);
-    places.map(|place| path.join(place)).find(|file| file.is_file())
+    let database = places.map(|place| path.join(place)).find(|file| file.is_file());
+    // hloc writes the features of a run beside the folder of its model.
+    let features = [path.to_owned(), path.join("..")].into_iter().flat_map(|folder| {
+        let files = fs::read_dir(folder).into_iter().flatten().flatten().map(|file| file.path());
+        let mut files: Vec<PathBuf> = files.filter(|file| is_features(file)).collect();
+        files.sort();
+        files
+    });
+    database.into_iter().chain(features).collect()
+}
+
+/// Returns true for local features of hloc: `features.h5` or `feats-TYPE.h5`, but no matches of them.
+fn is_features(path: &Path) -> bool {
+    let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    let is_named = name == "features.h5" || (name.starts_with("feats-") && name.ends_with(".h5"));
+    is_named && !name.contains("matches")
 }
 
 pub(super) const EXPECTED: &str = "points3D.bin or points3D.txt in it, or in sparse, model, models, colmap/sparse \

@@ -37,7 +37,7 @@ fn model_folders_open_with_centers_ids_and_files() {
     assert_eq!((bin.format, txt.format), ("COLMAP binary", "COLMAP text"));
     assert_eq!((bin.files.len(), txt.files.len()), (3, 3), "without rigs and frames");
     assert_eq!((&bin.notes, &txt.notes), (&vec![], &vec![]));
-    assert_eq!((bin.database, bin.positions.len()), (None, 8));
+    assert_eq!((bin.beside, bin.positions.len()), (vec![], 8));
     // pycolmap: `image.projection_center()` of image 20, the last; the sum of `point3D.xyz`.
     let center = [-0.18425494062287595, 0.11058267526290974, 0.11110621415901362];
     close(*bin.cameras.last().unwrap(), center, 1e-12);
@@ -70,7 +70,7 @@ fn a_project_folder_leads_to_its_model_and_database() {
     assert_eq!(input.ids, [2, 3, 4, 6, 9, 11]);
     assert_eq!(input.cameras.len(), 3);
     assert_eq!(input.model, Some(project.join("sparse/0")));
-    assert_eq!(input.database, Some(project.join("database.db")));
+    assert_eq!(input.beside, [project.join("database.db")]);
     assert_eq!(input.files.len(), 3, "the classic layout: {:?}", input.files);
     let direct = read::open(&project.join("sparse/0")).unwrap();
     assert_eq!(direct.positions, input.positions);
@@ -142,19 +142,23 @@ fn of_several_models_the_largest_is_read_and_the_others_are_noted() {
 }
 
 #[test]
-fn the_database_of_a_project_is_found_from_its_model_as_well() {
+fn descriptors_of_a_project_are_found_from_its_model_as_well() {
     for (project, model, database) in [
         ("", "sparse/0", "database.db"),
         ("", "colmap/sparse/0", "colmap/database.db"),
         ("sparse/0", "sparse/0", "database.db"),
         ("sparse", "sparse", "database.db"),
+        ("sfm", "sfm", "feats-superpoint-n4096-r1024.h5"),
+        ("", "sparse", "features.h5"),
     ] {
         let dir = tempfile::tempdir().unwrap();
         copy_folder(&data("project/sparse/0"), &dir.path().join(model));
         fs::copy(data("project/database.db"), dir.path().join(database)).unwrap();
+        fs::write(dir.path().join("feats-superpoint_matches-superglue.h5"), "").unwrap();
         let input = read::open(&dir.path().join(project)).unwrap();
-        let found = fs::canonicalize(input.database.unwrap()).unwrap();
-        assert_eq!(found, fs::canonicalize(dir.path().join(database)).unwrap(), "{model}");
+        let [found] = &input.beside[..] else { panic!("{model}: {:?}", input.beside) };
+        let expected = fs::canonicalize(dir.path().join(database)).unwrap();
+        assert_eq!(fs::canonicalize(found).unwrap(), expected, "{model}");
     }
 }
 

@@ -87,7 +87,7 @@ def audit(
     map: the unprotected map. Lengths are in meters if it has a scale, else in the median distance to the K-th neighbor.
     schemes: names in `SCHEMES`, or functions (`scheme`). Default: all names. Arguments that take several items also take one.
     neighbors: what makes the neighbor lists: "oracle" (from the true points), names in `SOURCES`, or functions (`source`).
-    inlier_ratios: shares of true neighbors in the lists of the oracle. Default: six values.
+    inlier_ratios: shares of true neighbors in the lists of the oracle. Default: 0.5 and 0.1; for images six values.
     oracle_noise: where wrong entries of the oracle lie: "uniform", "near", "clustered".
     solvers: names in `SOLVERS`, or functions. Default: the strongest for the size of the map. A function takes a Released and its
         Neighborhoods, and a `numpy.random.Generator` if it has a third parameter. It returns positions `(n_slots, 3)` relative to

@@ -68,7 +68,7 @@ fn errors(document: &Document) -> String {
     let strongest = speaking(document);
     match strongest.and_then(|row| Some((row, row.median_error?))) {
         Some((row, median)) => {
-            let scheme = row.scheme.to_uppercase();
+            let scheme = words::scheme_name(&row.scheme);
             let smallest = tables::thresholds(document).first().and_then(|t| t.parse::<f64>().ok());
             // Swapped coordinates that are restored leave only an error of rounding.
             match smallest.is_some_and(|smallest| median < 0.001 * smallest) {
@@ -91,7 +91,7 @@ fn certainty(document: &Document) -> String {
             words::percent(sure),
             words::points(row.unit),
             words::percent(right),
-            row.scheme.to_uppercase()
+            words::scheme_name(&row.scheme)
         ))
     });
     said.unwrap_or_else(|| "How well the attacker can judge its own result".to_owned())

@@ -318,7 +318,7 @@ fn exhibit(document: &Document, inversion: &Inversion, view: &InvertedView) -> O
         words::points(row.unit),
         words::within(&typed, row.unit),
     );
-    let by = format!("({}, {})", view.scheme.to_uppercase(), attack::briefly(row));
+    let by = format!("({}, {})", words::scheme_name(&view.scheme), attack::briefly(row));
     let mut said = match view.basis() {
         Basis::Released => format!("From the released data alone, {back} {by}."),
         Basis::Given => format!("With given neighbors, {back} {by}."),

@@ -355,7 +355,7 @@ impl Card {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Banner {
     pub level: Level,
-    /// "Not protected."
+    /// "Do not release this map under any scheme tried."
     pub headline: String,
     /// What the strongest attack recovers, and from which data.
     pub sentence: String,
@@ -366,39 +366,106 @@ pub(crate) struct Banner {
 }
 
 pub(crate) fn banner(document: &Document, cards: &[Card], refusals: &[Refusal]) -> Banner {
-    let names: Vec<String> = refusals.iter().map(|one| one.scheme.to_uppercase()).collect();
+    let names: Vec<String> = refusals.iter().map(|one| words::scheme_name(&one.scheme)).collect();
     let unknown = (!refusals.is_empty())
         .then(|| format!("Not audited, so nothing is known: {}.", words::list(&names)));
     let today = worst(cards, Basis::Released);
     let known = worst(cards, Basis::Given).or_else(|| worst(cards, Basis::Oracle));
     // The model may have fewer tracks than an attacker finds links.
     let every = every(cards).filter(|_| !views::is_sequence(document));
-    let (level, headline, sentence) = match (today, known) {
-        (Some(found), _) => {
-            let level = Level::of(found.1.recovered);
-            (level, headline(level, cards), attack_sentence(document, found))
+    let bearings: Vec<String> =
+        cards.iter().filter_map(|card| bearings_sentence(document, &card.scheme)).take(1).collect();
+    let (level, headline, mut sentences) = match (today, known) {
+        (Some(strongest), _) => {
+            let (headline, reason) = decision(document, cards);
+            let attack = attack_sentence(document, strongest);
+            let sentences = [reason, Some(attack)].into_iter().flatten().collect();
+            (Level::of(strongest.1.recovered), headline, sentences)
         }
         // An untested attack may succeed, so known neighbors decide the color.
-        (None, Some(found)) => {
-            let level = Level::of(found.1.recovered).min(Level::Orange);
+        (None, Some(strongest)) => {
+            let level = Level::of(strongest.1.recovered).min(Level::Orange);
             let headline = "Not tested: what an attacker recovers from the released data alone.";
-            (level, headline.to_owned(), attack_sentence(document, found))
+            (level, headline.to_owned(), vec![attack_sentence(document, strongest)])
         }
         (None, None) => {
             let nothing = "Nothing is known about this protection.";
-            (Level::Gray, "No scheme was tested.".to_owned(), nothing.to_owned())
+            (Level::Gray, "No scheme was tested.".to_owned(), vec![nothing.to_owned()])
         }
     };
-    let bearings = cards.iter().find_map(|card| bearings_sentence(document, &card.scheme));
     let (level, headline) = match level {
         // Few recovered points do not mean that little is seen.
-        Level::Gray if bearings.is_some() => {
+        Level::Gray if !bearings.is_empty() => {
             (Level::Orange, "Bearings of points are published.".to_owned())
         }
         level => (level, headline),
     };
-    let sentence = bearings.into_iter().chain([sentence]).collect::<Vec<_>>().join(" ");
-    Banner { level, headline, sentence, every, unknown }
+    // What was not tried stands beside a low figure.
+    let at = if headline.starts_with("Under") { 0 } else { sentences.len() };
+    sentences.splice(at..at, not_tried(document));
+    sentences.splice(0..0, bearings);
+    Banner { level, headline, sentence: sentences.join(" "), every, unknown }
+}
+
+/// Returns whether to release, by what came back from the released data alone, and the reason.
+fn decision(document: &Document, cards: &[Card]) -> (String, Option<String>) {
+    let tried = cards.iter().filter(|card| bearings_sentence(document, &card.scheme).is_none());
+    let mut leaks: Vec<(f64, String)> =
+        tried.filter_map(|card| Some((card.today()?, words::scheme_name(&card.scheme)))).collect();
+    leaks.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let n_little = leaks.iter().filter(|leak| Level::of(leak.0) == Level::Gray).count();
+    let names = |leaks: &[(f64, String)]| {
+        let names: Vec<String> = leaks.iter().map(|leak| leak.1.clone()).collect();
+        words::list(&names)
+    };
+    let what = match cards
+        .iter()
+        .flat_map(|card| strongest(document, &card.scheme, Basis::Released))
+        .next()
+    {
+        Some(row) if row.unit == LengthUnit::Pixel => "these images",
+        _ => "this map",
+    };
+    match (leaks.as_slice(), n_little) {
+        ([], _) => (format!("Nothing is known about {what}."), None),
+        ([(_, name)], 0) => (format!("Do not release {what} under {name}."), None),
+        ([least, ..], 0) => {
+            let (percent, part) = (words::percent(least.0), words::part(least.0));
+            let of = match what {
+                "this map" => "points",
+                _ => "keypoints",
+            };
+            let reason =
+                format!("The least leak, {percent} % ({}), is {part} of the {of}.", least.1);
+            (format!("Do not release {what} under any scheme tried."), Some(reason))
+        }
+        (leaks, n) => {
+            let (little, much) = leaks.split_at(n);
+            let (percent, little) = (words::percent(little[n - 1].0), names(little));
+            let not = format!("Do not release {what} under {}.", names(much));
+            let headline =
+                format!("Under {little}, no attack tried here recovers more than {percent} %.");
+            (headline, (!much.is_empty()).then_some(not))
+        }
+    }
+}
+
+/// Returns which kinds of attacks on released data were not tried.
+fn not_tried(document: &Document) -> Option<String> {
+    if views::is_sequence(document) || views::is_again(document) || document.results.is_empty() {
+        return None;
+    }
+    let rows = || document.results.iter();
+    let images = rows().any(|row| row.unit == LengthUnit::Pixel);
+    let by_descriptors = rows().any(|row| BY_DESCRIPTORS.contains(&row.neighbors.as_str()));
+    let alone = images || rows().any(|row| row.records_alone_percent.is_some());
+    let kinds = [
+        (!by_descriptors).then_some("attacks by descriptors"),
+        (!alone).then_some("the attack on the records alone"),
+        images.then_some("several queries with known poses (unlift audit sequence)"),
+    ];
+    let kinds: Vec<String> = kinds.into_iter().flatten().map(str::to_owned).collect();
+    (!kinds.is_empty()).then(|| format!("Not tried: {}.", words::list(&kinds)))
 }
 
 /// Returns a sentence on what every scheme would give back with known neighbors, if several were tried so.
@@ -416,22 +483,6 @@ fn worst(cards: &[Card], basis: Basis) -> Option<(&Card, &Finding)> {
     found.reduce(|a, b| if b.1.recovered > a.1.recovered { b } else { a })
 }
 
-fn headline(level: Level, cards: &[Card]) -> String {
-    let at_level = |card: &&Card| card.today().is_some_and(|percent| Level::of(percent) >= level);
-    let (n, of) = (cards.iter().filter(at_level).count(), cards.len());
-    let under = match (n, of) {
-        (_, 1) => String::new(),
-        (2, 2) => " under either scheme".to_owned(),
-        (n, of) if n == of => format!(" under any of the {of} schemes"),
-        (n, of) => format!(" under {n} of {of} schemes"),
-    };
-    match level {
-        Level::Red => format!("Not protected{under}."),
-        Level::Orange => format!("Badly protected{under}."),
-        Level::Gray => "No attack tried here recovers much.".to_owned(),
-    }
-}
-
 fn attack_sentence(document: &Document, (card, finding): (&Card, &Finding)) -> String {
     let typed = tables::headline_threshold(document).unwrap_or_default();
     let unit = document.results.first().map_or(LengthUnit::Meter, |row| row.unit);
@@ -440,7 +491,7 @@ fn attack_sentence(document: &Document, (card, finding): (&Card, &Finding)) -> S
         LengthUnit::Meter | LengthUnit::KthNeighbor => "the points of this map",
     };
     let what = format!("{} % of {of} {}", finding.percent, words::within(&typed, unit));
-    let by = format!("{}, {}", card.scheme.to_uppercase(), finding.briefly);
+    let by = format!("{}, {}", words::scheme_name(&card.scheme), finding.briefly);
     match finding.basis {
         Basis::Released => {
             let from = finding.when.trim_start_matches("Today, ");
@@ -461,7 +512,7 @@ pub(crate) fn next_steps(document: &Document, cards: &[Card]) -> Vec<String> {
     let images = document.results.first().is_some_and(|row| row.unit == LengthUnit::Pixel);
     let tried = |name: &str| document.results.iter().any(|row| row.neighbors.contains(name));
     let with_descriptors = BY_DESCRIPTORS.iter().any(|name| tried(name));
-    let has_file = document.options.get("descriptors").is_some_and(|given| !given.is_null());
+    let has_file = with_descriptors || document.input.other_sha256.contains_key("descriptors");
     let mut steps = Vec::new();
     if views::is_sequence(document) {
         if !document.results.iter().any(views::uses_lists) {
@@ -491,7 +542,7 @@ pub(crate) fn next_steps(document: &Document, cards: &[Card]) -> Vec<String> {
     if !with_descriptors {
         let options = match images || has_file {
             true => "`--neighbors descriptors`",
-            false => "`--descriptors FILE --neighbors descriptors`",
+            false => "`--descriptors FILE`",
         };
         steps.push(format!(
             "Try the stronger attack: add {options}. Descriptors show an attacker which {} are \
@@ -519,15 +570,30 @@ pub(crate) fn next_steps(document: &Document, cards: &[Card]) -> Vec<String> {
         steps.push(format!("Mitigate and measure again: add `--mitigate thin:1/4`{drop}{cost}."));
     }
     if document.gates.is_empty() {
-        let typed = tables::headline_threshold(document).unwrap_or_default();
-        let half = |row: &Row| row.neighbors == "oracle" && row.inlier_ratio == 0.5;
-        let ratio = if document.results.iter().any(half) { "@0.5" } else { "" };
-        steps.push(format!(
-            "Test it in your build: `--gate 'all{ratio}:{typed}<=20'` fails if more than 20 % \
-             comes back."
-        ));
+        steps.extend(gate_step(document, cards));
     }
     steps
+}
+
+/// Returns the step that suggests a gate: today's value of the scheme that leaks least, plus two points.
+fn gate_step(document: &Document, cards: &[Card]) -> Option<String> {
+    let typed = tables::headline_threshold(document)?;
+    let card = cards.iter().min_by(|a, b| {
+        let key = |card: &Card| card.today().unwrap_or(card.badness().1);
+        key(a).total_cmp(&key(b))
+    })?;
+    let released = strongest(document, &card.scheme, Basis::Released);
+    let row = released.or_else(|| strongest(document, &card.scheme, Basis::Oracle))?;
+    let attack = match row.neighbors.as_str() {
+        "oracle" => format!("@{}", row.inlier_ratio),
+        source => format!(":{source}"),
+    };
+    let limit = (share(row, &typed) + 2.0).ceil().min(100.0);
+    let scheme = &card.scheme;
+    Some(format!(
+        "Test it in your build: `--gate '{scheme}{attack}:{typed}<={limit}'` fails if two points more come back \
+         than today."
+    ))
 }
 
 fn has_pictures(row: &Row) -> bool {
@@ -542,7 +608,8 @@ fn least(document: &Document, cards: &[Card]) -> Option<String> {
     let known = cards.iter().filter(|card| card.today().is_some()).count();
     let comparable = cards.iter().filter(|card| known == 0 || card.today().is_some());
     let card = comparable.copied().reduce(|a, b| if share(b) < share(a) { b } else { a })?;
-    if cards.len() < 2 {
+    // The banner says what the least leak means where it is too much.
+    if cards.len() < 2 || Level::of(share(card).unwrap_or(100.0)) > Level::Gray {
         return None;
     }
     let shares: Vec<String> = [Basis::Released, Basis::Oracle]
@@ -553,7 +620,7 @@ fn least(document: &Document, cards: &[Card]) -> Option<String> {
             _ => format!("{} % {}", found.percent, found.when.to_lowercase()),
         })
         .collect();
-    let name = card.scheme.to_uppercase();
+    let name = words::scheme_name(&card.scheme);
     let cost =
         document.localization.iter().find(|one| one.scheme == card.scheme && !one.of_queries);
     let cost = cost.filter(|one| !one.is_unknown()).map(|one| match one.cost() {
@@ -576,7 +643,7 @@ pub(crate) fn bearings_sentence(document: &Document, scheme: &str) -> Option<Str
         values.max_by(f64::total_cmp)
     };
     let real = words::percent(of("real_bearings_percent")?);
-    let name = scheme.to_uppercase();
+    let name = words::scheme_name(scheme);
     let text = format!(
         "{name} publishes bearings: whoever stands in the center sees the scene. {real} % of the bearings are real"
     );

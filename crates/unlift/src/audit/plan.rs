@@ -138,10 +138,11 @@ impl<const D: usize> Plan<D> {
         }
     }
 
-    /// Adds the solver `consensus` for a map of `n_points` with fewer than 150 points per list
-    /// entry, where `joint` can be weaker.
+    /// Limits the oracle to the inlier ratios 0.5 and 0.1, and adds the solver `consensus` for a map of `n_points`
+    /// with fewer than 150 points per list entry, where `joint` can be weaker.
     #[must_use]
     pub fn for_map(mut self, n_points: usize, k: usize) -> Self {
+        self.inlier_ratios = vec![0.5, 0.1];
         if n_points < SMALL * k && !self.has_solver(Builtin::Consensus) {
             self.solvers.push(Arc::new(Builtin::Consensus));
         }
