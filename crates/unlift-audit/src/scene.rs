@@ -1,8 +1,10 @@
 //! The data of the report's 3D view: a sample of original, hidden and recovered points.
 
 use unlift::audit::{Cell, Plan};
+use unlift::geometry::frame::{Bounds, rounded_origin};
 use unlift::released::{Obfuscation, Released};
 use unlift::truth::Original;
+use unlift_io::clouds::record_segments;
 use unlift_report::scene::{
     ObfuscationView, Scene3d, SceneBox, Shapes, View, points_within_budget, subsample,
 };
@@ -27,7 +29,7 @@ impl Pictures {
         let points = original.reveal().positions();
         let most = points_within_budget(n_views, plan.schemes.len());
         let sample = subsample(points.len(), most, plan.seed);
-        let middle = unlift::geometry::frame::rounded_origin(points);
+        let middle = rounded_origin(points);
         let originals: Vec<[f32; 3]> =
             sample.iter().map(|&at| near(&points[at], &middle)).collect();
         let bounds = SceneBox::robust(&originals);
@@ -90,16 +92,12 @@ pub fn shapes(
         std::array::from_fn(|c| (f64::from(p[c]) + origin[c] - middle[c]) as f32)
     };
     match released.obfuscation() {
-        Obfuscation::Lines(lines) => Shapes::Segments(
-            records
-                .iter()
-                .filter_map(|&r| bounds.clip_line(place(&lines.foot()[r]), lines.direction()[r]))
-                .collect(),
-        ),
-        Obfuscation::Rays(rays) => {
-            let center = |r: usize| &rays.centers()[usize::from(rays.center()[r])];
-            let clip = |&r: &usize| bounds.clip_ray(place(center(r)), rays.direction()[r]);
-            Shapes::Segments(records.iter().filter_map(clip).collect())
+        Obfuscation::Lines(_) | Obfuscation::Rays(_) => {
+            let corner = |corner: [f32; 3]| [0, 1, 2].map(|c| f64::from(corner[c]) + middle[c]);
+            let frame = Bounds { low: corner(bounds.low), high: corner(bounds.high) };
+            let segments = record_segments(released, &frame, records.iter().copied());
+            let ends = |ends: [[f64; 3]; 2]| ends.map(|end| near(&end, middle));
+            Shapes::Segments(segments.into_iter().map(ends).collect())
         }
         Obfuscation::AxisPlanes(planes) => {
             let patch = |&r: &usize| {

@@ -62,7 +62,7 @@ struct ImageOptions {
     max_features: Option<NonZeroUsize>,
     max_images: Option<NonZeroUsize>,
     photos: Option<PathBuf>,
-    show: Option<Vec<String>>,
+    pictures: bool,
 }
 
 /// Extracts options from the dict `given`; an error about an item is one about an argument.
@@ -158,7 +158,7 @@ pub fn audit_images(
             plan,
             options: of_images.record(),
             gates,
-            show: opened.show,
+            draws: of_images.pictures,
             photos: of_images.photos,
             out: PathBuf::new(),
             share_safe: false,
@@ -188,7 +188,7 @@ pub fn audit_images(
 /// Renames options of the command line in an error to Python arguments.
 fn renamed(py: Python<'_>, error: PyErr) -> PyErr {
     let text = error.value(py).to_string();
-    let names = ["features", "max-features", "max-images", "show"];
+    let names = ["features", "max-features", "max-images"];
     let option =
         |text: String, name: &&str| text.replace(&format!("--{name}"), &name.replace('-', "_"));
     let renamed = names.iter().fold(text.clone(), option);
@@ -198,12 +198,10 @@ fn renamed(py: Python<'_>, error: PyErr) -> PyErr {
 impl ImageOptions {
     /// Returns the options for the report, with the names of the command line.
     fn record(&self) -> Json<String, Value> {
-        let show = self.show.as_ref().filter(|names| !names.is_empty());
         let record = [
             ("features", self.features.as_ref().map(|name| json!(name))),
             ("max_features", self.max_features.map(|most| json!(most.get()))),
             ("max_images", self.max_images.map(|most| json!(most.get()))),
-            ("show", show.map(|names| json!(names))),
         ];
         let given = record.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?)));
         given.collect()
@@ -225,7 +223,6 @@ struct Opened {
     source: FeatureSource,
     path: PathBuf,
     chosen: Vec<usize>,
-    show: Option<Vec<usize>>,
 }
 
 fn open(
@@ -251,20 +248,14 @@ fn open(
             (FeatureSource::open(&path, &extraction)?, path)
         }
     };
-    let names = source.names();
-    let chosen = choice::evenly(names.len(), options.max_images.map(|most| most.get()));
-    let place = path.display().to_string();
-    let show = match options.show.as_deref() {
-        None => None,
-        Some(wanted) => Some(choice::shown(wanted, names, &chosen, &place)?),
-    };
+    let chosen = choice::evenly(source.names().len(), options.max_images.map(|most| most.get()));
     // One error instead of one per image.
     if let (FeatureSource::File(_), true) = (&source, Needs::of_plan(plan).descriptors())
         && let Some(first) = source.first(&chosen)
     {
         fit(plan, first.descriptors.as_ref())?;
     }
-    Ok(Opened { source, path, chosen, show })
+    Ok(Opened { source, path, chosen })
 }
 
 /// Returns an error if a source of `plan` does not support the descriptors.

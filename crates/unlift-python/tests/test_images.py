@@ -176,7 +176,6 @@ def with_b(**change):
         (lambda i: quick("no such file"), "no such file: expected a file or folder, found nothing"),
         (lambda i: quick(i, "olc"), "scheme: expected one that is defined on images, found olc"),
         (lambda i: quick(i, neighbors="geometric", inlier_ratios=None), "expected one that is defined in 2 dimensions, found geometric"),
-        (lambda i: quick(i, show=["Z.png"], max_images=1), "^show: expected an image that max_images keeps, found Z.png"),
         (lambda i: quick(FIXTURES / "features-latest.h5", max_features=5), "^max_features: expected with a folder of photos, found a file"),
         (lambda i: quick(i, neighbors="overlap"), "inlier_ratios: expected neighbors with \"oracle\", found only overlap"),
         (lambda i: quick(i, gates=["olc:10<=3"]), "olc"),

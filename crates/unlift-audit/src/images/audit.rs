@@ -39,8 +39,8 @@ pub struct ImagesJob<'a> {
     pub options: Map<String, Value>,
     /// The gates.
     pub gates: Vec<Gate>,
-    /// Numbers of the images to draw; with `None` the audit chooses.
-    pub show: Option<Vec<usize>>,
+    /// Whether some images are drawn.
+    pub draws: bool,
     /// The folder of photos, if the source is a file.
     pub photos: Option<PathBuf>,
     /// The output folder.
@@ -239,20 +239,11 @@ fn drawn(
     tally: &Tally,
     figures: &[ImageFigures],
 ) -> Result<(Vec<Picture>, Vec<Inverted>), Error> {
-    let wanted: Vec<(usize, &str)> = match &job.show {
-        Some(show) => {
-            let usable = show.iter().filter(|at| tally.used.contains(at));
-            usable.map(|&at| (at, "")).collect()
-        }
-        None => telling(&job.plan, figures)
-            .into_iter()
-            .map(|(at, note)| (tally.used[at], note))
-            .collect(),
-    };
-    if wanted.is_empty() {
+    let chosen = if job.draws { telling(&job.plan, figures) } else { Vec::new() };
+    if chosen.is_empty() {
         return Ok((Vec::new(), Vec::new()));
     }
-    let numbers: Vec<usize> = wanted.iter().map(|(at, _)| *at).collect();
+    let numbers: Vec<usize> = chosen.iter().map(|(at, _)| tally.used[*at]).collect();
     let mut plan = job.plan.clone();
     plan.solvers.truncate(1);
     plan.repeats = 1;
@@ -266,7 +257,7 @@ fn drawn(
     for picture in &mut album.pictures {
         let at = numbers.iter().position(|&at| job.source.names()[at] == picture.name);
         let Some(at) = at else { continue };
-        picture.note = wanted[at].1.to_owned();
+        picture.note = chosen[at].1.to_owned();
         let photo = match (job.source, &job.photos) {
             (FeatureSource::Folder(folder), _) => folder.path(numbers[at]).to_owned(),
             (_, Some(photos)) => photos.join(&picture.name),

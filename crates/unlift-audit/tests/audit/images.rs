@@ -46,7 +46,7 @@ fn job<'a>(source: &'a FeatureSource, path: &'a Path) -> ImagesJob<'a> {
         },
         options: serde_json::Map::new(),
         gates: Vec::new(),
-        show: None,
+        draws: true,
         photos: None,
         out: PathBuf::new(),
         share_safe: false,

@@ -69,7 +69,7 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
         let job = ImagesJob {
             source: &source,
             path: &args.path,
-            show: None,
+            draws: true,
             chosen,
             plan,
             options: more_options(args),

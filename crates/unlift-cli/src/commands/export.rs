@@ -127,8 +127,8 @@ fn read(path: &Path) -> anyhow::Result<(Shown, Unit)> {
             let unit = released.unit();
             match released.obfuscation() {
                 Obfuscation::Lines(_) | Obfuscation::Rays(_) => {
-                    let within = surroundings(&released);
-                    let segments = record_segments(&released, &within.low, &within.high);
+                    let n = released.n_records();
+                    let segments = record_segments(&released, &surroundings(&released), 0..n);
                     Ok((Shown::Segments(segments), unit))
                 }
                 Obfuscation::AxisCandidates(candidates) => {

@@ -97,7 +97,7 @@ fn photos(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
         plan,
         options: record,
         gates: Vec::new(),
-        show: None,
+        draws: true,
         photos: None,
         out: out.to_owned(),
         share_safe: false,

@@ -87,89 +87,35 @@ pub fn write_lines<const D: usize>(path: &Path, segments: &[Segment<D>]) -> Resu
 /// The two ends of a line segment.
 pub type Segment<const D: usize> = [[f64; D]; 2];
 
-/// Returns the segments of the released lines or rays inside the box from `low` to `high`, in
-/// record order.
-///
-/// Coordinates are in the map's frame (the origin is added). Records that miss the box are left
-/// out. Other families have no segments.
+/// Returns the segments of these released lines or rays inside the box, in the map's frame (the
+/// origin is added). Records that miss the box, or only touch it, are left out. Other families have
+/// no segments.
 pub fn record_segments<const D: usize>(
     released: &Released<D>,
-    low: &[f64; D],
-    high: &[f64; D],
+    bounds: &Bounds<D>,
+    records: impl IntoIterator<Item = usize>,
 ) -> Vec<Segment<D>> {
     let origin = released.origin();
-    let placed = |p: [f32; D]| -> [f64; D] { std::array::from_fn(|c| f64::from(p[c]) + origin[c]) };
-    match released.obfuscation() {
-        Obfuscation::Lines(lines) => lines
-            .foot()
-            .iter()
-            .zip(lines.direction())
-            .filter_map(|(&f, d)| clip(&placed(f), &d.map(f64::from), LINE, (low, high)))
-            .collect(),
-        Obfuscation::Rays(rays) => rays
-            .center()
-            .iter()
-            .zip(rays.direction())
-            .filter_map(|(&c, d)| {
-                let center = placed(rays.centers()[usize::from(c)]);
-                clip(&center, &d.map(f64::from), RAY, (low, high))
-            })
-            .collect(),
-        Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => Vec::new(),
-    }
-}
-
-/// The start of a line and of a ray, in lengths of the direction.
-const LINE: f64 = f64::NEG_INFINITY;
-const RAY: f64 = 0.0;
-
-/// Returns the segment of the line or ray through `point` along `direction` inside the box, or
-/// `None` if it misses the box, only touches it, or has no direction.
-fn clip<const D: usize>(
-    point: &[f64; D],
-    direction: &[f64; D],
-    start: f64,
-    (low, high): (&[f64; D], &[f64; D]),
-) -> Option<Segment<D>> {
-    let bounds = Bounds { low: *low, high: *high };
-    let finite = |row: &[f64; D]| row.iter().all(|x| x.is_finite());
-    let is_box = low.iter().zip(high).all(|(low, high)| low <= high);
-    let (from, to) = bounds.clip(point, direction)?;
-    let from = from.max(start);
-    if !(from < to && is_box && finite(point) && finite(direction)) {
-        return None;
-    }
-    // Rounding may leave the box by an ulp.
-    let at = |t: f64| std::array::from_fn(|c| (point[c] + t * direction[c]).clamp(low[c], high[c]));
-    Some([at(from), at(to)])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const LOW: [f64; 3] = [0.0; 3];
-    const HIGH: [f64; 3] = [1.0, 2.0, 3.0];
-
-    #[test]
-    fn what_is_within_the_box_stays() {
-        let (x, y, nan) = ([1.0, -1.0, 0.0], [0.0, 1.0, 0.0], [f64::NAN, 0.0, 1.0]);
-        let full = Some([[0.5, 0.0, 1.0], [0.5, 2.0, 1.0]]);
-        for (point, direction, start, expected) in [
-            // A line ends on faces of the box, and a ray starts at its center.
-            ([0.5, 9.0, 1.0], y, LINE, full),
-            ([0.5, 1.0, 1.0], y, RAY, Some([[0.5, 1.0, 1.0], [0.5, 2.0, 1.0]])),
-            ([0.5, 9.0, 1.0], y, RAY, None),
-            // Lines that miss the box, touch it, or have no direction.
-            ([5.0, 5.0, 5.0], y, LINE, None),
-            ([1.0, 2.0, 0.0], x, LINE, None),
-            ([0.5; 3], [0.0; 3], LINE, None),
-            ([0.5; 3], nan, LINE, None),
-        ] {
-            assert_eq!(clip(&point, &direction, start, (&LOW, &HIGH)), expected, "{point:?}");
-        }
-        for high in [[1.0, -1.0, 1.0], [f64::NAN; 3]] {
-            assert_eq!(clip(&[0.5; 3], &y, LINE, (&LOW, &high)), None, "no box");
-        }
-    }
+    let segment = |record: usize| {
+        let (point, direction, start) = match released.obfuscation() {
+            Obfuscation::Lines(lines) => {
+                (lines.foot()[record], lines.direction()[record], f64::NEG_INFINITY)
+            }
+            Obfuscation::Rays(rays) => {
+                let center = rays.centers()[usize::from(rays.center()[record])];
+                (center, rays.direction()[record], 0.0)
+            }
+            Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => return None,
+        };
+        let point: [f64; D] = std::array::from_fn(|c| f64::from(point[c]) + origin[c]);
+        let direction = direction.map(f64::from);
+        let (from, to) = bounds.clip(&point, &direction)?;
+        // Rounding may leave the box by an ulp.
+        let at = |t: f64| {
+            let along = |c: usize| point[c] + t * direction[c];
+            std::array::from_fn(|c| along(c).clamp(bounds.low[c], bounds.high[c]))
+        };
+        (from.max(start) < to).then(|| [at(from.max(start)), at(to)])
+    };
+    records.into_iter().filter_map(segment).collect()
 }

@@ -5,6 +5,7 @@ use std::fs;
 
 use half::f16;
 use unlift::Unit;
+use unlift::geometry::frame::Bounds;
 use unlift::released::{Lines, Obfuscation, Rays, Released};
 use unlift_io::{clouds, read};
 
@@ -345,19 +346,20 @@ fn points_and_lines_are_written_if_they_are_finite() {
 
 #[test]
 fn records_are_clipped_in_the_frame_of_the_map() {
-    let origin = [1e6, 0.0, 0.0];
-    let (low, high) = ([1e6 - 1.0, -1.0, -1.0], [1e6 + 1.0, 1.0, 1.0]);
-    let along = [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0]];
-    let lines = Lines::through(&[[0.5, 0.0, 0.0], [2.0, 0.0, 0.0]], &along).unwrap();
-    let released =
-        |obfuscation| Released::try_new(obfuscation, 1, origin, Unit::Meter, None).unwrap();
-    assert_eq!(
-        clouds::record_segments(&released(Obfuscation::Lines(lines)), &low, &high),
-        [[[1e6 + 0.5, 0.0, -1.0], [1e6 + 0.5, 0.0, 1.0]]]
-    );
-    let rays = Rays::try_new(&[[0.0; 3]], vec![0], &along[..1]).unwrap();
-    assert_eq!(
-        clouds::record_segments(&released(Obfuscation::Rays(rays)), &low, &high),
-        [[[1e6, 0.0, 0.0], [1e6, 0.0, 1.0]]]
-    );
+    let bounds = Bounds { low: [1e6 - 1.0, -1.0, -1.0], high: [1e6 + 1.0, 1.0, 1.0] };
+    let segments = |obfuscation: Obfuscation<3>| {
+        let n = obfuscation.len();
+        let released = Released::try_new(obfuscation, 1, [1e6, 0.0, 0.0], Unit::Meter, None);
+        clouds::record_segments(&released.unwrap(), &bounds, 0..n)
+    };
+    let up = [0.0, 0.0, 1.0];
+    // The second line misses the box, the third one touches it.
+    let feet = [[0.5, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.0, 1.0]];
+    let lines = Lines::through(&feet, &[up, up, [0.0, 1.0, -1.0]]).unwrap();
+    let within = |x: f64, from: f64| [[1e6 + x, 0.0, from], [1e6 + x, 0.0, 1.0]];
+    assert_eq!(segments(Obfuscation::Lines(lines)), [within(0.5, -1.0)]);
+    // Rays from the middle, from below the box, and from above it.
+    let centers = [[0.0; 3], [0.0, 0.0, -5.0], [0.0, 0.0, 5.0]];
+    let rays = Rays::try_new(&centers, vec![0, 1, 2], &[up; 3]).unwrap();
+    assert_eq!(segments(Obfuscation::Rays(rays)), [within(0.0, 0.0), within(0.0, -1.0)]);
 }

@@ -27,7 +27,6 @@ SEVERAL = {
     "solvers",
     "thresholds",
     "gates",
-    "show",
 }
 
 #: A name in `SCHEMES`, or a function (`scheme`).
@@ -139,7 +138,7 @@ def audit_images(
     features: str | None = None,
     max_features: int | None = None,
     max_images: int | None = None,
-    show: Sequence[str] | str | None = None,
+    pictures: bool = True,
     photos: str | os.PathLike[str] | None = None,
     inlier_ratios: Sequence[float] | None = None,
     oracle_noise: Sequence[str] | str | None = None,
@@ -165,7 +164,7 @@ def audit_images(
     neighbors: "oracle", names in `IMAGE_SOURCES`, or functions (`source`).
     features: what to extract from photos: "sift", "aliked", "superpoint". max_features: how many.
     max_images: use at most this many, evenly spaced over their sorted names.
-    show: names of images to draw; none if empty. Default: those with the least, the median and the most recovered keypoints.
+    pictures: whether the page draws the images with the least, the median and the most recovered keypoints.
     photos: the folder of photos to draw, if `images` is not one.
     solvers: names in `IMAGE_SOLVERS`, or functions as for `audit`, with positions `(n_slots, 2)`.
     thresholds: errors in pixels up to which a keypoint counts as recovered.
@@ -193,7 +192,7 @@ def audit_images(
         max_features=max_features,
         max_images=max_images,
         photos=None if photos is None else os.fspath(photos),
-        show=show,
+        pictures=pictures,
     )
     native: tuple[_Report, list[str]] = _run(lambda tell: _audit_images(images, options, tell), progress, "image")
     report, messages = native

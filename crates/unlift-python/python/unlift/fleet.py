@@ -120,7 +120,7 @@ def audit_images(batches: Iterable[_pa.RecordBatch], **options: Any) -> Iterator
                 raise UnliftError(f"batches: expected a column {column}, found {found}")
         for image in batch.to_pylist():
             try:
-                report = audit({image["name"]: _features(image)}, show=[], **options)
+                report = audit({image["name"]: _features(image)}, pictures=False, **options)
             except UnliftError as error:
                 yield _batch([{"item": image["name"], "error": str(error)}])
                 continue

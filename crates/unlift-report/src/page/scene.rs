@@ -57,7 +57,7 @@ pub struct ObfuscationView {
 /// Records as drawn.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shapes {
-    /// Lines and rays clipped to the scene, see [`SceneBox::clip_line`] and [`SceneBox::clip_ray`].
+    /// Lines and rays clipped to the scene.
     Segments(Vec<[[f32; 3]; 2]>),
     /// Planes as outlined rectangles, see [`SceneBox::axis_patch`].
     Patches(Vec<[[f32; 3]; 4]>),
@@ -390,38 +390,6 @@ impl SceneBox {
         Self { low, high }
     }
 
-    /// Returns the part in the box of the line through `point` along `direction`; `None` if the
-    /// line misses the box or `direction` is zero.
-    pub fn clip_line(&self, point: [f32; 3], direction: [f32; 3]) -> Option<[[f32; 3]; 2]> {
-        self.clip(point, direction, f32::NEG_INFINITY)
-    }
-
-    /// Returns the part in the box of the half-line from `center`, like [`SceneBox::clip_line`].
-    pub fn clip_ray(&self, center: [f32; 3], direction: [f32; 3]) -> Option<[[f32; 3]; 2]> {
-        self.clip(center, direction, 0.0)
-    }
-
-    fn clip(&self, point: [f32; 3], direction: [f32; 3], from: f32) -> Option<[[f32; 3]; 2]> {
-        let (mut near, mut far) = (from, f32::INFINITY);
-        for axis in 0..3 {
-            let (low, high) = (self.low[axis] - point[axis], self.high[axis] - point[axis]);
-            if direction[axis] == 0.0 {
-                if low > 0.0 || high < 0.0 {
-                    return None;
-                }
-                continue;
-            }
-            let (a, b) = (low / direction[axis], high / direction[axis]);
-            near = near.max(a.min(b));
-            far = far.min(a.max(b));
-        }
-        if !near.is_finite() || !far.is_finite() || near >= far {
-            return None;
-        }
-        let at = |t: f32| std::array::from_fn(|axis| point[axis] + t * direction[axis]);
-        Some([at(near), at(far)])
-    }
-
     /// Returns the rectangle of the plane `coordinate[axis] == offset` in the box; `None` if it is
     /// outside.
     pub fn axis_patch(&self, axis: usize, offset: f32) -> Option<[[f32; 3]; 4]> {
@@ -538,15 +506,6 @@ mod tests {
         let view = &encode(&scene, &[row(0)], 0.1).views[0];
         assert_eq!(view.drawn, 6);
         assert_eq!(view.said, "6 of 9 points drawn; 1 not released, 1 lost, 1 outside the box");
-    }
-
-    const CUBE: SceneBox = SceneBox { low: [-1.0; 3], high: [1.0; 3] };
-
-    #[test]
-    fn a_ray_starts_at_its_center_or_at_a_face() {
-        assert_eq!(CUBE.clip_ray([0.0; 3], [0.0, 0.0, 1.0]).unwrap()[0], [0.0; 3]);
-        assert_eq!(CUBE.clip_ray([0.0, 0.0, -5.0], [0.0, 0.0, 1.0]).unwrap()[0], [0.0, 0.0, -1.0]);
-        assert_eq!(CUBE.clip_ray([0.0, 0.0, 5.0], [0.0, 0.0, 1.0]), None);
     }
 
     #[test]

@@ -1,5 +1,4 @@
-//! Procedural maps: a furnished room in meters, and other shapes, for experiments without real
-//! data.
+//! Procedural maps: a furnished room in meters, for experiments without real data.
 //!
 //! [`room`] furnishes a room (`room.rs`, `furniture.rs`), moves cameras through it
 //! and samples visible surfaces (`sampling.rs`) like structure from motion: dense on
@@ -9,14 +8,12 @@
 mod furniture;
 mod room;
 mod sampling;
-mod shapes;
 mod surfaces;
 
 use crate::seed::{Draws, Stage};
 use surfaces::{rotate, turn};
 
 pub use sampling::Camera;
-pub use shapes::{Shape, keypoints, shape};
 
 /// Tangent of half the angle (17.06 degrees) between walls and axes. Real maps are not aligned with
 /// their walls, and axis-wise schemes must not benefit from alignment.

@@ -18,8 +18,7 @@ pub use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays,
 pub use unlift::seed::{Draws, Key, Stage};
 pub use unlift::truth::{Original, Secret};
 pub use unlift::{
-    About, Descriptors, Error, PointSet, RecordId, RowOrder, Unit, synthetic, synthetic::Shape,
-    synthetic::shape,
+    About, Descriptors, Error, PointSet, RecordId, RowOrder, Unit, synthetic,
 };
 pub use unlift_testkit::{distance_to_record, image_around, on_threads, piles, room, uniform};
 

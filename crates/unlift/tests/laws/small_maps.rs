@@ -1,16 +1,33 @@
-//! Tests of small maps and of shapes other than rooms. `cargo bench -p unlift --bench families`
-//! runs the whole suite.
+//! Tests of small maps and of shapes other than rooms.
 //!
 //! Regression: on maps whose lists contain a large part of all records, joint recovery lost what
 //! its first pass, consensus, had found.
 
 use crate::maps::{audit, *};
 
-/// Returns the percentages of `n` points within 1.0 and 2.5 typical distances, by joint recovery
-/// and by consensus.
-fn both(of: Shape, n: usize, name: &str, ratio: f64) -> ([f64; 2], [f64; 2]) {
-    let points = shape(of, 1, n);
-    let typical = median(&mut Knn::new(&points).unwrap().kth_distances(50));
+fn room(seed: u64, n: usize) -> Vec<[f64; 3]> {
+    synthetic::room(seed, n).points
+}
+
+/// Returns a point anywhere in a cube.
+fn cube(draws: &mut Draws) -> [f64; 3] {
+    std::array::from_fn(|_| draws.between(0.0, 1.0))
+}
+
+/// Returns 2,000 points of a simple shape.
+fn shape(place: impl Fn(usize, &mut Draws) -> [f64; 3]) -> Vec<[f64; 3]> {
+    let draws = |item: usize| Draws::new(1, Stage::Shapes, 1 + item as u64);
+    (0..2_000).map(|item| place(item, &mut draws(item))).collect()
+}
+
+fn noisy(center: [f64; 3], sigma: f64, draws: &mut Draws) -> [f64; 3] {
+    center.map(|x| x + sigma * draws.normal())
+}
+
+/// Returns the percentages of points within 1.0 and 2.5 typical distances, by joint recovery and by
+/// consensus.
+fn both(points: &[[f64; 3]], name: &str, ratio: f64) -> ([f64; 2], [f64; 2]) {
+    let typical = median(&mut Knn::new(points).unwrap().kth_distances(50));
     let points = points.iter().map(|p| p.map(|x| x / typical)).collect();
     let original = Original::new(PointSet::try_new(points, Unit::KthNeighbor).unwrap());
     let solvers = [Builtin::Joint, Builtin::Consensus];
@@ -25,19 +42,28 @@ fn both(of: Shape, n: usize, name: &str, ratio: f64) -> ([f64; 2], [f64; 2]) {
 #[test]
 fn joint_recovery_keeps_what_its_first_pass_found() {
     // Shares within 1.0 before the fix: 67, 50 (within 2.5; consensus 88), 72, 57.
-    for (of, name, ratio, margin) in [
-        (Shape::Cube, "ppl", 0.3, 3.0),
-        (Shape::Cube, "ray", 0.1, 1.0),
-        (Shape::Cube, "cp", 1.0, 1.0),
-        (Shape::Lattice, "ppl+", 0.3, 5.0),
-        (Shape::Clusters, "olc", 0.2, 1.0),
-        (Shape::Plane, "plane", 0.3, 1.0),
+    let cubes = shape(|_, draws| cube(draws));
+    let lattice = shape(|i, _| [i % 13, i / 13 % 13, i / 169].map(|c| c as f64 / 13.0));
+    let mut of_map = Draws::new(1, Stage::Shapes, 0);
+    let centers: [_; 20] = std::array::from_fn(|_| cube(&mut of_map));
+    let clusters = shape(|_, draws| noisy(centers[draws.below(20) as usize], 0.03, draws));
+    let plane = shape(|_, draws| {
+        let (s, t) = (draws.between(0.0, 1.0), draws.between(0.0, 1.0));
+        noisy([s, 0.8 * t - 0.2 * s, 0.6 * t + 0.3 * s], 0.005, draws)
+    });
+    for (what, points, name, ratio, margin) in [
+        ("cube", &cubes, "ppl", 0.3, 3.0),
+        ("cube", &cubes, "ray", 0.1, 1.0),
+        ("cube", &cubes, "cp", 1.0, 1.0),
+        ("lattice", &lattice, "ppl+", 0.3, 5.0),
+        ("clusters", &clusters, "olc", 0.2, 1.0),
+        ("plane", &plane, "plane", 0.3, 1.0),
     ] {
-        let (joint, consensus) = both(of, 2_000, name, ratio);
+        let (joint, consensus) = both(points, name, ratio);
         for at in 0..2 {
             assert!(
                 joint[at] >= consensus[at] - margin,
-                "{of:?} {name} at {ratio}: joint {joint:?}, consensus {consensus:?}"
+                "{what} {name} at {ratio}: joint {joint:?}, consensus {consensus:?}"
             );
         }
     }
@@ -55,12 +81,11 @@ fn cp(points: &[[f64; 3]], k: usize, delta: Delta) -> f64 {
 /// lines cross completely, wide ones were excluded.
 #[test]
 fn deltas_of_exchanged_coordinates_do_not_collapse() {
-    let room = shape(Shape::Room, 3, 800);
-    let flat: Vec<[f64; 3]> = shape(Shape::Cube, 1, 2_000)
-        .into_iter()
-        .map(|[x, y, z]| [6.0 * x, 5.0 * y, 0.05 * z])
-        .collect();
-    for (points, right) in [(room, 0.35), (flat, 0.2)] {
+    let flat = shape(|_, draws| {
+        let [x, y, z] = cube(draws);
+        [6.0 * x, 5.0 * y, 0.05 * z]
+    });
+    for (points, right) in [(room(3, 800), 0.35), (flat, 0.2)] {
         let (chosen, best) = (cp(&points, 10, Delta::Auto), cp(&points, 10, Delta::Fixed(right)));
         assert!(chosen > best - 10.0, "{chosen} {best}");
     }
@@ -71,7 +96,7 @@ fn automatic_delta_does_not_collapse_where_little_is_right() {
     // Before the fix chance led to a thousandth of the typical distance, and shares within 2.5 were
     // 2 and 20 %; now 52 and 54.
     for (name, least) in [("ppl+", 50.2), ("cp", 52.8)] {
-        let (joint, consensus) = both(Shape::Room, 1_000, name, 0.1);
+        let (joint, consensus) = both(&room(1, 1_000), name, 0.1);
         let found = joint[1].min(consensus[1]);
         assert!(found > least, "{name}: joint {joint:?}, consensus {consensus:?}");
     }
