@@ -51,9 +51,6 @@ pub struct Maps {
 }
 
 /// Reads two maps, each with its file of descriptors. Lengths of both are in the unit of the first.
-///
-/// # Errors
-/// See [`maps::open`].
 pub fn open([a, b]: [(&Path, Option<&Path>); 2], preparation: &Preparation) -> Result<Maps, Error> {
     let first = maps::open(a.0, a.1, preparation)?;
     if a == b {

@@ -195,9 +195,6 @@ pub(crate) fn given(row: &Row) -> Given {
 const UNKNOWN: [&str; 6] = ["scheme", "neighbors", "oracle_noise", "inlier_ratio", "k", "solver"];
 
 /// Returns a row as `evaluate` prints it: rounded, without the fields of its name, with `notes`.
-///
-/// # Errors
-/// If a figure cannot be serialized (a bug).
 pub fn evaluated(
     found: &Row,
     thresholds: &[Threshold],

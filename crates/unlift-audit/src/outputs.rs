@@ -72,9 +72,6 @@ pub struct Finished {
 
 impl Audited {
     /// Renders the self-contained page.
-    ///
-    /// # Errors
-    /// If rendering fails.
     pub fn page(&self, share_safe: bool) -> Result<String, Error> {
         let options = RenderOptions { share_safe, ..self.drawn.clone() };
         Ok(render(&self.document, self.scene.as_ref(), &options)?)
@@ -95,9 +92,6 @@ impl Audited {
     }
 
     /// Stages page and figures under `names` in `out`. They appear when `out` is committed.
-    ///
-    /// # Errors
-    /// If a file cannot be written.
     pub fn stage(
         &self,
         out: &mut OutputSet,
@@ -116,9 +110,6 @@ impl Audited {
 
     /// Writes page and figures to `folder`, for which `out` was opened: both or none. With
     /// `share_safe` they contain figures only.
-    ///
-    /// # Errors
-    /// If a file cannot be written.
     pub fn write(
         &self,
         mut out: OutputSet,

@@ -6,9 +6,6 @@ use unlift::{OneLine, is_obeyed};
 
 /// Prints `text`, lines or JSON. If the reader closes the pipe early (`| head`), the rest is
 /// dropped without an error.
-///
-/// # Errors
-/// If stdout cannot be written for another reason.
 pub fn print(text: &str) -> anyhow::Result<()> {
     let text = harmless(text);
     let mut stdout = io::stdout().lock();

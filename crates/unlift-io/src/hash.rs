@@ -11,9 +11,6 @@ use unlift::Descriptors;
 use unlift::descriptors::Values;
 
 /// Returns the SHA-256 of a file's content, as 64 hexadecimal digits.
-///
-/// # Errors
-/// When the file cannot be read.
 pub fn hash_file(path: &Path) -> Result<String, Error> {
     let failed = |source| Error::read(path, source);
     let (mut file, _) = input::open(path)?;
@@ -37,9 +34,6 @@ pub fn hash_file(path: &Path) -> Result<String, Error> {
 /// ```sh
 /// sha256sum cameras.bin images.bin points3D.bin | sha256sum
 /// ```
-///
-/// # Errors
-/// When a file cannot be read.
 pub fn hash_files<P: AsRef<Path>>(paths: &[P]) -> Result<String, Error> {
     let mut lines = Vec::with_capacity(paths.len());
     for path in paths {
@@ -51,9 +45,6 @@ pub fn hash_files<P: AsRef<Path>>(paths: &[P]) -> Result<String, Error> {
 }
 
 /// Returns [`hash_files`] of the files of a map that was read.
-///
-/// # Errors
-/// When a file cannot be read.
 pub fn hash_input(input: &Input) -> Result<String, Error> {
     hash_files(&input.files)
 }

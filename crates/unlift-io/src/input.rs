@@ -68,9 +68,6 @@ impl Budget {
     }
 
     /// Checks that `bytes` for `place` are within the budget.
-    ///
-    /// # Errors
-    /// When they are not.
     pub fn admit(&self, place: impl Into<Place>, bytes: u64) -> Result<(), Error> {
         if bytes <= self.most {
             return Ok(());

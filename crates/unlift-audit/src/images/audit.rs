@@ -68,9 +68,6 @@ pub struct Used {
 
 /// Runs the job and writes its folder, completely or not at all. Without a usable image nothing is
 /// written.
-///
-/// # Errors
-/// See [`find`]; also if the folder cannot be written.
 pub fn perform(job: ImagesJob<'_>, out: OutputSet) -> Result<(Option<Finished>, Used), Error> {
     let (folder, share_safe) = (job.out.clone(), job.share_safe);
     let (found, used) = find(job)?;
@@ -231,9 +228,6 @@ const USUAL_RATIO: f64 = 0.5;
 
 /// Audits the drawn images again, with the first solver and seed. The seed of an image depends on
 /// its name, so the result is that of the audit, and no picture is kept in between.
-///
-/// # Errors
-/// If an image cannot be audited again.
 fn drawn(
     job: &ImagesJob<'_>,
     tally: &Tally,

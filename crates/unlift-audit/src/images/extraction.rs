@@ -77,9 +77,6 @@ impl Wanted {
     }
 
     /// Rejects all options if features exist already, in `found`.
-    ///
-    /// # Errors
-    /// If an option is given.
     pub fn check_unused(&self, found: &str) -> Result<(), Error> {
         let given = [
             (self.option, self.kind.is_some()),

@@ -103,9 +103,6 @@ impl Folder {
     }
 
     /// Extracts the features of photo `at`.
-    ///
-    /// # Errors
-    /// If this photo cannot be used.
     pub fn get(&self, at: usize) -> Result<ImageFeatures, crate::Error> {
         let path = &self.paths[at];
         let photo = self.extractor.read(path)?;

@@ -146,9 +146,6 @@ impl InMemory {
     }
 
     /// Returns the features of image `at`, under its name.
-    ///
-    /// # Errors
-    /// If it cannot be made.
     pub fn get(&self, at: usize) -> Result<ImageFeatures, Error> {
         let name = self.names[at].clone();
         Ok(ImageFeatures { name, ..(self.get)(at)? })

@@ -71,9 +71,6 @@ impl Inversion {
 
     /// Adds the picture of `recovered` keypoints to the sheet of the image `name`, whose photo has
     /// `size` pixels and shows the keypoints `original`.
-    ///
-    /// # Errors
-    /// If the photo cannot be used.
     pub fn add_keypoints(
         &self,
         (name, size): (&str, [usize; 2]),

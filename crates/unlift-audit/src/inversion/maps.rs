@@ -126,9 +126,6 @@ impl MapInversion {
     }
 
     /// Adds the pictures of `cell` by the first cameras, one per sheet.
-    ///
-    /// # Errors
-    /// If a picture cannot be made.
     pub fn add(&self, cell: &Cell<'_>, sheets: &mut [Sheet]) -> Result<(), Error> {
         let last = self.last.lock().unwrap_or_else(PoisonError::into_inner).take();
         let pictures = match last {

@@ -61,9 +61,6 @@ struct Judged {
 
 impl Painter {
     /// Creates a painter with the painting network, and loads the networks that compare.
-    ///
-    /// # Errors
-    /// If a file that replaces an embedded network cannot be loaded.
     pub fn try_new(inverter: Inverter) -> Result<Self, Error> {
         Ok(Self { inverter, lpips: Lpips::try_new()?, detector: Detector::try_new()? })
     }
@@ -120,9 +117,6 @@ impl Painter {
     }
 
     /// Returns true if any recovered point is in front of the camera.
-    ///
-    /// # Errors
-    /// See [`map`](Self::map).
     pub fn sees(&self, view: &View, recovered: &Recovered<3>) -> Result<bool, Error> {
         let positions: Vec<_> =
             (0..recovered.n_slots()).map(|slot| recovered.position(slot)).collect();

@@ -208,9 +208,6 @@ impl<'a> Held<'a> {
     }
 
     /// Returns the problems of all images with the map that `scheme` protects under `key`.
-    ///
-    /// # Errors
-    /// If the scheme cannot hide the map.
     pub fn with_map(&mut self, scheme: &dyn Scheme<3>, key: &Key) -> Result<Vec<Problem>, Error> {
         let (released, secret) = obfuscate(scheme, self.original, Some(&self.descriptors), key)?;
         let secret = secret.by_descriptor_row();
@@ -244,9 +241,6 @@ impl<'a> Held<'a> {
 
     /// Returns the problems of all images, whose keypoints `scheme` protects, with the map in the
     /// clear.
-    ///
-    /// # Errors
-    /// If the scheme cannot hide the keypoints of an image.
     pub fn with_queries(
         &mut self,
         scheme: &dyn Scheme<2>,

@@ -58,9 +58,6 @@ impl Cameras {
     /// Reads the cameras and tracks of the COLMAP model in `model`. `rows` are the points of the
     /// audit among the points of the model; lengths are multiplied by `scale`. Returns no views if
     /// the points have no tracks.
-    ///
-    /// # Errors
-    /// If a file of the model cannot be read.
     pub fn read(model: &Path, rows: &[u32], scale: f64) -> Result<Self, Error> {
         let named = |name: &str| {
             let files = ["bin", "txt"].map(|end| model.join(format!("{name}.{end}")));

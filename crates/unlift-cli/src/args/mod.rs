@@ -46,9 +46,6 @@ impl Cli {
     }
 
     /// Reads a command line, whose first word is the name of the program.
-    ///
-    /// # Errors
-    /// If the line is wrong, or asks for help.
     pub fn read(
         line: impl IntoIterator<Item = impl Into<OsString> + Clone>,
     ) -> Result<Self, clap::Error> {

@@ -12,9 +12,6 @@ use crate::atomic::{self, Access};
 use crate::read::colmap::{Camera, Image};
 
 /// Writes `cameras.txt`.
-///
-/// # Errors
-/// When the file cannot be written.
 pub fn write_cameras(path: &Path, cameras: &[Camera]) -> Result<(), Error> {
     atomic::write_file(path, Access::Private, |w| {
         writeln!(w, "{MODEL_MARK}\n# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]")?;

@@ -75,6 +75,15 @@ impl<'a> Arrays<'a> {
         self.names.iter().any(|known| known == name)
     }
 
+    /// Reads the array `name`, if there is one.
+    pub(super) fn optional<'n, T>(
+        &self,
+        name: &'n str,
+        read: impl FnOnce(&'n str) -> Result<T, Error>,
+    ) -> Result<Option<T>, Error> {
+        self.has(name).then(|| read(name)).transpose()
+    }
+
     /// Lists the names for an error.
     pub(super) fn list(&self) -> String {
         match self.names.len() {
@@ -152,10 +161,10 @@ impl<'a> Arrays<'a> {
         Ok(values.as_chunks().0.to_vec())
     }
 
-    /// Reads `D` finite numbers.
-    pub(super) fn vector<const D: usize>(&self, name: &str) -> Result<[f64; D], Error> {
-        let (values, _) = self.floats(name, [Some(D)])?;
-        Ok(std::array::from_fn(|axis| values[axis]))
+    /// Reads the origin, by default 0.
+    pub(super) fn origin<const D: usize>(&self) -> Result<[f64; D], Error> {
+        let values = self.optional("origin", |name| self.floats(name, [Some(D)]))?;
+        Ok(values.map_or([0.0; D], |(values, _)| std::array::from_fn(|axis| values[axis])))
     }
 
     /// Reads whole numbers from 0 to `below - 1`, and -1 for [`NONE`] if `or_none`.

@@ -125,9 +125,6 @@ impl<'a> ImageFile<'a> {
     }
 
     /// Checks that no image follows, as in the file `of`.
-    ///
-    /// # Errors
-    /// When one follows.
     pub fn expect_end(&mut self, of: &Path) -> Result<(), Error> {
         match self.waiting.last() {
             None => Ok(()),
@@ -158,18 +155,12 @@ impl ImageRows<'_> {
     }
 
     /// Returns the ground truth of the image.
-    ///
-    /// # Errors
-    /// When `read_truth` would fail.
     pub fn truth(self) -> Result<(Original<2>, Secret), Error> {
         self.read(truth_of)
     }
 
     /// Returns the neighborhoods of an image of `n_records` records with `slots_per_record` slots
     /// each.
-    ///
-    /// # Errors
-    /// When `read_neighborhoods` would fail.
     pub fn neighborhoods(
         self,
         n_records: usize,
@@ -179,9 +170,6 @@ impl ImageRows<'_> {
     }
 
     /// Returns the recovered points of the image.
-    ///
-    /// # Errors
-    /// When `read_recovered` would fail.
     pub fn recovered(self) -> Result<Recovered<2>, Error> {
         self.read(|arrays| recovered_of(arrays, None))
     }
@@ -237,9 +225,6 @@ impl<'a> ImageWriter<'a> {
     }
 
     /// Adds the neighborhoods of an image.
-    ///
-    /// # Errors
-    /// When the disk fails.
     pub fn neighborhoods(&mut self, name: &str, lists: &Neighborhoods) -> Result<(), Error> {
         self.append(name, lists::written(lists))
     }

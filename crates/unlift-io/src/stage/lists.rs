@@ -14,9 +14,6 @@ use crate::atomic::Access;
 
 /// Writes neighborhoods, one row per slot: `records` and, if present, `scores`. Shorter lists end
 /// with -1 (and a score of NaN).
-///
-/// # Errors
-/// When the file cannot be written.
 pub fn write_neighborhoods(path: &Path, neighborhoods: &Neighborhoods) -> Result<(), Error> {
     write_file(path, Access::Private, written(neighborhoods))
 }
@@ -88,14 +85,11 @@ fn lists_of(
 ) -> Result<Neighborhoods, Error> {
     let n_rows = n_records * slots_per_record;
     let (ids, [_, k]) = arrays.integers(name, [Some(n_rows), None], n_records, true)?;
-    let given = match arrays.has("scores") {
-        true => {
-            let sides = [Some(n_rows), Some(k)];
-            let single = |x: f64| Some(x as f32).filter(|x| !x.is_infinite());
-            Some(arrays.numbers("scores", sides, Class::Any, "a number", single)?.0)
-        }
-        false => None,
-    };
+    let given = arrays.optional("scores", |name| {
+        let sides = [Some(n_rows), Some(k)];
+        let single = |x: f64| Some(x as f32).filter(|x| !x.is_infinite());
+        Ok(arrays.numbers(name, sides, Class::Any, "a number", single)?.0)
+    })?;
     let (mut offsets, mut neighbors) = (vec![0], Vec::with_capacity(ids.len()));
     let mut scores = given.as_ref().map(|scores| Vec::with_capacity(scores.len()));
     let mut sorted = Vec::new();

@@ -114,9 +114,6 @@ pub fn kind(path: &Path) -> Result<Kind, Error> {
 }
 
 /// Returns true if the stage file `path` contains many images, below their names.
-///
-/// # Errors
-/// When it is not a NumPy archive.
 pub fn has_images(path: &Path) -> Result<bool, Error> {
     Ok(Archive::open(path)?.arrays()?.iter().any(|(_, name)| name.contains('/')))
 }

@@ -84,9 +84,6 @@ pub(super) fn written<'a, const D: usize>(
 /// Only `position` is required. Without `status`, a point is recovered, or without support if its
 /// coordinates are NaN; `support` and `evidence` default to 0. Confidence requires both of its
 /// arrays.
-///
-/// # Errors
-/// When the file differs from `docs/formats.md`.
 pub fn read_recovered<const D: usize>(path: &Path) -> Result<Recovered<D>, Error> {
     recovered_of(&Arrays::open(path)?, None)
 }
@@ -114,20 +111,15 @@ pub(super) fn recovered_of<const D: usize>(
             meta.wrong(WHY_UNKNOWN, format!("one of {}", names.join(", ")))
         })?,
     };
-    let origin = match arrays.has("origin") {
-        true => arrays.vector("origin")?,
-        false => [0.0; D],
-    };
+    let origin = arrays.origin()?;
     let estimates = estimates(arrays, &origin)?;
     let n = estimates.len();
     let confidence = match arrays.has("found") || arrays.has("error_scale") {
         true => Some(confidence(arrays, &estimates)?),
         false => None,
     };
-    let rows = match arrays.has("descriptor_row") {
-        true => Some(arrays.integers("descriptor_row", [Some(n)], n, false)?.0),
-        false => None,
-    };
+    let rows = |name| Ok(arrays.integers(name, [Some(n)], n, false)?.0);
+    let rows = arrays.optional("descriptor_row", rows)?;
     Recovered::try_new(&estimates, arrays.has("axis"), rows, origin, unit, delta)
         .and_then(|recovered| match confidence {
             Some(confidence) => recovered.with_confidence(confidence),
@@ -146,20 +138,17 @@ fn estimates<const D: usize>(
     let sides = [None, Some(D)];
     let (values, [n, _]) = arrays.numbers("position", sides, Class::Any, rule, no_infinity)?;
     let positions: &[[f64; D]] = values.as_chunks().0;
-    let optional = |name: &str, below: usize, or_none: bool| match arrays.has(name) {
-        true => arrays.integers(name, [Some(n)], below, or_none).map(|(values, _)| Some(values)),
-        false => Ok(None),
+    let optional = |name: &str, below: usize, or_none: bool| {
+        let values = |name| arrays.integers(name, [Some(n)], below, or_none);
+        Ok::<_, Error>(arrays.optional(name, values)?.map(|(values, _)| values))
     };
     let status = optional("status", Status::ALL.len(), false)?;
     let support = optional("support", 1 << 16, false)?;
     let axis = optional("axis", D, true)?;
-    let evidence = match arrays.has("evidence") {
-        true => {
-            let single = |x: f64| Some(x as f32).filter(|x| x.is_finite());
-            arrays.numbers("evidence", [Some(n)], Class::Any, "a finite number", single)?.0
-        }
-        false => vec![0.0; n],
-    };
+    let evidence = arrays.optional("evidence", |name| {
+        let single = |x: f64| Some(x as f32).filter(|x| x.is_finite());
+        Ok(arrays.numbers(name, [Some(n)], Class::Any, "a finite number", single)?.0)
+    })?;
     let estimate = |(slot, position): (usize, &[f64; D])| {
         let is_found = !position[0].is_nan();
         if position.iter().any(|x| x.is_nan() == is_found) {
@@ -193,7 +182,7 @@ fn estimates<const D: usize>(
             status,
             support: support.as_ref().map_or(0, |support| support[slot] as u16),
             axis,
-            evidence: evidence[slot],
+            evidence: evidence.as_ref().map_or(0.0, |evidence| evidence[slot]),
         })
     };
     positions.iter().enumerate().map(estimate).collect()

@@ -143,7 +143,7 @@ pub fn published_positions<const D: usize>(path: &Path) -> Result<Vec<Vec<[f64; 
         _ => return Ok(Vec::new()),
     };
     let direction = arrays.vectors("direction", Some(from.len()))?;
-    let origin = if arrays.has("origin") { arrays.vector("origin")? } else { [0.0; D] };
+    let origin = arrays.origin()?;
     let plus = |a: &[f64; D], b: &[f64; D]| std::array::from_fn(|c| a[c] + b[c]);
     let from: Vec<[f64; D]> = from.iter().map(|x| plus(x, &origin)).collect();
     let to = from.iter().zip(&direction).map(|(x, along)| plus(x, along)).collect();
@@ -177,15 +177,9 @@ pub(super) fn released_of<const D: usize>(arrays: &Arrays<'_>) -> Result<Release
     };
     let obfuscation = obfuscation.map_err(core)?;
     let descriptors = descriptors(arrays, obfuscation.len(), slots)?;
-    let origin = match arrays.has("origin") {
-        true => arrays.vector("origin")?,
-        false => [0.0; D],
-    };
-    let bounds = match arrays.has("bounds") {
-        true => boxes(arrays, "bounds", &arrays.floats("bounds", [Some(2), Some(D)])?.0)?.pop(),
-        false => None,
-    };
-    let released = Released::try_new(obfuscation, slots, origin, unit, descriptors);
+    let corners = |name| boxes(arrays, name, &arrays.floats(name, [Some(2), Some(D)])?.0);
+    let bounds = arrays.optional("bounds", corners)?.and_then(|mut boxes| boxes.pop());
+    let released = Released::try_new(obfuscation, slots, arrays.origin()?, unit, descriptors);
     let released = released.map_err(core)?.with_bounds(bounds);
     let found = released.fingerprint();
     match meta.fingerprint()? {

@@ -77,9 +77,6 @@ pub(super) fn written<'a, const D: usize>(
 ///
 /// Some arrays are optional: `slot` if the originals are in the order of slots, `dropped` if the
 /// reasons are unknown, `descriptor_row` if records have one slot.
-///
-/// # Errors
-/// When the file differs from `docs/formats.md`.
 pub fn read_truth<const D: usize>(path: &Path) -> Result<(Original<D>, Secret), Error> {
     truth_of(&Arrays::open(path)?)
 }
@@ -93,9 +90,9 @@ pub(super) fn truth_of<const D: usize>(
     let positions = arrays.vectors("position", None)?;
     let n = positions.len();
     // Returns the array `name` by original, or `None` if there is none.
-    let column = |name: &str, below: usize| match arrays.has(name) {
-        true => arrays.integers(name, [Some(n)], below, true).map(|(values, _)| Some(values)),
-        false => Ok(None),
+    let column = |name: &str, below: usize| {
+        let values = |name| arrays.integers(name, [Some(n)], below, true);
+        Ok::<_, Error>(arrays.optional(name, values)?.map(|(values, _)| values))
     };
     let slot = column("slot", n)?.unwrap_or_else(|| (0..n as u32).collect());
     let n_slots = slot.iter().filter(|&&slot| slot != NONE).count();
@@ -155,10 +152,8 @@ pub(super) fn truth_of<const D: usize>(
 /// Returns the originals without a slot, with their reasons.
 fn dropped(arrays: &Arrays<'_>, slot: &[u32]) -> Result<Vec<Dropped>, Error> {
     let n = slot.len();
-    let reasons = match arrays.has("dropped") {
-        true => Some(arrays.integers("dropped", [Some(n)], 1 + DropReason::ALL.len(), false)?.0),
-        false => None,
-    };
+    let codes = |name| arrays.integers(name, [Some(n)], 1 + DropReason::ALL.len(), false);
+    let reasons = arrays.optional("dropped", codes)?.map(|(codes, _)| codes);
     let mut dropped = Vec::new();
     for (original, &slot) in slot.iter().enumerate() {
         let code = reasons.as_ref().map(|reasons| reasons[original] as usize);

@@ -438,9 +438,6 @@ struct Figures {
 }
 
 /// Draws `comparison` of `old` and `new` as one self-contained HTML page.
-///
-/// # Errors
-/// [`Error::Template`] if it cannot be rendered (a bug of this crate).
 pub fn page(comparison: &Comparison, old: &Document, new: &Document) -> Result<String, Error> {
     let audits = [("old", old), ("new", new)].map(|(which, document)| Audit {
         which,

@@ -542,9 +542,6 @@ pub(crate) fn round(value: f64) -> f64 {
 }
 
 /// Returns `value` as JSON, with numbers rounded as in `audit.json`.
-///
-/// # Errors
-/// Fails if `value` cannot be JSON.
 pub fn rounded(value: &impl Serialize) -> serde_json::Result<Value> {
     let mut value = serde_json::to_value(value)?;
     round_floats(&mut value);

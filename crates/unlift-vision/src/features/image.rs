@@ -39,9 +39,6 @@ impl GrayImage {
     }
 
     /// Creates an image from bytes: 0 is black, 255 is white.
-    ///
-    /// # Errors
-    /// See [`try_new`](Self::try_new).
     pub fn from_bytes(width: usize, height: usize, bytes: &[u8]) -> Result<Self, Error> {
         let pixels = bytes.iter().map(|&byte| f32::from(byte) / 255.0).collect();
         Self::try_new(width, height, pixels)

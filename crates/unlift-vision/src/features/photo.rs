@@ -51,17 +51,11 @@ pub fn read(path: &Path) -> Result<GrayImage, Error> {
 }
 
 /// Reads the photo at `path`, upright, in colors.
-///
-/// # Errors
-/// See [`read`].
 pub fn read_color(path: &Path) -> Result<ColorImage, Error> {
     read_color_with(path, Turn::Upright)
 }
 
 /// Reads the photo at `path` in colors.
-///
-/// # Errors
-/// See [`read`].
 pub fn read_color_with(path: &Path, turn: Turn) -> Result<ColorImage, Error> {
     let photo = photo(path, turn)?;
     let (width, height) = (photo.width() as usize, photo.height() as usize);
@@ -90,9 +84,6 @@ fn bytes_of(path: &Path) -> Result<(Vec<u8>, String), Error> {
 }
 
 /// Decodes the bytes of a photo in a file called `name`, upright, as gray values.
-///
-/// # Errors
-/// See [`read`].
 pub fn decode(bytes: &[u8], name: &str) -> Result<GrayImage, Error> {
     let (mut photo, orientation) = decoded(bytes, name)?;
     photo.apply_orientation(orientation);
@@ -211,9 +202,6 @@ const QUALITY: u8 = 72;
 
 /// Encodes the photo at `path` as a color JPEG, downsized so that no side exceeds `longest` pixels,
 /// without metadata.
-///
-/// # Errors
-/// See [`read`].
 pub fn jpeg(path: &Path, longest: u32, turn: Turn) -> Result<Vec<u8>, Error> {
     let photo = photo(path, turn)?;
     let photo = match photo.width().max(photo.height()) > longest {
@@ -237,9 +225,6 @@ pub fn jpeg_of(image: &ColorImage, longest: usize) -> Result<Vec<u8>, Error> {
 }
 
 /// Encodes an image as PNG.
-///
-/// # Errors
-/// If encoding fails.
 pub fn png_of(image: &ColorImage) -> Result<Vec<u8>, Error> {
     let mut bytes = Cursor::new(Vec::new());
     buffer(image)

@@ -48,9 +48,6 @@ pub struct Tensor {
 
 impl Tensor {
     /// Creates an array with this shape.
-    ///
-    /// # Errors
-    /// If the shape needs another number of values.
     pub fn try_new(shape: &[usize], values: Vec<f32>) -> Result<Self, Error> {
         let asked = shape.iter().try_fold(1_usize, |product, &side| product.checked_mul(side));
         if asked != Some(values.len()) {
@@ -110,9 +107,6 @@ impl Network {
     }
 
     /// Loads the model of `entry` from given folders.
-    ///
-    /// # Errors
-    /// See [`load`](Self::load).
     pub fn load_from(folders: &Folders, entry: &Entry) -> Result<Self, Error> {
         match (folders.find(entry)?, entry.carried) {
             (Some(Place::File(path)), _) => Self::read(&path, entry),
@@ -124,9 +118,6 @@ impl Network {
     }
 
     /// Loads the model in the file `path`, as `entry` describes it.
-    ///
-    /// # Errors
-    /// See [`load`](Self::load); also if the file cannot be read.
     pub fn read(path: &Path, entry: &Entry) -> Result<Self, Error> {
         let place = path.display().to_string().escape_debug().to_string();
         let bytes = read_regular(path)
@@ -192,9 +183,6 @@ impl Network {
     }
 
     /// Runs the network like [`run`](Self::run), with any number of outputs.
-    ///
-    /// # Errors
-    /// See [`run`](Self::run).
     pub fn run_all(
         &self,
         inputs: Vec<(&str, Tensor)>,

@@ -60,9 +60,6 @@ impl Entry {
 }
 
 /// Returns the entry called `name`.
-///
-/// # Errors
-/// If there is none.
 pub fn entry(name: &str) -> Result<&'static Entry, Error> {
     let known = || MODELS.iter().map(|entry| entry.name).collect::<Vec<_>>().join(", ");
     MODELS.iter().find(|entry| entry.name == name).ok_or_else(|| {

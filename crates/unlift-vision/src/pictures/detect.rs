@@ -66,17 +66,11 @@ pub struct Detector {
 
 impl Detector {
     /// Loads the embedded detector, or the file that replaces it.
-    ///
-    /// # Errors
-    /// If the replacing file cannot be loaded.
     pub fn try_new() -> Result<Self, Error> {
         Ok(Self { network: Network::load(MODEL)? })
     }
 
     /// Finds the objects in `picture` with a score above `min_score`, the highest first.
-    ///
-    /// # Errors
-    /// If the network returns another shape.
     pub fn find(&self, picture: &ColorImage, min_score: f32) -> Result<Vec<Detection>, Error> {
         let (input, scale) = seen(picture)?;
         let [output] = self.network.run(vec![("images", input)], ["output"])?;

@@ -42,9 +42,6 @@ pub(crate) fn check_sizes(a: &ColorImage, b: &ColorImage, least: usize) -> Resul
 
 /// Returns the peak signal-to-noise ratio `10 log10(255^2 / MSE)` in dB, with the mean over all pixels and colors; infinite for
 /// equal pictures.
-///
-/// # Errors
-/// If the pictures differ in size.
 pub fn psnr(a: &ColorImage, b: &ColorImage) -> Result<f64, Error> {
     check_sizes(a, b, 1)?;
     let square = |(&a, &b): (&u8, &u8)| u64::from(a.abs_diff(b)).pow(2);
@@ -154,9 +151,6 @@ pub struct Lpips {
 
 impl Lpips {
     /// Loads the embedded model, or the file that replaces it.
-    ///
-    /// # Errors
-    /// If the replacing file cannot be loaded.
     pub fn try_new() -> Result<Self, Error> {
         Ok(Self { network: Network::load(MODEL)? })
     }

@@ -181,9 +181,6 @@ pub fn with_map(
 }
 
 /// Returns the errors of all `views` with a map in the clear and keypoints that `scheme` protects.
-///
-/// # Errors
-/// If the scheme cannot hide the keypoints of an image.
 pub fn with_queries(
     views: &[View],
     positions: &[[f64; 3]],

@@ -63,9 +63,6 @@ impl Aliked {
 
     /// Extracts the features of an image. Uses about 330 bytes of memory per pixel after
     /// downsizing.
-    ///
-    /// # Errors
-    /// If the network returns other shapes.
     pub fn extract(&self, image: &ColorImage) -> Result<LearnedFeatures, Error> {
         let small = image.fitted(self.options.max_image_size);
         let seen = small.as_ref().unwrap_or(image);

@@ -67,9 +67,6 @@ impl SuperPoint {
     }
 
     /// Extracts the features of an image.
-    ///
-    /// # Errors
-    /// If the network returns other shapes.
     pub fn extract(&self, image: &ColorImage) -> Result<LearnedFeatures, Error> {
         let small = image.fitted(self.options.max_image_size);
         let seen = small.as_ref().unwrap_or(image);
