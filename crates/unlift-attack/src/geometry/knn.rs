@@ -1,8 +1,7 @@
 //! Exact K nearest neighbors. Ties are ordered by row.
 //!
 //! The search tree is a balanced k-d tree. Points are stored leaf by leaf, one column per coordinate, so that a leaf takes a few vector
-//! instructions, and queries in [`spatial_order`](Knn::spatial_order) find their neighbors in the cache. The index of a node
-//! determines its place in the columns, so only boxes are stored.
+//! instructions. The index of a node determines its place in the columns, so only boxes are stored.
 //!
 //! A query first searches the smallest node around its point that holds enough others. The K-th distance found there is an upper bound.
 //! Then it takes every point within that bound, so that no tie is missed.
@@ -100,11 +99,6 @@ impl<'a, const D: usize> Knn<'a, D> {
             boxes[node] = boxes[2 * node].and(&boxes[2 * node + 1]);
         }
         Ok(Self { points, depth, boxes, columns, rows, places })
-    }
-
-    /// Returns all rows in an order in which near rows are adjacent; queries in this order are fastest.
-    pub fn spatial_order(&self) -> &[u32] {
-        &self.rows
     }
 
     /// Returns all rows in patches of near ones: the box is split along its longest side until a patch holds at most `most` rows (but a
@@ -355,34 +349,19 @@ fn take<const D: usize>(
 }
 
 impl<const D: usize> Knn<'_, D> {
-    /// Calls `of(row, its k nearest, entry)` for every row, with `entries` in spatial order. The nearest are other rows, as (squared
-    /// distance, row), nearest first.
-    ///
-    /// # Panics
-    /// When there is not one entry per row.
-    pub fn each<T: Send>(
-        &self,
-        k: usize,
-        entries: &mut [T],
-        of: impl Fn(usize, &[(f64, u32)], &mut T) + Sync,
-    ) {
-        assert_eq!(entries.len(), self.rows.len(), "one entry per row");
-        let rows = self.rows.par_iter().zip(entries).with_min_len(LEAF);
-        rows.for_each_init(Vec::new, |found, (&row, entry)| {
-            self.nearest(row as usize, k, found);
-            of(row as usize, found, entry);
-        });
-    }
-
-    /// Returns `of(row, its k nearest)` for every row, in the order of rows, see [`each`](Self::each).
-    pub fn per_row<T: Clone + Send>(
+    /// Returns `of(row, its k nearest other rows)` for every row, in the order of rows. The nearest are (squared distance, row), nearest
+    /// first.
+    pub fn per_row<T: Send>(
         &self,
         k: usize,
         of: impl Fn(usize, &[(f64, u32)]) -> T + Sync,
     ) -> Vec<T> {
-        let mut by_place: Vec<Option<T>> = vec![None; self.rows.len()];
-        self.each(k, &mut by_place, |row, found, entry| *entry = Some(of(row, found)));
-        self.places.iter().filter_map(|&place| by_place[place as usize].take()).collect()
+        let rows = (0..self.rows.len()).into_par_iter();
+        let value = |found: &mut Vec<_>, row| {
+            self.nearest(row, k, found);
+            of(row, found)
+        };
+        rows.map_init(Vec::new, value).collect()
     }
 
     /// Returns the distance of every row to its `k`-th nearest other row (to the last one in small sets).
@@ -467,9 +446,6 @@ mod tests {
         let points = [[0.0, 0.0], [5.0, 0.0], [1.0, 0.0]];
         let knn = Knn::new(&points).unwrap();
         assert_eq!(knn.kth_distances(1), [1.0, 4.0, 1.0]);
-        let mut order = knn.spatial_order().to_vec();
-        order.sort_unstable();
-        assert_eq!(order, [0, 1, 2]);
         assert!(Knn::<3>::new(&[]).is_err() && Knn::new(&[[0.0, f64::NAN]]).is_err());
     }
 }

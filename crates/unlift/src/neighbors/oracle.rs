@@ -191,65 +191,39 @@ impl<'a, const D: usize> Nearness<'a, D> {
     fn each(&self, n: usize, rows: &mut [RecordId], make: &Make<'_>) {
         let hidden = self.secret.hidden();
         let length = (rows.len() / hidden.len().max(1)).max(1);
-        // Spatial order keeps the neighbors of consecutive slots in the cache.
-        let mut of_original: Vec<_> = (0..self.secret.n_originals()).map(|_| None).collect();
-        for ((slot, row), original) in rows.chunks_mut(length).enumerate().zip(hidden) {
-            of_original[original.index()] = Some((slot as u32, row));
-        }
-        let in_order = |&original: &u32| of_original[original as usize].take();
-        let mut ordered: Vec<_> = self.knn.spatial_order().iter().map(in_order).collect();
-        drop(of_original);
-        self.knn.each(n + MARGIN, &mut ordered, |original, found, entry| {
-            let Some((slot, row)) = entry else { return };
-            let mut records = Vec::with_capacity(n);
-            self.keep_records(original, n, found, &mut records);
-            if records.len() < n {
-                self.from(original, n, &mut records);
-            }
-            make(*slot as usize, &mut records, row);
+        let rows = rows.par_chunks_mut(length).zip(hidden).enumerate();
+        rows.for_each_init(Default::default, |(found, records), (slot, (row, original))| {
+            self.from(original.index(), n, found, records);
+            make(slot, records, row);
         });
     }
 
-    /// Writes the `n` records nearest to `original` (fewer if there are fewer) to `records`.
-    fn from(&self, original: usize, n: usize, records: &mut Vec<RecordId>) {
-        let mut found = Vec::new();
+    /// Writes the `n` records nearest to `original` (fewer if there are fewer) to `records`, each once, without its own.
+    fn from(
+        &self,
+        original: usize,
+        n: usize,
+        found: &mut Vec<(f64, u32)>,
+        records: &mut Vec<RecordId>,
+    ) {
+        let (own, several) = (self.record_of[original], self.slots_per_record > 1);
         let mut reach = n + MARGIN;
         loop {
-            self.knn.nearest(original, reach, &mut found);
-            self.keep_records(original, n, &found, records);
+            self.knn.nearest(original, reach, found);
+            records.clear();
+            for &(_, at) in found.iter() {
+                if records.len() < n
+                    && let Some(record) = self.record_of[at as usize]
+                    && Some(record) != own
+                    && !(several && listed(records, record))
+                {
+                    records.push(record);
+                }
+            }
             if records.len() == n || found.len() < reach {
                 return;
             }
             reach *= 2;
-        }
-    }
-
-    fn record_of(&self, original: usize) -> Option<RecordId> {
-        self.record_of[original]
-    }
-
-    /// Keeps the first `n` records that hide one of `found`, each once, without the record of
-    /// `original`.
-    fn keep_records(
-        &self,
-        original: usize,
-        n: usize,
-        found: &[(f64, u32)],
-        records: &mut Vec<RecordId>,
-    ) {
-        let own = self.record_of[original];
-        let several = self.slots_per_record > 1;
-        records.clear();
-        for &(_, at) in found {
-            if let Some(record) = self.record_of[at as usize]
-                && Some(record) != own
-                && !(several && listed(records, record))
-            {
-                records.push(record);
-                if records.len() == n {
-                    return;
-                }
-            }
         }
     }
 }
@@ -452,7 +426,7 @@ impl Outliers {
         let patches = knn.patches(PATCH * truth.k);
         let (mut starts, mut records) = (vec![0], Vec::new());
         let mut patch_of_original = vec![0u32; secret.n_originals()];
-        let (mut around, mut near) = (Vec::new(), Vec::new());
+        let (mut around, mut around_place, mut near) = (Vec::new(), Vec::new(), Vec::new());
         for (at, patch) in patches.iter().enumerate() {
             let middle = patch[patch.len() / 2];
             knn.nearest(middle as usize, RING.1 * truth.k, &mut around);
@@ -466,8 +440,8 @@ impl Outliers {
                         break;
                     }
                 }
-                let hidden_there = nearness.record_of(place as usize);
-                nearness.from(place as usize, truth.k, &mut near);
+                let hidden_there = nearness.record_of[place as usize];
+                nearness.from(place as usize, truth.k, &mut around_place, &mut near);
                 for record in hidden_there.into_iter().chain(near.iter().copied()).take(truth.k) {
                     if !listed(&records[start..], record) {
                         records.push(record);
