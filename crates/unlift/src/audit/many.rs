@@ -2,6 +2,7 @@
 //! memory at a time.
 
 use std::collections::BTreeMap;
+use std::ops::AddAssign;
 
 use rayon::prelude::*;
 
@@ -190,8 +191,7 @@ fn one<const D: usize>(
         Owned { original, descriptors, hidden, search: &search, kept: &Kept::default(), name };
     let mut pools: Vec<(Row, Vec<Pool>)> = Vec::new();
     let mut each = |finished: &Finished<'_>| {
-        let mut pool = Pool::new(&finished.row, &plan.thresholds);
-        pool.add(finished, &plan.thresholds);
+        let pool = Pool::of(finished, &plan.thresholds);
         match pools.iter_mut().find(|(row, _)| row.is_same_cell(&finished.row)) {
             Some((_, pools)) => pools.push(pool),
             None => pools.push((finished.row.clone(), vec![pool])),
@@ -239,27 +239,16 @@ pub(super) struct Pool {
     /// Row of the first image, which identifies the cell.
     cell: Row,
     n_points: usize,
-    within: Vec<usize>,
-    blind_within: Vec<usize>,
-    exact: Option<usize>,
-    /// Percentage of slots whose axis was identified, times slots.
-    axis: Option<f64>,
-    n_places: f64,
-    places_within: Vec<f64>,
-    blind_places_within: Vec<f64>,
-    metrics: BTreeMap<String, Figure>,
-    /// Delta times slots.
-    delta: f64,
-    /// Number of true entries of lists.
-    hits: f64,
     n_listed: usize,
+    /// Sums by figure and threshold: of points within it, of true entries of lists, of percentages times points. A figure that no image
+    /// has is absent.
+    sums: BTreeMap<(&'static str, usize), f64>,
+    metrics: BTreeMap<String, Figure>,
     lost: BTreeMap<&'static str, usize>,
     dropped: BTreeMap<&'static str, usize>,
-    trials: Option<BTreeMap<u32, u64>>,
+    trials: BTreeMap<u32, u64>,
     /// Percentages times points, for each attack on the records alone.
     alone: BTreeMap<&'static str, Vec<f64>>,
-    /// Percentage of descriptors assigned to their own point, times points.
-    assignment: Option<f64>,
     reliability: Option<Reliability>,
     sure_unknown: Option<Unknown>,
     errors: Errors,
@@ -267,103 +256,60 @@ pub(super) struct Pool {
 }
 
 impl Pool {
-    pub(super) fn new(row: &Row, thresholds: &[Threshold]) -> Self {
-        let n = thresholds.len();
-        Self {
-            cell: row.clone(),
-            n_points: 0,
-            within: vec![0; n],
-            blind_within: vec![0; n],
-            exact: row.exact_percent.map(|_| 0),
-            axis: row.axis_accuracy_percent.map(|_| 0.0),
-            n_places: 0.0,
-            places_within: vec![0.0; n],
-            blind_places_within: vec![0.0; n],
-            metrics: BTreeMap::new(),
-            delta: 0.0,
-            hits: 0.0,
-            n_listed: 0,
-            lost: BTreeMap::new(),
-            dropped: BTreeMap::new(),
-            trials: row.ransac_trials.as_ref().map(|_| BTreeMap::new()),
-            alone: BTreeMap::new(),
-            assignment: row.assignment_accuracy_percent.map(|_| 0.0),
-            reliability: None,
-            sure_unknown: None,
-            errors: Errors::default(),
-            blind_errors: Errors::default(),
-        }
-    }
-
-    pub(super) fn add(&mut self, finished: &Finished<'_>, thresholds: &[Threshold]) {
+    /// Returns the sums of one image.
+    pub(super) fn of(finished: &Finished<'_>, thresholds: &[Threshold]) -> Self {
         let Finished { row, accuracy, baseline, weights, whole, n_listed, .. } = finished;
         let n = accuracy.n_points();
-        self.n_points += n;
+        let percentage = |percent: Option<f64>| percent.map(|percent| percent * n as f64);
+        let mut sums = BTreeMap::from([
+            (("delta", 0), row.delta * n as f64),
+            (("hits", 0), row.inlier_ratio * *n_listed as f64),
+            (("places", 0), weights.iter().sum()),
+        ]);
         for (at, threshold) in thresholds.iter().enumerate() {
-            self.within[at] += accuracy.n_within(threshold.value);
-            self.blind_within[at] += baseline.n_within(threshold.value);
-            self.places_within[at] += accuracy.weight_within(threshold.value, weights);
-            self.blind_places_within[at] += baseline.weight_within(threshold.value, weights);
+            sums.insert(("within", at), accuracy.n_within(threshold.value) as f64);
+            sums.insert(("blind", at), baseline.n_within(threshold.value) as f64);
+            sums.insert(("places within", at), accuracy.weight_within(threshold.value, weights));
+            sums.insert(("blind places", at), baseline.weight_within(threshold.value, weights));
         }
-        if let Some(n_exact) = accuracy.n_exact {
-            *self.exact.get_or_insert(0) += n_exact;
+        for (name, sum) in [
+            ("exact", accuracy.n_exact.map(|n_exact| n_exact as f64)),
+            ("axis", percentage(row.axis_accuracy_percent)),
+            ("assignment", percentage(row.assignment_accuracy_percent)),
+        ] {
+            sums.extend(sum.map(|sum| ((name, 0), sum)));
         }
-        if let Some(percent) = row.axis_accuracy_percent {
-            *self.axis.get_or_insert(0.0) += percent * n as f64;
-        }
-        for (name, value) in &row.metrics {
+        let figure = |(name, value): (&String, &f64)| {
             let of_images = whole.contains(name);
-            let count = if of_images { 1 } else { n };
-            let figure = self.metrics.entry(name.clone()).or_default();
-            figure.sum += value * count as f64;
-            figure.known += count;
-            figure.of_images = of_images;
+            let known = if of_images { 1 } else { n };
+            (name.clone(), Figure { sum: value * known as f64, known, of_images })
+        };
+        let alone = |alone: &Alone| {
+            (alone.name, alone.percent.iter().map(|percent| percent * n as f64).collect())
+        };
+        Self {
+            cell: row.clone(),
+            n_points: n,
+            n_listed: *n_listed,
+            sums,
+            metrics: row.metrics.iter().map(figure).collect(),
+            lost: row.lost.clone(),
+            dropped: row.dropped.clone(),
+            trials: row.ransac_trials.iter().flatten().copied().collect(),
+            alone: row.records_alone.iter().map(alone).collect(),
+            reliability: row.reliability.clone(),
+            sure_unknown: row.sure_unknown,
+            errors: Errors::of(accuracy),
+            blind_errors: Errors::of(baseline),
         }
-        self.n_places += weights.iter().sum::<f64>();
-        self.delta += row.delta * n as f64;
-        self.hits += row.inlier_ratio * *n_listed as f64;
-        self.n_listed += n_listed;
-        for (&reason, count) in &row.lost {
-            *self.lost.entry(reason).or_insert(0) += count;
-        }
-        for (&reason, count) in &row.dropped {
-            *self.dropped.entry(reason).or_insert(0) += count;
-        }
-        for &(up_to, slots) in row.ransac_trials.iter().flatten() {
-            let trials = self.trials.get_or_insert_with(BTreeMap::new);
-            *trials.entry(up_to).or_insert(0) += slots;
-        }
-        for alone in &row.records_alone {
-            let percent = alone.percent.iter().map(|percent| percent * n as f64);
-            self.alone.insert(alone.name, percent.collect());
-        }
-        if let Some(percent) = row.assignment_accuracy_percent {
-            *self.assignment.get_or_insert(0.0) += percent * n as f64;
-        }
-        self.reliability.clone_from(&row.reliability);
-        self.sure_unknown = row.sure_unknown;
-        self.errors.add(accuracy);
-        self.blind_errors.add(baseline);
     }
 
     /// Adds the sums of `more`, a pool of the same row.
     pub(super) fn merge(&mut self, more: &Self) {
         self.n_points += more.n_points;
-        let counts = |to: &mut [usize], more: &[usize]| {
-            to.iter_mut().zip(more).for_each(|(to, more)| *to += more);
-        };
-        let sums = |to: &mut [f64], more: &[f64]| {
-            to.iter_mut().zip(more).for_each(|(to, more)| *to += more);
-        };
-        counts(&mut self.within, &more.within);
-        counts(&mut self.blind_within, &more.blind_within);
-        sums(&mut self.places_within, &more.places_within);
-        sums(&mut self.blind_places_within, &more.blind_places_within);
-        if let Some(more) = more.exact {
-            *self.exact.get_or_insert(0) += more;
-        }
-        if let Some(more) = more.axis {
-            *self.axis.get_or_insert(0.0) += more;
+        self.n_listed += more.n_listed;
+        for (&key, more) in &more.sums {
+            *self.sums.entry(key).or_insert(0.0) += more;
         }
         for (name, more) in &more.metrics {
             let figure = self.metrics.entry(name.clone()).or_default();
@@ -371,16 +317,10 @@ impl Pool {
             figure.known += more.known;
             figure.of_images = more.of_images;
         }
-        self.n_places += more.n_places;
-        self.delta += more.delta;
-        self.hits += more.hits;
-        self.n_listed += more.n_listed;
         for (name, more) in &more.alone {
             // An attack that cannot run on an item recovers nothing there.
-            sums(self.alone.entry(name).or_insert_with(|| vec![0.0; more.len()]), more);
-        }
-        if let Some(more) = more.assignment {
-            *self.assignment.get_or_insert(0.0) += more;
+            let all = self.alone.entry(name).or_insert_with(|| vec![0.0; more.len()]);
+            all.iter_mut().zip(more).for_each(|(all, more)| *all += more);
         }
         if let (Some(all), Some(more)) = (&mut self.reliability, &more.reliability) {
             all.merge(more);
@@ -389,62 +329,60 @@ impl Pool {
         self.sure_unknown = self.sure_unknown.or(more.sure_unknown);
         merge_counts(&mut self.lost, &more.lost);
         merge_counts(&mut self.dropped, &more.dropped);
+        merge_counts(&mut self.trials, &more.trials);
         merge_counts(&mut self.errors.0, &more.errors.0);
         merge_counts(&mut self.blind_errors.0, &more.blind_errors.0);
-        for (&up_to, slots) in more.trials.iter().flatten() {
-            *self.trials.get_or_insert_with(BTreeMap::new).entry(up_to).or_insert(0) += slots;
-        }
     }
 
     pub(super) fn row(&self, thresholds: &[Threshold]) -> Row {
         let n = self.n_points.max(1) as f64;
-        let percent = |counts: &[usize]| counts.iter().map(|&c| 100.0 * c as f64 / n).collect();
-        let places = self.n_places.max(f64::MIN_POSITIVE);
-        let of_places = |sums: &[f64]| sums.iter().map(|sum| 100.0 * sum / places).collect();
-        debug_assert_eq!(self.within.len(), thresholds.len());
+        let sum = |name: &'static str| self.sums.get(&(name, 0)).copied();
+        let percent = |name: &'static str, of: f64| {
+            let sum = |at: usize| self.sums.get(&(name, at)).copied().unwrap_or(0.0);
+            (0..thresholds.len()).map(|at| 100.0 * sum(at) / of).collect()
+        };
+        let n_places = sum("places").unwrap_or(0.0);
+        let places = n_places.max(f64::MIN_POSITIVE);
+        let is_known =
+            |(_, figure): &(&String, &Figure)| figure.of_images || figure.known == self.n_points;
+        let alone = |(&name, sums): (&&'static str, &Vec<f64>)| Alone {
+            name,
+            percent: sums.iter().map(|sum| sum / n).collect(),
+        };
         Row {
             // A requested ratio identifies the cell. A measured one is a mean over entries.
             inlier_ratio: match self.cell.oracle_noise {
-                None if self.n_listed > 0 => self.hits / self.n_listed as f64,
+                None if self.n_listed > 0 => sum("hits").unwrap_or(0.0) / self.n_listed as f64,
                 _ => self.cell.inlier_ratio,
             },
-            delta: self.delta / n,
+            delta: sum("delta").unwrap_or(0.0) / n,
             n_points: self.n_points,
             lost: self.lost.clone(),
             dropped: self.dropped.clone(),
-            recovered_percent: percent(&self.within),
-            blind_percent: percent(&self.blind_within),
-            axis_accuracy_percent: self.axis.map(|sum| sum / n),
-            exact_percent: self.exact.map(|exact| 100.0 * exact as f64 / n),
+            recovered_percent: percent("within", n),
+            blind_percent: percent("blind", n),
+            axis_accuracy_percent: sum("axis").map(|sum| sum / n),
+            exact_percent: sum("exact").map(|exact| 100.0 * exact / n),
             metrics: self
                 .metrics
                 .iter()
-                .filter(|(_, figure)| figure.of_images || figure.known == self.n_points)
+                .filter(is_known)
                 .map(|(name, figure)| (name.clone(), figure.sum / figure.known.max(1) as f64))
                 .collect(),
             error_percentiles: PERCENTILES
                 .map(|p| self.errors.percentile(p, self.n_points))
                 .to_vec(),
             blind_median_error: self.blind_errors.percentile(50.0, self.n_points),
-            ransac_trials: self
-                .trials
-                .as_ref()
-                .map(|trials| trials.iter().map(|(&up_to, &slots)| (up_to, slots)).collect()),
-            records_alone: self
-                .alone
-                .iter()
-                .map(|(&name, sums)| Alone {
-                    name,
-                    percent: sums.iter().map(|sum| sum / n).collect(),
-                })
-                .collect(),
-            assignment_accuracy_percent: self.assignment.map(|sum| sum / n),
+            ransac_trials: (self.cell.ransac_trials.is_some() || !self.trials.is_empty())
+                .then(|| self.trials.iter().map(|(&up_to, &slots)| (up_to, slots)).collect()),
+            records_alone: self.alone.iter().map(alone).collect(),
+            assignment_accuracy_percent: sum("assignment").map(|sum| sum / n),
             reliability: self.reliability.clone().filter(|_| self.sure_unknown.is_none()),
             sure_unknown: self.sure_unknown,
             distinct: self.cell.distinct.as_ref().map(|_| Distinct {
-                n_places: self.n_places.round() as usize,
-                recovered_percent: of_places(&self.places_within),
-                blind_percent: of_places(&self.blind_places_within),
+                n_places: n_places.round() as usize,
+                recovered_percent: percent("places within", places),
+                blind_percent: percent("blind places", places),
             }),
             ..self.cell.clone()
         }
@@ -452,14 +390,16 @@ impl Pool {
 }
 
 /// Histogram of finite errors by their leading bits.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Errors(BTreeMap<u32, usize>);
 
 impl Errors {
-    fn add(&mut self, accuracy: &Accuracy) {
+    fn of(accuracy: &Accuracy) -> Self {
+        let mut counts = BTreeMap::new();
         for &error in accuracy.errors().iter().filter(|error| error.is_finite()) {
-            *self.0.entry((error as f32).to_bits() >> DROPPED_BITS).or_insert(0) += 1;
+            *counts.entry((error as f32).to_bits() >> DROPPED_BITS).or_insert(0) += 1;
         }
+        Self(counts)
     }
 
     /// Returns the error that `percent` of `of` keypoints do not exceed, to the width of a bin;
@@ -479,8 +419,11 @@ impl Errors {
     }
 }
 
-fn merge_counts<K: Copy + Ord>(to: &mut BTreeMap<K, usize>, more: &BTreeMap<K, usize>) {
-    for (&key, count) in more {
-        *to.entry(key).or_insert(0) += count;
+fn merge_counts<K: Copy + Ord, N: Copy + AddAssign + Default>(
+    to: &mut BTreeMap<K, N>,
+    more: &BTreeMap<K, N>,
+) {
+    for (&key, &count) in more {
+        *to.entry(key).or_default() += count;
     }
 }

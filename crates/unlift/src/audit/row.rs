@@ -204,29 +204,24 @@ impl Row {
         };
         let columns = 0..mean.recovered_percent.len();
         let known = |x: Option<f64>| x.unwrap_or(0.0);
+        type Column = fn(&Row) -> Option<&Vec<f64>>;
+        let means = |of: Column| -> Vec<f64> {
+            columns.clone().map(|c| known(average(&|r| Some(of(r)?[c])))).collect()
+        };
+        let spreads = |of: Column| -> Vec<f64> {
+            columns.clone().map(|c| known(spread(&|r| Some(of(r)?[c])))).collect()
+        };
         let repeats = Repeats {
             n: rows.len() as u32,
-            recovered_percent_std: columns
-                .clone()
-                .map(|c| known(spread(&|r| Some(r.recovered_percent[c]))))
-                .collect(),
-            blind_percent_std: columns
-                .clone()
-                .map(|c| known(spread(&|r| Some(r.blind_percent[c]))))
-                .collect(),
+            recovered_percent_std: spreads(|r| Some(&r.recovered_percent)),
+            blind_percent_std: spreads(|r| Some(&r.blind_percent)),
             median_error_std: spread(&|r| r.error_percentiles[0]),
         };
-        for c in columns {
-            mean.recovered_percent[c] = known(average(&|r| Some(r.recovered_percent[c])));
-            mean.blind_percent[c] = known(average(&|r| Some(r.blind_percent[c])));
-        }
+        mean.recovered_percent = means(|r| Some(&r.recovered_percent));
+        mean.blind_percent = means(|r| Some(&r.blind_percent));
         if let Some(distinct) = &mut mean.distinct {
-            let of = |r: &Row| r.distinct.clone();
-            for c in 0..distinct.recovered_percent.len() {
-                distinct.recovered_percent[c] =
-                    known(average(&|r| of(r).map(|d| d.recovered_percent[c])));
-                distinct.blind_percent[c] = known(average(&|r| of(r).map(|d| d.blind_percent[c])));
-            }
+            distinct.recovered_percent = means(|r| Some(&r.distinct.as_ref()?.recovered_percent));
+            distinct.blind_percent = means(|r| Some(&r.distinct.as_ref()?.blind_percent));
         }
         for p in 0..mean.error_percentiles.len() {
             mean.error_percentiles[p] = average(&|r| r.error_percentiles[p]);

@@ -76,7 +76,6 @@ impl Pooled {
         let baseline = baseline.as_ref().unwrap_or(&accuracy);
         let weights = distinct_weights(original, secret);
         row.fill_distinct(&accuracy, baseline, &weights, &self.thresholds);
-        let mut pool = Pool::new(&row, &self.thresholds);
         let finished = Finished {
             row,
             accuracy: &accuracy,
@@ -86,7 +85,7 @@ impl Pooled {
             n_listed: 0,
             seconds: RowSeconds::default(),
         };
-        pool.add(&finished, &self.thresholds);
+        let pool = Pool::of(&finished, &self.thresholds);
         match &mut self.pool {
             None => self.pool = Some(pool),
             Some(all) => all.merge(&pool),

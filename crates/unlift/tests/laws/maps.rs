@@ -17,9 +17,7 @@ pub use unlift::recover::{
 pub use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
 pub use unlift::seed::{Draws, Key, Stage};
 pub use unlift::truth::{Original, Secret};
-pub use unlift::{
-    About, Descriptors, Error, PointSet, RecordId, RowOrder, Unit, synthetic,
-};
+pub use unlift::{About, Descriptors, Error, PointSet, RecordId, RowOrder, Unit, synthetic};
 pub use unlift_testkit::{distance_to_record, image_around, on_threads, piles, room, uniform};
 
 /// Returns `n` seeds, the same in every run. With `UNLIFT_RANDOM_TESTS=50`, 50 seeds that differ in every run; a failure prints them.
