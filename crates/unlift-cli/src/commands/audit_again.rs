@@ -13,7 +13,7 @@ use super::audits::{self, map_thresholds};
 use crate::args::AuditAgainArgs;
 use crate::exit::{Outcome, usage};
 use crate::output::command_line;
-use crate::progress::{Progress, Spinner};
+use crate::progress::Progress;
 use crate::values::{all_schemes, distinct};
 
 pub fn run(args: &AuditAgainArgs) -> anyhow::Result<Outcome> {
@@ -61,7 +61,7 @@ pub fn run(args: &AuditAgainArgs) -> anyhow::Result<Outcome> {
 }
 
 fn maps(args: &AuditAgainArgs) -> anyhow::Result<Maps> {
-    let _alive = Spinner::unless(args.audit.quiet, "reading the maps");
+    let _alive = Progress::uncounted(args.audit.quiet, "reading the maps");
     let descriptors: [Option<&Path>; 2] = match (args.descriptors.as_slice(), args.a == args.b) {
         ([], _) => [None, None],
         ([both], true) => [Some(both), Some(both)],

@@ -15,7 +15,7 @@ use unlift_report::Document;
 
 use crate::args::MapArgs;
 use crate::exit::Outcome;
-use crate::progress::Spinner;
+use crate::progress::Progress;
 
 pub const RELEASED: &str = "released.npz";
 /// File name of the truth, which only the owner has.
@@ -53,7 +53,7 @@ pub fn open_map(
     beside: bool,
     (seed, quiet): (u64, bool),
 ) -> anyhow::Result<(Input, Prepared)> {
-    let _alive = Spinner::unless(quiet, "reading the map");
+    let _alive = Progress::uncounted(quiet, "reading the map");
     let preparation = Preparation {
         scale: args.scale,
         k: usize::from(args.k),

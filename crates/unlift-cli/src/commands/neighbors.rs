@@ -15,7 +15,7 @@ use super::image_stages::{Counts, list_by_oracle, list_by_source};
 use crate::args::NeighborsArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::print;
-use crate::progress::Spinner;
+use crate::progress::Progress;
 use crate::stderr;
 use crate::values::NeighborSource;
 use unlift_audit::check_file;
@@ -36,7 +36,7 @@ pub fn run(args: &NeighborsArgs) -> anyhow::Result<Outcome> {
     let kind = Kind::Stage(Stage::Neighborhoods);
     check_file(&args.out, kind, &rules)?;
     let images = has_images(&args.released)?;
-    let alive = Spinner::new("finding neighbors");
+    let alive = Progress::uncounted(false, "finding neighbors");
     let (made, name) = match (&args.neighbors, args.truth.as_deref(), args.inlier_ratio) {
         (NeighborSource::Own(named), None, _) => {
             let named = named.clone();

@@ -15,7 +15,7 @@ use super::image_stages::recover_all;
 use crate::args::RecoverArgs;
 use crate::exit::Outcome;
 use crate::output::print;
-use crate::progress::Spinner;
+use crate::progress::Progress;
 use crate::stderr;
 use unlift_audit::check_file;
 
@@ -50,7 +50,7 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
     if has_images(&args.released)? {
         return images(args, &options, &rules);
     }
-    let alive = Spinner::new("recovering");
+    let alive = Progress::uncounted(false, "recovering");
     let released = read_released::<3>(&args.released)?;
     let map = (released.n_records(), released.slots_per_record());
     let lists = read_neighborhoods(&args.neighbors, map.0, map.1)?;
@@ -76,7 +76,7 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
 }
 
 fn images(args: &RecoverArgs, options: &RecoverOptions, rules: &Rules) -> anyhow::Result<Outcome> {
-    let alive = Spinner::new("recovering");
+    let alive = Progress::uncounted(false, "recovering");
     // The same note about several images is printed once.
     let mut told = HashSet::new();
     let note = |lists: &Neighborhoods, slots: usize| {
