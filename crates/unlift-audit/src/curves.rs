@@ -1,19 +1,12 @@
 //! Error curves over many images or tiles. They are counts, so their size does not depend on the
 //! number of items.
 
-use unlift::audit::{Cell, Observer, Row};
+use unlift::audit::{Cell, Observer, Plan, Row, Watcher};
 use unlift_report::ErrorCdf;
 
 use crate::Progress;
 
 const CURVE_POINTS: i32 = 80;
-
-/// The errors of an error curve: from 0.01 to 10 times the largest threshold, evenly on a
-/// logarithmic axis.
-pub fn curve_errors(largest_threshold: f64) -> impl Iterator<Item = f64> {
-    let exponent = |step: i32| -2.0 + 3.0 * f64::from(step) / f64::from(CURVE_POINTS);
-    (0..=CURVE_POINTS).map(move |step| largest_threshold * 10f64.powf(exponent(step)))
-}
 
 struct Curve {
     cell: Row,
@@ -31,9 +24,13 @@ pub struct Curves<'a> {
 }
 
 impl<'a> Curves<'a> {
-    /// Creates an empty set of curves over the errors of [`curve_errors`].
-    pub fn new(largest_threshold: f64, steps: &'a dyn Progress) -> Self {
-        let errors = curve_errors(largest_threshold).collect();
+    /// Creates an empty set of curves over errors from 0.01 to 10 times the largest threshold of
+    /// `plan`, evenly on a logarithmic axis.
+    pub fn new<const D: usize>(plan: &Plan<D>, steps: &'a dyn Progress) -> Self {
+        let largest = plan.thresholds.iter().map(|t| t.value).fold(0.0, f64::max);
+        let exponent = |step: i32| -2.0 + 3.0 * f64::from(step) / f64::from(CURVE_POINTS);
+        let error = |step: i32| largest * 10f64.powf(exponent(step));
+        let errors = (0..=CURVE_POINTS).map(error).collect();
         Self { errors, curves: Vec::new(), steps, told: 0.0 }
     }
 
@@ -80,6 +77,41 @@ impl<const D: usize> Observer<D> for Curves<'_> {
         let within = self.errors.iter().map(|&error| cell.accuracy.n_within(error)).collect();
         let n = cell.accuracy.n_points();
         self.curves.push(Curve { cell: cell.row.clone(), within, n });
+    }
+}
+
+/// Reports the progress of an audit of many items, merges their curves, and passes on the rows of
+/// each.
+pub struct OfItems<'a, F, const D: usize> {
+    /// The curves of all items.
+    pub curves: Curves<'a>,
+    plan: &'a Plan<D>,
+    each: F,
+}
+
+impl<'a, F: FnMut(&str, &[Row]), const D: usize> OfItems<'a, F, D> {
+    /// Creates the watcher of an audit by `plan` that calls `each` with the name and rows of an
+    /// item.
+    pub fn new(plan: &'a Plan<D>, steps: &'a dyn Progress, each: F) -> Self {
+        Self { curves: Curves::new(plan, steps), plan, each }
+    }
+}
+
+impl<'a, F: FnMut(&str, &[Row]), const D: usize> Watcher<D> for OfItems<'a, F, D> {
+    type OfItem = Curves<'a>;
+
+    fn begin(&mut self) -> Curves<'a> {
+        Curves::new(self.plan, self.curves.steps)
+    }
+
+    fn progress(&mut self, _: usize, _: usize, what: &str) {
+        // Each item reports its own share.
+        self.curves.steps.add(0.0, what);
+    }
+
+    fn item(&mut self, name: &str, rows: &[Row], curves: Curves<'a>) {
+        self.curves.merge(curves);
+        (self.each)(name, rows);
     }
 }
 

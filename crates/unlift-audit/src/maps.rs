@@ -17,7 +17,7 @@ use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::scene::Scene3d;
 
 use crate::Error;
-use crate::curves::{curve_errors, curves_of};
+use crate::curves::{Curves, curves_of};
 use crate::document::{self, Provenance};
 use crate::doubts::{
     Spread, check_lengths_of_gates, check_scale, check_truth, doubts, sides_m, unlike_neighbors,
@@ -296,10 +296,9 @@ pub fn find(job: Job<'_>) -> Result<Audited, Error> {
     }
     let Ran { mut outcome, scene, curves, sheets, tile_rows } = match &cut {
         Some(tiles) => {
-            let found = tiles::run(whole, tiles, &job.plan, job.progress)
+            let (outcome, tile_rows, curves) = tiles::run(whole, tiles, &job.plan, job.progress)
                 .map_err(|error| of_file(error).advise("a larger --tile-points"))?;
-            let (tile_rows, curves) = (found.rows, found.curves.shares());
-            let outcome = found.outcome;
+            let curves = curves.shares();
             Ran { outcome, scene: None, curves, sheets: Vec::new(), tile_rows }
         }
         None => {
@@ -315,7 +314,7 @@ pub fn find(job: Job<'_>) -> Result<Audited, Error> {
                 return Err(error);
             }
             let scene = watcher.pictures.map(|p| p.into_scene(&job.cameras, job.up));
-            let (curves, sheets) = (watcher.curves, watcher.sheets);
+            let (curves, sheets) = (watcher.curves.shares(), watcher.sheets);
             Ran { outcome, scene, curves, sheets, tile_rows: Vec::new() }
         }
     };
@@ -403,8 +402,7 @@ fn watcher<'a>(job: &Job<'a>) -> Watcher<'a> {
     Watcher {
         progress: job.progress,
         pictures: (!job.share_safe).then(|| Pictures::new(job.original, &job.plan, n_views)),
-        curves: Vec::new(),
-        thresholds: job.plan.thresholds.iter().map(|t| t.value).collect(),
+        curves: Curves::new(&job.plan, job.progress),
         inversion: job.inversion.clone(),
         sheets: match (&job.inversion, job.share_safe) {
             (Some(inversion), false) => {
@@ -420,8 +418,7 @@ fn watcher<'a>(job: &Job<'a>) -> Watcher<'a> {
 struct Watcher<'a> {
     progress: &'a dyn Progress,
     pictures: Option<Pictures>,
-    curves: Vec<(Row, Vec<(f64, f64)>)>,
-    thresholds: Vec<f64>,
+    curves: Curves<'a>,
     inversion: Option<Arc<MapInversion>>,
     /// One sheet for each of the first cameras.
     sheets: Vec<Sheet>,
@@ -441,9 +438,7 @@ impl Observer for Watcher<'_> {
         if cell.repeat > 0 {
             return;
         }
-        let most = self.thresholds.iter().copied().fold(0.0, f64::max);
-        let points = curve_errors(most).map(|at| (at, cell.accuracy.percent_within(at))).collect();
-        self.curves.push((cell.row.clone(), points));
+        self.curves.cell(cell);
         if let Some(pictures) = &mut self.pictures {
             pictures.add(cell);
         }

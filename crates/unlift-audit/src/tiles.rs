@@ -1,11 +1,11 @@
 //! Large maps in tiles: each tile is hidden and attacked as a map of its own.
 
-use unlift::audit::{self, Item, Outcome, Plan, Row, run_many};
+use unlift::audit::{Item, Outcome, Plan, Row, run_many};
 use unlift::truth::Original;
 use unlift::{Descriptors, Error, PointSet};
 
 use crate::Progress;
-use crate::curves::Curves;
+use crate::curves::{Curves, OfItems};
 
 /// A part of a map: a box in plan view that overlaps no other tile.
 #[derive(Clone, Debug, PartialEq)]
@@ -120,51 +120,21 @@ fn bounds(positions: &[[f64; 3]], rows: &[u32]) -> [[f64; 3]; 2] {
     bounds
 }
 
-pub(crate) struct Found<'a> {
-    pub(crate) outcome: Outcome,
-    pub(crate) rows: Vec<Vec<Row>>,
-    pub(crate) curves: Curves<'a>,
-}
-
-/// Runs `plan` on every tile of a map, one after the other.
+/// Runs `plan` on every tile of a map, one after the other. Also returns the rows of each tile and
+/// the curves of all.
 pub(crate) fn run<'a>(
     (original, descriptors): (&Original<3>, Option<&Descriptors>),
     tiles: &[Tile],
-    plan: &Plan<3>,
+    plan: &'a Plan<3>,
     progress: &'a dyn Progress,
-) -> Result<Found<'a>, Error> {
-    let most = plan.thresholds.iter().map(|t| t.value).fold(0.0, f64::max);
-    let mut watcher =
-        Watcher { progress, most, rows: Vec::new(), curves: Curves::new(most, progress) };
+) -> Result<(Outcome, Vec<Vec<Row>>, Curves<'a>), Error> {
+    let mut tile_rows = Vec::new();
+    let mut watcher = OfItems::new(plan, progress, |_, rows| tile_rows.push(rows.to_vec()));
     progress.show(0, tiles.len(), "splitting the map into tiles");
     let items = tiles.iter().map(|tile| tile.item(original, descriptors));
     let outcome = run_many(items, plan, &mut watcher)?;
-    Ok(Found { outcome, rows: watcher.rows, curves: watcher.curves })
-}
-
-struct Watcher<'a> {
-    progress: &'a dyn Progress,
-    most: f64,
-    rows: Vec<Vec<Row>>,
-    curves: Curves<'a>,
-}
-
-impl<'a> audit::Watcher<3> for Watcher<'a> {
-    type OfItem = Curves<'a>;
-
-    fn begin(&mut self) -> Curves<'a> {
-        Curves::new(self.most, self.progress)
-    }
-
-    fn progress(&mut self, _: usize, _: usize, what: &str) {
-        // Each tile reports its own share.
-        self.progress.add(0.0, what);
-    }
-
-    fn item(&mut self, _: &str, rows: &[Row], seen: Curves<'a>) {
-        self.curves.merge(seen);
-        self.rows.push(rows.to_vec());
-    }
+    let curves = watcher.curves;
+    Ok((outcome, tile_rows, curves))
 }
 
 #[cfg(test)]

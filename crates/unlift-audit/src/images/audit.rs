@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use serde_json::{Map, Value};
-use unlift::audit::{self, Outcome, Plan, Row, run_many};
+use unlift::audit::{Outcome, Plan, run_many};
 use unlift_io::hash::{hash_file, hash_files, hash_list};
 use unlift_io::outputs::OutputSet;
 use unlift_report::RenderOptions;
@@ -19,7 +19,7 @@ use super::pictures::Album;
 use super::stream::{Needs, Stream, Tally};
 use crate::Error;
 use crate::Progress;
-use crate::curves::{Curves, curves_of};
+use crate::curves::{OfItems, curves_of};
 use crate::document::{self, Found, Provenance};
 use crate::gate::{Gate, check_gates, gate_results};
 use crate::inversion::Inversion;
@@ -84,8 +84,13 @@ pub fn perform(job: ImagesJob<'_>, out: OutputSet) -> Result<(Option<Finished>, 
 pub fn find(job: ImagesJob<'_>) -> Result<(Option<Audited>, Used), Error> {
     check_gates(&job.gates, &job.plan, false)?;
     let tally = RefCell::new(Tally::default());
-    let mut watcher = Watcher::new(&job, &tally);
+    let mut figures = Vec::new();
+    let mut watcher = OfItems::new(&job.plan, job.progress, |name, rows| {
+        let n = tally.borrow_mut().take();
+        figures.push(document::image(name, n, rows, &job.plan.thresholds));
+    });
     let steps = job.progress;
+    steps.show(0, job.chosen.len(), "reading images");
     for error in job.source.refused() {
         tally.borrow_mut().unusable += 1;
         steps.say(&error.to_string());
@@ -97,8 +102,7 @@ pub fn find(job: ImagesJob<'_>) -> Result<(Option<Audited>, Used), Error> {
     for error in job.inversion.iter().flat_map(|inversion| inversion.failed()) {
         steps.say(&format!("note: not painted: {error}"));
     }
-    let Watcher { figures, curves, .. } = watcher;
-    let curves = curves.shares();
+    let curves = watcher.curves.shares();
     let tally = tally.into_inner();
     let used = Used { used: tally.used.len(), unusable: tally.unusable };
     if used.used == 0 {
@@ -175,51 +179,6 @@ fn input(job: &ImagesJob<'_>, tally: &Tally, outcome: &Outcome) -> Result<Input,
             too_small: outcome.n_too_small as u64,
         }),
     })
-}
-
-/// Reports progress and keeps the figures of every image.
-struct Watcher<'a> {
-    progress: &'a dyn Progress,
-    tally: &'a RefCell<Tally>,
-    plan: &'a Plan<2>,
-    figures: Vec<ImageFigures>,
-    most: f64,
-    curves: Curves<'a>,
-}
-
-impl<'a> Watcher<'a> {
-    fn new(job: &'a ImagesJob<'_>, tally: &'a RefCell<Tally>) -> Self {
-        let most = job.plan.thresholds.iter().map(|t| t.value).fold(0.0, f64::max);
-        let progress = job.progress;
-        progress.show(0, job.chosen.len(), "reading images");
-        Self {
-            progress,
-            tally,
-            plan: &job.plan,
-            figures: Vec::new(),
-            most,
-            curves: Curves::new(most, progress),
-        }
-    }
-}
-
-impl<'a> audit::Watcher<2> for Watcher<'a> {
-    type OfItem = Curves<'a>;
-
-    fn begin(&mut self) -> Curves<'a> {
-        Curves::new(self.most, self.progress)
-    }
-
-    fn progress(&mut self, _: usize, _: usize, what: &str) {
-        // Each image reports its own share.
-        self.progress.add(0.0, what);
-    }
-
-    fn item(&mut self, name: &str, rows: &[Row], seen: Curves<'a>) {
-        self.curves.merge(seen);
-        let n = self.tally.borrow_mut().take();
-        self.figures.push(document::image(name, n, rows, &self.plan.thresholds));
-    }
 }
 
 const PREVIEW: u32 = 640;

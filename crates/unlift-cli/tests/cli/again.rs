@@ -4,25 +4,19 @@ use crate::common::Place;
 
 const N_POINTS: usize = 300;
 
-/// Returns a number in [0, 1) for any index.
-fn random(at: usize) -> f64 {
-    (at as f64 * 0.754_877_666 + 0.1).fract()
-}
-
 fn points() -> Vec<[f64; 3]> {
-    let point = |at: usize| {
-        let [x, y, z] = [0, 1, 2].map(|c| random(3 * at * at % 7907 + c * 131 + at));
-        [5.0 * x, 4.0 * y, 3.0 * z]
-    };
-    (0..N_POINTS).map(point).collect()
+    // Numbers in [0, 1) for any index.
+    let random = |at: usize| (at as f64 * 0.754_877_666 + 0.1).fract();
+    let unit = |at: usize| [0, 1, 2].map(|c| random(3 * at * at % 7907 + c * 131 + at));
+    (0..N_POINTS).map(unit).map(|[x, y, z]| [5.0 * x, 4.0 * y, 3.0 * z]).collect()
 }
 
 /// Creates a map in `a.csv`, a version without its last tenth in `b.csv`, and descriptors of both.
 fn maps() -> Place {
     let (place, points) = (Place::empty(), points());
-    for (name, n) in [("a", N_POINTS), ("b", N_POINTS - N_POINTS / 10)] {
-        place.write_points(&format!("{name}.csv"), &points[..n]);
-        place.write_descriptors(&format!("{name}.bin"), &points[..n], 128);
+    for (name, points) in [("a", &points[..]), ("b", &points[..N_POINTS - N_POINTS / 10])] {
+        place.write_points(&format!("{name}.csv"), points);
+        place.write_descriptors(&format!("{name}.bin"), points, 128);
     }
     place
 }
