@@ -88,6 +88,11 @@ impl Error {
         Self { fault: Fault::Request(message.into()), advice: None }
     }
 
+    /// Creates an error that is not of the request, with a text of its own.
+    pub fn failed(message: impl Into<String>) -> Self {
+        Self { fault: Fault::Input(message.into().into()), advice: None }
+    }
+
     fn input(error: impl std::error::Error + Send + Sync + 'static) -> Self {
         Self { fault: Fault::Input(Box::new(error)), advice: None }
     }

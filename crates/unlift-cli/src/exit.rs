@@ -3,6 +3,7 @@
 use std::fmt;
 
 use unlift::{OneLine, is_obeyed};
+use unlift_audit::Error;
 
 use crate::args::Cli;
 use crate::output::printed;
@@ -25,39 +26,14 @@ const USAGE: u8 = 2;
 /// on the command line it is a usage error, see [`unlift_audit::check_file`].
 const BAD_INPUT: u8 = 3;
 
-/// A command line that asks for something impossible (exit code 2).
-#[derive(Debug)]
-pub struct Usage(String);
-
-impl fmt::Display for Usage {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
+/// Returns the error of a command line that asks for something impossible (exit code 2).
+pub fn usage(message: impl Into<String>) -> Error {
+    Error::request(message)
 }
-
-impl std::error::Error for Usage {}
-
-pub fn usage(message: impl Into<String>) -> anyhow::Error {
-    Usage(message.into()).into()
-}
-
-#[derive(Debug)]
-struct Advised {
-    error: anyhow::Error,
-    advice: String,
-}
-
-impl fmt::Display for Advised {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:#}", self.error)
-    }
-}
-
-impl std::error::Error for Advised {}
 
 /// Adds advice to `error`: what the user can try instead.
-pub fn advise(error: impl Into<anyhow::Error>, advice: impl Into<String>) -> anyhow::Error {
-    Advised { error: error.into(), advice: advice.into() }.into()
+pub fn advise(error: impl Into<Error>, advice: impl Into<String>) -> Error {
+    error.into().advise(advice)
 }
 
 /// Prints help or a usage error, and returns the exit code.
@@ -80,7 +56,7 @@ pub fn refused(error: clap::Error) -> u8 {
 }
 
 /// Prints an error, if any, and returns the exit code.
-pub fn finish(result: anyhow::Result<Outcome>) -> u8 {
+pub fn finish(result: crate::Result<Outcome>) -> u8 {
     match result {
         Ok(Outcome::Done) => 0,
         Ok(Outcome::GateFailed) => 1,
@@ -91,35 +67,23 @@ pub fn finish(result: anyhow::Result<Outcome>) -> u8 {
     }
 }
 
-fn lines(error: &anyhow::Error) -> Vec<String> {
-    let of_audit = |error: &anyhow::Error| {
-        let error = error.downcast_ref::<unlift_audit::Error>();
-        error.and_then(|error| error.advice().map(str::to_owned))
-    };
-    let advised = error.downcast_ref::<Advised>().map(|advised| advised.advice.clone());
-    let advice = advised.or_else(|| of_audit(error)).map(|advice| format!("  try: {advice}"));
+fn lines(error: &Error) -> Vec<String> {
+    let advice = error.advice().map(|advice| format!("  try: {advice}"));
     [line(error)].into_iter().chain(advice).collect()
 }
 
 /// Formats an error for `stderr::tell`.
-pub fn line(error: &anyhow::Error) -> String {
-    format!("unlift: {error:#}")
+pub fn line(error: &impl fmt::Display) -> String {
+    format!("unlift: {error}")
 }
 
-fn code(error: &anyhow::Error) -> u8 {
-    if let Some(advised) = error.downcast_ref::<Advised>() {
-        return code(&advised.error);
-    }
-    let of_audit = error.downcast_ref::<unlift_audit::Error>();
-    let is_usage =
-        error.downcast_ref::<Usage>().is_some() || of_audit.is_some_and(|error| error.is_request());
-    if is_usage { USAGE } else { BAD_INPUT }
+fn code(error: &Error) -> u8 {
+    if error.is_request() { USAGE } else { BAD_INPUT }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use anyhow::Context;
 
     #[test]
     fn advice_keeps_the_code_and_adds_a_line() {
@@ -130,9 +94,8 @@ mod tests {
 
     #[test]
     fn everything_else_is_bad_input() {
-        let error = unlift::Error::new("points", "51", "3");
-        let error = Err::<(), _>(error).context("a.ply").unwrap_err();
+        let error = unlift::Error::new("points", "51", "3").into();
         assert_eq!(code(&error), BAD_INPUT);
-        assert_eq!(lines(&error), ["unlift: a.ply: points: expected 51, found 3"]);
+        assert_eq!(lines(&error), ["unlift: points: expected 51, found 3"]);
     }
 }

@@ -14,6 +14,8 @@ mod values;
 use std::ffi::OsString;
 use std::sync::OnceLock;
 
+type Result<T> = std::result::Result<T, unlift_audit::Error>;
+
 static WORDS: OnceLock<Vec<OsString>> = OnceLock::new();
 
 /// Returns the words of the command line, none before [`run`].

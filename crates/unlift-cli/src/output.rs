@@ -6,14 +6,14 @@ use unlift::{OneLine, is_obeyed};
 
 /// Prints `text`, lines or JSON. If the reader closes the pipe early (`| head`), the rest is
 /// dropped without an error.
-pub fn print(text: &str) -> anyhow::Result<()> {
+pub fn print(text: &str) -> crate::Result<()> {
     let text = harmless(text);
     let mut stdout = io::stdout().lock();
     printed(stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()))
 }
 
 /// Converts the result of a write to stdout; a broken pipe is no error.
-pub fn printed(result: io::Result<()>) -> anyhow::Result<()> {
+pub fn printed(result: io::Result<()>) -> crate::Result<()> {
     match result {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(unlift_io::Error::write("stdout", error).into())

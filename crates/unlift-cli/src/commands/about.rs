@@ -7,7 +7,7 @@ use unlift_vision::network::{Entry, Folders, MODELS, Place};
 use crate::exit::Outcome;
 use crate::output::print;
 
-pub fn schemes() -> anyhow::Result<Outcome> {
+pub fn schemes() -> crate::Result<Outcome> {
     let mut text = String::new();
     for scheme in all() {
         let meant_for = match (scheme.in_3d, scheme.in_2d) {
@@ -30,7 +30,7 @@ pub fn schemes() -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-pub fn models() -> anyhow::Result<Outcome> {
+pub fn models() -> crate::Result<Outcome> {
     let folders = Folders::of_process();
     let mut text = String::new();
     for entry in MODELS {

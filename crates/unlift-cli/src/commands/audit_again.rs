@@ -16,7 +16,7 @@ use crate::output::command_line;
 use crate::progress::Progress;
 use crate::values::{all_schemes, distinct};
 
-pub fn run(args: &AuditAgainArgs) -> anyhow::Result<Outcome> {
+pub fn run(args: &AuditAgainArgs) -> crate::Result<Outcome> {
     let started = Instant::now();
     let inputs = [&args.a, &args.b].into_iter().chain(&args.descriptors);
     audits::perform(&args.audit, inputs.map(|path| path.as_path()).collect(), |out| {
@@ -60,7 +60,7 @@ pub fn run(args: &AuditAgainArgs) -> anyhow::Result<Outcome> {
     })
 }
 
-fn maps(args: &AuditAgainArgs) -> anyhow::Result<Maps> {
+fn maps(args: &AuditAgainArgs) -> crate::Result<Maps> {
     let _alive = Progress::uncounted(args.audit.quiet, "reading the maps");
     let descriptors: [Option<&Path>; 2] = match (args.descriptors.as_slice(), args.a == args.b) {
         ([], _) => [None, None],

@@ -30,7 +30,7 @@ use crate::progress::Progress;
 use crate::stderr;
 use crate::values::{NeighborSource, distinct, image_schemes};
 
-pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
+pub fn run(args: &AuditImagesArgs) -> crate::Result<Outcome> {
     let started = Instant::now();
     let mut plan = plan(args)?;
     let photos = photos_of_images(&args.paint, &args.path)?;
@@ -41,7 +41,7 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
         let extraction = extraction(args, &plan)?;
         let source = FeatureSource::open(&args.path, &extraction).map_err(|error| {
             let map = read::is_project(&args.path);
-            let error = anyhow::Error::from(error);
+            let error = unlift_audit::Error::from(error);
             if map { advise(error, "unlift audit map, as this is a map") } else { error }
         })?;
         if let Some(note) = source.passed_over() {
@@ -90,7 +90,7 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
     Ok(outcome)
 }
 
-fn plan(args: &AuditImagesArgs) -> anyhow::Result<Plan<2>> {
+fn plan(args: &AuditImagesArgs) -> crate::Result<Plan<2>> {
     let usual = with_oracle(&args.oracle, Plan::new(Unit::Pixel));
     let mut sources = match &*args.neighbors {
         [] => usual_sources(true),
@@ -120,7 +120,7 @@ fn plan(args: &AuditImagesArgs) -> anyhow::Result<Plan<2>> {
 }
 
 /// Returns the options of the extractor, checked against the sources of the plan.
-fn extraction(args: &AuditImagesArgs, plan: &Plan<2>) -> anyhow::Result<Extraction> {
+fn extraction(args: &AuditImagesArgs, plan: &Plan<2>) -> crate::Result<Extraction> {
     if args.paint.photos.is_some() && args.path.is_dir() {
         return Err(usage("--photos: expected with a file of features, found a folder of photos"));
     }
@@ -136,7 +136,7 @@ fn check_photos(
     args: &AuditImagesArgs,
     source: &FeatureSource,
     chosen: &[usize],
-) -> anyhow::Result<()> {
+) -> crate::Result<()> {
     let (Some(_), Some(photos)) = (&args.paint.invert, &args.paint.photos) else { return Ok(()) };
     if chosen.iter().any(|&at| photos.join(&source.names()[at]).is_file()) {
         return Ok(());
@@ -154,7 +154,7 @@ fn check_descriptors(
     source: &FeatureSource,
     chosen: &[usize],
     plan: &mut Plan<2>,
-) -> anyhow::Result<Option<Descriptors>> {
+) -> crate::Result<Option<Descriptors>> {
     let invert = args.paint.invert.is_some();
     let protects = !args.protect.protect_descriptors.is_empty();
     let wanted = invert || protects || Needs::of_plan(plan).descriptors();

@@ -33,7 +33,7 @@ const QUICK_RATIO: f64 = 0.5;
 /// Source of `--quick`: the fastest one, for any descriptors.
 const QUICK_SOURCE: &str = "similarity";
 
-pub fn run(args: &AuditMapArgs) -> anyhow::Result<Outcome> {
+pub fn run(args: &AuditMapArgs) -> crate::Result<Outcome> {
     let started = Instant::now();
     audits::perform(&args.audit, inputs(args), |out| {
         let (input, prepared) = open_map(
@@ -74,13 +74,13 @@ pub fn run(args: &AuditMapArgs) -> anyhow::Result<Outcome> {
         let lists = NeighborSource::files(&args.solvers.neighbors).map(|path| ("neighbors", path));
         let hashes = found.into_iter().chain(lists);
         let hashes = hashes.map(|(name, path)| Ok((name.to_owned(), hash_file(path)?)));
-        job.input.other_sha256 = hashes.collect::<anyhow::Result<IndexMap<_, _>>>()?;
+        job.input.other_sha256 = hashes.collect::<crate::Result<IndexMap<_, _>>>()?;
         Ok(Some(perform(job, out)?))
     })
 }
 
 /// Returns an error if the map has another size than `--expect-extent`.
-fn check_extent(args: &AuditMapArgs, prepared: &Prepared) -> anyhow::Result<()> {
+fn check_extent(args: &AuditMapArgs, prepared: &Prepared) -> crate::Result<()> {
     let extent_m = sides_m(prepared.original.reveal());
     let (Some((low, high)), Some(sides)) = (args.expect_extent, extent_m) else { return Ok(()) };
     if (low..=high).contains(&sides.into_iter().fold(0.0, f64::max)) {
@@ -98,7 +98,7 @@ fn inversion(
     prepared: &Prepared,
     input: &read::Input,
     progress: &Progress,
-) -> anyhow::Result<Option<Arc<MapInversion>>> {
+) -> crate::Result<Option<Arc<MapInversion>>> {
     if args.paint.invert.is_none() {
         return Ok(None);
     }
@@ -127,7 +127,7 @@ fn inputs(args: &AuditMapArgs) -> Vec<&Path> {
 }
 
 /// Returns the protections of descriptors, if requested.
-fn protected_by(args: &AuditMapArgs, prepared: &Prepared) -> anyhow::Result<Vec<Protection>> {
+fn protected_by(args: &AuditMapArgs, prepared: &Prepared) -> crate::Result<Vec<Protection>> {
     if let (Some(one), None) = (args.protect.protect_descriptors.first(), &prepared.descriptors) {
         let expected = "expected descriptors (--descriptors FILE), found none";
         return Err(usage(format!("--protect-descriptors {}: {expected}", one.name())));
@@ -144,7 +144,7 @@ fn plan(
     (prepared, input): (&Prepared, &read::Input),
     protections: &[Protection],
     (notes, doubts): (&mut Vec<String>, &mut Vec<String>),
-) -> anyhow::Result<Plan<3>> {
+) -> crate::Result<Plan<3>> {
     let k = usize::from(args.map.k);
     if args.solvers.no_records_alone {
         notes.push(NO_RECORDS_ALONE.to_owned());
@@ -193,7 +193,7 @@ fn plan(
 }
 
 /// Returns the mitigations of the command line.
-fn mitigations(args: &AuditMapArgs, prepared: &Prepared) -> anyhow::Result<Vec<Change>> {
+fn mitigations(args: &AuditMapArgs, prepared: &Prepared) -> crate::Result<Vec<Change>> {
     let tracks = Some(&prepared.cameras.tracks).filter(|tracks| !tracks.is_empty());
     for mitigation in &args.mitigate {
         let name = mitigation.name();

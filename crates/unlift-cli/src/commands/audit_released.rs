@@ -25,7 +25,7 @@ use crate::values::{self, NeighborSource};
 /// Name of a scheme without a name.
 const UNNAMED: &str = "released";
 
-pub fn run(args: &AuditReleasedArgs) -> anyhow::Result<Outcome> {
+pub fn run(args: &AuditReleasedArgs) -> crate::Result<Outcome> {
     let started = Instant::now();
     audits::perform(&args.audit, inputs(args), |out| {
         let name = name(args)?;
@@ -62,7 +62,7 @@ fn inputs(args: &AuditReleasedArgs) -> Vec<&Path> {
 }
 
 /// Returns the name of the scheme, from `--name` or from the file.
-fn name(args: &AuditReleasedArgs) -> anyhow::Result<String> {
+fn name(args: &AuditReleasedArgs) -> crate::Result<String> {
     if let Some(name) = &args.name {
         return Ok(name.clone());
     }
@@ -77,7 +77,7 @@ fn name(args: &AuditReleasedArgs) -> anyhow::Result<String> {
 
 /// Reads the original points, the released map and the secret, and checks that they belong
 /// together.
-fn open(args: &AuditReleasedArgs) -> anyhow::Result<(Prepared, (Released<3>, Secret))> {
+fn open(args: &AuditReleasedArgs) -> crate::Result<(Prepared, (Released<3>, Secret))> {
     if has_images(&args.released)? {
         let error = unlift_io::Error::new(&args.released, "", "a released map", "released images");
         return Err(advise(error, "unlift recover and unlift evaluate, which take images, too"));
@@ -113,7 +113,7 @@ fn described(
     args: &AuditReleasedArgs,
     released: Released<3>,
     secret: &Secret,
-) -> anyhow::Result<Released<3>> {
+) -> crate::Result<Released<3>> {
     let Some(path) = &args.descriptors else { return Ok(released) };
     if released.descriptors().is_some() {
         let found = args.released.display();
@@ -145,7 +145,7 @@ fn plan(
     prepared: &Prepared,
     released: &Released<3>,
     (notes, doubts): (&mut Vec<String>, &mut Vec<String>),
-) -> anyhow::Result<Plan<3>> {
+) -> crate::Result<Plan<3>> {
     let (k, points) = (usize::from(args.k), prepared.original.reveal());
     let usual = Plan::new(points.unit()).for_map(prepared.original.len(), k);
     let usual = with_oracle(&args.oracle, usual);
@@ -164,7 +164,7 @@ fn plan(
     })
 }
 
-fn provenance(args: &AuditReleasedArgs, prepared: &Prepared) -> anyhow::Result<Input> {
+fn provenance(args: &AuditReleasedArgs, prepared: &Prepared) -> crate::Result<Input> {
     let mut others = vec![("truth".to_owned(), hash_file(&args.truth)?)];
     if let Some(path) = &args.descriptors {
         others.push(("descriptors".to_owned(), hash_file(path)?));

@@ -20,7 +20,7 @@ use crate::progress::Progress;
 use crate::stderr;
 use crate::values::{distinct, image_schemes};
 
-pub fn run(args: &AuditSequenceArgs) -> anyhow::Result<Outcome> {
+pub fn run(args: &AuditSequenceArgs) -> crate::Result<Outcome> {
     let started = Instant::now();
     let plan = plan(args)?;
     let pose_error = pose_error(args)?;
@@ -70,7 +70,7 @@ pub fn run(args: &AuditSequenceArgs) -> anyhow::Result<Outcome> {
     })
 }
 
-fn plan(args: &AuditSequenceArgs) -> anyhow::Result<Plan<2>> {
+fn plan(args: &AuditSequenceArgs) -> crate::Result<Plan<2>> {
     let usual = Plan::new(Unit::Pixel);
     let mut schemes = image_schemes(&args.schemes, &usual);
     let mitigations = distinct(args.mitigate.clone(), |a, b| a.name() == b.name());
@@ -85,7 +85,7 @@ fn plan(args: &AuditSequenceArgs) -> anyhow::Result<Plan<2>> {
 }
 
 /// Returns the error of the poses in units of the model.
-fn pose_error(args: &AuditSequenceArgs) -> anyhow::Result<Option<PoseError>> {
+fn pose_error(args: &AuditSequenceArgs) -> crate::Result<Option<PoseError>> {
     let Some((cm, angle_deg)) = args.poses else { return Ok(None) };
     let Some(scale) = args.scale else {
         return Err(usage("--poses perturbed: expected --scale, meters per unit of the model"));

@@ -37,8 +37,8 @@ use crate::values::{NeighborSource, distinct};
 pub fn perform(
     args: &AuditArgs,
     inputs: Vec<&Path>,
-    work: impl FnOnce(OutputSet) -> anyhow::Result<Option<Finished>> + Send,
-) -> anyhow::Result<Outcome> {
+    work: impl FnOnce(OutputSet) -> crate::Result<Option<Finished>> + Send,
+) -> crate::Result<Outcome> {
     let rules = Rules::new(inputs, false);
     check_junit(args, &rules)?;
     let out = open_audit(&args.out, rules.clone(), args.share_safe)?;
@@ -51,7 +51,7 @@ pub fn perform(
 const JUNIT: &str = "--junit";
 
 /// Checks that the file of `--junit` can be written, and that it is not a file of the report.
-fn check_junit(args: &AuditArgs, rules: &Rules) -> anyhow::Result<()> {
+fn check_junit(args: &AuditArgs, rules: &Rules) -> crate::Result<()> {
     let Some(path) = &args.junit else { return Ok(()) };
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     if let Some(folder) = folder.filter(|folder| !folder.exists()) {
@@ -71,7 +71,7 @@ fn check_junit(args: &AuditArgs, rules: &Rules) -> anyhow::Result<()> {
 }
 
 /// Writes the results of gates atomically, readable by all users.
-fn write_junit(args: &AuditArgs, finished: &Finished, rules: &Rules) -> anyhow::Result<()> {
+fn write_junit(args: &AuditArgs, finished: &Finished, rules: &Rules) -> crate::Result<()> {
     let Some(path) = &args.junit else { return Ok(()) };
     check_file_of(JUNIT, path, Kind::Junit, rules)?;
     let text = junit(&finished.document);
@@ -102,7 +102,7 @@ pub fn solvers<const D: usize>(given: &[Builtin], usual: &Plan<D>) -> Vec<Arc<dy
 pub fn thresholds<const D: usize>(
     given: &[Threshold],
     usual: &Plan<D>,
-) -> anyhow::Result<Vec<Threshold>> {
+) -> crate::Result<Vec<Threshold>> {
     let thresholds = if given.is_empty() { &usual.thresholds } else { given };
     for (at, threshold) in thresholds.iter().enumerate() {
         if thresholds[..at].iter().any(|earlier| earlier.value == threshold.value) {
@@ -120,7 +120,7 @@ pub fn map_thresholds(
     prepared: &Prepared,
     usual: &Plan<3>,
     (notes, doubts): (&mut Vec<String>, &mut Vec<String>),
-) -> anyhow::Result<Vec<Threshold>> {
+) -> crate::Result<Vec<Threshold>> {
     let thresholds = thresholds(&args.thresholds, usual)?;
     let (points, typed) = (prepared.original.reveal(), !args.thresholds.is_empty());
     let lengths = check_thresholds(points.positions(), points.unit(), &thresholds, typed)?;
@@ -137,7 +137,7 @@ pub fn neighbors(
     (prepared, descriptors): (&Prepared, Option<&Descriptors>),
     lacking: &str,
     (n_read, notes): (usize, &mut Vec<String>),
-) -> anyhow::Result<Vec<NeighborsBy<3>>> {
+) -> crate::Result<Vec<NeighborsBy<3>>> {
     let mut sources = match requested {
         [] => unlift_audit::sources::usual(descriptors.is_some()),
         _ => Vec::new(),
@@ -177,7 +177,7 @@ pub fn neighbors(
 pub fn check_fit<const D: usize>(
     source: &dyn Source<D>,
     descriptors: &Descriptors,
-) -> anyhow::Result<()> {
+) -> crate::Result<()> {
     source.takes(descriptors).map_err(|error| {
         let name = source.name();
         // Errors of another kind are about the source's model and name its path.
@@ -194,7 +194,7 @@ pub fn check_fit<const D: usize>(
 pub fn check_oracle<const D: usize>(
     args: &OracleArgs,
     sources: &[NeighborsBy<D>],
-) -> anyhow::Result<()> {
+) -> crate::Result<()> {
     for (option, given) in [
         ("--inlier-ratios", !args.inlier_ratios.is_empty()),
         ("--oracle-noise", !args.oracle_noise.is_empty()),
@@ -212,8 +212,8 @@ pub fn check_oracle<const D: usize>(
 /// Returns the protections of the command line. `kind` is that of the descriptors that they protect.
 pub fn protections(
     args: &ProtectArgs,
-    kind: impl FnOnce() -> anyhow::Result<DescriptorKind>,
-) -> anyhow::Result<Vec<Protection>> {
+    kind: impl FnOnce() -> crate::Result<DescriptorKind>,
+) -> crate::Result<Vec<Protection>> {
     let requested = distinct(args.protect_descriptors.clone(), |a, b| a == b);
     if !requested.iter().any(Protection::needs_public) {
         return Ok(requested);
@@ -235,11 +235,7 @@ pub fn protections(
 }
 
 /// Reads all descriptors of photos or of a file of features.
-fn public(
-    path: &Path,
-    kind: DescriptorKind,
-    min_score: Option<f32>,
-) -> anyhow::Result<Descriptors> {
+fn public(path: &Path, kind: DescriptorKind, min_score: Option<f32>) -> crate::Result<Descriptors> {
     let wanted = Wanted {
         option: "--public-descriptors",
         kind: path.is_dir().then_some(kind),
@@ -268,7 +264,7 @@ fn public(
 }
 
 /// Returns the kind of `descriptors`; an error about `option` if there are none.
-pub fn kind(option: &str, descriptors: Option<&Descriptors>) -> anyhow::Result<DescriptorKind> {
+pub fn kind(option: &str, descriptors: Option<&Descriptors>) -> crate::Result<DescriptorKind> {
     let Some(descriptors) = descriptors else {
         return Err(usage(format!("{option}: expected descriptors, found none")));
     };
@@ -276,7 +272,7 @@ pub fn kind(option: &str, descriptors: Option<&Descriptors>) -> anyhow::Result<D
 }
 
 /// Opens the painter for descriptors of `kind`: the user's network, or the known one.
-pub fn painter(kind: DescriptorKind, network: Option<&PathBuf>) -> anyhow::Result<Painter> {
+pub fn painter(kind: DescriptorKind, network: Option<&PathBuf>) -> crate::Result<Painter> {
     let inverter = match network {
         Some(path) => Inverter::read(path, kind),
         None => Inverter::of(kind),
@@ -289,7 +285,7 @@ pub fn painter(kind: DescriptorKind, network: Option<&PathBuf>) -> anyhow::Resul
 pub fn photos_of_images<'a>(
     args: &'a PaintArgs,
     path: &'a Path,
-) -> anyhow::Result<Option<&'a Path>> {
+) -> crate::Result<Option<&'a Path>> {
     match (&args.photos, path.is_dir()) {
         _ if args.invert.is_none() => Ok(None),
         (Some(photos), _) => Ok(Some(photos)),

@@ -4,7 +4,6 @@ use std::io::Read;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-use anyhow::anyhow;
 use unlift::released::Released;
 use unlift::truth::Secret;
 use unlift::{Fingerprint, OneLine};
@@ -23,9 +22,10 @@ pub const TRUTH: &str = "truth.npz";
 
 /// Runs `work` on `RAYON_NUM_THREADS` threads (default: all cores). rayon's global pool would panic
 /// if the system refuses threads.
-pub fn with_threads<T: Send>(work: impl FnOnce() -> anyhow::Result<T> + Send) -> anyhow::Result<T> {
+pub fn with_threads<T: Send>(work: impl FnOnce() -> crate::Result<T> + Send) -> crate::Result<T> {
     let pool = rayon::ThreadPoolBuilder::new().build();
-    let pool = pool.map_err(|error| anyhow!("cannot start threads: {error}"))?;
+    let pool = pool
+        .map_err(|error| unlift_audit::Error::failed(format!("cannot start threads: {error}")))?;
     pool.install(work)
 }
 
@@ -52,7 +52,7 @@ pub fn open_map(
     args: &MapArgs,
     beside: bool,
     (seed, quiet): (u64, bool),
-) -> anyhow::Result<(Input, Prepared)> {
+) -> crate::Result<(Input, Prepared)> {
     let _alive = Progress::uncounted(quiet, "reading the map");
     let preparation = Preparation {
         scale: args.scale,
@@ -70,7 +70,7 @@ pub fn expect_slots<const D: usize>(
     path: &Path,
     released: &Released<D>,
     secret: &Secret,
-) -> anyhow::Result<()> {
+) -> crate::Result<()> {
     let wrong = |expected: usize, what: &str, found: usize| {
         let expected = format!("{expected} hidden points{what}, as in the truth");
         Err(Error::new(path, "", expected, found.to_string()).into())
@@ -88,7 +88,7 @@ pub fn expect_slots<const D: usize>(
 ///
 /// # Errors
 /// If the file cannot be read, or is no `audit.json` of this version of the format.
-pub fn read_document(path: &Path) -> anyhow::Result<Document> {
+pub fn read_document(path: &Path) -> crate::Result<Document> {
     let mut text = String::new();
     let (mut file, _) = unlift_io::input::open(path)?;
     file.read_to_string(&mut text).map_err(|error| Error::read(path, error))?;
@@ -96,12 +96,12 @@ pub fn read_document(path: &Path) -> anyhow::Result<Document> {
         let text = error.to_string();
         // The path names the file already.
         let text = text.strip_prefix("audit.json: ").unwrap_or(&text);
-        anyhow!("{}: {}", OneLine(path.display()), OneLine(text))
+        unlift_audit::Error::failed(format!("{}: {}", OneLine(path.display()), OneLine(text)))
     })
 }
 
 /// Returns an error if `failed` images could not be `done`; each was reported in a line before.
-pub fn all_could_be(done: &str, path: &Path, n: usize, failed: usize) -> anyhow::Result<Outcome> {
+pub fn all_could_be(done: &str, path: &Path, n: usize, failed: usize) -> crate::Result<Outcome> {
     if failed == 0 {
         return Ok(Outcome::Done);
     }

@@ -17,7 +17,7 @@ use crate::output::{print, table};
 
 const PAGE: &str = "compare.html";
 
-pub fn run(args: &CompareArgs) -> anyhow::Result<Outcome> {
+pub fn run(args: &CompareArgs) -> crate::Result<Outcome> {
     let (old, new) = (read_document(&args.old)?, read_document(&args.new)?);
     // A comparison of share-safe audits is readable by others, like the audits.
     let named = old.input.path.is_some() || new.input.path.is_some();

@@ -17,7 +17,7 @@ use crate::exit::{Outcome, advise};
 use crate::output::{print, table};
 use crate::stderr;
 
-pub fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
+pub fn run(args: &EvaluateArgs) -> crate::Result<Outcome> {
     if has_images(&args.truth)? {
         return images(args);
     }
@@ -42,7 +42,7 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     report(args, &row, &thresholds, &notes)
 }
 
-fn images(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
+fn images(args: &EvaluateArgs) -> crate::Result<Outcome> {
     let thresholds = match args.thresholds.as_slice() {
         [] => Plan::<2>::new(Unit::Pixel).thresholds,
         given => given.to_vec(),
@@ -60,7 +60,7 @@ fn check(
     checked: &Checked,
     thresholds: &[Threshold],
     unit: Unit,
-) -> anyhow::Result<Vec<String>> {
+) -> crate::Result<Vec<String>> {
     checked.notes(thresholds, unit).map_err(|error| {
         let error = unlift_io::Error::core(&args.recovered, error).into();
         match released_path(args) {
@@ -80,7 +80,7 @@ fn report(
     row: &Row,
     thresholds: &[Threshold],
     notes: &[String],
-) -> anyhow::Result<Outcome> {
+) -> crate::Result<Outcome> {
     for note in notes {
         stderr::note(format_args!("{}: {note}", args.recovered.display()));
     }
@@ -97,7 +97,7 @@ fn released_path(args: &EvaluateArgs) -> Option<PathBuf> {
     Some(args.truth.with_file_name(RELEASED)).filter(|path| path.exists())
 }
 
-fn released(args: &EvaluateArgs, secret: &Secret) -> anyhow::Result<Option<Released<3>>> {
+fn released(args: &EvaluateArgs, secret: &Secret) -> crate::Result<Option<Released<3>>> {
     let Some(path) = released_path(args) else { return Ok(None) };
     let released = read_released::<3>(&path)?;
     same_map(&path, Some(released.fingerprint()), &args.truth, secret.map())?;

@@ -27,7 +27,7 @@ enum Shown {
     Segments(Vec<Segment<3>>),
 }
 
-pub fn run(args: &ExportArgs) -> anyhow::Result<Outcome> {
+pub fn run(args: &ExportArgs) -> crate::Result<Outcome> {
     let inputs = [Some(args.path.as_path()), args.cameras.as_deref()];
     let rules = Rules::new(inputs.into_iter().flatten(), false);
     let ending = args.out.extension().map(|ending| ending.to_ascii_lowercase());
@@ -56,7 +56,7 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<Outcome> {
 }
 
 /// Writes a PLY or OBJ file, and returns a description of its content.
-fn cloud(args: &ExportArgs, ending: Option<&str>, shown: &Shown) -> anyhow::Result<String> {
+fn cloud(args: &ExportArgs, ending: Option<&str>, shown: &Shown) -> crate::Result<String> {
     let wrong = |expected: &str, found: &str, way_out: &str| {
         Err(advise(unlift_io::Error::new(&args.path, "", expected, found), way_out))
     };
@@ -79,7 +79,7 @@ fn cloud(args: &ExportArgs, ending: Option<&str>, shown: &Shown) -> anyhow::Resu
     }
 }
 
-fn model(args: &ExportArgs, rules: Rules) -> anyhow::Result<String> {
+fn model(args: &ExportArgs, rules: Rules) -> crate::Result<String> {
     let names = ["cameras.txt", "images.txt", "points3D.txt"];
     let first = names.map(|name| (name, Kind::Model));
     let mut out = OutputSet::create(&args.out, rules, Access::Private, &first).map_err(refused)?;
@@ -100,7 +100,7 @@ fn model(args: &ExportArgs, rules: Rules) -> anyhow::Result<String> {
     Ok(format!("a model of {n} points, {} cameras and {} images", cameras.len(), images.len()))
 }
 
-fn views(project: &Path) -> anyhow::Result<(Vec<colmap::Camera>, Vec<colmap::Image>)> {
+fn views(project: &Path) -> crate::Result<(Vec<colmap::Camera>, Vec<colmap::Image>)> {
     match read::open(project)?.model {
         Some(folder) => Ok(colmap::read_views(&folder)?),
         None => {
@@ -111,7 +111,7 @@ fn views(project: &Path) -> anyhow::Result<(Vec<colmap::Camera>, Vec<colmap::Ima
 }
 
 /// Reads the file at `path`, and returns its content and its unit.
-fn read(path: &Path) -> anyhow::Result<(Shown, Unit)> {
+fn read(path: &Path) -> crate::Result<(Shown, Unit)> {
     let kind = kind(path)?;
     let wrong = |found: &str| {
         let expected = "a released, recovered or truth file of a map";
@@ -155,7 +155,7 @@ fn read(path: &Path) -> anyhow::Result<(Shown, Unit)> {
 }
 
 /// Converts lengths to the units of the map, if `--scale` is given.
-fn scaled(args: &ExportArgs, (mut shown, unit): (Shown, Unit)) -> anyhow::Result<Shown> {
+fn scaled(args: &ExportArgs, (mut shown, unit): (Shown, Unit)) -> crate::Result<Shown> {
     let Some(scale) = args.scale else { return Ok(shown) };
     if unit != Unit::Meter {
         let expected = "a file in meters (obfuscate --scale)";

@@ -25,7 +25,7 @@ struct Tally {
     failed: usize,
 }
 
-pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
+pub fn run(args: &FeaturesArgs) -> crate::Result<Outcome> {
     let rules = Rules::new([args.images.as_path()], false);
     let target = check_file(&args.out, Kind::Features, &rules)?;
     check_no_photo(&args.images, &target)?;
@@ -39,7 +39,7 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
     }
     for error in source.refused() {
         tally.failed += 1;
-        progress.say(&line(&anyhow::anyhow!("{error}")));
+        progress.say(&line(&error));
     }
     write(&source, (args, &rules), &mut tally, &mut progress)?;
     drop(progress);
@@ -52,7 +52,7 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
 }
 
 /// Refuses an output file that the next run would read as a photo.
-fn check_no_photo(images: &Path, target: &Path) -> anyhow::Result<()> {
+fn check_no_photo(images: &Path, target: &Path) -> crate::Result<()> {
     let folder = match target.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
@@ -67,7 +67,7 @@ fn check_no_photo(images: &Path, target: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn extraction(args: &FeaturesArgs) -> anyhow::Result<Extraction> {
+fn extraction(args: &FeaturesArgs) -> crate::Result<Extraction> {
     let wanted = Wanted { max_image_size: args.max_image_size, ..args.extraction.wanted() };
     if args.as_stored && args.images.is_file() {
         return Err(usage("--as-stored: expected with a folder of photos, found a file"));
@@ -80,11 +80,11 @@ fn write(
     (args, rules): (&FeaturesArgs, &Rules),
     tally: &mut Tally,
     progress: &mut Progress,
-) -> anyhow::Result<()> {
+) -> crate::Result<()> {
     let names = source.names();
     let all: Vec<usize> = (0..names.len()).collect();
     let mut writer = FeatureWriter::create(&args.out)?;
-    let one = |&at: &usize| -> anyhow::Result<ImageFeatures> {
+    let one = |&at: &usize| -> crate::Result<ImageFeatures> {
         let image = source.get(at)?;
         // A photo without features is no error.
         if matches!(source, FeatureSource::File(_)) {
@@ -93,7 +93,7 @@ fn write(
         Ok(image)
     };
     progress.show(0, names.len(), "reading images");
-    in_order(&all, one, |at, result| -> anyhow::Result<()> {
+    in_order(&all, one, |at, result| -> crate::Result<()> {
         progress.show(at + 1, names.len(), &names[at]);
         let usable = result.and_then(|image| {
             writer.check(&image)?;

@@ -45,10 +45,10 @@ pub struct Counts {
 
 /// Runs `work` in parallel on the items of `next`, and passes the results to `done` in order.
 fn each<T: Send, U: Send>(
-    mut next: impl FnMut() -> anyhow::Result<Option<T>>,
-    work: impl Fn(T) -> anyhow::Result<U> + Sync,
-    mut done: impl FnMut(U) -> anyhow::Result<()>,
-) -> anyhow::Result<()> {
+    mut next: impl FnMut() -> crate::Result<Option<T>>,
+    work: impl Fn(T) -> crate::Result<U> + Sync,
+    mut done: impl FnMut(U) -> crate::Result<()>,
+) -> crate::Result<()> {
     loop {
         let mut batch = Vec::new();
         while batch.len() < AT_WORK * rayon::current_num_threads() {
@@ -68,9 +68,9 @@ fn each<T: Send, U: Send>(
 }
 
 /// Hides the keypoints of all images of `args.path` and writes both files into `out`.
-pub fn hide(args: &ObfuscateArgs, key: &Key, out: &mut OutputSet) -> anyhow::Result<Counts> {
+pub fn hide(args: &ObfuscateArgs, key: &Key, out: &mut OutputSet) -> crate::Result<Counts> {
     let scheme = args.scheme.of_dimension::<2>(&SchemeOptions::usual(Unit::Pixel));
-    let scheme = scheme.ok_or_else(|| anyhow::anyhow!("not a scheme for images"))?;
+    let scheme = scheme.ok_or_else(|| unlift_audit::Error::failed("not a scheme for images"))?;
     let source = FeatureSource::open(&args.path, &Extraction::default())?;
     let tally = RefCell::new(Tally::default());
     for error in source.refused() {
@@ -122,7 +122,7 @@ pub fn list_by_oracle(
     args: &NeighborsArgs,
     oracle: &Oracle<'_>,
     rules: &Rules,
-) -> anyhow::Result<Counts> {
+) -> crate::Result<Counts> {
     let mut pairs = Pairs::open(oracle.truth, Some(&args.released))?;
     let how = (args.oracle_noise, oracle.inlier_ratio, oracle.k);
     let work = |pair: Pair| {
@@ -145,7 +145,7 @@ pub fn list_by_source(
     source: &dyn Source<2>,
     seed: u64,
     out: (&Path, &Rules),
-) -> anyhow::Result<Counts> {
+) -> crate::Result<Counts> {
     let mut images = ImageFile::open(released, Stage::Released)?;
     let work = |rows: ImageRows<'_>| {
         let name = rows.name().to_owned();
@@ -172,7 +172,7 @@ pub fn recover_all(
     (solver, options): (Builtin, &RecoverOptions),
     out: (&Path, &Rules),
     mut note: impl FnMut(&Neighborhoods, usize),
-) -> anyhow::Result<Counts> {
+) -> crate::Result<Counts> {
     let mut images = ImageFile::open(released, Stage::Released)?;
     let mut lists = ImageFile::open(neighbors, Stage::Neighborhoods)?;
     let next = || {
@@ -214,7 +214,7 @@ pub fn evaluate_all(
     args: &EvaluateArgs,
     released: Option<&Path>,
     thresholds: &[Threshold],
-) -> anyhow::Result<Evaluated> {
+) -> crate::Result<Evaluated> {
     let mut pairs = Pairs::open(&args.truth, released)?;
     let mut found = ImageFile::open(&args.recovered, Stage::Recovered)?;
     let mut pooled = Pooled::new(thresholds);
@@ -262,13 +262,13 @@ struct Pair {
 }
 
 impl<'a> Pairs<'a> {
-    fn open(truth: &'a Path, released: Option<&'a Path>) -> anyhow::Result<Self> {
+    fn open(truth: &'a Path, released: Option<&'a Path>) -> crate::Result<Self> {
         let images = ImageFile::open(truth, Stage::Truth)?;
         let open = |path| Ok::<_, Error>((path, ImageFile::open(path, Stage::Released)?));
         Ok(Self { truth: (truth, images), released: released.map(open).transpose()? })
     }
 
-    fn next(&mut self) -> anyhow::Result<Option<Pair>> {
+    fn next(&mut self) -> crate::Result<Option<Pair>> {
         let truth = self.truth.0;
         let Some(rows) = self.truth.1.next_image()? else {
             if let Some((_, released)) = &mut self.released {
@@ -306,10 +306,10 @@ fn list(
 fn write<T: Send, U: Send>(
     (out, rules): (&Path, &Rules),
     kind: Stage,
-    next: impl FnMut() -> anyhow::Result<Option<T>>,
-    work: impl Fn(T) -> anyhow::Result<Option<(String, U)>> + Sync,
+    next: impl FnMut() -> crate::Result<Option<T>>,
+    work: impl Fn(T) -> crate::Result<Option<(String, U)>> + Sync,
     mut add: impl FnMut(&mut ImageWriter<'_>, &mut Counts, &str, &U) -> Result<(), Error>,
-) -> anyhow::Result<Counts> {
+) -> crate::Result<Counts> {
     let mut output = OutputFile::create(out, Access::Private)?;
     let mut writer = ImageWriter::start(&mut output);
     let mut counts = Counts::default();

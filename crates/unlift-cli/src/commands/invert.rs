@@ -31,7 +31,7 @@ use crate::stderr;
 /// Images in memory per thread.
 const AT_WORK: usize = 2;
 
-pub fn run(args: &InvertArgs) -> anyhow::Result<Outcome> {
+pub fn run(args: &InvertArgs) -> crate::Result<Outcome> {
     let inputs = [Some(&args.path), args.recovered.as_ref(), args.cameras.as_ref()];
     let rules = Rules::new(inputs.into_iter().flatten().map(PathBuf::as_path), false);
     // Only checks that files can be written there.
@@ -64,7 +64,7 @@ struct Target<'a> {
 
 impl Target<'_> {
     /// Returns the path of the picture of image `name`, which may contain folders.
-    fn file(&self, name: &str) -> anyhow::Result<PathBuf> {
+    fn file(&self, name: &str) -> crate::Result<PathBuf> {
         let relative = Path::new(name);
         let within = relative.components().all(|part| matches!(part, Component::Normal(_)));
         if !within || name.is_empty() {
@@ -81,7 +81,7 @@ impl Target<'_> {
         Ok(self.rules.check(&file, Kind::Picture)?)
     }
 
-    fn write(&self, file: &Path, picture: &ColorImage) -> anyhow::Result<()> {
+    fn write(&self, file: &Path, picture: &ColorImage) -> crate::Result<()> {
         let bytes = marked_picture(&photo::png_of(picture)?);
         write_file(file, Access::Private, |out| std::io::Write::write_all(out, &bytes))?;
         self.painted.fetch_add(1, Ordering::Relaxed);
@@ -99,9 +99,9 @@ impl Target<'_> {
 fn each<T: Sync>(
     to: &Target<'_>,
     images: &[T],
-    paint: impl Fn(&T) -> anyhow::Result<(String, ColorImage)> + Sync,
-) -> anyhow::Result<usize> {
-    let one = |image: &T| -> anyhow::Result<()> {
+    paint: impl Fn(&T) -> crate::Result<(String, ColorImage)> + Sync,
+) -> crate::Result<usize> {
+    let one = |image: &T| -> crate::Result<()> {
         let (name, picture) = paint(image)?;
         to.write(&to.file(&name)?, &picture)
     };
@@ -112,7 +112,7 @@ fn each<T: Sync>(
 }
 
 /// Paints from the keypoints of photos or of a file.
-fn keypoints(to: &Target<'_>) -> anyhow::Result<usize> {
+fn keypoints(to: &Target<'_>) -> crate::Result<usize> {
     let path = &to.args.path;
     let wanted = Wanted { option: "--features", kind: to.args.features, ..Wanted::default() };
     let extraction = wanted.extraction(path)?;
@@ -139,7 +139,7 @@ fn keypoints(to: &Target<'_>) -> anyhow::Result<usize> {
 }
 
 /// Returns the descriptor kind of the first released image that has descriptors.
-fn kind_of_images(path: &Path) -> anyhow::Result<DescriptorKind> {
+fn kind_of_images(path: &Path) -> crate::Result<DescriptorKind> {
     let mut released = ImageFile::open(path, Stage::Released)?;
     while let Some(rows) = released.next_image()? {
         let image = rows.released()?;
@@ -151,7 +151,7 @@ fn kind_of_images(path: &Path) -> anyhow::Result<DescriptorKind> {
 }
 
 /// Paints from the recovered keypoints of released images.
-fn images(to: &Target<'_>, recovered: &Path) -> anyhow::Result<usize> {
+fn images(to: &Target<'_>, recovered: &Path) -> crate::Result<usize> {
     let path = &to.args.path;
     let painter = &painter(kind_of_images(path)?, None)?;
     let mut released = ImageFile::open(path, Stage::Released)?;
@@ -186,7 +186,7 @@ fn images(to: &Target<'_>, recovered: &Path) -> anyhow::Result<usize> {
 }
 
 /// Paints from the recovered points of a map, as the cameras of a model see them.
-fn map(to: &Target<'_>, recovered: &Path) -> anyhow::Result<usize> {
+fn map(to: &Target<'_>, recovered: &Path) -> crate::Result<usize> {
     let (args, path) = (to.args, &to.args.path);
     let Some(model) = &args.cameras else {
         return Err(usage(
@@ -223,7 +223,7 @@ fn map(to: &Target<'_>, recovered: &Path) -> anyhow::Result<usize> {
 
 /// Paints six views from the center of bearings, such as a sphere cloud: directions are released, so
 /// nothing needs to be recovered.
-fn bearings(to: &Target<'_>, released: &Released<3>) -> anyhow::Result<usize> {
+fn bearings(to: &Target<'_>, released: &Released<3>) -> crate::Result<usize> {
     let of_map = |error| Error::core(&to.args.path, error);
     let painter = painter(kind("PATH", released.descriptors())?, None)?;
     let seen = on_bearings(released).map_err(of_map)?;

@@ -29,7 +29,7 @@ use crate::exit::Outcome;
 ///
 /// # Errors
 /// If the command cannot complete; `exit` turns the error into a line and an exit code.
-pub fn run(command: Command) -> anyhow::Result<Outcome> {
+pub fn run(command: Command) -> crate::Result<Outcome> {
     match command {
         Command::Demo(args) => demo::run(&args),
         Command::Audit(AuditCommand::Map(args)) => audit_map::run(&args),

@@ -30,7 +30,7 @@ pub struct Oracle<'a> {
     pub k: usize,
 }
 
-pub fn run(args: &NeighborsArgs) -> anyhow::Result<Outcome> {
+pub fn run(args: &NeighborsArgs) -> crate::Result<Outcome> {
     let inputs = [Some(args.released.as_path()), args.truth.as_deref()];
     let rules = Rules::new(inputs.into_iter().flatten(), false);
     let kind = Kind::Stage(Stage::Neighborhoods);
@@ -88,7 +88,7 @@ fn by_source(
     named: &Named,
     images: bool,
     rules: &Rules,
-) -> anyhow::Result<Made> {
+) -> crate::Result<Made> {
     if images {
         let source = named.of_dimension::<2>().map_err(|_| {
             usage(format!("--neighbors {}: expected with a map, found images", named.name()))
@@ -127,7 +127,7 @@ fn check_source(
 }
 
 /// Makes the lists of a map at one inlier ratio.
-fn by_oracle(args: &NeighborsArgs, oracle: &Oracle<'_>) -> anyhow::Result<Neighborhoods> {
+fn by_oracle(args: &NeighborsArgs, oracle: &Oracle<'_>) -> crate::Result<Neighborhoods> {
     let (original, secret) = read_truth::<3>(oracle.truth)?;
     // Only the released map has the number of points per record.
     let released = read_released::<3>(&args.released)?;

@@ -19,7 +19,7 @@ use unlift_audit::{Progress as _, refused};
 const GUESSABLE: &str = "unlift: note: whoever guesses the --seed can restore the order of the records and, under cp, \
     the points: do not release this map";
 
-pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
+pub fn run(args: &ObfuscateArgs) -> crate::Result<Outcome> {
     let inputs = [args.path.as_path()].into_iter().chain(args.map.descriptors.as_deref());
     let files = [(RELEASED, Kind::Stage(Stage::Released)), (TRUTH, Kind::Stage(Stage::Truth))];
     let rules = Rules::new(inputs, false);
@@ -51,7 +51,7 @@ pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
 }
 
 /// Returns the key that all randomness comes from.
-fn key(args: &ObfuscateArgs) -> anyhow::Result<Key> {
+fn key(args: &ObfuscateArgs) -> crate::Result<Key> {
     Ok(match args.seed {
         Some(seed) => {
             stderr::tell(GUESSABLE);
@@ -62,7 +62,7 @@ fn key(args: &ObfuscateArgs) -> anyhow::Result<Key> {
 }
 
 /// Hides the keypoints of many images, each under a key of its own.
-fn images(args: &ObfuscateArgs, mut out: OutputSet) -> anyhow::Result<Outcome> {
+fn images(args: &ObfuscateArgs, mut out: OutputSet) -> crate::Result<Outcome> {
     let map = &args.map;
     for (option, given) in [
         ("--scale", map.scale.is_some()),

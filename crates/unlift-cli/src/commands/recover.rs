@@ -42,7 +42,7 @@ fn notes(offsets: &[u64], about: About, slots_per_record: usize) -> Vec<String> 
     notes
 }
 
-pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
+pub fn run(args: &RecoverArgs) -> crate::Result<Outcome> {
     let rules = Rules::new([args.released.as_path(), &args.neighbors], false);
     let kind = Kind::Stage(Stage::Recovered);
     check_file(&args.out, kind, &rules)?;
@@ -75,7 +75,7 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-fn images(args: &RecoverArgs, options: &RecoverOptions, rules: &Rules) -> anyhow::Result<Outcome> {
+fn images(args: &RecoverArgs, options: &RecoverOptions, rules: &Rules) -> crate::Result<Outcome> {
     let alive = Progress::uncounted(false, "recovering");
     // The same note about several images is printed once.
     let mut told = HashSet::new();

@@ -13,7 +13,7 @@ use crate::exit::{Outcome, usage};
 use crate::output::print;
 use crate::stderr;
 
-pub fn run(args: &TableArgs) -> anyhow::Result<Outcome> {
+pub fn run(args: &TableArgs) -> crate::Result<Outcome> {
     let ending = args.out.as_ref().map(|out| {
         let ending = out.extension().unwrap_or_default();
         ending.to_string_lossy().to_ascii_lowercase()

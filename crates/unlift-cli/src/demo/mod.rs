@@ -43,7 +43,7 @@ const RATIOS: [f64; 2] = [0.5, 0.1];
 /// Page and JSON file of the photos; the map has the audit's usual names.
 const OF_PHOTOS: [&str; 2] = ["photos.html", "photos.json"];
 
-pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
+pub fn run(args: &DemoArgs) -> crate::Result<Outcome> {
     let files = [
         (PAGE, Kind::Page),
         (FIGURES, Kind::AuditJson),
@@ -68,7 +68,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-fn photos(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
+fn photos(progress: &Part<'_>, out: &Path) -> crate::Result<Audited> {
     let started = Instant::now();
     let folder = tempdir()?;
     photos::write(folder.path())?;
@@ -107,13 +107,14 @@ fn photos(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
         started,
     };
     let (found, _) = find_images(job)?;
-    let mut found = found.ok_or_else(|| anyhow::anyhow!("demo: the photos could not be read"))?;
+    let mut found =
+        found.ok_or_else(|| unlift_audit::Error::failed("demo: the photos could not be read"))?;
     // The temporary path is meaningless.
     found.document.input.path = Some("Two photos of the demo".to_owned());
     Ok(found)
 }
 
-fn map(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
+fn map(progress: &Part<'_>, out: &Path) -> crate::Result<Audited> {
     let started = Instant::now();
     let room = synthetic::room(SEED, N_POINTS);
     let sha256 = hash_positions(&room.points);

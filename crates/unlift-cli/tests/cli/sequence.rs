@@ -7,7 +7,7 @@ use unlift::Descriptors;
 use unlift::descriptors::Values;
 use unlift_io::features::{FeatureSource, FeatureWriter, ImageFeatures};
 
-use crate::common::Place;
+use crate::common::{Place, row};
 
 const N_IMAGES: usize = 6;
 const N_POINTS: usize = 80;
@@ -93,10 +93,7 @@ fn keypoints_come_back_by_the_number_of_queries() {
     assert!(stdout.contains("After 2 queries 0.0 %, "), "{stdout}");
     let document = place.json("a/audit.json");
     let share = |scheme: &str, neighbors: &str| {
-        let mut rows = document["results"].as_array().unwrap().iter();
-        let row =
-            rows.find(|row| row["scheme"] == scheme && row["neighbors"] == neighbors).unwrap();
-        row["recovered_percent"]["5"].as_f64().unwrap()
+        row(&document, scheme, neighbors)["recovered_percent"]["5"].as_f64().unwrap()
     };
     for by in ["sequence", "tracks"] {
         assert_eq!(share("lines2d", &format!("{by}@2")), 0.0);
@@ -120,11 +117,7 @@ fn lists_and_changed_descriptors_have_rows_of_their_own() {
     let (text, _) = place.ends(&format!("{audit} --gate lines2d:5<=100"), 1);
     assert!(text.contains("neighbors by descriptors, the best source, were not tried"), "{text}");
     let document = place.json("unlift-audit/audit.json");
-    let row = |scheme: &str, neighbors: &str| {
-        let mut rows = document["results"].as_array().unwrap().iter();
-        rows.find(|row| row["scheme"] == scheme && row["neighbors"] == neighbors).unwrap()
-    };
-    let share = |scheme, neighbors| row(scheme, neighbors)["recovered_percent"]["5"].as_f64();
+    let share = |scheme, by| row(&document, scheme, by)["recovered_percent"]["5"].as_f64();
     let alone = share("lines2d", "sequence@5").unwrap();
     // These descriptors say nothing about neighbors, so lists must not move what the queries fix.
     assert!(share("lines2d", "sequence+lists@5").unwrap() >= alone);

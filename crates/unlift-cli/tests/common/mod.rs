@@ -155,6 +155,13 @@ impl Place {
     }
 }
 
+/// Returns the row of an audit's document for a scheme and a source.
+pub fn row<'a>(document: &'a Value, scheme: &str, neighbors: &str) -> &'a Value {
+    let mut rows = document["results"].as_array().expect("rows").iter();
+    rows.find(|row| row["scheme"] == scheme && row["neighbors"] == neighbors)
+        .unwrap_or_else(|| panic!("{scheme} {neighbors}"))
+}
+
 pub fn said(output: &Output) -> (String, String) {
     let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).expect("UTF-8");
     (text(&output.stdout), text(&output.stderr))
