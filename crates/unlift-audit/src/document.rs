@@ -144,7 +144,7 @@ pub fn tiles(
     results: &[Row],
     thresholds: &[Threshold],
 ) -> Vec<report::TileFigures> {
-    let one = |(tile, rows): (&Tile, &Vec<Row>)| {
+    let figures = |(tile, rows): (&Tile, &Vec<Row>)| {
         let percent = |result: &Row| {
             let row = rows.iter().find(|row| row.is_same_cell(result));
             row.map(|row| by_threshold(thresholds, &row.recovered_percent)).unwrap_or_default()
@@ -155,7 +155,7 @@ pub fn tiles(
             recovered_percent: results.iter().map(percent).collect(),
         }
     };
-    tiles.iter().zip(rows).map(one).collect()
+    tiles.iter().zip(rows).map(figures).collect()
 }
 
 /// Returns the figures of one image of an audit.
@@ -282,14 +282,14 @@ pub fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
 /// the reason names the affected part.
 fn not_audited<const D: usize>(plan: &Plan<D>, missing: &[NotAudited]) -> Vec<report::NotAudited> {
     let mut told: Vec<(&NotAudited, Vec<&NotAudited>)> = Vec::new();
-    for one in missing {
+    for part in missing {
         let same = |(first, _): &&mut (&NotAudited, Vec<&NotAudited>)| {
             (&first.scheme, &first.neighbors, &first.reason)
-                == (&one.scheme, &one.neighbors, &one.reason)
+                == (&part.scheme, &part.neighbors, &part.reason)
         };
         match told.iter_mut().find(same) {
-            Some((_, all)) => all.push(one),
-            None => told.push((one, vec![one])),
+            Some((_, all)) => all.push(part),
+            None => told.push((part, vec![part])),
         }
     }
     let text = |(first, all): (&NotAudited, Vec<&NotAudited>)| {
@@ -307,9 +307,9 @@ fn not_audited<const D: usize>(plan: &Plan<D>, missing: &[NotAudited]) -> Vec<re
 
 /// Returns inlier ratios, with the noise model if there are several.
 fn parts<const D: usize>(plan: &Plan<D>, missing: &[&NotAudited]) -> Vec<String> {
-    let part = |one: &&NotAudited| {
-        let ratio = one.inlier_ratio.map(|ratio| ratio.to_string()).unwrap_or_default();
-        match one.oracle_noise {
+    let part = |missing: &&NotAudited| {
+        let ratio = missing.inlier_ratio.map(|ratio| ratio.to_string()).unwrap_or_default();
+        match missing.oracle_noise {
             Some(noise) if plan.oracle_noise.len() > 1 => format!("{ratio} ({noise})"),
             _ => ratio,
         }

@@ -68,10 +68,10 @@ impl Tiles {
                 "tile: expected below {n_tiles}, found {at}"
             )));
         }
-        let mut found = Vec::with_capacity(n_tiles);
-        split(positions, rows, n_tiles, plan, &mut found);
-        found.retain(|tile| self.only.is_none_or(|at| at == tile.at));
-        Ok(found)
+        let mut tiles = Vec::with_capacity(n_tiles);
+        split(positions, rows, n_tiles, plan, &mut tiles);
+        tiles.retain(|tile| self.only.is_none_or(|at| at == tile.at));
+        Ok(tiles)
     }
 }
 
@@ -80,7 +80,7 @@ fn split(
     mut rows: Vec<u32>,
     n_tiles: usize,
     plan: [usize; 2],
-    found: &mut Vec<Tile>,
+    tiles: &mut Vec<Tile>,
 ) {
     if n_tiles == 1 {
         rows.sort_unstable();
@@ -93,7 +93,7 @@ fn split(
             [at(left_out), at((places.len() - left_out).saturating_sub(1))]
         });
         let bounds = [0, 1].map(|end| quantiles.map(|both| both[end]));
-        found.push(Tile { at: found.len(), rows, bounds });
+        tiles.push(Tile { at: tiles.len(), rows, bounds });
         return;
     }
     let ([low, high], [a, b]) = (bounds(positions, &rows), plan);
@@ -106,8 +106,8 @@ fn split(
         x.total_cmp(&y).then(i.cmp(&j))
     });
     let right = rows.split_off(n_left);
-    split(positions, rows, left_tiles, plan, found);
-    split(positions, right, n_tiles - left_tiles, plan, found);
+    split(positions, rows, left_tiles, plan, tiles);
+    split(positions, right, n_tiles - left_tiles, plan, tiles);
 }
 
 fn bounds(positions: &[[f64; 3]], rows: &[u32]) -> [[f64; 3]; 2] {
@@ -149,14 +149,14 @@ mod tests {
             .map(|_| [draws.between(0.0, 9.0), draws.between(0.0, 4.0), draws.between(0.0, 1.0)])
             .collect();
         let cut = |most, up| Tiles { most, only: None }.of(&points, up).unwrap();
-        let found = cut(100, None);
-        assert_eq!(found.len(), 11);
-        let mut rows: Vec<u32> = found.iter().flat_map(|tile| tile.rows.clone()).collect();
+        let tiles = cut(100, None);
+        assert_eq!(tiles.len(), 11);
+        let mut rows: Vec<u32> = tiles.iter().flat_map(|tile| tile.rows.clone()).collect();
         rows.sort_unstable();
         assert_eq!(rows, (0..1003).collect::<Vec<u32>>());
-        assert!(found.iter().all(|tile| (91..=92).contains(&tile.rows.len())));
-        for (at, one) in found.iter().enumerate() {
-            for other in &found[..at] {
+        assert!(tiles.iter().all(|tile| (91..=92).contains(&tile.rows.len())));
+        for (at, one) in tiles.iter().enumerate() {
+            for other in &tiles[..at] {
                 let apart = |c: usize| {
                     one.bounds[1][c] <= other.bounds[0][c] || other.bounds[1][c] <= one.bounds[0][c]
                 };
@@ -170,7 +170,7 @@ mod tests {
         );
         assert_eq!(cut(2000, None).len(), 1);
         let third = Tiles { most: 100, only: Some(2) }.of(&points, None).unwrap();
-        assert_eq!(third, [found[2].clone()]);
+        assert_eq!(third, [tiles[2].clone()]);
         let error = Tiles { most: 100, only: Some(11) }.of(&points, None).unwrap_err();
         assert_eq!(error.to_string(), "tile: expected below 11, found 11");
     }

@@ -70,9 +70,9 @@ pub struct Used {
 /// written.
 pub fn perform(job: ImagesJob<'_>, out: OutputSet) -> Result<(Option<Finished>, Used), Error> {
     let (folder, share_safe) = (job.out.clone(), job.share_safe);
-    let (found, used) = find(job)?;
-    let write = |found: Audited| found.write(out, &folder, share_safe);
-    Ok((found.map(write).transpose()?, used))
+    let (audited, used) = find(job)?;
+    let write = |audited: Audited| audited.write(out, &folder, share_safe);
+    Ok((audited.map(write).transpose()?, used))
 }
 
 /// Runs the job and writes nothing. Returns no results without a usable image. A share-safe job

@@ -45,10 +45,10 @@ impl Folder {
     /// missing.
     pub fn open(root: &Path, extraction: &Extraction) -> Result<Self, crate::Error> {
         let extractor = Extractor::try_new(extraction)?;
-        let mut found = Found::default();
-        found.visit(root);
-        if found.photos.is_empty() {
-            return Err(match found.refused.pop() {
+        let mut listing = Listing::default();
+        listing.visit(root);
+        if listing.photos.is_empty() {
+            return Err(match listing.refused.pop() {
                 Some(refused) => refused,
                 None => {
                     let found = found.others().map_or("none".to_owned(), |o| format!("only {o}"));
@@ -57,13 +57,13 @@ impl Folder {
             }
             .into());
         }
-        let passed_over = found.others().map(|others| {
+        let passed_over = listing.others().map(|others| {
             let root = root.display();
             format!("{root}: passed over {others}: only JPEG, PNG and WebP are read")
         });
-        found.photos.sort_unstable();
-        let (names, paths): (_, Vec<PathBuf>) = found.photos.into_iter().unzip();
-        let (extraction, refused) = (extraction.clone(), found.refused);
+        listing.photos.sort_unstable();
+        let (names, paths): (_, Vec<PathBuf>) = listing.photos.into_iter().unzip();
+        let (extraction, refused) = (extraction.clone(), listing.refused);
         let turn = Turn::Upright;
         Ok(Self { extractor, turn, extraction, names, paths, refused, passed_over })
     }
@@ -158,13 +158,13 @@ fn of_network(features: LearnedFeatures) -> ImageFeatures {
 }
 
 #[derive(Default)]
-struct Found {
+struct Listing {
     photos: Vec<(String, PathBuf)>,
     refused: Vec<Error>,
     others: BTreeMap<String, usize>,
 }
 
-impl Found {
+impl Listing {
     /// Formats the skipped images: `12 .heic, 1 .tiff`.
     fn others(&self) -> Option<String> {
         let others = self.others.iter().map(|(ending, n)| format!("{n} .{ending}"));
@@ -258,10 +258,10 @@ mod tests {
         let mut expected: Vec<String> = (0..12).map(|at| format!("f{at:02}/a.jpg")).collect();
         expected.splice(0..0, ["c.jpg".to_owned()]);
         expected.push("link/b.jpg".to_owned());
-        let mut found = Found::default();
-        found.visit(dir.path());
-        let mut names: Vec<String> = found.photos.into_iter().map(|(name, _)| name).collect();
+        let mut listing = Listing::default();
+        listing.visit(dir.path());
+        let mut names: Vec<String> = listing.photos.into_iter().map(|(name, _)| name).collect();
         names.sort_unstable();
-        assert_eq!((names, found.refused.len()), (expected, 0));
+        assert_eq!((names, listing.refused.len()), (expected, 0));
     }
 }

@@ -26,7 +26,7 @@ use crate::scene::{near, shapes};
 const LEAST_SIDE: usize = 16;
 
 /// One camera of the map that took a photo.
-struct Seen {
+struct PhotoView {
     name: String,
     view: View,
     photo: ColorImage,
@@ -39,7 +39,7 @@ type Picture = (ColorImage, Judged);
 /// Makes pictures of a map and compares them with the photos.
 pub struct MapInversion {
     painter: Painter,
-    seen: Vec<Seen>,
+    seen: Vec<PhotoView>,
     /// The cell that was measured last and its pictures, one per photo, so that the page does not
     /// paint them again.
     last: Mutex<Option<(Row, u32, Vec<Picture>)>>,
@@ -109,7 +109,7 @@ impl MapInversion {
         photos: impl IntoIterator<Item = (String, View, ColorImage)>,
     ) -> Result<Self, Error> {
         let seen = photos.into_iter().map(|(name, view, photo)| {
-            seen(&painter, name.clone(), view, &photo).map_err(|error| error.within(&name))
+            photo_view(&painter, name.clone(), view, &photo).map_err(|error| error.within(&name))
         });
         let seen = seen.collect::<Result<_, Error>>()?;
         Ok(Self { painter, seen, last: Mutex::default() })
@@ -156,7 +156,7 @@ impl MapInversion {
     }
 
     fn pictures(&self, cell: &Cell<'_>, n: usize) -> Result<Vec<Picture>, Error> {
-        let of_one = |seen: &Seen| {
+        let of_one = |seen: &PhotoView| {
             let picture = self.painter.map(&seen.view, cell.released, cell.recovered)?;
             let judged = self.painter.judge(&picture, &seen.photo, &seen.objects)?;
             Ok((picture, judged))
@@ -164,7 +164,7 @@ impl MapInversion {
         self.seen.par_iter().take(n).map(of_one).collect()
     }
 
-    fn truth<'a>(&'a self, seen: &'a Seen, cell: &Cell<'_>) -> Result<&'a Picture, Error> {
+    fn truth<'a>(&'a self, seen: &'a PhotoView, cell: &Cell<'_>) -> Result<&'a Picture, Error> {
         let make = || {
             let originals = cell.original.reveal().positions();
             let positions: Vec<Option<[f64; 3]>> = originals.iter().copied().map(Some).collect();
@@ -243,16 +243,21 @@ fn one(
     (camera, image): (&colmap::Camera, &colmap::Image),
     path: &Path,
     scale: f64,
-) -> Result<Seen, Error> {
+) -> Result<PhotoView, Error> {
     // COLMAP ignores the orientation tag of photos.
     let photo = read_color_with(path, Turn::AsStored)?;
     let name = String::from_utf8_lossy(&image.name).into_owned();
     view(camera, image, scale)
-        .and_then(|view| seen(painter, name, view, &photo))
+        .and_then(|view| photo_view(painter, name, view, &photo))
         .map_err(|error| error.within(&path.display().to_string().escape_debug().to_string()))
 }
 
-fn seen(painter: &Painter, name: String, view: View, photo: &ColorImage) -> Result<Seen, Error> {
+fn photo_view(
+    painter: &Painter,
+    name: String,
+    view: View,
+    photo: &ColorImage,
+) -> Result<PhotoView, Error> {
     let [width, height] = view.size;
     if [photo.width(), photo.height()] != view.size {
         let expected = format!("a photo of {width} x {height} pixels, as its camera");
@@ -265,7 +270,7 @@ fn seen(painter: &Painter, name: String, view: View, photo: &ColorImage) -> Resu
     }
     let photo = photo.halved()?;
     let objects = painter.objects(&photo)?;
-    Ok(Seen { name, view, photo, objects, truth: OnceLock::new() })
+    Ok(PhotoView { name, view, photo, objects, truth: OnceLock::new() })
 }
 
 /// Returns the view of an image of a COLMAP model; `scale` is the number of units per unit of the

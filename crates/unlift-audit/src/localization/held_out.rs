@@ -424,19 +424,19 @@ pub fn summary(
         // The upper one of an even number.
         values.get(values.len() / 2).copied().unwrap_or(f64::INFINITY)
     };
-    let center = |one: &Located| one.error.map_or(f64::INFINITY, |(center, _)| center);
-    let angle = |one: &Located| one.error.map_or(f64::INFINITY, |(_, angle)| angle);
+    let center = |image: &Located| image.error.map_or(f64::INFINITY, |(center, _)| center);
+    let angle = |image: &Located| image.error.map_or(f64::INFINITY, |(_, angle)| angle);
     let finite = |value: f64| Some(value).filter(|value| value.is_finite());
     let error = middle(located, &center);
     let recall = |(name, most, angle_most): &(String, f64, f64)| {
-        let within = |one: &&Located| center(one) <= *most && angle(one) <= *angle_most;
+        let within = |image: &&Located| center(image) <= *most && angle(image) <= *angle_most;
         let n = located.iter().filter(within).count();
         (name.clone(), 100.0 * n as f64 / located.len().max(1) as f64)
     };
     HeldOut {
         n_images: located.len() as u64,
-        right_matches: middle(located, &|one| one.n_right as f64),
-        matches: middle(located, &|one| one.n_pairs as f64),
+        right_matches: middle(located, &|image| image.n_right as f64),
+        matches: middle(located, &|image| image.n_pairs as f64),
         center_error: finite(error),
         rotation_error_degrees: finite(middle(located, &angle)),
         // If most unprotected images have no pose, the quotient is 0, which would look precise.
@@ -510,12 +510,12 @@ impl Query {
 impl Unit32 {
     pub(crate) fn of(descriptors: &Descriptors, rows: impl Iterator<Item = usize>) -> Self {
         let dim = descriptors.dim();
-        let (mut values, mut one) = (Vec::new(), vec![0.0; dim]);
+        let (mut values, mut descriptor) = (Vec::new(), vec![0.0; dim]);
         for row in rows {
-            descriptors.read_row(row, &mut one);
-            let length = one.iter().map(|x| x * x).sum::<f32>().sqrt();
+            descriptors.read_row(row, &mut descriptor);
+            let length = descriptor.iter().map(|x| x * x).sum::<f32>().sqrt();
             let scale = if length > 0.0 { 1.0 / length } else { 0.0 };
-            values.extend(one.iter().map(|x| x * scale));
+            values.extend(descriptor.iter().map(|x| x * scale));
         }
         Self { dim, values }
     }

@@ -64,9 +64,9 @@ fn in_memory(
     FeatureSource::InMemory(InMemory::try_new(names, get).expect("images"))
 }
 
-fn found((found, used): (Option<Audited>, Used)) -> Audited {
+fn figures((figures, used): (Option<Audited>, Used)) -> Audited {
     assert_eq!((used.used, used.unusable), (NAMES.len(), 0));
-    found.expect("figures")
+    figures.expect("figures")
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn images_in_memory_have_the_figures_of_a_file() {
     (0..NAMES.len()).for_each(|at| writer.append(&image(at)).expect("an image"));
     writer.finish().expect("a file");
     let file = FeatureSource::File(unlift_io::features::FeatureSource::open(&path).expect("it"));
-    let of_file = found(find(job(&file, &path)).expect("an audit"));
+    let of_file = figures(find(job(&file, &path)).expect("an audit"));
 
     let asked = Arc::new(AtomicUsize::new(0));
     let counted = Arc::clone(&asked);
@@ -85,7 +85,7 @@ fn images_in_memory_have_the_figures_of_a_file() {
         counted.fetch_add(1, Ordering::Relaxed);
         Ok(image(at))
     });
-    let of_memory = found(find(job(&memory, Path::new("images"))).expect("an audit"));
+    let of_memory = figures(find(job(&memory, Path::new("images"))).expect("an audit"));
     assert_eq!(of_memory.document.results, of_file.document.results);
     assert_eq!(of_memory.document.images, of_file.document.images);
     assert!(!of_file.document.results.is_empty());
@@ -116,7 +116,8 @@ fn keypoints_that_halves_rounded_out_of_the_image_are_moved_to_its_edge() {
             Ok(image)
         })
     };
-    let document = found(find(job(&with(640.4), Path::new("images"))).expect("an audit")).document;
+    let document =
+        figures(find(job(&with(640.4), Path::new("images"))).expect("an audit")).document;
     let note =
         "5 keypoints were at most a pixel outside of their images, and are moved to the edge";
     assert_eq!(document.notes, [note]);

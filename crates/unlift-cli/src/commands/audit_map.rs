@@ -206,7 +206,7 @@ fn mitigations(args: &AuditMapArgs, prepared: &Prepared) -> crate::Result<Vec<Ch
             return Err(usage(format!("--mitigate {name}: {expected}, found none")));
         }
     }
-    let with = |one: &Mitigation| Change::Mitigation(one.clone(), tracks.cloned());
+    let with = |mitigation: &Mitigation| Change::Mitigation(mitigation.clone(), tracks.cloned());
     Ok(args.mitigate.iter().map(with).collect())
 }
 

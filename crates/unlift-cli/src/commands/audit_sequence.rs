@@ -75,7 +75,7 @@ fn plan(args: &AuditSequenceArgs) -> crate::Result<Plan<2>> {
     let mut schemes = image_schemes(&args.schemes, &usual);
     let mitigations = distinct(args.mitigate.clone(), |a, b| a.name() == b.name());
     let changes: Vec<Change> =
-        mitigations.into_iter().map(|one| Change::Mitigation(one, None)).collect();
+        mitigations.into_iter().map(|mitigation| Change::Mitigation(mitigation, None)).collect();
     schemes.extend(Changed::all(&schemes, &changes));
     let of = |label: &str, value: f64| Threshold { label: label.to_owned(), value };
     let few = Plan { thresholds: vec![of("5", 5.0), of("10", 10.0), of("25", 25.0)], ..usual };

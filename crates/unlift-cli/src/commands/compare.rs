@@ -68,22 +68,23 @@ fn text(comparison: &Comparison, written: Option<PathBuf>) -> String {
     ];
     for (rows, which) in only {
         for Unmatched { scheme, attack } in rows {
-            let said = format!("{which}: {scheme}: {attack}");
-            text.push_str(&format!("{}\n", OneLine(said)));
+            let line = format!("{which}: {scheme}: {attack}");
+            text.push_str(&format!("{}\n", OneLine(line)));
         }
     }
-    for one in &comparison.costs_more {
-        let now = one.new_multiple.map_or("no pose or not known".into(), |new| format!("{new:.2}"));
-        let (scheme, was) = (&one.scheme, one.old_multiple);
-        let said = format!(
+    for cost in &comparison.costs_more {
+        let now =
+            cost.new_multiple.map_or("no pose or not known".into(), |new| format!("{new:.2}"));
+        let (scheme, was) = (&cost.scheme, cost.old_multiple);
+        let line = format!(
             "LOCALIZES LESS PRECISELY: {scheme}: {was:.2} times the unprotected error before, {now} now"
         );
-        text.push_str(&format!("{}\n", OneLine(said)));
+        text.push_str(&format!("{}\n", OneLine(line)));
     }
     for lost in &comparison.lost {
         let by = lost.neighbors.as_ref().map(|by| format!(" by {by}")).unwrap_or_default();
-        let said = format!("OUT OF VIEW: {}{by}: {}", lost.scheme, lost.reason);
-        text.push_str(&format!("{}\n", OneLine(said)));
+        let line = format!("OUT OF VIEW: {}{by}: {}", lost.scheme, lost.reason);
+        text.push_str(&format!("{}\n", OneLine(line)));
     }
     text.push_str(&format!("{}\n", comparison.summary()));
     if let Some(page) = written {

@@ -84,7 +84,7 @@ fn write(
     let names = source.names();
     let all: Vec<usize> = (0..names.len()).collect();
     let mut writer = FeatureWriter::create(&args.out)?;
-    let one = |&at: &usize| -> crate::Result<ImageFeatures> {
+    let read = |&at: &usize| -> crate::Result<ImageFeatures> {
         let image = source.get(at)?;
         // A photo without features is no error.
         if matches!(source, FeatureSource::File(_)) {
@@ -93,7 +93,7 @@ fn write(
         Ok(image)
     };
     progress.show(0, names.len(), "reading images");
-    in_order(&all, one, |at, result| -> crate::Result<()> {
+    in_order(&all, read, |at, result| -> crate::Result<()> {
         progress.show(at + 1, names.len(), &names[at]);
         let usable = result.and_then(|image| {
             writer.check(&image)?;

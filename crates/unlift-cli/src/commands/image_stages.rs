@@ -216,7 +216,7 @@ pub fn evaluate_all(
     thresholds: &[Threshold],
 ) -> crate::Result<Evaluated> {
     let mut pairs = Pairs::open(&args.truth, released)?;
-    let mut found = ImageFile::open(&args.recovered, Stage::Recovered)?;
+    let mut recovered_file = ImageFile::open(&args.recovered, Stage::Recovered)?;
     let mut pooled = Pooled::new(thresholds);
     let (mut about, mut checked) = (None, Checked::default());
     while let Some(pair) = pairs.next()? {
@@ -225,7 +225,7 @@ pub fn evaluate_all(
             pooled.add_unreleased(&secret);
             continue;
         }
-        let recovered = found.expect(&name, &args.truth)?.recovered()?;
+        let recovered = recovered_file.expect(&name, &args.truth)?.recovered()?;
         same_map(&args.recovered, recovered.about().map, &args.truth, secret.map())?;
         let added = pooled.add(&recovered, &original, &secret, released.as_ref());
         let of_image = |error: unlift::Error| {
@@ -240,7 +240,7 @@ pub fn evaluate_all(
             about = Some(recovered.about());
         }
     }
-    found.expect_end(&args.truth)?;
+    recovered_file.expect_end(&args.truth)?;
     let row = pooled.row();
     let row =
         row.ok_or_else(|| Error::new(&args.truth, "", "images with hidden points", "none"))?;

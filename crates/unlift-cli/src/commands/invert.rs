@@ -155,7 +155,7 @@ fn images(to: &Target<'_>, recovered: &Path) -> crate::Result<usize> {
     let path = &to.args.path;
     let painter = &painter(kind_of_images(path)?, None)?;
     let mut released = ImageFile::open(path, Stage::Released)?;
-    let mut found = ImageFile::open(recovered, Stage::Recovered)?;
+    let mut recovered_file = ImageFile::open(recovered, Stage::Recovered)?;
     let (mut unusable, mut at_work) = (0, Vec::new());
     let paint = |at_work: &mut Vec<_>| {
         let n = each(to, at_work, |(name, released, recovered)| {
@@ -172,7 +172,7 @@ fn images(to: &Target<'_>, recovered: &Path) -> crate::Result<usize> {
         left -= 1;
         let name = rows.name().to_owned();
         let image = rows.released()?;
-        let came_back = found.expect(&name, path)?.recovered()?;
+        let came_back = recovered_file.expect(&name, path)?.recovered()?;
         same_map(recovered, came_back.about().map, path, Some(image.fingerprint()))?;
         at_work.push((name, image, came_back));
         if at_work.len() >= AT_WORK * rayon::current_num_threads() {
@@ -180,7 +180,7 @@ fn images(to: &Target<'_>, recovered: &Path) -> crate::Result<usize> {
         }
     }
     if left > 0 {
-        found.expect_end(path)?;
+        recovered_file.expect_end(path)?;
     }
     Ok(unusable + paint(&mut at_work)?)
 }

@@ -62,7 +62,7 @@ pub fn run(args: &DemoArgs) -> crate::Result<Outcome> {
         let title = "Two photos: a cat and a cup of coffee";
         let map = map.opening_with(&photos, title, OF_PHOTOS[0]);
         let finished = map.write(out, &args.out, false)?;
-        Ok(said(of_photos, of_map, &finished.report))
+        Ok(summary(of_photos, of_map, &finished.report))
     })?;
     print(&text)?;
     Ok(Outcome::Done)
@@ -106,12 +106,12 @@ fn photos(progress: &Part<'_>, out: &Path) -> crate::Result<Audited> {
         command: Some(command_line()),
         started,
     };
-    let (found, _) = find_images(job)?;
-    let mut found =
-        found.ok_or_else(|| unlift_audit::Error::failed("demo: the photos could not be read"))?;
+    let (audited, _) = find_images(job)?;
+    let mut audited =
+        audited.ok_or_else(|| unlift_audit::Error::failed("demo: the photos could not be read"))?;
     // The temporary path is meaningless.
-    found.document.input.path = Some("Two photos of the demo".to_owned());
-    Ok(found)
+    audited.document.input.path = Some("Two photos of the demo".to_owned());
+    Ok(audited)
 }
 
 fn map(progress: &Part<'_>, out: &Path) -> crate::Result<Audited> {
@@ -147,14 +147,14 @@ fn map(progress: &Part<'_>, out: &Path) -> crate::Result<Audited> {
 }
 
 /// Formats a short summary for users who do not know the schemes.
-fn said(photos: Vec<Shares>, map: Vec<Shares>, page: &Path) -> String {
+fn summary(photos: Vec<Shares>, map: Vec<Shares>, page: &Path) -> String {
     let percent = |share: Option<f64>| share.map_or("-".to_owned(), |x| format!("{x:.1} %"));
-    let of_photos = photos.into_iter().map(|one| {
-        let back = format!("{} of the keypoints came back", percent(one.today));
-        vec![format!("  {}", one.scheme), one.title, back, one.pictures.unwrap_or_default()]
+    let of_photos = photos.into_iter().map(|row| {
+        let back = format!("{} of the keypoints came back", percent(row.today));
+        vec![format!("  {}", row.scheme), row.title, back, row.pictures.unwrap_or_default()]
     });
-    let of_map = map.into_iter().map(|one| {
-        vec![format!("  {}", one.scheme), one.title, percent(one.today), percent(one.known)]
+    let of_map = map.into_iter().map(|row| {
+        vec![format!("  {}", row.scheme), row.title, percent(row.today), percent(row.known)]
     });
     let head = ["", "points that came back:", "today", "if half of the neighbors were known"];
     let mut map_rows = vec![head.map(str::to_owned).to_vec()];

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use crate::common::{Place, said};
+use crate::common::{Place, texts};
 use crate::layouts;
 
 #[test]
@@ -19,7 +19,7 @@ fn the_papers_figures_stand_beside_ours() {
     let claims = |line: &str| {
         let mut python = Command::new("python3");
         python.arg(&script).args(line.split(' ')).current_dir(place.path("."));
-        said(&python.args(["--unlift", env!("CARGO_BIN_EXE_unlift")]).output().unwrap())
+        texts(&python.args(["--unlift", env!("CARGO_BIN_EXE_unlift")]).output().unwrap())
     };
     let (text, stderr) = claims("d --table 1,7 --images 2 --out claims.csv --work o");
     assert!(

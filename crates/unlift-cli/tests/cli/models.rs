@@ -1,6 +1,6 @@
 //! `unlift models`, and missing models.
 
-use crate::common::{Place, said};
+use crate::common::{Place, texts};
 
 /// Runs a line with this folder of models and without those of the user; returns stdout and stderr.
 fn with_models(place: &Place, folder: &str, line: &str, code: i32) -> (String, String) {
@@ -8,7 +8,7 @@ fn with_models(place: &Place, folder: &str, line: &str, code: i32) -> (String, S
     let output =
         program.env("UNLIFT_MODELS", folder).env("XDG_DATA_HOME", "data").output().unwrap();
     assert_eq!(output.status.code(), Some(code), "{line}: {output:?}");
-    said(&output)
+    texts(&output)
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::common::{Place, said};
+use crate::common::{Place, texts};
 use crate::layouts;
 
 /// Inputs of the reader; the lines must make everything else.
@@ -83,7 +83,7 @@ fn every_command_line_of_the_readme_runs_as_it_is_written() {
             outputs.push(out.to_owned());
         }
         let run = place.shell(&line);
-        let (stdout, stderr) = said(&run);
+        let (stdout, stderr) = texts(&run);
         // A gate may fail, and must report that; nothing else may fail.
         let failed = line.contains("--gate") && stdout.contains("FAILED");
         assert_eq!(run.status.code(), Some(i32::from(failed)), "{line}\n{stdout}{stderr}");

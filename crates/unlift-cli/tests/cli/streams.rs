@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::common::{Place, said};
+use crate::common::{Place, texts};
 
 const HIDE: &str = "obfuscate room.csv --scheme olc --k 10 --seed 1 --out hidden";
 
@@ -15,7 +15,7 @@ fn a_reader_that_has_enough_ends_the_output_and_a_full_disk_is_an_error() {
         assert!(!place.text("errors").contains("stdout"), "{line}");
         if cfg!(target_os = "linux") {
             let done = place.shell(&format!("unlift {line} >/dev/full"));
-            let told = said(&done).1;
+            let told = texts(&done).1;
             assert_eq!(done.status.code(), Some(3), "{line}: {told}");
             let full = "unlift: stdout: expected space to write, found a full disk";
             assert_eq!(told.lines().last(), Some(full), "{line}");
@@ -44,7 +44,7 @@ fn no_name_reaches_the_terminal_as_it_is() {
         &["audit", "map", odd, "--out", odd],
     ] {
         let output = place.program(words.iter().copied()).output().expect("the program starts");
-        let (stdout, stderr) = said(&output);
+        let (stdout, stderr) = texts(&output);
         let text = stdout + &stderr;
         let is_obeyed = |c: &char| *c != '\n' && unlift::is_obeyed(*c);
         assert_eq!(text.chars().find(is_obeyed), None, "{text:?}");

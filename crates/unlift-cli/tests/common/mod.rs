@@ -137,7 +137,7 @@ impl Place {
     /// Runs a line that must end with `code`, and returns stdout and stderr.
     pub fn ends(&self, line: &str, code: i32) -> (String, String) {
         let output = self.program(line.split_whitespace()).output().expect("the program starts");
-        let (stdout, stderr) = said(&output);
+        let (stdout, stderr) = texts(&output);
         assert_eq!(output.status.code(), Some(code), "{line}\n{stderr}");
         (stdout, stderr)
     }
@@ -162,7 +162,7 @@ pub fn row<'a>(document: &'a Value, scheme: &str, neighbors: &str) -> &'a Value 
         .unwrap_or_else(|| panic!("{scheme} {neighbors}"))
 }
 
-pub fn said(output: &Output) -> (String, String) {
+pub fn texts(output: &Output) -> (String, String) {
     let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).expect("UTF-8");
     (text(&output.stdout), text(&output.stderr))
 }
