@@ -317,7 +317,6 @@ impl Options<'_> {
     /// Returns the plan `usual` with these options, for points in `unit`.
     fn plan<const D: usize>(&self, usual: Plan<D>, unit: Unit, by: &Raised) -> PyResult<Plan<D>>
     where
-        OwnScheme: Scheme<D>,
         OwnSource: Source<D>,
         OwnSolver: Solver<D>,
     {
@@ -402,10 +401,7 @@ fn own_or_named<const D: usize>(
     given: &Bound<'_, PyAny>,
     unit: Unit,
     by: &Raised,
-) -> PyResult<Arc<dyn Scheme<D>>>
-where
-    OwnScheme: Scheme<D>,
-{
+) -> PyResult<Arc<dyn Scheme<D>>> {
     let scheme = scheme_of(given, &SchemeOptions::usual(unit), by)?;
     let is_ours = SCHEMES.iter().any(|entry| entry.name == scheme.name());
     check_own_name("schemes", given, scheme.name(), is_ours)?;

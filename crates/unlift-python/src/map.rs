@@ -178,10 +178,7 @@ pub fn scheme_of<const D: usize>(
     given: &Bound<'_, PyAny>,
     options: &SchemeOptions,
     raised_by: &Raised,
-) -> PyResult<Arc<dyn Scheme<D>>>
-where
-    OwnScheme: Scheme<D>,
-{
+) -> PyResult<Arc<dyn Scheme<D>>> {
     let Ok(name) = given.extract::<String>() else {
         return Ok(Arc::new(OwnScheme::new(given, raised_by)?));
     };

@@ -18,7 +18,7 @@ use unlift::{Error, OneLine};
 use crate::arrays::{raised, rows, to_rows, wrong};
 use crate::hidden::{Released as PyReleased, released_of};
 use crate::lists::{self, Neighborhoods as PyNeighborhoods};
-use crate::records::{Hiding, InDimension, hiding};
+use crate::records::hiding;
 use crate::threads;
 
 /// Exceptions of user functions, and a flag that prevents further calls.
@@ -125,10 +125,7 @@ impl OwnScheme {
     }
 }
 
-impl<const D: usize> Scheme<D> for OwnScheme
-where
-    Hiding<D>: InDimension,
-{
+impl<const D: usize> Scheme<D> for OwnScheme {
     fn name(&self) -> &str {
         &self.0.name
     }

@@ -1,5 +1,7 @@
 //! Records that a user's scheme returns.
 
+use std::any::Any;
+
 use pyo3::PyClass;
 use pyo3::prelude::*;
 use unlift::obfuscate::Lifted;
@@ -82,30 +84,6 @@ impl<const D: usize> Hiding<D> {
 
 /// Records of an image or of a map.
 type OfEither = Either<Hiding<2>, Hiding<3>>;
-
-/// Access to records by dimension.
-pub trait InDimension: Sized {
-    /// Returns `records` if they are of this dimension.
-    fn of_records(records: &Records) -> Option<&Self>;
-}
-
-impl InDimension for Hiding<2> {
-    fn of_records(records: &Records) -> Option<&Self> {
-        match &records.0 {
-            Either::Image(hiding) => Some(hiding),
-            Either::Map(_) => None,
-        }
-    }
-}
-
-impl InDimension for Hiding<3> {
-    fn of_records(records: &Records) -> Option<&Self> {
-        match &records.0 {
-            Either::Image(_) => None,
-            Either::Map(hiding) => Some(hiding),
-        }
-    }
-}
 
 /// Records and the points that they hide: the base class of Lines, Rays, Planes and Candidates.
 #[pyclass(frozen, subclass, module = "unlift")]
@@ -263,14 +241,12 @@ fn candidates<const D: usize>(
 }
 
 /// Converts the result of the function `name` to records of points `(n, D)`.
-pub fn hiding<const D: usize>(returned: &Bound<'_, PyAny>, name: &str) -> PyResult<Hiding<D>>
-where
-    Hiding<D>: InDimension,
-{
+pub fn hiding<const D: usize>(returned: &Bound<'_, PyAny>, name: &str) -> PyResult<Hiding<D>> {
     let Ok(records) = returned.cast::<Records>() else {
         let expected = "Lines, Rays, Planes or Candidates";
         return Err(wrong(name, expected, returned.get_type()));
     };
     let found = || wrong(name, format!("records of points (n, {D})"), format!("(n, {})", 5 - D));
-    Hiding::of_records(records.get()).cloned().ok_or_else(found)
+    let records = of_either!(&records.get().0, hiding => hiding as &dyn Any);
+    records.downcast_ref::<Hiding<D>>().cloned().ok_or_else(found)
 }
