@@ -161,14 +161,7 @@ impl Drop for OutputSet {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn entries(folder: &Path) -> Vec<String> {
-        let entries = fs::read_dir(folder).unwrap();
-        let mut names: Vec<String> =
-            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-        names.sort();
-        names
-    }
+    use crate::atomic::tests::entries;
 
     #[test]
     fn a_set_is_moved_whole_or_not_at_all() {

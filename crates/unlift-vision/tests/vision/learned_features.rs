@@ -116,18 +116,6 @@ fn options_choose_the_best_and_sizes_are_undone() {
 }
 
 #[test]
-fn threads_do_not_change_a_byte() {
-    let image = waves(96, 64);
-    let aliked = aliked(AlikedOptions { min_score: 0.05, ..AlikedOptions::default() });
-    let alone = aliked.extract(&image).unwrap();
-    std::thread::scope(|scope| {
-        for _ in 0..6 {
-            scope.spawn(|| assert_eq!(aliked.extract(&image).unwrap(), alone));
-        }
-    });
-}
-
-#[test]
 fn images_without_structure_have_no_features() {
     let (aliked, superpoint) = (aliked(AlikedOptions::default()), narrow_superpoint());
     for (width, height) in [(1, 1), (5, 3), (7, 100), (1, 200), (8, 8), (64, 64), (97, 33)] {
