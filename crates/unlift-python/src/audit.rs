@@ -26,7 +26,7 @@ use crate::arrays::{raised, wrong};
 use crate::images::Images;
 use crate::lists;
 use crate::map::{Map, scheme_of};
-use crate::own::{OwnScheme, OwnSolver, OwnSource, Raised, solver_of};
+use crate::own::{OwnSolver, OwnSource, Raised, solver_of};
 use crate::report::Report;
 use crate::threads::{self, Watcher};
 

@@ -51,7 +51,7 @@ impl Folder {
             return Err(match listing.refused.pop() {
                 Some(refused) => refused,
                 None => {
-                    let found = found.others().map_or("none".to_owned(), |o| format!("only {o}"));
+                    let found = listing.others().map_or("none".to_owned(), |o| format!("only {o}"));
                     Error::new(root, "", "JPEG, PNG or WebP photos", found)
                 }
             }

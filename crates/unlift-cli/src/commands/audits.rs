@@ -5,7 +5,6 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use tempfile::tempdir;
 use unlift::audit::{NeighborsBy, Plan, Threshold};
 use unlift::descriptors::Values;
 use unlift::neighbors::{Needs, Source};
@@ -222,8 +221,7 @@ pub fn protections(
     let public = match &args.public_descriptors {
         Some(path) => public(path, kind, None)?,
         None => {
-            let folder = tempdir()?;
-            photos::write(folder.path())?;
+            let folder = photos::folder()?;
             public(folder.path(), kind, Some(photos::MIN_SCORE))?
         }
     };

@@ -7,7 +7,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use serde_json::{Map, json};
-use tempfile::tempdir;
 use unlift::audit::{Measure, NeighborsBy, Plan};
 use unlift::neighbors::Geometric;
 use unlift::recover::Builtin;
@@ -70,8 +69,7 @@ pub fn run(args: &DemoArgs) -> crate::Result<Outcome> {
 
 fn photos(progress: &Part<'_>, out: &Path) -> crate::Result<Audited> {
     let started = Instant::now();
-    let folder = tempdir()?;
-    photos::write(folder.path())?;
+    let folder = photos::folder()?;
     let options = AlikedOptions { min_score: photos::MIN_SCORE, ..AlikedOptions::default() };
     let source = FeatureSource::open(folder.path(), &Extraction::Aliked(options))?;
     let painter = painter(DescriptorKind::Aliked, None)?;

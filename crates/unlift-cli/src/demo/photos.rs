@@ -1,7 +1,8 @@
 //! The two photos that are part of the program.
 
-use std::path::Path;
-use std::{fs, io};
+use std::fs;
+
+use tempfile::TempDir;
 
 /// Minimum score of keypoints of the photos. It is low, because there are only two photos.
 pub const MIN_SCORE: f32 = 0.02;
@@ -12,7 +13,12 @@ static PHOTOS: [(&str, &[u8]); 2] = [
     ("coffee.jpg", include_bytes!("photos/coffee.jpg")),
 ];
 
-/// Writes the two photos into a folder.
-pub fn write(folder: &Path) -> io::Result<()> {
-    PHOTOS.iter().try_for_each(|(name, bytes)| fs::write(folder.join(name), bytes))
+/// Writes the two photos into a temporary folder.
+pub fn folder() -> crate::Result<TempDir> {
+    let write = || {
+        let folder = tempfile::tempdir()?;
+        PHOTOS.iter().try_for_each(|(name, bytes)| fs::write(folder.path().join(name), bytes))?;
+        Ok(folder)
+    };
+    Ok(write().map_err(|error| unlift_io::Error::write(std::env::temp_dir(), error))?)
 }
