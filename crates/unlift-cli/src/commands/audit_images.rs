@@ -41,7 +41,6 @@ pub fn run(args: &AuditImagesArgs) -> crate::Result<Outcome> {
         let extraction = extraction(args, &plan)?;
         let source = FeatureSource::open(&args.path, &extraction).map_err(|error| {
             let map = read::is_project(&args.path);
-            let error = unlift_audit::Error::from(error);
             if map { advise(error, "unlift audit map, as this is a map") } else { error }
         })?;
         if let Some(note) = source.passed_over() {

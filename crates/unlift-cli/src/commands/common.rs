@@ -61,7 +61,7 @@ pub fn open_map(
         beside,
         seed,
     };
-    Ok(maps::open(path, args.descriptors.as_deref(), &preparation)?)
+    maps::open(path, args.descriptors.as_deref(), &preparation)
 }
 
 /// Returns an error if the released map and the truth differ in the number of hidden points, in

@@ -72,7 +72,7 @@ fn extraction(args: &FeaturesArgs) -> crate::Result<Extraction> {
     if args.as_stored && args.images.is_file() {
         return Err(usage("--as-stored: expected with a folder of photos, found a file"));
     }
-    Ok(wanted.extraction(&args.images)?)
+    wanted.extraction(&args.images)
 }
 
 fn write(

@@ -90,7 +90,7 @@ pub fn hide(args: &ObfuscateArgs, key: &Key, out: &mut OutputSet) -> crate::Resu
     let mut maps = ImageWriter::start(&mut released);
     let mut counts = Counts::default();
     each(
-        || Ok(images.next().transpose()?),
+        || images.next().transpose(),
         |image| {
             let key = key_of(key, &image.name);
             let descriptors = image.descriptors.as_ref();

@@ -141,7 +141,7 @@ fn map(progress: &Part<'_>, out: &Path) -> crate::Result<Audited> {
         command: Some(command_line()),
         ..Job::of(&original, started)
     };
-    Ok(find_map(job)?)
+    find_map(job)
 }
 
 /// Formats a short summary for users who do not know the schemes.
