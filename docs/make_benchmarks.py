@@ -321,7 +321,7 @@ def pictures():
         solid += lines(name, of_map, FEWER_SCHEMES, papers[1])
         true.append(line(name, baseline(of_images, papers[0]), baseline(of_map, papers[1])))
     put("docs/benchmarks.md", "pictures", [
-        "SSIM / LPIPS, means over the photos at half their size; in brackets the paper's SSIM on 7-Scenes (another network, full size).", "",
+        "SSIM / LPIPS (SqueezeNet), means over the photos at half their size; in brackets the paper's SSIM on 7-Scenes (another network, full size).", "",
         "Images:", "", *head("of", "In", *IMAGE_SCHEMES), *flat, "",
         "Maps as their cameras see them:", "", *head("of", "In", *FEWER_SCHEMES), *solid, "",
         "True points, SSIM / PSNR / LPIPS:", "", *head("of", "images", "map"), *true, ""])
@@ -457,8 +457,8 @@ def protect():
             spheres.append(line(name, f"`{row['scheme']}`", f"{metric['real_bearings_percent']:.0f}", f"{100 * row['inlier_ratio']:.0f}",
                                 f"{metric['decoys_precision_percent']:.0f}/{metric['decoys_recall_percent']:.0f}", f"{metric['decoys_area']:.3f}"))
     put("docs/benchmarks.md", "protect", [
-        *lines, "Sphere clouds:", "", *head("map", "scheme", "real bearings, %", "true in lists, %", "decoys: precision/recall, %", "area"), *spheres, "",
-        f"Points within the first threshold: at most {recovered:.1f} %.", ""])
+        *lines, *(["Sphere clouds:", "", *head("map", "scheme", "real bearings, %", "true in lists, %", "decoys: precision/recall, %", "area"), *spheres, "",
+                   f"Points within the first threshold: at most {recovered:.1f} %.", ""] if spheres else ["Sphere clouds: the audits gave no rows.", ""])])
 
 
 SECTIONS = [accuracy, noise, own, alone, large, images, pictures, sequence, again, cost, protect]

@@ -12,7 +12,7 @@ Each page runs in an empty folder. A block after
     <!-- output -->           must have been printed, line by line, by the block before it; a line of `...` stands for any lines
 
 Numbers in the text of a page (with a decimal point, or before `%`) must be printed by its examples, or be in a document of the repository
-that the paragraph links to. Links to documents of the repository must lead to a file and a heading.
+that the paragraph links to. Figures of ARTIFACT.md are checked, too. Links to documents of the repository must lead to a file and a heading.
 """
 
 from __future__ import annotations
@@ -130,13 +130,24 @@ class Page:
         return found
 
 
+def artifact() -> list[str]:
+    """Checks that our figures in ARTIFACT.md are in the documents it names, and the paper's in its tables."""
+    cards = (ROOT / "crates/unlift-vision/models").glob("*/README.md")
+    ours = "".join(path.read_text() for path in (ROOT / "docs/benchmarks.md", *cards))
+    paper = "".join(path.read_text() for path in (ROOT / "docs/paper").glob("*.csv"))
+    rows = [[cell.strip() for cell in line.split("|")] for line in (ROOT / "ARTIFACT.md").read_text().splitlines() if line.startswith("| ")]
+    return [f"ARTIFACT.md: {figure} is not where it should come from: {row[1]}"
+            for row in rows for cell, source in ((row[3], ours), (row[4], paper)) for figure in re.findall(r"\d+\.\d+", cell)
+            if not re.search(rf"(?<![\d.]){re.escape(figure)}(?!\d|\.\d)", source)]
+
+
 def main() -> int:
     binary = program()
     if binary is None:
         print("no program unlift is built: examples of the command line are not run")
     if importlib.util.find_spec("unlift") is None:
         print("unlift is not installed in this Python: its examples are not run")
-    wrong: list[str] = []
+    wrong = artifact()
     for path in sorted(PAGES.rglob("*.md")):
         started = time.monotonic()
         page = Page(path, "--slow" in sys.argv[1:])

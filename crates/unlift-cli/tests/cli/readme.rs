@@ -109,8 +109,9 @@ fn anchor(heading: &str) -> String {
     kept.map(|c| if c == ' ' { '-' } else { c }).collect()
 }
 
-const DOCUMENTS: [&str; 6] = [
+const DOCUMENTS: [&str; 7] = [
     "README.md",
+    "ARTIFACT.md",
     "ARCHITECTURE.md",
     "CONTRIBUTING.md",
     "STYLE.md",

@@ -29,7 +29,7 @@ pub const SOURCES: &[SourceEntry] = &[SourceEntry {
 /// The descriptors choose the network: SIFT, 128 floats that are not SIFT (taken for ALIKED), or
 /// 256 floats (SuperPoint, whose network users train themselves).
 ///
-/// Source: Sec. 5 and supplement E, where positions are not known either; pair scores, the loss and
+/// Source: Sec. 5 and supplement D, where positions are not known either; pair scores, the loss and
 /// the walk are ours.
 #[derive(Clone, Copy, Debug)]
 pub struct Learned;
