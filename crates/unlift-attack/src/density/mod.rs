@@ -4,7 +4,7 @@
 //! [`tomography`] uses that. Records relate to the density of hidden points as coincidence lines to the activity in positron emission
 //! tomography. So the same iterations find the density that makes all records likeliest: maximum likelihood by expectation maximization
 //! (Shepp and Vardi 1982) with smoothing (Silverman et al. 1990). Each point is placed where its record meets most of the
-//! density. The published attacks read the same [`feasible`] lines (`recover/published_density.rs`).
+//! density. The published attacks read the same [`feasible`] lines (`recover/baselines/density.rs`).
 //!
 //! Two modules use the result: `neighbors` lists records whose points are close, and `recover` takes the positions as they are.
 //! It works in three dimensions only: in a plane all lines meet.

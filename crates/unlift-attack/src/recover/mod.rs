@@ -5,28 +5,28 @@
 //! 1. `options`: options of recovery. `assignment`: descriptors of paired lines. `result`: recovered positions. `solver`: the
 //!    trait [`Solver`], which you can implement.
 //! 2. `map`: the data that all solvers read. `Settings` in `map/family` holds every constant that differs between maps and images.
-//! 3. `consensus`, `joint`, `layout`, `ranking` and `beliefs`: the steps of our attack. `ransac` and `published_density`: published
-//!    attacks, for comparison.
+//!    `input`: what all steps of `joint` read.
+//! 3. `consensus`, `joint`, `ranking` and `beliefs`: the steps of our attack. `anchors`: start and layout of rays from anchors.
 //! 4. `delta`: the choice of the distance that decides support.
 //! 5. `exact`: coordinates that a rule of the scheme fixes. `confidence`: the probability that an estimate is right.
-//! 6. `problem`: the steps in their order. `records_alone`: attacks without neighborhoods.
+//! 6. `problem`: the steps in their order. `records_alone`: attacks without neighborhoods. `baselines`: published attacks.
 //!
 //! [`recover`] runs the whole attack.
 
+mod anchors;
 mod assignment;
+mod baselines;
 mod beliefs;
 mod confidence;
 mod consensus;
 mod delta;
 mod exact;
+mod input;
 mod joint;
-mod layout;
 mod map;
 mod options;
 mod problem;
-mod published_density;
 mod ranking;
-mod ransac;
 mod records_alone;
 mod result;
 mod solver;

@@ -3,23 +3,29 @@
 use crate::density::{Peaks, tomography};
 use crate::neighbors::Neighborhoods;
 use crate::recover::assignment::descriptor_rows;
+use crate::recover::baselines::density::published;
+use crate::recover::baselines::ransac::Ransac;
 use crate::recover::confidence::cues::Solved;
+use crate::recover::input::Input;
 use crate::recover::map::family::{Family, Settings};
 use crate::recover::map::graph::Graph;
+use crate::recover::map::lines::LineRow;
 use crate::recover::map::lists::Slots;
+use crate::recover::map::pieces::{CandidatePieces, LinePieces, Pieces, PlanePieces};
 use crate::recover::options::{Delta, RecoverOptions};
-use crate::recover::published_density::published;
-use crate::recover::ransac::Ransac;
 use crate::recover::records_alone::{self, Placement};
 use crate::recover::result::{Estimate, Recovered, TrialCounts, Unknown};
 use crate::recover::solver::Builtin;
-use crate::recover::{beliefs, confidence, consensus, delta, exact, joint, layout, ranking};
+use crate::recover::{anchors, beliefs, confidence, consensus, delta, exact, joint, ranking};
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, Fingerprint, RowOrder};
 
 /// Number of joint recoveries from known positions, each after the known ones are put back. With eight instead of three, `dcl2d` on
 /// RedKitchen gains less than a point.
 const ROUNDS: usize = 3;
+
+/// Least mean evidence, in nats, of estimates on rays whose centers have regions: below it they are hardly better than chance.
+const LEAST_EVIDENCE: f64 = 1.5;
 
 pub(super) struct Problem<'a, const D: usize> {
     released: &'a Released<D>,
@@ -119,41 +125,26 @@ impl<'a, const D: usize> Problem<'a, D> {
         start: Vec<Estimate<D>>,
         known: &[Option<Estimate<D>>],
     ) -> Vec<Estimate<D>> {
-        let Records::Listed { family, graph: Some(graph), both_ways } = &self.records else {
+        let Records::Listed { family, graph: Some(graph), .. } = &self.records else {
             return start;
         };
-        let (lists, delta, seed) = (self.lists, self.delta as f32, self.options.seed);
-        let restore = |mut estimates: Vec<Estimate<D>>| {
-            for (estimate, known) in estimates.iter_mut().zip(known) {
-                *estimate = known.unwrap_or(*estimate);
+        let (lists, delta, seed) = ((self.lists, graph), self.delta as f32, self.options.seed);
+        match &**family {
+            Family::Lines { rows, slots_per_record, chance, has_regions } => {
+                let pieces =
+                    LinePieces::new(rows, *slots_per_record, (chance, *has_regions), delta);
+                let rays = has_regions.then_some(&rows[..]);
+                steps(&Input::new(pieces, lists, delta, seed), rays, start, known)
             }
-            estimates
-        };
-        // All slots together: each by its neighbors' estimates.
-        let rounds = if known.is_empty() { 1 } else { ROUNDS };
-        let estimates = (0..rounds).fold(restore(start), |estimates, _| {
-            restore(joint::recover(family, graph, delta, seed, estimates))
-        });
-        // Lists from the records alone say what the records say. The following steps would count it twice.
-        if lists.about().order == RowOrder::Either {
-            return estimates;
+            Family::Planes { planes, sorted } => {
+                let pieces = PlanePieces::new(planes, sorted, delta);
+                steps(&Input::new(pieces, lists, delta, seed), None, start, known)
+            }
+            Family::Candidates { rows, chance } => {
+                let pieces = CandidatePieces::new(rows, chance, delta);
+                steps(&Input::new(pieces, lists, delta, seed), None, start, known)
+            }
         }
-        // A layout of the whole image, which known positions replace.
-        let estimates = match &**family {
-            Family::Lines { rows, .. } if family.has_regions() && known.is_empty() => {
-                layout::recover(rows, lists, estimates)
-            }
-            _ => estimates,
-        };
-        // The likeliest places under the whole lists; or under their entries alone, where what is not listed says too little. Beliefs
-        // are for maps with one slot per record: points of paired lines and of images lose as often as they gain.
-        let with_beliefs = D == 3 && both_ways.is_some() && lists.scores().is_some();
-        restore(match ranking::recover(family, lists, delta, seed, estimates) {
-            Err(estimates) if with_beliefs => {
-                beliefs::recover(family, graph, delta, seed, estimates)
-            }
-            Ok(estimates) | Err(estimates) => estimates,
-        })
     }
 
     /// Applies exact constraints to the last estimates and adds confidence.
@@ -231,4 +222,48 @@ pub(super) fn check_lists<const D: usize>(
         return Err(Error::new("neighborhoods", expected, record.0.to_string()));
     }
     Ok(())
+}
+
+/// Returns the estimates of all slots after the steps of joint recovery from `start`. `rays` are those whose centers have regions. Estimates
+/// that are `known`, per slot, stay as they are.
+fn steps<const D: usize, P: Pieces<D>>(
+    input: &Input<'_, P>,
+    rays: Option<&[LineRow<D>]>,
+    start: Vec<Estimate<D>>,
+    known: &[Option<Estimate<D>>],
+) -> Vec<Estimate<D>> {
+    let Input { pieces, lists, graph, .. } = input;
+    let restore = |mut estimates: Vec<Estimate<D>>| {
+        for (estimate, known) in estimates.iter_mut().zip(known) {
+            *estimate = known.unwrap_or(*estimate);
+        }
+        estimates
+    };
+    let mut estimates = restore(start);
+    // All slots together: each by its neighbors' estimates. From rays that say hardly more than chance, neighbors add nothing.
+    for _ in 0..if known.is_empty() { 1 } else { ROUNDS } {
+        if rays.is_none() || mean_evidence(&estimates) >= LEAST_EVIDENCE {
+            estimates = restore(joint::recover(input, estimates));
+        }
+    }
+    // Lists from the records alone say what the records say. The following steps would count it twice.
+    if lists.about().order == RowOrder::Either {
+        return estimates;
+    }
+    // A layout of the whole image, which known positions replace.
+    if let Some(rays) = rays.filter(|_| known.is_empty()) {
+        estimates = anchors::layout::recover(rays, (lists, &graph.listers), estimates);
+    }
+    // The likeliest places under the whole lists; or under their entries alone, where what is not listed says too little. Beliefs
+    // are for maps with one slot per record: points of paired lines and of images lose as often as they gain.
+    let with_beliefs = D == 3 && pieces.slots_per_record() == 1 && lists.scores().is_some();
+    restore(match ranking::recover(input, estimates) {
+        Err(estimates) if with_beliefs => beliefs::recover(input, estimates),
+        Ok(estimates) | Err(estimates) => estimates,
+    })
+}
+
+fn mean_evidence<const D: usize>(estimates: &[Estimate<D>]) -> f64 {
+    let sum: f64 = estimates.iter().map(|e| f64::from(e.evidence)).sum();
+    sum / estimates.len().max(1) as f64
 }

@@ -4,11 +4,11 @@ use rayon::prelude::*;
 
 use crate::density::{Peaks, tomography};
 use crate::neighbors::{Geometric, Neighborhoods, geometric_by};
+use crate::recover::baselines::density::published;
 use crate::recover::map::lines::{LineRow, from_lines, from_rays};
 use crate::recover::map::lists::found;
 use crate::recover::options::RecoverOptions;
 use crate::recover::problem::Problem;
-use crate::recover::published_density::published;
 use crate::recover::result::{Estimate, Recovered, Status, stored_support};
 use crate::recover::solver::Builtin;
 use crate::released::{Obfuscation, Released};

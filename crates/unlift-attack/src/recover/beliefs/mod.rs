@@ -24,11 +24,11 @@ mod temper;
 use rayon::prelude::*;
 
 use crate::geometry::knn::Knn;
-use crate::recover::map::family::Family;
+use crate::recover::input::Input;
 use crate::recover::map::graph::{Graph, Side, either, side};
 use crate::recover::map::lines::ln;
 use crate::recover::map::lists::CHUNK;
-use crate::recover::map::pieces::{CandidatePieces, LinePieces, Piece, Pieces, PlanePieces};
+use crate::recover::map::pieces::{Piece, Pieces};
 use crate::recover::map::places::{along_curve, distance2};
 use crate::recover::result::{Estimate, Status};
 use crate::seed::{Draws, Stage};
@@ -69,36 +69,13 @@ const MAX_STEPS: usize = 15;
 /// Places with less weight are dropped.
 const LEAST_WEIGHT: f32 = 1e-3;
 
-/// Returns the estimates of all slots after beliefs from `start`, the estimates of joint recovery. Without enough slots, returns `start`.
-pub(super) fn recover<const D: usize>(
-    family: &Family<'_, D>,
-    graph: &Graph,
-    delta: f32,
-    seed: u64,
-    start: Vec<Estimate<D>>,
-) -> Vec<Estimate<D>> {
-    match family {
-        Family::Lines { rows, slots_per_record, chance, has_regions } => iterate(
-            &LinePieces::new(rows, *slots_per_record, (chance, *has_regions), delta),
-            graph,
-            seed,
-            start,
-        ),
-        Family::Planes { planes, sorted } => {
-            iterate(&PlanePieces::new(planes, sorted, delta), graph, seed, start)
-        }
-        Family::Candidates { rows, chance } => {
-            iterate(&CandidatePieces::new(rows, chance, delta), graph, seed, start)
-        }
-    }
-}
-
-fn iterate<const D: usize, P: Pieces<D>>(
-    pieces: &P,
-    graph: &Graph,
-    seed: u64,
+/// Returns the estimates of all slots after beliefs from `estimates`, those of joint recovery. Without enough slots, they stay.
+pub(super) fn recover<const D: usize, P: Pieces<D>>(
+    input: &Input<'_, P>,
     mut estimates: Vec<Estimate<D>>,
 ) -> Vec<Estimate<D>> {
+    let Input { pieces, graph, seed, .. } = input;
+    let seed = *seed;
     let n = estimates.len();
     let n_known = estimates.iter().filter(|estimate| estimate.status == Status::Ok).count();
     if n_known < LEAST_SLOTS {

@@ -25,55 +25,22 @@
 //! turn, two neighbors could exchange places forever. So even and odd slots take turns. Only the first iteration moves all
 //! slots in one turn, because it starts from estimates that depend on records alone.
 
-mod input;
 mod least_squares;
 mod neighbor_distribution;
 mod state;
 mod update;
 mod votes;
 
-use crate::recover::joint::input::Input;
+use crate::recover::input::Input;
 use crate::recover::joint::state::State;
-use crate::recover::map::family::Family;
-use crate::recover::map::graph::Graph;
-use crate::recover::map::pieces::{CandidatePieces, LinePieces, Pieces, PlanePieces};
+use crate::recover::map::pieces::Pieces;
 use crate::recover::map::places::along_curve;
 use crate::recover::result::Estimate;
 
 const ITERATIONS: usize = 16;
 
-/// Rays whose centers have regions keep the estimates of consensus if the mean evidence is below this, in nats: then those
-/// estimates are hardly better than chance, and neighbors add nothing.
-const LEAST_EVIDENCE: f64 = 1.5;
-
 /// Returns the estimates of all slots after joint recovery from `start`.
-pub(crate) fn recover<const D: usize>(
-    family: &Family<'_, D>,
-    graph: &Graph,
-    delta: f32,
-    seed: u64,
-    start: Vec<Estimate<D>>,
-) -> Vec<Estimate<D>> {
-    if family.has_regions() && mean_evidence(&start) < LEAST_EVIDENCE {
-        return start;
-    }
-    match family {
-        Family::Lines { rows, slots_per_record, chance, has_regions } => {
-            let pieces = LinePieces::new(rows, *slots_per_record, (chance, *has_regions), delta);
-            iterate(&Input::new(pieces, graph, delta, seed), start)
-        }
-        Family::Planes { planes, sorted } => {
-            let pieces = PlanePieces::new(planes, sorted, delta);
-            iterate(&Input::new(pieces, graph, delta, seed), start)
-        }
-        Family::Candidates { rows, chance } => {
-            let pieces = CandidatePieces::new(rows, chance, delta);
-            iterate(&Input::new(pieces, graph, delta, seed), start)
-        }
-    }
-}
-
-fn iterate<const D: usize, P: Pieces<D>>(
+pub(super) fn recover<const D: usize, P: Pieces<D>>(
     input: &Input<'_, P>,
     start: Vec<Estimate<D>>,
 ) -> Vec<Estimate<D>> {
@@ -93,9 +60,4 @@ fn iterate<const D: usize, P: Pieces<D>>(
         }
     }
     state.into_accepted()
-}
-
-fn mean_evidence<const D: usize>(estimates: &[Estimate<D>]) -> f64 {
-    let sum: f64 = estimates.iter().map(|e| f64::from(e.evidence)).sum();
-    sum / estimates.len().max(1) as f64
 }

@@ -6,7 +6,7 @@
 
 use rayon::prelude::*;
 
-use crate::recover::joint::input::{Input, RANDOM, Sampled};
+use crate::recover::input::{Input, RANDOM, Sampled};
 use crate::recover::map::family::Settings;
 use crate::recover::map::graph::{CLASSES, Side, either, side};
 use crate::recover::map::grid::Density;

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use rayon::prelude::*;
 
-use crate::recover::joint::input::Input;
+use crate::recover::input::Input;
 use crate::recover::joint::neighbor_distribution::NeighborDistribution;
 use crate::recover::joint::update::{Context, Scratch, TUBE};
 use crate::recover::map::graph::{either, record_of};

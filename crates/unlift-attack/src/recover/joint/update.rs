@@ -1,6 +1,6 @@
 //! The update of one slot in one iteration: propose candidates, score them, refine the best one.
 
-use crate::recover::joint::input::Input;
+use crate::recover::input::Input;
 use crate::recover::joint::least_squares::{Directions, least_squares};
 use crate::recover::joint::neighbor_distribution::NeighborDistribution;
 use crate::recover::joint::votes::{Columns, Ends, Odds};

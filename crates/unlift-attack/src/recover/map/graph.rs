@@ -18,7 +18,7 @@ pub(crate) enum Side {
     Mutual,
 }
 
-const SCORE_CLASSES: usize = 1 << CLASS_BITS;
+const SCORE_CLASSES: usize = 8;
 /// Quantiles of all scores at which classes begin: finer at the top, where most true neighbors are.
 const SCORE_RANKS: [f64; SCORE_CLASSES - 1] = [0.3, 0.55, 0.72, 0.84, 0.91, 0.955, 0.98];
 /// Number of scores from which these quantiles are computed.
@@ -27,6 +27,8 @@ pub(crate) const CLASSES: usize = 3 * SCORE_CLASSES;
 /// Largest number of reverse edges of a slot, as a multiple of the mean list length: a record in very many lists is in most of
 /// them by mistake.
 const MOST_REVERSE: usize = 3;
+/// Slots per parallel task.
+const PART: usize = 1 << 12;
 
 /// Returns the record of a slot. Records have one or two slots, so a shift replaces a division.
 #[inline(always)]
@@ -60,11 +62,44 @@ fn score_bounds(lists: &Neighborhoods) -> Vec<f32> {
     SCORE_RANKS.iter().filter_map(at).collect()
 }
 
-/// Returns the score class of the entry with index `at` among all entries.
-#[inline(always)]
-fn score_class(lists: &Neighborhoods, bounds: &[f32], at: usize) -> u8 {
-    let class = |score: f32| bounds.partition_point(|&bound| bound <= score) as u8;
-    lists.scores().map_or(0, |scores| class(scores[at]))
+/// Returns the class of the entry `at` of the list of `slot`.
+fn class_of(lists: &Neighborhoods, bounds: &[f32], side: Side, slot: usize, at: usize) -> u8 {
+    let class = |scores: &[f32]| {
+        let score = scores[lists.offsets()[slot] as usize + at];
+        bounds.partition_point(|&bound| bound <= score)
+    };
+    (side as usize * SCORE_CLASSES + lists.scores().map_or(0, class)) as u8
+}
+
+/// Slots that list each record, ascending.
+#[derive(Debug)]
+pub(crate) struct Listers {
+    offsets: Vec<usize>,
+    slots: Vec<u32>,
+}
+
+impl Listers {
+    fn new(lists: &Neighborhoods, n_records: usize) -> Self {
+        let mut offsets = vec![0; n_records + 1];
+        for record in lists.records() {
+            offsets[record.index() + 1] += 1;
+        }
+        for record in 0..n_records {
+            offsets[record + 1] += offsets[record];
+        }
+        let (mut next, mut slots) = (offsets.clone(), vec![0; lists.records().len()]);
+        for slot in 0..lists.n_slots() {
+            for record in lists.of(slot) {
+                slots[next[record.index()]] = slot as u32;
+                next[record.index()] += 1;
+            }
+        }
+        Self { offsets, slots }
+    }
+
+    pub(crate) fn of(&self, record: usize) -> &[u32] {
+        &self.slots[self.offsets[record]..self.offsets[record + 1]]
+    }
 }
 
 /// Edges per slot, in order of their ends, with the class of each.
@@ -75,75 +110,64 @@ pub(crate) struct Graph {
     ends: Vec<u32>,
     class: Vec<u8>,
     slots_per_record: usize,
+    pub(crate) listers: Listers,
 }
 
 impl Graph {
     /// Creates the edges of `lists` in both directions.
     pub(crate) fn new(lists: &Neighborhoods, slots_per_record: usize) -> Self {
         let n_slots = lists.n_slots();
-        let n_records = n_slots / slots_per_record;
+        let listers = Listers::new(lists, n_slots / slots_per_record);
         let bounds = &score_bounds(lists);
         let most = MOST_REVERSE * lists.records().len().div_ceil(n_slots.max(1)).max(1);
-        let n_blocks = n_records.div_ceil(BLOCK);
-        let transposed: Vec<Transposed> = (0..n_slots.div_ceil(BLOCK))
+        let edges = |slot: usize, edges: &mut (Vec<u32>, Vec<u8>)| {
+            let mut put = |end: u32, class: u8| {
+                edges.0.push(end);
+                edges.1.push(class);
+            };
+            let list = lists.of(slot);
+            let own = |side: Side, at: usize| class_of(lists, bounds, side, slot, at);
+            let record = record_of(slot, slots_per_record);
+            let all = listers.of(record);
+            let (mut at, mut mutual) = (0, u32::MAX);
+            // Slots are in random order, so evenly spaced ones are a fair sample.
+            for &by in all.iter().step_by(all.len().div_ceil(most).max(1)) {
+                let theirs = record_of(by as usize, slots_per_record) as u32;
+                while at < list.len() && list[at].0 < theirs {
+                    put(list[at].0 * slots_per_record as u32, own(Side::Forward, at));
+                    at += 1;
+                }
+                if at < list.len() && list[at].0 == theirs {
+                    put(theirs * slots_per_record as u32, own(Side::Mutual, at));
+                    at += 1;
+                    mutual = theirs;
+                } else if mutual != theirs {
+                    // If a record is mutual already, its other slot adds nothing.
+                    let entry = lists.of(by as usize).partition_point(|r| r.index() < record);
+                    put(by, class_of(lists, bounds, Side::Reverse, by as usize, entry));
+                }
+            }
+            for (at, entry) in list.iter().enumerate().skip(at) {
+                put(entry.0 * slots_per_record as u32, own(Side::Forward, at));
+            }
+            edges.0.len() as u64
+        };
+        let slots: Vec<usize> = (0..n_slots).step_by(PART).collect();
+        let parts: Vec<(Vec<u64>, (Vec<u32>, Vec<u8>))> = slots
             .into_par_iter()
-            .map(|part| Transposed::new(lists, part, n_blocks, bounds))
+            .map(|first| {
+                let mut found = (Vec::new(), Vec::new());
+                let slots = first..(first + PART).min(n_slots);
+                (slots.map(|slot| edges(slot, &mut found)).collect(), found)
+            })
             .collect();
-        // Each block gets space for the largest possible size of its rows. Unused memory is hardly touched.
-        let slots_of = |block: usize| {
-            let records = block * BLOCK..((block + 1) * BLOCK).min(n_records);
-            records.start * slots_per_record..records.end * slots_per_record
-        };
-        let room = |block: usize| {
-            let slots = slots_of(block);
-            let n_listed = lists.offsets()[slots.end] - lists.offsets()[slots.start];
-            let n_reverse: usize = transposed.iter().map(|part| part.of_block(block).len()).sum();
-            n_listed as usize + slots_per_record * n_reverse
-        };
-        let rooms: Vec<usize> = (0..n_blocks).map(room).collect();
-        let total = rooms.iter().sum();
-        let (mut ends, mut class) = (vec![0; total], vec![0; total]);
-        let (mut free, mut free_class) = (&mut ends[..], &mut class[..]);
-        let mut rows = Vec::with_capacity(n_blocks);
-        for &len in &rooms {
-            let (Some(ends), Some(class)) =
-                (free.split_off_mut(..len), free_class.split_off_mut(..len))
-            else {
-                unreachable!("rooms are as long as the columns");
-            };
-            rows.push(Rows { ends, class, n: 0 });
+        let (mut offsets, mut ends, mut class) = (vec![0], Vec::new(), Vec::new());
+        for (until, (part, classes)) in parts {
+            offsets.extend(until.iter().map(|until| ends.len() as u64 + until));
+            ends.extend(part);
+            class.extend(classes);
         }
-        let merged = |reverse: &mut Block, (block, mut rows): (usize, Rows<'_>)| {
-            reverse.fill(&transposed, block);
-            let slots = slots_of(block);
-            let first = slots.start;
-            let add = |slot: usize| {
-                let all = reverse.of(record_of(slot - first, slots_per_record));
-                let entry = lists.offsets()[slot] as usize;
-                let class = |at| score_class(lists, bounds, entry + at);
-                rows.add(lists.of(slot), all, slots_per_record, most, class);
-                rows.n
-            };
-            slots.map(add).collect::<Vec<usize>>()
-        };
-        let row_ends: Vec<Vec<usize>> =
-            rows.into_par_iter().enumerate().map_init(Block::default, merged).collect();
-        // Close the gaps between blocks.
-        let (mut from, mut to) = (0, 0);
-        let mut offsets = Vec::with_capacity(n_slots + 1);
-        offsets.push(0);
-        for (row_ends, room) in row_ends.iter().zip(rooms) {
-            let n = row_ends.last().copied().unwrap_or(0);
-            ends.copy_within(from..from + n, to);
-            class.copy_within(from..from + n, to);
-            offsets.extend(row_ends.iter().map(|end| (to + end) as u64));
-            (from, to) = (from + room, to + n);
-        }
-        ends.truncate(to);
-        class.truncate(to);
-        ends.shrink_to_fit();
-        class.shrink_to_fit();
-        Self { offsets, ends, class, slots_per_record }
+        Self { offsets, ends, class, slots_per_record, listers }
     }
 
     /// Returns the ends of the edges of `slot`, and the class of each.
@@ -190,155 +214,6 @@ impl Graph {
     pub(crate) fn neighborhoods(&self) -> Neighborhoods {
         let records = self.ends.iter().map(|&end| RecordId(end)).collect();
         Neighborhoods::unchecked(self.offsets.clone(), records)
-    }
-}
-
-// Transposed lists: which slots list a record, one block of records at a time.
-//
-// Entries are first distributed over the blocks of their records, in four bytes each. A block is sorted only when its rows
-// are made, while it is in the cache: a plain counting sort takes twice the time (docs/decisions/joint.md).
-
-/// Number of records in a block, and of slots whose lists one task transposes.
-const BLOCK: usize = 1 << BITS;
-/// Bits of a slot or a record within its block.
-const BITS: u32 = 12;
-const CLASS_BITS: u32 = 3;
-// A slot, a record and a class fit into one entry.
-const _: () = assert!(2 * BITS + CLASS_BITS <= u32::BITS);
-
-/// The entries of the lists of [`BLOCK`] slots, by block of their record and then in order of slot.
-struct Transposed {
-    first_slot: u32,
-    /// Offset of each block.
-    offsets: Vec<u32>,
-    /// From the highest bit: slot (within this part), record (within its block), class.
-    entries: Vec<u32>,
-}
-
-impl Transposed {
-    fn new(lists: &Neighborhoods, part: usize, n_blocks: usize, bounds: &[f32]) -> Self {
-        let slots = part * BLOCK..((part + 1) * BLOCK).min(lists.n_slots());
-        let mut offsets = vec![0u32; n_blocks + 1];
-        for record in slots.clone().flat_map(|slot| lists.of(slot)) {
-            offsets[record.index() / BLOCK + 1] += 1;
-        }
-        for block in 0..n_blocks {
-            offsets[block + 1] += offsets[block];
-        }
-        let mut next = offsets.clone();
-        let mut entries = vec![0; offsets[n_blocks] as usize];
-        for (in_part, slot) in slots.enumerate() {
-            let first = lists.offsets()[slot] as usize;
-            for (at, record) in lists.of(slot).iter().enumerate() {
-                let to = &mut next[record.index() / BLOCK];
-                let in_block = record.index() % BLOCK;
-                let packed = (in_part << BITS | in_block) << CLASS_BITS;
-                let class = score_class(lists, bounds, first + at);
-                entries[*to as usize] = packed as u32 | u32::from(class);
-                *to += 1;
-            }
-        }
-        Self { first_slot: (part * BLOCK) as u32, offsets, entries }
-    }
-
-    fn of_block(&self, block: usize) -> &[u32] {
-        &self.entries[self.offsets[block] as usize..self.offsets[block + 1] as usize]
-    }
-}
-
-/// The entries whose records are in one block, sorted by record and slot.
-#[derive(Default)]
-struct Block {
-    offsets: Vec<u32>,
-    /// The slot that owns the entry, and the class of its score.
-    by: Vec<(u32, u8)>,
-}
-
-impl Block {
-    fn fill(&mut self, transposed: &[Transposed], block: usize) {
-        let record = |entry: u32| (entry >> CLASS_BITS) as usize % BLOCK;
-        let Self { offsets, by } = self;
-        // Offsets are shifted by two places; filling the rows moves them to their ends.
-        offsets.clear();
-        offsets.resize(BLOCK + 2, 0);
-        for part in transposed {
-            part.of_block(block).iter().for_each(|&entry| offsets[record(entry) + 2] += 1);
-        }
-        for r in 0..BLOCK {
-            offsets[r + 2] += offsets[r + 1];
-        }
-        by.resize(offsets[BLOCK + 1] as usize, (0, 0));
-        for part in transposed {
-            for &entry in part.of_block(block) {
-                let slot = part.first_slot + (entry >> (BITS + CLASS_BITS));
-                let to = &mut offsets[record(entry) + 1];
-                by[*to as usize] = (slot, (entry % SCORE_CLASSES as u32) as u8);
-                *to += 1;
-            }
-        }
-    }
-
-    /// Returns the slots that list a record of the block, and the score class of each.
-    #[inline(always)]
-    fn of(&self, record: usize) -> &[(u32, u8)] {
-        &self.by[self.offsets[record] as usize..self.offsets[record + 1] as usize]
-    }
-}
-
-/// The rows of one block, in a buffer with space for all of them; `n` is the number of edges so far.
-struct Rows<'a> {
-    ends: &'a mut [u32],
-    class: &'a mut [u8],
-    n: usize,
-}
-
-impl Rows<'_> {
-    /// Merges the `list` of a slot with `all` slots that list its record; both are ascending. About `most` of `all` are used.
-    /// `score_class` returns the class of an entry of the list.
-    fn add(
-        &mut self,
-        list: &[RecordId],
-        all: &[(u32, u8)],
-        slots_per_record: usize,
-        most: usize,
-        score_class: impl Fn(usize) -> u8,
-    ) {
-        // Slots are in random order, so evenly spaced ones are a fair sample.
-        let every = all.len().div_ceil(most).max(1);
-        let n_reverse = all.len().div_ceil(every);
-        let class = |side: Side, of_score: u8| (side as usize * SCORE_CLASSES) as u8 + of_score;
-        let own = slots_per_record as u32;
-        let room = self.n..self.n + list.len() + n_reverse;
-        let (ends, classes) = (&mut self.ends[room.clone()], &mut self.class[room]);
-        let mut to = 0;
-        let mut put = |end: u32, class: u8, stays: bool| {
-            (ends[to], classes[to]) = (end, class);
-            to += usize::from(stays);
-        };
-        // Branches would be unpredictable, so steps are added instead.
-        let (mut at, mut reverse, mut mutual) = (0, 0, u32::MAX);
-        while at < list.len() && reverse < n_reverse {
-            let (mine, (by, of_score)) = (list[at].0, all[reverse * every]);
-            // Records have one or two slots.
-            let theirs = by >> (own - 1);
-            let (is_mine, is_theirs) = (mine <= theirs, theirs <= mine);
-            let side = if is_theirs { Side::Mutual } else { Side::Forward };
-            let of_mine = class(side, score_class(at));
-            let of_theirs = class(Side::Reverse, of_score);
-            let end = if is_mine { mine * own } else { by };
-            // If a record is mutual already, its other slot adds nothing.
-            put(end, if is_mine { of_mine } else { of_theirs }, is_mine | (theirs != mutual));
-            mutual = if is_mine & is_theirs { theirs } else { mutual };
-            at += usize::from(is_mine);
-            reverse += usize::from(is_theirs);
-        }
-        for (at, record) in list.iter().enumerate().skip(at) {
-            put(record.0 * own, class(Side::Forward, score_class(at)), true);
-        }
-        for &(by, of_score) in all.iter().step_by(every).skip(reverse) {
-            put(by, class(Side::Reverse, of_score), by >> (own - 1) != mutual);
-        }
-        self.n += to;
     }
 }
 
@@ -398,14 +273,16 @@ mod tests {
     #[test]
     fn edges_are_those_found_one_by_one() {
         for per in [1, 2] {
-            let lists = lists(2 * BLOCK + 77, per);
+            let lists = lists(2 * PART + 77, per);
             let on = |threads| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 pool.install(|| Graph::new(&lists, per))
             };
             let (one, three) = (on(1), on(3));
             let bounds = score_bounds(&lists);
-            let of_score = |entry| score_class(&lists, &bounds, entry);
+            let scores = lists.scores().unwrap();
+            let of_score =
+                |entry: usize| bounds.partition_point(|&bound| bound <= scores[entry]) as u8;
             let mut n_edges = 0;
             for slot in 0..lists.n_slots() {
                 let expected = expected(&lists, per, slot, &of_score);

@@ -1,9 +1,8 @@
 //! Exact consensus: on each slot's own record, the position whose agreement with the listed records is least probable by chance.
 
-mod anchors;
-
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
+use crate::recover::anchors;
 use crate::recover::map::chance::{CandidateField, ChanceField, tube};
 use crate::recover::map::family::Family;
 use crate::recover::map::lines::{CandidateColumns, Intervals, LineColumns, LineRow, Sections};
@@ -20,7 +19,9 @@ pub(crate) fn solve<const D: usize>(
     slots: &Slots,
 ) -> Vec<Estimate<D>> {
     match family {
-        Family::Lines { rows, .. } if family.has_regions() => anchors::solve(rows, lists, slots),
+        Family::Lines { rows, .. } if family.has_regions() => {
+            anchors::start::solve(rows, lists, slots)
+        }
         Family::Planes { planes, sorted } => {
             let chance = window_chance(planes, sorted, delta);
             let scratch = || std::array::from_fn(|_| Vec::new());

@@ -14,30 +14,30 @@
 //! estimates. Even and odd slots take turns, as in joint recovery.
 //!
 //! Far estimates are as likely at all places, so only those within a few `R_i` count, and each likelihood is divided by that of a far
-//! estimate. Slots near each other share the search for them (`Group`). Eight places are scored at a time.
-
-mod surroundings;
+//! estimate. Eight places are scored at a time.
 
 use rayon::prelude::*;
 
+use crate::geometry::knn::Knn;
 use crate::neighbors::Neighborhoods;
-use crate::recover::map::family::Family;
+use crate::recover::input::Input;
 use crate::recover::map::graph::record_of;
 use crate::recover::map::lines::{LANES, Lanes, ln};
 use crate::recover::map::lists::CHUNK;
-use crate::recover::map::pieces::{CandidatePieces, LinePieces, Pieces, PlanePieces};
-use crate::recover::map::places::distance2;
+use crate::recover::map::pieces::Pieces;
+use crate::recover::map::places::{Places, along_curve, distance2};
 use crate::recover::result::{Estimate, Status};
 use crate::seed::{Draws, Stage};
 use crate::simd::{Kernel, dispatch};
-use surroundings::{Group, NEAR, Surroundings};
 
 /// Number of iterations.
 const ITERATIONS: usize = 5;
 /// Softness `s`.
 const SOFTNESS: f32 = 0.06;
-/// Number of iterations that search far; the others search near. Groups are made again in each of them.
+/// Number of iterations that search far; the others search near.
 const FAR_ITERATIONS: usize = 2;
+/// Estimates within this many radii are compared with a list.
+const NEAR: f32 = 1.6;
 /// Steps along the record, in radii.
 const LINE_STEPS: [Lanes; 2] = [
     [0.0, 0.5, -0.5, 0.21, -0.21, 0.09, -0.09, 0.04],
@@ -84,36 +84,11 @@ const LEAST_RATIO_OF_SOURCES: f32 = 0.75;
 
 /// Returns the estimates of all slots after ranking from `start`, the estimates of joint recovery; `start` as an error if what lists do not
 /// name says too little.
-pub(crate) fn recover<const D: usize>(
-    family: &Family<'_, D>,
-    lists: &Neighborhoods,
-    delta: f32,
-    seed: u64,
-    start: Vec<Estimate<D>>,
-) -> Result<Vec<Estimate<D>>, Vec<Estimate<D>>> {
-    match family {
-        Family::Lines { rows, slots_per_record, chance, has_regions } => iterate(
-            &LinePieces::new(rows, *slots_per_record, (chance, *has_regions), delta),
-            lists,
-            seed,
-            start,
-        ),
-        Family::Planes { planes, sorted } => {
-            iterate(&PlanePieces::new(planes, sorted, delta), lists, seed, start)
-        }
-        Family::Candidates { rows, chance } => {
-            iterate(&CandidatePieces::new(rows, chance, delta), lists, seed, start)
-        }
-    }
-}
-
-fn iterate<const D: usize, P: Pieces<D>>(
-    pieces: &P,
-    lists: &Neighborhoods,
-    seed: u64,
+pub(super) fn recover<const D: usize, P: Pieces<D>>(
+    input: &Input<'_, P>,
     mut estimates: Vec<Estimate<D>>,
 ) -> Result<Vec<Estimate<D>>, Vec<Estimate<D>>> {
-    let n = estimates.len();
+    let (lists, n) = (input.lists, estimates.len());
     let mean_length = lists.records().len() as f32 / n.max(1) as f32;
     if (n as f32) < LEAST_LISTS * mean_length {
         return Err(estimates);
@@ -122,64 +97,47 @@ fn iterate<const D: usize, P: Pieces<D>>(
         None => LEAST_RATIO,
         Some(_) => LEAST_RATIO_OF_SOURCES,
     };
-    let listers = Listers::new(lists, n / pieces.slots_per_record());
-    let mut around = Surroundings::default();
     for iteration in 0..ITERATIONS {
-        if iteration < FAR_ITERATIONS {
-            let Some(new) = Surroundings::new(&estimates, lists) else { return Err(estimates) };
-            around = new;
-        } else {
-            around.update(&estimates, lists);
-        }
-        let [near, farther] = shares_within(pieces, lists, &estimates, &around);
-        let inlier_ratio = near.clamp(INLIER_RATIO.0, INLIER_RATIO.1);
-        if inlier_ratio < least_ratio || farther > MOST_FARTHER * near {
-            return if iteration == 0 { Err(estimates) } else { Ok(estimates) };
-        }
-        let place = |(e, &radius): (&Estimate<D>, &f32)| {
-            let inverse = if radius > 0.0 { 1.0 / (radius * radius) } else { 0.0 };
-            Place { x: e.position, inverse }
-        };
-        let mut places: Vec<Place<D>> = estimates.iter().zip(&around.radius).map(place).collect();
+        let mut radius = Vec::new();
         for half in 0..2 {
+            let is_known = |slot: &u32| estimates[*slot as usize].status == Status::Ok;
+            let slots: Vec<u32> = (0..n as u32).filter(is_known).collect();
+            let point = |slot: &u32| estimates[*slot as usize].position.map(f64::from);
+            let points: Vec<[f64; D]> = slots.iter().map(point).collect();
+            let Ok(tree) = Knn::new(&points) else { return Err(estimates) };
+            if half == 0 {
+                radius = radii(&tree, &slots, lists);
+            }
+            let [near, farther] = shares_within(input, &estimates, &radius);
+            let inlier_ratio = near.clamp(INLIER_RATIO.0, INLIER_RATIO.1);
+            if half == 0 && (inlier_ratio < least_ratio || farther > MOST_FARTHER * near) {
+                return if iteration == 0 { Err(estimates) } else { Ok(estimates) };
+            }
             let context = Context {
-                pieces,
-                lists,
-                listers: &listers,
+                input,
                 estimates: &estimates,
-                places: &places,
-                around: &around,
+                tree: &tree,
+                slots: &slots,
+                radius: &radius,
                 odds: Odds::new(inlier_ratio, mean_length / n as f32),
                 inlier_ratio,
-                tries_elsewhere: iteration == 0 && inlier_ratio > LEAST_ELSEWHERE,
                 iteration,
-                seed,
             };
-            let moved: Vec<Vec<(u32, Best<D>)>> = around
-                .groups
+            let moves = |slot: &u32| slot % 2 == half && radius[*slot as usize] > 0.0;
+            let order = along_curve(&Places::new(&estimates));
+            let moving: Vec<u32> = order.into_iter().filter(moves).collect();
+            let moved: Vec<Vec<Best<D>>> = moving
                 .par_chunks(CHUNK)
                 .map_init(
-                    || Terms::new(n),
-                    |terms, groups| {
-                        let mut moved = Vec::new();
-                        for group in groups {
-                            dispatch(Half {
-                                context: &context,
-                                group,
-                                half,
-                                terms: &mut *terms,
-                                moved: &mut moved,
-                            });
-                        }
-                        moved
-                    },
+                    || Terms::new(n, lists.n_slots()),
+                    |terms, slots| dispatch(Chunk { context: &context, slots, terms }),
                 )
                 .collect();
-            for (slot, Best { x, axis, .. }) in moved.into_iter().flatten() {
+            for (slot, Best { x, axis, .. }) in moving.into_iter().zip(moved.into_iter().flatten())
+            {
                 if x.iter().all(|x| x.is_finite()) {
-                    let slot = slot as usize;
-                    (estimates[slot].position, estimates[slot].axis) = (x, axis as u8);
-                    places[slot].x = x;
+                    let estimate = &mut estimates[slot as usize];
+                    (estimate.position, estimate.axis) = (x, axis as u8);
                 }
             }
         }
@@ -187,76 +145,42 @@ fn iterate<const D: usize, P: Pieces<D>>(
     Ok(estimates)
 }
 
-/// Slots that list each record.
-pub(super) struct Listers {
-    offsets: Vec<usize>,
-    slots: Vec<u32>,
-}
-
-impl Listers {
-    pub(super) fn new(lists: &Neighborhoods, n_records: usize) -> Self {
-        let mut offsets = vec![0; n_records + 1];
-        for record in lists.records() {
-            offsets[record.index() + 1] += 1;
-        }
-        for record in 0..n_records {
-            offsets[record + 1] += offsets[record];
-        }
-        let (mut next, mut slots) = (offsets.clone(), vec![0; lists.records().len()]);
-        for slot in 0..lists.n_slots() {
-            for record in lists.of(slot) {
-                slots[next[record.index()]] = slot as u32;
-                next[record.index()] += 1;
-            }
-        }
-        Self { offsets, slots }
-    }
-
-    pub(super) fn of(&self, record: usize) -> &[u32] {
-        &self.slots[self.offsets[record]..self.offsets[record + 1]]
-    }
+/// Returns, per slot, the distance within which as many estimates lie as its list is long; 0 for slots without estimate or list. The points
+/// of `tree` are the estimates of `slots`.
+fn radii<const D: usize>(tree: &Knn<'_, D>, slots: &[u32], lists: &Neighborhoods) -> Vec<f32> {
+    let of_row = |found: &mut Vec<(f64, u32)>, row: usize| {
+        tree.nearest(row, lists.of(slots[row] as usize).len(), found);
+        found.last().map_or(0.0, |last| last.0.sqrt() as f32)
+    };
+    let found: Vec<f32> = (0..slots.len()).into_par_iter().map_init(Vec::new, of_row).collect();
+    let mut radius = vec![0.0; lists.n_slots()];
+    slots.iter().zip(found).for_each(|(&slot, found)| radius[slot as usize] = found);
+    radius
 }
 
 /// Returns the fraction of listed records within [`REACH`] radii, which is about the inlier ratio, and within [`FARTHER`] radii.
 fn shares_within<const D: usize, P: Pieces<D>>(
-    pieces: &P,
-    lists: &Neighborhoods,
+    input: &Input<'_, P>,
     estimates: &[Estimate<D>],
-    around: &Surroundings,
+    radius: &[f32],
 ) -> [f32; 2] {
     let (mut within, mut all) = ([0; 2], 0);
+    let slots_per_record = input.pieces.slots_per_record();
     let every = estimates.len().div_ceil(SAMPLE);
-    for slot in (0..estimates.len()).step_by(every).filter(|&slot| around.radius[slot] > 0.0) {
-        let bounds = [REACH, FARTHER].map(|times| (times * around.radius[slot]).powi(2));
-        for record in lists.of(slot) {
-            let x = &estimates[slot].position;
-            let nearest = nearest_slot(pieces, estimates, record.index(), x);
+    for slot in (0..estimates.len()).step_by(every).filter(|&slot| radius[slot] > 0.0) {
+        let bounds = [REACH, FARTHER].map(|times| (times * radius[slot]).powi(2));
+        for record in input.lists.of(slot) {
+            let others = &estimates[record.index() * slots_per_record..][..slots_per_record];
+            // A lost estimate is not near, because its distance is no number.
+            let away = |other: &Estimate<D>| distance2(&other.position, &estimates[slot].position);
+            let nearest = others.iter().map(away).fold(f32::INFINITY, f32::min);
             for (count, bound) in within.iter_mut().zip(bounds) {
-                *count += usize::from(nearest.is_some_and(|(d2, _)| d2 < bound));
+                *count += usize::from(nearest < bound);
             }
             all += 1;
         }
     }
     within.map(|count| count as f32 / all.max(1) as f32)
-}
-
-/// Returns the slot of `record` whose estimate is nearest to `x`, after its squared distance.
-#[inline(always)]
-fn nearest_slot<const D: usize, P: Pieces<D>>(
-    pieces: &P,
-    estimates: &[Estimate<D>],
-    record: usize,
-    x: &[f32; D],
-) -> Option<(f32, usize)> {
-    let first = record * pieces.slots_per_record();
-    let mut nearest: Option<(f32, usize)> = None;
-    for (at, estimate) in estimates[first..][..pieces.slots_per_record()].iter().enumerate() {
-        let d2 = distance2(&estimate.position, x);
-        if estimate.status == Status::Ok && nearest.is_none_or(|(least, _)| d2 < least) {
-            nearest = Some((d2, first + at));
-        }
-    }
-    nearest
 }
 
 /// Likelihood ratios of entries that are surely within the radius, against entries far outside.
@@ -288,82 +212,47 @@ fn exponential(y: f32) -> f32 {
     f32::from_bits((y + (ZERO - STEEPNESS)).min(ZERO + 28.0).to_bits() << 9)
 }
 
-/// The place of a slot, and `1 / R^2`; 0 if it has no list.
-#[derive(Clone, Copy)]
-struct Place<const D: usize> {
-    x: [f32; D],
-    inverse: f32,
-}
-
-/// The estimates near a group, and those near one slot, which are the terms of its log-likelihood.
+/// The estimates near a place, which are the terms of the log-likelihood of a slot there, with buffers.
 struct Terms<const D: usize> {
-    /// Per slot, its row in the following columns; 0 if it is not near. Row 0 is far from all.
-    row: Vec<u32>,
-    places: Vec<Place<D>>,
-    x: [Vec<f32>; D],
-    /// Odds of each estimate as a neighbor of the slot, and of the slot as a neighbor of it.
-    own: Vec<f32>,
-    theirs: Vec<f32>,
-    /// Squared distance to the other slot of the own record, which explains the entry if it is nearer; else infinite.
-    most: Vec<f32>,
-    squared: Vec<f32>,
-    kept: Vec<u32>,
-    /// The radius of the slot at the center.
-    length: f32,
+    /// Per record, whether the slot lists it, and per slot, whether it lists the slot's record.
+    listed: Vec<bool>,
+    lists: Vec<bool>,
+    /// Radius at the center, and the number of estimates within it.
     radius: f32,
+    length: f32,
+    /// Differences of the estimates to the center.
     away: [Vec<f32>; D],
     terms: Vec<Term>,
     aimed: Vec<[f32; 2]>,
 }
 
 /// What the estimate of one other slot contributes.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 struct Term {
+    /// `1 / R^2` in steps of steepness.
     inverse: f32,
+    /// Odds of the estimate as a neighbor of the slot, and of the slot as a neighbor of it.
     own: f32,
     theirs: f32,
+    /// Squared distance to the other slot of the own record, which explains the entry if it is nearer; else infinite.
     most: f32,
 }
 
-/// Coordinate that is far from all estimates, and finite when squared.
-const FAR: f32 = 1e18;
+/// A term without effect, and its distance from the center.
+const NOTHING: (Term, f32) =
+    (Term { inverse: 0.0, own: 1.0, theirs: 1.0, most: f32::INFINITY }, 1e18);
 
 impl<const D: usize> Terms<D> {
-    fn new(n: usize) -> Self {
+    fn new(n_records: usize, n_slots: usize) -> Self {
         Self {
-            row: vec![0; n],
-            places: Vec::new(),
-            x: std::array::from_fn(|_| Vec::new()),
-            own: Vec::new(),
-            theirs: Vec::new(),
-            most: Vec::new(),
-            squared: Vec::new(),
-            kept: Vec::new(),
-            length: 0.0,
+            listed: vec![false; n_records],
+            lists: vec![false; n_slots],
             radius: 0.0,
+            length: 0.0,
             away: std::array::from_fn(|_| Vec::new()),
             terms: Vec::new(),
             aimed: Vec::new(),
         }
-    }
-
-    /// Reads the estimates near a group.
-    #[inline(always)]
-    fn enter(&mut self, places: &[Place<D>], near: &[u32]) {
-        self.places.clear();
-        self.places.push(Place { x: [FAR; D], inverse: 0.0 });
-        self.places.extend(near.iter().map(|&slot| places[slot as usize]));
-        for (row, &slot) in near.iter().enumerate() {
-            self.row[slot as usize] = row as u32 + 1;
-        }
-        for c in 0..D {
-            self.x[c].clear();
-            self.x[c].extend(self.places.iter().map(|place| place.x[c]));
-        }
-    }
-
-    fn leave(&mut self, near: &[u32]) {
-        near.iter().for_each(|&slot| self.row[slot as usize] = 0);
     }
 
     /// Prepares for places `from + t * direction`, where `from` is relative to the center.
@@ -425,50 +314,39 @@ impl<const D: usize> Terms<D> {
 
 /// What an iteration reads.
 struct Context<'a, const D: usize, P> {
-    pieces: &'a P,
-    lists: &'a Neighborhoods,
-    listers: &'a Listers,
+    input: &'a Input<'a, P>,
     estimates: &'a [Estimate<D>],
-    places: &'a [Place<D>],
-    around: &'a Surroundings,
+    /// The estimates of `slots`.
+    tree: &'a Knn<'a, D>,
+    slots: &'a [u32],
+    radius: &'a [f32],
     odds: Odds,
     inlier_ratio: f32,
-    tries_elsewhere: bool,
     iteration: usize,
-    seed: u64,
 }
 
-/// The even or the odd slots of a group.
-struct Half<'a, 'b, const D: usize, P> {
+struct Chunk<'a, 'b, const D: usize, P> {
     context: &'a Context<'b, D, P>,
-    group: &'a Group,
-    half: u32,
+    slots: &'a [u32],
     terms: &'a mut Terms<D>,
-    moved: &'a mut Vec<(u32, Best<D>)>,
 }
 
-impl<const D: usize, P: Pieces<D>> Kernel for Half<'_, '_, D, P> {
-    type Output = ();
+impl<const D: usize, P: Pieces<D>> Kernel for Chunk<'_, '_, D, P> {
+    type Output = Vec<Best<D>>;
 
     #[inline(always)]
-    fn run(self) {
-        let Self { context, group, half, terms, moved } = self;
-        let mut lost = Vec::new();
-        terms.enter(context.places, &group.near);
-        for &slot in &group.members {
-            if slot % 2 == half && context.around.radius[slot as usize] > 0.0 {
-                let (best, is_lost) = context.likeliest(slot as usize, terms);
-                if context.tries_elsewhere && (is_lost || P::PER_SLOT > 1) {
-                    lost.push(moved.len());
-                }
-                moved.push((slot, best));
+    fn run(self) -> Vec<Best<D>> {
+        let Self { context, slots, terms } = self;
+        let tries_elsewhere = context.iteration == 0 && context.inlier_ratio > LEAST_ELSEWHERE;
+        let mut all = Vec::with_capacity(slots.len());
+        for &slot in slots {
+            let (mut best, is_lost) = context.likeliest(slot as usize, terms);
+            if tries_elsewhere && (is_lost || P::PER_SLOT > 1) {
+                context.try_elsewhere(slot as usize, &mut best, terms);
             }
+            all.push(best);
         }
-        terms.leave(&group.near);
-        for at in lost {
-            let (slot, best) = &mut moved[at];
-            context.try_elsewhere(*slot as usize, best, terms);
-        }
+        all
     }
 }
 
@@ -486,9 +364,10 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
     fn likeliest(&self, slot: usize, terms: &mut Terms<D>) -> (Best<D>, bool) {
         let old = self.estimates[slot];
         let item = (slot * ITERATIONS + self.iteration) as u64;
-        let mut draws = Draws::new(self.seed, Stage::Ranking, item);
+        let mut draws = Draws::new(self.input.seed, Stage::Ranking, item);
         let n_near = self.collect(slot, slot, terms);
-        let is_lost = (n_near as f32) < LOST * self.inlier_ratio * self.lists.of(slot).len() as f32;
+        let expected = self.inlier_ratio * self.input.lists.of(slot).len() as f32;
+        let is_lost = (n_near as f32) < LOST * expected;
         let axis = usize::from(old.axis);
         let mut best = Best { score: f32::NEG_INFINITY, x: old.position, axis };
         let rounds: &[Lanes] = match P::NORMAL {
@@ -515,7 +394,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         best: &mut Best<D>,
     ) {
         let Best { x: from, axis, .. } = from;
-        let piece = self.pieces.piece(slot, axis);
+        let piece = self.input.pieces.piece(slot, axis);
         let radius = terms.radius;
         let direction: [f32; D] = match P::NORMAL {
             true => {
@@ -526,7 +405,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
                 let length = distance2(&away, &[0.0; D]).sqrt().max(f32::MIN_POSITIVE);
                 away.map(|x| x / length)
             }
-            false => self.pieces.direction(slot, axis),
+            false => self.input.pieces.direction(slot, axis),
         };
         let size = radius * draws.between(0.75, 1.25) as f32;
         let length2 = distance2(&direction, &[0.0; D]);
@@ -550,25 +429,23 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
     /// Tries the places of `slot` that are near the estimates of listed records.
     #[inline(never)]
     fn try_elsewhere(&self, slot: usize, best: &mut Best<D>, terms: &mut Terms<D>) {
-        let own = self.lists.of(slot);
-        let mut draws = Draws::new(self.seed, Stage::Ranking, u64::MAX - slot as u64);
+        let Input { pieces, lists, seed, .. } = self.input;
+        let own = lists.of(slot);
+        let mut draws = Draws::new(*seed, Stage::Ranking, u64::MAX - slot as u64);
         for record in own.iter().step_by(own.len().div_ceil(ELSEWHERE).max(1)) {
-            let first = record.index() * self.pieces.slots_per_record();
-            for center in first..first + self.pieces.slots_per_record() {
-                let (x, radius) = (self.estimates[center].position, self.around.radius[center]);
-                let near = |axis: usize| self.pieces.piece(slot, axis).project(&x);
+            let first = record.index() * pieces.slots_per_record();
+            for center in first..first + pieces.slots_per_record() {
+                let (x, radius) = (self.estimates[center].position, self.radius[center]);
+                let near = |axis: usize| pieces.piece(slot, axis).project(&x);
                 let is_near = |&axis: &usize| distance2(&near(axis), &x) < radius * radius;
                 if !(0..P::PER_SLOT).any(|axis| is_near(&axis)) {
                     continue;
                 }
-                let group = &self.around.groups[self.around.group_of[center] as usize];
-                terms.enter(self.places, &group.near);
                 self.collect(slot, center, terms);
                 for axis in (0..P::PER_SLOT).filter(is_near) {
                     let from = Best { score: 0.0, x: near(axis), axis };
                     self.search(slot, (&x, from), &ELSEWHERE_STEPS, &mut draws, terms, best);
                 }
-                terms.leave(&group.near);
             }
         }
     }
@@ -576,79 +453,56 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
     /// Collects the terms of `slot` for places around the estimate of `center`; returns how many listed records are near.
     #[inline(always)]
     fn collect(&self, slot: usize, center: usize, terms: &mut Terms<D>) -> usize {
-        let Self { pieces, lists, estimates, around, odds, .. } = self;
-        let Terms { row, places, x, own, theirs, most, squared, kept, .. } = terms;
+        let Self { input: Input { pieces, lists, graph, .. }, estimates, radius, odds, .. } = *self;
         let slots_per_record = pieces.slots_per_record();
         let record = record_of(slot, slots_per_record);
-        terms.radius = around.radius[center];
+        let place = |slot: usize| &estimates[slot].position;
+        let at = place(center);
+        let mark = |terms: &mut Terms<D>, to: bool| {
+            lists.of(slot).iter().for_each(|record| terms.listed[record.index()] = to);
+            graph.listers.of(record).iter().for_each(|&slot| terms.lists[slot as usize] = to);
+        };
+        mark(terms, true);
+        terms.radius = radius[center];
         terms.length = lists.of(center).len() as f32;
-        let reach2 = NEAR * NEAR * terms.radius * terms.radius;
-        let at = self.places[center].x;
-        let n = places.len();
-        for column in [&mut *own, theirs] {
-            column.clear();
-            column.resize(n, odds.not_listed);
-        }
-        if slots_per_record == 2 || most.len() < n {
-            most.clear();
-            most.resize(n, f32::INFINITY);
-        }
-        squared.resize(n, 0.0);
-        kept.resize(n + 1, 0);
-        let (own, theirs, most) = (&mut own[..n], &mut theirs[..n], &mut most[..n]);
-        let (places, squared) = (&places[..n], &mut squared[..n]);
-        let x: [&[f32]; D] = std::array::from_fn(|c| &x[c][..n]);
-        for i in 0..n {
-            squared[i] = distance2(&std::array::from_fn(|c| x[c][i]), &at);
-        }
+        terms.terms.clear();
+        terms.away.iter_mut().for_each(Vec::clear);
+        let partner = (slots_per_record == 2 && estimates[slot ^ 1].status == Status::Ok)
+            .then(|| place(slot ^ 1));
+        let reach = f64::from(NEAR * terms.radius);
         let mut n_near = 0;
-        for record in lists.of(slot) {
-            let first = record.index() * slots_per_record;
-            let mut i = row[first] as usize;
-            if slots_per_record == 2 {
-                let other = row[first + 1] as usize;
-                let is_other = squared[other] < squared[i];
-                let (nearer, farther) = if is_other { (other, i) } else { (i, other) };
-                own[farther] = 1.0;
-                i = nearer;
+        self.tree.within(&at.map(f64::from), (reach * reach, usize::MAX), |row, _| {
+            let other = self.slots[row as usize] as usize;
+            let of = record_of(other, slots_per_record);
+            if of == record {
+                return;
             }
-            own[i] = odds.listed;
-            n_near += usize::from(squared[i] < reach2);
+            let x = place(other);
+            let is_listed = terms.listed[of];
+            // Of the two slots of a listed record, the nearer one is meant.
+            let is_farther = is_listed && slots_per_record == 2 && {
+                let (own, other_slot) = (distance2(x, at), distance2(place(other ^ 1), at));
+                other_slot < own || (other_slot == own && other % 2 == 1)
+            };
+            n_near += usize::from(is_listed && !is_farther);
+            let lists_slot = terms.lists[other];
+            let of_entry = |is: bool| if is { odds.listed } else { odds.not_listed };
+            let most = partner.filter(|_| lists_slot).map(|partner| distance2(partner, x));
+            let has_list = radius[other] > 0.0;
+            terms.terms.push(Term {
+                inverse: if has_list { STEEPNESS / (radius[other] * radius[other]) } else { 0.0 },
+                own: if is_farther { 1.0 } else { of_entry(is_listed) },
+                theirs: if has_list { of_entry(lists_slot) } else { 1.0 },
+                most: most.unwrap_or(f32::INFINITY),
+            });
+            (0..D).for_each(|c| terms.away[c].push(x[c] - at[c]));
+        });
+        // Terms count in pairs.
+        if terms.terms.len() % 2 == 1 {
+            terms.terms.push(NOTHING.0);
+            terms.away.iter_mut().for_each(|away| away.push(NOTHING.1));
         }
-        let partner = slot ^ 1;
-        let has_partner = slots_per_record == 2 && estimates[partner].status == Status::Ok;
-        for &lister in self.listers.of(record) {
-            let i = row[lister as usize] as usize;
-            theirs[i] = odds.listed;
-            if has_partner {
-                most[i] = distance2(&self.places[partner].x, &places[i].x);
-            }
-        }
-        for slot in 0..slots_per_record {
-            squared[row[record * slots_per_record + slot] as usize] = f32::INFINITY;
-        }
-        let mut n_kept = 0;
-        for (i, &squared) in squared.iter().enumerate().skip(1) {
-            kept[n_kept] = i as u32;
-            n_kept += usize::from(squared < reach2);
-        }
-        // Row 0 completes the last pair, without effect.
-        kept[n_kept] = 0;
-        n_kept = n_kept.next_multiple_of(2);
-        (own[0], theirs[0]) = (1.0, 1.0);
-        let kept = &kept[..n_kept];
-        terms.terms.resize(n_kept, Term::default());
-        terms.away.iter_mut().for_each(|away| away.resize(n_kept, 0.0));
-        let mut away = terms.away.each_mut().map(|away| &mut away[..n_kept]);
-        let terms = &mut terms.terms[..n_kept];
-        for (k, &i) in kept.iter().enumerate() {
-            let i = i as usize;
-            let Place { x, inverse } = places[i];
-            let theirs = if inverse > 0.0 { theirs[i] } else { 1.0 };
-            let inverse = STEEPNESS * inverse;
-            terms[k] = Term { inverse, own: own[i], theirs, most: most[i] };
-            (0..D).for_each(|c| away[c][k] = x[c] - at[c]);
-        }
+        mark(terms, false);
         n_near
     }
 }

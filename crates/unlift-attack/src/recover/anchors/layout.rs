@@ -1,4 +1,4 @@
-//! Layout: positions on rays from anchors (`dcl2d`) from the graph of neighbors alone.
+//! The layout: positions from the graph of neighbors alone.
 //!
 //! Rays of one anchor meet only there, so crossings give no position. But lists say who is near whom, and that draws a map:
 //!
@@ -19,8 +19,8 @@ use crate::RecordId;
 use crate::geometry::knn::Knn;
 use crate::geometry::vector::quantile;
 use crate::neighbors::Neighborhoods;
+use crate::recover::map::graph::Listers;
 use crate::recover::map::lines::LineRow;
-use crate::recover::ranking::Listers;
 use crate::recover::result::{Estimate, Status};
 
 /// Number of landmarks.
@@ -55,14 +55,13 @@ const REACH: f64 = 6.0;
 /// Returns the layout of the slots, or `start` if that agrees as well with the lists.
 pub(crate) fn recover<const D: usize>(
     rows: &[LineRow<D>],
-    lists: &Neighborhoods,
+    (lists, listers): (&Neighborhoods, &Listers),
     start: Vec<Estimate<D>>,
 ) -> Vec<Estimate<D>> {
-    let listers = Listers::new(lists, rows.len());
     let least = CLEARLY * agreement(lists, &start);
     let mut best = (least, start.clone());
     // The slots that list a record may count as its neighbors, too.
-    let edges = [None, Some(&listers)].map(|listers| Edges::new(lists, listers));
+    let edges = [None, Some(listers)].map(|listers| Edges::new(lists, listers));
     for number in 0..LAYOUTS {
         let edges = &edges[number % 2];
         if edges.kept < LEAST_KEPT {
@@ -75,7 +74,7 @@ pub(crate) fn recover<const D: usize>(
         };
         let slots: Vec<u32> = (0..rows.len() as u32).filter(is_placed).collect();
         let Some(ranges) = affine(rows, &layout, &slots) else { continue };
-        let ascent = Ascent { rows, lists, listers: &listers, edges, slots: &slots };
+        let ascent = Ascent { rows, lists, listers, edges, slots: &slots };
         let mut estimates = start.clone();
         for (&slot, range) in slots.iter().zip(ascent.run(ranges)) {
             estimates[slot as usize].position = rows[slot as usize].at(range as f32);

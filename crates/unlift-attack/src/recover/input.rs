@@ -1,5 +1,6 @@
-//! The data that every iteration of joint recovery reads and none changes.
+//! What every step of joint recovery reads and none changes.
 
+use crate::neighbors::Neighborhoods;
 use crate::recover::map::graph::Graph;
 use crate::seed::{Draws, Stage};
 
@@ -8,11 +9,13 @@ pub(super) const RANDOM: usize = 24;
 /// Largest number of sampled slots: with lists of 50 they have about 100,000 edges.
 const SAMPLED_SLOTS: usize = 1 << 11;
 
-/// The map, the neighborhood graph and the sample from which joint recovery learns.
+/// A map as its family of records sees it, its lists, and the sample from which distributions are learned.
 pub(super) struct Input<'a, P> {
     pub(super) pieces: P,
+    pub(super) lists: &'a Neighborhoods,
     pub(super) graph: &'a Graph,
     pub(super) delta: f32,
+    pub(super) seed: u64,
     /// How many edges lead to each record.
     pub(super) listed: Vec<u32>,
     /// Evenly spaced slots from which the distribution of true neighbors is learned.
@@ -26,7 +29,12 @@ pub(super) struct Sampled {
 }
 
 impl<'a, P> Input<'a, P> {
-    pub(super) fn new(pieces: P, graph: &'a Graph, delta: f32, seed: u64) -> Self {
+    pub(super) fn new(
+        pieces: P,
+        (lists, graph): (&'a Neighborhoods, &'a Graph),
+        delta: f32,
+        seed: u64,
+    ) -> Self {
         let n = if graph.len() == 0 { 0 } else { graph.n_slots() };
         let row = |slot: usize| {
             let mut draws = Draws::new(seed, Stage::NullSample, slot as u64);
@@ -34,6 +42,6 @@ impl<'a, P> Input<'a, P> {
             Sampled { slot, random }
         };
         let sample = (0..n).step_by(n.div_ceil(SAMPLED_SLOTS).max(1)).map(row).collect();
-        Self { pieces, graph, delta, listed: graph.times_listed(), sample }
+        Self { pieces, lists, graph, delta, seed, listed: graph.times_listed(), sample }
     }
 }

@@ -1,4 +1,4 @@
-//! Consensus for rays from anchors, which are centers with a region of the image each: ranges from the spread of bearings.
+//! The start: ranges from the spread of bearings.
 //!
 //! Rays of one anchor meet only in the anchor, and rays of two anchors lie in different regions, so crossings give no position.
 //! Perspective gives a range: from the anchor, neighbors within a distance `s` of a point at range `r` are seen within an
@@ -33,7 +33,7 @@ struct Window {
     evidence: f32,
 }
 
-pub(super) fn solve<const D: usize>(
+pub(in crate::recover) fn solve<const D: usize>(
     rows: &[LineRow<D>],
     lists: &Neighborhoods,
     slots: &Slots,

@@ -1,0 +1,4 @@
+//! Published attacks, for comparison.
+
+pub(super) mod density;
+pub(super) mod ransac;
