@@ -42,17 +42,6 @@ use crate::neighbors::Neighborhoods;
 use crate::released::Released;
 use problem::{Problem, check_lists};
 
-/// Learns the chance that a random listed record passes near a place, as consensus does. Returns a function of the center of a ray,
-/// the place (relative to the released origin) and delta; `None` for planes.
-#[doc(hidden)]
-pub fn chance<'a, const D: usize>(
-    released: &'a Released<D>,
-    lists: &Neighborhoods,
-) -> impl Fn(usize, &[f32; D], f32) -> Option<f32> + 'a {
-    let family = map::family::Family::new(released, lists);
-    move |group, x, delta| family.chance_at(group, x, delta)
-}
-
 /// Recovers the hidden points of `released` from `lists` by `solver`: the map `R` of Eq. (3).
 ///
 /// The result depends on the arguments alone, not on the number of threads.

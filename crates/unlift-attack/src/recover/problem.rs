@@ -5,7 +5,6 @@ use crate::neighbors::Neighborhoods;
 use crate::recover::assignment::descriptor_rows;
 use crate::recover::baselines::density::published;
 use crate::recover::baselines::ransac::Ransac;
-use crate::recover::confidence::cues::Solved;
 use crate::recover::input::Input;
 use crate::recover::map::family::{Family, Settings};
 use crate::recover::map::graph::Graph;
@@ -162,14 +161,16 @@ impl<'a, const D: usize> Problem<'a, D> {
         if let Some(unknown) = confidence::not_asked::<D>(self.solver, &self.options) {
             return Ok(recovered.without_confidence(unknown));
         }
-        let Records::Listed { family, graph: Some(graph), .. } = &self.records else {
+        let Records::Listed { graph: Some(graph), .. } = &self.records else {
             return Ok(recovered.without_confidence(Unknown::OtherSolver));
         };
         if let Some(unknown) = confidence::unknown(self.released, self.lists, estimates) {
             return Ok(recovered.without_confidence(unknown));
         }
-        let solved = Solved { estimates, unsettled: &unsettled, delta: self.delta as f32 };
-        recovered.with_confidence(confidence::predict(family, graph, self.released, &solved))
+        match confidence::predict(graph, self.released, estimates) {
+            Ok(confidence) => recovered.with_confidence(confidence),
+            Err(unknown) => Ok(recovered.without_confidence(unknown)),
+        }
     }
 
     /// Applies exact constraints, if the family has any, and repeats joint recovery from the result where that helps. The paper's

@@ -148,11 +148,11 @@ pub(super) fn recover<const D: usize, P: Pieces<D>>(
 /// Returns, per slot, the distance within which as many estimates lie as its list is long; 0 for slots without estimate or list. The points
 /// of `tree` are the estimates of `slots`.
 fn radii<const D: usize>(tree: &Knn<'_, D>, slots: &[u32], lists: &Neighborhoods) -> Vec<f32> {
-    let of_row = |found: &mut Vec<(f64, u32)>, row: usize| {
-        tree.nearest(row, lists.of(slots[row] as usize).len(), found);
-        found.last().map_or(0.0, |last| last.0.sqrt() as f32)
-    };
-    let found: Vec<f32> = (0..slots.len()).into_par_iter().map_init(Vec::new, of_row).collect();
+    let length = |row: usize| lists.of(slots[row] as usize).len();
+    let longest = (0..slots.len()).map(length).max().unwrap_or(0);
+    let found = tree.per_row(longest, |row, found| {
+        found[..length(row).min(found.len())].last().map_or(0.0, |last| last.0.sqrt() as f32)
+    });
     let mut radius = vec![0.0; lists.n_slots()];
     slots.iter().zip(found).for_each(|(&slot, found)| radius[slot as usize] = found);
     radius

@@ -117,11 +117,13 @@ pub enum Unknown {
     Coincident,
     /// Lists have more entries per hidden point than in all maps on which the model was fitted.
     SmallMap,
+    /// Wrong entries of lists are near, too, so that they are no sign of a wrong place.
+    NearEntries,
 }
 
 impl Unknown {
     /// All reasons.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::NotAsked,
         Self::NotGiven,
         Self::OfImages,
@@ -131,6 +133,7 @@ impl Unknown {
         Self::Flat,
         Self::Coincident,
         Self::SmallMap,
+        Self::NearEntries,
     ];
 
     /// Name in files.
@@ -145,6 +148,7 @@ impl Unknown {
             Self::Flat => "flat",
             Self::Coincident => "coincident",
             Self::SmallMap => "small_map",
+            Self::NearEntries => "near_entries",
         }
     }
 
@@ -170,6 +174,9 @@ impl Unknown {
             }
             Self::SmallMap => {
                 "the map is small: a list holds more than a hundredth of its points, and the confidence model was not fitted on such maps"
+            }
+            Self::NearEntries => {
+                "wrong entries of the lists are near, too, and the confidence model was not fitted on such lists"
             }
         }
     }

@@ -39,7 +39,12 @@ fn what_is_said_comes_true_as_often_as_said() {
             let lists = near.lists(ratio, &outliers, 7).unwrap();
             let recovered = solve(&hidden.released, &lists, joint());
             let accuracy = evaluate(&recovered, &hidden.original, &hidden.secret).unwrap();
-            let of_map = reliability(&recovered, &accuracy, typical).unwrap();
+            let Some(of_map) = reliability(&recovered, &accuracy, typical) else {
+                // Wrong entries are near, too.
+                assert_eq!(recovered.confidence_unknown(), Some(Unknown::NearEntries));
+                assert!(noise == Noise::Near || ratio < 0.1, "{name}: {noise:?}");
+                continue;
+            };
             match &mut all {
                 Some(all) => all.merge(&of_map),
                 None => all = Some(of_map),

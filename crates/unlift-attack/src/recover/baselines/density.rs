@@ -13,7 +13,6 @@ use crate::density::feasible::{Feasible, FeasibleLine, Hides};
 use crate::density::{Peak, Peaks};
 use crate::geometry::vector::{dot, sub, widen};
 use crate::released::Released;
-use crate::simd::{Kernel, dispatch};
 
 /// Nearest lines that vote first: the largest number, and the largest fraction of all lines.
 const COARSE: (usize, f64) = (500, 0.05);
@@ -40,11 +39,11 @@ pub(crate) fn published<const D: usize>(released: &Released<D>) -> Peaks {
     let lines = &feasible.lines;
     let every = lines.len().div_ceil(MOST_VOTERS);
     let voters: Vec<u32> = (0..lines.len() as u32).step_by(every).collect();
-    let columns = Columns::new(voters.iter().map(|&voter| row(&lines[voter as usize])));
+    let voting: Vec<FeasibleLine> = voters.iter().map(|&voter| lines[voter as usize]).collect();
     let (most, share) = if feasible.hides == Hides::Two { COARSE_OF_PAIRS } else { COARSE };
     let k = most.min((share * lines.len() as f64) as usize).max(2);
     let place = |row: usize| {
-        let mut distances = columns.map(|other| between(&lines[row], other));
+        let mut distances: Vec<f32> = voting.iter().map(|o| between(&lines[row], o)).collect();
         silence(&mut distances, row, lines, &voters);
         let (near, reach) = nearest(&distances, k);
         let near = near.iter().map(|&at| &lines[voters[at as usize] as usize]);
@@ -63,7 +62,7 @@ pub(crate) fn published<const D: usize>(released: &Released<D>) -> Peaks {
     let mut of: Vec<Option<Peak>> = peaks.collect();
     if feasible.hides == Hides::One {
         for _ in 0..REFINEMENTS {
-            of = refine(lines, &voters, &columns, &of);
+            of = refine(lines, (&voters, &voting), &of);
         }
     }
     Peaks { of, resolution }
@@ -72,21 +71,19 @@ pub(crate) fn published<const D: usize>(released: &Released<D>) -> Peaks {
 /// Refines once: lines vote that pass near the estimate of a line and whose own estimates are near that line.
 fn refine(
     lines: &[FeasibleLine],
-    voters: &[u32],
-    columns: &Columns<6>,
+    (voters, voting): (&[u32], &[FeasibleLine]),
     estimates: &[Option<Peak>],
 ) -> Vec<Option<Peak>> {
     let point = |&voter: &u32| estimates[voter as usize].map_or([f32::NAN; 3], |p| p.position);
-    let points = Columns::new(voters.iter().map(point));
+    let points: Vec<[f32; 3]> = voters.iter().map(point).collect();
     let step = |row: usize| {
         let estimate = estimates[row]?;
-        let FeasibleLine { through, direction, .. } = lines[row];
-        let mut distances = points.map(|point| from_line(point, through, direction));
+        let mut distances: Vec<f32> =
+            points.iter().map(|&point| from_line(point, &lines[row])).collect();
         silence(&mut distances, row, lines, voters);
         let (near, _) = nearest(&distances, REFINE);
-        let to_line =
-            |[x, y, z, u, v, w]: [f32; 6]| from_line(estimate.position, [x, y, z], [u, v, w]);
-        let mut distances = columns.map(to_line);
+        let to_line = |line: &FeasibleLine| from_line(estimate.position, line);
+        let mut distances: Vec<f32> = voting.iter().map(to_line).collect();
         silence(&mut distances, row, lines, voters);
         let (mut passing, _) = nearest(&distances, REFINE);
         passing.sort_unstable();
@@ -253,60 +250,12 @@ fn two_modes(votes: &mut [f64]) -> Option<[f64; 2]> {
     Some([pair[0].min(pair[1]), pair[0].max(pair[1])])
 }
 
-// Distances to all lines or estimates: the inner loops of the published attacks.
+// Distances to all lines or estimates.
 
-/// Rows in columns, so that a function of every row runs over whole vectors.
-#[derive(Debug)]
-struct Columns<const N: usize>([Vec<f32>; N]);
-
-impl<const N: usize> Columns<N> {
-    fn new(rows: impl Iterator<Item = [f32; N]>) -> Self {
-        let mut columns = std::array::from_fn(|_| Vec::new());
-        for row in rows {
-            columns
-                .iter_mut()
-                .zip(row)
-                .for_each(|(column, x): (&mut Vec<f32>, f32)| column.push(x));
-        }
-        Self(columns)
-    }
-
-    fn map(&self, of: impl Fn([f32; N]) -> f32) -> Vec<f32> {
-        let mut out = vec![0.0; self.0[0].len()];
-        dispatch(Map { columns: self, of, out: &mut out });
-        out
-    }
-}
-
-struct Map<'a, const N: usize, F> {
-    columns: &'a Columns<N>,
-    of: F,
-    out: &'a mut [f32],
-}
-
-impl<const N: usize, F: Fn([f32; N]) -> f32> Kernel for Map<'_, N, F> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let columns = self.columns.0.each_ref().map(|column| &column[..self.out.len()]);
-        for (j, out) in self.out.iter_mut().enumerate() {
-            *out = (self.of)(columns.map(|column| column[j]));
-        }
-    }
-}
-
-/// Returns a line as a row: a point of it, then its direction.
-fn row(line: &FeasibleLine) -> [f32; 6] {
-    let ([x, y, z], [u, v, w]) = (line.through, line.direction);
-    [x, y, z, u, v, w]
-}
-
-/// Returns the squared distance between `line` and the line of a row; infinite for parallel ones.
-#[inline(always)]
-fn between(line: &FeasibleLine, [x, y, z, u, v, w]: [f32; 6]) -> f32 {
+/// Returns the squared distance between two lines; infinite for parallel ones.
+fn between(line: &FeasibleLine, other: &FeasibleLine) -> f32 {
     let (p, d) = (line.through, line.direction);
-    let (q, e) = ([x, y, z], [u, v, w]);
+    let (q, e) = (other.through, other.direction);
     let normal = [d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2], d[0] * e[1] - d[1] * e[0]];
     let (mut across, mut square) = (0.0, 0.0);
     for c in 0..3 {
@@ -316,24 +265,14 @@ fn between(line: &FeasibleLine, [x, y, z, u, v, w]: [f32; 6]) -> f32 {
     if square < 1e-6 { f32::INFINITY } else { across * across / square }
 }
 
-/// Returns the squared distance of `point` from a line; infinite if `point` is NaN.
-#[inline(always)]
-fn from_line(point: [f32; 3], through: [f32; 3], direction: [f32; 3]) -> f32 {
-    let away: [f32; 3] = std::array::from_fn(|c| point[c] - through[c]);
-    let square = square_across(&away, &direction);
-    if square.is_nan() { f32::INFINITY } else { square }
-}
-
-/// Returns the squared length of the component of `v` perpendicular to `d`, without a difference of large squares.
-#[inline(always)]
-fn square_across(v: &[f32; 3], d: &[f32; 3]) -> f32 {
+/// Returns the squared distance of `point` from a line, without a difference of large squares; infinite if `point` is NaN.
+fn from_line(point: [f32; 3], line: &FeasibleLine) -> f32 {
+    let d = line.direction;
+    let v: [f32; 3] = std::array::from_fn(|c| point[c] - line.through[c]);
     let along = v[0] * d[0] + v[1] * d[1] + v[2] * d[2];
-    let mut square = 0.0;
-    for c in 0..3 {
-        let across = v[c] - along * d[c];
-        square += across * across;
-    }
-    square
+    let across = |c: usize| v[c] - along * d[c];
+    let square: f32 = (0..3).map(|c| across(c) * across(c)).sum();
+    if square.is_nan() { f32::INFINITY } else { square }
 }
 
 /// Returns the indices of the `k` smallest finite distances (ties by index), unordered, and the largest of these, not squared.
@@ -355,9 +294,7 @@ fn nearest(squared: &[f32], k: usize) -> (Vec<u32>, f32) {
 mod tests {
     use super::*;
     use crate::seed::{Draws, Stage};
-    use crate::simd::portable;
 
-    /// Also on the same bits in vector and in portable code.
     #[test]
     fn distances_between_lines_are_the_least_over_their_points() {
         let mut draws = Draws::new(4, Stage::Synthetic, 0);
@@ -369,18 +306,14 @@ mod tests {
             group: None,
         };
         let lines: Vec<FeasibleLine> = (0..101).map(line).collect();
-        let columns = Columns::new(lines.iter().map(row));
-        let mut plain = vec![0.0; 101];
-        let of = |other: [f32; 6]| between(&lines[0], other);
-        portable(Map { columns: &columns, of, out: &mut plain });
-        assert_eq!(columns.map(of), plain);
-        assert_eq!(plain[0], f32::INFINITY);
-        for (other, squared) in lines.iter().zip(plain).skip(1) {
+        let squared: Vec<f32> = lines.iter().map(|other| between(&lines[0], other)).collect();
+        assert_eq!(squared[0], f32::INFINITY);
+        for (other, squared) in lines.iter().zip(squared).skip(1) {
             // The nearest point of the first line, by golden-section search.
             let at = |t: f32| {
                 let FeasibleLine { through, direction, .. } = lines[0];
                 let point = std::array::from_fn(|c| through[c] + t * direction[c]);
-                from_line(point, other.through, other.direction)
+                from_line(point, other)
             };
             let (mut low, mut high) = (-1e3f32, 1e3f32);
             for _ in 0..100 {

@@ -45,19 +45,6 @@ impl<'a, const D: usize> Family<'a, D> {
         }
     }
 
-    /// Chance that a random listed record passes within `delta` of `x`. For rays, the slot belongs to the center `group`; other
-    /// records ignore it. `None` for planes, whose offsets are counted exactly.
-    pub(crate) fn chance_at(&self, group: usize, x: &[f32; D], delta: f32) -> Option<f32> {
-        match self {
-            Self::Lines { chance, .. } => {
-                let field = chance.get(group).or(chance.first());
-                field.map(|field| field.at(x, tube(D, delta)))
-            }
-            Self::Planes { .. } => None,
-            Self::Candidates { chance, .. } => Some(chance.at(x, &chance.tubes(delta))),
-        }
-    }
-
     pub(crate) fn slots_per_record(&self) -> usize {
         match self {
             Self::Lines { slots_per_record, .. } => *slots_per_record,

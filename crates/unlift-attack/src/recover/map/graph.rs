@@ -153,12 +153,13 @@ impl Graph {
             edges.0.len() as u64
         };
         let slots: Vec<usize> = (0..n_slots).step_by(PART).collect();
-        let parts: Vec<(Vec<u64>, (Vec<u32>, Vec<u8>))> = slots
+        let parts: Vec<_> = slots
             .into_par_iter()
             .map(|first| {
                 let mut found = (Vec::new(), Vec::new());
                 let slots = first..(first + PART).min(n_slots);
-                (slots.map(|slot| edges(slot, &mut found)).collect(), found)
+                let until: Vec<u64> = slots.map(|slot| edges(slot, &mut found)).collect();
+                (until, found)
             })
             .collect();
         let (mut offsets, mut ends, mut class) = (vec![0], Vec::new(), Vec::new());

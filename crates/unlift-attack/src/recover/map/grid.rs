@@ -246,11 +246,6 @@ impl<const D: usize> Density<D> {
         }
     }
 
-    /// Returns the logarithm of the typical density over `density`.
-    pub(crate) fn sparsity(&self, density: f32) -> f32 {
-        libm::logf(self.typical / density)
-    }
-
     /// Returns the local width: how much larger the distance to neighbors is than at a typical place. Lists are equally long
     /// everywhere, so neighbors lie farther away where the density is low. Dense places get 1, because the grid does not resolve them.
     /// The cube root is right in three dimensions; two dimensions use it, too.

@@ -1,0 +1,224 @@
+//! Confidence: the probability that an estimate is right, without ground truth.
+//!
+//! Around a right estimate, many of the records that the slot lists are near, and many of those that list the slot. Around a wrong one,
+//! fewer are, by chance or because estimates drifted together. A logistic model turns their numbers into a probability, and two of them
+//! into the scale of the error. Its constants were fitted on synthetic rooms, a cube, clusters and an outdoor scene, never on a real map
+//! (docs/decisions/confidence.md).
+
+use rayon::prelude::*;
+
+use crate::ListsBy;
+use crate::geometry::flatness::flatness;
+use crate::geometry::knn::Knn;
+use crate::geometry::vector::{median, widen};
+use crate::neighbors::Neighborhoods;
+use crate::recover::map::family::Settings;
+use crate::recover::map::graph::{Graph, Side, either, record_of, side};
+use crate::recover::map::places::distance2;
+use crate::recover::options::RecoverOptions;
+use crate::recover::result::{Confidence, Estimate, Status, Unknown};
+use crate::recover::solver::Builtin;
+use crate::released::{Obfuscation, Released};
+
+/// Returns why confidence is not computed, if options, solver or dimension say so.
+pub(super) fn not_asked<const D: usize>(
+    solver: Builtin,
+    options: &RecoverOptions,
+) -> Option<Unknown> {
+    match solver {
+        Builtin::Joint if !options.confidence => Some(Unknown::NotAsked),
+        Builtin::Joint => (!Settings::of_dimension::<D>().confidence).then_some(Unknown::OfImages),
+        _ => Some(Unknown::OtherSolver),
+    }
+}
+
+/// Estimates within this many radii are near. A radius is the distance to this nearest estimate, within these bounds of the median.
+const NEAR: f32 = 1.3;
+const NEIGHBOR: usize = 50;
+const RADII: (f32, f32) = (0.3, 3.3);
+/// If this many times as many records are within [`FARTHER`] radii, wrong entries are near, too. The model was not fitted on such lists.
+const MOST_FARTHER: f64 = 1.5;
+const FARTHER: f32 = 2.0;
+/// Smaller shares are raised by this before a logarithm.
+const LEAST: f32 = 0.02;
+const LEAST_FOREIGN: f32 = 0.05;
+
+/// For lines, paired lines, rays, planes and candidates: the constant term of the probability, and that of the scale.
+const OF_KIND: [(f32, f32); 5] =
+    [(-3.268, -2.741), (-6.75, -2.546), (-5.78, -2.245), (-6.443, -1.623), (-5.376, -2.314)];
+/// Weights in the logit of the probability, of the logarithms of: near records that the slot lists; that list the slot; the share of near
+/// entries of near slots; this share of the map; the share of near records from other centers.
+const FOUND: [f32; 5] = [2.494, 0.308, -0.608, -1.07, 1.33];
+/// Weights in the logarithm of the scale, of the logarithms of: all near records; the share of near entries of near slots.
+const SCALE: [f32; 2] = [-0.133, -0.675];
+
+/// Predicts the confidence of every slot.
+/// Fails when wrong entries are near.
+pub(super) fn predict<const D: usize>(
+    graph: &Graph,
+    released: &Released<D>,
+    estimates: &[Estimate<D>],
+) -> Result<Vec<Confidence>, Unknown> {
+    let slots_per_record = released.slots_per_record();
+    let kind = match released.obfuscation() {
+        Obfuscation::Lines(_) => slots_per_record - 1,
+        Obfuscation::Rays(_) => 2,
+        Obfuscation::AxisPlanes(_) => 3,
+        Obfuscation::AxisCandidates(_) => 4,
+    };
+    let Some(radius) = radii(estimates) else {
+        return Ok(vec![Confidence::LOST; estimates.len()]);
+    };
+    // Calls `of` with the class and the slot of every end of an edge within some radii.
+    let near = |slot: usize, radii: f32, of: &mut dyn FnMut(u8, usize)| {
+        let (ends, class) = graph.of(slot);
+        let x = &estimates[slot].position;
+        let reach2 = (radii * radius[slot]) * (radii * radius[slot]);
+        for (&end, &class) in ends.iter().zip(class) {
+            let last = end as usize + usize::from(either(class, slots_per_record));
+            let is_near = |&end: &usize| distance2(&estimates[end].position, x) < reach2;
+            (end as usize..=last).filter(is_near).for_each(|end| of(class, end));
+        }
+    };
+    // Near records that a slot lists, near ones that list it, and the number of both if all were near.
+    let count = |slot: usize, radii: f32| -> [f32; 3] {
+        let (mut last, mut counts) = (usize::MAX, [0.0; 3]);
+        near(slot, radii, &mut |class, end| {
+            // The two slots of a record are adjacent, and count once.
+            let record = record_of(end, slots_per_record);
+            if !(either(class, slots_per_record) && record == last) {
+                counts[0] += f32::from(u8::from(side(class) != Side::Reverse));
+                counts[1] += f32::from(u8::from(side(class) != Side::Forward));
+            }
+            last = record;
+        });
+        let is_mutual = |class: &&u8| side(**class) == Side::Mutual;
+        let classes = graph.of(slot).1;
+        counts[2] = (classes.len() + classes.iter().filter(is_mutual).count()) as f32;
+        counts
+    };
+    let n = estimates.len();
+    let counts = |radii: f32| -> Vec<[f32; 3]> {
+        let count = |slot: usize| match estimates[slot].status {
+            Status::Ok => count(slot, radii),
+            _ => [0.0; 3],
+        };
+        (0..n).into_par_iter().map(count).collect()
+    };
+    // Sums of whole numbers, which are exact in any order.
+    let total = |counts: &[[f32; 3]], at: usize| -> f64 {
+        counts.iter().map(|count| f64::from(count[at])).sum()
+    };
+    let n_near = |counts: &[[f32; 3]]| total(counts, 0) + total(counts, 1);
+    let farther = n_near(&counts(FARTHER));
+    let counts = counts(NEAR);
+    if farther > MOST_FARTHER * n_near(&counts) {
+        return Err(Unknown::NearEntries);
+    }
+    let of_map = (n_near(&counts) / total(&counts, 2).max(1.0)) as f32;
+    let share = |[lists, listed, all]: [f32; 3]| (lists + listed) / all.max(1.0);
+    let center = |slot: usize| match released.obfuscation() {
+        Obfuscation::Rays(rays) => rays.center()[slot],
+        _ => 0,
+    };
+    let of_slot = |slot: usize| {
+        if estimates[slot].status != Status::Ok {
+            return Confidence::LOST;
+        }
+        let (mut shares, mut foreign, mut ends) = (0.0, 0.0f32, 0.0f32);
+        near(slot, NEAR, &mut |_, end| {
+            shares += share(counts[end]);
+            foreign += f32::from(u8::from(center(end) != center(slot)));
+            ends += 1.0;
+        });
+        let of_near = libm::logf(shares / ends.max(1.0) + LEAST);
+        let foreign = if kind == 2 { foreign / ends.max(1.0) } else { 1.0 };
+        let [lists, listed, _] = counts[slot];
+        let cues = [
+            libm::log1pf(lists),
+            libm::log1pf(listed),
+            of_near,
+            libm::logf(of_map + LEAST),
+            libm::logf(foreign + LEAST_FOREIGN),
+        ];
+        let sum = |weights: &[f32], cues: &[f32]| -> f32 {
+            weights.iter().zip(cues).map(|(weight, cue)| weight * cue).sum()
+        };
+        let logit = OF_KIND[kind].0 + sum(&FOUND, &cues);
+        let scale = OF_KIND[kind].1 + sum(&SCALE, &[libm::log1pf(lists + listed), of_near]);
+        Confidence {
+            found: 1.0 / (1.0 + libm::expf(-logit)),
+            scale: radius[slot] * libm::expf(scale),
+        }
+    };
+    Ok((0..n).into_par_iter().map(of_slot).collect())
+}
+
+/// Returns the radius of every slot; the median for lost ones. `None` without estimates.
+fn radii<const D: usize>(estimates: &[Estimate<D>]) -> Option<Vec<f32>> {
+    let is_known = |slot: &usize| estimates[*slot].status == Status::Ok;
+    let slots: Vec<usize> = (0..estimates.len()).filter(is_known).collect();
+    let points: Vec<[f64; D]> =
+        slots.iter().map(|&slot| widen(&estimates[slot].position)).collect();
+    let tree = Knn::new(&points).ok()?;
+    let found = tree.kth_distances(NEIGHBOR);
+    let median = median(&mut found.clone()) as f32;
+    let mut radius = vec![median; estimates.len()];
+    for (&slot, found) in slots.iter().zip(found) {
+        radius[slot] = (found as f32).clamp(RADII.0 * median, RADII.1 * median);
+    }
+    Some(radius)
+}
+
+/// Longest mean list, as a fraction of all hidden points, in the maps on which the model was fitted.
+const MOST_LISTED: f64 = 0.01;
+
+/// A map is flat if its smallest extent is at most this fraction of its largest one.
+const FLAT: f64 = 0.01;
+
+/// Points coincide if at least this fraction of all rays or planes equals another one. Different points hardly ever have equal ones.
+const COINCIDENT: f64 = 0.5;
+
+/// Returns why the model does not apply to maps recovered from `lists`, if so.
+///
+/// In these cases, one tenth to nine tenths of the estimates with a predicted probability of 90 % were right.
+pub(super) fn unknown<const D: usize>(
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    estimates: &[Estimate<D>],
+) -> Option<Unknown> {
+    let n_slots = lists.n_slots() as f64;
+    let mean = lists.records().len() as f64 / n_slots.max(1.0);
+    let found = estimates.iter().filter(|one| one.status == Status::Ok);
+    if lists.scores().is_some() {
+        Some(Unknown::RankedLists)
+    } else if lists.about().lists_by != ListsBy::Oracle {
+        Some(Unknown::GivenLists)
+    } else if mean > MOST_LISTED * n_slots {
+        Some(Unknown::SmallMap)
+    } else if twins(released.obfuscation()) >= COINCIDENT {
+        // Other records are drawn at random, so that coinciding points do not have equal lines or candidates.
+        Some(Unknown::Coincident)
+    } else {
+        let places: Vec<[f64; D]> = found.map(|one| widen(&one.position)).collect();
+        (flatness(&places) <= FLAT).then_some(Unknown::Flat)
+    }
+}
+
+/// Returns the fraction of rays or planes that equal another one bit for bit.
+fn twins<const D: usize>(obfuscation: &Obfuscation<D>) -> f64 {
+    let mut rows: Vec<(u8, [u32; D])> = match obfuscation {
+        Obfuscation::Rays(rays) => {
+            let directions = rays.direction().iter().map(|d| d.map(f32::to_bits));
+            rays.center().iter().copied().zip(directions).collect()
+        }
+        Obfuscation::AxisPlanes(planes) => {
+            let offsets = planes.offset().iter().map(|offset| [offset.to_bits(); D]);
+            planes.axis().iter().copied().zip(offsets).collect()
+        }
+        Obfuscation::Lines(_) | Obfuscation::AxisCandidates(_) => return 0.0,
+    };
+    rows.par_sort_unstable();
+    let same = rows.chunk_by(|a, b| a == b).map(<[_]>::len).filter(|&n| n > 1);
+    same.sum::<usize>() as f64 / rows.len().max(1) as f64
+}
