@@ -265,7 +265,7 @@ pub struct BreakEven {
 pub enum Bound {
     /// Between two tested ratios, by linear interpolation.
     Interpolated,
-    /// Half comes back even at the smallest tested ratio, so the true value is at most this.
+    /// Half comes back at this ratio, and no ratio a little below it was tested: the true value is at most this.
     BelowTested,
     /// Half does not come back at any tested ratio.
     AboveTested,

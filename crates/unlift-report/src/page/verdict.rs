@@ -255,7 +255,7 @@ fn break_even(point: &BreakEven, points: &str) -> String {
         }
         (Bound::BelowTested, Some(ratio)) => {
             format!(
-                "Half of the {points} come back even when only {ratio} % of the neighbors are right, the smallest share tested."
+                "Half of the {points} come back even when only {ratio} % of the neighbors are right."
             )
         }
         (Bound::AboveTested, Some(ratio)) => {

@@ -69,7 +69,7 @@ fn the_verdict_leads_with_the_strongest_attack_from_the_released_data() {
         "OLC Random lines Today, from the released data alone 58.6 % records alone (tomography) If half of the \
          neighbors were known 92.3 % known neighbors, 50 % right, solver consensus A blind guess recovers \
          1.9 %, the released records alone 58.6 %. Lists of neighbors add 33.7 percentage points (known neighbors). Half \
-         of the points come back even when only 10 % of the neighbors are right, the smallest share tested.",
+         of the points come back even when only 10 % of the neighbors are right.",
         "PLANE Axis-aligned planes Today, from the released data alone Not tried on this scheme, so the \
          result is unknown. If half of the neighbors were known 83.7 %",
     ];

@@ -3,6 +3,9 @@
 use super::plan::Plan;
 use super::row::Row;
 
+/// Largest difference of two tested ratios to interpolate between. Shares fall late, so a line over a wide gap would overstate safety.
+const MAX_GAP: f64 = 0.3;
+
 /// Percentage of recovered points at break-even.
 const HALF: f64 = 50.0;
 
@@ -11,7 +14,7 @@ const HALF: f64 = 50.0;
 pub enum Bound {
     /// Interpolated between two tested ratios.
     Interpolated,
-    /// Half or more come back even at the lowest tested ratio, which is stated.
+    /// Half or more come back at the stated ratio, and no ratio a little below it was tested.
     BelowTested,
     /// Fewer than half come back at every tested ratio; the highest is stated.
     AboveTested,
@@ -102,14 +105,14 @@ fn curve(rows: &[&Row], share: &dyn Fn(&Row) -> f64) -> Vec<(f64, f64)> {
 /// `curve` descends in ratio. It may cross one half several times, because shares vary by a few
 /// points between random seeds. Any higher crossing would overstate safety.
 fn crossing(curve: &[(f64, f64)]) -> Option<(f64, Bound)> {
-    let (first, last) = (curve.first()?, curve.last()?);
+    let first = curve.first()?;
     let Some(at) = curve.iter().rposition(|(_, share)| *share >= HALF) else {
         return Some((first.0, Bound::AboveTested));
     };
-    let Some(below) = curve.get(at + 1) else {
-        return Some((last.0, Bound::BelowTested));
-    };
     let above = curve[at];
+    let Some(below) = curve.get(at + 1).filter(|below| above.0 - below.0 < MAX_GAP) else {
+        return Some((above.0, Bound::BelowTested));
+    };
     let share = (above.1 - HALF) / (above.1 - below.1);
     Some((above.0 + share * (below.0 - above.0), Bound::Interpolated))
 }
@@ -124,6 +127,7 @@ mod tests {
         for (curve, expected) in [
             (&[(1.0, 90.0), (0.5, 70.0), (0.3, 40.0)][..], (0.5 - 0.4 / 3.0, Interpolated)),
             (&[(1.0, 90.0), (0.1, 60.0)], (0.1, BelowTested)),
+            (&[(0.5, 90.0), (0.1, 10.0)], (0.5, BelowTested)),
             (&[(1.0, 40.0), (0.1, 10.0)], (1.0, AboveTested)),
             // `ray-voxel` by `consensus` on a real map: the highest ratio gives a smaller share.
             (&[(1.0, 48.1), (0.75, 52.3), (0.5, 50.0)], (0.5, BelowTested)),
