@@ -18,6 +18,8 @@ const TICK: Duration = Duration::from_millis(500);
 const LINES: Duration = Duration::from_secs(60);
 /// Seconds of a day, the longest time that is estimated.
 const A_DAY: f64 = 86_400.0;
+/// Exit code after an interrupt, as shells have it.
+const INTERRUPTED: i32 = 130;
 /// Steps of a bar per item, so that it moves within items. Fractions are rounded to them.
 const PARTS: u64 = 1_000_000;
 
@@ -51,6 +53,20 @@ impl Progress {
             // A failed write only loses the status.
             let _ = text.write_str(&status(state.pos(), state.len(), state.elapsed()));
         }));
+        let (interrupted, began) = (bar.downgrade(), Instant::now());
+        // Of several, the first handler stays.
+        let _ = ctrlc::set_handler(move || {
+            if let Some(bar) = interrupted.upgrade() {
+                let (status, step) =
+                    (status(bar.position(), bar.length(), began.elapsed()), bar.message());
+                bar.finish_and_clear();
+                tell(format_args!("unlift: interrupted at {status}: {step}"));
+            }
+            tell(
+                "  try: nothing is written, so run it again, or in parts, each with its own --out",
+            );
+            std::process::exit(INTERRUPTED);
+        });
         if !quiet {
             // In a thread, because a step may take minutes.
             let (bar, started) = (bar.downgrade(), Instant::now());

@@ -219,8 +219,8 @@ const SURE: f32 = 0.9;
 const NEAR_PX: f64 = 10.0;
 
 /// Recovers the keypoints of a query also from its lists of neighbors. `known` has the positions that [`recover`] found, and `alone`
-/// those that lists alone give. Known positions that are more likely right than wrong, and than those of lists alone, stay as they are
-/// until exact constraints apply. The result has no confidence.
+/// those that lists alone give. Known positions that are more likely right than wrong, and that are more likely right than those of
+/// lists alone or near them, stay as they are until exact constraints apply. The result has no confidence.
 ///
 /// # Errors
 /// When the lists do not have one row per slot, or the arguments are of different queries.
@@ -231,15 +231,16 @@ pub fn with_lists(
     seed: u64,
 ) -> Result<Recovered<2>, Error> {
     let confidence = known.confidence().unwrap_or_default();
-    let is_sure = |slot: &usize| confidence[*slot].found >= SURE;
-    let sure: Vec<usize> = (0..confidence.len()).filter(is_sure).collect();
-    let is_right = |slot: &&usize| {
-        let both = known.position(**slot).zip(alone.position(**slot));
+    let is_near = |slot: usize| {
+        let both = known.position(slot).zip(alone.position(slot));
         both.is_some_and(|(a, b)| distance(&a, &b) <= NEAR_PX)
     };
-    let right = sure.iter().filter(is_right).count() as f32 / sure.len().max(1) as f32;
-    let kept = |row: &Confidence| if row.found > right { *row } else { Confidence::LOST };
-    let known = known.clone().with_confidence(confidence.iter().map(kept).collect())?;
+    let sure = || (0..confidence.len()).filter(|&slot| confidence[slot].found >= SURE);
+    let right = sure().filter(|&slot| is_near(slot)).count() as f32 / sure().count().max(1) as f32;
+    let keeps = |slot: usize, row: &Confidence| row.found > right || is_near(slot);
+    let kept = |(slot, row)| if keeps(slot, row) { *row } else { Confidence::LOST };
+    let kept = confidence.iter().enumerate().map(kept).collect();
+    let known = known.clone().with_confidence(kept)?;
     let options = RecoverOptions { seed, ..RecoverOptions::default() };
     recover_from(&known, &query.released, lists, &options)
 }

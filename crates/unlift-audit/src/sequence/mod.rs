@@ -21,6 +21,7 @@ use unlift::neighbors::{Neighborhoods, Source, of_what_there_is};
 use unlift::obfuscate::{Scheme, obfuscate};
 use unlift::recover::recover as recover_map;
 use unlift::recover::{Builtin, RecoverOptions, Recovered};
+use unlift::released::Obfuscation;
 use unlift::seed::Key;
 use unlift::sequence::{Links, Query, Solved, recover, with_lists};
 use unlift::truth::Secret;
@@ -455,6 +456,9 @@ impl Hidden<'_> {
         if let Some(lists) = attack.lists {
             let own = &self.queries[query];
             let (lists, alone) = &lists[query];
+            // Where they differ from a sequence, lists are no better under `cp2d` (docs/decisions/sequence.md).
+            let is_pair = matches!(own.released.obfuscation(), Obfuscation::AxisCandidates(_));
+            let alone = if is_pair { &solved.recovered } else { alone };
             solved.recovered = with_lists(&solved.recovered, own, (lists, alone), attack.seed)?;
         }
         Ok(solved)

@@ -1,10 +1,35 @@
 //! Output streams: unread pipes, full disks, and names with terminal control characters.
 
 use std::fs;
+#[cfg(unix)]
+use std::io::{BufRead, BufReader, Read};
+#[cfg(unix)]
+use std::process::{Command, Stdio};
 
 use crate::common::{Place, texts};
 
 const HIDE: &str = "obfuscate room.csv --scheme olc --k 10 --seed 1 --out hidden";
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_tells_what_was_done_and_that_nothing_is_written() {
+    let place = Place::with_room(3000);
+    place.write_descriptors("other.bin", &unlift::synthetic::room(2, 3000).points, 128);
+    let line = "audit map room.csv --scale 1 --descriptors other.bin --repeats 9 --out a";
+    let mut program = place.program(line.split(' ')).stderr(Stdio::piped()).spawn().unwrap();
+    // The doubt about the descriptors is told when the work starts.
+    let mut stderr = BufReader::new(program.stderr.take().unwrap());
+    let mut told = String::new();
+    stderr.read_line(&mut told).unwrap();
+    let killed = Command::new("kill").args(["-INT", &program.id().to_string()]).status().unwrap();
+    stderr.read_to_string(&mut told).unwrap();
+    assert_eq!((killed.success(), program.wait().unwrap().code()), (true, Some(130)), "{told}");
+    assert!(
+        told.contains("unlift: interrupted at ") && told.contains("nothing is written"),
+        "{told}"
+    );
+    assert!(!place.path("a/audit.json").exists());
+}
 
 #[test]
 fn a_reader_that_has_enough_ends_the_output_and_a_full_disk_is_an_error() {
