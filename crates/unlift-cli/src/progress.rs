@@ -3,9 +3,12 @@
 
 use std::fmt::Write;
 use std::io::IsTerminal;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use indicatif::{
+    HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle, WeakProgressBar,
+};
 use unlift::OneLine;
 
 use crate::stderr::tell;
@@ -18,6 +21,14 @@ const TICK: Duration = Duration::from_millis(500);
 const LINES: Duration = Duration::from_secs(60);
 /// Seconds of a day, the longest time that is estimated.
 const A_DAY: f64 = 86_400.0;
+/// The progress that started last, for an interrupt: its bar, its start and its line.
+type Current = (WeakProgressBar, Instant, fn(&ProgressBar, Duration) -> String);
+static CURRENT: Mutex<Option<Current>> = Mutex::new(None);
+
+fn lock(current: &Mutex<Option<Current>>) -> MutexGuard<'_, Option<Current>> {
+    current.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// Exit code after an interrupt, as shells have it.
 const INTERRUPTED: i32 = 130;
 /// Steps of a bar per item, so that it moves within items. Fractions are rounded to them.
@@ -53,18 +64,18 @@ impl Progress {
             // A failed write only loses the status.
             let _ = text.write_str(&status(state.pos(), state.len(), state.elapsed()));
         }));
-        let (interrupted, began) = (bar.downgrade(), Instant::now());
-        // Of several, the first handler stays.
-        let _ = ctrlc::set_handler(move || {
-            if let Some(bar) = interrupted.upgrade() {
-                let (status, step) =
-                    (status(bar.position(), bar.length(), began.elapsed()), bar.message());
+        *lock(&CURRENT) = Some((bar.downgrade(), Instant::now(), line));
+        // The first handler stays, and tells of the progress that started last.
+        let _ = ctrlc::set_handler(|| {
+            let current = lock(&CURRENT).take();
+            if let Some((bar, began, line)) = current
+                && let Some(bar) = bar.upgrade()
+            {
+                let done = line(&bar, began.elapsed());
                 bar.finish_and_clear();
-                tell(format_args!("unlift: interrupted at {status}: {step}"));
+                tell(format_args!("unlift: interrupted at {done}"));
             }
-            tell(
-                "  try: nothing is written, so run it again, or in parts, each with its own --out",
-            );
+            tell("  try: nothing is written: run it again, or in parts, each with its own --out");
             std::process::exit(INTERRUPTED);
         });
         if !quiet {
