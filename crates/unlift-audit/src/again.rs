@@ -29,8 +29,8 @@ use unlift_report::document::Input;
 
 use crate::Progress;
 use crate::document::{self, Found, Provenance, names, only_named, ordered};
-use crate::doubts::{check_lengths_of_gates, sides_m, with_extent};
-use crate::gate::{Gate, check_gates, gate_results};
+use crate::doubts::{sides_m, with_extent};
+use crate::gate::{Gate, check_gates, check_lengths_of_gates, gate_results};
 use crate::outputs::{Audited, Finished};
 use crate::prepare::{Preparation, Prepared};
 use crate::{Error, check_stop, frames, maps};

@@ -4,7 +4,7 @@
 
 use unlift::audit::{Plan, Row, Threshold};
 use unlift::evaluate::{
-    are_strangers, away_from_own, belongs, is_noise, nearer_to_own, recovered_away,
+    OFF_RECORD, are_strangers, away_from_own, belongs, is_noise, nearer_to_own, recovered_away,
 };
 use unlift::geometry::frame::Bounds;
 use unlift::geometry::knn::Knn;
@@ -16,7 +16,6 @@ use unlift::{Descriptors, PointSet, Unit};
 use unlift_report::document::{GateResult, Input};
 
 use crate::Error;
-use crate::gate::{Gate, noise};
 use crate::tiles::Tile;
 
 /// Limits of delta, in multiples of the quartiles of the distance to the K-th neighbor; beyond them
@@ -377,7 +376,7 @@ fn across(points: &[[f64; 3]]) -> f64 {
 const ACROSS_M: [f64; 2] = [1e-6, 1e9];
 /// If nearest neighbors are this many times the largest threshold apart, no attack can come near
 /// ([`HOPELESS`]), or the lengths are doubtful ([`UNUSUAL`]).
-const HOPELESS: f64 = 100.0;
+pub(crate) const HOPELESS: f64 = 100.0;
 const UNUSUAL: f64 = 10.0;
 
 /// Checks a scale against the points as they were read.
@@ -486,20 +485,20 @@ pub fn check_thresholds(
     Ok(SaidOfLengths::default())
 }
 
-/// Checks the thresholds of gates: a gate that no attack can break means nothing.
-pub(crate) fn check_lengths_of_gates(points: &PointSet<3>, gates: &[Gate]) -> Result<(), Error> {
-    let by_size = |a: &&Gate, b: &&Gate| a.threshold.total_cmp(&b.threshold);
-    let Some(gate) = gates.iter().min_by(by_size) else { return Ok(()) };
-    let nearest = Extent::of(points.positions())?.nearest;
-    if nearest < HOPELESS * gate.threshold {
-        return Ok(());
-    }
-    Err(Error::request(format!(
-        "--gate {}: expected points less than {HOPELESS} times its threshold from their nearest neighbors, found {} times: \
-         no attack could come near",
-        gate.typed,
-        short(nearest / gate.threshold)
-    )))
+/// Share of a threshold that noise of records may take. Attacks stay on records, and others may average noise away.
+const NOISE: f64 = 0.1;
+
+/// Returns a line about a row whose points are off their records, if that matters within `threshold`; always if it is infinite.
+pub(crate) fn noise(row: &Row, threshold: f64) -> Option<String> {
+    let off = *row.metrics.get(OFF_RECORD)?;
+    (!threshold.is_finite() || off > NOISE * threshold).then(|| {
+        format!(
+            "{}: half of the points are {} or more off their records, as by noise: an attack here stays on the records and \
+             keeps this error, but others may average it away",
+            row.scheme,
+            short(off)
+        )
+    })
 }
 
 /// Formats three digits, with an exponent where there would be many zeros.

@@ -15,15 +15,14 @@
 //! `sequence@5`, `sequence+lists@5` and `tracks@5` are sources: `dcl2d:sequence@5:10<=20` bounds what comes back from
 //! five queries, `olc:again:0.10<=20` what comes back from two releases of a map.
 
-use unlift::Unit;
 use unlift::audit::{NeighborsBy, NotAudited, Plan, Row, Threshold};
-use unlift::evaluate::OFF_RECORD;
 use unlift::neighbors::Needs;
 use unlift::neighbors::oracle::Noise;
 use unlift::recover::Builtin;
+use unlift::{PointSet, Unit};
 use unlift_report::document::{FEWEST_HELD_OUT, GateResult, HeldOut, Localization, UNPROTECTED};
 
-use crate::doubts::short;
+use crate::doubts::{Extent, HOPELESS, noise, short};
 use crate::{Error, sources};
 
 /// A bound on a figure of an audit.
@@ -403,20 +402,20 @@ fn untried<const D: usize>(gate: &Gate, plan: &Plan<D>, described: bool) -> Opti
     })
 }
 
-/// Share of a threshold that noise of records may take. Attacks stay on records, and others may average noise away.
-const NOISE: f64 = 0.1;
-
-/// Returns a line about a row whose points are off their records, if that matters within `threshold`; always if it is infinite.
-pub(crate) fn noise(row: &Row, threshold: f64) -> Option<String> {
-    let off = *row.metrics.get(OFF_RECORD)?;
-    (!threshold.is_finite() || off > NOISE * threshold).then(|| {
-        format!(
-            "{}: half of the points are {} or more off their records, as by noise: an attack here stays on the records and \
-             keeps this error, but others may average it away",
-            row.scheme,
-            short(off)
-        )
-    })
+/// Checks the thresholds of gates: a gate that no attack can break means nothing.
+pub(crate) fn check_lengths_of_gates(points: &PointSet<3>, gates: &[Gate]) -> Result<(), Error> {
+    let by_size = |a: &&Gate, b: &&Gate| a.threshold.total_cmp(&b.threshold);
+    let Some(gate) = gates.iter().min_by(by_size) else { return Ok(()) };
+    let nearest = Extent::of(points.positions())?.nearest;
+    if nearest < HOPELESS * gate.threshold {
+        return Ok(());
+    }
+    Err(Error::request(format!(
+        "--gate {}: expected points less than {HOPELESS} times its threshold from their nearest neighbors, found {} times: \
+         no attack could come near",
+        gate.typed,
+        short(nearest / gate.threshold)
+    )))
 }
 
 /// Returns the results of all gates. A gate fails if something it applies to was not audited, or if

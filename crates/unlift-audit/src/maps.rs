@@ -20,10 +20,9 @@ use crate::Error;
 use crate::curves::{Curves, curves_of};
 use crate::document::{self, Provenance};
 use crate::doubts::{
-    Spread, check_lengths_of_gates, check_scale, check_truth, doubts, sides_m, unlike_neighbors,
-    with_extent,
+    Spread, check_scale, check_truth, doubts, sides_m, unlike_neighbors, with_extent,
 };
-use crate::gate::{Gate, check_gates, gate_results};
+use crate::gate::{Gate, check_gates, check_lengths_of_gates, gate_results};
 use crate::given_away::follows_places;
 use crate::inversion::MapInversion;
 use crate::localization::{self, Cameras, Localize};

@@ -1,6 +1,20 @@
 //! Numbers and names in words: thresholds, shares, ratios, schemes, reasons.
 
-use crate::document::LengthUnit;
+use serde::{Deserialize, Serialize};
+
+/// The unit of every length in a row: thresholds, delta, errors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum LengthUnit {
+    /// Meters, by the declared scale.
+    #[serde(rename = "m")]
+    Meter,
+    /// The median distance of an original to its K-th nearest neighbor; used without a scale.
+    #[serde(rename = "kth_neighbor")]
+    KthNeighbor,
+    /// Pixels; used for audits of images.
+    #[serde(rename = "px")]
+    Pixel,
+}
 
 /// Returns the title of a scheme, with its changes to the map: `olc_thin4` is "Random lines, thin4". An
 /// unknown scheme keeps its name.

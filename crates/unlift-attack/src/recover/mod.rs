@@ -25,6 +25,7 @@ mod input;
 mod joint;
 mod map;
 mod options;
+mod placement;
 mod problem;
 mod ranking;
 mod records_alone;

@@ -12,7 +12,7 @@ use crate::recover::map::lines::LineRow;
 use crate::recover::map::lists::Slots;
 use crate::recover::map::pieces::{CandidatePieces, LinePieces, Pieces, PlanePieces};
 use crate::recover::options::{Delta, RecoverOptions};
-use crate::recover::records_alone::{self, Placement};
+use crate::recover::placement::{self, Placement};
 use crate::recover::result::{Estimate, Recovered, TrialCounts, Unknown};
 use crate::recover::solver::Builtin;
 use crate::recover::{anchors, beliefs, confidence, consensus, delta, exact, joint, ranking};
@@ -63,7 +63,7 @@ impl<'a, const D: usize> Problem<'a, D> {
         options.check()?;
         let map = released.fingerprint();
         map.expect(lists.about().map)?;
-        let at_peaks = |peaks: Peaks| (records_alone::delta(&peaks), Records::Alone(peaks));
+        let at_peaks = |peaks: Peaks| (placement::delta(&peaks), Records::Alone(peaks));
         let (delta, records) = match solver {
             Builtin::Density => at_peaks(published(released)),
             Builtin::Tomography => at_peaks(tomography(released)),

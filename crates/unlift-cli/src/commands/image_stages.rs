@@ -20,7 +20,6 @@ use unlift_io::stage::{ImageFile, ImageRows, ImageWriter, Kind as Stage};
 use unlift_vision::features::Extraction;
 
 use super::common::{RELEASED, TRUTH, expect_slots, same_map};
-use super::neighbors::Oracle;
 use crate::args::{EvaluateArgs, NeighborsArgs, ObfuscateArgs};
 use crate::progress::Stderr;
 use unlift_audit::Checked;
@@ -115,6 +114,13 @@ pub fn hide(args: &ObfuscateArgs, key: &Key, out: &mut OutputSet) -> crate::Resu
     truth.commit()?;
     released.commit()?;
     Ok(counts)
+}
+
+/// What the oracle needs.
+pub struct Oracle<'a> {
+    pub truth: &'a Path,
+    pub inlier_ratio: f64,
+    pub k: usize,
 }
 
 /// Writes the oracle's lists for all images to `args.out`, if `rules` allow it.

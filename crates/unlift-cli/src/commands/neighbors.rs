@@ -1,7 +1,5 @@
 //! `unlift neighbors`: makes neighbor lists from released data alone, or by the oracle.
 
-use std::path::Path;
-
 use unlift::neighbors::oracle::{Outliers, TrueNeighbors, search};
 use unlift::neighbors::sources::Named;
 use unlift::neighbors::{Needs, Neighborhoods, Source};
@@ -11,7 +9,7 @@ use unlift_io::outputs::{Kind, Rules};
 use unlift_io::stage::{Kind as Stage, has_images, read_released, read_truth, write_neighborhoods};
 
 use super::common::{expect_slots, same_map};
-use super::image_stages::{Counts, list_by_oracle, list_by_source};
+use super::image_stages::{Counts, Oracle, list_by_oracle, list_by_source};
 use crate::args::NeighborsArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::print;
@@ -22,13 +20,6 @@ use unlift_audit::check_file;
 
 /// Entries of the oracle's lists, by default.
 const K: u16 = 50;
-
-/// What the oracle needs.
-pub struct Oracle<'a> {
-    pub truth: &'a Path,
-    pub inlier_ratio: f64,
-    pub k: usize,
-}
 
 pub fn run(args: &NeighborsArgs) -> crate::Result<Outcome> {
     let inputs = [Some(args.released.as_path()), args.truth.as_deref()];

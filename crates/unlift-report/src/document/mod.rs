@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::words;
+pub use crate::words::LengthUnit;
 
 /// The schema that this build writes and reads.
 pub const SCHEMA: u32 = 1;
@@ -116,20 +117,6 @@ pub struct NotAudited {
     pub neighbors: Option<String>,
     /// The reason: what was expected and what was found.
     pub reason: String,
-}
-
-/// The unit of every length in a row: thresholds, delta, errors.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum LengthUnit {
-    /// Meters, by the declared scale.
-    #[serde(rename = "m")]
-    Meter,
-    /// The median distance of an original to its K-th nearest neighbor; used without a scale.
-    #[serde(rename = "kth_neighbor")]
-    KthNeighbor,
-    /// Pixels; used for audits of images.
-    #[serde(rename = "px")]
-    Pixel,
 }
 
 /// The figures of one (scheme, neighbors, oracle noise, inlier ratio, K, solver).

@@ -377,9 +377,8 @@ pub(crate) fn banner(document: &Document, cards: &[Card], refusals: &[Refusal]) 
         cards.iter().filter_map(|card| bearings_sentence(document, &card.scheme)).take(1).collect();
     let (level, headline, mut sentences) = match (today, known) {
         (Some(strongest), _) => {
-            let (headline, reason) = decision(document, cards);
-            let attack = attack_sentence(document, strongest);
-            let sentences = [reason, Some(attack)].into_iter().flatten().collect();
+            let (headline, mut sentences) = decision(document, cards);
+            sentences.push(attack_sentence(document, strongest));
             (Level::of(strongest.1.recovered), headline, sentences)
         }
         // An untested attack may succeed, so known neighbors decide the color.
@@ -398,56 +397,72 @@ pub(crate) fn banner(document: &Document, cards: &[Card], refusals: &[Refusal]) 
         Level::Gray if !bearings.is_empty() => {
             (Level::Orange, "Bearings of points are published.".to_owned())
         }
+        // A small leak is no good result before the main attack was tried.
+        Level::Gray if !uses_descriptors(document, None) => (Level::Orange, headline),
         level => (level, headline),
     };
-    // What was not tried stands beside a low figure.
-    let at = if headline.starts_with("Under") { 0 } else { sentences.len() };
-    sentences.splice(at..at, not_tried(document));
-    sentences.splice(0..0, bearings);
+    sentences.splice(0..0, bearings.into_iter().chain(not_tried(document)));
     Banner { level, headline, sentence: sentences.join(" "), every, unknown }
 }
 
-/// Returns whether to release, by what came back from the released data alone, and the reason.
-fn decision(document: &Document, cards: &[Card]) -> (String, Option<String>) {
-    let tried = cards.iter().filter(|card| bearings_sentence(document, &card.scheme).is_none());
-    let mut leaks: Vec<(f64, String)> =
-        tried.filter_map(|card| Some((card.today()?, words::scheme_name(&card.scheme)))).collect();
-    leaks.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let n_little = leaks.iter().filter(|leak| Level::of(leak.0) == Level::Gray).count();
-    let names = |leaks: &[(f64, String)]| {
-        let names: Vec<String> = leaks.iter().map(|leak| leak.1.clone()).collect();
-        words::list(&names)
-    };
-    let what = match cards
-        .iter()
-        .flat_map(|card| strongest(document, &card.scheme, Basis::Released))
-        .next()
-    {
-        Some(row) if row.unit == LengthUnit::Pixel => "these images",
-        _ => "this map",
-    };
-    match (leaks.as_slice(), n_little) {
-        ([], _) => (format!("Nothing is known about {what}."), None),
-        ([(_, name)], 0) => (format!("Do not release {what} under {name}."), None),
-        ([least, ..], 0) => {
-            let (percent, part) = (words::percent(least.0), words::part(least.0));
-            let of = match what {
-                "this map" => "points",
-                _ => "keypoints",
-            };
-            let reason =
-                format!("The least leak, {percent} % ({}), is {part} of the {of}.", least.1);
-            (format!("Do not release {what} under any scheme tried."), Some(reason))
-        }
-        (leaks, n) => {
-            let (little, much) = leaks.split_at(n);
-            let (percent, little) = (words::percent(little[n - 1].0), names(little));
-            let not = format!("Do not release {what} under {}.", names(much));
-            let headline =
-                format!("Under {little}, no attack tried here recovers more than {percent} %.");
-            (headline, (!much.is_empty()).then_some(not))
+/// Returns whether to release, by what came back from the released data alone, and the reasons. A small leak decides nothing
+/// before attacks by descriptors were tried.
+fn decision(document: &Document, cards: &[Card]) -> (String, Vec<String>) {
+    let (mut much, mut little, mut undecided) = (Vec::new(), Vec::new(), Vec::new());
+    let hides = |card: &&Card| bearings_sentence(document, &card.scheme).is_none();
+    let is_little = |percent: f64| Level::of(percent) == Level::Gray;
+    // Cards are sorted by their leak, the largest first.
+    for card in cards.iter().filter(hides) {
+        let name = words::scheme_name(&card.scheme);
+        match card.today() {
+            Some(percent) if !is_little(percent) => much.push((percent, name)),
+            Some(percent) if uses_descriptors(document, Some(&card.scheme)) => {
+                little.push((percent, name))
+            }
+            _ => undecided.push((0.0, name)),
         }
     }
+    let names = |leaks: &[(f64, String)]| {
+        words::list(&leaks.iter().map(|leak| leak.1.clone()).collect::<Vec<_>>())
+    };
+    let (what, of) = match is_of_images(document) {
+        true => ("these images", "keypoints"),
+        false => ("this map", "points"),
+    };
+    let not = format!("Do not release {what} under {}.", names(&much));
+    let open =
+        (!undecided.is_empty()).then(|| format!("Nothing is decided about {}.", names(&undecided)));
+    match (little.first(), much.last()) {
+        (Some(most), _) => {
+            let percent = words::percent(most.0);
+            let little = names(&little);
+            let headline =
+                format!("Under {little}, no attack tried here recovers more than {percent} %.");
+            let not = (!much.is_empty()).then_some(not);
+            (headline, not.into_iter().chain(open).collect())
+        }
+        (None, Some(least)) if much.len() > 1 => {
+            let (percent, part) = (words::percent(least.0), words::part(least.0));
+            let all = format!("Do not release {what} under any scheme tried.");
+            let headline = if undecided.is_empty() { all } else { not };
+            let reason =
+                format!("The least leak, {percent} % ({}), is {part} of the {of}.", least.1);
+            (headline, [reason].into_iter().chain(open).collect())
+        }
+        (None, Some(_)) => (not, open.into_iter().collect()),
+        (None, None) => (format!("Not decided: {what} under {}.", names(&undecided)), Vec::new()),
+    }
+}
+
+fn is_of_images(document: &Document) -> bool {
+    document.results.iter().any(|row| row.unit == LengthUnit::Pixel)
+}
+
+/// Returns true if an attack on `scheme`, or on any scheme, used descriptors.
+fn uses_descriptors(document: &Document, scheme: Option<&str>) -> bool {
+    let of_views = views::is_sequence(document) || views::is_again(document);
+    let mut rows = document.results.iter().filter(|row| scheme.is_none_or(|it| it == row.scheme));
+    of_views || rows.any(|row| BY_DESCRIPTORS.contains(&row.neighbors.as_str()))
 }
 
 /// Returns which kinds of attacks on released data were not tried.
@@ -455,12 +470,10 @@ fn not_tried(document: &Document) -> Option<String> {
     if views::is_sequence(document) || views::is_again(document) || document.results.is_empty() {
         return None;
     }
-    let rows = || document.results.iter();
-    let images = rows().any(|row| row.unit == LengthUnit::Pixel);
-    let by_descriptors = rows().any(|row| BY_DESCRIPTORS.contains(&row.neighbors.as_str()));
-    let alone = images || rows().any(|row| row.records_alone_percent.is_some());
+    let images = is_of_images(document);
+    let alone = images || document.results.iter().any(|row| row.records_alone_percent.is_some());
     let kinds = [
-        (!by_descriptors).then_some("attacks by descriptors"),
+        (!uses_descriptors(document, None)).then_some("attacks by descriptors"),
         (!alone).then_some("the attack on the records alone"),
         images.then_some("several queries with known poses (unlift audit sequence)"),
     ];
@@ -509,7 +522,7 @@ const BY_DESCRIPTORS: [&str; 4] = ["similarity", "overlap", "descriptors", "lear
 
 /// Returns the next steps, the most urgent first. Options of the command line are in back quotes.
 pub(crate) fn next_steps(document: &Document, cards: &[Card]) -> Vec<String> {
-    let images = document.results.first().is_some_and(|row| row.unit == LengthUnit::Pixel);
+    let images = is_of_images(document);
     let tried = |name: &str| document.results.iter().any(|row| row.neighbors.contains(name));
     let with_descriptors = BY_DESCRIPTORS.iter().any(|name| tried(name));
     let has_file = with_descriptors || document.input.other_sha256.contains_key("descriptors");
@@ -608,8 +621,9 @@ fn least(document: &Document, cards: &[Card]) -> Option<String> {
     let known = cards.iter().filter(|card| card.today().is_some()).count();
     let comparable = cards.iter().filter(|card| known == 0 || card.today().is_some());
     let card = comparable.copied().reduce(|a, b| if share(b) < share(a) { b } else { a })?;
-    // The banner says what the least leak means where it is too much.
-    if cards.len() < 2 || Level::of(share(card).unwrap_or(100.0)) > Level::Gray {
+    // The banner says what the least leak means where it is too much, or not decided.
+    let is_little = Level::of(share(card).unwrap_or(100.0)) == Level::Gray;
+    if cards.len() < 2 || !is_little || !uses_descriptors(document, Some(&card.scheme)) {
         return None;
     }
     let shares: Vec<String> = [Basis::Released, Basis::Oracle]

@@ -3,11 +3,12 @@
 
 use std::time::Instant;
 
+use super::clock::{Clock, RowSeconds};
 use super::lists::{Kept, Lists};
+use super::missing::{NotAudited, told};
 use super::observer::{Cell, Counts, Observer};
 use super::plan::{Plan, Threshold, key_of, oracle_seed};
 use super::row::{Alone, Row, measure};
-use super::run::{Clock, NotAudited, RowSeconds, told};
 use crate::evaluate::{
     Accuracy, away_from_own, bearings, belongs, blind, distinct_weights, evaluate,
     farthest_for_rounding, is_noise, joined, off_record,

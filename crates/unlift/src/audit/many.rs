@@ -8,11 +8,13 @@ use rayon::prelude::*;
 
 use super::break_even::break_even;
 use super::cells::{Finished, Owned, Rows, of_item};
+use super::clock::{Clock, RowSeconds, Seconds};
 use super::lists::Kept;
+use super::missing::NotAudited;
 use super::observer::{Observer, Silent};
 use super::plan::{Plan, Threshold};
 use super::row::{Alone, Distinct, PERCENTILES, Row};
-use super::run::{Clock, NotAudited, Outcome, RowSeconds, Seconds, none_applies};
+use super::run::{Outcome, none_applies};
 use crate::compiled::Both;
 use crate::evaluate::{Accuracy, Reliability};
 use crate::neighbors::oracle;

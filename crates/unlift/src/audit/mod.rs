@@ -6,8 +6,10 @@
 
 mod break_even;
 mod cells;
+mod clock;
 mod lists;
 mod many;
+mod missing;
 mod observer;
 mod plan;
 mod row;
@@ -16,8 +18,10 @@ pub mod staged;
 
 pub use break_even::{Bound, BreakEven, STRONGEST, break_even};
 pub use cells::{check_laws, records_alone};
+pub use clock::{RowSeconds, Seconds};
 pub use many::{Item, Watcher, run_many};
+pub use missing::NotAudited;
 pub use observer::{Cell, Counts, Measure, Observer, Silent};
 pub use plan::{NeighborsBy, Plan, PointNeighbors, Threshold, Variant};
 pub use row::{Alone, Distinct, PERCENTILES, Repeats, Row, measure};
-pub use run::{NotAudited, Outcome, RowSeconds, Seconds, run, run_released, scheme_called};
+pub use run::{Outcome, run, run_released, scheme_called};

@@ -1,23 +1,23 @@
-//! Audits of one map, in the clear or obfuscated by another program: its result, the parts of a plan without a row, and times.
+//! Audits of one map, in the clear or obfuscated by another program.
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use super::break_even::{BreakEven, break_even};
 use super::cells::{Owned, Rows, of_item};
+use super::clock::{Clock, Seconds};
 use super::lists::Kept;
+use super::missing::NotAudited;
 use super::observer::Observer;
-use super::plan::{Plan, Variant};
+use super::plan::Plan;
 use super::row::Row;
 use crate::compiled::Both;
 use crate::evaluate::belongs;
 use crate::geometry::frame::Bounds;
 use crate::neighbors::oracle;
-use crate::neighbors::oracle::Noise;
 use crate::obfuscate::{Lifted, Scheme};
 use crate::released::Released;
 use crate::seed::Key;
-use crate::truth::{DropReason, Original, Secret};
+use crate::truth::{Original, Secret};
 use crate::{Descriptors, Error};
 
 /// Result of an audit.
@@ -150,146 +150,4 @@ pub fn run_released(
     plan.check(original.len(), released.descriptors().is_some())?;
     belongs(original, released, secret)?;
     every_cell((original, None), Some(hidden), plan, observer)
-}
-
-/// A scheme, or a scheme with one source, that could not be audited. It has no row, because an
-/// unknown value must not look like a small one.
-#[derive(Clone, Debug, PartialEq)]
-pub struct NotAudited {
-    /// Scheme name.
-    pub scheme: String,
-    /// Source without lists, as in [`Row::neighbors`](super::Row::neighbors); `None` if the scheme
-    /// has no rows at all.
-    pub neighbors: Option<String>,
-    /// Noise model, if the source is the oracle.
-    pub oracle_noise: Option<&'static str>,
-    /// Inlier ratio requested of the oracle.
-    pub inlier_ratio: Option<f64>,
-    /// Error message: what was expected and what was found.
-    pub reason: String,
-}
-
-impl NotAudited {
-    pub(super) fn scheme(scheme: &str, error: &Error) -> Self {
-        Self {
-            scheme: scheme.to_owned(),
-            neighbors: None,
-            oracle_noise: None,
-            inlier_ratio: None,
-            reason: error.to_string(),
-        }
-    }
-
-    pub(super) fn variant<const D: usize>(
-        scheme: &str,
-        variant: &Variant<'_, D>,
-        error: &Error,
-        secret: &Secret,
-    ) -> Self {
-        let mut reason = error.to_string();
-        let (left, all) = (secret.dropped().len(), secret.n_originals());
-        if left > 0 {
-            let why = DropReason::ALL
-                .map(|why| (why, secret.dropped().iter().filter(|d| d.reason == why).count()));
-            let most = why.into_iter().max_by_key(|(_, n)| *n).map_or("", |(why, _)| why.name());
-            let most = most.replace('_', " ");
-            reason.push_str(&format!(
-                " ({scheme} leaves out {left} of {all} points, most of them as {most})"
-            ));
-        }
-        Self {
-            scheme: scheme.to_owned(),
-            neighbors: Some(variant.by.name().to_owned()),
-            oracle_noise: variant.noise.map(Noise::name),
-            inlier_ratio: variant.inlier_ratio,
-            reason,
-        }
-    }
-
-    /// Returns true if both have the same scheme and variant. Reasons are not compared.
-    pub(super) fn is_same_cell(&self, other: &Self) -> bool {
-        self.scheme == other.scheme
-            && self.neighbors == other.neighbors
-            && self.oracle_noise == other.oracle_noise
-            && self.inlier_ratio == other.inlier_ratio
-    }
-}
-
-/// Shortens `missing` of one scheme: a scheme without rows that failed for a single reason becomes
-/// one entry.
-pub(super) fn told(missing: Vec<NotAudited>, has_rows: bool) -> Vec<NotAudited> {
-    match missing.first() {
-        Some(first) if !has_rows && missing.iter().all(|m| m.reason == first.reason) => {
-            let (scheme, reason) = (first.scheme.clone(), first.reason.clone());
-            let (neighbors, oracle_noise, inlier_ratio) = (None, None, None);
-            vec![NotAudited { scheme, neighbors, oracle_noise, inlier_ratio, reason }]
-        }
-        _ => missing,
-    }
-}
-
-/// Seconds per stage. They are not part of the results.
-#[derive(Clone, Debug, Default, PartialEq)]
-#[non_exhaustive]
-pub struct Seconds {
-    /// Search of the originals' nearest neighbors.
-    pub search: f64,
-    /// Obfuscation, over all schemes and repeats.
-    pub obfuscate: f64,
-    /// Making of neighborhoods.
-    pub neighbors: f64,
-    /// Recovery.
-    pub recover: f64,
-    /// Attacks on the records alone, with their evaluation.
-    pub records_alone: f64,
-    /// Evaluation, including the blind baseline.
-    pub evaluate: f64,
-    /// Seconds per row, summed over repeats.
-    pub rows: Vec<RowSeconds>,
-}
-
-/// Seconds of one row.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[non_exhaustive]
-pub struct RowSeconds {
-    /// Making of its neighborhoods; 0 if another solver's row contains this time.
-    pub neighbors: f64,
-    /// Recovery.
-    pub recover: f64,
-}
-
-impl RowSeconds {
-    pub(super) fn add(&mut self, more: &Self) {
-        self.neighbors += more.neighbors;
-        self.recover += more.recover;
-    }
-}
-
-#[derive(Default)]
-pub(super) struct Clock {
-    pub(super) seconds: Seconds,
-}
-
-impl Clock {
-    pub(super) fn time<T>(
-        &mut self,
-        stage: impl Fn(&mut Seconds) -> &mut f64,
-        work: impl FnOnce() -> Result<T, Error>,
-    ) -> Result<T, Error> {
-        let started = Instant::now();
-        let result = work();
-        *stage(&mut self.seconds) += started.elapsed().as_secs_f64();
-        result
-    }
-
-    /// Adds the stages of another clock, without the seconds per row.
-    pub(super) fn merge(&mut self, more: &Self) {
-        let (to, more) = (&mut self.seconds, &more.seconds);
-        to.search += more.search;
-        to.obfuscate += more.obfuscate;
-        to.neighbors += more.neighbors;
-        to.recover += more.recover;
-        to.records_alone += more.records_alone;
-        to.evaluate += more.evaluate;
-    }
 }

@@ -4,13 +4,13 @@
 pub use super::plan::{key_of, oracle_seed};
 
 use super::cells::Finished;
+use super::clock::RowSeconds;
 use super::lists::{Kept, Lists};
 use super::many::Pool;
 use super::plan::Threshold;
 use super::plan::{NeighborsBy, Plan, Variant};
 use super::row::Row;
 use super::row::measure;
-use super::run::RowSeconds;
 use crate::evaluate::{blind, distinct_weights};
 use crate::neighbors::Neighborhoods;
 use crate::neighbors::oracle::{self, Noise};
