@@ -592,7 +592,7 @@ pub(crate) fn next_steps(document: &Document, cards: &[Card]) -> Vec<String> {
 fn gate_step(document: &Document, cards: &[Card]) -> Option<String> {
     let typed = tables::headline_threshold(document)?;
     let card = cards.iter().min_by(|a, b| {
-        let key = |card: &Card| card.today().unwrap_or(card.badness().1);
+        let key = |card: &Card| card.today().unwrap_or(f64::INFINITY);
         key(a).total_cmp(&key(b))
     })?;
     let released = strongest(document, &card.scheme, Basis::Released);
@@ -601,7 +601,9 @@ fn gate_step(document: &Document, cards: &[Card]) -> Option<String> {
         "oracle" => format!("@{}", row.inlier_ratio),
         source => format!(":{source}"),
     };
-    let limit = (share(row, &typed) + 2.0).ceil().min(100.0);
+    // A gate on an inlier ratio covers the baselines, too.
+    let today = card.today().filter(|_| released.is_none()).unwrap_or(0.0);
+    let limit = (share(row, &typed).max(today) + 2.0).ceil().min(100.0);
     let scheme = &card.scheme;
     Some(format!(
         "Test it in your build: `--gate '{scheme}{attack}:{typed}<={limit}'` fails if two points more come back \
