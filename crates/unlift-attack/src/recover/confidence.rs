@@ -3,7 +3,7 @@
 //! Around a right estimate, many of the records that the slot lists are near, and many of those that list the slot. Around a wrong one,
 //! fewer are, by chance or because estimates drifted together. A logistic model turns their numbers into a probability, and two of them
 //! into the scale of the error. Its constants were fitted on synthetic rooms, a cube, clusters and an outdoor scene, never on a real map
-//! (docs/decisions/confidence.md).
+//! (docs/decisions/attack.md).
 
 use rayon::prelude::*;
 

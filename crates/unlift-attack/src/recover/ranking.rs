@@ -79,7 +79,7 @@ const LEAST_LISTS: f32 = 4.0;
 const LEAST_RATIO: f32 = 0.15;
 /// The limit for lists with scores, which sources make. A choice by descriptors leaves out near points, too, so that a record that is
 /// not listed says little: lists of SIFT maps (0.2) would lose up to 17 points, those of ALIKED maps (0.6) up to 4. Lists of ALIKED images
-/// (0.9) gain up to 20 (docs/decisions/ranking.md).
+/// (0.9) gain up to 20 (docs/decisions/tried.md).
 const LEAST_RATIO_OF_SOURCES: f32 = 0.75;
 
 /// Returns the estimates of all slots after ranking from `start`, the estimates of joint recovery; `start` as an error if what lists do not

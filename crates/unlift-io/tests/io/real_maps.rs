@@ -114,7 +114,7 @@ fn what_is_said_about_a_real_map_comes_true() {
         let threshold = meters.unwrap_or(typical);
         let mut found: Option<Reliability> = None;
         let options = SchemeOptions { voxel: 5.0 * typical };
-        // Probabilities under `ray-voxel` are known to be too high (docs/decisions/confidence.md).
+        // Probabilities under `ray-voxel` are known to be too high (docs/decisions/attack.md).
         let fitted = SCHEMES.iter().filter(|entry| entry.name != "ray-voxel");
         for scheme in fitted.filter_map(|entry| entry.of_dimension::<3>(&options)) {
             let (released, secret) =

@@ -16,7 +16,7 @@
 //! published on the axis that was exchanged. The first iteration moves all slots, the others a random half of them.
 //!
 //! The method is belief propagation with particles on the graph of lists, as in the localization of sensor networks (Ihler et al. 2005),
-//! without the division by messages sent before, which changed no figure. Figures are in docs/decisions/beliefs.md.
+//! without the division by messages sent before, which changed no figure. Figures are in docs/decisions/attack.md.
 
 mod tables;
 mod temper;
