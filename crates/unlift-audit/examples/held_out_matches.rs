@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (model, features, nth): (PathBuf, PathBuf, usize) =
         (next()?.into(), next()?.into(), next()?.parse()?);
     let preparation = Preparation { scale: Some(1.0), ..Preparation::default() };
-    let (_, prepared) = maps::open(&model, None, &preparation)?;
+    let prepared = maps::open(&model, None, &preparation)?;
     let cameras = &prepared.cameras;
     let mut held = Held::open(&features, nth, cameras, &prepared.original, &Quiet)?;
     let lines = scheme("lines2d")?.of_dimension::<2>(&SchemeOptions::usual(Unit::Pixel));

@@ -9,11 +9,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use serde_json::{Map, Value, json};
+use serde_json::json;
 use unlift::Unit;
 use unlift::again::{Solved, by_descriptors, by_geometry};
 use unlift::audit::{NotAudited, Plan, Row, Seconds};
-use unlift::audit::{measure, records_alone, scheme_called};
+use unlift::audit::{measure, records_alone};
 use unlift::evaluate::{blind, joined};
 use unlift::geometry::knn::Knn;
 use unlift::geometry::vector::distance;
@@ -22,18 +22,14 @@ use unlift::released::Released;
 use unlift::seed::Key;
 use unlift::truth::{Original, Secret};
 use unlift_io::hash::hash_input;
-use unlift_io::outputs::OutputSet;
-use unlift_io::read;
-use unlift_report::RenderOptions;
 use unlift_report::document::Input;
 
-use crate::Progress;
-use crate::document::{self, Found, Provenance, names, only_named, ordered};
-use crate::doubts::{sides_m, with_extent};
-use crate::gate::{Gate, check_gates, check_lengths_of_gates, gate_results};
-use crate::outputs::{Audited, Finished};
+use crate::audit::{Attacked, Audit};
+use crate::document::ordered;
+use crate::doubts::sides_m;
+use crate::gate::Tried;
 use crate::prepare::{Preparation, Prepared};
-use crate::{Error, check_stop, frames, maps};
+use crate::{Error, Progress, check_stop, document, frames, maps};
 
 /// The solver of all rows.
 const SOLVER: &str = "intersection";
@@ -45,113 +41,191 @@ const GEOMETRY: &str = "again-geometry";
 /// The two maps of an audit, in one unit.
 pub struct Maps {
     /// The first map, whose points are to be recovered.
-    pub first: (read::Input, Prepared),
+    pub first: Prepared,
     /// The second map; `None` if it is the first one again.
-    pub second: Option<(read::Input, Prepared)>,
+    pub second: Option<Prepared>,
 }
 
-/// Reads two maps, each with its file of descriptors. Lengths of both are in the unit of the first.
-pub fn open([a, b]: [(&Path, Option<&Path>); 2], preparation: &Preparation) -> Result<Maps, Error> {
-    let first = maps::open(a.0, a.1, preparation)?;
-    if a == b {
-        return Ok(Maps { first, second: None });
+impl Maps {
+    /// Reads two maps. Lengths of both are in the unit of the first. `descriptors` are the files of the first and of the second map, or
+    /// of both, if they are one map. Notes and doubts about the second map are added to those of the first.
+    pub fn open(
+        [a, b]: [&Path; 2],
+        descriptors: &[PathBuf],
+        preparation: &Preparation,
+    ) -> Result<Self, Error> {
+        let files: [Option<&Path>; 2] = match (descriptors, a == b) {
+            ([], _) => [None, None],
+            ([both], true) => [Some(both), Some(both)],
+            ([a, b], _) => [Some(a), Some(b)],
+            (given, _) => {
+                let expected = "expected one file for A and one for B, as A and B differ";
+                let n = given.len();
+                return Err(Error::request(format!("--descriptors: {expected}, found {n}")));
+            }
+        };
+        let mut first = maps::open(a, files[0], preparation)?;
+        if (a, files[0]) == (b, files[1]) {
+            return Ok(Self { first, second: None });
+        }
+        let mut second = maps::open(b, files[1], preparation)?;
+        let points = second.original.reveal();
+        if points.unit() == Unit::KthNeighbor {
+            let factor = second.unit_in_map_units / first.unit_in_map_units;
+            let points = points.scaled(factor, Unit::KthNeighbor);
+            let points = points.map_err(|error| unlift_io::Error::core(b, error))?;
+            second.original = Original::new(points);
+        }
+        let dims = [&first, &second].map(|map| map.descriptors.as_ref().map(|rows| rows.dim()));
+        if let [Some(a), Some(b)] = dims
+            && a != b
+        {
+            return Err(Error::request(format!(
+                "--descriptors: expected {a} values per descriptor of B, as of A, found {b}"
+            )));
+        }
+        let of_second = |text: &String| format!("second map: {text}");
+        first.notes.extend(second.notes.iter().map(of_second));
+        first.doubts.extend(second.doubts.iter().map(of_second));
+        Ok(Self { first, second: Some(second) })
     }
-    let (input, mut prepared) = maps::open(b.0, b.1, preparation)?;
-    let points = prepared.original.reveal();
-    if points.unit() == Unit::KthNeighbor {
-        let factor = prepared.unit_in_map_units / first.1.unit_in_map_units;
-        let points = points.scaled(factor, Unit::KthNeighbor);
-        let points = points.map_err(|error| unlift_io::Error::core(b.0, error))?;
-        prepared.original = Original::new(points);
+
+    fn second(&self) -> &Prepared {
+        self.second.as_ref().unwrap_or(&self.first)
     }
-    Ok(Maps { first, second: Some((input, prepared)) })
+
+    /// Returns what a report says of the maps, whose first is at `path`.
+    ///
+    /// # Errors
+    /// If the files cannot be read again for their hash, or have changed.
+    pub fn about(&self, path: &Path) -> Result<Input, Error> {
+        let second = hash_input(&self.second().input)?;
+        let other_sha256 = ordered([("second".to_owned(), second)]);
+        Ok(Input { other_sha256, ..self.first.about(path)? })
+    }
 }
 
-/// The inputs of an audit of a map that is released twice.
-pub struct AgainJob<'a> {
+/// A map that is released twice, and how it is attacked.
+pub struct Again<'a> {
     /// The maps.
     pub maps: &'a Maps,
-    /// Their paths as typed.
-    pub paths: [&'a Path; 2],
     /// Schemes of the first and of the second release.
     pub pairs: Vec<[Arc<dyn Scheme<3>>; 2]>,
-    /// The plan: thresholds, seed, and whether records alone are attacked. [`perform`] fills in the
-    /// rest.
+    /// Thresholds, seed, and whether records alone are attacked.
     pub plan: Plan<3>,
-    /// Recorded options, in addition to those of the plan.
-    pub options: Map<String, Value>,
-    /// Notes for readers of the figures.
-    pub notes: Vec<String>,
-    /// Doubts about all figures. No gate holds with one.
-    pub doubts: Vec<String>,
-    /// The gates.
-    pub gates: Vec<Gate>,
-    /// The output folder.
-    pub out: PathBuf,
-    /// Writes figures only.
-    pub share_safe: bool,
-    /// Receives the progress.
-    pub progress: &'a dyn Progress,
-    /// The command line, for the record.
-    pub command: Option<String>,
-    /// The start of the command.
-    pub started: Instant,
 }
 
-/// Runs the job and writes its folder, completely or not at all.
-///
-/// # Errors
-/// If a scheme cannot hide a map, a gate has no row, `progress` stops the audit, or the folder
-/// cannot be written.
-pub fn perform(mut job: AgainJob<'_>, out: OutputSet) -> Result<Finished, Error> {
-    let (first, second) = (&job.maps.first, job.maps.second.as_ref().unwrap_or(&job.maps.first));
-    let described = first.1.descriptors.is_some() && second.1.descriptors.is_some();
-    job.plan.schemes = job.pairs.iter().map(|pair| scheme_called(&name(pair))).collect();
-    let sources = if described { &[AGAIN, GEOMETRY][..] } else { &[GEOMETRY] };
-    job.plan.neighbors = sources.iter().map(|by| only_named((*by).to_owned())).collect();
-    check_gates(&job.gates, &job.plan, false)?;
-    check_lengths_of_gates(first.1.original.reveal(), &job.gates)?;
-    if !described {
-        job.notes.push("links by geometry only: both maps need descriptors for others".to_owned());
+impl Again<'_> {
+    /// Attacks both releases. A scheme that cannot hide a map is an error.
+    pub(crate) fn attack(
+        &self,
+        audit: &Audit<'_>,
+        progress: &dyn Progress,
+    ) -> Result<Attacked, Error> {
+        let (first, second) = (&self.maps.first, self.maps.second());
+        let described = first.descriptors.is_some() && second.descriptors.is_some();
+        let sources = if described { &[AGAIN, GEOMETRY][..] } else { &[GEOMETRY] };
+        let tried = Tried {
+            schemes: self.pairs.iter().map(name).collect(),
+            sources: sources.iter().map(|&by| by.to_owned()).collect(),
+            solvers: vec![SOLVER.to_owned()],
+            inlier_ratios: Vec::new(),
+            lacks_best_source: described,
+            ..Tried::by(&self.plan, described)
+        };
+        let frame = match &self.maps.second {
+            Some(second) => frames::doubt(first, second)?,
+            None => None,
+        };
+        let doubts: Vec<String> = audit.doubts.iter().cloned().chain(frame).collect();
+        let without = "links by geometry only: both maps need descriptors for others";
+        let without = (!described).then(|| without.to_owned());
+        let notes = doubts.iter().chain(&audit.notes).cloned().chain(without).collect::<Vec<_>>();
+        audit.begin(&tried, Some(first.original.reveal()), &notes, progress)?;
+        let (rows, not_audited, seconds) = self.rows(sources, progress)?;
+        let mut options = document::names(&tried, audit.options.clone());
+        options.insert("records_alone".into(), json!(self.plan.records_alone));
+        let extent_m = sides_m(first.original.reveal());
+        Ok(Attacked {
+            tried,
+            about: Some(Input { extent_m, ..audit.about.clone() }),
+            options,
+            notes,
+            doubts: vec![doubts.first().cloned(); rows.len()],
+            rows,
+            not_audited,
+            seconds,
+            ..Attacked::default()
+        })
     }
-    if job.maps.second.is_some() {
-        job.doubts.extend(frames::doubt(&first.1, &second.1)?);
+
+    /// Hides both maps under each pair of schemes and attacks them.
+    fn rows(&self, sources: &[&str], progress: &dyn Progress) -> Result<Rows, Error> {
+        let (first, second, plan) = (&self.maps.first, self.maps.second(), &self.plan);
+        let (mut rows, mut not_audited) = (Vec::new(), Vec::new());
+        let mut seconds = Seconds::default();
+        let (total, seed) = (self.pairs.len() * sources.len(), plan.seed);
+        let knn = Knn::new(second.original.reveal().positions())?;
+        for (at, pair) in self.pairs.iter().enumerate() {
+            let scheme = name(pair);
+            let show = |what: &str| {
+                progress.show(at * sources.len(), total, &format!("{scheme}, {what}"));
+                check_stop(progress)
+            };
+            show("two releases")?;
+            let started = Instant::now();
+            let hide = |scheme: &dyn Scheme<3>, map: &Prepared, seed: u64| {
+                let key = Key::from_seed(seed);
+                obfuscate(scheme, &map.original, map.descriptors.as_ref(), &key)
+            };
+            let a = hide(&*pair[0], first, seed)?;
+            let b = hide(&*pair[1], second, seed.wrapping_add(1))?;
+            seconds.obfuscate += started.elapsed().as_secs_f64();
+            let alone = match plan.records_alone {
+                true => {
+                    show("records alone")?;
+                    let started = Instant::now();
+                    let alone = records_alone(&a, &first.original, plan, seed)?;
+                    seconds.records_alone += started.elapsed().as_secs_f64();
+                    alone
+                }
+                false => Vec::new(),
+            };
+            for &source in sources {
+                show(source)?;
+                let started = Instant::now();
+                let by = if source == AGAIN { by_descriptors } else { by_geometry };
+                let solved = match by(&a.0, &b.0) {
+                    Ok(solved) => solved,
+                    Err(error) => {
+                        not_audited.push(NotAudited {
+                            scheme: scheme.clone(),
+                            neighbors: Some(source.to_owned()),
+                            oracle_noise: None,
+                            inlier_ratio: None,
+                            reason: error.to_string(),
+                        });
+                        continue;
+                    }
+                };
+                seconds.recover += started.elapsed().as_secs_f64();
+                let row =
+                    row(&solved, plan, (&first.original, &a), (&second.original, &b.1), &knn)?;
+                let (neighbors, solver) = (source.to_owned(), SOLVER.to_owned());
+                let records_alone = alone.clone();
+                let (scheme, k) = (scheme.clone(), 2);
+                rows.push(Row { scheme, neighbors, solver, k, records_alone, ..row });
+            }
+        }
+        if rows.is_empty() {
+            let reason = not_audited.first().map_or("no schemes", |one| one.reason.as_str());
+            return Err(Error::request(format!(
+                "audit again: expected a row, found none: {reason}"
+            )));
+        }
+        seconds.rows = vec![Default::default(); rows.len()];
+        Ok((rows, not_audited, seconds))
     }
-    for note in job.doubts.iter().chain(&job.notes) {
-        job.progress.say(&format!("note: {note}"));
-    }
-    let (rows, not_audited, seconds) = rows(&job, [&first.1, &second.1], sources)?;
-    let doubts = vec![job.doubts.first().cloned(); rows.len()];
-    let gates =
-        gate_results(&job.gates, (&job.plan, described), &rows, &not_audited, &doubts, &[])?;
-    let mut options = job.options.clone();
-    options.extend(names(&job.plan));
-    options.insert("records_alone".into(), json!(job.plan.records_alone));
-    let points = first.1.original.reveal();
-    let scale = 1.0 / first.1.unit_in_map_units;
-    let mut provenance = Provenance {
-        input: Input {
-            path: Some(job.paths[0].display().to_string()),
-            sha256: Some(hash_input(&first.0)?),
-            n_points: points.len() as u64,
-            scale_m_per_unit: (points.unit() == Unit::Meter).then_some(scale),
-            unit_in_map_units: Some(first.1.unit_in_map_units),
-            extent_m: sides_m(points),
-            other_sha256: ordered([("second".to_owned(), hash_input(&second.0)?)]),
-            ..Input::default()
-        },
-        options,
-        notes: job.doubts.iter().chain(&job.notes).cloned().collect(),
-        gates,
-        command: job.command,
-        started: job.started,
-    };
-    provenance.gates = with_extent(provenance.gates, &provenance.input);
-    let found =
-        Found { rows: &rows, not_audited: &not_audited, break_even: &[], seconds: &seconds };
-    let document = document::document(&job.plan, &found, provenance);
-    let audited = Audited { document, scene: None, drawn: RenderOptions::default() };
-    audited.write(out, &job.out, job.share_safe)
 }
 
 /// Returns the name of a pair of schemes: `olc`, or `olc/cp` for two different ones.
@@ -160,75 +234,6 @@ fn name([a, b]: &[Arc<dyn Scheme<3>>; 2]) -> String {
 }
 
 type Rows = (Vec<Row>, Vec<NotAudited>, Seconds);
-
-/// Hides both maps under each pair of schemes and attacks them.
-fn rows(
-    job: &AgainJob<'_>,
-    [first, second]: [&Prepared; 2],
-    sources: &[&str],
-) -> Result<Rows, Error> {
-    let (mut rows, mut not_audited) = (Vec::new(), Vec::new());
-    let mut seconds = Seconds::default();
-    let (total, seed) = (job.pairs.len() * sources.len(), job.plan.seed);
-    let knn = Knn::new(second.original.reveal().positions())?;
-    for (at, pair) in job.pairs.iter().enumerate() {
-        let scheme = name(pair);
-        let show = |what: &str| {
-            job.progress.show(at * sources.len(), total, &format!("{scheme}, {what}"));
-            check_stop(job.progress)
-        };
-        show("two releases")?;
-        let started = Instant::now();
-        let hide = |scheme: &dyn Scheme<3>, map: &Prepared, seed: u64| {
-            let key = Key::from_seed(seed);
-            obfuscate(scheme, &map.original, map.descriptors.as_ref(), &key)
-        };
-        let a = hide(&*pair[0], first, seed)?;
-        let b = hide(&*pair[1], second, seed.wrapping_add(1))?;
-        seconds.obfuscate += started.elapsed().as_secs_f64();
-        let alone = match job.plan.records_alone {
-            true => {
-                show("records alone")?;
-                let started = Instant::now();
-                let alone = records_alone(&a, &first.original, &job.plan, seed)?;
-                seconds.records_alone += started.elapsed().as_secs_f64();
-                alone
-            }
-            false => Vec::new(),
-        };
-        for &source in sources {
-            show(source)?;
-            let started = Instant::now();
-            let by = if source == AGAIN { by_descriptors } else { by_geometry };
-            let solved = match by(&a.0, &b.0) {
-                Ok(solved) => solved,
-                Err(error) => {
-                    not_audited.push(NotAudited {
-                        scheme: scheme.clone(),
-                        neighbors: Some(source.to_owned()),
-                        oracle_noise: None,
-                        inlier_ratio: None,
-                        reason: error.to_string(),
-                    });
-                    continue;
-                }
-            };
-            seconds.recover += started.elapsed().as_secs_f64();
-            let row =
-                row(&solved, &job.plan, (&first.original, &a), (&second.original, &b.1), &knn)?;
-            let (neighbors, solver) = (source.to_owned(), SOLVER.to_owned());
-            let records_alone = alone.clone();
-            let (scheme, k) = (scheme.clone(), 2);
-            rows.push(Row { scheme, neighbors, solver, k, records_alone, ..row });
-        }
-    }
-    if rows.is_empty() {
-        let reason = not_audited.first().map_or("no schemes", |one| one.reason.as_str());
-        return Err(Error::request(format!("audit again: expected a row, found none: {reason}")));
-    }
-    seconds.rows = vec![Default::default(); rows.len()];
-    Ok((rows, not_audited, seconds))
-}
 
 /// Measures what came back of the first map. A link is right if no point of the second map is nearer
 /// to the first one's.

@@ -5,11 +5,12 @@ use std::time::Instant;
 use indexmap::IndexMap;
 use serde_json::{Map, Value, json};
 use unlift::Unit;
-use unlift::audit::{self, NeighborsBy, NotAudited, Plan, PointNeighbors, Row, Threshold};
+use unlift::audit::{self, NeighborsBy, NotAudited, Plan, Row, Threshold};
 use unlift::recover::Delta;
 use unlift_report::Given;
 use unlift_report::document as report;
 
+use crate::gate::Tried;
 use crate::tiles::Tile;
 
 /// Facts about an audit that its outcome does not contain.
@@ -61,18 +62,12 @@ pub fn options<const D: usize>(plan: &Plan<D>, more: Map<String, Value>) -> Map<
     options
 }
 
-/// Returns the names of the plan's schemes and thresholds as recorded options.
-pub fn names<const D: usize>(plan: &Plan<D>) -> Map<String, Value> {
-    let schemes: Vec<&str> = plan.schemes.iter().map(|scheme| scheme.name()).collect();
-    let thresholds: Vec<&str> = plan.thresholds.iter().map(|t| t.label.as_str()).collect();
-    let named = [("schemes", json!(schemes)), ("thresholds", json!(thresholds))];
-    named.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
-}
-
-/// Returns a source without lists, so that gates know the name of rows that an audit makes itself.
-pub fn only_named<const D: usize>(name: String) -> NeighborsBy<D> {
-    let (offsets, neighbors, scores) = (Vec::new(), Vec::new(), None);
-    NeighborsBy::Given(PointNeighbors { name, offsets, neighbors, scores })
+/// Returns the names of schemes and thresholds, and `more`, as recorded options.
+pub fn names(tried: &Tried, more: Map<String, Value>) -> Map<String, Value> {
+    let thresholds: Vec<&str> = tried.thresholds.iter().map(|t| t.label.as_str()).collect();
+    let named = [("schemes", json!(tried.schemes)), ("thresholds", json!(thresholds))];
+    let named = named.into_iter().map(|(name, value)| (name.to_owned(), value));
+    more.into_iter().chain(named).collect()
 }
 
 /// The results of an audit of a map or of images.

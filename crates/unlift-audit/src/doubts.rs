@@ -402,7 +402,7 @@ pub fn check_scale(points: &[[f64; 3]], scale: Option<f64>) -> Result<(), Error>
 
 /// Messages about lengths: a note, and a doubt, with which no gate holds.
 #[derive(Debug, Default, PartialEq, Eq)]
-pub struct SaidOfLengths {
+pub struct LengthMessages {
     /// Figures may be too large.
     pub note: Option<String>,
     /// Figures may be too small.
@@ -419,15 +419,15 @@ pub fn check_thresholds(
     unit: Unit,
     thresholds: &[Threshold],
     typed: bool,
-) -> Result<SaidOfLengths, Error> {
+) -> Result<LengthMessages, Error> {
     if unit != Unit::Meter && !typed {
-        return Ok(SaidOfLengths::default());
+        return Ok(LengthMessages::default());
     }
     let by_size = |a: &&Threshold, b: &&Threshold| a.value.total_cmp(&b.value);
     let (Some(least), Some(most)) =
         (thresholds.iter().min_by(by_size), thresholds.iter().max_by(by_size))
     else {
-        return Ok(SaidOfLengths::default());
+        return Ok(LengthMessages::default());
     };
     let Extent { across, nearest } = Extent::of(points)?;
     let option = if typed { "--thresholds" } else { "--scale" };
@@ -471,7 +471,7 @@ pub fn check_thresholds(
             in_unit(across),
             named(most),
         );
-        return Ok(SaidOfLengths { note: Some(note), doubt: None });
+        return Ok(LengthMessages { note: Some(note), doubt: None });
     }
     if nearest >= UNUSUAL * most.value {
         let doubt = format!(
@@ -480,9 +480,9 @@ pub fn check_thresholds(
             in_unit(nearest),
             named(most),
         );
-        return Ok(SaidOfLengths { note: None, doubt: Some(doubt) });
+        return Ok(LengthMessages { note: None, doubt: Some(doubt) });
     }
-    Ok(SaidOfLengths::default())
+    Ok(LengthMessages::default())
 }
 
 /// Share of a threshold that noise of records may take. Attacks stay on records, and others may average noise away.
@@ -544,7 +544,7 @@ mod tests {
         unit: Unit,
         labels: [&str; 2],
         typed: bool,
-    ) -> Result<SaidOfLengths, String> {
+    ) -> Result<LengthMessages, String> {
         let thresholds = labels.map(|label| Threshold::parse(label).unwrap());
         check_thresholds(&room(scale), unit, &thresholds, typed).map_err(|error| error.to_string())
     }
@@ -560,7 +560,7 @@ mod tests {
     #[test]
     fn thresholds_that_mean_nothing_for_a_map_are_refused_or_noted() {
         let usual = |scale| checked(scale, Unit::Meter, ["0.10", "0.25"], false);
-        assert_eq!(usual(1.0), Ok(SaidOfLengths::default()));
+        assert_eq!(usual(1.0), Ok(LengthMessages::default()));
         // The larger threshold alone gives a note.
         let note = usual(0.03).unwrap().note.unwrap();
         assert!(note.contains("less than the threshold 0.25 m"), "{note}");
@@ -570,9 +570,9 @@ mod tests {
         let of = |labels, typed| checked(20.0, Unit::KthNeighbor, labels, typed);
         for labels in [["1e300", "1e301"], ["1e-300", "1e-9"]] {
             assert!(of(labels, true).unwrap_err().starts_with("--thresholds: expected"));
-            assert_eq!(of(labels, false), Ok(SaidOfLengths::default()));
+            assert_eq!(of(labels, false), Ok(LengthMessages::default()));
         }
-        assert_eq!(of(["1.0", "2.5"], true), Ok(SaidOfLengths::default()));
+        assert_eq!(of(["1.0", "2.5"], true), Ok(LengthMessages::default()));
     }
 
     #[test]

@@ -99,38 +99,36 @@ impl Gate {
             && missing.neighbors.as_ref().is_none_or(|name| of_source(name) && of_ratio)
     }
 
-    /// Returns a part of the gate for which `plan` has no row, as expected and found.
-    pub fn not_in<const D: usize>(&self, plan: &Plan<D>) -> Option<(String, String)> {
-        let listed = |names: Vec<String>| format!("one of {}", names.join(", "));
-        let lacks = |what: &str, wanted: &str, names: Vec<String>| {
-            let found = (wanted.to_owned(), !names.iter().any(|name| name == wanted));
-            found.1.then(|| (format!("{what}: {}", listed(names)), found.0))
+    /// Returns a part of the gate for which the audit has no row, as expected and found.
+    pub fn not_in(&self, tried: &Tried) -> Option<(String, String)> {
+        let one_of = |names: &[String]| format!("one of {}", names.join(", "));
+        let lacks = |what: &str, requested: Option<&str>, names: &[String]| {
+            let unknown = requested.filter(|name| !names.iter().any(|known| known == name))?;
+            Some((format!("{what}: {}", one_of(names)), unknown.to_owned()))
         };
-        let schemes = || plan.schemes.iter().map(|s| s.name().to_owned()).collect();
-        let solvers = || plan.solvers.iter().map(|s| s.name().to_owned()).collect();
-        let sources = || plan.neighbors.iter().map(|by| by.name().to_owned()).collect();
-        let scheme = self.scheme.as_ref().and_then(|name| lacks("scheme", name, schemes()));
-        let solver = || self.solver.and_then(|name| lacks("solver", name, solvers()));
-        let source = || self.source.as_ref().and_then(|name| lacks("neighbors", name, sources()));
-        let oracle = plan.asks_oracle();
-        let ratios = if oracle { plan.inlier_ratios.as_slice() } else { &[] };
-        let ratio = || {
-            let wanted = self.inlier_ratio.filter(|wanted| !ratios.contains(wanted))?;
-            let expected = match oracle {
-                true => listed(ratios.iter().map(f64::to_string).collect()),
-                false => "none, because measured ratios have no gates".to_owned(),
-            };
-            Some((format!("inlier ratio: {expected}"), wanted.to_string()))
-        };
-        let threshold = || {
-            let labels = plan.thresholds.iter().map(|t| t.label.clone()).collect();
-            let known = plan.thresholds.iter().any(|t| t.value == self.threshold);
-            (!known).then(|| (format!("threshold: {}", listed(labels)), self.threshold.to_string()))
-        };
+        let scheme = lacks("scheme", self.scheme.as_deref(), &tried.schemes);
         if self.figure == Figure::Localization {
             return scheme;
         }
-        scheme.or_else(solver).or_else(source).or_else(ratio).or_else(threshold)
+        let ratio = || {
+            let ratio = self.inlier_ratio.filter(|ratio| !tried.inlier_ratios.contains(ratio))?;
+            let expected = match tried.inlier_ratios.as_slice() {
+                [] => "none, because measured ratios have no gates".to_owned(),
+                ratios => one_of(&ratios.iter().map(f64::to_string).collect::<Vec<_>>()),
+            };
+            Some((format!("inlier ratio: {expected}"), ratio.to_string()))
+        };
+        let threshold = || {
+            let labels: Vec<_> = tried.thresholds.iter().map(|t| t.label.clone()).collect();
+            let known = tried.thresholds.iter().any(|t| t.value == self.threshold);
+            (!known)
+                .then(|| (format!("threshold: {}", one_of(&labels)), self.threshold.to_string()))
+        };
+        scheme
+            .or_else(|| lacks("solver", self.solver, &tried.solvers))
+            .or_else(|| lacks("neighbors", self.source.as_deref(), &tried.sources))
+            .or_else(ratio)
+            .or_else(threshold)
     }
 
     /// Returns the largest bounded figure among `candidates`. `None` if the gate covers none of
@@ -312,13 +310,13 @@ fn ratio(text: &str) -> Result<f64, String> {
 }
 
 /// Returns the candidates of gates, each with its row and the index of its threshold.
-fn candidates<'a, const D: usize>(
-    plan: &Plan<D>,
+fn candidates<'a>(
+    thresholds: &[Threshold],
     rows: &'a [Row],
 ) -> Vec<(Candidate<'a>, &'a Row, usize)> {
     let mut candidates = Vec::new();
     for row in rows {
-        for (at, threshold) in plan.thresholds.iter().enumerate() {
+        for (at, threshold) in thresholds.iter().enumerate() {
             let candidate = Candidate {
                 scheme: &row.scheme,
                 solver: &row.solver,
@@ -355,19 +353,62 @@ fn in_words(gate: &Gate, found: f64, row: &Row, at: usize, threshold: &Threshold
     format!("{}, {attack}, {verb} within {} {unit}", row.scheme, threshold.label)
 }
 
-/// Reports a gate without rows before the audit runs. `localizes` is true if the audit measures
-/// localization.
-pub fn check_gates<const D: usize>(
-    gates: &[Gate],
-    plan: &Plan<D>,
-    localizes: bool,
-) -> Result<(), Error> {
+/// What an audit tries, by the names that its rows have.
+#[derive(Clone, Debug, Default)]
+pub struct Tried {
+    /// Schemes.
+    pub schemes: Vec<String>,
+    /// Solvers.
+    pub solvers: Vec<String>,
+    /// Sources of neighborhoods.
+    pub sources: Vec<String>,
+    /// Inlier ratios of the oracle; none without it.
+    pub inlier_ratios: Vec<f64>,
+    /// Errors below which a point counts as recovered.
+    pub thresholds: Vec<Threshold>,
+    /// Whether records alone could be attacked and are not.
+    pub lacks_records_alone: bool,
+    /// Whether descriptors are known and the best source for them is not tried.
+    pub lacks_best_source: bool,
+    /// Whether localization is measured.
+    pub localizes: bool,
+}
+
+impl Tried {
+    /// Returns what `plan` tries; `described` is true if there are descriptors. True neighbors alone replace a source, as no source
+    /// is better.
+    pub fn by<const D: usize>(plan: &Plan<D>, described: bool) -> Self {
+        let described = described || plan.own_sources().any(|by| by.needs() == Needs::Descriptors);
+        let is_best = |by: &NeighborsBy<D>| match by {
+            NeighborsBy::Oracle => plan.inlier_ratios.contains(&1.0),
+            by => by.name() == sources::BY_DESCRIPTORS.name,
+        };
+        Self {
+            schemes: plan.schemes.iter().map(|scheme| scheme.name().to_owned()).collect(),
+            solvers: plan.solvers.iter().map(|solver| solver.name().to_owned()).collect(),
+            sources: plan.neighbors.iter().map(|by| by.name().to_owned()).collect(),
+            inlier_ratios: plan
+                .inlier_ratios
+                .iter()
+                .copied()
+                .filter(|_| plan.asks_oracle())
+                .collect(),
+            thresholds: plan.thresholds.clone(),
+            lacks_records_alone: D == 3 && !plan.records_alone,
+            lacks_best_source: described && !plan.neighbors.iter().any(is_best),
+            localizes: false,
+        }
+    }
+}
+
+/// Reports a gate without rows before the audit runs.
+pub fn check_gates(gates: &[Gate], tried: &Tried) -> Result<(), Error> {
     let of_localization = |gate: &&Gate| gate.figure == Figure::Localization;
-    if let Some(gate) = gates.iter().find(of_localization).filter(|_| !localizes) {
+    if let Some(gate) = gates.iter().find(of_localization).filter(|_| !tried.localizes) {
         let expected = "expected a COLMAP model with cameras and tracks, not in tiles";
         return Err(Error::request(format!("--gate {}: {expected}, found none", gate.typed)));
     }
-    let lacking = |gate: &Gate| gate.not_in(plan).map(|part| (gate.typed.clone(), part));
+    let lacking = |gate: &Gate| gate.not_in(tried).map(|part| (gate.typed.clone(), part));
     match gates.iter().find_map(lacking) {
         None => Ok(()),
         Some((gate, (expected, found))) => {
@@ -383,20 +424,13 @@ pub fn check_gates<const D: usize>(
     }
 }
 
-/// Returns an attack that `plan` lacks although the gate covers it; `described` is true if the map has descriptors. True
-/// neighbors alone replace a source, as no source is better.
-fn untried<const D: usize>(gate: &Gate, plan: &Plan<D>, described: bool) -> Option<String> {
+/// Returns an attack that was not tried although the gate covers it.
+fn untried(gate: &Gate, tried: &Tried) -> Option<String> {
     let all = gate.solver.is_none() && gate.source.is_none();
-    if D == 3 && all && gate.figure == Figure::Recovered && !plan.records_alone {
+    if all && gate.figure == Figure::Recovered && tried.lacks_records_alone {
         return Some("records alone were not tried, and no attack is named".to_owned());
     }
-    let described = described || plan.own_sources().any(|by| by.needs() == Needs::Descriptors);
-    let is_best = |by: &NeighborsBy<D>| match by {
-        NeighborsBy::Oracle => plan.inlier_ratios.contains(&1.0),
-        by => by.name() == sources::BY_DESCRIPTORS.name,
-    };
-    let lacks = all && gate.inlier_ratio.is_none() && described;
-    (lacks && !plan.neighbors.iter().any(is_best)).then(|| {
+    (all && gate.inlier_ratio.is_none() && tried.lacks_best_source).then(|| {
         let best = sources::BY_DESCRIPTORS.name;
         format!("neighbors by {best}, the best source, were not tried, and no attack is named")
     })
@@ -420,19 +454,20 @@ pub(crate) fn check_lengths_of_gates(points: &PointSet<3>, gates: &[Gate]) -> Re
 
 /// Returns the results of all gates. A gate fails if something it applies to was not audited, or if
 /// a row it applies to has a doubt; `doubts` has one entry per row, or is empty. A gate that names no
-/// attack needs the best one of each kind; `described` is true if the map has descriptors.
-pub fn gate_results<const D: usize>(
+/// attack needs the best one of each kind.
+pub fn gate_results(
     gates: &[Gate],
-    (plan, described): (&Plan<D>, bool),
+    tried: &Tried,
     rows: &[Row],
     not_audited: &[NotAudited],
     doubts: &[Option<String>],
     localization: &[Localization],
 ) -> Result<Vec<GateResult>, Error> {
     let doubtful = rows.iter().zip(doubts).filter_map(|(row, doubt)| Some((row, doubt.as_ref()?)));
-    let doubtful: Vec<(Vec<_>, &String)> =
-        doubtful.map(|(row, doubt)| (candidates(plan, std::slice::from_ref(row)), doubt)).collect();
-    let rows = candidates(plan, rows);
+    let doubtful: Vec<(Vec<_>, &String)> = doubtful
+        .map(|(row, doubt)| (candidates(&tried.thresholds, std::slice::from_ref(row)), doubt))
+        .collect();
+    let rows = candidates(&tried.thresholds, rows);
     let result = |gate: &Gate| {
         if gate.figure == Figure::Localization {
             return Ok(of_localization(gate, localization, not_audited));
@@ -443,7 +478,7 @@ pub fn gate_results<const D: usize>(
                 gate.worst([candidate]).is_some_and(|one| one.total_cmp(&found).is_eq())
             };
             let (_, row, at) = rows.iter().find(|(candidate, ..)| decides(*candidate))?;
-            Some(in_words(gate, found, row, *at, &plan.thresholds[*at]))
+            Some(in_words(gate, found, row, *at, &tried.thresholds[*at]))
         });
         let is_about = |rows: &[(Candidate<'_>, &Row, usize)]| {
             rows.iter().any(|(candidate, ..)| gate.covers(candidate))
@@ -458,7 +493,7 @@ pub fn gate_results<const D: usize>(
         let mut covered = rows.iter().filter(|(candidate, ..)| gate.covers(candidate));
         let of_noise = || covered.find_map(|(_, row, _)| noise(row, gate.threshold));
         let doubt = doubt.map(|doubt| doubt.to_string()).or_else(of_noise);
-        let doubt = || doubt.or_else(|| untried(gate, plan, described));
+        let doubt = || doubt.or_else(|| untried(gate, tried));
         let reason = reason.or_else(|| if keeps { doubt() } else { None });
         // A gate without a row must never count as held.
         if found_percent.is_none() && reason.is_none() {
@@ -629,7 +664,7 @@ mod tests {
             ("ppl@0.4:0.10<=20", "inlier ratio: one of 1, 0.5, found 0.4"),
             ("ppl:0.2<=20", "threshold: one of 0.10, 0.25, found 0.2"),
         ] {
-            let lacks = Gate::parse(text).unwrap().not_in(&plan);
+            let lacks = Gate::parse(text).unwrap().not_in(&Tried::by(&plan, false));
             let line = lacks.map(|(expected, found)| format!("{expected}, found {found}"));
             assert_eq!(line.unwrap_or_default(), expected, "{text}");
         }

@@ -1,32 +1,32 @@
 //! Audits of files as a library call: from a map or images on disk to figures and a page.
 //!
 //! ```text
-//! open ──> Plan ──> perform (run, gate, draw) ──> audit.json, report.html
+//! input, plan, gates, output ──Audit──> run ──> Audited ──write──> audit.json, report.html
 //! ```
 //!
 //! ```no_run
 //! use std::path::Path;
-//! use std::time::Instant;
 //!
 //! use unlift::Unit;
 //! use unlift::audit::Plan;
-//! use unlift_audit::{Gate, Job, Preparation, maps, open_audit};
+//! use unlift_audit::maps::{self, Map};
+//! use unlift_audit::{Audit, Gate, Input, Output, Preparation, Quiet};
 //! use unlift_io::outputs::Rules;
 //!
 //! # fn main() -> Result<(), unlift_audit::Error> {
-//! let (started, path) = (Instant::now(), Path::new("reconstruction/0"));
+//! let path = Path::new("reconstruction/0");
 //! let preparation = Preparation { scale: Some(1.0), ..Preparation::default() };
-//! let (input, prepared) = maps::open(path, None, &preparation)?;
-//! let out = Path::new("audit");
-//! let files = open_audit(out, Rules::new([path], false), false)?;
-//! let finished = maps::perform(
-//!     Job {
-//!         plan: Plan::new(Unit::Meter).for_map(prepared.original.len(), 50),
-//!         gates: vec![Gate::parse("all@0.5:0.10<=20").expect("a gate")],
-//!         ..Job::new(path, &input, &prepared, out, started)?
-//!     },
-//!     files,
-//! )?;
+//! let prepared = maps::open(path, None, &preparation)?;
+//! let plan = Plan::new(Unit::Meter).for_map(prepared.original.len(), 50);
+//! let output = Output::new(Path::new("audit"));
+//! let files = output.open(Rules::new([path], false))?;
+//! let input = Input::Map(Map { plan, ..Map::new(&prepared) });
+//! let audit = Audit {
+//!     about: prepared.about(path)?,
+//!     gates: vec![Gate::parse("all@0.5:0.10<=20").expect("a gate")],
+//!     ..Audit::of_map(input, &prepared, output)
+//! };
+//! let finished = audit.run(&Quiet)?.write(files)?;
 //! assert!(finished.passed());
 //! # Ok(())
 //! # }
@@ -35,6 +35,8 @@
 //! The schemes, sources and measures of the plan may be your own; see `unlift`.
 
 pub mod again;
+mod audit;
+pub mod changes;
 mod curves;
 mod document;
 mod doubts;
@@ -47,23 +49,25 @@ pub mod localization;
 pub mod maps;
 mod outputs;
 mod prepare;
+pub mod released;
+mod request;
 mod scene;
 pub mod sequence;
 pub mod sources;
 mod tiles;
 
+pub use audit::{Audit, Hidden, Input, Output, Views};
 pub use document::peak_bytes;
 pub use document::{evaluated, ordered, row};
 pub use doubts::{
-    Checked, SaidOfLengths, check_scale, check_thresholds, sides_m, unlike_neighbors,
+    Checked, LengthMessages, check_scale, check_thresholds, sides_m, unlike_neighbors,
 };
-pub use gate::{Candidate, Figure, Gate};
+pub use gate::{Candidate, Figure, Gate, Tried};
 pub use given_away::read_from_file;
-pub use maps::Job;
-pub use outputs::{
-    Audited, FIGURES, Finished, PAGE, check_file, check_file_of, open_audit, refused,
-};
+pub use outputs::{Audited, FIGURES, Files, Finished, PAGE, check_file, check_file_of, refused};
 pub use prepare::{Preparation, Prepared, by_point, prepare};
+pub use request::{Planned, Request, check_fit, distinct};
+pub use tiles::{Tile, Tiles};
 
 use std::fmt;
 

@@ -1,146 +1,71 @@
-//! Audits of a prepared map, as `audit map` and `demo` run them.
+//! Maps: read and prepared, and attacked whole, in tiles or as they are released.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 
 use unlift::audit::{Alone, Cell, Observer, Outcome, Plan, Row, run, run_released};
-use unlift::released::Released;
-use unlift::truth::{Original, Secret};
-use unlift::{Descriptors, ErrorKind, Unit};
-use unlift_io::hash::hash_input;
-use unlift_io::outputs::OutputSet;
+use unlift::truth::Original;
+use unlift::{Descriptors, ErrorKind};
 use unlift_io::read;
 use unlift_report::RenderOptions;
 use unlift_report::document::Input;
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::scene::Scene3d;
 
-use crate::Error;
+use crate::audit::{Attacked, Audit, Hidden};
 use crate::curves::{Curves, curves_of};
-use crate::document::{self, Provenance};
-use crate::doubts::{
-    Spread, check_scale, check_truth, doubts, sides_m, unlike_neighbors, with_extent,
-};
-use crate::gate::{Gate, check_gates, check_lengths_of_gates, gate_results};
+use crate::doubts::{Spread, check_scale, check_truth, doubts, sides_m, unlike_neighbors};
+use crate::gate::Tried;
 use crate::given_away::follows_places;
 use crate::inversion::MapInversion;
 use crate::localization::{self, Cameras, Localize};
-use crate::outputs::{Audited, Finished};
 use crate::prepare::{Preparation, Prepared, prepare};
 use crate::scene::Pictures;
-use crate::tiles;
-pub use crate::tiles::{Tile, Tiles};
-use crate::{Progress, Quiet};
+use crate::tiles::{self, Tile, Tiles};
+use crate::{Error, Progress, document};
 
-/// The inputs of an audit.
-pub struct Job<'a> {
+/// A map, and how it is attacked.
+pub struct Map<'a> {
     /// The points, in the unit of the audit.
     pub original: &'a Original<3>,
     /// Descriptors, one row per point.
     pub descriptors: Option<&'a Descriptors>,
-    /// The release and its secret, if the points are hidden already.
-    pub hidden: Option<&'a (Released<3>, Secret)>,
-    /// An attack on values of the released file that its records do not contain.
-    pub read: Option<Alone>,
     /// The cameras that observe the points, for localization; not used with tiles.
     pub localize: Option<Localize<'a>>,
     /// Camera centers in the unit of the audit, for the 3D view.
     pub cameras: Vec<[f64; 3]>,
     /// The up direction of the 3D view, if known.
     pub up: Option<[f64; 3]>,
-    /// The plan of the audit.
+    /// The plan of the attack.
     pub plan: Plan<3>,
-    /// The input files.
-    pub input: Input,
-    /// Recorded options, in addition to those of the plan.
-    pub options: serde_json::Map<String, serde_json::Value>,
-    /// Notes for readers of the figures; also reported to `progress`.
-    pub notes: Vec<String>,
-    /// Doubts about all figures: reported as notes, and no gate holds with one.
-    pub doubts: Vec<String>,
-    /// The gates.
-    pub gates: Vec<Gate>,
-    /// The output folder.
-    pub out: PathBuf,
-    /// Hides and attacks each tile as a map of its own. Then the page shows only where the map
-    /// leaks most.
-    pub tiles: Option<Tiles>,
-    /// Writes figures only.
-    pub share_safe: bool,
     /// Makes pictures of recovered points; the plan measures with it, too.
     pub inversion: Option<Arc<MapInversion>>,
-    /// Receives the progress.
-    pub progress: &'a dyn Progress,
-    /// The command line, for the record.
-    pub command: Option<String>,
-    /// The start of the command.
-    pub started: Instant,
 }
 
-impl<'a> Job<'a> {
-    /// Creates the default audit of the map at `path`, as [`open`] read it, with the output folder
-    /// `out`.
-    ///
-    /// # Errors
-    /// If the files of the map cannot be read again for their hash, or have changed.
-    pub fn new(
-        path: &Path,
-        input: &read::Input,
-        prepared: &'a Prepared,
-        out: &Path,
-        started: Instant,
-    ) -> Result<Self, Error> {
-        let points = prepared.original.reveal();
-        let scale = 1.0 / prepared.unit_in_map_units;
-        let job = Self::of(&prepared.original, started);
-        Ok(Self {
+impl<'a> Map<'a> {
+    /// Returns a map as [`open`] read it, with the default plan.
+    pub fn new(prepared: &'a Prepared) -> Self {
+        let (cameras, held_out, protections) = (&prepared.cameras, None, Vec::new());
+        Self {
             descriptors: prepared.descriptors.as_ref(),
-            localize: Some(Localize {
-                cameras: &prepared.cameras,
-                held_out: None,
-                protections: Vec::new(),
-            }),
-            cameras: input.cameras.iter().map(|c| c.map(|x| x * scale)).collect(),
-            up: input.up,
-            input: Input {
-                path: Some(path.display().to_string()),
-                sha256: Some(hash_input(input)?),
-                scale_m_per_unit: (points.unit() == Unit::Meter).then_some(scale),
-                unit_in_map_units: Some(prepared.unit_in_map_units),
-                ..job.input
-            },
-            notes: prepared.notes.clone(),
-            doubts: prepared.doubts.clone(),
-            out: out.to_owned(),
-            ..job
-        })
+            localize: Some(Localize { cameras, held_out, protections }),
+            cameras: prepared.centers(),
+            up: prepared.input.up,
+            ..Self::of(&prepared.original)
+        }
     }
 
-    /// Creates the default audit of points in memory, without output folder.
-    pub fn of(original: &'a Original<3>, started: Instant) -> Self {
+    /// Returns points in memory, with the default plan.
+    pub fn of(original: &'a Original<3>) -> Self {
         let points = original.reveal();
         Self {
             original,
             descriptors: None,
-            hidden: None,
-            read: None,
             localize: None,
             cameras: Vec::new(),
             up: None,
             plan: Plan::new(points.unit()).for_map(points.len(), USUAL_K),
-            input: Input { n_points: points.len() as u64, ..Input::default() },
-            options: serde_json::Map::new(),
-            notes: Vec::new(),
-            doubts: Vec::new(),
-            gates: Vec::new(),
-            out: PathBuf::new(),
-            tiles: None,
-            share_safe: false,
             inversion: None,
-            progress: &Quiet,
-            command: None,
-            started,
         }
     }
 }
@@ -150,8 +75,8 @@ const SHEETS: usize = 3;
 /// K of a default audit of a map.
 const USUAL_K: usize = 50;
 
-/// Reads a map and prepares it for an audit; `descriptors` is a separate file of descriptors. Notes
-/// and doubts about the input are in the result.
+/// Reads a map and prepares it for an audit; `descriptors` is a separate file of descriptors. The result has notes and doubts about the
+/// input.
 ///
 /// # Errors
 /// If a file cannot be read, if the scale makes lengths meaningless, or if too few points are
@@ -160,7 +85,7 @@ pub fn open(
     path: &Path,
     descriptors: Option<&Path>,
     preparation: &Preparation,
-) -> Result<(read::Input, Prepared), Error> {
+) -> Result<Prepared, Error> {
     let input = read::open(path).map_err(|error| {
         let way_out = "the folder of a COLMAP model or project; for photos, unlift audit images";
         let is_other = path.is_dir() && !read::is_project(path);
@@ -210,7 +135,8 @@ pub fn open(
         prepared.doubts.extend(unlike_neighbors(points, rows)?);
     }
     prepared.rows = rows_of_file(&prepared.rows, &input.left_out);
-    Ok((input, prepared))
+    prepared.input = input;
+    Ok(prepared)
 }
 
 /// Reads the first file beside the model of `input` that has the descriptors of its points; returns why none of
@@ -253,164 +179,137 @@ pub fn zeros(descriptors: &Descriptors) -> Option<String> {
     })
 }
 
-/// Runs the job and writes its files, all or none.
-pub fn perform(job: Job<'_>, out: OutputSet) -> Result<Finished, Error> {
-    let (folder, share_safe) = (job.out.clone(), job.share_safe);
-    find(job)?.write(out, &folder, share_safe)
-}
-
-/// Runs the job and writes nothing.
-///
-/// # Errors
-/// If the plan does not fit the map, a gate fails, or `progress` stops the audit.
-pub fn find(job: Job<'_>) -> Result<Audited, Error> {
-    let localize = job.localize.as_ref().filter(|_| job.tiles.is_none());
-    let localizes = localize.is_some_and(|localize| !localize.cameras.views.is_empty());
-    check_gates(&job.gates, &job.plan, localizes)?;
-    check_lengths_of_gates(job.original.reveal(), &job.gates)?;
-    for note in job.doubts.iter().chain(&job.notes) {
-        job.progress.say(&format!("note: {note}"));
-    }
-    let of_file = |error| match &job.input.path {
-        Some(file) => Error::from(unlift_io::Error::core(file, error)),
-        None => Error::from(error),
-    };
-    // Localization comes first: wrong features are reported before the long attacks.
-    let (localization, said) = match localize {
-        Some(localize) => {
-            localization::of_schemes(localize, job.original, &job.plan, job.progress)?
+impl Map<'_> {
+    /// Attacks the map: in `tiles`, or as it is `hidden`.
+    pub(crate) fn attack(
+        &self,
+        tiles: Option<Tiles>,
+        hidden: Option<&Hidden<'_>>,
+        audit: &Audit<'_>,
+        progress: &dyn Progress,
+    ) -> Result<Attacked, Error> {
+        let (original, plan) = (self.original, &self.plan);
+        let release = hidden.map(|hidden| hidden.release);
+        let localize = self.localize.as_ref().filter(|_| tiles.is_none());
+        let of_hidden = release.is_some_and(|(released, _)| released.descriptors().is_some());
+        let mut tried = Tried::by(plan, self.descriptors.is_some() || of_hidden);
+        tried.localizes = localize.is_some_and(|localize| !localize.cameras.views.is_empty());
+        let notes = audit.doubts.iter().chain(&audit.notes);
+        audit.begin(&tried, Some(original.reveal()), notes, progress)?;
+        let of_file = |error| match &audit.about.path {
+            Some(file) => Error::from(unlift_io::Error::core(file, error)),
+            None => Error::from(error),
+        };
+        // Localization comes first: wrong features are reported before the long attacks.
+        let (localization, notes_on_images) = match localize {
+            Some(localize) => localization::of_schemes(localize, original, plan, progress)?,
+            None => Default::default(),
+        };
+        let cut = |tiles: Tiles| tiles.of(original.reveal().positions(), self.up);
+        let cut = tiles.map(cut).transpose()?;
+        let spread = match &cut {
+            Some(tiles) => Spread::of_tiles(original, tiles, plan.k),
+            None => Spread::of(original.reveal().positions(), plan.k),
+        };
+        let spread = spread.map_err(of_file)?;
+        if let Some(release) = release {
+            check_truth(original, release, &spread).map_err(of_file)?;
         }
-        None => Default::default(),
-    };
-    let whole = (job.original, job.descriptors);
-    let cut = |asked: Tiles| asked.of(job.original.reveal().positions(), job.up);
-    let cut = job.tiles.map(cut).transpose()?;
-    let spread = match &cut {
-        Some(tiles) => Spread::of_tiles(job.original, tiles, job.plan.k),
-        None => Spread::of(job.original.reveal().positions(), job.plan.k),
-    };
-    let spread = spread.map_err(of_file)?;
-    if let Some(hidden) = job.hidden {
-        check_truth(job.original, hidden, &spread).map_err(of_file)?;
-    }
-    let Ran { mut outcome, scene, curves, sheets, tile_rows } = match &cut {
-        Some(tiles) => {
-            let (outcome, tile_rows, curves) = tiles::run(whole, tiles, &job.plan, job.progress)
-                .map_err(|error| of_file(error).advise("a larger --tile-points"))?;
-            let curves = curves.shares();
-            Ran { outcome, scene: None, curves, sheets: Vec::new(), tile_rows }
-        }
-        None => {
-            let mut watcher = watcher(&job);
-            let outcome = match job.hidden {
-                None => run(whole.0, whole.1, &job.plan, &mut watcher)
-                    .map_err(|error| of_file(error).advise("a smaller --k, or fewer --schemes"))?,
-                Some(hidden) => {
-                    run_released(job.original, hidden, &job.plan, &mut watcher).map_err(of_file)?
-                }
-            };
-            if let Some(error) = watcher.failed {
-                return Err(error);
+        let Ran { mut outcome, scene, curves, sheets, tile_rows } = match &cut {
+            Some(tiles) => {
+                let whole = (original, self.descriptors);
+                let (outcome, tile_rows, curves) = tiles::run(whole, tiles, plan, progress)
+                    .map_err(|error| of_file(error).advise("a larger --tile-points"))?;
+                let curves = curves.shares();
+                Ran { outcome, scene: None, curves, sheets: Vec::new(), tile_rows }
             }
-            let scene = watcher.pictures.map(|p| p.into_scene(&job.cameras, job.up));
-            let (curves, sheets) = (watcher.curves.shares(), watcher.sheets);
-            Ran { outcome, scene, curves, sheets, tile_rows: Vec::new() }
+            None => {
+                let mut watcher = self.watcher(audit.output.share_safe, progress);
+                let outcome =
+                    match release {
+                        None => run(original, self.descriptors, plan, &mut watcher).map_err(
+                            |error| of_file(error).advise("a smaller --k, or fewer --schemes"),
+                        )?,
+                        Some(release) => {
+                            run_released(original, release, plan, &mut watcher).map_err(of_file)?
+                        }
+                    };
+                if let Some(error) = watcher.failed {
+                    return Err(error);
+                }
+                let scene = watcher.pictures.map(|p| p.into_scene(&self.cameras, self.up));
+                let (curves, sheets) = (watcher.curves.shares(), watcher.sheets);
+                Ran { outcome, scene, curves, sheets, tile_rows: Vec::new() }
+            }
+        };
+        // Of values that are no better than a blind guess there is nothing to say.
+        let beats = |alone: &&Alone, row: &Row| {
+            alone.percent.iter().zip(&row.blind_percent).any(|(a, b)| a > b)
+        };
+        let read = hidden.and_then(|hidden| hidden.read.as_ref());
+        for row in &mut outcome.rows {
+            row.records_alone.extend(read.filter(|alone| beats(alone, row)).cloned());
         }
-    };
-    // Of values that are no better than a blind guess there is nothing to say.
-    let beats = |alone: &&Alone, row: &Row| {
-        alone.percent.iter().zip(&row.blind_percent).any(|(a, b)| a > b)
-    };
-    for row in &mut outcome.rows {
-        row.records_alone.extend(job.read.as_ref().filter(|alone| beats(alone, row)).cloned());
+        let followed = release.map(|release| follows_places(original, release));
+        let of_file: Vec<String> =
+            audit.doubts.iter().cloned().chain(followed.into_iter().flatten()).collect();
+        let rows = (plan, &outcome.rows[..], &tile_rows[..]);
+        let doubts = doubts((original, spread), release, rows, &of_file);
+        for note in doubts.notes.iter().filter(|note| !audit.doubts.contains(note)) {
+            progress.say(&format!("note: {note}"));
+        }
+        let mut options = audit.options.clone();
+        if let Some(inversion) = &self.inversion {
+            options.insert("inverter_sha256".into(), inversion.sha256().into());
+        }
+        if let Some(Tiles { max_points, only }) = tiles {
+            options.insert("tile_points".into(), max_points.into());
+            options.extend(only.map(|at| ("tile".to_owned(), at.into())));
+        }
+        let of_tiles =
+            |tiles: &Vec<Tile>| document::tiles(tiles, &tile_rows, &outcome.rows, &plan.thresholds);
+        let (error_cdf, inversions) = (curves_of(curves, &outcome.rows), sheets);
+        Ok(Attacked {
+            tried,
+            about: Some(Input { extent_m: sides_m(original.reveal()), ..audit.about.clone() }),
+            options: document::options(plan, options),
+            notes: [audit.notes.clone(), doubts.notes, notes_on_images].concat(),
+            doubts: doubts.of_rows,
+            localization,
+            tiles: cut.as_ref().map(of_tiles).unwrap_or_default(),
+            scene,
+            drawn: RenderOptions { error_cdf, inversions, ..RenderOptions::default() },
+            rows: outcome.rows,
+            not_audited: outcome.not_audited,
+            break_even: outcome.break_even,
+            seconds: outcome.seconds,
+            images: Vec::new(),
+        })
     }
-    let followed = job.hidden.map(|hidden| follows_places(job.original, hidden));
-    let of_file: Vec<String> =
-        job.doubts.iter().cloned().chain(followed.into_iter().flatten()).collect();
-    let mut doubts = doubts(
-        (job.original, spread),
-        job.hidden,
-        (&job.plan, &outcome.rows, &tile_rows),
-        &of_file,
-    );
-    for note in doubts.notes.iter().filter(|note| !job.doubts.contains(note)) {
-        job.progress.say(&format!("note: {note}"));
+
+    /// Creates the observer of the cells.
+    fn watcher<'a>(&self, share_safe: bool, progress: &'a dyn Progress) -> Watcher<'a> {
+        let n_views = self.plan.schemes.len() * self.plan.rows_per_scheme();
+        let inversion = self.inversion.clone();
+        let n_sheets = inversion.as_ref().map_or(0, |inversion| inversion.n_photos().min(SHEETS));
+        Watcher {
+            progress,
+            pictures: (!share_safe).then(|| Pictures::new(self.original, &self.plan, n_views)),
+            curves: Curves::new(&self.plan, progress),
+            inversion,
+            sheets: vec![Sheet::default(); if share_safe { 0 } else { n_sheets }],
+            failed: None,
+        }
     }
-    let (rows, missing) = (&outcome.rows, &outcome.not_audited);
-    doubts.notes.extend(said);
-    let of_hidden = job.hidden.is_some_and(|(released, _)| released.descriptors().is_some());
-    let described = job.descriptors.is_some() || of_hidden;
-    let gates = gate_results(
-        &job.gates,
-        (&job.plan, described),
-        rows,
-        missing,
-        &doubts.of_rows,
-        &localization,
-    )?;
-    let input = Input { extent_m: sides_m(job.original.reveal()), ..job.input };
-    let gates = with_extent(gates, &input);
-    let mut options = job.options;
-    if let Some(inversion) = &job.inversion {
-        options.insert("inverter_sha256".into(), inversion.sha256().into());
-    }
-    if let Some(Tiles { most, only }) = job.tiles {
-        options.insert("tile_points".into(), most.into());
-        options.extend(only.map(|at| ("tile".to_owned(), at.into())));
-    }
-    let options = document::options(&job.plan, options);
-    let provenance = Provenance {
-        input,
-        options,
-        notes: job.notes.into_iter().chain(doubts.notes).collect(),
-        gates,
-        command: job.command,
-        started: job.started,
-    };
-    let found = document::Found {
-        rows: &outcome.rows,
-        not_audited: &outcome.not_audited,
-        break_even: &outcome.break_even,
-        seconds: &outcome.seconds,
-    };
-    let mut document = document::document(&job.plan, &found, provenance);
-    document.localization = localization;
-    if let Some(tiles) = &cut {
-        document.tiles = document::tiles(tiles, &tile_rows, &outcome.rows, &job.plan.thresholds);
-    }
-    let drawn = RenderOptions {
-        error_cdf: curves_of(curves, &outcome.rows),
-        inversions: sheets,
-        ..RenderOptions::default()
-    };
-    Ok(Audited { document, scene, drawn })
 }
 
-/// The results of a job before they become a document.
+/// The results of an attack before they are checked.
 struct Ran {
     outcome: Outcome,
     scene: Option<Scene3d>,
     curves: Vec<(Row, Vec<(f64, f64)>)>,
     sheets: Vec<Sheet>,
     tile_rows: Vec<Vec<Row>>,
-}
-
-/// Creates the observer of the cells of `job`.
-fn watcher<'a>(job: &Job<'a>) -> Watcher<'a> {
-    let n_views = job.plan.schemes.len() * job.plan.rows_per_scheme();
-    Watcher {
-        progress: job.progress,
-        pictures: (!job.share_safe).then(|| Pictures::new(job.original, &job.plan, n_views)),
-        curves: Curves::new(&job.plan, job.progress),
-        inversion: job.inversion.clone(),
-        sheets: match (&job.inversion, job.share_safe) {
-            (Some(inversion), false) => {
-                vec![Sheet::default(); inversion.n_photos().min(SHEETS)]
-            }
-            _ => Vec::new(),
-        },
-        failed: None,
-    }
 }
 
 /// Reports progress and collects what the page draws.

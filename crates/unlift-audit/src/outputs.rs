@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use unlift::OneLine;
-use unlift_io::atomic::{Access, OutputFile, write_file};
+use unlift_io::atomic::{Access, OutputFile, make_folders, write_file};
 use unlift_io::outputs::{Kind, OutputSet, Rules};
 use unlift_report::scene::Scene3d;
 use unlift_report::{
@@ -12,6 +12,7 @@ use unlift_report::{
 };
 
 use crate::Error;
+use crate::audit::Output;
 
 /// File name of the page of an audit.
 pub const PAGE: &str = "report.html";
@@ -26,7 +27,7 @@ pub fn refused(error: unlift_io::Error) -> Error {
 /// Checks that the file `path` may be written, and returns its absolute place with links resolved.
 /// Call it before and after the work.
 ///
-/// Like [`open_audit`] for folders, it reports a place that cannot be written as an error of the
+/// Like [`Output::open`] for folders, it reports a place that cannot be written as an error of the
 /// command line.
 pub fn check_file(path: &Path, kind: Kind, rules: &Rules) -> Result<PathBuf, Error> {
     check_file_of("--out", path, kind, rules)
@@ -46,11 +47,50 @@ pub fn check_file_of(
     Ok(place)
 }
 
-/// Opens the output folder of an audit. If the results may be shared, others can read it.
-pub fn open_audit(out: &Path, rules: Rules, share_safe: bool) -> Result<OutputSet, Error> {
-    let access = if share_safe { Access::Usual } else { Access::Private };
-    let first = [(PAGE, Kind::Page), (FIGURES, Kind::AuditJson)];
-    OutputSet::create(out, rules, access, &first).map_err(refused)
+/// The files of an audit, which were checked before the work.
+pub struct Files {
+    output: Output,
+    set: OutputSet,
+    rules: Rules,
+}
+
+const JUNIT: &str = "--junit";
+
+impl Output {
+    fn access(&self) -> Access {
+        // If the results may be shared, others can read the folder.
+        if self.share_safe { Access::Usual } else { Access::Private }
+    }
+
+    /// Opens the output folder of an audit, and checks the file for the results of gates, which is none of the report.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn open(&self, rules: Rules) -> Result<Files, Error> {
+        let junit = self.junit.as_ref().map(|path| self.check_junit(path, &rules)).transpose()?;
+        let first = [(PAGE, Kind::Page), (FIGURES, Kind::AuditJson)];
+        let set = OutputSet::create(&self.folder, rules.clone(), self.access(), &first);
+        let set = set.map_err(refused)?;
+        let out = std::fs::canonicalize(&self.folder).unwrap_or_default();
+        if let (Some(path), Some(target)) = (&self.junit, junit)
+            && [PAGE, FIGURES].iter().any(|name| out.join(name) == target)
+        {
+            let path = path.display();
+            let expected = "expected a file of its own, found one of --out";
+            return Err(Error::request(format!("{JUNIT}: {path}: {expected}")));
+        }
+        Ok(Files { output: self.clone(), set, rules })
+    }
+
+    fn check_junit(&self, path: &Path, rules: &Rules) -> Result<PathBuf, Error> {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        if let Some(folder) = folder.filter(|folder| !folder.exists()) {
+            // It may be the folder of the report.
+            make_folders(folder, self.access())
+                .map_err(|error| Error::request(format!("{JUNIT}: {error}")))?;
+        }
+        check_file_of(JUNIT, path, Kind::Junit, rules)
+    }
 }
 
 /// The results of an audit, before they are written.
@@ -108,17 +148,17 @@ impl Audited {
         Ok(document)
     }
 
-    /// Writes page and figures to `folder`, for which `out` was opened: both or none. With
-    /// `share_safe` they contain figures only.
-    pub fn write(
-        &self,
-        mut out: OutputSet,
-        folder: &Path,
-        share_safe: bool,
-    ) -> Result<Finished, Error> {
-        let document = self.stage(&mut out, [PAGE, FIGURES], share_safe)?;
-        out.commit()?;
-        Ok(Finished { document, report: folder.join(PAGE) })
+    /// Writes page and figures, both or none, and the results of gates.
+    pub fn write(&self, files: Files) -> Result<Finished, Error> {
+        let Files { output, mut set, rules } = files;
+        let document = self.stage(&mut set, [PAGE, FIGURES], output.share_safe)?;
+        set.commit()?;
+        if let Some(path) = &output.junit {
+            check_file_of(JUNIT, path, Kind::Junit, &rules)?;
+            let text = unlift_report::junit(&document);
+            write_file(path, Access::Usual, |w| w.write_all(text.as_bytes()))?;
+        }
+        Ok(Finished { document, report: output.folder.join(PAGE) })
     }
 }
 

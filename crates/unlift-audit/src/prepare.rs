@@ -9,8 +9,12 @@ use unlift::geometry::vector::distance;
 use unlift::seed::{Draws, Stage};
 use unlift::truth::Original;
 use unlift::{Descriptors, Error, ErrorKind, PointSet, Unit};
+use unlift_io::hash::{hash_file, hash_input};
+use unlift_io::read;
 use unlift_io::stage::read_point_neighborhoods;
+use unlift_report::document::Input;
 
+use crate::doubts::sides_m;
 use crate::localization::Cameras;
 
 /// Options for the points of a file.
@@ -55,24 +59,74 @@ pub struct Prepared {
     pub notes: Vec<String>,
     /// Doubts about all figures. No gate holds with one.
     pub doubts: Vec<String>,
+    /// The map as it was read; empty for points in memory.
+    pub input: read::Input,
 }
 
 impl Prepared {
     /// Takes points that are in the unit of the audit, without descriptors and cameras.
     pub fn of(original: Original<3>) -> Self {
         let rows = (0..original.len() as u32).collect();
-        let (cameras, notes, doubts) = Default::default();
-        let (descriptors, descriptors_file, unit_in_map_units) = (None, None, 1.0);
+        let (descriptors, descriptors_file, cameras, notes, doubts, input) = Default::default();
         Self {
             original,
             descriptors,
             descriptors_file,
-            unit_in_map_units,
+            unit_in_map_units: 1.0,
             rows,
             cameras,
             notes,
             doubts,
+            input,
         }
+    }
+
+    /// Checks that the longest side of the map, in meters at this `scale`, is in a range.
+    ///
+    /// # Errors
+    /// If it is not. Without a scale, nothing is checked.
+    pub fn check_extent(
+        &self,
+        (low, high): (f64, f64),
+        scale: Option<f64>,
+    ) -> Result<(), crate::Error> {
+        let extent_m = sides_m(self.original.reveal());
+        let is_within =
+            |sides: [f64; 3]| (low..=high).contains(&sides.into_iter().fold(0.0, f64::max));
+        if extent_m.is_none_or(is_within) {
+            return Ok(());
+        }
+        let found = Input { extent_m, scale_m_per_unit: scale, ..Input::default() };
+        let found = found.extent().unwrap_or_default();
+        let expected = format!("a longest side of {low} to {high} m");
+        let error = format!("--expect-extent: expected {expected}, found {found}");
+        Err(crate::Error::request(error))
+    }
+
+    /// Returns the centers of the cameras, in the unit of the audit.
+    pub fn centers(&self) -> Vec<[f64; 3]> {
+        let scale = 1.0 / self.unit_in_map_units;
+        self.input.cameras.iter().map(|center| center.map(|x| x * scale)).collect()
+    }
+
+    /// Returns what a report says of the map at `path`, with the hashes of its files.
+    ///
+    /// # Errors
+    /// If the files cannot be read again for their hash, or have changed.
+    pub fn about(&self, path: &Path) -> Result<Input, crate::Error> {
+        let points = self.original.reveal();
+        let descriptors = self.descriptors_file.iter();
+        let others = descriptors.map(|file| Ok(("descriptors".to_owned(), hash_file(file)?)));
+        Ok(Input {
+            path: Some(path.display().to_string()),
+            sha256: Some(hash_input(&self.input)?),
+            n_points: points.len() as u64,
+            scale_m_per_unit: (points.unit() == Unit::Meter)
+                .then_some(1.0 / self.unit_in_map_units),
+            unit_in_map_units: Some(self.unit_in_map_units),
+            other_sha256: others.collect::<Result<_, crate::Error>>()?,
+            ..Input::default()
+        })
     }
 }
 
@@ -138,16 +192,16 @@ fn median_kth_distance(points: &[[f64; 3]], k: usize) -> Result<f64, Error> {
 
 /// Reads lists by row of the file and keeps those of the prepared rows.
 ///
-/// `n_read` rows were read from the file of the map. Doubts about the lists are added to `notes`.
+/// Doubts about the lists are added to `notes`.
 ///
 /// # Errors
 /// If the file cannot be read, or has another number of rows.
 pub fn by_point(
     path: &Path,
     prepared: &Prepared,
-    n_read: usize,
     notes: &mut Vec<String>,
 ) -> Result<PointNeighbors, crate::Error> {
+    let n_read = prepared.input.n_rows().max(prepared.original.len());
     let lists = read_point_neighborhoods(path, n_read)?;
     let mut kept_as = vec![None; n_read];
     for (kept, &row) in prepared.rows.iter().enumerate() {

@@ -38,13 +38,13 @@ impl Tile {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tiles {
     /// Maximum number of points of a tile.
-    pub most: usize,
+    pub max_points: usize,
     /// The number of the only tile to audit, as a task of a cluster; `None` for all.
     pub only: Option<usize>,
 }
 
 impl Tiles {
-    /// Splits points into the fewest tiles of at most `most` points, of nearly equal size, by a k-d
+    /// Splits points into the fewest tiles of at most `max_points` points, of nearly equal size, by a k-d
     /// tree in plan view: across the longer side, never across the height.
     ///
     /// The height is the axis nearest to `up`; without `up`, the axis of the smallest extent.
@@ -62,7 +62,7 @@ impl Tiles {
         let longest = |by: [f64; 3]| (0..3).max_by(|&a, &b| by[a].total_cmp(&by[b])).unwrap_or(2);
         let height = longest(up.map_or(size.map(|x| -x), |up| up.map(f64::abs)));
         let plan = [[1, 2], [0, 2], [0, 1]][height];
-        let n_tiles = positions.len().div_ceil(self.most.max(1)).max(1);
+        let n_tiles = positions.len().div_ceil(self.max_points.max(1)).max(1);
         if let Some(at) = self.only.filter(|&at| at >= n_tiles) {
             return Err(crate::Error::request(format!(
                 "tile: expected below {n_tiles}, found {at}"
@@ -148,7 +148,7 @@ mod tests {
         let points: Vec<[f64; 3]> = (0..1003)
             .map(|_| [draws.between(0.0, 9.0), draws.between(0.0, 4.0), draws.between(0.0, 1.0)])
             .collect();
-        let cut = |most, up| Tiles { most, only: None }.of(&points, up).unwrap();
+        let cut = |max_points, up| Tiles { max_points, only: None }.of(&points, up).unwrap();
         let tiles = cut(100, None);
         assert_eq!(tiles.len(), 11);
         let mut rows: Vec<u32> = tiles.iter().flat_map(|tile| tile.rows.clone()).collect();
@@ -169,9 +169,9 @@ mod tests {
             upright[0].bounds[1][0] <= upright[1].bounds[0][0] && upright[0].bounds[1][0] < 4.0
         );
         assert_eq!(cut(2000, None).len(), 1);
-        let third = Tiles { most: 100, only: Some(2) }.of(&points, None).unwrap();
+        let third = Tiles { max_points: 100, only: Some(2) }.of(&points, None).unwrap();
         assert_eq!(third, [tiles[2].clone()]);
-        let error = Tiles { most: 100, only: Some(11) }.of(&points, None).unwrap_err();
+        let error = Tiles { max_points: 100, only: Some(11) }.of(&points, None).unwrap_err();
         assert_eq!(error.to_string(), "tile: expected below 11, found 11");
     }
 }

@@ -2,14 +2,12 @@
 
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use crate::stderr::tell;
-use unlift::Unit;
-use unlift::audit::{Plan, Threshold};
+use unlift::audit::Threshold;
 use unlift::neighbors::oracle::Noise;
 use unlift::neighbors::sources::Named;
-use unlift::obfuscate::{Entry, Mitigation, Protection, SCHEMES, Scheme, SchemeOptions};
+use unlift::obfuscate::{Entry, Mitigation, Protection};
 use unlift::recover::Builtin;
 use unlift_audit::sources;
 use unlift_vision::network::DescriptorKind;
@@ -56,16 +54,6 @@ pub fn score(text: &str) -> Result<f32, String> {
 
 pub fn any_scheme(text: &str) -> Result<&'static Entry, String> {
     unlift::obfuscate::scheme(text).map_err(|error| expected(&error))
-}
-
-/// Parses the name of a user's scheme, which must fit into a gate and a file name.
-pub fn scheme_name(text: &str) -> Result<String, String> {
-    let known = |c: char| c.is_ascii_alphanumeric() || "+-_.".contains(c);
-    let fits = (1..=40).contains(&text.len()) && text.chars().all(known);
-    if fits && text != "all" && text.starts_with(|c: char| c.is_ascii_alphanumeric()) {
-        return Ok(text.to_owned());
-    }
-    Err(format!("expected up to 40 letters, digits, +, -, _ and . (not all), found {text}"))
 }
 
 pub fn scheme(text: &str) -> Result<&'static Entry, String> {
@@ -132,10 +120,6 @@ pub fn image_mitigation(text: &str) -> Result<Mitigation, String> {
         mitigation if mitigation.fits_images() => Ok(mitigation),
         _ => Err(format!("expected noise:DEVIATION or drop:SHARE, found {text}")),
     }
-}
-
-pub fn all_schemes() -> Vec<&'static Entry> {
-    SCHEMES.iter().filter(|entry| entry.in_3d.is_some()).collect()
 }
 
 pub fn mitigation(text: &str) -> Result<Mitigation, String> {
@@ -243,27 +227,6 @@ pub fn extent(text: &str) -> Result<(f64, f64), String> {
     range.ok_or_else(|| format!("expected LOW..HIGH in meters (for example 5..50), found {text}"))
 }
 
-/// Returns the requested schemes for images, each once, or the default.
-pub fn image_schemes(given: &[&'static Entry], usual: &Plan<2>) -> Vec<Arc<dyn Scheme<2>>> {
-    if given.is_empty() {
-        return usual.schemes.clone();
-    }
-    let options = SchemeOptions::usual(Unit::Pixel);
-    let entries = distinct(given.to_vec(), |a, b| a.name == b.name);
-    entries.iter().filter_map(|entry| entry.of_dimension(&options)).collect()
-}
-
-/// Removes items that repeat an earlier one, because an audit has one row per combination.
-pub fn distinct<T>(items: Vec<T>, same: impl Fn(&T, &T) -> bool) -> Vec<T> {
-    let mut kept: Vec<T> = Vec::with_capacity(items.len());
-    for item in items {
-        if !kept.iter().any(|earlier| same(earlier, &item)) {
-            kept.push(item);
-        }
-    }
-    kept
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -330,10 +293,5 @@ mod tests {
     #[test]
     fn nan_and_infinity_are_no_lengths() {
         assert!(positive("nan").is_err() && positive("inf").is_err() && ratio("nan").is_err());
-    }
-
-    #[test]
-    fn repeats_fall_away_in_order() {
-        assert_eq!(distinct(vec![1.0, 0.5, 1.0], |a, b| a == b), [1.0, 0.5]);
     }
 }

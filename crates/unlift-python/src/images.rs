@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyString;
 use unlift::OneLine;
 use unlift_audit::Error;
-use unlift_audit::images::InMemory;
+use unlift_audit::images::FeatureSource;
 use unlift_io::features::ImageFeatures;
 
 use crate::arrays::{UnliftError, descriptors, raised, rows, wrong};
@@ -18,7 +18,7 @@ const KEYS: [&str; 4] = ["keypoints", "width", "height", "descriptors"];
 /// Source of images.
 pub enum Images {
     Path(PathBuf),
-    InMemory(InMemory),
+    InMemory(FeatureSource),
 }
 
 impl Images {
@@ -50,7 +50,7 @@ impl Images {
                 .unwrap_or_else(|| Err(format!("{place}: expected arrays, found an interrupt")))
                 .map_err(Error::request)
         };
-        InMemory::try_new(names, get).map(Self::InMemory).map_err(raised)
+        FeatureSource::in_memory(names, get).map(Self::InMemory).map_err(raised)
     }
 }
 

@@ -8,7 +8,7 @@ use unlift::audit::check_laws;
 use unlift::obfuscate::{Scheme, SchemeOptions, obfuscate as hide, scheme};
 use unlift::seed::Key;
 use unlift_audit::{Preparation, Prepared, check_scale, maps, prepare};
-use unlift_io::hash::{hash_file, hash_input, hash_positions};
+use unlift_io::hash::hash_positions;
 use unlift_report::document::Input;
 
 use crate::arrays::{descriptors, raised, rows, to_array, to_descriptors, to_rows, wrong};
@@ -22,12 +22,7 @@ use crate::threads;
 pub struct Map {
     pub prepared: Arc<Prepared>,
     /// Origin of the points, for the report.
-    pub input: Input,
-    /// Camera centers in the unit of the map.
-    pub cameras: Vec<[f64; 3]>,
-    pub up: Option<[f64; 3]>,
-    /// Notes that a report must contain.
-    pub notes: Vec<String>,
+    pub about: Input,
 }
 
 /// Returns the options of preparation.
@@ -69,18 +64,17 @@ impl Map {
         threads::run(py, None, None, move || {
             check_scale(&rows, scale)?;
             let sha256 = Some(hash_positions(&rows));
-            let prepared = prepare(rows, given.as_ref(), &preparation)?;
-            let input = Input {
+            let mut prepared = prepare(rows, given.as_ref(), &preparation)?;
+            let zeros = prepared.descriptors.as_ref().and_then(maps::zeros);
+            prepared.notes.extend(zeros);
+            let about = Input {
                 sha256,
                 n_points: prepared.original.len() as u64,
                 scale_m_per_unit: scale,
                 unit_in_map_units: Some(prepared.unit_in_map_units),
                 ..Input::default()
             };
-            let zeros = prepared.descriptors.as_ref().and_then(maps::zeros);
-            let notes = prepared.notes.iter().cloned().chain(zeros).collect();
-            let (prepared, cameras) = (Arc::new(prepared), Vec::new());
-            Ok::<_, unlift_audit::Error>(Self { prepared, input, cameras, up: None, notes })
+            Ok::<_, unlift_audit::Error>(Self { prepared: Arc::new(prepared), about })
         })
     }
 
@@ -124,7 +118,7 @@ impl Map {
     /// Notes on reading and preparation; a report has them, too.
     #[getter]
     fn notes(&self) -> Vec<String> {
-        self.prepared.doubts.iter().chain(&self.notes).cloned().collect()
+        self.prepared.doubts.iter().chain(&self.prepared.notes).cloned().collect()
     }
 
     /// Indices of the points that are left, ascending `(n,)`.
@@ -148,28 +142,8 @@ pub fn read(
 ) -> PyResult<Map> {
     let preparation = preparation(scale, k, max_points, seed)?;
     threads::run(py, None, None, move || {
-        let (input, prepared) = maps::open(&path, descriptors.as_deref(), &preparation)?;
-        let sha256 = Some(hash_input(&input)?);
-        let unit = prepared.unit_in_map_units;
-        let mut other_sha256 = unlift_audit::ordered([]);
-        if let Some(file) = &descriptors {
-            other_sha256.insert("descriptors".to_owned(), hash_file(file)?);
-        }
-        Ok::<_, unlift_audit::Error>(Map {
-            input: Input {
-                path: Some(path.display().to_string()),
-                sha256,
-                n_points: prepared.original.len() as u64,
-                scale_m_per_unit: scale,
-                unit_in_map_units: Some(unit),
-                other_sha256,
-                ..Input::default()
-            },
-            cameras: input.cameras.iter().map(|center| center.map(|x| x / unit)).collect(),
-            up: input.up,
-            notes: prepared.notes.clone(),
-            prepared: Arc::new(prepared),
-        })
+        let prepared = Arc::new(maps::open(&path, descriptors.as_deref(), &preparation)?);
+        Ok::<_, unlift_audit::Error>(Map { about: prepared.about(&path)?, prepared })
     })
 }
 

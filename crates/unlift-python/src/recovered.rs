@@ -143,8 +143,10 @@ pub fn evaluate<'py>(
     let released = truth.cast::<Hidden>().ok().map(|hidden| hidden.get().parts().0.clone());
     let released = released.map(crate::hidden::Released::of_map).transpose()?;
     let truth = truth_of(truth)?;
-    let usual = Plan::<3>::new(truth.original().reveal().unit()).thresholds;
-    let thresholds = self::thresholds(thresholds, &usual)?;
+    let mut thresholds = self::thresholds(thresholds)?;
+    if thresholds.is_empty() {
+        thresholds = Plan::<3>::new(truth.original().reveal().unit()).thresholds;
+    }
     let (recovered, asked) = (Arc::clone(&recovered.0), thresholds.clone());
     let (row, notes) = threads::run(py, None, None, move || {
         let (original, secret) = (truth.original(), &truth.secret);

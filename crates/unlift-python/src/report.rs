@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use unlift_audit::{Audited, open_audit};
+use unlift_audit::{Audited, Output};
 use unlift_io::outputs::Rules;
 
 use crate::arrays::raised;
@@ -62,8 +62,9 @@ impl Report {
         force: bool,
     ) -> PyResult<PathBuf> {
         py.detach(|| {
-            let files = open_audit(&out, Rules::new([], force), share_safe).map_err(refused)?;
-            Ok(self.0.write(files, &out, share_safe).map_err(raised)?.report)
+            let output = Output { share_safe, ..Output::new(&out) };
+            let files = output.open(Rules::new([], force)).map_err(refused)?;
+            Ok(self.0.write(files).map_err(raised)?.report)
         })
     }
 

@@ -11,6 +11,8 @@ use unlift_vision::features::{
     Extraction, Extractor, Features, Found as FoundFeatures, LearnedFeatures,
 };
 
+use super::{FeatureSource, Origin};
+
 /// File name endings of photos. The format is detected from the bytes.
 const ENDINGS: [&str; 6] = ["jpg", "jpeg", "jpe", "jfif", "png", "webp"];
 /// File name endings of images that cannot be read; they are counted and skipped.
@@ -25,101 +27,43 @@ pub fn is_photo(path: &Path) -> bool {
     ending.is_some_and(|ending| ENDINGS.contains(&&*ending))
 }
 
-/// The photos of a folder, sorted by name.
-pub struct Folder {
-    extractor: Extractor,
-    turn: Turn,
-    extraction: Extraction,
-    names: Vec<String>,
-    paths: Vec<PathBuf>,
-    refused: Vec<Error>,
-    passed_over: Option<String>,
+/// Lists the photos in `root` and its subfolders, each folder once: under its own name, or
+/// under the first link to it. Names that begin with a dot are skipped.
+///
+/// # Errors
+/// If the folder cannot be read or contains no photo, an option is out of range, or a model is
+/// missing.
+pub(super) fn open(root: &Path, extraction: &Extraction) -> Result<FeatureSource, crate::Error> {
+    let extractor = Extractor::try_new(extraction)?;
+    let mut listing = Listing::default();
+    listing.visit(root);
+    let others = listing.others();
+    if listing.photos.is_empty() {
+        return Err(match listing.refused.pop() {
+            Some(refused) => refused,
+            None => {
+                let found = others.map_or("none".to_owned(), |others| format!("only {others}"));
+                Error::new(root, "", "JPEG, PNG or WebP photos", found)
+            }
+        }
+        .into());
+    }
+    let passed_over = others.map(|others| {
+        let root = root.display();
+        format!("{root}: passed over {others}: only JPEG, PNG and WebP are read")
+    });
+    listing.photos.sort_unstable();
+    let (names, paths) = listing.photos.into_iter().unzip();
+    let (kind, turn) = (extraction.kind(), Turn::Upright);
+    let from = Origin::Photos { paths, extractor, kind, turn };
+    Ok(FeatureSource { names, refused: listing.refused, passed_over, from })
 }
 
-impl Folder {
-    /// Lists the photos in `root` and its subfolders, each folder once: under its own name, or
-    /// under the first link to it. Names that begin with a dot are skipped.
-    ///
-    /// # Errors
-    /// If the folder cannot be read or contains no photo, an option is out of range, or a model is
-    /// missing.
-    pub fn open(root: &Path, extraction: &Extraction) -> Result<Self, crate::Error> {
-        let extractor = Extractor::try_new(extraction)?;
-        let mut listing = Listing::default();
-        listing.visit(root);
-        if listing.photos.is_empty() {
-            return Err(match listing.refused.pop() {
-                Some(refused) => refused,
-                None => {
-                    let found = listing.others().map_or("none".to_owned(), |o| format!("only {o}"));
-                    Error::new(root, "", "JPEG, PNG or WebP photos", found)
-                }
-            }
-            .into());
-        }
-        let passed_over = listing.others().map(|others| {
-            let root = root.display();
-            format!("{root}: passed over {others}: only JPEG, PNG and WebP are read")
-        });
-        listing.photos.sort_unstable();
-        let (names, paths): (_, Vec<PathBuf>) = listing.photos.into_iter().unzip();
-        let (extraction, refused) = (extraction.clone(), listing.refused);
-        let turn = Turn::Upright;
-        Ok(Self { extractor, turn, extraction, names, paths, refused, passed_over })
-    }
-
-    /// Returns how photos are turned before extraction.
-    pub fn turn(&self) -> Turn {
-        self.turn
-    }
-
-    /// Sets how photos are turned before extraction.
-    #[must_use]
-    pub fn with_turn(self, turn: Turn) -> Self {
-        Self { extractor: self.extractor.with_turn(turn), turn, ..self }
-    }
-
-    /// Returns the names of all photos, sorted by their bytes.
-    pub fn names(&self) -> &[String] {
-        &self.names
-    }
-
-    /// Returns one error for each file or folder that cannot be used.
-    pub fn refused(&self) -> &[Error] {
-        &self.refused
-    }
-
-    /// Describes the skipped images in one line.
-    pub fn passed_over(&self) -> Option<&str> {
-        self.passed_over.as_deref()
-    }
-
-    /// Returns the path of photo `at`.
-    pub fn path(&self, at: usize) -> &Path {
-        &self.paths[at]
-    }
-
-    /// Extracts the features of photo `at`.
-    pub fn get(&self, at: usize) -> Result<ImageFeatures, crate::Error> {
-        let path = &self.paths[at];
-        let photo = self.extractor.read(path)?;
-        let features = match photo.found {
-            FoundFeatures::Sift(features) => of_sift(features),
-            FoundFeatures::Learned(features) => of_network(features),
-        };
-        Ok(ImageFeatures {
-            name: self.names[at].clone(),
-            size: Some(photo.size.map(|side| side as u32)),
-            uncertainty_px: Some(photo.noise_px),
-            upright: self.turn == Turn::Upright,
-            photo: Some(path.clone()),
-            ..features
-        })
-    }
-
-    /// Returns the options of the extraction.
-    pub fn extraction(&self) -> &Extraction {
-        &self.extraction
+/// Converts extracted features to those of files.
+pub(super) fn features_of(found: FoundFeatures) -> ImageFeatures {
+    match found {
+        FoundFeatures::Sift(features) => of_sift(features),
+        FoundFeatures::Learned(features) => of_network(features),
     }
 }
 

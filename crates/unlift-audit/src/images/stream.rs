@@ -165,7 +165,7 @@ impl<'a> Stream<'a> {
         let numbers = &self.chosen[self.next..self.chosen.len().min(self.next + n)];
         self.next += numbers.len();
         let (source, path, needs) = (self.source, self.path, &self.needs);
-        let in_memory = matches!(source, FeatureSource::InMemory(_));
+        let in_memory = source.is_in_memory();
         let read = |&at: &usize| (at, image(source, path, at, needs));
         let read: Vec<_> = numbers.par_iter().with_max_len(1).map(read).collect();
         for (at, image) in read {
@@ -218,7 +218,7 @@ fn image(
     needs: &Needs,
 ) -> Result<Ready, crate::Error> {
     let features = source.get(at)?;
-    let in_memory = matches!(source, FeatureSource::InMemory(_));
+    let in_memory = source.is_in_memory();
     let sha256 = in_memory.then(|| hash_features(&features));
     let wrong = |expected: &str, found: &str| {
         Error::new(path, format!("image {}", features.name.escape_debug()), expected, found)

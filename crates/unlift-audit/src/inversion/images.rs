@@ -9,7 +9,10 @@ use unlift_report::inversions::Inversion as Sheet;
 use unlift_vision::features::ColorImage;
 use unlift_vision::features::photo::jpeg_of;
 use unlift_vision::features::photo::{Turn, read_color_with};
+use unlift_vision::network::DescriptorKind;
 use unlift_vision::pictures::{Detection, Points};
+
+use crate::images::FeatureSource;
 
 use super::{Judged, Painter, SHOWN, figures, needed, painted, shown, size};
 
@@ -47,6 +50,23 @@ impl Inversion {
     pub fn new(painter: Painter, photos: &Path, turn: Turn) -> Self {
         let photos = photos.to_owned();
         Self { painter, photos, turn, known: Mutex::default(), failed: Mutex::default() }
+    }
+
+    /// Opens the measure for the images of `source` at `path`. Photos are in the folder `photos`, or in `path`. `kind` is that of the
+    /// descriptors.
+    ///
+    /// # Errors
+    /// If there is no folder of photos, or a network cannot be read.
+    pub fn open(
+        (source, path): (&FeatureSource, &Path),
+        kind: DescriptorKind,
+        photos: Option<&Path>,
+        network: Option<&Path>,
+    ) -> Result<Self, crate::Error> {
+        let photos = photos.or_else(|| Some(path).filter(|path| path.is_dir()));
+        let none = "--invert: expected --photos, as PATH is no folder of photos";
+        let photos = photos.ok_or_else(|| crate::Error::request(none))?;
+        Ok(Self::new(Painter::open(kind, network)?, photos, source.turn()))
     }
 
     /// Returns the SHA-256 of the painting network, in hexadecimal.

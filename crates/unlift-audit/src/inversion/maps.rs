@@ -20,6 +20,9 @@ use unlift_vision::pictures::{Detection, Lens, View};
 
 use super::{Judged, Painter, SHOWN, figures, needed, painted, shown};
 use crate::Progress;
+use crate::changes::kind_of;
+use crate::images::choice;
+use crate::prepare::Prepared;
 use crate::scene::{near, shapes};
 
 /// Smallest side of a picture for which the metrics are defined.
@@ -52,22 +55,28 @@ impl fmt::Debug for MapInversion {
 }
 
 impl MapInversion {
-    /// Opens the COLMAP model in `model`, whose lengths are multiplied by `scale` in the audit.
-    /// Uses at most `most` of its images that have a photo in `photos`, evenly spaced over their
-    /// names.
+    /// Opens the photos of a map, which must be a COLMAP model with descriptors. Uses at most `max_images` of its images that have a
+    /// photo in `photos`, evenly spaced over their names. `network` is that of the user.
     ///
     /// Cameras with an unknown lens and unusable photos are reported and skipped.
     ///
     /// # Errors
-    /// If no photo is left, or a file of the model cannot be read.
+    /// If something is missing, no photo is left, or a file cannot be read.
     pub fn open(
-        painter: Painter,
-        model: &Path,
-        photos: &Path,
-        scale: f64,
-        most: usize,
+        prepared: &Prepared,
+        photos: Option<&Path>,
+        network: Option<&Path>,
+        max_images: usize,
         progress: &dyn Progress,
     ) -> Result<Self, crate::Error> {
+        let missing = |what: &str| crate::Error::request(format!("--invert: expected {what}"));
+        let photos = photos.ok_or_else(|| missing("--photos, the folder of the map's photos"))?;
+        let model = "a COLMAP model with cameras, found only points";
+        let model = prepared.input.model.as_ref().ok_or_else(|| missing(model))?;
+        let descriptors = "descriptors (--descriptors FILE), found none";
+        let descriptors = prepared.descriptors.as_ref().ok_or_else(|| missing(descriptors))?;
+        let painter = Painter::open(kind_of("--invert", Some(descriptors))?, network)?;
+        let scale = 1.0 / prepared.unit_in_map_units;
         let (cameras, mut images) = colmap::read_views(model)?;
         images.sort_by(|a, b| a.name.cmp(&b.name));
         let with_photo = |image: &colmap::Image| {
@@ -76,13 +85,15 @@ impl MapInversion {
         };
         let with_photo: Vec<_> =
             images.iter().filter_map(|image| Some((image, with_photo(image)?))).collect();
-        let (n, most) = (with_photo.len(), most.min(with_photo.len()));
+        let n = with_photo.len();
         if n < images.len() {
             let found = format!("{n} of {} images of the model have a photo", images.len());
             progress.say(&format!("note: {}: {found}", photos.display()));
         }
         let mut seen = Vec::new();
-        for (image, path) in (0..most).map(|at| &with_photo[(2 * at + 1) * n / (2 * most)]) {
+        for (image, path) in
+            choice::evenly(n, Some(max_images)).into_iter().map(|at| &with_photo[at])
+        {
             let camera = cameras.iter().find(|camera| camera.id == image.camera_id);
             let made = camera.ok_or_else(|| {
                 let id = image.camera_id.to_string();

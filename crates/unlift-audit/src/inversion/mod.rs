@@ -5,6 +5,7 @@ mod images;
 mod maps;
 
 use std::borrow::Cow;
+use std::path::Path;
 
 use unlift::audit::Row;
 use unlift::recover::Recovered;
@@ -13,6 +14,7 @@ use unlift::{Descriptors, Error, RowOrder};
 use unlift_report::inversions::{InvertedView, Likeness, Painted};
 use unlift_vision::features::ColorImage;
 use unlift_vision::features::photo::jpeg_of;
+use unlift_vision::network::DescriptorKind;
 use unlift_vision::pictures::{
     CLASSES, Detection, Detector, Inverter, Lpips, Metrics, Points, Projection, View,
 };
@@ -60,6 +62,18 @@ struct Judged {
 }
 
 impl Painter {
+    /// Opens the painter for descriptors of `kind`: the network of the user, or the known one.
+    ///
+    /// # Errors
+    /// If a network cannot be read.
+    pub fn open(kind: DescriptorKind, network: Option<&Path>) -> Result<Self, crate::Error> {
+        let inverter = match network {
+            Some(path) => Inverter::read(path, kind),
+            None => Inverter::of(kind),
+        };
+        Ok(Self::try_new(inverter?)?)
+    }
+
     /// Creates a painter with the painting network, and loads the networks that compare.
     pub fn try_new(inverter: Inverter) -> Result<Self, Error> {
         Ok(Self { inverter, lpips: Lpips::try_new()?, detector: Detector::try_new()? })

@@ -92,7 +92,7 @@ impl<'a> Held<'a> {
         progress: &dyn Progress,
     ) -> Result<Self, crate::Error> {
         let source = FeatureSource::open(path, &Extraction::default())?.with_turn(Turn::AsStored);
-        let names = source.names();
+        let names = &source.names;
         let images: Vec<(usize, usize)> = (0..cameras.views.len())
             .filter_map(|at| {
                 let name = String::from_utf8_lossy(&cameras.images[at].0);

@@ -14,8 +14,8 @@ use unlift::truth::Original;
 use unlift_io::read::colmap;
 use unlift_report::document::{self as report, UNPROTECTED};
 
-use crate::Error;
-use crate::Progress;
+use crate::prepare::Prepared;
+use crate::{Error, Progress};
 
 /// Localization in an audit.
 #[derive(Clone, Debug)]
@@ -27,6 +27,26 @@ pub struct Localize<'a> {
     pub held_out: Option<(PathBuf, usize)>,
     /// Protections of the descriptors of queries, each with every scheme on keypoints.
     pub protections: Vec<Protection>,
+}
+
+impl<'a> Localize<'a> {
+    /// Returns the localization of one of `nth` images, with photos or features at `path`.
+    ///
+    /// # Errors
+    /// If the map has no cameras that observe its points.
+    pub fn held_out(
+        prepared: &'a Prepared,
+        path: &Path,
+        nth: usize,
+        protections: Vec<Protection>,
+    ) -> Result<Self, Error> {
+        if prepared.cameras.views.is_empty() {
+            let expected = "--localize: expected a COLMAP model with cameras and tracks";
+            return Err(Error::request(format!("{expected}, found none")));
+        }
+        let held_out = Some((path.to_owned(), nth));
+        Ok(Self { cameras: &prepared.cameras, held_out, protections })
+    }
 }
 
 impl Localize<'_> {

@@ -8,14 +8,14 @@
 mod view;
 
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
 use rayon::prelude::*;
-use serde_json::{Map, Value, json};
+use serde_json::json;
 use unlift::audit::staged::{Pooled, key_of};
-use unlift::audit::{NeighborsBy, Plan, Row, Seconds};
+use unlift::audit::{Plan, Row, Seconds};
 use unlift::evaluate::evaluate;
 use unlift::neighbors::{Neighborhoods, Source, of_what_there_is};
 use unlift::obfuscate::{Scheme, obfuscate};
@@ -25,8 +25,7 @@ use unlift::released::Obfuscation;
 use unlift::seed::Key;
 use unlift::sequence::{Links, Query, Solved, recover, with_lists};
 use unlift::truth::Secret;
-use unlift_io::hash::{hash_file, hash_files};
-use unlift_io::outputs::OutputSet;
+use unlift_io::hash::hash_files;
 use unlift_io::read;
 use unlift_report::RenderOptions;
 use unlift_report::document::{ImageCounts, Input};
@@ -35,18 +34,15 @@ use unlift_vision::pictures::Points;
 
 use self::view::Model;
 pub use self::view::{PoseError, View};
-use crate::Progress;
-use crate::document::{self, Found, Provenance, names, only_named};
-use crate::gate::{Gate, check_gates, gate_results};
-use crate::images::audit::Used;
+use crate::audit::{Attacked, Audit};
+use crate::gate::Tried;
 use crate::images::{FeatureSource, choice};
 use crate::inversion::{Inversion, NEAR_PX, weight};
-use crate::outputs::{Audited, Finished};
 use crate::sources::BY_DESCRIPTORS;
-use crate::{Error, check_stop};
+use crate::{Error, Progress, check_stop, document};
 
-/// The inputs of an audit of a sequence.
-pub struct SequenceJob<'a> {
+/// Images with known poses, and how they are attacked.
+pub struct Sequence<'a> {
     /// The COLMAP project or model with the poses.
     pub model: &'a Path,
     /// The features of the images.
@@ -61,22 +57,8 @@ pub struct SequenceJob<'a> {
     pub queries: Vec<usize>,
     /// The error that is added to the poses.
     pub pose_error: Option<PoseError>,
-    /// Recorded options, in addition to those of the plan.
-    pub options: Map<String, Value>,
-    /// The gates.
-    pub gates: Vec<Gate>,
     /// Makes pictures of recovered keypoints, if they are wanted.
-    pub inversion: Option<&'a Inversion>,
-    /// The output folder.
-    pub out: PathBuf,
-    /// Writes figures only.
-    pub share_safe: bool,
-    /// Receives the progress.
-    pub progress: &'a dyn Progress,
-    /// The command line, for the record.
-    pub command: Option<String>,
-    /// The start of the command.
-    pub started: Instant,
+    pub inversion: Option<Inversion>,
 }
 
 /// The solver of all rows.
@@ -90,73 +72,186 @@ const TRACKS: &str = "tracks";
 /// A line of each of three views meets the others in a point.
 const LEAST_VIEWS: usize = 3;
 
-/// Runs the job and writes its folder, completely or not at all.
-///
-/// # Errors
-/// If the model cannot be read, fewer than two of its images have usable features, a number of
-/// queries exceeds theirs and has a gate, `progress` stops the audit, or the folder cannot be
-/// written. Unusable images are reported and counted.
-pub fn perform(mut job: SequenceJob<'_>, out: OutputSet) -> Result<(Finished, Used), Error> {
-    let steps = job.progress;
-    steps.show(0, 1, "reading images");
-    let input = read::open(job.model)?;
-    let Some(folder) = &input.model else {
-        let expected = "a COLMAP model, which has the poses";
-        return Err(unlift_io::Error::new(job.model, "", expected, input.format).into());
-    };
-    let pose_error = job.pose_error.map(|error| (error, job.plan.seed));
-    let (mut views, mut unusable) = (Vec::new(), job.source.refused().len());
-    job.source.refused().iter().for_each(|error| steps.say(&error.to_string()));
-    let model = Model::read(folder)?;
-    for view in model.views((job.source, job.path), pose_error) {
-        match view {
-            Ok(view) => views.push(view),
-            Err(error) => {
-                unusable += 1;
-                steps.say(&error.to_string());
+impl Sequence<'_> {
+    /// Attacks the images. Fewer than two with usable features, or fewer than the smallest number of queries, are an error.
+    pub(crate) fn attack(
+        &self,
+        audit: &Audit<'_>,
+        progress: &dyn Progress,
+    ) -> Result<Attacked, Error> {
+        let passed_over = &self.source.passed_over;
+        passed_over.iter().for_each(|note| progress.say(&format!("note: {note}")));
+        progress.show(0, 1, "reading images");
+        let input = read::open(self.model)?;
+        let Some(folder) = &input.model else {
+            let expected = "a COLMAP model, which has the poses";
+            return Err(unlift_io::Error::new(self.model, "", expected, input.format).into());
+        };
+        let pose_error = self.pose_error.map(|error| (error, self.plan.seed));
+        let (mut views, mut unusable) = (Vec::new(), self.source.refused().len());
+        self.source.refused().iter().for_each(|error| progress.say(&error.to_string()));
+        let model = Model::read(folder)?;
+        for view in model.views((self.source, self.path), pose_error) {
+            match view {
+                Ok(view) => views.push(view),
+                Err(error) => {
+                    unusable += 1;
+                    progress.say(&error.to_string());
+                }
             }
         }
+        let fewest = self.queries.first().copied().unwrap_or(2);
+        if views.len() < fewest {
+            let expected = format!("at least {fewest} images that are in {}", self.model.display());
+            let found = views.len().to_string();
+            return Err(unlift_io::Error::new(self.path, "", expected, found).into());
+        }
+        let wrong = |(expected, found)| unlift_io::Error::new(self.path, "", expected, found);
+        alike(&views, model.n_points()).map_err(wrong)?;
+        let mut notes = Vec::new();
+        let n_left_out: usize = views.iter().map(|view| view.n_left_out).sum();
+        if n_left_out > 0 {
+            notes.push(format!(
+                "{n_left_out} keypoints have no place in a pinhole camera: left out"
+            ));
+        }
+        let (queries, too_many): (Vec<usize>, Vec<usize>) =
+            self.queries.iter().partition(|n| **n <= views.len());
+        if !too_many.is_empty() {
+            notes.push(format!("{} images: no rows for {too_many:?} queries", views.len()));
+        }
+        let tried = self.tried(&queries);
+        audit.begin(&tried, None, &notes, progress)?;
+        let mut inversions = Vec::new();
+        let (rows, seconds) = self.rows(&views, &queries, &mut inversions, progress)?;
+        // Photos that could not be used have no pictures.
+        inversions.retain(|sheet| !sheet.views.is_empty());
+        let mut options = document::names(&tried, audit.options.clone());
+        options.insert("queries".into(), json!(queries));
+        options.extend(self.lists.as_ref().map(|by| ("lists".to_owned(), json!(by.name()))));
+        if let Some(error) = self.pose_error {
+            options.insert("pose_error_distance".into(), json!(error.distance));
+            options.insert("pose_error_angle_deg".into(), json!(error.angle_deg));
+        }
+        Ok(Attacked {
+            tried,
+            rows,
+            seconds,
+            about: Some(self.about(&input, &views, unusable)?),
+            options,
+            notes,
+            drawn: RenderOptions { inversions, ..RenderOptions::default() },
+            ..Attacked::default()
+        })
     }
-    let used = Used { used: views.len(), unusable };
-    let fewest = job.queries.first().copied().unwrap_or(2);
-    if views.len() < fewest {
-        let expected = format!("at least {fewest} images that are in {}", job.model.display());
-        let found = views.len().to_string();
-        return Err(unlift_io::Error::new(job.path, "", expected, found).into());
+
+    fn tried(&self, queries: &[usize]) -> Tried {
+        let with_lists = self.lists.is_some().then_some(WITH_LISTS);
+        let kinds = || [SEQUENCE, TRACKS].into_iter().chain(with_lists);
+        let sources = queries.iter().flat_map(|n| kinds().map(move |by| format!("{by}@{n}")));
+        Tried {
+            sources: sources.collect(),
+            solvers: vec![SOLVER.to_owned()],
+            inlier_ratios: Vec::new(),
+            lacks_best_source: self
+                .lists
+                .as_ref()
+                .is_none_or(|by| by.name() != BY_DESCRIPTORS.name),
+            ..Tried::by(&self.plan, false)
+        }
     }
-    let wrong = |(expected, found)| unlift_io::Error::new(job.path, "", expected, found);
-    alike(&views, model.n_points()).map_err(wrong)?;
-    let mut notes = Vec::new();
-    let n_left_out: usize = views.iter().map(|view| view.n_left_out).sum();
-    if n_left_out > 0 {
-        notes.push(format!("{n_left_out} keypoints have no place in a pinhole camera: left out"));
+
+    fn about(&self, model: &read::Input, views: &[View], unusable: usize) -> Result<Input, Error> {
+        let all: Vec<usize> = (0..self.source.names.len()).collect();
+        let n_points: usize = views.iter().map(|view| view.original.len()).sum();
+        Ok(Input {
+            path: Some(self.path.display().to_string()),
+            sha256: Some(self.source.hash(self.path, &all)?),
+            n_points: n_points as u64,
+            other_sha256: [("model".to_owned(), hash_files(&model.files)?)].into_iter().collect(),
+            images: Some(ImageCounts {
+                found: (self.source.names.len() + self.source.refused().len()) as u64,
+                used: views.len() as u64,
+                unusable: unusable as u64,
+                too_small: 0,
+            }),
+            ..Input::default()
+        })
     }
-    let too_many: Vec<usize> = job.queries.extract_if(.., |n| *n > views.len()).collect();
-    if !too_many.is_empty() {
-        notes.push(format!("{} images: no rows for {too_many:?} queries", views.len()));
+
+    /// Hides the views under each scheme and attacks them with each number of queries.
+    fn rows(
+        &self,
+        views: &[View],
+        queries: &[usize],
+        inversions: &mut Vec<Sheet>,
+        progress: &dyn Progress,
+    ) -> Result<(Vec<Row>, Seconds), Error> {
+        let plan = &self.plan;
+        let mut seconds = Seconds::default();
+        let mut rows = Vec::new();
+        let reach = queries.iter().copied().max().unwrap_or(0);
+        let mut known: Option<(Vec<Secret>, Links)> = None;
+        let n_kinds = if self.lists.is_some() { 3 } else { 2 };
+        let total = plan.schemes.len() * queries.len() * n_kinds;
+        for scheme in &plan.schemes {
+            let started = Instant::now();
+            let (protected, secrets) = hide(&**scheme, views, plan.seed)?;
+            seconds.obfuscate += started.elapsed().as_secs_f64();
+            progress.show(rows.len(), total, &format!("{}, linking queries", scheme.name()));
+            let started = Instant::now();
+            // Links depend on descriptors and cameras only.
+            let same = known.as_ref().and_then(|(of, links)| {
+                let orders =
+                    (!scheme.changes_descriptors()).then(|| orders(of, &secrets)).flatten()?;
+                Some(links.reordered(&orders))
+            });
+            let links = match same {
+                Some(links) => links,
+                None => {
+                    let links = Links::by_descriptors(&protected, reach)?;
+                    if !scheme.changes_descriptors() {
+                        known = Some((secrets.clone(), links.clone()));
+                    }
+                    links
+                }
+            };
+            let links = &links;
+            let tracks = tracks(views, &secrets);
+            let hidden = Hidden { views, queries: protected, secrets };
+            let lists = self.lists.as_deref().map(|by| hidden.lists(by, plan.seed)).transpose()?;
+            seconds.neighbors += started.elapsed().as_secs_f64();
+            let kinds = [(SEQUENCE, links, None), (TRACKS, &tracks, None)];
+            let combined = lists.as_ref().map(|lists| (WITH_LISTS, links, Some(lists)));
+            for &n in queries {
+                for (by, links, lists) in kinds.into_iter().chain(combined) {
+                    check_stop(progress)?;
+                    let what = format!("{}, {n} queries, links by {by}", scheme.name());
+                    progress.show(rows.len(), total, &what);
+                    let started = Instant::now();
+                    let attack = Attack { links, lists, n, seed: plan.seed };
+                    let row = hidden.row(&attack, &tracks, plan)?;
+                    seconds.recover += started.elapsed().as_secs_f64();
+                    let (scheme, neighbors) = (scheme.name().to_owned(), format!("{by}@{n}"));
+                    let share = |row: &Row| row.recovered_percent[plan.headline];
+                    // Who has more queries can use fewer.
+                    let of = |fewer: &&Row| {
+                        let is_same = fewer.neighbors.split('@').next() == Some(by);
+                        is_same && fewer.scheme == scheme && share(fewer) > share(&row)
+                    };
+                    let row = rows.iter().rfind(of).cloned().unwrap_or(row);
+                    let row = Row { scheme, neighbors, k: n, solver: SOLVER.to_owned(), ..row };
+                    let strongest = if combined.is_some() { WITH_LISTS } else { SEQUENCE };
+                    if let Some(inversion) = self.inversion.as_ref().filter(|_| by == strongest) {
+                        paint(inversion, (&hidden, &attack), &row, progress, inversions)?;
+                    }
+                    rows.push(row);
+                }
+            }
+        }
+        seconds.rows = vec![Default::default(); rows.len()];
+        Ok((rows, seconds))
     }
-    notes.iter().for_each(|note| steps.say(&format!("note: {note}")));
-    job.plan.neighbors = sources(&job.queries, job.lists.is_some());
-    check_gates(&job.gates, &job.plan, false)?;
-    let mut inversions = Vec::new();
-    let (rows, seconds) = rows(&job, &views, &mut inversions)?;
-    let lacks_lists = job.lists.as_ref().is_none_or(|by| by.name() != BY_DESCRIPTORS.name);
-    let gates = gate_results(&job.gates, (&job.plan, lacks_lists), &rows, &[], &[], &[])?;
-    let provenance = Provenance {
-        notes,
-        input: described(&job, &input, &views, used)?,
-        options: options(&job),
-        gates,
-        command: job.command,
-        started: job.started,
-    };
-    let found = Found { rows: &rows, not_audited: &[], break_even: &[], seconds: &seconds };
-    let document = document::document(&job.plan, &found, provenance);
-    // Photos that could not be used have no pictures.
-    inversions.retain(|sheet| !sheet.views.is_empty());
-    let drawn = RenderOptions { inversions, ..RenderOptions::default() };
-    let audited = Audited { document, scene: None, drawn };
-    Ok((audited.write(out, &job.out, job.share_safe)?, used))
 }
 
 /// Returns what was expected and found if keypoints that show one point have descriptors that are not alike.
@@ -174,125 +269,6 @@ fn alike(views: &[View], n_points: usize) -> Result<(), (String, String)> {
         alike.add(&points, &rows)?;
     }
     alike.check()
-}
-
-/// Names the sources of the rows, for gates.
-fn sources(queries: &[usize], with_lists: bool) -> Vec<NeighborsBy<2>> {
-    let kinds = || [SEQUENCE, TRACKS].into_iter().chain(with_lists.then_some(WITH_LISTS));
-    let names = queries.iter().flat_map(|n| kinds().map(move |by| format!("{by}@{n}")));
-    names.map(only_named).collect()
-}
-
-fn options(job: &SequenceJob<'_>) -> Map<String, Value> {
-    let mut options = job.options.clone();
-    options.extend(names(&job.plan));
-    options.insert("queries".into(), json!(job.queries));
-    options.extend(job.lists.as_ref().map(|by| ("lists".to_owned(), json!(by.name()))));
-    if let Some(error) = job.pose_error {
-        options.insert("pose_error_distance".into(), json!(error.distance));
-        options.insert("pose_error_angle_deg".into(), json!(error.angle_deg));
-    }
-    options
-}
-
-fn described(
-    job: &SequenceJob<'_>,
-    model: &read::Input,
-    views: &[View],
-    used: Used,
-) -> Result<Input, Error> {
-    let sha256 = match job.source {
-        FeatureSource::Folder(folder) => {
-            let photos: Vec<&Path> = (0..folder.names().len()).map(|at| folder.path(at)).collect();
-            hash_files(&photos)?
-        }
-        FeatureSource::File(_) | FeatureSource::InMemory(_) => hash_file(job.path)?,
-    };
-    let n_points: usize = views.iter().map(|view| view.original.len()).sum();
-    Ok(Input {
-        path: Some(job.path.display().to_string()),
-        sha256: Some(sha256),
-        n_points: n_points as u64,
-        scale_m_per_unit: None,
-        unit_in_map_units: None,
-        extent_m: None,
-        other_sha256: [("model".to_owned(), hash_files(&model.files)?)].into_iter().collect(),
-        images: Some(ImageCounts {
-            found: (job.source.names().len() + job.source.refused().len()) as u64,
-            used: used.used as u64,
-            unusable: used.unusable as u64,
-            too_small: 0,
-        }),
-    })
-}
-
-/// Hides the views under each scheme and attacks them with each number of queries.
-fn rows(
-    job: &SequenceJob<'_>,
-    views: &[View],
-    inversions: &mut Vec<Sheet>,
-) -> Result<(Vec<Row>, Seconds), Error> {
-    let mut seconds = Seconds::default();
-    let mut rows = Vec::new();
-    let reach = job.queries.iter().copied().max().unwrap_or(0);
-    let mut known: Option<(Vec<Secret>, Links)> = None;
-    let total = job.plan.schemes.len() * job.plan.neighbors.len();
-    for scheme in &job.plan.schemes {
-        let started = Instant::now();
-        let (queries, secrets) = hide(&**scheme, views, job.plan.seed)?;
-        seconds.obfuscate += started.elapsed().as_secs_f64();
-        job.progress.show(rows.len(), total, &format!("{}, linking queries", scheme.name()));
-        let started = Instant::now();
-        // Links depend on descriptors and cameras only.
-        let same = known.as_ref().and_then(|(of, links)| {
-            let orders = (!scheme.changes_descriptors()).then(|| orders(of, &secrets)).flatten()?;
-            Some(links.reordered(&orders))
-        });
-        let links = match same {
-            Some(links) => links,
-            None => {
-                let links = Links::by_descriptors(&queries, reach)?;
-                if !scheme.changes_descriptors() {
-                    known = Some((secrets.clone(), links.clone()));
-                }
-                links
-            }
-        };
-        let links = &links;
-        let tracks = tracks(views, &secrets);
-        let hidden = Hidden { views, queries, secrets };
-        let lists = job.lists.as_deref().map(|by| hidden.lists(by, job.plan.seed)).transpose()?;
-        seconds.neighbors += started.elapsed().as_secs_f64();
-        let kinds = [(SEQUENCE, links, None), (TRACKS, &tracks, None)];
-        let combined = lists.as_ref().map(|lists| (WITH_LISTS, links, Some(lists)));
-        for &n in &job.queries {
-            for (by, links, lists) in kinds.into_iter().chain(combined) {
-                check_stop(job.progress)?;
-                let what = format!("{}, {n} queries, links by {by}", scheme.name());
-                job.progress.show(rows.len(), total, &what);
-                let started = Instant::now();
-                let attack = Attack { links, lists, n, seed: job.plan.seed };
-                let row = hidden.row(&attack, &tracks, &job.plan)?;
-                seconds.recover += started.elapsed().as_secs_f64();
-                let (scheme, neighbors) = (scheme.name().to_owned(), format!("{by}@{n}"));
-                let share = |row: &Row| row.recovered_percent[job.plan.headline];
-                // Who has more queries can use fewer.
-                let of = |fewer: &&Row| {
-                    let is_same = fewer.neighbors.split('@').next() == Some(by);
-                    is_same && fewer.scheme == scheme && share(fewer) > share(&row)
-                };
-                let row = rows.iter().rfind(of).cloned().unwrap_or(row);
-                let row = Row { scheme, neighbors, k: n, solver: SOLVER.to_owned(), ..row };
-                let strongest = if combined.is_some() { WITH_LISTS } else { SEQUENCE };
-                if let Some(inversion) = job.inversion.filter(|_| by == strongest) {
-                    paint(inversion, (&hidden, &attack), &row, job.progress, inversions)?;
-                }
-                rows.push(row);
-            }
-        }
-    }
-    seconds.rows = vec![Default::default(); rows.len()];
-    Ok((rows, seconds))
 }
 
 fn hide(

@@ -110,7 +110,7 @@ impl Model {
         (source, path): (&FeatureSource, &Path),
         pose_error: Option<(PoseError, u64)>,
     ) -> Vec<Result<View, crate::Error>> {
-        let names = source.names();
+        let names = &source.names;
         let both: Vec<(usize, usize)> = names
             .iter()
             .enumerate()

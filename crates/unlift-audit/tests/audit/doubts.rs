@@ -3,7 +3,6 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
 use unlift::audit::{Plan, Threshold};
 use unlift::descriptors::Values;
@@ -13,9 +12,10 @@ use unlift::released::{Lines, Obfuscation, Released};
 use unlift::seed::{Key, Stage};
 use unlift::truth::{Original, OriginalId, Secret};
 use unlift::{Descriptors, PointSet, Unit};
+use unlift_audit::maps::Map;
 use unlift_audit::{
-    Audited, Error, Gate, Job, Preparation, Prepared, maps, prepare, read_from_file,
-    unlike_neighbors,
+    Audit, Audited, Error, Gate, Hidden, Input, Output, Preparation, Prepared, Quiet, prepare,
+    read_from_file, unlike_neighbors,
 };
 use unlift_io::read;
 
@@ -50,15 +50,13 @@ fn audit(
     plan: Plan<3>,
     gate: &str,
 ) -> Result<Audited, Error> {
-    let job = Job {
-        hidden,
-        plan,
-        notes: prepared.notes.clone(),
-        doubts: prepared.doubts.clone(),
-        gates: vec![Gate::parse(gate).unwrap()],
-        ..Job::of(&prepared.original, Instant::now())
+    let map = Map { plan, ..Map::of(&prepared.original) };
+    let input = match hidden {
+        Some(release) => Input::Released(map, Hidden { release, read: None }),
+        None => Input::Map(map),
     };
-    maps::find(job)
+    let gates = vec![Gate::parse(gate).unwrap()];
+    Audit { gates, ..Audit::of_map(input, prepared, Output::new(Path::new(""))) }.run(&Quiet)
 }
 
 /// Returns the doubt with which the only gate does not hold. The notes contain it, too.
@@ -192,13 +190,11 @@ fn a_gate_that_names_no_attack_needs_the_best_of_each_kind() {
     let said = |gate: &str, plan: Plan<3>, described: bool| {
         let values = (0..N * 8).map(|at| (at * 37 % 101) as u8).collect();
         let descriptors = Descriptors::try_new(Values::U8(values), 8).expect("descriptors");
-        let job = Job {
-            plan,
-            descriptors: described.then_some(&descriptors),
-            gates: vec![Gate::parse(gate).expect("a gate")],
-            ..Job::of(&points.original, Instant::now())
-        };
-        let gate = maps::find(job).expect("an audit").document.gates.remove(0);
+        let descriptors = described.then_some(&descriptors);
+        let input = Input::Map(Map { plan, descriptors, ..Map::of(&points.original) });
+        let gates = vec![Gate::parse(gate).expect("a gate")];
+        let audit = Audit { gates, ..Audit::new(input, Output::new(Path::new(""))) };
+        let gate = audit.run(&Quiet).expect("an audit").document.gates.remove(0);
         assert_eq!(gate.passed, gate.reason.is_none());
         gate.reason.unwrap_or_default()
     };
@@ -266,14 +262,13 @@ fn a_released_file_that_gives_places_away_is_no_protection() {
         let secret = Secret::try_new(hidden, None, rows, Vec::new(), N).unwrap();
         let secret = secret.of_map(Some(released.fingerprint()), 1).unwrap();
         let plan = plan(&["olc"]);
-        let job = Job {
-            read: read_from_file(&[feet], (&points.original, &secret), &plan.thresholds),
-            hidden: Some(&(released, secret)),
-            plan,
-            gates: vec![Gate::parse("olc:joint:0.10<=100").unwrap()],
-            ..Job::of(&points.original, Instant::now())
-        };
-        let document = maps::find(job).unwrap().document;
+        let read = read_from_file(&[feet], (&points.original, &secret), &plan.thresholds);
+        let release = (released, secret);
+        let map = Map { plan, ..Map::of(&points.original) };
+        let input = Input::Released(map, Hidden { release: &release, read });
+        let gates = vec![Gate::parse("olc:joint:0.10<=100").unwrap()];
+        let audit = Audit { gates, ..Audit::new(input, Output::new(Path::new(""))) };
+        let document = audit.run(&Quiet).unwrap().document;
         let read = document.results[0].records_alone_percent.as_ref().map(|by| by["0.10"]);
         let gate = &document.gates[0];
         assert_eq!(

@@ -1,20 +1,20 @@
 //! Images in memory: same figures as from a file, number of requests, and error lines.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Instant;
 
 use unlift::audit::Plan;
 use unlift::descriptors::Values;
 use unlift::recover::Builtin;
 use unlift::{Descriptors, Unit};
-use unlift_audit::images::audit::{ImagesJob, Used, find, perform};
-use unlift_audit::images::{FeatureSource, InMemory};
-use unlift_audit::{Audited, Error, Quiet, open_audit};
+use unlift_audit::images::audit::Images;
+use unlift_audit::images::{FeatureSource, Opened};
+use unlift_audit::{Audit, Audited, Error, Input, Output, Quiet};
 use unlift_io::features::{FeatureWriter, ImageFeatures};
 use unlift_io::outputs::Rules;
+use unlift_vision::features::Extraction;
 
 const NAMES: [&str; 5] = ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "e.jpg"];
 
@@ -32,41 +32,31 @@ fn image(at: usize) -> ImageFeatures {
     }
 }
 
-fn job<'a>(source: &'a FeatureSource, path: &'a Path) -> ImagesJob<'a> {
-    let usual = Plan::new(Unit::Pixel);
-    ImagesJob {
-        source,
-        path,
-        chosen: (0..source.names().len()).collect(),
-        plan: Plan {
-            inlier_ratios: vec![0.5],
-            k: 10,
-            solvers: vec![Arc::new(Builtin::Consensus)],
-            ..usual
-        },
-        options: serde_json::Map::new(),
-        gates: Vec::new(),
-        draws: true,
-        photos: None,
-        out: PathBuf::new(),
-        share_safe: false,
-        inversion: None,
-        progress: &Quiet,
-        command: None,
-        started: Instant::now(),
-    }
+fn audit(source: FeatureSource) -> Result<Audited, Error> {
+    audit_at(source, Path::new("images"), Path::new("")).map(|(audited, _)| audited)
+}
+
+fn audit_at(source: FeatureSource, path: &Path, out: &Path) -> Result<(Audited, Output), Error> {
+    let opened = Opened::of(source, path, None);
+    let plan = Plan {
+        inlier_ratios: vec![0.5],
+        k: 10,
+        solvers: vec![Arc::new(Builtin::Consensus)],
+        ..Plan::new(Unit::Pixel)
+    };
+    let input = Images { opened: &opened, plan, draws: true, photos: None, inversion: None };
+    let output = Output::new(out);
+    let audited = Audit::new(Input::Images(input), output.clone()).run(&Quiet)?;
+    let images = audited.document.input.images.as_ref().expect("images");
+    assert_eq!((images.used, images.unusable), (NAMES.len() as u64, 0));
+    Ok((audited, output))
 }
 
 fn in_memory(
     get: impl Fn(usize) -> Result<ImageFeatures, Error> + Send + Sync + 'static,
 ) -> FeatureSource {
     let names = NAMES.map(str::to_owned).to_vec();
-    FeatureSource::InMemory(InMemory::try_new(names, get).expect("images"))
-}
-
-fn figures((figures, used): (Option<Audited>, Used)) -> Audited {
-    assert_eq!((used.used, used.unusable), (NAMES.len(), 0));
-    figures.expect("figures")
+    FeatureSource::in_memory(names, get).expect("images")
 }
 
 #[test]
@@ -76,8 +66,8 @@ fn images_in_memory_have_the_figures_of_a_file() {
     let mut writer = FeatureWriter::create(&path).expect("a file");
     (0..NAMES.len()).for_each(|at| writer.append(&image(at)).expect("an image"));
     writer.finish().expect("a file");
-    let file = FeatureSource::File(unlift_io::features::FeatureSource::open(&path).expect("it"));
-    let of_file = figures(find(job(&file, &path)).expect("an audit"));
+    let file = FeatureSource::open(&path, &Extraction::default()).expect("it");
+    let (of_file, _) = audit_at(file, &path, Path::new("")).expect("an audit");
 
     let asked = Arc::new(AtomicUsize::new(0));
     let counted = Arc::clone(&asked);
@@ -85,7 +75,8 @@ fn images_in_memory_have_the_figures_of_a_file() {
         counted.fetch_add(1, Ordering::Relaxed);
         Ok(image(at))
     });
-    let of_memory = figures(find(job(&memory, Path::new("images"))).expect("an audit"));
+    let out = place.path().join("audit");
+    let (of_memory, output) = audit_at(memory, Path::new("images"), &out).expect("an audit");
     assert_eq!(of_memory.document.results, of_file.document.results);
     assert_eq!(of_memory.document.images, of_file.document.images);
     assert!(!of_file.document.results.is_empty());
@@ -95,13 +86,8 @@ fn images_in_memory_have_the_figures_of_a_file() {
     // Three images are drawn.
     assert_eq!(asked.load(Ordering::Relaxed), NAMES.len() + 3);
 
-    // Finding and writing in one call gives the same page.
-    let out = place.path().join("audit");
-    let files = open_audit(&out, Rules::new([], false), false).expect("a folder");
-    let (finished, _) =
-        perform(ImagesJob { out: out.clone(), ..job(&memory, Path::new("images")) }, files)
-            .expect("an audit");
-    let page = fs::read_to_string(finished.expect("figures").report).expect("a page");
+    let files = output.open(Rules::new([], false)).expect("a folder");
+    let page = fs::read_to_string(of_memory.write(files).expect("files").report).expect("a page");
     let pictures = |page: &str| page.matches("id=\"picture-graph\"").count();
     assert!(pictures(&page) > 0 && pictures(&of_memory.page(false).expect("a page")) > 0);
     assert_eq!(pictures(&of_memory.page(true).expect("a page")), 0);
@@ -116,19 +102,18 @@ fn keypoints_that_halves_rounded_out_of_the_image_are_moved_to_its_edge() {
             Ok(image)
         })
     };
-    let document =
-        figures(find(job(&with(640.4), Path::new("images"))).expect("an audit")).document;
+    let document = audit(with(640.4)).expect("an audit").document;
     let note =
         "5 keypoints were at most a pixel outside of their images, and are moved to the edge";
     assert_eq!(document.notes, [note]);
-    assert!(find(job(&with(641.0), Path::new("images"))).is_err());
+    assert!(audit(with(641.0)).is_err());
 }
 
 #[test]
 fn a_mistake_in_memory_ends_the_audit_in_a_line() {
     let line = |wrong: fn(ImageFeatures) -> ImageFeatures| {
         let images = in_memory(move |at| Ok(if at == 1 { wrong(image(at)) } else { image(at) }));
-        find(job(&images, Path::new("images"))).expect_err("an error").to_string()
+        audit(images).expect_err("an error").to_string()
     };
     assert_eq!(
         line(|image| ImageFeatures { size: None, ..image }),
@@ -140,6 +125,6 @@ fn a_mistake_in_memory_ends_the_audit_in_a_line() {
     });
     assert!(outside.starts_with("images: image b.jpg") && outside.contains("700"), "{outside}");
     let images = in_memory(|_| Err(Error::request("images: gone")));
-    let gone = find(job(&images, Path::new("images"))).expect_err("an error");
+    let gone = audit(images).expect_err("an error");
     assert!(gone.is_request() && gone.to_string() == "images: gone");
 }

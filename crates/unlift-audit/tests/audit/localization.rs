@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
 use unlift::Descriptors;
 use unlift::Unit;
@@ -14,7 +13,8 @@ use unlift::recover::Builtin;
 use unlift::seed::{Draws, Stage};
 use unlift_audit::localization::Localize;
 use unlift_audit::localization::held_out::Held;
-use unlift_audit::{Audited, Gate, Job, Preparation, Prepared, Quiet, maps};
+use unlift_audit::maps::{self, Map};
+use unlift_audit::{Audit, Audited, Gate, Input, Output, Preparation, Prepared, Quiet};
 use unlift_io::features::{FeatureWriter, ImageFeatures};
 use unlift_report::document::Localization;
 
@@ -98,13 +98,13 @@ fn write(folder: &Path) {
     writer.finish().unwrap();
 }
 
-fn open(folder: &Path) -> (unlift_io::read::Input, Prepared) {
+fn open(folder: &Path) -> Prepared {
     let preparation = Preparation { scale: Some(1.0), k: 20, ..Preparation::default() };
     maps::open(folder, None, &preparation).unwrap()
 }
 
 fn audit(folder: &Path, mitigate: &[&str], gates: &[&str], held_out: bool) -> Audited {
-    let (input, prepared) = open(folder);
+    let prepared = open(folder);
     let mut schemes = schemes(&["olc", "plane"], Unit::Meter);
     let change = |text: &&str| {
         let tracks = Some(Arc::clone(&prepared.cameras.tracks));
@@ -121,13 +121,11 @@ fn audit(folder: &Path, mitigate: &[&str], gates: &[&str], held_out: bool) -> Au
         ..Plan::new(Unit::Meter)
     };
     let held_out = held_out.then(|| (folder.join("features.h5"), 4));
-    let job = Job {
-        plan,
-        gates: gates.iter().map(|text| Gate::parse(text).unwrap()).collect(),
-        localize: Some(Localize { cameras: &prepared.cameras, held_out, protections: Vec::new() }),
-        ..Job::new(folder, &input, &prepared, &folder.join("out"), Instant::now()).unwrap()
-    };
-    maps::find(job).unwrap()
+    let localize = Localize { cameras: &prepared.cameras, held_out, protections: Vec::new() };
+    let map = Map { plan, localize: Some(localize), ..Map::new(&prepared) };
+    let gates = gates.iter().map(|text| Gate::parse(text).unwrap()).collect();
+    let audit = Audit::of_map(Input::Map(map), &prepared, Output::new(Path::new("")));
+    Audit { gates, ..audit }.run(&Quiet).unwrap()
 }
 
 fn of<'a>(audited: &'a Audited, scheme: &str) -> &'a Localization {
@@ -193,7 +191,7 @@ fn photos_of_another_size_are_refused() {
     write(folder.path());
     let camera = "1 PINHOLE 1280 960 1000 1000 640 480\n";
     std::fs::write(folder.path().join("cameras.txt"), camera).unwrap();
-    let (_, Prepared { cameras, original, .. }) = open(folder.path());
+    let Prepared { cameras, original, .. } = open(folder.path());
     let features = folder.path().join("features.h5");
     let error = Held::open(&features, 4, &cameras, &original, &Quiet).err().unwrap().to_string();
     let expected = "expected 1280 x 960 pixels, as its camera in the model, found 640 x 480";
@@ -205,15 +203,12 @@ fn a_model_without_tracks_is_silent_and_a_gate_on_it_is_told() {
     let folder = tempfile::tempdir().unwrap();
     write(folder.path());
     std::fs::remove_file(folder.path().join("images.txt")).unwrap();
-    let (input, prepared) = open(folder.path());
+    let prepared = open(folder.path());
     assert!(prepared.cameras.views.is_empty());
     let gates = vec![Gate::parse("olc:localization<=2").unwrap()];
-    let job = Job {
-        gates,
-        ..Job::new(folder.path(), &input, &prepared, &folder.path().join("out"), Instant::now())
-            .unwrap()
-    };
-    let error = maps::find(job).err().unwrap().to_string();
+    let input = Input::Map(Map::new(&prepared));
+    let audit = Audit::of_map(input, &prepared, Output::new(Path::new("")));
+    let error = Audit { gates, ..audit }.run(&Quiet).err().unwrap().to_string();
     let expected = "--gate olc:localization<=2: expected a COLMAP model with cameras and tracks, not in tiles, found none";
     assert_eq!(error, expected);
 }

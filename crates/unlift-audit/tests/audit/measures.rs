@@ -3,15 +3,14 @@
 use std::fs;
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
 use unlift::audit::{Cell, Counts, Item, Measure, Plan, Silent, run_many};
 use unlift::geometry::frame::Bounds;
 use unlift::recover::Builtin;
 use unlift::truth::Original;
 use unlift::{Error, PointSet, Unit};
-use unlift_audit::{Error as AuditError, Finished, Job, Preparation};
-use unlift_audit::{maps, open_audit};
+use unlift_audit::maps::{self, Map};
+use unlift_audit::{Audit, Error as AuditError, Finished, Input, Output, Preparation, Quiet};
 use unlift_io::outputs::Rules;
 use unlift_report::Document;
 
@@ -33,7 +32,7 @@ impl Measure<3> for Found {
 fn audit(folder: &Path) -> Result<Finished, AuditError> {
     let map = write_map(folder, &unlift::synthetic::room(1, 400).points);
     let preparation = Preparation { scale: Some(1.0), k: 10, ..Preparation::default() };
-    let (input, prepared) = maps::open(&map, None, &preparation)?;
+    let prepared = maps::open(&map, None, &preparation)?;
     let usual = Plan::new(Unit::Meter);
     let plan = Plan {
         schemes: schemes(&["cp"], Unit::Meter),
@@ -44,9 +43,10 @@ fn audit(folder: &Path) -> Result<Finished, AuditError> {
         ..usual
     };
     let out = folder.join("audit");
-    let files = open_audit(&out, Rules::new([map.as_path()], false), false)?;
-    let job = Job { plan, ..Job::new(&map, &input, &prepared, &out, Instant::now())? };
-    maps::perform(job, files)
+    let output = Output::new(&out);
+    let files = output.open(Rules::new([map.as_path()], false))?;
+    let input = Input::Map(Map { plan, ..Map::new(&prepared) });
+    Audit::of_map(input, &prepared, output).run(&Quiet)?.write(files)
 }
 
 #[test]

@@ -1,11 +1,11 @@
 //! Notes and doubts about how a map was read, in its audit and in gates.
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use unlift::audit::Plan;
 use unlift::synthetic::room;
-use unlift_audit::{Gate, Job, Preparation, maps};
+use unlift_audit::maps::{self, Map};
+use unlift_audit::{Audit, Gate, Input, Output, Preparation, Quiet};
 use unlift_report::Document;
 
 use crate::write_map;
@@ -19,12 +19,14 @@ fn room_with_gaps(folder: &Path, every: usize) -> PathBuf {
 
 fn audit(map: &Path) -> Document {
     let preparation = Preparation { k: 10, ..Preparation::default() };
-    let (input, prepared) = maps::open(map, None, &preparation).expect("a map");
-    let job = Job::new(map, &input, &prepared, Path::new(""), Instant::now()).expect("a job");
-    let mut plan = Plan { k: 10, inlier_ratios: vec![0.5], ..job.plan.clone() };
+    let prepared = maps::open(map, None, &preparation).expect("a map");
+    let map = Map::new(&prepared);
+    let mut plan = Plan { k: 10, inlier_ratios: vec![0.5], ..map.plan.clone() };
     plan.schemes.retain(|scheme| scheme.name() == "olc");
     let gates = vec![Gate::parse("olc:1.0<=100").expect("a gate")];
-    maps::find(Job { plan, gates, ..job }).expect("an audit").document
+    let input = Input::Map(Map { plan, ..map });
+    let audit = Audit::of_map(input, &prepared, Output::new(Path::new("")));
+    Audit { gates, ..audit }.run(&Quiet).expect("an audit").document
 }
 
 #[test]
@@ -46,10 +48,10 @@ fn rows_are_those_of_the_file() {
     let dir = tempfile::tempdir().unwrap();
     let map = room_with_gaps(dir.path(), 50);
     let all = Preparation { k: 10, ..Preparation::default() };
-    let rows = maps::open(&map, None, &all).unwrap().1.rows;
+    let rows = maps::open(&map, None, &all).unwrap().rows;
     let expected: Vec<u32> = (0..400).filter(|row| row % 50 != 0).collect();
     assert_eq!(rows, expected);
     let some = Preparation { max_points: Some(100), ..all };
-    let rows = maps::open(&map, None, &some).unwrap().1.rows;
+    let rows = maps::open(&map, None, &some).unwrap().rows;
     assert!(rows.len() == 100 && rows.is_sorted() && rows.iter().all(|row| row % 50 != 0));
 }

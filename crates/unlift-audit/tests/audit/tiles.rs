@@ -3,14 +3,13 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
 use unlift::audit::{NeighborsBy, Plan};
 use unlift::neighbors::Geometric;
 use unlift::recover::Builtin;
 use unlift::{Unit, synthetic};
-use unlift_audit::maps::{Tiles, find};
-use unlift_audit::{Job, Preparation, prepare};
+use unlift_audit::maps::Map;
+use unlift_audit::{Audit, Input, Output, Preparation, Quiet, Tiles, prepare};
 use unlift_io::read;
 
 use crate::{schemes, write_map};
@@ -29,10 +28,11 @@ fn audit(only: Option<usize>, threads: usize) -> unlift_audit::Audited {
         k: 20,
         ..Plan::new(Unit::Meter)
     };
-    let job = Job::new(&path, &input, &prepared, Path::new("unused"), Instant::now()).unwrap();
-    let job = Job { plan, tiles: Some(Tiles { most: 600, only }), ..job };
+    let map = Map { plan, ..Map::new(&prepared) };
+    let input = Input::Tiles(map, Tiles { max_points: 600, only });
+    let audit = Audit::of_map(input, &prepared, Output::new(Path::new("")));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    pool.install(|| find(job)).unwrap()
+    pool.install(|| audit.run(&Quiet)).unwrap()
 }
 
 #[test]

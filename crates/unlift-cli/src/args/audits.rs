@@ -144,12 +144,7 @@ pub struct PaintArgs {
 impl PaintArgs {
     /// Returns the user's network and photos, which must not be overwritten.
     pub fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
-        self.network().into_iter().chain(&self.photos)
-    }
-
-    /// Returns the file of the user's network.
-    pub fn network(&self) -> Option<&PathBuf> {
-        self.invert.as_ref().and_then(Option::as_ref)
+        self.invert.iter().flatten().chain(&self.photos)
     }
 }
 
@@ -186,12 +181,9 @@ impl ExtractionArgs {
 
     /// Adds the options that were given to those of the report.
     pub fn record(&self, options: &mut Map<String, Value>) {
-        let mut record = |name: &str, value: Option<Value>| {
-            options.extend(value.map(|value| (name.to_owned(), value)));
-        };
-        record("features", self.features.map(|kind| json!(kind.name())));
-        record("max_features", self.max_features.map(|most| json!(most.get())));
-        record("min_score", self.min_score.map(|score| json!(score)));
+        record(options, "features", self.features.map(|kind| json!(kind.name())));
+        record(options, "max_features", self.max_features.map(|most| json!(most.get())));
+        record(options, "min_score", self.min_score.map(|score| json!(score)));
     }
 }
 
@@ -490,7 +482,7 @@ pub struct AuditReleasedArgs {
     pub truth: PathBuf,
     /// Name of the scheme in the results [default: the value of "scheme" in RELEASED, otherwise
     /// "released"]
-    #[arg(long, value_name = "NAME", value_parser = values::scheme_name, help_heading = "Input")]
+    #[arg(long, value_name = "NAME", value_parser = unlift_audit::released::check_name, help_heading = "Input")]
     pub name: Option<String>,
     /// Descriptors of the original points, if RELEASED has none: a .npy array with a row per point,
     /// or a file in unlift's format P3DESC01 (docs/formats.md)
@@ -506,4 +498,69 @@ pub struct AuditReleasedArgs {
     pub oracle: OracleArgs,
     #[command(flatten)]
     pub audit: AuditArgs,
+}
+
+/// Adds an option that was given to those of the report.
+fn record(options: &mut Map<String, Value>, name: &str, value: Option<Value>) {
+    options.extend(value.map(|value| (name.to_owned(), value)));
+}
+
+/// Returns the names of mitigations for the report, if there are any.
+fn named(mitigations: &[Mitigation]) -> Option<Value> {
+    let names = mitigations.iter().map(Mitigation::name).collect::<Vec<_>>();
+    (!names.is_empty()).then(|| json!(names))
+}
+
+impl AuditMapArgs {
+    /// Returns true if the audit uses descriptors, which may lie beside the model.
+    pub fn uses_descriptors(&self) -> bool {
+        let needs = |source: &NeighborSource| match source {
+            NeighborSource::Own(named) => named.name() != "geometric",
+            NeighborSource::Oracle | NeighborSource::File(_) => false,
+        };
+        let neighbors = &self.solvers.neighbors;
+        neighbors.is_empty()
+            || neighbors.iter().any(needs)
+            || self.paint.invert.is_some()
+            || self.mitigate.iter().any(Mitigation::changes_descriptors)
+            || !self.protect.protect_descriptors.is_empty()
+    }
+
+    /// Returns the options that change the points, for the report.
+    pub fn record(&self) -> Map<String, Value> {
+        let mut options = Map::new();
+        record(&mut options, "max_points", self.map.max_points.map(|most| json!(most.get())));
+        record(&mut options, "mitigate", named(&self.mitigate));
+        self.protect.record(&mut options);
+        let hold_out = self.localize.as_ref().map(|_| json!(self.hold_out.get()));
+        record(&mut options, "hold_out", hold_out);
+        if self.paint.invert.is_some() {
+            record(&mut options, "invert", Some(json!(true)));
+            record(&mut options, "max_images", Some(json!(self.max_images.get())));
+        }
+        options
+    }
+}
+
+impl AuditImagesArgs {
+    /// Returns the options that change the images, for the report.
+    pub fn record(&self) -> Map<String, Value> {
+        let mut options = Map::new();
+        self.extraction.record(&mut options);
+        self.protect.record(&mut options);
+        record(&mut options, "max_images", self.max_images.map(|most| json!(most.get())));
+        record(&mut options, "invert", self.paint.invert.as_ref().map(|_| json!(true)));
+        options
+    }
+}
+
+impl AuditSequenceArgs {
+    /// Returns the options that change the images, for the report.
+    pub fn record(&self) -> Map<String, Value> {
+        let mut options = Map::new();
+        record(&mut options, "model", Some(json!(self.model.display().to_string())));
+        record(&mut options, "mitigate", named(&self.mitigate));
+        self.extraction.record(&mut options);
+        options
+    }
 }

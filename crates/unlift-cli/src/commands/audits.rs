@@ -1,293 +1,379 @@
-//! What the audits share: outputs, plans, protected descriptors and painters.
+//! The audits: arguments to an `Audit`, which is run and printed.
 
-use std::fs;
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Arc;
 
-use unlift::audit::{NeighborsBy, Plan, Threshold};
-use unlift::descriptors::Values;
-use unlift::neighbors::{Needs, Source};
-use unlift::obfuscate::Protection;
-use unlift::recover::{Builtin, Solver};
-use unlift::{Descriptors, ErrorKind};
-use unlift_audit::images::FeatureSource;
-use unlift_audit::images::extraction::Wanted;
-use unlift_audit::inversion::Painter;
+use serde_json::json;
+use unlift::audit::{Measure, NeighborsBy, Plan, Threshold, scheme_called};
+use unlift::neighbors::sources::Named;
+use unlift::obfuscate::{Change, Changed, Entry, Mitigation, SCHEMES, Scheme, SchemeOptions};
+use unlift::recover::Builtin;
+use unlift::{Descriptors, Unit};
+use unlift_audit::again::{Again, Maps};
+use unlift_audit::changes::{mitigations, protections, protections_of_map, public_descriptors};
+use unlift_audit::images::audit::Images;
+use unlift_audit::images::{FeatureSource, Opened, Opening};
+use unlift_audit::inversion::{Inversion, MapInversion};
+use unlift_audit::localization::Localize;
+use unlift_audit::maps::Map;
+use unlift_audit::sequence::{PoseError, Sequence};
 use unlift_audit::{
-    FIGURES, Finished, PAGE, Prepared, by_point, check_file_of, check_thresholds, open_audit,
+    Audit, Audited, Finished, Hidden, Input, Output, Preparation, Prepared, Request, Tiles, Views,
+    by_point, check_thresholds, distinct, read_from_file, released,
 };
-use unlift_io::Error;
-use unlift_io::atomic::{Access, make_folders, write_file};
-use unlift_io::outputs::{Kind, OutputSet, Rules};
-use unlift_report::junit;
+use unlift_io::hash::hash_file;
+use unlift_io::outputs::Rules;
+use unlift_io::stage::published_positions;
+use unlift_vision::features::photo::Turn;
 use unlift_vision::network::DescriptorKind;
-use unlift_vision::pictures::Inverter;
 
-use super::common::with_threads;
-use crate::args::{AuditArgs, OracleArgs, PaintArgs, ProtectArgs};
+use super::common::{all_could_be, open_map, with_threads};
+use crate::args::{
+    AuditAgainArgs, AuditArgs, AuditImagesArgs, AuditMapArgs, AuditReleasedArgs, AuditSequenceArgs,
+    OracleArgs, ProtectArgs, SolverArgs,
+};
 use crate::demo::photos;
-use crate::exit::{Outcome, advise, usage};
-use crate::output::print;
-use crate::values::{NeighborSource, distinct};
+use crate::exit::{Outcome, usage};
+use crate::output::{command_line, print};
+use crate::progress::Progress;
+use crate::values::NeighborSource;
 
-/// Runs the audit `work`, writes its results and prints them. Files in `inputs` must not be
-/// overwritten. `work` returns nothing if nothing could be audited.
-pub fn perform(
+/// Runs the audit that `work` makes with an output, writes its results and prints them. Files in `inputs` must not be overwritten.
+fn perform<'a>(
     args: &AuditArgs,
-    inputs: Vec<&Path>,
-    work: impl FnOnce(OutputSet) -> crate::Result<Option<Finished>> + Send,
-) -> crate::Result<Outcome> {
-    let rules = Rules::new(inputs, false);
-    check_junit(args, &rules)?;
-    let out = open_audit(&args.out, rules.clone(), args.share_safe)?;
-    let Some(finished) = with_threads(|| work(out))? else { return Ok(Outcome::Done) };
-    write_junit(args, &finished, &rules)?;
-    print(&finished.text())?;
-    Ok(if finished.passed() { Outcome::Done } else { Outcome::GateFailed })
-}
-
-const JUNIT: &str = "--junit";
-
-/// Checks that the file of `--junit` can be written, and that it is not a file of the report.
-fn check_junit(args: &AuditArgs, rules: &Rules) -> crate::Result<()> {
-    let Some(path) = &args.junit else { return Ok(()) };
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    if let Some(folder) = folder.filter(|folder| !folder.exists()) {
-        // As for the folder of the report, which may be the same folder.
-        let access = if args.share_safe { Access::Usual } else { Access::Private };
-        make_folders(folder, access).map_err(|error| usage(format!("{JUNIT}: {error}")))?;
-    }
-    let target = check_file_of(JUNIT, path, Kind::Junit, rules)?;
-    let out = fs::canonicalize(&args.out).unwrap_or_default();
-    if [PAGE, FIGURES].iter().any(|name| out.join(name) == target) {
-        let path = path.display();
-        return Err(usage(format!(
-            "{JUNIT}: {path}: expected a file of its own, found one of --out"
-        )));
-    }
-    Ok(())
-}
-
-/// Writes the results of gates atomically, readable by all users.
-fn write_junit(args: &AuditArgs, finished: &Finished, rules: &Rules) -> crate::Result<()> {
-    let Some(path) = &args.junit else { return Ok(()) };
-    check_file_of(JUNIT, path, Kind::Junit, rules)?;
-    let text = junit(&finished.document);
-    Ok(write_file(path, Access::Usual, |w| w.write_all(text.as_bytes()))?)
-}
-
-/// Returns the plan `usual` with the options of the oracle.
-pub fn with_oracle<const D: usize>(args: &OracleArgs, mut usual: Plan<D>) -> Plan<D> {
-    if !args.inlier_ratios.is_empty() {
-        usual.inlier_ratios = distinct(args.inlier_ratios.clone(), |a, b| a == b);
-    }
-    if !args.oracle_noise.is_empty() {
-        usual.oracle_noise = distinct(args.oracle_noise.clone(), |a, b| a == b);
-    }
-    usual.repeats = args.repeats;
-    usual
-}
-
-/// Returns the requested solvers, each once, or the default.
-pub fn solvers<const D: usize>(given: &[Builtin], usual: &Plan<D>) -> Vec<Arc<dyn Solver<D>>> {
-    match given {
-        [] => usual.solvers.clone(),
-        given => Builtin::list(&distinct(given.to_vec(), |a, b| a == b)),
-    }
-}
-
-/// Returns the requested thresholds, or the default. A repeated threshold is an error.
-pub fn thresholds<const D: usize>(
-    given: &[Threshold],
-    usual: &Plan<D>,
-) -> crate::Result<Vec<Threshold>> {
-    let thresholds = if given.is_empty() { &usual.thresholds } else { given };
-    for (at, threshold) in thresholds.iter().enumerate() {
-        if thresholds[..at].iter().any(|earlier| earlier.value == threshold.value) {
-            let label = &threshold.label;
-            return Err(usage(format!("--thresholds: expected each once, found {label} again")));
-        }
-    }
-    Ok(thresholds.to_vec())
-}
-
-/// Returns the thresholds of an audit of a map, and adds what is doubtful about its lengths to
-/// `notes` and `doubts`.
-pub fn map_thresholds(
-    args: &AuditArgs,
-    prepared: &Prepared,
-    usual: &Plan<3>,
-    (notes, doubts): (&mut Vec<String>, &mut Vec<String>),
-) -> crate::Result<Vec<Threshold>> {
-    let thresholds = thresholds(&args.thresholds, usual)?;
-    let (points, typed) = (prepared.original.reveal(), !args.thresholds.is_empty());
-    let lengths = check_thresholds(points.positions(), points.unit(), &thresholds, typed)?;
-    notes.extend(lengths.note);
-    doubts.extend(lengths.doubt);
-    Ok(thresholds)
-}
-
-/// Returns the sources of an audit of a map, each once, and checks that options and descriptors fit
-/// them. The file had `n_read` points. Notes for the user are added to `notes`; `lacking` says where
-/// descriptors are expected.
-pub fn neighbors(
-    (requested, args): (&[NeighborSource], &OracleArgs),
-    (prepared, descriptors): (&Prepared, Option<&Descriptors>),
-    lacking: &str,
-    (n_read, notes): (usize, &mut Vec<String>),
-) -> crate::Result<Vec<NeighborsBy<3>>> {
-    let mut sources = match requested {
-        [] => unlift_audit::sources::usual(descriptors.is_some()),
-        _ => Vec::new(),
+    inputs: impl IntoIterator<Item = &'a Path>,
+    work: impl FnOnce(Output) -> crate::Result<Audited> + Send,
+) -> crate::Result<Finished> {
+    let output = Output {
+        share_safe: args.share_safe,
+        junit: args.junit.clone(),
+        command: Some(command_line()),
+        ..Output::new(&args.out)
     };
-    for source in distinct(requested.to_vec(), |a, b| a == b) {
-        sources.push(match source {
+    let files = output.open(Rules::new(inputs, false))?;
+    let finished = with_threads(|| work(output)?.write(files))?;
+    print(&finished.text())?;
+    Ok(finished)
+}
+
+/// Runs `audit` with the gates of the command line.
+fn run(audit: Audit<'_>, args: &AuditArgs, progress: &Progress) -> crate::Result<Audited> {
+    Audit { gates: args.gate.clone(), ..audit }.run(progress)
+}
+
+fn outcome(finished: &Finished) -> Outcome {
+    if finished.passed() { Outcome::Done } else { Outcome::GateFailed }
+}
+
+/// Returns a request of what several audits share.
+fn request<const D: usize>(args: &AuditArgs, k: u16) -> Request<D> {
+    Request { thresholds: args.thresholds.clone(), ..Request::new(usize::from(k), args.seed) }
+}
+
+fn with_oracle<const D: usize>(request: Request<D>, args: &OracleArgs) -> Request<D> {
+    Request {
+        inlier_ratios: args.inlier_ratios.clone(),
+        oracle_noise: args.oracle_noise.clone(),
+        repeats: args.repeats,
+        ..request
+    }
+}
+
+/// Adds the sources and solvers of a map, and what is doubtful about a file of lists to its notes.
+fn with_solvers(
+    request: Request<3>,
+    args: &SolverArgs,
+    prepared: &mut Prepared,
+) -> crate::Result<Request<3>> {
+    let mut neighbors = Vec::new();
+    for source in distinct(args.neighbors.clone(), NeighborSource::eq) {
+        neighbors.push(match source {
             NeighborSource::Oracle => NeighborsBy::Oracle,
+            NeighborSource::Own(named) => NeighborsBy::Source(named.of_dimension()?),
             NeighborSource::File(path) => {
-                NeighborsBy::Given(by_point(&path, prepared, n_read, notes)?)
-            }
-            NeighborSource::Own(named) => {
-                let source = named.of_dimension()?;
-                match descriptors {
-                    Some(descriptors) => check_fit(&*source, descriptors)?,
-                    None if source.needs() == Needs::Descriptors => {
-                        let name = source.name();
-                        let error = format!("--neighbors {name}: expected descriptors {lacking}");
-                        return Err(usage(format!("{error}, found none")));
-                    }
-                    None => {}
-                }
-                NeighborsBy::Source(source)
+                let mut notes = Vec::new();
+                let lists = by_point(&path, prepared, &mut notes)?;
+                prepared.notes.extend(notes);
+                NeighborsBy::Given(lists)
             }
         });
     }
-    let own = sources.iter().filter_map(NeighborsBy::source);
-    notes.extend(own.filter_map(|source| source.note(prepared.original.len())));
-    let files = sources.iter().filter(|by| matches!(by, NeighborsBy::Given(_))).count();
-    if files > 1 {
-        return Err(usage(format!("--neighbors: expected at most one file, found {files}")));
-    }
-    check_oracle(args, &sources)?;
-    Ok(sources)
+    let solvers = Builtin::list(&args.solver);
+    Ok(Request { neighbors, solvers, records_alone: !args.no_records_alone, ..request })
 }
 
-/// Returns an error if a source does not support this kind of descriptors.
-pub fn check_fit<const D: usize>(
-    source: &dyn Source<D>,
-    descriptors: &Descriptors,
-) -> crate::Result<()> {
-    source.takes(descriptors).map_err(|error| {
-        let name = source.name();
-        // Errors of another kind are about the source's model and name its path.
-        if error.kind() != ErrorKind::Descriptors {
-            return usage(format!("--neighbors {name}: {error}"));
+/// Returns the hashes of files with lists.
+fn hashes_of_lists(args: &SolverArgs) -> crate::Result<BTreeMap<String, String>> {
+    let hash = |path| Ok(("neighbors".to_owned(), hash_file(path)?));
+    NeighborSource::files(&args.neighbors).map(hash).collect()
+}
+
+/// Reads the descriptors that owner and attacker know, by default those of the photos of the demo.
+fn public(args: &ProtectArgs, kind: DescriptorKind) -> crate::Result<Descriptors> {
+    match &args.public_descriptors {
+        Some(path) => public_descriptors(path, kind, None),
+        None => public_descriptors(photos::folder()?.path(), kind, Some(photos::MIN_SCORE)),
+    }
+}
+
+/// Returns the requested schemes; none means the default.
+fn schemes<const D: usize>(entries: &[&Entry], unit: Unit) -> Vec<Arc<dyn Scheme<D>>> {
+    let options = SchemeOptions::usual(unit);
+    entries.iter().filter_map(|entry| entry.of_dimension(&options)).collect()
+}
+
+const NO_RECORDS_ALONE: &str =
+    "--no-records-alone: the attack on the records alone was not tried; it may recover more";
+
+/// `unlift audit map`
+pub fn map(args: &AuditMapArgs) -> crate::Result<Outcome> {
+    let more = args.paint.inputs().chain(&args.localize).chain(&args.protect.public_descriptors);
+    let inputs = [args.path.as_path()].into_iter().chain(args.map.descriptors.as_deref());
+    let inputs = inputs.chain(NeighborSource::files(&args.solvers.neighbors));
+    let inputs = inputs.chain(more.map(|path| path.as_path()));
+    let finished = perform(&args.audit, inputs, |output| {
+        let AuditArgs { seed, quiet, .. } = args.audit;
+        let mut prepared = open_map(&args.path, &args.map, args.uses_descriptors(), (seed, quiet))?;
+        let progress = Progress::new(quiet);
+        let inversion = match &args.paint.invert {
+            Some(network) => {
+                let (photos, max_images) = (args.paint.photos.as_deref(), args.max_images.get());
+                let network = network.as_deref();
+                let opened = MapInversion::open(&prepared, photos, network, max_images, &progress);
+                Some(Arc::new(opened?))
+            }
+            None => None,
+        };
+        if let Some(range) = args.expect_extent {
+            prepared.check_extent(range, args.map.scale)?;
         }
-        let (expected, found) = (error.expected(), error.found());
-        let error = usage(format!("--neighbors {name}: expected {expected}, found {found}"));
-        advise(error, "--neighbors similarity, which takes descriptors of any kind")
-    })
-}
-
-/// Returns an error for an option of the oracle if it is none of the sources.
-pub fn check_oracle<const D: usize>(
-    args: &OracleArgs,
-    sources: &[NeighborsBy<D>],
-) -> crate::Result<()> {
-    for (option, given) in [
-        ("--inlier-ratios", !args.inlier_ratios.is_empty()),
-        ("--oracle-noise", !args.oracle_noise.is_empty()),
-    ] {
-        if given && !sources.iter().any(NeighborsBy::is_oracle) {
-            let found = sources.iter().map(NeighborsBy::name).collect::<Vec<_>>().join(", ");
-            return Err(usage(format!(
-                "{option}: expected with --neighbors oracle, found only {found}"
-            )));
+        let protections =
+            protections_of_map(&args.protect.protect_descriptors, &prepared, |kind| {
+                public(&args.protect, kind)
+            })?;
+        if args.solvers.no_records_alone {
+            prepared.notes.push(NO_RECORDS_ALONE.to_owned());
         }
-    }
-    Ok(())
+        let unit = prepared.original.reveal().unit();
+        let n_points = prepared.original.len();
+        let n_together = args.tile_points.map_or(n_points, |most| n_points.min(most.get()));
+        let mut usual = Plan::new(unit).for_map(n_together, usize::from(args.map.k));
+        if args.full {
+            usual.inlier_ratios = Plan::<3>::new(unit).inlier_ratios;
+            usual.solvers = Builtin::list(&[Builtin::Joint, Builtin::Consensus, Builtin::Ransac]);
+        }
+        let request = with_oracle(request(&args.audit, args.map.k), &args.oracle);
+        let mut request = with_solvers(request, &args.solvers, &mut prepared)?;
+        request.schemes = schemes(&args.schemes, unit);
+        if args.quick {
+            request.quick(&usual, prepared.descriptors.is_some())?;
+        }
+        request.changes = mitigations(&args.mitigate, &prepared, args.tile_points.is_some())?;
+        request.changes.extend(protections.iter().cloned().map(Change::Protection));
+        let descriptors = prepared.descriptors.as_ref();
+        let place = "(--descriptors FILE)";
+        let planned = request.of_map(usual, &prepared, descriptors, place)?;
+        let mut plan = planned.note(&mut prepared);
+        plan.measures.extend(inversion.iter().map(|one| Arc::clone(one) as Arc<dyn Measure<3>>));
+        let mut map = Map { plan, inversion, ..Map::new(&prepared) };
+        if let Some(path) = &args.localize {
+            let nth = args.hold_out.get();
+            map.localize = Some(Localize::held_out(&prepared, path, nth, protections)?);
+        }
+        let input = match args.tile_points {
+            Some(most) => Input::Tiles(map, Tiles { max_points: most.get(), only: None }),
+            None => Input::Map(map),
+        };
+        let mut audit = Audit::of_map(input, &prepared, output);
+        audit.about = prepared.about(&args.path)?;
+        audit.about.other_sha256.extend(hashes_of_lists(&args.solvers)?);
+        audit.options = args.record();
+        run(audit, &args.audit, &progress)
+    })?;
+    Ok(outcome(&finished))
 }
 
-/// Returns the protections of the command line. `kind` is that of the descriptors that they protect.
-pub fn protections(
-    args: &ProtectArgs,
-    kind: impl FnOnce() -> crate::Result<DescriptorKind>,
-) -> crate::Result<Vec<Protection>> {
-    let requested = distinct(args.protect_descriptors.clone(), |a, b| a == b);
-    if !requested.iter().any(Protection::needs_public) {
-        return Ok(requested);
+/// `unlift audit released`
+pub fn released(args: &AuditReleasedArgs) -> crate::Result<Outcome> {
+    let stages = [args.released.as_path(), &args.truth].into_iter();
+    let lists = NeighborSource::files(&args.solvers.neighbors);
+    let inputs = stages.chain(args.descriptors.as_deref()).chain(lists);
+    let files = released::Files {
+        released: &args.released,
+        truth: &args.truth,
+        descriptors: args.descriptors.as_deref(),
+    };
+    let finished = perform(&args.audit, inputs, |output| {
+        let name = args.name.clone().map_or_else(|| files.scheme_name(), Ok)?;
+        let released::Release { mut prepared, hidden } = files.open()?;
+        let progress = Progress::new(args.audit.quiet);
+        let (unit, k) = (prepared.original.reveal().unit(), usize::from(args.k));
+        let usual = Plan::new(unit).for_map(prepared.original.len(), k);
+        let request = with_oracle(request(&args.audit, args.k), &args.oracle);
+        let request = with_solvers(request, &args.solvers, &mut prepared)?;
+        let request = Request { schemes: vec![scheme_called(&name)], ..request };
+        let (descriptors, place) = (hidden.0.descriptors(), "in the released map");
+        let planned = request.of_map(usual, &prepared, descriptors, place)?;
+        let plan = planned.note(&mut prepared);
+        let published = published_positions(&args.released)?;
+        let truth = (&prepared.original, &hidden.1);
+        let read = read_from_file(&published, truth, &plan.thresholds);
+        let map = Map { plan, ..Map::of(&prepared.original) };
+        let input = Input::Released(map, Hidden { release: &hidden, read });
+        let mut audit = Audit::of_map(input, &prepared, output);
+        audit.about = files.about(prepared.original.len())?;
+        audit.about.other_sha256.extend(hashes_of_lists(&args.solvers)?);
+        audit.options.insert("released".into(), json!(true));
+        run(audit, &args.audit, &progress)
+    })?;
+    Ok(outcome(&finished))
+}
+
+/// `unlift audit images`
+pub fn images(args: &AuditImagesArgs) -> crate::Result<Outcome> {
+    let mut request = with_oracle(request::<2>(&args.audit, args.k), &args.oracle);
+    request.schemes = schemes(&args.schemes, Unit::Pixel);
+    request.solvers = Builtin::list(&args.solver);
+    for source in &args.neighbors {
+        request.neighbors.push(match source {
+            NeighborSource::Own(named) => NeighborsBy::Source(named.of_dimension()?),
+            NeighborSource::Oracle | NeighborSource::File(_) => NeighborsBy::Oracle,
+        });
     }
-    let kind = kind()?;
-    let public = match &args.public_descriptors {
-        Some(path) => public(path, kind, None)?,
-        None => {
-            let folder = photos::folder()?;
-            public(folder.path(), kind, Some(photos::MIN_SCORE))?
+    let mut plan = request.plan(Plan::new(Unit::Pixel), true)?;
+    plan.check_for_many().map_err(|error| usage(error.to_string()))?;
+    let more = args.paint.inputs().chain(&args.protect.public_descriptors);
+    let inputs = [&args.path].into_iter().chain(more).map(|path| path.as_path());
+    let finished = perform(&args.audit, inputs, |output| {
+        let photos = args.paint.photos.as_deref();
+        let opening = Opening {
+            wanted: args.extraction.wanted(),
+            max_images: args.max_images.map(|most| most.get()),
+            photos,
+            paints: args.paint.invert.is_some(),
+            uses_descriptors: args.paint.invert.is_some()
+                || !args.protect.protect_descriptors.is_empty(),
+            is_usual: args.neighbors.is_empty(),
+        };
+        let opened = Opened::open(&args.path, &opening, &mut plan)?;
+        let inversion = match &args.paint.invert {
+            Some(network) => {
+                let (kind, of) = (opened.kind("--invert")?, (&opened.source, &*args.path));
+                Some(Arc::new(Inversion::open(of, kind, photos, network.as_deref())?))
+            }
+            None => None,
+        };
+        let protections = protections(
+            &args.protect.protect_descriptors,
+            || opened.kind("--protect-descriptors"),
+            |kind| public(&args.protect, kind),
+        )?;
+        let changes: Vec<Change> = protections.into_iter().map(Change::Protection).collect();
+        plan.schemes.extend(Changed::all(&plan.schemes, &changes));
+        plan.measures.extend(inversion.iter().map(|one| Arc::clone(one) as Arc<dyn Measure<2>>));
+        let progress = Progress::new(args.audit.quiet);
+        let photos = args.paint.photos.clone();
+        let images = Images { opened: &opened, plan, draws: true, photos, inversion };
+        let mut audit = Audit::new(Input::Images(images), output);
+        audit.options = args.record();
+        run(audit, &args.audit, &progress)
+    })?;
+    if let Some(count) = &finished.document.input.images {
+        all_could_be("used", &args.path, count.used as usize, count.unusable as usize)?;
+    }
+    Ok(outcome(&finished))
+}
+
+/// `unlift audit sequence`
+pub fn sequence(args: &AuditSequenceArgs) -> crate::Result<Outcome> {
+    let usual = Plan::new(Unit::Pixel);
+    let mut request = request::<2>(&args.audit, usual.k as u16);
+    request.schemes = schemes(&args.schemes, Unit::Pixel);
+    let mitigations =
+        distinct(args.mitigate.clone(), |a: &Mitigation, b| a.name() == b.name()).into_iter();
+    request.changes = mitigations.map(|change| Change::Mitigation(change, None)).collect();
+    let threshold = |label: &str, value| Threshold { label: label.to_owned(), value };
+    let thresholds = vec![threshold("5", 5.0), threshold("10", 10.0), threshold("25", 25.0)];
+    let plan = request.plan(Plan { thresholds, ..usual }, false)?;
+    let pose_error = match (args.poses, args.scale) {
+        (None, _) => None,
+        (Some((cm, angle_deg)), Some(scale)) => {
+            Some(PoseError { distance: 0.01 * cm / scale, angle_deg })
+        }
+        (Some(_), None) => {
+            let expected = "expected --scale, meters per unit of the model";
+            return Err(usage(format!("--poses perturbed: {expected}")));
         }
     };
-    let with = |protection: Protection| match protection.needs_public() {
-        true => protection.with_public(&public),
-        false => Ok(protection),
-    };
-    Ok(requested.into_iter().map(with).collect::<Result<_, _>>()?)
-}
-
-/// Reads all descriptors of photos or of a file of features.
-fn public(path: &Path, kind: DescriptorKind, min_score: Option<f32>) -> crate::Result<Descriptors> {
-    let wanted = Wanted {
-        option: "--public-descriptors",
-        kind: path.is_dir().then_some(kind),
-        min_score: min_score.filter(|_| kind != DescriptorKind::Sift),
-        ..Wanted::default()
-    };
-    let source = FeatureSource::open(path, &wanted.extraction(path)?)?;
-    let mut values = Vec::new();
-    for at in 0..source.names().len() {
-        let Some(descriptors) = source.get(at)?.descriptors else { continue };
-        let is = DescriptorKind::of(&descriptors, "--public-descriptors")?;
-        if is != kind {
-            let expected = format!("descriptors of {}", kind.name());
-            return Err(Error::new(path, "", expected, is.name()).into());
-        }
-        let mut row = vec![0.0; descriptors.dim()];
-        for at in 0..descriptors.len() {
-            descriptors.read_row(at, &mut row);
-            values.extend_from_slice(&row);
-        }
+    if args.paint.invert.is_some() && args.audit.share_safe {
+        return Err(usage("--invert: expected without --share-safe, as pictures show the place"));
     }
-    if values.is_empty() {
-        return Err(Error::new(path, "", "descriptors", "none").into());
-    }
-    Ok(Descriptors::try_new(Values::F32(values), kind.dim())?)
+    let inputs = [&args.model, &args.path].into_iter().chain(args.paint.inputs());
+    let finished = perform(&args.audit, inputs.map(|path| path.as_path()), |output| {
+        let extraction = args.extraction.wanted().extraction(&args.path)?;
+        // A model is of the photos as they are stored.
+        let source = FeatureSource::open(&args.path, &extraction)?.with_turn(Turn::AsStored);
+        let inversion = match &args.paint.invert {
+            Some(network) => {
+                let all: Vec<usize> = (0..source.names.len()).collect();
+                let kind = source.kind("--invert", &all)?;
+                let of = (&source, args.path.as_path());
+                Some(Inversion::open(of, kind, args.paint.photos.as_deref(), network.as_deref())?)
+            }
+            None => None,
+        };
+        let mut queries = args.queries.clone();
+        queries.sort_unstable();
+        queries.dedup();
+        let progress = Progress::new(args.audit.quiet);
+        let sequence = Sequence {
+            model: &args.model,
+            source: &source,
+            path: &args.path,
+            plan,
+            lists: args.neighbors.as_ref().map(Named::of_dimension).transpose()?,
+            queries,
+            pose_error,
+            inversion,
+        };
+        let mut audit = Audit::new(Input::Views(Views::Sequence(sequence)), output);
+        audit.options = args.record();
+        run(audit, &args.audit, &progress)
+    })?;
+    Ok(outcome(&finished))
 }
 
-/// Returns the kind of `descriptors`; an error about `option` if there are none.
-pub fn kind(option: &str, descriptors: Option<&Descriptors>) -> crate::Result<DescriptorKind> {
-    let Some(descriptors) = descriptors else {
-        return Err(usage(format!("{option}: expected descriptors, found none")));
-    };
-    DescriptorKind::of(descriptors, option).map_err(|error| usage(error.to_string()))
-}
-
-/// Opens the painter for descriptors of `kind`: the user's network, or the known one.
-pub fn painter(kind: DescriptorKind, network: Option<&PathBuf>) -> crate::Result<Painter> {
-    let inverter = match network {
-        Some(path) => Inverter::read(path, kind),
-        None => Inverter::of(kind),
-    };
-    Ok(Painter::try_new(inverter?)?)
-}
-
-/// Returns the folder of photos to compare pictures of images at `path` with, if pictures are
-/// requested.
-pub fn photos_of_images<'a>(
-    args: &'a PaintArgs,
-    path: &'a Path,
-) -> crate::Result<Option<&'a Path>> {
-    match (&args.photos, path.is_dir()) {
-        _ if args.invert.is_none() => Ok(None),
-        (Some(photos), _) => Ok(Some(photos)),
-        (None, true) => Ok(Some(path)),
-        (None, false) => Err(usage("--invert: expected --photos, as PATH is no folder of photos")),
-    }
+/// `unlift audit again`
+pub fn again(args: &AuditAgainArgs) -> crate::Result<Outcome> {
+    let inputs = [&args.a, &args.b].into_iter().chain(&args.descriptors);
+    let finished = perform(&args.audit, inputs.map(|path| path.as_path()), |output| {
+        let preparation = Preparation { scale: args.scale, ..Preparation::default() };
+        let reading = Progress::uncounted(args.audit.quiet, "reading the maps");
+        let mut maps = Maps::open([&args.a, &args.b], &args.descriptors, &preparation)?;
+        drop(reading);
+        let (points, typed) = (maps.first.original.reveal(), !args.audit.thresholds.is_empty());
+        let usual = Plan::new(points.unit());
+        let request = request::<3>(&args.audit, usual.k as u16);
+        let plan =
+            Request { records_alone: !args.no_records_alone, ..request }.plan(usual, false)?;
+        let lengths = check_thresholds(points.positions(), points.unit(), &plan.thresholds, typed)?;
+        let options = SchemeOptions::usual(points.unit());
+        maps.first.notes.extend(lengths.note);
+        maps.first.doubts.extend(lengths.doubt);
+        let pairs = match args.schemes.as_slice() {
+            [] => SCHEMES.iter().map(|entry| [entry; 2]).collect(),
+            given => distinct(given.to_vec(), |a, b| a.map(|e| e.name) == b.map(|e| e.name)),
+        };
+        let pairs = pairs
+            .into_iter()
+            .filter_map(|[a, b]| Some([a.of_dimension(&options)?, b.of_dimension(&options)?]));
+        let progress = Progress::new(args.audit.quiet);
+        let again = Again { maps: &maps, pairs: pairs.collect(), plan };
+        let mut audit = Audit::of_map(Input::Views(Views::Again(again)), &maps.first, output);
+        audit.about = maps.about(&args.a)?;
+        audit.options.insert("again".into(), json!(args.b.display().to_string()));
+        run(audit, &args.audit, &progress)
+    })?;
+    Ok(outcome(&finished))
 }

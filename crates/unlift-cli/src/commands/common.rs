@@ -4,12 +4,9 @@ use std::io::Read;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-use unlift::released::Released;
-use unlift::truth::Secret;
-use unlift::{Fingerprint, OneLine};
+use unlift::OneLine;
 use unlift_audit::{Preparation, Prepared, maps};
 use unlift_io::Error;
-use unlift_io::read::Input;
 use unlift_report::Document;
 
 use crate::args::MapArgs;
@@ -29,30 +26,13 @@ pub fn with_threads<T: Send>(work: impl FnOnce() -> crate::Result<T> + Send) -> 
     pool.install(work)
 }
 
-/// Returns an error if `file` belongs to another released map than `of`. A missing fingerprint is
-/// accepted.
-pub fn same_map(
-    file: &Path,
-    found: Option<Fingerprint>,
-    of: &Path,
-    expected: Option<Fingerprint>,
-) -> Result<(), Error> {
-    match (found, expected) {
-        (Some(found), Some(expected)) if found != expected => {
-            let expected = format!("{expected}, that of the released map of {}", of.display());
-            Err(Error::new(file, "fingerprint", expected, found.to_string()))
-        }
-        _ => Ok(()),
-    }
-}
-
 /// Reads and prepares a map, for `audit map` and `obfuscate`. Descriptors that lie beside the model are read with `beside`.
 pub fn open_map(
     path: &Path,
     args: &MapArgs,
     beside: bool,
     (seed, quiet): (u64, bool),
-) -> crate::Result<(Input, Prepared)> {
+) -> crate::Result<Prepared> {
     let _alive = Progress::uncounted(quiet, "reading the map");
     let preparation = Preparation {
         scale: args.scale,
@@ -62,26 +42,6 @@ pub fn open_map(
         seed,
     };
     maps::open(path, args.descriptors.as_deref(), &preparation)
-}
-
-/// Returns an error if the released map and the truth differ in the number of hidden points, in
-/// total or per record.
-pub fn expect_slots<const D: usize>(
-    path: &Path,
-    released: &Released<D>,
-    secret: &Secret,
-) -> crate::Result<()> {
-    let wrong = |expected: usize, what: &str, found: usize| {
-        let expected = format!("{expected} hidden points{what}, as in the truth");
-        Err(Error::new(path, "", expected, found.to_string()).into())
-    };
-    if released.n_slots() != secret.n_slots() {
-        return wrong(secret.n_slots(), "", released.n_slots());
-    }
-    if released.slots_per_record() != secret.slots_per_record() {
-        return wrong(secret.slots_per_record(), " per record", released.slots_per_record());
-    }
-    Ok(())
 }
 
 /// Reads an `audit.json`.

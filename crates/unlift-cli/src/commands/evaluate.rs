@@ -10,12 +10,13 @@ use unlift::{About, RowOrder, Unit};
 use unlift_audit::{Checked, evaluated};
 use unlift_io::stage::{has_images, read_recovered_in, read_released, read_truth};
 
-use super::common::{RELEASED, expect_slots, same_map};
+use super::common::RELEASED;
 use super::image_stages::{Evaluated, evaluate_all};
 use crate::args::EvaluateArgs;
 use crate::exit::{Outcome, advise};
 use crate::output::{print, table};
 use crate::stderr;
+use unlift_audit::released::{expect_slots, same_map};
 
 pub fn run(args: &EvaluateArgs) -> crate::Result<Outcome> {
     if has_images(&args.truth)? {

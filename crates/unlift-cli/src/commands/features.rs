@@ -34,12 +34,12 @@ pub fn run(args: &FeaturesArgs) -> crate::Result<Outcome> {
     let source = FeatureSource::open(&args.images, &extraction)?.with_turn(turn);
     let mut progress = Progress::new(args.quiet);
     let mut tally = Tally::default();
-    if let Some(note) = source.passed_over() {
+    if let Some(note) = &source.passed_over {
         progress.say(&format!("unlift: note: {note}"));
     }
     for error in source.refused() {
         tally.failed += 1;
-        progress.say(&line(&error));
+        progress.say(&line(error));
     }
     write(&source, (args, &rules), &mut tally, &mut progress)?;
     drop(progress);
@@ -81,13 +81,13 @@ fn write(
     tally: &mut Tally,
     progress: &mut Progress,
 ) -> crate::Result<()> {
-    let names = source.names();
+    let names = &source.names;
     let all: Vec<usize> = (0..names.len()).collect();
     let mut writer = FeatureWriter::create(&args.out)?;
     let read = |&at: &usize| -> crate::Result<ImageFeatures> {
         let image = source.get(at)?;
         // A photo without features is no error.
-        if matches!(source, FeatureSource::File(_)) {
+        if source.is_file() {
             image.described(&args.images)?;
         }
         Ok(image)

@@ -19,13 +19,14 @@ use unlift_io::outputs::{Kind, OutputSet, Rules};
 use unlift_io::stage::{ImageFile, ImageRows, ImageWriter, Kind as Stage};
 use unlift_vision::features::Extraction;
 
-use super::common::{RELEASED, TRUTH, expect_slots, same_map};
+use super::common::{RELEASED, TRUTH};
 use crate::args::{EvaluateArgs, NeighborsArgs, ObfuscateArgs};
 use crate::progress::Stderr;
 use unlift_audit::Checked;
 use unlift_audit::Progress as _;
 use unlift_audit::images::FeatureSource;
 use unlift_audit::images::stream::{Needs, Stream, Tally};
+use unlift_audit::released::{expect_slots, same_map};
 
 /// Images in memory per thread.
 const AT_WORK: usize = 2;
@@ -76,7 +77,7 @@ pub fn hide(args: &ObfuscateArgs, key: &Key, out: &mut OutputSet) -> crate::Resu
         tally.borrow_mut().unusable += 1;
         Stderr.say(&error.to_string());
     }
-    let all: Vec<usize> = (0..source.names().len()).collect();
+    let all: Vec<usize> = (0..source.names.len()).collect();
     let mut images =
         Stream::new((&source, &args.path), &all, Needs::whatever_there_is(), &tally, &Stderr);
     let staged = |out: &mut OutputSet, name, kind, access| {

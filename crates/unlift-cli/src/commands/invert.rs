@@ -7,9 +7,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 use unlift::OneLine;
 use unlift::released::Released;
+use unlift_audit::changes::kind_of;
 use unlift_audit::images::extraction::Wanted;
 use unlift_audit::images::{FeatureSource, choice};
-use unlift_audit::inversion::{on_bearings, six_views, view};
+use unlift_audit::inversion::{Painter, on_bearings, six_views, view};
 use unlift_audit::refused;
 use unlift_io::Error;
 use unlift_io::atomic::{Access, make_folders, write_file};
@@ -21,12 +22,12 @@ use unlift_io::stage::{
 use unlift_vision::features::{ColorImage, photo};
 use unlift_vision::network::DescriptorKind;
 
-use super::audits::{kind, painter};
-use super::common::{all_could_be, same_map};
+use super::common::all_could_be;
 use crate::args::InvertArgs;
 use crate::exit::{Outcome, line, usage};
 use crate::output::print;
 use crate::stderr;
+use unlift_audit::released::same_map;
 
 /// Images in memory per thread.
 const AT_WORK: usize = 2;
@@ -117,13 +118,10 @@ fn keypoints(to: &Target<'_>) -> crate::Result<usize> {
     let wanted = Wanted { option: "--features", kind: to.args.features, ..Wanted::default() };
     let extraction = wanted.extraction(path)?;
     let source = FeatureSource::open(path, &extraction)?;
-    let chosen = to.chosen(source.names().len());
-    let kind = match &source {
-        FeatureSource::Folder(_) => extraction.kind(),
-        // Errors of single images are reported when they are painted.
-        _ => kind("PATH", source.first(&chosen).and_then(|image| image.descriptors).as_ref())?,
-    };
-    let painter = &painter(kind, None)?;
+    let chosen = to.chosen(source.names.len());
+    // Errors of single images are reported when they are painted.
+    let kind = source.kind("PATH", &chosen)?;
+    let painter = &Painter::open(kind, None)?;
     each(to, &chosen, |&at| {
         let image = source.get(at)?;
         let place = || format!("image {}", image.name.escape_debug());
@@ -144,16 +142,16 @@ fn kind_of_images(path: &Path) -> crate::Result<DescriptorKind> {
     while let Some(rows) = released.next_image()? {
         let image = rows.released()?;
         if image.n_slots() > 0 {
-            return kind("PATH", image.descriptors());
+            return kind_of("PATH", image.descriptors());
         }
     }
-    kind("PATH", None)
+    kind_of("PATH", None)
 }
 
 /// Paints from the recovered keypoints of released images.
 fn images(to: &Target<'_>, recovered: &Path) -> crate::Result<usize> {
     let path = &to.args.path;
-    let painter = &painter(kind_of_images(path)?, None)?;
+    let painter = &Painter::open(kind_of_images(path)?, None)?;
     let mut released = ImageFile::open(path, Stage::Released)?;
     let mut recovered_file = ImageFile::open(recovered, Stage::Recovered)?;
     let (mut unusable, mut at_work) = (0, Vec::new());
@@ -195,7 +193,7 @@ fn map(to: &Target<'_>, recovered: &Path) -> crate::Result<usize> {
     };
     let scale = args.scale.unwrap_or(1.0);
     let released = read_released::<3>(path)?;
-    let painter = painter(kind("PATH", released.descriptors())?, None)?;
+    let painter = Painter::open(kind_of("PATH", released.descriptors())?, None)?;
     let came_back = read_recovered::<3>(recovered)?;
     same_map(recovered, came_back.about().map, path, Some(released.fingerprint()))?;
     let (cameras, mut images) = colmap::read_views(model)?;
@@ -225,7 +223,7 @@ fn map(to: &Target<'_>, recovered: &Path) -> crate::Result<usize> {
 /// nothing needs to be recovered.
 fn bearings(to: &Target<'_>, released: &Released<3>) -> crate::Result<usize> {
     let of_map = |error| Error::core(&to.args.path, error);
-    let painter = painter(kind("PATH", released.descriptors())?, None)?;
+    let painter = Painter::open(kind_of("PATH", released.descriptors())?, None)?;
     let seen = on_bearings(released).map_err(of_map)?;
     each(to, &six_views(released).map_err(of_map)?, |(name, view)| {
         Ok(((*name).to_owned(), painter.map(view, released, &seen).map_err(of_map)?))

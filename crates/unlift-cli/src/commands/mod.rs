@@ -1,12 +1,7 @@
 //! The commands, one file each.
 
 mod about;
-mod audit_again;
-mod audit_images;
-mod audit_map;
-mod audit_released;
-mod audit_sequence;
-pub mod audits;
+mod audits;
 pub mod common;
 mod compare;
 mod evaluate;
@@ -32,11 +27,11 @@ use crate::exit::Outcome;
 pub fn run(command: Command) -> crate::Result<Outcome> {
     match command {
         Command::Demo(args) => demo::run(&args),
-        Command::Audit(AuditCommand::Map(args)) => audit_map::run(&args),
-        Command::Audit(AuditCommand::Images(args)) => audit_images::run(&args),
-        Command::Audit(AuditCommand::Released(args)) => audit_released::run(&args),
-        Command::Audit(AuditCommand::Sequence(args)) => audit_sequence::run(&args),
-        Command::Audit(AuditCommand::Again(args)) => audit_again::run(&args),
+        Command::Audit(AuditCommand::Map(args)) => audits::map(&args),
+        Command::Audit(AuditCommand::Images(args)) => audits::images(&args),
+        Command::Audit(AuditCommand::Released(args)) => audits::released(&args),
+        Command::Audit(AuditCommand::Sequence(args)) => audits::sequence(&args),
+        Command::Audit(AuditCommand::Again(args)) => audits::again(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Table(args) => table::run(&args),
         Command::Obfuscate(args) => with_threads(|| obfuscate::run(&args)),

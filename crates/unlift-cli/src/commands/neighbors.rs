@@ -8,7 +8,6 @@ use unlift::{Error, OneLine};
 use unlift_io::outputs::{Kind, Rules};
 use unlift_io::stage::{Kind as Stage, has_images, read_released, read_truth, write_neighborhoods};
 
-use super::common::{expect_slots, same_map};
 use super::image_stages::{Counts, Oracle, list_by_oracle, list_by_source};
 use crate::args::NeighborsArgs;
 use crate::exit::{Outcome, advise, usage};
@@ -17,6 +16,7 @@ use crate::progress::Progress;
 use crate::stderr;
 use crate::values::NeighborSource;
 use unlift_audit::check_file;
+use unlift_audit::released::{expect_slots, same_map};
 
 /// Entries of the oracle's lists, by default.
 const K: u16 = 50;

@@ -29,7 +29,7 @@ pub fn run(args: &ObfuscateArgs) -> crate::Result<Outcome> {
     let Some(scheme) = args.scheme.of_dimension::<3>(&SchemeOptions::usual(unit)) else {
         return images(args, out);
     };
-    let (_, prepared) = open_map(&args.path, &args.map, false, (args.seed.unwrap_or(0), false))?;
+    let prepared = open_map(&args.path, &args.map, false, (args.seed.unwrap_or(0), false))?;
     for note in prepared.doubts.iter().chain(&prepared.notes) {
         Stderr.say(&format!("note: {note}"));
     }

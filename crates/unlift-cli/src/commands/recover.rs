@@ -10,7 +10,6 @@ use unlift_io::stage::{
     Kind as Stage, has_images, read_neighborhoods, read_released, write_recovered,
 };
 
-use super::common::same_map;
 use super::image_stages::recover_all;
 use crate::args::RecoverArgs;
 use crate::exit::Outcome;
@@ -18,6 +17,7 @@ use crate::output::print;
 use crate::progress::Progress;
 use crate::stderr;
 use unlift_audit::check_file;
+use unlift_audit::released::same_map;
 
 /// Returns notes on lists that another program wrote; `offsets` are the starts of the lists.
 fn notes(offsets: &[u64], about: About, slots_per_record: usize) -> Vec<String> {

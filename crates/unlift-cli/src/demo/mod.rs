@@ -4,30 +4,28 @@ pub mod photos;
 
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
 
-use serde_json::{Map, json};
+use serde_json::json;
 use unlift::audit::{Measure, NeighborsBy, Plan};
 use unlift::neighbors::Geometric;
 use unlift::recover::Builtin;
 use unlift::truth::Original;
 use unlift::{PointSet, Unit, synthetic};
-use unlift_audit::images::FeatureSource;
-use unlift_audit::images::audit::{ImagesJob, find as find_images};
+use unlift_audit::images::audit::Images;
 use unlift_audit::images::choice::headline;
+use unlift_audit::images::{FeatureSource, Opened};
 use unlift_audit::inversion::Inversion;
-use unlift_audit::maps::find as find_map;
-use unlift_audit::{Audited, FIGURES, Job, PAGE, refused};
+use unlift_audit::maps::Map;
+use unlift_audit::{Audit, Audited, FIGURES, Input, Output, PAGE, refused};
 use unlift_io::atomic::Access;
 use unlift_io::hash::hash_positions;
 use unlift_io::outputs::{Kind, OutputSet, Rules};
 use unlift_report::Shares;
-use unlift_report::document::Input;
+use unlift_report::document::Input as About;
 use unlift_vision::features::{AlikedOptions, Extraction};
 use unlift_vision::network::{DescriptorKind, Learned};
 
 use crate::args::DemoArgs;
-use crate::commands::audits::painter;
 use crate::commands::common::with_threads;
 use crate::exit::Outcome;
 use crate::output::{command_line, print, table};
@@ -54,27 +52,27 @@ pub fn run(args: &DemoArgs) -> crate::Result<Outcome> {
     let text = with_threads(|| {
         let bar = Progress::new(args.quiet);
         bar.show(0, PARTS, "");
-        let photos = photos(&Part::new(&bar, "attacking two protected photos", 40.0), &args.out)?;
-        let map = map(&Part::new(&bar, "attacking a protected map", 60.0), &args.out)?;
+        let output = || Output { command: Some(command_line()), ..Output::new(&args.out) };
+        let photos = photos(&Part::new(&bar, "attacking two protected photos", 40.0), output())?;
+        let map = map(&Part::new(&bar, "attacking a protected map", 60.0), output())?;
         photos.stage(&mut out, OF_PHOTOS, false)?;
         let (of_photos, of_map) = (photos.shares(), map.shares());
         let title = "Two photos: a cat and a cup of coffee";
         let map = map.opening_with(&photos, title, OF_PHOTOS[0]);
-        let finished = map.write(out, &args.out, false)?;
-        Ok(summary(of_photos, of_map, &finished.report))
+        map.stage(&mut out, [PAGE, FIGURES], false)?;
+        out.commit()?;
+        Ok(summary(of_photos, of_map, &args.out.join(PAGE)))
     })?;
     print(&text)?;
     Ok(Outcome::Done)
 }
 
-fn photos(progress: &Part<'_>, out: &Path) -> crate::Result<Audited> {
-    let started = Instant::now();
+fn photos(progress: &Part<'_>, output: Output) -> crate::Result<Audited> {
     let folder = photos::folder()?;
     let options = AlikedOptions { min_score: photos::MIN_SCORE, ..AlikedOptions::default() };
     let source = FeatureSource::open(folder.path(), &Extraction::Aliked(options))?;
-    let painter = painter(DescriptorKind::Aliked, None)?;
-    let inversion = Inversion::new(painter, folder.path(), source.turn());
-    let inversion = Arc::new(inversion);
+    let of = (&source, folder.path());
+    let inversion = Arc::new(Inversion::open(of, DescriptorKind::Aliked, None, None)?);
     let usual = Plan::new(Unit::Pixel);
     let plan = Plan {
         neighbors: vec![NeighborsBy::Source(Arc::new(Learned))],
@@ -85,41 +83,23 @@ fn photos(progress: &Part<'_>, out: &Path) -> crate::Result<Audited> {
         measures: vec![Arc::clone(&inversion) as Arc<dyn Measure<2>>],
         ..usual
     };
-    let mut record = Map::new();
-    record.insert("features".into(), json!(DescriptorKind::Aliked.name()));
-    record.insert("min_score".into(), json!(photos::MIN_SCORE));
-    let job = ImagesJob {
-        source: &source,
-        path: folder.path(),
-        chosen: (0..source.names().len()).collect(),
-        plan,
-        options: record,
-        gates: Vec::new(),
-        draws: true,
-        photos: None,
-        out: out.to_owned(),
-        share_safe: false,
-        inversion: Some(inversion),
-        progress,
-        command: Some(command_line()),
-        started,
-    };
-    let (audited, _) = find_images(job)?;
-    let mut audited =
-        audited.ok_or_else(|| unlift_audit::Error::failed("demo: the photos could not be read"))?;
+    let opened = Opened::of(source, folder.path(), None);
+    let inversion = Some(inversion);
+    let images = Images { opened: &opened, plan, draws: true, photos: None, inversion };
+    let mut audit = Audit::new(Input::Images(images), output);
+    audit.options.insert("features".into(), json!(DescriptorKind::Aliked.name()));
+    audit.options.insert("min_score".into(), json!(photos::MIN_SCORE));
+    let mut audited = audit.run(progress)?;
     // The temporary path is meaningless.
     audited.document.input.path = Some("Two photos of the demo".to_owned());
     Ok(audited)
 }
 
-fn map(progress: &Part<'_>, out: &Path) -> crate::Result<Audited> {
-    let started = Instant::now();
+fn map(progress: &Part<'_>, output: Output) -> crate::Result<Audited> {
     let room = synthetic::room(SEED, N_POINTS);
     let sha256 = hash_positions(&room.points);
     let original = Original::new(PointSet::try_new(room.points, Unit::Meter)?);
-    let mut options = Map::new();
-    options.insert("room".into(), json!({ "seed": SEED }));
-    let job = Job {
+    let map = Map {
         cameras: room.cameras.iter().map(|camera| camera.center).collect(),
         up: Some([0.0, 0.0, 1.0]),
         plan: Plan {
@@ -127,21 +107,19 @@ fn map(progress: &Part<'_>, out: &Path) -> crate::Result<Audited> {
             inlier_ratios: RATIOS.to_vec(),
             ..Plan::new(Unit::Meter).for_map(original.len(), 50)
         },
-        input: Input {
-            path: Some("The map of a made-up room".to_owned()),
-            sha256: Some(sha256),
-            n_points: original.len() as u64,
-            scale_m_per_unit: Some(1.0),
-            unit_in_map_units: Some(1.0),
-            ..Input::default()
-        },
-        options,
-        out: out.to_owned(),
-        progress,
-        command: Some(command_line()),
-        ..Job::of(&original, started)
+        ..Map::of(&original)
     };
-    find_map(job)
+    let mut audit = Audit::new(Input::Map(map), output);
+    audit.options.insert("room".into(), json!({ "seed": SEED }));
+    audit.about = About {
+        path: Some("The map of a made-up room".to_owned()),
+        sha256: Some(sha256),
+        n_points: original.len() as u64,
+        scale_m_per_unit: Some(1.0),
+        unit_in_map_units: Some(1.0),
+        ..About::default()
+    };
+    audit.run(progress)
 }
 
 /// Formats a short summary for users who do not know the schemes.

@@ -1,0 +1,191 @@
+//! A released map and its truth, as another program wrote them.
+
+use std::path::Path;
+
+use unlift::Fingerprint;
+use unlift::released::Released;
+use unlift::truth::Secret;
+use unlift_io::Error as FileError;
+use unlift_io::hash::{hash_file, hash_files};
+use unlift_io::read::{self, Input as Points};
+use unlift_io::stage::{has_images, read_released, read_truth, scheme_name};
+use unlift_report::document::Input;
+
+use crate::doubts::unlike_neighbors;
+use crate::prepare::Prepared;
+use crate::{Error, maps};
+
+/// A released map, its secret, and the original points.
+pub struct Release {
+    /// The original points.
+    pub prepared: Prepared,
+    /// The released map and the secret.
+    pub hidden: (Released<3>, Secret),
+}
+
+/// The files of a released map.
+#[derive(Clone, Copy, Debug)]
+pub struct Files<'a> {
+    /// The records.
+    pub released: &'a Path,
+    /// The original points, and the record of each.
+    pub truth: &'a Path,
+    /// Descriptors of the original points, if the records have none.
+    pub descriptors: Option<&'a Path>,
+}
+
+/// Name of a scheme without a name.
+const UNNAMED: &str = "released";
+
+impl Files<'_> {
+    /// Returns the name of the scheme that the file of records states.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or the name does not fit into a gate and a file name.
+    pub fn scheme_name(&self) -> Result<String, Error> {
+        let Some(stated) = scheme_name(self.released)? else { return Ok(UNNAMED.to_owned()) };
+        check_name(&stated).map_err(|wrong| {
+            let (expected, found) = wrong.split_once(", found ").unwrap_or((&wrong, &stated));
+            let expected = expected.trim_start_matches("expected ");
+            let place = "metadata unlift, scheme";
+            let error = FileError::new(self.released, place, expected, found);
+            Error::from(error).advise("--name NAME")
+        })
+    }
+
+    /// Reads the files, and checks that they belong together.
+    ///
+    /// # Errors
+    /// If a file cannot be read, or is of another map.
+    pub fn open(&self) -> Result<Release, Error> {
+        if has_images(self.released)? {
+            let found = "released images";
+            let error = FileError::new(self.released, "", "a released map", found);
+            let advice = "unlift recover and unlift evaluate, which take images, too";
+            return Err(Error::from(error).advise(advice));
+        }
+        let released = read_released::<3>(self.released)?;
+        let (original, secret) = read_truth::<3>(self.truth)?;
+        same_map(self.released, Some(released.fingerprint()), self.truth, secret.map())?;
+        expect_slots(self.released, &released, &secret)?;
+        let released = self.described(released, &secret)?;
+        let slots = secret.slots_per_record();
+        let secret = secret.of_map(Some(released.fingerprint()), slots);
+        let secret = secret.map_err(|error| FileError::core(self.truth, error))?;
+        let notes = released.descriptors().and_then(maps::zeros).into_iter().collect();
+        let mut prepared = Prepared { notes, ..Prepared::of(original) };
+        if let (Some(rows), Some(order)) = (released.descriptors(), rows_of_originals(&secret)) {
+            let points = prepared.original.reveal();
+            prepared.doubts.extend(unlike_neighbors(points, &rows.select(&order))?);
+        }
+        Ok(Release { prepared, hidden: (released, secret) })
+    }
+
+    /// Returns the released map with the descriptors of the file of descriptors, if there is one.
+    fn described(&self, released: Released<3>, secret: &Secret) -> Result<Released<3>, Error> {
+        let Some(path) = self.descriptors else { return Ok(released) };
+        if released.descriptors().is_some() {
+            let expected = "--descriptors: expected with a released map without";
+            let found = self.released.display();
+            return Err(Error::request(format!("{expected}, found some in {found}")));
+        }
+        // Only the ids of the points are needed.
+        let ids = (0..secret.n_originals() as u64).collect();
+        let of_originals = read::descriptors(path, &Points { ids, ..Points::default() })?;
+        let mut of_rows = vec![0; secret.n_slots()];
+        for (slot, &row) in secret.descriptor_row().iter().enumerate() {
+            of_rows[row as usize] = secret.hidden()[slot].0;
+        }
+        let described = Released::try_new(
+            released.obfuscation().clone(),
+            released.slots_per_record(),
+            released.origin(),
+            released.unit(),
+            Some(of_originals.select(&of_rows)),
+        );
+        let described = described.map_err(|error| FileError::core(path, error))?;
+        Ok(described.with_bounds(released.bounds()))
+    }
+
+    /// Returns what a report says of the files of `n_points` points.
+    ///
+    /// # Errors
+    /// If a file cannot be read again for its hash.
+    pub fn about(&self, n_points: usize) -> Result<Input, Error> {
+        let mut others = vec![("truth".to_owned(), hash_file(self.truth)?)];
+        if let Some(path) = self.descriptors {
+            others.push(("descriptors".to_owned(), hash_file(path)?));
+        }
+        Ok(Input {
+            path: Some(self.released.display().to_string()),
+            sha256: Some(hash_files(&[self.released])?),
+            n_points: n_points as u64,
+            other_sha256: others.into_iter().collect(),
+            ..Input::default()
+        })
+    }
+}
+
+/// Returns the descriptor row of every original, if all are hidden.
+fn rows_of_originals(secret: &Secret) -> Option<Vec<u32>> {
+    let mut rows = vec![None; secret.n_originals()];
+    for (slot, &row) in secret.descriptor_row().iter().enumerate() {
+        rows[secret.hidden()[slot].index()] = Some(row);
+    }
+    rows.into_iter().collect()
+}
+
+/// Checks the name of a user's scheme, which must fit into a gate and a file name.
+///
+/// # Errors
+/// What was expected and found, if it does not.
+pub fn check_name(text: &str) -> Result<String, String> {
+    let known = |c: char| c.is_ascii_alphanumeric() || "+-_.".contains(c);
+    let fits = (1..=40).contains(&text.len()) && text.chars().all(known);
+    if fits && text != "all" && text.starts_with(|c: char| c.is_ascii_alphanumeric()) {
+        return Ok(text.to_owned());
+    }
+    Err(format!("expected up to 40 letters, digits, +, -, _ and . (not all), found {text}"))
+}
+
+/// Returns an error if `file` belongs to another released map than `of`. A missing fingerprint is
+/// accepted.
+///
+/// # Errors
+/// If both fingerprints are known and differ.
+pub fn same_map(
+    file: &Path,
+    found: Option<Fingerprint>,
+    of: &Path,
+    expected: Option<Fingerprint>,
+) -> Result<(), FileError> {
+    match (found, expected) {
+        (Some(found), Some(expected)) if found != expected => {
+            let expected = format!("{expected}, that of the released map of {}", of.display());
+            Err(FileError::new(file, "fingerprint", expected, found.to_string()))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Returns an error if the released map and the truth differ in the number of hidden points, in
+/// total or per record.
+///
+/// # Errors
+/// If they do.
+pub fn expect_slots<const D: usize>(
+    path: &Path,
+    released: &Released<D>,
+    secret: &Secret,
+) -> Result<(), FileError> {
+    for (expected, found, what) in [
+        (secret.n_slots(), released.n_slots(), ""),
+        (secret.slots_per_record(), released.slots_per_record(), " per record"),
+    ] {
+        if found != expected {
+            let expected = format!("{expected} hidden points{what}, as in the truth");
+            return Err(FileError::new(path, "", expected, found.to_string()));
+        }
+    }
+    Ok(())
+}

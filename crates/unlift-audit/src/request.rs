@@ -1,0 +1,248 @@
+//! What a user requests of an attack, and the plan that this makes.
+
+use std::sync::Arc;
+
+use unlift::audit::{NeighborsBy, Plan, Threshold};
+use unlift::neighbors::oracle::Noise;
+use unlift::neighbors::{Needs, Source};
+use unlift::obfuscate::{Change, Changed, Scheme};
+use unlift::recover::{Builtin, Delta, Solver};
+use unlift::{Descriptors, ErrorKind};
+
+use crate::doubts::{LengthMessages, check_thresholds};
+use crate::images::choice;
+use crate::prepare::Prepared;
+use crate::{Error, sources};
+
+/// What a user requests of an attack. What is empty has its default; built-in names count once.
+#[derive(Clone, Debug)]
+pub struct Request<const D: usize> {
+    /// Schemes.
+    pub schemes: Vec<Arc<dyn Scheme<D>>>,
+    /// Changes under which every scheme is audited, too.
+    pub changes: Vec<Change>,
+    /// Sources of neighborhoods.
+    pub neighbors: Vec<NeighborsBy<D>>,
+    /// Inlier ratios of the oracle.
+    pub inlier_ratios: Vec<f64>,
+    /// Noise models of the oracle.
+    pub oracle_noise: Vec<Noise>,
+    /// Solvers.
+    pub solvers: Vec<Arc<dyn Solver<D>>>,
+    /// Errors below which a point counts as recovered.
+    pub thresholds: Vec<Threshold>,
+    /// True neighbors per point; it has no default.
+    pub k: usize,
+    /// Distance within which a listed record supports a position.
+    pub delta: Delta,
+    /// Whether maps are also attacked by records alone.
+    pub records_alone: bool,
+    /// Seed of the first repeat.
+    pub seed: u64,
+    /// Number of seeds to average.
+    pub repeats: u32,
+}
+
+/// The plan for a map, and what there is to say of it.
+pub struct Planned {
+    /// The plan.
+    pub plan: Plan<3>,
+    /// Notes for readers of the figures.
+    pub notes: Vec<String>,
+    /// Doubts about all figures.
+    pub doubts: Vec<String>,
+}
+
+impl Planned {
+    /// Adds notes and doubts to those of the map, and returns the plan.
+    pub fn note(self, prepared: &mut Prepared) -> Plan<3> {
+        prepared.notes.extend(self.notes);
+        prepared.doubts.extend(self.doubts);
+        self.plan
+    }
+}
+
+impl<const D: usize> Request<D> {
+    /// Creates a request of defaults.
+    pub fn new(k: usize, seed: u64) -> Self {
+        let (schemes, changes, neighbors, solvers, thresholds) = Default::default();
+        Self {
+            schemes,
+            changes,
+            neighbors,
+            inlier_ratios: Vec::new(),
+            oracle_noise: Vec::new(),
+            solvers,
+            thresholds,
+            k,
+            delta: Delta::Auto,
+            records_alone: true,
+            seed,
+            repeats: 1,
+        }
+    }
+
+    /// Returns the plan `usual` with what is requested; `described` is true if there are descriptors.
+    ///
+    /// # Errors
+    /// If a threshold or a source repeats, or an option of the oracle is given without it.
+    pub fn plan(self, usual: Plan<D>, described: bool) -> Result<Plan<D>, Error> {
+        let neighbors = match self.neighbors.is_empty() {
+            true => sources::usual(described),
+            false => each_once(self.neighbors)?,
+        };
+        for (option, is_given) in [
+            ("--inlier-ratios", !self.inlier_ratios.is_empty()),
+            ("--oracle-noise", !self.oracle_noise.is_empty()),
+        ] {
+            if is_given && !neighbors.iter().any(NeighborsBy::is_oracle) {
+                let names = neighbors.iter().map(NeighborsBy::name).collect::<Vec<_>>().join(", ");
+                let expected = "expected with --neighbors oracle";
+                return Err(Error::request(format!("{option}: {expected}, found only {names}")));
+            }
+        }
+        let thresholds = given_or(self.thresholds, usual.thresholds);
+        for (at, Threshold { label, value }) in thresholds.iter().enumerate() {
+            if thresholds[..at].iter().any(|earlier| earlier.value == *value) {
+                let error = format!("--thresholds: expected each once, found {label} again");
+                return Err(Error::request(error));
+            }
+        }
+        let is_ours = |name: &str| unlift::obfuscate::scheme(name).is_ok();
+        let schemes = distinct(self.schemes, |a, b| a.name() == b.name() && is_ours(a.name()));
+        let mut schemes = given_or(schemes, usual.schemes);
+        schemes.extend(Changed::all(&schemes, &self.changes));
+        let is_ours = |solver: &dyn Solver<D>| Builtin::of(solver).is_some();
+        let same = |a: &Arc<dyn Solver<D>>, b: &Arc<dyn Solver<D>>| {
+            a.name() == b.name() && is_ours(&**a) && is_ours(&**b)
+        };
+        Ok(Plan {
+            schemes,
+            neighbors,
+            inlier_ratios: given_or(distinct(self.inlier_ratios, f64::eq), usual.inlier_ratios),
+            oracle_noise: given_or(distinct(self.oracle_noise, Noise::eq), usual.oracle_noise),
+            solvers: given_or(distinct(self.solvers, same), usual.solvers),
+            k: self.k,
+            delta: self.delta,
+            records_alone: self.records_alone,
+            headline: if D == 2 { choice::headline(&thresholds) } else { usual.headline },
+            thresholds,
+            seed: self.seed,
+            repeats: self.repeats,
+            ..usual
+        })
+    }
+}
+
+/// Schemes of a quick audit: the best-known one, and one that hides two points per record.
+const QUICK_SCHEMES: [&str; 2] = ["olc", "ppl"];
+const QUICK_RATIO: f64 = 0.5;
+/// Source of a quick audit: the fastest one, for any descriptors.
+const QUICK_SOURCE: &str = "similarity";
+
+impl Request<3> {
+    /// Requests a small audit in place of the usual schemes and sources.
+    ///
+    /// # Errors
+    /// None, unless the source of a quick audit is unknown.
+    pub fn quick(&mut self, usual: &Plan<3>, described: bool) -> Result<(), Error> {
+        let is_quick = |scheme: &&Arc<dyn Scheme<3>>| QUICK_SCHEMES.contains(&scheme.name());
+        self.schemes = usual.schemes.iter().filter(is_quick).cloned().collect();
+        self.inlier_ratios = vec![QUICK_RATIO];
+        self.neighbors = vec![NeighborsBy::Oracle];
+        if described {
+            let source = sources::named(QUICK_SOURCE)?.of_dimension()?;
+            self.neighbors.push(NeighborsBy::Source(source));
+        }
+        Ok(())
+    }
+
+    /// Returns the plan for a map whose release has `descriptors`; `place` says where they are expected.
+    ///
+    /// # Errors
+    /// As of [`plan`](Self::plan), if a source does not support the descriptors, or if thresholds mean nothing for the map.
+    pub fn of_map(
+        self,
+        usual: Plan<3>,
+        prepared: &Prepared,
+        descriptors: Option<&Descriptors>,
+        place: &str,
+    ) -> Result<Planned, Error> {
+        let (points, typed) = (prepared.original.reveal(), !self.thresholds.is_empty());
+        let plan = self.plan(usual, descriptors.is_some())?;
+        let (positions, unit) = (points.positions(), points.unit());
+        let LengthMessages { note, doubt } =
+            check_thresholds(positions, unit, &plan.thresholds, typed)?;
+        check_fit(&plan, descriptors, place)?;
+        let own = plan.own_sources().filter_map(|source| source.note(points.len()));
+        let notes = note.into_iter().chain(own).collect();
+        Ok(Planned { plan, notes, doubts: doubt.into_iter().collect() })
+    }
+}
+
+/// Returns an error if a source of `plan` does not support the descriptors. `place` says where they are expected.
+pub fn check_fit<const D: usize>(
+    plan: &Plan<D>,
+    descriptors: Option<&Descriptors>,
+    place: &str,
+) -> Result<(), Error> {
+    plan.own_sources().try_for_each(|source| {
+        let name = source.name();
+        let Some(descriptors) = descriptors else {
+            let expected = format!("expected descriptors {place}");
+            let error = format!("--neighbors {name}: {}, found none", expected.trim_end());
+            return match source.needs() {
+                Needs::Descriptors => Err(Error::request(error)),
+                _ => Ok(()),
+            };
+        };
+        source.takes(descriptors).map_err(|error| {
+            // Errors of another kind are about the source's model and name its path.
+            if error.kind() != ErrorKind::Descriptors {
+                return Error::request(format!("--neighbors {name}: {error}"));
+            }
+            let (expected, found) = (error.expected(), error.found());
+            let line = format!("--neighbors {name}: expected {expected}, found {found}");
+            let advice = "--neighbors similarity, which takes descriptors of any kind";
+            Error::request(line).advise(advice)
+        })
+    })
+}
+
+/// Returns each source once. Different files, or different sources of the user with one name, are an error.
+fn each_once<const D: usize>(neighbors: Vec<NeighborsBy<D>>) -> Result<Vec<NeighborsBy<D>>, Error> {
+    let is_ours = |source: &dyn Source<D>| sources::named(source.name()).is_ok();
+    let neighbors = distinct(neighbors, |a, b| match (a, b) {
+        (NeighborsBy::Oracle, NeighborsBy::Oracle) => true,
+        (NeighborsBy::Given(a), NeighborsBy::Given(b)) => a == b,
+        (NeighborsBy::Source(a), NeighborsBy::Source(b)) => a.name() == b.name() && is_ours(&**a),
+        _ => false,
+    });
+    let n_files = neighbors.iter().filter(|by| matches!(by, NeighborsBy::Given(_))).count();
+    if n_files > 1 {
+        let error = format!("--neighbors: expected at most one file, found {n_files}");
+        return Err(Error::request(error));
+    }
+    for (at, by) in neighbors.iter().enumerate() {
+        if neighbors[..at].iter().any(|earlier| earlier.name() == by.name()) {
+            let error = format!("--neighbors: expected each name once, found {}", by.name());
+            return Err(Error::request(error));
+        }
+    }
+    Ok(neighbors)
+}
+
+fn given_or<T>(given: Vec<T>, usual: Vec<T>) -> Vec<T> {
+    if given.is_empty() { usual } else { given }
+}
+
+/// Removes items that repeat an earlier one, because an audit has one row per combination.
+pub fn distinct<T>(items: Vec<T>, same: impl Fn(&T, &T) -> bool) -> Vec<T> {
+    let mut kept: Vec<T> = Vec::with_capacity(items.len());
+    for item in items {
+        if !kept.iter().any(|earlier| same(earlier, &item)) {
+            kept.push(item);
+        }
+    }
+    kept
+}
