@@ -3,13 +3,14 @@
 use crate::Error;
 
 /// What one unit of a coordinate means.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Unit {
     /// Meters: the owner declared a scale.
     Meter,
     /// Pixels of an image.
     Pixel,
     /// The map's median distance to the K-th neighbor: the unit of maps without a declared scale.
+    #[default]
     KthNeighbor,
 }
 

@@ -198,23 +198,17 @@ impl Again<'_> {
                 let solved = match by(&a.0, &b.0) {
                     Ok(solved) => solved,
                     Err(error) => {
-                        not_audited.push(NotAudited {
-                            scheme: scheme.clone(),
-                            neighbors: Some(source.to_owned()),
-                            oracle_noise: None,
-                            inlier_ratio: None,
-                            reason: error.to_string(),
-                        });
+                        not_audited.push(NotAudited::new(&scheme, Some(source), error));
                         continue;
                     }
                 };
                 seconds.recover += started.elapsed().as_secs_f64();
-                let row =
+                let mut row =
                     row(&solved, plan, (&first.original, &a), (&second.original, &b.1), &knn)?;
                 let (neighbors, solver) = (source.to_owned(), SOLVER.to_owned());
-                let records_alone = alone.clone();
+                row.add_alone(alone.iter().cloned());
                 let (scheme, k) = (scheme.clone(), 2);
-                rows.push(Row { scheme, neighbors, solver, k, records_alone, ..row });
+                rows.push(Row { scheme, neighbors, solver, k, ..row });
             }
         }
         if rows.is_empty() {

@@ -4,10 +4,8 @@ use std::time::Instant;
 
 use indexmap::IndexMap;
 use serde_json::{Map, Value, json};
-use unlift::Unit;
-use unlift::audit::{self, NeighborsBy, NotAudited, Plan, Row, Threshold};
+use unlift::audit::{self, NeighborsBy, NotAudited, Plan, Row};
 use unlift::recover::Delta;
-use unlift_report::Given;
 use unlift_report::document as report;
 
 use crate::gate::Tried;
@@ -107,10 +105,10 @@ pub fn document<const D: usize>(
         input: provenance.input,
         options: provenance.options,
         seed: plan.seed,
-        results: outcome.rows.iter().map(|r| row(r, &plan.thresholds)).collect(),
+        results: outcome.rows.to_vec(),
         not_audited: not_audited(plan, outcome.not_audited),
         notes: provenance.notes,
-        break_even: outcome.break_even.iter().map(break_even).collect(),
+        break_even: outcome.break_even.to_vec(),
         gates: provenance.gates,
         images: Vec::new(),
         tiles: Vec::new(),
@@ -128,21 +126,12 @@ pub fn document<const D: usize>(
     }
 }
 
-fn by_threshold(thresholds: &[Threshold], percents: &[f64]) -> report::ByThreshold {
-    ordered(thresholds.iter().map(|t| t.label.clone()).zip(percents.iter().copied()))
-}
-
 /// Returns the figures of every tile: those of its `rows` that are in the pooled `results`.
-pub fn tiles(
-    tiles: &[Tile],
-    rows: &[Vec<Row>],
-    results: &[Row],
-    thresholds: &[Threshold],
-) -> Vec<report::TileFigures> {
+pub fn tiles(tiles: &[Tile], rows: &[Vec<Row>], results: &[Row]) -> Vec<report::TileFigures> {
     let figures = |(tile, rows): (&Tile, &Vec<Row>)| {
         let percent = |result: &Row| {
             let row = rows.iter().find(|row| row.is_same_cell(result));
-            row.map(|row| by_threshold(thresholds, &row.recovered_percent)).unwrap_or_default()
+            row.map(|row| row.recovered_percent.clone()).unwrap_or_default()
         };
         report::TileFigures {
             bounds: Some(tile.bounds),
@@ -154,21 +143,16 @@ pub fn tiles(
 }
 
 /// Returns the figures of one image of an audit.
-pub fn image(
-    name: &str,
-    n_points: usize,
-    rows: &[Row],
-    thresholds: &[Threshold],
-) -> report::ImageFigures {
+pub fn image(name: &str, n_points: usize, rows: &[Row]) -> report::ImageFigures {
     let figures = |row: &Row| report::ImageRow {
-        recovered_percent: by_threshold(thresholds, &row.recovered_percent),
+        recovered_percent: row.recovered_percent.clone(),
         distinct_percent: row
             .distinct
             .as_ref()
-            .map(|d| by_threshold(thresholds, &d.recovered_percent))
+            .map(|d| d.recovered_percent.clone())
             .unwrap_or_default(),
         inlier_ratio: row.inlier_ratio,
-        median_error: row.error_percentiles.first().copied().flatten(),
+        median_error: row.median_error,
     };
     report::ImageFigures {
         name: Some(name.to_owned()),
@@ -177,28 +161,15 @@ pub fn image(
     }
 }
 
-/// Returns the neighborhoods of a row, as the page distinguishes them.
-pub(crate) fn given(row: &Row) -> Given {
-    Given {
-        neighbors: row.neighbors.clone(),
-        oracle_noise: row.oracle_noise.map(str::to_owned),
-        inlier_ratio: row.inlier_ratio,
-    }
-}
-
 /// Fields of a row that are unknown where points come from files.
 const UNKNOWN: [&str; 6] = ["scheme", "neighbors", "oracle_noise", "inlier_ratio", "k", "solver"];
 
 /// Returns a row as `evaluate` prints it: rounded, without the fields of its name, with `notes`.
-pub fn evaluated(
-    found: &Row,
-    thresholds: &[Threshold],
-    notes: &[String],
-) -> Result<Value, serde_json::Error> {
-    let mut value = unlift_report::rounded(&row(found, thresholds))?;
+pub fn evaluated(row: &Row, notes: &[String]) -> Result<Value, serde_json::Error> {
+    let mut value = unlift_report::rounded(row)?;
     if let Some(fields) = value.as_object_mut() {
         fields.retain(|name, _| !UNKNOWN.contains(&name.as_str()));
-        if found.blind_percent.is_empty() {
+        if row.blind_percent.is_empty() {
             fields.retain(|name, _| !name.starts_with("blind_"));
         }
         if !notes.is_empty() {
@@ -208,74 +179,9 @@ pub fn evaluated(
     Ok(value)
 }
 
-/// Converts a row to its written form.
-pub fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
-    let by_threshold = |percents: &[f64]| by_threshold(thresholds, percents);
-    let by_reason = |counts: &std::collections::BTreeMap<&'static str, usize>| {
-        ordered(counts.iter().map(|(reason, &n)| ((*reason).to_owned(), n as u64)))
-    };
-    let labels = || thresholds.iter().map(|t| t.label.clone());
-    let label = |p: f64| format!("{p:.0}");
-    let alone: Option<Vec<(&str, f64)>> =
-        (0..thresholds.len()).map(|at| row.best_alone(at)).collect();
-    report::Row {
-        scheme: row.scheme.clone(),
-        neighbors: row.neighbors.clone(),
-        oracle_noise: row.oracle_noise.map(str::to_owned),
-        inlier_ratio: row.inlier_ratio,
-        k: row.k as u32,
-        solver: row.solver.to_owned(),
-        delta: Some(row.delta),
-        unit: match row.unit {
-            Unit::Meter => report::LengthUnit::Meter,
-            Unit::KthNeighbor => report::LengthUnit::KthNeighbor,
-            Unit::Pixel => report::LengthUnit::Pixel,
-        },
-        n_points: row.n_points as u64,
-        n_lost: row.n_lost() as u64,
-        lost: by_reason(&row.lost),
-        dropped: by_reason(&row.dropped),
-        recovered_percent: by_threshold(&row.recovered_percent),
-        blind_percent: by_threshold(&row.blind_percent),
-        records_alone_percent: alone
-            .as_ref()
-            .map(|best| ordered(labels().zip(best.iter().map(|(_, percent)| *percent)))),
-        records_alone_by: alone
-            .map(|best| ordered(labels().zip(best.iter().map(|(name, _)| (*name).to_owned())))),
-        axis_accuracy_percent: row.axis_accuracy_percent,
-        exact_percent: row.exact_percent,
-        assignment_accuracy_percent: row.assignment_accuracy_percent,
-        metrics: ordered(row.metrics.iter().map(|(name, &value)| (name.clone(), value))),
-        median_error: row.error_percentiles[0],
-        blind_median_error: row.blind_median_error,
-        error_percentiles: ordered(
-            audit::PERCENTILES.iter().map(|&p| label(p)).zip(row.error_percentiles.iter().copied()),
-        ),
-        sure_unknown: row.sure_unknown.map(|unknown| unknown.reason().to_owned()),
-        sure_percent: row.reliability.as_ref().map(|r| r.sure_percent()),
-        sure_correct_percent: row.reliability.as_ref().and_then(|r| r.sure_correct_percent()),
-        reliability: row.reliability.as_ref().map(|r| r.bins.iter().map(bin).collect()),
-        ransac_trials: row
-            .ransac_trials
-            .as_ref()
-            .map(|bins| bins.iter().map(|&(up_to, n)| (u64::from(up_to), n)).collect()),
-        repeats: row.repeats.as_ref().map_or(1, |r| r.n),
-        std: row.repeats.as_ref().map(|r| report::Spread {
-            recovered_percent: by_threshold(&r.recovered_percent_std),
-            blind_percent: by_threshold(&r.blind_percent_std),
-            median_error: r.median_error_std,
-        }),
-        distinct: row.distinct.as_ref().map(|d| report::Distinct {
-            n_places: d.n_places as u64,
-            recovered_percent: by_threshold(&d.recovered_percent),
-            blind_percent: by_threshold(&d.blind_percent),
-        }),
-    }
-}
-
 /// Lists what has no row, once per scheme, source and reason. If other rows of the source exist,
 /// the reason names the affected part.
-fn not_audited<const D: usize>(plan: &Plan<D>, missing: &[NotAudited]) -> Vec<report::NotAudited> {
+fn not_audited<const D: usize>(plan: &Plan<D>, missing: &[NotAudited]) -> Vec<NotAudited> {
     let mut told: Vec<(&NotAudited, Vec<&NotAudited>)> = Vec::new();
     for part in missing {
         let same = |(first, _): &&mut (&NotAudited, Vec<&NotAudited>)| {
@@ -294,8 +200,7 @@ fn not_audited<const D: usize>(plan: &Plan<D>, missing: &[NotAudited]) -> Vec<re
             || first.reason.clone(),
             |_| format!("at {}: {}", parts(plan, &all).join(", "), first.reason),
         );
-        let (scheme, neighbors) = (first.scheme.clone(), first.neighbors.clone());
-        report::NotAudited { scheme, neighbors, reason }
+        NotAudited { reason, ..first.clone() }
     };
     told.into_iter().map(text).collect()
 }
@@ -310,25 +215,6 @@ fn parts<const D: usize>(plan: &Plan<D>, missing: &[&NotAudited]) -> Vec<String>
         }
     };
     missing.iter().map(part).collect()
-}
-
-fn bin(bin: &unlift::evaluate::Bin) -> report::ReliabilityBin {
-    report::ReliabilityBin { predicted: bin.predicted(), observed: bin.observed(), n: bin.n as u64 }
-}
-
-fn break_even(row: &audit::BreakEven) -> report::BreakEven {
-    report::BreakEven {
-        scheme: row.scheme.clone(),
-        solver: row.solver.to_owned(),
-        oracle_noise: Some(row.oracle_noise.to_owned()),
-        threshold: row.threshold.clone(),
-        inlier_ratio: Some(row.inlier_ratio),
-        bound: match row.bound {
-            audit::Bound::Interpolated => report::Bound::Interpolated,
-            audit::Bound::BelowTested => report::Bound::BelowTested,
-            audit::Bound::AboveTested => report::Bound::AboveTested,
-        },
-    }
 }
 
 /// Collects pairs into an ordered map.

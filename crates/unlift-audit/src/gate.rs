@@ -324,7 +324,7 @@ fn candidates<'a>(
                 inlier_ratio: row.oracle_noise.is_some().then_some(row.inlier_ratio),
                 threshold: threshold.value,
                 recovered_percent: row.recovered_percent[at],
-                baseline_percent: row.baseline_percent(at),
+                baseline_percent: row.baseline_percent(&threshold.label).unwrap_or(f64::NAN),
             };
             candidates.push((candidate, row, at));
         }
@@ -335,13 +335,17 @@ fn candidates<'a>(
 fn in_words(gate: &Gate, found: f64, row: &Row, at: usize, threshold: &Threshold) -> String {
     // If the row's own figure is smaller, a baseline without neighborhoods decides.
     let is_own = gate.figure == Figure::Gain || found == row.recovered_percent[at];
-    let attack = match row.best_alone(at) {
+    let alone = row.records_alone_percent.as_ref().and_then(|by| by.get(&threshold.label));
+    let attack = match alone {
         _ if is_own => {
-            let noise = row.oracle_noise.filter(|noise| *noise != Noise::Uniform.name());
+            let noise = row.oracle_noise.as_ref().filter(|noise| *noise != Noise::Uniform.name());
             let noise = noise.map_or_else(String::new, |noise| format!(" ({noise})"));
             format!("{}{noise} at {:.2}, {}", row.neighbors, row.inlier_ratio, row.solver)
         }
-        Some((name, alone)) if found == alone => format!("records alone, {name}"),
+        Some(alone) if found == *alone => {
+            let by = row.records_alone_by.as_ref().and_then(|by| by.get(&threshold.label));
+            format!("records alone, {}", by.map_or("", String::as_str))
+        }
         _ => "a blind guess".to_owned(),
     };
     let verb = if gate.figure == Figure::Gain { "gained" } else { "recovered" };
@@ -672,13 +676,7 @@ mod tests {
 
     #[test]
     fn what_was_not_audited_is_missed() {
-        let scheme = NotAudited {
-            scheme: "ppl".to_owned(),
-            neighbors: None,
-            oracle_noise: None,
-            inlier_ratio: None,
-            reason: String::new(),
-        };
+        let scheme = NotAudited::new("ppl", None, "");
         let neighbors = Some("oracle".into());
         let lists = NotAudited { neighbors, inlier_ratio: Some(0.5), ..scheme.clone() };
         for (text, missing, is_missed) in [

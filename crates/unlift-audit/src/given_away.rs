@@ -31,7 +31,10 @@ pub fn read_from_file(
         let n = (0..secret.n_slots()).filter(is_near).count();
         100.0 * n as f64 / secret.n_slots().max(1) as f64
     };
-    let best = |t: &Threshold| columns.iter().map(|of| within(of, t.value)).fold(0.0, f64::max);
+    let best = |t: &Threshold| {
+        let percent = columns.iter().map(|of| within(of, t.value)).fold(0.0, f64::max);
+        (t.label.clone(), percent)
+    };
     let percent = thresholds.iter().map(best).collect();
     (!published.is_empty()).then_some(Alone { name: "read from the file", percent })
 }

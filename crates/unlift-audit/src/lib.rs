@@ -58,7 +58,7 @@ mod tiles;
 
 pub use audit::{Audit, Hidden, Input, Output, Views};
 pub use document::peak_bytes;
-pub use document::{evaluated, ordered, row};
+pub use document::{evaluated, ordered};
 pub use doubts::{
     Checked, LengthMessages, check_scale, check_thresholds, sides_m, unlike_neighbors,
 };

@@ -244,11 +244,11 @@ impl Map<'_> {
         };
         // Of values that are no better than a blind guess there is nothing to say.
         let beats = |alone: &&Alone, row: &Row| {
-            alone.percent.iter().zip(&row.blind_percent).any(|(a, b)| a > b)
+            alone.percent.values().zip(row.blind_percent.values()).any(|(a, b)| a > b)
         };
         let read = hidden.and_then(|hidden| hidden.read.as_ref());
         for row in &mut outcome.rows {
-            row.records_alone.extend(read.filter(|alone| beats(alone, row)).cloned());
+            row.add_alone(read.filter(|alone| beats(alone, row)).cloned());
         }
         let followed = release.map(|release| follows_places(original, release));
         let of_file: Vec<String> =
@@ -266,8 +266,7 @@ impl Map<'_> {
             options.insert("tile_points".into(), max_points.into());
             options.extend(only.map(|at| ("tile".to_owned(), at.into())));
         }
-        let of_tiles =
-            |tiles: &Vec<Tile>| document::tiles(tiles, &tile_rows, &outcome.rows, &plan.thresholds);
+        let of_tiles = |tiles: &Vec<Tile>| document::tiles(tiles, &tile_rows, &outcome.rows);
         let (error_cdf, inversions) = (curves_of(curves, &outcome.rows), sheets);
         Ok(Attacked {
             tried,

@@ -9,7 +9,7 @@ use unlift_report::scene::{
     ObfuscationView, Scene3d, SceneBox, Shapes, View, points_within_budget, subsample,
 };
 
-use crate::document::given;
+use unlift_report::Given;
 
 /// Points and shapes that are collected while an audit runs.
 pub struct Pictures {
@@ -66,7 +66,7 @@ impl Pictures {
         });
         self.scene.views.push(View {
             scheme: cell.row.scheme.to_owned(),
-            given: given(cell.row),
+            given: Given::of(cell.row),
             solver: cell.row.solver.to_owned(),
             recovered: recovered.collect(),
         });

@@ -157,7 +157,7 @@ pub fn evaluate<'py>(
         let (row, _) = measure(&recovered, original, secret, baseline.as_ref(), &asked)?;
         Ok::<_, unlift::Error>((row, notes))
     })?;
-    let figures = unlift_audit::evaluated(&row, &thresholds, &notes).map_err(raised)?;
+    let figures = unlift_audit::evaluated(&row, &notes).map_err(raised)?;
     let figures = py.import("json")?.call_method1("loads", (figures.to_string(),))?;
     Ok(figures.cast_into::<PyDict>()?)
 }

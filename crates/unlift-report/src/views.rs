@@ -1,6 +1,8 @@
 //! Results from several releases of the same points: queries with known poses, and a map that was released twice.
 
-use crate::document::{Document, LengthUnit, Row};
+use unlift::Unit;
+
+use crate::document::{Document, Row};
 use crate::page::tables;
 use crate::words::align;
 use crate::{attack, words};
@@ -16,7 +18,7 @@ pub(crate) fn sequence_sentences(document: &Document) -> Vec<String> {
     let typed = tables::headline_threshold(document).unwrap_or_default();
     let sentence = |scheme: &str| {
         let rows = document.results.iter().filter(|row| row.scheme == scheme && !is_tracks(row));
-        let mut best: Vec<(u32, f64)> = Vec::new();
+        let mut best: Vec<(usize, f64)> = Vec::new();
         for row in rows {
             let Some(&share) = row.recovered_percent.get(&typed) else { continue };
             match best.iter_mut().find(|(k, _)| *k == row.k) {
@@ -25,7 +27,7 @@ pub(crate) fn sequence_sentences(document: &Document) -> Vec<String> {
             }
         }
         let said =
-            |(k, share): &(u32, f64)| format!("after {k} queries {} %", words::percent(*share));
+            |(k, share): &(usize, f64)| format!("after {k} queries {} %", words::percent(*share));
         let parts: Vec<String> = best.iter().map(said).collect();
         let shares = words::capital(&words::list(&parts));
         format!(
@@ -123,7 +125,7 @@ pub(crate) fn again_table(document: &Document) -> String {
     let thresholds = tables::thresholds(document);
     let headline = tables::headline_threshold(document).unwrap_or_default();
     let unit = match document.results.first().map(|row| row.unit) {
-        Some(LengthUnit::Meter) => "m",
+        Some(Unit::Meter) => "m",
         _ => "x",
     };
     let mut head = ["schemes", "links by"].map(str::to_owned).to_vec();

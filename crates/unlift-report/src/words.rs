@@ -1,20 +1,6 @@
 //! Numbers and names in words: thresholds, shares, ratios, schemes, reasons.
 
-use serde::{Deserialize, Serialize};
-
-/// The unit of every length in a row: thresholds, delta, errors.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum LengthUnit {
-    /// Meters, by the declared scale.
-    #[serde(rename = "m")]
-    Meter,
-    /// The median distance of an original to its K-th nearest neighbor; used without a scale.
-    #[serde(rename = "kth_neighbor")]
-    KthNeighbor,
-    /// Pixels; used for audits of images.
-    #[serde(rename = "px")]
-    Pixel,
-}
+use unlift::Unit;
 
 /// Returns the title of a scheme, with its changes to the map: `olc_thin4` is "Random lines, thin4". An
 /// unknown scheme keeps its name.
@@ -86,38 +72,38 @@ pub(crate) fn scheme_rule(scheme: &str) -> &'static str {
 pub(crate) const USUAL_DISTANCE: &str = "the usual distance to the K-th neighbor";
 
 /// Returns a threshold in short form: `10 cm`, `2.5×` (times [`USUAL_DISTANCE`]), `10 px`.
-pub(crate) fn threshold(typed: &str, unit: LengthUnit) -> String {
+pub(crate) fn threshold(typed: &str, unit: Unit) -> String {
     match (unit, typed.parse::<f64>()) {
-        (LengthUnit::Meter, Ok(meters)) => meters_text(meters),
-        (LengthUnit::Meter, Err(_)) => format!("{typed} m"),
-        (LengthUnit::Pixel, _) => format!("{typed} px"),
-        (LengthUnit::KthNeighbor, Ok(times)) => format!("{times}×"),
-        (LengthUnit::KthNeighbor, Err(_)) => format!("{typed}×"),
+        (Unit::Meter, Ok(meters)) => meters_text(meters),
+        (Unit::Meter, Err(_)) => format!("{typed} m"),
+        (Unit::Pixel, _) => format!("{typed} px"),
+        (Unit::KthNeighbor, Ok(times)) => format!("{times}×"),
+        (Unit::KthNeighbor, Err(_)) => format!("{typed}×"),
     }
 }
 
 /// Returns a threshold for a sentence: `within 10 cm`, `within 2.5 times the usual distance ...`.
-pub(crate) fn within(typed: &str, unit: LengthUnit) -> String {
+pub(crate) fn within(typed: &str, unit: Unit) -> String {
     match (unit, typed.parse::<f64>()) {
-        (LengthUnit::KthNeighbor, Ok(1.0)) => format!("within {USUAL_DISTANCE}"),
-        (LengthUnit::KthNeighbor, Ok(times)) => format!("within {times} times {USUAL_DISTANCE}"),
+        (Unit::KthNeighbor, Ok(1.0)) => format!("within {USUAL_DISTANCE}"),
+        (Unit::KthNeighbor, Ok(times)) => format!("within {times} times {USUAL_DISTANCE}"),
         _ => format!("within {}", threshold(typed, unit)),
     }
 }
 
-pub(crate) fn points(unit: LengthUnit) -> &'static str {
+pub(crate) fn points(unit: Unit) -> &'static str {
     match unit {
-        LengthUnit::Meter | LengthUnit::KthNeighbor => "points",
-        LengthUnit::Pixel => "keypoints",
+        Unit::Meter | Unit::KthNeighbor => "points",
+        Unit::Pixel => "keypoints",
     }
 }
 
 /// Returns a length in words: centimeters below a meter, pixels, or multiples of the unit.
-pub(crate) fn length(value: f64, unit: LengthUnit) -> String {
+pub(crate) fn length(value: f64, unit: Unit) -> String {
     match unit {
-        LengthUnit::Meter => meters_text(value),
-        LengthUnit::KthNeighbor => format!("{}×", grouped(value)),
-        LengthUnit::Pixel => format!("{} px", grouped(value)),
+        Unit::Meter => meters_text(value),
+        Unit::KthNeighbor => format!("{}×", grouped(value)),
+        Unit::Pixel => format!("{} px", grouped(value)),
     }
 }
 
@@ -196,7 +182,7 @@ pub(crate) fn reason(name: &str) -> String {
 }
 
 /// Returns a count with thousands grouped: "21,149" for 21149.
-pub(crate) fn thousands(count: u64) -> String {
+pub(crate) fn thousands(count: impl std::fmt::Display) -> String {
     let digits = count.to_string();
     let mut text = String::with_capacity(digits.len() + digits.len() / 3);
     for (i, digit) in digits.chars().enumerate() {
@@ -209,7 +195,7 @@ pub(crate) fn thousands(count: u64) -> String {
 }
 
 /// Returns an ordinal number: "50th" for 50.
-pub(crate) fn ordinal(number: u32) -> String {
+pub(crate) fn ordinal(number: usize) -> String {
     let ending = match (number % 10, number % 100) {
         (_, 11..=13) => "th",
         (1, _) => "st",
@@ -268,24 +254,24 @@ mod tests {
 
     #[test]
     fn centimeters_need_meters() {
-        assert_eq!(threshold("0.10", LengthUnit::Meter), "10 cm");
-        assert_eq!(threshold("0.005", LengthUnit::Meter), "5 mm");
-        assert_eq!(threshold("2.5", LengthUnit::Meter), "2.5 m");
-        assert_eq!(threshold("1.0", LengthUnit::KthNeighbor), "1×");
-        assert_eq!(threshold("2.50", LengthUnit::KthNeighbor), "2.5×");
-        assert_eq!(length(0.34567, LengthUnit::KthNeighbor), "0.346×");
-        assert_eq!(threshold("10", LengthUnit::Pixel), "10 px");
-        assert_eq!(length(3.4567, LengthUnit::Pixel), "3.46 px");
-        assert_eq!(length(1284.2, LengthUnit::Pixel), "1,280 px");
-        assert_eq!(length(12_345.0, LengthUnit::Meter), "12,300 m");
+        assert_eq!(threshold("0.10", Unit::Meter), "10 cm");
+        assert_eq!(threshold("0.005", Unit::Meter), "5 mm");
+        assert_eq!(threshold("2.5", Unit::Meter), "2.5 m");
+        assert_eq!(threshold("1.0", Unit::KthNeighbor), "1×");
+        assert_eq!(threshold("2.50", Unit::KthNeighbor), "2.5×");
+        assert_eq!(length(0.34567, Unit::KthNeighbor), "0.346×");
+        assert_eq!(threshold("10", Unit::Pixel), "10 px");
+        assert_eq!(length(3.4567, Unit::Pixel), "3.46 px");
+        assert_eq!(length(1284.2, Unit::Pixel), "1,280 px");
+        assert_eq!(length(12_345.0, Unit::Meter), "12,300 m");
     }
 
     #[test]
     fn without_a_scale_lengths_are_compared_with_the_distance_of_neighbors() {
-        let said = |typed| within(typed, LengthUnit::KthNeighbor);
+        let said = |typed| within(typed, Unit::KthNeighbor);
         assert_eq!(said("1.0"), "within the usual distance to the K-th neighbor");
         assert_eq!(said("2.5"), "within 2.5 times the usual distance to the K-th neighbor");
-        assert_eq!(within("0.10", LengthUnit::Meter), "within 10 cm");
-        assert_eq!(within("10", LengthUnit::Pixel), "within 10 px");
+        assert_eq!(within("0.10", Unit::Meter), "within 10 cm");
+        assert_eq!(within("10", Unit::Pixel), "within 10 px");
     }
 }

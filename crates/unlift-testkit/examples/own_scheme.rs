@@ -67,7 +67,7 @@ fn main() -> Result<(), Error> {
             let best =
                 rows.max_by(|a, b| a.recovered_percent[0].total_cmp(&b.recovered_percent[0]));
             if let Some(row) = best {
-                let [near, far] = row.recovered_percent[..] else { continue };
+                let (near, far) = (row.recovered_percent[0], row.recovered_percent[1]);
                 println!("{:8} {ratio:>5}  {near:5.1} {far:5.1} %, {}", row.scheme, row.solver);
             }
         }

@@ -48,7 +48,7 @@ impl Images<'_> {
         let mut images = Vec::new();
         let mut watcher = OfItems::new(plan, progress, |name, rows| {
             let n = tally.borrow_mut().take();
-            images.push(document::image(name, n, rows, &plan.thresholds));
+            images.push(document::image(name, n, rows));
         });
         progress.show(0, chosen.len(), "reading images");
         for error in source.refused() {

@@ -10,8 +10,8 @@ use unlift_report::pictures::{
 };
 
 use crate::Progress;
-use crate::document::given;
 use crate::inversion::Inversion;
+use unlift_report::Given;
 
 /// Collects the pictures of all audited images, in their order.
 pub struct Album<'a> {
@@ -84,7 +84,7 @@ impl Observer<2> for Page<'_> {
         {
             picture.released.push(ReleasedView { scheme: scheme.clone(), marks });
         }
-        let given = given(cell.row);
+        let given = Given::of(cell.row);
         let first = picture.released.first().is_some_and(|view| view.scheme == *scheme);
         if first && picture.graphs.iter().all(|graph| graph.given != given) {
             let neighbors = slot_of.iter().map(|slot| slot.map_or(Vec::new(), |s| best(cell, s)));

@@ -19,7 +19,7 @@ use unlift_vision::pictures::{
     CLASSES, Detection, Detector, Inverter, Lpips, Metrics, Points, Projection, View,
 };
 
-use crate::document::given;
+use unlift_report::Given;
 
 pub use bearings::{on_bearings, six_views};
 pub use images::Inversion;
@@ -208,7 +208,7 @@ fn figures(found: &Judged, baseline: &Judged) -> Vec<(String, f64)> {
 fn shown(row: &Row, picture: &ColorImage, judged: &Judged) -> Result<InvertedView, Error> {
     Ok(InvertedView {
         scheme: row.scheme.clone(),
-        given: given(row),
+        given: Given::of(row),
         solver: row.solver.to_owned(),
         painted: painted(picture, judged)?,
     })

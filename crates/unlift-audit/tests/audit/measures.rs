@@ -64,7 +64,7 @@ fn figures_of_a_measure_stand_in_the_files() {
         assert!((row.metrics["thirds"] - found / 3.0).abs() < 1e-3, "{}", row.metrics["thirds"]);
     }
     // Rows differ, so a constant would fail.
-    let lost: Vec<u64> = document.results.iter().map(|row| row.n_lost).collect();
+    let lost: Vec<usize> = document.results.iter().map(|row| row.n_lost).collect();
     assert!(lost.iter().any(|&n| n != lost[0]), "{lost:?}");
 }
 

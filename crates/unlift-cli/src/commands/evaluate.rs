@@ -40,7 +40,7 @@ pub fn run(args: &EvaluateArgs) -> crate::Result<Outcome> {
         .map_err(|error| unlift_io::Error::core(&args.recovered, error))?;
     let mut notes = notes(recovered.about(), secret.slots_per_record());
     notes.extend(check(args, &checked, &thresholds, unit)?);
-    report(args, &row, &thresholds, &notes)
+    report(args, &row, &notes)
 }
 
 fn images(args: &EvaluateArgs) -> crate::Result<Outcome> {
@@ -52,7 +52,7 @@ fn images(args: &EvaluateArgs) -> crate::Result<Outcome> {
     let Evaluated { row, about, checked } = evaluate_all(args, released.as_deref(), &thresholds)?;
     let mut notes = notes(about, 1);
     notes.extend(check(args, &checked, &thresholds, Unit::Pixel)?);
-    report(args, &row, &thresholds, &notes)
+    report(args, &row, &notes)
 }
 
 /// Returns notes on results that may be wrong; an error if the files do not belong together.
@@ -76,20 +76,11 @@ fn check(
     })
 }
 
-fn report(
-    args: &EvaluateArgs,
-    row: &Row,
-    thresholds: &[Threshold],
-    notes: &[String],
-) -> crate::Result<Outcome> {
+fn report(args: &EvaluateArgs, row: &Row, notes: &[String]) -> crate::Result<Outcome> {
     for note in notes {
         stderr::note(format_args!("{}: {note}", args.recovered.display()));
     }
-    print(&if args.json {
-        format!("{:#}\n", evaluated(row, thresholds, notes)?)
-    } else {
-        as_table(row, thresholds)
-    })?;
+    print(&if args.json { format!("{:#}\n", evaluated(row, notes)?) } else { as_table(row) })?;
     Ok(Outcome::Done)
 }
 
@@ -126,32 +117,30 @@ fn percent(share: f64) -> String {
     if share > 0.0 && share < 0.05 { "under 0.1 %".to_owned() } else { format!("{share:.1} %") }
 }
 
-fn as_table(row: &Row, thresholds: &[Threshold]) -> String {
+fn as_table(row: &Row) -> String {
     let unit = row.unit.name();
     let line = |what: String, figure: String| vec![what, figure];
     let mut lines = vec![line("released points".to_owned(), row.n_points.to_string())];
     for (reason, n) in &row.dropped {
         lines.push(line(format!("not released: {reason}"), n.to_string()));
     }
-    for (threshold, share) in thresholds.iter().zip(&row.recovered_percent) {
-        lines.push(line(format!("within {} {unit}", threshold.label), percent(*share)));
+    for (label, share) in &row.recovered_percent {
+        lines.push(line(format!("within {} {unit}", label), percent(*share)));
     }
-    for (threshold, share) in thresholds.iter().zip(&row.blind_percent) {
-        lines.push(line(format!("blind, within {} {unit}", threshold.label), percent(*share)));
+    for (label, share) in &row.blind_percent {
+        lines.push(line(format!("blind, within {} {unit}", label), percent(*share)));
     }
     for (reason, n) in &row.lost {
         lines.push(line(format!("lost: {reason}"), n.to_string()));
     }
-    let median = row.error_percentiles.first().copied().flatten();
-    let median = median.map_or("-".to_owned(), |error| format!("{error:.4}"));
+    let median = row.median_error.map_or("-".to_owned(), |error| format!("{error:.4}"));
     lines.push(line(format!("median error, {unit}"), median));
-    let sure = row.reliability.as_ref();
     for (what, share) in [
         ("axes named", row.axis_accuracy_percent),
         ("exact: the published value", row.exact_percent),
         ("descriptors assigned", row.assignment_accuracy_percent),
-        ("attacker 90 % sure", sure.map(|sure| sure.sure_percent())),
-        ("of these within", sure.and_then(|sure| sure.sure_correct_percent())),
+        ("attacker 90 % sure", row.sure_percent),
+        ("of these within", row.sure_correct_percent),
     ] {
         lines.extend(share.map(|share| line(what.to_owned(), percent(share))));
     }

@@ -1,9 +1,11 @@
 //! The comparison of two audits: what leaks more, what leaks less, and what only one of them has.
 
+use unlift::Unit;
+
 use minijinja::value::Serde;
 use serde::Serialize;
 
-use crate::document::{Document, LengthUnit, Localization, Row};
+use crate::document::{Document, Localization, Row};
 use crate::page::{environment, tables};
 use crate::{Error, attack, words};
 
@@ -273,11 +275,11 @@ fn common_thresholds(
     Ok(pairs)
 }
 
-fn unit_name(unit: LengthUnit) -> &'static str {
+fn unit_name(unit: Unit) -> &'static str {
     match unit {
-        LengthUnit::Meter => "m",
-        LengthUnit::KthNeighbor => "kth_neighbor",
-        LengthUnit::Pixel => "px",
+        Unit::Meter => "m",
+        Unit::KthNeighbor => "kth_neighbor",
+        Unit::Pixel => "px",
     }
 }
 

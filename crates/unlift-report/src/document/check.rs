@@ -31,9 +31,7 @@ impl Document {
             }
         }
         for (i, point) in self.break_even.iter().enumerate() {
-            if let Some(ratio) = point.inlier_ratio {
-                between(&format!("break_even[{i}].inlier_ratio"), ratio, 0.0, 1.0)?;
-            }
+            between(&format!("break_even[{i}].inlier_ratio"), point.inlier_ratio, 0.0, 1.0)?;
         }
         for (i, gate) in self.gates.iter().enumerate() {
             if let Some(found) = gate.found_percent {
@@ -135,7 +133,7 @@ fn check_row(place: &str, row: &Row) -> Result<(), Error> {
         let expected = format!("null, as sure_unknown says {reason:?}");
         return Err(invalid(format!("{place}.sure_percent"), expected, sure.to_string()));
     }
-    let lost: u64 = row.lost.values().sum();
+    let lost: usize = row.lost.values().sum();
     // With repeats each count is a rounded mean, so the sum may differ.
     if row.repeats == 1 && lost != row.n_lost {
         let expected = format!("a sum of {}", row.n_lost);
@@ -146,7 +144,7 @@ fn check_row(place: &str, row: &Row) -> Result<(), Error> {
         return Err(invalid(format!("{place}.n_lost"), expected, row.n_lost.to_string()));
     }
     for (field, value) in [
-        ("delta", row.delta),
+        ("delta", Some(row.delta)),
         ("median_error", row.median_error),
         ("blind_median_error", row.blind_median_error),
         ("axis_accuracy_percent", row.axis_accuracy_percent),

@@ -1,6 +1,6 @@
 //! The structs of `audit.json`, schema 1.
 //!
-//! `results` has one row per (scheme, neighbors, oracle noise, inlier ratio, K, solver). Only [`Run`]
+//! `results` has one [`Row`] per (scheme, neighbors, oracle noise, inlier ratio, K, solver). Only [`Run`]
 //! holds what differs between runs (seconds, memory, threads, command line), so `results` are
 //! byte-identical for the same input, options and seed.
 
@@ -10,21 +10,15 @@ mod share;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+pub use unlift::audit::{
+    Bound, BreakEven, ByReason, ByThreshold, Distinct, NotAudited, ReliabilityBin, Row, STRONGEST,
+    Spread,
+};
 
 use crate::words;
-pub use crate::words::LengthUnit;
 
 /// The schema that this build writes and reads.
 pub const SCHEMA: u32 = 1;
-
-/// Percentages by threshold, as typed by the user and in that order.
-pub type ByThreshold = IndexMap<String, f64>;
-
-/// The value of [`BreakEven::solver`] for the strongest attack at every inlier ratio.
-pub const STRONGEST: &str = "strongest";
-
-/// Numbers of points by reason.
-pub type ByReason = IndexMap<String, u64>;
 
 /// A whole audit: the content of `audit.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -105,157 +99,6 @@ impl Input {
         let scale = self.scale_m_per_unit.map(|scale| format!(" at --scale {scale}"));
         Some(self.size()? + &scale.unwrap_or_default())
     }
-}
-
-/// A scheme, or one source of neighborhoods for a scheme, that could not be audited.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct NotAudited {
-    /// The scheme's user-facing name.
-    pub scheme: String,
-    /// The source, as in [`Row::neighbors`]; absent if the whole scheme has no row.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub neighbors: Option<String>,
-    /// The reason: what was expected and what was found.
-    pub reason: String,
-}
-
-/// The figures of one (scheme, neighbors, oracle noise, inlier ratio, K, solver).
-///
-/// With repeats, the figures are means over the repeats and [`Row::std`] holds their spread.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Row {
-    /// The scheme's user-facing name, for example `ppl+`.
-    pub scheme: String,
-    /// The source of the neighborhoods: `oracle`, `file`, or the name of a source.
-    pub neighbors: String,
-    /// How the oracle chose the wrong neighbors: `uniform`, `near` or `clustered`; `None` for other
-    /// sources.
-    pub oracle_noise: Option<String>,
-    /// Share of true neighbors: as requested for the oracle, measured for other sources.
-    pub inlier_ratio: f64,
-    /// Neighbors per hidden point.
-    pub k: u32,
-    /// `joint`, `consensus`, `ransac`, `density` or `tomography`.
-    pub solver: String,
-    /// Delta in `unit`; `None` if it was chosen per point.
-    pub delta: Option<f64>,
-    /// The unit of all lengths in this row.
-    pub unit: LengthUnit,
-    /// Points released under the scheme, the base of all percentages.
-    pub n_points: u64,
-    /// Released points without a position after recovery; they count as misses.
-    pub n_lost: u64,
-    /// `n_lost` by reason.
-    pub lost: ByReason,
-    /// Points that the scheme did not release, by reason.
-    pub dropped: ByReason,
-    /// Percent of the released points recovered within each threshold.
-    pub recovered_percent: ByThreshold,
-    /// Percent recovered by a blind guess from one record at a time.
-    pub blind_percent: ByThreshold,
-    /// Percent recovered by the best attack on the released records alone, per threshold; equal in all rows of a
-    /// scheme, absent without such an attack.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub records_alone_percent: Option<ByThreshold>,
-    /// The attack behind `records_alone_percent`, with the same keys: `tomography`, `density` or `geometric, joint`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub records_alone_by: Option<IndexMap<String, String>>,
-    /// Percent of points whose swapped axis was identified correctly (`cp` only).
-    pub axis_accuracy_percent: Option<f64>,
-    /// Percent of points whose coordinates all equal the published values (`cp`, `cp2d` only).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub exact_percent: Option<f64>,
-    /// Percent of descriptors assigned to the right point of their line (`ppl`, `ppl+` only).
-    pub assignment_accuracy_percent: Option<f64>,
-    /// Figures of added measures, by name; each has its own unit.
-    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
-    pub metrics: IndexMap<String, f64>,
-    /// Median error over the released points, in `unit`; lost points count as infinitely far, and `None` is infinite.
-    pub median_error: Option<f64>,
-    /// Median error of a blind guess; absent in documents of earlier versions.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub blind_median_error: Option<f64>,
-    /// Percentiles (`50`, `75`, `90`, `95`, `99`) of the error, as in `median_error`.
-    pub error_percentiles: IndexMap<String, Option<f64>>,
-    /// Percent of the released points that the attacker estimates to be within the smallest threshold with a
-    /// probability of at least 90 %; `None` if unknown.
-    #[serde(default)]
-    pub sure_percent: Option<f64>,
-    /// Why `sure_percent` is not known; absent if it is known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub sure_unknown: Option<String>,
-    /// Percent of these points that are within the smallest threshold; absent without such points.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub sure_correct_percent: Option<f64>,
-    /// Ten bins of the attacker's estimated probability, from 0 to 1, over recovered points.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub reliability: Option<Vec<ReliabilityBin>>,
-    /// Histogram of RANSAC's trials per point: (largest number of trials in the bin, points in it).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub ransac_trials: Option<Vec<(u64, u64)>>,
-    /// Number of runs with different seeds.
-    #[serde(default = "one", skip_serializing_if = "is_one")]
-    pub repeats: u32,
-    /// Standard deviations over the repeats; `None` for a single run.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub std: Option<Spread>,
-    /// Shares over distinct places (images only).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub distinct: Option<Distinct>,
-}
-
-/// A bin of points with similar estimated probability, over all repeats.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-pub struct ReliabilityBin {
-    /// The mean estimated probability, 0 to 1; `None` without points.
-    pub predicted: Option<f64>,
-    /// The share of points within the smallest threshold; `None` without points.
-    pub observed: Option<f64>,
-    /// Points in the bin.
-    pub n: u64,
-}
-
-/// Standard deviations of a row's figures over its repeats.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Spread {
-    /// Deviation of [`Row::recovered_percent`], in percentage points.
-    pub recovered_percent: ByThreshold,
-    /// Deviation of [`Row::blind_percent`], in percentage points.
-    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
-    pub blind_percent: ByThreshold,
-    /// Deviation of [`Row::median_error`], in the row's unit.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub median_error: Option<f64>,
-}
-
-/// The smallest inlier ratio at which half of the points come back within a threshold.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct BreakEven {
-    /// The scheme's user-facing name.
-    pub scheme: String,
-    /// The solver's name, or [`STRONGEST`] if several attacks ran.
-    pub solver: String,
-    /// How the oracle chose the wrong neighbors, as in [`Row::oracle_noise`].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub oracle_noise: Option<String>,
-    /// The threshold as typed.
-    pub threshold: String,
-    /// The ratio: interpolated, or the smallest or largest tested one; see [`BreakEven::bound`].
-    pub inlier_ratio: Option<f64>,
-    /// How the ratio relates to the tested ratios.
-    pub bound: Bound,
-}
-
-/// The relation of a break-even ratio to the tested ratios.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Bound {
-    /// Between two tested ratios, by linear interpolation.
-    Interpolated,
-    /// Half comes back at this ratio, and no ratio a little below it was tested: the true value is at most this.
-    BelowTested,
-    /// Half does not come back at any tested ratio.
-    AboveTested,
 }
 
 /// The accuracy of localization under a scheme: medians over the images of the map.
@@ -393,18 +236,6 @@ pub struct ImageCounts {
     pub too_small: u64,
 }
 
-/// Shares over distinct places, each counted once. About a fifth of an image's keypoints lie exactly on
-/// another one.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Distinct {
-    /// Number of places.
-    pub n_places: u64,
-    /// Percent of the places recovered within each threshold.
-    pub recovered_percent: ByThreshold,
-    /// Percent of the places recovered by a blind guess.
-    pub blind_percent: ByThreshold,
-}
-
 /// The figures of one tile.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct TileFigures {
@@ -442,26 +273,8 @@ pub struct ImageRow {
     pub median_error: Option<f64>,
 }
 
-impl Row {
-    /// Returns the larger baseline within `threshold` (as typed): a blind guess, or the best attack on the records
-    /// alone. Neighborhoods add what exceeds it.
-    pub fn baseline_percent(&self, threshold: &str) -> Option<f64> {
-        let alone = self.records_alone_percent.as_ref().and_then(|map| map.get(threshold));
-        let blind = self.blind_percent.get(threshold);
-        blind.into_iter().chain(alone).copied().reduce(f64::max)
-    }
-}
-
-fn one() -> u32 {
-    1
-}
-
 fn is_false(value: &bool) -> bool {
     !value
-}
-
-fn is_one(value: &u32) -> bool {
-    *value == 1
 }
 
 impl Document {

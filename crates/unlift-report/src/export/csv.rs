@@ -57,8 +57,6 @@ fn cells(
     metrics: &[&String],
 ) -> Vec<String> {
     let number = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
-    let unit = serde_json::to_value(row.unit).ok();
-    let unit = unit.as_ref().and_then(|unit| unit.as_str()).unwrap_or_default().to_owned();
     let mut cells = vec![
         row.scheme.clone(),
         row.neighbors.clone(),
@@ -66,11 +64,11 @@ fn cells(
         row.inlier_ratio.to_string(),
         row.k.to_string(),
         row.solver.clone(),
-        number(row.delta),
-        unit,
+        row.delta.to_string(),
+        row.unit.name().to_owned(),
         row.n_points.to_string(),
         row.n_lost.to_string(),
-        row.dropped.values().sum::<u64>().to_string(),
+        row.dropped.values().sum::<usize>().to_string(),
     ];
     let spread = row.std.as_ref().map(|std| &std.recovered_percent);
     let by_threshold: [Option<&ByThreshold>; 4] = [

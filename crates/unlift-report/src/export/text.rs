@@ -1,6 +1,8 @@
 //! The short table for a terminal.
 
-use crate::document::{Bound, Document, LengthUnit, Row, STRONGEST};
+use unlift::Unit;
+
+use crate::document::{Bound, Document, Row, STRONGEST};
 use crate::page::verdict::Verdict;
 use crate::page::{cost, tables, tiles, verdict};
 use crate::words::align;
@@ -55,7 +57,7 @@ pub fn text_table(document: &Document) -> String {
         text.push_str(&format!("blind, break-even: within {headline} {}\n", unit(document)));
     }
     text.push_str("true: share of the listed neighbors that are among the nearest\n");
-    if document.results.first().is_some_and(|row| row.unit == LengthUnit::KthNeighbor) {
+    if document.results.first().is_some_and(|row| row.unit == Unit::KthNeighbor) {
         text.push_str(&format!("x: times {}\n", words::USUAL_DISTANCE));
     }
     text.push_str(&tiles::line(document).unwrap_or_default());
@@ -111,9 +113,9 @@ fn percent(value: Option<&f64>, spread: Option<&f64>) -> String {
 
 fn unit(document: &Document) -> &'static str {
     match document.results.first().map(|row| row.unit) {
-        Some(LengthUnit::KthNeighbor) => "x",
-        Some(LengthUnit::Pixel) => "px",
-        Some(LengthUnit::Meter) | None => "m",
+        Some(Unit::KthNeighbor) => "x",
+        Some(Unit::Pixel) => "px",
+        Some(Unit::Meter) | None => "m",
     }
 }
 
@@ -133,10 +135,10 @@ fn break_even(document: &Document, row: &Row, typed: &str) -> String {
     if !of_scheme.into_iter().any(is_other) {
         return "-".to_owned();
     }
-    match points.next().map(|p| (p.bound, p.inlier_ratio.map(words::ratio_percent))) {
-        Some((Bound::Interpolated, Some(ratio))) => format!("{ratio} %"),
-        Some((Bound::BelowTested, Some(ratio))) => format!("<= {ratio} %"),
-        Some((Bound::AboveTested, Some(ratio))) => format!("> {ratio} %"),
-        _ => "-".to_owned(),
+    match points.next().map(|p| (p.bound, words::ratio_percent(p.inlier_ratio))) {
+        Some((Bound::Interpolated, ratio)) => format!("{ratio} %"),
+        Some((Bound::BelowTested, ratio)) => format!("<= {ratio} %"),
+        Some((Bound::AboveTested, ratio)) => format!("> {ratio} %"),
+        None => "-".to_owned(),
     }
 }

@@ -275,7 +275,7 @@ pub(crate) fn table(document: &Document) -> Option<Table> {
         let leak = leak(document, &one.scheme, basis).filter(|_| !one.of_queries);
         let of_scheme = document.results.iter().find(|row| row.scheme == one.scheme);
         let released = of_scheme.map_or(1.0, |row| {
-            row.n_points as f64 / (row.n_points + row.dropped.values().sum::<u64>()).max(1) as f64
+            row.n_points as f64 / (row.n_points + row.dropped.values().sum::<usize>()).max(1) as f64
         });
         let protects = match (one.scheme.as_str(), one.of_queries) {
             (UNPROTECTED, _) => "nothing",

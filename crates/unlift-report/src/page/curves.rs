@@ -1,11 +1,13 @@
 //! The charts of the page: their titles, which state the result that a chart shows, their menus, and the data of the script.
 
+use unlift::Unit;
+
 use std::collections::HashSet;
 
 use serde::Serialize;
 
 use crate::attack::{Basis, Given};
-use crate::document::{Document, LengthUnit, Row};
+use crate::document::{Document, Row};
 use crate::page::pictures::{EncodedPicture, first_choice};
 use crate::page::scene::Encoded;
 use crate::page::{RenderOptions, tables, verdict};
@@ -374,11 +376,11 @@ fn first_given(document: &Document, givens: &[GivenChoice]) -> usize {
     place.unwrap_or(0)
 }
 
-pub(crate) fn unit_sign(unit: Option<LengthUnit>) -> &'static str {
+pub(crate) fn unit_sign(unit: Option<Unit>) -> &'static str {
     match unit {
-        Some(LengthUnit::KthNeighbor) => "×",
-        Some(LengthUnit::Pixel) => "px",
-        Some(LengthUnit::Meter) | None => "m",
+        Some(Unit::KthNeighbor) => "×",
+        Some(Unit::Pixel) => "px",
+        Some(Unit::Meter) | None => "m",
     }
 }
 

@@ -10,11 +10,13 @@ pub(crate) mod tables;
 pub(crate) mod tiles;
 pub(crate) mod verdict;
 
+use unlift::Unit;
+
 use minijinja::value::Serde;
 use minijinja::{AutoEscape, Environment, UndefinedBehavior};
 use serde::Serialize;
 
-use crate::document::{Document, ImageCounts, LengthUnit};
+use crate::document::{Document, ImageCounts};
 use crate::page::curves::{Findings, findings, page_data};
 use crate::page::gates::{Gates, gates};
 use crate::page::inversions::{Exhibit, Inversion, Sheet, exhibits, sheets};
@@ -247,11 +249,11 @@ fn subject(document: &Document) -> Subject {
     // The oracle uses the K of the audit; other sources choose their own.
     let oracle = document.results.iter().find(|row| row.neighbors == "oracle");
     let typed = document.options.get("k").and_then(serde_json::Value::as_u64);
-    let k = oracle.map(|row| row.k).or(typed.and_then(|k| u32::try_from(k).ok())).unwrap_or(50);
-    let of = document.results.first().map_or(LengthUnit::Meter, |row| row.unit);
-    let metric = of != LengthUnit::KthNeighbor;
+    let k = oracle.map(|row| row.k).or(typed.and_then(|k| usize::try_from(k).ok())).unwrap_or(50);
+    let of = document.results.first().map_or(Unit::Meter, |row| row.unit);
+    let metric = of != Unit::KthNeighbor;
     let unit = match (metric, input.scale_m_per_unit, input.unit_in_map_units) {
-        (true, ..) if of == LengthUnit::Pixel => "Lengths are in pixels.".to_owned(),
+        (true, ..) if of == Unit::Pixel => "Lengths are in pixels.".to_owned(),
         (true, scale, _) => {
             let by =
                 scale.map(|scale| format!(", by the declared scale of {scale} m per map unit"));
@@ -267,7 +269,7 @@ fn subject(document: &Document) -> Subject {
         name,
         n_points: words::thousands(input.n_points),
         metric,
-        kind: if of == LengthUnit::Pixel { "images" } else { "map" },
+        kind: if of == Unit::Pixel { "images" } else { "map" },
         points: words::points(of),
         images: input.images.as_ref().map(images_text),
         unit,
@@ -361,7 +363,7 @@ impl Opening {
             verdict: verdict(document),
             exhibits: exhibits(document, inversions),
             notes: document.notes.clone(),
-            images: document.results.first().is_some_and(|row| row.unit == LengthUnit::Pixel),
+            images: document.results.first().is_some_and(|row| row.unit == Unit::Pixel),
         }
     }
 

@@ -1,8 +1,10 @@
 //! The figures as tables of text, which the page shows without script.
 
+use unlift::Unit;
+
 use serde::Serialize;
 
-use crate::document::{Bound, ByReason, ByThreshold, Document, LengthUnit, Row};
+use crate::document::{Bound, ByReason, ByThreshold, Document, Row};
 use crate::{attack, words};
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -145,8 +147,7 @@ pub(crate) fn recovered(document: &Document) -> Table {
     };
     let caption = format!("Recovered {points}, in percent of the released {points}.{spread}");
     let table = Table::of_results(document, ("recovered", caption), heads, |row| {
-        let mut cells =
-            vec![row.k.to_string(), known(row.delta, |delta| words::length(delta, row.unit))];
+        let mut cells = vec![row.k.to_string(), words::length(row.delta, row.unit)];
         let spread = row.std.as_ref().map(|std| &std.recovered_percent);
         cells.extend(shares(document, &row.recovered_percent, spread));
         cells.push(words::thousands(row.n_points));
@@ -210,13 +211,12 @@ pub(crate) fn errors(document: &Document) -> Table {
 
 pub(crate) fn break_even(document: &Document) -> Option<Table> {
     let rows = document.break_even.iter().map(|point| {
-        let ratio = point.inlier_ratio.map(words::ratio_percent);
-        let ratio = match (point.bound, ratio) {
-            (Bound::Interpolated, Some(ratio)) => format!("{ratio} %"),
-            (Bound::BelowTested, Some(ratio)) => format!("at most {ratio} %"),
-            (Bound::AboveTested, Some(ratio)) => format!("more than {ratio} %"),
-            (_, None) => "not reached".to_owned(),
+        let bound = match point.bound {
+            Bound::Interpolated => "",
+            Bound::BelowTested => "at most ",
+            Bound::AboveTested => "more than ",
         };
+        let ratio = format!("{bound}{} %", words::ratio_percent(point.inlier_ratio));
         let within = threshold_text(document, &point.threshold);
         let source = attack::plain_source("oracle", point.oracle_noise.as_deref());
         vec![point.scheme.clone(), point.solver.clone(), source, within, ratio]
@@ -385,7 +385,7 @@ const HEADLINE_PX: f64 = 10.0;
 /// Returns the threshold of verdicts: the first; for images the one nearest to 10 px.
 pub(crate) fn headline_threshold(document: &Document) -> Option<String> {
     let all = thresholds(document);
-    if document.results.first().is_none_or(|row| row.unit != LengthUnit::Pixel) {
+    if document.results.first().is_none_or(|row| row.unit != Unit::Pixel) {
         return all.into_iter().next();
     }
     let away = |typed: &String| {

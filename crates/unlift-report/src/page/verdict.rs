@@ -5,9 +5,10 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
+use unlift::Unit;
 
 use crate::attack::{Basis, Given};
-use crate::document::{Bound, BreakEven, Document, LengthUnit, Row};
+use crate::document::{Bound, BreakEven, Document, Row};
 use crate::page::tables;
 use crate::{attack, views, words};
 
@@ -234,40 +235,33 @@ fn added(gain: f64) -> String {
 }
 
 fn lowest<'a>(document: &'a Document, scheme: &str, typed: &str) -> Option<&'a BreakEven> {
-    let rank = |point: &BreakEven| match (point.bound, point.inlier_ratio) {
-        (Bound::BelowTested, ratio) => (0, ratio.unwrap_or(0.0)),
-        (Bound::Interpolated, ratio) => (1, ratio.unwrap_or(1.0)),
-        (Bound::AboveTested, ratio) => (2, ratio.unwrap_or(1.0)),
+    let rank = |point: &BreakEven| match point.bound {
+        Bound::BelowTested => 0,
+        Bound::Interpolated => 1,
+        Bound::AboveTested => 2,
     };
     let of = |point: &&BreakEven| point.scheme == scheme && point.threshold == typed;
-    document.break_even.iter().filter(of).min_by(|a, b| {
-        let ((a, a_ratio), (b, b_ratio)) = (rank(a), rank(b));
-        a.cmp(&b).then(a_ratio.total_cmp(&b_ratio))
-    })
+    document
+        .break_even
+        .iter()
+        .filter(of)
+        .min_by(|a, b| rank(a).cmp(&rank(b)).then(a.inlier_ratio.total_cmp(&b.inlier_ratio)))
 }
 
 fn break_even(point: &BreakEven, points: &str) -> String {
-    match (point.bound, point.inlier_ratio.map(words::ratio_percent)) {
-        (Bound::Interpolated, Some(ratio)) => {
+    let ratio = words::ratio_percent(point.inlier_ratio);
+    match point.bound {
+        Bound::Interpolated => {
             format!(
                 "Half of the {points} come back as soon as {ratio} % of the neighbors are right."
             )
         }
-        (Bound::BelowTested, Some(ratio)) => {
-            format!(
-                "Half of the {points} come back even when only {ratio} % of the neighbors are right."
-            )
-        }
-        (Bound::AboveTested, Some(ratio)) => {
-            format!(
-                "Less than half of the {points} came back, even with {ratio} % of the neighbors right, the largest share tested."
-            )
-        }
-        (_, None) => {
-            format!(
-                "Less than half of the {points} came back at every tested share of right neighbors."
-            )
-        }
+        Bound::BelowTested => format!(
+            "Half of the {points} come back even when only {ratio} % of the neighbors are right."
+        ),
+        Bound::AboveTested => format!(
+            "Less than half of the {points} came back, even with {ratio} % of the neighbors right, the largest share tested."
+        ),
     }
 }
 
@@ -455,7 +449,7 @@ fn decision(document: &Document, cards: &[Card]) -> (String, Vec<String>) {
 }
 
 fn is_of_images(document: &Document) -> bool {
-    document.results.iter().any(|row| row.unit == LengthUnit::Pixel)
+    document.results.iter().any(|row| row.unit == Unit::Pixel)
 }
 
 /// Returns true if an attack on `scheme`, or on any scheme, used descriptors.
@@ -498,10 +492,10 @@ fn worst(cards: &[Card], basis: Basis) -> Option<(&Card, &Finding)> {
 
 fn attack_sentence(document: &Document, (card, finding): (&Card, &Finding)) -> String {
     let typed = tables::headline_threshold(document).unwrap_or_default();
-    let unit = document.results.first().map_or(LengthUnit::Meter, |row| row.unit);
+    let unit = document.results.first().map_or(Unit::Meter, |row| row.unit);
     let of = match unit {
-        LengthUnit::Pixel => "the keypoints of these images",
-        LengthUnit::Meter | LengthUnit::KthNeighbor => "the points of this map",
+        Unit::Pixel => "the keypoints of these images",
+        Unit::Meter | Unit::KthNeighbor => "the points of this map",
     };
     let what = format!("{} % of {of} {}", finding.percent, words::within(&typed, unit));
     let by = format!("{}, {}", words::scheme_name(&card.scheme), finding.briefly);

@@ -234,7 +234,7 @@ fn crowded() -> Document {
         row.repeats = 3;
         let spread = row.recovered_percent.keys().map(|typed| (typed.clone(), 10.5));
         row.std = Some(Spread { recovered_percent: spread.collect(), ..Spread::default() });
-        row.k += at as u32;
+        row.k += at;
     }
     document.not_audited.clear();
     document

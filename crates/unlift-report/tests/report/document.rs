@@ -6,17 +6,14 @@ use unlift_report::{Document, Error, RenderOptions, junit, render};
 
 use crate::sample;
 
-fn missing(scheme: &str, neighbors: Option<&str>, reason: &str) -> NotAudited {
-    let neighbors = neighbors.map(str::to_owned);
-    NotAudited { scheme: scheme.into(), neighbors, reason: reason.into() }
-}
-
 #[test]
 fn a_document_survives_its_text() {
     let mut document = sample::document(true);
     assert!(!document.to_json().unwrap().contains("\"metrics\""));
-    document.not_audited =
-        vec![missing("star", None, "k: flat"), missing("plane", Some("geometric"), "no")];
+    document.not_audited = vec![
+        NotAudited::new("star", None, "k: flat"),
+        NotAudited::new("plane", Some("geometric"), "no"),
+    ];
     document.notes.push("--max-points: 200 of 400 points are audited".to_owned());
     document.gates[0] = GateResult {
         found_percent: None,
@@ -86,7 +83,7 @@ fn a_broken_rule_names_its_place() {
         (|d| d.results[0].records_alone_percent.as_mut().unwrap()[1] = 101.0, "results[0].records_alone_percent[\"0.25\"]: expected a number from 0 to 100, found 101"),
         (|d| d.results[0].sure_unknown = Some("few".into()), "results[0].sure_percent: expected null, as sure_unknown says \"few\", found 74.7"),
         (|d| (d.gates[1].passed, d.gates[1].found_percent) = (true, None), "gates[1].passed: expected false where a figure is not known, found true"),
-        (|d| d.not_audited.push(missing("olc", None, "no")), "not_audited[0].scheme: expected a scheme without rows in results, found olc, which has rows"),
+        (|d| d.not_audited.push(NotAudited::new("olc", None, "no")), "not_audited[0].scheme: expected a scheme without rows in results, found olc, which has rows"),
         (
             |d| {
                 *d = sample::images();
@@ -112,11 +109,15 @@ fn a_broken_rule_names_its_place() {
 fn what_others_say_of_why_they_failed_is_kept_back() {
     let mut document = sample::document(true);
     document.not_audited = vec![
-        missing("mine", None, "mine: expected records or lists, found KeyError: 'secret'"),
-        missing("plane", Some("near"), "near: expected records or lists, found secret"),
-        missing("plane", Some("oracle"), "solver mine: expected positions, found secret"),
-        missing("plane", Some("learned"), "/home/secret/x.onnx: expected a network, found none"),
-        missing("plane", Some("geometric"), "k: expected at most 3, found 50"),
+        NotAudited::new("mine", None, "mine: expected records or lists, found KeyError: 'secret'"),
+        NotAudited::new("plane", Some("near"), "near: expected records or lists, found secret"),
+        NotAudited::new("plane", Some("oracle"), "solver mine: expected positions, found secret"),
+        NotAudited::new(
+            "plane",
+            Some("learned"),
+            "/home/secret/x.onnx: expected a network, found none",
+        ),
+        NotAudited::new("plane", Some("geometric"), "k: expected at most 3, found 50"),
     ];
     document.gates[0].reason = Some("mine was not audited: mine: found secret".into());
     document.notes = vec!["/secret/rigs.bin: cut off".into(), "5 of 9 descriptors".into()];
@@ -237,12 +238,10 @@ fn documents_keep_the_schema() {
     let mut full = sample::document(true);
     full.results[0].repeats = 3;
     full.results[0].std = Some(Spread { median_error: Some(0.1), ..Spread::default() });
-    full.results[0].delta = None;
     full.results[0].metrics.insert("faces found".into(), 0.25);
     (full.results[1].sure_percent, full.results[1].sure_unknown) = (None, Some("few".into()));
-    let missing = NotAudited { scheme: "star".into(), neighbors: None, reason: "flat".into() };
     full.not_audited =
-        vec![NotAudited { neighbors: Some("geometric".into()), ..missing.clone() }, missing];
+        [Some("geometric"), None].map(|by| NotAudited::new("star", by, "flat")).into();
     full.gates[0].passed = false;
     (full.gates[0].found_percent, full.gates[0].reason) = (None, Some("not audited".into()));
     full.run.seconds.stages.insert("read".into(), 0.5);

@@ -363,8 +363,7 @@ fn the_terminal_table_has_a_line_per_source_and_says_what_is_missing() {
         document.results.push(row);
     }
     for (neighbors, reason) in [(None, "flat"), (Some("geometric"), "geometric: no lists")] {
-        let (scheme, neighbors) = ("star".to_owned(), neighbors.map(str::to_owned));
-        document.not_audited.push(NotAudited { scheme, neighbors, reason: reason.into() });
+        document.not_audited.push(NotAudited::new("star", neighbors, reason));
     }
     let table = text_table(&document);
     let lines: Vec<&str> = table.lines().collect();

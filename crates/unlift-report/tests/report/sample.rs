@@ -1,6 +1,7 @@
 //! A synthetic audit of a synthetic room, and of images. No figure was measured.
 
 use indexmap::IndexMap;
+use unlift::Unit;
 use unlift_report::Given;
 use unlift_report::document::*;
 use unlift_report::pictures::{Graph, Marks, Picture, RecoveredView, ReleasedView};
@@ -37,7 +38,7 @@ pub fn document(metric: bool) -> Document {
             solver: solver.into(),
             oracle_noise: Some("uniform".into()),
             threshold: threshold.into(),
-            inlier_ratio: Some(ratio),
+            inlier_ratio: ratio,
             bound,
         }
     };
@@ -77,14 +78,14 @@ fn row(s: usize, r: usize, solver: &str, thresholds: [&str; 2], metric: bool) ->
         thresholds.map(str::to_owned).into_iter().zip(values).collect()
     };
     let alone = SHARES[s].3;
-    let bin = |at: u64| {
+    let bin = |at: usize| {
         let middle = (10 * at + 5) as f64 / 100.0;
         let observed = Some(middle + 0.002 * (at as f64 - 5.0));
         ReliabilityBin { predicted: Some(middle), observed, n: 500 + 400 * at }
     };
     let errors = [("50", 0.03), ("75", 0.07), ("90", 0.2), ("95", 0.6), ("99", 1.8)];
     let has = |schemes: &[&str], value: f64| schemes.contains(&SCHEMES[s]).then_some(value);
-    let lost = 12 + 40 * r as u64;
+    let lost = 12 + 40 * r;
     Row {
         scheme: SCHEMES[s].into(),
         neighbors: "oracle".into(),
@@ -92,8 +93,8 @@ fn row(s: usize, r: usize, solver: &str, thresholds: [&str; 2], metric: bool) ->
         inlier_ratio: RATIOS[r],
         k: 50,
         solver: solver.into(),
-        delta: Some(0.08 * scale),
-        unit: if metric { LengthUnit::Meter } else { LengthUnit::KthNeighbor },
+        delta: 0.08 * scale,
+        unit: if metric { Unit::Meter } else { Unit::KthNeighbor },
         n_points: 21_148,
         n_lost: lost,
         lost: [("degenerate".into(), 12), ("no_support".into(), lost - 12)].into(),
@@ -106,18 +107,15 @@ fn row(s: usize, r: usize, solver: &str, thresholds: [&str; 2], metric: bool) ->
         axis_accuracy_percent: has(&["cp"], 97.3 - 6.0 * r as f64),
         exact_percent: has(&["cp"], 26.1 - 3.0 * r as f64),
         assignment_accuracy_percent: has(&["ppl", "ppl+"], 98.0 - 3.0 * r as f64),
-        metrics: IndexMap::new(),
         median_error: Some(0.03 * scale),
         blind_median_error: Some(1.25 * scale),
         error_percentiles: errors.map(|(p, error)| (p.into(), Some(error * scale))).into(),
         sure_percent: Some((8.0 * shares[0]).round() / 10.0),
-        sure_unknown: None,
         sure_correct_percent: Some(97.0),
         reliability: Some((0..10).map(bin).collect()),
         ransac_trials: (solver == "ransac").then(|| vec![(10, 9_000), (100, 12_148)]),
         repeats: 1,
-        std: None,
-        distinct: None,
+        ..Row::default()
     }
 }
 
@@ -149,9 +147,8 @@ pub fn mixed(metric: bool) -> Document {
         if row.scheme != "plane" {
             own("geometric", 0.05, [7.0 - weaker / 10.0, 14.0]);
         } else if row.solver == "consensus" {
-            let reason = "planes say nothing of where points are".into();
-            let neighbors = Some("geometric".into());
-            document.not_audited.push(NotAudited { scheme: row.scheme, neighbors, reason });
+            let reason = "planes say nothing of where points are";
+            document.not_audited.push(NotAudited::new(&row.scheme, Some("geometric"), reason));
         }
     }
     document.run.seconds.rows.clear();
@@ -160,7 +157,7 @@ pub fn mixed(metric: bool) -> Document {
 
 /// Returns a number in 0..1 from a counter.
 fn random(counter: usize) -> f32 {
-    let mut z = (counter as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    let mut z = (counter + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     ((z ^ (z >> 27)) >> 40) as f32 / (1u64 << 24) as f32
 }
@@ -215,7 +212,7 @@ pub fn images() -> Document {
         row.scheme = if row.scheme == "olc" { "lines2d" } else { "cp2d" }.into();
         row.recovered_percent = by([21.5, 61.5, 81.5, 95.5].map(|share| share - at as f64));
         row.blind_percent = by([0.5, 2.25, 4.5, 11.0]);
-        (row.unit, row.reliability) = (LengthUnit::Pixel, None);
+        (row.unit, row.reliability) = (Unit::Pixel, None);
         (row.sure_percent, row.sure_correct_percent) = (None, None);
         row.sure_unknown = Some("nobody has compared it with what comes true in images".into());
         (row.records_alone_percent, row.records_alone_by) = (None, None);

@@ -1,5 +1,7 @@
 //! Break-even ratio of a scheme: the lowest inlier ratio at which half of the points come back.
 
+use serde::{Deserialize, Serialize};
+
 use super::plan::Plan;
 use super::row::Row;
 
@@ -10,7 +12,8 @@ const MAX_GAP: f64 = 0.3;
 const HALF: f64 = 50.0;
 
 /// Relation of a break-even ratio to the tested inlier ratios.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Bound {
     /// Interpolated between two tested ratios.
     Interpolated,
@@ -20,28 +23,17 @@ pub enum Bound {
     AboveTested,
 }
 
-impl Bound {
-    /// Returns the name used in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Interpolated => "interpolated",
-            Self::BelowTested => "below_tested",
-            Self::AboveTested => "above_tested",
-        }
-    }
-}
-
 /// The lowest inlier ratio, among the tested ones and those between them, at which half of the
 /// points come back within a threshold.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BreakEven {
     /// Scheme name.
     pub scheme: String,
     /// Solver name, or [`STRONGEST`].
     pub solver: String,
     /// Noise model of the oracle.
-    pub oracle_noise: &'static str,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub oracle_noise: Option<String>,
     /// Threshold label.
     pub threshold: String,
     /// The ratio, linearly interpolated, or the tested ratio that bounds it.
@@ -64,16 +56,24 @@ pub fn break_even<const D: usize>(plan: &Plan<D>, rows: &[Row]) -> Vec<BreakEven
     for scheme in &plan.schemes {
         for noise in &plan.oracle_noise {
             let (scheme, oracle_noise) = (scheme.name(), noise.name());
-            let of = |row: &&Row| row.scheme == scheme && row.oracle_noise == Some(oracle_noise);
-            let by_rows = |row: &Row| row.recovered_percent[plan.headline];
-            let by_any = |row: &Row| by_rows(row).max(row.baseline_percent(plan.headline));
+            let of = |row: &&Row| {
+                row.scheme == scheme && row.oracle_noise.as_deref() == Some(oracle_noise)
+            };
+            let threshold = &plan.thresholds[plan.headline].label;
+            let by_rows = |row: &Row| row.recovered_percent[threshold];
+            let by_any = |row: &Row| {
+                row.baseline_percent(threshold).map_or(by_rows(row), |base| by_rows(row).max(base))
+            };
             let mut push = |solver: &str, rows: &[&Row], share: &dyn Fn(&Row) -> f64| {
                 if let Some((inlier_ratio, bound)) = crossing(&curve(rows, share)) {
-                    let threshold = plan.thresholds[plan.headline].label.clone();
-                    let (scheme, solver) = (scheme.to_owned(), solver.to_owned());
-                    let found =
-                        BreakEven { scheme, solver, oracle_noise, threshold, inlier_ratio, bound };
-                    result.push(found);
+                    result.push(BreakEven {
+                        scheme: scheme.to_owned(),
+                        solver: solver.to_owned(),
+                        oracle_noise: Some(oracle_noise.to_owned()),
+                        threshold: threshold.clone(),
+                        inlier_ratio,
+                        bound,
+                    });
                 }
             };
             let all: Vec<&Row> = rows.iter().filter(of).collect();

@@ -7,14 +7,13 @@ use super::clock::{Clock, RowSeconds};
 use super::lists::{Kept, Lists};
 use super::missing::{NotAudited, told};
 use super::observer::{Cell, Counts, Observer};
-use super::plan::{Plan, Threshold, key_of, oracle_seed};
-use super::row::{Alone, Row, measure};
+use super::plan::{Plan, key_of, oracle_seed};
+use super::row::{Alone, Row, by_threshold, measure};
 use crate::evaluate::{
     Accuracy, away_from_own, bearings, belongs, blind, distinct_weights, evaluate,
     farthest_for_rounding, is_noise, joined, off_record,
 };
 use crate::geometry::knn::Knn;
-use crate::neighbors::oracle::Noise;
 use crate::obfuscate::{Scheme, all, obfuscate};
 use crate::recover::{Builtin, RecoverOptions, recover};
 use crate::released::Released;
@@ -115,7 +114,7 @@ pub(super) fn cells<const D: usize>(
     };
     match clock.time(|s| &mut s.obfuscate, hide) {
         Ok(hidden) => attack(owned, run, &hidden, clock, observer, each),
-        Err(error) if !owned.may_be_small() => Ok(vec![NotAudited::scheme(run.scheme, &error)]),
+        Err(error) if !owned.may_be_small() => Ok(vec![NotAudited::new(run.scheme, None, error)]),
         Err(error) => Err(error.within(run.scheme)),
     }
 }
@@ -208,13 +207,13 @@ pub(super) fn attack<const D: usize>(
             let mut row = Row {
                 scheme: scheme.to_owned(),
                 neighbors: variant.by.name().to_owned(),
-                oracle_noise: variant.noise.map(Noise::name),
+                oracle_noise: variant.noise.map(|noise| noise.name().to_owned()),
                 inlier_ratio: made.ratio,
                 k: made.k,
                 solver: solver.name().to_owned(),
                 ..measured
             };
-            row.records_alone.clone_from(&alone);
+            row.add_alone(alone.iter().cloned());
             row.metrics.extend(made.ratio_at_k.map(|ratio| (RATIO_AT_K.to_owned(), ratio)));
             row.metrics.extend(bearings(&hidden.0, original, secret, &made.lists));
             row.metrics.extend(off_record(&hidden.0, original, secret));
@@ -280,14 +279,13 @@ pub fn records_alone<const D: usize>(
     for (name, recovered) in recover::records_alone(released, &options)? {
         if (0..recovered.n_slots()).any(|slot| recovered.position(slot).is_some()) {
             let accuracy = evaluate(&recovered, original, secret)?;
-            found.push(Alone { name, percent: within(&accuracy, &plan.thresholds) });
+            found.push(Alone {
+                name,
+                percent: by_threshold(&plan.thresholds, |t| accuracy.percent_within(t.value)),
+            });
         }
     }
     Ok(found)
-}
-
-fn within(accuracy: &Accuracy, thresholds: &[Threshold]) -> Vec<f64> {
-    thresholds.iter().map(|t| accuracy.percent_within(t.value)).collect()
 }
 
 /// Result of one map or image.

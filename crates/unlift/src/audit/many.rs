@@ -13,12 +13,11 @@ use super::lists::Kept;
 use super::missing::NotAudited;
 use super::observer::{Observer, Silent};
 use super::plan::{Plan, Threshold};
-use super::row::{Alone, Distinct, PERCENTILES, Row};
+use super::row::{Alone, ByReason, ByThreshold, Distinct, Parts, Row, by_threshold};
 use super::run::{Outcome, none_applies};
 use crate::compiled::Both;
 use crate::evaluate::{Accuracy, Reliability};
 use crate::neighbors::oracle;
-use crate::recover::Unknown;
 use crate::truth::Original;
 use crate::{Descriptors, Error};
 
@@ -244,15 +243,15 @@ pub(super) struct Pool {
     n_listed: usize,
     /// Sums by figure and threshold: of points within it, of true entries of lists, of percentages times points. A figure that no image
     /// has is absent.
-    sums: BTreeMap<(&'static str, usize), f64>,
+    sums: BTreeMap<(&'static str, String), f64>,
     metrics: BTreeMap<String, Figure>,
-    lost: BTreeMap<&'static str, usize>,
-    dropped: BTreeMap<&'static str, usize>,
+    lost: ByReason,
+    dropped: ByReason,
     trials: BTreeMap<u32, u64>,
     /// Percentages times points, for each attack on the records alone.
-    alone: BTreeMap<&'static str, Vec<f64>>,
+    alone: BTreeMap<&'static str, ByThreshold>,
     reliability: Option<Reliability>,
-    sure_unknown: Option<Unknown>,
+    sure_unknown: Option<String>,
     errors: Errors,
     blind_errors: Errors,
 }
@@ -264,22 +263,23 @@ impl Pool {
         let n = accuracy.n_points();
         let percentage = |percent: Option<f64>| percent.map(|percent| percent * n as f64);
         let mut sums = BTreeMap::from([
-            (("delta", 0), row.delta * n as f64),
-            (("hits", 0), row.inlier_ratio * *n_listed as f64),
-            (("places", 0), weights.iter().sum()),
+            (("delta", String::new()), row.delta * n as f64),
+            (("hits", String::new()), row.inlier_ratio * *n_listed as f64),
+            (("places", String::new()), weights.iter().sum()),
         ]);
-        for (at, threshold) in thresholds.iter().enumerate() {
-            sums.insert(("within", at), accuracy.n_within(threshold.value) as f64);
-            sums.insert(("blind", at), baseline.n_within(threshold.value) as f64);
-            sums.insert(("places within", at), accuracy.weight_within(threshold.value, weights));
-            sums.insert(("blind places", at), baseline.weight_within(threshold.value, weights));
+        for Threshold { label, value } in thresholds {
+            let mut add = |name, sum| sums.insert((name, label.clone()), sum);
+            add("within", accuracy.n_within(*value) as f64);
+            add("blind", baseline.n_within(*value) as f64);
+            add("places within", accuracy.weight_within(*value, weights));
+            add("blind places", baseline.weight_within(*value, weights));
         }
         for (name, sum) in [
             ("exact", accuracy.n_exact.map(|n_exact| n_exact as f64)),
             ("axis", percentage(row.axis_accuracy_percent)),
             ("assignment", percentage(row.assignment_accuracy_percent)),
         ] {
-            sums.extend(sum.map(|sum| ((name, 0), sum)));
+            sums.extend(sum.map(|sum| ((name, String::new()), sum)));
         }
         let figure = |(name, value): (&String, &f64)| {
             let of_images = whole.contains(name);
@@ -287,7 +287,8 @@ impl Pool {
             (name.clone(), Figure { sum: value * known as f64, known, of_images })
         };
         let alone = |alone: &Alone| {
-            (alone.name, alone.percent.iter().map(|percent| percent * n as f64).collect())
+            let sum = |(label, percent): (&String, &f64)| (label.clone(), percent * n as f64);
+            (alone.name, alone.percent.iter().map(sum).collect())
         };
         Self {
             cell: row.clone(),
@@ -298,9 +299,9 @@ impl Pool {
             lost: row.lost.clone(),
             dropped: row.dropped.clone(),
             trials: row.ransac_trials.iter().flatten().copied().collect(),
-            alone: row.records_alone.iter().map(alone).collect(),
-            reliability: row.reliability.clone(),
-            sure_unknown: row.sure_unknown,
+            alone: row.parts.alone.iter().map(alone).collect(),
+            reliability: row.parts.reliability.clone(),
+            sure_unknown: row.sure_unknown.clone(),
             errors: Errors::of(accuracy),
             blind_errors: Errors::of(baseline),
         }
@@ -310,8 +311,8 @@ impl Pool {
     pub(super) fn merge(&mut self, more: &Self) {
         self.n_points += more.n_points;
         self.n_listed += more.n_listed;
-        for (&key, more) in &more.sums {
-            *self.sums.entry(key).or_insert(0.0) += more;
+        for (key, more) in &more.sums {
+            *self.sums.entry(key.clone()).or_insert(0.0) += more;
         }
         for (name, more) in &more.metrics {
             let figure = self.metrics.entry(name.clone()).or_default();
@@ -321,14 +322,16 @@ impl Pool {
         }
         for (name, more) in &more.alone {
             // An attack that cannot run on an item recovers nothing there.
-            let all = self.alone.entry(name).or_insert_with(|| vec![0.0; more.len()]);
-            all.iter_mut().zip(more).for_each(|(all, more)| *all += more);
+            let all = self.alone.entry(name).or_default();
+            for (label, more) in more {
+                *all.entry(label.clone()).or_insert(0.0) += more;
+            }
         }
         if let (Some(all), Some(more)) = (&mut self.reliability, &more.reliability) {
             all.merge(more);
         }
         // Confidence counts only if it is known for all items.
-        self.sure_unknown = self.sure_unknown.or(more.sure_unknown);
+        self.sure_unknown = self.sure_unknown.take().or_else(|| more.sure_unknown.clone());
         merge_counts(&mut self.lost, &more.lost);
         merge_counts(&mut self.dropped, &more.dropped);
         merge_counts(&mut self.trials, &more.trials);
@@ -338,20 +341,20 @@ impl Pool {
 
     pub(super) fn row(&self, thresholds: &[Threshold]) -> Row {
         let n = self.n_points.max(1) as f64;
-        let sum = |name: &'static str| self.sums.get(&(name, 0)).copied();
-        let percent = |name: &'static str, of: f64| {
-            let sum = |at: usize| self.sums.get(&(name, at)).copied().unwrap_or(0.0);
-            (0..thresholds.len()).map(|at| 100.0 * sum(at) / of).collect()
+        let of = |name, label: &str| self.sums.get(&(name, label.to_owned())).copied();
+        let sum = |name| of(name, "");
+        let percent = |name, all: f64| {
+            by_threshold(thresholds, |t| 100.0 * of(name, &t.label).unwrap_or(0.0) / all)
         };
         let n_places = sum("places").unwrap_or(0.0);
         let places = n_places.max(f64::MIN_POSITIVE);
         let is_known =
             |(_, figure): &(&String, &Figure)| figure.of_images || figure.known == self.n_points;
-        let alone = |(&name, sums): (&&'static str, &Vec<f64>)| Alone {
+        let alone = |(&name, sums): (&&'static str, &ByThreshold)| Alone {
             name,
-            percent: sums.iter().map(|sum| sum / n).collect(),
+            percent: sums.iter().map(|(label, sum)| (label.clone(), sum / n)).collect(),
         };
-        Row {
+        let mut row = Row {
             // A requested ratio identifies the cell. A measured one is a mean over entries.
             inlier_ratio: match self.cell.oracle_noise {
                 None if self.n_listed > 0 => sum("hits").unwrap_or(0.0) / self.n_listed as f64,
@@ -359,6 +362,7 @@ impl Pool {
             },
             delta: sum("delta").unwrap_or(0.0) / n,
             n_points: self.n_points,
+            n_lost: self.lost.values().sum(),
             lost: self.lost.clone(),
             dropped: self.dropped.clone(),
             recovered_percent: percent("within", n),
@@ -371,23 +375,25 @@ impl Pool {
                 .filter(is_known)
                 .map(|(name, figure)| (name.clone(), figure.sum / figure.known.max(1) as f64))
                 .collect(),
-            error_percentiles: PERCENTILES
-                .map(|p| self.errors.percentile(p, self.n_points))
-                .to_vec(),
             blind_median_error: self.blind_errors.percentile(50.0, self.n_points),
             ransac_trials: (self.cell.ransac_trials.is_some() || !self.trials.is_empty())
                 .then(|| self.trials.iter().map(|(&up_to, &slots)| (up_to, slots)).collect()),
-            records_alone: self.alone.iter().map(alone).collect(),
+            parts: Parts {
+                alone: self.alone.iter().map(alone).collect(),
+                reliability: self.reliability.clone().filter(|_| self.sure_unknown.is_none()),
+            },
             assignment_accuracy_percent: sum("assignment").map(|sum| sum / n),
-            reliability: self.reliability.clone().filter(|_| self.sure_unknown.is_none()),
-            sure_unknown: self.sure_unknown,
+            sure_unknown: self.sure_unknown.clone(),
             distinct: self.cell.distinct.as_ref().map(|_| Distinct {
                 n_places: n_places.round() as usize,
                 recovered_percent: percent("places within", places),
                 blind_percent: percent("blind places", places),
             }),
             ..self.cell.clone()
-        }
+        };
+        row.fill_errors(|p| self.errors.percentile(p, self.n_points));
+        row.summarize();
+        row
     }
 }
 
@@ -421,11 +427,11 @@ impl Errors {
     }
 }
 
-fn merge_counts<K: Copy + Ord, N: Copy + AddAssign + Default>(
+fn merge_counts<K: Clone + Ord, N: Copy + AddAssign + Default>(
     to: &mut BTreeMap<K, N>,
     more: &BTreeMap<K, N>,
 ) {
-    for (&key, &count) in more {
-        *to.entry(key).or_default() += count;
+    for (key, &count) in more {
+        *to.entry(key.clone()).or_default() += count;
     }
 }

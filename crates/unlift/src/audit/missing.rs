@@ -1,5 +1,7 @@
 //! Parts of a plan without a row.
 
+use serde::{Deserialize, Serialize};
+
 use super::plan::Variant;
 use crate::Error;
 use crate::neighbors::oracle::Noise;
@@ -7,30 +9,30 @@ use crate::truth::{DropReason, Secret};
 
 /// A scheme, or a scheme with one source, that could not be audited. It has no row, because an
 /// unknown value must not look like a small one.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NotAudited {
     /// Scheme name.
     pub scheme: String,
     /// Source without lists, as in [`Row::neighbors`](super::Row::neighbors); `None` if the scheme
     /// has no rows at all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub neighbors: Option<String>,
-    /// Noise model, if the source is the oracle.
+    /// Noise model, if the source is the oracle; not written.
+    #[serde(skip)]
     pub oracle_noise: Option<&'static str>,
-    /// Inlier ratio requested of the oracle.
+    /// Inlier ratio requested of the oracle; not written.
+    #[serde(skip)]
     pub inlier_ratio: Option<f64>,
     /// Error message: what was expected and what was found.
     pub reason: String,
 }
 
 impl NotAudited {
-    pub(super) fn scheme(scheme: &str, error: &Error) -> Self {
-        Self {
-            scheme: scheme.to_owned(),
-            neighbors: None,
-            oracle_noise: None,
-            inlier_ratio: None,
-            reason: error.to_string(),
-        }
+    /// Creates the entry of a scheme, or of one source for it.
+    pub fn new(scheme: &str, neighbors: Option<&str>, reason: impl ToString) -> Self {
+        let (scheme, neighbors) = (scheme.to_owned(), neighbors.map(str::to_owned));
+        let reason = reason.to_string();
+        Self { scheme, neighbors, oracle_noise: None, inlier_ratio: None, reason }
     }
 
     pub(super) fn variant<const D: usize>(
@@ -51,11 +53,9 @@ impl NotAudited {
             ));
         }
         Self {
-            scheme: scheme.to_owned(),
-            neighbors: Some(variant.by.name().to_owned()),
             oracle_noise: variant.noise.map(Noise::name),
             inlier_ratio: variant.inlier_ratio,
-            reason,
+            ..Self::new(scheme, Some(variant.by.name()), reason)
         }
     }
 
@@ -73,9 +73,7 @@ impl NotAudited {
 pub(super) fn told(missing: Vec<NotAudited>, has_rows: bool) -> Vec<NotAudited> {
     match missing.first() {
         Some(first) if !has_rows && missing.iter().all(|m| m.reason == first.reason) => {
-            let (scheme, reason) = (first.scheme.clone(), first.reason.clone());
-            let (neighbors, oracle_noise, inlier_ratio) = (None, None, None);
-            vec![NotAudited { scheme, neighbors, oracle_noise, inlier_ratio, reason }]
+            vec![NotAudited::new(&first.scheme, None, &first.reason)]
         }
         _ => missing,
     }

@@ -23,5 +23,8 @@ pub use many::{Item, Watcher, run_many};
 pub use missing::NotAudited;
 pub use observer::{Cell, Counts, Measure, Observer, Silent};
 pub use plan::{NeighborsBy, Plan, PointNeighbors, Threshold, Variant};
-pub use row::{Alone, Distinct, PERCENTILES, Repeats, Row, measure};
+pub use row::{
+    Alone, ByReason, ByThreshold, Distinct, PERCENTILES, Parts, ReliabilityBin, Row, Spread,
+    measure,
+};
 pub use run::{Outcome, run, run_released, scheme_called};

@@ -2,24 +2,34 @@
 
 use std::collections::BTreeMap;
 
+use indexmap::IndexMap;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
 use super::plan::Threshold;
-use crate::evaluate::{Accuracy, Reliability, evaluate, reliability};
-use crate::recover::{Recovered, Unknown};
+use crate::evaluate::{Accuracy, Bin, Reliability, evaluate, reliability};
+use crate::recover::Recovered;
 use crate::truth::{DropReason, Original, Secret};
 use crate::{Error, Unit};
 
 /// Percentiles of the error in a row.
 pub const PERCENTILES: [f64; 5] = [50.0, 75.0, 90.0, 95.0, 99.0];
 
-/// A row of an audit. Figures are means over repeats; counts are those of the first repeat.
-#[derive(Clone, Debug, PartialEq)]
+/// Percentages by label of the threshold, in the order of the plan.
+pub type ByThreshold = IndexMap<String, f64>;
+
+/// Numbers of points by reason.
+pub type ByReason = BTreeMap<String, usize>;
+
+/// A row of an audit, as `audit.json` contains it. Figures are means over repeats; counts are those
+/// of the first repeat.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Row {
-    /// Scheme name.
+    /// Scheme name, for example `ppl+`.
     pub scheme: String,
     /// Source of the neighborhoods: `oracle`, `file`, or the name of a source.
     pub neighbors: String,
-    /// Noise model of the oracle; `None` for other sources.
-    pub oracle_noise: Option<&'static str>,
+    /// Noise model of the oracle: `uniform`, `near` or `clustered`; `None` for other sources.
+    pub oracle_noise: Option<String>,
     /// Inlier ratio, requested (oracle) or measured.
     pub inlier_ratio: f64,
     /// Records per list: requested of the oracle, the longest of given lists, or chosen by an
@@ -30,50 +40,88 @@ pub struct Row {
     pub k: usize,
     /// Solver name.
     pub solver: String,
-    /// Distance within which a listed record supports a position, in the unit of the points.
+    /// Distance within which a listed record supports a position, in `unit`.
     pub delta: f64,
-    /// The unit of lengths.
+    /// Unit of all lengths.
+    #[serde(serialize_with = "write_unit", deserialize_with = "read_unit")]
     pub unit: Unit,
-    /// Number of released points.
+    /// Number of released points, the base of all percentages.
     pub n_points: usize,
-    /// Points that could not be recovered, by reason.
-    pub lost: BTreeMap<&'static str, usize>,
+    /// Released points that could not be recovered; they count as misses.
+    pub n_lost: usize,
+    /// `n_lost` by reason.
+    pub lost: ByReason,
     /// Points that the scheme left out, by reason.
-    pub dropped: BTreeMap<&'static str, usize>,
-    /// Percentage recovered within each threshold, in the plan's order.
-    pub recovered_percent: Vec<f64>,
+    pub dropped: ByReason,
+    /// Percentage recovered within each threshold.
+    pub recovered_percent: ByThreshold,
     /// Percentage that the blind baseline recovers: no neighborhoods, one record at a time.
-    pub blind_percent: Vec<f64>,
-    /// Results of attacks on the released records alone, without neighborhoods or descriptors.
-    /// Equal in all rows of a scheme; empty if there are none.
-    pub records_alone: Vec<Alone>,
+    pub blind_percent: ByThreshold,
+    /// Percentage that the best attack on the released records alone recovers, without neighborhoods
+    /// or descriptors. Equal in all rows of a scheme; absent without such an attack.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub records_alone_percent: Option<ByThreshold>,
+    /// Best attack on the records alone within each threshold: `tomography`, `geometric, joint`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub records_alone_by: Option<IndexMap<String, String>>,
     /// Percentage of exchanged axes that were identified (`cp`).
     pub axis_accuracy_percent: Option<f64>,
     /// Percentage recovered exactly, with the very value that another record publishes (`cp`,
     /// `cp2d`): all coordinates equal the original's as `f32` relative to the released origin.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exact_percent: Option<f64>,
     /// Percentage of descriptors assigned to their own point (paired lines with descriptors).
     pub assignment_accuracy_percent: Option<f64>,
     /// Figures of the plan's [measures](super::Measure) by name, and `inlier_ratio_at_k` of an
     /// attacker's own lists, which uses as many true neighbors as they have records. Means over
     /// repeats; over images, weighted by points.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub metrics: BTreeMap<String, f64>,
-    /// Errors at [`PERCENTILES`]; `None` if fewer points were recovered.
-    pub error_percentiles: Vec<Option<f64>>,
+    /// Median error; lost points count as infinitely far, and `None` is infinite.
+    pub median_error: Option<f64>,
     /// Median error of the blind baseline.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blind_median_error: Option<f64>,
-    /// Reliability of the attacker's probabilities to lie within the smallest threshold, over all
-    /// repeats; `None` for solvers without probabilities.
-    pub reliability: Option<Reliability>,
-    /// Reason why there are no such probabilities; `None` if there are, and for a row that is no
-    /// attack.
-    pub sure_unknown: Option<Unknown>,
+    /// Errors at [`PERCENTILES`]; `None` if fewer points were recovered.
+    pub error_percentiles: IndexMap<String, Option<f64>>,
+    /// Percentage of released points that the attacker estimates to be within the smallest threshold
+    /// with a probability of at least 90 %, over all repeats; `None` if unknown.
+    #[serde(default)]
+    pub sure_percent: Option<f64>,
+    /// Reason why `sure_percent` is unknown; absent if it is known, and for a row that is no attack.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sure_unknown: Option<String>,
+    /// Percentage of these points that are within the smallest threshold; absent without any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sure_correct_percent: Option<f64>,
+    /// Ten bins of the attacker's probability, from 0 to 1, over recovered points.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reliability: Option<Vec<ReliabilityBin>>,
     /// (Upper bound of trials, number of slots) of the sampling loop (`ransac`).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ransac_trials: Option<Vec<(u32, u64)>>,
+    /// Number of runs with different seeds.
+    #[serde(default = "single", skip_serializing_if = "is_single")]
+    pub repeats: u32,
     /// Spread over repeats, if there are several.
-    pub repeats: Option<Repeats>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub std: Option<Spread>,
     /// Shares of distinct places (images only).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distinct: Option<Distinct>,
+    /// What means over repeats and items need; not written.
+    #[serde(skip)]
+    pub parts: Parts,
+}
+
+/// Results that a row summarizes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Parts {
+    /// Results of all attacks on the records alone.
+    pub alone: Vec<Alone>,
+    /// Reliability of the attacker's probabilities to lie within the smallest threshold; `None` for
+    /// solvers without probabilities.
+    pub reliability: Option<Reliability>,
 }
 
 /// Result of an attack on the records alone.
@@ -81,53 +129,78 @@ pub struct Row {
 pub struct Alone {
     /// Solver, or source and solver: `tomography`, `geometric, joint`.
     pub name: &'static str,
-    /// Percentage recovered within each threshold, in the plan's order.
-    pub percent: Vec<f64>,
+    /// Percentage recovered within each threshold.
+    pub percent: ByThreshold,
+}
+
+/// Points with similar probabilities, over all repeats.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReliabilityBin {
+    /// Mean probability, 0 to 1; `None` without points.
+    pub predicted: Option<f64>,
+    /// Share of points within the smallest threshold; `None` without points.
+    pub observed: Option<f64>,
+    /// Number of points.
+    pub n: usize,
 }
 
 /// Shares of distinct places, each counted once: a fifth of the keypoints of an image share their
 /// place with another. Keypoints at the same place have equal weights that sum to 1.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Distinct {
     /// Number of distinct places.
     pub n_places: usize,
-    /// Percentage recovered within each threshold, in the plan's order.
-    pub recovered_percent: Vec<f64>,
+    /// Percentage recovered within each threshold.
+    pub recovered_percent: ByThreshold,
     /// Percentage recovered by the blind baseline.
-    pub blind_percent: Vec<f64>,
+    pub blind_percent: ByThreshold,
 }
 
-/// Spread over seeds.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Repeats {
-    /// Number of seeds.
-    pub n: u32,
-    /// Standard deviation of each recovered percentage (with n - 1).
-    pub recovered_percent_std: Vec<f64>,
-    /// Standard deviation of each blind percentage.
-    pub blind_percent_std: Vec<f64>,
-    /// Standard deviation of the median error; `None` if it is unknown in any repeat.
-    pub median_error_std: Option<f64>,
+/// Standard deviations over repeats (with n - 1).
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Spread {
+    /// Deviation of each recovered percentage.
+    pub recovered_percent: ByThreshold,
+    /// Deviation of each blind percentage.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub blind_percent: ByThreshold,
+    /// Deviation of the median error; `None` if it is unknown in any repeat.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub median_error: Option<f64>,
+}
+
+fn write_unit<S: Serializer>(unit: &Unit, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_str(unit.name())
+}
+
+fn read_unit<'de, D: Deserializer<'de>>(from: D) -> Result<Unit, D::Error> {
+    let name = String::deserialize(from)?;
+    let expected = "unit: expected m, px or kth_neighbor, found";
+    Unit::from_name(&name).ok_or_else(|| serde::de::Error::custom(format!("{expected} {name}")))
+}
+
+fn single() -> u32 {
+    1
+}
+
+fn is_single(value: &u32) -> bool {
+    *value == 1
+}
+
+/// Returns a value for each threshold by its label.
+pub(super) fn by_threshold(
+    thresholds: &[Threshold],
+    value: impl FnMut(&Threshold) -> f64,
+) -> ByThreshold {
+    thresholds.iter().map(|t| t.label.clone()).zip(thresholds.iter().map(value)).collect()
 }
 
 impl Row {
-    /// Returns the number of points that could not be recovered.
-    pub fn n_lost(&self) -> usize {
-        self.lost.values().sum()
-    }
-
-    /// Returns the name and the percentage of the best attack on the records alone within threshold
-    /// `at`.
-    pub fn best_alone(&self, at: usize) -> Option<(&'static str, f64)> {
-        let found = self.records_alone.iter().map(|alone| (alone.name, alone.percent[at]));
-        found.reduce(|best, other| if other.1 > best.1 { other } else { best })
-    }
-
-    /// Returns the larger baseline within threshold `at`, in percent: the blind guess or the best
-    /// attack on the records alone.
-    pub fn baseline_percent(&self, at: usize) -> f64 {
-        let blind = self.blind_percent[at];
-        self.best_alone(at).map_or(blind, |(_, alone)| blind.max(alone))
+    /// Returns the larger baseline within `threshold`, in percent: the blind guess or the best attack
+    /// on the records alone. Neighborhoods add what exceeds it.
+    pub fn baseline_percent(&self, threshold: &str) -> Option<f64> {
+        let alone = self.records_alone_percent.as_ref().and_then(|by| by.get(threshold));
+        self.blind_percent.get(threshold).into_iter().chain(alone).copied().reduce(f64::max)
     }
 
     /// Returns true if both have the same scheme, source, noise model, requested inlier ratio and
@@ -140,28 +213,62 @@ impl Row {
             && (self.oracle_noise.is_none() || self.inlier_ratio == other.inlier_ratio)
     }
 
+    /// Adds results of attacks on the records alone.
+    pub fn add_alone(&mut self, more: impl IntoIterator<Item = Alone>) {
+        self.parts.alone.extend(more);
+        self.summarize();
+    }
+
+    /// Computes what is written of [`Parts`].
+    pub(super) fn summarize(&mut self) {
+        let best = |label: &String| {
+            let all = self.parts.alone.iter().map(|alone| (alone.name, alone.percent[label]));
+            all.reduce(|best, other| if other.1 > best.1 { other } else { best })
+        };
+        let labels = || self.recovered_percent.keys();
+        let best: Option<Vec<_>> = labels().map(best).collect();
+        let best = best.map(|best| labels().cloned().zip(best).collect::<Vec<_>>());
+        let percent = |(label, (_, percent)): &(String, (_, f64))| (label.clone(), *percent);
+        self.records_alone_percent = best.as_ref().map(|best| best.iter().map(percent).collect());
+        let by = |(label, (name, _)): (String, (&str, _))| (label, name.to_owned());
+        self.records_alone_by = best.map(|best| best.into_iter().map(by).collect());
+        let reliability = self.parts.reliability.as_ref();
+        self.sure_percent = reliability.map(Reliability::sure_percent);
+        self.sure_correct_percent = reliability.and_then(Reliability::sure_correct_percent);
+        self.reliability = reliability.map(|all| {
+            let bin = |bin: &Bin| ReliabilityBin {
+                predicted: bin.predicted(),
+                observed: bin.observed(),
+                n: bin.n,
+            };
+            all.bins.iter().map(bin).collect()
+        });
+    }
+
     pub(super) fn smallest(thresholds: &[Threshold]) -> f64 {
         thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min)
     }
 
-    pub(super) fn fill(
-        &mut self,
-        accuracy: &Accuracy,
-        blind: Option<&Accuracy>,
-        thresholds: &[Threshold],
-    ) {
-        let within = |accuracy: &Accuracy| {
-            thresholds.iter().map(|t| accuracy.percent_within(t.value)).collect()
-        };
+    fn fill(&mut self, accuracy: &Accuracy, blind: Option<&Accuracy>, thresholds: &[Threshold]) {
+        let within =
+            |accuracy: &Accuracy| by_threshold(thresholds, |t| accuracy.percent_within(t.value));
         self.n_points = accuracy.n_points();
-        self.lost = accuracy.lost.iter().map(|(status, &n)| (status.name(), n)).collect();
+        self.n_lost = accuracy.n_lost();
+        self.lost =
+            accuracy.lost.iter().map(|(status, &n)| (status.name().to_owned(), n)).collect();
         self.recovered_percent = within(accuracy);
         self.blind_percent = blind.map(within).unwrap_or_default();
         self.axis_accuracy_percent = accuracy.axis_percent;
         self.exact_percent = accuracy.exact_percent();
         self.assignment_accuracy_percent = accuracy.assignment_percent;
-        self.error_percentiles = PERCENTILES.map(|p| accuracy.percentile(p)).to_vec();
+        self.fill_errors(|p| accuracy.percentile(p));
         self.blind_median_error = blind.and_then(|blind| blind.percentile(50.0));
+    }
+
+    /// Fills in the error at each of [`PERCENTILES`].
+    pub(super) fn fill_errors(&mut self, at: impl Fn(f64) -> Option<f64>) {
+        self.error_percentiles = PERCENTILES.iter().map(|&p| (format!("{p:.0}"), at(p))).collect();
+        self.median_error = at(50.0);
     }
 
     /// Adds the shares of distinct places; `weights` has one entry per slot.
@@ -174,11 +281,10 @@ impl Row {
     ) {
         let all: f64 = weights.iter().sum();
         let within = |accuracy: &Accuracy| {
-            let percent = |t: &Threshold| match all {
+            by_threshold(thresholds, |t| match all {
                 0.0 => 0.0,
                 _ => 100.0 * accuracy.weight_within(t.value, weights) / all,
-            };
-            thresholds.iter().map(percent).collect()
+            })
         };
         self.distinct = Some(Distinct {
             n_places: all.round() as usize,
@@ -202,35 +308,35 @@ impl Row {
             let squares: f64 = rows.iter().filter_map(value).map(|x| (x - m) * (x - m)).sum();
             Some((squares / (n - 1.0)).sqrt())
         };
-        let columns = 0..mean.recovered_percent.len();
-        let known = |x: Option<f64>| x.unwrap_or(0.0);
-        type Column = fn(&Row) -> Option<&Vec<f64>>;
-        let means = |of: Column| -> Vec<f64> {
-            columns.clone().map(|c| known(average(&|r| Some(of(r)?[c])))).collect()
+        type Column = fn(&Row) -> Option<&ByThreshold>;
+        type Of<'a> = &'a dyn Fn(&dyn Fn(&Row) -> Option<f64>) -> Option<f64>;
+        let each = |of: Column, value: Of<'_>| -> ByThreshold {
+            let labels = of(&rows[0]).into_iter().flat_map(|by| by.keys());
+            let of_label = |label: &String| {
+                let value = value(&|r| of(r)?.get(label).copied()).unwrap_or(0.0);
+                (label.clone(), value)
+            };
+            labels.map(of_label).collect()
         };
-        let spreads = |of: Column| -> Vec<f64> {
-            columns.clone().map(|c| known(spread(&|r| Some(of(r)?[c])))).collect()
-        };
-        let repeats = Repeats {
-            n: rows.len() as u32,
-            recovered_percent_std: spreads(|r| Some(&r.recovered_percent)),
-            blind_percent_std: spreads(|r| Some(&r.blind_percent)),
-            median_error_std: spread(&|r| r.error_percentiles[0]),
-        };
-        mean.recovered_percent = means(|r| Some(&r.recovered_percent));
-        mean.blind_percent = means(|r| Some(&r.blind_percent));
+        mean.repeats = rows.len() as u32;
+        mean.std = Some(Spread {
+            recovered_percent: each(|r| Some(&r.recovered_percent), &spread),
+            blind_percent: each(|r| Some(&r.blind_percent), &spread),
+            median_error: spread(&|r| r.median_error),
+        });
+        mean.recovered_percent = each(|r| Some(&r.recovered_percent), &average);
+        mean.blind_percent = each(|r| Some(&r.blind_percent), &average);
         if let Some(distinct) = &mut mean.distinct {
-            distinct.recovered_percent = means(|r| Some(&r.distinct.as_ref()?.recovered_percent));
-            distinct.blind_percent = means(|r| Some(&r.distinct.as_ref()?.blind_percent));
+            distinct.recovered_percent =
+                each(|r| Some(&r.distinct.as_ref()?.recovered_percent), &average);
+            distinct.blind_percent = each(|r| Some(&r.distinct.as_ref()?.blind_percent), &average);
         }
-        for p in 0..mean.error_percentiles.len() {
-            mean.error_percentiles[p] = average(&|r| r.error_percentiles[p]);
-        }
+        mean.fill_errors(|p| average(&|r| r.error_percentiles[&format!("{p:.0}")]));
         mean.blind_median_error = average(&|r| r.blind_median_error);
         mean.delta = average(&|r| Some(r.delta)).unwrap_or(mean.delta);
         // A requested ratio identifies the row; averaging would change its last bit.
         if mean.oracle_noise.is_none() {
-            mean.inlier_ratio = known(average(&|r| Some(r.inlier_ratio)));
+            mean.inlier_ratio = average(&|r| Some(r.inlier_ratio)).unwrap_or(0.0);
         }
         mean.exact_percent = average(&|r| r.exact_percent);
         mean.axis_accuracy_percent = average(&|r| r.axis_accuracy_percent);
@@ -241,25 +347,25 @@ impl Row {
         });
         mean.assignment_accuracy_percent = average(&|r| r.assignment_accuracy_percent);
         for row in &rows[1..] {
-            if let (Some(all), Some(more)) = (&mut mean.reliability, &row.reliability) {
+            if let (Some(all), Some(more)) = (&mut mean.parts.reliability, &row.parts.reliability) {
                 all.merge(more);
             }
         }
         // Confidence counts only if it is known in all repeats; a part of them would be biased.
-        mean.sure_unknown = rows.iter().find_map(|row| row.sure_unknown);
+        mean.sure_unknown = rows.iter().find_map(|row| row.sure_unknown.clone());
         if mean.sure_unknown.is_some() {
-            mean.reliability = None;
+            mean.parts.reliability = None;
         }
-        mean.records_alone.retain_mut(|alone| {
-            let of = |row: &Row| row.records_alone.iter().find(|a| a.name == alone.name).cloned();
+        mean.parts.alone.retain_mut(|alone| {
+            let of = |row: &Row| row.parts.alone.iter().find(|a| a.name == alone.name).cloned();
             let all: Option<Vec<Alone>> = rows.iter().map(of).collect();
-            for (c, percent) in alone.percent.iter_mut().enumerate() {
-                let values = all.iter().flatten().map(|alone| alone.percent[c]);
+            for (label, percent) in &mut alone.percent {
+                let values = all.iter().flatten().map(|alone| alone.percent[label]);
                 *percent = values.sum::<f64>() / n;
             }
             all.is_some()
         });
-        mean.repeats = Some(repeats);
+        mean.summarize();
         mean
     }
 }
@@ -280,49 +386,19 @@ pub fn measure<const D: usize>(
     thresholds: &[Threshold],
 ) -> Result<(Row, Accuracy), Error> {
     let accuracy = evaluate(recovered, original, secret)?;
-    let mut row = unmeasured(recovered.unit(), secret);
-    row.delta = recovered.delta();
-    row.ransac_trials = recovered.trials().map(|trials| trials.bins().collect());
+    let count = |reason| secret.dropped().iter().filter(|d| d.reason == reason).count();
+    let dropped = DropReason::ALL.map(|reason| (reason.name().to_owned(), count(reason)));
+    let mut row = Row {
+        unit: recovered.unit(),
+        delta: recovered.delta(),
+        dropped: dropped.into_iter().filter(|(_, n)| *n > 0).collect(),
+        ransac_trials: recovered.trials().map(|trials| trials.bins().collect()),
+        repeats: 1,
+        sure_unknown: recovered.confidence_unknown().map(|unknown| unknown.reason().to_owned()),
+        ..Row::default()
+    };
     row.fill(&accuracy, blind, thresholds);
-    row.sure_unknown = recovered.confidence_unknown();
-    row.reliability = reliability(recovered, &accuracy, Row::smallest(thresholds));
+    row.parts.reliability = reliability(recovered, &accuracy, Row::smallest(thresholds));
+    row.summarize();
     Ok((row, accuracy))
-}
-
-/// Returns a row with the figures of the obfuscation only.
-pub(super) fn unmeasured(unit: Unit, secret: &Secret) -> Row {
-    let mut dropped = BTreeMap::new();
-    for reason in DropReason::ALL {
-        let n = secret.dropped().iter().filter(|d| d.reason == reason).count();
-        if n > 0 {
-            dropped.insert(reason.name(), n);
-        }
-    }
-    Row {
-        scheme: String::new(),
-        neighbors: String::new(),
-        oracle_noise: None,
-        inlier_ratio: 0.0,
-        k: 0,
-        solver: String::new(),
-        delta: 0.0,
-        unit,
-        n_points: secret.n_slots(),
-        lost: BTreeMap::new(),
-        dropped,
-        recovered_percent: Vec::new(),
-        blind_percent: Vec::new(),
-        records_alone: Vec::new(),
-        axis_accuracy_percent: None,
-        exact_percent: None,
-        assignment_accuracy_percent: None,
-        metrics: BTreeMap::new(),
-        error_percentiles: Vec::new(),
-        blind_median_error: None,
-        reliability: None,
-        sure_unknown: None,
-        ransac_trials: None,
-        repeats: None,
-        distinct: None,
-    }
 }

@@ -103,7 +103,7 @@ impl Pooled {
     pub fn row(&self) -> Option<Row> {
         let mut row = self.pool.as_ref()?.row(&self.thresholds);
         for &(reason, n) in self.dropped.iter().filter(|(_, n)| *n > 0) {
-            *row.dropped.entry(reason.name()).or_insert(0) += n;
+            *row.dropped.entry(reason.name().to_owned()).or_insert(0) += n;
         }
         if !self.with_blind {
             row.blind_percent.clear();

@@ -13,14 +13,15 @@ const CRATES: &[(&str, &[&str])] = &[
     ("unlift", &["unlift-attack"]),
     ("unlift-io", &["unlift"]),
     ("unlift-vision", &["unlift"]),
-    ("unlift-report", &[]),
+    ("unlift-report", &["unlift"]),
     ("unlift-testkit", &["unlift"]),
     ("unlift-audit", &["unlift", "unlift-io", "unlift-vision", "unlift-report"]),
     ("unlift-cli", &["unlift", "unlift-audit", "unlift-io", "unlift-vision", "unlift-report"]),
 ];
 
 /// External dependencies allowed for the two core crates.
-const DEPENDENCIES: &[&str] = &["libm", "rayon", "nalgebra", "sha2", "chacha20", "getrandom"];
+const DEPENDENCIES: &[&str] =
+    &["libm", "rayon", "nalgebra", "sha2", "chacha20", "getrandom", "serde", "indexmap"];
 
 /// Maximum number of lines of a file, without unit tests.
 const MOST_LINES: usize = 800;

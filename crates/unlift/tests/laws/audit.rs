@@ -25,23 +25,25 @@ fn the_best_attack_on_the_records_alone_is_the_second_baseline() {
     let outcome = audit(&room(3_000), &plan);
     assert!(outcome.seconds.records_alone > 0.0);
     for row in &outcome.rows {
-        let best = |at: usize| row.best_alone(at).map(|(_, percent)| percent);
+        let (alone, best) = (&row.parts.alone, &row.records_alone_percent);
         if row.scheme == "plane" {
-            assert_eq!((row.records_alone.len(), best(0)), (0, None), "planes alone tell nothing");
-            assert_eq!(row.baseline_percent(0), row.blind_percent[0]);
+            assert_eq!((alone.len(), best), (0, &None), "planes alone tell nothing");
+            assert_eq!(row.baseline_percent("0.10"), Some(row.blind_percent["0.10"]));
             continue;
         }
-        let named = |name: &str| row.records_alone.iter().find(|a| a.name == name);
+        let named = |name: &str| alone.iter().find(|a| a.name == name);
         let tomography = &named("tomography").unwrap().percent;
-        for (at, percent) in tomography.iter().enumerate() {
-            assert!(best(at).unwrap() >= *percent, "{}: at least tomography", row.scheme);
-            assert!(row.baseline_percent(at) >= row.blind_percent[at].max(*percent));
+        for (label, percent) in tomography {
+            let best = best.as_ref().unwrap()[label];
+            assert!(best >= *percent, "{}: at least tomography", row.scheme);
+            let baseline = row.baseline_percent(label);
+            assert_eq!(baseline, Some(row.blind_percent[label].max(best)));
         }
         assert!(named("geometric, joint").is_some(), "{}", row.scheme);
     }
     // Records alone recover much of a room from `olc`, so the blind baseline is too weak.
     let olc = &outcome.rows[0];
-    assert!(olc.baseline_percent(1) > olc.blind_percent[1] + 20.0, "{olc:?}");
+    assert!(olc.baseline_percent("0.25") > Some(olc.blind_percent["0.25"] + 20.0), "{olc:?}");
 }
 
 #[test]
@@ -53,7 +55,7 @@ fn break_even_takes_the_strongest_attack_at_every_ratio() {
     for row in &mut rows {
         let wins = matches!((&*row.solver, row.inlier_ratio), ("joint", 0.5) | ("ransac", 0.1));
         row.recovered_percent[0] = if wins { 60.0 } else { 40.0 };
-        row.blind_percent.fill(0.0);
+        row.blind_percent.values_mut().for_each(|percent| *percent = 0.0);
     }
     let of = |rows: &[Row], scheme: &str, solver: &str| {
         let found = break_even(&plan, rows);
@@ -74,7 +76,8 @@ fn break_even_takes_the_strongest_attack_at_every_ratio() {
     }
     plan.solvers = Builtin::list(&[Builtin::Joint]);
     rows.retain(|row| row.solver == "joint");
-    rows.iter_mut().for_each(|row| row.blind_percent.fill(0.0));
+    rows.iter_mut()
+        .for_each(|row| row.blind_percent.values_mut().for_each(|percent| *percent = 0.0));
     let alone = break_even(&plan, &rows);
     assert!(alone.iter().all(|b| b.solver == "joint"), "one attack has no strongest");
 }
@@ -218,7 +221,7 @@ fn a_solver_of_ones_own_has_rows_and_loses_those_that_it_fails_on() {
     let rows: Vec<[&str; 2]> =
         outcome.rows.iter().map(|row| [&*row.scheme, &*row.solver]).collect();
     assert_eq!(rows, [["olc", "foot"], ["olc", "joint"], ["plane", "joint"]]);
-    assert_eq!(outcome.rows[0].sure_unknown, Some(Unknown::OtherSolver));
+    assert_eq!(outcome.rows[0].sure_unknown, Some(Unknown::OtherSolver.reason().to_owned()));
     let [missing] = &outcome.not_audited[..] else { panic!("{:?}", outcome.not_audited) };
     assert_eq!((&*missing.scheme, missing.neighbors.as_deref()), ("plane", Some("oracle")));
     let expected = "solver foot: records: expected lines, found";

@@ -16,13 +16,13 @@ fn check(what: &str, points: Vec<[f64; 3]>, k: usize) {
     for row in &outcome.rows {
         let cell = format!("{what}: {} {} at {}", row.scheme, row.solver, row.inlier_ratio);
         assert!(row.delta.is_finite() && row.delta > 0.0, "{cell}: delta {}", row.delta);
-        let shares = row.recovered_percent.iter().chain(&row.blind_percent);
+        let shares = row.recovered_percent.values().chain(row.blind_percent.values());
         let mut shares = shares.chain(&row.axis_accuracy_percent).chain(&row.exact_percent);
         assert!(shares.all(|share| (0.0..=100.0).contains(share)), "{cell}: {row:?}");
-        let mut errors = row.error_percentiles.iter().flatten().chain(&row.blind_median_error);
+        let mut errors = row.error_percentiles.values().flatten().chain(&row.blind_median_error);
         assert!(errors.all(|error| error.is_finite() && *error >= 0.0), "{cell}: {row:?}");
         assert!(row.lost.values().sum::<usize>() <= row.n_points * 2, "{cell}: {row:?}");
-        let Some(reliability) = &row.reliability else { continue };
+        let Some(reliability) = &row.parts.reliability else { continue };
         let sure = reliability.sure;
         assert!(sure.expected.is_finite(), "{cell}: {sure:?}");
         if sure.n * 100 >= reliability.n_points && sure.n >= 20 {

@@ -1,6 +1,6 @@
 //! Tests of audits of images: pooled rows, coincident keypoints, images with few keypoints.
 
-use unlift::audit::{NeighborsBy, Observer, PointNeighbors, Watcher};
+use unlift::audit::{ByThreshold, NeighborsBy, Observer, PointNeighbors, Watcher};
 use unlift::neighbors::sources::Named;
 use unlift::neighbors::{Overlap, Similarity};
 
@@ -99,7 +99,7 @@ fn rows_are_pooled_over_keypoints() {
     }
     // Rows depend neither on the order of images, nor on threads, nor on other images.
     let turned = run(&[images[1].clone(), images[0].clone()], &plan).rows;
-    let shares = |rows: &[Row]| -> Vec<Vec<f64>> {
+    let shares = |rows: &[Row]| -> Vec<ByThreshold> {
         rows.iter().map(|row| row.recovered_percent.clone()).collect()
     };
     assert_eq!(shares(&pooled), shares(&turned));
@@ -125,7 +125,7 @@ fn images_with_few_keypoints_are_attacked() {
             assert!(row.k == plan.k || row.neighbors != "oracle", "{what}");
             // All of four keypoints with wrong neighbors may be lost.
             let sure = n > 4 && row.inlier_ratio >= 0.5 && row.solver != "ransac";
-            assert!(!sure || 2 * row.n_lost() < row.n_points, "{what}: {:?}", row.lost);
+            assert!(!sure || 2 * row.n_lost < row.n_points, "{what}: {:?}", row.lost);
         }
         let best = outcome.rows.iter().filter(|row| row.scheme == "lines2d");
         let best = best.map(|row| row.recovered_percent[3]).fold(0.0, f64::max);
@@ -170,7 +170,7 @@ fn images_with_hardly_any_keypoints_are_counted() {
     for row in &outcome.rows {
         let what = format!("{} by {} with {}", row.scheme, row.neighbors, row.solver);
         assert_eq!(row.n_points + row.dropped.values().sum::<usize>(), n, "{what}");
-        assert!(row.recovered_percent.iter().all(|p| (0.0..=100.0).contains(p)), "{what}");
+        assert!(row.recovered_percent.values().all(|p| (0.0..=100.0).contains(p)), "{what}");
         assert!(row.delta.is_finite(), "{what}");
     }
     for image in &images {
