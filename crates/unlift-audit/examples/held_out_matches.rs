@@ -9,6 +9,7 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 use unlift::Unit;
+use unlift::geometry::camera::Camera;
 use unlift::localization::Match;
 use unlift::obfuscate::{SchemeOptions, scheme};
 use unlift::seed::Key;
@@ -34,12 +35,13 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 fn of(problems: &[Problem]) -> Vec<Value> {
     let one = |(seed, problem): (usize, &Problem)| {
-        let (view, error) = (&problem.truth, problem.solve(seed as u64));
+        let (Camera { intrinsics, pose }, error) = (&problem.truth, problem.solve(seed as u64));
         let matches: Vec<Value> = problem.matches.iter().filter_map(flat).collect();
         json!({
-            "rotation": view.rotation, "center": view.center, "focal": view.focal,
-            "principal": view.principal, "size": view.size, "matches": matches,
-            "center_error": error.map(|error| error.0), "rotation_error_degrees": error.map(|error| error.1),
+            "rotation": pose.rotation, "center": pose.center, "focal": intrinsics.focal,
+            "principal": intrinsics.principal, "size": problem.size, "matches": matches,
+            "center_error": error.map(|error| error.center),
+            "rotation_error_degrees": error.map(|error| error.rotation_degrees),
         })
     };
     problems.iter().enumerate().map(one).collect()

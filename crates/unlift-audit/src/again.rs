@@ -74,7 +74,7 @@ impl Maps {
             let factor = second.unit_in_map_units / first.unit_in_map_units;
             let points = points.scaled(factor, Unit::KthNeighbor);
             let points = points.map_err(|error| unlift_io::Error::core(b, error))?;
-            second.original = Original::new(points);
+            second.original = Arc::new(Original::new(points));
         }
         let dims = [&first, &second].map(|map| map.descriptors.as_ref().map(|rows| rows.dim()));
         if let [Some(a), Some(b)] = dims
@@ -212,7 +212,8 @@ impl Again<'_> {
             }
         }
         if rows.is_empty() {
-            let reason = not_audited.first().map_or("no schemes", |one| one.reason.as_str());
+            let reason =
+                not_audited.first().map_or("no schemes", |missing| missing.reason.as_str());
             return Err(Error::request(format!(
                 "audit again: expected a row, found none: {reason}"
             )));
@@ -235,15 +236,15 @@ fn row(
     solved: &Solved,
     plan: &Plan<3>,
     (original, (released, secret)): (&Original<3>, &(Released<3>, Secret)),
-    (other, other_secret): (&Original<3>, &Secret),
+    (second, second_secret): (&Original<3>, &Secret),
     knn: &Knn<'_, 3>,
 ) -> Result<Row, unlift::Error> {
     let baseline = blind(released, original, secret);
     let (mut row, accuracy) =
         measure(&solved.recovered, original, secret, Some(&baseline), &plan.thresholds)?;
     let own = joined(&solved.recovered, original, secret);
-    let (points, others) = (original.reveal().positions(), other.reveal().positions());
-    let per_record = other_secret.slots_per_record();
+    let (points, others) = (original.reveal().positions(), second.reveal().positions());
+    let per_record = second_secret.slots_per_record();
     let headline = &plan.thresholds[plan.headline];
     let (mut n_linked, mut n_right, mut n_within) = (0, 0, 0);
     let mut found = Vec::new();
@@ -254,7 +255,7 @@ fn row(
         let nearest = found.first().map_or(f64::INFINITY, |nearest| nearest.0.sqrt());
         let slots = *record as usize * per_record..(*record as usize + 1) * per_record;
         let away = |hidden: &unlift::OriginalId| distance(&others[hidden.index()], point);
-        n_right += usize::from(other_secret.hidden()[slots].iter().any(|at| away(at) <= nearest));
+        n_right += usize::from(second_secret.hidden()[slots].iter().any(|at| away(at) <= nearest));
         n_linked += 1;
         n_within += usize::from(accuracy.errors()[slot] <= headline.value);
     }

@@ -13,7 +13,7 @@ use unlift_report::document::{self as report, ImageFigures, Localization, TileFi
 use unlift_report::scene::Scene3d;
 
 use crate::again::Again;
-use crate::document::{self, Found, Provenance};
+use crate::document;
 use crate::doubts::with_extent;
 use crate::gate::{Gate, Tried, check_gates, check_lengths_of_gates, gate_results};
 use crate::images::audit::Images;
@@ -43,6 +43,8 @@ pub struct Audit<'a> {
 }
 
 /// The input of an audit.
+// There is one per audit, so its size costs nothing.
+#[allow(clippy::large_enum_variant)]
 pub enum Input<'a> {
     /// A map, which is hidden under each scheme.
     Map(Map<'a>),
@@ -57,6 +59,7 @@ pub enum Input<'a> {
 }
 
 /// Several releases of the same points.
+#[allow(clippy::large_enum_variant)]
 pub enum Views<'a> {
     /// Images with known poses, each hidden under its own key.
     Sequence(Sequence<'a>),
@@ -187,25 +190,21 @@ impl<'a> Audit<'a> {
             &attacked.localization,
         )?;
         let input = attacked.about.unwrap_or_else(|| self.about.clone());
-        let provenance = Provenance {
+        let document = report::Document {
+            unlift: env!("CARGO_PKG_VERSION").to_owned(),
+            schema: report::SCHEMA,
             gates: with_extent(gates, &input),
             input,
             options: attacked.options,
+            seed: plan.seed,
+            not_audited: document::not_audited(plan, &attacked.not_audited),
+            results: attacked.rows,
             notes: attacked.notes,
-            command: self.output.command.clone(),
-            started: self.output.started,
-        };
-        let found = Found {
-            rows: &attacked.rows,
-            not_audited: &attacked.not_audited,
-            break_even: &attacked.break_even,
-            seconds: &attacked.seconds,
-        };
-        let document = report::Document {
-            localization: attacked.localization,
+            break_even: attacked.break_even,
             images: attacked.images,
             tiles: attacked.tiles,
-            ..document::document(plan, &found, provenance)
+            localization: attacked.localization,
+            run: document::run(&self.output, &attacked.seconds),
         };
         Ok(Audited { document, scene: attacked.scene, drawn: attacked.drawn })
     }

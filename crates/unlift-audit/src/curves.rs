@@ -20,7 +20,7 @@ pub struct Curves<'a> {
     curves: Vec<Curve>,
     steps: &'a dyn Progress,
     /// The share of the item that was reported as finished.
-    told: f64,
+    reported: f64,
 }
 
 impl<'a> Curves<'a> {
@@ -31,7 +31,7 @@ impl<'a> Curves<'a> {
         let exponent = |step: i32| -2.0 + 3.0 * f64::from(step) / f64::from(CURVE_POINTS);
         let error = |step: i32| largest * 10f64.powf(exponent(step));
         let errors = (0..=CURVE_POINTS).map(error).collect();
-        Self { errors, curves: Vec::new(), steps, told: 0.0 }
+        Self { errors, curves: Vec::new(), steps, reported: 0.0 }
     }
 
     /// Adds the curves of another item.
@@ -62,8 +62,8 @@ impl<'a> Curves<'a> {
 impl<const D: usize> Observer<D> for Curves<'_> {
     fn progress(&mut self, done: usize, total: usize, _: &str) {
         let share = done as f64 / total.max(1) as f64;
-        self.steps.add(share - self.told, "");
-        self.told = share;
+        self.steps.add(share - self.reported, "");
+        self.reported = share;
     }
 
     fn goes_on(&self) -> bool {

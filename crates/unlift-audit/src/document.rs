@@ -1,6 +1,4 @@
-//! Converts an audit's outcome to the written document. Nothing is computed here.
-
-use std::time::Instant;
+//! Parts of the written document. Nothing is computed here.
 
 use indexmap::IndexMap;
 use serde_json::{Map, Value, json};
@@ -8,24 +6,9 @@ use unlift::audit::{self, NeighborsBy, NotAudited, Plan, Row};
 use unlift::recover::Delta;
 use unlift_report::document as report;
 
+use crate::audit::Output;
 use crate::gate::Tried;
 use crate::tiles::Tile;
-
-/// Facts about an audit that its outcome does not contain.
-pub struct Provenance {
-    /// The input files.
-    pub input: report::Input,
-    /// The recorded options.
-    pub options: Map<String, Value>,
-    /// Notes for readers of the figures.
-    pub notes: Vec<String>,
-    /// Gates and their results.
-    pub gates: Vec<report::GateResult>,
-    /// The command line, if there was one.
-    pub command: Option<String>,
-    /// The start of the audit.
-    pub started: Instant,
-}
 
 /// Returns the plan and `more` as recorded options.
 pub fn options<const D: usize>(plan: &Plan<D>, more: Map<String, Value>) -> Map<String, Value> {
@@ -68,25 +51,8 @@ pub fn names(tried: &Tried, more: Map<String, Value>) -> Map<String, Value> {
     more.into_iter().chain(named).collect()
 }
 
-/// The results of an audit of a map or of images.
-pub struct Found<'a> {
-    /// One row per combination.
-    pub rows: &'a [Row],
-    /// Combinations without a row.
-    pub not_audited: &'a [NotAudited],
-    /// The inlier ratios at which half of the points come back.
-    pub break_even: &'a [audit::BreakEven],
-    /// The times of the stages.
-    pub seconds: &'a audit::Seconds,
-}
-
-/// Builds the document of an audit. For images, the caller adds the figures of each image.
-pub fn document<const D: usize>(
-    plan: &Plan<D>,
-    outcome: &Found<'_>,
-    provenance: Provenance,
-) -> report::Document {
-    let seconds = outcome.seconds;
+/// Returns what the document says of the run itself.
+pub fn run(output: &Output, seconds: &audit::Seconds) -> report::Run {
     let stages = [
         ("search", seconds.search),
         ("obfuscate", seconds.obfuscate),
@@ -99,29 +65,14 @@ pub fn document<const D: usize>(
         let made = (row.neighbors > 0.0).then(|| ("neighbors".to_owned(), row.neighbors));
         ordered(made.into_iter().chain([("recover".to_owned(), row.recover)]))
     });
-    report::Document {
-        unlift: env!("CARGO_PKG_VERSION").to_owned(),
-        schema: report::SCHEMA,
-        input: provenance.input,
-        options: provenance.options,
-        seed: plan.seed,
-        results: outcome.rows.to_vec(),
-        not_audited: not_audited(plan, outcome.not_audited),
-        notes: provenance.notes,
-        break_even: outcome.break_even.to_vec(),
-        gates: provenance.gates,
-        images: Vec::new(),
-        tiles: Vec::new(),
-        localization: Vec::new(),
-        run: report::Run {
-            command: provenance.command,
-            threads: rayon::current_num_threads() as u32,
-            peak_memory_bytes: peak_bytes(),
-            seconds: report::Seconds {
-                total: provenance.started.elapsed().as_secs_f64(),
-                rows: rows.collect(),
-                stages: ordered(stages.map(|(name, s)| (name.to_owned(), s))),
-            },
+    report::Run {
+        command: output.command.clone(),
+        threads: rayon::current_num_threads() as u32,
+        peak_memory_bytes: peak_bytes(),
+        seconds: report::Seconds {
+            total: output.started.elapsed().as_secs_f64(),
+            rows: rows.collect(),
+            stages: ordered(stages.map(|(name, s)| (name.to_owned(), s))),
         },
     }
 }
@@ -181,28 +132,28 @@ pub fn evaluated(row: &Row, notes: &[String]) -> Result<Value, serde_json::Error
 
 /// Lists what has no row, once per scheme, source and reason. If other rows of the source exist,
 /// the reason names the affected part.
-fn not_audited<const D: usize>(plan: &Plan<D>, missing: &[NotAudited]) -> Vec<NotAudited> {
-    let mut told: Vec<(&NotAudited, Vec<&NotAudited>)> = Vec::new();
+pub fn not_audited<const D: usize>(plan: &Plan<D>, missing: &[NotAudited]) -> Vec<NotAudited> {
+    let mut groups: Vec<(&NotAudited, Vec<&NotAudited>)> = Vec::new();
     for part in missing {
         let same = |(first, _): &&mut (&NotAudited, Vec<&NotAudited>)| {
             (&first.scheme, &first.neighbors, &first.reason)
                 == (&part.scheme, &part.neighbors, &part.reason)
         };
-        match told.iter_mut().find(same) {
+        match groups.iter_mut().find(same) {
             Some((_, all)) => all.push(part),
-            None => told.push((part, vec![part])),
+            None => groups.push((part, vec![part])),
         }
     }
     let text = |(first, all): (&NotAudited, Vec<&NotAudited>)| {
-        let asked = plan.oracle_noise.len() * plan.inlier_ratios.len();
-        let part = first.oracle_noise.filter(|_| all.len() < asked);
+        let n_parts = plan.oracle_noise.len() * plan.inlier_ratios.len();
+        let part = first.oracle_noise.filter(|_| all.len() < n_parts);
         let reason = part.map_or_else(
             || first.reason.clone(),
             |_| format!("at {}: {}", parts(plan, &all).join(", "), first.reason),
         );
         NotAudited { reason, ..first.clone() }
     };
-    told.into_iter().map(text).collect()
+    groups.into_iter().map(text).collect()
 }
 
 /// Returns inlier ratios, with the noise model if there are several.

@@ -173,11 +173,11 @@ pub(crate) fn check_truth(
 ) -> Result<(), unlift::Error> {
     belongs(original, released, secret)?;
     let (middle, unit) = (median(&mut away_from_own(released, original, secret)), released.unit());
-    let most = APART * spread.middle;
-    if middle <= most || is_noise(released, original, secret) {
+    let limit = APART * spread.middle;
+    if middle <= limit || is_noise(released, original, secret) {
         return Ok(());
     }
-    let expected = format!("records within {} of their own points", in_unit(most, unit));
+    let expected = format!("records within {} of their own points", in_unit(limit, unit));
     let found = format!("{}: not measured (another unit, scale or frame?)", in_unit(middle, unit));
     Err(unlift::Error::new("truth", expected, found))
 }
@@ -386,15 +386,15 @@ const UNUSUAL: f64 = 10.0;
 pub fn check_scale(points: &[[f64; 3]], scale: Option<f64>) -> Result<(), Error> {
     let Some(scale) = scale else { return Ok(()) };
     let across = across(points);
-    let [least, most] = ACROSS_M;
+    let [min, max] = ACROSS_M;
     // Coincident points have their own error.
-    if across == 0.0 || (least..=most).contains(&(across * scale)) {
+    if across == 0.0 || (min..=max).contains(&(across * scale)) {
         return Ok(());
     }
     let error = Error::request(format!(
         "--scale {scale:e}: expected {:.1e} to {:.1e} meters per unit, as the map is {} units across, found {scale:e}",
-        least / across,
-        most / across,
+        min / across,
+        max / across,
         short(across),
     ));
     Err(error.advise("--scale 1 for a map in meters, or no --scale for relative lengths"))
@@ -424,7 +424,7 @@ pub fn check_thresholds(
         return Ok(LengthMessages::default());
     }
     let by_size = |a: &&Threshold, b: &&Threshold| a.value.total_cmp(&b.value);
-    let (Some(least), Some(most)) =
+    let (Some(smallest), Some(largest)) =
         (thresholds.iter().min_by(by_size), thresholds.iter().max_by(by_size))
     else {
         return Ok(LengthMessages::default());
@@ -447,38 +447,38 @@ pub fn check_thresholds(
         Unit::Meter => "another --scale (meters per unit of the map), or other --thresholds",
         Unit::KthNeighbor | Unit::Pixel => "other --thresholds, or none for the usual ones",
     };
-    if across > 0.0 && least.value >= across {
+    if across > 0.0 && smallest.value >= across {
         let error = Error::request(format!(
             "{option}: expected a map larger than the smallest threshold, {}, found one {} across: any guess \
              would count as recovered",
-            named(least),
+            named(smallest),
             in_unit(across),
         ));
         return Err(error.advise(way_out));
     }
-    if nearest >= HOPELESS * most.value {
+    if nearest >= HOPELESS * largest.value {
         let error = Error::request(format!(
             "{option}: expected points less than {HOPELESS} times the largest threshold, {}, from their nearest neighbors, \
              found {}: no attack could come near",
-            named(most),
+            named(largest),
             in_unit(nearest),
         ));
         return Err(error.advise(way_out));
     }
-    if across > 0.0 && most.value >= across {
+    if across > 0.0 && largest.value >= across {
         let note = format!(
             "the map is {} across, less than the threshold {}: within it any guess counts as recovered",
             in_unit(across),
-            named(most),
+            named(largest),
         );
         return Ok(LengthMessages { note: Some(note), doubt: None });
     }
-    if nearest >= UNUSUAL * most.value {
+    if nearest >= UNUSUAL * largest.value {
         let doubt = format!(
             "lengths are doubtful: points are {} from their nearest neighbors, far more than the largest threshold, {}: is \
              {option} right?",
             in_unit(nearest),
-            named(most),
+            named(largest),
         );
         return Ok(LengthMessages { note: None, doubt: Some(doubt) });
     }

@@ -295,14 +295,22 @@ fn qualifiers(names: &[&str]) -> Result<(Option<&'static str>, Option<String>), 
     Ok((solver, source))
 }
 
-fn positive(text: &str) -> Result<f64, String> {
+/// Parses a number above 0.
+///
+/// # Errors
+/// What was expected and found.
+pub fn positive(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
         _ => Err(format!("expected a number above 0, found {text}")),
     }
 }
 
-fn ratio(text: &str) -> Result<f64, String> {
+/// Parses a number from 0 to 1.
+///
+/// # Errors
+/// What was expected and found.
+pub fn ratio(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
         _ => Err(format!("expected a number from 0 to 1, found {text}")),

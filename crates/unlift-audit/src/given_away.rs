@@ -17,7 +17,8 @@ const FOLLOWS: f64 = 0.6;
 /// values are those of its two points in any order.
 pub fn read_from_file(
     published: &[Vec<[f64; 3]>],
-    (original, secret): (&Original<3>, &Secret),
+    original: &Original<3>,
+    secret: &Secret,
     thresholds: &[Threshold],
 ) -> Option<Alone> {
     let slots = secret.slots_per_record();

@@ -62,7 +62,7 @@ pub use document::{evaluated, ordered};
 pub use doubts::{
     Checked, LengthMessages, check_scale, check_thresholds, sides_m, unlike_neighbors,
 };
-pub use gate::{Candidate, Figure, Gate, Tried};
+pub use gate::{Candidate, Figure, Gate, Tried, positive, ratio};
 pub use given_away::read_from_file;
 pub use outputs::{Audited, FIGURES, Files, Finished, PAGE, check_file, check_file_of, refused};
 pub use prepare::{Preparation, Prepared, by_point, prepare};

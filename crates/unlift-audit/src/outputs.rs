@@ -122,12 +122,12 @@ impl Audited {
         shares(&self.document, &self.drawn.inversions)
     }
 
-    /// Puts the verdict and pictures of `other` at the top of this audit's page, under `title`.
-    /// `details` is a link to the page of `other`.
+    /// Puts the verdict and pictures of `first` at the top of this audit's page, under `title`.
+    /// `details` is a link to the page of `first`.
     #[must_use]
-    pub fn opening_with(mut self, other: &Self, title: &str, details: &str) -> Self {
-        let inversions = &other.drawn.inversions;
-        self.drawn.opening = Some(Opening::titled(&other.document, inversions, title, details));
+    pub fn opening_with(mut self, first: &Self, title: &str, details: &str) -> Self {
+        let inversions = &first.drawn.inversions;
+        self.drawn.opening = Some(Opening::titled(&first.document, inversions, title, details));
         self
     }
 

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use unlift::audit::PointNeighbors;
 use unlift::geometry::knn::Knn;
@@ -44,7 +45,7 @@ impl Default for Preparation {
 #[derive(Debug)]
 pub struct Prepared {
     /// The points in the unit of the audit.
-    pub original: Original<3>,
+    pub original: Arc<Original<3>>,
     /// Descriptors, one row per point.
     pub descriptors: Option<Descriptors>,
     /// The file that the descriptors were read from.
@@ -69,7 +70,7 @@ impl Prepared {
         let rows = (0..original.len() as u32).collect();
         let (descriptors, descriptors_file, cameras, notes, doubts, input) = Default::default();
         Self {
-            original,
+            original: Arc::new(original),
             descriptors,
             descriptors_file,
             unit_in_map_units: 1.0,
@@ -143,15 +144,15 @@ pub fn prepare<'a>(
     let positions = positions.into();
     let (n_read, mut notes) = (positions.len(), Vec::new());
     let mut rows: Vec<u32> = (0..n_read as u32).collect();
-    if let Some(most) = preparation.max_points
-        && rows.len() > most
+    if let Some(max_points) = preparation.max_points
+        && rows.len() > max_points
     {
         notes.push(format!(
-            "--max-points: {most} of {n_read} points are audited; the whole map is denser, so more of it is \
+            "--max-points: {max_points} of {n_read} points are audited; the whole map is denser, so more of it is \
              recovered"
         ));
         Draws::new(preparation.seed, Stage::Subset, 0).shuffle(&mut rows);
-        rows.truncate(most);
+        rows.truncate(max_points);
         rows.sort_unstable();
     }
     let k = preparation.k;
@@ -244,7 +245,7 @@ fn doubts(offsets: &[u64], neighbors: &[u32], prepared: &Prepared) -> Vec<String
         for &neighbor in &neighbors[w[0] as usize..w[1] as usize] {
             // A large odd factor spreads the compared points over the map.
             let stranger = (n * 7919 + 3) % points.len();
-            let to = |other: usize| distance(&points[point], &points[other]);
+            let to = |neighbor: usize| distance(&points[point], &points[neighbor]);
             nearer += usize::from(to(neighbor as usize) < to(stranger));
             n += 1;
         }

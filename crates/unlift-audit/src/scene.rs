@@ -27,8 +27,8 @@ impl Pictures {
     /// Chooses the points for `n_views` results.
     pub fn new(original: &Original<3>, plan: &Plan<3>, n_views: usize) -> Self {
         let points = original.reveal().positions();
-        let most = points_within_budget(n_views, plan.schemes.len());
-        let sample = subsample(points.len(), most, plan.seed);
+        let max_points = points_within_budget(n_views, plan.schemes.len());
+        let sample = subsample(points.len(), max_points, plan.seed);
         let middle = rounded_origin(points);
         let originals: Vec<[f32; 3]> =
             sample.iter().map(|&at| near(&points[at], &middle)).collect();

@@ -68,7 +68,7 @@ fn agreement(lists: &Neighborhoods, slots_per_record: usize) -> f64 {
         let (own, record) = (lists.of(slot), RecordId((slot / slots_per_record) as u32));
         let slots =
             |id: &RecordId| id.index() * slots_per_record..(id.index() + 1) * slots_per_record;
-        for others in own.iter().flat_map(slots).map(|other| lists.of(other)) {
+        for others in own.iter().flat_map(slots).map(|record| lists.of(record)) {
             all += others.len();
             if others.binary_search(&record).is_ok() {
                 common += others.iter().filter(|id| own.binary_search(id).is_ok()).count();
@@ -92,10 +92,10 @@ impl<const D: usize> Source<D> for ByDescriptors {
     }
 
     fn lists(&self, released: &Released<D>, k: usize, seed: u64) -> Result<Neighborhoods, Error> {
-        let (first, other) = candidates(released.descriptors());
+        let (first, second) = candidates(released.descriptors());
         let lists = first.lists(released, k, seed)?;
-        let Some(other) = other else { return Ok(lists) };
-        let others = other.lists(released, k, seed)?;
+        let Some(second) = second else { return Ok(lists) };
+        let others = second.lists(released, k, seed)?;
         let agreement = |lists| agreement(lists, released.slots_per_record());
         Ok(if agreement(&others) > BETTER * agreement(&lists) { others } else { lists })
     }
@@ -121,7 +121,7 @@ mod tests {
     use unlift::seed::Key;
     use unlift::truth::Original;
     use unlift::{PointSet, Unit};
-    use unlift_vision::features::{AlikedOptions, Extraction, Extractor, Found};
+    use unlift_vision::features::{Extraction, Extractor, Found, LearnedOptions};
 
     use super::*;
 
@@ -170,7 +170,7 @@ mod tests {
     #[test]
     fn lists_that_agree_better_decide_between_aliked_and_others() {
         let photo = "../unlift-cli/src/demo/photos/coffee.jpg".as_ref();
-        let aliked = Extraction::Aliked(AlikedOptions::default());
+        let aliked = Extraction::Aliked(LearnedOptions::ALIKED);
         let photo = Extractor::try_new(&aliked).unwrap().read(photo).unwrap();
         let Found::Learned(found) = photo.found else { panic!("no ALIKED") };
         // A Hadamard matrix turns descriptors and keeps their distances, as if another network had made them.

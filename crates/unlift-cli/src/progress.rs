@@ -99,19 +99,6 @@ impl Progress {
         Self { bar }
     }
 
-    /// Sets `done` of `total` items as finished; `what` is the next item.
-    pub fn show(&self, done: usize, total: usize, what: &str) {
-        self.bar.set_length(total as u64 * PARTS);
-        // Fractions that threads added may already exceed `done`.
-        self.bar.set_position(self.bar.position().max(done as u64 * PARTS));
-        self.name(what);
-    }
-
-    /// Prints a line on stderr without breaking the bar.
-    pub fn say(&self, line: &str) {
-        self.bar.suspend(|| tell(line));
-    }
-
     fn name(&self, what: &str) {
         if !what.is_empty() {
             self.bar.set_message(OneLine(what).to_string());
@@ -133,7 +120,10 @@ fn status(parts: u64, of: Option<u64>, elapsed: Duration) -> String {
 
 impl unlift_audit::Progress for Progress {
     fn show(&self, done: usize, total: usize, what: &str) {
-        Self::show(self, done, total, what);
+        self.bar.set_length(total as u64 * PARTS);
+        // Fractions that threads added may already exceed `done`.
+        self.bar.set_position(self.bar.position().max(done as u64 * PARTS));
+        self.name(what);
     }
 
     fn add(&self, share: f64, what: &str) {
@@ -142,7 +132,8 @@ impl unlift_audit::Progress for Progress {
     }
 
     fn say(&self, line: &str) {
-        Self::say(self, &format!("unlift: {line}"));
+        // The line must not break the bar.
+        self.bar.suspend(|| tell(format_args!("unlift: {line}")));
     }
 }
 
@@ -164,6 +155,8 @@ impl unlift_audit::Progress for Stderr {
 
 #[cfg(test)]
 mod tests {
+    use unlift_audit::Progress as _;
+
     use super::*;
 
     #[test]
@@ -172,11 +165,11 @@ mod tests {
         let bar = &progress.bar;
         let status_now = || status(bar.position(), bar.length(), Duration::ZERO);
         progress.show(0, 2, "a.jpg");
-        (0..2).for_each(|_| unlift_audit::Progress::add(&progress, 1.0 / 3.0, ""));
+        (0..2).for_each(|_| progress.add(1.0 / 3.0, ""));
         assert_eq!((status_now(), bar.message()), ("33 %".to_owned(), "a.jpg".to_owned()));
-        unlift_audit::Progress::add(&progress, 1.0 / 3.0, "b.jpg");
+        progress.add(1.0 / 3.0, "b.jpg");
         assert_eq!((status_now(), bar.message()), ("50 %".to_owned(), "b.jpg".to_owned()));
-        (0..2).for_each(|_| unlift_audit::Progress::add(&progress, 1.0, ""));
+        (0..2).for_each(|_| progress.add(1.0, ""));
         progress.show(1, 2, "");
         assert_eq!(status_now(), "99 %");
     }

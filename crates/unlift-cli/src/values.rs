@@ -5,12 +5,11 @@ use std::path::{Path, PathBuf};
 
 use crate::stderr::tell;
 use unlift::audit::Threshold;
-use unlift::neighbors::oracle::Noise;
 use unlift::neighbors::sources::Named;
-use unlift::obfuscate::{Entry, Mitigation, Protection};
+use unlift::obfuscate::{Entry, Mitigation};
 use unlift::recover::Builtin;
 use unlift_audit::sources;
-use unlift_vision::network::DescriptorKind;
+pub use unlift_audit::{positive, ratio};
 
 /// Source of neighbor lists.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,8 +32,14 @@ impl NeighborSource {
     }
 }
 
-pub fn feature_type(text: &str) -> Result<DescriptorKind, String> {
-    DescriptorKind::from_name(text).map_err(|error| expected(&error))
+/// Converts the error of `parse` to what was expected and found.
+pub fn by<T>(
+    parse: fn(&str) -> Result<T, unlift::Error>,
+) -> impl Fn(&str) -> Result<T, String> + Clone {
+    move |text| {
+        parse(text)
+            .map_err(|error| format!("expected {}, found {}", error.expected(), error.found()))
+    }
 }
 
 /// Parses a number of points, images or features. Stage files number rows with 32 bits.
@@ -50,10 +55,6 @@ pub fn score(text: &str) -> Result<f32, String> {
         Ok(value) if (0.0..1.0).contains(&value) => Ok(value),
         _ => Err(format!("expected a number from 0 to below 1, found {text}")),
     }
-}
-
-pub fn any_scheme(text: &str) -> Result<&'static Entry, String> {
-    unlift::obfuscate::scheme(text).map_err(|error| expected(&error))
 }
 
 pub fn scheme(text: &str) -> Result<&'static Entry, String> {
@@ -79,7 +80,7 @@ fn of_dimension(
     if let Some(entry) = unlift::obfuscate::all().find(|entry| entry.name == text && fits(entry)) {
         return Ok(entry);
     }
-    let note = if any_scheme(text).is_ok() { otherwise } else { "" };
+    let note = if unlift::obfuscate::scheme(text).is_ok() { otherwise } else { "" };
     let fitting = unlift::obfuscate::all().filter(|entry| fits(entry));
     let names: Vec<&str> = fitting.map(|entry| entry.name).collect();
     Err(format!("expected one of {}, found {text}{note}", names.join(", ")))
@@ -116,54 +117,24 @@ pub fn own_image_source(text: &str) -> Result<Named, String> {
 
 /// Parses a change to the descriptors of single images.
 pub fn image_mitigation(text: &str) -> Result<Mitigation, String> {
-    match mitigation(text)? {
+    match by(Mitigation::parse)(text)? {
         mitigation if mitigation.fits_images() => Ok(mitigation),
         _ => Err(format!("expected noise:DEVIATION or drop:SHARE, found {text}")),
     }
 }
 
-pub fn mitigation(text: &str) -> Result<Mitigation, String> {
-    Mitigation::parse(text).map_err(|error| expected(&error))
-}
-
-pub fn protection(text: &str) -> Result<Protection, String> {
-    Protection::parse(text).map_err(|error| expected(&error))
-}
-
 /// Parses the name of a solver. Former names are read with a note.
 pub fn solver(text: &str) -> Result<Builtin, String> {
-    let solver = Builtin::from_name(text).map_err(|error| expected(&error))?;
+    let solver = by(Builtin::from_name)(text)?;
     if solver.name() != text {
         tell(format_args!("unlift: note: the solver {text} is called {} now", solver.name()));
     }
     Ok(solver)
 }
 
-pub fn noise(text: &str) -> Result<Noise, String> {
-    Noise::from_name(text).map_err(|error| expected(&error))
-}
-
-fn expected(error: &unlift::Error) -> String {
-    format!("expected {}, found {}", error.expected(), error.found())
-}
-
-pub fn positive(text: &str) -> Result<f64, String> {
-    match text.trim().parse::<f64>() {
-        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-        _ => Err(format!("expected a number above 0, found {text}")),
-    }
-}
-
 pub fn scale(text: &str) -> Result<f64, String> {
     positive(text)
         .map_err(|_| format!("expected meters per unit of the map, a number above 0, found {text}"))
-}
-
-pub fn ratio(text: &str) -> Result<f64, String> {
-    match text.trim().parse::<f64>() {
-        Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
-        _ => Err(format!("expected a number from 0 to 1, found {text}")),
-    }
 }
 
 /// Parses a threshold; reports use the typed text as key.
@@ -199,7 +170,7 @@ pub fn any_source(text: &str) -> Result<NeighborSource, String> {
 
 /// Parses a source other than the oracle.
 fn own_source(text: &str) -> Result<Named, String> {
-    sources::named(text).map_err(|error| expected(&error))
+    by(sources::named)(text)
 }
 
 /// Parses a number of queries: two or more.
@@ -229,6 +200,9 @@ pub fn extent(text: &str) -> Result<(f64, f64), String> {
 
 #[cfg(test)]
 mod tests {
+    use unlift::neighbors::oracle::Noise;
+    use unlift_vision::network::DescriptorKind;
+
     use super::*;
 
     #[test]
@@ -245,8 +219,8 @@ mod tests {
             scheme("pppl").unwrap_err(),
             scheme("cp2d").unwrap_err(),
             solver("magic").unwrap_err(),
-            noise("white").unwrap_err(),
-            feature_type("SIFT").unwrap_err(),
+            by(Noise::from_name)("white").unwrap_err(),
+            by(DescriptorKind::from_name)("SIFT").unwrap_err(),
             score("1").unwrap_err(),
             own_source("magic").unwrap_err(),
         ];

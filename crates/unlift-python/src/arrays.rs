@@ -131,31 +131,22 @@ fn within<T: Element + Copy + Display + TryInto<i64>>(
         let expected = format!("an array of {} axes", axes.join(" or "));
         return Err(wrong(name, expected, shape_text(&shape)));
     }
-    let one = |&value: &T| match value.try_into() {
+    let index = |&value: &T| match value.try_into() {
         Ok(index) if range.contains(&index) => Ok(index),
         _ => Err(wrong(name, format!("numbers from {} to {}", range.start(), range.end()), value)),
     };
-    let values = array.readonly().as_slice()?.iter().map(one).collect::<PyResult<_>>()?;
+    let values = array.readonly().as_slice()?.iter().map(index).collect::<PyResult<_>>()?;
     Ok((values, shape))
 }
 
-/// Returns whole numbers from 0 below `most`, from an array with one of `dims` axes, and its shape.
+/// Returns whole numbers from 0 below `end`, from an array with one of `dims` axes, and its shape.
 pub fn indices(
     name: &str,
     given: &Bound<'_, PyAny>,
     dims: &[usize],
-    most: u32,
+    end: u32,
 ) -> PyResult<(Vec<u32>, Vec<usize>)> {
-    // Lists are long: avoid a conversion if the type fits.
-    if let Ok(array) = array(name, given, WHOLE)?.cast::<PyArrayDyn<u32>>()
-        && dims.contains(&array.ndim())
-        && array.is_c_contiguous()
-        && let values = array.readonly().as_slice()?.to_vec()
-        && values.iter().all(|&value| value < most)
-    {
-        return Ok((values, array.shape().to_vec()));
-    }
-    let (values, shape) = whole(name, given, dims, 0..=i64::from(most) - 1)?;
+    let (values, shape) = whole(name, given, dims, 0..=i64::from(end) - 1)?;
     Ok((values.into_iter().map(|value| value as u32).collect(), shape))
 }
 

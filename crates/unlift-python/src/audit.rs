@@ -203,8 +203,8 @@ impl ImageOptions {
     fn record(&self) -> Json<String, Value> {
         let record = [
             ("features", self.features.as_ref().map(|name| json!(name))),
-            ("max_features", self.max_features.map(|most| json!(most.get()))),
-            ("max_images", self.max_images.map(|most| json!(most.get()))),
+            ("max_features", self.max_features.map(|max| json!(max.get()))),
+            ("max_images", self.max_images.map(|max| json!(max.get()))),
         ];
         let given = record.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?)));
         given.collect()
@@ -316,6 +316,6 @@ pub fn delta(given: Option<f64>) -> PyResult<Delta> {
     match given {
         None => Ok(Delta::Auto),
         Some(length) if length.is_finite() && length > 0.0 => Ok(Delta::Fixed(length)),
-        Some(other) => Err(wrong("delta", "a number above 0, or None", other)),
+        Some(length) => Err(wrong("delta", "a number above 0, or None", length)),
     }
 }

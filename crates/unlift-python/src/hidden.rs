@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use unlift::released::{self, Obfuscation};
 use unlift::truth::{Original, Secret};
-use unlift_audit::{Prepared, check_file_of};
+use unlift_audit::check_file_of;
 use unlift_io::outputs;
 use unlift_io::stage::{Kind, read_released, read_truth, write_released, write_truth};
 
@@ -179,29 +179,8 @@ fn columns<'py, const D: usize>(
 #[pyclass(frozen, module = "unlift")]
 #[derive(Clone)]
 pub struct Truth {
-    of: Whose,
+    pub original: Arc<Original<3>>,
     pub secret: Arc<Secret>,
-}
-
-/// Points in memory, or read from a file.
-#[derive(Clone)]
-enum Whose {
-    Map(Arc<Prepared>),
-    File(Arc<Original<3>>),
-}
-
-impl Truth {
-    /// Returns the truth of a map in memory.
-    pub fn of(prepared: Arc<Prepared>, secret: Secret) -> Self {
-        Self { of: Whose::Map(prepared), secret: Arc::new(secret) }
-    }
-
-    pub fn original(&self) -> &Original<3> {
-        match &self.of {
-            Whose::Map(prepared) => &prepared.original,
-            Whose::File(original) => original,
-        }
-    }
 }
 
 #[pymethods]
@@ -210,21 +189,21 @@ impl Truth {
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let (original, secret) = py.detach(|| read_truth::<3>(&path)).map_err(raised)?;
-        Ok(Self { of: Whose::File(Arc::new(original)), secret: Arc::new(secret) })
+        Ok(Self { original: Arc::new(original), secret: Arc::new(secret) })
     }
 
     /// Writes the truth (`.npz`), as `unlift obfuscate` does, readable only by you. Replaces other
     /// files only with `force`.
     #[pyo3(signature = (path, *, force=false))]
     fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
-        let write = |path: &Path| write_truth(path, self.original(), &self.secret);
+        let write = |path: &Path| write_truth(path, &self.original, &self.secret);
         save(py, (path, force), Kind::Truth, write)
     }
 
     /// Points `(n, 3)`.
     #[getter]
     fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        Ok(to_rows(py, self.original().reveal().positions().to_vec())?.into_any())
+        Ok(to_rows(py, self.original.reveal().positions().to_vec())?.into_any())
     }
 
     /// Index of the point in each slot `(n_slots,)`.

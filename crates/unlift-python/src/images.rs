@@ -16,6 +16,8 @@ use crate::threads;
 const KEYS: [&str; 4] = ["keypoints", "width", "height", "descriptors"];
 
 /// Source of images.
+// There is one per audit, so its size costs nothing.
+#[allow(clippy::large_enum_variant)]
 pub enum Images {
     Path(PathBuf),
     InMemory(FeatureSource),
@@ -99,8 +101,8 @@ fn features_of(place: &str, given: &Bound<'_, PyAny>) -> PyResult<ImageFeatures>
     };
     let needed = |key: &str| -> PyResult<Bound<'_, PyAny>> {
         let [least @ .., _] = &KEYS;
-        let found = || wrong(place, least.join(", "), format!("no {key}"));
-        item(key)?.ok_or_else(found)
+        let missing = || wrong(place, least.join(", "), format!("no {key}"));
+        item(key)?.ok_or_else(missing)
     };
     let keypoints = rows::<2>(&at(place, "keypoints"), &needed("keypoints")?)?;
     let n = keypoints.len();

@@ -51,7 +51,7 @@ mod _unlift {
     #[pymodule_export]
     use super::own::{check_scheme, check_solver, check_source};
     #[pymodule_export]
-    use super::records::{Candidates, Lines, Planes, Rays, Records};
+    use super::records::{Records, candidates, lines, planes, rays};
     #[pymodule_export]
     use super::recovered::{Recovered, evaluate, recover};
     #[pymodule_export]

@@ -35,11 +35,7 @@ impl Neighborhoods {
         scores: Option<&Bound<'_, PyAny>>,
         needs: &str,
     ) -> PyResult<Self> {
-        let needs = match needs {
-            "descriptors" => Needs::Descriptors,
-            "nothing" => Needs::Nothing,
-            other => return Err(wrong("needs", "descriptors or nothing", other)),
-        };
+        let needs = needs_of(needs)?;
         let lists = of_either!(&released_of(released)?.0, released => {
             lists_of(released, records, scores, usize::MAX, needs)
         });
@@ -89,6 +85,15 @@ impl Neighborhoods {
     }
 }
 
+/// Returns what a source needs, by its name.
+pub fn needs_of(name: &str) -> PyResult<Needs> {
+    match name {
+        "descriptors" => Ok(Needs::Descriptors),
+        "nothing" => Ok(Needs::Nothing),
+        unknown => Err(wrong("needs", "descriptors or nothing", unknown)),
+    }
+}
+
 /// Converts an array `(n_slots, k)`, padded by -1, to lists of `released` with at most `k` entries
 /// each.
 fn lists_of<const D: usize>(
@@ -105,9 +110,9 @@ fn lists_of<const D: usize>(
         return Err(wrong("records", expected, shape_text(&shape)));
     }
     let scores = match scores.map(|scores| numbers("scores", scores)).transpose()? {
-        Some((_, found)) if found != shape => {
+        Some((_, own)) if own != shape => {
             let expected = format!("the shape of the records, {}", shape_text(&shape));
-            return Err(wrong("scores", expected, shape_text(&found)));
+            return Err(wrong("scores", expected, shape_text(&own)));
         }
         scores => scores.map(|(values, _)| values),
     };
@@ -211,7 +216,7 @@ pub fn oracle(
     let slots_per_record = released.clone().of_map()?.slots_per_record();
     let truth = truth.clone();
     let lists = threads::run(py, None, None, move || {
-        let knn = search(truth.original())?;
+        let knn = search(&truth.original)?;
         let near = TrueNeighbors::new(&knn, &truth.secret, slots_per_record, k)?;
         let outliers = Outliers::new(noise, &near, &knn, &truth.secret, seed)?;
         near.lists(inlier_ratio, &outliers, seed)

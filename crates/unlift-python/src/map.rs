@@ -186,6 +186,7 @@ pub fn obfuscate(
         Ok::<_, unlift::Error>((released, secret))
     });
     let (released, secret) = hidden.map_err(|error| by.as_cause_of(py, error))?;
-    let truth = Truth::of(Arc::clone(&map.prepared), secret);
+    let original = Arc::clone(&map.prepared.original);
+    let truth = Truth { original, secret: Arc::new(secret) };
     Ok(Hidden::of(Released::from(released), truth))
 }

@@ -37,22 +37,22 @@ impl Raised {
 
     /// Stores `error`, and returns its message.
     pub fn keep(&self, py: Python<'_>, error: PyErr) -> String {
-        let told = OneLine(error.to_string()).to_string();
+        let message = OneLine(error.to_string()).to_string();
         let mut errors = self.errors.lock().unwrap_or_else(PoisonError::into_inner);
         // One exception may concern several points: store it once.
-        if errors.iter().all(|(line, _)| *line != told) {
-            errors.push((told.clone(), error.clone_ref(py)));
+        if errors.iter().all(|(line, _)| *line != message) {
+            errors.push((message.clone(), error.clone_ref(py)));
         }
-        told
+        message
     }
 
     /// Sets the stored exception whose message `error` contains as its cause.
     pub fn as_cause_of(&self, py: Python<'_>, error: PyErr) -> PyErr {
         let text = error.value(py).to_string();
         let errors = self.errors.lock().unwrap_or_else(PoisonError::into_inner);
-        let told = errors.iter().filter(|(line, _)| text.contains(line.as_str()));
+        let known = errors.iter().filter(|(line, _)| text.contains(line.as_str()));
         // If one message is the beginning of another, the longer one is the cause.
-        if let Some((_, cause)) = told.max_by_key(|(line, _)| line.len()) {
+        if let Some((_, cause)) = known.max_by_key(|(line, _)| line.len()) {
             error.set_cause(py, Some(cause.clone_ref(py)));
         }
         error
@@ -161,14 +161,9 @@ const USUAL_K: usize = 50;
 impl OwnSource {
     /// Creates a source. It reads descriptors unless the attribute `needs` is "nothing".
     pub fn new(function: &Bound<'_, PyAny>, raised: &Raised) -> PyResult<Self> {
-        let needs: Option<String> = match function.getattr("needs") {
-            Ok(needs) => Some(needs.extract()?),
-            Err(_) => None,
-        };
-        let needs = match needs.as_deref() {
-            None | Some("descriptors") => Needs::Descriptors,
-            Some("nothing") => Needs::Nothing,
-            Some(other) => return Err(wrong("needs", "descriptors or nothing", other)),
+        let needs = match function.getattr("needs") {
+            Ok(needs) => lists::needs_of(&needs.extract::<String>()?)?,
+            Err(_) => Needs::Descriptors,
         };
         let k = function.getattr("k").ok().map(|k| k.extract()).transpose()?.unwrap_or(USUAL_K);
         if k == 0 {

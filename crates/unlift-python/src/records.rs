@@ -2,12 +2,9 @@
 
 use std::any::Any;
 
-use pyo3::PyClass;
 use pyo3::prelude::*;
 use unlift::obfuscate::Lifted;
-use unlift::released::{
-    AxisCandidates, AxisPlanes, Lines as LineRecords, Obfuscation, Rays as RayRecords,
-};
+use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays};
 use unlift::truth::{DropReason, Dropped};
 use unlift::{Error, OriginalId};
 
@@ -32,9 +29,9 @@ impl<const D: usize> Hiding<D> {
         if let Some(hidden) = hidden {
             let (of, shape) = indices("hidden", hidden, &[1, 2], u32::MAX)?;
             slots_per_record = shape.get(1).copied().unwrap_or(1);
-            let most = if matches!(obfuscation, Obfuscation::Lines(_)) { 2 } else { 1 };
-            if shape[0] != n || !(1..=most).contains(&slots_per_record) {
-                let expected = format!("one row per record ({n}), of at most {most} points");
+            let max_points = if matches!(obfuscation, Obfuscation::Lines(_)) { 2 } else { 1 };
+            if shape[0] != n || !(1..=max_points).contains(&slots_per_record) {
+                let expected = format!("one row per record ({n}), of at most {max_points} points");
                 return Err(wrong("hidden", expected, shape_text(&shape)));
             }
             rows = Some(of);
@@ -53,10 +50,10 @@ impl<const D: usize> Hiding<D> {
             let lifted = Lifted::one_each(self.obfuscation);
             return Ok(Lifted { swapped_axis: self.swapped_axis, ..lifted });
         };
-        let mut seen = vec![false; n];
+        let mut is_hidden = vec![false; n];
         for &row in &hidden {
-            match seen.get_mut(row as usize) {
-                Some(seen) if !*seen => *seen = true,
+            match is_hidden.get_mut(row as usize) {
+                Some(is_hidden) if !*is_hidden => *is_hidden = true,
                 Some(_) => {
                     let found = format!("point {row} twice");
                     return Err(Error::new(name, "every point in one record", found));
@@ -67,7 +64,7 @@ impl<const D: usize> Hiding<D> {
                 }
             }
         }
-        let left = (0..n).filter(|&row| !seen[row]);
+        let left = (0..n).filter(|&row| !is_hidden[row]);
         let dropped = left.map(|row| Dropped {
             original: OriginalId::from_index(row),
             reason: DropReason::Other,
@@ -82,16 +79,13 @@ impl<const D: usize> Hiding<D> {
     }
 }
 
-/// Records of an image or of a map.
-type OfEither = Either<Hiding<2>, Hiding<3>>;
-
-/// Records and the points that they hide: the base class of Lines, Rays, Planes and Candidates.
-#[pyclass(frozen, subclass, module = "unlift")]
-pub struct Records(OfEither);
+/// Records and the points that they hide, of an image or of a map.
+#[pyclass(frozen, module = "unlift")]
+pub struct Records(Either<Hiding<2>, Hiding<3>>);
 
 impl Records {
     fn n_and_family(&self) -> (usize, &'static str) {
-        of_either!(&self.0, one => (one.obfuscation.len(), one.obfuscation.family()))
+        of_either!(&self.0, of => (of.obfuscation.len(), of.obfuscation.family()))
     }
 }
 
@@ -107,137 +101,103 @@ impl Records {
     }
 }
 
-fn of<T: PyClass<BaseType = Records>>(hiding: OfEither, class: T) -> PyClassInitializer<T> {
-    PyClassInitializer::from(Records(hiding)).add_subclass(class)
-}
-
-/// Lines through `points` (n, 3) along `directions` (n, 3); for an image, both (n, 2). With
-/// `hidden` (n, 2) each hides two points.
-#[pyclass(frozen, extends = Records, module = "unlift")]
-pub struct Lines;
-
-#[pymethods]
-impl Lines {
-    #[new]
-    #[pyo3(signature = (points, directions, *, hidden=None))]
-    fn new(
-        points: &Bound<'_, PyAny>,
-        directions: &Bound<'_, PyAny>,
-        hidden: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<PyClassInitializer<Self>> {
-        let given = (points, directions, hidden);
-        let hiding = match is_of_pairs("points", points)? {
-            true => Either::Image(lines(given)?),
-            false => Either::Map(lines(given)?),
-        };
-        Ok(of(hiding, Self))
-    }
+/// Makes records of an image if the rows of an array are pairs, else of a map.
+macro_rules! records_by {
+    ($rows:ident => $made:expr) => {
+        Ok(Records(match is_of_pairs(stringify!($rows), $rows)? {
+            true => Either::Image($made?),
+            false => Either::Map($made?),
+        }))
+    };
 }
 
 type Given<'a, 'py> = &'a Bound<'py, PyAny>;
 
-fn lines<const D: usize>(
-    (points, directions, hidden): (Given<'_, '_>, Given<'_, '_>, Option<Given<'_, '_>>),
-) -> PyResult<Hiding<D>> {
-    let (points, directions) = (rows("points", points)?, rows("directions", directions)?);
-    let lines = LineRecords::through(&points, &directions).map_err(raised)?;
-    Hiding::of(Obfuscation::Lines(lines), hidden)
+/// Lines through `points` (n, 3) along `directions` (n, 3); for an image, both (n, 2). With
+/// `hidden` (n, 2) each hides two points.
+#[pyfunction(name = "Lines")]
+#[pyo3(signature = (points, directions, *, hidden=None))]
+pub fn lines(
+    points: &Bound<'_, PyAny>,
+    directions: &Bound<'_, PyAny>,
+    hidden: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Records> {
+    fn of<const D: usize>(
+        points: Given<'_, '_>,
+        directions: Given<'_, '_>,
+        hidden: Option<Given<'_, '_>>,
+    ) -> PyResult<Hiding<D>> {
+        let (points, directions) = (rows("points", points)?, rows("directions", directions)?);
+        let lines = Lines::through(&points, &directions).map_err(raised)?;
+        Hiding::of(Obfuscation::Lines(lines), hidden)
+    }
+    records_by!(points => of(points, directions, hidden))
 }
 
 /// Rays from `centers` (m, 3) along `directions` (n, 3), from the center to the point; `center`
 /// (n,) is the index of each ray's center. For an image, centers (m, 2) and directions (n, 2).
-#[pyclass(frozen, extends = Records, module = "unlift")]
-pub struct Rays;
-
-#[pymethods]
-impl Rays {
-    #[new]
-    #[pyo3(signature = (centers, center, directions, *, hidden=None))]
-    fn new(
-        centers: &Bound<'_, PyAny>,
-        center: &Bound<'_, PyAny>,
-        directions: &Bound<'_, PyAny>,
-        hidden: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<PyClassInitializer<Self>> {
-        let given = (centers, center, directions, hidden);
-        let hiding = match is_of_pairs("centers", centers)? {
-            true => Either::Image(rays(given)?),
-            false => Either::Map(rays(given)?),
-        };
-        Ok(of(hiding, Self))
+#[pyfunction(name = "Rays")]
+#[pyo3(signature = (centers, center, directions, *, hidden=None))]
+pub fn rays(
+    centers: &Bound<'_, PyAny>,
+    center: &Bound<'_, PyAny>,
+    directions: &Bound<'_, PyAny>,
+    hidden: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Records> {
+    fn of<const D: usize>(
+        centers: Given<'_, '_>,
+        center: Given<'_, '_>,
+        directions: Given<'_, '_>,
+        hidden: Option<Given<'_, '_>>,
+    ) -> PyResult<Hiding<D>> {
+        let centers = rows("centers", centers)?;
+        let (center, _) = indices("center", center, &[1], centers.len().min(255) as u32)?;
+        let center = center.iter().map(|&at| at as u8).collect();
+        let rays = Rays::try_new(&centers, center, &rows("directions", directions)?);
+        Hiding::of(Obfuscation::Rays(rays.map_err(raised)?), hidden)
     }
-}
-
-fn rays<const D: usize>(
-    (centers, center, directions, hidden): (
-        Given<'_, '_>,
-        Given<'_, '_>,
-        Given<'_, '_>,
-        Option<Given<'_, '_>>,
-    ),
-) -> PyResult<Hiding<D>> {
-    let centers = rows("centers", centers)?;
-    let (center, _) = indices("center", center, &[1], centers.len().min(255) as u32)?;
-    let center = center.iter().map(|&at| at as u8).collect();
-    let rays = RayRecords::try_new(&centers, center, &rows("directions", directions)?);
-    Hiding::of(Obfuscation::Rays(rays.map_err(raised)?), hidden)
+    records_by!(centers => of(centers, center, directions, hidden))
 }
 
 /// Planes on which coordinate `axis` (n,), 0 to 2, equals `offset` (n,). Not for images.
-#[pyclass(frozen, extends = Records, module = "unlift")]
-pub struct Planes;
-
-#[pymethods]
-impl Planes {
-    #[new]
-    #[pyo3(signature = (axis, offset, *, hidden=None))]
-    fn new(
-        axis: &Bound<'_, PyAny>,
-        offset: &Bound<'_, PyAny>,
-        hidden: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<PyClassInitializer<Self>> {
-        let (axis, _) = indices("axis", axis, &[1], 3)?;
-        let axis = axis.iter().map(|&at| at as u8).collect();
-        let planes = AxisPlanes::try_new(axis, &column("offset", offset)?).map_err(raised)?;
-        Ok(of(Either::Map(Hiding::of(Obfuscation::AxisPlanes(planes), hidden)?), Self))
-    }
+#[pyfunction(name = "Planes")]
+#[pyo3(signature = (axis, offset, *, hidden=None))]
+pub fn planes(
+    axis: &Bound<'_, PyAny>,
+    offset: &Bound<'_, PyAny>,
+    hidden: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Records> {
+    let (axis, _) = indices("axis", axis, &[1], 3)?;
+    let axis = axis.iter().map(|&at| at as u8).collect();
+    let planes = AxisPlanes::try_new(axis, &column("offset", offset)?).map_err(raised)?;
+    Ok(Records(Either::Map(Hiding::of(Obfuscation::AxisPlanes(planes), hidden)?)))
 }
 
 /// Points `positions` (n, 3) with one coordinate, `swapped_axis` (n,), 0 to 2, of another point.
 /// The axis is secret and not released. For an image, positions (n, 2), and axes 0 and 1.
-#[pyclass(frozen, extends = Records, module = "unlift")]
-pub struct Candidates;
-
-#[pymethods]
-impl Candidates {
-    #[new]
-    #[pyo3(signature = (positions, swapped_axis, *, hidden=None))]
-    fn new(
-        positions: &Bound<'_, PyAny>,
-        swapped_axis: &Bound<'_, PyAny>,
-        hidden: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<PyClassInitializer<Self>> {
-        let given = (positions, swapped_axis, hidden);
-        let hiding = match is_of_pairs("positions", positions)? {
-            true => Either::Image(candidates(given)?),
-            false => Either::Map(candidates(given)?),
-        };
-        Ok(of(hiding, Self))
+#[pyfunction(name = "Candidates")]
+#[pyo3(signature = (positions, swapped_axis, *, hidden=None))]
+pub fn candidates(
+    positions: &Bound<'_, PyAny>,
+    swapped_axis: &Bound<'_, PyAny>,
+    hidden: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Records> {
+    fn of<const D: usize>(
+        positions: Given<'_, '_>,
+        swapped_axis: Given<'_, '_>,
+        hidden: Option<Given<'_, '_>>,
+    ) -> PyResult<Hiding<D>> {
+        let points = AxisCandidates::try_new(&rows("positions", positions)?).map_err(raised)?;
+        let (axis, _) = indices("swapped_axis", swapped_axis, &[1], D as u32)?;
+        if axis.len() != points.len() {
+            let expected = format!("{} numbers, one per record", points.len());
+            return Err(wrong("swapped_axis", expected, axis.len()));
+        }
+        let swapped_axis = Some(axis.iter().map(|&at| at as u8).collect());
+        let hiding = Hiding::of(Obfuscation::AxisCandidates(points), hidden)?;
+        Ok(Hiding { swapped_axis, ..hiding })
     }
-}
-
-fn candidates<const D: usize>(
-    (positions, swapped_axis, hidden): (Given<'_, '_>, Given<'_, '_>, Option<Given<'_, '_>>),
-) -> PyResult<Hiding<D>> {
-    let points = AxisCandidates::try_new(&rows("positions", positions)?).map_err(raised)?;
-    let (axis, _) = indices("swapped_axis", swapped_axis, &[1], D as u32)?;
-    if axis.len() != points.len() {
-        let expected = format!("{} numbers, one per record", points.len());
-        return Err(wrong("swapped_axis", expected, axis.len()));
-    }
-    let swapped_axis = Some(axis.iter().map(|&at| at as u8).collect());
-    let hiding = Hiding::of(Obfuscation::AxisCandidates(points), hidden)?;
-    Ok(Hiding { swapped_axis, ..hiding })
+    records_by!(positions => of(positions, swapped_axis, hidden))
 }
 
 /// Converts the result of the function `name` to records of points `(n, D)`.
@@ -246,7 +206,7 @@ pub fn hiding<const D: usize>(returned: &Bound<'_, PyAny>, name: &str) -> PyResu
         let expected = "Lines, Rays, Planes or Candidates";
         return Err(wrong(name, expected, returned.get_type()));
     };
-    let found = || wrong(name, format!("records of points (n, {D})"), format!("(n, {})", 5 - D));
+    let mismatch = || wrong(name, format!("records of points (n, {D})"), format!("(n, {})", 5 - D));
     let records = of_either!(&records.get().0, hiding => hiding as &dyn Any);
-    records.downcast_ref::<Hiding<D>>().cloned().ok_or_else(found)
+    records.downcast_ref::<Hiding<D>>().cloned().ok_or_else(mismatch)
 }

@@ -27,8 +27,8 @@ impl Recovered {
     /// Reads recovered points (`.npz`).
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let found = py.detach(|| read_recovered::<3>(&path)).map_err(raised)?;
-        Ok(Self(Arc::new(found)))
+        let recovered = py.detach(|| read_recovered::<3>(&path)).map_err(raised)?;
+        Ok(Self(Arc::new(recovered)))
     }
 
     /// Writes the points (`.npz`), as `unlift recover` does. Replaces other files only with
@@ -126,8 +126,8 @@ pub fn recover(
     }
     let lists = Arc::clone(&lists.0);
     let work = move || solve(&released, &lists, &*solver, &options);
-    let found = threads::run(py, threads, Some(by.stop()), work);
-    Ok(Recovered(Arc::new(found.map_err(|error| by.as_cause_of(py, error))?)))
+    let recovered = threads::run(py, threads, Some(by.stop()), work);
+    Ok(Recovered(Arc::new(recovered.map_err(|error| by.as_cause_of(py, error))?)))
 }
 
 /// Compares recovered points with the truth; returns a dict like a row of an audit. With a Hidden
@@ -145,16 +145,16 @@ pub fn evaluate<'py>(
     let truth = truth_of(truth)?;
     let mut thresholds = self::thresholds(thresholds)?;
     if thresholds.is_empty() {
-        thresholds = Plan::<3>::new(truth.original().reveal().unit()).thresholds;
+        thresholds = Plan::<3>::new(truth.original.reveal().unit()).thresholds;
     }
-    let (recovered, asked) = (Arc::clone(&recovered.0), thresholds.clone());
+    let (recovered, requested) = (Arc::clone(&recovered.0), thresholds.clone());
     let (row, notes) = threads::run(py, None, None, move || {
-        let (original, secret) = (truth.original(), &truth.secret);
+        let (original, secret) = (&truth.original, &truth.secret);
         let mut checked = Checked::default();
         checked.add(&recovered, original, secret, released.as_deref())?;
-        let notes = checked.notes(&asked, original.reveal().unit())?;
+        let notes = checked.notes(&requested, original.reveal().unit())?;
         let baseline = released.map(|released| blind(&released, original, secret));
-        let (row, _) = measure(&recovered, original, secret, baseline.as_ref(), &asked)?;
+        let (row, _) = measure(&recovered, original, secret, baseline.as_ref(), &requested)?;
         Ok::<_, unlift::Error>((row, notes))
     })?;
     let figures = unlift_audit::evaluated(&row, &notes).map_err(raised)?;

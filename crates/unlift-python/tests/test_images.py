@@ -177,7 +177,7 @@ def with_b(**change):
         (lambda i: quick(i, "olc"), "scheme: expected one that is defined on images, found olc"),
         (lambda i: quick(i, neighbors="geometric", inlier_ratios=None), "expected one that is defined in 2 dimensions, found geometric"),
         (lambda i: quick(FIXTURES / "features-latest.h5", max_features=5), "^max_features: expected with a folder of photos, found a file"),
-        (lambda i: quick(i, neighbors="overlap"), "inlier_ratios: expected neighbors with \"oracle\", found only overlap"),
+        (lambda i: quick(i, neighbors="overlap"), "inlier_ratios: expected with neighbors oracle, found only overlap"),
         (lambda i: quick(i, gates=["olc:10<=3"]), "olc"),
     ],
 )

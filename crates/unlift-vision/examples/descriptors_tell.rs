@@ -17,9 +17,7 @@ use unlift::released::Released;
 use unlift::seed::Key;
 use unlift::truth::Original;
 use unlift::{About, Descriptors, PointSet, RecordId, RowOrder, Unit};
-use unlift_vision::features::{
-    AlikedOptions, Extraction, Extractor, Found, SiftOptions, SuperPointOptions,
-};
+use unlift_vision::features::{Extraction, Extractor, Found, LearnedOptions, SiftOptions};
 use unlift_vision::network::Learned;
 
 const K: usize = 20;
@@ -41,14 +39,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     if photos.is_empty() {
         return Err("expected photos in the folder, found none".into());
     }
-    let faint = AlikedOptions { min_score: 0.02, ..AlikedOptions::default() };
+    let faint = LearnedOptions { min_score: 0.02, ..LearnedOptions::ALIKED };
     let mut kinds = vec![
         ("SIFT", Extraction::Sift(SiftOptions::default())),
         ("ALIKED, the best 2,048", Extraction::Aliked(faint)),
-        ("ALIKED, score above 0.2", Extraction::Aliked(AlikedOptions::default())),
+        ("ALIKED, score above 0.2", Extraction::Aliked(LearnedOptions::ALIKED)),
     ];
     if arguments.any(|argument| argument == "--superpoint") {
-        kinds.push(("SuperPoint", Extraction::SuperPoint(SuperPointOptions::default())));
+        kinds.push(("SuperPoint", Extraction::SuperPoint(LearnedOptions::SUPERPOINT)));
     }
     println!("| features | keypoints | {} |", COLUMNS.join(" | "));
     println!("| --- | --- |{}", " --- |".repeat(COLUMNS.len()));

@@ -15,7 +15,7 @@ use std::time::Instant;
 
 use unlift_vision::features::in_order;
 use unlift_vision::features::{
-    Aliked, AlikedOptions, Features, LearnedFeatures, Sift, SiftOptions, photo,
+    Aliked, Features, LearnedFeatures, LearnedOptions, Sift, SiftOptions, photo,
 };
 
 #[derive(Default)]
@@ -69,7 +69,7 @@ fn run() -> Result<(), Box<dyn Error>> {
             extract(&options, photo::read, |image| Ok(raw(&sift.extract(image))))
         }
         "aliked" => {
-            let mut of = AlikedOptions::default();
+            let mut of = LearnedOptions::ALIKED;
             of.max_features = options.max_features.unwrap_or(of.max_features);
             let aliked = Aliked::try_new(of)?;
             extract(&options, photo::read_color, |image| Ok(raw_learned(&aliked.extract(image)?)))

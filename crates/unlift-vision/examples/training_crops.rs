@@ -21,9 +21,7 @@ use unlift::descriptors::Values;
 use unlift::neighbors::{dense, usual};
 use unlift::seed::{Draws, Stage};
 use unlift_vision::features::in_order;
-use unlift_vision::features::{
-    AlikedOptions, Extraction, Extractor, Found, SiftOptions, SuperPointOptions,
-};
+use unlift_vision::features::{Extraction, Extractor, Found, LearnedOptions, SiftOptions};
 
 /// Steps of a pair score per standard deviation.
 const STEPS: f32 = 1024.0;
@@ -102,8 +100,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn extraction(kind: &str, max_image_size: Option<usize>) -> Result<Extraction, String> {
     let mut extraction = match kind {
         "sift" => Extraction::Sift(SiftOptions::default()),
-        "aliked" => Extraction::Aliked(AlikedOptions { min_score: 0.0, ..Default::default() }),
-        "superpoint" => Extraction::SuperPoint(SuperPointOptions::default()),
+        "aliked" => Extraction::Aliked(LearnedOptions { min_score: 0.0, ..LearnedOptions::ALIKED }),
+        "superpoint" => Extraction::SuperPoint(LearnedOptions::SUPERPOINT),
         _ => return Err(format!("--type: expected sift, aliked or superpoint, found {kind:?}")),
     };
     let of_kind = match &mut extraction {

@@ -14,6 +14,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 use triangulate::{Fit, MISS, MOST_HYPOTHESES, Sight, triangulate};
 
+use crate::geometry::camera::Camera;
 use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{distance, dot, median, sub, widen};
 use crate::neighbors::{Blocks, Neighborhoods, comparable, mutual};
@@ -21,53 +22,24 @@ use crate::recover::{Confidence, Estimate, RecoverOptions, Recovered, Status, re
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, RowOrder, Unit};
 
-/// A pinhole camera with its pose: a point `x` of the world is at `rotation x + translation` in the frame right, down, forward.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Camera {
-    /// Focal lengths in pixels.
-    pub focal: [f64; 2],
-    /// Principal point in pixels; the middle of the first pixel is `(0, 0)`.
-    pub center: [f64; 2],
-    /// Rotation from the world to the camera.
-    pub rotation: [[f64; 3]; 3],
-    /// Position of the world's origin in the frame of the camera.
-    pub translation: [f64; 3],
-}
-
 /// Cosine of the largest angle between the viewing directions of two queries that are compared: 75 degrees.
 const TURNED: f64 = 0.26;
-
-impl Camera {
-    /// Returns the matrix `K [R | t]`.
-    fn projection(&self) -> [[f64; 4]; 3] {
-        let row = |r: usize| -> [f64; 4] {
-            let [x, y, z] = self.rotation[r];
-            [x, y, z, self.translation[r]]
-        };
-        let last = row(2);
-        let scaled = |r: usize| -> [f64; 4] {
-            let own = row(r);
-            std::array::from_fn(|c| self.focal[r] * own[c] + self.center[r] * last[c])
-        };
-        [scaled(0), scaled(1), last]
-    }
-
-    /// Whether both cameras look in similar directions, so that they can match.
-    fn looks_like(&self, other: &Self) -> bool {
-        dot(&self.rotation[2], &other.rotation[2]) > TURNED
-    }
-}
 
 /// A protected query and the pose at which the service localized it.
 #[derive(Clone, Debug)]
 pub struct Query {
     /// The released records and descriptors. Pixels are those of a pinhole camera, without distortion.
     pub released: Released<2>,
-    /// Camera and pose.
+    /// The camera; the middle of the first pixel is `(0, 0)`.
     pub camera: Camera,
 }
 
 impl Query {
+    /// Whether both cameras look in similar directions, so that they can match.
+    fn looks_like(&self, other: &Self) -> bool {
+        dot(&self.camera.pose.rotation[2], &other.camera.pose.rotation[2]) > TURNED
+    }
+
     /// Back-projects the record of `slot`.
     fn sight(&self, projection: [[f64; 4]; 3], slot: usize) -> Sight {
         let origin = self.released.origin();
@@ -305,7 +277,7 @@ impl Links {
         let blocks: Vec<Blocks> = described.par_iter().map(|rows| Blocks::new(rows)).collect();
         let pairs: Vec<(usize, usize)> = (0..queries.len())
             .flat_map(|a| (a + 1..queries.len().min(a + reach)).map(move |b| (a, b)))
-            .filter(|&(a, b)| queries[a].camera.looks_like(&queries[b].camera))
+            .filter(|&(a, b)| queries[a].looks_like(&queries[b]))
             .collect();
         let of_pair = |&(a, b): &(usize, usize)| mutual(&blocks[a], &blocks[b]);
         let found: Vec<_> = pairs.par_iter().with_max_len(1).map(of_pair).collect();

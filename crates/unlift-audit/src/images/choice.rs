@@ -11,10 +11,10 @@ pub fn headline(thresholds: &[Threshold]) -> usize {
     (0..thresholds.len()).min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0)
 }
 
-/// Returns the numbers of at most `most` of `n` images, evenly spaced: the middles of equal parts.
-pub fn evenly(n: usize, most: Option<usize>) -> Vec<usize> {
-    let most = most.unwrap_or(n).min(n);
-    (0..most).map(|at| ((2 * at + 1) * n) / (2 * most)).collect()
+/// Returns the numbers of at most `max_images` of `n` images, evenly spaced: the middles of equal parts.
+pub fn evenly(n: usize, max_images: Option<usize>) -> Vec<usize> {
+    let max_images = max_images.unwrap_or(n).min(n);
+    (0..max_images).map(|at| ((2 * at + 1) * n) / (2 * max_images)).collect()
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use std::path::Path;
 use unlift::Descriptors;
 use unlift::descriptors::Values;
 use unlift::neighbors::DescriptorKind;
-use unlift_vision::features::{AlikedOptions, Extraction, SiftOptions, SuperPointOptions};
+use unlift_vision::features::{Extraction, LearnedOptions, SiftOptions};
 
 use crate::Error;
 
@@ -46,34 +46,30 @@ impl Wanted {
         if path.is_file() {
             self.check_unused("a file")?;
         }
-        let max_features = self.max_features.map(NonZeroUsize::get);
-        let max_image_size = self.max_image_size.map(|side| side as usize);
         Ok(match self.kind.unwrap_or(DescriptorKind::Sift) {
             DescriptorKind::Sift => {
                 self.refuse("--min-score", self.min_score.is_some(), DescriptorKind::Aliked)?;
                 let usual = SiftOptions::default();
                 Extraction::Sift(SiftOptions {
-                    max_features: max_features.unwrap_or(usual.max_features),
-                    max_image_size: max_image_size.unwrap_or(usual.max_image_size),
+                    max_features: self.max_features.map_or(usual.max_features, NonZeroUsize::get),
+                    max_image_size: self
+                        .max_image_size
+                        .map_or(usual.max_image_size, |side| side as usize),
                 })
             }
-            DescriptorKind::Aliked => {
-                let usual = AlikedOptions::default();
-                Extraction::Aliked(AlikedOptions {
-                    max_features: max_features.unwrap_or(usual.max_features),
-                    min_score: self.min_score.unwrap_or(usual.min_score),
-                    max_image_size: max_image_size.unwrap_or(usual.max_image_size),
-                })
-            }
+            DescriptorKind::Aliked => Extraction::Aliked(self.learned(LearnedOptions::ALIKED)),
             DescriptorKind::SuperPoint => {
-                let usual = SuperPointOptions::default();
-                Extraction::SuperPoint(SuperPointOptions {
-                    max_features: max_features.unwrap_or(usual.max_features),
-                    min_score: self.min_score.unwrap_or(usual.min_score),
-                    max_image_size: max_image_size.unwrap_or(usual.max_image_size),
-                })
+                Extraction::SuperPoint(self.learned(LearnedOptions::SUPERPOINT))
             }
         })
+    }
+
+    fn learned(self, usual: LearnedOptions) -> LearnedOptions {
+        LearnedOptions {
+            max_features: self.max_features.map_or(usual.max_features, NonZeroUsize::get),
+            min_score: self.min_score.unwrap_or(usual.min_score),
+            max_image_size: self.max_image_size.map_or(usual.max_image_size, |side| side as usize),
+        }
     }
 
     /// Rejects all options if features exist already, in `found`.

@@ -103,18 +103,12 @@ pub struct Needs {
 }
 
 impl Needs {
-    /// Returns the needs of a source.
-    pub fn of(source: &Arc<dyn Source<2>>) -> Self {
-        let needy = |source: &Arc<dyn Source<2>>| source.needs() == neighbors::Needs::Descriptors;
-        let sources = Some(source.clone()).filter(needy).into_iter().collect();
-        Self { sources, whatever: false }
-    }
-
     /// Returns the needs of a plan.
     pub fn of_plan(plan: &Plan<2>) -> Self {
-        let own = plan.neighbors.iter().flat_map(|by| match by {
-            NeighborsBy::Source(source) => Self::of(source).sources,
-            NeighborsBy::Oracle | NeighborsBy::Given(_) => Vec::new(),
+        let needy = |source: &Arc<dyn Source<2>>| source.needs() == neighbors::Needs::Descriptors;
+        let own = plan.neighbors.iter().filter_map(|by| match by {
+            NeighborsBy::Source(source) => Some(source.clone()).filter(needy),
+            NeighborsBy::Oracle | NeighborsBy::Given(_) => None,
         });
         // Measures may use descriptors if there are any.
         Self { sources: own.collect(), whatever: !plan.measures.is_empty() }
@@ -253,7 +247,7 @@ fn image(
 
 /// Returns what was expected of these features and what was found; `None` if nothing is missing. An
 /// image without keypoints needs nothing.
-pub fn lacking(features: &ImageFeatures, needs: &Needs) -> Option<(String, String)> {
+fn lacking(features: &ImageFeatures, needs: &Needs) -> Option<(String, String)> {
     if features.keypoints.is_empty() || !needs.descriptors() {
         return None;
     }

@@ -2,6 +2,7 @@
 //! needs to be recovered.
 
 use unlift::Error;
+use unlift::geometry::camera::Pose;
 use unlift::neighbors::{REAL, Similarity, Source, support};
 use unlift::recover::Recovered;
 use unlift::released::{Obfuscation, Rays, Released};
@@ -28,7 +29,8 @@ pub fn six_views(released: &Released<3>) -> Result<Vec<(&'static str, View)>, Er
     let center = std::array::from_fn(|c| released.origin()[c] + f64::from(center[c]));
     let (half, middle) = (SIDE as f64 / 2.0, (SIDE as f64 - 1.0) / 2.0);
     let lens = Lens::try_new("SIMPLE_PINHOLE", &[half, middle, middle])?;
-    let view = |rotation| View { center, rotation, lens: lens.clone(), size: [SIDE; 2] };
+    let view =
+        |rotation| View { pose: Pose { rotation, center }, lens: lens.clone(), size: [SIDE; 2] };
     Ok(SIX.into_iter().map(|(name, rotation)| (name, view(rotation))).collect())
 }
 

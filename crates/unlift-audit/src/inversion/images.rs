@@ -45,13 +45,6 @@ impl fmt::Debug for Inversion {
 }
 
 impl Inversion {
-    /// Creates a measure for images whose photos are in the folder `photos`. `turn` sets the
-    /// orientation of photos in which keypoints are pixels.
-    pub fn new(painter: Painter, photos: &Path, turn: Turn) -> Self {
-        let photos = photos.to_owned();
-        Self { painter, photos, turn, known: Mutex::default(), failed: Mutex::default() }
-    }
-
     /// Opens the measure for the images of `source` at `path`. Photos are in the folder `photos`, or in `path`. `kind` is that of the
     /// descriptors.
     ///
@@ -66,7 +59,9 @@ impl Inversion {
         let photos = photos.or_else(|| Some(path).filter(|path| path.is_dir()));
         let none = "--invert: expected --photos, as PATH is no folder of photos";
         let photos = photos.ok_or_else(|| crate::Error::request(none))?;
-        Ok(Self::new(Painter::open(kind, network)?, photos, source.turn()))
+        let (painter, photos) = (Painter::open(kind, network)?, photos.to_owned());
+        let (known, failed) = Default::default();
+        Ok(Self { painter, photos, turn: source.turn(), known, failed })
     }
 
     /// Returns the SHA-256 of the painting network, in hexadecimal.

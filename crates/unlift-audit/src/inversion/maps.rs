@@ -8,6 +8,7 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use rayon::prelude::*;
 use unlift::Error;
 use unlift::audit::{Cell, Measure, Row};
+use unlift::geometry::camera::Pose;
 use unlift::geometry::frame::rounded_origin;
 use unlift_io::read::colmap;
 use unlift_report::inversions::Inversion as Sheet;
@@ -42,7 +43,7 @@ type Picture = (ColorImage, Judged);
 /// Makes pictures of a map and compares them with the photos.
 pub struct MapInversion {
     painter: Painter,
-    seen: Vec<PhotoView>,
+    views: Vec<PhotoView>,
     /// The cell that was measured last and its pictures, one per photo, so that the page does not
     /// paint them again.
     last: Mutex<Option<(Row, u32, Vec<Picture>)>>,
@@ -50,7 +51,7 @@ pub struct MapInversion {
 
 impl fmt::Debug for MapInversion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("MapInversion").field("photos", &self.seen.len()).finish_non_exhaustive()
+        f.debug_struct("MapInversion").field("photos", &self.views.len()).finish_non_exhaustive()
     }
 }
 
@@ -90,40 +91,24 @@ impl MapInversion {
             let found = format!("{n} of {} images of the model have a photo", images.len());
             progress.say(&format!("note: {}: {found}", photos.display()));
         }
-        let mut seen = Vec::new();
+        let mut views = Vec::new();
         for (image, path) in
             choice::evenly(n, Some(max_images)).into_iter().map(|at| &with_photo[at])
         {
-            let camera = cameras.iter().find(|camera| camera.id == image.camera_id);
-            let made = camera.ok_or_else(|| {
+            let made = image.camera(&cameras).ok_or_else(|| {
                 let id = image.camera_id.to_string();
                 Error::new(path.display().to_string(), "a camera of the model", id)
             });
-            match made.and_then(|camera| one(&painter, (camera, image), path, scale)) {
-                Ok(one) => seen.push(one),
+            match made.and_then(|camera| open_photo(&painter, (camera, image), path, scale)) {
+                Ok(open_photo) => views.push(open_photo),
                 Err(error) => progress.say(&format!("note: not painted: {error}")),
             }
         }
-        if seen.is_empty() {
+        if views.is_empty() {
             let expected = format!("photos of the images in {}", model.display());
             return Err(unlift_io::Error::new(photos, "", expected, "none").into());
         }
-        Ok(Self { painter, seen, last: Mutex::default() })
-    }
-
-    /// Creates a measure from photos in memory: name, camera in the unit of the audit, pixels.
-    ///
-    /// # Errors
-    /// If a photo does not have the size of its camera, or is too small.
-    pub fn of(
-        painter: Painter,
-        photos: impl IntoIterator<Item = (String, View, ColorImage)>,
-    ) -> Result<Self, Error> {
-        let seen = photos.into_iter().map(|(name, view, photo)| {
-            photo_view(&painter, name.clone(), view, &photo).map_err(|error| error.within(&name))
-        });
-        let seen = seen.collect::<Result<_, Error>>()?;
-        Ok(Self { painter, seen, last: Mutex::default() })
+        Ok(Self { painter, views, last: Mutex::default() })
     }
 
     /// Returns the SHA-256 of the painting network, in hexadecimal.
@@ -133,7 +118,7 @@ impl MapInversion {
 
     /// Returns the number of photos.
     pub fn n_photos(&self) -> usize {
-        self.seen.len()
+        self.views.len()
     }
 
     /// Adds the pictures of `cell` by the first cameras, one per sheet.
@@ -147,18 +132,20 @@ impl MapInversion {
             }
             _ => self.pictures(cell, sheets.len())?,
         };
-        let is_new = |sheet: &Sheet| sheet.released.iter().all(|one| one.scheme != cell.row.scheme);
+        let is_new =
+            |sheet: &Sheet| sheet.released.iter().all(|shown| shown.scheme != cell.row.scheme);
         let records = sheets.iter().any(is_new).then(|| records(cell));
-        for ((seen, sheet), (picture, judged)) in self.seen.iter().zip(sheets).zip(pictures) {
-            let (painted_of_truth, baseline) = self.truth(seen, cell)?;
+        for ((photo_view, sheet), (picture, judged)) in self.views.iter().zip(sheets).zip(pictures)
+        {
+            let (painted_of_truth, baseline) = self.truth(photo_view, cell)?;
             if sheet.photo.is_empty() {
-                sheet.name.clone_from(&seen.name);
-                sheet.size = seen.view.size.map(|side| side as u32);
-                sheet.photo = jpeg_of(&seen.photo, SHOWN)?;
+                sheet.name.clone_from(&photo_view.name);
+                sheet.size = photo_view.view.size.map(|side| side as u32);
+                sheet.photo = jpeg_of(&photo_view.photo, SHOWN)?;
                 sheet.baseline = painted(painted_of_truth, baseline)?;
             }
             if let Some((shapes, middle)) = &records {
-                let marks = marks(&seen.view, shapes, middle)?;
+                let marks = marks(&photo_view.view, shapes, middle)?;
                 sheet.released.push(ReleasedView { scheme: cell.row.scheme.clone(), marks });
             }
             sheet.views.push(shown(cell.row, &picture, &judged)?);
@@ -167,34 +154,39 @@ impl MapInversion {
     }
 
     fn pictures(&self, cell: &Cell<'_>, n: usize) -> Result<Vec<Picture>, Error> {
-        let of_one = |seen: &PhotoView| {
-            let picture = self.painter.map(&seen.view, cell.released, cell.recovered)?;
-            let judged = self.painter.judge(&picture, &seen.photo, &seen.objects)?;
+        let of_one = |photo_view: &PhotoView| {
+            let picture = self.painter.map(&photo_view.view, cell.released, cell.recovered)?;
+            let judged = self.painter.judge(&picture, &photo_view.photo, &photo_view.objects)?;
             Ok((picture, judged))
         };
-        self.seen.par_iter().take(n).map(of_one).collect()
+        self.views.par_iter().take(n).map(of_one).collect()
     }
 
-    fn truth<'a>(&'a self, seen: &'a PhotoView, cell: &Cell<'_>) -> Result<&'a Picture, Error> {
+    fn truth<'a>(
+        &'a self,
+        photo_view: &'a PhotoView,
+        cell: &Cell<'_>,
+    ) -> Result<&'a Picture, Error> {
         let make = || {
             let originals = cell.original.reveal().positions();
             let positions: Vec<Option<[f64; 3]>> = originals.iter().copied().map(Some).collect();
             let descriptors = needed(cell.descriptors)?;
-            let picture = self.painter.seen(&seen.view, &positions, descriptors, |_, _| 1.0)?;
-            let baseline = self.painter.judge(&picture, &seen.photo, &seen.objects)?;
+            let picture =
+                self.painter.picture_of(&photo_view.view, &positions, descriptors, |_, _| 1.0)?;
+            let baseline = self.painter.judge(&picture, &photo_view.photo, &photo_view.objects)?;
             Ok((picture, baseline))
         };
-        seen.truth.get_or_init(make).as_ref().map_err(Error::clone)
+        photo_view.truth.get_or_init(make).as_ref().map_err(Error::clone)
     }
 }
 
 impl Measure<3> for MapInversion {
     /// Returns means over the photos that have the figure: not every photo has objects.
     fn measure(&self, cell: &Cell<'_>) -> Result<Vec<(String, f64)>, Error> {
-        let pictures = self.pictures(cell, self.seen.len())?;
+        let pictures = self.pictures(cell, self.views.len())?;
         let mut all = Vec::new();
-        for (seen, (_, judged)) in self.seen.iter().zip(&pictures) {
-            all.extend(figures(judged, &self.truth(seen, cell)?.1));
+        for (photo_view, (_, judged)) in self.views.iter().zip(&pictures) {
+            all.extend(figures(judged, &self.truth(photo_view, cell)?.1));
         }
         let mut sums = BTreeMap::new();
         for (name, value) in all {
@@ -230,8 +222,8 @@ fn marks(view: &View, shapes: &Shapes, middle: &[f64; 3]) -> Result<Marks, Error
             let t = step as f32 / STEPS as f32;
             place([0, 1, 2].map(|c| a[c] + t * (b[c] - a[c])))
         };
-        let seen = view.project(&(0..=STEPS).map(at).collect::<Vec<_>>())?.places;
-        Ok(seen.first().zip(seen.last()).map(|(&from, &to)| [from, to]))
+        let projected = view.project(&(0..=STEPS).map(at).collect::<Vec<_>>())?.places;
+        Ok(projected.first().zip(projected.last()).map(|(&from, &to)| [from, to]))
     };
     Ok(match shapes {
         Shapes::Segments(all) => {
@@ -249,7 +241,7 @@ fn marks(view: &View, shapes: &Shapes, middle: &[f64; 3]) -> Result<Marks, Error
     })
 }
 
-fn one(
+fn open_photo(
     painter: &Painter,
     (camera, image): (&colmap::Camera, &colmap::Image),
     path: &Path,
@@ -291,8 +283,7 @@ fn photo_view(
 /// If COLMAP has no such camera model.
 pub fn view(camera: &colmap::Camera, image: &colmap::Image, scale: f64) -> Result<View, Error> {
     Ok(View {
-        center: image.center.map(|x| x * scale),
-        rotation: image.rotation,
+        pose: Pose { center: image.pose.center.map(|x| x * scale), ..image.pose },
         lens: Lens::try_new(camera.model.name, &camera.params)?,
         size: [camera.width_px, camera.height_px].map(|side| side as usize),
     })

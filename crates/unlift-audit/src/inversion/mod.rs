@@ -62,7 +62,7 @@ struct Judged {
 }
 
 impl Painter {
-    /// Opens the painter for descriptors of `kind`: the network of the user, or the known one.
+    /// Opens the painter for descriptors of `kind`, with the network of the user or the known one, and the networks that compare.
     ///
     /// # Errors
     /// If a network cannot be read.
@@ -71,12 +71,8 @@ impl Painter {
             Some(path) => Inverter::read(path, kind),
             None => Inverter::of(kind),
         };
-        Ok(Self::try_new(inverter?)?)
-    }
-
-    /// Creates a painter with the painting network, and loads the networks that compare.
-    pub fn try_new(inverter: Inverter) -> Result<Self, Error> {
-        Ok(Self { inverter, lpips: Lpips::try_new()?, detector: Detector::try_new()? })
+        let (lpips, detector) = (Lpips::try_new()?, Detector::try_new()?);
+        Ok(Self { inverter: inverter?, lpips, detector })
     }
 
     /// Makes the picture of keypoints `(n, 2)` in an image of `size` (width, height) pixels.
@@ -125,7 +121,7 @@ impl Painter {
     ) -> Result<ColorImage, Error> {
         let positions: Vec<_> =
             (0..recovered.n_slots()).map(|slot| recovered.position(slot)).collect();
-        self.seen(view, &positions, &*assigned(released, recovered)?, |slot, depth| {
+        self.picture_of(view, &positions, &*assigned(released, recovered)?, |slot, depth| {
             weight(recovered, slot, NEAR * f64::from(depth))
         })
     }
@@ -137,7 +133,7 @@ impl Painter {
         Ok(!view.project(&positions)?.points.is_empty())
     }
 
-    fn seen(
+    fn picture_of(
         &self,
         view: &View,
         positions: &[Option<[f64; 3]>],
@@ -166,9 +162,11 @@ impl Painter {
         objects: &[Detection],
     ) -> Result<Judged, Error> {
         let metrics = Metrics::of(picture, photo, &self.lpips)?;
-        let seen = self.objects(picture)?;
+        let repeated = self.objects(picture)?;
         let again = |object: &Detection| {
-            seen.iter().any(|one| one.class == object.class && one.overlap(object) >= SAME)
+            repeated
+                .iter()
+                .any(|found| found.class == object.class && found.overlap(object) >= SAME)
         };
         let found = objects.iter().map(|object| (object.class, again(object))).collect();
         Ok(Judged { metrics, found })
@@ -189,7 +187,7 @@ impl Judged {
         classes.dedup();
         let all = (!classes.is_empty()).then(|| (OBJECTS.to_owned(), share(&|_| true)));
         let name = |class: usize| format!("{OBJECTS}_of_{}", CLASSES[class].replace(' ', "_"));
-        let each = classes.iter().map(|&class| (name(class), share(&|other| other == class)));
+        let each = classes.iter().map(|&class| (name(class), share(&|known| known == class)));
         all.into_iter().chain(each).collect()
     }
 }
@@ -251,7 +249,11 @@ fn in_sight(
     let kept = all.only(|at| of(at) > 0.0);
     let visible = kept.visible(view.size);
     let weights = (kept.points.iter().zip(&kept.depths).zip(visible))
-        .map(|((&slot, &depth), seen)| if seen { weight(slot as usize, depth) } else { 0.0 })
+        .map(
+            |((&slot, &depth), is_visible)| {
+                if is_visible { weight(slot as usize, depth) } else { 0.0 }
+            },
+        )
         .collect();
     Ok((kept, weights))
 }
@@ -276,6 +278,7 @@ pub(crate) fn weight<const D: usize>(recovered: &Recovered<D>, slot: usize, near
 #[cfg(test)]
 mod tests {
     use unlift::descriptors::Values;
+    use unlift::geometry::camera::Pose;
     use unlift::recover::{Estimate, Status};
     use unlift::released::{Lines, Obfuscation};
     use unlift::{About, Unit};
@@ -285,8 +288,7 @@ mod tests {
 
     fn view() -> View {
         View {
-            center: [0.0; 3],
-            rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            pose: Pose::IDENTITY,
             lens: Lens::try_new("SIMPLE_PINHOLE", &[100.0, 32.0, 32.0]).unwrap(),
             size: [64, 64],
         }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 use unlift::descriptors::Values;
+use unlift::geometry::camera::{Camera, Intrinsics, PoseError};
 use unlift::geometry::frame::Bounds;
 use unlift::geometry::vector::{distance, median, squared_distance};
 use unlift::localization::{Free, Match, View, estimate, free_directions};
@@ -36,8 +37,10 @@ const REACH: f64 = 0.1;
 
 /// A held-out image.
 struct Query {
-    /// The image with its true pose.
-    view: View,
+    /// The camera with its true pose.
+    camera: Camera,
+    /// Width and height of the image in pixels.
+    size: [f64; 2],
     /// Undistorted keypoints in pixels of the pinhole, within the image.
     places: Vec<[f64; 2]>,
     descriptors: Unit32,
@@ -135,8 +138,8 @@ impl<'a> Held<'a> {
             return Err(unlift_io::Error::new(path, "", expected, found).into());
         }
         let dim = photos[0].1.descriptors.dim();
-        if let Some((_, other)) = photos.iter().find(|(_, photo)| photo.descriptors.dim() != dim) {
-            let found = other.descriptors.dim().to_string();
+        if let Some((_, photo)) = photos.iter().find(|(_, photo)| photo.descriptors.dim() != dim) {
+            let found = photo.descriptors.dim().to_string();
             let expected = format!("{dim} values per descriptor in every image");
             return Err(unlift_io::Error::new(path, "", expected, found).into());
         }
@@ -326,18 +329,18 @@ impl<'a> Held<'a> {
         let of = |(number, query): (usize, &Query)| {
             let pairs = &pairs[number];
             let is_right = |&&(keypoint, row): &&Pair| {
-                let place = query.view.project(&positions[row]);
+                let place = query.camera.project(&positions[row]);
                 place.is_some_and(|p| distance(&p, &query.places[keypoint]) <= NEAR)
             };
             let start = self.most_similar(pairs).map(|similar| {
                 let points = pairs.iter().map(|(_, row)| &positions[*row]);
-                let mut away: Vec<f64> = points.map(|p| distance(p, &similar.center)).collect();
-                let (rotation, center) = (similar.rotation, similar.center);
-                let view = View { rotation, center, ..query.view.clone() };
-                (view, REACH * median(&mut away))
+                let pose = similar.camera.pose;
+                let mut away: Vec<f64> = points.map(|p| distance(p, &pose.center)).collect();
+                (Camera { pose, ..query.camera }, REACH * median(&mut away))
             });
             Problem {
-                truth: query.view.clone(),
+                truth: query.camera,
+                size: query.size,
                 start,
                 n_pairs: pairs.len(),
                 n_right: pairs.iter().filter(is_right).count(),
@@ -363,12 +366,14 @@ impl<'a> Held<'a> {
 
 /// The pose problem of one held-out image.
 pub struct Problem {
-    /// The image with its true pose.
-    pub truth: View,
+    /// The camera with its true pose.
+    pub truth: Camera,
+    /// Width and height of the image in pixels.
+    pub size: [f64; 2],
     /// The matches, as far as they fix the pose.
     pub matches: Vec<Match>,
     /// The pose of the most similar other image, and the standard deviation of further starts.
-    start: Option<(View, f64)>,
+    start: Option<(Camera, f64)>,
     n_pairs: usize,
     /// Matches within 3 px of the true projection.
     n_right: usize,
@@ -378,16 +383,16 @@ pub struct Problem {
 pub struct Located {
     n_pairs: usize,
     n_right: usize,
-    /// Errors of the center and of the rotation in degrees; `None` without an estimate.
-    error: Option<(f64, f64)>,
+    /// The error of the pose; `None` without an estimate.
+    error: Option<PoseError>,
 }
 
 impl Problem {
-    /// Estimates the pose and returns its errors: of the center, and of the rotation in degrees.
-    pub fn solve(&self, seed: u64) -> Option<(f64, f64)> {
+    /// Estimates the pose and returns its error.
+    pub fn solve(&self, seed: u64) -> Option<PoseError> {
         let (start, reach) = self.start.as_ref()?;
         let (found, _) = estimate(start, &self.matches, *reach, seed)?;
-        Some(found.pose_distance(&self.truth))
+        Some(found.pose.error(&self.truth.pose))
     }
 }
 
@@ -424,12 +429,12 @@ pub fn summary(
         // The upper one of an even number.
         values.get(values.len() / 2).copied().unwrap_or(f64::INFINITY)
     };
-    let center = |image: &Located| image.error.map_or(f64::INFINITY, |(center, _)| center);
-    let angle = |image: &Located| image.error.map_or(f64::INFINITY, |(_, angle)| angle);
+    let center = |image: &Located| image.error.map_or(f64::INFINITY, |error| error.center);
+    let angle = |image: &Located| image.error.map_or(f64::INFINITY, |error| error.rotation_degrees);
     let finite = |value: f64| Some(value).filter(|value| value.is_finite());
     let error = middle(located, &center);
-    let recall = |(name, most, angle_most): &(String, f64, f64)| {
-        let within = |image: &&Located| center(image) <= *most && angle(image) <= *angle_most;
+    let recall = |(name, max_center, max_angle): &(String, f64, f64)| {
+        let within = |image: &&Located| center(image) <= *max_center && angle(image) <= *max_angle;
         let n = located.iter().filter(within).count();
         (name.clone(), 100.0 * n as f64 / located.len().max(1) as f64)
     };
@@ -477,13 +482,14 @@ impl Photo {
             (nearest.0 <= NEAR * NEAR).then_some(nearest.1)
         };
         let of_points = view.observed.iter().filter_map(|&row| {
-            let place = lens.project(view.in_camera(&positions[row as usize]))?;
+            let place = lens.project(view.camera.pose.in_camera(&positions[row as usize]))?;
             Some((row as usize, nearest(&place)?))
         });
         let of_points = of_points.collect();
         let flat = |(row, place): (usize, &[f64; 2])| {
             let flat = lens.undistort(*place)?;
-            let place = [0, 1].map(|c| view.focal[c] * flat[c] + view.principal[c]);
+            let Intrinsics { focal, principal } = &view.camera.intrinsics;
+            let place = [0, 1].map(|c| focal[c] * flat[c] + principal[c]);
             let is_inside = (0..2).all(|c| (0.0..=view.size[c]).contains(&place[c]));
             is_inside.then_some((place, row as u32))
         };
@@ -495,15 +501,13 @@ impl Photo {
         let rows = self.places.iter().map(|(_, row)| *row as usize);
         let descriptors = Unit32::of(&self.descriptors, rows);
         let places = self.places.iter().map(|(place, _)| *place).collect();
-        // Pose estimation copies the view in every step.
-        let view = View { observed: Vec::new(), ..view.clone() };
-        Query { view, places, descriptors }
+        Query { camera: view.camera, size: view.size, places, descriptors }
     }
 }
 
 impl Query {
     fn bounds(&self) -> Result<Bounds<2>, Error> {
-        Bounds::try_new([0.0; 2], self.view.size)
+        Bounds::try_new([0.0; 2], self.size)
     }
 }
 

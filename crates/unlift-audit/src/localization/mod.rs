@@ -2,12 +2,12 @@
 
 pub mod held_out;
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use unlift::audit::Plan;
-use unlift::localization::{Localization, PoseError, View, unprotected, with_map, with_queries};
+use unlift::geometry::camera::{Camera, Pose, PoseError};
+use unlift::localization::{Localization, View, unprotected, with_map, with_queries};
 use unlift::obfuscate::{Change, Changed, Protection, SCHEMES, Scheme, SchemeOptions, obfuscate};
 use unlift::seed::Key;
 use unlift::truth::Original;
@@ -47,9 +47,7 @@ impl<'a> Localize<'a> {
         let held_out = Some((path.to_owned(), nth));
         Ok(Self { cameras: &prepared.cameras, held_out, protections })
     }
-}
 
-impl Localize<'_> {
     /// Returns all schemes on keypoints, and each under every protection.
     fn query_schemes(&self) -> Vec<Arc<dyn Scheme<2>>> {
         let options = SchemeOptions::usual(unlift::Unit::Pixel);
@@ -90,41 +88,24 @@ impl Cameras {
         let (cameras, images) = colmap::read_views(model)?;
         let points = colmap::read_points(&file, true)?;
         let Some(tracks) = points.tracks else { return Ok(Self::default()) };
-        let mut observed: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        let mut lengths = Vec::with_capacity(rows.len());
-        for (at, &row) in rows.iter().enumerate() {
-            let mut of_point: Vec<u32> =
-                tracks.row(row as usize).iter().map(|observation| observation.0).collect();
-            // A track may contain two keypoints of an image; both show the same point.
-            of_point.sort_unstable();
-            of_point.dedup();
-            lengths.push(of_point.len() as u32);
-            of_point.into_iter().for_each(|id| observed.entry(id).or_default().push(at as u32));
-        }
+        let (observed, lengths) = tracks.observed(&images, rows);
         let mut found = Self { tracks: lengths.into(), ..Self::default() };
-        for image in &images {
-            let Some(observed) = observed.remove(&image.id) else { continue };
+        for (image, observed) in images.iter().zip(observed).filter(|(_, rows)| !rows.is_empty()) {
             let camera = image.camera(&cameras);
-            let pinhole = camera.and_then(|camera| Some((camera, camera.pinhole()?)));
-            let Some((camera, (focal, principal))) = pinhole else {
+            let pinhole = camera.and_then(|camera| Some((camera, camera.intrinsics()?)));
+            let Some((camera, intrinsics)) = pinhole else {
                 found.left_out += 1;
                 continue;
             };
             found.images.push((image.name.clone(), camera.clone()));
-            found.views.push(View {
-                rotation: image.rotation,
-                center: image.center.map(|x| x * scale),
-                focal,
-                principal,
-                size: [camera.width_px as f64, camera.height_px as f64],
-                observed,
-            });
+            let size = [camera.width_px as f64, camera.height_px as f64];
+            let center = image.pose.center.map(|x| x * scale);
+            let camera = Camera { intrinsics, pose: Pose { center, ..image.pose } };
+            found.views.push(View { camera, size, observed });
         }
         Ok(found)
     }
-}
 
-impl Cameras {
     /// Returns a note about images that are left out.
     pub(crate) fn note(&self) -> Option<String> {
         (self.left_out > 0).then(|| {

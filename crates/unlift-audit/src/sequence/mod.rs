@@ -17,6 +17,7 @@ use serde_json::json;
 use unlift::audit::staged::{Pooled, key_of};
 use unlift::audit::{Plan, Row, Seconds};
 use unlift::evaluate::evaluate;
+use unlift::geometry::camera::PoseError;
 use unlift::neighbors::{Neighborhoods, Source, of_what_there_is};
 use unlift::obfuscate::{Scheme, obfuscate};
 use unlift::recover::recover as recover_map;
@@ -33,7 +34,7 @@ use unlift_report::inversions::Inversion as Sheet;
 use unlift_vision::pictures::Points;
 
 use self::view::Model;
-pub use self::view::{PoseError, View};
+pub use self::view::View;
 use crate::audit::{Attacked, Audit};
 use crate::gate::Tried;
 use crate::images::{FeatureSource, choice};
@@ -130,8 +131,8 @@ impl Sequence<'_> {
         options.insert("queries".into(), json!(queries));
         options.extend(self.lists.as_ref().map(|by| ("lists".to_owned(), json!(by.name()))));
         if let Some(error) = self.pose_error {
-            options.insert("pose_error_distance".into(), json!(error.distance));
-            options.insert("pose_error_angle_deg".into(), json!(error.angle_deg));
+            options.insert("pose_error_distance".into(), json!(error.center));
+            options.insert("pose_error_angle_deg".into(), json!(error.rotation_degrees));
         }
         Ok(Attacked {
             tried,
@@ -218,7 +219,7 @@ impl Sequence<'_> {
             };
             let links = &links;
             let tracks = tracks(views, &secrets);
-            let hidden = Hidden { views, queries: protected, secrets };
+            let hidden = Protected { views, queries: protected, secrets };
             let lists = self.lists.as_deref().map(|by| hidden.lists(by, plan.seed)).transpose()?;
             seconds.neighbors += started.elapsed().as_secs_f64();
             let kinds = [(SEQUENCE, links, None), (TRACKS, &tracks, None)];
@@ -276,13 +277,13 @@ fn hide(
     views: &[View],
     seed: u64,
 ) -> Result<(Vec<Query>, Vec<Secret>), Error> {
-    let one = |view: &View| {
+    let hide = |view: &View| {
         let key = key_of(&Key::from_seed(seed), &view.name);
         let hidden = obfuscate(scheme, &view.original, Some(&view.descriptors), &key);
         let (released, secret) = hidden.map_err(|error| error.within(&view.name))?;
-        Ok((Query { released, camera: view.camera.clone() }, secret))
+        Ok((Query { released, camera: view.camera }, secret))
     };
-    let hidden: Result<Vec<_>, unlift::Error> = views.iter().map(one).collect();
+    let hidden: Result<Vec<_>, unlift::Error> = views.iter().map(hide).collect();
     Ok(hidden?.into_iter().unzip())
 }
 
@@ -314,7 +315,7 @@ fn tracks(views: &[View], secrets: &[Secret]) -> Links {
 }
 
 /// Protected views with their secrets.
-struct Hidden<'a> {
+struct Protected<'a> {
     views: &'a [View],
     queries: Vec<Query>,
     secrets: Vec<Secret>,
@@ -350,32 +351,27 @@ impl Share {
 /// Shares within the headline threshold, and the share of right links.
 #[derive(Default)]
 struct Shares {
-    /// Keypoints linked in three or more views.
-    linked: Share,
-    /// Keypoints that the model's tracks link so.
-    tracked: Share,
-    /// Keypoints that show no point of the service's map.
-    new: Share,
+    /// Keypoints linked in three or more views, those that the model's tracks link so, and those that show no point of the
+    /// service's map.
+    of_keypoints: [Share; 3],
     /// Links of which the model knows both keypoints.
     right: Share,
 }
 
+/// The names of the shares of keypoints.
+const NAMES: [&str; 3] = ["linked", "tracked", "new"];
+
 impl Shares {
     fn add(&mut self, more: &Self) {
-        let pairs = [
-            (&mut self.linked, &more.linked),
-            (&mut self.tracked, &more.tracked),
-            (&mut self.new, &more.new),
-            (&mut self.right, &more.right),
-        ];
-        for (to, more) in pairs {
+        let own = self.of_keypoints.iter_mut().chain([&mut self.right]);
+        for (to, more) in own.zip(more.of_keypoints.iter().chain([&more.right])) {
             to.n += more.n;
             to.right += more.right;
         }
     }
 }
 
-impl Hidden<'_> {
+impl Protected<'_> {
     /// Makes the lists of neighbors within each query, and the positions that they give alone.
     fn lists(
         &self,
@@ -416,8 +412,7 @@ impl Hidden<'_> {
         let mut row = pooled.row().ok_or_else(missing)?;
         let of_all = |share: &Share| 100.0 * share.n as f64 / row.n_points.max(1) as f64;
         let label = &plan.thresholds[plan.headline].label;
-        for (name, share) in [("linked", &all.linked), ("tracked", &all.tracked), ("new", &all.new)]
-        {
+        for (name, share) in NAMES.into_iter().zip(&all.of_keypoints) {
             row.metrics.insert(format!("{name}_percent"), of_all(share));
             let within = share.percent().map(|of| (format!("{name}_within_{label}_percent"), of));
             row.metrics.extend(within);
@@ -455,15 +450,14 @@ impl Hidden<'_> {
         let mut shares = Shares::default();
         for (slot, &error) in accuracy.errors().iter().enumerate() {
             let is_within = error <= headline;
-            if solved.n_views[slot] >= LEAST_VIEWS {
-                shares.linked.count(is_within);
-            }
-            if 1 + tracks.track(query, slot, &window).len() >= LEAST_VIEWS {
-                shares.tracked.count(is_within);
-            }
             let point = self.point(query, slot);
-            if point.is_none() {
-                shares.new.count(is_within);
+            let counts = [
+                solved.n_views[slot] >= LEAST_VIEWS,
+                1 + tracks.track(query, slot, &window).len() >= LEAST_VIEWS,
+                point.is_none(),
+            ];
+            for (share, _) in shares.of_keypoints.iter_mut().zip(counts).filter(|(_, is)| *is) {
+                share.count(is_within);
             }
             let Some(point) = point else { continue };
             for (other, at) in attack.links.track(query, slot, &window) {
@@ -494,7 +488,7 @@ const SHOWN: usize = 3;
 /// cannot be used are reported once.
 fn paint(
     inversion: &Inversion,
-    (hidden, attack): (&Hidden<'_>, &Attack<'_>),
+    (hidden, attack): (&Protected<'_>, &Attack<'_>),
     row: &Row,
     progress: &dyn Progress,
     sheets: &mut Vec<Sheet>,

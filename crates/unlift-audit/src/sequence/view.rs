@@ -4,10 +4,10 @@
 use std::path::Path;
 
 use rayon::prelude::*;
+use unlift::geometry::camera::{Camera, Intrinsics, PoseError};
 use unlift::geometry::frame::Bounds;
 use unlift::geometry::vector::distance;
 use unlift::seed::{Draws, Stage};
-use unlift::sequence::Camera;
 use unlift::truth::Original;
 use unlift::{Descriptors, PointSet, Unit};
 use unlift_io::Error;
@@ -22,15 +22,6 @@ use crate::images::FeatureSource;
 const SHOWS_PX: f64 = 2.0;
 /// Places on each side of an image whose undistorted places bound the undistorted image.
 const PER_SIDE: usize = 32;
-
-/// An error added to each pose, as a service has it: of this size, in a random direction.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PoseError {
-    /// Distance of the camera from its true place, in units of the model.
-    pub distance: f64,
-    /// Angle between the camera and its true orientation, in degrees.
-    pub angle_deg: f64,
-}
 
 /// A query before it is protected.
 pub struct View {
@@ -55,8 +46,8 @@ pub struct View {
 impl View {
     /// Returns where the photo shows a place of the pinhole camera; NaN where it does not.
     pub fn in_photo(&self, place: [f64; 2]) -> [f32; 2] {
-        let (focal, center) = self.lens.pinhole();
-        let [x, y] = [0, 1].map(|c| (place[c] - center[c]) / focal[c]);
+        let Intrinsics { focal, principal } = self.lens.intrinsics();
+        let [x, y] = [0, 1].map(|c| (place[c] - principal[c]) / focal[c]);
         self.lens.project([x, y, 1.0]).map_or([f32::NAN; 2], |place| place.map(|x| x as f32))
     }
 }
@@ -81,19 +72,9 @@ impl Model {
             let lens = Lens::try_new(camera.model.name, &camera.params);
             (camera.id, lens, [camera.width_px, camera.height_px])
         };
-        let mut by_id: Vec<(u32, usize)> =
-            images.iter().enumerate().map(|(at, image)| (image.id, at)).collect();
-        by_id.sort_unstable();
-        let mut shown = vec![Vec::new(); images.len()];
-        if let Some(tracks) = &points.tracks {
-            for row in 0..points.ids.len() {
-                for &(id, _) in tracks.row(row) {
-                    if let Ok(at) = by_id.binary_search_by_key(&id, |image| image.0) {
-                        shown[by_id[at].1].push(row as u32);
-                    }
-                }
-            }
-        }
+        let rows: Vec<u32> = (0..points.ids.len() as u32).collect();
+        let observed = points.tracks.as_ref().map(|tracks| tracks.observed(&images, &rows).0);
+        let shown = observed.unwrap_or_else(|| vec![Vec::new(); images.len()]);
         let lenses = cameras.iter().map(lens).collect();
         Ok(Self { lenses, images, positions: points.positions, shown })
     }
@@ -123,7 +104,7 @@ impl Model {
             .collect();
         let image = |&(at, of): &(usize, usize)| {
             let image = &self.images[of];
-            (&*names[at], image.id, image.center)
+            (&*names[at], image.id, image.pose.center)
         };
         let order = in_time(&both.iter().map(image).collect::<Vec<_>>());
         let both: Vec<(usize, usize)> = order.into_iter().map(|at| both[at]).collect();
@@ -173,13 +154,15 @@ impl Model {
         }
         let points = PointSet::try_new(places, Unit::Pixel).map_err(|error| unusable(&error))?;
         let original = Original::within(points, bounds).map_err(|error| unusable(&error))?;
-        let (focal, center) = lens.pinhole();
-        let (rotation, translation) = pose(image, pose_error);
+        let pose = pose_error.map_or(image.pose, |(error, seed)| {
+            let mut draws = Draws::new(seed, Stage::Image, u64::from(image.id));
+            image.pose.with_error(error, &mut draws)
+        });
         Ok(View {
             shows: self.shows(&features, of, lens, &kept),
             original,
             descriptors: descriptors.select(&kept),
-            camera: Camera { focal, center, rotation, translation },
+            camera: Camera { intrinsics: lens.intrinsics(), pose },
             lens: lens.clone(),
             size: [*width as usize, *height as usize],
             n_left_out: features.keypoints.len() - kept.len(),
@@ -198,8 +181,7 @@ impl Model {
         let image = &self.images[of];
         let mut shows: Vec<Option<(f64, u32)>> = vec![None; kept.len()];
         for &row in &self.shown[of] {
-            let away = [0, 1, 2].map(|c| self.positions[row as usize][c] - image.center[c]);
-            let x = image.rotation.map(|r| (0..3).map(|c| r[c] * away[c]).sum::<f64>());
+            let x = image.pose.in_camera(&self.positions[row as usize]);
             let Some(place) = lens.project(x) else { continue };
             let distance2 = |at: usize| {
                 let [u, v] = features.keypoints[kept[at] as usize];
@@ -209,7 +191,7 @@ impl Model {
             let Some(at) = nearest.filter(|&at| distance2(at) <= SHOWS_PX * SHOWS_PX) else {
                 continue;
             };
-            if shows[at].is_none_or(|(other, _)| distance2(at) < other) {
+            if shows[at].is_none_or(|(nearest2, _)| distance2(at) < nearest2) {
                 shows[at] = Some((distance2(at), row));
             }
         }
@@ -219,9 +201,9 @@ impl Model {
 
 /// Returns where a pinhole camera with the focal lengths and the principal point of the lens sees what the lens sees at `place`.
 fn undistorted(lens: &Lens, place: [f64; 2]) -> Option<[f64; 2]> {
-    let (focal, center) = lens.pinhole();
+    let Intrinsics { focal, principal } = lens.intrinsics();
     let flat = lens.undistort(place)?;
-    Some([0, 1].map(|c| focal[c] * flat[c] + center[c]))
+    Some([0, 1].map(|c| focal[c] * flat[c] + principal[c]))
 }
 
 /// Returns the box of the undistorted image.
@@ -274,35 +256,6 @@ fn natural(name: &str) -> Vec<(usize, &str)> {
         rest = others;
     }
     parts
-}
-
-type Pose = ([[f64; 3]; 3], [f64; 3]);
-
-/// Returns rotation and translation of an image, with the error that a service has.
-fn pose(image: &Image, error: Option<(PoseError, u64)>) -> Pose {
-    let (mut rotation, mut center) = (image.rotation, image.center);
-    if let Some((error, seed)) = error {
-        let mut draws = Draws::new(seed, Stage::Image, u64::from(image.id));
-        let (axis, direction): ([f64; 3], [f64; 3]) = (draws.direction(), draws.direction());
-        (0..3).for_each(|c| center[c] += error.distance * direction[c]);
-        rotation = turned(&rotation, axis, error.angle_deg.to_radians());
-    }
-    let translation = rotation.map(|row| -(0..3).map(|c| row[c] * center[c]).sum::<f64>());
-    (rotation, translation)
-}
-
-/// Returns `rotation`, followed by a turn by `angle` about `axis`.
-fn turned(rotation: &[[f64; 3]; 3], axis: [f64; 3], angle: f64) -> [[f64; 3]; 3] {
-    let (sin, cos) = (libm::sin(angle), libm::cos(angle));
-    let [x, y, z] = axis;
-    let cross = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
-    let turn = |r: usize, c: usize| {
-        let same = if r == c { cos } else { 0.0 };
-        same + sin * cross[r][c] + (1.0 - cos) * axis[r] * axis[c]
-    };
-    std::array::from_fn(|r| {
-        std::array::from_fn(|c| (0..3).map(|k| turn(r, k) * rotation[k][c]).sum())
-    })
 }
 
 #[cfg(test)]

@@ -262,7 +262,7 @@ fn a_released_file_that_gives_places_away_is_no_protection() {
         let secret = Secret::try_new(hidden, None, rows, Vec::new(), N).unwrap();
         let secret = secret.of_map(Some(released.fingerprint()), 1).unwrap();
         let plan = plan(&["olc"]);
-        let read = read_from_file(&[feet], (&points.original, &secret), &plan.thresholds);
+        let read = read_from_file(&[feet], &points.original, &secret, &plan.thresholds);
         let release = (released, secret);
         let map = Map { plan, ..Map::of(&points.original) };
         let input = Input::Released(map, Hidden { release: &release, read });

@@ -58,7 +58,7 @@ pub struct OracleArgs {
     /// records), near (random records between the (2 x K)-th and the (10 x K)-th nearest),
     /// clustered (nearby points share the same few wrong places, as happens where descriptors look
     /// alike) [default: uniform]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::noise)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::by(Noise::from_name))]
     pub oracle_noise: Vec<Noise>,
     /// Average the results over N random seeds
     #[arg(long, value_name = "N", default_value = "1", value_parser = value_parser!(u32).range(1..=10_000))]
@@ -101,7 +101,7 @@ pub struct ProtectArgs {
     /// also subspace:4:random or :adversarial. ldp:256,2,8 releases 2 of 256 public words, which
     /// contain the nearest one with a probability for epsilon = 8 (ICCV 2023). Sources read what
     /// an attacker infers
-    #[arg(long, value_name = "RULE", value_parser = values::protection)]
+    #[arg(long, value_name = "RULE", value_parser = values::by(Protection::parse))]
     pub protect_descriptors: Vec<Protection>,
     /// Folder of photos, or file of features, whose descriptors owner and attacker know: the
     /// database of adversarial directions, and the source of words. Never use those of the map
@@ -154,7 +154,7 @@ impl PaintArgs {
 pub struct ExtractionArgs {
     /// Features to extract from photos: sift, aliked, or superpoint, whose weights you supply (see
     /// unlift models) [default: sift]
-    #[arg(long, value_name = "TYPE", value_parser = values::feature_type)]
+    #[arg(long, value_name = "TYPE", value_parser = values::by(DescriptorKind::from_name))]
     pub features: Option<DescriptorKind>,
     /// Number of features per photo. aliked and superpoint keep the N best. sift keeps whole
     /// scales, the coarsest first, and stops after the scale that exceeds N, so it may return more
@@ -182,7 +182,7 @@ impl ExtractionArgs {
     /// Adds the options that were given to those of the report.
     pub fn record(&self, options: &mut Map<String, Value>) {
         record(options, "features", self.features.map(|kind| json!(kind.name())));
-        record(options, "max_features", self.max_features.map(|most| json!(most.get())));
+        record(options, "max_features", self.max_features.map(|max| json!(max.get())));
         record(options, "min_score", self.min_score.map(|score| json!(score)));
     }
 }
@@ -272,7 +272,7 @@ pub struct AuditMapArgs {
     /// images observe; noise:0.1 adds Gaussian noise of this standard deviation to each value of
     /// unit-length descriptors; bits:2 rounds each value to 2 bits; pca:32 keeps 32 principal
     /// components; drop:0.5 withholds half of the descriptors
-    #[arg(long, value_name = "STEPS", value_parser = values::mitigation, help_heading = "Attack")]
+    #[arg(long, value_name = "STEPS", value_parser = values::by(Mitigation::parse), help_heading = "Attack")]
     pub mitigate: Vec<Mitigation>,
     #[command(flatten)]
     pub protect: ProtectArgs,
@@ -529,7 +529,7 @@ impl AuditMapArgs {
     /// Returns the options that change the points, for the report.
     pub fn record(&self) -> Map<String, Value> {
         let mut options = Map::new();
-        record(&mut options, "max_points", self.map.max_points.map(|most| json!(most.get())));
+        record(&mut options, "max_points", self.map.max_points.map(|max| json!(max.get())));
         record(&mut options, "mitigate", named(&self.mitigate));
         self.protect.record(&mut options);
         let hold_out = self.localize.as_ref().map(|_| json!(self.hold_out.get()));
@@ -548,7 +548,7 @@ impl AuditImagesArgs {
         let mut options = Map::new();
         self.extraction.record(&mut options);
         self.protect.record(&mut options);
-        record(&mut options, "max_images", self.max_images.map(|most| json!(most.get())));
+        record(&mut options, "max_images", self.max_images.map(|max| json!(max.get())));
         record(&mut options, "invert", self.paint.invert.as_ref().map(|_| json!(true)));
         options
     }

@@ -9,6 +9,8 @@ use unlift::neighbors::oracle::Noise;
 use unlift::obfuscate::Entry;
 use unlift::recover::Builtin;
 
+use unlift_vision::network::DescriptorKind;
+
 use super::audits::{ExtractionArgs, MapArgs};
 use crate::values::{self, NeighborSource};
 
@@ -53,7 +55,7 @@ pub struct ObfuscateArgs {
     #[arg(value_name = "PATH")]
     pub path: PathBuf,
     /// Scheme that hides the points (unlift schemes lists them). Schemes for images need images
-    #[arg(long, value_name = "SCHEME", value_parser = values::any_scheme)]
+    #[arg(long, value_name = "SCHEME", value_parser = values::by(unlift::obfuscate::scheme))]
     pub scheme: &'static Entry,
     /// Folder for released.npz and truth.npz; other files in it stay
     #[arg(long, value_name = "DIR", default_value = "unlift-obfuscated")]
@@ -95,7 +97,7 @@ pub struct NeighborsArgs {
     #[arg(long, value_name = "RATIO", value_parser = values::ratio, requires = "truth")]
     pub inlier_ratio: Option<f64>,
     /// For the oracle: wrong entries of the lists, uniform, near or clustered (see unlift audit map)
-    #[arg(long, value_name = "MODEL", value_parser = values::noise, default_value = "uniform")]
+    #[arg(long, value_name = "MODEL", value_parser = values::by(Noise::from_name), default_value = "uniform")]
     pub oracle_noise: Noise,
     /// Number of records per list; there is a list per hidden point [default: 50 for the oracle,
     /// otherwise chosen by the source]
@@ -252,8 +254,8 @@ pub struct InvertArgs {
     pub recovered: Option<PathBuf>,
     /// Features to extract from photos: sift, aliked, or superpoint, whose weights you supply (see
     /// unlift models) [default: sift]
-    #[arg(long, value_name = "TYPE", value_parser = values::feature_type)]
-    pub features: Option<unlift_vision::network::DescriptorKind>,
+    #[arg(long, value_name = "TYPE", value_parser = values::by(DescriptorKind::from_name))]
+    pub features: Option<DescriptorKind>,
     /// COLMAP model with the cameras from which to paint the map; only if PATH is a released map
     #[arg(long, value_name = "MODEL", requires = "recovered", requires = "scale")]
     pub cameras: Option<PathBuf>,

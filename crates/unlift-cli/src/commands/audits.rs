@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use serde_json::json;
 use unlift::audit::{Measure, NeighborsBy, Plan, Threshold, scheme_called};
+use unlift::geometry::camera::PoseError;
 use unlift::neighbors::sources::Named;
 use unlift::obfuscate::{Change, Changed, Entry, Mitigation, SCHEMES, Scheme, SchemeOptions};
 use unlift::recover::Builtin;
@@ -17,7 +18,7 @@ use unlift_audit::images::{FeatureSource, Opened, Opening};
 use unlift_audit::inversion::{Inversion, MapInversion};
 use unlift_audit::localization::Localize;
 use unlift_audit::maps::Map;
-use unlift_audit::sequence::{PoseError, Sequence};
+use unlift_audit::sequence::Sequence;
 use unlift_audit::{
     Audit, Audited, Finished, Hidden, Input, Output, Preparation, Prepared, Request, Tiles, Views,
     by_point, check_thresholds, distinct, read_from_file, released,
@@ -157,7 +158,7 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<Outcome> {
         }
         let unit = prepared.original.reveal().unit();
         let n_points = prepared.original.len();
-        let n_together = args.tile_points.map_or(n_points, |most| n_points.min(most.get()));
+        let n_together = args.tile_points.map_or(n_points, |max| n_points.min(max.get()));
         let mut usual = Plan::new(unit).for_map(n_together, usize::from(args.map.k));
         if args.full {
             usual.inlier_ratios = Plan::<3>::new(unit).inlier_ratios;
@@ -175,14 +176,15 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<Outcome> {
         let place = "(--descriptors FILE)";
         let planned = request.of_map(usual, &prepared, descriptors, place)?;
         let mut plan = planned.note(&mut prepared);
-        plan.measures.extend(inversion.iter().map(|one| Arc::clone(one) as Arc<dyn Measure<3>>));
+        plan.measures
+            .extend(inversion.iter().map(|measure| Arc::clone(measure) as Arc<dyn Measure<3>>));
         let mut map = Map { plan, inversion, ..Map::new(&prepared) };
         if let Some(path) = &args.localize {
             let nth = args.hold_out.get();
             map.localize = Some(Localize::held_out(&prepared, path, nth, protections)?);
         }
         let input = match args.tile_points {
-            Some(most) => Input::Tiles(map, Tiles { max_points: most.get(), only: None }),
+            Some(max) => Input::Tiles(map, Tiles { max_points: max.get(), only: None }),
             None => Input::Map(map),
         };
         let mut audit = Audit::of_map(input, &prepared, output);
@@ -217,9 +219,9 @@ pub fn released(args: &AuditReleasedArgs) -> crate::Result<Outcome> {
         let planned = request.of_map(usual, &prepared, descriptors, place)?;
         let plan = planned.note(&mut prepared);
         let published = published_positions(&args.released)?;
-        let truth = (&prepared.original, &hidden.1);
-        let read = read_from_file(&published, truth, &plan.thresholds);
-        let map = Map { plan, ..Map::of(&prepared.original) };
+        let (original, secret) = (&prepared.original, &hidden.1);
+        let read = read_from_file(&published, original, secret, &plan.thresholds);
+        let map = Map { plan, ..Map::of(original) };
         let input = Input::Released(map, Hidden { release: &hidden, read });
         let mut audit = Audit::of_map(input, &prepared, output);
         audit.about = files.about(prepared.original.len())?;
@@ -249,7 +251,7 @@ pub fn images(args: &AuditImagesArgs) -> crate::Result<Outcome> {
         let photos = args.paint.photos.as_deref();
         let opening = Opening {
             wanted: args.extraction.wanted(),
-            max_images: args.max_images.map(|most| most.get()),
+            max_images: args.max_images.map(|max| max.get()),
             photos,
             paints: args.paint.invert.is_some(),
             uses_descriptors: args.paint.invert.is_some()
@@ -271,7 +273,8 @@ pub fn images(args: &AuditImagesArgs) -> crate::Result<Outcome> {
         )?;
         let changes: Vec<Change> = protections.into_iter().map(Change::Protection).collect();
         plan.schemes.extend(Changed::all(&plan.schemes, &changes));
-        plan.measures.extend(inversion.iter().map(|one| Arc::clone(one) as Arc<dyn Measure<2>>));
+        plan.measures
+            .extend(inversion.iter().map(|measure| Arc::clone(measure) as Arc<dyn Measure<2>>));
         let progress = Progress::new(args.audit.quiet);
         let photos = args.paint.photos.clone();
         let images = Images { opened: &opened, plan, draws: true, photos, inversion };
@@ -298,8 +301,8 @@ pub fn sequence(args: &AuditSequenceArgs) -> crate::Result<Outcome> {
     let plan = request.plan(Plan { thresholds, ..usual }, false)?;
     let pose_error = match (args.poses, args.scale) {
         (None, _) => None,
-        (Some((cm, angle_deg)), Some(scale)) => {
-            Some(PoseError { distance: 0.01 * cm / scale, angle_deg })
+        (Some((cm, rotation_degrees)), Some(scale)) => {
+            Some(PoseError { center: 0.01 * cm / scale, rotation_degrees })
         }
         (Some(_), None) => {
             let expected = "expected --scale, meters per unit of the model";

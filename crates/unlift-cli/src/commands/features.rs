@@ -11,12 +11,12 @@ use unlift_vision::features::photo::Turn;
 
 use super::common::all_could_be;
 use crate::args::FeaturesArgs;
-use crate::exit::{Outcome, line, usage};
+use crate::exit::{Outcome, usage};
 use crate::output::print;
 use crate::progress::Progress;
-use unlift_audit::check_file;
 use unlift_audit::images::extraction::Wanted;
 use unlift_audit::images::{FeatureSource, is_photo};
+use unlift_audit::{Progress as _, check_file};
 
 #[derive(Default)]
 struct Tally {
@@ -35,11 +35,11 @@ pub fn run(args: &FeaturesArgs) -> crate::Result<Outcome> {
     let mut progress = Progress::new(args.quiet);
     let mut tally = Tally::default();
     if let Some(note) = &source.passed_over {
-        progress.say(&format!("unlift: note: {note}"));
+        progress.say(&format!("note: {note}"));
     }
     for error in source.refused() {
         tally.failed += 1;
-        progress.say(&line(error));
+        progress.say(&error.to_string());
     }
     write(&source, (args, &rules), &mut tally, &mut progress)?;
     drop(progress);
@@ -107,7 +107,7 @@ fn write(
             }
             Err(error) => {
                 tally.failed += 1;
-                progress.say(&line(&error));
+                progress.say(&error.to_string());
             }
         }
         Ok(())

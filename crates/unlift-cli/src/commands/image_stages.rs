@@ -44,7 +44,7 @@ pub struct Counts {
 }
 
 /// Runs `work` in parallel on the items of `next`, and passes the results to `done` in order.
-fn each<T: Send, U: Send>(
+pub fn each<T: Send, U: Send>(
     mut next: impl FnMut() -> crate::Result<Option<T>>,
     work: impl Fn(T) -> crate::Result<U> + Sync,
     mut done: impl FnMut(U) -> crate::Result<()>,
@@ -53,7 +53,7 @@ fn each<T: Send, U: Send>(
         let mut batch = Vec::new();
         while batch.len() < AT_WORK * rayon::current_num_threads() {
             match next()? {
-                Some(one) => batch.push(one),
+                Some(item) => batch.push(item),
                 None => break,
             }
         }

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 use unlift::OneLine;
+use unlift::recover::Recovered;
 use unlift::released::Released;
 use unlift_audit::changes::kind_of;
 use unlift_audit::images::extraction::Wanted;
@@ -23,14 +24,12 @@ use unlift_vision::features::{ColorImage, photo};
 use unlift_vision::network::DescriptorKind;
 
 use super::common::all_could_be;
+use super::image_stages;
 use crate::args::InvertArgs;
 use crate::exit::{Outcome, line, usage};
 use crate::output::print;
 use crate::stderr;
 use unlift_audit::released::same_map;
-
-/// Images in memory per thread.
-const AT_WORK: usize = 2;
 
 pub fn run(args: &InvertArgs) -> crate::Result<Outcome> {
     let inputs = [Some(&args.path), args.recovered.as_ref(), args.cameras.as_ref()];
@@ -82,11 +81,19 @@ impl Target<'_> {
         Ok(self.rules.check(&file, Kind::Picture)?)
     }
 
-    fn write(&self, file: &Path, picture: &ColorImage) -> crate::Result<()> {
+    /// Writes the picture of image `name`.
+    fn add(&self, name: &str, picture: &ColorImage) -> crate::Result<()> {
+        let file = self.file(name)?;
         let bytes = marked_picture(&photo::png_of(picture)?);
-        write_file(file, Access::Private, |out| std::io::Write::write_all(out, &bytes))?;
+        write_file(&file, Access::Private, |out| std::io::Write::write_all(out, &bytes))?;
         self.painted.fetch_add(1, Ordering::Relaxed);
         Ok(())
+    }
+
+    /// Prints the error of an image that has no picture. Returns the number of these images.
+    fn count(&self, result: crate::Result<()>) -> usize {
+        let failed = result.err().inspect(|error| stderr::tell(line(error)));
+        usize::from(failed.is_some())
     }
 
     /// Returns the indices of the images to paint, out of `n`.
@@ -102,14 +109,9 @@ fn each<T: Sync>(
     images: &[T],
     paint: impl Fn(&T) -> crate::Result<(String, ColorImage)> + Sync,
 ) -> crate::Result<usize> {
-    let one = |image: &T| -> crate::Result<()> {
-        let (name, picture) = paint(image)?;
-        to.write(&to.file(&name)?, &picture)
-    };
-    let results: Vec<_> = images.par_iter().with_max_len(1).map(one).collect();
-    let failed: Vec<_> = results.into_iter().filter_map(Result::err).collect();
-    failed.iter().for_each(|error| stderr::tell(line(error)));
-    Ok(failed.len())
+    let work = |image: &T| paint(image).and_then(|(name, picture)| to.add(&name, &picture));
+    let results: Vec<_> = images.par_iter().with_max_len(1).map(work).collect();
+    Ok(results.into_iter().map(|result| to.count(result)).sum())
 }
 
 /// Paints from the keypoints of photos or of a file.
@@ -154,33 +156,34 @@ fn images(to: &Target<'_>, recovered: &Path) -> crate::Result<usize> {
     let painter = &Painter::open(kind_of_images(path)?, None)?;
     let mut released = ImageFile::open(path, Stage::Released)?;
     let mut recovered_file = ImageFile::open(recovered, Stage::Recovered)?;
-    let (mut unusable, mut at_work) = (0, Vec::new());
-    let paint = |at_work: &mut Vec<_>| {
-        let n = each(to, at_work, |(name, released, recovered)| {
-            let picture = painter.image(released, recovered);
-            let place =
-                |error: unlift::Error| Error::core(path, error.within(&format!("image {name}")));
-            Ok((String::clone(name), picture.map_err(place)?))
-        });
-        at_work.clear();
-        n
-    };
-    let mut left = to.args.max_images.map_or(usize::MAX, |most| most.get());
-    while let Some(rows) = released.next_image()?.filter(|_| left > 0) {
+    let mut left = to.args.max_images.map_or(usize::MAX, NonZeroUsize::get);
+    let next = || {
+        if left == 0 {
+            return Ok(None);
+        }
         left -= 1;
+        let Some(rows) = released.next_image()? else {
+            recovered_file.expect_end(path)?;
+            return Ok(None);
+        };
         let name = rows.name().to_owned();
         let image = rows.released()?;
         let came_back = recovered_file.expect(&name, path)?.recovered()?;
         same_map(recovered, came_back.about().map, path, Some(image.fingerprint()))?;
-        at_work.push((name, image, came_back));
-        if at_work.len() >= AT_WORK * rayon::current_num_threads() {
-            unusable += paint(&mut at_work)?;
-        }
-    }
-    if left > 0 {
-        recovered_file.expect_end(path)?;
-    }
-    Ok(unusable + paint(&mut at_work)?)
+        Ok(Some((name, image, came_back)))
+    };
+    let mut unusable = 0;
+    let work = |(name, released, recovered): (String, Released<2>, Recovered<2>)| {
+        let picture = painter.image(&released, &recovered);
+        let place =
+            |error: unlift::Error| Error::core(path, error.within(&format!("image {name}")));
+        Ok(picture.map_err(place).map_err(Into::into).and_then(|picture| to.add(&name, &picture)))
+    };
+    image_stages::each(next, work, |result| {
+        unusable += to.count(result);
+        Ok(())
+    })?;
+    Ok(unusable)
 }
 
 /// Paints from the recovered points of a map, as the cameras of a model see them.
@@ -205,8 +208,7 @@ fn map(to: &Target<'_>, recovered: &Path) -> crate::Result<usize> {
         let of_image = |error: unlift::Error| {
             Error::core(model, error.within(&format!("image {}", name.escape_debug())))
         };
-        let camera = cameras.iter().find(|camera| camera.id == image.camera_id);
-        let camera = camera.ok_or_else(|| {
+        let camera = image.camera(&cameras).ok_or_else(|| {
             of_image(unlift::Error::new("camera", "one of the model", image.camera_id.to_string()))
         })?;
         let view = view(camera, image, scale).map_err(of_image)?;
@@ -224,8 +226,8 @@ fn map(to: &Target<'_>, recovered: &Path) -> crate::Result<usize> {
 fn bearings(to: &Target<'_>, released: &Released<3>) -> crate::Result<usize> {
     let of_map = |error| Error::core(&to.args.path, error);
     let painter = Painter::open(kind_of("PATH", released.descriptors())?, None)?;
-    let seen = on_bearings(released).map_err(of_map)?;
+    let places = on_bearings(released).map_err(of_map)?;
     each(to, &six_views(released).map_err(of_map)?, |(name, view)| {
-        Ok(((*name).to_owned(), painter.map(view, released, &seen).map_err(of_map)?))
+        Ok(((*name).to_owned(), painter.map(view, released, &places).map_err(of_map)?))
     })
 }

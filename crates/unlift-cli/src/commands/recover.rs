@@ -16,8 +16,8 @@ use crate::exit::Outcome;
 use crate::output::print;
 use crate::progress::Progress;
 use crate::stderr;
-use unlift_audit::check_file;
 use unlift_audit::released::same_map;
+use unlift_audit::{Progress as _, check_file};
 
 /// Returns notes on lists that another program wrote; `offsets` are the starts of the lists.
 fn notes(offsets: &[u64], about: About, slots_per_record: usize) -> Vec<String> {
@@ -57,7 +57,7 @@ pub fn run(args: &RecoverArgs) -> crate::Result<Outcome> {
     let of = &args.released;
     same_map(&args.neighbors, lists.about().map, of, Some(released.fingerprint()))?;
     for note in notes(lists.offsets(), lists.about(), released.slots_per_record()) {
-        alive.say(&format!("unlift: note: {}: {note}", args.neighbors.display()));
+        alive.say(&format!("note: {}: {note}", args.neighbors.display()));
     }
     let recovered = recover(&released, &lists, &args.solver, &options);
     let recovered = recovered.map_err(|error| unlift_io::Error::core(&args.released, error))?;
@@ -78,11 +78,11 @@ pub fn run(args: &RecoverArgs) -> crate::Result<Outcome> {
 fn images(args: &RecoverArgs, options: &RecoverOptions, rules: &Rules) -> crate::Result<Outcome> {
     let alive = Progress::uncounted(false, "recovering");
     // The same note about several images is printed once.
-    let mut told = HashSet::new();
+    let mut printed = HashSet::new();
     let note = |lists: &Neighborhoods, slots: usize| {
         for note in notes(lists.offsets(), lists.about(), slots) {
             let what = note.split(|c: char| c.is_ascii_digit()).next_back().unwrap_or_default();
-            if told.insert(what.to_owned()) {
+            if printed.insert(what.to_owned()) {
                 stderr::note(format_args!("{}: {note}", args.neighbors.display()));
             }
         }

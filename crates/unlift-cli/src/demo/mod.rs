@@ -3,7 +3,7 @@
 pub mod photos;
 
 use std::path::Path;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use serde_json::json;
 use unlift::audit::{Measure, NeighborsBy, Plan};
@@ -22,14 +22,14 @@ use unlift_io::hash::hash_positions;
 use unlift_io::outputs::{Kind, OutputSet, Rules};
 use unlift_report::Shares;
 use unlift_report::document::Input as About;
-use unlift_vision::features::{AlikedOptions, Extraction};
+use unlift_vision::features::{Extraction, LearnedOptions};
 use unlift_vision::network::{DescriptorKind, Learned};
 
 use crate::args::DemoArgs;
 use crate::commands::common::with_threads;
 use crate::exit::Outcome;
 use crate::output::{command_line, print, table};
-use crate::progress::Progress;
+use crate::progress::{Progress, Stderr};
 
 /// Seed of the synthetic room.
 const SEED: u64 = 0;
@@ -50,11 +50,12 @@ pub fn run(args: &DemoArgs) -> crate::Result<Outcome> {
     let rules = Rules::new([], false);
     let mut out = OutputSet::create(&args.out, rules, Access::Private, &files).map_err(refused)?;
     let text = with_threads(|| {
-        let bar = Progress::new(args.quiet);
-        bar.show(0, PARTS, "");
         let output = || Output { command: Some(command_line()), ..Output::new(&args.out) };
-        let photos = photos(&Part::new(&bar, "attacking two protected photos", 40.0), output())?;
-        let map = map(&Part::new(&bar, "attacking a protected map", 60.0), output())?;
+        let attacking = Progress::uncounted(args.quiet, "attacking two protected photos");
+        let photos = photos(output())?;
+        drop(attacking);
+        let _attacking = Progress::uncounted(args.quiet, "attacking a protected map");
+        let map = map(output())?;
         photos.stage(&mut out, OF_PHOTOS, false)?;
         let (of_photos, of_map) = (photos.shares(), map.shares());
         let title = "Two photos: a cat and a cup of coffee";
@@ -67,9 +68,9 @@ pub fn run(args: &DemoArgs) -> crate::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-fn photos(progress: &Part<'_>, output: Output) -> crate::Result<Audited> {
+fn photos(output: Output) -> crate::Result<Audited> {
     let folder = photos::folder()?;
-    let options = AlikedOptions { min_score: photos::MIN_SCORE, ..AlikedOptions::default() };
+    let options = LearnedOptions { min_score: photos::MIN_SCORE, ..LearnedOptions::ALIKED };
     let source = FeatureSource::open(folder.path(), &Extraction::Aliked(options))?;
     let of = (&source, folder.path());
     let inversion = Arc::new(Inversion::open(of, DescriptorKind::Aliked, None, None)?);
@@ -89,13 +90,13 @@ fn photos(progress: &Part<'_>, output: Output) -> crate::Result<Audited> {
     let mut audit = Audit::new(Input::Images(images), output);
     audit.options.insert("features".into(), json!(DescriptorKind::Aliked.name()));
     audit.options.insert("min_score".into(), json!(photos::MIN_SCORE));
-    let mut audited = audit.run(progress)?;
+    let mut audited = audit.run(&Stderr)?;
     // The temporary path is meaningless.
     audited.document.input.path = Some("Two photos of the demo".to_owned());
     Ok(audited)
 }
 
-fn map(progress: &Part<'_>, output: Output) -> crate::Result<Audited> {
+fn map(output: Output) -> crate::Result<Audited> {
     let room = synthetic::room(SEED, N_POINTS);
     let sha256 = hash_positions(&room.points);
     let original = Original::new(PointSet::try_new(room.points, Unit::Meter)?);
@@ -119,7 +120,7 @@ fn map(progress: &Part<'_>, output: Output) -> crate::Result<Audited> {
         unit_in_map_units: Some(1.0),
         ..About::default()
     };
-    audit.run(progress)
+    audit.run(&Stderr)
 }
 
 /// Formats a short summary for users who do not know the schemes.
@@ -143,47 +144,4 @@ fn summary(photos: Vec<Shares>, map: Vec<Shares>, page: &Path) -> String {
         table(&map_rows, &[1]),
         unlift::OneLine(page.display())
     )
-}
-
-/// Length of the progress bar; each part of the demo takes steps in proportion to its time.
-const PARTS: usize = 100;
-
-/// Progress of one part of the demo, with a plain description.
-struct Part<'a> {
-    bar: &'a Progress,
-    words: &'static str,
-    /// Number of steps of the bar.
-    weight: f64,
-    /// Finished items and all items.
-    items: Mutex<(f64, usize)>,
-}
-
-impl<'a> Part<'a> {
-    fn new(bar: &'a Progress, words: &'static str, weight: f64) -> Self {
-        unlift_audit::Progress::add(bar, 0.0, words);
-        Self { bar, words, weight, items: Mutex::new((0.0, 1)) }
-    }
-
-    fn step(&self, change: impl FnOnce(&mut (f64, usize))) {
-        let mut items = self.items.lock().unwrap_or_else(PoisonError::into_inner);
-        let before = items.0 / items.1 as f64;
-        change(&mut items);
-        items.0 = items.0.min(items.1 as f64);
-        let share = (items.0 / items.1 as f64 - before).max(0.0);
-        unlift_audit::Progress::add(self.bar, share * self.weight, self.words);
-    }
-}
-
-impl unlift_audit::Progress for Part<'_> {
-    fn show(&self, done: usize, total: usize, _: &str) {
-        self.step(|items| *items = (done as f64, total.max(1)));
-    }
-
-    fn add(&self, share: f64, _: &str) {
-        self.step(|items| items.0 += share);
-    }
-
-    fn say(&self, line: &str) {
-        self.bar.say(line);
-    }
 }

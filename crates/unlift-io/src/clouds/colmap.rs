@@ -41,8 +41,8 @@ pub fn write_images(path: &Path, images: &[Image]) -> Result<(), Error> {
     atomic::write_file(path, Access::Private, |w| {
         writeln!(w, "{MODEL_MARK}\n# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME")?;
         for image in images {
-            let [qw, qx, qy, qz] = quaternion(&image.rotation);
-            let [tx, ty, tz] = image.rotation.map(|row| -dot(&row, &image.center));
+            let [qw, qx, qy, qz] = quaternion(&image.pose.rotation);
+            let [tx, ty, tz] = image.pose.translation();
             write!(w, "{} {qw} {qx} {qy} {qz} {tx} {ty} {tz} {} ", image.id, image.camera_id)?;
             w.write_all(&image.name)?;
             // The line of 2D points is required, and empty.
@@ -70,10 +70,6 @@ pub fn write_model_points(path: &Path, points: &[Option<[f64; 3]>]) -> Result<()
         }
         Ok(())
     })
-}
-
-fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Returns the unit quaternion (w, x, y, z) of a rotation, with `w >= 0`.
@@ -107,6 +103,8 @@ fn quaternion(r: &[[f64; 3]; 3]) -> [f64; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use unlift::geometry::camera::Pose;
+
     use crate::read::colmap::{CameraModel, read_points, read_views};
 
     /// Rotations about each axis and an oblique one, including half turns.
@@ -145,8 +143,7 @@ mod tests {
                 id: at as u32 + 1,
                 name: format!("seq/{at}.png").into_bytes(),
                 camera_id: 3,
-                center: [1.5 * at as f64, -2.0, 0.25],
-                rotation,
+                pose: Pose { rotation, center: [1.5 * at as f64, -2.0, 0.25] },
                 n_points2d: 0,
             })
             .collect();
@@ -160,8 +157,8 @@ mod tests {
         for (read, written) in read_images.iter().zip(&images) {
             assert_eq!((read.id, &read.name), (written.id, &written.name));
             let near = |a: f64, b: f64| (a - b).abs() < 1e-9 * (1.0 + b.abs());
-            assert!((0..3).all(|c| near(read.center[c], written.center[c])), "{read:?}");
-            let (a, b) = (read.rotation.as_flattened(), written.rotation.as_flattened());
+            assert!((0..3).all(|c| near(read.pose.center[c], written.pose.center[c])), "{read:?}");
+            let (a, b) = (read.pose.rotation.as_flattened(), written.pose.rotation.as_flattened());
             assert!(a.iter().zip(b).all(|(&a, &b)| near(a, b)), "{read:?} {written:?}");
         }
         let read = read_points(&at("points3D.txt"), false).unwrap();
@@ -176,8 +173,7 @@ mod tests {
             id: 7,
             name: name.to_vec(),
             camera_id: 1,
-            center: [0.0; 3],
-            rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            pose: Pose::IDENTITY,
             n_points2d: 0,
         };
         for name in [&b"a b.png"[..], b"", b"a\n9 1 0 0 0 0 0 0 1 b"] {

@@ -5,11 +5,14 @@
 //!
 //! Source: COLMAP's documentation, "Output Format".
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+
+use unlift::geometry::camera::{Intrinsics, Pose};
 
 use super::bytes::Bytes;
 use super::lines::{Lines, coordinates, number, quoted, words};
-use super::map_input::center_and_rotation;
+use super::map_input::pose_of;
 use crate::error::Error;
 
 /// A camera model as files store it. Audits of points do not need its projection.
@@ -83,7 +86,7 @@ pub struct Camera {
 
 impl Camera {
     /// Returns focal lengths and principal point in pixels; `None` for a panorama, which has none.
-    pub fn pinhole(&self) -> Option<([f64; 2], [f64; 2])> {
+    pub fn intrinsics(&self) -> Option<Intrinsics> {
         if self.model.name == "EQUIRECTANGULAR" {
             return None;
         }
@@ -93,7 +96,7 @@ impl Camera {
         let principal = [value(first)?, value(first + 1)?];
         let all = [focal, principal].concat();
         let usable = all.iter().all(|x| x.is_finite()) && focal.iter().all(|&f| f > 0.0);
-        usable.then_some((focal, principal))
+        usable.then_some(Intrinsics { focal, principal })
     }
 }
 
@@ -106,11 +109,8 @@ pub struct Image {
     pub name: Vec<u8>,
     /// The id of its camera.
     pub camera_id: u32,
-    /// The camera center in the world, in units of the model. Not finite if the file has no pose.
-    pub center: [f64; 3],
-    /// The rotation from world to camera: a world point `x` is at `rotation (x - center)`. Camera
-    /// axes point right, down and forward.
-    pub rotation: [[f64; 3]; 3],
+    /// The pose in units of the model. Not finite if the file has none.
+    pub pose: Pose,
     /// The number of 2D points, triangulated or not.
     pub n_points2d: u64,
 }
@@ -126,7 +126,7 @@ impl Image {
 
     /// The unit vector in the world that points up in the photo.
     pub fn up(&self) -> [f64; 3] {
-        self.rotation[1].map(|x| -x)
+        self.pose.rotation[1].map(|x| -x)
     }
 }
 
@@ -153,6 +153,22 @@ pub struct Tracks {
 impl Tracks {
     pub(super) fn new() -> Self {
         Self { offsets: vec![0], observations: Vec::new() }
+    }
+
+    /// Returns, for each of `images`, which of the points in `rows` it observes, as indices in `rows`, and the number of images that
+    /// observe each point. An image counts once per point.
+    pub fn observed(&self, images: &[Image], rows: &[u32]) -> (Vec<Vec<u32>>, Vec<u32>) {
+        let by_id: BTreeMap<u32, usize> =
+            images.iter().enumerate().rev().map(|(at, image)| (image.id, at)).collect();
+        let mut observed = vec![Vec::new(); images.len()];
+        let of_point = |(at, &row): (usize, &u32)| {
+            let ids: BTreeSet<u32> = self.row(row as usize).iter().map(|(id, _)| *id).collect();
+            let known = ids.iter().filter_map(|id| by_id.get(id));
+            known.for_each(|&image| observed[image].push(at as u32));
+            ids.len() as u32
+        };
+        let lengths = rows.iter().enumerate().map(of_point).collect();
+        (observed, lengths)
     }
 
     /// Returns the observations of the point in `row`.
@@ -214,7 +230,7 @@ pub fn read_views(model: &Path) -> Result<(Vec<Camera>, Vec<Image>), Error> {
             let expected = format!("the id of a camera in cameras.{extension}");
             return wrong(expected, image.camera_id.to_string());
         }
-        if image.center.iter().any(|x| !x.is_finite()) {
+        if image.pose.center.iter().any(|x| !x.is_finite()) {
             return wrong("a finite pose".to_owned(), "none".to_owned());
         }
     }
@@ -314,12 +330,12 @@ fn binary_images(path: &Path) -> Result<Vec<Image>, Error> {
         let id = bytes.u32("image id")?;
         let rotation = bytes.doubles("rotation")?;
         let translation = bytes.doubles("translation")?;
-        let (center, rotation) = center_and_rotation(rotation, translation);
+        let pose = pose_of(rotation, translation);
         let camera_id = bytes.u32("camera id")?;
         let name = bytes.zero_terminated("image name")?;
         let n_points2d = bytes.count("2D points", POINT2D_BYTES)?;
         bytes.skip(n_points2d * POINT2D_BYTES, "2D points")?;
-        images.push(Image { id, name, camera_id, center, rotation, n_points2d });
+        images.push(Image { id, name, camera_id, pose, n_points2d });
     }
     bytes.end()?;
     Ok(images)
@@ -396,7 +412,7 @@ fn text_images(path: &Path) -> Result<Vec<Image>, Error> {
         let id = next(&lines, &mut words, "an image id")?;
         let rotation = coordinates(&lines, &mut words, "a rotation (4 numbers)")?;
         let translation = coordinates(&lines, &mut words, "a translation (3 numbers)")?;
-        let (center, rotation) = center_and_rotation(rotation, translation);
+        let pose = pose_of(rotation, translation);
         let camera_id = next(&lines, &mut words, "a camera id")?;
         drop(words);
         let name = after_words(lines.line(), 9).to_vec();
@@ -409,14 +425,7 @@ fn text_images(path: &Path) -> Result<Vec<Image>, Error> {
             let expected = "2D points of 3 numbers (x, y, point id)";
             return Err(lines.error(expected, format!("{n_words} numbers")));
         }
-        images.push(Image {
-            id,
-            name,
-            camera_id,
-            center,
-            rotation,
-            n_points2d: n_words as u64 / 3,
-        });
+        images.push(Image { id, name, camera_id, pose, n_points2d: n_words as u64 / 3 });
     }
     Ok(images)
 }

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use unlift::geometry::camera::Pose;
+
 /// A map as it was read, in the units of its file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Input {
@@ -153,14 +155,13 @@ pub const DOWNWARD: [f64; 3] = [0.0, -1.0, 0.0];
 /// Up in the frame of a camera whose y axis points up.
 pub const UPWARD: [f64; 3] = [0.0, 1.0, 0.0];
 
-/// Returns the center `-R^T t` and the rotation `R` of a camera with the pose `x_cam = R x + t`,
-/// given as a quaternion (w, x, y, z) and `t`. Not finite for a zero quaternion.
-pub(super) fn center_and_rotation(quaternion: [f64; 4], t: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
+/// Returns the pose `x_cam = R x + t`, given as a quaternion (w, x, y, z) and `t`. Not finite for a zero quaternion.
+pub(super) fn pose_of(quaternion: [f64; 4], t: [f64; 3]) -> Pose {
     // Divides by the squared norm, because files contain norms such as 0.9999999.
     let (r, norm2) = scaled_rotation(quaternion);
-    let c: [f64; 3] =
+    let center =
         std::array::from_fn(|j| -(r[0][j] * t[0] + r[1][j] * t[1] + r[2][j] * t[2]) / norm2);
-    (c, r.map(|row| row.map(|x| x / norm2)))
+    Pose { rotation: r.map(|row| row.map(|x| x / norm2)), center }
 }
 
 #[cfg(test)]
@@ -171,7 +172,7 @@ mod tests {
     fn center_is_where_the_pose_maps_to_zero() {
         // A rotation by 90 degrees about z: x_cam = (-y, x, z) + t.
         let half = 0.5_f64.sqrt();
-        let (c, rotation) = center_and_rotation([half, 0.0, 0.0, half], [1.0, 2.0, 3.0]);
+        let Pose { center: c, rotation } = pose_of([half, 0.0, 0.0, half], [1.0, 2.0, 3.0]);
         for (found, expected) in c.iter().zip([-2.0, 1.0, -3.0]) {
             assert!((found - expected).abs() < 1e-12, "{c:?}");
         }
@@ -179,9 +180,8 @@ mod tests {
         for (found, expected) in rotation.iter().flatten().zip(turned.iter().flatten()) {
             assert!((found - expected).abs() < 1e-12, "{rotation:?}");
         }
-        assert!(center_and_rotation([0.0; 4], [1.0, 2.0, 3.0]).0.iter().all(|x| x.is_nan()));
-        assert!(
-            center_and_rotation([1.0, 0.0, 0.0, 0.0], [f64::NAN; 3]).0.iter().all(|x| x.is_nan())
-        );
+        assert!(pose_of([0.0; 4], [1.0, 2.0, 3.0]).center.iter().all(|x| x.is_nan()));
+        let center = pose_of([1.0, 0.0, 0.0, 0.0], [f64::NAN; 3]).center;
+        assert!(center.iter().all(|x| x.is_nan()));
     }
 }

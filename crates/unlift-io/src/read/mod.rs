@@ -230,7 +230,7 @@ fn colmap_model(model: &Model) -> Result<Input, Error> {
                 "{n} of {of} images name a camera that is not in cameras.{extension}"
             ));
         }
-        images.iter().for_each(|image| input.camera(Some((image.center, image.up()))));
+        images.iter().for_each(|image| input.camera(Some((image.pose.center, image.up()))));
     } else {
         input.notes.push(format!("camera centers: there is no images.{extension}"));
     }

@@ -57,7 +57,7 @@ fn names_need_not_be_utf8_and_text_may_have_windows_line_ends_and_no_2d_points()
     let (_dir, path) = write("images.txt", text);
     let images = colmap::read_images(&path).unwrap();
     assert_eq!(
-        (images[0].name.as_slice(), images[0].center),
+        (images[0].name.as_slice(), images[0].pose.center),
         (&b"a b.jpg"[..], [-1.0, -2.0, -3.0])
     );
     assert_eq!((images[1].name.as_slice(), images[1].n_points2d), (&b"c.jpg"[..], 0));

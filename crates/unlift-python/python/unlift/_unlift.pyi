@@ -93,42 +93,26 @@ def read(
     seed: int = 0,
 ) -> Map: ...
 
-@disjoint_base
+@final
 class Records:
     def __len__(self) -> int: ...
 
-@final
-class Lines(Records):
-    def __new__(
-        cls, points: npt.ArrayLike, directions: npt.ArrayLike, *, hidden: npt.ArrayLike | None = None
-    ) -> Lines: ...
-
-@final
-class Rays(Records):
-    def __new__(
-        cls,
-        centers: npt.ArrayLike,
-        center: npt.ArrayLike,
-        directions: npt.ArrayLike,
-        *,
-        hidden: npt.ArrayLike | None = None,
-    ) -> Rays: ...
-
-@final
-class Planes(Records):
-    def __new__(
-        cls, axis: npt.ArrayLike, offset: npt.ArrayLike, *, hidden: npt.ArrayLike | None = None
-    ) -> Planes: ...
-
-@final
-class Candidates(Records):
-    def __new__(
-        cls,
-        positions: npt.ArrayLike,
-        swapped_axis: npt.ArrayLike,
-        *,
-        hidden: npt.ArrayLike | None = None,
-    ) -> Candidates: ...
+def Lines(
+    points: npt.ArrayLike, directions: npt.ArrayLike, *, hidden: npt.ArrayLike | None = None
+) -> Records: ...
+def Rays(
+    centers: npt.ArrayLike,
+    center: npt.ArrayLike,
+    directions: npt.ArrayLike,
+    *,
+    hidden: npt.ArrayLike | None = None,
+) -> Records: ...
+def Planes(
+    axis: npt.ArrayLike, offset: npt.ArrayLike, *, hidden: npt.ArrayLike | None = None
+) -> Records: ...
+def Candidates(
+    positions: npt.ArrayLike, swapped_axis: npt.ArrayLike, *, hidden: npt.ArrayLike | None = None
+) -> Records: ...
 
 @final
 class Released:

@@ -7,7 +7,7 @@ use unlift::Error;
 use unlift::neighbors::DescriptorKind;
 
 use super::image::ColorImage;
-use super::learned::{Aliked, AlikedOptions, LearnedFeatures, SuperPoint, SuperPointOptions};
+use super::learned::{Aliked, LearnedFeatures, LearnedOptions, SuperPoint};
 use super::photo::{self, Turn};
 use super::sift::{Features, Sift, SiftOptions};
 
@@ -24,9 +24,9 @@ pub enum Extraction {
     /// SIFT.
     Sift(SiftOptions),
     /// ALIKED.
-    Aliked(AlikedOptions),
+    Aliked(LearnedOptions),
     /// SuperPoint.
-    SuperPoint(SuperPointOptions),
+    SuperPoint(LearnedOptions),
 }
 
 impl Default for Extraction {

@@ -32,5 +32,5 @@ mod sift;
 
 pub use extractor::{Extraction, Extractor, Found, Photo, in_order};
 pub use image::{ColorImage, GrayImage};
-pub use learned::{Aliked, AlikedOptions, LearnedFeatures, SuperPoint, SuperPointOptions};
+pub use learned::{Aliked, LearnedFeatures, LearnedOptions, SuperPoint};
 pub use sift::{Features, Keypoint, Sift, SiftOptions};

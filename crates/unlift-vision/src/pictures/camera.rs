@@ -5,6 +5,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use unlift::Error;
+use unlift::geometry::camera::{Intrinsics, Pose};
 
 use super::inverter::check_size;
 
@@ -157,9 +158,9 @@ impl Lens {
         place.iter().all(|x| x.is_finite()).then_some(place)
     }
 
-    /// Focal lengths and principal point in pixels, with the middle of the first pixel at (0, 0).
-    pub fn pinhole(&self) -> ([f64; 2], [f64; 2]) {
-        (self.focal, self.center.map(|x| x - 0.5))
+    /// Returns focal lengths and principal point, with the middle of the first pixel at (0, 0).
+    pub fn intrinsics(&self) -> Intrinsics {
+        Intrinsics { focal: self.focal, principal: self.center.map(|x| x - 0.5) }
     }
 
     /// Returns where the point that [`project`](Self::project) maps to `place` is on the plane at
@@ -276,11 +277,8 @@ fn check(model: &str, params: &[f64], n: usize) -> Result<(), Error> {
 /// A camera with its pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
-    /// Camera center, in units of the map.
-    pub center: [f64; 3],
-    /// Rotation from the map to the camera: `rotation (x - center)` is a point `x` in the frame
-    /// right, down, forward.
-    pub rotation: [[f64; 3]; 3],
+    /// The pose, in units of the map.
+    pub pose: Pose,
     /// The lens.
     pub lens: Lens,
     /// Width and height of the image in pixels.
@@ -320,8 +318,7 @@ impl View {
         let mut found = Projection::default();
         for (at, point) in points.iter().enumerate() {
             let Some(point) = point else { continue };
-            let away = [0, 1, 2].map(|c| point[c] - self.center[c]);
-            let x = self.rotation.map(|row| (0..3).map(|c| row[c] * away[c]).sum::<f64>());
+            let x = self.pose.in_camera(point);
             let Some(place) = self.lens.project(x) else { continue };
             let inside = (0..2).all(|c| place[c] >= -0.5 && place[c] < self.size[c] as f64 - 0.5);
             if inside {

@@ -1,5 +1,6 @@
 //! Every camera model of COLMAP, compared with COLMAP 4.2; projection of maps and occlusion.
 
+use unlift::geometry::camera::Pose;
 use unlift_vision::pictures::{Lens, View};
 
 /// Points in the camera's frame.
@@ -85,9 +86,11 @@ const SIZE: [usize; 2] = [640, 480];
 
 fn view() -> View {
     View {
-        center: [1.0, 2.0, 3.0],
-        // Looks along the world's x axis; right is -y.
-        rotation: [[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]],
+        pose: Pose {
+            center: [1.0, 2.0, 3.0],
+            // Looks along the world's x axis; right is -y.
+            rotation: [[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]],
+        },
         lens: Lens::try_new("PINHOLE", &[500.0, 500.0, 320.0, 240.0]).unwrap(),
         size: SIZE,
     }

@@ -16,7 +16,7 @@ use unlift::seed::Key;
 use unlift::truth::Original;
 use unlift::{Descriptors, PointSet, Unit};
 use unlift_testkit::{described_map, source_laws};
-use unlift_vision::features::{AlikedOptions, Extraction, Extractor, Found};
+use unlift_vision::features::{Extraction, Extractor, Found, LearnedOptions};
 use unlift_vision::network::Learned;
 
 use crate::shared;
@@ -100,7 +100,7 @@ fn many_maps_may_request_the_network_at_once() {
 fn the_network_names_more_neighbors_than_its_inputs_do() {
     const K: usize = 20;
     let Some(photo) = shared("data/redkitchen/images/frame-000500.color.jpg") else { return };
-    let aliked = Extraction::Aliked(AlikedOptions { min_score: 0.02, ..Default::default() });
+    let aliked = Extraction::Aliked(LearnedOptions { min_score: 0.02, ..LearnedOptions::ALIKED });
     let kinds: [(_, &dyn Source<2>, f64); 2] =
         [(Extraction::default(), &Overlap, 0.03), (aliked, &Similarity, 0.2)];
     for (extraction, plain, gain) in kinds {

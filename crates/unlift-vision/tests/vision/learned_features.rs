@@ -7,13 +7,13 @@ use safetensors::SafeTensors;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use unlift_vision::features::{
-    Aliked, AlikedOptions, ColorImage, LearnedFeatures, SuperPoint, SuperPointOptions, photo,
+    Aliked, ColorImage, LearnedFeatures, LearnedOptions, SuperPoint, photo,
 };
 use unlift_vision::network::{Entry, Network, Port, entry};
 
 use crate::{floats, shared};
 
-fn aliked(options: AlikedOptions) -> Aliked {
+fn aliked(options: LearnedOptions) -> Aliked {
     Aliked::try_new(options).unwrap()
 }
 
@@ -69,7 +69,7 @@ fn features_of_aliked_are_those_of_the_authors_code() {
     let file = SafeTensors::deserialize(&bytes).unwrap();
     let (_, header) = SafeTensors::read_metadata(&bytes).unwrap();
     let meta: Value = serde_json::from_str(&header.metadata().as_ref().unwrap()["meta"]).unwrap();
-    let aliked = aliked(AlikedOptions { max_features: 5000, ..AlikedOptions::default() });
+    let aliked = aliked(LearnedOptions { max_features: 5000, ..LearnedOptions::ALIKED });
     for (at, image) in meta["images"].as_array().unwrap().iter().enumerate() {
         let path = shared(image["path"].as_str().unwrap()).unwrap();
         let [places, descriptors, scores] = ["keypoints", "descriptors", "scores"]
@@ -99,7 +99,7 @@ fn features_of_aliked_are_those_of_the_authors_code() {
 #[test]
 fn options_choose_the_best_and_sizes_are_undone() {
     let image = waves(200, 136);
-    let low = || AlikedOptions { min_score: 0.05, ..AlikedOptions::default() };
+    let low = || LearnedOptions { min_score: 0.05, ..LearnedOptions::ALIKED };
     let all = aliked(low()).extract(&image).unwrap();
     let n = all.keypoints.len();
     assert!(n > 30, "{n}");
@@ -108,16 +108,16 @@ fn options_choose_the_best_and_sizes_are_undone() {
         let length: f32 = descriptor.iter().map(|value| value * value).sum();
         assert!((length - 1.0).abs() < 1e-4);
     }
-    let few = aliked(AlikedOptions { max_features: 7, ..low() }).extract(&image).unwrap();
+    let few = aliked(LearnedOptions { max_features: 7, ..low() }).extract(&image).unwrap();
     assert_eq!(few.keypoints, all.keypoints[..7]);
-    let half = aliked(AlikedOptions { max_image_size: 100, ..low() }).extract(&image).unwrap();
+    let half = aliked(LearnedOptions { max_image_size: 100, ..low() }).extract(&image).unwrap();
     let right = half.keypoints.iter().filter(|[x, _]| *x > 110.0).count();
     assert!(right > 0, "keypoints are in pixels of the image as it was given");
 }
 
 #[test]
 fn images_without_structure_have_no_features() {
-    let (aliked, superpoint) = (aliked(AlikedOptions::default()), narrow_superpoint());
+    let (aliked, superpoint) = (aliked(LearnedOptions::ALIKED), narrow_superpoint());
     for (width, height) in [(1, 1), (5, 3), (7, 100), (1, 200), (8, 8), (64, 64), (97, 33)] {
         for level in [0, 128, 255] {
             let n = aliked.extract(&flat(width, height, level)).unwrap().keypoints.len();
@@ -133,11 +133,11 @@ fn images_without_structure_have_no_features() {
 
 #[test]
 fn options_out_of_range_are_named() {
-    let error = |options: AlikedOptions| Aliked::try_new(options).err().unwrap().to_string();
-    let usual = AlikedOptions::default;
-    let none = AlikedOptions { max_features: 0, ..usual() };
+    let error = |options: LearnedOptions| Aliked::try_new(options).err().unwrap().to_string();
+    let usual = || LearnedOptions::ALIKED;
+    let none = LearnedOptions { max_features: 0, ..usual() };
     assert_eq!(error(none), "max_features: expected at least 1, found 0");
-    let unknown = AlikedOptions { min_score: f32::NAN, ..usual() };
+    let unknown = LearnedOptions { min_score: f32::NAN, ..usual() };
     assert_eq!(error(unknown), "min_score: expected 0 to below 1, found NaN");
 }
 
@@ -151,7 +151,7 @@ fn narrow_superpoint() -> SuperPoint {
     let narrow = Entry { outputs: OUTPUTS, ..*entry("superpoint").unwrap() };
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/superpoint-random");
     let network = Network::read(&path.join("superpoint.onnx"), &narrow).unwrap();
-    SuperPoint::of_network(network, SuperPointOptions::default()).unwrap()
+    SuperPoint::of_network(network, LearnedOptions::SUPERPOINT).unwrap()
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-use super::View;
+use crate::geometry::camera::{Camera, Intrinsics};
 use crate::geometry::vector::{distance, dot, sub};
 use crate::seed::{Draws, Stage};
 
@@ -49,26 +49,27 @@ const FEWEST: usize = 6;
 
 impl Match {
     /// Returns the residuals in pixels, and their number; `None` if the point is behind the camera.
-    fn residuals(&self, view: &View) -> Option<([f64; 2], usize)> {
+    fn residuals(&self, camera: &Camera) -> Option<([f64; 2], usize)> {
         match self {
-            Self::Point { place, point } => Some((sub(&view.project(point)?, place), 2)),
+            Self::Point { place, point } => Some((sub(&camera.project(point)?, place), 2)),
             Self::MapLine { place, point, direction } => {
-                let x = view.in_camera(point);
-                let d = view.rotation.map(|row| dot(&row, direction));
+                let x = camera.pose.in_camera(point);
+                let d = camera.pose.rotation.map(|row| dot(&row, direction));
+                let Intrinsics { focal, principal } = &camera.intrinsics;
                 // The plane through the camera and the line, as a line in pixels.
                 let plane = [
                     x[1] * d[2] - x[2] * d[1],
                     x[2] * d[0] - x[0] * d[2],
                     x[0] * d[1] - x[1] * d[0],
                 ];
-                let (a, b) = (plane[0] / view.focal[0], plane[1] / view.focal[1]);
-                let away = sub(place, &view.principal);
+                let (a, b) = (plane[0] / focal[0], plane[1] / focal[1]);
+                let away = sub(place, principal);
                 let length = libm::hypot(a, b);
                 let off = (a * away[0] + b * away[1] + plane[2]) / length;
                 (length > 0.0).then_some(([off, 0.0], 1))
             }
             Self::ImageLine { place, direction, point } => {
-                let away = sub(&view.project(point)?, place);
+                let away = sub(&camera.project(point)?, place);
                 let length = libm::hypot(direction[0], direction[1]);
                 let off = (away[0] * direction[1] - away[1] * direction[0]) / length;
                 (length > 0.0).then_some(([off, 0.0], 1))
@@ -77,95 +78,63 @@ impl Match {
     }
 }
 
-impl View {
-    /// Returns the view moved by a small rotation and translation in its own frame: `w`, then `dt`.
-    #[must_use]
-    pub fn moved(&self, by: &[f64; 6]) -> Self {
-        let (w, dt) = ([by[0], by[1], by[2]], [by[3], by[4], by[5]]);
-        let turn = rotation(&w);
-        let mut rotation = [[0.0; 3]; 3];
-        for (row, turn) in rotation.iter_mut().zip(&turn) {
-            *row = std::array::from_fn(|c| (0..3).map(|k| turn[k] * self.rotation[k][c]).sum());
-        }
-        // The center moves by -R^T dt.
-        let center = std::array::from_fn(|c| {
-            self.center[c] - (0..3).map(|k| rotation[k][c] * dt[k]).sum::<f64>()
-        });
-        Self { rotation, center, ..self.clone() }
-    }
-
-    /// Returns the distance of the center and the angle in degrees between this pose and `other`.
-    pub fn pose_distance(&self, other: &Self) -> (f64, f64) {
-        let trace: f64 = (0..3).map(|k| dot(&self.rotation[k], &other.rotation[k])).sum();
-        let angle = libm::acos(((trace - 1.0) / 2.0).clamp(-1.0, 1.0));
-        (distance(&self.center, &other.center), angle.to_degrees())
-    }
-}
-
-/// Returns the rotation by the angle `|w|` about `w` (Rodrigues).
-fn rotation(w: &[f64; 3]) -> [[f64; 3]; 3] {
-    let angle = dot(w, w).sqrt();
-    let (sine, versine) = match angle > 1e-12 {
-        true => (libm::sin(angle) / angle, (1.0 - libm::cos(angle)) / (angle * angle)),
-        false => (1.0, 0.5),
-    };
-    let cross = [[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]];
-    std::array::from_fn(|r| {
-        std::array::from_fn(|c| {
-            let square: f64 = (0..3).map(|k| cross[r][k] * cross[k][c]).sum();
-            f64::from(u8::from(r == c)) + sine * cross[r][c] + versine * square
-        })
-    })
-}
-
 /// Estimates the pose from `matches`, some of which are wrong. Starts from the pose of `start`, as
 /// retrieval gives, and from ten perturbed ones; `reach` is the standard deviation of their centers.
 /// Returns the estimate with the most inliers and their number; `None` with too few matches.
 ///
 /// The loss is Cauchy's with a decreasing scale, at last truncated at [`INLIER`].
-pub fn estimate(start: &View, matches: &[Match], reach: f64, seed: u64) -> Option<(View, usize)> {
+pub fn estimate(
+    start: &Camera,
+    matches: &[Match],
+    reach: f64,
+    seed: u64,
+) -> Option<(Camera, usize)> {
     if matches.len() < FEWEST {
         return None;
     }
-    let mut best: Option<(View, usize)> = None;
+    let mut best: Option<(Camera, usize)> = None;
     for at in 0..=STARTS {
         let mut draws = Draws::new(seed, Stage::Localization, at);
         let amount = if at == 0 { 0.0 } else { 1.0 };
         let by =
             std::array::from_fn(|c| amount * draws.normal() * if c < 3 { 0.15 } else { reach });
-        let mut view = start.moved(&by);
+        let mut camera = moved(start, &by);
         for scale in SCALES {
-            refine(&mut view, matches, |r| 1.0 / (1.0 + (r / scale) * (r / scale)));
+            refine(&mut camera, matches, |r| 1.0 / (1.0 + (r / scale) * (r / scale)));
         }
-        refine(&mut view, matches, |r| f64::from(u8::from(r < INLIER)));
-        let n = matches.iter().filter(|one| size(one, &view).is_some_and(|r| r < INLIER)).count();
+        refine(&mut camera, matches, |r| f64::from(u8::from(r < INLIER)));
+        let n = matches.iter().filter(|one| size(one, &camera).is_some_and(|r| r < INLIER)).count();
         if best.as_ref().is_none_or(|(_, most)| n > *most) {
-            best = Some((view, n));
+            best = Some((camera, n));
         }
     }
     best
 }
 
-fn size(one: &Match, view: &View) -> Option<f64> {
-    one.residuals(view).map(|(r, _)| libm::hypot(r[0], r[1]))
+fn moved(camera: &Camera, by: &[f64; 6]) -> Camera {
+    Camera { pose: camera.pose.moved(by), ..*camera }
+}
+
+fn size(one: &Match, camera: &Camera) -> Option<f64> {
+    one.residuals(camera).map(|(r, _)| libm::hypot(r[0], r[1]))
 }
 
 /// Improves the pose by Levenberg-Marquardt on reweighted squares. `weight` is the weight of a
 /// residual of some pixels.
-fn refine(view: &mut View, matches: &[Match], weight: impl Fn(f64) -> f64) {
+fn refine(camera: &mut Camera, matches: &[Match], weight: impl Fn(f64) -> f64) {
     let depths = matches.iter().map(|one| match one {
         Match::Point { point, .. } | Match::ImageLine { point, .. } => {
-            distance(point, &view.center)
+            distance(point, &camera.pose.center)
         }
-        Match::MapLine { point, .. } => distance(point, &view.center),
+        Match::MapLine { point, .. } => distance(point, &camera.pose.center),
     });
     let depth = depths.sum::<f64>() / matches.len() as f64;
     let mut damping = 1e-4;
     for _ in 0..ITERATIONS {
         let weights: Vec<f64> =
-            matches.iter().map(|one| size(one, view).map_or(0.0, &weight)).collect();
-        let cost = |view: &View| {
-            let of = |(one, weight): (&Match, &f64)| match size(one, view) {
+            matches.iter().map(|one| size(one, camera).map_or(0.0, &weight)).collect();
+        let cost = |camera: &Camera| {
+            let of = |(one, weight): (&Match, &f64)| match size(one, camera) {
                 Some(r) => weight * r * r,
                 // Moving a point behind the camera must not pay.
                 None => weight * 1e6,
@@ -175,16 +144,16 @@ fn refine(view: &mut View, matches: &[Match], weight: impl Fn(f64) -> f64) {
         let mut normal = Matrix6::zeros();
         let mut slope = Vector6::zeros();
         let steps: [f64; 6] = std::array::from_fn(|c| if c < 3 { 1e-6 } else { 1e-6 * depth });
-        let moved: [View; 6] = std::array::from_fn(|c| {
+        let all_moved: [Camera; 6] = std::array::from_fn(|c| {
             let mut by = [0.0; 6];
             by[c] = steps[c];
-            view.moved(&by)
+            moved(camera, &by)
         });
         for (one, weight) in matches.iter().zip(&weights) {
-            let Some((r, n)) = one.residuals(view).filter(|_| *weight > 0.0) else { continue };
+            let Some((r, n)) = one.residuals(camera).filter(|_| *weight > 0.0) else { continue };
             let mut rows = [Vector6::zeros(); 2];
             for c in 0..6 {
-                let Some((after, _)) = one.residuals(&moved[c]) else { continue };
+                let Some((after, _)) = one.residuals(&all_moved[c]) else { continue };
                 rows.iter_mut()
                     .enumerate()
                     .for_each(|(k, row)| row[c] = (after[k] - r[k]) / steps[c]);
@@ -194,7 +163,7 @@ fn refine(view: &mut View, matches: &[Match], weight: impl Fn(f64) -> f64) {
                 slope += rows[k] * (r[k] * weight);
             }
         }
-        let before = cost(view);
+        let before = cost(camera);
         let mut improved = false;
         for _ in 0..4 {
             let mut damped = normal;
@@ -203,10 +172,10 @@ fn refine(view: &mut View, matches: &[Match], weight: impl Fn(f64) -> f64) {
                 damping = (damping * 100.0).max(1e-6);
                 continue;
             };
-            let next = view.moved(&std::array::from_fn(|c| step[c]));
+            let next = moved(camera, &std::array::from_fn(|c| step[c]));
             if cost(&next) < before {
                 improved = (before - cost(&next)) > 1e-9 * before;
-                (*view, damping) = (next, damping * 0.1);
+                (*camera, damping) = (next, damping * 0.1);
                 break;
             }
             damping *= 10.0;
@@ -220,18 +189,14 @@ fn refine(view: &mut View, matches: &[Match], weight: impl Fn(f64) -> f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::camera::{Pose, PoseError};
     use crate::geometry::vector::along;
 
     #[test]
     fn poses_are_found_among_wrong_matches() {
-        let truth = View {
-            rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-            center: [0.2, -0.1, 0.3],
-            focal: [500.0, 510.0],
-            principal: [320.0, 240.0],
-            size: [640.0, 480.0],
-            observed: Vec::new(),
-        };
+        let intrinsics = Intrinsics { focal: [500.0, 510.0], principal: [320.0, 240.0] };
+        let pose = Pose { center: [0.2, -0.1, 0.3], ..Pose::IDENTITY };
+        let truth = Camera { intrinsics, pose };
         // 120 matches with half a pixel of noise, every third of them wrong.
         let matches = |kind: &str| -> Vec<Match> {
             let mut draws = Draws::new(5, Stage::Shapes, 0);
@@ -240,7 +205,7 @@ mod tests {
                     [(-2.0, 2.0), (-1.5, 1.5), (3.0, 6.0)].map(|(a, b)| draws.between(a, b));
                 let mut place = truth.project(&point).unwrap().map(|x| x + 0.5 * draws.normal());
                 if at.is_multiple_of(3) {
-                    place = truth.size.map(|side| draws.between(0.0, side));
+                    place = [640.0, 480.0].map(|side| draws.between(0.0, side));
                 }
                 match kind {
                     "point" => Match::Point { place, point },
@@ -260,17 +225,18 @@ mod tests {
             };
             (0..120).map(&mut of).collect()
         };
-        let start = truth.moved(&[0.1, -0.15, 0.1, 0.4, -0.3, 0.3]);
+        let start = moved(&truth, &[0.1, -0.15, 0.1, 0.4, -0.3, 0.3]);
         // Errors of lines are larger by about the root of two, and wrong matches of lines are
         // inliers more often.
         for (kind, most) in [("point", 0.01), ("map", 0.02), ("image", 0.02)] {
             let (found, inliers) = estimate(&start, &matches(kind), 0.3, 0).unwrap();
-            let (center, angle) = found.pose_distance(&truth);
+            let PoseError { center, rotation_degrees: angle } = found.pose.error(&truth.pose);
             assert!(center < most && angle < 0.3, "{kind}: {center} m, {angle} degrees");
             assert!((78..=95).contains(&inliers), "{kind}: {inliers}");
         }
         assert_eq!(estimate(&start, &matches("point")[..5], 0.3, 0), None);
-        let (center, angle) = truth.moved(&[0.0, 0.02, 0.0, 0.3, 0.0, -0.4]).pose_distance(&truth);
+        let moved = truth.pose.moved(&[0.0, 0.02, 0.0, 0.3, 0.0, -0.4]);
+        let PoseError { center, rotation_degrees: angle } = moved.error(&truth.pose);
         assert!((center - 0.5).abs() < 1e-12 && (angle - 0.02_f64.to_degrees()).abs() < 1e-9);
     }
 }

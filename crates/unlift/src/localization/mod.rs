@@ -17,8 +17,9 @@ pub use estimate::{INLIER, Match, estimate};
 use nalgebra::{Matrix6, SymmetricEigen, Vector6};
 use rayon::prelude::*;
 
+use crate::geometry::camera::{Camera, PoseError};
 use crate::geometry::frame::Bounds;
-use crate::geometry::vector::{dot, sub, widen};
+use crate::geometry::vector::{dot, widen};
 use crate::obfuscate::{Scheme, obfuscate};
 use crate::released::{Obfuscation, Released};
 use crate::seed::{Key, Stage};
@@ -34,28 +35,12 @@ const MOST_CONDITION: f64 = 1e12;
 /// at the true projections, so it needs no keypoints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
-    /// Rotation from the map to the camera: a point `x` is at `rotation (x - center)`. Camera axes
-    /// point right, down and forward.
-    pub rotation: [[f64; 3]; 3],
-    /// Camera center, in the unit of the points.
-    pub center: [f64; 3],
-    /// Focal lengths in pixels.
-    pub focal: [f64; 2],
-    /// Principal point in pixels.
-    pub principal: [f64; 2],
+    /// The camera, in the unit of the points.
+    pub camera: Camera,
     /// Width and height of the image in pixels.
     pub size: [f64; 2],
     /// Rows of the points that the image observes.
     pub observed: Vec<u32>,
-}
-
-/// Standard deviations of a pose.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PoseError {
-    /// Deviation of the camera center, in the unit of the points: the root of the trace.
-    pub center: f64,
-    /// Deviation of the rotation in degrees: the root of the trace.
-    pub rotation_degrees: f64,
 }
 
 /// Accuracy of localization over many images.
@@ -189,7 +174,7 @@ pub fn with_queries(
 ) -> Result<Vec<Option<PoseError>>, Error> {
     let of = |(number, view): (usize, &View)| {
         let inside = |row: &u32| {
-            let place = view.project(&positions[*row as usize])?;
+            let place = view.camera.project(&positions[*row as usize])?;
             let is_inside = (0..2).all(|c| (0.0..=view.size[c]).contains(&place[c]));
             is_inside.then_some((*row, place))
         };
@@ -226,30 +211,17 @@ enum ImageLine {
 }
 
 impl View {
-    /// Returns the place of a point in the camera's frame.
-    pub fn in_camera(&self, point: &[f64; 3]) -> [f64; 3] {
-        let away = sub(point, &self.center);
-        self.rotation.map(|row| dot(&row, &away))
-    }
-
-    /// Projects a point into the image, in pixels; `None` behind the camera.
-    pub fn project(&self, point: &[f64; 3]) -> Option<[f64; 2]> {
-        let x = self.in_camera(point);
-        let on = |c: usize| self.focal[c] * x[c] / x[2] + self.principal[c];
-        (x[2] > 0.0).then(|| [on(0), on(1)])
-    }
-
     /// Returns the derivative of the projection of `x`, in the camera's frame, by `x`.
     fn slopes(&self, x: &[f64; 3]) -> [[f64; 3]; 2] {
-        let [fx, fy] = self.focal;
+        let [fx, fy] = self.camera.intrinsics.focal;
         let z = x[2];
         [[fx / z, 0.0, -fx * x[0] / (z * z)], [0.0, fy / z, -fy * x[1] / (z * z)]]
     }
 
     /// Returns the direction in the image of a line through `point`; `None` behind the camera.
     fn image_of(&self, point: &[f64; 3], direction: &[f64; 3]) -> Option<[f64; 2]> {
-        let x = self.in_camera(point);
-        let turned = self.rotation.map(|row| dot(&row, direction));
+        let x = self.camera.pose.in_camera(point);
+        let turned = self.camera.pose.rotation.map(|row| dot(&row, direction));
         (x[2] > 0.0).then(|| self.slopes(&x).map(|row| dot(&row, &turned)))
     }
 
@@ -264,7 +236,7 @@ impl View {
         let mut information = Matrix6::zeros();
         let (mut depths, mut n) = (0.0, 0.0);
         for (point, line) in matches {
-            let x = self.in_camera(&point);
+            let x = self.camera.pose.in_camera(&point);
             if x[2] <= 0.0 {
                 continue;
             }
@@ -314,18 +286,19 @@ impl View {
 
 #[cfg(test)]
 mod tests {
-
     use super::*;
+    use crate::geometry::camera::{Intrinsics, Pose};
+    use crate::geometry::vector::sub;
     use crate::obfuscate::{SCHEMES, SchemeOptions};
     use crate::released::Rays;
     use crate::{OriginalId, synthetic};
 
     fn view(focal: f64, n: usize) -> View {
         View {
-            rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-            center: [0.0; 3],
-            focal: [focal; 2],
-            principal: [320.0, 240.0],
+            camera: Camera {
+                intrinsics: Intrinsics { focal: [focal; 2], principal: [320.0, 240.0] },
+                pose: Pose::IDENTITY,
+            },
             size: [640.0, 480.0],
             observed: (0..n as u32).collect(),
         }
@@ -356,9 +329,10 @@ mod tests {
         let middle = [0, 1].map(|c| points.iter().map(|p| p[c]).sum::<f64>() / 3_000.0);
         // Forward is +y of the room, down is -z.
         let rotation = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]];
-        let base = View { rotation, center: [middle[0], middle[1] - 1.0, 1.5], ..view(500.0, 0) };
+        let mut base = view(500.0, 0);
+        base.camera.pose = Pose { rotation, center: [middle[0], middle[1] - 1.0, 1.5] };
         let seen = |row: &u32| {
-            let place = base.project(&points[*row as usize]);
+            let place = base.camera.project(&points[*row as usize]);
             place.is_some_and(|place| (0..2).all(|c| (0.0..base.size[c]).contains(&place[c])))
         };
         let observed: Vec<u32> = (0..points.len() as u32).filter(seen).collect();

@@ -2,8 +2,9 @@
 
 use unlift::again::{Solved, by_descriptors, by_geometry};
 use unlift::evaluate::Accuracy;
+use unlift::geometry::camera::{Camera, Intrinsics, Pose};
 use unlift::obfuscate::SCHEMES;
-use unlift::sequence::{self, Camera, Links, Query};
+use unlift::sequence::{self, Links, Query};
 
 use crate::maps::*;
 
@@ -133,13 +134,8 @@ fn camera(at: usize) -> Camera {
     let turned = [[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]];
     let row = |a: f64, b: f64| [0, 1, 2].map(|i| a * turned[0][i] + b * turned[1][i]);
     let rotation = [row(cr, -sr), row(sr, cr), turned[2]];
-    let translation = rotation.map(|row| -dot(&row, &center));
-    Camera { focal: [500.0; 2], center: [319.5, 239.5], rotation, translation }
-}
-
-fn project(camera: &Camera, x: &[f64; 3]) -> [f64; 2] {
-    let of = |row: usize| dot(&camera.rotation[row], x) + camera.translation[row];
-    [0, 1].map(|c| camera.focal[c] * of(c) / of(2) + camera.center[c])
+    let intrinsics = Intrinsics { focal: [500.0; 2], principal: [319.5, 239.5] };
+    Camera { intrinsics, pose: Pose { rotation, center } }
 }
 
 /// Queries of the points that all cameras see.
@@ -153,10 +149,12 @@ fn sequence(scheme: &str, n: usize) -> Sequence {
     let mut draws = Draws::new(1, Stage::Synthetic, 0);
     let mut point = || [(-1.2, 1.2), (-0.8, 0.8), (3.0, 6.0)].map(|(a, b)| draws.between(a, b));
     let mut points: Vec<[f64; 3]> = (0..150).map(|_| point()).collect();
-    points.retain(|x| (0..n).all(|at| image.contains(&project(&camera(at), x))));
+    points.retain(|x| {
+        (0..n).all(|at| camera(at).project(x).is_some_and(|place| image.contains(&place)))
+    });
     assert!(points.len() > 75, "{}", points.len());
     let view = |at: usize| {
-        let places = points.iter().map(|x| project(&camera(at), x)).collect();
+        let places = points.iter().filter_map(|x| camera(at).project(x)).collect();
         let places = PointSet::try_new(places, Unit::Pixel).unwrap();
         release(scheme, &Original::within(places, image).unwrap(), at as u64)
     };

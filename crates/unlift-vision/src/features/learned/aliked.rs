@@ -6,8 +6,8 @@
 
 use unlift::Error;
 
-use super::LearnedFeatures;
 use super::maxima::{Scores, Wanted, corners};
+use super::{LearnedFeatures, LearnedOptions};
 use crate::features::ColorImage;
 use crate::network::{Network, Tensor};
 
@@ -26,28 +26,10 @@ const PATCH: usize = 9;
 /// Keypoints that are described at a time: 13 MB.
 const BATCH: usize = 1024;
 
-/// Options of ALIKED. The defaults are COLMAP's.
-#[derive(Clone, Debug, PartialEq)]
-pub struct AlikedOptions {
-    /// Maximum number of features, the best ones; default 2048.
-    pub max_features: usize,
-    /// Score that a keypoint must exceed, 0 to 1; default 0.2.
-    pub min_score: f32,
-    /// Longest side in pixels, default 1600. Larger images are downsized; keypoints are in pixels
-    /// of the original image.
-    pub max_image_size: usize,
-}
-
-impl Default for AlikedOptions {
-    fn default() -> Self {
-        Self { max_features: 2048, min_score: 0.2, max_image_size: 1600 }
-    }
-}
-
 /// The extractor.
 pub struct Aliked {
     network: Network,
-    options: AlikedOptions,
+    options: LearnedOptions,
 }
 
 impl Aliked {
@@ -56,8 +38,8 @@ impl Aliked {
     /// # Errors
     /// If a field is out of range (the error names the first one), or a file that replaces the
     /// embedded model cannot be loaded.
-    pub fn try_new(options: AlikedOptions) -> Result<Self, Error> {
-        super::check(options.max_features, options.min_score, options.max_image_size)?;
+    pub fn try_new(options: LearnedOptions) -> Result<Self, Error> {
+        options.check()?;
         Ok(Self { network: Network::load(MODEL)?, options })
     }
 

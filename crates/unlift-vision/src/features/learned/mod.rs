@@ -11,8 +11,8 @@ mod superpoint;
 
 use unlift::Error;
 
-pub use aliked::{Aliked, AlikedOptions};
-pub use superpoint::{SuperPoint, SuperPointOptions};
+pub use aliked::Aliked;
+pub use superpoint::SuperPoint;
 
 /// Features of one image, the best first.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -28,16 +28,36 @@ pub struct LearnedFeatures {
     pub dim: usize,
 }
 
-/// Checks the ranges of the common options.
-fn check(max_features: usize, min_score: f32, max_image_size: usize) -> Result<(), Error> {
-    if max_features == 0 {
-        return Err(Error::new("max_features", "at least 1", "0"));
+/// Options of the extraction by a network.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LearnedOptions {
+    /// Maximum number of features, the best ones.
+    pub max_features: usize,
+    /// Score that a keypoint must exceed, 0 to 1.
+    pub min_score: f32,
+    /// Longest side in pixels. Larger images are downsized; keypoints are in pixels of the original image.
+    pub max_image_size: usize,
+}
+
+impl LearnedOptions {
+    /// The options of ALIKED in COLMAP.
+    pub const ALIKED: Self = Self { max_features: 2048, min_score: 0.2, max_image_size: 1600 };
+    /// The options of SuperPoint in hloc.
+    pub const SUPERPOINT: Self =
+        Self { max_features: 4096, min_score: 0.005, max_image_size: 1600 };
+
+    /// Checks the ranges.
+    fn check(&self) -> Result<(), Error> {
+        let Self { max_features, min_score, max_image_size } = *self;
+        if max_features == 0 {
+            return Err(Error::new("max_features", "at least 1", "0"));
+        }
+        if !(0.0..1.0).contains(&min_score) {
+            return Err(Error::new("min_score", "0 to below 1", min_score.to_string()));
+        }
+        if !(1..=1 << 16).contains(&max_image_size) {
+            return Err(Error::new("max_image_size", "1 to 65536", max_image_size.to_string()));
+        }
+        Ok(())
     }
-    if !(0.0..1.0).contains(&min_score) {
-        return Err(Error::new("min_score", "0 to below 1", min_score.to_string()));
-    }
-    if !(1..=1 << 16).contains(&max_image_size) {
-        return Err(Error::new("max_image_size", "1 to 65536", max_image_size.to_string()));
-    }
-    Ok(())
 }

@@ -6,8 +6,8 @@
 
 use unlift::Error;
 
-use super::LearnedFeatures;
 use super::maxima::{Scores, Wanted, corners};
+use super::{LearnedFeatures, LearnedOptions};
 use crate::features::ColorImage;
 use crate::network::{Network, Tensor};
 
@@ -18,28 +18,10 @@ const CELL: usize = 8;
 /// keypoints.
 const RADIUS: usize = 4;
 
-/// Options of SuperPoint. The defaults are hloc's.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SuperPointOptions {
-    /// Maximum number of features, the best ones; default 4096.
-    pub max_features: usize,
-    /// Score that a keypoint must exceed, 0 to 1; default 0.005.
-    pub min_score: f32,
-    /// Longest side in pixels, default 1600. Larger images are downsized; keypoints are in pixels
-    /// of the original image.
-    pub max_image_size: usize,
-}
-
-impl Default for SuperPointOptions {
-    fn default() -> Self {
-        Self { max_features: 4096, min_score: 0.005, max_image_size: 1600 }
-    }
-}
-
 /// The extractor.
 pub struct SuperPoint {
     network: Network,
-    options: SuperPointOptions,
+    options: LearnedOptions,
 }
 
 impl SuperPoint {
@@ -48,7 +30,7 @@ impl SuperPoint {
     /// # Errors
     /// If a field is out of range (the error names the first one), or the model is missing (the
     /// error names its folder).
-    pub fn try_new(options: SuperPointOptions) -> Result<Self, Error> {
+    pub fn try_new(options: LearnedOptions) -> Result<Self, Error> {
         Self::of_network(Network::load(MODEL)?, options)
     }
 
@@ -56,8 +38,8 @@ impl SuperPoint {
     ///
     /// # Errors
     /// If a field is out of range; the error names the first one.
-    pub fn of_network(network: Network, options: SuperPointOptions) -> Result<Self, Error> {
-        super::check(options.max_features, options.min_score, options.max_image_size)?;
+    pub fn of_network(network: Network, options: LearnedOptions) -> Result<Self, Error> {
+        options.check()?;
         Ok(Self { network, options })
     }
 
