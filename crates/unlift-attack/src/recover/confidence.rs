@@ -12,25 +12,11 @@ use crate::geometry::flatness::flatness;
 use crate::geometry::knn::Knn;
 use crate::geometry::vector::{median, widen};
 use crate::neighbors::Neighborhoods;
-use crate::recover::map::family::Settings;
+use crate::recover::attack::Attack;
 use crate::recover::map::graph::{Graph, Side, either, record_of, side};
 use crate::recover::map::places::distance2;
-use crate::recover::options::RecoverOptions;
 use crate::recover::result::{Confidence, Estimate, Status, Unknown};
-use crate::recover::solver::Builtin;
 use crate::released::{Obfuscation, Released};
-
-/// Returns why confidence is not computed, if options, solver or dimension say so.
-pub(super) fn not_asked<const D: usize>(
-    solver: Builtin,
-    options: &RecoverOptions,
-) -> Option<Unknown> {
-    match solver {
-        Builtin::Joint if !options.confidence => Some(Unknown::NotAsked),
-        Builtin::Joint => (!Settings::of_dimension::<D>().confidence).then_some(Unknown::OfImages),
-        _ => Some(Unknown::OtherSolver),
-    }
-}
 
 /// Estimates within this many radii are near. A radius is the distance to this nearest estimate, within these bounds of the median.
 const NEAR: f32 = 1.3;
@@ -52,13 +38,24 @@ const FOUND: [f32; 5] = [2.494, 0.308, -0.608, -1.07, 1.33];
 /// Weights in the logarithm of the scale, of the logarithms of: all near records; the share of near entries of near slots.
 const SCALE: [f32; 2] = [-0.133, -0.675];
 
-/// Predicts the confidence of every slot.
-/// Fails when wrong entries are near.
+/// Predicts the confidence of every slot that `attack` placed. `graph` is that of joint recovery.
+/// Fails where the model was never fitted or tested.
 pub(super) fn predict<const D: usize>(
-    graph: &Graph,
-    released: &Released<D>,
+    attack: &Attack<'_, D>,
+    graph: Option<&Graph>,
     estimates: &[Estimate<D>],
 ) -> Result<Vec<Confidence>, Unknown> {
+    let Attack { released, lists, options, .. } = attack;
+    let graph = graph.ok_or(Unknown::OtherSolver)?;
+    if !options.confidence {
+        return Err(Unknown::NotAsked);
+    }
+    if D == 2 {
+        return Err(Unknown::OfImages);
+    }
+    if let Some(unknown) = unknown(released, lists, estimates) {
+        return Err(unknown);
+    }
     let slots_per_record = released.slots_per_record();
     let kind = match released.obfuscation() {
         Obfuscation::Lines(_) => slots_per_record - 1,
@@ -182,7 +179,7 @@ const COINCIDENT: f64 = 0.5;
 /// Returns why the model does not apply to maps recovered from `lists`, if so.
 ///
 /// In these cases, one tenth to nine tenths of the estimates with a predicted probability of 90 % were right.
-pub(super) fn unknown<const D: usize>(
+fn unknown<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
     estimates: &[Estimate<D>],

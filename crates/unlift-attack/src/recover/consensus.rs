@@ -3,118 +3,100 @@
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
 use crate::recover::anchors;
-use crate::recover::map::chance::{CandidateField, ChanceField, tube};
+use crate::recover::map::chance::CandidateField;
+use crate::recover::map::families::LineFamily;
 use crate::recover::map::family::Family;
-use crate::recover::map::lines::{CandidateColumns, Intervals, LineColumns, LineRow, Sections};
+use crate::recover::map::lines::{CandidateColumns, Intervals, LineColumns, Sections};
 use crate::recover::map::lists::{Slots, found, not_fixed, solve_chunks};
-use crate::recover::map::planes::{best_window, window_chance};
+use crate::recover::map::planes::best_window;
 use crate::recover::result::{Estimate, Status, stored_support};
 use crate::released::AxisPlanes;
-use crate::simd::{Kernel, dispatch, prefetch};
+use crate::simd::{Kernel, dispatch};
 
-pub(crate) fn solve<const D: usize>(
-    family: &Family<'_, D>,
+pub(crate) fn solve<const D: usize, F: Family<D>>(
+    family: &F,
     lists: &Neighborhoods,
     delta: f32,
     slots: &Slots,
 ) -> Vec<Estimate<D>> {
-    match family {
-        Family::Lines { rows, .. } if family.has_regions() => {
-            anchors::start::solve(rows, lists, slots)
-        }
-        Family::Planes { planes, sorted } => {
-            let chance = window_chance(planes, sorted, delta);
-            let scratch = || std::array::from_fn(|_| Vec::new());
-            solve_chunks(slots, scratch, |by_axis, first, out| {
-                for (at, estimate) in out.iter_mut().enumerate() {
-                    *estimate = on_plane(planes, first + at, lists, &chance, delta, by_axis);
-                }
-            })
-        }
-        Family::Lines { .. } | Family::Candidates { .. } => {
-            solve_chunks(slots, Scratch::default, |scratch, first, out| {
-                dispatch(Chunk { family, lists, delta, first, out, scratch });
-            })
+    if let Some(rays) = family.anchored() {
+        return anchors::start::solve(rays, lists, slots);
+    }
+    let at = &family.at_delta(delta);
+    solve_chunks(slots, Scratch::default, |scratch, first, out| {
+        dispatch(Chunk { family, lists, at: (delta, at), first, out, scratch });
+    })
+}
+
+/// Buffers of one thread.
+pub(crate) struct Scratch<const D: usize> {
+    pub(crate) lines: LineColumns<D>,
+    pub(crate) candidates: CandidateColumns<D>,
+    pub(crate) sections: Sections,
+    intervals: Intervals,
+    /// The sections of records that may vote.
+    pub(crate) votes: Sections,
+    /// Listed planes by axis, as (offset, record).
+    pub(crate) by_axis: [Vec<(f32, RecordId)>; D],
+}
+
+impl<const D: usize> Default for Scratch<D> {
+    fn default() -> Self {
+        Self {
+            lines: LineColumns::default(),
+            candidates: CandidateColumns::default(),
+            sections: Sections::default(),
+            intervals: Intervals::default(),
+            votes: Sections::default(),
+            by_axis: std::array::from_fn(|_| Vec::new()),
         }
     }
 }
 
-#[derive(Default)]
-struct Scratch<const D: usize> {
-    lines: LineColumns<D>,
-    candidates: CandidateColumns<D>,
-    sections: Sections,
-    intervals: Intervals,
-}
-
-/// Consecutive slots on lines or on axis candidates, which have one unknown.
-struct Chunk<'a, const D: usize> {
-    family: &'a Family<'a, D>,
+/// Consecutive slots.
+struct Chunk<'a, const D: usize, F: Family<D>> {
+    family: &'a F,
     lists: &'a Neighborhoods,
-    delta: f32,
+    at: (f32, &'a F::AtDelta),
     first: usize,
     out: &'a mut [Estimate<D>],
     scratch: &'a mut Scratch<D>,
 }
 
-impl<const D: usize> Kernel for Chunk<'_, D> {
+impl<const D: usize, F: Family<D>> Kernel for Chunk<'_, D, F> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let Self { family, lists, delta, first, out, scratch } = self;
-        let tubes = match family {
-            Family::Candidates { chance, .. } => chance.tubes(delta),
-            Family::Lines { .. } | Family::Planes { .. } => [0.0; D],
-        };
-        for (at, estimate) in out.iter_mut().enumerate() {
-            let slot = first + at;
-            match family {
-                Family::Lines { rows, slots_per_record, chance, .. } => {
-                    prefetch_listed(lists, slot + 1, rows);
-                    let own = &rows[slot / slots_per_record];
-                    scratch.lines.gather(rows, lists.of(slot));
-                    *estimate = on_line(own, chance, delta, scratch);
-                }
-                Family::Candidates { rows, chance } => {
-                    prefetch_listed(lists, slot + 1, rows);
-                    scratch.candidates.gather(rows, lists.of(slot));
-                    *estimate = on_candidates(&rows[slot], (chance, &tubes), delta, scratch);
-                }
-                Family::Planes { .. } => {}
+        let Self { family, lists, at, first, out, scratch } = self;
+        for (slot, estimate) in (first..).zip(out) {
+            if slot + 1 < lists.n_slots() {
+                lists.of(slot + 1).iter().for_each(|record| family.prefetch(record.index()));
             }
+            *estimate = family.consensus(slot, lists.of(slot), at, scratch);
         }
     }
 }
 
+/// Returns the estimate on the line or ray of `slot` from the gathered records.
 #[inline(always)]
-fn prefetch_listed<T>(lists: &Neighborhoods, slot: usize, rows: &[T]) {
-    if slot < lists.n_slots() {
-        lists.of(slot).iter().for_each(|record| prefetch(rows, record.index()));
-    }
-}
-
-/// Returns the estimate on a line or ray from the gathered records.
-#[inline(always)]
-fn on_line<const D: usize>(
-    own: &LineRow<D>,
-    chance: &[ChanceField<D>],
-    delta: f32,
+pub(crate) fn on_line<const D: usize>(
+    family: &LineFamily<D>,
+    slot: usize,
+    (delta, &tube): (f32, &f32),
     scratch: &mut Scratch<D>,
 ) -> Estimate<D> {
     let Scratch { lines, sections, intervals, .. } = scratch;
-    let delta2 = delta * delta;
+    let (own, delta2) = (family.own(slot), delta * delta);
     lines.sections(own, sections);
     let may_vote = lines.n_that_may_vote(own);
     if sections.n_voting() < 2 {
         return not_fixed(may_vote);
     }
-    let field = &chance[if own.is_ray() { own.group as usize } else { 0 }];
-    let Some(peak) =
-        intervals.peak(sections, (delta2, own.floor(), own.to), may_vote, |t, cells, chance| {
-            field.add_along((&own.through, &own.direction), t, tube(D, delta), (cells, chance));
-        })
-    else {
+    let limits = (delta2, own.floor(), own.to);
+    let Some(peak) = intervals.peak(sections, limits, may_vote, |t, cells, chance| {
+        family.field(own).add_along((&own.through, &own.direction), t, tube, (cells, chance));
+    }) else {
         return Estimate::lost(Status::NoSupport);
     };
     let (t, support) = refit(sections, peak.t, delta2);
@@ -124,10 +106,10 @@ fn on_line<const D: usize>(
 /// Returns the best estimate on any axis line of a slot from the gathered records. Axes are compared by evidence, not by counts: along
 /// the long axis of an elongated map more records agree by chance.
 #[inline(always)]
-fn on_candidates<const D: usize>(
+pub(crate) fn on_candidates<const D: usize>(
     own: &[f32; D],
-    (chance, tubes): (&CandidateField<D>, &[f32; D]),
-    delta: f32,
+    chance: &CandidateField<D>,
+    (delta, tubes): (f32, &[f32; D]),
     scratch: &mut Scratch<D>,
 ) -> Estimate<D> {
     let Scratch { candidates, sections, intervals, .. } = scratch;
@@ -169,34 +151,41 @@ fn refit(sections: &Sections, t: f32, delta2: f32) -> (f32, u32) {
     (t + shift, support)
 }
 
-/// Returns the estimate on a plane; free coordinates are independent. `by_axis` is a buffer for the listed planes, as (offset, record).
-fn on_plane<const D: usize>(
+/// Returns the estimate on a plane; free coordinates are independent. `by_axis` is a buffer.
+#[inline(always)]
+pub(crate) fn on_plane<const D: usize>(
     planes: &AxisPlanes<D>,
     slot: usize,
-    lists: &Neighborhoods,
-    chance: &[f32],
-    delta: f32,
+    listed: &[RecordId],
+    (delta, chance): (f32, &[f32]),
     by_axis: &mut [Vec<(f32, RecordId)>; D],
 ) -> Estimate<D> {
-    by_axis.iter_mut().for_each(Vec::clear);
-    let listed = lists.of(slot);
-    for &record in listed {
-        let axis = usize::from(planes.axis()[record.index()]);
-        by_axis[axis].push((planes.offset()[record.index()], record));
-    }
+    gather_planes(planes, listed, by_axis);
     let own = usize::from(planes.axis()[slot]);
-    let n = listed.len();
     let mut estimate = found([0.0; D], 0, 0, 0.0);
-    for (axis, listed) in by_axis.iter_mut().enumerate() {
+    for (axis, of_axis) in by_axis.iter_mut().enumerate() {
         if axis == own {
             estimate.position[axis] = planes.offset()[slot];
-        } else if let Some(window) = best_window(listed, chance, delta) {
+        } else if let Some(window) = best_window(of_axis, chance, delta) {
             estimate.position[axis] = window.offset;
             estimate.support = estimate.support.saturating_add(stored_support(window.count));
             estimate.evidence += window.evidence;
         } else {
-            return not_fixed(n);
+            return not_fixed(listed.len());
         }
     }
     estimate
+}
+
+/// Sorts `listed` planes by axis.
+pub(crate) fn gather_planes<const D: usize>(
+    planes: &AxisPlanes<D>,
+    listed: &[RecordId],
+    by_axis: &mut [Vec<(f32, RecordId)>; D],
+) {
+    by_axis.iter_mut().for_each(Vec::clear);
+    for &record in listed {
+        let axis = usize::from(planes.axis()[record.index()]);
+        by_axis[axis].push((planes.offset()[record.index()], record));
+    }
 }

@@ -8,7 +8,7 @@
 use crate::geometry::frame::Bounds;
 use crate::neighbors::Neighborhoods;
 use crate::recover::consensus;
-use crate::recover::map::family::{Family, Settings};
+use crate::recover::map::family::Family;
 use crate::recover::map::lists::{CHUNK, Slots, mixed};
 use crate::recover::map::places::trimmed;
 use crate::released::{Obfuscation, Released};
@@ -29,16 +29,10 @@ const HALVINGS: u32 = 14;
 const HALVINGS_NOT_TOO_WIDE: u32 = 5;
 /// Largest number of halvings, so that the result is positive in 32 bits.
 const MOST_HALVINGS: u32 = 100;
-/// A delta is too wide if a random record agrees with a typical place with this probability.
-const TOO_WIDE: f32 = 0.04;
 /// Steps per octave of the fine ladder. The maximum is flat, so finer steps do not help.
 const FINE: i32 = 3;
 /// Deltas form the plateau if their score reaches this fraction of the largest: for the wide choice, then for the narrow one.
 const AS_GOOD: (f64, f64) = (0.94, 0.95);
-/// Position of the narrow choice on the plateau, as a fraction of its logarithmic width: the very edge is noisy.
-const ACROSS: f64 = 1.0 / 3.0;
-/// Position of the narrow choice for planes. They leave two coordinates open, so that a wider support helps.
-const ACROSS_OF_PLANES: f64 = 3.0 / 4.0;
 /// Below the lower edge of the plateau, evidence grows by more than this factor per octave,
 const GROWTH: f64 = 1.2;
 /// or is less than this fraction of the best of the coarse ladder.
@@ -53,25 +47,17 @@ const BEYOND_EDGE_OF_SCORED: f64 = 2.0;
 /// A chosen delta of candidates is replaced by the least one if that is more than this many times as wide. Partners of exchanges
 /// agree exactly, so that evidence hardly falls as delta shrinks, and on small maps or lattices the choice is arbitrary.
 const COLLAPSED: f64 = 4.0;
-/// Chance at the least delta of candidates, as a multiple of the fraction of all records in one list: if points lie on surfaces,
-/// one line passes as close as neighbors are with that probability, and a record has three lines.
-const LEAST_OF_CANDIDATES: f64 = 3.0;
-/// Upper bound of that chance, for lists with a large fraction of all records.
-const MOST_OF_LEAST: f64 = 0.25;
-/// Least delta of candidates in flat maps, as a fraction of the radius that holds a list's neighbors.
-const LEAST_OF_FLAT: f64 = 0.5;
-
 /// Chooses delta for `released` as `family`, in the unit of the map. Consensus reads `used`: the lists as `given`, or those of
 /// both directions. With `sharp`, it chooses a narrow delta, for joint recovery.
-pub(super) fn learn<const D: usize>(
+pub(super) fn learn<const D: usize, F: Family<D>>(
     released: &Released<D>,
-    family: &Family<'_, D>,
+    family: &F,
     (used, given): (&Neighborhoods, &Neighborhoods),
     sharp: bool,
     seed: u64,
 ) -> f64 {
     let spacing = spacing(released);
-    if family.has_regions() {
+    if family.anchored().is_some() {
         return ANCHOR_DELTA * spacing;
     }
     let beyond_edge = match given.scores().is_some() {
@@ -80,35 +66,12 @@ pub(super) fn learn<const D: usize>(
     };
     let per_list = given.records().len() as f64 / given.n_slots().max(1) as f64;
     let share = per_list / released.n_records().max(1) as f64;
-    // The bounds of a map may be far wider than its points.
-    let of_bounds = !Settings::of_dimension::<D>().limits_by_share;
-    let least = if of_bounds { LEAST_DELTA * spacing } else { 0.0 };
-    let chosen =
-        choose(family, used, sharp.then_some(beyond_edge), (least, share), seed).unwrap_or(1.0);
-    let least = least_of_candidates(family, share);
+    // The bounds of a map may be far wider than its points, so that the share limits delta.
+    let least = if D == 2 { LEAST_DELTA * spacing } else { 0.0 };
+    let beyond_edge = sharp.then_some(beyond_edge);
+    let chosen = choose(family, used, beyond_edge, (least, share), seed).unwrap_or(1.0);
+    let least = if D == 2 { 0.0 } else { family.least_delta(share) };
     if COLLAPSED * chosen < least { least } else { chosen }
-}
-
-/// Returns the least delta of axis candidates of a map, if a list holds the fraction `share` of all records; 0 for other families
-/// and for images.
-fn least_of_candidates<const D: usize>(family: &Family<'_, D>, share: f64) -> f64 {
-    let is_of_candidates = matches!(family, Family::Candidates { .. });
-    if !(is_of_candidates && Settings::of_dimension::<D>().limits_by_share) {
-        return 0.0;
-    }
-    let least = (LEAST_OF_CANDIDATES * share).min(MOST_OF_LEAST) as f32;
-    // Chance grows with delta: bisect to more than 32 bits.
-    let (mut below, mut above) = (0.0, family.extent());
-    for _ in 0..48 {
-        let middle = 0.5 * (below + above);
-        if family.typical_chance(middle as f32) < least {
-            below = middle;
-        } else {
-            above = middle;
-        }
-    }
-    let of_flat = family.radius_if_flat(share).map_or(0.0, |radius| LEAST_OF_FLAT * radius);
-    f64::max(above, of_flat)
 }
 
 /// Returns the spacing of points spread evenly over the known bounds, or else over all regions; 0 without both. Axis candidates
@@ -140,20 +103,16 @@ fn spacing<const D: usize>(released: &Released<D>) -> f64 {
 /// Returns the delta with the best score, at least `least`; `None` for an empty map or one without extent. A list holds the
 /// fraction `share` of all records. The maximum is a plateau. By default the widest delta of it is taken, whose larger support is
 /// more stable; with `beyond_edge`, a narrow one, at most that many times its lower edge, because joint recovery sharpens it.
-fn choose<const D: usize>(
-    family: &Family<'_, D>,
+fn choose<const D: usize, F: Family<D>>(
+    family: &F,
     lists: &Neighborhoods,
     beyond_edge: Option<f64>,
     (least, share): (f64, f64),
     seed: u64,
 ) -> Option<f64> {
-    let settings = Settings::of_dimension::<D>();
     let chance = |delta: f64| family.typical_chance(delta as f32);
-    let is_of_planes = matches!(family, Family::Planes { .. });
-    let is_of_candidates = matches!(family, Family::Candidates { .. });
-    let base = if is_of_candidates { settings.too_wide_of_candidates } else { TOO_WIDE };
-    let (wide, narrow) = limits(family, share);
-    let too_wide = base.max(wide);
+    let [wide, narrow] = if D == 2 { [0.0; 2] } else { family.limits(share).map(|x| x as f32) };
+    let too_wide = F::TOO_WIDE.max(wide);
     // Keep some steps of the ladder between the two limits.
     let too_narrow = narrow.min(too_wide / 8.0);
     // In a flat map two of the three lines of a record run within the plane.
@@ -167,9 +126,8 @@ fn choose<const D: usize>(
     if lists.n_slots() == 0 || !(extent.is_finite() && extent > 0.0) {
         return None;
     }
-    let n_chunks =
-        if is_of_planes { settings.delta_chunks_of_planes } else { settings.delta_chunks };
-    let slots = Slots::chunks(&sample_chunks(lists.n_slots(), n_chunks, seed), lists.n_slots());
+    let chunks = sample_chunks(lists.n_slots(), F::DELTA_CHUNKS, seed);
+    let slots = Slots::chunks(&chunks, lists.n_slots());
     let mixed = mixed(lists, slots.iter(), family.slots_per_record());
     let mean_evidence = |lists: &Neighborhoods, delta: f64| {
         let solved = consensus::solve(family, lists, delta as f32, &slots);
@@ -194,8 +152,7 @@ fn choose<const D: usize>(
         }
     }
     // The fine ladder may exceed the limit of the coarse one, except in images.
-    let keeps_to_limit = is_of_candidates && settings.candidates_keep_to_limit;
-    let most_chance = if keeps_to_limit { too_wide } else { f32::INFINITY };
+    let most_chance = if F::KEEPS_TO_LIMIT { too_wide } else { f32::INFINITY };
     let fine: Vec<(f64, f64)> = (1 - FINE..2 * FINE)
         .map(|step| coarse * libm::exp2(f64::from(step) / f64::from(FINE)))
         .filter(|&delta| delta >= least && (too_narrow..=most_chance).contains(&chance(delta)))
@@ -206,31 +163,11 @@ fn choose<const D: usize>(
     let near = |&&(_, value): &&(f64, f64)| value >= as_good * most || value == most;
     let (low, high) = (fine.iter().find(near)?.0, fine.iter().rev().find(near)?.0);
     let Some(beyond_edge) = beyond_edge else { return Some(high) };
-    let across = |share: f64| low * libm::pow(high / low, share);
-    Some(match is_of_planes {
-        true => across(ACROSS_OF_PLANES),
-        false if !settings.keeps_near_edge => across(ACROSS),
-        false => across(ACROSS).min(beyond_edge * edge(coarse, &value).max(least)),
+    let across = low * libm::pow(high / low, F::ACROSS);
+    Some(match F::KEEPS_NEAR_EDGE {
+        true => across.min(beyond_edge * edge(coarse, &value).max(least)),
+        false => across,
     })
-}
-
-/// Returns two limits on chance: a delta with less chance than the first is never too wide, and one with less than the second is
-/// too narrow.
-///
-/// If a list holds the fraction `s` of all records, its neighbors lie in a ball that holds this fraction of the map. A random line
-/// passes through that ball with probability `s^(2/3)` if points fill space and `s^2` if they lie on a curve; a random plane
-/// with `s^(1/3)` and `s`.
-fn limits<const D: usize>(family: &Family<'_, D>, share: f64) -> (f32, f32) {
-    let power = |factor: f64, power: f64| (factor * libm::pow(share, power)) as f32;
-    match family {
-        _ if !Settings::of_dimension::<D>().limits_by_share => (0.0, 0.0),
-        Family::Planes { .. } => (power(0.5, 0.5), power(1.0, 1.0)),
-        // Rays are dense near their centers, so chance is large at a typical place.
-        _ if family.is_of_rays() => (power(3.0, 2.0 / 3.0), power(1.0, 2.0)),
-        Family::Lines { .. } | Family::Candidates { .. } => {
-            (power(1.0, 2.0 / 3.0), power(1.0, 2.0))
-        }
-    }
 }
 
 /// Returns the lower edge of the plateau: where evidence begins to fall as delta shrinks below `coarse`, the best of the coarse

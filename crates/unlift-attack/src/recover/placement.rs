@@ -2,12 +2,13 @@
 
 use rayon::prelude::*;
 
+use crate::Error;
 use crate::density::Peaks;
 use crate::neighbors::Neighborhoods;
-use crate::recover::map::lines::{LineRow, from_lines, from_rays};
+use crate::recover::map::lines::{LineRow, rows_of};
 use crate::recover::map::lists::found;
-use crate::recover::result::{Estimate, Status, stored_support};
-use crate::released::{Obfuscation, Released};
+use crate::recover::result::{Estimate, Recovered, Status, Unknown, stored_support};
+use crate::released::Released;
 
 /// A solver that places each hidden point at its peak.
 ///
@@ -25,14 +26,25 @@ pub(super) fn delta(peaks: &Peaks) -> f64 {
     if peaks.resolution > 0.0 { peaks.resolution } else { 1.0 }
 }
 
+/// Returns the points at `peaks`.
+pub(super) fn recover<const D: usize>(
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    peaks: &Peaks,
+) -> Result<Recovered<D>, Error> {
+    let estimates = Placement::new(released, lists, peaks).solve();
+    let recovered = Recovered::new(released, lists, &estimates, delta(peaks))?;
+    Ok(recovered.without_confidence(Unknown::OtherSolver))
+}
+
 impl<'a, const D: usize> Placement<'a, D> {
     pub(super) fn new(released: &Released<D>, lists: &'a Neighborhoods, peaks: &'a Peaks) -> Self {
-        let rows = match released.obfuscation() {
-            Obfuscation::Lines(lines) => from_lines(lines, None),
-            Obfuscation::Rays(rays) => from_rays(rays, None),
-            Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => Vec::new(),
-        };
-        Self { rows, slots_per_record: released.slots_per_record(), lists, peaks }
+        Self {
+            rows: rows_of(released, None),
+            slots_per_record: released.slots_per_record(),
+            lists,
+            peaks,
+        }
     }
 
     pub(super) fn solve(&self) -> Vec<Estimate<D>> {

@@ -20,12 +20,12 @@ use rayon::prelude::*;
 
 use crate::geometry::knn::Knn;
 use crate::neighbors::Neighborhoods;
-use crate::recover::input::Input;
+use crate::recover::map::family::Family;
 use crate::recover::map::graph::record_of;
 use crate::recover::map::lines::{LANES, Lanes, ln};
 use crate::recover::map::lists::CHUNK;
-use crate::recover::map::pieces::Pieces;
 use crate::recover::map::places::{Places, along_curve, distance2};
+use crate::recover::problem::Problem;
 use crate::recover::result::{Estimate, Status};
 use crate::seed::{Draws, Stage};
 use crate::simd::{Kernel, dispatch};
@@ -56,7 +56,7 @@ const ELSEWHERE: usize = 8;
 /// Steps from such a place, in radii.
 const ELSEWHERE_STEPS: Lanes = [0.0, 0.1, -0.1, 0.2, -0.2, 0.4, -0.4, 0.6];
 /// These places are tried for slots with fewer listed estimates nearby than this fraction of the expected number. Slots with several
-/// pieces always try them, because the piece may be wrong.
+/// family always try them, because the piece may be wrong.
 const LOST: f32 = 0.85;
 const LEAST_ELSEWHERE: f32 = 0.5;
 /// Bounds of the number of estimates within the radius, as a fraction of K. Far from the center, only a part of them is counted.
@@ -84,11 +84,11 @@ const LEAST_RATIO_OF_SOURCES: f32 = 0.75;
 
 /// Returns the estimates of all slots after ranking from `start`, the estimates of joint recovery; `start` as an error if what lists do not
 /// name says too little.
-pub(super) fn recover<const D: usize, P: Pieces<D>>(
-    input: &Input<'_, P>,
+pub(super) fn recover<const D: usize, F: Family<D>>(
+    problem: &Problem<'_, D, F>,
     mut estimates: Vec<Estimate<D>>,
 ) -> Result<Vec<Estimate<D>>, Vec<Estimate<D>>> {
-    let (lists, n) = (input.lists, estimates.len());
+    let (lists, n) = (problem.lists, estimates.len());
     let mean_length = lists.records().len() as f32 / n.max(1) as f32;
     if (n as f32) < LEAST_LISTS * mean_length {
         return Err(estimates);
@@ -108,13 +108,13 @@ pub(super) fn recover<const D: usize, P: Pieces<D>>(
             if half == 0 {
                 radius = radii(&tree, &slots, lists);
             }
-            let [near, farther] = shares_within(input, &estimates, &radius);
+            let [near, farther] = shares_within(problem, &estimates, &radius);
             let inlier_ratio = near.clamp(INLIER_RATIO.0, INLIER_RATIO.1);
             if half == 0 && (inlier_ratio < least_ratio || farther > MOST_FARTHER * near) {
                 return if iteration == 0 { Err(estimates) } else { Ok(estimates) };
             }
             let context = Context {
-                input,
+                problem,
                 estimates: &estimates,
                 tree: &tree,
                 slots: &slots,
@@ -159,17 +159,17 @@ fn radii<const D: usize>(tree: &Knn<'_, D>, slots: &[u32], lists: &Neighborhoods
 }
 
 /// Returns the fraction of listed records within [`REACH`] radii, which is about the inlier ratio, and within [`FARTHER`] radii.
-fn shares_within<const D: usize, P: Pieces<D>>(
-    input: &Input<'_, P>,
+fn shares_within<const D: usize, F: Family<D>>(
+    problem: &Problem<'_, D, F>,
     estimates: &[Estimate<D>],
     radius: &[f32],
 ) -> [f32; 2] {
     let (mut within, mut all) = ([0; 2], 0);
-    let slots_per_record = input.pieces.slots_per_record();
+    let slots_per_record = problem.family.slots_per_record();
     let every = estimates.len().div_ceil(SAMPLE);
     for slot in (0..estimates.len()).step_by(every).filter(|&slot| radius[slot] > 0.0) {
         let bounds = [REACH, FARTHER].map(|times| (times * radius[slot]).powi(2));
-        for record in input.lists.of(slot) {
+        for record in problem.lists.of(slot) {
             let others = &estimates[record.index() * slots_per_record..][..slots_per_record];
             // A lost estimate is not near, because its distance is no number.
             let away = |other: &Estimate<D>| distance2(&other.position, &estimates[slot].position);
@@ -313,8 +313,8 @@ impl<const D: usize> Terms<D> {
 }
 
 /// What an iteration reads.
-struct Context<'a, const D: usize, P> {
-    input: &'a Input<'a, P>,
+struct Context<'a, const D: usize, F: Family<D>> {
+    problem: &'a Problem<'a, D, F>,
     estimates: &'a [Estimate<D>],
     /// The estimates of `slots`.
     tree: &'a Knn<'a, D>,
@@ -325,13 +325,13 @@ struct Context<'a, const D: usize, P> {
     iteration: usize,
 }
 
-struct Chunk<'a, 'b, const D: usize, P> {
-    context: &'a Context<'b, D, P>,
+struct Chunk<'a, 'b, const D: usize, F: Family<D>> {
+    context: &'a Context<'b, D, F>,
     slots: &'a [u32],
     terms: &'a mut Terms<D>,
 }
 
-impl<const D: usize, P: Pieces<D>> Kernel for Chunk<'_, '_, D, P> {
+impl<const D: usize, F: Family<D>> Kernel for Chunk<'_, '_, D, F> {
     type Output = Vec<Best<D>>;
 
     #[inline(always)]
@@ -341,7 +341,7 @@ impl<const D: usize, P: Pieces<D>> Kernel for Chunk<'_, '_, D, P> {
         let mut all = Vec::with_capacity(slots.len());
         for &slot in slots {
             let (mut best, is_lost) = context.likeliest(slot as usize, terms);
-            if tries_elsewhere && (is_lost || P::PER_SLOT > 1) {
+            if tries_elsewhere && (is_lost || F::PIECES > 1) {
                 context.try_elsewhere(slot as usize, &mut best, terms);
             }
             all.push(best);
@@ -358,19 +358,19 @@ struct Best<const D: usize> {
     axis: usize,
 }
 
-impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
+impl<const D: usize, F: Family<D>> Context<'_, D, F> {
     /// Returns the likeliest of some places on the record of `slot`, and whether few listed estimates are near it.
     #[inline(always)]
     fn likeliest(&self, slot: usize, terms: &mut Terms<D>) -> (Best<D>, bool) {
         let old = self.estimates[slot];
         let item = (slot * ITERATIONS + self.iteration) as u64;
-        let mut draws = Draws::new(self.input.seed, Stage::Ranking, item);
+        let mut draws = Draws::new(self.problem.seed, Stage::Ranking, item);
         let n_near = self.collect(slot, slot, terms);
-        let expected = self.inlier_ratio * self.input.lists.of(slot).len() as f32;
+        let expected = self.inlier_ratio * self.problem.lists.of(slot).len() as f32;
         let is_lost = (n_near as f32) < LOST * expected;
         let axis = usize::from(old.axis);
         let mut best = Best { score: f32::NEG_INFINITY, x: old.position, axis };
-        let rounds: &[Lanes] = match P::NORMAL {
+        let rounds: &[Lanes] = match F::NORMAL {
             true => &PLANE_STEPS,
             false if self.iteration < FAR_ITERATIONS => &LINE_STEPS,
             false => &NEAR_LINE_STEPS,
@@ -394,9 +394,9 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         best: &mut Best<D>,
     ) {
         let Best { x: from, axis, .. } = from;
-        let piece = self.input.pieces.piece(slot, axis);
+        let piece = self.problem.family.piece(slot, axis);
         let radius = terms.radius;
-        let direction: [f32; D] = match P::NORMAL {
+        let direction: [f32; D] = match F::NORMAL {
             true => {
                 let random: [f32; D] =
                     std::array::from_fn(|c| from[c] + draws.between(-1.0, 1.0) as f32 * radius);
@@ -405,7 +405,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
                 let length = distance2(&away, &[0.0; D]).sqrt().max(f32::MIN_POSITIVE);
                 away.map(|x| x / length)
             }
-            false => self.input.pieces.direction(slot, axis),
+            false => self.problem.family.direction(slot, axis),
         };
         let size = radius * draws.between(0.75, 1.25) as f32;
         let length2 = distance2(&direction, &[0.0; D]);
@@ -429,20 +429,20 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
     /// Tries the places of `slot` that are near the estimates of listed records.
     #[inline(never)]
     fn try_elsewhere(&self, slot: usize, best: &mut Best<D>, terms: &mut Terms<D>) {
-        let Input { pieces, lists, seed, .. } = self.input;
+        let Problem { family, lists, seed, .. } = self.problem;
         let own = lists.of(slot);
         let mut draws = Draws::new(*seed, Stage::Ranking, u64::MAX - slot as u64);
         for record in own.iter().step_by(own.len().div_ceil(ELSEWHERE).max(1)) {
-            let first = record.index() * pieces.slots_per_record();
-            for center in first..first + pieces.slots_per_record() {
+            let first = record.index() * family.slots_per_record();
+            for center in first..first + family.slots_per_record() {
                 let (x, radius) = (self.estimates[center].position, self.radius[center]);
-                let near = |axis: usize| pieces.piece(slot, axis).project(&x);
+                let near = |axis: usize| family.piece(slot, axis).project(&x);
                 let is_near = |&axis: &usize| distance2(&near(axis), &x) < radius * radius;
-                if !(0..P::PER_SLOT).any(|axis| is_near(&axis)) {
+                if !(0..F::PIECES).any(|axis| is_near(&axis)) {
                     continue;
                 }
                 self.collect(slot, center, terms);
-                for axis in (0..P::PER_SLOT).filter(is_near) {
+                for axis in (0..F::PIECES).filter(is_near) {
                     let from = Best { score: 0.0, x: near(axis), axis };
                     self.search(slot, (&x, from), &ELSEWHERE_STEPS, &mut draws, terms, best);
                 }
@@ -453,8 +453,9 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
     /// Collects the terms of `slot` for places around the estimate of `center`; returns how many listed records are near.
     #[inline(always)]
     fn collect(&self, slot: usize, center: usize, terms: &mut Terms<D>) -> usize {
-        let Self { input: Input { pieces, lists, graph, .. }, estimates, radius, odds, .. } = *self;
-        let slots_per_record = pieces.slots_per_record();
+        let Self { problem: Problem { family, lists, graph, .. }, estimates, radius, odds, .. } =
+            *self;
+        let slots_per_record = family.slots_per_record();
         let record = record_of(slot, slots_per_record);
         let place = |slot: usize| &estimates[slot].position;
         let at = place(center);

@@ -2,10 +2,10 @@
 
 use crate::density::{Peaks, tomography};
 use crate::neighbors::{Geometric, Neighborhoods, geometric_by};
+use crate::recover::attack::Attack;
 use crate::recover::baselines::density::published;
-use crate::recover::options::RecoverOptions;
+use crate::recover::options::{Delta, RecoverOptions};
 use crate::recover::placement::{Placement, delta};
-use crate::recover::problem::Problem;
 use crate::recover::result::Recovered;
 use crate::recover::solver::Builtin;
 use crate::released::{Obfuscation, Released};
@@ -33,10 +33,12 @@ pub fn records_alone<const D: usize>(
     // Planes and rays from one center have no geometric lists.
     if let Ok(lists) = geometric_by(released, Geometric::K, &peaks) {
         let options = RecoverOptions { confidence: false, ..*options };
-        let problem = Problem::new(released, &lists, Builtin::Joint, &options)?;
-        let start = problem.start();
-        attacks.push(("geometric, consensus", problem.finish(start.clone())?));
-        attacks.push(("geometric, joint", problem.finish(problem.joint(start, &[]))?));
+        let joint = Attack::new(released, &lists, &options, Builtin::Joint).run()?;
+        // Delta does not need to be learned twice.
+        let options = RecoverOptions { delta: Delta::Fixed(joint.delta()), ..options };
+        let start = Attack::new(released, &lists, &options, Builtin::Joint);
+        attacks.push(("geometric, consensus", Attack { only_starts: true, ..start }.run()?));
+        attacks.push(("geometric, joint", joint));
     }
     Ok(attacks)
 }

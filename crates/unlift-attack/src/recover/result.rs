@@ -1,7 +1,5 @@
 //! Results of recovery: estimates, confidence, and the recovered map.
 
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use crate::neighbors::Neighborhoods;
 use crate::recover::assignment::descriptor_rows;
 use crate::released::{Obfuscation, Released};
@@ -194,31 +192,22 @@ pub struct TrialHistogram {
 }
 
 impl TrialHistogram {
+    /// Counts the `trials` of slots. A slot without trials is not a slot that was solved quickly, and does not count.
+    pub(crate) fn new(trials: &[u32]) -> Self {
+        let mut counts = [0; Self::UP_TO.len()];
+        for &n in trials.iter().filter(|&&n| n > 0) {
+            let bin = Self::UP_TO.partition_point(|&up_to| up_to < n);
+            counts[bin.min(counts.len() - 1)] += 1;
+        }
+        Self { counts }
+    }
+
     /// Inclusive upper ends of the bins.
     pub const UP_TO: [u32; 9] = [1, 3, 10, 30, 100, 300, 1_000, 3_000, MAX_TRIALS];
 
     /// Returns (upper end, number of slots) per bin.
     pub fn bins(&self) -> impl Iterator<Item = (u32, u64)> {
         Self::UP_TO.into_iter().zip(self.counts)
-    }
-}
-
-/// A histogram that threads fill concurrently. Sums of integers do not depend on the order.
-#[derive(Debug, Default)]
-pub(crate) struct TrialCounts {
-    bins: [AtomicU64; TrialHistogram::UP_TO.len()],
-}
-
-impl TrialCounts {
-    /// Counts a slot that took `trials` trials.
-    pub(crate) fn note(&self, trials: u32) {
-        let bin = TrialHistogram::UP_TO.partition_point(|&up_to| up_to < trials);
-        self.bins[bin.min(self.bins.len() - 1)].fetch_add(1, Ordering::Relaxed);
-    }
-
-    /// Returns the histogram so far.
-    pub(crate) fn histogram(&self) -> TrialHistogram {
-        TrialHistogram { counts: self.bins.each_ref().map(|bin| bin.load(Ordering::Relaxed)) }
     }
 }
 
@@ -319,11 +308,23 @@ impl<const D: usize> Recovered<D> {
             Estimate { position, status: Status::Ok, support: 0, axis: axis as u8, evidence: 0.0 }
         };
         let estimates: Vec<Estimate<D>> = positions.iter().enumerate().map(estimate).collect();
+        let recovered = Self::new(released, lists, &estimates, 0.0)?;
+        Ok(recovered.without_confidence(Unknown::OtherSolver))
+    }
+
+    /// Creates the result of an attack on `released` with `lists`, from one estimate per slot.
+    pub(crate) fn new(
+        released: &Released<D>,
+        lists: &Neighborhoods,
+        estimates: &[Estimate<D>],
+        delta: f64,
+    ) -> Result<Self, Error> {
+        let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
         let rows = descriptor_rows(released, lists);
         let (origin, unit) = (released.origin(), released.unit());
         let about = About { map: Some(released.fingerprint()), ..lists.about() };
-        Self::try_new(&estimates, candidates.is_some(), rows, origin, unit, 0.0)
-            .map(|recovered| recovered.with_about(about).without_confidence(Unknown::OtherSolver))
+        let recovered = Self::try_new(estimates, with_axis, rows, origin, unit, delta)?;
+        Ok(recovered.with_about(about))
     }
 
     /// Sets the released map and the row order of these positions: those of the lists they were made from.

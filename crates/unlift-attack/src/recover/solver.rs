@@ -1,19 +1,20 @@
 //! Solvers: the trait [`Solver`], which you can implement, and the solvers of this crate.
 
-use std::any::Any;
 use std::fmt::Debug;
 use std::sync::Arc;
 
+use super::attack::{Attack, check};
 use super::options::RecoverOptions;
 use super::result::Recovered;
 use crate::Error;
+use crate::compiled::Both;
 use crate::neighbors::Neighborhoods;
 use crate::released::Released;
 
 /// A recovery method: it turns released records and lists of their neighbors into positions. An audit takes `Arc<dyn Solver<D>>`.
 ///
 /// [`Recovered::from_positions`] makes the return value from positions.
-pub trait Solver<const D: usize>: Any + Debug + Send + Sync {
+pub trait Solver<const D: usize>: Debug + Send + Sync {
     /// Name in rows and reports: one plain word, different from the names in [`Builtin::ALL`].
     fn name(&self) -> &str;
 
@@ -33,6 +34,11 @@ pub trait Solver<const D: usize>: Any + Debug + Send + Sync {
     /// Whether positions depend on the lists. Otherwise the solver attacks the records alone.
     fn reads_lists(&self) -> bool {
         true
+    }
+
+    /// Returns this solver if it is one of this crate.
+    fn builtin(&self) -> Option<Builtin> {
+        None
     }
 }
 
@@ -96,12 +102,45 @@ impl Builtin {
     pub fn list<const D: usize>(solvers: &[Self]) -> Vec<Arc<dyn Solver<D>>> {
         solvers.iter().map(|&solver| Arc::new(solver) as Arc<dyn Solver<D>>).collect()
     }
+}
 
-    /// Returns the builtin solver behind `solver`, if it is one.
-    pub fn of<const D: usize>(solver: &dyn Solver<D>) -> Option<Self> {
-        let any: &dyn Any = solver;
-        any.downcast_ref().copied()
+impl<const D: usize> Solver<D> for Builtin {
+    fn name(&self) -> &str {
+        Self::name(self)
     }
+
+    fn recover(
+        &self,
+        released: &Released<D>,
+        lists: &Neighborhoods,
+        options: &RecoverOptions,
+    ) -> Result<Recovered<D>, Error> {
+        let solve: Solve<D> = SOLVE.of()?;
+        solve(*self, released, lists, options)
+    }
+
+    fn reads_lists(&self) -> bool {
+        Self::FROM_LISTS.contains(self)
+    }
+
+    fn builtin(&self) -> Option<Builtin> {
+        Some(*self)
+    }
+}
+
+type Solve<const D: usize> =
+    fn(Builtin, &Released<D>, &Neighborhoods, &RecoverOptions) -> Result<Recovered<D>, Error>;
+
+static SOLVE: Both<Solve<2>, Solve<3>> = Both(solve::<2>, solve::<3>);
+
+fn solve<const D: usize>(
+    solver: Builtin,
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    options: &RecoverOptions,
+) -> Result<Recovered<D>, Error> {
+    check(released, lists, options)?;
+    Attack::new(released, lists, options, solver).run()
 }
 
 #[cfg(test)]

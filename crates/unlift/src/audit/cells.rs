@@ -15,7 +15,7 @@ use crate::evaluate::{
 };
 use crate::geometry::knn::Knn;
 use crate::obfuscate::{Scheme, all, obfuscate};
-use crate::recover::{Builtin, RecoverOptions, recover};
+use crate::recover::{RecoverOptions, recover};
 use crate::released::Released;
 use crate::seed::Key;
 use crate::truth::{Original, Secret};
@@ -189,7 +189,7 @@ pub(super) fn attack<const D: usize>(
             let started = Instant::now();
             let recovered = match recover(&hidden.0, &made.lists, &**solver, &options) {
                 // The failure of a custom solver costs only its own rows.
-                Err(error) if Builtin::of(&**solver).is_none() && !owned.may_be_small() => {
+                Err(error) if solver.builtin().is_none() && !owned.may_be_small() => {
                     let error = error.within(&format!("solver {}", solver.name()));
                     missing.push(NotAudited::variant(scheme, variant, &error, &hidden.1));
                     continue;

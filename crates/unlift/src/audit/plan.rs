@@ -151,7 +151,7 @@ impl<const D: usize> Plan<D> {
 
     /// Returns true if the plan contains this built-in solver.
     pub fn has_solver(&self, builtin: Builtin) -> bool {
-        self.solvers.iter().any(|solver| Builtin::of(&**solver) == Some(builtin))
+        self.solvers.iter().any(|solver| solver.builtin() == Some(builtin))
     }
 
     /// Returns true if the oracle is among the sources.
@@ -239,7 +239,7 @@ impl<const D: usize> Plan<D> {
     fn check_fields(&self) -> Result<(), Error> {
         check_names("scheme", self.schemes.iter().map(|scheme| scheme.name()))?;
         check_names("solver", self.solvers.iter().map(|solver| solver.name()))?;
-        let own = self.solvers.iter().filter(|solver| Builtin::of(&***solver).is_none());
+        let own = self.solvers.iter().filter(|solver| solver.builtin().is_none());
         if let Some(solver) = own.into_iter().find(|one| Builtin::from_name(one.name()).is_ok()) {
             // Reports describe built-in solvers by their names.
             let expected = "a name that no solver of unlift has";

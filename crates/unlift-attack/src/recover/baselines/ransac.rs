@@ -11,11 +11,12 @@ use rayon::prelude::*;
 
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
+use crate::recover::consensus::{Scratch, gather_planes};
+use crate::recover::map::families::{CandidateFamily, LineFamily, PlaneFamily};
 use crate::recover::map::family::Family;
-use crate::recover::map::lines::{LineColumns, NO_VOTE, Sections};
-use crate::recover::map::lists::{Slots, found, solve_chunks};
-use crate::recover::result::{Estimate, MAX_TRIALS, Status, TrialCounts};
-use crate::released::AxisPlanes;
+use crate::recover::map::lines::{NO_VOTE, Sections};
+use crate::recover::map::lists::found;
+use crate::recover::result::{Estimate, MAX_TRIALS, Status};
 use crate::seed::{Draws, Stage};
 use crate::simd::{Kernel, dispatch};
 
@@ -24,95 +25,103 @@ const CONFIDENCE: f64 = 0.99;
 /// Records per sample and unknown coordinate.
 const SAMPLE: u32 = 2;
 
-pub(crate) struct Ransac<'a, const D: usize> {
-    pub(crate) family: &'a Family<'a, D>,
-    pub(crate) lists: &'a Neighborhoods,
-    pub(crate) delta: f32,
-    pub(crate) seed: u64,
-    pub(crate) trials: &'a TrialCounts,
-}
-
-impl<const D: usize> Ransac<'_, D> {
-    pub(crate) fn solve(&self) -> Vec<Estimate<D>> {
-        let axes = match self.family {
-            Family::Candidates { rows, .. } => vote(rows, self.lists),
-            Family::Lines { .. } | Family::Planes { .. } => Vec::new(),
-        };
-        solve_chunks(&Slots::all(self.lists.n_slots()), Scratch::default, |scratch, first, out| {
-            for (at, estimate) in out.iter_mut().enumerate() {
-                let slot = first + at;
-                let (solved, trials) = dispatch(Slot { ransac: self, axes: &axes, slot, scratch });
-                *estimate = solved;
-                // A slot without trials is not a slot that was solved quickly.
-                if trials > 0 {
-                    self.trials.note(trials);
-                }
-            }
-        })
+/// How the loop samples records of a family.
+pub(crate) trait Trials<const D: usize> {
+    /// Returns the exchanged axis of every record; nothing for families without one.
+    fn axes(&self, _lists: &Neighborhoods) -> Vec<u8> {
+        Vec::new()
     }
+    /// Returns the position of `slot` with the largest support and its support, and the number of trials.
+    fn solve(
+        &self,
+        slot: usize,
+        listed: (&[RecordId], &[u8]),
+        delta: f32,
+        draws: &mut Draws,
+        scratch: &mut Scratch<D>,
+    ) -> (Result<([f32; D], u32), Status>, u32);
 }
 
-struct Scratch<const D: usize> {
-    lines: LineColumns<D>,
-    sections: Sections,
-    /// The sections of records that may vote.
-    votes: Sections,
-    /// Listed offsets of planes, by axis.
-    offsets: [Vec<f32>; D],
+/// Returns the estimates of all slots, and the number of trials of each; 0 if it was not tried.
+pub(crate) fn solve<const D: usize, F: Family<D>>(
+    family: &F,
+    lists: &Neighborhoods,
+    delta: f32,
+    seed: u64,
+) -> (Vec<Estimate<D>>, Vec<u32>) {
+    let axes = &family.axes(lists);
+    let solve = |scratch: &mut Scratch<D>, slot| {
+        dispatch(Slot { family, lists, axes, delta, seed, slot, scratch })
+    };
+    (0..lists.n_slots()).into_par_iter().map_init(Scratch::default, solve).unzip()
 }
 
-impl<const D: usize> Default for Scratch<D> {
-    fn default() -> Self {
-        let offsets = std::array::from_fn(|_| Vec::new());
-        let (sections, votes) = (Sections::default(), Sections::default());
-        Self { lines: LineColumns::default(), sections, votes, offsets }
-    }
-}
-
-struct Slot<'a, const D: usize> {
-    ransac: &'a Ransac<'a, D>,
+struct Slot<'a, const D: usize, F> {
+    family: &'a F,
+    lists: &'a Neighborhoods,
     axes: &'a [u8],
+    delta: f32,
+    seed: u64,
     slot: usize,
     scratch: &'a mut Scratch<D>,
 }
 
-impl<const D: usize> Kernel for Slot<'_, D> {
+impl<const D: usize, F: Family<D>> Kernel for Slot<'_, D, F> {
     type Output = (Estimate<D>, u32);
 
     #[inline(always)]
     fn run(self) -> Self::Output {
-        let Self { ransac, axes, slot, scratch } = self;
-        let listed = ransac.lists.of(slot);
-        let mut draws = Draws::new(ransac.seed, Stage::Ransac, slot as u64);
-        let (solved, trials, axis) = match ransac.family {
-            Family::Lines { rows, slots_per_record, .. } => {
-                let own = &rows[slot / slots_per_record];
-                scratch.lines.gather(rows, listed);
-                scratch.lines.sections(own, &mut scratch.sections);
-                let may_vote = scratch.lines.n_that_may_vote(own);
-                let (found, trials) = on_line(scratch, may_vote, ransac.delta, &mut draws);
-                (found.map(|(t, support)| (own.at(own.clamp(t)), support)), trials, 0)
-            }
-            Family::Candidates { rows, .. } => {
-                let (own, axis) = (&rows[slot], axes[slot]);
-                sections_of_voted(rows, axes, listed, slot, &mut scratch.sections);
-                let (found, trials) = on_line(scratch, listed.len(), ransac.delta, &mut draws);
-                let at = |t| std::array::from_fn(|c| if c == axis.into() { t } else { own[c] });
-                (found.map(|(t, support)| (at(t), support)), trials, axis)
-            }
-            Family::Planes { planes, .. } => {
-                let offsets = &mut scratch.offsets;
-                match on_plane(planes, slot, listed, offsets, ransac.delta, &mut draws) {
-                    Ok((place, support, trials)) => (Ok((place, support)), trials, 0),
-                    Err(status) => (Err(status), 0, 0),
-                }
-            }
-        };
+        let Self { family, lists, axes, delta, seed, slot, scratch } = self;
+        let mut draws = Draws::new(seed, Stage::Ransac, slot as u64);
+        let (solved, trials) =
+            family.solve(slot, (lists.of(slot), axes), delta, &mut draws, scratch);
+        let axis = axes.get(slot).copied().unwrap_or(0);
         let estimate = match solved {
             Ok((position, support)) => found(position, support, axis.into(), 0.0),
             Err(status) => Estimate { axis, ..Estimate::lost(status) },
         };
         (estimate, trials)
+    }
+}
+
+impl<const D: usize> Trials<D> for LineFamily<D> {
+    #[inline(always)]
+    fn solve(
+        &self,
+        slot: usize,
+        (listed, _): (&[RecordId], &[u8]),
+        delta: f32,
+        draws: &mut Draws,
+        scratch: &mut Scratch<D>,
+    ) -> (Result<([f32; D], u32), Status>, u32) {
+        let own = self.own(slot);
+        scratch.lines.gather(&self.rows, listed);
+        scratch.lines.sections(own, &mut scratch.sections);
+        let may_vote = scratch.lines.n_that_may_vote(own);
+        let (found, trials) = on_line(scratch, may_vote, delta, draws);
+        (found.map(|(t, support)| (own.at(own.clamp(t)), support)), trials)
+    }
+}
+
+impl<const D: usize> Trials<D> for CandidateFamily<'_, D> {
+    fn axes(&self, lists: &Neighborhoods) -> Vec<u8> {
+        vote(self.rows, lists)
+    }
+
+    #[inline(always)]
+    fn solve(
+        &self,
+        slot: usize,
+        (listed, axes): (&[RecordId], &[u8]),
+        delta: f32,
+        draws: &mut Draws,
+        scratch: &mut Scratch<D>,
+    ) -> (Result<([f32; D], u32), Status>, u32) {
+        let (own, axis) = (&self.rows[slot], axes[slot]);
+        sections_of_voted(self.rows, axes, listed, slot, &mut scratch.sections);
+        let (found, trials) = on_line(scratch, listed.len(), delta, draws);
+        let at = |t| std::array::from_fn(|c| if c == axis.into() { t } else { own[c] });
+        (found.map(|(t, support)| (at(t), support)), trials)
     }
 }
 
@@ -188,57 +197,58 @@ fn on_line<const D: usize>(
     (Ok((best_t + sum / weight, best)), trials)
 }
 
-/// Returns the place on the plane of `slot` with the largest support, its support, and the number of trials. `offsets` is a buffer.
-#[inline(always)]
-fn on_plane<const D: usize>(
-    planes: &AxisPlanes<D>,
-    slot: usize,
-    listed: &[RecordId],
-    offsets: &mut [Vec<f32>; D],
-    delta: f32,
-    draws: &mut Draws,
-) -> Result<([f32; D], u32, u32), Status> {
-    if listed.len() < 2 {
-        return Err(Status::TooFewNeighbors);
-    }
-    let own = usize::from(planes.axis()[slot]);
-    offsets.iter_mut().for_each(Vec::clear);
-    for record in listed {
-        offsets[usize::from(planes.axis()[record.index()])].push(planes.offset()[record.index()]);
-    }
-    let free = (0..D).filter(|&axis| axis != own);
-    if free.clone().any(|axis| offsets[axis].is_empty()) {
-        return Err(Status::Degenerate);
-    }
-    let n: u32 = free.clone().map(|axis| offsets[axis].len() as u32).sum();
-    let mut place = [0.0; D];
-    place[own] = planes.offset()[slot];
-    let (mut best_place, mut best) = (place, 0);
-    let (mut trials, mut needed) = (0, MAX_TRIALS);
-    while trials < needed {
-        trials += 1;
-        for axis in free.clone() {
-            let mut draw = || offsets[axis][draws.below(offsets[axis].len() as u64) as usize];
-            place[axis] = (0..SAMPLE).map(|_| draw()).sum::<f32>() / SAMPLE as f32;
+impl<const D: usize> Trials<D> for PlaneFamily<'_, D> {
+    #[inline(always)]
+    fn solve(
+        &self,
+        slot: usize,
+        (listed, _): (&[RecordId], &[u8]),
+        delta: f32,
+        draws: &mut Draws,
+        scratch: &mut Scratch<D>,
+    ) -> (Result<([f32; D], u32), Status>, u32) {
+        if listed.len() < 2 {
+            return (Err(Status::TooFewNeighbors), 0);
         }
-        let is_near = |axis: usize, x: &f32| u32::from((x - place[axis]).abs() <= delta);
-        let of_axis = |axis: usize| offsets[axis].iter().map(|x| is_near(axis, x)).sum::<u32>();
-        let support = free.clone().map(of_axis).sum();
-        if support > best {
-            (best_place, best) = (place, support);
-            needed = trials_needed(support, n, SAMPLE * (D as u32 - 1));
+        let by_axis = &mut scratch.by_axis;
+        gather_planes(self.planes, listed, by_axis);
+        let own = usize::from(self.planes.axis()[slot]);
+        let free = (0..D).filter(|&axis| axis != own);
+        if free.clone().any(|axis| by_axis[axis].is_empty()) {
+            return (Err(Status::Degenerate), 0);
         }
+        let n: u32 = free.clone().map(|axis| by_axis[axis].len() as u32).sum();
+        let mut place = [0.0; D];
+        place[own] = self.planes.offset()[slot];
+        let (mut best_place, mut best) = (place, 0);
+        let (mut trials, mut needed) = (0, MAX_TRIALS);
+        while trials < needed {
+            trials += 1;
+            for axis in free.clone() {
+                let offsets = &by_axis[axis];
+                let mut draw = || offsets[draws.below(offsets.len() as u64) as usize].0;
+                place[axis] = (0..SAMPLE).map(|_| draw()).sum::<f32>() / SAMPLE as f32;
+            }
+            let is_near = |axis: usize, x: f32| u32::from((x - place[axis]).abs() <= delta);
+            let of_axis =
+                |axis: usize| by_axis[axis].iter().map(|x| is_near(axis, x.0)).sum::<u32>();
+            let support = free.clone().map(of_axis).sum();
+            if support > best {
+                (best_place, best) = (place, support);
+                needed = trials_needed(support, n, SAMPLE * (D as u32 - 1));
+            }
+        }
+        if best == 0 {
+            return (Err(Status::NoSupport), 0);
+        }
+        for axis in free {
+            let away = by_axis[axis].iter().map(|x| x.0 - best_place[axis]);
+            let near = away.filter(|away| away.abs() <= delta);
+            let (sum, count) = near.fold((0.0, 0), |(sum, n), away| (sum + away, n + 1));
+            place[axis] = best_place[axis] + if count > 0 { sum / count as f32 } else { 0.0 };
+        }
+        (Ok((place, best)), trials)
     }
-    if best == 0 {
-        return Err(Status::NoSupport);
-    }
-    for axis in free {
-        let away = offsets[axis].iter().map(|x| x - best_place[axis]);
-        let near = away.filter(|away| away.abs() <= delta);
-        let (sum, count) = near.fold((0.0, 0), |(sum, n), away| (sum + away, n + 1));
-        place[axis] = best_place[axis] + if count > 0 { sum / count as f32 } else { 0.0 };
-    }
-    Ok((place, best, trials))
 }
 
 // The exchanged coordinate of permuted points (supplement A).

@@ -24,12 +24,12 @@ mod temper;
 use rayon::prelude::*;
 
 use crate::geometry::knn::Knn;
-use crate::recover::input::Input;
+use crate::recover::map::family::{Family, Piece};
 use crate::recover::map::graph::{Graph, Side, either, side};
 use crate::recover::map::lines::ln;
 use crate::recover::map::lists::CHUNK;
-use crate::recover::map::pieces::{Piece, Pieces};
 use crate::recover::map::places::{along_curve, distance2};
+use crate::recover::problem::Problem;
 use crate::recover::result::{Estimate, Status};
 use crate::seed::{Draws, Stage};
 use tables::{BIN_ENDS, Tables};
@@ -50,7 +50,7 @@ const DENSITY_WEIGHT: f32 = 0.5;
 const LEAST_DENSITY: f32 = 0.05;
 /// Radius of the kernel of that density, in typical widths. The kernel is about a normal distribution of a third of a width.
 const DENSITY_RADIUS: f32 = 0.91;
-/// Largest number of candidates per slot, shared by the pieces of its feasible set, and the part of them that edges propose.
+/// Largest number of candidates per slot, shared by the family of its feasible set, and the part of them that edges propose.
 const CANDIDATES: usize = 40;
 const OF_EDGES: f32 = 0.67;
 /// An edge proposes a candidate if the squared distance of its place to the record is below this, in squared widths.
@@ -70,19 +70,19 @@ const MAX_STEPS: usize = 15;
 const LEAST_WEIGHT: f32 = 1e-3;
 
 /// Returns the estimates of all slots after beliefs from `estimates`, those of joint recovery. Without enough slots, they stay.
-pub(super) fn recover<const D: usize, P: Pieces<D>>(
-    input: &Input<'_, P>,
+pub(super) fn recover<const D: usize, F: Family<D>>(
+    problem: &Problem<'_, D, F>,
     mut estimates: Vec<Estimate<D>>,
 ) -> Vec<Estimate<D>> {
-    let Input { pieces, graph, seed, .. } = input;
-    let seed = *seed;
+    let Problem { family, graph, seed, .. } = *problem;
+
     let n = estimates.len();
     let n_known = estimates.iter().filter(|estimate| estimate.status == Status::Ok).count();
     if n_known < LEAST_SLOTS {
         return estimates;
     }
     let start = estimates.clone();
-    let marginals = Marginals::new(pieces, n);
+    let marginals = Marginals::new(family, n);
     let mut beliefs: Vec<Vec<Place<D>>> = start_weights(&estimates)
         .into_iter()
         .zip(&estimates)
@@ -95,13 +95,13 @@ pub(super) fn recover<const D: usize, P: Pieces<D>>(
     let mut tables = None;
     for iteration in 0..ITERATIONS {
         let Some(places) = Places::new(&beliefs, &mut typical) else { return estimates };
-        let learned = Tables::learn(pieces, graph, &places, seed, tables.as_ref());
-        let temper = temper::learn(pieces, graph, &places, &learned, seed);
+        let learned = Tables::learn(family, graph, &places, seed, tables.as_ref());
+        let temper = temper::learn(family, graph, &places, &learned, seed);
         let proposals = proposals(&places, seed);
         let points: Vec<[f64; D]> = places.places.iter().map(|p| p.x.map(f64::from)).collect();
         let Ok(tree) = Knn::new(&points) else { return estimates };
         let context = Context {
-            pieces,
+            family,
             graph,
             places: &places,
             tables: &learned,
@@ -264,13 +264,13 @@ struct Marginals(Vec<Vec<f32>>);
 
 impl Marginals {
     /// Learns nothing for families whose feasible sets have one piece.
-    fn new<const D: usize, P: Pieces<D>>(pieces: &P, n: usize) -> Self {
-        if P::PER_SLOT == 1 {
+    fn new<const D: usize, F: Family<D>>(family: &F, n: usize) -> Self {
+        if F::PIECES == 1 {
             return Self(Vec::new());
         }
         let of_axis = |axis: usize| {
             let values: Vec<f32> =
-                (0..n).map(|slot| pieces.piece(slot, axis).through[axis]).collect();
+                (0..n).map(|slot| family.piece(slot, axis).through[axis]).collect();
             let mut sorted = values.clone();
             sorted.sort_unstable_by(f32::total_cmp);
             let around = (n / 200).max(20);
@@ -282,7 +282,7 @@ impl Marginals {
             };
             values.iter().map(density).collect()
         };
-        Self((0..P::PER_SLOT).map(of_axis).collect())
+        Self((0..F::PIECES).map(of_axis).collect())
     }
 
     #[inline(always)]
@@ -292,8 +292,8 @@ impl Marginals {
 }
 
 /// What an iteration reads.
-struct Context<'a, const D: usize, P> {
-    pieces: &'a P,
+struct Context<'a, const D: usize, F: Family<D>> {
+    family: &'a F,
     graph: &'a Graph,
     places: &'a Places<D>,
     tables: &'a Tables,
@@ -330,11 +330,11 @@ struct Scratch<const D: usize> {
     candidates: Vec<Candidate<D>>,
 }
 
-impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
+impl<const D: usize, F: Family<D>> Context<'_, D, F> {
     /// Returns the new places of `slot`, the best one first; `None` if there is no candidate.
     fn update(&self, slot: usize, scratch: &mut Scratch<D>) -> Option<Vec<Place<D>>> {
         let Scratch { near, candidates } = scratch;
-        near.resize_with(P::PER_SLOT, Vec::new);
+        near.resize_with(F::PIECES, Vec::new);
         candidates.clear();
         for (piece, near) in near.iter_mut().enumerate() {
             self.propose(slot, piece, near, candidates);
@@ -364,11 +364,11 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         near: &mut Vec<Near<D>>,
         candidates: &mut Vec<Candidate<D>>,
     ) {
-        let Self { pieces, places, tables, .. } = self;
-        let slots_per_record = pieces.slots_per_record();
-        let own = pieces.piece(slot, piece);
+        let Self { family, places, tables, .. } = self;
+        let slots_per_record = family.slots_per_record();
+        let own = family.piece(slot, piece);
         let first = candidates.len();
-        let room = CANDIDATES / P::PER_SLOT;
+        let room = CANDIDATES / F::PIECES;
         let of_edges = (room as f32 * OF_EDGES) as usize;
         let partner = (slots_per_record == 2).then(|| places.best(slot ^ 1)).flatten();
         near.clear();
@@ -404,7 +404,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
                 last.goes_on = false;
             }
         }
-        let item = (slot * P::PER_SLOT + piece) as u64;
+        let item = (slot * F::PIECES + piece) as u64;
         let mut draws = Draws::new(self.seed, Stage::BeliefProposals, !item);
         let start = draws.below(self.proposals.len() as u64) as usize;
         let (before, after) = self.proposals.split_at(start);
@@ -445,7 +445,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
             }
         }
         let evidence = self.temper * (sum + ln(product));
-        let own = self.pieces.piece(slot, piece);
+        let own = self.family.piece(slot, piece);
         let range = match own.from_center {
             true => distance2(&own.through, x) / (self.places.typical * self.places.typical),
             false => 1.0,
@@ -475,10 +475,10 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
     /// Moves a candidate along its piece while that improves its score, in steps that become shorter.
     fn refine(&self, slot: usize, start: Candidate<D>, near: &[Vec<Near<D>>]) -> Candidate<D> {
         let (mut best, piece) = (start, start.piece);
-        let own = self.pieces.piece(slot, piece);
-        let along = self.pieces.direction(slot, piece);
+        let own = self.family.piece(slot, piece);
+        let along = self.family.direction(slot, piece);
         // Directions of a plane are the axes other than its normal.
-        let free: Vec<[f32; D]> = match P::NORMAL {
+        let free: Vec<[f32; D]> = match F::NORMAL {
             true => (0..D)
                 .filter(|&axis| along[axis] == 0.0)
                 .map(|axis| std::array::from_fn(|c| if c == axis { 1.0 } else { 0.0 }))

@@ -3,10 +3,10 @@
 use rayon::prelude::*;
 
 use super::Places;
+use crate::recover::map::family::Family;
 use crate::recover::map::graph::{CLASSES, Graph, either};
 use crate::recover::map::lines::ln;
 use crate::recover::map::lists::CHUNK;
-use crate::recover::map::pieces::Pieces;
 use crate::seed::{Draws, Stage};
 
 /// Number of bins of the distance: up to the first bound, log-spaced up to the second one, and beyond.
@@ -45,14 +45,14 @@ fn bin_of(u: f32) -> usize {
 impl Tables {
     /// Learns tables by expectation maximization. An edge says something about the distance if the places of both ends are right, which
     /// has the probability of their weights; else its distance is unknown.
-    pub(super) fn learn<const D: usize, P: Pieces<D>>(
-        pieces: &P,
+    pub(super) fn learn<const D: usize, F: Family<D>>(
+        family: &F,
         graph: &Graph,
         places: &Places<D>,
         seed: u64,
         before: Option<&Self>,
     ) -> Self {
-        let slots_per_record = pieces.slots_per_record();
+        let slots_per_record = family.slots_per_record();
         let every = places.n_slots().div_ceil(SAMPLE).max(1);
         let sample: Vec<usize> = (0..places.n_slots()).step_by(every).collect();
         // Pairs of places of a slot and of the end of an edge: their bin and the weight of both.

@@ -8,9 +8,9 @@ use rayon::prelude::*;
 
 use super::Places;
 use super::tables::Tables;
+use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
 use crate::recover::map::lines::ln;
-use crate::recover::map::pieces::Pieces;
 use crate::recover::map::places::distance2;
 use crate::seed::{Draws, Stage};
 
@@ -36,8 +36,8 @@ struct Named<const D: usize> {
 }
 
 /// Returns the temper for these lists and tables.
-pub(super) fn learn<const D: usize, P: Pieces<D>>(
-    pieces: &P,
+pub(super) fn learn<const D: usize, F: Family<D>>(
+    family: &F,
     graph: &Graph,
     places: &Places<D>,
     tables: &Tables,
@@ -47,7 +47,7 @@ pub(super) fn learn<const D: usize, P: Pieces<D>>(
     let sample: Vec<usize> = (0..places.n_slots()).step_by(every).collect();
     let named: Vec<Vec<Named<D>>> = sample
         .par_iter()
-        .map(|&slot| named(pieces, graph, places, tables, seed, slot))
+        .map(|&slot| named(family, graph, places, tables, seed, slot))
         .filter(|named| named.len() > 1)
         .collect();
     let fit = |temper: f32| -> f64 {
@@ -70,15 +70,15 @@ pub(super) fn learn<const D: usize, P: Pieces<D>>(
 }
 
 /// Returns the places that the edges of `slot` lead to, far from each other, those with the most evidence first.
-fn named<const D: usize, P: Pieces<D>>(
-    pieces: &P,
+fn named<const D: usize, F: Family<D>>(
+    family: &F,
     graph: &Graph,
     places: &Places<D>,
     tables: &Tables,
     seed: u64,
     slot: usize,
 ) -> Vec<Named<D>> {
-    let slots_per_record = pieces.slots_per_record();
+    let slots_per_record = family.slots_per_record();
     let (ends, classes) = graph.of(slot);
     let best_at = |edge: usize| {
         let range = places.at_end(ends[edge], classes[edge], slots_per_record);
@@ -86,8 +86,8 @@ fn named<const D: usize, P: Pieces<D>>(
     };
     let width = places.typical;
     let passes = |slot: usize, x: &[f32; D]| {
-        let near = |piece| distance2(&pieces.piece(slot, piece).project(x), x) < width * width;
-        (0..P::PER_SLOT).any(near)
+        let near = |piece| distance2(&family.piece(slot, piece).project(x), x) < width * width;
+        (0..F::PIECES).any(near)
     };
     let mut draws = Draws::new(seed, Stage::BeliefTables, !(slot as u64));
     let others: Vec<usize> =

@@ -3,17 +3,20 @@
 mod exchanges;
 mod partners;
 
-use crate::recover::map::family::Settings;
 use crate::recover::result::Estimate;
 use crate::released::{Obfuscation, Released};
 
-/// Moves the estimates of `released` to where exact constraints allow them to be; `None` if its family has none.
+/// Partners of exchanged coordinates are searched within this many deltas. In images, delta is narrow and values are few.
+const fn reach<const D: usize>() -> f64 {
+    if D == 2 { 4.0 } else { 1.0 }
+}
+
+/// Moves the estimates of `released` to where exact constraints allow them to be, if its family has any.
 pub(crate) fn settle<const D: usize>(
     released: &Released<D>,
-    estimates: &[Estimate<D>],
+    estimates: Vec<Estimate<D>>,
     delta: f64,
-) -> Option<Vec<Estimate<D>>> {
-    let Obfuscation::AxisCandidates(records) = released.obfuscation() else { return None };
-    let reach = (Settings::of_dimension::<D>().exact_reach * delta) as f32;
-    Some(exchanges::settle(records.position(), estimates.to_vec(), reach))
+) -> Vec<Estimate<D>> {
+    let Obfuscation::AxisCandidates(records) = released.obfuscation() else { return estimates };
+    exchanges::settle(records.position(), estimates, (reach::<D>() * delta) as f32)
 }

@@ -1,8 +1,8 @@
 //! The last step of an update: weighted least squares over the estimates of nearby neighbors.
 
 use crate::recover::joint::votes::Columns;
+use crate::recover::map::family::{Family, Piece};
 use crate::recover::map::lines::{LANES, Lanes, fill};
-use crate::recover::map::pieces::{Piece, Pieces};
 use crate::recover::map::places::Places;
 
 /// Number of least-squares steps. The second one recomputes the weights.
@@ -81,15 +81,15 @@ impl<const D: usize> Sums<D> {
 /// along it. `at` returns, for a place, `1 / reach^2`, the distribution of neighbors (`gain`, `1 / a^2`) and the likelihood ratio
 /// at which an estimate has half weight.
 #[inline(always)]
-pub(super) fn least_squares<const D: usize, P: Pieces<D>>(
-    pieces: &P,
+pub(super) fn least_squares<const D: usize, F: Family<D>>(
+    family: &F,
     places: &Places<D>,
     own: &Piece<D>,
     (near, directions): (&Columns<D>, &mut Directions<D>),
     mut x: [f32; D],
     at: impl Fn(&[f32; D]) -> (f32, (f32, f32), f32),
 ) -> ([f32; D], u32) {
-    let of = |slot: &u32| pieces.direction(*slot as usize, places.piece(*slot as usize));
+    let of = |slot: &u32| family.direction(*slot as usize, places.piece(*slot as usize));
     fill(directions, &near.slot, of);
     directions.iter_mut().for_each(|column| column.resize(near.odds.len(), 0.0));
     let mut records = 0;
@@ -98,18 +98,18 @@ pub(super) fn least_squares<const D: usize, P: Pieces<D>>(
         let sums = Sums::new(near, directions, &x, weights);
         let n: u32 = sums.n.iter().sum();
         if step_at == STEPS {
-            records = match pieces.slots_per_record() {
+            records = match family.slots_per_record() {
                 1 => n,
                 _ => near.n_pairs(&x, weights.0),
             };
         }
-        x = own.project(&step::<D, P>(own, &x, &sums, n));
+        x = own.project(&step::<D, F>(own, &x, &sums, n));
     }
     (x, records)
 }
 
 #[inline(always)]
-fn step<const D: usize, P: Pieces<D>>(
+fn step<const D: usize, F: Family<D>>(
     own: &Piece<D>,
     x: &[f32; D],
     sums: &Sums<D>,
@@ -119,8 +119,8 @@ fn step<const D: usize, P: Pieces<D>>(
     let weight = total(&sums.weight);
     let mut pull = sums.pull.map(|lanes| total(&lanes));
     // The component along a record: the direction of a line, or all but the normal of a plane.
-    let (whole, sign) = if P::NORMAL { (1.0, -1.0) } else { (0.0, 1.0) };
-    let free_fraction = 1.0 - P::MOST_ALONG.min(P::ALONG / n.max(1) as f32);
+    let (whole, sign) = if F::NORMAL { (1.0, -1.0) } else { (0.0, 1.0) };
+    let free_fraction = 1.0 - F::MOST_ALONG.min(F::ALONG / n.max(1) as f32);
     let mut hold = [[0.0f32; D]; D];
     for (r, row) in hold.iter_mut().enumerate() {
         for (c, value) in row.iter_mut().enumerate() {

@@ -31,31 +31,31 @@ mod state;
 mod update;
 mod votes;
 
-use crate::recover::input::Input;
 use crate::recover::joint::state::State;
-use crate::recover::map::pieces::Pieces;
+use crate::recover::map::family::Family;
 use crate::recover::map::places::along_curve;
+use crate::recover::problem::Problem;
 use crate::recover::result::Estimate;
 
 const ITERATIONS: usize = 16;
 
 /// Returns the estimates of all slots after joint recovery from `start`.
-pub(super) fn recover<const D: usize, P: Pieces<D>>(
-    input: &Input<'_, P>,
+pub(super) fn recover<const D: usize, F: Family<D>>(
+    problem: &Problem<'_, D, F>,
     start: Vec<Estimate<D>>,
 ) -> Vec<Estimate<D>> {
-    let mut state = State::new(input, start);
+    let mut state = State::new(problem, start);
     let order = along_curve(state.places());
     for iteration in 0..ITERATIONS {
         let groups = if iteration == 0 { 1 } else { 2 };
         for group in 0..groups {
-            state.learn_if_stale(input);
+            state.learn_if_stale(problem);
             let is_moving = |slot: &u32| *slot as usize % groups == group;
             let slots = order.iter().copied().filter(is_moving);
-            let updates = state.propose_score_refine(input, slots);
-            state.apply(input, &updates);
+            let updates = state.propose_score_refine(problem, slots);
+            state.apply(problem, &updates);
         }
-        if state.has_converged(input) {
+        if state.has_converged(problem) {
             break;
         }
     }

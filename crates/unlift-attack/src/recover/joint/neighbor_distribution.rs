@@ -6,12 +6,11 @@
 
 use rayon::prelude::*;
 
-use crate::recover::input::{Input, RANDOM, Sampled};
-use crate::recover::map::family::Settings;
+use crate::recover::map::family::Family;
 use crate::recover::map::graph::{CLASSES, Side, either, side};
 use crate::recover::map::grid::Density;
-use crate::recover::map::pieces::Pieces;
 use crate::recover::map::places::{Places, distance2};
+use crate::recover::problem::{Problem, RANDOM, Sampled};
 use crate::simd::{Kernel, dispatch};
 
 /// True neighbors are counted within this many radii, which hold nearly all of them.
@@ -56,20 +55,20 @@ pub(super) struct NeighborDistribution {
 impl NeighborDistribution {
     /// Learns the distribution from `places`. Neighbors are counted within [`REACH`] times `radius`; the learned radius is at
     /// least `least_radius`.
-    pub(super) fn learn<const D: usize, P: Pieces<D>>(
-        input: &Input<'_, P>,
+    pub(super) fn learn<const D: usize, F: Family<D>>(
+        problem: &Problem<'_, D, F>,
         places: &Places<D>,
         density: &Density<D>,
         radius: f32,
         least_radius: f32,
     ) -> Self {
-        let learning = Learning { input, places, density, reach: REACH * radius };
+        let learning = Learning { problem, places, density, reach: REACH * radius };
         let part = |rows: &[Sampled]| dispatch(Part { rows, learning: &learning });
-        let parts: Vec<Tally> = input.sample.par_chunks(PART).map(part).collect();
+        let parts: Vec<Tally> = problem.sample.par_chunks(PART).map(part).collect();
         let mut total = Tally::default();
         parts.iter().for_each(|part| total.merge(part));
-        let limits = (least_radius, P::MOST_RADIUS * input.delta);
-        let distribution = total.distribution::<D, P>(&input.pieces, learning.reach, limits);
+        let limits = (least_radius, F::MOST_RADIUS * problem.delta);
+        let distribution = total.distribution::<D, F>(&problem.family, learning.reach, limits);
         Self { most_imbalance: learning.most_imbalance(), ..distribution }
     }
 
@@ -88,15 +87,15 @@ impl NeighborDistribution {
     }
 }
 
-struct Learning<'a, const D: usize, P> {
-    input: &'a Input<'a, P>,
+struct Learning<'a, const D: usize, F: Family<D>> {
+    problem: &'a Problem<'a, D, F>,
     places: &'a Places<D>,
     density: &'a Density<D>,
     /// True neighbors are counted within this many local widths.
     reach: f32,
 }
 
-impl<const D: usize, P: Pieces<D>> Learning<'_, D, P> {
+impl<const D: usize, F: Family<D>> Learning<'_, D, F> {
     #[inline(always)]
     fn reach_at(&self, x: &[f32; D]) -> f32 {
         self.density.width(self.density.at(x)) * self.reach
@@ -104,8 +103,8 @@ impl<const D: usize, P: Pieces<D>> Learning<'_, D, P> {
 
     #[inline(always)]
     fn count(&self, Sampled { slot, random }: &Sampled, tally: &mut Tally) {
-        let slots_per_record = self.input.pieces.slots_per_record();
-        let (ends, class) = self.input.graph.of(*slot);
+        let slots_per_record = self.problem.family.slots_per_record();
+        let (ends, class) = self.problem.graph.of(*slot);
         let x = self.places.of(*slot);
         let reach = self.reach_at(&x);
         let (reach2, scale) = (reach * reach, BINS as f32 / reach);
@@ -147,11 +146,11 @@ impl<const D: usize, P: Pieces<D>> Learning<'_, D, P> {
         let places = self.places;
         let (mut entries, mut beside) = (0.0, 0.0);
         let mut own = Vec::new();
-        for Sampled { slot, random } in self.input.sample.iter().step_by(EVERY) {
+        for Sampled { slot, random } in self.problem.sample.iter().step_by(EVERY) {
             if !places.is_known(*slot) {
                 continue;
             }
-            let (ends, class) = self.input.graph.of(*slot);
+            let (ends, class) = self.problem.graph.of(*slot);
             own.clear();
             let edges = ends.iter().zip(class);
             own.extend(
@@ -190,12 +189,12 @@ const LEAST_COMPANIONS: f64 = 0.25;
 /// The bound for lists whose wrong entries form clusters, in nats.
 const MOST_IMBALANCE: f32 = 10.0;
 
-struct Part<'a, const D: usize, P> {
+struct Part<'a, const D: usize, F: Family<D>> {
     rows: &'a [Sampled],
-    learning: &'a Learning<'a, D, P>,
+    learning: &'a Learning<'a, D, F>,
 }
 
-impl<const D: usize, P: Pieces<D>> Kernel for Part<'_, D, P> {
+impl<const D: usize, F: Family<D>> Kernel for Part<'_, D, F> {
     type Output = Tally;
 
     #[inline(always)]
@@ -247,9 +246,10 @@ impl Tally {
         let excess = bins.map(|(found, by_chance)| f64::from(found) - (1.0 - fraction) * by_chance);
         // Wrong entries in the same region are uniform: their density is the one measured in the outer bins.
         let volume = |bin: usize| ((bin + 1) as f64).powi(D as i32) - (bin as f64).powi(D as i32);
-        let outside = match Settings::of_dimension::<D>().measures_background {
-            true => excess[OUTSIDE..].iter().sum::<f64>().max(0.0),
-            false => 0.0,
+        // In images, true neighbors reach those bins.
+        let outside = match D {
+            2 => 0.0,
+            _ => excess[OUTSIDE..].iter().sum::<f64>().max(0.0),
         };
         let density = outside / (OUTSIDE..BINS).map(volume).sum::<f64>();
         let neighbors = std::array::from_fn(|bin| (excess[bin] - density * volume(bin)).max(0.0));
@@ -258,9 +258,9 @@ impl Tally {
     }
 
     /// Computes the distribution, without the bound on imbalance.
-    fn distribution<const D: usize, P: Pieces<D>>(
+    fn distribution<const D: usize, F: Family<D>>(
         &self,
-        pieces: &P,
+        family: &F,
         reach: f32,
         (least_radius, most_radius): (f32, f32),
     ) -> NeighborDistribution {
@@ -278,10 +278,10 @@ impl Tally {
         let mut odds = [0.0; CLASSES];
         let (mut edges, mut ends, mut neighbors, mut n_background) = (0.0, 0.0, 0.0, 0.0);
         for (class, of_class) in self.classes.iter().enumerate() {
-            let either = either(class as u8, pieces.slots_per_record());
+            let either = either(class as u8, family.slots_per_record());
             let close = true_fraction(close_fraction(*of_class), chance[usize::from(either)]);
             let of_close = match side(class as u8) {
-                _ if !P::SUBTRACTS_BACKGROUND => 1.0,
+                _ if !F::SUBTRACTS_BACKGROUND => 1.0,
                 Side::Mutual => fraction_of_mutual,
                 Side::Forward | Side::Reverse => fraction_of_all,
             };

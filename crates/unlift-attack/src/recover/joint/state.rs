@@ -4,14 +4,14 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use rayon::prelude::*;
 
-use crate::recover::input::Input;
 use crate::recover::joint::neighbor_distribution::NeighborDistribution;
 use crate::recover::joint::update::{Context, Scratch, TUBE};
+use crate::recover::map::family::Family;
 use crate::recover::map::graph::{either, record_of};
 use crate::recover::map::grid::Density;
 use crate::recover::map::lists::CHUNK;
-use crate::recover::map::pieces::Pieces;
 use crate::recover::map::places::{Places, distance2};
+use crate::recover::problem::Problem;
 use crate::recover::result::{Estimate, Status};
 use crate::simd::{Kernel, dispatch};
 
@@ -70,12 +70,12 @@ pub(super) struct Update<const D: usize> {
 }
 
 impl<const D: usize> State<D> {
-    pub(super) fn new<P: Pieces<D>>(input: &Input<'_, P>, start: Vec<Estimate<D>>) -> Self {
+    pub(super) fn new<F: Family<D>>(problem: &Problem<'_, D, F>, start: Vec<Estimate<D>>) -> Self {
         let n = start.len();
         let places = Places::new(&start);
         let least_radius = (ROUNDING * places.farthest()).max(f32::MIN_POSITIVE);
-        let radius = P::MOST_RADIUS * input.delta;
-        let (density, neighbors) = learn(input, &places, radius, least_radius);
+        let radius = F::MOST_RADIUS * problem.delta;
+        let (density, neighbors) = learn(problem, &places, radius, least_radius);
         Self {
             accepted: start.clone(),
             estimates: start,
@@ -103,13 +103,13 @@ impl<const D: usize> State<D> {
     }
 
     /// Learns density and distribution from the current places if enough slots have jumped.
-    pub(super) fn learn_if_stale<P: Pieces<D>>(&mut self, input: &Input<'_, P>) {
+    pub(super) fn learn_if_stale<F: Family<D>>(&mut self, problem: &Problem<'_, D, F>) {
         if self.n_jumped_since_learning as f64 <= STALE * self.estimates.len() as f64 {
             return;
         }
         let before = self.neighbors.most_imbalance;
         (self.density, self.neighbors) =
-            learn(input, &self.places, self.neighbors.radius, self.least_radius);
+            learn(problem, &self.places, self.neighbors.radius, self.least_radius);
         if self.neighbors.most_imbalance != before {
             // Margins under another bound are not comparable.
             self.margin.fill(0.0);
@@ -118,17 +118,17 @@ impl<const D: usize> State<D> {
     }
 
     /// Computes the new estimates of `slots`: the best of their candidates, refined.
-    pub(super) fn propose_score_refine<P: Pieces<D>>(
+    pub(super) fn propose_score_refine<F: Family<D>>(
         &self,
-        input: &Input<'_, P>,
+        problem: &Problem<'_, D, F>,
         slots: impl Iterator<Item = u32>,
     ) -> Vec<Update<D>> {
         let of_slot =
             |slot: u32| Update { slot, margin: 0.0, estimate: self.estimates[slot as usize] };
         let mut updates: Vec<Update<D>> = slots.map(of_slot).collect();
         let Self { places, density, neighbors, .. } = self;
-        let odds = neighbors.odds_of_slot(input.pieces.slots_per_record());
-        let context = Context { input, places, density, neighbors, odds };
+        let odds = neighbors.odds_of_slot(problem.family.slots_per_record());
+        let context = Context { problem, places, density, neighbors, odds };
         updates.par_chunks_mut(CHUNK).for_each_init(Scratch::default, |scratch, updates| {
             dispatch(Chunk { context: &context, state: self, updates, scratch });
         });
@@ -137,9 +137,13 @@ impl<const D: usize> State<D> {
 
     /// Applies `updates`, and counts for each slot the relevant jumps of its neighbors: those from or to a place near the slot's
     /// feasible set.
-    pub(super) fn apply<P: Pieces<D>>(&mut self, input: &Input<'_, P>, updates: &[Update<D>]) {
-        let Input { pieces, graph, .. } = input;
-        let (radius, slots_per_record) = (self.neighbors.radius, pieces.slots_per_record());
+    pub(super) fn apply<F: Family<D>>(
+        &mut self,
+        problem: &Problem<'_, D, F>,
+        updates: &[Update<D>],
+    ) {
+        let Problem { family, graph, .. } = problem;
+        let (radius, slots_per_record) = (self.neighbors.radius, family.slots_per_record());
         let mut jumped = Vec::new();
         for Update { slot, margin, estimate } in updates {
             let at = *slot as usize;
@@ -157,8 +161,8 @@ impl<const D: usize> State<D> {
         let before = std::mem::replace(&mut self.places, Places::new(&self.estimates));
         let reach2 = (TUBE * radius) * (TUBE * radius);
         let may_lie_near = |slot: usize, x: &[f32; D]| {
-            let near = |piece| distance2(&pieces.piece(slot, piece).project(x), x) < reach2;
-            (0..P::PER_SLOT).any(near)
+            let near = |piece| distance2(&family.piece(slot, piece).project(x), x) < reach2;
+            (0..F::PIECES).any(near)
         };
         jumped.par_iter().with_min_len(JUMPS_PER_THREAD).for_each(|&slot| {
             let (from, to) = (before.of(slot), self.places.of(slot));
@@ -179,14 +183,14 @@ impl<const D: usize> State<D> {
     }
 
     /// Accepts or rejects an iteration; returns whether it was the last one.
-    pub(super) fn has_converged<P: Pieces<D>>(&mut self, input: &Input<'_, P>) -> bool {
+    pub(super) fn has_converged<F: Family<D>>(&mut self, problem: &Problem<'_, D, F>) -> bool {
         let n = self.estimates.len();
         if (self.n_jumped as f64) < SETTLED * n as f64 {
             // So few jumps hardly change agreement.
             self.accepted.clone_from(&self.estimates);
             return true;
         }
-        let agreement = agreement(input, &self.estimates);
+        let agreement = agreement(problem, &self.estimates);
         if agreement < (1.0 - WORSE) * self.best_agreement {
             return true;
         }
@@ -202,14 +206,14 @@ impl<const D: usize> State<D> {
 }
 
 /// Learns density and distribution from `places`; neighbors are counted within a multiple of `radius`.
-fn learn<const D: usize, P: Pieces<D>>(
-    input: &Input<'_, P>,
+fn learn<const D: usize, F: Family<D>>(
+    problem: &Problem<'_, D, F>,
     places: &Places<D>,
     radius: f32,
     least_radius: f32,
 ) -> (Density<D>, NeighborDistribution) {
-    let density = Density::new(places, &input.listed, SMOOTH * radius);
-    let neighbors = NeighborDistribution::learn(input, places, &density, radius, least_radius);
+    let density = Density::new(places, &problem.listed, SMOOTH * radius);
+    let neighbors = NeighborDistribution::learn(problem, places, &density, radius, least_radius);
     (density, neighbors)
 }
 
@@ -218,15 +222,15 @@ fn is_jump<const D: usize>(a: &Estimate<D>, b: &Estimate<D>, radius: f32) -> boo
     a.status != b.status || distance2(&a.position, &b.position) > radius * radius
 }
 
-struct Chunk<'a, 'b, const D: usize, P> {
-    context: &'a Context<'b, D, P>,
+struct Chunk<'a, 'b, const D: usize, F: Family<D>> {
+    context: &'a Context<'b, D, F>,
     state: &'a State<D>,
     /// Slots with their old estimates, which are replaced by new ones.
     updates: &'a mut [Update<D>],
     scratch: &'a mut Scratch<D>,
 }
 
-impl<const D: usize, P: Pieces<D>> Kernel for Chunk<'_, '_, D, P> {
+impl<const D: usize, F: Family<D>> Kernel for Chunk<'_, '_, D, F> {
     type Output = ();
 
     #[inline(always)]
@@ -253,8 +257,11 @@ impl<const D: usize, P: Pieces<D>> Kernel for Chunk<'_, '_, D, P> {
 /// expected by chance.
 ///
 /// Agreement is measured on records, because neighboring estimates can drift together and still agree with each other.
-fn agreement<const D: usize, P: Pieces<D>>(input: &Input<'_, P>, estimates: &[Estimate<D>]) -> f64 {
-    let Input { pieces, graph, delta, .. } = input;
+fn agreement<const D: usize, F: Family<D>>(
+    problem: &Problem<'_, D, F>,
+    estimates: &[Estimate<D>],
+) -> f64 {
+    let Problem { family, graph, delta, .. } = problem;
     let of_slot = |&slot: &usize| {
         let estimate = &estimates[slot];
         if estimate.status != Status::Ok {
@@ -262,14 +269,14 @@ fn agreement<const D: usize, P: Pieces<D>>(input: &Input<'_, P>, estimates: &[Es
         }
         let (mut near, mut all) = (0u32, 0u32);
         for &end in graph.of(slot).0 {
-            let record = record_of(end as usize, pieces.slots_per_record());
-            if pieces.may_vote(slot, record) {
-                let d2 = pieces.record_distance2(record, &estimate.position);
+            let record = record_of(end as usize, family.slots_per_record());
+            if family.may_vote(slot, record) {
+                let d2 = family.record_distance2(record, &estimate.position);
                 all += 1;
                 near += u32::from(d2 <= delta * delta);
             }
         }
-        let chance = pieces.record_chance(slot, &estimate.position);
+        let chance = family.record_chance(slot, &estimate.position, &problem.at_delta);
         f64::from(near) - f64::from(all) * f64::from(chance)
     };
     let n = estimates.len();

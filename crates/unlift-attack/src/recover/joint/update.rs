@@ -1,15 +1,15 @@
 //! The update of one slot in one iteration: propose candidates, score them, refine the best one.
 
-use crate::recover::input::Input;
 use crate::recover::joint::least_squares::{Directions, least_squares};
 use crate::recover::joint::neighbor_distribution::NeighborDistribution;
 use crate::recover::joint::votes::{Columns, Ends, Odds};
+use crate::recover::map::family::{Family, Piece};
 use crate::recover::map::graph::{CLASSES, either, record_of};
 use crate::recover::map::grid::Density;
 use crate::recover::map::lines::ln;
 use crate::recover::map::lists::found;
-use crate::recover::map::pieces::{Piece, Pieces};
 use crate::recover::map::places::{Places, distance2};
+use crate::recover::problem::Problem;
 use crate::recover::result::{Estimate, Status};
 
 /// Estimates farther from a piece than this many radii are ignored.
@@ -34,8 +34,8 @@ const PRIOR: f32 = 0.5;
 /// Largest number of places (8 MB) that stay in the cache and need no prefetching.
 const CACHED: usize = 1 << 19;
 
-pub(super) struct Context<'a, const D: usize, P> {
-    pub(super) input: &'a Input<'a, P>,
+pub(super) struct Context<'a, const D: usize, F: Family<D>> {
+    pub(super) problem: &'a Problem<'a, D, F>,
     pub(super) places: &'a Places<D>,
     pub(super) density: &'a Density<D>,
     pub(super) neighbors: &'a NeighborDistribution,
@@ -67,13 +67,13 @@ impl<const D: usize> Default for Scratch<D> {
     }
 }
 
-impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
+impl<const D: usize, F: Family<D>> Context<'_, D, F> {
     /// Prefetches the places that [`solve`](Self::solve) reads.
     #[inline(always)]
     pub(super) fn prefetch(&self, slot: usize) {
         if self.places.len() > CACHED {
             // The other slot of a record is next to the one in the edge.
-            let ends = self.input.graph.of(slot).0.iter();
+            let ends = self.problem.graph.of(slot).0.iter();
             ends.for_each(|&end| self.places.prefetch(end as usize));
         }
     }
@@ -87,21 +87,21 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         old: &Estimate<D>,
         scratch: &mut Scratch<D>,
     ) -> (Estimate<D>, f32) {
-        let Input { pieces, graph, .. } = self.input;
+        let Problem { family, graph, .. } = *self.problem;
         scratch.candidates.clear();
-        scratch.all.gather(graph.of(slot), self.places, pieces.slots_per_record());
+        scratch.all.gather(graph.of(slot), self.places, family.slots_per_record());
         let (reach, center_radius) =
             (TUBE * self.neighbors.radius, CENTER_RADIUS * self.neighbors.radius);
         let odds = self.odds(slot);
-        for piece in 0..P::PER_SLOT {
-            let own = pieces.piece(slot, piece);
+        for piece in 0..F::PIECES {
+            let own = family.piece(slot, piece);
             scratch.all.near(&own, reach, center_radius, &odds, &mut scratch.near[piece]);
             self.propose(&own, (slot, piece), old, scratch);
         }
         let Some((first, margin)) = self.winner(slot, &scratch.candidates) else {
             return (*old, 0.0);
         };
-        let own = pieces.piece(slot, first.piece);
+        let own = family.piece(slot, first.piece);
         let near = &mut scratch.near[first.piece];
         if near.len() == 0 {
             return (*old, 0.0);
@@ -109,12 +109,12 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         let at = |x: &[f32; D]| {
             let density = self.density.at(x);
             let reach = LEAST_SQUARES_RADIUS * self.neighbors.radius * self.density.width(density);
-            let half_weight_ratio = P::HALF_WEIGHT_RATIO
+            let half_weight_ratio = F::HALF_WEIGHT_RATIO
                 * (1.0 + self.neighbors.background / self.volume(density) / density);
             (1.0 / (reach * reach), self.distribution(density), half_weight_ratio)
         };
         let near = (&*near, &mut scratch.directions);
-        let (x, support) = least_squares(pieces, self.places, &own, near, first.x, at);
+        let (x, support) = least_squares(family, self.places, &own, near, first.x, at);
         if !x.iter().all(|c| c.is_finite()) {
             return (*old, 0.0);
         }
@@ -124,7 +124,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
     #[inline(always)]
     fn odds(&self, slot: usize) -> Odds<'_, D> {
         let (of_class, other) = (&self.odds, slot ^ 1);
-        if self.input.pieces.slots_per_record() == 2 && self.places.is_known(other) {
+        if self.problem.family.slots_per_record() == 2 && self.places.is_known(other) {
             let partner = self.places.of(other);
             let (gain, inverse_a2) = self.distribution(self.density.at(&partner));
             return Odds { of_class, partner, gain, inverse_a2 };
@@ -187,7 +187,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         let most_imbalance = self.neighbors.most_imbalance;
         for i in 0..n {
             let x = std::array::from_fn(|c| tried[c][i]);
-            let prior = prior[i] + self.input.pieces.ln_spread(slot, &x);
+            let prior = prior[i] + self.problem.family.ln_spread(slot, &x);
             let distribution = (gain[i], inverse_a2[i]);
             let likelihood = match most_imbalance < f32::INFINITY {
                 true => near.balanced_log_likelihood(&x, distribution, most_imbalance),
@@ -229,19 +229,20 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
     /// Returns what records add to the scores of two places: records pass within delta, but their estimates may be elsewhere.
     #[inline(always)]
     fn record_scores(&self, slot: usize, x: [[f32; D]; 2]) -> [f32; 2] {
-        let Input { pieces, graph, delta, .. } = self.input;
-        let slots_per_record = pieces.slots_per_record();
-        let at =
-            x.map(|x| (self.distribution(self.density.at(&x)), pieces.record_chance(slot, &x)));
+        let Problem { family, graph, delta, at_delta, .. } = self.problem;
+        let slots_per_record = family.slots_per_record();
+        let at = x.map(|x| {
+            (self.distribution(self.density.at(&x)), family.record_chance(slot, &x, at_delta))
+        });
         let (ends, class) = graph.of(slot);
         let mut sums = [0.0; 2];
         for (&end, &class) in ends.iter().zip(class) {
             let record = record_of(end as usize, slots_per_record);
-            if !pieces.may_vote(slot, record) {
+            if !family.may_vote(slot, record) {
                 continue;
             }
             for (i, x) in x.iter().enumerate() {
-                if pieces.record_distance2(record, x) > delta * delta {
+                if family.record_distance2(record, x) > delta * delta {
                     continue;
                 }
                 let ((gain, inverse_a2), chance) = at[i];

@@ -1,8 +1,8 @@
 //! Estimates at the ends of a slot's edges, in columns, and their likelihood for a place.
 
+use crate::recover::map::family::Piece;
 use crate::recover::map::graph::{CLASSES, Side, either, side};
 use crate::recover::map::lines::{LANES, Lanes, ln};
-use crate::recover::map::pieces::Piece;
 use crate::recover::map::places::{Places, UNKNOWN_COORDINATE, distance2};
 
 /// Coordinate of padding: beyond any reach, and finite when squared.

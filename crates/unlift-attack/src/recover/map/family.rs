@@ -1,195 +1,143 @@
-//! A released map prepared for solving, with one row per record.
+//! Families of records behind one trait: feasible sets as flat pieces, distances to records, and chance.
 
-use crate::neighbors::Neighborhoods;
-use crate::recover::map::chance::{
-    self, CandidateField, ChanceField, interquartile_range, line_extent, ray_extent, tube,
-};
-use crate::recover::map::lines::{LineRow, from_lines, from_rays};
-use crate::recover::map::planes::SortedPlanes;
-use crate::released::{AxisPlanes, Obfuscation, Released};
+use crate::RecordId;
+use crate::recover::baselines::ransac::Trials;
+use crate::recover::consensus::Scratch;
+use crate::recover::map::lines::LineRow;
+use crate::recover::result::Estimate;
 
-/// Records of one family in the form that solvers read.
-#[derive(Debug)]
-pub(crate) enum Family<'a, const D: usize> {
-    /// Lines with one or two slots each, or rays, which have a group; `has_regions` if the centers of rays have regions.
-    Lines {
-        rows: Vec<LineRow<D>>,
-        slots_per_record: usize,
-        chance: Vec<ChanceField<D>>,
-        has_regions: bool,
-    },
-    /// Axis planes, sorted by their offsets.
-    Planes { planes: &'a AxisPlanes<D>, sorted: SortedPlanes },
-    /// Axis candidates.
-    Candidates { rows: &'a [[f32; D]], chance: CandidateField<D> },
-}
-
-impl<'a, const D: usize> Family<'a, D> {
-    /// Prepares the records of `released`, and learns their chance from `lists`.
-    pub(crate) fn new(released: &'a Released<D>, lists: &Neighborhoods) -> Self {
-        let slots_per_record = released.slots_per_record();
-        match released.obfuscation() {
-            Obfuscation::Lines(_) | Obfuscation::Rays(_) => {
-                let rows = line_rows(released);
-                let chance = chance::of_lines(&rows, lists, slots_per_record);
-                let has_regions = matches!(released.obfuscation(), Obfuscation::Rays(rays) if rays.regions().is_some());
-                Self::Lines { rows, slots_per_record, chance, has_regions }
-            }
-            Obfuscation::AxisPlanes(planes) => {
-                Self::Planes { planes, sorted: SortedPlanes::new(planes) }
-            }
-            Obfuscation::AxisCandidates(candidates) => {
-                let rows = candidates.position();
-                Self::Candidates { rows, chance: chance::of_candidates(rows, lists) }
-            }
-        }
-    }
-
-    pub(crate) fn slots_per_record(&self) -> usize {
-        match self {
-            Self::Lines { slots_per_record, .. } => *slots_per_record,
-            Self::Planes { .. } | Self::Candidates { .. } => 1,
-        }
-    }
-
-    pub(crate) fn is_of_rays(&self) -> bool {
-        match self {
-            Self::Lines { rows, .. } => rows.first().is_some_and(LineRow::is_ray),
-            Self::Planes { .. } | Self::Candidates { .. } => false,
-        }
-    }
-
-    /// Whether these are rays whose centers have regions. Such rays of one center meet only there, and rays of two centers do not meet.
-    pub(crate) fn has_regions(&self) -> bool {
-        match self {
-            Self::Lines { has_regions, .. } => *has_regions,
-            Self::Planes { .. } | Self::Candidates { .. } => false,
-        }
-    }
-
-    /// For axis candidates in a flat map, returns the radius about a place that holds the fraction `share` of the points.
-    pub(crate) fn radius_if_flat(&self, share: f64) -> Option<f64> {
-        match self {
-            Self::Candidates { chance, .. } => chance.radius_if_flat(share),
-            Self::Lines { .. } | Self::Planes { .. } => None,
-        }
-    }
-
-    /// Returns the chance that a random record passes within `delta` of a typical place.
-    pub(crate) fn typical_chance(&self, delta: f32) -> f32 {
-        match self {
-            Self::Lines { chance, .. } => {
-                chance.iter().map(ChanceField::typical).fold(0.0, f32::max) * tube(D, delta)
-            }
-            Self::Planes { sorted, .. } => sorted.typical_chance(delta),
-            Self::Candidates { chance, .. } => chance.typical_chance(delta),
-        }
-    }
-
-    /// Returns a length of the order of the map's size, from the records alone; 0 for an empty map.
-    ///
-    /// Lines: their median distance from their middle. Rays: the largest distance between centers. Planes and candidates: the largest
-    /// interquartile range over the axes.
-    pub(crate) fn extent(&self) -> f64 {
-        match self {
-            Self::Lines { rows, .. } => {
-                let Some(first) = rows.first() else {
-                    return 0.0;
-                };
-                if first.is_ray() { ray_extent(rows) } else { line_extent(rows) }
-            }
-            Self::Planes { sorted, .. } => sorted.extent(),
-            Self::Candidates { rows, .. } => {
-                let range = |axis: usize| {
-                    let mut column: Vec<f32> = rows.iter().map(|row| row[axis]).collect();
-                    column.sort_unstable_by(f32::total_cmp);
-                    interquartile_range(&column)
-                };
-                (0..D).map(range).fold(0.0, f64::max)
-            }
-        }
-    }
-}
-
-/// Returns lines and rays as rows, cut at the bounds where these are known; no rows for other families.
-fn line_rows<const D: usize>(released: &Released<D>) -> Vec<LineRow<D>> {
-    let bounds = released.bounds().map(|bounds| bounds.about(&released.origin()));
-    match released.obfuscation() {
-        Obfuscation::Lines(records) => from_lines(records, bounds.as_ref()),
-        Obfuscation::Rays(records) => from_rays(records, bounds.as_ref()),
-        Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => Vec::new(),
-    }
-}
-
-/// Constants that differ between maps (3D) and images (2D). No other code of recovery depends on the dimension, except geometry
-/// (volumes and directions).
+/// A flat piece of a feasible set: a line, a chord, a half-line or a plane.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Settings {
+pub(crate) struct Piece<const D: usize> {
+    /// A point of the piece; the end of a half-line.
+    pub(crate) through: [f32; D],
+    /// Projection matrix onto the directions of the piece.
+    pub(crate) along: [[f32; D]; D],
+    /// Direction of a half-line or a chord; zero for other pieces.
+    pub(crate) sense: [f32; D],
+    /// Length in that direction.
+    pub(crate) to: f32,
+    /// Whether the piece is a ray: a point near `through` is near all rays of that center.
+    pub(crate) from_center: bool,
+}
+
+impl<const D: usize> Piece<D> {
+    pub(crate) fn line(through: [f32; D], direction: [f32; D]) -> Self {
+        let along = std::array::from_fn(|r| std::array::from_fn(|c| direction[r] * direction[c]));
+        Self { through, along, sense: [0.0; D], to: f32::INFINITY, from_center: false }
+    }
+
+    /// Returns the point of the piece nearest to `x`.
+    #[inline(always)]
+    pub(crate) fn project(&self, x: &[f32; D]) -> [f32; D] {
+        let away: [f32; D] = std::array::from_fn(|c| x[c] - self.through[c]);
+        let distance: f32 = away.iter().zip(&self.sense).map(|(a, s)| s * a).sum();
+        let keep = if distance < 0.0 { 0.0 } else { 1.0 };
+        let keep = if distance > self.to { self.to / distance } else { keep };
+        std::array::from_fn(|r| {
+            let moved: f32 = away.iter().zip(&self.along[r]).map(|(a, along)| along * a).sum();
+            self.through[r] + keep * moved
+        })
+    }
+}
+
+/// Records of one family: where a point of theirs may be, how near they pass to a place, and how likely that is by chance. All steps are
+/// generic over it, so that no step depends on a family.
+pub(crate) trait Family<const D: usize>: Trials<D> + Sync {
+    /// Number of pieces of each feasible set.
+    const PIECES: usize = 1;
+    /// Whether pieces are planes with a normal, not lines with a direction.
+    const NORMAL: bool = false;
+
+    // Joint recovery.
+
+    /// Largest weight of an estimate along its own piece in least squares, relative to 1 across it.
+    const MOST_ALONG: f32 = 0.25;
+    /// With `n` estimates, the weight along the own piece is at most `ALONG / n`.
+    const ALONG: f32 = 2.0;
+    /// In least squares, an estimate has half weight at this likelihood ratio of a true neighbor against chance.
+    const HALF_WEIGHT_RATIO: f32 = 1.0;
+    /// Whether wrong entries of the same region count as background and not as true neighbors: along a line they would draw a place
+    /// into the middle of its region. Planes and candidates keep them, because a neighbor fixes few coordinates and more are better.
+    const SUBTRACTS_BACKGROUND: bool = false;
+    /// Largest radius of the distribution of neighbors, in deltas. Without it, the radius would grow where most estimates are wrong.
+    const MOST_RADIUS: f32 = 0.95;
+
+    /// How often joint recovery runs again from exact coordinates. This improves images. On maps it gains 0.2 points and takes half as
+    /// long again.
+    const RERUNS: usize = 0;
+
+    // The choice of delta.
+
     /// Chunks of slots that are solved per delta to choose it. Fewer in images, where this takes most of the time.
-    pub(crate) delta_chunks: usize,
-    /// Such chunks for planes: more, because their evidence hardly depends on delta, so that noise widens the plateau.
-    pub(crate) delta_chunks_of_planes: usize,
-    /// A delta is too wide if a random candidate passes a typical place with this probability. In an image, both lines of a record cross
-    /// the whole plane, so random records agree more often.
-    pub(crate) too_wide_of_candidates: f32,
+    const DELTA_CHUNKS: usize = if D == 2 { 4 } else { 12 };
+    /// A delta is too wide if a random record agrees with a typical place with this probability.
+    const TOO_WIDE: f32 = 0.04;
     /// Whether that limit also holds for the fine ladder.
-    pub(crate) candidates_keep_to_limit: bool,
-    /// Whether the fraction of all records in one list limits delta. In images, the known bounds limit it.
-    pub(crate) limits_by_share: bool,
+    const KEEPS_TO_LIMIT: bool = false;
+    /// Position of the narrow choice on the plateau, as a fraction of its logarithmic width: the very edge is noisy.
+    const ACROSS: f64 = 1.0 / 3.0;
     /// Whether a narrow delta stays near the lower edge of the plateau. In an image, lines cross everywhere, so that this edge is
     /// noise.
-    pub(crate) keeps_near_edge: bool,
-    /// Largest radius of the distribution of neighbors of candidates, in deltas. Delta is narrower in images.
-    pub(crate) most_radius_of_candidates: f32,
-    /// Whether edges in the outer bins measure the background. In images, true neighbors reach those bins.
-    pub(crate) measures_background: bool,
-    /// Distance within which partners of exchanged coordinates are searched, in deltas. In images, delta is narrow and values are
-    /// few.
-    pub(crate) exact_reach: f64,
-    /// Least probability of accepted exchanges. In an image, even a wrong partner is close.
-    pub(crate) least_exchange: f32,
-    /// How often joint recovery of candidates runs again from exact coordinates. This improves images. On maps it gains
-    /// 0.2 points and takes half as long again.
-    pub(crate) joint_reruns: usize,
-    /// Whether confidence is computed. Its probabilities were never tested on images.
-    pub(crate) confidence: bool,
-}
+    const KEEPS_NEAR_EDGE: bool = D != 2;
 
-/// Settings of maps, chosen on RedKitchen and Castle.
-const OF_MAPS: Settings = Settings {
-    delta_chunks: 12,
-    delta_chunks_of_planes: 24,
-    too_wide_of_candidates: 0.04,
-    candidates_keep_to_limit: false,
-    limits_by_share: true,
-    keeps_near_edge: true,
-    most_radius_of_candidates: 0.95,
-    measures_background: true,
-    exact_reach: 1.0,
-    least_exchange: 0.2,
-    joint_reruns: 0,
-    confidence: true,
-};
+    /// What consensus and joint recovery compute once for a delta.
+    type AtDelta: Sync;
 
-/// Settings of images, chosen on six photos of RedKitchen.
-const OF_IMAGES: Settings = Settings {
-    delta_chunks: 4,
-    delta_chunks_of_planes: 4,
-    too_wide_of_candidates: 0.12,
-    candidates_keep_to_limit: true,
-    limits_by_share: false,
-    keeps_near_edge: false,
-    most_radius_of_candidates: 3.0,
-    measures_background: false,
-    exact_reach: 4.0,
-    least_exchange: 0.05,
-    joint_reruns: 2,
-    confidence: false,
-};
-
-impl Settings {
-    /// Returns the settings of images for `D == 2`, else those of maps.
-    pub(crate) const fn of_dimension<const D: usize>() -> Self {
-        if D == 2 { OF_IMAGES } else { OF_MAPS }
+    fn at_delta(&self, delta: f32) -> Self::AtDelta;
+    fn slots_per_record(&self) -> usize {
+        1
+    }
+    /// Returns rays whose centers have regions. Such rays of one center meet only there, and rays of two centers do not meet.
+    fn anchored(&self) -> Option<&[LineRow<D>]> {
+        None
+    }
+    /// Returns a length of the order of the map's size, from the records alone; 0 for an empty map.
+    fn extent(&self) -> f64;
+    /// Returns the chance that a random record passes within `delta` of a typical place.
+    fn typical_chance(&self, delta: f32) -> f32;
+    /// Returns two limits on chance for maps in which a list holds the fraction `share` of all records: a delta with less chance than
+    /// the first is never too wide, and one with less than the second is too narrow.
+    ///
+    /// Neighbors then lie in a ball that holds this fraction of the map. A random line passes through it with probability `share^(2/3)` if
+    /// points fill space and `share^2` if they lie on a curve; a random plane with `share^(1/3)` and `share`.
+    fn limits(&self, share: f64) -> [f64; 2] {
+        [libm::pow(share, 2.0 / 3.0), libm::pow(share, 2.0)]
+    }
+    /// In a flat map, returns the radius about a place that holds the fraction `share` of the points.
+    fn radius_if_flat(&self, _share: f64) -> Option<f64> {
+        None
+    }
+    /// Returns the least delta of a map in which a list holds the fraction `share` of all records; 0 without a limit.
+    fn least_delta(&self, _share: f64) -> f64 {
+        0.0
+    }
+    /// Loads a record that is read soon; changes no result.
+    #[inline(always)]
+    fn prefetch(&self, _record: usize) {}
+    /// Returns the estimate of consensus for `slot`, from the records `listed`.
+    fn consensus(
+        &self,
+        slot: usize,
+        listed: &[RecordId],
+        at: (f32, &Self::AtDelta),
+        scratch: &mut Scratch<D>,
+    ) -> Estimate<D>;
+    fn piece(&self, slot: usize, piece: usize) -> Piece<D>;
+    /// Returns the unit direction of a piece, or its normal.
+    fn direction(&self, slot: usize, piece: usize) -> [f32; D];
+    /// Whether a record near a place is evidence for a point of `slot`.
+    #[inline(always)]
+    fn may_vote(&self, _slot: usize, _record: usize) -> bool {
+        true
+    }
+    /// Returns the squared distance from `x` to the feasible set of `record`.
+    fn record_distance2(&self, record: usize, x: &[f32; D]) -> f32;
+    /// Returns the chance that a random record that may vote for `slot` passes within delta of `x`.
+    fn record_chance(&self, slot: usize, x: &[f32; D], at: &Self::AtDelta) -> f32;
+    /// Returns the logarithm of the range prior at `x`, `p_range` of joint recovery; 0 where the prior is uniform.
+    #[inline(always)]
+    fn ln_spread(&self, _slot: usize, _x: &[f32; D]) -> f32 {
+        0.0
     }
 }

@@ -3,7 +3,7 @@
 use crate::RecordId;
 use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{along, widen};
-use crate::released::{Lines, Rays};
+use crate::released::{Lines, Obfuscation, Rays, Released};
 
 /// A line or ray. A row is half a cache line, so that a neighbor costs one memory access.
 #[derive(Clone, Copy, Debug)]
@@ -25,11 +25,20 @@ pub(crate) const NO_GROUP: u32 = u32::MAX;
 /// Lines with a smaller squared sine are parallel, so that they give no position along each other.
 const PARALLEL: f32 = 1e-6;
 
-/// Converts lines to rows. `bounds`, relative to the released origin, cut lines to chords that start where the line enters.
-pub(crate) fn from_lines<const D: usize>(
-    lines: &Lines<D>,
+/// Converts lines or rays to rows; no rows for other families. `bounds`, relative to the released origin, cut lines to chords that start
+/// where the line enters.
+pub(crate) fn rows_of<const D: usize>(
+    released: &Released<D>,
     bounds: Option<&Bounds<D>>,
 ) -> Vec<LineRow<D>> {
+    match released.obfuscation() {
+        Obfuscation::Lines(lines) => from_lines(lines, bounds),
+        Obfuscation::Rays(rays) => from_rays(rays, bounds),
+        Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => Vec::new(),
+    }
+}
+
+fn from_lines<const D: usize>(lines: &Lines<D>, bounds: Option<&Bounds<D>>) -> Vec<LineRow<D>> {
     let row = |(foot, &direction): (&[f32; D], &[f32; D])| {
         let (at, toward) = (widen(foot), widen(&direction));
         let (through, to) = match bounds.and_then(|bounds| bounds.clip(&at, &toward)) {
@@ -42,10 +51,7 @@ pub(crate) fn from_lines<const D: usize>(
 }
 
 /// Converts rays to rows, cut at the region of their center or else at `bounds`, where these are known.
-pub(crate) fn from_rays<const D: usize>(
-    rays: &Rays<D>,
-    bounds: Option<&Bounds<D>>,
-) -> Vec<LineRow<D>> {
+fn from_rays<const D: usize>(rays: &Rays<D>, bounds: Option<&Bounds<D>>) -> Vec<LineRow<D>> {
     let row = |(&center, &direction): (&u8, &[f32; D])| {
         let through = rays.centers()[usize::from(center)];
         let region = rays.regions().map(|regions| &regions[usize::from(center)]).or(bounds);

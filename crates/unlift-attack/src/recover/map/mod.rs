@@ -2,14 +2,14 @@
 //!
 //! From the bottom up: a grid of cells and the density of estimates on it (`grid`); rows per record and their sections with a
 //! feasible line (`lines`, `planes`); the chance that a random record passes near a place (`chance`); all of these for one map
-//! (`family`); lists and the neighborhood graph (`lists`, `graph`); estimates per slot and feasible sets (`places`, `pieces`).
+//! (`family`, `families`); lists and the neighborhood graph (`lists`, `graph`); estimates per slot (`places`).
 
 pub(crate) mod chance;
+pub(crate) mod families;
 pub(crate) mod family;
 pub(crate) mod graph;
 pub(crate) mod grid;
 pub(crate) mod lines;
 pub(crate) mod lists;
-pub(crate) mod pieces;
 pub(crate) mod places;
 pub(crate) mod planes;

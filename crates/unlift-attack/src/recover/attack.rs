@@ -1,0 +1,184 @@
+//! The attacks of this crate, from released records and lists to recovered points: the steps in their order.
+
+use crate::Error;
+use crate::RowOrder;
+use crate::density::tomography;
+use crate::neighbors::Neighborhoods;
+use crate::recover::baselines::density::published;
+use crate::recover::baselines::ransac;
+use crate::recover::map::families::{CandidateFamily, LineFamily, PlaneFamily};
+use crate::recover::map::family::Family;
+use crate::recover::map::graph::Graph;
+use crate::recover::map::lists::Slots;
+use crate::recover::options::{Delta, RecoverOptions};
+use crate::recover::problem::Problem;
+use crate::recover::ranking;
+use crate::recover::result::{Estimate, Recovered, TrialHistogram, Unknown};
+use crate::recover::solver::Builtin;
+use crate::recover::{anchors, beliefs, confidence, consensus, delta, exact, joint, placement};
+use crate::released::{Obfuscation, Released};
+
+/// Number of joint recoveries from known positions, each after the known ones are put back. With eight instead of three, `dcl2d` on
+/// RedKitchen gains less than a point.
+const ROUNDS: usize = 3;
+
+/// Least mean evidence, in nats, of estimates on rays whose centers have regions: below it they are hardly better than chance.
+const LEAST_EVIDENCE: f64 = 1.5;
+
+/// An attack by one of our solvers.
+pub(super) struct Attack<'a, const D: usize> {
+    pub(super) released: &'a Released<D>,
+    pub(super) lists: &'a Neighborhoods,
+    pub(super) options: RecoverOptions,
+    pub(super) solver: Builtin,
+    /// Whether [`Builtin::Joint`] ends after its first step, `consensus`.
+    pub(super) only_starts: bool,
+    /// Estimates that stay as they are, per slot; empty if none is known.
+    pub(super) known: Vec<Option<Estimate<D>>>,
+}
+
+/// Recovers by [`Builtin::Joint`] from known positions of some slots. Positions that are more likely right than wrong, by
+/// the confidence in `known`, stay as they are until exact constraints apply (`cp2d`). The result has no confidence.
+///
+/// # Errors
+/// When options are out of range, the lists do not have one row per slot, or `known` belongs to another map.
+pub fn recover_from<const D: usize>(
+    known: &Recovered<D>,
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    options: &RecoverOptions,
+) -> Result<Recovered<D>, Error> {
+    released.fingerprint().expect(known.about().map)?;
+    check(released, lists, options)?;
+    let known = (0..released.n_slots()).map(|slot| known.sure_estimate(slot)).collect();
+    Attack { known, ..Attack::new(released, lists, options, Builtin::Joint) }.run()
+}
+
+/// Rejects options out of range, and lists that do not fit the map.
+pub(super) fn check<const D: usize>(
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    options: &RecoverOptions,
+) -> Result<(), Error> {
+    if lists.n_slots() != released.n_slots() {
+        let expected = format!("{} rows, one per slot", released.n_slots());
+        return Err(Error::new("neighborhoods", expected, lists.n_slots().to_string()));
+    }
+    // Lists of another map may have the same number of rows.
+    let n_records = released.n_records();
+    if let Some(record) = lists.records().iter().find(|record| record.index() >= n_records) {
+        let expected = format!("records below {n_records}");
+        return Err(Error::new("neighborhoods", expected, record.0.to_string()));
+    }
+    options.check()
+}
+
+impl<'a, const D: usize> Attack<'a, D> {
+    pub(super) fn new(
+        released: &'a Released<D>,
+        lists: &'a Neighborhoods,
+        options: &RecoverOptions,
+        solver: Builtin,
+    ) -> Self {
+        Self { released, lists, options: *options, solver, only_starts: false, known: Vec::new() }
+    }
+
+    /// Fails when the lists belong to another map.
+    pub(super) fn run(&self) -> Result<Recovered<D>, Error> {
+        let Self { released, lists, .. } = *self;
+        released.fingerprint().expect(lists.about().map)?;
+        match (self.solver, released.obfuscation()) {
+            (Builtin::Density, _) => placement::recover(released, lists, &published(released)),
+            (Builtin::Tomography, _) => placement::recover(released, lists, &tomography(released)),
+            (_, Obfuscation::Lines(_)) => self.run_on(&LineFamily::new(released, lists, false)),
+            (_, Obfuscation::Rays(rays)) => {
+                self.run_on(&LineFamily::new(released, lists, rays.regions().is_some()))
+            }
+            (_, Obfuscation::AxisPlanes(planes)) => self.run_on(&PlaneFamily::new(planes)),
+            (_, Obfuscation::AxisCandidates(candidates)) => {
+                self.run_on(&CandidateFamily::new(candidates.position(), lists))
+            }
+        }
+    }
+
+    /// Runs the attack on records of one family: consensus, the steps of [`joint`](Self::joint), exact constraints, confidence.
+    fn run_on<F: Family<D>>(&self, family: &F) -> Result<Recovered<D>, Error> {
+        let Self { released, lists, options, solver, .. } = self;
+        let is_joint = *solver == Builtin::Joint;
+        // Joint recovery reads lists in both directions from its start on.
+        let graph = is_joint.then(|| Graph::new(lists, family.slots_per_record()));
+        let single = graph.as_ref().filter(|_| family.slots_per_record() == 1);
+        let both_ways = single.map(Graph::neighborhoods);
+        let used = both_ways.as_ref().unwrap_or(lists);
+        let delta = match options.delta {
+            Delta::Fixed(delta) => delta,
+            Delta::Auto => delta::learn(released, family, (used, lists), is_joint, options.seed),
+        };
+        if *solver == Builtin::Ransac {
+            let (estimates, trials) = ransac::solve(family, lists, delta as f32, options.seed);
+            let recovered = Recovered::new(released, lists, &estimates, delta)?;
+            let trials = Some(TrialHistogram::new(&trials));
+            return Ok(recovered.with_trials(trials).without_confidence(Unknown::OtherSolver));
+        }
+        let settle = |estimates| exact::settle(released, estimates, delta);
+        let mut estimates =
+            consensus::solve(family, used, delta as f32, &Slots::all(lists.n_slots()));
+        if let Some(graph) = graph.as_ref().filter(|_| !self.only_starts) {
+            let problem = Problem::new(family, (lists, graph), delta as f32, options.seed);
+            estimates = settle(joint(&problem, estimates, &self.known));
+            for _ in 0..F::RERUNS {
+                estimates = settle(joint(&problem, estimates, &[]));
+            }
+        } else {
+            estimates = settle(estimates);
+        }
+        let recovered = Recovered::new(released, lists, &estimates, delta)?;
+        match confidence::predict(self, graph.as_ref(), &estimates) {
+            Ok(confidence) => recovered.with_confidence(confidence),
+            Err(unknown) => Ok(recovered.without_confidence(unknown)),
+        }
+    }
+}
+
+/// Returns the estimates of all slots after the steps of joint recovery from `start`. Estimates that are `known`, per slot, stay as they
+/// are.
+fn joint<const D: usize, F: Family<D>>(
+    problem: &Problem<'_, D, F>,
+    start: Vec<Estimate<D>>,
+    known: &[Option<Estimate<D>>],
+) -> Vec<Estimate<D>> {
+    let Problem { family, lists, graph, .. } = problem;
+    let restore = |mut estimates: Vec<Estimate<D>>| {
+        for (estimate, known) in estimates.iter_mut().zip(known) {
+            *estimate = known.unwrap_or(*estimate);
+        }
+        estimates
+    };
+    let mut estimates = restore(start);
+    // All slots together: each by its neighbors' estimates. From rays that say hardly more than chance, neighbors add nothing.
+    for _ in 0..if known.is_empty() { 1 } else { ROUNDS } {
+        if family.anchored().is_none() || mean_evidence(&estimates) >= LEAST_EVIDENCE {
+            estimates = restore(joint::recover(problem, estimates));
+        }
+    }
+    // Lists from the records alone say what the records say. The following steps would count it twice.
+    if lists.about().order == RowOrder::Either {
+        return estimates;
+    }
+    // A layout of the whole image, which known positions replace.
+    if let Some(rays) = family.anchored().filter(|_| known.is_empty()) {
+        estimates = anchors::layout::recover(rays, (lists, &graph.listers), estimates);
+    }
+    // The likeliest places under the whole lists; or under their entries alone, where what is not listed says too little. Beliefs
+    // are for maps with one slot per record: points of paired lines and of images lose as often as they gain.
+    let with_beliefs = D == 3 && family.slots_per_record() == 1 && lists.scores().is_some();
+    restore(match ranking::recover(problem, estimates) {
+        Err(estimates) if with_beliefs => beliefs::recover(problem, estimates),
+        Ok(estimates) | Err(estimates) => estimates,
+    })
+}
+
+fn mean_evidence<const D: usize>(estimates: &[Estimate<D>]) -> f64 {
+    let sum: f64 = estimates.iter().map(|e| f64::from(e.evidence)).sum();
+    sum / estimates.len().max(1) as f64
+}
