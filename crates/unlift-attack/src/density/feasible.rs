@@ -3,21 +3,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::geometry::vector::{along, distance, dot, median, sub, widen};
+use crate::recover::map::lines::{LineRow, NO_GROUP, rows_of};
 use crate::released::{AxisCandidates, Obfuscation, Released};
-
-/// A line, or the part of it beyond `from`, on which a hidden point may lie.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct FeasibleLine {
-    pub(crate) through: [f32; 3],
-    /// Unit length.
-    pub(crate) direction: [f32; 3],
-    /// Parameter where it begins.
-    pub(crate) from: f32,
-    /// Prior probability of this line among the lines of its record, up to a common factor.
-    pub(crate) prior: f32,
-    /// Center of a ray. Lines of one group always meet there, so they are no evidence for each other.
-    pub(crate) group: Option<u8>,
-}
 
 /// What a record hides. It decides how the likelihood of a place depends on the density of points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,8 +23,10 @@ pub(crate) enum Hides {
 #[derive(Debug)]
 pub(crate) struct Feasible {
     pub(crate) hides: Hides,
-    /// Lines, `per_record` per record.
-    pub(crate) lines: Vec<FeasibleLine>,
+    /// Lines and rays without an end, `per_record` per record. Rays of one center always meet there, so they are no evidence for each other.
+    pub(crate) lines: Vec<LineRow<3>>,
+    /// Prior probability of each line among the lines of its record, up to a common factor; empty if they are equal.
+    pub(crate) prior: Vec<f32>,
     pub(crate) per_record: usize,
     pub(crate) n_groups: usize,
 }
@@ -51,49 +40,40 @@ impl Feasible {
         if D != 3 {
             return None;
         }
-        let line = |through: [f32; 3], direction: [f32; 3]| FeasibleLine {
-            through,
-            direction,
-            from: f32::NEG_INFINITY,
-            prior: 1.0,
-            group: None,
+        let line = |row: &LineRow<D>| LineRow {
+            through: solid(&row.through),
+            direction: solid(&row.direction),
+            group: row.group,
+            to: f32::INFINITY,
         };
+        let lines = rows_of(released, None).iter().map(line).collect();
+        let (prior, per_record) = (Vec::new(), 1);
         match released.obfuscation() {
-            Obfuscation::Lines(lines) => {
-                let rows = lines.foot().iter().zip(lines.direction());
+            Obfuscation::Lines(_) => {
                 let hides = if released.slots_per_record() == 2 { Hides::Two } else { Hides::One };
-                let lines = rows.map(|(foot, d)| line(solid(foot), solid(d))).collect();
-                Some(Self { hides, lines, per_record: 1, n_groups: 0 })
+                Some(Self { hides, lines, prior, per_record, n_groups: 0 })
             }
             Obfuscation::Rays(rays) => {
-                let rows = rays.center().iter().zip(rays.direction());
-                let lines = rows
-                    .map(|(&center, direction)| FeasibleLine {
-                        from: 0.0,
-                        group: Some(center),
-                        ..line(solid(&rays.centers()[usize::from(center)]), solid(direction))
-                    })
-                    .collect();
                 let n_groups = rays.centers().len();
-                Some(Self { hides: Hides::OnRay, lines, per_record: 1, n_groups })
+                Some(Self { hides: Hides::OnRay, lines, prior, per_record, n_groups })
             }
             Obfuscation::AxisPlanes(_) => None,
             Obfuscation::AxisCandidates(candidates) => {
+                let unit = |axis: usize| std::array::from_fn(|c| f32::from(u8::from(c == axis)));
+                let line = |(row, axis): (&[f32; D], usize)| {
+                    let mut through = solid(row);
+                    through[axis] = 0.0;
+                    let (group, to) = (NO_GROUP, f32::INFINITY);
+                    LineRow { through, direction: unit(axis), group, to }
+                };
+                let rows = candidates.position();
+                let lines = rows.iter().flat_map(|row| (0..3).map(move |axis| (row, axis)));
+                let lines = lines.map(line).collect();
+                // The value on an exchanged axis is random, so it is more probable where values are dense.
                 let common = value_densities(candidates);
-                let mut lines = Vec::with_capacity(3 * candidates.len());
-                for (row, position) in candidates.position().iter().enumerate() {
-                    for axis in 0..3 {
-                        let (mut through, mut direction) = (solid(position), [0.0; 3]);
-                        through[axis] = 0.0;
-                        direction[axis] = 1.0;
-                        // The value on an exchanged axis is random, so it is more probable where values are dense.
-                        lines.push(FeasibleLine {
-                            prior: common[axis][row],
-                            ..line(through, direction)
-                        });
-                    }
-                }
-                Some(Self { hides: Hides::OnAxis, lines, per_record: 3, n_groups: 0 })
+                let prior = (0..rows.len()).flat_map(|row| [0, 1, 2].map(|axis| (axis, row)));
+                let prior = prior.map(|(axis, row): (usize, usize)| common[axis][row]).collect();
+                Some(Self { hides: Hides::OnAxis, lines, prior, per_record: 3, n_groups: 0 })
             }
         }
     }
@@ -106,7 +86,7 @@ impl Feasible {
     /// Measures parameters from the point nearest to `middle`. The origin of a map is rounded, so a shifted or scaled map has other feet. Rays
     /// keep their center.
     pub(crate) fn counted_from(mut self, middle: &[f64; 3]) -> Self {
-        for line in self.lines.iter_mut().filter(|line| line.group.is_none()) {
+        for line in self.lines.iter_mut().filter(|line| !line.is_ray()) {
             line.through = nearest(line, middle).map(|x| x as f32);
         }
         self
@@ -125,7 +105,7 @@ impl Feasible {
 }
 
 /// Returns the mean of the centers of rays, and the largest distance between two of them.
-fn between_centers(lines: &[FeasibleLine]) -> Option<([f64; 3], f64)> {
+fn between_centers(lines: &[LineRow<3>]) -> Option<([f64; 3], f64)> {
     let mut centers: Vec<[f64; 3]> = Vec::new();
     for line in lines {
         let center = widen(&line.through);
@@ -152,14 +132,14 @@ fn between_centers(lines: &[FeasibleLine]) -> Option<([f64; 3], f64)> {
 const PARALLEL: f64 = 1e-5;
 
 /// Returns the least-squares intersection of lines, and the median distance of the lines from it; `None` for parallel lines.
-fn crossing(lines: &[FeasibleLine]) -> Option<([f64; 3], f64)> {
+fn crossing(lines: &[LineRow<3>]) -> Option<([f64; 3], f64)> {
     // The squared distance from a line is |(I - d d') (x - p)|^2, which gives normal equations in x. Terms are sorted before they are summed,
     // so that the order of records changes no bit.
-    let across = |line: &FeasibleLine, row: usize, column: usize| {
+    let across = |line: &LineRow<3>, row: usize, column: usize| {
         f64::from(u8::from(row == column))
             - f64::from(line.direction[row]) * f64::from(line.direction[column])
     };
-    let sum = |term: &dyn Fn(&FeasibleLine) -> f64| {
+    let sum = |term: &dyn Fn(&LineRow<3>) -> f64| {
         let mut terms: Vec<f64> = lines.iter().map(term).collect();
         terms.sort_unstable_by(f64::total_cmp);
         terms.iter().sum::<f64>()
@@ -186,7 +166,7 @@ fn crossing(lines: &[FeasibleLine]) -> Option<([f64; 3], f64)> {
 }
 
 /// Returns the point of a line nearest to `x`.
-fn nearest(line: &FeasibleLine, x: &[f64; 3]) -> [f64; 3] {
+fn nearest(line: &LineRow<3>, x: &[f64; 3]) -> [f64; 3] {
     let (through, direction) = (widen(&line.through), widen(&line.direction));
     along(&through, dot(&sub(x, &through), &direction), &direction)
 }

@@ -1,11 +1,13 @@
 //! Peaks: the most probable place of each record's point.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
-use super::feasible::{FeasibleLine, Hides};
-use super::grid::Span;
+use super::feasible::Hides;
 use super::spread::Spread;
 use super::{Peak, Peaks};
+use crate::recover::map::lines::LineRow;
 
 /// Samples to either side that count as the same place, about as many as smoothing reaches.
 const REACH: usize = 2;
@@ -21,8 +23,8 @@ pub(super) fn find(spread: &Spread<'_>) -> Peaks {
             spread.view(record, spread.weights_of(record), view);
             let lines = record * feasible.per_record..(record + 1) * feasible.per_record;
             if let [first, second] = out {
-                let (line, span) = (&feasible.lines[record], spread.spans[record]);
-                Window::all(view, span, spread.grid.side, windows);
+                let (line, span) = (&feasible.lines[record], &spread.spans[record]);
+                Window::all(view, span, spread.grid.cell, windows);
                 let total = view.iter().sum();
                 if let Some(pair) = best_pair(windows) {
                     [*first, *second] = pair.map(|w| peak(&w, line, 0, total, view.len()));
@@ -32,13 +34,13 @@ pub(super) fn find(spread: &Spread<'_>) -> Peaks {
             }
         },
     );
-    Peaks { of, resolution: f64::from(spread.grid.side) }
+    Peaks { of, resolution: f64::from(spread.grid.cell) }
 }
 
 /// Returns the place with the largest likelihood around it on any line of a record.
 fn best(
     spread: &Spread<'_>,
-    lines: std::ops::Range<usize>,
+    lines: Range<usize>,
     view: &[f32],
     windows: &mut Vec<Window>,
 ) -> Option<Peak> {
@@ -46,8 +48,8 @@ fn best(
     let mut found: Option<(Window, usize)> = None;
     let mut begin = 0;
     for at in lines.clone() {
-        let span = spread.spans[at];
-        Window::all(&view[begin..begin + span.len()], span, spread.grid.side, windows);
+        let span = &spread.spans[at];
+        Window::all(&view[begin..begin + span.len()], span, spread.grid.cell, windows);
         begin += span.len();
         for window in windows.iter() {
             if window.likelihood > found.map_or(0.0, |(best, _)| best.likelihood) {
@@ -95,14 +97,14 @@ struct Window {
 
 impl Window {
     /// Computes one window per sample of a line.
-    fn all(view: &[f32], span: Span, side: f32, out: &mut Vec<Self>) {
+    fn all(view: &[f32], span: &Range<i32>, side: f32, out: &mut Vec<Self>) {
         out.clear();
         for at in 0..view.len() {
             let from = at.saturating_sub(REACH);
             let near = &view[from..view.len().min(at + REACH + 1)];
             let likelihood: f32 = near.iter().sum();
             let moment: f32 = near.iter().enumerate().map(|(i, x)| i as f32 * x).sum();
-            let first = (span.first + from as i32) as f32 + 0.5;
+            let first = (span.start + from as i32) as f32 + 0.5;
             let shift = if likelihood > 0.0 { moment / likelihood } else { 0.0 };
             out.push(Self { likelihood, t: (first + shift) * side });
         }
@@ -111,13 +113,12 @@ impl Window {
 
 fn peak(
     window: &Window,
-    line: &FeasibleLine,
+    line: &LineRow<3>,
     axis: usize,
     total: f32,
     n_samples: usize,
 ) -> Option<Peak> {
-    let position: [f32; 3] =
-        std::array::from_fn(|c| line.through[c] + window.t * line.direction[c]);
+    let position = line.at(window.t);
     let blind = (2 * REACH + 1) as f32 / n_samples as f32;
     let evidence = libm::logf(window.likelihood / total / blind).max(0.0);
     let sound = evidence.is_finite() && position.iter().all(|x| x.is_finite());

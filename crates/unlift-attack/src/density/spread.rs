@@ -1,9 +1,14 @@
 //! Expectation maximization on one grid.
 
+use std::ops::Range;
+use std::sync::atomic::{AtomicU32, Ordering};
+
 use rayon::prelude::*;
 
-use super::feasible::{Feasible, FeasibleLine, Hides};
-use super::grid::{Grid, SMOOTHING, Span};
+use super::feasible::{Feasible, Hides};
+use super::grid::SMOOTHING;
+use crate::recover::map::grid::Grid;
+use crate::recover::map::lines::LineRow;
 
 /// Rounds on each grid. From 4 to 20 rounds, recovered fractions on procedural rooms change by less than half a point.
 const ROUNDS: usize = 4;
@@ -14,11 +19,11 @@ const LEAST_OTHERS: f32 = 1e-4;
 pub(super) struct Spread<'a> {
     pub(super) feasible: &'a Feasible,
     /// Density of all records, smoothed.
-    pub(super) grid: Grid,
+    pub(super) grid: Grid<3>,
     /// For rays, the density from rays of other centers, per center; else empty.
-    others: Vec<Grid>,
+    others: Vec<Grid<3>>,
     /// Samples per line.
-    pub(super) spans: Vec<Span>,
+    pub(super) spans: Vec<Range<i32>>,
     /// Start of the weights of each record, and the end of the last.
     offsets: Vec<usize>,
     /// Weight of the record's point per sample, line after line; 0 at first.
@@ -26,8 +31,9 @@ pub(super) struct Spread<'a> {
 }
 
 impl<'a> Spread<'a> {
-    pub(super) fn new(feasible: &'a Feasible, grid: Grid) -> Self {
-        let spans: Vec<Span> = feasible.lines.par_iter().map(|line| grid.span(line)).collect();
+    pub(super) fn new(feasible: &'a Feasible, grid: Grid<3>) -> Self {
+        let spans: Vec<Range<i32>> =
+            feasible.lines.par_iter().map(|line| grid.span(line)).collect();
         let mut offsets = vec![0];
         let mut n_samples = 0;
         for spans in spans.chunks(feasible.per_record) {
@@ -55,24 +61,23 @@ impl<'a> Spread<'a> {
         let per_record = self.feasible.per_record;
         out.clear();
         for at in record * per_record..(record + 1) * per_record {
-            let (line, span) = (&self.feasible.lines[at], self.spans[at]);
+            let (line, span) = (&self.feasible.lines[at], self.spans[at].clone());
             let begin = out.len();
-            let grid = line.group.and_then(|g| self.others.get(usize::from(g)));
             let subtracts = self.others.is_empty();
-            let grid = grid.unwrap_or(&self.grid);
+            let grid = self.others.get(line.group as usize).unwrap_or(&self.grid);
+            let prior = self.feasible.prior.get(at).copied().unwrap_or(1.0);
             let own = &own[begin..begin + span.len()];
             let kernel = self_kernel(line);
-            for k in span.first..span.end {
+            for (at, k) in span.enumerate() {
                 let Some(voxel) = grid.voxel(line, k) else {
                     out.push(0.0);
                     continue;
                 };
-                let all = grid.mass[voxel];
-                let mine =
-                    if subtracts { convolve(own, (k - span.first) as usize, &kernel) } else { 0.0 };
-                let others = (all - mine).max(all * LEAST_OTHERS) * line.prior;
+                let all = grid.values[voxel];
+                let mine = if subtracts { convolve(own, at, &kernel) } else { 0.0 };
+                let others = (all - mine).max(all * LEAST_OTHERS) * prior;
                 let t = grid.parameter(k);
-                out.push(if line.group.is_some() { others * t * t } else { others });
+                out.push(if line.is_ray() { others * t * t } else { others });
             }
         }
     }
@@ -107,7 +112,7 @@ impl<'a> Spread<'a> {
     /// Turns the likelihood of one point into that of one of two: a pair at distance `d` has `d^2` times the probability to be paired along
     /// this line.
     fn pair_up(&self, record: usize, view: &mut [f32]) {
-        let first = self.spans[record].first;
+        let first = self.spans[record].start;
         // Relative to the middle of the span, to avoid a difference of large squares.
         let middle = f64::from(first) + 0.5 * view.len() as f64;
         let place = |at: usize| f64::from(first) + at as f64 + 0.5 - middle;
@@ -129,44 +134,35 @@ impl<'a> Spread<'a> {
     fn maximize(&mut self) {
         self.others.clear();
         for group in 0..self.feasible.n_groups {
-            let mut others = self.grid.with(self.deposit(|line| line.group != Some(group as u8)));
-            others.smooth();
+            let mut others = self.grid.clone();
+            others.values = self.deposit(|line| line.group != group as u32);
+            others.smooth(1);
             self.others.push(others);
         }
-        self.grid.mass = self.deposit(|_| true);
-        self.grid.smooth();
+        self.grid.values = self.deposit(|_| true);
+        self.grid.smooth(1);
     }
 
     /// Sums the weights of the lines that `admit` accepts, per voxel. Sums are of integers, so they depend neither on threads nor on the
-    /// order of records. Each task has its own layers of voxels.
-    fn deposit(&self, admit: impl Fn(&FeasibleLine) -> bool + Sync) -> Vec<f32> {
-        const LAYERS: usize = 4;
+    /// order of records.
+    fn deposit(&self, admit: impl Fn(&LineRow<3>) -> bool + Sync) -> Vec<f32> {
         let (grid, per_record) = (&self.grid, self.feasible.per_record);
-        let mut quanta = vec![0u32; grid.mass.len()];
-        quanta.par_chunks_mut(LAYERS * grid.layer().max(1)).enumerate().for_each(|(slab, out)| {
-            let begin = slab * LAYERS * grid.layer();
-            let mut offset = 0;
-            for (at, (line, &span)) in self.feasible.lines.iter().zip(&self.spans).enumerate() {
-                let weights = &self.weights[offset..offset + span.len()];
-                offset += span.len();
-                debug_assert!(
-                    (at + 1) % per_record != 0 || offset == self.offsets[(at + 1) / per_record]
-                );
-                if !admit(line) {
-                    continue;
-                }
-                let part = grid.span_in_layers(line, span, slab * LAYERS, (slab + 1) * LAYERS);
-                for k in part.first..part.end {
-                    // Voxels below the slab wrap around and are out of range, too.
-                    let voxel = grid.voxel(line, k).map(|voxel| voxel.wrapping_sub(begin));
-                    if let Some(sum) = voxel.and_then(|voxel| out.get_mut(voxel)) {
-                        let quantum = weights[(k - span.first) as usize] * QUANTA;
-                        *sum = sum.saturating_add((quantum + 0.5) as u32);
+        let sums: Vec<AtomicU32> = grid.values.iter().map(|_| AtomicU32::new(0)).collect();
+        (0..self.feasible.n_records()).into_par_iter().for_each(|record| {
+            let mut weights = self.weights_of(record).iter();
+            for at in record * per_record..(record + 1) * per_record {
+                let line = &self.feasible.lines[at];
+                for (k, weight) in self.spans[at].clone().zip(weights.by_ref()) {
+                    let quantum = (weight * QUANTA + 0.5) as u32;
+                    let voxel = grid.voxel(line, k).filter(|_| quantum > 0 && admit(line));
+                    if let Some(voxel) = voxel {
+                        let add = |sum: u32| Some(sum.saturating_add(quantum));
+                        let _ = sums[voxel].fetch_update(Ordering::Relaxed, Ordering::Relaxed, add);
                     }
                 }
             }
         });
-        quanta.into_par_iter().map(|sum| sum as f32 / QUANTA).collect()
+        sums.into_par_iter().map(|sum| sum.into_inner() as f32 / QUANTA).collect()
     }
 }
 
@@ -174,7 +170,7 @@ impl<'a> Spread<'a> {
 const QUANTA: f32 = 1_048_576.0;
 
 /// Returns the fraction of a sample's weight that smoothing leaves at the sample, and at samples one and two steps away on the line.
-fn self_kernel(line: &FeasibleLine) -> [f32; 3] {
+fn self_kernel(line: &LineRow<3>) -> [f32; 3] {
     // Linear between the taps of the binomial kernel, as for a shift by a part of a voxel.
     let tap = |x: f32| {
         let x = x.abs();

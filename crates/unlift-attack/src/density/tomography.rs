@@ -11,9 +11,9 @@
 
 use super::Peaks;
 use super::feasible::{Feasible, Hides};
-use super::grid::Grid;
 use super::peaks::find;
 use super::spread::Spread;
+use crate::recover::map::grid::Grid;
 use crate::released::Released;
 
 /// Half the side of the first box in extents of the map, and its voxels along each axis.
@@ -45,7 +45,7 @@ pub(crate) fn tomography<const D: usize>(released: &Released<D>) -> Peaks {
     let (half, voxels) = if rays { FIRST_BOX_OF_RAYS } else { FIRST_BOX };
     let side = (2.0 * half * extent / voxels as f64) as f32;
     let low = middle.map(|x| (x - half * extent) as f32);
-    let mut spread = Spread::new(&feasible, Grid::even(low, side, [voxels; 3]));
+    let mut spread = Spread::new(&feasible, Grid::even(low, side, [voxels; 3], 1.0));
     spread.rounds();
     let (low, high) = spread.grid.bounds(BEYOND);
     let sides: [f32; 3] = std::array::from_fn(|c| high[c] - low[c]);

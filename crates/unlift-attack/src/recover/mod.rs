@@ -23,7 +23,7 @@ mod consensus;
 mod delta;
 mod exact;
 mod joint;
-mod map;
+pub(crate) mod map;
 mod options;
 mod placement;
 mod problem;

@@ -9,9 +9,10 @@
 
 use rayon::prelude::*;
 
-use crate::density::feasible::{Feasible, FeasibleLine, Hides};
+use crate::density::feasible::{Feasible, Hides};
 use crate::density::{Peak, Peaks};
 use crate::geometry::vector::{dot, sub, widen};
+use crate::recover::map::lines::LineRow;
 use crate::released::Released;
 
 /// Nearest lines that vote first: the largest number, and the largest fraction of all lines.
@@ -39,7 +40,7 @@ pub(crate) fn published<const D: usize>(released: &Released<D>) -> Peaks {
     let lines = &feasible.lines;
     let every = lines.len().div_ceil(MOST_VOTERS);
     let voters: Vec<u32> = (0..lines.len() as u32).step_by(every).collect();
-    let voting: Vec<FeasibleLine> = voters.iter().map(|&voter| lines[voter as usize]).collect();
+    let voting: Vec<LineRow<3>> = voters.iter().map(|&voter| lines[voter as usize]).collect();
     let (most, share) = if feasible.hides == Hides::Two { COARSE_OF_PAIRS } else { COARSE };
     let k = most.min((share * lines.len() as f64) as usize).max(2);
     let place = |row: usize| {
@@ -70,8 +71,8 @@ pub(crate) fn published<const D: usize>(released: &Released<D>) -> Peaks {
 
 /// Refines once: lines vote that pass near the estimate of a line and whose own estimates are near that line.
 fn refine(
-    lines: &[FeasibleLine],
-    (voters, voting): (&[u32], &[FeasibleLine]),
+    lines: &[LineRow<3>],
+    (voters, voting): (&[u32], &[LineRow<3>]),
     estimates: &[Option<Peak>],
 ) -> Vec<Option<Peak>> {
     let point = |&voter: &u32| estimates[voter as usize].map_or([f32::NAN; 3], |p| p.position);
@@ -82,7 +83,7 @@ fn refine(
             points.iter().map(|&point| from_line(point, &lines[row])).collect();
         silence(&mut distances, row, lines, voters);
         let (near, _) = nearest(&distances, REFINE);
-        let to_line = |line: &FeasibleLine| from_line(estimate.position, line);
+        let to_line = |line: &LineRow<3>| from_line(estimate.position, line);
         let mut distances: Vec<f32> = voting.iter().map(to_line).collect();
         silence(&mut distances, row, lines, voters);
         let (mut passing, _) = nearest(&distances, REFINE);
@@ -98,9 +99,9 @@ fn refine(
 }
 
 /// Removes votes, by their `distances`: that of the line of `row` itself, or those of all rays of its center.
-fn silence(distances: &mut [f32], row: usize, lines: &[FeasibleLine], voters: &[u32]) {
+fn silence(distances: &mut [f32], row: usize, lines: &[LineRow<3>], voters: &[u32]) {
     let own = lines[row].group;
-    if own.is_some() {
+    if lines[row].is_ray() {
         for (distance, &voter) in distances.iter_mut().zip(voters) {
             if lines[voter as usize].group == own {
                 *distance = f32::INFINITY;
@@ -112,19 +113,19 @@ fn silence(distances: &mut [f32], row: usize, lines: &[FeasibleLine], voters: &[
 }
 
 /// Returns the parameters at which `line` is passed most closely by `others`, except parallel ones.
-fn passes<'a>(line: &FeasibleLine, others: impl Iterator<Item = &'a FeasibleLine>) -> Vec<f64> {
+fn passes<'a>(line: &LineRow<3>, others: impl Iterator<Item = &'a LineRow<3>>) -> Vec<f64> {
     let (through, direction) = (widen(&line.through), widen(&line.direction));
-    let pass = |other: &FeasibleLine| {
+    let pass = |other: &LineRow<3>| {
         let (away, e) = (sub(&through, &widen(&other.through)), widen(&other.direction));
         let cosine = dot(&direction, &e);
         let square_sine = 1.0 - cosine * cosine;
         let t = (cosine * dot(&away, &e) - dot(&away, &direction)) / square_sine;
-        (square_sine > 1e-6 && t > f64::from(line.from)).then_some(t)
+        (square_sine > 1e-6 && t > f64::from(line.floor())).then_some(t)
     };
     others.filter_map(pass).collect()
 }
 
-fn on(line: &FeasibleLine, t: f64) -> Option<Peak> {
+fn on(line: &LineRow<3>, t: f64) -> Option<Peak> {
     let position = std::array::from_fn(|c| {
         (f64::from(line.through[c]) + t * f64::from(line.direction[c])) as f32
     });
@@ -253,7 +254,7 @@ fn two_modes(votes: &mut [f64]) -> Option<[f64; 2]> {
 // Distances to all lines or estimates.
 
 /// Returns the squared distance between two lines; infinite for parallel ones.
-fn between(line: &FeasibleLine, other: &FeasibleLine) -> f32 {
+fn between(line: &LineRow<3>, other: &LineRow<3>) -> f32 {
     let (p, d) = (line.through, line.direction);
     let (q, e) = (other.through, other.direction);
     let normal = [d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2], d[0] * e[1] - d[1] * e[0]];
@@ -266,7 +267,7 @@ fn between(line: &FeasibleLine, other: &FeasibleLine) -> f32 {
 }
 
 /// Returns the squared distance of `point` from a line, without a difference of large squares; infinite if `point` is NaN.
-fn from_line(point: [f32; 3], line: &FeasibleLine) -> f32 {
+fn from_line(point: [f32; 3], line: &LineRow<3>) -> f32 {
     let d = line.direction;
     let v: [f32; 3] = std::array::from_fn(|c| point[c] - line.through[c]);
     let along = v[0] * d[0] + v[1] * d[1] + v[2] * d[2];
@@ -293,28 +294,24 @@ fn nearest(squared: &[f32], k: usize) -> (Vec<u32>, f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::recover::map::lines::NO_GROUP;
     use crate::seed::{Draws, Stage};
 
     #[test]
     fn distances_between_lines_are_the_least_over_their_points() {
         let mut draws = Draws::new(4, Stage::Synthetic, 0);
-        let line = |_| FeasibleLine {
+        let line = |_| LineRow {
             through: std::array::from_fn(|_| draws.between(-3.0, 3.0) as f32),
             direction: draws.direction::<3>().map(|x| x as f32),
-            from: f32::NEG_INFINITY,
-            prior: 1.0,
-            group: None,
+            group: NO_GROUP,
+            to: f32::INFINITY,
         };
-        let lines: Vec<FeasibleLine> = (0..101).map(line).collect();
+        let lines: Vec<LineRow<3>> = (0..101).map(line).collect();
         let squared: Vec<f32> = lines.iter().map(|other| between(&lines[0], other)).collect();
         assert_eq!(squared[0], f32::INFINITY);
         for (other, squared) in lines.iter().zip(squared).skip(1) {
             // The nearest point of the first line, by golden-section search.
-            let at = |t: f32| {
-                let FeasibleLine { through, direction, .. } = lines[0];
-                let point = std::array::from_fn(|c| through[c] + t * direction[c]);
-                from_line(point, other)
-            };
+            let at = |t: f32| from_line(lines[0].at(t), other);
             let (mut low, mut high) = (-1e3f32, 1e3f32);
             for _ in 0..100 {
                 let (a, b) = (low + 0.382 * (high - low), low + 0.618 * (high - low));

@@ -135,7 +135,7 @@ impl<const D: usize> Kernel for Lengths<'_, D> {
             let (row, weight) = (&rows[record], counts[record] as f32);
             let inside = grid.clip(&row.through, &row.direction, row.floor(), row.to);
             let Some((from, to)) = inside else { continue };
-            let steps = ((to - from) / grid.cell()).ceil().max(1.0);
+            let steps = ((to - from) / grid.cell).ceil().max(1.0);
             let step = (to - from) / steps;
             t.clear();
             t.extend((0..steps as i32).map(|i| from + (i as f32 + 0.5) * step));
@@ -186,7 +186,7 @@ pub(crate) fn of_candidates<const D: usize>(
         (low[axis], high[axis]) = (0.0, 0.0);
         let mut grid = Grid::over(low, high, CELLS / 8);
         // The grid has one cell along this axis, in which the line is as long as the cell.
-        let length = grid.cell();
+        let length = grid.cell;
         for (row, &n) in rows.iter().zip(&counts) {
             let cell = grid.index(row);
             grid.values[cell] += n as f32 * length;

@@ -1,17 +1,19 @@
 //! A dense grid over the box of a map, and the density of estimates on it.
 
+use rayon::prelude::*;
+
 use crate::recover::map::graph::record_of;
 use crate::recover::map::places::Places;
 
 /// Cubic cells over a box. Places outside belong to the nearest cell.
 #[derive(Clone, Debug)]
 pub(crate) struct Grid<const D: usize> {
-    low: [f32; D],
-    cell: f32,
+    pub(crate) low: [f32; D],
+    pub(crate) cell: f32,
     per_length: f32,
-    dims: [usize; D],
+    pub(crate) dims: [usize; D],
     /// Index of the last cell along each axis, as a float.
-    last: [f32; D],
+    pub(crate) last: [f32; D],
     pub(crate) values: Vec<f32>,
 }
 
@@ -19,8 +21,10 @@ pub(crate) struct Grid<const D: usize> {
 const ROUNDING: f32 = 8_388_608.0;
 
 impl<const D: usize> Grid<D> {
-    fn new(low: [f32; D], cell: f32, dims: [usize; D], values: Vec<f32>) -> Self {
+    /// Creates cells of one value.
+    pub(crate) fn even(low: [f32; D], cell: f32, dims: [usize; D], value: f32) -> Self {
         let last = dims.map(|n| (n - 1) as f32);
+        let values = vec![value; dims.iter().product()];
         Self { low, cell, per_length: 1.0 / cell, dims, last, values }
     }
 
@@ -50,17 +54,12 @@ impl<const D: usize> Grid<D> {
 
     fn of_cells(low: [f32; D], high: [f32; D], cell: f32) -> Self {
         let side = |c: usize| (((high[c] - low[c]) / cell).ceil() as usize).clamp(1, 1 << 20);
-        let dims: [usize; D] = std::array::from_fn(side);
-        Self::new(low, cell, dims, vec![0.0; dims.iter().product()])
+        Self::even(low, cell, std::array::from_fn(side), 0.0)
     }
 
     /// Returns the sides of the box, in whole cells.
     pub(crate) fn sides(&self) -> [f32; D] {
         self.dims.map(|n| n as f32 * self.cell)
-    }
-
-    pub(crate) fn cell(&self) -> f32 {
-        self.cell
     }
 
     pub(crate) fn volume(&self) -> f32 {
@@ -158,29 +157,32 @@ impl<const D: usize> Grid<D> {
         (from < to).then_some((from, to))
     }
 
-    /// Smooths with weights 1 2 1 along each axis, with neighbors `apart` cells away.
+    /// Smooths with weights 1 2 1 along each axis, with neighbors `apart` cells away; at the walls, values stay inside.
     pub(crate) fn smooth(&mut self, apart: usize) {
+        let mut out = vec![0.0; self.values.len()];
         let mut stride = 1;
-        let mut line = Vec::new();
-        for c in (0..D).rev() {
-            let n = self.dims[c];
-            let block = stride * n;
-            for start in (0..self.values.len()).step_by(block) {
-                for inner in 0..stride {
-                    let at = |i: usize| start + inner + i * stride;
-                    line.clear();
-                    line.extend((0..n).map(|i| self.values[at(i)]));
-                    for i in 0..n {
-                        let (before, after) =
-                            (line[i.saturating_sub(apart)], line[(i + apart).min(n - 1)]);
-                        self.values[at(i)] = 0.25 * (before + after) + 0.5 * line[i];
-                    }
+        for n in self.dims.into_iter().rev() {
+            let values = &self.values;
+            // Cells of one row have the same place along this axis, except along the last axis.
+            let row = if stride == 1 { n } else { stride };
+            let smooth = |(number, out): (usize, &mut [f32])| {
+                let start = number * row;
+                for (x, out) in out.iter_mut().enumerate() {
+                    let (at, i) = (start + x, if stride == 1 { x } else { number % n });
+                    let before = values[at - i.min(apart) * stride];
+                    let after = values[at + (n - 1 - i).min(apart) * stride];
+                    *out = 0.25 * (before + after) + 0.5 * values[at];
                 }
-            }
-            stride = block;
+            };
+            out.par_chunks_mut(row).enumerate().with_min_len(ROWS).for_each(smooth);
+            std::mem::swap(&mut self.values, &mut out);
+            stride *= n;
         }
     }
 }
+
+/// Least number of rows of cells per parallel task.
+const ROWS: usize = 64;
 
 // The density of estimates: `p_random` of joint recovery.
 
