@@ -24,7 +24,7 @@ use crate::recover::map::family::Family;
 use crate::recover::map::graph::record_of;
 use crate::recover::map::lines::{LANES, Lanes, ln};
 use crate::recover::map::lists::CHUNK;
-use crate::recover::map::places::{Places, along_curve, distance2};
+use crate::recover::map::places::{along_curve, distance2};
 use crate::recover::problem::Problem;
 use crate::recover::result::{Estimate, Status};
 use crate::seed::{Draws, Stage};
@@ -124,7 +124,7 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
                 iteration,
             };
             let moves = |slot: &u32| slot % 2 == half && radius[*slot as usize] > 0.0;
-            let order = along_curve(&Places::new(&estimates));
+            let order = along_curve(&estimates);
             let moving: Vec<u32> = order.into_iter().filter(moves).collect();
             let moved: Vec<Vec<Best<D>>> = moving
                 .par_chunks(CHUNK)

@@ -63,6 +63,12 @@ pub(crate) fn stored_support(count: u32) -> u16 {
 }
 
 impl<const D: usize> Estimate<D> {
+    /// Whether the slot has a position.
+    #[inline(always)]
+    pub(crate) fn is_known(&self) -> bool {
+        self.status == Status::Ok
+    }
+
     /// Creates the estimate of a slot that was not recovered.
     pub fn lost(status: Status) -> Self {
         Self { position: [f32::NAN; D], status, support: 0, axis: 0, evidence: 0.0 }

@@ -210,7 +210,7 @@ impl<const D: usize> Places<D> {
             None => lost(),
         };
         let estimates: Vec<Estimate<D>> = beliefs.iter().map(estimate).collect();
-        let order = along_curve(&crate::recover::map::places::Places::new(&estimates));
+        let order = along_curve(&estimates);
         Some(Self { places, offsets, slot, width, typical, order })
     }
 

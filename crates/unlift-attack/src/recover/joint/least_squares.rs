@@ -3,7 +3,7 @@
 use crate::recover::joint::votes::Columns;
 use crate::recover::map::family::{Family, Piece};
 use crate::recover::map::lines::{LANES, Lanes, fill};
-use crate::recover::map::places::Places;
+use crate::recover::result::Estimate;
 
 /// Number of least-squares steps. The second one recomputes the weights.
 const STEPS: usize = 2;
@@ -83,13 +83,14 @@ impl<const D: usize> Sums<D> {
 #[inline(always)]
 pub(super) fn least_squares<const D: usize, F: Family<D>>(
     family: &F,
-    places: &Places<D>,
+    estimates: &[Estimate<D>],
     own: &Piece<D>,
     (near, directions): (&Columns<D>, &mut Directions<D>),
     mut x: [f32; D],
     at: impl Fn(&[f32; D]) -> (f32, (f32, f32), f32),
 ) -> ([f32; D], u32) {
-    let of = |slot: &u32| family.direction(*slot as usize, places.piece(*slot as usize));
+    let of =
+        |&slot: &u32| family.direction(slot as usize, usize::from(estimates[slot as usize].axis));
     fill(directions, &near.slot, of);
     directions.iter_mut().for_each(|column| column.resize(near.odds.len(), 0.0));
     let mut records = 0;

@@ -15,11 +15,10 @@
 //! region of its own; it is 1 for other records. Where wrong entries form clusters, the sums of forward and of reverse
 //! edges may differ only up to a bound (`votes`).
 //!
-//! A slot *jumps* if it moves farther than one radius, which holds half of the true neighbors, or if its status changes. A slot whose
-//! best candidate leads by a clear margin is updated again only after enough neighbors have jumped nearby. `odds`,
+//! A slot *jumps* if it moves farther than one radius, which holds half of the true neighbors, or if its status changes. `odds`,
 //! `p_true` and `p_random` are learned from the current estimates (`neighbor_distribution`, `map::grid`), and again after
 //! enough slots have jumped. Iterations end when few slots jump, when the number of jumps hardly falls, when fewer records pass
-//! near the estimates than before, or after 16 iterations (`state`).
+//! near the estimates than before, or after 16 iterations.
 //!
 //! All slots of a turn read the old estimates, so the result depends neither on order nor on threads. If all slots moved in one
 //! turn, two neighbors could exchange places forever. So even and odd slots take turns. Only the first iteration moves all
@@ -27,37 +26,151 @@
 
 mod least_squares;
 mod neighbor_distribution;
-mod state;
 mod update;
 mod votes;
 
-use crate::recover::joint::state::State;
+use rayon::prelude::*;
+
+use crate::recover::joint::neighbor_distribution::NeighborDistribution;
+use crate::recover::joint::update::{Context, Scratch};
 use crate::recover::map::family::Family;
-use crate::recover::map::places::along_curve;
+use crate::recover::map::graph::record_of;
+use crate::recover::map::grid::Density;
+use crate::recover::map::lists::CHUNK;
+use crate::recover::map::places::{along_curve, distance2};
 use crate::recover::problem::Problem;
 use crate::recover::result::Estimate;
+use crate::simd::{Kernel, dispatch};
 
 const ITERATIONS: usize = 16;
+/// Least radius, as a fraction of the largest coordinate: estimates of the same place differ by rounding.
+const ROUNDING: f32 = 8.0 * f32::EPSILON;
+/// Smoothing width of the density of estimates, in radii: wide, so that a few estimates at one place hardly change it.
+const SMOOTH: f32 = 4.5;
+/// Iterations end when fewer than this fraction of the slots jump.
+const SETTLED: f64 = 0.03;
+/// Distribution and density are learned again after more than this fraction of the slots have jumped. Learning once per
+/// iteration makes maps of paired lines and of planes worse.
+const STALE: f64 = 0.02;
+/// Iterations end when fewer than half of the slots jump, but more than this fraction of the number in the iteration before.
+/// Both numbers count all jumps, whichever slots they are of.
+const SLOW: f64 = 0.9;
+/// Iterations end when agreement falls by more than this fraction of its best value; smaller changes are noise.
+const WORSE: f64 = 0.08;
+/// Number of slots on which agreement is measured.
+const AGREEMENT_SLOTS: usize = 1 << 12;
 
 /// Returns the estimates of all slots after joint recovery from `start`.
 pub(super) fn recover<const D: usize, F: Family<D>>(
     problem: &Problem<'_, D, F>,
     start: Vec<Estimate<D>>,
 ) -> Vec<Estimate<D>> {
-    let mut state = State::new(problem, start);
-    let order = along_curve(state.places());
+    let n = start.len();
+    let order = along_curve(&start);
+    let known = start.iter().filter(|estimate| estimate.is_known());
+    let farthest = known.flat_map(|e| e.position).fold(0.0, |most: f32, x| most.max(x.abs()));
+    let least_radius = (ROUNDING * farthest).max(f32::MIN_POSITIVE);
+    let learn = |estimates: &[Estimate<D>], radius: f32| {
+        let density = Density::new(estimates, &problem.listed, SMOOTH * radius);
+        let neighbors =
+            NeighborDistribution::learn(problem, estimates, &density, radius, least_radius);
+        (density, neighbors)
+    };
+    let (mut density, mut neighbors) = learn(&start, F::MOST_RADIUS * problem.delta);
+    let (mut accepted, mut estimates) = (start.clone(), start);
+    // As if all slots had jumped before.
+    let (mut n_before, mut n_since_learning, mut best_agreement) = (n, 0, f64::NEG_INFINITY);
     for iteration in 0..ITERATIONS {
         let groups = if iteration == 0 { 1 } else { 2 };
+        let mut n_jumped = 0;
         for group in 0..groups {
-            state.learn_if_stale(problem);
-            let is_moving = |slot: &u32| *slot as usize % groups == group;
-            let slots = order.iter().copied().filter(is_moving);
-            let updates = state.propose_score_refine(problem, slots);
-            state.apply(problem, &updates);
+            if n_since_learning as f64 > STALE * n as f64 {
+                (density, neighbors) = learn(&estimates, neighbors.radius);
+                n_since_learning = 0;
+            }
+            let moves = |slot: &u32| *slot as usize % groups == group;
+            let slots: Vec<u32> = order.iter().copied().filter(moves).collect();
+            let context = Context::new(problem, &estimates, &density, &neighbors);
+            let moved: Vec<Vec<Estimate<D>>> = slots
+                .par_chunks(CHUNK)
+                .map_init(Scratch::default, |scratch, slots| {
+                    dispatch(Chunk { context: &context, slots, scratch })
+                })
+                .collect();
+            for (&slot, new) in slots.iter().zip(moved.iter().flatten()) {
+                let old = std::mem::replace(&mut estimates[slot as usize], *new);
+                let far = distance2(&old.position, &new.position) > neighbors.radius.powi(2);
+                n_jumped += usize::from(far || old.status != new.status);
+                n_since_learning += usize::from(far || old.status != new.status);
+            }
         }
-        if state.has_converged(problem) {
+        if (n_jumped as f64) < SETTLED * n as f64 {
+            // So few jumps hardly change agreement.
+            return estimates;
+        }
+        let agreement = agreement(problem, &estimates);
+        if agreement < (1.0 - WORSE) * best_agreement {
             break;
         }
+        best_agreement = best_agreement.max(agreement);
+        accepted.clone_from(&estimates);
+        if 2 * n_jumped < n && n_jumped as f64 > SLOW * n_before as f64 {
+            break;
+        }
+        n_before = n_jumped;
     }
-    state.into_accepted()
+    accepted
+}
+
+struct Chunk<'a, 'b, const D: usize, F: Family<D>> {
+    context: &'a Context<'b, D, F>,
+    slots: &'a [u32],
+    scratch: &'a mut Scratch<D>,
+}
+
+impl<const D: usize, F: Family<D>> Kernel for Chunk<'_, '_, D, F> {
+    type Output = Vec<Estimate<D>>;
+
+    #[inline(always)]
+    fn run(self) -> Vec<Estimate<D>> {
+        let Self { context, slots, scratch } = self;
+        let mut moved = Vec::with_capacity(slots.len());
+        for &slot in slots {
+            moved.push(context.solve(slot as usize, scratch));
+        }
+        moved
+    }
+}
+
+/// Returns the mean number of records at the ends of a slot's edges that pass within delta of its estimate, minus the number
+/// expected by chance.
+///
+/// Agreement is measured on records, because neighboring estimates can drift together and still agree with each other.
+fn agreement<const D: usize, F: Family<D>>(
+    problem: &Problem<'_, D, F>,
+    estimates: &[Estimate<D>],
+) -> f64 {
+    let Problem { family, graph, delta, .. } = problem;
+    let of_slot = |&slot: &usize| {
+        let estimate = &estimates[slot];
+        if !estimate.is_known() {
+            return 0.0;
+        }
+        let (mut near, mut all) = (0u32, 0u32);
+        for &end in graph.of(slot).0 {
+            let record = record_of(end as usize, family.slots_per_record());
+            if family.may_vote(slot, record) {
+                let d2 = family.record_distance2(record, &estimate.position);
+                all += 1;
+                near += u32::from(d2 <= delta * delta);
+            }
+        }
+        let chance = family.record_chance(slot, &estimate.position, &problem.at_delta);
+        f64::from(near) - f64::from(all) * f64::from(chance)
+    };
+    let n = estimates.len();
+    let slots: Vec<usize> = (0..n).step_by(n.div_ceil(AGREEMENT_SLOTS).max(1)).collect();
+    let parts: Vec<f64> =
+        slots.par_chunks(256).map(|part| part.iter().map(of_slot).sum()).collect();
+    parts.iter().sum::<f64>() / slots.len().max(1) as f64
 }

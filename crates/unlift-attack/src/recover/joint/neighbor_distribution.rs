@@ -9,8 +9,9 @@ use rayon::prelude::*;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::{CLASSES, Side, either, side};
 use crate::recover::map::grid::Density;
-use crate::recover::map::places::{Places, distance2};
+use crate::recover::map::places::{distance2, nearest2};
 use crate::recover::problem::{Problem, RANDOM, Sampled};
+use crate::recover::result::Estimate;
 use crate::simd::{Kernel, dispatch};
 
 /// True neighbors are counted within this many radii, which hold nearly all of them.
@@ -53,16 +54,16 @@ pub(super) struct NeighborDistribution {
 }
 
 impl NeighborDistribution {
-    /// Learns the distribution from `places`. Neighbors are counted within [`REACH`] times `radius`; the learned radius is at
+    /// Learns the distribution from `estimates`. Neighbors are counted within [`REACH`] times `radius`; the learned radius is at
     /// least `least_radius`.
     pub(super) fn learn<const D: usize, F: Family<D>>(
         problem: &Problem<'_, D, F>,
-        places: &Places<D>,
+        estimates: &[Estimate<D>],
         density: &Density<D>,
         radius: f32,
         least_radius: f32,
     ) -> Self {
-        let learning = Learning { problem, places, density, reach: REACH * radius };
+        let learning = Learning { problem, estimates, density, reach: REACH * radius };
         let part = |rows: &[Sampled]| dispatch(Part { rows, learning: &learning });
         let parts: Vec<Tally> = problem.sample.par_chunks(PART).map(part).collect();
         let mut total = Tally::default();
@@ -89,7 +90,7 @@ impl NeighborDistribution {
 
 struct Learning<'a, const D: usize, F: Family<D>> {
     problem: &'a Problem<'a, D, F>,
-    places: &'a Places<D>,
+    estimates: &'a [Estimate<D>],
     density: &'a Density<D>,
     /// True neighbors are counted within this many local widths.
     reach: f32,
@@ -105,11 +106,11 @@ impl<const D: usize, F: Family<D>> Learning<'_, D, F> {
     fn count(&self, Sampled { slot, random }: &Sampled, tally: &mut Tally) {
         let slots_per_record = self.problem.family.slots_per_record();
         let (ends, class) = self.problem.graph.of(*slot);
-        let x = self.places.of(*slot);
+        let x = self.estimates[*slot].position;
         let reach = self.reach_at(&x);
         let (reach2, scale) = (reach * reach, BINS as f32 / reach);
         let close = |end: u32, class: u8| {
-            let (d2, _) = self.places.nearest(end, either(class, slots_per_record), &x);
+            let d2 = nearest2(self.estimates, end, either(class, slots_per_record), &x);
             (d2 < reach2).then(|| ((d2.sqrt() * scale) as usize).min(BINS - 1))
         };
         let mut n_mutual = 0;
@@ -143,11 +144,11 @@ impl<const D: usize, F: Family<D>> Learning<'_, D, F> {
     /// Uniformly wrong entries stand alone. Records with similar descriptors are wrong together: a list with one of them holds
     /// others beside it, so that their place gathers as much evidence as the right one. But those records do not list back.
     fn most_imbalance(&self) -> f32 {
-        let places = self.places;
+        let place = |slot: usize| self.estimates[slot].position;
         let (mut entries, mut beside) = (0.0, 0.0);
         let mut own = Vec::new();
         for Sampled { slot, random } in self.problem.sample.iter().step_by(EVERY) {
-            if !places.is_known(*slot) {
+            if !self.estimates[*slot].is_known() {
                 continue;
             }
             let (ends, class) = self.problem.graph.of(*slot);
@@ -156,18 +157,18 @@ impl<const D: usize, F: Family<D>> Learning<'_, D, F> {
             own.extend(
                 edges.filter(|(_, class)| side(**class) == Side::Forward).map(|(end, _)| *end),
             );
-            let x = places.of(*slot);
+            let x = place(*slot);
             for &entry in own.iter().step_by(own.len().div_ceil(ENTRIES).max(1)) {
                 entries += 1.0;
-                if !places.is_known(entry as usize) {
+                if !self.estimates[entry as usize].is_known() {
                     continue;
                 }
-                let y = places.of(entry as usize);
+                let y = place(entry as usize);
                 let reach = self.reach_at(&y);
                 if distance2(&x, &y) <= ELSEWHERE * ELSEWHERE * reach * reach {
                     continue;
                 }
-                let is_beside = |end: u32| distance2(&places.of(end as usize), &y) < reach * reach;
+                let is_beside = |end: u32| distance2(&place(end as usize), &y) < reach * reach;
                 let found = own.iter().filter(|&&end| end != entry && is_beside(end)).count();
                 let by_chance = random.iter().filter(|(end, _)| is_beside(*end)).count();
                 beside += found as f64 - (own.len() - 1) as f64 / RANDOM as f64 * by_chance as f64;
@@ -200,7 +201,7 @@ impl<const D: usize, F: Family<D>> Kernel for Part<'_, D, F> {
     #[inline(always)]
     fn run(self) -> Tally {
         let mut tally = Tally::default();
-        for row in self.rows.iter().filter(|row| self.learning.places.is_known(row.slot)) {
+        for row in self.rows.iter().filter(|row| self.learning.estimates[row.slot].is_known()) {
             self.learning.count(row, &mut tally);
         }
         tally

@@ -8,12 +8,12 @@ use crate::recover::map::graph::{CLASSES, either, record_of};
 use crate::recover::map::grid::Density;
 use crate::recover::map::lines::ln;
 use crate::recover::map::lists::found;
-use crate::recover::map::places::{Places, distance2};
+use crate::recover::map::places::{distance2, nearest2};
 use crate::recover::problem::Problem;
 use crate::recover::result::{Estimate, Status};
 
 /// Estimates farther from a piece than this many radii are ignored.
-pub(super) const TUBE: f32 = 6.0;
+const TUBE: f32 = 6.0;
 /// Estimates within this many radii of the center of a ray are ignored: they are close to all rays of that center, so that a few
 /// wrong ones would draw many slots there.
 const CENTER_RADIUS: f32 = 3.0;
@@ -31,16 +31,13 @@ const TIE_MARGIN: f32 = 8.0;
 const WRONG_ESTIMATES: f32 = 0.2;
 /// Weight of the density prior. It is below 1 because candidates are estimates, which already lie where density is large.
 const PRIOR: f32 = 0.5;
-/// Largest number of places (8 MB) that stay in the cache and need no prefetching.
-const CACHED: usize = 1 << 19;
-
 pub(super) struct Context<'a, const D: usize, F: Family<D>> {
-    pub(super) problem: &'a Problem<'a, D, F>,
-    pub(super) places: &'a Places<D>,
-    pub(super) density: &'a Density<D>,
-    pub(super) neighbors: &'a NeighborDistribution,
+    problem: &'a Problem<'a, D, F>,
+    estimates: &'a [Estimate<D>],
+    density: &'a Density<D>,
+    neighbors: &'a NeighborDistribution,
     /// Per class, see [`Odds::of_class`].
-    pub(super) odds: [(f32, f32); CLASSES],
+    odds: [(f32, f32); CLASSES],
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -67,29 +64,24 @@ impl<const D: usize> Default for Scratch<D> {
     }
 }
 
-impl<const D: usize, F: Family<D>> Context<'_, D, F> {
-    /// Prefetches the places that [`solve`](Self::solve) reads.
-    #[inline(always)]
-    pub(super) fn prefetch(&self, slot: usize) {
-        if self.places.len() > CACHED {
-            // The other slot of a record is next to the one in the edge.
-            let ends = self.problem.graph.of(slot).0.iter();
-            ends.for_each(|&end| self.places.prefetch(end as usize));
-        }
+impl<'a, const D: usize, F: Family<D>> Context<'a, D, F> {
+    pub(super) fn new(
+        problem: &'a Problem<'a, D, F>,
+        estimates: &'a [Estimate<D>],
+        density: &'a Density<D>,
+        neighbors: &'a NeighborDistribution,
+    ) -> Self {
+        let odds = neighbors.odds_of_slot(problem.family.slots_per_record());
+        Self { problem, estimates, density, neighbors, odds }
     }
 
-    /// Returns the new estimate of `slot` and its margin in nats, see [`Update::margin`](super::state::Update). Without nearby
-    /// estimates it returns the old estimate and 0.
+    /// Returns the new estimate of `slot`; the old one without nearby estimates.
     #[inline(always)]
-    pub(super) fn solve(
-        &self,
-        slot: usize,
-        old: &Estimate<D>,
-        scratch: &mut Scratch<D>,
-    ) -> (Estimate<D>, f32) {
+    pub(super) fn solve(&self, slot: usize, scratch: &mut Scratch<D>) -> Estimate<D> {
+        let old = &self.estimates[slot];
         let Problem { family, graph, .. } = *self.problem;
         scratch.candidates.clear();
-        scratch.all.gather(graph.of(slot), self.places, family.slots_per_record());
+        scratch.all.gather(graph.of(slot), self.estimates, family.slots_per_record());
         let (reach, center_radius) =
             (TUBE * self.neighbors.radius, CENTER_RADIUS * self.neighbors.radius);
         let odds = self.odds(slot);
@@ -98,13 +90,13 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
             scratch.all.near(&own, reach, center_radius, &odds, &mut scratch.near[piece]);
             self.propose(&own, (slot, piece), old, scratch);
         }
-        let Some((first, margin)) = self.winner(slot, &scratch.candidates) else {
-            return (*old, 0.0);
+        let Some(first) = self.winner(slot, &scratch.candidates) else {
+            return *old;
         };
         let own = family.piece(slot, first.piece);
         let near = &mut scratch.near[first.piece];
         if near.len() == 0 {
-            return (*old, 0.0);
+            return *old;
         }
         let at = |x: &[f32; D]| {
             let density = self.density.at(x);
@@ -114,18 +106,18 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
             (1.0 / (reach * reach), self.distribution(density), half_weight_ratio)
         };
         let near = (&*near, &mut scratch.directions);
-        let (x, support) = least_squares(family, self.places, &own, near, first.x, at);
+        let (x, support) = least_squares(family, self.estimates, &own, near, first.x, at);
         if !x.iter().all(|c| c.is_finite()) {
-            return (*old, 0.0);
+            return *old;
         }
-        (found(x, support, first.piece, (first.score - first.prior).max(0.0)), margin)
+        found(x, support, first.piece, (first.score - first.prior).max(0.0))
     }
 
     #[inline(always)]
     fn odds(&self, slot: usize) -> Odds<'_, D> {
         let (of_class, other) = (&self.odds, slot ^ 1);
-        if self.problem.family.slots_per_record() == 2 && self.places.is_known(other) {
-            let partner = self.places.of(other);
+        if self.problem.family.slots_per_record() == 2 && self.estimates[other].is_known() {
+            let partner = self.estimates[other].position;
             let (gain, inverse_a2) = self.distribution(self.density.at(&partner));
             return Odds { of_class, partner, gain, inverse_a2 };
         }
@@ -197,9 +189,9 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         }
     }
 
-    /// Returns the best candidate and its margin. If the second best is close, the records decide between the two.
+    /// Returns the best candidate. If the second best is close, the records decide between the two.
     #[inline(always)]
-    fn winner(&self, slot: usize, candidates: &[Candidate<D>]) -> Option<(Candidate<D>, f32)> {
+    fn winner(&self, slot: usize, candidates: &[Candidate<D>]) -> Option<Candidate<D>> {
         let mut best = *candidates.first()?;
         for candidate in &candidates[1..] {
             if candidate.score > best.score {
@@ -213,17 +205,11 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
                 second = Some(*candidate);
             }
         }
-        let Some(second) = second else {
-            return Some((best, best.score - best.prior));
+        let Some(second) = second.filter(|second| best.score - second.score < TIE_MARGIN) else {
+            return Some(best);
         };
-        let margin = best.score - second.score;
-        if margin < TIE_MARGIN {
-            let [of_best, of_second] = self.record_scores(slot, [best.x, second.x]);
-            if second.score + of_second > best.score + of_best {
-                return Some((second, 0.0));
-            }
-        }
-        Some((best, margin))
+        let [of_best, of_second] = self.record_scores(slot, [best.x, second.x]);
+        Some(if second.score + of_second > best.score + of_best { second } else { best })
     }
 
     /// Returns what records add to the scores of two places: records pass within delta, but their estimates may be elsewhere.
@@ -248,7 +234,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
                 let ((gain, inverse_a2), chance) = at[i];
                 let odds = self.neighbors.odds[usize::from(class)];
                 let either = either(class, slots_per_record);
-                let q = 1.0 / (1.0 + self.places.nearest(end, either, x).0 * inverse_a2);
+                let q = 1.0 / (1.0 + nearest2(self.estimates, end, either, x) * inverse_a2);
                 let by_estimate = 1.0 + odds * gain * q * q * q;
                 sums[i] += ln(1.0 + WRONG_ESTIMATES * odds / chance / by_estimate);
             }

@@ -3,7 +3,8 @@
 use crate::recover::map::family::Piece;
 use crate::recover::map::graph::{CLASSES, Side, either, side};
 use crate::recover::map::lines::{LANES, Lanes, ln};
-use crate::recover::map::places::{Places, UNKNOWN_COORDINATE, distance2};
+use crate::recover::map::places::distance2;
+use crate::recover::result::Estimate;
 
 /// Coordinate of padding: beyond any reach, and finite when squared.
 const PADDING_COORDINATE: f32 = 1e19;
@@ -42,7 +43,7 @@ impl<const D: usize> Ends<D> {
     pub(super) fn gather(
         &mut self,
         (ends, class): (&[u32], &[u8]),
-        places: &Places<D>,
+        estimates: &[Estimate<D>],
         slots_per_record: usize,
     ) {
         let most = slots_per_record * ends.len();
@@ -52,7 +53,7 @@ impl<const D: usize> Ends<D> {
         let mut n = 0;
         for (&end, &class) in ends.iter().zip(class) {
             let mut set = |i: usize, slot: u32| {
-                let x = places.of(slot as usize);
+                let x = estimates[slot as usize].position;
                 for c in 0..D {
                     columns[c][i] = x[c];
                 }
@@ -97,9 +98,8 @@ impl<const D: usize> Ends<D> {
         let apart2 = &mut self.apart2[..n];
         for i in 0..n {
             let x: [f32; D] = std::array::from_fn(|c| columns[c][i]);
-            // A very large delta would reach even slots without an estimate.
-            let d2 = distance2(&x, &piece.project(&x));
-            apart2[i] = if x[0] == UNKNOWN_COORDINATE { f32::INFINITY } else { d2 };
+            // A lost estimate is not near, because its distance is no number.
+            apart2[i] = distance2(&x, &piece.project(&x));
         }
         if piece.from_center {
             for i in 0..n {

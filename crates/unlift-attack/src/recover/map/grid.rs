@@ -3,7 +3,8 @@
 use rayon::prelude::*;
 
 use crate::recover::map::graph::record_of;
-use crate::recover::map::places::Places;
+use crate::recover::map::places::{box_of_most, sample};
+use crate::recover::result::Estimate;
 
 /// Cubic cells over a box. Places outside belong to the nearest cell.
 #[derive(Clone, Debug)]
@@ -202,18 +203,18 @@ const WIDER: usize = 3;
 const WIDEST: f32 = 2.5;
 
 impl<const D: usize> Density<D> {
-    /// Computes the density of `places`, smoothed over about `radius`; `listed` is the number of edges to each record.
-    pub(crate) fn new(places: &Places<D>, listed: &[u32], radius: f32) -> Self {
-        let n = places.len();
-        let (low, high) = places.trimmed_box();
+    /// Computes the density of `estimates`, smoothed over about `radius`; `listed` is the number of edges to each record.
+    pub(crate) fn new(estimates: &[Estimate<D>], listed: &[u32], radius: f32) -> Self {
+        let n = estimates.len();
+        let (low, high) = box_of_most(estimates);
         let mut grid = Grid::with_cell(low, high, radius * CELL, (4 * n).max(1 << 16));
         let slots_per_record = n / listed.len().max(1);
         let mut weight = 0.0f64;
-        for slot in 0..n {
+        for (slot, estimate) in estimates.iter().enumerate() {
             let times = listed[record_of(slot, slots_per_record)] as f32;
             weight += f64::from(times);
-            if places.is_known(slot) {
-                grid.spread(&places.of(slot), times);
+            if estimate.is_known() {
+                grid.spread(&estimate.position, times);
             }
         }
         grid.smooth(1);
@@ -225,7 +226,7 @@ impl<const D: usize> Density<D> {
         for value in &mut grid.values {
             *value = value.max(least) * scale;
         }
-        let mut sample: Vec<f32> = places.sample().map(|x| grid.at(&x)).collect();
+        let mut sample: Vec<f32> = sample(estimates).map(|x| grid.at(&x)).collect();
         let middle = sample.len() / 2;
         let typical = match sample.is_empty() {
             true => scale,
