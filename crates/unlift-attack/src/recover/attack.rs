@@ -9,7 +9,6 @@ use crate::recover::baselines::ransac;
 use crate::recover::map::families::{CandidateFamily, LineFamily, PlaneFamily};
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
-use crate::recover::map::lists::Slots;
 use crate::recover::options::{Delta, RecoverOptions};
 use crate::recover::problem::Problem;
 use crate::recover::ranking;
@@ -120,9 +119,9 @@ impl<'a, const D: usize> Attack<'a, D> {
             let trials = Some(TrialHistogram::new(&trials));
             return Ok(recovered.with_trials(trials).without_confidence(Unknown::OtherSolver));
         }
+        let slots: Vec<usize> = (0..lists.n_slots()).collect();
         let settle = |estimates| exact::settle(released, estimates, delta);
-        let mut estimates =
-            consensus::solve(family, used, delta as f32, &Slots::all(lists.n_slots()));
+        let mut estimates = consensus::solve(family, used, delta as f32, &slots);
         if let Some(graph) = graph.as_ref().filter(|_| !self.only_starts) {
             let problem = Problem::new(family, (lists, graph), delta as f32, options.seed);
             estimates = settle(joint(&problem, estimates, &self.known));

@@ -1,5 +1,7 @@
 //! Exact consensus: on each slot's own record, the position whose agreement with the listed records is least probable by chance.
 
+use rayon::prelude::*;
+
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
 use crate::recover::anchors;
@@ -7,7 +9,7 @@ use crate::recover::map::chance::CandidateField;
 use crate::recover::map::families::LineFamily;
 use crate::recover::map::family::Family;
 use crate::recover::map::lines::{CandidateColumns, Intervals, LineColumns, Sections};
-use crate::recover::map::lists::{Slots, found, not_fixed, solve_chunks};
+use crate::recover::map::lists::{CHUNK, found, not_fixed};
 use crate::recover::map::planes::best_window;
 use crate::recover::result::{Estimate, Status, stored_support};
 use crate::released::AxisPlanes;
@@ -17,15 +19,16 @@ pub(crate) fn solve<const D: usize, F: Family<D>>(
     family: &F,
     lists: &Neighborhoods,
     delta: f32,
-    slots: &Slots,
+    slots: &[usize],
 ) -> Vec<Estimate<D>> {
     if let Some(rays) = family.anchored() {
         return anchors::start::solve(rays, lists, slots);
     }
     let at = &family.at_delta(delta);
-    solve_chunks(slots, Scratch::default, |scratch, first, out| {
-        dispatch(Chunk { family, lists, at: (delta, at), first, out, scratch });
-    })
+    let solve = |scratch: &mut Scratch<D>, slots| {
+        dispatch(Chunk { family, lists, at: (delta, at), slots, scratch })
+    };
+    slots.par_chunks(CHUNK).map_init(Scratch::default, solve).flatten_iter().collect()
 }
 
 /// Buffers of one thread.
@@ -53,28 +56,28 @@ impl<const D: usize> Default for Scratch<D> {
     }
 }
 
-/// Consecutive slots.
 struct Chunk<'a, const D: usize, F: Family<D>> {
     family: &'a F,
     lists: &'a Neighborhoods,
     at: (f32, &'a F::AtDelta),
-    first: usize,
-    out: &'a mut [Estimate<D>],
+    slots: &'a [usize],
     scratch: &'a mut Scratch<D>,
 }
 
 impl<const D: usize, F: Family<D>> Kernel for Chunk<'_, D, F> {
-    type Output = ();
+    type Output = Vec<Estimate<D>>;
 
     #[inline(always)]
-    fn run(self) {
-        let Self { family, lists, at, first, out, scratch } = self;
-        for (slot, estimate) in (first..).zip(out) {
-            if slot + 1 < lists.n_slots() {
-                lists.of(slot + 1).iter().for_each(|record| family.prefetch(record.index()));
+    fn run(self) -> Vec<Estimate<D>> {
+        let Self { family, lists, at, slots, scratch } = self;
+        let mut estimates = Vec::with_capacity(slots.len());
+        for (number, &slot) in slots.iter().enumerate() {
+            if let Some(&next) = slots.get(number + 1) {
+                lists.of(next).iter().for_each(|record| family.prefetch(record.index()));
             }
-            *estimate = family.consensus(slot, lists.of(slot), at, scratch);
+            estimates.push(family.consensus(slot, lists.of(slot), at, scratch));
         }
+        estimates
     }
 }
 

@@ -9,7 +9,7 @@ use crate::geometry::frame::Bounds;
 use crate::neighbors::Neighborhoods;
 use crate::recover::consensus;
 use crate::recover::map::family::Family;
-use crate::recover::map::lists::{CHUNK, Slots, mixed};
+use crate::recover::map::lists::{CHUNK, mixed};
 use crate::recover::map::places::trimmed;
 use crate::released::{Obfuscation, Released};
 use crate::seed::{Draws, Stage};
@@ -126,9 +126,8 @@ fn choose<const D: usize, F: Family<D>>(
     if lists.n_slots() == 0 || !(extent.is_finite() && extent > 0.0) {
         return None;
     }
-    let chunks = sample_chunks(lists.n_slots(), F::DELTA_CHUNKS, seed);
-    let slots = Slots::chunks(&chunks, lists.n_slots());
-    let mixed = mixed(lists, slots.iter(), family.slots_per_record());
+    let slots = sample(lists.n_slots(), F::DELTA_CHUNKS, seed);
+    let mixed = mixed(lists, &slots, family.slots_per_record());
     let mean_evidence = |lists: &Neighborhoods, delta: f64| {
         let solved = consensus::solve(family, lists, delta as f32, &slots);
         solved.iter().map(|e| f64::from(e.evidence)).sum::<f64>() / solved.len() as f64
@@ -190,15 +189,16 @@ fn edge(coarse: f64, value: &impl Fn(f64) -> f64) -> f64 {
     at(LOWEST)
 }
 
-fn sample_chunks(n_slots: usize, sample: usize, seed: u64) -> Vec<usize> {
-    let n_chunks = n_slots.div_ceil(CHUNK);
-    if n_chunks <= sample {
-        return (0..n_chunks).collect();
-    }
+/// Returns the slots of some chunks, in ascending order.
+fn sample(n_slots: usize, n_chunks: usize, seed: u64) -> Vec<usize> {
+    let all = n_slots.div_ceil(CHUNK);
     let mut draws = Draws::new(seed, Stage::DeltaSlots, 0);
-    let mut chunks: Vec<usize> =
-        (0..sample).map(|_| draws.below(n_chunks as u64) as usize).collect();
+    let mut chunks: Vec<usize> = match all <= n_chunks {
+        true => (0..all).collect(),
+        false => (0..n_chunks).map(|_| draws.below(all as u64) as usize).collect(),
+    };
     chunks.sort_unstable();
     chunks.dedup();
-    chunks
+    let slots = |chunk: usize| chunk * CHUNK..n_slots.min((chunk + 1) * CHUNK);
+    chunks.into_iter().flat_map(slots).collect()
 }

@@ -142,18 +142,7 @@ impl Unknown {
 
     /// Name in files.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::NotAsked => "not_asked",
-            Self::NotGiven => "not_given",
-            Self::OfImages => "images",
-            Self::OtherSolver => "other_solver",
-            Self::RankedLists => "ranked_lists",
-            Self::GivenLists => "given_lists",
-            Self::Flat => "flat",
-            Self::Coincident => "coincident",
-            Self::SmallMap => "small_map",
-            Self::NearEntries => "near_entries",
-        }
+        self.texts().0
     }
 
     /// Returns the reason called `name`.
@@ -163,25 +152,37 @@ impl Unknown {
 
     /// Returns the reason in words, to follow "not known here: ".
     pub fn reason(self) -> &'static str {
+        self.texts().1
+    }
+
+    fn texts(self) -> (&'static str, &'static str) {
         match self {
-            Self::NotAsked => "confidence was not requested",
-            Self::NotGiven => "the recovered points have no confidence values",
-            Self::OfImages => "the confidence model was fitted on maps and not tested on images",
-            Self::OtherSolver => "only the solver joint estimates confidence",
-            Self::RankedLists => {
-                "the confidence model was not fitted on lists that a source ranked"
+            Self::NotAsked => ("not_asked", "confidence was not requested"),
+            Self::NotGiven => ("not_given", "the recovered points have no confidence values"),
+            Self::OfImages => {
+                ("images", "the confidence model was fitted on maps and not tested on images")
             }
-            Self::GivenLists => "the confidence model was fitted on lists of the oracle only",
-            Self::Flat => "the confidence model was not fitted on flat or thin maps",
-            Self::Coincident => {
-                "the confidence model was not fitted on maps in which most points coincide"
+            Self::OtherSolver => ("other_solver", "only the solver joint estimates confidence"),
+            Self::RankedLists => (
+                "ranked_lists",
+                "the confidence model was not fitted on lists that a source ranked",
+            ),
+            Self::GivenLists => {
+                ("given_lists", "the confidence model was fitted on lists of the oracle only")
             }
-            Self::SmallMap => {
-                "the map is small: a list holds more than a hundredth of its points, and the confidence model was not fitted on such maps"
-            }
-            Self::NearEntries => {
-                "wrong entries of the lists are near, too, and the confidence model was not fitted on such lists"
-            }
+            Self::Flat => ("flat", "the confidence model was not fitted on flat or thin maps"),
+            Self::Coincident => (
+                "coincident",
+                "the confidence model was not fitted on maps in which most points coincide",
+            ),
+            Self::SmallMap => (
+                "small_map",
+                "the map is small: a list holds more than a hundredth of its points, and the confidence model was not fitted on such maps",
+            ),
+            Self::NearEntries => (
+                "near_entries",
+                "wrong entries of the lists are near, too, and the confidence model was not fitted on such lists",
+            ),
         }
     }
 }

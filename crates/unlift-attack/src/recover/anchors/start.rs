@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::neighbors::Neighborhoods;
 use crate::recover::map::lines::{LineRow, evidence};
-use crate::recover::map::lists::{Slots, found, mixed};
+use crate::recover::map::lists::{found, mixed};
 use crate::recover::result::{Estimate, Status};
 
 /// Slots with mixed lists, to measure evidence by chance: a mean over so many has an error of a few percent.
@@ -36,17 +36,18 @@ struct Window {
 pub(in crate::recover) fn solve<const D: usize>(
     rows: &[LineRow<D>],
     lists: &Neighborhoods,
-    slots: &Slots,
+    slots: &[usize],
 ) -> Vec<Estimate<D>> {
     let bearings = bearings(rows);
     let n = lists.n_slots();
     let windows: Vec<Option<Window>> =
         (0..n).into_par_iter().map(|slot| window(rows, &bearings, slot, lists)).collect();
     // The best of several windows has some evidence even by chance.
-    let sample = || (0..n).step_by(n.div_ceil(SAMPLE).max(1));
-    let mixed = mixed(lists, sample(), 1);
+    let sample: Vec<usize> = (0..n).step_by(n.div_ceil(SAMPLE).max(1)).collect();
+    let mixed = mixed(lists, &sample, 1);
+    let window_by_chance = |&slot: &usize| window(rows, &bearings, slot, &mixed);
     let by_chance: Vec<f32> =
-        sample().filter_map(|slot| Some(window(rows, &bearings, slot, &mixed)?.evidence)).collect();
+        sample.iter().filter_map(window_by_chance).map(|window| window.evidence).collect();
     let by_chance = CHANCE * by_chance.iter().sum::<f32>() / by_chance.len().max(1) as f32;
     let fractions = fractions_before(rows, lists, &bearings, &windows);
     let estimate = |slot: usize| {
@@ -60,7 +61,7 @@ pub(in crate::recover) fn solve<const D: usize>(
         let range = libm::powf(fraction, 1.0 / D as f32) * rows[slot].to;
         found(rows[slot].at(range), count, 0, excess)
     };
-    slots.iter().map(estimate).collect()
+    slots.iter().copied().map(estimate).collect()
 }
 
 /// Returns, per slot, the fraction of its ray's region before its point: the rank of its window among rays of similar bearing.

@@ -1,6 +1,4 @@
-//! Chunks of slots, and mixed lists, which measure chance.
-
-use rayon::prelude::*;
+//! Estimates from lists, and mixed lists, which measure chance.
 
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
@@ -8,31 +6,6 @@ use crate::recover::result::{Estimate, Status, stored_support};
 
 /// Slots per chunk: fixed, so that results do not depend on the number of threads.
 pub(crate) const CHUNK: usize = 64;
-
-/// The slots of a run, in chunks of [`CHUNK`]. Only the last chunk may be shorter.
-#[derive(Clone, Debug)]
-pub(crate) struct Slots {
-    /// First slot of each chunk.
-    firsts: Vec<usize>,
-    n: usize,
-}
-
-impl Slots {
-    pub(crate) fn all(n: usize) -> Self {
-        Self { n, firsts: (0..n).step_by(CHUNK).collect() }
-    }
-
-    /// Creates the slots of some `chunks`, in ascending order, of a map of `n_slots`.
-    pub(crate) fn chunks(chunks: &[usize], n_slots: usize) -> Self {
-        let firsts: Vec<usize> = chunks.iter().map(|chunk| chunk * CHUNK).collect();
-        let n = firsts.iter().map(|first| CHUNK.min(n_slots - first)).sum();
-        Self { firsts, n }
-    }
-
-    pub(crate) fn iter(&self) -> impl Iterator<Item = usize> {
-        self.firsts.iter().flat_map(|&first| first..first + CHUNK).take(self.n)
-    }
-}
 
 pub(crate) fn found<const D: usize>(
     position: [f32; D],
@@ -49,20 +22,6 @@ pub(crate) fn not_fixed<const D: usize>(n: usize) -> Estimate<D> {
     Estimate::lost(if n < 2 { Status::TooFewNeighbors } else { Status::Degenerate })
 }
 
-/// Calls `solve(scratch, first slot, estimates)` for every chunk; returns the estimates in order of `slots`.
-pub(crate) fn solve_chunks<const D: usize, S: Send>(
-    slots: &Slots,
-    scratch: impl Fn() -> S + Sync + Send,
-    solve: impl Fn(&mut S, usize, &mut [Estimate<D>]) + Sync + Send,
-) -> Vec<Estimate<D>> {
-    let mut estimates = vec![Estimate::lost(Status::NoSupport); slots.n];
-    estimates
-        .par_chunks_mut(CHUNK)
-        .zip(&slots.firsts)
-        .for_each_init(scratch, |scratch, (out, &first)| solve(scratch, first, out));
-    estimates
-}
-
 /// Distance between the entries of a mixed list, as a fraction of all entries. The golden section spreads them evenly, so that
 /// no two come from one list.
 const SPREAD: f64 = 0.618_033_988_749_895;
@@ -72,12 +31,12 @@ const TRIES: usize = 8;
 /// Returns lists without information for some `slots` (ascending): as long as their own lists, but with entries of other lists.
 pub(crate) fn mixed(
     lists: &Neighborhoods,
-    slots: impl Iterator<Item = usize>,
+    slots: &[usize],
     slots_per_record: usize,
 ) -> Neighborhoods {
     let step = (lists.records().len() as f64 * SPREAD) as usize;
     let (mut offsets, mut records) = (vec![0], Vec::<RecordId>::new());
-    for slot in slots {
+    for &slot in slots {
         let first = records.len();
         offsets.resize(slot + 1, first as u64);
         let len = lists.of(slot).len();
