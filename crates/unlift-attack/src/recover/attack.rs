@@ -14,7 +14,7 @@ use crate::recover::problem::Problem;
 use crate::recover::ranking;
 use crate::recover::result::{Estimate, Recovered, TrialHistogram, Unknown};
 use crate::recover::solver::Builtin;
-use crate::recover::{anchors, beliefs, confidence, consensus, delta, exact, joint, placement};
+use crate::recover::{anchors, beliefs, confidence, consensus, delta, exact, joint, records_alone};
 use crate::released::{Obfuscation, Released};
 
 /// Number of joint recoveries from known positions, each after the known ones are put back. With eight instead of three, `dcl2d` on
@@ -87,8 +87,10 @@ impl<'a, const D: usize> Attack<'a, D> {
         let Self { released, lists, .. } = *self;
         released.fingerprint().expect(lists.about().map)?;
         match (self.solver, released.obfuscation()) {
-            (Builtin::Density, _) => placement::recover(released, lists, &published(released)),
-            (Builtin::Tomography, _) => placement::recover(released, lists, &tomography(released)),
+            (Builtin::Density, _) => records_alone::at_peaks(released, lists, &published(released)),
+            (Builtin::Tomography, _) => {
+                records_alone::at_peaks(released, lists, &tomography(released))
+            }
             (_, Obfuscation::Lines(_)) => self.run_on(&LineFamily::new(released, lists, false)),
             (_, Obfuscation::Rays(rays)) => {
                 self.run_on(&LineFamily::new(released, lists, rays.regions().is_some()))

@@ -9,7 +9,7 @@ use crate::recover::map::chance::CandidateField;
 use crate::recover::map::families::LineFamily;
 use crate::recover::map::family::Family;
 use crate::recover::map::lines::{CandidateColumns, Intervals, LineColumns, Sections};
-use crate::recover::map::lists::{CHUNK, found, not_fixed};
+use crate::recover::map::places::CHUNK;
 use crate::recover::map::planes::best_window;
 use crate::recover::result::{Estimate, Status, stored_support};
 use crate::released::AxisPlanes;
@@ -29,6 +29,11 @@ pub(crate) fn solve<const D: usize, F: Family<D>>(
         dispatch(Chunk { family, lists, at: (delta, at), slots, scratch })
     };
     slots.par_chunks(CHUNK).map_init(Scratch::default, solve).flatten_iter().collect()
+}
+
+/// Creates the estimate of a slot whose neighbors do not fix a point; `n` of them may vote.
+fn not_fixed<const D: usize>(n: usize) -> Estimate<D> {
+    Estimate::lost(if n < 2 { Status::TooFewNeighbors } else { Status::Degenerate })
 }
 
 /// Buffers of one thread.
@@ -103,7 +108,7 @@ pub(crate) fn on_line<const D: usize>(
         return Estimate::lost(Status::NoSupport);
     };
     let (t, support) = refit(sections, peak.t, delta2);
-    found(own.at(own.clamp(t)), support, 0, peak.evidence)
+    Estimate::at(own.at(own.clamp(t)), support, 0, peak.evidence)
 }
 
 /// Returns the best estimate on any axis line of a slot from the gathered records. Axes are compared by evidence, not by counts: along
@@ -135,7 +140,7 @@ pub(crate) fn on_candidates<const D: usize>(
             let (t, support) = refit(sections, peak.t, delta2);
             let mut position = *own;
             position[axis] = t;
-            best = found(position, support, axis, peak.evidence);
+            best = Estimate::at(position, support, axis, peak.evidence);
         }
     }
     best
@@ -165,7 +170,7 @@ pub(crate) fn on_plane<const D: usize>(
 ) -> Estimate<D> {
     gather_planes(planes, listed, by_axis);
     let own = usize::from(planes.axis()[slot]);
-    let mut estimate = found([0.0; D], 0, 0, 0.0);
+    let mut estimate = Estimate::at([0.0; D], 0, 0, 0.0);
     for (axis, of_axis) in by_axis.iter_mut().enumerate() {
         if axis == own {
             estimate.position[axis] = planes.offset()[slot];

@@ -8,8 +8,9 @@
 use crate::geometry::frame::Bounds;
 use crate::neighbors::Neighborhoods;
 use crate::recover::consensus;
+use crate::recover::map::chance::mixed;
 use crate::recover::map::family::Family;
-use crate::recover::map::lists::{CHUNK, mixed};
+use crate::recover::map::places::CHUNK;
 use crate::recover::map::places::trimmed;
 use crate::released::{Obfuscation, Released};
 use crate::seed::{Draws, Stage};

@@ -2,7 +2,7 @@
 //!
 //! Modules, in an order in which each imports mostly modules above it:
 //!
-//! 1. `options`: options of recovery. `assignment`: descriptors of paired lines. `result`: recovered positions. `solver`: the
+//! 1. `options`: options of recovery. `result`: recovered positions. `solver`: the
 //!    trait [`Solver`], which you can implement.
 //! 2. `map`: the data that all solvers read. `map/family.rs`: the trait of families of records, on which no step depends otherwise.
 //!    `problem`: what all steps of `joint` read.
@@ -14,7 +14,6 @@
 //! [`recover`] runs the whole attack.
 
 mod anchors;
-mod assignment;
 mod attack;
 mod baselines;
 mod beliefs;
@@ -25,7 +24,6 @@ mod exact;
 mod joint;
 pub(crate) mod map;
 mod options;
-mod placement;
 mod problem;
 mod ranking;
 mod records_alone;

@@ -1,12 +1,14 @@
 //! Attacks on the released records alone, without neighborhoods and descriptors.
 
-use crate::density::{Peaks, tomography};
+use rayon::prelude::*;
+
+use crate::density::{Peak, Peaks, tomography};
 use crate::neighbors::{Geometric, Neighborhoods, geometric_by};
 use crate::recover::attack::Attack;
 use crate::recover::baselines::density::published;
+use crate::recover::map::lines::rows_of;
 use crate::recover::options::{Delta, RecoverOptions};
-use crate::recover::placement::{Placement, delta};
-use crate::recover::result::Recovered;
+use crate::recover::result::{Estimate, Recovered, Status, Unknown, stored_support};
 use crate::recover::solver::Builtin;
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, RowOrder};
@@ -24,12 +26,15 @@ pub fn records_alone<const D: usize>(
     released: &Released<D>,
     options: &RecoverOptions,
 ) -> Result<Vec<(&'static str, Recovered<D>)>, Error> {
+    let none = Neighborhoods::unchecked(vec![0; released.n_slots() + 1], Vec::new());
+    // For paired lines, the order of the two points is unknown.
+    let none = none.with_about(About { order: RowOrder::Either, ..About::default() });
     let mut attacks = Vec::new();
     if matches!(released.obfuscation(), Obfuscation::Rays(_)) {
-        attacks.push((Builtin::Density.name(), at(released, &published(released))?));
+        attacks.push((Builtin::Density.name(), at_peaks(released, &none, &published(released))?));
     }
     let peaks = tomography(released);
-    attacks.push((Builtin::Tomography.name(), at(released, &peaks)?));
+    attacks.push((Builtin::Tomography.name(), at_peaks(released, &none, &peaks)?));
     // Planes and rays from one center have no geometric lists.
     if let Ok(lists) = geometric_by(released, Geometric::K, &peaks) {
         let options = RecoverOptions { confidence: false, ..*options };
@@ -43,14 +48,48 @@ pub fn records_alone<const D: usize>(
     Ok(attacks)
 }
 
-/// Returns the positions of `peaks`. For paired lines, the order of the two points is unknown.
-fn at<const D: usize>(released: &Released<D>, peaks: &Peaks) -> Result<Recovered<D>, Error> {
-    let none = Neighborhoods::unchecked(vec![0; released.n_slots() + 1], Vec::new());
-    let estimates = Placement::new(released, &none, peaks).solve();
-    let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
-    let (origin, unit) = (released.origin(), released.unit());
-    let delta = delta(peaks);
-    let about =
-        About { map: Some(released.fingerprint()), order: RowOrder::Either, ..About::default() };
-    Ok(Recovered::try_new(&estimates, with_axis, None, origin, unit, delta)?.with_about(about))
+/// Returns the points at `peaks`.
+///
+/// Lists do not change positions. For paired lines they decide which of the two positions belongs to which slot: the cheaper
+/// assignment wins, with the distances to the listed records (Eq. (4)) as cost. With empty lists the order is that along the line.
+pub(super) fn at_peaks<const D: usize>(
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    peaks: &Peaks,
+) -> Result<Recovered<D>, Error> {
+    let rows = rows_of(released, None);
+    // Delta is the resolution of the peaks.
+    let delta = if peaks.resolution > 0.0 { peaks.resolution } else { 1.0 };
+    let peak = |slot: usize| match peaks.of[slot] {
+        // These attacks return positions in three dimensions only.
+        Some(Peak { position, axis, evidence }) => {
+            Estimate::at(std::array::from_fn(|c| position[c % 3]), 0, axis.into(), evidence)
+        }
+        None => Estimate::lost(Status::NoSupport),
+    };
+    let distances = |slot: usize, x: [f32; D]| {
+        let rows = &rows;
+        lists.of(slot).iter().map(move |record| {
+            let row = &rows[record.index()];
+            let away: [f32; D] = std::array::from_fn(|c| x[c] - row.through[c]);
+            let along: f32 = (0..D).map(|c| away[c] * row.direction[c]).sum();
+            let across = |c: usize| away[c] - along * row.direction[c];
+            (0..D).map(|c| across(c) * across(c)).sum::<f32>().sqrt()
+        })
+    };
+    let cost = |at: usize, slot: usize| distances(slot, peak(at).position).sum::<f32>();
+    let place = |slot: usize| {
+        let (a, b) = (slot & !1, slot | 1);
+        let is_crossed =
+            released.slots_per_record() == 2 && cost(a, a) + cost(b, b) > cost(b, a) + cost(a, b);
+        let mut estimate = peak(if is_crossed { slot ^ 1 } else { slot });
+        if !rows.is_empty() {
+            let near = distances(slot, estimate.position).filter(|&d| d <= delta as f32);
+            estimate.support = stored_support(near.count() as u32);
+        }
+        estimate
+    };
+    let estimates: Vec<_> = (0..released.n_slots()).into_par_iter().map(place).collect();
+    let recovered = Recovered::new(released, lists, &estimates, delta)?;
+    Ok(recovered.without_confidence(Unknown::OtherSolver))
 }

@@ -1,7 +1,9 @@
 //! Results of recovery: estimates, confidence, and the recovered map.
 
+use rayon::prelude::*;
+
+use crate::RecordId;
 use crate::neighbors::Neighborhoods;
-use crate::recover::assignment::descriptor_rows;
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, Unit};
 
@@ -67,6 +69,12 @@ impl<const D: usize> Estimate<D> {
     #[inline(always)]
     pub(crate) fn is_known(&self) -> bool {
         self.status == Status::Ok
+    }
+
+    /// Creates the estimate of a slot that was recovered.
+    pub(crate) fn at(position: [f32; D], support: u32, axis: usize, evidence: f32) -> Self {
+        let (status, support, axis) = (Status::Ok, stored_support(support), axis as u8);
+        Self { position, status, support, axis, evidence }
     }
 
     /// Creates the estimate of a slot that was not recovered.
@@ -459,6 +467,33 @@ impl<const D: usize> Recovered<D> {
     pub(crate) fn with_trials(self, trials: Option<TrialHistogram>) -> Self {
         Self { trials, ..self }
     }
+}
+
+/// Per slot, the released descriptor row that belongs to it (supplement B); `None` unless records have two slots and
+/// descriptors.
+///
+/// The cheaper of the two assignments wins. The cost of a descriptor and a list is the sum of the distances from the descriptor to
+/// the listed records, each taken to the nearer of the record's two descriptors.
+fn descriptor_rows<const D: usize>(
+    released: &Released<D>,
+    lists: &Neighborhoods,
+) -> Option<Vec<u32>> {
+    let descriptors = released.descriptors().filter(|_| released.slots_per_record() == 2)?;
+    let cost = |row: usize, slot: usize| {
+        let to_record = |record: &RecordId| {
+            let [one, other] =
+                [0, 1].map(|side| descriptors.squared_distance(row, 2 * record.index() + side));
+            f64::from(one.min(other).sqrt())
+        };
+        lists.of(slot).iter().map(to_record).sum::<f64>()
+    };
+    let rows_of = |record: usize| {
+        let [a, b] = [2 * record, 2 * record + 1];
+        let is_straight = cost(a, a) + cost(b, b) <= cost(a, b) + cost(b, a);
+        let first = if is_straight { [a, b] } else { [b, a] };
+        first.map(|row| row as u32)
+    };
+    Some((0..released.n_records()).into_par_iter().flat_map_iter(rows_of).collect())
 }
 
 #[cfg(test)]

@@ -9,8 +9,8 @@
 use rayon::prelude::*;
 
 use crate::neighbors::Neighborhoods;
+use crate::recover::map::chance::mixed;
 use crate::recover::map::lines::{LineRow, evidence};
-use crate::recover::map::lists::{found, mixed};
 use crate::recover::result::{Estimate, Status};
 
 /// Slots with mixed lists, to measure evidence by chance: a mean over so many has an error of a few percent.
@@ -59,7 +59,7 @@ pub(in crate::recover) fn solve<const D: usize>(
         // Without evidence, use the range with half of the points before it.
         let fraction = 0.5 + trust * (fractions[slot] - 0.5);
         let range = libm::powf(fraction, 1.0 / D as f32) * rows[slot].to;
-        found(rows[slot].at(range), count, 0, excess)
+        Estimate::at(rows[slot].at(range), count, 0, excess)
     };
     slots.iter().copied().map(estimate).collect()
 }

@@ -15,7 +15,6 @@ use crate::recover::consensus::{Scratch, gather_planes};
 use crate::recover::map::families::{CandidateFamily, LineFamily, PlaneFamily};
 use crate::recover::map::family::Family;
 use crate::recover::map::lines::{NO_VOTE, Sections};
-use crate::recover::map::lists::found;
 use crate::recover::result::{Estimate, MAX_TRIALS, Status};
 use crate::seed::{Draws, Stage};
 use crate::simd::{Kernel, dispatch};
@@ -77,7 +76,7 @@ impl<const D: usize, F: Family<D>> Kernel for Slot<'_, D, F> {
             family.solve(slot, (lists.of(slot), axes), delta, &mut draws, scratch);
         let axis = axes.get(slot).copied().unwrap_or(0);
         let estimate = match solved {
-            Ok((position, support)) => found(position, support, axis.into(), 0.0),
+            Ok((position, support)) => Estimate::at(position, support, axis.into(), 0.0),
             Err(status) => Estimate { axis, ..Estimate::lost(status) },
         };
         (estimate, trials)

@@ -27,7 +27,7 @@ use crate::geometry::knn::Knn;
 use crate::recover::map::family::{Family, Piece};
 use crate::recover::map::graph::{Graph, Side, either, side};
 use crate::recover::map::lines::ln;
-use crate::recover::map::lists::CHUNK;
+use crate::recover::map::places::CHUNK;
 use crate::recover::map::places::{along_curve, distance2};
 use crate::recover::problem::Problem;
 use crate::recover::result::{Estimate, Status};

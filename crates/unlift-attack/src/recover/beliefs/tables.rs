@@ -6,7 +6,7 @@ use super::Places;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::{CLASSES, Graph, either};
 use crate::recover::map::lines::ln;
-use crate::recover::map::lists::CHUNK;
+use crate::recover::map::places::CHUNK;
 use crate::seed::{Draws, Stage};
 
 /// Number of bins of the distance: up to the first bound, log-spaced up to the second one, and beyond.

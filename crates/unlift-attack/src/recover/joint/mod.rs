@@ -36,7 +36,7 @@ use crate::recover::joint::update::{Context, Scratch};
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::record_of;
 use crate::recover::map::grid::Density;
-use crate::recover::map::lists::CHUNK;
+use crate::recover::map::places::CHUNK;
 use crate::recover::map::places::{along_curve, distance2};
 use crate::recover::problem::Problem;
 use crate::recover::result::Estimate;

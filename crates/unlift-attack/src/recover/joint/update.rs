@@ -7,7 +7,6 @@ use crate::recover::map::family::{Family, Piece};
 use crate::recover::map::graph::{CLASSES, either, record_of};
 use crate::recover::map::grid::Density;
 use crate::recover::map::lines::ln;
-use crate::recover::map::lists::found;
 use crate::recover::map::places::{distance2, nearest2};
 use crate::recover::problem::Problem;
 use crate::recover::result::{Estimate, Status};
@@ -110,7 +109,7 @@ impl<'a, const D: usize, F: Family<D>> Context<'a, D, F> {
         if !x.iter().all(|c| c.is_finite()) {
             return *old;
         }
-        found(x, support, first.piece, (first.score - first.prior).max(0.0))
+        Estimate::at(x, support, first.piece, (first.score - first.prior).max(0.0))
     }
 
     #[inline(always)]

@@ -2,7 +2,7 @@
 //!
 //! From the bottom up: a grid of cells and the density of estimates on it (`grid`); rows per record and their sections with a
 //! feasible line (`lines`, `planes`); the chance that a random record passes near a place (`chance`); all of these for one map
-//! (`family`, `families`); lists and the neighborhood graph (`lists`, `graph`); estimates per slot (`places`).
+//! (`family`, `families`); the neighborhood graph (`graph`); estimates per slot (`places`).
 
 pub(crate) mod chance;
 pub(crate) mod families;
@@ -10,6 +10,5 @@ pub(crate) mod family;
 pub(crate) mod graph;
 pub(crate) mod grid;
 pub(crate) mod lines;
-pub(crate) mod lists;
 pub(crate) mod places;
 pub(crate) mod planes;

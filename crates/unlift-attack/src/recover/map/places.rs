@@ -5,6 +5,9 @@ use rayon::prelude::*;
 use crate::geometry::curve;
 use crate::recover::result::Estimate;
 
+/// Slots per parallel task: fixed, so that results do not depend on the number of threads.
+pub(crate) const CHUNK: usize = 64;
+
 /// Number of places in samples: quantiles of so many have an error of about a percent.
 const SAMPLE: usize = 1 << 14;
 
