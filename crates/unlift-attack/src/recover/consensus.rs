@@ -42,8 +42,8 @@ pub(crate) struct Scratch<const D: usize> {
     pub(crate) candidates: CandidateColumns<D>,
     pub(crate) sections: Sections,
     intervals: Intervals,
-    /// The sections of records that may vote.
-    pub(crate) votes: Sections,
+    /// Indices of the sections that vote.
+    pub(crate) voting: Vec<usize>,
     /// Listed planes by axis, as (offset, record).
     pub(crate) by_axis: [Vec<(f32, RecordId)>; D],
 }
@@ -55,7 +55,7 @@ impl<const D: usize> Default for Scratch<D> {
             candidates: CandidateColumns::default(),
             sections: Sections::default(),
             intervals: Intervals::default(),
-            votes: Sections::default(),
+            voting: Vec::new(),
             by_axis: std::array::from_fn(|_| Vec::new()),
         }
     }

@@ -23,8 +23,7 @@ use crate::neighbors::Neighborhoods;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::record_of;
 use crate::recover::map::lines::{LANES, Lanes, ln};
-use crate::recover::map::places::CHUNK;
-use crate::recover::map::places::{along_curve, distance2};
+use crate::recover::map::places::{CHUNK, Candidate, along_curve, distance2};
 use crate::recover::problem::Problem;
 use crate::recover::result::{Estimate, Status};
 use crate::seed::{Draws, Stage};
@@ -126,14 +125,15 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
             let moves = |slot: &u32| slot % 2 == half && radius[*slot as usize] > 0.0;
             let order = along_curve(&estimates);
             let moving: Vec<u32> = order.into_iter().filter(moves).collect();
-            let moved: Vec<Vec<Best<D>>> = moving
+            let moved: Vec<Vec<Candidate<D>>> = moving
                 .par_chunks(CHUNK)
                 .map_init(
                     || Terms::new(n, lists.n_slots()),
                     |terms, slots| dispatch(Chunk { context: &context, slots, terms }),
                 )
                 .collect();
-            for (slot, Best { x, axis, .. }) in moving.into_iter().zip(moved.into_iter().flatten())
+            for (slot, Candidate { x, piece: axis, .. }) in
+                moving.into_iter().zip(moved.into_iter().flatten())
             {
                 if x.iter().all(|x| x.is_finite()) {
                     let estimate = &mut estimates[slot as usize];
@@ -332,10 +332,10 @@ struct Chunk<'a, 'b, const D: usize, F: Family<D>> {
 }
 
 impl<const D: usize, F: Family<D>> Kernel for Chunk<'_, '_, D, F> {
-    type Output = Vec<Best<D>>;
+    type Output = Vec<Candidate<D>>;
 
     #[inline(always)]
-    fn run(self) -> Vec<Best<D>> {
+    fn run(self) -> Vec<Candidate<D>> {
         let Self { context, slots, terms } = self;
         let tries_elsewhere = context.iteration == 0 && context.inlier_ratio > LEAST_ELSEWHERE;
         let mut all = Vec::with_capacity(slots.len());
@@ -350,18 +350,10 @@ impl<const D: usize, F: Family<D>> Kernel for Chunk<'_, '_, D, F> {
     }
 }
 
-/// A place with its score and its piece.
-#[derive(Clone, Copy)]
-struct Best<const D: usize> {
-    score: f32,
-    x: [f32; D],
-    axis: usize,
-}
-
 impl<const D: usize, F: Family<D>> Context<'_, D, F> {
     /// Returns the likeliest of some places on the record of `slot`, and whether few listed estimates are near it.
     #[inline(always)]
-    fn likeliest(&self, slot: usize, terms: &mut Terms<D>) -> (Best<D>, bool) {
+    fn likeliest(&self, slot: usize, terms: &mut Terms<D>) -> (Candidate<D>, bool) {
         let old = self.estimates[slot];
         let item = (slot * ITERATIONS + self.iteration) as u64;
         let mut draws = Draws::new(self.problem.seed, Stage::Ranking, item);
@@ -369,14 +361,14 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         let expected = self.inlier_ratio * self.problem.lists.of(slot).len() as f32;
         let is_lost = (n_near as f32) < LOST * expected;
         let axis = usize::from(old.axis);
-        let mut best = Best { score: f32::NEG_INFINITY, x: old.position, axis };
+        let mut best = Candidate { score: f32::NEG_INFINITY, x: old.position, piece: axis };
         let rounds: &[Lanes] = match F::NORMAL {
             true => &PLANE_STEPS,
             false if self.iteration < FAR_ITERATIONS => &LINE_STEPS,
             false => &NEAR_LINE_STEPS,
         };
         for steps in rounds {
-            let from = Best { axis, ..best };
+            let from = Candidate { piece: axis, ..best };
             self.search(slot, (&old.position, from), steps, &mut draws, terms, &mut best);
         }
         (best, is_lost)
@@ -387,13 +379,13 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
     fn search(
         &self,
         slot: usize,
-        (center, from): (&[f32; D], Best<D>),
+        (center, from): (&[f32; D], Candidate<D>),
         steps: &Lanes,
         draws: &mut Draws,
         terms: &mut Terms<D>,
-        best: &mut Best<D>,
+        best: &mut Candidate<D>,
     ) {
-        let Best { x: from, axis, .. } = from;
+        let Candidate { x: from, piece: axis, .. } = from;
         let piece = self.problem.family.piece(slot, axis);
         let radius = terms.radius;
         let direction: [f32; D] = match F::NORMAL {
@@ -421,14 +413,14 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         for w in 0..LANES {
             if scores[w] > best.score {
                 let x = if steps[w] == 0.0 { from } else { places[w] };
-                *best = Best { score: scores[w], x, axis };
+                *best = Candidate { score: scores[w], x, piece: axis };
             }
         }
     }
 
     /// Tries the places of `slot` that are near the estimates of listed records.
     #[inline(never)]
-    fn try_elsewhere(&self, slot: usize, best: &mut Best<D>, terms: &mut Terms<D>) {
+    fn try_elsewhere(&self, slot: usize, best: &mut Candidate<D>, terms: &mut Terms<D>) {
         let Problem { family, lists, seed, .. } = self.problem;
         let own = lists.of(slot);
         let mut draws = Draws::new(*seed, Stage::Ranking, u64::MAX - slot as u64);
@@ -443,7 +435,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
                 }
                 self.collect(slot, center, terms);
                 for axis in (0..F::PIECES).filter(is_near) {
-                    let from = Best { score: 0.0, x: near(axis), axis };
+                    let from = Candidate { score: 0.0, x: near(axis), piece: axis };
                     self.search(slot, (&x, from), &ELSEWHERE_STEPS, &mut draws, terms, best);
                 }
             }

@@ -148,22 +148,14 @@ fn on_line<const D: usize>(
     delta: f32,
     draws: &mut Draws,
 ) -> (Result<(f32, u32), Status>, u32) {
-    let Scratch { sections, votes, .. } = scratch;
+    let Scratch { sections, voting, .. } = scratch;
     if sections.n_voting() < 2 {
         let few = may_vote < 2;
         return (Err(if few { Status::TooFewNeighbors } else { Status::Degenerate }), 0);
     }
-    votes.at.clear();
-    votes.miss2.clear();
-    votes.bend.clear();
-    for j in 0..sections.len() {
-        if sections.miss2[j] < NO_VOTE {
-            votes.at.push(sections.at[j]);
-            votes.miss2.push(sections.miss2[j]);
-            votes.bend.push(sections.bend[j]);
-        }
-    }
-    let (n, delta2) = (votes.len(), delta * delta);
+    voting.clear();
+    voting.extend((0..sections.len()).filter(|&j| sections.miss2[j] < NO_VOTE));
+    let (n, delta2) = (voting.len(), delta * delta);
     let (mut best_t, mut best) = (0.0, 0);
     let (mut trials, mut needed) = (0, MAX_TRIALS);
     while trials < needed {
@@ -171,9 +163,10 @@ fn on_line<const D: usize>(
         let one = draws.below(n as u64) as usize;
         let mut other = draws.below(n as u64 - 1) as usize;
         other += usize::from(other >= one);
-        let (a, b) = (votes.bend[one], votes.bend[other]);
-        let t = (a * votes.at[one] + b * votes.at[other]) / (a + b);
-        let columns = votes.at.iter().zip(&votes.miss2).zip(&votes.bend);
+        let [one, other] = [one, other].map(|at| voting[at]);
+        let (a, b) = (sections.bend[one], sections.bend[other]);
+        let t = (a * sections.at[one] + b * sections.at[other]) / (a + b);
+        let columns = sections.at.iter().zip(&sections.miss2).zip(&sections.bend);
         let is_near = |((at, miss2), bend): ((&f32, &f32), &f32)| {
             u32::from(miss2 + bend * (t - at) * (t - at) <= delta2)
         };
@@ -187,10 +180,10 @@ fn on_line<const D: usize>(
         return (Err(Status::NoSupport), trials);
     }
     let (mut weight, mut sum) = (0.0f32, 0.0f32);
-    for j in 0..n {
-        if votes.squared_distance(j, best_t) <= delta2 {
-            weight += votes.bend[j];
-            sum += votes.bend[j] * (votes.at[j] - best_t);
+    for &j in voting.iter() {
+        if sections.squared_distance(j, best_t) <= delta2 {
+            weight += sections.bend[j];
+            sum += sections.bend[j] * (sections.at[j] - best_t);
         }
     }
     (Ok((best_t + sum / weight, best)), trials)

@@ -27,8 +27,7 @@ use crate::geometry::knn::Knn;
 use crate::recover::map::family::{Family, Piece};
 use crate::recover::map::graph::{Graph, Side, either, side};
 use crate::recover::map::lines::ln;
-use crate::recover::map::places::CHUNK;
-use crate::recover::map::places::{along_curve, distance2};
+use crate::recover::map::places::{CHUNK, Candidate, along_curve, distance2};
 use crate::recover::problem::Problem;
 use crate::recover::result::{Estimate, Status};
 use crate::seed::{Draws, Stage};
@@ -314,13 +313,6 @@ struct Near<const D: usize> {
     class: u8,
     /// Whether the next place belongs to the same edge.
     goes_on: bool,
-}
-
-#[derive(Clone, Copy)]
-struct Candidate<const D: usize> {
-    x: [f32; D],
-    piece: usize,
-    score: f32,
 }
 
 /// Buffers of one thread: per piece, the places of neighbors that are near it, and the candidates.

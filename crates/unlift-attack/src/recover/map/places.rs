@@ -11,6 +11,14 @@ pub(crate) const CHUNK: usize = 64;
 /// Number of places in samples: quantiles of so many have an error of about a percent.
 const SAMPLE: usize = 1 << 14;
 
+/// A possible place of a slot, on a piece of its feasible set.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Candidate<const D: usize> {
+    pub(crate) x: [f32; D],
+    pub(crate) piece: usize,
+    pub(crate) score: f32,
+}
+
 /// Returns a sample of the known places, evenly over the slots.
 pub(crate) fn sample<const D: usize>(
     estimates: &[Estimate<D>],
