@@ -71,10 +71,7 @@ pub(super) fn at_peaks<const D: usize>(
         let rows = &rows;
         lists.of(slot).iter().map(move |record| {
             let row = &rows[record.index()];
-            let away: [f32; D] = std::array::from_fn(|c| x[c] - row.through[c]);
-            let along: f32 = (0..D).map(|c| away[c] * row.direction[c]).sum();
-            let across = |c: usize| away[c] - along * row.direction[c];
-            (0..D).map(|c| across(c) * across(c)).sum::<f32>().sqrt()
+            row.distance2(&x, row.along(&x)).sqrt()
         })
     };
     let cost = |at: usize, slot: usize| distances(slot, peak(at).position).sum::<f32>();

@@ -11,8 +11,7 @@ use rayon::prelude::*;
 
 use crate::density::feasible::{Feasible, Hides};
 use crate::density::{Peak, Peaks};
-use crate::geometry::vector::{dot, sub, widen};
-use crate::recover::map::lines::LineRow;
+use crate::recover::map::lines::{LineRow, NO_GROUP, NO_VOTE};
 use crate::released::Released;
 
 /// Nearest lines that vote first: the largest number, and the largest fraction of all lines.
@@ -44,7 +43,7 @@ pub(crate) fn published<const D: usize>(released: &Released<D>) -> Peaks {
     let (most, share) = if feasible.hides == Hides::Two { COARSE_OF_PAIRS } else { COARSE };
     let k = most.min((share * lines.len() as f64) as usize).max(2);
     let place = |row: usize| {
-        let mut distances: Vec<f32> = voting.iter().map(|o| between(&lines[row], o)).collect();
+        let mut distances: Vec<f32> = voting.iter().map(|o| section(&lines[row], o).1).collect();
         silence(&mut distances, row, lines, &voters);
         let (near, reach) = nearest(&distances, k);
         let near = near.iter().map(|&at| &lines[voters[at as usize] as usize]);
@@ -79,11 +78,14 @@ fn refine(
     let points: Vec<[f32; 3]> = voters.iter().map(point).collect();
     let step = |row: usize| {
         let estimate = estimates[row]?;
-        let mut distances: Vec<f32> =
-            points.iter().map(|&point| from_line(point, &lines[row])).collect();
+        let mut distances: Vec<f32> = points
+            .iter()
+            .map(|&point| lines[row].distance2(&point, lines[row].along(&point)))
+            .collect();
         silence(&mut distances, row, lines, voters);
         let (near, _) = nearest(&distances, REFINE);
-        let to_line = |line: &LineRow<3>| from_line(estimate.position, line);
+        let to_line =
+            |line: &LineRow<3>| line.distance2(&estimate.position, line.along(&estimate.position));
         let mut distances: Vec<f32> = voting.iter().map(to_line).collect();
         silence(&mut distances, row, lines, voters);
         let (mut passing, _) = nearest(&distances, REFINE);
@@ -114,21 +116,19 @@ fn silence(distances: &mut [f32], row: usize, lines: &[LineRow<3>], voters: &[u3
 
 /// Returns the parameters at which `line` is passed most closely by `others`, except parallel ones.
 fn passes<'a>(line: &LineRow<3>, others: impl Iterator<Item = &'a LineRow<3>>) -> Vec<f64> {
-    let (through, direction) = (widen(&line.through), widen(&line.direction));
-    let pass = |other: &LineRow<3>| {
-        let (away, e) = (sub(&through, &widen(&other.through)), widen(&other.direction));
-        let cosine = dot(&direction, &e);
-        let square_sine = 1.0 - cosine * cosine;
-        let t = (cosine * dot(&away, &e) - dot(&away, &direction)) / square_sine;
-        (square_sine > 1e-6 && t > f64::from(line.floor())).then_some(t)
-    };
-    others.filter_map(pass).collect()
+    let sections = others.map(|other| section(line, other));
+    let voting = sections.filter(|&(t, miss2, _)| miss2 < NO_VOTE && t > line.floor());
+    voting.map(|(t, _, _)| f64::from(t)).collect()
+}
+
+/// Returns where two whole lines pass each other, see [`LineRow::section`].
+fn section(line: &LineRow<3>, other: &LineRow<3>) -> (f32, f32, f32) {
+    let whole = LineRow { group: NO_GROUP, ..*line };
+    whole.section((other.through, other.direction, other.group))
 }
 
 fn on(line: &LineRow<3>, t: f64) -> Option<Peak> {
-    let position = std::array::from_fn(|c| {
-        (f64::from(line.through[c]) + t * f64::from(line.direction[c])) as f32
-    });
+    let position = line.at(t as f32);
     let finite = position.iter().all(|x: &f32| x.is_finite());
     finite.then_some(Peak { position, axis: 0, evidence: 0.0 })
 }
@@ -251,31 +251,6 @@ fn two_modes(votes: &mut [f64]) -> Option<[f64; 2]> {
     Some([pair[0].min(pair[1]), pair[0].max(pair[1])])
 }
 
-// Distances to all lines or estimates.
-
-/// Returns the squared distance between two lines; infinite for parallel ones.
-fn between(line: &LineRow<3>, other: &LineRow<3>) -> f32 {
-    let (p, d) = (line.through, line.direction);
-    let (q, e) = (other.through, other.direction);
-    let normal = [d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2], d[0] * e[1] - d[1] * e[0]];
-    let (mut across, mut square) = (0.0, 0.0);
-    for c in 0..3 {
-        across += (q[c] - p[c]) * normal[c];
-        square += normal[c] * normal[c];
-    }
-    if square < 1e-6 { f32::INFINITY } else { across * across / square }
-}
-
-/// Returns the squared distance of `point` from a line, without a difference of large squares; infinite if `point` is NaN.
-fn from_line(point: [f32; 3], line: &LineRow<3>) -> f32 {
-    let d = line.direction;
-    let v: [f32; 3] = std::array::from_fn(|c| point[c] - line.through[c]);
-    let along = v[0] * d[0] + v[1] * d[1] + v[2] * d[2];
-    let across = |c: usize| v[c] - along * d[c];
-    let square: f32 = (0..3).map(|c| across(c) * across(c)).sum();
-    if square.is_nan() { f32::INFINITY } else { square }
-}
-
 /// Returns the indices of the `k` smallest finite distances (ties by index), unordered, and the largest of these, not squared.
 fn nearest(squared: &[f32], k: usize) -> (Vec<u32>, f32) {
     // Distances are not negative, so their bits sort as they do.
@@ -289,36 +264,4 @@ fn nearest(squared: &[f32], k: usize) -> (Vec<u32>, f32) {
     let farthest = |&key: &u64| f32::from_bits((key >> 32) as u32).sqrt();
     let reach = keys.iter().max().map_or(f32::INFINITY, farthest);
     (keys.iter().map(|&key| key as u32).collect(), reach)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::recover::map::lines::NO_GROUP;
-    use crate::seed::{Draws, Stage};
-
-    #[test]
-    fn distances_between_lines_are_the_least_over_their_points() {
-        let mut draws = Draws::new(4, Stage::Synthetic, 0);
-        let line = |_| LineRow {
-            through: std::array::from_fn(|_| draws.between(-3.0, 3.0) as f32),
-            direction: draws.direction::<3>().map(|x| x as f32),
-            group: NO_GROUP,
-            to: f32::INFINITY,
-        };
-        let lines: Vec<LineRow<3>> = (0..101).map(line).collect();
-        let squared: Vec<f32> = lines.iter().map(|other| between(&lines[0], other)).collect();
-        assert_eq!(squared[0], f32::INFINITY);
-        for (other, squared) in lines.iter().zip(squared).skip(1) {
-            // The nearest point of the first line, by golden-section search.
-            let at = |t: f32| from_line(lines[0].at(t), other);
-            let (mut low, mut high) = (-1e3f32, 1e3f32);
-            for _ in 0..100 {
-                let (a, b) = (low + 0.382 * (high - low), low + 0.618 * (high - low));
-                if at(a) < at(b) { high = b } else { low = a }
-            }
-            let least = at(0.5 * (low + high));
-            assert!((least.sqrt() - squared.sqrt()).abs() < 2e-3, "{least} {squared}");
-        }
-    }
 }

@@ -130,9 +130,7 @@ impl<const D: usize> Family<D> for LineFamily<D> {
     #[inline(always)]
     fn record_distance2(&self, record: usize, x: &[f32; D]) -> f32 {
         let row = &self.rows[record];
-        let away: [f32; D] = std::array::from_fn(|c| x[c] - row.through[c]);
-        let t = row.clamp(away.iter().zip(&row.direction).map(|(a, d)| a * d).sum());
-        away.iter().zip(&row.direction).map(|(a, d)| (a - t * d) * (a - t * d)).sum()
+        row.distance2(x, row.clamp(row.along(x)))
     }
 
     #[inline(always)]
@@ -148,8 +146,7 @@ impl<const D: usize> Family<D> for LineFamily<D> {
             return 0.0;
         }
         let own = self.own(slot);
-        let t: f32 = (0..D).map(|c| (x[c] - own.through[c]) * own.direction[c]).sum();
-        (D - 1) as f32 * ln((t / own.to).max(LEAST_RANGE))
+        (D - 1) as f32 * ln((own.along(x) / own.to).max(LEAST_RANGE))
     }
 }
 

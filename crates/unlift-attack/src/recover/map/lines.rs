@@ -99,7 +99,10 @@ impl<const D: usize> LineRow<D> {
     /// Let `v` and `u` be the components of `self.through - through` and `self.direction` perpendicular to the record. Then the squared
     /// distance is `|v + t u|^2`. It is no difference of large squares, so `f32` suffices far from the origin.
     #[inline(always)]
-    fn section(&self, (through, direction, group): ([f32; D], [f32; D], u32)) -> (f32, f32, f32) {
+    pub(crate) fn section(
+        &self,
+        (through, direction, group): ([f32; D], [f32; D], u32),
+    ) -> (f32, f32, f32) {
         let (mut w_e, mut d_e) = (0.0, 0.0);
         for c in 0..D {
             w_e += (self.through[c] - through[c]) * direction[c];
@@ -123,6 +126,19 @@ impl<const D: usize> LineRow<D> {
         let behind = self.is_ray() & ((group == self.group) | (w_e + t * d_e <= 0.0));
         let miss2 = if parallel | behind { NO_VOTE } else { miss };
         (t, miss2, if parallel { 1.0 } else { u_u })
+    }
+
+    /// Returns the parameter at which the whole line of this row passes closest to `x`.
+    #[inline(always)]
+    pub(crate) fn along(&self, x: &[f32; D]) -> f32 {
+        (0..D).map(|c| (x[c] - self.through[c]) * self.direction[c]).sum()
+    }
+
+    /// Returns the squared distance from `x` to the point at `t`, without a difference of large squares.
+    #[inline(always)]
+    pub(crate) fn distance2(&self, x: &[f32; D], t: f32) -> f32 {
+        let across = |c: usize| x[c] - self.through[c] - t * self.direction[c];
+        (0..D).map(|c| across(c) * across(c)).sum()
     }
 
     #[inline(always)]
