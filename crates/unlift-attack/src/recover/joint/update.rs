@@ -9,7 +9,7 @@ use crate::recover::map::grid::Density;
 use crate::recover::map::lines::ln;
 use crate::recover::map::places::{distance2, nearest2};
 use crate::recover::problem::Problem;
-use crate::recover::result::{Estimate, Status};
+use crate::recover::result::Estimate;
 
 /// Estimates farther from a piece than this many radii are ignored.
 const TUBE: f32 = 6.0;
@@ -22,8 +22,6 @@ const LEAST_SQUARES_RADIUS: f32 = 3.75;
 const TRUE_CANDIDATES: f32 = 5.0;
 /// Least and largest number of such candidates per piece.
 const CANDIDATES: (f32, f32) = (8.0, 16.0);
-/// Capacity for all candidates and the old estimate, in whole vectors.
-const ROOM: usize = 24;
 /// If the scores of the best candidate and the best one elsewhere differ by less than this many nats, the records near them decide.
 const TIE_MARGIN: f32 = 8.0;
 /// Assumed fraction of true neighbors whose record passes near the point but whose estimate is wrong.
@@ -155,31 +153,13 @@ impl<'a, const D: usize, F: Family<D>> Context<'a, D, F> {
         let n_true = (self.neighbors.fraction * scratch.all.len() as f32).max(1.0);
         let most = TRUE_CANDIDATES / n_true * near.len() as f32;
         let step = near.len().div_ceil(most.clamp(CANDIDATES.0, CANDIDATES.1) as usize).max(1);
-        let (mut tried, mut n) = ([[0.0; ROOM]; D], 0);
-        let mut add = |x: [f32; D]| {
-            tried.iter_mut().zip(x).for_each(|(column, x)| column[n] = x);
-            n += 1;
-        };
-        for i in (0..near.len()).step_by(step) {
-            add(own.project(&near.at(i)));
-        }
-        if old.status == Status::Ok && usize::from(old.axis) == piece {
-            add(old.position);
-        }
-        // All capacity is computed, so the loop runs over whole vectors.
-        let (mut cells, mut density) = ([0; ROOM], [0.0; ROOM]);
-        let columns = tried.each_ref().map(|column| &column[..n]);
-        self.density.at_each(&columns, &mut cells[..n], &mut density[..n]);
-        let (mut gain, mut inverse_a2, mut prior) = ([0.0; ROOM], [0.0; ROOM], [0.0; ROOM]);
-        for i in 0..ROOM {
-            (gain[i], inverse_a2[i]) = self.distribution(density[i]);
-            prior[i] = PRIOR * ln(density[i]);
-        }
+        let estimates = (0..near.len()).step_by(step).map(|i| own.project(&near.at(i)));
+        let old = Some(old).filter(|old| old.is_known() && usize::from(old.axis) == piece);
         let most_imbalance = self.neighbors.most_imbalance;
-        for i in 0..n {
-            let x = std::array::from_fn(|c| tried[c][i]);
-            let prior = prior[i] + self.problem.family.ln_spread(slot, &x);
-            let distribution = (gain[i], inverse_a2[i]);
+        for x in estimates.chain(old.map(|old| old.position)) {
+            let density = self.density.at(&x);
+            let prior = PRIOR * ln(density) + self.problem.family.ln_spread(slot, &x);
+            let distribution = self.distribution(density);
             let likelihood = match most_imbalance < f32::INFINITY {
                 true => near.balanced_log_likelihood(&x, distribution, most_imbalance),
                 false => near.log_likelihood(&x, distribution),

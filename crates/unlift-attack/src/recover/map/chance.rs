@@ -206,11 +206,7 @@ pub(crate) struct CandidateField<const D: usize> {
 impl<const D: usize> CandidateField<D> {
     /// Returns the chance that a random record passes within `delta` of a typical place.
     pub(crate) fn typical_chance(&self, delta: f32) -> f32 {
-        let tubes = self.tubes(delta);
-        if tubes.iter().all(|&one| one == tubes[0]) {
-            return self.along.iter().map(ChanceField::typical).sum::<f32>() * tubes[0];
-        }
-        self.along.iter().zip(&tubes).map(|(field, tube)| field.typical() * tube).sum()
+        self.along.iter().zip(self.tubes(delta)).map(|(field, tube)| field.typical() * tube).sum()
     }
 
     /// For a flat map, whose box is much thinner than neighborhoods are wide, returns the radius of the disc that holds the fraction
