@@ -55,7 +55,7 @@ const ELSEWHERE: usize = 8;
 /// Steps from such a place, in radii.
 const ELSEWHERE_STEPS: Lanes = [0.0, 0.1, -0.1, 0.2, -0.2, 0.4, -0.4, 0.6];
 /// These places are tried for slots with fewer listed estimates nearby than this fraction of the expected number. Slots with several
-/// family always try them, because the piece may be wrong.
+/// pieces always try them, because the piece may be wrong.
 const LOST: f32 = 0.85;
 const LEAST_ELSEWHERE: f32 = 0.5;
 /// Bounds of the number of estimates within the radius, as a fraction of K. Far from the center, only a part of them is counted.

@@ -50,7 +50,7 @@ const DENSITY_WEIGHT: f32 = 0.5;
 const LEAST_DENSITY: f32 = 0.05;
 /// Radius of the kernel of that density, in typical widths. The kernel is about a normal distribution of a third of a width.
 const DENSITY_RADIUS: f32 = 0.91;
-/// Largest number of candidates per slot, shared by the family of its feasible set, and the part of them that edges propose.
+/// Largest number of candidates per slot, shared by the pieces of its feasible set, and the part of them that edges propose.
 const CANDIDATES: usize = 40;
 const OF_EDGES: f32 = 0.67;
 /// An edge proposes a candidate if the squared distance of its place to the record is below this, in squared widths.
