@@ -15,7 +15,8 @@
 //! region of its own; it is 1 for other records. Where wrong entries form clusters, the sums of forward and of reverse
 //! edges may differ only up to a bound (`votes`).
 //!
-//! A slot *jumps* if it moves farther than one radius, which holds half of the true neighbors, or if its status changes. `odds`,
+//! A slot *jumps* if it moves farther than one radius, which holds half of the true neighbors, or if its status changes. A slot whose
+//! best candidate leads by a clear margin is updated again only after enough neighbors have jumped nearby. `odds`,
 //! `p_true` and `p_random` are learned from the current estimates (`neighbor_distribution`, `map::grid`), and again after
 //! enough slots have jumped. Iterations end when few slots jump, when the number of jumps hardly falls, when fewer records pass
 //! near the estimates than before, or after 16 iterations.
@@ -29,12 +30,14 @@ mod neighbor_distribution;
 mod update;
 mod votes;
 
+use std::sync::atomic::{AtomicU32, Ordering};
+
 use rayon::prelude::*;
 
 use crate::recover::joint::neighbor_distribution::NeighborDistribution;
-use crate::recover::joint::update::{Context, Scratch};
+use crate::recover::joint::update::{Context, Scratch, TUBE};
 use crate::recover::map::family::Family;
-use crate::recover::map::graph::record_of;
+use crate::recover::map::graph::{either, record_of};
 use crate::recover::map::grid::Density;
 use crate::recover::map::places::{CHUNK, along_curve, distance2};
 use crate::recover::problem::Problem;
@@ -46,6 +49,11 @@ const ITERATIONS: usize = 16;
 const ROUNDING: f32 = 8.0 * f32::EPSILON;
 /// Smoothing width of the density of estimates, in radii: wide, so that a few estimates at one place hardly change it.
 const SMOOTH: f32 = 4.5;
+/// A slot is updated again once its margin is at most this many nats per jump of a neighbor. One jump can change the score by more,
+/// but some jumps confirm the place.
+const MARGIN_PER_JUMP: f32 = 2.0;
+/// Least number of jumps per parallel task.
+const JUMPS_PER_THREAD: usize = 64;
 /// Iterations end when fewer than this fraction of the slots jump.
 const SETTLED: f64 = 0.03;
 /// Distribution and density are learned again after more than this fraction of the slots have jumped. Learning once per
@@ -64,7 +72,7 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
     problem: &Problem<'_, D, F>,
     start: Vec<Estimate<D>>,
 ) -> Vec<Estimate<D>> {
-    let n = start.len();
+    let (n, family) = (start.len(), problem.family);
     let order = along_curve(&start);
     let known = start.iter().filter(|estimate| estimate.is_known());
     let farthest = known.flat_map(|e| e.position).fold(0.0, |most: f32, x| most.max(x.abs()));
@@ -77,6 +85,9 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
     };
     let (mut density, mut neighbors) = learn(&start, F::MOST_RADIUS * problem.delta);
     let (mut accepted, mut estimates) = (start.clone(), start);
+    // Per slot, the lead of its place over others in nats, or 0 if it must be updated again, and the number of jumps near it since its turn.
+    let mut margin = vec![0.0f32; n];
+    let mut jumps_near: Vec<AtomicU32> = (0..n).map(|_| AtomicU32::new(0)).collect();
     // As if all slots had jumped before.
     let (mut n_before, mut n_since_learning, mut best_agreement) = (n, 0, f64::NEG_INFINITY);
     for iteration in 0..ITERATIONS {
@@ -84,24 +95,64 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
         let mut n_jumped = 0;
         for group in 0..groups {
             if n_since_learning as f64 > STALE * n as f64 {
+                let before = neighbors.most_imbalance;
                 (density, neighbors) = learn(&estimates, neighbors.radius);
                 n_since_learning = 0;
+                if neighbors.most_imbalance != before {
+                    // Margins under another bound are not comparable.
+                    margin.fill(0.0);
+                }
             }
-            let moves = |slot: &u32| *slot as usize % groups == group;
+            let moves = |slot: &u32| {
+                let slot = *slot as usize;
+                let n_jumps = jumps_near[slot].load(Ordering::Relaxed) as f32;
+                let is_settled = margin[slot] > 0.0 && n_jumps <= margin[slot] / MARGIN_PER_JUMP;
+                slot % groups == group && !is_settled
+            };
             let slots: Vec<u32> = order.iter().copied().filter(moves).collect();
             let context = Context::new(problem, &estimates, &density, &neighbors);
-            let moved: Vec<Vec<Estimate<D>>> = slots
+            let moved: Vec<Vec<(Estimate<D>, f32)>> = slots
                 .par_chunks(CHUNK)
                 .map_init(Scratch::default, |scratch, slots| {
                     dispatch(Chunk { context: &context, slots, scratch })
                 })
                 .collect();
-            for (&slot, new) in slots.iter().zip(moved.iter().flatten()) {
-                let old = std::mem::replace(&mut estimates[slot as usize], *new);
-                let far = distance2(&old.position, &new.position) > neighbors.radius.powi(2);
-                n_jumped += usize::from(far || old.status != new.status);
-                n_since_learning += usize::from(far || old.status != new.status);
+            (group..n).step_by(groups).for_each(|slot| *jumps_near[slot].get_mut() = 0);
+            let mut jumped = Vec::new();
+            for (&slot, &(new, lead)) in slots.iter().zip(moved.iter().flatten()) {
+                let slot = slot as usize;
+                let old = std::mem::replace(&mut estimates[slot], new);
+                let is_far = distance2(&old.position, &new.position) > neighbors.radius.powi(2);
+                margin[slot] = lead;
+                if is_far || old.status != new.status {
+                    // It is updated again in any case.
+                    margin[slot] = 0.0;
+                    jumped.push((slot, [old.position, new.position]));
+                }
             }
+            n_jumped += jumped.len();
+            n_since_learning += jumped.len();
+            // A jump from or to a place near the record of a neighbor may concern the neighbor.
+            let reach2 = (TUBE * neighbors.radius).powi(2);
+            let may_lie_near = |slot: usize, x: &[f32; D]| {
+                let near = |piece| distance2(&family.piece(slot, piece).project(x), x) < reach2;
+                (0..F::PIECES).any(near)
+            };
+            jumped.par_iter().with_min_len(JUMPS_PER_THREAD).for_each(|(slot, places)| {
+                let (ends, class) = problem.graph.of(*slot);
+                for (&end, &class) in ends.iter().zip(class) {
+                    let end = end as usize;
+                    let slots = end..=end + usize::from(either(class, family.slots_per_record()));
+                    // Both slots of a record lie on one piece.
+                    if slots.clone().any(|slot| margin[slot] > 0.0)
+                        && places.iter().any(|x| may_lie_near(end, x))
+                    {
+                        slots.for_each(|slot| {
+                            jumps_near[slot].fetch_add(1, Ordering::Relaxed);
+                        });
+                    }
+                }
+            });
         }
         if (n_jumped as f64) < SETTLED * n as f64 {
             // So few jumps hardly change agreement.
@@ -128,10 +179,10 @@ struct Chunk<'a, 'b, const D: usize, F: Family<D>> {
 }
 
 impl<const D: usize, F: Family<D>> Kernel for Chunk<'_, '_, D, F> {
-    type Output = Vec<Estimate<D>>;
+    type Output = Vec<(Estimate<D>, f32)>;
 
     #[inline(always)]
-    fn run(self) -> Vec<Estimate<D>> {
+    fn run(self) -> Vec<(Estimate<D>, f32)> {
         let Self { context, slots, scratch } = self;
         let mut moved = Vec::with_capacity(slots.len());
         for &slot in slots {

@@ -12,7 +12,7 @@ use crate::recover::problem::Problem;
 use crate::recover::result::Estimate;
 
 /// Estimates farther from a piece than this many radii are ignored.
-const TUBE: f32 = 6.0;
+pub(super) const TUBE: f32 = 6.0;
 /// Estimates within this many radii of the center of a ray are ignored: they are close to all rays of that center, so that a few
 /// wrong ones would draw many slots there.
 const CENTER_RADIUS: f32 = 3.0;
@@ -72,9 +72,10 @@ impl<'a, const D: usize, F: Family<D>> Context<'a, D, F> {
         Self { problem, estimates, density, neighbors, odds }
     }
 
-    /// Returns the new estimate of `slot`; the old one without nearby estimates.
+    /// Returns the new estimate of `slot`, and its margin: the lead of its place over the best candidate elsewhere in nats, or without such
+    /// a candidate its log-likelihood ratio; 0 if it must be updated again. Without nearby estimates it returns the old estimate and 0.
     #[inline(always)]
-    pub(super) fn solve(&self, slot: usize, scratch: &mut Scratch<D>) -> Estimate<D> {
+    pub(super) fn solve(&self, slot: usize, scratch: &mut Scratch<D>) -> (Estimate<D>, f32) {
         let old = &self.estimates[slot];
         let Problem { family, graph, .. } = *self.problem;
         scratch.candidates.clear();
@@ -87,13 +88,13 @@ impl<'a, const D: usize, F: Family<D>> Context<'a, D, F> {
             scratch.all.near(&own, reach, center_radius, &odds, &mut scratch.near[piece]);
             self.propose(&own, (slot, piece), old, scratch);
         }
-        let Some(first) = self.winner(slot, &scratch.candidates) else {
-            return *old;
+        let Some((first, margin)) = self.winner(slot, &scratch.candidates) else {
+            return (*old, 0.0);
         };
         let own = family.piece(slot, first.piece);
         let near = &mut scratch.near[first.piece];
         if near.len() == 0 {
-            return *old;
+            return (*old, 0.0);
         }
         let at = |x: &[f32; D]| {
             let density = self.density.at(x);
@@ -105,9 +106,10 @@ impl<'a, const D: usize, F: Family<D>> Context<'a, D, F> {
         let near = (&*near, &mut scratch.directions);
         let (x, support) = least_squares(family, self.estimates, &own, near, first.x, at);
         if !x.iter().all(|c| c.is_finite()) {
-            return *old;
+            return (*old, 0.0);
         }
-        Estimate::at(x, support, first.piece, (first.score - first.prior).max(0.0))
+        let evidence = (first.score - first.prior).max(0.0);
+        (Estimate::at(x, support, first.piece, evidence), margin)
     }
 
     #[inline(always)]
@@ -168,9 +170,9 @@ impl<'a, const D: usize, F: Family<D>> Context<'a, D, F> {
         }
     }
 
-    /// Returns the best candidate. If the second best is close, the records decide between the two.
+    /// Returns the best candidate and its margin. If the second best is close, the records decide between the two.
     #[inline(always)]
-    fn winner(&self, slot: usize, candidates: &[Candidate<D>]) -> Option<Candidate<D>> {
+    fn winner(&self, slot: usize, candidates: &[Candidate<D>]) -> Option<(Candidate<D>, f32)> {
         let mut best = *candidates.first()?;
         for candidate in &candidates[1..] {
             if candidate.score > best.score {
@@ -184,11 +186,17 @@ impl<'a, const D: usize, F: Family<D>> Context<'a, D, F> {
                 second = Some(*candidate);
             }
         }
-        let Some(second) = second.filter(|second| best.score - second.score < TIE_MARGIN) else {
-            return Some(best);
+        let Some(second) = second else {
+            return Some((best, best.score - best.prior));
         };
-        let [of_best, of_second] = self.record_scores(slot, [best.x, second.x]);
-        Some(if second.score + of_second > best.score + of_best { second } else { best })
+        let margin = best.score - second.score;
+        if margin < TIE_MARGIN {
+            let [of_best, of_second] = self.record_scores(slot, [best.x, second.x]);
+            if second.score + of_second > best.score + of_best {
+                return Some((second, 0.0));
+            }
+        }
+        Some((best, margin))
     }
 
     /// Returns what records add to the scores of two places: records pass within delta, but their estimates may be elsewhere.
