@@ -59,11 +59,11 @@ fn pairs<const D: usize>(
     let Some(partners) = Partners::find(&sides, reach) else {
         return vec![None; n];
     };
-    let rarity = rarity(published, &sides, reach);
+    let rarity = rarity(published, &sides, partners.reach);
     let prior = prior::<D>(&sides);
     let class = classes(estimates);
     let class: Vec<usize> = order.iter().map(|&record| class[record as usize]).collect();
-    let mut distances = Distances::new(reach);
+    let mut distances = Distances::new(partners.reach);
     // Per entry, the message that the record is free of other partners.
     let mut messages = vec![0.5; partners.of.len()];
     let mut weight = Vec::new();

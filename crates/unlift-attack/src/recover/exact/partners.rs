@@ -5,12 +5,16 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::geometry::curve;
-use crate::geometry::knn::Knn;
 
 /// Records per parallel task: fixed, so that sums do not depend on the number of threads.
 const PART: usize = 1 << 10;
-/// Number of partners that each record looks for, so that time and memory are linear in the map.
-const MOST: usize = 24;
+/// Largest mean number of partners per record. A shorter reach enforces it, so that time and memory are linear in the map.
+const MOST: f64 = 16.0;
+/// Records on which the number of partners is counted.
+const SAMPLE: usize = 1 << 12;
+/// Largest number of partners of one record where a shorter reach does not help, because many records have equal coordinates
+/// (a floor at 0, a few exact heights).
+const MOST_OF_TIES: usize = 64;
 
 /// A record, on the axis that it is believed to have exchanged.
 #[derive(Clone, Copy, Debug)]
@@ -30,57 +34,34 @@ pub(super) struct Partners {
     pub(super) of: Vec<u32>,
     /// Index of the same pair in the row of the partner.
     pub(super) back: Vec<u32>,
+    /// Largest distance between an estimate and the value that a partner published.
+    pub(super) reach: f32,
 }
 
 impl Partners {
-    /// Finds pairs of `sides` on one axis, each of whose estimates lies within `reach` of the value that the other published: for every
-    /// record, those that fit it best. `None` if there are none.
+    /// Finds pairs of `sides` on one axis, each of whose estimates lies within `reach` of the value that the other published. Uses a shorter
+    /// reach if there are too many pairs. `None` if there are none.
     pub(super) fn find(sides: &[Side], reach: f32) -> Option<Self> {
-        // A record and its partner have published value and estimate exchanged. Records of other axes are far away. Many may have equal
-        // coordinates (a floor at 0): a last coordinate, which hardly counts, spreads them.
-        let known: Vec<u32> =
-            (0..sides.len() as u32).filter(|&i| sides[i as usize].axis != LOST).collect();
-        let reach = f64::from(reach);
-        let spread =
-            |i: u32| 1e-3 * reach * f64::from(i.wrapping_mul(0x9e37_79b9)) / f64::from(u32::MAX);
-        let far = |side: &Side| 1e6 * reach * side.axis as f64;
-        let place = |i: u32, a: f32, b: f32| {
-            [f64::from(a), f64::from(b), far(&sides[i as usize]) + spread(i)]
-        };
-        let point = |&i: &u32| place(i, sides[i as usize].published, sides[i as usize].estimate);
-        let points: Vec<[f64; 3]> = known.iter().map(point).collect();
-        let tree = Knn::new(&points).ok()?;
-        let pairs = |found: &mut Vec<(f64, u32)>, &i: &u32| {
-            let own = &sides[i as usize];
-            tree.nearest_to(place(i, own.estimate, own.published), MOST, found);
-            let near = |a: f32, b: f32| (f64::from(a) - f64::from(b)).abs() <= reach;
-            let fits = |&j: &u32| {
-                let other = &sides[j as usize];
-                near(other.published, own.estimate)
-                    && near(other.estimate, own.published)
-                    && (j != i && other.axis == own.axis)
-            };
-            let partners = found.iter().map(|&(_, row)| known[row as usize]).filter(fits);
-            partners.flat_map(|j| [(i, j), (j, i)]).collect::<Vec<_>>()
-        };
-        let mut pairs: Vec<(u32, u32)> =
-            known.par_iter().map_init(Vec::new, pairs).flatten_iter().collect();
-        pairs.par_sort_unstable();
-        pairs.dedup();
-        if pairs.is_empty() || pairs.len() > u32::MAX as usize {
+        let mut strips = Strips::new(sides, reach);
+        let found = strips.mean();
+        let mut has_ties = false;
+        if found > MOST {
+            // The number of partners is proportional to the square of the reach.
+            strips = Strips::new(sides, reach * (MOST / found).sqrt() as f32);
+            has_ties = strips.mean() > MOST_OF_TIES as f64;
+        }
+        let (offsets, of) = if has_ties { strips.some_rows() } else { strips.rows() };
+        if of.is_empty() || of.len() > u32::MAX as usize {
             return None;
         }
-        let mut offsets = vec![0; sides.len() + 1];
-        pairs.iter().for_each(|pair| offsets[pair.0 as usize + 1] += 1);
-        (0..sides.len()).for_each(|i| offsets[i + 1] += offsets[i]);
         // Rows ascend, so the pairs of record j come in the order of its entries.
         let mut next = offsets.clone();
-        let back = |&(_, j): &(u32, u32)| {
+        let back = |&j: &u32| {
             next[j as usize] += 1;
             next[j as usize] as u32 - 1
         };
-        let back = pairs.iter().map(back).collect();
-        Some(Self { offsets, of: pairs.into_iter().map(|pair| pair.1).collect(), back })
+        let back = of.iter().map(back).collect();
+        Some(Self { offsets, of, back, reach: strips.reach as f32 })
     }
 
     /// Returns a value per entry; `of` writes those of one record.
@@ -114,6 +95,124 @@ pub(super) fn by_part<T: Send>(n: usize, of: impl Fn(Range<usize>) -> T + Sync) 
     (0..n.div_ceil(PART)).into_par_iter().map(part).collect()
 }
 
+/// Records sorted by axis, by published value in steps of about the reach, and by estimate within a step.
+struct Strips<'a> {
+    sides: &'a [Side],
+    /// (axis and step, estimate, record), sorted.
+    sorted: Vec<(u64, f32, u32)>,
+    low: f64,
+    reach: f64,
+    /// Slightly more than the reach, so that rounding treats both records of a pair alike.
+    step: f64,
+}
+
+/// Largest number of steps along one axis, so that axis and step fit into a sorting key.
+const MOST_STEPS: f64 = (1u64 << 40) as f64;
+
+impl<'a> Strips<'a> {
+    fn new(sides: &'a [Side], reach: f32) -> Self {
+        let known = || sides.iter().enumerate().filter(|(_, side)| side.axis != LOST);
+        let lower = known().map(|(_, side)| side.published.min(side.estimate));
+        let (low, reach) = (f64::from(lower.fold(f32::MAX, f32::min)), f64::from(reach));
+        let mut strips = Self { sides, sorted: Vec::new(), low, reach, step: 1.01 * reach };
+        let row = |(i, side): (usize, &Side)| {
+            (strips.strip(side, side.published), side.estimate, i as u32)
+        };
+        strips.sorted = known().map(row).collect();
+        strips.sorted.par_sort_unstable_by(|a, b| {
+            a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2))
+        });
+        strips
+    }
+
+    fn strip(&self, side: &Side, value: f32) -> u64 {
+        let steps = ((f64::from(value) - self.low) / self.step).min(MOST_STEPS);
+        // Step 0 stays empty, because the step below the lowest one is searched, too.
+        (side.axis as u64) << 48 | (steps as u64 + 1)
+    }
+
+    fn mean(&self) -> f64 {
+        let every = self.sides.len().div_ceil(SAMPLE).max(1);
+        let looked: Vec<usize> = (0..self.sides.len()).step_by(every).collect();
+        let found: usize = looked.par_iter().map(|&i| self.of(i).count()).sum();
+        found as f64 / looked.len().max(1) as f64
+    }
+
+    /// Returns, for each of the three steps around the estimate of record `i`, the records whose estimates are near its published value.
+    fn about(&self, i: usize) -> impl Iterator<Item = &[(u64, f32, u32)]> {
+        let own = &self.sides[i];
+        let middle = (own.axis != LOST).then(|| self.strip(own, own.estimate));
+        let published = f64::from(own.published);
+        let (low, high) = (published - self.step, published + self.step);
+        let strips = middle.into_iter().flat_map(|middle| middle - 1..=middle + 1);
+        strips.map(move |strip| {
+            let is_below = |row: &(u64, f32, u32)| row.0 == strip && f64::from(row.1) < low;
+            let from = self.sorted.partition_point(|row| row.0 < strip || is_below(row));
+            let rows = &self.sorted[from..];
+            &rows[..rows.partition_point(|row| row.0 == strip && f64::from(row.1) <= high)]
+        })
+    }
+
+    fn fit(&self, i: usize, j: usize) -> bool {
+        let near = |a: f32, b: f32| (f64::from(a) - f64::from(b)).abs() <= self.reach;
+        let (own, other) = (&self.sides[i], &self.sides[j]);
+        near(other.published, own.estimate) && near(other.estimate, own.published) && j != i
+    }
+
+    fn of(&self, i: usize) -> impl Iterator<Item = u32> {
+        let records = self.about(i).flatten().map(|row| row.2);
+        records.filter(move |&j| self.fit(i, j as usize))
+    }
+
+    /// Returns all possible partners of all records: offsets of the rows, and the partners in ascending order.
+    fn rows(&self) -> (Vec<usize>, Vec<u32>) {
+        let part = |records: Range<usize>| {
+            let (mut ends, mut of) = (Vec::with_capacity(records.len()), Vec::new());
+            for i in records {
+                let start = of.len();
+                of.extend(self.of(i));
+                of[start..].sort_unstable();
+                ends.push(of.len());
+            }
+            (ends, of)
+        };
+        let (mut offsets, mut all) = (vec![0], Vec::new());
+        for (ends, of) in by_part(self.sides.len(), part) {
+            offsets.extend(ends.iter().map(|end| all.len() + end));
+            all.extend(of);
+        }
+        (offsets, all)
+    }
+
+    /// Returns [`rows`](Self::rows) with some of the possible partners only.
+    fn some_rows(&self) -> (Vec<usize>, Vec<u32>) {
+        let both = |i: usize| self.some_of(i).flat_map(move |j| [(i as u32, j), (j, i as u32)]);
+        let part = |records: Range<usize>| records.flat_map(both).collect::<Vec<_>>();
+        let mut pairs = by_part(self.sides.len(), part).concat();
+        pairs.par_sort_unstable();
+        pairs.dedup();
+        let mut offsets = vec![0; self.sides.len() + 1];
+        for (i, _) in &pairs {
+            offsets[*i as usize + 1] += 1;
+        }
+        for i in 0..self.sides.len() {
+            offsets[i + 1] += offsets[i];
+        }
+        (offsets, pairs.into_iter().map(|(_, j)| j).collect())
+    }
+
+    /// Returns some of the possible partners of record `i`: a few from each step, different ones for each record.
+    fn some_of(&self, i: usize) -> impl Iterator<Item = u32> {
+        let some = self.about(i).flat_map(move |rows| {
+            let n = rows.len().min(MOST_OF_TIES / 2);
+            // Evenly spaced, from a start that differs by record: an odd multiplier reaches every remainder.
+            let start = i.wrapping_mul(0x9e37_79b9) % rows.len().max(1);
+            (0..n).map(move |at| rows[(start + at * rows.len() / n) % rows.len()].2)
+        });
+        some.filter(move |&j| self.fit(i, j as usize))
+    }
+}
+
 /// Bits per value: two values and the axis make a key.
 const BITS: u32 = 20;
 
@@ -142,7 +241,7 @@ mod tests {
         let sides = vec![side; 50_000];
         let partners = Partners::find(&sides, 0.1).unwrap();
         let n = partners.of.len() / sides.len();
-        assert!((24..=48).contains(&n), "{n} partners a record");
+        assert!((32..=256).contains(&n), "{n} partners a record");
         for (i, entry) in [0, 777, 49_999].map(|i| (i, partners.entries(i).start)) {
             let (j, back) = (partners.of[entry] as usize, partners.back[entry] as usize);
             assert!(partners.entries(j).contains(&back) && partners.of[back] as usize == i);
