@@ -102,8 +102,8 @@ const FIVE: [&str; 5] = ["olc", "ppl", "ray", "plane", "cp"];
 const BASELINES: &[(&str, u64)] = &[
     ("joint", 0x3336f1a8f0f6ea7b),
     ("ransac", 0x4a079b433b6941bc),
-    ("density", 0x0c841755abe725f2),
-    ("tomography", 0x5d4188e487d7ce99),
+    ("density", 0xe4bbc22766efad46),
+    ("tomography", 0xe93a13b0d03c11d1),
 ];
 
 #[test]
