@@ -6,7 +6,7 @@ use unlift::audit::{NeighborsBy, Plan, Threshold};
 use unlift::neighbors::oracle::Noise;
 use unlift::neighbors::{Needs, Source};
 use unlift::obfuscate::{Change, Changed, Scheme};
-use unlift::recover::{Builtin, Delta, Solver};
+use unlift::recover::{Delta, Solver};
 use unlift::{Descriptors, ErrorKind};
 
 use crate::doubts::{LengthMessages, check_thresholds};
@@ -112,7 +112,7 @@ impl<const D: usize> Request<D> {
         let schemes = distinct(self.schemes, |a, b| a.name() == b.name() && is_ours(a.name()));
         let mut schemes = given_or(schemes, usual.schemes);
         schemes.extend(Changed::all(&schemes, &self.changes));
-        let is_ours = |solver: &dyn Solver<D>| Builtin::of(solver).is_some();
+        let is_ours = |solver: &dyn Solver<D>| solver.builtin().is_some();
         let same = |a: &Arc<dyn Solver<D>>, b: &Arc<dyn Solver<D>>| {
             a.name() == b.name() && is_ours(&**a) && is_ours(&**b)
         };
