@@ -69,8 +69,7 @@ impl Grid<3> {
         let mut sum = 0.0;
         for choice in 0..8 {
             let (mut weight, mut at) = (1.0, 0);
-            for c in 0..3 {
-                let (low, share) = corner[c];
+            for (c, &(low, share)) in corner.iter().enumerate() {
                 let upper = choice >> c & 1 == 1;
                 weight *= if upper { share } else { 1.0 - share };
                 at = at * self.dims[c] + (low + usize::from(upper)).min(self.dims[c] - 1);

@@ -69,7 +69,7 @@ impl NeighborDistribution {
         let mut total = Tally::default();
         parts.iter().for_each(|part| total.merge(part));
         let limits = (least_radius, F::MOST_RADIUS * problem.delta);
-        let distribution = total.distribution::<D, F>(&problem.family, learning.reach, limits);
+        let distribution = total.distribution::<D, F>(problem.family, learning.reach, limits);
         Self { most_imbalance: learning.most_imbalance(), ..distribution }
     }
 
