@@ -3,9 +3,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::geometry::vector::{along, distance, dot, median, sub, widen};
-use crate::recover::map::chance::densities;
 use crate::recover::map::lines::{LineRow, NO_GROUP, rows_of};
-use crate::released::{Obfuscation, Released};
+use crate::released::{AxisCandidates, Obfuscation, Released};
 
 /// What a record hides. It decides how the likelihood of a place depends on the density of points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,9 +70,7 @@ impl Feasible {
                 let lines = rows.iter().flat_map(|row| (0..3).map(move |axis| (row, axis)));
                 let lines = lines.map(line).collect();
                 // The value on an exchanged axis is random, so it is more probable where values are dense.
-                let common: [Vec<f32>; 3] = std::array::from_fn(|axis| {
-                    densities(&rows.iter().map(|row| row[axis % D]).collect::<Vec<_>>())
-                });
+                let common = value_densities(candidates);
                 let prior = (0..rows.len()).flat_map(|row| [0, 1, 2].map(|axis| (axis, row)));
                 let prior = prior.map(|(axis, row): (usize, usize)| common[axis][row]).collect();
                 Some(Self { hides: Hides::OnAxis, lines, prior, per_record: 3, n_groups: 0 })
@@ -172,4 +169,32 @@ fn crossing(lines: &[LineRow<3>]) -> Option<([f64; 3], f64)> {
 fn nearest(line: &LineRow<3>, x: &[f64; 3]) -> [f64; 3] {
     let (through, direction) = (widen(&line.through), widen(&line.direction));
     along(&through, dot(&sub(x, &through), &direction), &direction)
+}
+
+/// Number of values to either side over which the density of published values is measured.
+const REACH: usize = 50;
+
+/// Returns, per axis and record, the density of the published values of that axis around the record's value.
+fn value_densities<const D: usize>(candidates: &AxisCandidates<D>) -> [Vec<f32>; 3] {
+    let n = candidates.len();
+    std::array::from_fn(|axis| {
+        let value = |row: u32| candidates.position()[row as usize][axis % D];
+        let mut order: Vec<u32> = (0..n as u32).collect();
+        order.sort_by(|&a, &b| value(a).total_cmp(&value(b)));
+        let reach = REACH.min(n / 4);
+        // The mean spacing is added, because equal values have no width.
+        let spacing = match n {
+            0 | 1 => 1.0,
+            _ => (value(order[n - 1]) - value(order[0])) / n as f32,
+        };
+        let mut densities = vec![1.0; n];
+        for rank in 0..n {
+            let (low, high) = (rank.saturating_sub(reach), (rank + reach).min(n - 1));
+            let width = value(order[high]) - value(order[low]) + spacing;
+            if width > 0.0 {
+                densities[order[rank] as usize] = (high - low + 1) as f32 / width;
+            }
+        }
+        densities
+    })
 }

@@ -24,7 +24,6 @@ mod temper;
 use rayon::prelude::*;
 
 use crate::geometry::knn::Knn;
-use crate::recover::map::chance::densities;
 use crate::recover::map::family::{Family, Piece};
 use crate::recover::map::graph::{Graph, Side, either, side};
 use crate::recover::map::lines::ln;
@@ -82,7 +81,7 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
         return estimates;
     }
     let start = estimates.clone();
-    let marginals = marginals(family, n);
+    let marginals = Marginals::new(family, n);
     let mut beliefs: Vec<Vec<Place<D>>> = start_weights(&estimates)
         .into_iter()
         .zip(&estimates)
@@ -259,15 +258,36 @@ fn proposals<const D: usize>(places: &Places<D>, seed: u64) -> Vec<[f32; D]> {
     likely.into_iter().map(|(_, x)| x).collect()
 }
 
-/// Returns the volume element of axis candidates: per piece and slot, the logarithm of the density of the values on the exchanged axis;
-/// nothing for families whose feasible sets have one piece.
-fn marginals<const D: usize, F: Family<D>>(family: &F, n: usize) -> Vec<Vec<f32>> {
-    let axes = if F::PIECES == 1 { 0..0 } else { 0..F::PIECES };
-    let values = |axis: usize| -> Vec<f32> {
-        (0..n).map(|slot| family.piece(slot, axis).through[axis]).collect()
-    };
-    let of_axis = |axis: usize| densities(&values(axis)).into_iter().map(ln).collect();
-    axes.map(of_axis).collect()
+/// The volume element of axis candidates: per slot and piece, the logarithm of the density of the values on the exchanged axis.
+struct Marginals(Vec<Vec<f32>>);
+
+impl Marginals {
+    /// Learns nothing for families whose feasible sets have one piece.
+    fn new<const D: usize, F: Family<D>>(family: &F, n: usize) -> Self {
+        if F::PIECES == 1 {
+            return Self(Vec::new());
+        }
+        let of_axis = |axis: usize| {
+            let values: Vec<f32> =
+                (0..n).map(|slot| family.piece(slot, axis).through[axis]).collect();
+            let mut sorted = values.clone();
+            sorted.sort_unstable_by(f32::total_cmp);
+            let around = (n / 200).max(20);
+            let density = |value: &f32| {
+                let at = sorted.partition_point(|x| x < value);
+                let (low, high) = (at.saturating_sub(around), (at + around).min(n - 1));
+                let length = (sorted[high] - sorted[low]).max(f32::MIN_POSITIVE);
+                ln((high - low) as f32 / length)
+            };
+            values.iter().map(density).collect()
+        };
+        Self((0..F::PIECES).map(of_axis).collect())
+    }
+
+    #[inline(always)]
+    fn at(&self, slot: usize, piece: usize) -> f32 {
+        self.0.get(piece).map_or(0.0, |column| column[slot])
+    }
 }
 
 /// What an iteration reads.
@@ -280,7 +300,7 @@ struct Context<'a, const D: usize, F: Family<D>> {
     proposals: &'a [[f32; D]],
     /// All places, for their density.
     tree: &'a Knn<'a, D>,
-    marginals: &'a [Vec<f32>],
+    marginals: &'a Marginals,
     seed: u64,
 }
 
@@ -425,7 +445,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         evidence
             + DENSITY_WEIGHT * ln(LEAST_DENSITY + self.density(slot, x))
             + 0.5 * (D - 1) as f32 * ln(range.max(1e-6))
-            + self.marginals.get(piece).map_or(0.0, |column| column[slot])
+            + self.marginals.at(slot, piece)
     }
 
     /// Returns the weighted number of places of other slots around `x`.

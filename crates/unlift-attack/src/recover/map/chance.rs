@@ -255,31 +255,6 @@ impl<const D: usize> CandidateField<D> {
     }
 }
 
-/// Number of values to either side over which their density is measured.
-const AROUND: usize = 50;
-
-/// Returns the density of `values` around each of them.
-pub(crate) fn densities(values: &[f32]) -> Vec<f32> {
-    let n = values.len();
-    let mut order: Vec<usize> = (0..n).collect();
-    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
-    let around = AROUND.min(n / 4);
-    // The mean spacing is added, because equal values have no width.
-    let spacing = match n {
-        0 | 1 => 1.0,
-        _ => (values[order[n - 1]] - values[order[0]]) / n as f32,
-    };
-    let mut densities = vec![1.0; n];
-    for rank in 0..n {
-        let (low, high) = (rank.saturating_sub(around), (rank + around).min(n - 1));
-        let width = values[order[high]] - values[order[low]] + spacing;
-        if width > 0.0 {
-            densities[order[rank]] = (high - low + 1) as f32 / width;
-        }
-    }
-    densities
-}
-
 // Lists without information.
 
 /// Distance between the entries of a mixed list, as a fraction of all entries. The golden section spreads them evenly, so that
