@@ -8,7 +8,7 @@ use crate::recover::anchors;
 use crate::recover::map::chance::CandidateField;
 use crate::recover::map::families::LineFamily;
 use crate::recover::map::family::Family;
-use crate::recover::map::lines::{CandidateColumns, Intervals, LineColumns, Sections};
+use crate::recover::map::lines::{Columns, Intervals, LineColumns, Sections};
 use crate::recover::map::places::CHUNK;
 use crate::recover::map::planes::best_window;
 use crate::recover::result::{Estimate, Status, stored_support};
@@ -39,7 +39,7 @@ fn not_fixed<const D: usize>(n: usize) -> Estimate<D> {
 /// Buffers of one thread.
 pub(crate) struct Scratch<const D: usize> {
     pub(crate) lines: LineColumns<D>,
-    pub(crate) candidates: CandidateColumns<D>,
+    pub(crate) candidates: Columns<D>,
     pub(crate) sections: Sections,
     intervals: Intervals,
     /// Indices of the sections that vote.
@@ -52,7 +52,7 @@ impl<const D: usize> Default for Scratch<D> {
     fn default() -> Self {
         Self {
             lines: LineColumns::default(),
-            candidates: CandidateColumns::default(),
+            candidates: Columns::default(),
             sections: Sections::default(),
             intervals: Intervals::default(),
             voting: Vec::new(),
@@ -122,7 +122,8 @@ pub(crate) fn on_candidates<const D: usize>(
 ) -> Estimate<D> {
     let Scratch { candidates, sections, intervals, .. } = scratch;
     let delta2 = delta * delta;
-    if candidates.len() < 2 {
+    let n = candidates.0[0].len();
+    if n < 2 {
         return Estimate::lost(Status::TooFewNeighbors);
     }
     let mut best = Estimate::lost(Status::NoSupport);
@@ -130,7 +131,7 @@ pub(crate) fn on_candidates<const D: usize>(
     for axis in 0..D {
         candidates.sections(own, axis, delta2, sections);
         let limits = (delta2, f32::NEG_INFINITY, f32::INFINITY);
-        let Some(peak) = intervals.peak(sections, limits, candidates.len(), |t, cells, chances| {
+        let Some(peak) = intervals.peak(sections, limits, n, |t, cells, chances| {
             chance.add_along((own, axis), t, tubes, (cells, chances));
         }) else {
             continue;

@@ -1,15 +1,12 @@
 //! The last step of an update: weighted least squares over the estimates of nearby neighbors.
 
-use crate::recover::joint::votes::Columns;
+use crate::recover::joint::votes::Near;
 use crate::recover::map::family::{Family, Piece};
-use crate::recover::map::lines::{LANES, Lanes, fill};
+use crate::recover::map::lines::{Columns, LANES, Lanes};
 use crate::recover::result::Estimate;
 
 /// Number of least-squares steps. The second one recomputes the weights.
 const STEPS: usize = 2;
-
-/// Unit directions (for planes: normals) of the records of neighbors, one column per coordinate.
-pub(super) type Directions<const D: usize> = [Vec<f32>; D];
 
 /// Weighted sums over nearby neighbors, one per vector lane.
 #[derive(Clone, Copy)]
@@ -35,16 +32,17 @@ impl<const D: usize> Sums<D> {
     /// Sums over the neighbors of `near` within `1 / sqrt(inverse_reach2)` of `x`.
     #[inline(always)]
     fn new(
-        near: &Columns<D>,
-        directions: &Directions<D>,
+        near: &Near<D>,
+        directions: &Columns<D>,
         x: &[f32; D],
         (inverse_reach2, (gain, inverse_a2), half_weight_ratio): (f32, (f32, f32), f32),
     ) -> Self {
         let mut sums = Self::ZERO;
         let odds = near.odds.as_chunks::<LANES>().0;
-        let places: [&[Lanes]; D] = std::array::from_fn(|c| &near.x[c].as_chunks().0[..odds.len()]);
+        let places: [&[Lanes]; D] =
+            std::array::from_fn(|c| &near.x.0[c].as_chunks().0[..odds.len()]);
         let directions: [&[Lanes]; D] =
-            std::array::from_fn(|c| &directions[c].as_chunks().0[..odds.len()]);
+            std::array::from_fn(|c| &directions.0[c].as_chunks().0[..odds.len()]);
         for i in 0..odds.len() {
             for lane in 0..LANES {
                 let away: [f32; D] = std::array::from_fn(|c| places[c][i][lane] - x[c]);
@@ -78,21 +76,21 @@ impl<const D: usize> Sums<D> {
 /// Moves `x` along `own` by weighted least squares; returns the place and the number of records within reach.
 ///
 /// The residual of a neighbor is the difference to its estimate: with full weight across its own record, with less weight
-/// along it. `at` returns, for a place, `1 / reach^2`, the distribution of neighbors (`gain`, `1 / a^2`) and the likelihood ratio
+/// along it. `directions` is a buffer for unit directions (for planes: normals). `at` returns, for a place, `1 / reach^2`, the distribution of neighbors (`gain`, `1 / a^2`) and the likelihood ratio
 /// at which an estimate has half weight.
 #[inline(always)]
 pub(super) fn least_squares<const D: usize, F: Family<D>>(
     family: &F,
     estimates: &[Estimate<D>],
     own: &Piece<D>,
-    (near, directions): (&Columns<D>, &mut Directions<D>),
+    (near, directions): (&Near<D>, &mut Columns<D>),
     mut x: [f32; D],
     at: impl Fn(&[f32; D]) -> (f32, (f32, f32), f32),
 ) -> ([f32; D], u32) {
     let of =
         |&slot: &u32| family.direction(slot as usize, usize::from(estimates[slot as usize].axis));
-    fill(directions, &near.slot, of);
-    directions.iter_mut().for_each(|column| column.resize(near.odds.len(), 0.0));
+    directions.fill(&near.slot, of);
+    directions.resize(near.odds.len(), 0.0);
     let mut records = 0;
     for step_at in 1..=STEPS {
         let weights = at(&x);

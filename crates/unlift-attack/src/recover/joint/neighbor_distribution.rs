@@ -46,10 +46,10 @@ pub(super) struct NeighborDistribution {
     pub(super) density_at_zero: f32,
     /// Odds times density of wrong entries that lie in the same region of the map; uniform within the reach.
     pub(super) background: f32,
-    /// Bound on the imbalance of forward and reverse edges, in nats, see [`Columns::balanced_log_likelihood`]; infinite where
+    /// Bound on the imbalance of forward and reverse edges, in nats, see [`Near::balanced_log_likelihood`]; infinite where
     /// wrong entries form no clusters.
     ///
-    /// [`Columns::balanced_log_likelihood`]: super::votes::Columns::balanced_log_likelihood
+    /// [`Near::balanced_log_likelihood`]: super::votes::Near::balanced_log_likelihood
     pub(super) most_imbalance: f32,
 }
 

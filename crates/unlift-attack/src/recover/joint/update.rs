@@ -1,12 +1,12 @@
 //! The update of one slot in one iteration: propose candidates, score them, refine the best one.
 
-use crate::recover::joint::least_squares::{Directions, least_squares};
+use crate::recover::joint::least_squares::least_squares;
 use crate::recover::joint::neighbor_distribution::NeighborDistribution;
-use crate::recover::joint::votes::{Columns, Ends, Odds};
+use crate::recover::joint::votes::{Ends, Near, Odds};
 use crate::recover::map::family::{Family, Piece};
 use crate::recover::map::graph::{CLASSES, either, record_of};
 use crate::recover::map::grid::Density;
-use crate::recover::map::lines::ln;
+use crate::recover::map::lines::{Columns, ln};
 use crate::recover::map::places::{distance2, nearest2};
 use crate::recover::problem::Problem;
 use crate::recover::result::Estimate;
@@ -48,15 +48,15 @@ struct Candidate<const D: usize> {
 pub(super) struct Scratch<const D: usize> {
     all: Ends<D>,
     /// One per piece.
-    near: [Columns<D>; D],
-    directions: Directions<D>,
+    near: [Near<D>; D],
+    directions: Columns<D>,
     candidates: Vec<Candidate<D>>,
 }
 
 impl<const D: usize> Default for Scratch<D> {
     fn default() -> Self {
-        let near = std::array::from_fn(|_| Columns::default());
-        let directions = std::array::from_fn(|_| Vec::new());
+        let near = std::array::from_fn(|_| Near::default());
+        let directions = Columns::default();
         Self { all: Ends::default(), near, directions, candidates: Vec::new() }
     }
 }

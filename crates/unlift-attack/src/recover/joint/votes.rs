@@ -2,7 +2,7 @@
 
 use crate::recover::map::family::Piece;
 use crate::recover::map::graph::{CLASSES, Side, either, side};
-use crate::recover::map::lines::{LANES, Lanes, ln};
+use crate::recover::map::lines::{Columns, LANES, Lanes, ln};
 use crate::recover::map::places::distance2;
 use crate::recover::result::Estimate;
 
@@ -21,20 +21,14 @@ pub(super) struct Odds<'a, const D: usize> {
 }
 
 /// The estimates at the ends of a slot's edges, in columns.
+#[derive(Default)]
 pub(super) struct Ends<const D: usize> {
-    x: [Vec<f32>; D],
+    x: Columns<D>,
     slot: Vec<u32>,
     class: Vec<u8>,
     /// Buffers: squared distances to a piece, and the rows near it.
     apart2: Vec<f32>,
     kept: Vec<u32>,
-}
-
-impl<const D: usize> Default for Ends<D> {
-    fn default() -> Self {
-        let x = std::array::from_fn(|_| Vec::new());
-        Self { x, slot: Vec::new(), class: Vec::new(), apart2: Vec::new(), kept: Vec::new() }
-    }
 }
 
 impl<const D: usize> Ends<D> {
@@ -48,7 +42,7 @@ impl<const D: usize> Ends<D> {
     ) {
         let most = slots_per_record * ends.len();
         self.resize(most);
-        let columns = self.x.each_mut().map(|column| &mut column[..most]);
+        let columns = self.x.0.each_mut().map(|column| &mut column[..most]);
         let (slots, classes) = (&mut self.slot[..most], &mut self.class[..most]);
         let mut n = 0;
         for (&end, &class) in ends.iter().zip(class) {
@@ -72,7 +66,7 @@ impl<const D: usize> Ends<D> {
 
     #[inline(always)]
     fn resize(&mut self, n: usize) {
-        self.x.iter_mut().for_each(|column| column.resize(n, 0.0));
+        self.x.resize(n, 0.0);
         self.slot.resize(n, 0);
         self.class.resize(n, 0);
     }
@@ -90,11 +84,11 @@ impl<const D: usize> Ends<D> {
         reach: f32,
         center_radius: f32,
         odds: &Odds<'_, D>,
-        near: &mut Columns<D>,
+        near: &mut Near<D>,
     ) {
         let n = self.slot.len();
         self.apart2.resize(n, 0.0);
-        let columns: [&[f32]; D] = std::array::from_fn(|c| &self.x[c][..n]);
+        let columns = self.x.first(n);
         let apart2 = &mut self.apart2[..n];
         for i in 0..n {
             let x: [f32; D] = std::array::from_fn(|c| columns[c][i]);
@@ -128,9 +122,10 @@ impl<const D: usize> Ends<D> {
 }
 
 /// Estimates near a piece, and the odds that each is a true neighbor's, in columns.
-pub(super) struct Columns<const D: usize> {
+#[derive(Default)]
+pub(super) struct Near<const D: usize> {
     /// Padded to whole vectors with rows of no effect, as are `odds` and `side`.
-    pub(super) x: [Vec<f32>; D],
+    pub(super) x: Columns<D>,
     pub(super) odds: Vec<f32>,
     /// 1 where the edge may belong to the other slot of the record.
     may_be_partners: Vec<f32>,
@@ -138,19 +133,11 @@ pub(super) struct Columns<const D: usize> {
     pub(super) slot: Vec<u32>,
 }
 
-impl<const D: usize> Default for Columns<D> {
-    fn default() -> Self {
-        let x = std::array::from_fn(|_| Vec::new());
-        let (odds, may_be_partners) = (Vec::new(), Vec::new());
-        Self { x, odds, may_be_partners, side: Vec::new(), slot: Vec::new() }
-    }
-}
-
-impl<const D: usize> Columns<D> {
+impl<const D: usize> Near<D> {
     /// Resizes to `n` rows, which [`set`](Self::set) must fill.
     #[inline(always)]
     fn resize(&mut self, n: usize) {
-        self.x.iter_mut().for_each(|column| column.resize(n, 0.0));
+        self.x.resize(n, 0.0);
         self.odds.resize(n, 0.0);
         self.may_be_partners.resize(n, 0.0);
         self.side.resize(n, Side::Mutual);
@@ -159,7 +146,7 @@ impl<const D: usize> Columns<D> {
 
     #[inline(always)]
     fn set(&mut self, i: usize, x: &[f32; D], (odds, side): ((f32, f32), Side), slot: u32) {
-        for (column, x) in self.x.iter_mut().zip(x) {
+        for (column, x) in self.x.0.iter_mut().zip(x) {
             column[i] = *x;
         }
         (self.odds[i], self.may_be_partners[i]) = odds;
@@ -173,7 +160,7 @@ impl<const D: usize> Columns<D> {
             return;
         }
         let n = self.odds.len();
-        let columns: [&[f32]; D] = std::array::from_fn(|c| &self.x[c][..n]);
+        let columns = self.x.first(n);
         let (odds, may_be_partners) = (&mut self.odds[..n], &self.may_be_partners[..n]);
         for i in 0..n {
             let r2 = distance2(&of.partner, &std::array::from_fn(|c| columns[c][i]));
@@ -184,7 +171,7 @@ impl<const D: usize> Columns<D> {
 
     fn pad(&mut self) {
         let n = self.odds.len().next_multiple_of(LANES);
-        self.x.iter_mut().for_each(|column| column.resize(n, PADDING_COORDINATE));
+        self.x.resize(n, PADDING_COORDINATE);
         self.odds.resize(n, 0.0);
         self.side.resize(n, Side::Mutual);
     }
@@ -196,14 +183,14 @@ impl<const D: usize> Columns<D> {
 
     #[inline(always)]
     pub(super) fn at(&self, i: usize) -> [f32; D] {
-        std::array::from_fn(|c| self.x[c][i])
+        std::array::from_fn(|c| self.x.0[c][i])
     }
 
     /// Counts the records with an estimate within `1 / sqrt(inverse_reach2)` of `x`. Records have two slots, in adjacent rows.
     #[inline(always)]
     pub(super) fn n_pairs(&self, x: &[f32; D], inverse_reach2: f32) -> u32 {
         let n = self.len();
-        let columns: [&[f32]; D] = std::array::from_fn(|c| &self.x[c][..n]);
+        let columns = self.x.first(n);
         let is_near = |i: usize| {
             let d2 = distance2(&std::array::from_fn(|c| columns[c][i]), x);
             u32::from(1.0 - d2 * inverse_reach2 > 0.0)
@@ -269,7 +256,7 @@ impl<const D: usize> Columns<D> {
     ) -> impl Fn(usize, usize) -> f32 + '_ {
         let (odds, _) = self.odds.as_chunks::<LANES>();
         let columns: [&[Lanes]; D] =
-            std::array::from_fn(|c| &self.x[c].as_chunks().0[..odds.len()]);
+            std::array::from_fn(|c| &self.x.0[c].as_chunks().0[..odds.len()]);
         let x = *x;
         move |i: usize, lane: usize| {
             let r2 = distance2(&std::array::from_fn(|c| columns[c][i][lane]), &x);

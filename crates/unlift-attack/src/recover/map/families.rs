@@ -327,7 +327,7 @@ impl<const D: usize> Family<D> for CandidateFamily<'_, D> {
         at: (f32, &[f32; D]),
         scratch: &mut Scratch<D>,
     ) -> Estimate<D> {
-        scratch.candidates.gather(self.rows, listed);
+        scratch.candidates.fill(listed, |record| self.rows[record.index()]);
         consensus::on_candidates(&self.rows[slot], &self.chance, at, scratch)
     }
 

@@ -147,42 +147,52 @@ impl<const D: usize> LineRow<D> {
     }
 }
 
-type Columns<const D: usize> = [Vec<f32>; D];
+/// Points or directions in columns, one per coordinate, so that loops run over whole vectors.
+pub(crate) struct Columns<const D: usize>(pub(crate) [Vec<f32>; D]);
 
-/// Fills `columns` with one row per item.
-#[inline(always)]
-pub(crate) fn fill<const D: usize, T>(
-    columns: &mut Columns<D>,
-    items: &[T],
-    row: impl Fn(&T) -> [f32; D],
-) {
-    columns.iter_mut().for_each(|column| column.resize(items.len(), 0.0));
-    let mut columns = columns.each_mut().map(|column| &mut column[..items.len()]);
-    for (j, item) in items.iter().enumerate() {
-        columns.iter_mut().zip(row(item)).for_each(|(column, x)| column[j] = x);
+impl<const D: usize> Default for Columns<D> {
+    fn default() -> Self {
+        Self(std::array::from_fn(|_| Vec::new()))
     }
 }
 
-/// Listed lines in columns, so that the loop over sections runs over whole vectors.
-#[derive(Clone, Debug)]
+impl<const D: usize> Columns<D> {
+    /// Resizes to `n` rows; new ones are `x` in each coordinate.
+    #[inline(always)]
+    pub(crate) fn resize(&mut self, n: usize, x: f32) {
+        self.0.iter_mut().for_each(|column| column.resize(n, x));
+    }
+
+    /// Fills the columns with one row per item.
+    #[inline(always)]
+    pub(crate) fn fill<T>(&mut self, items: &[T], row: impl Fn(&T) -> [f32; D]) {
+        self.resize(items.len(), 0.0);
+        let mut columns = self.0.each_mut().map(|column| &mut column[..items.len()]);
+        for (j, item) in items.iter().enumerate() {
+            columns.iter_mut().zip(row(item)).for_each(|(column, x)| column[j] = x);
+        }
+    }
+
+    /// Returns the first `n` rows.
+    #[inline(always)]
+    pub(crate) fn first(&self, n: usize) -> [&[f32]; D] {
+        std::array::from_fn(|c| &self.0[c][..n])
+    }
+}
+
+/// Listed lines in columns.
+#[derive(Default)]
 pub(crate) struct LineColumns<const D: usize> {
     through: Columns<D>,
     direction: Columns<D>,
     group: Vec<u32>,
 }
 
-impl<const D: usize> Default for LineColumns<D> {
-    fn default() -> Self {
-        let columns = || std::array::from_fn(|_| Vec::new());
-        Self { through: columns(), direction: columns(), group: Vec::new() }
-    }
-}
-
 impl<const D: usize> LineColumns<D> {
     #[inline(always)]
     pub(crate) fn gather(&mut self, rows: &[LineRow<D>], records: &[RecordId]) {
-        fill(&mut self.through, records, |record| rows[record.index()].through);
-        fill(&mut self.direction, records, |record| rows[record.index()].direction);
+        self.through.fill(records, |record| rows[record.index()].through);
+        self.direction.fill(records, |record| rows[record.index()].direction);
         self.group.clear();
         self.group.extend(records.iter().map(|record| rows[record.index()].group));
     }
@@ -199,8 +209,7 @@ impl<const D: usize> LineColumns<D> {
     pub(crate) fn sections(&self, own: &LineRow<D>, out: &mut Sections) {
         let n = self.group.len();
         out.resize(n);
-        let through: [&[f32]; D] = std::array::from_fn(|c| &self.through[c][..n]);
-        let direction: [&[f32]; D] = std::array::from_fn(|c| &self.direction[c][..n]);
+        let (through, direction) = (self.through.first(n), self.direction.first(n));
         let group = &self.group[..n];
         let (at, miss2, bend) = (&mut out.at[..n], &mut out.miss2[..n], &mut out.bend[..n]);
         for j in 0..n {
@@ -211,38 +220,17 @@ impl<const D: usize> LineColumns<D> {
     }
 }
 
-/// Listed axis candidates in columns.
-#[derive(Clone, Debug)]
-pub(crate) struct CandidateColumns<const D: usize> {
-    position: Columns<D>,
-}
-
-impl<const D: usize> Default for CandidateColumns<D> {
-    fn default() -> Self {
-        Self { position: std::array::from_fn(|_| Vec::new()) }
-    }
-}
-
-impl<const D: usize> CandidateColumns<D> {
-    #[inline(always)]
-    pub(crate) fn gather(&mut self, rows: &[[f32; D]], records: &[RecordId]) {
-        fill(&mut self.position, records, |record| rows[record.index()]);
-    }
-
-    pub(crate) fn len(&self) -> usize {
-        self.position[0].len()
-    }
-
-    /// Computes the sections of the gathered records with the line through `own` along `axis`.
+impl<const D: usize> Columns<D> {
+    /// Computes the sections of axis candidates at these points with the line through `own` along `axis`.
     ///
     /// A record has `D` axis lines and counts once, by the nearest of them. Its line along `axis` is parallel to the own one: within
     /// delta it agrees with every `t`, which is evidence for the axis but not for the position. Of the other lines, the nearest
     /// is free along the coordinate with the largest difference.
     #[inline(always)]
     pub(crate) fn sections(&self, own: &[f32; D], axis: usize, delta2: f32, out: &mut Sections) {
-        let n = self.position[0].len();
+        let n = self.0[0].len();
         out.resize(n);
-        let position: [&[f32]; D] = std::array::from_fn(|c| &self.position[c][..n]);
+        let position = self.first(n);
         let along = position[axis];
         let (at, miss2, bend) = (&mut out.at[..n], &mut out.miss2[..n], &mut out.bend[..n]);
         // Factors instead of branches keep the loop in vectors.
