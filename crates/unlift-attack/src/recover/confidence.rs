@@ -10,11 +10,11 @@ use rayon::prelude::*;
 use crate::ListsBy;
 use crate::geometry::flatness::flatness;
 use crate::geometry::knn::Knn;
-use crate::geometry::vector::{median, widen};
+use crate::geometry::vector::median;
 use crate::neighbors::Neighborhoods;
 use crate::recover::attack::Attack;
 use crate::recover::map::graph::{Graph, Side, either, record_of, side};
-use crate::recover::map::places::distance2;
+use crate::recover::map::places::{distance2, known};
 use crate::recover::result::{Confidence, Estimate, Status, Unknown};
 use crate::released::{Obfuscation, Released};
 
@@ -153,16 +153,13 @@ pub(super) fn predict<const D: usize>(
 
 /// Returns the radius of every slot; the median for lost ones. `None` without estimates.
 fn radii<const D: usize>(estimates: &[Estimate<D>]) -> Option<Vec<f32>> {
-    let is_known = |slot: &usize| estimates[*slot].status == Status::Ok;
-    let slots: Vec<usize> = (0..estimates.len()).filter(is_known).collect();
-    let points: Vec<[f64; D]> =
-        slots.iter().map(|&slot| widen(&estimates[slot].position)).collect();
+    let (slots, points) = known(estimates);
     let tree = Knn::new(&points).ok()?;
     let found = tree.kth_distances(NEIGHBOR);
     let median = median(&mut found.clone()) as f32;
     let mut radius = vec![median; estimates.len()];
     for (&slot, found) in slots.iter().zip(found) {
-        radius[slot] = (found as f32).clamp(RADII.0 * median, RADII.1 * median);
+        radius[slot as usize] = (found as f32).clamp(RADII.0 * median, RADII.1 * median);
     }
     Some(radius)
 }
@@ -186,7 +183,6 @@ fn unknown<const D: usize>(
 ) -> Option<Unknown> {
     let n_slots = lists.n_slots() as f64;
     let mean = lists.records().len() as f64 / n_slots.max(1.0);
-    let found = estimates.iter().filter(|one| one.status == Status::Ok);
     if lists.scores().is_some() {
         Some(Unknown::RankedLists)
     } else if lists.about().lists_by != ListsBy::Oracle {
@@ -197,8 +193,7 @@ fn unknown<const D: usize>(
         // Other records are drawn at random, so that coinciding points do not have equal lines or candidates.
         Some(Unknown::Coincident)
     } else {
-        let places: Vec<[f64; D]> = found.map(|one| widen(&one.position)).collect();
-        (flatness(&places) <= FLAT).then_some(Unknown::Flat)
+        (flatness(&known(estimates).1) <= FLAT).then_some(Unknown::Flat)
     }
 }
 

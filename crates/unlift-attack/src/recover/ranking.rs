@@ -23,7 +23,7 @@ use crate::neighbors::Neighborhoods;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::record_of;
 use crate::recover::map::lines::{LANES, Lanes, ln};
-use crate::recover::map::places::{CHUNK, Candidate, along_curve, distance2};
+use crate::recover::map::places::{CHUNK, Candidate, along_curve, distance2, known};
 use crate::recover::problem::Problem;
 use crate::recover::result::{Estimate, Status};
 use crate::seed::{Draws, Stage};
@@ -99,10 +99,7 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
     for iteration in 0..ITERATIONS {
         let mut radius = Vec::new();
         for half in 0..2 {
-            let is_known = |slot: &u32| estimates[*slot as usize].status == Status::Ok;
-            let slots: Vec<u32> = (0..n as u32).filter(is_known).collect();
-            let point = |slot: &u32| estimates[*slot as usize].position.map(f64::from);
-            let points: Vec<[f64; D]> = slots.iter().map(point).collect();
+            let (slots, points) = known(&estimates);
             let Ok(tree) = Knn::new(&points) else { return Err(estimates) };
             if half == 0 {
                 radius = radii(&tree, &slots, lists);

@@ -9,7 +9,7 @@
 //!
 //! Step 3 is rough, and a layout may be folded. So the result counts only if clearly more listed records are then among the nearest.
 
-use std::cmp::Ordering;
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
@@ -169,8 +169,10 @@ impl Edges {
     fn shortest_paths(&self, from: usize) -> Vec<f32> {
         let mut length = vec![f32::INFINITY; self.of.len()];
         length[from] = 0.0;
-        let mut open = BinaryHeap::from([Open(0.0, from as u32)]);
-        while let Some(Open(reached, slot)) = open.pop() {
+        // The bits of lengths are ordered as they are.
+        let mut open = BinaryHeap::from([Reverse((0u32, from as u32))]);
+        while let Some(Reverse((bits, slot))) = open.pop() {
+            let reached = f32::from_bits(bits);
             if reached > length[slot as usize] {
                 continue;
             }
@@ -178,29 +180,11 @@ impl Edges {
                 let through = reached + edge;
                 if through < length[to as usize] {
                     length[to as usize] = through;
-                    open.push(Open(through, to));
+                    open.push(Reverse((through.to_bits(), to)));
                 }
             }
         }
         length
-    }
-}
-
-/// A slot in the queue of shortest paths; the shortest comes first.
-#[derive(PartialEq)]
-struct Open(f32, u32);
-
-impl Eq for Open {}
-
-impl PartialOrd for Open {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Open {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.0.total_cmp(&self.0).then(other.1.cmp(&self.1))
     }
 }
 

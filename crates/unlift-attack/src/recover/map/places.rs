@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::geometry::curve;
+use crate::geometry::vector::widen;
 use crate::recover::result::Estimate;
 
 /// Slots per parallel task: fixed, so that results do not depend on the number of threads.
@@ -25,6 +26,12 @@ pub(crate) fn sample<const D: usize>(
 ) -> impl Iterator<Item = [f32; D]> + '_ {
     let every = estimates.len().div_ceil(SAMPLE).max(1);
     estimates.iter().step_by(every).filter(|e| e.is_known()).map(|e| e.position)
+}
+
+/// Returns the slots that have a place, and their places.
+pub(crate) fn known<const D: usize>(estimates: &[Estimate<D>]) -> (Vec<u32>, Vec<[f64; D]>) {
+    let known = (0u32..).zip(estimates).filter(|(_, estimate)| estimate.is_known());
+    known.map(|(slot, estimate)| (slot, widen(&estimate.position))).unzip()
 }
 
 /// Returns the corners of a box around most known places.
