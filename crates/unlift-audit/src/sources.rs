@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use unlift::audit::NeighborsBy;
 use unlift::neighbors::sources::{self, Named, SourceEntry};
-use unlift::neighbors::{Needs, Neighborhoods, Overlap, Similarity, Source};
+use unlift::neighbors::{KeptPairs, Needs, Neighborhoods, Overlap, Similarity, Source};
 use unlift::released::Released;
 use unlift::{Descriptors, Error, RecordId};
 
@@ -92,10 +92,20 @@ impl<const D: usize> Source<D> for ByDescriptors {
     }
 
     fn lists(&self, released: &Released<D>, k: usize, seed: u64) -> Result<Neighborhoods, Error> {
+        self.lists_keeping(released, k, seed, &mut KeptPairs::default())
+    }
+
+    fn lists_keeping(
+        &self,
+        released: &Released<D>,
+        k: usize,
+        seed: u64,
+        kept: &mut KeptPairs,
+    ) -> Result<Neighborhoods, Error> {
         let (first, second) = candidates(released.descriptors());
-        let lists = first.lists(released, k, seed)?;
+        let lists = first.lists_keeping(released, k, seed, kept)?;
         let Some(second) = second else { return Ok(lists) };
-        let others = second.lists(released, k, seed)?;
+        let others = second.lists_keeping(released, k, seed, kept)?;
         let agreement = |lists| agreement(lists, released.slots_per_record());
         Ok(if agreement(&others) > BETTER * agreement(&lists) { others } else { lists })
     }

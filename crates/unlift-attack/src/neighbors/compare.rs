@@ -7,6 +7,7 @@ use std::sync::Mutex;
 use rayon::prelude::*;
 
 use super::alike;
+use super::kept::are_equal;
 use super::rows::Rows;
 use crate::simd::BLOCK;
 use crate::{Descriptors, Error};
@@ -32,6 +33,8 @@ const PARTNERS: usize = 64;
 
 /// A similarity of two descriptors. The score of a pair does not depend on its order.
 pub trait Likeness: Sync {
+    /// Name by which pair scores are kept.
+    const NAME: &'static str;
     /// Scores are rounded to multiples of this, so that their sums are exact in any order.
     const STEP: f32;
     /// [`BLOCK`] rows, prepared for comparison.
@@ -49,8 +52,9 @@ pub trait Likeness: Sync {
     fn scores(&self, a: &Self::Block, b: &Self::Block, scores: &mut [f32]);
 }
 
-/// Returns the `most` best partners of every row among the rows of other records. The search is exact up to `exact` rows. With more
-/// rows, similar rows are first made adjacent, and each block is compared with the blocks that have the most similar means.
+/// Returns the `most` best partners of every row among the rows of other records. The search is exact up to `exact` rows, and reads the
+/// scores of pairs that `kept` has. With more rows, similar rows are first made adjacent, and each block is compared with the blocks that
+/// have the most similar means.
 ///
 /// # Errors
 /// When there are more rows than `exact`, and the means of all blocks are equal.
@@ -59,10 +63,17 @@ pub fn search<L: Likeness>(
     rows: &mut Rows<'_>,
     most: usize,
     exact: usize,
+    kept: &mut KeptPairs,
 ) -> Result<Vec<Found>, Error> {
     let n_blocks = rows.len().div_ceil(BLOCK);
     if rows.len() <= exact {
-        return Ok(compare(likeness, rows, most, (&Pairs::all(n_blocks), None)));
+        let found = kept.0.as_ref().and_then(|all| all.found(likeness, rows, most));
+        let found = found.or_else(|| {
+            let all = kept.0.insert(Compared::new(likeness, rows, 2 * most + SPARE));
+            all.found(likeness, rows, most)
+        });
+        let anew = || finished::<L>(compare(likeness, rows, most, (&Pairs::all(n_blocks), None)));
+        return Ok(found.unwrap_or_else(anew));
     }
     rows.reorder(alike::order(&rows.descriptors, &rows.slots));
     let means = alike::means(&rows.descriptors, &rows.slots)?;
@@ -70,7 +81,126 @@ pub fn search<L: Likeness>(
     let all = Pairs::all(n_blocks.div_ceil(BLOCK));
     let alike = compare(likeness, &of_blocks, PARTNERS, (&all, None));
     let every = rows.len().div_ceil(USUAL);
-    Ok(compare(likeness, rows, most, (&chosen(&alike), Some(every))))
+    let pairs = chosen(&finished::<L>(alike));
+    Ok(finished::<L>(compare(likeness, rows, most, (&pairs, Some(every)))))
+}
+
+fn finished<L: Likeness>(rows: Vec<Row>) -> Vec<Found> {
+    rows.into_iter().map(|row| row.found(L::STEP)).collect()
+}
+
+/// Scores of all pairs of the descriptors of a map, for further maps that lack a few of them or put them into other records.
+#[derive(Clone, Debug, Default)]
+pub struct KeptPairs(Option<Compared>);
+
+#[cfg(test)]
+impl KeptPairs {
+    pub(super) fn n_rows(&self) -> usize {
+        self.0.as_ref().map_or(0, |all| all.slots.len())
+    }
+}
+
+/// Partners that are kept beyond those that the map needs, in place of those that another map lacks.
+const SPARE: usize = 8;
+/// Largest number of rows that another map may lack.
+const LACKING: usize = 4;
+
+/// Rows, each compared with all others as if every row were a record.
+#[derive(Clone, Debug)]
+struct Compared {
+    name: &'static str,
+    counts: bool,
+    most: usize,
+    descriptors: Descriptors,
+    slots: Vec<u32>,
+    rows: Vec<Row>,
+}
+
+impl Compared {
+    fn new<L: Likeness>(likeness: &L, rows: &Rows<'_>, most: usize) -> Self {
+        let all = Pairs::all(rows.len().div_ceil(BLOCK));
+        let mut found = compare(likeness, &rows.apart(), most, (&all, None));
+        found.par_iter_mut().for_each(|row| row.best.sort());
+        Self {
+            name: L::NAME,
+            counts: likeness.counts(),
+            most,
+            descriptors: rows.descriptors.clone().into_owned(),
+            slots: rows.slots.clone(),
+            rows: found,
+        }
+    }
+
+    /// Returns what [`search`] returns for `rows`; `None` if their scores do not follow from those of a few pairs.
+    ///
+    /// Sums of scores are exact in any order, so what rows must not count can be subtracted.
+    fn found<L: Likeness>(&self, likeness: &L, rows: &Rows<'_>, most: usize) -> Option<Vec<Found>> {
+        if (self.name, self.counts) != (L::NAME, likeness.counts()) {
+            return None;
+        }
+        // Both are ordered by content; of equal rows it does not matter which one is absent.
+        let (mut own, mut absent) = (Vec::with_capacity(rows.len()), Vec::new());
+        let mut row_of = vec![None; self.slots.len()];
+        for (at, &slot) in self.slots.iter().enumerate() {
+            let next = rows.slots.get(own.len());
+            let equals = |next| are_equal((&self.descriptors, slot), (&rows.descriptors, next));
+            if next.is_some_and(|&next| equals(next)) {
+                row_of[at] = Some(own.len() as u32);
+                own.push(at as u32);
+            } else {
+                absent.push(at as u32);
+            }
+        }
+        if own.len() < rows.len() || absent.len() > LACKING {
+            return None;
+        }
+        let record = |row: u32| rows.records[row as usize];
+        let mut by_record: Vec<u32> = (0..rows.len() as u32).collect();
+        by_record.sort_by_key(|&row| record(row));
+        let mut uncounted = Vec::new();
+        for rows in by_record.chunk_by(|&a, &b| record(a) == record(b)) {
+            for &a in rows {
+                let others = rows.iter().filter(|&&b| b != a);
+                uncounted.extend(others.map(|&b| (a, own[b as usize])));
+            }
+        }
+        for &at in &absent {
+            uncounted.extend((0..rows.len() as u32).map(|row| (row, at)));
+        }
+        let mut found: Vec<Row> = own.iter().map(|&at| self.rows[at as usize].clone()).collect();
+        if self.counts {
+            for (&(row, _), score) in uncounted.iter().zip(self.scores(likeness, &own, &uncounted))
+            {
+                found[row as usize].uncount(score, L::STEP);
+            }
+        }
+        let finish = |(at, mut row): (usize, Row)| {
+            let is_full = row.best.entries.len() == self.most;
+            let record = rows.records[at];
+            let other = |(score, other): (f32, u32)| Some((score, row_of[other as usize]?));
+            let others = row.best.entries.into_iter().filter_map(other);
+            let others = others.filter(|&(_, other)| rows.records[other as usize] != record);
+            row.best = Best { entries: others.take(most).collect(), ..Best::new(most) };
+            (!is_full || row.best.entries.len() == most).then(|| row.found(L::STEP))
+        };
+        found.into_par_iter().enumerate().map(finish).collect()
+    }
+
+    /// Returns the scores of pairs of a row, `own` of which is its place here, with a place here.
+    fn scores<L: Likeness>(&self, likeness: &L, own: &[u32], pairs: &[(u32, u32)]) -> Vec<f32> {
+        let block = |at: &mut dyn Iterator<Item = u32>| {
+            let slots: Vec<u32> = at.map(|at| self.slots[at as usize]).collect();
+            likeness.block(&self.descriptors, &slots)
+        };
+        let scratch = || vec![0.0f32; BLOCK * BLOCK];
+        let of_pairs = pairs.par_chunks(BLOCK).map_init(scratch, |scores, pairs| {
+            let a = block(&mut pairs.iter().map(|&(row, _)| own[row as usize]));
+            let b = block(&mut pairs.iter().map(|&(_, at)| at));
+            likeness.scores(&a, &b, scores);
+            (0..pairs.len()).map(|at| scores[at * BLOCK + at]).collect::<Vec<f32>>()
+        });
+        of_pairs.flatten_iter().collect()
+    }
 }
 
 /// Compares rows according to `pairs`; each row keeps its `most` best partners of other records. Mean and deviation come from all
@@ -82,7 +212,7 @@ fn compare<L: Likeness>(
     rows: &Rows<'_>,
     most: usize,
     (pairs, every): (&Pairs, Option<usize>),
-) -> Vec<Found> {
+) -> Vec<Row> {
     let kept: Vec<Mutex<Vec<Row>>> = rows
         .slots
         .chunks(BLOCK)
@@ -136,7 +266,7 @@ fn compare<L: Likeness>(
         Ok(rows) => rows,
         Err(poisoned) => poisoned.into_inner(),
     });
-    rows.map(|row| row.found(L::STEP)).collect()
+    rows.collect()
 }
 
 /// Rows spread over the map, for mean and deviation of scores.
@@ -181,6 +311,7 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     }
 }
 
+#[derive(Clone, Debug)]
 struct Row {
     best: Best,
     n: u64,
@@ -210,6 +341,15 @@ impl Row {
         self.n += n;
         self.sum += sum;
         self.squares += squares;
+    }
+
+    /// Takes back a counted score.
+    fn uncount(&mut self, score: f32, step: f32) {
+        let mut one = Self::new(0);
+        one.count(&[score], &[0], 1, step);
+        self.n -= one.n;
+        self.sum -= one.sum;
+        self.squares -= one.squares;
     }
 
     fn found(self, step: f32) -> Found {
@@ -305,10 +445,14 @@ impl Best {
         }
     }
 
-    /// Returns the kept entries, highest score first, equal scores by id.
-    pub fn into_sorted(mut self) -> Vec<(f32, u32)> {
+    fn sort(&mut self) {
         self.shrink();
         self.entries.sort_unstable_by(higher_first);
+    }
+
+    /// Returns the kept entries, highest score first, equal scores by id.
+    pub fn into_sorted(mut self) -> Vec<(f32, u32)> {
+        self.sort();
         self.entries
     }
 }
@@ -410,7 +554,7 @@ mod tests {
         exact: usize,
     ) -> Vec<Vec<(f32, u32)>> {
         let mut rows = Rows::of_all(descriptors);
-        let found = search(likeness, &mut rows, most, exact).unwrap();
+        let found = search(likeness, &mut rows, most, exact, &mut KeptPairs::default()).unwrap();
         let mut by_slot = vec![Vec::new(); rows.len()];
         for (found, &slot) in found.into_iter().zip(&rows.slots) {
             let best = found.best.into_iter();
@@ -460,6 +604,7 @@ mod tests {
         let all = Pairs::all(rows.len().div_ceil(BLOCK));
         let exact = compare(&patches, &rows, 1, (&all, None));
         let sampled = compare(&patches, &rows, 1, (&all, Some(3)));
+        let [exact, sampled] = [exact, sampled].map(finished::<Patches>);
         for (exact, sampled) in exact.iter().zip(&sampled) {
             let off = (exact.mean - sampled.mean).abs() / exact.deviation;
             assert!(off < 0.2, "{off}");

@@ -32,7 +32,6 @@ impl KeptLists {
         let slots = by_content(descriptors);
         let pairs = || self.slots.iter().zip(&slots);
         if self.slots.len() != slots.len()
-            || self.descriptors.dim() != descriptors.dim()
             || !pairs().all(|(&a, &b)| are_equal((&self.descriptors, a), (descriptors, b)))
         {
             return None;
@@ -56,9 +55,10 @@ impl KeptLists {
 }
 
 /// Whether two rows hold the same values.
-fn are_equal((a, i): (&Descriptors, u32), (b, j): (&Descriptors, u32)) -> bool {
+pub(super) fn are_equal((a, i): (&Descriptors, u32), (b, j): (&Descriptors, u32)) -> bool {
     let row = |at: u32| at as usize * a.dim()..(at as usize + 1) * a.dim();
     match (a.values(), b.values()) {
+        _ if a.dim() != b.dim() => false,
         (Values::U8(a), Values::U8(b)) => a[row(i)] == b[row(j)],
         (Values::F32(a), Values::F32(b)) => a[row(i)] == b[row(j)],
         _ => false,
@@ -69,36 +69,73 @@ fn are_equal((a, i): (&Descriptors, u32), (b, j): (&Descriptors, u32)) -> bool {
 mod tests {
     use super::KeptLists;
     use crate::descriptors::Values;
-    use crate::neighbors::{Overlap, Similarity, Source};
+    use crate::neighbors::{KeptPairs, Overlap, Similarity, Source};
     use crate::released::{AxisPlanes, Lines, Obfuscation, Released};
     use crate::seed::{Draws, Stage};
     use crate::{Descriptors, Unit};
 
     const N: usize = 300;
 
-    /// Returns a map whose record `at` has the descriptor `order[at]` of `rows`.
+    /// Returns a map whose slot `at` has the descriptor `order[at]` of `rows`.
     fn map(rows: &[[u8; 128]], order: &[usize], obfuscation: Obfuscation<3>) -> Released<3> {
         let values = order.iter().flat_map(|&at| rows[at]).collect();
         let descriptors = Descriptors::try_new(Values::U8(values), 128).unwrap();
-        Released::try_new(obfuscation, 1, [0.0; 3], Unit::Meter, Some(descriptors)).unwrap()
+        let slots = order.len() / obfuscation.len();
+        Released::try_new(obfuscation, slots, [0.0; 3], Unit::Meter, Some(descriptors)).unwrap()
     }
 
-    #[test]
-    fn kept_lists_equal_those_of_the_map_alone() {
+    fn lines(n: usize) -> Obfuscation<3> {
+        let direction = |at: usize| [(at as f64).sin(), (at as f64).cos(), 1.0];
+        let directions: Vec<[f64; 3]> = (0..n).map(direction).collect();
+        Obfuscation::Lines(Lines::through(&vec![[0.0; 3]; n], &directions).unwrap())
+    }
+
+    fn random() -> Vec<[u8; 128]> {
         let mut draws = Draws::new(5, Stage::Synthetic, 1);
         let mut rows = vec![[0u8; 128]; N];
         rows.iter_mut().flatten().for_each(|value| *value = draws.below(90) as u8);
         // Equal descriptors are ordered by their slots.
         (rows[7], rows[8]) = (rows[100], rows[100]);
-        let direction = |at: usize| [(at as f64).sin(), (at as f64).cos(), 1.0];
-        let directions: Vec<[f64; 3]> = (0..N).map(direction).collect();
-        let lines = Lines::through(&vec![[0.0; 3]; N], &directions).unwrap();
+        rows
+    }
+
+    #[test]
+    fn lists_from_kept_pairs_equal_those_of_the_map_alone() {
+        let rows = random();
+        let all: Vec<usize> = (0..N).map(|at| at * 77 % N).collect();
+        let without = |dropped: &[usize]| -> Vec<usize> {
+            all.iter().copied().filter(|at| !dropped.contains(at)).collect()
+        };
+        let sources: [&dyn Source<3>; 2] = [&Similarity, &Overlap];
+        for source in sources {
+            let mut kept = KeptPairs::default();
+            for (order, slots, n_kept) in [
+                (without(&[]), 1, N),
+                (without(&[41]), 1, N),
+                (without(&[8]), 1, N),
+                (without(&[]), 2, N),
+                (without(&[7, 200]), 2, N),
+                // Too few are left to be told from kept ones.
+                (without(&[1, 2, 3, 4, 5, 6]), 2, N - 6),
+                (without(&[]), 1, N),
+            ] {
+                let map = map(&rows, &order, lines(order.len() / slots));
+                let lists = source.lists_keeping(&map, 12, 0, &mut kept).unwrap();
+                assert_eq!(lists, source.lists(&map, 12, 0).unwrap(), "{} {n_kept}", source.name());
+                assert_eq!(kept.n_rows(), n_kept);
+            }
+        }
+    }
+
+    #[test]
+    fn kept_lists_equal_those_of_the_map_alone() {
+        let mut rows = random();
         let planes =
             AxisPlanes::try_new(vec![0; N], &(0..N).map(|at| at as f64).collect::<Vec<_>>())
                 .unwrap();
         let identity: Vec<usize> = (0..N).collect();
         let shuffled: Vec<usize> = (0..N).map(|at| at * 77 % N).collect();
-        let a = map(&rows, &identity, Obfuscation::Lines(lines));
+        let a = map(&rows, &identity, lines(N));
         let b = map(&rows, &shuffled, Obfuscation::AxisPlanes(planes));
         let sources: [&dyn Source<3>; 2] = [&Similarity, &Overlap];
         for source in sources {

@@ -22,6 +22,7 @@ pub mod sources;
 mod walk;
 
 pub use bearings::{REAL, support};
+pub use compare::KeptPairs;
 pub(crate) use compare::MOST_ROWS;
 pub use dense::{Dense, dense, usual};
 pub(crate) use geometric::geometric_by;

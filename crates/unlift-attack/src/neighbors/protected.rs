@@ -49,6 +49,7 @@ pub struct Sets {
 }
 
 impl Likeness for Shared {
+    const NAME: &'static str = "protected";
     const STEP: f32 = 1.0 / 1_024.0;
     type Block = Sets;
 

@@ -98,6 +98,20 @@ impl<'a> Rows<'a> {
         }
     }
 
+    /// Returns the same rows, each as a record of its own.
+    pub fn apart(&self) -> Rows<'_> {
+        let (slots, records) = (self.slots.clone(), (0..self.len() as u32).collect());
+        let descriptors = Cow::Borrowed(&*self.descriptors);
+        Rows {
+            descriptors,
+            slots,
+            records,
+            n_records: self.len(),
+            slots_per_record: 1,
+            about: self.about,
+        }
+    }
+
     /// Sets another order of slots.
     pub fn reorder(&mut self, slots: Vec<u32>) {
         self.records = records_of(&slots, self.slots_per_record);

@@ -9,7 +9,7 @@ use std::collections::{BinaryHeap, HashMap};
 
 use rayon::prelude::*;
 
-use super::compare::{Best, MOST_ROWS, higher_first, search};
+use super::compare::{Best, KeptPairs, MOST_ROWS, higher_first, search};
 use super::overlap::Patches;
 use super::rows::Rows;
 use super::similarity::Cosine;
@@ -42,7 +42,8 @@ pub type Scores<'a> = dyn Fn(&Part) -> Result<Vec<f32>, Error> + Sync + 'a;
 
 /// Lists the `k` records nearest to each slot by `scores`. For SIFT, lists those that two short walks are most likely to reach, one
 /// over these records and one as in [`overlap`](super::overlap()). The score is the logarithm of the probability that a record is among
-/// the nearest, or of the discounted probability to be reached; the mean over both ends or walks.
+/// the nearest, or of the discounted probability to be reached; the mean over both ends or walks. Untrained scores of pairs come from
+/// `pairs` and are kept there.
 ///
 /// # Errors
 /// When `scores` fails, the map has no descriptors, or it has fewer than `k` other records.
@@ -50,14 +51,15 @@ pub fn scored<const D: usize>(
     released: &Released<D>,
     k: usize,
     scores: &Scores<'_>,
+    pairs: &mut KeptPairs,
 ) -> Result<Neighborhoods, Error> {
     let mut rows = Rows::new(released, k)?;
     let enough = rows.enough_for(k);
     let kept = enough.max(CANDIDATES);
     let patches = Patches::of(&rows.descriptors).ok();
     let found = match &patches {
-        Some(patches) => search(patches, &mut rows, kept, MOST_ROWS)?,
-        None => search(&Cosine { counts: true }, &mut rows, kept, MOST_ROWS)?,
+        Some(patches) => search(patches, &mut rows, kept, MOST_ROWS, pairs)?,
+        None => search(&Cosine { counts: true }, &mut rows, kept, MOST_ROWS, pairs)?,
     };
     let untrained = walk::standardized(&found);
     let n = rows.len();
@@ -387,17 +389,28 @@ mod tests {
     #[test]
     fn what_scores_call_near_is_listed_in_one_set_and_in_several() {
         for n in [300, WHOLE + 500] {
-            let right = right(&scored(&released(n, true), 10, &alike).unwrap(), n, 10);
+            let right = right(
+                &scored(&released(n, true), 10, &alike, &mut KeptPairs::default()).unwrap(),
+                n,
+                10,
+            );
             assert!(right > 0.9, "{n} points: {right}");
         }
         // Scores alone decide the lists of others than SIFT.
-        let right = right(&scored(&released(300, false), 10, &opposite).unwrap(), 300, 10);
+        let right = right(
+            &scored(&released(300, false), 10, &opposite, &mut KeptPairs::default()).unwrap(),
+            300,
+            10,
+        );
         assert!(right < 0.15, "{right}");
     }
 
     #[test]
     fn scores_that_are_none_are_refused() {
-        let scored = |values: Vec<f32>| scored(&released(20, true), 5, &|_| Ok(values.clone()));
+        let scored = |values: Vec<f32>| {
+            let scores = |_: &Part| Ok(values.clone());
+            scored(&released(20, true), 5, &scores, &mut KeptPairs::default())
+        };
         for (values, found) in [
             (vec![0.0; 7], "7"),
             (vec![f32::NAN; 400], "NaN"),

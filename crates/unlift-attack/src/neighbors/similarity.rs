@@ -1,7 +1,7 @@
 //! The source `similarity`: near points have similar descriptors of any kind.
 
 use super::Neighborhoods;
-use super::compare::{Likeness, MOST_ROWS, note, search};
+use super::compare::{KeptPairs, Likeness, MOST_ROWS, note, search};
 use super::protected::Shared;
 use super::rows::Rows;
 use super::source::{Needs, Source};
@@ -33,13 +33,23 @@ pub fn similarity<const D: usize>(
     released: &Released<D>,
     k: usize,
 ) -> Result<Neighborhoods, Error> {
+    keeping(released, k, &mut KeptPairs::default())
+}
+
+fn keeping<const D: usize>(
+    released: &Released<D>,
+    k: usize,
+    kept: &mut KeptPairs,
+) -> Result<Neighborhoods, Error> {
     let counts = released.descriptors().is_some_and(are_learned);
     let protected = released.protected();
     match protected.and_then(|protected| Some((protected, Shared::new(protected, counts)?))) {
         Some((protected, shared)) => {
-            ranked_by(&shared, Rows::of_map(protected.rows(), released, k)?, k)
+            // Protected descriptors differ between maps, and so does their likeness.
+            let rows = Rows::of_map(protected.rows(), released, k)?;
+            ranked_by(&shared, rows, k, &mut KeptPairs::default())
         }
-        None => ranked_by(&Cosine { counts }, Rows::new(released, k)?, k),
+        None => ranked_by(&Cosine { counts }, Rows::new(released, k)?, k, kept),
     }
 }
 
@@ -48,15 +58,16 @@ fn ranked_by<L: Likeness>(
     likeness: &L,
     mut rows: Rows<'_>,
     k: usize,
+    kept: &mut KeptPairs,
 ) -> Result<Neighborhoods, Error> {
     let enough = rows.enough_for(k);
     if !likeness.counts() {
-        let found = search(likeness, &mut rows, enough, MOST_ROWS)?;
+        let found = search(likeness, &mut rows, enough, MOST_ROWS, kept)?;
         let ranked: Vec<_> = found.into_iter().map(|found| found.best).collect();
         return rows.lists(&ranked, k);
     }
     let most = enough.max(walk::CANDIDATES);
-    let found = search(likeness, &mut rows, most, MOST_ROWS)?;
+    let found = search(likeness, &mut rows, most, MOST_ROWS, kept)?;
     let ranked = walk::standardized(&found);
     rows.lists(&walk::walk(&ranked, &rows.records, enough, WALK), k)
 }
@@ -94,6 +105,16 @@ impl<const D: usize> Source<D> for Similarity {
         similarity(released, k)
     }
 
+    fn lists_keeping(
+        &self,
+        released: &Released<D>,
+        k: usize,
+        _: u64,
+        kept: &mut KeptPairs,
+    ) -> Result<Neighborhoods, Error> {
+        keeping(released, k, kept)
+    }
+
     fn reads_descriptors_alone(&self) -> bool {
         true
     }
@@ -120,6 +141,7 @@ pub struct Units {
 }
 
 impl Likeness for Cosine {
+    const NAME: &'static str = "cosine";
     /// Finer than any relevant difference.
     const STEP: f32 = 1.0 / 32_768.0;
     type Block = Units;

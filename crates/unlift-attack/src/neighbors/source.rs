@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use super::Neighborhoods;
+use super::{KeptPairs, Neighborhoods};
 use crate::released::Released;
 use crate::{About, Descriptors, Error, RowOrder};
 
@@ -56,6 +56,22 @@ pub trait Source<const D: usize>: Debug + Send + Sync {
             (Needs::Descriptors, Some(descriptors)) => self.takes(descriptors),
             (Needs::Descriptors, None) => Err(lacks_descriptors(self.name())),
         }
+    }
+
+    /// Returns the lists of [`lists`](Self::lists). A source that compares all descriptors of a map keeps the scores of pairs, for further
+    /// maps with nearly the same descriptors.
+    ///
+    /// # Errors
+    /// When [`lists`](Self::lists) fails.
+    fn lists_keeping(
+        &self,
+        released: &Released<D>,
+        k: usize,
+        seed: u64,
+        kept: &mut KeptPairs,
+    ) -> Result<Neighborhoods, Error> {
+        let _ = kept;
+        self.lists(released, k, seed)
     }
 
     /// Whether lists follow from the descriptors alone, whatever their order, without the records and the seed. Then an audit makes

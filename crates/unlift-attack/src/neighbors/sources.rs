@@ -3,11 +3,11 @@
 use std::any::Any;
 use std::sync::Arc;
 
-use super::Neighborhoods;
 use super::geometric::Geometric;
 use super::overlap::Overlap;
 use super::similarity::Similarity;
 use super::source::{Needs, Source};
+use super::{KeptPairs, Neighborhoods};
 use crate::released::Released;
 use crate::{Descriptors, Error};
 
@@ -143,6 +143,17 @@ impl<const D: usize> Source<D> for Chosen<D> {
 
     fn lists(&self, released: &Released<D>, k: usize, seed: u64) -> Result<Neighborhoods, Error> {
         self.source.lists(released, k, seed).map_err(|error| error.within(self.name()))
+    }
+
+    fn lists_keeping(
+        &self,
+        released: &Released<D>,
+        k: usize,
+        seed: u64,
+        kept: &mut KeptPairs,
+    ) -> Result<Neighborhoods, Error> {
+        let lists = self.source.lists_keeping(released, k, seed, kept);
+        lists.map_err(|error| error.within(self.name()))
     }
 
     fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {

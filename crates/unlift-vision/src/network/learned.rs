@@ -5,7 +5,8 @@ use std::sync::{Arc, OnceLock};
 use unlift::descriptors::Values;
 use unlift::neighbors::sources::SourceEntry;
 use unlift::neighbors::{
-    DescriptorKind, Needs, Neighborhoods, Overlap, Part, Similarity, Source, dense, scored,
+    DescriptorKind, KeptPairs, Needs, Neighborhoods, Overlap, Part, Similarity, Source, dense,
+    scored,
 };
 use unlift::released::Released;
 use unlift::{Descriptors, Error};
@@ -73,8 +74,18 @@ impl<const D: usize> Source<D> for Learned {
         }
     }
 
-    fn lists(&self, released: &Released<D>, k: usize, _: u64) -> Result<Neighborhoods, Error> {
-        scored(released, k, &|part| scores(network(&part.descriptors)?, part))
+    fn lists(&self, released: &Released<D>, k: usize, seed: u64) -> Result<Neighborhoods, Error> {
+        self.lists_keeping(released, k, seed, &mut KeptPairs::default())
+    }
+
+    fn lists_keeping(
+        &self,
+        released: &Released<D>,
+        k: usize,
+        _: u64,
+        kept: &mut KeptPairs,
+    ) -> Result<Neighborhoods, Error> {
+        scored(released, k, &|part| scores(network(&part.descriptors)?, part), kept)
     }
 
     fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {

@@ -1,11 +1,12 @@
 //! Neighborhoods of one obfuscation, from every source of a plan.
 
 use std::cell::RefCell;
+use std::collections::BTreeMap;
 
 use super::plan::{NeighborsBy, Plan, Variant};
 use crate::geometry::knn::Knn;
 use crate::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
-use crate::neighbors::{KeptLists, Neighborhoods, Source, of_what_there_is};
+use crate::neighbors::{KeptLists, KeptPairs, Neighborhoods, Source, of_what_there_is};
 use crate::released::Released;
 use crate::truth::Secret;
 use crate::{About, Error, RowOrder};
@@ -24,30 +25,31 @@ pub struct Made {
     pub ratio_at_k: Option<f64>,
 }
 
-/// Lists of sources that read descriptors alone, kept by the name of the source for further schemes and repeats.
+/// Lists and pair scores of sources that read descriptors alone, kept by the name of the source for further schemes and repeats.
 #[derive(Debug, Default)]
-pub struct Kept(RefCell<Vec<(String, KeptLists)>>);
+pub struct Kept(RefCell<BTreeMap<String, (Option<KeptLists>, KeptPairs)>>);
 
 impl Kept {
-    /// Returns the lists of `source` for `released`: kept ones if they apply, else new ones.
+    /// Returns the lists of `source` for `released`: kept ones if they apply, else new ones, from kept pair scores if they apply.
     fn lists<const D: usize>(
         &self,
         source: &dyn Source<D>,
         released: &Released<D>,
         seed: u64,
     ) -> Result<Neighborhoods, Error> {
-        let make = || source.lists(released, source.k(released), seed);
+        let k = source.k(released);
         if !source.reads_descriptors_alone() {
-            return make();
+            return source.lists(released, k, seed);
         }
         let mut kept = self.0.borrow_mut();
-        let of_source = kept.iter().find(|(name, _)| name == source.name());
-        if let Some((_, lists)) = of_source {
-            return lists.of(released).map_or_else(make, Ok);
+        let (kept, pairs) = kept.entry(source.name().to_owned()).or_default();
+        if let Some(lists) = kept.as_ref().and_then(|kept| kept.of(released)) {
+            return Ok(lists);
         }
-        let lists = make()?;
-        let new = KeptLists::new(released, &lists);
-        kept.extend(new.map(|new| (source.name().to_owned(), new)));
+        let lists = source.lists_keeping(released, k, seed, pairs)?;
+        if kept.is_none() {
+            *kept = KeptLists::new(released, &lists);
+        }
         Ok(lists)
     }
 }

@@ -7,7 +7,7 @@ mod hypotheses;
 
 use hypotheses::{BINS, CELLS, Cell, DIM, Hypotheses, Version};
 
-use super::compare::{Likeness, MOST_ROWS, note, search};
+use super::compare::{KeptPairs, Likeness, MOST_ROWS, note, search};
 use super::rows::Rows;
 use super::source::{Needs, Source};
 use super::walk::Walk;
@@ -32,10 +32,18 @@ pub const WALK: Walk = Walk { steps: 5, decay: 0.7 };
 /// # Errors
 /// When the map has no SIFT descriptors, or fewer than `k` other records.
 pub fn overlap<const D: usize>(released: &Released<D>, k: usize) -> Result<Neighborhoods, Error> {
+    keeping(released, k, &mut KeptPairs::default())
+}
+
+fn keeping<const D: usize>(
+    released: &Released<D>,
+    k: usize,
+    kept: &mut KeptPairs,
+) -> Result<Neighborhoods, Error> {
     let mut rows = Rows::new(released, k)?;
     let enough = rows.enough_for(k);
     let patches = Patches::of(&rows.descriptors)?;
-    let found = search(&patches, &mut rows, enough.max(walk::CANDIDATES), MOST_ROWS)?;
+    let found = search(&patches, &mut rows, enough.max(walk::CANDIDATES), MOST_ROWS, kept)?;
     let ranked = walk::standardized(&found);
     rows.lists(&walk::walk(&ranked, &rows.records, enough, WALK), k)
 }
@@ -60,6 +68,16 @@ impl<const D: usize> Source<D> for Overlap {
 
     fn lists(&self, released: &Released<D>, k: usize, _: u64) -> Result<Neighborhoods, Error> {
         overlap(released, k)
+    }
+
+    fn lists_keeping(
+        &self,
+        released: &Released<D>,
+        k: usize,
+        _: u64,
+        kept: &mut KeptPairs,
+    ) -> Result<Neighborhoods, Error> {
+        keeping(released, k, kept)
     }
 
     fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
@@ -125,6 +143,7 @@ impl Patches {
 }
 
 impl Likeness for Patches {
+    const NAME: &'static str = "overlap";
     /// Scores are integers.
     const STEP: f32 = 1.0;
     type Block = Block;
