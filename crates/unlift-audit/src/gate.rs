@@ -6,7 +6,7 @@
 //!
 //! `ppl@0.5:0.10<=20` fails if more than 20 % of the points are recovered within 0.10 under `ppl`
 //! at inlier ratio 0.5. `SCHEME` may be `all`. Without `@RATIO`, a solver or a source, all of them
-//! count. Every noise model and K counts. The strongest attack decides. Without a solver and a
+//! count. Every noise model and K counts. The upper end of the 95 % interval of the strongest attack decides. Without a solver and a
 //! source, attacks that need no neighborhoods count as well (the blind guess and records alone).
 //! `:gain` bounds what neighborhoods add to the larger of these two baselines, in percentage
 //! points. `SCHEME:localization<=MULTIPLE` fails if the error of localization exceeds the
@@ -15,7 +15,7 @@
 //! `sequence@5`, `sequence+lists@5` and `tracks@5` are sources: `dcl2d:sequence@5:10<=20` bounds what comes back from
 //! five queries, `olc:again:0.10<=20` what comes back from two releases of a map.
 
-use unlift::audit::{NeighborsBy, NotAudited, Plan, Row, Threshold};
+use unlift::audit::{Estimate, NeighborsBy, NotAudited, Plan, Row, Threshold};
 use unlift::neighbors::Needs;
 use unlift::neighbors::oracle::Noise;
 use unlift::recover::Builtin;
@@ -70,14 +70,24 @@ pub struct Candidate<'a> {
     pub inlier_ratio: Option<f64>,
     /// The threshold's value.
     pub threshold: f64,
-    /// Percentage recovered within the threshold.
-    pub recovered_percent: f64,
-    /// Percentage recovered by an attacker without neighborhoods.
-    pub baseline_percent: f64,
+    /// Share recovered within the threshold.
+    pub recovered: Estimate,
+    /// Share recovered by an attacker without neighborhoods.
+    pub baseline: Estimate,
 }
 
-fn worse(a: f64, b: f64) -> f64 {
-    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
+/// A figure that a gate bounds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounded {
+    /// The figure, in percent or percentage points.
+    pub found: f64,
+    /// Upper end of its 95 % interval, which the bound limits.
+    pub highest: f64,
+}
+
+/// Returns the one with the larger upper end; what is no number is largest.
+fn worse(a: Bounded, b: Bounded) -> Bounded {
+    if a.highest.is_nan() || a.highest >= b.highest { a } else { b }
 }
 
 impl Gate {
@@ -133,25 +143,32 @@ impl Gate {
 
     /// Returns the largest bounded figure among `candidates`. `None` if the gate covers none of
     /// them, which must never count as passing.
-    pub fn worst<'a>(&self, candidates: impl IntoIterator<Item = Candidate<'a>>) -> Option<f64> {
+    pub fn worst<'a>(
+        &self,
+        candidates: impl IntoIterator<Item = Candidate<'a>>,
+    ) -> Option<Bounded> {
+        let of = |share: Estimate| Bounded { found: share.percent, highest: share.interval[1] };
         candidates
             .into_iter()
             .filter(|c| self.covers(c))
             .map(|c| match self.figure {
                 Figure::Recovered if self.solver.is_none() && self.source.is_none() => {
-                    worse(c.recovered_percent, c.baseline_percent)
+                    worse(of(c.recovered), of(c.baseline))
                 }
-                Figure::Recovered => c.recovered_percent,
-                Figure::Gain => c.recovered_percent - c.baseline_percent,
+                Figure::Recovered => of(c.recovered),
+                Figure::Gain => Bounded {
+                    found: c.recovered.percent - c.baseline.percent,
+                    highest: c.recovered.highest_gain(&c.baseline),
+                },
                 // Not a figure of a row.
-                Figure::Localization => f64::NAN,
+                Figure::Localization => Bounded { found: f64::NAN, highest: f64::NAN },
             })
             .reduce(worse)
     }
 
-    /// Returns true if a figure is within the bound. NaN is not.
-    pub fn passes(&self, found_percent: f64) -> bool {
-        found_percent <= self.bound_percent
+    /// Returns true if the upper end of a figure is within the bound. NaN is not.
+    pub fn passes(&self, highest: f64) -> bool {
+        highest <= self.bound_percent
     }
 }
 
@@ -322,6 +339,7 @@ fn candidates<'a>(
     thresholds: &[Threshold],
     rows: &'a [Row],
 ) -> Vec<(Candidate<'a>, &'a Row, usize)> {
+    let unknown = Estimate { percent: f64::NAN, interval: [f64::NAN; 2] };
     let mut candidates = Vec::new();
     for row in rows {
         for (at, threshold) in thresholds.iter().enumerate() {
@@ -331,8 +349,8 @@ fn candidates<'a>(
                 source: &row.neighbors,
                 inlier_ratio: row.oracle_noise.is_some().then_some(row.inlier_ratio),
                 threshold: threshold.value,
-                recovered_percent: row.recovered_percent[at],
-                baseline_percent: row.baseline_percent(&threshold.label).unwrap_or(f64::NAN),
+                recovered: row.recovered(&threshold.label).unwrap_or(unknown),
+                baseline: row.baseline(&threshold.label).unwrap_or(unknown),
             };
             candidates.push((candidate, row, at));
         }
@@ -484,13 +502,14 @@ pub fn gate_results(
         if gate.figure == Figure::Localization {
             return Ok(of_localization(gate, localization, not_audited));
         }
-        let found_percent = gate.worst(rows.iter().map(|(candidate, ..)| *candidate));
-        let of = found_percent.and_then(|found| {
+        let worst = gate.worst(rows.iter().map(|(candidate, ..)| *candidate));
+        let of = worst.and_then(|worst| {
             let decides = |candidate| {
-                gate.worst([candidate]).is_some_and(|one| one.total_cmp(&found).is_eq())
+                let is_same = |one: Bounded| one.highest.total_cmp(&worst.highest).is_eq();
+                gate.worst([candidate]).is_some_and(is_same)
             };
             let (_, row, at) = rows.iter().find(|(candidate, ..)| decides(*candidate))?;
-            Some(in_words(gate, found, row, *at, &tried.thresholds[*at]))
+            Some(in_words(gate, worst.found, row, *at, &tried.thresholds[*at]))
         });
         let is_about = |rows: &[(Candidate<'_>, &Row, usize)]| {
             rows.iter().any(|(candidate, ..)| gate.covers(candidate))
@@ -501,22 +520,29 @@ pub fn gate_results(
             let (scheme, with) = (&missing.scheme, with.unwrap_or_default());
             format!("{scheme}{with} was not audited: {}", missing.reason)
         });
-        let keeps = found_percent.is_some_and(|found| gate.passes(found));
+        let keeps = worst.is_some_and(|worst| gate.passes(worst.highest));
         let mut covered = rows.iter().filter(|(candidate, ..)| gate.covers(candidate));
         let of_noise = || covered.find_map(|(_, row, _)| noise(row, gate.threshold));
         let doubt = doubt.map(|doubt| doubt.to_string()).or_else(of_noise);
         let doubt = || doubt.or_else(|| untried(gate, tried));
         let reason = reason.or_else(|| if keeps { doubt() } else { None });
         // A gate without a row must never count as held.
-        if found_percent.is_none() && reason.is_none() {
+        if worst.is_none() && reason.is_none() {
             return Err(Error::request(format!(
                 "--gate {}: expected a row, found none",
                 gate.typed
             )));
         }
         let passed = reason.is_none() && keeps;
-        let (gate, bound_percent) = (gate.typed.clone(), gate.bound_percent);
-        Ok(GateResult { gate, found_percent, of, bound_percent, passed, reason })
+        Ok(GateResult {
+            gate: gate.typed.clone(),
+            found_percent: worst.map(|worst| worst.found),
+            highest_percent: worst.map(|worst| worst.highest),
+            of,
+            bound_percent: gate.bound_percent,
+            passed,
+            reason,
+        })
     };
     gates.iter().map(result).collect()
 }
@@ -576,6 +602,7 @@ fn of_localization(
     GateResult {
         gate: gate.typed.clone(),
         found_percent,
+        highest_percent: None,
         of: worst.map(|one| format!("{}, {}", one.scheme, by(one))),
         bound_percent: gate.bound_percent,
         passed: reason.is_none() && found_percent.is_some_and(|found| gate.passes(found)),
@@ -587,6 +614,10 @@ fn of_localization(
 mod tests {
     use super::*;
 
+    fn exactly(percent: f64) -> Estimate {
+        Estimate { percent, interval: [percent; 2] }
+    }
+
     fn row(scheme: &str, inlier_ratio: f64, recovered_percent: f64) -> Candidate<'_> {
         Candidate {
             scheme,
@@ -594,8 +625,8 @@ mod tests {
             source: "oracle",
             inlier_ratio: Some(inlier_ratio),
             threshold: 0.1,
-            recovered_percent,
-            baseline_percent: 6.0,
+            recovered: exactly(recovered_percent),
+            baseline: exactly(6.0),
         }
     }
 
@@ -628,7 +659,7 @@ mod tests {
         let own = Candidate { source: "overlap", inlier_ratio: None, ..row("ppl", 0.1, 15.0) };
         let sources = &[row("ppl", 0.5, 30.0), weak, own][..];
         // `olc` with `similarity` recovered 58.6 % but records alone 66.6 %, and a gate of 60 held.
-        let alone = &[Candidate { baseline_percent: 66.6, ..row("olc", 0.5, 58.6) }][..];
+        let alone = &[Candidate { baseline: exactly(66.6), ..row("olc", 0.5, 58.6) }][..];
         let measured = &[Candidate { inlier_ratio: None, ..row("ppl", 0.5, 18.0) }][..];
         let others = &[row("ppl", 1.0, 99.0), row("olc", 0.5, 98.0), row("ppl", 0.5, 18.0)][..];
         for (text, rows, expected) in [
@@ -650,13 +681,19 @@ mod tests {
             ("olc:joint:0.10<=60", alone, Some(58.6)),
             ("olc:oracle:0.10<=60", alone, Some(58.6)),
         ] {
-            assert_eq!(Gate::parse(text).unwrap().worst(rows.iter().copied()), expected, "{text}");
+            let worst = Gate::parse(text).unwrap().worst(rows.iter().copied());
+            assert_eq!(worst.map(|worst| worst.found), expected, "{text}");
         }
+        // The upper end of an interval counts, and decides which row is the worst.
+        let within = |percent, high| Estimate { percent, interval: [0.0, high] };
+        let few = Candidate { recovered: within(18.0, 22.0), ..row("ppl", 0.5, 0.0) };
         let gate = Gate::parse("all:0.1<=20").unwrap();
+        let worst = gate.worst([few, row("olc", 0.5, 19.0)]).unwrap();
+        assert_eq!(worst, Bounded { found: 18.0, highest: 22.0 });
         assert!(!gate.passes(21.0) && gate.passes(20.0));
         // A figure that is no number fails, whatever the other figures.
         let rows = [row("ppl", 1.0, 3.0), row("ppl", 0.5, f64::NAN), row("ppl", 0.3, 2.0)];
-        assert!(!gate.passes(f64::NAN) && !gate.passes(gate.worst(rows).unwrap()));
+        assert!(!gate.passes(f64::NAN) && !gate.passes(gate.worst(rows).unwrap().highest));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //! descriptors.
 
 use unlift::Descriptors;
-use unlift::audit::{Alone, Threshold};
+use unlift::audit::{Alone, Share, Threshold};
 use unlift::evaluate::correlation;
 use unlift::geometry::vector::distance;
 use unlift::released::Released;
@@ -29,15 +29,14 @@ pub fn read_from_file(
         let is_near = |&slot: &usize| {
             columns.iter().any(|rows| distance(&rows[slot / slots], point(slot)) <= threshold)
         };
-        let n = (0..secret.n_slots()).filter(is_near).count();
-        100.0 * n as f64 / secret.n_slots().max(1) as f64
+        (0..secret.n_slots()).filter(is_near).count()
     };
     let best = |t: &Threshold| {
-        let percent = columns.iter().map(|of| within(of, t.value)).fold(0.0, f64::max);
-        (t.label.clone(), percent)
+        let n = columns.iter().map(|of| within(of, t.value)).max().unwrap_or(0);
+        (t.label.clone(), Share::of(n as f64, secret.n_slots() as f64))
     };
-    let percent = thresholds.iter().map(best).collect();
-    (!published.is_empty()).then_some(Alone { name: "read from the file", percent })
+    let shares = thresholds.iter().map(best).collect();
+    (!published.is_empty()).then_some(Alone { name: "read from the file", shares })
 }
 
 /// Returns doubts about released data whose rows or columns follow the places of the points, which no attack uses.

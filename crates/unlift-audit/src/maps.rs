@@ -244,7 +244,7 @@ impl Map<'_> {
         };
         // Of values that are no better than a blind guess there is nothing to say.
         let beats = |alone: &&Alone, row: &Row| {
-            alone.percent.values().zip(row.blind_percent.values()).any(|(a, b)| a > b)
+            alone.shares.iter().any(|(label, share)| share.percent() > row.blind_percent[label])
         };
         let read = hidden.and_then(|hidden| hidden.read.as_ref());
         for row in &mut outcome.rows {

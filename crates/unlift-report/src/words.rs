@@ -1,6 +1,7 @@
 //! Numbers and names in words: thresholds, shares, ratios, schemes, reasons.
 
 use unlift::Unit;
+use unlift::audit::Interval;
 
 /// Returns the title of a scheme, with its changes to the map: `olc_thin4` is "Random lines, thin4". An
 /// unknown scheme keeps its name.
@@ -135,6 +136,11 @@ pub(crate) fn significant(value: f64, digits: usize) -> String {
 
 pub(crate) fn percent(value: f64) -> String {
     format!("{value:.1}")
+}
+
+/// Returns the ends of an interval: "45.9 to 47.3".
+pub(crate) fn interval([low, high]: Interval) -> String {
+    format!("{} to {}", percent(low), percent(high))
 }
 
 /// Returns "if half of the neighbors were known", for any inlier ratio.

@@ -37,6 +37,9 @@ impl Document {
             if let Some(found) = gate.found_percent {
                 finite(&format!("gates[{i}].found_percent"), found)?;
             }
+            if let Some(highest) = gate.highest_percent {
+                finite(&format!("gates[{i}].highest_percent"), highest)?;
+            }
             finite(&format!("gates[{i}].bound_percent"), gate.bound_percent)?;
             if gate.passed && (gate.found_percent.is_none() || gate.reason.is_some()) {
                 let expected = "false where a figure is not known";
@@ -128,6 +131,18 @@ fn check_row(place: &str, row: &Row) -> Result<(), Error> {
         ("std.blind_percent", std.map(|std| &std.blind_percent)),
     ] {
         map.map_or(Ok(()), |map| percentages(&format!("{place}.{field}"), map))?;
+    }
+    let of = row.interval.as_ref();
+    for (field, intervals) in [
+        ("recovered_percent", of.map(|of| &of.recovered_percent)),
+        ("blind_percent", of.map(|of| &of.blind_percent)),
+        ("records_alone_percent", of.map(|of| &of.records_alone_percent)),
+    ] {
+        for (typed, [low, high]) in intervals.into_iter().flatten() {
+            let place = format!("{place}.interval.{field}[{typed:?}]");
+            between(&place, *low, 0.0, *high)?;
+            between(&place, *high, *low, 100.0)?;
+        }
     }
     if let (Some(sure), Some(reason)) = (row.sure_percent, &row.sure_unknown) {
         let expected = format!("null, as sure_unknown says {reason:?}");

@@ -11,8 +11,8 @@ use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 pub use unlift::audit::{
-    Bound, BreakEven, ByReason, ByThreshold, Distinct, NotAudited, ReliabilityBin, Row, STRONGEST,
-    Spread,
+    Bound, BreakEven, ByReason, ByThreshold, Distinct, Intervals, NotAudited, ReliabilityBin, Row,
+    STRONGEST, Spread,
 };
 
 use crate::words;
@@ -185,6 +185,10 @@ pub struct GateResult {
     /// The figure that was compared, in percent (or percentage points for a gain over the larger
     /// baseline, or multiples for localization); `None` if it is not known or infinite.
     pub found_percent: Option<f64>,
+    /// The upper end of the 95 % interval of `found_percent`, which the bound limits; absent for localization
+    /// and in documents of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub highest_percent: Option<f64>,
     /// The attack behind the figure: scheme, source and ratio, solver, distance.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,

@@ -62,7 +62,12 @@ fn gate_found(gate: &GateResult) -> String {
     let of = gate.of.as_ref().map_or_else(String::new, |of| format!(": {of}"));
     let found = gate.found_percent.map(|found| match is_of_localization(gate) {
         true => format!("found {found:.2} times the unprotected error{of}"),
-        false => format!("found {found:.1} %{of}"),
+        false => match gate.highest_percent {
+            Some(highest) => {
+                format!("found {found:.1} %, up to {highest:.1} % with its sampling error{of}")
+            }
+            None => format!("found {found:.1} %{of}"),
+        },
     });
     let found: Vec<String> = found.into_iter().chain(gate.reason.clone()).collect();
     found.join("; ")
@@ -83,8 +88,16 @@ pub(crate) fn in_words(gate: &GateResult) -> GateWords {
         false => (" %", ("came back", "may")),
     };
     let found = gate.found_percent.map(|found| {
-        let found = beside(found, gate.bound_percent);
-        format!("{found}{unit} {}, at most {bound}{unit} {}", verb.0, verb.1)
+        let highest = gate.highest_percent.map(|highest| {
+            let highest = beside(highest, gate.bound_percent);
+            format!(" ({highest}{unit} at the upper end of the 95 % interval, which decides)")
+        });
+        let found = match &highest {
+            Some(_) => words::percent(found),
+            None => beside(found, gate.bound_percent),
+        };
+        let highest = highest.unwrap_or_default();
+        format!("{found}{unit} {}{highest}, at most {bound}{unit} {}", verb.0, verb.1)
     });
     let found = found.unwrap_or_else(|| format!("not known; at most {bound}{unit} {}", verb.1));
     let word = if gate.passed { "PASS" } else { "FAIL" };
@@ -129,6 +142,13 @@ mod tests {
         let named = GateResult { of: Some(of.into()), ..gate("all:0.10<=20", 20.04, 20.0) };
         assert_eq!(gate_found(&named), format!("found 20.0 %: {of}"));
         assert_eq!(in_words(&named).said, format!("20.04 % came back, at most 20 % may; {of}"));
+        let sampled =
+            GateResult { highest_percent: Some(20.04), ..gate("all:0.10<=20", 19.6, 20.0) };
+        assert_eq!(gate_found(&sampled), "found 19.6 %, up to 20.0 % with its sampling error");
+        assert_eq!(
+            in_words(&sampled).said,
+            "19.6 % came back (20.04 % at the upper end of the 95 % interval, which decides), at most 20 % may"
+        );
         let unknown = GateResult {
             found_percent: None,
             passed: false,

@@ -1,8 +1,9 @@
 //! The figures as tables of text, which the page shows without script.
 
-use unlift::Unit;
-
+use indexmap::IndexMap;
 use serde::Serialize;
+use unlift::Unit;
+use unlift::audit::Interval;
 
 use crate::document::{Bound, ByReason, ByThreshold, Document, Row};
 use crate::{attack, words};
@@ -110,8 +111,20 @@ fn known<T>(value: Option<T>, said: impl FnOnce(T) -> String) -> String {
     value.map_or(NONE.into(), said)
 }
 
-fn shares(document: &Document, shares: &ByThreshold, spread: Option<&ByThreshold>) -> Vec<String> {
-    let cell = |typed: &String| percent_cell(shares.get(typed), spread.and_then(|s| s.get(typed)));
+/// Returns a cell per threshold: the percentage with its interval, "67.0 (66.4 to 67.6)", or with its spread over seeds.
+fn shares(
+    document: &Document,
+    shares: &ByThreshold,
+    intervals: Option<&IndexMap<String, Interval>>,
+    spread: Option<&ByThreshold>,
+) -> Vec<String> {
+    let cell = |typed: &String| match intervals.and_then(|all| all.get(typed)) {
+        Some(interval) => {
+            let percent = percent_cell(shares.get(typed), None);
+            format!("{percent} ({})", words::interval(*interval))
+        }
+        None => percent_cell(shares.get(typed), spread.and_then(|s| s.get(typed))),
+    };
     thresholds(document).iter().map(cell).collect()
 }
 
@@ -140,6 +153,9 @@ pub(crate) fn recovered(document: &Document) -> Table {
     let heads = [figures(["K", "delta"]), within_columns(document, ""), figures([points])].concat();
     let repeats = document.results.iter().map(|row| row.repeats).max().unwrap_or(1);
     let spread = match repeats > 1 {
+        _ if document.results.iter().any(|row| row.interval.is_some()) => {
+            " In brackets: the 95 % interval, by the sampling error.".to_owned()
+        }
         true => format!(
             " Mean ± standard deviation (where above {SPREAD_THAT_COUNTS}) over {repeats} seeds."
         ),
@@ -149,7 +165,8 @@ pub(crate) fn recovered(document: &Document) -> Table {
     let table = Table::of_results(document, ("recovered", caption), heads, |row| {
         let mut cells = vec![row.k.to_string(), words::length(row.delta, row.unit)];
         let spread = row.std.as_ref().map(|std| &std.recovered_percent);
-        cells.extend(shares(document, &row.recovered_percent, spread));
+        let of = row.interval.as_ref().map(|of| &of.recovered_percent);
+        cells.extend(shares(document, &row.recovered_percent, of, spread));
         cells.push(words::thousands(row.n_points));
         Some(cells)
     });
@@ -163,7 +180,8 @@ pub(crate) fn baselines(document: &Document) -> Table {
         let line = |who: String, shares| [vec![scheme.to_owned(), who], shares].concat();
         rows.extend(of().map(|row| {
             let spread = row.std.as_ref().map(|std| &std.blind_percent);
-            line("blind guess".to_owned(), shares(document, &row.blind_percent, spread))
+            let of = row.interval.as_ref().map(|of| &of.blind_percent);
+            line("blind guess".to_owned(), shares(document, &row.blind_percent, of, spread))
         }));
         rows.extend(of().filter_map(|row| {
             let alone = row.records_alone_percent.as_ref()?;
@@ -171,7 +189,8 @@ pub(crate) fn baselines(document: &Document) -> Table {
             let by = row.records_alone_by.iter().flat_map(|by| by.values());
             let by = distinct(by.map(String::as_str)).join("; ");
             let who = attack::records_alone(Some(by.as_str()).filter(|by| !by.is_empty()));
-            Some(line(who, shares(document, alone, None)))
+            let of = row.interval.as_ref().map(|of| &of.records_alone_percent);
+            Some(line(who, shares(document, alone, of, None)))
         }));
     }
     let caption = "Baselines: what an attacker recovers without lists of neighbors. Lists add what exceeds the larger baseline.";
@@ -185,8 +204,8 @@ pub(crate) fn distinct_places(document: &Document) -> Option<Table> {
     let caption = "Recovered places, in percent: keypoints at the same place count once.";
     let table = Table::of_results(document, ("distinct", caption), heads, |row| {
         let distinct = row.distinct.as_ref()?;
-        let mut cells = shares(document, &distinct.recovered_percent, None);
-        cells.extend(shares(document, &distinct.blind_percent, None));
+        let mut cells = shares(document, &distinct.recovered_percent, None, None);
+        cells.extend(shares(document, &distinct.blind_percent, None, None));
         cells.push(words::thousands(distinct.n_places));
         Some(cells)
     });

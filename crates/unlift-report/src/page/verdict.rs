@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 use unlift::Unit;
+use unlift::audit::Interval;
 
 use crate::attack::{Basis, Given};
 use crate::document::{Bound, BreakEven, Document, Row};
@@ -126,12 +127,16 @@ fn card(document: &Document, scheme: &str) -> Option<Card> {
     };
     let found = |basis, row: &Row, own: Option<f64>| {
         let (floor, by, briefly) = without(row);
+        let own = own.filter(|own| *own >= floor);
         let (recovered, by, briefly) = match own {
-            Some(own) if own >= floor => (own, attack::name(row), attack::briefly(row)),
-            _ => (floor, by, briefly),
+            Some(own) => (own, attack::name(row), attack::briefly(row)),
+            None => (floor, by, briefly),
         };
-        let (percent, level) = (words::percent(recovered), Level::of(recovered));
-        Finding { basis, when: when(basis, row), recovered, percent, level, by, briefly, floor }
+        let estimate = if own.is_some() { row.recovered(typed) } else { row.baseline(typed) };
+        let interval = estimate.map(|estimate| estimate.interval);
+        let level = Level::of(interval.map_or(recovered, |interval| interval[1]));
+        let (percent, when) = (words::percent(recovered), when(basis, row));
+        Finding { basis, when, recovered, interval, percent, level, by, briefly, floor }
     };
     let of = |basis| {
         let row = strongest(document, scheme, basis)?;
@@ -311,6 +316,8 @@ pub(crate) struct Finding {
     /// "Today, from the released data alone".
     pub when: String,
     pub recovered: f64,
+    /// Ends of the 95 % interval; `None` in documents of earlier versions.
+    pub interval: Option<Interval>,
     pub percent: String,
     pub level: Level,
     /// The attack: "neighbors by descriptor overlap, 35 listed, 11 % of them right, solver joint".
@@ -325,6 +332,21 @@ pub(crate) struct Refusal {
     pub scheme: String,
     pub title: String,
     pub reason: String,
+}
+
+impl Finding {
+    /// Returns the upper end of the interval, which decides.
+    fn highest(&self) -> f64 {
+        self.interval.map_or(self.recovered, |interval| interval[1])
+    }
+
+    /// Returns "46.6 % (45.9 to 47.3)".
+    fn said(&self) -> String {
+        match self.interval {
+            Some(interval) => format!("{} % ({})", self.percent, words::interval(interval)),
+            None => format!("{} %", self.percent),
+        }
+    }
 }
 
 impl Card {
@@ -373,11 +395,11 @@ pub(crate) fn banner(document: &Document, cards: &[Card], refusals: &[Refusal]) 
         (Some(strongest), _) => {
             let (headline, mut sentences) = decision(document, cards);
             sentences.push(attack_sentence(document, strongest));
-            (Level::of(strongest.1.recovered), headline, sentences)
+            (strongest.1.level, headline, sentences)
         }
         // An untested attack may succeed, so known neighbors decide the color.
         (None, Some(strongest)) => {
-            let level = Level::of(strongest.1.recovered).min(Level::Orange);
+            let level = strongest.1.level.min(Level::Orange);
             let headline = "Not tested: what an attacker recovers from the released data alone.";
             (level, headline.to_owned(), vec![attack_sentence(document, strongest)])
         }
@@ -404,19 +426,18 @@ pub(crate) fn banner(document: &Document, cards: &[Card], refusals: &[Refusal]) 
 fn decision(document: &Document, cards: &[Card]) -> (String, Vec<String>) {
     let (mut much, mut little, mut undecided) = (Vec::new(), Vec::new(), Vec::new());
     let hides = |card: &&Card| bearings_sentence(document, &card.scheme).is_none();
-    let is_little = |percent: f64| Level::of(percent) == Level::Gray;
     // Cards are sorted by their leak, the largest first.
     for card in cards.iter().filter(hides) {
         let name = words::scheme_name(&card.scheme);
-        match card.today() {
-            Some(percent) if !is_little(percent) => much.push((percent, name)),
-            Some(percent) if uses_descriptors(document, Some(&card.scheme)) => {
-                little.push((percent, name))
+        match card.finding(Basis::Released) {
+            Some(found) if found.level != Level::Gray => much.push((Some(found), name)),
+            Some(found) if uses_descriptors(document, Some(&card.scheme)) => {
+                little.push((Some(found), name))
             }
-            _ => undecided.push((0.0, name)),
+            _ => undecided.push((None, name)),
         }
     }
-    let names = |leaks: &[(f64, String)]| {
+    let names = |leaks: &[(Option<&Finding>, String)]| {
         words::list(&leaks.iter().map(|leak| leak.1.clone()).collect::<Vec<_>>())
     };
     let (what, of) = match is_of_images(document) {
@@ -426,21 +447,21 @@ fn decision(document: &Document, cards: &[Card]) -> (String, Vec<String>) {
     let not = format!("Do not release {what} under {}.", names(&much));
     let open =
         (!undecided.is_empty()).then(|| format!("Nothing is decided about {}.", names(&undecided)));
-    match (little.first(), much.last()) {
-        (Some(most), _) => {
-            let percent = words::percent(most.0);
+    let highest = little.iter().filter_map(|leak| leak.0).map(Finding::highest);
+    match (highest.reduce(f64::max), much.last()) {
+        (Some(highest), _) => {
+            let percent = words::percent(highest);
             let little = names(&little);
             let headline =
                 format!("Under {little}, no attack tried here recovers more than {percent} %.");
             let not = (!much.is_empty()).then_some(not);
             (headline, not.into_iter().chain(open).collect())
         }
-        (None, Some(least)) if much.len() > 1 => {
-            let (percent, part) = (words::percent(least.0), words::part(least.0));
+        (None, Some((Some(least), name))) if much.len() > 1 => {
+            let (percent, part) = (least.said(), words::part(least.recovered));
             let all = format!("Do not release {what} under any scheme tried.");
             let headline = if undecided.is_empty() { all } else { not };
-            let reason =
-                format!("The least leak, {percent} % ({}), is {part} of the {of}.", least.1);
+            let reason = format!("The least leak, {percent} under {name}, is {part} of the {of}.");
             (headline, [reason].into_iter().chain(open).collect())
         }
         (None, Some(_)) => (not, open.into_iter().collect()),
@@ -481,8 +502,8 @@ fn every(cards: &[Card]) -> Option<String> {
         cards.iter().map(|card| card.finding(Basis::Oracle)).collect();
     let known = known.filter(|known| known.len() > 1)?;
     let least = known.into_iter().reduce(|a, b| if b.recovered < a.recovered { b } else { a })?;
-    let (when, percent) = (&least.when, &least.percent);
-    Some(format!("{when}, every scheme tried would give back {percent} % or more."))
+    let (when, percent) = (&least.when, least.said());
+    Some(format!("{when}, every scheme tried would give back {percent} or more."))
 }
 
 fn worst(cards: &[Card], basis: Basis) -> Option<(&Card, &Finding)> {
@@ -497,7 +518,7 @@ fn attack_sentence(document: &Document, (card, finding): (&Card, &Finding)) -> S
         Unit::Pixel => "the keypoints of these images",
         Unit::Meter | Unit::KthNeighbor => "the points of this map",
     };
-    let what = format!("{} % of {of} {}", finding.percent, words::within(&typed, unit));
+    let what = format!("{} of {of} {}", finding.said(), words::within(&typed, unit));
     let by = format!("{}, {}", words::scheme_name(&card.scheme), finding.briefly);
     match finding.basis {
         Basis::Released => {
@@ -596,8 +617,10 @@ fn gate_step(document: &Document, cards: &[Card]) -> Option<String> {
         source => format!(":{source}"),
     };
     // A gate on an inlier ratio covers the baselines, too.
-    let today = card.today().filter(|_| released.is_none()).unwrap_or(0.0);
-    let limit = (share(row, &typed).max(today) + 2.0).ceil().min(100.0);
+    let today = card.finding(Basis::Released).filter(|_| released.is_none());
+    let today = today.map_or(0.0, Finding::highest);
+    let own = row.recovered(&typed).map_or(share(row, &typed), |own| own.interval[1]);
+    let limit = (own.max(today) + 2.0).ceil().min(100.0);
     let scheme = &card.scheme;
     Some(format!(
         "Test it in your build: `--gate '{scheme}{attack}:{typed}<={limit}'` fails if two points more come back \
@@ -613,12 +636,14 @@ fn has_pictures(row: &Row) -> bool {
 fn least(document: &Document, cards: &[Card]) -> Option<String> {
     let hides = |card: &&Card| bearings_sentence(document, &card.scheme).is_none();
     let cards: Vec<&Card> = cards.iter().filter(hides).collect();
-    let share = |card: &Card| card.today().or(card.finding(Basis::Oracle).map(|f| f.recovered));
+    let finding =
+        |card: &Card| card.finding(Basis::Released).or(card.finding(Basis::Oracle)).cloned();
+    let share = |card: &Card| finding(card).map(|finding| finding.recovered);
     let known = cards.iter().filter(|card| card.today().is_some()).count();
     let comparable = cards.iter().filter(|card| known == 0 || card.today().is_some());
     let card = comparable.copied().reduce(|a, b| if share(b) < share(a) { b } else { a })?;
     // The banner says what the least leak means where it is too much, or not decided.
-    let is_little = Level::of(share(card).unwrap_or(100.0)) == Level::Gray;
+    let is_little = finding(card).is_some_and(|finding| finding.level == Level::Gray);
     if cards.len() < 2 || !is_little || !uses_descriptors(document, Some(&card.scheme)) {
         return None;
     }
@@ -626,8 +651,8 @@ fn least(document: &Document, cards: &[Card]) -> Option<String> {
         .iter()
         .filter_map(|&basis| card.finding(basis))
         .map(|found| match found.basis {
-            Basis::Released => format!("{} % today", found.percent),
-            _ => format!("{} % {}", found.percent, found.when.to_lowercase()),
+            Basis::Released => format!("{} today", found.said()),
+            _ => format!("{} {}", found.said(), found.when.to_lowercase()),
         })
         .collect();
     let name = words::scheme_name(&card.scheme);

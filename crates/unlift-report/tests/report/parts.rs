@@ -100,6 +100,7 @@ fn gates_on_localization_speak_of_multiples() {
     document.gates = vec![GateResult {
         gate: "ppl:localization<=1.5".to_owned(),
         found_percent: Some(1.6),
+        highest_percent: None,
         of: Some("ppl, bound".to_owned()),
         bound_percent: 1.5,
         passed: false,

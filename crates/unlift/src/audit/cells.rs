@@ -8,7 +8,7 @@ use super::lists::{Kept, Lists};
 use super::missing::{NotAudited, told};
 use super::observer::{Cell, Counts, Observer};
 use super::plan::{Plan, key_of, oracle_seed};
-use super::row::{Alone, Row, by_threshold, measure};
+use super::row::{Alone, Row, measure, within};
 use crate::evaluate::{
     Accuracy, away_from_own, bearings, belongs, blind, distinct_weights, evaluate,
     farthest_for_rounding, is_noise, joined, off_record,
@@ -279,10 +279,7 @@ pub fn records_alone<const D: usize>(
     for (name, recovered) in recover::records_alone(released, &options)? {
         if (0..recovered.n_slots()).any(|slot| recovered.position(slot).is_some()) {
             let accuracy = evaluate(&recovered, original, secret)?;
-            found.push(Alone {
-                name,
-                percent: by_threshold(&plan.thresholds, |t| accuracy.percent_within(t.value)),
-            });
+            found.push(Alone { name, shares: within(&accuracy, &plan.thresholds) });
         }
     }
     Ok(found)

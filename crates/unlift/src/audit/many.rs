@@ -13,8 +13,9 @@ use super::lists::Kept;
 use super::missing::NotAudited;
 use super::observer::{Observer, Silent};
 use super::plan::{Plan, Threshold};
-use super::row::{Alone, ByReason, ByThreshold, Distinct, Parts, Row, by_threshold};
+use super::row::{Alone, ByReason, Distinct, Parts, Row, within};
 use super::run::{Outcome, none_applies};
+use super::share::{Share, Shares, merge, percents, shares};
 use crate::compiled::Both;
 use crate::evaluate::{Accuracy, Reliability};
 use crate::neighbors::oracle;
@@ -118,7 +119,7 @@ pub fn run_many<const D: usize, E: From<Error>>(
         return Err(none_applies(first).into());
     }
     let pooled = |cell: &CellSums| {
-        let repeats: Vec<Row> = cell.pools.iter().map(|pool| pool.row(&plan.thresholds)).collect();
+        let repeats: Vec<Row> = cell.pools.iter().map(|pool| pool.row()).collect();
         Row::mean(&repeats)
     };
     let rows: Vec<Row> = cells.iter().map(pooled).collect();
@@ -241,15 +242,16 @@ pub(super) struct Pool {
     cell: Row,
     n_points: usize,
     n_listed: usize,
-    /// Sums by figure and threshold: of points within it, of true entries of lists, of percentages times points. A figure that no image
-    /// has is absent.
-    sums: BTreeMap<(&'static str, String), f64>,
+    /// Sums by figure: of true entries of lists, of percentages times points. A figure that no image has is absent.
+    sums: BTreeMap<&'static str, f64>,
+    /// Points and distinct places within each threshold.
+    shares: BTreeMap<&'static str, Shares>,
     metrics: BTreeMap<String, Figure>,
     lost: ByReason,
     dropped: ByReason,
     trials: BTreeMap<u32, u64>,
-    /// Percentages times points, for each attack on the records alone.
-    alone: BTreeMap<&'static str, ByThreshold>,
+    /// Shares of each attack on the records alone.
+    alone: BTreeMap<&'static str, Shares>,
     reliability: Option<Reliability>,
     sure_unknown: Option<String>,
     errors: Errors,
@@ -263,43 +265,42 @@ impl Pool {
         let n = accuracy.n_points();
         let percentage = |percent: Option<f64>| percent.map(|percent| percent * n as f64);
         let mut sums = BTreeMap::from([
-            (("delta", String::new()), row.delta * n as f64),
-            (("hits", String::new()), row.inlier_ratio * *n_listed as f64),
-            (("places", String::new()), weights.iter().sum()),
+            ("delta", row.delta * n as f64),
+            ("hits", row.inlier_ratio * *n_listed as f64),
+            ("places", weights.iter().sum()),
         ]);
-        for Threshold { label, value } in thresholds {
-            let mut add = |name, sum| sums.insert((name, label.clone()), sum);
-            add("within", accuracy.n_within(*value) as f64);
-            add("blind", baseline.n_within(*value) as f64);
-            add("places within", accuracy.weight_within(*value, weights));
-            add("blind places", baseline.weight_within(*value, weights));
-        }
+        let places = sums["places"];
+        let of_places = |of: &Accuracy| {
+            shares(thresholds, |t| Share::of(of.weight_within(t.value, weights), places))
+        };
         for (name, sum) in [
             ("exact", accuracy.n_exact.map(|n_exact| n_exact as f64)),
             ("axis", percentage(row.axis_accuracy_percent)),
             ("assignment", percentage(row.assignment_accuracy_percent)),
         ] {
-            sums.extend(sum.map(|sum| ((name, String::new()), sum)));
+            sums.extend(sum.map(|sum| (name, sum)));
         }
         let figure = |(name, value): (&String, &f64)| {
             let of_images = whole.contains(name);
             let known = if of_images { 1 } else { n };
             (name.clone(), Figure { sum: value * known as f64, known, of_images })
         };
-        let alone = |alone: &Alone| {
-            let sum = |(label, percent): (&String, &f64)| (label.clone(), percent * n as f64);
-            (alone.name, alone.percent.iter().map(sum).collect())
-        };
         Self {
             cell: row.clone(),
             n_points: n,
             n_listed: *n_listed,
             sums,
+            shares: BTreeMap::from([
+                ("recovered", within(accuracy, thresholds)),
+                ("blind", within(baseline, thresholds)),
+                ("places", of_places(accuracy)),
+                ("blind places", of_places(baseline)),
+            ]),
             metrics: row.metrics.iter().map(figure).collect(),
             lost: row.lost.clone(),
             dropped: row.dropped.clone(),
             trials: row.ransac_trials.iter().flatten().copied().collect(),
-            alone: row.parts.alone.iter().map(alone).collect(),
+            alone: row.parts.alone.iter().map(|of| (of.name, of.shares.clone())).collect(),
             reliability: row.parts.reliability.clone(),
             sure_unknown: row.sure_unknown.clone(),
             errors: Errors::of(accuracy),
@@ -311,8 +312,9 @@ impl Pool {
     pub(super) fn merge(&mut self, more: &Self) {
         self.n_points += more.n_points;
         self.n_listed += more.n_listed;
-        for (key, more) in &more.sums {
-            *self.sums.entry(key.clone()).or_insert(0.0) += more;
+        merge_counts(&mut self.sums, &more.sums);
+        for (name, more) in &more.shares {
+            merge(self.shares.entry(name).or_default(), more);
         }
         for (name, more) in &more.metrics {
             let figure = self.metrics.entry(name.clone()).or_default();
@@ -321,11 +323,7 @@ impl Pool {
             figure.of_images = more.of_images;
         }
         for (name, more) in &more.alone {
-            // An attack that cannot run on an item recovers nothing there.
-            let all = self.alone.entry(name).or_default();
-            for (label, more) in more {
-                *all.entry(label.clone()).or_insert(0.0) += more;
-            }
+            merge(self.alone.entry(name).or_default(), more);
         }
         if let (Some(all), Some(more)) = (&mut self.reliability, &more.reliability) {
             all.merge(more);
@@ -339,20 +337,15 @@ impl Pool {
         merge_counts(&mut self.blind_errors.0, &more.blind_errors.0);
     }
 
-    pub(super) fn row(&self, thresholds: &[Threshold]) -> Row {
+    pub(super) fn row(&self) -> Row {
         let n = self.n_points.max(1) as f64;
-        let of = |name, label: &str| self.sums.get(&(name, label.to_owned())).copied();
-        let sum = |name| of(name, "");
-        let percent = |name, all: f64| {
-            by_threshold(thresholds, |t| 100.0 * of(name, &t.label).unwrap_or(0.0) / all)
-        };
-        let n_places = sum("places").unwrap_or(0.0);
-        let places = n_places.max(f64::MIN_POSITIVE);
+        let sum = |name| self.sums.get(name).copied();
         let is_known =
             |(_, figure): &(&String, &Figure)| figure.of_images || figure.known == self.n_points;
-        let alone = |(&name, sums): (&&'static str, &ByThreshold)| Alone {
-            name,
-            percent: sums.iter().map(|(label, sum)| (label.clone(), sum / n)).collect(),
+        let alone = |(&name, shares): (&&'static str, &Shares)| {
+            // An attack that cannot run on an item recovers nothing there.
+            let of_all = |(label, share): (&String, &Share)| (label.clone(), share.among(n));
+            Alone { name, shares: shares.iter().map(of_all).collect() }
         };
         let mut row = Row {
             // A requested ratio identifies the cell. A measured one is a mean over entries.
@@ -365,8 +358,6 @@ impl Pool {
             n_lost: self.lost.values().sum(),
             lost: self.lost.clone(),
             dropped: self.dropped.clone(),
-            recovered_percent: percent("within", n),
-            blind_percent: percent("blind", n),
             axis_accuracy_percent: sum("axis").map(|sum| sum / n),
             exact_percent: sum("exact").map(|exact| 100.0 * exact / n),
             metrics: self
@@ -385,12 +376,13 @@ impl Pool {
             assignment_accuracy_percent: sum("assignment").map(|sum| sum / n),
             sure_unknown: self.sure_unknown.clone(),
             distinct: self.cell.distinct.as_ref().map(|_| Distinct {
-                n_places: n_places.round() as usize,
-                recovered_percent: percent("places within", places),
-                blind_percent: percent("blind places", places),
+                n_places: sum("places").unwrap_or(0.0).round() as usize,
+                recovered_percent: percents(&self.shares["places"]),
+                blind_percent: percents(&self.shares["blind places"]),
             }),
             ..self.cell.clone()
         };
+        row.fill_shares(&self.shares["recovered"], &self.shares["blind"]);
         row.fill_errors(|p| self.errors.percentile(p, self.n_points));
         row.summarize();
         row

@@ -14,6 +14,7 @@ mod observer;
 mod plan;
 mod row;
 mod run;
+mod share;
 pub mod staged;
 
 pub use break_even::{Bound, BreakEven, STRONGEST, break_even};
@@ -24,7 +25,8 @@ pub use missing::NotAudited;
 pub use observer::{Cell, Counts, Measure, Observer, Silent};
 pub use plan::{NeighborsBy, Plan, PointNeighbors, Threshold, Variant};
 pub use row::{
-    Alone, ByReason, ByThreshold, Distinct, PERCENTILES, Parts, ReliabilityBin, Row, Spread,
-    measure,
+    Alone, ByReason, ByThreshold, Distinct, Intervals, PERCENTILES, Parts, ReliabilityBin, Row,
+    Spread, measure,
 };
 pub use run::{Outcome, run, run_released, scheme_called};
+pub use share::{Estimate, Interval, Share, Shares};

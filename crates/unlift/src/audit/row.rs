@@ -6,6 +6,7 @@ use indexmap::IndexMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::plan::Threshold;
+use super::share::{Estimate, Interval, Share, Shares, intervals, over_repeats, percents, shares};
 use crate::evaluate::{Accuracy, Bin, Reliability, evaluate, reliability};
 use crate::recover::Recovered;
 use crate::truth::{DropReason, Original, Secret};
@@ -106,6 +107,10 @@ pub struct Row {
     /// Spread over repeats, if there are several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub std: Option<Spread>,
+    /// 95 % intervals of the percentages, by their sampling error; absent in documents of earlier
+    /// versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interval: Option<Intervals>,
     /// Shares of distinct places (images only).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distinct: Option<Distinct>,
@@ -129,8 +134,8 @@ pub struct Parts {
 pub struct Alone {
     /// Solver, or source and solver: `tomography`, `geometric, joint`.
     pub name: &'static str,
-    /// Percentage recovered within each threshold.
-    pub percent: ByThreshold,
+    /// Share recovered within each threshold.
+    pub shares: Shares,
 }
 
 /// Points with similar probabilities, over all repeats.
@@ -169,6 +174,26 @@ pub struct Spread {
     pub median_error: Option<f64>,
 }
 
+/// 95 % intervals: [Wilson's](Share::interval) over points, over images or tiles where there are
+/// several, and over repeats. The widest counts.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Intervals {
+    /// Interval of each recovered percentage.
+    pub recovered_percent: IndexMap<String, Interval>,
+    /// Interval of each blind percentage.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub blind_percent: IndexMap<String, Interval>,
+    /// Interval of the best attack on the records alone.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub records_alone_percent: IndexMap<String, Interval>,
+}
+
+/// Returns the share within each threshold.
+pub(super) fn within(accuracy: &Accuracy, thresholds: &[Threshold]) -> Shares {
+    let n = accuracy.n_points() as f64;
+    shares(thresholds, |t| Share::of(accuracy.n_within(t.value) as f64, n))
+}
+
 fn write_unit<S: Serializer>(unit: &Unit, to: S) -> Result<S::Ok, S::Error> {
     to.serialize_str(unit.name())
 }
@@ -187,20 +212,27 @@ fn is_single(value: &u32) -> bool {
     *value == 1
 }
 
-/// Returns a value for each threshold by its label.
-pub(super) fn by_threshold(
-    thresholds: &[Threshold],
-    value: impl FnMut(&Threshold) -> f64,
-) -> ByThreshold {
-    thresholds.iter().map(|t| t.label.clone()).zip(thresholds.iter().map(value)).collect()
-}
-
 impl Row {
     /// Returns the larger baseline within `threshold`, in percent: the blind guess or the best attack
     /// on the records alone. Neighborhoods add what exceeds it.
     pub fn baseline_percent(&self, threshold: &str) -> Option<f64> {
         let alone = self.records_alone_percent.as_ref().and_then(|by| by.get(threshold));
         self.blind_percent.get(threshold).into_iter().chain(alone).copied().reduce(f64::max)
+    }
+
+    /// Returns the recovered percentage within `threshold` with its interval.
+    pub fn recovered(&self, threshold: &str) -> Option<Estimate> {
+        let interval = self.interval.as_ref()?.recovered_percent.get(threshold)?;
+        Some(Estimate { percent: *self.recovered_percent.get(threshold)?, interval: *interval })
+    }
+
+    /// Returns the [baseline](Self::baseline_percent) within `threshold` with its interval.
+    pub fn baseline(&self, threshold: &str) -> Option<Estimate> {
+        let of = self.interval.as_ref()?;
+        let both = [of.blind_percent.get(threshold), of.records_alone_percent.get(threshold)];
+        let interval =
+            both.into_iter().flatten().copied().reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])])?;
+        Some(Estimate { percent: self.baseline_percent(threshold)?, interval })
     }
 
     /// Returns true if both have the same scheme, source, noise model, requested inlier ratio and
@@ -222,16 +254,18 @@ impl Row {
     /// Computes what is written of [`Parts`].
     pub(super) fn summarize(&mut self) {
         let best = |label: &String| {
-            let all = self.parts.alone.iter().map(|alone| (alone.name, alone.percent[label]));
-            all.reduce(|best, other| if other.1 > best.1 { other } else { best })
+            let all = self.parts.alone.iter().map(|alone| (alone.name, alone.shares[label]));
+            let better = |a: &Share, b: &Share| b.percent() > a.percent();
+            all.reduce(|best, other| if better(&best.1, &other.1) { other } else { best })
         };
-        let labels = || self.recovered_percent.keys();
-        let best: Option<Vec<_>> = labels().map(best).collect();
-        let best = best.map(|best| labels().cloned().zip(best).collect::<Vec<_>>());
-        let percent = |(label, (_, percent)): &(String, (_, f64))| (label.clone(), *percent);
-        self.records_alone_percent = best.as_ref().map(|best| best.iter().map(percent).collect());
-        let by = |(label, (name, _)): (String, (&str, _))| (label, name.to_owned());
-        self.records_alone_by = best.map(|best| best.into_iter().map(by).collect());
+        let labels = self.recovered_percent.keys();
+        let best = labels.map(|label| Some((label.clone(), best(label)?)));
+        let best: Option<Vec<(String, (&'static str, Share))>> = best.collect();
+        let named = best.clone().into_iter().flatten().map(|(at, (name, _))| (at, name.to_owned()));
+        let shares: Shares = best.iter().flatten().map(|(at, best)| (at.clone(), best.1)).collect();
+        self.records_alone_by = best.as_ref().map(|_| named.collect());
+        self.records_alone_percent = best.map(|_| percents(&shares));
+        self.interval.get_or_insert_default().records_alone_percent = intervals(&shares);
         let reliability = self.parts.reliability.as_ref();
         self.sure_percent = reliability.map(Reliability::sure_percent);
         self.sure_correct_percent = reliability.and_then(Reliability::sure_correct_percent);
@@ -250,19 +284,25 @@ impl Row {
     }
 
     fn fill(&mut self, accuracy: &Accuracy, blind: Option<&Accuracy>, thresholds: &[Threshold]) {
-        let within =
-            |accuracy: &Accuracy| by_threshold(thresholds, |t| accuracy.percent_within(t.value));
         self.n_points = accuracy.n_points();
         self.n_lost = accuracy.n_lost();
         self.lost =
             accuracy.lost.iter().map(|(status, &n)| (status.name().to_owned(), n)).collect();
-        self.recovered_percent = within(accuracy);
-        self.blind_percent = blind.map(within).unwrap_or_default();
+        let of = |accuracy| within(accuracy, thresholds);
+        self.fill_shares(&of(accuracy), &blind.map(of).unwrap_or_default());
         self.axis_accuracy_percent = accuracy.axis_percent;
         self.exact_percent = accuracy.exact_percent();
         self.assignment_accuracy_percent = accuracy.assignment_percent;
         self.fill_errors(|p| accuracy.percentile(p));
         self.blind_median_error = blind.and_then(|blind| blind.percentile(50.0));
+    }
+
+    pub(super) fn fill_shares(&mut self, recovered: &Shares, blind: &Shares) {
+        self.recovered_percent = percents(recovered);
+        self.blind_percent = percents(blind);
+        let of = self.interval.get_or_insert_default();
+        of.recovered_percent = intervals(recovered);
+        of.blind_percent = intervals(blind);
     }
 
     /// Fills in the error at each of [`PERCENTILES`].
@@ -281,10 +321,8 @@ impl Row {
     ) {
         let all: f64 = weights.iter().sum();
         let within = |accuracy: &Accuracy| {
-            by_threshold(thresholds, |t| match all {
-                0.0 => 0.0,
-                _ => 100.0 * accuracy.weight_within(t.value, weights) / all,
-            })
+            let within = |t: &Threshold| Share::of(accuracy.weight_within(t.value, weights), all);
+            percents(&shares(thresholds, within))
         };
         self.distinct = Some(Distinct {
             n_places: all.round() as usize,
@@ -319,13 +357,33 @@ impl Row {
             labels.map(of_label).collect()
         };
         mean.repeats = rows.len() as u32;
-        mean.std = Some(Spread {
+        let std = Spread {
             recovered_percent: each(|r| Some(&r.recovered_percent), &spread),
             blind_percent: each(|r| Some(&r.blind_percent), &spread),
             median_error: spread(&|r| r.median_error),
-        });
+        };
         mean.recovered_percent = each(|r| Some(&r.recovered_percent), &average);
         mean.blind_percent = each(|r| Some(&r.blind_percent), &average);
+        type Ends = fn(&Intervals) -> &IndexMap<String, Interval>;
+        let ends = |of: Ends, means: &ByThreshold, std: &ByThreshold| {
+            let interval = |(label, mean): (&String, &f64)| {
+                let of =
+                    |row: &Row| row.interval.as_ref().and_then(|all| of(all).get(label)).copied();
+                let of: Option<Vec<Interval>> = rows.iter().map(of).collect();
+                Some((label.clone(), over_repeats(&of?, *mean, *std.get(label)?)))
+            };
+            means.iter().filter_map(interval).collect()
+        };
+        mean.interval = Some(Intervals {
+            recovered_percent: ends(
+                |of| &of.recovered_percent,
+                &mean.recovered_percent,
+                &std.recovered_percent,
+            ),
+            blind_percent: ends(|of| &of.blind_percent, &mean.blind_percent, &std.blind_percent),
+            ..Intervals::default()
+        });
+        mean.std = Some(std);
         if let Some(distinct) = &mut mean.distinct {
             distinct.recovered_percent =
                 each(|r| Some(&r.distinct.as_ref()?.recovered_percent), &average);
@@ -359,9 +417,8 @@ impl Row {
         mean.parts.alone.retain_mut(|alone| {
             let of = |row: &Row| row.parts.alone.iter().find(|a| a.name == alone.name).cloned();
             let all: Option<Vec<Alone>> = rows.iter().map(of).collect();
-            for (label, percent) in &mut alone.percent {
-                let values = all.iter().flatten().map(|alone| alone.percent[label]);
-                *percent = values.sum::<f64>() / n;
+            for (label, share) in &mut alone.shares {
+                *share = Share::mean(all.iter().flatten().map(|alone| alone.shares[label]));
             }
             all.is_some()
         });

@@ -101,12 +101,13 @@ impl Pooled {
 
     /// Returns the row over all images, without its name; `None` if no image released a point.
     pub fn row(&self) -> Option<Row> {
-        let mut row = self.pool.as_ref()?.row(&self.thresholds);
+        let mut row = self.pool.as_ref()?.row();
         for &(reason, n) in self.dropped.iter().filter(|(_, n)| *n > 0) {
             *row.dropped.entry(reason.name().to_owned()).or_insert(0) += n;
         }
         if !self.with_blind {
             row.blind_percent.clear();
+            row.interval.iter_mut().for_each(|interval| interval.blind_percent.clear());
             row.blind_median_error = None;
             row.distinct.iter_mut().for_each(|distinct| distinct.blind_percent.clear());
         }

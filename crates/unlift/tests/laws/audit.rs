@@ -32,10 +32,10 @@ fn the_best_attack_on_the_records_alone_is_the_second_baseline() {
             continue;
         }
         let named = |name: &str| alone.iter().find(|a| a.name == name);
-        let tomography = &named("tomography").unwrap().percent;
-        for (label, percent) in tomography {
+        let tomography = &named("tomography").unwrap().shares;
+        for (label, share) in tomography {
             let best = best.as_ref().unwrap()[label];
-            assert!(best >= *percent, "{}: at least tomography", row.scheme);
+            assert!(best >= share.percent(), "{}: at least tomography", row.scheme);
             let baseline = row.baseline_percent(label);
             assert_eq!(baseline, Some(row.blind_percent[label].max(best)));
         }

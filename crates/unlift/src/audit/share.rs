@@ -1,0 +1,230 @@
+//! A share of points and its sampling error.
+
+use indexmap::IndexMap;
+
+use super::plan::Threshold;
+use super::row::ByThreshold;
+
+/// Ends of a 95 % interval, in percent.
+pub type Interval = [f64; 2];
+
+/// A percentage with its 95 % interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// The percentage.
+    pub percent: f64,
+    /// Its interval.
+    pub interval: Interval,
+}
+
+impl Estimate {
+    /// Returns the upper end of the interval of what `self` exceeds `other` by (Newcombe's method).
+    /// Errors are taken as independent, which is never too small for points that both recover.
+    pub fn highest_gain(&self, other: &Self) -> f64 {
+        let gain = self.percent - other.percent;
+        gain + (self.interval[1] - self.percent).hypot(other.percent - other.interval[0])
+    }
+}
+
+/// Sums over maps, images or tiles, whose points are not independent.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Share {
+    n_items: f64,
+    points: f64,
+    within: f64,
+    points_squared: f64,
+    within_squared: f64,
+    product: f64,
+}
+
+impl Share {
+    /// Creates the share of `within` of the `points` of one map, image or tile.
+    pub fn of(within: f64, points: f64) -> Self {
+        Self {
+            n_items: 1.0,
+            points,
+            within,
+            points_squared: points * points,
+            within_squared: within * within,
+            product: points * within,
+        }
+    }
+
+    /// Adds the sums of other items.
+    pub(super) fn merge(&mut self, more: &Self) {
+        self.n_items += more.n_items;
+        self.points += more.points;
+        self.within += more.within;
+        self.points_squared += more.points_squared;
+        self.within_squared += more.within_squared;
+        self.product += more.product;
+    }
+
+    /// Returns the mean over repeats, whose points are the same.
+    pub(super) fn mean(repeats: impl Iterator<Item = Self>) -> Self {
+        let (mut all, mut n) = (Self::default(), 0.0);
+        repeats.for_each(|share| (all.merge(&share), n += 1.0).0);
+        Self {
+            n_items: all.n_items / n,
+            points: all.points / n,
+            within: all.within / n,
+            points_squared: all.points_squared / n,
+            within_squared: all.within_squared / n,
+            product: all.product / n,
+        }
+    }
+
+    /// Returns the share among `points`, of which none is within that is not counted yet.
+    pub(super) fn among(mut self, points: f64) -> Self {
+        if points > self.points {
+            self.merge(&Self::of(0.0, points - self.points));
+        }
+        self
+    }
+
+    /// Returns the percentage; zero without points.
+    pub fn percent(&self) -> f64 {
+        if self.points == 0.0 { 0.0 } else { 100.0 * self.within / self.points }
+    }
+
+    /// Returns the 95 % interval of the percentage: Wilson's over points, as if they were independent;
+    /// over several items, the wider of this and the t interval of a ratio of sums.
+    pub fn interval(&self) -> Interval {
+        if self.points == 0.0 {
+            return [0.0, 100.0];
+        }
+        let share = self.within / self.points;
+        let z = NORMAL;
+        let (n, square) = (self.points, z * z);
+        let center = (share + square / (2.0 * n)) / (1.0 + square / n);
+        let half = z / (1.0 + square / n)
+            * (share * (1.0 - share) / n + square / (4.0 * n * n)).max(0.0).sqrt();
+        let wilson =
+            [100.0 * (center - half), 100.0 * (center + half)].map(|p| p.clamp(0.0, 100.0));
+        if self.n_items < 2.0 {
+            return wilson;
+        }
+        let squares =
+            self.within_squared - 2.0 * share * self.product + share * share * self.points_squared;
+        let error = (self.n_items / (self.n_items - 1.0) * squares.max(0.0)).sqrt() / self.points;
+        wider(wilson, around(100.0 * share, 100.0 * error, self.n_items - 1.0))
+    }
+}
+
+/// Returns the interval of a mean over repeats: the wider of the mean interval of one repeat and the t
+/// interval by their standard deviation `std`.
+pub(super) fn over_repeats(intervals: &[Interval], mean: f64, std: f64) -> Interval {
+    let n = intervals.len() as f64;
+    let end = |end: usize| intervals.iter().map(|interval| interval[end]).sum::<f64>() / n;
+    wider([end(0), end(1)], around(mean, std / n.sqrt(), n - 1.0))
+}
+
+/// 97.5 % quantile of the normal distribution.
+const NORMAL: f64 = 1.959_963_984_540_054;
+/// 97.5 % quantiles of Student's t distribution, from one degree of freedom.
+const STUDENT: [f64; 10] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228];
+
+fn around(mean: f64, error: f64, freedom: f64) -> Interval {
+    let t = STUDENT.get(freedom as usize - 1).copied().unwrap_or_else(|| {
+        let z = NORMAL;
+        // The first terms of its expansion are right to 0.001 here.
+        z + (z.powi(3) + z) / (4.0 * freedom)
+            + (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / (96.0 * freedom * freedom)
+    });
+    [mean - t * error, mean + t * error].map(|percent| percent.clamp(0.0, 100.0))
+}
+
+fn wider(a: Interval, b: Interval) -> Interval {
+    [a[0].min(b[0]), a[1].max(b[1])]
+}
+
+/// Shares by label of the threshold.
+pub type Shares = IndexMap<String, Share>;
+
+/// Returns a share for each threshold by its label.
+pub(super) fn shares(thresholds: &[Threshold], share: impl Fn(&Threshold) -> Share) -> Shares {
+    thresholds.iter().map(|t| (t.label.clone(), share(t))).collect()
+}
+
+pub(super) fn merge(to: &mut Shares, more: &Shares) {
+    for (label, more) in more {
+        to.entry(label.clone()).or_default().merge(more);
+    }
+}
+
+pub(super) fn percents(shares: &Shares) -> ByThreshold {
+    shares.iter().map(|(label, share)| (label.clone(), share.percent())).collect()
+}
+
+pub(super) fn intervals(shares: &Shares) -> IndexMap<String, Interval> {
+    shares.iter().map(|(label, share)| (label.clone(), share.interval())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::seed::{Key, Stage};
+
+    /// Returns the percentage of 1,000 draws whose interval contains `truth`.
+    fn coverage(truth: f64, mut draw: impl FnMut(&mut dyn FnMut() -> f64) -> Interval) -> f64 {
+        let mut draws = Key::from_seed(7).draws(Stage::Scheme, 0);
+        let mut uniform = || draws.unit();
+        let covers = |[low, high]: Interval| (low..=high).contains(&truth);
+        (0..1_000).filter(|_| covers(draw(&mut uniform))).count() as f64 / 10.0
+    }
+
+    fn count(n: usize, share: f64, uniform: &mut dyn FnMut() -> f64) -> f64 {
+        (0..n).filter(|_| uniform() < share).count() as f64
+    }
+
+    /// Returns a normal number of deviation 1 (the sum of twelve uniform numbers).
+    fn normal(uniform: &mut dyn FnMut() -> f64) -> f64 {
+        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+    }
+
+    #[test]
+    fn intervals_contain_the_truth_in_95_of_100_draws() {
+        for (n, share) in [(400, 0.5), (400, 0.03), (3_000, 0.2), (3_000, 0.97)] {
+            let found = coverage(100.0 * share, |uniform| {
+                Share::of(count(n, share, uniform), n as f64).interval()
+            });
+            assert!((93.0..=97.0).contains(&found), "{share} of {n} points: {found}");
+        }
+        for (n_items, share, deviation) in [(30, 0.5, 0.15), (100, 0.2, 0.05), (8, 0.6, 0.1)] {
+            let found = coverage(100.0 * share, |uniform| {
+                let mut all = Share::default();
+                for _ in 0..n_items {
+                    let n = 300 + (300.0 * uniform()) as usize;
+                    let of_item = share + deviation * normal(uniform);
+                    all.merge(&Share::of(count(n, of_item, uniform), n as f64));
+                }
+                all.interval()
+            });
+            assert!((93.0..=97.0).contains(&found), "{share} in {n_items} images: {found}");
+        }
+        for n in [2, 5, 20] {
+            let found = coverage(40.0, |uniform| {
+                let of: Vec<f64> = (0..n).map(|_| 40.0 + 3.0 * normal(uniform)).collect();
+                let mean = of.iter().sum::<f64>() / n as f64;
+                let squares: f64 = of.iter().map(|x| (x - mean) * (x - mean)).sum();
+                let points = Share::of(0.4 * 1e6, 1e6).interval();
+                over_repeats(&vec![points; n], mean, (squares / (n as f64 - 1.0)).sqrt())
+            });
+            assert!((93.0..=97.0).contains(&found), "{n} repeats: {found}");
+        }
+    }
+
+    /// Independent points in every image give no narrower interval than the points of one map.
+    #[test]
+    fn an_interval_is_never_narrower_than_over_points() {
+        let mut all = Share::default();
+        (0..50).for_each(|_| all.merge(&Share::of(0.0, 100.0)));
+        assert_eq!(all.interval(), Share::of(0.0, 5_000.0).interval());
+        assert!(all.interval()[1] > 0.07, "no point of 5,000 came back, but some may");
+        assert_eq!(Share::default().interval(), [0.0, 100.0]);
+        let [a, b] = [Share::of(60.0, 100.0), Share::of(40.0, 100.0)];
+        let of = |share: Share| Estimate { percent: share.percent(), interval: share.interval() };
+        // Newcombe's interval of this difference ends at 32.6 points for independent samples.
+        assert!((of(a).highest_gain(&of(b)) - 32.6).abs() < 0.1);
+    }
+}
