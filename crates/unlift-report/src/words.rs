@@ -2,36 +2,34 @@
 
 use unlift::Unit;
 use unlift::audit::Interval;
+use unlift::obfuscate::{self, Facts};
+
+/// Returns what is known of a scheme, without its changes to the map (`olc_thin4` is `olc`); `None` for schemes of others.
+pub(crate) fn facts(scheme: &str) -> Option<&'static Facts> {
+    obfuscate::all().find(|entry| entry.name == base(scheme)).map(|entry| &entry.facts)
+}
+
+fn base(scheme: &str) -> &str {
+    scheme.split('_').next().unwrap_or(scheme)
+}
 
 /// Returns the title of a scheme, with its changes to the map: `olc_thin4` is "Random lines, thin4". An
 /// unknown scheme keeps its name.
 pub(crate) fn scheme_title(scheme: &str) -> String {
-    let (base, changes) = scheme.split_once('_').unwrap_or((scheme, ""));
-    let title = match base {
-        "olc" => "Random lines",
-        "ppl" => "Paired-point lines",
-        "ppl+" => "Paired-point lines, plane-aware",
-        "ray" => "Ray cloud, two centers",
-        "ray-voxel" => "Ray cloud, voxel parity",
-        "plane" => "Axis-aligned planes",
-        "cp" => "Coordinate permutation",
-        "lines2d" => "Random lines in the image",
-        "cp2d" => "Coordinate permutation in the image",
-        "dcl2d" => "Dual convergent lines",
-        "lines2d-gravity" => "Lines along gravity in the image",
-        "sphere" => "Sphere cloud, a third of the bearings real",
-        _ => return scheme.to_owned(),
-    };
-    match changes {
-        "" => title.to_owned(),
-        _ => format!("{title}, {}", changes.replace('_', ", ")),
+    match facts(scheme) {
+        Some(facts) => scheme.replace('_', ", ").replacen(base(scheme), facts.title, 1),
+        None => scheme.to_owned(),
     }
 }
 
 /// Returns the name of a scheme in a sentence: `OLC`; other people's names stay as they are.
 pub(crate) fn scheme_name(scheme: &str) -> String {
-    let base = scheme.split_once('_').map_or(scheme, |(base, _)| base);
-    if scheme_rule(base).is_empty() { scheme.to_owned() } else { scheme.to_uppercase() }
+    if facts(scheme).is_some() { scheme.to_uppercase() } else { scheme.to_owned() }
+}
+
+/// Returns a sentence on what a scheme publishes in place of a point; empty for unknown schemes.
+pub(crate) fn scheme_rule(scheme: &str) -> &'static str {
+    facts(scheme).map_or("", |facts| facts.rule)
 }
 
 /// Returns a percentage as a part in words: "nearly half".
@@ -43,29 +41,6 @@ pub(crate) fn part(percent: f64) -> &'static str {
         45.0.. => "nearly half",
         30.0.. => "a third or more",
         _ => "a fifth or more",
-    }
-}
-
-/// Returns a sentence on what a scheme publishes in place of a point; empty for unknown schemes.
-pub(crate) fn scheme_rule(scheme: &str) -> &'static str {
-    match scheme {
-        "olc" => "Each point becomes a line of random direction through it.",
-        "ppl" => "Two random points share the line through both.",
-        "ppl+" => "Two points share a line that leaves the surface around them.",
-        "ray" => "Each point becomes a ray from one of two published centers.",
-        "ray-voxel" => {
-            "Each point becomes a ray from one of two published centers; the voxel of the point decides which."
-        }
-        "plane" => "Each point keeps one coordinate of three.",
-        "cp" => "Two points swap one coordinate.",
-        "lines2d" => "Each keypoint becomes a line of random direction through it.",
-        "cp2d" => "Two keypoints swap one of their two coordinates.",
-        "dcl2d" => "Each keypoint becomes a ray from the anchor of its half of the image.",
-        "lines2d-gravity" => {
-            "Each keypoint becomes the line through it and the image of the gravity direction."
-        }
-        "sphere" => "Each point becomes its bearing from the center of the map, among decoys.",
-        _ => "",
     }
 }
 

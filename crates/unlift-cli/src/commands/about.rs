@@ -22,8 +22,8 @@ pub fn schemes() -> crate::Result<Outcome> {
         };
         let facts = scheme.facts;
         text.push_str(&format!(
-            "{}\n  for          {meant_for}{request}\n  rule         {}\n  hidden       {}\n  publication  {}\n  patents      {}\n",
-            scheme.name, facts.summary, facts.hidden, facts.source, facts.patents
+            "{}: {}\n  for          {meant_for}{request}\n  rule         {}\n  hidden       {}\n  publication  {}\n  patents      {}\n",
+            scheme.name, facts.title, facts.rule, facts.hidden, facts.source, facts.patents
         ));
     }
     print(&text)?;

@@ -1,6 +1,8 @@
 //! Documents that may be shared: figures only.
 
 use serde_json::Value;
+use unlift::neighbors::sources;
+use unlift::obfuscate;
 
 use crate::document::Document;
 
@@ -10,23 +12,8 @@ const WITHHELD: &str = "(withheld)";
 const NAMING_OPTIONS: [&str; 9] =
     ["descriptors", "input", "inverter_sha256", "map", "model", "out", "path", "photos", "show"];
 
-/// The schemes of unlift. A reason from another scheme or source may contain anything: a line of data, a path.
-const SCHEMES: [&str; 12] = [
-    "olc",
-    "ppl",
-    "ppl+",
-    "ray",
-    "ray-voxel",
-    "plane",
-    "cp",
-    "lines2d",
-    "cp2d",
-    "dcl2d",
-    "sphere",
-    "lines2d-gravity",
-];
-const SOURCES: [&str; 7] =
-    ["oracle", "file", "similarity", "overlap", "descriptors", "geometric", "learned"];
+/// Further sources of unlift. A reason from another scheme or source may contain anything: a line of data, a path.
+const SOURCES: [&str; 4] = ["oracle", "file", "descriptors", "learned"];
 const OWN_FAILED: &str = "its own function failed";
 const NOT_AUDITED: &str = " was not audited";
 
@@ -50,8 +37,11 @@ impl Document {
         }
         for missing in &mut safe.not_audited {
             let source = missing.neighbors.as_deref();
-            let is_ours = SCHEMES.contains(&&*missing.scheme)
-                && source.is_none_or(|source| SOURCES.contains(&source));
+            let is_source = |name: &str| {
+                SOURCES.contains(&name) || sources::SOURCES.iter().any(|entry| entry.name == name)
+            };
+            let is_ours = obfuscate::all().any(|entry| entry.name == missing.scheme)
+                && source.is_none_or(is_source);
             // A reason may also come from the solver of another author.
             if !is_ours || missing.reason.contains("solver ") {
                 missing.reason = OWN_FAILED.to_owned();

@@ -2,8 +2,6 @@
 
 use unlift::Unit;
 
-use std::collections::HashSet;
-
 use serde::Serialize;
 
 use crate::attack::{Basis, Given};
@@ -384,24 +382,13 @@ pub(crate) fn unit_sign(unit: Option<Unit>) -> &'static str {
     }
 }
 
-const KNOWN_SCHEMES: [&str; 7] = ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp"];
+/// Number of colors and marks.
 const SLOTS: usize = 8;
 
-/// Returns the number of the color and mark of `scheme`; unknown schemes are numbered as they appear.
+/// Returns the number of the color and mark of `scheme`; unknown schemes are numbered from the last one as they appear.
 fn slot(document: &Document, scheme: &str) -> usize {
-    let known = match scheme {
-        "lines2d" => "olc",
-        "cp2d" => "cp",
-        "dcl2d" => "ray",
-        other => other,
-    };
-    if let Some(slot) = KNOWN_SCHEMES.iter().position(|name| *name == known) {
-        return slot;
-    }
-    let names = document.results.iter().map(|row| row.scheme.as_str());
-    let before: HashSet<&str> = names
-        .take_while(|name| *name != scheme)
-        .filter(|name| !KNOWN_SCHEMES.contains(name))
-        .collect();
-    (KNOWN_SCHEMES.len() + before.len()) % SLOTS
+    let known = |name: &str| words::facts(name).map(|facts| facts.color);
+    let others = || tables::schemes(document).into_iter().filter(|name| known(name).is_none());
+    let number = || others().position(|name| name == scheme).unwrap_or(0);
+    known(scheme).unwrap_or_else(|| (SLOTS - 1 + number()) % SLOTS)
 }

@@ -17,7 +17,9 @@ pub struct Cp;
 pub const ENTRY: Entry = Entry {
     name: "cp",
     facts: Facts {
-        summary: "random pairs exchange one random coordinate",
+        title: "Coordinate permutation",
+        rule: "Two points swap one coordinate.",
+        color: 6,
         source: "Pan et al., Privacy Preserving Localization via Coordinate Permutations, ICCV 2023",
         hidden: "which coordinate was exchanged, and its value",
         patents: "none found",
@@ -30,7 +32,8 @@ pub const ENTRY: Entry = Entry {
 pub const CP2D: Entry = Entry {
     name: "cp2d",
     facts: Facts {
-        summary: "random pairs of keypoints exchange one random coordinate",
+        title: "Coordinate permutation in the image",
+        rule: "Two keypoints swap one of their two coordinates.",
         ..ENTRY.facts
     },
     in_2d: Some(|_| Arc::new(Cp)),

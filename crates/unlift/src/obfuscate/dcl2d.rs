@@ -29,7 +29,9 @@ pub struct Dcl2d;
 pub const ENTRY: Entry = Entry {
     name: "dcl2d",
     facts: Facts {
-        summary: "a line from every keypoint to the anchor of its half of the image",
+        title: "Dual convergent lines",
+        rule: "Each keypoint becomes a ray from the anchor of its half of the image.",
+        color: 3,
         source: "Kim et al., Dual Convergent Lines, CVPR 2026",
         hidden: "the range from the anchor (1 of 2 coordinates)",
         patents: "none found",

@@ -22,7 +22,9 @@ pub struct Olc;
 pub const ENTRY: Entry = Entry {
     name: "olc",
     facts: Facts {
-        summary: "a random line through every point",
+        title: "Random lines",
+        rule: "Each point becomes a line of random direction through it.",
+        color: 0,
         source: "Speciale et al., Privacy Preserving Image-Based Localization, CVPR 2019",
         hidden: "the position along the line (1 of 3 coordinates)",
         patents: "EP 3818501 B1 / WO 2020/009829 \"3D line clouds\", Microsoft (US 16/025,120)",
@@ -35,7 +37,9 @@ pub const ENTRY: Entry = Entry {
 pub const LINES2D: Entry = Entry {
     name: "lines2d",
     facts: Facts {
-        summary: "a random line through every keypoint",
+        title: "Random lines in the image",
+        rule: "Each keypoint becomes a line of random direction through it.",
+        color: 0,
         source: "Speciale et al., Privacy Preserving Image Queries for Camera Localization, ICCV 2019",
         hidden: "the position along the line (1 of 2 coordinates)",
         patents: "US 10,839,556, Microsoft",
@@ -72,7 +76,9 @@ pub struct Gravity;
 pub const GRAVITY: Entry = Entry {
     name: "lines2d-gravity",
     facts: Facts {
-        summary: "the line through a keypoint and the image of the gravity direction",
+        title: "Lines along gravity in the image",
+        rule: "Each keypoint becomes the line through it and the image of the gravity direction.",
+        color: 7,
         source: "Geppert et al., Privacy Preserving Structure-from-Motion, ECCV 2020",
         hidden: "the position along the line (1 of 2 coordinates)",
         patents: "none found",

@@ -17,7 +17,9 @@ pub struct Plane;
 pub const ENTRY: Entry = Entry {
     name: "plane",
     facts: Facts {
-        summary: "an axis-parallel plane through every point, the axis drawn in equal thirds",
+        title: "Axis-aligned planes",
+        rule: "Each point keeps one coordinate of three.",
+        color: 5,
         source: "Geppert et al., Privacy Preserving Partial Localization, CVPR 2022",
         hidden: "two of three coordinates",
         patents: "none found",

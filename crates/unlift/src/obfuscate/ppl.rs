@@ -23,7 +23,9 @@ pub struct Ppl;
 pub const ENTRY: Entry = Entry {
     name: "ppl",
     facts: Facts {
-        summary: "one line through two random points",
+        title: "Paired-point lines",
+        rule: "Two random points share the line through both.",
+        color: 1,
         source: "Lee et al., Paired-Point Lifting for Enhanced Privacy-Preserving Visual Localization, CVPR 2023",
         hidden: "two positions along the line and which descriptor is whose",
         patents: "application declared by its authors; line clouds as for olc",
@@ -107,7 +109,9 @@ pub struct PplPlus;
 pub const PLUS: Entry = Entry {
     name: "ppl+",
     facts: Facts {
-        summary: "as ppl, but no line lies within the local surface of its first point",
+        title: "Paired-point lines, plane-aware",
+        rule: "Two points share a line that leaves the surface around them.",
+        color: 2,
         patents: "as ppl",
         ..ENTRY.facts
     },

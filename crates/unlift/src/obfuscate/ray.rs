@@ -20,7 +20,9 @@ pub struct Ray;
 pub const ENTRY: Entry = Entry {
     name: "ray",
     facts: Facts {
-        summary: "a half-line from one of two k-means centers, drawn at random",
+        title: "Ray cloud, two centers",
+        rule: "Each point becomes a ray from one of two published centers.",
+        color: 3,
         source: "Moon et al., Efficient Privacy-Preserving Visual Localization Using 3D Ray Clouds, CVPR 2024",
         hidden: "the range from the center (1 of 3 coordinates)",
         patents: "US 2025/0329045 A1; PCT application declared by its authors",
@@ -59,7 +61,9 @@ pub struct RayVoxel {
 pub const VOXEL: Entry = Entry {
     name: "ray-voxel",
     facts: Facts {
-        summary: "as ray, the center given by the parity of the point's voxel",
+        title: "Ray cloud, voxel parity",
+        rule: "Each point becomes a ray from one of two published centers; the voxel of the point decides which.",
+        color: 4,
         patents: "as ray",
         ..ENTRY.facts
     },

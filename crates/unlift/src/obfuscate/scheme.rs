@@ -45,8 +45,12 @@ impl Entry {
 /// Facts about a scheme; empty if unknown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Facts {
-    /// Rule in one line.
-    pub summary: &'static str,
+    /// Title in a few words.
+    pub title: &'static str,
+    /// Sentence on what is published in place of a point.
+    pub rule: &'static str,
+    /// Number of its color in charts, 0 to 7. Schemes with similar rules for maps and images share one.
+    pub color: usize,
     /// Publication.
     pub source: &'static str,
     /// Part of a point that stays secret.

@@ -31,7 +31,9 @@ const VARIANCE: f64 = 0.1;
 pub const ENTRY: Entry = Entry {
     name: "sphere",
     facts: Facts {
-        summary: "the bearing of a point from the center of the map; two thirds are decoys",
+        title: "Sphere cloud, a third of the bearings real",
+        rule: "Each point becomes its bearing from the center of the map, among decoys.",
+        color: 7,
         source: "Moon et al., Depth-Guided Privacy-Preserving Visual Localization Using 3D Sphere Clouds, BMVC 2024",
         hidden: "the range from the center (1 of 3 coordinates)",
         patents: "PCT application declared by its authors",
