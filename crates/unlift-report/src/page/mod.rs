@@ -15,15 +15,15 @@ use unlift::Unit;
 use minijinja::value::Serde;
 use minijinja::{AutoEscape, Environment, UndefinedBehavior};
 use serde::Serialize;
+use serde_json::{Value, json};
 
 use crate::document::{Document, ImageCounts};
-use crate::page::curves::{Findings, findings, page_data};
-use crate::page::gates::{Gates, gates};
-use crate::page::inversions::{Exhibit, Inversion, Sheet, exhibits, sheets};
+use crate::page::curves::{findings, page_data};
+use crate::page::gates::gates;
+use crate::page::inversions::{Exhibit, Inversion, exhibits, sheets};
 use crate::page::pictures::Picture;
 use crate::page::scene::{Scene3d, encode};
-use crate::page::tables::Table;
-use crate::page::tiles::{HeatMap, heat_maps};
+use crate::page::tiles::heat_maps;
 use crate::page::verdict::{Card, Verdict, verdict};
 use crate::{Error, attack, words};
 
@@ -104,49 +104,54 @@ pub fn render(
     let own = Opening::of(&document, shown);
     let oracle = document.results.iter();
     let oracle = oracle.filter(|row| attack::basis(row) == attack::Basis::Oracle);
-    let page = Page {
-        style: STYLE,
-        bundle: BUNDLE,
-        scripts: SCRIPTS,
-        data: script_text(&data),
-        blocks: &blocks,
-        pictures: pictures.len(),
-        findings: findings(&document),
-        parts: opening.into_iter().chain([own]).collect(),
-        sheets: drawn,
-        sheets_left_out,
-        heat_maps: heat_maps(&document),
-        cost: cost::chart(&document),
-        scene: encoded.as_ref().map(|scene| SceneWords {
-            n_points: words::thousands(scene.n_points),
-            n_drawn: words::thousands(scene.n_drawn as u64),
-            whole: scene.n_drawn as u64 >= scene.n_points,
-        }),
-        share_safe: options.share_safe,
-        subject: subject(&document),
-        gates: gates(&document),
-        has_curves: tables::distinct(oracle.map(|row| row.inlier_ratio)).len() > 1,
-        judged: page_data.has_reliability(),
-        tables: table_list.into_iter().flatten().collect(),
-        losses: loss_list.into_iter().flatten().collect(),
-        times: tables::times(&document),
-        options: options_text,
-        command: document.run.command.as_deref(),
-        sha256: document.input.sha256.as_deref(),
-        other_sha256: document.input.other_sha256.iter().collect(),
-        seconds: words::seconds(document.run.seconds.total),
-        memory: document.run.peak_memory_bytes.map(words::bytes),
-        not_audited: document
-            .not_audited
-            .iter()
-            .map(|one| {
-                let source = one.neighbors.as_deref().map(|by| attack::plain_source(by, None));
-                (&one.scheme, source, &one.reason)
-            })
-            .collect(),
-        notes: &document.notes,
-        document: &document,
-    };
+    let shown_scene = encoded.as_ref().map(|scene| {
+        json!({
+            "n_points": words::thousands(scene.n_points),
+            "n_drawn": words::thousands(scene.n_drawn),
+            "whole": scene.n_drawn as u64 >= scene.n_points,
+        })
+    });
+    let parts: Vec<Opening> = opening.into_iter().chain([own]).collect();
+    let not_audited = document.not_audited.iter().map(|one| {
+        let source = one.neighbors.as_deref().map(|by| attack::plain_source(by, None));
+        (&one.scheme, source, &one.reason)
+    });
+    let page = json!({
+        "style": STYLE,
+        "bundle": BUNDLE,
+        "scripts": SCRIPTS,
+        // JSON for the script; free of `<`.
+        "data": script_text(&data),
+        "blocks": blocks,
+        "pictures": pictures.len(),
+        "findings": findings(&document),
+        // The verdict of this audit, after that of another audit if there is one.
+        "parts": parts,
+        "sheets": drawn,
+        "sheets_left_out": sheets_left_out,
+        "heat_maps": heat_maps(&document),
+        "cost": cost::chart(&document),
+        "scene": shown_scene,
+        "share_safe": options.share_safe,
+        "subject": subject(&document),
+        "gates": gates(&document),
+        // Known neighbors were tried at several shares of right ones.
+        "has_curves": tables::distinct(oracle.map(|row| row.inlier_ratio)).len() > 1,
+        // A row has estimated probabilities.
+        "judged": page_data.has_reliability(),
+        "tables": table_list.into_iter().flatten().collect::<Vec<_>>(),
+        "losses": loss_list.into_iter().flatten().collect::<Vec<_>>(),
+        "times": tables::times(&document),
+        "options": options_text,
+        "command": document.run.command,
+        "sha256": document.input.sha256,
+        "other_sha256": document.input.other_sha256.iter().collect::<Vec<_>>(),
+        "seconds": words::seconds(document.run.seconds.total),
+        "memory": document.run.peak_memory_bytes.map(words::bytes),
+        "not_audited": not_audited.collect::<Vec<_>>(),
+        "notes": document.notes,
+        "document": document,
+    });
     let mut env = environment();
     // A non-breaking space keeps a figure and its unit on one line.
     env.add_filter("tied", |text: String| {
@@ -174,45 +179,6 @@ fn turns(c: char) -> bool {
     matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-#[derive(Debug, Serialize)]
-struct Page<'a> {
-    style: [&'static str; 2],
-    bundle: &'static str,
-    scripts: [&'static str; 8],
-    /// JSON for the script; free of `<`.
-    data: String,
-    blocks: &'a [String],
-    scene: Option<SceneWords>,
-    pictures: usize,
-    /// The verdict of this audit, after that of another audit if there is one.
-    parts: Vec<Opening>,
-    findings: Findings,
-    sheets: Vec<Sheet>,
-    /// Number of pictures that were left out to keep the page small.
-    sheets_left_out: usize,
-    heat_maps: Vec<HeatMap>,
-    cost: Option<cost::Chart>,
-    share_safe: bool,
-    subject: Subject,
-    gates: Option<Gates>,
-    /// Whether known neighbors were tried at several shares of right ones.
-    has_curves: bool,
-    /// Whether any row has estimated probabilities.
-    judged: bool,
-    tables: Vec<Table>,
-    losses: Vec<Table>,
-    times: Option<Table>,
-    options: Vec<(String, String)>,
-    command: Option<&'a str>,
-    sha256: Option<&'a str>,
-    other_sha256: Vec<(&'a String, &'a String)>,
-    seconds: String,
-    memory: Option<String>,
-    not_audited: Vec<(&'a String, Option<String>, &'a String)>,
-    notes: &'a [String],
-    document: &'a Document,
-}
-
 fn coded(text: &str) -> minijinja::Value {
     let escaped = text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
     let parts = escaped.split('`').enumerate();
@@ -223,32 +189,11 @@ fn coded(text: &str) -> minijinja::Value {
     minijinja::Value::from_safe_string(parts.collect())
 }
 
-#[derive(Debug, Serialize)]
-struct SceneWords {
-    n_points: String,
-    n_drawn: String,
-    whole: bool,
-}
-
-#[derive(Debug, Serialize)]
-struct Subject {
-    /// The last telling part of the path; the whole path is in the last section.
-    name: Option<String>,
-    n_points: String,
-    metric: bool,
-    kind: &'static str,
-    points: &'static str,
-    images: Option<String>,
-    unit: String,
-    kth: String,
-    usual_distance: &'static str,
-}
-
-fn subject(document: &Document) -> Subject {
+fn subject(document: &Document) -> Value {
     let input = &document.input;
     // The oracle uses the K of the audit; other sources choose their own.
     let oracle = document.results.iter().find(|row| row.neighbors == "oracle");
-    let typed = document.options.get("k").and_then(serde_json::Value::as_u64);
+    let typed = document.options.get("k").and_then(Value::as_u64);
     let k = oracle.map(|row| row.k).or(typed.and_then(|k| usize::try_from(k).ok())).unwrap_or(50);
     let of = document.results.first().map_or(Unit::Meter, |row| row.unit);
     let metric = of != Unit::KthNeighbor;
@@ -264,18 +209,18 @@ fn subject(document: &Document) -> Subject {
         }
         (false, _, None) => String::new(),
     };
-    let name = input.path.as_deref().map(short_name);
-    Subject {
-        name,
-        n_points: words::thousands(input.n_points),
-        metric,
-        kind: if of == Unit::Pixel { "images" } else { "map" },
-        points: words::points(of),
-        images: input.images.as_ref().map(images_text),
-        unit,
-        kth: words::ordinal(k),
-        usual_distance: words::USUAL_DISTANCE,
-    }
+    json!({
+        // The last telling part of the path; the whole path is in the last section.
+        "name": input.path.as_deref().map(short_name),
+        "n_points": words::thousands(input.n_points),
+        "metric": metric,
+        "kind": if of == Unit::Pixel { "images" } else { "map" },
+        "points": words::points(of),
+        "images": input.images.as_ref().map(images_text),
+        "unit": unit,
+        "kth": words::ordinal(k),
+        "usual_distance": words::USUAL_DISTANCE,
+    })
 }
 
 fn images_text(counts: &ImageCounts) -> String {
@@ -305,11 +250,11 @@ fn short_name(path: &str) -> String {
     name.unwrap_or(path).to_owned()
 }
 
-fn plain(value: &serde_json::Value) -> String {
+fn plain(value: &Value) -> String {
     match value {
-        serde_json::Value::String(text) => text.clone(),
-        serde_json::Value::Array(items) => items.iter().map(plain).collect::<Vec<_>>().join(", "),
-        serde_json::Value::Null => "none".to_owned(),
+        Value::String(text) => text.clone(),
+        Value::Array(items) => items.iter().map(plain).collect::<Vec<_>>().join(", "),
+        Value::Null => "none".to_owned(),
         other => other.to_string(),
     }
 }
