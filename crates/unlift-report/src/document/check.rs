@@ -152,7 +152,10 @@ fn shares(place: &str, value: &Value, highest: Option<f64>) -> Result<(), Error>
         }
         (Value::Number(number), Some(highest)) => match number.as_f64() {
             Some(value) if (0.0..=highest).contains(&value) => Ok(()),
-            _ => invalid(place, format!("a number from 0 to {highest}"), number),
+            value => {
+                let expected = format!("a number from 0 to {highest}");
+                invalid(place, expected, value.unwrap_or(f64::NAN))
+            }
         },
         _ => Ok(()),
     }

@@ -3,23 +3,20 @@
 use unlift::Unit;
 
 use serde::Serialize;
+use serde_json::{Value, json};
 
 use crate::attack::{Basis, Given};
-use crate::document::{Document, Row};
-use crate::page::pictures::{EncodedPicture, first_choice};
-use crate::page::scene::Encoded;
+use crate::document::{ByThreshold, Document, Row};
 use crate::page::{RenderOptions, tables, verdict};
 use crate::{attack, words};
 
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Findings {
-    pub curves: String,
-    pub errors: String,
-    pub certainty: String,
-}
-
-pub(crate) fn findings(document: &Document) -> Findings {
-    Findings { curves: curves(document), errors: errors(document), certainty: certainty(document) }
+/// Returns the titles of the charts.
+pub(crate) fn findings(document: &Document) -> Value {
+    json!({
+        "curves": curves(document),
+        "errors": errors(document),
+        "certainty": certainty(document),
+    })
 }
 
 /// Ratio of the recovery with the fewest right neighbors to that with the most, from which on wrong
@@ -107,51 +104,6 @@ fn speaking(document: &Document) -> Option<&Row> {
     })
 }
 
-#[derive(Debug, Serialize)]
-pub(crate) struct PageData<'a> {
-    #[serde(flatten)]
-    choices: Choices,
-    thresholds: Vec<ThresholdData>,
-    rows: Vec<RowData>,
-    headline: usize,
-    /// `m`, `px`, or `×` for multiples of the usual distance to the K-th neighbor.
-    unit: &'static str,
-    scene: Option<&'a Encoded>,
-    pictures: &'a [EncodedPicture],
-    first_picture: Option<&'a str>,
-}
-
-impl PageData<'_> {
-    /// Returns whether the chart of estimated probabilities has a curve.
-    pub(crate) fn has_reliability(&self) -> bool {
-        self.rows.iter().any(|row| !row.reliability.is_empty())
-    }
-}
-
-#[derive(Debug, Serialize)]
-struct ThresholdData {
-    label: String,
-    value: Option<f64>,
-}
-
-#[derive(Debug, Serialize)]
-struct RowData {
-    /// Places in the lists of [`Choices`].
-    scheme: usize,
-    given: usize,
-    solver: usize,
-    /// The label of this row's neighborhoods: `neighbors by descriptor overlap, 11 % right`.
-    label: String,
-    ratio: f64,
-    strongest: Vec<bool>,
-    recovered: Vec<Option<f64>>,
-    errors: Vec<(f64, f64)>,
-    /// (stated probability, share that was right), in percent, ascending; without bins of few
-    /// points.
-    reliability: Vec<(f64, f64)>,
-    unknown: Option<String>,
-}
-
 fn is_strongest(document: &Document, row: &Row, typed: &str) -> bool {
     let best = verdict::strongest_given(document, &row.scheme, &Given::of(row), typed);
     best.is_some_and(|best| std::ptr::eq(best, row))
@@ -160,7 +112,8 @@ fn is_strongest(document: &Document, row: &Row, typed: &str) -> bool {
 /// Bins with at least this share of the released points are drawn; smaller ones scatter.
 const LEAST_DRAWN: f64 = 0.005;
 
-fn judged(row: &Row) -> Vec<(f64, f64)> {
+/// Returns (stated probability, share that was right), in percent, ascending; without bins of few points.
+pub(crate) fn judged(row: &Row) -> Vec<(f64, f64)> {
     let least = LEAST_DRAWN * row.n_points as f64;
     row.reliability
         .iter()
@@ -170,54 +123,56 @@ fn judged(row: &Row) -> Vec<(f64, f64)> {
         .collect()
 }
 
-pub(crate) fn page_data<'a>(
-    document: &'a Document,
-    scene: Option<&'a Encoded>,
-    pictures: &'a [EncodedPicture],
+/// Returns the data of the script, with `drawn`, those of the 3D view and the pictures.
+pub(crate) fn page_data(
+    document: &Document,
     options: &RenderOptions,
-) -> PageData<'a> {
+    drawn: impl IntoIterator<Item = (&'static str, Value)>,
+) -> Value {
     let thresholds = tables::thresholds(document);
     let choices = Choices::of(document);
-    let by_threshold = |map: &crate::document::ByThreshold| {
+    let by_threshold = |map: &ByThreshold| {
         thresholds.iter().map(|typed| map.get(typed).copied()).collect::<Vec<_>>()
     };
-    let rows = document.results.iter().enumerate().filter_map(|(index, row)| {
+    let rows = document.results.iter().enumerate().map(|(index, row)| {
         let cdf = options.error_cdf.iter().find(|cdf| cdf.row == index);
         let given = Given::of(row);
-        Some(RowData {
-            scheme: choices.scheme(&row.scheme)?,
-            given: choices.given(&given)?,
-            solver: choices.solver(&row.solver)?,
-            label: given.label(),
-            ratio: row.inlier_ratio,
-            strongest: thresholds.iter().map(|typed| is_strongest(document, row, typed)).collect(),
-            recovered: by_threshold(&row.recovered_percent),
-            errors: cdf.map_or_else(|| percentile_points(row), |cdf| cdf.points.clone()),
-            reliability: judged(row),
-            unknown: row.sure_unknown.clone(),
+        let strongest = thresholds.iter().map(|typed| is_strongest(document, row, typed));
+        json!({
+            // Places in the lists of the choices.
+            "scheme": choices.scheme(&row.scheme),
+            "given": choices.given(&given),
+            "solver": choices.solver(&row.solver),
+            "label": given.label(),
+            "ratio": row.inlier_ratio,
+            "strongest": strongest.collect::<Vec<bool>>(),
+            "recovered": by_threshold(&row.recovered_percent),
+            "errors": cdf.map_or_else(|| percentile_points(row), |cdf| cdf.points.clone()),
+            "reliability": judged(row),
+            "unknown": row.sure_unknown,
         })
     });
-    PageData {
-        rows: rows.collect(),
-        thresholds: thresholds
-            .iter()
-            .map(|typed| ThresholdData {
-                label: tables::threshold_text(document, typed),
-                value: typed.parse().ok(),
-            })
-            .collect(),
-        unit: unit_sign(document.results.first().map(|row| row.unit)),
-        headline: tables::headline_threshold(document)
-            .and_then(|typed| thresholds.iter().position(|other| *other == typed))
-            .unwrap_or(0),
-        choices,
-        scene,
-        first_picture: first_choice(pictures),
-        pictures,
-    }
+    let labels = thresholds.iter().map(|typed| {
+        let label = tables::threshold_text(document, typed);
+        json!({ "label": label, "value": typed.parse::<f64>().ok() })
+    });
+    let headline = tables::headline_threshold(document);
+    let headline = headline.and_then(|typed| thresholds.iter().position(|it| *it == typed));
+    let mut data = json!({
+        "rows": rows.collect::<Vec<_>>(),
+        "thresholds": labels.collect::<Vec<_>>(),
+        "unit": unit_sign(document.results.first().map(|row| row.unit)),
+        "headline": headline.unwrap_or(0),
+        "schemes": choices.schemes,
+        "givens": choices.givens,
+        "solvers": choices.solvers,
+        "first_given": choices.first_given,
+    });
+    drawn.into_iter().for_each(|(name, value)| data[name] = value);
+    data
 }
 
-fn percentile_points(row: &crate::document::Row) -> Vec<(f64, f64)> {
+fn percentile_points(row: &Row) -> Vec<(f64, f64)> {
     let points = row.error_percentiles.iter();
     let mut points: Vec<(f64, f64)> =
         points.filter_map(|(percent, error)| Some(((*error)?, percent.parse().ok()?))).collect();
@@ -234,7 +189,7 @@ fn percentile_points(row: &crate::document::Row) -> Vec<(f64, f64)> {
 }
 
 /// The lists of choices. The script finds a row only by its places in them.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Choices {
     pub schemes: Vec<SchemeChoice>,
     pub givens: Vec<GivenChoice>,

@@ -18,7 +18,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::document::{Document, ImageCounts};
-use crate::page::curves::{findings, page_data};
+use crate::page::curves::{findings, judged, page_data};
 use crate::page::gates::gates;
 use crate::page::inversions::{Exhibit, Inversion, exhibits, sheets};
 use crate::page::pictures::Picture;
@@ -75,13 +75,19 @@ pub fn render(
     let error_unit = tables::thresholds(&document).first().and_then(|typed| typed.parse().ok());
     let encoded = scene.map(|scene| encode(scene, &document.results, error_unit.unwrap_or(1.0)));
     // A view without points or without recovered points would be empty.
-    let encoded = encoded.filter(|scene| scene.n_drawn > 0 && !scene.views.is_empty());
+    let encoded = encoded.filter(|scene| scene.n_drawn > 0 && scene.has_views);
     let mut blocks = encoded.as_ref().map(|scene| scene.blocks.clone()).unwrap_or_default();
     let shown = if options.share_safe { &[] } else { options.pictures.as_slice() };
     let within = tables::headline_threshold(&document).and_then(|typed| typed.parse().ok());
-    let pictures = pictures::encode(shown, within.unwrap_or(10.0), &mut blocks);
-    let page_data = page_data(&document, encoded.as_ref(), &pictures, options);
-    let data = serde_json::to_string(&page_data)?;
+    let within = within.unwrap_or(10.0);
+    let pictures = pictures::encode(shown, within, &mut blocks);
+    let n_pictures = pictures.len();
+    let drawn = [
+        ("scene", encoded.as_ref().map_or(Value::Null, |scene| scene.data.clone())),
+        ("first_picture", pictures::first_choice(shown, within).into()),
+        ("pictures", pictures.into()),
+    ];
+    let data = page_data(&document, options, drawn).to_string();
     let options_text: Vec<(String, String)> =
         document.options.iter().map(|(name, value)| (name.clone(), plain(value))).collect();
     let table_list = [
@@ -123,7 +129,7 @@ pub fn render(
         // JSON for the script; free of `<`.
         "data": script_text(&data),
         "blocks": blocks,
-        "pictures": pictures.len(),
+        "pictures": n_pictures,
         "findings": findings(&document),
         // The verdict of this audit, after that of another audit if there is one.
         "parts": parts,
@@ -138,7 +144,7 @@ pub fn render(
         // Known neighbors were tried at several shares of right ones.
         "has_curves": tables::distinct(oracle.map(|row| row.inlier_ratio)).len() > 1,
         // A row has estimated probabilities.
-        "judged": page_data.has_reliability(),
+        "judged": document.results.iter().any(|row| !judged(row).is_empty()),
         "tables": table_list.into_iter().flatten().collect::<Vec<_>>(),
         "losses": loss_list.into_iter().flatten().collect::<Vec<_>>(),
         "times": tables::times(&document),

@@ -5,6 +5,7 @@
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use serde_json::{Value, json};
 
 use crate::page::scene::subsample;
 use crate::{attack, words};
@@ -86,56 +87,13 @@ const BUDGET_BYTES: usize = 3_600_000;
 const NOT_DRAWN: u16 = u16::MAX;
 const BYTES_PER_POINT: usize = 2 * size_of::<u16>();
 
-#[derive(Debug, serde::Serialize)]
-pub(crate) struct EncodedPicture {
-    name: String,
-    note: String,
-    size: [u32; 2],
-    photo: Option<usize>,
-    said: String,
-    keypoints: usize,
-    short_px: f32,
-    released: Vec<EncodedMarks>,
-    views: Vec<EncodedView>,
-    graphs: Vec<EncodedGraph>,
-}
-
-#[derive(Debug, serde::Serialize)]
-struct EncodedMarks {
-    scheme: String,
-    kind: &'static str,
-    block: usize,
-}
-
-#[derive(Debug, serde::Serialize)]
-struct EncodedView {
-    scheme: String,
-    /// The key of the neighborhoods, equal in all pictures.
-    given: String,
-    label: String,
-    solver: String,
-    block: usize,
-    said: String,
-    #[serde(skip)]
-    share: f64,
-    #[serde(skip)]
-    own: bool,
-}
-
-#[derive(Debug, serde::Serialize)]
-struct EncodedGraph {
-    given: String,
-    said: String,
-    /// Neighbors per keypoint; shorter lists are padded with points that are not drawn.
-    k: usize,
-    block: usize,
-}
-
 /// Returns the key of the neighborhoods that are shown first: those made by the attacker that recover
 /// most of the first picture.
-pub(crate) fn first_choice(pictures: &[EncodedPicture]) -> Option<&str> {
-    let own = pictures.first()?.views.iter().filter(|view| view.own);
-    own.max_by(|a, b| a.share.total_cmp(&b.share)).map(|view| view.given.as_str())
+pub(crate) fn first_choice(pictures: &[Picture], within: f64) -> Option<String> {
+    let first = pictures.first()?;
+    let own = first.views.iter().filter(|view| !attack::is_oracle(&view.given.neighbors));
+    let share = |view: &RecoveredView| recovered_said(first, view, within).0;
+    own.max_by(|a, b| share(a).total_cmp(&share(b))).map(|view| key(&view.given))
 }
 
 /// Edges below this fraction of the smaller side are short, as in the paper's figures.
@@ -143,17 +101,13 @@ const SHORT_SHARE: f32 = 0.1;
 
 /// Encodes up to [`MOST_PICTURES`] pictures and appends their blocks to `blocks`. Keypoints are thinned
 /// to keep the budget. Shares within `within` pixels are over all released keypoints.
-pub(crate) fn encode(
-    pictures: &[Picture],
-    within: f64,
-    blocks: &mut Vec<String>,
-) -> Vec<EncodedPicture> {
+pub(crate) fn encode(pictures: &[Picture], within: f64, blocks: &mut Vec<String>) -> Vec<Value> {
     let pictures = &pictures[..pictures.len().min(MOST_PICTURES)];
     let each = BUDGET_BYTES / pictures.len().max(1);
     pictures.iter().map(|picture| one(picture, each, within, blocks)).collect()
 }
 
-fn one(picture: &Picture, budget: usize, within: f64, blocks: &mut Vec<String>) -> EncodedPicture {
+fn one(picture: &Picture, budget: usize, within: f64, blocks: &mut Vec<String>) -> Value {
     let points = 1
         + 2 * picture.released.len()
         + picture.views.len()
@@ -181,23 +135,21 @@ fn one(picture: &Picture, budget: usize, within: f64, blocks: &mut Vec<String>) 
             Marks::Rays(all) => ("rays", ends(all)),
             Marks::Points(all) => ("points", at(all, &chosen, place)),
         };
-        EncodedMarks { scheme: view.scheme.clone(), kind, block: push(bytes) }
+        json!({ "scheme": view.scheme, "kind": kind, "block": push(bytes) })
     });
-    let released = released.collect();
+    let released: Vec<Value> = released.collect();
     let views = picture.views.iter().map(|view| {
-        let (share, said) = recovered_said(picture, view, within);
-        EncodedView {
-            scheme: view.scheme.clone(),
-            given: key(&view.given),
-            label: view.given.label(),
-            solver: view.solver.clone(),
-            block: push(at(&view.recovered, &chosen, place)),
-            said,
-            share,
-            own: !attack::is_oracle(&view.given.neighbors),
-        }
+        json!({
+            "scheme": view.scheme,
+            // The key of the neighborhoods, equal in all pictures.
+            "given": key(&view.given),
+            "label": view.given.label(),
+            "solver": view.solver,
+            "block": push(at(&view.recovered, &chosen, place)),
+            "said": recovered_said(picture, view, within).1,
+        })
     });
-    let views = views.collect();
+    let views: Vec<Value> = views.collect();
     let graphs = picture.graphs.iter().map(|graph| {
         let listed = |&i: &usize| {
             let of = graph.neighbors.get(i).map(Vec::as_slice).unwrap_or_default();
@@ -205,21 +157,22 @@ fn one(picture: &Picture, budget: usize, within: f64, blocks: &mut Vec<String>) 
         };
         let block = push(chosen.iter().flat_map(listed).collect());
         let said = graph_said(picture, graph, short_px);
-        EncodedGraph { given: key(&graph.given), said, k: GRAPH_NEIGHBORS, block }
+        // Shorter lists are padded with points that are not drawn.
+        json!({ "given": key(&graph.given), "said": said, "k": GRAPH_NEIGHBORS, "block": block })
     });
-    let graphs = graphs.collect();
-    EncodedPicture {
-        name: picture.name.clone(),
-        note: picture.note.clone(),
-        size: picture.size,
-        photo,
-        said: picture_said(picture, chosen.len()),
-        keypoints,
-        short_px,
-        released,
-        views,
-        graphs,
-    }
+    let graphs: Vec<Value> = graphs.collect();
+    json!({
+        "name": picture.name,
+        "note": picture.note,
+        "size": picture.size,
+        "photo": photo,
+        "said": picture_said(picture, chosen.len()),
+        "keypoints": keypoints,
+        "short_px": short_px,
+        "released": released,
+        "views": views,
+        "graphs": graphs,
+    })
 }
 
 fn at(

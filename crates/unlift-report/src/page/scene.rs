@@ -5,6 +5,7 @@
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use serde_json::{Value, json};
 
 use crate::attack::Given;
 use crate::document::Row;
@@ -113,40 +114,15 @@ pub fn points_within_budget(n_views: usize, n_schemes: usize) -> usize {
     budget.saturating_sub(fixed) / (BYTES_PER_POINT + n_views * BYTES_PER_RECOVERED)
 }
 
-#[derive(Debug, serde::Serialize)]
+/// The view as the script reads it.
 pub(crate) struct Encoded {
-    pub low: [f32; 3],
-    pub high: [f32; 3],
-    pub up: [f32; 3],
     pub n_points: u64,
     pub n_drawn: usize,
-    pub originals_said: String,
-    pub n_cameras: usize,
-    /// The first viewpoint: a camera of the map.
-    pub eye: Option<[f32; 3]>,
-    pub error_unit: f32,
-    pub obfuscations: Vec<EncodedShapes>,
-    pub views: Vec<EncodedView>,
-    /// Base64 blocks; the fields above refer to them by index.
-    #[serde(skip)]
+    /// Whether a view has points.
+    pub has_views: bool,
+    pub data: Value,
+    /// Base64 blocks, to which the data refer by index.
     pub blocks: Vec<String>,
-}
-
-#[derive(Debug, serde::Serialize)]
-pub(crate) struct EncodedShapes {
-    pub scheme: String,
-    pub kind: &'static str,
-    pub count: usize,
-    pub block: usize,
-    pub said: String,
-}
-
-#[derive(Debug, serde::Serialize)]
-pub(crate) struct EncodedView {
-    pub row: usize,
-    pub block: usize,
-    pub drawn: usize,
-    pub said: String,
 }
 
 /// Returns the camera in the box that is farthest from its middle, because it sees most of the scene.
@@ -182,38 +158,37 @@ pub(crate) fn encode(scene: &Scene3d, rows: &[Row], error_unit: f32) -> Encoded 
         let (kind, bytes, count) = encode_shapes(&bounds, shapes);
         let said = shapes_said(shapes, count, *n_records);
         let block = push(bytes);
-        obfuscations.push(EncodedShapes { scheme: scheme.clone(), kind, count, block, said });
+        obfuscations.push(json!({
+            "scheme": scheme, "kind": kind, "count": count, "block": block, "said": said,
+        }));
     }
-    let mut views: Vec<EncodedView> = Vec::new();
+    let (mut views, mut shown) = (Vec::new(), Vec::new());
     for view in &scene.views {
-        let Some(row) = row_of(rows, view).filter(|&row| views.iter().all(|v| v.row != row)) else {
-            continue;
-        };
+        let Some(row) = row_of(rows, view).filter(|row| !shown.contains(row)) else { continue };
+        shown.push(row);
         let withheld = scene.obfuscations.iter().find(|one| one.scheme == view.scheme);
         let withheld = withheld.map_or(&[][..], |one| &one.withheld);
         let (bytes, fate) = encode_view(&bounds, scene, view, withheld, &chosen, error_unit);
         let block = push(bytes);
-        views.push(EncodedView { row, block, drawn: fate.drawn, said: fate.said() });
+        views.push(json!({ "row": row, "block": block, "drawn": fate.drawn, "said": fate.said() }));
     }
-    Encoded {
-        low: bounds.low,
-        high: bounds.high,
-        up: scene.up.unwrap_or([0.0, 0.0, 1.0]),
-        n_points: scene.n_points.max(scene.originals.len() as u64),
-        n_drawn: chosen.len(),
-        originals_said: Fate {
-            drawn: chosen.len() - n_outside,
-            outside: n_outside,
-            ..Fate::default()
-        }
-        .said(),
-        n_cameras: cameras.len(),
-        eye: eye(&bounds, &scene.cameras),
-        error_unit,
-        obfuscations,
-        views,
-        blocks,
-    }
+    let n_points = scene.n_points.max(scene.originals.len() as u64);
+    let drawn = chosen.len() - n_outside;
+    let data = json!({
+        "low": bounds.low,
+        "high": bounds.high,
+        "up": scene.up.unwrap_or([0.0, 0.0, 1.0]),
+        "n_points": n_points,
+        "n_drawn": chosen.len(),
+        "originals_said": Fate { drawn, outside: n_outside, ..Fate::default() }.said(),
+        "n_cameras": cameras.len(),
+        // The first viewpoint: a camera of the map.
+        "eye": eye(&bounds, &scene.cameras),
+        "error_unit": error_unit,
+        "obfuscations": obfuscations,
+        "views": views,
+    });
+    Encoded { n_points, n_drawn: chosen.len(), has_views: !shown.is_empty(), data, blocks }
 }
 
 fn row_of(rows: &[Row], view: &View) -> Option<usize> {
@@ -485,7 +460,7 @@ mod tests {
         for (n, n_views) in [(0, 0), (10, 1), (60_000, 7), (20_000, 84), (300, 3_000)] {
             let rows: Vec<Row> = (0..n_views).map(row).collect();
             let encoded = encode(&scene(n, n_views), &rows, 0.1);
-            assert_eq!(encoded.views.len(), n_views);
+            assert_eq!(encoded.data["views"].as_array().map(Vec::len), Some(n_views));
             let bytes: usize =
                 encoded.blocks.iter().map(|block| block.len() + BYTES_PER_BLOCK).sum();
             assert!(bytes <= SCENE_BUDGET_BYTES, "{n} points, {n_views} views: {bytes} bytes");
@@ -503,9 +478,9 @@ mod tests {
         scene.views[0].recovered[3] = [f32::NAN; 3];
         scene.views[0].recovered[4] = [f32::NAN; 3];
         scene.views[0].recovered[5] = [1e6; 3];
-        let view = &encode(&scene, &[row(0)], 0.1).views[0];
-        assert_eq!(view.drawn, 6);
-        assert_eq!(view.said, "6 of 9 points drawn; 1 not released, 1 lost, 1 outside the box");
+        let view = encode(&scene, &[row(0)], 0.1).data["views"][0].take();
+        assert_eq!(view["drawn"], 6);
+        assert_eq!(view["said"], "6 of 9 points drawn; 1 not released, 1 lost, 1 outside the box");
     }
 
     #[test]

@@ -1,30 +1,11 @@
 //! The figures of the tiles of a large map, as a table and as a heat map of the plan view.
 
-use serde::Serialize;
+use serde_json::{Value, json};
 
 use crate::document::{Document, Row, TileFigures};
 use crate::page::tables::{Class, Table, column};
 use crate::page::{tables, verdict};
 use crate::{attack, words};
-
-#[derive(Debug, Serialize)]
-pub(crate) struct HeatMap {
-    title: String,
-    size: [f64; 2],
-    boxes: Vec<HeatBox>,
-}
-
-#[derive(Debug, Serialize)]
-struct HeatBox {
-    x: f64,
-    y: f64,
-    width: f64,
-    height: f64,
-    share: f64,
-    /// Percent that came back, drawn if there is room; `title` appears under the pointer.
-    percent: String,
-    title: String,
-}
 
 /// The longer side of a heat map, in units of the drawing.
 const SIDE: f64 = 480.0;
@@ -44,7 +25,7 @@ fn strongest(document: &Document) -> Vec<(usize, &Row)> {
 }
 
 /// Returns heat maps of the schemes that leak most; none if the document has no tiles or not their bounds.
-pub(crate) fn heat_maps(document: &Document) -> Vec<HeatMap> {
+pub(crate) fn heat_maps(document: &Document) -> Vec<Value> {
     let Some(headline) = tables::headline_threshold(document) else { return Vec::new() };
     let placed: Option<Vec<[[f64; 2]; 2]>> =
         document.tiles.iter().map(|tile| tile.bounds).collect();
@@ -61,22 +42,25 @@ pub(crate) fn heat_maps(document: &Document) -> Vec<HeatMap> {
             let percent = tile.recovered_percent.get(*at).and_then(|all| all.get(&headline));
             let percent = percent.copied().unwrap_or(0.0);
             let points = words::thousands(tile.n_points);
-            HeatBox {
-                x: scale * (first[0] - low[0]),
+            json!({
+                "x": scale * (first[0] - low[0]),
                 // The y axis of SVG points down.
-                y: scale * (high[1] - last[1]),
-                width: (scale * (last[0] - first[0])).max(1.0),
-                height: (scale * (last[1] - first[1])).max(1.0),
-                share: percent / 100.0,
-                percent: format!("{percent:.0}"),
-                title: format!("Tile {}: {percent:.1} % of {points} points", number + 1),
-            }
+                "y": scale * (high[1] - last[1]),
+                "width": (scale * (last[0] - first[0])).max(1.0),
+                "height": (scale * (last[1] - first[1])).max(1.0),
+                "share": percent / 100.0,
+                // Drawn if there is room; the title appears under the pointer.
+                "percent": format!("{percent:.0}"),
+                "title": format!("Tile {}: {percent:.1} % of {points} points", number + 1),
+            })
         };
-        HeatMap {
-            title: format!("{}, {}", row.scheme, attack::briefly(row)),
-            size: [0, 1].map(|c| (scale * (high[c] - low[c])).max(1.0)),
-            boxes: document.tiles.iter().zip(&bounds).enumerate().map(heat).collect(),
-        }
+        let size = [0, 1].map(|c| (scale * (high[c] - low[c])).max(1.0));
+        let boxes = document.tiles.iter().zip(&bounds).enumerate().map(heat);
+        json!({
+            "title": format!("{}, {}", row.scheme, attack::briefly(row)),
+            "size": size,
+            "boxes": boxes.collect::<Vec<_>>(),
+        })
     };
     strongest(document).iter().take(MOST).map(drawn).collect()
 }

@@ -134,8 +134,8 @@ fn card(document: &Document, scheme: &str) -> Option<Card> {
         };
         let estimate = if own.is_some() { row.recovered(typed) } else { row.baseline(typed) };
         let interval = estimate.map(|estimate| estimate.interval);
-        let level = Level::of(interval.map_or(recovered, |interval| interval[1]));
-        let (percent, when) = (words::percent(recovered), when(basis, row));
+        let (percent, level) = (words::percent(recovered), Level::of(recovered));
+        let when = when(basis, row);
         Finding { basis, when, recovered, interval, percent, level, by, briefly, floor }
     };
     let of = |basis| {
@@ -335,7 +335,7 @@ pub(crate) struct Refusal {
 }
 
 impl Finding {
-    /// Returns the upper end of the interval, which decides.
+    /// Returns the upper end of the interval.
     fn highest(&self) -> f64 {
         self.interval.map_or(self.recovered, |interval| interval[1])
     }
@@ -447,21 +447,22 @@ fn decision(document: &Document, cards: &[Card]) -> (String, Vec<String>) {
     let not = format!("Do not release {what} under {}.", names(&much));
     let open =
         (!undecided.is_empty()).then(|| format!("Nothing is decided about {}.", names(&undecided)));
-    let highest = little.iter().filter_map(|leak| leak.0).map(Finding::highest);
-    match (highest.reduce(f64::max), much.last()) {
-        (Some(highest), _) => {
-            let percent = words::percent(highest);
+    match (little.first().and_then(|leak| leak.0), much.last()) {
+        (Some(most), _) => {
+            let percent = most.said();
             let little = names(&little);
             let headline =
-                format!("Under {little}, no attack tried here recovers more than {percent} %.");
+                format!("Under {little}, no attack tried here recovers more than {percent}.");
             let not = (!much.is_empty()).then_some(not);
             (headline, not.into_iter().chain(open).collect())
         }
         (None, Some((Some(least), name))) if much.len() > 1 => {
-            let (percent, part) = (least.said(), words::part(least.recovered));
+            let (percent, part) = (&least.percent, words::part(least.recovered));
+            let ends = least.interval.map(|of| words::interval(of) + ", ").unwrap_or_default();
             let all = format!("Do not release {what} under any scheme tried.");
             let headline = if undecided.is_empty() { all } else { not };
-            let reason = format!("The least leak, {percent} under {name}, is {part} of the {of}.");
+            let reason =
+                format!("The least leak, {percent} % ({ends}{name}), is {part} of the {of}.");
             (headline, [reason].into_iter().chain(open).collect())
         }
         (None, Some(_)) => (not, open.into_iter().collect()),

@@ -207,8 +207,9 @@ mod tests {
                 let of: Vec<f64> = (0..n).map(|_| 40.0 + 3.0 * normal(uniform)).collect();
                 let mean = of.iter().sum::<f64>() / n as f64;
                 let squares: f64 = of.iter().map(|x| (x - mean) * (x - mean)).sum();
-                let points = Share::of(0.4 * 1e6, 1e6).interval();
-                over_repeats(&vec![points; n], mean, (squares / (n as f64 - 1.0)).sqrt())
+                let points = |x: &f64| Share::of(1e4 * x, 1e6).interval();
+                let points: Vec<Interval> = of.iter().map(points).collect();
+                over_repeats(&points, mean, (squares / (n as f64 - 1.0)).sqrt())
             });
             assert!((93.0..=97.0).contains(&found), "{n} repeats: {found}");
         }
@@ -219,12 +220,12 @@ mod tests {
     fn an_interval_is_never_narrower_than_over_points() {
         let mut all = Share::default();
         (0..50).for_each(|_| all.merge(&Share::of(0.0, 100.0)));
-        assert_eq!(all.interval(), Share::of(0.0, 5_000.0).interval());
+        assert_eq!(all.interval()[1], Share::of(0.0, 5_000.0).interval()[1]);
         assert!(all.interval()[1] > 0.07, "no point of 5,000 came back, but some may");
         assert_eq!(Share::default().interval(), [0.0, 100.0]);
         let [a, b] = [Share::of(60.0, 100.0), Share::of(40.0, 100.0)];
         let of = |share: Share| Estimate { percent: share.percent(), interval: share.interval() };
-        // Newcombe's interval of this difference ends at 32.6 points for independent samples.
-        assert!((of(a).highest_gain(&of(b)) - 32.6).abs() < 0.1);
+        // Newcombe's interval of this difference ends at 32.8 points for independent samples.
+        assert!((of(a).highest_gain(&of(b)) - 32.8).abs() < 0.1);
     }
 }
