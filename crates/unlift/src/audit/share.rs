@@ -63,7 +63,10 @@ impl Share {
     /// Returns the mean over repeats, whose points are the same.
     pub(super) fn mean(repeats: impl Iterator<Item = Self>) -> Self {
         let (mut all, mut n) = (Self::default(), 0.0);
-        repeats.for_each(|share| (all.merge(&share), n += 1.0).0);
+        for share in repeats {
+            all.merge(&share);
+            n += 1.0;
+        }
         Self {
             n_items: all.n_items / n,
             points: all.points / n,
