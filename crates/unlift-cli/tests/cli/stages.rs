@@ -44,6 +44,9 @@ fn as_staged(row: &Value, staged: &Value) -> Value {
     }
     row.remove("metrics");
     row.retain(|name, _| staged.get(name).is_some() || !name.starts_with("records_alone"));
+    if let Some(interval) = row["interval"].as_object_mut() {
+        interval.remove("records_alone_percent");
+    }
     Value::Object(row)
 }
 

@@ -448,7 +448,7 @@ mod tests {
 
     fn row(at: usize) -> Row {
         let text = r#"{"scheme": "olc", "neighbors": "", "oracle_noise": null, "inlier_ratio": 0.25, "k": 50,
-            "solver": "consensus", "delta": null, "unit": "m", "n_points": 9, "n_lost": 0, "lost": {},
+            "solver": "consensus", "delta": 0.1, "unit": "m", "n_points": 9, "n_lost": 0, "lost": {},
             "dropped": {}, "recovered_percent": {}, "blind_percent": {}, "axis_accuracy_percent": null,
             "assignment_accuracy_percent": null, "median_error": null, "error_percentiles": {}}"#;
         let row: Row = serde_json::from_str(text).expect("a row");

@@ -38,10 +38,11 @@ pub struct Share {
 }
 
 impl Share {
-    /// Creates the share of `within` of the `points` of one map, image or tile.
+    /// Creates the share of `within` of the `points` of one map, image or tile. One without points says
+    /// nothing about the spread.
     pub fn of(within: f64, points: f64) -> Self {
         Self {
-            n_items: 1.0,
+            n_items: f64::from(u8::from(points > 0.0)),
             points,
             within,
             points_squared: points * points,
@@ -226,6 +227,10 @@ mod tests {
         assert_eq!(all.interval()[1], Share::of(0.0, 5_000.0).interval()[1]);
         assert!(all.interval()[1] > 0.07, "no point of 5,000 came back, but some may");
         assert_eq!(Share::default().interval(), [0.0, 100.0]);
+        let (mut two, mut three) = (Share::of(2.0, 10.0), Share::of(2.0, 10.0));
+        [5.0, 0.0].map(|points| three.merge(&Share::of(0.0, points)));
+        two.merge(&Share::of(0.0, 5.0));
+        assert_eq!(two, three, "an image without points");
         let [a, b] = [Share::of(60.0, 100.0), Share::of(40.0, 100.0)];
         let of = |share: Share| Estimate { percent: share.percent(), interval: share.interval() };
         // Newcombe's interval of this difference ends at 32.8 points for independent samples.
