@@ -148,9 +148,8 @@ fn raise_avx2(left: &[u8], right: &[i8], depth: usize, best: &mut [i16]) {
                 let best = &mut best[at..at + PANEL].as_chunks_mut::<PANEL>().0[0];
                 // SAFETY: as above.
                 *best = unsafe {
-                    let higher =
-                        _mm256_max_epi16(std::mem::transmute::<[i16; PANEL], _>(*best), sum);
-                    std::mem::transmute::<__m256i, [i16; PANEL]>(higher)
+                    let before = std::mem::transmute::<[i16; PANEL], __m256i>(*best);
+                    std::mem::transmute::<__m256i, [i16; PANEL]>(_mm256_max_epi16(before, sum))
                 };
             }
         }

@@ -228,8 +228,9 @@ mod tests {
         assert!(all.interval()[1] > 0.07, "no point of 5,000 came back, but some may");
         assert_eq!(Share::default().interval(), [0.0, 100.0]);
         let (mut two, mut three) = (Share::of(2.0, 10.0), Share::of(2.0, 10.0));
-        [5.0, 0.0].map(|points| three.merge(&Share::of(0.0, points)));
         two.merge(&Share::of(0.0, 5.0));
+        three.merge(&Share::of(0.0, 5.0));
+        three.merge(&Share::of(0.0, 0.0));
         assert_eq!(two, three, "an image without points");
         let [a, b] = [Share::of(60.0, 100.0), Share::of(40.0, 100.0)];
         let of = |share: Share| Estimate { percent: share.percent(), interval: share.interval() };
