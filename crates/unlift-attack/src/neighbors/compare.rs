@@ -68,7 +68,13 @@ pub fn search<L: Likeness>(
     let n_blocks = rows.len().div_ceil(BLOCK);
     if rows.len() <= exact {
         let found = kept.0.as_ref().and_then(|all| all.found(likeness, rows, most));
+        // Scores of a map that lacks many points do not replace those of the whole map, which further maps need.
+        let is_of_whole =
+            |all: &Compared| all.name == L::NAME && all.slots.len() >= rows.slots.len();
         let found = found.or_else(|| {
+            if kept.0.as_ref().is_some_and(is_of_whole) {
+                return None;
+            }
             let all = kept.0.insert(Compared::new(likeness, rows, 2 * most + SPARE));
             all.found(likeness, rows, most)
         });
