@@ -66,12 +66,17 @@ class Shard:
         pairs = numpy.memmap(folder / "pairs.i16", "<i2", "r")
         self.pairs = pairs.reshape(self.crops, -1, self.n, self.n)
 
-    def read(self, rows: numpy.ndarray) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """Descriptors of unit length, pair scores in standard deviations, what is wanted of every row."""
+    def read(self, rows: numpy.ndarray, kept: numpy.ndarray | None = None) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Descriptors of unit length, pair scores in standard deviations, what is wanted of every row; of the points
+        `kept` of each crop, or of all."""
         # Squares of the counts of SIFT sum to 512 x 512; learned descriptors have length 1.
         descriptors = torch.from_numpy(self.descriptors[rows]).float() / (512 if self.is_sift else 1)
-        pairs = torch.from_numpy(self.pairs[rows]).float() * (1 / STEPS)
-        return descriptors, pairs, wanted(torch.from_numpy(self.places[rows]), torch.from_numpy(self.reaches[rows]))
+        places, pairs = torch.from_numpy(self.places[rows]), torch.from_numpy(self.pairs[rows])
+        reaches = torch.from_numpy(self.reaches[rows])
+        if kept is not None:
+            descriptors, places, pairs = descriptors[:, kept], places[:, kept], pairs[..., kept, :][..., kept]
+            reaches = reach(places)
+        return descriptors, pairs.float() * (1 / STEPS), wanted(places, reaches)
 
 
 def shards(folders: list[pathlib.Path]) -> list[Shard]:
@@ -83,8 +88,8 @@ def shards(folders: list[pathlib.Path]) -> list[Shard]:
 class Batches:
     """Batch `step` is a function of the seed and the step alone, so that a run goes on where it stopped."""
 
-    def __init__(self, shards: list[Shard], points: int, seed: int):
-        self.shards, self.points, self.seed = shards, points, seed
+    def __init__(self, shards: list[Shard], points: int, seed: int, thin: float):
+        self.shards, self.points, self.seed, self.thin = shards, points, seed, thin
         self.mirror = torch.from_numpy(mirror())
         self.epoch, self.batches = -1, []
         self.per_epoch = sum(shard.crops // self._crops(shard) for shard in shards)
@@ -103,14 +108,18 @@ class Batches:
         self.epoch = epoch
 
     def batch(self, step: int) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """The batch of one step: about `points` points in crops of one size, half of them mirrored."""
+        """The batch of one step: about `points` points in crops of one size, half of them mirrored. A share `thin` of the
+        crops of at least 512 points keeps a random half: points of maps are sparser than keypoints."""
         epoch, at = divmod(step, self.per_epoch)
         if epoch != self.epoch:
             self._draw(epoch)
-        shard, rows = self.batches[at]
-        descriptors, pairs, target = self.shards[shard].read(rows)
-        mirrored = numpy.random.default_rng([self.seed, epoch, at]).random(len(rows)) < 0.5
-        if self.shards[shard].is_sift and mirrored.any():
+        index, rows = self.batches[at]
+        shard, random = self.shards[index], numpy.random.default_rng([self.seed, epoch, at])
+        mirrored = random.random(len(rows)) < 0.5
+        is_thin = shard.n >= 512 and random.random() < self.thin
+        kept = numpy.sort(random.permutation(shard.n)[: shard.n // 2]) if is_thin else None
+        descriptors, pairs, target = shard.read(rows, kept)
+        if shard.is_sift and mirrored.any():
             mirrored = torch.from_numpy(mirrored)
             descriptors[mirrored] = descriptors[mirrored][..., self.mirror]
         return descriptors, pairs, target

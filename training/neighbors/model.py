@@ -25,15 +25,16 @@ def features(reaches: int) -> int:
 
 
 def hinges(pairs: torch.Tensor) -> torch.Tensor:
-    """Features of every pair from its scores `(.., reaches, n, n)` in standard deviations: `(.., features, n, n)`.
+    """Features of every pair from its scores `(.., reaches, n, n)` in standard deviations: `(features, .., n, n)`.
 
     Of the best reach: linear, and from where on a match is unlikely to be chance; of each reach: the latter.
     """
-    best = pairs.amax(-3, keepdim=True)
+    pairs = pairs.movedim(-3, 0)
+    best = pairs.amax(0, keepdim=True)
     parts = [0.3 * best, functional.relu(best - 1.5), functional.relu(best - 3.0)]
-    if pairs.shape[-3] > 1:
+    if len(pairs) > 1:
         parts.append(functional.relu(pairs - 2.0))
-    return torch.cat(parts, -3)
+    return torch.cat(parts)
 
 
 class Block(nn.Module):
@@ -50,13 +51,13 @@ class Block(nn.Module):
         self.narrow = nn.Linear(2 * shape.dim, shape.dim)
 
     def forward(self, points: torch.Tensor, bias: torch.Tensor) -> torch.Tensor:
-        """`points` (.., n, dim), `bias` (.., heads, n, n)."""
+        """`points` (.., n, dim), `bias` (heads, .., n, n)."""
         *batch, n, dim = points.shape
         parts = self.into(self.before(points)).reshape(*batch, n, 3, self.heads, dim // self.heads)
-        query, key, value = (part.transpose(-2, -3) for part in parts.unbind(-3))
+        query, key, value = parts.movedim((-3, -2), (0, 1)).unbind(0)
         query = query * (1 / math.sqrt(dim // self.heads))
-        attention = torch.softmax(query @ key.transpose(-1, -2) + bias, -1).to(value.dtype)
-        met = (attention @ value).transpose(-3, -2).reshape(*batch, n, dim)
+        attention = torch.softmax(query @ key.transpose(-1, -2) + bias, -1, dtype=value.dtype)
+        met = (attention @ value).movedim(0, -2).reshape(*batch, n, dim)
         points = points + self.out(met)
         return points + self.narrow(functional.silu(self.wide(self.between(points))))
 
@@ -94,7 +95,7 @@ class Network(nn.Module):
         # One after the other: all of them at once take more memory than everything else.
         def term(first: int, count: int) -> torch.Tensor:
             weight = self.pairs.weight[first : first + count]
-            return (weight @ found.flatten(-2)).reshape(*found.shape[:-3], count, *found.shape[-2:])
+            return (weight @ found.flatten(1)).reshape(count, *found.shape[1:])
 
         # Values of unit vectors are small: scaled to a deviation near 1.
         points = self.first(descriptors * math.sqrt(shape.columns))
@@ -103,4 +104,4 @@ class Network(nn.Module):
             points = block(points, term(at * shape.heads, shape.heads))
         points = self.last(points)
         score = self.left(points) @ self.right(points).transpose(-1, -2)
-        return score * (1 / math.sqrt(shape.dim)) + term(shape.heads * shape.blocks, 1).squeeze(-3)
+        return score * (1 / math.sqrt(shape.dim)) + term(shape.heads * shape.blocks, 1)[0]

@@ -29,23 +29,6 @@ def walk(scores: torch.Tensor) -> torch.Tensor:
     return torch.where(reached > 1e-30, reached.clamp(min=1e-30).log(), likely - 1e3)
 
 
-def walked(logs: torch.Tensor, itself: torch.Tensor) -> torch.Tensor:
-    """The log of where the walk leads, from log probabilities (.., n, n) of crops: what a loss can be taken of. A small
-    part stays where the row itself points, so that nothing is impossible."""
-    both = (logs + logs.transpose(-1, -2)) / 2
-    floor = both.detach().topk(EDGES, -1).values[..., -1:]
-    kept = (both >= floor) | (both >= floor.transpose(-1, -2))
-    weight = torch.exp(SHARPNESS * both) * kept
-    step = (weight / weight.sum(-1, keepdim=True).clamp(min=1e-9)).bfloat16()
-    here, reached = step, step.float()
-    for at in range(1, STEPS):
-        here = step @ here
-        reached = reached + DECAY**at * here
-    reached = reached.masked_fill(itself, 0.0)
-    share = reached / reached.sum(-1, keepdim=True).clamp(min=1e-9)
-    return torch.log(0.9 * share + 0.1 * logs.exp() + 1e-6)
-
-
 def inlier_ratios(scores: torch.Tensor, places: torch.Tensor, at: tuple[int, ...]) -> list[float]:
     """Share of the first `k` of each row that are among its `k` nearest, for every `k`."""
     squares = without_self(-torch.cdist(places.double(), places.double()))

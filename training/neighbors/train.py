@@ -16,7 +16,6 @@ import torch
 
 import data
 import evaluate
-import ranking
 import weights
 from model import Network, Shape
 
@@ -35,7 +34,8 @@ def parsed():
     parser.add_argument("--warm-up", type=int, default=100, help="steps over which rates rise")
     parser.add_argument("--rate", type=float, default=1.2e-3)
     parser.add_argument("--muon", type=float, default=0.0, help="rate of the matrices by Muon; 0: all by AdamW")
-    parser.add_argument("--walked", type=float, default=0.0, help="weight of the loss after the walk")
+    parser.add_argument("--weights", type=pathlib.Path, help="start from these weights")
+    parser.add_argument("--thin", type=float, default=0.0, help="share of large crops that lose a random half of their points")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--half", action="store_true", help="bf16 where that is fast")
     for field in dataclasses.fields(Shape):
@@ -43,14 +43,11 @@ def parsed():
     return parser.parse_args()
 
 
-def loss_of(scores: torch.Tensor, target: torch.Tensor, walked: float) -> torch.Tensor:
-    """Cross entropy of every row's softmax over the other points, and `walked` times that of where the walk leads."""
+def loss_of(scores: torch.Tensor, target: torch.Tensor) -> torch.Tensor:
+    """Cross entropy of every row's softmax over the other points."""
     itself = torch.eye(scores.shape[-1], dtype=torch.bool)
     logs = torch.log_softmax(scores.float().masked_fill(itself, -1e9), -1)
-    loss = -(target * logs).sum(-1).mean()
-    if walked:
-        loss = loss - walked * (target * ranking.walked(logs, itself)).sum(-1).mean()
-    return loss
+    return -(target * logs).sum(-1).mean()
 
 
 def optimizers(network: Network, rate: float, muon: float) -> list[torch.optim.Optimizer]:
@@ -70,7 +67,8 @@ class Run:
     def __init__(self, options):
         torch.manual_seed(options.seed)
         shape = Shape(**{field.name: getattr(options, field.name) for field in dataclasses.fields(Shape)})
-        self.options, self.network = options, Network(shape)
+        self.options = options
+        self.network = weights.load(options.weights)[0] if options.weights else Network(shape)
         self.optimizers = optimizers(self.network, options.rate, options.muon)
         self.rates = [group["lr"] for optimizer in self.optimizers for group in optimizer.param_groups]
         self.step, self.seconds, self.best = 0, 0.0, 0.0
@@ -105,7 +103,7 @@ class Run:
             pairs = pairs.bfloat16()
         with torch.autocast("cpu", torch.bfloat16, enabled=self.options.half):
             scores = self.network(descriptors, pairs)
-        loss = loss_of(scores, target, self.options.walked)
+        loss = loss_of(scores, target)
         loss.backward()
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), 1.0)
         for optimizer in self.optimizers:
@@ -134,7 +132,7 @@ def main():
     # With other work on the machine, threads wait for each other: two are slower than one.
     torch.set_num_threads(1)
     options.out.mkdir(parents=True, exist_ok=True)
-    batches = data.Batches(data.shards(options.data), options.points, options.seed)
+    batches = data.Batches(data.shards(options.data), options.points, options.seed, options.thin)
     run = Run(options)
     fresh = run.step == 0
     with open(options.out / "curve.csv", "a" if not fresh else "w", newline="") as file:
