@@ -29,12 +29,11 @@ def hinges(pairs: torch.Tensor) -> torch.Tensor:
 
     Of the best reach: linear, and from where on a match is unlikely to be chance; of each reach: the latter.
     """
-    pairs = pairs.movedim(-3, 0)
-    best = pairs.amax(0, keepdim=True)
+    best = pairs.amax(-3)
     parts = [0.3 * best, functional.relu(best - 1.5), functional.relu(best - 3.0)]
-    if len(pairs) > 1:
-        parts.append(functional.relu(pairs - 2.0))
-    return torch.cat(parts)
+    if pairs.shape[-3] > 1:
+        parts += [functional.relu(reach - 2.0) for reach in pairs.unbind(-3)]
+    return torch.stack(parts)
 
 
 class Block(nn.Module):
@@ -54,10 +53,11 @@ class Block(nn.Module):
         """`points` (.., n, dim), `bias` (heads, .., n, n)."""
         *batch, n, dim = points.shape
         parts = self.into(self.before(points)).reshape(*batch, n, 3, self.heads, dim // self.heads)
-        query, key, value = parts.movedim((-3, -2), (0, 1)).unbind(0)
+        # Heads come first. The exporter needs axes that are not negative.
+        query, key, value = (part.movedim(part.ndim - 2, 0) for part in parts.unbind(-3))
         query = query * (1 / math.sqrt(dim // self.heads))
         attention = torch.softmax(query @ key.transpose(-1, -2) + bias, -1, dtype=value.dtype)
-        met = (attention @ value).movedim(0, -2).reshape(*batch, n, dim)
+        met = (attention @ value).movedim(0, points.ndim - 1).reshape(*batch, n, dim)
         points = points + self.out(met)
         return points + self.narrow(functional.silu(self.wide(self.between(points))))
 
