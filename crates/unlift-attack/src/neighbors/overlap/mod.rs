@@ -5,7 +5,7 @@
 
 mod hypotheses;
 
-use hypotheses::{BINS, CELLS, Cell, DIM, Hypotheses, Version};
+use hypotheses::{BINS, CELLS, DIM, Hypotheses, Version};
 
 use super::compare::{KeptPairs, Likeness, MOST_ROWS, note, search};
 use super::rows::Rows;
@@ -253,21 +253,22 @@ fn squares(descriptors: &Descriptors, slot: usize) -> [[f32; BINS]; CELLS] {
 /// Converts a version of a patch to bytes. Histograms are mixed before the square root.
 fn quantize(squares: &[[f32; BINS]; CELLS], version: &Version, bytes: &mut [u8; DIM]) {
     let mut mixed = [0.0f32; DIM];
-    for (cell, mixed) in version.cells.iter().zip(mixed.chunks_exact_mut(BINS)) {
-        for bin in 0..BINS {
-            // Orientations of a descriptor turn in the opposite sense of the grid.
-            mixed[(bin + BINS - version.turn) % BINS] = mix(squares, cell, bin);
+    for (cell, mixed) in version.cells.iter().zip(mixed.as_chunks_mut::<BINS>().0) {
+        for &(from, share) in cell {
+            for (mixed, square) in mixed.iter_mut().zip(&squares[usize::from(from)]) {
+                *mixed += square * share;
+            }
         }
+        // Orientations of a descriptor turn in the opposite sense of the grid.
+        mixed.rotate_left(version.turn);
     }
     let depth = version.cells.len() * BINS;
     let norm = mixed[..depth].iter().sum::<f32>().sqrt().max(NORM_FLOOR);
     let scale = LENGTH * version.root_weight / norm;
     for (byte, &value) in bytes[..depth].iter_mut().zip(&mixed) {
-        *byte = (value.sqrt() * scale).round() as u8;
+        // Rounds without a call: no value is negative.
+        let value = value.sqrt() * scale;
+        let whole = value as i32;
+        *byte = (whole + i32::from(value - whole as f32 >= 0.5)) as u8;
     }
-}
-
-#[inline(always)]
-fn mix(squares: &[[f32; BINS]; CELLS], cell: &Cell, bin: usize) -> f32 {
-    cell.iter().map(|&(from, share)| squares[usize::from(from)][bin] * share).sum()
 }
