@@ -1,4 +1,4 @@
-//! The lists of neighbors behind an attack: their source and quality, or none at all.
+//! The attack behind a row: its scheme, its lists of neighbors, its solver, and their names.
 
 use crate::document::Row;
 use crate::words;
@@ -14,6 +14,26 @@ pub struct Given {
     pub inlier_ratio: f64,
 }
 
+/// An attack, as a row of the results names it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Attack {
+    /// The scheme's user-facing name.
+    pub scheme: String,
+    /// The neighborhoods.
+    pub given: Given,
+    /// The solver's name.
+    pub solver: String,
+}
+
+/// What one attack recovers, as the page shows it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ByAttack<T> {
+    /// The attack.
+    pub attack: Attack,
+    /// Recovered positions, or a picture painted from them.
+    pub recovered: T,
+}
+
 impl Given {
     /// Returns the neighborhoods of a row.
     pub fn of(row: &Row) -> Self {
@@ -27,19 +47,37 @@ impl Given {
     /// Returns whether both are one choice on the page. A measured ratio is ignored, because it differs
     /// between schemes, images and repeats.
     pub(crate) fn same_choice(&self, other: &Self) -> bool {
-        let noise =
-            |given: &Self| given.oracle_noise.clone().unwrap_or_else(|| "uniform".to_owned());
         self.neighbors == other.neighbors
             && (!is_oracle(&self.neighbors)
-                || (self.inlier_ratio == other.inlier_ratio && noise(self) == noise(other)))
+                || (self.inlier_ratio == other.inlier_ratio
+                    && noise(&self.oracle_noise) == noise(&other.oracle_noise)))
     }
 
     pub(crate) fn label(&self) -> String {
-        neighborhoods(&self.neighbors, self.oracle_noise.as_deref(), self.inlier_ratio)
+        let source = plain_source(&self.neighbors, self.oracle_noise.as_deref());
+        format!("{source}, {} % right", words::ratio_percent(self.inlier_ratio))
     }
 }
 
-const WITHOUT_NEIGHBORS: [&str; 2] = ["density", "tomography"];
+impl Attack {
+    /// Returns the attack of a row.
+    pub fn of(row: &Row) -> Self {
+        let (scheme, solver) = (row.scheme.clone(), row.solver.clone());
+        Self { scheme, given: Given::of(row), solver }
+    }
+
+    /// Returns whether `row` has the figures of this attack.
+    pub(crate) fn is_of(&self, row: &Row) -> bool {
+        row.scheme == self.scheme
+            && row.solver == self.solver
+            && self.given.same_choice(&Given::of(row))
+    }
+}
+
+/// Returns the name of the oracle's noise model; documents of earlier versions have none.
+pub(crate) fn noise(name: &Option<String>) -> &str {
+    name.as_deref().unwrap_or("uniform")
+}
 
 /// The data behind an attack.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -52,25 +90,29 @@ pub(crate) enum Basis {
     Oracle,
 }
 
-/// Returns the basis of a row.
-pub(crate) fn basis(row: &Row) -> Basis {
-    basis_of(&row.neighbors, &row.solver)
-}
+impl Basis {
+    pub(crate) const ALL: [Self; 3] = [Self::Released, Self::Given, Self::Oracle];
 
-pub(crate) fn basis_of(neighbors: &str, solver: &str) -> Basis {
-    match neighbors {
-        _ if !looks_at_neighbors(solver) => Basis::Released,
-        "oracle" => Basis::Oracle,
-        name if name.starts_with(TRACKS) => Basis::Oracle,
-        "file" => Basis::Given,
-        _ => Basis::Released,
+    pub(crate) fn of(neighbors: &str, solver: &str) -> Self {
+        match neighbors {
+            _ if !reads_lists(solver) => Self::Released,
+            "oracle" => Self::Oracle,
+            name if queries(name).is_some_and(|(by, _)| by == TRACKS) => Self::Oracle,
+            "file" => Self::Given,
+            _ => Self::Released,
+        }
     }
 }
 
+/// Returns the basis of a row.
+pub(crate) fn basis(row: &Row) -> Basis {
+    Basis::of(&row.neighbors, &row.solver)
+}
+
 /// Sources of a sequence, before the number of queries: links by descriptors, and by true tracks.
-const SEQUENCE: &str = "sequence@";
-pub(crate) const SEQUENCE_AND_LISTS: &str = "sequence+lists@";
-const TRACKS: &str = "tracks@";
+const SEQUENCE: &str = "sequence";
+pub(crate) const SEQUENCE_AND_LISTS: &str = "sequence+lists";
+const TRACKS: &str = "tracks";
 
 /// Sources of two releases: links by descriptors, and by geometry alone.
 pub(crate) const AGAIN: &str = "again";
@@ -81,26 +123,20 @@ pub(crate) fn is_again(neighbors: &str) -> bool {
     [AGAIN, AGAIN_GEOMETRY].contains(&neighbors)
 }
 
+/// Returns the source and the number of queries of a row of a sequence: `tracks` and `5` of `tracks@5`.
+pub(crate) fn queries(neighbors: &str) -> Option<(&str, &str)> {
+    let sources = [SEQUENCE, SEQUENCE_AND_LISTS, TRACKS];
+    neighbors.split_once('@').filter(|(by, _)| sources.contains(by))
+}
+
 /// Returns whether a row needs no lists of neighbors, because it intersects several releases.
 pub(crate) fn intersects(neighbors: &str) -> bool {
     is_again(neighbors) || queries(neighbors).is_some()
 }
 
-/// Returns the number of queries of a row of a sequence, as text.
-pub(crate) fn queries(neighbors: &str) -> Option<&str> {
-    [SEQUENCE, SEQUENCE_AND_LISTS, TRACKS].iter().find_map(|by| neighbors.strip_prefix(by))
-}
-
-pub(crate) fn has_neighborhoods(row: &Row) -> bool {
-    looks_at_neighbors(&row.solver)
-}
-
-pub(crate) fn looks_at_neighbors(solver: &str) -> bool {
-    !WITHOUT_NEIGHBORS.contains(&solver)
-}
-
-pub(crate) fn without_solver(given: &Given, solver: &str) -> String {
-    if looks_at_neighbors(solver) { given.label() } else { records_alone(Some(solver)) }
+/// Returns whether a solver reads lists of neighbors.
+pub(crate) fn reads_lists(solver: &str) -> bool {
+    !["density", "tomography"].contains(&solver)
 }
 
 pub(crate) fn is_oracle(neighbors: &str) -> bool {
@@ -119,47 +155,42 @@ pub(crate) fn source(neighbors: &str, oracle_noise: Option<&str>) -> String {
 
 /// Returns the name of a source in plain words, for the page: `known neighbors`, `neighbors by descriptor overlap`.
 pub(crate) fn plain_source(neighbors: &str, oracle_noise: Option<&str>) -> String {
-    match (neighbors, oracle_noise) {
-        ("oracle", None | Some("uniform")) => "known neighbors".to_owned(),
-        ("oracle", Some(noise)) => format!("known neighbors, wrong ones {noise}"),
-        ("file", _) => "neighbors from a file".to_owned(),
-        ("overlap", _) => "neighbors by descriptor overlap".to_owned(),
-        ("similarity", _) => "neighbors by descriptor similarity".to_owned(),
-        ("learned", _) => "neighbors by a learned network".to_owned(),
-        ("geometric", _) => "neighbors by record geometry".to_owned(),
-        (AGAIN, _) => "two releases, linked by descriptors".to_owned(),
-        (AGAIN_GEOMETRY, _) => "two releases, linked by geometry".to_owned(),
-        (own, _) if own.starts_with(TRACKS) => {
-            format!("{} queries with known poses and tracks", &own[TRACKS.len()..])
-        }
-        (own, _) if own.starts_with(SEQUENCE_AND_LISTS) => {
-            let n = &own[SEQUENCE_AND_LISTS.len()..];
-            format!("{n} queries with known poses, and neighbors by descriptors")
-        }
-        (own, _) if own.starts_with(SEQUENCE) => {
-            format!("{} queries with known poses", &own[SEQUENCE.len()..])
-        }
-        (own, _) => format!("neighbors by {own}"),
-    }
-}
-
-/// Returns the label of neighborhoods on the page: `known neighbors, 50 % right`.
-pub(crate) fn neighborhoods(neighbors: &str, oracle_noise: Option<&str>, ratio: f64) -> String {
-    let source = plain_source(neighbors, oracle_noise);
-    format!("{source}, {} % right", words::ratio_percent(ratio))
+    let name = match (neighbors, oracle_noise) {
+        ("oracle", None | Some("uniform")) => "known neighbors",
+        ("oracle", Some(noise)) => return format!("known neighbors, wrong ones {noise}"),
+        ("file", _) => "neighbors from a file",
+        ("overlap", _) => "neighbors by descriptor overlap",
+        ("similarity", _) => "neighbors by descriptor similarity",
+        ("learned", _) => "neighbors by a learned network",
+        ("geometric", _) => "neighbors by record geometry",
+        (AGAIN, _) => "two releases, linked by descriptors",
+        (AGAIN_GEOMETRY, _) => "two releases, linked by geometry",
+        (own, _) => match queries(own) {
+            None => return format!("neighbors by {own}"),
+            Some((by, n)) => {
+                let more = match by {
+                    TRACKS => " and tracks",
+                    SEQUENCE_AND_LISTS => ", and neighbors by descriptors",
+                    _ => "",
+                };
+                return format!("{n} queries with known poses{more}");
+            }
+        },
+    };
+    name.to_owned()
 }
 
 /// Returns the attack of a row in a few words, for a sentence: `known neighbors`, `records alone`.
 pub(crate) fn briefly(row: &Row) -> String {
-    match row.neighbors.as_str() {
-        _ if !has_neighborhoods(row) => "records alone".to_owned(),
-        _ => plain_source(&row.neighbors, row.oracle_noise.as_deref()),
+    match reads_lists(&row.solver) {
+        true => plain_source(&row.neighbors, row.oracle_noise.as_deref()),
+        false => records_alone(None),
     }
 }
 
 /// Returns the whole attack of a row: `known neighbors, 50 % right, solver joint`.
 pub(crate) fn name(row: &Row) -> String {
-    if !has_neighborhoods(row) {
+    if !reads_lists(&row.solver) {
         return records_alone(Some(&row.solver));
     }
     if intersects(&row.neighbors) {
@@ -168,11 +199,11 @@ pub(crate) fn name(row: &Row) -> String {
     // The attacker chooses the length of its own lists, and the share of right neighbors depends on it.
     let given = match basis(row) {
         Basis::Released | Basis::Given => {
-            let (source, right) =
-                (plain_source(&row.neighbors, None), words::ratio_percent(row.inlier_ratio));
+            let source = plain_source(&row.neighbors, None);
+            let right = words::ratio_percent(row.inlier_ratio);
             format!("{source}, {} listed, {right} % of them right", row.k)
         }
-        _ => neighborhoods(&row.neighbors, row.oracle_noise.as_deref(), row.inlier_ratio),
+        Basis::Oracle => Given::of(row).label(),
     };
     format!("{given}, solver {}", row.solver)
 }

@@ -31,14 +31,16 @@ mod attack;
 pub mod compare;
 pub mod document;
 pub mod export;
+mod gates;
 mod page;
-mod views;
+mod results;
+mod table;
 mod words;
 
-pub use attack::Given;
+pub use attack::{Attack, ByAttack, Given};
 pub use document::{Document, Error, rounded};
-pub use export::{junit, text_table};
-pub use page::gates::gate_lines;
+pub use export::text_table;
+pub use gates::{gate_lines, junit};
 pub use page::scene::Scene3d;
 pub use page::{
     ErrorCdf, Opening, RenderOptions, Shares, inversions, pictures, render, scene, shares,

@@ -47,14 +47,21 @@ pub(crate) fn part(percent: f64) -> &'static str {
 /// The unit of a map without a scale, in words; the page defines it once.
 pub(crate) const USUAL_DISTANCE: &str = "the usual distance to the K-th neighbor";
 
-/// Returns a threshold in short form: `10 cm`, `2.5×` (times [`USUAL_DISTANCE`]), `10 px`.
+/// Returns the sign of a unit on the page; × is times [`USUAL_DISTANCE`].
+pub(crate) fn sign(unit: Unit) -> &'static str {
+    match unit {
+        Unit::Meter => "m",
+        Unit::KthNeighbor => "×",
+        Unit::Pixel => "px",
+    }
+}
+
+/// Returns a threshold in short form: `10 cm`, `2.5×`, `10 px`.
 pub(crate) fn threshold(typed: &str, unit: Unit) -> String {
     match (unit, typed.parse::<f64>()) {
         (Unit::Meter, Ok(meters)) => meters_text(meters),
-        (Unit::Meter, Err(_)) => format!("{typed} m"),
-        (Unit::Pixel, _) => format!("{typed} px"),
         (Unit::KthNeighbor, Ok(times)) => format!("{times}×"),
-        (Unit::KthNeighbor, Err(_)) => format!("{typed}×"),
+        _ => format!("{typed} {}", sign(unit)),
     }
 }
 
@@ -113,6 +120,11 @@ pub(crate) fn percent(value: f64) -> String {
     format!("{value:.1}")
 }
 
+/// Returns the cell of a percentage in a terminal: "46.6 %", or a dash.
+pub(crate) fn percent_or_dash(value: Option<f64>) -> String {
+    value.map_or("-".to_owned(), |value| format!("{value:.1} %"))
+}
+
 /// Returns the ends of an interval: "45.9 to 47.3".
 pub(crate) fn interval([low, high]: Interval) -> String {
     format!("{} to {}", percent(low), percent(high))
@@ -143,7 +155,7 @@ pub(crate) fn capital(text: &str) -> String {
 pub(crate) fn list(items: &[String]) -> String {
     match items {
         [] => String::new(),
-        [one] => one.clone(),
+        [item] => item.clone(),
         [first @ .., last] => format!("{} and {last}", first.join(", ")),
     }
 }
@@ -155,11 +167,6 @@ pub(crate) fn ratio_percent(ratio: f64) -> String {
         0.99..1.0 => significant(ratio * 100.0, 3),
         _ => significant(ratio * 100.0, 2),
     }
-}
-
-/// Returns a reason in words: "odd point" for `odd_point`.
-pub(crate) fn reason(name: &str) -> String {
-    name.replace('_', " ")
 }
 
 /// Returns a count with thousands grouped: "21,149" for 21149.

@@ -1,42 +1,55 @@
 //! Every row of `results` as CSV (RFC 4180), for scripts and spreadsheets.
 
-use crate::document::{ByThreshold, Document, Row};
-use crate::page::tables::distinct;
+use crate::document::{ByThreshold, Row};
+use crate::results::{Results, distinct};
+use crate::table::{Table, figure};
 
 /// Returns all rows, with a column per figure, or per threshold of `within` if a figure depends on it. Unknown cells are empty.
-pub(super) fn csv(document: &Document, within: &[String]) -> String {
-    let rows = &document.results;
-    let names = distinct(rows.iter().flat_map(|row| row.metrics.keys()));
-    let percentiles = distinct(rows.iter().flat_map(|row| row.error_percentiles.keys()));
+pub(super) fn csv(results: &Results<'_>, within: &[&str]) -> String {
+    let number = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
     // The command line recognizes its tables by the first four columns.
-    let mut heads: Vec<String> = [
-        "scheme",
-        "neighbors",
-        "oracle_noise",
-        "inlier_ratio",
-        "k",
-        "solver",
-        "delta",
-        "unit",
-        "n_points",
-        "n_lost",
-        "n_dropped",
-    ]
-    .map(str::to_owned)
-    .to_vec();
-    for figure in ["recovered_percent", "recovered_std", "blind_percent", "records_alone_percent"] {
-        heads.extend(within.iter().map(|typed| format!("{figure}_within_{typed}")));
+    let mut columns = vec![
+        figure("scheme", |row: &Row| row.scheme.clone()),
+        figure("neighbors", |row: &Row| row.neighbors.clone()),
+        figure("oracle_noise", |row: &Row| row.oracle_noise.clone().unwrap_or_default()),
+        figure("inlier_ratio", |row: &Row| row.inlier_ratio.to_string()),
+        figure("k", |row: &Row| row.k.to_string()),
+        figure("solver", |row: &Row| row.solver.clone()),
+        figure("delta", |row: &Row| row.delta.to_string()),
+        figure("unit", |row: &Row| row.unit.name().to_owned()),
+        figure("n_points", |row: &Row| row.n_points.to_string()),
+        figure("n_lost", |row: &Row| row.n_lost.to_string()),
+        figure("n_dropped", |row: &Row| row.dropped.values().sum::<usize>().to_string()),
+    ];
+    for (name, shares) in BY_THRESHOLD {
+        columns.extend(within.iter().map(|typed| {
+            let share = move |row: &Row| number(shares(row).and_then(|of| of.get(*typed).copied()));
+            figure(format!("{name}_within_{typed}"), share)
+        }));
     }
-    heads.extend(ALWAYS.map(|(name, _)| name.to_owned()));
-    heads.extend(percentiles.iter().map(|percentile| format!("error_percentile_{percentile}")));
-    heads.extend(names.iter().map(|name| format!("metric_{name}")));
-    heads.push("repeats".to_owned());
-    let mut text = line(&heads);
-    for row in rows {
-        text.push_str(&line(&cells(row, within, &percentiles, &names)));
+    columns.extend(ALWAYS.map(|(name, value)| figure(name, move |row| number(value(row)))));
+    for key in distinct(results.rows.iter().flat_map(|row| row.error_percentiles.keys())) {
+        let error = move |row: &Row| number(row.error_percentiles.get(key).copied().flatten());
+        columns.push(figure(format!("error_percentile_{key}"), error));
     }
-    text
+    for name in distinct(results.rows.iter().flat_map(|row| row.metrics.keys())) {
+        let metric = move |row: &Row| number(row.metrics.get(name).copied());
+        columns.push(figure(format!("metric_{name}"), metric));
+    }
+    columns.push(figure("repeats", |row: &Row| row.repeats.to_string()));
+    let table = Table::of("", "", results.rows, columns);
+    let heads = table.columns.into_iter().map(|head| head.name).collect();
+    [heads].iter().chain(&table.rows).map(|cells| line(cells)).collect()
 }
+
+type Shares = fn(&Row) -> Option<&ByThreshold>;
+
+const BY_THRESHOLD: [(&str, Shares); 4] = [
+    ("recovered_percent", |row| Some(&row.recovered_percent)),
+    ("recovered_std", |row| Some(&row.std.as_ref()?.recovered_percent)),
+    ("blind_percent", |row| Some(&row.blind_percent)),
+    ("records_alone_percent", |row| row.records_alone_percent.as_ref()),
+];
 
 type Figure = fn(&Row) -> Option<f64>;
 
@@ -49,45 +62,6 @@ const ALWAYS: [(&str, Figure); 7] = [
     ("median_error", |row| row.median_error),
     ("blind_median_error", |row| row.blind_median_error),
 ];
-
-fn cells(
-    row: &Row,
-    within: &[String],
-    percentiles: &[&String],
-    metrics: &[&String],
-) -> Vec<String> {
-    let number = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
-    let mut cells = vec![
-        row.scheme.clone(),
-        row.neighbors.clone(),
-        row.oracle_noise.clone().unwrap_or_default(),
-        row.inlier_ratio.to_string(),
-        row.k.to_string(),
-        row.solver.clone(),
-        row.delta.to_string(),
-        row.unit.name().to_owned(),
-        row.n_points.to_string(),
-        row.n_lost.to_string(),
-        row.dropped.values().sum::<usize>().to_string(),
-    ];
-    let spread = row.std.as_ref().map(|std| &std.recovered_percent);
-    let by_threshold: [Option<&ByThreshold>; 4] = [
-        Some(&row.recovered_percent),
-        spread,
-        Some(&row.blind_percent),
-        row.records_alone_percent.as_ref(),
-    ];
-    for shares in by_threshold {
-        let share = |typed| number(shares.and_then(|shares| shares.get(typed).copied()));
-        cells.extend(within.iter().map(share));
-    }
-    cells.extend(ALWAYS.map(|(_, figure)| number(figure(row))));
-    let percentile = |key: &&String| number(row.error_percentiles.get(*key).copied().flatten());
-    cells.extend(percentiles.iter().map(percentile));
-    cells.extend(metrics.iter().map(|name| number(row.metrics.get(*name).copied())));
-    cells.push(row.repeats.to_string());
-    cells
-}
 
 fn line(cells: &[String]) -> String {
     let cells: Vec<String> = cells.iter().map(|cell| quoted(cell)).collect();

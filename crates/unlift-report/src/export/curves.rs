@@ -2,8 +2,8 @@
 
 use crate::document::Document;
 use crate::export::escaped;
-use crate::page::curves::Choices;
-use crate::page::{tables, verdict};
+use crate::page::curves::{givens, slot};
+use crate::results::{Results, distinct};
 use crate::{attack, words};
 
 /// Width and height of the drawing; the constants below are the sides of the plot in it.
@@ -21,36 +21,36 @@ const DASHES: [&str; 3] = ["none", "7 4", "2 3"];
 /// Returns the curves of the oracle's rows within the threshold `only` (as typed), or the headline threshold: the
 /// strongest attack at every inlier ratio, as on the page. `None` without a row by the oracle.
 pub fn curves(document: &Document, only: Option<&str>) -> Option<String> {
-    let typed = only.map(str::to_owned).or_else(|| tables::headline_threshold(document))?;
-    let choices = Choices::of(document);
-    let oracle: Vec<_> = choices.givens.iter().filter(|given| given.group == "oracle").collect();
-    let sources = tables::distinct(oracle.iter().map(|given| given.source.as_str()));
+    let results = &Results::of(document);
+    let typed = only.unwrap_or(results.headline);
+    let givens = givens(results);
+    let oracle: Vec<_> = givens.iter().filter(|given| given.group == "oracle").collect();
+    let sources = distinct(oracle.iter().map(|given| given.source.as_str()));
     sources.first()?;
-    let mut text = frame(document, &typed);
-    for scheme in &choices.schemes {
+    let mut text = frame(results, typed);
+    let mut entries = Vec::new();
+    for scheme in &results.schemes {
+        let slot = slot(results, scheme);
         for (at, source) in sources.iter().enumerate() {
             let of_source = oracle.iter().filter(|given| given.source == *source);
-            let mut points: Vec<(f64, f64)> = of_source
-                .filter_map(|choice| {
-                    let given = &choice.given;
-                    let row = verdict::strongest_given(document, &scheme.name, given, &typed)?;
-                    // A solver that uses only the records has no ratio.
-                    let has_ratio = attack::has_neighborhoods(row);
-                    let share = row.recovered_percent.get(&typed).filter(|_| has_ratio)?;
-                    Some((given.inlier_ratio, *share))
-                })
-                .collect();
+            let points = of_source.filter_map(|choice| {
+                let row = results.strongest_given(scheme, &choice.given, typed)?;
+                // A solver that uses only the records has no ratio.
+                let has_ratio = attack::reads_lists(&row.solver);
+                let share = row.recovered_percent.get(typed).filter(|_| has_ratio)?;
+                Some((choice.given.inlier_ratio, *share))
+            });
+            let mut points: Vec<(f64, f64)> = points.collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            text.push_str(&curve(&points, scheme.slot, DASHES[at % DASHES.len()]));
+            text.push_str(&curve(&points, slot, DASHES[at % DASHES.len()]));
         }
+        entries.push((*scheme, slot, DASHES[0]));
     }
-    let mut entries: Vec<(String, usize, &str)> =
-        choices.schemes.iter().map(|scheme| (scheme.name.clone(), scheme.slot, "none")).collect();
     if sources.len() > 1 {
         let dashed = sources.iter().enumerate();
-        entries.extend(dashed.map(|(at, name)| ((*name).to_owned(), 4, DASHES[at % 3])));
+        entries.extend(dashed.map(|(at, name)| (*name, 4, DASHES[at % DASHES.len()])));
     }
-    for (at, (name, slot, dash)) in entries.iter().enumerate() {
+    for (at, (name, slot, dash)) in entries.into_iter().enumerate() {
         let (x, y) = (RIGHT + 22.0, TOP + 8.0 + 19.0 * at as f64);
         let color = COLORS[slot % COLORS.len()];
         text.push_str(&format!(
@@ -69,11 +69,9 @@ fn place((ratio, percent): (f64, f64)) -> (f64, f64) {
     (LEFT + ratio * (RIGHT - LEFT), BOTTOM - percent / 100.0 * (BOTTOM - TOP))
 }
 
-fn frame(document: &Document, typed: &str) -> String {
-    let unit = document.results.first().map(|row| row.unit);
-    let points = unit.map_or("points", words::points);
-    let within = unit.map_or_else(|| typed.to_owned(), |unit| words::within(typed, unit));
-    let title = escaped(&format!("{points} recovered {within}, %"));
+fn frame(results: &Results<'_>, typed: &str) -> String {
+    let (document, within) = (results.document, words::within(typed, results.unit));
+    let title = escaped(&format!("{} recovered {within}, %", results.points()));
     let (width, height) = SIZE;
     let version = escaped(&document.unlift).replace("--", "- -");
     let mut text = format!(

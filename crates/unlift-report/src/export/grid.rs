@@ -1,87 +1,118 @@
-//! The cells of a table for a paper: a row per scheme, a column per kind of neighborhoods.
+//! The table for a paper, in LaTeX and Markdown: a row per scheme, a column per kind of neighborhoods.
 
-use crate::document::Document;
-use crate::page::curves::{Choices, GivenChoice};
+use crate::page::curves::{GivenChoice, givens};
 use crate::page::tables::percent_cell;
-use crate::page::{tables, verdict};
+use crate::results::Results;
+use crate::table::NONE;
 use crate::{attack, words};
 
+/// The strongest attack per scheme and neighborhoods, and the two baselines.
 pub(super) struct Grid {
-    pub caption: String,
-    pub heads: Vec<String>,
-    pub rows: Vec<Vec<String>>,
+    /// Version and seed, with which the table was made.
+    origin: String,
+    caption: String,
+    heads: Vec<String>,
+    rows: Vec<Vec<String>>,
 }
 
 /// The cell of a figure that the audit could not measure; it must not look like a small one.
 const NOT_AUDITED: &str = "not audited";
 
-/// Returns the strongest attack per scheme and neighborhoods, and the two baselines; a cell has a figure per threshold of
-/// `within`.
-pub(super) fn grid(document: &Document, within: &[String]) -> Grid {
-    let choices = Choices::of(document);
-    let givens: Vec<&GivenChoice> = choices.givens.iter().collect();
-    let all = tables::thresholds(document);
-    let joined = |cell: &dyn Fn(&str) -> String| {
-        within.iter().map(|typed| cell(typed)).collect::<Vec<_>>().join(" / ")
-    };
-    let baseline = |shares: &[Option<f64>]| {
-        joined(&|typed| {
-            let at = all.iter().position(|known| known == typed);
-            percent_cell(at.and_then(|at| shares.get(at)?.as_ref()), None)
-        })
-    };
-    let any_alone = choices.schemes.iter().any(|scheme| scheme.alone.iter().any(Option::is_some));
-    let mut heads = vec!["scheme".to_owned()];
-    heads.extend(givens.iter().map(|given| head(given)));
-    heads.push("blind".to_owned());
-    if any_alone {
-        heads.push("records alone".to_owned());
-    }
-    let mut rows = Vec::new();
-    for scheme in &choices.schemes {
-        let cell = |given: &&GivenChoice| {
-            let row =
-                |typed: &str| verdict::strongest_given(document, &scheme.name, &given.given, typed);
-            if within.first().is_none_or(|typed| row(typed).is_none()) {
-                let refused = document.not_audited.iter().any(|refused| {
-                    refused.scheme == scheme.name
-                        && refused.neighbors.as_deref() == Some(&given.given.neighbors)
-                });
-                return if refused { NOT_AUDITED.to_owned() } else { percent_cell(None, None) };
-            }
-            joined(&|typed| {
-                let row = row(typed);
-                let spread = row.and_then(|row| row.std.as_ref()?.recovered_percent.get(typed));
-                percent_cell(row.and_then(|row| row.recovered_percent.get(typed)), spread)
-            })
+impl Grid {
+    /// Returns a table whose cells have a figure per threshold of `within`.
+    pub(super) fn of(results: &Results<'_>, within: &[&str]) -> Self {
+        let document = results.document;
+        let givens = givens(results);
+        let joined = |cell: &dyn Fn(&str) -> String| {
+            within.iter().map(|typed| cell(typed)).collect::<Vec<_>>().join(" / ")
         };
-        let mut cells = vec![scheme.name.clone()];
-        cells.extend(givens.iter().map(cell));
-        cells.push(baseline(&scheme.blind));
-        if any_alone {
-            cells.push(baseline(&scheme.alone));
-        }
-        rows.push(cells);
+        let any_alone = results.rows.iter().any(|row| row.records_alone_percent.is_some());
+        let mut heads = vec!["scheme".to_owned()];
+        heads.extend(givens.iter().map(head));
+        heads.push("blind".to_owned());
+        heads.extend(any_alone.then(|| attack::records_alone(None)));
+        let row = |scheme: &&str| {
+            let cell = |choice: &GivenChoice| {
+                let row = |typed: &str| results.strongest_given(scheme, &choice.given, typed);
+                if within.first().is_none_or(|typed| row(typed).is_none()) {
+                    let is_refused = document.not_audited.iter().any(|refused| {
+                        refused.scheme == *scheme
+                            && refused.neighbors.as_deref() == Some(&choice.given.neighbors)
+                    });
+                    return if is_refused { NOT_AUDITED } else { NONE }.to_owned();
+                }
+                joined(&|typed| {
+                    let row = row(typed);
+                    let spread = row.and_then(|row| row.std.as_ref()?.recovered_percent.get(typed));
+                    percent_cell(row.and_then(|row| row.recovered_percent.get(typed)), spread)
+                })
+            };
+            let blind = |typed: &str| {
+                let blind = results.max(scheme, |row| row.blind_percent.get(typed).copied());
+                percent_cell(blind.as_ref(), None)
+            };
+            let alone = |typed: &str| {
+                let alone = results.records_alone(scheme, typed).map(|(percent, _)| percent);
+                percent_cell(alone.as_ref(), None)
+            };
+            let mut cells = vec![(*scheme).to_owned()];
+            cells.extend(givens.iter().map(cell));
+            cells.push(joined(&blind));
+            cells.extend(any_alone.then(|| joined(&alone)));
+            cells
+        };
+        let mut rows: Vec<Vec<String>> = results.schemes.iter().map(row).collect();
+        rows.extend(results.refused().map(|(scheme, _)| {
+            let cells = vec![NOT_AUDITED.to_owned(); heads.len() - 1];
+            [vec![scheme.to_owned()], cells].concat()
+        }));
+        let origin = format!("unlift {}, seed {}", on_one_line(&document.unlift), document.seed);
+        Self { origin, caption: caption(results, within), heads, rows }
     }
-    for refused in document.not_audited.iter().filter(|refused| refused.neighbors.is_none()) {
-        let mut cells = vec![NOT_AUDITED.to_owned(); heads.len()];
-        cells[0].clone_from(&refused.scheme);
-        rows.push(cells);
+
+    /// Returns a `tabular` with the rules of booktabs.
+    pub(super) fn latex(&self) -> String {
+        let line = |cells: &Vec<String>| {
+            let cells: Vec<String> = cells.iter().map(|cell| in_latex(cell)).collect();
+            format!("{} \\\\\n", cells.join(" & "))
+        };
+        format!(
+            "% {}; \\usepackage{{booktabs}}\n% {}\n\\begin{{tabular}}{{l{}}}\n\\toprule\n{}\\midrule\n{}\\bottomrule\n\\end{{tabular}}\n",
+            self.origin,
+            on_one_line(&self.caption),
+            "r".repeat(self.heads.len() - 1),
+            line(&self.heads),
+            self.rows.iter().map(line).collect::<String>()
+        )
     }
-    Grid { caption: caption(document, within), heads, rows }
+
+    /// Returns a table in GitHub's Markdown, with figures flush right, below the caption.
+    pub(super) fn markdown(&self) -> String {
+        let line = |cells: &Vec<String>| {
+            let cells: Vec<String> = cells.iter().map(|cell| in_markdown(cell)).collect();
+            format!("| {} |\n", cells.join(" | "))
+        };
+        format!(
+            "<!-- {} -->\n{}\n\n{}| --- |{}\n{}",
+            // Two dashes would end the comment.
+            self.origin.replace("--", "- -"),
+            in_markdown(&self.caption),
+            line(&self.heads),
+            " ---: |".repeat(self.heads.len() - 1),
+            self.rows.iter().map(line).collect::<String>()
+        )
+    }
 }
 
-fn caption(document: &Document, within: &[String]) -> String {
-    let row = document.results.first();
-    let points = row.map_or("points", |row| words::points(row.unit));
-    let within: Vec<String> =
-        within.iter().map(|typed| tables::threshold_text(document, typed)).collect();
+fn caption(results: &Results<'_>, within: &[&str]) -> String {
+    let points = results.points();
+    let within: Vec<String> = within.iter().map(|typed| results.threshold(typed)).collect();
     let mut text = format!(
         "Percent of the {points} recovered within {}, by the strongest attack tried. Columns: the share of right \
          neighbors in the lists of an oracle, or another source of lists; blind is a guess without neighborhoods.",
         within.join(" / ")
     );
-    let repeats = document.results.iter().map(|row| row.repeats).max().unwrap_or(1);
+    let repeats = results.rows.iter().map(|row| row.repeats).max().unwrap_or(1);
     if repeats > 1 {
         text.push_str(&format!(" Means over {repeats} seeds."));
     }
@@ -99,43 +130,6 @@ fn head(choice: &GivenChoice) -> String {
         None | Some("uniform") => format!("{:?}", given.inlier_ratio),
         Some(noise) => format!("{:?} ({noise})", given.inlier_ratio),
     }
-}
-
-/// Returns a `tabular` with the rules of booktabs.
-pub(super) fn latex(document: &Document, grid: &Grid) -> String {
-    let columns = "r".repeat(grid.heads.len().saturating_sub(1));
-    let line = |cells: &[String]| {
-        let cells: Vec<String> = cells.iter().map(|cell| in_latex(cell)).collect();
-        format!("{} \\\\\n", cells.join(" & "))
-    };
-    let mut text = format!(
-        "% unlift {}, seed {}; \\usepackage{{booktabs}}\n% {}\n\\begin{{tabular}}{{l{columns}}}\n\\toprule\n{}\\midrule\n",
-        on_one_line(&document.unlift),
-        document.seed,
-        on_one_line(&grid.caption),
-        line(&grid.heads)
-    );
-    grid.rows.iter().for_each(|row| text.push_str(&line(row)));
-    text + "\\bottomrule\n\\end{tabular}\n"
-}
-
-/// Returns a table in GitHub's Markdown, with figures flush right, below the caption.
-pub(super) fn markdown(document: &Document, grid: &Grid) -> String {
-    let line = |cells: &[String]| {
-        let cells: Vec<String> = cells.iter().map(|cell| in_markdown(cell)).collect();
-        format!("| {} |\n", cells.join(" | "))
-    };
-    // Two dashes would end the comment.
-    let version = on_one_line(&document.unlift).replace("--", "- -");
-    let rule = " ---: |".repeat(grid.heads.len().saturating_sub(1));
-    let mut text = format!(
-        "<!-- unlift {version}, seed {} -->\n{}\n\n{}| --- |{rule}\n",
-        document.seed,
-        in_markdown(&grid.caption),
-        line(&grid.heads)
-    );
-    grid.rows.iter().for_each(|row| text.push_str(&line(row)));
-    text
 }
 
 fn on_one_line(text: &str) -> String {

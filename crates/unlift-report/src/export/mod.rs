@@ -1,18 +1,15 @@
-//! Figures for papers and for other programs: tables as CSV, LaTeX and Markdown, curves as SVG, gates as JUnit XML, and the table
-//! of the terminal.
+//! Figures for papers and for other programs: tables as CSV, LaTeX and Markdown, curves as SVG, and the table of the terminal.
 
 mod csv;
 mod curves;
 mod grid;
-mod junit;
-mod text;
+mod terminal;
 
 use crate::document::Document;
-use crate::page::tables;
+use crate::results::Results;
 
 pub use curves::curves;
-pub use junit::junit;
-pub use text::text_table;
+pub use terminal::text_table;
 
 /// The format of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,21 +23,19 @@ pub enum TableFormat {
 }
 
 /// Returns the thresholds of a document, as typed, in their order.
-pub fn thresholds(document: &Document) -> Vec<String> {
-    tables::thresholds(document)
+pub fn thresholds(document: &Document) -> Vec<&str> {
+    Results::of(document).thresholds
 }
 
 /// Returns the figures of `document` as a table, for the threshold `only` (as typed) or for all. The text ends
 /// with a line break.
 pub fn table(document: &Document, format: TableFormat, only: Option<&str>) -> String {
-    let within: Vec<String> = match only {
-        Some(typed) => vec![typed.to_owned()],
-        None => tables::thresholds(document),
-    };
+    let results = &Results::of(document);
+    let within = only.map_or_else(|| results.thresholds.clone(), |typed| vec![typed]);
     match format {
-        TableFormat::Csv => csv::csv(document, &within),
-        TableFormat::Latex => grid::latex(document, &grid::grid(document, &within)),
-        TableFormat::Markdown => grid::markdown(document, &grid::grid(document, &within)),
+        TableFormat::Csv => csv::csv(results, &within),
+        TableFormat::Latex => grid::Grid::of(results, &within).latex(),
+        TableFormat::Markdown => grid::Grid::of(results, &within).markdown(),
     }
 }
 

@@ -3,13 +3,14 @@
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
+use serde_json::{Value, json};
 
-use crate::attack::{Basis, Given, basis_of};
-use crate::document::{Document, Row};
+use crate::attack::{self, Basis, ByAttack};
+use crate::document::Row;
 use crate::page::pictures::{Marks, ReleasedView};
 use crate::page::verdict::Level;
-use crate::page::{tables, verdict};
-use crate::{attack, views, words};
+use crate::results::{Results, distinct};
+use crate::words;
 
 /// One photo and the pictures painted from its keypoints. All pictures are JPEGs of one size.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -25,52 +26,47 @@ pub struct Inversion {
     /// What each scheme releases, in pixels of the photo.
     pub released: Vec<ReleasedView>,
     /// Pictures painted from recovered keypoints.
-    pub views: Vec<InvertedView>,
+    pub views: Vec<ByAttack<Painted>>,
 }
 
-/// A picture that a network painted.
+/// A picture that a network painted, and its similarity to the photo.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Painted {
     /// The picture.
     pub jpeg: Vec<u8>,
-    /// Its similarity to the photo.
-    pub likeness: Likeness,
-}
-
-/// The similarity of a picture to the photo.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Likeness {
     /// Structural similarity (SSIM); 1 for equal pictures.
     pub ssim: f64,
     /// Perceptual distance (LPIPS); 0 for equal pictures.
     pub lpips: f64,
 }
 
-impl Likeness {
-    fn said(self) -> String {
-        format!("SSIM {:.2}, LPIPS {:.2}", self.ssim, self.lpips)
+type View = ByAttack<Painted>;
+
+impl View {
+    fn basis(&self) -> Basis {
+        Basis::of(&self.attack.given.neighbors, &self.attack.solver)
+    }
+
+    fn row<'a>(&self, results: &Results<'a>) -> Option<&'a Row> {
+        results.rows.iter().find(|row| self.attack.is_of(row))
+    }
+
+    fn shown(&self) -> Shown {
+        let (given, solver) = (&self.attack.given, &self.attack.solver);
+        let without_lists = || attack::records_alone(Some(solver));
+        let label = if attack::reads_lists(solver) { given.label() } else { without_lists() };
+        self.recovered.shown(label)
     }
 }
 
-/// A picture painted from the keypoints recovered under one scheme, from one kind of neighborhoods.
-#[derive(Debug, Clone, PartialEq)]
-pub struct InvertedView {
-    /// The scheme's user-facing name.
-    pub scheme: String,
-    /// The neighborhoods.
-    pub given: Given,
-    /// The solver's name.
-    pub solver: String,
-    /// The picture.
-    pub painted: Painted,
-}
-
-impl InvertedView {
-    pub(crate) fn basis(&self) -> Basis {
-        basis_of(&self.given.neighbors, &self.solver)
+impl Painted {
+    fn shown(&self, label: String) -> Shown {
+        let likeness = format!("SSIM {:.2}, LPIPS {:.2}", self.ssim, self.lpips);
+        Shown { label, likeness, source: source(&self.jpeg) }
     }
 }
 
+/// A photo and its pictures on the page.
 #[derive(Debug, Serialize)]
 pub(crate) struct Sheet {
     name: String,
@@ -91,7 +87,7 @@ struct SheetRow {
 #[derive(Debug, Serialize)]
 struct Shown {
     label: String,
-    said: String,
+    likeness: String,
     source: String,
 }
 
@@ -100,14 +96,14 @@ const BUDGET_BYTES: usize = 2_500_000;
 
 /// Returns the sheets of `inversions` and the number of pictures that were left out to keep the page small: first
 /// whole photos from the end, then the last pictures of the longest rows of `others`.
-pub(crate) fn sheets(document: &Document, inversions: &[Inversion]) -> (Vec<Sheet>, usize) {
-    let mut sheets: Vec<Sheet> = inversions.iter().map(|one| sheet(document, one)).collect();
-    let size = |sheets: &[Sheet]| sheets.iter().map(Sheet::size).sum::<usize>();
+pub(crate) fn sheets(results: &Results<'_>, inversions: &[Inversion]) -> (Vec<Sheet>, usize) {
+    let mut sheets: Vec<Sheet> = inversions.iter().map(|of| sheet(results, of)).collect();
+    let is_large = |sheets: &[Sheet]| sheets.iter().map(Sheet::size).sum::<usize>() > BUDGET_BYTES;
     let mut left_out = 0;
-    while size(&sheets) > BUDGET_BYTES && sheets.len() > 1 {
+    while is_large(&sheets) && sheets.len() > 1 {
         left_out += sheets.pop().map_or(0, |sheet| sheet.pictures().count());
     }
-    while size(&sheets) > BUDGET_BYTES {
+    while is_large(&sheets) {
         let rows = sheets.iter_mut().flat_map(|sheet| &mut sheet.rows);
         // One picture of each scheme stays.
         let more = |row: &&mut SheetRow| {
@@ -133,89 +129,52 @@ impl Sheet {
     }
 }
 
-/// Returns the view of [`verdict::strongest`] for `scheme` and this basis.
-pub(crate) fn strongest<'a>(
-    document: &Document,
+/// Returns the view of [`Results::strongest`] for `scheme` and this basis.
+fn strongest<'a>(
+    results: &Results<'_>,
     inversion: &'a Inversion,
     scheme: &str,
     basis: Basis,
-) -> Option<&'a InvertedView> {
-    let views = || {
-        let of_scheme = inversion.views.iter().filter(|view| view.scheme == scheme);
-        of_scheme.filter(|view| view.basis() == basis)
-    };
-    let row = verdict::strongest(document, scheme, basis);
-    let is_row = |view: &&InvertedView| {
-        row.is_some_and(|row| view.solver == row.solver && view.given.same_choice(&Given::of(row)))
-    };
-    let best = |a: &&InvertedView, b: &&InvertedView| {
-        a.painted.likeness.ssim.total_cmp(&b.painted.likeness.ssim)
-    };
+) -> Option<&'a View> {
+    let views = inversion.views.iter().filter(|view| view.attack.scheme == scheme);
+    let mut views = views.filter(|view| view.basis() == basis);
+    let row = results.strongest(scheme, basis);
+    let best = |a: &&View, b: &&View| a.recovered.ssim.total_cmp(&b.recovered.ssim);
     // If the strongest attack was not painted, the best picture stands in.
-    views().find(is_row).or_else(|| views().max_by(best))
+    let painted = views.clone().find(|view| row.is_some_and(|row| view.attack.is_of(row)));
+    painted.or_else(|| views.by_ref().max_by(best))
 }
 
-fn sheet(document: &Document, inversion: &Inversion) -> Sheet {
-    let schemes = tables::distinct(inversion.views.iter().map(|view| view.scheme.as_str()));
-    let by_queries = views::is_sequence(document);
+fn sheet(results: &Results<'_>, inversion: &Inversion) -> Sheet {
+    let schemes = distinct(inversion.views.iter().map(|view| view.attack.scheme.as_str()));
+    let by_queries = results.is_sequence();
     let rows = schemes.into_iter().map(|scheme| {
-        let of_bases = || {
-            let bases = [Basis::Released, Basis::Given, Basis::Oracle].into_iter();
-            bases.filter_map(|basis| strongest(document, inversion, scheme, basis)).collect()
+        let views = inversion.views.iter().filter(|view| view.attack.scheme == scheme);
+        let strongest = Basis::ALL.map(|basis| strongest(results, inversion, scheme, basis));
+        let is_main = |view: &&View| {
+            by_queries || strongest.iter().flatten().any(|main| std::ptr::eq(*main, *view))
         };
-        let main: Vec<&InvertedView> = match by_queries {
-            true => inversion.views.iter().filter(|view| view.scheme == scheme).collect(),
-            false => of_bases(),
+        let main: Vec<&View> = match by_queries {
+            true => views.clone().collect(),
+            false => strongest.into_iter().flatten().collect(),
         };
-        let is_main = |view: &InvertedView| main.iter().any(|other| std::ptr::eq(*other, view));
-        let others = inversion.views.iter().filter(|view| view.scheme == scheme && !is_main(view));
         SheetRow {
             scheme: scheme.to_owned(),
             by_queries,
-            others: others.map(shown).collect(),
-            main: main.into_iter().map(shown).collect(),
+            main: main.into_iter().map(View::shown).collect(),
+            others: views.filter(|view| !is_main(view)).map(View::shown).collect(),
         }
     });
     Sheet {
         name: inversion.name.clone(),
         photo: source(&inversion.photo),
-        baseline: painted(&inversion.baseline, "without protection".to_owned()),
+        baseline: inversion.baseline.shown("without protection".to_owned()),
         rows: rows.collect(),
     }
 }
 
-fn shown(view: &InvertedView) -> Shown {
-    painted(&view.painted, attack::without_solver(&view.given, &view.solver))
-}
-
-fn painted(painted: &Painted, label: String) -> Shown {
-    Shown { label, said: painted.likeness.said(), source: source(&painted.jpeg) }
-}
-
-pub(crate) fn source(jpeg: &[u8]) -> String {
+fn source(jpeg: &[u8]) -> String {
     format!("data:image/jpeg;base64,{}", STANDARD.encode(jpeg))
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Exhibit {
-    level: Level,
-    /// "An attacker can rebuild the picture."
-    verdict: &'static str,
-    said: String,
-    photo: String,
-    released: Option<Drawing>,
-    painted: String,
-    name: String,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct Drawing {
-    size: [u32; 2],
-    /// `lines` or `points`.
-    kind: &'static str,
-    path: String,
-    /// The rule of the scheme, and how many records are drawn.
-    said: String,
 }
 
 /// Ratios of SSIM to that without protection, from which on the picture, or parts of it, count as rebuilt.
@@ -235,17 +194,17 @@ fn rebuilt(ratio: f64) -> (Level, &'static str) {
 
 /// Returns how many photos of a scheme can be rebuilt from the released data alone: "1 of 2 pictures can be rebuilt, 1
 /// in parts"; `None` if no picture was painted.
-pub(crate) fn pictures_said(
-    document: &Document,
+pub(crate) fn count_rebuilt(
+    results: &Results<'_>,
     inversions: &[Inversion],
     scheme: &str,
 ) -> Option<String> {
-    let level = |one: &Inversion| {
-        let view = strongest(document, one, scheme, Basis::Released)?;
-        Some(rebuilt(kept(one, view)).0)
+    let level = |inversion: &Inversion| {
+        let view = strongest(results, inversion, scheme, Basis::Released)?;
+        Some(rebuilt(kept(inversion, view)).0)
     };
     let levels: Vec<Level> = inversions.iter().filter_map(level).collect();
-    let count = |level| levels.iter().filter(|&&one| one == level).count();
+    let count = |level| levels.iter().filter(|&&of| of == level).count();
     let (n, whole, parts) = (levels.len(), count(Level::Red), count(Level::Orange));
     let pictures = if n == 1 { "picture" } else { "pictures" };
     let in_parts = if parts > 0 { format!(", {parts} in parts") } else { String::new() };
@@ -254,140 +213,120 @@ pub(crate) fn pictures_said(
 
 /// Returns at most three exhibits. The first two show the best pictures from the released data alone, of different
 /// schemes and photos if possible. The last one shows an attack with given or known neighbors.
-pub(crate) fn exhibits(document: &Document, inversions: &[Inversion]) -> Vec<Exhibit> {
+pub(crate) fn exhibits(results: &Results<'_>, inversions: &[Inversion]) -> Vec<Value> {
     let Some(first) = inversions.first() else { return Vec::new() };
-    let mut shown: Vec<(&Inversion, &InvertedView)> = Vec::new();
+    let mut shown: Vec<(&Inversion, &View)> = Vec::new();
     for inversion in inversions.iter().take(2) {
-        let seen: Vec<&str> = shown.iter().map(|(_, view)| view.scheme.as_str()).collect();
-        let best = best(document, inversion, Basis::Released, &seen);
+        let schemes: Vec<&str> = shown.iter().map(|(_, of)| of.attack.scheme.as_str()).collect();
+        let best = best(results, inversion, Basis::Released, &schemes);
         shown.extend(best.map(|view| (inversion, view)));
     }
     for basis in [Basis::Given, Basis::Oracle] {
-        shown.extend(best(document, first, basis, &[]).map(|view| (first, view)));
+        shown.extend(best(results, first, basis, &[]).map(|view| (first, view)));
     }
-    shown.into_iter().filter_map(|(one, view)| exhibit(document, one, view)).take(3).collect()
+    shown.into_iter().filter_map(|(of, view)| exhibit(results, of, view)).take(3).collect()
 }
 
 /// Returns the view with the best level of its picture; of equal ones, that of the stronger attack.
 fn best<'a>(
-    document: &Document,
+    results: &Results<'_>,
     inversion: &'a Inversion,
     basis: Basis,
     without: &[&str],
-) -> Option<&'a InvertedView> {
+) -> Option<&'a View> {
     let views = inversion.views.iter().filter(|view| {
-        let strongest = strongest(document, inversion, &view.scheme, basis);
-        strongest.is_some_and(|one| std::ptr::eq(one, *view))
+        let scheme = view.attack.scheme.as_str();
+        let strongest = strongest(results, inversion, scheme, basis);
+        !without.contains(&scheme) && strongest.is_some_and(|of| std::ptr::eq(of, *view))
     });
-    let views = views.filter(|view| !without.contains(&view.scheme.as_str()));
-    let rank = |view: &InvertedView| {
-        let share = row_of(document, view).and_then(|row| share(document, row));
-        (rebuilt(kept(inversion, view)).0, share.unwrap_or(0.0))
+    let rank = |view: &View| {
+        let share = view.row(results).map_or(0.0, |row| results.share(row));
+        (rebuilt(kept(inversion, view)).0, share)
     };
-    let ranked = views.map(|view| (rank(view), view));
-    let best =
-        ranked.reduce(|a, b| if b.0.partial_cmp(&a.0).is_some_and(|o| o.is_gt()) { b } else { a });
-    best.map(|(_, view)| view)
-}
-
-fn row_of<'a>(document: &'a Document, view: &InvertedView) -> Option<&'a Row> {
-    document.results.iter().find(|row| {
-        row.scheme == view.scheme
-            && row.solver == view.solver
-            && view.given.same_choice(&Given::of(row))
-    })
-}
-
-fn share(document: &Document, row: &Row) -> Option<f64> {
-    row.recovered_percent.get(&tables::headline_threshold(document)?).copied()
+    views.reduce(|a, b| if rank(b) > rank(a) { b } else { a })
 }
 
 /// Returns the ratio of the picture's SSIM to that without protection.
-fn kept(inversion: &Inversion, view: &InvertedView) -> f64 {
-    let baseline = inversion.baseline.likeness.ssim;
-    if baseline > 0.0 { view.painted.likeness.ssim / baseline } else { 0.0 }
+fn kept(inversion: &Inversion, view: &View) -> f64 {
+    let baseline = inversion.baseline.ssim;
+    if baseline > 0.0 { view.recovered.ssim / baseline } else { 0.0 }
 }
 
-fn exhibit(document: &Document, inversion: &Inversion, view: &InvertedView) -> Option<Exhibit> {
+fn exhibit(results: &Results<'_>, inversion: &Inversion, view: &View) -> Option<Value> {
     let (level, verdict) = rebuilt(kept(inversion, view));
-    let row = row_of(document, view)?;
-    let typed = tables::headline_threshold(document)?;
+    let (row, scheme) = (view.row(results)?, &view.attack.scheme);
     let back = format!(
-        "{} % of the {} come back {}",
-        words::percent(share(document, row).unwrap_or(0.0)),
-        words::points(row.unit),
-        words::within(&typed, row.unit),
+        "{} % of the {} come back {} ({}, {}).",
+        words::percent(results.share(row)),
+        results.points(),
+        words::within(results.headline, row.unit),
+        words::scheme_name(scheme),
+        attack::briefly(row)
     );
-    let by = format!("({}, {})", words::scheme_name(&view.scheme), attack::briefly(row));
-    let mut said = match view.basis() {
-        Basis::Released => format!("From the released data alone, {back} {by}."),
-        Basis::Given => format!("With given neighbors, {back} {by}."),
+    let mut sentence = match view.basis() {
+        Basis::Released => format!("From the released data alone, {back}"),
+        Basis::Given => format!("With given neighbors, {back}"),
         Basis::Oracle => {
             let known = words::capital(&words::if_known(row.inlier_ratio));
-            format!("{known}: {back} {by}.")
+            format!("{known}: {back}")
         }
     };
     // If the network paints badly even from true points, the result shows little.
-    let baseline = inversion.baseline.likeness.ssim;
+    let baseline = inversion.baseline.ssim;
     if baseline < POOR {
-        said.push_str(&format!(
+        sentence.push_str(&format!(
             " Even from the true points this network paints a poor picture (similarity to the photo: SSIM {baseline:.2} of 1)."
         ));
     }
-    let released = inversion.released.iter().find(|one| one.scheme == view.scheme);
-    Some(Exhibit {
-        level,
-        verdict,
-        said,
-        photo: source(&inversion.photo),
-        released: released.and_then(|one| drawing(inversion.size, &one.scheme, &one.marks)),
-        painted: source(&view.painted.jpeg),
-        name: inversion.name.clone(),
-    })
+    let released = inversion.released.iter().find(|of| of.scheme == *scheme);
+    Some(json!({
+        "level": level,
+        "verdict": verdict,
+        "said": sentence,
+        "photo": source(&inversion.photo),
+        "released": released.and_then(|released| drawing(inversion.size, released)),
+        "painted": source(&view.recovered.jpeg),
+        "name": inversion.name,
+    }))
 }
 
-const MOST_LINES: usize = 700;
-const MOST_POINTS: usize = 4_000;
+const MAX_LINES: usize = 700;
+const MAX_POINTS: usize = 4_000;
 
 /// Returns the records as one path, thinned evenly; `None` if there is nothing to draw.
-fn drawing(size: [u32; 2], scheme: &str, marks: &Marks) -> Option<Drawing> {
-    let mut path = String::new();
+fn drawing(size: [u32; 2], released: &ReleasedView) -> Option<Value> {
     let at = |p: [f32; 2]| format!("{} {}", p[0].round(), p[1].round());
-    let (kind, drawn, all) = match marks {
+    let (kind, paths, max): (_, Vec<String>, _) = match &released.marks {
         Marks::Lines(all) | Marks::Rays(all) => {
-            let all: Vec<[[f32; 2]; 2]> = all.iter().copied().flatten().collect();
-            let few = evenly(&all, MOST_LINES);
-            few.iter().for_each(|[a, b]| path.push_str(&format!("M{}L{}", at(*a), at(*b))));
-            ("lines", few.len(), all.len())
+            let line = |[a, b]: &[[f32; 2]; 2]| format!("M{}L{}", at(*a), at(*b));
+            ("lines", all.iter().flatten().map(line).collect(), MAX_LINES)
         }
         Marks::Points(all) => {
-            let all: Vec<[f32; 2]> = all.iter().copied().flatten().collect();
-            let few = evenly(&all, MOST_POINTS);
-            few.iter().for_each(|p| path.push_str(&format!("M{}h0", at(*p))));
-            ("points", few.len(), all.len())
+            let point = |p: &[f32; 2]| format!("M{}h0", at(*p));
+            ("points", all.iter().flatten().map(point).collect(), MAX_POINTS)
         }
     };
-    let [n, of] = [drawn, all].map(|n| words::thousands(n as u64));
-    let some = if drawn < all { format!(" ({n} of {of} drawn)") } else { String::new() };
-    let rule = words::scheme_rule(scheme);
+    let (all, n) = (paths.len(), paths.len().min(max));
+    let [drawn, of] = [n, all].map(words::thousands);
+    let some = if n < all { format!(" ({drawn} of {of} drawn)") } else { String::new() };
+    let rule = words::scheme_rule(&released.scheme);
     let rule = if rule.is_empty() { "What the scheme releases." } else { rule };
-    let said = format!("{rule}{some}");
-    (drawn > 0).then_some(Drawing { size, kind, path, said })
-}
-
-fn evenly<T: Copy>(all: &[T], most: usize) -> Vec<T> {
-    let n = all.len().min(most);
-    (0..n).map(|at| all[at * all.len() / n]).collect()
+    let path: String = (0..n).map(|at| paths[at * all / n].as_str()).collect();
+    (n > 0).then(
+        || json!({ "size": size, "kind": kind, "path": path, "said": rule.to_owned() + &some }),
+    )
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::attack::{Attack, Given};
+    use crate::document::Document;
 
-    fn view(scheme: &str, inlier_ratio: f64, bytes: usize) -> InvertedView {
+    fn view(scheme: &str, inlier_ratio: f64, bytes: usize) -> View {
         let given = Given { neighbors: "oracle".into(), oracle_noise: None, inlier_ratio };
-        let painted = Painted { jpeg: vec![7; bytes], ..Painted::default() };
-        InvertedView { scheme: scheme.into(), given, solver: "joint".into(), painted }
+        let attack = Attack { scheme: scheme.into(), given, solver: "joint".into() };
+        View { attack, recovered: Painted { jpeg: vec![7; bytes], ..Painted::default() } }
     }
 
     fn document() -> Document {
@@ -406,7 +345,7 @@ mod tests {
             ..Inversion::default()
         };
         let of = |inversions: &[Inversion]| {
-            let (sheets, left_out) = sheets(&document(), inversions);
+            let (sheets, left_out) = sheets(&Results::of(&document()), inversions);
             (sheets.iter().map(|one| one.pictures().count()).collect::<Vec<_>>(), left_out)
         };
         assert_eq!(of(&[inversion(9_000), inversion(9_000)]), (vec![40, 40], 0));

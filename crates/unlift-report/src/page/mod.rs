@@ -1,31 +1,32 @@
 //! The page: one file that loads nothing and shows all numbers without script.
 
-pub(crate) mod cost;
+mod cost;
 pub(crate) mod curves;
-pub(crate) mod gates;
 pub mod inversions;
 pub mod pictures;
 pub mod scene;
 pub(crate) mod tables;
-pub(crate) mod tiles;
+mod tiles;
 pub(crate) mod verdict;
 
 use unlift::Unit;
 
 use minijinja::value::Serde;
 use minijinja::{AutoEscape, Environment, UndefinedBehavior};
-use serde::Serialize;
 use serde_json::{Value, json};
 
+use crate::attack::{self, Basis};
 use crate::document::{Document, ImageCounts};
-use crate::page::curves::{findings, judged, page_data};
-use crate::page::gates::gates;
-use crate::page::inversions::{Exhibit, Inversion, exhibits, sheets};
+use crate::gates::gates;
+use crate::page::inversions::Inversion;
 use crate::page::pictures::Picture;
-use crate::page::scene::{Scene3d, encode};
-use crate::page::tiles::heat_maps;
-use crate::page::verdict::{Card, Verdict, verdict};
-use crate::{Error, attack, words};
+use crate::page::scene::Scene3d;
+use crate::page::verdict::{Card, verdict};
+use crate::results::{Results, distinct};
+use crate::{Error, words};
+
+pub(crate) use cost::text as cost_text;
+pub(crate) use tiles::line as tiles_line;
 
 /// The templates, by the names under which they include each other.
 const TEMPLATES: [(&str, &str); 11] = [
@@ -70,92 +71,89 @@ pub fn render(
     options: &RenderOptions,
 ) -> Result<String, Error> {
     document.check()?;
-    let document = if options.share_safe { document.share_safe() } else { document.clone() };
-    let scene = scene.filter(|scene| !options.share_safe && !scene.originals.is_empty());
-    let error_unit = tables::thresholds(&document).first().and_then(|typed| typed.parse().ok());
-    let encoded = scene.map(|scene| encode(scene, &document.results, error_unit.unwrap_or(1.0)));
+    let safe = options.share_safe;
+    let document = if safe { document.share_safe() } else { document.clone() };
+    let results = &Results::of(&document);
+    // A share-safe page draws nothing of the input.
+    let (scene, pictures, inversions) = match safe {
+        true => (None, &[][..], &[][..]),
+        false => (scene, &options.pictures[..], &options.inversions[..]),
+    };
+    let scene = scene.filter(|scene| !scene.originals.is_empty());
+    let error_unit = results.thresholds.first().and_then(|typed| typed.parse().ok());
+    let scene = scene.map(|scene| scene::encode(scene, results.rows, error_unit.unwrap_or(1.0)));
     // A view without points or without recovered points would be empty.
-    let encoded = encoded.filter(|scene| scene.n_drawn > 0 && scene.has_views);
-    let mut blocks = encoded.as_ref().map(|scene| scene.blocks.clone()).unwrap_or_default();
-    let shown = if options.share_safe { &[] } else { options.pictures.as_slice() };
-    let within = tables::headline_threshold(&document).and_then(|typed| typed.parse().ok());
-    let within = within.unwrap_or(10.0);
-    let pictures = pictures::encode(shown, within, &mut blocks);
-    let n_pictures = pictures.len();
-    let drawn = [
-        ("scene", encoded.as_ref().map_or(Value::Null, |scene| scene.data.clone())),
-        ("first_picture", pictures::first_choice(shown, within).into()),
-        ("pictures", pictures.into()),
+    let scene = scene.filter(|scene| scene.n_drawn > 0 && scene.has_views);
+    let mut blocks = scene.as_ref().map(|scene| scene.blocks.clone()).unwrap_or_default();
+    let within = results.headline.parse().unwrap_or(10.0);
+    let encoded = pictures::encode(pictures, within, &mut blocks);
+    let n_pictures = encoded.len();
+    let mut data = curves::page_data(results, options);
+    data["scene"] = scene.as_ref().map_or(Value::Null, |scene| scene.data.clone());
+    data["first_picture"] = pictures::first_choice(pictures, within).into();
+    data["pictures"] = encoded.into();
+    let tables = [
+        Some(tables::recovered(results)),
+        Some(tables::baselines(results)),
+        cost::table(results),
+        tables::distinct_places(results),
+        tiles::table(results),
+        tables::likeness(results),
+        tables::objects(results),
+        Some(tables::errors(results)),
+        tables::break_even(results),
+        Some(tables::losses(results)),
+        tables::choices(results),
+        tables::trials(results),
     ];
-    let data = page_data(&document, options, drawn).to_string();
-    let options_text: Vec<(String, String)> =
-        document.options.iter().map(|(name, value)| (name.clone(), plain(value))).collect();
-    let table_list = [
-        Some(tables::recovered(&document)),
-        Some(tables::baselines(&document)),
-        cost::table(&document),
-        tables::distinct_places(&document),
-        tiles::table(&document),
-        tables::likeness(&document),
-        tables::objects(&document),
-        Some(tables::errors(&document)),
-        tables::break_even(&document),
-    ];
-    let loss_list =
-        [Some(tables::losses(&document)), tables::choices(&document), tables::trials(&document)];
-
-    let shown = if options.share_safe { &[] } else { options.inversions.as_slice() };
-    let (drawn, sheets_left_out) = sheets(&document, shown);
-    let opening = options.opening.clone().filter(|_| !options.share_safe);
-    let own = Opening::of(&document, shown);
-    let oracle = document.results.iter();
-    let oracle = oracle.filter(|row| attack::basis(row) == attack::Basis::Oracle);
-    let shown_scene = encoded.as_ref().map(|scene| {
+    let (sheets, sheets_left_out) = inversions::sheets(results, inversions);
+    let other = options.opening.iter().filter(|_| !safe).map(|opening| opening.0.clone());
+    let own = Opening::of(results, inversions, None);
+    let oracle = results.rows.iter().filter(|row| attack::basis(row) == Basis::Oracle);
+    let scene = scene.map(|scene| {
         json!({
             "n_points": words::thousands(scene.n_points),
             "n_drawn": words::thousands(scene.n_drawn),
             "whole": scene.n_drawn as u64 >= scene.n_points,
         })
     });
-    let parts: Vec<Opening> = opening.into_iter().chain([own]).collect();
-    let not_audited = document.not_audited.iter().map(|one| {
-        let source = one.neighbors.as_deref().map(|by| attack::plain_source(by, None));
-        (&one.scheme, source, &one.reason)
+    let not_audited = document.not_audited.iter().map(|refused| {
+        let source = refused.neighbors.as_deref().map(|by| attack::plain_source(by, None));
+        (&refused.scheme, source, &refused.reason)
     });
+    let plain = document.options.iter().map(|(name, value)| (name, plain(value)));
     let page = json!({
         "style": STYLE,
         "bundle": BUNDLE,
         "scripts": SCRIPTS,
         // JSON for the script; free of `<`.
-        "data": script_text(&data),
+        "data": script_text(&data.to_string()),
         "blocks": blocks,
         "pictures": n_pictures,
-        "findings": findings(&document),
+        "findings": curves::titles(results),
         // The verdict of this audit, after that of another audit if there is one.
-        "parts": parts,
-        "sheets": drawn,
+        "parts": other.chain([own.0]).collect::<Vec<_>>(),
+        "sheets": sheets,
         "sheets_left_out": sheets_left_out,
-        "heat_maps": heat_maps(&document),
-        "cost": cost::chart(&document),
-        "scene": shown_scene,
-        "share_safe": options.share_safe,
-        "subject": subject(&document),
+        "heat_maps": tiles::heat_maps(results),
+        "cost": cost::chart(results),
+        "scene": scene,
+        "share_safe": safe,
+        "subject": subject(results),
         "gates": gates(&document),
         // Known neighbors were tried at several shares of right ones.
-        "has_curves": tables::distinct(oracle.map(|row| row.inlier_ratio)).len() > 1,
+        "has_curves": distinct(oracle.map(|row| row.inlier_ratio)).len() > 1,
         // A row has estimated probabilities.
-        "judged": document.results.iter().any(|row| !judged(row).is_empty()),
-        "tables": table_list.into_iter().flatten().collect::<Vec<_>>(),
-        "losses": loss_list.into_iter().flatten().collect::<Vec<_>>(),
-        "times": tables::times(&document),
-        "options": options_text,
+        "judged": results.rows.iter().any(|row| !curves::judged(row).is_empty()),
+        "tables": tables.into_iter().flatten().collect::<Vec<_>>(),
+        "times": tables::times(results),
+        "options": plain.collect::<Vec<_>>(),
         "command": document.run.command,
         "sha256": document.input.sha256,
-        "other_sha256": document.input.other_sha256.iter().collect::<Vec<_>>(),
         "seconds": words::seconds(document.run.seconds.total),
         "memory": document.run.peak_memory_bytes.map(words::bytes),
         "not_audited": not_audited.collect::<Vec<_>>(),
-        "notes": document.notes,
+        "other_sha256": document.input.other_sha256.iter().collect::<Vec<_>>(),
         "document": document,
     });
     let mut env = environment();
@@ -195,33 +193,31 @@ fn coded(text: &str) -> minijinja::Value {
     minijinja::Value::from_safe_string(parts.collect())
 }
 
-fn subject(document: &Document) -> Value {
-    let input = &document.input;
+fn subject(results: &Results<'_>) -> Value {
+    let (document, input) = (results.document, &results.document.input);
     // The oracle uses the K of the audit; other sources choose their own.
-    let oracle = document.results.iter().find(|row| row.neighbors == "oracle");
+    let oracle = results.rows.iter().find(|row| attack::is_oracle(&row.neighbors));
     let typed = document.options.get("k").and_then(Value::as_u64);
-    let k = oracle.map(|row| row.k).or(typed.and_then(|k| usize::try_from(k).ok())).unwrap_or(50);
-    let of = document.results.first().map_or(Unit::Meter, |row| row.unit);
-    let metric = of != Unit::KthNeighbor;
-    let unit = match (metric, input.scale_m_per_unit, input.unit_in_map_units) {
-        (true, ..) if of == Unit::Pixel => "Lengths are in pixels.".to_owned(),
-        (true, scale, _) => {
+    let k = oracle.map(|row| row.k).or(typed.map(|k| k as usize)).unwrap_or(50);
+    let unit = match (results.unit, input.scale_m_per_unit, input.unit_in_map_units) {
+        (Unit::Pixel, ..) => "Lengths are in pixels.".to_owned(),
+        (Unit::Meter, scale, _) => {
             let by =
                 scale.map(|scale| format!(", by the declared scale of {scale} m per map unit"));
             input.size().unwrap_or("Meters".to_owned()) + &by.unwrap_or_default() + "."
         }
-        (false, _, Some(unit)) => {
+        (Unit::KthNeighbor, _, Some(unit)) => {
             format!("Here it is {} map units.", words::significant(unit, 4))
         }
-        (false, _, None) => String::new(),
+        (Unit::KthNeighbor, _, None) => String::new(),
     };
     json!({
         // The last telling part of the path; the whole path is in the last section.
         "name": input.path.as_deref().map(short_name),
         "n_points": words::thousands(input.n_points),
-        "metric": metric,
-        "kind": if of == Unit::Pixel { "images" } else { "map" },
-        "points": words::points(of),
+        "metric": results.unit != Unit::KthNeighbor,
+        "kind": if results.is_of_images() { "images" } else { "map" },
+        "points": results.points(),
         "images": input.images.as_ref().map(images_text),
         "unit": unit,
         "kth": words::ordinal(k),
@@ -296,28 +292,10 @@ pub struct ErrorCdf {
 }
 
 /// The opening of a page: the verdict on an audit, and its pictures if it has any.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Opening {
-    title: Option<String>,
-    details: Option<String>,
-    verdict: Verdict,
-    exhibits: Vec<Exhibit>,
-    notes: Vec<String>,
-    images: bool,
-}
+#[derive(Debug, Clone, PartialEq)]
+pub struct Opening(Value);
 
 impl Opening {
-    pub(crate) fn of(document: &Document, inversions: &[Inversion]) -> Self {
-        Self {
-            title: None,
-            details: None,
-            verdict: verdict(document),
-            exhibits: exhibits(document, inversions),
-            notes: document.notes.clone(),
-            images: document.results.first().is_some_and(|row| row.unit == Unit::Pixel),
-        }
-    }
-
     /// Returns the opening of another audit under a title; `details` is a link to that audit's own
     /// page.
     pub fn titled(
@@ -326,8 +304,17 @@ impl Opening {
         title: &str,
         details: &str,
     ) -> Self {
-        let (title, details) = (Some(title.to_owned()), Some(details.to_owned()));
-        Self { title, details, ..Self::of(document, inversions) }
+        Self::of(&Results::of(document), inversions, Some((title, details)))
+    }
+
+    fn of(results: &Results<'_>, inversions: &[Inversion], titled: Option<(&str, &str)>) -> Self {
+        Self(json!({
+            "title": titled.map(|(title, _)| title),
+            "details": titled.map(|(_, details)| details),
+            "verdict": verdict(results),
+            "exhibits": inversions::exhibits(results, inversions),
+            "notes": results.document.notes,
+        }))
     }
 }
 
@@ -349,12 +336,12 @@ pub struct Shares {
 
 /// Returns the shares of every scheme, the worst first, as at the top of the page.
 pub fn shares(document: &Document, inversions: &[Inversion]) -> Vec<Shares> {
-    let of = |card: Card| Shares {
-        today: card.today(),
-        known: card.finding(attack::Basis::Oracle).map(|finding| finding.recovered),
-        pictures: inversions::pictures_said(document, inversions, &card.scheme),
-        scheme: card.scheme,
-        title: card.title,
+    let results = &Results::of(document);
+    let of = |card: Card| {
+        let share = |basis| card.finding(basis).map(|finding| finding.recovered);
+        let (today, known) = (share(Basis::Released), share(Basis::Oracle));
+        let pictures = inversions::count_rebuilt(results, inversions, &card.scheme);
+        Shares { today, known, pictures, scheme: card.scheme, title: card.title }
     };
-    verdict(document).cards.into_iter().map(of).collect()
+    verdict::cards(results).into_iter().map(of).collect()
 }

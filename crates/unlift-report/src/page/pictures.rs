@@ -7,10 +7,9 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
+use crate::attack::{self, ByAttack, Given};
 use crate::page::scene::subsample;
-use crate::{attack, words};
-
-pub use crate::attack::Given;
+use crate::words;
 
 /// Maximal number of images on a page, which stays below 10 MB.
 pub const MOST_PICTURES: usize = 12;
@@ -33,7 +32,7 @@ pub struct Picture {
     /// Released records, one entry per scheme.
     pub released: Vec<ReleasedView>,
     /// Recovered keypoints, one entry per attack.
-    pub views: Vec<RecoveredView>,
+    pub views: Vec<View>,
     /// Graphs of neighbors, one per kind of neighborhoods.
     pub graphs: Vec<Graph>,
 }
@@ -58,19 +57,9 @@ pub enum Marks {
     Points(Vec<Option<[f32; 2]>>),
 }
 
-/// The keypoints recovered under one scheme, from one kind of neighborhoods.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RecoveredView {
-    /// The scheme's user-facing name.
-    pub scheme: String,
-    /// The neighborhoods.
-    pub given: Given,
-    /// The solver's name.
-    pub solver: String,
-    /// Recovered positions, one per keypoint of [`Picture::keypoints`]; `None` if it is lost or was not
-    /// released.
-    pub recovered: Vec<Option<[f32; 2]>>,
-}
+/// Recovered positions, one per keypoint of [`Picture::keypoints`]; `None` if it is lost or was not
+/// released.
+pub type View = ByAttack<Vec<Option<[f32; 2]>>>;
 
 /// A graph of neighborhoods: per keypoint up to [`GRAPH_NEIGHBORS`] neighbors.
 #[derive(Debug, Clone, PartialEq)]
@@ -91,9 +80,9 @@ const BYTES_PER_POINT: usize = 2 * size_of::<u16>();
 /// most of the first picture.
 pub(crate) fn first_choice(pictures: &[Picture], within: f64) -> Option<String> {
     let first = pictures.first()?;
-    let own = first.views.iter().filter(|view| !attack::is_oracle(&view.given.neighbors));
-    let share = |view: &RecoveredView| recovered_said(first, view, within).0;
-    own.max_by(|a, b| share(a).total_cmp(&share(b))).map(|view| key(&view.given))
+    let own = first.views.iter().filter(|view| !attack::is_oracle(&view.attack.given.neighbors));
+    let share = |view: &View| recovered(first, view, within).0;
+    own.max_by(|a, b| share(a).total_cmp(&share(b))).map(|view| key(&view.attack.given))
 }
 
 /// Edges below this fraction of the smaller side are short, as in the paper's figures.
@@ -104,10 +93,15 @@ const SHORT_SHARE: f32 = 0.1;
 pub(crate) fn encode(pictures: &[Picture], within: f64, blocks: &mut Vec<String>) -> Vec<Value> {
     let pictures = &pictures[..pictures.len().min(MOST_PICTURES)];
     let each = BUDGET_BYTES / pictures.len().max(1);
-    pictures.iter().map(|picture| one(picture, each, within, blocks)).collect()
+    pictures.iter().map(|picture| encode_picture(picture, each, within, blocks)).collect()
 }
 
-fn one(picture: &Picture, budget: usize, within: f64, blocks: &mut Vec<String>) -> Value {
+fn encode_picture(
+    picture: &Picture,
+    budget: usize,
+    within: f64,
+    blocks: &mut Vec<String>,
+) -> Value {
     let points = 1
         + 2 * picture.released.len()
         + picture.views.len()
@@ -122,6 +116,9 @@ fn one(picture: &Picture, budget: usize, within: f64, blocks: &mut Vec<String>) 
     };
     let photo = picture.photo.as_ref().map(|jpeg| push(jpeg.clone()));
     let keypoints = push(chosen.iter().flat_map(|&i| place(Some(picture.keypoints[i]))).collect());
+    let points = |all: &[Option<[f32; 2]>]| -> Vec<u8> {
+        chosen.iter().flat_map(|&i| place(all.get(i).copied().flatten())).collect()
+    };
     let released = picture.released.iter().map(|view| {
         let ends = |segments: &[Option<[[f32; 2]; 2]>]| -> Vec<u8> {
             let both = |&i: &usize| {
@@ -133,20 +130,20 @@ fn one(picture: &Picture, budget: usize, within: f64, blocks: &mut Vec<String>) 
         let (kind, bytes) = match &view.marks {
             Marks::Lines(all) => ("lines", ends(all)),
             Marks::Rays(all) => ("rays", ends(all)),
-            Marks::Points(all) => ("points", at(all, &chosen, place)),
+            Marks::Points(all) => ("points", points(all)),
         };
         json!({ "scheme": view.scheme, "kind": kind, "block": push(bytes) })
     });
     let released: Vec<Value> = released.collect();
     let views = picture.views.iter().map(|view| {
         json!({
-            "scheme": view.scheme,
+            "scheme": view.attack.scheme,
             // The key of the neighborhoods, equal in all pictures.
-            "given": key(&view.given),
-            "label": view.given.label(),
-            "solver": view.solver,
-            "block": push(at(&view.recovered, &chosen, place)),
-            "said": recovered_said(picture, view, within).1,
+            "given": key(&view.attack.given),
+            "label": view.attack.given.label(),
+            "solver": view.attack.solver,
+            "block": push(points(&view.recovered)),
+            "said": recovered(picture, view, within).1,
         })
     });
     let views: Vec<Value> = views.collect();
@@ -156,31 +153,27 @@ fn one(picture: &Picture, budget: usize, within: f64, blocks: &mut Vec<String>) 
             (0..GRAPH_NEIGHBORS).flat_map(|at| place(of.get(at).copied())).collect::<Vec<u8>>()
         };
         let block = push(chosen.iter().flat_map(listed).collect());
-        let said = graph_said(picture, graph, short_px);
+        let text = edges(picture, graph, short_px);
         // Shorter lists are padded with points that are not drawn.
-        json!({ "given": key(&graph.given), "said": said, "k": GRAPH_NEIGHBORS, "block": block })
+        json!({ "given": key(&graph.given), "said": text, "k": GRAPH_NEIGHBORS, "block": block })
     });
     let graphs: Vec<Value> = graphs.collect();
+    let n = picture.keypoints.len();
+    let [all, drawn] = [n, chosen.len()].map(words::thousands);
+    let some = if chosen.len() < n { format!(", {drawn} of them drawn") } else { String::new() };
+    let [w, h] = picture.size;
     json!({
         "name": picture.name,
         "note": picture.note,
         "size": picture.size,
         "photo": photo,
-        "said": picture_said(picture, chosen.len()),
+        "said": format!("{}, {w} x {h} px, {all} keypoints{some}", picture.name),
         "keypoints": keypoints,
         "short_px": short_px,
         "released": released,
         "views": views,
         "graphs": graphs,
     })
-}
-
-fn at(
-    all: &[Option<[f32; 2]>],
-    chosen: &[usize],
-    place: impl Fn(Option<[f32; 2]>) -> [u8; BYTES_PER_POINT],
-) -> Vec<u8> {
-    chosen.iter().flat_map(|&i| place(all.get(i).copied().flatten())).collect()
 }
 
 /// Encodes a position as a little-endian u16 pair, 0..=65534 across the image; points outside move to
@@ -206,32 +199,21 @@ fn key(given: &Given) -> String {
     }
 }
 
-/// Returns a sentence: "frame-1.jpg, 640 x 480 px, 2,113 keypoints, 900 of them drawn".
-fn picture_said(picture: &Picture, drawn: usize) -> String {
-    let count = |n: usize| words::thousands(n as u64);
-    let [w, h] = picture.size;
-    let n = picture.keypoints.len();
-    let some = if drawn < n { format!(", {} of them drawn", count(drawn)) } else { String::new() };
-    format!("{}, {w} x {h} px, {} keypoints{some}", picture.name, count(n))
-}
-
 /// Returns the share of the released keypoints, drawn or not, and a sentence: "81.3 % within 10 px
 /// (blue), the others orange; 3 lost".
-fn recovered_said(picture: &Picture, view: &RecoveredView, within: f64) -> (f64, String) {
-    let released = picture.released.iter().find(|one| one.scheme == view.scheme);
-    let is_released = |i: usize| match released.map(|one| &one.marks) {
+fn recovered(picture: &Picture, view: &View, within: f64) -> (f64, String) {
+    let released = picture.released.iter().find(|of| of.scheme == view.attack.scheme);
+    let is_released = |i: usize| match released.map(|of| &of.marks) {
         Some(Marks::Lines(all) | Marks::Rays(all)) => all.get(i).is_some_and(Option::is_some),
         Some(Marks::Points(all)) => all.get(i).is_some_and(Option::is_some),
         None => true,
     };
     let (mut n, mut hits, mut lost) = (0u64, 0u64, 0u64);
     for (i, truth) in picture.keypoints.iter().enumerate().filter(|(i, _)| is_released(*i)) {
+        let place = view.recovered.get(i).copied().flatten();
         n += 1;
-        match view.recovered.get(i).copied().flatten() {
-            Some(found) if distance(found, *truth) <= within => hits += 1,
-            Some(_) => {}
-            None => lost += 1,
-        }
+        lost += u64::from(place.is_none());
+        hits += u64::from(place.is_some_and(|place| distance(place, *truth) <= within));
     }
     let share = 100.0 * hits as f64 / n.max(1) as f64;
     let lost = if lost > 0 { format!("; {} lost", words::thousands(lost)) } else { String::new() };
@@ -241,7 +223,7 @@ fn recovered_said(picture: &Picture, view: &RecoveredView, within: f64) -> (f64,
 
 /// Returns a sentence: "the first five neighbors of each keypoint; 45.1 % of the edges are shorter than
 /// 48 px (green), the others red".
-fn graph_said(picture: &Picture, graph: &Graph, short_px: f32) -> String {
+fn edges(picture: &Picture, graph: &Graph, short_px: f32) -> String {
     let (mut n, mut short) = (0u64, 0u64);
     for (from, neighbors) in picture.keypoints.iter().zip(&graph.neighbors) {
         for to in neighbors.iter().take(GRAPH_NEIGHBORS) {
@@ -263,6 +245,7 @@ fn distance(a: [f32; 2], b: [f32; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::attack::Attack;
 
     #[test]
     fn shares_are_of_all_released_keypoints() {
@@ -281,17 +264,15 @@ mod tests {
             }],
             ..Picture::default()
         };
-        let view = RecoveredView {
-            scheme: "cp2d".into(),
-            given: Given::default(),
-            solver: "joint".into(),
+        let view = View {
+            attack: Attack { scheme: "cp2d".into(), ..Attack::default() },
             recovered: vec![Some([3.0, 4.0]), Some([30.0, 4.0]), None, None, Some([5.0, 0.0])],
         };
-        let (_, said) = recovered_said(&picture, &view, 5.0);
-        assert_eq!(said, "50.0 % within 5 px (blue), the others orange; 1 lost");
+        let (_, text) = recovered(&picture, &view, 5.0);
+        assert_eq!(text, "50.0 % within 5 px (blue), the others orange; 1 lost");
         let graph =
             Graph { given: Given::default(), neighbors: vec![vec![[3.0, 0.0], [5.0, 0.0]]] };
-        let said = graph_said(&picture, &graph, 5.0);
-        assert!(said.contains("50.0 % of the edges are shorter than 5 px"), "{said}");
+        let text = edges(&picture, &graph, 5.0);
+        assert!(text.contains("50.0 % of the edges are shorter than 5 px"), "{text}");
     }
 }

@@ -7,7 +7,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
-use crate::attack::Given;
+use crate::attack::ByAttack;
 use crate::document::Row;
 use crate::words;
 
@@ -28,19 +28,9 @@ pub struct Scene3d {
     pub views: Vec<View>,
 }
 
-/// The points recovered under one scheme, from one kind of neighborhoods, by one solver.
-#[derive(Debug, Clone, PartialEq)]
-pub struct View {
-    /// The scheme's user-facing name.
-    pub scheme: String,
-    /// The neighborhoods, as in the row of the results.
-    pub given: Given,
-    /// The solver's name.
-    pub solver: String,
-    /// Recovered positions `(n, 3)`, aligned with [`Scene3d::originals`]; NaN if a point is lost or was
-    /// not released.
-    pub recovered: Vec<[f32; 3]>,
-}
+/// Recovered positions `(n, 3)`, aligned with [`Scene3d::originals`]; NaN if a point is lost or was
+/// not released.
+pub type View = ByAttack<Vec<[f32; 3]>>;
 
 /// Released records of one scheme; a sample is enough for the drawing.
 #[derive(Debug, Clone, PartialEq)]
@@ -64,22 +54,6 @@ pub enum Shapes {
     Patches(Vec<[[f32; 3]; 4]>),
     /// Published points (with one swapped coordinate, for `cp`).
     Points(Vec<[f32; 3]>),
-}
-
-impl Shapes {
-    /// Returns the number of shapes.
-    pub fn len(&self) -> usize {
-        match self {
-            Shapes::Segments(shapes) => shapes.len(),
-            Shapes::Patches(shapes) => shapes.len(),
-            Shapes::Points(shapes) => shapes.len(),
-        }
-    }
-
-    /// Returns whether there are no shapes.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
 }
 
 /// Maximal number of bytes of the 3D view. With the libraries (about 1.1 MB), tables and curves the page
@@ -155,22 +129,26 @@ pub(crate) fn encode(scene: &Scene3d, rows: &[Row], error_unit: f32) -> Encoded 
 
     let mut obfuscations = Vec::new();
     for ObfuscationView { scheme, shapes, n_records, .. } in &scene.obfuscations {
-        let (kind, bytes, count) = encode_shapes(&bounds, shapes);
-        let said = shapes_said(shapes, count, *n_records);
+        let (kind, name, bytes, n_drawn) = encode_shapes(&bounds, shapes);
+        let [drawn, all] = [n_drawn as u64, *n_records].map(|n| words::thousands(n));
+        // "1,500 of 3,895 lines drawn".
+        let text = match n_drawn as u64 >= *n_records {
+            true => format!("{drawn} {name} drawn"),
+            false => format!("{drawn} of {all} {name} drawn"),
+        };
         let block = push(bytes);
         obfuscations.push(json!({
-            "scheme": scheme, "kind": kind, "count": count, "block": block, "said": said,
+            "scheme": scheme, "kind": kind, "count": n_drawn, "block": block, "said": text,
         }));
     }
     let (mut views, mut shown) = (Vec::new(), Vec::new());
     for view in &scene.views {
-        let Some(row) = row_of(rows, view).filter(|row| !shown.contains(row)) else { continue };
+        let row = rows.iter().position(|row| view.attack.is_of(row));
+        let Some(row) = row.filter(|row| !shown.contains(row)) else { continue };
         shown.push(row);
-        let withheld = scene.obfuscations.iter().find(|one| one.scheme == view.scheme);
-        let withheld = withheld.map_or(&[][..], |one| &one.withheld);
-        let (bytes, fate) = encode_view(&bounds, scene, view, withheld, &chosen, error_unit);
-        let block = push(bytes);
-        views.push(json!({ "row": row, "block": block, "drawn": fate.drawn, "said": fate.said() }));
+        let (bytes, fate) = encode_view(&bounds, scene, view, &chosen, error_unit);
+        let (block, text) = (push(bytes), fate.in_words());
+        views.push(json!({ "row": row, "block": block, "drawn": fate.drawn, "said": text }));
     }
     let n_points = scene.n_points.max(scene.originals.len() as u64);
     let drawn = chosen.len() - n_outside;
@@ -180,7 +158,7 @@ pub(crate) fn encode(scene: &Scene3d, rows: &[Row], error_unit: f32) -> Encoded 
         "up": scene.up.unwrap_or([0.0, 0.0, 1.0]),
         "n_points": n_points,
         "n_drawn": chosen.len(),
-        "originals_said": Fate { drawn, outside: n_outside, ..Fate::default() }.said(),
+        "originals_said": Fate { drawn, outside: n_outside, ..Fate::default() }.in_words(),
         "n_cameras": cameras.len(),
         // The first viewpoint: a camera of the map.
         "eye": eye(&bounds, &scene.cameras),
@@ -191,22 +169,15 @@ pub(crate) fn encode(scene: &Scene3d, rows: &[Row], error_unit: f32) -> Encoded 
     Encoded { n_points, n_drawn: chosen.len(), has_views: !shown.is_empty(), data, blocks }
 }
 
-fn row_of(rows: &[Row], view: &View) -> Option<usize> {
-    rows.iter().position(|row| {
-        row.scheme == view.scheme
-            && row.solver == view.solver
-            && Given::of(row).same_choice(&view.given)
-    })
-}
-
 fn encode_view(
     bounds: &SceneBox,
     scene: &Scene3d,
     view: &View,
-    withheld: &[usize],
     chosen: &[usize],
     error_unit: f32,
 ) -> (Vec<u8>, Fate) {
+    let released = scene.obfuscations.iter().find(|of| of.scheme == view.attack.scheme);
+    let is_withheld = |i| released.is_some_and(|released| released.withheld.contains(&i));
     let recovered = |i: usize| view.recovered.get(i).copied().unwrap_or([f32::NAN; 3]);
     let mut bytes = positions(bounds, chosen.iter().map(|&i| recovered(i)));
     let mut fate = Fate::default();
@@ -215,7 +186,7 @@ fn encode_view(
         match () {
             () if is_drawn(bounds, recovered(i)) => fate.drawn += 1,
             () if !error.is_nan() => fate.outside += 1,
-            () if withheld.contains(&i) => fate.withheld += 1,
+            () if is_withheld(i) => fate.withheld += 1,
             () => fate.lost += 1,
         }
         bytes.push(error_byte(error / error_unit));
@@ -227,18 +198,23 @@ fn is_drawn(bounds: &SceneBox, point: [f32; 3]) -> bool {
     quantize(bounds, point) != [NOT_DRAWN; 3]
 }
 
-fn encode_shapes(bounds: &SceneBox, shapes: &Shapes) -> (&'static str, Vec<u8>, usize) {
-    let max = if matches!(shapes, Shapes::Points(_)) { MAX_SHAPE_POINTS } else { MAX_SHAPES };
-    let chosen = subsample(shapes.len(), max, 0);
-    let count = chosen.len();
-    let chosen = chosen.into_iter();
-    match shapes {
-        Shapes::Segments(all) => {
-            ("segments", positions(bounds, chosen.flat_map(|i| all[i])), count)
-        }
-        Shapes::Patches(all) => ("patches", positions(bounds, chosen.flat_map(|i| all[i])), count),
-        Shapes::Points(all) => ("points", positions(bounds, chosen.map(|i| all[i])), count),
-    }
+/// Returns the kind of the shapes, their name, their bytes, and how many are drawn.
+fn encode_shapes(
+    bounds: &SceneBox,
+    shapes: &Shapes,
+) -> (&'static str, &'static str, Vec<u8>, usize) {
+    let (kind, name, n, max) = match shapes {
+        Shapes::Segments(all) => ("segments", "lines", all.len(), MAX_SHAPES),
+        Shapes::Patches(all) => ("patches", "planes", all.len(), MAX_SHAPES),
+        Shapes::Points(all) => ("points", "points", all.len(), MAX_SHAPE_POINTS),
+    };
+    let chosen = subsample(n, max, 0);
+    let corners = chosen.iter().flat_map(|&i| match shapes {
+        Shapes::Segments(all) => &all[i][..],
+        Shapes::Patches(all) => &all[i],
+        Shapes::Points(all) => std::slice::from_ref(&all[i]),
+    });
+    (kind, name, positions(bounds, corners.copied()), chosen.len())
 }
 
 /// Encodes positions as little-endian u16 triples, 0..=65534 across the box.
@@ -288,41 +264,22 @@ struct Fate {
 
 impl Fate {
     /// Returns a sentence: "3,861 of 3,895 points drawn; 34 not released".
-    fn said(&self) -> String {
-        let count = |n: usize| words::thousands(n as u64);
-        let all = self.drawn + self.withheld + self.lost + self.outside;
-        let others = [
+    fn in_words(&self) -> String {
+        let missing = [
             (self.withheld, "not released"),
             (self.lost, "lost"),
             (self.outside, "outside the box"),
         ];
-        let others: Vec<String> = others
-            .into_iter()
-            .filter(|(n, _)| *n > 0)
-            .map(|(n, what)| format!("{} {what}", count(n)))
-            .collect();
-        if others.is_empty() {
-            return format!("{} points drawn", count(all));
-        }
+        let missing = missing.into_iter().filter(|(n, _)| *n > 0);
+        let missing: Vec<String> =
+            missing.map(|(n, what)| format!("{} {what}", words::thousands(n))).collect();
+        let all = words::thousands(self.drawn + self.withheld + self.lost + self.outside);
         let drawn = match self.drawn {
-            0 => format!("None of {}", count(all)),
-            n => format!("{} of {}", count(n), count(all)),
+            _ if missing.is_empty() => return format!("{all} points drawn"),
+            0 => "None".to_owned(),
+            n => words::thousands(n),
         };
-        format!("{drawn} points drawn; {}", others.join(", "))
-    }
-}
-
-/// Returns a sentence: "1,500 of 3,895 lines drawn".
-fn shapes_said(shapes: &Shapes, drawn: usize, n_records: u64) -> String {
-    let what = match shapes {
-        Shapes::Segments(_) => "lines",
-        Shapes::Patches(_) => "planes",
-        Shapes::Points(_) => "points",
-    };
-    let all = words::thousands(n_records.max(drawn as u64));
-    match drawn as u64 >= n_records {
-        true => format!("{all} {what} drawn"),
-        false => format!("{} of {all} {what} drawn", words::thousands(drawn as u64)),
+        format!("{drawn} of {all} points drawn; {}", missing.join(", "))
     }
 }
 
@@ -414,15 +371,15 @@ fn mix(seed: u64, counter: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::attack::{Attack, Given};
 
     fn scene(n: usize, n_views: usize) -> Scene3d {
         let originals: Vec<[f32; 3]> =
             (0..n).map(|i| [i as f32, (i * 7 % 13) as f32, 0.5]).collect();
-        let view = |at: usize| View {
-            scheme: "olc".into(),
-            given: given(at),
-            solver: "consensus".into(),
-            recovered: originals.clone(),
+        let view = |at: usize| {
+            let (scheme, solver) = ("olc".into(), "consensus".into());
+            let attack = Attack { scheme, given: given(at), solver };
+            View { attack, recovered: originals.clone() }
         };
         let patch = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
         let shapes = Shapes::Patches(vec![patch; n]);

@@ -1,159 +1,63 @@
 //! The figures as tables of text, which the page shows without script.
 
-use indexmap::IndexMap;
-use serde::Serialize;
-use unlift::Unit;
 use unlift::audit::Interval;
 
-use crate::document::{Bound, ByReason, ByThreshold, Document, Row};
+use indexmap::IndexMap;
+
+use crate::document::{Bound, BreakEven, ByReason, ByThreshold, Row};
+use crate::results::{Results, distinct};
+use crate::table::{Class, Column, NONE, Table, column, figure, known, label};
 use crate::{attack, words};
 
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Table {
-    pub id: &'static str,
-    pub caption: String,
-    pub columns: Vec<Column>,
-    /// Cells by row, one per column.
-    pub rows: Vec<Vec<String>>,
-    /// Explanations below the table.
-    pub notes: Vec<String>,
+/// The number of columns that name a row.
+const KEYS: usize = 4;
+
+fn keys<'a>() -> Vec<Column<'a, Row>> {
+    let source = |row: &Row| attack::plain_source(&row.neighbors, row.oracle_noise.as_deref());
+    vec![
+        label("scheme", |row: &Row| row.scheme.clone()),
+        label("solver", |row: &Row| row.solver.clone()),
+        label("neighbors", source),
+        figure("of them right", |row: &Row| {
+            format!("{} %", words::ratio_percent(row.inlier_ratio))
+        }),
+    ]
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Column {
-    pub name: String,
-    pub class: Class,
+/// Returns a column per threshold, whose heads begin with `who`.
+fn within<'a, T>(
+    results: &'a Results<'_>,
+    who: &str,
+    cell: impl Fn(&T, &str) -> String + Copy + 'a,
+) -> impl Iterator<Item = Column<'a, T>> {
+    results.thresholds.iter().map(move |typed| {
+        let head = format!("{who}within {}, %", results.threshold(typed));
+        figure(head, move |item: &T| cell(item, typed))
+    })
 }
 
-/// The layout of a column's cells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub(crate) enum Class {
-    /// Names, flush left, on one line.
-    Label,
-    /// Figures, flush right.
-    Figure,
-    /// Text that may be long: flush left, on several lines.
-    Prose,
-}
-
-const NONE: &str = "–";
-
-impl Table {
-    pub(crate) fn new(
-        id: &'static str,
-        caption: impl Into<String>,
-        columns: Vec<Column>,
-        rows: Vec<Vec<String>>,
-    ) -> Self {
-        Self { id, caption: caption.into(), columns, rows, notes: Vec::new() }
-    }
-
-    /// Returns a table with a row per row of the results: its key cells, then those of `cells` under the heads `more`.
-    fn of_results(
-        document: &Document,
-        (id, caption): (&'static str, impl Into<String>),
-        more: Vec<Column>,
-        mut cells: impl FnMut(&Row) -> Option<Vec<String>>,
-    ) -> Self {
-        let rows = document.results.iter();
-        let rows = rows.filter_map(|row| Some([key_cells(row), cells(row)?].concat()));
-        Self::new(id, caption, [key_columns(), more].concat(), rows.collect())
-    }
-
-    fn without_empty_columns(mut self) -> Self {
-        let kept: Vec<bool> = (0..self.columns.len())
-            .map(|at| self.rows.is_empty() || self.rows.iter().any(|row| row[at] != NONE))
-            .collect();
-        let mut keep = kept.iter();
-        self.columns.retain(|_| *keep.next().unwrap_or(&true));
-        for row in &mut self.rows {
-            let mut keep = kept.iter();
-            row.retain(|_| *keep.next().unwrap_or(&true));
-        }
-        self
-    }
-
-    /// Returns the table if it has rows, and columns besides the key columns.
-    fn if_any(self) -> Option<Self> {
-        (self.columns.len() > key_columns().len() && !self.rows.is_empty()).then_some(self)
-    }
-}
-
-pub(crate) fn column(name: impl Into<String>, class: Class) -> Column {
-    Column { name: name.into(), class }
-}
-
-fn figures<T: Into<String>>(names: impl IntoIterator<Item = T>) -> Vec<Column> {
-    names.into_iter().map(|name| column(name, Class::Figure)).collect()
-}
-
-fn labels<const N: usize>(names: [&str; N]) -> Vec<Column> {
-    names.map(|name| column(name, Class::Label)).into()
-}
-
-fn key_columns() -> Vec<Column> {
-    [labels(["scheme", "solver", "neighbors"]), figures(["of them right"])].concat()
-}
-
-fn key_cells(row: &Row) -> Vec<String> {
-    let source = attack::plain_source(&row.neighbors, row.oracle_noise.as_deref());
-    let right = format!("{} %", words::ratio_percent(row.inlier_ratio));
-    vec![row.scheme.clone(), row.solver.clone(), source, right]
-}
-
-fn within_columns(document: &Document, who: &str) -> Vec<Column> {
-    let names = thresholds(document).into_iter().map(|typed| threshold_text(document, &typed));
-    figures(names.map(|name| format!("{who}within {name}, %")))
-}
-
-fn known<T>(value: Option<T>, said: impl FnOnce(T) -> String) -> String {
-    value.map_or(NONE.into(), said)
-}
-
-/// Returns a cell per threshold: the percentage with its interval, "67.0 (66.4 to 67.6)", or with its spread over seeds.
-fn shares(
-    document: &Document,
+/// Returns the percentage within a threshold with its interval, "67.0 (66.4 to 67.6)", or with its spread over seeds.
+fn share(
+    typed: &str,
     shares: &ByThreshold,
     intervals: Option<&IndexMap<String, Interval>>,
     spread: Option<&ByThreshold>,
-) -> Vec<String> {
-    let cell = |typed: &String| match intervals.and_then(|all| all.get(typed)) {
+) -> String {
+    match intervals.and_then(|all| all.get(typed)) {
         Some(interval) => {
             let percent = percent_cell(shares.get(typed), None);
             format!("{percent} ({})", words::interval(*interval))
         }
-        None => percent_cell(shares.get(typed), spread.and_then(|s| s.get(typed))),
-    };
-    thresholds(document).iter().map(cell).collect()
-}
-
-/// Returns `items` without repetitions, in their order.
-pub(crate) fn distinct<T: PartialEq>(items: impl IntoIterator<Item = T>) -> Vec<T> {
-    let mut kept = Vec::new();
-    for item in items {
-        if !kept.contains(&item) {
-            kept.push(item);
-        }
+        None => percent_cell(shares.get(typed), spread.and_then(|spread| spread.get(typed))),
     }
-    kept
-}
-
-pub(crate) fn schemes(document: &Document) -> Vec<&str> {
-    distinct(document.results.iter().map(|row| row.scheme.as_str()))
-}
-
-fn points(document: &Document) -> &'static str {
-    document.results.first().map_or("points", |row| words::points(row.unit))
 }
 
 /// Returns the table of main figures: percent recovered, a column per threshold.
-pub(crate) fn recovered(document: &Document) -> Table {
-    let points = points(document);
-    let heads = [figures(["K", "delta"]), within_columns(document, ""), figures([points])].concat();
-    let repeats = document.results.iter().map(|row| row.repeats).max().unwrap_or(1);
+pub(crate) fn recovered(results: &Results<'_>) -> Table {
+    let points = results.points();
+    let repeats = results.rows.iter().map(|row| row.repeats).max().unwrap_or(1);
     let spread = match repeats > 1 {
-        _ if document.results.iter().any(|row| row.interval.is_some()) => {
+        _ if results.rows.iter().any(|row| row.interval.is_some()) => {
             " In brackets: the 95 % interval, by the sampling error.".to_owned()
         }
         true => format!(
@@ -162,177 +66,184 @@ pub(crate) fn recovered(document: &Document) -> Table {
         false => String::new(),
     };
     let caption = format!("Recovered {points}, in percent of the released {points}.{spread}");
-    let table = Table::of_results(document, ("recovered", caption), heads, |row| {
-        let mut cells = vec![row.k.to_string(), words::length(row.delta, row.unit)];
+    let mut columns = keys();
+    columns.push(figure("K", |row: &Row| row.k.to_string()));
+    columns.push(figure("delta", |row: &Row| words::length(row.delta, row.unit)));
+    columns.extend(within(results, "", |row: &Row, typed| {
         let spread = row.std.as_ref().map(|std| &std.recovered_percent);
         let of = row.interval.as_ref().map(|of| &of.recovered_percent);
-        cells.extend(shares(document, &row.recovered_percent, of, spread));
-        cells.push(words::thousands(row.n_points));
-        Some(cells)
-    });
-    table.without_empty_columns()
+        share(typed, &row.recovered_percent, of, spread)
+    }));
+    columns.push(figure(points, |row: &Row| words::thousands(row.n_points)));
+    Table::of("recovered", caption, results.rows, columns).without_empty_columns()
 }
 
-pub(crate) fn baselines(document: &Document) -> Table {
-    let mut rows: Vec<Vec<String>> = Vec::new();
-    for scheme in schemes(document) {
-        let of = || document.results.iter().filter(|row| row.scheme == scheme);
-        let line = |who: String, shares| [vec![scheme.to_owned(), who], shares].concat();
-        rows.extend(of().map(|row| {
-            let spread = row.std.as_ref().map(|std| &std.blind_percent);
-            let of = row.interval.as_ref().map(|of| &of.blind_percent);
-            line("blind guess".to_owned(), shares(document, &row.blind_percent, of, spread))
-        }));
-        rows.extend(of().filter_map(|row| {
-            let alone = row.records_alone_percent.as_ref()?;
-            // The best attack may differ between thresholds.
-            let by = row.records_alone_by.iter().flat_map(|by| by.values());
-            let by = distinct(by.map(String::as_str)).join("; ");
-            let who = attack::records_alone(Some(by.as_str()).filter(|by| !by.is_empty()));
-            let of = row.interval.as_ref().map(|of| &of.records_alone_percent);
-            Some(line(who, shares(document, alone, of, None)))
-        }));
-    }
+pub(crate) fn baselines(results: &Results<'_>) -> Table {
+    /// A line: the row, and whether it is about the records alone.
+    type Line<'a> = (&'a Row, bool);
+    let lines = results.schemes.iter().flat_map(|scheme| {
+        let rows = results.of_scheme(scheme);
+        let alone = rows.clone().filter(|row| row.records_alone_percent.is_some());
+        rows.map(|row| (row, false)).chain(alone.map(|row| (row, true)))
+    });
+    let attacker = |(row, alone): &Line<'_>| {
+        // The best attack may differ between thresholds.
+        let by = row.records_alone_by.iter().flat_map(|by| by.values());
+        let by = distinct(by.map(String::as_str)).join("; ");
+        match alone {
+            true => attack::records_alone(Some(by.as_str()).filter(|by| !by.is_empty())),
+            false => "blind guess".to_owned(),
+        }
+    };
+    let mut columns = vec![
+        label("scheme", |(row, _): &Line<'_>| row.scheme.clone()),
+        label("attacker", attacker),
+    ];
+    columns.extend(within(results, "", |(row, alone): &Line<'_>, typed| {
+        let of = row.interval.as_ref();
+        match row.records_alone_percent.as_ref().filter(|_| *alone) {
+            Some(shares) => share(typed, shares, of.map(|of| &of.records_alone_percent), None),
+            None => {
+                let spread = row.std.as_ref().map(|std| &std.blind_percent);
+                share(typed, &row.blind_percent, of.map(|of| &of.blind_percent), spread)
+            }
+        }
+    }));
     let caption = "Baselines: what an attacker recovers without lists of neighbors. Lists add what exceeds the larger baseline.";
-    let columns = [labels(["scheme", "attacker"]), within_columns(document, "")].concat();
-    Table::new("baselines", caption, columns, distinct(rows))
+    let mut table = Table::of("baselines", caption, &lines.collect::<Vec<_>>(), columns);
+    table.rows = distinct(table.rows);
+    table
 }
 
-pub(crate) fn distinct_places(document: &Document) -> Option<Table> {
-    let blind = within_columns(document, "blind guess, ");
-    let heads = [within_columns(document, ""), blind, figures(["places"])].concat();
+pub(crate) fn distinct_places(results: &Results<'_>) -> Option<Table> {
+    let places = |row: &Row| row.distinct.clone().unwrap_or_default();
+    let mut columns = keys();
+    columns.extend(within(results, "", move |row, typed| {
+        percent_cell(places(row).recovered_percent.get(typed), None)
+    }));
+    columns.extend(within(results, "blind guess, ", move |row, typed| {
+        percent_cell(places(row).blind_percent.get(typed), None)
+    }));
+    columns.push(figure("places", move |row| words::thousands(places(row).n_places)));
     let caption = "Recovered places, in percent: keypoints at the same place count once.";
-    let table = Table::of_results(document, ("distinct", caption), heads, |row| {
-        let distinct = row.distinct.as_ref()?;
-        let mut cells = shares(document, &distinct.recovered_percent, None, None);
-        cells.extend(shares(document, &distinct.blind_percent, None, None));
-        cells.push(words::thousands(distinct.n_places));
-        Some(cells)
-    });
-    table.if_any()
+    let rows = results.rows.iter().filter(|row| row.distinct.is_some());
+    Table::of("distinct", caption, rows, columns).if_beyond(KEYS)
 }
 
-pub(crate) fn errors(document: &Document) -> Table {
-    let keys = document.results.iter().flat_map(|row| row.error_percentiles.keys());
+pub(crate) fn errors(results: &Results<'_>) -> Table {
+    let error = |row: &Row, error: Option<f64>| known(error, |x| words::length(x, row.unit));
+    let mut columns = keys();
+    columns.push(figure("median", move |row| error(row, row.median_error)));
+    columns.push(figure("median of a blind guess", move |row| error(row, row.blind_median_error)));
+    let percentiles = results.rows.iter().flat_map(|row| row.error_percentiles.keys());
     // Percentile 50 is the median, which has its own column.
-    let percentiles = distinct(keys.filter(|key| *key != "50"));
-    let mut heads = figures(["median", "median of a blind guess"]);
-    heads.extend(figures(percentiles.iter().map(|key| format!("{key} % within"))));
+    for key in distinct(percentiles.filter(|key| *key != "50")) {
+        let of = move |row: &Row| error(row, row.error_percentiles.get(key).copied().flatten());
+        columns.push(figure(format!("{key} % within"), of));
+    }
     let caption = "Errors: distances from recovered to true points. Lost points count as infinitely far; a percentile among them is a dash.";
-    let table = Table::of_results(document, ("errors", caption), heads, |row| {
-        let of = |key: &&String| row.error_percentiles.get(*key).copied().flatten();
-        let errors = [row.median_error, row.blind_median_error].into_iter();
-        let errors = errors.chain(percentiles.iter().map(of));
-        Some(errors.map(|error| known(error, |error| words::length(error, row.unit))).collect())
-    });
-    table.without_empty_columns()
+    Table::of("errors", caption, results.rows, columns).without_empty_columns()
 }
 
-pub(crate) fn break_even(document: &Document) -> Option<Table> {
-    let rows = document.break_even.iter().map(|point| {
+pub(crate) fn break_even(results: &Results<'_>) -> Option<Table> {
+    let source = |point: &BreakEven| attack::plain_source("oracle", point.oracle_noise.as_deref());
+    let right = |point: &BreakEven| {
         let bound = match point.bound {
             Bound::Interpolated => "",
             Bound::BelowTested => "at most ",
             Bound::AboveTested => "more than ",
         };
-        let ratio = format!("{bound}{} %", words::ratio_percent(point.inlier_ratio));
-        let within = threshold_text(document, &point.threshold);
-        let source = attack::plain_source("oracle", point.oracle_noise.as_deref());
-        vec![point.scheme.clone(), point.solver.clone(), source, within, ratio]
-    });
-    let columns = [labels(["scheme", "solver", "neighbors"]), figures(["within", "of them right"])];
+        format!("{bound}{} %", words::ratio_percent(point.inlier_ratio))
+    };
+    let columns = vec![
+        label("scheme", |point: &BreakEven| point.scheme.clone()),
+        label("solver", |point: &BreakEven| point.solver.clone()),
+        label("neighbors", source),
+        figure("within", |point: &BreakEven| results.threshold(&point.threshold)),
+        figure("of them right", right),
+    ];
     let caption =
         "Break-even: the smallest share of right neighbors at which half of the points come back.";
-    let table = Table::new("break-even", caption, columns.concat(), rows.collect());
-    (!table.rows.is_empty()).then_some(table)
+    Table::of("break-even", caption, &results.document.break_even, columns).if_beyond(0)
 }
 
-pub(crate) fn losses(document: &Document) -> Table {
-    let points = points(document);
+pub(crate) fn losses(results: &Results<'_>) -> Table {
+    let points = results.points();
     let capital = words::capital(points);
     let caption = format!(
         "{capital} that the scheme did not release, and {points} that were lost in recovery, by reason."
     );
-    let heads = vec![
-        column(format!("{points} released"), Class::Figure),
-        column("not released", Class::Prose),
-        column("lost", Class::Figure),
-        column("lost by reason", Class::Prose),
-    ];
-    let table = Table::of_results(document, ("losses", caption), heads, |row| {
-        let [released, lost] = [row.n_points, row.n_lost].map(words::thousands);
-        Some(vec![released, reasons(&row.dropped), lost, reasons(&row.lost)])
-    });
-    table.without_empty_columns()
+    let mut columns = keys();
+    columns.extend([
+        figure(format!("{points} released"), |row: &Row| words::thousands(row.n_points)),
+        column(Class::Prose, "not released", |row: &Row| reasons(&row.dropped)),
+        figure("lost", |row: &Row| words::thousands(row.n_lost)),
+        column(Class::Prose, "lost by reason", |row: &Row| reasons(&row.lost)),
+    ]);
+    Table::of("losses", caption, results.rows, columns).without_empty_columns()
 }
 
 fn reasons(map: &ByReason) -> String {
-    let parts: Vec<String> = map
-        .iter()
-        .filter(|(_, count)| **count > 0)
-        .map(|(name, count)| format!("{} {}", words::thousands(*count), words::reason(name)))
+    let parts = map.iter().filter(|(_, count)| **count > 0);
+    let parts: Vec<String> = parts
+        .map(|(name, count)| format!("{} {}", words::thousands(*count), name.replace('_', " ")))
         .collect();
     if parts.is_empty() { NONE.to_owned() } else { parts.join(", ") }
 }
 
-const UNKNOWN: &str = "not known here";
-
 /// Returns the table of correct choices and of points that the attacker is sure of; `None` if no row has any.
-pub(crate) fn choices(document: &Document) -> Option<Table> {
-    let percent = |value: Option<f64>| known(value, words::percent);
-    let mut notes: Vec<String> = Vec::new();
-    let heads = figures([
-        "swapped axis found, %",
-        "recovered exactly, %",
-        "descriptor assigned right, %",
-        "attacker sure, %",
-        "right of these, %",
+pub(crate) fn choices(results: &Results<'_>) -> Option<Table> {
+    const UNKNOWN: &str = "not known here";
+    fn percent<'a>(head: &str, value: impl Fn(&Row) -> Option<f64> + 'a) -> Column<'a, Row> {
+        figure(head, move |row| known(value(row), words::percent))
+    }
+    let mut columns = keys();
+    columns.extend([
+        percent("swapped axis found, %", |row| row.axis_accuracy_percent),
+        percent("recovered exactly, %", |row| row.exact_percent),
+        percent("descriptor assigned right, %", |row| row.assignment_accuracy_percent),
+        figure("attacker sure, %", |row: &Row| match (&row.sure_unknown, row.sure_percent) {
+            (Some(_), None) => UNKNOWN.to_owned(),
+            (_, sure) => known(sure, words::percent),
+        }),
+        percent("right of these, %", |row| row.sure_correct_percent),
     ]);
     let caption = "Correct choices of the attack, and points that the attacker is sure of.";
-    let mut table = Table::of_results(document, ("choices", caption), heads, |row| {
-        let sure = match (&row.sure_unknown, row.sure_percent) {
-            (Some(reason), None) => {
-                notes.push(format!("{}: {reason}", words::capital(UNKNOWN)));
-                UNKNOWN.to_owned()
-            }
-            (_, sure) => percent(sure),
-        };
-        Some(vec![
-            percent(row.axis_accuracy_percent),
-            percent(row.exact_percent),
-            percent(row.assignment_accuracy_percent),
-            sure,
-            percent(row.sure_correct_percent),
-        ])
-    });
+    let mut table = Table::of("choices", caption, results.rows, columns);
+    let unknown = results.rows.iter().filter(|row| row.sure_percent.is_none());
+    let unknown = unknown.filter_map(|row| row.sure_unknown.as_ref());
+    let notes = unknown.map(|reason| format!("{}: {reason}", words::capital(UNKNOWN)));
     table.notes = distinct(notes);
-    table.without_empty_columns().if_any()
+    table.without_empty_columns().if_beyond(KEYS)
 }
 
-pub(crate) fn trials(document: &Document) -> Option<Table> {
-    let points = points(document);
-    let heads = vec![column(format!("{points} by trials"), Class::Prose)];
-    let caption = format!("RANSAC: number of {points} by the number of random trials needed.");
-    let table = Table::of_results(document, ("trials", caption), heads, |row| {
-        let bins = row.ransac_trials.as_ref()?.iter().map(|&(bound, count)| {
+pub(crate) fn trials(results: &Results<'_>) -> Option<Table> {
+    let points = results.points();
+    let bins = |row: &Row| {
+        let bins = row.ransac_trials.iter().flatten().map(|&(bound, count)| {
             format!("≤ {}: {}", words::thousands(bound), words::thousands(count))
         });
-        Some(vec![bins.collect::<Vec<_>>().join(" · ")])
-    });
-    table.if_any()
+        bins.collect::<Vec<_>>().join(" · ")
+    };
+    let mut columns = keys();
+    columns.push(column(Class::Prose, format!("{points} by trials"), bins));
+    let caption = format!("RANSAC: number of {points} by the number of random trials needed.");
+    let rows = results.rows.iter().filter(|row| row.ransac_trials.is_some());
+    Table::of("trials", caption, rows, columns).if_beyond(KEYS)
 }
 
-pub(crate) fn times(document: &Document) -> Option<Table> {
-    let seconds = &document.run.seconds;
-    let stages = distinct(seconds.rows.iter().flat_map(|row| row.keys()));
-    let heads = figures(stages.iter().map(|stage| format!("{stage}, s")));
-    let mut rows = seconds.rows.iter();
-    let table = Table::of_results(document, ("times", "Seconds by stage."), heads, |_| {
-        let times = rows.next()?;
-        let text = |stage: &&String| known(times.get(*stage), |s| words::significant(*s, 3));
-        Some(stages.iter().map(text).collect())
-    });
-    table.if_any()
+pub(crate) fn times(results: &Results<'_>) -> Option<Table> {
+    let times = &results.document.run.seconds.rows;
+    let mut columns = keys();
+    for stage in distinct(times.iter().flat_map(|row| row.keys())) {
+        let seconds = move |row: &Row| {
+            let at = results.rows.iter().position(|own| std::ptr::eq(own, row));
+            let seconds = at.and_then(|at| times.get(at)?.get(stage));
+            known(seconds, |s| words::significant(*s, 3))
+        };
+        columns.push(figure(format!("{stage}, s"), seconds));
+    }
+    Table::of("times", "Seconds by stage.", results.rows, columns).if_beyond(KEYS)
 }
 
 /// The metrics of [`likeness`]: name in a document, head of a column, decimals.
@@ -341,83 +252,59 @@ const LIKENESS: [(&str, &str, usize); 3] =
 const OF_CLASS: &str = "objects_found_of_";
 const BASELINE: &str = "_baseline";
 
-fn with_unprotected(mut table: Table, cells: Vec<String>) -> Table {
+fn with_unprotected(mut table: Table, cells: impl IntoIterator<Item = String>) -> Table {
     let keys = ["without protection", NONE, NONE, NONE].map(str::to_owned);
-    table.rows.insert(0, [keys.to_vec(), cells].concat());
+    table.rows.insert(0, keys.into_iter().chain(cells).collect());
     table
 }
 
 /// Returns the table of the similarity of pictures to the photos; `None` if no row has any.
-pub(crate) fn likeness(document: &Document) -> Option<Table> {
-    let first = document.results.iter().find(|row| row.metrics.contains_key("ssim"))?;
-    let ours = |row: &Row, end: &str| {
-        LIKENESS.map(|(metric, _, digits)| {
-            let value = row.metrics.get(&format!("{metric}{end}"));
-            known(value, |value| format!("{value:.digits$}"))
-        })
+pub(crate) fn likeness(results: &Results<'_>) -> Option<Table> {
+    let first = results.rows.iter().find(|row| row.metrics.contains_key("ssim"))?;
+    let cell = |row: &Row, metric: &str, digits: usize| {
+        known(row.metrics.get(metric), |value| format!("{value:.digits$}"))
     };
-    let lost = |row: &Row| {
+    let mut columns = keys();
+    columns
+        .extend(LIKENESS.map(|(metric, head, digits)| {
+            figure(head, move |row: &Row| cell(row, metric, digits))
+        }));
+    columns.push(figure("SSIM lost", |row: &Row| {
         let of = |name: &str| row.metrics.get(name);
         let lost = of("ssim_baseline").zip(of("ssim")).map(|(baseline, ssim)| baseline - ssim);
         known(lost, |lost| format!("{lost:.3}"))
-    };
-    let line = |ours: [String; 3], lost| [&ours[..], &[lost]].concat();
-    let heads = figures(LIKENESS.map(|(_, name, _)| name).into_iter().chain(["SSIM lost"]));
+    }));
     let caption = "Similarity of pictures, painted from recovered points, to the photos; means over photos. Higher SSIM and PSNR and lower \
                    LPIPS mean more similar.";
-    let cells = |row: &Row| Some(line(ours(row, ""), lost(row)));
-    let table = Table::of_results(document, ("likeness", caption), heads, cells);
-    let unprotected = line(ours(first, BASELINE), NONE.into());
+    let table = Table::of("likeness", caption, results.rows, columns);
+    let unprotected =
+        LIKENESS.map(|(metric, _, digits)| cell(first, &format!("{metric}{BASELINE}"), digits));
+    let unprotected = unprotected.into_iter().chain([NONE.to_owned()]);
     Some(with_unprotected(table, unprotected).without_empty_columns())
 }
 
 /// Returns the table of the photos' objects that are found again in the pictures, a column per class; `None` if no row
 /// has any.
-pub(crate) fn objects(document: &Document) -> Option<Table> {
-    let names = document.results.iter().flat_map(|row| row.metrics.keys());
+pub(crate) fn objects(results: &Results<'_>) -> Option<Table> {
+    let first = results.rows.iter().find(|row| row.metrics.contains_key("objects_found"))?;
+    let names = results.rows.iter().flat_map(|row| row.metrics.keys());
     let classes = names.filter_map(|name| name.strip_prefix(OF_CLASS));
     let mut classes = distinct(classes.filter(|class| !class.ends_with(BASELINE)));
     classes.sort_unstable();
-    let found = |row: &Row, end: &str| -> Vec<String> {
-        let share = |class: &&str| {
-            let value = row.metrics.get(&format!("{OF_CLASS}{class}{end}"));
-            known(value, |value| words::percent(100.0 * value))
-        };
-        classes.iter().map(share).collect()
+    let cell = |row: &Row, class: &str, end: &str| {
+        let share = row.metrics.get(&format!("{OF_CLASS}{class}{end}"));
+        known(share, |share| words::percent(100.0 * share))
     };
-    let first = document.results.iter().find(|row| row.metrics.contains_key("objects_found"))?;
-    let heads = figures(classes.iter().map(|class| format!("{}, %", class.replace('_', " "))));
+    let mut columns = keys();
+    columns.extend(classes.iter().map(|class| {
+        let head = format!("{}, %", class.replace('_', " "));
+        figure(head, move |row: &Row| cell(row, class, ""))
+    }));
     let caption = "Everyday objects that a detector finds in the photos, and the share that it finds again in the same place of the \
                    pictures; means over the photos that show one.";
-    let cells = |row: &Row| Some(found(row, ""));
-    let table = Table::of_results(document, ("objects", caption), heads, cells);
-    with_unprotected(table, found(first, BASELINE)).if_any()
-}
-
-pub(crate) fn thresholds(document: &Document) -> Vec<String> {
-    let typed = document.results.iter().flat_map(|row| row.recovered_percent.keys());
-    distinct(typed).into_iter().cloned().collect()
-}
-
-const HEADLINE_PX: f64 = 10.0;
-
-/// Returns the threshold of verdicts: the first; for images the one nearest to 10 px.
-pub(crate) fn headline_threshold(document: &Document) -> Option<String> {
-    let all = thresholds(document);
-    if document.results.first().is_none_or(|row| row.unit != Unit::Pixel) {
-        return all.into_iter().next();
-    }
-    let away = |typed: &String| {
-        typed.parse::<f64>().map_or(f64::INFINITY, |value| (value / HEADLINE_PX).ln().abs())
-    };
-    all.into_iter().min_by(|a, b| away(a).total_cmp(&away(b)))
-}
-
-pub(crate) fn threshold_text(document: &Document, typed: &str) -> String {
-    match document.results.first() {
-        Some(row) => words::threshold(typed, row.unit),
-        None => typed.to_owned(),
-    }
+    let table = Table::of("objects", caption, results.rows, columns);
+    let unprotected = classes.iter().map(|class| cell(first, class, BASELINE));
+    with_unprotected(table, unprotected).if_beyond(KEYS)
 }
 
 /// Standard deviations over seeds up to this many percentage points are not shown.

@@ -2,45 +2,46 @@
 
 use serde_json::{Value, json};
 
-use crate::document::{Document, Row, TileFigures};
-use crate::page::tables::{Class, Table, column};
-use crate::page::{tables, verdict};
-use crate::{attack, words};
+use crate::attack;
+use crate::document::{Row, TileFigures};
+use crate::page::verdict;
+use crate::results::Results;
+use crate::table::{Table, figure, known, label};
+use crate::words;
 
 /// The longer side of a heat map, in units of the drawing.
 const SIDE: f64 = 480.0;
-const MOST: usize = 4;
+const MAX_MAPS: usize = 4;
 
 /// Returns, for every scheme, the row with the largest share and its index in the results; the worst scheme first.
-fn strongest(document: &Document) -> Vec<(usize, &Row)> {
-    verdict::verdict(document)
-        .cards
-        .iter()
-        .filter_map(|card| {
-            let row = *verdict::by_source(document, &card.scheme).first()?;
-            let at = document.results.iter().position(|other| std::ptr::eq(other, row))?;
-            Some((at, row))
-        })
-        .collect()
+fn strongest<'a>(results: &Results<'a>) -> Vec<(usize, &'a Row)> {
+    let cards = verdict::cards(results);
+    let strongest = cards.iter().filter_map(|card| {
+        let row = *results.by_source(&card.scheme).first()?;
+        Some((results.rows.iter().position(|other| std::ptr::eq(other, row))?, row))
+    });
+    strongest.collect()
+}
+
+/// Returns the percentage of a tile in the row at index `at` of the results.
+fn percent(results: &Results<'_>, tile: &TileFigures, at: usize) -> Option<f64> {
+    tile.recovered_percent.get(at)?.get(results.headline).copied()
 }
 
 /// Returns heat maps of the schemes that leak most; none if the document has no tiles or not their bounds.
-pub(crate) fn heat_maps(document: &Document) -> Vec<Value> {
-    let Some(headline) = tables::headline_threshold(document) else { return Vec::new() };
-    let placed: Option<Vec<[[f64; 2]; 2]>> =
-        document.tiles.iter().map(|tile| tile.bounds).collect();
-    let Some(bounds) = placed.filter(|bounds| !bounds.is_empty()) else { return Vec::new() };
+pub(crate) fn heat_maps(results: &Results<'_>) -> Vec<Value> {
+    let tiles = &results.document.tiles;
+    let bounds: Option<Vec<[[f64; 2]; 2]>> = tiles.iter().map(|tile| tile.bounds).collect();
+    let Some(bounds) = bounds.filter(|bounds| !bounds.is_empty()) else { return Vec::new() };
     let corner = |end: usize, pick: fn(f64, f64) -> f64| -> [f64; 2] {
-        let all = |c: usize| bounds.iter().map(|b| b[end][c]).reduce(pick).unwrap_or(0.0);
-        [all(0), all(1)]
+        [0, 1].map(|c| bounds.iter().map(|b| b[end][c]).reduce(pick).unwrap_or(0.0))
     };
     let (low, high) = (corner(0, f64::min), corner(1, f64::max));
     let extent = (high[0] - low[0]).max(high[1] - low[1]);
     let scale = if extent > 0.0 { SIDE / extent } else { 1.0 };
-    let drawn = |(at, row): &(usize, &Row)| {
+    let heat_map = |(at, row): (usize, &Row)| {
         let heat = |(number, (tile, [first, last])): (usize, (&TileFigures, &[[f64; 2]; 2]))| {
-            let percent = tile.recovered_percent.get(*at).and_then(|all| all.get(&headline));
-            let percent = percent.copied().unwrap_or(0.0);
+            let percent = percent(results, tile, at).unwrap_or(0.0);
             let points = words::thousands(tile.n_points);
             json!({
                 "x": scale * (first[0] - low[0]),
@@ -55,55 +56,46 @@ pub(crate) fn heat_maps(document: &Document) -> Vec<Value> {
             })
         };
         let size = [0, 1].map(|c| (scale * (high[c] - low[c])).max(1.0));
-        let boxes = document.tiles.iter().zip(&bounds).enumerate().map(heat);
         json!({
             "title": format!("{}, {}", row.scheme, attack::briefly(row)),
             "size": size,
-            "boxes": boxes.collect::<Vec<_>>(),
+            "boxes": tiles.iter().zip(&bounds).enumerate().map(heat).collect::<Vec<_>>(),
         })
     };
-    strongest(document).iter().take(MOST).map(drawn).collect()
+    strongest(results).into_iter().take(MAX_MAPS).map(heat_map).collect()
 }
 
-pub(crate) fn table(document: &Document) -> Option<Table> {
-    if document.tiles.is_empty() {
-        return None;
-    }
-    let headline = tables::headline_threshold(document)?;
-    let strongest = strongest(document);
-    let mut columns = vec![column("tile", Class::Label), column("points", Class::Figure)];
-    let names = strongest.iter().map(|(_, row)| format!("{}, %", row.scheme));
-    columns.extend(names.map(|name| column(name, Class::Figure)));
-    let cells = |(number, tile): (usize, &TileFigures)| {
-        let mut cells = vec![(number + 1).to_string(), words::thousands(tile.n_points)];
-        cells.extend(strongest.iter().map(|(at, _)| {
-            let percent = tile.recovered_percent.get(*at).and_then(|all| all.get(&headline));
-            percent.map_or("–".to_owned(), |percent| format!("{percent:.1}"))
-        }));
-        cells
-    };
+pub(crate) fn table(results: &Results<'_>) -> Option<Table> {
+    type Tile<'a> = (usize, &'a TileFigures);
+    let mut columns = vec![
+        label("tile", |(number, _): &Tile<'_>| (number + 1).to_string()),
+        figure("points", |(_, tile): &Tile<'_>| words::thousands(tile.n_points)),
+    ];
+    columns.extend(strongest(results).into_iter().map(|(at, row)| {
+        figure(format!("{}, %", row.scheme), move |(_, tile): &Tile<'_>| {
+            known(percent(results, tile, at), words::percent)
+        })
+    }));
     let caption = format!(
         "Points of every tile recovered within {}, in percent, by the strongest attack on the whole map.",
-        tables::threshold_text(document, &headline)
+        results.threshold(results.headline)
     );
-    let rows = document.tiles.iter().enumerate().map(cells).collect();
-    Some(Table::new("tiles", caption, columns, rows))
+    let tiles: Vec<Tile<'_>> = results.document.tiles.iter().enumerate().collect();
+    Table::of("tiles", caption, &tiles, columns).if_beyond(0)
 }
 
 /// Returns a line for the terminal about the tile that leaks most; `None` for a document without tiles.
-pub(crate) fn line(document: &Document) -> Option<String> {
-    let headline = tables::headline_threshold(document)?;
-    let (at, row) = *strongest(document).first()?;
-    let percent = |tile: &TileFigures| tile.recovered_percent.get(at)?.get(&headline).copied();
-    let found = document.tiles.iter().enumerate();
-    let mut found: Vec<(f64, usize)> = found.filter_map(|(i, t)| Some((percent(t)?, i))).collect();
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (least, most) = (found.first()?.0, found.last()?);
-    let (scheme, n) = (&row.scheme, document.tiles.len());
-    let least = words::percent(least);
+pub(crate) fn line(results: &Results<'_>) -> Option<String> {
+    let tiles = &results.document.tiles;
+    let (at, row) = *strongest(results).first()?;
+    let percents = tiles.iter().enumerate();
+    let percents = percents.filter_map(|(i, tile)| Some((percent(results, tile, at)?, i)));
+    let mut percents: Vec<(f64, usize)> = percents.collect();
+    percents.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (least, (largest, tile)) = (percents.first()?.0, *percents.last()?);
+    let (scheme, n, tile) = (&row.scheme, tiles.len(), tile + 1);
+    let [least, largest] = [least, largest].map(words::percent);
     Some(format!(
-        "tiles: of {n}, {scheme} gives back {least} to {} % each, most in tile {}\n",
-        words::percent(most.0),
-        most.1 + 1
+        "tiles: of {n}, {scheme} gives back {least} to {largest} % each, most in tile {tile}\n"
     ))
 }

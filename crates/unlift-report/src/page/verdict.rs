@@ -2,231 +2,153 @@
 //! known neighbors. The worst scheme comes first. The word "safe" never appears, because an audit shows what
 //! the tried attacks recover, and others may recover more.
 
-use std::collections::BTreeMap;
-
 use serde::Serialize;
+use serde_json::{Value, json};
 use unlift::Unit;
 use unlift::audit::Interval;
 
-use crate::attack::{Basis, Given};
-use crate::document::{Bound, BreakEven, Document, Row};
-use crate::page::tables;
-use crate::{attack, views, words};
+use crate::attack::{self, Basis};
+use crate::document::{Bound, BreakEven, Row};
+use crate::results::Results;
+use crate::words;
 
-/// The oracle's headline is its tested inlier ratio nearest to this one.
-const HEADLINE_RATIO: f64 = 0.5;
-
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct Verdict {
     pub banner: Banner,
     pub cards: Vec<Card>,
-    pub refusals: Vec<Refusal>,
+    /// Schemes that could not be audited.
+    pub refusals: Vec<Value>,
+    /// What to do next, the most urgent first. Options of the command line are in back quotes.
     pub steps: Vec<String>,
 }
 
 /// Judges every scheme by its strongest attacks, for the headline threshold.
-pub(crate) fn verdict(document: &Document) -> Verdict {
-    let schemes = tables::schemes(document).into_iter();
-    let mut cards: Vec<Card> = schemes.filter_map(|scheme| card(document, scheme)).collect();
-    // The sort is stable, so equal shares keep the document's order.
-    cards.sort_by(|a, b| {
-        let ((a, a_then), (b, b_then)) = (a.badness(), b.badness());
-        b.total_cmp(&a).then(b_then.total_cmp(&a_then))
-    });
-    let whole = document.not_audited.iter().filter(|refused| refused.neighbors.is_none());
-    let refusals = whole.map(|refused| Refusal {
-        scheme: refused.scheme.clone(),
-        title: words::scheme_title(&refused.scheme),
-        reason: refused.reason.clone(),
-    });
-    let refusals: Vec<Refusal> = refusals.collect();
-    let (banner, steps) = (banner(document, &cards, &refusals), next_steps(document, &cards));
+pub(crate) fn verdict(results: &Results<'_>) -> Verdict {
+    let cards = cards(results);
+    let refused = |(scheme, reason): (&str, &str)| json!({ "scheme": scheme, "title": words::scheme_title(scheme), "reason": reason });
+    let refusals = results.refused().map(refused).collect();
+    let (banner, steps) = (banner(results, &cards), next_steps(results, &cards));
     Verdict { banner, cards, refusals, steps }
 }
 
-pub(crate) fn share(row: &Row, typed: &str) -> f64 {
-    row.recovered_percent.get(typed).copied().unwrap_or(0.0)
-}
-
-/// Returns the row of `scheme` with the largest share on this basis; for the oracle, among the rows whose
-/// ratio is nearest to [`HEADLINE_RATIO`].
-pub(crate) fn strongest<'a>(document: &'a Document, scheme: &str, basis: Basis) -> Option<&'a Row> {
-    let typed = tables::headline_threshold(document)?;
-    let away = |row: &Row| match basis {
-        Basis::Oracle => (row.inlier_ratio - HEADLINE_RATIO).abs(),
-        Basis::Released | Basis::Given => 0.0,
-    };
-    let rows = document.results.iter().filter(|row| row.scheme == scheme);
-    rows.filter(|row| attack::basis(row) == basis).min_by(|a, b| {
-        away(a).total_cmp(&away(b)).then(share(b, &typed).total_cmp(&share(a, &typed)))
-    })
-}
-
-/// Returns the row that recovers most of `scheme` within `typed` from these neighborhoods; of equal ones the first.
-pub(crate) fn strongest_given<'a>(
-    document: &'a Document,
-    scheme: &str,
-    given: &Given,
-    typed: &str,
-) -> Option<&'a Row> {
-    let share = |row: &Row| row.recovered_percent.get(typed).copied().unwrap_or(-1.0);
-    let mut best: Option<&Row> = None;
-    for row in &document.results {
-        let is_rival = row.scheme == scheme && Given::of(row).same_choice(given);
-        if is_rival && best.is_none_or(|best| share(row) > share(best)) {
-            best = Some(row);
-        }
-    }
-    best
-}
-
-/// Returns the strongest row of every source of `scheme`: most recovered first, the oracle last.
-pub(crate) fn by_source<'a>(document: &'a Document, scheme: &str) -> Vec<&'a Row> {
-    let typed = tables::headline_threshold(document).unwrap_or_default();
-    let mut best: BTreeMap<&str, &Row> = BTreeMap::new();
-    for row in document.results.iter().filter(|row| row.scheme == scheme) {
-        if matches!(attack::basis(row), Basis::Released | Basis::Given) {
-            let so_far = best.entry(&row.neighbors).or_insert(row);
-            if share(row, &typed) > share(so_far, &typed) {
-                *so_far = row;
-            }
-        }
-    }
-    let mut rows: Vec<&Row> = best.into_values().collect();
-    rows.sort_by(|a, b| share(b, &typed).total_cmp(&share(a, &typed)));
-    rows.extend(strongest(document, scheme, Basis::Oracle));
-    rows
-}
-
-/// Returns the percentage by the records alone within `typed`, the best of the scheme's rows, and the attack's
-/// name.
-pub(crate) fn records_alone<'a>(
-    document: &'a Document,
-    scheme: &str,
-    typed: &str,
-) -> Option<(f64, Option<&'a str>)> {
-    let rows = document.results.iter().filter(|row| row.scheme == scheme);
-    let shares = rows.filter_map(|row| {
-        let percent = *row.records_alone_percent.as_ref()?.get(typed)?;
-        let by = row.records_alone_by.as_ref().and_then(|by| by.get(typed));
-        Some((percent, by.map(String::as_str)))
+/// Returns the cards of all schemes, the worst first.
+pub(crate) fn cards(results: &Results<'_>) -> Vec<Card> {
+    let schemes = results.schemes.iter();
+    let mut cards: Vec<Card> = schemes.filter_map(|scheme| card(results, scheme)).collect();
+    // By the share from released data alone, then by the larger other share. The sort is stable, so equal
+    // shares keep the document's order.
+    cards.sort_by(|a, b| {
+        let share = |card: &Card, basis| card.finding(basis).map_or(-1.0, |of| of.recovered);
+        let others = |card| share(card, Basis::Oracle).max(share(card, Basis::Given));
+        let today = share(b, Basis::Released).total_cmp(&share(a, Basis::Released));
+        today.then(others(b).total_cmp(&others(a)))
     });
-    shares.max_by(|a, b| a.0.total_cmp(&b.0))
+    cards
 }
 
-fn card(document: &Document, scheme: &str) -> Option<Card> {
-    let typed = &tables::headline_threshold(document)?;
-    let alone = records_alone(document, scheme, typed);
+fn card(results: &Results<'_>, scheme: &str) -> Option<Card> {
+    let typed = results.headline;
+    let alone = results.records_alone(scheme, typed);
     let blind = |row: &Row| row.blind_percent.get(typed).copied().unwrap_or(0.0);
+    let floor = |row: &Row| alone.map_or(0.0, |(percent, _)| percent).max(blind(row));
     // A baseline that recovers more than the row replaces it.
-    let without = |row: &Row| match alone {
-        Some((percent, by)) if percent >= blind(row) => {
-            (percent, attack::records_alone(by), "records alone".to_owned())
-        }
-        _ => (blind(row), "a blind guess".to_owned(), "a blind guess".to_owned()),
-    };
-    let found = |basis, row: &Row, own: Option<f64>| {
-        let (floor, by, briefly) = without(row);
-        let own = own.filter(|own| *own >= floor);
-        let (recovered, by, briefly) = match own {
-            Some(own) => (own, attack::name(row), attack::briefly(row)),
-            None => (floor, by, briefly),
+    let finding = |basis, row: &Row, own: Option<f64>| {
+        let floor = floor(row);
+        let (recovered, by, briefly) = match (own, alone) {
+            (Some(own), _) if own >= floor => (own, attack::name(row), attack::briefly(row)),
+            (_, Some((percent, by))) if percent >= blind(row) => {
+                (floor, attack::records_alone(by), attack::records_alone(None))
+            }
+            _ => (floor, "a blind guess".to_owned(), "a blind guess".to_owned()),
         };
-        let estimate = if own.is_some() { row.recovered(typed) } else { row.baseline(typed) };
+        let is_own = own.is_some_and(|own| own >= floor);
+        let estimate = if is_own { row.recovered(typed) } else { row.baseline(typed) };
         let interval = estimate.map(|estimate| estimate.interval);
         let (percent, level) = (words::percent(recovered), Level::of(recovered));
-        let when = when(basis, row);
-        Finding { basis, when, recovered, interval, percent, level, by, briefly, floor }
+        Finding {
+            basis,
+            when: when(basis, row),
+            recovered,
+            interval,
+            percent,
+            level,
+            by,
+            briefly,
+            floor,
+        }
     };
-    let of = |basis| {
-        let row = strongest(document, scheme, basis)?;
-        Some(found(basis, row, Some(share(row, typed))))
+    let first = results.of_scheme(scheme).next()?;
+    let of_basis = |basis| {
+        let row = results.strongest(scheme, basis)?;
+        Some(finding(basis, row, Some(results.share(row))))
     };
-    let any = document.results.iter().find(|row| row.scheme == scheme)?;
-    let mut findings: Vec<Finding> =
-        [Basis::Released, Basis::Given, Basis::Oracle].into_iter().filter_map(of).collect();
+    let mut findings: Vec<Finding> = Basis::ALL.into_iter().filter_map(of_basis).collect();
+    let is_today = |findings: &[Finding]| findings.iter().any(|of| of.basis == Basis::Released);
     // Baselines need only the released data, so they are attacks of today.
-    let (floor, ..) = without(any);
-    let tells = alone.is_some() || Level::of(floor) > Level::Gray;
-    if tells && findings.iter().all(|finding| finding.basis != Basis::Released) {
-        findings.insert(0, found(Basis::Released, any, None));
+    let tells = alone.is_some() || Level::of(floor(first)) > Level::Gray;
+    if tells && !is_today(&findings) {
+        findings.insert(0, finding(Basis::Released, first, None));
     }
     if findings.is_empty() {
         return None;
     }
-    let has_today = findings.iter().any(|finding| finding.basis == Basis::Released);
-    let refused = document.not_audited.iter().filter(|refused| refused.scheme == scheme);
+    let refused = results.document.not_audited.iter().filter(|refused| refused.scheme == scheme);
     let refused = refused.filter_map(|refused| {
         let source = attack::plain_source(refused.neighbors.as_deref()?, None);
         Some(format!("Not tried with {source}: {}.", refused.reason.trim_end_matches('.')))
     });
-    let points = words::points(any.unit);
+    let baselines = bearings_sentence(results, scheme).into_iter();
+    let baselines = baselines.chain([baselines_sentence(results, scheme, alone.map(|of| of.0))]);
     Some(Card {
         scheme: scheme.to_owned(),
         title: words::scheme_title(scheme),
         rule: words::scheme_rule(scheme),
-        findings,
-        baselines: bearings_sentence(document, scheme)
-            .into_iter()
-            .chain([baselines(document, scheme, typed, alone)])
-            .collect::<Vec<_>>()
-            .join(" "),
-        break_even: lowest(document, scheme, typed).map(|point| break_even(point, points)),
-        untried_today: !has_today,
+        baselines: baselines.collect::<Vec<_>>().join(" "),
+        break_even: lowest(results, scheme).map(|point| break_even(point, results.points())),
+        untried_today: !is_today(&findings),
         refused: refused.collect(),
+        findings,
     })
 }
 
 fn when(basis: Basis, row: &Row) -> String {
-    match basis {
-        Basis::Released if attack::queries(&row.neighbors).is_some() => {
-            "Today, from released queries and their poses".to_owned()
-        }
+    let is_sequence = attack::queries(&row.neighbors).is_some();
+    let text = match basis {
+        Basis::Released if is_sequence => "Today, from released queries and their poses",
         Basis::Released if attack::is_again(&row.neighbors) => {
-            "Today, from two releases of the map".to_owned()
+            "Today, from two releases of the map"
         }
-        Basis::Released => "Today, from the released data alone".to_owned(),
-        Basis::Given => "With neighbors from a given file".to_owned(),
-        Basis::Oracle if attack::queries(&row.neighbors).is_some() => {
-            "With links by the tracks of the model alone".to_owned()
-        }
-        Basis::Oracle => words::capital(&words::if_known(row.inlier_ratio)),
-    }
+        Basis::Released => "Today, from the released data alone",
+        Basis::Given => "With neighbors from a given file",
+        Basis::Oracle if is_sequence => "With links by the tracks of the model alone",
+        Basis::Oracle => return words::capital(&words::if_known(row.inlier_ratio)),
+    };
+    text.to_owned()
 }
 
 /// Returns what the two baselines recover, and what lists of neighbors add to the larger one: "A blind guess recovers
 /// 8.1 %, the released records alone 65.2 %. Lists of neighbors add 21.3 percentage points (by descriptor
 /// overlap)."
-fn baselines(
-    document: &Document,
-    scheme: &str,
-    typed: &str,
-    alone: Option<(f64, Option<&str>)>,
-) -> String {
-    let rows = document.results.iter().filter(|row| row.scheme == scheme);
-    let blind = rows.filter_map(|row| row.blind_percent.get(typed).copied());
-    let blind = blind.max_by(f64::total_cmp).unwrap_or(0.0);
-    let guess = format!("A blind guess recovers {} %", words::percent(blind));
-    let (without, floor) = match alone {
-        Some((percent, _)) => {
-            let records = words::percent(percent);
-            (format!("{guess}, the released records alone {records} %."), percent.max(blind))
-        }
-        None => (format!("{guess}."), blind),
+fn baselines_sentence(results: &Results<'_>, scheme: &str, alone: Option<f64>) -> String {
+    let blind = results.max(scheme, |row| row.blind_percent.get(results.headline).copied());
+    let blind = blind.unwrap_or(0.0);
+    let floor = alone.unwrap_or(0.0).max(blind);
+    let records = alone
+        .map(|alone| format!(", the released records alone {} %", words::percent(alone)))
+        .unwrap_or_default();
+    let without = format!("A blind guess recovers {} %{records}.", words::percent(blind));
+    // Solvers without neighborhoods do not show what lists add.
+    let adds = |row: &&Row| attack::reads_lists(&row.solver) && !attack::intersects(&row.neighbors);
+    let added = |row: &Row| {
+        let source = attack::plain_source(&row.neighbors, row.oracle_noise.as_deref());
+        let source = source.trim_start_matches("neighbors ");
+        format!("{} ({source})", added(results.share(row) - floor))
     };
-    let adds: Vec<String> = by_source(document, scheme)
-        .into_iter()
-        // Solvers without neighborhoods do not show what lists add.
-        .filter(|row| attack::has_neighborhoods(row) && !attack::intersects(&row.neighbors))
-        .map(|row| {
-            let source = attack::plain_source(&row.neighbors, row.oracle_noise.as_deref());
-            let source = source.trim_start_matches("neighbors ");
-            format!("{} ({source})", added(share(row, typed) - floor))
-        })
-        .collect();
-    match adds.is_empty() {
+    let sources = results.by_source(scheme).into_iter();
+    let added: Vec<String> = sources.filter(adds).map(added).collect();
+    match added.is_empty() {
         true => without,
-        false => format!("{without} Lists of neighbors add {}.", words::list(&adds)),
+        false => format!("{without} Lists of neighbors add {}.", words::list(&added)),
     }
 }
 
@@ -239,17 +161,15 @@ fn added(gain: f64) -> String {
     }
 }
 
-fn lowest<'a>(document: &'a Document, scheme: &str, typed: &str) -> Option<&'a BreakEven> {
+fn lowest<'a>(results: &Results<'a>, scheme: &str) -> Option<&'a BreakEven> {
     let rank = |point: &BreakEven| match point.bound {
         Bound::BelowTested => 0,
         Bound::Interpolated => 1,
         Bound::AboveTested => 2,
     };
-    let of = |point: &&BreakEven| point.scheme == scheme && point.threshold == typed;
-    document
-        .break_even
-        .iter()
-        .filter(of)
+    let points = results.document.break_even.iter();
+    points
+        .filter(|point| point.scheme == scheme && point.threshold == results.headline)
         .min_by(|a, b| rank(a).cmp(&rank(b)).then(a.inlier_ratio.total_cmp(&b.inlier_ratio)))
 }
 
@@ -293,7 +213,7 @@ impl Level {
 }
 
 /// The verdict on one scheme.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct Card {
     pub scheme: String,
     pub title: String,
@@ -309,7 +229,7 @@ pub(crate) struct Card {
     pub refused: Vec<String>,
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct Finding {
     #[serde(skip)]
     pub basis: Basis,
@@ -327,21 +247,9 @@ pub(crate) struct Finding {
     pub floor: f64,
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Refusal {
-    pub scheme: String,
-    pub title: String,
-    pub reason: String,
-}
-
 impl Finding {
-    /// Returns the upper end of the interval.
-    fn highest(&self) -> f64 {
-        self.interval.map_or(self.recovered, |interval| interval[1])
-    }
-
     /// Returns "46.6 % (45.9 to 47.3)".
-    fn said(&self) -> String {
+    fn in_words(&self) -> String {
         match self.interval {
             Some(interval) => format!("{} % ({})", self.percent, words::interval(interval)),
             None => format!("{} %", self.percent),
@@ -354,21 +262,18 @@ impl Card {
         self.findings.iter().find(|finding| finding.basis == basis)
     }
 
-    /// Returns the percentage recovered from the released data alone; `None` if that was not tried.
-    pub(crate) fn today(&self) -> Option<f64> {
-        self.finding(Basis::Released).map(|finding| finding.recovered)
+    /// Returns what was recovered from the released data alone; `None` if that was not tried.
+    pub(crate) fn today(&self) -> Option<&Finding> {
+        self.finding(Basis::Released)
     }
 
-    /// Returns the sort key of a card: the share from released data alone, then the larger other share;
-    /// -1 if not tried.
-    pub(crate) fn badness(&self) -> (f64, f64) {
-        let share = |basis| self.finding(basis).map_or(-1.0, |finding| finding.recovered);
-        (share(Basis::Released), share(Basis::Oracle).max(share(Basis::Given)))
+    fn name(&self) -> String {
+        words::scheme_name(&self.scheme)
     }
 }
 
 /// The verdict on a whole audit in a few lines.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct Banner {
     pub level: Level,
     /// "Do not release this map under any scheme tried."
@@ -381,27 +286,27 @@ pub(crate) struct Banner {
     pub unknown: Option<String>,
 }
 
-pub(crate) fn banner(document: &Document, cards: &[Card], refusals: &[Refusal]) -> Banner {
-    let names: Vec<String> = refusals.iter().map(|one| words::scheme_name(&one.scheme)).collect();
-    let unknown = (!refusals.is_empty())
+pub(crate) fn banner(results: &Results<'_>, cards: &[Card]) -> Banner {
+    let names: Vec<String> =
+        results.refused().map(|(scheme, _)| words::scheme_name(scheme)).collect();
+    let unknown = (!names.is_empty())
         .then(|| format!("Not audited, so nothing is known: {}.", words::list(&names)));
     let today = worst(cards, Basis::Released);
     let known = worst(cards, Basis::Given).or_else(|| worst(cards, Basis::Oracle));
     // The model may have fewer tracks than an attacker finds links.
-    let every = every(cards).filter(|_| !views::is_sequence(document));
-    let bearings: Vec<String> =
-        cards.iter().filter_map(|card| bearings_sentence(document, &card.scheme)).take(1).collect();
+    let every = every(cards).filter(|_| !results.is_sequence());
+    let bearings = cards.iter().find_map(|card| bearings_sentence(results, &card.scheme));
     let (level, headline, mut sentences) = match (today, known) {
         (Some(strongest), _) => {
-            let (headline, mut sentences) = decision(document, cards);
-            sentences.push(attack_sentence(document, strongest));
+            let (headline, mut sentences) = decision(results, cards);
+            sentences.push(attack_sentence(results, strongest));
             (strongest.1.level, headline, sentences)
         }
         // An untested attack may succeed, so known neighbors decide the color.
         (None, Some(strongest)) => {
             let level = strongest.1.level.min(Level::Orange);
             let headline = "Not tested: what an attacker recovers from the released data alone.";
-            (level, headline.to_owned(), vec![attack_sentence(document, strongest)])
+            (level, headline.to_owned(), vec![attack_sentence(results, strongest)])
         }
         (None, None) => {
             let nothing = "Nothing is known about this protection.";
@@ -410,86 +315,92 @@ pub(crate) fn banner(document: &Document, cards: &[Card], refusals: &[Refusal]) 
     };
     let (level, headline) = match level {
         // Few recovered points do not mean that little is seen.
-        Level::Gray if !bearings.is_empty() => {
+        Level::Gray if bearings.is_some() => {
             (Level::Orange, "Bearings of points are published.".to_owned())
         }
         // A small leak is no good result before the main attack was tried.
-        Level::Gray if !uses_descriptors(document, None) => (Level::Orange, headline),
+        Level::Gray if !uses_descriptors(results, None) => (Level::Orange, headline),
         level => (level, headline),
     };
-    sentences.splice(0..0, bearings.into_iter().chain(not_tried(document)));
+    sentences.splice(0..0, bearings.into_iter().chain(not_tried(results)));
     Banner { level, headline, sentence: sentences.join(" "), every, unknown }
 }
 
 /// Returns whether to release, by what came back from the released data alone, and the reasons. A small leak decides nothing
 /// before attacks by descriptors were tried.
-fn decision(document: &Document, cards: &[Card]) -> (String, Vec<String>) {
-    let (mut much, mut little, mut undecided) = (Vec::new(), Vec::new(), Vec::new());
-    let hides = |card: &&Card| bearings_sentence(document, &card.scheme).is_none();
+fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
     // Cards are sorted by their leak, the largest first.
-    for card in cards.iter().filter(hides) {
-        let name = words::scheme_name(&card.scheme);
-        match card.finding(Basis::Released) {
-            Some(found) if found.level != Level::Gray => much.push((Some(found), name)),
-            Some(found) if uses_descriptors(document, Some(&card.scheme)) => {
-                little.push((Some(found), name))
+    let (mut much, mut little, mut undecided) = (Vec::new(), Vec::new(), Vec::new());
+    for card in hidden(results, cards) {
+        match card.today() {
+            Some(leak) if leak.level != Level::Gray => much.push((card, leak)),
+            Some(leak) if uses_descriptors(results, Some(&card.scheme)) => {
+                little.push((card, leak))
             }
-            _ => undecided.push((None, name)),
+            _ => undecided.push(card.name()),
         }
     }
-    let names = |leaks: &[(Option<&Finding>, String)]| {
-        words::list(&leaks.iter().map(|leak| leak.1.clone()).collect::<Vec<_>>())
+    let names = |leaks: &[(&Card, &Finding)]| {
+        words::list(&leaks.iter().map(|(card, _)| card.name()).collect::<Vec<_>>())
     };
-    let (what, of) = match is_of_images(document) {
+    let (what, points) = match results.is_of_images() {
         true => ("these images", "keypoints"),
         false => ("this map", "points"),
     };
     let not = format!("Do not release {what} under {}.", names(&much));
-    let open =
-        (!undecided.is_empty()).then(|| format!("Nothing is decided about {}.", names(&undecided)));
-    match (little.first().and_then(|leak| leak.0), much.last()) {
-        (Some(most), _) => {
-            let percent = most.said();
-            let little = names(&little);
-            let headline =
-                format!("Under {little}, no attack tried here recovers more than {percent}.");
+    let undecided = words::list(&undecided);
+    let open = (!undecided.is_empty()).then(|| format!("Nothing is decided about {undecided}."));
+    match (little.first(), much.last()) {
+        (Some((_, largest)), _) => {
+            let headline = format!(
+                "Under {}, no attack tried here recovers more than {}.",
+                names(&little),
+                largest.in_words()
+            );
             let not = (!much.is_empty()).then_some(not);
             (headline, not.into_iter().chain(open).collect())
         }
-        (None, Some((Some(least), name))) if much.len() > 1 => {
-            let (percent, part) = (&least.percent, words::part(least.recovered));
+        (None, Some((card, least))) if much.len() > 1 => {
             let ends = least.interval.map(|of| words::interval(of) + ", ").unwrap_or_default();
             let all = format!("Do not release {what} under any scheme tried.");
-            let headline = if undecided.is_empty() { all } else { not };
-            let reason =
-                format!("The least leak, {percent} % ({ends}{name}), is {part} of the {of}.");
+            let headline = if open.is_none() { all } else { not };
+            let reason = format!(
+                "The least leak, {} % ({ends}{}), is {} of the {points}.",
+                least.percent,
+                card.name(),
+                words::part(least.recovered)
+            );
             (headline, [reason].into_iter().chain(open).collect())
         }
         (None, Some(_)) => (not, open.into_iter().collect()),
-        (None, None) => (format!("Not decided: {what} under {}.", names(&undecided)), Vec::new()),
+        (None, None) => (format!("Not decided: {what} under {undecided}."), Vec::new()),
     }
 }
 
-fn is_of_images(document: &Document) -> bool {
-    document.results.iter().any(|row| row.unit == Unit::Pixel)
+/// Returns the cards of schemes that publish no bearings: what those show is not the points that came back.
+fn hidden<'c>(results: &Results<'_>, cards: &'c [Card]) -> impl Iterator<Item = &'c Card> {
+    cards.iter().filter(|card| bearings_sentence(results, &card.scheme).is_none())
 }
 
+const BY_DESCRIPTORS: [&str; 4] = ["similarity", "overlap", "descriptors", "learned"];
+
 /// Returns true if an attack on `scheme`, or on any scheme, used descriptors.
-fn uses_descriptors(document: &Document, scheme: Option<&str>) -> bool {
-    let of_views = views::is_sequence(document) || views::is_again(document);
-    let mut rows = document.results.iter().filter(|row| scheme.is_none_or(|it| it == row.scheme));
-    of_views || rows.any(|row| BY_DESCRIPTORS.contains(&row.neighbors.as_str()))
+fn uses_descriptors(results: &Results<'_>, scheme: Option<&str>) -> bool {
+    let mut rows = results.rows.iter().filter(|row| scheme.is_none_or(|name| name == row.scheme));
+    results.is_sequence()
+        || results.is_again()
+        || rows.any(|row| BY_DESCRIPTORS.contains(&row.neighbors.as_str()))
 }
 
 /// Returns which kinds of attacks on released data were not tried.
-fn not_tried(document: &Document) -> Option<String> {
-    if views::is_sequence(document) || views::is_again(document) || document.results.is_empty() {
+fn not_tried(results: &Results<'_>) -> Option<String> {
+    if results.is_sequence() || results.is_again() || results.rows.is_empty() {
         return None;
     }
-    let images = is_of_images(document);
-    let alone = images || document.results.iter().any(|row| row.records_alone_percent.is_some());
+    let images = results.is_of_images();
+    let alone = images || results.rows.iter().any(|row| row.records_alone_percent.is_some());
     let kinds = [
-        (!uses_descriptors(document, None)).then_some("attacks by descriptors"),
+        (!uses_descriptors(results, None)).then_some("attacks by descriptors"),
         (!alone).then_some("the attack on the records alone"),
         images.then_some("several queries with known poses (unlift audit sequence)"),
     ];
@@ -499,28 +410,26 @@ fn not_tried(document: &Document) -> Option<String> {
 
 /// Returns a sentence on what every scheme would give back with known neighbors, if several were tried so.
 fn every(cards: &[Card]) -> Option<String> {
-    let known: Option<Vec<&Finding>> =
-        cards.iter().map(|card| card.finding(Basis::Oracle)).collect();
-    let known = known.filter(|known| known.len() > 1)?;
+    let known = cards.iter().map(|card| card.finding(Basis::Oracle));
+    let known = known.collect::<Option<Vec<_>>>().filter(|known| known.len() > 1)?;
     let least = known.into_iter().reduce(|a, b| if b.recovered < a.recovered { b } else { a })?;
-    let (when, percent) = (&least.when, least.said());
+    let (when, percent) = (&least.when, least.in_words());
     Some(format!("{when}, every scheme tried would give back {percent} or more."))
 }
 
 fn worst(cards: &[Card], basis: Basis) -> Option<(&Card, &Finding)> {
-    let found = cards.iter().filter_map(|card| Some((card, card.finding(basis)?)));
-    found.reduce(|a, b| if b.1.recovered > a.1.recovered { b } else { a })
+    let findings = cards.iter().filter_map(|card| Some((card, card.finding(basis)?)));
+    findings.reduce(|a, b| if b.1.recovered > a.1.recovered { b } else { a })
 }
 
-fn attack_sentence(document: &Document, (card, finding): (&Card, &Finding)) -> String {
-    let typed = tables::headline_threshold(document).unwrap_or_default();
-    let unit = document.results.first().map_or(Unit::Meter, |row| row.unit);
-    let of = match unit {
+fn attack_sentence(results: &Results<'_>, (card, finding): (&Card, &Finding)) -> String {
+    let points = match results.unit {
         Unit::Pixel => "the keypoints of these images",
         Unit::Meter | Unit::KthNeighbor => "the points of this map",
     };
-    let what = format!("{} of {of} {}", finding.said(), words::within(&typed, unit));
-    let by = format!("{}, {}", words::scheme_name(&card.scheme), finding.briefly);
+    let within = words::within(results.headline, results.unit);
+    let what = format!("{} of {points} {within}", finding.in_words());
+    let by = format!("{}, {}", card.name(), finding.briefly);
     match finding.basis {
         Basis::Released => {
             let from = finding.when.trim_start_matches("Today, ");
@@ -534,59 +443,51 @@ fn attack_sentence(document: &Document, (card, finding): (&Card, &Finding)) -> S
     }
 }
 
-const BY_DESCRIPTORS: [&str; 4] = ["similarity", "overlap", "descriptors", "learned"];
-
-/// Returns the next steps, the most urgent first. Options of the command line are in back quotes.
-pub(crate) fn next_steps(document: &Document, cards: &[Card]) -> Vec<String> {
-    let images = is_of_images(document);
-    let tried = |name: &str| document.results.iter().any(|row| row.neighbors.contains(name));
-    let with_descriptors = BY_DESCRIPTORS.iter().any(|name| tried(name));
-    let has_file = with_descriptors || document.input.other_sha256.contains_key("descriptors");
+fn next_steps(results: &Results<'_>, cards: &[Card]) -> Vec<String> {
+    let document = results.document;
+    let tried = |name: &str| results.rows.iter().any(|row| row.neighbors.contains(name));
     let mut steps = Vec::new();
-    if views::is_sequence(document) {
-        if !document.results.iter().any(views::uses_lists) {
-            steps.push(
+    let mut add = |step: &str| steps.push(step.to_owned());
+    if results.is_sequence() {
+        if !tried(attack::SEQUENCE_AND_LISTS) {
+            add(
                 "Try the stronger attack: add `--neighbors descriptors`, which also uses lists of \
-                 neighbors within each query."
-                    .to_owned(),
+                 neighbors within each query.",
             );
         }
-        steps.push(
+        add(
             "Mitigate and measure again: send fewer queries, or withhold the pose. Fewer views of \
-             a point give an attacker less to work with."
-                .to_owned(),
+             a point give an attacker less to work with.",
         );
-        steps.extend(views::sequence_sentences(document));
+        steps.extend(sequence_sentences(results));
         return steps;
     }
-    if views::is_again(document) {
-        steps.push(
-            "Publish a map once. To publish a new version, hide new and changed points only, and \
-             keep the records of the others."
-                .to_owned(),
-        );
-        steps.extend(views::again_sentences(document));
+    if results.is_again() {
+        add("Publish a map once. To publish a new version, hide new and changed points only, and \
+             keep the records of the others.");
+        steps.extend(again_sentences(results));
         return steps;
     }
+    let images = results.is_of_images();
+    let with_descriptors = BY_DESCRIPTORS.iter().any(|name| tried(name));
+    let has_file = with_descriptors || document.input.other_sha256.contains_key("descriptors");
     if !with_descriptors {
         let options = match images || has_file {
             true => "`--neighbors descriptors`",
             false => "`--descriptors FILE`",
         };
-        steps.push(format!(
+        add(&format!(
             "Try the stronger attack: add {options}. Descriptors show an attacker which {} are \
              neighbors, and no attack here used them.",
-            if images { "keypoints" } else { "points" }
+            results.points()
         ));
     } else if !tried("learned") && !tried("descriptors") {
-        steps.push(
-            "Try the stronger attack: add `--neighbors learned`, a network that finds neighbors \
-             from SIFT or ALIKED descriptors."
-                .to_owned(),
-        );
+        add("Try the stronger attack: add `--neighbors learned`, a network that finds neighbors \
+             from SIFT or ALIKED descriptors.");
     }
-    steps.extend(least(document, cards));
-    if with_descriptors && !document.results.iter().any(has_pictures) {
+    steps.extend(least(results, cards));
+    let has_pictures = |row: &Row| row.metrics.contains_key("ssim");
+    if with_descriptors && !results.rows.iter().any(has_pictures) {
         steps.push("See what an attacker sees: add `--invert` and the photos.".to_owned());
     }
     if images {
@@ -599,85 +500,67 @@ pub(crate) fn next_steps(document: &Document, cards: &[Card]) -> Vec<String> {
         steps.push(format!("Mitigate and measure again: add `--mitigate thin:1/4`{drop}{cost}."));
     }
     if document.gates.is_empty() {
-        steps.extend(gate_step(document, cards));
+        steps.extend(gate_step(results, cards));
     }
     steps
 }
 
 /// Returns the step that suggests a gate: today's value of the scheme that leaks least, plus two points.
-fn gate_step(document: &Document, cards: &[Card]) -> Option<String> {
-    let typed = tables::headline_threshold(document)?;
-    let card = cards.iter().min_by(|a, b| {
-        let key = |card: &Card| card.today().unwrap_or(f64::INFINITY);
-        key(a).total_cmp(&key(b))
-    })?;
-    let released = strongest(document, &card.scheme, Basis::Released);
-    let row = released.or_else(|| strongest(document, &card.scheme, Basis::Oracle))?;
+fn gate_step(results: &Results<'_>, cards: &[Card]) -> Option<String> {
+    let today = |card: &Card| card.today().map_or(f64::INFINITY, |today| today.recovered);
+    let card = cards.iter().min_by(|a, b| today(a).total_cmp(&today(b)))?;
+    let (scheme, typed) = (&card.scheme, results.headline);
+    let released = results.strongest(scheme, Basis::Released);
+    let row = released.or_else(|| results.strongest(scheme, Basis::Oracle))?;
     let attack = match row.neighbors.as_str() {
         "oracle" => format!("@{}", row.inlier_ratio),
         source => format!(":{source}"),
     };
     // A gate on an inlier ratio covers the baselines, too.
-    let today = card.finding(Basis::Released).filter(|_| released.is_none());
-    let today = today.map_or(0.0, Finding::highest);
-    let own = row.recovered(&typed).map_or(share(row, &typed), |own| own.interval[1]);
+    let today = card.today().filter(|_| released.is_none());
+    let today = today.map_or(0.0, |today| today.interval.map_or(today.recovered, |of| of[1]));
+    let own = row.recovered(typed).map_or(results.share(row), |own| own.interval[1]);
     let limit = (own.max(today) + 2.0).ceil().min(100.0);
-    let scheme = &card.scheme;
     Some(format!(
         "Test it in your build: `--gate '{scheme}{attack}:{typed}<={limit}'` fails if two points more come back \
          than today."
     ))
 }
 
-fn has_pictures(row: &Row) -> bool {
-    row.metrics.contains_key("ssim")
-}
-
-/// Returns which scheme leaks least. Schemes that publish bearings do not count: what they show is not the points that came back.
-fn least(document: &Document, cards: &[Card]) -> Option<String> {
-    let hides = |card: &&Card| bearings_sentence(document, &card.scheme).is_none();
-    let cards: Vec<&Card> = cards.iter().filter(hides).collect();
-    let finding =
-        |card: &Card| card.finding(Basis::Released).or(card.finding(Basis::Oracle)).cloned();
+/// Returns which scheme leaks least.
+fn least(results: &Results<'_>, cards: &[Card]) -> Option<String> {
+    let cards: Vec<&Card> = hidden(results, cards).collect();
+    let finding = |card: &'_ Card| card.today().or(card.finding(Basis::Oracle)).cloned();
     let share = |card: &Card| finding(card).map(|finding| finding.recovered);
-    let known = cards.iter().filter(|card| card.today().is_some()).count();
-    let comparable = cards.iter().filter(|card| known == 0 || card.today().is_some());
+    let is_known = cards.iter().any(|card| card.today().is_some());
+    let comparable = cards.iter().filter(|card| !is_known || card.today().is_some());
     let card = comparable.copied().reduce(|a, b| if share(b) < share(a) { b } else { a })?;
     // The banner says what the least leak means where it is too much, or not decided.
     let is_little = finding(card).is_some_and(|finding| finding.level == Level::Gray);
-    if cards.len() < 2 || !is_little || !uses_descriptors(document, Some(&card.scheme)) {
+    if cards.len() < 2 || !is_little || !uses_descriptors(results, Some(&card.scheme)) {
         return None;
     }
-    let shares: Vec<String> = [Basis::Released, Basis::Oracle]
-        .iter()
-        .filter_map(|&basis| card.finding(basis))
-        .map(|found| match found.basis {
-            Basis::Released => format!("{} today", found.said()),
-            _ => format!("{} {}", found.said(), found.when.to_lowercase()),
-        })
-        .collect();
-    let name = words::scheme_name(&card.scheme);
-    let cost =
-        document.localization.iter().find(|one| one.scheme == card.scheme && !one.of_queries);
-    let cost = cost.filter(|one| !one.is_unknown()).map(|one| match one.cost() {
+    let today = card.today().map(|today| format!("{} today", today.in_words()));
+    let known = card.finding(Basis::Oracle);
+    let known = known.map(|of| format!("{} {}", of.in_words(), of.when.to_lowercase()));
+    let shares: Vec<String> = today.into_iter().chain(known).collect();
+    let costs = results.document.localization.iter();
+    let cost = costs.into_iter().find(|of| of.scheme == card.scheme && !of.of_queries);
+    let cost = cost.filter(|cost| !cost.is_unknown()).map(|cost| match cost.cost() {
         Some(cost) => {
             let times = words::significant(cost, 3);
             format!(" Its localization error is {times} times the unprotected one.")
         }
         None => " Most cameras cannot be placed with it.".to_owned(),
     });
-    let cost = cost.unwrap_or_default();
+    let (name, cost) = (card.name(), cost.unwrap_or_default());
     Some(format!("Of the schemes tried, {name} leaks least: {}.{cost}", shares.join(", ")))
 }
 
 /// Returns what a scheme that publishes bearings shows; `None` for others. Recovered points say nothing about it: all bearings
 /// meet in the center, so no attack finds ranges, but directions are released as they are.
-pub(crate) fn bearings_sentence(document: &Document, scheme: &str) -> Option<String> {
-    let rows = document.results.iter().filter(|row| row.scheme == scheme);
-    let of = |name: &str| {
-        let values = rows.clone().filter_map(|row| row.metrics.get(name).copied());
-        values.max_by(f64::total_cmp)
-    };
+fn bearings_sentence(results: &Results<'_>, scheme: &str) -> Option<String> {
+    let of = |name: &str| results.max(scheme, |row| row.metrics.get(name).copied());
     let real = words::percent(of("real_bearings_percent")?);
     let name = words::scheme_name(scheme);
     let text = format!(
@@ -692,6 +575,55 @@ pub(crate) fn bearings_sentence(document: &Document, scheme: &str) -> Option<Str
         }
         None => format!("{text}."),
     })
+}
+
+/// Returns one sentence per scheme: what came back after each number of queries, from released data alone. Where lists of
+/// neighbors are used, too, the larger share counts.
+pub(crate) fn sequence_sentences(results: &Results<'_>) -> Vec<String> {
+    let sentence = |scheme: &&str| {
+        let mut largest: Vec<(usize, f64)> = Vec::new();
+        for row in results.of_scheme(scheme).filter(|row| attack::basis(row) != Basis::Oracle) {
+            let Some(&share) = row.recovered_percent.get(results.headline) else { continue };
+            match largest.iter_mut().find(|(k, _)| *k == row.k) {
+                Some((_, known)) => *known = share.max(*known),
+                None => largest.push((row.k, share)),
+            }
+        }
+        let after =
+            |(k, share): &(usize, f64)| format!("after {k} queries {} %", words::percent(*share));
+        let shares: Vec<String> = largest.iter().map(after).collect();
+        format!(
+            "{} of the keypoints came back within {} px ({}).",
+            words::capital(&words::list(&shares)),
+            results.headline,
+            words::scheme_name(scheme)
+        )
+    };
+    results.schemes.iter().map(sentence).collect()
+}
+
+/// Returns one sentence per scheme: what came back from two releases, by the stronger links.
+pub(crate) fn again_sentences(results: &Results<'_>) -> Vec<String> {
+    let sentence = |scheme: &&str| {
+        let mut rows = results.of_scheme(scheme);
+        let row = results.largest(rows.clone())?;
+        let mut text = format!(
+            "From two releases under {}, {} % of the points came back {}.",
+            words::scheme_name(scheme),
+            words::percent(results.share(row)),
+            words::within(results.headline, row.unit)
+        );
+        let described = rows.find(|row| row.neighbors == attack::AGAIN).unwrap_or(row);
+        let open = described.metrics.get("open_percent").copied().unwrap_or(0.0);
+        if open >= 0.05 {
+            text.push_str(&format!(
+                " Of {} %, both records are known, but leave a line or more.",
+                words::percent(open)
+            ));
+        }
+        Some(text)
+    };
+    results.schemes.iter().filter_map(sentence).collect()
 }
 
 #[cfg(test)]

@@ -2,8 +2,8 @@
 
 use unlift_report::compare::compare;
 use unlift_report::document::{Document, GateResult, HeldOut, Localization, Row};
-use unlift_report::inversions::{Inversion, InvertedView, Likeness, Painted};
-use unlift_report::{Given, RenderOptions, gate_lines, junit, render, text_table};
+use unlift_report::inversions::{Inversion, Painted};
+use unlift_report::{Attack, ByAttack, RenderOptions, gate_lines, junit, render, text_table};
 
 use crate::sample;
 
@@ -153,17 +153,15 @@ fn painted_document() -> Document {
 }
 
 fn inversion(document: &Document, ssim: impl Fn(&Row) -> f64) -> Inversion {
-    let view = |row: &Row| InvertedView {
-        scheme: row.scheme.clone(),
-        given: Given::of(row),
-        solver: row.solver.clone(),
-        painted: Painted { jpeg: vec![1], likeness: Likeness { ssim: ssim(row), lpips: 0.3 } },
+    let view = |row: &Row| ByAttack {
+        attack: Attack::of(row),
+        recovered: Painted { jpeg: vec![1], ssim: ssim(row), lpips: 0.3 },
     };
     let picture = sample::picture();
     Inversion {
         name: picture.name,
         size: picture.size,
-        baseline: Painted { likeness: Likeness { ssim: 0.5, lpips: 0.2 }, ..Painted::default() },
+        baseline: Painted { ssim: 0.5, lpips: 0.2, ..Painted::default() },
         released: picture.released,
         views: document.results.iter().map(view).collect(),
         ..Inversion::default()

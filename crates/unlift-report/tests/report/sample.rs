@@ -2,10 +2,10 @@
 
 use indexmap::IndexMap;
 use unlift::Unit;
-use unlift_report::Given;
 use unlift_report::document::*;
-use unlift_report::pictures::{Graph, Marks, Picture, RecoveredView, ReleasedView};
-use unlift_report::scene::{ObfuscationView, Scene3d, Shapes, View};
+use unlift_report::pictures::{Graph, Marks, Picture, ReleasedView};
+use unlift_report::scene::{ObfuscationView, Scene3d, Shapes};
+use unlift_report::{Attack, ByAttack, Given};
 
 pub const SCHEMES: [&str; 7] = ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp"];
 const RATIOS: [f64; 6] = [1.0, 0.75, 0.5, 0.3, 0.2, 0.1];
@@ -187,12 +187,7 @@ pub fn scene(document: &Document, n: usize) -> Scene3d {
             let size = if near { 0.02 } else { 1.0 };
             [0, 1, 2].map(|c| p[c] + size * (random(9 * i + c + r) - 0.5))
         });
-        View {
-            scheme: row.scheme.clone(),
-            given: Given::of(row),
-            solver: row.solver.clone(),
-            recovered: recovered.collect(),
-        }
+        ByAttack { attack: Attack::of(row), recovered: recovered.collect() }
     });
     let cameras = (0..40).map(|i| [3.0 + (0.157 * i as f32).cos(), 2.2, 1.5]).collect();
     let (n_points, views) = (document.input.n_points, views.collect());
@@ -242,10 +237,8 @@ pub fn picture() -> Picture {
     let place = |i: usize| [0, 1].map(|c| random(2 * i + c) * [640.0, 480.0][c]);
     let keypoints: Vec<[f32; 2]> = (0..300).map(place).collect();
     let given = Given { neighbors: "oracle".into(), oracle_noise: None, inlier_ratio: 0.5 };
-    let views = ["lines2d", "cp2d"].map(|scheme| RecoveredView {
-        scheme: scheme.into(),
-        given: given.clone(),
-        solver: "joint".into(),
+    let views = ["lines2d", "cp2d"].map(|scheme| ByAttack {
+        attack: Attack { scheme: scheme.into(), given: given.clone(), solver: "joint".into() },
         recovered: keypoints.iter().map(|p| Some(p.map(|x| x + 4.0))).collect(),
     });
     let lines = keypoints.iter().map(|p| Some([[p[0], 0.0], [p[0], 479.0]])).collect();

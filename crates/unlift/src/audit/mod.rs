@@ -29,4 +29,4 @@ pub use row::{
     Spread, measure,
 };
 pub use run::{Outcome, run, run_released, scheme_called};
-pub use share::{Estimate, Interval, Share, Shares};
+pub use share::{Interval, Share, Shares, WithInterval};

@@ -6,7 +6,9 @@ use indexmap::IndexMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::plan::Threshold;
-use super::share::{Estimate, Interval, Share, Shares, intervals, over_repeats, percents, shares};
+use super::share::{
+    Interval, Share, Shares, WithInterval, intervals, over_repeats, percents, shares,
+};
 use crate::evaluate::{Accuracy, Bin, Reliability, evaluate, reliability};
 use crate::recover::Recovered;
 use crate::truth::{DropReason, Original, Secret};
@@ -221,18 +223,18 @@ impl Row {
     }
 
     /// Returns the recovered percentage within `threshold` with its interval.
-    pub fn recovered(&self, threshold: &str) -> Option<Estimate> {
+    pub fn recovered(&self, threshold: &str) -> Option<WithInterval> {
         let interval = self.interval.as_ref()?.recovered_percent.get(threshold)?;
-        Some(Estimate { percent: *self.recovered_percent.get(threshold)?, interval: *interval })
+        Some(WithInterval { percent: *self.recovered_percent.get(threshold)?, interval: *interval })
     }
 
     /// Returns the [baseline](Self::baseline_percent) within `threshold` with its interval.
-    pub fn baseline(&self, threshold: &str) -> Option<Estimate> {
+    pub fn baseline(&self, threshold: &str) -> Option<WithInterval> {
         let of = self.interval.as_ref()?;
         let both = [of.blind_percent.get(threshold), of.records_alone_percent.get(threshold)];
         let interval =
             both.into_iter().flatten().copied().reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])])?;
-        Some(Estimate { percent: self.baseline_percent(threshold)?, interval })
+        Some(WithInterval { percent: self.baseline_percent(threshold)?, interval })
     }
 
     /// Returns true if both have the same scheme, source, noise model, requested inlier ratio and

@@ -10,14 +10,14 @@ pub type Interval = [f64; 2];
 
 /// A percentage with its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
+pub struct WithInterval {
     /// The percentage.
     pub percent: f64,
     /// Its interval.
     pub interval: Interval,
 }
 
-impl Estimate {
+impl WithInterval {
     /// Returns the upper end of the interval of what `self` exceeds `other` by (Newcombe's method).
     /// Errors are taken as independent, which is never too small for points that both recover.
     pub fn highest_gain(&self, other: &Self) -> f64 {
@@ -233,7 +233,8 @@ mod tests {
         three.merge(&Share::of(0.0, 0.0));
         assert_eq!(two, three, "an image without points");
         let [a, b] = [Share::of(60.0, 100.0), Share::of(40.0, 100.0)];
-        let of = |share: Share| Estimate { percent: share.percent(), interval: share.interval() };
+        let of =
+            |share: Share| WithInterval { percent: share.percent(), interval: share.interval() };
         // Newcombe's interval of this difference ends at 32.8 points for independent samples.
         assert!((of(a).highest_gain(&of(b)) - 32.8).abs() < 0.1);
     }

@@ -1,0 +1,404 @@
+//! The comparison of two audits: what leaks more, what leaks less, and what only one of them has.
+
+use minijinja::value::Serde;
+use serde::Serialize;
+use serde_json::json;
+
+use crate::attack::{self, Attack};
+use crate::document::{Document, Localization, Row};
+use crate::page::environment;
+use crate::results::Results;
+use crate::{Error, words};
+
+/// The old and the new figure of one attack, scheme and threshold.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Change {
+    /// The scheme's user-facing name.
+    pub scheme: String,
+    /// The attack: `oracle, 50 % true neighbors, K = 50, joint`, `blind guess` or `records alone`.
+    pub attack: String,
+    /// The threshold as typed in the new audit.
+    pub threshold: String,
+    /// Percent that came back in the old audit.
+    pub old_percent: f64,
+    /// Percent that comes back in the new one.
+    pub new_percent: f64,
+    /// The difference (new minus old) in percentage points.
+    pub points: f64,
+}
+
+/// A row that only one audit has.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Unmatched {
+    /// The scheme's user-facing name.
+    pub scheme: String,
+    /// The attack, as [`Change::attack`].
+    pub attack: String,
+}
+
+/// A scheme or source of the old audit without figures in the new one, so it may leak more.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Lost {
+    /// The scheme's user-facing name.
+    pub scheme: String,
+    /// The source of neighborhoods; `None` if the whole scheme is lost.
+    pub neighbors: Option<String>,
+    /// The reason.
+    pub reason: String,
+}
+
+/// A scheme under which cameras are placed less precisely than before.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CostsMore {
+    /// The scheme's user-facing name.
+    pub scheme: String,
+    /// The localization error in the old audit, as a multiple of the unprotected one.
+    pub old_multiple: f64,
+    /// The error in the new audit; `None` if it is not known or cameras do not localize.
+    pub new_multiple: Option<f64>,
+}
+
+/// The comparison of two audits.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Largest difference, in percentage points, at which a figure counts as the same.
+    pub tolerance_points: f64,
+    /// The origin of the tolerance: `twice the spread of repeats` or `usual without repeats`.
+    pub tolerance_is: &'static str,
+    /// Whether nothing leaks more, nothing is lost, and both audits are of the same inputs.
+    pub passed: bool,
+    /// Inputs that differ, so that a smaller figure may say nothing.
+    pub different: Vec<String>,
+    /// Figures that leak more, the largest difference first.
+    pub more: Vec<Change>,
+    /// Figures that leak less, the largest difference first.
+    pub less: Vec<Change>,
+    /// Figures that are the same up to the tolerance, in the order of the new audit.
+    pub same: Vec<Change>,
+    /// Schemes whose localization error has grown by more than a tenth. Held-out images are compared
+    /// with held-out images, bounds with bounds.
+    pub costs_more: Vec<CostsMore>,
+    /// Schemes and sources that cannot be compared any more.
+    pub lost: Vec<Lost>,
+    /// Rows of the old audit only.
+    pub only_old: Vec<Unmatched>,
+    /// Rows of the new audit only.
+    pub only_new: Vec<Unmatched>,
+}
+
+/// The reason why two audits cannot be compared.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Incomparable {
+    /// `unit`, `thresholds` or `results`.
+    pub place: &'static str,
+    /// The value of the old audit.
+    pub expected: String,
+    /// The value of the new audit.
+    pub found: String,
+}
+
+/// Usual largest difference between seeds of one audit, in percentage points.
+const USUAL_TOLERANCE: f64 = 2.0;
+/// Growth of a localization error that counts as the same; random directions change it by some
+/// percent.
+const GROWTH: f64 = 1.1;
+const RECORDS_ALONE: &str = "records alone";
+
+/// Compares the figures of two audits. Rows match by scheme, source, noise, requested inlier ratio (a measured one is a result),
+/// K and solver. Baselines are compared per scheme.
+///
+/// The tolerance is twice the largest standard deviation over repeats in both audits, or 2 points without repeats.
+///
+/// # Errors
+/// Fails if units or thresholds differ, or if no row matches.
+pub fn compare(old: &Document, new: &Document) -> Result<Comparison, Incomparable> {
+    let [was, is] = &[old, new].map(Results::of);
+    let within = common_thresholds(was, is)?;
+    let mut changes = Vec::new();
+    let mut only_new = Vec::new();
+    let mut taken = vec![false; was.rows.len()];
+    for row in is.rows {
+        let attack = Attack::of(row);
+        let is_like = |at: &usize| {
+            let other = &was.rows[*at];
+            !taken[*at] && attack.is_of(other) && other.k == row.k
+        };
+        let Some(at) = (0..was.rows.len()).find(is_like) else {
+            only_new.push(unmatched(row));
+            continue;
+        };
+        taken[at] = true;
+        let shares = |row: &Row, typed: &str| row.recovered_percent.get(typed).copied();
+        changes.extend(within.iter().filter_map(|[before, after]| {
+            let (before, percent) = (shares(&was.rows[at], before)?, shares(row, after)?);
+            Some(change(&row.scheme, attack_of(row), after, before, percent))
+        }));
+    }
+    if changes.is_empty() {
+        return Err(Incomparable {
+            place: "results",
+            expected: "an attack of the same scheme, source, ratio, k and solver".to_owned(),
+            found: format!("none among {}", is.rows.len()),
+        });
+    }
+    type Figure = fn(&Row, &str) -> Option<f64>;
+    let baselines: [(&str, Figure); 2] = [
+        ("blind guess", |row, typed| row.blind_percent.get(typed).copied()),
+        (RECORDS_ALONE, |row, typed| row.records_alone_percent.as_ref()?.get(typed).copied()),
+    ];
+    for scheme in &is.schemes {
+        for (name, figure) in baselines {
+            changes.extend(within.iter().filter_map(|[before, after]| {
+                let before = was.max(scheme, |row| figure(row, before))?;
+                let percent = is.max(scheme, |row| figure(row, after))?;
+                Some(change(scheme, name.to_owned(), after, before, percent))
+            }));
+        }
+    }
+    let missing = was.rows.iter().zip(&taken).filter(|(_, taken)| !**taken);
+    let mut only_old: Vec<Unmatched> = missing.map(|(row, _)| unmatched(row)).collect();
+    for scheme in &is.schemes {
+        let has_alone =
+            |of: &Results<'_>| of.of_scheme(scheme).any(|row| row.records_alone_percent.is_some());
+        let (scheme, attack) = ((*scheme).to_owned(), RECORDS_ALONE.to_owned());
+        match (has_alone(was), has_alone(is)) {
+            (true, false) => only_old.push(Unmatched { scheme, attack }),
+            (false, true) if was.schemes.contains(&scheme.as_str()) => {
+                only_new.push(Unmatched { scheme, attack });
+            }
+            _ => {}
+        }
+    }
+    let lost = lost(was, is, &taken);
+    // The largest standard deviation of a share over repeats.
+    let deviations = was.rows.iter().chain(is.rows).filter_map(|row| row.std.as_ref());
+    let deviations =
+        deviations.flat_map(|std| std.recovered_percent.values().chain(std.blind_percent.values()));
+    let (tolerance_points, tolerance_is) = match deviations.copied().reduce(f64::max) {
+        Some(spread) => ((200.0 * spread).ceil() / 100.0, "twice the spread of repeats"),
+        None => (USUAL_TOLERANCE, "usual without repeats"),
+    };
+    // Rounding errors in the last bit must not fail a build.
+    let beyond = tolerance_points + 1e-9;
+    let (mut more, rest): (Vec<_>, Vec<_>) =
+        changes.into_iter().partition(|change| change.points > beyond);
+    let (mut less, same): (Vec<_>, Vec<_>) =
+        rest.into_iter().partition(|change| change.points < -beyond);
+    more.sort_by(|a, b| b.points.total_cmp(&a.points));
+    less.sort_by(|a, b| a.points.total_cmp(&b.points));
+    let costs_more = costs_more(old, new);
+    let different = different(old, new);
+    let is_like = different.is_empty() && only_old.is_empty() && lost.is_empty();
+    let passed = is_like && more.is_empty() && costs_more.is_empty();
+    Ok(Comparison {
+        tolerance_points,
+        tolerance_is,
+        passed,
+        different,
+        more,
+        less,
+        same,
+        costs_more,
+        lost,
+        only_old,
+        only_new,
+    })
+}
+
+/// Returns the inputs that differ. Share-safe audits have no hashes.
+fn different(old: &Document, new: &Document) -> Vec<String> {
+    let (a, b) = (&old.input, &new.input);
+    let mut different = Vec::new();
+    let mut expect = |what: &str, was: &str, is: &str| {
+        if was != is {
+            different.push(format!("{what}: {was} in the old audit, {is} in the new one"));
+        }
+    };
+    let scale = |scale: Option<f64>| scale.map_or("none".to_owned(), |scale| scale.to_string());
+    expect("points", &a.n_points.to_string(), &b.n_points.to_string());
+    expect("scale", &scale(a.scale_m_per_unit), &scale(b.scale_m_per_unit));
+    if let (Some(was), Some(is)) = (a.size(), b.size()) {
+        expect("size", &was, &is);
+    }
+    for (role, was) in &a.other_sha256 {
+        let is = b.other_sha256.get(role).unwrap_or(was);
+        expect(&format!("hash of the file of {role}"), was, is);
+    }
+    // A scheme may release one truth in any number of files.
+    let has_truth = [a, b].iter().all(|input| input.other_sha256.contains_key("truth"));
+    if let (Some(was), Some(is), false) = (&a.sha256, &b.sha256, has_truth) {
+        expect("hash of the map or images", was, is);
+    }
+    different
+}
+
+/// Returns the schemes of the old audit that localize less precisely in the new one, or whose
+/// error is no longer known.
+fn costs_more(old: &Document, new: &Document) -> Vec<CostsMore> {
+    let mut all = old.localization.iter().chain(&new.localization);
+    let is_measured = all.all(|of| of.measured().is_some());
+    let multiple = |of: &Localization| match of.measured() {
+        Some(held_out) if is_measured => held_out.multiple,
+        _ => of.multiple.filter(|_| !of.changes_descriptors),
+    };
+    let worse = |was: &Localization| {
+        let is = new.localization.iter().find(|is| is.scheme == was.scheme);
+        let (old_multiple, new_multiple) = (multiple(was)?, is.and_then(multiple));
+        let is_worse = new_multiple.is_none_or(|new| new > GROWTH * old_multiple);
+        is_worse.then(|| CostsMore { scheme: was.scheme.clone(), old_multiple, new_multiple })
+    };
+    old.localization.iter().filter_map(worse).collect()
+}
+
+/// Returns the thresholds of both audits, as typed in the old and in the new one.
+fn common_thresholds<'a>(
+    old: &Results<'a>,
+    new: &Results<'a>,
+) -> Result<Vec<[&'a str; 2]>, Incomparable> {
+    let [was, is] = [old, new].map(|of| of.unit.name());
+    if was != is && !old.rows.is_empty() && !new.rows.is_empty() {
+        return Err(Incomparable { place: "unit", expected: was.into(), found: is.into() });
+    }
+    let equal = |a: &str, b: &str| match (a.parse::<f64>(), b.parse::<f64>()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => a == b,
+    };
+    let (was, is) = (&old.thresholds, &new.thresholds);
+    let like = |a: &&'a str| Some([*a, *is.iter().find(|b| equal(a, b))?]);
+    let pairs: Vec<[&str; 2]> = was.iter().filter_map(like).collect();
+    if pairs.len() != was.len() || pairs.len() != is.len() {
+        let listed = |typed: &[&str]| match typed {
+            [] => "none".to_owned(),
+            typed => typed.join(", "),
+        };
+        let (expected, found) = (listed(was), listed(is));
+        return Err(Incomparable { place: "thresholds", expected, found });
+    }
+    Ok(pairs)
+}
+
+/// Returns the name of a row's attack, without a measured ratio, which differs even between equal audits.
+fn attack_of(row: &Row) -> String {
+    let source = attack::source(&row.neighbors, row.oracle_noise.as_deref());
+    let right = match attack::is_oracle(&row.neighbors) {
+        true => format!(", {} % true neighbors", words::ratio_percent(row.inlier_ratio)),
+        false => String::new(),
+    };
+    format!("{source}{right}, K = {}, {}", row.k, row.solver)
+}
+
+fn unmatched(row: &Row) -> Unmatched {
+    Unmatched { scheme: row.scheme.clone(), attack: attack_of(row) }
+}
+
+fn change(scheme: &str, attack: String, typed: &str, was: f64, is: f64) -> Change {
+    Change {
+        scheme: scheme.to_owned(),
+        attack,
+        threshold: typed.to_owned(),
+        old_percent: was,
+        new_percent: is,
+        points: is - was,
+    }
+}
+
+/// Returns the schemes of the old audit without a matching row in the new one, and the sources that are no longer audited.
+fn lost(old: &Results<'_>, new: &Results<'_>, taken: &[bool]) -> Vec<Lost> {
+    let mut lost: Vec<Lost> = Vec::new();
+    for Row { scheme, neighbors, .. } in old.rows {
+        let refused = |by: Option<&String>| {
+            let mut refused = new.document.not_audited.iter();
+            refused.find(|of| of.scheme == *scheme && of.neighbors.as_ref() == by)
+        };
+        let mut rows = old.rows.iter().zip(taken).filter(|(row, _)| row.scheme == *scheme);
+        let (neighbors, reason) = if rows.all(|(_, taken)| !taken) {
+            let reason = match refused(None) {
+                Some(refused) => format!("not audited: {}", refused.reason),
+                None if new.schemes.contains(&scheme.as_str()) => {
+                    "no attack of the old audit is in the new one".to_owned()
+                }
+                None => "no row in the new audit".to_owned(),
+            };
+            (None, reason)
+        } else if let Some(refused) = refused(Some(neighbors)) {
+            (Some(neighbors.clone()), format!("not audited: {}", refused.reason))
+        } else {
+            continue;
+        };
+        let entry = Lost { scheme: scheme.clone(), neighbors, reason };
+        if !lost.contains(&entry) {
+            lost.push(entry);
+        }
+    }
+    lost
+}
+
+impl Comparison {
+    /// Returns the comparison in one line.
+    pub fn summary(&self) -> String {
+        let [more, less, same] = [&self.more, &self.less, &self.same].map(Vec::len);
+        let (points, is) = (self.tolerance_points, self.tolerance_is);
+        let point = if points == 1.0 { "point" } else { "points" };
+        let is_like = self.different.is_empty() && self.only_old.is_empty();
+        let not = if is_like { "" } else { "not compared: " };
+        let mut text = format!(
+            "{not}{} figures compared, tolerance {points} {point} ({is}): {more} leak more, {less} less, {same} as before",
+            more + less + same
+        );
+        for (n, what) in [
+            (self.costs_more.len(), "localize less precisely"),
+            (self.lost.len(), "cannot be compared any more"),
+        ] {
+            if n > 0 {
+                text.push_str(&format!("; {n} {what}"));
+            }
+        }
+        text
+    }
+}
+
+/// Draws `comparison` of `old` and `new` as one self-contained HTML page.
+pub fn page(comparison: &Comparison, old: &Document, new: &Document) -> Result<String, Error> {
+    let audits = [("old", old), ("new", new)].map(|(which, document)| {
+        json!({
+            "which": which,
+            "path": document.input.path,
+            "sha256": document.input.sha256,
+            "n_points": words::thousands(document.input.n_points),
+            "seed": document.seed,
+            "unlift": document.unlift,
+        })
+    });
+    let results = Results::of(new);
+    let cells = |change: &Change| {
+        [
+            change.scheme.clone(),
+            change.attack.clone(),
+            results.threshold(&change.threshold),
+            words::percent(change.old_percent),
+            words::percent(change.new_percent),
+            format!("{:+.1}", change.points),
+        ]
+    };
+    let tables = [
+        ("more", "Leaks more", &comparison.more),
+        ("less", "Leaks less", &comparison.less),
+        ("same", "As before", &comparison.same),
+    ];
+    let tables = tables.into_iter().filter(|(.., changes)| !changes.is_empty());
+    let tables = tables.map(|(id, title, changes)| {
+        let rows: Vec<[String; 6]> = changes.iter().map(cells).collect();
+        json!({ "id": id, "title": title, "rows": rows })
+    });
+    let page = json!({
+        "style": include_str!("../template/style.css"),
+        "comparison": comparison,
+        "summary": comparison.summary(),
+        "share_safe": old.input.path.is_none() && new.input.path.is_none(),
+        "audits": audits,
+        "tables": tables.collect::<Vec<_>>(),
+    });
+    let mut env = environment();
+    env.add_template("compare.html", include_str!("../template/compare.html"))?;
+    Ok(env.get_template("compare.html")?.render(Serde(&page))?)
+}

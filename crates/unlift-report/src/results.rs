@@ -1,0 +1,161 @@
+//! The rows of an audit, and the choices among them that all sections share.
+
+use std::collections::BTreeMap;
+
+use unlift::Unit;
+
+use crate::attack::{self, Basis, Given};
+use crate::document::{Document, Row};
+use crate::words;
+
+/// The oracle's headline is its tested inlier ratio nearest to this one.
+const HEADLINE_RATIO: f64 = 0.5;
+/// The headline threshold of images is the one nearest to this one.
+const HEADLINE_PX: f64 = 10.0;
+
+/// A document, and what all sections derive from it.
+pub(crate) struct Results<'a> {
+    pub document: &'a Document,
+    pub rows: &'a [Row],
+    /// All thresholds as typed.
+    pub thresholds: Vec<&'a str>,
+    /// The threshold of verdicts: the first; for images the one nearest to 10 px. Empty without rows.
+    pub headline: &'a str,
+    pub schemes: Vec<&'a str>,
+    pub unit: Unit,
+}
+
+impl<'a> Results<'a> {
+    pub(crate) fn of(document: &'a Document) -> Self {
+        let rows = &document.results[..];
+        let thresholds = rows.iter().flat_map(|row| row.recovered_percent.keys());
+        let thresholds = distinct(thresholds.map(String::as_str));
+        let unit = rows.first().map_or(Unit::Meter, |row| row.unit);
+        let away = |typed: &&&str| {
+            typed.parse::<f64>().map_or(f64::INFINITY, |value| (value / HEADLINE_PX).ln().abs())
+        };
+        let headline = match unit {
+            Unit::Pixel => thresholds.iter().min_by(|a, b| away(a).total_cmp(&away(b))),
+            Unit::Meter | Unit::KthNeighbor => thresholds.first(),
+        };
+        let headline = headline.copied().unwrap_or_default();
+        let schemes = distinct(rows.iter().map(|row| row.scheme.as_str()));
+        Self { document, rows, thresholds, headline, schemes, unit }
+    }
+
+    /// Returns whether the audit is of images.
+    pub(crate) fn is_of_images(&self) -> bool {
+        self.unit == Unit::Pixel
+    }
+
+    /// Returns whether the audit is of a sequence of queries.
+    pub(crate) fn is_sequence(&self) -> bool {
+        self.rows.iter().any(|row| attack::queries(&row.neighbors).is_some())
+    }
+
+    /// Returns whether the audit is of two releases.
+    pub(crate) fn is_again(&self) -> bool {
+        self.rows.iter().any(|row| attack::is_again(&row.neighbors))
+    }
+
+    /// Returns the schemes that could not be audited at all, and the reasons.
+    pub(crate) fn refused(&self) -> impl Iterator<Item = (&'a str, &'a str)> {
+        let refused = self.document.not_audited.iter().filter(|of| of.neighbors.is_none());
+        refused.map(|refused| (refused.scheme.as_str(), refused.reason.as_str()))
+    }
+
+    /// Returns "points" or "keypoints".
+    pub(crate) fn points(&self) -> &'static str {
+        words::points(self.unit)
+    }
+
+    /// Returns a threshold in short form: `10 cm`.
+    pub(crate) fn threshold(&self, typed: &str) -> String {
+        words::threshold(typed, self.unit)
+    }
+
+    pub(crate) fn of_scheme(&self, scheme: &str) -> impl Iterator<Item = &'a Row> + Clone {
+        self.rows.iter().filter(move |row| row.scheme == scheme)
+    }
+
+    /// Returns the percentage recovered within the headline threshold.
+    pub(crate) fn share(&self, row: &Row) -> f64 {
+        row.recovered_percent.get(self.headline).copied().unwrap_or(0.0)
+    }
+
+    /// Returns the row with the largest share; of equal ones the first.
+    pub(crate) fn largest<'r>(&self, rows: impl Iterator<Item = &'r Row>) -> Option<&'r Row> {
+        rows.reduce(|best, row| if self.share(row) > self.share(best) { row } else { best })
+    }
+
+    /// Returns the row of `scheme` with the largest share on this basis; for the oracle, among the rows whose
+    /// ratio is nearest to [`HEADLINE_RATIO`].
+    pub(crate) fn strongest(&self, scheme: &str, basis: Basis) -> Option<&'a Row> {
+        let away = |row: &Row| match basis {
+            Basis::Oracle => (row.inlier_ratio - HEADLINE_RATIO).abs(),
+            Basis::Released | Basis::Given => 0.0,
+        };
+        let rows = self.of_scheme(scheme).filter(|row| attack::basis(row) == basis);
+        rows.min_by(|a, b| {
+            away(a).total_cmp(&away(b)).then(self.share(b).total_cmp(&self.share(a)))
+        })
+    }
+
+    /// Returns the row that recovers most of `scheme` within `typed` from these neighborhoods; of equal ones the first.
+    pub(crate) fn strongest_given(
+        &self,
+        scheme: &str,
+        given: &Given,
+        typed: &str,
+    ) -> Option<&'a Row> {
+        let share = |row: &Row| row.recovered_percent.get(typed).copied().unwrap_or(-1.0);
+        let rivals = self.of_scheme(scheme).filter(|row| Given::of(row).same_choice(given));
+        rivals.reduce(|best, row| if share(row) > share(best) { row } else { best })
+    }
+
+    /// Returns the strongest row of every source of `scheme`: most recovered first, the oracle last.
+    pub(crate) fn by_source(&self, scheme: &str) -> Vec<&'a Row> {
+        let mut sources: BTreeMap<&str, &Row> = BTreeMap::new();
+        for row in self.of_scheme(scheme).filter(|row| attack::basis(row) != Basis::Oracle) {
+            let best = sources.entry(&row.neighbors).or_insert(row);
+            if self.share(row) > self.share(best) {
+                *best = row;
+            }
+        }
+        let mut rows: Vec<&Row> = sources.into_values().collect();
+        rows.sort_by(|a, b| self.share(b).total_cmp(&self.share(a)));
+        rows.extend(self.strongest(scheme, Basis::Oracle));
+        rows
+    }
+
+    /// Returns the percentage by the records alone within `typed`, the best of the scheme's rows, and the attack's
+    /// name.
+    pub(crate) fn records_alone(
+        &self,
+        scheme: &str,
+        typed: &str,
+    ) -> Option<(f64, Option<&'a str>)> {
+        let shares = self.of_scheme(scheme).filter_map(|row| {
+            let percent = *row.records_alone_percent.as_ref()?.get(typed)?;
+            let by = row.records_alone_by.as_ref().and_then(|by| by.get(typed));
+            Some((percent, by.map(String::as_str)))
+        });
+        shares.max_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// Returns the largest figure of a scheme's rows.
+    pub(crate) fn max(&self, scheme: &str, of: impl Fn(&Row) -> Option<f64>) -> Option<f64> {
+        self.of_scheme(scheme).filter_map(of).max_by(f64::total_cmp)
+    }
+}
+
+/// Returns `items` without repetitions, in their order.
+pub(crate) fn distinct<T: PartialEq>(items: impl IntoIterator<Item = T>) -> Vec<T> {
+    let mut kept = Vec::new();
+    for item in items {
+        if !kept.contains(&item) {
+            kept.push(item);
+        }
+    }
+    kept
+}
