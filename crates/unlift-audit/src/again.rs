@@ -12,24 +12,24 @@ use std::time::Instant;
 use serde_json::json;
 use unlift::Unit;
 use unlift::again::{Solved, by_descriptors, by_geometry};
-use unlift::audit::{NotAudited, Plan, Row, Seconds};
-use unlift::audit::{measure, records_alone};
+use unlift::audit::{NotAudited, Plan, Row, measure, records_alone};
 use unlift::evaluate::{blind, joined};
 use unlift::geometry::knn::Knn;
-use unlift::geometry::vector::distance;
+use unlift::geometry::vector::{along, cross, distance, dot, median, sub};
 use unlift::obfuscate::{Scheme, obfuscate};
 use unlift::released::Released;
-use unlift::seed::Key;
+use unlift::seed::{Draws, Key, Stage};
 use unlift::truth::{Original, Secret};
 use unlift_io::hash::hash_input;
 use unlift_report::document::Input;
 
 use crate::audit::{Attacked, Audit};
 use crate::document::ordered;
-use crate::doubts::sides_m;
+use crate::doubts::{short, sides_m};
 use crate::gate::Tried;
+use crate::localization::held_out::{Unit32, mutual};
 use crate::prepare::{Preparation, Prepared};
-use crate::{Error, Progress, check_stop, document, frames, maps};
+use crate::{Error, Progress, check_stop, document, maps};
 
 /// The solver of all rows.
 const SOLVER: &str = "intersection";
@@ -95,9 +95,6 @@ impl Maps {
     }
 
     /// Returns what a report says of the maps, whose first is at `path`.
-    ///
-    /// # Errors
-    /// If the files cannot be read again for their hash, or have changed.
     pub fn about(&self, path: &Path) -> Result<Input, Error> {
         let second = hash_input(&self.second().input)?;
         let other_sha256 = ordered([("second".to_owned(), second)]);
@@ -134,7 +131,7 @@ impl Again<'_> {
             ..Tried::by(&self.plan, described)
         };
         let frame = match &self.maps.second {
-            Some(second) => frames::doubt(first, second)?,
+            Some(second) => doubt_of_frames(first, second)?,
             None => None,
         };
         let doubts: Vec<String> = audit.doubts.iter().cloned().chain(frame).collect();
@@ -142,84 +139,81 @@ impl Again<'_> {
         let without = (!described).then(|| without.to_owned());
         let notes = doubts.iter().chain(&audit.notes).cloned().chain(without).collect::<Vec<_>>();
         audit.begin(&tried, Some(first.original.reveal()), &notes, progress)?;
-        let (rows, not_audited, seconds) = self.rows(sources, progress)?;
         let mut options = document::names(&tried, audit.options.clone());
         options.insert("records_alone".into(), json!(self.plan.records_alone));
         let extent_m = sides_m(first.original.reveal());
-        Ok(Attacked {
+        let mut attacked = Attacked {
             tried,
             about: Some(Input { extent_m, ..audit.about.clone() }),
             options,
             notes,
-            doubts: vec![doubts.first().cloned(); rows.len()],
-            rows,
-            not_audited,
-            seconds,
             ..Attacked::default()
-        })
-    }
-
-    /// Hides both maps under each pair of schemes and attacks them.
-    fn rows(&self, sources: &[&str], progress: &dyn Progress) -> Result<Rows, Error> {
-        let (first, second, plan) = (&self.maps.first, self.maps.second(), &self.plan);
-        let (mut rows, mut not_audited) = (Vec::new(), Vec::new());
-        let mut seconds = Seconds::default();
-        let (total, seed) = (self.pairs.len() * sources.len(), plan.seed);
+        };
         let knn = Knn::new(second.original.reveal().positions())?;
         for (at, pair) in self.pairs.iter().enumerate() {
-            let scheme = name(pair);
+            let (done, total) = (at * sources.len(), self.pairs.len() * sources.len());
             let show = |what: &str| {
-                progress.show(at * sources.len(), total, &format!("{scheme}, {what}"));
+                progress.show(done, total, &format!("{}, {what}", name(pair)));
                 check_stop(progress)
             };
-            show("two releases")?;
+            self.attack_pair(pair, sources, &knn, show, &mut attacked)?;
+        }
+        if attacked.rows.is_empty() {
+            let first = attacked.not_audited.first();
+            let reason = first.map_or("no schemes", |missing| missing.reason.as_str());
+            let error = format!("audit again: expected a row, found none: {reason}");
+            return Err(Error::request(error));
+        }
+        attacked.seconds.rows = vec![Default::default(); attacked.rows.len()];
+        attacked.doubts = vec![doubts.first().cloned(); attacked.rows.len()];
+        Ok(attacked)
+    }
+
+    /// Hides both maps under a pair of schemes and attacks them.
+    fn attack_pair(
+        &self,
+        pair: &[Arc<dyn Scheme<3>>; 2],
+        sources: &[&str],
+        knn: &Knn<'_, 3>,
+        show: impl Fn(&str) -> Result<(), Error>,
+        attacked: &mut Attacked,
+    ) -> Result<(), Error> {
+        let (first, second, plan) = (&self.maps.first, self.maps.second(), &self.plan);
+        let seconds = &mut attacked.seconds;
+        show("two releases")?;
+        let started = Instant::now();
+        let hide = |scheme: &dyn Scheme<3>, map: &Prepared, seed: u64| {
+            let key = Key::from_seed(seed);
+            obfuscate(scheme, &map.original, map.descriptors.as_ref(), &key)
+        };
+        let a = hide(&*pair[0], first, plan.seed)?;
+        let b = hide(&*pair[1], second, plan.seed.wrapping_add(1))?;
+        seconds.obfuscate += started.elapsed().as_secs_f64();
+        let mut alone = Vec::new();
+        if plan.records_alone {
+            show("records alone")?;
             let started = Instant::now();
-            let hide = |scheme: &dyn Scheme<3>, map: &Prepared, seed: u64| {
-                let key = Key::from_seed(seed);
-                obfuscate(scheme, &map.original, map.descriptors.as_ref(), &key)
-            };
-            let a = hide(&*pair[0], first, seed)?;
-            let b = hide(&*pair[1], second, seed.wrapping_add(1))?;
-            seconds.obfuscate += started.elapsed().as_secs_f64();
-            let alone = match plan.records_alone {
-                true => {
-                    show("records alone")?;
-                    let started = Instant::now();
-                    let alone = records_alone(&a, &first.original, plan, seed)?;
-                    seconds.records_alone += started.elapsed().as_secs_f64();
-                    alone
+            alone = records_alone(&a, &first.original, plan, plan.seed)?;
+            seconds.records_alone += started.elapsed().as_secs_f64();
+        }
+        for &source in sources {
+            show(source)?;
+            let started = Instant::now();
+            let by = if source == AGAIN { by_descriptors } else { by_geometry };
+            let solved = match by(&a.0, &b.0) {
+                Ok(solved) => solved,
+                Err(error) => {
+                    attacked.not_audited.push(NotAudited::new(&name(pair), Some(source), error));
+                    continue;
                 }
-                false => Vec::new(),
             };
-            for &source in sources {
-                show(source)?;
-                let started = Instant::now();
-                let by = if source == AGAIN { by_descriptors } else { by_geometry };
-                let solved = match by(&a.0, &b.0) {
-                    Ok(solved) => solved,
-                    Err(error) => {
-                        not_audited.push(NotAudited::new(&scheme, Some(source), error));
-                        continue;
-                    }
-                };
-                seconds.recover += started.elapsed().as_secs_f64();
-                let mut row =
-                    row(&solved, plan, (&first.original, &a), (&second.original, &b.1), &knn)?;
-                let (neighbors, solver) = (source.to_owned(), SOLVER.to_owned());
-                row.add_alone(alone.iter().cloned());
-                let (scheme, k) = (scheme.clone(), 2);
-                rows.push(Row { scheme, neighbors, solver, k, ..row });
-            }
+            seconds.recover += started.elapsed().as_secs_f64();
+            let mut row = row(&solved, plan, (&first.original, &a), (&second.original, &b.1), knn)?;
+            row.add_alone(alone.iter().cloned());
+            let (neighbors, solver) = (source.to_owned(), SOLVER.to_owned());
+            attacked.rows.push(Row { scheme: name(pair), neighbors, solver, k: 2, ..row });
         }
-        if rows.is_empty() {
-            let reason =
-                not_audited.first().map_or("no schemes", |missing| missing.reason.as_str());
-            return Err(Error::request(format!(
-                "audit again: expected a row, found none: {reason}"
-            )));
-        }
-        seconds.rows = vec![Default::default(); rows.len()];
-        Ok((rows, not_audited, seconds))
+        Ok(())
     }
 }
 
@@ -227,8 +221,6 @@ impl Again<'_> {
 fn name([a, b]: &[Arc<dyn Scheme<3>>; 2]) -> String {
     if a.name() == b.name() { a.name().to_owned() } else { format!("{}/{}", a.name(), b.name()) }
 }
-
-type Rows = (Vec<Row>, Vec<NotAudited>, Seconds);
 
 /// Measures what came back of the first map. A link is right if no point of the second map is nearer
 /// to the first one's.
@@ -267,4 +259,112 @@ fn row(
         ("open_percent".to_owned(), percent(solved.n_open, row.n_points)),
     ]);
     Ok(row)
+}
+
+/// Number of points of the first map that are compared.
+const SAMPLE: usize = 500;
+/// Places are equal within the median distance to this neighbor.
+const NEIGHBOR: usize = 10;
+/// Fewest matches that tell frames apart.
+const FEWEST: usize = 12;
+const TRIES: usize = 300;
+
+/// Returns a doubt if the maps are not in one frame, or do not show one place.
+fn doubt_of_frames(first: &Prepared, second: &Prepared) -> Result<Option<String>, Error> {
+    let (a, b) = (first.original.reveal().positions(), second.original.reveal().positions());
+    let rows: Vec<usize> = (0..a.len()).step_by(a.len().div_ceil(SAMPLE).max(1)).collect();
+    let knn = Knn::new(b)?;
+    let near = median(&mut knn.kth_distances(NEIGHBOR.min(b.len() - 1)));
+    let pairs: Vec<[[f64; 3]; 2]> = match (&first.descriptors, &second.descriptors) {
+        (Some(of_a), Some(of_b)) if of_a.dim() == of_b.dim() => {
+            let of_a = Unit32::of(of_a, rows.iter().copied());
+            let pairs = mutual(&of_a, &Unit32::of(of_b, 0..b.len()));
+            pairs.into_iter().map(|(i, j)| [a[rows[i]], b[j]]).collect()
+        }
+        _ => Vec::new(),
+    };
+    if pairs.len() < FEWEST {
+        let mut nearest = Vec::new();
+        let mut is_near = |row: &&usize| {
+            knn.nearest_to(a[**row], 1, &mut nearest);
+            nearest.first().is_some_and(|neighbor| neighbor.0.sqrt() <= near)
+        };
+        let n = rows.iter().filter(&mut is_near).count();
+        let message = format!(
+            "second map: near {n} of {} points of the first one: in another frame?",
+            rows.len()
+        );
+        return Ok((3 * n < rows.len()).then_some(message));
+    }
+    let fits =
+        |map: &Similar| pairs.iter().filter(|[p, q]| distance(&map.of(p), q) <= near).count();
+    let (same, mut draws) = (fits(&Similar::SAME), Draws::new(0, Stage::Subset, 0));
+    let mut best = (same, Similar::SAME);
+    for _ in 0..TRIES {
+        let three = [(); 3].map(|()| pairs[draws.below(pairs.len() as u64) as usize]);
+        let Some(map) = Similar::through(&three) else { continue };
+        let n = fits(&map);
+        if n > best.0 {
+            best = (n, map);
+        }
+    }
+    let (n, map) = best;
+    let of = pairs.len();
+    Ok(if n >= FEWEST && n > 2 * same {
+        Some(format!(
+            "second map: {same} of {of} points with similar descriptors are at one place, {n} after a turn of the first map by \
+             {:.1} degrees, a scale of {} and a shift of {}: both must be in one frame and scale",
+            map.angle(),
+            short(map.scale),
+            short(dot(&map.shift, &map.shift).sqrt()),
+        ))
+    } else if 10 * same < of {
+        Some(format!(
+            "second map: {same} of {of} points with similar descriptors are at one place: is it of the same place?"
+        ))
+    } else {
+        None
+    })
+}
+
+/// A similarity transform.
+struct Similar {
+    scale: f64,
+    rotation: [[f64; 3]; 3],
+    shift: [f64; 3],
+}
+
+impl Similar {
+    const SAME: Self = Self {
+        scale: 1.0,
+        rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        shift: [0.0; 3],
+    };
+
+    /// Returns the transform that maps a triangle to another one, up to its shape; `None` if one is flat.
+    fn through(pairs: &[[[f64; 3]; 2]; 3]) -> Option<Self> {
+        let [(length_a, a), (length_b, b)] = [0, 1].map(|side| {
+            let [p, q, r] = [0, 1, 2].map(|at| pairs[at][side]);
+            let (u, v) = (sub(&q, &p), sub(&r, &p));
+            let n = cross(&u, &v);
+            let unit = |x: [f64; 3]| x.map(|value| value / dot(&x, &x).sqrt());
+            (dot(&u, &u).sqrt() + dot(&v, &v).sqrt(), [unit(u), unit(n), cross(&unit(n), &unit(u))])
+        });
+        let rotation =
+            [0, 1, 2].map(|r| [0, 1, 2].map(|c| (0..3).map(|k| b[k][r] * a[k][c]).sum()));
+        let turned = Self { scale: length_b / length_a, rotation, shift: [0.0; 3] };
+        let shift = sub(&pairs[0][1], &turned.of(&pairs[0][0]));
+        let is_finite =
+            turned.scale.is_finite() && rotation.as_flattened().iter().all(|x: &f64| x.is_finite());
+        is_finite.then_some(Self { shift, ..turned })
+    }
+
+    fn of(&self, p: &[f64; 3]) -> [f64; 3] {
+        along(&self.shift, self.scale, &self.rotation.map(|row| dot(&row, p)))
+    }
+
+    fn angle(&self) -> f64 {
+        let trace: f64 = (0..3).map(|at| self.rotation[at][at]).sum();
+        libm::acos((0.5 * (trace - 1.0)).clamp(-1.0, 1.0)).to_degrees()
+    }
 }

@@ -181,14 +181,7 @@ impl<'a> Audit<'a> {
         plan: &Plan<D>,
         attacked: Attacked,
     ) -> Result<Audited, Error> {
-        let gates = gate_results(
-            &self.gates,
-            &attacked.tried,
-            &attacked.rows,
-            &attacked.not_audited,
-            &attacked.doubts,
-            &attacked.localization,
-        )?;
+        let gates = gate_results(&self.gates, &attacked)?;
         let input = attacked.about.unwrap_or_else(|| self.about.clone());
         let document = report::Document {
             unlift: env!("CARGO_PKG_VERSION").to_owned(),

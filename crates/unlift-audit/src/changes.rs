@@ -9,8 +9,7 @@ use unlift_io::Error as FileError;
 use unlift_vision::network::DescriptorKind;
 
 use crate::Error;
-use crate::images::FeatureSource;
-use crate::images::extraction::Wanted;
+use crate::images::{FeatureSource, Wanted};
 use crate::prepare::Prepared;
 use crate::request::distinct;
 
@@ -59,9 +58,6 @@ pub fn protections_of_map(
 
 /// Returns the requested protections. `kind` is that of the descriptors that they protect, and `public` returns the descriptors that
 /// owner and attacker know.
-///
-/// # Errors
-/// Those of `kind` and `public`, or if a protection cannot use the public descriptors.
 pub fn protections(
     requested: &[Protection],
     kind: impl FnOnce() -> Result<DescriptorKind, Error>,
@@ -80,9 +76,6 @@ pub fn protections(
 }
 
 /// Reads all descriptors of photos or of a file of features; `min_score` is that of features in photos.
-///
-/// # Errors
-/// If they cannot be read, or are not of `kind`.
 pub fn public_descriptors(
     path: &Path,
     kind: DescriptorKind,

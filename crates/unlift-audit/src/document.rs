@@ -12,43 +12,41 @@ use crate::tiles::Tile;
 
 /// Returns the plan and `more` as recorded options.
 pub fn options<const D: usize>(plan: &Plan<D>, more: Map<String, Value>) -> Map<String, Value> {
-    let names: Vec<&str> = plan.schemes.iter().map(|scheme| scheme.name()).collect();
-    let labels: Vec<&str> = plan.thresholds.iter().map(|t| t.label.as_str()).collect();
     let mut options = Map::new();
-    options.insert("schemes".into(), json!(names));
+    let mut record = |name: &str, value: Value| _ = options.insert(name.to_owned(), value);
+    record("schemes", plan.schemes.iter().map(|scheme| scheme.name()).collect());
     for (name, value) in plan.schemes.iter().flat_map(|scheme| scheme.parameters()) {
-        options.insert(name.into(), json!(value));
+        record(name, json!(value));
     }
     if D == 3 {
-        options.insert("records_alone".into(), json!(plan.records_alone));
+        record("records_alone", json!(plan.records_alone));
     }
-    let neighbors: Vec<&str> = plan.neighbors.iter().map(NeighborsBy::name).collect();
-    options.insert("neighbors".into(), json!(neighbors));
+    record("neighbors", plan.neighbors.iter().map(NeighborsBy::name).collect());
     if plan.asks_oracle() {
-        let names: Vec<&str> = plan.oracle_noise.iter().map(|noise| noise.name()).collect();
-        options.insert("oracle_noise".into(), json!(names));
+        record("oracle_noise", plan.oracle_noise.iter().map(|noise| noise.name()).collect());
     }
-    options.insert("inlier_ratios".into(), json!(plan.inlier_ratios));
-    options.insert("k".into(), json!(plan.k));
-    options
-        .insert("solver".into(), json!(plan.solvers.iter().map(|s| s.name()).collect::<Vec<_>>()));
-    let delta = match plan.delta {
-        Delta::Auto => json!("auto"),
-        Delta::Fixed(delta) => json!(delta),
-    };
-    options.insert("delta".into(), delta);
-    options.insert("thresholds".into(), json!(labels));
-    options.insert("repeats".into(), json!(plan.repeats));
+    record("inlier_ratios", json!(plan.inlier_ratios));
+    record("k", json!(plan.k));
+    record("solver", plan.solvers.iter().map(|solver| solver.name()).collect());
+    record(
+        "delta",
+        match plan.delta {
+            Delta::Auto => json!("auto"),
+            Delta::Fixed(delta) => json!(delta),
+        },
+    );
+    record("thresholds", plan.thresholds.iter().map(|t| t.label.as_str()).collect());
+    record("repeats", json!(plan.repeats));
     options.extend(more);
     options
 }
 
 /// Returns the names of schemes and thresholds, and `more`, as recorded options.
-pub fn names(tried: &Tried, more: Map<String, Value>) -> Map<String, Value> {
-    let thresholds: Vec<&str> = tried.thresholds.iter().map(|t| t.label.as_str()).collect();
-    let named = [("schemes", json!(tried.schemes)), ("thresholds", json!(thresholds))];
-    let named = named.into_iter().map(|(name, value)| (name.to_owned(), value));
-    more.into_iter().chain(named).collect()
+pub fn names(tried: &Tried, mut more: Map<String, Value>) -> Map<String, Value> {
+    more.insert("schemes".to_owned(), json!(tried.schemes));
+    let labels = tried.thresholds.iter().map(|t| t.label.as_str());
+    more.insert("thresholds".to_owned(), labels.collect());
+    more
 }
 
 /// Returns what the document says of the run itself.
@@ -97,19 +95,12 @@ pub fn tiles(tiles: &[Tile], rows: &[Vec<Row>], results: &[Row]) -> Vec<report::
 pub fn image(name: &str, n_points: usize, rows: &[Row]) -> report::ImageFigures {
     let figures = |row: &Row| report::ImageRow {
         recovered_percent: row.recovered_percent.clone(),
-        distinct_percent: row
-            .distinct
-            .as_ref()
-            .map(|d| d.recovered_percent.clone())
-            .unwrap_or_default(),
+        distinct_percent: row.distinct.clone().unwrap_or_default().recovered_percent,
         inlier_ratio: row.inlier_ratio,
         median_error: row.median_error,
     };
-    report::ImageFigures {
-        name: Some(name.to_owned()),
-        n_points: n_points as u64,
-        rows: rows.iter().map(figures).collect(),
-    }
+    let (name, rows) = (Some(name.to_owned()), rows.iter().map(figures).collect());
+    report::ImageFigures { name, n_points: n_points as u64, rows }
 }
 
 /// Fields of a row that are unknown where points come from files.
@@ -133,39 +124,33 @@ pub fn evaluated(row: &Row, notes: &[String]) -> Result<Value, serde_json::Error
 /// Lists what has no row, once per scheme, source and reason. If other rows of the source exist,
 /// the reason names the affected part.
 pub fn not_audited<const D: usize>(plan: &Plan<D>, missing: &[NotAudited]) -> Vec<NotAudited> {
-    let mut groups: Vec<(&NotAudited, Vec<&NotAudited>)> = Vec::new();
-    for part in missing {
-        let same = |(first, _): &&mut (&NotAudited, Vec<&NotAudited>)| {
-            (&first.scheme, &first.neighbors, &first.reason)
-                == (&part.scheme, &part.neighbors, &part.reason)
+    let same = |a: &NotAudited, b: &NotAudited| {
+        (&a.scheme, &a.neighbors, &a.reason) == (&b.scheme, &b.neighbors, &b.reason)
+    };
+    let n_parts = plan.oracle_noise.len() * plan.inlier_ratios.len();
+    let mut listed: Vec<NotAudited> = Vec::new();
+    for (at, first) in missing.iter().enumerate() {
+        if missing[..at].iter().any(|earlier| same(earlier, first)) {
+            continue;
+        }
+        let all = missing.iter().filter(|part| same(part, first));
+        let reason = match first.oracle_noise.filter(|_| all.clone().count() < n_parts) {
+            None => first.reason.clone(),
+            Some(_) => {
+                // Inlier ratios, with the noise model if there are several.
+                let part = |part: &NotAudited| {
+                    let ratio = part.inlier_ratio.map(|ratio| ratio.to_string());
+                    let noise = part.oracle_noise.filter(|_| plan.oracle_noise.len() > 1);
+                    let noise = noise.map(|noise| format!(" ({noise})"));
+                    ratio.unwrap_or_default() + &noise.unwrap_or_default()
+                };
+                let parts: Vec<String> = all.map(part).collect();
+                format!("at {}: {}", parts.join(", "), first.reason)
+            }
         };
-        match groups.iter_mut().find(same) {
-            Some((_, all)) => all.push(part),
-            None => groups.push((part, vec![part])),
-        }
+        listed.push(NotAudited { reason, ..first.clone() });
     }
-    let text = |(first, all): (&NotAudited, Vec<&NotAudited>)| {
-        let n_parts = plan.oracle_noise.len() * plan.inlier_ratios.len();
-        let part = first.oracle_noise.filter(|_| all.len() < n_parts);
-        let reason = part.map_or_else(
-            || first.reason.clone(),
-            |_| format!("at {}: {}", parts(plan, &all).join(", "), first.reason),
-        );
-        NotAudited { reason, ..first.clone() }
-    };
-    groups.into_iter().map(text).collect()
-}
-
-/// Returns inlier ratios, with the noise model if there are several.
-fn parts<const D: usize>(plan: &Plan<D>, missing: &[&NotAudited]) -> Vec<String> {
-    let part = |missing: &&NotAudited| {
-        let ratio = missing.inlier_ratio.map(|ratio| ratio.to_string()).unwrap_or_default();
-        match missing.oracle_noise {
-            Some(noise) if plan.oracle_noise.len() > 1 => format!("{ratio} ({noise})"),
-            _ => ratio,
-        }
-    };
-    missing.iter().map(part).collect()
+    listed
 }
 
 /// Collects pairs into an ordered map.

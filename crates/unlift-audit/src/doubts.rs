@@ -1,14 +1,15 @@
-//! Doubts: reasons why figures may be too small, because the attack was not at its best or the
-//! ground truth is of another map. Low recovery would look like protection, so each doubt is shown
-//! beside the verdict, and no gate holds with one.
+//! Doubts: reasons why figures may be too small, because the attack was not at its best, the ground
+//! truth is of another map, or a released file gives away more than its records. Low recovery would
+//! look like protection, so each doubt is shown beside the verdict, and no gate holds with one.
 
-use unlift::audit::{Plan, Row, Threshold};
+use unlift::audit::{Alone, Plan, Row, Share, Threshold};
 use unlift::evaluate::{
-    OFF_RECORD, are_strangers, away_from_own, belongs, is_noise, nearer_to_own, recovered_away,
+    OFF_RECORD, are_strangers, away_from_own, belongs, correlation, is_noise, nearer_to_own,
+    recovered_away,
 };
 use unlift::geometry::frame::Bounds;
 use unlift::geometry::knn::Knn;
-use unlift::geometry::vector::{median, sub};
+use unlift::geometry::vector::{distance, median, sub};
 use unlift::recover::Recovered;
 use unlift::released::Released;
 use unlift::truth::{Original, Secret};
@@ -24,7 +25,7 @@ use crate::tiles::Tile;
 /// solvers, sources and noise models.
 const NARROW: f64 = 0.05;
 const WIDE: f64 = 8.0;
-/// Number of points whose neighbors are searched: enough for quartiles.
+/// Number of points or descriptors that are examined: enough for quartiles.
 const SAMPLE: usize = 2000;
 /// Tolerated share of points that are farther from their own records than the smallest threshold.
 const STRAY: f64 = 0.01;
@@ -159,7 +160,7 @@ fn not_its_own(
         return None;
     }
     let away = away_from_own(released, original, secret);
-    stray_truth(&away, &plan.thresholds, released.unit())
+    strays(false, &away, &plan.thresholds, released.unit())
 }
 
 /// Nothing is measured if the median distance of points from their own records is this many times that to the K-th neighbor.
@@ -182,34 +183,21 @@ pub(crate) fn check_truth(
     Err(unlift::Error::new("truth", expected, found))
 }
 
-/// Returns a doubt about the ground truth, given the distances of points from their own records.
-pub(crate) fn stray_truth(away: &[f64], thresholds: &[Threshold], unit: Unit) -> Option<String> {
-    let strays = strays(away, thresholds, unit)?;
-    Some(format!(
-        "truth: {strays} away from their own records, where no attack can find them: check that it is of this map, in its \
-         frame, scale and order"
-    ))
-}
-
-/// Returns a doubt about recovered positions, given their distances from their own records.
-pub(crate) fn stray_positions(
-    away: &[f64],
-    thresholds: &[Threshold],
-    unit: Unit,
-) -> Option<String> {
-    let strays = strays(away, thresholds, unit)?;
-    Some(format!(
-        "recovered: {strays} away from their own records, where no hidden point is: check that they are of this map, in its \
-         frame, scale and order"
-    ))
-}
-
-/// Counts the distances of at least the smallest threshold; `None` up to a share of [`STRAY`].
-fn strays(away: &[f64], thresholds: &[Threshold], unit: Unit) -> Option<String> {
+/// Returns a doubt about positions by their distances from their own records: the ground truth, or what was `recovered`.
+fn strays(recovered: bool, away: &[f64], thresholds: &[Threshold], unit: Unit) -> Option<String> {
     let least = thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min);
     let (n, of) = (away.iter().filter(|&&away| away >= least).count(), away.len());
-    let are_many = n as f64 > STRAY * of as f64;
-    are_many.then(|| format!("{n} of {of} points are {} or more", in_unit(least, unit)))
+    let (what, where_, it_is) = match recovered {
+        true => ("recovered", "where no hidden point is", "they are"),
+        false => ("truth", "where no attack can find them", "it is"),
+    };
+    let least = in_unit(least, unit);
+    (n as f64 > STRAY * of as f64).then(|| {
+        format!(
+            "{what}: {n} of {of} points are {least} or more away from their own records, {where_}: check that {it_is} \
+             of this map, in its frame, scale and order"
+        )
+    })
 }
 
 /// Returns a doubt if lengths are not in the unit that a file states.
@@ -257,10 +245,13 @@ pub fn unlike_neighbors(
 }
 
 fn in_unit(length: f64, unit: Unit) -> String {
+    with_sign(&short(length), unit)
+}
+
+fn with_sign(text: &str, unit: Unit) -> String {
     match unit {
-        Unit::Meter => format!("{} m", short(length)),
-        Unit::Pixel => format!("{} px", short(length)),
-        Unit::KthNeighbor => short(length),
+        Unit::Meter | Unit::Pixel => format!("{text} {}", unit.name()),
+        Unit::KthNeighbor => text.to_owned(),
     }
 }
 
@@ -279,9 +270,6 @@ pub struct Checked {
 
 impl Checked {
     /// Adds a map or an image.
-    ///
-    /// # Errors
-    /// If the ground truth is not that of `released`.
     pub fn add<const D: usize>(
         &mut self,
         recovered: &Recovered<D>,
@@ -300,9 +288,6 @@ impl Checked {
     }
 
     /// Returns the doubts about the figures.
-    ///
-    /// # Errors
-    /// If the positions are not of this ground truth.
     pub fn notes(
         &self,
         thresholds: &[Threshold],
@@ -314,8 +299,8 @@ impl Checked {
             let found = format!("{nearer} of {n} (of another map, or in another order of rows)");
             return Err(unlift::Error::new("positions", expected, found));
         }
-        let truth = stray_truth(&self.truth, thresholds, unit);
-        let recovered = stray_positions(&self.recovered, thresholds, unit);
+        let truth = strays(false, &self.truth, thresholds, unit);
+        let recovered = strays(true, &self.recovered, thresholds, unit);
         Ok(truth.into_iter().chain(recovered).collect())
     }
 }
@@ -332,9 +317,6 @@ pub struct Extent {
 
 impl Extent {
     /// Measures `points`, at least two.
-    ///
-    /// # Errors
-    /// If a coordinate is not finite.
     pub fn of(points: &[[f64; 3]]) -> Result<Self, unlift::Error> {
         let nearest = median(&mut Knn::new(points)?.kth_distances(1));
         Ok(Self { across: across(points), nearest })
@@ -431,58 +413,43 @@ pub fn check_thresholds(
     };
     let Extent { across, nearest } = Extent::of(points)?;
     let option = if typed { "--thresholds" } else { "--scale" };
-    let in_unit = |length: f64| match unit {
-        Unit::Meter => format!("{} m", short(length)),
-        Unit::Pixel => format!("{} px", short(length)),
-        Unit::KthNeighbor => {
-            format!("{} times the usual distance to the K-th neighbor", short(length))
-        }
+    let times = match unit {
+        Unit::KthNeighbor => " times the usual distance to the K-th neighbor",
+        Unit::Meter | Unit::Pixel => "",
     };
-    let named = |threshold: &Threshold| match unit {
-        Unit::Meter => format!("{} m", threshold.label),
-        Unit::Pixel => format!("{} px", threshold.label),
-        Unit::KthNeighbor => threshold.label.clone(),
-    };
-    let way_out = match unit {
-        Unit::Meter => "another --scale (meters per unit of the map), or other --thresholds",
-        Unit::KthNeighbor | Unit::Pixel => "other --thresholds, or none for the usual ones",
+    let [across_text, nearest_text] = [across, nearest].map(|x| in_unit(x, unit) + times);
+    let [smallest_text, largest_text] = [smallest, largest].map(|t| with_sign(&t.label, unit));
+    let error = |text: String| {
+        Error::request(format!("{option}: expected {text}")).advise(match unit {
+            Unit::Meter => "another --scale (meters per unit of the map), or other --thresholds",
+            Unit::KthNeighbor | Unit::Pixel => "other --thresholds, or none for the usual ones",
+        })
     };
     if across > 0.0 && smallest.value >= across {
-        let error = Error::request(format!(
-            "{option}: expected a map larger than the smallest threshold, {}, found one {} across: any guess \
-             would count as recovered",
-            named(smallest),
-            in_unit(across),
-        ));
-        return Err(error.advise(way_out));
+        return Err(error(format!(
+            "a map larger than the smallest threshold, {smallest_text}, found one {across_text} across: any guess \
+             would count as recovered"
+        )));
     }
     if nearest >= HOPELESS * largest.value {
-        let error = Error::request(format!(
-            "{option}: expected points less than {HOPELESS} times the largest threshold, {}, from their nearest neighbors, \
-             found {}: no attack could come near",
-            named(largest),
-            in_unit(nearest),
-        ));
-        return Err(error.advise(way_out));
+        return Err(error(format!(
+            "points less than {HOPELESS} times the largest threshold, {largest_text}, from their nearest neighbors, \
+             found {nearest_text}: no attack could come near"
+        )));
     }
-    if across > 0.0 && largest.value >= across {
-        let note = format!(
-            "the map is {} across, less than the threshold {}: within it any guess counts as recovered",
-            in_unit(across),
-            named(largest),
-        );
-        return Ok(LengthMessages { note: Some(note), doubt: None });
-    }
-    if nearest >= UNUSUAL * largest.value {
-        let doubt = format!(
-            "lengths are doubtful: points are {} from their nearest neighbors, far more than the largest threshold, {}: is \
-             {option} right?",
-            in_unit(nearest),
-            named(largest),
-        );
-        return Ok(LengthMessages { note: None, doubt: Some(doubt) });
-    }
-    Ok(LengthMessages::default())
+    let note = (across > 0.0 && largest.value >= across).then(|| {
+        format!(
+            "the map is {across_text} across, less than the threshold {largest_text}: within it any guess counts as recovered"
+        )
+    });
+    let is_doubtful = note.is_none() && nearest >= UNUSUAL * largest.value;
+    let doubt = is_doubtful.then(|| {
+        format!(
+            "lengths are doubtful: points are {nearest_text} from their nearest neighbors, far more than the largest threshold, \
+             {largest_text}: is {option} right?"
+        )
+    });
+    Ok(LengthMessages { note, doubt })
 }
 
 /// Share of a threshold that noise of records may take. Attacks stay on records, and others may average noise away.
@@ -508,6 +475,81 @@ pub(crate) fn short(length: f64) -> String {
         return format!("{length:.digits$}");
     }
     format!("{length:.1e}")
+}
+
+/// A column of descriptors follows the places if its correlation with a coordinate is this large. Real maps have 0.36 or less.
+const FOLLOWS: f64 = 0.6;
+
+/// Measures the attack that takes published values for the points: each of `published` has a position per record. Of a pair, the
+/// values are those of its two points in any order.
+pub fn read_from_file(
+    published: &[Vec<[f64; 3]>],
+    original: &Original<3>,
+    secret: &Secret,
+    thresholds: &[Threshold],
+) -> Option<Alone> {
+    let slots = secret.slots_per_record();
+    let point = |slot: usize| &original.reveal().positions()[secret.hidden()[slot].index()];
+    let columns: Vec<&[Vec<[f64; 3]>]> =
+        if slots == 1 { published.chunks(1).collect() } else { vec![published] };
+    let within = |columns: &[Vec<[f64; 3]>], threshold: f64| {
+        let is_near = |&slot: &usize| {
+            columns.iter().any(|rows| distance(&rows[slot / slots], point(slot)) <= threshold)
+        };
+        (0..secret.n_slots()).filter(is_near).count()
+    };
+    let best = |t: &Threshold| {
+        let n = columns.iter().map(|of| within(of, t.value)).max().unwrap_or(0);
+        (t.label.clone(), Share::of(n as f64, secret.n_slots() as f64))
+    };
+    let shares = thresholds.iter().map(best).collect();
+    (!published.is_empty()).then_some(Alone { name: "read from the file", shares })
+}
+
+/// Returns doubts about released data whose rows or columns follow the places of the points, which no attack uses.
+pub(crate) fn follows_places(
+    original: &Original<3>,
+    (released, secret): &(Released<3>, Secret),
+) -> Vec<String> {
+    let points = original.reveal().positions();
+    let point = |slot: usize| &points[secret.hidden()[slot].index()];
+    let (n, slots) = (released.n_records(), secret.slots_per_record());
+    let record = |at: usize| point(at % n * slots);
+    let nearer = |at: &usize| {
+        let away = |by: usize| distance(record(*at), record(at + by));
+        away(1) < away(n / 2)
+    };
+    let n_nearer = (0..n).filter(nearer).count();
+    // By chance a half; the margin is five standard deviations.
+    let is_ordered = n_nearer as f64 > 0.5 * n as f64 + 2.5 * (n as f64).sqrt();
+    let order = is_ordered.then(|| {
+        format!(
+            "order of records: after {n_nearer} of {n} comes one nearer by than another, where half are so by chance: the order \
+             gives places away, and no attack uses it (release records in random order)"
+        )
+    });
+    let columns = released.descriptors().into_iter().flat_map(|rows| columns(rows, secret, points));
+    order.into_iter().chain(columns).collect()
+}
+
+/// Returns a doubt about each column of descriptors that follows a coordinate.
+fn columns(rows: &Descriptors, secret: &Secret, points: &[[f64; 3]]) -> Vec<String> {
+    let slots = (0..secret.n_slots()).step_by(secret.n_slots().div_ceil(SAMPLE).max(1));
+    let (mut values, mut row) = (vec![Vec::new(); rows.dim()], vec![0.0; rows.dim()]);
+    for slot in slots.clone() {
+        rows.read_row(secret.descriptor_row()[slot] as usize, &mut row);
+        values.iter_mut().zip(&row).for_each(|(column, &value)| column.push(f64::from(value)));
+    }
+    let places: [Vec<f64>; 3] =
+        [0, 1, 2].map(|c| slots.clone().map(|s| points[secret.hidden()[s].index()][c]).collect());
+    let follows =
+        |column: &Vec<f64>| places.iter().any(|axis| correlation(column, axis).abs() > FOLLOWS);
+    let doubt = |at: usize| {
+        format!(
+            "descriptors: column {at} follows a coordinate, and no attack uses it: leave it out"
+        )
+    };
+    (0..values.len()).filter(|&at| follows(&values[at])).map(doubt).collect()
 }
 
 #[cfg(test)]

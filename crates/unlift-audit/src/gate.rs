@@ -15,13 +15,14 @@
 //! `sequence@5`, `sequence+lists@5` and `tracks@5` are sources: `dcl2d:sequence@5:10<=20` bounds what comes back from
 //! five queries, `olc:again:0.10<=20` what comes back from two releases of a map.
 
-use unlift::audit::{Estimate, NeighborsBy, NotAudited, Plan, Row, Threshold};
+use unlift::audit::{NeighborsBy, NotAudited, Plan, Row, Threshold, WithInterval};
 use unlift::neighbors::Needs;
 use unlift::neighbors::oracle::Noise;
 use unlift::recover::Builtin;
 use unlift::{PointSet, Unit};
 use unlift_report::document::{FEWEST_HELD_OUT, GateResult, HeldOut, Localization, UNPROTECTED};
 
+use crate::audit::Attacked;
 use crate::doubts::{Extent, HOPELESS, noise, short};
 use crate::{Error, sources};
 
@@ -57,126 +58,104 @@ pub enum Figure {
     Localization,
 }
 
-/// The figures that a gate compares, of one row and one threshold.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Candidate<'a> {
-    /// The row's scheme.
-    pub scheme: &'a str,
-    /// The row's solver.
-    pub solver: &'a str,
-    /// The row's source of neighborhoods.
-    pub source: &'a str,
-    /// The row's inlier ratio, as requested; `None` if it was measured.
-    pub inlier_ratio: Option<f64>,
-    /// The threshold's value.
-    pub threshold: f64,
-    /// Share recovered within the threshold.
-    pub recovered: Estimate,
-    /// Share recovered by an attacker without neighborhoods.
-    pub baseline: Estimate,
-}
-
-/// A figure that a gate bounds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounded {
-    /// The figure, in percent or percentage points.
-    pub found: f64,
-    /// Upper end of its 95 % interval, which the bound limits.
-    pub highest: f64,
-}
-
-/// Returns the one with the larger upper end; what is no number is largest.
-fn worse(a: Bounded, b: Bounded) -> Bounded {
-    if a.highest.is_nan() || a.highest >= b.highest { a } else { b }
-}
-
 impl Gate {
-    /// Returns true if the gate applies to this row and threshold.
-    pub fn covers(&self, row: &Candidate<'_>) -> bool {
+    /// Returns true if the gate applies to this row.
+    fn covers(&self, row: &Row) -> bool {
+        let is_requested = |ratio| row.oracle_noise.is_some() && row.inlier_ratio == ratio;
         self.scheme.as_deref().is_none_or(|name| name == row.scheme)
             && self.solver.is_none_or(|name| name == row.solver)
-            && self.source.as_deref().is_none_or(|name| name == row.source)
-            && self.inlier_ratio.is_none_or(|wanted| row.inlier_ratio == Some(wanted))
-            && self.threshold == row.threshold
+            && self.source.as_deref().is_none_or(|name| name == row.neighbors)
+            && self.inlier_ratio.is_none_or(is_requested)
     }
 
     /// Returns true if the gate applies to something without a row. If a scheme could not be
     /// applied, every gate on it does.
-    pub fn misses(&self, missing: &NotAudited) -> bool {
+    fn misses(&self, missing: &NotAudited) -> bool {
         let of_source = |name: &String| self.source.as_ref().is_none_or(|wanted| wanted == name);
         let of_ratio = self.inlier_ratio.is_none_or(|wanted| missing.inlier_ratio == Some(wanted));
         self.scheme.as_deref().is_none_or(|name| name == missing.scheme)
             && missing.neighbors.as_ref().is_none_or(|name| of_source(name) && of_ratio)
     }
 
-    /// Returns a part of the gate for which the audit has no row, as expected and found.
-    pub fn not_in(&self, tried: &Tried) -> Option<(String, String)> {
-        let one_of = |names: &[String]| format!("one of {}", names.join(", "));
-        let lacks = |what: &str, requested: Option<&str>, names: &[String]| {
-            let unknown = requested.filter(|name| !names.iter().any(|known| known == name))?;
-            Some((format!("{what}: {}", one_of(names)), unknown.to_owned()))
+    /// Returns the part of the gate for which the audit has no row: its name, what was expected, and what was found.
+    fn not_in(&self, tried: &Tried) -> Option<(&'static str, String, String)> {
+        let names = |names: &[String]| format!("one of {}", names.join(", "));
+        let lacks = |part, requested: Option<&str>, known: &[String]| {
+            let unknown = requested.filter(|name| known.iter().all(|known| known != name))?;
+            Some((part, names(known), unknown.to_owned()))
         };
         let scheme = lacks("scheme", self.scheme.as_deref(), &tried.schemes);
-        if self.figure == Figure::Localization {
+        if scheme.is_some() || self.figure == Figure::Localization {
             return scheme;
         }
         let ratio = || {
             let ratio = self.inlier_ratio.filter(|ratio| !tried.inlier_ratios.contains(ratio))?;
             let expected = match tried.inlier_ratios.as_slice() {
                 [] => "none, because measured ratios have no gates".to_owned(),
-                ratios => one_of(&ratios.iter().map(f64::to_string).collect::<Vec<_>>()),
+                ratios => names(&ratios.iter().map(f64::to_string).collect::<Vec<_>>()),
             };
-            Some((format!("inlier ratio: {expected}"), ratio.to_string()))
+            Some(("inlier ratio", expected, ratio.to_string()))
         };
         let threshold = || {
             let labels: Vec<_> = tried.thresholds.iter().map(|t| t.label.clone()).collect();
-            let known = tried.thresholds.iter().any(|t| t.value == self.threshold);
-            (!known)
-                .then(|| (format!("threshold: {}", one_of(&labels)), self.threshold.to_string()))
+            let is_known = self.threshold_in(tried).is_some();
+            (!is_known).then(|| ("threshold", names(&labels), self.threshold.to_string()))
         };
-        scheme
-            .or_else(|| lacks("solver", self.solver, &tried.solvers))
+        lacks("solver", self.solver, &tried.solvers)
             .or_else(|| lacks("neighbors", self.source.as_deref(), &tried.sources))
             .or_else(ratio)
             .or_else(threshold)
     }
 
-    /// Returns the largest bounded figure among `candidates`. `None` if the gate covers none of
+    fn threshold_in<'t>(&self, tried: &'t Tried) -> Option<&'t Threshold> {
+        tried.thresholds.iter().find(|threshold| threshold.value == self.threshold)
+    }
+
+    /// Returns the bounded figure of a row within the threshold `label`; NaN if it is not known. The upper end of its interval decides.
+    fn bounded(&self, row: &Row, label: &str) -> WithInterval {
+        let unknown = WithInterval { percent: f64::NAN, interval: [f64::NAN; 2] };
+        let recovered = row.recovered(label).unwrap_or(unknown);
+        let baseline = row.baseline(label).unwrap_or(unknown);
+        match self.figure {
+            Figure::Recovered if self.solver.is_none() && self.source.is_none() => {
+                if is_worse(&baseline, &recovered) { baseline } else { recovered }
+            }
+            Figure::Recovered => recovered,
+            Figure::Gain => WithInterval {
+                percent: recovered.percent - baseline.percent,
+                interval: [f64::NAN, recovered.highest_gain(&baseline)],
+            },
+            // Not a figure of a row.
+            Figure::Localization => unknown,
+        }
+    }
+
+    /// Returns the row of `rows` with the largest bounded figure. `None` if the gate covers none of
     /// them, which must never count as passing.
-    pub fn worst<'a>(
+    fn worst<'r>(
         &self,
-        candidates: impl IntoIterator<Item = Candidate<'a>>,
-    ) -> Option<Bounded> {
-        let of = |share: Estimate| Bounded { found: share.percent, highest: share.interval[1] };
-        candidates
-            .into_iter()
-            .filter(|c| self.covers(c))
-            .map(|c| match self.figure {
-                Figure::Recovered if self.solver.is_none() && self.source.is_none() => {
-                    worse(of(c.recovered), of(c.baseline))
-                }
-                Figure::Recovered => of(c.recovered),
-                Figure::Gain => Bounded {
-                    found: c.recovered.percent - c.baseline.percent,
-                    highest: c.recovered.highest_gain(&c.baseline),
-                },
-                // Not a figure of a row.
-                Figure::Localization => Bounded { found: f64::NAN, highest: f64::NAN },
-            })
-            .reduce(worse)
+        rows: impl Iterator<Item = &'r Row>,
+        label: &str,
+    ) -> Option<(WithInterval, &'r Row)> {
+        let covered = rows.filter(|row| self.covers(row));
+        let figures = covered.map(|row| (self.bounded(row, label), row));
+        figures.reduce(|a, b| if is_worse(&b.0, &a.0) { b } else { a })
     }
 
     /// Returns true if the upper end of a figure is within the bound. NaN is not.
-    pub fn passes(&self, highest: f64) -> bool {
+    fn passes(&self, highest: f64) -> bool {
         highest <= self.bound_percent
     }
 }
 
+/// Returns whether the upper end of `a` is larger; what is no number is largest.
+fn is_worse(a: &WithInterval, b: &WithInterval) -> bool {
+    let [a, b] = [a, b].map(|of| of.interval[1]);
+    !(b.is_nan() || b >= a)
+}
+
 impl Gate {
     /// Parses the form that the module describes.
-    ///
-    /// # Errors
-    /// If a part is wrong; the error names it.
     pub fn parse(text: &str) -> Result<Self, String> {
         const FORM: &str = "SCHEME[:SOLVER][:SOURCE][@RATIO]:THRESHOLD[:gain]<=PERCENT";
         let form =
@@ -313,9 +292,6 @@ fn qualifiers(names: &[&str]) -> Result<(Option<&'static str>, Option<String>), 
 }
 
 /// Parses a number above 0.
-///
-/// # Errors
-/// What was expected and found.
 pub fn positive(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
@@ -324,9 +300,6 @@ pub fn positive(text: &str) -> Result<f64, String> {
 }
 
 /// Parses a number from 0 to 1.
-///
-/// # Errors
-/// What was expected and found.
 pub fn ratio(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
@@ -334,53 +307,25 @@ pub fn ratio(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Returns the candidates of gates, each with its row and the index of its threshold.
-fn candidates<'a>(
-    thresholds: &[Threshold],
-    rows: &'a [Row],
-) -> Vec<(Candidate<'a>, &'a Row, usize)> {
-    let unknown = Estimate { percent: f64::NAN, interval: [f64::NAN; 2] };
-    let mut candidates = Vec::new();
-    for row in rows {
-        for (at, threshold) in thresholds.iter().enumerate() {
-            let candidate = Candidate {
-                scheme: &row.scheme,
-                solver: &row.solver,
-                source: &row.neighbors,
-                inlier_ratio: row.oracle_noise.is_some().then_some(row.inlier_ratio),
-                threshold: threshold.value,
-                recovered: row.recovered(&threshold.label).unwrap_or(unknown),
-                baseline: row.baseline(&threshold.label).unwrap_or(unknown),
-            };
-            candidates.push((candidate, row, at));
-        }
-    }
-    candidates
-}
-
-fn in_words(gate: &Gate, found: f64, row: &Row, at: usize, threshold: &Threshold) -> String {
+fn in_words(gate: &Gate, figure: f64, row: &Row, label: &str) -> String {
     // If the row's own figure is smaller, a baseline without neighborhoods decides.
-    let is_own = gate.figure == Figure::Gain || found == row.recovered_percent[at];
-    let alone = row.records_alone_percent.as_ref().and_then(|by| by.get(&threshold.label));
+    let is_own = gate.figure == Figure::Gain || row.recovered_percent.get(label) == Some(&figure);
+    let alone = row.records_alone_percent.as_ref().and_then(|by| by.get(label));
     let attack = match alone {
         _ if is_own => {
             let noise = row.oracle_noise.as_ref().filter(|noise| *noise != Noise::Uniform.name());
             let noise = noise.map_or_else(String::new, |noise| format!(" ({noise})"));
             format!("{}{noise} at {:.2}, {}", row.neighbors, row.inlier_ratio, row.solver)
         }
-        Some(alone) if found == *alone => {
-            let by = row.records_alone_by.as_ref().and_then(|by| by.get(&threshold.label));
+        Some(alone) if figure == *alone => {
+            let by = row.records_alone_by.as_ref().and_then(|by| by.get(label));
             format!("records alone, {}", by.map_or("", String::as_str))
         }
         _ => "a blind guess".to_owned(),
     };
     let verb = if gate.figure == Figure::Gain { "gained" } else { "recovered" };
-    let unit = match row.unit {
-        Unit::Meter => "m",
-        Unit::Pixel => "px",
-        Unit::KthNeighbor => "x",
-    };
-    format!("{}, {attack}, {verb} within {} {unit}", row.scheme, threshold.label)
+    let sign = if row.unit == Unit::KthNeighbor { "x" } else { row.unit.name() };
+    format!("{}, {attack}, {verb} within {label} {sign}", row.scheme)
 }
 
 /// What an audit tries, by the names that its rows have.
@@ -433,25 +378,21 @@ impl Tried {
 
 /// Reports a gate without rows before the audit runs.
 pub fn check_gates(gates: &[Gate], tried: &Tried) -> Result<(), Error> {
-    let of_localization = |gate: &&Gate| gate.figure == Figure::Localization;
-    if let Some(gate) = gates.iter().find(of_localization).filter(|_| !tried.localizes) {
-        let expected = "expected a COLMAP model with cameras and tracks, not in tiles";
-        return Err(Error::request(format!("--gate {}: {expected}, found none", gate.typed)));
-    }
-    let lacking = |gate: &Gate| gate.not_in(tried).map(|part| (gate.typed.clone(), part));
-    match gates.iter().find_map(lacking) {
-        None => Ok(()),
-        Some((gate, (expected, found))) => {
-            let (part, names) = expected.split_once(": ").unwrap_or(("row", &expected));
-            let error = format!("--gate {gate}: {part}: expected {names}, found {found}");
-            Err(match part {
-                "threshold" => {
-                    Error::request(error).advise("--scale and --thresholds, which change them")
-                }
-                _ => Error::request(error),
-            })
+    for gate in gates {
+        if gate.figure == Figure::Localization && !tried.localizes {
+            let expected = "expected a COLMAP model with cameras and tracks, not in tiles";
+            return Err(Error::request(format!("--gate {}: {expected}, found none", gate.typed)));
         }
+        let Some((part, expected, found)) = gate.not_in(tried) else { continue };
+        let gate = &gate.typed;
+        let error =
+            Error::request(format!("--gate {gate}: {part}: expected {expected}, found {found}"));
+        return Err(match part {
+            "threshold" => error.advise("--scale and --thresholds, which change them"),
+            _ => error,
+        });
     }
+    Ok(())
 }
 
 /// Returns an attack that was not tried although the gate covers it.
@@ -483,76 +424,54 @@ pub(crate) fn check_lengths_of_gates(points: &PointSet<3>, gates: &[Gate]) -> Re
 }
 
 /// Returns the results of all gates. A gate fails if something it applies to was not audited, or if
-/// a row it applies to has a doubt; `doubts` has one entry per row, or is empty. A gate that names no
-/// attack needs the best one of each kind.
-pub fn gate_results(
-    gates: &[Gate],
-    tried: &Tried,
-    rows: &[Row],
-    not_audited: &[NotAudited],
-    doubts: &[Option<String>],
-    localization: &[Localization],
-) -> Result<Vec<GateResult>, Error> {
-    let doubtful = rows.iter().zip(doubts).filter_map(|(row, doubt)| Some((row, doubt.as_ref()?)));
-    let doubtful: Vec<(Vec<_>, &String)> = doubtful
-        .map(|(row, doubt)| (candidates(&tried.thresholds, std::slice::from_ref(row)), doubt))
-        .collect();
-    let rows = candidates(&tried.thresholds, rows);
-    let result = |gate: &Gate| {
-        if gate.figure == Figure::Localization {
-            return Ok(of_localization(gate, localization, not_audited));
-        }
-        let worst = gate.worst(rows.iter().map(|(candidate, ..)| *candidate));
-        let of = worst.and_then(|worst| {
-            let decides = |candidate| {
-                let is_same = |one: Bounded| one.highest.total_cmp(&worst.highest).is_eq();
-                gate.worst([candidate]).is_some_and(is_same)
-            };
-            let (_, row, at) = rows.iter().find(|(candidate, ..)| decides(*candidate))?;
-            Some(in_words(gate, worst.found, row, *at, &tried.thresholds[*at]))
-        });
-        let is_about = |rows: &[(Candidate<'_>, &Row, usize)]| {
-            rows.iter().any(|(candidate, ..)| gate.covers(candidate))
-        };
-        let doubt = doubtful.iter().find(|(rows, _)| is_about(rows)).map(|(_, doubt)| doubt);
-        let reason = not_audited.iter().find(|missing| gate.misses(missing)).map(|missing| {
-            let with = missing.neighbors.as_ref().map(|name| format!(" with neighbors by {name}"));
-            let (scheme, with) = (&missing.scheme, with.unwrap_or_default());
-            format!("{scheme}{with} was not audited: {}", missing.reason)
-        });
-        let keeps = worst.is_some_and(|worst| gate.passes(worst.highest));
-        let mut covered = rows.iter().filter(|(candidate, ..)| gate.covers(candidate));
-        let of_noise = || covered.find_map(|(_, row, _)| noise(row, gate.threshold));
-        let doubt = doubt.map(|doubt| doubt.to_string()).or_else(of_noise);
-        let doubt = || doubt.or_else(|| untried(gate, tried));
-        let reason = reason.or_else(|| if keeps { doubt() } else { None });
-        // A gate without a row must never count as held.
-        if worst.is_none() && reason.is_none() {
-            return Err(Error::request(format!(
-                "--gate {}: expected a row, found none",
-                gate.typed
-            )));
-        }
-        let passed = reason.is_none() && keeps;
-        Ok(GateResult {
-            gate: gate.typed.clone(),
-            found_percent: worst.map(|worst| worst.found),
-            highest_percent: worst.map(|worst| worst.highest),
-            of,
-            bound_percent: gate.bound_percent,
-            passed,
-            reason,
-        })
+/// a row it applies to has a doubt. A gate that names no attack needs the best one of each kind.
+pub(crate) fn gate_results(gates: &[Gate], attacked: &Attacked) -> Result<Vec<GateResult>, Error> {
+    gates.iter().map(|gate| gate_result(gate, attacked)).collect()
+}
+
+fn gate_result(gate: &Gate, attacked: &Attacked) -> Result<GateResult, Error> {
+    let Attacked { tried, rows, not_audited, doubts, localization, .. } = attacked;
+    if gate.figure == Figure::Localization {
+        return Ok(of_localization(gate, localization, not_audited));
+    }
+    let label = gate.threshold_in(tried).map(|threshold| threshold.label.as_str());
+    let worst = label.and_then(|label| gate.worst(rows.iter(), label));
+    let highest = worst.map(|(worst, _)| worst.interval[1]);
+    let is_kept = highest.is_some_and(|highest| gate.passes(highest));
+    let missing = not_audited.iter().find(|missing| gate.misses(missing)).map(|missing| {
+        let with = missing.neighbors.as_ref().map(|name| format!(" with neighbors by {name}"));
+        let (scheme, with) = (&missing.scheme, with.unwrap_or_default());
+        format!("{scheme}{with} was not audited: {}", missing.reason)
+    });
+    let doubt = || {
+        let mut covered = rows.iter().enumerate().filter(|(_, row)| gate.covers(row));
+        let doubt = covered.clone().find_map(|(at, _)| doubts.get(at)?.clone());
+        let noise = || covered.find_map(|(_, row)| noise(row, gate.threshold));
+        doubt.or_else(noise).or_else(|| untried(gate, tried))
     };
-    gates.iter().map(result).collect()
+    let reason = missing.or_else(|| if is_kept { doubt() } else { None });
+    // A gate without a row must never count as held.
+    if worst.is_none() && reason.is_none() {
+        let error = format!("--gate {}: expected a row, found none", gate.typed);
+        return Err(Error::request(error));
+    }
+    Ok(GateResult {
+        gate: gate.typed.clone(),
+        found_percent: worst.map(|(worst, _)| worst.percent),
+        highest_percent: highest,
+        of: worst.zip(label).map(|((worst, row), label)| in_words(gate, worst.percent, row, label)),
+        bound_percent: gate.bound_percent,
+        passed: reason.is_none() && is_kept,
+        reason,
+    })
 }
 
 /// Returns the localization error that a gate compares, as a multiple. Few held-out images may fail a gate that the bound passes,
 /// because the bound assumes that all matches are found.
-fn cost_of_gate(one: &Localization) -> Option<f64> {
-    match (&one.held_out, one.measured()) {
-        (Some(few), None) => Some(one.cost()?.max(few.multiple?)),
-        _ => one.cost(),
+fn cost_of_gate(of: &Localization) -> Option<f64> {
+    match (&of.held_out, of.measured()) {
+        (Some(few), None) => Some(of.cost()?.max(few.multiple?)),
+        _ => of.cost(),
     }
 }
 
@@ -562,39 +481,35 @@ fn of_localization(
     localization: &[Localization],
     not_audited: &[NotAudited],
 ) -> GateResult {
-    let covered = |scheme: &str| gate.scheme.as_deref().is_none_or(|name| name == scheme);
-    let of_map =
-        |one: &&Localization| !one.of_queries && one.scheme != UNPROTECTED && covered(&one.scheme);
-    let all: Vec<&Localization> = localization.iter().filter(of_map).collect();
-    let missing = not_audited.iter().find(|one| one.neighbors.is_none() && covered(&one.scheme));
+    let covers = |scheme: &str| gate.scheme.as_deref().is_none_or(|name| name == scheme);
+    let cost = |of: &Localization| cost_of_gate(of).unwrap_or(f64::INFINITY);
+    let of_map = localization.iter().filter(|of| !of.of_queries && of.scheme != UNPROTECTED);
+    let worst = of_map.filter(|of| covers(&of.scheme)).max_by(|a, b| cost(a).total_cmp(&cost(b)));
+    let missing = not_audited.iter().find(|of| of.neighbors.is_none() && covers(&of.scheme));
     // Within the widest limits.
     let recall = |held: &HeldOut| held.recall_percent.values().copied().fold(0.0, f64::max);
-    let is_lost = |one: &Localization| {
-        one.scheme == UNPROTECTED && one.held_out.as_ref().is_some_and(|held| recall(held) < 50.0)
+    let is_lost = |of: &Localization| {
+        of.scheme == UNPROTECTED && of.held_out.as_ref().is_some_and(|held| recall(held) < 50.0)
     };
-    let worst = all.iter().max_by(|a, b| {
-        let cost = |one: &Localization| cost_of_gate(one).unwrap_or(f64::INFINITY);
-        cost(a).total_cmp(&cost(b))
-    });
     let reason = match (worst, missing) {
         (_, Some(missing)) => {
             Some(format!("{} was not audited: {}", missing.scheme, missing.reason))
         }
         (None, None) => Some("localization was not measured".to_owned()),
-        (Some(one), None) if one.is_unknown() => Some(format!(
+        (Some(worst), None) if worst.is_unknown() => Some(format!(
             "{} changes descriptors, so its cost is not known without {FEWEST_HELD_OUT} or more held-out images",
-            one.scheme
+            worst.scheme
         )),
         (Some(_), None) if localization.iter().any(is_lost) => {
             Some("most held-out images do not localize even without protection".to_owned())
         }
-        (Some(one), None) if cost_of_gate(one).is_none() => {
-            Some(format!("{}: most images do not localize", one.scheme))
+        (Some(worst), None) if cost_of_gate(worst).is_none() => {
+            Some(format!("{}: most images do not localize", worst.scheme))
         }
         (Some(_), None) => None,
     };
-    let found_percent = worst.and_then(|one| cost_of_gate(one));
-    let by = |one: &Localization| match (&one.held_out, one.measured()) {
+    let found_percent = worst.and_then(cost_of_gate);
+    let by = |of: &Localization| match (&of.held_out, of.measured()) {
         (_, Some(_)) => "held-out images",
         (Some(_), None) => "the larger of the bound and few held-out images",
         (None, None) => "bound",
@@ -603,7 +518,7 @@ fn of_localization(
         gate: gate.typed.clone(),
         found_percent,
         highest_percent: None,
-        of: worst.map(|one| format!("{}, {}", one.scheme, by(one))),
+        of: worst.map(|worst| format!("{}, {}", worst.scheme, by(worst))),
         bound_percent: gate.bound_percent,
         passed: reason.is_none() && found_percent.is_some_and(|found| gate.passes(found)),
         reason,
@@ -613,20 +528,31 @@ fn of_localization(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use unlift::audit::Intervals;
 
-    fn exactly(percent: f64) -> Estimate {
-        Estimate { percent, interval: [percent; 2] }
+    fn row(scheme: &str, inlier_ratio: f64, recovered_percent: f64) -> Row {
+        with_baseline(scheme, inlier_ratio, recovered_percent, 6.0)
     }
 
-    fn row(scheme: &str, inlier_ratio: f64, recovered_percent: f64) -> Candidate<'_> {
-        Candidate {
-            scheme,
-            solver: "joint",
-            source: "oracle",
-            inlier_ratio: Some(inlier_ratio),
-            threshold: 0.1,
-            recovered: exactly(recovered_percent),
-            baseline: exactly(6.0),
+    fn with_baseline(scheme: &str, inlier_ratio: f64, recovered: f64, blind: f64) -> Row {
+        let percents = |percent| [("0.1".to_owned(), percent)].into_iter().collect();
+        let ends = |percent| [("0.1".to_owned(), [percent; 2])].into_iter().collect();
+        let (recovered_percent, blind_percent) = (percents(recovered), percents(blind));
+        let interval = Intervals {
+            recovered_percent: ends(recovered),
+            blind_percent: ends(blind),
+            ..Intervals::default()
+        };
+        Row {
+            scheme: scheme.into(),
+            solver: "joint".into(),
+            neighbors: "oracle".into(),
+            oracle_noise: Some("uniform".into()),
+            inlier_ratio,
+            recovered_percent,
+            blind_percent,
+            interval: Some(interval),
+            ..Row::default()
         }
     }
 
@@ -655,12 +581,12 @@ mod tests {
     #[test]
     #[rustfmt::skip] // One row per line.
     fn the_largest_figure_of_the_rows_of_a_gate_counts() {
-        let weak = Candidate { solver: "ransac", ..row("ppl", 0.5, 12.0) };
-        let own = Candidate { source: "overlap", inlier_ratio: None, ..row("ppl", 0.1, 15.0) };
+        let weak = Row { solver: "ransac".into(), ..row("ppl", 0.5, 12.0) };
+        let own = Row { neighbors: "overlap".into(), oracle_noise: None, ..row("ppl", 0.1, 15.0) };
         let sources = &[row("ppl", 0.5, 30.0), weak, own][..];
         // `olc` with `similarity` recovered 58.6 % but records alone 66.6 %, and a gate of 60 held.
-        let alone = &[Candidate { baseline: exactly(66.6), ..row("olc", 0.5, 58.6) }][..];
-        let measured = &[Candidate { inlier_ratio: None, ..row("ppl", 0.5, 18.0) }][..];
+        let alone = &[with_baseline("olc", 0.5, 58.6, 66.6)][..];
+        let measured = &[Row { oracle_noise: None, ..row("ppl", 0.5, 18.0) }][..];
         let others = &[row("ppl", 1.0, 99.0), row("olc", 0.5, 98.0), row("ppl", 0.5, 18.0)][..];
         for (text, rows, expected) in [
             ("all:0.1<=20", &[row("olc", 1.0, 19.0), row("ppl", 0.5, 21.0), row("cp", 0.1, 3.0)][..], Some(21.0)),
@@ -681,19 +607,21 @@ mod tests {
             ("olc:joint:0.10<=60", alone, Some(58.6)),
             ("olc:oracle:0.10<=60", alone, Some(58.6)),
         ] {
-            let worst = Gate::parse(text).unwrap().worst(rows.iter().copied());
-            assert_eq!(worst.map(|worst| worst.found), expected, "{text}");
+            let worst = Gate::parse(text).unwrap().worst(rows.iter(), "0.1");
+            assert_eq!(worst.map(|(worst, _)| worst.percent), expected, "{text}");
         }
         // The upper end of an interval counts, and decides which row is the worst.
-        let within = |percent, high| Estimate { percent, interval: [0.0, high] };
-        let few = Candidate { recovered: within(18.0, 22.0), ..row("ppl", 0.5, 0.0) };
+        let mut few = row("ppl", 0.5, 18.0);
+        few.interval.as_mut().unwrap().recovered_percent[0] = [0.0, 22.0];
         let gate = Gate::parse("all:0.1<=20").unwrap();
-        let worst = gate.worst([few, row("olc", 0.5, 19.0)]).unwrap();
-        assert_eq!(worst, Bounded { found: 18.0, highest: 22.0 });
+        let rows = [few, row("olc", 0.5, 19.0)];
+        let (worst, _) = gate.worst(rows.iter(), "0.1").unwrap();
+        assert_eq!((worst.percent, worst.interval), (18.0, [0.0, 22.0]));
         assert!(!gate.passes(21.0) && gate.passes(20.0));
         // A figure that is no number fails, whatever the other figures.
         let rows = [row("ppl", 1.0, 3.0), row("ppl", 0.5, f64::NAN), row("ppl", 0.3, 2.0)];
-        assert!(!gate.passes(f64::NAN) && !gate.passes(gate.worst(rows).unwrap().highest));
+        let (worst, _) = gate.worst(rows.iter(), "0.1").unwrap();
+        assert!(!gate.passes(f64::NAN) && !gate.passes(worst.interval[1]));
     }
 
     #[test]
@@ -714,7 +642,8 @@ mod tests {
             ("ppl:0.2<=20", "threshold: one of 0.10, 0.25, found 0.2"),
         ] {
             let lacks = Gate::parse(text).unwrap().not_in(&Tried::by(&plan, false));
-            let line = lacks.map(|(expected, found)| format!("{expected}, found {found}"));
+            let line =
+                lacks.map(|(part, expected, found)| format!("{part}: {expected}, found {found}"));
             assert_eq!(line.unwrap_or_default(), expected, "{text}");
         }
     }

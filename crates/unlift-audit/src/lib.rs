@@ -40,9 +40,7 @@ pub mod changes;
 mod curves;
 mod document;
 mod doubts;
-mod frames;
 mod gate;
-mod given_away;
 pub mod images;
 pub mod inversion;
 pub mod localization;
@@ -51,7 +49,6 @@ mod outputs;
 mod prepare;
 pub mod released;
 mod request;
-mod scene;
 pub mod sequence;
 pub mod sources;
 mod tiles;
@@ -60,10 +57,10 @@ pub use audit::{Audit, Hidden, Input, Output, Views};
 pub use document::peak_bytes;
 pub use document::{evaluated, ordered};
 pub use doubts::{
-    Checked, LengthMessages, check_scale, check_thresholds, sides_m, unlike_neighbors,
+    Checked, LengthMessages, check_scale, check_thresholds, read_from_file, sides_m,
+    unlike_neighbors,
 };
-pub use gate::{Candidate, Figure, Gate, Tried, positive, ratio};
-pub use given_away::read_from_file;
+pub use gate::{Figure, Gate, Tried, positive, ratio};
 pub use outputs::{Audited, FIGURES, Files, Finished, PAGE, check_file, check_file_of, refused};
 pub use prepare::{Preparation, Prepared, by_point, prepare};
 pub use request::{Planned, Request, check_fit, distinct};
@@ -95,10 +92,6 @@ impl Error {
     /// Creates an error that is not of the request, with a text of its own.
     pub fn failed(message: impl Into<String>) -> Self {
         Self { fault: Fault::Input(message.into().into()), advice: None }
-    }
-
-    fn input(error: impl std::error::Error + Send + Sync + 'static) -> Self {
-        Self { fault: Fault::Input(Box::new(error)), advice: None }
     }
 
     /// Adds advice: what the user could try instead.
@@ -135,29 +128,10 @@ impl fmt::Display for Error {
     }
 }
 
-impl std::error::Error for Error {}
-
-impl From<unlift::Error> for Error {
-    fn from(error: unlift::Error) -> Self {
-        Self::input(error)
-    }
-}
-
-impl From<unlift_io::Error> for Error {
-    fn from(error: unlift_io::Error) -> Self {
-        Self::input(error)
-    }
-}
-
-impl From<unlift_report::Error> for Error {
-    fn from(error: unlift_report::Error) -> Self {
-        Self::input(error)
-    }
-}
-
-impl From<serde_json::Error> for Error {
-    fn from(error: serde_json::Error) -> Self {
-        Self::input(error)
+// It is no `std::error::Error`, so that every error of a file becomes one by `?`.
+impl<E: std::error::Error + Send + Sync + 'static> From<E> for Error {
+    fn from(error: E) -> Self {
+        Self { fault: Fault::Input(Box::new(error)), advice: None }
     }
 }
 

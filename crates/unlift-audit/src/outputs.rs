@@ -63,9 +63,6 @@ impl Output {
     }
 
     /// Opens the output folder of an audit, and checks the file for the results of gates, which is none of the report.
-    ///
-    /// # Errors
-    /// If a file cannot be written.
     pub fn open(&self, rules: Rules) -> Result<Files, Error> {
         let junit = self.junit.as_ref().map(|path| self.check_junit(path, &rules)).transpose()?;
         let first = [(PAGE, Kind::Page), (FIGURES, Kind::AuditJson)];

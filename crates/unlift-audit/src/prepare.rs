@@ -83,9 +83,6 @@ impl Prepared {
     }
 
     /// Checks that the longest side of the map, in meters at this `scale`, is in a range.
-    ///
-    /// # Errors
-    /// If it is not. Without a scale, nothing is checked.
     pub fn check_extent(
         &self,
         (low, high): (f64, f64),
@@ -111,9 +108,6 @@ impl Prepared {
     }
 
     /// Returns what a report says of the map at `path`, with the hashes of its files.
-    ///
-    /// # Errors
-    /// If the files cannot be read again for their hash, or have changed.
     pub fn about(&self, path: &Path) -> Result<Input, crate::Error> {
         let points = self.original.reveal();
         let descriptors = self.descriptors_file.iter();
@@ -193,15 +187,11 @@ fn median_kth_distance(points: &[[f64; 3]], k: usize) -> Result<f64, Error> {
 
 /// Reads lists by row of the file and keeps those of the prepared rows.
 ///
-/// Doubts about the lists are added to `notes`.
+/// Doubts about the lists are added to the notes of the map.
 ///
 /// # Errors
 /// If the file cannot be read, or has another number of rows.
-pub fn by_point(
-    path: &Path,
-    prepared: &Prepared,
-    notes: &mut Vec<String>,
-) -> Result<PointNeighbors, crate::Error> {
+pub fn by_point(path: &Path, prepared: &mut Prepared) -> Result<PointNeighbors, crate::Error> {
     let n_read = prepared.input.n_rows().max(prepared.original.len());
     let lists = read_point_neighborhoods(path, n_read)?;
     let mut kept_as = vec![None; n_read];
@@ -222,7 +212,8 @@ pub fn by_point(
         }
         offsets.push(neighbors.len() as u64);
     }
-    notes.extend(doubts(&offsets, &neighbors, prepared));
+    let doubts = doubts(&offsets, &neighbors, prepared);
+    prepared.notes.extend(doubts);
     // The hashes identify the file; a file called oracle must not appear as the source `oracle`.
     let name = "file".to_owned();
     Ok(PointNeighbors { name, offsets, neighbors, scores })

@@ -54,9 +54,6 @@ impl Files<'_> {
     }
 
     /// Reads the files, and checks that they belong together.
-    ///
-    /// # Errors
-    /// If a file cannot be read, or is of another map.
     pub fn open(&self) -> Result<Release, Error> {
         if has_images(self.released)? {
             let found = "released images";
@@ -108,9 +105,6 @@ impl Files<'_> {
     }
 
     /// Returns what a report says of the files of `n_points` points.
-    ///
-    /// # Errors
-    /// If a file cannot be read again for its hash.
     pub fn about(&self, n_points: usize) -> Result<Input, Error> {
         let mut others = vec![("truth".to_owned(), hash_file(self.truth)?)];
         if let Some(path) = self.descriptors {
@@ -136,9 +130,6 @@ fn rows_of_originals(secret: &Secret) -> Option<Vec<u32>> {
 }
 
 /// Checks the name of a user's scheme, which must fit into a gate and a file name.
-///
-/// # Errors
-/// What was expected and found, if it does not.
 pub fn check_name(text: &str) -> Result<String, String> {
     let known = |c: char| c.is_ascii_alphanumeric() || "+-_.".contains(c);
     let fits = (1..=40).contains(&text.len()) && text.chars().all(known);
@@ -150,9 +141,6 @@ pub fn check_name(text: &str) -> Result<String, String> {
 
 /// Returns an error if `file` belongs to another released map than `of`. A missing fingerprint is
 /// accepted.
-///
-/// # Errors
-/// If both fingerprints are known and differ.
 pub fn same_map(
     file: &Path,
     found: Option<Fingerprint>,
@@ -170,9 +158,6 @@ pub fn same_map(
 
 /// Returns an error if the released map and the truth differ in the number of hidden points, in
 /// total or per record.
-///
-/// # Errors
-/// If they do.
 pub fn expect_slots<const D: usize>(
     path: &Path,
     released: &Released<D>,

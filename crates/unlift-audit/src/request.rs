@@ -10,7 +10,7 @@ use unlift::recover::{Delta, Solver};
 use unlift::{Descriptors, ErrorKind};
 
 use crate::doubts::{LengthMessages, check_thresholds};
-use crate::images::choice;
+use crate::images::headline;
 use crate::prepare::Prepared;
 use crate::{Error, sources};
 
@@ -102,11 +102,10 @@ impl<const D: usize> Request<D> {
             }
         }
         let thresholds = given_or(self.thresholds, usual.thresholds);
-        for (at, Threshold { label, value }) in thresholds.iter().enumerate() {
-            if thresholds[..at].iter().any(|earlier| earlier.value == *value) {
-                let error = format!("--thresholds: expected each once, found {label} again");
-                return Err(Error::request(error));
-            }
+        if let Some(threshold) = repeated(&thresholds, |a, b| a.value == b.value) {
+            let label = &threshold.label;
+            let error = format!("--thresholds: expected each once, found {label} again");
+            return Err(Error::request(error));
         }
         let is_ours = |name: &str| unlift::obfuscate::scheme(name).is_ok();
         let schemes = distinct(self.schemes, |a, b| a.name() == b.name() && is_ours(a.name()));
@@ -125,7 +124,7 @@ impl<const D: usize> Request<D> {
             k: self.k,
             delta: self.delta,
             records_alone: self.records_alone,
-            headline: if D == 2 { choice::headline(&thresholds) } else { usual.headline },
+            headline: if D == 2 { headline(&thresholds) } else { usual.headline },
             thresholds,
             seed: self.seed,
             repeats: self.repeats,
@@ -142,9 +141,6 @@ const QUICK_SOURCE: &str = "similarity";
 
 impl Request<3> {
     /// Requests a small audit in place of the usual schemes and sources.
-    ///
-    /// # Errors
-    /// None, unless the source of a quick audit is unknown.
     pub fn quick(&mut self, usual: &Plan<3>, described: bool) -> Result<(), Error> {
         let is_quick = |scheme: &&Arc<dyn Scheme<3>>| QUICK_SCHEMES.contains(&scheme.name());
         self.schemes = usual.schemes.iter().filter(is_quick).cloned().collect();
@@ -186,27 +182,26 @@ pub fn check_fit<const D: usize>(
     descriptors: Option<&Descriptors>,
     place: &str,
 ) -> Result<(), Error> {
-    plan.own_sources().try_for_each(|source| {
-        let name = source.name();
-        let Some(descriptors) = descriptors else {
-            let expected = format!("expected descriptors {place}");
-            let error = format!("--neighbors {name}: {}, found none", expected.trim_end());
-            return match source.needs() {
-                Needs::Descriptors => Err(Error::request(error)),
-                _ => Ok(()),
-            };
-        };
-        source.takes(descriptors).map_err(|error| {
-            // Errors of another kind are about the source's model and name its path.
-            if error.kind() != ErrorKind::Descriptors {
-                return Error::request(format!("--neighbors {name}: {error}"));
+    for source in plan.own_sources() {
+        let wrong = |text: String| Error::request(format!("--neighbors {}: {text}", source.name()));
+        match descriptors.map(|descriptors| source.takes(descriptors)) {
+            None if source.needs() == Needs::Descriptors => {
+                let expected = format!("expected descriptors {place}");
+                return Err(wrong(format!("{}, found none", expected.trim_end())));
             }
-            let (expected, found) = (error.expected(), error.found());
-            let line = format!("--neighbors {name}: expected {expected}, found {found}");
-            let advice = "--neighbors similarity, which takes descriptors of any kind";
-            Error::request(line).advise(advice)
-        })
-    })
+            None | Some(Ok(())) => {}
+            // Errors of another kind are about the source's model and name its path.
+            Some(Err(error)) if error.kind() != ErrorKind::Descriptors => {
+                return Err(wrong(error.to_string()));
+            }
+            Some(Err(error)) => {
+                let (expected, found) = (error.expected(), error.found());
+                let advice = "--neighbors similarity, which takes descriptors of any kind";
+                return Err(wrong(format!("expected {expected}, found {found}")).advise(advice));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Returns each source once. Different files, or different sources of the user with one name, are an error.
@@ -223,13 +218,19 @@ fn each_once<const D: usize>(neighbors: Vec<NeighborsBy<D>>) -> Result<Vec<Neigh
         let error = format!("--neighbors: expected at most one file, found {n_files}");
         return Err(Error::request(error));
     }
-    for (at, by) in neighbors.iter().enumerate() {
-        if neighbors[..at].iter().any(|earlier| earlier.name() == by.name()) {
+    match repeated(&neighbors, |a, b| a.name() == b.name()) {
+        None => Ok(neighbors),
+        Some(by) => {
             let error = format!("--neighbors: expected each name once, found {}", by.name());
-            return Err(Error::request(error));
+            Err(Error::request(error))
         }
     }
-    Ok(neighbors)
+}
+
+/// Returns the first item that repeats an earlier one.
+fn repeated<T>(items: &[T], same: impl Fn(&T, &T) -> bool) -> Option<&T> {
+    let repeats = |at: &usize| items[..*at].iter().any(|earlier| same(earlier, &items[*at]));
+    (0..items.len()).find(repeats).map(|at| &items[at])
 }
 
 fn given_or<T>(given: Vec<T>, usual: Vec<T>) -> Vec<T> {

@@ -24,9 +24,6 @@ pub fn all() -> Vec<&'static SourceEntry> {
 }
 
 /// Returns the source called `name`.
-///
-/// # Errors
-/// If there is none; the error lists the names.
 pub fn named(name: &str) -> Result<Named, Error> {
     Named::parse_among(name, &all())
 }

@@ -48,9 +48,6 @@ impl Tiles {
     /// tree in plan view: across the longer side, never across the height.
     ///
     /// The height is the axis nearest to `up`; without `up`, the axis of the smallest extent.
-    ///
-    /// # Errors
-    /// If `only` is not the number of a tile.
     pub fn of(
         self,
         positions: &[[f64; 3]],

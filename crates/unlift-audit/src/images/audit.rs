@@ -51,10 +51,8 @@ impl Images<'_> {
             images.push(document::image(name, n, rows));
         });
         progress.show(0, chosen.len(), "reading images");
-        for error in source.refused() {
-            tally.borrow_mut().unusable += 1;
-            progress.say(&error.to_string());
-        }
+        source.refused.iter().for_each(|line| progress.say(line));
+        tally.borrow_mut().unusable += source.refused.len();
         let needs = Needs::of_plan(plan);
         let stream = Stream::new((source, path), chosen, needs, &tally, progress);
         let outcome = run_many(stream, plan, &mut watcher)?;
@@ -110,7 +108,7 @@ impl Images<'_> {
             sha256: Some(sha256),
             n_points: tally.n_points as u64,
             images: Some(ImageCounts {
-                found: (source.names.len() + source.refused().len()) as u64,
+                found: (source.names.len() + source.refused.len()) as u64,
                 used: tally.used.len() as u64,
                 unusable: tally.unusable as u64,
                 too_small: outcome.n_too_small as u64,
@@ -150,7 +148,7 @@ impl Images<'_> {
             let named = || Some(self.photos.as_ref()?.join(&picture.name));
             let photo = source.photo(numbers[at]).map(Path::to_owned).or_else(named);
             let Some(photo) = photo else { continue };
-            match unlift_vision::features::photo::jpeg(&photo, PREVIEW, source.turn()) {
+            match unlift_vision::features::photo::jpeg(&photo, PREVIEW, source.turn) {
                 Ok(jpeg) => picture.photo = Some(jpeg),
                 Err(error) => progress.say(&format!("note: {error}")),
             }

@@ -29,10 +29,6 @@ pub fn is_photo(path: &Path) -> bool {
 
 /// Lists the photos in `root` and its subfolders, each folder once: under its own name, or
 /// under the first link to it. Names that begin with a dot are skipped.
-///
-/// # Errors
-/// If the folder cannot be read or contains no photo, an option is out of range, or a model is
-/// missing.
 pub(super) fn open(root: &Path, extraction: &Extraction) -> Result<FeatureSource, crate::Error> {
     let extractor = Extractor::try_new(extraction)?;
     let mut listing = Listing::default();
@@ -54,9 +50,9 @@ pub(super) fn open(root: &Path, extraction: &Extraction) -> Result<FeatureSource
     });
     listing.photos.sort_unstable();
     let (names, paths) = listing.photos.into_iter().unzip();
-    let (kind, turn) = (extraction.kind(), Turn::Upright);
-    let from = Origin::Photos { paths, extractor, kind, turn };
-    Ok(FeatureSource { names, refused: listing.refused, passed_over, from })
+    let from = Origin::Photos { paths, extractor, kind: extraction.kind() };
+    let refused = listing.refused.iter().map(ToString::to_string).collect();
+    Ok(FeatureSource { names, refused, passed_over, turn: Turn::Upright, from })
 }
 
 /// Converts extracted features to those of files.

@@ -1,19 +1,20 @@
 //! Features of images from a folder of photos, an HDF5 file of hloc, a COLMAP database, or memory.
 
 pub mod audit;
-pub mod choice;
-pub mod extraction;
 mod folder;
 mod pictures;
 pub mod stream;
 
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use unlift::audit::Plan;
+use unlift::Descriptors;
+use unlift::audit::{Plan, Threshold};
+use unlift::descriptors::Values;
 use unlift_io::features::{self, ImageFeatures};
 use unlift_io::hash::{hash_file, hash_files};
 use unlift_vision::features::photo::Turn;
-use unlift_vision::features::{Extraction, Extractor};
+use unlift_vision::features::{Extraction, Extractor, LearnedOptions, SiftOptions};
 use unlift_vision::network::DescriptorKind;
 
 use crate::changes::kind_of;
@@ -31,16 +32,19 @@ type Get = Box<dyn Fn(usize) -> Result<ImageFeatures, Error> + Send + Sync>;
 pub struct FeatureSource {
     /// The names of all images, sorted by their bytes.
     pub names: Vec<String>,
-    refused: Vec<unlift_io::Error>,
+    /// A line for each entry that cannot be used.
+    pub refused: Vec<String>,
     /// Skipped entries in one line.
     pub passed_over: Option<String>,
+    /// The orientation of photos in which keypoints are pixels.
+    pub turn: Turn,
     from: Origin,
 }
 
 /// The origin of features.
 enum Origin {
     /// Photos, whose features are extracted on request.
-    Photos { paths: Vec<PathBuf>, extractor: Extractor, kind: DescriptorKind, turn: Turn },
+    Photos { paths: Vec<PathBuf>, extractor: Extractor, kind: DescriptorKind },
     /// A file of features.
     File(features::FeatureSource),
     /// Images of the caller.
@@ -49,17 +53,19 @@ enum Origin {
 
 impl FeatureSource {
     /// Opens a folder of photos, or a file of features.
-    ///
-    /// # Errors
-    /// If `path` does not exist, or contains no image.
     pub fn open(path: &Path, extraction: &Extraction) -> Result<Self, Error> {
         let metadata = std::fs::metadata(path).map_err(|e| unlift_io::Error::read(path, e))?;
         if metadata.is_dir() {
             return folder::open(path, extraction);
         }
         let file = features::FeatureSource::open(path)?;
-        let (names, refused) = (file.names().to_vec(), Vec::new());
-        Ok(Self { names, refused, passed_over: None, from: Origin::File(file) })
+        Ok(Self {
+            names: file.names().to_vec(),
+            refused: file.refused().iter().map(ToString::to_string).collect(),
+            passed_over: None,
+            turn: if file.is_upright() { Turn::Upright } else { Turn::AsStored },
+            from: Origin::File(file),
+        })
     }
 
     /// Creates a source of the images `names` in memory. `get` returns the features of the image with an index in `names`, from any
@@ -77,42 +83,19 @@ impl FeatureSource {
         }
         if let Some(pair) = names.windows(2).find(|pair| pair[0].as_bytes() >= pair[1].as_bytes()) {
             let expected = "images: expected each name once, sorted by bytes";
-            return Err(Error::request(format!(
-                "{expected}, found {:?} before {:?}",
-                pair[0], pair[1]
-            )));
+            let found = format!("found {:?} before {:?}", pair[0], pair[1]);
+            return Err(Error::request(format!("{expected}, {found}")));
         }
-        let from = Origin::Memory(Box::new(get));
-        Ok(Self { names, refused: Vec::new(), passed_over: None, from })
-    }
-
-    /// Returns an error for each entry that cannot be used.
-    pub fn refused(&self) -> &[unlift_io::Error] {
-        match &self.from {
-            Origin::File(file) => file.refused(),
-            Origin::Photos { .. } | Origin::Memory(_) => &self.refused,
-        }
-    }
-
-    /// Returns the orientation of photos in which keypoints are pixels.
-    pub fn turn(&self) -> Turn {
-        match &self.from {
-            Origin::Photos { turn, .. } => *turn,
-            Origin::File(file) if !file.is_upright() => Turn::AsStored,
-            Origin::File(_) | Origin::Memory(_) => Turn::Upright,
-        }
+        let (refused, from) = (Vec::new(), Origin::Memory(Box::new(get)));
+        Ok(Self { names, refused, passed_over: None, turn: Turn::Upright, from })
     }
 
     /// Sets how photos of a folder are turned. No effect for files, which state it themselves.
     #[must_use]
     pub fn with_turn(self, turn: Turn) -> Self {
-        let from = match self.from {
-            Origin::Photos { paths, extractor, kind, .. } => {
-                Origin::Photos { paths, extractor: extractor.with_turn(turn), kind, turn }
-            }
-            from => from,
-        };
-        Self { from, ..self }
+        let Origin::Photos { paths, extractor, kind } = self.from else { return self };
+        let from = Origin::Photos { paths, extractor: extractor.with_turn(turn), kind };
+        Self { turn, from, ..self }
     }
 
     /// Returns true for images of the caller, who can correct them.
@@ -127,39 +110,26 @@ impl FeatureSource {
 
     /// Returns the photo of image `at`, if images are photos.
     pub fn photo(&self, at: usize) -> Option<&Path> {
-        match &self.from {
-            Origin::Photos { paths, .. } => Some(&paths[at]),
-            Origin::File(_) | Origin::Memory(_) => None,
-        }
+        if let Origin::Photos { paths, .. } = &self.from { Some(&paths[at]) } else { None }
     }
 
     /// Returns the hash of the photos `used`, or of the file of features at `path`.
-    ///
-    /// # Errors
-    /// If a file cannot be read.
     pub fn hash(&self, path: &Path, used: &[usize]) -> Result<String, Error> {
-        Ok(match &self.from {
-            Origin::Photos { paths, .. } => {
-                hash_files(&used.iter().map(|&at| &paths[at]).collect::<Vec<_>>())?
-            }
-            Origin::File(_) | Origin::Memory(_) => hash_file(path)?,
-        })
+        let photos: Option<Vec<&Path>> = used.iter().map(|&at| self.photo(at)).collect();
+        Ok(photos.map_or_else(|| hash_file(path), |photos| hash_files(&photos))?)
     }
 
     /// Reads the features of image `at` of `names`.
-    ///
-    /// # Errors
-    /// If this image cannot be used; others may be.
     pub fn get(&self, at: usize) -> Result<ImageFeatures, Error> {
         let name = self.names[at].clone();
         Ok(match &self.from {
-            Origin::Photos { paths, extractor, turn, .. } => {
+            Origin::Photos { paths, extractor, .. } => {
                 let photo = extractor.read(&paths[at])?;
                 ImageFeatures {
                     name,
                     size: Some(photo.size.map(|side| side as u32)),
                     uncertainty_px: Some(photo.noise_px),
-                    upright: *turn == Turn::Upright,
+                    upright: self.turn == Turn::Upright,
                     photo: Some(paths[at].clone()),
                     ..folder::features_of(photo.found)
                 }
@@ -171,7 +141,7 @@ impl FeatureSource {
 
     /// Returns the first of `chosen` that can be read and has keypoints, to check its contents
     /// before the audit. The audit reports the unusable ones.
-    pub fn first(&self, chosen: &[usize]) -> Option<ImageFeatures> {
+    fn first(&self, chosen: &[usize]) -> Option<ImageFeatures> {
         let mut read = chosen.iter().filter_map(|&at| self.get(at).ok());
         read.find(|image| !image.keypoints.is_empty())
     }
@@ -186,11 +156,79 @@ impl FeatureSource {
     }
 }
 
+/// What a user requests of the extraction from photos; `None` is the default.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Wanted {
+    /// The option that chooses the features.
+    pub option: &'static str,
+    /// The chosen features.
+    pub kind: Option<DescriptorKind>,
+    /// `--max-features`.
+    pub max_features: Option<NonZeroUsize>,
+    /// `--min-score`.
+    pub min_score: Option<f32>,
+    /// `--max-image-size`.
+    pub max_image_size: Option<u32>,
+}
+
+impl Wanted {
+    /// Returns the options of the extractor for the photos at `path`.
+    ///
+    /// # Errors
+    /// If `path` is a file and an option is given, or an option belongs to other features.
+    pub fn extraction(self, path: &Path) -> Result<Extraction, Error> {
+        if path.is_file() {
+            self.check_unused("a file")?;
+        }
+        let max_features = self.max_features.map(NonZeroUsize::get);
+        let max_image_size = self.max_image_size.map(|side| side as usize);
+        let learned = |usual: LearnedOptions| LearnedOptions {
+            max_features: max_features.unwrap_or(usual.max_features),
+            min_score: self.min_score.unwrap_or(usual.min_score),
+            max_image_size: max_image_size.unwrap_or(usual.max_image_size),
+        };
+        Ok(match self.kind {
+            Some(DescriptorKind::Aliked) => Extraction::Aliked(learned(LearnedOptions::ALIKED)),
+            Some(DescriptorKind::SuperPoint) => {
+                Extraction::SuperPoint(learned(LearnedOptions::SUPERPOINT))
+            }
+            None | Some(DescriptorKind::Sift) => {
+                let (option, aliked) = (self.option, DescriptorKind::Aliked.name());
+                if self.min_score.is_some() {
+                    let kind = self.kind.map(|kind| format!("{option} {}", kind.name()));
+                    let found = kind.unwrap_or("none".to_owned());
+                    let expected = format!("expected with {option} {aliked}");
+                    return Err(Error::request(format!("--min-score: {expected}, found {found}")));
+                }
+                let usual = SiftOptions::default();
+                Extraction::Sift(SiftOptions {
+                    max_features: max_features.unwrap_or(usual.max_features),
+                    max_image_size: max_image_size.unwrap_or(usual.max_image_size),
+                })
+            }
+        })
+    }
+
+    /// Rejects all options if features exist already, in `found`.
+    pub fn check_unused(&self, found: &str) -> Result<(), Error> {
+        let given = [
+            (self.option, self.kind.is_some()),
+            ("--max-features", self.max_features.is_some()),
+            ("--min-score", self.min_score.is_some()),
+            ("--max-image-size", self.max_image_size.is_some()),
+        ];
+        given.iter().find(|(_, given)| *given).map_or(Ok(()), |(name, _)| {
+            let expected = "expected with a folder of photos";
+            Err(Error::request(format!("{name}: {expected}, found {found}")))
+        })
+    }
+}
+
 /// Options of opening images for an audit.
 #[derive(Clone, Debug, Default)]
 pub struct Opening<'a> {
     /// Options of the extraction from photos.
-    pub wanted: extraction::Wanted,
+    pub wanted: Wanted,
     /// Maximum number of images, evenly spaced.
     pub max_images: Option<usize>,
     /// The folder of photos of a file of features.
@@ -225,29 +263,30 @@ impl Opened {
             return Err(Error::request(format!("{expected}, found a folder of photos")));
         }
         let extraction = opening.wanted.extraction(path)?;
-        if let (true, Some(rows)) = (path.is_dir(), extraction::sample(&extraction)) {
-            check_fit(plan, Some(&rows), "")?;
+        let kind = extraction.kind();
+        // Every source accepts SIFT.
+        if path.is_dir() && kind != DescriptorKind::Sift {
+            // Two samples, which differ because equal rows are rejected.
+            let values = [vec![0.1; kind.dim()], vec![-0.1; kind.dim()]].concat();
+            let samples = Descriptors::try_new(Values::F32(values), kind.dim())?;
+            check_fit(plan, Some(&samples), "")?;
         }
         let source = FeatureSource::open(path, &extraction).map_err(|error| {
             let map = unlift_io::read::is_project(path);
             if map { error.advise("unlift audit map, as this is a map") } else { error }
         })?;
         let opened = Self::of(source, path, opening.max_images);
-        let has_photo = |&at: &usize| {
-            opening.photos.is_none_or(|photos| photos.join(&opened.source.names[at]).is_file())
+        let has_photo = |photos: &Path| {
+            opened.chosen.iter().any(|&at| photos.join(&opened.source.names[at]).is_file())
         };
-        if let (true, Some(photos)) = (opening.paints, opening.photos)
-            && !opened.chosen.iter().any(has_photo)
-        {
+        if let Some(photos) = opening.photos.filter(|photos| opening.paints && !has_photo(photos)) {
             let expected = format!("photos of the images in {}", path.display());
             return Err(unlift_io::Error::new(photos, "", expected, "none").into());
         }
         // Extracted features always have descriptors.
         let uses = opening.uses_descriptors || stream::Needs::of_plan(plan).descriptors();
-        if uses
-            && opened.source.is_file()
-            && let Some(first) = opened.source.first(&opened.chosen)
-        {
+        let first = (uses && opened.source.is_file()).then(|| opened.source.first(&opened.chosen));
+        if let Some(first) = first.flatten() {
             if opening.is_usual && first.descriptors.is_none() {
                 plan.neighbors = sources::usual(false);
             }
@@ -261,7 +300,7 @@ impl Opened {
 
     /// Takes images that were opened already.
     pub fn of(source: FeatureSource, path: &Path, max_images: Option<usize>) -> Self {
-        let chosen = choice::evenly(source.names.len(), max_images);
+        let chosen = evenly(source.names.len(), max_images);
         Self { source, path: path.to_owned(), chosen }
     }
 
@@ -269,6 +308,21 @@ impl Opened {
     pub fn kind(&self, option: &str) -> Result<DescriptorKind, Error> {
         self.source.kind(option, &self.chosen)
     }
+}
+
+/// The headline threshold in pixels; the nearest given threshold is used.
+const HEADLINE_PX: f64 = 10.0;
+
+/// Returns the index of the headline threshold in `thresholds`.
+pub fn headline(thresholds: &[Threshold]) -> usize {
+    let away = |at: &usize| (thresholds[*at].value / HEADLINE_PX).ln().abs();
+    (0..thresholds.len()).min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0)
+}
+
+/// Returns the numbers of at most `max_images` of `n` images, evenly spaced: the middles of equal parts.
+pub fn evenly(n: usize, max_images: Option<usize>) -> Vec<usize> {
+    let max_images = max_images.unwrap_or(n).min(n);
+    (0..max_images).map(|at| ((2 * at + 1) * n) / (2 * max_images)).collect()
 }
 
 #[cfg(test)]
@@ -288,5 +342,13 @@ mod tests {
         assert_eq!(line(&["a", "a"]).as_deref(), Some(expected));
         assert!(line(&["a", "B"]).is_some());
         assert_eq!(line(&[]).as_deref(), Some("images: expected at least one, found none"));
+    }
+
+    #[test]
+    fn images_are_evenly_spaced_and_all_without_a_limit() {
+        assert_eq!(evenly(4, None), [0, 1, 2, 3]);
+        assert_eq!(evenly(10, Some(3)), [1, 5, 8]);
+        assert_eq!(evenly(3, Some(9)), [0, 1, 2]);
+        assert_eq!(evenly(0, Some(2)), [0; 0]);
     }
 }

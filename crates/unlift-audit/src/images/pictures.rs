@@ -5,13 +5,11 @@ use std::sync::Arc;
 use unlift::audit::{Cell, Observer, Row, Watcher};
 use unlift::released::{Obfuscation, Released};
 use unlift_report::inversions::Inversion as Inverted;
-use unlift_report::pictures::{
-    GRAPH_NEIGHBORS, Graph, Marks, Picture, RecoveredView, ReleasedView,
-};
+use unlift_report::pictures::{GRAPH_NEIGHBORS, Graph, Marks, Picture, ReleasedView};
+use unlift_report::{Attack, ByAttack};
 
 use crate::Progress;
 use crate::inversion::Inversion;
-use unlift_report::Given;
 
 /// Collects the pictures of all audited images, in their order.
 pub struct Album<'a> {
@@ -84,21 +82,18 @@ impl Observer<2> for Page<'_> {
         {
             picture.released.push(ReleasedView { scheme: scheme.clone(), marks });
         }
-        let given = Given::of(cell.row);
+        let attack = Attack::of(cell.row);
         let first = picture.released.first().is_some_and(|view| view.scheme == *scheme);
-        if first && picture.graphs.iter().all(|graph| graph.given != given) {
+        if first && picture.graphs.iter().all(|graph| graph.given != attack.given) {
             let neighbors = slot_of.iter().map(|slot| slot.map_or(Vec::new(), |s| best(cell, s)));
-            picture.graphs.push(Graph { given: given.clone(), neighbors: neighbors.collect() });
+            picture
+                .graphs
+                .push(Graph { given: attack.given.clone(), neighbors: neighbors.collect() });
         }
         let recovered = slot_of.iter().map(|slot| {
             slot.and_then(|slot| cell.recovered.position(slot)).map(|place| narrow(&place))
         });
-        picture.views.push(RecoveredView {
-            scheme: scheme.to_owned(),
-            given,
-            solver: cell.row.solver.to_owned(),
-            recovered: recovered.collect(),
-        });
+        picture.views.push(ByAttack { attack, recovered: recovered.collect() });
     }
 }
 
@@ -122,61 +117,38 @@ fn best(cell: &Cell<'_, 2>, slot: usize) -> Vec<[f32; 2]> {
 }
 
 fn marks(released: &Released<2>, slot_of: &[Option<usize>]) -> Option<Marks> {
-    let origin = released.origin();
-    let bounds = released.bounds()?;
-    let at = |p: &[f64; 2], t: f64, d: &[f64; 2]| -> [f32; 2] {
-        [0, 1].map(|c| (p[c] + t * d[c]) as f32)
-    };
+    let (origin, bounds) = (released.origin(), released.bounds()?);
     let place = |p: &[f32; 2]| [0, 1].map(|c| f64::from(p[c]) + origin[c]);
-    let records = slot_of.iter();
+    let part = |p: [f64; 2], along: [f64; 2], (from, to): (f64, f64)| {
+        [from, to].map(|t| [0, 1].map(|c| (p[c] + t * along[c]) as f32))
+    };
+    let segments = |of: &dyn Fn(usize) -> Option<[[f32; 2]; 2]>| -> Vec<_> {
+        slot_of.iter().map(|slot| of((*slot)?)).collect()
+    };
     Some(match released.obfuscation() {
-        Obfuscation::Lines(lines) => Marks::Lines(
-            records
-                .map(|slot| {
-                    let foot = place(lines.foot().get((*slot)?)?);
-                    let along = lines.direction().get((*slot)?)?.map(f64::from);
-                    let (from, to) = bounds.clip(&foot, &along)?;
-                    Some([at(&foot, from, &along), at(&foot, to, &along)])
-                })
-                .collect(),
-        ),
-        Obfuscation::Rays(rays) => Marks::Rays(
-            records
-                .map(|slot| {
-                    let center = usize::from(*rays.center().get((*slot)?)?);
-                    let anchor = place(rays.centers().get(center)?);
-                    let along = rays.direction().get((*slot)?)?.map(f64::from);
-                    let to = ray_end(released, center, &anchor, &along)?;
-                    Some([at(&anchor, 0.0, &along), at(&anchor, to, &along)])
-                })
-                .collect(),
-        ),
-        Obfuscation::AxisCandidates(points) => Marks::Points(
-            records
-                .map(|slot| Some(place(points.position().get((*slot)?)?).map(|x| x as f32)))
-                .collect(),
-        ),
+        Obfuscation::Lines(lines) => Marks::Lines(segments(&|slot| {
+            let (foot, along) =
+                (place(&lines.foot()[slot]), lines.direction()[slot].map(f64::from));
+            Some(part(foot, along, bounds.clip(&foot, &along)?))
+        })),
+        Obfuscation::Rays(rays) => Marks::Rays(segments(&|slot| {
+            let center = usize::from(rays.center()[slot]);
+            let anchor = place(&rays.centers()[center]);
+            let along = rays.direction()[slot].map(f64::from);
+            // The ray leaves the region of the image in which its point lies. Regions are relative to the origin.
+            let region = rays.regions().and_then(|regions| regions.get(center));
+            let region = region.map_or(bounds, |region| region.about(&origin.map(|x| -x)));
+            // Because of rounding, a ray along a border may miss the region.
+            let (_, to) = region.clip(&anchor, &along).or_else(|| bounds.clip(&anchor, &along))?;
+            Some(part(anchor, along, (0.0, to.max(0.0))))
+        })),
+        Obfuscation::AxisCandidates(points) => {
+            let point = |slot: &Option<usize>| Some(narrow(&place(&points.position()[(*slot)?])));
+            Marks::Points(slot_of.iter().map(point).collect())
+        }
         // No scheme for images makes planes.
         Obfuscation::AxisPlanes(_) => return None,
     })
-}
-
-/// Returns where a ray leaves the region of the image in which its point lies.
-fn ray_end(
-    released: &Released<2>,
-    center: usize,
-    anchor: &[f64; 2],
-    along: &[f64; 2],
-) -> Option<f64> {
-    let Obfuscation::Rays(rays) = released.obfuscation() else { return None };
-    let bounds = released.bounds()?;
-    let origin = released.origin();
-    let region = rays.regions().and_then(|regions| regions.get(center));
-    // Regions are relative to the origin.
-    let region = region.map(|region| region.about(&origin.map(|x| -x))).unwrap_or(bounds);
-    // Because of rounding, a ray along a border may miss the region.
-    let (_, to) = region.clip(anchor, along).or_else(|| bounds.clip(anchor, along))?;
-    Some(to.max(0.0))
 }
 
 fn narrow(place: &[f64; 2]) -> [f32; 2] {

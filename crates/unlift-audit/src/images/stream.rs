@@ -13,7 +13,6 @@ use unlift::neighbors::{self, Source};
 use unlift::truth::Original;
 use unlift::{PointSet, Unit};
 use unlift_io::Error;
-use unlift_io::features::ImageFeatures;
 use unlift_io::hash::hash_features;
 
 use super::FeatureSource;
@@ -105,13 +104,13 @@ pub struct Needs {
 impl Needs {
     /// Returns the needs of a plan.
     pub fn of_plan(plan: &Plan<2>) -> Self {
-        let needy = |source: &Arc<dyn Source<2>>| source.needs() == neighbors::Needs::Descriptors;
         let own = plan.neighbors.iter().filter_map(|by| match by {
-            NeighborsBy::Source(source) => Some(source.clone()).filter(needy),
+            NeighborsBy::Source(source) => Some(source.clone()),
             NeighborsBy::Oracle | NeighborsBy::Given(_) => None,
         });
+        let needy = own.filter(|source| source.needs() == neighbors::Needs::Descriptors);
         // Measures may use descriptors if there are any.
-        Self { sources: own.collect(), whatever: !plan.measures.is_empty() }
+        Self { sources: needy.collect(), whatever: !plan.measures.is_empty() }
     }
 
     /// Needs nothing, but keeps descriptors if there are any.
@@ -125,8 +124,15 @@ impl Needs {
     }
 }
 
-/// An image, its hash if it is in memory, the number of its moved keypoints, and whether it has descriptors.
-type Ready = (Item<2>, Option<String>, usize, bool);
+/// An image that was read.
+struct Ready {
+    image: Item<2>,
+    /// The hash of an image in memory.
+    sha256: Option<String>,
+    /// Number of keypoints that were moved to the edge.
+    n_moved: usize,
+    described: bool,
+}
 
 /// The images `chosen` of a source. Memory depends on the number of threads, not of images.
 pub struct Stream<'a> {
@@ -159,27 +165,26 @@ impl<'a> Stream<'a> {
         let numbers = &self.chosen[self.next..self.chosen.len().min(self.next + n)];
         self.next += numbers.len();
         let (source, path, needs) = (self.source, self.path, &self.needs);
-        let in_memory = source.is_in_memory();
-        let read = |&at: &usize| (at, image(source, path, at, needs));
-        let read: Vec<_> = numbers.par_iter().with_max_len(1).map(read).collect();
-        for (at, image) in read {
-            match image {
-                Ok(image) => {
-                    let mut tally = self.tally.borrow_mut();
-                    tally.fill(&image.0.original);
-                    tally.n_moved += image.2;
-                    tally.described |= image.3;
-                    drop(tally);
-                    self.ready.push_back((at, Ok(image)));
+        let read = |&at: &usize| (at, read(source, path, at, needs));
+        let images: Vec<_> = numbers.par_iter().with_max_len(1).map(read).collect();
+        let mut tally = self.tally.borrow_mut();
+        for (at, image) in images {
+            match &image {
+                Ok(Ready { image, n_moved, described, .. }) => {
+                    tally.fill(&image.original);
+                    tally.n_moved += n_moved;
+                    tally.described |= described;
                 }
                 // The caller can correct images in memory, so the error ends the audit.
-                Err(error) if in_memory => self.ready.push_back((at, Err(error))),
+                Err(_) if source.is_in_memory() => {}
                 Err(error) => {
-                    self.tally.borrow_mut().unusable += 1;
+                    tally.unusable += 1;
                     self.steps.say(&error.to_string());
                     self.steps.add(1.0, "");
+                    continue;
                 }
             }
+            self.ready.push_back((at, image));
         }
     }
 }
@@ -192,46 +197,43 @@ impl Iterator for Stream<'_> {
             self.read_ahead();
         }
         let (at, ready) = self.ready.pop_front()?;
-        let (image, sha256, ..) = match ready {
-            Ok(ready) => ready,
-            Err(error) => return Some(Err(error)),
-        };
-        let mut tally = self.tally.borrow_mut();
-        tally.used.push(at);
-        tally.hashes.extend(sha256);
-        tally.n_points += image.original.len();
-        tally.sizes.push_back(image.original.len());
-        Some(Ok(image))
+        Some(ready.map(|Ready { image, sha256, .. }| {
+            let mut tally = self.tally.borrow_mut();
+            tally.used.push(at);
+            tally.hashes.extend(sha256);
+            tally.n_points += image.original.len();
+            tally.sizes.push_back(image.original.len());
+            image
+        }))
     }
 }
 
-fn image(
+fn read(
     source: &FeatureSource,
     path: &Path,
     at: usize,
     needs: &Needs,
 ) -> Result<Ready, crate::Error> {
     let features = source.get(at)?;
-    let in_memory = source.is_in_memory();
-    let sha256 = in_memory.then(|| hash_features(&features));
-    let wrong = |expected: &str, found: &str| {
-        Error::new(path, format!("image {}", features.name.escape_debug()), expected, found)
-    };
-    if let Some((expected, found)) = lacking(&features, needs) {
-        return Err(wrong(&expected, &found).into());
+    let sha256 = source.is_in_memory().then(|| hash_features(&features));
+    let place = format!("image {}", features.name.escape_debug());
+    let wrong = |expected: &str, found: &str| Error::new(path, place.clone(), expected, found);
+    // An image without keypoints needs nothing.
+    let needy = needs.sources.iter().filter(|_| !features.keypoints.is_empty());
+    for source in needy {
+        let descriptors = features.descriptors.as_ref();
+        let descriptors = descriptors.ok_or_else(|| wrong("descriptors", "none"))?;
+        source.takes(descriptors).map_err(|error| wrong(error.expected(), error.found()))?;
     }
     let [width, height] = features.size.ok_or_else(|| wrong("a size in pixels", "none"))?;
     // The middle of the first pixel is (0, 0).
     let high = [f64::from(width) - 0.5, f64::from(height) - 0.5];
-    let of_image = |error: unlift::Error| {
-        Error::core(path, error.within(&format!("image {}", features.name.escape_debug())))
-    };
+    let of_image = |error: unlift::Error| Error::core(path, error.within(&place));
     let bounds = Bounds::try_new([-0.5; 2], high).map_err(of_image)?;
     // hloc stores half floats, whose rounding error is up to a pixel.
     let mut n_moved = 0;
     let to_edge = |keypoint: [f64; 2]| {
-        let near: [f64; 2] =
-            std::array::from_fn(|c| keypoint[c].clamp(bounds.low[c], bounds.high[c]));
+        let near = [0, 1].map(|c| keypoint[c].clamp(bounds.low[c], bounds.high[c]));
         let is_near = (0..2).all(|c| (near[c] - keypoint[c]).abs() <= 1.0) && near != keypoint;
         n_moved += usize::from(is_near);
         if is_near { near } else { keypoint }
@@ -242,18 +244,6 @@ fn image(
     // Descriptors use most of the memory of an image.
     let described = features.descriptors.is_some();
     let descriptors = features.descriptors.filter(|_| needs.descriptors() || needs.whatever);
-    Ok((Item { name: features.name, original, descriptors }, sha256, n_moved, described))
-}
-
-/// Returns what was expected of these features and what was found; `None` if nothing is missing. An
-/// image without keypoints needs nothing.
-fn lacking(features: &ImageFeatures, needs: &Needs) -> Option<(String, String)> {
-    if features.keypoints.is_empty() || !needs.descriptors() {
-        return None;
-    }
-    let Some(found) = &features.descriptors else {
-        return Some(("descriptors".to_owned(), "none".to_owned()));
-    };
-    let error = needs.sources.iter().find_map(|source| source.takes(found).err())?;
-    Some((error.expected().to_owned(), error.found().to_owned()))
+    let image = Item { name: features.name, original, descriptors };
+    Ok(Ready { image, sha256, n_moved, described })
 }

@@ -21,9 +21,6 @@ const SIX: [(&str, [[f64; 3]; 3]); 6] = [
 const SIDE: usize = 640;
 
 /// Returns six views, by name, that together cover all directions from the center of `released`.
-///
-/// # Errors
-/// If its records are not bearings from one center.
 pub fn six_views(released: &Released<3>) -> Result<Vec<(&'static str, View)>, Error> {
     let (_, center) = bearings(released)?;
     let center = std::array::from_fn(|c| released.origin()[c] + f64::from(center[c]));
@@ -36,9 +33,6 @@ pub fn six_views(released: &Released<3>) -> Result<Vec<(&'static str, View)>, Er
 
 /// Returns a place on every bearing of `released`, at distance 1 from the center. Bearings that look
 /// like decoys have none.
-///
-/// # Errors
-/// If its records are not bearings from one center, or have no descriptors.
 pub fn on_bearings(released: &Released<3>) -> Result<Recovered<3>, Error> {
     let (rays, center) = bearings(released)?;
     let source: &dyn Source<3> = &Similarity;

@@ -7,22 +7,18 @@ use unlift::audit::{Cell, Counts, Measure, Row};
 use unlift::{Descriptors, Error};
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_vision::features::ColorImage;
-use unlift_vision::features::photo::jpeg_of;
-use unlift_vision::features::photo::{Turn, read_color_with};
+use unlift_vision::features::photo::{Turn, jpeg_of, read_color_with};
 use unlift_vision::network::DescriptorKind;
-use unlift_vision::pictures::{Detection, Points};
+use unlift_vision::pictures::Points;
 
 use crate::images::FeatureSource;
 
-use super::{Judged, Painter, SHOWN, figures, needed, painted, shown, size};
+use super::{Painter, Photo, Picture, SHOWN, needed, size};
 
-/// A photo at the size of its pictures, and the baseline of its true points.
+/// A photo and the picture of its true points: no attack on positions can be expected to do better.
 struct Truth {
-    photo: ColorImage,
-    objects: Vec<Detection>,
-    picture: ColorImage,
-    /// The figures of that picture: no attack on positions can be expected to do better.
-    baseline: Judged,
+    photo: Photo,
+    baseline: Picture,
 }
 
 /// Number of photos kept for further cells; fewer images are processed at the same time.
@@ -47,9 +43,6 @@ impl fmt::Debug for Inversion {
 impl Inversion {
     /// Opens the measure for the images of `source` at `path`. Photos are in the folder `photos`, or in `path`. `kind` is that of the
     /// descriptors.
-    ///
-    /// # Errors
-    /// If there is no folder of photos, or a network cannot be read.
     pub fn open(
         (source, path): (&FeatureSource, &Path),
         kind: DescriptorKind,
@@ -61,12 +54,12 @@ impl Inversion {
         let photos = photos.ok_or_else(|| crate::Error::request(none))?;
         let (painter, photos) = (Painter::open(kind, network)?, photos.to_owned());
         let (known, failed) = Default::default();
-        Ok(Self { painter, photos, turn: source.turn(), known, failed })
+        Ok(Self { painter, photos, turn: source.turn, known, failed })
     }
 
     /// Returns the SHA-256 of the painting network, in hexadecimal.
     pub fn sha256(&self) -> &str {
-        self.painter.sha256()
+        self.painter.inverter.sha256()
     }
 
     /// Returns the reasons why images have no pictures, ordered by image name.
@@ -75,13 +68,9 @@ impl Inversion {
     }
 
     /// Adds the picture of `cell` to the sheet of its image.
-    ///
-    /// # Errors
-    /// If the photo cannot be used (see [`failed`](Self::failed)).
     pub fn add(&self, cell: &Cell<'_, 2>, sheet: &mut Sheet) -> Result<(), Error> {
-        let truth = self.truth(cell)?;
-        let picture = self.painter.image(cell.released, cell.recovered)?;
-        self.put(&truth, cell.row, &picture, sheet)
+        let image = self.painter.image(cell.released, cell.recovered)?;
+        self.put(&*self.truth(cell)?, cell.row, image, sheet)
     }
 
     /// Adds the picture of `recovered` keypoints to the sheet of the image `name`, whose photo has
@@ -95,23 +84,22 @@ impl Inversion {
         sheet: &mut Sheet,
     ) -> Result<(), Error> {
         let truth = self.truth_of(name, size, original)?;
-        let picture = self.painter.inverter.invert(recovered, size)?;
-        self.put(&truth, row, &picture, sheet)
+        let image = self.painter.inverter.invert(recovered, size)?;
+        self.put(&truth, row, image, sheet)
     }
 
     fn put(
         &self,
         truth: &Truth,
         row: &Row,
-        picture: &ColorImage,
+        image: ColorImage,
         sheet: &mut Sheet,
     ) -> Result<(), Error> {
         if sheet.photo.is_empty() {
-            sheet.photo = jpeg_of(&truth.photo, SHOWN)?;
-            sheet.baseline = painted(&truth.picture, &truth.baseline)?;
+            sheet.photo = jpeg_of(&truth.photo.image, SHOWN)?;
+            sheet.baseline = truth.baseline.painted()?;
         }
-        let judged = self.painter.judge(picture, &truth.photo, &truth.objects)?;
-        sheet.views.push(shown(row, picture, &judged)?);
+        sheet.views.push(self.painter.compare(image, &truth.photo)?.shown(row)?);
         Ok(())
     }
 
@@ -139,11 +127,10 @@ impl Inversion {
             let path = path.display().to_string().escape_debug().to_string();
             return Err(Error::new(path, format!("a photo of {expected}"), found));
         }
-        let photo = photo.halved()?;
-        let picture = self.painter.keypoints(places, descriptors, size)?;
-        let objects = self.painter.objects(&photo)?;
-        let baseline = self.painter.judge(&picture, &photo, &objects)?;
-        let truth = Arc::new(Truth { photo, objects, picture, baseline });
+        let photo = self.painter.photo(&photo)?;
+        let image = self.painter.keypoints(places, descriptors, size)?;
+        let baseline = self.painter.compare(image, &photo)?;
+        let truth = Arc::new(Truth { photo, baseline });
         let mut known = lock(&self.known);
         if known.len() >= KEPT {
             known.clear();
@@ -170,9 +157,8 @@ impl Measure<2> for Inversion {
                 return Ok(Vec::new());
             }
         };
-        let picture = self.painter.image(cell.released, cell.recovered)?;
-        let found = self.painter.judge(&picture, &truth.photo, &truth.objects)?;
-        Ok(figures(&found, &truth.baseline))
+        let image = self.painter.image(cell.released, cell.recovered)?;
+        Ok(self.painter.compare(image, &truth.photo)?.figures(&truth.baseline))
     }
 }
 

@@ -14,17 +14,15 @@ use unlift_io::read::colmap;
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::pictures::{Marks, ReleasedView};
 use unlift_report::scene::{SceneBox, Shapes};
-use unlift_vision::features::ColorImage;
-use unlift_vision::features::photo::jpeg_of;
-use unlift_vision::features::photo::{Turn, read_color_with};
-use unlift_vision::pictures::{Detection, Lens, View};
+use unlift_vision::features::photo::{Turn, jpeg_of, read_color_with};
+use unlift_vision::pictures::{Lens, View};
 
-use super::{Judged, Painter, SHOWN, figures, needed, painted, shown};
+use super::{Painter, Photo, Picture, SHOWN, needed};
 use crate::Progress;
 use crate::changes::kind_of;
-use crate::images::choice;
+use crate::images::evenly;
+use crate::maps::{near, shapes};
 use crate::prepare::Prepared;
-use crate::scene::{near, shapes};
 
 /// Smallest side of a picture for which the metrics are defined.
 const LEAST_SIDE: usize = 16;
@@ -33,12 +31,10 @@ const LEAST_SIDE: usize = 16;
 struct PhotoView {
     name: String,
     view: View,
-    photo: ColorImage,
-    objects: Vec<Detection>,
+    photo: Photo,
+    /// The picture of the true points.
     truth: OnceLock<Result<Picture, Error>>,
 }
-
-type Picture = (ColorImage, Judged);
 
 /// Makes pictures of a map and compares them with the photos.
 pub struct MapInversion {
@@ -92,9 +88,7 @@ impl MapInversion {
             progress.say(&format!("note: {}: {found}", photos.display()));
         }
         let mut views = Vec::new();
-        for (image, path) in
-            choice::evenly(n, Some(max_images)).into_iter().map(|at| &with_photo[at])
-        {
+        for (image, path) in evenly(n, Some(max_images)).into_iter().map(|at| &with_photo[at]) {
             let made = image.camera(&cameras).ok_or_else(|| {
                 let id = image.camera_id.to_string();
                 Error::new(path.display().to_string(), "a camera of the model", id)
@@ -113,7 +107,7 @@ impl MapInversion {
 
     /// Returns the SHA-256 of the painting network, in hexadecimal.
     pub fn sha256(&self) -> &str {
-        self.painter.sha256()
+        self.painter.inverter.sha256()
     }
 
     /// Returns the number of photos.
@@ -135,48 +129,39 @@ impl MapInversion {
         let is_new =
             |sheet: &Sheet| sheet.released.iter().all(|shown| shown.scheme != cell.row.scheme);
         let records = sheets.iter().any(is_new).then(|| records(cell));
-        for ((photo_view, sheet), (picture, judged)) in self.views.iter().zip(sheets).zip(pictures)
-        {
-            let (painted_of_truth, baseline) = self.truth(photo_view, cell)?;
+        for ((of, sheet), picture) in self.views.iter().zip(sheets).zip(pictures) {
             if sheet.photo.is_empty() {
-                sheet.name.clone_from(&photo_view.name);
-                sheet.size = photo_view.view.size.map(|side| side as u32);
-                sheet.photo = jpeg_of(&photo_view.photo, SHOWN)?;
-                sheet.baseline = painted(painted_of_truth, baseline)?;
+                sheet.name.clone_from(&of.name);
+                sheet.size = of.view.size.map(|side| side as u32);
+                sheet.photo = jpeg_of(&of.photo.image, SHOWN)?;
+                sheet.baseline = self.truth(of, cell)?.painted()?;
             }
             if let Some((shapes, middle)) = &records {
-                let marks = marks(&photo_view.view, shapes, middle)?;
+                let marks = marks(&of.view, shapes, middle)?;
                 sheet.released.push(ReleasedView { scheme: cell.row.scheme.clone(), marks });
             }
-            sheet.views.push(shown(cell.row, &picture, &judged)?);
+            sheet.views.push(picture.shown(cell.row)?);
         }
         Ok(())
     }
 
     fn pictures(&self, cell: &Cell<'_>, n: usize) -> Result<Vec<Picture>, Error> {
-        let of_one = |photo_view: &PhotoView| {
-            let picture = self.painter.map(&photo_view.view, cell.released, cell.recovered)?;
-            let judged = self.painter.judge(&picture, &photo_view.photo, &photo_view.objects)?;
-            Ok((picture, judged))
+        let picture = |of: &PhotoView| {
+            let image = self.painter.map(&of.view, cell.released, cell.recovered)?;
+            self.painter.compare(image, &of.photo)
         };
-        self.views.par_iter().take(n).map(of_one).collect()
+        self.views.par_iter().take(n).map(picture).collect()
     }
 
-    fn truth<'a>(
-        &'a self,
-        photo_view: &'a PhotoView,
-        cell: &Cell<'_>,
-    ) -> Result<&'a Picture, Error> {
+    fn truth<'a>(&'a self, of: &'a PhotoView, cell: &Cell<'_>) -> Result<&'a Picture, Error> {
         let make = || {
             let originals = cell.original.reveal().positions();
             let positions: Vec<Option<[f64; 3]>> = originals.iter().copied().map(Some).collect();
             let descriptors = needed(cell.descriptors)?;
-            let picture =
-                self.painter.picture_of(&photo_view.view, &positions, descriptors, |_, _| 1.0)?;
-            let baseline = self.painter.judge(&picture, &photo_view.photo, &photo_view.objects)?;
-            Ok((picture, baseline))
+            let image = self.painter.points(&of.view, &positions, descriptors, |_, _| 1.0)?;
+            self.painter.compare(image, &of.photo)
         };
-        photo_view.truth.get_or_init(make).as_ref().map_err(Error::clone)
+        of.truth.get_or_init(make).as_ref().map_err(Error::clone)
     }
 }
 
@@ -185,8 +170,8 @@ impl Measure<3> for MapInversion {
     fn measure(&self, cell: &Cell<'_>) -> Result<Vec<(String, f64)>, Error> {
         let pictures = self.pictures(cell, self.views.len())?;
         let mut all = Vec::new();
-        for (photo_view, (_, judged)) in self.views.iter().zip(&pictures) {
-            all.extend(figures(judged, &self.truth(photo_view, cell)?.1));
+        for (of, picture) in self.views.iter().zip(&pictures) {
+            all.extend(picture.figures(self.truth(of, cell)?));
         }
         let mut sums = BTreeMap::new();
         for (name, value) in all {
@@ -249,38 +234,26 @@ fn open_photo(
 ) -> Result<PhotoView, Error> {
     // COLMAP ignores the orientation tag of photos.
     let photo = read_color_with(path, Turn::AsStored)?;
-    let name = String::from_utf8_lossy(&image.name).into_owned();
-    view(camera, image, scale)
-        .and_then(|view| photo_view(painter, name, view, &photo))
-        .map_err(|error| error.within(&path.display().to_string().escape_debug().to_string()))
-}
-
-fn photo_view(
-    painter: &Painter,
-    name: String,
-    view: View,
-    photo: &ColorImage,
-) -> Result<PhotoView, Error> {
-    let [width, height] = view.size;
-    if [photo.width(), photo.height()] != view.size {
-        let expected = format!("a photo of {width} x {height} pixels, as its camera");
-        let found = format!("{} x {}", photo.width(), photo.height());
-        return Err(Error::new("size", expected, found));
-    }
-    if width.min(height) < 2 * LEAST_SIDE {
-        let expected = format!("at least {0} x {0} pixels", 2 * LEAST_SIDE);
-        return Err(Error::new("size", expected, format!("{width} x {height} pixels")));
-    }
-    let photo = photo.halved()?;
-    let objects = painter.objects(&photo)?;
-    Ok(PhotoView { name, view, photo, objects, truth: OnceLock::new() })
+    let open = || {
+        let view = view(camera, image, scale)?;
+        let [width, height] = view.size;
+        if [photo.width(), photo.height()] != view.size {
+            let expected = format!("a photo of {width} x {height} pixels, as its camera");
+            let found = format!("{} x {}", photo.width(), photo.height());
+            return Err(Error::new("size", expected, found));
+        }
+        if width.min(height) < 2 * LEAST_SIDE {
+            let expected = format!("at least {0} x {0} pixels", 2 * LEAST_SIDE);
+            return Err(Error::new("size", expected, format!("{width} x {height} pixels")));
+        }
+        let name = String::from_utf8_lossy(&image.name).into_owned();
+        Ok(PhotoView { name, view, photo: painter.photo(&photo)?, truth: OnceLock::new() })
+    };
+    open().map_err(|error| error.within(&path.display().to_string().escape_debug().to_string()))
 }
 
 /// Returns the view of an image of a COLMAP model; `scale` is the number of units per unit of the
 /// model.
-///
-/// # Errors
-/// If COLMAP has no such camera model.
 pub fn view(camera: &colmap::Camera, image: &colmap::Image, scale: f64) -> Result<View, Error> {
     Ok(View {
         pose: Pose { center: image.pose.center.map(|x| x * scale), ..image.pose },

@@ -5,21 +5,21 @@ mod images;
 mod maps;
 
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use unlift::audit::Row;
 use unlift::recover::Recovered;
 use unlift::released::Released;
 use unlift::{Descriptors, Error, RowOrder};
-use unlift_report::inversions::{InvertedView, Likeness, Painted};
+use unlift_report::inversions::Painted;
+use unlift_report::{Attack, ByAttack};
 use unlift_vision::features::ColorImage;
 use unlift_vision::features::photo::jpeg_of;
 use unlift_vision::network::DescriptorKind;
 use unlift_vision::pictures::{
     CLASSES, Detection, Detector, Inverter, Lpips, Metrics, Points, Projection, View,
 };
-
-use unlift_report::Given;
 
 pub use bearings::{on_bearings, six_views};
 pub use images::Inversion;
@@ -53,19 +53,23 @@ pub struct Painter {
     detector: Detector,
 }
 
-/// The comparison of a picture with its photo.
+/// A photo at the size of its pictures, and its objects.
+struct Photo {
+    image: ColorImage,
+    objects: Vec<Detection>,
+}
+
+/// A picture, compared with its photo.
 #[derive(Clone, Debug)]
-struct Judged {
+struct Picture {
+    image: ColorImage,
     metrics: Metrics,
     /// The class of every object of the photo, and whether it is found in the picture.
-    found: Vec<(usize, bool)>,
+    objects: Vec<(usize, bool)>,
 }
 
 impl Painter {
     /// Opens the painter for descriptors of `kind`, with the network of the user or the known one, and the networks that compare.
-    ///
-    /// # Errors
-    /// If a network cannot be read.
     pub fn open(kind: DescriptorKind, network: Option<&Path>) -> Result<Self, crate::Error> {
         let inverter = match network {
             Some(path) => Inverter::read(path, kind),
@@ -76,9 +80,6 @@ impl Painter {
     }
 
     /// Makes the picture of keypoints `(n, 2)` in an image of `size` (width, height) pixels.
-    ///
-    /// # Errors
-    /// If there is not one descriptor per keypoint, of a kind that the network supports.
     pub fn keypoints(
         &self,
         places: &[[f32; 2]],
@@ -110,30 +111,24 @@ impl Painter {
     }
 
     /// Makes the picture of a recovered map as `view` sees it.
-    ///
-    /// # Errors
-    /// If descriptors were not released, or the network does not support them.
     pub fn map(
         &self,
         view: &View,
         released: &Released<3>,
         recovered: &Recovered<3>,
     ) -> Result<ColorImage, Error> {
-        let positions: Vec<_> =
-            (0..recovered.n_slots()).map(|slot| recovered.position(slot)).collect();
-        self.picture_of(view, &positions, &*assigned(released, recovered)?, |slot, depth| {
+        let descriptors = &*assigned(released, recovered)?;
+        self.points(view, &positions(recovered), descriptors, |slot, depth| {
             weight(recovered, slot, NEAR * f64::from(depth))
         })
     }
 
     /// Returns true if any recovered point is in front of the camera.
     pub fn sees(&self, view: &View, recovered: &Recovered<3>) -> Result<bool, Error> {
-        let positions: Vec<_> =
-            (0..recovered.n_slots()).map(|slot| recovered.position(slot)).collect();
-        Ok(!view.project(&positions)?.points.is_empty())
+        Ok(!view.project(&positions(recovered))?.points.is_empty())
     }
 
-    fn picture_of(
+    fn points(
         &self,
         view: &View,
         positions: &[Option<[f64; 3]>],
@@ -147,76 +142,59 @@ impl Painter {
         self.inverter.invert(&points, view.size)
     }
 
-    fn sha256(&self) -> &str {
-        self.inverter.sha256()
+    fn photo(&self, photo: &ColorImage) -> Result<Photo, Error> {
+        let image = photo.halved()?;
+        Ok(Photo { objects: self.detector.find(&image, SURE)?, image })
     }
 
-    fn objects(&self, photo: &ColorImage) -> Result<Vec<Detection>, Error> {
-        self.detector.find(photo, SURE)
-    }
-
-    fn judge(
-        &self,
-        picture: &ColorImage,
-        photo: &ColorImage,
-        objects: &[Detection],
-    ) -> Result<Judged, Error> {
-        let metrics = Metrics::of(picture, photo, &self.lpips)?;
-        let repeated = self.objects(picture)?;
+    fn compare(&self, image: ColorImage, photo: &Photo) -> Result<Picture, Error> {
+        let metrics = Metrics::of(&image, &photo.image, &self.lpips)?;
+        let found = self.detector.find(&image, SURE)?;
         let again = |object: &Detection| {
-            repeated
-                .iter()
-                .any(|found| found.class == object.class && found.overlap(object) >= SAME)
+            let mut same = found.iter().filter(|of| of.class == object.class);
+            (object.class, same.any(|of| of.overlap(object) >= SAME))
         };
-        let found = objects.iter().map(|object| (object.class, again(object))).collect();
-        Ok(Judged { metrics, found })
+        Ok(Picture { image, metrics, objects: photo.objects.iter().map(again).collect() })
     }
 }
 
-impl Judged {
-    /// Returns the share of the photo's objects that are found in the picture, if there are any;
-    /// then by class.
-    fn objects_found(&self) -> Vec<(String, f64)> {
+impl Picture {
+    /// Returns the figures of the picture: its similarity, the share of the photo's objects that are found in it, if there are
+    /// any, and then by class. Names end with `end`.
+    fn named(&self, end: &str) -> Vec<(String, f64)> {
+        let Metrics { ssim, psnr, lpips } = self.metrics;
+        let figures = [("ssim", ssim), ("psnr", psnr.min(MOST_DB)), ("lpips", lpips)];
         let share = |of: &dyn Fn(usize) -> bool| {
-            let of = self.found.iter().filter(|(class, _)| of(*class));
+            let of = self.objects.iter().filter(|(class, _)| of(*class));
             let (n, found) = (of.clone().count(), of.filter(|(_, found)| *found).count());
             found as f64 / n as f64
         };
-        let mut classes: Vec<usize> = self.found.iter().map(|(class, _)| *class).collect();
-        classes.sort_unstable();
-        classes.dedup();
+        let classes: BTreeSet<usize> = self.objects.iter().map(|(class, _)| *class).collect();
         let all = (!classes.is_empty()).then(|| (OBJECTS.to_owned(), share(&|_| true)));
         let name = |class: usize| format!("{OBJECTS}_of_{}", CLASSES[class].replace(' ', "_"));
         let each = classes.iter().map(|&class| (name(class), share(&|known| known == class)));
-        all.into_iter().chain(each).collect()
+        let figures = figures.map(|(name, value)| (name.to_owned(), value)).into_iter();
+        let named = figures.chain(all).chain(each);
+        named.map(|(name, value)| (name + end, value)).collect()
+    }
+
+    /// Returns the figures of the picture and of the picture of the true points.
+    fn figures(&self, baseline: &Self) -> Vec<(String, f64)> {
+        [self.named(""), baseline.named(BASELINE)].concat()
+    }
+
+    fn painted(&self) -> Result<Painted, Error> {
+        let Metrics { ssim, lpips, .. } = self.metrics;
+        Ok(Painted { jpeg: jpeg_of(&self.image, SHOWN)?, ssim, lpips })
+    }
+
+    fn shown(&self, row: &Row) -> Result<ByAttack<Painted>, Error> {
+        Ok(ByAttack { attack: Attack::of(row), recovered: self.painted()? })
     }
 }
 
-fn figures(found: &Judged, baseline: &Judged) -> Vec<(String, f64)> {
-    let named = |(judged, of): (&Judged, &str)| {
-        let Metrics { ssim, psnr, lpips } = judged.metrics;
-        let figures = [("ssim", ssim), ("psnr", psnr.min(MOST_DB)), ("lpips", lpips)];
-        let figures = figures.map(|(name, value)| (name.to_owned(), value)).into_iter();
-        let all = figures.chain(judged.objects_found());
-        all.map(|(name, value)| (name + of, value)).collect::<Vec<_>>()
-    };
-    [(found, ""), (baseline, BASELINE)].into_iter().flat_map(named).collect()
-}
-
-fn shown(row: &Row, picture: &ColorImage, judged: &Judged) -> Result<InvertedView, Error> {
-    Ok(InvertedView {
-        scheme: row.scheme.clone(),
-        given: Given::of(row),
-        solver: row.solver.to_owned(),
-        painted: painted(picture, judged)?,
-    })
-}
-
-fn painted(picture: &ColorImage, judged: &Judged) -> Result<Painted, Error> {
-    Ok(Painted {
-        jpeg: jpeg_of(picture, SHOWN)?,
-        likeness: Likeness { ssim: judged.metrics.ssim, lpips: judged.metrics.lpips },
-    })
+fn positions(recovered: &Recovered<3>) -> Vec<Option<[f64; 3]>> {
+    (0..recovered.n_slots()).map(|slot| recovered.position(slot)).collect()
 }
 
 fn needed(descriptors: Option<&Descriptors>) -> Result<&Descriptors, Error> {

@@ -250,8 +250,7 @@ impl<'a> Held<'a> {
         key: &Key,
     ) -> Result<Vec<Problem>, Error> {
         let mut pairs = self.pairs_in_the_clear();
-        let points: Vec<usize> = (0..self.is_part.len()).filter(|&row| self.is_part[row]).collect();
-        let map = Unit32::of(&self.descriptors, points.iter().copied());
+        let (points, map) = self.parts();
         let hide = |(number, query): (usize, &Query)| {
             let n = query.places.len();
             let keypoints = PointSet::try_new(query.places.clone(), Unit::Pixel)?;
@@ -265,8 +264,8 @@ impl<'a> Held<'a> {
                 protection.protect(&Descriptors::try_new(plain, query.descriptors.dim)?, &key)?;
             let mut best = Best::new(n, map.len());
             for j in 0..map.len() {
-                let similar = protected.similarities(map.row(j));
-                similar.into_iter().enumerate().for_each(|(i, x)| best.offer(i, j, x));
+                let similar = protected.similarities(map.row(j)).into_iter().enumerate();
+                similar.for_each(|(i, x)| best.offer(i, j, x));
             }
             let pairs = best.pairs(has_ties(&protected)).into_iter();
             Ok((free, Some(pairs.map(|(i, j)| (i, points[j])).collect::<Vec<_>>())))
@@ -289,9 +288,15 @@ impl<'a> Held<'a> {
     }
 
     fn pairs_in_the_clear(&mut self) -> Arc<Vec<Vec<Pair>>> {
+        let (rows, unit) = self.parts();
+        self.pairs(rows, Compared::Plain(unit))
+    }
+
+    /// Returns the points of the map, and their descriptors.
+    fn parts(&self) -> (Vec<usize>, Unit32) {
         let rows: Vec<usize> = (0..self.is_part.len()).filter(|&row| self.is_part[row]).collect();
         let unit = Unit32::of(&self.descriptors, rows.iter().copied());
-        self.pairs(rows, Compared::Plain(unit))
+        (rows, unit)
     }
 
     /// Returns the matches of every image with the points `rows`, whose descriptors are `compared`.
@@ -340,7 +345,6 @@ impl<'a> Held<'a> {
             });
             Problem {
                 truth: query.camera,
-                size: query.size,
                 start,
                 n_pairs: pairs.len(),
                 n_right: pairs.iter().filter(is_right).count(),
@@ -367,11 +371,9 @@ impl<'a> Held<'a> {
 /// The pose problem of one held-out image.
 pub struct Problem {
     /// The camera with its true pose.
-    pub truth: Camera,
-    /// Width and height of the image in pixels.
-    pub size: [f64; 2],
+    truth: Camera,
     /// The matches, as far as they fix the pose.
-    pub matches: Vec<Match>,
+    matches: Vec<Match>,
     /// The pose of the most similar other image, and the standard deviation of further starts.
     start: Option<(Camera, f64)>,
     n_pairs: usize,
@@ -387,21 +389,15 @@ pub struct Located {
     error: Option<PoseError>,
 }
 
-impl Problem {
-    /// Estimates the pose and returns its error.
-    pub fn solve(&self, seed: u64) -> Option<PoseError> {
-        let (start, reach) = self.start.as_ref()?;
-        let (found, _) = estimate(start, &self.matches, *reach, seed)?;
-        Some(found.pose.error(&self.truth.pose))
-    }
-}
-
 /// Estimates the poses of all images.
 pub fn locate(problems: &[Problem], seed: u64) -> Vec<Located> {
-    let of = |(number, problem): (usize, &Problem)| Located {
-        n_pairs: problem.n_pairs,
-        n_right: problem.n_right,
-        error: problem.solve(seed.wrapping_add(number as u64)),
+    let of = |(number, problem): (usize, &Problem)| {
+        let Problem { truth, matches, start, n_pairs, n_right } = problem;
+        let estimate = start.as_ref().and_then(|(start, reach)| {
+            estimate(start, matches, *reach, seed.wrapping_add(number as u64))
+        });
+        let error = estimate.map(|(camera, _)| camera.pose.error(&truth.pose));
+        Located { n_pairs: *n_pairs, n_right: *n_right, error }
     };
     problems.par_iter().enumerate().map(of).collect()
 }

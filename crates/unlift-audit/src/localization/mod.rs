@@ -31,9 +31,6 @@ pub struct Localize<'a> {
 
 impl<'a> Localize<'a> {
     /// Returns the localization of one of `nth` images, with photos or features at `path`.
-    ///
-    /// # Errors
-    /// If the map has no cameras that observe its points.
     pub fn held_out(
         prepared: &'a Prepared,
         path: &Path,
@@ -115,11 +112,15 @@ impl Cameras {
     }
 }
 
+/// What a scheme protects.
+enum Protects<'a> {
+    Nothing,
+    Map(&'a dyn Scheme<3>),
+    Queries(&'a dyn Scheme<2>),
+}
+
 /// Returns the accuracy under every scheme of `plan` and under every scheme on queries, after that
 /// of the map itself, and notes. Empty without views.
-///
-/// # Errors
-/// If a scheme cannot hide the keypoints of an image, or features cannot be read.
 pub(crate) fn of_schemes(
     localize: &Localize<'_>,
     original: &Original<3>,
@@ -133,87 +134,65 @@ pub(crate) fn of_schemes(
     let positions = original.reveal().positions();
     let base = unprotected(views, positions);
     let row = |scheme: &str, errors: &[Option<PoseError>]| {
-        let found = Localization::of(errors, &base);
+        let bound = Localization::of(errors, &base);
         let finite = |value: f64| Some(value).filter(|value| value.is_finite());
         report::Localization {
             scheme: scheme.to_owned(),
             of_queries: false,
-            multiple: finite(found.multiple),
-            center_error: finite(found.center),
-            rotation_error_degrees: finite(found.rotation_degrees),
-            failed_percent: found.failed_percent,
+            multiple: finite(bound.multiple),
+            center_error: finite(bound.center),
+            rotation_error_degrees: finite(bound.rotation_degrees),
+            failed_percent: bound.failed_percent,
             changes_descriptors: false,
             held_out: None,
         }
     };
     let key = Key::from_seed(plan.seed);
-    let mut rows = vec![row(UNPROTECTED, &base)];
+    let mut rows = vec![(Protects::Nothing, row(UNPROTECTED, &base))];
     for scheme in &plan.schemes {
         // A scheme that cannot hide the map is among those that were not audited.
         let Ok((released, secret)) = obfuscate(&**scheme, original, None, &key) else { continue };
-        let errors = with_map(views, positions, &released, &secret);
+        let row = row(scheme.name(), &with_map(views, positions, &released, &secret));
         let changes_descriptors = scheme.changes_descriptors();
-        rows.push(report::Localization { changes_descriptors, ..row(scheme.name(), &errors) });
+        rows.push((Protects::Map(&**scheme), report::Localization { changes_descriptors, ..row }));
     }
     let queries = localize.query_schemes();
     for scheme in &queries {
-        let errors = with_queries(views, positions, &**scheme, &key)?;
+        let row = row(scheme.name(), &with_queries(views, positions, &**scheme, &key)?);
         let changes_descriptors = scheme.changes_descriptors();
-        let row = row(scheme.name(), &errors);
-        rows.push(report::Localization { of_queries: true, changes_descriptors, ..row });
+        let row = report::Localization { of_queries: true, changes_descriptors, ..row };
+        rows.push((Protects::Queries(&**scheme), row));
     }
-    let notes = match &localize.held_out {
-        None => Vec::new(),
-        Some((path, nth)) => {
-            let of = (localize.cameras, original, plan);
-            vec![hold_out(path, *nth, of, &queries, &mut rows, progress)?]
-        }
-    };
-    Ok((rows, notes))
-}
-
-/// Adds what was measured on held-out images to every row, and returns a note about them.
-fn hold_out(
-    path: &Path,
-    nth: usize,
-    (cameras, original, plan): (&Cameras, &Original<3>, &Plan<3>),
-    queries: &[Arc<dyn Scheme<2>>],
-    rows: &mut [report::Localization],
-    progress: &dyn Progress,
-) -> Result<String, Error> {
-    let mut held = held_out::Held::open(path, nth, cameras, original, progress)?;
-    let note = held.note();
-    progress.say(&format!("note: {note}"));
-    let (key, seed) = (Key::from_seed(plan.seed), plan.seed);
-    let base = held_out::locate(&held.unprotected(), seed);
-    let limits: Vec<(String, f64, f64)> = match original.reveal().unit() {
-        unlift::Unit::Meter => [(0.05, 5.0), (0.25, 2.0), (0.5, 5.0)]
-            .map(|(m, angle)| (format!("{:.0} cm, {angle} deg", 100.0 * m), m, angle))
-            .to_vec(),
-        // Without a scale, multiples of the unprotected bound.
-        _ => {
-            let bound = rows[0].center_error.unwrap_or(0.0);
-            [10.0, 30.0, 100.0]
-                .map(|times| (format!("{times} times the bound, 5 deg"), times * bound, 5.0))
-                .to_vec()
-        }
-    };
-    let n_rows = rows.len();
-    for (at, row) in rows.iter_mut().enumerate() {
-        progress.show(at, n_rows, &format!("localization, {}", row.scheme));
-        let problems = match row.of_queries {
-            true => {
-                let scheme = queries.iter().find(|scheme| scheme.name() == row.scheme);
-                scheme.map(|scheme| held.with_queries(&**scheme, &key)).transpose()?
-            }
-            false => {
-                let scheme = plan.schemes.iter().find(|scheme| scheme.name() == row.scheme);
-                scheme.map(|scheme| held.with_map(&**scheme, &key)).transpose()?
+    let mut notes = Vec::new();
+    if let Some((path, nth)) = &localize.held_out {
+        let mut held = held_out::Held::open(path, *nth, localize.cameras, original, progress)?;
+        notes.push(held.note());
+        progress.say(&format!("note: {}", held.note()));
+        let base = held_out::locate(&held.unprotected(), plan.seed);
+        let limits: Vec<(String, f64, f64)> = match original.reveal().unit() {
+            unlift::Unit::Meter => [(0.05, 5.0), (0.25, 2.0), (0.5, 5.0)]
+                .map(|(m, angle)| (format!("{:.0} cm, {angle} deg", 100.0 * m), m, angle))
+                .to_vec(),
+            // Without a scale, multiples of the unprotected bound.
+            _ => {
+                let bound = rows[0].1.center_error.unwrap_or(0.0);
+                [10.0, 30.0, 100.0]
+                    .map(|times| (format!("{times} times the bound, 5 deg"), times * bound, 5.0))
+                    .to_vec()
             }
         };
-        let located = problems.map(|problems| held_out::locate(&problems, seed));
-        let located = located.as_ref().unwrap_or(&base);
-        row.held_out = Some(held_out::summary(located, &base, &limits));
+        let n_rows = rows.len();
+        for (at, (protects, row)) in rows.iter_mut().enumerate() {
+            progress.show(at, n_rows, &format!("localization, {}", row.scheme));
+            let problems = match protects {
+                Protects::Nothing => None,
+                Protects::Map(scheme) => Some(held.with_map(*scheme, &key)?),
+                Protects::Queries(scheme) => Some(held.with_queries(*scheme, &key)?),
+            };
+            let located = problems.map(|problems| held_out::locate(&problems, plan.seed));
+            let located = located.as_ref().unwrap_or(&base);
+            row.held_out = Some(held_out::summary(located, &base, &limits));
+        }
     }
-    Ok(note)
+    Ok((rows.into_iter().map(|(_, row)| row).collect(), notes))
 }

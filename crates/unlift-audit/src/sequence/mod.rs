@@ -37,7 +37,7 @@ use self::view::Model;
 pub use self::view::View;
 use crate::audit::{Attacked, Audit};
 use crate::gate::Tried;
-use crate::images::{FeatureSource, choice};
+use crate::images::{FeatureSource, evenly};
 use crate::inversion::{Inversion, NEAR_PX, weight};
 use crate::sources::BY_DESCRIPTORS;
 use crate::{Error, Progress, check_stop, document};
@@ -89,8 +89,8 @@ impl Sequence<'_> {
             return Err(unlift_io::Error::new(self.model, "", expected, input.format).into());
         };
         let pose_error = self.pose_error.map(|error| (error, self.plan.seed));
-        let (mut views, mut unusable) = (Vec::new(), self.source.refused().len());
-        self.source.refused().iter().for_each(|error| progress.say(&error.to_string()));
+        let (mut views, mut unusable) = (Vec::new(), self.source.refused.len());
+        self.source.refused.iter().for_each(|line| progress.say(line));
         let model = Model::read(folder)?;
         for view in model.views((self.source, self.path), pose_error) {
             match view {
@@ -171,7 +171,7 @@ impl Sequence<'_> {
             n_points: n_points as u64,
             other_sha256: [("model".to_owned(), hash_files(&model.files)?)].into_iter().collect(),
             images: Some(ImageCounts {
-                found: (self.source.names.len() + self.source.refused().len()) as u64,
+                found: (self.source.names.len() + self.source.refused.len()) as u64,
                 used: views.len() as u64,
                 unusable: unusable as u64,
                 too_small: 0,
@@ -331,7 +331,7 @@ struct Attack<'a> {
 }
 
 /// A number of keypoints or links, and how many of them are right.
-#[derive(Default)]
+#[derive(Clone, Copy, Default)]
 struct Share {
     n: usize,
     right: usize,
@@ -348,28 +348,12 @@ impl Share {
     }
 }
 
-/// Shares within the headline threshold, and the share of right links.
-#[derive(Default)]
-struct Shares {
-    /// Keypoints linked in three or more views, those that the model's tracks link so, and those that show no point of the
-    /// service's map.
-    of_keypoints: [Share; 3],
-    /// Links of which the model knows both keypoints.
-    right: Share,
-}
+/// Keypoints, right within the headline threshold: linked in three or more views, linked so by the model's tracks, and without a
+/// point of the service's map. Then links of which the model knows both keypoints.
+type Shares = [Share; 4];
 
 /// The names of the shares of keypoints.
 const NAMES: [&str; 3] = ["linked", "tracked", "new"];
-
-impl Shares {
-    fn add(&mut self, more: &Self) {
-        let own = self.of_keypoints.iter_mut().chain([&mut self.right]);
-        for (to, more) in own.zip(more.of_keypoints.iter().chain([&more.right])) {
-            to.n += more.n;
-            to.right += more.right;
-        }
-    }
-}
 
 impl Protected<'_> {
     /// Makes the lists of neighbors within each query, and the positions that they give alone.
@@ -406,18 +390,20 @@ impl Protected<'_> {
         for (query, (recovered, shares)) in found.iter().enumerate() {
             let (original, released) = (&self.views[query].original, &self.queries[query].released);
             pooled.add(recovered, original, &self.secrets[query], Some(released))?;
-            all.add(shares);
+            for (all, share) in all.iter_mut().zip(shares) {
+                *all = Share { n: all.n + share.n, right: all.right + share.right };
+            }
         }
         let missing = || unlift::Error::new("sequence", "keypoints", "none");
         let mut row = pooled.row().ok_or_else(missing)?;
         let of_all = |share: &Share| 100.0 * share.n as f64 / row.n_points.max(1) as f64;
         let label = &plan.thresholds[plan.headline].label;
-        for (name, share) in NAMES.into_iter().zip(&all.of_keypoints) {
+        for (name, share) in NAMES.into_iter().zip(&all) {
             row.metrics.insert(format!("{name}_percent"), of_all(share));
             let within = share.percent().map(|of| (format!("{name}_within_{label}_percent"), of));
             row.metrics.extend(within);
         }
-        row.inlier_ratio = all.right.percent().unwrap_or(0.0) / 100.0;
+        row.inlier_ratio = all[3].percent().unwrap_or(0.0) / 100.0;
         Ok(row)
     }
 
@@ -456,13 +442,13 @@ impl Protected<'_> {
                 1 + tracks.track(query, slot, &window).len() >= LEAST_VIEWS,
                 point.is_none(),
             ];
-            for (share, _) in shares.of_keypoints.iter_mut().zip(counts).filter(|(_, is)| *is) {
+            for (share, _) in shares.iter_mut().zip(counts).filter(|(_, is)| *is) {
                 share.count(is_within);
             }
             let Some(point) = point else { continue };
             for (other, at) in attack.links.track(query, slot, &window) {
                 if let Some(other) = self.point(other as usize, at as usize) {
-                    shares.right.count(point == other);
+                    shares[3].count(point == other);
                 }
             }
         }
@@ -493,7 +479,7 @@ fn paint(
     progress: &dyn Progress,
     sheets: &mut Vec<Sheet>,
 ) -> Result<(), Error> {
-    for query in choice::evenly(hidden.views.len(), Some(SHOWN)) {
+    for query in evenly(hidden.views.len(), Some(SHOWN)) {
         let view = &hidden.views[query];
         let at = sheets.iter().position(|sheet| sheet.name == view.name);
         let at = at.unwrap_or_else(|| {
