@@ -5,13 +5,14 @@ use std::path::PathBuf;
 
 use clap::{Args, value_parser};
 use serde_json::{Map, Value, json};
+use unlift::Unit;
 use unlift::audit::Threshold;
 use unlift::neighbors::oracle::Noise;
 use unlift::neighbors::sources::Named;
 use unlift::obfuscate::{Entry, Mitigation, Protection};
 use unlift::recover::Builtin;
 use unlift_audit::Gate;
-use unlift_audit::images::extraction::Wanted;
+use unlift_audit::images::Wanted;
 use unlift_vision::network::DescriptorKind;
 
 use crate::values::{self, NeighborSource};
@@ -207,6 +208,13 @@ pub struct MapArgs {
     /// Number of nearest neighbors of a point that count as true neighbors (K)
     #[arg(long, value_name = "K", default_value = "50", value_parser = value_parser!(u16).range(1..))]
     pub k: u16,
+}
+
+impl MapArgs {
+    /// Returns the unit of lengths.
+    pub fn unit(&self) -> Unit {
+        if self.scale.is_some() { Unit::Meter } else { Unit::KthNeighbor }
+    }
 }
 
 /// Options of `audit map`.

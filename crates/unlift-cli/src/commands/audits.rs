@@ -20,12 +20,13 @@ use unlift_audit::localization::Localize;
 use unlift_audit::maps::Map;
 use unlift_audit::sequence::Sequence;
 use unlift_audit::{
-    Audit, Audited, Finished, Hidden, Input, Output, Preparation, Prepared, Request, Tiles, Views,
-    by_point, check_thresholds, distinct, read_from_file, released,
+    Audit, Audited, Hidden, Input, Output, Preparation, Prepared, Request, Tiles, Views, by_point,
+    check_thresholds, distinct, read_from_file, released,
 };
 use unlift_io::hash::hash_file;
 use unlift_io::outputs::Rules;
 use unlift_io::stage::published_positions;
+use unlift_report::Document;
 use unlift_vision::features::photo::Turn;
 use unlift_vision::network::DescriptorKind;
 
@@ -45,7 +46,7 @@ fn perform<'a>(
     args: &AuditArgs,
     inputs: impl IntoIterator<Item = &'a Path>,
     work: impl FnOnce(Output) -> crate::Result<Audited> + Send,
-) -> crate::Result<Finished> {
+) -> crate::Result<(Outcome, Document)> {
     let output = Output {
         share_safe: args.share_safe,
         junit: args.junit.clone(),
@@ -55,16 +56,13 @@ fn perform<'a>(
     let files = output.open(Rules::new(inputs, false))?;
     let finished = with_threads(|| work(output)?.write(files))?;
     print(&finished.text())?;
-    Ok(finished)
+    let outcome = if finished.passed() { Outcome::Done } else { Outcome::GateFailed };
+    Ok((outcome, finished.document))
 }
 
 /// Runs `audit` with the gates of the command line.
 fn run(audit: Audit<'_>, args: &AuditArgs, progress: &Progress) -> crate::Result<Audited> {
     Audit { gates: args.gate.clone(), ..audit }.run(progress)
-}
-
-fn outcome(finished: &Finished) -> Outcome {
-    if finished.passed() { Outcome::Done } else { Outcome::GateFailed }
 }
 
 /// Returns a request of what several audits share.
@@ -92,12 +90,7 @@ fn with_solvers(
         neighbors.push(match source {
             NeighborSource::Oracle => NeighborsBy::Oracle,
             NeighborSource::Own(named) => NeighborsBy::Source(named.of_dimension()?),
-            NeighborSource::File(path) => {
-                let mut notes = Vec::new();
-                let lists = by_point(&path, prepared, &mut notes)?;
-                prepared.notes.extend(notes);
-                NeighborsBy::Given(lists)
-            }
+            NeighborSource::File(path) => NeighborsBy::Given(by_point(&path, prepared)?),
         });
     }
     let solvers = Builtin::list(&args.solver);
@@ -133,7 +126,7 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<Outcome> {
     let inputs = [args.path.as_path()].into_iter().chain(args.map.descriptors.as_deref());
     let inputs = inputs.chain(NeighborSource::files(&args.solvers.neighbors));
     let inputs = inputs.chain(more.map(|path| path.as_path()));
-    let finished = perform(&args.audit, inputs, |output| {
+    let (outcome, _) = perform(&args.audit, inputs, |output| {
         let AuditArgs { seed, quiet, .. } = args.audit;
         let mut prepared = open_map(&args.path, &args.map, args.uses_descriptors(), (seed, quiet))?;
         let progress = Progress::new(quiet);
@@ -193,7 +186,7 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<Outcome> {
         audit.options = args.record();
         run(audit, &args.audit, &progress)
     })?;
-    Ok(outcome(&finished))
+    Ok(outcome)
 }
 
 /// `unlift audit released`
@@ -206,7 +199,7 @@ pub fn released(args: &AuditReleasedArgs) -> crate::Result<Outcome> {
         truth: &args.truth,
         descriptors: args.descriptors.as_deref(),
     };
-    let finished = perform(&args.audit, inputs, |output| {
+    let (outcome, _) = perform(&args.audit, inputs, |output| {
         let name = args.name.clone().map_or_else(|| files.scheme_name(), Ok)?;
         let released::Release { mut prepared, hidden } = files.open()?;
         let progress = Progress::new(args.audit.quiet);
@@ -229,7 +222,7 @@ pub fn released(args: &AuditReleasedArgs) -> crate::Result<Outcome> {
         audit.options.insert("released".into(), json!(true));
         run(audit, &args.audit, &progress)
     })?;
-    Ok(outcome(&finished))
+    Ok(outcome)
 }
 
 /// `unlift audit images`
@@ -247,7 +240,7 @@ pub fn images(args: &AuditImagesArgs) -> crate::Result<Outcome> {
     plan.check_for_many().map_err(|error| usage(error.to_string()))?;
     let more = args.paint.inputs().chain(&args.protect.public_descriptors);
     let inputs = [&args.path].into_iter().chain(more).map(|path| path.as_path());
-    let finished = perform(&args.audit, inputs, |output| {
+    let (outcome, document) = perform(&args.audit, inputs, |output| {
         let photos = args.paint.photos.as_deref();
         let opening = Opening {
             wanted: args.extraction.wanted(),
@@ -282,10 +275,10 @@ pub fn images(args: &AuditImagesArgs) -> crate::Result<Outcome> {
         audit.options = args.record();
         run(audit, &args.audit, &progress)
     })?;
-    if let Some(count) = &finished.document.input.images {
+    if let Some(count) = document.input.images {
         all_could_be("used", &args.path, count.used as usize, count.unusable as usize)?;
     }
-    Ok(outcome(&finished))
+    Ok(outcome)
 }
 
 /// `unlift audit sequence`
@@ -313,7 +306,7 @@ pub fn sequence(args: &AuditSequenceArgs) -> crate::Result<Outcome> {
         return Err(usage("--invert: expected without --share-safe, as pictures show the place"));
     }
     let inputs = [&args.model, &args.path].into_iter().chain(args.paint.inputs());
-    let finished = perform(&args.audit, inputs.map(|path| path.as_path()), |output| {
+    let (outcome, _) = perform(&args.audit, inputs.map(|path| path.as_path()), |output| {
         let extraction = args.extraction.wanted().extraction(&args.path)?;
         // A model is of the photos as they are stored.
         let source = FeatureSource::open(&args.path, &extraction)?.with_turn(Turn::AsStored);
@@ -344,13 +337,13 @@ pub fn sequence(args: &AuditSequenceArgs) -> crate::Result<Outcome> {
         audit.options = args.record();
         run(audit, &args.audit, &progress)
     })?;
-    Ok(outcome(&finished))
+    Ok(outcome)
 }
 
 /// `unlift audit again`
 pub fn again(args: &AuditAgainArgs) -> crate::Result<Outcome> {
     let inputs = [&args.a, &args.b].into_iter().chain(&args.descriptors);
-    let finished = perform(&args.audit, inputs.map(|path| path.as_path()), |output| {
+    let (outcome, _) = perform(&args.audit, inputs.map(|path| path.as_path()), |output| {
         let preparation = Preparation { scale: args.scale, ..Preparation::default() };
         let reading = Progress::uncounted(args.audit.quiet, "reading the maps");
         let mut maps = Maps::open([&args.a, &args.b], &args.descriptors, &preparation)?;
@@ -378,5 +371,5 @@ pub fn again(args: &AuditAgainArgs) -> crate::Result<Outcome> {
         audit.options.insert("again".into(), json!(args.b.display().to_string()));
         run(audit, &args.audit, &progress)
     })?;
-    Ok(outcome(&finished))
+    Ok(outcome)
 }

@@ -13,10 +13,6 @@ use crate::args::MapArgs;
 use crate::exit::Outcome;
 use crate::progress::Progress;
 
-pub const RELEASED: &str = "released.npz";
-/// File name of the truth, which only the owner has.
-pub const TRUTH: &str = "truth.npz";
-
 /// Runs `work` on `RAYON_NUM_THREADS` threads (default: all cores). rayon's global pool would panic
 /// if the system refuses threads.
 pub fn with_threads<T: Send>(work: impl FnOnce() -> crate::Result<T> + Send) -> crate::Result<T> {

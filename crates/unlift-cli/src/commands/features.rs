@@ -5,7 +5,6 @@ use std::path::Path;
 use unlift::OneLine;
 use unlift_io::features::{FeatureWriter, ImageFeatures};
 use unlift_io::outputs::{Kind, Rules};
-use unlift_vision::features::Extraction;
 use unlift_vision::features::in_order;
 use unlift_vision::features::photo::Turn;
 
@@ -14,73 +13,26 @@ use crate::args::FeaturesArgs;
 use crate::exit::{Outcome, usage};
 use crate::output::print;
 use crate::progress::Progress;
-use unlift_audit::images::extraction::Wanted;
-use unlift_audit::images::{FeatureSource, is_photo};
+use unlift_audit::images::{FeatureSource, Wanted, is_photo};
 use unlift_audit::{Progress as _, check_file};
-
-#[derive(Default)]
-struct Tally {
-    images: usize,
-    features: usize,
-    failed: usize,
-}
 
 pub fn run(args: &FeaturesArgs) -> crate::Result<Outcome> {
     let rules = Rules::new([args.images.as_path()], false);
     let target = check_file(&args.out, Kind::Features, &rules)?;
     check_no_photo(&args.images, &target)?;
-    let extraction = extraction(args)?;
-    let turn = if args.as_stored { Turn::AsStored } else { Turn::Upright };
-    let source = FeatureSource::open(&args.images, &extraction)?.with_turn(turn);
-    let mut progress = Progress::new(args.quiet);
-    let mut tally = Tally::default();
-    if let Some(note) = &source.passed_over {
-        progress.say(&format!("note: {note}"));
-    }
-    for error in source.refused() {
-        tally.failed += 1;
-        progress.say(&error.to_string());
-    }
-    write(&source, (args, &rules), &mut tally, &mut progress)?;
-    drop(progress);
-    if tally.images > 0 {
-        let (images, features) = (tally.images, tally.features);
-        let out = OneLine(args.out.display());
-        print(&format!("{images} images, {features} features, in {out}\n"))?;
-    }
-    all_could_be("used", &args.images, tally.images, tally.failed)
-}
-
-/// Refuses an output file that the next run would read as a photo.
-fn check_no_photo(images: &Path, target: &Path) -> crate::Result<()> {
-    let folder = match target.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let (Ok(images), Ok(folder)) = (images.canonicalize(), folder.canonicalize()) else {
-        return Ok(());
-    };
-    if folder.starts_with(images) && is_photo(target) {
-        let expected = "expected a name that is not read as a photo";
-        return Err(usage(format!("--out: {}: {expected}", target.display())));
-    }
-    Ok(())
-}
-
-fn extraction(args: &FeaturesArgs) -> crate::Result<Extraction> {
-    let wanted = Wanted { max_image_size: args.max_image_size, ..args.extraction.wanted() };
     if args.as_stored && args.images.is_file() {
         return Err(usage("--as-stored: expected with a folder of photos, found a file"));
     }
-    wanted.extraction(&args.images)
-}
-
-fn write(
-    source: &FeatureSource,
-    (args, rules): (&FeaturesArgs, &Rules),
-    tally: &mut Tally,
-    progress: &mut Progress,
-) -> crate::Result<()> {
+    let wanted = Wanted { max_image_size: args.max_image_size, ..args.extraction.wanted() };
+    let extraction = wanted.extraction(&args.images)?;
+    let turn = if args.as_stored { Turn::AsStored } else { Turn::Upright };
+    let source = FeatureSource::open(&args.images, &extraction)?.with_turn(turn);
+    let progress = Progress::new(args.quiet);
+    if let Some(note) = &source.passed_over {
+        progress.say(&format!("note: {note}"));
+    }
+    source.refused.iter().for_each(|line| progress.say(line));
+    let (mut n_images, mut n_features, mut n_failed) = (0, 0, source.refused.len());
     let names = &source.names;
     let all: Vec<usize> = (0..names.len()).collect();
     let mut writer = FeatureWriter::create(&args.out)?;
@@ -102,19 +54,40 @@ fn write(
         match usable {
             Ok(image) => {
                 writer.append(&image)?;
-                tally.images += 1;
-                tally.features += image.keypoints.len();
+                n_images += 1;
+                n_features += image.keypoints.len();
             }
             Err(error) => {
-                tally.failed += 1;
+                n_failed += 1;
                 progress.say(&error.to_string());
             }
         }
         Ok(())
     })?;
-    if tally.images > 0 {
+    if n_images > 0 {
         rules.check(&args.out, Kind::Features)?;
         writer.finish()?;
+    }
+    drop(progress);
+    if n_images > 0 {
+        let out = OneLine(args.out.display());
+        print(&format!("{n_images} images, {n_features} features, in {out}\n"))?;
+    }
+    all_could_be("used", &args.images, n_images, n_failed)
+}
+
+/// Refuses an output file that the next run would read as a photo.
+fn check_no_photo(images: &Path, target: &Path) -> crate::Result<()> {
+    let folder = match target.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let (Ok(images), Ok(folder)) = (images.canonicalize(), folder.canonicalize()) else {
+        return Ok(());
+    };
+    if folder.starts_with(images) && is_photo(target) {
+        let expected = "expected a name that is not read as a photo";
+        return Err(usage(format!("--out: {}: {expected}", target.display())));
     }
     Ok(())
 }

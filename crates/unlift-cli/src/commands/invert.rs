@@ -9,8 +9,7 @@ use unlift::OneLine;
 use unlift::recover::Recovered;
 use unlift::released::Released;
 use unlift_audit::changes::kind_of;
-use unlift_audit::images::extraction::Wanted;
-use unlift_audit::images::{FeatureSource, choice};
+use unlift_audit::images::{FeatureSource, Wanted, evenly};
 use unlift_audit::inversion::{Painter, on_bearings, six_views, view};
 use unlift_audit::refused;
 use unlift_io::Error;
@@ -24,7 +23,7 @@ use unlift_vision::features::{ColorImage, photo};
 use unlift_vision::network::DescriptorKind;
 
 use super::common::all_could_be;
-use super::image_stages;
+use super::stages::{self, of_image};
 use crate::args::InvertArgs;
 use crate::exit::{Outcome, line, usage};
 use crate::output::print;
@@ -98,7 +97,7 @@ impl Target<'_> {
 
     /// Returns the indices of the images to paint, out of `n`.
     fn chosen(&self, n: usize) -> Vec<usize> {
-        choice::evenly(n, self.args.max_images.map(NonZeroUsize::get))
+        evenly(n, self.args.max_images.map(NonZeroUsize::get))
     }
 }
 
@@ -174,12 +173,10 @@ fn images(to: &Target<'_>, recovered: &Path) -> crate::Result<usize> {
     };
     let mut unusable = 0;
     let work = |(name, released, recovered): (String, Released<2>, Recovered<2>)| {
-        let picture = painter.image(&released, &recovered);
-        let place =
-            |error: unlift::Error| Error::core(path, error.within(&format!("image {name}")));
-        Ok(picture.map_err(place).map_err(Into::into).and_then(|picture| to.add(&name, &picture)))
+        let picture = painter.image(&released, &recovered).map_err(of_image(path, &name));
+        Ok(picture.map_err(Into::into).and_then(|picture| to.add(&name, &picture)))
     };
-    image_stages::each(next, work, |result| {
+    stages::each(next, work, |result| {
         unusable += to.count(result);
         Ok(())
     })?;

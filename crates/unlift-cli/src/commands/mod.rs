@@ -1,17 +1,13 @@
-//! The commands, one file each.
+//! The commands.
 
 mod about;
 mod audits;
 pub mod common;
 mod compare;
-mod evaluate;
 mod export;
 mod features;
-mod image_stages;
 mod invert;
-mod neighbors;
-mod obfuscate;
-mod recover;
+mod stages;
 mod table;
 
 use common::with_threads;
@@ -34,10 +30,10 @@ pub fn run(command: Command) -> crate::Result<Outcome> {
         Command::Audit(AuditCommand::Again(args)) => audits::again(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Table(args) => table::run(&args),
-        Command::Obfuscate(args) => with_threads(|| obfuscate::run(&args)),
-        Command::Neighbors(args) => with_threads(|| neighbors::run(&args)),
-        Command::Recover(args) => with_threads(|| recover::run(&args)),
-        Command::Evaluate(args) => with_threads(|| evaluate::run(&args)),
+        Command::Obfuscate(args) => with_threads(|| stages::obfuscate(&args)),
+        Command::Neighbors(args) => with_threads(|| stages::neighbors(&args)),
+        Command::Recover(args) => with_threads(|| stages::recover(&args)),
+        Command::Evaluate(args) => with_threads(|| stages::evaluate(&args)),
         Command::Export(args) => export::run(&args),
         Command::Features(args) => with_threads(|| features::run(&args)),
         Command::Invert(args) => with_threads(|| invert::run(&args)),

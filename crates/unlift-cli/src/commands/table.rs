@@ -36,9 +36,8 @@ pub fn run(args: &TableArgs) -> crate::Result<Outcome> {
     let document = read_document(&args.audit)?;
     let known = thresholds(&document);
     let only = args.thresholds.as_ref().map(|requested| {
-        let same =
-            |typed: &&String| typed.parse::<f64>().is_ok_and(|value| value == requested.value);
-        known.iter().find(same).map(String::as_str).ok_or_else(|| {
+        let same = |typed: &&&str| typed.parse::<f64>().is_ok_and(|value| value == requested.value);
+        known.iter().find(same).copied().ok_or_else(|| {
             let (known, found) = (known.join(", "), &requested.label);
             usage(format!("--thresholds: expected one of {known}, as in the audit, found {found}"))
         })
