@@ -13,8 +13,7 @@ use unlift::neighbors::oracle::Noise;
 use unlift::obfuscate::{SCHEMES, Scheme, SchemeOptions};
 use unlift::recover::{Delta, Solver};
 use unlift_audit::images::audit::Images as ImagesInput;
-use unlift_audit::images::extraction::Wanted;
-use unlift_audit::images::{Opened, Opening};
+use unlift_audit::images::{Opened, Opening, Wanted};
 use unlift_audit::maps::Map as MapInput;
 use unlift_audit::{Audit, Audited, Error, Gate, Input, Output, Request, Tiles, sources};
 use unlift_vision::network::DescriptorKind;
@@ -23,7 +22,7 @@ use crate::arrays::{raised, wrong};
 use crate::images::Images;
 use crate::lists;
 use crate::map::{Map, scheme_of};
-use crate::own::{OwnSolver, OwnSource, Raised, solver_of};
+use crate::own::{Own, Raised, solver_of};
 use crate::report::Report;
 use crate::threads::{self, Watcher};
 
@@ -226,8 +225,7 @@ impl Options<'_> {
     /// Returns these options for points in `unit`.
     fn request<const D: usize>(&self, unit: Unit, by: &Raised) -> PyResult<Request<D>>
     where
-        OwnSource: Source<D>,
-        OwnSolver: Solver<D>,
+        Own: Source<D> + Solver<D>,
     {
         let noise = |name: &String| Noise::from_name(name).map_err(raised);
         Ok(Request {
@@ -267,13 +265,13 @@ fn each<T, U>(
 /// Returns the source for a name or a function.
 fn source<const D: usize>(given: &Bound<'_, PyAny>, by: &Raised) -> PyResult<NeighborsBy<D>>
 where
-    OwnSource: Source<D>,
+    Own: Source<D>,
 {
     Ok(match given.extract::<String>().as_deref() {
         Ok("oracle") => NeighborsBy::Oracle,
         Ok(name) => NeighborsBy::Source(lists::named(name, None)?.of_dimension().map_err(raised)?),
         Err(_) => {
-            let source: Arc<dyn Source<D>> = Arc::new(OwnSource::new(given, by)?);
+            let source: Arc<dyn Source<D>> = Arc::new(Own::source(given, by)?);
             let name = source.name();
             let is_ours = ["oracle", "file"].contains(&name) || sources::named(name).is_ok();
             check_own_name("neighbors", name, is_ours)?;

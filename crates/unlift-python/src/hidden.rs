@@ -232,18 +232,8 @@ impl Truth {
 /// A hidden map: `released` for the attacker, `truth` for the owner.
 #[pyclass(frozen, module = "unlift", get_all)]
 pub struct Hidden {
-    released: Released,
-    truth: Truth,
-}
-
-impl Hidden {
-    pub fn of(released: Released, truth: Truth) -> Self {
-        Self { released, truth }
-    }
-
-    pub fn parts(&self) -> (&Released, &Truth) {
-        (&self.released, &self.truth)
-    }
+    pub released: Released,
+    pub truth: Truth,
 }
 
 #[pymethods]

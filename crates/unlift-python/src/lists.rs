@@ -212,9 +212,8 @@ pub fn oracle(
     seed: u64,
 ) -> PyResult<Neighborhoods> {
     let noise = Noise::from_name(noise).map_err(raised)?;
-    let (released, truth) = hidden.parts();
-    let slots_per_record = released.clone().of_map()?.slots_per_record();
-    let truth = truth.clone();
+    let slots_per_record = hidden.released.clone().of_map()?.slots_per_record();
+    let truth = hidden.truth.clone();
     let lists = threads::run(py, None, None, move || {
         let knn = search(&truth.original)?;
         let near = TrueNeighbors::new(&knn, &truth.secret, slots_per_record, k)?;

@@ -13,7 +13,7 @@ use unlift_report::document::Input;
 
 use crate::arrays::{descriptors, raised, rows, to_array, to_descriptors, to_rows, wrong};
 use crate::hidden::{Hidden, Released, Truth};
-use crate::own::{OwnScheme, Raised};
+use crate::own::{Own, Raised};
 use crate::threads;
 
 /// Points to audit, with optional descriptors. Lengths are in meters with a scale, else in median
@@ -154,7 +154,7 @@ pub fn scheme_of<const D: usize>(
     raised_by: &Raised,
 ) -> PyResult<Arc<dyn Scheme<D>>> {
     let Ok(name) = given.extract::<String>() else {
-        return Ok(Arc::new(OwnScheme::new(given, raised_by)?));
+        return Ok(Arc::new(Own::scheme(given, raised_by)?));
     };
     let entry = scheme(&name).map_err(raised)?;
     let subjects = if D == 2 { "images" } else { "maps" };
@@ -188,5 +188,5 @@ pub fn obfuscate(
     let (released, secret) = hidden.map_err(|error| by.as_cause_of(py, error))?;
     let original = Arc::clone(&map.prepared.original);
     let truth = Truth { original, secret: Arc::new(secret) };
-    Ok(Hidden::of(Released::from(released), truth))
+    Ok(Hidden { released: Released::from(released), truth })
 }

@@ -59,17 +59,51 @@ impl Raised {
     }
 }
 
-/// A Python function, and how it is called.
+/// A Python function that is a scheme, a source or a solver:
+/// - a scheme returns the records of `points` (n, D),
+/// - a source returns the lists of a released map,
+/// - a solver returns positions `(n_slots, D)` from a released map and its lists, relative to the
+///   released origin; rows that are not finite were not recovered.
 #[derive(Debug)]
-struct Function {
+pub struct Own {
     name: String,
-    call: Py<PyAny>,
+    function: Py<PyAny>,
     /// True if it takes a random generator.
     takes_random: bool,
+    /// What a source reads: descriptors unless the attribute `needs` is "nothing".
+    needs: Needs,
+    /// Number of records of a source's list that are used.
+    k: usize,
     raised: Raised,
 }
 
-impl Function {
+/// Default number of records of a list that are used; the attribute `k` changes it.
+const USUAL_K: usize = 50;
+
+impl Own {
+    /// Accepts a scheme.
+    pub fn scheme(function: &Bound<'_, PyAny>, raised: &Raised) -> PyResult<Self> {
+        Self::new(function, ("schemes", 1), raised)
+    }
+
+    /// Accepts a source.
+    pub fn source(function: &Bound<'_, PyAny>, raised: &Raised) -> PyResult<Self> {
+        let needs = match function.getattr("needs") {
+            Ok(needs) => lists::needs_of(&needs.extract::<String>()?)?,
+            Err(_) => Needs::Descriptors,
+        };
+        let k = function.getattr("k").ok().map(|k| k.extract()).transpose()?.unwrap_or(USUAL_K);
+        if k == 0 {
+            return Err(wrong("k", "at least 1", k));
+        }
+        Ok(Self { needs, k, ..Self::new(function, ("neighbors", 1), raised)? })
+    }
+
+    /// Accepts a solver.
+    pub fn solver(function: &Bound<'_, PyAny>, raised: &Raised) -> PyResult<Self> {
+        Self::new(function, ("solvers", 2), raised)
+    }
+
     /// Accepts a function of `n_given` arguments, or one more for a random generator.
     fn new(
         function: &Bound<'_, PyAny>,
@@ -87,8 +121,14 @@ impl Function {
         let name = name.unwrap_or_else(|| "own".to_owned());
         let inspect = function.py().import("inspect")?;
         let parameters = inspect.call_method1("signature", (function,))?.getattr("parameters")?;
-        let (call, raised) = (function.clone().unbind(), raised.clone());
-        Ok(Self { name, call, takes_random: parameters.len()? > n_given, raised })
+        Ok(Self {
+            name,
+            function: function.clone().unbind(),
+            takes_random: parameters.len()? > n_given,
+            needs: Needs::Nothing,
+            k: USUAL_K,
+            raised: raised.clone(),
+        })
     }
 
     /// Calls `make`; returns an error if it raises, or if calls are no longer allowed.
@@ -111,23 +151,13 @@ impl Function {
             let random = py.import("numpy")?.getattr("random")?;
             arguments.push(random.call_method1("default_rng", (seed.to_vec(),))?);
         }
-        self.call.bind(py).call1(PyTuple::new(py, arguments)?)
+        self.function.bind(py).call1(PyTuple::new(py, arguments)?)
     }
 }
 
-/// A scheme that is a function from `points` (n, D) to records.
-#[derive(Debug)]
-pub struct OwnScheme(Function);
-
-impl OwnScheme {
-    pub fn new(function: &Bound<'_, PyAny>, raised: &Raised) -> PyResult<Self> {
-        Function::new(function, ("schemes", 1), raised).map(Self)
-    }
-}
-
-impl<const D: usize> Scheme<D> for OwnScheme {
+impl<const D: usize> Scheme<D> for Own {
     fn name(&self) -> &str {
-        &self.0.name
+        &self.name
     }
 
     fn lift(
@@ -136,49 +166,22 @@ impl<const D: usize> Scheme<D> for OwnScheme {
         _: Option<&Bounds<D>>,
         key: &Key,
     ) -> Result<Lifted<D>, Error> {
-        let name = &self.0.name;
         let mut draws = key.draws(Stage::Scheme, 0);
         let seed = [(); 4].map(|()| draws.bits());
-        let hiding = self.0.made(|py| {
-            let returned = self.0.call(py, vec![to_rows(py, points.to_vec())?.into_any()], seed)?;
-            hiding(&returned, name)
+        let hiding = self.made(|py| {
+            let returned = self.call(py, vec![to_rows(py, points.to_vec())?.into_any()], seed)?;
+            hiding(&returned, &self.name)
         })?;
-        hiding.lifted(points.len(), name)
+        hiding.lifted(points.len(), &self.name)
     }
 }
 
-/// A source that is a function from a released map to lists.
-#[derive(Debug)]
-pub struct OwnSource {
-    function: Function,
-    needs: Needs,
-    k: usize,
-}
-
-/// Default number of records of a list that are used; the attribute `k` changes it.
-const USUAL_K: usize = 50;
-
-impl OwnSource {
-    /// Creates a source. It reads descriptors unless the attribute `needs` is "nothing".
-    pub fn new(function: &Bound<'_, PyAny>, raised: &Raised) -> PyResult<Self> {
-        let needs = match function.getattr("needs") {
-            Ok(needs) => lists::needs_of(&needs.extract::<String>()?)?,
-            Err(_) => Needs::Descriptors,
-        };
-        let k = function.getattr("k").ok().map(|k| k.extract()).transpose()?.unwrap_or(USUAL_K);
-        if k == 0 {
-            return Err(wrong("k", "at least 1", k));
-        }
-        Ok(Self { function: Function::new(function, ("neighbors", 1), raised)?, needs, k })
-    }
-}
-
-impl<const D: usize> Source<D> for OwnSource
+impl<const D: usize> Source<D> for Own
 where
     PyReleased: From<Released<D>>,
 {
     fn name(&self) -> &str {
-        &self.function.name
+        &self.name
     }
 
     fn needs(&self) -> Needs {
@@ -190,31 +193,20 @@ where
     }
 
     fn lists(&self, released: &Released<D>, k: usize, seed: u64) -> Result<Neighborhoods, Error> {
-        self.function.made(|py| {
+        self.made(|py| {
             let shown = Bound::new(py, PyReleased::from(released.clone()))?.into_any();
-            let returned = self.function.call(py, vec![shown], [seed, 0, 0, 0])?;
+            let returned = self.call(py, vec![shown], [seed, 0, 0, 0])?;
             lists::returned(&returned, released, k, self.needs)
         })
     }
 }
 
-/// A solver that is a function from a released map and its lists to positions `(n_slots, D)`
-/// relative to the released origin. Rows that are not finite were not recovered.
-#[derive(Debug)]
-pub struct OwnSolver(Function);
-
-impl OwnSolver {
-    pub fn new(function: &Bound<'_, PyAny>, raised: &Raised) -> PyResult<Self> {
-        Function::new(function, ("solvers", 2), raised).map(Self)
-    }
-}
-
-impl<const D: usize> Solver<D> for OwnSolver
+impl<const D: usize> Solver<D> for Own
 where
     PyReleased: From<Released<D>>,
 {
     fn name(&self) -> &str {
-        &self.0.name
+        &self.name
     }
 
     fn recover(
@@ -223,10 +215,10 @@ where
         lists: &Neighborhoods,
         options: &RecoverOptions,
     ) -> Result<Recovered<D>, Error> {
-        let positions = self.0.made(|py| {
+        let positions = self.made(|py| {
             let shown = Bound::new(py, PyReleased::from(released.clone()))?.into_any();
             let listed = Bound::new(py, PyNeighborhoods(Arc::new(lists.clone())))?.into_any();
-            let returned = self.0.call(py, vec![shown, listed], [options.seed, 0, 0, 0])?;
+            let returned = self.call(py, vec![shown, listed], [options.seed, 0, 0, 0])?;
             rows::<D>("positions", &returned)
         })?;
         let positions: Vec<[f32; D]> = positions.iter().map(|x| x.map(|x| x as f32)).collect();
@@ -240,11 +232,11 @@ pub fn solver_of<const D: usize>(
     raised_by: &Raised,
 ) -> PyResult<Arc<dyn Solver<D>>>
 where
-    OwnSolver: Solver<D>,
+    Own: Solver<D>,
 {
     match given.extract::<String>() {
         Ok(name) => Ok(Arc::new(Builtin::from_name(&name).map_err(raised)?)),
-        Err(_) => Ok(Arc::new(OwnSolver::new(given, raised_by)?)),
+        Err(_) => Ok(Arc::new(Own::solver(given, raised_by)?)),
     }
 }
 
@@ -264,7 +256,7 @@ fn kept(py: Python<'_>, by: &Raised, laws: impl FnOnce() + Send + 'static) -> Py
 #[pyo3(signature = (scheme, *, images=false))]
 pub fn check_scheme(py: Python<'_>, scheme: &Bound<'_, PyAny>, images: bool) -> PyResult<()> {
     let by = Raised::default();
-    let scheme = OwnScheme::new(scheme, &by)?;
+    let scheme = Own::scheme(scheme, &by)?;
     kept(py, &by, move || match images {
         true => unlift_testkit::scheme_laws::<2>(&scheme),
         false => unlift_testkit::scheme_laws::<3>(&scheme),
@@ -282,7 +274,7 @@ pub fn check_source(
     released: &Bound<'_, PyAny>,
 ) -> PyResult<()> {
     let (by, released) = (Raised::default(), released_of(released)?.of_map()?);
-    let source = OwnSource::new(source, &by)?;
+    let source = Own::source(source, &by)?;
     kept(py, &by, move || unlift_testkit::source_laws::<3>(&source, &released))
 }
 
@@ -298,6 +290,6 @@ pub fn check_solver(
     lists: &PyNeighborhoods,
 ) -> PyResult<()> {
     let (by, released) = (Raised::default(), released_of(released)?.of_map()?);
-    let (solver, lists) = (OwnSolver::new(solver, &by)?, Arc::clone(&lists.0));
+    let (solver, lists) = (Own::solver(solver, &by)?, Arc::clone(&lists.0));
     kept(py, &by, move || unlift_testkit::solver_laws::<3>(&solver, &released, &lists))
 }

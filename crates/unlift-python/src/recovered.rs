@@ -140,7 +140,7 @@ pub fn evaluate<'py>(
     truth: &Bound<'py, PyAny>,
     thresholds: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let released = truth.cast::<Hidden>().ok().map(|hidden| hidden.get().parts().0.clone());
+    let released = truth.cast::<Hidden>().ok().map(|hidden| hidden.get().released.clone());
     let released = released.map(crate::hidden::Released::of_map).transpose()?;
     let truth = truth_of(truth)?;
     let mut thresholds = self::thresholds(thresholds)?;
