@@ -1,8 +1,7 @@
 //! Figures for papers and for other programs: tables as CSV, LaTeX and Markdown, curves as SVG, and the table of the terminal.
 
-mod csv;
 mod curves;
-mod grid;
+mod tables;
 mod terminal;
 
 use crate::document::Document;
@@ -33,9 +32,9 @@ pub fn table(document: &Document, format: TableFormat, only: Option<&str>) -> St
     let results = &Results::of(document);
     let within = only.map_or_else(|| results.thresholds.clone(), |typed| vec![typed]);
     match format {
-        TableFormat::Csv => csv::csv(results, &within),
-        TableFormat::Latex => grid::Grid::of(results, &within).latex(),
-        TableFormat::Markdown => grid::Grid::of(results, &within).markdown(),
+        TableFormat::Csv => tables::csv(results, &within),
+        TableFormat::Latex => tables::Grid::of(results, &within).latex(),
+        TableFormat::Markdown => tables::Grid::of(results, &within).markdown(),
     }
 }
 

@@ -4,9 +4,9 @@ use unlift::Unit;
 
 use crate::attack::{self, Basis};
 use crate::document::{Bound, Document, Row, STRONGEST};
+use crate::page::cost_text;
 use crate::page::tables::percent_cell;
 use crate::page::verdict::{self, Verdict};
-use crate::page::{cost_text, tiles_line};
 use crate::results::Results;
 use crate::table::{Column, Table, figure, label};
 use crate::words::{self, percent_or_dash};
@@ -47,7 +47,6 @@ pub fn text_table(document: &Document) -> String {
     }
     let text = format!("{first}\n{}\n\n{}", banner.sentence, table(results, &lines));
     let (headline, unit) = (results.headline, unit(results));
-    let tiles = tiles_line(results);
     let several = (results.thresholds.len() > 1)
         .then(|| format!("blind, break-even: within {headline} {unit}\n"));
     let truth = "true: share of the listed neighbors that are among the nearest\n".to_owned();
@@ -60,7 +59,7 @@ pub fn text_table(document: &Document) -> String {
         let by = if by.is_empty() { String::new() } else { format!(" by {by}") };
         format!("not audited: {}{by}: {reason}\n", refused.scheme)
     });
-    let notes = several.into_iter().chain([truth]).chain(times).chain(tiles);
+    let notes = several.into_iter().chain([truth]).chain(times);
     text + &notes.chain([cost_text(results)]).chain(refused).collect::<String>()
 }
 

@@ -26,7 +26,6 @@ use crate::results::{Results, distinct};
 use crate::{Error, words};
 
 pub(crate) use cost::text as cost_text;
-pub(crate) use tiles::line as tiles_line;
 
 /// The templates, by the names under which they include each other.
 const TEMPLATES: [(&str, &str); 11] = [
@@ -104,7 +103,6 @@ pub fn render(
         tables::break_even(results),
         Some(tables::losses(results)),
         tables::choices(results),
-        tables::trials(results),
     ];
     let (sheets, sheets_left_out) = inversions::sheets(results, inversions);
     let other = options.opening.iter().filter(|_| !safe).map(|opening| opening.0.clone());

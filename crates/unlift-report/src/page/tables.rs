@@ -217,21 +217,6 @@ pub(crate) fn choices(results: &Results<'_>) -> Option<Table> {
     table.without_empty_columns().if_beyond(KEYS)
 }
 
-pub(crate) fn trials(results: &Results<'_>) -> Option<Table> {
-    let points = results.points();
-    let bins = |row: &Row| {
-        let bins = row.ransac_trials.iter().flatten().map(|&(bound, count)| {
-            format!("≤ {}: {}", words::thousands(bound), words::thousands(count))
-        });
-        bins.collect::<Vec<_>>().join(" · ")
-    };
-    let mut columns = keys();
-    columns.push(column(Class::Prose, format!("{points} by trials"), bins));
-    let caption = format!("RANSAC: number of {points} by the number of random trials needed.");
-    let rows = results.rows.iter().filter(|row| row.ransac_trials.is_some());
-    Table::of("trials", caption, rows, columns).if_beyond(KEYS)
-}
-
 pub(crate) fn times(results: &Results<'_>) -> Option<Table> {
     let times = &results.document.run.seconds.rows;
     let mut columns = keys();

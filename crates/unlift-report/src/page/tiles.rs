@@ -83,19 +83,3 @@ pub(crate) fn table(results: &Results<'_>) -> Option<Table> {
     let tiles: Vec<Tile<'_>> = results.document.tiles.iter().enumerate().collect();
     Table::of("tiles", caption, &tiles, columns).if_beyond(0)
 }
-
-/// Returns a line for the terminal about the tile that leaks most; `None` for a document without tiles.
-pub(crate) fn line(results: &Results<'_>) -> Option<String> {
-    let tiles = &results.document.tiles;
-    let (at, row) = *strongest(results).first()?;
-    let percents = tiles.iter().enumerate();
-    let percents = percents.filter_map(|(i, tile)| Some((percent(results, tile, at)?, i)));
-    let mut percents: Vec<(f64, usize)> = percents.collect();
-    percents.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (least, (largest, tile)) = (percents.first()?.0, *percents.last()?);
-    let (scheme, n, tile) = (&row.scheme, tiles.len(), tile + 1);
-    let [least, largest] = [least, largest].map(words::percent);
-    Some(format!(
-        "tiles: of {n}, {scheme} gives back {least} to {largest} % each, most in tile {tile}\n"
-    ))
-}
