@@ -4,7 +4,6 @@
 //! cargo run --release -p unlift-audit --example held_out_matches -- MODEL FEATURES N
 //! ```
 
-use std::error::Error;
 use std::path::PathBuf;
 
 use serde_json::{Value, json};
@@ -14,11 +13,11 @@ use unlift::localization::Match;
 use unlift::obfuscate::{SchemeOptions, scheme};
 use unlift::seed::Key;
 use unlift_audit::localization::held_out::{Held, Problem};
-use unlift_audit::{Preparation, Quiet, maps};
+use unlift_audit::{Error, Preparation, Quiet, maps};
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<(), Error> {
     let mut arguments = std::env::args().skip(1);
-    let mut next = || arguments.next().ok_or("expected MODEL FEATURES N");
+    let mut next = || arguments.next().ok_or_else(|| Error::request("expected MODEL FEATURES N"));
     let (model, features, nth): (PathBuf, PathBuf, usize) =
         (next()?.into(), next()?.into(), next()?.parse()?);
     let preparation = Preparation { scale: Some(1.0), ..Preparation::default() };
@@ -26,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let cameras = &prepared.cameras;
     let mut held = Held::open(&features, nth, cameras, &prepared.original, &Quiet)?;
     let lines = scheme("lines2d")?.of_dimension::<2>(&SchemeOptions::usual(Unit::Pixel));
-    let lines = lines.ok_or("expected lines2d in 2D")?;
+    let lines = lines.ok_or_else(|| Error::failed("expected lines2d in 2D"))?;
     let queries = held.with_queries(&*lines, &Key::from_seed(0))?;
     let points = held.unprotected();
     println!("{}", json!({ "point": of(&points), "lines2d": of(&queries) }));

@@ -345,6 +345,7 @@ impl<'a> Held<'a> {
             });
             Problem {
                 truth: query.camera,
+                size: query.size,
                 start,
                 n_pairs: pairs.len(),
                 n_right: pairs.iter().filter(is_right).count(),
@@ -371,9 +372,11 @@ impl<'a> Held<'a> {
 /// The pose problem of one held-out image.
 pub struct Problem {
     /// The camera with its true pose.
-    truth: Camera,
+    pub truth: Camera,
+    /// Width and height of the image in pixels.
+    pub size: [f64; 2],
     /// The matches, as far as they fix the pose.
-    matches: Vec<Match>,
+    pub matches: Vec<Match>,
     /// The pose of the most similar other image, and the standard deviation of further starts.
     start: Option<(Camera, f64)>,
     n_pairs: usize,
@@ -389,15 +392,21 @@ pub struct Located {
     error: Option<PoseError>,
 }
 
+impl Problem {
+    /// Estimates the pose and returns its error.
+    pub fn solve(&self, seed: u64) -> Option<PoseError> {
+        let (start, reach) = self.start.as_ref()?;
+        let (camera, _) = estimate(start, &self.matches, *reach, seed)?;
+        Some(camera.pose.error(&self.truth.pose))
+    }
+}
+
 /// Estimates the poses of all images.
 pub fn locate(problems: &[Problem], seed: u64) -> Vec<Located> {
-    let of = |(number, problem): (usize, &Problem)| {
-        let Problem { truth, matches, start, n_pairs, n_right } = problem;
-        let estimate = start.as_ref().and_then(|(start, reach)| {
-            estimate(start, matches, *reach, seed.wrapping_add(number as u64))
-        });
-        let error = estimate.map(|(camera, _)| camera.pose.error(&truth.pose));
-        Located { n_pairs: *n_pairs, n_right: *n_right, error }
+    let of = |(number, problem): (usize, &Problem)| Located {
+        n_pairs: problem.n_pairs,
+        n_right: problem.n_right,
+        error: problem.solve(seed.wrapping_add(number as u64)),
     };
     problems.par_iter().enumerate().map(of).collect()
 }

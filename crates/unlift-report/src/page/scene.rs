@@ -130,7 +130,7 @@ pub(crate) fn encode(scene: &Scene3d, rows: &[Row], error_unit: f32) -> Encoded 
     let mut obfuscations = Vec::new();
     for ObfuscationView { scheme, shapes, n_records, .. } in &scene.obfuscations {
         let (kind, name, bytes, n_drawn) = encode_shapes(&bounds, shapes);
-        let [drawn, all] = [n_drawn as u64, *n_records].map(|n| words::thousands(n));
+        let [drawn, all] = [n_drawn as u64, *n_records].map(words::thousands);
         // "1,500 of 3,895 lines drawn".
         let text = match n_drawn as u64 >= *n_records {
             true => format!("{drawn} {name} drawn"),
