@@ -104,16 +104,4 @@ mod tests {
             "a.h5: array x: expected at most 256 MiB in memory of a file of 259.8 KiB, found 4 GiB";
         assert_eq!(error.to_string(), expected);
     }
-
-    #[test]
-    fn only_regular_files_are_opened() {
-        let folder = tempfile::tempdir().unwrap();
-        let line = |path: &Path| open(path).unwrap_err().to_string();
-        assert!(line(folder.path()).ends_with("expected a file, found a folder"));
-        #[cfg(unix)]
-        assert_eq!(
-            line(Path::new("/dev/zero")),
-            "/dev/zero: expected a file, found a pipe, a socket or a device"
-        );
-    }
 }

@@ -111,18 +111,8 @@ mod tests {
     fn rotations() -> Vec<[[f64; 3]; 3]> {
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.6, -0.48, 0.64]];
         let angles = [0.0, 0.3, 1.9, std::f64::consts::PI, 4.5];
-        let turned = |axis: [f64; 3], angle: f64| {
-            let (s, c) = angle.sin_cos();
-            let [x, y, z] = axis;
-            let cross = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
-            std::array::from_fn(|i| {
-                std::array::from_fn(|j| {
-                    let same = if i == j { c } else { 0.0 };
-                    same + s * cross[i][j] + (1.0 - c) * axis[i] * axis[j]
-                })
-            })
-        };
-        axes.iter().flat_map(|&axis| angles.map(|angle| turned(axis, angle))).collect()
+        let of = |[x, y, z]: [f64; 3]| Pose::IDENTITY.moved(&[x, y, z, 0.0, 0.0, 0.0]).rotation;
+        axes.iter().flat_map(|axis| angles.map(|angle| of(axis.map(|x| angle * x)))).collect()
     }
 
     #[test]
@@ -136,17 +126,14 @@ mod tests {
             height_px: 480,
             params: vec![525.25, 320.0, 240.0, -0.01],
         }];
-        let images: Vec<Image> = rotations()
-            .iter()
-            .enumerate()
-            .map(|(at, &rotation)| Image {
-                id: at as u32 + 1,
-                name: format!("seq/{at}.png").into_bytes(),
-                camera_id: 3,
-                pose: Pose { rotation, center: [1.5 * at as f64, -2.0, 0.25] },
-                n_points2d: 0,
-            })
-            .collect();
+        let image = |(at, rotation): (usize, [[f64; 3]; 3])| Image {
+            id: at as u32 + 1,
+            name: format!("seq/{at}.png").into_bytes(),
+            camera_id: 3,
+            pose: Pose { rotation, center: [1.5 * at as f64, -2.0, 0.25] },
+            n_points2d: 0,
+        };
+        let images: Vec<Image> = rotations().into_iter().enumerate().map(image).collect();
         let points = [Some([1.0, 2.5, -1e-7]), None, Some([1e6, 0.1, 3.0])];
         write_cameras(&at("cameras.txt"), &cameras).unwrap();
         write_images(&at("images.txt"), &images).unwrap();
@@ -169,15 +156,10 @@ mod tests {
     #[test]
     fn names_that_a_line_cannot_hold_are_refused() {
         let folder = tempfile::tempdir().unwrap();
-        let image = |name: &[u8]| Image {
-            id: 7,
-            name: name.to_vec(),
-            camera_id: 1,
-            pose: Pose::IDENTITY,
-            n_points2d: 0,
-        };
         for name in [&b"a b.png"[..], b"", b"a\n9 1 0 0 0 0 0 0 1 b"] {
-            let error = write_images(&folder.path().join("images.txt"), &[image(name)]);
+            let (name, pose) = (name.to_vec(), Pose::IDENTITY);
+            let image = Image { id: 7, name, camera_id: 1, pose, n_points2d: 0 };
+            let error = write_images(&folder.path().join("images.txt"), &[image]);
             let error = error.unwrap_err().to_string();
             assert!(error.contains("image 7: expected a name without spaces"), "{error}");
         }

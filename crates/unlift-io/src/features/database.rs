@@ -2,7 +2,7 @@
 //!
 //! Source: COLMAP's documentation, "Database Format".
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -22,18 +22,28 @@ use crate::input::{self, Budget};
 use crate::read::lines::quoted;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
+enum Kind {
     Bytes,
     /// Little-endian `f32`. The table states the row length in bytes.
     Floats,
 }
 
 /// A matrix of one image: `n` rows of `row_bytes` bytes each.
-pub(crate) struct Rows {
-    pub kind: Kind,
-    pub n: usize,
-    pub row_bytes: usize,
-    pub data: Vec<u8>,
+struct Rows {
+    kind: Kind,
+    n: usize,
+    row_bytes: usize,
+    data: Vec<u8>,
+}
+
+impl Rows {
+    /// Returns the values row by row, and their number per row.
+    fn into_values(self) -> (Values, usize) {
+        match self.kind {
+            Kind::Bytes => (Values::U8(self.data), self.row_bytes),
+            Kind::Floats => (Values::F32(floats(&self.data)), self.row_bytes / 4),
+        }
+    }
 }
 
 const TABLES: [&str; 4] = ["images", "cameras", "keypoints", "descriptors"];
@@ -47,8 +57,11 @@ const STEPS_PER_BYTE: u64 = 4;
 /// An open database, with image ids by name.
 pub(crate) struct Database {
     path: PathBuf,
-    connection: Connection,
-    image_ids: HashMap<Vec<u8>, i64>,
+    // A connection cannot be used by two threads at once.
+    connection: Mutex<Connection>,
+    /// Sorted by name, which may not be UTF-8.
+    image_ids: Vec<(Vec<u8>, i64)>,
+    names: Vec<String>,
     /// True if a column `type` states the extractor (COLMAP 4 and later).
     has_type: bool,
     steps: Arc<AtomicU64>,
@@ -69,38 +82,35 @@ impl Database {
         }
         steps.store(0, Relaxed);
         let image_ids = image_ids(&connection, path, &budget)?;
+        let name = |(name, _): &(Vec<u8>, i64)| String::from_utf8_lossy(name).into_owned();
+        let names = image_ids.iter().map(name).collect();
         let has_type = connection.prepare("SELECT type FROM descriptors LIMIT 0").is_ok();
-        Ok(Self { path: path.to_owned(), connection, image_ids, has_type, steps })
+        let (path, connection) = (path.to_owned(), Mutex::new(connection));
+        Ok(Self { path, connection, image_ids, names, has_type, steps })
     }
 
-    pub fn names(&self) -> Vec<Vec<u8>> {
-        let mut names: Vec<Vec<u8>> = self.image_ids.keys().cloned().collect();
-        names.sort_unstable();
-        names
+    pub fn names(&self) -> &[String] {
+        &self.names
     }
 
-    pub fn error(
-        &self,
-        name: &[u8],
-        expected: impl Into<String>,
-        found: impl Into<String>,
-    ) -> Error {
+    fn error(&self, name: &[u8], expected: impl Into<String>, found: impl Into<String>) -> Error {
         Error::new(&self.path, format!("image {}", quoted(name)), expected, found)
     }
 
     fn image_id(&self, name: &[u8]) -> Result<i64, Error> {
-        let found = self.image_ids.get(name).copied();
-        found.ok_or_else(|| self.error(name, "this image of the model", "no such image"))
+        let at = self.image_ids.binary_search_by(|(known, _)| known[..].cmp(name));
+        let at = at.map_err(|_| self.error(name, "this image of the model", "no such image"))?;
+        Ok(self.image_ids[at].1)
     }
 
-    pub fn descriptors(&self, name: &[u8]) -> Result<Rows, Error> {
-        let found = self.matrix(name, "descriptors")?;
+    pub fn descriptors(&self, name: &[u8]) -> Result<(Values, usize), Error> {
+        let found = self.matrix(name, "descriptors")?.map(Rows::into_values);
         found.ok_or_else(|| self.error(name, "descriptors", "none"))
     }
 
     /// Returns the descriptors or the keypoints (floats) of an image, or `None` if `table` has no
     /// row for it.
-    pub fn matrix(&self, name: &[u8], table: &str) -> Result<Option<Rows>, Error> {
+    fn matrix(&self, name: &[u8], table: &str) -> Result<Option<Rows>, Error> {
         let image_id = self.image_id(name)?;
         let of_keypoints = table == "keypoints";
         let kind = if self.has_type && !of_keypoints { "type" } else { "0" };
@@ -140,15 +150,16 @@ impl Database {
         place: &str,
         read: impl FnOnce(&Row<'_>) -> rusqlite::Result<T>,
     ) -> Result<Option<T>, Error> {
+        let connection = self.connection.lock().unwrap_or_else(PoisonError::into_inner);
         self.steps.store(0, Relaxed);
-        let statement = self.connection.prepare(query);
+        let statement = connection.prepare(query);
         let found =
             statement.and_then(|mut statement| statement.query_row([image_id], read).optional());
         found.map_err(|error| refuse(&self.path, place, &error))
     }
 
     /// Returns width and height in pixels of an image, if its camera states them.
-    pub fn size(&self, name: &[u8]) -> Result<Option<[u32; 2]>, Error> {
+    fn size(&self, name: &[u8]) -> Result<Option<[u32; 2]>, Error> {
         let query = "SELECT cameras.width, cameras.height FROM images JOIN cameras \
                      ON images.camera_id = cameras.camera_id WHERE image_id = ?";
         let image_id = self.image_id(name)?;
@@ -215,11 +226,11 @@ fn image_ids(
     connection: &Connection,
     path: &Path,
     budget: &Budget,
-) -> Result<HashMap<Vec<u8>, i64>, Error> {
+) -> Result<Vec<(Vec<u8>, i64)>, Error> {
     let failed = |e: rusqlite::Error| refuse(path, "table images", &e);
     let mut statement = connection.prepare("SELECT image_id, name FROM images").map_err(failed)?;
     let mut rows = statement.query([]).map_err(failed)?;
-    let (mut image_ids, mut bytes) = (HashMap::new(), 0);
+    let (mut image_ids, mut bytes) = (BTreeMap::new(), 0);
     while let Some(row) = rows.next().map_err(failed)? {
         let name = row.get_ref(1).map_err(failed)?;
         let name = name.as_bytes().map_err(|e| failed(e.into()))?;
@@ -228,7 +239,7 @@ fn image_ids(
         budget.admit("table images", bytes)?;
         image_ids.insert(name.to_vec(), row.get(0).map_err(failed)?);
     }
-    Ok(image_ids)
+    Ok(image_ids.into_iter().collect())
 }
 
 /// Returns the URI of a database that is opened read-only, without writing a journal.
@@ -265,43 +276,25 @@ fn uri(path: &Path) -> OsString {
     uri.into()
 }
 
-pub(super) struct Colmap {
-    // A connection cannot be used by two threads at once.
-    database: Mutex<Database>,
-    raw: Vec<Vec<u8>>,
-    names: Vec<String>,
-}
-
-impl Colmap {
-    pub fn open(path: &Path) -> Result<Self, Error> {
-        let database = Database::open(path)?;
-        let raw = database.names();
-        let names = raw.iter().map(|name| String::from_utf8_lossy(name).into_owned()).collect();
-        Ok(Self { database: Mutex::new(database), raw, names })
-    }
-
-    pub fn names(&self) -> &[String] {
-        &self.names
-    }
-
+impl Database {
+    /// Reads the features of image `at` of [`names`](Self::names).
     pub fn get(&self, at: usize) -> Result<ImageFeatures, Error> {
-        let name = &self.raw[at][..];
-        let database = self.database.lock().unwrap_or_else(PoisonError::into_inner);
-        let size = database.size(name)?;
-        let Some(rows) = database.matrix(name, "keypoints")? else {
-            return Err(database.error(name, "keypoints", "none"));
+        let name = &self.image_ids[at].0[..];
+        let size = self.size(name)?;
+        let Some(rows) = self.matrix(name, "keypoints")? else {
+            return Err(self.error(name, "keypoints", "none"));
         };
-        let descriptors = database.matrix(name, "descriptors")?;
+        let descriptors = self.matrix(name, "descriptors")?;
         let columns = rows.row_bytes / 4;
         if ![2, 4, 6].contains(&columns) {
             let found = format!("{columns} columns");
-            return Err(database.error(name, "keypoints of 2, 4 or 6 columns", found));
+            return Err(self.error(name, "keypoints of 2, 4 or 6 columns", found));
         }
         let values = floats(&rows.data);
         if let Some(bad) = values.iter().position(|value| !value.is_finite()) {
             let (row, found) = (bad / columns, values[bad].to_string());
             let expected = format!("a finite number in keypoint {row}");
-            return Err(database.error(name, expected, found));
+            return Err(self.error(name, expected, found));
         }
         let mut image = ImageFeatures { name: self.names[at].clone(), size, ..Default::default() };
         // COLMAP places the center of the first pixel at (0.5, 0.5).
@@ -314,12 +307,11 @@ impl Colmap {
         if let Some(stored) = descriptors {
             if stored.n != rows.n {
                 let expected = format!("{} descriptors, one per keypoint", rows.n);
-                return Err(database.error(name, expected, stored.n.to_string()));
+                return Err(self.error(name, expected, stored.n.to_string()));
             }
-            let matrix = matrix(stored).map_err(|error| {
-                database.error(name, error.expected().to_owned(), error.found().to_owned())
-            })?;
-            image.descriptors = Some(matrix);
+            let (values, dim) = stored.into_values();
+            let wrong = |error: unlift::Error| self.error(name, error.expected(), error.found());
+            image.descriptors = Some(Descriptors::try_new(values, dim).map_err(wrong)?);
         }
         Ok(image)
     }
@@ -341,13 +333,6 @@ fn shape(row: &[f32]) -> (f32, f32) {
     }
 }
 
-fn matrix(rows: Rows) -> Result<Descriptors, unlift::Error> {
-    match rows.kind {
-        Kind::Bytes => Descriptors::try_new(Values::U8(rows.data), rows.row_bytes),
-        Kind::Floats => Descriptors::try_new(Values::F32(floats(&rows.data)), rows.row_bytes / 4),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -362,7 +347,8 @@ mod tests {
                  SELECT count(*) FROM c"
             );
             database.steps.store(0, Relaxed);
-            database.connection.query_row(&query, [], |row| row.get::<_, i64>(0))
+            let connection = database.connection.lock().unwrap();
+            connection.query_row(&query, [], |row| row.get::<_, i64>(0))
         };
         assert_eq!(count(1000).unwrap(), 1000);
         let error = refuse(Path::new("f"), "", &count(i64::MAX).unwrap_err());

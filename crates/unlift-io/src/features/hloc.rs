@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 
 use half::f16;
 use hdf5_pure::{
-    AttrValue, DType, Dataset, DatasetBuilder, Datatype, DatatypeByteOrder, File,
-    FileAccessProperties, FileCreateProperties, FileLocking, FloatingPointLayout, Group,
-    MemoryStrategy, MetadataCacheConfig, ReadSeekSource, SyncPolicy,
+    AttrValue, DType, Dataset, Datatype, DatatypeByteOrder, File, FileAccessProperties,
+    FileCreateProperties, FileLocking, FloatingPointLayout, Group, MemoryStrategy,
+    MetadataCacheConfig, ReadSeekSource, SyncPolicy,
 };
 use unlift::Descriptors;
 use unlift::descriptors::Values;
@@ -20,6 +20,7 @@ use crate::atomic::{Access, OutputFile};
 use crate::error::Error;
 use crate::input::{self, Budget};
 use crate::read::lines::quoted;
+use crate::read::npy::tuple;
 use unlift::guard::caught;
 
 /// Groups with arrays, by their paths.
@@ -27,6 +28,7 @@ type Groups = Vec<(String, Group)>;
 
 /// Bytes of headers that are kept, because a header is read in a dozen pieces.
 const CACHE: usize = 1 << 20;
+const KEYPOINTS: &str = "keypoints";
 /// An attribute of `keypoints`: 1 if they are in pixels of upright photos, else 0.
 const UPRIGHT: &str = "upright";
 const UNCERTAINTY: &str = "uncertainty";
@@ -54,7 +56,7 @@ impl Hloc {
         let first = if file.names.is_empty() { Vec::new() } else { file.arrays(0)? };
         let has = |name: &str| first.iter().any(|array| array == name);
         match () {
-            () if has("keypoints") => Ok(file),
+            () if has(KEYPOINTS) => Ok(file),
             () if has("matches0") || has("matches") => wrong("matches of pairs of images"),
             () if has("global_descriptor") => wrong("global descriptors of whole images"),
             () => Ok(file),
@@ -216,7 +218,7 @@ impl Hloc {
 
     /// Returns an attribute of the keypoints of image `at`.
     fn attribute(&self, at: usize, key: &str) -> Result<Option<f64>, Error> {
-        let (image, name) = (&self.names[at], "keypoints");
+        let (image, name) = (&self.names[at], KEYPOINTS);
         self.step(image, name, || {
             let refuse = |error| self.refuse(image, name, error);
             let dataset = self.groups[at].dataset(name).map_err(refuse)?;
@@ -233,17 +235,17 @@ impl Hloc {
         let wrong = |array: &'static str| {
             move |(expected, found): Wrong| self.error(name, array, expected, found)
         };
-        let Some(places) = optional("keypoints")? else {
+        let Some(places) = optional(KEYPOINTS)? else {
             let found = format!("only {}", present.join(", "));
             return Err(self.error(name, "", "an array keypoints", found));
         };
-        let keypoints = keypoints(&places).map_err(wrong("keypoints"))?;
+        let keypoints = keypoints(&places).map_err(wrong(KEYPOINTS))?;
         let n = keypoints.len();
         let per_keypoint = |array: &str| -> Result<Option<Vec<f32>>, Error> {
             let Some(values) = optional(array)? else { return Ok(None) };
             if values.shape != [n as u64] && values.shape != [n as u64, 1] {
                 let expected = format!("one value per keypoint, ({n},)");
-                return Err(self.error(name, array, expected, shape_text(&values.shape)));
+                return Err(self.error(name, array, expected, tuple(&values.shape)));
             }
             Ok(Some(values.values.to_f64().into_iter().map(|value| value as f32).collect()))
         };
@@ -288,10 +290,10 @@ impl Hloc {
 
 /// The values of an array, row-major.
 enum Numbers {
-    U8(Vec<u8>),
-    F32(Vec<f32>),
-    F64(Vec<f64>),
-    I64(Vec<i64>),
+    Bytes(Vec<u8>),
+    Floats(Vec<f64>),
+    /// Other integers.
+    Whole(Vec<f64>),
 }
 
 struct Array {
@@ -300,21 +302,10 @@ struct Array {
 }
 
 impl Numbers {
-    fn len(&self) -> usize {
-        match self {
-            Self::U8(values) => values.len(),
-            Self::F32(values) => values.len(),
-            Self::F64(values) => values.len(),
-            Self::I64(values) => values.len(),
-        }
-    }
-
     fn to_f64(&self) -> Vec<f64> {
         match self {
-            Self::U8(values) => values.iter().map(|&x| f64::from(x)).collect(),
-            Self::F32(values) => values.iter().map(|&x| f64::from(x)).collect(),
-            Self::F64(values) => values.clone(),
-            Self::I64(values) => values.iter().map(|&x| x as f64).collect(),
+            Self::Bytes(values) => values.iter().map(|&x| f64::from(x)).collect(),
+            Self::Floats(values) | Self::Whole(values) => values.clone(),
         }
     }
 }
@@ -334,13 +325,14 @@ const HALF: FloatingPointLayout = FloatingPointLayout {
 fn numbers(dataset: &Dataset, count: u64) -> Result<Option<Numbers>, hdf5_pure::Error> {
     let dtype = dataset.dtype()?;
     Ok(Some(match dtype {
-        DType::U8 if count == 0 => Numbers::U8(Vec::new()),
-        _ if count == 0 => Numbers::F32(Vec::new()),
-        DType::F32 => Numbers::F32(dataset.read_f32()?),
-        DType::F64 => Numbers::F64(dataset.read_f64()?),
-        DType::U8 => Numbers::U8(dataset.read_u8()?),
-        DType::I8 | DType::I16 | DType::I32 | DType::I64 => Numbers::I64(dataset.read_i64()?),
-        DType::U16 | DType::U32 | DType::U64 => Numbers::I64(dataset.read_i64()?),
+        DType::U8 if count == 0 => Numbers::Bytes(Vec::new()),
+        _ if count == 0 => Numbers::Floats(Vec::new()),
+        DType::F32 => Numbers::Floats(dataset.read_f32()?.into_iter().map(f64::from).collect()),
+        DType::F64 => Numbers::Floats(dataset.read_f64()?),
+        DType::U8 => Numbers::Bytes(dataset.read_u8()?),
+        DType::I8 | DType::I16 | DType::I32 | DType::I64 | DType::U16 | DType::U32 | DType::U64 => {
+            Numbers::Whole(dataset.read_i64()?.into_iter().map(|x| x as f64).collect())
+        }
         _ => {
             let order = match dataset.datatype()? {
                 Datatype::FloatingPoint { size: 2, byte_order, layout: HALF } => byte_order,
@@ -352,7 +344,7 @@ fn numbers(dataset: &Dataset, count: u64) -> Result<Option<Numbers>, hdf5_pure::
                 _ => return Ok(None),
             };
             let bytes = dataset.read_raw()?;
-            Numbers::F32(bytes.as_chunks().0.iter().map(|&half| from(half).to_f32()).collect())
+            Numbers::Floats(bytes.as_chunks().0.iter().map(|&half| from(half).to_f64()).collect())
         }
     }))
 }
@@ -366,17 +358,6 @@ fn transposed<T: Copy>(values: &[T], rows: usize) -> Vec<T> {
     transposed
 }
 
-/// Formats a shape like NumPy: `(128, 40)`.
-fn shape_text(shape: &[u64]) -> String {
-    match shape {
-        [n] => format!("({n},)"),
-        _ => {
-            let sides: Vec<String> = shape.iter().map(u64::to_string).collect();
-            format!("({})", sides.join(", "))
-        }
-    }
-}
-
 /// The expected and the found value.
 type Wrong = (String, String);
 
@@ -386,7 +367,7 @@ fn keypoints(array: &Array) -> Result<Vec<[f64; 2]>, Wrong> {
         [_, columns] if columns >= 2 => columns as usize,
         // Some exporters write an image without keypoints like this.
         [0] | [0, _] | [2, 0] => return Ok(Vec::new()),
-        _ => return Err(("shape (N, 2)".to_owned(), shape_text(&array.shape))),
+        _ => return Err(("shape (N, 2)".to_owned(), tuple(&array.shape))),
     };
     let values = array.values.to_f64();
     let rows: Vec<[f64; 2]> = values.chunks_exact(columns).map(|row| [row[0], row[1]]).collect();
@@ -403,28 +384,26 @@ fn keypoints(array: &Array) -> Result<Vec<[f64; 2]>, Wrong> {
 fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
     let expected = || format!("shape (D, N) with N = {n}, one column per keypoint");
     let dim = match array.shape[..] {
-        ref sides if n == 0 && array.values.len() == 0 => {
+        ref sides if n == 0 && sides.contains(&0) => {
             sides.iter().copied().max().unwrap_or(0).max(1) as usize
         }
         [dim, count] if count == n as u64 && dim > 0 => dim as usize,
         [count, _] if count == n as u64 => {
-            let found = format!("{}, rows and columns exchanged", shape_text(&array.shape));
+            let found = format!("{}, rows and columns exchanged", tuple(&array.shape));
             return Err((expected(), found));
         }
-        _ => return Err((expected(), shape_text(&array.shape))),
+        _ => return Err((expected(), tuple(&array.shape))),
     };
     let is_rows = dim == n && has_equal_rows(&array.values.to_f64(), n);
-    let floats = |values: &[f32]| {
-        Values::F32(if is_rows { values.to_vec() } else { transposed(values, dim) })
-    };
+    // Transposing a matrix of one row changes nothing.
+    let sides = if is_rows { 1 } else { dim };
     let values = match array.values {
-        Numbers::U8(bytes) if is_rows => Values::U8(bytes),
-        Numbers::U8(bytes) => Values::U8(transposed(&bytes, dim)),
-        Numbers::F32(values) => floats(&values),
-        Numbers::F64(doubles) => {
-            floats(&doubles.iter().map(|&value| value as f32).collect::<Vec<_>>())
+        Numbers::Bytes(bytes) => Values::U8(transposed(&bytes, sides)),
+        Numbers::Floats(values) => {
+            let values: Vec<f32> = values.into_iter().map(|value| value as f32).collect();
+            Values::F32(transposed(&values, sides))
         }
-        Numbers::I64(_) => {
+        Numbers::Whole(_) => {
             return Err(("floats, or unsigned bytes".to_owned(), "other integers".to_owned()));
         }
     };
@@ -461,7 +440,7 @@ fn size(array: &Array) -> Result<[u32; 2], Wrong> {
     .ok_or_else(|| {
         let found = match sides.len() {
             2 => format!("{} and {}", sides[0], sides[1]),
-            _ => shape_text(&array.shape),
+            _ => tuple(&array.shape),
         };
         ("width and height in pixels".to_owned(), found)
     })
@@ -556,10 +535,19 @@ impl FeatureWriter {
         }
         self.images.insert(image.name.clone());
         let columns = columns(image);
-        self.staged += columns.iter().map(|column| column.bytes.len()).sum::<usize>();
+        self.staged += columns.iter().map(|(.., bytes)| bytes.len()).sum::<usize>();
         root.create_group_with(&image.name, |group| {
-            for column in columns {
-                group.create_dataset(column.name, |dataset| column.fill(dataset));
+            for (name, shape, datatype, bytes) in columns {
+                group.create_dataset(name, |dataset| {
+                    let count = shape.iter().product();
+                    dataset.with_raw_data(datatype, bytes, count).with_shape(&shape);
+                    if name == KEYPOINTS {
+                        dataset.set_attr(UPRIGHT, AttrValue::F64(f64::from(image.upright)));
+                        if let Some(value) = image.uncertainty_px {
+                            dataset.set_attr(UNCERTAINTY, AttrValue::F64(value));
+                        }
+                    }
+                });
             }
         })?;
         if self.staged > MAX_STAGED {
@@ -622,42 +610,16 @@ fn check(image: &ImageFeatures, path: &Path) -> Result<(), Error> {
     Ok(())
 }
 
-/// An array to write.
-struct Column {
-    name: &'static str,
-    shape: Vec<u64>,
-    datatype: Datatype,
-    bytes: Vec<u8>,
-    attributes: Vec<(&'static str, f64)>,
-}
-
-impl Column {
-    fn fill(self, dataset: &mut DatasetBuilder) {
-        let count = self.shape.iter().product();
-        dataset.with_raw_data(self.datatype, self.bytes, count).with_shape(&self.shape);
-        for (name, value) in self.attributes {
-            dataset.set_attr(name, AttrValue::F64(value));
-        }
-    }
-}
+/// The name, the shape, the type and the bytes of an array to write.
+type Column = (&'static str, Vec<u64>, Datatype, Vec<u8>);
 
 /// The arrays of an image, in hloc's types.
 fn columns(image: &ImageFeatures) -> Vec<Column> {
     let n = image.keypoints.len() as u64;
-    let column = |name, shape: &[u64], datatype, bytes| Column {
-        name,
-        shape: shape.to_vec(),
-        datatype,
-        bytes,
-        attributes: Vec::new(),
-    };
     let floats = |values: &[f32]| values.iter().flat_map(|x| x.to_le_bytes()).collect();
     let single = hdf5_pure::make_f32_type;
     let places: Vec<f32> = image.keypoints.iter().flatten().map(|&value| value as f32).collect();
-    let mut attributes = vec![(UPRIGHT, f64::from(image.upright))];
-    attributes.extend(image.uncertainty_px.map(|value| (UNCERTAINTY, value)));
-    let keypoints = column("keypoints", &[n, 2], single(), floats(&places));
-    let mut columns = vec![Column { attributes, ..keypoints }];
+    let mut columns: Vec<Column> = vec![(KEYPOINTS, vec![n, 2], single(), floats(&places))];
     if let Some(rows) = &image.descriptors {
         let (datatype, bytes) = match rows.values() {
             Values::U8(values) => (hdf5_pure::make_u8_type(), transposed(values, rows.len())),
@@ -674,16 +636,16 @@ fn columns(image: &ImageFeatures) -> Vec<Column> {
                 None => (single(), floats(&transposed(values, rows.len()))),
             },
         };
-        columns.push(column("descriptors", &[rows.dim() as u64, n], datatype, bytes));
+        columns.push(("descriptors", vec![rows.dim() as u64, n], datatype, bytes));
     }
     let per_keypoint =
         [("scores", &image.scores), ("scales", &image.scales), ("oris", &image.orientations_deg)];
     for (name, values) in per_keypoint {
-        columns.extend(values.as_ref().map(|values| column(name, &[n], single(), floats(values))));
+        columns.extend(values.as_ref().map(|values| (name, vec![n], single(), floats(values))));
     }
     if let Some(size) = image.size {
         let bytes = size.iter().flat_map(|&side| i64::from(side).to_le_bytes()).collect();
-        columns.push(column("image_size", &[2], hdf5_pure::make_i64_type(), bytes));
+        columns.push(("image_size", vec![2], hdf5_pure::make_i64_type(), bytes));
     }
     columns
 }
@@ -707,7 +669,8 @@ mod tests {
             row.iter_mut().for_each(|x| *x /= norm);
         }
         let read = |values: Vec<f32>| {
-            let array = Array { shape: vec![N as u64; 2], values: Numbers::F32(values) };
+            let values = Numbers::Floats(values.into_iter().map(f64::from).collect());
+            let array = Array { shape: vec![N as u64; 2], values };
             descriptors(array, N).unwrap().values().clone()
         };
         assert_eq!(read(transposed(&rows, N)), Values::F32(rows.clone()));

@@ -89,7 +89,7 @@ pub struct FeatureSource {
 
 enum Kind {
     Hloc(hloc::Hloc),
-    Colmap(database::Colmap),
+    Colmap(database::Database),
 }
 
 const SQLITE: &[u8; 8] = b"SQLite f";
@@ -106,7 +106,7 @@ impl FeatureSource {
         File::take(file, 8).read_to_end(&mut start).map_err(|e| Error::read(path, e))?;
         let kind = match start.first_chunk() {
             Some(HDF5) => Kind::Hloc(hloc::Hloc::open(path)?),
-            Some(SQLITE) => Kind::Colmap(database::Colmap::open(path)?),
+            Some(SQLITE) => Kind::Colmap(database::Database::open(path)?),
             _ => {
                 let expected = "features in HDF5, or a COLMAP database (SQLite)";
                 let found = match len {

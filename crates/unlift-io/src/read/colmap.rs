@@ -474,15 +474,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn row_is_id() {
-        for (row, model) in CAMERA_MODELS.iter().enumerate() {
-            assert_eq!(CameraModel::from_id(row as i32), Some(model));
-            assert_eq!(CameraModel::from_name(model.name.as_bytes()).unwrap().id, row as i32);
-        }
-        assert_eq!(CameraModel::from_id(-1), None);
-    }
-
-    #[test]
     fn unsorted_points_are_sorted_with_their_tracks() {
         let points = Points {
             ids: vec![7, 2],
@@ -498,24 +489,5 @@ mod tests {
         let tracks = sorted.tracks.unwrap();
         assert_eq!(tracks.row(0), [(2, 0)]);
         assert_eq!(tracks.row(1), [(7, 0), (7, 1)]);
-    }
-
-    #[test]
-    fn two_images_of_one_name_are_refused() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("images.txt");
-        let line = |id: u32, name| format!("{id} 1 0 0 0 0 0 0 1 {name}\n\n");
-        std::fs::write(&path, line(1, "a.jpg") + &line(2, "b.jpg") + &line(3, "a.jpg")).unwrap();
-        let error = read_images(&path).unwrap_err().to_string();
-        assert!(
-            error.ends_with("images.txt: expected each name once, found \"a.jpg\" again"),
-            "{error}"
-        );
-    }
-
-    #[test]
-    fn names_keep_their_spaces() {
-        assert_eq!(after_words(b"1 2  a b.jpg", 2), b"a b.jpg");
-        assert_eq!(after_words(b"1 2", 2), b"");
     }
 }

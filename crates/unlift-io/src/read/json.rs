@@ -6,8 +6,9 @@ use std::io::{self, BufRead, BufReader, Read};
 use std::marker::PhantomData;
 use std::path::{Component, Path, PathBuf};
 
+use serde::Deserialize;
 use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
-use serde::{Deserialize, de};
+use unlift::geometry::camera::Pose;
 
 use super::map_input::{DOWNWARD, Input, camera};
 use super::ply;
@@ -68,7 +69,7 @@ pub fn read(path: &Path) -> Result<Input, Error> {
 
 const MAPS: &str = "a map of OpenSfM or nerfstudio";
 
-/// A reader that replaces `NaN` and `Infinity`, which other programs write, by an empty string.
+/// A reader that replaces `NaN` and `Infinity`, which other programs write, by `null`.
 struct Strict<R> {
     bytes: io::Bytes<R>,
     /// The bytes to return next, in reverse order.
@@ -110,8 +111,8 @@ impl<R: BufRead> Strict<R> {
         for _ in 0..n {
             self.bytes.next().transpose()?;
         }
-        self.ahead.push(b'"');
-        Ok(Some(b'"'))
+        self.ahead.extend(b"llu");
+        Ok(Some(b'n'))
     }
 }
 
@@ -177,82 +178,27 @@ impl Object {
     }
 }
 
-/// A number. A missing one is NaN.
-struct Number(f64);
-
-impl<'de> Deserialize<'de> for Number {
-    fn deserialize<D: Deserializer<'de>>(json: D) -> Result<Self, D::Error> {
-        struct Any;
-        impl Visitor<'_> for Any {
-            type Value = f64;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a number")
-            }
-
-            fn visit_f64<E>(self, value: f64) -> Result<f64, E> {
-                Ok(value)
-            }
-
-            fn visit_i64<E>(self, value: i64) -> Result<f64, E> {
-                Ok(value as f64)
-            }
-
-            fn visit_u64<E>(self, value: u64) -> Result<f64, E> {
-                Ok(value as f64)
-            }
-
-            fn visit_unit<E>(self) -> Result<f64, E> {
-                Ok(f64::NAN)
-            }
-
-            fn visit_str<E: de::Error>(self, value: &str) -> Result<f64, E> {
-                // An empty string replaces NaN (`Strict`).
-                match value {
-                    "" => Ok(f64::NAN),
-                    value => Err(E::invalid_value(de::Unexpected::Str(value), &self)),
-                }
-            }
-        }
-        json.deserialize_any(Any).map(Self)
-    }
-}
-
-fn numbers<const N: usize>(numbers: [Number; N]) -> [f64; N] {
-    numbers.map(|number| number.0)
+/// Numbers, of which missing ones are NaN.
+fn numbers<const N: usize>(numbers: [Option<f64>; N]) -> [f64; N] {
+    numbers.map(|number| number.unwrap_or(f64::NAN))
 }
 
 /// A shot of OpenSfM. Its rotation is the axis times the angle.
 #[derive(Deserialize)]
 struct Shot {
-    rotation: [Number; 3],
-    translation: [Number; 3],
+    rotation: [Option<f64>; 3],
+    translation: [Option<f64>; 3],
 }
 
 #[derive(Deserialize)]
 struct Point {
-    coordinates: [Number; 3],
+    coordinates: [Option<f64>; 3],
 }
 
 #[derive(Deserialize)]
 struct Frame {
     /// The pose from camera (y is up) to world.
-    transform_matrix: Vec<[Number; 4]>,
-}
-
-/// Returns the rotation about `vector` by its length.
-fn rotation(vector: [f64; 3]) -> [[f64; 3]; 3] {
-    let angle = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let axis = if angle > 0.0 { vector.map(|x| x / angle) } else { [0.0; 3] };
-    let (sin, cos) = (libm::sin(angle), libm::cos(angle));
-    let [x, y, z] = axis;
-    let cross = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
-    std::array::from_fn(|row| {
-        std::array::from_fn(|c| {
-            let unit = if row == c { cos } else { 0.0 };
-            unit + sin * cross[row][c] + (1.0 - cos) * axis[row] * axis[c]
-        })
-    })
+    transform_matrix: Vec<[Option<f64>; 4]>,
 }
 
 impl Object {
@@ -260,12 +206,11 @@ impl Object {
     fn take<'de, A: MapAccess<'de>>(&mut self, json: &mut A) -> Result<(), A::Error> {
         let Self { names, found, cloud } = self;
         match names.last().map_or("", String::as_str) {
-            "shots" => {
-                json.next_value_seed(Items::new(|Shot { rotation: vector, translation }| {
-                    let rotation = rotation(numbers(vector));
-                    found.camera(Some(camera(&rotation, &numbers(translation), DOWNWARD)));
-                }))
-            }
+            "shots" => json.next_value_seed(Items::new(|Shot { rotation, translation }| {
+                let [x, y, z] = numbers(rotation);
+                let rotation = Pose::IDENTITY.moved(&[x, y, z, 0.0, 0.0, 0.0]).rotation;
+                found.camera(Some(camera(&rotation, &numbers(translation), DOWNWARD)));
+            })),
             "points" => json.next_value_seed(Items::new(|Point { coordinates }| {
                 found.positions.push(numbers(coordinates));
             })),

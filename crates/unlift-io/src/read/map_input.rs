@@ -163,25 +163,3 @@ pub(super) fn pose_of(quaternion: [f64; 4], t: [f64; 3]) -> Pose {
         std::array::from_fn(|j| -(r[0][j] * t[0] + r[1][j] * t[1] + r[2][j] * t[2]) / norm2);
     Pose { rotation: r.map(|row| row.map(|x| x / norm2)), center }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn center_is_where_the_pose_maps_to_zero() {
-        // A rotation by 90 degrees about z: x_cam = (-y, x, z) + t.
-        let half = 0.5_f64.sqrt();
-        let Pose { center: c, rotation } = pose_of([half, 0.0, 0.0, half], [1.0, 2.0, 3.0]);
-        for (found, expected) in c.iter().zip([-2.0, 1.0, -3.0]) {
-            assert!((found - expected).abs() < 1e-12, "{c:?}");
-        }
-        let turned = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
-        for (found, expected) in rotation.iter().flatten().zip(turned.iter().flatten()) {
-            assert!((found - expected).abs() < 1e-12, "{rotation:?}");
-        }
-        assert!(pose_of([0.0; 4], [1.0, 2.0, 3.0]).center.iter().all(|x| x.is_nan()));
-        let center = pose_of([1.0, 0.0, 0.0, 0.0], [f64::NAN; 3]).center;
-        assert!(center.iter().all(|x| x.is_nan()));
-    }
-}

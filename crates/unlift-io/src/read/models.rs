@@ -1,9 +1,10 @@
 //! Finds the COLMAP model of a folder.
 
 use std::fs;
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use super::lines::Lines;
 use super::ply;
 use crate::error::Error;
 use crate::input;
@@ -131,41 +132,22 @@ impl Candidate {
     /// Returns the number of points that the file declares.
     fn n_points(&self) -> Result<u64, Error> {
         let path = &self.points;
-        let wrong = |error| Error::read(path, error);
-        let file = BufReader::new(input::open(path)?.0);
         let ends = |with: &str| path.extension().is_some_and(|extension| extension == with);
         if ends("ply") {
             return Ok(ply::read(path)?.positions.len() as u64);
         }
         if ends("bin") {
             let mut count = Vec::new();
-            file.take(8).read_to_end(&mut count).map_err(wrong)?;
+            let read = input::open(path)?.0.take(8).read_to_end(&mut count);
+            read.map_err(|error| Error::read(path, error))?;
             // A truncated file counts as empty. If it is chosen, its reader returns the error.
             return Ok(count.try_into().map_or(0, u64::from_le_bytes));
         }
-        n_lines(file).map_err(wrong)
-    }
-}
-
-/// Counts lines that are neither blank nor comments.
-fn n_lines(mut file: impl BufRead) -> io::Result<u64> {
-    let mut n = 0;
-    let mut is_start = true;
-    loop {
-        let part = file.fill_buf()?;
-        if part.is_empty() {
-            return Ok(n);
+        let (mut lines, mut n) = (Lines::open(path)?, 0);
+        while lines.advance_to_data()? {
+            n += 1;
         }
-        for &byte in part {
-            if byte == b'\n' {
-                is_start = true;
-            } else if is_start && !byte.is_ascii_whitespace() {
-                n += u64::from(byte != b'#');
-                is_start = false;
-            }
-        }
-        let length = part.len();
-        file.consume(length);
+        Ok(n)
     }
 }
 

@@ -226,6 +226,12 @@ fn check_size<R: Read>(bytes: &Bytes<R>, rows: u64, row: Option<u64>) -> Result<
     Err(bytes.error_ahead(expected, format!("{} bytes", bytes.remaining())))
 }
 
+/// Formats a shape like NumPy: `(128, 40)` or `(7,)`.
+pub(crate) fn tuple<T: ToString>(sides: &[T]) -> String {
+    let text: Vec<String> = sides.iter().map(T::to_string).collect();
+    format!("({}{})", text.join(", "), if sides.len() == 1 { "," } else { "" })
+}
+
 /// The header of an array: a Python dictionary with three keys.
 pub(crate) struct Header(Vec<u8>);
 

@@ -11,7 +11,7 @@ use super::meta::{KEY, Meta};
 use crate::Error;
 use crate::input::Budget;
 use crate::read::bytes::Bytes;
-use crate::read::npy::Header;
+use crate::read::npy::{Header, tuple};
 use crate::read::npz::Archive;
 
 /// The values of an array that holds either bytes or floats.
@@ -238,10 +238,7 @@ impl<'a> Arrays<'a> {
                 shape.iter().zip(&sides).all(|(n, side)| side.is_none_or(|side| side == *n))
             };
             let Some(shape) = shape.filter(fits) else {
-                return Err(wrong(
-                    &format!("shape {}", shown(&sides)),
-                    &shape_text(&numbers.shape),
-                ));
+                return Err(wrong(&format!("shape {}", shown(&sides)), &tuple(&numbers.shape)));
             };
             numbers.check(bytes)?;
             let n = shape.iter().product::<usize>();
@@ -270,7 +267,7 @@ impl<'a> Arrays<'a> {
             let header = Header::read(bytes)?;
             let kind = String::from_utf8_lossy(header.type_text()).into_owned();
             if let Some(shape) = header.shape().filter(|shape| !shape.is_empty()) {
-                return Err(wrong(format!("shape {}", shape_text(&shape))));
+                return Err(wrong(format!("shape {}", tuple(&shape))));
             }
             let width = match kind.trim_start_matches(['<', '>', '|']).as_bytes().first() {
                 Some(b'U') => 4,
@@ -335,14 +332,5 @@ fn shown(sides: &[Option<usize>]) -> String {
         Some(n) => n.to_string(),
         None => ["n", "k", "d"][at.min(2)].to_owned(),
     };
-    tuple(sides.iter().enumerate().map(letter))
-}
-
-fn shape_text(shape: &[u64]) -> String {
-    tuple(shape.iter().map(u64::to_string))
-}
-
-fn tuple(sides: impl Iterator<Item = String>) -> String {
-    let sides: Vec<String> = sides.collect();
-    format!("({}{})", sides.join(", "), if sides.len() == 1 { "," } else { "" })
+    tuple(&sides.iter().enumerate().map(letter).collect::<Vec<_>>())
 }

@@ -13,6 +13,7 @@ use zip::{CompressionMethod, DateTime, System, ZipWriter};
 use super::meta::{KEY, to_text};
 use crate::Error;
 use crate::atomic::{self, Access};
+use crate::read::npy::tuple;
 
 /// Arrays with metadata. Equal values make equal bytes.
 pub(super) struct Written<'a> {
@@ -150,11 +151,8 @@ impl<'a> Zip<'a> {
 
     /// Starts the array `name` with its header.
     fn start(&mut self, name: &str, descr: &str, shape: &[usize], size: usize) -> io::Result<()> {
-        let sides = match shape {
-            [n] => format!("{n},"),
-            sides => sides.iter().map(usize::to_string).collect::<Vec<_>>().join(", "),
-        };
-        let text = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({sides}), }}");
+        let shape = tuple(shape);
+        let text = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}");
         // Magic, version and length take 10 bytes, the end of the line one.
         let length = (text.len() + 11).next_multiple_of(64) - 10;
         let mut header = b"\x93NUMPY\x01\x00".to_vec();
