@@ -8,7 +8,7 @@ use unlift::Descriptors;
 use unlift::descriptors::Values;
 use unlift_io::features::{FeatureSource, FeatureWriter, ImageFeatures};
 
-use super::{data, shared, shown, write, write_database};
+use super::{data, shown, write, write_database};
 
 /// The name and the shape of an array, and what fills it.
 type Filled<'a> = (&'a str, &'a [u64], Box<dyn Fn(&mut DatasetBuilder)>);
@@ -157,26 +157,6 @@ fn databases_come_in_the_same_convention() {
     let images = all(&path);
     assert!(images.iter().all(|image| floats(image).len() == 8 * 4));
     assert_eq!(images[0].keypoints[0], [-0.5, -0.5]);
-}
-
-#[test]
-fn real_features_make_the_round_trip() {
-    for (name, n_images, n_keypoints) in
-        [("features-sift.h5", 6, 13_202), ("features-sift-f16.h5", 1, 1404)]
-    {
-        let Some(path) = shared(&format!("data/redkitchen/{name}")) else { continue };
-        let images = all(&path);
-        let total: usize = images.iter().map(|image| image.keypoints.len()).sum();
-        assert_eq!((images.len(), total), (n_images, n_keypoints));
-        let (size, uncertainty) = (images[0].size, images[0].uncertainty_px);
-        assert_eq!((size, uncertainty), (Some([640, 480]), Some(1.0)));
-        let dir = tempfile::tempdir().unwrap();
-        let copy = dir.path().join("copy.h5");
-        let mut writer = FeatureWriter::create(&copy).unwrap();
-        images.iter().for_each(|image| writer.append(image).unwrap());
-        writer.finish().unwrap();
-        assert_eq!(all(&copy), images);
-    }
 }
 
 /// A name, a shape, and a function that adds the values.

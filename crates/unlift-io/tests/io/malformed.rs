@@ -6,9 +6,10 @@ use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use unlift_io::features::FeatureSource;
-use unlift_io::read;
+use unlift_io::{read, stage};
 
-use super::{copy_folder, data, fixture, npy as array, refused, shown};
+use super::stages::maps;
+use super::{copy_folder, data, fixture, npy as array, refused, shown, write};
 
 pub fn patched(mut file: Vec<u8>, at: usize, bytes: &[u8]) -> Vec<u8> {
     file[at..at + bytes.len()].copy_from_slice(bytes);
@@ -70,10 +71,8 @@ fn a_file_that_may_not_be_read_is_refused() {
         eprintln!("skipped: this user may read everything");
         return;
     }
-    assert_eq!(
-        shown(dir.path(), &read::open(&path).unwrap_err()),
-        "a.csv: expected a readable file, found no permission to read"
-    );
+    let line = "a.csv: expected a readable file, found no permission to read";
+    assert_eq!(shown(dir.path(), &read::open(&path).unwrap_err()), line);
 }
 
 /// They must be an error before they are opened.
@@ -179,6 +178,7 @@ fn text() -> Vec<Row> {
         points("half an observation", "7 0 0 0 0 0 0 0 1 2 3\n", ":1: expected observations of 2 numbers (image id, 2D point), found 3 numbers"),
         points("binary where text is expected", "\u{6}\0\0\0\0\0\0\0\u{2}\0\0\n", ":1: expected text, found binary data"),
         model("pose cut", "images.txt", "1 1 0 0 0 1 2\n\n", ":1: expected a translation (3 numbers), found end of line"),
+        model("a name twice", "images.txt", "1 1 0 0 0 0 0 0 1 a.jpg\n\n2 1 0 0 0 0 0 0 1 a.jpg\n\n", ": expected each name once, found \"a.jpg\" again"),
         model("2D points cut", "images.txt", "1 1 0 0 0 1 2 3 1 a.jpg\n1 2 3 4\n", ":2: expected 2D points of 3 numbers (x, y, point id), found 4 numbers"),
         model("unknown camera model", "cameras.txt", "1 WIDE 640 480 1 2 3\n", ":1: expected a camera model of COLMAP for camera 1, found \"WIDE\""),
         model("parameter missing", "cameras.txt", "1 PINHOLE 640 480 1 2 3\n", ":1: expected 4 parameters of PINHOLE, found 3"),
@@ -280,10 +280,12 @@ enum Input {
     Text,
     Descriptors,
     Features,
+    /// A released map, which checksums protect.
+    Stage,
 }
 
 /// Inputs: a folder of fixtures or none, a file in it, its kind.
-const INPUTS: [(&str, &str, Input); 20] = [
+const INPUTS: [(&str, &str, Input); 21] = [
     (MODEL, "cameras.bin", Input::Text),
     (MODEL, "images.bin", Input::Map),
     (MODEL, "points3D.bin", Input::Map),
@@ -304,6 +306,7 @@ const INPUTS: [(&str, &str, Input); 20] = [
     ("project", "database.db", Input::Descriptors),
     ("", "features-latest.h5", Input::Features),
     ("", "features-earliest.h5", Input::Features),
+    ("", "released.npz", Input::Stage),
 ];
 
 fn bytes_of(folder: &str, name: &str) -> Vec<u8> {
@@ -312,6 +315,11 @@ fn bytes_of(folder: &str, name: &str) -> Vec<u8> {
         "scene.nvm" => super::others::nvm().into_bytes(),
         "reconstruction.json" => super::others::opensfm(&super::POINTS).into_bytes(),
         "table.csv" => b"# id x y z\n1,0.5,2,-3e2\n2,1,nan,4\n".to_vec(),
+        "released.npz" => {
+            let (_dir, path) = write(name, "");
+            stage::write_released(&path, &maps::released::<3>(3, 40)[2]).unwrap();
+            fs::read(path).unwrap()
+        }
         _ => fixture(Path::new(folder).join(name).to_str().unwrap()),
     }
 }
@@ -324,6 +332,7 @@ fn reads(kind: Input, dir: &Path, path: &Path, map: &read::Input) -> bool {
             read::open(if is_model { dir } else { path }).map(drop)
         }
         Input::Descriptors => read::descriptors(path, map).map(drop),
+        Input::Stage => stage::read_released::<3>(path).map(drop),
         Input::Features => FeatureSource::open(path).and_then(|source| {
             (0..source.names().len()).try_for_each(|at| source.get(at).map(drop))
         }),
@@ -365,7 +374,8 @@ fn inputs_that_are_cut_or_changed_anywhere_are_read_or_refused() {
         for n in places().rev() {
             file.set_len(n as u64).unwrap();
             let opens = reads(kind, dir.path(), &path, &map);
-            assert!(!opens || kind != Input::Map, "{folder}/{name} cut at {n} opens");
+            let is_whole = [Input::Map, Input::Stage].contains(&kind);
+            assert!(!opens || !is_whole, "{folder}/{name} cut at {n} opens");
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Random values of every kind, from a seed.
 
 use unlift::descriptors::Values;
+use unlift::geometry::frame::Bounds;
 use unlift::neighbors::Neighborhoods;
 use unlift::recover::{Estimate, Recovered, Status};
 use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
@@ -54,7 +55,10 @@ pub fn released<const D: usize>(seed: u64, n: usize) -> Vec<Released<D>> {
         let origin = std::array::from_fn(|_| draws.between(-4e6, 4e6));
         let unit = [Unit::Meter, Unit::Pixel, Unit::KthNeighbor][draws.below(3) as usize];
         let descriptors = descriptors(&mut draws, n * slots);
-        Released::try_new(obfuscation, slots, origin, unit, descriptors).unwrap()
+        let released = Released::try_new(obfuscation, slots, origin, unit, descriptors).unwrap();
+        // Of an image, the size is released, too.
+        let image = Bounds { low: [-9.5; D], high: [90.25; D] };
+        released.with_bounds((D == 2).then_some(image))
     };
     families.into_iter().map(with_rest).collect()
 }

@@ -1,6 +1,6 @@
 //! Tests stage files: round trips, NumPy, and malformed files.
 
-mod maps;
+pub mod maps;
 mod numpy;
 mod round_trip;
 mod strict;

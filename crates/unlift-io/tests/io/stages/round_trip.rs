@@ -3,11 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use unlift::geometry::frame::Bounds;
 use unlift::neighbors::Neighborhoods;
-use unlift::obfuscate::{SCHEMES, SchemeOptions, obfuscate};
 use unlift::released::{AxisCandidates, Lines, Obfuscation, Released};
-use unlift::seed::Key;
 use unlift::truth::{Original, Secret};
 use unlift::{PointSet, RecordId, Unit};
 use unlift_io::Error;
@@ -94,26 +91,6 @@ fn neighborhoods_come_back() {
             let path = written(folder.path(), Kind::Neighborhoods, write);
             assert_eq!(stage::read_neighborhoods(&path, n, slots).unwrap(), lists);
         }
-    }
-}
-
-/// Public data about an image is released with it: without the image size, recovery has less
-/// information.
-#[test]
-fn released_images_keep_their_size() {
-    let folder = tempfile::tempdir().unwrap();
-    let bounds = Bounds::try_new([0.0, 0.0], [640.0, 480.1]).unwrap();
-    let keypoints: Vec<[f64; 2]> =
-        (0..90).map(|i| [7.1 * f64::from(i), 5.0 + 0.3 * f64::from(i * i % 1500)]).collect();
-    let points = PointSet::try_new(keypoints, Unit::Pixel).unwrap();
-    let original = Original::within(points, bounds).unwrap();
-    let options = SchemeOptions { voxel: 50.0 };
-    for scheme in SCHEMES.iter().filter_map(|entry| entry.of_dimension::<2>(&options)) {
-        let (released, _) = obfuscate(&*scheme, &original, None, &Key::from_seed(3)).unwrap();
-        assert!(released.bounds().is_some());
-        let write = |path: &Path| stage::write_released(path, &released);
-        let path = written(folder.path(), Kind::Released, write);
-        assert!(stage::read_released::<2>(&path).unwrap() == released, "{}", scheme.name());
     }
 }
 
