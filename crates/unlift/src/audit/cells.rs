@@ -162,11 +162,8 @@ pub(super) fn attack<const D: usize>(
         let what = format!("{scheme}, neighbors by {}", variant.by.name());
         each(observer, Step::Begins(what));
         let started = Instant::now();
-        let mut make = || match owned.may_be_small() {
-            true => sources.make_of_what_there_is(variant),
-            false => sources.make(variant),
-        };
-        let made = match clock.time(|s| &mut s.neighbors, || Ok(make()))? {
+        let mut make = || Ok(sources.make(variant, owned.may_be_small()));
+        let made = match clock.time(|s| &mut s.neighbors, &mut make)? {
             Err(error) if !owned.may_be_small() => {
                 missing.push(NotAudited::variant(scheme, variant, &error, &hidden.1));
                 continue;

@@ -85,70 +85,55 @@ impl<'a, const D: usize> Lists<'a, D> {
         Self { plan, search, released, secret, by_row, seeds, kept, near, outliers }
     }
 
-    /// Makes the lists of one variant of the plan.
+    /// Makes the lists of one variant of the plan. If `may_be_short`, they are shorter than requested
+    /// where there are too few records, and empty only for a single record.
     ///
     /// # Errors
     /// When the source cannot make lists for this obfuscation.
-    pub fn make(&mut self, variant: &Variant<'_, D>) -> Result<Made, Error> {
-        let slots = self.released.slots_per_record();
+    pub fn make(&mut self, variant: &Variant<'_, D>, may_be_short: bool) -> Result<Made, Error> {
+        let (slots, plan_k) = (self.released.slots_per_record(), self.plan.k);
+        let others = self.released.n_records().saturating_sub(1);
         match variant.by {
             NeighborsBy::Oracle => {
                 let ratio = variant.inlier_ratio.unwrap_or(1.0);
-                let lists = self.oracle(variant, self.plan.k)?;
-                Ok(Made { lists, ratio, k: self.plan.k, ratio_at_k: None })
+                // Wrong entries need records, too, so the longest possible list can be shorter than
+                // `others`.
+                let lists = match may_be_short {
+                    false => Some(self.oracle(variant, plan_k)?),
+                    true => {
+                        let mut lengths = (1..=plan_k.min(others)).rev();
+                        lengths.find_map(|k| self.oracle(variant, k).ok())
+                    }
+                };
+                let Some(lists) = lists else { return self.none(variant) };
+                Ok(Made { lists, ratio, k: plan_k, ratio_at_k: None })
             }
             NeighborsBy::Given(points) => {
                 let scores = points.scores.as_deref();
                 let (offsets, neighbors) = (&points.offsets, &points.neighbors);
                 let lists = oracle::from_points(offsets, neighbors, scores, self.secret, slots)?;
-                let others = self.released.n_records().saturating_sub(1);
                 let k = lists.longest().min(others).max(1);
                 let ratio = self.near(k, false)?.measured_inlier_ratio(&lists);
                 Ok(Made { lists, ratio, k, ratio_at_k: None })
             }
+            NeighborsBy::Source(_) if may_be_short && others == 0 => self.none(variant),
             NeighborsBy::Source(source) => {
+                let k = source.k(self.released);
+                let is_short = may_be_short && others < k.max(plan_k);
+                let lists = match is_short {
+                    true => of_what_there_is(&**source, self.released, self.seeds.1)?,
+                    false => {
+                        source.supports(self.released)?;
+                        self.kept.lists(&**source, self.released, self.seeds.1)?
+                    }
+                };
                 // Lists of such sources are in the order of descriptor rows, not of slots.
-                source.supports(self.released)?;
-                let k = source.k(self.released);
-                let lists = self.kept.lists(&**source, self.released, self.seeds.1)?;
-                let ratio = self.near(self.plan.k, true)?.measured_inlier_ratio(&lists);
-                let ratio_at_k = Some(self.near(k, true)?.measured_inlier_ratio(&lists));
-                Ok(Made { lists, ratio, k, ratio_at_k })
-            }
-        }
-    }
-
-    /// Makes the lists of one variant, shorter than requested where there are too few records. A
-    /// record has an empty list only if it is the only one.
-    ///
-    /// # Errors
-    /// Returns the errors of [`make`](Self::make), if the map is large enough.
-    pub fn make_of_what_there_is(&mut self, variant: &Variant<'_, D>) -> Result<Made, Error> {
-        let others = self.released.n_records().saturating_sub(1);
-        match variant.by {
-            NeighborsBy::Given(_) => self.make(variant),
-            NeighborsBy::Source(_) if others == 0 => self.none(variant),
-            NeighborsBy::Source(source) if others < source.k(self.released).max(self.plan.k) => {
-                let lists = of_what_there_is(&**source, self.released, self.seeds.1)?;
-                let k = source.k(self.released);
-                let plan_k = self.plan.k;
                 let mut ratio = |k: usize| -> Result<f64, Error> {
-                    Ok(self.near(k.min(others), true)?.measured_inlier_ratio(&lists))
+                    let k = if is_short { k.min(others) } else { k };
+                    Ok(self.near(k, true)?.measured_inlier_ratio(&lists))
                 };
                 let (ratio, ratio_at_k) = (ratio(plan_k)?, Some(ratio(k)?));
                 Ok(Made { lists, ratio, k, ratio_at_k })
-            }
-            NeighborsBy::Source(_) => self.make(variant),
-            NeighborsBy::Oracle => {
-                // Wrong entries need records, too, so the longest possible list can be shorter than
-                // `others`.
-                let lengths = (1..=self.plan.k.min(others)).rev();
-                let mut made = lengths.map(|k| self.oracle(variant, k).ok());
-                let Some(lists) = made.find_map(|lists| lists) else {
-                    return self.none(variant);
-                };
-                let (lists, ratio) = (lists, variant.inlier_ratio.unwrap_or(1.0));
-                Ok(Made { lists, ratio, k: self.plan.k, ratio_at_k: None })
             }
         }
     }

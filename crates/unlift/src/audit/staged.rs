@@ -37,7 +37,7 @@ pub fn oracle_lists(
     // The oracle's lists do not depend on the attacker's seed.
     let kept = Kept::default();
     let mut lists = Lists::new(&plan, &search, hidden, &hidden.1, (seed, 0), &kept);
-    Ok(lists.make_of_what_there_is(&variant)?.lists)
+    Ok(lists.make(&variant, true)?.lists)
 }
 
 /// A row over many images, added one by one. Memory does not grow with their number.

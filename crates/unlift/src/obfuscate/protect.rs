@@ -335,18 +335,8 @@ mod tests {
         assert_eq!(name("subspace:2"), "subspace2");
         assert_eq!(name("subspace:4:random"), "subspace4.random");
         assert_eq!(name("ldp:256,2,8"), "ldp256.2.8");
-        for wrong in [
-            "",
-            "subspace",
-            "subspace:0",
-            "subspace:1",
-            "subspace:9",
-            "subspace:2:odd",
-            "ldp:256",
-            "ldp:4,4,1",
-            "ldp:4,1,0",
-            "noise:0.1",
-        ] {
+        let wrong = "|subspace|subspace:0|subspace:1|subspace:9|subspace:2:odd|ldp:256|ldp:4,4,1";
+        for wrong in wrong.split('|').chain(["ldp:4,1,0", "noise:0.1"]) {
             let error = Protection::parse(wrong).unwrap_err().to_string();
             assert_eq!(error, format!("protection: expected {FORMS}, found {wrong}"));
         }
@@ -380,10 +370,8 @@ mod tests {
                 // No direction is the one from the descriptor to an entry.
                 for entry in made.public().map(unit_rows).into_iter().flatten() {
                     let towards: Vec<f32> = entry.iter().zip(&plain).map(|(a, b)| a - b).collect();
-                    assert!(
-                        parts.iter().all(|part| cosine(part, &towards).abs() <= 0.9999),
-                        "{text}"
-                    );
+                    let away = |part: &&[f32]| cosine(part, &towards).abs() <= 0.9999;
+                    assert!(parts.iter().all(away), "{text}");
                 }
             }
         }

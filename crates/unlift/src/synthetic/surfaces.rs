@@ -81,6 +81,10 @@ impl Scene {
         Self { size, surfaces: Vec::new(), blockers: Vec::new() }
     }
 
+    pub(super) fn at(&mut self, place: Place) -> Piece<'_> {
+        Piece { scene: self, place }
+    }
+
     /// Returns true if a box occludes `point` from `camera`.
     pub(super) fn hides(&self, camera: [f64; 3], point: [f64; 3]) -> bool {
         // The segment ends 1 cm before the point, so that a surface does not occlude itself.
@@ -88,94 +92,70 @@ impl Scene {
         let to = add(point, scale(ray, 0.01 / norm(ray)));
         self.blockers.iter().any(|b| b.blocks(camera, to))
     }
+}
 
-    /// Adds a parallelogram at `corner` of `place`, visible from the side of `u x v`.
-    pub(super) fn sheet(
-        &mut self,
-        place: &Place,
-        corner: [f64; 3],
-        u: [f64; 3],
-        v: [f64; 3],
-        texture: Texture,
-    ) {
-        self.outlined(place, corner, u, v, Outline::Full, texture);
+/// A place in a scene, at which surfaces are added.
+pub(super) struct Piece<'a> {
+    scene: &'a mut Scene,
+    place: Place,
+}
+
+impl Piece<'_> {
+    /// Returns the piece at `offset` in this one, rotated further by `turn`.
+    pub(super) fn turned(&mut self, offset: [f64; 3], turn: Turn) -> Piece<'_> {
+        Piece { place: self.place.then(offset, turn), scene: self.scene }
     }
 
-    pub(super) fn outlined(
-        &mut self,
-        place: &Place,
-        corner: [f64; 3],
-        u: [f64; 3],
-        v: [f64; 3],
-        outline: Outline,
-        texture: Texture,
-    ) {
-        self.face(place, [corner, u, v], outline, texture);
+    /// Returns the piece at `offset` in this one.
+    pub(super) fn at(&mut self, offset: [f64; 3]) -> Piece<'_> {
+        self.turned(offset, [1.0, 0.0])
     }
 
-    /// Adds a surface with a corner and two sides.
-    fn face(
+    /// Adds a parallelogram with a corner and two sides, visible from the side of `u x v`.
+    pub(super) fn sheet(&mut self, corner: [f64; 3], u: [f64; 3], v: [f64; 3], texture: Texture) {
+        self.face([corner, u, v], Outline::Full, texture);
+    }
+
+    pub(super) fn face(
         &mut self,
-        place: &Place,
         [corner, u, v]: [[f64; 3]; 3],
         outline: Outline,
         texture: Texture,
     ) {
-        self.surfaces.push(Surface {
-            corner: place.point(corner),
-            u: place.direction(u),
-            v: place.direction(v),
-            outline,
-            texture,
-        });
+        let place = &self.place;
+        let (corner, u, v) = (place.point(corner), place.direction(u), place.direction(v));
+        self.scene.surfaces.push(Surface { corner, u, v, outline, texture });
     }
 
     /// Adds a solid box between two corners that occludes what is behind it.
-    pub(super) fn block(
-        &mut self,
-        place: &Place,
-        low: [f64; 3],
-        high: [f64; 3],
-        faces: Faces,
-        texture: Texture,
-    ) {
-        self.shell(place, low, high, faces, texture);
-        self.blockers.push(Blocker { place: *place, low, high });
+    pub(super) fn block(&mut self, low: [f64; 3], high: [f64; 3], faces: Faces, texture: Texture) {
+        self.shell(low, high, faces, texture);
+        self.scene.blockers.push(Blocker { place: self.place, low, high });
     }
 
     /// Adds the faces of a box that occludes almost nothing.
-    pub(super) fn shell(
-        &mut self,
-        place: &Place,
-        low: [f64; 3],
-        high: [f64; 3],
-        faces: Faces,
-        texture: Texture,
-    ) {
+    pub(super) fn shell(&mut self, low: [f64; 3], high: [f64; 3], faces: Faces, texture: Texture) {
         let [w, d, h] = sub(high, low);
         let (x, y, z) = ([w, 0.0, 0.0], [0.0, d, 0.0], [0.0, 0.0, h]);
         let (right, front, top) = (add(low, x), add(low, y), add(low, z));
-        let mut add = |sides| self.face(place, sides, Outline::Full, texture);
-        add([front, z, x]);
-        add([top, x, y]);
+        self.sheet(front, z, x, texture);
+        self.sheet(top, x, y, texture);
         if faces != Faces::FrontAndTop {
-            add([low, x, z]);
-            add([low, z, y]);
-            add([right, y, z]);
+            self.sheet(low, x, z, texture);
+            self.sheet(low, z, y, texture);
+            self.sheet(right, y, z, texture);
         }
         if faces == Faces::All {
-            add([low, y, x]);
+            self.sheet(low, y, x, texture);
         }
     }
 
-    /// Adds an upright tube of twelve sides around `middle` (of its foot), with `radius` at the
-    /// foot and `top_radius` at the top.
+    /// Adds an upright tube of twelve sides around `middle` (of its foot), with two radii, at the
+    /// foot and at the top.
     pub(super) fn tube(
         &mut self,
-        place: &Place,
         middle: [f64; 3],
-        radius: f64,
-        top_radius: f64,
+        [radius, top_radius]: [f64; 2],
         height: f64,
         texture: Texture,
     ) {
@@ -195,19 +175,15 @@ impl Scene {
                 (top_radius - radius) * 0.5 * (pair[0][1] + pair[1][1]),
                 height,
             ];
-            let u = sub(foot(pair[1]), foot(pair[0]));
-            self.face(place, [foot(pair[0]), u, lean], Outline::Full, side);
+            self.sheet(foot(pair[0]), sub(foot(pair[1]), foot(pair[0])), lean, side);
         }
         let corner = add(middle, [-top_radius, -top_radius, height]);
         let (u, v) = ([2.0 * top_radius, 0.0, 0.0], [0.0, 2.0 * top_radius, 0.0]);
-        self.face(place, [corner, u, v], Outline::Ellipse, texture);
+        self.face([corner, u, v], Outline::Ellipse, texture);
         // A box inside the tube is a sufficient occluder.
         let inner = 0.7 * radius.max(top_radius);
-        self.blockers.push(Blocker {
-            place: *place,
-            low: sub(middle, [inner, inner, 0.0]),
-            high: add(middle, [inner, inner, height]),
-        });
+        let (low, high) = (sub(middle, [inner, inner, 0.0]), add(middle, [inner, inner, height]));
+        self.scene.blockers.push(Blocker { place: self.place, low, high });
     }
 }
 
@@ -226,21 +202,19 @@ pub(super) struct Texture {
     pub(super) patch_radius: f64,
 }
 
-impl Texture {
-    const fn new([even, outline, patches, per_patch, patch_radius]: [f64; 5]) -> Self {
-        Self { even, outline, patches, per_patch, patch_radius }
-    }
-
-    pub(super) const PAINT: Self = Self::new([1.5, 2.5, 0.4, 16.0, 0.03]);
-    pub(super) const SMOOTH: Self = Self::new([10.0, 18.0, 1.5, 22.0, 0.025]);
-    pub(super) const WOOD: Self = Self::new([22.0, 24.0, 7.0, 36.0, 0.03]);
-    pub(super) const FLOOR: Self = Self::new([5.0, 3.0, 1.5, 24.0, 0.04]);
-    pub(super) const FABRIC: Self = Self::new([45.0, 14.0, 8.0, 50.0, 0.035]);
-    pub(super) const PATTERN: Self = Self::new([150.0, 50.0, 26.0, 80.0, 0.035]);
-    pub(super) const PRINT: Self = Self::new([2_100.0, 70.0, 150.0, 26.0, 0.016]);
-    pub(super) const LEAVES: Self = Self::new([2_000.0, 150.0, 0.0, 0.0, 0.02]);
-    pub(super) const GLASS: Self = Self::new([6.0, 60.0, 0.0, 0.0, 0.02]);
+const fn texture([even, outline, patches, per_patch, patch_radius]: [f64; 5]) -> Texture {
+    Texture { even, outline, patches, per_patch, patch_radius }
 }
+
+pub(super) const PAINT: Texture = texture([1.5, 2.5, 0.4, 16.0, 0.03]);
+pub(super) const SMOOTH: Texture = texture([10.0, 18.0, 1.5, 22.0, 0.025]);
+pub(super) const WOOD: Texture = texture([22.0, 24.0, 7.0, 36.0, 0.03]);
+pub(super) const FLOOR: Texture = texture([5.0, 3.0, 1.5, 24.0, 0.04]);
+pub(super) const FABRIC: Texture = texture([45.0, 14.0, 8.0, 50.0, 0.035]);
+pub(super) const PATTERN: Texture = texture([150.0, 50.0, 26.0, 80.0, 0.035]);
+pub(super) const PRINT: Texture = texture([2_100.0, 70.0, 150.0, 26.0, 0.016]);
+pub(super) const LEAVES: Texture = texture([2_000.0, 150.0, 0.0, 0.0, 0.02]);
+pub(super) const GLASS: Texture = texture([6.0, 60.0, 0.0, 0.0, 0.02]);
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Outline {
