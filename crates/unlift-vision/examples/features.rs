@@ -10,81 +10,73 @@ use std::error::Error;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
-use std::process::ExitCode;
 use std::time::Instant;
 
-use unlift_vision::features::in_order;
-use unlift_vision::features::{
-    Aliked, Features, LearnedFeatures, LearnedOptions, Sift, SiftOptions, photo,
-};
+use unlift_vision::features::{Aliked, LearnedOptions, Sift, SiftOptions, in_order, photo};
 
-#[derive(Default)]
-struct Options {
-    images: Vec<String>,
-    out: Option<String>,
-    threads: usize,
-    max_features: Option<usize>,
-}
+/// The rows of keypoints of a photo, the size of a descriptor, and the bytes of descriptors.
+type Raw = (Vec<[f32; 4]>, u32, Vec<u8>);
 
-/// The features of a photo.
-struct Raw {
-    keypoints: Vec<[f32; 4]>,
-    bytes_per_descriptor: u32,
-    descriptors: Vec<u8>,
-}
-
-fn main() -> ExitCode {
-    match run() {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("{error}");
-            ExitCode::FAILURE
-        }
-    }
-}
-
-fn run() -> Result<(), Box<dyn Error>> {
-    let (mut options, mut kind) = (Options::default(), "sift".to_owned());
+fn main() -> Result<(), Box<dyn Error>> {
+    let (mut images, mut out, mut kind) = (Vec::new(), None, "sift".to_owned());
+    let (mut threads, mut max_features) = (0, None);
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().ok_or(format!("{argument}: expected a value"));
-        let mut number = || -> Result<usize, String> {
-            let value = value()?;
-            value.parse().map_err(|_| format!("{argument}: expected a number, found {value:?}"))
-        };
         match argument.as_str() {
-            "--threads" => options.threads = number()?,
-            "--max-features" => options.max_features = Some(number()?),
+            "--threads" => threads = value()?.parse()?,
+            "--max-features" => max_features = Some(value()?.parse()?),
             "--type" => kind = value()?,
-            "--out" => options.out = Some(value()?),
-            _ => options.images.push(argument),
+            "--out" => out = Some(value()?),
+            _ => images.push(argument),
         }
     }
-    rayon::ThreadPoolBuilder::new().num_threads(options.threads).build_global()?;
-    match kind.as_str() {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
+    let all = match kind.as_str() {
         "sift" => {
             let mut of = SiftOptions::default();
-            of.max_features = options.max_features.unwrap_or(of.max_features);
+            of.max_features = max_features.unwrap_or(of.max_features);
             let sift = Sift::try_new(of)?;
-            extract(&options, photo::read, |image| Ok(raw(&sift.extract(image))))
+            extract(&images, photo::read, |image| {
+                let found = sift.extract(image);
+                let rows = found.keypoints.iter().map(|at| [at.x, at.y, at.scale, at.orientation]);
+                Ok((rows.collect(), 128, found.descriptors.concat()))
+            })?
         }
         "aliked" => {
             let mut of = LearnedOptions::ALIKED;
-            of.max_features = options.max_features.unwrap_or(of.max_features);
+            of.max_features = max_features.unwrap_or(of.max_features);
             let aliked = Aliked::try_new(of)?;
-            extract(&options, photo::read_color, |image| Ok(raw_learned(&aliked.extract(image)?)))
+            extract(&images, photo::read_color, |image| {
+                let found = aliked.extract(image)?;
+                // From the middle of the first pixel to its corner.
+                let rows = found.keypoints.iter().map(|[x, y]| [x + 0.5, y + 0.5, 0.0, 0.0]);
+                let bytes = found.descriptors.iter().flat_map(|value| value.to_le_bytes());
+                Ok((rows.collect(), 4 * found.dim as u32, bytes.collect()))
+            })?
         }
-        _ => Err(format!("--type: expected sift or aliked, found {kind:?}").into()),
+        _ => return Err(format!("--type: expected sift or aliked, found {kind:?}").into()),
+    };
+    let Some(out) = out else { return Ok(()) };
+    let mut file = BufWriter::new(File::create(out)?);
+    for (keypoints, bytes_per_descriptor, descriptors) in &all {
+        file.write_all(&(keypoints.len() as u32).to_le_bytes())?;
+        file.write_all(&bytes_per_descriptor.to_le_bytes())?;
+        for value in keypoints.iter().flatten() {
+            file.write_all(&value.to_le_bytes())?;
+        }
+        file.write_all(descriptors)?;
     }
+    Ok(file.flush()?)
 }
 
-/// Extracts the features of all photos, prints the time of extraction alone, and writes FILE.
+/// Extracts the features of all photos, and prints the time of extraction alone.
 fn extract<Image: Sync>(
-    options: &Options,
+    images: &[String],
     read: impl Fn(&Path) -> Result<Image, unlift::Error>,
     extract: impl Fn(&Image) -> Result<Raw, unlift::Error> + Sync,
-) -> Result<(), Box<dyn Error>> {
-    let images = options.images.iter().map(|image| read(Path::new(image)));
+) -> Result<Vec<Raw>, unlift::Error> {
+    let images = images.iter().map(|image| read(Path::new(image)));
     let images: Vec<Image> = images.collect::<Result<_, _>>()?;
     // A warm-up run, as for the compared extractors.
     images.first().map(&extract).transpose()?;
@@ -95,38 +87,7 @@ fn extract<Image: Sync>(
         Ok::<(), unlift::Error>(())
     })?;
     let seconds = start.elapsed().as_secs_f64();
-    let total: usize = all.iter().map(|raw| raw.keypoints.len()).sum();
+    let total: usize = all.iter().map(|(keypoints, ..)| keypoints.len()).sum();
     println!("{} images, {total} features, {seconds:.4} s", images.len());
-    if let Some(path) = &options.out {
-        let mut file = BufWriter::new(File::create(path)?);
-        for raw in &all {
-            file.write_all(&(raw.keypoints.len() as u32).to_le_bytes())?;
-            file.write_all(&raw.bytes_per_descriptor.to_le_bytes())?;
-            for value in raw.keypoints.iter().flatten() {
-                file.write_all(&value.to_le_bytes())?;
-            }
-            file.write_all(&raw.descriptors)?;
-        }
-        file.flush()?;
-    }
-    Ok(())
-}
-
-fn raw(found: &Features) -> Raw {
-    let keypoints = found.keypoints.iter().map(|at| [at.x, at.y, at.scale, at.orientation]);
-    Raw {
-        keypoints: keypoints.collect(),
-        bytes_per_descriptor: 128,
-        descriptors: found.descriptors.concat(),
-    }
-}
-
-/// Converts positions from the middle of the first pixel to its corner.
-fn raw_learned(found: &LearnedFeatures) -> Raw {
-    let keypoints = found.keypoints.iter().map(|[x, y]| [x + 0.5, y + 0.5, 0.0, 0.0]);
-    Raw {
-        keypoints: keypoints.collect(),
-        bytes_per_descriptor: 4 * found.dim as u32,
-        descriptors: found.descriptors.iter().flat_map(|value| value.to_le_bytes()).collect(),
-    }
+    Ok(all)
 }

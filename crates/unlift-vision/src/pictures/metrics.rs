@@ -204,14 +204,10 @@ mod tests {
     fn pictures_that_cannot_be_compared_are_one_line() {
         let text = |a: &ColorImage, b: &ColorImage| ssim(a, b).unwrap_err().to_string();
         let a = picture(8, 8, |_| 3);
-        assert_eq!(
-            text(&a, &picture(8, 9, |_| 3)),
-            "pictures: expected another picture of 8 x 8 pixels, found one of 8 x 9"
-        );
+        let line = "pictures: expected another picture of 8 x 8 pixels, found one of 8 x 9";
+        assert_eq!(text(&a, &picture(8, 9, |_| 3)), line);
         let small = picture(8, 6, |_| 3);
-        assert_eq!(
-            text(&small, &small),
-            "pictures: expected pictures of at least 7 x 7 pixels, found 8 x 6"
-        );
+        let line = "pictures: expected pictures of at least 7 x 7 pixels, found 8 x 6";
+        assert_eq!(text(&small, &small), line);
     }
 }

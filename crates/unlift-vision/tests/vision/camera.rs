@@ -76,10 +76,8 @@ fn wrong_cameras_are_one_line() {
     let text = |model: &str, params: &[f64]| Lens::try_new(model, params).unwrap_err().to_string();
     assert_eq!(text("PINHOLE", &[1.0; 3]), "PINHOLE: expected 4 parameters, found 3");
     assert_eq!(text("MIRROR", &[]), "camera model: expected one of COLMAP's, found MIRROR");
-    assert_eq!(
-        text("EQUIRECTANGULAR", &[1.0, f64::NAN]),
-        "EQUIRECTANGULAR: expected finite parameters, found NaN"
-    );
+    let line = "EQUIRECTANGULAR: expected finite parameters, found NaN";
+    assert_eq!(text("EQUIRECTANGULAR", &[1.0, f64::NAN]), line);
 }
 
 const SIZE: [usize; 2] = [640, 480];

@@ -86,10 +86,8 @@ fn a_file_with_another_hash_format_or_shape_is_refused() {
     let hash = aliked().sha256.unwrap();
     // The hash of the empty string.
     let empty = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855";
-    assert_eq!(
-        refused(aliked(), b""),
-        format!("DIR/aliked-n16rot.onnx: expected SHA-256 {hash}, found {empty}")
-    );
+    let line = format!("DIR/aliked-n16rot.onnx: expected SHA-256 {hash}, found {empty}");
+    assert_eq!(refused(aliked(), b""), line);
     let unknown = Entry { sha256: None, inputs: &[], outputs: &[], ..*aliked() };
     for bytes in [&b""[..], b"text", &aliked().carried.unwrap()[..1000]] {
         let error = refused(&unknown, bytes);
@@ -117,15 +115,11 @@ fn a_missing_model_and_an_unknown_name_are_one_line() {
          (https://github.com/Shiaoming/ALIKED), found nothing"
     );
     let folders = Folders { given: Some("no such folder".into()), user: None };
-    assert_eq!(
-        Network::load_from(&folders, &entry).unwrap_err().to_string(),
-        "UNLIFT_MODELS: expected a folder, found no such folder"
-    );
+    let line = "UNLIFT_MODELS: expected a folder, found no such folder";
+    assert_eq!(Network::load_from(&folders, &entry).unwrap_err().to_string(), line);
     let names: Vec<&str> = MODELS.iter().map(|entry| entry.name).collect();
-    assert_eq!(
-        Network::load("no such model").unwrap_err().to_string(),
-        format!("model: expected one of {}, found no such model", names.join(", "))
-    );
+    let line = format!("model: expected one of {}, found no such model", names.join(", "));
+    assert_eq!(Network::load("no such model").unwrap_err().to_string(), line);
 }
 
 #[test]

@@ -68,10 +68,8 @@ fn a_file_that_is_no_photo_gives_one_line() {
     assert_eq!(text(b"", "a.jpg"), format!("a.jpg: {expected} an empty file"));
     assert_eq!(text(b"Dear Sir,\n", "a.jpg"), format!("a.jpg: {expected} text"));
     assert_eq!(text(b"GIF89a\x01\0\x01\0", "a.jpg"), format!("a.jpg: {expected} a GIF image"));
-    assert_eq!(
-        text(&[0, 1, 2, 0xff, 4], "a.jpg"),
-        format!("a.jpg: {expected} a file that starts with 00 01 02 ff")
-    );
+    let line = format!("a.jpg: {expected} a file that starts with 00 01 02 ff");
+    assert_eq!(text(&[0, 1, 2, 0xff, 4], "a.jpg"), line);
     assert_eq!(text(b"x", "a\nb.jpg"), format!("a\\nb.jpg: {expected} text"));
 }
 
@@ -80,10 +78,8 @@ fn a_truncated_photo_gives_one_line() {
     let image = DynamicImage::from(colors(200, 150));
     let jpeg = encode(&image, ImageFormat::Jpeg);
     for end in [3, 30, jpeg.len() / 3, jpeg.len() - 2] {
-        assert_eq!(
-            text(&jpeg[..end], "a.jpg"),
-            "a.jpg: expected a whole JPEG image, found one that is cut off"
-        );
+        let line = "a.jpg: expected a whole JPEG image, found one that is cut off";
+        assert_eq!(text(&jpeg[..end], "a.jpg"), line);
     }
     // The end marker of a thumbnail in the header does not count.
     let mut thumbnail = jpeg[..2].to_vec();
@@ -115,10 +111,8 @@ fn a_header_with_too_many_pixels_is_refused_before_memory_is_allocated() {
         })
     });
     png[29..33].copy_from_slice(&(!checksum).to_be_bytes());
-    assert_eq!(
-        text(&png, "a.png"),
-        "a.png: expected at most 268435456 pixels, found 65536 x 65536"
-    );
+    let line = "a.png: expected at most 268435456 pixels, found 65536 x 65536";
+    assert_eq!(text(&png, "a.png"), line);
 }
 
 /// Decoders fill in what a JPEG lacks: 2^28 gray pixels from 700 bytes, for seconds.

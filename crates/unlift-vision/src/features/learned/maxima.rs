@@ -120,26 +120,4 @@ mod tests {
         let high = Wanted { min_score: 0.3, ..ALL };
         assert_eq!(row.maxima(&high), [[0, 0]]);
     }
-
-    #[test]
-    fn the_best_come_first_and_the_border_is_left_out() {
-        let mut values = vec![0.0; 7 * 7];
-        for (x, y, score) in [(0, 3, 0.9), (3, 3, 0.5), (6, 6, 0.7), (5, 1, 0.6)] {
-            values[y * 7 + x] = score;
-        }
-        let map = scores(7, &values);
-        assert_eq!(map.maxima(&ALL), [[0, 3], [6, 6], [5, 1], [3, 3]]);
-        let inner = Wanted { border: 1, ..ALL };
-        assert_eq!(map.maxima(&inner), [[5, 1], [3, 3]]);
-        let none = Wanted { border: 4, ..ALL };
-        assert_eq!(map.maxima(&none), [[0; 2]; 0]);
-    }
-
-    #[test]
-    fn scores_between_pixels_are_weighted_and_zero_outside() {
-        let map = scores(2, &[0.0, 1.0, 2.0, 3.0]);
-        assert_eq!(map.at([0.5, 0.5]), 1.5);
-        assert_eq!(map.at([1.0, 1.0]), 3.0);
-        assert_eq!(map.at([1.5, 1.0]), 1.5);
-    }
 }

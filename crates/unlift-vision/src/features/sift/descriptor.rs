@@ -257,23 +257,3 @@ fn sum(values: &[f32; LENGTH], of: impl Fn(f32) -> f32) -> f32 {
     }
     lanes.iter().sum()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn bytes_are_roots_of_clamped_shares_with_directions_reversed() {
-        // 64 equal values: each an equal share, 512 sqrt(1 / 64) = 64.
-        let mut histograms: [f32; LENGTH] = std::array::from_fn(|i| 3.0 * (i % 2) as f32);
-        histograms.swap(0, 1);
-        let bytes = quantize(histograms);
-        assert_eq!(bytes[..8], [64, 64, 0, 64, 0, 64, 0, 0]);
-        assert_eq!(bytes[8..16], [0, 64, 0, 64, 0, 64, 0, 64]);
-        let mut histograms = [1.0; LENGTH];
-        histograms[0] = 1e6;
-        let bytes = quantize(histograms);
-        assert!(bytes[0] == 255 && bytes[1..].iter().all(|&byte| byte < 2));
-        assert_eq!(quantize([0.0; LENGTH]), [0; LENGTH]);
-    }
-}
