@@ -2,7 +2,6 @@
 
 use unlift::neighbors::geometric;
 
-use crate::degenerate::statuses;
 use crate::maps::*;
 
 const ALONE: [Builtin; 2] = [Builtin::Density, Builtin::Tomography];
@@ -22,19 +21,10 @@ fn furnished(n: usize) -> Vec<[f64; 3]> {
     synthetic::room(1, n).points
 }
 
-/// Returns the percentage of points within `reach`. The two positions of a paired line are compared
-/// as a set.
+/// Returns the percentage of points within `reach`, with the points of a paired line in either order.
 fn percent_within(hidden: &Hidden<3>, recovered: &Recovered<3>, reach: f64) -> f64 {
-    let about = About { order: RowOrder::Slots, ..recovered.about() };
-    let (recovered, per) = (recovered.clone().with_about(about), hidden.secret.slots_per_record());
-    let hits = |secret: &Secret| -> Vec<usize> {
-        let accuracy = evaluate(&recovered, &hidden.original, secret).unwrap();
-        let hits = |of: &[f64]| of.iter().filter(|error| **error <= reach).count();
-        accuracy.errors().chunks(per).map(hits).collect()
-    };
-    let crossed = hits(&hidden.secret.exchanged(|_| per == 2));
-    let best = hits(&hidden.secret).into_iter().zip(crossed).map(|(a, b)| a.max(b));
-    100.0 * best.sum::<usize>() as f64 / hidden.secret.n_slots() as f64
+    let about = About { order: RowOrder::Either, ..recovered.about() };
+    hidden.percent_within(&recovered.clone().with_about(about), reach)
 }
 
 /// Floors are shares within 25 cm, at most two points below the measured ones. No attack on
@@ -118,44 +108,16 @@ fn geometric_lists_hold_neighbors() {
     }
 }
 
-/// Maps that determine little or nothing: a status, never a NaN, never a panic.
-fn odd_maps_are_answered<const D: usize>(name: &str, scheme: &Entry) {
-    let far = [vec![[1e6; D]; 3], uniform(1, 60)].concat();
-    let maps = [piles(3, 1, 40, 0.0), piles(3, 2, 40, 1e-7), uniform(3, 2), uniform(3, 9), far];
-    for points in maps {
-        let Ok(hidden) = try_hide::<D>(scheme, &points, 0.5, 1) else { continue };
-        let options = ALONE.map(|solver| (solver, RecoverOptions::default())).to_vec();
-        statuses(name, &hidden.released, &empty_lists(&hidden.released), options);
-        if let Ok(lists) = geometric(&hidden.released, 5) {
-            assert_eq!(lists.n_slots(), hidden.released.n_slots(), "{name}");
-        }
-    }
-}
-
-#[test]
-fn density_of_odd_maps() {
-    over_schemes!(odd_maps_are_answered);
-    for n in [0, 50] {
-        let lines = Lines::through(&uniform::<3>(1, n), &vec![[0.0, 0.6, 0.8]; n]).unwrap();
-        let family = Obfuscation::Lines(lines);
-        let released = Released::try_new(family, 1, [0.0; 3], Unit::Meter, None).unwrap();
-        ALONE.iter().for_each(|&solver| _ = alone(&released, solver));
-        assert!(geometric(&released, 5).unwrap().records().is_empty());
-    }
-}
-
 #[test]
 fn where_records_alone_tell_nothing_the_error_says_so() {
     let planes = hide::<3>(entry("plane"), &furnished(200), 1).released;
-    assert_eq!(
-        geometric(&planes, 5).unwrap_err().to_string(),
-        "geometric neighborhoods: expected lines, rays or axis candidates, found planes"
-    );
     let flat = hide::<2>(entry("lines2d"), &room(1, 100), 1).released;
-    assert_eq!(
-        geometric(&flat, 5).unwrap_err().to_string(),
-        "geometric neighborhoods: expected a map in three dimensions, found 2"
-    );
+    for (error, line) in [
+        (geometric(&planes, 5).unwrap_err(), "lines, rays or axis candidates, found planes"),
+        (geometric(&flat, 5).unwrap_err(), "a map in three dimensions, found 2"),
+    ] {
+        assert_eq!(error.to_string(), format!("geometric neighborhoods: expected {line}"));
+    }
     for solver in ALONE {
         assert!(alone(&planes, solver).status().iter().all(|&s| s == Status::NoSupport));
     }

@@ -32,39 +32,25 @@ fn check(what: &str, points: Vec<[f64; 3]>, k: usize) {
     }
 }
 
-fn room(n: usize) -> Vec<[f64; 3]> {
-    synthetic::room(5, n).points
-}
-
 #[test]
-fn points_that_fall_together_are_not_counted_as_sure() {
+fn maps_at_the_limits_are_audited_or_refused_with_a_reason() {
+    let room = |n: usize| synthetic::room(5, n).points;
     let mut draws = Draws::new(11, Stage::Synthetic, 77);
-    let mut points = room(600);
-    while points.len() < 6_000 {
-        points.push(points[draws.below(600) as usize]);
+    let mut fallen = room(600);
+    while fallen.len() < 6_000 {
+        fallen.push(fallen[draws.below(600) as usize]);
     }
-    check("90 % duplicates", points, 20);
-    check("all equal", vec![[1.0, 2.0, 3.0]; 300], 20);
-}
-
-#[test]
-fn flat_and_thin_maps_are_audited_or_refused_with_a_reason() {
-    let mut draws = Draws::new(11, Stage::Synthetic, 77);
     let mut unit = || draws.between(0.0, 5.0);
-    check("on a line", (0..2_000).map(|_| [unit(), 0.0, 0.0]).collect(), 20);
-    check("on a plane", (0..2_000).map(|_| [unit(), unit(), 0.0]).collect(), 20);
-    check("on a slanted line", (0..2_000).map(|_| [unit(); 3]).collect(), 20);
-}
-
-#[test]
-fn two_far_clusters_do_not_make_anybody_sure() {
     let far = room(3_000).into_iter().map(|p| p.map(|x| x + 1e5));
-    check("two far clusters", room(3_000).into_iter().chain(far).collect(), 20);
-}
-
-#[test]
-fn tiny_maps_and_lists_as_long_as_the_map_are_audited() {
-    for n in [2, 3, 5, 40] {
-        check(&format!("{n} points"), room(n), n - 1);
+    for (what, points) in [
+        ("90 % duplicates", fallen),
+        ("all equal", vec![[1.0, 2.0, 3.0]; 300]),
+        ("on a line", (0..2_000).map(|_| [unit(), 0.0, 0.0]).collect()),
+        ("on a plane", (0..2_000).map(|_| [unit(), unit(), 0.0]).collect()),
+        ("on a slanted line", (0..2_000).map(|_| [unit(); 3]).collect()),
+        ("two far clusters", room(3_000).into_iter().chain(far).collect()),
+    ] {
+        check(what, points, 20);
     }
+    [2, 3, 5, 40].into_iter().for_each(|n| check(&format!("{n} points"), room(n), n - 1));
 }

@@ -83,6 +83,14 @@ fn lists_again(lists: &Neighborhoods, order: &[usize], per: usize) -> Neighborho
     lists_of(&rows.collect::<Vec<_>>(), order.len(), per)
 }
 
+/// Returns the mean, and what it may be by chance: four of its standard deviations, and a share that is too small to compare.
+fn mean_and_chance(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    (mean, 0.01 + 4.0 * (variance / n).sqrt())
+}
+
 /// Recovery from another form of the same map recovers the same percentage of points: records in another order, lines reversed and
 /// through another of their points, centers in another order.
 fn shares_do_not_depend_on_how_a_map_is_written<const D: usize>(name: &str, scheme: &Entry) {
@@ -115,11 +123,7 @@ fn shares_do_not_depend_on_how_a_map_is_written<const D: usize>(name: &str, sche
         }
     }
     for (solver, differences) in Builtin::FROM_LISTS.iter().zip(&differences) {
-        let n = differences.len() as f64;
-        let mean = differences.iter().sum::<f64>() / n;
-        let variance = differences.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        // Four standard deviations of the mean, and a share that is too small to compare.
-        let chance = 0.01 + 4.0 * (variance / n).sqrt();
+        let (mean, chance) = mean_and_chance(differences);
         assert!(mean.abs() < chance, "{name} in {D}D, {solver:?}: {differences:?}");
     }
 }
@@ -181,11 +185,7 @@ fn metadata_lowers_nothing<const D: usize>(name: &str, scheme: &Entry) {
         }
     }
     for (key, differences) in &differences {
-        let n = TIMES as f64;
-        let mean = differences.iter().sum::<f64>() / n;
-        let variance = differences.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        // As above.
-        let chance = 0.01 + 4.0 * (variance / n).sqrt();
+        let (mean, chance) = mean_and_chance(differences);
         assert!(mean > -chance, "{name} in {D}D, {key:?}: {differences:?}");
     }
 }
