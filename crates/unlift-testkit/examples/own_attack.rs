@@ -1,0 +1,145 @@
+//! Audit with a custom source of neighborhoods and a custom solver: `cargo run --release -p
+//! unlift-testkit --example own_attack`.
+//!
+//! The source sorts records by the mean of their descriptors and lists the next ones in this order.
+//! Your source may contain trained weights as fields. The solver returns, on each line, the median
+//! of the nearest points to the listed lines. Most of these must belong to true neighbors, so it
+//! fails where `joint` does not.
+
+use std::sync::Arc;
+
+use unlift::audit::{NeighborsBy, Plan, Silent, run};
+use unlift::neighbors::{Needs, Neighborhoods, Similarity, Source};
+use unlift::obfuscate::olc::Olc;
+use unlift::recover::{Builtin, RecoverOptions, Recovered, Solver};
+use unlift::released::{Obfuscation, Released};
+use unlift::{About, Error, RecordId, RowOrder, Unit};
+
+/// Lists records with similar brightness.
+#[derive(Debug)]
+struct Brightness;
+
+impl Source<3> for Brightness {
+    fn name(&self) -> &str {
+        "brightness"
+    }
+
+    fn needs(&self) -> Needs {
+        Needs::Descriptors
+    }
+
+    fn k(&self, _: &Released<3>) -> usize {
+        20
+    }
+
+    fn lists(&self, released: &Released<3>, k: usize, _: u64) -> Result<Neighborhoods, Error> {
+        self.supports(released)?;
+        let (n, Some(descriptors)) = (released.n_records(), released.descriptors()) else {
+            return Err(Error::new("descriptors", "some", "none"));
+        };
+        if released.slots_per_record() != 1 {
+            // An error states the place, what was expected and what was found.
+            return Err(Error::new("records", "one hidden point each", "paired lines"));
+        }
+        let mut row = vec![0.0; descriptors.dim()];
+        let mut brightness = |at: usize| {
+            descriptors.read_row(at, &mut row);
+            row.iter().sum::<f32>()
+        };
+        let bright: Vec<f32> = (0..n).map(&mut brightness).collect();
+        let mut order: Vec<usize> = (0..n).collect();
+        order.sort_by(|&a, &b| bright[a].total_cmp(&bright[b]));
+        let mut place = vec![0; n];
+        order.iter().enumerate().for_each(|(at, &record)| place[record] = at);
+        let (mut offsets, mut records) = (vec![0], Vec::new());
+        for &at in &place {
+            let first = at.saturating_sub(k / 2).min(n.saturating_sub(k + 1));
+            let near = (first..n).filter(|&other| other != at).take(k);
+            records.extend(near.map(|other| RecordId::from_index(order[other])));
+            offsets.push(records.len() as u64);
+        }
+        // Rows are descriptor rows. With one point per record these are the slots.
+        let (map, order) = (Some(released.fingerprint()), RowOrder::DescriptorRows);
+        let lists = Neighborhoods::try_new(offsets, records, None, n, 1)?;
+        Ok(lists.with_about(About { map, order, ..About::default() }))
+    }
+}
+
+/// The median of the nearest points to the listed lines.
+#[derive(Debug)]
+struct Median;
+
+impl Solver<3> for Median {
+    fn name(&self) -> &str {
+        "median"
+    }
+
+    fn recover(
+        &self,
+        released: &Released<3>,
+        lists: &Neighborhoods,
+        _: &RecoverOptions,
+    ) -> Result<Recovered<3>, Error> {
+        let Obfuscation::Lines(lines) = released.obfuscation() else {
+            return Err(Error::new("records", "lines", released.obfuscation().family()));
+        };
+        // Feet, directions and positions are relative to `released.origin()`.
+        let position = |slot: usize| {
+            let own = slot / released.slots_per_record();
+            let (foot, direction) = (lines.foot()[own], lines.direction()[own]);
+            let places = lists.of(slot).iter().map(|record| {
+                let other = record.index();
+                nearest(foot, direction, lines.foot()[other], lines.direction()[other])
+            });
+            let mut places: Vec<f32> = places.filter(|t| t.is_finite()).collect();
+            places.sort_unstable_by(f32::total_cmp);
+            // A position that is not finite means that the point was not recovered.
+            let t = places.get(places.len() / 2).copied().unwrap_or(f32::NAN);
+            std::array::from_fn(|c| foot[c] + t * direction[c])
+        };
+        let positions: Vec<[f32; 3]> = (0..released.n_slots()).map(position).collect();
+        Recovered::from_positions(released, lists, &positions)
+    }
+}
+
+/// Returns the parameter on the line through `a` of the point nearest to the line through `b`. The
+/// directions `u` and `v` have length 1.
+fn nearest(a: [f32; 3], u: [f32; 3], b: [f32; 3], v: [f32; 3]) -> f32 {
+    let dot = |x: [f32; 3], y: [f32; 3]| x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
+    let between: [f32; 3] = std::array::from_fn(|c| b[c] - a[c]);
+    let cosine = dot(u, v);
+    (dot(between, u) - cosine * dot(between, v)) / (1.0 - cosine * cosine)
+}
+
+fn main() -> Result<(), Error> {
+    // Call these in tests of your crate. They check for one list and one result per slot, which do
+    // not depend on the number of threads.
+    let (original, released, secret) = unlift_testkit::described_map(&Olc, 1_500);
+    unlift_testkit::source_laws(&Brightness, &released);
+    let lists = Brightness.lists(&released, 20, 0)?;
+    unlift_testkit::solver_laws(&Median, &released, &lists);
+
+    // An audit needs one descriptor per original, because it hides the map itself.
+    let mut row_of = vec![0; original.len()];
+    for (slot, id) in secret.hidden().iter().enumerate() {
+        row_of[id.index()] = slot as u32;
+    }
+    let descriptors = released.descriptors().map(|descriptors| descriptors.select(&row_of));
+    let sources: [Arc<dyn Source<3>>; 2] = [Arc::new(Brightness), Arc::new(Similarity)];
+    let plan = Plan {
+        schemes: vec![Arc::new(Olc)],
+        neighbors: sources
+            .map(NeighborsBy::Source)
+            .into_iter()
+            .chain([NeighborsBy::Oracle])
+            .collect(),
+        solvers: vec![Arc::new(Median), Arc::new(Builtin::Joint)],
+        ..Plan::new(Unit::Meter)
+    };
+    println!("source      solver  right    within 0.10 and 0.25 m, percent");
+    for row in run(&original, descriptors.as_ref(), &plan, &mut Silent)?.rows {
+        let (right, share) = (100.0 * row.inlier_ratio, row.recovered_percent);
+        println!("{:11} {:7} {right:4.1} %  {share:.1?}", row.neighbors, row.solver);
+    }
+    Ok(())
+}
