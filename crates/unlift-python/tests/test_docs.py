@@ -11,6 +11,22 @@ import pytest
 import unlift
 
 README = pathlib.Path(__file__).parents[1] / "README.md"
+ROOT = pathlib.Path(__file__).parents[3]
+DOCUMENTS = ["README.md", "ARTIFACT.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "STYLE.md", "docs/formats.md", "docs/benchmarks.md"]
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_links_between_documents_lead_somewhere(name):
+    document = ROOT / name
+    for link in re.findall(r"\]\(([^) ]*[.#][^) ]*)\)", document.read_text()):
+        file, _, anchor = link.partition("#")
+        target = document.parent / file if file else document
+        if "://" in link:
+            continue
+        assert target.exists(), link
+        headings = [line.lstrip("#").strip().lower() for line in target.read_text().splitlines() if line.startswith("#")] if anchor else []
+        # As GitHub makes anchors.
+        assert not anchor or anchor in [re.sub(r"[^\w -]", "", heading).replace(" ", "-") for heading in headings], link
 
 
 @pytest.mark.parametrize("name", ["unlift", "unlift.neighbors", "unlift.testing", "unlift._plugins"])

@@ -3,7 +3,6 @@
 use std::fs;
 
 use image::RgbImage;
-use serde_json::Value;
 use unlift::Descriptors;
 use unlift::descriptors::Values;
 use unlift_io::features::{FeatureSource, FeatureWriter, ImageFeatures};
@@ -57,30 +56,12 @@ fn photos_become_pooled_rows_rows_per_image_and_pictures() {
     assert_eq!(names, ["a.png", "b.png", "c/d.png"]);
     let n_points: u64 = images.iter().filter_map(|image| image["n_points"].as_u64()).sum();
     assert_eq!(Some(n_points), document["input"]["n_points"].as_u64());
-    for (at, row) in rows.iter().enumerate() {
-        // Pooled shares lie within those of the images.
-        let shares =
-            images.iter().filter_map(|i| i["rows"][at]["recovered_percent"]["10"].as_f64());
-        let (low, high) = shares.fold((100.0f64, 0.0f64), |(l, h), x| (l.min(x), h.max(x)));
-        let pooled = row["recovered_percent"]["10"].as_f64().unwrap();
-        assert!((low - 1e-3..=high + 1e-3).contains(&pooled), "{pooled} of {low} to {high}");
-    }
     assert!(document["break_even"].as_array().unwrap().iter().all(|b| b["threshold"] == "10"));
     let page = place.text("a/report.html");
     assert!(page.contains("c/d.png") && page.contains("id=\"picture-graph\""));
     assert_eq!(page.matches("/9j/").count(), 3, "a JPEG per image");
-
-    // A share-safe audit has neither names nor pictures.
-    place.ends(&format!("audit images photos {QUICK} --share-safe --max-images 2 --out s"), 0);
-    for file in ["s/audit.json", "s/report.html"] {
-        let text = place.text(file);
-        for secret in ["a.png", "c/d.png", "photos\"", "/9j/", "id=\"picture-graph\""] {
-            assert!(!text.contains(secret), "{file}: {secret}");
-        }
-    }
-    let document = place.json("s/audit.json");
-    assert_eq!(document["images"].as_array().map(Vec::len), Some(2));
-    assert_eq!(document["images"][0]["name"], Value::Null);
+    place.ends(&format!("audit images photos {QUICK} --max-images 2 --out b"), 0);
+    assert_eq!(place.json("b/audit.json")["images"].as_array().map(Vec::len), Some(2));
 }
 
 #[test]

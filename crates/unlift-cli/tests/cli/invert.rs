@@ -27,8 +27,6 @@ fn an_audit_of_images_tells_how_alike_pictures_are_and_shows_them() {
     assert!(page.contains("id=\"inversions\"") && page.contains("data:image/jpeg;base64,"));
     // A photo, its baseline and its recovered picture, for three images.
     assert!(page.matches("<figure").count() >= 9);
-    place.ends(&format!("audit images photos --invert {CHEAP} --share-safe --out safe"), 0);
-    assert!(!place.text("safe/report.html").contains("id=\"inversions\""));
 }
 
 #[test]
@@ -48,10 +46,8 @@ fn keypoints_and_what_came_back_are_painted_to_files() {
     place.ends("features photos --out features.h5", 0);
     place.ends("obfuscate features.h5 --scheme cp2d --out hidden", 0);
     let released = "hidden/released.npz";
-    assert_eq!(
-        place.complains(&format!("invert {released} --out y"), 2),
-        "unlift: RECOVERED: expected what came back of PATH, found none\n"
-    );
+    let line = "unlift: RECOVERED: expected what came back of PATH, found none\n";
+    assert_eq!(place.complains(&format!("invert {released} --out y"), 2), line);
     place.ends(&format!("neighbors {released} --neighbors overlap --out lists.npz"), 0);
     place.ends(&format!("recover {released} --neighbors lists.npz --out back.npz"), 0);
     let (stdout, _) = place.ends(&format!("invert {released} back.npz --out back"), 0);

@@ -5,7 +5,6 @@ mod common;
 
 mod again;
 mod audit_map;
-mod claims;
 mod compare;
 mod corpus;
 mod export;
@@ -20,7 +19,6 @@ mod layouts;
 mod models;
 mod outputs;
 mod readme;
-mod released;
 mod sequence;
 mod stages;
 #[cfg(unix)]

@@ -173,4 +173,13 @@ fn files_of_another_map_are_refused() {
         assert!(stderr.contains(&expected) && stderr.lines().count() == 1, "{stderr}");
         assert!(!place.path("x").exists(), "{line}");
     }
+    let audit = "audit released one/released.npz --k 10 --out x --truth";
+    for (more, code, expected) in [
+        ("two/truth.npz", 3, "unlift: one/released.npz: fingerprint: expected "),
+        ("one/truth.npz --gate olc@1:0.25<=5", 2, "scheme: expected one of released, found olc"),
+        ("one/truth.npz --name all", 2, "(not all), found all"),
+    ] {
+        let stderr = place.complains(&format!("{audit} {more}"), code);
+        assert!(stderr.contains(expected) && !place.path("x").exists(), "{stderr}");
+    }
 }
