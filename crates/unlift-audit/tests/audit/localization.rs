@@ -1,6 +1,5 @@
 //! Localization in audits of a COLMAP model: bound, held-out images, gates.
 
-use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -8,6 +7,7 @@ use unlift::Descriptors;
 use unlift::Unit;
 use unlift::audit::Plan;
 use unlift::descriptors::Values;
+use unlift::geometry::camera::{Camera, Intrinsics, Pose};
 use unlift::obfuscate::{Change, Changed, Mitigation};
 use unlift::recover::Builtin;
 use unlift::seed::{Draws, Stage};
@@ -21,13 +21,14 @@ use unlift_report::document::Localization;
 use crate::schemes;
 
 const N_IMAGES: u32 = 12;
-const FOCAL: f64 = 500.0;
 const DIM: usize = 32;
 
-/// Returns the rotation and the center of an image: cameras on a line, which look along +y.
-fn pose(image: u32) -> ([[f64; 3]; 3], [f64; 3]) {
+/// Returns the camera of an image: on a line, looking along +y.
+fn camera(image: u32) -> Camera {
     let center = [1.5 + 0.2 * f64::from(image), 0.4 + 0.05 * f64::from(image % 3), 1.2];
-    ([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]], center)
+    let rotation = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]];
+    let intrinsics = Intrinsics { focal: [500.0; 2], principal: [320.0, 240.0] };
+    Camera { intrinsics, pose: Pose { rotation, center } }
 }
 
 /// Writes a COLMAP model of random points, and features of its images with noise of half a pixel and
@@ -36,66 +37,39 @@ fn write(folder: &Path) {
     let mut draws = Draws::new(4, Stage::Shapes, 0);
     let mut point = |_| [draws.between(0.0, 5.0), draws.between(3.0, 5.0), draws.between(0.0, 2.5)];
     let points: Vec<[f64; 3]> = (0..1_500).map(&mut point).collect();
-    let (mut images, mut text) = (String::new(), String::new());
-    let mut keypoints: Vec<Vec<([f64; 2], usize)>> = Vec::new();
-    for image in 0..N_IMAGES {
-        let (rotation, center) = pose(image);
-        let mut draws = Draws::new(1, Stage::Shapes, image.into());
-        let mut seen = Vec::new();
-        for (row, point) in points.iter().enumerate() {
-            let away: [f64; 3] = std::array::from_fn(|c| point[c] - center[c]);
-            let x = rotation.map(|row| (0..3).map(|c| row[c] * away[c]).sum::<f64>());
-            let place = [FOCAL * x[0] / x[2] + 320.0, FOCAL * x[1] / x[2] + 240.0];
-            if x[2] > 0.5 && (1.0..639.0).contains(&place[0]) && (1.0..479.0).contains(&place[1]) {
-                seen.push((place.map(|p| p - 0.5 + 0.3 * draws.normal()), row));
-            }
-        }
-        // A quarter turn about x, and t = -R c.
-        let half = 0.5_f64.sqrt();
-        let t = rotation.map(|row| -(0..3).map(|c| row[c] * center[c]).sum::<f64>());
-        writeln!(
-            images,
-            "{} {half} {half} 0 0 {} {} {} 1 {image:02}.jpg\n",
-            image + 1,
-            t[0],
-            t[1],
-            t[2]
-        )
-        .unwrap();
-        keypoints.push(seen);
-    }
-    for (row, point) in points.iter().enumerate() {
-        let [x, y, z] = point;
-        write!(text, "{} {x} {y} {z} 0 0 0 0.5", row + 1).unwrap();
-        for (image, seen) in keypoints.iter().enumerate() {
-            if let Some(at) = seen.iter().position(|(_, of)| *of == row) {
-                write!(text, " {} {at}", image + 1).unwrap();
-            }
-        }
-        text.push('\n');
-    }
-    std::fs::write(folder.join("cameras.txt"), "1 PINHOLE 640 480 500 500 320 240\n").unwrap();
-    std::fs::write(folder.join("images.txt"), images).unwrap();
-    std::fs::write(folder.join("points3D.txt"), text).unwrap();
+    let (mut images, mut tracks) = (String::new(), vec![String::new(); points.len()]);
     let mut writer = FeatureWriter::create(&folder.join("features.h5")).unwrap();
-    for (image, seen) in keypoints.iter().enumerate() {
-        let mut draws = Draws::new(2, Stage::Shapes, image as u64);
-        let values = seen.iter().flat_map(|(_, row)| {
-            let mut own = Draws::new(3, Stage::Shapes, *row as u64);
-            let noisy = |_| (own.normal() + 0.2 * draws.normal()) as f32;
-            (0..DIM).map(noisy).collect::<Vec<f32>>()
-        });
-        let descriptors = Descriptors::try_new(Values::F32(values.collect()), DIM).unwrap();
-        let image = ImageFeatures {
-            name: format!("{image:02}.jpg"),
-            size: Some([640, 480]),
-            keypoints: seen.iter().map(|(place, _)| *place).collect(),
-            descriptors: Some(descriptors),
-            ..ImageFeatures::default()
-        };
+    for image in 0..N_IMAGES {
+        let (camera, name) = (camera(image), format!("{image:02}.jpg"));
+        // A quarter turn about x.
+        let half = 0.5_f64.sqrt();
+        let [x, y, z] = camera.pose.translation();
+        images += &format!("{} {half} {half} 0 0 {x} {y} {z} 1 {name}\n\n", image + 1);
+        let [mut of_places, mut of_values] =
+            [1, 2].map(|seed| Draws::new(seed, Stage::Shapes, image.into()));
+        let (mut keypoints, mut values) = (Vec::new(), Vec::new());
+        for (row, point) in points.iter().enumerate() {
+            let is_seen =
+                |p: &[f64; 2]| (1.0..639.0).contains(&p[0]) && (1.0..479.0).contains(&p[1]);
+            let Some(place) = camera.project(point).filter(is_seen) else { continue };
+            tracks[row] += &format!(" {} {}", image + 1, keypoints.len());
+            keypoints.push(place.map(|p| p - 0.5 + 0.3 * of_places.normal()));
+            let mut own = Draws::new(3, Stage::Shapes, row as u64);
+            values.extend((0..DIM).map(|_| (own.normal() + 0.2 * of_values.normal()) as f32));
+        }
+        let descriptors = Some(Descriptors::try_new(Values::F32(values), DIM).unwrap());
+        let size = Some([640, 480]);
+        let image = ImageFeatures { name, size, keypoints, descriptors, ..Default::default() };
         writer.append(&image).unwrap();
     }
     writer.finish().unwrap();
+    let line = |(row, ([x, y, z], track)): (usize, (&[f64; 3], &String))| {
+        format!("{} {x} {y} {z} 0 0 0 0.5{track}\n", row + 1)
+    };
+    let points: String = points.iter().zip(&tracks).enumerate().map(line).collect();
+    std::fs::write(folder.join("cameras.txt"), "1 PINHOLE 640 480 500 500 320 240\n").unwrap();
+    std::fs::write(folder.join("images.txt"), images).unwrap();
+    std::fs::write(folder.join("points3D.txt"), points).unwrap();
 }
 
 fn open(folder: &Path) -> Prepared {

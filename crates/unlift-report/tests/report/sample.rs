@@ -69,6 +69,11 @@ pub fn document(metric: bool) -> Document {
     document
 }
 
+/// Changes the rows of a scheme.
+pub fn change(document: &mut Document, scheme: &str, change: impl Fn(&mut Row)) {
+    document.results.iter_mut().filter(|row| row.scheme == scheme).for_each(change);
+}
+
 fn row(s: usize, r: usize, solver: &str, thresholds: [&str; 2], metric: bool) -> Row {
     let penalty = if solver == "ransac" { 0.4 + 1.1 * r as f64 } else { 0.0 };
     let shares = [SHARES[s].0[r], SHARES[s].1[r]];
@@ -126,8 +131,7 @@ pub fn mixed(metric: bool) -> Document {
     let half: Vec<Row> =
         document.results.iter().filter(|row| row.inlier_ratio == 0.5).cloned().collect();
     for row in half {
-        let s =
-            SCHEMES.iter().position(|scheme| *scheme == row.scheme).expect("one of them") as f64;
+        let s = SCHEMES.iter().position(|name| *name == row.scheme).unwrap() as f64;
         let weaker = if row.solver == "ransac" { 3.0 } else { 0.0 };
         let mut own = |neighbors: &str, inlier_ratio, shares: [f64; 2]| {
             let mut row = row.clone();
@@ -136,10 +140,7 @@ pub fn mixed(metric: bool) -> Document {
             // Half of the points or more are lost, so no percentile is known.
             row.median_error = None;
             row.error_percentiles.values_mut().for_each(|error| *error = None);
-            row.recovered_percent
-                .values_mut()
-                .zip(shares)
-                .for_each(|(value, share)| *value = share);
+            row.recovered_percent.values_mut().zip(shares).for_each(|(old, new)| *old = new);
             document.results.push(row);
         };
         let falling = 4.5 * s + weaker;
@@ -169,13 +170,11 @@ pub fn scene(document: &Document, n: usize) -> Scene3d {
     let obfuscations = SCHEMES.map(|scheme| {
         let some = originals.iter().take(1_500);
         let shapes = match scheme {
-            "plane" => Shapes::Patches(
-                some.step_by(10)
-                    .map(|p| {
-                        [[p[0], 0.0, 0.0], [p[0], 4.5, 0.0], [p[0], 4.5, 2.6], [p[0], 0.0, 2.6]]
-                    })
-                    .collect(),
-            ),
+            "plane" => {
+                let corners = [[0.0, 0.0], [4.5, 0.0], [4.5, 2.6], [0.0, 2.6]];
+                let patch = |p: &[f32; 3]| corners.map(|[y, z]| [p[0], y, z]);
+                Shapes::Patches(some.step_by(10).map(patch).collect())
+            }
             "cp" => Shapes::Points(originals.iter().map(|p| [p[0], p[1], 1.3]).collect()),
             _ => Shapes::Segments(some.map(|p| [[p[0], 0.0, p[2]], [p[0], 4.5, p[2]]]).collect()),
         };
@@ -200,9 +199,8 @@ pub fn images() -> Document {
     let by = |values: [f64; 4]| -> ByThreshold {
         ["1", "5", "10", "25"].map(str::to_owned).into_iter().zip(values).collect()
     };
-    document
-        .results
-        .retain(|row| row.solver == "consensus" && ["olc", "cp"].contains(&&*row.scheme));
+    let is_kept = |row: &Row| row.solver == "consensus" && ["olc", "cp"].contains(&&*row.scheme);
+    document.results.retain(is_kept);
     for (at, row) in document.results.iter_mut().enumerate() {
         row.scheme = if row.scheme == "olc" { "lines2d" } else { "cp2d" }.into();
         row.recovered_percent = by([21.5, 61.5, 81.5, 95.5].map(|share| share - at as f64));
