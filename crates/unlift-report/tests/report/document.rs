@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 use unlift_report::document::{GateResult, ImageCounts, NotAudited, Spread};
-use unlift_report::{Document, Error, RenderOptions, junit, render};
+use unlift_report::{Document, RenderOptions, junit, render};
 
 use crate::sample;
 

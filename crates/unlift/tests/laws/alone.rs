@@ -21,10 +21,19 @@ fn furnished(n: usize) -> Vec<[f64; 3]> {
     synthetic::room(1, n).points
 }
 
-/// Returns the percentage of points within `reach`, with the points of a paired line in either order.
+/// Returns the percentage of points within `reach`. The two positions of a paired line are compared
+/// as a set.
 fn percent_within(hidden: &Hidden<3>, recovered: &Recovered<3>, reach: f64) -> f64 {
-    let about = About { order: RowOrder::Either, ..recovered.about() };
-    hidden.percent_within(&recovered.clone().with_about(about), reach)
+    let about = About { order: RowOrder::Slots, ..recovered.about() };
+    let (recovered, per) = (recovered.clone().with_about(about), hidden.secret.slots_per_record());
+    let hits = |secret: &Secret| -> Vec<usize> {
+        let accuracy = evaluate(&recovered, &hidden.original, secret).unwrap();
+        let hits = |of: &[f64]| of.iter().filter(|error| **error <= reach).count();
+        accuracy.errors().chunks(per).map(hits).collect()
+    };
+    let crossed = hits(&hidden.secret.exchanged(|_| per == 2));
+    let best = hits(&hidden.secret).into_iter().zip(crossed).map(|(a, b)| a.max(b));
+    100.0 * best.sum::<usize>() as f64 / hidden.secret.n_slots() as f64
 }
 
 /// Floors are shares within 25 cm, at most two points below the measured ones. No attack on
