@@ -15,7 +15,7 @@ use unlift::seed::Key;
 use unlift_audit::localization::held_out::{Held, Problem};
 use unlift_audit::{Error, Preparation, Quiet, maps};
 
-fn main() -> Result<(), Error> {
+fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let mut next = || arguments.next().ok_or_else(|| Error::request("expected MODEL FEATURES N"));
     let (model, features, nth): (PathBuf, PathBuf, usize) =

@@ -128,12 +128,20 @@ impl fmt::Display for Error {
     }
 }
 
-// It is no `std::error::Error`, so that every error of a file becomes one by `?`.
-impl<E: std::error::Error + Send + Sync + 'static> From<E> for Error {
-    fn from(error: E) -> Self {
-        Self { fault: Fault::Input(Box::new(error)), advice: None }
-    }
+impl std::error::Error for Error {}
+
+// Errors of everything that an audit reads and calls become its own.
+macro_rules! from {
+    ($($error:ty),*) => {$(
+        impl From<$error> for Error {
+            fn from(error: $error) -> Self {
+                Self { fault: Fault::Input(Box::new(error)), advice: None }
+            }
+        }
+    )*};
 }
+
+from!(unlift::Error, unlift_io::Error, unlift_report::Error, serde_json::Error);
 
 /// Receives the progress of an audit, from any thread.
 pub trait Progress: Send + Sync {
