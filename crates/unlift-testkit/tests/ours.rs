@@ -9,7 +9,7 @@ use unlift::neighbors::sources::SOURCES;
 use unlift::neighbors::{Needs, Neighborhoods, Source};
 use unlift::obfuscate::olc::Olc;
 use unlift::obfuscate::{Change, Changed, Lifted, Protection, Scheme, SchemeOptions, all};
-use unlift::recover::Builtin;
+use unlift::recover::{Builtin, RecoverOptions, Recovered, Solver};
 use unlift::released::{Lines, Obfuscation, Released};
 use unlift::seed::{Draws, Key, Stage};
 use unlift::{Descriptors, Error, Unit};
@@ -60,9 +60,25 @@ fn our_solvers() {
     }
 }
 
-/// A scheme and a source with a bug each.
+/// A solver, a scheme and a source with a bug each.
 #[derive(Debug)]
 struct Wrong;
+
+/// It returns results for half of the slots only.
+impl Solver<3> for Wrong {
+    fn name(&self) -> &str {
+        "half"
+    }
+
+    fn recover(
+        &self,
+        released: &Released<3>,
+        lists: &Neighborhoods,
+        _: &RecoverOptions,
+    ) -> Result<Recovered<3>, Error> {
+        Recovered::from_positions(released, lists, &vec![[0.0; 3]; released.n_slots() / 2])
+    }
+}
 
 /// Its lines pass 10 cm beside their points.
 impl Scheme<3> for Wrong {
@@ -100,6 +116,14 @@ impl Source<3> for Wrong {
         let (n, slots) = (released.n_records(), released.slots_per_record());
         Neighborhoods::try_new(vec![0; n * slots + 1], Vec::new(), None, n, slots)
     }
+}
+
+#[test]
+#[should_panic(expected = "positions: expected 300, one per slot, found 150")]
+fn a_solver_that_answers_for_some_slots_is_found_out() {
+    let (_, released, _) = described_map(&Olc, 300);
+    let lists = Neighborhoods::try_new(vec![0; 301], Vec::new(), None, 300, 1).unwrap();
+    solver_laws(&Wrong, &released, &lists);
 }
 
 #[test]

@@ -474,6 +474,12 @@ mod tests {
     use super::*;
 
     #[test]
+    fn names_keep_their_spaces() {
+        assert_eq!(after_words(b"1 2  a b.jpg", 2), b"a b.jpg");
+        assert_eq!(after_words(b"1 2", 2), b"");
+    }
+
+    #[test]
     fn unsorted_points_are_sorted_with_their_tracks() {
         let points = Points {
             ids: vec![7, 2],

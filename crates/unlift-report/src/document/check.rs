@@ -1,5 +1,7 @@
 //! The rules of `audit.json` that its types cannot express.
 
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use crate::Error;
@@ -77,18 +79,33 @@ impl Document {
         Ok(())
     }
 
-    /// Checks that the document survives its text: JSON has neither NaN nor infinity, and makes null of them.
     fn check_finite(&self) -> Result<(), Error> {
-        let mut written = self.clone();
-        // What is not written.
-        written.results.iter_mut().for_each(|row| row.parts = Default::default());
-        for missing in &mut written.not_audited {
-            (missing.oracle_noise, missing.inlier_ratio) = (None, None);
-        }
-        match serde_json::from_value::<Self>(serde_json::to_value(&written)?) {
-            Ok(read) if read == written => Ok(()),
-            _ => invalid("a figure", "a finite number", "NaN or infinity"),
-        }
+        // Parts of a row are not written.
+        let written = |row: &Row| Row { parts: Default::default(), ..row.clone() };
+        all_finite("results", &self.results.iter().map(written).collect::<Vec<_>>())?;
+        all_finite("gates", &self.gates)?;
+        all_finite("break_even", &self.break_even)?;
+        all_finite("images", &self.images)?;
+        all_finite("tiles", &self.tiles)?;
+        all_finite("localization", &self.localization)?;
+        finite("input", &self.input)?;
+        finite("run", &self.run)
+    }
+}
+
+fn all_finite<T: Serialize + DeserializeOwned + PartialEq>(
+    name: &str,
+    parts: &[T],
+) -> Result<(), Error> {
+    parts.iter().enumerate().try_for_each(|(i, part)| finite(&format!("{name}[{i}]"), part))
+}
+
+/// Checks that all numbers of a part are finite: JSON has neither NaN nor infinity, so that what is read from its text differs
+/// from it.
+fn finite<T: Serialize + DeserializeOwned + PartialEq>(place: &str, part: &T) -> Result<(), Error> {
+    match serde_json::from_value::<T>(serde_json::to_value(part)?) {
+        Ok(read) if read == *part => Ok(()),
+        _ => invalid(place, "finite numbers", "NaN or infinity"),
     }
 }
 

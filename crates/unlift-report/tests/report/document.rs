@@ -53,8 +53,8 @@ fn a_document_survives_its_text() {
 fn a_broken_rule_names_its_place() {
     type Spoil = fn(&mut Document);
     let rules: [(Spoil, &str); 11] = [
-        (|d| d.results[1].median_error = Some(f64::NAN), "a figure: expected a finite number, found NaN or infinity"),
-        (|d| _ = d.results[1].metrics.insert("faces".into(), f64::INFINITY), "a figure: expected a finite number, found NaN or infinity"),
+        (|d| d.results[1].median_error = Some(f64::NAN), "results[1]: expected finite numbers, found NaN or infinity"),
+        (|d| _ = d.results[1].metrics.insert("faces".into(), f64::INFINITY), "results[1]: expected finite numbers, found NaN or infinity"),
         (|d| d.results[2].recovered_percent[0] = 100.5, "results[2].recovered_percent[\"0.10\"]: expected a number from 0 to 100, found 100.5"),
         (|d| d.results[1] = d.results[0].clone(), "results[1]: expected a combination of its own, found the combination of results[0] again"),
         (|d| d.results[0].n_lost = 5, "results[0].lost: expected a sum of 5, found 12"),

@@ -383,3 +383,13 @@ fn the_terminal_table_has_a_line_per_source_and_says_what_is_missing() {
     assert!(table.contains("not audited: star: flat\n"), "{table}");
     assert!(table.contains("not audited: star by geometric: no lists\n"), "{table}");
 }
+
+#[test]
+fn the_axis_of_errors_begins_at_a_hundredth_of_the_largest_threshold() {
+    let mut document = sample::document(true);
+    document.results[0].error_percentiles.insert("1".into(), Some(1e-6));
+    let page = page(&document, None, false);
+    assert!(
+        page.contains("[0.0025,1.0]") && !page.contains("[1e-6,") && !page.contains("[0.000001,")
+    );
+}
