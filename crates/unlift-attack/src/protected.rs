@@ -116,6 +116,11 @@ impl ProtectedDescriptors {
         self.rule
     }
 
+    /// Whether the plain descriptors were bytes.
+    pub fn of_bytes(&self) -> bool {
+        self.bytes
+    }
+
     /// Number of rows.
     pub fn len(&self) -> usize {
         self.rows.len()

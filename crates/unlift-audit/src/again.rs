@@ -25,7 +25,7 @@ use unlift_report::document::Input;
 
 use crate::audit::{Attacked, Audit};
 use crate::document::ordered;
-use crate::doubts::{short, sides_m};
+use crate::doubts::{short, with_sides};
 use crate::gate::Tried;
 use crate::localization::held_out::{Unit32, mutual};
 use crate::prepare::{Preparation, Prepared};
@@ -141,10 +141,9 @@ impl Again<'_> {
         audit.begin(&tried, Some(first.original.reveal()), &notes, progress)?;
         let mut options = document::names(&tried, audit.options.clone());
         options.insert("records_alone".into(), json!(self.plan.records_alone));
-        let extent_m = sides_m(first.original.reveal());
         let mut attacked = Attacked {
             tried,
-            about: Some(Input { extent_m, ..audit.about.clone() }),
+            about: Some(with_sides(audit.about.clone(), first.original.reveal())),
             options,
             notes,
             ..Attacked::default()

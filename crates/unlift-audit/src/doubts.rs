@@ -323,10 +323,10 @@ impl Extent {
     }
 }
 
-/// Returns the sides of the box around all points but the outer 1 % of each axis, if lengths are in meters.
-pub fn sides_m(points: &PointSet<3>) -> Option<[f64; 3]> {
-    let bounds = Bounds::quantiles(points.positions(), 0.01)?;
-    (points.unit() == Unit::Meter).then(|| sub(&bounds.high, &bounds.low))
+/// Returns `input` with the sides of the box around all points but the outer 1 % of each axis.
+pub fn with_sides(input: Input, points: &PointSet<3>) -> Input {
+    let bounds = Bounds::quantiles(points.positions(), 0.01);
+    input.with_sides(bounds.map(|bounds| sub(&bounds.high, &bounds.low)), points.unit())
 }
 
 /// Adds the extent of the map to what gates compare.

@@ -57,8 +57,7 @@ pub use audit::{Audit, Hidden, Input, Output, Views};
 pub use document::peak_bytes;
 pub use document::{evaluated, ordered};
 pub use doubts::{
-    Checked, LengthMessages, check_scale, check_thresholds, read_from_file, sides_m,
-    unlike_neighbors,
+    Checked, LengthMessages, check_scale, check_thresholds, read_from_file, unlike_neighbors,
 };
 pub use gate::{Figure, Gate, Tried, positive, ratio};
 pub use outputs::{Audited, FIGURES, Files, Finished, PAGE, check_file, check_file_of, refused};

@@ -20,7 +20,7 @@ use unlift_report::{Attack, ByAttack, RenderOptions};
 use crate::audit::{Attacked, Audit, Hidden};
 use crate::curves::{Curves, curves_of};
 use crate::doubts::{
-    Spread, check_scale, check_truth, doubts, follows_places, sides_m, unlike_neighbors,
+    Spread, check_scale, check_truth, doubts, follows_places, unlike_neighbors, with_sides,
 };
 use crate::gate::Tried;
 use crate::inversion::MapInversion;
@@ -236,7 +236,8 @@ impl Map<'_> {
                             |error| of_file(error).advise("a smaller --k, or fewer --schemes"),
                         )?,
                         Some(release) => {
-                            run_released(original, release, plan, &mut watcher).map_err(of_file)?
+                            run_released((original, self.descriptors), release, plan, &mut watcher)
+                                .map_err(of_file)?
                         }
                     };
                 if let Some(error) = watcher.failed {
@@ -252,7 +253,8 @@ impl Map<'_> {
             alone.shares.iter().any(|(label, share)| share.percent() > row.blind_percent[label])
         };
         let read = hidden.and_then(|hidden| hidden.read.as_ref());
-        for row in &mut outcome.rows {
+        let given = plan.schemes.first().map(|scheme| scheme.name());
+        for row in outcome.rows.iter_mut().filter(|row| given == Some(&*row.scheme)) {
             row.add_alone(read.filter(|alone| beats(alone, row)).cloned());
         }
         let followed = release.map(|release| follows_places(original, release));
@@ -275,7 +277,7 @@ impl Map<'_> {
         let (error_cdf, inversions) = (curves_of(curves, &outcome.rows), sheets);
         Ok(Attacked {
             tried,
-            about: Some(Input { extent_m: sides_m(original.reveal()), ..audit.about.clone() }),
+            about: Some(with_sides(audit.about.clone(), original.reveal())),
             options: document::options(plan, options),
             notes: [audit.notes.clone(), doubts.notes, notes_on_images].concat(),
             doubts: doubts.of_rows,

@@ -15,7 +15,7 @@ use unlift_io::read;
 use unlift_io::stage::read_point_neighborhoods;
 use unlift_report::document::Input;
 
-use crate::doubts::sides_m;
+use crate::doubts::with_sides;
 use crate::localization::Cameras;
 
 /// Options for the points of a file.
@@ -88,14 +88,14 @@ impl Prepared {
         (low, high): (f64, f64),
         scale: Option<f64>,
     ) -> Result<(), crate::Error> {
-        let extent_m = sides_m(self.original.reveal());
+        let input = Input { scale_m_per_unit: scale, ..Input::default() };
+        let input = with_sides(input, self.original.reveal());
         let is_within =
             |sides: [f64; 3]| (low..=high).contains(&sides.into_iter().fold(0.0, f64::max));
-        if extent_m.is_none_or(is_within) {
+        if input.extent_m.is_none_or(is_within) {
             return Ok(());
         }
-        let found = Input { extent_m, scale_m_per_unit: scale, ..Input::default() };
-        let found = found.extent().unwrap_or_default();
+        let found = input.extent().unwrap_or_default();
         let expected = format!("a longest side of {low} to {high} m");
         let error = format!("--expect-extent: expected {expected}, found {found}");
         Err(crate::Error::request(error))

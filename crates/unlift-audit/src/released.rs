@@ -73,7 +73,9 @@ impl Files<'_> {
         let mut prepared = Prepared { notes, ..Prepared::of(original) };
         if let (Some(rows), Some(order)) = (released.descriptors(), rows_of_originals(&secret)) {
             let points = prepared.original.reveal();
-            prepared.doubts.extend(unlike_neighbors(points, &rows.select(&order))?);
+            let rows = rows.select(&order);
+            prepared.doubts.extend(unlike_neighbors(points, &rows)?);
+            prepared.descriptors = Some(rows);
         }
         Ok(Release { prepared, hidden: (released, secret) })
     }

@@ -65,10 +65,13 @@ pub struct Comparison {
     pub tolerance_points: f64,
     /// The origin of the tolerance: `twice the spread of repeats` or `usual without repeats`.
     pub tolerance_is: &'static str,
-    /// Whether nothing leaks more, nothing is lost, and both audits are of the same inputs.
+    /// Whether nothing leaks more, nothing is lost, and both audits are of the same inputs, or of inputs whose difference is
+    /// accepted.
     pub passed: bool,
     /// Inputs that differ, so that a smaller figure may say nothing.
     pub different: Vec<String>,
+    /// Why inputs may differ, if the user said so.
+    pub accepted: Option<Accepted>,
     /// Figures that leak more, the largest difference first.
     pub more: Vec<Change>,
     /// Figures that leak less, the largest difference first.
@@ -84,6 +87,40 @@ pub struct Comparison {
     pub only_old: Vec<Unmatched>,
     /// Rows of the new audit only.
     pub only_new: Vec<Unmatched>,
+}
+
+/// The user's statement that inputs may differ, until a day.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Accepted {
+    /// The reason.
+    pub reason: String,
+    /// The last day on which it holds, as `2027-03-01`.
+    pub until: String,
+    /// Whether that day is past.
+    pub past: bool,
+}
+
+impl Accepted {
+    /// Parses "reason, until 2027-03-01"; `today` is a day in this form.
+    ///
+    /// # Errors
+    /// If there is no reason, or no such day: what was expected.
+    pub fn parse(text: &str, today: &str) -> Result<Self, &'static str> {
+        const EXPECTED: &str = "\"REASON, until YYYY-MM-DD\"";
+        let (reason, until) = text.rsplit_once(", until ").ok_or(EXPECTED)?;
+        let (reason, until) = (reason.trim(), until.trim());
+        let form =
+            |(at, c): (usize, char)| if at == 4 || at == 7 { c == '-' } else { c.is_ascii_digit() };
+        let part = |range| until.get(range).and_then(|part: &str| part.parse::<u32>().ok());
+        let is_day = until.len() == 10
+            && until.char_indices().all(form)
+            && part(5..7).is_some_and(|month| (1..=12).contains(&month))
+            && part(8..10).is_some_and(|day| (1..=31).contains(&day));
+        if reason.is_empty() || !is_day {
+            return Err(EXPECTED);
+        }
+        Ok(Self { reason: reason.to_owned(), until: until.to_owned(), past: until < today })
+    }
 }
 
 /// The reason why two audits cannot be compared.
@@ -107,11 +144,17 @@ const RECORDS_ALONE: &str = "records alone";
 /// Compares the figures of two audits. Rows match by scheme, source, noise, requested inlier ratio (a measured one is a result),
 /// K and solver. Baselines are compared per scheme.
 ///
+/// `accepted` lets inputs differ. It lets nothing leak more.
+///
 /// The tolerance is twice the largest standard deviation over repeats in both audits, or 2 points without repeats.
 ///
 /// # Errors
 /// Fails if units or thresholds differ, or if no row matches.
-pub fn compare(old: &Document, new: &Document) -> Result<Comparison, Incomparable> {
+pub fn compare(
+    old: &Document,
+    new: &Document,
+    accepted: Option<Accepted>,
+) -> Result<Comparison, Incomparable> {
     let [was, is] = &[old, new].map(Results::of);
     let within = common_thresholds(was, is)?;
     let mut changes = Vec::new();
@@ -188,13 +231,15 @@ pub fn compare(old: &Document, new: &Document) -> Result<Comparison, Incomparabl
     less.sort_by(|a, b| a.points.total_cmp(&b.points));
     let costs_more = costs_more(old, new);
     let different = different(old, new);
-    let is_like = different.is_empty() && only_old.is_empty() && lost.is_empty();
+    let is_accepted = accepted.as_ref().is_some_and(|accepted| !accepted.past);
+    let is_like = (different.is_empty() || is_accepted) && only_old.is_empty() && lost.is_empty();
     let passed = is_like && more.is_empty() && costs_more.is_empty();
     Ok(Comparison {
         tolerance_points,
         tolerance_is,
         passed,
         different,
+        accepted,
         more,
         less,
         same,
@@ -339,7 +384,8 @@ impl Comparison {
         let [more, less, same] = [&self.more, &self.less, &self.same].map(Vec::len);
         let (points, is) = (self.tolerance_points, self.tolerance_is);
         let point = if points == 1.0 { "point" } else { "points" };
-        let is_like = self.different.is_empty() && self.only_old.is_empty();
+        let is_accepted = self.accepted.as_ref().is_some_and(|accepted| !accepted.past);
+        let is_like = (self.different.is_empty() || is_accepted) && self.only_old.is_empty();
         let not = if is_like { "" } else { "not compared: " };
         let mut text = format!(
             "{not}{} figures compared, tolerance {points} {point} ({is}): {more} leak more, {less} less, {same} as before",

@@ -33,6 +33,7 @@ pub mod document;
 pub mod export;
 mod gates;
 mod page;
+mod release;
 mod results;
 mod table;
 mod words;
@@ -45,4 +46,5 @@ pub use page::scene::Scene3d;
 pub use page::{
     ErrorCdf, Opening, RenderOptions, Shares, inversions, pictures, render, scene, shares,
 };
+pub use release::leak;
 pub use words::align;

@@ -74,6 +74,17 @@ impl<'a> Results<'a> {
         words::threshold(typed, self.unit)
     }
 
+    /// Returns a threshold for a sentence: `within 10 cm`, or `within 3.9 % of the map's longest side` without a scale.
+    pub(crate) fn within(&self, typed: &str) -> String {
+        match (self.document.input.longest_side, typed.parse::<f64>()) {
+            (Some(side), Ok(times)) if self.unit == Unit::KthNeighbor && side > 0.0 => {
+                let percent = words::significant(100.0 * times / side, 2);
+                format!("within {percent} % of the map's longest side")
+            }
+            _ => format!("within {}", self.threshold(typed)),
+        }
+    }
+
     pub(crate) fn of_scheme(&self, scheme: &str) -> impl Iterator<Item = &'a Row> + Clone {
         self.rows.iter().filter(move |row| row.scheme == scheme)
     }

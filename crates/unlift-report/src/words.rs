@@ -65,15 +65,6 @@ pub(crate) fn threshold(typed: &str, unit: Unit) -> String {
     }
 }
 
-/// Returns a threshold for a sentence: `within 10 cm`, `within 2.5 times the usual distance ...`.
-pub(crate) fn within(typed: &str, unit: Unit) -> String {
-    match (unit, typed.parse::<f64>()) {
-        (Unit::KthNeighbor, Ok(1.0)) => format!("within {USUAL_DISTANCE}"),
-        (Unit::KthNeighbor, Ok(times)) => format!("within {times} times {USUAL_DISTANCE}"),
-        _ => format!("within {}", threshold(typed, unit)),
-    }
-}
-
 pub(crate) fn points(unit: Unit) -> &'static str {
     match unit {
         Unit::Meter | Unit::KthNeighbor => "points",
@@ -252,14 +243,5 @@ mod tests {
         assert_eq!(length(3.4567, Unit::Pixel), "3.46 px");
         assert_eq!(length(1284.2, Unit::Pixel), "1,280 px");
         assert_eq!(length(12_345.0, Unit::Meter), "12,300 m");
-    }
-
-    #[test]
-    fn without_a_scale_lengths_are_compared_with_the_distance_of_neighbors() {
-        let said = |typed| within(typed, Unit::KthNeighbor);
-        assert_eq!(said("1.0"), "within the usual distance to the K-th neighbor");
-        assert_eq!(said("2.5"), "within 2.5 times the usual distance to the K-th neighbor");
-        assert_eq!(within("0.10", Unit::Meter), "within 10 cm");
-        assert_eq!(within("10", Unit::Pixel), "within 10 px");
     }
 }

@@ -40,6 +40,8 @@ struct PhotoView {
 pub struct MapInversion {
     painter: Painter,
     views: Vec<PhotoView>,
+    /// The inlier ratio of the oracle whose recoveries are painted; `None`: all.
+    ratio: Option<f64>,
     /// The cell that was measured last and its pictures, one per photo, so that the page does not
     /// paint them again.
     last: Mutex<Option<(Row, u32, Vec<Picture>)>>,
@@ -102,7 +104,18 @@ impl MapInversion {
             let expected = format!("photos of the images in {}", model.display());
             return Err(unlift_io::Error::new(photos, "", expected, "none").into());
         }
-        Ok(Self { painter, views, last: Mutex::default() })
+        Ok(Self { painter, views, ratio: None, last: Mutex::default() })
+    }
+
+    /// Paints the oracle's recoveries at this inlier ratio only.
+    #[must_use]
+    pub fn at_ratio(self, ratio: f64) -> Self {
+        Self { ratio: Some(ratio), ..self }
+    }
+
+    fn paints(&self, row: &Row) -> bool {
+        let is_oracle = row.oracle_noise.is_some();
+        !is_oracle || self.ratio.is_none_or(|ratio| ratio == row.inlier_ratio)
     }
 
     /// Returns the SHA-256 of the painting network, in hexadecimal.
@@ -117,6 +130,9 @@ impl MapInversion {
 
     /// Adds the pictures of `cell` by the first cameras, one per sheet.
     pub fn add(&self, cell: &Cell<'_>, sheets: &mut [Sheet]) -> Result<(), Error> {
+        if !self.paints(cell.row) {
+            return Ok(());
+        }
         let last = self.last.lock().unwrap_or_else(PoisonError::into_inner).take();
         let pictures = match last {
             Some((row, repeat, pictures))
@@ -168,6 +184,9 @@ impl MapInversion {
 impl Measure<3> for MapInversion {
     /// Returns means over the photos that have the figure: not every photo has objects.
     fn measure(&self, cell: &Cell<'_>) -> Result<Vec<(String, f64)>, Error> {
+        if !self.paints(cell.row) {
+            return Ok(Vec::new());
+        }
         let pictures = self.pictures(cell, self.views.len())?;
         let mut all = Vec::new();
         for (of, picture) in self.views.iter().zip(&pictures) {

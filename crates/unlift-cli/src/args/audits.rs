@@ -292,8 +292,9 @@ pub struct AuditMapArgs {
     pub tile_points: Option<NonZeroUsize>,
     #[command(flatten)]
     pub paint: PaintArgs,
-    /// Compare pictures with at most N photos, evenly spaced by name
-    #[arg(long, value_parser = values::count, value_name = "N", default_value = "12", help_heading = "Result")]
+    /// With --invert: compare pictures with at most N photos, evenly spaced by name. The oracle's
+    /// pictures are those at inlier ratio 0.5, unless --inlier-ratios or --full is given
+    #[arg(long, value_parser = values::count, value_name = "N", default_value = "3", help_heading = "Result")]
     pub max_images: NonZeroUsize,
     /// Also localize held-out images of the map. The folder has its photos (SIFT features are
     /// extracted), or the file their features (see unlift features --as-stored). The map is made
@@ -472,6 +473,7 @@ pub struct AuditAgainArgs {
 #[command(after_help = "\
 Examples:
   unlift audit released mine.npz --truth truth.npz --name mine
+  unlift audit released mine.npz --truth truth.npz --schemes olc,ray
   unlift audit released mine.npz --truth truth.npz --neighbors oracle --neighbors geometric
   unlift audit released mine.npz --truth truth.npz --gate 'all@0.5:0.10<=20'
 
@@ -500,6 +502,10 @@ pub struct AuditReleasedArgs {
     #[arg(long, value_name = "K", default_value = "50", help_heading = "Input",
           value_parser = value_parser!(u16).range(1..))]
     pub k: u16,
+    /// Also audit these schemes of unlift on the same points, separated by commas
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::scheme,
+          help_heading = "Attack")]
+    pub schemes: Vec<&'static Entry>,
     #[command(flatten)]
     pub solvers: SolverArgs,
     #[command(flatten)]

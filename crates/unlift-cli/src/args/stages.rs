@@ -6,9 +6,10 @@ use std::path::PathBuf;
 use clap::{Args, value_parser};
 use unlift::audit::Threshold;
 use unlift::neighbors::oracle::Noise;
-use unlift::obfuscate::Entry;
+use unlift::obfuscate::{Entry, Mitigation, Protection};
 use unlift::recover::Builtin;
 
+use unlift_report::compare::Accepted;
 use unlift_vision::network::DescriptorKind;
 
 use super::audits::{ExtractionArgs, MapArgs};
@@ -38,6 +39,7 @@ pub struct DemoArgs {
 Examples:
   unlift obfuscate PROJECT --scheme ppl --scale 1 --out hidden
   unlift obfuscate PROJECT --scheme olc --descriptors PROJECT/database.db --out hidden
+  unlift obfuscate PROJECT --scheme ray --mitigate thin:1/4 --audit unlift-audit/audit.json
   unlift obfuscate features.h5 --scheme dcl2d --out hidden-images
 
 released.npz is what an attacker sees: records (such as lines) in place of points.
@@ -62,6 +64,21 @@ pub struct ObfuscateArgs {
     pub out: PathBuf,
     #[command(flatten)]
     pub map: MapArgs,
+    /// Change the map before the scheme hides it, as unlift audit map --mitigate does
+    #[arg(long, value_name = "STEPS", value_parser = values::by(Mitigation::parse),
+          conflicts_with = "protect_descriptors")]
+    pub mitigate: Option<Mitigation>,
+    /// Release protected descriptors, as unlift audit map --protect-descriptors audits them
+    #[arg(long, value_name = "RULE", value_parser = values::by(Protection::parse))]
+    pub protect_descriptors: Option<Protection>,
+    /// The descriptors that owner and users know, as for unlift audit map [default: the two photos
+    /// of unlift demo]
+    #[arg(long, value_name = "PATH", requires = "protect_descriptors")]
+    pub public_descriptors: Option<PathBuf>,
+    /// The audit.json of unlift audit map on this map: print what its attacks recover under this
+    /// scheme, and refuse an audit of another map, or without this scheme
+    #[arg(long, value_name = "FILE")]
+    pub audit: Option<PathBuf>,
     /// Random seed, for experiments [default: a fresh 256-bit key]
     #[arg(long, value_name = "INTEGER")]
     pub seed: Option<u64>,
@@ -312,14 +329,15 @@ are compared by scheme and threshold. Rows that only one of the audits has are l
 
 The comparison fails (exit code 1) if a result of the later audit is larger by more than twice its
 standard deviation over --repeats, or by more than 2 percentage points without --repeats. It also
-fails if a scheme of the earlier audit has no comparable result in the later one, or if a source of
-the earlier audit could not be used in the later one.
+fails if an attack of the earlier audit is not in the later one, or if the inputs differ (see
+--accept).
 
 Audits in different units or with different thresholds are refused (exit code 3).
 
 Examples:
   unlift compare before/audit.json unlift-audit/audit.json
-  unlift compare before/audit.json unlift-audit/audit.json --out compared")]
+  unlift compare before/audit.json unlift-audit/audit.json --out compared
+  unlift compare baseline.json unlift-audit/audit.json --accept 'two more rooms, until 2027-03-01'")]
 pub struct CompareArgs {
     /// The audit.json of the earlier audit
     #[arg(value_name = "OLD.json")]
@@ -330,6 +348,10 @@ pub struct CompareArgs {
     /// Also write a page, compare.html, to this folder; other files in it stay
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Compare although points, scale, size or files differ, until this day (UTC). Text, JSON and page
+    /// state the reason. A result that is larger still fails
+    #[arg(long, value_name = "REASON, until YYYY-MM-DD", value_parser = values::accepted)]
+    pub accept: Option<Accepted>,
     /// Print the comparison as JSON in place of the text
     #[arg(long)]
     pub json: bool,

@@ -5,14 +5,14 @@ use std::path::Path;
 use std::sync::Arc;
 
 use serde_json::json;
+use unlift::Unit;
 use unlift::audit::{Measure, NeighborsBy, Plan, Threshold, scheme_called};
 use unlift::geometry::camera::PoseError;
 use unlift::neighbors::sources::Named;
 use unlift::obfuscate::{Change, Changed, Entry, Mitigation, SCHEMES, Scheme, SchemeOptions};
 use unlift::recover::Builtin;
-use unlift::{Descriptors, Unit};
 use unlift_audit::again::{Again, Maps};
-use unlift_audit::changes::{mitigations, protections, protections_of_map, public_descriptors};
+use unlift_audit::changes::{mitigations, protections, protections_of_map};
 use unlift_audit::images::audit::Images;
 use unlift_audit::images::{FeatureSource, Opened, Opening};
 use unlift_audit::inversion::{Inversion, MapInversion};
@@ -28,14 +28,12 @@ use unlift_io::outputs::Rules;
 use unlift_io::stage::published_positions;
 use unlift_report::Document;
 use unlift_vision::features::photo::Turn;
-use unlift_vision::network::DescriptorKind;
 
-use super::common::{all_could_be, open_map, with_threads};
+use super::common::{all_could_be, open_map, public, with_threads};
 use crate::args::{
     AuditAgainArgs, AuditArgs, AuditImagesArgs, AuditMapArgs, AuditReleasedArgs, AuditSequenceArgs,
-    OracleArgs, ProtectArgs, SolverArgs,
+    OracleArgs, SolverArgs,
 };
-use crate::demo::photos;
 use crate::exit::{Outcome, usage};
 use crate::output::{command_line, print};
 use crate::progress::Progress;
@@ -103,14 +101,6 @@ fn hashes_of_lists(args: &SolverArgs) -> crate::Result<BTreeMap<String, String>>
     NeighborSource::files(&args.neighbors).map(hash).collect()
 }
 
-/// Reads the descriptors that owner and attacker know, by default those of the photos of the demo.
-fn public(args: &ProtectArgs, kind: DescriptorKind) -> crate::Result<Descriptors> {
-    match &args.public_descriptors {
-        Some(path) => public_descriptors(path, kind, None),
-        None => public_descriptors(photos::folder()?.path(), kind, Some(photos::MIN_SCORE)),
-    }
-}
-
 /// Returns the requested schemes; none means the default.
 fn schemes<const D: usize>(entries: &[&Entry], unit: Unit) -> Vec<Arc<dyn Scheme<D>>> {
     let options = SchemeOptions::usual(unit);
@@ -119,6 +109,9 @@ fn schemes<const D: usize>(entries: &[&Entry], unit: Unit) -> Vec<Arc<dyn Scheme
 
 const NO_RECORDS_ALONE: &str =
     "--no-records-alone: the attack on the records alone was not tried; it may recover more";
+
+/// The inlier ratio of the oracle whose pictures are painted by default.
+const PAINTED_RATIO: f64 = 0.5;
 
 /// `unlift audit map`
 pub fn map(args: &AuditMapArgs) -> crate::Result<Outcome> {
@@ -130,12 +123,13 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<Outcome> {
         let AuditArgs { seed, quiet, .. } = args.audit;
         let mut prepared = open_map(&args.path, &args.map, args.uses_descriptors(), (seed, quiet))?;
         let progress = Progress::new(quiet);
+        let has_ratios = args.full || !args.oracle.inlier_ratios.is_empty();
         let inversion = match &args.paint.invert {
             Some(network) => {
                 let (photos, max_images) = (args.paint.photos.as_deref(), args.max_images.get());
                 let network = network.as_deref();
-                let opened = MapInversion::open(&prepared, photos, network, max_images, &progress);
-                Some(Arc::new(opened?))
+                let opened = MapInversion::open(&prepared, photos, network, max_images, &progress)?;
+                Some(Arc::new(if has_ratios { opened } else { opened.at_ratio(PAINTED_RATIO) }))
             }
             None => None,
         };
@@ -144,7 +138,7 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<Outcome> {
         }
         let protections =
             protections_of_map(&args.protect.protect_descriptors, &prepared, |kind| {
-                public(&args.protect, kind)
+                public(args.protect.public_descriptors.as_deref(), kind)
             })?;
         if args.solvers.no_records_alone {
             prepared.notes.push(NO_RECORDS_ALONE.to_owned());
@@ -169,8 +163,18 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<Outcome> {
         let place = "(--descriptors FILE)";
         let planned = request.of_map(usual, &prepared, descriptors, place)?;
         let mut plan = planned.note(&mut prepared);
-        plan.measures
-            .extend(inversion.iter().map(|measure| Arc::clone(measure) as Arc<dyn Measure<3>>));
+        if let Some(inversion) = &inversion {
+            let attacks = match has_ratios {
+                true => plan.rows_per_scheme(),
+                false => plan.neighbors.len() * plan.solvers.len(),
+            };
+            let (schemes, photos) = (plan.schemes.len(), inversion.n_photos());
+            let n = photos * schemes * attacks * plan.repeats as usize;
+            progress.say(&format!(
+                "note: {n} pictures: {photos} photos x {attacks} attacks x {schemes} schemes"
+            ));
+            plan.measures.push(Arc::clone(inversion) as Arc<dyn Measure<3>>);
+        }
         let mut map = Map { plan, inversion, ..Map::new(&prepared) };
         if let Some(path) = &args.localize {
             let nth = args.hold_out.get();
@@ -207,14 +211,20 @@ pub fn released(args: &AuditReleasedArgs) -> crate::Result<Outcome> {
         let usual = Plan::new(unit).for_map(prepared.original.len(), k);
         let request = with_oracle(request(&args.audit, args.k), &args.oracle);
         let request = with_solvers(request, &args.solvers, &mut prepared)?;
-        let request = Request { schemes: vec![scheme_called(&name)], ..request };
+        let mut schemes = schemes(&args.schemes, unit);
+        if schemes.iter().any(|scheme| scheme.name() == name) {
+            let expected = "expected another name than a scheme of --schemes";
+            return Err(usage(format!("--name: {expected}, found {name}")));
+        }
+        schemes.insert(0, scheme_called(&name));
+        let request = Request { schemes, ..request };
         let (descriptors, place) = (hidden.0.descriptors(), "in the released map");
         let planned = request.of_map(usual, &prepared, descriptors, place)?;
         let plan = planned.note(&mut prepared);
         let published = published_positions(&args.released)?;
         let (original, secret) = (&prepared.original, &hidden.1);
         let read = read_from_file(&published, original, secret, &plan.thresholds);
-        let map = Map { plan, ..Map::of(original) };
+        let map = Map { plan, descriptors: prepared.descriptors.as_ref(), ..Map::of(original) };
         let input = Input::Released(map, Hidden { release: &hidden, read });
         let mut audit = Audit::of_map(input, &prepared, output);
         audit.about = files.about(prepared.original.len())?;
@@ -262,7 +272,7 @@ pub fn images(args: &AuditImagesArgs) -> crate::Result<Outcome> {
         let protections = protections(
             &args.protect.protect_descriptors,
             || opened.kind("--protect-descriptors"),
-            |kind| public(&args.protect, kind),
+            |kind| public(args.protect.public_descriptors.as_deref(), kind),
         )?;
         let changes: Vec<Change> = protections.into_iter().map(Change::Protection).collect();
         plan.schemes.extend(Changed::all(&plan.schemes, &changes));

@@ -4,12 +4,15 @@ use std::io::Read;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-use unlift::OneLine;
+use unlift::{Descriptors, OneLine};
+use unlift_audit::changes::public_descriptors;
 use unlift_audit::{Preparation, Prepared, maps};
 use unlift_io::Error;
 use unlift_report::Document;
+use unlift_vision::network::DescriptorKind;
 
 use crate::args::MapArgs;
+use crate::demo::photos;
 use crate::exit::Outcome;
 use crate::progress::Progress;
 
@@ -38,6 +41,14 @@ pub fn open_map(
         seed,
     };
     maps::open(path, args.descriptors.as_deref(), &preparation)
+}
+
+/// Reads the descriptors that owner and attacker know, by default those of the photos of the demo.
+pub fn public(path: Option<&Path>, kind: DescriptorKind) -> crate::Result<Descriptors> {
+    match path {
+        Some(path) => public_descriptors(path, kind, None),
+        None => public_descriptors(photos::folder()?.path(), kind, Some(photos::MIN_SCORE)),
+    }
 }
 
 /// Reads an `audit.json`.

@@ -30,7 +30,7 @@ pub fn run(args: &CompareArgs) -> crate::Result<Outcome> {
         }
         None => None,
     };
-    let comparison = compare(&old, &new).map_err(|wrong| {
+    let comparison = compare(&old, &new, args.accept.clone()).map_err(|wrong| {
         let expected = format!("{}, as in {}", wrong.expected, args.old.display());
         Error::new(&args.new, wrong.place, expected, wrong.found)
     })?;
@@ -51,7 +51,14 @@ pub fn run(args: &CompareArgs) -> crate::Result<Outcome> {
 
 /// Formats the differences and the verdict.
 fn text(comparison: &Comparison, written: Option<PathBuf>) -> String {
-    let differs = |what: &String| format!("NOT COMPARED: {}\n", OneLine(what));
+    let accepted = match &comparison.accepted {
+        None => "NOT COMPARED".to_owned(),
+        Some(accepted) if accepted.past => {
+            format!("NOT COMPARED, as --accept ended on {}", accepted.until)
+        }
+        Some(accepted) => format!("accepted until {} ({})", accepted.until, accepted.reason),
+    };
+    let differs = |what: &String| format!("{}: {}\n", OneLine(&accepted), OneLine(what));
     let mut text: String = comparison.different.iter().map(differs).collect();
     let changed = [(&comparison.more, "leaks more"), (&comparison.less, "leaks less")];
     if changed.iter().any(|(changes, _)| !changes.is_empty()) {

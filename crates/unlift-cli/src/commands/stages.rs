@@ -4,6 +4,7 @@
 use std::cell::RefCell;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use rayon::prelude::*;
 use unlift::audit::staged::{Pooled, key_of, oracle_lists, oracle_seed};
@@ -12,16 +13,17 @@ use unlift::evaluate::blind;
 use unlift::neighbors::oracle::{Outliers, TrueNeighbors, search};
 use unlift::neighbors::sources::Named;
 use unlift::neighbors::{Needs as SourceNeeds, Neighborhoods, of_what_there_is};
-use unlift::obfuscate::{Scheme, SchemeOptions, obfuscate as hide};
+use unlift::obfuscate::{Change, Changed, Scheme, SchemeOptions, obfuscate as hide};
 use unlift::recover::{RecoverOptions, Recovered, Status, recover as solve};
 use unlift::released::Released;
 use unlift::seed::Key;
 use unlift::truth::{Original, Secret};
 use unlift::{About, OneLine, RowOrder, Unit};
+use unlift_audit::changes::{mitigations, protections_of_map};
 use unlift_audit::images::FeatureSource;
 use unlift_audit::images::stream::{Needs, Stream, Tally};
 use unlift_audit::released::{expect_slots, same_map};
-use unlift_audit::{Checked, Progress as _, check_file, refused};
+use unlift_audit::{Checked, Prepared, Progress as _, check_file, refused};
 use unlift_io::Error;
 use unlift_io::atomic::{Access, OutputFile};
 use unlift_io::outputs::{Kind, OutputSet, Rules};
@@ -30,9 +32,10 @@ use unlift_io::stage::{
     read_recovered_in, read_released, read_truth, write_neighborhoods, write_recovered,
     write_released, write_truth,
 };
+use unlift_report::leak;
 use unlift_vision::features::Extraction;
 
-use super::common::{all_could_be, open_map};
+use super::common::{all_could_be, open_map, public, read_document};
 use crate::args::{EvaluateArgs, NeighborsArgs, ObfuscateArgs, RecoverArgs};
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{print, table};
@@ -93,7 +96,9 @@ const GUESSABLE: &str = "unlift: note: whoever guesses the --seed can restore th
 /// `unlift obfuscate`
 pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<Outcome> {
     let (map, name, unit) = (&args.map, args.scheme.name, args.map.unit());
-    let inputs = [args.path.as_path()].into_iter().chain(map.descriptors.as_deref());
+    let more = [&map.descriptors, &args.public_descriptors, &args.audit];
+    let more = more.into_iter().filter_map(|path| path.as_deref());
+    let inputs = [args.path.as_path()].into_iter().chain(more);
     let files = [(RELEASED, Kind::Stage(Stage::Released)), (TRUTH, Kind::Stage(Stage::Truth))];
     let rules = Rules::new(inputs, false);
     let mut out = OutputSet::create(&args.out, rules, Access::Private, &files).map_err(refused)?;
@@ -111,6 +116,9 @@ pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<Outcome> {
             ("--scale", map.scale.is_some()),
             ("--descriptors", map.descriptors.is_some()),
             ("--max-points", map.max_points.is_some()),
+            ("--mitigate", args.mitigate.is_some()),
+            ("--protect-descriptors", args.protect_descriptors.is_some()),
+            ("--audit", args.audit.is_some()),
         ] {
             if given {
                 let found = format!("found {name}, which hides images");
@@ -132,6 +140,10 @@ pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<Outcome> {
     for note in prepared.doubts.iter().chain(&prepared.notes) {
         Stderr.say(&format!("note: {note}"));
     }
+    let scheme = changed(args, scheme, &prepared)?;
+    let name = scheme.name();
+    let leak = args.audit.as_deref().map(|path| leak_of(path, args, &prepared, name));
+    let leak = leak.transpose()?;
     let hidden = hide(&*scheme, &prepared.original, prepared.descriptors.as_ref(), &key()?);
     let (released, secret) = hidden.map_err(|error| Error::core(&args.path, error))?;
     write_truth(&out.stage(TRUTH, Kind::Stage(Stage::Truth))?, &prepared.original, &secret)?;
@@ -142,7 +154,36 @@ pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<Outcome> {
     print(&format!(
         "{name}: {slots} points hidden in {records} records, {dropped} dropped, in {folder}\n"
     ))?;
+    leak.map_or(Ok(()), |leak| print(&format!("audited: {leak}\n")))?;
     Ok(Outcome::Done)
+}
+
+/// Returns `scheme` with the requested mitigation or protection of descriptors.
+fn changed(
+    args: &ObfuscateArgs,
+    scheme: Arc<dyn Scheme<3>>,
+    prepared: &Prepared,
+) -> crate::Result<Arc<dyn Scheme<3>>> {
+    let public = |kind| public(args.public_descriptors.as_deref(), kind);
+    let protections = protections_of_map(args.protect_descriptors.as_slice(), prepared, public)?;
+    let mut changes = mitigations(args.mitigate.as_slice(), prepared, false)?;
+    changes.extend(protections.into_iter().map(Change::Protection));
+    Ok(match changes.pop() {
+        Some(change) => Arc::new(Changed::new(scheme, change)),
+        None => scheme,
+    })
+}
+
+/// Returns what the audit at `path` says about this release.
+fn leak_of(
+    path: &Path,
+    args: &ObfuscateArgs,
+    prepared: &Prepared,
+    scheme: &str,
+) -> crate::Result<String> {
+    let document = read_document(path)?;
+    leak(&document, &prepared.about(&args.path)?, scheme)
+        .map_err(|[expected, found]| Error::new(path, "", expected, found).into())
 }
 
 /// Hides the keypoints of all images of `path`, each under a key of its own, and writes both files into `out`. Also returns the

@@ -82,6 +82,23 @@ fn what_leaks_more_or_is_out_of_view_fails() {
         let (text, _) = place.ends(&format!("compare was.json {name}"), 1);
         assert!(text.starts_with("NOT COMPARED: "), "{name}: {text}");
         assert!(text.contains("\nnot compared: "), "{name}: {text}");
+        let accepted = |until: &str, code| {
+            let accept = format!("--accept=new-rooms, until {until}");
+            let line = ["compare", "was.json", name, &accept];
+            let output = place.program(line).output().expect("a program");
+            assert_eq!(output.status.code(), Some(code), "{name}: {output:?}");
+            String::from_utf8(output.stdout).expect("text")
+        };
+        // An attack that is gone cannot be accepted.
+        let (code, start) = match name {
+            "attack.json" => (1, "NOT COMPARED: only in the old audit"),
+            _ => (0, "accepted until 2999-12-31 (new-rooms): "),
+        };
+        assert!(accepted("2999-12-31", code).starts_with(start), "{name}");
+        let ended =
+            ["NOT COMPARED, as --accept ended on 2020-02-29: ", start][usize::from(code == 1)];
+        assert!(accepted("2020-02-29", 1).starts_with(ended), "{name}");
+        assert_eq!(accepted("soon", 2), "");
     }
     let compared = place.prints("compare old.json new.json --json --out c", 1);
     assert_eq!(compared["more"][0]["scheme"], "olc");

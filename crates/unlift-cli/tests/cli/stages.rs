@@ -183,3 +183,65 @@ fn files_of_another_map_are_refused() {
         assert!(stderr.contains(expected) && !place.path("x").exists(), "{stderr}");
     }
 }
+
+/// A release with a mitigation or protected descriptors has the figures of its audit, and `--audit` prints them.
+#[test]
+fn a_release_is_made_as_it_was_audited() {
+    let place = place();
+    let map = "room.csv --scale 1 --k 10 --descriptors d.bin --seed 7";
+    let changes = ["--mitigate thin:1/2", "--protect-descriptors subspace:2:random"];
+    let audit = "--neighbors similarity --no-records-alone";
+    let changed = changes.join(" ");
+    place.ends(&format!("audit map {map} {audit} --schemes olc,ppl {changed} --out a"), 0);
+    let document = place.json("a/audit.json");
+    for (scheme, change, name) in [
+        ("ppl", changes[0], "ppl_thin2"),
+        ("olc", changes[1], "olc_subspace2.random"),
+        ("ppl", changes[1], "ppl_subspace2.random"),
+    ] {
+        let release = format!("obfuscate {map} --scheme {scheme} {change} --audit a/audit.json");
+        let (told, _) = place.ends(&format!("{release} --out r"), 0);
+        let row = document["results"].as_array().unwrap().iter().find(|row| row["scheme"] == name);
+        let row = row.unwrap_or_else(|| panic!("{name} in {document}"));
+        let percent = row["recovered_percent"]["0.10"].as_f64().unwrap();
+        let leak = format!("\naudited: Today, from the released data alone: {percent:.1} % (");
+        assert!(told.starts_with(name) && told.contains(&leak), "{leak} in {told}");
+        place.ends("neighbors r/released.npz --neighbors similarity --seed 7 --out lists", 0);
+        place.ends("recover r/released.npz --neighbors lists --seed 7 --out back", 0);
+        let staged = place.prints("evaluate back --truth r/truth.npz --json", 0);
+        assert_eq!(as_staged(row, &staged), staged, "{name}");
+    }
+    place.write("other.csv", place.text("room.csv").replacen("0.", "1.", 1));
+    let refused = "--audit a/audit.json --out x";
+    for (line, expected) in [
+        (map.replace("room", "other"), "expected an audit of this map, found one of another map"),
+        (format!("{map} --max-points 300"), "expected 300 points, found 400 points"),
+        (format!("{map} --mitigate bits:2"), "expected an audit of olc_bits2, found olc, "),
+    ] {
+        let told = place.complains(&format!("obfuscate {line} --scheme olc {refused}"), 3);
+        assert!(told.contains(expected) && !place.path("x").exists(), "{told}");
+    }
+}
+
+/// Our schemes are audited beside given records, on the same points.
+#[test]
+fn schemes_of_ours_stand_beside_given_records() {
+    let place = place();
+    chain(&place, "mine", "olc", "uniform", 3);
+    let audit = "audit released mine/released.npz --truth mine/truth.npz --k 10 --inlier-ratios 0.5 \
+                 --neighbors oracle --neighbors similarity --no-records-alone --out a";
+    place.ends(&format!("{audit} --name mine --schemes olc,plane"), 0);
+    let document = place.json("a/audit.json");
+    let rows = document["results"].as_array().expect("rows");
+    let percent = |scheme: &str, by: &str| {
+        let row = rows.iter().find(|row| row["scheme"] == scheme && row["neighbors"] == by);
+        row.and_then(|row| row["recovered_percent"]["0.10"].as_f64()).expect("a figure")
+    };
+    assert_eq!(rows.len(), 6);
+    for by in ["oracle", "similarity"] {
+        let (mine, olc) = (percent("mine", by), percent("olc", by));
+        assert!((mine - olc).abs() < 5.0 && percent("plane", by) < mine, "{by}: {mine}, {olc}");
+    }
+    let told = place.complains(&format!("{audit} --name olc --schemes olc"), 2);
+    assert!(told.starts_with("unlift: --name: expected another name"), "{told}");
+}

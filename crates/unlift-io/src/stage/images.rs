@@ -205,8 +205,7 @@ impl<'a> ImageWriter<'a> {
     /// # Errors
     /// When its family differs from the first image, or the disk fails.
     pub fn released(&mut self, name: &str, released: &Released<2>) -> Result<(), Error> {
-        let written = released::written(&self.path, released)?;
-        self.append(name, written)
+        self.append(name, released::written(released))
     }
 
     /// Adds the ground truth of an image.

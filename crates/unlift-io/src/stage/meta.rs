@@ -6,6 +6,7 @@ use serde_json::{Map, Value, json};
 use unlift::{About, Fingerprint, ListsBy, RowOrder, Unit};
 
 use super::Kind;
+use super::released::{EPSILON, OF_BYTES};
 use crate::Error;
 
 /// The name of the array.
@@ -14,7 +15,7 @@ pub(super) const KEY: &str = "unlift";
 /// The version that is written, and the only one that is read.
 const VERSION: u64 = 1;
 
-const KEYS: [&str; 10] = [
+const KEYS: [&str; 12] = [
     "kind",
     "version",
     "unit",
@@ -25,6 +26,8 @@ const KEYS: [&str; 10] = [
     "lists_by",
     "slots_per_record",
     "delta",
+    EPSILON,
+    OF_BYTES,
 ];
 /// The reason why confidence is unknown.
 pub(super) const WHY_UNKNOWN: &str = "confidence_unknown";
@@ -117,10 +120,15 @@ impl<'a> Meta<'a> {
         self.given("slots_per_record", "1 or 2", slots)
     }
 
-    /// The distance that decided support, by default 0.
-    pub(super) fn delta(&self) -> Result<f64, Error> {
+    /// The number of at least 0 at `key`, by default 0.
+    pub(super) fn number(&self, key: &str) -> Result<f64, Error> {
         let number = |value: &Value| value.as_f64().filter(|&x| x >= 0.0);
-        Ok(self.given("delta", "a number of at least 0", number)?.unwrap_or(0.0))
+        Ok(self.given(key, "a number of at least 0", number)?.unwrap_or(0.0))
+    }
+
+    /// The value of `key`, by default false.
+    pub(super) fn flag(&self, key: &str) -> Result<bool, Error> {
+        Ok(self.given(key, "true or false", Value::as_bool)?.unwrap_or(false))
     }
 
     pub(super) fn wrong(&self, key: &str, expected: impl Into<String>) -> Error {

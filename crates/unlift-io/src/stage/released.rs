@@ -2,11 +2,14 @@
 
 use std::path::Path;
 
+use std::sync::Arc;
+
 use serde_json::json;
-use unlift::Descriptors;
 use unlift::descriptors::Values;
 use unlift::geometry::frame::Bounds;
+use unlift::protected::Rule;
 use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
+use unlift::{Descriptors, ProtectedDescriptors};
 
 use super::Kind;
 use super::arrays::Arrays;
@@ -15,7 +18,7 @@ use super::write::{Written, write_file};
 use crate::Error;
 use crate::atomic::Access;
 
-pub(super) const ARRAYS: [&str; 11] = [
+pub(super) const ARRAYS: [&str; 14] = [
     "foot",
     "direction",
     "center",
@@ -25,9 +28,23 @@ pub(super) const ARRAYS: [&str; 11] = [
     "offset",
     "position",
     "descriptor",
+    SUBSPACE,
+    WORDS,
+    PUBLIC,
     "origin",
     "bounds",
 ];
+
+/// The foot and the directions of each descriptor's subspace, in place of `descriptor`.
+const SUBSPACE: &str = "descriptor_subspace";
+/// The numbers of words of each descriptor, in place of `descriptor`.
+const WORDS: &str = "descriptor_words";
+/// The descriptors that owner and attacker know.
+const PUBLIC: &str = "public_descriptor";
+/// The privacy budget of words, in the metadata.
+pub(super) const EPSILON: &str = "epsilon";
+/// Whether protected descriptors were bytes, in the metadata.
+pub(super) const OF_BYTES: &str = "of_bytes";
 
 /// The names of the families, and the array that only one of them has.
 const FAMILIES: [(&str, &str); 4] = [
@@ -42,19 +59,12 @@ const FAMILIES: [(&str, &str); 4] = [
 /// It contains nothing of the ground truth: no ids, names or times.
 ///
 /// # Errors
-/// When the file cannot be written, or the map has protected descriptors, for which there is no
-/// format.
+/// When the file cannot be written.
 pub fn write_released<const D: usize>(path: &Path, released: &Released<D>) -> Result<(), Error> {
-    write_file(path, Access::Usual, written(path, released)?)
+    write_file(path, Access::Usual, written(released))
 }
 
-pub(super) fn written<'a, const D: usize>(
-    path: &Path,
-    released: &'a Released<D>,
-) -> Result<Written<'a>, Error> {
-    if released.protected().is_some() {
-        return Err(Error::new(path, "", "a map with plain descriptors", "protected descriptors"));
-    }
+pub(super) fn written<const D: usize>(released: &Released<D>) -> Written<'_> {
     let obfuscation = released.obfuscation();
     let (n, slots) = (released.n_records(), released.slots_per_record());
     let mut meta = new_meta(Kind::Released);
@@ -84,20 +94,56 @@ pub(super) fn written<'a, const D: usize>(
             written.vectors("position", candidates.position());
         }
     }
-    if let Some(descriptors) = released.descriptors() {
-        let dim = descriptors.dim();
-        let shape = [n, slots, dim];
-        let shape = if slots == 1 { &[n, dim][..] } else { &shape };
-        match descriptors.values() {
-            Values::U8(values) => written.array("descriptor", shape, values.iter().copied()),
-            Values::F32(values) => written.array("descriptor", shape, values.iter().copied()),
+    match (released.protected(), released.descriptors()) {
+        (Some(protected), _) => write_protected(&mut written, protected, [n, slots]),
+        (None, Some(plain)) if slots == 1 => {
+            write_rows(&mut written, "descriptor", plain, &[n, plain.dim()]);
         }
+        (None, Some(plain)) => {
+            write_rows(&mut written, "descriptor", plain, &[n, slots, plain.dim()]);
+        }
+        (None, None) => {}
     }
     written.array("origin", &[D], released.origin().into_iter());
     if let Some(bounds) = released.bounds() {
         written.array("bounds", &[2, D], corners(&bounds));
     }
-    Ok(written)
+    written
+}
+
+fn write_rows<'a>(
+    written: &mut Written<'a>,
+    name: &'static str,
+    rows: &'a Descriptors,
+    shape: &[usize],
+) {
+    match rows.values() {
+        Values::U8(values) => written.array(name, shape, values.iter().copied()),
+        Values::F32(values) => written.array(name, shape, values.iter().copied()),
+    }
+}
+
+/// Writes protected descriptors, and the public ones that they are made with.
+fn write_protected<'a>(
+    written: &mut Written<'a>,
+    protected: &'a ProtectedDescriptors,
+    [n, slots]: [usize; 2],
+) {
+    let rows = protected.rows();
+    match protected.rule() {
+        Rule::Subspace { m } => {
+            write_rows(written, SUBSPACE, rows, &[n, slots, m + 1, protected.dim()]);
+        }
+        Rule::Words { m, epsilon } => {
+            let Values::F32(words) = rows.values() else { return };
+            written.array(WORDS, &[n, slots, m], words.iter().map(|&word| word as i32));
+            written.meta.insert(EPSILON.into(), json!(epsilon));
+        }
+    }
+    written.meta.insert(OF_BYTES.into(), json!(protected.of_bytes()));
+    if let Some(public) = protected.public() {
+        write_rows(written, PUBLIC, public, &[public.len(), public.dim()]);
+    }
 }
 
 fn corners<const D: usize>(bounds: &Bounds<D>) -> impl Iterator<Item = f64> + use<D> {
@@ -181,6 +227,10 @@ pub(super) fn released_of<const D: usize>(arrays: &Arrays<'_>) -> Result<Release
     let bounds = arrays.optional("bounds", corners)?.and_then(|mut boxes| boxes.pop());
     let released = Released::try_new(obfuscation, slots, arrays.origin()?, unit, descriptors);
     let released = released.map_err(core)?.with_bounds(bounds);
+    let released = match protected(arrays, released.n_records(), slots)? {
+        Some(protected) => released.with_protected(protected).map_err(core)?,
+        None => released,
+    };
     let found = released.fingerprint();
     match meta.fingerprint()? {
         Some(stated) if stated != found => {
@@ -260,4 +310,38 @@ fn descriptors(arrays: &Arrays<'_>, n: usize, slots: usize) -> Result<Option<Des
     }
     let values = values.map_or_else(Values::F32, Values::U8);
     Descriptors::try_new(values, dim).map(Some).map_err(|source| arrays.refused(source))
+}
+
+/// Reads protected descriptors.
+fn protected(
+    arrays: &Arrays<'_>,
+    n: usize,
+    slots: usize,
+) -> Result<Option<ProtectedDescriptors>, Error> {
+    let public = arrays.optional(PUBLIC, |name| arrays.floats(name, [None, None]))?;
+    let n_public = public.as_ref().map_or(0, |(_, [n, _])| *n);
+    let (rule, rows, width) = if arrays.has(SUBSPACE) {
+        let (rows, [.., points, dim]) =
+            arrays.floats(SUBSPACE, [Some(n), Some(slots), None, None])?;
+        let rows = rows.into_iter().map(|x| x as f32).collect::<Vec<_>>();
+        (Rule::Subspace { m: points.saturating_sub(1) }, rows, points * dim)
+    } else if arrays.has(WORDS) {
+        let (words, [.., m]) =
+            arrays.integers(WORDS, [Some(n), Some(slots), None], n_public, false)?;
+        let epsilon = arrays.meta().number(EPSILON)?;
+        (Rule::Words { m, epsilon }, words.into_iter().map(|word| word as f32).collect(), m)
+    } else {
+        return Ok(None);
+    };
+    let rows = rows.chunks(width.max(1)).map(<[f32]>::to_vec).collect();
+    let public = public.map(|(values, [_, dim])| {
+        let values = values.into_iter().map(|x| x as f32).collect();
+        Descriptors::try_new(Values::F32(values), dim).map(Arc::new)
+    });
+    let of_bytes = arrays.meta().flag(OF_BYTES)?;
+    public
+        .transpose()
+        .and_then(|public| ProtectedDescriptors::try_new(rule, rows, public, of_bytes))
+        .map(Some)
+        .map_err(|source| arrays.refused(source))
 }

@@ -10,6 +10,7 @@ mod share;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use unlift::Unit;
 pub use unlift::audit::{
     Bound, BreakEven, ByReason, ByThreshold, Distinct, Intervals, NotAudited, ReliabilityBin, Row,
     STRONGEST, Spread,
@@ -79,6 +80,9 @@ pub struct Input {
     /// Sides of the box around all points but the outer 1 % of each axis, in meters, if lengths are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub extent_m: Option<[f64; 3]>,
+    /// The longest side of this box in the unit of the rows, if lengths are not in meters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub longest_side: Option<f64>,
     /// SHA-256 of further files that were read, by role (`descriptors`, `neighbors`).
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub other_sha256: IndexMap<String, String>,
@@ -88,6 +92,18 @@ pub struct Input {
 }
 
 impl Input {
+    /// Adds the sides of the box around all points but the outer 1 % of each axis, in the unit of the rows.
+    #[must_use]
+    pub fn with_sides(self, sides: Option<[f64; 3]>, unit: Unit) -> Self {
+        let is_metric = unit == Unit::Meter;
+        let longest_side = sides.map(|sides| sides.into_iter().fold(0.0, f64::max));
+        Self {
+            extent_m: sides.filter(|_| is_metric),
+            longest_side: longest_side.filter(|_| !is_metric),
+            ..self
+        }
+    }
+
     /// Returns the size of the map: "15.9 m x 8.2 m x 3.1 m".
     pub fn size(&self) -> Option<String> {
         let sides = self.extent_m?.map(|side| format!("{} m", words::significant(side, 3)));
@@ -297,7 +313,7 @@ impl Document {
                 round_floats(part);
             }
         }
-        for field in ["unit_in_map_units", "extent_m"] {
+        for field in ["unit_in_map_units", "extent_m", "longest_side"] {
             if let Some(length) = value.pointer_mut(&format!("/input/{field}")) {
                 round_floats(length);
             }

@@ -70,7 +70,7 @@ fn place((ratio, percent): (f64, f64)) -> (f64, f64) {
 }
 
 fn frame(results: &Results<'_>, typed: &str) -> String {
-    let (document, within) = (results.document, words::within(typed, results.unit));
+    let (document, within) = (results.document, results.within(typed));
     let title = escaped(&format!("{} recovered {within}, %", results.points()));
     let (width, height) = SIZE;
     let version = escaped(&document.unlift).replace("--", "- -");

@@ -259,7 +259,7 @@ fn exhibit(results: &Results<'_>, inversion: &Inversion, view: &View) -> Option<
         "{} % of the {} come back {} ({}, {}).",
         words::percent(results.share(row)),
         results.points(),
-        words::within(results.headline, row.unit),
+        results.within(results.headline),
         words::scheme_name(scheme),
         attack::briefly(row)
     );

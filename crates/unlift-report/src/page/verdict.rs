@@ -46,7 +46,7 @@ pub(crate) fn cards(results: &Results<'_>) -> Vec<Card> {
     cards
 }
 
-fn card(results: &Results<'_>, scheme: &str) -> Option<Card> {
+pub(crate) fn card(results: &Results<'_>, scheme: &str) -> Option<Card> {
     let typed = results.headline;
     let alone = results.records_alone(scheme, typed);
     let blind = |row: &Row| row.blind_percent.get(typed).copied().unwrap_or(0.0);
@@ -249,7 +249,7 @@ pub(crate) struct Finding {
 
 impl Finding {
     /// Returns "46.6 % (45.9 to 47.3)".
-    fn in_words(&self) -> String {
+    pub(crate) fn in_words(&self) -> String {
         match self.interval {
             Some(interval) => format!("{} % ({})", self.percent, words::interval(interval)),
             None => format!("{} %", self.percent),
@@ -427,7 +427,7 @@ fn attack_sentence(results: &Results<'_>, (card, finding): (&Card, &Finding)) ->
         Unit::Pixel => "the keypoints of these images",
         Unit::Meter | Unit::KthNeighbor => "the points of this map",
     };
-    let within = words::within(results.headline, results.unit);
+    let within = results.within(results.headline);
     let what = format!("{} of {points} {within}", finding.in_words());
     let by = format!("{}, {}", card.name(), finding.briefly);
     match finding.basis {
@@ -611,7 +611,7 @@ pub(crate) fn again_sentences(results: &Results<'_>) -> Vec<String> {
             "From two releases under {}, {} % of the points came back {}.",
             words::scheme_name(scheme),
             words::percent(results.share(row)),
-            words::within(results.headline, row.unit)
+            results.within(results.headline)
         );
         let described = rows.find(|row| row.neighbors == attack::AGAIN).unwrap_or(row);
         let open = described.metrics.get("open_percent").copied().unwrap_or(0.0);

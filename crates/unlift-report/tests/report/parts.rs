@@ -120,17 +120,17 @@ fn gates_on_localization_speak_of_multiples() {
 fn a_larger_localization_error_fails_a_comparison() {
     let (old, mut new) = (document(true), document(true));
     new.localization[1].multiple = Some(1.5);
-    assert!(compare(&old, &new).unwrap().passed, "within a tenth");
+    assert!(compare(&old, &new, None).unwrap().passed, "within a tenth");
     new.localization[1].multiple = Some(1.7);
     new.localization[2].multiple = None;
-    let found = compare(&old, &new).unwrap();
+    let found = compare(&old, &new, None).unwrap();
     let worse: Vec<&str> = found.costs_more.iter().map(|one| one.scheme.as_str()).collect();
     assert_eq!(worse, ["olc", "ppl"]);
     assert!(!found.passed && found.summary().ends_with("; 2 localize less precisely"));
     new.localization.clear();
-    let unknown = compare(&old, &new).unwrap();
+    let unknown = compare(&old, &new, None).unwrap();
     assert!(!unknown.passed && unknown.costs_more[0].new_multiple.is_none());
-    assert!(compare(&new, &old).unwrap().passed, "the old audit did not measure it");
+    assert!(compare(&new, &old, None).unwrap().passed, "the old audit did not measure it");
 }
 
 /// Returns an audit of images, with rows by an attacker's own lists for both schemes.

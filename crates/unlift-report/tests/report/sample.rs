@@ -51,6 +51,7 @@ pub fn document(metric: bool) -> Document {
         "input": {
             "path": "maps/furnished-room/sparse/0", "sha256": "9f86d081", "n_points": 21_149,
             "scale_m_per_unit": metric.then_some(1.0), "unit_in_map_units": if metric { 1.0 } else { 0.0834 },
+            "longest_side": (!metric).then_some(25.0),
         },
         "options": {"schemes": SCHEMES, "k": 50, "solver": ["consensus", "ransac"], "thresholds": thresholds},
         "gates": [

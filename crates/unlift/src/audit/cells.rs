@@ -30,7 +30,7 @@ const RATIO_AT_K: &str = "inlier_ratio_at_k";
 pub(super) struct Owned<'a, const D: usize> {
     pub(super) original: &'a Original<D>,
     pub(super) descriptors: Option<&'a Descriptors>,
-    /// The released map and its secret if the points are already hidden; no scheme is applied then.
+    /// The released map and its secret if the points are already hidden under the plan's first scheme.
     pub(super) hidden: Option<&'a (Released<D>, Secret)>,
     pub(super) search: &'a Knn<'a, D>,
     /// Lists that do not depend on the scheme.
@@ -104,7 +104,7 @@ pub(super) fn cells<const D: usize>(
     observer: &mut dyn Observer<D>,
     each: impl FnMut(&mut dyn Observer<D>, Step<'_>),
 ) -> Result<Vec<NotAudited>, Error> {
-    if let Some(hidden) = owned.hidden {
+    if let Some(hidden) = owned.hidden.filter(|_| run.scheme == run.plan.schemes[0].name()) {
         return attack(owned, run, hidden, clock, observer, each);
     }
     let hide = || {

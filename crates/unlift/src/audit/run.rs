@@ -77,8 +77,7 @@ fn one<const D: usize>(
     every_cell((original, descriptors), None, plan, observer)
 }
 
-/// Runs every cell of `plan`. If `hidden` is given, it is the obfuscation for the plan's only
-/// scheme.
+/// Runs every cell of `plan`. If `hidden` is given, it is the obfuscation for the plan's first scheme.
 pub(super) fn every_cell<const D: usize>(
     (original, descriptors): (&Original<D>, Option<&Descriptors>),
     hidden: Option<&(Released<D>, Secret)>,
@@ -131,17 +130,17 @@ pub fn scheme_called<const D: usize>(name: &str) -> Arc<dyn Scheme<D>> {
     Arc::new(Unknown { name: name.to_owned() })
 }
 
-/// Runs `plan` on given records and their secret. The plan's only scheme comes from
-/// [`scheme_called`].
+/// Runs `plan` on given records and their secret, which the plan's first scheme stands for
+/// ([`scheme_called`]). Other schemes hide the same points, with `descriptors`.
 ///
-/// The records must be of the points `original`, in the same frame and unit. Repeats differ only in
-/// the seeds of the oracle and the attacker.
+/// The records must be of the points `original`, in the same frame and unit. Repeats of the given records differ only
+/// in the seeds of the oracle and the attacker.
 ///
 /// # Errors
 /// When the plan does not fit the map, or when the three do not belong together: wrong ground truth
 /// would make the map look safe.
 pub fn run_released(
-    original: &Original<3>,
+    (original, descriptors): (&Original<3>, Option<&Descriptors>),
     hidden: &(Released<3>, Secret),
     plan: &Plan<3>,
     observer: &mut dyn Observer<3>,
@@ -149,5 +148,5 @@ pub fn run_released(
     let (released, secret) = hidden;
     plan.check(original.len(), released.descriptors().is_some())?;
     belongs(original, released, secret)?;
-    every_cell((original, None), Some(hidden), plan, observer)
+    every_cell((original, descriptors), Some(hidden), plan, observer)
 }
