@@ -10,7 +10,6 @@ use unlift::truth::Original;
 use unlift::{Descriptors, ErrorKind};
 use unlift_io::clouds::record_segments;
 use unlift_io::read;
-use unlift_report::document::Input;
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::scene::{
     ObfuscationView, Scene3d, SceneBox, Shapes, points_within_budget, subsample,

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::alike;
 use super::kept::are_equal;
 use super::rows::Rows;
+use super::scored::Rankings;
 use crate::simd::BLOCK;
 use crate::{Descriptors, Error};
 
@@ -67,15 +68,15 @@ pub fn search<L: Likeness>(
 ) -> Result<Vec<Found>, Error> {
     let n_blocks = rows.len().div_ceil(BLOCK);
     if rows.len() <= exact {
-        let found = kept.0.as_ref().and_then(|all| all.found(likeness, rows, most));
+        let found = kept.compared.as_ref().and_then(|all| all.found(likeness, rows, most));
         // Scores of a map that lacks many points do not replace those of the whole map, which further maps need.
         let is_of_whole =
             |all: &Compared| all.name == L::NAME && all.slots.len() >= rows.slots.len();
         let found = found.or_else(|| {
-            if kept.0.as_ref().is_some_and(is_of_whole) {
+            if kept.compared.as_ref().is_some_and(is_of_whole) {
                 return None;
             }
-            let all = kept.0.insert(Compared::new(likeness, rows, 2 * most + SPARE));
+            let all = kept.compared.insert(Compared::new(likeness, rows, 2 * most + SPARE));
             all.found(likeness, rows, most)
         });
         let anew = || finished::<L>(compare(likeness, rows, most, (&Pairs::all(n_blocks), None)));
@@ -97,12 +98,16 @@ fn finished<L: Likeness>(rows: Vec<Row>) -> Vec<Found> {
 
 /// Scores of all pairs of the descriptors of a map, for further maps that lack a few of them or put them into other records.
 #[derive(Clone, Debug, Default)]
-pub struct KeptPairs(Option<Compared>);
+pub struct KeptPairs {
+    compared: Option<Compared>,
+    /// The partners by a network, for further maps with the same descriptors.
+    pub(super) rankings: Option<Rankings>,
+}
 
 #[cfg(test)]
 impl KeptPairs {
     pub(super) fn n_rows(&self) -> usize {
-        self.0.as_ref().map_or(0, |all| all.slots.len())
+        self.compared.as_ref().map_or(0, |all| all.slots.len())
     }
 }
 

@@ -10,6 +10,7 @@ use std::collections::{BinaryHeap, HashMap};
 use rayon::prelude::*;
 
 use super::compare::{Best, KeptPairs, MOST_ROWS, higher_first, search};
+use super::kept::are_equal;
 use super::overlap::Patches;
 use super::rows::Rows;
 use super::similarity::Cosine;
@@ -37,13 +38,34 @@ pub struct Part {
 }
 
 /// Scores all pairs of the `n` descriptors of a part, `(n, n)`, row-major: the natural logarithm of the probability that the
-/// column's point is among the nearest of the row's, up to a constant per row. Scores are finite; those between points of one record are not read.
+/// column's point is among the nearest of the row's, up to a constant per row. Scores are finite; those of a point with itself are not read.
 pub type Scores<'a> = dyn Fn(&Part) -> Result<Vec<f32>, Error> + Sync + 'a;
+
+/// Partners of the rows of a map by its descriptors alone: as if every row were a record.
+#[derive(Clone, Debug)]
+pub(super) struct Rankings {
+    descriptors: Descriptors,
+    slots: Vec<u32>,
+    most: usize,
+    /// By untrained scores, in standard deviations.
+    untrained: Vec<Ranked>,
+    /// By the mean log probabilities of both rows.
+    trained: Vec<Ranked>,
+}
+
+impl Rankings {
+    /// Returns whether `rows` have these descriptors, in this order.
+    fn are_of(&self, rows: &Rows<'_>, most: usize) -> bool {
+        let mut pairs = self.slots.iter().zip(&rows.slots);
+        (self.most, self.slots.len()) == (most, rows.len())
+            && pairs.all(|(&a, &b)| are_equal((&self.descriptors, a), (&rows.descriptors, b)))
+    }
+}
 
 /// Lists the `k` records nearest to each slot by `scores`. For SIFT, lists those that two short walks are most likely to reach, one
 /// over these records and one as in [`overlap`](super::overlap()). The score is the logarithm of the probability that a record is among
-/// the nearest, or of the discounted probability to be reached; the mean over both ends or walks. Untrained scores of pairs come from
-/// `pairs` and are kept there.
+/// the nearest, or of the discounted probability to be reached; the mean over both ends or walks. Scores of pairs come from
+/// `kept` and are kept there: all calls with it must have the same `scores`.
 ///
 /// # Errors
 /// When `scores` fails, the map has no descriptors, or it has fewer than `k` other records.
@@ -51,18 +73,51 @@ pub fn scored<const D: usize>(
     released: &Released<D>,
     k: usize,
     scores: &Scores<'_>,
-    pairs: &mut KeptPairs,
+    kept: &mut KeptPairs,
 ) -> Result<Neighborhoods, Error> {
     let mut rows = Rows::new(released, k)?;
-    let enough = rows.enough_for(k);
-    let kept = enough.max(CANDIDATES);
     let patches = Patches::of(&rows.descriptors).ok();
-    let found = match &patches {
-        Some(patches) => search(patches, &mut rows, kept, MOST_ROWS, pairs)?,
-        None => search(&Cosine { counts: true }, &mut rows, kept, MOST_ROWS, pairs)?,
+    // Enough for two slots per record, so that rankings do not depend on the scheme.
+    let most = (2 * k).max(CANDIDATES) + 1;
+    let rankings = match kept.rankings.take() {
+        Some(rankings) if rankings.are_of(&rows, most) => rankings,
+        _ => rankings(&mut rows, most, patches.as_ref(), scores, kept)?,
+    };
+    let others = |ranked: &[Ranked]| -> Vec<Ranked> {
+        let record = |row: u32| rows.records[row as usize];
+        let of = |(row, ranked): (usize, &Ranked)| {
+            let is_other = |&&(_, other): &&(f32, u32)| record(other) != rows.records[row];
+            ranked.iter().filter(is_other).copied().collect()
+        };
+        ranked.par_iter().enumerate().map(of).collect()
+    };
+    let (mut trained, untrained) = (others(&rankings.trained), others(&rankings.untrained));
+    kept.rankings = (rows.len() <= MOST_ROWS).then_some(rankings);
+    let enough = rows.enough_for(k);
+    if patches.is_none() {
+        // The best scores are right more often than the rows that a walk reaches.
+        trained.iter_mut().for_each(|row| row.truncate(enough));
+        return rows.lists(&trained, k);
+    }
+    let walked = |ranked: &[_]| walk::walk(ranked, &rows.records, REACHED * enough, overlap::WALK);
+    rows.lists(&mixed(&walked(&trained), &walked(&untrained), enough), k)
+}
+
+/// Ranks the partners of `rows`, which it reorders if there are many.
+fn rankings(
+    rows: &mut Rows<'_>,
+    most: usize,
+    patches: Option<&Patches>,
+    scores: &Scores<'_>,
+    kept: &mut KeptPairs,
+) -> Result<Rankings, Error> {
+    let mut apart = rows.apart();
+    let found = match patches {
+        Some(patches) => search(patches, &mut apart, most, MOST_ROWS, kept)?,
+        None => search(&Cosine { counts: true }, &mut apart, most, MOST_ROWS, kept)?,
     };
     let untrained = walk::standardized(&found);
-    let n = rows.len();
+    let n = apart.len();
     let (sets, usual) = if n <= WHOLE {
         (vec![Set { rows: (0..n as u32).collect(), inner: vec![true; n] }], None)
     } else {
@@ -71,30 +126,25 @@ pub fn scored<const D: usize>(
     };
     drop(found);
     let part = |set: &Set| {
-        let slots: Vec<u32> = set.rows.iter().map(|&row| rows.slots[row as usize]).collect();
+        let slots: Vec<u32> = set.rows.iter().map(|&row| apart.slots[row as usize]).collect();
         let of_set = |all: &Vec<_>| set.rows.iter().map(|&row| all[row as usize]).collect();
         let usual = usual.as_ref().map(of_set);
-        Part { descriptors: rows.descriptors.select(&slots), usual }
+        Part { descriptors: apart.descriptors.select(&slots), usual }
     };
-    let found: Vec<Vec<Vec<(u32, f32)>>> = sets
+    let found: Vec<Vec<Ranked>> = sets
         .par_iter()
-        .map(|set| within(&rows, set, scores(&part(set))?, kept))
+        .map(|set| within(set, scores(&part(set))?, most))
         .collect::<Result<_, _>>()?;
-    let mut ranked: Vec<Vec<(u32, f32)>> = vec![Vec::new(); rows.len()];
+    let mut trained: Vec<Ranked> = vec![Vec::new(); n];
     for (set, found) in sets.iter().zip(found) {
         for (&row, pairs) in set.rows.iter().zip(found) {
-            ranked[row as usize].extend(pairs);
+            trained[row as usize].extend(pairs);
         }
     }
-    let ranked: Vec<Ranked> = ranked.into_par_iter().map(merged).collect();
-    let mut ranked = both_ways(ranked);
-    if patches.is_none() {
-        // The best scores are right more often than the rows that a walk reaches.
-        ranked.iter_mut().for_each(|row| row.truncate(enough));
-        return rows.lists(&ranked, k);
-    }
-    let walked = |ranked: &[_]| walk::walk(ranked, &rows.records, REACHED * enough, overlap::WALK);
-    rows.lists(&mixed(&walked(&ranked), &walked(&untrained), enough), k)
+    let trained = both_ways(trained.into_par_iter().map(merged).collect());
+    let (slots, descriptors) = (apart.slots.clone(), apart.descriptors.clone().into_owned());
+    rows.reorder(slots.clone());
+    Ok(Rankings { descriptors, slots, most, untrained, trained })
 }
 
 /// Returns the `most` rows with the largest mean probability over two walks.
@@ -117,47 +167,45 @@ fn mixed(a: &[Ranked], b: &[Ranked], most: usize) -> Vec<Ranked> {
 
 /// Returns the best partners per row of a set by the mean of both rows' log probabilities.
 fn within(
-    rows: &Rows<'_>,
     Set { rows: set, inner }: &Set,
     mut logs: Vec<f32>,
     most: usize,
-) -> Result<Vec<Vec<(u32, f32)>>, Error> {
+) -> Result<Vec<Ranked>, Error> {
     let n = set.len();
     let wrong = |found: String| Error::new("scores of pairs", format!("{n} x {n} numbers"), found);
     if logs.len() != n * n {
         return Err(wrong(logs.len().to_string()));
     }
-    let other = |i: usize, j: usize| rows.records[set[i] as usize] != rows.records[set[j] as usize];
-    let odd = |&(at, score): &(usize, &f32)| !score.is_finite() && other(at / n, at % n);
+    let odd = |&(at, score): &(usize, &f32)| !score.is_finite() && at / n != at % n;
     if let Some((_, score)) = logs.iter().enumerate().find(odd) {
         return Err(wrong(score.to_string()));
     }
     for (i, line) in logs.chunks_exact_mut(n).enumerate() {
-        let of_others = || (0..n).filter(|&j| other(i, j));
-        let top = of_others().map(|j| line[j]).fold(f32::NEG_INFINITY, f32::max);
-        let sum: f64 = of_others().map(|j| libm::exp(f64::from(line[j] - top))).sum();
+        line[i] = f32::NEG_INFINITY;
+        let top = line.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let sum: f64 = line.iter().map(|score| libm::exp(f64::from(score - top))).sum();
         let log = top + libm::log(sum.max(f64::MIN_POSITIVE)) as f32;
         line.iter_mut().for_each(|score| *score -= log);
     }
     let best = |i: usize| {
         let mut best = Best::new(most);
-        for j in (0..n).filter(|&j| other(i, j)) {
+        for j in (0..n).filter(|&j| j != i) {
             best.push((logs[i * n + j] + logs[j * n + i]) / 2.0, set[j]);
         }
-        best.into_sorted().into_iter().map(|(score, row)| (row, score)).collect()
+        best.into_sorted()
     };
     Ok((0..n).map(|i| if inner[i] { best(i) } else { Vec::new() }).collect())
 }
 
 /// Returns one entry per partner, with the mean of its scores over sets; best first.
-fn merged(mut pairs: Vec<(u32, f32)>) -> Ranked {
+fn merged(mut pairs: Ranked) -> Ranked {
     // A stable sort keeps the order of sets, so sums do not depend on threads.
-    pairs.sort_by_key(|&(other, _)| other);
-    let one = |pairs: &[(u32, f32)]| {
-        let sum: f32 = pairs.iter().map(|&(_, score)| score).sum();
-        (sum / pairs.len() as f32, pairs[0].0)
+    pairs.sort_by_key(|&(_, other)| other);
+    let one = |pairs: &[(f32, u32)]| {
+        let sum: f32 = pairs.iter().map(|&(score, _)| score).sum();
+        (sum / pairs.len() as f32, pairs[0].1)
     };
-    let mut ranked: Vec<_> = pairs.chunk_by(|a, b| a.0 == b.0).map(one).collect();
+    let mut ranked: Vec<_> = pairs.chunk_by(|a, b| a.1 == b.1).map(one).collect();
     ranked.sort_unstable_by(higher_first);
     ranked
 }

@@ -20,8 +20,8 @@ use unlift_audit::localization::Localize;
 use unlift_audit::maps::Map;
 use unlift_audit::sequence::Sequence;
 use unlift_audit::{
-    Audit, Audited, Hidden, Input, Output, Preparation, Prepared, Request, Tiles, Views, by_point,
-    check_thresholds, distinct, read_from_file, released,
+    Audit, Audited, Hidden, Input, Output, Preparation, Prepared, Progress as _, Request, Tiles,
+    Views, by_point, check_thresholds, distinct, read_from_file, released,
 };
 use unlift_io::hash::hash_file;
 use unlift_io::outputs::Rules;

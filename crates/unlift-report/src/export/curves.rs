@@ -1,10 +1,10 @@
 //! The recovered share over the inlier ratio as an SVG file, one curve per scheme.
 
+use crate::attack;
 use crate::document::Document;
 use crate::export::escaped;
 use crate::page::curves::{givens, slot};
 use crate::results::{Results, distinct};
-use crate::{attack, words};
 
 /// Width and height of the drawing; the constants below are the sides of the plot in it.
 const SIZE: (f64, f64) = (640.0, 400.0);
