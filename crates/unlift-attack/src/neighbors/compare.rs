@@ -101,7 +101,7 @@ fn finished<L: Likeness>(rows: Vec<Row>) -> Vec<Found> {
 pub struct KeptPairs {
     compared: Option<Compared>,
     /// The partners by a network, for further maps with the same descriptors.
-    pub(super) rankings: Option<Rankings>,
+    pub(super) rankings: Vec<Rankings>,
 }
 
 #[cfg(test)]
@@ -113,8 +113,8 @@ impl KeptPairs {
 
 /// Partners that are kept beyond those that the map needs, in place of those that another map lacks.
 const SPARE: usize = 8;
-/// Largest number of rows that another map may lack.
-const LACKING: usize = 4;
+/// Another map may lack at most one of so many rows.
+const LACKING: usize = 16;
 
 /// Rows, each compared with all others as if every row were a record.
 #[derive(Clone, Debug)]
@@ -162,7 +162,7 @@ impl Compared {
                 absent.push(at as u32);
             }
         }
-        if own.len() < rows.len() || absent.len() > LACKING {
+        if own.len() < rows.len() || LACKING * absent.len() > self.slots.len() {
             return None;
         }
         let record = |row: u32| rows.records[row as usize];
@@ -175,15 +175,13 @@ impl Compared {
                 uncounted.extend(others.map(|&b| (a, own[b as usize])));
             }
         }
-        for &at in &absent {
-            uncounted.extend((0..rows.len() as u32).map(|row| (row, at)));
-        }
         let mut found: Vec<Row> = own.iter().map(|&at| self.rows[at as usize].clone()).collect();
         if self.counts {
             for (&(row, _), score) in uncounted.iter().zip(self.scores(likeness, &own, &uncounted))
             {
                 found[row as usize].uncount(score, L::STEP);
             }
+            self.uncount(likeness, &absent, &own, &mut found);
         }
         let finish = |(at, mut row): (usize, Row)| {
             let is_full = row.best.entries.len() == self.most;
@@ -197,16 +195,36 @@ impl Compared {
         found.into_par_iter().enumerate().map(finish).collect()
     }
 
+    /// Returns the rows at `at`, prepared for comparison.
+    fn block<L: Likeness>(&self, likeness: &L, at: impl Iterator<Item = u32>) -> L::Block {
+        let slots: Vec<u32> = at.map(|at| self.slots[at as usize]).collect();
+        likeness.block(&self.descriptors, &slots)
+    }
+
+    /// Takes back the scores of `rows`, whose places here are `own`, with those at `absent`.
+    fn uncount<L: Likeness>(&self, likeness: &L, absent: &[u32], own: &[u32], rows: &mut [Row]) {
+        let blocks =
+            absent.chunks(BLOCK).map(|at| (at.len(), self.block(likeness, at.iter().copied())));
+        let blocks: Vec<(usize, L::Block)> = blocks.collect();
+        let scratch = || vec![0.0f32; BLOCK * BLOCK];
+        let of_block = |scores: &mut Vec<f32>, (rows, own): (&mut [Row], &[u32])| {
+            let a = self.block(likeness, own.iter().copied());
+            for (n, absent) in &blocks {
+                likeness.scores(&a, absent, scores);
+                for (row, scores) in rows.iter_mut().zip(scores.chunks(BLOCK)) {
+                    scores[..*n].iter().for_each(|&score| row.uncount(score, L::STEP));
+                }
+            }
+        };
+        rows.par_chunks_mut(BLOCK).zip(own.par_chunks(BLOCK)).for_each_init(scratch, of_block);
+    }
+
     /// Returns the scores of pairs of a row, `own` of which is its place here, with a place here.
     fn scores<L: Likeness>(&self, likeness: &L, own: &[u32], pairs: &[(u32, u32)]) -> Vec<f32> {
-        let block = |at: &mut dyn Iterator<Item = u32>| {
-            let slots: Vec<u32> = at.map(|at| self.slots[at as usize]).collect();
-            likeness.block(&self.descriptors, &slots)
-        };
         let scratch = || vec![0.0f32; BLOCK * BLOCK];
         let of_pairs = pairs.par_chunks(BLOCK).map_init(scratch, |scores, pairs| {
-            let a = block(&mut pairs.iter().map(|&(row, _)| own[row as usize]));
-            let b = block(&mut pairs.iter().map(|&(_, at)| at));
+            let a = self.block(likeness, pairs.iter().map(|&(row, _)| own[row as usize]));
+            let b = self.block(likeness, pairs.iter().map(|&(_, at)| at));
             likeness.scores(&a, &b, scores);
             (0..pairs.len()).map(|at| scores[at * BLOCK + at]).collect::<Vec<f32>>()
         });

@@ -24,6 +24,9 @@ const WHOLE: usize = 3072;
 /// Rows that each walk may reach, as a multiple of those wanted: a row that both reach late may rank first.
 const REACHED: usize = 4;
 
+/// Number of rankings that are kept: schemes hide all points, all but an odd one, or most of them.
+const MOST_RANKINGS: usize = 3;
+
 /// Partners of a row, best first.
 type Ranked = Vec<(f32, u32)>;
 
@@ -79,9 +82,10 @@ pub fn scored<const D: usize>(
     let patches = Patches::of(&rows.descriptors).ok();
     // Enough for two slots per record, so that rankings do not depend on the scheme.
     let most = (2 * k).max(CANDIDATES) + 1;
-    let rankings = match kept.rankings.take() {
-        Some(rankings) if rankings.are_of(&rows, most) => rankings,
-        _ => rankings(&mut rows, most, patches.as_ref(), scores, kept)?,
+    let known = kept.rankings.iter().position(|rankings| rankings.are_of(&rows, most));
+    let rankings = match known {
+        Some(at) => kept.rankings.remove(at),
+        None => rankings(&mut rows, most, patches.as_ref(), scores, kept)?,
     };
     let others = |ranked: &[Ranked]| -> Vec<Ranked> {
         let record = |row: u32| rows.records[row as usize];
@@ -92,7 +96,11 @@ pub fn scored<const D: usize>(
         ranked.par_iter().enumerate().map(of).collect()
     };
     let (mut trained, untrained) = (others(&rankings.trained), others(&rankings.untrained));
-    kept.rankings = (rows.len() <= MOST_ROWS).then_some(rankings);
+    if rows.len() <= MOST_ROWS {
+        kept.rankings.push(rankings);
+        let too_many = kept.rankings.len().saturating_sub(MOST_RANKINGS);
+        kept.rankings.drain(..too_many);
+    }
     let enough = rows.enough_for(k);
     if patches.is_none() {
         // The best scores are right more often than the rows that a walk reaches.
@@ -388,8 +396,13 @@ mod tests {
 
     /// Points along a closed curve, whose descriptors change slowly.
     fn released(n: usize, is_sift: bool) -> Released<3> {
-        let points: Vec<[f64; 3]> = (0..n).map(|i| [i as f64, 0.0, (i % 7) as f64]).collect();
-        let lines = Lines::through(&points, &vec![[0.0, 1.0, 0.5]; n]).unwrap();
+        hidden(n, is_sift, 1)
+    }
+
+    fn hidden(n: usize, is_sift: bool, slots: usize) -> Released<3> {
+        let points: Vec<[f64; 3]> =
+            (0..n / slots).map(|i| [i as f64, 0.0, (i % 7) as f64]).collect();
+        let lines = Lines::through(&points, &vec![[0.0, 1.0, 0.5]; points.len()]).unwrap();
         let byte = |at: usize, bin: usize| {
             let turn = std::f64::consts::TAU * at as f64 / n as f64;
             let wave = libm::sin(turn * (1 + bin % 9) as f64 + (bin * bin) as f64);
@@ -402,7 +415,7 @@ mod tests {
         };
         let descriptors = Descriptors::try_new(values, 128).unwrap();
         let obfuscation = Obfuscation::Lines(lines);
-        Released::try_new(obfuscation, 1, [0.0; 3], Unit::Meter, Some(descriptors)).unwrap()
+        Released::try_new(obfuscation, slots, [0.0; 3], Unit::Meter, Some(descriptors)).unwrap()
     }
 
     fn alike(part: &Part) -> Result<Vec<f32>, Error> {
@@ -451,6 +464,19 @@ mod tests {
             10,
         );
         assert!(right < 0.15, "{right}");
+    }
+
+    #[test]
+    fn lists_from_kept_rankings_equal_those_of_the_map_alone() {
+        let mut kept = KeptPairs::default();
+        for (n, slots, n_kept) in
+            [(400, 1, 1), (400, 2, 1), (398, 2, 2), (400, 1, 2), (40, 1, 3), (42, 1, 3)]
+        {
+            let map = hidden(n, true, slots);
+            let alone = scored(&map, 12, &alike, &mut KeptPairs::default()).unwrap();
+            assert_eq!(scored(&map, 12, &alike, &mut kept).unwrap(), alone, "{n} points");
+            assert_eq!(kept.rankings.len(), n_kept);
+        }
     }
 
     #[test]

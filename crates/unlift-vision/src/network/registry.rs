@@ -155,7 +155,7 @@ pub static MODELS: &[Entry] = &[
         purpose: "near points by their SIFT descriptors (the source `learned`)",
         licence: "MIT OR Apache-2.0",
         owner: "https://github.com/unlift/unlift",
-        sha256: Some("70a05b3e7c40fdbd4f542f1e4a85374a6b24b2050d831b8ce1f11a42e76fe2e8"),
+        sha256: Some("c074bdafaab15005924cc85df0eb58b6abda621e3368f4cd81f967dc7ae9b9ad"),
         inputs: &[
             Port { name: "descriptors", shape: &[None, Some(128)] },
             Port { name: "pairs", shape: &[Some(3), None, None] },
