@@ -35,7 +35,7 @@ pub fn gate_lines(document: &Document) -> String {
     document.gates.iter().map(line).collect()
 }
 
-/// Returns the figure found for a gate, its attack, and the reason if the gate failed for another reason.
+/// Returns the reason if a gate failed for another one than the figure, the figure, and its attack.
 fn briefly(gate: &GateResult) -> String {
     let of = gate.of.as_ref().map_or_else(String::new, |of| format!(": {of}"));
     let figure = gate.found_percent.map(|figure| match gate.highest_percent {
@@ -47,7 +47,7 @@ fn briefly(gate: &GateResult) -> String {
         }
         None => format!("found {figure:.1} %{of}"),
     });
-    figure.into_iter().chain(gate.reason.clone()).collect::<Vec<_>>().join("; ")
+    gate.reason.clone().into_iter().chain(figure).collect::<Vec<_>>().join("; ")
 }
 
 /// Returns true if the gate bounds a localization error, whose figures are multiples.
@@ -75,7 +75,7 @@ fn in_words(gate: &GateResult) -> String {
         }
     };
     let figure = format!("{figure} at most {bound}{unit} {may}");
-    let parts = [Some(figure), gate.of.clone(), gate.reason.clone()];
+    let parts = [gate.reason.clone(), Some(figure), gate.of.clone()];
     parts.into_iter().flatten().collect::<Vec<_>>().join("; ")
 }
 

@@ -22,11 +22,6 @@ pub(crate) fn scheme_title(scheme: &str) -> String {
     }
 }
 
-/// Returns the name of a scheme in a sentence: `OLC`; other people's names stay as they are.
-pub(crate) fn scheme_name(scheme: &str) -> String {
-    if facts(scheme).is_some() { scheme.to_uppercase() } else { scheme.to_owned() }
-}
-
 /// Returns a sentence on what a scheme publishes in place of a point; empty for unknown schemes.
 pub(crate) fn scheme_rule(scheme: &str) -> &'static str {
     facts(scheme).map_or("", |facts| facts.rule)

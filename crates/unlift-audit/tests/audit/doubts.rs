@@ -282,5 +282,8 @@ fn a_released_file_that_gives_places_away_is_no_protection() {
     let (_, order) = said(&sorted, false, 30.0);
     assert!(order.starts_with("order of records: after "), "{order}");
     let (_, column) = said(&random, true, 30.0);
-    assert!(column.starts_with("descriptors: column 1 follows a coordinate"), "{column}");
+    assert!(
+        column.starts_with("descriptors: column 1 (from 0) follows the coordinate "),
+        "{column}"
+    );
 }

@@ -70,7 +70,7 @@ pub struct OracleArgs {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Attack")]
 pub struct SolverArgs {
-    /// Source of the attacker's lists of neighbors; repeatable. oracle, a test tool, makes lists
+    /// Source of the attacker's lists of neighbors; repeatable, FILE once. oracle, a test tool, makes lists
     /// from the original points, with a chosen fraction of true neighbors. The others make lists
     /// from the released map: descriptors (the best one for the descriptors), similarity (any
     /// descriptors), overlap (SIFT), learned (a network, for SIFT or ALIKED), geometric (places

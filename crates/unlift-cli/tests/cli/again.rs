@@ -27,7 +27,7 @@ fn two_releases_give_points_back() {
     let line = "audit again a.csv a.csv --scale 1 --descriptors a.bin --schemes olc,plane,olc/cp \
                 --no-records-alone --out a";
     let (stdout, _) = place.ends(line, 0);
-    assert!(stdout.contains("From two releases under OLC, 100.0 % of the points"), "{stdout}");
+    assert!(stdout.contains("From two releases under olc, 100.0 % of the points"), "{stdout}");
     assert!(stdout.contains("not audited: plane, again-geometry"), "{stdout}");
     let document = place.json("a/audit.json");
     assert_eq!(document["results"].as_array().unwrap().len(), 5);

@@ -57,7 +57,7 @@ fn errors(results: &Results<'_>) -> String {
     else {
         return format!("How far off the recovered {points} are");
     };
-    let scheme = words::scheme_name(&row.scheme);
+    let scheme = row.scheme;
     let smallest = results.thresholds.first().and_then(|typed| typed.parse::<f64>().ok());
     // Swapped coordinates that are restored leave only an error of rounding.
     let how = match smallest.is_some_and(|smallest| median < 0.001 * smallest) {
@@ -74,7 +74,7 @@ fn certainty(results: &Results<'_>) -> String {
             words::percent(row.sure_percent?),
             results.points(),
             words::percent(row.sure_correct_percent?),
-            words::scheme_name(&row.scheme)
+            row.scheme
         ))
     });
     sure.unwrap_or_else(|| "How well the attacker can judge its own result".to_owned())

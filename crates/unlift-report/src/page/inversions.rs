@@ -260,7 +260,7 @@ fn exhibit(results: &Results<'_>, inversion: &Inversion, view: &View) -> Option<
         words::percent(results.share(row)),
         results.points(),
         results.within(results.headline),
-        words::scheme_name(scheme),
+        scheme,
         attack::briefly(row)
     );
     let mut sentence = match view.basis() {

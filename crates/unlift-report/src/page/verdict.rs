@@ -268,7 +268,7 @@ impl Card {
     }
 
     fn name(&self) -> String {
-        words::scheme_name(&self.scheme)
+        self.scheme.clone()
     }
 }
 
@@ -287,8 +287,7 @@ pub(crate) struct Banner {
 }
 
 pub(crate) fn banner(results: &Results<'_>, cards: &[Card]) -> Banner {
-    let names: Vec<String> =
-        results.refused().map(|(scheme, _)| words::scheme_name(scheme)).collect();
+    let names: Vec<String> = results.refused().map(|(scheme, _)| scheme.to_owned()).collect();
     let unknown = (!names.is_empty())
         .then(|| format!("Not audited, so nothing is known: {}.", words::list(&names)));
     let today = worst(cards, Basis::Released);
@@ -487,12 +486,14 @@ fn next_steps(results: &Results<'_>, cards: &[Card]) -> Vec<String> {
     }
     steps.extend(least(results, cards));
     let has_pictures = |row: &Row| row.metrics.contains_key("ssim");
-    if with_descriptors && !results.rows.iter().any(has_pictures) {
+    // The records were made by another program, which alone can change them.
+    let is_given = document.options.contains_key("released");
+    if with_descriptors && !is_given && !results.rows.iter().any(has_pictures) {
         steps.push("See what an attacker sees: add `--invert` and the photos.".to_owned());
     }
     if images {
         steps.push("Mitigate and measure again: extract fewer keypoints.".to_owned());
-    } else if document.options.get("mitigate").is_none() {
+    } else if !is_given && document.options.get("mitigate").is_none() {
         let drop = if has_file { " or `--mitigate drop:0.5`" } else { "" };
         let localizes =
             !document.localization.is_empty() && !document.options.contains_key("hold_out");
@@ -562,7 +563,7 @@ fn least(results: &Results<'_>, cards: &[Card]) -> Option<String> {
 fn bearings_sentence(results: &Results<'_>, scheme: &str) -> Option<String> {
     let of = |name: &str| results.max(scheme, |row| row.metrics.get(name).copied());
     let real = words::percent(of("real_bearings_percent")?);
-    let name = words::scheme_name(scheme);
+    let name = scheme;
     let text = format!(
         "{name} publishes bearings: whoever stands in the center sees the scene. {real} % of the bearings are real"
     );
@@ -596,7 +597,7 @@ pub(crate) fn sequence_sentences(results: &Results<'_>) -> Vec<String> {
             "{} of the keypoints came back within {} px ({}).",
             words::capital(&words::list(&shares)),
             results.headline,
-            words::scheme_name(scheme)
+            scheme
         )
     };
     results.schemes.iter().map(sentence).collect()
@@ -609,7 +610,7 @@ pub(crate) fn again_sentences(results: &Results<'_>) -> Vec<String> {
         let row = results.largest(rows.clone())?;
         let mut text = format!(
             "From two releases under {}, {} % of the points came back {}.",
-            words::scheme_name(scheme),
+            scheme,
             words::percent(results.share(row)),
             results.within(results.headline)
         );

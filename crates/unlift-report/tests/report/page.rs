@@ -61,23 +61,23 @@ fn verdict(document: &Document) -> String {
 #[test]
 fn the_verdict_names_the_strongest_attack_of_every_scheme() {
     let of_lists = [
-        "Do not release this map under OLC, RAY and RAY-VOXEL. Not tried: attacks by descriptors. The least leak, 20.8 % \
-         (RAY-VOXEL), is a fifth or more of the points. Nothing is decided about CP, PPL, PPL+ and PLANE. An attacker recovers 58.6 % of the points of this map within \
-         10 cm today, from the released data alone (OLC, records alone). If half of the neighbors were known, every scheme \
+        "Do not release this map under olc, ray and ray-voxel. Not tried: attacks by descriptors. The least leak, 20.8 % \
+         (ray-voxel), is a fifth or more of the points. Nothing is decided about cp, ppl, ppl+ and plane. An attacker recovers 58.6 % of the points of this map within \
+         10 cm today, from the released data alone (olc, records alone). If half of the neighbors were known, every scheme \
          tried would give back 83.3 % or more.",
-        "OLC Random lines Today, from the released data alone 58.6 % records alone (tomography) If half of the \
+        "olc Random lines Today, from the released data alone 58.6 % records alone (tomography) If half of the \
          neighbors were known 92.3 % known neighbors, 50 % right, solver consensus A blind guess recovers \
          1.9 %, the released records alone 58.6 %. Lists of neighbors add 33.7 percentage points (known neighbors). Half \
          of the points come back even when only 10 % of the neighbors are right.",
-        "PLANE Axis-aligned planes Today, from the released data alone Not tried on this scheme, so the \
+        "plane Axis-aligned planes Today, from the released data alone Not tried on this scheme, so the \
          result is unknown. If half of the neighbors were known 83.7 %",
     ];
     let of_own_lists = [
-        "OLC Random lines",
+        "olc Random lines",
         "41.0 % neighbors by descriptor overlap, 35 listed, 8.2 % of them right, solver consensus",
         "A blind guess recovers 1.2 %, the released records alone 7.3 %. Lists of neighbors add 33.7 percentage points \
          (by descriptor overlap), nothing (by record geometry) and 81.8 percentage points (known neighbors).",
-        "PLANE Axis-aligned planes",
+        "plane Axis-aligned planes",
         "Not tried with neighbors by record geometry: planes say nothing of where points are.",
     ];
     for (document, in_order) in
@@ -98,15 +98,15 @@ fn publish_bearings(row: &mut Row) {
 fn published_bearings_lead_the_verdict_and_never_count_as_the_least_leak() {
     let mut document = sample::document(true);
     sample::change(&mut document, "ppl+", publish_bearings);
-    assert!(verdict(&document).contains("RAY-VOXEL. PPL+ publishes bearings: whoever stands"));
+    assert!(verdict(&document).contains("ray-voxel. ppl+ publishes bearings: whoever stands"));
     let mut document = sample::mixed(true);
     sample::change(&mut document, "ppl+", |row| {
         let alone = row.records_alone_percent.iter_mut().flat_map(|percent| percent.values_mut());
         row.recovered_percent.values_mut().chain(alone).for_each(|percent| *percent = 1.0);
     });
-    assert!(said(&document).contains("PPL+ leaks least"));
+    assert!(said(&document).contains("ppl+ leaks least"));
     sample::change(&mut document, "ppl+", publish_bearings);
-    assert!(!said(&document).contains("PPL+ leaks least"));
+    assert!(!said(&document).contains("ppl+ leaks least"));
 }
 
 #[test]
@@ -134,9 +134,9 @@ fn what_could_not_be_audited_is_said_and_never_reads_as_little() {
     document.not_audited =
         serde_json::from_value(serde_json::json!([{"scheme": "ppl+", "reason": reason}])).unwrap();
     let text = verdict(&document);
-    assert!(text.contains("Not audited, so nothing is known: PPL+."), "{text}");
+    assert!(text.contains("Not audited, so nothing is known: ppl+."), "{text}");
     assert!(
-        text.contains(&format!("PPL+ Paired-point lines, plane-aware Not audited : {reason}")),
+        text.contains(&format!("ppl+ Paired-point lines, plane-aware Not audited : {reason}")),
         "{text}"
     );
     let page = without_script(&page(&document, None, true));
@@ -260,7 +260,7 @@ fn a_guess_that_gets_more_than_every_attack_is_the_verdict() {
         row.blind_percent.values_mut().for_each(|percent| *percent = 96.0);
     });
     let said = verdict(&document);
-    assert!(said.contains("(PLANE, a blind guess)"), "{said}");
+    assert!(said.contains("(plane, a blind guess)"), "{said}");
     assert!(said.contains("96.0 % a blind guess"), "{said}");
 }
 
@@ -299,11 +299,11 @@ fn every_figure_stands_in_a_table_and_what_must_be_known_beside_the_verdict() {
 #[rustfmt::skip] // One row per line.
 fn the_banner_says_how_bad_it_is() {
     for (schemes, color, expected) in [
-        (&["olc"][..], "red", "Do not release this map under OLC. Not tried: attacks by descriptors. An attacker recovers 58.6 %"),
-        (&["ray", "ray-voxel"], "orange", "Do not release this map under any scheme tried. Not tried: attacks by descriptors. The least leak, 20.8 % (RAY-VOXEL), is a fifth or more of the points."),
-        (&["ppl", "cp"], "orange", "Not decided: this map under CP and PPL. Not tried: attacks by descriptors. An attacker recovers 16.2"),
+        (&["olc"][..], "red", "Do not release this map under olc. Not tried: attacks by descriptors. An attacker recovers 58.6 %"),
+        (&["ray", "ray-voxel"], "orange", "Do not release this map under any scheme tried. Not tried: attacks by descriptors. The least leak, 20.8 % (ray-voxel), is a fifth or more of the points."),
+        (&["ppl", "cp"], "orange", "Not decided: this map under cp and ppl. Not tried: attacks by descriptors. An attacker recovers 16.2"),
         // An untested attack is no good result.
-        (&["plane"], "orange", "Not tested: what an attacker recovers from the released data alone. Not tried: attacks by descriptors and the attack on the records alone. An attacker would recover 83.7 % of the points of this map within 10 cm if half of the neighbors were known (PLANE, known neighbors)."),
+        (&["plane"], "orange", "Not tested: what an attacker recovers from the released data alone. Not tried: attacks by descriptors and the attack on the records alone. An attacker would recover 83.7 % of the points of this map within 10 cm if half of the neighbors were known (plane, known neighbors)."),
     ] {
         let mut document = sample::document(true);
         document.results.retain(|row| schemes.contains(&row.scheme.as_str()));

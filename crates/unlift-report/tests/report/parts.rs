@@ -185,7 +185,7 @@ fn the_page_begins_with_what_an_attacker_paints_from_the_released_data() {
     let (first, second) = (found.find(rebuilt), found.find(not));
     assert!(first.is_some() && first < second, "{found}");
     assert!(found.contains(
-        "% of the keypoints come back within 10\u{a0}px (LINES2D, neighbors by descriptor overlap)."
+        "% of the keypoints come back within 10\u{a0}px (lines2d, neighbors by descriptor overlap)."
     ));
     assert!(found.contains("What the service receives") && found.contains("<path d=\"M"));
     assert!(!found.to_lowercase().contains("worse picture"));
@@ -198,7 +198,7 @@ fn only_the_strongest_attacks_are_shown_at_first() {
     let document = painted_document();
     let found = painted_page(&document, vec![inversion(&document, |_| 0.4)], false);
     let (_, section) = found.split_once("id=\"inversions\"").expect("pictures");
-    let (_, row) = section.split_once("<h3>LINES2D</h3>").expect("a scheme");
+    let (_, row) = section.split_once("<h3>lines2d</h3>").expect("a scheme");
     let (main, others) = row.split_once("<details>").expect("the others are folded away");
     assert_eq!(main.matches("<img").count(), 2, "released data alone, and half of the neighbors");
     assert!(main.contains("neighbors by descriptor overlap, 20 % right"));

@@ -20,7 +20,7 @@ pub struct Made {
     pub ratio: f64,
     /// Records per list.
     pub k: usize,
-    /// Inlier ratio of an attacker's own lists, with as many true neighbors as they have records.
+    /// Inlier ratio of lists other than the oracle's, with as many true neighbors as they have records.
     /// `ratio` uses the K of the plan instead.
     pub ratio_at_k: Option<f64>,
 }
@@ -113,8 +113,11 @@ impl<'a, const D: usize> Lists<'a, D> {
                 let (offsets, neighbors) = (&points.offsets, &points.neighbors);
                 let lists = oracle::from_points(offsets, neighbors, scores, self.secret, slots)?;
                 let k = lists.longest().min(others).max(1);
-                let ratio = self.near(k, false)?.measured_inlier_ratio(&lists);
-                Ok(Made { lists, ratio, k, ratio_at_k: None })
+                let mut ratio = |k: usize| -> Result<f64, Error> {
+                    Ok(self.near(k, false)?.measured_inlier_ratio(&lists))
+                };
+                let (ratio, ratio_at_k) = (ratio(plan_k.min(others))?, Some(ratio(k)?));
+                Ok(Made { lists, ratio, k, ratio_at_k })
             }
             NeighborsBy::Source(_) if may_be_short && others == 0 => self.none(variant),
             NeighborsBy::Source(source) => {

@@ -1,6 +1,7 @@
 //! Plausibility checks: does data without a fingerprint belong to this map?
 
 use crate::Error;
+use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{along, distance, dot, median, sub};
 use crate::neighbors::{Neighborhoods, REAL, support};
 use crate::recover::Recovered;
@@ -53,6 +54,11 @@ fn count(nearer: impl Iterator<Item = bool>) -> (usize, usize) {
     nearer.fold((0, 0), |(nearer, n), is_nearer| (nearer + usize::from(is_nearer), n + 1))
 }
 
+/// Bounds are rounded by this share of their sides, and this share of the points may be outside: keypoints at the border of an
+/// image.
+const BOUNDS_SLACK: f64 = 1e-3;
+const MOST_OUTSIDE: f64 = 0.01;
+
 /// Checks that ground truth and released map belong together: unit, number of points, fingerprint,
 /// and positions of the points. With the wrong ground truth, a map would wrongly look safe.
 ///
@@ -83,8 +89,24 @@ pub fn belongs<const D: usize>(
     let (nearer, n) = nearer_to_own_record(released, n, point_of(original, secret));
     if are_strangers((nearer, n)) {
         let expected = "points nearer to their own records than to others";
-        let found = format!("{nearer} of {n} (the truth of another map, frame or order of slots)");
+        let found =
+            format!("{nearer} of {n} (the truth of another map, unit, frame or order of slots)");
         return Err(Error::new("truth", expected, found));
+    }
+    let points = original.reveal().positions();
+    let is_outside = |bounds: &Bounds<D>, slot: &usize| {
+        let point = points[secret.hidden()[*slot].index()];
+        (0..D).any(|c| {
+            let slack = BOUNDS_SLACK * (bounds.high[c] - bounds.low[c]);
+            point[c] < bounds.low[c] - slack || point[c] > bounds.high[c] + slack
+        })
+    };
+    if let Some(bounds) = released.bounds() {
+        let outside = (0..n).filter(|slot| is_outside(&bounds, slot)).count();
+        if outside as f64 > MOST_OUTSIDE * n as f64 {
+            let found = format!("{outside} of {n} outside");
+            return Err(Error::new("bounds", "a box of all hidden points", found));
+        }
     }
     Ok(())
 }
