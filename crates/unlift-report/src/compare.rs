@@ -5,7 +5,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use crate::attack::{self, Attack};
-use crate::document::{Document, Localization, Row};
+use crate::document::{Document, Input, Localization, Row};
 use crate::page::environment;
 use crate::results::Results;
 use crate::{Error, words};
@@ -262,6 +262,11 @@ fn different(old: &Document, new: &Document) -> Vec<String> {
     let scale = |scale: Option<f64>| scale.map_or("none".to_owned(), |scale| scale.to_string());
     expect("points", &a.n_points.to_string(), &b.n_points.to_string());
     expect("scale", &scale(a.scale_m_per_unit), &scale(b.scale_m_per_unit));
+    // Without a scale, thresholds are multiples of a distance in the map.
+    let unit = |of: &Input| of.unit_in_map_units.map(|unit| words::significant(unit, 3));
+    if let (Some(was), Some(is)) = (unit(a), unit(b)) {
+        expect("map units per unit of the thresholds", &was, &is);
+    }
     if let (Some(was), Some(is)) = (a.size(), b.size()) {
         expect("size", &was, &is);
     }

@@ -22,6 +22,11 @@ pub(crate) fn scheme_title(scheme: &str) -> String {
     }
 }
 
+/// Returns whether a scheme of ours has a mitigation or protected descriptors: `olc_thin4`.
+pub(crate) fn is_changed(scheme: &str) -> bool {
+    facts(scheme).is_some() && base(scheme) != scheme
+}
+
 /// Returns a sentence on what a scheme publishes in place of a point; empty for unknown schemes.
 pub(crate) fn scheme_rule(scheme: &str) -> &'static str {
     facts(scheme).map_or("", |facts| facts.rule)

@@ -68,17 +68,17 @@ pub fn search<L: Likeness>(
 ) -> Result<Vec<Found>, Error> {
     let n_blocks = rows.len().div_ceil(BLOCK);
     if rows.len() <= exact {
-        let found = kept.compared.as_ref().and_then(|all| all.found(likeness, rows, most));
+        let is_like = |all: &Compared| (all.name, all.counts) == (L::NAME, likeness.counts());
+        let known = kept.compared.iter().find(|all| is_like(all));
+        let mut found = known.and_then(|all| all.found(likeness, rows, most));
         // Scores of a map that lacks many points do not replace those of the whole map, which further maps need.
-        let is_of_whole =
-            |all: &Compared| all.name == L::NAME && all.slots.len() >= rows.slots.len();
-        let found = found.or_else(|| {
-            if kept.compared.as_ref().is_some_and(is_of_whole) {
-                return None;
-            }
-            let all = kept.compared.insert(Compared::new(likeness, rows, 2 * most + SPARE));
-            all.found(likeness, rows, most)
-        });
+        let is_of_whole = known.is_some_and(|all| all.slots.len() >= rows.slots.len());
+        if found.is_none() && !is_of_whole {
+            let all = Compared::new(likeness, rows, 2 * most + SPARE);
+            found = all.found(likeness, rows, most);
+            kept.compared.retain(|all| !is_like(all));
+            kept.compared.push(all);
+        }
         let anew = || finished::<L>(compare(likeness, rows, most, (&Pairs::all(n_blocks), None)));
         return Ok(found.unwrap_or_else(anew));
     }
@@ -99,7 +99,7 @@ fn finished<L: Likeness>(rows: Vec<Row>) -> Vec<Found> {
 /// Scores of all pairs of the descriptors of a map, for further maps that lack a few of them or put them into other records.
 #[derive(Clone, Debug, Default)]
 pub struct KeptPairs {
-    compared: Option<Compared>,
+    compared: Vec<Compared>,
     /// The partners by a network, for further maps with the same descriptors.
     pub(super) rankings: Vec<Rankings>,
 }
@@ -107,7 +107,7 @@ pub struct KeptPairs {
 #[cfg(test)]
 impl KeptPairs {
     pub(super) fn n_rows(&self) -> usize {
-        self.compared.as_ref().map_or(0, |all| all.slots.len())
+        self.compared.last().map_or(0, |all| all.slots.len())
     }
 }
 
@@ -146,9 +146,6 @@ impl Compared {
     ///
     /// Sums of scores are exact in any order, so what rows must not count can be subtracted.
     fn found<L: Likeness>(&self, likeness: &L, rows: &Rows<'_>, most: usize) -> Option<Vec<Found>> {
-        if (self.name, self.counts) != (L::NAME, likeness.counts()) {
-            return None;
-        }
         // Both are ordered by content; of equal rows it does not matter which one is absent.
         let (mut own, mut absent) = (Vec::with_capacity(rows.len()), Vec::new());
         let mut row_of = vec![None; self.slots.len()];

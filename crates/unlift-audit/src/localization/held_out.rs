@@ -133,8 +133,10 @@ impl<'a> Held<'a> {
         let is_held = |at: usize| at % nth == nth / 2;
         let n_held = (0..photos.len()).filter(|&at| is_held(at)).count();
         if n_held == 0 || photos.len() - n_held < FEWEST_OTHERS {
-            let expected = format!("features of at least {} images of the map", nth.max(3));
-            let found = photos.len().to_string();
+            let expected = format!(
+                "features of an image to hold out, and of at least {FEWEST_OTHERS} others of the map"
+            );
+            let found = format!("{} images, {n_held} of them to hold out", photos.len());
             return Err(unlift_io::Error::new(path, "", expected, found).into());
         }
         let dim = photos[0].1.descriptors.dim();

@@ -1,7 +1,7 @@
 //! Arguments of the five audits. What several audits share is a struct of its own.
 
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, value_parser};
 use serde_json::{Map, Value, json};
@@ -118,11 +118,15 @@ impl ProtectArgs {
             let names: Vec<String> =
                 self.protect_descriptors.iter().map(Protection::name).collect();
             options.insert("protect_descriptors".into(), json!(names));
-            let public =
-                if self.public_descriptors.is_some() { "given" } else { "photos of the demo" };
+            let public = public_name(self.public_descriptors.as_deref());
             options.insert("public_descriptors".into(), json!(public));
         }
     }
+}
+
+/// Returns the origin of public descriptors, for the report.
+pub fn public_name(path: Option<&Path>) -> &'static str {
+    if path.is_some() { "given" } else { "photos of the demo" }
 }
 
 /// Options of painted pictures.

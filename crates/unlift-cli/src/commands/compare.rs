@@ -94,6 +94,9 @@ fn text(comparison: &Comparison, written: Option<PathBuf>) -> String {
         text.push_str(&format!("{}\n", OneLine(line)));
     }
     text.push_str(&format!("{}\n", comparison.summary()));
+    if !comparison.different.is_empty() && comparison.accepted.is_none() {
+        text.push_str("if the inputs differ on purpose: --accept 'REASON, until YYYY-MM-DD', or keep the new audit as the baseline\n");
+    }
     if let Some(page) = written {
         text.push_str(&format!("\npage: {}\n", OneLine(page.display())));
     }

@@ -36,7 +36,7 @@ use unlift_report::leak;
 use unlift_vision::features::Extraction;
 
 use super::common::{all_could_be, open_map, public, read_document};
-use crate::args::{EvaluateArgs, NeighborsArgs, ObfuscateArgs, RecoverArgs};
+use crate::args::{EvaluateArgs, NeighborsArgs, ObfuscateArgs, RecoverArgs, public_name};
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{print, table};
 use crate::progress::{Progress, Stderr};
@@ -182,7 +182,9 @@ fn leak_of(
     scheme: &str,
 ) -> crate::Result<String> {
     let document = read_document(path)?;
-    leak(&document, &prepared.about(&args.path)?, scheme)
+    let public = || public_name(args.public_descriptors.as_deref());
+    let public = args.protect_descriptors.as_ref().map(|_| public());
+    leak(&document, &prepared.about(&args.path)?, (scheme, public))
         .map_err(|[expected, found]| Error::new(path, "", expected, found).into())
 }
 

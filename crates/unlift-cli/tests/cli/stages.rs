@@ -204,8 +204,9 @@ fn a_release_is_made_as_it_was_audited() {
         let row = document["results"].as_array().unwrap().iter().find(|row| row["scheme"] == name);
         let row = row.unwrap_or_else(|| panic!("{name} in {document}"));
         let percent = row["recovered_percent"]["0.10"].as_f64().unwrap();
-        let leak = format!("\naudited: Today, from the released data alone: {percent:.1} % (");
-        assert!(told.starts_with(name) && told.contains(&leak), "{leak} in {told}");
+        let leak = format!("Today, from the released data alone: {percent:.1} % (");
+        assert!(told.starts_with(name) && told.contains("\naudited: "), "{told}");
+        assert!(told.contains(&leak), "{leak} in {told}");
         place.ends("neighbors r/released.npz --neighbors similarity --seed 7 --out lists", 0);
         place.ends("recover r/released.npz --neighbors lists --seed 7 --out back", 0);
         let staged = place.prints("evaluate back --truth r/truth.npz --json", 0);
@@ -216,6 +217,10 @@ fn a_release_is_made_as_it_was_audited() {
     for (line, expected) in [
         (map.replace("room", "other"), "expected an audit of this map, found one of another map"),
         (format!("{map} --max-points 300"), "expected 300 points, found 400 points"),
+        (
+            map.replace("--scale 1", "--scale 2"),
+            "expected 2 scale and a unit of 0.5 map units, found 1 scale",
+        ),
         (format!("{map} --mitigate bits:2"), "expected an audit of olc_bits2, found olc, "),
     ] {
         let told = place.complains(&format!("obfuscate {line} --scheme olc {refused}"), 3);

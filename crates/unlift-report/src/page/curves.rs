@@ -57,7 +57,7 @@ fn errors(results: &Results<'_>) -> String {
     else {
         return format!("How far off the recovered {points} are");
     };
-    let scheme = row.scheme;
+    let scheme = &row.scheme;
     let smallest = results.thresholds.first().and_then(|typed| typed.parse::<f64>().ok());
     // Swapped coordinates that are restored leave only an error of rounding.
     let how = match smallest.is_some_and(|smallest| median < 0.001 * smallest) {

@@ -351,8 +351,13 @@ fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
     let open = (!undecided.is_empty()).then(|| format!("Nothing is decided about {undecided}."));
     match (little.first(), much.last()) {
         (Some((_, largest)), _) => {
+            let places = |(card, _): &(&Card, &Finding)| localizes(results, &card.scheme);
+            let but = match little.iter().any(places) {
+                true => "",
+                false => ", but most cameras cannot be placed with it",
+            };
             let headline = format!(
-                "Under {}, no attack tried here recovers more than {}.",
+                "Under {}, no attack tried here recovers more than {}{but}.",
                 names(&little),
                 largest.in_words()
             );
@@ -374,6 +379,20 @@ fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
         (None, Some(_)) => (not, open.into_iter().collect()),
         (None, None) => (format!("Not decided: {what} under {undecided}."), Vec::new()),
     }
+}
+
+/// Returns the cards whose schemes localize, if there are any, else all.
+fn localizing<'c>(results: &Results<'_>, cards: Vec<&'c Card>) -> Vec<&'c Card> {
+    let useful: Vec<&Card> =
+        cards.iter().copied().filter(|card| localizes(results, &card.scheme)).collect();
+    if useful.is_empty() { cards } else { useful }
+}
+
+/// Returns false if most cameras cannot be placed under `scheme`.
+pub(crate) fn localizes(results: &Results<'_>, scheme: &str) -> bool {
+    let mut costs = results.document.localization.iter();
+    let cost = costs.find(|of| of.scheme == scheme && !of.of_queries);
+    cost.is_none_or(|cost| cost.is_unknown() || cost.cost().is_some())
 }
 
 /// Returns the cards of schemes that publish no bearings: what those show is not the points that came back.
@@ -509,7 +528,10 @@ fn next_steps(results: &Results<'_>, cards: &[Card]) -> Vec<String> {
 /// Returns the step that suggests a gate: today's value of the scheme that leaks least, plus two points.
 fn gate_step(results: &Results<'_>, cards: &[Card]) -> Option<String> {
     let today = |card: &Card| card.today().map_or(f64::INFINITY, |today| today.recovered);
-    let card = cards.iter().min_by(|a, b| today(a).total_cmp(&today(b)))?;
+    // A gate on a changed scheme needs the options of the change.
+    let plain = cards.iter().filter(|card| !words::is_changed(&card.scheme));
+    let useful = localizing(results, plain.collect()).into_iter();
+    let card = useful.min_by(|a, b| today(a).total_cmp(&today(b)))?;
     let (scheme, typed) = (&card.scheme, results.headline);
     let released = results.strongest(scheme, Basis::Released);
     let row = released.or_else(|| results.strongest(scheme, Basis::Oracle))?;
@@ -521,11 +543,13 @@ fn gate_step(results: &Results<'_>, cards: &[Card]) -> Option<String> {
     let today = card.today().filter(|_| released.is_none());
     let today = today.map_or(0.0, |today| today.interval.map_or(today.recovered, |of| of[1]));
     let own = row.recovered(typed).map_or(results.share(row), |own| own.interval[1]);
-    let limit = (own.max(today) + 2.0).ceil().min(100.0);
-    Some(format!(
-        "Test it in your build: `--gate '{scheme}{attack}:{typed}<={limit}'` fails if two points more come back \
-         than today."
-    ))
+    let limit = (own.max(today) + 2.0).ceil();
+    (limit < 100.0).then(|| {
+        format!(
+            "Test it in your build: `--gate '{scheme}{attack}:{typed}<={limit}'` fails if this attack recovers about two \
+             percentage points more than today."
+        )
+    })
 }
 
 /// Returns which scheme leaks least.
@@ -535,7 +559,8 @@ fn least(results: &Results<'_>, cards: &[Card]) -> Option<String> {
     let share = |card: &Card| finding(card).map(|finding| finding.recovered);
     let is_known = cards.iter().any(|card| card.today().is_some());
     let comparable = cards.iter().filter(|card| !is_known || card.today().is_some());
-    let card = comparable.copied().reduce(|a, b| if share(b) < share(a) { b } else { a })?;
+    let useful = localizing(results, comparable.copied().collect()).into_iter();
+    let card = useful.reduce(|a, b| if share(b) < share(a) { b } else { a })?;
     // The banner says what the least leak means where it is too much, or not decided.
     let is_little = finding(card).is_some_and(|finding| finding.level == Level::Gray);
     if cards.len() < 2 || !is_little || !uses_descriptors(results, Some(&card.scheme)) {
