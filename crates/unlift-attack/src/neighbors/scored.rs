@@ -81,7 +81,7 @@ pub fn scored<const D: usize>(
     let mut rows = Rows::new(released, k)?;
     let patches = Patches::of(&rows.descriptors).ok();
     // Enough for two slots per record, so that rankings do not depend on the scheme.
-    let most = (2 * k).max(CANDIDATES) + 1;
+    let most = (2 * k + 1).max(CANDIDATES);
     let known = kept.rankings.iter().position(|rankings| rankings.are_of(&rows, most));
     let rankings = match known {
         Some(at) => kept.rankings.remove(at),

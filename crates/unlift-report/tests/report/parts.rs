@@ -95,6 +95,24 @@ fn changed_descriptors_have_no_known_cost_without_held_out_images() {
     assert_eq!(one.cost(), one.multiple, "the bound counts instead");
 }
 
+/// A scheme under which no camera is placed is not what the verdict and its advice name first.
+#[test]
+fn a_scheme_that_does_not_localize_is_no_advice() {
+    let mut document = document(false);
+    for row in &mut document.results {
+        (row.neighbors, row.oracle_noise) = ("descriptors".to_owned(), None);
+        let percent = if row.scheme == "plane" { 5.0 } else { 12.0 };
+        row.recovered_percent.values_mut().for_each(|x| *x = percent);
+        row.blind_percent.values_mut().for_each(|x| *x = 1.0);
+        (row.records_alone_percent, row.records_alone_by) = (None, None);
+    }
+    let text = page(&document);
+    assert!(text.contains("leaks least") && !text.contains("plane leaks least"));
+    document.results.retain(|row| row.scheme == "plane");
+    let text = page(&document);
+    assert!(text.contains(", but most cameras cannot be placed with it."), "{text}");
+}
+
 #[test]
 fn gates_on_localization_speak_of_multiples() {
     let mut document = document(true);

@@ -2,6 +2,7 @@
 //! `unlift_testkit::scheme_laws`.
 
 use unlift::evaluate::{away_from_own, belongs};
+use unlift::geometry::frame::Bounds;
 use unlift::neighbors::geometric;
 
 use crate::maps::*;
@@ -64,6 +65,12 @@ fn a_truth_belongs_to_its_map_alone() {
         // A point lies on its record up to rounding.
         let away = away_from_own(&released, &original, &secret);
         assert!(away.iter().all(|&away| away < 1e-4), "{name}");
+        let inner = Bounds::try_new([0.0; 3], [1.0; 3]).unwrap();
+        let cut = released.clone().with_bounds(Some(inner));
+        let of_cut =
+            secret.clone().of_map(Some(cut.fingerprint()), cut.slots_per_record()).unwrap();
+        let wrong = belongs(&original, &cut, &of_cut).unwrap_err().to_string();
+        assert!(wrong.starts_with("bounds: expected a box of all hidden points"), "{wrong}");
         if !["ppl", "ray"].contains(&name) {
             let Hidden { original, released, secret } = hide(entry(name), &together, 6);
             assert!(belongs(&original, &released, &secret).is_ok(), "{name}");
