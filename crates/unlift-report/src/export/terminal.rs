@@ -50,6 +50,11 @@ pub fn text_table(document: &Document) -> String {
     let several = (results.thresholds.len() > 1)
         .then(|| format!("blind, break-even: within {headline} {unit}\n"));
     let truth = "true: share of the listed neighbors that are among the nearest\n".to_owned();
+    let shown = lines.iter().filter(|line| matches!(line, Line::Attack(_))).count();
+    let more = results.rows.len() - shown;
+    let more = (more > 0).then(|| {
+        format!("{more} more attacks, of other inlier ratios or solvers, are in the report\n")
+    });
     let times = (results.unit == Unit::KthNeighbor)
         .then(|| format!("x: times {}\n", words::USUAL_DISTANCE));
     let refused = document.not_audited.iter().map(|refused| {
@@ -59,7 +64,7 @@ pub fn text_table(document: &Document) -> String {
         let by = if by.is_empty() { String::new() } else { format!(" by {by}") };
         format!("not audited: {}{by}: {reason}\n", refused.scheme)
     });
-    let notes = several.into_iter().chain([truth]).chain(times);
+    let notes = several.into_iter().chain([truth]).chain(times).chain(more);
     text + &notes.chain([cost_text(results)]).chain(refused).collect::<String>()
 }
 
