@@ -87,8 +87,8 @@ def of_image(scheme: str) -> dict:
             data = (keypoints + 0.5).astype("<f4")  # COLMAP's middle of the first pixel is (0.5, 0.5)
             db.execute("insert into keypoints values (1, ?, 2, ?)", [len(data), data.tobytes()])
         db.close()
-        unlift("obfuscate", "database.db", "--scheme", scheme, "--seed", str(SEED), "--out", "hidden")
-        oracle = ["--neighbors", "oracle", "--truth", "hidden/truth.npz", "--inlier-ratio", str(RATIO), "--k", "20"]
+        unlift("obfuscate", "database.db", "--schemes", scheme, "--seed", str(SEED), "--out", "hidden")
+        oracle = ["--neighbors", "oracle", "--truth", "hidden/truth.npz", "--inlier-ratios", str(RATIO), "--k", "20"]
         unlift("neighbors", "hidden/released.npz", *oracle, "--seed", str(SEED), "--out", "lists.npz")
         unlift("recover", "hidden/released.npz", "--neighbors", "lists.npz", "--seed", str(SEED), "--out", "back.npz")
         told = json.loads(unlift("evaluate", "back.npz", "--truth", "hidden/truth.npz", "--thresholds", "10,25", "--json"))

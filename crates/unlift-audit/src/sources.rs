@@ -156,7 +156,7 @@ mod tests {
         let floats =
             |dim: usize| Values::F32((0..dim * 8).map(|at| (at * 37 % 11) as f32 - 5.0).collect());
         let sift = Values::U8((0..128 * 8).map(|at| (at * 37 % 101) as u8).collect());
-        assert_eq!(best(sift, 128), ("learned".to_owned(), false));
+        assert_eq!(best(sift, 128), ("learned".to_owned(), true));
         assert_eq!(best(floats(128), 128), ("learned".to_owned(), true));
         assert_eq!(best(floats(64), 64), ("similarity".to_owned(), false));
     }

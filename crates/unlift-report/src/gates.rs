@@ -167,6 +167,6 @@ mod tests {
             reason: Some("ppl+ could not be audited".into()),
             ..gate("ppl+:0.10<=20", 0.0, 20.0)
         };
-        assert_eq!(in_words(&unknown), "not known; at most 20 % may; ppl+ could not be audited");
+        assert_eq!(in_words(&unknown), "ppl+ could not be audited; not known; at most 20 % may");
     }
 }

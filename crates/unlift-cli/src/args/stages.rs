@@ -37,10 +37,10 @@ pub struct DemoArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  unlift obfuscate PROJECT --scheme ppl --scale 1 --out hidden
-  unlift obfuscate PROJECT --scheme olc --descriptors PROJECT/database.db --out hidden
-  unlift obfuscate PROJECT --scheme ray --mitigate thin:1/4 --audit unlift-audit/audit.json
-  unlift obfuscate features.h5 --scheme dcl2d --out hidden-images
+  unlift obfuscate PROJECT --schemes ppl --scale 1 --out hidden
+  unlift obfuscate PROJECT --schemes olc --descriptors PROJECT/database.db --out hidden
+  unlift obfuscate PROJECT --schemes ray --mitigate thin:1/4 --audit unlift-audit/audit.json
+  unlift obfuscate features.h5 --schemes dcl2d --out hidden-images
 
 released.npz is what an attacker sees: records (such as lines) in place of points.
 truth.npz holds the original points; keep it private.
@@ -57,7 +57,8 @@ pub struct ObfuscateArgs {
     #[arg(value_name = "PATH")]
     pub path: PathBuf,
     /// Scheme that hides the points (unlift schemes lists them). Schemes for images need images
-    #[arg(long, value_name = "SCHEME", value_parser = values::by(unlift::obfuscate::scheme))]
+    #[arg(long = "schemes", alias = "scheme", value_name = "SCHEME",
+          value_parser = values::by(unlift::obfuscate::scheme))]
     pub scheme: &'static Entry,
     /// Folder for released.npz and truth.npz; other files in it stay
     #[arg(long, value_name = "DIR", default_value = "unlift-obfuscated")]
@@ -98,7 +99,7 @@ Sources:
 Examples:
   unlift neighbors hidden/released.npz --neighbors overlap --out neighborhoods.npz
   unlift neighbors hidden/released.npz --neighbors oracle --truth hidden/truth.npz \\
-      --inlier-ratio 0.5")]
+      --inlier-ratios 0.5")]
 pub struct NeighborsArgs {
     /// The released.npz of a map or of images
     #[arg(value_name = "RELEASED")]
@@ -111,7 +112,8 @@ pub struct NeighborsArgs {
     pub truth: Option<PathBuf>,
     /// For the oracle: fraction of each list that consists of true nearest neighbors, from 0 to 1:
     /// round(RATIO x K) of K entries
-    #[arg(long, value_name = "RATIO", value_parser = values::ratio, requires = "truth")]
+    #[arg(long = "inlier-ratios", alias = "inlier-ratio", value_name = "RATIO",
+          value_parser = values::ratio, requires = "truth")]
     pub inlier_ratio: Option<f64>,
     /// For the oracle: wrong entries of the lists, uniform, near or clustered (see unlift audit map)
     #[arg(long, value_name = "MODEL", value_parser = values::by(Noise::from_name), default_value = "uniform")]

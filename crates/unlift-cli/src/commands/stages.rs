@@ -288,7 +288,7 @@ pub fn neighbors(args: &NeighborsArgs) -> crate::Result<Outcome> {
             return Err(usage(format!("--truth: expected with --neighbors oracle, found {name}")));
         }
         _ => {
-            let expected = "expected --truth and --inlier-ratio, found none";
+            let expected = "expected --truth and --inlier-ratios, found none";
             return Err(usage(format!("--neighbors oracle: {expected}")));
         }
     };

@@ -66,10 +66,10 @@ fn protected_descriptors_and_bearings_are_audited() {
     let (stdout, _) = place.ends(&format!("{audit} --schemes sphere --out s"), 0);
     assert!(stdout.contains("bearing"), "{stdout}");
     let obfuscate = "obfuscate room.csv --scale 1 --descriptors d.bin";
-    place.ends(&format!("{obfuscate} --scheme sphere --out sphere"), 0);
+    place.ends(&format!("{obfuscate} --schemes sphere --out sphere"), 0);
     let (stdout, _) = place.ends("invert sphere/released.npz --out views", 0);
     assert_eq!(stdout, "6 pictures, in views\n");
-    place.ends(&format!("{obfuscate} --scheme olc --out olc"), 0);
+    place.ends(&format!("{obfuscate} --schemes olc --out olc"), 0);
     let stderr = place.complains("invert olc/released.npz --out none", 2);
     assert!(stderr.contains("RECOVERED: expected"), "{stderr}");
     let stderr = place.complains(&format!("{audit} --protect-descriptors subspace:0"), 2);

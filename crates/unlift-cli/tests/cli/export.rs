@@ -7,9 +7,9 @@ use crate::common::Place;
 /// Recovers a room that `scheme` hides; a unit of its map is half a meter.
 fn recovered(scheme: &str) -> Place {
     let place = Place::with_room(400);
-    let hide = "obfuscate room.csv --scale 0.5 --seed 1 --k 10 --out hidden --scheme";
+    let hide = "obfuscate room.csv --scale 0.5 --seed 1 --k 10 --out hidden --schemes";
     place.ends(&format!("{hide} {scheme}"), 0);
-    let lists = "neighbors hidden/released.npz --neighbors oracle --truth hidden/truth.npz --inlier-ratio 1 --k 10 --out lists.npz";
+    let lists = "neighbors hidden/released.npz --neighbors oracle --truth hidden/truth.npz --inlier-ratios 1 --k 10 --out lists.npz";
     place.ends(lists, 0);
     place.ends("recover hidden/released.npz --neighbors lists.npz --out back.npz", 0);
     place

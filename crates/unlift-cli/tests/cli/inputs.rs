@@ -57,14 +57,14 @@ fn what_cannot_be_meant_is_refused_with_a_way_out() {
         );
         assert!(!place.path("a").exists(), "{line}");
     }
-    let told = place.complains("obfuscate room.csv --scheme olc --scale 1e-300 --out a", 2);
+    let told = place.complains("obfuscate room.csv --schemes olc --scale 1e-300 --out a", 2);
     assert!(told.starts_with("unlift: --scale 1e-300: expected"), "{told}");
 }
 
 #[test]
 fn descriptors_that_are_missing_are_told_with_where_they_are() {
     let place = Place::with_room(100);
-    place.ends("obfuscate room.csv --scheme olc --k 10 --out hidden", 0);
+    place.ends("obfuscate room.csv --schemes olc --k 10 --out hidden", 0);
     assert_eq!(
         place.complains("neighbors hidden/released.npz --neighbors overlap", 3),
         "unlift: hidden/released.npz: descriptors for overlap: expected some in the released map, \

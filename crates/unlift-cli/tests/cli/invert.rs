@@ -44,7 +44,7 @@ fn keypoints_and_what_came_back_are_painted_to_files() {
     assert_eq!(place.text("pictures/a.png.png"), "mine");
 
     place.ends("features photos --out features.h5", 0);
-    place.ends("obfuscate features.h5 --scheme cp2d --out hidden", 0);
+    place.ends("obfuscate features.h5 --schemes cp2d --out hidden", 0);
     let released = "hidden/released.npz";
     let line = "unlift: RECOVERED: expected what came back of PATH, found none\n";
     assert_eq!(place.complains(&format!("invert {released} --out y"), 2), line);

@@ -40,11 +40,11 @@ fn inputs_are_never_written_over() {
     let fixture = "../unlift-io/tests/data/project/database.db";
     fs::copy(Path::new(env!("CARGO_MANIFEST_DIR")).join(fixture), place.path("database.db"))
         .unwrap();
-    place.ends("obfuscate room.csv --scheme olc --k 10 --out x", 0);
+    place.ends("obfuscate room.csv --schemes olc --k 10 --out x", 0);
     let truth = place.names("x").into_iter().find(|name| name.starts_with("truth")).unwrap();
     let released = truth.replace("truth", "released");
     let oracle = format!(
-        "neighbors x/{released} --neighbors oracle --truth x/{truth} --inlier-ratio 1 --out"
+        "neighbors x/{released} --neighbors oracle --truth x/{truth} --inlier-ratios 1 --out"
     );
     let before = place.bytes(&format!("x/{truth}"));
     let mut lines = vec![
@@ -70,7 +70,7 @@ fn inputs_are_never_written_over() {
 fn a_killed_run_leaves_the_old_output_and_the_next_one_goes_on() {
     use std::os::unix::fs::PermissionsExt;
     let place = Place::with_room(2000);
-    let line = |seed: u32| format!("obfuscate room.csv --scheme ppl --k 10 --out x --seed {seed}");
+    let line = |seed: u32| format!("obfuscate room.csv --schemes ppl --k 10 --out x --seed {seed}");
     place.ends(&line(1), 0);
     let old: Vec<_> = place.names("x").iter().map(|n| place.bytes(&format!("x/{n}"))).collect();
     for delay in [2, 5, 10, 20, 40, 80] {

@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 
 use crate::common::{Place, texts};
 
-const HIDE: &str = "obfuscate room.csv --scheme olc --k 10 --seed 1 --out hidden";
+const HIDE: &str = "obfuscate room.csv --schemes olc --k 10 --seed 1 --out hidden";
 
 #[cfg(unix)]
 #[test]
