@@ -162,7 +162,7 @@ fn centimeters_never_appear_without_a_scale() {
     let document = sample::mixed(false);
     let text = without_script(&page(&document, None, false));
     assert!(text.contains("No scale was declared"));
-    assert!(text.contains("within 4 % of the map") && text.contains("s longest side today"));
+    assert!(text.contains("within 4\u{a0}% of the map&#x27;s longest side today"));
     assert!(text.contains("the median distance from a point to its 50th nearest neighbor"));
     for unit in [" cm", " mm", "neighbor distance", " nd"] {
         assert!(!text.contains(unit), "{unit}");
