@@ -102,6 +102,11 @@ pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<Outcome> {
     let files = [(RELEASED, Kind::Stage(Stage::Released)), (TRUTH, Kind::Stage(Stage::Truth))];
     let rules = Rules::new(inputs, false);
     let mut out = OutputSet::create(&args.out, rules, Access::Private, &files).map_err(refused)?;
+    if args.out.join(RELEASED).exists() {
+        stderr::note(
+            "--out: an earlier release is replaced: never publish both, as their records meet in the points",
+        );
+    }
     // All randomness comes from this key.
     let key = || match args.seed {
         Some(seed) => {

@@ -200,7 +200,9 @@ fn a_release_is_made_as_it_was_audited() {
         ("ppl", changes[1], "ppl_subspace2.random"),
     ] {
         let release = format!("obfuscate {map} --schemes {scheme} {change} --audit a/audit.json");
-        let (told, _) = place.ends(&format!("{release} --out r"), 0);
+        let replaces = place.path("r").exists();
+        let (told, notes) = place.ends(&format!("{release} --out r"), 0);
+        assert_eq!(notes.contains("an earlier release is replaced"), replaces, "{notes}");
         let row = document["results"].as_array().unwrap().iter().find(|row| row["scheme"] == name);
         let row = row.unwrap_or_else(|| panic!("{name} in {document}"));
         let percent = row["recovered_percent"]["0.10"].as_f64().unwrap();
