@@ -75,7 +75,8 @@ impl Files<'_> {
             let points = prepared.original.reveal();
             let rows = rows.select(&order);
             prepared.doubts.extend(unlike_neighbors(points, &rows)?);
-            prepared.descriptors = Some(rows);
+            // Other schemes would release the plain descriptors, which are not known here.
+            prepared.descriptors = released.protected().is_none().then_some(rows);
         }
         Ok(Release { prepared, hidden: (released, secret) })
     }

@@ -1,5 +1,7 @@
 //! The comparison of two audits: what leaks more, what leaks less, and what only one of them has.
 
+use jiff::civil::Date;
+use jiff::{Timestamp, tz::TimeZone};
 use minijinja::value::Serde;
 use serde::Serialize;
 use serde_json::json;
@@ -101,33 +103,25 @@ pub struct Accepted {
 }
 
 impl Accepted {
-    /// Parses "reason, until 2027-03-01"; `today` is a day in this form.
+    /// Parses "reason, until 2027-03-01".
     ///
     /// # Errors
     /// If there is no reason, or no such day: what was expected.
-    pub fn parse(text: &str, today: &str) -> Result<Self, &'static str> {
+    pub fn parse(text: &str) -> Result<Self, &'static str> {
         const EXPECTED: &str = "\"REASON, until YYYY-MM-DD\"";
         let (reason, until) = text.rsplit_once(", until ").ok_or(EXPECTED)?;
-        let (reason, until) = (reason.trim(), until.trim());
-        let form =
-            |(at, c): (usize, char)| if at == 4 || at == 7 { c == '-' } else { c.is_ascii_digit() };
-        let part = |range| until.get(range).and_then(|part: &str| part.parse::<u32>().ok());
-        let is_day = until.len() == 10
-            && until.char_indices().all(form)
-            && part(5..7).is_some_and(|month| (1..=12).contains(&month))
-            && part(8..10).is_some_and(|day| (1..=31).contains(&day));
-        if reason.is_empty() || !is_day {
-            return Err(EXPECTED);
-        }
-        Ok(Self { reason: reason.to_owned(), until: until.to_owned(), past: until < today })
+        let day: Date = until.trim().parse().map_err(|_| EXPECTED)?;
+        let reason = Some(reason.trim()).filter(|reason| !reason.is_empty()).ok_or(EXPECTED)?;
+        let today = Timestamp::now().to_zoned(TimeZone::UTC).date();
+        Ok(Self { reason: reason.to_owned(), until: day.to_string(), past: day < today })
     }
 }
 
 /// The reason why two audits cannot be compared.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Incomparable {
-    /// `unit`, `thresholds` or `results`.
-    pub place: &'static str,
+    /// `unit`, `thresholds`, `results`, or a property of the input.
+    pub place: String,
     /// The value of the old audit.
     pub expected: String,
     /// The value of the new audit.
@@ -179,7 +173,7 @@ pub fn compare(
     }
     if changes.is_empty() {
         return Err(Incomparable {
-            place: "results",
+            place: "results".into(),
             expected: "an attack of the same scheme, source, ratio, k and solver".to_owned(),
             found: format!("none among {}", is.rows.len()),
         });
@@ -230,7 +224,11 @@ pub fn compare(
     more.sort_by(|a, b| b.points.total_cmp(&a.points));
     less.sort_by(|a, b| a.points.total_cmp(&b.points));
     let costs_more = costs_more(old, new);
-    let different = different(old, new);
+    let differs = |of: Difference| {
+        format!("{}: {} in the old audit, {} in the new one", of.property, of.was, of.is)
+    };
+    let different: Vec<String> =
+        different(&old.input, &new.input).into_iter().map(differs).collect();
     let is_accepted = accepted.as_ref().is_some_and(|accepted| !accepted.past);
     let is_like = (different.is_empty() || is_accepted) && only_old.is_empty() && lost.is_empty();
     let passed = is_like && more.is_empty() && costs_more.is_empty();
@@ -250,20 +248,27 @@ pub fn compare(
     })
 }
 
-/// Returns the inputs that differ. Share-safe audits have no hashes.
-fn different(old: &Document, new: &Document) -> Vec<String> {
-    let (a, b) = (&old.input, &new.input);
+/// A property in which two inputs differ.
+pub(crate) struct Difference {
+    pub property: String,
+    pub was: String,
+    pub is: String,
+}
+
+/// Returns the properties in which two inputs differ. Share-safe audits have no hashes.
+pub(crate) fn different(a: &Input, b: &Input) -> Vec<Difference> {
     let mut different = Vec::new();
-    let mut expect = |what: &str, was: &str, is: &str| {
+    let mut expect = |property: &str, was: &str, is: &str| {
         if was != is {
-            different.push(format!("{what}: {was} in the old audit, {is} in the new one"));
+            let [property, was, is] = [property, was, is].map(str::to_owned);
+            different.push(Difference { property, was, is });
         }
     };
     let scale = |scale: Option<f64>| scale.map_or("none".to_owned(), |scale| scale.to_string());
     expect("points", &a.n_points.to_string(), &b.n_points.to_string());
     expect("scale", &scale(a.scale_m_per_unit), &scale(b.scale_m_per_unit));
-    // Without a scale, thresholds are multiples of a distance in the map.
-    let unit = |of: &Input| of.unit_in_map_units.map(|unit| words::significant(unit, 3));
+    // Without a scale, thresholds and parameters of schemes are multiples of a distance in the map.
+    let unit = |of: &Input| of.unit_in_map_units.map(|unit| words::significant(unit, 6));
     if let (Some(was), Some(is)) = (unit(a), unit(b)) {
         expect("map units per unit of the thresholds", &was, &is);
     }
@@ -307,7 +312,7 @@ fn common_thresholds<'a>(
 ) -> Result<Vec<[&'a str; 2]>, Incomparable> {
     let [was, is] = [old, new].map(|of| of.unit.name());
     if was != is && !old.rows.is_empty() && !new.rows.is_empty() {
-        return Err(Incomparable { place: "unit", expected: was.into(), found: is.into() });
+        return Err(Incomparable { place: "unit".into(), expected: was.into(), found: is.into() });
     }
     let equal = |a: &str, b: &str| match (a.parse::<f64>(), b.parse::<f64>()) {
         (Ok(a), Ok(b)) => a == b,
@@ -322,7 +327,7 @@ fn common_thresholds<'a>(
             typed => typed.join(", "),
         };
         let (expected, found) = (listed(was), listed(is));
-        return Err(Incomparable { place: "thresholds", expected, found });
+        return Err(Incomparable { place: "thresholds".into(), expected, found });
     }
     Ok(pairs)
 }

@@ -7,9 +7,8 @@ use std::sync::Mutex;
 use rayon::prelude::*;
 
 use super::alike;
-use super::kept::are_equal;
+use super::kept::{Rankings, are_equal};
 use super::rows::Rows;
-use super::scored::Rankings;
 use crate::simd::BLOCK;
 use crate::{Descriptors, Error};
 

@@ -1,7 +1,7 @@
 //! Lists for several maps that release the same descriptors, each in its own order.
 
 use super::Neighborhoods;
-use super::rows::by_content;
+use super::rows::{Rows, by_content};
 use crate::descriptors::Values;
 use crate::released::Released;
 use crate::{About, Descriptors, RecordId};
@@ -51,6 +51,31 @@ impl KeptLists {
         }
         let lists = Neighborhoods::try_new(offsets, records, scores, slots.len(), 1).ok()?;
         Some(lists.with_about(About { map: Some(released.fingerprint()), ..self.lists.about() }))
+    }
+}
+
+/// Partners of a row, best first.
+pub(super) type Ranked = Vec<(f32, u32)>;
+
+/// Partners of the rows of a map by its descriptors alone: as if every row were a record.
+#[derive(Clone, Debug)]
+pub(super) struct Rankings {
+    pub(super) descriptors: Descriptors,
+    pub(super) slots: Vec<u32>,
+    /// Largest number of partners per row and set.
+    pub(super) most: usize,
+    /// By untrained scores, in standard deviations.
+    pub(super) untrained: Vec<Ranked>,
+    /// By the mean log probabilities of both rows.
+    pub(super) trained: Vec<Ranked>,
+}
+
+impl Rankings {
+    /// Returns whether `rows` have these descriptors, in this order.
+    pub(super) fn are_of(&self, rows: &Rows<'_>, most: usize) -> bool {
+        let mut pairs = self.slots.iter().zip(&rows.slots);
+        (self.most, self.slots.len()) == (most, rows.len())
+            && pairs.all(|(&a, &b)| are_equal((&self.descriptors, a), (&rows.descriptors, b)))
     }
 }
 

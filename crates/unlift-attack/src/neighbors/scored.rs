@@ -10,7 +10,7 @@ use std::collections::{BinaryHeap, HashMap};
 use rayon::prelude::*;
 
 use super::compare::{Best, KeptPairs, MOST_ROWS, higher_first, search};
-use super::kept::are_equal;
+use super::kept::{Ranked, Rankings};
 use super::overlap::Patches;
 use super::rows::Rows;
 use super::similarity::Cosine;
@@ -25,10 +25,7 @@ const WHOLE: usize = 3072;
 const REACHED: usize = 4;
 
 /// Number of rankings that are kept: schemes hide all points, all but an odd one, or most of them.
-const MOST_RANKINGS: usize = 3;
-
-/// Partners of a row, best first.
-type Ranked = Vec<(f32, u32)>;
+const MAX_RANKINGS: usize = 3;
 
 /// Descriptors that are scored together.
 #[derive(Debug)]
@@ -43,27 +40,6 @@ pub struct Part {
 /// Scores all pairs of the `n` descriptors of a part, `(n, n)`, row-major: the natural logarithm of the probability that the
 /// column's point is among the nearest of the row's, up to a constant per row. Scores are finite; those of a point with itself are not read.
 pub type Scores<'a> = dyn Fn(&Part) -> Result<Vec<f32>, Error> + Sync + 'a;
-
-/// Partners of the rows of a map by its descriptors alone: as if every row were a record.
-#[derive(Clone, Debug)]
-pub(super) struct Rankings {
-    descriptors: Descriptors,
-    slots: Vec<u32>,
-    most: usize,
-    /// By untrained scores, in standard deviations.
-    untrained: Vec<Ranked>,
-    /// By the mean log probabilities of both rows.
-    trained: Vec<Ranked>,
-}
-
-impl Rankings {
-    /// Returns whether `rows` have these descriptors, in this order.
-    fn are_of(&self, rows: &Rows<'_>, most: usize) -> bool {
-        let mut pairs = self.slots.iter().zip(&rows.slots);
-        (self.most, self.slots.len()) == (most, rows.len())
-            && pairs.all(|(&a, &b)| are_equal((&self.descriptors, a), (&rows.descriptors, b)))
-    }
-}
 
 /// Lists the `k` records nearest to each slot by `scores`. For SIFT, lists those that two short walks are most likely to reach, one
 /// over these records and one as in [`overlap`](super::overlap()). The score is the logarithm of the probability that a record is among
@@ -87,7 +63,7 @@ pub fn scored<const D: usize>(
         Some(at) => kept.rankings.remove(at),
         None => rankings(&mut rows, most, patches.as_ref(), scores, kept)?,
     };
-    let others = |ranked: &[Ranked]| -> Vec<Ranked> {
+    let without_own = |ranked: &[Ranked]| -> Vec<Ranked> {
         let record = |row: u32| rows.records[row as usize];
         let of = |(row, ranked): (usize, &Ranked)| {
             let is_other = |&&(_, other): &&(f32, u32)| record(other) != rows.records[row];
@@ -95,10 +71,11 @@ pub fn scored<const D: usize>(
         };
         ranked.par_iter().enumerate().map(of).collect()
     };
-    let (mut trained, untrained) = (others(&rankings.trained), others(&rankings.untrained));
+    let (mut trained, untrained) =
+        (without_own(&rankings.trained), without_own(&rankings.untrained));
     if rows.len() <= MOST_ROWS {
         kept.rankings.push(rankings);
-        let too_many = kept.rankings.len().saturating_sub(MOST_RANKINGS);
+        let too_many = kept.rankings.len().saturating_sub(MAX_RANKINGS);
         kept.rankings.drain(..too_many);
     }
     let enough = rows.enough_for(k);

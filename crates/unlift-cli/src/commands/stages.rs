@@ -189,8 +189,8 @@ fn leak_of(
     let document = read_document(path)?;
     let public = || public_name(args.public_descriptors.as_deref());
     let public = args.protect_descriptors.as_ref().map(|_| public());
-    leak(&document, &prepared.about(&args.path)?, (scheme, public))
-        .map_err(|[expected, found]| Error::new(path, "", expected, found).into())
+    leak(&document, &prepared.about(&args.path)?, scheme, public)
+        .map_err(|wrong| Error::new(path, wrong.place, wrong.expected, wrong.found).into())
 }
 
 /// Hides the keypoints of all images of `path`, each under a key of its own, and writes both files into `out`. Also returns the

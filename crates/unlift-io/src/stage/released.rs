@@ -1,7 +1,6 @@
 //! Released maps: records by family, and descriptors.
 
 use std::path::Path;
-
 use std::sync::Arc;
 
 use serde_json::json;
@@ -318,6 +317,13 @@ fn protected(
     n: usize,
     slots: usize,
 ) -> Result<Option<ProtectedDescriptors>, Error> {
+    let given = ["descriptor", SUBSPACE, WORDS, PUBLIC].into_iter().filter(|name| arrays.has(name));
+    let given: Vec<&str> = given.collect();
+    if !matches!(given[..], [] | [_] | [SUBSPACE | WORDS, PUBLIC]) || given == [PUBLIC] {
+        let expected =
+            format!("one of descriptor, {SUBSPACE} and {WORDS}, and {PUBLIC} beside the last two");
+        return Err(Error::new(arrays.path(), "arrays", expected, given.join(", ")));
+    }
     let public = arrays.optional(PUBLIC, |name| arrays.floats(name, [None, None]))?;
     let n_public = public.as_ref().map_or(0, |(_, [n, _])| *n);
     let (rule, rows, width) = if arrays.has(SUBSPACE) {

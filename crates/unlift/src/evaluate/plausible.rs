@@ -57,7 +57,7 @@ fn count(nearer: impl Iterator<Item = bool>) -> (usize, usize) {
 /// Bounds are rounded by this share of their sides, and this share of the points may be outside: keypoints at the border of an
 /// image.
 const BOUNDS_SLACK: f64 = 1e-3;
-const MOST_OUTSIDE: f64 = 0.01;
+const MAX_OUTSIDE: f64 = 0.01;
 
 /// Checks that ground truth and released map belong together: unit, number of points, fingerprint,
 /// and positions of the points. With the wrong ground truth, a map would wrongly look safe.
@@ -103,7 +103,7 @@ pub fn belongs<const D: usize>(
     };
     if let Some(bounds) = released.bounds() {
         let outside = (0..n).filter(|slot| is_outside(&bounds, slot)).count();
-        if outside as f64 > MOST_OUTSIDE * n as f64 {
+        if outside as f64 > MAX_OUTSIDE * n as f64 {
             let found = format!("{outside} of {n} outside");
             return Err(Error::new("bounds", "a box of all hidden points", found));
         }
