@@ -1,9 +1,6 @@
 //! Exit codes, and errors as one line with advice.
 
-use std::fmt;
-
 use unlift::{OneLine, is_obeyed};
-use unlift_audit::Error;
 
 use crate::args::Cli;
 use crate::output::printed;
@@ -25,16 +22,6 @@ const USAGE: u8 = 2;
 /// stdout that cannot be written. A place that cannot be written is found before the work starts;
 /// on the command line it is a usage error, see [`unlift_audit::check_file`].
 const BAD_INPUT: u8 = 3;
-
-/// Returns the error of a command line that asks for something impossible (exit code 2).
-pub fn usage(message: impl Into<String>) -> Error {
-    Error::request(message)
-}
-
-/// Adds advice to `error`: what the user can try instead.
-pub fn advise(error: impl Into<Error>, advice: impl Into<String>) -> Error {
-    error.into().advise(advice)
-}
 
 /// Prints help or a usage error, and returns the exit code.
 pub fn refused(error: clap::Error) -> u8 {
@@ -61,41 +48,11 @@ pub fn finish(result: crate::Result<Outcome>) -> u8 {
         Ok(Outcome::Done) => 0,
         Ok(Outcome::GateFailed) => 1,
         Err(error) => {
-            lines(&error).iter().for_each(tell);
-            code(&error)
+            tell(format_args!("unlift: {error}"));
+            if let Some(advice) = error.advice() {
+                tell(format_args!("  try: {advice}"));
+            }
+            if error.is_request() { USAGE } else { BAD_INPUT }
         }
-    }
-}
-
-fn lines(error: &Error) -> Vec<String> {
-    let advice = error.advice().map(|advice| format!("  try: {advice}"));
-    [line(error)].into_iter().chain(advice).collect()
-}
-
-/// Formats an error for `stderr::tell`.
-pub fn line(error: &impl fmt::Display) -> String {
-    format!("unlift: {error}")
-}
-
-fn code(error: &Error) -> u8 {
-    if error.is_request() { USAGE } else { BAD_INPUT }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn advice_keeps_the_code_and_adds_a_line() {
-        let error = advise(usage("--k: expected at most 10, found 50"), "--k 10");
-        assert_eq!(code(&error), USAGE);
-        assert_eq!(lines(&error), ["unlift: --k: expected at most 10, found 50", "  try: --k 10"]);
-    }
-
-    #[test]
-    fn everything_else_is_bad_input() {
-        let error = unlift::Error::new("points", "51", "3").into();
-        assert_eq!(code(&error), BAD_INPUT);
-        assert_eq!(lines(&error), ["unlift: points: expected 51, found 3"]);
     }
 }

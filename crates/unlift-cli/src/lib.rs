@@ -14,7 +14,9 @@ mod values;
 use std::ffi::OsString;
 use std::sync::OnceLock;
 
-type Result<T> = std::result::Result<T, unlift_audit::Error>;
+use unlift_audit::Error;
+
+type Result<T> = std::result::Result<T, Error>;
 
 static WORDS: OnceLock<Vec<OsString>> = OnceLock::new();
 

@@ -63,8 +63,9 @@ pub fn score(text: &str) -> Result<f32, String> {
     }
 }
 
+/// Parses a scheme for maps, also one that is audited only on request.
 pub fn scheme(text: &str) -> Result<&'static Entry, String> {
-    of_dimension(text, |entry| entry.in_3d.is_some(), " (for images only)")
+    fitting_scheme(text, |entry| entry.in_3d.is_some(), " (for images only)")
 }
 
 /// Parses `olc`, the same scheme twice, or `olc/cp`, two different ones.
@@ -74,42 +75,43 @@ pub fn scheme_pair(text: &str) -> Result<[&'static Entry; 2], String> {
 }
 
 pub fn image_scheme(text: &str) -> Result<&'static Entry, String> {
-    of_dimension(text, |entry| entry.in_2d.is_some(), " (for maps only)")
+    fitting_scheme(text, |entry| entry.in_2d.is_some(), " (for maps only)")
 }
 
-/// Returns the scheme called `text`, also one that is audited only on request.
-fn of_dimension(
+fn fitting_scheme(
     text: &str,
     fits: impl Fn(&Entry) -> bool,
-    otherwise: &str,
+    unfit: &str,
 ) -> Result<&'static Entry, String> {
-    if let Some(entry) = unlift::obfuscate::all().find(|entry| entry.name == text && fits(entry)) {
-        return Ok(entry);
-    }
-    let note = if unlift::obfuscate::scheme(text).is_ok() { otherwise } else { "" };
-    let fitting = unlift::obfuscate::all().filter(|entry| fits(entry));
-    let names: Vec<&str> = fitting.map(|entry| entry.name).collect();
-    Err(format!("expected one of {}, found {text}{note}", names.join(", ")))
+    let fitting: Vec<_> = unlift::obfuscate::all().filter(|entry| fits(entry)).collect();
+    fitting.iter().find(|entry| entry.name == text).copied().ok_or_else(|| {
+        let note = if unlift::obfuscate::scheme(text).is_ok() { unfit } else { "" };
+        none_of(fitting.iter().map(|entry| entry.name), text) + note
+    })
+}
+
+/// Returns the error for `text`, which is none of `names`.
+fn none_of<'a>(names: impl IntoIterator<Item = &'a str>, text: &str) -> String {
+    let names: Vec<&str> = names.into_iter().collect();
+    format!("expected one of {}, found {text}", names.join(", "))
 }
 
 /// Parses a solver for images, which must use lists: in the plane all lines intersect, so records
 /// alone reveal nothing.
 pub fn image_solver(text: &str) -> Result<Builtin, String> {
-    let names = || Builtin::FROM_LISTS.map(|solver| solver.name()).join(", ");
     let of_lists = solver(text).ok().filter(|solver| Builtin::FROM_LISTS.contains(solver));
-    of_lists.ok_or_else(|| format!("expected one of {}, found {text}", names()))
+    of_lists.ok_or_else(|| none_of(Builtin::FROM_LISTS.map(|solver| solver.name()), text))
 }
 
 pub fn image_source(text: &str) -> Result<NeighborSource, String> {
-    if text == "oracle" {
-        return Ok(NeighborSource::Oracle);
-    }
-    let own = sources::named(text).ok().filter(|named| named.of_dimension::<2>().is_ok());
-    own.map(NeighborSource::Own).ok_or_else(|| {
+    let is_of_images = |source: &NeighborSource| match source {
+        NeighborSource::Own(named) => named.of_dimension::<2>().is_ok(),
+        _ => true,
+    };
+    any_source(text).ok().filter(is_of_images).ok_or_else(|| {
         let all = sources::all();
         let of_images = all.iter().filter(|entry| entry.in_2d.is_some()).map(|entry| entry.name);
-        let names: Vec<&str> = ["oracle"].into_iter().chain(of_images).collect();
-        format!("expected one of {}, found {text}", names.join(", "))
+        none_of(["oracle"].into_iter().chain(of_images), text)
     })
 }
 
@@ -148,35 +150,30 @@ pub fn threshold(text: &str) -> Result<Threshold, String> {
     Threshold::parse(text).map_err(|_| format!("expected a number above 0, found {text}"))
 }
 
+/// Parses the name of a source, or a path.
 pub fn neighbor_source(text: &str) -> Result<NeighborSource, String> {
-    match text {
-        "" => Err("expected oracle, a source or a file".to_owned()),
-        "oracle" => Ok(NeighborSource::Oracle),
-        name if sources::named(name).is_ok() => own_source(name).map(NeighborSource::Own),
-        // If one name of a list is known, an unknown one is a typo, not a missing file.
-        names
-            if !names.contains(std::path::is_separator)
-                && names
-                    .split([',', '+'])
-                    .any(|name| name == "oracle" || sources::named(name).is_ok()) =>
-        {
-            Err(format!("expected one source (repeat the option for rows of each), found {names}"))
-        }
-        path => Ok(NeighborSource::File(path.into())),
+    if text.is_empty() {
+        return Err("expected oracle, a source or a file".to_owned());
     }
+    if let Ok(source) = any_source(text) {
+        return Ok(source);
+    }
+    // If one name of a list is known, an unknown one is a typo, not a missing file.
+    let is_path = text.contains(std::path::is_separator);
+    if !is_path && text.split([',', '+']).any(|name| any_source(name).is_ok()) {
+        return Err(format!(
+            "expected one source (repeat the option for rows of each), found {text}"
+        ));
+    }
+    Ok(NeighborSource::File(text.into()))
 }
 
 /// Parses the name of a source.
 pub fn any_source(text: &str) -> Result<NeighborSource, String> {
     match text {
         "oracle" => Ok(NeighborSource::Oracle),
-        name => own_source(name).map(NeighborSource::Own),
+        name => by(sources::named)(name).map(NeighborSource::Own),
     }
-}
-
-/// Parses a source other than the oracle.
-fn own_source(text: &str) -> Result<Named, String> {
-    by(sources::named)(text)
 }
 
 /// Parses a number of queries: two or more.
@@ -228,7 +225,7 @@ mod tests {
             by(Noise::from_name)("white").unwrap_err(),
             by(DescriptorKind::from_name)("SIFT").unwrap_err(),
             score("1").unwrap_err(),
-            own_source("magic").unwrap_err(),
+            any_source("magic").unwrap_err(),
         ];
         assert_eq!(
             texts.join("\n"),

@@ -112,15 +112,14 @@ pub struct ProtectArgs {
 }
 
 impl ProtectArgs {
-    /// Adds the options that were given to those of the report.
-    pub fn record(&self, options: &mut Map<String, Value>) {
-        if !self.protect_descriptors.is_empty() {
-            let names: Vec<String> =
-                self.protect_descriptors.iter().map(Protection::name).collect();
-            options.insert("protect_descriptors".into(), json!(names));
-            let public = public_name(self.public_descriptors.as_deref());
-            options.insert("public_descriptors".into(), json!(public));
-        }
+    fn recorded(&self) -> [Recorded; 2] {
+        let names: Vec<String> = self.protect_descriptors.iter().map(Protection::name).collect();
+        let public = public_name(self.public_descriptors.as_deref());
+        let is_given = !names.is_empty();
+        [
+            ("protect_descriptors", is_given.then(|| json!(names))),
+            ("public_descriptors", is_given.then(|| json!(public))),
+        ]
     }
 }
 
@@ -184,11 +183,12 @@ impl ExtractionArgs {
         }
     }
 
-    /// Adds the options that were given to those of the report.
-    pub fn record(&self, options: &mut Map<String, Value>) {
-        record(options, "features", self.features.map(|kind| json!(kind.name())));
-        record(options, "max_features", self.max_features.map(|max| json!(max.get())));
-        record(options, "min_score", self.min_score.map(|score| json!(score)));
+    fn recorded(&self) -> [Recorded; 3] {
+        [
+            ("features", self.features.map(|kind| json!(kind.name()))),
+            ("max_features", self.max_features.map(|max| json!(max))),
+            ("min_score", self.min_score.map(|score| json!(score))),
+        ]
     }
 }
 
@@ -518,9 +518,12 @@ pub struct AuditReleasedArgs {
     pub audit: AuditArgs,
 }
 
-/// Adds an option that was given to those of the report.
-fn record(options: &mut Map<String, Value>, name: &str, value: Option<Value>) {
-    options.extend(value.map(|value| (name.to_owned(), value)));
+/// Name and value of an option in the report; `None` if it was not given.
+type Recorded = (&'static str, Option<Value>);
+
+/// Returns the options that were given, for the report.
+fn given(options: impl IntoIterator<Item = Recorded>) -> Map<String, Value> {
+    options.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?))).collect()
 }
 
 /// Returns the names of mitigations for the report, if there are any.
@@ -546,39 +549,34 @@ impl AuditMapArgs {
 
     /// Returns the options that change the points, for the report.
     pub fn record(&self) -> Map<String, Value> {
-        let mut options = Map::new();
-        record(&mut options, "max_points", self.map.max_points.map(|max| json!(max.get())));
-        record(&mut options, "mitigate", named(&self.mitigate));
-        self.protect.record(&mut options);
-        let hold_out = self.localize.as_ref().map(|_| json!(self.hold_out.get()));
-        record(&mut options, "hold_out", hold_out);
-        if self.paint.invert.is_some() {
-            record(&mut options, "invert", Some(json!(true)));
-            record(&mut options, "max_images", Some(json!(self.max_images.get())));
-        }
-        options
+        let paints = self.paint.invert.is_some();
+        let options = [
+            ("max_points", self.map.max_points.map(|max| json!(max))),
+            ("mitigate", named(&self.mitigate)),
+        ];
+        given(options.into_iter().chain(self.protect.recorded()).chain([
+            ("hold_out", self.localize.is_some().then(|| json!(self.hold_out))),
+            ("invert", paints.then(|| json!(true))),
+            ("max_images", paints.then(|| json!(self.max_images))),
+        ]))
     }
 }
 
 impl AuditImagesArgs {
     /// Returns the options that change the images, for the report.
     pub fn record(&self) -> Map<String, Value> {
-        let mut options = Map::new();
-        self.extraction.record(&mut options);
-        self.protect.record(&mut options);
-        record(&mut options, "max_images", self.max_images.map(|max| json!(max.get())));
-        record(&mut options, "invert", self.paint.invert.as_ref().map(|_| json!(true)));
-        options
+        given(self.extraction.recorded().into_iter().chain(self.protect.recorded()).chain([
+            ("max_images", self.max_images.map(|max| json!(max))),
+            ("invert", self.paint.invert.is_some().then(|| json!(true))),
+        ]))
     }
 }
 
 impl AuditSequenceArgs {
     /// Returns the options that change the images, for the report.
     pub fn record(&self) -> Map<String, Value> {
-        let mut options = Map::new();
-        record(&mut options, "model", Some(json!(self.model.display().to_string())));
-        record(&mut options, "mitigate", named(&self.mitigate));
-        self.extraction.record(&mut options);
-        options
+        let model = json!(self.model.display().to_string());
+        let options = [("model", Some(model)), ("mitigate", named(&self.mitigate))];
+        given(options.into_iter().chain(self.extraction.recorded()))
     }
 }

@@ -9,7 +9,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 pub use audits::{
     AuditAgainArgs, AuditArgs, AuditImagesArgs, AuditMapArgs, AuditReleasedArgs, AuditSequenceArgs,
-    MapArgs, OracleArgs, SolverArgs, public_name,
+    MapArgs, OracleArgs, PaintArgs, SolverArgs, public_name,
 };
 pub use stages::{
     CompareArgs, DemoArgs, EvaluateArgs, ExportArgs, FeaturesArgs, InvertArgs, NeighborsArgs,

@@ -26,15 +26,15 @@ use unlift_audit::{
 use unlift_io::hash::hash_file;
 use unlift_io::outputs::Rules;
 use unlift_io::stage::published_positions;
-use unlift_report::Document;
 use unlift_vision::features::photo::Turn;
 
 use super::common::{all_could_be, open_map, public, with_threads};
+use crate::Error;
 use crate::args::{
     AuditAgainArgs, AuditArgs, AuditImagesArgs, AuditMapArgs, AuditReleasedArgs, AuditSequenceArgs,
-    OracleArgs, SolverArgs,
+    OracleArgs, PaintArgs, SolverArgs,
 };
-use crate::exit::{Outcome, usage};
+use crate::exit::Outcome;
 use crate::output::{command_line, print};
 use crate::progress::Progress;
 use crate::values::NeighborSource;
@@ -44,7 +44,7 @@ fn perform<'a>(
     args: &AuditArgs,
     inputs: impl IntoIterator<Item = &'a Path>,
     work: impl FnOnce(Output) -> crate::Result<Audited> + Send,
-) -> crate::Result<(Outcome, Document)> {
+) -> crate::Result<Outcome> {
     let output = Output {
         share_safe: args.share_safe,
         junit: args.junit.clone(),
@@ -54,8 +54,7 @@ fn perform<'a>(
     let files = output.open(Rules::new(inputs, false))?;
     let finished = with_threads(|| work(output)?.write(files))?;
     print(&finished.text())?;
-    let outcome = if finished.passed() { Outcome::Done } else { Outcome::GateFailed };
-    Ok((outcome, finished.document))
+    Ok(if finished.passed() { Outcome::Done } else { Outcome::GateFailed })
 }
 
 /// Runs `audit` with the gates of the command line.
@@ -119,7 +118,7 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<Outcome> {
     let inputs = [args.path.as_path()].into_iter().chain(args.map.descriptors.as_deref());
     let inputs = inputs.chain(NeighborSource::files(&args.solvers.neighbors));
     let inputs = inputs.chain(more.map(|path| path.as_path()));
-    let (outcome, _) = perform(&args.audit, inputs, |output| {
+    perform(&args.audit, inputs, |output| {
         let AuditArgs { seed, quiet, .. } = args.audit;
         let mut prepared = open_map(&args.path, &args.map, args.uses_descriptors(), (seed, quiet))?;
         let progress = Progress::new(quiet);
@@ -189,8 +188,7 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<Outcome> {
         audit.about.other_sha256.extend(hashes_of_lists(&args.solvers)?);
         audit.options = args.record();
         run(audit, &args.audit, &progress)
-    })?;
-    Ok(outcome)
+    })
 }
 
 /// `unlift audit released`
@@ -203,7 +201,7 @@ pub fn released(args: &AuditReleasedArgs) -> crate::Result<Outcome> {
         truth: &args.truth,
         descriptors: args.descriptors.as_deref(),
     };
-    let (outcome, _) = perform(&args.audit, inputs, |output| {
+    perform(&args.audit, inputs, |output| {
         let name = args.name.clone().map_or_else(|| files.scheme_name(), Ok)?;
         let released::Release { mut prepared, hidden } = files.open()?;
         let progress = Progress::new(args.audit.quiet);
@@ -214,7 +212,7 @@ pub fn released(args: &AuditReleasedArgs) -> crate::Result<Outcome> {
         let mut schemes = schemes(&args.schemes, unit);
         if schemes.iter().any(|scheme| scheme.name() == name) {
             let expected = "expected another name than a scheme of --schemes";
-            return Err(usage(format!("--name: {expected}, found {name}")));
+            return Err(Error::request(format!("--name: {expected}, found {name}")));
         }
         schemes.insert(0, scheme_called(&name));
         let request = Request { schemes, ..request };
@@ -231,8 +229,7 @@ pub fn released(args: &AuditReleasedArgs) -> crate::Result<Outcome> {
         audit.about.other_sha256.extend(hashes_of_lists(&args.solvers)?);
         audit.options.insert("released".into(), json!(true));
         run(audit, &args.audit, &progress)
-    })?;
-    Ok(outcome)
+    })
 }
 
 /// `unlift audit images`
@@ -247,10 +244,11 @@ pub fn images(args: &AuditImagesArgs) -> crate::Result<Outcome> {
         });
     }
     let mut plan = request.plan(Plan::new(Unit::Pixel), true)?;
-    plan.check_for_many().map_err(|error| usage(error.to_string()))?;
+    plan.check_for_many().map_err(|error| Error::request(error.to_string()))?;
     let more = args.paint.inputs().chain(&args.protect.public_descriptors);
     let inputs = [&args.path].into_iter().chain(more).map(|path| path.as_path());
-    let (outcome, document) = perform(&args.audit, inputs, |output| {
+    let mut count = None;
+    let outcome = perform(&args.audit, inputs, |output| {
         let photos = args.paint.photos.as_deref();
         let opening = Opening {
             wanted: args.extraction.wanted(),
@@ -262,13 +260,8 @@ pub fn images(args: &AuditImagesArgs) -> crate::Result<Outcome> {
             is_usual: args.neighbors.is_empty(),
         };
         let opened = Opened::open(&args.path, &opening, &mut plan)?;
-        let inversion = match &args.paint.invert {
-            Some(network) => {
-                let (kind, of) = (opened.kind("--invert")?, (&opened.source, &*args.path));
-                Some(Arc::new(Inversion::open(of, kind, photos, network.as_deref())?))
-            }
-            None => None,
-        };
+        let inversion = inversion(&args.paint, &opened.source, &opened.chosen, &args.path)?;
+        let inversion = inversion.map(Arc::new);
         let protections = protections(
             &args.protect.protect_descriptors,
             || opened.kind("--protect-descriptors"),
@@ -283,12 +276,28 @@ pub fn images(args: &AuditImagesArgs) -> crate::Result<Outcome> {
         let images = Images { opened: &opened, plan, draws: true, photos, inversion };
         let mut audit = Audit::new(Input::Images(images), output);
         audit.options = args.record();
-        run(audit, &args.audit, &progress)
+        let audited = run(audit, &args.audit, &progress)?;
+        count = audited.document.input.images;
+        Ok(audited)
     })?;
-    if let Some(count) = document.input.images {
+    if let Some(count) = count {
         all_could_be("used", &args.path, count.used as usize, count.unusable as usize)?;
     }
     Ok(outcome)
+}
+
+/// Opens the painter of pictures, if it is requested.
+fn inversion(
+    args: &PaintArgs,
+    source: &FeatureSource,
+    chosen: &[usize],
+    path: &Path,
+) -> crate::Result<Option<Inversion>> {
+    let Some(network) = &args.invert else { return Ok(None) };
+    let kind = source.kind("--invert", chosen)?;
+    let inversion =
+        Inversion::open((source, path), kind, args.photos.as_deref(), network.as_deref())?;
+    Ok(Some(inversion))
 }
 
 /// `unlift audit sequence`
@@ -302,33 +311,24 @@ pub fn sequence(args: &AuditSequenceArgs) -> crate::Result<Outcome> {
     let threshold = |label: &str, value| Threshold { label: label.to_owned(), value };
     let thresholds = vec![threshold("5", 5.0), threshold("10", 10.0), threshold("25", 25.0)];
     let plan = request.plan(Plan { thresholds, ..usual }, false)?;
-    let pose_error = match (args.poses, args.scale) {
-        (None, _) => None,
-        (Some((cm, rotation_degrees)), Some(scale)) => {
-            Some(PoseError { center: 0.01 * cm / scale, rotation_degrees })
-        }
-        (Some(_), None) => {
-            let expected = "expected --scale, meters per unit of the model";
-            return Err(usage(format!("--poses perturbed: {expected}")));
-        }
-    };
+    let pose_error = args.poses.map(|(cm, rotation_degrees)| {
+        let expected = "--poses perturbed: expected --scale, meters per unit of the model";
+        let scale = args.scale.ok_or_else(|| Error::request(expected))?;
+        Ok::<_, Error>(PoseError { center: 0.01 * cm / scale, rotation_degrees })
+    });
+    let pose_error = pose_error.transpose()?;
     if args.paint.invert.is_some() && args.audit.share_safe {
-        return Err(usage("--invert: expected without --share-safe, as pictures show the place"));
+        return Err(Error::request(
+            "--invert: expected without --share-safe, as pictures show the place",
+        ));
     }
     let inputs = [&args.model, &args.path].into_iter().chain(args.paint.inputs());
-    let (outcome, _) = perform(&args.audit, inputs.map(|path| path.as_path()), |output| {
+    perform(&args.audit, inputs.map(|path| path.as_path()), |output| {
         let extraction = args.extraction.wanted().extraction(&args.path)?;
         // A model is of the photos as they are stored.
         let source = FeatureSource::open(&args.path, &extraction)?.with_turn(Turn::AsStored);
-        let inversion = match &args.paint.invert {
-            Some(network) => {
-                let all: Vec<usize> = (0..source.names.len()).collect();
-                let kind = source.kind("--invert", &all)?;
-                let of = (&source, args.path.as_path());
-                Some(Inversion::open(of, kind, args.paint.photos.as_deref(), network.as_deref())?)
-            }
-            None => None,
-        };
+        let all: Vec<usize> = (0..source.names.len()).collect();
+        let inversion = inversion(&args.paint, &source, &all, &args.path)?;
         let mut queries = args.queries.clone();
         queries.sort_unstable();
         queries.dedup();
@@ -346,14 +346,13 @@ pub fn sequence(args: &AuditSequenceArgs) -> crate::Result<Outcome> {
         let mut audit = Audit::new(Input::Views(Views::Sequence(sequence)), output);
         audit.options = args.record();
         run(audit, &args.audit, &progress)
-    })?;
-    Ok(outcome)
+    })
 }
 
 /// `unlift audit again`
 pub fn again(args: &AuditAgainArgs) -> crate::Result<Outcome> {
     let inputs = [&args.a, &args.b].into_iter().chain(&args.descriptors);
-    let (outcome, _) = perform(&args.audit, inputs.map(|path| path.as_path()), |output| {
+    perform(&args.audit, inputs.map(|path| path.as_path()), |output| {
         let preparation = Preparation { scale: args.scale, ..Preparation::default() };
         let reading = Progress::uncounted(args.audit.quiet, "reading the maps");
         let mut maps = Maps::open([&args.a, &args.b], &args.descriptors, &preparation)?;
@@ -380,6 +379,5 @@ pub fn again(args: &AuditAgainArgs) -> crate::Result<Outcome> {
         audit.about = maps.about(&args.a)?;
         audit.options.insert("again".into(), json!(args.b.display().to_string()));
         run(audit, &args.audit, &progress)
-    })?;
-    Ok(outcome)
+    })
 }

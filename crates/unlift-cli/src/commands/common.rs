@@ -51,10 +51,7 @@ pub fn public(path: Option<&Path>, kind: DescriptorKind) -> crate::Result<Descri
     }
 }
 
-/// Reads an `audit.json`.
-///
-/// # Errors
-/// If the file cannot be read, or is no `audit.json` of this version of the format.
+/// Reads an `audit.json` of this version of the format.
 pub fn read_document(path: &Path) -> crate::Result<Document> {
     let mut text = String::new();
     let (mut file, _) = unlift_io::input::open(path)?;

@@ -73,26 +73,24 @@ fn text(comparison: &Comparison, written: Option<PathBuf>) -> String {
         (&comparison.only_old, "NOT COMPARED: only in the old audit"),
         (&comparison.only_new, "only in the new audit"),
     ];
+    let mut lines = Vec::new();
     for (rows, which) in only {
-        for Unmatched { scheme, attack } in rows {
-            let line = format!("{which}: {scheme}: {attack}");
-            text.push_str(&format!("{}\n", OneLine(line)));
-        }
+        let line = |Unmatched { scheme, attack }: &_| format!("{which}: {scheme}: {attack}");
+        lines.extend(rows.iter().map(line));
     }
     for cost in &comparison.costs_more {
         let now =
             cost.new_multiple.map_or("no pose or not known".into(), |new| format!("{new:.2}"));
         let (scheme, was) = (&cost.scheme, cost.old_multiple);
-        let line = format!(
+        lines.push(format!(
             "LOCALIZES LESS PRECISELY: {scheme}: {was:.2} times the unprotected error before, {now} now"
-        );
-        text.push_str(&format!("{}\n", OneLine(line)));
+        ));
     }
     for lost in &comparison.lost {
         let by = lost.neighbors.as_ref().map(|by| format!(" by {by}")).unwrap_or_default();
-        let line = format!("OUT OF VIEW: {}{by}: {}", lost.scheme, lost.reason);
-        text.push_str(&format!("{}\n", OneLine(line)));
+        lines.push(format!("OUT OF VIEW: {}{by}: {}", lost.scheme, lost.reason));
     }
+    lines.iter().for_each(|line| text.push_str(&format!("{}\n", OneLine(line))));
     text.push_str(&format!("{}\n", comparison.summary()));
     if !comparison.different.is_empty() && comparison.accepted.is_none() {
         text.push_str("if the inputs differ on purpose: --accept 'REASON, until YYYY-MM-DD', or keep the new audit as the baseline\n");

@@ -1,11 +1,13 @@
 //! `unlift export`: writes stage files of maps in formats of other programs.
 
+use std::ffi::OsStr;
 use std::path::Path;
 
 use unlift::geometry::frame::Bounds;
 use unlift::released::{Obfuscation, Released};
 use unlift::{OneLine, Unit};
 use unlift_audit::{check_file, refused};
+use unlift_io::Error as FileError;
 use unlift_io::atomic::Access;
 use unlift_io::clouds::{
     Segment, record_segments, write_cameras, write_images, write_lines, write_model_points,
@@ -17,8 +19,9 @@ use unlift_io::stage::{
     Kind as Stage, has_images, kind, read_recovered, read_released, read_truth,
 };
 
+use crate::Error;
 use crate::args::ExportArgs;
-use crate::exit::{Outcome, advise, usage};
+use crate::exit::Outcome;
 use crate::output::print;
 
 enum Shown {
@@ -30,52 +33,44 @@ enum Shown {
 pub fn run(args: &ExportArgs) -> crate::Result<Outcome> {
     let inputs = [Some(args.path.as_path()), args.cameras.as_deref()];
     let rules = Rules::new(inputs.into_iter().flatten(), false);
-    let ending = args.out.extension().map(|ending| ending.to_ascii_lowercase());
-    let ending = ending.as_ref().map(|ending| ending.to_string_lossy());
-    let ending = ending.as_deref();
-    if args.cameras.is_some() && matches!(ending, Some("ply" | "obj")) {
-        let found = OneLine(args.out.display());
-        return Err(usage(format!("--cameras: expected a folder as --out, found {found}")));
+    let ending = args.out.extension().map(OsStr::to_ascii_lowercase);
+    let is = |name: &str| ending.as_deref().is_some_and(|ending| ending == name);
+    let is_cloud = is("ply") || is("obj");
+    let out = OneLine(args.out.display());
+    if args.cameras.is_some() && is_cloud {
+        return Err(Error::request(format!("--cameras: expected a folder as --out, found {out}")));
     }
-    let n = match ending {
-        Some("ply" | "obj") => {
-            check_file(&args.out, Kind::Cloud, &rules)?;
-            let shown = scaled(args, read(&args.path)?)?;
-            cloud(args, ending, &shown)?
-        }
-        Some(_) if !args.out.is_dir() => {
-            let found = OneLine(args.out.display());
-            return Err(usage(format!(
-                "--out: expected a name that ends in .ply or .obj, or a folder without an ending, found {found}"
-            )));
-        }
-        _ => model(args, rules)?,
+    let n = if is_cloud {
+        check_file(&args.out, Kind::Cloud, &rules)?;
+        cloud(args, is("ply"))?
+    } else if ending.is_some() && !args.out.is_dir() {
+        return Err(Error::request(format!(
+            "--out: expected a name that ends in .ply or .obj, or a folder without an ending, found {out}"
+        )));
+    } else {
+        model(args, rules)?
     };
-    print(&format!("{n}, in {}\n", OneLine(args.out.display())))?;
+    print(&format!("{n}, in {out}\n"))?;
     Ok(Outcome::Done)
 }
 
 /// Writes a PLY or OBJ file, and returns a description of its content.
-fn cloud(args: &ExportArgs, ending: Option<&str>, shown: &Shown) -> crate::Result<String> {
+fn cloud(args: &ExportArgs, is_ply: bool) -> crate::Result<String> {
     let wrong = |expected: &str, found: &str, way_out: &str| {
-        Err(advise(unlift_io::Error::new(&args.path, "", expected, found), way_out))
+        Err(Error::from(FileError::new(&args.path, "", expected, found)).advise(way_out))
     };
-    match (ending, shown) {
-        (Some("ply"), Shown::Points(points)) => {
-            let points: Vec<[f64; 3]> = points.iter().flatten().copied().collect();
+    match scaled(args, read(&args.path)?)? {
+        Shown::Points(points) if is_ply => {
+            let points: Vec<[f64; 3]> = points.into_iter().flatten().collect();
             write_points(&args.out, &points)?;
             Ok(format!("{} points", points.len()))
         }
-        (Some("obj"), Shown::Segments(segments)) => {
-            write_lines(&args.out, segments)?;
+        Shown::Segments(segments) if !is_ply => {
+            write_lines(&args.out, &segments)?;
             Ok(format!("{} segments", segments.len()))
         }
-        (_, Shown::Points(_)) => {
-            wrong("lines or rays, as --out is .obj", "points", "--out NAME.ply")
-        }
-        (_, Shown::Segments(_)) => {
-            wrong("points, as --out is .ply", "lines or rays", "--out NAME.obj")
-        }
+        Shown::Points(_) => wrong("lines or rays, as --out is .obj", "points", "--out NAME.ply"),
+        Shown::Segments(_) => wrong("points, as --out is .ply", "lines or rays", "--out NAME.obj"),
     }
 }
 
@@ -84,8 +79,8 @@ fn model(args: &ExportArgs, rules: Rules) -> crate::Result<String> {
     let first = names.map(|name| (name, Kind::Model));
     let mut out = OutputSet::create(&args.out, rules, Access::Private, &first).map_err(refused)?;
     let Shown::Points(points) = scaled(args, read(&args.path)?)? else {
-        let error = unlift_io::Error::new(&args.path, "", "points, for a model", "lines or rays");
-        return Err(advise(error, "--out NAME.obj"));
+        let error = FileError::new(&args.path, "", "points, for a model", "lines or rays");
+        return Err(Error::from(error).advise("--out NAME.obj"));
     };
     let (cameras, images) = match &args.cameras {
         None => (Vec::new(), Vec::new()),
@@ -105,7 +100,7 @@ fn views(project: &Path) -> crate::Result<(Vec<colmap::Camera>, Vec<colmap::Imag
         Some(folder) => Ok(colmap::read_views(&folder)?),
         None => {
             let expected = "a COLMAP model with cameras";
-            Err(unlift_io::Error::new(project, "", expected, "only points").into())
+            Err(FileError::new(project, "", expected, "only points").into())
         }
     }
 }
@@ -115,7 +110,7 @@ fn read(path: &Path) -> crate::Result<(Shown, Unit)> {
     let kind = kind(path)?;
     let wrong = |found: &str| {
         let expected = "a released, recovered or truth file of a map";
-        Err(unlift_io::Error::new(path, "", expected, found).into())
+        Err(FileError::new(path, "", expected, found).into())
     };
     if has_images(path)? {
         return wrong("one of images");
@@ -123,21 +118,16 @@ fn read(path: &Path) -> crate::Result<(Shown, Unit)> {
     match kind {
         Stage::Released => {
             let released = read_released::<3>(path)?;
-            let origin = released.origin();
-            let unit = released.unit();
-            match released.obfuscation() {
-                Obfuscation::Lines(_) | Obfuscation::Rays(_) => {
-                    let n = released.n_records();
-                    let segments = record_segments(&released, &surroundings(&released), 0..n);
-                    Ok((Shown::Segments(segments), unit))
-                }
+            let shown = match released.obfuscation() {
+                Obfuscation::Lines(lines) => segments(&released, lines.foot(), 0.01, 0.5),
+                Obfuscation::Rays(rays) => segments(&released, rays.centers(), 0.0, 3.0),
                 Obfuscation::AxisCandidates(candidates) => {
-                    let place =
-                        |p: &[f32; 3]| Some(std::array::from_fn(|c| f64::from(p[c]) + origin[c]));
-                    Ok((Shown::Points(candidates.position().iter().map(place).collect()), unit))
+                    let places = places(&released, candidates.position());
+                    Shown::Points(places.into_iter().map(Some).collect())
                 }
-                Obfuscation::AxisPlanes(_) => wrong("planes, which have no end"),
-            }
+                Obfuscation::AxisPlanes(_) => return wrong("planes, which have no end"),
+            };
+            Ok((shown, released.unit()))
         }
         Stage::Recovered => {
             let recovered = read_recovered::<3>(path)?;
@@ -160,37 +150,35 @@ fn scaled(args: &ExportArgs, (mut shown, unit): (Shown, Unit)) -> crate::Result<
     if unit != Unit::Meter {
         let expected = "a file in meters (obfuscate --scale)";
         let path = args.path.display();
-        return Err(usage(format!(
+        return Err(Error::request(format!(
             "--scale: expected {expected}, found {path} in {}",
             unit.name()
         )));
     }
-    let points = match &mut shown {
-        Shown::Points(points) => points.iter_mut().flatten().collect::<Vec<_>>(),
-        Shown::Segments(segments) => segments.iter_mut().flatten().collect(),
-    };
-    for point in points {
-        *point = point.map(|x| x / scale);
+    let divide = |point: &mut [f64; 3]| *point = point.map(|x| x / scale);
+    match &mut shown {
+        Shown::Points(points) => points.iter_mut().flatten().for_each(divide),
+        Shown::Segments(segments) => segments.iter_mut().flatten().for_each(divide),
     }
     Ok(shown)
 }
 
-/// Estimates from the records alone a box that holds most of the hidden points. Lines: the box of
-/// the feet without 1 % at each end, extended by half its width. Rays: the box of the centers,
-/// extended by three times its width.
-fn surroundings(released: &Released<3>) -> Bounds<3> {
-    let (places, left_out, around) = match released.obfuscation() {
-        Obfuscation::Lines(lines) => (lines.foot(), 0.01, 0.5),
-        Obfuscation::Rays(rays) => (rays.centers(), 0.0, 3.0),
-        Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => (&[][..], 0.0, 0.0),
-    };
+/// Returns positions of released records in the frame of the map.
+fn places(released: &Released<3>, positions: &[[f32; 3]]) -> Vec<[f64; 3]> {
     let origin = released.origin();
     let place = |p: &[f32; 3]| std::array::from_fn(|c| f64::from(p[c]) + origin[c]);
-    let places: Vec<[f64; 3]> = places.iter().map(place).collect();
-    let bounds = Bounds::quantiles(&places, left_out);
+    positions.iter().map(place).collect()
+}
+
+/// Returns the parts of lines or rays in a box that holds most of the hidden points, estimated from feet or centers alone: the box of
+/// these without the share `left_out` at each end, extended by `around` times its width.
+fn segments(released: &Released<3>, positions: &[[f32; 3]], left_out: f64, around: f64) -> Shown {
+    let origin = released.origin();
+    let bounds = Bounds::quantiles(&places(released, positions), left_out);
     let Bounds { low, high } = bounds.unwrap_or(Bounds { low: origin, high: origin });
     let widest = (0..3).map(|c| high[c] - low[c]).fold(0.0, f64::max);
     // All places may coincide: then extend by one unit.
     let more = if widest > 0.0 { around * widest } else { 1.0 };
-    Bounds { low: low.map(|x| x - more), high: high.map(|x| x + more) }
+    let bounds = Bounds { low: low.map(|x| x - more), high: high.map(|x| x + more) };
+    Shown::Segments(record_segments(released, &bounds, 0..released.n_records()))
 }

@@ -9,8 +9,9 @@ use unlift_vision::features::in_order;
 use unlift_vision::features::photo::Turn;
 
 use super::common::all_could_be;
+use crate::Error;
 use crate::args::FeaturesArgs;
-use crate::exit::{Outcome, usage};
+use crate::exit::Outcome;
 use crate::output::print;
 use crate::progress::Progress;
 use unlift_audit::images::{FeatureSource, Wanted, is_photo};
@@ -21,7 +22,7 @@ pub fn run(args: &FeaturesArgs) -> crate::Result<Outcome> {
     let target = check_file(&args.out, Kind::Features, &rules)?;
     check_no_photo(&args.images, &target)?;
     if args.as_stored && args.images.is_file() {
-        return Err(usage("--as-stored: expected with a folder of photos, found a file"));
+        return Err(Error::request("--as-stored: expected with a folder of photos, found a file"));
     }
     let wanted = Wanted { max_image_size: args.max_image_size, ..args.extraction.wanted() };
     let extraction = wanted.extraction(&args.images)?;
@@ -47,11 +48,7 @@ pub fn run(args: &FeaturesArgs) -> crate::Result<Outcome> {
     progress.show(0, names.len(), "reading images");
     in_order(&all, read, |at, result| -> crate::Result<()> {
         progress.show(at + 1, names.len(), &names[at]);
-        let usable = result.and_then(|image| {
-            writer.check(&image)?;
-            Ok(image)
-        });
-        match usable {
+        match result.and_then(|image| Ok(writer.check(&image).map(|()| image)?)) {
             Ok(image) => {
                 writer.append(&image)?;
                 n_images += 1;
@@ -67,9 +64,7 @@ pub fn run(args: &FeaturesArgs) -> crate::Result<Outcome> {
     if n_images > 0 {
         rules.check(&args.out, Kind::Features)?;
         writer.finish()?;
-    }
-    drop(progress);
-    if n_images > 0 {
+        drop(progress);
         let out = OneLine(args.out.display());
         print(&format!("{n_images} images, {n_features} features, in {out}\n"))?;
     }
@@ -87,7 +82,7 @@ fn check_no_photo(images: &Path, target: &Path) -> crate::Result<()> {
     };
     if folder.starts_with(images) && is_photo(target) {
         let expected = "expected a name that is not read as a photo";
-        return Err(usage(format!("--out: {}: {expected}", target.display())));
+        return Err(Error::request(format!("--out: {}: {expected}", target.display())));
     }
     Ok(())
 }

@@ -1,8 +1,8 @@
 //! `unlift invert`: paints pictures from keypoints, recovered keypoints, a recovered map, or bearings.
 
+use std::io::Write;
 use std::num::NonZeroUsize;
 use std::path::{Component, Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 use unlift::OneLine;
@@ -12,7 +12,7 @@ use unlift_audit::changes::kind_of;
 use unlift_audit::images::{FeatureSource, Wanted, evenly};
 use unlift_audit::inversion::{Painter, on_bearings, six_views, view};
 use unlift_audit::refused;
-use unlift_io::Error;
+use unlift_io::Error as FileError;
 use unlift_io::atomic::{Access, make_folders, write_file};
 use unlift_io::outputs::{Kind, OutputSet, Rules, marked_picture};
 use unlift_io::read::colmap;
@@ -24,8 +24,9 @@ use unlift_vision::network::DescriptorKind;
 
 use super::common::all_could_be;
 use super::stages::{self, of_image};
+use crate::Error;
 use crate::args::InvertArgs;
-use crate::exit::{Outcome, line, usage};
+use crate::exit::Outcome;
 use crate::output::print;
 use crate::stderr;
 use unlift_audit::released::same_map;
@@ -35,8 +36,8 @@ pub fn run(args: &InvertArgs) -> crate::Result<Outcome> {
     let rules = Rules::new(inputs.into_iter().flatten().map(PathBuf::as_path), false);
     // Only checks that files can be written there.
     drop(OutputSet::create(&args.out, rules.clone(), Access::Private, &[]).map_err(refused)?);
-    let to = Target { args, rules, painted: AtomicUsize::new(0) };
-    let unusable = match (&args.recovered, declared_kind(&args.path)) {
+    let to = Target { args, rules };
+    let Counts { painted, unusable } = match (&args.recovered, declared_kind(&args.path)) {
         (Some(recovered), _) if has_images(&args.path)? => images(&to, recovered)?,
         (Some(recovered), _) => map(&to, recovered)?,
         (None, Some(Stage::Released)) => {
@@ -44,31 +45,51 @@ pub fn run(args: &InvertArgs) -> crate::Result<Outcome> {
             match map.filter(|released| released.obfuscation().is_bearings()) {
                 Some(released) => bearings(&to, &released)?,
                 None => {
-                    return Err(usage("RECOVERED: expected what came back of PATH, found none"));
+                    return Err(Error::request(
+                        "RECOVERED: expected what came back of PATH, found none",
+                    ));
                 }
             }
         }
         (None, _) => keypoints(&to)?,
     };
-    let (painted, out) = (to.painted.into_inner(), OneLine(args.out.display()));
-    print(&format!("{painted} pictures, in {out}\n"))?;
+    print(&format!("{painted} pictures, in {}\n", OneLine(args.out.display())))?;
     all_could_be("painted", &args.path, painted, unusable)
 }
 
 struct Target<'a> {
     args: &'a InvertArgs,
     rules: Rules,
-    painted: AtomicUsize,
+}
+
+/// Counts of images.
+#[derive(Default)]
+struct Counts {
+    painted: usize,
+    unusable: usize,
+}
+
+impl Counts {
+    /// Counts an image, and prints its error if it has no picture.
+    fn add(&mut self, result: crate::Result<()>) {
+        match result {
+            Ok(()) => self.painted += 1,
+            Err(error) => {
+                stderr::tell(format_args!("unlift: {error}"));
+                self.unusable += 1;
+            }
+        }
+    }
 }
 
 impl Target<'_> {
-    /// Returns the path of the picture of image `name`, which may contain folders.
-    fn file(&self, name: &str) -> crate::Result<PathBuf> {
+    /// Writes the picture of image `name`, which may contain folders.
+    fn add(&self, name: &str, picture: &ColorImage) -> crate::Result<()> {
         let relative = Path::new(name);
         let within = relative.components().all(|part| matches!(part, Component::Normal(_)));
         if !within || name.is_empty() {
             let (expected, found) = ("a name within a folder", format!("{name:?}"));
-            return Err(Error::new(&self.args.path, "image", expected, found).into());
+            return Err(FileError::new(&self.args.path, "image", expected, found).into());
         }
         // Append to the whole name, because `a.jpg` and `a.png` may be two images.
         let mut file = self.args.out.join(relative).into_os_string();
@@ -77,22 +98,9 @@ impl Target<'_> {
         if let Some(folder) = file.parent() {
             make_folders(folder, Access::Private)?;
         }
-        Ok(self.rules.check(&file, Kind::Picture)?)
-    }
-
-    /// Writes the picture of image `name`.
-    fn add(&self, name: &str, picture: &ColorImage) -> crate::Result<()> {
-        let file = self.file(name)?;
+        let file = self.rules.check(&file, Kind::Picture)?;
         let bytes = marked_picture(&photo::png_of(picture)?);
-        write_file(&file, Access::Private, |out| std::io::Write::write_all(out, &bytes))?;
-        self.painted.fetch_add(1, Ordering::Relaxed);
-        Ok(())
-    }
-
-    /// Prints the error of an image that has no picture. Returns the number of these images.
-    fn count(&self, result: crate::Result<()>) -> usize {
-        let failed = result.err().inspect(|error| stderr::tell(line(error)));
-        usize::from(failed.is_some())
+        Ok(write_file(&file, Access::Private, |out| out.write_all(&bytes))?)
     }
 
     /// Returns the indices of the images to paint, out of `n`.
@@ -101,20 +109,21 @@ impl Target<'_> {
     }
 }
 
-/// Paints all images in parallel, and prints a line for each that fails. Returns the number of
-/// failures.
+/// Paints all images in parallel, and prints a line for each that fails.
 fn each<T: Sync>(
     to: &Target<'_>,
     images: &[T],
     paint: impl Fn(&T) -> crate::Result<(String, ColorImage)> + Sync,
-) -> crate::Result<usize> {
+) -> Counts {
     let work = |image: &T| paint(image).and_then(|(name, picture)| to.add(&name, &picture));
     let results: Vec<_> = images.par_iter().with_max_len(1).map(work).collect();
-    Ok(results.into_iter().map(|result| to.count(result)).sum())
+    let mut counts = Counts::default();
+    results.into_iter().for_each(|result| counts.add(result));
+    counts
 }
 
 /// Paints from the keypoints of photos or of a file.
-fn keypoints(to: &Target<'_>) -> crate::Result<usize> {
+fn keypoints(to: &Target<'_>) -> crate::Result<Counts> {
     let path = &to.args.path;
     let wanted = Wanted { option: "--features", kind: to.args.features, ..Wanted::default() };
     let extraction = wanted.extraction(path)?;
@@ -123,18 +132,18 @@ fn keypoints(to: &Target<'_>) -> crate::Result<usize> {
     // Errors of single images are reported when they are painted.
     let kind = source.kind("PATH", &chosen)?;
     let painter = &Painter::open(kind, None)?;
-    each(to, &chosen, |&at| {
+    Ok(each(to, &chosen, |&at| {
         let image = source.get(at)?;
         let place = || format!("image {}", image.name.escape_debug());
-        let wrong = |expected: &str| Error::new(path, place(), expected, "none");
+        let wrong = |expected: &str| FileError::new(path, place(), expected, "none");
         let descriptors = image.descriptors.as_ref().ok_or_else(|| wrong("descriptors"))?;
         let size = image.size.ok_or_else(|| wrong("a size in pixels"))?.map(|side| side as usize);
         let places: Vec<[f32; 2]> =
             image.keypoints.iter().map(|place| place.map(|x| x as f32)).collect();
         let picture = painter.keypoints(&places, descriptors, size);
-        let picture = picture.map_err(|error| Error::core(path, error.within(&place())))?;
+        let picture = picture.map_err(|error| FileError::core(path, error.within(&place())))?;
         Ok((image.name, picture))
-    })
+    }))
 }
 
 /// Returns the descriptor kind of the first released image that has descriptors.
@@ -150,7 +159,7 @@ fn kind_of_images(path: &Path) -> crate::Result<DescriptorKind> {
 }
 
 /// Paints from the recovered keypoints of released images.
-fn images(to: &Target<'_>, recovered: &Path) -> crate::Result<usize> {
+fn images(to: &Target<'_>, recovered: &Path) -> crate::Result<Counts> {
     let path = &to.args.path;
     let painter = &Painter::open(kind_of_images(path)?, None)?;
     let mut released = ImageFile::open(path, Stage::Released)?;
@@ -171,23 +180,23 @@ fn images(to: &Target<'_>, recovered: &Path) -> crate::Result<usize> {
         same_map(recovered, came_back.about().map, path, Some(image.fingerprint()))?;
         Ok(Some((name, image, came_back)))
     };
-    let mut unusable = 0;
+    let mut counts = Counts::default();
     let work = |(name, released, recovered): (String, Released<2>, Recovered<2>)| {
         let picture = painter.image(&released, &recovered).map_err(of_image(path, &name));
         Ok(picture.map_err(Into::into).and_then(|picture| to.add(&name, &picture)))
     };
     stages::each(next, work, |result| {
-        unusable += to.count(result);
+        counts.add(result);
         Ok(())
     })?;
-    Ok(unusable)
+    Ok(counts)
 }
 
 /// Paints from the recovered points of a map, as the cameras of a model see them.
-fn map(to: &Target<'_>, recovered: &Path) -> crate::Result<usize> {
+fn map(to: &Target<'_>, recovered: &Path) -> crate::Result<Counts> {
     let (args, path) = (to.args, &to.args.path);
     let Some(model) = &args.cameras else {
-        return Err(usage(
+        return Err(Error::request(
             "--cameras: expected a COLMAP model whose cameras see the map, found none",
         ));
     };
@@ -199,11 +208,11 @@ fn map(to: &Target<'_>, recovered: &Path) -> crate::Result<usize> {
     let (cameras, mut images) = colmap::read_views(model)?;
     images.sort_by(|a, b| a.name.cmp(&b.name));
     let chosen = to.chosen(images.len());
-    each(to, &chosen, |&at| {
+    Ok(each(to, &chosen, |&at| {
         let image = &images[at];
         let name = String::from_utf8_lossy(&image.name).into_owned();
         let of_image = |error: unlift::Error| {
-            Error::core(model, error.within(&format!("image {}", name.escape_debug())))
+            FileError::core(model, error.within(&format!("image {}", name.escape_debug())))
         };
         let camera = image.camera(&cameras).ok_or_else(|| {
             of_image(unlift::Error::new("camera", "one of the model", image.camera_id.to_string()))
@@ -215,16 +224,16 @@ fn map(to: &Target<'_>, recovered: &Path) -> crate::Result<usize> {
         }
         let picture = painter.map(&view, &released, &came_back).map_err(of_image)?;
         Ok((name, picture))
-    })
+    }))
 }
 
 /// Paints six views from the center of bearings, such as a sphere cloud: directions are released, so
 /// nothing needs to be recovered.
-fn bearings(to: &Target<'_>, released: &Released<3>) -> crate::Result<usize> {
-    let of_map = |error| Error::core(&to.args.path, error);
+fn bearings(to: &Target<'_>, released: &Released<3>) -> crate::Result<Counts> {
+    let of_map = |error| FileError::core(&to.args.path, error);
     let painter = Painter::open(kind_of("PATH", released.descriptors())?, None)?;
     let places = on_bearings(released).map_err(of_map)?;
-    each(to, &six_views(released).map_err(of_map)?, |(name, view)| {
+    Ok(each(to, &six_views(released).map_err(of_map)?, |(name, view)| {
         Ok(((*name).to_owned(), painter.map(view, released, &places).map_err(of_map)?))
-    })
+    }))
 }

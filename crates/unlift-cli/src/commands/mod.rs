@@ -16,10 +16,7 @@ use crate::args::{AuditCommand, Command};
 use crate::demo;
 use crate::exit::Outcome;
 
-/// Runs one command.
-///
-/// # Errors
-/// If the command cannot complete; `exit` turns the error into a line and an exit code.
+/// Runs one command; `exit` turns an error into a line and an exit code.
 pub fn run(command: Command) -> crate::Result<Outcome> {
     match command {
         Command::Demo(args) => demo::run(&args),

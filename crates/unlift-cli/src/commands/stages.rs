@@ -3,7 +3,7 @@
 
 use std::cell::RefCell;
 use std::collections::HashSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -12,7 +12,7 @@ use unlift::audit::{Plan, Row, Threshold, measure};
 use unlift::evaluate::blind;
 use unlift::neighbors::oracle::{Outliers, TrueNeighbors, search};
 use unlift::neighbors::sources::Named;
-use unlift::neighbors::{Needs as SourceNeeds, Neighborhoods, of_what_there_is};
+use unlift::neighbors::{Needs as SourceNeeds, Neighborhoods, Source, of_what_there_is};
 use unlift::obfuscate::{Change, Changed, Scheme, SchemeOptions, obfuscate as hide};
 use unlift::recover::{RecoverOptions, Recovered, Status, recover as solve};
 use unlift::released::Released;
@@ -24,7 +24,7 @@ use unlift_audit::images::FeatureSource;
 use unlift_audit::images::stream::{Needs, Stream, Tally};
 use unlift_audit::released::{expect_slots, same_map};
 use unlift_audit::{Checked, Prepared, Progress as _, check_file, refused};
-use unlift_io::Error;
+use unlift_io::Error as FileError;
 use unlift_io::atomic::{Access, OutputFile};
 use unlift_io::outputs::{Kind, OutputSet, Rules};
 use unlift_io::stage::{
@@ -36,8 +36,9 @@ use unlift_report::leak;
 use unlift_vision::features::Extraction;
 
 use super::common::{all_could_be, open_map, public, read_document};
+use crate::Error;
 use crate::args::{EvaluateArgs, NeighborsArgs, ObfuscateArgs, RecoverArgs, public_name};
-use crate::exit::{Outcome, advise, usage};
+use crate::exit::Outcome;
 use crate::output::{print, table};
 use crate::progress::{Progress, Stderr};
 use crate::stderr;
@@ -68,26 +69,20 @@ pub fn each<T: Send, U: Send>(
     mut done: impl FnMut(U) -> crate::Result<()>,
 ) -> crate::Result<()> {
     loop {
-        let mut batch = Vec::new();
-        while batch.len() < AT_WORK * rayon::current_num_threads() {
-            match next()? {
-                Some(item) => batch.push(item),
-                None => break,
-            }
-        }
+        let items = std::iter::from_fn(|| next().transpose());
+        let batch = items.take(AT_WORK * rayon::current_num_threads());
+        let batch = batch.collect::<crate::Result<Vec<T>>>()?;
         if batch.is_empty() {
             return Ok(());
         }
         let results: Vec<_> = batch.into_par_iter().with_max_len(1).map(&work).collect();
-        for result in results {
-            done(result?)?;
-        }
+        results.into_iter().try_for_each(|result| done(result?))?;
     }
 }
 
 /// Returns what converts an error about an image to one of the file `path`.
-pub fn of_image(path: &Path, name: &str) -> impl Fn(unlift::Error) -> Error {
-    move |error| Error::core(path, error.within(&format!("image {name}")))
+pub fn of_image(path: &Path, name: &str) -> impl Fn(unlift::Error) -> FileError {
+    move |error| FileError::core(path, error.within(&format!("image {name}")))
 }
 
 const GUESSABLE: &str = "unlift: note: whoever guesses the --seed can restore the order of the records and, under cp, \
@@ -95,7 +90,7 @@ const GUESSABLE: &str = "unlift: note: whoever guesses the --seed can restore th
 
 /// `unlift obfuscate`
 pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<Outcome> {
-    let (map, name, unit) = (&args.map, args.scheme.name, args.map.unit());
+    let (map, unit) = (&args.map, args.map.unit());
     let more = [&map.descriptors, &args.public_descriptors, &args.audit];
     let more = more.into_iter().filter_map(|path| path.as_deref());
     let inputs = [args.path.as_path()].into_iter().chain(more);
@@ -107,39 +102,8 @@ pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<Outcome> {
             "--out: an earlier release is replaced: never publish both, as their records meet in the points",
         );
     }
-    // All randomness comes from this key.
-    let key = || match args.seed {
-        Some(seed) => {
-            stderr::tell(GUESSABLE);
-            Ok(Key::from_seed(seed))
-        }
-        None => Key::fresh(),
-    };
-    let folder = OneLine(args.out.display());
     let Some(scheme) = args.scheme.of_dimension::<3>(&SchemeOptions::usual(unit)) else {
-        for (option, given) in [
-            ("--scale", map.scale.is_some()),
-            ("--descriptors", map.descriptors.is_some()),
-            ("--max-points", map.max_points.is_some()),
-            ("--mitigate", args.mitigate.is_some()),
-            ("--protect-descriptors", args.protect_descriptors.is_some()),
-            ("--audit", args.audit.is_some()),
-        ] {
-            if given {
-                let found = format!("found {name}, which hides images");
-                return Err(usage(format!("{option}: expected with a map, {found}")));
-            }
-        }
-        let scheme = args.scheme.of_dimension::<2>(&SchemeOptions::usual(Unit::Pixel));
-        let scheme =
-            scheme.ok_or_else(|| unlift_audit::Error::failed("not a scheme for images"))?;
-        let (counts, unusable) = hide_images(&args.path, &*scheme, &key()?, &mut out)?;
-        out.commit()?;
-        let Counts { images, slots, points, .. } = counts;
-        print(&format!(
-            "{name}: {slots} keypoints of {images} images hidden, {points} dropped, in {folder}\n"
-        ))?;
-        return all_could_be("used", &args.path, images, unusable);
+        return obfuscate_images(args, out);
     };
     let prepared = open_map(&args.path, map, false, (args.seed.unwrap_or(0), false))?;
     for note in prepared.doubts.iter().chain(&prepared.notes) {
@@ -149,18 +113,25 @@ pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<Outcome> {
     let name = scheme.name();
     let leak = args.audit.as_deref().map(|path| leak_of(path, args, &prepared, name));
     let leak = leak.transpose()?;
-    let hidden = hide(&*scheme, &prepared.original, prepared.descriptors.as_ref(), &key()?);
-    let (released, secret) = hidden.map_err(|error| Error::core(&args.path, error))?;
+    let hidden = hide(&*scheme, &prepared.original, prepared.descriptors.as_ref(), &key(args)?);
+    let (released, secret) = hidden.map_err(|error| FileError::core(&args.path, error))?;
     write_truth(&out.stage(TRUTH, Kind::Stage(Stage::Truth))?, &prepared.original, &secret)?;
     write_released(&out.stage(RELEASED, Kind::Stage(Stage::Released))?, &released)?;
     out.commit()?;
     let (slots, records) = (released.n_slots(), released.n_records());
-    let dropped = secret.dropped().len();
+    let (dropped, folder) = (secret.dropped().len(), OneLine(args.out.display()));
     print(&format!(
         "{name}: {slots} points hidden in {records} records, {dropped} dropped, in {folder}\n"
     ))?;
     leak.map_or(Ok(()), |leak| print(&format!("audited: {leak}\n")))?;
     Ok(Outcome::Done)
+}
+
+/// Returns the key from which all randomness comes.
+fn key(args: &ObfuscateArgs) -> Result<Key, unlift::Error> {
+    let Some(seed) = args.seed else { return Key::fresh() };
+    stderr::tell(GUESSABLE);
+    Ok(Key::from_seed(seed))
 }
 
 /// Returns `scheme` with the requested mitigation or protection of descriptors.
@@ -190,20 +161,31 @@ fn leak_of(
     let public = || public_name(args.public_descriptors.as_deref());
     let public = args.protect_descriptors.as_ref().map(|_| public());
     leak(&document, &prepared.about(&args.path)?, scheme, public)
-        .map_err(|wrong| Error::new(path, wrong.place, wrong.expected, wrong.found).into())
+        .map_err(|wrong| FileError::new(path, wrong.place, wrong.expected, wrong.found).into())
 }
 
-/// Hides the keypoints of all images of `path`, each under a key of its own, and writes both files into `out`. Also returns the
-/// number of images that could not be used.
-fn hide_images(
-    path: &Path,
-    scheme: &dyn Scheme<2>,
-    key: &Key,
-    out: &mut OutputSet,
-) -> crate::Result<(Counts, usize)> {
+/// Hides the keypoints of all images, each under a key of its own, and writes both files into `out`.
+fn obfuscate_images(args: &ObfuscateArgs, mut out: OutputSet) -> crate::Result<Outcome> {
+    let (map, path, name) = (&args.map, &args.path, args.scheme.name);
+    for (option, given) in [
+        ("--scale", map.scale.is_some()),
+        ("--descriptors", map.descriptors.is_some()),
+        ("--max-points", map.max_points.is_some()),
+        ("--mitigate", args.mitigate.is_some()),
+        ("--protect-descriptors", args.protect_descriptors.is_some()),
+        ("--audit", args.audit.is_some()),
+    ] {
+        if given {
+            let found = format!("found {name}, which hides images");
+            return Err(Error::request(format!("{option}: expected with a map, {found}")));
+        }
+    }
+    let scheme = args.scheme.of_dimension::<2>(&SchemeOptions::usual(Unit::Pixel));
+    let scheme = scheme.ok_or_else(|| Error::failed("not a scheme for images"))?;
+    let key = key(args)?;
     let source = FeatureSource::open(path, &Extraction::default())?;
     let tally = RefCell::new(Tally::default());
-    tally.borrow_mut().unusable += source.refused.len();
+    tally.borrow_mut().unusable = source.refused.len();
     source.refused.iter().for_each(|line| Stderr.say(line));
     let all: Vec<usize> = (0..source.names.len()).collect();
     let mut images =
@@ -218,8 +200,8 @@ fn hide_images(
     each(
         || images.next().transpose(),
         |image| {
-            let key = key_of(key, &image.name);
-            let hidden = hide(scheme, &image.original, image.descriptors.as_ref(), &key);
+            let key = key_of(&key, &image.name);
+            let hidden = hide(&*scheme, &image.original, image.descriptors.as_ref(), &key);
             Ok((hidden.map_err(of_image(path, &image.name))?, image))
         },
         |((released, secret), image)| {
@@ -230,12 +212,17 @@ fn hide_images(
             Ok(maps.released(&image.name, &released)?)
         },
     )?;
-    let unusable = tally.borrow().unusable;
     truths.finish()?;
     maps.finish()?;
     truth.commit()?;
     released.commit()?;
-    Ok((counts, unusable))
+    out.commit()?;
+    let Counts { images: n, slots, points, .. } = counts;
+    let folder = OneLine(args.out.display());
+    print(&format!(
+        "{name}: {slots} keypoints of {n} images hidden, {points} dropped, in {folder}\n"
+    ))?;
+    all_could_be("used", path, n, tally.borrow().unusable)
 }
 
 /// Writes a file of images: applies `work` to the items of `next`, and writes the results by `add`.
@@ -244,7 +231,7 @@ fn write<T: Send, U: Send>(
     kind: Stage,
     next: impl FnMut() -> crate::Result<Option<T>>,
     work: impl Fn(T) -> crate::Result<Option<(String, U)>> + Sync,
-    mut add: impl FnMut(&mut ImageWriter<'_>, &mut Counts, &str, &U) -> Result<(), Error>,
+    mut add: impl FnMut(&mut ImageWriter<'_>, &mut Counts, &str, &U) -> Result<(), FileError>,
 ) -> crate::Result<Counts> {
     let mut output = OutputFile::create(out, Access::Private)?;
     let mut writer = ImageWriter::start(&mut output);
@@ -273,8 +260,8 @@ pub fn neighbors(args: &NeighborsArgs) -> crate::Result<Outcome> {
     let alive = Progress::uncounted(false, "finding neighbors");
     let (counts, name) = match (&args.neighbors, args.truth.as_deref(), args.inlier_ratio) {
         (NeighborSource::Own(named), None, _) => {
-            let named = named.clone();
-            let named = args.k.map_or(named.clone(), |k| named.with_k(usize::from(k)));
+            let of_k = |k| named.clone().with_k(usize::from(k));
+            let named = args.k.map_or_else(|| named.clone(), of_k);
             let counts = match images {
                 true => images_by_source(args, &named, rules)?,
                 false => write_lists(args, rules, &map_by_source(args, &named)?)?,
@@ -290,11 +277,13 @@ pub fn neighbors(args: &NeighborsArgs) -> crate::Result<Outcome> {
         }
         (NeighborSource::Own(named), Some(_), _) => {
             let name = named.name();
-            return Err(usage(format!("--truth: expected with --neighbors oracle, found {name}")));
+            return Err(Error::request(format!(
+                "--truth: expected with --neighbors oracle, found {name}"
+            )));
         }
         _ => {
             let expected = "expected --truth and --inlier-ratios, found none";
-            return Err(usage(format!("--neighbors oracle: {expected}")));
+            return Err(Error::request(format!("--neighbors oracle: {expected}")));
         }
     };
     drop(alive);
@@ -321,31 +310,42 @@ fn add_lists(
     counts: &mut Counts,
     name: &str,
     lists: &Neighborhoods,
-) -> Result<(), Error> {
+) -> Result<(), FileError> {
     counts.slots += lists.n_slots();
     counts.longest = counts.longest.max(lists.longest());
     writer.neighborhoods(name, lists)
+}
+
+/// Returns an error if `source` needs other descriptors than those of `released`, where `expected` are missing.
+fn check_descriptors<const D: usize>(
+    source: &dyn Source<D>,
+    released: &Released<D>,
+    expected: &str,
+) -> Result<(), unlift::Error> {
+    match released.descriptors() {
+        Some(descriptors) => source.takes(descriptors),
+        None if source.needs() == SourceNeeds::Descriptors => {
+            let what = format!("descriptors for {}", source.name());
+            Err(unlift::Error::new(what, expected, "none"))
+        }
+        None => Ok(()),
+    }
 }
 
 /// Makes the lists of a map as an attacker does.
 fn map_by_source(args: &NeighborsArgs, named: &Named) -> crate::Result<Neighborhoods> {
     let released = read_released::<3>(&args.released)?;
     let source = named.of_dimension::<3>()?;
-    let of_map = |error| Error::core(&args.released, error);
-    match released.descriptors() {
-        None if source.needs() == SourceNeeds::Descriptors => {
-            let what = format!("descriptors for {}", source.name());
-            let error = unlift::Error::new(what, "some in the released map", "none");
-            let advice =
-                "--neighbors geometric, or hide the map with unlift obfuscate --descriptors FILE";
-            return Err(advise(of_map(error), advice));
-        }
-        None => {}
-        Some(descriptors) => source.takes(descriptors).map_err(|error| {
-            let advice = "--neighbors similarity, which takes descriptors of any kind";
-            advise(of_map(error), advice)
-        })?,
-    }
+    let of_map = |error| FileError::core(&args.released, error);
+    check_descriptors(&*source, &released, "some in the released map").map_err(|error| {
+        let advice = match released.descriptors() {
+            Some(_) => "--neighbors similarity, which takes descriptors of any kind",
+            None => {
+                "--neighbors geometric, or hide the map with unlift obfuscate --descriptors FILE"
+            }
+        };
+        Error::from(of_map(error)).advise(advice)
+    })?;
     if let Some(note) = source.note(released.n_slots()) {
         stderr::note(note);
     }
@@ -366,25 +366,21 @@ fn map_by_oracle(args: &NeighborsArgs, truth: &Path, ratio: f64) -> crate::Resul
         let outliers = Outliers::new(args.oracle_noise, &near, &knn, &secret, args.seed)?;
         near.lists(ratio, &outliers, args.seed)
     };
-    Ok(lists().map_err(|error| Error::core(truth, error))?)
+    Ok(lists().map_err(|error| FileError::core(truth, error))?)
 }
 
 /// Writes a source's lists for all images.
 fn images_by_source(args: &NeighborsArgs, named: &Named, rules: &Rules) -> crate::Result<Counts> {
     let source = named.of_dimension::<2>().map_err(|_| {
-        usage(format!("--neighbors {}: expected with a map, found images", named.name()))
+        Error::request(format!("--neighbors {}: expected with a map, found images", named.name()))
     })?;
     let mut images = ImageFile::open(&args.released, Stage::Released)?;
     let work = |rows: ImageRows<'_>| {
         let name = rows.name().to_owned();
         let image = rows.released()?;
-        let wrong = of_image(&args.released, &name);
-        if image.descriptors().is_none() && source.needs() == SourceNeeds::Descriptors {
-            let what = format!("descriptors for {}", source.name());
-            return Err(wrong(unlift::Error::new(what, "some", "none")).into());
-        }
-        image.descriptors().map_or(Ok(()), |rows| source.takes(rows)).map_err(&wrong)?;
-        let lists = of_what_there_is(&*source, &image, args.seed).map_err(wrong)?;
+        let lists = check_descriptors(&*source, &image, "some")
+            .and_then(|()| of_what_there_is(&*source, &image, args.seed))
+            .map_err(of_image(&args.released, &name))?;
         Ok(Some((name, lists)))
     };
     let next = || Ok(images.next_image()?);
@@ -417,35 +413,34 @@ pub fn recover(args: &RecoverArgs) -> crate::Result<Outcome> {
     let kind = Kind::Stage(Stage::Recovered);
     check_file(&args.out, kind, &rules)?;
     let alive = Progress::uncounted(false, "recovering");
-    let options = RecoverOptions { seed: args.seed, ..RecoverOptions::default() };
-    let out = OneLine(args.out.display());
-    if has_images(&args.released)? {
-        let Counts { points, slots, images, .. } = recover_images(args, &options, &rules)?;
-        drop(alive);
-        print(&format!(
-            "{points} of {slots} keypoints of {images} images have a position, in {out}\n"
-        ))?;
-        return Ok(Outcome::Done);
-    }
-    let released = read_released::<3>(&args.released)?;
-    let (records, slots) = (released.n_records(), released.slots_per_record());
-    let lists = read_neighborhoods(&args.neighbors, records, slots)?;
-    let map = Some(released.fingerprint());
-    same_map(&args.neighbors, lists.about().map, &args.released, map)?;
-    for note in notes_on_lists(&lists, slots) {
-        alive.say(&format!("note: {}: {note}", args.neighbors.display()));
-    }
-    let recovered = solve(&released, &lists, &args.solver, &options);
-    let recovered = recovered.map_err(|error| Error::core(&args.released, error))?;
-    check_file(&args.out, kind, &rules)?;
-    write_recovered(&args.out, &recovered)?;
+    let what = if has_images(&args.released)? {
+        let Counts { points, slots, images, .. } = recover_images(args, &rules, &alive)?;
+        format!("{points} of {slots} keypoints of {images} images have a position")
+    } else {
+        let released = read_released::<3>(&args.released)?;
+        let (records, slots) = (released.n_records(), released.slots_per_record());
+        let lists = read_neighborhoods(&args.neighbors, records, slots)?;
+        check_lists(args, &released, &lists, &mut HashSet::new(), &alive)?;
+        let recovered = recovered(args, &released, &lists)
+            .map_err(|error| FileError::core(&args.released, error))?;
+        check_file(&args.out, kind, &rules)?;
+        write_recovered(&args.out, &recovered)?;
+        let (n, slots) = (n_recovered(&recovered), recovered.n_slots());
+        let (delta, unit) = (recovered.delta(), recovered.unit().name());
+        format!("{n} of {slots} points have a position, with delta {delta:.4} {unit}")
+    };
     drop(alive);
-    let (n, slots) = (n_recovered(&recovered), recovered.n_slots());
-    let (delta, unit) = (recovered.delta(), recovered.unit().name());
-    print(&format!(
-        "{n} of {slots} points have a position, with delta {delta:.4} {unit}, in {out}\n"
-    ))?;
+    print(&format!("{what}, in {}\n", OneLine(args.out.display())))?;
     Ok(Outcome::Done)
+}
+
+fn recovered<const D: usize>(
+    args: &RecoverArgs,
+    released: &Released<D>,
+    lists: &Neighborhoods,
+) -> Result<Recovered<D>, unlift::Error> {
+    let options = RecoverOptions { seed: args.seed, ..RecoverOptions::default() };
+    solve(released, lists, &args.solver, &options)
 }
 
 fn n_recovered<const D: usize>(recovered: &Recovered<D>) -> usize {
@@ -453,14 +448,9 @@ fn n_recovered<const D: usize>(recovered: &Recovered<D>) -> usize {
 }
 
 /// Recovers all images, and writes them.
-fn recover_images(
-    args: &RecoverArgs,
-    options: &RecoverOptions,
-    rules: &Rules,
-) -> crate::Result<Counts> {
+fn recover_images(args: &RecoverArgs, rules: &Rules, alive: &Progress) -> crate::Result<Counts> {
     let mut images = ImageFile::open(&args.released, Stage::Released)?;
     let mut lists = ImageFile::open(&args.neighbors, Stage::Neighborhoods)?;
-    // The same note about several images is printed once.
     let mut printed = HashSet::new();
     let next = || {
         let Some(rows) = images.next_image()? else {
@@ -471,18 +461,11 @@ fn recover_images(
         let image = rows.released()?;
         let (records, slots) = (image.n_records(), image.slots_per_record());
         let lists = lists.expect(&name, &args.released)?.neighborhoods(records, slots)?;
-        let map = Some(image.fingerprint());
-        same_map(&args.neighbors, lists.about().map, &args.released, map)?;
-        for note in notes_on_lists(&lists, slots) {
-            let what = note.split(|c: char| c.is_ascii_digit()).next_back().unwrap_or_default();
-            if printed.insert(what.to_owned()) {
-                stderr::note(format_args!("{}: {note}", args.neighbors.display()));
-            }
-        }
+        check_lists(args, &image, &lists, &mut printed, alive)?;
         Ok(Some((name, image, lists)))
     };
     let work = |(name, image, lists): (String, Released<2>, Neighborhoods)| {
-        let recovered = solve(&image, &lists, &args.solver, options);
+        let recovered = recovered(args, &image, &lists);
         let recovered = recovered.map_err(of_image(&args.released, &name))?;
         Ok(Some((name, recovered)))
     };
@@ -494,32 +477,46 @@ fn recover_images(
     })
 }
 
-/// Returns notes on lists that another program wrote.
-fn notes_on_lists(lists: &Neighborhoods, slots_per_record: usize) -> Vec<String> {
-    let mut notes = Vec::new();
+/// Checks that `lists` are of `released`, and prints notes on lists that another program wrote. A note that is in `printed` differs at
+/// most in its numbers from an earlier one, and is not repeated.
+fn check_lists<const D: usize>(
+    args: &RecoverArgs,
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    printed: &mut HashSet<String>,
+    alive: &Progress,
+) -> crate::Result<()> {
+    let About { map, order, .. } = lists.about();
+    same_map(&args.neighbors, map, &args.released, Some(released.fingerprint()))?;
+    let mut note = |numbers: String, note: &str| {
+        if printed.insert(note.to_owned()) {
+            alive.say(&format!("note: {}: {numbers}{note}", args.neighbors.display()));
+        }
+    };
     let n = lists.n_slots();
     let empty = (0..n).filter(|&slot| lists.of(slot).is_empty()).count();
     if empty > 0 {
-        notes.push(format!(
-            "{empty} of {n} lists are empty: solvers that read lists recover nothing there"
-        ));
+        let numbers = format!("{empty} of {n} ");
+        note(numbers, "lists are empty: solvers that read lists recover nothing there");
     }
-    if lists.about().map.is_none() {
-        notes.push("does not name its released map; assumed to be this one".to_owned());
+    if map.is_none() {
+        note(String::new(), "does not name its released map; assumed to be this one");
     }
-    if lists.about().order == RowOrder::Unstated && slots_per_record > 1 {
+    if order == RowOrder::Unstated && released.slots_per_record() > 1 {
         let names = RowOrder::STATED.map(|order| order.name().unwrap_or_default()).join(", ");
-        notes.push(format!(
+        let text = format!(
             "does not state what its rows are counted by (metadata rows_by: {names}): figures of what is recovered \
              will be upper bounds"
-        ));
+        );
+        note(String::new(), &text);
     }
-    notes
+    Ok(())
 }
 
 /// What was compared.
 struct Evaluated {
     row: Row,
+    thresholds: Vec<Threshold>,
     /// Without a fingerprint if any image lacks that of its released image.
     about: About,
     slots_per_record: usize,
@@ -531,23 +528,12 @@ struct Evaluated {
 pub fn evaluate(args: &EvaluateArgs) -> crate::Result<Outcome> {
     // The released map beside the truth, for the blind baseline.
     let released = Some(args.truth.with_file_name(RELEASED)).filter(|path| path.exists());
-    let images = has_images(&args.truth)?;
-    let (unit, thresholds, evaluated) = match images {
-        true => {
-            let thresholds = thresholds(args, Unit::Pixel);
-            let evaluated = evaluate_images(args, released.as_deref(), &thresholds)?;
-            (Unit::Pixel, thresholds, evaluated)
-        }
-        false => {
-            let (original, secret) = read_truth::<3>(&args.truth)?;
-            let unit = original.reveal().unit();
-            let thresholds = thresholds(args, unit);
-            let released = released.as_ref();
-            let evaluated = evaluate_map(args, released, (&original, &secret), &thresholds)?;
-            (unit, thresholds, evaluated)
-        }
+    let released = released.as_deref();
+    let evaluated = match has_images(&args.truth)? {
+        true => evaluate_images(args, released)?,
+        false => evaluate_map(args, released)?,
     };
-    let Evaluated { row, about, slots_per_record, checked } = evaluated;
+    let Evaluated { row, thresholds, about, slots_per_record, checked } = evaluated;
     let mut notes = Vec::new();
     if about.map.is_none() {
         notes.push("does not name its released map; assumed to be that of the truth".to_owned());
@@ -557,12 +543,14 @@ pub fn evaluate(args: &EvaluateArgs) -> crate::Result<Outcome> {
                     record, so the figures are upper bounds";
         notes.push(note.to_owned());
     }
-    notes.extend(checked.notes(&thresholds, unit).map_err(|error| {
-        let error = Error::core(&args.recovered, error).into();
-        let advice = || {
-            format!("put {RELEASED} beside the truth: records identify a map better than points")
-        };
-        if released.is_some() { error } else { advise(error, advice()) }
+    notes.extend(checked.notes(&thresholds, row.unit).map_err(|error| {
+        let error = Error::from(FileError::core(&args.recovered, error));
+        if released.is_some() {
+            return error;
+        }
+        error.advise(format!(
+            "put {RELEASED} beside the truth: records identify a map better than points"
+        ))
     })?);
     for note in &notes {
         stderr::note(format_args!("{}: {note}", args.recovered.display()));
@@ -574,6 +562,7 @@ pub fn evaluate(args: &EvaluateArgs) -> crate::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
+/// Returns the requested thresholds, by default those of an audit in `unit`.
 fn thresholds(args: &EvaluateArgs, unit: Unit) -> Vec<Threshold> {
     match args.thresholds.as_slice() {
         [] => Plan::<3>::new(unit).thresholds,
@@ -581,40 +570,36 @@ fn thresholds(args: &EvaluateArgs, unit: Unit) -> Vec<Threshold> {
     }
 }
 
-fn evaluate_map(
-    args: &EvaluateArgs,
-    released: Option<&PathBuf>,
-    (original, secret): (&Original<3>, &Secret),
-    thresholds: &[Threshold],
-) -> crate::Result<Evaluated> {
-    let recovered = read_recovered_in::<3>(&args.recovered, original.reveal().unit())?;
+fn evaluate_map(args: &EvaluateArgs, released: Option<&Path>) -> crate::Result<Evaluated> {
+    let (original, secret) = read_truth::<3>(&args.truth)?;
+    let unit = original.reveal().unit();
+    let thresholds = thresholds(args, unit);
+    let recovered = read_recovered_in::<3>(&args.recovered, unit)?;
     let about = recovered.about();
     same_map(&args.recovered, about.map, &args.truth, secret.map())?;
     let released = released.map(|path| {
         let released = read_released::<3>(path)?;
         same_map(path, Some(released.fingerprint()), &args.truth, secret.map())?;
-        expect_slots(path, &released, secret)?;
-        Ok::<_, Error>(released)
+        expect_slots(path, &released, &secret)?;
+        Ok::<_, FileError>(released)
     });
     let released = released.transpose()?;
     let mut checked = Checked::default();
-    let added = checked.add(&recovered, original, secret, released.as_ref());
-    added.map_err(|error| Error::core(&args.truth, error))?;
-    let baseline = released.map(|released| blind(&released, original, secret));
-    let (row, _) = measure(&recovered, original, secret, baseline.as_ref(), thresholds)
-        .map_err(|error| Error::core(&args.recovered, error))?;
-    Ok(Evaluated { row, about, slots_per_record: secret.slots_per_record(), checked })
+    let added = checked.add(&recovered, &original, &secret, released.as_ref());
+    added.map_err(|error| FileError::core(&args.truth, error))?;
+    let baseline = released.map(|released| blind(&released, &original, &secret));
+    let (row, _) = measure(&recovered, &original, &secret, baseline.as_ref(), &thresholds)
+        .map_err(|error| FileError::core(&args.recovered, error))?;
+    let slots_per_record = secret.slots_per_record();
+    Ok(Evaluated { row, thresholds, about, slots_per_record, checked })
 }
 
 /// Computes the row over all images.
-fn evaluate_images(
-    args: &EvaluateArgs,
-    released: Option<&Path>,
-    thresholds: &[Threshold],
-) -> crate::Result<Evaluated> {
+fn evaluate_images(args: &EvaluateArgs, released: Option<&Path>) -> crate::Result<Evaluated> {
+    let thresholds = thresholds(args, Unit::Pixel);
     let mut pairs = Pairs::open(&args.truth, released)?;
     let mut file = ImageFile::open(&args.recovered, Stage::Recovered)?;
-    let (mut pooled, mut checked) = (Pooled::new(thresholds), Checked::default());
+    let (mut pooled, mut checked) = (Pooled::new(&thresholds), Checked::default());
     let mut about: Option<About> = None;
     while let Some(Pair { name, original, secret, released }) = pairs.next()? {
         if secret.n_slots() == 0 {
@@ -633,9 +618,10 @@ fn evaluate_images(
         }
     }
     file.expect_end(&args.truth)?;
-    let none = || Error::new(&args.truth, "", "images with hidden points", "none");
+    let none = || FileError::new(&args.truth, "", "images with hidden points", "none");
     let row = pooled.row().ok_or_else(none)?;
-    Ok(Evaluated { row, about: about.unwrap_or_default(), slots_per_record: 1, checked })
+    let about = about.unwrap_or_default();
+    Ok(Evaluated { row, thresholds, about, slots_per_record: 1, checked })
 }
 
 /// Iterator over images of a truth file and of the released file.
@@ -655,7 +641,7 @@ struct Pair {
 impl<'a> Pairs<'a> {
     fn open(truth: &'a Path, released: Option<&'a Path>) -> crate::Result<Self> {
         let images = ImageFile::open(truth, Stage::Truth)?;
-        let open = |path| Ok::<_, Error>((path, ImageFile::open(path, Stage::Released)?));
+        let open = |path| Ok::<_, FileError>((path, ImageFile::open(path, Stage::Released)?));
         Ok(Self { truth: (truth, images), released: released.map(open).transpose()? })
     }
 

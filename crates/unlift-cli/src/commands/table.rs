@@ -8,8 +8,9 @@ use unlift_io::outputs::{Kind, Rules};
 use unlift_report::export::{TableFormat, curves, table, thresholds};
 
 use super::common::read_document;
+use crate::Error;
 use crate::args::TableArgs;
-use crate::exit::{Outcome, usage};
+use crate::exit::Outcome;
 use crate::output::print;
 use crate::stderr;
 
@@ -26,7 +27,7 @@ pub fn run(args: &TableArgs) -> crate::Result<Outcome> {
         Some(_) => {
             let expected = "--out: expected a name that ends in .md, .tex, .csv or .svg";
             let found = args.out.iter().map(|out| out.display().to_string()).collect::<String>();
-            return Err(usage(format!("{expected}, found {found}")));
+            return Err(Error::request(format!("{expected}, found {found}")));
         }
     };
     let rules = Rules::new([args.audit.as_path()], false);
@@ -39,14 +40,18 @@ pub fn run(args: &TableArgs) -> crate::Result<Outcome> {
         let same = |typed: &&&str| typed.parse::<f64>().is_ok_and(|value| value == requested.value);
         known.iter().find(same).copied().ok_or_else(|| {
             let (known, found) = (known.join(", "), &requested.label);
-            usage(format!("--thresholds: expected one of {known}, as in the audit, found {found}"))
+            Error::request(format!(
+                "--thresholds: expected one of {known}, as in the audit, found {found}"
+            ))
         })
     });
     let only = only.transpose()?;
     let text = match format {
         Some(format) => table(&document, format, only),
         None => curves(&document, only).ok_or_else(|| {
-            usage("--out: expected an audit with rows by the oracle, for curves, found none")
+            Error::request(
+                "--out: expected an audit with rows by the oracle, for curves, found none",
+            )
         })?,
     };
     // A table does not show schemes that were not audited.

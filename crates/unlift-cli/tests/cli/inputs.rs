@@ -70,10 +70,6 @@ fn descriptors_that_are_missing_are_told_with_where_they_are() {
         "unlift: hidden/released.npz: descriptors for overlap: expected some in the released map, \
          found none\n  try: --neighbors geometric, or hide the map with unlift obfuscate --descriptors FILE\n"
     );
-    assert_eq!(
-        place.complains("audit map room.csv --k 10 --neighbors overlap", 2),
-        "unlift: --neighbors overlap: expected descriptors (--descriptors FILE), found none\n"
-    );
 }
 
 #[test]

@@ -1,10 +1,8 @@
 //! Tests of the program: exit codes, one-line errors, complete outputs, identical bytes.
 
-#[path = "../common/mod.rs"]
-mod common;
-
 mod again;
 mod audit_map;
+mod common;
 mod compare;
 mod corpus;
 mod export;

@@ -1,16 +1,13 @@
 //! Output streams: unread pipes, full disks, and names with terminal control characters.
 
 use std::fs;
-#[cfg(unix)]
 use std::io::{BufRead, BufReader, Read};
-#[cfg(unix)]
 use std::process::{Command, Stdio};
 
 use crate::common::{Place, texts};
 
 const HIDE: &str = "obfuscate room.csv --schemes olc --k 10 --seed 1 --out hidden";
 
-#[cfg(unix)]
 #[test]
 fn an_interrupt_tells_what_was_done_and_that_nothing_is_written() {
     let place = Place::with_room(3000);

@@ -1,8 +1,5 @@
 //! Helpers of the tests: a temporary folder with inputs, and runs of the program in it.
 
-// Each test program compiles this file and uses only a part of it.
-#![allow(dead_code)]
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
