@@ -19,15 +19,7 @@ from ._unlift import audit_images as _audit_images
 T = TypeVar("T")
 
 #: Options that take a list or a single item.
-SEVERAL = {
-    "schemes",
-    "neighbors",
-    "inlier_ratios",
-    "oracle_noise",
-    "solvers",
-    "thresholds",
-    "gates",
-}
+SEVERAL = {"schemes", "neighbors", "inlier_ratios", "oracle_noise", "solvers", "thresholds", "gates"}
 
 #: A name in `SCHEMES`, or a function (`scheme`).
 Scheme = str | Callable[..., Records]
@@ -105,28 +97,12 @@ def audit(
     If a scheme or source of your own fails, or a scheme fails a property test, it has no row and a warning names it. Raises UnliftError
     for a wrong argument, or if no scheme has a row. KeyboardInterrupt takes effect at once.
     """
-    options = _options(
-        schemes=schemes,
-        neighbors=neighbors,
-        inlier_ratios=inlier_ratios,
-        oracle_noise=oracle_noise,
-        solvers=solvers,
-        thresholds=thresholds,
-        k=k,
-        tile_points=tile_points,
-        tile=tile,
-        delta=delta,
-        records_alone=records_alone,
-        seed=seed,
-        repeats=repeats,
-        gates=gates,
-        threads=threads,
-    )
+    options = _options(locals())
     report = Report(_run(lambda tell: _audit(map, options, tell), progress, "row"))
-    for one in report.document.get("not_audited") or []:
-        if one["scheme"] not in SCHEMES or one.get("neighbors") not in (None, "oracle", *SOURCES):
-            by = f" with neighbors by {one['neighbors']}" if one.get("neighbors") else ""
-            warnings.warn(f"{one['scheme']}{by} was not audited: {one['reason']}", stacklevel=2)
+    for missing in report.document.get("not_audited") or []:
+        if missing["scheme"] not in SCHEMES or missing.get("neighbors") not in (None, "oracle", *SOURCES):
+            by = f" with neighbors by {missing['neighbors']}" if missing.get("neighbors") else ""
+            warnings.warn(f"{missing['scheme']}{by} was not audited: {missing['reason']}", stacklevel=2)
     return report
 
 
@@ -175,25 +151,8 @@ def audit_images(
     Raises UnliftError for wrong arrays; the message names the image, what was expected and what was found. If an image of a path cannot
     be used, a warning names it, the audit leaves it out, and `Report.passed` is False. KeyboardInterrupt takes effect at once.
     """
-    options = _options(
-        schemes=schemes,
-        neighbors=neighbors,
-        inlier_ratios=inlier_ratios,
-        oracle_noise=oracle_noise,
-        solvers=solvers,
-        thresholds=thresholds,
-        k=k,
-        delta=delta,
-        seed=seed,
-        repeats=repeats,
-        gates=gates,
-        threads=threads,
-        features=features,
-        max_features=max_features,
-        max_images=max_images,
-        photos=None if photos is None else os.fspath(photos),
-        pictures=pictures,
-    )
+    photos = None if photos is None else os.fspath(photos)
+    options = _options(locals())
     native: tuple[_Report, list[str]] = _run(lambda tell: _audit_images(images, options, tell), progress, "image")
     report, messages = native
     for line in messages:
@@ -206,11 +165,11 @@ def _several(given: Any) -> list[Any]:
     return [given] if isinstance(given, str) or callable(given) else list(given)
 
 
-def _options(**options: Any) -> dict[str, Any]:
-    """Returns the options in the form that the native module takes."""
+def _options(arguments: dict[str, Any]) -> dict[str, Any]:
+    """Returns arguments by name in the form that the native module takes, which ignores those that are no options."""
     return {
         name: _several(given) if name in SEVERAL and given is not None else given
-        for name, given in options.items()
+        for name, given in arguments.items()
     }
 
 
@@ -219,36 +178,18 @@ def _run(
     progress: bool | Callable[[int, int, str], object],
     unit: str,
 ) -> T:
-    """Runs `audit` with a callback for its progress, and returns its result."""
-    if progress is True:
-        with _Bar(unit) as bar:
-            return audit(bar.tell)
-    return audit(progress or None)
+    """Runs `audit` with a callback for its progress: of the caller, a bar of tqdm if it is installed, or lines on stderr."""
+    if progress is not True:
+        return audit(progress or None)
+    try:
+        from tqdm.auto import tqdm  # type: ignore[import-untyped,unused-ignore]
+    except ImportError:
+        return audit(lambda done, total, what: print(f"unlift: {done}/{total} {what}", file=sys.stderr, flush=True))
+    with tqdm(unit=unit) as bar:
 
+        def tell(done: int, total: int, what: str) -> None:
+            bar.total = total
+            bar.set_description(what, refresh=False)
+            bar.update(done - bar.n)
 
-class _Bar:
-    """Shows the progress of an audit: by tqdm if it is installed, else in lines on stderr."""
-
-    def __init__(self, unit: str) -> None:
-        self._unit = unit
-
-    def __enter__(self) -> _Bar:
-        try:
-            from tqdm.auto import tqdm  # type: ignore[import-untyped,unused-ignore]
-
-            self._bar: Any = tqdm(unit=self._unit)
-        except ImportError:
-            self._bar = None
-        return self
-
-    def tell(self, done: int, total: int, what: str) -> None:
-        if self._bar is None:
-            print(f"unlift: {done}/{total} {what}", file=sys.stderr, flush=True)
-            return
-        self._bar.total = total
-        self._bar.set_description(what, refresh=False)
-        self._bar.update(done - self._bar.n)
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.close()
+        return audit(tell)

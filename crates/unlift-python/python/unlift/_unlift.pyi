@@ -245,26 +245,9 @@ def audit(
 def audit_images(
     images: Any, options: dict[str, Any], tell: Callable[[int, int, str], object] | None
 ) -> tuple[Report, list[str]]: ...
-def check_scheme(scheme: Callable[..., Records], *, images: bool = False) -> None:
-    """Checks that a scheme hides every point, on its record, by its key alone, and in an order that reveals nothing.
-
-    It calls the scheme with 0, 1, 2, 3, 7, 120, 200, 300, 301, 600 and 700 points: of a made-up room, at random, many in one place;
-    with `images`, keypoints `(n, 2)`. A scheme may refuse points by an exception, except 200, 600 and 700 points of a room.
-    """
-
+def check_scheme(scheme: Callable[..., Records], *, images: bool = False) -> None: ...
 def check_solver(
     solver: Callable[..., Any], released: Released | Hidden, lists: Neighborhoods
-) -> None:
-    """Checks that a solver returns a row for every hidden point of `released`, and the same positions again.
-
-    It calls the solver three times, the last time with empty lists.
-    """
-
-def check_source(source: Callable[..., Any], released: Released | Hidden) -> None:
-    """Checks that a source returns a list for every hidden point of `released`, of records of this map, by its seed alone.
-
-    It calls the source three times.
-    """
-
-def command_line(words: list[str]) -> int:
-    """Runs the command line `words`, of which the first is the name of the program, and returns the exit code."""
+) -> None: ...
+def check_source(source: Callable[..., Any], released: Released | Hidden) -> None: ...
+def command_line(words: list[str]) -> int: ...

@@ -148,21 +148,14 @@ def _features(image: dict[str, Any]) -> Features:
 
 def _rows_of(item: str, document: dict[str, Any], tile: int | None = None) -> _pa.RecordBatch:
     """Returns the rows of one audit, with the name of its item."""
-    notes = document.get("notes") or []
-    rows = [{**_figures(row), "item": item, "tile": tile, "notes": notes} for row in document["results"]]
-    missing = [
-        {"item": item, "tile": tile, "scheme": one["scheme"], "error": one["reason"]} for one in document.get("not_audited") or []
-    ]
-    return _batch(rows + missing)
+    rows = [{**_pairs(row), "notes": document.get("notes") or []} for row in document["results"]]
+    rows += [{"scheme": row["scheme"], "error": row["reason"]} for row in document.get("not_audited") or []]
+    return _batch([{**row, "item": item, "tile": tile} for row in rows])
 
 
-def _figures(row: dict[str, Any]) -> dict[str, Any]:
-    figures: dict[str, Any] = {}
-    for name, of in ROWS.items():
-        value = row.get(name)
-        is_map = of.startswith("map")
-        figures[name] = list(value.items()) if is_map and value is not None else value
-    return figures
+def _pairs(row: dict[str, Any]) -> dict[str, Any]:
+    """Returns a row with lists of pairs in place of dicts, as Arrow takes maps."""
+    return {name: list(value.items()) if isinstance(value, dict) else value for name, value in row.items()}
 
 
 def _batch(rows: list[dict[str, Any]]) -> _pa.RecordBatch:
