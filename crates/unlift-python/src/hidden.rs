@@ -71,12 +71,8 @@ impl Released {
     /// with `force`.
     #[pyo3(signature = (path, *, force=false))]
     fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
-        save(
-            py,
-            (path, force),
-            Kind::Released,
-            |path| of_either!(&self.0, released => write_released(path, released)),
-        )
+        let write = |path: &Path| of_either!(&self.0, released => write_released(path, released));
+        save(py, (path, force), Kind::Released, write)
     }
 
     fn __len__(&self) -> usize {
@@ -252,11 +248,8 @@ pub fn released_of(given: &Bound<'_, PyAny>) -> PyResult<Released> {
     if let Ok(hidden) = given.cast::<Hidden>() {
         return Ok(hidden.get().released.clone());
     }
-    let released = given.cast::<Released>();
-    released.map(|released| released.get().clone()).map_err(|_| {
-        let found = given.get_type().to_string();
-        wrong("released", "a Released or a Hidden", found)
-    })
+    let released = given.cast::<Released>().map(|released| released.get().clone());
+    released.map_err(|_| wrong("released", "a Released or a Hidden", given.get_type()))
 }
 
 /// Extracts the truth from a Truth or a Hidden.
@@ -264,10 +257,8 @@ pub fn truth_of(given: &Bound<'_, PyAny>) -> PyResult<Truth> {
     if let Ok(hidden) = given.cast::<Hidden>() {
         return Ok(hidden.get().truth.clone());
     }
-    given.cast::<Truth>().map(|truth| truth.get().clone()).map_err(|_| {
-        let found = given.get_type().to_string();
-        wrong("truth", "a Truth or a Hidden", found)
-    })
+    let truth = given.cast::<Truth>().map(|truth| truth.get().clone());
+    truth.map_err(|_| wrong("truth", "a Truth or a Hidden", given.get_type()))
 }
 
 /// Writes a stage file of `kind` to `path` by `write`; with `force`, also over foreign files.

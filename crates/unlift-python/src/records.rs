@@ -103,15 +103,13 @@ impl Records {
 
 /// Makes records of an image if the rows of an array are pairs, else of a map.
 macro_rules! records_by {
-    ($rows:ident => $made:expr) => {
+    ($rows:ident => $hiding:expr) => {
         Ok(Records(match is_of_pairs(stringify!($rows), $rows)? {
-            true => Either::Image($made?),
-            false => Either::Map($made?),
+            true => Either::Image($hiding),
+            false => Either::Map($hiding),
         }))
     };
 }
-
-type Given<'a, 'py> = &'a Bound<'py, PyAny>;
 
 /// Lines through `points` (n, 3) along `directions` (n, 3); for an image, both (n, 2). With
 /// `hidden` (n, 2) each hides two points.
@@ -122,16 +120,10 @@ pub fn lines(
     directions: &Bound<'_, PyAny>,
     hidden: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Records> {
-    fn of<const D: usize>(
-        points: Given<'_, '_>,
-        directions: Given<'_, '_>,
-        hidden: Option<Given<'_, '_>>,
-    ) -> PyResult<Hiding<D>> {
-        let (points, directions) = (rows("points", points)?, rows("directions", directions)?);
-        let lines = Lines::through(&points, &directions).map_err(raised)?;
-        Hiding::of(Obfuscation::Lines(lines), hidden)
-    }
-    records_by!(points => of(points, directions, hidden))
+    records_by!(points => {
+        let lines = Lines::through(&rows("points", points)?, &rows("directions", directions)?);
+        Hiding::of(Obfuscation::Lines(lines.map_err(raised)?), hidden)?
+    })
 }
 
 /// Rays from `centers` (m, 3) along `directions` (n, 3), from the center to the point; `center`
@@ -144,19 +136,13 @@ pub fn rays(
     directions: &Bound<'_, PyAny>,
     hidden: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Records> {
-    fn of<const D: usize>(
-        centers: Given<'_, '_>,
-        center: Given<'_, '_>,
-        directions: Given<'_, '_>,
-        hidden: Option<Given<'_, '_>>,
-    ) -> PyResult<Hiding<D>> {
+    records_by!(centers => {
         let centers = rows("centers", centers)?;
         let (center, _) = indices("center", center, &[1], centers.len().min(255) as u32)?;
         let center = center.iter().map(|&at| at as u8).collect();
         let rays = Rays::try_new(&centers, center, &rows("directions", directions)?);
-        Hiding::of(Obfuscation::Rays(rays.map_err(raised)?), hidden)
-    }
-    records_by!(centers => of(centers, center, directions, hidden))
+        Hiding::of(Obfuscation::Rays(rays.map_err(raised)?), hidden)?
+    })
 }
 
 /// Planes on which coordinate `axis` (n,), 0 to 2, equals `offset` (n,). Not for images.
@@ -182,22 +168,18 @@ pub fn candidates(
     swapped_axis: &Bound<'_, PyAny>,
     hidden: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Records> {
-    fn of<const D: usize>(
-        positions: Given<'_, '_>,
-        swapped_axis: Given<'_, '_>,
-        hidden: Option<Given<'_, '_>>,
-    ) -> PyResult<Hiding<D>> {
+    let n_axes = if is_of_pairs("positions", positions)? { 2 } else { 3 };
+    records_by!(positions => {
         let points = AxisCandidates::try_new(&rows("positions", positions)?).map_err(raised)?;
-        let (axis, _) = indices("swapped_axis", swapped_axis, &[1], D as u32)?;
+        let (axis, _) = indices("swapped_axis", swapped_axis, &[1], n_axes)?;
         if axis.len() != points.len() {
             let expected = format!("{} numbers, one per record", points.len());
             return Err(wrong("swapped_axis", expected, axis.len()));
         }
         let swapped_axis = Some(axis.iter().map(|&at| at as u8).collect());
         let hiding = Hiding::of(Obfuscation::AxisCandidates(points), hidden)?;
-        Ok(Hiding { swapped_axis, ..hiding })
-    }
-    records_by!(positions => of(positions, swapped_axis, hidden))
+        Hiding { swapped_axis, ..hiding }
+    })
 }
 
 /// Converts the result of the function `name` to records of points `(n, D)`.

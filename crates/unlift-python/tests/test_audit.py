@@ -1,23 +1,13 @@
 """Audits: the results of the command line, schemes and sources that are functions, interrupts."""
 
 import json
-import os
-import shutil
 import subprocess
 
 import numpy as np
 import pytest
 
 import unlift
-
-PROGRAM = os.environ.get("UNLIFT_PROGRAM") or shutil.which("unlift")
-
-
-@pytest.fixture
-def points():
-    random = np.random.default_rng(7)
-    flat = random.uniform(0, 4, (600, 2))
-    return np.column_stack([flat, 0.3 * np.sin(flat[:, 0] * 2) + 1.0])
+from conftest import PROGRAM, needs_program
 
 
 @pytest.fixture
@@ -36,7 +26,7 @@ def figures(document):
     return json.dumps({key: document.get(key) for key in keep}, sort_keys=True)
 
 
-@pytest.mark.skipif(PROGRAM is None, reason="the command line is not here (UNLIFT_PROGRAM)")
+@needs_program
 def test_figures_are_those_of_the_command_line(points, tmp_path):
     np.save(tmp_path / "points.npy", points)
     line = "audit map points.npy --scale 1 --schemes olc,cp --inlier-ratios 0.5 --k 20 --gate all:0.10<=1 --quiet --out cli"

@@ -3,7 +3,6 @@
 import csv
 import json
 import math
-import os
 import pathlib
 import shutil
 import subprocess
@@ -11,8 +10,8 @@ import sys
 
 import numpy as np
 import pytest
+from conftest import PROGRAM, needs_program
 
-PROGRAM = os.environ.get("UNLIFT_PROGRAM") or shutil.which("unlift")
 ROOT = pathlib.Path(__file__).parents[3]
 PHOTOS = sorted((ROOT / "crates" / "unlift-cli" / "src" / "demo" / "photos").glob("*.jpg"))
 
@@ -41,7 +40,7 @@ def scene(folder):
     (model / "points3D.txt").write_text("".join(rows))
 
 
-@pytest.mark.skipif(PROGRAM is None, reason="the command line is not here (UNLIFT_PROGRAM)")
+@needs_program
 def test_the_papers_figures_stand_beside_ours(tmp_path):
     def claims(*words):
         command = [sys.executable, ROOT / "docs" / "claims.py", *words, "--unlift", PROGRAM]

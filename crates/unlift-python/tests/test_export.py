@@ -1,19 +1,16 @@
 """Other programs open what the command line writes."""
 
-import os
 import pathlib
-import shutil
 import subprocess
 
 import numpy as np
 import pytest
 
 import unlift
+from conftest import PROGRAM, needs_program
 
-PROGRAM = os.environ.get("UNLIFT_PROGRAM") or shutil.which("unlift")
 
-
-@pytest.mark.skipif(PROGRAM is None, reason="the command line is not here (UNLIFT_PROGRAM)")
+@needs_program
 def test_pycolmap_opens_a_model(tmp_path: pathlib.Path):
     pycolmap = pytest.importorskip("pycolmap")
     points = np.random.default_rng(1).uniform(0, 4, (300, 3))

@@ -1,7 +1,4 @@
-"""Saved files: foreign files are not replaced, and only the owner can read the truth."""
-
-import os
-import stat
+"""Saved files: foreign files are not replaced."""
 
 import numpy as np
 import pytest
@@ -38,15 +35,6 @@ def test_what_is_not_of_its_kind_stays(parts, name, tmp_path):
     with pytest.raises(unlift.UnliftError, match="expected a file, found a folder"):
         part.save(tmp_path, force=True)
     assert [entry.name for entry in tmp_path.iterdir()] == ["x.npz"]
-
-
-@pytest.mark.skipif(os.name == "nt", reason="modes are those of Unix")
-def test_the_truth_is_for_its_owner_alone(parts, tmp_path):
-    path = tmp_path / "t.npz"
-    parts["lists"].save(path)
-    path.chmod(0o666)
-    parts["truth"].save(path, force=True)
-    assert stat.S_IMODE(path.stat().st_mode) == 0o600
 
 
 def test_a_report_names_the_way_out_as_python_has_it(tmp_path):

@@ -1,9 +1,7 @@
 """Audits of images: the results of the command line, schemes and sources that are functions, one-line errors."""
 
 import json
-import os
 import pathlib
-import shutil
 import sqlite3
 import subprocess
 
@@ -11,9 +9,8 @@ import numpy as np
 import pytest
 
 import unlift
+from conftest import PROGRAM, needs_program
 
-PROGRAM = os.environ.get("UNLIFT_PROGRAM") or shutil.which("unlift")
-HAS_PROGRAM = pytest.mark.skipif(PROGRAM is None, reason="the command line is not here (UNLIFT_PROGRAM)")
 FIXTURES = pathlib.Path(__file__).parents[2] / "unlift-io" / "tests" / "data"
 QUICK = {"inlier_ratios": [0.5], "solvers": ["consensus"], "k": 10}
 
@@ -71,7 +68,7 @@ def program(line, folder, code=0):
     return json.loads((folder / "cli" / "audit.json").read_text())
 
 
-@HAS_PROGRAM
+@needs_program
 def test_figures_are_those_of_the_command_line(images, tmp_path):
     database(tmp_path / "database.db", images)
     line = "audit images database.db --schemes lines2d,dcl2d --neighbors oracle --neighbors overlap --inlier-ratios 0.5,0.3"

@@ -7,14 +7,6 @@ import unlift
 
 
 @pytest.fixture
-def points():
-    """Returns points on a surface, such as a wall, where neighbors are near each other."""
-    random = np.random.default_rng(7)
-    flat = random.uniform(0, 4, (600, 2))
-    return np.column_stack([flat, 0.3 * np.sin(flat[:, 0] * 2) + 1.0])
-
-
-@pytest.fixture
 def described(points):
     random = np.random.default_rng(8)
     waves = np.sin(points @ random.uniform(-2, 2, (3, 128)) + random.uniform(0, 6, 128))
@@ -84,22 +76,3 @@ def test_errors_are_those_of_numpy(described):
         assert percent == pytest.approx(100 * np.mean(errors <= float(label)), abs=1e-3)
     sure = back.probability_within(0.1)
     assert sure is None or (sure.shape == (600,) and 0 <= sure.min() <= sure.max() <= 1)
-
-
-@pytest.mark.parametrize(
-    "wrong, said",
-    [
-        (lambda p: unlift.Map(p[:, :2]), r"positions: expected an array of shape \(n, 3\), found \(600, 2\)"),
-        (lambda p: unlift.Map(p, p[:5].astype("f4"), scale=1), "descriptors: expected 600 rows, one per point, found 5"),
-        (lambda p: unlift.Map(p, np.zeros((600, 4), int), scale=1), "descriptors: expected an array of uint8 or floats, found one of int64"),
-        (lambda p: unlift.Map(p, scale=-1), "scale: expected a number above 0, found -1"),
-        (lambda p: unlift.Map(p[:9], scale=1), "points: expected at least 51"),
-        (lambda p: unlift.read("no such map"), "no such map: expected"),
-        (lambda p: unlift.obfuscate(unlift.Map(p), "cp2d"), "scheme: expected one that is defined on maps, found cp2d"),
-        (lambda p: unlift.neighbors.overlap(unlift.obfuscate(unlift.Map(p), "olc")), "descriptors: expected some"),
-    ],
-)
-def test_what_is_wrong_is_said_in_a_line(points, wrong, said):
-    with pytest.raises(unlift.UnliftError, match=said) as error:
-        wrong(points)
-    assert "\n" not in str(error.value)
