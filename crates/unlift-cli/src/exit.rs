@@ -7,15 +7,8 @@ use crate::output::printed;
 use crate::stderr::tell;
 use crate::words;
 
-/// The result of a command that completed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
-    /// Exit code 0.
-    Done,
-    /// Exit code 1: the audit completed, and more points come back than a gate allows.
-    GateFailed,
-}
-
+/// Exit code if more points come back than a gate allows.
+const GATE_FAILED: u8 = 1;
 /// Exit code for a wrong command line, as in clap.
 const USAGE: u8 = 2;
 /// Exit code for files that cannot be read, written or used, even a single image of many, and for a
@@ -31,7 +24,7 @@ pub fn refused(error: clap::Error) -> u8 {
     let text = error.render().to_string();
     if !error.use_stderr() {
         // Help is a result and goes to stdout, in clap's colors.
-        return finish(printed(error.print()).map(|()| Outcome::Done));
+        return finish(printed(error.print()).map(|()| true));
     }
     if text.chars().any(|c| c != '\n' && is_obeyed(c)) {
         text.lines().for_each(tell);
@@ -42,11 +35,11 @@ pub fn refused(error: clap::Error) -> u8 {
     USAGE
 }
 
-/// Prints an error, if any, and returns the exit code.
-pub fn finish(result: crate::Result<Outcome>) -> u8 {
+/// Prints the error of a command, if any, and returns the exit code. A result of false means that a gate failed.
+pub fn finish(result: crate::Result<bool>) -> u8 {
     match result {
-        Ok(Outcome::Done) => 0,
-        Ok(Outcome::GateFailed) => 1,
+        Ok(true) => 0,
+        Ok(false) => GATE_FAILED,
         Err(error) => {
             tell(format_args!("unlift: {error}"));
             if let Some(advice) = error.advice() {

@@ -3,8 +3,8 @@
 
 use std::fmt::Write;
 use std::io::IsTerminal;
-use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
 use indicatif::{
     HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle, WeakProgressBar,
@@ -21,13 +21,10 @@ const TICK: Duration = Duration::from_millis(500);
 const LINES: Duration = Duration::from_secs(60);
 /// Seconds of a day, the longest time that is estimated.
 const A_DAY: f64 = 86_400.0;
-/// The progress that started last, for an interrupt: its bar, its start and its line.
-type Current = (WeakProgressBar, Instant, fn(&ProgressBar, Duration) -> String);
-static CURRENT: Mutex<Option<Current>> = Mutex::new(None);
-
-fn lock(current: &Mutex<Option<Current>>) -> MutexGuard<'_, Option<Current>> {
-    current.lock().unwrap_or_else(PoisonError::into_inner)
-}
+/// Formats how far a bar is.
+type Line = fn(&ProgressBar) -> String;
+/// The progress that started last, for an interrupt.
+static CURRENT: Mutex<Option<(WeakProgressBar, Line)>> = Mutex::new(None);
 
 /// Exit code after an interrupt, as shells have it.
 const INTERRUPTED: i32 = 130;
@@ -42,21 +39,21 @@ pub struct Progress {
 impl Progress {
     /// Starts the progress over countable items.
     pub fn new(quiet: bool) -> Self {
-        Self::start(quiet, "{bar:30} {status} {wide_msg}", |bar, elapsed| {
-            format!("{}: {}", status(bar.position(), bar.length(), elapsed), bar.message())
+        Self::start(quiet, "{bar:30} {status} {wide_msg}", |bar| {
+            format!("{}: {}", status(bar.position(), bar.length(), bar.elapsed()), bar.message())
         })
     }
 
     /// Starts the progress of work whose steps cannot be counted: shows `what` and the elapsed time.
     pub fn uncounted(quiet: bool, what: &'static str) -> Self {
-        let progress = Self::start(quiet, "{spinner} {msg}, {elapsed}", |bar, elapsed| {
-            format!("{}, {} s", bar.message(), elapsed.as_secs())
+        let progress = Self::start(quiet, "{spinner} {msg}, {elapsed}", |bar| {
+            format!("{}, {} s", bar.message(), bar.elapsed().as_secs())
         });
         progress.bar.set_message(what);
         progress
     }
 
-    fn start(quiet: bool, template: &str, line: fn(&ProgressBar, Duration) -> String) -> Self {
+    fn start(quiet: bool, template: &str, line: Line) -> Self {
         // A hidden bar still counts and estimates.
         let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::hidden());
         let style = ProgressStyle::with_template(template).expect("the template is ours");
@@ -64,14 +61,15 @@ impl Progress {
             // A failed write only loses the status.
             let _ = text.write_str(&status(state.pos(), state.len(), state.elapsed()));
         }));
-        *lock(&CURRENT) = Some((bar.downgrade(), Instant::now(), line));
+        let current = || CURRENT.lock().unwrap_or_else(PoisonError::into_inner);
+        *current() = Some((bar.downgrade(), line));
         // The first handler stays, and tells of the progress that started last.
-        let _ = ctrlc::set_handler(|| {
-            let current = lock(&CURRENT).take();
-            if let Some((bar, began, line)) = current
+        let _ = ctrlc::set_handler(move || {
+            let last = current().take();
+            if let Some((bar, line)) = last
                 && let Some(bar) = bar.upgrade()
             {
-                let done = line(&bar, began.elapsed());
+                let done = line(&bar);
                 bar.finish_and_clear();
                 tell(format_args!("unlift: interrupted at {done}"));
             }
@@ -80,7 +78,7 @@ impl Progress {
         });
         if !quiet {
             // In a thread, because a step may take minutes.
-            let (bar, started) = (bar.downgrade(), Instant::now());
+            let bar = bar.downgrade();
             let on_terminal = std::io::stderr().is_terminal();
             std::thread::spawn(move || {
                 std::thread::sleep(if on_terminal { PATIENCE } else { LINES });
@@ -90,7 +88,7 @@ impl Progress {
                         bar.enable_steady_tick(TICK);
                         return;
                     }
-                    tell(format_args!("unlift: {}", line(&bar, started.elapsed())));
+                    tell(format_args!("unlift: {}", line(&bar)));
                     drop(bar);
                     std::thread::sleep(LINES);
                 }

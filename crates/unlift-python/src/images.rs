@@ -92,17 +92,13 @@ fn features_of(place: &str, given: &Bound<'_, PyAny>) -> PyResult<ImageFeatures>
             return Err(wrong(place, format!("only {}", KEYS.join(", ")), OneLine(key)));
         }
     }
-    let has = |key: &str| given.contains(key);
     let item = |key: &str| -> PyResult<Option<Bound<'_, PyAny>>> {
-        if !has(key)? {
-            return Ok(None);
-        }
-        Ok(Some(given.get_item(key)?).filter(|item| !item.is_none()))
+        let item = given.contains(key)?.then(|| given.get_item(key)).transpose()?;
+        Ok(item.filter(|item| !item.is_none()))
     };
-    let needed = |key: &str| -> PyResult<Bound<'_, PyAny>> {
-        let [least @ .., _] = &KEYS;
-        let missing = || wrong(place, least.join(", "), format!("no {key}"));
-        item(key)?.ok_or_else(missing)
+    let needed = |key: &str| {
+        let [needed @ .., _] = &KEYS;
+        item(key)?.ok_or_else(|| wrong(place, needed.join(", "), format!("no {key}")))
     };
     let keypoints = rows::<2>(&at(place, "keypoints"), &needed("keypoints")?)?;
     let n = keypoints.len();
@@ -110,20 +106,14 @@ fn features_of(place: &str, given: &Bound<'_, PyAny>) -> PyResult<ImageFeatures>
         let given = needed(key)?;
         let side = given.extract::<u32>().ok().filter(|side| *side > 0);
         let expected = "a whole number of pixels above 0";
-        side.ok_or_else(|| wrong(&at(place, key), expected, OneLine(told_as(&given))))
+        side.ok_or_else(|| wrong(&at(place, key), expected, OneLine(text_of(&given))))
     };
     let size = [side("width")?, side("height")?];
-    let descriptors = match item("descriptors")? {
-        Some(given) => {
-            let (rows, place) =
-                (descriptors(&at(place, "descriptors"), &given)?, at(place, "descriptors"));
-            if rows.len() != n {
-                return Err(wrong(&place, format!("{n} rows, one per keypoint"), rows.len()));
-            }
-            Some(rows)
-        }
-        None => None,
-    };
+    let place = at(place, "descriptors");
+    let descriptors = item("descriptors")?.map(|given| descriptors(&place, &given)).transpose()?;
+    if let Some(rows) = descriptors.as_ref().filter(|rows| rows.len() != n) {
+        return Err(wrong(&place, format!("{n} rows, one per keypoint"), rows.len()));
+    }
     Ok(ImageFeatures { size: Some(size), keypoints, descriptors, ..Default::default() })
 }
 
@@ -131,6 +121,6 @@ fn at(place: &str, key: &str) -> String {
     format!("{place}[{key:?}]")
 }
 
-fn told_as(given: &Bound<'_, PyAny>) -> String {
+fn text_of(given: &Bound<'_, PyAny>) -> String {
     given.repr().map_or_else(|_| "no number".to_owned(), |text| text.to_string())
 }

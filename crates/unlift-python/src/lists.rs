@@ -118,24 +118,15 @@ fn lists_of<const D: usize>(
     };
     let columns = shape[1];
     let (mut offsets, mut kept) = (vec![0], Vec::new());
-    let mut kept_scores = scores.as_ref().map(|_| Vec::new());
     for slot in 0..n_slots {
         let row = slot * columns..(slot + 1) * columns;
-        for at in row.filter(|&at| rows[at] >= 0).take(k) {
-            kept.push(RecordId(rows[at] as u32));
-            if let (Some(kept), Some(scores)) = (&mut kept_scores, &scores) {
-                kept.push(scores[at] as f32);
-            }
-        }
+        kept.extend(row.filter(|&at| rows[at] >= 0).take(k));
         offsets.push(kept.len() as u64);
     }
-    let lists = neighbors::Neighborhoods::try_new(
-        offsets,
-        kept,
-        kept_scores,
-        n,
-        released.slots_per_record(),
-    );
+    let records = kept.iter().map(|&at| RecordId(rows[at] as u32)).collect();
+    let scores = scores.map(|scores| kept.iter().map(|&at| scores[at] as f32).collect());
+    let slots_per_record = released.slots_per_record();
+    let lists = neighbors::Neighborhoods::try_new(offsets, records, scores, n, slots_per_record);
     let order = match needs {
         Needs::Nothing => RowOrder::Either,
         _ => RowOrder::DescriptorRows,

@@ -1,7 +1,7 @@
 //! Schemes, sources and solvers that are Python functions, and property tests of them.
 
 use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use pyo3::exceptions::PyAssertionError;
 use pyo3::prelude::*;
@@ -19,7 +19,7 @@ use crate::arrays::{raised, rows, to_rows, wrong};
 use crate::hidden::{Released as PyReleased, released_of};
 use crate::lists::{self, Neighborhoods as PyNeighborhoods};
 use crate::records::hiding;
-use crate::threads;
+use crate::threads::{self, locked};
 
 /// Exceptions of user functions, and a flag that prevents further calls.
 #[derive(Clone, Debug, Default)]
@@ -38,7 +38,7 @@ impl Raised {
     /// Stores `error`, and returns its message.
     pub fn keep(&self, py: Python<'_>, error: PyErr) -> String {
         let message = OneLine(error.to_string()).to_string();
-        let mut errors = self.errors.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut errors = locked(&self.errors);
         // One exception may concern several points: store it once.
         if errors.iter().all(|(line, _)| *line != message) {
             errors.push((message.clone(), error.clone_ref(py)));
@@ -49,7 +49,7 @@ impl Raised {
     /// Sets the stored exception whose message `error` contains as its cause.
     pub fn as_cause_of(&self, py: Python<'_>, error: PyErr) -> PyErr {
         let text = error.value(py).to_string();
-        let errors = self.errors.lock().unwrap_or_else(PoisonError::into_inner);
+        let errors = locked(&self.errors);
         let known = errors.iter().filter(|(line, _)| text.contains(line.as_str()));
         // If one message is the beginning of another, the longer one is the cause.
         if let Some((_, cause)) = known.max_by_key(|(line, _)| line.len()) {

@@ -221,7 +221,6 @@ impl MapArgs {
     }
 }
 
-/// Options of `audit map`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -254,7 +253,6 @@ to the map fails.")]
 pub struct AuditMapArgs {
     /// A COLMAP model or project folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply,
     /// .csv, .xyz, .txt, .asc, .pts, .npy, .npz or .splat file
-    #[arg(value_name = "PATH")]
     pub path: PathBuf,
     #[command(flatten)]
     pub map: MapArgs,
@@ -314,7 +312,6 @@ pub struct AuditMapArgs {
     pub audit: AuditArgs,
 }
 
-/// Options of `audit images`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -332,7 +329,6 @@ If an image cannot be used, unlift prints a line on stderr, counts the image in 
 the others, and ends with exit code 3.")]
 pub struct AuditImagesArgs {
     /// A folder of photos, hloc's features.h5, or a COLMAP database.db
-    #[arg(value_name = "PATH")]
     pub path: PathBuf,
     #[command(flatten)]
     pub extraction: ExtractionArgs,
@@ -368,7 +364,6 @@ pub struct AuditImagesArgs {
     pub audit: AuditArgs,
 }
 
-/// Options of `audit sequence`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -387,10 +382,8 @@ their names. The row tracks@5 links them by the tracks of MODEL instead: what be
 give. With --neighbors, the row sequence+lists@5 also uses lists of neighbors within each image.")]
 pub struct AuditSequenceArgs {
     /// A COLMAP project or model with the poses of the images
-    #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// A folder of photos, hloc's features.h5, or a COLMAP database.db
-    #[arg(value_name = "PATH")]
     pub path: PathBuf,
     #[command(flatten)]
     pub extraction: ExtractionArgs,
@@ -427,7 +420,6 @@ pub struct AuditSequenceArgs {
     pub audit: AuditArgs,
 }
 
-/// Options of `audit again`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -446,10 +438,8 @@ row again-geometry links lines that meet, without descriptors.
 In a gate, SOURCE is again or again-geometry.")]
 pub struct AuditAgainArgs {
     /// The map of the first release: any PATH of unlift audit map
-    #[arg(value_name = "A")]
     pub a: PathBuf,
     /// The map of the second release, in the same frame; A again, or a later version of it
-    #[arg(value_name = "B")]
     pub b: PathBuf,
     /// Meters per unit of both maps. Without it, lengths are multiples of the median distance from a
     /// point of A to its 50th nearest neighbor
@@ -472,7 +462,6 @@ pub struct AuditAgainArgs {
     pub audit: AuditArgs,
 }
 
-/// Options of `audit released`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -489,7 +478,6 @@ docs/formats.md shows how.
 In a gate, SCHEME is the name of your scheme, or all.")]
 pub struct AuditReleasedArgs {
     /// A file with the records of your scheme: what an attacker sees
-    #[arg(value_name = "RELEASED")]
     pub released: PathBuf,
     /// A file with the original points and, for each, the record that hides it
     #[arg(long, value_name = "TRUTH", help_heading = "Input")]

@@ -15,7 +15,6 @@ use unlift_vision::network::DescriptorKind;
 use super::audits::{ExtractionArgs, MapArgs};
 use crate::values::{self, NeighborSource};
 
-/// Options of `demo`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -33,7 +32,6 @@ pub struct DemoArgs {
     pub quiet: bool,
 }
 
-/// Options of `obfuscate`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -54,7 +52,6 @@ of each point, which intersect in the point.")]
 pub struct ObfuscateArgs {
     /// A map, any PATH of unlift audit map. Or images: a folder of photos, hloc's features.h5, or a
     /// COLMAP database.db
-    #[arg(value_name = "PATH")]
     pub path: PathBuf,
     /// Scheme that hides the points (unlift schemes lists them). Schemes for images need images
     #[arg(long = "schemes", alias = "scheme", value_name = "SCHEME",
@@ -85,7 +82,6 @@ pub struct ObfuscateArgs {
     pub seed: Option<u64>,
 }
 
-/// Options of `neighbors`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Sources:
@@ -102,7 +98,6 @@ Examples:
       --inlier-ratios 0.5")]
 pub struct NeighborsArgs {
     /// The released.npz of a map or of images
-    #[arg(value_name = "RELEASED")]
     pub released: PathBuf,
     /// Method that makes the lists, see Sources below
     #[arg(long, value_name = "SOURCE", value_parser = values::any_source)]
@@ -130,14 +125,12 @@ pub struct NeighborsArgs {
     pub out: PathBuf,
 }
 
-/// Options of `recover`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   unlift recover hidden/released.npz --neighbors neighborhoods.npz --out recovered.npz")]
 pub struct RecoverArgs {
     /// The released.npz of a map or of images
-    #[arg(value_name = "RELEASED")]
     pub released: PathBuf,
     /// File with lists of neighbors, written by unlift neighbors or your own program
     /// (docs/formats.md). density and tomography compute positions without the lists and need them
@@ -155,7 +148,6 @@ pub struct RecoverArgs {
     pub out: PathBuf,
 }
 
-/// Options of `evaluate`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -166,7 +158,6 @@ If released.npz is in the folder of TRUTH, unlift also guesses from one record a
 baseline.")]
 pub struct EvaluateArgs {
     /// Recovered points that unlift recover wrote
-    #[arg(value_name = "RECOVERED")]
     pub recovered: PathBuf,
     /// The truth.npz that unlift obfuscate wrote
     #[arg(long, value_name = "TRUTH")]
@@ -180,7 +171,6 @@ pub struct EvaluateArgs {
     pub json: bool,
 }
 
-/// Options of `export`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 The ending of --out decides the format:
@@ -211,7 +201,6 @@ pub struct ExportArgs {
     pub cameras: Option<PathBuf>,
 }
 
-/// Options of `features`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -232,7 +221,6 @@ If an image cannot be used, unlift prints a line on stderr, writes the others, a
 with exit code 3.")]
 pub struct FeaturesArgs {
     /// A folder of photos, hloc's features.h5, or a COLMAP database.db
-    #[arg(value_name = "IMAGES")]
     pub images: PathBuf,
     /// HDF5 file to write, in hloc's layout
     #[arg(long, value_name = "FILE", default_value = "features.h5")]
@@ -252,7 +240,6 @@ pub struct FeaturesArgs {
     pub quiet: bool,
 }
 
-/// Options of `invert`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 unlift writes one PNG per image, half as large as the image. The picture of a.jpg is a.jpg.png.
@@ -265,11 +252,9 @@ Examples:
 pub struct InvertArgs {
     /// A folder of photos, hloc's features.h5, a COLMAP database.db, or the released.npz of a map
     /// or of images
-    #[arg(value_name = "PATH")]
     pub path: PathBuf,
     /// Output file of unlift recover for PATH; required if PATH is a released.npz. Without it,
     /// unlift paints six views from the center of a sphere cloud
-    #[arg(value_name = "RECOVERED")]
     pub recovered: Option<PathBuf>,
     /// Features to extract from photos: sift, aliked, or superpoint, whose weights you supply (see
     /// unlift models) [default: sift]
@@ -290,7 +275,6 @@ pub struct InvertArgs {
     pub out: PathBuf,
 }
 
-/// Options of `table`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 The ending of --out decides the format:
@@ -322,7 +306,6 @@ pub struct TableArgs {
     pub out: Option<PathBuf>,
 }
 
-/// Options of `compare`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Two results are compared if they have the same scheme, source of neighbors, noise (--oracle-noise),

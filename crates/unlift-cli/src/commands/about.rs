@@ -4,10 +4,9 @@ use unlift::OneLine;
 use unlift::obfuscate::{ON_REQUEST, all};
 use unlift_vision::network::{Entry, Folders, MODELS, Place};
 
-use crate::exit::Outcome;
 use crate::output::print;
 
-pub fn schemes() -> crate::Result<Outcome> {
+pub fn schemes() -> crate::Result<()> {
     let mut text = String::new();
     for scheme in all() {
         let meant_for = match (scheme.in_3d, scheme.in_2d) {
@@ -26,11 +25,10 @@ pub fn schemes() -> crate::Result<Outcome> {
             scheme.name, facts.title, facts.rule, facts.hidden, facts.source, facts.patents
         ));
     }
-    print(&text)?;
-    Ok(Outcome::Done)
+    print(&text)
 }
 
-pub fn models() -> crate::Result<Outcome> {
+pub fn models() -> crate::Result<()> {
     let folders = Folders::of_process();
     let mut text = String::new();
     for entry in MODELS {
@@ -41,8 +39,7 @@ pub fn models() -> crate::Result<Outcome> {
             entry.name, entry.purpose, entry.licence, entry.owner
         ));
     }
-    print(&text)?;
-    Ok(Outcome::Done)
+    print(&text)
 }
 
 fn here(place: Option<&Place>, folders: &Folders, entry: &Entry) -> String {

@@ -34,17 +34,17 @@ use crate::args::{
     AuditAgainArgs, AuditArgs, AuditImagesArgs, AuditMapArgs, AuditReleasedArgs, AuditSequenceArgs,
     OracleArgs, PaintArgs, SolverArgs,
 };
-use crate::exit::Outcome;
 use crate::output::{command_line, print};
 use crate::progress::Progress;
 use crate::values::NeighborSource;
 
-/// Runs the audit that `work` makes with an output, writes its results and prints them. Files in `inputs` must not be overwritten.
+/// Runs the audit that `work` makes with an output, writes its results and prints them. Returns whether every gate held. Files in
+/// `inputs` must not be overwritten.
 fn perform<'a>(
     args: &AuditArgs,
     inputs: impl IntoIterator<Item = &'a Path>,
     work: impl FnOnce(Output) -> crate::Result<Audited> + Send,
-) -> crate::Result<Outcome> {
+) -> crate::Result<bool> {
     let output = Output {
         share_safe: args.share_safe,
         junit: args.junit.clone(),
@@ -54,7 +54,7 @@ fn perform<'a>(
     let files = output.open(Rules::new(inputs, false))?;
     let finished = with_threads(|| work(output)?.write(files))?;
     print(&finished.text())?;
-    Ok(if finished.passed() { Outcome::Done } else { Outcome::GateFailed })
+    Ok(finished.passed())
 }
 
 /// Runs `audit` with the gates of the command line.
@@ -113,7 +113,7 @@ const NO_RECORDS_ALONE: &str =
 const PAINTED_RATIO: f64 = 0.5;
 
 /// `unlift audit map`
-pub fn map(args: &AuditMapArgs) -> crate::Result<Outcome> {
+pub fn map(args: &AuditMapArgs) -> crate::Result<bool> {
     let more = args.paint.inputs().chain(&args.localize).chain(&args.protect.public_descriptors);
     let inputs = [args.path.as_path()].into_iter().chain(args.map.descriptors.as_deref());
     let inputs = inputs.chain(NeighborSource::files(&args.solvers.neighbors));
@@ -192,7 +192,7 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<Outcome> {
 }
 
 /// `unlift audit released`
-pub fn released(args: &AuditReleasedArgs) -> crate::Result<Outcome> {
+pub fn released(args: &AuditReleasedArgs) -> crate::Result<bool> {
     let stages = [args.released.as_path(), &args.truth].into_iter();
     let lists = NeighborSource::files(&args.solvers.neighbors);
     let inputs = stages.chain(args.descriptors.as_deref()).chain(lists);
@@ -233,7 +233,7 @@ pub fn released(args: &AuditReleasedArgs) -> crate::Result<Outcome> {
 }
 
 /// `unlift audit images`
-pub fn images(args: &AuditImagesArgs) -> crate::Result<Outcome> {
+pub fn images(args: &AuditImagesArgs) -> crate::Result<bool> {
     let mut request = with_oracle(request::<2>(&args.audit, args.k), &args.oracle);
     request.schemes = schemes(&args.schemes, Unit::Pixel);
     request.solvers = Builtin::list(&args.solver);
@@ -248,7 +248,7 @@ pub fn images(args: &AuditImagesArgs) -> crate::Result<Outcome> {
     let more = args.paint.inputs().chain(&args.protect.public_descriptors);
     let inputs = [&args.path].into_iter().chain(more).map(|path| path.as_path());
     let mut count = None;
-    let outcome = perform(&args.audit, inputs, |output| {
+    let passed = perform(&args.audit, inputs, |output| {
         let photos = args.paint.photos.as_deref();
         let opening = Opening {
             wanted: args.extraction.wanted(),
@@ -283,7 +283,7 @@ pub fn images(args: &AuditImagesArgs) -> crate::Result<Outcome> {
     if let Some(count) = count {
         all_could_be("used", &args.path, count.used as usize, count.unusable as usize)?;
     }
-    Ok(outcome)
+    Ok(passed)
 }
 
 /// Opens the painter of pictures, if it is requested.
@@ -301,7 +301,7 @@ fn inversion(
 }
 
 /// `unlift audit sequence`
-pub fn sequence(args: &AuditSequenceArgs) -> crate::Result<Outcome> {
+pub fn sequence(args: &AuditSequenceArgs) -> crate::Result<bool> {
     let usual = Plan::new(Unit::Pixel);
     let mut request = request::<2>(&args.audit, usual.k as u16);
     request.schemes = schemes(&args.schemes, Unit::Pixel);
@@ -350,7 +350,7 @@ pub fn sequence(args: &AuditSequenceArgs) -> crate::Result<Outcome> {
 }
 
 /// `unlift audit again`
-pub fn again(args: &AuditAgainArgs) -> crate::Result<Outcome> {
+pub fn again(args: &AuditAgainArgs) -> crate::Result<bool> {
     let inputs = [&args.a, &args.b].into_iter().chain(&args.descriptors);
     perform(&args.audit, inputs.map(|path| path.as_path()), |output| {
         let preparation = Preparation { scale: args.scale, ..Preparation::default() };

@@ -13,7 +13,6 @@ use unlift_vision::network::DescriptorKind;
 
 use crate::args::MapArgs;
 use crate::demo::photos;
-use crate::exit::Outcome;
 use crate::progress::Progress;
 
 /// Runs `work` on `RAYON_NUM_THREADS` threads (default: all cores). rayon's global pool would panic
@@ -65,9 +64,9 @@ pub fn read_document(path: &Path) -> crate::Result<Document> {
 }
 
 /// Returns an error if `failed` images could not be `done`; each was reported in a line before.
-pub fn all_could_be(done: &str, path: &Path, n: usize, failed: usize) -> crate::Result<Outcome> {
+pub fn all_could_be(done: &str, path: &Path, n: usize, failed: usize) -> crate::Result<()> {
     if failed == 0 {
-        return Ok(Outcome::Done);
+        return Ok(());
     }
     let expected = format!("{} images that can be {done}", n + failed);
     Err(Error::new(path, "", expected, n.to_string()).into())

@@ -12,12 +12,12 @@ use unlift_report::compare::{Change, Comparison, Unmatched, compare, page};
 
 use super::common::read_document;
 use crate::args::CompareArgs;
-use crate::exit::Outcome;
 use crate::output::{print, table};
 
 const PAGE: &str = "compare.html";
 
-pub fn run(args: &CompareArgs) -> crate::Result<Outcome> {
+/// Compares two audits, and returns false if the later one leaks more.
+pub fn run(args: &CompareArgs) -> crate::Result<bool> {
     let (old, new) = (read_document(&args.old)?, read_document(&args.new)?);
     // A comparison of share-safe audits is readable by others, like the audits.
     let named = old.input.path.is_some() || new.input.path.is_some();
@@ -46,7 +46,7 @@ pub fn run(args: &CompareArgs) -> crate::Result<Outcome> {
         true => serde_json::to_string_pretty(&comparison)? + "\n",
         false => text(&comparison, written),
     })?;
-    Ok(if comparison.passed { Outcome::Done } else { Outcome::GateFailed })
+    Ok(comparison.passed)
 }
 
 /// Formats the differences and the verdict.

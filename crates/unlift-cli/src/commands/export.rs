@@ -21,7 +21,6 @@ use unlift_io::stage::{
 
 use crate::Error;
 use crate::args::ExportArgs;
-use crate::exit::Outcome;
 use crate::output::print;
 
 enum Shown {
@@ -30,7 +29,7 @@ enum Shown {
     Segments(Vec<Segment<3>>),
 }
 
-pub fn run(args: &ExportArgs) -> crate::Result<Outcome> {
+pub fn run(args: &ExportArgs) -> crate::Result<()> {
     let inputs = [Some(args.path.as_path()), args.cameras.as_deref()];
     let rules = Rules::new(inputs.into_iter().flatten(), false);
     let ending = args.out.extension().map(OsStr::to_ascii_lowercase);
@@ -50,8 +49,7 @@ pub fn run(args: &ExportArgs) -> crate::Result<Outcome> {
     } else {
         model(args, rules)?
     };
-    print(&format!("{n}, in {out}\n"))?;
-    Ok(Outcome::Done)
+    print(&format!("{n}, in {out}\n"))
 }
 
 /// Writes a PLY or OBJ file, and returns a description of its content.

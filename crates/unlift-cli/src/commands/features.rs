@@ -11,13 +11,12 @@ use unlift_vision::features::photo::Turn;
 use super::common::all_could_be;
 use crate::Error;
 use crate::args::FeaturesArgs;
-use crate::exit::Outcome;
 use crate::output::print;
 use crate::progress::Progress;
 use unlift_audit::images::{FeatureSource, Wanted, is_photo};
 use unlift_audit::{Progress as _, check_file};
 
-pub fn run(args: &FeaturesArgs) -> crate::Result<Outcome> {
+pub fn run(args: &FeaturesArgs) -> crate::Result<()> {
     let rules = Rules::new([args.images.as_path()], false);
     let target = check_file(&args.out, Kind::Features, &rules)?;
     check_no_photo(&args.images, &target)?;

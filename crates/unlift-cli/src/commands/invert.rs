@@ -26,12 +26,11 @@ use super::common::all_could_be;
 use super::stages::{self, of_image};
 use crate::Error;
 use crate::args::InvertArgs;
-use crate::exit::Outcome;
 use crate::output::print;
 use crate::stderr;
 use unlift_audit::released::same_map;
 
-pub fn run(args: &InvertArgs) -> crate::Result<Outcome> {
+pub fn run(args: &InvertArgs) -> crate::Result<()> {
     let inputs = [Some(&args.path), args.recovered.as_ref(), args.cameras.as_ref()];
     let rules = Rules::new(inputs.into_iter().flatten().map(PathBuf::as_path), false);
     // Only checks that files can be written there.

@@ -14,18 +14,17 @@ use common::with_threads;
 
 use crate::args::{AuditCommand, Command};
 use crate::demo;
-use crate::exit::Outcome;
 
-/// Runs one command; `exit` turns an error into a line and an exit code.
-pub fn run(command: Command) -> crate::Result<Outcome> {
-    match command {
+/// Runs one command, and returns false if a gate failed.
+pub fn run(command: Command) -> crate::Result<bool> {
+    let done = match command {
+        Command::Audit(AuditCommand::Map(args)) => return audits::map(&args),
+        Command::Audit(AuditCommand::Images(args)) => return audits::images(&args),
+        Command::Audit(AuditCommand::Released(args)) => return audits::released(&args),
+        Command::Audit(AuditCommand::Sequence(args)) => return audits::sequence(&args),
+        Command::Audit(AuditCommand::Again(args)) => return audits::again(&args),
+        Command::Compare(args) => return compare::run(&args),
         Command::Demo(args) => demo::run(&args),
-        Command::Audit(AuditCommand::Map(args)) => audits::map(&args),
-        Command::Audit(AuditCommand::Images(args)) => audits::images(&args),
-        Command::Audit(AuditCommand::Released(args)) => audits::released(&args),
-        Command::Audit(AuditCommand::Sequence(args)) => audits::sequence(&args),
-        Command::Audit(AuditCommand::Again(args)) => audits::again(&args),
-        Command::Compare(args) => compare::run(&args),
         Command::Table(args) => table::run(&args),
         Command::Obfuscate(args) => with_threads(|| stages::obfuscate(&args)),
         Command::Neighbors(args) => with_threads(|| stages::neighbors(&args)),
@@ -36,5 +35,6 @@ pub fn run(command: Command) -> crate::Result<Outcome> {
         Command::Invert(args) => with_threads(|| invert::run(&args)),
         Command::Schemes => about::schemes(),
         Command::Models => about::models(),
-    }
+    };
+    done.map(|()| true)
 }

@@ -38,7 +38,6 @@ use unlift_vision::features::Extraction;
 use super::common::{all_could_be, open_map, public, read_document};
 use crate::Error;
 use crate::args::{EvaluateArgs, NeighborsArgs, ObfuscateArgs, RecoverArgs, public_name};
-use crate::exit::Outcome;
 use crate::output::{print, table};
 use crate::progress::{Progress, Stderr};
 use crate::stderr;
@@ -89,7 +88,7 @@ const GUESSABLE: &str = "unlift: note: whoever guesses the --seed can restore th
     the points: do not release this map";
 
 /// `unlift obfuscate`
-pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<Outcome> {
+pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<()> {
     let (map, unit) = (&args.map, args.map.unit());
     let more = [&map.descriptors, &args.public_descriptors, &args.audit];
     let more = more.into_iter().filter_map(|path| path.as_deref());
@@ -106,9 +105,7 @@ pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<Outcome> {
         return obfuscate_images(args, out);
     };
     let prepared = open_map(&args.path, map, false, (args.seed.unwrap_or(0), false))?;
-    for note in prepared.doubts.iter().chain(&prepared.notes) {
-        Stderr.say(&format!("note: {note}"));
-    }
+    prepared.doubts.iter().chain(&prepared.notes).for_each(stderr::note);
     let scheme = changed(args, scheme, &prepared)?;
     let name = scheme.name();
     let leak = args.audit.as_deref().map(|path| leak_of(path, args, &prepared, name));
@@ -123,8 +120,7 @@ pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<Outcome> {
     print(&format!(
         "{name}: {slots} points hidden in {records} records, {dropped} dropped, in {folder}\n"
     ))?;
-    leak.map_or(Ok(()), |leak| print(&format!("audited: {leak}\n")))?;
-    Ok(Outcome::Done)
+    leak.map_or(Ok(()), |leak| print(&format!("audited: {leak}\n")))
 }
 
 /// Returns the key from which all randomness comes.
@@ -165,7 +161,7 @@ fn leak_of(
 }
 
 /// Hides the keypoints of all images, each under a key of its own, and writes both files into `out`.
-fn obfuscate_images(args: &ObfuscateArgs, mut out: OutputSet) -> crate::Result<Outcome> {
+fn obfuscate_images(args: &ObfuscateArgs, mut out: OutputSet) -> crate::Result<()> {
     let (map, path, name) = (&args.map, &args.path, args.scheme.name);
     for (option, given) in [
         ("--scale", map.scale.is_some()),
@@ -252,7 +248,7 @@ fn write<T: Send, U: Send>(
 const K: u16 = 50;
 
 /// `unlift neighbors`
-pub fn neighbors(args: &NeighborsArgs) -> crate::Result<Outcome> {
+pub fn neighbors(args: &NeighborsArgs) -> crate::Result<()> {
     let inputs = [Some(args.released.as_path()), args.truth.as_deref()];
     let rules = &Rules::new(inputs.into_iter().flatten(), false);
     check_file(&args.out, Kind::Stage(Stage::Neighborhoods), rules)?;
@@ -288,8 +284,7 @@ pub fn neighbors(args: &NeighborsArgs) -> crate::Result<Outcome> {
     };
     drop(alive);
     let (n, longest, out) = (counts.slots, counts.longest, OneLine(args.out.display()));
-    print(&format!("{n} neighborhoods of up to {longest} by {name}, in {out}\n"))?;
-    Ok(Outcome::Done)
+    print(&format!("{n} neighborhoods of up to {longest} by {name}, in {out}\n"))
 }
 
 /// Writes the lists of a map.
@@ -394,7 +389,7 @@ fn images_by_oracle(
     ratio: f64,
     rules: &Rules,
 ) -> crate::Result<Counts> {
-    let mut pairs = Pairs::open(truth, Some(&args.released))?;
+    let next = pairs(truth, Some(&args.released))?;
     let how = (args.oracle_noise, ratio, usize::from(args.k.unwrap_or(K)));
     let work = |pair: Pair| {
         let Pair { name, original, secret, released } = pair;
@@ -404,11 +399,11 @@ fn images_by_oracle(
         let lists = lists.map_err(of_image(truth, &name))?;
         Ok(Some((name, lists)))
     };
-    write((&args.out, rules), Stage::Neighborhoods, || pairs.next(), work, add_lists)
+    write((&args.out, rules), Stage::Neighborhoods, next, work, add_lists)
 }
 
 /// `unlift recover`
-pub fn recover(args: &RecoverArgs) -> crate::Result<Outcome> {
+pub fn recover(args: &RecoverArgs) -> crate::Result<()> {
     let rules = Rules::new([args.released.as_path(), &args.neighbors], false);
     let kind = Kind::Stage(Stage::Recovered);
     check_file(&args.out, kind, &rules)?;
@@ -430,8 +425,7 @@ pub fn recover(args: &RecoverArgs) -> crate::Result<Outcome> {
         format!("{n} of {slots} points have a position, with delta {delta:.4} {unit}")
     };
     drop(alive);
-    print(&format!("{what}, in {}\n", OneLine(args.out.display())))?;
-    Ok(Outcome::Done)
+    print(&format!("{what}, in {}\n", OneLine(args.out.display())))
 }
 
 fn recovered<const D: usize>(
@@ -516,24 +510,22 @@ fn check_lists<const D: usize>(
 /// What was compared.
 struct Evaluated {
     row: Row,
-    thresholds: Vec<Threshold>,
     /// Without a fingerprint if any image lacks that of its released image.
     about: About,
     slots_per_record: usize,
-    /// Checks that the compared files belong together.
-    checked: Checked,
+    /// Doubts about the figures, or why the compared files do not belong together.
+    doubts: Result<Vec<String>, unlift::Error>,
 }
 
 /// `unlift evaluate`
-pub fn evaluate(args: &EvaluateArgs) -> crate::Result<Outcome> {
+pub fn evaluate(args: &EvaluateArgs) -> crate::Result<()> {
     // The released map beside the truth, for the blind baseline.
     let released = Some(args.truth.with_file_name(RELEASED)).filter(|path| path.exists());
     let released = released.as_deref();
-    let evaluated = match has_images(&args.truth)? {
+    let Evaluated { row, about, slots_per_record, doubts } = match has_images(&args.truth)? {
         true => evaluate_images(args, released)?,
         false => evaluate_map(args, released)?,
     };
-    let Evaluated { row, thresholds, about, slots_per_record, checked } = evaluated;
     let mut notes = Vec::new();
     if about.map.is_none() {
         notes.push("does not name its released map; assumed to be that of the truth".to_owned());
@@ -543,7 +535,7 @@ pub fn evaluate(args: &EvaluateArgs) -> crate::Result<Outcome> {
                     record, so the figures are upper bounds";
         notes.push(note.to_owned());
     }
-    notes.extend(checked.notes(&thresholds, row.unit).map_err(|error| {
+    notes.extend(doubts.map_err(|error| {
         let error = Error::from(FileError::core(&args.recovered, error));
         if released.is_some() {
             return error;
@@ -558,8 +550,7 @@ pub fn evaluate(args: &EvaluateArgs) -> crate::Result<Outcome> {
     print(&match args.json {
         true => format!("{:#}\n", unlift_audit::evaluated(&row, &notes)?),
         false => as_table(&row),
-    })?;
-    Ok(Outcome::Done)
+    })
 }
 
 /// Returns the requested thresholds, by default those of an audit in `unit`.
@@ -591,17 +582,17 @@ fn evaluate_map(args: &EvaluateArgs, released: Option<&Path>) -> crate::Result<E
     let (row, _) = measure(&recovered, &original, &secret, baseline.as_ref(), &thresholds)
         .map_err(|error| FileError::core(&args.recovered, error))?;
     let slots_per_record = secret.slots_per_record();
-    Ok(Evaluated { row, thresholds, about, slots_per_record, checked })
+    Ok(Evaluated { row, about, slots_per_record, doubts: checked.notes(&thresholds, unit) })
 }
 
 /// Computes the row over all images.
 fn evaluate_images(args: &EvaluateArgs, released: Option<&Path>) -> crate::Result<Evaluated> {
     let thresholds = thresholds(args, Unit::Pixel);
-    let mut pairs = Pairs::open(&args.truth, released)?;
+    let mut next = pairs(&args.truth, released)?;
     let mut file = ImageFile::open(&args.recovered, Stage::Recovered)?;
     let (mut pooled, mut checked) = (Pooled::new(&thresholds), Checked::default());
     let mut about: Option<About> = None;
-    while let Some(Pair { name, original, secret, released }) = pairs.next()? {
+    while let Some(Pair { name, original, secret, released }) = next()? {
         if secret.n_slots() == 0 {
             pooled.add_unreleased(&secret);
             continue;
@@ -620,16 +611,11 @@ fn evaluate_images(args: &EvaluateArgs, released: Option<&Path>) -> crate::Resul
     file.expect_end(&args.truth)?;
     let none = || FileError::new(&args.truth, "", "images with hidden points", "none");
     let row = pooled.row().ok_or_else(none)?;
-    let about = about.unwrap_or_default();
-    Ok(Evaluated { row, thresholds, about, slots_per_record: 1, checked })
+    let (about, doubts) = (about.unwrap_or_default(), checked.notes(&thresholds, Unit::Pixel));
+    Ok(Evaluated { row, about, slots_per_record: 1, doubts })
 }
 
-/// Iterator over images of a truth file and of the released file.
-struct Pairs<'a> {
-    truth: (&'a Path, ImageFile<'a>),
-    released: Option<(&'a Path, ImageFile<'a>)>,
-}
-
+/// An image with its truth.
 struct Pair {
     name: String,
     original: Original<2>,
@@ -638,26 +624,26 @@ struct Pair {
     released: Option<Released<2>>,
 }
 
-impl<'a> Pairs<'a> {
-    fn open(truth: &'a Path, released: Option<&'a Path>) -> crate::Result<Self> {
-        let images = ImageFile::open(truth, Stage::Truth)?;
-        let open = |path| Ok::<_, FileError>((path, ImageFile::open(path, Stage::Released)?));
-        Ok(Self { truth: (truth, images), released: released.map(open).transpose()? })
-    }
-
-    fn next(&mut self) -> crate::Result<Option<Pair>> {
-        let truth = self.truth.0;
-        let Some(rows) = self.truth.1.next_image()? else {
-            if let Some((_, released)) = &mut self.released {
+/// Returns a function that reads the next image of a truth file and of the released file.
+fn pairs<'a>(
+    truth: &'a Path,
+    released: Option<&'a Path>,
+) -> crate::Result<impl FnMut() -> crate::Result<Option<Pair>>> {
+    let mut images = ImageFile::open(truth, Stage::Truth)?;
+    let open = |path| Ok::<_, FileError>((path, ImageFile::open(path, Stage::Released)?));
+    let mut released = released.map(open).transpose()?;
+    Ok(move || {
+        let Some(rows) = images.next_image()? else {
+            if let Some((_, released)) = &mut released {
                 released.expect_end(truth)?;
             }
             return Ok(None);
         };
         let name = rows.name().to_owned();
         let (original, secret) = rows.truth()?;
-        let released = match &mut self.released {
-            Some((path, images)) if secret.n_slots() > 0 => {
-                let image = images.expect(&name, truth)?.released()?;
+        let released = match &mut released {
+            Some((path, released)) if secret.n_slots() > 0 => {
+                let image = released.expect(&name, truth)?.released()?;
                 same_map(path, Some(image.fingerprint()), truth, secret.map())?;
                 expect_slots(path, &image, &secret)?;
                 Some(image)
@@ -665,7 +651,7 @@ impl<'a> Pairs<'a> {
             _ => None,
         };
         Ok(Some(Pair { name, original, secret, released }))
-    }
+    })
 }
 
 /// Formats a percentage; one above zero never reads as zero.

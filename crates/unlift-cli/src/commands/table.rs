@@ -10,11 +10,10 @@ use unlift_report::export::{TableFormat, curves, table, thresholds};
 use super::common::read_document;
 use crate::Error;
 use crate::args::TableArgs;
-use crate::exit::Outcome;
 use crate::output::print;
 use crate::stderr;
 
-pub fn run(args: &TableArgs) -> crate::Result<Outcome> {
+pub fn run(args: &TableArgs) -> crate::Result<()> {
     let ending = args.out.as_ref().map(|out| {
         let ending = out.extension().unwrap_or_default();
         ending.to_string_lossy().to_ascii_lowercase()
@@ -61,8 +60,7 @@ pub fn run(args: &TableArgs) -> crate::Result<Outcome> {
     }
     match &args.out {
         // All users may read it.
-        Some(path) => write_file(path, Access::Usual, |w| w.write_all(text.as_bytes()))?,
-        None => print(&text)?,
+        Some(path) => Ok(write_file(path, Access::Usual, |w| w.write_all(text.as_bytes()))?),
+        None => print(&text),
     }
-    Ok(Outcome::Done)
 }

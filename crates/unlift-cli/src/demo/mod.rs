@@ -26,7 +26,6 @@ use unlift_vision::network::{DescriptorKind, Learned};
 
 use crate::args::DemoArgs;
 use crate::commands::common::with_threads;
-use crate::exit::Outcome;
 use crate::output::{command_line, print, table};
 use crate::progress::{Progress, Stderr};
 
@@ -39,7 +38,7 @@ const RATIOS: [f64; 2] = [0.5, 0.1];
 /// Page and JSON file of the photos; the map has the audit's usual names.
 const OF_PHOTOS: [&str; 2] = ["photos.html", "photos.json"];
 
-pub fn run(args: &DemoArgs) -> crate::Result<Outcome> {
+pub fn run(args: &DemoArgs) -> crate::Result<()> {
     let files = [
         (PAGE, Kind::Page),
         (FIGURES, Kind::AuditJson),
@@ -63,8 +62,7 @@ pub fn run(args: &DemoArgs) -> crate::Result<Outcome> {
         out.commit()?;
         Ok(summary(of_photos, of_map, &args.out.join(PAGE)))
     })?;
-    print(&text)?;
-    Ok(Outcome::Done)
+    print(&text)
 }
 
 fn photos(output: Output) -> crate::Result<Audited> {

@@ -16,6 +16,7 @@ mod invert;
 mod layouts;
 mod models;
 mod outputs;
+#[cfg(unix)]
 mod readme;
 mod sequence;
 mod stages;
