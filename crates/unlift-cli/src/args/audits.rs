@@ -379,7 +379,10 @@ queries give keypoints back without neighbors. The attack links keypoints by the
 
 The row sequence@5 attacks each image with the five consecutive images around it, in the order of
 their names. The row tracks@5 links them by the tracks of MODEL instead: what better links would
-give. With --neighbors, the row sequence+lists@5 also uses lists of neighbors within each image.")]
+give. With --neighbors, the row sequence+lists@5 also uses lists of neighbors within each image.
+
+If an image cannot be used, unlift prints a line on stderr, counts the image in audit.json, audits
+the others, and ends with exit code 3.")]
 pub struct AuditSequenceArgs {
     /// A COLMAP project or model with the poses of the images
     pub model: PathBuf,

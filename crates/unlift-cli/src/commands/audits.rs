@@ -1,6 +1,7 @@
 //! The audits: arguments to an `Audit`, which is run and printed.
 
 use std::collections::BTreeMap;
+use std::iter;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -38,11 +39,15 @@ use crate::output::{command_line, print};
 use crate::progress::Progress;
 use crate::values::NeighborSource;
 
-/// Runs the audit that `work` makes with an output, writes its results and prints them. Returns whether every gate held. Files in
-/// `inputs` must not be overwritten.
+/// Runs the audit of `path` that `work` makes with an output, writes its results and prints them. Returns whether every gate held.
+/// `path` and the files in `more` must not be overwritten.
+///
+/// # Errors
+/// Among others, if images of `path` could not be used; the results without them are written.
 fn perform<'a>(
     args: &AuditArgs,
-    inputs: impl IntoIterator<Item = &'a Path>,
+    path: &'a Path,
+    more: impl IntoIterator<Item = &'a Path>,
     work: impl FnOnce(Output) -> crate::Result<Audited> + Send,
 ) -> crate::Result<bool> {
     let output = Output {
@@ -51,9 +56,12 @@ fn perform<'a>(
         command: Some(command_line()),
         ..Output::new(&args.out)
     };
-    let files = output.open(Rules::new(inputs, false))?;
+    let files = output.open(Rules::new(iter::once(path).chain(more), false))?;
     let finished = with_threads(|| work(output)?.write(files))?;
     print(&finished.text())?;
+    if let Some(count) = finished.document.input.images {
+        all_could_be("used", path, count.used as usize, count.unusable as usize)?;
+    }
     Ok(finished.passed())
 }
 
@@ -115,10 +123,9 @@ const PAINTED_RATIO: f64 = 0.5;
 /// `unlift audit map`
 pub fn map(args: &AuditMapArgs) -> crate::Result<bool> {
     let more = args.paint.inputs().chain(&args.localize).chain(&args.protect.public_descriptors);
-    let inputs = [args.path.as_path()].into_iter().chain(args.map.descriptors.as_deref());
-    let inputs = inputs.chain(NeighborSource::files(&args.solvers.neighbors));
-    let inputs = inputs.chain(more.map(|path| path.as_path()));
-    perform(&args.audit, inputs, |output| {
+    let lists = NeighborSource::files(&args.solvers.neighbors);
+    let more = lists.chain(args.map.descriptors.as_deref()).chain(more.map(|path| path.as_path()));
+    perform(&args.audit, &args.path, more, |output| {
         let AuditArgs { seed, quiet, .. } = args.audit;
         let mut prepared = open_map(&args.path, &args.map, args.uses_descriptors(), (seed, quiet))?;
         let progress = Progress::new(quiet);
@@ -193,15 +200,14 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<bool> {
 
 /// `unlift audit released`
 pub fn released(args: &AuditReleasedArgs) -> crate::Result<bool> {
-    let stages = [args.released.as_path(), &args.truth].into_iter();
     let lists = NeighborSource::files(&args.solvers.neighbors);
-    let inputs = stages.chain(args.descriptors.as_deref()).chain(lists);
+    let more = lists.chain([args.truth.as_path()]).chain(args.descriptors.as_deref());
     let files = released::Files {
         released: &args.released,
         truth: &args.truth,
         descriptors: args.descriptors.as_deref(),
     };
-    perform(&args.audit, inputs, |output| {
+    perform(&args.audit, &args.released, more, |output| {
         let name = args.name.clone().map_or_else(|| files.scheme_name(), Ok)?;
         let released::Release { mut prepared, hidden } = files.open()?;
         let progress = Progress::new(args.audit.quiet);
@@ -246,9 +252,7 @@ pub fn images(args: &AuditImagesArgs) -> crate::Result<bool> {
     let mut plan = request.plan(Plan::new(Unit::Pixel), true)?;
     plan.check_for_many().map_err(|error| Error::request(error.to_string()))?;
     let more = args.paint.inputs().chain(&args.protect.public_descriptors);
-    let inputs = [&args.path].into_iter().chain(more).map(|path| path.as_path());
-    let mut count = None;
-    let passed = perform(&args.audit, inputs, |output| {
+    perform(&args.audit, &args.path, more.map(|path| path.as_path()), |output| {
         let photos = args.paint.photos.as_deref();
         let opening = Opening {
             wanted: args.extraction.wanted(),
@@ -276,14 +280,8 @@ pub fn images(args: &AuditImagesArgs) -> crate::Result<bool> {
         let images = Images { opened: &opened, plan, draws: true, photos, inversion };
         let mut audit = Audit::new(Input::Images(images), output);
         audit.options = args.record();
-        let audited = run(audit, &args.audit, &progress)?;
-        count = audited.document.input.images;
-        Ok(audited)
-    })?;
-    if let Some(count) = count {
-        all_could_be("used", &args.path, count.used as usize, count.unusable as usize)?;
-    }
-    Ok(passed)
+        run(audit, &args.audit, &progress)
+    })
 }
 
 /// Opens the painter of pictures, if it is requested.
@@ -322,8 +320,8 @@ pub fn sequence(args: &AuditSequenceArgs) -> crate::Result<bool> {
             "--invert: expected without --share-safe, as pictures show the place",
         ));
     }
-    let inputs = [&args.model, &args.path].into_iter().chain(args.paint.inputs());
-    perform(&args.audit, inputs.map(|path| path.as_path()), |output| {
+    let more = iter::once(&args.model).chain(args.paint.inputs());
+    perform(&args.audit, &args.path, more.map(|path| path.as_path()), |output| {
         let extraction = args.extraction.wanted().extraction(&args.path)?;
         // A model is of the photos as they are stored.
         let source = FeatureSource::open(&args.path, &extraction)?.with_turn(Turn::AsStored);
@@ -351,8 +349,8 @@ pub fn sequence(args: &AuditSequenceArgs) -> crate::Result<bool> {
 
 /// `unlift audit again`
 pub fn again(args: &AuditAgainArgs) -> crate::Result<bool> {
-    let inputs = [&args.a, &args.b].into_iter().chain(&args.descriptors);
-    perform(&args.audit, inputs.map(|path| path.as_path()), |output| {
+    let more = iter::once(&args.b).chain(&args.descriptors);
+    perform(&args.audit, &args.a, more.map(|path| path.as_path()), |output| {
         let preparation = Preparation { scale: args.scale, ..Preparation::default() };
         let reading = Progress::uncounted(args.audit.quiet, "reading the maps");
         let mut maps = Maps::open([&args.a, &args.b], &args.descriptors, &preparation)?;

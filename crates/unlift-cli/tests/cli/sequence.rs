@@ -89,6 +89,21 @@ fn keypoints_come_back_by_the_number_of_queries() {
 }
 
 #[test]
+fn an_image_of_another_size_is_counted_and_the_others_are_audited() {
+    let place = walk();
+    let images = String::from_utf8(place.bytes("model/images.txt")).unwrap();
+    place.write("model/images.txt", images.replace(" 1 5.png", " 2 5.png"));
+    let cameras = "1 SIMPLE_PINHOLE 640 480 500 320 240\n2 SIMPLE_PINHOLE 320 240 250 160 120\n";
+    place.write("model/cameras.txt", cameras);
+    let line = "audit sequence model f.h5 --queries 2 --schemes lines2d --out a";
+    let (_, stderr) = place.ends(line, 3);
+    assert!(stderr.contains("5.png: expected 320 x 240 pixels, as its camera"), "{stderr}");
+    assert!(stderr.contains("f.h5: expected 6 images that can be used, found 5"), "{stderr}");
+    let images = &place.json("a/audit.json")["input"]["images"];
+    assert_eq!([&images["used"], &images["unusable"]], [5, 1]);
+}
+
+#[test]
 fn lists_and_changed_descriptors_have_rows_of_their_own() {
     let place = walk();
     let audit = "audit sequence model f.h5 --queries 2,5 --schemes lines2d --thresholds 5";
