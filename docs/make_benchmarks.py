@@ -26,7 +26,6 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 SHARED = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else ROOT.parent / "shared").resolve()
 DATA = SHARED / "data"
 PROGRAM = ROOT / "target/release/unlift"
-RATIOS = [1.0, 0.75, 0.5, 0.3, 0.2, 0.1]
 SCHEMES = ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp"]
 FEWER_SCHEMES = ["olc", "ppl", "ray", "plane", "cp"]
 IMAGE_SCHEMES = ["lines2d", "cp2d", "dcl2d"]

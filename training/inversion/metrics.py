@@ -7,22 +7,17 @@ from safetensors.torch import load_file
 from torch.nn import functional
 
 
-def ssim(a: torch.Tensor, b: torch.Tensor, peak: float = 1.0, gaussian: bool = False) -> torch.Tensor:
-    """Mean over pixels and channels, `(b,)`: uniform windows of 7 x 7 as scikit-image has them by default, or a Gaussian
-    window (11 x 11, sigma 1.5). `peak` is the range of values that the constants assume."""
-    line = torch.exp(-((torch.arange(11, dtype=a.dtype, device=a.device) - 5) ** 2) / 4.5)
-    window = torch.outer(line, line) / line.sum() ** 2
+def ssim(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
+    """Mean over pixels and channels, `(b,)`: uniform windows of 7 x 7 as scikit-image has them by default."""
 
     def mean(x):
-        if gaussian:
-            return functional.conv2d(x, window.expand(x.shape[1], 1, 11, 11), groups=x.shape[1])
         return functional.avg_pool2d(x, 7, 1)
 
     at_a, at_b = mean(a), mean(b)
-    unbiased = 1 if gaussian else 49 / 48
+    unbiased = 49 / 48
     aa, bb = unbiased * (mean(a * a) - at_a**2), unbiased * (mean(b * b) - at_b**2)
     ab = unbiased * (mean(a * b) - at_a * at_b)
-    c1, c2 = (0.01 * peak) ** 2, (0.03 * peak) ** 2
+    c1, c2 = 0.01**2, 0.03**2
     s = (2 * at_a * at_b + c1) * (2 * ab + c2) / ((at_a**2 + at_b**2 + c1) * (aa + bb + c2))
     return s.mean((1, 2, 3))
 
@@ -35,13 +30,9 @@ def psnr(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
 class Lpips(torch.nn.Module):
     """LPIPS v0.1 on SqueezeNet 1.1, from `lpips_squeeze_v0.1.safetensors`."""
 
-    POOLED = (0, 3, 6)  # a maximum over 3 x 3 comes after these
-    TAKEN = (0, 2, 4, 5, 6, 7, 8)  # what is compared: the first convolution, then fire modules by number
-
     def __init__(self, path: pathlib.Path, device: str = "cpu"):
         super().__init__()
         self.tensors = load_file(path, device)
-        self.fires = [3, 4, 6, 7, 9, 10, 11, 12]
         self.shift = self.tensors["scaling_layer.shift"].view(1, 3, 1, 1)
         self.scale = self.tensors["scaling_layer.scale"].view(1, 3, 1, 1)
 
@@ -52,7 +43,7 @@ class Lpips(torch.nn.Module):
         x = (2 * x - 1 - self.shift) / self.scale
         x = self._conv("features.0", x, stride=2)
         found = [x]
-        for fire in self.fires:
+        for fire in (3, 4, 6, 7, 9, 10, 11, 12):
             if fire in (3, 6, 9):
                 x = functional.max_pool2d(x, 3, 2, ceil_mode=True)
             x = self._conv(f"features.{fire}.squeeze", x)

@@ -11,7 +11,6 @@ import numpy
 import torch
 
 STEPS = 1024.0  # of a pair score per standard deviation
-REACHES = 3
 K = 20
 
 

@@ -16,6 +16,7 @@ import torch
 
 import data
 import evaluate
+import ranking
 import weights
 from model import Network, Shape
 
@@ -45,8 +46,7 @@ def parsed():
 
 def loss_of(scores: torch.Tensor, target: torch.Tensor) -> torch.Tensor:
     """Cross entropy of every row's softmax over the other points."""
-    itself = torch.eye(scores.shape[-1], dtype=torch.bool)
-    logs = torch.log_softmax(scores.float().masked_fill(itself, -1e9), -1)
+    logs = torch.log_softmax(ranking.without_self(scores.float()), -1)
     return -(target * logs).sum(-1).mean()
 
 
