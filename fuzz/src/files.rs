@@ -125,9 +125,10 @@ pub fn photo(bytes: &[u8]) {
     if let Ok(image) = unlift_vision::features::photo::decode(bytes, "a photo") {
         assert!(image.width() > 0 && image.height() > 0);
         let path = file("p.jpg", bytes);
-        let color =
-            unlift_vision::features::photo::read_color(&path).expect("as it was read in gray");
-        assert_eq!([color.width(), color.height()], [image.width(), image.height()]);
+        let turn = unlift_vision::features::photo::Turn::Upright;
+        let color = unlift_vision::features::photo::read_color(&path, turn);
+        let (width, height) = color.expect("as it was read in gray").dimensions();
+        assert_eq!([width as usize, height as usize], [image.width(), image.height()]);
     }
 }
 

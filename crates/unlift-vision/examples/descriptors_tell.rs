@@ -17,7 +17,7 @@ use unlift::released::Released;
 use unlift::seed::Key;
 use unlift::truth::Original;
 use unlift::{About, Descriptors, PointSet, RecordId, RowOrder, Unit};
-use unlift_vision::features::{Extraction, Extractor, Found, LearnedOptions, SiftOptions};
+use unlift_vision::features::{Extraction, Extractor, PhotoFeatures};
 use unlift_vision::network::Learned;
 
 const K: usize = 20;
@@ -39,14 +39,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     if photos.is_empty() {
         return Err("expected photos in the folder, found none".into());
     }
-    let faint = LearnedOptions { min_score: 0.02, ..LearnedOptions::ALIKED };
     let mut kinds = vec![
-        ("SIFT", Extraction::Sift(SiftOptions::default())),
-        ("ALIKED, the best 2,048", Extraction::Aliked(faint)),
-        ("ALIKED, score above 0.2", Extraction::Aliked(LearnedOptions::ALIKED)),
+        ("SIFT", Extraction::SIFT),
+        ("ALIKED, the best 2,048", Extraction { min_score: 0.02, ..Extraction::ALIKED }),
+        ("ALIKED, score above 0.2", Extraction::ALIKED),
     ];
     if arguments.any(|argument| argument == "--superpoint") {
-        kinds.push(("SuperPoint", Extraction::SuperPoint(LearnedOptions::SUPERPOINT)));
+        kinds.push(("SuperPoint", Extraction::SUPERPOINT));
     }
     println!("| features | keypoints | {} |", COLUMNS.join(" | "));
     println!("| --- | --- |{}", " --- |".repeat(COLUMNS.len()));
@@ -72,12 +71,12 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// Measures the inlier ratios of a photo; `None` if it has too few keypoints.
 fn named(extractor: &Extractor, photo: &Path) -> Result<Option<Shares>, unlift::Error> {
-    let (places, values, dim) = match extractor.read(photo)?.found {
-        Found::Sift(found) => {
-            let places: Vec<_> = found.keypoints.iter().map(|at| [at.x, at.y]).collect();
-            (places, Values::U8(found.descriptors.concat()), 128)
+    let (places, values, dim) = match extractor.read(photo)?.features {
+        PhotoFeatures::Sift(sift) => {
+            let places: Vec<_> = sift.keypoints.iter().map(|at| [at.x, at.y]).collect();
+            (places, Values::U8(sift.descriptors.concat()), 128)
         }
-        Found::Learned(found) => (found.keypoints, Values::F32(found.descriptors), found.dim),
+        PhotoFeatures::Learned(of) => (of.keypoints, Values::F32(of.descriptors), of.dim),
     };
     if places.len() <= K {
         return Ok(None);

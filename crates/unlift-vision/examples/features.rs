@@ -12,7 +12,9 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::time::Instant;
 
-use unlift_vision::features::{Aliked, LearnedOptions, Sift, SiftOptions, in_order, photo};
+use unlift_vision::features::photo::{self, Turn};
+use unlift_vision::features::{Extraction, Sift, aliked, in_order};
+use unlift_vision::network::Network;
 
 /// The rows of keypoints of a photo, the size of a descriptor, and the bytes of descriptors.
 type Raw = (Vec<[f32; 4]>, u32, Vec<u8>);
@@ -32,27 +34,28 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
+    let with_options = |usual: Extraction| Extraction {
+        max_features: max_features.unwrap_or(usual.max_features),
+        ..usual
+    };
     let all = match kind.as_str() {
         "sift" => {
-            let mut of = SiftOptions::default();
-            of.max_features = max_features.unwrap_or(of.max_features);
-            let sift = Sift::try_new(of)?;
+            let sift = Sift::try_new(with_options(Extraction::SIFT))?;
             extract(&images, photo::read, |image| {
-                let found = sift.extract(image);
-                let rows = found.keypoints.iter().map(|at| [at.x, at.y, at.scale, at.orientation]);
-                Ok((rows.collect(), 128, found.descriptors.concat()))
+                let all = sift.extract(image);
+                let rows = all.keypoints.iter().map(|at| [at.x, at.y, at.scale, at.orientation]);
+                Ok((rows.collect(), 128, all.descriptors.concat()))
             })?
         }
         "aliked" => {
-            let mut of = LearnedOptions::ALIKED;
-            of.max_features = max_features.unwrap_or(of.max_features);
-            let aliked = Aliked::try_new(of)?;
+            let options = with_options(Extraction::ALIKED);
+            let network = Network::load("aliked-n16rot")?;
             extract(&images, photo::read_color, |image| {
-                let found = aliked.extract(image)?;
+                let all = aliked(&network, &options, image)?;
                 // From the middle of the first pixel to its corner.
-                let rows = found.keypoints.iter().map(|[x, y]| [x + 0.5, y + 0.5, 0.0, 0.0]);
-                let bytes = found.descriptors.iter().flat_map(|value| value.to_le_bytes());
-                Ok((rows.collect(), 4 * found.dim as u32, bytes.collect()))
+                let rows = all.keypoints.iter().map(|[x, y]| [x + 0.5, y + 0.5, 0.0, 0.0]);
+                let bytes = all.descriptors.iter().flat_map(|value| value.to_le_bytes());
+                Ok((rows.collect(), 4 * all.dim as u32, bytes.collect()))
             })?
         }
         _ => return Err(format!("--type: expected sift or aliked, found {kind:?}").into()),
@@ -73,10 +76,10 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// Extracts the features of all photos, and prints the time of extraction alone.
 fn extract<Image: Sync>(
     images: &[String],
-    read: impl Fn(&Path) -> Result<Image, unlift::Error>,
+    read: impl Fn(&Path, Turn) -> Result<Image, unlift::Error>,
     extract: impl Fn(&Image) -> Result<Raw, unlift::Error> + Sync,
 ) -> Result<Vec<Raw>, unlift::Error> {
-    let images = images.iter().map(|image| read(Path::new(image)));
+    let images = images.iter().map(|image| read(Path::new(image), Turn::Upright));
     let images: Vec<Image> = images.collect::<Result<_, _>>()?;
     // A warm-up run, as for the compared extractors.
     images.first().map(&extract).transpose()?;

@@ -10,18 +10,16 @@
 //! average number of crops that contain a keypoint. `--whole N`: one crop per photo, the N
 //! keypoints nearest the middle, or all; a folder per photo, named by its line.
 
-use std::collections::BTreeMap;
 use std::error::Error;
-use std::fs::{File, OpenOptions, create_dir_all};
-use std::io::{BufWriter, Write};
+use std::fs::{OpenOptions, create_dir_all};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use unlift::Descriptors;
 use unlift::descriptors::Values;
 use unlift::neighbors::{dense, usual};
 use unlift::seed::{Draws, Stage};
-use unlift_vision::features::in_order;
-use unlift_vision::features::{Extraction, Extractor, Found, LearnedOptions, SiftOptions};
+use unlift_vision::features::{Extraction, Extractor, PhotoFeatures, in_order};
 
 /// Steps of a pair score per standard deviation.
 const STEPS: f32 = 1024.0;
@@ -69,12 +67,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let photos = std::fs::read_to_string(list)?;
     let photos: Vec<(u32, &str)> = (0..).zip(photos.lines()).collect();
     let extractor = Extractor::try_new(&extraction(&kind, max_image_size)?)?;
-    let mut folders = BTreeMap::new();
     let mut n_keypoints = 0;
     let crops = |&(photo, path): &(u32, &str)| -> Result<Vec<Crop>, Box<dyn Error + Send + Sync>> {
-        let Some(features) = features(extractor.read(Path::new(path))?.found)? else {
-            return Ok(Vec::new());
-        };
+        let photo_features = extractor.read(Path::new(path))?.features;
+        let Some(features) = features(photo_features)? else { return Ok(Vec::new()) };
         let rows = chosen(&features, photo, &options);
         Ok(rows.iter().map(|rows| crop(&features, photo, rows)).collect::<Result<_, _>>()?)
     };
@@ -82,14 +78,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         for crop in crops.map_err(|error| error.to_string())? {
             let n = crop.places.len();
             let name = options.whole.map_or(n.to_string(), |_| format!("{:04}", crop.photo));
-            if !folders.contains_key(&name) {
-                folders.insert(name.clone(), Folder::new(&out.join(&name), &crop)?);
-            }
-            folders.get_mut(&name).ok_or("no folder")?.add(&crop)?;
+            append(&out.join(name), &crop)?;
             n_keypoints += n;
-        }
-        if options.whole.is_some() {
-            folders.clear();
         }
         Ok(())
     })?;
@@ -98,29 +88,23 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 fn extraction(kind: &str, max_image_size: Option<usize>) -> Result<Extraction, String> {
-    let mut extraction = match kind {
-        "sift" => Extraction::Sift(SiftOptions::default()),
-        "aliked" => Extraction::Aliked(LearnedOptions { min_score: 0.0, ..LearnedOptions::ALIKED }),
-        "superpoint" => Extraction::SuperPoint(LearnedOptions::SUPERPOINT),
+    let usual = match kind {
+        "sift" => Extraction::SIFT,
+        "aliked" => Extraction { min_score: 0.0, ..Extraction::ALIKED },
+        "superpoint" => Extraction::SUPERPOINT,
         _ => return Err(format!("--type: expected sift, aliked or superpoint, found {kind:?}")),
     };
-    let of_kind = match &mut extraction {
-        Extraction::Sift(options) => &mut options.max_image_size,
-        Extraction::Aliked(options) => &mut options.max_image_size,
-        Extraction::SuperPoint(options) => &mut options.max_image_size,
-    };
-    *of_kind = max_image_size.unwrap_or(*of_kind);
-    Ok(extraction)
+    Ok(Extraction { max_image_size: max_image_size.unwrap_or(usual.max_image_size), ..usual })
 }
 
 /// Converts the features of a photo; `None` if there are too few.
-fn features(found: Found) -> Result<Option<Features>, unlift::Error> {
-    let (places, values, dim): (Vec<[f32; 2]>, _, _) = match found {
-        Found::Sift(found) => {
-            let places = found.keypoints.iter().map(|keypoint| [keypoint.x, keypoint.y]).collect();
-            (places, Values::U8(found.descriptors.concat()), 128)
+fn features(features: PhotoFeatures) -> Result<Option<Features>, unlift::Error> {
+    let (places, values, dim): (Vec<[f32; 2]>, _, _) = match features {
+        PhotoFeatures::Sift(sift) => {
+            let places = sift.keypoints.iter().map(|keypoint| [keypoint.x, keypoint.y]).collect();
+            (places, Values::U8(sift.descriptors.concat()), 128)
         }
-        Found::Learned(found) => (found.keypoints, Values::F32(found.descriptors), found.dim),
+        PhotoFeatures::Learned(of) => (of.keypoints, Values::F32(of.descriptors), of.dim),
     };
     if places.len() < 64 {
         return Ok(None);
@@ -134,13 +118,13 @@ fn features(found: Found) -> Result<Option<Features>, unlift::Error> {
 /// Chooses the rows of each crop of a photo.
 fn chosen(features: &Features, photo: u32, options: &Options) -> Vec<Vec<u32>> {
     let n = features.places.len();
-    if let Some(most) = options.whole {
+    if let Some(n_points) = options.whole {
         let extent = |axis: usize| {
             let values = features.places.iter().map(|place| place[axis]);
             values.fold((f32::MAX, f32::MIN), |(low, high), x| (low.min(x), high.max(x)))
         };
         let middle = [0, 1].map(extent).map(|(low, high)| (low + high) / 2.0);
-        return vec![nearest(features, middle, 1.0, most.min(n))];
+        return vec![nearest(features, middle, 1.0, n_points.min(n))];
     }
     let mut draws = Draws::new(options.seed, Stage::Subset, u64::from(photo));
     let mut crops = Vec::new();
@@ -156,16 +140,16 @@ fn chosen(features: &Features, photo: u32, options: &Options) -> Vec<Vec<u32>> {
     crops
 }
 
-/// Returns the `most` keypoints nearest `place`, by the larger of the distances along the axes,
+/// Returns the `n` keypoints nearest `place`, by the larger of the distances along the axes,
 /// with y multiplied by `stretch`.
-fn nearest(features: &Features, place: [f32; 2], stretch: f32, most: usize) -> Vec<u32> {
+fn nearest(features: &Features, place: [f32; 2], stretch: f32, n: usize) -> Vec<u32> {
     let distance = |row: &u32| {
         let [x, y] = features.places[*row as usize];
         (x - place[0]).abs().max((y - place[1]).abs() * stretch)
     };
     let mut rows: Vec<u32> = (0..features.places.len() as u32).collect();
     rows.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
-    rows.truncate(most);
+    rows.truncate(n);
     rows
 }
 
@@ -179,42 +163,21 @@ fn crop(features: &Features, photo: u32, rows: &[u32]) -> Result<Crop, unlift::E
     Ok(Crop { photo, places, descriptors, pairs })
 }
 
-struct Folder {
-    files: [BufWriter<File>; 4],
-}
-
-impl Folder {
-    fn new(path: &Path, first: &Crop) -> std::io::Result<Self> {
-        create_dir_all(path)?;
-        let open = |name: &str| {
-            let file = OpenOptions::new().create(true).append(true).open(path.join(name))?;
-            Ok::<_, std::io::Error>(BufWriter::new(file))
-        };
-        let descriptors = match first.descriptors.values() {
-            Values::U8(_) => "descriptors.u8",
-            Values::F32(_) => "descriptors.f32",
-        };
-        let files =
-            [open(descriptors)?, open("places.f32")?, open("pairs.i16")?, open("photos.u32")?];
-        Ok(Self { files })
+/// Appends a crop to the files in `folder`.
+fn append(folder: &Path, crop: &Crop) -> std::io::Result<()> {
+    create_dir_all(folder)?;
+    let write = |name: &str, bytes: &[u8]| {
+        OpenOptions::new().create(true).append(true).open(folder.join(name))?.write_all(bytes)
+    };
+    let floats = |values: &[f32]| -> Vec<u8> {
+        values.iter().flat_map(|value| value.to_le_bytes()).collect()
+    };
+    match crop.descriptors.values() {
+        Values::U8(values) => write("descriptors.u8", values)?,
+        Values::F32(values) => write("descriptors.f32", &floats(values))?,
     }
-
-    fn add(&mut self, crop: &Crop) -> std::io::Result<()> {
-        let [descriptors, places, pairs, photos] = &mut self.files;
-        match crop.descriptors.values() {
-            Values::U8(values) => descriptors.write_all(values)?,
-            Values::F32(values) => {
-                for value in values {
-                    descriptors.write_all(&value.to_le_bytes())?;
-                }
-            }
-        }
-        for value in crop.places.iter().flatten() {
-            places.write_all(&value.to_le_bytes())?;
-        }
-        for score in &crop.pairs {
-            pairs.write_all(&((score * STEPS).round() as i16).to_le_bytes())?;
-        }
-        photos.write_all(&crop.photo.to_le_bytes())
-    }
+    let steps = crop.pairs.iter().map(|score| (score * STEPS).round() as i16);
+    write("places.f32", &floats(crop.places.as_flattened()))?;
+    write("pairs.i16", &steps.flat_map(i16::to_le_bytes).collect::<Vec<u8>>())?;
+    write("photos.u32", &crop.photo.to_le_bytes())
 }

@@ -7,9 +7,7 @@ use unlift::descriptors::Values;
 use unlift_io::Error;
 use unlift_io::features::{ImageFeatures, round_to_half};
 use unlift_vision::features::photo::Turn;
-use unlift_vision::features::{
-    Extraction, Extractor, Features, Found as FoundFeatures, LearnedFeatures,
-};
+use unlift_vision::features::{Extraction, Extractor, Features, LearnedFeatures, PhotoFeatures};
 
 use super::{FeatureSource, Origin};
 
@@ -50,16 +48,16 @@ pub(super) fn open(root: &Path, extraction: &Extraction) -> Result<FeatureSource
     });
     listing.photos.sort_unstable();
     let (names, paths) = listing.photos.into_iter().unzip();
-    let from = Origin::Photos { paths, extractor, kind: extraction.kind() };
+    let from = Origin::Photos { paths, extractor, kind: extraction.kind };
     let refused = listing.refused.iter().map(ToString::to_string).collect();
     Ok(FeatureSource { names, refused, passed_over, turn: Turn::Upright, from })
 }
 
 /// Converts extracted features to those of files.
-pub(super) fn features_of(found: FoundFeatures) -> ImageFeatures {
-    match found {
-        FoundFeatures::Sift(features) => of_sift(features),
-        FoundFeatures::Learned(features) => of_network(features),
+pub(super) fn features_of(features: PhotoFeatures) -> ImageFeatures {
+    match features {
+        PhotoFeatures::Sift(features) => of_sift(features),
+        PhotoFeatures::Learned(features) => of_network(features),
     }
 }
 

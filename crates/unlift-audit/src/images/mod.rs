@@ -14,7 +14,7 @@ use unlift::descriptors::Values;
 use unlift_io::features::{self, ImageFeatures};
 use unlift_io::hash::{hash_file, hash_files};
 use unlift_vision::features::photo::Turn;
-use unlift_vision::features::{Extraction, Extractor, LearnedOptions, SiftOptions};
+use unlift_vision::features::{Extraction, Extractor};
 use unlift_vision::network::DescriptorKind;
 
 use crate::changes::kind_of;
@@ -131,7 +131,7 @@ impl FeatureSource {
                     uncertainty_px: Some(photo.noise_px),
                     upright: self.turn == Turn::Upright,
                     photo: Some(paths[at].clone()),
-                    ..folder::features_of(photo.found)
+                    ..folder::features_of(photo.features)
                 }
             }
             Origin::File(file) => file.get(at)?,
@@ -180,32 +180,25 @@ impl Wanted {
         if path.is_file() {
             self.check_unused("a file")?;
         }
-        let max_features = self.max_features.map(NonZeroUsize::get);
-        let max_image_size = self.max_image_size.map(|side| side as usize);
-        let learned = |usual: LearnedOptions| LearnedOptions {
-            max_features: max_features.unwrap_or(usual.max_features),
-            min_score: self.min_score.unwrap_or(usual.min_score),
-            max_image_size: max_image_size.unwrap_or(usual.max_image_size),
-        };
-        Ok(match self.kind {
-            Some(DescriptorKind::Aliked) => Extraction::Aliked(learned(LearnedOptions::ALIKED)),
-            Some(DescriptorKind::SuperPoint) => {
-                Extraction::SuperPoint(learned(LearnedOptions::SUPERPOINT))
-            }
+        let usual = match self.kind {
+            Some(DescriptorKind::Aliked) => Extraction::ALIKED,
+            Some(DescriptorKind::SuperPoint) => Extraction::SUPERPOINT,
             None | Some(DescriptorKind::Sift) => {
                 let (option, aliked) = (self.option, DescriptorKind::Aliked.name());
                 if self.min_score.is_some() {
                     let kind = self.kind.map(|kind| format!("{option} {}", kind.name()));
-                    let found = kind.unwrap_or("none".to_owned());
+                    let given = kind.unwrap_or("none".to_owned());
                     let expected = format!("expected with {option} {aliked}");
-                    return Err(Error::request(format!("--min-score: {expected}, found {found}")));
+                    return Err(Error::request(format!("--min-score: {expected}, found {given}")));
                 }
-                let usual = SiftOptions::default();
-                Extraction::Sift(SiftOptions {
-                    max_features: max_features.unwrap_or(usual.max_features),
-                    max_image_size: max_image_size.unwrap_or(usual.max_image_size),
-                })
+                Extraction::SIFT
             }
+        };
+        Ok(Extraction {
+            max_features: self.max_features.map_or(usual.max_features, NonZeroUsize::get),
+            min_score: self.min_score.unwrap_or(usual.min_score),
+            max_image_size: self.max_image_size.map_or(usual.max_image_size, |side| side as usize),
+            ..usual
         })
     }
 
@@ -263,7 +256,7 @@ impl Opened {
             return Err(Error::request(format!("{expected}, found a folder of photos")));
         }
         let extraction = opening.wanted.extraction(path)?;
-        let kind = extraction.kind();
+        let kind = extraction.kind;
         // Every source accepts SIFT.
         if path.is_dir() && kind != DescriptorKind::Sift {
             // Two samples, which differ because equal rows are rejected.

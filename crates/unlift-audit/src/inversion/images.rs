@@ -7,7 +7,7 @@ use unlift::audit::{Cell, Counts, Measure, Row};
 use unlift::{Descriptors, Error};
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_vision::features::ColorImage;
-use unlift_vision::features::photo::{Turn, jpeg_of, read_color_with};
+use unlift_vision::features::photo::{Turn, jpeg_of, read_color};
 use unlift_vision::network::DescriptorKind;
 use unlift_vision::pictures::Points;
 
@@ -120,10 +120,11 @@ impl Inversion {
             return Ok(Arc::clone(known));
         }
         let path = self.photos.join(name);
-        let photo = read_color_with(&path, self.turn)?;
-        if [photo.width(), photo.height()] != size {
-            let [expected, found] = [size, [photo.width(), photo.height()]]
-                .map(|[width, height]| format!("{width} x {height} pixels"));
+        let photo = read_color(&path, self.turn)?;
+        let of_photo = [photo.width() as usize, photo.height() as usize];
+        if of_photo != size {
+            let [expected, found] =
+                [size, of_photo].map(|[width, height]| format!("{width} x {height} pixels"));
             let path = path.display().to_string().escape_debug().to_string();
             return Err(Error::new(path, format!("a photo of {expected}"), found));
         }

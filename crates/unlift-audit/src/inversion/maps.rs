@@ -14,7 +14,7 @@ use unlift_io::read::colmap;
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::pictures::{Marks, ReleasedView};
 use unlift_report::scene::{SceneBox, Shapes};
-use unlift_vision::features::photo::{Turn, jpeg_of, read_color_with};
+use unlift_vision::features::photo::{Turn, jpeg_of, read_color};
 use unlift_vision::pictures::{Lens, View};
 
 use super::{Painter, Photo, Picture, SHOWN, needed};
@@ -252,11 +252,11 @@ fn open_photo(
     scale: f64,
 ) -> Result<PhotoView, Error> {
     // COLMAP ignores the orientation tag of photos.
-    let photo = read_color_with(path, Turn::AsStored)?;
+    let photo = read_color(path, Turn::AsStored)?;
     let open = || {
         let view = view(camera, image, scale)?;
         let [width, height] = view.size;
-        if [photo.width(), photo.height()] != view.size {
+        if [photo.width() as usize, photo.height() as usize] != view.size {
             let expected = format!("a photo of {width} x {height} pixels, as its camera");
             let found = format!("{} x {}", photo.width(), photo.height());
             return Err(Error::new("size", expected, found));

@@ -14,8 +14,8 @@ use unlift::released::Released;
 use unlift::{Descriptors, Error, RowOrder};
 use unlift_report::inversions::Painted;
 use unlift_report::{Attack, ByAttack};
-use unlift_vision::features::ColorImage;
 use unlift_vision::features::photo::jpeg_of;
+use unlift_vision::features::{ColorImage, halved};
 use unlift_vision::network::DescriptorKind;
 use unlift_vision::pictures::{
     CLASSES, Detection, Detector, Inverter, Lpips, Metrics, Points, Projection, View,
@@ -143,7 +143,7 @@ impl Painter {
     }
 
     fn photo(&self, photo: &ColorImage) -> Result<Photo, Error> {
-        let image = photo.halved()?;
+        let image = halved(photo)?;
         Ok(Photo { objects: self.detector.find(&image, SURE)?, image })
     }
 

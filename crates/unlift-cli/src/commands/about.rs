@@ -2,7 +2,7 @@
 
 use unlift::OneLine;
 use unlift::obfuscate::{ON_REQUEST, all};
-use unlift_vision::network::{Entry, Folders, MODELS, Place};
+use unlift_vision::network::{Folders, MODELS};
 
 use crate::output::print;
 
@@ -32,7 +32,11 @@ pub fn models() -> crate::Result<()> {
     let folders = Folders::of_process();
     let mut text = String::new();
     for entry in MODELS {
-        let here = here(folders.find(entry)?.as_ref(), &folders, entry);
+        let here = match folders.find(entry)? {
+            Some(path) => OneLine(path.display()).to_string(),
+            None if entry.carried.is_some() => "in the program".to_owned(),
+            None => format!("no: {}", OneLine(folders.missing(entry))),
+        };
         let hash = entry.sha256.unwrap_or("not known: its bytes depend on what it was made with");
         text.push_str(&format!(
             "{}\n  for      {}\n  licence  {}\n  owner    {}\n  sha256   {hash}\n  here     {here}\n",
@@ -40,12 +44,4 @@ pub fn models() -> crate::Result<()> {
         ));
     }
     print(&text)
-}
-
-fn here(place: Option<&Place>, folders: &Folders, entry: &Entry) -> String {
-    match place {
-        Some(Place::Carried) => "in the program".to_owned(),
-        Some(Place::File(path)) => OneLine(path.display()).to_string(),
-        None => format!("no: {}", OneLine(folders.missing(entry))),
-    }
 }

@@ -21,7 +21,7 @@ use unlift_io::hash::hash_positions;
 use unlift_io::outputs::{Kind, OutputSet, Rules};
 use unlift_report::Shares;
 use unlift_report::document::Input as About;
-use unlift_vision::features::{Extraction, LearnedOptions};
+use unlift_vision::features::Extraction;
 use unlift_vision::network::{DescriptorKind, Learned};
 
 use crate::args::DemoArgs;
@@ -67,8 +67,8 @@ pub fn run(args: &DemoArgs) -> crate::Result<()> {
 
 fn photos(output: Output) -> crate::Result<Audited> {
     let folder = photos::folder()?;
-    let options = LearnedOptions { min_score: photos::MIN_SCORE, ..LearnedOptions::ALIKED };
-    let source = FeatureSource::open(folder.path(), &Extraction::Aliked(options))?;
+    let extraction = Extraction { min_score: photos::MIN_SCORE, ..Extraction::ALIKED };
+    let source = FeatureSource::open(folder.path(), &extraction)?;
     let of = (&source, folder.path());
     let inversion = Arc::new(Inversion::open(of, DescriptorKind::Aliked, None, None)?);
     let usual = Plan::new(Unit::Pixel);

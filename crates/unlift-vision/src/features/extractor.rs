@@ -6,65 +6,89 @@ use rayon::prelude::*;
 use unlift::Error;
 use unlift::neighbors::DescriptorKind;
 
-use super::image::ColorImage;
-use super::learned::{Aliked, LearnedFeatures, LearnedOptions, SuperPoint};
+use super::learned::{LearnedFeatures, aliked, superpoint};
 use super::photo::{self, Turn};
-use super::sift::{Features, Sift, SiftOptions};
+use super::sift::{Features, Sift};
+use crate::network::Network;
 
 /// Smallest side of an image that can have an extremum.
-const LEAST_SIDE: usize = 3;
+const LEAST_SIDE: u32 = 3;
 /// Standard deviation of a keypoint in pixels of the processed image, as hloc states it.
 const DETECTION_NOISE: f64 = 1.0;
 /// Standard deviation of a SuperPoint keypoint, which is on a pixel.
 const SUPERPOINT_NOISE: f64 = 2.0;
 
-/// Kind and options of the extraction.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Extraction {
-    /// SIFT.
-    Sift(SiftOptions),
-    /// ALIKED.
-    Aliked(LearnedOptions),
-    /// SuperPoint.
-    SuperPoint(LearnedOptions),
+/// Kind and options of the extraction. The default is SIFT as in COLMAP.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extraction {
+    /// The kind of the features.
+    pub kind: DescriptorKind,
+    /// Number of requested features. Networks return the best ones, at most this number. SIFT
+    /// returns whole levels, from the coarsest to the one that exceeds this number, so it may
+    /// return more.
+    pub max_features: usize,
+    /// Score that a keypoint of a network must exceed, 0 to 1. Keypoints of SIFT have none.
+    pub min_score: f32,
+    /// Longest side in pixels. Larger images are downsized; keypoints are in pixels of the original image.
+    pub max_image_size: usize,
 }
 
 impl Default for Extraction {
     fn default() -> Self {
-        Self::Sift(SiftOptions::default())
+        Self::SIFT
     }
 }
 
 impl Extraction {
-    /// Returns the kind of the descriptors.
-    pub fn kind(&self) -> DescriptorKind {
-        match self {
-            Self::Sift(_) => DescriptorKind::Sift,
-            Self::Aliked(_) => DescriptorKind::Aliked,
-            Self::SuperPoint(_) => DescriptorKind::SuperPoint,
-        }
-    }
+    /// The options of SIFT in COLMAP.
+    pub const SIFT: Self = Self {
+        kind: DescriptorKind::Sift,
+        max_features: 8192,
+        min_score: 0.0,
+        max_image_size: 3200,
+    };
+    /// The options of ALIKED in COLMAP.
+    pub const ALIKED: Self = Self {
+        kind: DescriptorKind::Aliked,
+        max_features: 2048,
+        min_score: 0.2,
+        max_image_size: 1600,
+    };
+    /// The options of SuperPoint in hloc.
+    pub const SUPERPOINT: Self = Self {
+        kind: DescriptorKind::SuperPoint,
+        max_features: 4096,
+        min_score: 0.005,
+        max_image_size: 1600,
+    };
 
-    fn max_image_size(&self) -> usize {
-        match self {
-            Self::Sift(options) => options.max_image_size,
-            Self::Aliked(options) => options.max_image_size,
-            Self::SuperPoint(options) => options.max_image_size,
+    /// Checks the ranges.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let Self { max_features, min_score, max_image_size, .. } = *self;
+        if max_features == 0 {
+            return Err(Error::new("max_features", "at least 1", "0"));
         }
+        if !(0.0..1.0).contains(&min_score) {
+            return Err(Error::new("min_score", "0 to below 1", min_score.to_string()));
+        }
+        if !(1..=1 << 16).contains(&max_image_size) {
+            return Err(Error::new("max_image_size", "1 to 65536", max_image_size.to_string()));
+        }
+        Ok(())
     }
 }
 
 /// An extractor; threads can share it.
 pub struct Extractor {
-    of: Of,
-    max_image_size: usize,
+    options: Extraction,
+    method: Method,
     turn: Turn,
 }
 
-enum Of {
+enum Method {
     Sift(Sift),
-    Aliked(Aliked),
-    SuperPoint(SuperPoint),
+    Aliked(Network),
+    SuperPoint(Network),
 }
 
 /// The features of a photo.
@@ -74,11 +98,11 @@ pub struct Photo {
     /// Standard deviation of a keypoint in pixels of the photo.
     pub noise_px: f64,
     /// The features.
-    pub found: Found,
+    pub features: PhotoFeatures,
 }
 
 /// Features of SIFT or of a network.
-pub enum Found {
+pub enum PhotoFeatures {
     /// Features of SIFT.
     Sift(Features),
     /// Features of a network.
@@ -90,15 +114,14 @@ impl Extractor {
     ///
     /// # Errors
     /// If an option is out of range or a model is missing; the error names it.
-    pub fn try_new(extraction: &Extraction) -> Result<Self, Error> {
-        let of = match extraction {
-            Extraction::Sift(options) => Of::Sift(Sift::try_new(options.clone())?),
-            Extraction::Aliked(options) => Of::Aliked(Aliked::try_new(options.clone())?),
-            Extraction::SuperPoint(options) => {
-                Of::SuperPoint(SuperPoint::try_new(options.clone())?)
-            }
+    pub fn try_new(options: &Extraction) -> Result<Self, Error> {
+        options.check()?;
+        let method = match options.kind {
+            DescriptorKind::Sift => Method::Sift(Sift::try_new(*options)?),
+            DescriptorKind::Aliked => Method::Aliked(Network::load("aliked-n16rot")?),
+            DescriptorKind::SuperPoint => Method::SuperPoint(Network::load("superpoint")?),
         };
-        Ok(Self { of, max_image_size: extraction.max_image_size(), turn: Turn::Upright })
+        Ok(Self { options: *options, method, turn: Turn::Upright })
     }
 
     /// Sets how photos are turned before extraction.
@@ -112,49 +135,30 @@ impl Extractor {
     /// # Errors
     /// See [`photo::read`]; also if a side has fewer than 3 pixels.
     pub fn read(&self, path: &Path) -> Result<Photo, Error> {
-        let (size, noise_px, found) = match &self.of {
-            Of::Sift(sift) => {
-                let image = photo::read_with(path, self.turn)?;
-                let size = large_enough(path, [image.width(), image.height()])?;
-                (size, DETECTION_NOISE, Found::Sift(sift.extract(&image)))
+        let photo = photo::open(path, self.turn)?;
+        let (width, height) = (photo.width(), photo.height());
+        if width.min(height) < LEAST_SIDE {
+            let name = path.display().to_string().escape_debug().to_string();
+            let expected = format!("at least {LEAST_SIDE} pixels a side");
+            return Err(Error::new(name, expected, format!("{width} x {height}")));
+        }
+        let (noise_px, features) = match &self.method {
+            Method::Sift(sift) => {
+                (DETECTION_NOISE, PhotoFeatures::Sift(sift.extract(&photo::gray(photo)?)))
             }
-            Of::Aliked(aliked) => {
-                let (image, size) = color(path, self.turn)?;
-                (size, DETECTION_NOISE, Found::Learned(aliked.extract(&image)?))
+            Method::Aliked(network) => {
+                let features = aliked(network, &self.options, &photo::color(photo)?)?;
+                (DETECTION_NOISE, PhotoFeatures::Learned(features))
             }
-            Of::SuperPoint(superpoint) => {
-                let (image, size) = color(path, self.turn)?;
-                (size, SUPERPOINT_NOISE, Found::Learned(superpoint.extract(&image)?))
+            Method::SuperPoint(network) => {
+                let features = superpoint(network, &self.options, &photo::color(photo)?)?;
+                (SUPERPOINT_NOISE, PhotoFeatures::Learned(features))
             }
         };
-        let shrunk = size[0].max(size[1]) as f64 / self.max_image_size as f64;
-        Ok(Photo { size, noise_px: noise_px * shrunk.max(1.0), found })
+        let shrunk = f64::from(width.max(height)) / self.options.max_image_size as f64;
+        let size = [width as usize, height as usize];
+        Ok(Photo { size, noise_px: noise_px * shrunk.max(1.0), features })
     }
-
-    /// Returns the hash of the network's file if the user supplies it; such a file may change
-    /// between runs.
-    pub fn sha256(&self) -> Option<&str> {
-        match &self.of {
-            Of::Sift(_) | Of::Aliked(_) => None,
-            Of::SuperPoint(superpoint) => Some(superpoint.sha256()),
-        }
-    }
-}
-
-fn color(path: &Path, turn: Turn) -> Result<(ColorImage, [usize; 2]), Error> {
-    let image = photo::read_color_with(path, turn)?;
-    let size = large_enough(path, [image.width(), image.height()])?;
-    Ok((image, size))
-}
-
-fn large_enough(path: &Path, size: [usize; 2]) -> Result<[usize; 2], Error> {
-    if size.iter().any(|&side| side < LEAST_SIDE) {
-        let expected = format!("at least {LEAST_SIDE} pixels a side");
-        let found = format!("{} x {}", size[0], size[1]);
-        let name = path.display().to_string();
-        return Err(Error::new(name.escape_debug().to_string(), expected, found));
-    }
-    Ok(size)
 }
 
 /// Items per thread that are processed before results are passed on.

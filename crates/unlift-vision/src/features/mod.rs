@@ -5,7 +5,7 @@
 //! photo ──> ColorImage ──> network ──> maxima ──> descriptors ──> LearnedFeatures
 //! ```
 //!
-//! [`read`](photo::read) decodes a photo, [`Sift`] or [`Aliked`] extracts features,
+//! [`read`](photo::read) decodes a photo, [`Sift`], [`aliked`] or [`superpoint`] extracts features,
 //! [`in_order`] processes many photos in constant memory. [`Extractor`] extracts
 //! any kind of features. The same image gives the same bytes for any number of threads.
 //!
@@ -30,7 +30,7 @@ mod learned;
 pub mod photo;
 mod sift;
 
-pub use extractor::{Extraction, Extractor, Found, Photo, in_order};
-pub use image::{ColorImage, GrayImage};
-pub use learned::{Aliked, LearnedFeatures, LearnedOptions, SuperPoint};
-pub use sift::{Features, Keypoint, Sift, SiftOptions};
+pub use extractor::{Extraction, Extractor, Photo, PhotoFeatures, in_order};
+pub use image::{ColorImage, GrayImage, halved};
+pub use learned::{LearnedFeatures, aliked, superpoint};
+pub use sift::{Features, Keypoint, Sift};

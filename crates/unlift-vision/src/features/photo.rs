@@ -6,19 +6,17 @@ use std::path::Path;
 use ::image::codecs::jpeg::JpegEncoder;
 use ::image::imageops::FilterType;
 use ::image::metadata::Orientation;
-use ::image::{
-    DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits, Rgb, RgbImage,
-};
+use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits, Rgb};
 use unlift::Error;
 
-use super::image::{ColorImage, GrayImage};
+use super::image::{ColorImage, GrayImage, check_sides, fitted};
 use crate::read_regular;
 
 /// The readable formats, for errors.
 const KINDS: &str = "a JPEG, PNG or WebP image";
 /// Maximum number of pixels of a photo: 16384 x 16384. A header can declare any size in a few
 /// bytes.
-const MOST_PIXELS: u64 = 1 << 28;
+const MAX_PIXELS: u64 = 1 << 28;
 /// Maximum number of pixels per byte of a JPEG: every block of 8 x 8 pixels takes a bit. A file
 /// beyond it is truncated or of one color, but decoders fill in missing blocks.
 const JPEG_PIXELS_PER_BYTE: u64 = 512;
@@ -41,57 +39,33 @@ pub enum Turn {
     AsStored,
 }
 
-/// Reads the photo at `path`, upright, as gray values. The format is detected from the bytes.
+/// Reads the photo at `path` as gray values. The format is detected from the bytes.
 ///
 /// # Errors
 /// One line with the path, if the file does not exist, is not JPEG, PNG or WebP, is truncated, or
 /// has more than 2^28 pixels or more than its size allows.
-pub fn read(path: &Path) -> Result<GrayImage, Error> {
-    gray(&photo(path, Turn::Upright)?)
-}
-
-/// Reads the photo at `path`, upright, in colors.
-pub fn read_color(path: &Path) -> Result<ColorImage, Error> {
-    read_color_with(path, Turn::Upright)
+pub fn read(path: &Path, turn: Turn) -> Result<GrayImage, Error> {
+    gray(open(path, turn)?)
 }
 
 /// Reads the photo at `path` in colors.
-pub fn read_color_with(path: &Path, turn: Turn) -> Result<ColorImage, Error> {
-    let photo = photo(path, turn)?;
-    let (width, height) = (photo.width() as usize, photo.height() as usize);
-    ColorImage::try_new(width, height, photo.into_rgb8().into_raw())
-}
-
-pub(crate) fn read_with(path: &Path, turn: Turn) -> Result<GrayImage, Error> {
-    gray(&photo(path, turn)?)
-}
-
-pub(crate) fn photo(path: &Path, turn: Turn) -> Result<DynamicImage, Error> {
-    let (bytes, name) = bytes_of(path)?;
-    let (mut photo, orientation) = decoded(&bytes, &name)?;
-    if turn == Turn::Upright {
-        photo.apply_orientation(orientation);
-    }
-    Ok(photo)
-}
-
-/// Returns the bytes of a file, and its name in errors.
-fn bytes_of(path: &Path) -> Result<(Vec<u8>, String), Error> {
-    let name = path.display().to_string();
-    let bytes = read_regular(path)
-        .map_err(|error| Error::new(name.escape_debug().to_string(), KINDS, error.to_string()))?;
-    Ok((bytes, name))
+pub fn read_color(path: &Path, turn: Turn) -> Result<ColorImage, Error> {
+    color(open(path, turn)?)
 }
 
 /// Decodes the bytes of a photo in a file called `name`, upright, as gray values.
 pub fn decode(bytes: &[u8], name: &str) -> Result<GrayImage, Error> {
-    let (mut photo, orientation) = decoded(bytes, name)?;
-    photo.apply_orientation(orientation);
-    gray(&photo)
+    gray(decoded(bytes, name, Turn::Upright)?)
 }
 
-/// Decodes a photo as stored, and its orientation.
-fn decoded(bytes: &[u8], name: &str) -> Result<(DynamicImage, Orientation), Error> {
+pub(crate) fn open(path: &Path, turn: Turn) -> Result<DynamicImage, Error> {
+    let name = path.display().to_string();
+    let bytes = read_regular(path)
+        .map_err(|error| Error::new(name.escape_debug().to_string(), KINDS, error.to_string()))?;
+    decoded(&bytes, &name, turn)
+}
+
+fn decoded(bytes: &[u8], name: &str, turn: Turn) -> Result<DynamicImage, Error> {
     // Escaping keeps the error in one line.
     let wrong = |expected: &str, found: String| {
         Error::new(name.escape_debug().to_string(), expected, found.escape_debug().to_string())
@@ -100,60 +74,69 @@ fn decoded(bytes: &[u8], name: &str) -> Result<(DynamicImage, Orientation), Erro
         Ok(format @ (ImageFormat::Jpeg | ImageFormat::Png | ImageFormat::WebP)) => format,
         _ => return Err(wrong(KINDS, kind(bytes))),
     };
-    let kind = label(format);
+    let whole = format!("a whole {} image", label(format));
     if format == ImageFormat::Jpeg && !has_end(bytes) {
-        return Err(wrong("a whole JPEG image", "one that is cut off".to_owned()));
+        return Err(wrong(&whole, "one that is cut off".to_owned()));
     }
-    let whole = format!("a whole {kind} image");
-    let broken = |error: image::ImageError| wrong(&whole, error.to_string());
-    let most = most_pixels(format, bytes.len() as u64);
+    let broken = |error: ImageError| wrong(&whole, error.to_string());
+    let max_pixels = max_pixels(format, bytes.len() as u64);
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     // Limits memory by the size in a PNG's header, because a color profile can inflate a thousand
     // times.
-    let declared = bytes.get(16..24).filter(|_| format == ImageFormat::Png).map(|sides| {
-        let side =
-            |at: usize| u64::from(u32::from_be_bytes(std::array::from_fn(|byte| sides[at + byte])));
-        side(0).saturating_mul(side(4))
-    });
+    let side = |at: usize| Some(u64::from(u32::from_be_bytes(*bytes.get(at..)?.first_chunk()?)));
+    let declared = match (format, side(16), side(20)) {
+        (ImageFormat::Png, Some(width), Some(height)) => width.saturating_mul(height),
+        _ => max_pixels,
+    };
     let mut limits = Limits::no_limits();
-    limits.max_alloc = Some(declared.map_or(most, |n| n.min(most)) * PIXEL_BYTES + BESIDE_PIXELS);
+    limits.max_alloc = Some(declared.min(max_pixels) * PIXEL_BYTES + BESIDE_PIXELS);
     reader.limits(limits);
     let mut decoder = reader.into_decoder().map_err(broken)?;
     let (width, height) = decoder.dimensions();
-    let found = u64::from(width) * u64::from(height);
-    if found > most {
-        let of =
-            if found > MOST_PIXELS { String::new() } else { format!(" in {} bytes", bytes.len()) };
-        let most = if found > MOST_PIXELS { MOST_PIXELS } else { most };
-        return Err(wrong(&format!("at most {most} pixels{of}"), format!("{width} x {height}")));
+    let n_pixels = u64::from(width) * u64::from(height);
+    if n_pixels > max_pixels {
+        let expected = match n_pixels > MAX_PIXELS {
+            true => format!("at most {MAX_PIXELS} pixels"),
+            false => format!("at most {max_pixels} pixels in {} bytes", bytes.len()),
+        };
+        return Err(wrong(&expected, format!("{width} x {height}")));
     }
     let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
-    Ok((DynamicImage::from_decoder(decoder).map_err(broken)?, orientation))
+    let mut photo = DynamicImage::from_decoder(decoder).map_err(broken)?;
+    if turn == Turn::Upright {
+        photo.apply_orientation(orientation);
+    }
+    Ok(photo)
 }
 
 /// Returns the maximum number of pixels of a photo of `n_bytes` bytes.
-fn most_pixels(format: ImageFormat, n_bytes: u64) -> u64 {
+fn max_pixels(format: ImageFormat, n_bytes: u64) -> u64 {
     let per_byte = match format {
         ImageFormat::Jpeg => JPEG_PIXELS_PER_BYTE,
         _ => OTHER_PIXELS_PER_BYTE,
     };
-    n_bytes.saturating_mul(per_byte).clamp(FREE_PIXELS, MOST_PIXELS)
+    n_bytes.saturating_mul(per_byte).clamp(FREE_PIXELS, MAX_PIXELS)
 }
 
 /// Converts to gray values as COLMAP does: rounded to bytes, weights of Rec. 709, transparency
 /// ignored.
-fn gray(photo: &DynamicImage) -> Result<GrayImage, Error> {
+pub(crate) fn gray(photo: DynamicImage) -> Result<GrayImage, Error> {
     let (width, height) = (photo.width() as usize, photo.height() as usize);
     if !photo.color().has_color() {
         return GrayImage::from_bytes(width, height, photo.to_luma8().as_raw());
     }
-    let mut bytes = Vec::with_capacity(width * height);
-    let colors = photo.to_rgb8();
-    bytes.extend(colors.pixels().map(|pixel| {
-        let [red, green, blue] = pixel.0.map(f32::from);
+    let luma = |color: &Rgb<u8>| {
+        let [red, green, blue] = color.0.map(f32::from);
         (0.2126 * red + 0.7152 * green + 0.0722 * blue).round() as u8
-    }));
+    };
+    let bytes: Vec<u8> = photo.to_rgb8().pixels().map(luma).collect();
     GrayImage::from_bytes(width, height, &bytes)
+}
+
+/// Converts to colors as bytes, transparency ignored.
+pub(crate) fn color(photo: DynamicImage) -> Result<ColorImage, Error> {
+    check_sides(photo.width(), photo.height())?;
+    Ok(photo.into_rgb8())
 }
 
 fn kind(bytes: &[u8]) -> String {
@@ -203,7 +186,7 @@ const QUALITY: u8 = 72;
 /// Encodes the photo at `path` as a color JPEG, downsized so that no side exceeds `longest` pixels,
 /// without metadata.
 pub fn jpeg(path: &Path, longest: u32, turn: Turn) -> Result<Vec<u8>, Error> {
-    let photo = photo(path, turn)?;
+    let photo = open(path, turn)?;
     let photo = match photo.width().max(photo.height()) > longest {
         true => photo.resize(longest, longest, FilterType::Triangle),
         false => photo,
@@ -219,27 +202,21 @@ pub fn jpeg(path: &Path, longest: u32, turn: Turn) -> Result<Vec<u8>, Error> {
 /// # Errors
 /// If a side still has more than 65,535 pixels.
 pub fn jpeg_of(image: &ColorImage, longest: usize) -> Result<Vec<u8>, Error> {
-    let small = image.fitted(longest);
-    encoded(&buffer(small.as_ref().unwrap_or(image)))
+    encoded(fitted(image, longest).as_ref().unwrap_or(image))
         .map_err(|error| Error::new("picture", "at most 65535 pixels a side", error.to_string()))
+}
+
+fn encoded(image: &ColorImage) -> Result<Vec<u8>, ImageError> {
+    let mut bytes = Vec::new();
+    image.write_with_encoder(JpegEncoder::new_with_quality(&mut bytes, QUALITY))?;
+    Ok(bytes)
 }
 
 /// Encodes an image as PNG.
 pub fn png_of(image: &ColorImage) -> Result<Vec<u8>, Error> {
     let mut bytes = Cursor::new(Vec::new());
-    buffer(image)
+    image
         .write_to(&mut bytes, ImageFormat::Png)
         .map_err(|error| Error::new("picture", "one that fits a PNG", error.to_string()))?;
     Ok(bytes.into_inner())
-}
-
-fn buffer(image: &ColorImage) -> RgbImage {
-    let (width, height) = (image.width() as u32, image.height() as u32);
-    RgbImage::from_fn(width, height, |x, y| Rgb(image.pixel(x as usize, y as usize)))
-}
-
-fn encoded(image: &RgbImage) -> Result<Vec<u8>, ImageError> {
-    let mut bytes = Vec::new();
-    image.write_with_encoder(JpegEncoder::new_with_quality(&mut bytes, QUALITY))?;
-    Ok(bytes)
 }

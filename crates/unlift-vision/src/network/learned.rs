@@ -2,7 +2,6 @@
 
 use std::sync::{Arc, OnceLock};
 
-use unlift::descriptors::Values;
 use unlift::neighbors::sources::SourceEntry;
 use unlift::neighbors::{
     DescriptorKind, KeptPairs, Needs, Neighborhoods, Overlap, Part, Similarity, Source, dense,
@@ -40,19 +39,12 @@ pub struct Learned;
 /// (docs/decisions/sources.md).
 const LIKENESS: f32 = 0.2;
 
-fn model(kind: DescriptorKind) -> &'static str {
-    match kind {
-        DescriptorKind::Sift => "neighbors-sift",
-        DescriptorKind::Aliked => "neighbors-aliked",
-        DescriptorKind::SuperPoint => "neighbors-superpoint",
-    }
-}
-
 fn network(descriptors: &Descriptors) -> Result<&'static Network, Error> {
     static LOADED: [OnceLock<Result<Network, Error>>; DescriptorKind::ALL.len()] =
         [const { OnceLock::new() }; DescriptorKind::ALL.len()];
     let kind = DescriptorKind::of(descriptors, NAME)?;
-    let loaded = LOADED[kind as usize].get_or_init(|| Network::load(model(kind)));
+    let load = || Network::load(&format!("neighbors-{}", kind.name()));
+    let loaded = LOADED[kind as usize].get_or_init(load);
     loaded.as_ref().map_err(Error::clone)
 }
 
@@ -121,11 +113,10 @@ fn scores(network: &Network, part: &Part) -> Result<Vec<f32>, Error> {
 }
 
 fn of_unit_length(descriptors: &Descriptors) -> Vec<f32> {
-    let mut values = match descriptors.values() {
-        Values::U8(values) => values.iter().map(|&x| f32::from(x)).collect(),
-        Values::F32(values) => values.clone(),
-    };
-    for row in values.chunks_exact_mut(descriptors.dim()) {
+    let dim = descriptors.dim();
+    let mut values = vec![0.0; descriptors.len() * dim];
+    for (at, row) in values.chunks_exact_mut(dim).enumerate() {
+        descriptors.read_row(at, row);
         let squares = row.iter().map(|&x| f64::from(x) * f64::from(x));
         let norm = squares.sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
         row.iter_mut().for_each(|x| *x = (f64::from(*x) / norm) as f32);

@@ -36,7 +36,7 @@ use unlift::guard::{caught, told};
 use crate::read_regular;
 
 pub use learned::{Learned, SOURCES};
-pub use registry::{Entry, Folders, MODELS, Place, Port, entry};
+pub use registry::{Entry, Folders, MODELS, Port, entry};
 pub use unlift::neighbors::DescriptorKind;
 
 /// An array of floats, row-major.
@@ -49,8 +49,8 @@ pub struct Tensor {
 impl Tensor {
     /// Creates an array with this shape.
     pub fn try_new(shape: &[usize], values: Vec<f32>) -> Result<Self, Error> {
-        let asked = shape.iter().try_fold(1_usize, |product, &side| product.checked_mul(side));
-        if asked != Some(values.len()) {
+        let n = shape.iter().try_fold(1_usize, |product, &side| product.checked_mul(side));
+        if n != Some(values.len()) {
             let expected = format!("values of the shape {shape:?}");
             return Err(Error::new("tensor", expected, format!("{} values", values.len())));
         }
@@ -109,11 +109,9 @@ impl Network {
     /// Loads the model of `entry` from given folders.
     pub fn load_from(folders: &Folders, entry: &Entry) -> Result<Self, Error> {
         match (folders.find(entry)?, entry.carried) {
-            (Some(Place::File(path)), _) => Self::read(&path, entry),
-            (Some(Place::Carried), Some(bytes)) => {
-                Self::from_bytes(Cow::Borrowed(bytes), entry.name, entry)
-            }
-            _ => Err(folders.missing(entry)),
+            (Some(path), _) => Self::read(&path, entry),
+            (None, Some(bytes)) => Self::from_bytes(Cow::Borrowed(bytes), entry.name, entry),
+            (None, None) => Err(folders.missing(entry)),
         }
     }
 
@@ -175,51 +173,38 @@ impl Network {
         inputs: Vec<(&str, Tensor)>,
         outputs: [&str; N],
     ) -> Result<[Tensor; N], Error> {
-        let found = self.run_all(inputs, &outputs)?;
-        let fewer = |found: Vec<Tensor>| {
-            Error::new(&*self.place, format!("{N} outputs"), found.len().to_string())
-        };
-        found.try_into().map_err(fewer)
-    }
-
-    /// Runs the network like [`run`](Self::run), with any number of outputs.
-    pub fn run_all(
-        &self,
-        inputs: Vec<(&str, Tensor)>,
-        outputs: &[&str],
-    ) -> Result<Vec<Tensor>, Error> {
         let wrong =
             |expected: &str, found: &str| Error::new(&*self.place, expected, one_line(found));
         let id = |name: &str| {
             self.model.find_node(name).ok_or_else(|| wrong("a value of the network", name))
         };
-        let mut given = Vec::with_capacity(inputs.len());
+        let mut values = Vec::with_capacity(inputs.len());
         for (name, tensor) in inputs {
-            let shape = tensor.shape().to_vec();
-            let value = Value::from_shape(&shape, tensor.into_values())
+            let value = Value::from_shape(&tensor.shape, tensor.values)
                 .map_err(|error| wrong("a tensor", &error.to_string()))?;
-            given.push((id(name)?, value.into()));
+            values.push((id(name)?, value.into()));
         }
-        let asked = outputs.iter().map(|name| id(name)).collect::<Result<Vec<_>, _>>()?;
+        let requested = outputs.iter().map(|name| id(name)).collect::<Result<Vec<_>, _>>()?;
         let pool = self.idle().pop().unwrap_or_else(|| Arc::new(ThreadPool::with_num_threads(1)));
         let options = RunOptions::default().with_thread_pool(Some(Arc::clone(&pool)));
-        let result = aside(|| self.model.run(given, &asked, Some(options)));
+        let result = aside(|| self.model.run(values, &requested, Some(options)));
         let result = result.map_err(|panic| wrong("a network that runs", &panic))?;
         self.idle().push(pool);
         let values = result.map_err(|error| wrong("inputs that fit", &error.to_string()))?;
-        let tensors = values.into_iter().zip(outputs).map(|(value, name)| match value {
-            Value::FloatTensor(tensor) => {
-                let shape = tensor.shape().to_vec();
-                // The declared shapes of a file may be wrong.
-                let port = self.outputs.iter().find(|port| port.name == *name);
-                if let Some(port) = port.filter(|port| !port.takes(&shape)) {
-                    return Err(wrong(&format!("an output {port}"), &format!("{shape:?}")));
-                }
-                Tensor::try_new(&shape, tensor.into_data())
+        let tensors = values.into_iter().zip(outputs).map(|(value, name)| {
+            let Value::FloatTensor(tensor) = value else { return Err(wrong("floats", name)) };
+            let shape = tensor.shape().to_vec();
+            // The declared shapes of a file may be wrong.
+            let port = self.outputs.iter().find(|port| port.name == name);
+            if let Some(port) = port.filter(|port| !port.takes(&shape)) {
+                return Err(wrong(&format!("an output {port}"), &format!("{shape:?}")));
             }
-            _ => Err(wrong("floats", name)),
+            Tensor::try_new(&shape, tensor.into_data())
         });
-        tensors.collect()
+        let tensors = tensors.collect::<Result<Vec<_>, _>>()?;
+        let fewer =
+            |tensors: Vec<Tensor>| wrong(&format!("{N} outputs"), &tensors.len().to_string());
+        tensors.try_into().map_err(fewer)
     }
 
     fn idle(&self) -> MutexGuard<'_, Vec<Arc<ThreadPool>>> {
@@ -231,16 +216,17 @@ impl Network {
     fn check(&self, ports: &[Port], ids: &[NodeId], kind: &str) -> Result<(), Error> {
         for port in ports {
             let info = ids.iter().filter_map(|&id| self.model.node_info(id));
-            let found = info.into_iter().find(|info| info.name() == Some(port.name));
-            let expected = || format!("an {kind} {port}");
-            let wrong = |found: String| Error::new(&*self.place, expected(), found);
-            let Some(found) = found else {
+            let info = info.into_iter().find(|info| info.name() == Some(port.name));
+            let wrong = |found: String| {
+                Error::new(&*self.place, format!("an {kind} {port}"), one_line(&found))
+            };
+            let Some(info) = info else {
                 let names = ids.iter().filter_map(|&id| self.model.node_info(id)?.name());
                 let names: Vec<&str> = names.collect();
-                return Err(wrong(format!("{kind}s {}", one_line(&names.join(", ")))));
+                return Err(wrong(format!("{kind}s {}", names.join(", "))));
             };
             // Exporters may omit shapes of outputs; `run` checks the actual ones.
-            let Some(shape) = found.shape() else { continue };
+            let Some(shape) = info.shape() else { continue };
             let fits = shape.len() == port.shape.len()
                 && shape.iter().zip(port.shape).all(|(side, expected)| match (side, expected) {
                     (Dimension::Fixed(side), Some(expected)) => side == expected,
@@ -248,7 +234,7 @@ impl Network {
                     (Dimension::Symbolic(_), expected) => kind == "output" || expected.is_none(),
                 });
             if !fits {
-                return Err(wrong(one_line(&format!("{shape:?}"))));
+                return Err(wrong(format!("{shape:?}")));
             }
         }
         Ok(())

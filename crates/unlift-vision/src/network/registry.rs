@@ -67,6 +67,11 @@ pub fn entry(name: &str) -> Result<&'static Entry, Error> {
     })
 }
 
+/// The output of networks that make pictures.
+const PICTURE: &[Port] = &[Port { name: "picture", shape: &[Some(1), Some(3), None, None] }];
+/// The output of networks that score pairs of descriptors.
+const SCORES: &[Port] = &[Port { name: "scores", shape: &[None, None] }];
+
 /// All models, by name. A `static`, because a `const` would copy the bytes of all embedded files to
 /// each use.
 pub static MODELS: &[Entry] = &[
@@ -99,7 +104,7 @@ pub static MODELS: &[Entry] = &[
         owner: "https://github.com/unlift/unlift",
         sha256: Some("99a466241a5d569053bb514c0e35f348faed8867c65c7054aeb8422841aca69e"),
         inputs: &[Port { name: "features", shape: &[Some(1), Some(131), None, None] }],
-        outputs: &[Port { name: "picture", shape: &[Some(1), Some(3), None, None] }],
+        outputs: PICTURE,
         carried: Some(unlift_model_inverter_aliked::ONNX),
     },
     Entry {
@@ -109,7 +114,7 @@ pub static MODELS: &[Entry] = &[
         owner: "https://github.com/unlift/unlift",
         sha256: Some("da3df84cfde8f9ffd64347c5cd580eb565f194be3b68194400b64bc180811c63"),
         inputs: &[Port { name: "features", shape: &[Some(1), Some(135), None, None] }],
-        outputs: &[Port { name: "picture", shape: &[Some(1), Some(3), None, None] }],
+        outputs: PICTURE,
         carried: Some(unlift_model_inverter_sift::ONNX),
     },
     Entry {
@@ -121,7 +126,7 @@ pub static MODELS: &[Entry] = &[
         // Users train it themselves.
         sha256: None,
         inputs: &[Port { name: "features", shape: &[Some(1), Some(259), None, None] }],
-        outputs: &[Port { name: "picture", shape: &[Some(1), Some(3), None, None] }],
+        outputs: PICTURE,
         carried: None,
     },
     Entry {
@@ -147,7 +152,7 @@ pub static MODELS: &[Entry] = &[
             Port { name: "descriptors", shape: &[None, Some(128)] },
             Port { name: "pairs", shape: &[Some(1), None, None] },
         ],
-        outputs: &[Port { name: "scores", shape: &[None, None] }],
+        outputs: SCORES,
         carried: Some(unlift_model_neighbors_aliked::ONNX),
     },
     Entry {
@@ -160,7 +165,7 @@ pub static MODELS: &[Entry] = &[
             Port { name: "descriptors", shape: &[None, Some(128)] },
             Port { name: "pairs", shape: &[Some(3), None, None] },
         ],
-        outputs: &[Port { name: "scores", shape: &[None, None] }],
+        outputs: SCORES,
         carried: Some(unlift_model_neighbors_sift::ONNX),
     },
     Entry {
@@ -175,7 +180,7 @@ pub static MODELS: &[Entry] = &[
             Port { name: "descriptors", shape: &[None, Some(256)] },
             Port { name: "pairs", shape: &[Some(1), None, None] },
         ],
-        outputs: &[Port { name: "scores", shape: &[None, None] }],
+        outputs: SCORES,
         carried: None,
     },
     Entry {
@@ -218,15 +223,6 @@ pub struct Folders {
     pub user: Option<PathBuf>,
 }
 
-/// The place of a model.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Place {
-    /// A file.
-    File(PathBuf),
-    /// Embedded in the program.
-    Carried,
-}
-
 impl Folders {
     /// Returns the folders of this process: `UNLIFT_MODELS`, and `XDG_DATA_HOME/unlift/models`
     /// (default `~/.local/share`, on Windows `%APPDATA%`).
@@ -241,20 +237,19 @@ impl Folders {
         Self { given: set(VARIABLE), user: user.map(|data| data.join("unlift").join("models")) }
     }
 
-    /// Finds the file of `entry` in the folders, then in the program; `None` if it is missing.
+    /// Finds the file of `entry` in the folders; it replaces the embedded one.
     ///
     /// # Errors
     /// If `UNLIFT_MODELS` is not a folder.
-    pub fn find(&self, entry: &Entry) -> Result<Option<Place>, Error> {
+    pub fn find(&self, entry: &Entry) -> Result<Option<PathBuf>, Error> {
         if let Some(given) = &self.given
             && !given.is_dir()
         {
-            let found = given.display().to_string();
-            return Err(Error::new(VARIABLE, "a folder", found.escape_debug().to_string()));
+            let name = given.display().to_string();
+            return Err(Error::new(VARIABLE, "a folder", name.escape_debug().to_string()));
         }
-        let paths = [&self.given, &self.user].into_iter().flatten();
-        let file = paths.map(|folder| folder.join(entry.file())).find(|path| path.is_file());
-        Ok(file.map(Place::File).or(entry.carried.map(|_| Place::Carried)))
+        let folders = [&self.given, &self.user].into_iter().flatten();
+        Ok(folders.map(|folder| folder.join(entry.file())).find(|path| path.is_file()))
     }
 
     /// Returns the error for a missing `entry`, which names the folders it belongs in.
@@ -277,18 +272,18 @@ mod tests {
     use std::fs;
 
     #[test]
-    fn folders_come_before_the_program_and_the_given_one_first() {
+    fn the_given_folder_comes_first() {
         let place = tempfile::tempdir().unwrap();
         let [given, user] = ["given", "user"].map(|name| place.path().join(name));
         fs::create_dir(&given).unwrap();
         let folders = Folders { given: Some(given.clone()), user: Some(user.clone()) };
         let entry = &MODELS[0];
-        assert_eq!(folders.find(entry), Ok(Some(Place::Carried)));
+        assert_eq!(folders.find(entry), Ok(None));
         fs::create_dir(&user).unwrap();
         for folder in [user, given] {
             let file = folder.join(entry.file());
             fs::write(&file, "a model").unwrap();
-            assert_eq!(folders.find(entry), Ok(Some(Place::File(file))));
+            assert_eq!(folders.find(entry), Ok(Some(file)));
         }
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Source: COLMAP's documentation ("Camera Models") and the papers it cites.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use unlift::Error;
 use unlift::geometry::camera::{Intrinsics, Pose};
@@ -12,16 +12,15 @@ use super::inverter::check_size;
 /// Number of angles tested for the fold of a model: 0.03 degrees apart.
 const TRIED: usize = 6000;
 
-/// The distortion of a camera model.
+/// The distortion of a camera model: radial `k`, tangential `p` and thin-prism `s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
-    /// Perspective, radial distortion `(1 + k1 r2 + k2 r4 + k3 r6) / (1 + k4 r2 + k5 r4 + k6 r6)`,
-    /// tangential `p`.
+    /// Perspective, radial distortion `(1 + k1 r2 + k2 r4 + k3 r6) / (1 + k4 r2 + k5 r4 + k6 r6)`.
     Perspective { k: [f64; 6], p: [f64; 2] },
     /// Fisheye: the angle from the axis, times `1 + k1 a2 + k2 a4 ..`.
     Fisheye { k: [f64; 6] },
     /// THIN_PRISM_FISHEYE: the angle with radial, tangential and thin-prism terms, added.
-    ThinPrism { k: [f64; 4], p: [f64; 2], s: [f64; 2] },
+    ThinPrism { k: [f64; 6], p: [f64; 2], s: [f64; 2] },
     /// RAD_TAN_THIN_PRISM_FISHEYE.
     RadTan { k: [f64; 6], p: [f64; 2], s: [f64; 4] },
     /// FOV: one parameter, an angle.
@@ -36,7 +35,7 @@ enum Kind {
 
 impl Kind {
     /// Returns the largest angle from the axis up to which the image radius increases.
-    fn most(&self) -> f64 {
+    fn max_angle(&self) -> f64 {
         let all = match self {
             Self::Perspective { .. } | Self::Fov(_) | Self::Division(_) => FRAC_PI_2,
             _ => PI,
@@ -58,15 +57,15 @@ impl Kind {
         Some(match self {
             Self::Perspective { k, .. } => {
                 let r2 = libm::tan(angle) * libm::tan(angle);
-                let below = 1.0 + r2 * (k[3] + r2 * (k[4] + r2 * k[5]));
+                let below = polynomial(&k[3..], r2);
                 if below <= 0.0 {
                     return None;
                 }
-                let above = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[2]));
-                libm::tan(angle) * above / below
+                libm::tan(angle) * polynomial(&k[..3], r2) / below
             }
-            Self::Fisheye { k } | Self::RadTan { k, .. } => angle * polynomial(k, angle * angle),
-            Self::ThinPrism { k, .. } => angle * polynomial(k, angle * angle),
+            Self::Fisheye { k } | Self::RadTan { k, .. } | Self::ThinPrism { k, .. } => {
+                angle * polynomial(k, angle * angle)
+            }
             // These have no polynomial; `bent` detects their limits.
             Self::Fov(_) | Self::Division(_) | Self::Unified(..) | Self::Equirectangular => angle,
         })
@@ -78,7 +77,7 @@ impl Kind {
 pub struct Lens {
     kind: Kind,
     /// Largest angle from the axis; beyond it the model folds back.
-    most: f64,
+    max_angle: f64,
     focal: [f64; 2],
     center: [f64; 2],
 }
@@ -92,64 +91,62 @@ impl Lens {
         if let Some(bad) = params.iter().find(|x| !x.is_finite()) {
             return Err(Error::new(model, "finite parameters", bad.to_string()));
         }
+        // Focal lengths (one or two), the center, then the distortion.
+        let n_focal =
+            if model.starts_with("SIMPLE_") || model.starts_with("RADIAL") { 1 } else { 2 };
+        let n_before = if model == "EQUIRECTANGULAR" { 2 } else { n_focal + 2 };
         let f = |at: usize| params.get(at).copied().unwrap_or(0.0);
-        let some = |from: usize, n: usize| {
-            let mut k = [0.0; 6];
-            (0..n).for_each(|at| k[at] = f(from + at));
-            k
-        };
-        let plain = |k: [f64; 6], p: [f64; 2]| Kind::Perspective { k, p };
-        // Single focal length, number of parameters after the center, distortion.
-        let (single, n, kind) = match model {
-            "SIMPLE_PINHOLE" => (true, 0, plain([0.0; 6], [0.0; 2])),
-            "PINHOLE" => (false, 0, plain([0.0; 6], [0.0; 2])),
-            "SIMPLE_RADIAL" => (true, 1, plain(some(3, 1), [0.0; 2])),
-            "RADIAL" => (true, 2, plain(some(3, 2), [0.0; 2])),
-            "OPENCV" => (false, 4, plain(some(4, 2), [f(6), f(7)])),
+        let d = |at: usize| f(n_before + at);
+        // The first `n` are radial, the others zero.
+        let k = |n: usize| std::array::from_fn(|at| if at < n { d(at) } else { 0.0 });
+        // Number of parameters of the distortion, and the distortion.
+        let (n, kind) = match model {
+            "SIMPLE_PINHOLE" | "PINHOLE" => (0, Kind::Perspective { k: k(0), p: [0.0; 2] }),
+            "SIMPLE_RADIAL" => (1, Kind::Perspective { k: k(1), p: [0.0; 2] }),
+            "RADIAL" => (2, Kind::Perspective { k: k(2), p: [0.0; 2] }),
+            "OPENCV" => (4, Kind::Perspective { k: k(2), p: [d(2), d(3)] }),
             "FULL_OPENCV" => {
-                (false, 8, plain([f(4), f(5), f(8), f(9), f(10), f(11)], [f(6), f(7)]))
+                let k = [d(0), d(1), d(4), d(5), d(6), d(7)];
+                (8, Kind::Perspective { k, p: [d(2), d(3)] })
             }
-            "OPENCV_FISHEYE" => (false, 4, Kind::Fisheye { k: some(4, 4) }),
-            "SIMPLE_RADIAL_FISHEYE" => (true, 1, Kind::Fisheye { k: some(3, 1) }),
-            "RADIAL_FISHEYE" => (true, 2, Kind::Fisheye { k: some(3, 2) }),
-            "SIMPLE_FISHEYE" => (true, 0, Kind::Fisheye { k: [0.0; 6] }),
-            "FISHEYE" => (false, 0, Kind::Fisheye { k: [0.0; 6] }),
+            "SIMPLE_FISHEYE" | "FISHEYE" => (0, Kind::Fisheye { k: k(0) }),
+            "SIMPLE_RADIAL_FISHEYE" => (1, Kind::Fisheye { k: k(1) }),
+            "RADIAL_FISHEYE" => (2, Kind::Fisheye { k: k(2) }),
+            "OPENCV_FISHEYE" => (4, Kind::Fisheye { k: k(4) }),
             "THIN_PRISM_FISHEYE" => {
-                let k = [f(4), f(5), f(8), f(9)];
-                (false, 8, Kind::ThinPrism { k, p: [f(6), f(7)], s: [f(10), f(11)] })
+                let k = [d(0), d(1), d(4), d(5), 0.0, 0.0];
+                (8, Kind::ThinPrism { k, p: [d(2), d(3)], s: [d(6), d(7)] })
             }
             "RAD_TAN_THIN_PRISM_FISHEYE" => {
-                let (p, s) = ([f(10), f(11)], [f(12), f(13), f(14), f(15)]);
-                (false, 12, Kind::RadTan { k: some(4, 6), p, s })
+                let (p, s) = ([d(6), d(7)], [d(8), d(9), d(10), d(11)]);
+                (12, Kind::RadTan { k: k(6), p, s })
             }
-            "FOV" => (false, 1, Kind::Fov(f(4))),
-            "SIMPLE_DIVISION" => (true, 1, Kind::Division(f(3))),
-            "DIVISION" => (false, 1, Kind::Division(f(4))),
-            "EUCM" => (false, 2, Kind::Unified(f(4), f(5))),
-            "EQUIRECTANGULAR" => {
-                let [width, height] = [f(0), f(1)];
-                let focal = [width / std::f64::consts::TAU, height / PI];
-                let center = [width / 2.0, height / 2.0];
-                check(model, params, 2)?;
-                let (kind, most) = (Kind::Equirectangular, PI);
-                return Ok(Self { kind, most, focal, center });
-            }
-            other => {
-                let found = other.escape_debug().to_string();
-                return Err(Error::new("camera model", "one of COLMAP's", found));
+            "FOV" => (1, Kind::Fov(d(0))),
+            "SIMPLE_DIVISION" | "DIVISION" => (1, Kind::Division(d(0))),
+            "EUCM" => (2, Kind::Unified(d(0), d(1))),
+            "EQUIRECTANGULAR" => (0, Kind::Equirectangular),
+            _ => {
+                let name = model.escape_debug().to_string();
+                return Err(Error::new("camera model", "one of COLMAP's", name));
             }
         };
-        let first = if single { 1 } else { 2 };
-        check(model, params, first + 2 + n)?;
-        let focal = [f(0), if single { f(0) } else { f(1) }];
-        Ok(Self { most: kind.most(), kind, focal, center: [f(first), f(first + 1)] })
+        if params.len() != n_before + n {
+            let expected = format!("{} parameters", n_before + n);
+            return Err(Error::new(model, expected, params.len().to_string()));
+        }
+        let (focal, center) = match kind {
+            // Its parameters are the size of the image.
+            Kind::Equirectangular => ([f(0) / TAU, f(1) / PI], [f(0) / 2.0, f(1) / 2.0]),
+            _ => ([f(0), f(n_focal - 1)], [f(n_focal), f(n_focal + 1)]),
+        };
+        Ok(Self { max_angle: kind.max_angle(), kind, focal, center })
     }
 
     /// Projects a point at `x` (right, down, forward) into the image, in pixels with the middle of
     /// the first pixel at (0, 0). `None` behind the camera, or where the model folds back.
     pub fn project(&self, x: [f64; 3]) -> Option<[f64; 2]> {
         let radius = libm::sqrt(x[0] * x[0] + x[1] * x[1]);
-        if libm::atan2(radius, x[2]) > self.most {
+        if libm::atan2(radius, x[2]) > self.max_angle {
             return None;
         }
         let place = self.bent(x)?;
@@ -208,8 +205,7 @@ impl Lens {
         let place = match &self.kind {
             Kind::Perspective { k, p } => {
                 let r2 = squared(flat);
-                let above = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[2]));
-                let below = 1.0 + r2 * (k[3] + r2 * (k[4] + r2 * k[5]));
+                let (above, below) = (polynomial(&k[..3], r2), polynomial(&k[3..], r2));
                 let moved = tangential(flat, r2, *p);
                 [0, 1].map(|c| flat[c] * above / below + moved[c])
             }
@@ -264,16 +260,6 @@ fn polynomial(k: &[f64], x: f64) -> f64 {
     1.0 + x * k.iter().rev().fold(0.0, |sum, k| k + x * sum)
 }
 
-fn check(model: &str, params: &[f64], n: usize) -> Result<(), Error> {
-    match params.len() == n {
-        true => Ok(()),
-        false => {
-            let found = params.len().to_string();
-            Err(Error::new(model, format!("{n} parameters"), found))
-        }
-    }
-}
-
 /// A camera with its pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
@@ -315,19 +301,18 @@ impl View {
         u32::try_from(points.len()).map_err(|_| {
             Error::new("points", "at most 4294967295 of them", points.len().to_string())
         })?;
-        let mut found = Projection::default();
+        let mut projection = Projection::default();
         for (at, point) in points.iter().enumerate() {
             let Some(point) = point else { continue };
             let x = self.pose.in_camera(point);
             let Some(place) = self.lens.project(x) else { continue };
-            let inside = (0..2).all(|c| place[c] >= -0.5 && place[c] < self.size[c] as f64 - 0.5);
-            if inside {
-                found.points.push(at as u32);
-                found.places.push(place.map(|x| x as f32));
-                found.depths.push(libm::sqrt(x.iter().map(|x| x * x).sum::<f64>()) as f32);
+            if (0..2).all(|c| place[c] >= -0.5 && place[c] < self.size[c] as f64 - 0.5) {
+                projection.points.push(at as u32);
+                projection.places.push(place.map(|x| x as f32));
+                projection.depths.push(libm::sqrt(x.iter().map(|x| x * x).sum::<f64>()) as f32);
             }
         }
-        Ok(found)
+        Ok(projection)
     }
 }
 
@@ -358,14 +343,14 @@ impl Projection {
         }
         let hidden = |(place, depth): (&[f32; 2], &f32)| {
             let [x, y] = cell(*place);
-            let around = |x: f32, most: usize| {
+            let around = |x: f32, n_cells: usize| {
                 let low = (x - 0.5).floor().max(0.0) as usize;
-                low..=(low + 1).min(most - 1)
+                low..=(low + 1).min(n_cells - 1)
             };
             let before = around(y, height)
                 .flat_map(|y| around(x, width).map(move |x| y * width + x))
                 .flat_map(|cell| &depths[cell])
-                .filter(|other| **other * BEHIND < *depth);
+                .filter(|nearer| **nearer * BEHIND < *depth);
             before.take(ENOUGH).count() == ENOUGH
         };
         self.places.iter().zip(&self.depths).map(|point| !hidden(point)).collect()

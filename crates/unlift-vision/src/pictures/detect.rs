@@ -72,36 +72,33 @@ impl Detector {
 
     /// Finds the objects in `picture` with a score above `min_score`, the highest first.
     pub fn find(&self, picture: &ColorImage, min_score: f32) -> Result<Vec<Detection>, Error> {
-        let (input, scale) = seen(picture)?;
+        let (input, scale) = resized(picture)?;
         let [output] = self.network.run(vec![("images", input)], ["output"])?;
         let grids = STRIDES.into_iter().flat_map(|stride| {
             let side = SIDE / stride;
             (0..side * side).map(move |at| (stride as f32, [at % side, at / side]))
         });
         let rows = output.values().chunks_exact(BEFORE + CLASSES.len());
-        let mut found = Vec::new();
+        let mut candidates = Vec::new();
         for ((stride, cell), row) in grids.zip(rows) {
             for (class, likely) in row[BEFORE..].iter().enumerate() {
                 let score = row[4] * likely;
                 if score > min_score {
                     let middle = [0, 1].map(|c| (row[c] + cell[c] as f32) * stride / scale);
                     let half = [0, 1].map(|c| libm::expf(row[2 + c]) * stride / scale / 2.0);
-                    let sides = [
-                        middle[0] - half[0],
-                        middle[1] - half[1],
-                        middle[0] + half[0],
-                        middle[1] + half[1],
-                    ];
-                    found.push(Detection { class, score, sides });
+                    let [left, top] = [0, 1].map(|c| middle[c] - half[c]);
+                    let [right, bottom] = [0, 1].map(|c| middle[c] + half[c]);
+                    let sides = [left, top, right, bottom];
+                    candidates.push(Detection { class, score, sides });
                 }
             }
         }
         // The sort is stable, so equal scores keep the order of cells.
-        found.sort_by(|a, b| b.score.total_cmp(&a.score));
+        candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
         let mut kept: Vec<Detection> = Vec::new();
-        for one in found {
-            if !kept.iter().any(|k| k.class == one.class && k.overlap(&one) > OVERLAP) {
-                kept.push(one);
+        for new in candidates {
+            if !kept.iter().any(|k| k.class == new.class && k.overlap(&new) > OVERLAP) {
+                kept.push(new);
             }
         }
         Ok(kept)
@@ -109,8 +106,8 @@ impl Detector {
 }
 
 /// Resizes the picture to the network's input, in BGR, and returns the scale.
-fn seen(picture: &ColorImage) -> Result<(Tensor, f32), Error> {
-    let (width, height) = (picture.width(), picture.height());
+fn resized(picture: &ColorImage) -> Result<(Tensor, f32), Error> {
+    let (width, height) = (picture.width() as usize, picture.height() as usize);
     let scale = (SIDE as f64 / height as f64).min(SIDE as f64 / width as f64);
     let [wide, high] = [width, height].map(|side| ((side as f64 * scale) as usize).clamp(1, SIDE));
     let mut values = vec![f32::from(GRAY); 3 * SIDE * SIDE];
@@ -124,7 +121,7 @@ fn seen(picture: &ColorImage) -> Result<(Tensor, f32), Error> {
         for x in 0..wide {
             let (left, right, across) = between(x, width, wide);
             let corners = [(left, top), (right, top), (left, bottom), (right, bottom)];
-            let [a, b, c, d] = corners.map(|(x, y)| picture.pixel(x, y));
+            let [a, b, c, d] = corners.map(|(x, y)| picture.get_pixel(x as u32, y as u32).0);
             for color in 0..3 {
                 let mix = |a: u8, b: u8| f32::from(a) * (1.0 - across) + f32::from(b) * across;
                 let value = mix(a[color], b[color]) * (1.0 - down) + mix(c[color], d[color]) * down;

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use image::Rgb;
 use unlift::{Descriptors, Error};
 
 use crate::features::ColorImage;
@@ -32,11 +33,8 @@ impl Points<'_> {
     fn check(&self) -> Result<(), Error> {
         let n = self.places.len();
         let depths = self.depths.map_or(n, <[f32]>::len);
-        for (what, rows) in [
-            ("descriptors", self.descriptors.len()),
-            ("weights", self.weights.len()),
-            ("depths", depths),
-        ] {
+        let lengths = [self.descriptors.len(), self.weights.len(), depths];
+        for (what, rows) in ["descriptors", "weights", "depths"].into_iter().zip(lengths) {
             if rows != n {
                 return Err(Error::new(what, format!("{n}, one per point"), rows.to_string()));
             }
@@ -79,8 +77,9 @@ pub(crate) fn check_size([width, height]: [usize; 2]) -> Result<(), Error> {
 /// `colored`.
 ///
 /// Channels: the descriptor (of unit length, times the root of its columns); with `colored`, four for
-/// the color of the point, which is not known; the position inside the cell from -1 to 1; the weight. Several points in a cell give their weighted mean and the
-/// largest weight; with depths, the nearest point. Cells without points are zero.
+/// the color of the point, which is not known; the position inside the cell from -1 to 1; the
+/// weight. Several points in a cell give their weighted mean and the largest weight; with depths,
+/// the nearest point. Cells without points are zero.
 ///
 /// # Errors
 /// If the columns of `points` differ in length, a side has less than 2 pixels, or the image has
@@ -102,7 +101,7 @@ pub fn feature_image(
     let mut row = vec![0.0; columns + 2];
     for at in 0..points.places.len() {
         let Some((cell, inside)) = points.cell(at, size) else { continue };
-        let (cell, mut weight) = (cell[1] * width + cell[0], points.weights[at]);
+        let (cell, weight) = (cell[1] * width + cell[0], points.weights[at]);
         if let Some(depths) = points.depths {
             let nearer = depths[at] < nearest[cell];
             if !nearer {
@@ -123,8 +122,7 @@ pub fn feature_image(
         }
         total[cell] += weight;
         let largest = &mut values[(columns + 2) * plane + cell];
-        weight = weight.max(*largest);
-        *largest = weight;
+        *largest = weight.max(*largest);
     }
     for channel in values.chunks_exact_mut(plane).take(columns + 2) {
         for (value, total) in channel.iter_mut().zip(&total) {
@@ -149,7 +147,7 @@ impl Inverter {
     /// # Errors
     /// If it is neither embedded nor in the user's folders, or its file cannot be loaded.
     pub fn of(kind: DescriptorKind) -> Result<Self, Error> {
-        Ok(Self { kind, network: Network::load(model(kind))? })
+        Ok(Self { kind, network: Network::load(&model(kind))? })
     }
 
     /// Loads an inverter from a file, as `training/inversion` exports it: input `features`, which
@@ -158,7 +156,7 @@ impl Inverter {
     /// # Errors
     /// If the file cannot be read, or has other inputs and outputs.
     pub fn read(path: &Path, kind: DescriptorKind) -> Result<Self, Error> {
-        let entry = Entry { sha256: None, ..*entry(model(kind))? };
+        let entry = Entry { sha256: None, ..*entry(&model(kind))? };
         Ok(Self { kind, network: Network::read(path, &entry)? })
     }
 
@@ -177,50 +175,37 @@ impl Inverter {
         self.takes(points.descriptors)?;
         let features = feature_image(points, size, self.kind == DescriptorKind::Sift)?;
         let [picture] = self.network.run(vec![("features", features)], ["picture"])?;
-        let size = size.map(|side| side / 2);
+        let [width, height] = size.map(|side| side / 2);
         match *picture.shape() {
-            [1, 3, rows, columns] if columns >= size[0] && rows >= size[1] => {
-                color_image(&picture, size)
+            [1, 3, rows, columns] if columns >= width && rows >= height => {
+                Ok(ColorImage::from_fn(width as u32, height as u32, |x, y| {
+                    let at = y as usize * columns + x as usize;
+                    let value = |color: usize| picture.values()[color * rows * columns + at];
+                    Rgb([0, 1, 2]
+                        .map(|color| (255.0 * value(color)).round().clamp(0.0, 255.0) as u8))
+                }))
             }
             ref shape => {
                 let expected =
-                    format!("a picture of 3 planes of {} x {} pixels at least", size[0], size[1]);
+                    format!("a picture of 3 planes of {width} x {height} pixels at least");
                 Err(Error::new("inverter", expected, format!("one of shape {shape:?}")))
             }
         }
     }
 
     fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
-        let found = match descriptors.is_empty() {
-            true => return Ok(()),
-            false => DescriptorKind::of(descriptors, "pictures")?,
-        };
-        if found == self.kind {
+        if descriptors.is_empty() {
+            return Ok(());
+        }
+        let kind = DescriptorKind::of(descriptors, "pictures")?;
+        if kind == self.kind {
             return Ok(());
         }
         let expected = format!("descriptors of the network's kind ({:?})", self.kind);
-        Err(Error::new("pictures", expected, format!("{found:?}")))
+        Err(Error::new("pictures", expected, format!("{kind:?}")))
     }
 }
 
-fn model(kind: DescriptorKind) -> &'static str {
-    match kind {
-        DescriptorKind::Sift => "inverter-sift",
-        DescriptorKind::Aliked => "inverter-aliked",
-        DescriptorKind::SuperPoint => "inverter-superpoint",
-    }
-}
-
-/// Crops planes `(1, 3, height, width)` with values from 0 to 1 and rounds them to bytes.
-fn color_image(planes: &Tensor, [width, height]: [usize; 2]) -> Result<ColorImage, Error> {
-    let [.., rows, columns] = planes.shape() else { unreachable!("four sides were seen") };
-    let (plane, columns) = (rows * columns, *columns);
-    let mut pixels = Vec::with_capacity(3 * width * height);
-    for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
-        for color in 0..3 {
-            let value = planes.values()[color * plane + y * columns + x];
-            pixels.push((255.0 * value).round().clamp(0.0, 255.0) as u8);
-        }
-    }
-    ColorImage::try_new(width, height, pixels)
+fn model(kind: DescriptorKind) -> String {
+    format!("inverter-{}", kind.name())
 }

@@ -26,27 +26,27 @@ impl Metrics {
     }
 }
 
-/// Checks that two pictures have the same size, with at least `least` pixels per side.
-pub(crate) fn check_sizes(a: &ColorImage, b: &ColorImage, least: usize) -> Result<(), Error> {
+/// Checks that two pictures have the same size, with at least `min_side` pixels per side.
+fn check_sizes(a: &ColorImage, b: &ColorImage, min_side: u32) -> Result<(), Error> {
     let size = |image: &ColorImage| format!("{} x {}", image.width(), image.height());
-    if (a.width(), a.height()) != (b.width(), b.height()) {
+    if a.dimensions() != b.dimensions() {
         let expected = format!("another picture of {} pixels", size(a));
         return Err(Error::new("pictures", expected, format!("one of {}", size(b))));
     }
-    if a.width().min(a.height()) < least {
-        let expected = format!("pictures of at least {least} x {least} pixels");
+    if a.width().min(a.height()) < min_side {
+        let expected = format!("pictures of at least {min_side} x {min_side} pixels");
         return Err(Error::new("pictures", expected, size(a)));
     }
     Ok(())
 }
 
-/// Returns the peak signal-to-noise ratio `10 log10(255^2 / MSE)` in dB, with the mean over all pixels and colors; infinite for
-/// equal pictures.
-pub fn psnr(a: &ColorImage, b: &ColorImage) -> Result<f64, Error> {
+/// Returns the peak signal-to-noise ratio `10 log10(255^2 / MSE)` in dB, with the mean over all
+/// pixels and colors; infinite for equal pictures.
+fn psnr(a: &ColorImage, b: &ColorImage) -> Result<f64, Error> {
     check_sizes(a, b, 1)?;
     let square = |(&a, &b): (&u8, &u8)| u64::from(a.abs_diff(b)).pow(2);
-    let sum: u64 = a.pixels().iter().zip(b.pixels()).map(square).sum();
-    let mean = sum as f64 / a.pixels().len() as f64;
+    let sum: u64 = a.iter().zip(b.iter()).map(square).sum();
+    let mean = sum as f64 / a.len() as f64;
     Ok(10.0 * libm::log10(255.0 * 255.0 / mean))
 }
 
@@ -54,47 +54,28 @@ const WINDOW: usize = 7;
 const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);
 const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
 
-/// Sums over some pixels of one color of both pictures.
-#[derive(Clone, Copy, Default)]
-struct Sums {
-    a: u64,
-    b: u64,
-    aa: u64,
-    bb: u64,
-    ab: u64,
+/// Sums over some pixels of one color of both pictures: of a, b, a^2, b^2 and a b.
+type Sums = [u64; 5];
+
+fn products(a: u8, b: u8) -> Sums {
+    let (a, b) = (u64::from(a), u64::from(b));
+    [a, b, a * a, b * b, a * b]
 }
 
-impl Sums {
-    fn of(a: u8, b: u8) -> Self {
-        let (a, b) = (u64::from(a), u64::from(b));
-        Self { a, b, aa: a * a, bb: b * b, ab: a * b }
-    }
+/// Adds the entering and subtracts the leaving sums.
+fn moved(sums: Sums, enters: Sums, leaves: Sums) -> Sums {
+    std::array::from_fn(|at| sums[at] + enters[at] - leaves[at])
+}
 
-    fn zip(self, other: Self, f: impl Fn(u64, u64) -> u64) -> Self {
-        Self {
-            a: f(self.a, other.a),
-            b: f(self.b, other.b),
-            aa: f(self.aa, other.aa),
-            bb: f(self.bb, other.bb),
-            ab: f(self.ab, other.ab),
-        }
-    }
-
-    /// Adds the entering and subtracts the leaving sums.
-    fn moved(self, enters: Self, leaves: Self) -> Self {
-        self.zip(enters, |x, y| x + y).zip(leaves, |x, y| x - y)
-    }
-
-    fn similarity(self) -> f64 {
-        let n = (WINDOW * WINDOW) as f64;
-        let mean = |sum: u64| sum as f64 / n;
-        let (a, b) = (mean(self.a), mean(self.b));
-        let sample = n / (n - 1.0);
-        let aa = sample * (mean(self.aa) - a * a);
-        let bb = sample * (mean(self.bb) - b * b);
-        let ab = sample * (mean(self.ab) - a * b);
-        ((2.0 * a * b + C1) * (2.0 * ab + C2)) / ((a * a + b * b + C1) * (aa + bb + C2))
-    }
+/// Returns the structural similarity in a window with these sums.
+fn similarity(sums: Sums) -> f64 {
+    let n = (WINDOW * WINDOW) as f64;
+    let [a, b, aa, bb, ab] = sums.map(|sum| sum as f64 / n);
+    let sample = n / (n - 1.0);
+    let aa = sample * (aa - a * a);
+    let bb = sample * (bb - b * b);
+    let ab = sample * (ab - a * b);
+    ((2.0 * a * b + C1) * (2.0 * ab + C2)) / ((a * a + b * b + C1) * (aa + bb + C2))
 }
 
 /// Returns the mean structural similarity over all windows of 7 x 7 pixels inside the pictures, and
@@ -106,18 +87,18 @@ impl Sums {
 ///
 /// # Errors
 /// If the pictures differ in size, or a side has less than 7 pixels.
-pub fn ssim(a: &ColorImage, b: &ColorImage) -> Result<f64, Error> {
-    check_sizes(a, b, WINDOW)?;
-    let (width, height) = (a.width(), a.height());
+fn ssim(a: &ColorImage, b: &ColorImage) -> Result<f64, Error> {
+    check_sizes(a, b, WINDOW as u32)?;
+    let (width, height) = (a.width() as usize, a.height() as usize);
     let stride = 3 * width;
+    let (left, right) = (a.as_raw(), b.as_raw());
     let mut columns = vec![Sums::default(); stride];
-    let pair =
-        |y: usize, x: usize| Sums::of(a.pixels()[y * stride + x], b.pixels()[y * stride + x]);
+    let pair = |y: usize, x: usize| products(left[y * stride + x], right[y * stride + x]);
     let mut total = 0.0;
     for y in 0..height {
         for (x, column) in columns.iter_mut().enumerate() {
             let leaves = if y < WINDOW { Sums::default() } else { pair(y - WINDOW, x) };
-            *column = column.moved(pair(y, x), leaves);
+            *column = moved(*column, pair(y, x), leaves);
         }
         if y + 1 < WINDOW {
             continue;
@@ -126,9 +107,9 @@ pub fn ssim(a: &ColorImage, b: &ColorImage) -> Result<f64, Error> {
             let mut window = Sums::default();
             for x in 0..width {
                 let leaves = x.checked_sub(WINDOW).map(|x| columns[3 * x + color]);
-                window = window.moved(columns[3 * x + color], leaves.unwrap_or_default());
+                window = moved(window, columns[3 * x + color], leaves.unwrap_or_default());
                 if x + 1 >= WINDOW {
-                    total += window.similarity();
+                    total += similarity(window);
                 }
             }
         }
@@ -138,7 +119,7 @@ pub fn ssim(a: &ColorImage, b: &ColorImage) -> Result<f64, Error> {
 
 const MODEL: &str = "lpips-squeeze";
 /// Smallest side; pooling leaves nothing of smaller pictures.
-const LEAST: usize = 16;
+const MIN_SIDE: u32 = 16;
 
 /// The network of the learned perceptual distance (LPIPS); threads can share it.
 ///
@@ -161,7 +142,7 @@ impl Lpips {
     /// # Errors
     /// If the pictures differ in size, or a side has less than 16 pixels.
     pub fn distance(&self, a: &ColorImage, b: &ColorImage) -> Result<f64, Error> {
-        check_sizes(a, b, LEAST)?;
+        check_sizes(a, b, MIN_SIDE)?;
         let inputs = vec![("a", tensor(a)?), ("b", tensor(b)?)];
         let [distance] = self.network.run(inputs, ["distance"])?;
         Ok(f64::from(distance.values()[0]))
@@ -170,17 +151,17 @@ impl Lpips {
 
 /// Returns planes (1, 3, height, width) with values from 0 to 1.
 fn tensor(image: &ColorImage) -> Result<Tensor, Error> {
-    let plane = |color: usize| image.pixels().iter().skip(color).step_by(3);
+    let plane = |color: usize| image.iter().skip(color).step_by(3);
     let values = (0..3).flat_map(plane).map(|&value| f32::from(value) / 255.0).collect();
-    Tensor::try_new(&[1, 3, image.height(), image.width()], values)
+    Tensor::try_new(&[1, 3, image.height() as usize, image.width() as usize], values)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn picture(width: usize, height: usize, value: impl Fn(usize) -> u8) -> ColorImage {
-        ColorImage::try_new(width, height, (0..3 * width * height).map(value).collect()).unwrap()
+    fn picture(width: u32, height: u32, value: impl Fn(u32) -> u8) -> ColorImage {
+        ColorImage::from_raw(width, height, (0..3 * width * height).map(value).collect()).unwrap()
     }
 
     #[test]
@@ -188,13 +169,13 @@ mod tests {
         let a = picture(13, 10, |at| (at * at % 251) as u8);
         let b = picture(13, 10, |at| (at * 29 % 241) as u8);
         let mut total = 0.0;
-        for (y, x, color) in (0..4 * 7 * 3).map(|at| (at / 21, at / 3 % 7, at % 3)) {
+        for (y, x, color) in (0..4 * 7 * 3).map(|at| (at / 21, at / 3 % 7, at as usize % 3)) {
             let mut window = Sums::default();
             for (dy, dx) in (0..49).map(|at| (at / 7, at % 7)) {
-                let at = |image: &ColorImage| image.pixel(x + dx, y + dy)[color];
-                window = window.moved(Sums::of(at(&a), at(&b)), Sums::default());
+                let at = |image: &ColorImage| image.get_pixel(x + dx, y + dy)[color];
+                window = moved(window, products(at(&a), at(&b)), Sums::default());
             }
-            total += window.similarity();
+            total += similarity(window);
         }
         assert!((ssim(&a, &b).unwrap() - total / 84.0).abs() < 1e-12);
         assert_eq!(ssim(&a, &a).unwrap(), 1.0);

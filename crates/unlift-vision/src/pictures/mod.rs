@@ -17,4 +17,4 @@ mod metrics;
 pub use camera::{Lens, Projection, View};
 pub use detect::{CLASSES, Detection, Detector};
 pub use inverter::{CELL, Inverter, Points, feature_image};
-pub use metrics::{Lpips, Metrics, psnr, ssim};
+pub use metrics::{Lpips, Metrics};

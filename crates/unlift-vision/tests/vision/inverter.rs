@@ -6,7 +6,7 @@ use unlift::{Descriptors, Error};
 use unlift_vision::network::Tensor;
 use unlift_vision::pictures::{CELL, Points, feature_image};
 
-use crate::floats;
+use crate::{assert_close, floats};
 
 /// `training/inversion/batches.py` makes this file.
 const GOLDEN: &[u8] = include_bytes!("../data/feature-image.safetensors");
@@ -46,12 +46,8 @@ impl Columns {
     }
 }
 
-fn check(values: &[f32], expected: &[f32]) {
-    assert_eq!(values.len(), expected.len());
-    for (at, (value, expected)) in values.iter().zip(expected).enumerate() {
-        assert!((value - expected).abs() < 1e-5, "value {at}: {value} and {expected}");
-    }
-}
+/// Sums in another order.
+const TOLERANCE: f32 = 1e-5;
 
 #[test]
 fn the_feature_image_is_that_of_training_and_colors_are_zero() {
@@ -59,7 +55,7 @@ fn the_feature_image_is_that_of_training_and_colors_are_zero() {
     let file = SafeTensors::deserialize(GOLDEN).unwrap();
     let plain = columns.image(false, false).unwrap();
     assert_eq!(plain.shape(), [1, COLUMNS + 3, 6, 8]);
-    check(plain.values(), &floats(&file, "features"));
+    assert_close("features", plain.values(), &floats(&file, "features"), TOLERANCE);
     let colorless = columns.image(false, true).unwrap();
     let (before, rest) = colorless.values().split_at(COLUMNS * PLANE);
     let (colors, after) = rest.split_at(4 * PLANE);
@@ -90,8 +86,8 @@ fn with_depths_the_nearest_point_of_a_cell_replaces_the_mean() {
         depths: Vec::new(),
     };
     assert!((10..n / 2).contains(&kept.len()), "{} of {n}", kept.len());
-    let expected = alone.image(false, false).unwrap();
-    check(all.image(true, false).unwrap().values(), expected.values());
+    let (image, expected) = (all.image(true, false).unwrap(), alone.image(false, false).unwrap());
+    assert_close("nearest", image.values(), expected.values(), TOLERANCE);
 }
 
 #[test]

@@ -16,7 +16,7 @@ use unlift::seed::Key;
 use unlift::truth::Original;
 use unlift::{Descriptors, PointSet, Unit};
 use unlift_testkit::{described_map, source_laws};
-use unlift_vision::features::{Extraction, Extractor, Found, LearnedOptions};
+use unlift_vision::features::{Extraction, Extractor, PhotoFeatures};
 use unlift_vision::network::Learned;
 
 use crate::shared;
@@ -100,17 +100,19 @@ fn many_maps_may_request_the_network_at_once() {
 fn the_network_names_more_neighbors_than_its_inputs_do() {
     const K: usize = 20;
     let Some(photo) = shared("data/redkitchen/images/frame-000500.color.jpg") else { return };
-    let aliked = Extraction::Aliked(LearnedOptions { min_score: 0.02, ..LearnedOptions::ALIKED });
+    let aliked = Extraction { min_score: 0.02, ..Extraction::ALIKED };
     let kinds: [(_, &dyn Source<2>, f64); 2] =
-        [(Extraction::default(), &Overlap, 0.03), (aliked, &Similarity, 0.2)];
+        [(Extraction::SIFT, &Overlap, 0.03), (aliked, &Similarity, 0.2)];
     for (extraction, plain, gain) in kinds {
         let photo = Extractor::try_new(&extraction).unwrap().read(&photo).unwrap();
-        let (places, values) = match photo.found {
-            Found::Sift(sift) => (
+        let (places, values) = match photo.features {
+            PhotoFeatures::Sift(sift) => (
                 sift.keypoints.iter().map(|at| [at.x - 0.5, at.y - 0.5]).collect::<Vec<_>>(),
                 Values::U8(sift.descriptors.concat()),
             ),
-            Found::Learned(learned) => (learned.keypoints, Values::F32(learned.descriptors)),
+            PhotoFeatures::Learned(learned) => {
+                (learned.keypoints, Values::F32(learned.descriptors))
+            }
         };
         let points = places.iter().map(|place| place.map(f64::from)).collect();
         let points = PointSet::try_new(points, Unit::Pixel).unwrap();

@@ -28,3 +28,11 @@ fn floats(file: &SafeTensors, name: &str) -> Vec<f32> {
     let values = file.tensor(name).unwrap().data().as_chunks::<4>().0;
     values.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect()
 }
+
+/// Checks that each value is within `tolerance` of the expected one.
+fn assert_close(name: &str, values: &[f32], expected: &[f32], tolerance: f32) {
+    assert_eq!(values.len(), expected.len(), "{name}");
+    for (at, (value, expected)) in values.iter().zip(expected).enumerate() {
+        assert!((value - expected).abs() < tolerance, "{name}, {at}: {value} and {expected}");
+    }
+}

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use serde_json::Value;
-use unlift_vision::features::photo::read_color;
+use unlift_vision::features::photo::{Turn, read_color};
 use unlift_vision::pictures::{CLASSES, Detection, Detector, Lpips, Metrics};
 
 use crate::shared;
@@ -23,7 +23,8 @@ fn metrics_are_those_of_scikit_image_and_lpips() {
     assert!(pairs.len() >= 6);
     for (name, pair) in pairs {
         let read = |side: &str| {
-            read_color(&shared.join("reference").join(pair[side].as_str().unwrap())).unwrap()
+            let path = shared.join("reference").join(pair[side].as_str().unwrap());
+            read_color(&path, Turn::Upright).unwrap()
         };
         let found = Metrics::of(&read("a"), &read("b"), &lpips).unwrap();
         let apart = |key: &str, found: f64| (found - pair[key].as_f64().unwrap()).abs();
@@ -38,7 +39,8 @@ fn detections_are_those_of_yolox() {
     let Some((shared, reference)) = reference("yolox_nano_reference.json") else { return };
     let detector = Detector::try_new().unwrap();
     for result in reference["results"].as_array().unwrap() {
-        let picture = read_color(&shared.join(result["image"].as_str().unwrap())).unwrap();
+        let path = shared.join(result["image"].as_str().unwrap());
+        let picture = read_color(&path, Turn::Upright).unwrap();
         let found = detector.find(&picture, 0.1).unwrap();
         let expected: Vec<Detection> = result["detections"]
             .as_array()

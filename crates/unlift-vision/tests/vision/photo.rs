@@ -4,7 +4,7 @@ use std::io::Cursor;
 use std::path::Path;
 
 use image::{DynamicImage, ImageFormat, Rgb, RgbImage};
-use unlift_vision::features::photo::{decode, read, read_color};
+use unlift_vision::features::photo::{Turn, decode, read, read_color};
 
 fn colors(width: u32, height: u32) -> RgbImage {
     RgbImage::from_fn(width, height, |x, y| Rgb([(7 * x) as u8, (5 * y) as u8, (3 * x + y) as u8]))
@@ -133,12 +133,13 @@ fn a_header_with_more_pixels_than_its_bytes_can_hold_is_refused() {
 
 #[test]
 fn files_are_read_by_content_and_missing_ones_named() {
+    let read = |path: &Path| read(path, Turn::Upright);
+    let read_color = |path: &Path| read_color(path, Turn::Upright);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("really a png.jpg");
     std::fs::write(&path, encode(&DynamicImage::from(colors(8, 8)), ImageFormat::Png)).unwrap();
     assert_eq!(read(&path).unwrap().width(), 8);
-    let color = read_color(&path).unwrap();
-    assert_eq!((color.width(), color.height(), color.pixel(7, 6)), (8, 8, [49, 30, 27]));
+    assert_eq!(read_color(&path).unwrap(), colors(8, 8));
     std::fs::write(&path, "text").unwrap();
     let error = read_color(&path).unwrap_err().to_string();
     assert!(error.ends_with("png.jpg: expected a JPEG, PNG or WebP image, found text"), "{error}");

@@ -3,7 +3,7 @@
 use std::f32::consts::{FRAC_PI_2, TAU};
 
 use rayon::prelude::*;
-use unlift_vision::features::{Features, GrayImage, Keypoint, Sift, SiftOptions};
+use unlift_vision::features::{Extraction, Features, GrayImage, Keypoint, Sift};
 
 /// An image of Gaussian blobs `(x, y, sigma, height)`, in COLMAP's pixel convention.
 fn blobs(width: usize, height: usize, blobs: &[(f32, f32, f32, f32)]) -> GrayImage {
@@ -135,7 +135,7 @@ fn features_are_kept_from_the_coarsest_level_on_and_levels_whole() {
     let mut last = all.keypoints.len();
     let mut fewer = 0;
     for max_features in [400, 200, 100, 50, 10, 1] {
-        let options = SiftOptions { max_features, ..SiftOptions::default() };
+        let options = Extraction { max_features, ..Extraction::SIFT };
         let some = Sift::try_new(options).unwrap().extract(&image);
         let n = some.keypoints.len();
         // The coarsest features, unchanged, in the same order, and at least the requested number.
@@ -151,7 +151,7 @@ fn features_are_kept_from_the_coarsest_level_on_and_levels_whole() {
 #[test]
 fn an_image_that_is_too_large_is_shrunk_and_keypoints_are_not() {
     let image = blobs(200, 150, &[(80.5, 70.5, 8.0, 0.4)]);
-    let options = SiftOptions { max_image_size: 100, ..SiftOptions::default() };
+    let options = Extraction { max_image_size: 100, ..Extraction::SIFT };
     let features = Sift::try_new(options).unwrap().extract(&image);
     let best = features.keypoints[0];
     assert!((best.x - 80.5).hypot(best.y - 70.5) < 0.5, "{best:?}");

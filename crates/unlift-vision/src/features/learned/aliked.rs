@@ -6,12 +6,12 @@
 
 use unlift::Error;
 
-use super::maxima::{Scores, Wanted, corners};
-use super::{LearnedFeatures, LearnedOptions};
-use crate::features::ColorImage;
+use super::LearnedFeatures;
+use super::maxima::{Scores, corners};
+use crate::features::image::{fitted, unshrunk};
+use crate::features::{ColorImage, Extraction};
 use crate::network::{Network, Tensor};
 
-const MODEL: &str = "aliked-n16rot";
 /// The network halves an image five times.
 const MULTIPLE: usize = 32;
 /// Radius in pixels of the window that determines the sub-pixel position, and in which there is no
@@ -26,97 +26,80 @@ const PATCH: usize = 9;
 /// Keypoints that are described at a time: 13 MB.
 const BATCH: usize = 1024;
 
-/// The extractor.
-pub struct Aliked {
-    network: Network,
-    options: LearnedOptions,
+/// Extracts the features of an image with the network `aliked-n16rot`. Uses about 330 bytes of
+/// memory per pixel after downsizing.
+///
+/// # Errors
+/// If the network has other inputs or outputs.
+pub fn aliked(
+    network: &Network,
+    options: &Extraction,
+    image: &ColorImage,
+) -> Result<LearnedFeatures, Error> {
+    let small = fitted(image, options.max_image_size);
+    let small = small.as_ref().unwrap_or(image);
+    let (scores, levels) = dense(network, small)?;
+    let maxima = scores.maxima(RADIUS, options);
+    let places: Vec<[f32; 2]> = maxima.into_iter().map(|pixel| refined(&scores, pixel)).collect();
+    let mut descriptors = Vec::with_capacity(places.len() * DIM);
+    for places in places.chunks(BATCH) {
+        descriptors.extend(describe(network, &levels, places)?);
+    }
+    let scores = places.iter().map(|&place| scores.at(place)).collect();
+    let keypoints = places.into_iter().map(|place| unshrunk(image, small, place)).collect();
+    Ok(LearnedFeatures { keypoints, scores, descriptors, dim: DIM })
 }
 
-impl Aliked {
-    /// Creates an extractor with these options.
-    ///
-    /// # Errors
-    /// If a field is out of range (the error names the first one), or a file that replaces the
-    /// embedded model cannot be loaded.
-    pub fn try_new(options: LearnedOptions) -> Result<Self, Error> {
-        options.check()?;
-        Ok(Self { network: Network::load(MODEL)?, options })
-    }
-
-    /// Extracts the features of an image. Uses about 330 bytes of memory per pixel after
-    /// downsizing.
-    pub fn extract(&self, image: &ColorImage) -> Result<LearnedFeatures, Error> {
-        let small = image.fitted(self.options.max_image_size);
-        let seen = small.as_ref().unwrap_or(image);
-        let (scores, levels) = self.dense(seen)?;
-        let wanted = Wanted {
-            radius: RADIUS,
-            border: RADIUS,
-            min_score: self.options.min_score,
-            most: self.options.max_features,
-        };
-        let places: Vec<[f32; 2]> =
-            scores.maxima(&wanted).into_iter().map(|pixel| refined(&scores, pixel)).collect();
-        let mut descriptors = Vec::with_capacity(places.len() * DIM);
-        for places in places.chunks(BATCH) {
-            descriptors.extend(self.describe(&levels, places)?);
-        }
-        let scores = places.iter().map(|&place| scores.at(place)).collect();
-        let keypoints = places.into_iter().map(|place| image.unshrunk(seen, place)).collect();
-        Ok(LearnedFeatures { keypoints, scores, descriptors, dim: DIM })
-    }
-
-    /// Returns the scores of all pixels, and the maps from which descriptors are made.
-    fn dense(&self, image: &ColorImage) -> Result<(Scores, Levels), Error> {
-        let size = [image.width(), image.height()];
-        let padded = size.map(|side| side.next_multiple_of(MULTIPLE));
-        let padding = [0, 1].map(|side| (padded[side] - size[side]) / 2);
-        let inner = |at: usize, side: usize| at.saturating_sub(padding[side]).min(size[side] - 1);
-        let [width, height] = padded;
-        let mut planes = vec![0.0; 3 * width * height];
-        for y in 0..height {
-            for x in 0..width {
-                let colors = image.pixel(inner(x, 0), inner(y, 1));
-                for (channel, value) in colors.into_iter().enumerate() {
-                    planes[(channel * height + y) * width + x] = f32::from(value) / 255.0;
-                }
+/// Returns the scores of all pixels, and the maps from which descriptors are made.
+fn dense(network: &Network, image: &ColorImage) -> Result<(Scores, Levels), Error> {
+    let size = [image.width() as usize, image.height() as usize];
+    let padded = size.map(|side| side.next_multiple_of(MULTIPLE));
+    let padding = [0, 1].map(|side| (padded[side] - size[side]) / 2);
+    let inner = |at: usize, side: usize| at.saturating_sub(padding[side]).min(size[side] - 1);
+    let [width, height] = padded;
+    let mut planes = vec![0.0; 3 * width * height];
+    for y in 0..height {
+        for x in 0..width {
+            let colors = image.get_pixel(inner(x, 0) as u32, inner(y, 1) as u32).0;
+            for (channel, value) in colors.into_iter().enumerate() {
+                planes[(channel * height + y) * width + x] = f32::from(value) / 255.0;
             }
         }
-        let input = Tensor::try_new(&[1, 3, height, width], planes)?;
-        let outputs = ["score", "level1", "level2", "level3", "level4"];
-        let [score, a, b, c, d] = self.network.run(vec![("image", input)], outputs)?;
-        let rows = score.values().chunks_exact(width).skip(padding[1]).take(size[1]);
-        let values = rows.flat_map(|row| &row[padding[0]..padding[0] + size[0]]).copied().collect();
-        let scores = Scores { width: size[0], height: size[1], values };
-        Ok((scores, Levels::new([a, b, c, d], padding, size)))
     }
+    let input = Tensor::try_new(&[1, 3, height, width], planes)?;
+    let outputs = ["score", "level1", "level2", "level3", "level4"];
+    let [score, fine, coarse @ ..] = network.run(vec![("image", input)], outputs)?;
+    let rows = score.values().chunks_exact(width).skip(padding[1]).take(size[1]);
+    let values = rows.flat_map(|row| &row[padding[0]..padding[0] + size[0]]).copied().collect();
+    let scores = Scores { width: size[0], height: size[1], values };
+    Ok((scores, Levels { fine, coarse, padding, size }))
+}
 
-    /// Returns the descriptors at these positions, one after the other.
-    fn describe(&self, levels: &Levels, places: &[[f32; 2]]) -> Result<Vec<f32>, Error> {
-        let n = places.len();
-        let mut patches = vec![0.0; n * PATCH * DIM];
-        for (place, patch) in places.iter().zip(patches.chunks_exact_mut(PATCH * DIM)) {
-            let [x, y] = place.map(|at| at as isize);
-            for (at, out) in patch.chunks_exact_mut(DIM).enumerate() {
-                levels.pixel(x + at as isize % 3 - 1, y + at as isize / 3 - 1, out);
-            }
+/// Returns the descriptors at these positions, one after the other.
+fn describe(network: &Network, levels: &Levels, places: &[[f32; 2]]) -> Result<Vec<f32>, Error> {
+    let n = places.len();
+    let mut patches = vec![0.0; n * PATCH * DIM];
+    for (place, patch) in places.iter().zip(patches.chunks_exact_mut(PATCH * DIM)) {
+        let [x, y] = place.map(|at| at as isize);
+        for (at, out) in patch.chunks_exact_mut(DIM).enumerate() {
+            levels.pixel(x + at as isize % 3 - 1, y + at as isize / 3 - 1, out);
         }
-        let patches = Tensor::try_new(&[n, PATCH, DIM], patches)?;
-        let [offsets] = self.network.run(vec![("patch", patches)], ["offsets"])?;
-        let most = levels.size[0].max(levels.size[1]) as f32 / 4.0;
-        let mut samples = vec![0.0; n * SAMPLES * DIM];
-        let of_each = samples.chunks_exact_mut(SAMPLES * DIM);
-        let offsets = offsets.values().chunks_exact(2 * SAMPLES);
-        for (([x, y], offsets), samples) in places.iter().zip(offsets).zip(of_each) {
-            for (at, out) in samples.chunks_exact_mut(DIM).enumerate() {
-                let [across, down] = [offsets[at], offsets[SAMPLES + at]];
-                levels.between(x + across.clamp(-most, most), y + down.clamp(-most, most), out);
-            }
-        }
-        let samples = Tensor::try_new(&[n, SAMPLES, DIM], samples)?;
-        let [descriptors] = self.network.run(vec![("samples", samples)], ["descriptors"])?;
-        Ok(descriptors.into_values())
     }
+    let patches = Tensor::try_new(&[n, PATCH, DIM], patches)?;
+    let [offsets] = network.run(vec![("patch", patches)], ["offsets"])?;
+    let limit = levels.size[0].max(levels.size[1]) as f32 / 4.0;
+    let mut samples = vec![0.0; n * SAMPLES * DIM];
+    let of_each = samples.chunks_exact_mut(SAMPLES * DIM);
+    let offsets = offsets.values().chunks_exact(2 * SAMPLES);
+    for (([x, y], offsets), samples) in places.iter().zip(offsets).zip(of_each) {
+        for (at, out) in samples.chunks_exact_mut(DIM).enumerate() {
+            let [across, down] = [offsets[at], offsets[SAMPLES + at]];
+            levels.between(x + across.clamp(-limit, limit), y + down.clamp(-limit, limit), out);
+        }
+    }
+    let samples = Tensor::try_new(&[n, SAMPLES, DIM], samples)?;
+    let [descriptors] = network.run(vec![("samples", samples)], ["descriptors"])?;
+    Ok(descriptors.into_values())
 }
 
 /// Returns the sub-pixel position of a keypoint: the mean of the pixels around it, weighted by the
@@ -140,31 +123,26 @@ fn refined(scores: &Scores, [x, y]: [usize; 2]) -> [f32; 2] {
 }
 
 const CHANNELS: usize = 32;
-pub(crate) const DIM: usize = 4 * CHANNELS;
+const DIM: usize = 4 * CHANNELS;
 
 /// The four levels of ALIKED over an image that was padded on all sides.
 ///
 /// Resizing the coarse levels to all pixels would need 512 bytes per pixel, so only requested
 /// pixels are computed.
-pub(crate) struct Levels {
+struct Levels {
     /// `(1, 32, height, width)`.
     fine: Tensor,
     /// `(1, height / s, width / s, 32)` for s = 2, 8, 32.
     coarse: [Tensor; 3],
     /// Pixels of padding on the left and above.
-    pub padding: [usize; 2],
+    padding: [usize; 2],
     /// Width and height of the image without padding.
-    pub size: [usize; 2],
+    size: [usize; 2],
 }
 
 impl Levels {
-    pub(crate) fn new(levels: [Tensor; 4], padding: [usize; 2], size: [usize; 2]) -> Self {
-        let [fine, a, b, c] = levels;
-        Self { fine, coarse: [a, b, c], padding, size }
-    }
-
     /// Describes the position `(x, y)` by bilinear interpolation of four pixels.
-    pub(crate) fn between(&self, x: f32, y: f32, out: &mut [f32]) {
+    fn between(&self, x: f32, y: f32, out: &mut [f32]) {
         out.fill(0.0);
         let mut pixel = [0.0; DIM];
         for ([x, y], weight) in corners(x, y) {
@@ -175,7 +153,7 @@ impl Levels {
 
     /// Describes the pixel in column `x` of row `y` by 128 values of length 1; zeros outside the
     /// image.
-    pub(crate) fn pixel(&self, x: isize, y: isize, out: &mut [f32]) {
+    fn pixel(&self, x: isize, y: isize, out: &mut [f32]) {
         let [width, height] = self.size;
         if !(0..width as isize).contains(&x) || !(0..height as isize).contains(&y) {
             return out.fill(0.0);
@@ -230,27 +208,18 @@ fn square(values: &[f32]) -> f32 {
 mod tests {
     use super::*;
 
-    /// Levels of a padded image of 64 x 32 whose channels hold `value(channel, x, y)` in 0..1.
-    fn levels(value: impl Fn(usize, f32, f32) -> f32) -> Levels {
-        let fine = (0..CHANNELS * 32 * 64)
-            .map(|at| value(at / (32 * 64), (at % 64) as f32 / 63.0, (at / 64 % 32) as f32 / 31.0));
-        let coarse = [(16, 32), (4, 8), (1, 2)].map(|(rows, columns): (usize, usize)| {
-            let part = |at: usize, n: usize| at as f32 / (n.max(2) - 1) as f32;
-            let values = (0..rows * columns * CHANNELS).map(|at| {
-                let (pixel, channel) = (at / CHANNELS, at % CHANNELS);
-                value(channel, part(pixel % columns, columns), part(pixel / columns, rows))
-            });
-            Tensor::try_new(&[1, rows, columns, CHANNELS], values.collect()).unwrap()
-        });
-        let fine = Tensor::try_new(&[1, CHANNELS, 32, 64], fine.collect()).unwrap();
-        let [a, b, c] = coarse;
-        Levels::new([fine, a, b, c], [3, 5], [58, 22])
-    }
-
     #[test]
     fn corners_of_all_levels_lie_on_each_other() {
-        // A ramp from left to right is the same ramp on every level.
-        let levels = levels(|_, x, _| 1.0 + x);
+        // Levels of a padded image of 64 x 32: a ramp from left to right is the same on each.
+        let ramp = |x: usize, columns: usize| 1.0 + x as f32 / (columns - 1) as f32;
+        let fine = (0..CHANNELS * 32 * 64).map(|at| ramp(at % 64, 64)).collect();
+        let coarse = [(16, 32), (4, 8), (1, 2)].map(|(rows, columns)| {
+            let value = |at: usize| ramp(at / CHANNELS % columns, columns);
+            let values = (0..rows * columns * CHANNELS).map(value).collect();
+            Tensor::try_new(&[1, rows, columns, CHANNELS], values).unwrap()
+        });
+        let fine = Tensor::try_new(&[1, CHANNELS, 32, 64], fine).unwrap();
+        let levels = Levels { fine, coarse, padding: [3, 5], size: [58, 22] };
         let mut pixel = [0.0; DIM];
         levels.pixel(20, 7, &mut pixel);
         assert!((square(&pixel) - 1.0).abs() < 1e-6);

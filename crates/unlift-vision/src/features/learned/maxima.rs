@@ -1,5 +1,7 @@
 //! Non-maximum suppression in a map of scores.
 
+use crate::features::Extraction;
+
 /// A map of scores, `(height, width)`, row-major.
 pub(crate) struct Scores {
     pub width: usize,
@@ -7,26 +9,15 @@ pub(crate) struct Scores {
     pub values: Vec<f32>,
 }
 
-/// Criteria of maxima.
-pub(crate) struct Wanted {
-    /// Half side of the square around a maximum that contains no other one.
-    pub radius: usize,
-    /// Width in pixels of the image border without maxima.
-    pub border: usize,
-    /// The score that must be exceeded.
-    pub min_score: f32,
-    /// Maximum number of maxima, the best ones.
-    pub most: usize,
-}
-
 impl Scores {
-    /// Returns the positions `(x, y)` of the maxima, the best first, equal ones in reading order.
+    /// Returns the positions `(x, y)` of the maxima that `options` request, the best first, equal
+    /// ones in reading order. None is within `radius` pixels of the image border, and the square of
+    /// this half side around a maximum contains no other one.
     ///
     /// Three passes, as in the code of ALIKED and SuperPoint: each maximum suppresses its
     /// neighborhood, then the rest may have new maxima.
-    pub(crate) fn maxima(&self, wanted: &Wanted) -> Vec<[usize; 2]> {
+    pub(crate) fn maxima(&self, radius: usize, options: &Extraction) -> Vec<[usize; 2]> {
         let Self { width, height, ref values } = *self;
-        let radius = wanted.radius;
         let largest = |map: &[f32]| windows(map, width, radius, f32::max);
         let mut taken: Vec<bool> =
             values.iter().zip(largest(values)).map(|(a, b)| *a == b).collect();
@@ -42,14 +33,14 @@ impl Scores {
                 *taken |= maximum && !hidden;
             }
         }
-        let inner = |at: usize, side: usize| at >= wanted.border && at + wanted.border < side;
-        let mut found: Vec<usize> = (0..values.len())
-            .filter(|&at| taken[at] && values[at] > wanted.min_score)
+        let inner = |at: usize, side: usize| at >= radius && at + radius < side;
+        let mut maxima: Vec<usize> = (0..values.len())
+            .filter(|&at| taken[at] && values[at] > options.min_score)
             .filter(|&at| inner(at % width, width) && inner(at / width, height))
             .collect();
-        found.sort_by(|&a, &b| values[b].total_cmp(&values[a]).then(a.cmp(&b)));
-        found.truncate(wanted.most);
-        found.into_iter().map(|at| [at % width, at / width]).collect()
+        maxima.sort_by(|&a, &b| values[b].total_cmp(&values[a]).then(a.cmp(&b)));
+        maxima.truncate(options.max_features);
+        maxima.into_iter().map(|at| [at % width, at / width]).collect()
     }
 
     /// Returns the bilinearly interpolated score at a position; 0 outside.
@@ -104,20 +95,17 @@ fn merge<T: Copy>(into: &mut [T], other: &[T], larger: fn(T, T) -> T) {
 mod tests {
     use super::*;
 
-    fn scores(width: usize, values: &[f32]) -> Scores {
-        Scores { width, height: values.len() / width, values: values.to_vec() }
-    }
-
-    const ALL: Wanted = Wanted { radius: 1, border: 0, min_score: 0.0, most: 100 };
-
     #[test]
     fn a_suppressed_score_suppresses_none() {
-        // 5 suppresses 4, and so 3 is a maximum of the rest; 2 is beside it.
-        let row = scores(4, &[0.5, 0.4, 0.3, 0.2]);
-        assert_eq!(row.maxima(&ALL), [[0, 0], [2, 0]]);
-        let limited = Wanted { most: 1, ..ALL };
-        assert_eq!(row.maxima(&limited), [[0, 0]]);
-        let high = Wanted { min_score: 0.3, ..ALL };
-        assert_eq!(row.maxima(&high), [[0, 0]]);
+        // 5 suppresses 4, and so 3 is a maximum of the rest; 2 is beside it. Around them the border.
+        let mut values = vec![0.0; 18];
+        values[7..11].copy_from_slice(&[0.5, 0.4, 0.3, 0.2]);
+        let row = Scores { width: 6, height: 3, values };
+        let all = Extraction { min_score: 0.1, ..Extraction::ALIKED };
+        assert_eq!(row.maxima(1, &all), [[1, 1], [3, 1]]);
+        let limited = Extraction { max_features: 1, ..all };
+        assert_eq!(row.maxima(1, &limited), [[1, 1]]);
+        let high = Extraction { min_score: 0.3, ..all };
+        assert_eq!(row.maxima(1, &high), [[1, 1]]);
     }
 }

@@ -6,9 +6,10 @@
 
 use unlift::Error;
 
-use super::maxima::{Scores, Wanted, corners};
-use super::{LearnedFeatures, LearnedOptions};
-use crate::features::ColorImage;
+use super::LearnedFeatures;
+use super::maxima::{Scores, corners};
+use crate::features::image::{fitted, unshrunk};
+use crate::features::{ColorImage, Extraction};
 use crate::network::{Network, Tensor};
 
 const MODEL: &str = "superpoint";
@@ -18,80 +19,47 @@ const CELL: usize = 8;
 /// keypoints.
 const RADIUS: usize = 4;
 
-/// The extractor.
-pub struct SuperPoint {
-    network: Network,
-    options: LearnedOptions,
-}
-
-impl SuperPoint {
-    /// Creates an extractor with these options and the user's weights.
-    ///
-    /// # Errors
-    /// If a field is out of range (the error names the first one), or the model is missing (the
-    /// error names its folder).
-    pub fn try_new(options: LearnedOptions) -> Result<Self, Error> {
-        Self::of_network(Network::load(MODEL)?, options)
+/// Extracts the features of an image with a network that has the inputs and outputs of SuperPoint.
+///
+/// # Errors
+/// If its outputs do not fit together.
+pub fn superpoint(
+    network: &Network,
+    options: &Extraction,
+    image: &ColorImage,
+) -> Result<LearnedFeatures, Error> {
+    let small = fitted(image, options.max_image_size);
+    let small = small.as_ref().unwrap_or(image);
+    let size = [small.width() as usize, small.height() as usize];
+    if size[0].min(size[1]) < CELL {
+        return Ok(LearnedFeatures::default());
     }
-
-    /// Creates an extractor with a network that has the inputs and outputs of SuperPoint.
-    ///
-    /// # Errors
-    /// If a field is out of range; the error names the first one.
-    pub fn of_network(network: Network, options: LearnedOptions) -> Result<Self, Error> {
-        options.check()?;
-        Ok(Self { network, options })
+    let pixels = small.pixels().map(|color| gray(color.0)).collect();
+    let input = Tensor::try_new(&[1, 1, size[1], size[0]], pixels)?;
+    let [score, coarse] = network.run(vec![("image", input)], ["score", "coarse"])?;
+    let &[_, height, width] = score.shape() else {
+        let found = format!("{:?}", score.shape());
+        return Err(Error::new(MODEL, "scores of shape (1, any, any)", found));
+    };
+    if coarse.shape()[..3] != [1, height / CELL, width / CELL] || height < CELL || width < CELL {
+        let expected =
+            format!("descriptors of cells of {CELL} pixels of ({height}, {width}) scores");
+        return Err(Error::new(MODEL, expected, format!("{:?}", coarse.shape())));
     }
-
-    /// Returns the SHA-256 of the network's file.
-    pub fn sha256(&self) -> &str {
-        self.network.sha256()
+    let scores = Scores { width, height, values: score.into_values() };
+    let maxima = scores.maxima(RADIUS, options);
+    let dim = coarse.shape().last().copied().unwrap_or(0);
+    let mut descriptors = vec![0.0; maxima.len() * dim];
+    for (&pixel, out) in maxima.iter().zip(descriptors.chunks_exact_mut(dim)) {
+        describe(&coarse, pixel, [width, height], out);
     }
-
-    /// Extracts the features of an image.
-    pub fn extract(&self, image: &ColorImage) -> Result<LearnedFeatures, Error> {
-        let small = image.fitted(self.options.max_image_size);
-        let seen = small.as_ref().unwrap_or(image);
-        if seen.width().min(seen.height()) < CELL {
-            return Ok(LearnedFeatures::default());
-        }
-        let pixels = (0..seen.width() * seen.height())
-            .map(|at| gray(seen.pixel(at % seen.width(), at / seen.width())));
-        let input = Tensor::try_new(&[1, 1, seen.height(), seen.width()], pixels.collect())?;
-        let [score, coarse] = self.network.run(vec![("image", input)], ["score", "coarse"])?;
-        let &[_, height, width] = score.shape() else {
-            let found = format!("{:?}", score.shape());
-            return Err(Error::new(MODEL, "scores of shape (1, any, any)", found));
-        };
-        if coarse.shape()[..3] != [1, height / CELL, width / CELL] || height < CELL || width < CELL
-        {
-            let expected =
-                format!("descriptors of cells of {CELL} pixels of ({height}, {width}) scores");
-            return Err(Error::new(MODEL, expected, format!("{:?}", coarse.shape())));
-        }
-        let scores = Scores { width, height, values: score.into_values() };
-        let wanted = Wanted {
-            radius: RADIUS,
-            border: RADIUS,
-            min_score: self.options.min_score,
-            most: self.options.max_features,
-        };
-        let places = scores.maxima(&wanted);
-        let dim = coarse.shape().last().copied().unwrap_or(0);
-        let mut descriptors = vec![0.0; places.len() * dim];
-        for (&place, out) in places.iter().zip(descriptors.chunks_exact_mut(dim)) {
-            describe(&coarse, place, [width, height], out);
-        }
-        Ok(LearnedFeatures {
-            keypoints: places
-                .iter()
-                .map(|&[x, y]| image.unshrunk(seen, [x as f64, y as f64]))
-                .collect(),
-            scores: places.iter().map(|&[x, y]| scores.values[y * width + x]).collect(),
-            descriptors,
-            dim,
-        })
-    }
+    let keypoint = |pixel: &[usize; 2]| unshrunk(image, small, pixel.map(|at| at as f32));
+    Ok(LearnedFeatures {
+        keypoints: maxima.iter().map(keypoint).collect(),
+        scores: maxima.iter().map(|&[x, y]| scores.values[y * width + x]).collect(),
+        descriptors,
+        dim,
+    })
 }
 
 /// Converts to gray in 0..1 with the weights of Rec. 601, as OpenCV does.

@@ -2,12 +2,13 @@
 //! that COLMAP stores.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use unlift::simd::{Kernel, dispatch};
 
 use super::gradient::{Gradients, TURN};
-use super::orientation::{Place, weights};
-use super::scale_space::{Plane, lanes};
+use super::orientation::{Place, weigh};
+use super::scale_space::{BLOCK, Plane, lanes};
 
 /// Directions of a histogram.
 pub(crate) const BINS: usize = 8;
@@ -24,13 +25,6 @@ const WINDOW: f64 = 2.0;
 const RIM: usize = CELLS + 2;
 /// Allocated cells; a power of two, so that indices need no bounds check.
 const ROOM: usize = 64;
-/// Pixels computed together.
-const BLOCK: usize = 16;
-
-#[derive(Default)]
-pub(crate) struct Desk {
-    pub(crate) weights: [Vec<f32>; 2],
-}
 
 /// Returns unnormalized histograms of the pixels around `place`, rotated by `angle` radians: value
 /// `(row * 4 + column) * 8 + direction`. Lowe 2004, Sec. 6.1.
@@ -39,26 +33,22 @@ pub(crate) fn describe(
     level: &Plane,
     place: Place,
     angle: f64,
-    desk: &mut Desk,
+    weights: &mut [Vec<f32>; 2],
 ) -> [f32; LENGTH] {
     let side = MAGNIFICATION * place.sigma;
     // Half the diagonal of the cells, with half a cell of rim.
     let radius = (std::f64::consts::SQRT_2 * side * (CELLS + 1) as f64 / 2.0 + 0.5) as usize;
-    let (column, row) = place.pixel();
-    let shift = (column as f64 - place.x, row as f64 - place.y);
-    weights(radius, shift.0, WINDOW * side, &mut desk.weights[0]);
-    weights(radius, shift.1, WINDOW * side, &mut desk.weights[1]);
+    weigh(place, radius, WINDOW * side, weights);
     // Blocks read beyond the last pixel of a row.
-    desk.weights[0].resize(2 * radius + 1 + BLOCK, 0.0);
+    weights[0].resize(2 * radius + 1 + BLOCK, 0.0);
+    let (column, row) = place.pixel();
     // Gradients at the border are one-sided, so they are omitted.
     let rows = row.saturating_sub(radius).max(1)..(row + radius + 1).min(level.height - 1);
     let columns = column.saturating_sub(radius).max(1)..(column + radius + 1).min(level.width - 1);
     gradients.prepare(level, rows.clone());
     let (sin, cos) = libm::sincos(angle);
     let frame = Frame { sin: sin / side, cos: cos / side, turn: (angle * 8.0 / TAU) as f32 };
-    let first = (column as f64 - radius as f64, row as f64 - radius as f64);
-    let votes = Votes { gradients, place, frame, rows, columns, first, weights: &desk.weights };
-    let cells = dispatch(votes);
+    let cells = dispatch(Votes { gradients, place, frame, rows, columns, radius, weights });
     let mut histograms = [0.0; LENGTH];
     for (at, bins) in histograms.as_chunks_mut::<BINS>().0.iter_mut().enumerate() {
         *bins = cells[(at / CELLS + 1) * RIM + at % CELLS + 1];
@@ -101,10 +91,9 @@ struct Votes<'a> {
     gradients: &'a Gradients,
     place: Place,
     frame: Frame,
-    rows: std::ops::Range<usize>,
-    columns: std::ops::Range<usize>,
-    /// The pixel of the first weights; may be outside the image.
-    first: (f64, f64),
+    rows: Range<usize>,
+    columns: Range<usize>,
+    radius: usize,
     weights: &'a [Vec<f32>; 2],
 }
 
@@ -120,7 +109,8 @@ impl Kernel for Votes<'_> {
 
     #[inline(always)]
     fn run(self) -> Self::Output {
-        let Self { gradients, place, frame, rows, columns, first, weights } = self;
+        let Self { gradients, place, frame, rows, columns, radius, weights } = self;
+        let (column, row) = place.pixel();
         let mut cells = [[0.0; BINS]; ROOM];
         for y in rows {
             let dy = y as f64 - place.y;
@@ -131,8 +121,8 @@ impl Kernel for Votes<'_> {
                 continue;
             }
             let (low, end) = (low as usize, end as usize);
-            let down = weights[1][(y as f64 - first.1) as usize];
-            let across = &weights[0][(low as f64 - first.0) as usize..];
+            let down = weights[1][y + radius - row];
+            let across = &weights[0][low + radius - column..];
             let (lengths, angles) = (gradients.length.row(y), gradients.angle.row(y));
             for at in (low..end).step_by(BLOCK) {
                 let dx = (at as f64 - place.x) as f32;

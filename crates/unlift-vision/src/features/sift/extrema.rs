@@ -2,12 +2,16 @@
 
 use unlift::simd::{Kernel, dispatch};
 
-use super::scale_space::{Plane, lanes};
+use super::LEVELS;
+use super::orientation::Place;
+use super::scale_space::{BLOCK, Plane, lanes, sigma};
 
-/// Pixels compared together.
-const BLOCK: usize = 16;
-/// Contrast that a sample needs, as a share of the threshold of its refined peak.
-const SAMPLED: f64 = 0.8;
+/// Minimum contrast of a keypoint, as a difference of gray values in `0..1`.
+const MIN_CONTRAST: f64 = 0.02 / 3.0;
+/// Contrast that a sample needs: less than its refined peak.
+const MIN_SAMPLE: f32 = (0.8 * MIN_CONTRAST) as f32;
+/// Maximum ratio of principal curvatures; keypoints above it are on edges.
+const MAX_EDGE_RATIO: f64 = 10.0;
 
 /// Three differences of four consecutive levels, computed on demand: subtracting again is cheaper
 /// than memory.
@@ -21,12 +25,10 @@ impl Differences<'_> {
         self.0[level + 1].at(x, y) - self.0[level].at(x, y)
     }
 
-    /// Replaces `found` by the extrema `(x, y)` of the middle difference, row by row, with a
-    /// contrast of at least [`SAMPLED`] times `peak`. Border pixels are excluded. Lowe 2004, Sec.
-    /// 3.1.
-    pub(crate) fn extrema(self, peak: f64, found: &mut Vec<(u32, u32)>) {
-        found.clear();
-        dispatch(Scan { differences: self, least: (SAMPLED * peak) as f32, found });
+    /// Returns the extrema `(x, y)` of the middle difference, row by row, with a contrast of at
+    /// least [`MIN_SAMPLE`]. Border pixels are excluded. Lowe 2004, Sec. 3.1.
+    pub(crate) fn extrema(self) -> Vec<(usize, usize)> {
+        dispatch(self)
     }
 
     /// Returns true if the middle difference at `(x, y)` is larger than all 26 neighbors (smaller
@@ -45,19 +47,14 @@ impl Differences<'_> {
     }
 }
 
-struct Scan<'a> {
-    differences: Differences<'a>,
-    least: f32,
-    found: &'a mut Vec<(u32, u32)>,
-}
-
-impl Kernel for Scan<'_> {
-    type Output = ();
+/// The scan for extrema.
+impl Kernel for Differences<'_> {
+    type Output = Vec<(usize, usize)>;
 
     #[inline(always)]
-    fn run(self) {
-        let Self { differences, least, found } = self;
-        let levels = differences.0;
+    fn run(self) -> Self::Output {
+        let mut extrema = Vec::new();
+        let levels = self.0;
         let (width, height) = (levels[0].width, levels[0].height);
         for y in 1..height.saturating_sub(1) {
             let rows = [levels[0].row(y), levels[1].row(y), levels[2].row(y), levels[3].row(y)];
@@ -68,19 +65,20 @@ impl Kernel for Scan<'_> {
                 levels[2].row(y + 1),
             ];
             for start in (1..width.saturating_sub(1)).step_by(BLOCK) {
-                if !strong(rows[1], rows[2], start, least) {
+                if !strong(rows[1], rows[2], start) {
                     continue;
                 }
-                let mut peaks = peaks(&rows, &across, start, least);
+                let mut peaks = peaks(&rows, &across, start);
                 while peaks != 0 {
                     let x = start + peaks.trailing_zeros() as usize;
                     peaks &= peaks - 1;
-                    if x < width - 1 && differences.extreme(x, y) {
-                        found.push((x as u32, y as u32));
+                    if x < width - 1 && self.extreme(x, y) {
+                        extrema.push((x, y));
                     }
                 }
             }
         }
+        extrema
     }
 }
 
@@ -94,10 +92,10 @@ fn difference(below: &[f32], above: &[f32], at: usize) -> [f32; BLOCK] {
 }
 
 #[inline(always)]
-fn strong(below: &[f32], above: &[f32], at: usize, least: f32) -> bool {
+fn strong(below: &[f32], above: &[f32], at: usize) -> bool {
     let mut any = 0;
     for value in difference(below, above, at) {
-        any |= u32::from(value.abs() >= least);
+        any |= u32::from(value.abs() >= MIN_SAMPLE);
     }
     any != 0
 }
@@ -105,7 +103,7 @@ fn strong(below: &[f32], above: &[f32], at: usize, least: f32) -> bool {
 /// Returns as bits the pixels of a block that have the contrast and exceed six neighbors: four in
 /// their level, one in each other. One in hundreds does, and needs the full test.
 #[inline(always)]
-fn peaks(levels: &[&[f32]; 4], across: &[&[f32]; 4], at: usize, least: f32) -> u32 {
+fn peaks(levels: &[&[f32]; 4], across: &[&[f32]; 4], at: usize) -> u32 {
     let here = difference(levels[1], levels[2], at);
     let left = difference(levels[1], levels[2], at - 1);
     let right = difference(levels[1], levels[2], at + 1);
@@ -115,11 +113,11 @@ fn peaks(levels: &[&[f32]; 4], across: &[&[f32]; 4], at: usize, least: f32) -> u
     let coarser = difference(levels[2], levels[3], at);
     let mut peaks = 0;
     for i in 0..BLOCK {
-        let most = left[i].max(right[i]).max(up[i]).max(down[i]).max(finer[i]).max(coarser[i]);
-        let fewest = left[i].min(right[i]).min(up[i]).min(down[i]).min(finer[i]).min(coarser[i]);
+        let highest = left[i].max(right[i]).max(up[i]).max(down[i]).max(finer[i]).max(coarser[i]);
+        let lowest = left[i].min(right[i]).min(up[i]).min(down[i]).min(finer[i]).min(coarser[i]);
         let value = here[i];
-        let high = (value >= least) & (value > most);
-        let low = (value <= -least) & (value < fewest);
+        let high = (value >= MIN_SAMPLE) & (value > highest);
+        let low = (value <= -MIN_SAMPLE) & (value < lowest);
         peaks |= u32::from(high | low) << i;
     }
     peaks
@@ -132,30 +130,16 @@ const FAR: f64 = 0.6;
 /// An offset beyond this belongs to another extremum.
 const TOO_FAR: f64 = 1.5;
 
-/// An extremum of the differences, in pixels of its octave.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Peak {
-    /// Column, the middle of the first pixel at 0.
-    pub(crate) x: f64,
-    /// Row, the middle of the first pixel at 0.
-    pub(crate) y: f64,
-    /// Offset from the middle difference, in levels.
-    pub(crate) level: f64,
-}
-
-/// Returns the extremum of the quadratic through the samples around `(x, y)`.
+/// Returns the extremum of the quadratic through the samples around `(x, y)`; `level` is the number
+/// of the middle difference.
 ///
-/// `None` if its contrast is not above `peak`, its principal curvatures have a ratio above `edge`
-/// or opposite signs, or it is too far away. `level` is the number of the middle difference, and
-/// `levels` the largest allowed level. Lowe 2004, Sec. 4; moves and limits as VLFeat documents
-/// them.
+/// `None` if its contrast is too low, its principal curvatures have too large a ratio or opposite
+/// signs, or it is too far away. Lowe 2004, Sec. 4; moves and limits as VLFeat documents them.
 pub(crate) fn refine(
     differences: Differences<'_>,
     (mut x, mut y): (usize, usize),
-    (level, levels): (usize, usize),
-    peak: f64,
-    edge: f64,
-) -> Option<Peak> {
+    level: usize,
+) -> Option<Place> {
     let (width, height) = (differences.0[0].width, differences.0[0].height);
     let mut shape = Shape::at(differences, x, y);
     let mut offset = shape.offset();
@@ -169,15 +153,17 @@ pub(crate) fn refine(
         offset = shape.offset();
     }
     let [dx, dy, ds] = offset;
-    let found = Peak { x: x as f64 + dx, y: y as f64 + dy, level: ds };
+    let (x, y, level) = (x as f64 + dx, y as f64 + dy, level as f64 + ds);
     let value = shape.value + 0.5 * dot(shape.slope, offset);
-    let inside = (0.0..=(width - 1) as f64).contains(&found.x)
-        && (0.0..=(height - 1) as f64).contains(&found.y)
-        && (0.0..=levels as f64).contains(&(level as f64 + ds));
+    let inside = (0.0..=(width - 1) as f64).contains(&x)
+        && (0.0..=(height - 1) as f64).contains(&y)
+        && (0.0..=(LEVELS + 2) as f64).contains(&level);
     let near = offset.iter().all(|offset| offset.abs() < TOO_FAR);
     let roundness = shape.roundness();
-    let round = roundness >= 0.0 && roundness < (edge + 1.0) * (edge + 1.0) / edge;
-    (value.abs() > peak && round && near && inside).then_some(found)
+    let max_roundness = (MAX_EDGE_RATIO + 1.0) * (MAX_EDGE_RATIO + 1.0) / MAX_EDGE_RATIO;
+    let round = roundness >= 0.0 && roundness < max_roundness;
+    let is_peak = value.abs() > MIN_CONTRAST && round && near && inside;
+    is_peak.then(|| Place { x, y, sigma: sigma(level) })
 }
 
 /// Returns the pixel where the refinement continues; border pixels are excluded.

@@ -5,9 +5,8 @@ use std::ops::Range;
 
 use unlift::simd::{Kernel, dispatch};
 
-use super::scale_space::{Plane, lanes};
+use super::scale_space::{BLOCK, Plane, lanes};
 
-const BLOCK: usize = 16;
 /// Eighths in a full turn: angles are in units of descriptor bins, `0..=8`.
 pub(crate) const TURN: f32 = 8.0;
 

@@ -10,8 +10,8 @@ use std::sync::{Mutex, PoisonError};
 
 use unlift::Error;
 
-use crate::features::GrayImage;
-use descriptor::{Desk, quantize};
+use crate::features::{Extraction, GrayImage};
+use descriptor::quantize;
 use extrema::{Differences, refine};
 use gradient::Gradients;
 use orientation::Place;
@@ -21,27 +21,6 @@ use scale_space::{Ladder, Octave};
 const OCTAVES: usize = 4;
 /// Levels of scale in an octave.
 const LEVELS: usize = 3;
-/// Minimum contrast of a keypoint, as a difference of gray values in `0..1`.
-const MIN_CONTRAST: f64 = 0.02 / 3.0;
-/// Maximum ratio of principal curvatures; keypoints above it are on edges.
-const MAX_EDGE_RATIO: f64 = 10.0;
-
-/// Options of SIFT. The defaults are COLMAP's.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SiftOptions {
-    /// Number of requested features, default 8192. Whole levels are kept, from the coarsest to the
-    /// one that exceeds this number, so more may be returned.
-    pub max_features: usize,
-    /// Longest side in pixels, default 3200. Larger images are downsized; keypoints are in pixels
-    /// of the original image.
-    pub max_image_size: usize,
-}
-
-impl Default for SiftOptions {
-    fn default() -> Self {
-        Self { max_features: 8192, max_image_size: 3200 }
-    }
-}
 
 /// A position in an image with a scale and an orientation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,7 +57,7 @@ pub struct Features {
 /// that it leaves open follow the documentation of VLFeat (vlfeat.org) and COLMAP
 /// (colmap.github.io).
 pub struct Sift {
-    options: SiftOptions,
+    options: Extraction,
     ladder: Ladder,
     idle: Mutex<Vec<Workspace>>,
 }
@@ -86,7 +65,7 @@ pub struct Sift {
 impl Default for Sift {
     /// Uses COLMAP's defaults.
     fn default() -> Self {
-        Self::unchecked(SiftOptions::default())
+        Self { options: Extraction::SIFT, ladder: Ladder::new(), idle: Mutex::default() }
     }
 }
 
@@ -94,36 +73,25 @@ impl Default for Sift {
 struct Workspace {
     octave: Octave,
     gradients: Gradients,
-    desk: Desk,
-    extrema: Vec<(u32, u32)>,
-    places: Vec<Place>,
+    /// Weights of the columns and rows around a keypoint.
+    weights: [Vec<f32>; 2],
 }
 
 /// The results of one level of scale.
 struct Level {
-    places: usize,
+    n_places: usize,
     /// `None` if the description is deferred.
     features: Option<Features>,
 }
 
 impl Sift {
-    /// Creates an extractor with `options`.
+    /// Creates an extractor with `options`, of which SIFT has no `min_score`.
     ///
     /// # Errors
     /// If a field is out of range; the error names the first one.
-    pub fn try_new(options: SiftOptions) -> Result<Self, Error> {
-        let SiftOptions { max_features, max_image_size } = options;
-        if max_features == 0 {
-            return Err(Error::new("max_features", "at least 1", "0"));
-        }
-        if !(1..=1 << 16).contains(&max_image_size) {
-            return Err(Error::new("max_image_size", "1 to 65536", max_image_size.to_string()));
-        }
-        Ok(Self::unchecked(options))
-    }
-
-    fn unchecked(options: SiftOptions) -> Self {
-        Self { ladder: Ladder::new(), options, idle: Mutex::default() }
+    pub fn try_new(options: Extraction) -> Result<Self, Error> {
+        options.check()?;
+        Ok(Self { options, ..Self::default() })
     }
 
     /// Extracts the features of `image`, in its pixels even if it is downsized.
@@ -147,19 +115,22 @@ impl Sift {
         features
     }
 
+    /// Extracts whole levels, from the coarsest on until they exceed the number of requested
+    /// features.
     fn run(&self, image: &GrayImage, workspace: &mut Workspace) -> Features {
+        let max_features = self.options.max_features;
         // Describing is the most expensive step, and a level with most of the requested features is
         // often dropped for coarser ones. Such levels are described only if they are kept.
-        let put_off = self.options.max_features / 2;
-        let mut levels = self.scan(image, workspace, |_, places| places <= put_off);
-        let first = self.first_kept(&levels);
-        if levels[first..].iter().any(|level| level.features.is_none()) {
-            let missing: Vec<bool> = levels
-                .iter()
-                .enumerate()
-                .map(|(at, level)| at >= first && level.features.is_none())
-                .collect();
-            let late = self.scan(image, workspace, |at, _| missing[at]);
+        let mut levels = self.scan(image, workspace, |_, n_places| n_places <= max_features / 2);
+        let mut n_places = 0;
+        let exceeds = |level: &Level| {
+            n_places += level.n_places;
+            n_places > max_features
+        };
+        let first = levels.iter().rposition(exceeds).unwrap_or(0);
+        let is_missing = |at: usize| at >= first && levels[at].features.is_none();
+        if (0..levels.len()).any(is_missing) {
+            let late = self.scan(image, workspace, |at, _| is_missing(at));
             for (level, late) in levels.iter_mut().zip(late) {
                 level.features = level.features.take().or(late.features);
             }
@@ -172,26 +143,13 @@ impl Sift {
         all
     }
 
-    /// Returns the finest kept level: levels are added from the coarsest on until they exceed the
-    /// number of requested features.
-    fn first_kept(&self, levels: &[Level]) -> usize {
-        let mut places = 0;
-        for (at, level) in levels.iter().enumerate().rev() {
-            places += level.places;
-            if places > self.options.max_features {
-                return at;
-            }
-        }
-        0
-    }
-
-    /// Scans all levels, from the finest; describes those for which `wanted(level, places)` is
+    /// Scans all levels, from the finest; describes those for which `is_wanted(level, n_places)` is
     /// true.
     fn scan(
         &self,
         image: &GrayImage,
         workspace: &mut Workspace,
-        wanted: impl Fn(usize, usize) -> bool,
+        is_wanted: impl Fn(usize, usize) -> bool,
     ) -> Vec<Level> {
         let mut levels = Vec::new();
         workspace.octave.start(image, &self.ladder);
@@ -206,54 +164,40 @@ impl Sift {
                 if level > 1 {
                     workspace.octave.step(level - 1, &self.ladder);
                 }
-                self.find(level, workspace);
-                let places = workspace.places.len();
-                let features =
-                    wanted(levels.len(), places).then(|| self.describe(pixel, workspace));
-                levels.push(Level { places, features });
+                let differences = Differences(&workspace.octave.levels);
+                let extrema = differences.extrema().into_iter();
+                let places: Vec<Place> =
+                    extrema.filter_map(|at| refine(differences, at, level)).collect();
+                let features = is_wanted(levels.len(), places.len())
+                    .then(|| describe(&places, pixel, workspace));
+                levels.push(Level { n_places: places.len(), features });
             }
             // This octave has no interior pixels, and later ones have none either.
-            let (width, height) = workspace.octave.size();
-            if width.min(height) < 6 {
+            let level = &workspace.octave.levels[0];
+            if level.width.min(level.height) < 6 {
                 break;
             }
         }
         levels
     }
+}
 
-    /// Fills `places` with the refined extrema of the current level.
-    fn find(&self, level: usize, workspace: &mut Workspace) {
-        let Workspace { octave, extrema, places, .. } = workspace;
-        let differences = Differences(octave.levels());
-        differences.extrema(MIN_CONTRAST, extrema);
-        places.clear();
-        places.extend(extrema.iter().filter_map(|&(x, y)| {
-            let range = (level, LEVELS + 2);
-            let at = (x as usize, y as usize);
-            let peak = refine(differences, at, range, MIN_CONTRAST, MAX_EDGE_RATIO)?;
-            let sigma = self.ladder.sigma(level as f64 + peak.level);
-            Some(Place { x: peak.x, y: peak.y, sigma })
-        }));
-    }
-
-    /// Computes orientations and descriptors of `places`; a pixel of the octave is `pixel` pixels
-    /// of the image.
-    fn describe(&self, pixel: f64, workspace: &mut Workspace) -> Features {
-        let Workspace { octave, gradients, desk, places, .. } = workspace;
-        let level = &octave.levels()[1];
-        gradients.reset(level);
-        let mut features = Features::default();
-        for &place in places.iter() {
-            let (angles, n_peaks) =
-                orientation::orientations(gradients, level, place, &mut desk.weights);
-            for &angle in &angles[..n_peaks] {
-                features.keypoints.push(keypoint(place, angle, pixel));
-                let histograms = descriptor::describe(gradients, level, place, angle, desk);
-                features.descriptors.push(quantize(histograms));
-            }
+/// Computes orientations and descriptors of `places`; a pixel of the octave is `pixel` pixels of
+/// the image.
+fn describe(places: &[Place], pixel: f64, workspace: &mut Workspace) -> Features {
+    let Workspace { octave, gradients, weights } = workspace;
+    let level = &octave.levels[1];
+    gradients.reset(level);
+    let mut features = Features::default();
+    for &place in places {
+        let (angles, n_peaks) = orientation::orientations(gradients, level, place, weights);
+        for &angle in &angles[..n_peaks] {
+            features.keypoints.push(keypoint(place, angle, pixel));
+            let histograms = descriptor::describe(gradients, level, place, angle, weights);
+            features.descriptors.push(quantize(histograms));
         }
-        features
     }
+    features
 }
 
 fn keypoint(place: Place, angle: f64, pixel: f64) -> Keypoint {

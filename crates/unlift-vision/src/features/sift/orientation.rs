@@ -1,6 +1,7 @@
 //! Orientations of a keypoint: peaks of a histogram of gradient directions.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use unlift::simd::{Kernel, dispatch};
 
@@ -32,22 +33,26 @@ impl Place {
     }
 }
 
-/// Computes Gaussian weights of a row or column of pixels: `exp(-(i - radius + shift)^2 / (2
-/// sigma^2))`.
+/// Computes Gaussian weights of the columns and of the rows within `radius` pixels of the middle
+/// one: `exp(-d^2 / (2 sigma^2))` for the distance `d` from `place`. Windows are their products, so
+/// no pixel needs an exponential.
 ///
-/// Quotients of neighboring weights are geometric, so each needs two multiplications. Windows are
-/// products of weights for x and y, so no pixel needs an exponential.
-pub(crate) fn weights(radius: usize, shift: f64, sigma: f64, into: &mut Vec<f32>) {
+/// Quotients of neighboring weights are geometric, so each needs two multiplications.
+pub(crate) fn weigh(place: Place, radius: usize, sigma: f64, weights: &mut [Vec<f32>; 2]) {
+    let (column, row) = place.pixel();
+    let shift = [column as f64 - place.x, row as f64 - place.y];
     let falloff = 0.5 / (sigma * sigma);
-    let first = shift - radius as f64;
-    let mut weight = libm::exp(-falloff * first * first);
-    let mut quotient = libm::exp(-falloff * (2.0 * first + 1.0));
     let change = libm::exp(-2.0 * falloff);
-    into.clear();
-    for _ in 0..2 * radius + 1 {
-        into.push(weight as f32);
-        weight *= quotient;
-        quotient *= change;
+    for (weights, shift) in weights.iter_mut().zip(shift) {
+        let first = shift - radius as f64;
+        let mut weight = libm::exp(-falloff * first * first);
+        let mut quotient = libm::exp(-falloff * (2.0 * first + 1.0));
+        weights.clear();
+        for _ in 0..2 * radius + 1 {
+            weights.push(weight as f32);
+            weight *= quotient;
+            quotient *= change;
+        }
     }
 }
 
@@ -61,13 +66,11 @@ pub(crate) fn orientations(
 ) -> ([f64; MAX_ORIENTATIONS], usize) {
     let window = WINDOW * place.sigma;
     let radius = ((3.0 * window) as usize).max(1);
-    let (column, row) = place.pixel();
-    let shift = (column as f64 - place.x, row as f64 - place.y);
-    self::weights(radius, shift.0, window, &mut weights[0]);
-    self::weights(radius, shift.1, window, &mut weights[1]);
+    weigh(place, radius, window, weights);
+    let row = place.pixel().1;
     let rows = row.saturating_sub(radius)..(row + radius + 1).min(level.height);
-    gradients.prepare(level, rows);
-    let mut histogram = dispatch(Votes { gradients, place, radius, shift, weights });
+    gradients.prepare(level, rows.clone());
+    let mut histogram = dispatch(Votes { gradients, place, rows, radius, weights });
     for _ in 0..SMOOTHED {
         histogram = std::array::from_fn(|bin| {
             (histogram[(bin + BINS - 1) % BINS] + histogram[bin] + histogram[(bin + 1) % BINS])
@@ -80,8 +83,8 @@ pub(crate) fn orientations(
 struct Votes<'a> {
     gradients: &'a Gradients,
     place: Place,
+    rows: Range<usize>,
     radius: usize,
-    shift: (f64, f64),
     weights: &'a [Vec<f32>; 2],
 }
 
@@ -90,13 +93,13 @@ impl Kernel for Votes<'_> {
 
     #[inline(always)]
     fn run(self) -> [f32; BINS] {
-        let Self { gradients, place, radius, shift, weights } = self;
+        let Self { gradients, place, rows, radius, weights } = self;
         let (column, row) = place.pixel();
-        let (width, height) = (gradients.length.width, gradients.length.height);
+        let shift = (column as f64 - place.x, row as f64 - place.y);
         let reach = (radius * radius) as f64 + 0.6;
         // Bins -1 and 36 have their own places here and are added to the last and first bin below.
         let mut histogram = [0.0_f32; BINS + 2];
-        for y in row.saturating_sub(radius)..(row + radius + 1).min(height) {
+        for y in rows {
             let dy = y as f64 - row as f64 + shift.1;
             let half = libm::sqrt((reach - dy * dy).max(0.0));
             // Integer pixels within the circle around the middle pixel.
@@ -104,7 +107,7 @@ impl Kernel for Votes<'_> {
             let low =
                 libm::ceil(middle - half).max(column as f64 - radius as f64).max(0.0) as usize;
             let high = libm::floor(middle + half).min((column + radius) as f64) as usize;
-            let end = (high + 1).min(width);
+            let end = (high + 1).min(gradients.length.width);
             if low >= end {
                 continue;
             }
@@ -132,17 +135,17 @@ impl Kernel for Votes<'_> {
 
 /// Finds the peaks of a histogram, each moved to the vertex of the parabola through its neighbors.
 fn peaks(histogram: &[f32; BINS]) -> ([f64; MAX_ORIENTATIONS], usize) {
-    let highest = histogram.iter().fold(0.0_f32, |most, &value| most.max(value));
-    let (mut angles, mut found) = ([0.0; MAX_ORIENTATIONS], 0);
+    let highest = histogram.iter().copied().fold(0.0, f32::max);
+    let (mut angles, mut n_peaks) = ([0.0; MAX_ORIENTATIONS], 0);
     for (bin, &here) in histogram.iter().enumerate() {
         let before = histogram[(bin + BINS - 1) % BINS];
         let after = histogram[(bin + 1) % BINS];
-        if found < MAX_ORIENTATIONS && here > SHARE * highest && here > before && here > after {
+        if n_peaks < MAX_ORIENTATIONS && here > SHARE * highest && here > before && here > after {
             let (here, before, after) = (f64::from(here), f64::from(before), f64::from(after));
             let offset = -0.5 * (after - before) / (after + before - 2.0 * here);
-            angles[found] = TAU * (bin as f64 + offset + 0.5) / BINS as f64;
-            found += 1;
+            angles[n_peaks] = TAU * (bin as f64 + offset + 0.5) / BINS as f64;
+            n_peaks += 1;
         }
     }
-    (angles, found)
+    (angles, n_peaks)
 }

@@ -5,10 +5,11 @@ use unlift::simd::{Kernel, dispatch};
 use super::LEVELS;
 use crate::features::GrayImage;
 
-/// Values per step of a vector loop.
-pub(crate) const LANES: usize = 32;
-/// Columns that may be read beyond a row, so that loops need no special case for its end.
-const SLACK: usize = 16;
+/// Values per step of a filter.
+const LANES: usize = 32;
+/// Pixels per step of the other vector loops. As many columns may be read beyond a row, so that
+/// loops need no special case for its end.
+pub(crate) const BLOCK: usize = 16;
 
 /// Rows of `f32`, each longer than the image is wide. Values beyond `width` are finite but
 /// undefined.
@@ -16,6 +17,7 @@ const SLACK: usize = 16;
 pub(crate) struct Plane {
     pub(crate) width: usize,
     pub(crate) height: usize,
+    /// Length of a row with its slack, a multiple of [`LANES`].
     stride: usize,
     values: Vec<f32>,
 }
@@ -25,7 +27,7 @@ impl Plane {
     pub(crate) fn reshape(&mut self, width: usize, height: usize) {
         self.width = width;
         self.height = height;
-        self.stride = (width + SLACK).next_multiple_of(LANES);
+        self.stride = (width + BLOCK).next_multiple_of(LANES);
         self.values.resize(self.stride * height, 0.0);
     }
 
@@ -44,36 +46,21 @@ impl Plane {
         self.values[y * self.stride + x]
     }
 
-    /// Returns the length of a row with its slack, a multiple of [`LANES`].
-    pub(crate) fn stride(&self) -> usize {
-        self.stride
-    }
-
     /// Doubles an image by linear interpolation; the last pixel is repeated. Pixel `i` moves to
     /// `2 i`.
     pub(crate) fn double(&mut self, image: &GrayImage) {
         let (width, height) = (image.width(), image.height());
         self.reshape(2 * width, 2 * height);
-        for y in 0..height {
-            let (row, slack) = self.row_mut(2 * y).split_at_mut(2 * width);
-            let from = image.row(y);
-            for ((pair, &here), &next) in row.chunks_exact_mut(2).zip(from).zip(&from[1..]) {
-                pair.copy_from_slice(&[here, 0.5 * (here + next)]);
+        for y in 0..2 * height {
+            let [above, below] = [y / 2, y.div_ceil(2).min(height - 1)].map(|y| image.row(y));
+            let (row, slack) = self.row_mut(y).split_at_mut(2 * width);
+            for (x, pair) in row.as_chunks_mut::<2>().0.iter_mut().enumerate() {
+                let next = (x + 1).min(width - 1);
+                let between = |row: &[f32]| 0.5 * (row[x] + row[next]);
+                // Where both rows or columns are the same, the means are their exact values.
+                *pair = [0.5 * (above[x] + below[x]), 0.5 * (between(above) + between(below))];
             }
-            row[2 * width - 2..].fill(from[width - 1]);
             slack.fill(0.0);
-        }
-        let stride = self.stride;
-        for y in 0..height {
-            let (above, rest) = self.values[2 * y * stride..].split_at_mut(stride);
-            let (between, below) = rest.split_at_mut(stride);
-            if y + 1 == height {
-                between.copy_from_slice(above);
-                continue;
-            }
-            for ((value, &a), &b) in between.iter_mut().zip(above.iter()).zip(below.iter()) {
-                *value = 0.5 * (a + b);
-            }
         }
     }
 
@@ -97,29 +84,23 @@ pub(crate) fn lanes<const N: usize>(row: &[f32], at: usize) -> [f32; N] {
     values
 }
 
-/// Radius of the widest filter: one level per octave needs 45.
-const MOST_RADIUS: usize = 48;
+/// Radius of the widest filter, that from level 4 to level 5.
+const MAX_RADIUS: usize = 13;
 
-pub(crate) struct Gaussian {
-    /// The middle and one side: `taps[i]` is the weight of both neighbors at distance `i`.
-    taps: Vec<f32>,
+/// Returns a Gaussian of standard deviation `sigma` pixels, truncated at four of them: its middle and
+/// one side. Value `i` is the weight of both neighbors at distance `i`.
+fn gaussian(sigma: f64) -> Vec<f32> {
+    let radius = libm::ceil(4.0 * sigma) as usize;
+    let weight = |at: usize| libm::exp(-0.5 * (at as f64 / sigma) * (at as f64 / sigma));
+    let total: f64 = 1.0 + 2.0 * (1..=radius).map(weight).sum::<f64>();
+    (0..=radius).map(|at| (weight(at) / total) as f32).collect()
 }
 
-impl Gaussian {
-    /// Creates a Gaussian of standard deviation `sigma` pixels, truncated at four of them.
-    pub(crate) fn new(sigma: f64) -> Self {
-        let radius = (libm::ceil(4.0 * sigma) as usize).clamp(1, MOST_RADIUS);
-        let weight = |at: usize| libm::exp(-0.5 * (at as f64 / sigma) * (at as f64 / sigma));
-        let total: f64 = 1.0 + 2.0 * (1..=radius).map(weight).sum::<f64>();
-        Self { taps: (0..=radius).map(|at| (weight(at) / total) as f32).collect() }
-    }
-
-    /// Smooths `from` into `to`, repeating values at the border. `line` is a buffer.
-    pub(crate) fn smooth(&self, from: &Plane, to: &mut Plane, line: &mut Vec<f32>) {
-        to.reshape(from.width, from.height);
-        line.resize(from.stride() + 2 * MOST_RADIUS, 0.0);
-        dispatch(Smooth { from, to, line, taps: &self.taps });
-    }
+/// Smooths `from` into `to` with a Gaussian, repeating values at the border. `line` is a buffer.
+fn smooth(taps: &[f32], from: &Plane, to: &mut Plane, line: &mut Vec<f32>) {
+    to.reshape(from.width, from.height);
+    line.resize(from.stride + 2 * MAX_RADIUS, 0.0);
+    dispatch(Smooth { from, to, line, taps });
 }
 
 /// Filters columns, then rows, one output row at a time, so that intermediate values stay in the
@@ -139,9 +120,9 @@ impl Kernel for Smooth<'_> {
         let Self { from, to, line, taps } = self;
         let (width, last, radius) = (from.width, from.height - 1, taps.len() - 1);
         for y in 0..from.height {
-            let line = &mut line[..from.stride() + 2 * radius];
+            let line = &mut line[..from.stride + 2 * radius];
             let middle = from.row(y).as_chunks::<LANES>().0;
-            let mut sides = [(middle, middle); MOST_RADIUS];
+            let mut sides = [(middle, middle); MAX_RADIUS];
             for (i, side) in sides[..radius].iter_mut().enumerate() {
                 let above = from.row(y.saturating_sub(i + 1));
                 let below = from.row((y + i + 1).min(last));
@@ -204,12 +185,12 @@ const NOMINAL: f64 = 0.5;
 /// Smoothing of the first level of an octave, in pixels of the octave.
 const FIRST: f64 = 1.6;
 
-/// Standard deviations and filters, the same for every octave.
+/// The filters, the same for every octave.
 pub(crate) struct Ladder {
     /// From the image to the first level.
-    first: Gaussian,
+    first: Vec<f32>,
     /// From each level to the next.
-    steps: Vec<Gaussian>,
+    steps: Vec<Vec<f32>>,
 }
 
 impl Ladder {
@@ -220,16 +201,16 @@ impl Ladder {
         let first = libm::sqrt(FIRST * FIRST - nominal * nominal);
         let step = FIRST * libm::sqrt(ratio * ratio - 1.0);
         let steps = (0..LEVELS + 2)
-            .map(|level| Gaussian::new(step * libm::exp2(level as f64 / LEVELS as f64)))
+            .map(|level| gaussian(step * libm::exp2(level as f64 / LEVELS as f64)))
             .collect();
-        Self { first: Gaussian::new(first), steps }
+        Self { first: gaussian(first), steps }
     }
+}
 
-    /// Returns the smoothing at `level`, in pixels of the octave; level 1 is the first one with
-    /// keypoints.
-    pub(crate) fn sigma(&self, level: f64) -> f64 {
-        FIRST * libm::exp2(level / LEVELS as f64)
-    }
+/// Returns the smoothing at `level`, in pixels of the octave; level 1 is the first one with
+/// keypoints.
+pub(crate) fn sigma(level: f64) -> f64 {
+    FIRST * libm::exp2(level / LEVELS as f64)
 }
 
 /// Four consecutive levels of an octave, each smoother than the previous one by the same factor.
@@ -238,7 +219,7 @@ impl Ladder {
 /// level is in memory. Lowe 2004, Sec. 3.
 #[derive(Default)]
 pub(crate) struct Octave {
-    levels: [Plane; 4],
+    pub(crate) levels: [Plane; 4],
     line: Vec<f32>,
 }
 
@@ -247,7 +228,7 @@ impl Octave {
     pub(crate) fn start(&mut self, image: &GrayImage, ladder: &Ladder) {
         let [level, .., spare] = &mut self.levels;
         spare.double(image);
-        ladder.first.smooth(spare, level, &mut self.line);
+        smooth(&ladder.first, spare, level, &mut self.line);
         self.fill(ladder);
     }
 
@@ -261,9 +242,9 @@ impl Octave {
     }
 
     fn fill(&mut self, ladder: &Ladder) {
-        for (at, gaussian) in ladder.steps[..3].iter().enumerate() {
+        for (at, taps) in ladder.steps[..3].iter().enumerate() {
             let (done, rest) = self.levels.split_at_mut(at + 1);
-            gaussian.smooth(&done[at], &mut rest[0], &mut self.line);
+            smooth(taps, &done[at], &mut rest[0], &mut self.line);
         }
     }
 
@@ -271,14 +252,6 @@ impl Octave {
     pub(crate) fn step(&mut self, level: usize, ladder: &Ladder) {
         self.levels.rotate_left(1);
         let [.., from, to] = &mut self.levels;
-        ladder.steps[level + 2].smooth(from, to, &mut self.line);
-    }
-
-    pub(crate) fn levels(&self) -> &[Plane; 4] {
-        &self.levels
-    }
-
-    pub(crate) fn size(&self) -> (usize, usize) {
-        (self.levels[0].width, self.levels[0].height)
+        smooth(&ladder.steps[level + 2], from, to, &mut self.line);
     }
 }
