@@ -1,7 +1,7 @@
 """Converts photos to arrays for training: `prepare.py OUT PACK.. --features PROGRAM`, with packs that `pack.py` wrote.
 
-`cargo build --release --example features -p unlift-vision` builds PROGRAM, unlift's extractor in one file. For SIFT alone,
-`--no-default-features` makes it small. OUT gets a folder `SPLIT-SIZE` for each split of the packs and each size, with NumPy files:
+`cargo build --release --example features -p unlift-vision` builds PROGRAM, unlift's extractor in one file. OUT gets a folder
+`SPLIT-SIZE` for each split of the packs and each size, with NumPy files:
 `pixels` (n, 640, 640, 3) bytes, a smaller photo continued by its mirror image to the right and below; `size` (n, 2), width and
 height of the photo; `counts` (n,), its number of keypoints; `keypoints` (k, 2) in pixels, the corner of the first pixel at (0, 0);
 `descriptors` (k, 128), bytes of SIFT and 32-bit floats of ALIKED.
