@@ -4,8 +4,7 @@
 
 use unlift::audit::{Alone, Plan, Row, Share, Threshold};
 use unlift::evaluate::{
-    OFF_RECORD, are_strangers, away_from_own, belongs, correlation, is_noise, nearer_to_own,
-    recovered_away,
+    OFF_RECORD, Truth, are_strangers, correlation, nearer_to_own, recovered_away,
 };
 use unlift::geometry::frame::Bounds;
 use unlift::geometry::knn::Knn;
@@ -156,11 +155,11 @@ fn not_its_own(
     (released, secret): &(Released<3>, Secret),
     plan: &Plan<3>,
 ) -> Option<String> {
-    if is_noise(released, original, secret) {
+    let truth = Truth { original, released, secret };
+    if truth.is_noise() {
         return None;
     }
-    let away = away_from_own(released, original, secret);
-    strays(false, &away, &plan.thresholds, released.unit())
+    strays(false, &truth.away_from_own(), &plan.thresholds, released.unit())
 }
 
 /// Nothing is measured if the median distance of points from their own records is this many times that to the K-th neighbor.
@@ -172,10 +171,11 @@ pub(crate) fn check_truth(
     (released, secret): &(Released<3>, Secret),
     spread: &Spread,
 ) -> Result<(), unlift::Error> {
-    belongs(original, released, secret)?;
-    let (middle, unit) = (median(&mut away_from_own(released, original, secret)), released.unit());
+    let truth = Truth { original, released, secret };
+    truth.belongs()?;
+    let (middle, unit) = (median(&mut truth.away_from_own()), released.unit());
     let limit = APART * spread.middle;
-    if middle <= limit || is_noise(released, original, secret) {
+    if middle <= limit || truth.is_noise() {
         return Ok(());
     }
     let expected = format!("records within {} of their own points", in_unit(limit, unit));
@@ -280,8 +280,9 @@ impl Checked {
         let (nearer, n) = nearer_to_own(recovered, original, secret, released);
         self.nearer = (self.nearer.0 + nearer, self.nearer.1 + n);
         if let Some(released) = released {
-            belongs(original, released, secret)?;
-            self.truth.extend(away_from_own(released, original, secret));
+            let truth = Truth { original, released, secret };
+            truth.belongs()?;
+            self.truth.extend(truth.away_from_own());
             self.recovered.extend(recovered_away(released, recovered));
         }
         Ok(())

@@ -6,10 +6,9 @@ use std::sync::{Arc, Mutex};
 use pyo3::exceptions::PyAssertionError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
-use unlift::geometry::frame::Bounds;
 use unlift::guard::caught;
 use unlift::neighbors::{Needs, Neighborhoods, Source};
-use unlift::obfuscate::{Lifted, Scheme};
+use unlift::obfuscate::{Lifted, LocalPoints, Scheme};
 use unlift::recover::{Builtin, RecoverOptions, Recovered, Solver};
 use unlift::released::Released;
 use unlift::seed::{Key, Stage};
@@ -160,12 +159,8 @@ impl<const D: usize> Scheme<D> for Own {
         &self.name
     }
 
-    fn lift(
-        &self,
-        points: &[[f64; D]],
-        _: Option<&Bounds<D>>,
-        key: &Key,
-    ) -> Result<Lifted<D>, Error> {
+    fn lift(&self, points: &LocalPoints<'_, D>, key: &Key) -> Result<Lifted<D>, Error> {
+        let points = points.positions;
         let mut draws = key.draws(Stage::Scheme, 0);
         let seed = [(); 4].map(|()| draws.bits());
         let hiding = self.made(|py| {

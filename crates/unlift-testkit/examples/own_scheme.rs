@@ -6,9 +6,8 @@
 use std::sync::Arc;
 
 use unlift::audit::{Plan, Silent, run};
-use unlift::geometry::frame::Bounds;
 use unlift::obfuscate::olc::Olc;
-use unlift::obfuscate::{Lifted, Scheme};
+use unlift::obfuscate::{Lifted, LocalPoints, Scheme};
 use unlift::released::{Lines, Obfuscation};
 use unlift::seed::{Key, Stage};
 use unlift::truth::Original;
@@ -30,13 +29,8 @@ impl Scheme<3> for Tilted {
         vec![("tilt", self.most)]
     }
 
-    fn lift(
-        &self,
-        points: &[[f64; 3]],
-        _: Option<&Bounds<3>>,
-        key: &Key,
-    ) -> Result<Lifted<3>, Error> {
-        let key = key.stage(Stage::Scheme);
+    fn lift(&self, points: &LocalPoints<'_, 3>, key: &Key) -> Result<Lifted<3>, Error> {
+        let (points, key) = (points.positions, key.stage(Stage::Scheme));
         let direction = |row: usize| {
             let mut draws = key.draws(row as u64);
             let [x, y] = draws.direction::<2>();

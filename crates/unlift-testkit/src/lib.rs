@@ -15,7 +15,7 @@ mod schemes;
 mod solvers;
 mod sources;
 
-pub use points::{distance_to_record, image_around, piles, room, uniform};
+pub use points::{image_around, piles, room, uniform};
 pub use schemes::scheme_laws;
 pub use solvers::solver_laws;
 pub use sources::{described_map, source_laws};

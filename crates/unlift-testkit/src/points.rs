@@ -1,8 +1,6 @@
-//! Points for tests, and their distances to records.
+//! Points for tests.
 
 use unlift::geometry::frame::Bounds;
-use unlift::geometry::vector::{along, distance, dot, sub, widen};
-use unlift::released::Obfuscation;
 use unlift::seed::{Draws, Stage};
 
 /// Returns points of a room: walls, uneven clusters, scatter, and 3 % that coincide with another
@@ -64,38 +62,5 @@ pub fn image_around<const D: usize>(points: &[[f64; D]], step: f64) -> Bounds<D>
     Bounds {
         low: std::array::from_fn(|c| ((low(c) / step).floor() - 1.0) * step),
         high: std::array::from_fn(|c| ((high(c) / step).ceil() + 1.0) * step),
-    }
-}
-
-/// Returns the distance of `point` to the feasible set of `record`.
-pub fn distance_to_record<const D: usize>(
-    obfuscation: &Obfuscation<D>,
-    record: usize,
-    point: &[f64; D],
-) -> f64 {
-    let from_line = |through: &[f32; D], direction: &[f32; D], floor: f64| {
-        let (through, direction) = (widen(through), widen(direction));
-        let t = dot(&sub(point, &through), &direction) / dot(&direction, &direction);
-        distance(point, &along(&through, t.max(floor), &direction))
-    };
-    match obfuscation {
-        Obfuscation::Lines(lines) => {
-            from_line(&lines.foot()[record], &lines.direction()[record], f64::NEG_INFINITY)
-        }
-        Obfuscation::Rays(rays) => {
-            let center = rays.centers()[usize::from(rays.center()[record])];
-            from_line(&center, &rays.direction()[record], 0.0)
-        }
-        Obfuscation::AxisPlanes(planes) => {
-            let axis = usize::from(planes.axis()[record]);
-            (point[axis] - f64::from(planes.offset()[record])).abs()
-        }
-        Obfuscation::AxisCandidates(candidates) => {
-            let off = sub(point, &widen(&candidates.position()[record]));
-            let along = |axis: usize| {
-                (0..D).filter(|&c| c != axis).map(|c| off[c] * off[c]).sum::<f64>().sqrt()
-            };
-            (0..D).map(along).fold(f64::INFINITY, f64::min)
-        }
     }
 }

@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use unlift::descriptors::Values;
-use unlift::geometry::frame::Bounds;
 use unlift::neighbors::oracle::{TrueNeighbors, search};
 use unlift::neighbors::sources::SOURCES;
 use unlift::neighbors::{Needs, Neighborhoods, Source};
 use unlift::obfuscate::olc::Olc;
-use unlift::obfuscate::{Change, Changed, Lifted, Protection, Scheme, SchemeOptions, all};
+use unlift::obfuscate::{
+    Change, Changed, Lifted, LocalPoints, Protection, Scheme, SchemeOptions, all,
+};
 use unlift::recover::{Builtin, RecoverOptions, Recovered, Solver};
 use unlift::released::{Lines, Obfuscation, Released};
 use unlift::seed::{Draws, Key, Stage};
@@ -86,12 +87,8 @@ impl Scheme<3> for Wrong {
         "beside"
     }
 
-    fn lift(
-        &self,
-        points: &[[f64; 3]],
-        _: Option<&Bounds<3>>,
-        _: &Key,
-    ) -> Result<Lifted<3>, Error> {
+    fn lift(&self, points: &LocalPoints<'_, 3>, _: &Key) -> Result<Lifted<3>, Error> {
+        let points = points.positions;
         let beside: Vec<[f64; 3]> = points.iter().map(|p| [p[0], p[1], p[2] + 0.1]).collect();
         let lines = Lines::through(&beside, &vec![[1.0, 0.0, 0.0]; points.len()])?;
         Ok(Lifted::one_each(Obfuscation::Lines(lines)))

@@ -11,8 +11,7 @@
 //! ```
 //! use std::sync::Arc;
 //! use unlift::audit::{Plan, Silent, run};
-//! use unlift::geometry::frame::Bounds;
-//! use unlift::obfuscate::{Lifted, Scheme};
+//! use unlift::obfuscate::{Lifted, LocalPoints, Scheme};
 //! use unlift::released::{Lines, Obfuscation};
 //! use unlift::seed::{Key, Stage};
 //! use unlift::{Error, PointSet, Unit, synthetic, truth::Original};
@@ -26,8 +25,8 @@
 //!         "level"
 //!     }
 //!
-//!     fn lift(&self, points: &[[f64; 3]], _: Option<&Bounds<3>>, key: &Key) -> Result<Lifted<3>, Error> {
-//!         let key = key.stage(Stage::Scheme);
+//!     fn lift(&self, points: &LocalPoints<'_, 3>, key: &Key) -> Result<Lifted<3>, Error> {
+//!         let (points, key) = (points.positions, key.stage(Stage::Scheme));
 //!         let level = |row: usize| key.draws(row as u64).direction::<2>();
 //!         let directions: Vec<_> = (0..points.len()).map(level).map(|[x, y]| [x, y, 0.0]).collect();
 //!         Ok(Lifted::one_each(Obfuscation::Lines(Lines::through(points, &directions)?)))

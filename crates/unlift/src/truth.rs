@@ -167,52 +167,45 @@ impl Secret {
         n_originals: usize,
     ) -> Result<Self, Error> {
         let n = hidden.len();
-        if let Some(axis) = &swapped_axis
-            && axis.len() != n
-        {
-            return Err(Error::new("swapped axes", format!("{n} rows"), axis.len().to_string()));
-        }
-        if descriptor_row.len() != n {
-            let found = descriptor_row.len().to_string();
-            return Err(Error::new("descriptor rows", format!("{n} rows"), found));
+        let n_axes = swapped_axis.as_ref().map_or(n, Vec::len);
+        for (what, rows) in [("swapped axes", n_axes), ("descriptor rows", descriptor_row.len())] {
+            if rows != n {
+                return Err(Error::new(what, format!("{n} rows"), rows.to_string()));
+            }
         }
         if let Some(slot) = descriptor_row.iter().position(|&row| row as usize >= n) {
             let what = format!("descriptor row of slot {slot}");
             return Err(Error::new(what, format!("below {n}"), descriptor_row[slot].to_string()));
         }
-        let mut seen = vec![false; n_originals];
+        let not_once = |id: usize, found: &str| {
+            Error::new(format!("original {id}"), "in one slot or dropped once", found)
+        };
+        let mut is_used = vec![false; n_originals];
         for id in hidden.iter().copied().chain(dropped.iter().map(|d| d.original)) {
-            match seen.get_mut(id.index()) {
-                Some(seen @ false) => *seen = true,
-                Some(_) => {
-                    let what = format!("original {}", id.0);
-                    return Err(Error::new(what, "in one slot or dropped once", "two entries"));
-                }
+            match is_used.get_mut(id.index()) {
+                Some(is_used @ false) => *is_used = true,
+                Some(_) => return Err(not_once(id.index(), "two entries")),
                 None => {
                     let expected = format!("originals below {n_originals}");
                     return Err(Error::new("hidden originals", expected, id.0.to_string()));
                 }
             }
         }
-        if let Some(missing) = seen.iter().position(|seen| !seen) {
-            return Err(Error::new(
-                format!("original {missing}"),
-                "in one slot or dropped once",
-                "neither",
-            ));
+        if let Some(missing) = is_used.iter().position(|is_used| !is_used) {
+            return Err(not_once(missing, "neither"));
         }
         let paired = descriptor_row.iter().enumerate().any(|(slot, &row)| row as usize != slot);
         let slots_per_record = 1 + usize::from(paired);
-        let map = None;
-        Ok(Self {
+        let secret = Self {
             hidden,
             swapped_axis,
             descriptor_row,
             dropped,
             n_originals,
             slots_per_record,
-            map,
-        })
+            map: None,
+        };
+        Ok(secret)
     }
 
     /// Sets the released map and the number of points per record.
@@ -304,5 +297,10 @@ impl Secret {
     /// Returns the points that are in no record.
     pub fn dropped(&self) -> &[Dropped] {
         &self.dropped
+    }
+
+    /// Returns the number of points that were left out for `reason`.
+    pub fn n_dropped(&self, reason: DropReason) -> usize {
+        self.dropped.iter().filter(|dropped| dropped.reason == reason).count()
     }
 }

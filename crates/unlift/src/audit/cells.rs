@@ -3,17 +3,15 @@
 
 use std::time::Instant;
 
-use super::clock::{Clock, RowSeconds};
+use super::clock::{RowSeconds, Seconds};
 use super::lists::{Kept, Lists};
-use super::missing::{NotAudited, told};
+use super::missing::{NotAudited, shortened};
 use super::observer::{Cell, Counts, Observer};
 use super::plan::{Plan, key_of, oracle_seed};
 use super::row::{Alone, Row, measure, within};
-use crate::evaluate::{
-    Accuracy, away_from_own, bearings, belongs, blind, distinct_weights, evaluate,
-    farthest_for_rounding, is_noise, joined, off_record,
-};
+use crate::evaluate::{Accuracy, Truth, blind, distinct_weights, evaluate, joined};
 use crate::geometry::knn::Knn;
+use crate::neighbors::oracle;
 use crate::obfuscate::{Scheme, all, obfuscate};
 use crate::recover::{RecoverOptions, recover};
 use crate::released::Released;
@@ -32,9 +30,6 @@ pub(super) struct Owned<'a, const D: usize> {
     pub(super) descriptors: Option<&'a Descriptors>,
     /// The released map and its secret if the points are already hidden under the plan's first scheme.
     pub(super) hidden: Option<&'a (Released<D>, Secret)>,
-    pub(super) search: &'a Knn<'a, D>,
-    /// Lists that do not depend on the scheme.
-    pub(super) kept: &'a Kept,
     /// Name of the item, if the audit has several.
     pub(super) name: Option<&'a str>,
 }
@@ -47,14 +42,19 @@ impl<const D: usize> Owned<'_, D> {
     }
 }
 
-/// Plan, scheme, repeat and seed of a group of rows.
-#[derive(Clone, Copy)]
-pub(super) struct Run<'a, const D: usize> {
-    pub(super) plan: &'a Plan<D>,
-    pub(super) scheme: &'a str,
-    pub(super) repeat: u32,
+/// Scheme, repeat and randomness of a group of rows, and what all groups of an item share.
+struct Run<'a, const D: usize> {
+    plan: &'a Plan<D>,
+    search: &'a Knn<'a, D>,
+    /// Lists that do not depend on the scheme.
+    kept: &'a Kept,
+    scheme: &'a dyn Scheme<D>,
+    repeat: u32,
+    key: Key,
     /// Seed of the oracle. Released data does not depend on it.
-    pub(super) oracle_seed: u64,
+    oracle_seed: u64,
+    /// Seed of the attacker.
+    seed: u64,
 }
 
 /// A finished row with the data that pooling needs.
@@ -71,14 +71,17 @@ pub(super) struct Finished<'a> {
     pub(super) seconds: RowSeconds,
 }
 
-/// Progress of one scheme and repeat.
-pub(super) enum Step<'a> {
-    /// The work that begins.
-    Begins(String),
-    /// A part of the work has ended, in units of the cost of one recovery.
-    Ended(usize),
-    /// A row is finished.
-    Row(Box<Finished<'a>>),
+/// Progress of an item, in units of the cost of one recovery.
+struct Progress<'a, const D: usize> {
+    observer: &'a mut dyn Observer<D>,
+    done: usize,
+    total: usize,
+}
+
+impl<const D: usize> Progress<'_, D> {
+    fn begin(&mut self, what: &str) {
+        self.observer.progress(self.done, self.total, what);
+    }
 }
 
 /// Typical cost of attacks on the records alone, in recoveries.
@@ -92,103 +95,83 @@ fn cost<const D: usize>(plan: &Plan<D>) -> usize {
     alone + plan.own_sources().count() * LISTS_COST + plan.rows_per_scheme()
 }
 
-/// Hides the points with `scheme` under `key` and computes every cell.
+/// Computes every cell of one scheme and repeat. Calls `each` with every finished row. Returns the
+/// cells without a row, for which the scheme, a source or a custom solver failed.
 ///
 /// # Errors
-/// Returns the errors of [`attack`]. For images, it also fails if the scheme cannot hide the points.
-pub(super) fn cells<const D: usize>(
-    owned: &Owned<'_, D>,
-    run: &Run<'_, D>,
-    (scheme, key): (&dyn Scheme<D>, &Key),
-    clock: &mut Clock,
-    observer: &mut dyn Observer<D>,
-    each: impl FnMut(&mut dyn Observer<D>, Step<'_>),
-) -> Result<Vec<NotAudited>, Error> {
-    if let Some(hidden) = owned.hidden.filter(|_| run.scheme == run.plan.schemes[0].name()) {
-        return attack(owned, run, hidden, clock, observer, each);
-    }
-    let hide = || {
-        let hidden = obfuscate(scheme, owned.original, owned.descriptors, key)?;
-        check_laws(scheme, owned.original, key, (&hidden.0, &hidden.1))?;
-        Ok(hidden)
-    };
-    match clock.time(|s| &mut s.obfuscate, hide) {
-        Ok(hidden) => attack(owned, run, &hidden, clock, observer, each),
-        Err(error) if !owned.may_be_small() => Ok(vec![NotAudited::new(run.scheme, None, error)]),
-        Err(error) => Err(error.within(run.scheme)),
-    }
-}
-
-/// Computes every cell of one scheme and repeat for `hidden`, the released map and its secret.
-///
-/// Calls `each` with the progress and every finished row. Returns the cells
-/// without a row, for which a source or a custom solver failed.
-///
-/// # Errors
-/// For images, whose rows are pooled, any failure of a source or solver. For maps, failures of
+/// For images, whose rows are pooled, any failure of a scheme, source or solver. For maps, failures of
 /// built-in solvers and of measures only. Also when the observer stops the audit.
-pub(super) fn attack<const D: usize>(
+fn cells<const D: usize>(
     owned: &Owned<'_, D>,
     run: &Run<'_, D>,
-    hidden: &(Released<D>, Secret),
-    clock: &mut Clock,
-    observer: &mut dyn Observer<D>,
-    mut each: impl FnMut(&mut dyn Observer<D>, Step<'_>),
+    clock: &mut Seconds,
+    progress: &mut Progress<'_, D>,
+    each: &mut dyn FnMut(Finished<'_>),
 ) -> Result<Vec<NotAudited>, Error> {
-    let Run { plan, scheme, repeat, oracle_seed } = *run;
-    let original = owned.original;
-    // The attacker's crate has no keys, so its seed is the integer of the repeat. Released data
-    // depends on a key.
-    let attacker = plan.seed.wrapping_add(u64::from(repeat));
-    let of_scheme = |error: Error| error.within(scheme);
-    let baseline = clock.time(|s| &mut s.evaluate, || Ok(blind(&hidden.0, original, &hidden.1)))?;
+    let (plan, original, scheme) = (run.plan, owned.original, run.scheme.name());
+    let hide = || {
+        let hidden = obfuscate(run.scheme, original, owned.descriptors, &run.key)?;
+        check_laws(run.scheme, original, &run.key, (&hidden.0, &hidden.1))?;
+        Ok::<_, Error>(hidden)
+    };
+    let made;
+    let hidden = match owned.hidden.filter(|_| scheme == plan.schemes[0].name()) {
+        Some(hidden) => hidden,
+        None => match clock.time(|s| &mut s.obfuscate, hide) {
+            Ok(hidden) => {
+                made = hidden;
+                &made
+            }
+            Err(error) if !owned.may_be_small() => {
+                return Ok(vec![NotAudited::new(scheme, None, error)]);
+            }
+            Err(error) => return Err(error.within(scheme)),
+        },
+    };
+    let (released, secret) = (&hidden.0, &hidden.1);
+    let baseline = clock.time(|s| &mut s.evaluate, || blind(released, original, secret));
     // In the plane all lines meet, so records alone contain no information.
     let mut alone = Vec::new();
     if plan.records_alone && D == 3 {
-        each(observer, Step::Begins(format!("{scheme}, records alone")));
-        alone = clock
-            .time(|s| &mut s.records_alone, || records_alone(hidden, original, plan, attacker))?;
-        each(observer, Step::Ended(ALONE_COST));
+        progress.begin(&format!("{scheme}, records alone"));
+        let attack = || records_alone(hidden, original, plan, run.seed);
+        alone = clock.time(|s| &mut s.records_alone, attack)?;
+        progress.done += ALONE_COST;
     }
-    let by_row = hidden.1.by_descriptor_row();
+    let by_row = secret.by_descriptor_row();
     let mut sources =
-        Lists::new(plan, owned.search, hidden, &by_row, (oracle_seed, attacker), owned.kept);
+        Lists::new(plan, run.search, hidden, &by_row, (run.oracle_seed, run.seed), run.kept);
     let mut missing = Vec::new();
     for variant in &plan.variants() {
-        let source = match variant.noise {
-            Some(noise) => noise.name().to_owned(),
-            None => variant.by.name().to_owned(),
-        };
-        let what = format!("{scheme}, neighbors by {}", variant.by.name());
-        each(observer, Step::Begins(what));
+        let source = variant.noise.map_or(variant.by.name(), |noise| noise.name());
+        progress.begin(&format!("{scheme}, neighbors by {}", variant.by.name()));
         let started = Instant::now();
-        let mut make = || Ok(sources.make(variant, owned.may_be_small()));
-        let made = match clock.time(|s| &mut s.neighbors, &mut make)? {
+        let make = || sources.make(variant, owned.may_be_small());
+        let made = match clock.time(|s| &mut s.neighbors, make) {
             Err(error) if !owned.may_be_small() => {
-                missing.push(NotAudited::variant(scheme, variant, &error, &hidden.1));
+                missing.push(NotAudited::variant(scheme, variant, &error, secret));
                 continue;
             }
-            made => made.map_err(of_scheme)?,
+            made => made.map_err(|error| error.within(scheme))?,
         };
         let making = started.elapsed().as_secs_f64();
         if variant.by.source().is_some() {
-            each(observer, Step::Ended(LISTS_COST));
+            progress.done += LISTS_COST;
         }
         let options =
-            RecoverOptions { delta: plan.delta, seed: attacker, ..RecoverOptions::default() };
+            RecoverOptions { delta: plan.delta, seed: run.seed, ..RecoverOptions::default() };
         for (at, solver) in plan.solvers.iter().enumerate() {
-            if !observer.goes_on() {
+            if !progress.observer.goes_on() {
                 let error = Error::new("audit", "to run to the end", "a request to stop");
                 return Err(error.of_kind(ErrorKind::Stopped));
             }
-            let what = format!("{scheme} at {:.2} {source}, {}", made.ratio, solver.name());
-            each(observer, Step::Begins(what));
+            progress.begin(&format!("{scheme} at {:.2} {source}, {}", made.ratio, solver.name()));
             let started = Instant::now();
-            let recovered = match recover(&hidden.0, &made.lists, &**solver, &options) {
+            let recovered = match recover(released, &made.lists, &**solver, &options) {
                 // The failure of a custom solver costs only its own rows.
                 Err(error) if solver.builtin().is_none() && !owned.may_be_small() => {
                     let error = error.within(&format!("solver {}", solver.name()));
-                    missing.push(NotAudited::variant(scheme, variant, &error, &hidden.1));
+                    missing.push(NotAudited::variant(scheme, variant, &error, secret));
                     continue;
                 }
                 recovered => recovered?,
@@ -196,11 +179,11 @@ pub(super) fn attack<const D: usize>(
             let took = started.elapsed().as_secs_f64();
             // All solvers share the lists. The first solver's row has the time of making them.
             let making = if at == 0 { making } else { 0.0 };
-            clock.seconds.recover += took;
-            let blind = Some(&baseline);
-            let measure = || measure(&recovered, original, &hidden.1, blind, &plan.thresholds);
+            clock.recover += took;
+            let measure =
+                || measure(&recovered, original, secret, Some(&baseline), &plan.thresholds);
             let (measured, accuracy) = clock.time(|s| &mut s.evaluate, measure)?;
-            let secret = &*joined(&recovered, original, &hidden.1);
+            let secret = &*joined(&recovered, original, secret);
             let mut row = Row {
                 scheme: scheme.to_owned(),
                 neighbors: variant.by.name().to_owned(),
@@ -211,22 +194,24 @@ pub(super) fn attack<const D: usize>(
                 ..measured
             };
             row.add_alone(alone.iter().cloned());
+            let truth = Truth { original, released, secret };
             row.metrics.extend(made.ratio_at_k.map(|ratio| (RATIO_AT_K.to_owned(), ratio)));
-            row.metrics.extend(bearings(&hidden.0, original, secret, &made.lists));
-            row.metrics.extend(off_record(&hidden.0, original, secret));
-            let weights = places(owned, secret);
+            row.metrics.extend(truth.bearings(&made.lists));
+            row.metrics.extend(truth.off_record());
+            let mut weights = Vec::new();
             if owned.may_be_small() {
+                weights = distinct_weights(original, secret);
                 row.fill_distinct(&accuracy, &baseline, &weights, &plan.thresholds);
             }
             let bare = row.clone();
             let cell = Cell {
                 name: owned.name,
                 row: &bare,
-                repeat,
+                repeat: run.repeat,
                 original,
                 descriptors: owned.descriptors,
                 secret,
-                released: &hidden.0,
+                released,
                 lists: &made.lists,
                 recovered: &recovered,
                 accuracy: &accuracy,
@@ -239,8 +224,9 @@ pub(super) fn attack<const D: usize>(
                 }
                 row.metrics.extend(measured);
             }
-            observer.cell(&Cell { row: &row, ..cell });
-            let finished = Finished {
+            progress.observer.cell(&Cell { row: &row, ..cell });
+            progress.done += 1;
+            each(Finished {
                 row,
                 accuracy: &accuracy,
                 baseline: &baseline,
@@ -248,17 +234,10 @@ pub(super) fn attack<const D: usize>(
                 whole: &whole,
                 n_listed: made.lists.records().len(),
                 seconds: RowSeconds { neighbors: making, recover: took },
-            };
-            each(observer, Step::Ended(1));
-            each(observer, Step::Row(Box::new(finished)));
+            });
         }
     }
     Ok(missing)
-}
-
-/// Returns weights with which distinct places count once; empty for maps.
-fn places<const D: usize>(owned: &Owned<'_, D>, secret: &Secret) -> Vec<f64> {
-    if owned.may_be_small() { distinct_weights(owned.original, secret) } else { Vec::new() }
 }
 
 /// Runs and measures all attacks on the records alone. Omits those that place no point of `hidden`.
@@ -272,14 +251,14 @@ pub fn records_alone<const D: usize>(
     seed: u64,
 ) -> Result<Vec<Alone>, Error> {
     let options = RecoverOptions { seed, ..RecoverOptions::default() };
-    let mut found = Vec::new();
+    let mut results = Vec::new();
     for (name, recovered) in recover::records_alone(released, &options)? {
         if (0..recovered.n_slots()).any(|slot| recovered.position(slot).is_some()) {
             let accuracy = evaluate(&recovered, original, secret)?;
-            found.push(Alone { name, shares: within(&accuracy, &plan.thresholds) });
+            results.push(Alone { name, shares: within(&accuracy, &plan.thresholds) });
         }
     }
-    Ok(found)
+    Ok(results)
 }
 
 /// Result of one map or image.
@@ -300,36 +279,38 @@ pub(super) struct Rows {
 pub(super) fn of_item<const D: usize>(
     owned: &Owned<'_, D>,
     plan: &Plan<D>,
-    clock: &mut Clock,
+    clock: &mut Seconds,
     observer: &mut dyn Observer<D>,
     finished: &mut dyn FnMut(&Finished<'_>),
 ) -> Result<Rows, Error> {
+    let search = &clock.time(|s| &mut s.search, || oracle::search(owned.original))?;
+    let kept = &Kept::default();
     let per_scheme = cost(plan);
     let total = per_scheme * plan.schemes.len() * plan.repeats as usize;
-    let (mut found, mut done) = (Rows::default(), 0);
+    let mut progress = Progress { observer, done: 0, total };
+    let mut all = Rows::default();
     for scheme in &plan.schemes {
         let mut by_repeat: Vec<Vec<(Row, RowSeconds)>> = Vec::new();
         let mut missing: Vec<NotAudited> = Vec::new();
-        let n_before = found.rows.len();
+        let n_before = all.rows.len();
         for repeat in 0..plan.repeats {
-            let (key, oracle_seed) = seeds(plan.seed.wrapping_add(u64::from(repeat)), owned.name);
-            let run = Run { plan, scheme: scheme.name(), repeat, oracle_seed };
-            let (mut of_repeat, before) = (Vec::new(), done);
-            let hide = (&**scheme, &key);
-            let lacking = cells(owned, &run, hide, clock, observer, |observer, step| match step {
-                Step::Begins(what) => observer.progress(done, total, &what),
-                Step::Ended(cost) => done += cost,
-                Step::Row(row) => {
-                    finished(&row);
-                    let Finished { row, seconds, .. } = *row;
-                    of_repeat.push((row, seconds));
-                }
-            })?;
-            done = before + per_scheme;
+            // The attacker's crate has no keys, so its seed is the integer of the repeat. Released
+            // data depends on a key.
+            let seed = plan.seed.wrapping_add(u64::from(repeat));
+            let (key, oracle_seed) = seeds(seed, owned.name);
+            let scheme = &**scheme;
+            let run = Run { plan, search, kept, scheme, repeat, key, oracle_seed, seed };
+            let (mut of_repeat, before) = (Vec::new(), progress.done);
+            let mut each = |row: Finished<'_>| {
+                finished(&row);
+                of_repeat.push((row.row, row.seconds));
+            };
+            let lacking = cells(owned, &run, clock, &mut progress, &mut each)?;
+            progress.done = before + per_scheme;
             by_repeat.push(of_repeat);
-            for one in lacking {
-                if !missing.iter().any(|other| other.is_same_cell(&one)) {
-                    missing.push(one);
+            for cell in lacking {
+                if !missing.iter().any(|known| known.is_same_cell(&cell)) {
+                    missing.push(cell);
                 }
             }
         }
@@ -339,15 +320,13 @@ pub(super) fn of_item<const D: usize>(
             let Some(same) = same.collect::<Option<Vec<_>>>() else { continue };
             let mut seconds = RowSeconds::default();
             same.iter().for_each(|(_, more)| seconds.add(more));
-            found.seconds.push(seconds);
-            found
-                .rows
-                .push(Row::mean(&same.iter().map(|(row, _)| row.clone()).collect::<Vec<_>>()));
+            all.seconds.push(seconds);
+            all.rows.push(Row::mean(&same.iter().map(|(row, _)| row.clone()).collect::<Vec<_>>()));
         }
-        found.not_audited.extend(told(missing, found.rows.len() > n_before));
+        all.not_audited.extend(shortened(missing, all.rows.len() > n_before));
     }
-    observer.progress(done, total, "done");
-    Ok(found)
+    progress.begin("done");
+    Ok(all)
 }
 
 fn seeds(seed: u64, name: Option<&str>) -> (Key, u64) {
@@ -372,18 +351,18 @@ pub fn check_laws<const D: usize>(
     key: &Key,
     (released, secret): (&Released<D>, &Secret),
 ) -> Result<(), Error> {
-    belongs(original, released, secret)?;
+    let truth = Truth { original, released, secret };
+    truth.belongs()?;
     if all().any(|entry| entry.name == scheme.name()) {
         return Ok(());
     }
-    let away = away_from_own(released, original, secret);
+    let away = truth.away_from_own();
     let farthest = away.iter().copied().fold(0.0, f64::max);
-    let most = farthest_for_rounding(released, original, secret);
+    let limit = truth.farthest_for_rounding();
     // Bearings may have decoys, and nothing is recovered from them in any case. The error of a scheme with noise is measured.
-    let may_be_off =
-        || released.obfuscation().is_bearings() || is_noise(released, original, secret);
-    if farthest > most && !may_be_off() {
-        let off = away.iter().filter(|&&away| away > most).count();
+    let may_be_off = || released.obfuscation().is_bearings() || truth.is_noise();
+    if farthest > limit && !may_be_off() {
+        let off = away.iter().filter(|&&away| away > limit).count();
         let found = format!("{off} of {} away from them, by up to {farthest:.2e}", away.len());
         return Err(Error::new("hidden points", "on their own records", found));
     }

@@ -2,8 +2,6 @@
 
 use std::time::Instant;
 
-use crate::Error;
-
 /// Seconds per stage. They are not part of the results.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
@@ -41,31 +39,26 @@ impl RowSeconds {
     }
 }
 
-#[derive(Default)]
-pub(super) struct Clock {
-    pub(super) seconds: Seconds,
-}
-
-impl Clock {
+impl Seconds {
+    /// Does `work` and adds its time to that of a stage.
     pub(super) fn time<T>(
         &mut self,
-        stage: impl Fn(&mut Seconds) -> &mut f64,
-        work: impl FnOnce() -> Result<T, Error>,
-    ) -> Result<T, Error> {
+        stage: impl Fn(&mut Self) -> &mut f64,
+        work: impl FnOnce() -> T,
+    ) -> T {
         let started = Instant::now();
         let result = work();
-        *stage(&mut self.seconds) += started.elapsed().as_secs_f64();
+        *stage(self) += started.elapsed().as_secs_f64();
         result
     }
 
     /// Adds the stages of another clock, without the seconds per row.
     pub(super) fn merge(&mut self, more: &Self) {
-        let (to, more) = (&mut self.seconds, &more.seconds);
-        to.search += more.search;
-        to.obfuscate += more.obfuscate;
-        to.neighbors += more.neighbors;
-        to.recover += more.recover;
-        to.records_alone += more.records_alone;
-        to.evaluate += more.evaluate;
+        self.search += more.search;
+        self.obfuscate += more.obfuscate;
+        self.neighbors += more.neighbors;
+        self.recover += more.recover;
+        self.records_alone += more.records_alone;
+        self.evaluate += more.evaluate;
     }
 }

@@ -8,17 +8,15 @@ use rayon::prelude::*;
 
 use super::break_even::break_even;
 use super::cells::{Finished, Owned, Rows, of_item};
-use super::clock::{Clock, RowSeconds, Seconds};
-use super::lists::Kept;
+use super::clock::{RowSeconds, Seconds};
 use super::missing::NotAudited;
 use super::observer::{Observer, Silent};
 use super::plan::{Plan, Threshold};
-use super::row::{Alone, ByReason, Distinct, Parts, Row, within};
+use super::row::{Alone, ByReason, Distinct, Parts, Row, places_within, within};
 use super::run::{Outcome, none_applies};
-use super::share::{Share, Shares, merge, percents, shares};
+use super::share::{Shares, merge, percents};
 use crate::compiled::Both;
 use crate::evaluate::{Accuracy, Reliability};
-use crate::neighbors::oracle;
 use crate::truth::Original;
 use crate::{Descriptors, Error};
 
@@ -88,7 +86,7 @@ pub fn run_many<const D: usize, E: From<Error>>(
     watcher: &mut impl Watcher<D>,
 ) -> Result<Outcome, E> {
     plan.check_for_many()?;
-    let one: One<D> = ONE.of()?;
+    let sums_of: SumsOf<D> = SUMS_OF.of()?;
     let mut items = items.into_iter();
     let expected = items.size_hint().0;
     let at_work = if D == 2 { AT_WORK * rayon::current_num_threads() } else { 1 };
@@ -99,17 +97,17 @@ pub fn run_many<const D: usize, E: From<Error>>(
         let Some(first) = batch.first() else { break };
         watcher.progress(n_items, expected.max(n_items), &first.name);
         let begun: Vec<_> = batch.into_iter().map(|item| (item, watcher.begin())).collect();
-        let one = |(item, mut seen): (Item<D>, _)| {
-            let done = one(&item, plan, &mut seen);
-            (item, seen, done)
+        let work = |(item, mut observer): (Item<D>, _)| {
+            let done = sums_of(&item, plan, &mut observer);
+            (item, observer, done)
         };
-        let done: Vec<_> = begun.into_par_iter().with_max_len(1).map(one).collect();
-        for (item, seen, done) in done {
+        let done: Vec<_> = begun.into_par_iter().with_max_len(1).map(work).collect();
+        for (item, observer, done) in done {
             let (rows, sums) = done.map_err(|error| error.within(&item.name))?;
             all.merge(sums);
             n_items += 1;
             n_too_small += usize::from(item.original.len() <= plan.k);
-            watcher.item(&item.name, &rows, seen);
+            watcher.item(&item.name, &rows, observer);
         }
     }
     watcher.progress(n_items, n_items, "done");
@@ -118,14 +116,11 @@ pub fn run_many<const D: usize, E: From<Error>>(
     if let (true, Some(first)) = (cells.is_empty(), not_audited.first()) {
         return Err(none_applies(first).into());
     }
-    let pooled = |cell: &CellSums| {
-        let repeats: Vec<Row> = cell.pools.iter().map(|pool| pool.row()).collect();
-        Row::mean(&repeats)
-    };
+    let pooled = |cell: &CellSums| Row::mean(&cell.pools.iter().map(Pool::row).collect::<Vec<_>>());
     let rows: Vec<Row> = cells.iter().map(pooled).collect();
     let break_even = break_even(plan, &rows);
     let seconds = cells.iter().map(|cell| cell.seconds).collect();
-    let seconds = Seconds { rows: seconds, ..clock.seconds };
+    let seconds = Seconds { rows: seconds, ..clock };
     Ok(Outcome { rows, not_audited, break_even, n_items, n_too_small, seconds })
 }
 
@@ -136,7 +131,7 @@ struct Sums {
     not_audited: Vec<NotAudited>,
     /// Number of items with points.
     n_pooled: usize,
-    clock: Clock,
+    clock: Seconds,
 }
 
 struct CellSums {
@@ -152,12 +147,12 @@ impl Sums {
         self.clock.merge(&more.clock);
         self.n_pooled += more.n_pooled;
         for missing in more.not_audited {
-            if !self.not_audited.iter().any(|other| other.is_same_cell(&missing)) {
+            if !self.not_audited.iter().any(|known| known.is_same_cell(&missing)) {
                 self.not_audited.push(missing);
             }
         }
         for cell in more.cells {
-            match self.cells.iter_mut().find(|other| other.row.is_same_cell(&cell.row)) {
+            match self.cells.iter_mut().find(|known| known.row.is_same_cell(&cell.row)) {
                 Some(to) => {
                     to.pools.iter_mut().zip(&cell.pools).for_each(|(to, more)| to.merge(more));
                     to.seconds.add(&cell.seconds);
@@ -169,28 +164,25 @@ impl Sums {
     }
 }
 
-type One<const D: usize> =
+type SumsOf<const D: usize> =
     fn(&Item<D>, &Plan<D>, &mut dyn Observer<D>) -> Result<(Vec<Row>, Sums), Error>;
 
-static ONE: Both<One<2>, One<3>> = Both(one::<2>, one::<3>);
+static SUMS_OF: Both<SumsOf<2>, SumsOf<3>> = Both(sums_of::<2>, sums_of::<3>);
 
 /// Returns the rows of one item and its sums; both are empty without points.
-fn one<const D: usize>(
+fn sums_of<const D: usize>(
     item: &Item<D>,
     plan: &Plan<D>,
-    seen: &mut dyn Observer<D>,
+    observer: &mut dyn Observer<D>,
 ) -> Result<(Vec<Row>, Sums), Error> {
     let mut sums = Sums::default();
     if item.original.is_empty() {
-        seen.progress(1, 1, "done");
+        observer.progress(1, 1, "done");
         return Ok((Vec::new(), sums));
     }
     check(item, plan)?;
-    let search = sums.clock.time(|s| &mut s.search, || oracle::search(&item.original))?;
     let (original, descriptors) = (&item.original, item.descriptors.as_ref());
-    let (hidden, name) = (None, Some(&*item.name));
-    let owned =
-        Owned { original, descriptors, hidden, search: &search, kept: &Kept::default(), name };
+    let owned = Owned { original, descriptors, hidden: None, name: Some(&item.name) };
     let mut pools: Vec<(Row, Vec<Pool>)> = Vec::new();
     let mut each = |finished: &Finished<'_>| {
         let pool = Pool::of(finished, &plan.thresholds);
@@ -199,11 +191,11 @@ fn one<const D: usize>(
             None => pools.push((finished.row.clone(), vec![pool])),
         }
     };
-    let found = of_item(&owned, plan, &mut sums.clock, seen, &mut each)?;
-    let Rows { rows, seconds, not_audited } = found;
+    let Rows { rows, seconds, not_audited } =
+        of_item(&owned, plan, &mut sums.clock, observer, &mut each)?;
     for (row, seconds) in rows.iter().zip(seconds) {
         // A cell that failed in another repeat has no row.
-        if let Some(at) = pools.iter().position(|(other, _)| other.is_same_cell(row)) {
+        if let Some(at) = pools.iter().position(|(first, _)| first.is_same_cell(row)) {
             let (row, pools) = pools.swap_remove(at);
             sums.cells.push(CellSums { row, pools, n_items: 1, seconds });
         }
@@ -245,13 +237,13 @@ pub(super) struct Pool {
     /// Sums by figure: of true entries of lists, of percentages times points. A figure that no image has is absent.
     sums: BTreeMap<&'static str, f64>,
     /// Points and distinct places within each threshold.
-    shares: BTreeMap<&'static str, Shares>,
+    shares: SharesByName,
     metrics: BTreeMap<String, Figure>,
     lost: ByReason,
     dropped: ByReason,
     trials: BTreeMap<u32, u64>,
     /// Shares of each attack on the records alone.
-    alone: BTreeMap<&'static str, Shares>,
+    alone: SharesByName,
     reliability: Option<Reliability>,
     sure_unknown: Option<String>,
     errors: Errors,
@@ -269,10 +261,6 @@ impl Pool {
             ("hits", row.inlier_ratio * *n_listed as f64),
             ("places", weights.iter().sum()),
         ]);
-        let places = sums["places"];
-        let of_places = |of: &Accuracy| {
-            shares(thresholds, |t| Share::of(of.weight_within(t.value, weights), places))
-        };
         for (name, sum) in [
             ("exact", accuracy.n_exact.map(|n_exact| n_exact as f64)),
             ("axis", percentage(row.axis_accuracy_percent)),
@@ -293,8 +281,8 @@ impl Pool {
             shares: BTreeMap::from([
                 ("recovered", within(accuracy, thresholds)),
                 ("blind", within(baseline, thresholds)),
-                ("places", of_places(accuracy)),
-                ("blind places", of_places(baseline)),
+                ("places", places_within(accuracy, weights, thresholds)),
+                ("blind places", places_within(baseline, weights, thresholds)),
             ]),
             metrics: row.metrics.iter().map(figure).collect(),
             lost: row.lost.clone(),
@@ -313,17 +301,13 @@ impl Pool {
         self.n_points += more.n_points;
         self.n_listed += more.n_listed;
         merge_counts(&mut self.sums, &more.sums);
-        for (name, more) in &more.shares {
-            merge(self.shares.entry(name).or_default(), more);
-        }
+        merge_shares(&mut self.shares, &more.shares);
+        merge_shares(&mut self.alone, &more.alone);
         for (name, more) in &more.metrics {
             let figure = self.metrics.entry(name.clone()).or_default();
             figure.sum += more.sum;
             figure.known += more.known;
             figure.of_images = more.of_images;
-        }
-        for (name, more) in &more.alone {
-            merge(self.alone.entry(name).or_default(), more);
         }
         if let (Some(all), Some(more)) = (&mut self.reliability, &more.reliability) {
             all.merge(more);
@@ -344,8 +328,8 @@ impl Pool {
             |(_, figure): &(&String, &Figure)| figure.of_images || figure.known == self.n_points;
         let alone = |(&name, shares): (&&'static str, &Shares)| {
             // An attack that cannot run on an item recovers nothing there.
-            let of_all = |(label, share): (&String, &Share)| (label.clone(), share.among(n));
-            Alone { name, shares: shares.iter().map(of_all).collect() }
+            let of_all = shares.iter().map(|(label, share)| (label.clone(), share.among(n)));
+            Alone { name, shares: of_all.collect() }
         };
         let mut row = Row {
             // A requested ratio identifies the cell. A measured one is a mean over entries.
@@ -419,7 +403,15 @@ impl Errors {
     }
 }
 
-fn merge_counts<K: Clone + Ord, N: Copy + AddAssign + Default>(
+type SharesByName = BTreeMap<&'static str, Shares>;
+
+fn merge_shares(to: &mut SharesByName, more: &SharesByName) {
+    for (name, more) in more {
+        merge(to.entry(name).or_default(), more);
+    }
+}
+
+pub(super) fn merge_counts<K: Clone + Ord, N: Copy + AddAssign + Default>(
     to: &mut BTreeMap<K, N>,
     more: &BTreeMap<K, N>,
 ) {

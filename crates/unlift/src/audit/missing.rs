@@ -44,12 +44,10 @@ impl NotAudited {
         let mut reason = error.to_string();
         let (left, all) = (secret.dropped().len(), secret.n_originals());
         if left > 0 {
-            let why = DropReason::ALL
-                .map(|why| (why, secret.dropped().iter().filter(|d| d.reason == why).count()));
-            let most = why.into_iter().max_by_key(|(_, n)| *n).map_or("", |(why, _)| why.name());
-            let most = most.replace('_', " ");
+            let main = DropReason::ALL.into_iter().max_by_key(|why| secret.n_dropped(*why));
+            let main = main.map_or("", DropReason::name).replace('_', " ");
             reason.push_str(&format!(
-                " ({scheme} leaves out {left} of {all} points, most of them as {most})"
+                " ({scheme} leaves out {left} of {all} points, most of them as {main})"
             ));
         }
         Self {
@@ -70,7 +68,7 @@ impl NotAudited {
 
 /// Shortens `missing` of one scheme: a scheme without rows that failed for a single reason becomes
 /// one entry.
-pub(super) fn told(missing: Vec<NotAudited>, has_rows: bool) -> Vec<NotAudited> {
+pub(super) fn shortened(missing: Vec<NotAudited>, has_rows: bool) -> Vec<NotAudited> {
     match missing.first() {
         Some(first) if !has_rows && missing.iter().all(|m| m.reason == first.reason) => {
             vec![NotAudited::new(&first.scheme, None, &first.reason)]

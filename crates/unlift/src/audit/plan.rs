@@ -143,15 +143,12 @@ impl<const D: usize> Plan<D> {
     #[must_use]
     pub fn for_map(mut self, n_points: usize, k: usize) -> Self {
         self.inlier_ratios = vec![0.5, 0.1];
-        if n_points < SMALL * k && !self.has_solver(Builtin::Consensus) {
+        let lacks_consensus =
+            self.solvers.iter().all(|solver| solver.builtin() != Some(Builtin::Consensus));
+        if n_points < SMALL * k && lacks_consensus {
             self.solvers.push(Arc::new(Builtin::Consensus));
         }
         self
-    }
-
-    /// Returns true if the plan contains this built-in solver.
-    pub fn has_solver(&self, builtin: Builtin) -> bool {
-        self.solvers.iter().any(|solver| solver.builtin() == Some(builtin))
     }
 
     /// Returns true if the oracle is among the sources.
@@ -169,21 +166,13 @@ impl<const D: usize> Plan<D> {
     pub fn variants(&self) -> Vec<Variant<'_, D>> {
         let mut variants = Vec::new();
         for by in &self.neighbors {
-            match by {
-                NeighborsBy::Oracle => {
-                    for &noise in &self.oracle_noise {
-                        let ratios = self.inlier_ratios.iter().map(|&ratio| Some(ratio));
-                        let noise = Some(noise);
-                        variants.extend(ratios.map(|inlier_ratio| Variant {
-                            by,
-                            noise,
-                            inlier_ratio,
-                        }));
-                    }
-                }
-                NeighborsBy::Given(_) | NeighborsBy::Source(_) => {
-                    variants.push(Variant { by, noise: None, inlier_ratio: None });
-                }
+            if !by.is_oracle() {
+                variants.push(Variant { by, noise: None, inlier_ratio: None });
+                continue;
+            }
+            for noise in self.oracle_noise.iter().copied().map(Some) {
+                let ratios = self.inlier_ratios.iter().copied().map(Some);
+                variants.extend(ratios.map(|inlier_ratio| Variant { by, noise, inlier_ratio }));
             }
         }
         variants
@@ -239,8 +228,8 @@ impl<const D: usize> Plan<D> {
     fn check_fields(&self) -> Result<(), Error> {
         check_names("scheme", self.schemes.iter().map(|scheme| scheme.name()))?;
         check_names("solver", self.solvers.iter().map(|solver| solver.name()))?;
-        let own = self.solvers.iter().filter(|solver| solver.builtin().is_none());
-        if let Some(solver) = own.into_iter().find(|one| Builtin::from_name(one.name()).is_ok()) {
+        let mut own = self.solvers.iter().filter(|solver| solver.builtin().is_none());
+        if let Some(solver) = own.find(|solver| Builtin::from_name(solver.name()).is_ok()) {
             // Reports describe built-in solvers by their names.
             let expected = "a name that no solver of unlift has";
             return Err(Error::new("solver", expected, solver.name()));

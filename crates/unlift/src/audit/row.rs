@@ -190,10 +190,26 @@ pub struct Intervals {
     pub records_alone_percent: IndexMap<String, Interval>,
 }
 
-/// Returns the share within each threshold.
+/// Returns the share of points within each threshold.
 pub(super) fn within(accuracy: &Accuracy, thresholds: &[Threshold]) -> Shares {
     let n = accuracy.n_points() as f64;
     shares(thresholds, |t| Share::of(accuracy.n_within(t.value) as f64, n))
+}
+
+/// Returns the share of distinct places within each threshold; `weights` has one entry per slot.
+pub(super) fn places_within(
+    accuracy: &Accuracy,
+    weights: &[f64],
+    thresholds: &[Threshold],
+) -> Shares {
+    let n: f64 = weights.iter().sum();
+    shares(thresholds, |t| Share::of(accuracy.weight_within(t.value, weights), n))
+}
+
+/// Returns the numbers of points that a scheme left out.
+pub(super) fn dropped(secret: &Secret) -> ByReason {
+    let count = |reason: DropReason| (reason.name().to_owned(), secret.n_dropped(reason));
+    DropReason::ALL.map(count).into_iter().filter(|(_, n)| *n > 0).collect()
 }
 
 fn write_unit<S: Serializer>(unit: &Unit, to: S) -> Result<S::Ok, S::Error> {
@@ -258,7 +274,7 @@ impl Row {
         let best = |label: &String| {
             let all = self.parts.alone.iter().map(|alone| (alone.name, alone.shares[label]));
             let better = |a: &Share, b: &Share| b.percent() > a.percent();
-            all.reduce(|best, other| if better(&best.1, &other.1) { other } else { best })
+            all.reduce(|best, next| if better(&best.1, &next.1) { next } else { best })
         };
         let labels = self.recovered_percent.keys();
         let best = labels.map(|label| Some((label.clone(), best(label)?)));
@@ -279,24 +295,6 @@ impl Row {
             };
             all.bins.iter().map(bin).collect()
         });
-    }
-
-    pub(super) fn smallest(thresholds: &[Threshold]) -> f64 {
-        thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min)
-    }
-
-    fn fill(&mut self, accuracy: &Accuracy, blind: Option<&Accuracy>, thresholds: &[Threshold]) {
-        self.n_points = accuracy.n_points();
-        self.n_lost = accuracy.n_lost();
-        self.lost =
-            accuracy.lost.iter().map(|(status, &n)| (status.name().to_owned(), n)).collect();
-        let of = |accuracy| within(accuracy, thresholds);
-        self.fill_shares(&of(accuracy), &blind.map(of).unwrap_or_default());
-        self.axis_accuracy_percent = accuracy.axis_percent;
-        self.exact_percent = accuracy.exact_percent();
-        self.assignment_accuracy_percent = accuracy.assignment_percent;
-        self.fill_errors(|p| accuracy.percentile(p));
-        self.blind_median_error = blind.and_then(|blind| blind.percentile(50.0));
     }
 
     pub(super) fn fill_shares(&mut self, recovered: &Shares, blind: &Shares) {
@@ -321,15 +319,11 @@ impl Row {
         weights: &[f64],
         thresholds: &[Threshold],
     ) {
-        let all: f64 = weights.iter().sum();
-        let within = |accuracy: &Accuracy| {
-            let within = |t: &Threshold| Share::of(accuracy.weight_within(t.value, weights), all);
-            percents(&shares(thresholds, within))
-        };
+        let percents_of = |of| percents(&places_within(of, weights, thresholds));
         self.distinct = Some(Distinct {
-            n_places: all.round() as usize,
-            recovered_percent: within(accuracy),
-            blind_percent: within(blind),
+            n_places: weights.iter().sum::<f64>().round() as usize,
+            recovered_percent: percents_of(accuracy),
+            blind_percent: percents_of(blind),
         });
     }
 
@@ -445,19 +439,28 @@ pub fn measure<const D: usize>(
     thresholds: &[Threshold],
 ) -> Result<(Row, Accuracy), Error> {
     let accuracy = evaluate(recovered, original, secret)?;
-    let count = |reason| secret.dropped().iter().filter(|d| d.reason == reason).count();
-    let dropped = DropReason::ALL.map(|reason| (reason.name().to_owned(), count(reason)));
+    let lost = accuracy.lost.iter().map(|(status, &n)| (status.name().to_owned(), n));
     let mut row = Row {
         unit: recovered.unit(),
         delta: recovered.delta(),
-        dropped: dropped.into_iter().filter(|(_, n)| *n > 0).collect(),
+        n_points: accuracy.n_points(),
+        n_lost: accuracy.n_lost(),
+        lost: lost.collect(),
+        dropped: dropped(secret),
+        axis_accuracy_percent: accuracy.axis_percent,
+        exact_percent: accuracy.exact_percent(),
+        assignment_accuracy_percent: accuracy.assignment_percent,
+        blind_median_error: blind.and_then(|blind| blind.percentile(50.0)),
         ransac_trials: recovered.trials().map(|trials| trials.bins().collect()),
         repeats: 1,
         sure_unknown: recovered.confidence_unknown().map(|unknown| unknown.reason().to_owned()),
         ..Row::default()
     };
-    row.fill(&accuracy, blind, thresholds);
-    row.parts.reliability = reliability(recovered, &accuracy, Row::smallest(thresholds));
+    let shares_of = |of| within(of, thresholds);
+    row.fill_shares(&shares_of(&accuracy), &blind.map(shares_of).unwrap_or_default());
+    row.fill_errors(|p| accuracy.percentile(p));
+    let smallest = thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min);
+    row.parts.reliability = reliability(recovered, &accuracy, smallest);
     row.summarize();
     Ok((row, accuracy))
 }

@@ -4,17 +4,14 @@ use std::sync::Arc;
 
 use super::break_even::{BreakEven, break_even};
 use super::cells::{Owned, Rows, of_item};
-use super::clock::{Clock, Seconds};
-use super::lists::Kept;
+use super::clock::Seconds;
 use super::missing::NotAudited;
 use super::observer::Observer;
 use super::plan::Plan;
 use super::row::Row;
 use crate::compiled::Both;
-use crate::evaluate::belongs;
-use crate::geometry::frame::Bounds;
-use crate::neighbors::oracle;
-use crate::obfuscate::{Lifted, Scheme};
+use crate::evaluate::Truth;
+use crate::obfuscate::{Lifted, LocalPoints, Scheme};
 use crate::released::Released;
 use crate::seed::Key;
 use crate::truth::{Original, Secret};
@@ -54,53 +51,36 @@ pub fn run<const D: usize>(
     plan: &Plan<D>,
     observer: &mut dyn Observer<D>,
 ) -> Result<Outcome, Error> {
-    let one: One<D> = ONE.of()?;
-    one(original, descriptors, plan, observer)
+    plan.check(original.len(), descriptors.is_some())?;
+    let every_cell: EveryCell<D> = EVERY_CELL.of()?;
+    every_cell((original, descriptors), None, plan, observer)
 }
 
-type One<const D: usize> = fn(
-    &Original<D>,
-    Option<&Descriptors>,
+type EveryCell<const D: usize> = fn(
+    (&Original<D>, Option<&Descriptors>),
+    Option<&(Released<D>, Secret)>,
     &Plan<D>,
     &mut dyn Observer<D>,
 ) -> Result<Outcome, Error>;
 
-static ONE: Both<One<2>, One<3>> = Both(one::<2>, one::<3>);
-
-fn one<const D: usize>(
-    original: &Original<D>,
-    descriptors: Option<&Descriptors>,
-    plan: &Plan<D>,
-    observer: &mut dyn Observer<D>,
-) -> Result<Outcome, Error> {
-    plan.check(original.len(), descriptors.is_some())?;
-    every_cell((original, descriptors), None, plan, observer)
-}
+static EVERY_CELL: Both<EveryCell<2>, EveryCell<3>> = Both(every_cell::<2>, every_cell::<3>);
 
 /// Runs every cell of `plan`. If `hidden` is given, it is the obfuscation for the plan's first scheme.
-pub(super) fn every_cell<const D: usize>(
+fn every_cell<const D: usize>(
     (original, descriptors): (&Original<D>, Option<&Descriptors>),
     hidden: Option<&(Released<D>, Secret)>,
     plan: &Plan<D>,
     observer: &mut dyn Observer<D>,
 ) -> Result<Outcome, Error> {
-    let mut clock = Clock::default();
-    let search = clock.time(|s| &mut s.search, || oracle::search(original))?;
-    let owned = Owned {
-        original,
-        descriptors,
-        hidden,
-        search: &search,
-        kept: &Kept::default(),
-        name: None,
-    };
-    let Rows { rows, seconds, not_audited } =
-        of_item(&owned, plan, &mut clock, observer, &mut |_| ())?;
-    if let (true, Some(first)) = (rows.is_empty(), not_audited.first()) {
+    let mut clock = Seconds::default();
+    let owned = Owned { original, descriptors, hidden, name: None };
+    let all = of_item(&owned, plan, &mut clock, observer, &mut |_| ())?;
+    if let (true, Some(first)) = (all.rows.is_empty(), all.not_audited.first()) {
         return Err(none_applies(first));
     }
+    let Rows { rows, seconds, not_audited } = all;
     let break_even = break_even(plan, &rows);
-    let seconds = Seconds { rows: seconds, ..clock.seconds };
+    let seconds = Seconds { rows: seconds, ..clock };
     Ok(Outcome { rows, not_audited, break_even, n_items: 1, n_too_small: 0, seconds })
 }
 
@@ -120,7 +100,7 @@ impl<const D: usize> Scheme<D> for Unknown {
         &self.name
     }
 
-    fn lift(&self, _: &[[f64; D]], _: Option<&Bounds<D>>, _: &Key) -> Result<Lifted<D>, Error> {
+    fn lift(&self, _: &LocalPoints<'_, D>, _: &Key) -> Result<Lifted<D>, Error> {
         Err(Error::new("scheme", "one that unlift can apply", "a scheme of another program"))
     }
 }
@@ -147,6 +127,6 @@ pub fn run_released(
 ) -> Result<Outcome, Error> {
     let (released, secret) = hidden;
     plan.check(original.len(), released.descriptors().is_some())?;
-    belongs(original, released, secret)?;
+    Truth { original, released, secret }.belongs()?;
     every_cell((original, descriptors), Some(hidden), plan, observer)
 }

@@ -6,17 +6,15 @@ pub use super::plan::{key_of, oracle_seed};
 use super::cells::Finished;
 use super::clock::RowSeconds;
 use super::lists::{Kept, Lists};
-use super::many::Pool;
-use super::plan::Threshold;
-use super::plan::{NeighborsBy, Plan, Variant};
-use super::row::Row;
-use super::row::measure;
+use super::many::{Pool, merge_counts};
+use super::plan::{NeighborsBy, Plan, Threshold, Variant};
+use super::row::{ByReason, Row, dropped, measure};
 use crate::evaluate::{blind, distinct_weights};
 use crate::neighbors::Neighborhoods;
 use crate::neighbors::oracle::{self, Noise};
 use crate::recover::Recovered;
 use crate::released::Released;
-use crate::truth::{DropReason, Original, Secret};
+use crate::truth::{Original, Secret};
 use crate::{Error, Unit};
 
 /// Makes lists of `k` records at inlier ratio `ratio`, shorter in an image with too few points.
@@ -48,14 +46,14 @@ pub struct Pooled {
     /// True if the blind figures of every image are known.
     with_blind: bool,
     /// Dropped points of images of which nothing was released.
-    dropped: Vec<(DropReason, usize)>,
+    dropped: ByReason,
 }
 
 impl Pooled {
     /// Returns an empty sum with these thresholds.
     pub fn new(thresholds: &[Threshold]) -> Self {
         let thresholds = thresholds.to_vec();
-        Self { pool: None, thresholds, with_blind: true, dropped: Vec::new() }
+        Self { pool: None, thresholds, with_blind: true, dropped: ByReason::new() }
     }
 
     /// Adds the result of one image. Without its released map the row has no blind figures.
@@ -95,16 +93,13 @@ impl Pooled {
 
     /// Adds an image of which no point was released.
     pub fn add_unreleased(&mut self, secret: &Secret) {
-        let count = |reason| secret.dropped().iter().filter(|d| d.reason == reason).count();
-        self.dropped.extend(DropReason::ALL.map(|reason| (reason, count(reason))));
+        merge_counts(&mut self.dropped, &dropped(secret));
     }
 
     /// Returns the row over all images, without its name; `None` if no image released a point.
     pub fn row(&self) -> Option<Row> {
         let mut row = self.pool.as_ref()?.row();
-        for &(reason, n) in self.dropped.iter().filter(|(_, n)| *n > 0) {
-            *row.dropped.entry(reason.name().to_owned()).or_insert(0) += n;
-        }
+        merge_counts(&mut row.dropped, &self.dropped);
         if !self.with_blind {
             row.blind_percent.clear();
             row.interval.iter_mut().for_each(|interval| interval.blind_percent.clear());

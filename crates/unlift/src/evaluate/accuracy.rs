@@ -10,7 +10,7 @@ use crate::{Error, OriginalId, RowOrder};
 
 /// Errors of a recovery. Shares are of *all* released points; a point that was not recovered is a
 /// miss.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Accuracy {
     /// Error per slot in the unit of the points; infinite if not recovered.
     errors: Vec<f64>,
@@ -67,11 +67,9 @@ pub fn evaluate<const D: usize>(
     let by_row = compare(recovered, original, &secret.by_descriptor_row());
     let errors = straight.errors.iter().zip(&crossed.errors).map(|(a, b)| a.min(*b)).collect();
     let assigned = [&accuracy, &straight, &by_row].map(|of| of.assignment_percent.unwrap_or(0.0));
-    let assigned = accuracy.assignment_percent.map(|_| assigned.into_iter().fold(0.0, f64::max));
-    Ok(Accuracy {
-        n_exact: accuracy.n_exact,
-        ..Accuracy::new(errors, accuracy.lost, None, assigned)
-    })
+    let Accuracy { lost, n_exact, assignment_percent, .. } = accuracy;
+    let assignment_percent = assignment_percent.map(|_| assigned.into_iter().fold(0.0, f64::max));
+    Ok(Accuracy { lost, n_exact, assignment_percent, ..Accuracy::of(errors) })
 }
 
 /// Compares every row with the original in its slot of `secret`.
@@ -100,12 +98,12 @@ fn compare<const D: usize>(
     };
     let n_exact = secret.swapped_axis().map(|_| hidden().filter(|slot| is_exact(*slot)).count());
     let axis_percent = match (recovered.axis(), secret.swapped_axis()) {
-        (Some(said), Some(true_axis)) => percent_equal(said, true_axis),
+        (Some(axis), Some(true_axis)) => percent_equal(axis, true_axis),
         _ => None,
     };
     let assignment_percent =
-        recovered.descriptor_row().and_then(|said| percent_equal(said, secret.descriptor_row()));
-    Accuracy { n_exact, ..Accuracy::new(errors, lost, axis_percent, assignment_percent) }
+        recovered.descriptor_row().and_then(|row| percent_equal(row, secret.descriptor_row()));
+    Accuracy { lost, n_exact, axis_percent, assignment_percent, ..Accuracy::of(errors) }
 }
 
 fn percent_equal<T: PartialEq>(a: &[T], b: &[T]) -> Option<f64> {
@@ -114,15 +112,11 @@ fn percent_equal<T: PartialEq>(a: &[T], b: &[T]) -> Option<f64> {
 }
 
 impl Accuracy {
-    pub(super) fn new(
-        errors: Vec<f64>,
-        lost: BTreeMap<Status, usize>,
-        axis_percent: Option<f64>,
-        assignment_percent: Option<f64>,
-    ) -> Self {
+    /// Returns the accuracy of slots with these errors; all else is unknown.
+    pub(super) fn of(errors: Vec<f64>) -> Self {
         let mut sorted = errors.clone();
         sorted.sort_unstable_by(f64::total_cmp);
-        Self { errors, sorted, lost, n_exact: None, axis_percent, assignment_percent }
+        Self { errors, sorted, ..Self::default() }
     }
 
     /// Returns the number of released points.
@@ -239,8 +233,7 @@ mod tests {
 
     #[test]
     fn lost_points_count_as_misses() {
-        let accuracy =
-            Accuracy::new(vec![0.1, f64::INFINITY, 0.3, 0.2], BTreeMap::new(), None, None);
+        let accuracy = Accuracy::of(vec![0.1, f64::INFINITY, 0.3, 0.2]);
         assert_eq!(accuracy.percent_within(0.2), 50.0);
         assert_eq!(accuracy.percentile(50.0), Some(0.2));
         assert_eq!(accuracy.percentile(75.0), Some(0.3));

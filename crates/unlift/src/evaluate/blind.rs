@@ -1,7 +1,5 @@
 //! The blind baseline: an attack without neighborhoods. Only what exceeds it is a leak.
 
-use std::collections::BTreeMap;
-
 use super::Accuracy;
 use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{along, distance, dot, sub, widen};
@@ -40,7 +38,7 @@ pub fn blind<const D: usize>(
             distance(&guess[slot / released.slots_per_record()], &local[original.index()])
         })
         .collect();
-    Accuracy::new(errors, BTreeMap::new(), None, None)
+    Accuracy::of(errors)
 }
 
 /// Returns one guess per record, relative to the released origin.

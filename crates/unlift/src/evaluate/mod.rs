@@ -7,9 +7,8 @@ mod reliability;
 
 pub use accuracy::{Accuracy, distinct_weights, evaluate, joined};
 pub use blind::blind;
-pub(crate) use plausible::off_record;
 pub use plausible::{
-    OFF_RECORD, are_strangers, away_from_own, bearings, belongs, correlation,
-    farthest_for_rounding, is_noise, nearer_to_own, recovered_away,
+    OFF_RECORD, Truth, are_strangers, correlation, distance_to_record, nearer_to_own,
+    recovered_away,
 };
 pub use reliability::{BINS, Bin, Reliability, SURE, reliability};

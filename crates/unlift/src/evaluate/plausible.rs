@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::geometry::frame::Bounds;
-use crate::geometry::vector::{along, distance, dot, median, sub};
+use crate::geometry::vector::{along, distance, dot, median, sub, widen};
 use crate::neighbors::{Neighborhoods, REAL, support};
 use crate::recover::Recovered;
 use crate::released::{Obfuscation, Released};
@@ -22,8 +22,9 @@ pub fn nearer_to_own<const D: usize>(
     released: Option<&Released<D>>,
 ) -> (usize, usize) {
     let n = recovered.n_slots().min(secret.n_slots());
+    let positions = (0..n).map(|slot| recovered.position(slot));
     if let Some(released) = released {
-        return nearer_to_own_record(released, n, |slot| recovered.position(slot));
+        return nearer_to_own_record(released, by_record(released, positions));
     }
     let points = original.reveal().positions();
     let slots = secret.slots_per_record();
@@ -33,11 +34,10 @@ pub fn nearer_to_own<const D: usize>(
         let away = hidden.iter().map(|id| distance(position, &points[id.index()]));
         away.fold(f64::INFINITY, f64::min)
     };
-    count((0..n).filter_map(|slot| {
-        let (position, record) = (recovered.position(slot)?, slot / slots);
-        let other = (record + n_records.div_ceil(2)) % n_records;
+    count(positions.enumerate().filter_map(|(slot, position)| {
+        let (position, record) = (position?, slot / slots);
         // Points at the same place are equally near.
-        Some(nearest(&position, record) <= nearest(&position, other))
+        Some(nearest(&position, record) <= nearest(&position, half_a_map_away(record, n_records)))
     }))
 }
 
@@ -54,115 +54,32 @@ fn count(nearer: impl Iterator<Item = bool>) -> (usize, usize) {
     nearer.fold((0, 0), |(nearer, n), is_nearer| (nearer + usize::from(is_nearer), n + 1))
 }
 
-/// Bounds are rounded by this share of their sides, and this share of the points may be outside: keypoints at the border of an
-/// image.
-const BOUNDS_SLACK: f64 = 1e-3;
-const MAX_OUTSIDE: f64 = 0.01;
+fn half_a_map_away(record: usize, n_records: usize) -> usize {
+    (record + n_records.div_ceil(2)) % n_records
+}
 
-/// Checks that ground truth and released map belong together: unit, number of points, fingerprint,
-/// and positions of the points. With the wrong ground truth, a map would wrongly look safe.
-///
-/// # Errors
-/// When the three do not belong together.
-pub fn belongs<const D: usize>(
-    original: &Original<D>,
+/// Returns the record and the place of each slot with a position, relative to the released origin.
+fn by_record<const D: usize>(
     released: &Released<D>,
-    secret: &Secret,
-) -> Result<(), Error> {
-    let (unit, found) = (original.reveal().unit(), released.unit());
-    if unit != found {
-        let expected = format!("{}, the unit of the originals", unit.name());
-        return Err(Error::new("unit of the released map", expected, found.name()));
-    }
-    for (what, expected, found) in [
-        ("originals", secret.n_originals(), original.len()),
-        ("hidden points", secret.n_slots(), released.n_slots()),
-        ("hidden points per record", secret.slots_per_record(), released.slots_per_record()),
-    ] {
-        if expected != found {
-            let expected = format!("{expected}, as in the secret");
-            return Err(Error::new(what, expected, found.to_string()));
-        }
-    }
-    released.fingerprint().expect(secret.map())?;
-    let n = secret.n_slots().min(released.n_slots());
-    let (nearer, n) = nearer_to_own_record(released, n, point_of(original, secret));
-    if are_strangers((nearer, n)) {
-        let expected = "points nearer to their own records than to others";
-        let found =
-            format!("{nearer} of {n} (the truth of another map, unit, frame or order of slots)");
-        return Err(Error::new("truth", expected, found));
-    }
-    let points = original.reveal().positions();
-    let is_outside = |bounds: &Bounds<D>, slot: &usize| {
-        let point = points[secret.hidden()[*slot].index()];
-        (0..D).any(|c| {
-            let slack = BOUNDS_SLACK * (bounds.high[c] - bounds.low[c]);
-            point[c] < bounds.low[c] - slack || point[c] > bounds.high[c] + slack
-        })
-    };
-    if let Some(bounds) = released.bounds() {
-        let outside = (0..n).filter(|slot| is_outside(&bounds, slot)).count();
-        if outside as f64 > MAX_OUTSIDE * n as f64 {
-            let found = format!("{outside} of {n} outside");
-            return Err(Error::new("bounds", "a box of all hidden points", found));
-        }
-    }
-    Ok(())
+    positions: impl Iterator<Item = Option<[f64; D]>>,
+) -> impl Iterator<Item = (usize, [f64; D])> {
+    let (slots, origin) = (released.slots_per_record(), released.origin());
+    let positions = positions.take(released.n_slots()).enumerate();
+    positions.filter_map(move |(slot, position)| Some((slot / slots, sub(&position?, &origin))))
 }
 
-fn point_of<const D: usize>(
-    original: &Original<D>,
-    secret: &Secret,
-) -> impl Fn(usize) -> Option<[f64; D]> {
-    let points = original.reveal().positions();
-    |slot| Some(points[secret.hidden()[slot].index()])
-}
-
-/// Counts the slots that are nearer to their own record than to one half a map away, and the slots
-/// with a position.
+/// Counts the places that are nearer to their own record than to one half a map away, and all places.
 fn nearer_to_own_record<const D: usize>(
     released: &Released<D>,
-    n: usize,
-    place: impl Fn(usize) -> Option<[f64; D]>,
+    places: impl Iterator<Item = (usize, [f64; D])>,
 ) -> (usize, usize) {
-    let (slots, n_records) = (released.slots_per_record(), released.n_records());
-    count((0..n).filter_map(|slot| {
-        let point = sub(&place(slot)?, &released.origin());
-        let record = slot / slots;
-        let other = (record + n_records.div_ceil(2)) % n_records;
-        let away = |record: usize| to_record(released.obfuscation(), record, &point);
+    let records = released.obfuscation();
+    count(places.map(|(own, place)| {
+        let other = half_a_map_away(own, records.len());
+        let away = |record: usize| distance_to_record(records, record, &place);
         // Points at the same place have equal distances up to rounding.
-        Some(away(record) <= away(other) + rounding(released.obfuscation(), record, &point))
+        away(own) <= away(other) + rounding(records, own, &place)
     }))
-}
-
-/// Returns the distance of every hidden point to its own record, in the unit of the map. It is
-/// almost 0 if ground truth and released map belong together. A point farther away than a threshold
-/// cannot be recovered within it.
-pub fn away_from_own<const D: usize>(
-    released: &Released<D>,
-    original: &Original<D>,
-    secret: &Secret,
-) -> Vec<f64> {
-    let n = secret.n_slots().min(released.n_slots());
-    away(released, n, point_of(original, secret))
-}
-
-/// Returns the largest distance of a hidden point to its own record that rounding to `f32`
-/// explains, in the unit of the map.
-pub fn farthest_for_rounding<const D: usize>(
-    released: &Released<D>,
-    original: &Original<D>,
-    secret: &Secret,
-) -> f64 {
-    let place = point_of(original, secret);
-    let of_slot = |slot: usize| {
-        let point = sub(&place(slot)?, &released.origin());
-        Some(rounding(released.obfuscation(), slot / released.slots_per_record(), &point))
-    };
-    let n = secret.n_slots().min(released.n_slots());
-    (0..n).filter_map(of_slot).fold(0.0, f64::max)
 }
 
 /// Returns the distances of recovered positions to their own records; almost 0 if rows have the
@@ -171,52 +88,188 @@ pub fn recovered_away<const D: usize>(
     released: &Released<D>,
     recovered: &Recovered<D>,
 ) -> Vec<f64> {
-    let n = recovered.n_slots().min(released.n_slots());
-    away(released, n, |slot| recovered.position(slot))
+    let positions = (0..recovered.n_slots()).map(|slot| recovered.position(slot));
+    let places = by_record(released, positions);
+    places.map(|(own, place)| distance_to_record(released.obfuscation(), own, &place)).collect()
 }
 
-fn away<const D: usize>(
-    released: &Released<D>,
-    n: usize,
-    place: impl Fn(usize) -> Option<[f64; D]>,
-) -> Vec<f64> {
-    let slots = released.slots_per_record();
-    let of_slot = |slot: usize| {
-        let point = sub(&place(slot)?, &released.origin());
-        Some(to_record(released.obfuscation(), slot / slots, &point))
-    };
-    (0..n).filter_map(of_slot).collect()
+/// Bounds are rounded by this share of their sides, and this share of the points may be outside: keypoints at the border of an
+/// image.
+const BOUNDS_SLACK: f64 = 1e-3;
+const MAX_OUTSIDE: f64 = 0.01;
+/// Share of points nearer to their own records than to others, so that records clearly belong to the points.
+const CLEARLY: f64 = 0.75;
+/// The metric of rows whose points are off their records as by [`Truth::is_noise`]: their median distance, in the unit of the map.
+pub const OFF_RECORD: &str = "off_record";
+
+/// A released map with its ground truth.
+#[derive(Clone, Copy, Debug)]
+pub struct Truth<'a, const D: usize> {
+    /// True points.
+    pub original: &'a Original<D>,
+    /// Released map.
+    pub released: &'a Released<D>,
+    /// Secret of the released map.
+    pub secret: &'a Secret,
+}
+
+impl<const D: usize> Truth<'_, D> {
+    /// Checks that ground truth and released map belong together: unit, number of points, fingerprint,
+    /// and positions of the points. With the wrong ground truth, a map would wrongly look safe.
+    ///
+    /// # Errors
+    /// When the three do not belong together.
+    pub fn belongs(&self) -> Result<(), Error> {
+        let Self { original, released, secret } = self;
+        let (unit, released_unit) = (original.reveal().unit(), released.unit());
+        if unit != released_unit {
+            let expected = format!("{}, the unit of the originals", unit.name());
+            return Err(Error::new("unit of the released map", expected, released_unit.name()));
+        }
+        for (what, expected, number) in [
+            ("originals", secret.n_originals(), original.len()),
+            ("hidden points", secret.n_slots(), released.n_slots()),
+            ("hidden points per record", secret.slots_per_record(), released.slots_per_record()),
+        ] {
+            if expected != number {
+                let expected = format!("{expected}, as in the secret");
+                return Err(Error::new(what, expected, number.to_string()));
+            }
+        }
+        released.fingerprint().expect(secret.map())?;
+        let (nearer, n) = nearer_to_own_record(released, self.places());
+        if are_strangers((nearer, n)) {
+            let expected = "points nearer to their own records than to others";
+            let share = format!("{nearer} of {n}");
+            let found =
+                format!("{share} (the truth of another map, unit, frame or order of slots)");
+            return Err(Error::new("truth", expected, found));
+        }
+        let is_outside = |bounds: &Bounds<D>, point: &[f64; D]| {
+            (0..D).any(|c| {
+                let slack = BOUNDS_SLACK * (bounds.high[c] - bounds.low[c]);
+                point[c] < bounds.low[c] - slack || point[c] > bounds.high[c] + slack
+            })
+        };
+        if let Some(bounds) = released.bounds() {
+            let outside = self.points().filter(|point| is_outside(&bounds, point)).count();
+            if outside as f64 > MAX_OUTSIDE * n as f64 {
+                let found = format!("{outside} of {n} outside");
+                return Err(Error::new("bounds", "a box of all hidden points", found));
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the hidden point of each slot.
+    fn points(&self) -> impl Iterator<Item = [f64; D]> {
+        let points = self.original.reveal().positions();
+        self.secret.hidden().iter().map(|id| points[id.index()])
+    }
+
+    fn places(&self) -> impl Iterator<Item = (usize, [f64; D])> {
+        by_record(self.released, self.points().map(Some))
+    }
+
+    /// Returns the distance of every hidden point to its own record, in the unit of the map. It is
+    /// almost 0 if ground truth and released map belong together. A point farther away than a
+    /// threshold cannot be recovered within it.
+    pub fn away_from_own(&self) -> Vec<f64> {
+        let records = self.released.obfuscation();
+        self.places().map(|(own, place)| distance_to_record(records, own, &place)).collect()
+    }
+
+    /// Returns the largest distance of a hidden point to its own record that rounding to `f32`
+    /// explains, in the unit of the map.
+    pub fn farthest_for_rounding(&self) -> f64 {
+        let records = self.released.obfuscation();
+        self.places().map(|(own, place)| rounding(records, own, &place)).fold(0.0, f64::max)
+    }
+
+    /// Returns whether hidden points are off their records as by a scheme's noise: in directions that
+    /// do not depend on the place. A wrong scale, frame or order of slots moves them by their places,
+    /// or all alike.
+    pub fn is_noise(&self) -> bool {
+        let records = self.released.obfuscation();
+        let (nearer, n) = nearer_to_own_record(self.released, self.places());
+        let off = |(own, place)| sub(&place, &on_record(records, own, &place));
+        let off: Vec<[f64; D]> = self.places().map(off).collect();
+        let points: Vec<[f64; D]> = self.places().map(|(_, place)| place).collect();
+        let column = |of: &[[f64; D]], c: usize| -> Vec<f64> { of.iter().map(|x| x[c]).collect() };
+        // Five deviations of a correlation by chance; of few points less.
+        let limit = (5.0 / (n.max(1) as f64).sqrt()).min(0.3);
+        let is_free = |c: usize| {
+            let own = column(&off, c);
+            let (sum, squares) = own.iter().fold((0.0, 0.0), |(s, q), x| (s + x, q + x * x));
+            let are_alike = sum * sum > limit * limit * squares * n as f64;
+            let is_unrelated = |axis| correlation(&own, &column(&points, axis)).abs() <= limit;
+            !are_alike && (0..D).all(is_unrelated)
+        };
+        nearer as f64 >= CLEARLY * n as f64 && (0..D).all(is_free)
+    }
+
+    /// Returns the metric [`OFF_RECORD`] of a row, if rounding does not explain it.
+    pub(crate) fn off_record(&self) -> Option<(String, f64)> {
+        let mut away = self.away_from_own();
+        let middle = if away.is_empty() { 0.0 } else { median(&mut away) };
+        let is_noise = middle > self.farthest_for_rounding()
+            && !self.released.obfuscation().is_bearings()
+            && self.is_noise();
+        is_noise.then(|| (OFF_RECORD.to_owned(), middle))
+    }
+
+    /// Returns figures on bearings from one center, by name; empty for other records.
+    ///
+    /// `real_bearings_percent` is the share of records that point to their own point. Decoys are told
+    /// by the support of their lists: records with little support are called decoys. Precision, recall
+    /// and the area under the curve are those of decoys; the area is 0.5 by chance.
+    pub fn bearings(&self, lists: &Neighborhoods) -> Vec<(String, f64)> {
+        let Some(support) = support(self.released, lists) else { return Vec::new() };
+        let limit = self.farthest_for_rounding();
+        let decoy: Vec<bool> = self.away_from_own().into_iter().map(|away| away > limit).collect();
+        let n_decoys = decoy.iter().filter(|decoy| **decoy).count();
+        let n_real = decoy.len() - n_decoys;
+        let percent = |part: usize, whole: usize| 100.0 * part as f64 / whole.max(1) as f64;
+        let mut figures = vec![("real_bearings_percent", percent(n_real, decoy.len()))];
+        if n_decoys > 0 && n_real > 0 {
+            let called = || support.iter().zip(&decoy).filter(|(support, _)| **support < REAL);
+            let right = called().filter(|(_, decoy)| **decoy).count();
+            figures.push(("decoys_precision_percent", percent(right, called().count())));
+            figures.push(("decoys_recall_percent", percent(right, n_decoys)));
+            figures.push(("decoys_area", area(&support, &decoy)));
+        }
+        figures.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+    }
 }
 
 /// Returns the distance between a point and its record that rounding to `f32` explains.
-fn rounding<const D: usize>(obfuscation: &Obfuscation<D>, record: usize, point: &[f64; D]) -> f64 {
-    let held = match obfuscation {
+fn rounding<const D: usize>(records: &Obfuscation<D>, record: usize, point: &[f64; D]) -> f64 {
+    let held = match records {
         Obfuscation::Lines(_) | Obfuscation::AxisPlanes(_) => [0.0; D],
         Obfuscation::Rays(rays) => rays.centers()[usize::from(rays.center()[record])],
         Obfuscation::AxisCandidates(candidates) => candidates.position()[record],
     };
     let size = |v: &[f64; D]| dot(v, v).sqrt();
-    8.0 * f64::from(f32::EPSILON) * (size(point) + size(&held.map(f64::from)))
+    8.0 * f64::from(f32::EPSILON) * (size(point) + size(&widen(&held)))
 }
 
 /// Returns the place of a record that is nearest to `point`, relative to the released origin.
 fn on_record<const D: usize>(
-    obfuscation: &Obfuscation<D>,
+    records: &Obfuscation<D>,
     record: usize,
     point: &[f64; D],
 ) -> [f64; D] {
-    let on_line = |from: [f32; D], direction: [f32; D], least: f64| -> [f64; D] {
-        let (from, direction) = (from.map(f64::from), direction.map(f64::from));
-        let t = dot(&sub(point, &from), &direction).max(least);
-        along(&from, t, &direction)
+    let on_line = |from: &[f32; D], direction: &[f32; D], least: f64| {
+        let (from, direction) = (widen(from), widen(direction));
+        along(&from, dot(&sub(point, &from), &direction).max(least), &direction)
     };
-    match obfuscation {
+    match records {
         Obfuscation::Lines(lines) => {
-            on_line(lines.foot()[record], lines.direction()[record], f64::NEG_INFINITY)
+            on_line(&lines.foot()[record], &lines.direction()[record], f64::NEG_INFINITY)
         }
         Obfuscation::Rays(rays) => {
-            let center = rays.centers()[usize::from(rays.center()[record])];
-            on_line(center, rays.direction()[record], 0.0)
+            let center = &rays.centers()[usize::from(rays.center()[record])];
+            on_line(center, &rays.direction()[record], 0.0)
         }
         Obfuscation::AxisPlanes(planes) => {
             let (axis, mut place) = (usize::from(planes.axis()[record]), *point);
@@ -224,9 +277,10 @@ fn on_record<const D: usize>(
             place
         }
         Obfuscation::AxisCandidates(candidates) => {
-            let published = candidates.position()[record].map(f64::from);
-            let of_axis = |axis: usize| -> [f64; D] {
-                std::array::from_fn(|c| if c == axis { point[c] } else { published[c] })
+            let of_axis = |axis: usize| {
+                let mut place = widen(&candidates.position()[record]);
+                place[axis] = point[axis];
+                place
             };
             let nearer =
                 |a: &[f64; D], b: &[f64; D]| distance(point, a).total_cmp(&distance(point, b));
@@ -235,55 +289,13 @@ fn on_record<const D: usize>(
     }
 }
 
-fn to_record<const D: usize>(obfuscation: &Obfuscation<D>, record: usize, point: &[f64; D]) -> f64 {
-    distance(point, &on_record(obfuscation, record, point))
-}
-
-/// The metric of rows whose points are off their records as by [`is_noise`]: their median distance, in the unit of the map.
-pub const OFF_RECORD: &str = "off_record";
-/// Share of points nearer to their own records than to others, so that records clearly belong to the points.
-const CLEARLY: f64 = 0.75;
-
-/// Returns whether hidden points are off their records as by a scheme's noise: in directions that do not depend on the place. A wrong
-/// scale, frame or order of slots moves them by their places, or all alike.
-pub fn is_noise<const D: usize>(
-    released: &Released<D>,
-    original: &Original<D>,
-    secret: &Secret,
-) -> bool {
-    let n = secret.n_slots().min(released.n_slots());
-    let place = point_of(original, secret);
-    let (nearer, of) = nearer_to_own_record(released, n, &place);
-    let points = (0..n).filter_map(&place).map(|point| sub(&point, &released.origin()));
-    let points: Vec<[f64; D]> = points.collect();
-    let off = |(slot, point): (usize, &[f64; D])| {
-        sub(point, &on_record(released.obfuscation(), slot / released.slots_per_record(), point))
-    };
-    let off: Vec<[f64; D]> = points.iter().enumerate().map(off).collect();
-    let column = |rows: &[[f64; D]], c: usize| -> Vec<f64> { rows.iter().map(|x| x[c]).collect() };
-    // Five deviations of a correlation by chance; of few points less.
-    let most = (5.0 / (n.max(1) as f64).sqrt()).min(0.3);
-    let is_free = |c: usize| {
-        let own = column(&off, c);
-        let (sum, squares) = own.iter().fold((0.0, 0.0), |(s, q), x| (s + x, q + x * x));
-        let are_alike = sum * sum > most * most * squares * n as f64;
-        !are_alike && (0..D).all(|axis| correlation(&own, &column(&points, axis)).abs() <= most)
-    };
-    nearer as f64 >= CLEARLY * of as f64 && (0..D).all(is_free)
-}
-
-/// Returns the metric [`OFF_RECORD`] of a row, if rounding does not explain it.
-pub(crate) fn off_record<const D: usize>(
-    released: &Released<D>,
-    original: &Original<D>,
-    secret: &Secret,
-) -> Option<(String, f64)> {
-    let mut away = away_from_own(released, original, secret);
-    let middle = if away.is_empty() { 0.0 } else { median(&mut away) };
-    let is_off = middle > farthest_for_rounding(released, original, secret);
-    let is_noise =
-        is_off && !released.obfuscation().is_bearings() && is_noise(released, original, secret);
-    is_noise.then(|| (OFF_RECORD.to_owned(), middle))
+/// Returns the distance of `point`, relative to the released origin, to the feasible set of `record`.
+pub fn distance_to_record<const D: usize>(
+    records: &Obfuscation<D>,
+    record: usize,
+    point: &[f64; D],
+) -> f64 {
+    distance(point, &on_record(records, record, point))
 }
 
 /// Returns Pearson's correlation of two columns; 0 if one is constant.
@@ -294,35 +306,6 @@ pub fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let (a, b) = (off(a, mean(a)), off(b, mean(b)));
     let spread = (sum(&a, &a) * sum(&b, &b)).sqrt();
     if spread > 0.0 { sum(&a, &b) / spread } else { 0.0 }
-}
-
-/// Returns figures on bearings from one center, by name; empty for other records.
-///
-/// `real_bearings_percent` is the share of records that point to their own point. Decoys are told
-/// by the support of their lists: records with little support are called decoys. Precision, recall
-/// and the area under the curve are those of decoys; the area is 0.5 by chance.
-pub fn bearings<const D: usize>(
-    released: &Released<D>,
-    original: &Original<D>,
-    secret: &Secret,
-    lists: &Neighborhoods,
-) -> Vec<(String, f64)> {
-    let Some(support) = support(released, lists) else { return Vec::new() };
-    let most = farthest_for_rounding(released, original, secret);
-    let decoy: Vec<bool> =
-        away_from_own(released, original, secret).into_iter().map(|away| away > most).collect();
-    let n_decoys = decoy.iter().filter(|decoy| **decoy).count();
-    let n_real = decoy.len() - n_decoys;
-    let percent = |part: usize, whole: usize| 100.0 * part as f64 / whole.max(1) as f64;
-    let mut figures = vec![("real_bearings_percent", percent(n_real, decoy.len()))];
-    if n_decoys > 0 && n_real > 0 {
-        let called = || support.iter().zip(&decoy).filter(|(support, _)| **support < REAL);
-        let right = called().filter(|(_, decoy)| **decoy).count();
-        figures.push(("decoys_precision_percent", percent(right, called().count())));
-        figures.push(("decoys_recall_percent", percent(right, n_decoys)));
-        figures.push(("decoys_area", area(&support, &decoy)));
-    }
-    figures.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
 }
 
 /// Returns the probability that a random decoy has less support than a random real record; equal
@@ -368,15 +351,17 @@ mod tests {
         };
         let scheme = (sphere::ENTRY.in_3d.unwrap())(&SchemeOptions::usual(Unit::Meter));
         let (released, secret) = obfuscate(&*scheme, &original, None, &Key::from_seed(0)).unwrap();
-        let found = bearings(&released, &original, &secret, &lists(&secret));
-        let of = |name: &str| found.iter().find(|(known, _)| known == name).unwrap().1;
+        let truth = Truth { original: &original, released: &released, secret: &secret };
+        let figures = truth.bearings(&lists(&secret));
+        let of = |name: &str| figures.iter().find(|(known, _)| known == name).unwrap().1;
         assert!((of("real_bearings_percent") - 100.0 / 3.0).abs() < 0.2);
         // Twelve neighbors among 600 points cover a wider angle than the attack expects.
-        assert!(of("decoys_area") > 0.75, "{found:?}");
-        assert!(of("decoys_precision_percent") > 80.0, "{found:?}");
-        assert!(of("decoys_recall_percent") > 60.0, "{found:?}");
+        assert!(of("decoys_area") > 0.75, "{figures:?}");
+        assert!(of("decoys_precision_percent") > 80.0, "{figures:?}");
+        assert!(of("decoys_recall_percent") > 60.0, "{figures:?}");
         // Lines are no bearings.
         let (released, secret) = obfuscate(&Olc, &original, None, &Key::from_seed(0)).unwrap();
-        assert_eq!(bearings::<3>(&released, &original, &secret, &lists(&secret)), []);
+        let truth = Truth { original: &original, released: &released, secret: &secret };
+        assert_eq!(truth.bearings(&lists(&secret)), []);
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix6, Vector6};
 
 use crate::geometry::camera::{Camera, Intrinsics};
-use crate::geometry::vector::{distance, dot, sub};
+use crate::geometry::vector::{cross, distance, dot, sub};
 use crate::seed::{Draws, Stage};
 
 /// A match of a keypoint of an image with a point of a map. Places are pixels of the pinhole.
@@ -37,7 +37,7 @@ pub enum Match {
 }
 
 /// Residuals up to this many pixels are inliers.
-pub const INLIER: f64 = 4.0;
+const INLIER: f64 = 4.0;
 /// Scales of the robust loss in pixels, from the first to the last rounds.
 const SCALES: [f64; 6] = [64.0, 32.0, 16.0, 8.0, 4.0, 2.0];
 /// Iterations per scale.
@@ -57,11 +57,7 @@ impl Match {
                 let d = camera.pose.rotation.map(|row| dot(&row, direction));
                 let Intrinsics { focal, principal } = &camera.intrinsics;
                 // The plane through the camera and the line, as a line in pixels.
-                let plane = [
-                    x[1] * d[2] - x[2] * d[1],
-                    x[2] * d[0] - x[0] * d[2],
-                    x[0] * d[1] - x[1] * d[0],
-                ];
+                let plane = cross(&x, &d);
                 let (a, b) = (plane[0] / focal[0], plane[1] / focal[1]);
                 let away = sub(place, principal);
                 let length = libm::hypot(a, b);
@@ -82,7 +78,7 @@ impl Match {
 /// retrieval gives, and from ten perturbed ones; `reach` is the standard deviation of their centers.
 /// Returns the estimate with the most inliers and their number; `None` with too few matches.
 ///
-/// The loss is Cauchy's with a decreasing scale, at last truncated at [`INLIER`].
+/// The loss is Cauchy's with a decreasing scale, at last truncated at 4 pixels.
 pub fn estimate(
     start: &Camera,
     matches: &[Match],
@@ -103,8 +99,9 @@ pub fn estimate(
             refine(&mut camera, matches, |r| 1.0 / (1.0 + (r / scale) * (r / scale)));
         }
         refine(&mut camera, matches, |r| f64::from(u8::from(r < INLIER)));
-        let n = matches.iter().filter(|one| size(one, &camera).is_some_and(|r| r < INLIER)).count();
-        if best.as_ref().is_none_or(|(_, most)| n > *most) {
+        let is_inlier = |input: &&Match| size(input, &camera).is_some_and(|r| r < INLIER);
+        let n = matches.iter().filter(is_inlier).count();
+        if best.as_ref().is_none_or(|(_, max)| n > *max) {
             best = Some((camera, n));
         }
     }
@@ -115,26 +112,26 @@ fn moved(camera: &Camera, by: &[f64; 6]) -> Camera {
     Camera { pose: camera.pose.moved(by), ..*camera }
 }
 
-fn size(one: &Match, camera: &Camera) -> Option<f64> {
-    one.residuals(camera).map(|(r, _)| libm::hypot(r[0], r[1]))
+fn size(input: &Match, camera: &Camera) -> Option<f64> {
+    input.residuals(camera).map(|(r, _)| libm::hypot(r[0], r[1]))
 }
 
 /// Improves the pose by Levenberg-Marquardt on reweighted squares. `weight` is the weight of a
 /// residual of some pixels.
 fn refine(camera: &mut Camera, matches: &[Match], weight: impl Fn(f64) -> f64) {
-    let depths = matches.iter().map(|one| match one {
-        Match::Point { point, .. } | Match::ImageLine { point, .. } => {
-            distance(point, &camera.pose.center)
-        }
-        Match::MapLine { point, .. } => distance(point, &camera.pose.center),
+    let depths = matches.iter().map(|input| {
+        let (Match::Point { point, .. }
+        | Match::ImageLine { point, .. }
+        | Match::MapLine { point, .. }) = input;
+        distance(point, &camera.pose.center)
     });
     let depth = depths.sum::<f64>() / matches.len() as f64;
     let mut damping = 1e-4;
     for _ in 0..ITERATIONS {
         let weights: Vec<f64> =
-            matches.iter().map(|one| size(one, camera).map_or(0.0, &weight)).collect();
+            matches.iter().map(|input| size(input, camera).map_or(0.0, &weight)).collect();
         let cost = |camera: &Camera| {
-            let of = |(one, weight): (&Match, &f64)| match size(one, camera) {
+            let of = |(input, weight): (&Match, &f64)| match size(input, camera) {
                 Some(r) => weight * r * r,
                 // Moving a point behind the camera must not pay.
                 None => weight * 1e6,
@@ -149,11 +146,11 @@ fn refine(camera: &mut Camera, matches: &[Match], weight: impl Fn(f64) -> f64) {
             by[c] = steps[c];
             moved(camera, &by)
         });
-        for (one, weight) in matches.iter().zip(&weights) {
-            let Some((r, n)) = one.residuals(camera).filter(|_| *weight > 0.0) else { continue };
+        for (input, weight) in matches.iter().zip(&weights) {
+            let Some((r, n)) = input.residuals(camera).filter(|_| *weight > 0.0) else { continue };
             let mut rows = [Vector6::zeros(); 2];
             for c in 0..6 {
-                let Some((after, _)) = one.residuals(&all_moved[c]) else { continue };
+                let Some((after, _)) = input.residuals(&all_moved[c]) else { continue };
                 rows.iter_mut()
                     .enumerate()
                     .for_each(|(k, row)| row[c] = (after[k] - r[k]) / steps[c]);

@@ -12,22 +12,22 @@
 
 mod estimate;
 
-pub use estimate::{INLIER, Match, estimate};
+pub use estimate::{Match, estimate};
 
 use nalgebra::{Matrix6, SymmetricEigen, Vector6};
 use rayon::prelude::*;
 
 use crate::geometry::camera::{Camera, PoseError};
 use crate::geometry::frame::Bounds;
-use crate::geometry::vector::{dot, widen};
+use crate::geometry::vector::{cross, dot, widen};
 use crate::obfuscate::{Scheme, obfuscate};
 use crate::released::{Obfuscation, Released};
 use crate::seed::{Key, Stage};
 use crate::truth::{Original, Secret};
-use crate::{Error, PointSet, Unit};
+use crate::{Error, OriginalId, PointSet, Unit};
 
 /// Largest condition number of a pose that counts as determined.
-const MOST_CONDITION: f64 = 1e12;
+const MAX_CONDITION: f64 = 1e12;
 
 /// An image with its pose and the points that it observes.
 ///
@@ -101,21 +101,18 @@ pub enum Free<const D: usize> {
 /// axis of axis candidates counts as known, because a match can be verified under each axis.
 pub fn free_directions<const D: usize>(released: &Released<D>, secret: &Secret) -> Vec<Free<D>> {
     let n = released.n_slots();
-    let record = |slot: usize| slot / released.slots_per_record();
+    let of_record = |free: &dyn Fn(usize) -> [f64; D]| {
+        (0..n).map(|slot| Free::Along(free(slot / released.slots_per_record()))).collect()
+    };
     match released.obfuscation() {
-        Obfuscation::Lines(lines) => {
-            (0..n).map(|slot| Free::Along(widen(&lines.direction()[record(slot)]))).collect()
-        }
+        Obfuscation::Lines(lines) => of_record(&|record| widen(&lines.direction()[record])),
         // All bearings meet in the center, so the distance of a camera from it stays free. Decoys would
         // seem to fix it.
         bearings if bearings.is_bearings() => vec![Free::More; n],
-        Obfuscation::Rays(rays) => {
-            (0..n).map(|slot| Free::Along(widen(&rays.direction()[record(slot)]))).collect()
-        }
+        Obfuscation::Rays(rays) => of_record(&|record| widen(&rays.direction()[record])),
         // In an image, an axis-parallel line; in space, a plane.
         Obfuscation::AxisPlanes(planes) if D == 2 => {
-            let along = |slot: usize| unit_vector(1 - usize::from(planes.axis()[record(slot)]));
-            (0..n).map(|slot| Free::Along(along(slot))).collect()
+            of_record(&|record| unit_vector(1 - usize::from(planes.axis()[record])))
         }
         Obfuscation::AxisPlanes(_) => vec![Free::More; n],
         Obfuscation::AxisCandidates(_) => match secret.swapped_axis() {
@@ -132,8 +129,7 @@ fn unit_vector<const D: usize>(axis: usize) -> [f64; D] {
 /// Returns the errors of all `views` with the points themselves.
 pub fn unprotected(views: &[View], positions: &[[f64; 3]]) -> Vec<Option<PoseError>> {
     let of = |view: &View| {
-        let known = view.observed.iter().map(|&row| (positions[row as usize], ImageLine::Point));
-        view.pose_error(known)
+        view.pose_error(view.observed.iter().map(|&row| (positions[row as usize], Free::Nowhere)))
     };
     views.par_iter().map(of).collect()
 }
@@ -153,12 +149,12 @@ pub fn with_map(
     let of = |view: &View| {
         let known = view.observed.iter().filter_map(|&row| {
             let position = positions[row as usize];
-            let line = match free[row as usize] {
-                Free::Nowhere => ImageLine::Point,
-                Free::Along(direction) => ImageLine::Along(view.image_of(&position, &direction)?),
-                Free::More => return None,
+            let free = match free[row as usize] {
+                Free::Nowhere => Free::Nowhere,
+                Free::Along(direction) => Free::Along(view.image_of(&position, &direction)?),
+                Free::More => Free::More,
             };
-            Some((position, line))
+            Some((position, free))
         });
         view.pose_error(known)
     };
@@ -188,26 +184,10 @@ pub fn with_queries(
         let key = key.of_item(Stage::Image, number as u64);
         let (released, secret) = obfuscate(scheme, &original, None, &key)?;
         let free = free_directions(&released, &secret);
-        let known = secret.hidden().iter().zip(free).filter_map(|(hidden, free)| {
-            let line = match free {
-                Free::Nowhere => ImageLine::Point,
-                Free::Along(direction) => ImageLine::Along(direction),
-                Free::More => return None,
-            };
-            Some((positions[rows[hidden.index()] as usize], line))
-        });
-        Ok(view.pose_error(known))
+        let point = |hidden: &OriginalId| positions[rows[hidden.index()] as usize];
+        Ok(view.pose_error(secret.hidden().iter().map(point).zip(free)))
     };
     views.par_iter().enumerate().map(of).collect()
-}
-
-/// What a match fixes in the image.
-#[derive(Clone, Copy, Debug)]
-enum ImageLine {
-    /// Both coordinates.
-    Point,
-    /// The distance from a line with this direction.
-    Along([f64; 2]),
 }
 
 impl View {
@@ -225,35 +205,28 @@ impl View {
         (x[2] > 0.0).then(|| self.slopes(&x).map(|row| dot(&row, &turned)))
     }
 
-    /// Returns the deviations of the pose from matches of known points; `None` if they do not
-    /// determine it.
+    /// Returns the deviations of the pose from matches of known points, with the direction in the image
+    /// that each leaves free; `None` if they do not determine it.
     ///
     /// The pose is perturbed from the left: `dx = w x x + dt` in the camera's frame.
-    fn pose_error(
-        &self,
-        matches: impl Iterator<Item = ([f64; 3], ImageLine)>,
-    ) -> Option<PoseError> {
+    fn pose_error(&self, matches: impl Iterator<Item = ([f64; 3], Free<2>)>) -> Option<PoseError> {
         let mut information = Matrix6::zeros();
         let (mut depths, mut n) = (0.0, 0.0);
-        for (point, line) in matches {
+        for (point, free) in matches {
             let x = self.camera.pose.in_camera(&point);
-            if x[2] <= 0.0 {
+            if x[2] <= 0.0 || free == Free::More {
                 continue;
             }
             (depths, n) = (depths + x[2], n + 1.0);
             let rows = self.slopes(&x).map(|j| {
-                let by_rotation = [
-                    x[1] * j[2] - x[2] * j[1],
-                    x[2] * j[0] - x[0] * j[2],
-                    x[0] * j[1] - x[1] * j[0],
-                ];
+                let by_rotation = cross(&x, &j);
                 Vector6::new(by_rotation[0], by_rotation[1], by_rotation[2], j[0], j[1], j[2])
             });
-            match line {
-                ImageLine::Point => {
+            match free {
+                Free::Nowhere => {
                     rows.iter().for_each(|row| information += row * row.transpose());
                 }
-                ImageLine::Along(direction) => {
+                Free::Along(direction) => {
                     let length = libm::hypot(direction[0], direction[1]);
                     // A line toward the camera is a point in the image, which gives no normal.
                     if length > 0.0 {
@@ -261,6 +234,7 @@ impl View {
                         information += row * row.transpose();
                     }
                 }
+                Free::More => {}
             }
         }
         // Translations count in units of the mean depth, so that the condition number does not
@@ -271,8 +245,8 @@ impl View {
         }
         let scale = Matrix6::from_diagonal(&Vector6::new(1.0, 1.0, 1.0, depth, depth, depth));
         let eigen = SymmetricEigen::new(scale * information * scale);
-        let (least, most) = (eigen.eigenvalues.min(), eigen.eigenvalues.max());
-        if least <= 0.0 || most / least > MOST_CONDITION || most.is_nan() {
+        let (min, max) = (eigen.eigenvalues.min(), eigen.eigenvalues.max());
+        if min <= 0.0 || max / min > MAX_CONDITION || max.is_nan() {
             return None;
         }
         let variance = |c: usize| {
@@ -288,10 +262,8 @@ impl View {
 mod tests {
     use super::*;
     use crate::geometry::camera::{Intrinsics, Pose};
-    use crate::geometry::vector::sub;
     use crate::obfuscate::{SCHEMES, SchemeOptions};
-    use crate::released::Rays;
-    use crate::{OriginalId, synthetic};
+    use crate::synthetic;
 
     fn view(focal: f64, n: usize) -> View {
         View {
@@ -379,23 +351,13 @@ mod tests {
         }
     }
 
+    /// Neither do decoys help.
     #[test]
     fn rays_from_one_center_do_not_localize() {
         let (view, original) = room();
+        let sphere = crate::obfuscate::sphere::Sphere;
+        let (released, secret) = obfuscate(&sphere, &original, None, &Key::from_seed(0)).unwrap();
         let positions = original.reveal().positions();
-        let n = positions.len();
-        let center = [0.5, 9.0, 1.0];
-        let directions: Vec<[f64; 3]> = positions.iter().map(|p| sub(p, &center)).collect();
-        let rays = Rays::try_new(&[center], vec![0; n], &directions).unwrap();
-        let released =
-            Released::try_new(Obfuscation::Rays(rays), 1, [0.0; 3], Unit::Meter, None).unwrap();
-        let hidden = (0..n).map(OriginalId::from_index).collect();
-        let secret = Secret::try_new(hidden, None, (0..n as u32).collect(), vec![], n).unwrap();
-        assert_eq!(with_map(std::slice::from_ref(&view), positions, &released, &secret), [None]);
-        // Decoys do not help.
-        let usual = SchemeOptions::usual(Unit::Meter);
-        let sphere = crate::obfuscate::scheme("sphere").unwrap().of_dimension::<3>(&usual).unwrap();
-        let (released, secret) = obfuscate(&*sphere, &original, None, &Key::from_seed(0)).unwrap();
         assert_eq!(with_map(&[view], positions, &released, &secret), [None]);
     }
 

@@ -37,7 +37,13 @@ impl TrueNeighbors {
     ) -> Result<Self, Error> {
         let n_slots = secret.n_slots();
         let n_records = n_slots / slots_per_record;
-        check_k(k, n_records)?;
+        if k == 0 || n_records <= k {
+            let expected = match n_records.saturating_sub(1) {
+                0 => "more than one record".to_owned(),
+                others => format!("between 1 and {others} (other records)"),
+            };
+            return Err(Error::new("k", expected, k.to_string()));
+        }
         let mut records = vec![RecordId(0); n_slots * k];
         Nearness::new(knn, secret, slots_per_record).each(k, &mut records, &|_, near, row| {
             row.copy_from_slice(near);
@@ -62,7 +68,8 @@ impl TrueNeighbors {
         let offsets = (0..=n_slots as u64).map(|slot| slot * self.k as u64).collect();
         let (n_records, slots) = (self.n_records, self.slots_per_record);
         let lists = Neighborhoods::try_new(offsets, records, None, n_records, slots)?;
-        Ok(lists.with_about(about(self.map)))
+        let about = About { map: self.map, order: RowOrder::Slots, lists_by: ListsBy::Oracle };
+        Ok(lists.with_about(about))
     }
 
     /// Returns the number of true neighbors per list at an inlier ratio.
@@ -73,12 +80,15 @@ impl TrueNeighbors {
         // Lists without any true neighbor must not pass for lists with a few.
         let keep = (inlier_ratio * self.k as f64).round() as usize;
         let keep = keep.max(usize::from(inlier_ratio > 0.0));
-        let wanted = self.k - keep;
-        let most = outliers.most(self);
-        if wanted > most {
+        let n_wrong = self.k - keep;
+        let (available, meaning) = match outliers.noise {
+            Noise::Near => (outliers.per_slot, "between the 2K-th and the 10K-th nearest"),
+            Noise::Uniform | Noise::Clustered => (self.n_records - 1 - self.k, "not neighbors"),
+        };
+        if n_wrong > available {
             let what = format!("inlier ratio {inlier_ratio} at K = {}", self.k);
-            let expected = format!("at least {wanted} records that are {}", outliers.meaning());
-            return Err(Error::new(what, expected, most.to_string()));
+            let expected = format!("at least {n_wrong} records that are {meaning}");
+            return Err(Error::new(what, expected, available.to_string()));
         }
         Ok(keep)
     }
@@ -141,22 +151,6 @@ impl TrueNeighbors {
     }
 }
 
-fn check_k(k: usize, n_records: usize) -> Result<(), Error> {
-    if k > 0 && n_records > k {
-        return Ok(());
-    }
-    let others = n_records.saturating_sub(1);
-    let expected = match others {
-        0 => "more than one record".to_owned(),
-        _ => format!("between 1 and {others} (other records)"),
-    };
-    Err(Error::new("k", expected, k.to_string()))
-}
-
-fn about(map: Option<Fingerprint>) -> About {
-    About { map, order: RowOrder::Slots, lists_by: ListsBy::Oracle }
-}
-
 /// Builds a search over the originals for [`TrueNeighbors::new`], once per map.
 ///
 /// # Errors
@@ -192,8 +186,8 @@ impl<'a, const D: usize> Nearness<'a, D> {
         let hidden = self.secret.hidden();
         let length = (rows.len() / hidden.len().max(1)).max(1);
         let rows = rows.par_chunks_mut(length).zip(hidden).enumerate();
-        rows.for_each_init(Default::default, |(found, records), (slot, (row, original))| {
-            self.from(original.index(), n, found, records);
+        rows.for_each_init(Default::default, |(near, records), (slot, (row, original))| {
+            self.from(original.index(), n, near, records);
             make(slot, records, row);
         });
     }
@@ -203,15 +197,15 @@ impl<'a, const D: usize> Nearness<'a, D> {
         &self,
         original: usize,
         n: usize,
-        found: &mut Vec<(f64, u32)>,
+        near: &mut Vec<(f64, u32)>,
         records: &mut Vec<RecordId>,
     ) {
         let (own, several) = (self.record_of[original], self.slots_per_record > 1);
         let mut reach = n + MARGIN;
         loop {
-            self.knn.nearest(original, reach, found);
+            self.knn.nearest(original, reach, near);
             records.clear();
-            for &(_, at) in found.iter() {
+            for &(_, at) in near.iter() {
                 if records.len() < n
                     && let Some(record) = self.record_of[at as usize]
                     && Some(record) != own
@@ -220,7 +214,7 @@ impl<'a, const D: usize> Nearness<'a, D> {
                     records.push(record);
                 }
             }
-            if records.len() == n || found.len() < reach {
+            if records.len() == n || near.len() < reach {
                 return;
             }
             reach *= 2;
@@ -241,7 +235,7 @@ fn record_of_originals(secret: &Secret, slots_per_record: usize) -> Vec<Option<R
 /// early.
 #[inline(always)]
 fn listed(records: &[RecordId], record: RecordId) -> bool {
-    records.iter().fold(false, |hit, &other| hit | (other == record))
+    records.iter().fold(false, |hit, &known| hit | (known == record))
 }
 
 /// Translates neighbors given by original row to the records of one obfuscation. Omits dropped
@@ -265,7 +259,7 @@ pub fn from_points(
         let what = format!("neighbor entry {at}");
         return Err(Error::new(what, format!("points below {n}"), neighbors[at].to_string()));
     }
-    let ascending = offsets[0] == 0 && offsets.windows(2).all(|w| w[0] <= w[1]);
+    let ascending = offsets[0] == 0 && offsets.is_sorted();
     if !ascending || offsets[n] != neighbors.len() as u64 {
         let expected = format!("ascending from 0 to {}", neighbors.len());
         return Err(Error::new("offsets of neighbors by point", expected, "another sequence"));
@@ -349,7 +343,7 @@ const RING: (usize, usize) = (2, 10);
 const PATCH: usize = 2;
 const PLACES: usize = 2;
 /// Maximum number of draws for a far place; small maps may have none.
-const MOST_DRAWS: usize = 64;
+const MAX_DRAWS: usize = 64;
 
 /// Outliers of one noise model, prepared for one obfuscation.
 #[derive(Clone, Debug)]
@@ -407,8 +401,7 @@ impl Outliers {
                 let ring = &mut near[first..];
                 let mut draws = Draws::new(seed, Stage::OracleOutliers, slot as u64);
                 for (at, entry) in row.iter_mut().enumerate() {
-                    let drawn = at + draws.below((ring.len() - at) as u64) as usize;
-                    ring.swap(at, drawn);
+                    ring.swap(at, at + draws.below((ring.len() - at) as u64) as usize);
                     *entry = ring[at];
                 }
             });
@@ -434,7 +427,7 @@ impl Outliers {
             let start = records.len();
             for _ in 0..PLACES {
                 let mut place = middle;
-                for _ in 0..MOST_DRAWS {
+                for _ in 0..MAX_DRAWS {
                     place = draws.below(secret.n_originals() as u64) as u32;
                     if place != middle && around.iter().all(|&(_, other)| other != place) {
                         break;
@@ -454,28 +447,12 @@ impl Outliers {
             }
         }
         let patch_of = secret.hidden().iter().map(|id| patch_of_original[id.index()]).collect();
-        Self { noise: Noise::Clustered, records, per_slot: 0, starts, patch_of }
+        Self { noise: Noise::Clustered, records, starts, patch_of, ..Self::uniform() }
     }
 
     /// Returns the noise model.
     pub fn noise(&self) -> Noise {
         self.noise
-    }
-
-    /// Returns the number of outliers that every slot can have.
-    fn most(&self, truth: &TrueNeighbors) -> usize {
-        match self.noise {
-            Noise::Near => self.per_slot,
-            Noise::Uniform | Noise::Clustered => truth.n_records - 1 - truth.k,
-        }
-    }
-
-    /// Describes the records that [`most`](Self::most) counts, for error messages.
-    fn meaning(&self) -> &'static str {
-        match self.noise {
-            Noise::Near => "between the 2K-th and the 10K-th nearest",
-            Noise::Uniform | Noise::Clustered => "not neighbors",
-        }
     }
 
     /// Fills `row` with outliers of `slot`. Their order depends only on the seed and the slot, so a

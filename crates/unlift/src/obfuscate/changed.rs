@@ -4,8 +4,7 @@ use std::sync::Arc;
 
 use super::mitigate::Mitigation;
 use super::protect::Protection;
-use super::scheme::{Lifted, Scheme};
-use crate::geometry::frame::Bounds;
+use super::scheme::{Lifted, LocalPoints, Scheme};
 use crate::seed::Key;
 use crate::truth::{DropReason, Dropped};
 use crate::{Descriptors, Error, OriginalId};
@@ -57,24 +56,21 @@ impl<const D: usize> Scheme<D> for Changed<D> {
         self.scheme.parameters()
     }
 
-    fn lift(
-        &self,
-        points: &[[f64; D]],
-        bounds: Option<&Bounds<D>>,
-        key: &Key,
-    ) -> Result<Lifted<D>, Error> {
+    fn lift(&self, points: &LocalPoints<'_, D>, key: &Key) -> Result<Lifted<D>, Error> {
         let Change::Mitigation(mitigation, tracks) = &self.change else {
-            return self.scheme.lift(points, bounds, key);
+            return self.scheme.lift(points, key);
         };
-        let kept = mitigation.kept(points.len(), tracks.as_deref(), key)?;
-        let thinned: Vec<[f64; D]> = kept.iter().map(|&row| points[row as usize]).collect();
-        let mut lifted = self.scheme.lift(&thinned, bounds, key)?;
+        let n = points.positions.len();
+        let kept = mitigation.kept(n, tracks.as_deref(), key)?;
+        let thinned: Vec<_> = kept.iter().map(|&row| points.positions[row as usize]).collect();
+        let thinned = LocalPoints { positions: &thinned, ..*points };
+        let mut lifted = self.scheme.lift(&thinned, key)?;
         let original = |id: OriginalId| OriginalId(kept[id.index()]);
         lifted.hidden.iter_mut().for_each(|id| *id = original(*id));
-        lifted.dropped.iter_mut().for_each(|one| one.original = original(one.original));
-        let mut is_kept = vec![false; points.len()];
+        lifted.dropped.iter_mut().for_each(|dropped| dropped.original = original(dropped.original));
+        let mut is_kept = vec![false; n];
         kept.iter().for_each(|&row| is_kept[row as usize] = true);
-        let out = (0..points.len()).filter(|&row| !is_kept[row]).map(OriginalId::from_index);
+        let out = (0..n).filter(|&row| !is_kept[row]).map(OriginalId::from_index);
         let out = out.map(|original| Dropped { original, reason: DropReason::Thinned });
         lifted.dropped.extend(out);
         Ok(lifted)

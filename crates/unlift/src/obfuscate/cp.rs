@@ -3,9 +3,8 @@
 use std::sync::Arc;
 
 use super::ppl::random_pairs;
-use super::scheme::{Entry, Facts, Lifted, Scheme};
+use super::scheme::{Entry, Facts, Lifted, LocalPoints, Scheme};
 use crate::Error;
-use crate::geometry::frame::Bounds;
 use crate::released::{AxisCandidates, Obfuscation};
 use crate::seed::{Key, Stage};
 
@@ -45,23 +44,18 @@ impl<const D: usize> Scheme<D> for Cp {
         if D == 2 { CP2D.name } else { ENTRY.name }
     }
 
-    fn lift(
-        &self,
-        points: &[[f64; D]],
-        _: Option<&Bounds<D>>,
-        key: &Key,
-    ) -> Result<Lifted<D>, Error> {
-        let key = key.stage(Stage::Scheme);
+    fn lift(&self, points: &LocalPoints<'_, D>, key: &Key) -> Result<Lifted<D>, Error> {
+        let (points, key) = (points.positions, key.stage(Stage::Scheme));
         let (pairs, dropped) = random_pairs(points.len(), &mut key.draws(0));
         let (mut positions, mut hidden) = (Vec::new(), Vec::new());
         let mut swapped_axis = Vec::new();
         for (at, pair) in pairs.iter().enumerate() {
             let axis = key.draws(1 + at as u64).below(D as u64) as usize;
-            for (one, other) in [(pair[0], pair[1]), (pair[1], pair[0])] {
-                let mut position = points[one.index()];
-                position[axis] = points[other.index()][axis];
+            for (own, partner) in [(pair[0], pair[1]), (pair[1], pair[0])] {
+                let mut position = points[own.index()];
+                position[axis] = points[partner.index()][axis];
                 positions.push(position);
-                hidden.push(one);
+                hidden.push(own);
                 swapped_axis.push(axis as u8);
             }
         }

@@ -15,9 +15,8 @@
 use std::sync::Arc;
 
 use super::ray::rays_from;
-use super::scheme::{Entry, Facts, Lifted, Scheme};
+use super::scheme::{Entry, Facts, Lifted, LocalPoints, Scheme};
 use crate::Error;
-use crate::geometry::frame::Bounds;
 use crate::released::Obfuscation;
 use crate::seed::Key;
 
@@ -45,22 +44,17 @@ impl Scheme<2> for Dcl2d {
         ENTRY.name
     }
 
-    fn lift(
-        &self,
-        points: &[[f64; 2]],
-        bounds: Option<&Bounds<2>>,
-        _: &Key,
-    ) -> Result<Lifted<2>, Error> {
-        let Some(image) = bounds else {
+    fn lift(&self, points: &LocalPoints<'_, 2>, _: &Key) -> Result<Lifted<2>, Error> {
+        let Some(image) = points.bounds else {
             return Err(Error::new("image size", "known: anchors lie on its border", "none"));
         };
         let center = image.center();
         let half = (image.high[1] - image.low[1]) / 2.0;
         let anchors = [-1.0, 1.0].map(|side| [center[0], center[1] + side * half]);
         let chosen = |_, point: &[f64; 2]| usize::from(point[0] >= center[0]);
-        let mut lifted = rays_from(&anchors, points, chosen)?;
+        let mut lifted = rays_from(&anchors, points.positions, chosen)?;
         if let Obfuscation::Rays(rays) = lifted.obfuscation {
-            let (mut first, mut second) = (*image, *image);
+            let (mut first, mut second) = (image, image);
             (first.high[0], second.low[0]) = (center[0], center[0]);
             lifted.obfuscation = Obfuscation::Rays(rays.with_regions(vec![first, second])?);
         }

@@ -1,6 +1,6 @@
 //! Obfuscation: applies a scheme, then the steps that all schemes share (origin, shuffling).
 
-use super::scheme::Scheme;
+use super::scheme::{LocalPoints, Scheme};
 use super::size;
 use crate::geometry::frame::rounded_origin;
 use crate::geometry::vector::sub;
@@ -39,7 +39,8 @@ pub fn obfuscate<const D: usize>(
         None => rounded_origin(points.positions()),
     };
     let local: Vec<[f64; D]> = points.positions().iter().map(|p| sub(p, &origin)).collect();
-    let lifted = scheme.lift(&local, bounds.map(|b| b.about(&origin)).as_ref(), key)?;
+    let local = LocalPoints { positions: &local, bounds: bounds.map(|b| b.about(&origin)) };
+    let lifted = scheme.lift(&local, key)?;
 
     let slots = lifted.slots_per_record;
     let n_records = lifted.obfuscation.len();
@@ -49,18 +50,15 @@ pub fn obfuscate<const D: usize>(
     let mut swapped_axis = lifted.swapped_axis.as_ref().map(|_| Vec::with_capacity(n_records));
     let mut descriptor_row = Vec::with_capacity(n_records * slots);
     for (record, &from) in order.iter().enumerate() {
-        let mut slot_order: Vec<usize> = (0..slots).collect();
-        let mut rows: Vec<u32> = (0..slots).map(|s| (record * slots + s) as u32).collect();
+        let (from, to) = (from as usize, record * slots);
+        hidden.extend_from_slice(&lifted.hidden[from * slots..][..slots]);
+        descriptor_row.extend(to as u32..(to + slots) as u32);
         if slots > 1 {
-            slot_key.draws(record as u64).shuffle(&mut slot_order);
-            row_key.draws(record as u64).shuffle(&mut rows);
+            slot_key.draws(record as u64).shuffle(&mut hidden[to..]);
+            row_key.draws(record as u64).shuffle(&mut descriptor_row[to..]);
         }
-        for slot in slot_order {
-            hidden.push(lifted.hidden[from as usize * slots + slot]);
-        }
-        descriptor_row.extend(rows);
         if let (Some(kept), Some(axes)) = (&mut swapped_axis, &lifted.swapped_axis) {
-            kept.push(axes[from as usize]);
+            kept.push(axes[from]);
         }
     }
     // Released row r holds the descriptor of the original whose slot was given row r.
@@ -68,7 +66,7 @@ pub fn obfuscate<const D: usize>(
     for (slot, &row) in descriptor_row.iter().enumerate() {
         source[row as usize] = hidden[slot].0;
     }
-    let protect = |rows| scheme.protection().map(|one| one.protect(rows, key)).transpose();
+    let protect = |rows| scheme.protection().map(|by| by.protect(rows, key)).transpose();
     let protected = descriptors.map(protect).transpose()?.flatten();
     let plain = descriptors.filter(|_| protected.is_none()).map(|rows| rows.select(&source));
     let records = lifted.obfuscation.select(&order);

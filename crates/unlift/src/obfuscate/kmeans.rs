@@ -27,13 +27,9 @@ pub fn kmeans<const D: usize>(
         .into_par_iter()
         .map(|restart| lloyd(points, spread_start(points, k, key, restart)))
         .collect();
-    let mut best = 0;
-    for run in 1..runs.len() {
-        if runs[run].0 < runs[best].0 {
-            best = run;
-        }
-    }
-    let mut centers = runs[best].1.clone();
+    // The first of equally good runs counts.
+    let best = runs.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+    let mut centers = best.map(|(_, centers)| centers).unwrap_or_default();
     // The order of the centers must not depend on which restart won.
     centers.sort_unstable_by(|a, b| {
         a.iter()
@@ -100,12 +96,7 @@ fn lloyd<const D: usize>(points: &[[f64; D]], mut centers: Vec<[f64; D]>) -> (f6
 
 /// Returns the index of the nearest center (the first of equals) and the squared distance to it.
 fn nearest<const D: usize>(point: &[f64; D], centers: &[[f64; D]]) -> (usize, f64) {
-    let mut best = (0, f64::INFINITY);
-    for (at, center) in centers.iter().enumerate() {
-        let distance = squared_distance(point, center);
-        if distance < best.1 {
-            best = (at, distance);
-        }
-    }
-    best
+    let of = |(at, center)| (at, squared_distance(point, center));
+    let nearest = centers.iter().enumerate().map(of).min_by(|a, b| a.1.total_cmp(&b.1));
+    nearest.expect("a center")
 }

@@ -23,7 +23,7 @@ pub use changed::{Change, Changed};
 pub use hide::obfuscate;
 pub use mitigate::Mitigation;
 pub use protect::Protection;
-pub use scheme::{Build, Entry, Facts, Lifted, Scheme, SchemeOptions};
+pub use scheme::{Build, Entry, Facts, Lifted, LocalPoints, Scheme, SchemeOptions};
 
 use crate::Error;
 

@@ -7,9 +7,8 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::scheme::{Entry, Facts, Lifted, Scheme};
+use super::scheme::{Entry, Facts, Lifted, LocalPoints, Scheme};
 use crate::Error;
-use crate::geometry::frame::Bounds;
 use crate::geometry::vector::sub;
 use crate::released::{Lines, Obfuscation};
 use crate::seed::{Key, Stage};
@@ -53,16 +52,12 @@ impl<const D: usize> Scheme<D> for Olc {
         if D == 2 { LINES2D.name } else { ENTRY.name }
     }
 
-    fn lift(
-        &self,
-        points: &[[f64; D]],
-        _: Option<&Bounds<D>>,
-        key: &Key,
-    ) -> Result<Lifted<D>, Error> {
+    fn lift(&self, points: &LocalPoints<'_, D>, key: &Key) -> Result<Lifted<D>, Error> {
         let key = key.stage(Stage::Scheme);
         let direction = |row: usize| key.draws(row as u64).direction();
-        let directions: Vec<[f64; D]> = (0..points.len()).into_par_iter().map(direction).collect();
-        Ok(Lifted::one_each(Obfuscation::Lines(Lines::through(points, &directions)?)))
+        let rows = (0..points.positions.len()).into_par_iter();
+        let directions: Vec<[f64; D]> = rows.map(direction).collect();
+        Ok(Lifted::one_each(Obfuscation::Lines(Lines::through(points.positions, &directions)?)))
     }
 }
 
@@ -95,19 +90,14 @@ impl Scheme<2> for Gravity {
         GRAVITY.name
     }
 
-    fn lift(
-        &self,
-        points: &[[f64; 2]],
-        bounds: Option<&Bounds<2>>,
-        _: &Key,
-    ) -> Result<Lifted<2>, Error> {
-        let Some(image) = bounds else {
+    fn lift(&self, points: &LocalPoints<'_, 2>, _: &Key) -> Result<Lifted<2>, Error> {
+        let Some(image) = points.bounds else {
             return Err(Error::new("image size", "known: gravity points below it", "none"));
         };
         let [width, height] = sub(&image.high, &image.low);
         let [x, y] = image.center();
         let below = [x, y + BELOW * width.max(height)];
-        let directions: Vec<[f64; 2]> = points.iter().map(|p| sub(&below, p)).collect();
-        Ok(Lifted::one_each(Obfuscation::Lines(Lines::through(points, &directions)?)))
+        let directions: Vec<[f64; 2]> = points.positions.iter().map(|p| sub(&below, p)).collect();
+        Ok(Lifted::one_each(Obfuscation::Lines(Lines::through(points.positions, &directions)?)))
     }
 }

@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
-use super::scheme::{Entry, Facts, Lifted, Scheme};
+use super::scheme::{Entry, Facts, Lifted, LocalPoints, Scheme};
 use crate::Error;
-use crate::geometry::frame::Bounds;
 use crate::released::{AxisPlanes, Obfuscation};
 use crate::seed::{Key, Stage};
 
@@ -33,12 +32,8 @@ impl Scheme<3> for Plane {
         ENTRY.name
     }
 
-    fn lift(
-        &self,
-        points: &[[f64; 3]],
-        _: Option<&Bounds<3>>,
-        key: &Key,
-    ) -> Result<Lifted<3>, Error> {
+    fn lift(&self, points: &LocalPoints<'_, 3>, key: &Key) -> Result<Lifted<3>, Error> {
+        let points = points.positions;
         let mut axis: Vec<u8> = (0..points.len()).map(|i| (i % 3) as u8).collect();
         key.draws(Stage::Scheme, 0).shuffle(&mut axis);
         let offset: Vec<f64> =

@@ -5,8 +5,7 @@
 
 use std::sync::Arc;
 
-use super::scheme::{Entry, Facts, Lifted, Scheme};
-use crate::geometry::frame::Bounds;
+use super::scheme::{Entry, Facts, Lifted, LocalPoints, Scheme};
 use crate::geometry::knn::Knn;
 use crate::geometry::normal::local_normal;
 use crate::geometry::vector::{dot, squared_distance, sub};
@@ -42,17 +41,20 @@ impl Scheme<3> for Ppl {
         ENTRY.name
     }
 
-    fn lift(
-        &self,
-        points: &[[f64; 3]],
-        _: Option<&Bounds<3>>,
-        key: &Key,
-    ) -> Result<Lifted<3>, Error> {
-        let mut draws = key.draws(Stage::Scheme, 0);
-        let (mut pairs, mut dropped) = random_pairs(points.len(), &mut draws);
-        let coincident = separate(points, &mut pairs, &mut draws);
-        dropped.extend(coincident);
-        lines_through(points, &pairs, dropped)
+    fn lift(&self, points: &LocalPoints<'_, 3>, key: &Key) -> Result<Lifted<3>, Error> {
+        let (points, mut draws) = (points.positions, key.draws(Stage::Scheme, 0));
+        let (mut pairs, dropped) = random_pairs(points.len(), &mut draws);
+        let accept = |pair: &[OriginalId; 2]| apart(points, pair);
+        let mut refused = refused_last(&mut pairs, accept);
+        for _ in 0..RE_DRAWS {
+            if refused == 0 {
+                break;
+            }
+            // Coincident points need other partners, so as many accepted pairs join the pool.
+            let pool = (2 * refused).min(pairs.len());
+            refused = pair_again(&mut pairs, pool, &mut draws, accept);
+        }
+        lines_through(points, pairs, refused, dropped)
     }
 }
 
@@ -63,32 +65,20 @@ fn apart(points: &[[f64; 3]], pair: &[OriginalId; 2]) -> bool {
     squared_distance(&a, &b) > size2 * 1e-24
 }
 
-/// Pairs coincident points again. Removes and returns those that stay coincident.
-fn separate(
-    points: &[[f64; 3]],
-    pairs: &mut Vec<[OriginalId; 2]>,
-    draws: &mut Draws<Cipher>,
-) -> Vec<Dropped> {
-    let mut refused = refused_last(pairs, |pair| apart(points, pair));
-    for _ in 0..RE_DRAWS {
-        if refused == 0 {
-            break;
-        }
-        // Coincident points need other partners, so as many accepted pairs join the pool.
-        let pool = (2 * refused).min(pairs.len());
-        refused = pair_again(pairs, pool, draws, |pair| apart(points, pair));
-    }
-    let kept = pairs.len() - refused;
-    let dropped = drop_pairs(&pairs[kept..], DropReason::CoincidentPair);
-    pairs.truncate(kept);
-    dropped
-}
-
+/// Returns the lines through all pairs but the last `refused`, whose points are dropped.
 fn lines_through(
     points: &[[f64; 3]],
-    pairs: &[[OriginalId; 2]],
-    dropped: Vec<Dropped>,
+    mut pairs: Vec<[OriginalId; 2]>,
+    refused: usize,
+    mut dropped: Vec<Dropped>,
 ) -> Result<Lifted<3>, Error> {
+    for pair in pairs.split_off(pairs.len() - refused) {
+        let reason = match apart(points, &pair) {
+            true => DropReason::RejectedPair,
+            false => DropReason::CoincidentPair,
+        };
+        dropped.extend(pair.map(|original| Dropped { original, reason }));
+    }
     let through: Vec<[f64; 3]> = pairs.iter().map(|[a, _]| points[a.index()]).collect();
     let direction: Vec<[f64; 3]> =
         pairs.iter().map(|[a, b]| sub(&points[b.index()], &points[a.index()])).collect();
@@ -132,12 +122,8 @@ impl Scheme<3> for PplPlus {
         PLUS.name
     }
 
-    fn lift(
-        &self,
-        points: &[[f64; 3]],
-        _: Option<&Bounds<3>>,
-        key: &Key,
-    ) -> Result<Lifted<3>, Error> {
+    fn lift(&self, points: &LocalPoints<'_, 3>, key: &Key) -> Result<Lifted<3>, Error> {
+        let points = points.positions;
         let normals = normals(points)?;
         let on_surface = |pair: &[OriginalId; 2]| {
             let [a, b] = pair.map(|id| points[id.index()]);
@@ -147,7 +133,7 @@ impl Scheme<3> for PplPlus {
             })
         };
         let mut draws = key.draws(Stage::Scheme, 0);
-        let (mut pairs, mut dropped) = random_pairs(points.len(), &mut draws);
+        let (mut pairs, dropped) = random_pairs(points.len(), &mut draws);
         let accept = |pair: &[OriginalId; 2]| apart(points, pair) && !on_surface(pair);
         let mut refused = refused_last(&mut pairs, accept);
         let mut unchanged = 0;
@@ -162,14 +148,7 @@ impl Scheme<3> for PplPlus {
                 break;
             }
         }
-        let kept = pairs.len() - refused;
-        for pair in pairs.drain(kept..) {
-            let coincident = !apart(points, &pair);
-            let reason =
-                if coincident { DropReason::CoincidentPair } else { DropReason::RejectedPair };
-            dropped.extend(drop_pairs(&[pair], reason));
-        }
-        lines_through(points, &pairs, dropped)
+        lines_through(points, pairs, refused, dropped)
     }
 }
 
@@ -211,30 +190,15 @@ fn pair_again(
     accept: impl Fn(&[OriginalId; 2]) -> bool,
 ) -> usize {
     let start = pairs.len() - refused;
-    let mut pool: Vec<OriginalId> = pairs[start..].as_flattened().to_vec();
-    draws.shuffle(&mut pool);
-    let (mut accepted, mut still_refused) = (Vec::new(), Vec::new());
-    for pair in pool.as_chunks::<2>().0 {
-        if accept(pair) { accepted.push(*pair) } else { still_refused.push(*pair) }
-    }
-    for (at, pair) in accepted.iter().chain(&still_refused).enumerate() {
-        pairs[start + at] = *pair;
-    }
-    still_refused.len()
+    let again = &mut pairs[start..];
+    draws.shuffle(again.as_flattened_mut());
+    refused_last(again, accept)
 }
 
 /// Moves the pairs that `accept` refuses to the end and returns their number.
-fn refused_last(
-    pairs: &mut Vec<[OriginalId; 2]>,
-    accept: impl Fn(&[OriginalId; 2]) -> bool,
-) -> usize {
+fn refused_last(pairs: &mut [[OriginalId; 2]], accept: impl Fn(&[OriginalId; 2]) -> bool) -> usize {
     let (accepted, refused): (Vec<_>, Vec<_>) = pairs.iter().copied().partition(|p| accept(p));
-    pairs.clear();
-    pairs.extend(accepted);
-    pairs.extend(&refused);
+    pairs[..accepted.len()].copy_from_slice(&accepted);
+    pairs[accepted.len()..].copy_from_slice(&refused);
     refused.len()
-}
-
-fn drop_pairs(pairs: &[[OriginalId; 2]], reason: DropReason) -> Vec<Dropped> {
-    pairs.as_flattened().iter().map(|&original| Dropped { original, reason }).collect()
 }

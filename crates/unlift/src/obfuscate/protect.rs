@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use crate::descriptors::Values;
 use crate::protected::{MOST_DIRECTIONS, ProtectedDescriptors, Rule, inner, unit_rows};
-use crate::seed::{Draws, Key, Stage};
+use crate::seed::{Cipher, Draws, Key, Stage};
 use crate::{Descriptors, Error};
 
 /// Directions of a subspace.
@@ -38,13 +38,13 @@ pub struct Protection {
 
 const FORMS: &str = "subspace:M, subspace:M:random, subspace:M:adversarial, subspace:M:hybrid or ldp:WORDS,M,EPSILON";
 /// Largest vocabulary: Lloyd's algorithm takes a minute.
-const MOST_WORDS: usize = 1 << 14;
+const MAX_WORDS: usize = 1 << 14;
 /// Number of rounds of Lloyd's algorithm.
 const ROUNDS: usize = 20;
 /// Largest number of descriptors per word that Lloyd's algorithm reads.
-const MOST_PER_WORD: usize = 64;
+const MAX_PER_WORD: usize = 64;
 /// Largest share of the protected descriptors that public ones may equal.
-const MOST_OWN: f64 = 0.01;
+const MAX_OWN: f64 = 0.01;
 /// A direction is shorter than this if it lies in the span of the earlier ones.
 const SHORTEST: f64 = 1e-6;
 
@@ -73,7 +73,7 @@ impl Protection {
             "ldp" => {
                 let parts: Vec<&str> = rest.split(',').map(str::trim).collect();
                 let [words, m, epsilon] = parts[..] else { return Err(wrong()) };
-                let n_words = words.parse().ok().filter(|n| (2..=MOST_WORDS).contains(n));
+                let n_words = words.parse().ok().filter(|n| (2..=MAX_WORDS).contains(n));
                 let m = m.parse().ok().filter(|&m: &usize| m > 0 && Some(m) < n_words);
                 let epsilon = epsilon.parse().ok().filter(|x: &f64| *x > 0.0 && *x <= 100.0);
                 let words = n_words.zip(m).zip(epsilon);
@@ -146,7 +146,7 @@ impl Protection {
         let plain: Vec<Vec<f32>> = unit_rows(descriptors).collect();
         let (n, n_own) =
             (plain.len(), plain.iter().filter(|row| self.known.contains(&hash(row))).count());
-        if n_own as f64 > MOST_OWN * n as f64 {
+        if n_own as f64 > MAX_OWN * n as f64 {
             let found = format!("{n_own} of the {n} descriptors to protect among them");
             return Err(Error::new("public descriptors", "those of other images", found));
         }
@@ -168,12 +168,12 @@ impl Protection {
     ///
     /// Both depend on the subspace alone: the foot is its point nearest to the origin, and the
     /// basis is turned at random. Directions as drawn would show on which line the descriptor lies.
-    fn subspace<B: crate::seed::Bits>(
+    fn subspace(
         &self,
         m: usize,
         plain: &[f32],
         known: &[Vec<f32>],
-        draws: &mut Draws<B>,
+        draws: &mut Draws<Cipher>,
     ) -> Vec<f32> {
         let dim = plain.len();
         let n_adversarial = match self.directions {
@@ -245,13 +245,7 @@ fn remove(from: &mut [f64], basis: &[Vec<f64>]) {
 
 /// Draws `m` of `n` words, ascending: `own` is among them with probability
 /// `m e^epsilon / (m e^epsilon + n - m)`, and the others are uniform (the subset mechanism).
-fn subset<B: crate::seed::Bits>(
-    own: usize,
-    m: usize,
-    epsilon: f64,
-    n: usize,
-    draws: &mut Draws<B>,
-) -> Vec<f32> {
+fn subset(own: usize, m: usize, epsilon: f64, n: usize, draws: &mut Draws<Cipher>) -> Vec<f32> {
     let contains = 1.0 / (1.0 + (n - m) as f64 / m as f64 * libm::exp(-epsilon));
     let mut words = Vec::with_capacity(m);
     if draws.unit() < contains {
@@ -284,7 +278,7 @@ fn words(rows: &[Vec<f32>], n: usize) -> Vec<Vec<f32>> {
     let mut draws = Draws::new(0, Stage::KMeans, n as u64);
     let mut order: Vec<usize> = (0..rows.len()).collect();
     draws.shuffle(&mut order);
-    order.truncate(n * MOST_PER_WORD);
+    order.truncate(n * MAX_PER_WORD);
     let mut words: Vec<Vec<f32>> = order[..n].iter().map(|&at| rows[at].clone()).collect();
     for _ in 0..ROUNDS {
         let of: Vec<usize> = order.par_iter().map(|&at| nearest(&rows[at], &words)).collect();
@@ -407,7 +401,7 @@ mod tests {
         let (n, m, epsilon) = (20_000, 3, 2.0);
         let mut counts = [0_u32; 10];
         for item in 0..n {
-            let mut draws = Draws::new(1, Stage::Shapes, item);
+            let mut draws = Key::from_seed(1).draws(Stage::Shapes, item);
             let words = subset(7, m, epsilon, 10, &mut draws);
             assert!(words.windows(2).all(|pair| pair[0] < pair[1]) && words.len() == m);
             words.iter().for_each(|&word| counts[word as usize] += 1);
@@ -449,6 +443,7 @@ mod tests {
             assert_ne!(hide(1).unwrap().0.fingerprint(), released.fingerprint());
         }
     }
+
     #[test]
     fn public_descriptors_that_are_the_protected_ones_are_refused() {
         let of = descriptors(300, 9);

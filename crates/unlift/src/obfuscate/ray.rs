@@ -4,8 +4,7 @@
 use std::sync::Arc;
 
 use super::kmeans::kmeans;
-use super::scheme::{Entry, Facts, Lifted, Scheme};
-use crate::geometry::frame::Bounds;
+use super::scheme::{Entry, Facts, Lifted, LocalPoints, Scheme};
 use crate::geometry::vector::{dot, sub};
 use crate::released::{Obfuscation, Rays};
 use crate::seed::{Key, Stage};
@@ -39,14 +38,9 @@ impl Scheme<3> for Ray {
         ENTRY.name
     }
 
-    fn lift(
-        &self,
-        points: &[[f64; 3]],
-        _: Option<&Bounds<3>>,
-        key: &Key,
-    ) -> Result<Lifted<3>, Error> {
+    fn lift(&self, points: &LocalPoints<'_, 3>, key: &Key) -> Result<Lifted<3>, Error> {
         let choices = key.stage(Stage::Scheme);
-        from_centers(points, key, |row, _| choices.draws(row as u64).below(2) as usize)
+        from_centers(points.positions, key, |row, _| choices.draws(row as u64).below(2) as usize)
     }
 }
 
@@ -80,23 +74,18 @@ impl Scheme<3> for RayVoxel {
         vec![("voxel", self.voxel)]
     }
 
-    fn lift(
-        &self,
-        points: &[[f64; 3]],
-        _: Option<&Bounds<3>>,
-        key: &Key,
-    ) -> Result<Lifted<3>, Error> {
+    fn lift(&self, points: &LocalPoints<'_, 3>, key: &Key) -> Result<Lifted<3>, Error> {
         if !(self.voxel.is_finite() && self.voxel > 0.0) {
             return Err(Error::new("voxel", "a positive length", self.voxel.to_string()));
         }
         // The grid starts half a voxel below the smallest coordinates, as in the authors' code
         // (Open3D).
         let mut low = [f64::INFINITY; 3];
-        for point in points {
+        for point in points.positions {
             low = std::array::from_fn(|c| low[c].min(point[c]));
         }
         let start = low.map(|x| x - 0.5 * self.voxel);
-        from_centers(points, key, |_, point| {
+        from_centers(points.positions, key, |_, point| {
             let cell = |c: usize| ((point[c] - start[c]) / self.voxel).floor();
             (0..3).map(|c| cell(c).rem_euclid(2.0) as usize).sum::<usize>() % 2
         })

@@ -79,6 +79,15 @@ impl SchemeOptions {
     }
 }
 
+/// Points to hide, relative to the released origin.
+#[derive(Clone, Copy, Debug)]
+pub struct LocalPoints<'a, const D: usize> {
+    /// Coordinates, `(n, D)`.
+    pub positions: &'a [[f64; D]],
+    /// Public bounds of an image.
+    pub bounds: Option<Bounds<D>>,
+}
+
 /// A rule for hiding points, built-in or custom. Parameters are fields of the type.
 pub trait Scheme<const D: usize>: Debug + Send + Sync {
     /// Returns the name in rows, gates and reports: one word, unique in a plan.
@@ -89,8 +98,7 @@ pub trait Scheme<const D: usize>: Debug + Send + Sync {
         Vec::new()
     }
 
-    /// Hides `points`. Coordinates are relative to the released origin, as are `bounds`, the public
-    /// bounds of an image.
+    /// Hides `points`.
     ///
     /// All randomness must come from `key` with [`Stage::Scheme`], because these draws are
     /// released. Every original must be in exactly one slot, or dropped with a reason. No record
@@ -98,12 +106,7 @@ pub trait Scheme<const D: usize>: Debug + Send + Sync {
     ///
     /// # Errors
     /// When the rule cannot hide the points, or a parameter is out of range.
-    fn lift(
-        &self,
-        points: &[[f64; D]],
-        bounds: Option<&Bounds<D>>,
-        key: &Key,
-    ) -> Result<Lifted<D>, Error>;
+    fn lift(&self, points: &LocalPoints<'_, D>, key: &Key) -> Result<Lifted<D>, Error>;
 
     /// Returns the descriptors that are released in place of `descriptors`, one row per original;
     /// `None` if they are released unchanged, as geometric schemes do. Randomness must come from

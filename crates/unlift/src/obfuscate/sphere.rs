@@ -12,8 +12,7 @@
 use std::sync::Arc;
 
 use super::ray::rays_from;
-use super::scheme::{Entry, Facts, Lifted, Scheme};
-use crate::geometry::frame::Bounds;
+use super::scheme::{Entry, Facts, Lifted, LocalPoints, Scheme};
 use crate::released::{Obfuscation, Rays};
 use crate::seed::{Key, Stage};
 use crate::{Error, OriginalId};
@@ -51,12 +50,8 @@ impl Scheme<3> for Sphere {
         vec![("share of real bearings", KEPT)]
     }
 
-    fn lift(
-        &self,
-        points: &[[f64; 3]],
-        _: Option<&Bounds<3>>,
-        key: &Key,
-    ) -> Result<Lifted<3>, Error> {
+    fn lift(&self, points: &LocalPoints<'_, 3>, key: &Key) -> Result<Lifted<3>, Error> {
+        let points = points.positions;
         let n = points.len();
         if n < 2 {
             return Err(Error::new("points", "at least 2", n.to_string()));

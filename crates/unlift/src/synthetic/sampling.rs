@@ -1,11 +1,12 @@
 //! Sampling of surface points with the noise and the outliers of structure from motion.
 
-use super::surfaces::{Scene, Surface, add, dot, norm, scale, sub};
+use super::surfaces::{Scene, Surface, add, norm, scale};
 use super::{Purpose, draws};
+use crate::geometry::vector::{along, dot, sub};
 use crate::seed::Draws;
 
 /// Share of points that are exact copies of another point.
-pub(super) const COINCIDENT_SHARE: f64 = 0.03;
+const COINCIDENT_SHARE: f64 = 0.03;
 
 /// Share of points that lie far from any surface.
 const OUTLIER_SHARE: f64 = 0.015;
@@ -41,21 +42,21 @@ fn share(n: usize, share: f64) -> usize {
     (n as f64 * share).round() as usize
 }
 
-/// A true surface point, and the photos that see it.
+/// A true surface point, and the center of a photo that sees it.
 struct Seen {
     point: [f64; 3],
-    track: Track,
+    camera: [f64; 3],
 }
 
 /// Adds triangulation error. It grows quadratically with the distance along the viewing ray,
 /// linearly across it. One point in ten has a bad match.
 fn noisy(seen: Seen, draws: &mut Draws) -> [f64; 3] {
-    let ray = sub(seen.point, seen.track.center);
-    let distance = norm(ray);
+    let ray = sub(&seen.point, &seen.camera);
+    let distance = norm(&ray);
     let bad = if draws.unit() < 0.1 { 3.5 } else { 1.0 };
     let across = bad * (0.0006 + 0.0005 * distance);
-    let along = bad * (0.0008 + 0.0010 * distance * distance);
-    let depth = scale(ray, draws.normal() * along / distance);
+    let in_depth = bad * (0.0008 + 0.0010 * distance * distance);
+    let depth = scale(ray, draws.normal() * in_depth / distance);
     let jitter = std::array::from_fn(|_| draws.normal() * across);
     add(seen.point, add(depth, jitter))
 }
@@ -63,11 +64,11 @@ fn noisy(seen: Seen, draws: &mut Draws) -> [f64; 3] {
 /// Returns a wrong match: beyond the room on a viewing ray, or anywhere within several rooms.
 fn outlier(seen: Seen, scene: &Scene, draws: &mut Draws) -> [f64; 3] {
     if draws.unit() < 0.6 {
-        let ray = sub(seen.point, seen.track.center);
+        let ray = sub(&seen.point, &seen.camera);
         // 1 / u has a heavy tail, like depths from nearly parallel rays.
         let stretch = 1.8 / draws.between(0.3, 1.0);
-        let reach = 1.0 + scene.size[0] * (0.3 + stretch) / norm(ray);
-        return add(seen.track.center, scale(ray, reach));
+        let reach = 1.0 + scene.size[0] * (0.3 + stretch) / norm(&ray);
+        return along(&seen.camera, reach, &ray);
     }
     std::array::from_fn(|c| scene.size[c] * (0.5 + draws.between(-2.5, 2.5)))
 }
@@ -95,7 +96,7 @@ impl Sources {
         for (index, surface) in scene.surfaces.iter().enumerate() {
             let texture = surface.texture;
             let area = surface.area();
-            let around = 2.0 * (norm(surface.u) + norm(surface.v));
+            let around = 2.0 * (norm(&surface.u) + norm(&surface.v));
             // Contrast varies between surfaces.
             let contrast = 0.3 + 2.0 * draws.unit() * draws.unit();
             sources.push(index, Kind::Even, contrast * texture.even * area);
@@ -126,10 +127,10 @@ impl Sources {
             let surface = &scene.surfaces[source.surface];
             let (s, t) = match source.kind {
                 Kind::Even => (draws.unit(), draws.unit()),
-                Kind::Outline => on_outline(norm(surface.u), norm(surface.v), draws),
+                Kind::Outline => on_outline(norm(&surface.u), norm(&surface.v), draws),
                 Kind::Patch { s, t, radius } => (
-                    s + draws.normal() * radius / norm(surface.u),
-                    t + draws.normal() * radius / norm(surface.v),
+                    s + draws.normal() * radius / norm(&surface.u),
+                    t + draws.normal() * radius / norm(&surface.v),
                 ),
             };
             if !surface.holds(s, t) {
@@ -137,11 +138,11 @@ impl Sources {
             }
             let point = surface.at(s, t);
             let first = draws.below(cameras.len() as u64) as usize;
-            if let Some(track) = track(scene, cameras, surface, point, first)
-                && track.n_views >= MIN_VIEWS
-                && draws.unit() * (MANY_VIEWS as f64) < track.n_views as f64
+            if let Some((n_views, camera)) = views(scene, cameras, surface, &point, first)
+                && n_views >= MIN_VIEWS
+                && draws.unit() * (MANY_VIEWS as f64) < n_views as f64
             {
-                return Seen { point, track };
+                return Seen { point, camera };
             }
         }
         panic!("a furnished room has surfaces that are seen");
@@ -181,7 +182,7 @@ const FLATTEST_COSINE: f64 = 0.22;
 const MOST_CANDIDATES: usize = 16;
 
 /// Number of views from which on more make no difference.
-pub(super) const MANY_VIEWS: usize = 6;
+const MANY_VIEWS: usize = 6;
 
 /// Returns a closed walk around the middle of the room.
 pub(super) fn walk(seed: u64, scene: &Scene) -> Vec<Camera> {
@@ -204,8 +205,8 @@ pub(super) fn walk(seed: u64, scene: &Scene) -> Vec<Camera> {
                 sign * y * width + draws.between(-1.5, 1.5),
                 draws.between(-0.9, 0.35),
             ];
-            let look = [aim[0], aim[1], aim[2] * norm([aim[0], aim[1], 0.0])];
-            Camera { center, look: scale(look, 1.0 / norm(look)) }
+            let look = [aim[0], aim[1], aim[2] * norm(&[aim[0], aim[1], 0.0])];
+            Camera { center, look: scale(look, 1.0 / norm(&look)) }
         })
         .collect()
 }
@@ -222,47 +223,26 @@ fn on_square(t: f64) -> [f64; 2] {
     }
 }
 
-/// Views of a point: their number, and the center of one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Track {
-    /// Number of photos among the candidates that see the point, at most [`MANY_VIEWS`].
-    pub(super) n_views: usize,
-    /// Center of the first photo that sees the point.
-    pub(super) center: [f64; 3],
-}
-
-/// Finds the views of `point` on `surface`. Candidates start at photo `first` and follow the walk.
-pub(super) fn track(
+/// Returns the number of photos that see `point` on `surface`, at most [`MANY_VIEWS`], and the center
+/// of the first one. Candidates start at photo `first` and follow the walk.
+fn views(
     scene: &Scene,
     cameras: &[Camera],
     surface: &Surface,
-    point: [f64; 3],
+    point: &[f64; 3],
     first: usize,
-) -> Option<Track> {
+) -> Option<(usize, [f64; 3])> {
     let normal = surface.normal();
-    let mut track: Option<Track> = None;
-    let mut candidates = 0;
-    for i in 0..cameras.len() {
-        let camera = &cameras[(first + i) % cameras.len()];
-        let ray = sub(point, camera.center);
-        let distance = norm(ray);
-        if dot(ray, camera.look) < HALF_FIELD_COSINE * distance
-            || -dot(ray, normal) < FLATTEST_COSINE * distance
-        {
-            continue;
-        }
-        candidates += 1;
-        if candidates > MOST_CANDIDATES {
-            break;
-        }
-        if !scene.hides(camera.center, point) {
-            let n_views = track.map_or(0, |t| t.n_views) + 1;
-            let center = track.map_or(camera.center, |t| t.center);
-            track = Some(Track { n_views, center });
-            if n_views == MANY_VIEWS {
-                break;
-            }
-        }
-    }
-    track
+    let faces = |camera: &&Camera| {
+        let ray = sub(point, &camera.center);
+        let distance = norm(&ray);
+        dot(&ray, &camera.look) >= HALF_FIELD_COSINE * distance
+            && -dot(&ray, &normal) >= FLATTEST_COSINE * distance
+    };
+    let in_order = cameras[first..].iter().chain(&cameras[..first]);
+    let candidates = in_order.filter(faces).take(MOST_CANDIDATES);
+    let mut views =
+        candidates.filter(|camera| !scene.hides(&camera.center, point)).take(MANY_VIEWS);
+    let center = views.next()?.center;
+    Some((1 + views.count(), center))
 }

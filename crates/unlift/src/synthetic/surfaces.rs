@@ -1,5 +1,8 @@
 //! Textured surfaces of a scene, and boxes that occlude them.
 
+use crate::geometry::frame::Bounds;
+use crate::geometry::vector::{along, cross, dot, sub};
+
 /// Position and rotation of a piece. Its axes are: right along a wall (x), into the room (y), up
 /// (z).
 #[derive(Clone, Copy, Debug)]
@@ -9,50 +12,25 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// Returns the place at `offset` in this one, rotated further by `turn`.
-    pub(super) fn then(&self, offset: [f64; 3], turn: Turn) -> Self {
-        let ([a, b], [c, d]) = (self.turn, turn);
-        Self { origin: self.point(offset), turn: [a * c - b * d, b * c + a * d] }
-    }
-
     /// Converts a point of the piece to the room's frame.
-    pub(super) fn point(&self, p: [f64; 3]) -> [f64; 3] {
+    fn point(&self, p: [f64; 3]) -> [f64; 3] {
         add(self.origin, rotate(self.turn, p))
-    }
-
-    /// Converts a direction of the piece to the room's frame.
-    pub(super) fn direction(&self, v: [f64; 3]) -> [f64; 3] {
-        rotate(self.turn, v)
     }
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Blocker {
     place: Place,
-    low: [f64; 3],
-    high: [f64; 3],
+    bounds: Bounds<3>,
 }
 
 impl Blocker {
     /// Returns true if the segment from `from` to `to` intersects the box.
-    fn blocks(&self, from: [f64; 3], to: [f64; 3]) -> bool {
+    fn blocks(&self, from: &[f64; 3], to: &[f64; 3]) -> bool {
         let back = [self.place.turn[0], -self.place.turn[1]];
-        let start = rotate(back, sub(from, self.place.origin));
-        let along = rotate(back, sub(to, from));
-        let (mut enter, mut leave) = (0.0f64, 1.0f64);
-        for c in 0..3 {
-            if along[c] == 0.0 {
-                if start[c] < self.low[c] || start[c] > self.high[c] {
-                    return false;
-                }
-                continue;
-            }
-            let one = (self.low[c] - start[c]) / along[c];
-            let other = (self.high[c] - start[c]) / along[c];
-            enter = enter.max(one.min(other));
-            leave = leave.min(one.max(other));
-        }
-        enter <= leave
+        let start = rotate(back, sub(from, &self.place.origin));
+        let range = self.bounds.clip(&start, &rotate(back, sub(to, from)));
+        range.is_some_and(|(enter, leave)| enter.max(0.0) <= leave.min(1.0))
     }
 }
 
@@ -86,11 +64,11 @@ impl Scene {
     }
 
     /// Returns true if a box occludes `point` from `camera`.
-    pub(super) fn hides(&self, camera: [f64; 3], point: [f64; 3]) -> bool {
+    pub(super) fn hides(&self, camera: &[f64; 3], point: &[f64; 3]) -> bool {
         // The segment ends 1 cm before the point, so that a surface does not occlude itself.
         let ray = sub(camera, point);
-        let to = add(point, scale(ray, 0.01 / norm(ray)));
-        self.blockers.iter().any(|b| b.blocks(camera, to))
+        let to = along(point, 0.01 / norm(&ray), &ray);
+        self.blockers.iter().any(|b| b.blocks(camera, &to))
     }
 }
 
@@ -103,7 +81,9 @@ pub(super) struct Piece<'a> {
 impl Piece<'_> {
     /// Returns the piece at `offset` in this one, rotated further by `turn`.
     pub(super) fn turned(&mut self, offset: [f64; 3], turn: Turn) -> Piece<'_> {
-        Piece { place: self.place.then(offset, turn), scene: self.scene }
+        let ([a, b], [c, d]) = (self.place.turn, turn);
+        let turn = [a * c - b * d, b * c + a * d];
+        Piece { place: Place { origin: self.place.point(offset), turn }, scene: self.scene }
     }
 
     /// Returns the piece at `offset` in this one.
@@ -123,19 +103,23 @@ impl Piece<'_> {
         texture: Texture,
     ) {
         let place = &self.place;
-        let (corner, u, v) = (place.point(corner), place.direction(u), place.direction(v));
+        let (corner, u, v) = (place.point(corner), rotate(place.turn, u), rotate(place.turn, v));
         self.scene.surfaces.push(Surface { corner, u, v, outline, texture });
     }
 
     /// Adds a solid box between two corners that occludes what is behind it.
     pub(super) fn block(&mut self, low: [f64; 3], high: [f64; 3], faces: Faces, texture: Texture) {
         self.shell(low, high, faces, texture);
-        self.scene.blockers.push(Blocker { place: self.place, low, high });
+        self.occlude(low, high);
+    }
+
+    fn occlude(&mut self, low: [f64; 3], high: [f64; 3]) {
+        self.scene.blockers.push(Blocker { place: self.place, bounds: Bounds { low, high } });
     }
 
     /// Adds the faces of a box that occludes almost nothing.
     pub(super) fn shell(&mut self, low: [f64; 3], high: [f64; 3], faces: Faces, texture: Texture) {
-        let [w, d, h] = sub(high, low);
+        let [w, d, h] = sub(&high, &low);
         let (x, y, z) = ([w, 0.0, 0.0], [0.0, d, 0.0], [0.0, 0.0, h]);
         let (right, front, top) = (add(low, x), add(low, y), add(low, z));
         self.sheet(front, z, x, texture);
@@ -175,15 +159,15 @@ impl Piece<'_> {
                 (top_radius - radius) * 0.5 * (pair[0][1] + pair[1][1]),
                 height,
             ];
-            self.sheet(foot(pair[0]), sub(foot(pair[1]), foot(pair[0])), lean, side);
+            let (from, to) = (foot(pair[0]), foot(pair[1]));
+            self.sheet(from, sub(&to, &from), lean, side);
         }
         let corner = add(middle, [-top_radius, -top_radius, height]);
         let (u, v) = ([2.0 * top_radius, 0.0, 0.0], [0.0, 2.0 * top_radius, 0.0]);
         self.face([corner, u, v], Outline::Ellipse, texture);
         // A box inside the tube is a sufficient occluder.
         let inner = 0.7 * radius.max(top_radius);
-        let (low, high) = (sub(middle, [inner, inner, 0.0]), add(middle, [inner, inner, height]));
-        self.scene.blockers.push(Blocker { place: self.place, low, high });
+        self.occlude(add(middle, [-inner, -inner, 0.0]), add(middle, [inner, inner, height]));
     }
 }
 
@@ -237,7 +221,7 @@ pub(super) struct Surface {
 impl Surface {
     /// Returns the point at `(s, t)`, both 0 to 1.
     pub(super) fn at(&self, s: f64, t: f64) -> [f64; 3] {
-        add(self.corner, add(scale(self.u, s), scale(self.v, t)))
+        add(self.corner, along(&scale(self.u, s), t, &self.v))
     }
 
     /// Returns true if `(s, t)` lies on the surface.
@@ -253,13 +237,13 @@ impl Surface {
     }
 
     pub(super) fn normal(&self) -> [f64; 3] {
-        let n = cross(self.u, self.v);
-        scale(n, 1.0 / norm(n))
+        let n = cross(&self.u, &self.v);
+        scale(n, 1.0 / norm(&n))
     }
 
     /// Returns the area in square meters.
     pub(super) fn area(&self) -> f64 {
-        let full = norm(cross(self.u, self.v));
+        let full = norm(&cross(&self.u, &self.v));
         match self.outline {
             Outline::Full => full,
             // pi / 4; three digits are enough for a density.
@@ -282,32 +266,15 @@ pub(super) fn rotate([cos, sin]: Turn, v: [f64; 3]) -> [f64; 3] {
     [cos * v[0] - sin * v[1], sin * v[0] + cos * v[1], v[2]]
 }
 
-/// Returns a + b.
 pub(super) fn add(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|c| a[c] + b[c])
+    along(&a, 1.0, &b)
 }
 
-/// Returns a - b.
-pub(super) fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|c| a[c] - b[c])
-}
-
-/// Returns s a.
 pub(super) fn scale(a: [f64; 3], s: f64) -> [f64; 3] {
     a.map(|x| x * s)
 }
 
-/// Returns the dot product.
-pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
 /// Returns the length.
-pub(super) fn norm(a: [f64; 3]) -> f64 {
+pub(super) fn norm(a: &[f64; 3]) -> f64 {
     dot(a, a).sqrt()
-}
-
-/// Returns a x b.
-pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

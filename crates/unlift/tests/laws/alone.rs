@@ -6,34 +6,18 @@ use crate::maps::*;
 
 const ALONE: [Builtin; 2] = [Builtin::Density, Builtin::Tomography];
 
-fn empty_lists<const D: usize>(released: &Released<D>) -> Neighborhoods {
-    let rows = vec![Vec::new(); released.n_slots()];
-    lists_of(&rows, released.n_records(), released.slots_per_record())
-}
-
+/// Returns the positions. The order of the two points of a paired line is unknown.
 fn alone<const D: usize>(released: &Released<D>, solver: Builtin) -> Recovered<D> {
-    solve(released, &empty_lists(released), (solver, RecoverOptions::default()))
+    let rows = vec![Vec::new(); released.n_slots()];
+    let lists = lists_of(&rows, released.n_records(), released.slots_per_record());
+    let lists = lists.with_about(About { order: RowOrder::Either, ..About::default() });
+    solve(released, &lists, (solver, RecoverOptions::default()))
 }
 
 /// Returns a furnished room, denser than in other property tests, because these attacks depend on
 /// density.
 fn furnished(n: usize) -> Vec<[f64; 3]> {
     synthetic::room(1, n).points
-}
-
-/// Returns the percentage of points within `reach`. The two positions of a paired line are compared
-/// as a set.
-fn percent_within(hidden: &Hidden<3>, recovered: &Recovered<3>, reach: f64) -> f64 {
-    let about = About { order: RowOrder::Slots, ..recovered.about() };
-    let (recovered, per) = (recovered.clone().with_about(about), hidden.secret.slots_per_record());
-    let hits = |secret: &Secret| -> Vec<usize> {
-        let accuracy = evaluate(&recovered, &hidden.original, secret).unwrap();
-        let hits = |of: &[f64]| of.iter().filter(|error| **error <= reach).count();
-        accuracy.errors().chunks(per).map(hits).collect()
-    };
-    let crossed = hits(&hidden.secret.exchanged(|_| per == 2));
-    let best = hits(&hidden.secret).into_iter().zip(crossed).map(|(a, b)| a.max(b));
-    100.0 * best.sum::<usize>() as f64 / hidden.secret.n_slots() as f64
 }
 
 /// Floors are shares within 25 cm, at most two points below the measured ones. No attack on
@@ -56,7 +40,7 @@ fn a_room_comes_back_from_its_records() {
                 assert!(lost, "{name}, {solver:?}: a position from nowhere");
                 continue;
             };
-            let percent = percent_within(&hidden, &recovered, 0.25);
+            let percent = hidden.percent_within(&recovered, 0.25);
             assert!(percent >= least, "{name}, {solver:?}: {percent}");
         }
     }
@@ -71,12 +55,12 @@ fn a_scaled_map_has_the_same_shares() {
         for solver in ALONE {
             let percent = |points: &[[f64; 3]], scale: f64| {
                 let hidden = hide(entry(name), points, 1);
-                percent_within(&hidden, &alone(&hidden.released, solver), 0.25 * scale)
+                hidden.percent_within(&alone(&hidden.released, solver), 0.25 * scale)
             };
-            let (one, other) = (percent(&points, 1.0), percent(&scaled, 7.3));
+            let (here, there) = (percent(&points, 1.0), percent(&scaled, 7.3));
             // Records are rounded to `f32` after scaling, so a sample on the border of two voxels
             // may change sides. The tolerance is two of 1,500 points; measured: 0.
-            assert!((one - other).abs() <= 0.14, "{name}, {solver:?}: {one} and {other}");
+            assert!((here - there).abs() <= 0.14, "{name}, {solver:?}: {here} and {there}");
         }
     }
 }
@@ -86,14 +70,13 @@ fn a_scaled_map_has_the_same_shares() {
 fn permuted_records_give_permuted_positions() {
     let released = hide::<3>(entry("olc"), &furnished(1000), 1).released;
     let order = Draws::new(1, Stage::Shuffle, 9).permutation(1000);
-    let order: Vec<usize> = order.into_iter().map(|row| row as usize).collect();
-    let permuted = released_of(&released, again(released.obfuscation(), &order, None));
+    let permuted = released_of(&released, released.obfuscation().select(&order));
     for solver in ALONE {
-        let (one, other) = (alone(&released, solver), alone(&permuted, solver));
-        let bits = |x: [f32; 3]| x.map(f32::to_bits);
-        let same =
-            |(at, &row): (usize, &usize)| bits(one.positions()[row]) == bits(other.positions()[at]);
-        assert!(order.iter().enumerate().all(same), "{solver:?}");
+        let bits = |recovered: Recovered<3>| -> Vec<[u32; 3]> {
+            recovered.positions().iter().map(|x| x.map(f32::to_bits)).collect()
+        };
+        let [plain, permuted] = [&released, &permuted].map(|map| bits(alone(map, solver)));
+        assert!(order.iter().map(|&row| plain[row as usize]).eq(permuted), "{solver:?}");
     }
 }
 

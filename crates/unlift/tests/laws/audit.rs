@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use unlift::audit::{Bound, NeighborsBy, break_even};
 use unlift::neighbors::Geometric;
-use unlift::obfuscate::Lifted;
+use unlift::obfuscate::{Lifted, LocalPoints};
 
 use crate::maps::{self, *};
 
@@ -149,21 +149,17 @@ impl Scheme<3> for Wrong {
         "wrong"
     }
 
-    fn lift(
-        &self,
-        points: &[[f64; 3]],
-        bounds: Option<&Bounds<3>>,
-        key: &Key,
-    ) -> Result<Lifted<3>, Error> {
+    fn lift(&self, points: &LocalPoints<'_, 3>, key: &Key) -> Result<Lifted<3>, Error> {
         let (off, turn) = match self {
             Self::Order => {
-                let mut lifted = unlift::obfuscate::olc::Olc.lift(points, bounds, key)?;
+                let mut lifted = unlift::obfuscate::olc::Olc.lift(points, key)?;
                 key.draws(Stage::Scheme, 1).shuffle(&mut lifted.hidden);
                 return Ok(lifted);
             }
             Self::Beside => (1.0, 0),
             Self::Calls(calls) => (0.0, calls.fetch_add(1, Ordering::Relaxed)),
         };
+        let points = points.positions;
         let through: Vec<[f64; 3]> = points.iter().map(|p| [p[0], p[1] + off, p[2]]).collect();
         let lines = Lines::through(&through, &vec![[1.0, 0.0, f64::from(turn)]; points.len()])?;
         Ok(Lifted::one_each(Obfuscation::Lines(lines)))

@@ -66,7 +66,7 @@ const KEYPOINTS: usize = 1200;
 
 /// Returns keypoints along edges of objects and some anywhere; a fifth have another at the same
 /// place.
-fn image(seed: u64) -> Item<2> {
+fn edges(seed: u64) -> Item<2> {
     let mut draws = Draws::new(seed, Stage::Synthetic, 0);
     let mut points: Vec<[f64; 2]> = Vec::new();
     while points.len() < KEYPOINTS {
@@ -84,10 +84,7 @@ fn image(seed: u64) -> Item<2> {
         points.push(std::array::from_fn(|c| draws.between(0.0, 1.0) * SIZE[c]));
     }
     points.truncate(KEYPOINTS);
-    let points = PointSet::try_new(points, Unit::Pixel).unwrap();
-    let bounds = Bounds::try_new([0.0; 2], SIZE).unwrap();
-    let original = Original::within(points, bounds).unwrap();
-    Item { name: format!("image {seed}"), original, descriptors: None }
+    image(&format!("image {seed}"), points, SIZE)
 }
 
 /// (Inlier ratio, scheme, minimum percentages within 5, 10 and 25 px). `dcl2d` is compared with the
@@ -101,7 +98,7 @@ const FLOORS: &[(f64, &str, [f64; 3])] = &[
 
 fn rows_of_images(schemes: &[&str], ratios: &[f64]) -> Vec<Row> {
     let plan = plan(Unit::Pixel, schemes, ratios, &[Builtin::Joint]);
-    let images = (1..=3).map(|seed| Ok::<_, Error>(image(seed)));
+    let images = (1..=3).map(|seed| Ok::<_, Error>(edges(seed)));
     run_many(images, &plan, &mut Silent).unwrap().rows
 }
 

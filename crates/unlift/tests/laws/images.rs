@@ -9,13 +9,10 @@ use crate::maps::{self, *};
 const SIZE: [f64; 2] = [320.0, 240.0];
 
 fn image_of(name: &str, points: Vec<[f64; 2]>) -> Item<2> {
-    let bounds = Bounds::try_new([0.0; 2], SIZE).unwrap();
     let mut draws = Draws::new(points.len() as u64, Stage::Synthetic, 1);
     let values: Vec<u8> = (0..128 * points.len()).map(|_| draws.below(200) as u8).collect();
     let descriptors = Descriptors::try_new(Values::U8(values), 128).unwrap();
-    let points = PointSet::try_new(points, Unit::Pixel).unwrap();
-    let original = Original::within(points, bounds).unwrap();
-    Item { name: name.to_owned(), original, descriptors: Some(descriptors) }
+    Item { descriptors: Some(descriptors), ..image(name, points, SIZE) }
 }
 
 /// Returns keypoints in clusters; `twins` percent have a second keypoint at the same place.
@@ -37,37 +34,36 @@ fn keypoints(seed: u64, n: usize, twins: u64) -> Vec<[f64; 2]> {
     points
 }
 
-fn plan() -> Plan<2> {
-    Plan { inlier_ratios: vec![1.0, 0.5], ..Plan::new(Unit::Pixel) }
+fn run(
+    images: &[Item<2>],
+    plan: &Plan<2>,
+    watcher: &mut impl Watcher<2>,
+) -> Result<Outcome, Error> {
+    run_many(images.iter().cloned().map(Ok::<_, Error>), plan, watcher)
 }
 
-fn run(images: &[Item<2>], plan: &Plan<2>) -> Outcome {
-    let images = images.iter().cloned().map(Ok::<_, Error>);
-    run_many(images, plan, &mut Silent).unwrap()
-}
-
-/// Receives the rows of each image, and how far it was each time that the image told.
+/// Receives the rows of each image, and its messages of progress.
 #[derive(Default)]
-struct Each(Vec<(Vec<Row>, Heard)>);
+struct Each(Vec<(Vec<Row>, Messages)>);
 
 #[derive(Default)]
-struct Heard(Vec<(usize, usize)>);
+struct Messages(Vec<(usize, usize)>);
 
-impl Observer<2> for Heard {
+impl Observer<2> for Messages {
     fn progress(&mut self, done: usize, total: usize, _: &str) {
         self.0.push((done, total));
     }
 }
 
 impl Watcher<2> for Each {
-    type OfItem = Heard;
+    type OfItem = Messages;
 
-    fn begin(&mut self) -> Heard {
-        Heard::default()
+    fn begin(&mut self) -> Messages {
+        Messages::default()
     }
 
-    fn item(&mut self, _: &str, rows: &[Row], heard: Heard) {
-        self.0.push((rows.to_vec(), heard));
+    fn item(&mut self, _: &str, rows: &[Row], messages: Messages) {
+        self.0.push((rows.to_vec(), messages));
     }
 }
 
@@ -78,8 +74,7 @@ fn rows_are_pooled_over_keypoints() {
     let plan = Plan { repeats: 2, ..plan };
     let images = [image_of("a", keypoints(1, 300, 20)), image_of("b", keypoints(2, 150, 0))];
     let mut each = Each::default();
-    let all = images.iter().cloned().map(Ok::<_, Error>);
-    let pooled = run_many(all, &plan, &mut each).unwrap().rows;
+    let pooled = run(&images, &plan, &mut each).unwrap().rows;
     for (at, row) in pooled.iter().enumerate() {
         let [a, b] = [0, 1].map(|image: usize| &each.0[image].0[at]);
         assert_eq!(row.n_points, a.n_points + b.n_points);
@@ -98,12 +93,13 @@ fn rows_are_pooled_over_keypoints() {
         assert!(median(row) >= low / slack && median(row) <= high * slack, "{}", row.scheme);
     }
     // Rows depend neither on the order of images, nor on threads, nor on other images.
-    let turned = run(&[images[1].clone(), images[0].clone()], &plan).rows;
+    let rows = |images: &[Item<2>]| run(images, &plan, &mut Silent).unwrap().rows;
+    let turned = rows(&[images[1].clone(), images[0].clone()]);
     let shares = |rows: &[Row]| -> Vec<ByThreshold> {
         rows.iter().map(|row| row.recovered_percent.clone()).collect()
     };
     assert_eq!(shares(&pooled), shares(&turned));
-    let on = |threads| on_threads(threads, || run(&images, &plan).rows);
+    let on = |threads| on_threads(threads, || rows(&images));
     assert_eq!(on(1), on(3));
 }
 
@@ -115,7 +111,7 @@ fn images_with_few_keypoints_are_attacked() {
     plan.oracle_noise = Noise::ALL.to_vec();
     plan.neighbors.push(NeighborsBy::Source(Arc::new(Similarity)));
     for n in [4, 12, plan.k, plan.k + 3] {
-        let outcome = run(&[image_of("few", keypoints(3, n, 0))], &plan);
+        let outcome = run(&[image_of("few", keypoints(3, n, 0))], &plan, &mut Silent).unwrap();
         assert_eq!(outcome.n_too_small, usize::from(n <= plan.k));
         for row in &outcome.rows {
             let what = format!(
@@ -153,15 +149,14 @@ fn images_with_hardly_any_keypoints_are_counted() {
     plan.neighbors.push(NeighborsBy::Source(Arc::new(Similarity)));
     plan.neighbors.push(NeighborsBy::Source(Arc::new(Overlap)));
     let mut each = Each::default();
-    let all = images.iter().cloned().map(Ok::<_, Error>);
-    let outcome = run_many(all, &plan, &mut each).unwrap();
-    for (image, (_, Heard(heard))) in images.iter().zip(&each.0) {
-        let (last, total) = *heard.last().unwrap();
-        assert!(last == total && heard.is_sorted(), "{}: {heard:?}", image.name);
+    let outcome = run(&images, &plan, &mut each).unwrap();
+    for (image, (_, Messages(messages))) in images.iter().zip(&each.0) {
+        let (last, total) = *messages.last().unwrap();
+        assert!(last == total && messages.is_sorted(), "{}: {messages:?}", image.name);
         if image.original.len() > 2 {
             assert!(total > 3 * 4 * Builtin::FROM_LISTS.len(), "{}: lists cost, too", image.name);
-            let seen: std::collections::BTreeSet<_> = heard.iter().collect();
-            assert!(seen.len() > 3 * 4, "{}: {seen:?}", image.name);
+            let different: std::collections::BTreeSet<_> = messages.iter().collect();
+            assert!(different.len() > 3 * 4, "{}: {different:?}", image.name);
         }
     }
     assert_eq!((outcome.n_items, outcome.n_too_small), (9, 4));
@@ -174,7 +169,7 @@ fn images_with_hardly_any_keypoints_are_counted() {
         assert!(row.delta.is_finite(), "{what}");
     }
     for image in &images {
-        run(std::slice::from_ref(image), &plan);
+        run(std::slice::from_ref(image), &plan, &mut Silent).unwrap();
     }
 }
 
@@ -182,19 +177,17 @@ fn images_with_hardly_any_keypoints_are_counted() {
 fn what_is_not_for_images_is_refused() {
     let message = |plan: &Plan<2>| {
         let images = [image_of("a", keypoints(1, 100, 0))];
-        let images = images.into_iter().map(Ok::<_, Error>);
-        run_many(images, plan, &mut Silent).unwrap_err().to_string()
+        run(&images, plan, &mut Silent).unwrap_err().to_string()
     };
-    let mut alone = plan();
-    alone.solvers = vec![Arc::new(Builtin::Density)];
+    let alone = Plan { solvers: vec![Arc::new(Builtin::Density)], ..Plan::new(Unit::Pixel) };
     assert_eq!(message(&alone), "solver: expected one that recovers from lists, found density");
-    let mut given = plan();
-    given.neighbors = vec![NeighborsBy::Given(PointNeighbors {
+    let given = NeighborsBy::Given(PointNeighbors {
         name: "file".to_owned(),
         offsets: vec![0],
         neighbors: Vec::new(),
         scores: None,
-    })];
+    });
+    let given = Plan { neighbors: vec![given], ..Plan::new(Unit::Pixel) };
     let expected =
         "neighbors: expected the oracle, or a source that works on single items, found file";
     assert_eq!(message(&given), expected);

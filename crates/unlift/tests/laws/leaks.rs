@@ -1,47 +1,39 @@
 //! Statistical tests of leaks over many keys: the order of records, slots and list entries, random
 //! choices, and the last bits of rounded numbers must not correlate with ground truth.
 
+use std::collections::BTreeMap;
+
+use unlift::evaluate::correlation;
+
 use crate::maps::*;
 
 const KEYS: u64 = 60;
 const POINTS: usize = 150;
 /// Limit of the mean over all keys in standard deviations. Chance exceeds it in 6 of 10 million
 /// cases; there are some hundred statistics.
-const MOST: f64 = 5.0;
+const MAX_DEVIATIONS: f64 = 5.0;
 
-/// Correlations of released columns with ground truth, over many keys.
+/// Correlations of released columns with ground truth, over many keys: their sum and number.
 #[derive(Default)]
-struct Together(Vec<(String, f64, usize)>);
+struct Correlations(BTreeMap<String, (f64, f64)>);
 
-impl Together {
-    /// Adds the correlation of `told` with `truth` in standard deviations, 1 / sqrt(n - 1) for any
+impl Correlations {
+    /// Adds the correlation of `column` with `truth` in standard deviations, 1 / sqrt(n - 1) for any
     /// values.
-    fn add(&mut self, what: String, told: &[f64], truth: &[f64]) {
-        let Some(deviations) = correlation(told, truth) else { return };
-        match self.0.iter_mut().find(|(name, ..)| *name == what) {
-            Some((_, sum, n)) => (*sum, *n) = (*sum + deviations, *n + 1),
-            None => self.0.push((what, deviations, 1)),
+    fn add(&mut self, what: String, column: &[f64], truth: &[f64]) {
+        let deviations = correlation(column, truth) * (truth.len() as f64 - 1.0).sqrt();
+        // It is 0 if a column is constant.
+        if deviations != 0.0 {
+            let (sum, n) = self.0.entry(what).or_default();
+            (*sum, *n) = (*sum + deviations, *n + 1.0);
         }
     }
 
     /// Returns the columns that correlate more than by chance.
-    fn telling(&self) -> Vec<(&str, f64)> {
-        let means = self.0.iter().map(|(name, sum, n)| (&**name, sum / (*n as f64).sqrt()));
-        means.filter(|(_, mean)| mean.abs() > MOST).collect()
+    fn leaking(&self) -> Vec<(&str, f64)> {
+        let means = self.0.iter().map(|(name, (sum, n))| (&**name, sum / n.sqrt()));
+        means.filter(|(_, mean)| mean.abs() > MAX_DEVIATIONS).collect()
     }
-}
-
-/// Returns the correlation; `None` if a column is constant.
-fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
-    let n = a.len() as f64;
-    let centered = |values: &[f64]| -> Vec<f64> {
-        let mean = values.iter().sum::<f64>() / n;
-        values.iter().map(|x| x - mean).collect()
-    };
-    let (a, b) = (centered(a), centered(b));
-    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-    let scale = (product(&a, &a) * product(&b, &b)).sqrt();
-    (scale > 1e-12 * n).then(|| product(&a, &b) / scale * (n - 1.0).sqrt())
 }
 
 fn last_bit(x: f32) -> f64 {
@@ -49,7 +41,11 @@ fn last_bit(x: f32) -> f64 {
 }
 
 /// Returns the released values of a record that are random or result from rounding, by name.
-fn drawn<const D: usize>(scheme: &str, records: &Obfuscation<D>, at: usize) -> Vec<(String, f64)> {
+fn random_values<const D: usize>(
+    scheme: &str,
+    records: &Obfuscation<D>,
+    at: usize,
+) -> Vec<(String, f64)> {
     let bits = |what: &'static str, row: &[f32; D]| -> Vec<(String, f64)> {
         (0..D).map(|c| (format!("last bit of {what} {c}"), last_bit(row[c]))).collect()
     };
@@ -58,12 +54,12 @@ fn drawn<const D: usize>(scheme: &str, records: &Obfuscation<D>, at: usize) -> V
             [bits("foot", &lines.foot()[at]), bits("direction", &lines.direction()[at])].concat()
         }
         Obfuscation::Rays(rays) => {
-            let mut told = bits("direction", &rays.direction()[at]);
+            let mut values = bits("direction", &rays.direction()[at]);
             // In other schemes the position decides the center.
             if scheme == "ray" {
-                told.push(("center".to_owned(), f64::from(rays.center()[at])));
+                values.push(("center".to_owned(), f64::from(rays.center()[at])));
             }
-            told
+            values
         }
         Obfuscation::AxisPlanes(planes) => vec![
             ("axis".to_owned(), f64::from(planes.axis()[at])),
@@ -74,7 +70,7 @@ fn drawn<const D: usize>(scheme: &str, records: &Obfuscation<D>, at: usize) -> V
 }
 
 fn columns_tell_nothing<const D: usize>(name: &str, scheme: &Entry) {
-    let mut together = Together::default();
+    let mut correlations = Correlations::default();
     for key in 0..KEYS {
         // Points differ for every key, because last bits depend on the points.
         let points = room::<D>(key, POINTS);
@@ -91,20 +87,17 @@ fn columns_tell_nothing<const D: usize>(name: &str, scheme: &Entry) {
         for c in 0..D {
             truths.push((format!("coordinate {c}"), of_slots(&|slot| hidden.local(slot)[c])));
         }
-        let mut told = vec![("order of records".to_owned(), Vec::new())];
+        let mut columns: BTreeMap<String, Vec<f64>> = BTreeMap::new();
         for record in 0..slots.len() {
-            told[0].1.push(record as f64);
-            let drawn = drawn(name, hidden.released.obfuscation(), record);
-            for (at, (what, value)) in drawn.into_iter().enumerate() {
-                if record == 0 {
-                    told.push((what, Vec::new()));
-                }
-                told[at + 1].1.push(value);
+            let order = ("order of records".to_owned(), record as f64);
+            let values = random_values(name, hidden.released.obfuscation(), record);
+            for (what, value) in values.into_iter().chain([order]) {
+                columns.entry(what).or_default().push(value);
             }
         }
-        for (what, told) in &told {
+        for (what, column) in &columns {
             for (of, truth) in &truths {
-                together.add(format!("{what}, {of}"), told, truth);
+                correlations.add(format!("{what}, {of}"), column, truth);
             }
         }
         if per == 2 {
@@ -115,8 +108,8 @@ fn columns_tell_nothing<const D: usize>(name: &str, scheme: &Entry) {
             let alternating: Vec<f64> = (0..slots.len()).map(|at| (at % 2) as f64).collect();
             for (what, signs) in [("row", &first), ("x", &along)] {
                 let mean = signs.iter().sum::<f64>() / (signs.len() as f64).sqrt();
-                together.0.push((format!("order of slots by {what}, key {key}"), mean, 1));
-                together.add(format!("order of slots by {what}, record"), &alternating, signs);
+                correlations.0.insert(format!("order of slots by {what}, key {key}"), (mean, 1.0));
+                correlations.add(format!("order of slots by {what}, record"), &alternating, signs);
             }
         }
         let (mut place, mut right, near) = (Vec::new(), Vec::new(), hidden.near(10));
@@ -128,10 +121,10 @@ fn columns_tell_nothing<const D: usize>(name: &str, scheme: &Entry) {
                 right.push(f64::from(true_lists.of(slot).contains(record)));
             }
         }
-        together.add("place in a list, right".to_owned(), &place, &right);
+        correlations.add("place in a list, right".to_owned(), &place, &right);
     }
-    assert!(together.0.len() > 2 * D, "{name}");
-    assert!(together.telling().is_empty(), "{name} ({D}D) tells {:?}", together.telling());
+    assert!(correlations.0.len() > 2 * D, "{name}");
+    assert!(correlations.leaking().is_empty(), "{name} ({D}D) tells {:?}", correlations.leaking());
 }
 
 #[test]
@@ -147,10 +140,10 @@ fn what_tells_is_found() {
     let bit =
         |at: usize| if at.is_multiple_of(4) { f64::from(x[at] > 3.0) } else { (at / 4 % 2) as f64 };
     let bits: Vec<f64> = (0..POINTS).map(bit).collect();
-    let mut together = Together::default();
+    let mut correlations = Correlations::default();
     for _ in 0..KEYS {
-        together.add("bit".to_owned(), &bits, &x);
-        together.add("order".to_owned(), &rows, &rows);
+        correlations.add("bit".to_owned(), &bits, &x);
+        correlations.add("order".to_owned(), &rows, &rows);
     }
-    assert_eq!(together.telling().len(), 2, "{:?}", together.telling());
+    assert_eq!(correlations.leaking().len(), 2, "{:?}", correlations.leaking());
 }

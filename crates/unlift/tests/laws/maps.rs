@@ -4,7 +4,7 @@ pub use std::sync::Arc;
 
 pub use unlift::audit::{Item, Outcome, Plan, Row, Silent, run, run_many};
 pub use unlift::descriptors::Values;
-pub use unlift::evaluate::evaluate;
+pub use unlift::evaluate::{Truth, distance_to_record, evaluate};
 pub use unlift::geometry::frame::Bounds;
 pub use unlift::geometry::knn::Knn;
 pub use unlift::geometry::vector::{along, distance, dot, median, sub, widen};
@@ -18,7 +18,7 @@ pub use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays,
 pub use unlift::seed::{Draws, Key, Stage};
 pub use unlift::truth::{Original, Secret};
 pub use unlift::{About, Descriptors, Error, PointSet, RecordId, RowOrder, Unit, synthetic};
-pub use unlift_testkit::{distance_to_record, image_around, on_threads, piles, room, uniform};
+pub use unlift_testkit::{image_around, on_threads, piles, room, uniform};
 
 /// Returns `n` seeds, the same in every run. With `UNLIFT_RANDOM_TESTS=50`, 50 seeds that differ in every run; a failure prints them.
 pub fn seeds(n: usize) -> Vec<u64> {
@@ -75,6 +75,10 @@ pub fn hide<const D: usize>(scheme: &Entry, points: &[[f64; D]], seed: u64) -> H
 }
 
 impl<const D: usize> Hidden<D> {
+    pub fn truth(&self) -> Truth<'_, D> {
+        Truth { original: &self.original, released: &self.released, secret: &self.secret }
+    }
+
     /// Returns the original of `slot`, relative to the released origin.
     pub fn local(&self, slot: usize) -> [f64; D] {
         let point = self.original.reveal().positions()[self.secret.hidden()[slot].index()];
@@ -187,6 +191,13 @@ pub fn plan<const D: usize>(
     plan
 }
 
+/// Returns an image with keypoints, without descriptors.
+pub fn image(name: &str, points: Vec<[f64; 2]>, size: [f64; 2]) -> Item<2> {
+    let points = PointSet::try_new(points, Unit::Pixel).unwrap();
+    let original = Original::within(points, Bounds::try_new([0.0; 2], size).unwrap()).unwrap();
+    Item { name: name.to_owned(), original, descriptors: None }
+}
+
 /// Audits a map.
 pub fn audit(original: &Original<3>, plan: &Plan<3>) -> Outcome {
     run(original, None, plan, &mut Silent).unwrap()
@@ -230,34 +241,31 @@ pub fn random_descriptors(seed: u64, n: usize, dim: usize) -> Descriptors {
     Descriptors::try_new(Values::F32(values), dim).unwrap()
 }
 
-/// Returns the records in `order`. With draws, each is in another form: lines reversed and through another of their points, centers in
-/// another order.
+/// Returns the records, brought to normal form again. With draws, they start from another form: lines reversed and through another of
+/// their points, centers in another order.
 pub fn again<const D: usize>(
     records: &Obfuscation<D>,
-    order: &[usize],
     mut draws: Option<&mut Draws>,
 ) -> Obfuscation<D> {
-    let rows = |of: &[[f32; D]]| order.iter().map(|&old| widen(&of[old])).collect::<Vec<_>>();
+    let rows = |of: &[[f32; D]]| of.iter().map(widen).collect::<Vec<_>>();
     match records {
         Obfuscation::Lines(lines) => {
             let (mut points, mut directions) = (rows(lines.foot()), rows(lines.direction()));
             for (point, direction) in points.iter_mut().zip(&mut directions) {
                 let Some(draws) = &mut draws else { break };
                 *point = along(point, draws.between(-3.0, 3.0), direction);
-                let turned = draws.below(2) == 0;
-                *direction = direction.map(|x| if turned { -x } else { x });
+                let is_turned = draws.below(2) == 0;
+                *direction = direction.map(|x| if is_turned { -x } else { x });
             }
             Obfuscation::Lines(Lines::through(&points, &directions).unwrap())
         }
         Obfuscation::Rays(rays) => {
-            let of =
-                |at: u8| if draws.is_some() { rays.centers().len() as u8 - 1 - at } else { at };
-            let center = order.iter().map(|&old| of(rays.center()[old])).collect();
-            let mut centers: Vec<_> = rays.centers().iter().map(widen).collect();
+            let (mut centers, mut center) = (rows(rays.centers()), rays.center().to_vec());
             let mut regions = rays.regions().map(<[_]>::to_vec);
             if draws.is_some() {
                 centers.reverse();
                 regions.iter_mut().for_each(|regions| regions.reverse());
+                center.iter_mut().for_each(|at| *at = centers.len() as u8 - 1 - *at);
             }
             let again = Rays::try_new(&centers, center, &rows(rays.direction())).unwrap();
             Obfuscation::Rays(match regions {
@@ -266,9 +274,9 @@ pub fn again<const D: usize>(
             })
         }
         Obfuscation::AxisPlanes(planes) => {
-            let axis = order.iter().map(|&old| planes.axis()[old]).collect();
-            let offset: Vec<f64> = order.iter().map(|&old| planes.offset()[old].into()).collect();
-            Obfuscation::AxisPlanes(AxisPlanes::try_new(axis, &offset).unwrap())
+            let offset: Vec<f64> = planes.offset().iter().copied().map(f64::from).collect();
+            let again = AxisPlanes::try_new(planes.axis().to_vec(), &offset);
+            Obfuscation::AxisPlanes(again.unwrap())
         }
         Obfuscation::AxisCandidates(points) => {
             Obfuscation::AxisCandidates(AxisCandidates::try_new(&rows(points.position())).unwrap())

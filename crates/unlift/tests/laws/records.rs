@@ -1,8 +1,6 @@
 //! Properties of released maps: normal form, determinism, keys, and which truth belongs to a map. Others are in
 //! `unlift_testkit::scheme_laws`.
 
-use unlift::evaluate::{away_from_own, belongs};
-use unlift::geometry::frame::Bounds;
 use unlift::neighbors::geometric;
 
 use crate::maps::*;
@@ -10,7 +8,7 @@ use crate::maps::*;
 fn normal_form_is_idempotent<const D: usize>(name: &str, scheme: &Entry, n: usize, seed: u64) {
     let hidden = hide::<D>(scheme, &room(seed, n), seed);
     let stored = hidden.released.obfuscation();
-    let same = again(stored, &(0..stored.len()).collect::<Vec<_>>(), None);
+    let same = again(stored, None);
     assert!(record_bytes(stored) == record_bytes(&same), "{name}: normal form is not stable");
 }
 
@@ -59,21 +57,21 @@ fn a_truth_belongs_to_its_map_alone() {
     let (points, together) = (room::<3>(64, 200), vec![[1.3, 0.7, 2.1]; 200]);
     let turned = original(points.iter().map(|p| [p[1], p[2], p[0]]).collect());
     for name in ["olc", "ppl", "ray", "plane", "cp"] {
-        let Hidden { original, released, secret } = hide(entry(name), &points, 6);
-        assert!(belongs(&original, &released, &secret).is_ok(), "{name}");
-        assert!(belongs(&turned, &released, &secret).is_err(), "{name}");
+        let hidden = hide(entry(name), &points, 6);
+        let truth = hidden.truth();
+        assert!(truth.belongs().is_ok(), "{name}");
+        assert!(Truth { original: &turned, ..truth }.belongs().is_err(), "{name}");
         // A point lies on its record up to rounding.
-        let away = away_from_own(&released, &original, &secret);
-        assert!(away.iter().all(|&away| away < 1e-4), "{name}");
+        assert!(truth.away_from_own().iter().all(|&away| away < 1e-4), "{name}");
         let inner = Bounds::try_new([0.0; 3], [1.0; 3]).unwrap();
-        let cut = released.clone().with_bounds(Some(inner));
-        let of_cut =
-            secret.clone().of_map(Some(cut.fingerprint()), cut.slots_per_record()).unwrap();
-        let wrong = belongs(&original, &cut, &of_cut).unwrap_err().to_string();
+        let cut = hidden.released.clone().with_bounds(Some(inner));
+        let (secret, slots) = (hidden.secret.clone(), cut.slots_per_record());
+        let of_cut = secret.of_map(Some(cut.fingerprint()), slots).unwrap();
+        let wrong = Truth { released: &cut, secret: &of_cut, ..truth }.belongs().unwrap_err();
+        let wrong = wrong.to_string();
         assert!(wrong.starts_with("bounds: expected a box of all hidden points"), "{wrong}");
         if !["ppl", "ray"].contains(&name) {
-            let Hidden { original, released, secret } = hide(entry(name), &together, 6);
-            assert!(belongs(&original, &released, &secret).is_ok(), "{name}");
+            assert!(hide(entry(name), &together, 6).truth().belongs().is_ok(), "{name}");
         }
     }
 }

@@ -75,10 +75,10 @@ fn equivariance_of_joint_recovery() {
     over_schemes!(shifted_and_scaled_maps_leak_the_same, Builtin::Joint, 1.0);
 }
 
-fn lists_again(lists: &Neighborhoods, order: &[usize], per: usize) -> Neighborhoods {
+fn lists_again(lists: &Neighborhoods, order: &[u32], per: usize) -> Neighborhoods {
     let mut new_of = vec![0; order.len()];
-    order.iter().enumerate().for_each(|(new, &old)| new_of[old] = new as u32);
-    let slots = order.iter().flat_map(|&old| (0..per).map(move |at| old * per + at));
+    order.iter().enumerate().for_each(|(new, &old)| new_of[old as usize] = new as u32);
+    let slots = order.iter().flat_map(|&old| (0..per).map(move |at| old as usize * per + at));
     let rows = slots.map(|old| lists.of(old).iter().map(|id| new_of[id.index()]).collect());
     lists_of(&rows.collect::<Vec<_>>(), order.len(), per)
 }
@@ -101,9 +101,8 @@ fn shares_do_not_depend_on_how_a_map_is_written<const D: usize>(name: &str, sche
         let (released, lists) = (&hidden.released, hidden.lists(20, 0.5, time));
         let per = released.slots_per_record();
         let mut draws = Draws::new(time, Stage::Synthetic, 13);
-        let order: Vec<usize> =
-            (draws.permutation(released.n_records()).into_iter()).map(|old| old as usize).collect();
-        let written = again(released.obfuscation(), &order, Some(&mut draws));
+        let order = draws.permutation(released.n_records());
+        let written = again(&released.obfuscation().select(&order), Some(&mut draws));
         let anew = released_of(released, written);
         let new_lists = lists_again(&lists, &order, per);
         // Within 10 cm along every axis, in a room with sides of a few meters.
@@ -118,7 +117,7 @@ fn shares_do_not_depend_on_how_a_map_is_written<const D: usize>(name: &str, sche
             let options = (solver, RecoverOptions { seed: 3, ..RecoverOptions::default() });
             let before = share(&solve(released, &lists, options), &|slot| slot);
             let after = solve(&anew, &new_lists, options);
-            let after = share(&after, &|new| order[new / per] * per + new % per);
+            let after = share(&after, &|new| order[new / per] as usize * per + new % per);
             differences.push(after - before);
         }
     }

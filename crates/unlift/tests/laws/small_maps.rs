@@ -5,10 +5,6 @@
 
 use crate::maps::{audit, *};
 
-fn room(seed: u64, n: usize) -> Vec<[f64; 3]> {
-    synthetic::room(seed, n).points
-}
-
 /// Returns a point anywhere in a cube.
 fn cube(draws: &mut Draws) -> [f64; 3] {
     std::array::from_fn(|_| draws.between(0.0, 1.0))
@@ -85,7 +81,7 @@ fn deltas_of_exchanged_coordinates_do_not_collapse() {
         let [x, y, z] = cube(draws);
         [6.0 * x, 5.0 * y, 0.05 * z]
     });
-    for (points, right) in [(room(3, 800), 0.35), (flat, 0.2)] {
+    for (points, right) in [(synthetic::room(3, 800).points, 0.35), (flat, 0.2)] {
         let (chosen, best) = (cp(&points, 10, Delta::Auto), cp(&points, 10, Delta::Fixed(right)));
         assert!(chosen > best - 10.0, "{chosen} {best}");
     }
@@ -96,7 +92,7 @@ fn automatic_delta_does_not_collapse_where_little_is_right() {
     // Before the fix chance led to a thousandth of the typical distance, and shares within 2.5 were
     // 2 and 20 %; now 52 and 54.
     for (name, least) in [("ppl+", 50.2), ("cp", 52.8)] {
-        let (joint, consensus) = both(&room(1, 1_000), name, 0.1);
+        let (joint, consensus) = both(&synthetic::room(1, 1_000).points, name, 0.1);
         let found = joint[1].min(consensus[1]);
         assert!(found > least, "{name}: joint {joint:?}, consensus {consensus:?}");
     }
