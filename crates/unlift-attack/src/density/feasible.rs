@@ -176,7 +176,7 @@ const REACH: usize = 50;
 
 /// Returns, per axis and record, the density of the published values of that axis around the record's value.
 fn value_densities<const D: usize>(candidates: &AxisCandidates<D>) -> [Vec<f32>; 3] {
-    let n = candidates.len();
+    let n = candidates.position().len();
     std::array::from_fn(|axis| {
         let value = |row: u32| candidates.position()[row as usize][axis % D];
         let mut order: Vec<u32> = (0..n as u32).collect();

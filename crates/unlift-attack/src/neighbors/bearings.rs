@@ -14,7 +14,7 @@ const ROUNDS: usize = 4;
 /// center. Decoys have little support: their descriptor comes from elsewhere. Listed records count by their own support.
 pub fn support<const D: usize>(released: &Released<D>, lists: &Neighborhoods) -> Option<Vec<f64>> {
     let Obfuscation::Rays(rays) = released.obfuscation() else { return None };
-    let n = rays.len();
+    let n = rays.center().len();
     if !released.obfuscation().is_bearings() || lists.n_slots() != n || n < 2 {
         return None;
     }

@@ -20,10 +20,10 @@ impl<const D: usize> Obfuscation<D> {
     /// Number of records.
     pub fn len(&self) -> usize {
         match self {
-            Self::Lines(lines) => lines.len(),
-            Self::Rays(rays) => rays.len(),
-            Self::AxisPlanes(planes) => planes.len(),
-            Self::AxisCandidates(candidates) => candidates.len(),
+            Self::Lines(lines) => lines.foot.len(),
+            Self::Rays(rays) => rays.center.len(),
+            Self::AxisPlanes(planes) => planes.axis.len(),
+            Self::AxisCandidates(candidates) => candidates.position.len(),
         }
     }
 
@@ -35,10 +35,34 @@ impl<const D: usize> Obfuscation<D> {
     /// Returns the records `order[0], order[1], ...`.
     pub fn select(&self, order: &[u32]) -> Self {
         match self {
-            Self::Lines(lines) => Self::Lines(lines.select(order)),
-            Self::Rays(rays) => Self::Rays(rays.select(order)),
-            Self::AxisPlanes(planes) => Self::AxisPlanes(planes.select(order)),
-            Self::AxisCandidates(candidates) => Self::AxisCandidates(candidates.select(order)),
+            Self::Lines(Lines { foot, direction }) => {
+                Self::Lines(Lines { foot: rows(foot, order), direction: rows(direction, order) })
+            }
+            Self::Rays(Rays { centers, center, direction, regions }) => Self::Rays(Rays {
+                centers: centers.clone(),
+                center: rows(center, order),
+                direction: rows(direction, order),
+                regions: regions.clone(),
+            }),
+            Self::AxisPlanes(AxisPlanes { axis, offset }) => Self::AxisPlanes(AxisPlanes {
+                axis: rows(axis, order),
+                offset: rows(offset, order),
+            }),
+            Self::AxisCandidates(AxisCandidates { position }) => {
+                Self::AxisCandidates(AxisCandidates { position: rows(position, order) })
+            }
+        }
+    }
+
+    /// Returns a point and the unit direction of a line, or the center and the direction of a ray; `None` for other families.
+    pub(crate) fn line(&self, record: usize) -> Option<(&[f32; D], &[f32; D])> {
+        match self {
+            Self::Lines(lines) => Some((&lines.foot[record], &lines.direction[record])),
+            Self::Rays(rays) => {
+                let center = &rays.centers[usize::from(rays.center[record])];
+                Some((center, &rays.direction[record]))
+            }
+            Self::AxisPlanes(_) | Self::AxisCandidates(_) => None,
         }
     }
 
@@ -94,21 +118,6 @@ impl<const D: usize> Lines<D> {
             foot.push(finite_f32(foot_of(point, &unit), "foot", row)?.map(|x| x + 0.0));
         }
         Ok(Self { foot, direction })
-    }
-
-    /// Returns the rows `order[0], order[1], ...`.
-    pub fn select(&self, order: &[u32]) -> Self {
-        Self { foot: rows(&self.foot, order), direction: rows(&self.direction, order) }
-    }
-
-    /// Number of lines.
-    pub fn len(&self) -> usize {
-        self.foot.len()
-    }
-
-    /// Whether there are no lines.
-    pub fn is_empty(&self) -> bool {
-        self.foot.is_empty()
     }
 
     /// Point of each line nearest to the origin.
@@ -181,16 +190,6 @@ impl<const D: usize> Rays<D> {
         Ok(Self { centers, center, direction, regions: None })
     }
 
-    /// Returns the rows `order[0], order[1], ...`.
-    pub fn select(&self, order: &[u32]) -> Self {
-        Self {
-            centers: self.centers.clone(),
-            center: rows(&self.center, order),
-            direction: rows(&self.direction, order),
-            regions: self.regions.clone(),
-        }
-    }
-
     /// Declares that the region of a point decides its center. `regions` has, per center, the box of its points, relative to the released
     /// origin. It is a public rule of the scheme.
     ///
@@ -207,16 +206,6 @@ impl<const D: usize> Rays<D> {
     /// Box of the points of each center, relative to the released origin, if declared.
     pub fn regions(&self) -> Option<&[Bounds<D>]> {
         self.regions.as_deref()
-    }
-
-    /// Number of rays.
-    pub fn len(&self) -> usize {
-        self.center.len()
-    }
-
-    /// Whether there are no rays.
-    pub fn is_empty(&self) -> bool {
-        self.center.is_empty()
     }
 
     /// The published centers.
@@ -268,21 +257,6 @@ impl<const D: usize> AxisPlanes<D> {
         Ok(Self { axis, offset })
     }
 
-    /// Returns the rows `order[0], order[1], ...`.
-    pub fn select(&self, order: &[u32]) -> Self {
-        Self { axis: rows(&self.axis, order), offset: rows(&self.offset, order) }
-    }
-
-    /// Number of planes.
-    pub fn len(&self) -> usize {
-        self.axis.len()
-    }
-
-    /// Whether there are no planes.
-    pub fn is_empty(&self) -> bool {
-        self.axis.is_empty()
-    }
-
     /// Axis that each plane is perpendicular to.
     pub fn axis(&self) -> &[u8] {
         &self.axis
@@ -312,21 +286,6 @@ impl<const D: usize> AxisCandidates<D> {
             .map(|(row, &p)| Ok(finite_f32(p, "position", row)?.map(|x| x + 0.0)))
             .collect::<Result<_, Error>>()?;
         Ok(Self { position })
-    }
-
-    /// Returns the rows `order[0], order[1], ...`.
-    pub fn select(&self, order: &[u32]) -> Self {
-        Self { position: rows(&self.position, order) }
-    }
-
-    /// Number of records.
-    pub fn len(&self) -> usize {
-        self.position.len()
-    }
-
-    /// Whether there are no records.
-    pub fn is_empty(&self) -> bool {
-        self.position.is_empty()
     }
 
     /// The published points.

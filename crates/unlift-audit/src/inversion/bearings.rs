@@ -37,7 +37,7 @@ pub fn on_bearings(released: &Released<3>) -> Result<Recovered<3>, Error> {
     let (rays, center) = bearings(released)?;
     let source: &dyn Source<3> = &Similarity;
     let lists = source.lists(released, source.k(released), 0)?;
-    let support = support(released, &lists).unwrap_or_else(|| vec![REAL; rays.len()]);
+    let support = support(released, &lists).unwrap_or_else(|| vec![REAL; rays.center().len()]);
     let place = |(direction, support): (&[f32; 3], f64)| match support < REAL {
         true => [f32::NAN; 3],
         false => std::array::from_fn(|c| center[c] + direction[c]),

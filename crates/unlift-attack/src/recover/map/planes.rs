@@ -77,7 +77,7 @@ pub(crate) fn window_chance<const D: usize>(
     sorted: &SortedPlanes,
     delta: f32,
 ) -> Vec<f32> {
-    let mut chance = vec![0.0; planes.len()];
+    let mut chance = vec![0.0; planes.axis().len()];
     for Sorted { order, .. } in &sorted.by_axis {
         let mut end = 0;
         for (start, &record) in order.iter().enumerate() {
