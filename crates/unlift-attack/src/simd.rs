@@ -49,12 +49,6 @@ pub(crate) fn prefetch<T>(rows: &[T], at: usize) {
     let _ = (rows, at);
 }
 
-/// Runs `kernel` with the baseline instructions only, for tests.
-#[cfg(test)]
-pub(crate) fn portable<K: Kernel>(kernel: K) -> K::Output {
-    kernel.run()
-}
-
 /// Rows and columns of a block of [`raise_to_products`].
 pub(crate) const BLOCK: usize = 128;
 /// Adjacent columns in a packed right factor.

@@ -9,9 +9,9 @@ use crate::simd::Kernel;
 /// A line, or a half-line from `point`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line {
-    point: [f64; 3],
-    direction: [f64; 3],
-    is_ray: bool,
+    pub point: [f64; 3],
+    pub direction: [f64; 3],
+    pub is_ray: bool,
 }
 
 /// The place where a line is nearest to another one.
@@ -31,10 +31,6 @@ const LEAST_SINE: f64 = 1e-5;
 const ONE_CENTER: f64 = 1e-4;
 
 impl Line {
-    pub fn new(point: [f64; 3], direction: [f64; 3], is_ray: bool) -> Self {
-        Self { point, direction, is_ray }
-    }
-
     /// Returns where this line is nearest to `other`; `None` if they are nearly parallel, or only meet behind the start of a ray.
     pub fn meet(&self, other: &Self) -> Option<Meet> {
         let normal = cross(&self.direction, &other.direction);

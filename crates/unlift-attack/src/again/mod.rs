@@ -12,7 +12,7 @@
 mod meet;
 mod swaps;
 
-use crate::geometry::vector::{dot, quantile, sub, widen};
+use crate::geometry::vector::{dot, quantile_of, sub, widen};
 use crate::neighbors::{Blocks, MOST_ROWS, comparable, mutual};
 use crate::recover::{Confidence, Estimate, Recovered, Status};
 use crate::released::{Obfuscation, Released};
@@ -50,24 +50,18 @@ impl Flats {
     fn new(released: &Released<3>, origin: &[f64; 3]) -> Self {
         let shift = sub(&released.origin(), origin);
         let moved = |p: &[f32; 3]| [0, 1, 2].map(|c| f64::from(p[c]) + shift[c]);
-        let unit = |d: [f64; 3]| d.map(|x| x / dot(&d, &d).sqrt());
+        let records = released.obfuscation();
+        let is_ray = matches!(records, Obfuscation::Rays(_));
+        let line = |(p, d): (&[f32; 3], &[f32; 3])| {
+            let d = widen(d);
+            Line { point: moved(p), direction: d.map(|x| x / dot(&d, &d).sqrt()), is_ray }
+        };
         let (mut planes, mut swapped) = (Vec::new(), Vec::new());
         let mut per_record = 1;
-        let lines = match released.obfuscation() {
-            Obfuscation::Lines(lines) => lines
-                .foot()
-                .iter()
-                .zip(lines.direction())
-                .map(|(p, d)| Line::new(moved(p), unit(widen(d)), false))
-                .collect(),
-            Obfuscation::Rays(rays) => rays
-                .center()
-                .iter()
-                .zip(rays.direction())
-                .map(|(&c, d)| {
-                    Line::new(moved(&rays.centers()[usize::from(c)]), unit(widen(d)), true)
-                })
-                .collect(),
+        let lines = match records {
+            Obfuscation::Lines(_) | Obfuscation::Rays(_) => {
+                (0..records.len()).filter_map(|record| records.line(record)).map(line).collect()
+            }
             Obfuscation::AxisPlanes(of) => {
                 let rows = of.axis().iter().zip(of.offset());
                 let plane = |(&axis, &offset): (&u8, &f32)| {
@@ -80,10 +74,9 @@ impl Flats {
             Obfuscation::AxisCandidates(of) => {
                 swapped = of.position().iter().map(moved).collect();
                 per_record = 3;
-                let axes = |p: &[f64; 3]| {
-                    let p = *p;
+                let axes = |&point: &[f64; 3]| {
                     let along = |axis| [0, 1, 2].map(|c| if c == axis { 1.0 } else { 0.0 });
-                    [0, 1, 2].map(|axis| Line::new(p, along(axis), false))
+                    [0, 1, 2].map(|axis| Line { point, direction: along(axis), is_ray })
                 };
                 swapped.iter().flat_map(axes).collect()
             }
@@ -93,9 +86,7 @@ impl Flats {
 
     /// Returns the size that few swapped coordinates exceed.
     fn size(&self) -> f64 {
-        let mut sizes: Vec<f64> = self.swapped.as_flattened().iter().map(|x| x.abs()).collect();
-        sizes.sort_unstable_by(f64::total_cmp);
-        if sizes.is_empty() { 0.0 } else { quantile(&sizes, 0.99) }
+        quantile_of(self.swapped.as_flattened().iter().map(|x| x.abs()), 0.99)
     }
 
     fn of(&self, record: usize) -> &[Line] {
@@ -152,16 +143,15 @@ impl Place {
 /// When a release has no descriptors, or the two differ in the unit or the length of descriptors, or have too many points.
 pub fn by_descriptors(a: &Released<3>, b: &Released<3>) -> Result<Solved, Error> {
     check(a, b)?;
-    let described = |released: &Released<3>, which: &str| {
-        let none = || Error::new(format!("descriptors of the {which} release"), "some", "none");
-        released.descriptors().cloned().ok_or_else(none)
-    };
-    let (of_a, of_b) = (described(a, "first")?, described(b, "second")?);
+    let none =
+        |which: &str| Error::new(format!("descriptors of the {which} release"), "some", "none");
+    let of_a = a.descriptors().ok_or_else(|| none("first"))?;
+    let of_b = b.descriptors().ok_or_else(|| none("second"))?;
     if of_a.dim() != of_b.dim() {
         let expected = format!("{} columns, as in the first release", of_a.dim());
         return Err(Error::new("descriptors", expected, of_b.dim().to_string()));
     }
-    let both: Vec<Blocks> = comparable(&[&of_a, &of_b]).iter().map(|of| Blocks::new(of)).collect();
+    let both: Vec<Blocks> = comparable(&[of_a, of_b]).iter().map(|of| Blocks::new(of)).collect();
     let pairs = mutual(&both[0], &both[1]);
     let per_record = [a, b].map(Released::slots_per_record);
     let records: Vec<(usize, usize)> = pairs
@@ -180,13 +170,16 @@ pub fn by_descriptors(a: &Released<3>, b: &Released<3>) -> Result<Solved, Error>
     let usual = shifted.iter().sum::<f64>() / shifted.len().max(1) as f64;
     let usual = usual.max(f64::MIN_POSITIVE);
     let of_miss = |place: &Place| place.miss.map(|miss| miss / usual);
-    let linked = places.iter().zip(&pairs).map(|(place, &(row, _, ratio))| {
-        let by_descriptor = 0.99 * f64::from(1.0 - ratio.min(1.0));
-        Linked { row: row as usize, place: *place, unusual: of_miss(place), by_descriptor }
+    let linked = places.iter().zip(&records).zip(&pairs);
+    let linked = linked.map(|((place, &(_, partner)), &(row, _, ratio))| Linked {
+        row: row as usize,
+        partner: partner as u32,
+        place: *place,
+        unusual: of_miss(place),
+        by_descriptor: 0.99 * f64::from(1.0 - ratio.min(1.0)),
     });
     let linked: Vec<Linked> = linked.collect();
-    let other = |at: usize| records[at].1 as u32;
-    solved(a, &linked, other, usual, RowOrder::DescriptorRows)
+    solved(a, &linked, usual, RowOrder::DescriptorRows)
 }
 
 /// Recovers the points of `a` from records alone: of two lines that meet within rounding, one belongs to the other. The order of the
@@ -210,7 +203,7 @@ pub fn by_geometry(a: &Released<3>, b: &Released<3>) -> Result<Solved, Error> {
     let slots = [a, b].map(Released::slots_per_record);
     let near_a = meet::search(&of_a.lines, of_a.per_record, &of_b.lines);
     let near_b = meet::search(&of_b.lines, of_b.per_record, &of_a.lines);
-    let (mut linked, mut others) = (Vec::new(), Vec::new());
+    let mut linked = Vec::new();
     for (record, near) in near_a.iter().enumerate() {
         // The farthest ones are not of this point, so their distance is the usual one.
         let usual = near.last().map_or(1.0, |last| last.miss / near.len() as f64);
@@ -227,13 +220,18 @@ pub fn by_geometry(a: &Released<3>, b: &Released<3>) -> Result<Solved, Error> {
             let axis = if of_a.per_record > 1 { own as usize % 3 } else { 0 };
             let place = Place::of(&meet, axis);
             let (row, unusual) = (record * slots[0] + slot, Some(miss / usual));
-            linked.push(Linked { row, place, unusual, by_descriptor: 0.0 });
-            others.push(partner as u32);
+            linked.push(Linked {
+                row,
+                partner: partner as u32,
+                place,
+                unusual,
+                by_descriptor: 0.0,
+            });
         }
     }
     let all = near_a.iter().filter_map(|near| near.last()).map(|last| last.miss);
     let usual = all.sum::<f64>() / (near_a.len().max(1) * meet::KEPT) as f64;
-    solved(a, &linked, |at| others[at], usual, RowOrder::Either)
+    solved(a, &linked, usual, RowOrder::Either)
 }
 
 fn check(a: &Released<3>, b: &Released<3>) -> Result<(), Error> {
@@ -251,6 +249,8 @@ fn check(a: &Released<3>, b: &Released<3>) -> Result<(), Error> {
 struct Linked {
     /// Row of the first release.
     row: usize,
+    /// Record of the second release.
+    partner: u32,
     place: Place,
     /// Distance between the records in units of the usual one of wrong pairs; `None` if all such records meet.
     unusual: Option<f64>,
@@ -267,9 +267,7 @@ fn places([a, b]: &[Flats; 2], records: &[(usize, usize)]) -> Vec<Place> {
     }
     let middle = [0, 1, 2].map(|axis| {
         let of_axis = a.planes.iter().chain(&b.planes).filter(|plane| plane.0 == axis);
-        let mut offsets: Vec<f64> = of_axis.map(|plane| plane.1).collect();
-        offsets.sort_unstable_by(f64::total_cmp);
-        if offsets.is_empty() { 0.0 } else { quantile(&offsets, 0.5) }
+        quantile_of(of_axis.map(|plane| plane.1), 0.5)
     });
     let same = same_coordinate(a, b, records).max(rounding);
     let place = |&(own, other): &(usize, usize)| {
@@ -320,16 +318,13 @@ fn same_coordinate(a: &Flats, b: &Flats, records: &[(usize, usize)]) -> f64 {
         };
         Some((point[plane.0] - plane.1).abs())
     };
-    let mut differences: Vec<f64> = records.iter().filter_map(difference).collect();
-    differences.sort_unstable_by(f64::total_cmp);
-    if differences.is_empty() { 0.0 } else { 10.0 * quantile(&differences, 0.33) }
+    10.0 * quantile_of(records.iter().filter_map(difference), 0.33)
 }
 
-/// Judges all links together. `usual` is the length of a distance of 1; `other` returns the record of the second release.
+/// Judges all links together. `usual` is the length of a distance of 1.
 fn solved(
     a: &Released<3>,
     linked: &[Linked],
-    other: impl Fn(usize) -> u32,
     usual: f64,
     order: RowOrder,
 ) -> Result<Solved, Error> {
@@ -338,18 +333,16 @@ fn solved(
     let mut trusts = trusts.into_iter();
     let origin = a.origin();
     let sizes = linked.iter().filter_map(|link| link.place.point);
-    let mut sizes: Vec<f64> = sizes.map(|p| dot(&p, &p).sqrt()).collect();
-    sizes.sort_unstable_by(f64::total_cmp);
-    let rounding = if sizes.is_empty() { 0.0 } else { ROUNDING * quantile(&sizes, 0.9) };
+    let rounding = ROUNDING * quantile_of(sizes.map(|p| dot(&p, &p).sqrt()), 0.9);
     let noise = (noise * usual).max(rounding);
     let with_axis = matches!(a.obfuscation(), Obfuscation::AxisCandidates(_));
     let mut estimates = vec![Estimate::lost(Status::TooFewNeighbors); a.n_slots()];
     let mut confidence = vec![Confidence::LOST; a.n_slots()];
     let (mut links, mut n_open) = (vec![None; a.n_slots()], 0);
-    for (at, Linked { row, place, unusual, by_descriptor }) in linked.iter().enumerate() {
+    for Linked { row, partner, place, unusual, by_descriptor } in linked {
         let found = unusual.and_then(|_| trusts.next()).unwrap_or(*by_descriptor);
         if place.is_linked && (unusual.is_none() || found >= 0.5) {
-            links[*row] = Some(other(at));
+            links[*row] = Some(*partner);
             n_open += usize::from(place.is_open);
         }
         let position = place.point.map(|point| point.map(|x| x as f32));

@@ -7,7 +7,7 @@
 
 use super::Place;
 use crate::geometry::knn::Knn;
-use crate::geometry::vector::quantile;
+use crate::geometry::vector::quantile_of;
 
 /// Neighbors whose distance measures how dense points are.
 const DENSE: usize = 8;
@@ -97,9 +97,7 @@ fn same(a: &[[f64; 3]], b: &[[f64; 3]], records: &[(usize, usize)]) -> f64 {
     let least = |&(own, other): &(usize, usize)| {
         (0..3).map(|c| (a[own][c] - b[other][c]).abs()).fold(f64::INFINITY, f64::min)
     };
-    let mut least: Vec<f64> = records.iter().map(least).collect();
-    least.sort_unstable_by(f64::total_cmp);
-    if least.is_empty() { 0.0 } else { 10.0 * quantile(&least, 0.5) }
+    10.0 * quantile_of(records.iter().map(least), 0.5)
 }
 
 /// Returns the only row of `values`, sorted with rows, within `same` of `value`.
@@ -109,15 +107,11 @@ fn lookup(values: &[(f64, usize)], value: f64, same: f64) -> Option<usize> {
     (to == from + 1).then(|| values[from].1)
 }
 
-fn sorted(mut values: Vec<(f64, usize)>) -> Vec<(f64, usize)> {
-    values.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    values
-}
-
 fn cycles(nodes: &[Node], axis: usize, same: f64) -> Vec<Cycle> {
     let differ = |at: &usize| nodes[*at].axes.len() < 3 && nodes[*at].axes.contains(&axis);
     let own: Vec<usize> = (0..nodes.len()).filter(differ).collect();
-    let values = sorted(own.iter().map(|&at| (nodes[at].a[axis], at)).collect());
+    let mut values: Vec<(f64, usize)> = own.iter().map(|&at| (nodes[at].a[axis], at)).collect();
+    values.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let next: Vec<Option<usize>> =
         own.iter().map(|&at| lookup(&values, nodes[at].b[axis], same)).collect();
     let next = |at: usize| own.binary_search(&at).ok().and_then(|at| next[at]);

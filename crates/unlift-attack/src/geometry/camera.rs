@@ -69,7 +69,7 @@ impl Pose {
         let (axis, direction): ([f64; 3], [f64; 3]) = (draws.direction(), draws.direction());
         let angle = error.rotation_degrees.to_radians();
         Self {
-            rotation: turned(&turn(&axis.map(|x| x * angle)), &self.rotation),
+            rotation: turned(&axis.map(|x| x * angle), &self.rotation),
             center: [0, 1, 2].map(|c| self.center[c] + error.center * direction[c]),
         }
     }
@@ -78,7 +78,7 @@ impl Pose {
     #[must_use]
     pub fn moved(&self, by: &[f64; 6]) -> Self {
         let (w, dt) = ([by[0], by[1], by[2]], [by[3], by[4], by[5]]);
-        let rotation = turned(&turn(&w), &self.rotation);
+        let rotation = turned(&w, &self.rotation);
         // The center moves by -R^T dt.
         let center = std::array::from_fn(|c| {
             self.center[c] - (0..3).map(|k| rotation[k][c] * dt[k]).sum::<f64>()
@@ -113,23 +113,19 @@ impl Camera {
     }
 }
 
-/// Returns the rotation by the angle `|w|` about `w` (Rodrigues).
-fn turn(w: &[f64; 3]) -> [[f64; 3]; 3] {
+/// Returns `rotation`, followed by the rotation by the angle `|w|` about `w` (Rodrigues).
+fn turned(w: &[f64; 3], rotation: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
     let angle = dot(w, w).sqrt();
     let (sine, versine) = match angle > 1e-12 {
         true => (libm::sin(angle) / angle, (1.0 - libm::cos(angle)) / (angle * angle)),
         false => (1.0, 0.5),
     };
     let cross = [[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]];
-    std::array::from_fn(|r| {
+    let turn: [[f64; 3]; 3] = std::array::from_fn(|r| {
         std::array::from_fn(|c| {
             let square: f64 = (0..3).map(|k| cross[r][k] * cross[k][c]).sum();
             f64::from(u8::from(r == c)) + sine * cross[r][c] + versine * square
         })
-    })
-}
-
-/// Returns `rotation`, followed by `turn`.
-fn turned(turn: &[[f64; 3]; 3], rotation: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
+    });
     turn.map(|row| std::array::from_fn(|c| (0..3).map(|k| row[k] * rotation[k][c]).sum()))
 }

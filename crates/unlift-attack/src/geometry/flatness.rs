@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
-use super::vector::{dot, quantile};
+use super::vector::{dot, quantile, quantile_of};
 
 /// Fraction of the points that decide the thickness; the rest may be outliers.
 const KEPT: f64 = 0.9;
@@ -53,14 +53,9 @@ fn axes<const D: usize>(points: &[[f64; D]]) -> Option<[[f64; D]; D]> {
 
 /// Returns the length from the 5th to the 95th percentile of `points` along `axis`.
 fn extent<const D: usize>(points: &[[f64; D]], axis: &[f64; D]) -> f64 {
-    let along = sorted_along(points, axis);
-    if along.is_empty() { 0.0 } else { quantile(&along, 0.95) - quantile(&along, 0.05) }
-}
-
-fn sorted_along<const D: usize>(points: &[[f64; D]], axis: &[f64; D]) -> Vec<f64> {
     let mut along: Vec<f64> = points.iter().map(|p| dot(p, axis)).collect();
     along.sort_unstable_by(f64::total_cmp);
-    along
+    if along.is_empty() { 0.0 } else { quantile(&along, 0.95) - quantile(&along, 0.05) }
 }
 
 /// Returns the [`KEPT`] of `points` nearest to the plane across `axis` through the median of `kept`, in their order.
@@ -69,11 +64,9 @@ fn nearest_to_plane<const D: usize>(
     kept: &[[f64; D]],
     axis: &[f64; D],
 ) -> Vec<[f64; D]> {
-    let middle = quantile(&sorted_along(kept, axis), 0.5);
+    let middle = quantile_of(kept.iter().map(|p| dot(p, axis)), 0.5);
     let away = |p: &[f64; D]| (dot(p, axis) - middle).abs();
-    let mut all: Vec<f64> = points.iter().map(away).collect();
-    all.sort_unstable_by(f64::total_cmp);
-    let limit = quantile(&all, KEPT);
+    let limit = quantile_of(points.iter().map(away), KEPT);
     points.iter().filter(|p| away(p) <= limit).copied().collect()
 }
 

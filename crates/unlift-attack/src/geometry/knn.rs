@@ -9,6 +9,7 @@
 use rayon::prelude::*;
 
 use crate::Error;
+use crate::geometry::frame::Bounds;
 use crate::geometry::vector::squared_distance;
 use crate::simd::{Kernel, dispatch};
 
@@ -30,12 +31,6 @@ pub struct Knn<'a, const D: usize> {
     rows: Vec<u32>,
     /// Place of each row.
     places: Vec<u32>,
-}
-
-#[derive(Clone, Copy)]
-struct Bounds<const D: usize> {
-    low: [f64; D],
-    high: [f64; D],
 }
 
 impl<const D: usize> Bounds<D> {
@@ -121,20 +116,14 @@ impl<'a, const D: usize> Knn<'a, D> {
         self.search(position, None, k, found);
     }
 
-    /// Calls `of(row, point)` for all points whose squared distance to a position is at most `bound`; of coinciding points, at least for
-    /// the `most` with the lowest rows.
+    /// Calls `of(row)` for all points whose squared distance to a position is at most `bound`.
     #[inline(always)]
-    pub fn within(
-        &self,
-        position: &[f64; D],
-        (bound, most): (f64, usize),
-        mut of: impl FnMut(u32, [f64; D]),
-    ) {
-        self.leaves_within(position, (bound, most), usize::MAX, |places| {
+    pub fn within(&self, position: &[f64; D], bound: f64, mut of: impl FnMut(u32)) {
+        self.leaves_within(position, (bound, usize::MAX), usize::MAX, |places| {
             for place in places {
                 let point = std::array::from_fn(|c| self.columns[c][place]);
                 if squared_distance(position, &point) <= bound {
-                    of(self.rows[place], point);
+                    of(self.rows[place]);
                 }
             }
         });

@@ -60,6 +60,13 @@ pub fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
+/// Returns the [`quantile`] of values in any order; 0 without values.
+pub fn quantile_of(values: impl Iterator<Item = f64>, q: f64) -> f64 {
+    let mut sorted: Vec<f64> = values.collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    if sorted.is_empty() { 0.0 } else { quantile(&sorted, q) }
+}
+
 /// Returns the value below which the fraction `q` in `[0, 1]` of `sorted` lies, linearly interpolated.
 ///
 /// # Panics

@@ -461,7 +461,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
             .then(|| place(slot ^ 1));
         let reach = f64::from(NEAR * terms.radius);
         let mut n_near = 0;
-        self.tree.within(&at.map(f64::from), (reach * reach, usize::MAX), |row, _| {
+        self.tree.within(&at.map(f64::from), reach * reach, |row| {
             let other = self.slots[row as usize] as usize;
             let of = record_of(other, slots_per_record);
             if of == record {

@@ -51,36 +51,33 @@ impl Query {
             let normal = [-y / length, x / length];
             [normal[0], normal[1], -dot(&normal, &p)]
         };
-        let all = self.released.bounds().map_or(EVERYWHERE, |bounds| (bounds.low, bounds.high));
+        let all = self.released.bounds().unwrap_or(EVERYWHERE);
         match self.released.obfuscation() {
             Obfuscation::Lines(lines) => {
                 let line = through(absolute(&lines.foot()[record]), &lines.direction()[record]);
-                Sight::new(projection, all, [line])
+                Sight::new(projection, all, &[line])
             }
             Obfuscation::Rays(rays) => {
                 let center = usize::from(rays.center()[record]);
                 let line = through(absolute(&rays.centers()[center]), &rays.direction()[record]);
-                let region = rays.regions().map(|of| {
-                    let Bounds { low, high } = of[center];
-                    ([0, 1].map(|c| low[c] + origin[c]), [0, 1].map(|c| high[c] + origin[c]))
-                });
-                Sight::new(projection, region.unwrap_or(all), [line])
+                let region = rays.regions().map(|of| of[center].about(&origin.map(|x| -x)));
+                Sight::new(projection, region.unwrap_or(all), &[line])
             }
             Obfuscation::AxisCandidates(candidates) => {
                 let [u, v] = absolute(&candidates.position()[record]);
-                Sight::new(projection, all, [[1.0, 0.0, -u], [0.0, 1.0, -v]])
+                Sight::new(projection, all, &[[1.0, 0.0, -u], [0.0, 1.0, -v]])
             }
             Obfuscation::AxisPlanes(planes) => {
                 let axis = usize::from(planes.axis()[record]);
                 let at = f64::from(planes.offset()[record]) + origin[axis];
                 let line = if axis == 0 { [1.0, 0.0, -at] } else { [0.0, 1.0, -at] };
-                Sight::new(projection, all, [line])
+                Sight::new(projection, all, &[line])
             }
         }
     }
 }
 
-const EVERYWHERE: ([f64; 2], [f64; 2]) = ([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
+const EVERYWHERE: Bounds<2> = Bounds { low: [f64::NEG_INFINITY; 2], high: [f64::INFINITY; 2] };
 
 /// Positions of one query's keypoints, recovered from a sequence.
 #[derive(Clone, Debug)]

@@ -3,6 +3,7 @@
 //! A line of an image back-projects to a plane through the camera center. Three planes meet in a point, and further ones check it. A
 //! record of axis candidates is one of two lines, so that every subset of three views has eight solutions and a fourth view decides.
 
+use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{cross, distance, dot};
 
 /// A plane `n . x + d = 0`, scaled such that `(n . x + d) / depth` is the distance of the projection of `x` from a line, in pixels.
@@ -13,8 +14,8 @@ type Plane = [f64; 4];
 pub struct Sight {
     /// Projection matrix `K [R | t]`: homogeneous pixels; the last row gives the depth.
     projection: [[f64; 4]; 3],
-    /// Smallest and largest pixel coordinates at which the keypoint can be.
-    area: ([f64; 2], [f64; 2]),
+    /// Pixel coordinates at which the keypoint can be.
+    area: Bounds<2>,
     /// Back-projected lines, of which one contains the keypoint; the second is unused for most records.
     planes: [Plane; 2],
     /// Unit normals of these lines in the image.
@@ -23,27 +24,22 @@ pub struct Sight {
 }
 
 impl Sight {
-    /// Back-projects lines `[a, b, c]` with `a u + b v + c = 0` and unit `(a, b)`, of which one contains the keypoint.
-    pub fn new(
-        projection: [[f64; 4]; 3],
-        area: ([f64; 2], [f64; 2]),
-        lines: impl IntoIterator<Item = [f64; 3]>,
-    ) -> Self {
-        let (mut planes, mut normals, mut n_planes) = ([[0.0; 4]; 2], [[0.0; 2]; 2], 0);
-        for line in lines.into_iter().take(2) {
+    /// Back-projects one or two lines `[a, b, c]` with `a u + b v + c = 0` and unit `(a, b)`, of which one contains the keypoint.
+    pub fn new(projection: [[f64; 4]; 3], area: Bounds<2>, lines: &[[f64; 3]]) -> Self {
+        let (mut planes, mut normals) = ([[0.0; 4]; 2], [[0.0; 2]; 2]);
+        for (at, line) in lines.iter().enumerate() {
             let column = |c: usize| (0..3).map(|row| line[row] * projection[row][c]).sum();
-            planes[n_planes] = std::array::from_fn(column);
-            normals[n_planes] = [line[0], line[1]];
-            n_planes += 1;
+            planes[at] = std::array::from_fn(column);
+            normals[at] = [line[0], line[1]];
         }
-        Self { projection, area, planes, normals, n_planes }
+        Self { projection, area, planes, normals, n_planes: lines.len() }
     }
 
     /// Projects a point in front of the camera, into the area of the keypoint or at most `margin` pixels beside it.
     fn project(&self, x: &[f64; 3], margin: f64) -> Option<([f64; 2], f64)> {
         let [u, v, depth] = self.projection.map(|row| affine(&row, x));
         let place = [u / depth, v / depth];
-        let (low, high) = &self.area;
+        let Bounds { low, high } = &self.area;
         let inside = |c: usize| place[c] >= low[c] - margin && place[c] <= high[c] + margin;
         (depth > 0.0 && inside(0) && inside(1)).then_some((place, depth))
     }
@@ -67,8 +63,6 @@ fn affine(row: &[f64; 4], x: &[f64; 3]) -> f64 {
 /// A triangulated point, as seen by the first view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
-    /// The point in space.
-    pub point: [f64; 3],
     /// Its projection into the first view, on the line of the record.
     pub place: [f64; 2],
     /// Which of the record's lines contains the keypoint.
@@ -226,7 +220,6 @@ fn refine(sights: &[Sight], mut x: [f64; 3], noise_px: f64) -> Option<(f64, Fit)
     });
     let variance = solve(normal, along).map_or(f64::INFINITY, |by| dot(&along, &by));
     let fit = Fit {
-        point: x,
         place: [place[0] - own * a, place[1] - own * b],
         line,
         n_agree,

@@ -351,7 +351,7 @@ impl<const D: usize> Ascent<'_, D> {
             self.lists.of(slot).iter().for_each(|record| mark(record.index(), LISTED));
             self.listers.of(slot).iter().for_each(|&lister| mark(lister as usize, LISTS));
             self.edges.of[slot].iter().for_each(|edge| mark(edge.0 as usize, EDGE));
-            tree.within(&points[row], (far * radius2[row], usize::MAX), |row, _| {
+            tree.within(&points[row], far * radius2[row], |row| {
                 mark(self.slots[row as usize] as usize, 0);
             });
             let own = &self.rows[slot];

@@ -453,7 +453,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
     fn density(&self, slot: usize, x: &[f32; D]) -> f32 {
         let radius = DENSITY_RADIUS * self.places.typical;
         let (radius2, mut sum) = (radius * radius, 0.0);
-        self.tree.within(&x.map(f64::from), (f64::from(radius2), usize::MAX), |at, _| {
+        self.tree.within(&x.map(f64::from), f64::from(radius2), |at| {
             let at = at as usize;
             if self.places.slot[at] as usize != slot {
                 let place = &self.places.places[at];

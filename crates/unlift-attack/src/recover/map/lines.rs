@@ -473,7 +473,7 @@ pub(crate) fn ln(y: f32) -> f32 {
 mod tests {
     use super::*;
     use crate::seed::{Draws, Stage};
-    use crate::simd::{Kernel, dispatch, portable};
+    use crate::simd::{Kernel, dispatch};
 
     /// Computes sections of a list with a line; tests compare its bits between instruction sets.
     struct SectionBits<'a> {
@@ -504,7 +504,7 @@ mod tests {
         let directions: Vec<[f64; 3]> = points.iter().map(|_| draws.direction()).collect();
         let rows = from_lines(&Lines::through(&points, &directions).unwrap(), None);
         for own in 0..50 {
-            let bits = portable(SectionBits { rows: &rows, own });
+            let bits = SectionBits { rows: &rows, own }.run();
             assert!(bits == dispatch(SectionBits { rows: &rows, own }));
         }
     }
