@@ -3,7 +3,7 @@
 use unlift::neighbors::Neighborhoods;
 use unlift::recover::{Builtin, Delta, RecoverOptions, Status, recover};
 use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
-use unlift::{About, Error, ListsBy, RecordId, Unit};
+use unlift::{About, Error, RecordId, Unit};
 
 use super::bytes::Bytes;
 
@@ -83,7 +83,7 @@ fn lists<const D: usize>(
         0 => None,
         _ => Some(records.iter().map(|_| bytes.number() as f32).collect()),
     };
-    let lists_by = if bytes.byte().is_multiple_of(2) { ListsBy::Oracle } else { ListsBy::Unstated };
+    let by_oracle = bytes.byte().is_multiple_of(2);
     let lists = Neighborhoods::try_new(offsets, records, scores, n, slots)?;
-    Ok(lists.with_about(About { lists_by, ..About::default() }))
+    Ok(lists.with_about(About { by_oracle, ..About::default() }))
 }

@@ -15,14 +15,8 @@ pub struct Fingerprint(pub [u8; 16]);
 impl Fingerprint {
     /// Reads 32 hexadecimal digits; `None` for any other text.
     pub fn from_hex(text: &str) -> Option<Self> {
-        let digits: Vec<u8> =
-            text.chars().map(|c| c.to_digit(16).map(|d| d as u8)).collect::<Option<_>>()?;
-        let bytes: Vec<u8> =
-            digits.chunks(2).map(|pair| pair[0] << 4 | pair[pair.len() - 1]).collect();
-        if digits.len() != 32 {
-            return None;
-        }
-        bytes.try_into().ok().map(Self)
+        let is_hex = text.len() == 32 && text.bytes().all(|digit| digit.is_ascii_hexdigit());
+        u128::from_str_radix(text, 16).ok().filter(|_| is_hex).map(|bits| Self(bits.to_be_bytes()))
     }
 
     /// Rejects the fingerprint of another map. A missing one is accepted.
@@ -42,7 +36,7 @@ impl Fingerprint {
 
 impl fmt::Display for Fingerprint {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+        write!(f, "{:032x}", u128::from_be_bytes(self.0))
     }
 }
 
@@ -80,26 +74,6 @@ impl RowOrder {
     }
 }
 
-/// The origin of lists, which decides the kind of their errors.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum ListsBy {
-    /// The oracle: true neighbors, and wrong ones drawn at random.
-    Oracle,
-    /// Anything else, or a file that does not state it.
-    #[default]
-    Unstated,
-}
-
-impl ListsBy {
-    /// Name in files; `None` if it is not stated.
-    pub fn name(self) -> Option<&'static str> {
-        match self {
-            Self::Oracle => Some("oracle"),
-            Self::Unstated => None,
-        }
-    }
-}
-
 /// The released map, row order and origin of lists, or of positions made from them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct About {
@@ -107,8 +81,9 @@ pub struct About {
     pub map: Option<Fingerprint>,
     /// The order of rows.
     pub order: RowOrder,
-    /// The origin of the lists.
-    pub lists_by: ListsBy,
+    /// Whether the lists are stated to be the oracle's: true neighbors, and wrong ones drawn at random. It decides the kind of their
+    /// errors.
+    pub by_oracle: bool,
 }
 
 #[cfg(test)]

@@ -104,17 +104,9 @@ pub fn is_obeyed(c: char) -> bool {
 
 impl<T: Display> Display for OneLine<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(Escaped(f), "{}", self.0)
-    }
-}
-
-struct Escaped<'a, 'b>(&'a mut fmt::Formatter<'b>);
-
-impl Write for Escaped<'_, '_> {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        text.chars().try_for_each(|c| match is_obeyed(c) {
-            true => write!(self.0, "{}", c.escape_default()),
-            false => self.0.write_char(c),
+        self.0.to_string().chars().try_for_each(|c| match is_obeyed(c) {
+            true => write!(f, "{}", c.escape_default()),
+            false => f.write_char(c),
         })
     }
 }

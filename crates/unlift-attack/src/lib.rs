@@ -50,7 +50,7 @@ pub mod sequence;
 #[doc(hidden)]
 pub mod simd;
 
-pub use about::{About, Fingerprint, ListsBy, RowOrder};
+pub use about::{About, Fingerprint, RowOrder};
 pub use descriptors::Descriptors;
 pub use error::{Error, ErrorKind, OneLine, is_obeyed};
 pub use points::{PointSet, RecordId, Unit};

@@ -59,9 +59,9 @@ pub mod truth;
 
 pub use truth::OriginalId;
 pub use unlift_attack::{
-    About, Descriptors, Error, ErrorKind, Fingerprint, ListsBy, OneLine, PointSet,
-    ProtectedDescriptors, RecordId, RowOrder, Unit, again, descriptors, geometry, is_obeyed,
-    points, protected, recover, released, sequence,
+    About, Descriptors, Error, ErrorKind, Fingerprint, OneLine, PointSet, ProtectedDescriptors,
+    RecordId, RowOrder, Unit, again, descriptors, geometry, is_obeyed, points, protected, recover,
+    released, sequence,
 };
 #[doc(hidden)]
 pub use unlift_attack::{compiled, simd};

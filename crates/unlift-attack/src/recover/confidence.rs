@@ -7,7 +7,6 @@
 
 use rayon::prelude::*;
 
-use crate::ListsBy;
 use crate::geometry::flatness::flatness;
 use crate::geometry::knn::Knn;
 use crate::geometry::vector::median;
@@ -185,7 +184,7 @@ fn unknown<const D: usize>(
     let mean = lists.records().len() as f64 / n_slots.max(1.0);
     if lists.scores().is_some() {
         Some(Unknown::RankedLists)
-    } else if lists.about().lists_by != ListsBy::Oracle {
+    } else if !lists.about().by_oracle {
         Some(Unknown::GivenLists)
     } else if mean > MOST_LISTED * n_slots {
         Some(Unknown::SmallMap)

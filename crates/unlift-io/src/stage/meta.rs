@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde_json::{Map, Value, json};
-use unlift::{About, Fingerprint, ListsBy, RowOrder, Unit};
+use unlift::{About, Fingerprint, RowOrder, Unit};
 
 use super::Kind;
 use super::released::{EPSILON, OF_BYTES};
@@ -99,13 +99,12 @@ impl<'a> Meta<'a> {
         let expected = format!("one of {}", names.join(", "));
         let order =
             self.given("rows_by", expected, |value| RowOrder::from_name(value.as_str()?))?;
-        let is_oracle =
-            |value: &Value| (value.as_str() == ListsBy::Oracle.name()).then_some(ListsBy::Oracle);
-        let lists_by = self.given("lists_by", "oracle, or no such key", is_oracle)?;
+        let is_oracle = |value: &Value| (value.as_str() == Some("oracle")).then_some(true);
+        let by_oracle = self.given("lists_by", "oracle, or no such key", is_oracle)?;
         Ok(About {
             map: self.fingerprint()?,
             order: order.unwrap_or(RowOrder::Unstated),
-            lists_by: lists_by.unwrap_or(ListsBy::Unstated),
+            by_oracle: by_oracle.unwrap_or_default(),
         })
     }
 
@@ -161,7 +160,7 @@ pub(super) fn insert_fingerprint(meta: &mut Map<String, Value>, map: Option<Fing
 pub(super) fn insert_about(meta: &mut Map<String, Value>, about: About) {
     insert_fingerprint(meta, about.map);
     meta.extend(about.order.name().map(|name| ("rows_by".to_owned(), json!(name))));
-    meta.extend(about.lists_by.name().map(|name| ("lists_by".to_owned(), json!(name))));
+    meta.extend(about.by_oracle.then(|| ("lists_by".to_owned(), json!("oracle"))));
 }
 
 /// Formats `meta` with sorted keys, so that equal values make equal bytes with any map type of

@@ -8,7 +8,7 @@ use super::Neighborhoods;
 use crate::geometry::knn::Knn;
 use crate::seed::{Draws, Stage};
 use crate::truth::{Original, Secret};
-use crate::{About, Error, Fingerprint, ListsBy, RecordId, RowOrder};
+use crate::{About, Error, Fingerprint, RecordId, RowOrder};
 
 /// The true neighborhoods of every slot: the K records nearest to its original, by (distance,
 /// original id). They exclude the slot's own record and dropped points, and contain each record
@@ -68,7 +68,7 @@ impl TrueNeighbors {
         let offsets = (0..=n_slots as u64).map(|slot| slot * self.k as u64).collect();
         let (n_records, slots) = (self.n_records, self.slots_per_record);
         let lists = Neighborhoods::try_new(offsets, records, None, n_records, slots)?;
-        let about = About { map: self.map, order: RowOrder::Slots, lists_by: ListsBy::Oracle };
+        let about = About { map: self.map, order: RowOrder::Slots, by_oracle: true };
         Ok(lists.with_about(about))
     }
 

@@ -1,6 +1,5 @@
 //! Tests of confidence on rooms that were not used to fit constants.
 
-use unlift::ListsBy;
 use unlift::evaluate::{Reliability, reliability};
 
 use crate::maps::*;
@@ -66,7 +65,7 @@ fn lists_that_do_not_come_from_the_oracle_say_nothing_about_certainty() {
     let hidden = hide(entry("olc"), &scene(3, 3_000).0, 7);
     let lists = hidden.lists(20, 0.5, 7);
     let unknown = |lists| solve(&hidden.released, &lists, joint()).confidence_unknown();
-    let about = About { lists_by: ListsBy::Unstated, ..lists.about() };
+    let about = About { by_oracle: false, ..lists.about() };
     assert_eq!(unknown(lists.clone().with_about(about)), Some(Unknown::GivenLists));
     assert_eq!(unknown(lists), None);
 }

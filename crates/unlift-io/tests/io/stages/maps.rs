@@ -7,9 +7,7 @@ use unlift::recover::{Estimate, Recovered, Status};
 use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
 use unlift::seed::{Draws, Stage};
 use unlift::truth::{DropReason, Dropped, Original, Secret};
-use unlift::{
-    About, Descriptors, Fingerprint, ListsBy, OriginalId, PointSet, RecordId, RowOrder, Unit,
-};
+use unlift::{About, Descriptors, Fingerprint, OriginalId, PointSet, RecordId, RowOrder, Unit};
 
 pub fn draws(seed: u64) -> Draws {
     Draws::new(seed, Stage::Synthetic, 0)
@@ -110,11 +108,7 @@ fn about(seed: u64) -> About {
     let mut orders = RowOrder::STATED.to_vec();
     orders.push(RowOrder::Unstated);
     let map = (!seed.is_multiple_of(3)).then_some(Fingerprint([seed as u8; 16]));
-    About {
-        map,
-        order: orders[seed as usize % 4],
-        lists_by: [ListsBy::Oracle, ListsBy::Unstated][seed as usize % 2],
-    }
+    About { map, order: orders[seed as usize % 4], by_oracle: seed.is_multiple_of(2) }
 }
 
 /// Recovered points, a fifth of them lost; axis and descriptor rows for every second seed.
