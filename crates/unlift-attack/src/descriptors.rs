@@ -122,6 +122,18 @@ impl Descriptors {
         }
     }
 
+    /// Returns row `at`.
+    pub(crate) fn row(&self, at: usize) -> Vec<f32> {
+        let mut row = vec![0.0; self.dim];
+        self.read_row(at, &mut row);
+        row
+    }
+
+    /// Returns all rows.
+    pub(crate) fn rows(&self) -> impl Iterator<Item = Vec<f32>> {
+        (0..self.len()).map(|at| self.row(at))
+    }
+
     /// Returns the squared Euclidean distance between rows `a` and `b`.
     #[inline]
     pub fn squared_distance(&self, a: usize, b: usize) -> f32 {

@@ -98,12 +98,9 @@ impl ProtectedDescriptors {
             }
             (Rule::Words { .. }, public) => {
                 let n = public.as_ref().map_or(0, |words| words.len());
-                let mut row = vec![0.0; rows.dim()];
-                for at in 0..rows.len() {
-                    rows.read_row(at, &mut row);
-                    if let Some(word) = row.iter().find(|word| !(0.0..n as f32).contains(*word)) {
-                        return Err(wrong(format!("words below {n}"), *word as usize));
-                    }
+                let mut words = rows.rows().flatten();
+                if let Some(word) = words.find(|word| !(0.0..n as f32).contains(word)) {
+                    return Err(wrong(format!("words below {n}"), word as usize));
                 }
             }
             _ => {}
@@ -180,8 +177,7 @@ impl ProtectedDescriptors {
             let dim = self.dim();
             let known: Vec<Vec<f32>> = self.public.iter().flat_map(|it| unit_rows(it)).collect();
             let of = |at: usize| {
-                let mut row = vec![0.0; self.rows.dim()];
-                self.rows.read_row(at, &mut row);
+                let row = self.rows.row(at);
                 match self.rule {
                     Rule::Subspace { .. } => opposite(&row, dim, &known),
                     Rule::Words { .. } => {
@@ -289,9 +285,7 @@ fn add(to: &mut [f32], row: &[f32], times: f32) {
 
 /// Returns the rows of a matrix, brought to length 1.
 pub fn unit_rows(descriptors: &Descriptors) -> impl Iterator<Item = Vec<f32>> {
-    (0..descriptors.len()).map(|at| {
-        let mut row = vec![0.0; descriptors.dim()];
-        descriptors.read_row(at, &mut row);
+    descriptors.rows().map(|mut row| {
         let length = inner(&row, &row).sqrt();
         if length > 0.0 {
             row.iter_mut().for_each(|x| *x /= length);

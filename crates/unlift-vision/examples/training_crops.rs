@@ -158,7 +158,7 @@ fn crop(features: &Features, photo: u32, rows: &[u32]) -> Result<Crop, unlift::E
         |all: &Vec<(f64, f64)>| -> Vec<_> { rows.iter().map(|&row| all[row as usize]).collect() };
     let usual = features.usual.as_ref().map(of_rows);
     let descriptors = features.descriptors.select(rows);
-    let pairs = dense(&descriptors, usual.as_deref())?.into_scores();
+    let pairs = dense(&descriptors, usual.as_deref())?;
     let places = rows.iter().map(|&row| features.places[row as usize]).collect();
     Ok(Crop { photo, places, descriptors, pairs })
 }

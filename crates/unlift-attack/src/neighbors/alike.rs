@@ -46,7 +46,7 @@ fn halve(descriptors: &Descriptors, slots: &mut [u32]) {
 fn widest(descriptors: &Descriptors, slots: &[u32]) -> Vec<f32> {
     let every = slots.len().div_ceil(SAMPLE).max(1);
     let mut rows: Vec<Vec<f32>> =
-        slots.iter().step_by(every).map(|&slot| row(descriptors, slot)).collect();
+        slots.iter().step_by(every).map(|&slot| descriptors.row(slot as usize)).collect();
     let n = rows.len() as f32;
     let mean: Vec<f32> =
         (0..descriptors.dim()).map(|c| rows.iter().map(|row| row[c]).sum::<f32>() / n).collect();
@@ -72,12 +72,6 @@ fn widest(descriptors: &Descriptors, slots: &[u32]) -> Vec<f32> {
     direction
 }
 
-fn row(descriptors: &Descriptors, slot: u32) -> Vec<f32> {
-    let mut row = vec![0.0; descriptors.dim()];
-    descriptors.read_row(slot as usize, &mut row);
-    row
-}
-
 /// Returns the mean row of each block of `slots`.
 ///
 /// # Errors
@@ -86,7 +80,7 @@ pub fn means(descriptors: &Descriptors, slots: &[u32]) -> Result<Descriptors, Er
     let mean = |slots: &[u32]| {
         let mut sum = vec![0.0f32; descriptors.dim()];
         for &slot in slots {
-            sum.iter_mut().zip(row(descriptors, slot)).for_each(|(sum, x)| *sum += x);
+            sum.iter_mut().zip(descriptors.row(slot as usize)).for_each(|(sum, x)| *sum += x);
         }
         sum.into_iter().map(move |x| x / slots.len() as f32).collect::<Vec<f32>>()
     };

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use rayon::prelude::*;
 
@@ -43,18 +43,13 @@ pub trait Likeness: Sync {
     /// Prepares the rows of `slots`, at most [`BLOCK`].
     fn block(&self, descriptors: &Descriptors, slots: &[u32]) -> Self::Block;
 
-    /// Whether to compute mean and deviation of scores.
-    fn counts(&self) -> bool {
-        true
-    }
-
     /// Computes the scores of all rows of `a` with all of `b`, `(BLOCK, BLOCK)`. Scores of rows beyond the last are undefined.
     fn scores(&self, a: &Self::Block, b: &Self::Block, scores: &mut [f32]);
 }
 
 /// Returns the `most` best partners of every row among the rows of other records. The search is exact up to `exact` rows, and reads the
 /// scores of pairs that `kept` has. With more rows, similar rows are first made adjacent, and each block is compared with the blocks that
-/// have the most similar means.
+/// have the most similar means. Mean and deviation of scores are computed if `counts`.
 ///
 /// # Errors
 /// When there are more rows than `exact`, and the means of all blocks are equal.
@@ -62,33 +57,32 @@ pub fn search<L: Likeness>(
     likeness: &L,
     rows: &mut Rows<'_>,
     most: usize,
+    counts: bool,
     exact: usize,
     kept: &mut KeptPairs,
 ) -> Result<Vec<Found>, Error> {
-    let n_blocks = rows.len().div_ceil(BLOCK);
     if rows.len() <= exact {
-        let is_like = |all: &Compared| (all.name, all.counts) == (L::NAME, likeness.counts());
+        let is_like = |all: &Compared| (all.name, all.counts) == (L::NAME, counts);
         let known = kept.compared.iter().find(|all| is_like(all));
         let mut found = known.and_then(|all| all.found(likeness, rows, most));
         // Scores of a map that lacks many points do not replace those of the whole map, which further maps need.
         let is_of_whole = known.is_some_and(|all| all.slots.len() >= rows.slots.len());
         if found.is_none() && !is_of_whole {
-            let all = Compared::new(likeness, rows, 2 * most + SPARE);
+            let all = Compared::new(likeness, rows, 2 * most + SPARE, counts);
             found = all.found(likeness, rows, most);
             kept.compared.retain(|all| !is_like(all));
             kept.compared.push(all);
         }
-        let anew = || finished::<L>(compare(likeness, rows, most, (&Pairs::all(n_blocks), None)));
-        return Ok(found.unwrap_or_else(anew));
+        let anew = || compare(likeness, rows, most, &all_pairs(rows.len()), counts.then_some(1));
+        return Ok(found.unwrap_or_else(|| finished::<L>(anew())));
     }
     rows.reorder(alike::order(&rows.descriptors, &rows.slots));
     let means = alike::means(&rows.descriptors, &rows.slots)?;
     let of_blocks = Rows::of_all(&means);
-    let all = Pairs::all(n_blocks.div_ceil(BLOCK));
-    let alike = compare(likeness, &of_blocks, PARTNERS, (&all, None));
-    let every = rows.len().div_ceil(USUAL);
+    let alike = compare(likeness, &of_blocks, PARTNERS, &all_pairs(means.len()), None);
+    let every = counts.then(|| rows.len().div_ceil(USUAL));
     let pairs = chosen(&finished::<L>(alike));
-    Ok(finished::<L>(compare(likeness, rows, most, (&pairs, Some(every)))))
+    Ok(finished::<L>(compare(likeness, rows, most, &pairs, every)))
 }
 
 fn finished<L: Likeness>(rows: Vec<Row>) -> Vec<Found> {
@@ -98,16 +92,9 @@ fn finished<L: Likeness>(rows: Vec<Row>) -> Vec<Found> {
 /// Scores of all pairs of the descriptors of a map, for further maps that lack a few of them or put them into other records.
 #[derive(Clone, Debug, Default)]
 pub struct KeptPairs {
-    compared: Vec<Compared>,
+    pub(super) compared: Vec<Compared>,
     /// The partners by a network, for further maps with the same descriptors.
     pub(super) rankings: Vec<Rankings>,
-}
-
-#[cfg(test)]
-impl KeptPairs {
-    pub(super) fn n_rows(&self) -> usize {
-        self.compared.last().map_or(0, |all| all.slots.len())
-    }
 }
 
 /// Partners that are kept beyond those that the map needs, in place of those that another map lacks.
@@ -117,27 +104,27 @@ const LACKING: usize = 16;
 
 /// Rows, each compared with all others as if every row were a record.
 #[derive(Clone, Debug)]
-struct Compared {
+pub(super) struct Compared {
     name: &'static str,
     counts: bool,
     most: usize,
     descriptors: Descriptors,
-    slots: Vec<u32>,
+    pub(super) slots: Vec<u32>,
     rows: Vec<Row>,
 }
 
 impl Compared {
-    fn new<L: Likeness>(likeness: &L, rows: &Rows<'_>, most: usize) -> Self {
-        let all = Pairs::all(rows.len().div_ceil(BLOCK));
-        let mut found = compare(likeness, &rows.apart(), most, (&all, None));
-        found.par_iter_mut().for_each(|row| row.best.sort());
+    fn new<L: Likeness>(likeness: &L, rows: &Rows<'_>, most: usize, counts: bool) -> Self {
+        let (all, every) = (all_pairs(rows.len()), counts.then_some(1));
+        let mut compared = compare(likeness, &rows.apart(), most, &all, every);
+        compared.par_iter_mut().for_each(|row| row.best.sort());
         Self {
             name: L::NAME,
-            counts: likeness.counts(),
+            counts,
             most,
             descriptors: rows.descriptors.clone().into_owned(),
             slots: rows.slots.clone(),
-            rows: found,
+            rows: compared,
         }
     }
 
@@ -228,112 +215,95 @@ impl Compared {
     }
 }
 
-/// Compares rows according to `pairs`; each row keeps its `most` best partners of other records. Mean and deviation come from all
-/// pairs, or from those with every `every`-th row.
+/// Compares rows according to `tiles`; each row keeps its `most` best partners of other records. Mean and deviation come from
+/// the pairs with every `every`-th row; for 1, from those of `tiles`.
 ///
 /// What a row keeps depends on the set of its scores alone, so the result does not depend on the number of threads.
 fn compare<L: Likeness>(
     likeness: &L,
     rows: &Rows<'_>,
     most: usize,
-    (pairs, every): (&Pairs, Option<usize>),
+    tiles: &[Tile],
+    every: Option<usize>,
 ) -> Vec<Row> {
     let kept: Vec<Mutex<Vec<Row>>> = rows
         .slots
         .chunks(BLOCK)
         .map(|slots| Mutex::new(slots.iter().map(|_| Row::new(most)).collect()))
         .collect();
-    let block = |at: usize| {
-        let end = rows.len().min((at + 1) * BLOCK);
-        likeness.block(&rows.descriptors, &rows.slots[at * BLOCK..end])
+    let range = |at: usize| at * BLOCK..rows.len().min((at + 1) * BLOCK);
+    let block = |at: usize| likeness.block(&rows.descriptors, &rows.slots[range(at)]);
+    let counts = every == Some(1);
+    // Adds the rows of block `b` to those of block `a`, with these scores.
+    let offer = |a: usize, b: usize, scores: &[f32]| {
+        let records = &rows.records[range(b)];
+        for (i, row) in lock(&kept[a]).iter_mut().enumerate() {
+            let (scores, own) = (&scores[i * BLOCK..], rows.records[a * BLOCK + i]);
+            if counts {
+                row.count(scores, records, own, L::STEP);
+            }
+            for (j, (&score, &record)) in scores.iter().zip(records).enumerate() {
+                if score >= row.best.floor() && record != own {
+                    row.best.push(score, (b * BLOCK + j) as u32);
+                }
+            }
+        }
     };
-    let counts = likeness.counts() && every.is_none();
-    let usual = every.filter(|_| likeness.counts()).map(|every| Usual::new(likeness, rows, every));
+    // Rows spread over the map, for mean and deviation.
+    let every = every.filter(|&every| every > 1);
+    let usual: Vec<(L::Block, Vec<u32>)> = every.map_or_else(Vec::new, |every| {
+        let sample: Vec<usize> = (0..rows.len()).step_by(every).collect();
+        let of_sample = |sample: &[usize]| {
+            let slots: Vec<u32> = sample.iter().map(|&row| rows.slots[row]).collect();
+            let records = sample.iter().map(|&row| rows.records[row]).collect();
+            (likeness.block(&rows.descriptors, &slots), records)
+        };
+        sample.chunks(BLOCK).map(of_sample).collect()
+    });
     let scratch = || (vec![0.0f32; BLOCK * BLOCK], vec![0.0f32; BLOCK * BLOCK]);
-    for Tile { held, meetings } in pairs.tiles() {
+    for Tile { held, meetings } in tiles {
         let first = held.start;
         let held: Vec<L::Block> = held.clone().into_par_iter().map(block).collect();
-        if let Some(usual) = &usual {
-            held.par_iter().enumerate().for_each_init(scratch, |(scores, _), (at, block)| {
-                let a = first + at;
-                usual.count(
-                    likeness,
-                    block,
-                    scores,
-                    &mut lock(&kept[a]),
-                    &rows.records[a * BLOCK..],
-                );
-            });
-        }
-        meetings.par_iter().with_max_len(1).for_each_init(scratch, |(scores, turned), of_one| {
-            let b = of_one.block as usize;
-            let made = (b < first || b - first >= held.len()).then(|| block(b));
-            let own = made.as_ref().unwrap_or_else(|| &held[b - first]);
-            let of_b = Met::of(rows, b, counts, L::STEP);
-            for &a in &of_one.with {
-                let a = a as usize;
-                likeness.scores(&held[a - first], own, scores);
-                of_b.offer(&mut lock(&kept[a]), scores, &rows.records[a * BLOCK..]);
-                if a == b {
-                    continue;
+        held.par_iter().enumerate().for_each_init(scratch, |(scores, _), (at, block)| {
+            let a = first + at;
+            for (sample, records) in &usual {
+                likeness.scores(block, sample, scores);
+                for (i, row) in lock(&kept[a]).iter_mut().enumerate() {
+                    row.count(&scores[i * BLOCK..], records, rows.records[a * BLOCK + i], L::STEP);
                 }
-                for i in 0..BLOCK {
-                    for j in 0..BLOCK {
-                        turned[j * BLOCK + i] = scores[i * BLOCK + j];
-                    }
-                }
-                let of_a = Met::of(rows, a, counts, L::STEP);
-                of_a.offer(&mut lock(&kept[b]), turned, &rows.records[b * BLOCK..]);
             }
         });
+        meetings.par_iter().with_max_len(1).for_each_init(
+            scratch,
+            |(scores, turned), (b, with)| {
+                let b = *b as usize;
+                let made = (b < first || b - first >= held.len()).then(|| block(b));
+                let own = made.as_ref().unwrap_or_else(|| &held[b - first]);
+                for &a in with {
+                    let a = a as usize;
+                    likeness.scores(&held[a - first], own, scores);
+                    offer(a, b, scores);
+                    if a == b {
+                        continue;
+                    }
+                    for i in 0..BLOCK {
+                        for j in 0..BLOCK {
+                            turned[j * BLOCK + i] = scores[i * BLOCK + j];
+                        }
+                    }
+                    offer(b, a, turned);
+                }
+            },
+        );
     }
-    let rows = kept.into_iter().flat_map(|rows| match rows.into_inner() {
-        Ok(rows) => rows,
-        Err(poisoned) => poisoned.into_inner(),
-    });
-    rows.collect()
-}
-
-/// Rows spread over the map, for mean and deviation of scores.
-struct Usual<B> {
-    blocks: Vec<(B, Vec<u32>)>,
-}
-
-impl<B> Usual<B> {
-    /// Every `every`-th row.
-    fn new<L: Likeness<Block = B>>(likeness: &L, rows: &Rows<'_>, every: usize) -> Self {
-        let slots: Vec<u32> = rows.slots.iter().step_by(every).copied().collect();
-        let records: Vec<u32> = rows.records.iter().step_by(every).copied().collect();
-        let block = |(slots, records): (&[u32], &[u32])| {
-            (likeness.block(&rows.descriptors, slots), records.to_vec())
-        };
-        Self { blocks: slots.chunks(BLOCK).zip(records.chunks(BLOCK)).map(block).collect() }
-    }
-
-    /// Counts the scores of the rows of `block`.
-    fn count<L: Likeness<Block = B>>(
-        &self,
-        likeness: &L,
-        block: &B,
-        scores: &mut [f32],
-        rows: &mut [Row],
-        record_of: &[u32],
-    ) {
-        for (usual, records) in &self.blocks {
-            likeness.scores(block, usual, scores);
-            for (i, row) in rows.iter_mut().enumerate() {
-                row.count(&scores[i * BLOCK..], records, record_of[i], L::STEP);
-            }
-        }
-    }
+    let rows =
+        kept.into_iter().map(|rows| rows.into_inner().unwrap_or_else(PoisonError::into_inner));
+    rows.flatten().collect()
 }
 
 /// Locks a mutex. rayon propagates a panic of another thread, so data behind a poisoned lock is never used.
-fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    match mutex.lock() {
-        Ok(guard) => guard,
-        Err(poisoned) => poisoned.into_inner(),
-    }
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[derive(Clone, Debug)]
@@ -383,38 +353,6 @@ impl Row {
         let deviation = (self.squares / n - mean * mean).max(0.0).sqrt();
         let (mean, deviation) = (mean * step, deviation * step);
         Found { best: self.best.into_sorted(), mean, deviation }
-    }
-}
-
-/// A block whose rows are candidates for other rows.
-struct Met<'a> {
-    first: usize,
-    records: &'a [u32],
-    counts: bool,
-    step: f32,
-}
-
-impl<'a> Met<'a> {
-    fn of(rows: &'a Rows<'_>, block: usize, counts: bool, step: f32) -> Self {
-        let first = block * BLOCK;
-        let records = &rows.records[first..rows.len().min(first + BLOCK)];
-        Self { first, records, counts, step }
-    }
-
-    /// Adds its rows to `rows` with these scores; `record_of` has the record of each of `rows`.
-    fn offer(&self, rows: &mut [Row], scores: &[f32], record_of: &[u32]) {
-        for (i, row) in rows.iter_mut().enumerate() {
-            let scores = &scores[i * BLOCK..];
-            let own = record_of[i];
-            if self.counts {
-                row.count(scores, self.records, own, self.step);
-            }
-            for (j, (&score, &record)) in scores.iter().zip(self.records).enumerate() {
-                if score >= row.best.floor() && record != own {
-                    row.best.push(score, (self.first + j) as u32);
-                }
-            }
-        }
     }
 }
 
@@ -490,44 +428,24 @@ pub fn higher_first(a: &(f32, u32), b: &(f32, u32)) -> std::cmp::Ordering {
 /// Blocks in memory at a time if only some pairs are compared.
 const HELD: usize = 256;
 
-/// Pairs of blocks, grouped in tiles.
-pub struct Pairs {
-    tiles: Vec<Tile>,
-}
-
-/// Pairs with a range of blocks, which stay in memory meanwhile.
-pub struct Tile {
+/// Pairs of blocks with a range of blocks, which stay in memory meanwhile.
+struct Tile {
     /// The blocks in memory.
-    pub held: Range<usize>,
-    /// The blocks that are compared with them.
-    pub meetings: Vec<Meetings>,
+    held: Range<usize>,
+    /// Each block that is compared with some of them, and these.
+    meetings: Vec<(u32, Vec<u32>)>,
 }
 
-/// One block and the held blocks that it is compared with.
-pub struct Meetings {
-    /// Index of the block.
-    pub block: u32,
-    /// Held blocks.
-    pub with: Vec<u32>,
-}
-
-impl Pairs {
-    /// Returns all pairs of `n` blocks.
-    pub fn all(n: usize) -> Self {
-        // Each list starts with the block itself and descends, so that parallel threads work on different blocks.
-        let with = |block: u32| (0..=block).rev().collect();
-        let meetings = (0..n as u32).rev().map(|block| Meetings { block, with: with(block) });
-        Self { tiles: vec![Tile { held: 0..n, meetings: meetings.collect() }] }
-    }
-
-    /// The tiles, in order.
-    pub fn tiles(&self) -> &[Tile] {
-        &self.tiles
-    }
+/// Returns all pairs of the blocks of `n_rows` rows.
+fn all_pairs(n_rows: usize) -> Vec<Tile> {
+    let n = n_rows.div_ceil(BLOCK);
+    // Each list starts with the block itself and descends, so that parallel threads work on different blocks.
+    let with = |block: u32| (block, (0..=block).rev().collect());
+    vec![Tile { held: 0..n, meetings: (0..n as u32).rev().map(with).collect() }]
 }
 
 /// Returns the pairs of every block with itself and with the most similar blocks.
-pub fn chosen(alike: &[Found]) -> Pairs {
+fn chosen(alike: &[Found]) -> Vec<Tile> {
     let n = alike.len();
     // Each pair is stored under its lower index.
     let mut pairs: Vec<BTreeSet<u32>> =
@@ -546,10 +464,9 @@ pub fn chosen(alike: &[Found]) -> Pairs {
                 meetings.entry(b).or_default().push(a as u32);
             }
         }
-        let meetings = meetings.into_iter().map(|(block, with)| Meetings { block, with }).collect();
-        Tile { held, meetings }
+        Tile { held, meetings: meetings.into_iter().collect() }
     });
-    Pairs { tiles: tiles.collect() }
+    tiles.collect()
 }
 
 #[cfg(test)]
@@ -579,7 +496,8 @@ mod tests {
         exact: usize,
     ) -> Vec<Vec<(f32, u32)>> {
         let mut rows = Rows::of_all(descriptors);
-        let found = search(likeness, &mut rows, most, exact, &mut KeptPairs::default()).unwrap();
+        let kept = &mut KeptPairs::default();
+        let found = search(likeness, &mut rows, most, false, exact, kept).unwrap();
         let mut by_slot = vec![Vec::new(); rows.len()];
         for (found, &slot) in found.into_iter().zip(&rows.slots) {
             let best = found.best.into_iter();
@@ -596,8 +514,7 @@ mod tests {
         fn scores<L: Likeness>(likeness: &L, of: &Descriptors, exact: usize) -> Vec<f32> {
             found(likeness, of, 10, exact).concat().into_iter().map(|(score, _)| score).collect()
         }
-        let cosine = Cosine { counts: false };
-        assert_eq!(scores(&cosine, &descriptors, 0), scores(&cosine, &descriptors, MOST_ROWS));
+        assert_eq!(scores(&Cosine, &descriptors, 0), scores(&Cosine, &descriptors, MOST_ROWS));
         let patches = Patches::of(&descriptors).unwrap();
         assert_eq!(scores(&patches, &descriptors, 0), scores(&patches, &descriptors, MOST_ROWS));
     }
@@ -607,9 +524,8 @@ mod tests {
         let descriptors = crowds(30_000, 16);
         let n_blocks = 30_000usize.div_ceil(BLOCK);
         assert!(n_blocks > 3 * PARTNERS, "a third of the blocks");
-        let cosine = Cosine { counts: false };
-        let right = found(&cosine, &descriptors, 5, MOST_ROWS);
-        let some = found(&cosine, &descriptors, 5, 0);
+        let right = found(&Cosine, &descriptors, 5, MOST_ROWS);
+        let some = found(&Cosine, &descriptors, 5, 0);
         let lists = some.iter().zip(&right);
         let in_both = lists.map(|(found, right)| {
             right.iter().filter(|right| found.iter().any(|found| found.1 == right.1)).count()
@@ -618,7 +534,7 @@ mod tests {
         let recall = n_both as f64 / right.iter().map(Vec::len).sum::<usize>() as f64;
         assert!(recall >= 0.9, "{recall}");
         let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
-        assert_eq!(pool.install(|| found(&cosine, &descriptors, 5, 0)), some);
+        assert_eq!(pool.install(|| found(&Cosine, &descriptors, 5, 0)), some);
     }
 
     #[test]
@@ -626,9 +542,9 @@ mod tests {
         let descriptors = crowds(6_000, 128);
         let patches = Patches::of(&descriptors).unwrap();
         let rows = Rows::of_all(&descriptors);
-        let all = Pairs::all(rows.len().div_ceil(BLOCK));
-        let exact = compare(&patches, &rows, 1, (&all, None));
-        let sampled = compare(&patches, &rows, 1, (&all, Some(3)));
+        let all = all_pairs(rows.len());
+        let exact = compare(&patches, &rows, 1, &all, Some(1));
+        let sampled = compare(&patches, &rows, 1, &all, Some(3));
         let [exact, sampled] = [exact, sampled].map(finished::<Patches>);
         for (exact, sampled) in exact.iter().zip(&sampled) {
             let off = (exact.mean - sampled.mean).abs() / exact.deviation;

@@ -11,46 +11,20 @@ use crate::{Descriptors, Error};
 /// Largest number of descriptors, for which the matrices take 800 MB.
 const MOST: usize = 1 << 13;
 
-/// Scores of all pairs of `n` descriptors.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Dense {
-    n: usize,
-    scores: Vec<f32>,
-}
-
-impl Dense {
-    /// Number of descriptors.
-    pub fn n(&self) -> usize {
-        self.n
-    }
-
-    /// Number of scores per pair: [`REACHES`] for SIFT, 1 for others.
-    pub fn reaches(&self) -> usize {
-        self.scores.len() / (self.n * self.n)
-    }
-
-    /// Scores `(reaches, n, n)`: the best score of each reach in standard deviations above the mean, averaged over both rows. Mean and
-    /// deviation are those of a row's best scores over all reaches. Symmetric; 0 between a descriptor and itself.
-    pub fn scores(&self) -> &[f32] {
-        &self.scores
-    }
-
-    /// Returns [`scores`](Self::scores) by value.
-    pub fn into_scores(self) -> Vec<f32> {
-        self.scores
-    }
-}
-
-/// Computes the similarity of all pairs of `descriptors`: the overlap of their patches per reach for SIFT, the cosine for others.
+/// Computes the similarity of all pairs of `n` descriptors: the overlap of their patches per reach for SIFT, the cosine for others.
 ///
-/// The largest of a pair's [`REACHES`] scores is the one that [`overlap`](super::overlap()) starts its walk from; which one is the
+/// Returns scores `(reaches, n, n)`, with [`REACHES`] reaches for SIFT and one for others: the best score of each reach in standard
+/// deviations above the mean, averaged over both rows. Mean and deviation are those of a row's best scores over all reaches. Scores are
+/// symmetric; 0 between a descriptor and itself.
+///
+/// The largest of a pair's [`REACHES`] scores is the one that [`Overlap`](super::Overlap) starts its walk from; which one is the
 /// largest depends on the distance of the patches. Deviations are those among the given descriptors. For a part of a larger
 /// set, `usual` gives the mean and deviation of each descriptor's scores with all of the larger set ([`usual`](usual())),
 /// because within a part of similar descriptors scores are higher.
 ///
 /// # Errors
 /// When there are fewer than two descriptors or more than 8,192, or `usual` has another number of entries.
-pub fn dense(descriptors: &Descriptors, usual: Option<&[(f64, f64)]>) -> Result<Dense, Error> {
+pub fn dense(descriptors: &Descriptors, usual: Option<&[(f64, f64)]>) -> Result<Vec<f32>, Error> {
     let n = descriptors.len();
     check(n)?;
     if let Some(usual) = usual.filter(|usual| usual.len() != n) {
@@ -58,14 +32,9 @@ pub fn dense(descriptors: &Descriptors, usual: Option<&[(f64, f64)]>) -> Result<
         return Err(Error::new("dense scores", expected, usual.len().to_string()));
     }
     let mut scores = raw(descriptors);
-    match usual {
-        Some(usual) => standardize(&mut scores, usual),
-        None => {
-            let usual = within(&scores, n);
-            standardize(&mut scores, &usual);
-        }
-    }
-    Ok(Dense { n, scores })
+    let usual = usual.map_or_else(|| within(&scores, n), <[_]>::to_vec);
+    standardize(&mut scores, &usual);
+    Ok(scores)
 }
 
 /// Returns `(reaches, n, n)` scores before standardization.
@@ -77,10 +46,7 @@ fn raw(descriptors: &Descriptors) -> Vec<f32> {
             };
             all_pairs(&patches, descriptors, REACHES, best)
         }
-        Err(_) => {
-            let cosine = Cosine { counts: true };
-            all_pairs(&cosine, descriptors, 1, |_, a, b, found| cosine.scores(a, b, found))
-        }
+        Err(_) => all_pairs(&Cosine, descriptors, 1, |_, a, b, found| Cosine.scores(a, b, found)),
     }
 }
 
@@ -184,8 +150,8 @@ mod tests {
             all.copy_within(from..from + 8, 150 * 128 + cell * 8);
         }
         let of = |values: &[u8]| Descriptors::try_new(Values::U8(values.to_vec()), 128).unwrap();
-        let found = dense(&of(&all), None).unwrap();
-        let score = |reach: usize, i: usize, j: usize| found.scores()[(reach * 200 + i) * 200 + j];
+        let scores = dense(&of(&all), None).unwrap();
+        let score = |reach: usize, i: usize, j: usize| scores[(reach * 200 + i) * 200 + j];
         let shifted = score(1, 3, 150);
         assert!(shifted > score(0, 3, 150) + 2.0 && shifted > score(2, 3, 150) + 2.0);
         let best = (0..200).max_by(|&a, &b| score(1, 3, a).total_cmp(&score(1, 3, b)));
@@ -206,17 +172,16 @@ mod tests {
             values[7 * 16 + c] = 3.0 * values[c];
         }
         let all = Descriptors::try_new(Values::F32(values), 16).unwrap();
-        let found = dense(&all, None).unwrap();
-        assert_eq!((found.n(), found.reaches()), (40, 1));
-        let of = |i: usize, j: usize| found.scores()[i * 40 + j];
+        let scores = dense(&all, None).unwrap();
+        assert_eq!(scores.len(), 40 * 40);
+        let of = |i: usize, j: usize| scores[i * 40 + j];
         let best = (1..40).max_by(|&a, &b| of(0, a).total_cmp(&of(0, b)));
         assert_eq!((best, of(0, 7), of(9, 9)), (Some(7), of(7, 0), 0.0));
         // Standardized scores of every row have mean 0, so all of them do.
-        let mean = found.scores().iter().sum::<f32>() / 1600.0;
+        let mean = scores.iter().sum::<f32>() / 1600.0;
         assert!(mean.abs() < 1e-4, "{mean}");
         // Twice the deviation gives half the score.
-        let [narrow, wide] =
-            [1.0, 2.0].map(|by| dense(&all, Some(&[(0.0, by); 40])).unwrap().scores()[7]);
+        let [narrow, wide] = [1.0, 2.0].map(|by| dense(&all, Some(&[(0.0, by); 40])).unwrap()[7]);
         assert!(narrow == 2.0 * wide && (narrow - 1.0).abs() < 1e-6);
     }
 }

@@ -7,11 +7,11 @@ use rayon::prelude::*;
 
 use super::Neighborhoods;
 use super::source::{Needs, Source};
-use crate::density::{Peak, Peaks, tomography};
+use crate::density::{Peaks, tomography};
 use crate::geometry::knn::Knn;
-use crate::geometry::vector::{distance, dot, sub, widen};
+use crate::geometry::vector::{along, distance, dot, sub, widen};
 use crate::released::{Obfuscation, Released};
-use crate::{About, Error, RecordId, RowOrder};
+use crate::{Error, RecordId, RowOrder};
 
 /// Estimates searched per listed record: some belong to the same record, and some records pass too far away.
 const LOOK: usize = 3;
@@ -80,59 +80,46 @@ pub(crate) fn geometric_by<const D: usize>(
         Obfuscation::Rays(rays) => Some(rays.center()),
         Obfuscation::Lines(_) | Obfuscation::AxisCandidates(_) | Obfuscation::AxisPlanes(_) => None,
     };
-    let slots: Vec<usize> = (0..peaks.of.len()).filter(|&slot| peaks.of[slot].is_some()).collect();
-    let found: Vec<Peak> = peaks.of.iter().flatten().copied().collect();
-    let positions: Vec<[f64; 3]> = found.iter().map(|peak| widen(&peak.position)).collect();
+    let known = peaks.of.iter().enumerate();
+    let known = known.filter_map(|(slot, peak)| Some((slot, widen(&peak.as_ref()?.position))));
+    let (slots, positions): (Vec<usize>, Vec<[f64; 3]>) = known.unzip();
     let mut rows: Vec<Vec<(f32, RecordId)>> = vec![Vec::new(); peaks.of.len()];
-    if !positions.is_empty() {
-        let knn = Knn::new(&positions)?;
-        let per_record = released.slots_per_record();
-        let near = |scratch: &mut Vec<(f64, u32)>, at: usize| {
-            let own = RecordId::from_index(slots[at] / per_record);
-            let may_list = |record: RecordId| {
-                record != own && centers.is_none_or(|c| c[record.index()] != c[own.index()])
-            };
-            let mut look = LOOK * k;
-            loop {
-                knn.nearest(at, look, scratch);
-                let mut row: Vec<(f32, RecordId)> = Vec::new();
-                for &(squared, other) in scratch.iter() {
-                    let record = RecordId::from_index(slots[other as usize] / per_record);
-                    if may_list(record) && row.iter().all(|&(_, listed)| listed != record) {
-                        let miss = distance_to(released, record, &positions[at]);
-                        let far = (squared.sqrt() + miss) / peaks.resolution;
-                        row.push((-(far as f32), record));
-                    }
-                }
-                // Own records and rays of the own center take up places.
-                if row.len() >= k || scratch.len() < look || look >= MOST_LOOKED * k {
-                    row.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-                    row.truncate(k);
-                    return row;
-                }
-                look *= 2;
-            }
-        };
-        let listed: Vec<Vec<(f32, RecordId)>> =
-            (0..positions.len()).into_par_iter().map_init(Vec::new, near).collect();
-        for (row, slot) in listed.into_iter().zip(&slots) {
-            rows[*slot] = row;
-        }
+    if positions.is_empty() {
+        return Neighborhoods::scored(rows, released, RowOrder::Either);
     }
-    let mut offsets = vec![0u64];
-    offsets.extend(rows.iter().scan(0u64, |end, row| {
-        *end += row.len() as u64;
-        Some(*end)
-    }));
-    let (scores, records) = rows.into_iter().flatten().unzip();
-    let n_records = released.n_records();
-    let slots = released.slots_per_record();
-    let lists = Neighborhoods::try_new(offsets, records, Some(scores), n_records, slots)?;
-    Ok(lists.with_about(About {
-        map: Some(released.fingerprint()),
-        order: RowOrder::Either,
-        ..About::default()
-    }))
+    let knn = Knn::new(&positions)?;
+    let per_record = released.slots_per_record();
+    let near = |scratch: &mut Vec<(f64, u32)>, at: usize| {
+        let own = RecordId::from_index(slots[at] / per_record);
+        let may_list = |record: RecordId| {
+            record != own && centers.is_none_or(|c| c[record.index()] != c[own.index()])
+        };
+        let mut look = LOOK * k;
+        loop {
+            knn.nearest(at, look, scratch);
+            let mut row: Vec<(f32, RecordId)> = Vec::new();
+            for &(squared, near) in scratch.iter() {
+                let record = RecordId::from_index(slots[near as usize] / per_record);
+                if may_list(record) && row.iter().all(|&(_, listed)| listed != record) {
+                    let miss = distance_to(released, record, &positions[at]);
+                    let far = (squared.sqrt() + miss) / peaks.resolution;
+                    row.push((-(far as f32), record));
+                }
+            }
+            // Own records and rays of the own center take up places.
+            if row.len() >= k || scratch.len() < look || look >= MOST_LOOKED * k {
+                row.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+                row.truncate(k);
+                return row;
+            }
+            look *= 2;
+        }
+    };
+    let listed: Vec<_> = (0..positions.len()).into_par_iter().map_init(Vec::new, near).collect();
+    for (row, slot) in listed.into_iter().zip(slots) {
+        rows[slot] = row;
+    }
+    Neighborhoods::scored(rows, released, RowOrder::Either)
 }
 
 /// Rejects records that alone give no positions.
@@ -157,17 +144,11 @@ fn check<const D: usize>(released: &Released<D>, k: usize) -> Result<(), Error> 
 
 /// Returns the distance from `x` to the line of a record; 0 for axis candidates, which have three lines.
 fn distance_to<const D: usize>(released: &Released<D>, record: RecordId, x: &[f64; 3]) -> f64 {
-    let solid = |v: &[f32; D]| -> [f64; 3] { std::array::from_fn(|c| f64::from(v[c % D])) };
-    let at = record.index();
-    let (through, direction) = match released.obfuscation() {
-        Obfuscation::Lines(lines) => (solid(&lines.foot()[at]), solid(&lines.direction()[at])),
-        Obfuscation::Rays(rays) => {
-            (solid(&rays.centers()[usize::from(rays.center()[at])]), solid(&rays.direction()[at]))
-        }
-        Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => return 0.0,
+    let Some((through, direction)) = released.obfuscation().line(record.index()) else {
+        return 0.0;
     };
-    let away = sub(x, &through);
-    let t = dot(&away, &direction);
-    let nearest: [f64; 3] = std::array::from_fn(|c| through[c] + t * direction[c]);
-    distance(x, &nearest)
+    let [through, direction] =
+        [through, direction].map(|v| -> [f64; 3] { std::array::from_fn(|c| f64::from(v[c % D])) });
+    let t = dot(&sub(x, &through), &direction);
+    distance(x, &along(&through, t, &direction))
 }

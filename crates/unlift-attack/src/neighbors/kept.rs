@@ -19,7 +19,7 @@ pub struct KeptLists {
 }
 
 impl KeptLists {
-    /// Keeps the lists of `released`; `None` for records with two slots and for protected descriptors, which differ between schemes.
+    /// Keeps the lists of `released`; `None` for records with two slots.
     pub fn new<const D: usize>(released: &Released<D>, lists: &Neighborhoods) -> Option<Self> {
         let descriptors = released.descriptors().filter(|_| released.slots_per_record() == 1)?;
         let (descriptors, slots) = (descriptors.clone(), by_content(descriptors));
@@ -94,25 +94,17 @@ pub(super) fn are_equal((a, i): (&Descriptors, u32), (b, j): (&Descriptors, u32)
 mod tests {
     use super::KeptLists;
     use crate::descriptors::Values;
-    use crate::neighbors::{KeptPairs, Overlap, Similarity, Source};
-    use crate::released::{AxisPlanes, Lines, Obfuscation, Released};
+    use crate::neighbors::{KeptPairs, Overlap, Similarity, Source, described};
+    use crate::released::{AxisPlanes, Obfuscation, Released};
     use crate::seed::{Draws, Stage};
     use crate::{Descriptors, Unit};
 
     const N: usize = 300;
 
     /// Returns a map whose slot `at` has the descriptor `order[at]` of `rows`.
-    fn map(rows: &[[u8; 128]], order: &[usize], obfuscation: Obfuscation<3>) -> Released<3> {
+    fn map(rows: &[[u8; 128]], order: &[usize], slots_per_record: usize) -> Released<3> {
         let values = order.iter().flat_map(|&at| rows[at]).collect();
-        let descriptors = Descriptors::try_new(Values::U8(values), 128).unwrap();
-        let slots = order.len() / obfuscation.len();
-        Released::try_new(obfuscation, slots, [0.0; 3], Unit::Meter, Some(descriptors)).unwrap()
-    }
-
-    fn lines(n: usize) -> Obfuscation<3> {
-        let direction = |at: usize| [(at as f64).sin(), (at as f64).cos(), 1.0];
-        let directions: Vec<[f64; 3]> = (0..n).map(direction).collect();
-        Obfuscation::Lines(Lines::through(&vec![[0.0; 3]; n], &directions).unwrap())
+        described(Descriptors::try_new(Values::U8(values), 128).unwrap(), slots_per_record)
     }
 
     fn random() -> Vec<[u8; 128]> {
@@ -145,10 +137,10 @@ mod tests {
                 (without(&(0..30).collect::<Vec<_>>()), 2, N),
                 (without(&[]), 1, N),
             ] {
-                let map = map(&rows, &order, lines(order.len() / slots));
+                let map = map(&rows, &order, slots);
                 let lists = source.lists_keeping(&map, 12, 0, &mut kept).unwrap();
                 assert_eq!(lists, source.lists(&map, 12, 0).unwrap(), "{} {n_kept}", source.name());
-                assert_eq!(kept.n_rows(), n_kept);
+                assert_eq!(kept.compared[0].slots.len(), n_kept);
             }
         }
     }
@@ -156,13 +148,13 @@ mod tests {
     #[test]
     fn kept_lists_equal_those_of_the_map_alone() {
         let mut rows = random();
-        let planes =
-            AxisPlanes::try_new(vec![0; N], &(0..N).map(|at| at as f64).collect::<Vec<_>>())
-                .unwrap();
         let identity: Vec<usize> = (0..N).collect();
         let shuffled: Vec<usize> = (0..N).map(|at| at * 77 % N).collect();
-        let a = map(&rows, &identity, lines(N));
-        let b = map(&rows, &shuffled, Obfuscation::AxisPlanes(planes));
+        let [a, b] = [&identity, &shuffled].map(|order| map(&rows, order, 1));
+        // Another family.
+        let planes = Obfuscation::AxisPlanes(AxisPlanes::try_new(vec![0; N], &[1.0; N]).unwrap());
+        let descriptors = b.descriptors().cloned();
+        let b = Released::try_new(planes, 1, [0.0; 3], Unit::Meter, descriptors).unwrap();
         let sources: [&dyn Source<3>; 2] = [&Similarity, &Overlap];
         for source in sources {
             let kept = KeptLists::new(&a, &source.lists(&a, 12, 0).unwrap()).unwrap();
@@ -170,6 +162,6 @@ mod tests {
         }
         rows[3][5] += 1;
         let kept = KeptLists::new(&a, &Similarity.lists(&a, 12, 0).unwrap()).unwrap();
-        assert_eq!(kept.of(&map(&rows, &shuffled, b.obfuscation().clone())), None);
+        assert_eq!(kept.of(&map(&rows, &shuffled, 1)), None);
     }
 }

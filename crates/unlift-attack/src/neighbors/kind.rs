@@ -80,7 +80,7 @@ pub(crate) fn comparable<'a>(sets: &[&'a Descriptors]) -> Vec<Cow<'a, Descriptor
     let owned = |values, dim| Cow::Owned(Descriptors::unchecked(Values::F32(values), dim));
     let of = |&set: &&'a Descriptors| match set.values() {
         _ if lacks_root => {
-            owned(rows(set).flatten().map(|x| x.max(0.0).sqrt()).collect(), set.dim())
+            owned(set.rows().flatten().map(|x| x.max(0.0).sqrt()).collect(), set.dim())
         }
         Values::U8(bytes) if are_bits && are_bytes => {
             owned(bytes.iter().flat_map(bits).collect(), 8 * set.dim())
@@ -101,15 +101,7 @@ fn lacks_root(descriptors: &Descriptors) -> bool {
         squares > 25.0
     };
     let is_sift = Source::<2>::takes(&Overlap, descriptors).is_ok();
-    is_sift && 20 * rows(descriptors).filter(is_below).count() < descriptors.len()
-}
-
-fn rows(descriptors: &Descriptors) -> impl Iterator<Item = Vec<f32>> {
-    (0..descriptors.len()).map(|at| {
-        let mut row = vec![0.0; descriptors.dim()];
-        descriptors.read_row(at, &mut row);
-        row
-    })
+    is_sift && 20 * descriptors.rows().filter(is_below).count() < descriptors.len()
 }
 
 /// Returns whether rows of bytes are bit strings (ORB, BRIEF, AKAZE): bits of all weights are about as often 1 as 0, and rows differ in

@@ -21,10 +21,12 @@ mod source;
 pub mod sources;
 mod walk;
 
+#[cfg(test)]
+use crate::released::{Lines, Obfuscation, Released};
 pub use bearings::{REAL, support};
 pub use compare::KeptPairs;
 pub(crate) use compare::MOST_ROWS;
-pub use dense::{Dense, dense, usual};
+pub use dense::{dense, usual};
 pub(crate) use geometric::geometric_by;
 pub use geometric::{Geometric, geometric};
 pub use kept::KeptLists;
@@ -32,9 +34,18 @@ pub(crate) use kind::comparable;
 pub use kind::{DescriptorKind, are_bits};
 pub(crate) use mutual::{Blocks, mutual};
 pub use neighborhoods::Neighborhoods;
-pub use overlap::{Overlap, REACHES, overlap};
+pub use overlap::{Overlap, REACHES};
 pub use scored::{Part, Scores, scored};
-pub use similarity::{Similarity, similarity};
+pub use similarity::Similarity;
 #[doc(hidden)]
 pub use source::lacks_descriptors;
 pub use source::{Needs, Source, of_what_there_is};
+
+/// Returns parallel lines with these descriptors, for tests.
+#[cfg(test)]
+fn described(descriptors: crate::Descriptors, slots_per_record: usize) -> Released<3> {
+    let n = descriptors.len() / slots_per_record;
+    let lines = Lines::through(&vec![[0.0; 3]; n], &vec![[0.0, 1.0, 0.5]; n]).unwrap();
+    let (obfuscation, unit) = (Obfuscation::Lines(lines), crate::Unit::Meter);
+    Released::try_new(obfuscation, slots_per_record, [0.0; 3], unit, Some(descriptors)).unwrap()
+}

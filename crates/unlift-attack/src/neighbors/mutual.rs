@@ -45,12 +45,10 @@ pub(crate) struct Blocks {
     len: usize,
 }
 
-const COSINE: Cosine = Cosine { counts: false };
-
 impl Blocks {
     pub fn new(descriptors: &Descriptors) -> Self {
         let slots: Vec<u32> = (0..descriptors.len() as u32).collect();
-        let blocks = slots.chunks(BLOCK).map(|slots| COSINE.block(descriptors, slots));
+        let blocks = slots.chunks(BLOCK).map(|slots| Cosine.block(descriptors, slots));
         Self { blocks: blocks.collect(), len: descriptors.len() }
     }
 }
@@ -87,7 +85,7 @@ fn compare(
         let n_own = (n_rows - at).min(BLOCK);
         let mut lanes = Lanes::new(BLOCK * LANES);
         for (j, other) in b.blocks.iter().enumerate() {
-            COSINE.scores(own, other, &mut scores);
+            Cosine.scores(own, other, &mut scores);
             // The last block has places without descriptors.
             let n_other = (b.len - j * BLOCK).min(BLOCK);
             if n_other < BLOCK {
@@ -193,7 +191,7 @@ mod tests {
         let mut block = vec![0.0; BLOCK * BLOCK];
         for (i, own) in blocks_a.blocks.iter().enumerate() {
             for (j, other) in blocks_b.blocks.iter().enumerate() {
-                COSINE.scores(own, other, &mut block);
+                Cosine.scores(own, other, &mut block);
                 for (at, &score) in block.iter().enumerate() {
                     scores[i * BLOCK + at / BLOCK][j * BLOCK + at % BLOCK] = score;
                 }

@@ -1,6 +1,7 @@
 //! Lists of records per slot, in compressed rows.
 
-use crate::{About, Error, RecordId};
+use crate::released::Released;
+use crate::{About, Error, RecordId, RowOrder};
 
 /// Per slot, the records that are said to hide its neighbors. They ascend by record id, because an order by distance would reveal more
 /// than a set. The source and the fraction of true neighbors are not stored, as the attacker does not have them. The
@@ -48,7 +49,10 @@ impl Neighborhoods {
                 let expected = format!("{} rows", records.len());
                 return Err(Error::new("neighborhood scores", expected, scores.len().to_string()));
             }
-            check_scores(0, scores)?;
+            if let Some(at) = scores.iter().position(|x| !x.is_finite()) {
+                let what = format!("neighborhood score {at}");
+                return Err(Error::new(what, "a finite number", scores[at].to_string()));
+            }
         }
         for slot in 0..n_slots {
             let range = offsets[slot] as usize..offsets[slot + 1] as usize;
@@ -56,6 +60,31 @@ impl Neighborhoods {
             check_row(slot, &records[range], n_records, slots_per_record)?;
         }
         Ok(Self { offsets, records, scores, about: About::default() })
+    }
+
+    /// Creates lists of a released map from the (score, record) of each slot, in any order.
+    ///
+    /// # Errors
+    /// When a record is out of range, twice in a list or the slot's own, or a score is not finite.
+    pub(super) fn scored<const D: usize>(
+        rows: impl IntoIterator<Item = Vec<(f32, RecordId)>>,
+        released: &Released<D>,
+        order: RowOrder,
+    ) -> Result<Self, Error> {
+        let (mut offsets, mut records, mut scores) = (vec![0u64], Vec::new(), Vec::new());
+        for row in rows {
+            scores.extend(row.iter().map(|&(score, _)| score));
+            records.extend(row.iter().map(|&(_, record)| record));
+            offsets.push(records.len() as u64);
+        }
+        let (n_records, slots) = (released.n_records(), released.slots_per_record());
+        let lists = Self::try_new(offsets, records, Some(scores), n_records, slots)?;
+        Ok(lists.with_about(About { map: Some(released.fingerprint()), order, ..About::default() }))
+    }
+
+    /// Creates empty lists for `n_slots` slots.
+    pub fn empty(n_slots: usize) -> Self {
+        Self::unchecked(vec![0; n_slots + 1], Vec::new())
     }
 
     /// Creates lists from rows of checked lists, without checks.
@@ -112,19 +141,8 @@ impl Neighborhoods {
     }
 }
 
-/// Rejects scores that are not finite; `first` is the index of the first one.
-pub(super) fn check_scores(first: usize, scores: &[f32]) -> Result<(), Error> {
-    match scores.iter().position(|x| !x.is_finite()) {
-        Some(at) => {
-            let what = format!("neighborhood score {}", first + at);
-            Err(Error::new(what, "a finite number", scores[at].to_string()))
-        }
-        None => Ok(()),
-    }
-}
-
 /// Rejects a sorted list with a record twice, out of range, or the slot's own.
-pub(super) fn check_row(
+fn check_row(
     slot: usize,
     row: &[RecordId],
     n_records: usize,
@@ -149,7 +167,7 @@ pub(super) fn check_row(
 }
 
 /// Sorts a list by record, together with its scores.
-pub(super) fn sort_row(records: &mut [RecordId], scores: Option<&mut [f32]>) {
+fn sort_row(records: &mut [RecordId], scores: Option<&mut [f32]>) {
     match scores {
         None => records.sort_unstable(),
         Some(scores) => {

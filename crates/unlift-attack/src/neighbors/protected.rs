@@ -14,12 +14,11 @@ pub struct Shared {
     gain: f64,
     /// Estimated frequency of each word.
     frequency: Vec<f64>,
-    counts: bool,
 }
 
 impl Shared {
     /// Estimates the frequencies of words from the released sets.
-    pub fn new(protected: &ProtectedDescriptors, counts: bool) -> Option<Self> {
+    pub fn new(protected: &ProtectedDescriptors) -> Option<Self> {
         let Rule::Words { m, epsilon } = protected.rule() else { return None };
         let n_words = protected.public()?.len();
         let (k, size) = (n_words as f64, m as f64);
@@ -27,10 +26,8 @@ impl Shared {
         let own = 1.0 / (1.0 + (k - size) / size * libm::exp(-epsilon));
         let other = (size - own) / (k - 1.0).max(1.0);
         let mut counted = vec![0.0; n_words];
-        let mut row = vec![0.0; m];
-        for at in 0..protected.len() {
-            protected.rows().read_row(at, &mut row);
-            row.iter().for_each(|&word| counted[word as usize] += 1.0 / protected.len() as f64);
+        for word in protected.rows().rows().flatten() {
+            counted[word as usize] += 1.0 / protected.len() as f64;
         }
         // At least a tenth of a uniform frequency: estimates of rare words may be negative.
         let least = 0.1 / k;
@@ -38,7 +35,7 @@ impl Shared {
         let mut frequency: Vec<f64> = counted.into_iter().map(of).collect();
         let sum: f64 = frequency.iter().sum();
         frequency.iter_mut().for_each(|x| *x /= sum);
-        Some(Self { m, gain: libm::exp(epsilon.min(40.0)) - 1.0, frequency, counts })
+        Some(Self { m, gain: libm::exp(epsilon.min(40.0)) - 1.0, frequency })
     }
 }
 
@@ -65,10 +62,6 @@ impl Likeness for Shared {
             }
         }
         Sets { words, sums }
-    }
-
-    fn counts(&self) -> bool {
-        self.counts
     }
 
     fn scores(&self, a: &Sets, b: &Sets, scores: &mut [f32]) {
@@ -114,7 +107,7 @@ mod tests {
         // Word 0 is frequent.
         let rows = [[0, 1], [0, 2], [0, 3], [0, 4], [0, 5], [6, 7], [6, 8], [9, 10]];
         let made = of(rows.iter().map(|row| row.map(|x| x as f32).to_vec()).collect()).unwrap();
-        let shared = Shared::new(&made, false).unwrap();
+        let shared = Shared::new(&made).unwrap();
         let block = shared.block(made.rows(), &(0..rows.len() as u32).collect::<Vec<_>>());
         let mut scores = vec![0.0; BLOCK * BLOCK];
         shared.scores(&block, &block, &mut scores);

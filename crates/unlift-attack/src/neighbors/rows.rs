@@ -8,7 +8,7 @@ use super::Neighborhoods;
 use super::kind::comparable;
 use crate::descriptors::Values;
 use crate::released::Released;
-use crate::{About, Descriptors, Error, RecordId, RowOrder};
+use crate::{Descriptors, Error, RecordId, RowOrder};
 
 fn records_of(slots: &[u32], slots_per_record: usize) -> Vec<u32> {
     slots.iter().map(|&slot| slot / slots_per_record as u32).collect()
@@ -41,9 +41,7 @@ pub struct Rows<'a> {
     pub slots: Vec<u32>,
     /// The record of each row.
     pub records: Vec<u32>,
-    n_records: usize,
     slots_per_record: usize,
-    about: About,
 }
 
 impl<'a> Rows<'a> {
@@ -76,40 +74,20 @@ impl<'a> Rows<'a> {
         let slots = by_content(descriptors);
         let slots_per_record = released.slots_per_record();
         let records = records_of(&slots, slots_per_record);
-        let about = About {
-            map: Some(released.fingerprint()),
-            order: RowOrder::DescriptorRows,
-            ..About::default()
-        };
-        let descriptors = Cow::Borrowed(descriptors);
-        Ok(Self { descriptors, slots, records, n_records, slots_per_record, about })
+        Ok(Self { descriptors: Cow::Borrowed(descriptors), slots, records, slots_per_record })
     }
 
     /// Creates rows from `descriptors` in their order; each is a record.
     pub fn of_all(descriptors: &'a Descriptors) -> Self {
         let slots: Vec<u32> = (0..descriptors.len() as u32).collect();
-        Self {
-            descriptors: Cow::Borrowed(descriptors),
-            records: slots.clone(),
-            n_records: slots.len(),
-            slots_per_record: 1,
-            about: About::default(),
-            slots,
-        }
+        let records = slots.clone();
+        Self { descriptors: Cow::Borrowed(descriptors), slots, records, slots_per_record: 1 }
     }
 
     /// Returns the same rows, each as a record of its own.
     pub fn apart(&self) -> Rows<'_> {
         let (slots, records) = (self.slots.clone(), (0..self.len() as u32).collect());
-        let descriptors = Cow::Borrowed(&*self.descriptors);
-        Rows {
-            descriptors,
-            slots,
-            records,
-            n_records: self.len(),
-            slots_per_record: 1,
-            about: self.about,
-        }
+        Rows { descriptors: Cow::Borrowed(&self.descriptors), slots, records, slots_per_record: 1 }
     }
 
     /// Sets another order of slots.
@@ -128,30 +106,30 @@ impl<'a> Rows<'a> {
         k * self.slots_per_record
     }
 
-    /// Returns lists of the first `k` records of each row's ranking, `ranked[row]`, best first.
+    /// Returns lists of `released` with the first `k` records of each row's ranking, `ranked[row]`, best first.
     ///
     /// # Errors
     /// When a ranking contains own records or scores that are not finite.
-    pub fn lists(&self, ranked: &[Vec<(f32, u32)>], k: usize) -> Result<Neighborhoods, Error> {
+    pub fn lists<const D: usize>(
+        &self,
+        released: &Released<D>,
+        ranked: &[Vec<(f32, u32)>],
+        k: usize,
+    ) -> Result<Neighborhoods, Error> {
         let mut row_of = vec![0; self.len()];
         for (row, &slot) in self.slots.iter().enumerate() {
             row_of[slot as usize] = row;
         }
-        let (mut offsets, mut records) = (vec![0u64], Vec::new());
-        let mut scores = Vec::new();
-        for row in row_of {
-            let start = records.len();
-            for &(score, other) in &ranked[row] {
-                let record = RecordId(self.records[other as usize]);
-                if records.len() - start < k && !records[start..].contains(&record) {
-                    records.push(record);
-                    scores.push(score);
+        let list = |row: usize| {
+            let mut list: Vec<(f32, RecordId)> = Vec::with_capacity(k);
+            for &(score, partner) in &ranked[row] {
+                let record = RecordId(self.records[partner as usize]);
+                if list.len() < k && list.iter().all(|&(_, listed)| listed != record) {
+                    list.push((score, record));
                 }
             }
-            offsets.push(records.len() as u64);
-        }
-        let (n_records, slots) = (self.n_records, self.slots_per_record);
-        let lists = Neighborhoods::try_new(offsets, records, Some(scores), n_records, slots)?;
-        Ok(lists.with_about(self.about))
+            list
+        };
+        Neighborhoods::scored(row_of.into_iter().map(list), released, RowOrder::DescriptorRows)
     }
 }

@@ -5,6 +5,7 @@
 //! walks follow, one over the pairs with the best scores, one over the pairs with the best untrained scores, because their errors
 //! differ. Learned descriptors see a large area, so that their scores already are the ranking.
 
+use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 
 use rayon::prelude::*;
@@ -42,7 +43,7 @@ pub struct Part {
 pub type Scores<'a> = dyn Fn(&Part) -> Result<Vec<f32>, Error> + Sync + 'a;
 
 /// Lists the `k` records nearest to each slot by `scores`. For SIFT, lists those that two short walks are most likely to reach, one
-/// over these records and one as in [`overlap`](super::overlap()). The score is the logarithm of the probability that a record is among
+/// over these records and one as in [`Overlap`](super::Overlap). The score is the logarithm of the probability that a record is among
 /// the nearest, or of the discounted probability to be reached; the mean over both ends or walks. Scores of pairs come from
 /// `kept` and are kept there: all calls with it must have the same `scores`.
 ///
@@ -82,10 +83,10 @@ pub fn scored<const D: usize>(
     if patches.is_none() {
         // The best scores are right more often than the rows that a walk reaches.
         trained.iter_mut().for_each(|row| row.truncate(enough));
-        return rows.lists(&trained, k);
+        return rows.lists(released, &trained, k);
     }
     let walked = |ranked: &[_]| walk::walk(ranked, &rows.records, REACHED * enough, overlap::WALK);
-    rows.lists(&mixed(&walked(&trained), &walked(&untrained), enough), k)
+    rows.lists(released, &mixed(&walked(&trained), &walked(&untrained), enough), k)
 }
 
 /// Ranks the partners of `rows`, which it reorders if there are many.
@@ -98,8 +99,8 @@ fn rankings(
 ) -> Result<Rankings, Error> {
     let mut apart = rows.apart();
     let found = match patches {
-        Some(patches) => search(patches, &mut apart, most, MOST_ROWS, kept)?,
-        None => search(&Cosine { counts: true }, &mut apart, most, MOST_ROWS, kept)?,
+        Some(patches) => search(patches, &mut apart, most, true, MOST_ROWS, kept)?,
+        None => search(&Cosine, &mut apart, most, true, MOST_ROWS, kept)?,
     };
     let untrained = walk::standardized(&found);
     let n = apart.len();
@@ -126,7 +127,11 @@ fn rankings(
             trained[row as usize].extend(pairs);
         }
     }
-    let trained = both_ways(trained.into_par_iter().map(merged).collect());
+    let mean = |entries: &[(f32, u32)]| {
+        entries.iter().map(|&(score, _)| score).sum::<f32>() / entries.len() as f32
+    };
+    let trained = trained.into_par_iter().map(|entries| merged(entries, mean)).collect();
+    let trained = both_ways(trained);
     let (slots, descriptors) = (apart.slots.clone(), apart.descriptors.clone().into_owned());
     rows.reorder(slots.clone());
     Ok(Rankings { descriptors, slots, most, untrained, trained })
@@ -134,16 +139,12 @@ fn rankings(
 
 /// Returns the `most` rows with the largest mean probability over two walks.
 fn mixed(a: &[Ranked], b: &[Ranked], most: usize) -> Vec<Ranked> {
+    let mean = |entries: &[(f32, u32)]| {
+        let sum: f64 = entries.iter().map(|&(log, _)| libm::exp(f64::from(log)) / 2.0).sum();
+        libm::log(sum.max(f64::MIN_POSITIVE)) as f32
+    };
     let row = |(a, b): (&Ranked, &Ranked)| {
-        let both = a.iter().chain(b).map(|&(log, row)| (row, libm::exp(f64::from(log)) / 2.0));
-        let mut both: Vec<(u32, f64)> = both.collect();
-        both.sort_by_key(|&(row, _)| row);
-        let one = |same: &[(u32, f64)]| {
-            let sum: f64 = same.iter().map(|&(_, probability)| probability).sum();
-            (libm::log(sum.max(f64::MIN_POSITIVE)) as f32, same[0].0)
-        };
-        let mut ranked: Vec<_> = both.chunk_by(|a, b| a.0 == b.0).map(one).collect();
-        ranked.sort_unstable_by(higher_first);
+        let mut ranked = merged([&a[..], b].concat(), mean);
         ranked.truncate(most);
         ranked
     };
@@ -182,15 +183,12 @@ fn within(
     Ok((0..n).map(|i| if inner[i] { best(i) } else { Vec::new() }).collect())
 }
 
-/// Returns one entry per partner, with the mean of its scores over sets; best first.
-fn merged(mut pairs: Ranked) -> Ranked {
-    // A stable sort keeps the order of sets, so sums do not depend on threads.
-    pairs.sort_by_key(|&(_, other)| other);
-    let one = |pairs: &[(f32, u32)]| {
-        let sum: f32 = pairs.iter().map(|&(score, _)| score).sum();
-        (sum / pairs.len() as f32, pairs[0].1)
-    };
-    let mut ranked: Vec<_> = pairs.chunk_by(|a, b| a.1 == b.1).map(one).collect();
+/// Returns one entry per partner, with the `mean` of its entries; best first.
+fn merged(mut entries: Ranked, mean: impl Fn(&[(f32, u32)]) -> f32) -> Ranked {
+    // A stable sort keeps the order of entries, so sums do not depend on threads.
+    entries.sort_by_key(|&(_, partner)| partner);
+    let of_partner = entries.chunk_by(|a, b| a.1 == b.1);
+    let mut ranked: Ranked = of_partner.map(|entries| (mean(entries), entries[0].1)).collect();
     ranked.sort_unstable_by(higher_first);
     ranked
 }
@@ -224,16 +222,16 @@ const TIMES: usize = 2;
 const EDGES: usize = 24;
 
 /// Rows that are scored together.
-pub struct Set {
+struct Set {
     /// The rows, ascending.
-    pub rows: Vec<u32>,
+    rows: Vec<u32>,
     /// Whether each row is in the middle of the set.
-    pub inner: Vec<bool>,
+    inner: Vec<bool>,
 }
 
 /// Grows sets along the best pairs. `ranked` has the partners of each row, best first, with scores in standard deviations. Every row is in
 /// the middle of [`TIMES`] sets.
-pub fn around(ranked: &[Vec<(f32, u32)>]) -> Vec<Set> {
+fn around(ranked: &[Ranked]) -> Vec<Set> {
     let n = ranked.len();
     let edges = edges(ranked);
     let mut order: Vec<u32> = (0..n as u32).collect();
@@ -260,13 +258,13 @@ pub fn around(ranked: &[Vec<(f32, u32)>]) -> Vec<Set> {
             sets.push(growth.filled(sets.len()));
         }
         // Rows at the edge of a middle become starts in the next round.
-        order.sort_by_key(|&row| std::cmp::Reverse(place[row as usize]));
+        order.sort_by_key(|&row| Reverse(place[row as usize]));
     }
     sets
 }
 
 /// Returns the edges with their weights, in both directions.
-fn edges(ranked: &[Vec<(f32, u32)>]) -> Vec<Vec<(u32, f32)>> {
+fn edges(ranked: &[Ranked]) -> Vec<Vec<(u32, f32)>> {
     let mut edges: Vec<Vec<(u32, f32)>> = vec![Vec::new(); ranked.len()];
     for (row, list) in ranked.iter().enumerate() {
         for &(z, other) in list.iter().take(EDGES) {
@@ -288,7 +286,8 @@ struct Growth<'a> {
     set: Vec<u32>,
     /// Sum of weights per row; negative infinity for rows in the set.
     ties: HashMap<u32, f32>,
-    heap: BinaryHeap<Tied>,
+    /// Bits of sums, which are ordered as the sums are because none is negative. Among equal sums, the lower row is first.
+    heap: BinaryHeap<(u32, Reverse<u32>)>,
 }
 
 impl<'a> Growth<'a> {
@@ -298,9 +297,9 @@ impl<'a> Growth<'a> {
 
     /// Returns the allowed row with the largest sum of weights.
     fn next(&mut self, may: impl Fn(u32) -> bool) -> Option<u32> {
-        while let Some(Tied(tie, row)) = self.heap.pop() {
+        while let Some((tie, Reverse(row))) = self.heap.pop() {
             // Skip outdated entries.
-            if self.ties.get(&row) == Some(&tie) && may(row) {
+            if self.ties.get(&row).is_some_and(|now| now.to_bits() == tie) && may(row) {
                 return Some(row);
             }
         }
@@ -314,7 +313,7 @@ impl<'a> Growth<'a> {
             let tied = self.ties.entry(other).or_insert(0.0);
             if *tied != f32::NEG_INFINITY {
                 *tied += weight;
-                self.heap.push(Tied(*tied, other));
+                self.heap.push((tied.to_bits(), Reverse(other)));
             }
         }
     }
@@ -327,12 +326,12 @@ impl<'a> Growth<'a> {
         // Grow ring by ring. Always taking the most connected row would grow the set in one direction.
         while self.set.len() < SIZE - USUAL {
             let outside = self.ties.iter().filter(|&(_, &tie)| tie != f32::NEG_INFINITY);
-            let mut ring: Vec<Tied> = outside.map(|(&row, &tie)| Tied(tie, row)).collect();
+            let mut ring: Ranked = outside.map(|(&row, &tie)| (tie, row)).collect();
             if ring.is_empty() {
                 break;
             }
-            ring.sort_unstable_by(|a, b| b.cmp(a));
-            for Tied(_, row) in ring.into_iter().take(SIZE - USUAL - self.set.len()) {
+            ring.sort_unstable_by(higher_first);
+            for (_, row) in ring.into_iter().take(SIZE - USUAL - self.set.len()) {
                 self.take(row);
             }
         }
@@ -346,40 +345,14 @@ impl<'a> Growth<'a> {
     }
 }
 
-/// A row and its sum of weights; among equal sums the lower row is first.
-#[derive(PartialEq)]
-struct Tied(f32, u32);
-
-impl Eq for Tied {}
-
-impl Ord for Tied {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        higher_first(&(self.0, self.1), &(other.0, other.1)).reverse()
-    }
-}
-
-impl PartialOrd for Tied {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Unit;
     use crate::descriptors::Values;
-    use crate::released::{Lines, Obfuscation};
+    use crate::neighbors::described;
 
     /// Points along a closed curve, whose descriptors change slowly.
-    fn released(n: usize, is_sift: bool) -> Released<3> {
-        hidden(n, is_sift, 1)
-    }
-
-    fn hidden(n: usize, is_sift: bool, slots: usize) -> Released<3> {
-        let points: Vec<[f64; 3]> =
-            (0..n / slots).map(|i| [i as f64, 0.0, (i % 7) as f64]).collect();
-        let lines = Lines::through(&points, &vec![[0.0, 1.0, 0.5]; points.len()]).unwrap();
+    fn released(n: usize, is_sift: bool, slots: usize) -> Released<3> {
         let byte = |at: usize, bin: usize| {
             let turn = std::f64::consts::TAU * at as f64 / n as f64;
             let wave = libm::sin(turn * (1 + bin % 9) as f64 + (bin * bin) as f64);
@@ -390,9 +363,7 @@ mod tests {
             true => Values::U8(bytes.collect()),
             false => Values::F32(bytes.map(|byte| f32::from(byte) - 60.0).collect()),
         };
-        let descriptors = Descriptors::try_new(values, 128).unwrap();
-        let obfuscation = Obfuscation::Lines(lines);
-        Released::try_new(obfuscation, slots, [0.0; 3], Unit::Meter, Some(descriptors)).unwrap()
+        described(Descriptors::try_new(values, 128).unwrap(), slots)
     }
 
     fn alike(part: &Part) -> Result<Vec<f32>, Error> {
@@ -427,19 +398,15 @@ mod tests {
     #[test]
     fn what_scores_call_near_is_listed_in_one_set_and_in_several() {
         for n in [300, WHOLE + 500] {
-            let right = right(
-                &scored(&released(n, true), 10, &alike, &mut KeptPairs::default()).unwrap(),
-                n,
-                10,
-            );
+            let map = released(n, true, 1);
+            let lists = scored(&map, 10, &alike, &mut KeptPairs::default()).unwrap();
+            let right = right(&lists, n, 10);
             assert!(right > 0.9, "{n} points: {right}");
         }
         // Scores alone decide the lists of others than SIFT.
-        let right = right(
-            &scored(&released(300, false), 10, &opposite, &mut KeptPairs::default()).unwrap(),
-            300,
-            10,
-        );
+        let map = released(300, false, 1);
+        let lists = scored(&map, 10, &opposite, &mut KeptPairs::default()).unwrap();
+        let right = right(&lists, 300, 10);
         assert!(right < 0.15, "{right}");
     }
 
@@ -449,7 +416,7 @@ mod tests {
         for (n, slots, n_kept) in
             [(400, 1, 1), (400, 2, 1), (398, 2, 2), (400, 1, 2), (40, 1, 3), (42, 1, 3)]
         {
-            let map = hidden(n, true, slots);
+            let map = released(n, true, slots);
             let alone = scored(&map, 12, &alike, &mut KeptPairs::default()).unwrap();
             assert_eq!(scored(&map, 12, &alike, &mut kept).unwrap(), alone, "{n} points");
             assert_eq!(kept.rankings.len(), n_kept);
@@ -460,7 +427,7 @@ mod tests {
     fn scores_that_are_none_are_refused() {
         let scored = |values: Vec<f32>| {
             let scores = |_: &Part| Ok(values.clone());
-            scored(&released(20, true), 5, &scores, &mut KeptPairs::default())
+            scored(&released(20, true, 1), 5, &scores, &mut KeptPairs::default())
         };
         for (values, found) in [
             (vec![0.0; 7], "7"),

@@ -1,11 +1,11 @@
 //! The source `similarity`: near points have similar descriptors of any kind.
 
 use super::Neighborhoods;
-use super::compare::{KeptPairs, Likeness, MOST_ROWS, note, search};
+use super::compare::{KeptPairs, Likeness, note};
 use super::protected::Shared;
 use super::rows::Rows;
 use super::source::{Needs, Source};
-use super::walk::{self, Walk};
+use super::walk::{Walk, ranked_by};
 use crate::descriptors::Values;
 use crate::released::Released;
 use crate::simd::{self, BLOCK, Kernel};
@@ -15,7 +15,7 @@ use crate::{Descriptors, Error};
 /// very nearest (docs/decisions/sources.md).
 pub const WALK: Walk = Walk { steps: 2, decay: 0.2 };
 
-/// Lists the `k` records with the most similar descriptors. The score is the cosine similarity; of a record with two
+/// Lists the records with the most similar descriptors. The score is the cosine similarity; of a record with two
 /// descriptors, the larger one. SIFT without the root (L2 norm) is compared by its root, bit strings by their Hamming distance.
 ///
 /// For learned descriptors, which see a large area around their point, it lists the records that a short walk over the most similar
@@ -26,60 +26,13 @@ pub const WALK: Walk = Walk { steps: 2, decay: 0.2 };
 ///
 /// The search is exact up to 131,072 slots (`MOST_ROWS`). In a larger map, each block of descriptors is compared with the blocks
 /// that have the most similar means.
-///
-/// # Errors
-/// When the map has no descriptors, or fewer than `k` other records.
-pub fn similarity<const D: usize>(
-    released: &Released<D>,
-    k: usize,
-) -> Result<Neighborhoods, Error> {
-    keeping(released, k, &mut KeptPairs::default())
-}
-
-fn keeping<const D: usize>(
-    released: &Released<D>,
-    k: usize,
-    kept: &mut KeptPairs,
-) -> Result<Neighborhoods, Error> {
-    let counts = released.descriptors().is_some_and(are_learned);
-    let protected = released.protected();
-    match protected.and_then(|protected| Some((protected, Shared::new(protected, counts)?))) {
-        Some((protected, shared)) => {
-            // Protected descriptors differ between maps, and so does their likeness.
-            let rows = Rows::of_map(protected.rows(), released, k)?;
-            ranked_by(&shared, rows, k, &mut KeptPairs::default())
-        }
-        None => ranked_by(&Cosine { counts }, Rows::new(released, k)?, k, kept),
-    }
-}
-
-/// Lists the best records by a likeness; a walk over the best ones if it counts scores.
-fn ranked_by<L: Likeness>(
-    likeness: &L,
-    mut rows: Rows<'_>,
-    k: usize,
-    kept: &mut KeptPairs,
-) -> Result<Neighborhoods, Error> {
-    let enough = rows.enough_for(k);
-    if !likeness.counts() {
-        let found = search(likeness, &mut rows, enough, MOST_ROWS, kept)?;
-        let ranked: Vec<_> = found.into_iter().map(|found| found.best).collect();
-        return rows.lists(&ranked, k);
-    }
-    let most = enough.max(walk::CANDIDATES);
-    let found = search(likeness, &mut rows, most, MOST_ROWS, kept)?;
-    let ranked = walk::standardized(&found);
-    rows.lists(&walk::walk(&ranked, &rows.records, enough, WALK), k)
-}
+#[derive(Clone, Copy, Debug)]
+pub struct Similarity;
 
 /// Whether descriptors come from a network: floats that are no histograms of gradients.
 fn are_learned(descriptors: &Descriptors) -> bool {
     matches!(descriptors.values(), Values::F32(_)) && super::overlap::check(descriptors).is_err()
 }
-
-/// The function [`similarity`] as a source.
-#[derive(Clone, Copy, Debug)]
-pub struct Similarity;
 
 impl<const D: usize> Source<D> for Similarity {
     fn name(&self) -> &str {
@@ -101,8 +54,8 @@ impl<const D: usize> Source<D> for Similarity {
         }
     }
 
-    fn lists(&self, released: &Released<D>, k: usize, _: u64) -> Result<Neighborhoods, Error> {
-        similarity(released, k)
+    fn lists(&self, released: &Released<D>, k: usize, seed: u64) -> Result<Neighborhoods, Error> {
+        self.lists_keeping(released, k, seed, &mut KeptPairs::default())
     }
 
     fn lists_keeping(
@@ -112,7 +65,16 @@ impl<const D: usize> Source<D> for Similarity {
         _: u64,
         kept: &mut KeptPairs,
     ) -> Result<Neighborhoods, Error> {
-        keeping(released, k, kept)
+        let walk = released.descriptors().is_some_and(are_learned).then_some(WALK);
+        let protected = released.protected();
+        match protected.and_then(|protected| Some((protected, Shared::new(protected)?))) {
+            Some((protected, shared)) => {
+                // Protected descriptors differ between maps, and so does their likeness.
+                let rows = Rows::of_map(protected.rows(), released, k)?;
+                ranked_by(&shared, rows, walk, (released, k), &mut KeptPairs::default())
+            }
+            None => ranked_by(&Cosine, Rows::new(released, k)?, walk, (released, k), kept),
+        }
     }
 
     fn reads_descriptors_alone(&self) -> bool {
@@ -125,10 +87,7 @@ impl<const D: usize> Source<D> for Similarity {
 }
 
 /// Compares descriptors by their cosine.
-pub struct Cosine {
-    /// Whether to compute mean and deviation of the cosines.
-    pub counts: bool,
-}
+pub struct Cosine;
 
 /// Adjacent columns, whose sums fit in registers.
 const PANEL: usize = 16;
@@ -162,10 +121,6 @@ impl Likeness for Cosine {
             }
         }
         Units { dim, rows, columns }
-    }
-
-    fn counts(&self) -> bool {
-        self.counts
     }
 
     fn scores(&self, a: &Units, b: &Units, scores: &mut [f32]) {

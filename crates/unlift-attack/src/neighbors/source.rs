@@ -96,16 +96,14 @@ pub fn of_what_there_is<const D: usize>(
     released: &Released<D>,
     seed: u64,
 ) -> Result<Neighborhoods, Error> {
-    let (n_slots, n_records) = (released.n_slots(), released.n_records());
-    let others = n_records.saturating_sub(1);
+    let others = released.n_records().saturating_sub(1);
     if others > 0 {
         source.supports(released)?;
         return source.lists(released, source.k(released).min(others), seed);
     }
-    let (offsets, slots) = (vec![0; n_slots + 1], released.slots_per_record());
-    let lists = Neighborhoods::try_new(offsets, Vec::new(), None, n_records, slots)?;
     let map = Some(released.fingerprint());
-    Ok(lists.with_about(About { map, order: RowOrder::DescriptorRows, ..About::default() }))
+    let about = About { map, order: RowOrder::DescriptorRows, ..About::default() };
+    Ok(Neighborhoods::empty(released.n_slots()).with_about(about))
 }
 
 /// Creates the error of a source that needs descriptors for a map without them.

@@ -62,17 +62,6 @@ pub const SOURCES: &[SourceEntry] = &[
     },
 ];
 
-/// Returns the source of `known` with this name.
-///
-/// # Errors
-/// When there is none. The error lists the names.
-pub fn source(name: &str, known: &[&'static SourceEntry]) -> Result<&'static SourceEntry, Error> {
-    known.iter().copied().find(|entry| entry.name == name).ok_or_else(|| {
-        let names: Vec<&str> = known.iter().map(|entry| entry.name).collect();
-        Error::new("source", format!("one of {}", names.join(", ")), name)
-    })
-}
-
 /// A source of the registry and the length of its lists.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Named {
@@ -94,7 +83,12 @@ impl Named {
     /// # Errors
     /// As [`parse`](Self::parse).
     pub fn parse_among(name: &str, known: &[&'static SourceEntry]) -> Result<Self, Error> {
-        Ok(Self { entry: source(name.trim(), known)?, k: None })
+        let name = name.trim();
+        let entry = known.iter().copied().find(|entry| entry.name == name).ok_or_else(|| {
+            let names: Vec<&str> = known.iter().map(|entry| entry.name).collect();
+            Error::new("source", format!("one of {}", names.join(", ")), name)
+        })?;
+        Ok(Self { entry, k: None })
     }
 
     /// Sets the number of records per list, in place of the default of the source.
@@ -176,10 +170,9 @@ impl<const D: usize> Source<D> for Chosen<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Unit;
     use crate::descriptors::Values;
     use crate::neighbors::compare::MOST_ROWS;
-    use crate::released::{Lines, Obfuscation};
+    use crate::neighbors::described;
 
     fn named(name: &str) -> Named {
         Named::parse(name).unwrap()
@@ -189,18 +182,15 @@ mod tests {
     fn lists_are_as_long_as_the_source_chooses_or_as_asked() {
         let sift = Values::U8((0..=255).collect());
         let learned = Values::F32((0..256).map(|at| -(at as f32)).collect());
-        let [sift, learned] = [sift, learned].map(|values| {
-            let lines = Lines::through(&[[0.0; 3], [1.0; 3]], &[[0.0, 1.0, 0.5]; 2]).unwrap();
-            let descriptors = Some(Descriptors::try_new(values, 128).unwrap());
-            Released::try_new(Obfuscation::Lines(lines), 1, [0.0; 3], Unit::Meter, descriptors)
-        });
+        let [sift, learned] =
+            [sift, learned].map(|values| described(Descriptors::try_new(values, 128).unwrap(), 1));
         for (source, map, k) in [
             (named("overlap"), &sift, 35),
             (named("similarity"), &sift, 30),
             (named("similarity"), &learned, 12),
             (named("overlap").with_k(7), &sift, 7),
         ] {
-            assert_eq!(source.of_dimension::<3>().unwrap().k(map.as_ref().unwrap()), k);
+            assert_eq!(source.of_dimension::<3>().unwrap().k(map), k);
         }
     }
 

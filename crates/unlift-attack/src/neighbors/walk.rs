@@ -4,7 +4,11 @@
 
 use rayon::prelude::*;
 
-use super::compare::{Best, Found, higher_first};
+use super::Neighborhoods;
+use super::compare::{Best, Found, KeptPairs, Likeness, MOST_ROWS, higher_first, search};
+use super::rows::Rows;
+use crate::Error;
+use crate::released::Released;
 
 /// Number of edges per row.
 const EDGES: usize = 6;
@@ -24,6 +28,27 @@ pub struct Walk {
 
 /// Largest number of rows that a walk keeps after each step, the most probable ones.
 const WIDEST: usize = 128;
+
+/// Lists the `k` best records of a released map by a likeness, or those that a walk over the best ones reaches.
+///
+/// # Errors
+/// When the rows of a large map cannot be told apart.
+pub fn ranked_by<L: Likeness, const D: usize>(
+    likeness: &L,
+    mut rows: Rows<'_>,
+    how: Option<Walk>,
+    (released, k): (&Released<D>, usize),
+    kept: &mut KeptPairs,
+) -> Result<Neighborhoods, Error> {
+    let enough = rows.enough_for(k);
+    let most = if how.is_some() { enough.max(CANDIDATES) } else { enough };
+    let found = search(likeness, &mut rows, most, how.is_some(), MOST_ROWS, kept)?;
+    let ranked = match how {
+        Some(how) => walk(&standardized(&found), &rows.records, enough, how),
+        None => found.into_iter().map(|row| row.best).collect(),
+    };
+    rows.lists(released, &ranked, k)
+}
 
 /// Converts the scores of pairs to standard deviations above the mean score of their rows, averaged over both rows.
 pub fn standardized(found: &[Found]) -> Vec<Vec<(f32, u32)>> {

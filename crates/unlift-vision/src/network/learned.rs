@@ -99,7 +99,7 @@ fn scores(network: &Network, part: &Part) -> Result<Vec<f32>, Error> {
     let n = set.len();
     let descriptors = Tensor::try_new(&[n, set.dim()], of_unit_length(set))?;
     let pairs = dense(set, part.usual.as_deref())?;
-    let (reaches, pairs) = (pairs.reaches(), pairs.into_scores());
+    let reaches = pairs.len() / (n * n);
     let likeness = if reaches == 1 { pairs.clone() } else { Vec::new() };
     let pairs = Tensor::try_new(&[reaches, n, n], pairs)?;
     let [scores] = network.run(vec![("descriptors", descriptors), ("pairs", pairs)], ["scores"])?;

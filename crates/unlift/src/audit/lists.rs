@@ -105,7 +105,7 @@ impl<'a, const D: usize> Lists<'a, D> {
                         lengths.find_map(|k| self.oracle(variant, k).ok())
                     }
                 };
-                let Some(lists) = lists else { return self.none(variant) };
+                let Some(lists) = lists else { return Ok(self.none(variant)) };
                 Ok(Made { lists, ratio, k: plan_k, ratio_at_k: None })
             }
             NeighborsBy::Given(points) => {
@@ -119,7 +119,7 @@ impl<'a, const D: usize> Lists<'a, D> {
                 let (ratio, ratio_at_k) = (ratio(plan_k.min(others))?, Some(ratio(k)?));
                 Ok(Made { lists, ratio, k, ratio_at_k })
             }
-            NeighborsBy::Source(_) if may_be_short && others == 0 => self.none(variant),
+            NeighborsBy::Source(_) if may_be_short && others == 0 => Ok(self.none(variant)),
             NeighborsBy::Source(source) => {
                 let k = source.k(self.released);
                 let is_short = may_be_short && others < k.max(plan_k);
@@ -141,21 +141,17 @@ impl<'a, const D: usize> Lists<'a, D> {
         }
     }
 
-    fn none(&self, variant: &Variant<'_, D>) -> Result<Made, Error> {
-        let (n_slots, n_records) = (self.released.n_slots(), self.released.n_records());
-        let slots = self.released.slots_per_record();
-        let lists =
-            Neighborhoods::try_new(vec![0; n_slots + 1], Vec::new(), None, n_records, slots)?;
+    fn none(&self, variant: &Variant<'_, D>) -> Made {
         let map = Some(self.released.fingerprint());
-        let lists = lists.with_about(About { map, order: RowOrder::Slots, ..About::default() });
+        let about = About { map, order: RowOrder::Slots, ..About::default() };
+        let lists = Neighborhoods::empty(self.released.n_slots()).with_about(about);
         let (k, ratio_at_k) = match variant.by {
             // The metric is a mean over all points of all images, so an empty list counts with
             // ratio 0.
             NeighborsBy::Source(source) => (source.k(self.released), Some(0.0)),
             NeighborsBy::Oracle | NeighborsBy::Given(_) => (self.plan.k, None),
         };
-        let (lists, ratio) = (lists, variant.inlier_ratio.unwrap_or(0.0));
-        Ok(Made { lists, ratio, k, ratio_at_k })
+        Made { lists, ratio: variant.inlier_ratio.unwrap_or(0.0), k, ratio_at_k }
     }
 
     fn oracle(&mut self, variant: &Variant<'_, D>, k: usize) -> Result<Neighborhoods, Error> {

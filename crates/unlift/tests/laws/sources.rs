@@ -1,7 +1,7 @@
 //! Properties of all sources that compare descriptors, and of each source's purpose.
 
 use unlift::neighbors::sources::SOURCES;
-use unlift::neighbors::{Needs, Source, overlap, similarity};
+use unlift::neighbors::{Needs, Overlap, Similarity, Source};
 
 use crate::maps::*;
 
@@ -77,13 +77,13 @@ fn a_patch_that_is_turned_or_shifted_is_found_again() {
         rows.push(Picture::random(item as u64).descriptor(degrees, shift));
     }
     let map = released(&rows, 1);
-    let lists = overlap(&map, 5).unwrap();
+    let lists = Overlap.lists(&map, 5, 0).unwrap();
     for (item, change) in changes.iter().enumerate() {
         assert_eq!(best(&lists, item), RecordId(300 + item as u32), "{change:?}");
         assert_eq!(best(&lists, 300 + item), RecordId(item as u32), "{change:?}");
     }
     // `similarity` fails for all but the smallest rotation or shift, so the test can fail.
-    let plain = similarity(&map, 5).unwrap();
+    let plain = Similarity.lists(&map, 5, 0).unwrap();
     let found = (0..changes.len()).filter(|&i| best(&plain, i) == RecordId(300 + i as u32)).count();
     assert!(found < changes.len(), "{found}");
 }
@@ -91,7 +91,7 @@ fn a_patch_that_is_turned_or_shifted_is_found_again() {
 #[test]
 fn similarity_is_the_cosine() {
     let rows = random_map(150);
-    let lists = similarity(&released(&rows, 1), 10).unwrap();
+    let lists = Similarity.lists(&released(&rows, 1), 10, 0).unwrap();
     let cosine = |a: &[u8], b: &[u8]| {
         let dot = |a: &[u8], b: &[u8]| -> f64 {
             a.iter().zip(b).map(|(&x, &y)| f64::from(x) * f64::from(y)).sum()

@@ -28,6 +28,13 @@ pub struct Version {
     pub root_weight: f32,
 }
 
+impl Version {
+    /// Number of values.
+    pub fn depth(&self) -> usize {
+        self.cells.len() * BINS
+    }
+}
+
 /// Two versions that are compared, one of each patch, with equally many cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pair {

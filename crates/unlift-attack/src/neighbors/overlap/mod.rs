@@ -7,11 +7,11 @@ mod hypotheses;
 
 use hypotheses::{BINS, CELLS, DIM, Hypotheses, Version};
 
-use super::compare::{KeptPairs, Likeness, MOST_ROWS, note, search};
+use super::Neighborhoods;
+use super::compare::{KeptPairs, Likeness, note};
 use super::rows::Rows;
 use super::source::{Needs, Source};
-use super::walk::Walk;
-use super::{Neighborhoods, walk};
+use super::walk::{Walk, ranked_by};
 use crate::descriptors::Values;
 use crate::released::Released;
 use crate::simd::BLOCK;
@@ -23,32 +23,11 @@ pub const REACHES: usize = 3;
 /// The walk over matches: patches of near points need not overlap, so neighbors are several steps apart.
 pub const WALK: Walk = Walk { steps: 5, decay: 0.7 };
 
-/// Lists the `k` records whose patches overlap each slot's patch most, or that a short walk over such records reaches. The score is
+/// Lists the records whose patches overlap each slot's patch most, or that a short walk over such records reaches. The score is
 /// the logarithm of the discounted probability to be reached.
 ///
 /// The search is exact up to 131,072 slots (`MOST_ROWS`). In a larger map, each block of descriptors is compared with the blocks
 /// that have the most similar means, which misses some partners.
-///
-/// # Errors
-/// When the map has no SIFT descriptors, or fewer than `k` other records.
-pub fn overlap<const D: usize>(released: &Released<D>, k: usize) -> Result<Neighborhoods, Error> {
-    keeping(released, k, &mut KeptPairs::default())
-}
-
-fn keeping<const D: usize>(
-    released: &Released<D>,
-    k: usize,
-    kept: &mut KeptPairs,
-) -> Result<Neighborhoods, Error> {
-    let mut rows = Rows::new(released, k)?;
-    let enough = rows.enough_for(k);
-    let patches = Patches::of(&rows.descriptors)?;
-    let found = search(&patches, &mut rows, enough.max(walk::CANDIDATES), MOST_ROWS, kept)?;
-    let ranked = walk::standardized(&found);
-    rows.lists(&walk::walk(&ranked, &rows.records, enough, WALK), k)
-}
-
-/// The function [`overlap`] as a source.
 #[derive(Clone, Copy, Debug)]
 pub struct Overlap;
 
@@ -66,8 +45,8 @@ impl<const D: usize> Source<D> for Overlap {
         if D == 2 { 10 } else { 35 }
     }
 
-    fn lists(&self, released: &Released<D>, k: usize, _: u64) -> Result<Neighborhoods, Error> {
-        overlap(released, k)
+    fn lists(&self, released: &Released<D>, k: usize, seed: u64) -> Result<Neighborhoods, Error> {
+        self.lists_keeping(released, k, seed, &mut KeptPairs::default())
     }
 
     fn lists_keeping(
@@ -77,7 +56,9 @@ impl<const D: usize> Source<D> for Overlap {
         _: u64,
         kept: &mut KeptPairs,
     ) -> Result<Neighborhoods, Error> {
-        keeping(released, k, kept)
+        let rows = Rows::new(released, k)?;
+        let patches = Patches::of(&rows.descriptors)?;
+        ranked_by(&patches, rows, Some(WALK), (released, k), kept)
     }
 
     fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
@@ -166,9 +147,9 @@ impl Patches {
         let turned = starts(&self.hypotheses.turned);
         let still = starts(&self.hypotheses.still);
         for pair in self.hypotheses.pairs.iter().filter(|pair| counts(pair.shift)) {
-            let depth = self.hypotheses.turned[pair.turned].cells.len() * BINS;
-            let left = turned[pair.turned]..turned[pair.turned] + BLOCK * depth;
-            let right = still[pair.still]..still[pair.still] + BLOCK * depth;
+            let depth = self.hypotheses.turned[pair.turned].depth();
+            let left = turned[pair.turned]..turned[pair.turned + 1];
+            let right = still[pair.still]..still[pair.still + 1];
             let product = |left: &[u8], right: &[i8], best: &mut [i16]| {
                 simd::raise_to_products(left, right, depth, best);
             };
@@ -185,47 +166,38 @@ impl Patches {
     }
 }
 
-/// Returns the start of each version within a block.
+/// Returns the start of each version within a block, and the length of the block.
 fn starts(versions: &[Version]) -> Vec<usize> {
-    let step = |at: &mut usize, version: &Version| {
-        let start = *at;
-        *at += version.cells.len() * BINS * BLOCK;
-        Some(start)
-    };
-    versions.iter().scan(0, step).collect()
+    let mut starts = vec![0];
+    for version in versions {
+        starts.push(starts[starts.len() - 1] + BLOCK * version.depth());
+    }
+    starts
 }
 
 impl Block {
     fn new(hypotheses: &Hypotheses, descriptors: &Descriptors, slots: &[u32]) -> Self {
-        let length = |versions: &[Version]| -> usize {
-            versions.iter().map(|version| version.cells.len() * BINS * BLOCK).sum()
-        };
-        let mut block = Self {
-            turned: vec![0; length(&hypotheses.turned)],
-            still: vec![0; length(&hypotheses.still)],
-        };
+        let (of_turned, of_still) = (starts(&hypotheses.turned), starts(&hypotheses.still));
+        let mut turned = vec![0; of_turned[hypotheses.turned.len()]];
+        let mut still = vec![0; of_still[hypotheses.still.len()]];
         let mut bytes = [0u8; DIM];
         for (row, &slot) in slots.iter().enumerate() {
             let squares = squares(descriptors, slot as usize);
-            let mut start = 0;
-            for version in &hypotheses.turned {
-                let depth = version.cells.len() * BINS;
+            for (version, start) in hypotheses.turned.iter().zip(&of_turned) {
+                let depth = version.depth();
                 quantize(&squares, version, &mut bytes);
                 let at = start + row * depth;
-                block.turned[at..at + depth].copy_from_slice(&bytes[..depth]);
-                start += BLOCK * depth;
+                turned[at..at + depth].copy_from_slice(&bytes[..depth]);
             }
-            let mut start = 0;
-            for version in &hypotheses.still {
-                let depth = version.cells.len() * BINS;
+            for (version, start) in hypotheses.still.iter().zip(&of_still) {
+                let depth = version.depth();
                 quantize(&squares, version, &mut bytes);
                 for (at, &byte) in bytes[..depth].iter().enumerate() {
-                    block.still[start + simd::packed(row, at, depth)] = byte as i8;
+                    still[start + simd::packed(row, at, depth)] = byte as i8;
                 }
-                start += BLOCK * depth;
             }
         }
-        block
+        Self { turned, still }
     }
 }
 
@@ -262,7 +234,7 @@ fn quantize(squares: &[[f32; BINS]; CELLS], version: &Version, bytes: &mut [u8; 
         // Orientations of a descriptor turn in the opposite sense of the grid.
         mixed.rotate_left(version.turn);
     }
-    let depth = version.cells.len() * BINS;
+    let depth = version.depth();
     let norm = mixed[..depth].iter().sum::<f32>().sqrt().max(NORM_FLOOR);
     let scale = LENGTH * version.root_weight / norm;
     for (byte, &value) in bytes[..depth].iter_mut().zip(&mixed) {
