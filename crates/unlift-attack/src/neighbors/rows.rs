@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use rayon::prelude::*;
 
 use super::Neighborhoods;
+use super::kept::Ranked;
 use super::kind::comparable;
 use crate::descriptors::Values;
 use crate::released::Released;
@@ -113,7 +114,7 @@ impl<'a> Rows<'a> {
     pub fn lists<const D: usize>(
         &self,
         released: &Released<D>,
-        ranked: &[Vec<(f32, u32)>],
+        ranked: &[Ranked],
         k: usize,
     ) -> Result<Neighborhoods, Error> {
         let mut row_of = vec![0; self.len()];

@@ -233,7 +233,10 @@ struct Set {
 /// the middle of [`TIMES`] sets.
 fn around(ranked: &[Ranked]) -> Vec<Set> {
     let n = ranked.len();
-    let edges = edges(ranked);
+    let mut edges = walk::edges(ranked, EDGES);
+    for (_, weight) in edges.iter_mut().flatten() {
+        *weight = libm::expf(weight.min(8.0));
+    }
     let mut order: Vec<u32> = (0..n as u32).collect();
     let mut sets = Vec::new();
     for _ in 0..TIMES {
@@ -261,23 +264,6 @@ fn around(ranked: &[Ranked]) -> Vec<Set> {
         order.sort_by_key(|&row| Reverse(place[row as usize]));
     }
     sets
-}
-
-/// Returns the edges with their weights, in both directions.
-fn edges(ranked: &[Ranked]) -> Vec<Vec<(u32, f32)>> {
-    let mut edges: Vec<Vec<(u32, f32)>> = vec![Vec::new(); ranked.len()];
-    for (row, list) in ranked.iter().enumerate() {
-        for &(z, other) in list.iter().take(EDGES) {
-            let weight = libm::expf(z.min(8.0));
-            edges[row].push((other, weight));
-            edges[other as usize].push((row as u32, weight));
-        }
-    }
-    for list in &mut edges {
-        list.sort_unstable_by_key(|&(other, _)| other);
-        list.dedup_by_key(|&mut (other, _)| other);
-    }
-    edges
 }
 
 /// A set, and the weights that connect other rows to it.

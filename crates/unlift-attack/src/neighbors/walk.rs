@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::Neighborhoods;
 use super::compare::{Best, Found, KeptPairs, Likeness, MOST_ROWS, higher_first, search};
+use super::kept::Ranked;
 use super::rows::Rows;
 use crate::Error;
 use crate::released::Released;
@@ -51,7 +52,7 @@ pub fn ranked_by<L: Likeness, const D: usize>(
 }
 
 /// Converts the scores of pairs to standard deviations above the mean score of their rows, averaged over both rows.
-pub fn standardized(found: &[Found]) -> Vec<Vec<(f32, u32)>> {
+pub fn standardized(found: &[Found]) -> Vec<Ranked> {
     let z = |row: usize, score: f32| {
         (f64::from(score) - found[row].mean) / found[row].deviation.max(1e-9)
     };
@@ -59,7 +60,7 @@ pub fn standardized(found: &[Found]) -> Vec<Vec<(f32, u32)>> {
         let both = |&(score, other): &(f32, u32)| {
             (((z(row, score) + z(other as usize, score)) / 2.0) as f32, other)
         };
-        let mut ranked: Vec<(f32, u32)> = found[row].best.iter().map(both).collect();
+        let mut ranked: Ranked = found[row].best.iter().map(both).collect();
         ranked.sort_unstable_by(higher_first);
         ranked
     };
@@ -68,12 +69,7 @@ pub fn standardized(found: &[Found]) -> Vec<Vec<(f32, u32)>> {
 
 /// Ranks at most `most` rows that a walk from each row reaches, followed by the other rows in `ranked` (standardized scores or log
 /// probabilities, best first). Scores are natural logarithms.
-pub fn walk(
-    ranked: &[Vec<(f32, u32)>],
-    record_of: &[u32],
-    most: usize,
-    how: Walk,
-) -> Vec<Vec<(f32, u32)>> {
+pub fn walk(ranked: &[Ranked], record_of: &[u32], most: usize, how: Walk) -> Vec<Ranked> {
     let steps = graph(ranked);
     let scratch = || Scratch { at: vec![0.0; ranked.len()], sum: vec![0.0; ranked.len()] };
     (0..ranked.len())
@@ -100,19 +96,28 @@ pub fn walk(
         .collect()
 }
 
-/// Returns the probabilities of one step, per row in ascending order of the other row.
-fn graph(ranked: &[Vec<(f32, u32)>]) -> Vec<Vec<(u32, f64)>> {
-    let mut steps: Vec<Vec<(u32, f64)>> = vec![Vec::new(); ranked.len()];
+/// Returns the first `n` partners of each row, and the rows that have it among theirs, with their scores, in ascending order of rows.
+pub fn edges(ranked: &[Ranked], n: usize) -> Vec<Vec<(u32, f32)>> {
+    let mut edges: Vec<Vec<(u32, f32)>> = vec![Vec::new(); ranked.len()];
     for (row, list) in ranked.iter().enumerate() {
-        for &(z, other) in list.iter().take(EDGES) {
-            steps[row].push((other, f64::from(z)));
-            steps[other as usize].push((row as u32, f64::from(z)));
+        for &(score, partner) in list.iter().take(n) {
+            edges[row].push((partner, score));
+            edges[partner as usize].push((row as u32, score));
         }
     }
-    steps.par_iter_mut().for_each(|row| {
+    edges.par_iter_mut().for_each(|row| {
         // An edge that both ends keep is one edge with the same score.
-        row.sort_unstable_by_key(|&(other, _)| other);
-        row.dedup_by_key(|&mut (other, _)| other);
+        row.sort_unstable_by_key(|&(partner, _)| partner);
+        row.dedup_by_key(|&mut (partner, _)| partner);
+    });
+    edges
+}
+
+/// Returns the probabilities of one step, per row in ascending order of the other row.
+fn graph(ranked: &[Ranked]) -> Vec<Vec<(u32, f64)>> {
+    let step = |edges: Vec<(u32, f32)>| {
+        let mut row: Vec<(u32, f64)> =
+            edges.into_iter().map(|(partner, z)| (partner, f64::from(z))).collect();
         let weight = |z: f64, usual: f64| libm::exp(SHARPNESS * (z - usual));
         let total = |usual: f64| row.iter().map(|&(_, z)| weight(z, usual)).sum::<f64>();
         // Rows with a deviation of 0 may have scores beyond the range of an exponential.
@@ -121,11 +126,12 @@ fn graph(ranked: &[Vec<(f32, u32)>]) -> Vec<Vec<(u32, f64)>> {
             sum if sum.is_normal() => (USUAL, sum),
             _ => (top, total(top)),
         };
-        for (_, z) in row.iter_mut() {
+        for (_, z) in &mut row {
             *z = weight(*z, usual) / sum;
         }
-    });
-    steps
+        row
+    };
+    edges(ranked, EDGES).into_par_iter().map(step).collect()
 }
 
 struct Scratch {
