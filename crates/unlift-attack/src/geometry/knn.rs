@@ -254,16 +254,15 @@ fn split<const D: usize>(
             a.0[longest].total_cmp(&b.0[longest]).then(a.1.cmp(&b.1))
         });
     }
-    let alone = items.len() < ALONE;
+    let is_small = items.len() < ALONE;
     let (left, right) = items.split_at_mut(at);
-    if alone {
-        split(left, depth - 1, starts, first);
-        split(right, depth - 1, starts, middle);
+    let mut left = || split(left, depth - 1, starts, first);
+    let mut right = || split(right, depth - 1, starts, middle);
+    if is_small {
+        left();
+        right();
     } else {
-        rayon::join(
-            || split(left, depth - 1, starts, first),
-            || split(right, depth - 1, starts, middle),
-        );
+        rayon::join(left, right);
     }
 }
 

@@ -421,7 +421,7 @@ impl Best {
 }
 
 /// Order of results: by score, high to low, then by id.
-pub fn higher_first(a: &(f32, u32), b: &(f32, u32)) -> std::cmp::Ordering {
+pub fn higher_first<T: Ord>(a: &(f32, T), b: &(f32, T)) -> std::cmp::Ordering {
     b.0.total_cmp(&a.0).then(a.1.cmp(&b.1))
 }
 

@@ -6,6 +6,7 @@
 use rayon::prelude::*;
 
 use super::Neighborhoods;
+use super::compare::higher_first;
 use super::source::{Needs, Source};
 use crate::density::{Peaks, tomography};
 use crate::geometry::knn::Knn;
@@ -108,7 +109,7 @@ pub(crate) fn geometric_by<const D: usize>(
             }
             // Own records and rays of the own center take up places.
             if row.len() >= k || scratch.len() < look || look >= MOST_LOOKED * k {
-                row.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+                row.sort_unstable_by(higher_first);
                 row.truncate(k);
                 return row;
             }
