@@ -1,9 +1,11 @@
 //! Records as the lines on which their points may lie.
 
+use std::any::Any;
+
 use nalgebra::{Matrix3, Vector3};
 
 use crate::geometry::vector::{along, distance, dot, median, sub, widen};
-use crate::recover::map::lines::{LineRow, NO_GROUP, rows_of};
+use crate::recover::map::{LineRow, NO_GROUP, rows_of, unit};
 use crate::released::{AxisCandidates, Obfuscation, Released};
 
 /// What a record hides. It decides how the likelihood of a place depends on the density of points.
@@ -32,50 +34,43 @@ pub(crate) struct Feasible {
 }
 
 impl Feasible {
-    /// Converts the records of `released`; `None` for planes, whose offsets are three histograms that do not show which offsets belong
-    /// together.
+    /// Converts the records of `released`; `None` in the plane, where all lines meet, and for planes, whose offsets are three histograms that
+    /// do not show which offsets belong together.
     pub(crate) fn new<const D: usize>(released: &Released<D>) -> Option<Self> {
-        // These attacks work in three dimensions only, but the function is generic.
-        let solid = |v: &[f32; D]| -> [f32; 3] { std::array::from_fn(|c| v[c % D]) };
-        if D != 3 {
-            return None;
-        }
-        let line = |row: &LineRow<D>| LineRow {
-            through: solid(&row.through),
-            direction: solid(&row.direction),
-            group: row.group,
-            to: f32::INFINITY,
+        let released: &Released<3> = (released as &dyn Any).downcast_ref()?;
+        let line = |row: LineRow<3>| LineRow { to: f32::INFINITY, ..row };
+        let mut feasible = Self {
+            hides: Hides::One,
+            lines: rows_of(released, None).into_iter().map(line).collect(),
+            prior: Vec::new(),
+            per_record: 1,
+            n_groups: 0,
         };
-        let lines = rows_of(released, None).iter().map(line).collect();
-        let (prior, per_record) = (Vec::new(), 1);
         match released.obfuscation() {
-            Obfuscation::Lines(_) => {
-                let hides = if released.slots_per_record() == 2 { Hides::Two } else { Hides::One };
-                Some(Self { hides, lines, prior, per_record, n_groups: 0 })
+            Obfuscation::Lines(_) if released.slots_per_record() == 2 => {
+                feasible.hides = Hides::Two;
             }
+            Obfuscation::Lines(_) => {}
             Obfuscation::Rays(rays) => {
-                let n_groups = rays.centers().len();
-                Some(Self { hides: Hides::OnRay, lines, prior, per_record, n_groups })
+                (feasible.hides, feasible.n_groups) = (Hides::OnRay, rays.centers().len());
             }
-            Obfuscation::AxisPlanes(_) => None,
+            Obfuscation::AxisPlanes(_) => return None,
             Obfuscation::AxisCandidates(candidates) => {
-                let unit = |axis: usize| std::array::from_fn(|c| f32::from(u8::from(c == axis)));
-                let line = |(row, axis): (&[f32; D], usize)| {
-                    let mut through = solid(row);
-                    through[axis] = 0.0;
-                    let (group, to) = (NO_GROUP, f32::INFINITY);
-                    LineRow { through, direction: unit(axis), group, to }
-                };
-                let rows = candidates.position();
-                let lines = rows.iter().flat_map(|row| (0..3).map(move |axis| (row, axis)));
-                let lines = lines.map(line).collect();
                 // The value on an exchanged axis is random, so it is more probable where values are dense.
                 let common = value_densities(candidates);
-                let prior = (0..rows.len()).flat_map(|row| [0, 1, 2].map(|axis| (axis, row)));
-                let prior = prior.map(|(axis, row): (usize, usize)| common[axis][row]).collect();
-                Some(Self { hides: Hides::OnAxis, lines, prior, per_record: 3, n_groups: 0 })
+                for (row, &position) in candidates.position().iter().enumerate() {
+                    for axis in 0..3 {
+                        let (mut through, direction) = (position, unit(axis));
+                        through[axis] = 0.0;
+                        let (group, to) = (NO_GROUP, f32::INFINITY);
+                        feasible.lines.push(LineRow { through, direction, group, to });
+                        feasible.prior.push(common[axis][row]);
+                    }
+                }
+                (feasible.hides, feasible.per_record) = (Hides::OnAxis, 3);
             }
         }
+        Some(feasible)
     }
 
     /// Number of records.
@@ -175,10 +170,10 @@ fn nearest(line: &LineRow<3>, x: &[f64; 3]) -> [f64; 3] {
 const REACH: usize = 50;
 
 /// Returns, per axis and record, the density of the published values of that axis around the record's value.
-fn value_densities<const D: usize>(candidates: &AxisCandidates<D>) -> [Vec<f32>; 3] {
+fn value_densities(candidates: &AxisCandidates<3>) -> [Vec<f32>; 3] {
     let n = candidates.position().len();
     std::array::from_fn(|axis| {
-        let value = |row: u32| candidates.position()[row as usize][axis % D];
+        let value = |row: u32| candidates.position()[row as usize][axis];
         let mut order: Vec<u32> = (0..n as u32).collect();
         order.sort_by(|&a, &b| value(a).total_cmp(&value(b)));
         let reach = REACH.min(n / 4);

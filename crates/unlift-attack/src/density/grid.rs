@@ -4,11 +4,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::recover::map::grid::Grid;
-use crate::recover::map::lines::LineRow;
-
-/// Fraction that smoothing moves to each of the two neighbors along an axis.
-pub(super) const SMOOTHING: f32 = 0.25;
+use crate::recover::map::{Grid, LineRow};
 
 impl Grid<3> {
     /// Returns the steps of `line` in the box. Step `k` is at parameter `(k + 1/2) cell`. A few at its ends may lie just outside.

@@ -20,10 +20,10 @@
 
 pub(crate) mod feasible;
 mod grid;
-mod peaks;
+pub(crate) mod peaks;
 mod spread;
 
-use crate::recover::map::grid::Grid;
+use crate::recover::map::Grid;
 use crate::released::Released;
 use feasible::{Feasible, Hides};
 use peaks::find;
@@ -56,10 +56,8 @@ impl Peaks {
     }
 }
 
-/// Half the side of the first box in extents of the map, and its voxels along each axis.
-const FIRST_BOX: (f64, usize) = (6.0, 64);
-/// First box for rays: their centers lie inside the map, at distances of the order of its size.
-const FIRST_BOX_OF_RAYS: (f64, usize) = (2.0, 64);
+/// Voxels of the first box along each axis.
+const FIRST_VOXELS: usize = 64;
 /// Fraction of the points that may lie beyond each wall of the final box.
 const BEYOND: f64 = 0.01;
 /// Number of grids after the first. Each halves the voxels of the one before.
@@ -81,11 +79,11 @@ pub(crate) fn tomography<const D: usize>(released: &Released<D>) -> Peaks {
         return Peaks::none(n_slots);
     }
     let feasible = feasible.counted_from(&middle);
-    let rays = feasible.hides == Hides::OnRay;
-    let (half, voxels) = if rays { FIRST_BOX_OF_RAYS } else { FIRST_BOX };
-    let side = (2.0 * half * extent / voxels as f64) as f32;
+    // Half the side of the first box in extents of the map. Centers of rays lie inside the map, at distances of the order of its size.
+    let half = if feasible.hides == Hides::OnRay { 2.0 } else { 6.0 };
+    let side = (2.0 * half * extent / FIRST_VOXELS as f64) as f32;
     let low = middle.map(|x| (x - half * extent) as f32);
-    let mut spread = Spread::new(&feasible, Grid::even(low, side, [voxels; 3], 1.0));
+    let mut spread = Spread::new(&feasible, Grid::even(low, side, [FIRST_VOXELS; 3], 1.0));
     spread.rounds();
     let (low, high) = spread.grid.bounds(BEYOND);
     let sides: [f32; 3] = std::array::from_fn(|c| high[c] - low[c]);

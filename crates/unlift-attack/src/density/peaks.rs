@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::feasible::Hides;
 use super::spread::Spread;
 use super::{Peak, Peaks};
-use crate::recover::map::lines::LineRow;
+use crate::recover::map::LineRow;
 
 /// Samples to either side that count as the same place, about as many as smoothing reaches.
 const REACH: usize = 2;
@@ -63,28 +63,30 @@ fn best(
 
 /// Returns the two places with the largest joint likelihood, which grows with their distance.
 fn best_pair(windows: &[Window]) -> Option<[Window; 2]> {
-    let maxima: Vec<&Window> = (0..windows.len())
-        .filter(|&at| {
-            let likelihood = |at: Option<usize>| {
-                at.and_then(|at| windows.get(at)).map_or(0.0, |window| window.likelihood)
-            };
-            let here = windows[at].likelihood;
-            here > likelihood(at.checked_sub(1)) && here >= likelihood(Some(at + 1))
-        })
-        .map(|at| &windows[at])
-        .collect();
-    let (mut found, mut most) = (None, 0.0);
+    let likelihoods: Vec<f32> = windows.iter().map(|window| window.likelihood).collect();
+    let maxima: Vec<&Window> = maxima(&likelihoods).map(|at| &windows[at]).collect();
+    let (mut best, mut highest) = (None, 0.0);
     for (at, second) in maxima.iter().enumerate() {
         for first in &maxima[..at] {
             let apart = second.t - first.t;
             let likelihood = first.likelihood * second.likelihood * apart * apart;
-            if likelihood > most {
-                (found, most) = (Some([**first, **second]), likelihood);
+            if likelihood > highest {
+                (best, highest) = (Some([**first, **second]), likelihood);
             }
         }
     }
     // If there is only one maximum, both points are there.
-    found.or_else(|| maxima.first().map(|&&only| [only; 2]))
+    best.or_else(|| maxima.first().map(|&&only| [only; 2]))
+}
+
+/// Returns the indices of local maxima; the first one of equal neighbors.
+pub(crate) fn maxima<T: Copy + Default + PartialOrd>(values: &[T]) -> impl Iterator<Item = usize> {
+    let value =
+        move |at: Option<usize>| at.and_then(|at| values.get(at)).copied().unwrap_or_default();
+    let is_maximum = move |&at: &usize| {
+        values[at] > value(at.checked_sub(1)) && values[at] >= value(Some(at + 1))
+    };
+    (0..values.len()).filter(is_maximum)
 }
 
 /// Likelihood around one sample.

@@ -6,9 +6,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use rayon::prelude::*;
 
 use super::feasible::{Feasible, Hides};
-use super::grid::SMOOTHING;
-use crate::recover::map::grid::Grid;
-use crate::recover::map::lines::LineRow;
+use crate::recover::map::{Grid, LineRow, rows_mut};
 
 /// Rounds on each grid. From 4 to 20 rounds, recovered fractions on procedural rooms change by less than half a point.
 const ROUNDS: usize = 4;
@@ -85,14 +83,7 @@ impl<'a> Spread<'a> {
     /// Expectation: computes the weights from the density.
     fn expect(&mut self) {
         let mut weights = std::mem::take(&mut self.weights);
-        let mut rows: Vec<&mut [f32]> = Vec::with_capacity(self.feasible.n_records());
-        let mut rest = weights.as_mut_slice();
-        for record in 0..self.feasible.n_records() {
-            let n = self.offsets[record + 1] - self.offsets[record];
-            let (row, tail) = rest.split_at_mut(n);
-            rows.push(row);
-            rest = tail;
-        }
+        let rows = rows_mut(&mut weights, &self.offsets);
         let this = &*self;
         rows.into_par_iter().enumerate().for_each_init(Vec::new, |view, (record, row)| {
             this.view(record, row, view);
@@ -173,9 +164,8 @@ const QUANTA: f32 = 1_048_576.0;
 fn self_kernel(line: &LineRow<3>) -> [f32; 3] {
     // Linear between the taps of the binomial kernel, as for a shift by a part of a voxel.
     let tap = |x: f32| {
-        let x = x.abs();
-        let (here, beside) = (1.0 - 2.0 * SMOOTHING, SMOOTHING);
-        if x <= 1.0 { here + x * (beside - here) } else { beside * (2.0 - x).max(0.0) }
+        let (x, here, next) = (x.abs(), 0.5, 0.25);
+        if x <= 1.0 { here + x * (next - here) } else { next * (2.0 - x).max(0.0) }
     };
     [0.0, 1.0, 2.0].map(|steps| line.direction.iter().map(|d| tap(steps * d)).product())
 }

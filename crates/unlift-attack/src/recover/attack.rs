@@ -6,14 +6,11 @@ use crate::density::tomography;
 use crate::neighbors::Neighborhoods;
 use crate::recover::baselines::density::published;
 use crate::recover::baselines::ransac;
-use crate::recover::map::families::{CandidateFamily, LineFamily, PlaneFamily};
-use crate::recover::map::family::Family;
-use crate::recover::map::graph::Graph;
-use crate::recover::options::{Delta, RecoverOptions};
+use crate::recover::map::{CandidateFamily, Family, Graph, LineFamily, PlaneFamily};
 use crate::recover::problem::Problem;
 use crate::recover::ranking;
-use crate::recover::result::{Estimate, Recovered, TrialHistogram, Unknown};
-use crate::recover::solver::Builtin;
+use crate::recover::result::{Estimate, Recovered};
+use crate::recover::solver::{Builtin, Delta, RecoverOptions};
 use crate::recover::{anchors, beliefs, confidence, consensus, delta, exact, joint, records_alone};
 use crate::released::{Obfuscation, Released};
 
@@ -91,9 +88,8 @@ impl<'a, const D: usize> Attack<'a, D> {
             (Builtin::Tomography, _) => {
                 records_alone::at_peaks(released, lists, &tomography(released))
             }
-            (_, Obfuscation::Lines(_)) => self.run_on(&LineFamily::new(released, lists, false)),
-            (_, Obfuscation::Rays(rays)) => {
-                self.run_on(&LineFamily::new(released, lists, rays.regions().is_some()))
+            (_, Obfuscation::Lines(_) | Obfuscation::Rays(_)) => {
+                self.run_on(&LineFamily::new(released, lists))
             }
             (_, Obfuscation::AxisPlanes(planes)) => self.run_on(&PlaneFamily::new(planes)),
             (_, Obfuscation::AxisCandidates(candidates)) => {
@@ -102,38 +98,40 @@ impl<'a, const D: usize> Attack<'a, D> {
         }
     }
 
-    /// Runs the attack on records of one family: consensus, the steps of [`joint`](Self::joint), exact constraints, confidence.
+    /// Runs the attack on records of one family: delta, consensus, [`joint`], exact constraints, confidence.
     fn run_on<F: Family<D>>(&self, family: &F) -> Result<Recovered<D>, Error> {
-        let Self { released, lists, options, solver, .. } = self;
-        let is_joint = *solver == Builtin::Joint;
+        let Self { released, lists, options: RecoverOptions { seed, .. }, solver, .. } = *self;
+        let is_joint = solver == Builtin::Joint;
         // Joint recovery reads lists in both directions from its start on.
-        let graph = is_joint.then(|| Graph::new(lists, family.slots_per_record()));
-        let single = graph.as_ref().filter(|_| family.slots_per_record() == 1);
+        let graph = is_joint.then(|| Graph::new(lists, released.slots_per_record()));
+        let single = graph.as_ref().filter(|_| released.slots_per_record() == 1);
         let both_ways = single.map(Graph::neighborhoods);
         let used = both_ways.as_ref().unwrap_or(lists);
-        let delta = match options.delta {
+        let delta = match self.options.delta {
             Delta::Fixed(delta) => delta,
-            Delta::Auto => delta::learn(released, family, (used, lists), is_joint, options.seed),
+            Delta::Auto => delta::learn(released, family, (used, lists), is_joint, seed),
         };
-        if *solver == Builtin::Ransac {
-            let (estimates, trials) = ransac::solve(family, lists, delta as f32, options.seed);
-            let recovered = Recovered::new(released, lists, &estimates, delta)?;
-            let trials = Some(TrialHistogram::new(&trials));
-            return Ok(recovered.with_trials(trials).without_confidence(Unknown::OtherSolver));
-        }
         let slots: Vec<usize> = (0..lists.n_slots()).collect();
+        let start = || consensus::solve(family, used, delta as f32, &slots);
         let settle = |estimates| exact::settle(released, estimates, delta);
-        let mut estimates = consensus::solve(family, used, delta as f32, &slots);
-        if let Some(graph) = graph.as_ref().filter(|_| !self.only_starts) {
-            let problem = Problem::new(family, (lists, graph), delta as f32, options.seed);
-            estimates = settle(joint(&problem, estimates, &self.known));
-            for _ in 0..F::RERUNS {
-                estimates = settle(joint(&problem, estimates, &[]));
+        let mut trials = None;
+        let estimates = match &graph {
+            _ if solver == Builtin::Ransac => {
+                let (estimates, counts) = ransac::solve(family, lists, delta as f32, &slots, seed);
+                trials = Some(counts);
+                estimates
             }
-        } else {
-            estimates = settle(estimates);
-        }
-        let recovered = Recovered::new(released, lists, &estimates, delta)?;
+            Some(graph) if !self.only_starts => {
+                let problem = Problem::new(family, (lists, graph), delta as f32, seed);
+                let mut estimates = settle(joint(&problem, start(), &self.known));
+                for _ in 0..F::RERUNS {
+                    estimates = settle(joint(&problem, estimates, &[]));
+                }
+                estimates
+            }
+            _ => settle(start()),
+        };
+        let recovered = Recovered::new(released, lists, &estimates, delta)?.with_trials(trials);
         match confidence::predict(self, graph.as_ref(), &estimates) {
             Ok(confidence) => recovered.with_confidence(confidence),
             Err(unknown) => Ok(recovered.without_confidence(unknown)),
@@ -172,7 +170,7 @@ fn joint<const D: usize, F: Family<D>>(
     }
     // The likeliest places under the whole lists; or under their entries alone, where what is not listed says too little. Beliefs
     // are for maps with one slot per record: points of paired lines and of images lose as often as they gain.
-    let with_beliefs = D == 3 && family.slots_per_record() == 1 && lists.scores().is_some();
+    let with_beliefs = D == 3 && graph.slots_per_record == 1 && lists.scores().is_some();
     restore(match ranking::recover(problem, estimates) {
         Err(estimates) if with_beliefs => beliefs::recover(problem, estimates),
         Ok(estimates) | Err(estimates) => estimates,

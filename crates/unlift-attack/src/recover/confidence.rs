@@ -12,9 +12,8 @@ use crate::geometry::knn::Knn;
 use crate::geometry::vector::median;
 use crate::neighbors::Neighborhoods;
 use crate::recover::attack::Attack;
-use crate::recover::map::graph::{Graph, Side, either, record_of, side};
-use crate::recover::map::places::{distance2, known};
-use crate::recover::result::{Confidence, Estimate, Status, Unknown};
+use crate::recover::map::{Graph, Side, distance2, known, side};
+use crate::recover::result::{Confidence, Estimate, Unknown};
 use crate::released::{Obfuscation, Released};
 
 /// Estimates within this many radii are near. A radius is the distance to this nearest estimate, within these bounds of the median.
@@ -55,9 +54,8 @@ pub(super) fn predict<const D: usize>(
     if let Some(unknown) = unknown(released, lists, estimates) {
         return Err(unknown);
     }
-    let slots_per_record = released.slots_per_record();
     let kind = match released.obfuscation() {
-        Obfuscation::Lines(_) => slots_per_record - 1,
+        Obfuscation::Lines(_) => released.slots_per_record() - 1,
         Obfuscation::Rays(_) => 2,
         Obfuscation::AxisPlanes(_) => 3,
         Obfuscation::AxisCandidates(_) => 4,
@@ -65,41 +63,30 @@ pub(super) fn predict<const D: usize>(
     let Some(radius) = radii(estimates) else {
         return Ok(vec![Confidence::LOST; estimates.len()]);
     };
-    // Calls `of` with the class and the slot of every end of an edge within some radii.
-    let near = |slot: usize, radii: f32, of: &mut dyn FnMut(u8, usize)| {
-        let (ends, class) = graph.of(slot);
-        let x = &estimates[slot].position;
+    // Slots at the end of an edge of a slot, within some radii of it.
+    let near = |slot: usize, radii: f32, edge: (usize, u8)| {
         let reach2 = (radii * radius[slot]) * (radii * radius[slot]);
-        for (&end, &class) in ends.iter().zip(class) {
-            let last = end as usize + usize::from(either(class, slots_per_record));
-            let is_near = |&end: &usize| distance2(&estimates[end].position, x) < reach2;
-            (end as usize..=last).filter(is_near).for_each(|end| of(class, end));
-        }
+        let x = &estimates[slot].position;
+        graph.slots_at(edge).filter(move |&end| distance2(&estimates[end].position, x) < reach2)
     };
     // Near records that a slot lists, near ones that list it, and the number of both if all were near.
     let count = |slot: usize, radii: f32| -> [f32; 3] {
-        let (mut last, mut counts) = (usize::MAX, [0.0; 3]);
-        near(slot, radii, &mut |class, end| {
-            // The two slots of a record are adjacent, and count once.
-            let record = record_of(end, slots_per_record);
-            if !(either(class, slots_per_record) && record == last) {
-                counts[0] += f32::from(u8::from(side(class) != Side::Reverse));
-                counts[1] += f32::from(u8::from(side(class) != Side::Forward));
+        let mut counts = [0.0; 3];
+        for edge in graph.of(slot).filter(|_| estimates[slot].is_known()) {
+            // The two slots of a record count once.
+            let is_near = near(slot, radii, edge).next().is_some();
+            for (at, other_side) in [Side::Reverse, Side::Forward].into_iter().enumerate() {
+                if side(edge.1) != other_side {
+                    counts[at] += f32::from(u8::from(is_near));
+                    counts[2] += 1.0;
+                }
             }
-            last = record;
-        });
-        let is_mutual = |class: &&u8| side(**class) == Side::Mutual;
-        let classes = graph.of(slot).1;
-        counts[2] = (classes.len() + classes.iter().filter(is_mutual).count()) as f32;
+        }
         counts
     };
     let n = estimates.len();
     let counts = |radii: f32| -> Vec<[f32; 3]> {
-        let count = |slot: usize| match estimates[slot].status {
-            Status::Ok => count(slot, radii),
-            _ => [0.0; 3],
-        };
-        (0..n).into_par_iter().map(count).collect()
+        (0..n).into_par_iter().map(|slot| count(slot, radii)).collect()
     };
     // Sums of whole numbers, which are exact in any order.
     let total = |counts: &[[f32; 3]], at: usize| -> f64 {
@@ -118,15 +105,15 @@ pub(super) fn predict<const D: usize>(
         _ => 0,
     };
     let of_slot = |slot: usize| {
-        if estimates[slot].status != Status::Ok {
+        if !estimates[slot].is_known() {
             return Confidence::LOST;
         }
         let (mut shares, mut foreign, mut ends) = (0.0, 0.0f32, 0.0f32);
-        near(slot, NEAR, &mut |_, end| {
+        for end in graph.of(slot).flat_map(|edge| near(slot, NEAR, edge)) {
             shares += share(counts[end]);
             foreign += f32::from(u8::from(center(end) != center(slot)));
             ends += 1.0;
-        });
+        }
         let of_near = libm::logf(shares / ends.max(1.0) + LEAST);
         let foreign = if kind == 2 { foreign / ends.max(1.0) } else { 1.0 };
         let [lists, listed, _] = counts[slot];
@@ -163,15 +150,6 @@ fn radii<const D: usize>(estimates: &[Estimate<D>]) -> Option<Vec<f32>> {
     Some(radius)
 }
 
-/// Longest mean list, as a fraction of all hidden points, in the maps on which the model was fitted.
-const MOST_LISTED: f64 = 0.01;
-
-/// A map is flat if its smallest extent is at most this fraction of its largest one.
-const FLAT: f64 = 0.01;
-
-/// Points coincide if at least this fraction of all rays or planes equals another one. Different points hardly ever have equal ones.
-const COINCIDENT: f64 = 0.5;
-
 /// Returns why the model does not apply to maps recovered from `lists`, if so.
 ///
 /// In these cases, one tenth to nine tenths of the estimates with a predicted probability of 90 % were right.
@@ -186,17 +164,17 @@ fn unknown<const D: usize>(
         Some(Unknown::RankedLists)
     } else if !lists.about().by_oracle {
         Some(Unknown::GivenLists)
-    } else if mean > MOST_LISTED * n_slots {
+    } else if mean > 0.01 * n_slots {
         Some(Unknown::SmallMap)
-    } else if twins(released.obfuscation()) >= COINCIDENT {
-        // Other records are drawn at random, so that coinciding points do not have equal lines or candidates.
+    } else if twins(released.obfuscation()) >= 0.5 {
         Some(Unknown::Coincident)
     } else {
-        (flatness(&known(estimates).1) <= FLAT).then_some(Unknown::Flat)
+        (flatness(&known(estimates).1) <= 0.01).then_some(Unknown::Flat)
     }
 }
 
-/// Returns the fraction of rays or planes that equal another one bit for bit.
+/// Returns the fraction of rays or planes that equal another one bit for bit: different points hardly ever have equal ones. Other records are
+/// drawn at random, so that coinciding points do not have equal lines or candidates.
 fn twins<const D: usize>(obfuscation: &Obfuscation<D>) -> f64 {
     let mut rows: Vec<(u8, [u32; D])> = match obfuscation {
         Obfuscation::Rays(rays) => {

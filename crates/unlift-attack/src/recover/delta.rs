@@ -8,10 +8,7 @@
 use crate::geometry::frame::Bounds;
 use crate::neighbors::Neighborhoods;
 use crate::recover::consensus;
-use crate::recover::map::chance::mixed;
-use crate::recover::map::family::Family;
-use crate::recover::map::places::CHUNK;
-use crate::recover::map::places::trimmed;
+use crate::recover::map::{CHUNK, Family, mixed, trimmed_box};
 use crate::released::{Obfuscation, Released};
 use crate::seed::{Draws, Stage};
 
@@ -28,8 +25,6 @@ const HALVINGS: u32 = 14;
 /// Halvings in the coarse ladder below the first delta that is not too wide: a center far from all points makes the extent of
 /// rays arbitrarily large.
 const HALVINGS_NOT_TOO_WIDE: u32 = 5;
-/// Largest number of halvings, so that the result is positive in 32 bits.
-const MOST_HALVINGS: u32 = 100;
 /// Steps per octave of the fine ladder. The maximum is flat, so finer steps do not help.
 const FINE: i32 = 3;
 /// Deltas form the plateau if their score reaches this fraction of the largest: for the wide choice, then for the narrow one.
@@ -44,10 +39,10 @@ const LOWEST: i32 = 15;
 const BEYOND_EDGE: f64 = 2.25;
 /// Largest narrow delta for lists with scores, whose wrong entries have similar descriptors.
 const BEYOND_EDGE_OF_SCORED: f64 = 2.0;
-
 /// A chosen delta of candidates is replaced by the least one if that is more than this many times as wide. Partners of exchanges
 /// agree exactly, so that evidence hardly falls as delta shrinks, and on small maps or lattices the choice is arbitrary.
 const COLLAPSED: f64 = 4.0;
+
 /// Chooses delta for `released` as `family`, in the unit of the map. Consensus reads `used`: the lists as `given`, or those of
 /// both directions. With `sharp`, it chooses a narrow delta, for joint recovery.
 pub(super) fn learn<const D: usize, F: Family<D>>(
@@ -70,6 +65,7 @@ pub(super) fn learn<const D: usize, F: Family<D>>(
     // The bounds of a map may be far wider than its points, so that the share limits delta.
     let least = if D == 2 { LEAST_DELTA * spacing } else { 0.0 };
     let beyond_edge = sharp.then_some(beyond_edge);
+    let used = (used, released.slots_per_record());
     let chosen = choose(family, used, beyond_edge, (least, share), seed).unwrap_or(1.0);
     let least = if D == 2 { 0.0 } else { family.least_delta(share) };
     if COLLAPSED * chosen < least { least } else { chosen }
@@ -88,10 +84,9 @@ fn spacing<const D: usize>(released: &Released<D>) -> f64 {
     let Some(bounds) = released.bounds().or_else(of_regions) else { return 0.0 };
     let mut sides: [f64; D] = std::array::from_fn(|c| bounds.high[c] - bounds.low[c]);
     if let Obfuscation::AxisCandidates(candidates) = released.obfuscation() {
+        let (low, high) = trimmed_box(candidates.position());
         for (c, side) in sides.iter_mut().enumerate() {
-            let mut column: Vec<f32> = candidates.position().iter().map(|row| row[c]).collect();
-            let (low, high) = trimmed(&mut column);
-            let filled = f64::from(high - low);
+            let filled = f64::from(high[c] - low[c]);
             if *side > TOO_LARGE * filled {
                 *side = filled;
             }
@@ -106,7 +101,7 @@ fn spacing<const D: usize>(released: &Released<D>) -> f64 {
 /// more stable; with `beyond_edge`, a narrow one, at most that many times its lower edge, because joint recovery sharpens it.
 fn choose<const D: usize, F: Family<D>>(
     family: &F,
-    lists: &Neighborhoods,
+    (lists, slots_per_record): (&Neighborhoods, usize),
     beyond_edge: Option<f64>,
     (least, share): (f64, f64),
     seed: u64,
@@ -128,7 +123,7 @@ fn choose<const D: usize, F: Family<D>>(
         return None;
     }
     let slots = sample(lists.n_slots(), F::DELTA_CHUNKS, seed);
-    let mixed = mixed(lists, &slots, family.slots_per_record());
+    let mixed = mixed(lists, &slots, slots_per_record);
     let mean_evidence = |lists: &Neighborhoods, delta: f64| {
         let solved = consensus::solve(family, lists, delta as f32, &slots);
         solved.iter().map(|e| f64::from(e.evidence)).sum::<f64>() / solved.len() as f64
@@ -138,7 +133,8 @@ fn choose<const D: usize, F: Family<D>>(
     let (mut coarse, mut most) = (extent, f64::NEG_INFINITY);
     let halved = |step: u32| extent * libm::exp2(-f64::from(step));
     let is_too_wide = |step: u32| chance(halved(step)) > too_wide;
-    let first = (1..MOST_HALVINGS).find(|&step| !is_too_wide(step));
+    // No more halvings, so that the result is positive in 32 bits.
+    let first = (1..100).find(|&step| !is_too_wide(step));
     let steps = first.map(|first| first..=HALVINGS.max(first + HALVINGS_NOT_TOO_WIDE));
     for delta in steps.into_iter().flatten().map(halved) {
         if delta < least || chance(delta) < too_narrow {

@@ -1,17 +1,7 @@
 //! Recovery: from released records and neighborhoods to positions. No code here imports `truth`.
 //!
-//! Modules, in an order in which each imports mostly modules above it:
-//!
-//! 1. `options`: options of recovery. `result`: recovered positions. `solver`: the
-//!    trait [`Solver`], which you can implement.
-//! 2. `map`: the data that all solvers read. `map/family.rs`: the trait of families of records, on which no step depends otherwise.
-//!    `problem`: what all steps of `joint` read.
-//! 3. `consensus`, `joint`, `ranking` and `beliefs`: the steps of our attack. `anchors`: start and layout of rays from anchors.
-//! 4. `delta`: the choice of the distance that decides support.
-//! 5. `exact`: coordinates that a rule of the scheme fixes. `confidence`: the probability that an estimate is right.
-//! 6. `attack`: the steps in their order. `records_alone`: attacks without neighborhoods. `baselines`: published attacks.
-//!
-//! [`recover`] runs the whole attack.
+//! [`recover`] runs a [`Solver`]. `attack` has the steps of ours in their order. They are generic over the family of records
+//! (`map/family.rs`), on which no step depends otherwise; only `anchors` is for one scheme (`dcl2d`).
 
 mod anchors;
 mod attack;
@@ -23,7 +13,6 @@ mod delta;
 mod exact;
 mod joint;
 pub(crate) mod map;
-mod options;
 mod problem;
 mod ranking;
 mod records_alone;
@@ -31,10 +20,9 @@ mod result;
 mod solver;
 
 pub use attack::recover_from;
-pub use options::{Delta, RecoverOptions};
 pub use records_alone::records_alone;
-pub use result::{Confidence, Estimate, Recovered, Status, TrialHistogram, Unknown};
-pub use solver::{Builtin, Solver};
+pub use result::{Confidence, Estimate, Recovered, Status, Unknown};
+pub use solver::{Builtin, Delta, RecoverOptions, Solver};
 
 use crate::Error;
 use crate::neighbors::Neighborhoods;

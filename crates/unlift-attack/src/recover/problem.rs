@@ -1,14 +1,11 @@
 //! What every step of joint recovery reads and none changes.
 
 use crate::neighbors::Neighborhoods;
-use crate::recover::map::family::Family;
-use crate::recover::map::graph::Graph;
+use crate::recover::map::{Family, Graph, evenly};
 use crate::seed::{Draws, Stage};
 
 /// Random edges per sampled slot: about as many as the slot has edges of its own.
 pub(super) const RANDOM: usize = 24;
-/// Largest number of sampled slots: with lists of 50 they have about 100,000 edges.
-const SAMPLED_SLOTS: usize = 1 << 11;
 
 /// A map as its family of records sees it, its lists, and the sample from which distributions are learned.
 pub(super) struct Problem<'a, const D: usize, F: Family<D>> {
@@ -27,7 +24,7 @@ pub(super) struct Problem<'a, const D: usize, F: Family<D>> {
 /// A sampled slot, and edges drawn at random from the whole graph: the end and the class of each.
 pub(super) struct Sampled {
     pub(super) slot: usize,
-    pub(super) random: [(u32, u8); RANDOM],
+    pub(super) random: [(usize, u8); RANDOM],
 }
 
 impl<'a, const D: usize, F: Family<D>> Problem<'a, D, F> {
@@ -43,7 +40,8 @@ impl<'a, const D: usize, F: Family<D>> Problem<'a, D, F> {
             let random = std::array::from_fn(|_| graph.edge(draws.below(graph.len() as u64)));
             Sampled { slot, random }
         };
-        let sample = (0..n).step_by(n.div_ceil(SAMPLED_SLOTS).max(1)).map(row).collect();
+        // With lists of 50 they have about 100,000 edges.
+        let sample = evenly(n, 1 << 11).map(row).collect();
         let (at_delta, listed) = (family.at_delta(delta), graph.times_listed());
         Self { family, lists, graph, delta, at_delta, seed, listed, sample }
     }

@@ -16,22 +16,17 @@
 //! Far estimates are as likely at all places, so only those within a few `R_i` count, and each likelihood is divided by that of a far
 //! estimate. Eight places are scored at a time.
 
-use rayon::prelude::*;
-
 use crate::geometry::knn::Knn;
 use crate::neighbors::Neighborhoods;
-use crate::recover::map::family::Family;
-use crate::recover::map::graph::record_of;
-use crate::recover::map::lines::{LANES, Lanes, ln};
-use crate::recover::map::places::{CHUNK, Candidate, along_curve, distance2, known};
+use crate::recover::map::{
+    Candidate, Columns, Family, LANES, Lanes, Step, along_curve, distance2, evenly, known, ln,
+    nearest2, record_of, solve_slots,
+};
 use crate::recover::problem::Problem;
-use crate::recover::result::{Estimate, Status};
+use crate::recover::result::Estimate;
 use crate::seed::{Draws, Stage};
-use crate::simd::{Kernel, dispatch};
 
-/// Number of iterations.
 const ITERATIONS: usize = 5;
-/// Softness `s`.
 const SOFTNESS: f32 = 0.06;
 /// Number of iterations that search far; the others search near.
 const FAR_ITERATIONS: usize = 2;
@@ -70,8 +65,6 @@ const MOST_FARTHER: f32 = 1.9;
 const FARTHER: f32 = 2.0;
 /// Bounds of the inlier ratio. No list is taken to be perfect, because estimates are not.
 const INLIER_RATIO: (f32, f32) = (0.05, 0.98);
-/// Number of slots from which the inlier ratio is estimated.
-const SAMPLE: usize = 1 << 12;
 /// Maps with fewer slots than this many lists keep the estimates of joint recovery.
 const LEAST_LISTS: f32 = 4.0;
 /// Below this inlier ratio, the estimates of joint recovery are kept: Castle at 0.1 would lose up to 4 points within 1.0.
@@ -81,8 +74,8 @@ const LEAST_RATIO: f32 = 0.15;
 /// (0.9) gain up to 20 (docs/decisions/tried.md).
 const LEAST_RATIO_OF_SOURCES: f32 = 0.75;
 
-/// Returns the estimates of all slots after ranking from `start`, the estimates of joint recovery; `start` as an error if what lists do not
-/// name says too little.
+/// Returns the estimates of all slots after ranking from `estimates`, those of joint recovery; these as an error if what lists do not name
+/// says too little.
 pub(super) fn recover<const D: usize, F: Family<D>>(
     problem: &Problem<'_, D, F>,
     mut estimates: Vec<Estimate<D>>,
@@ -115,26 +108,17 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
                 tree: &tree,
                 slots: &slots,
                 radius: &radius,
-                odds: Odds::new(inlier_ratio, mean_length / n as f32),
+                odds: odds(inlier_ratio, mean_length / n as f32),
                 inlier_ratio,
                 iteration,
             };
-            let moves = |slot: &u32| slot % 2 == half && radius[*slot as usize] > 0.0;
-            let order = along_curve(&estimates);
-            let moving: Vec<u32> = order.into_iter().filter(moves).collect();
-            let moved: Vec<Vec<Candidate<D>>> = moving
-                .par_chunks(CHUNK)
-                .map_init(
-                    || Terms::new(n, lists.n_slots()),
-                    |terms, slots| dispatch(Chunk { context: &context, slots, terms }),
-                )
-                .collect();
-            for (slot, Candidate { x, piece: axis, .. }) in
-                moving.into_iter().zip(moved.into_iter().flatten())
-            {
+            let moves = |&slot: &usize| slot % 2 == half && radius[slot] > 0.0;
+            let moving: Vec<usize> = along_curve(&estimates).into_iter().filter(moves).collect();
+            let moved = solve_slots(&context, &moving);
+            for (slot, Candidate { x, piece, .. }) in moving.into_iter().zip(moved) {
                 if x.iter().all(|x| x.is_finite()) {
-                    let estimate = &mut estimates[slot as usize];
-                    (estimate.position, estimate.axis) = (x, axis as u8);
+                    let estimate = &mut estimates[slot];
+                    (estimate.position, estimate.axis) = (x, piece as u8);
                 }
             }
         }
@@ -162,15 +146,11 @@ fn shares_within<const D: usize, F: Family<D>>(
     radius: &[f32],
 ) -> [f32; 2] {
     let (mut within, mut all) = ([0; 2], 0);
-    let slots_per_record = problem.family.slots_per_record();
-    let every = estimates.len().div_ceil(SAMPLE);
-    for slot in (0..estimates.len()).step_by(every).filter(|&slot| radius[slot] > 0.0) {
+    for slot in evenly(estimates.len(), 1 << 12).filter(|&slot| radius[slot] > 0.0) {
         let bounds = [REACH, FARTHER].map(|times| (times * radius[slot]).powi(2));
         for record in problem.lists.of(slot) {
-            let others = &estimates[record.index() * slots_per_record..][..slots_per_record];
-            // A lost estimate is not near, because its distance is no number.
-            let away = |other: &Estimate<D>| distance2(&other.position, &estimates[slot].position);
-            let nearest = others.iter().map(away).fold(f32::INFINITY, f32::min);
+            let ends = problem.graph.slots_of(record.index());
+            let nearest = nearest2(estimates, ends, &estimates[slot].position);
             for (count, bound) in within.iter_mut().zip(bounds) {
                 *count += usize::from(nearest < bound);
             }
@@ -180,20 +160,11 @@ fn shares_within<const D: usize, F: Family<D>>(
     within.map(|count| count as f32 / all.max(1) as f32)
 }
 
-/// Likelihood ratios of entries that are surely within the radius, against entries far outside.
-#[derive(Clone, Copy)]
-struct Odds {
-    listed: f32,
-    not_listed: f32,
-}
-
-impl Odds {
-    /// `by_chance` is the chance that a wrong entry is a given record.
-    fn new(inlier_ratio: f32, by_chance: f32) -> Self {
-        let q = (1.0 - inlier_ratio) * by_chance;
-        let listed = (inlier_ratio / q).min(LARGEST);
-        Self { listed, not_listed: (1.0 - inlier_ratio) / (1.0 - q) }
-    }
+/// Returns the likelihood ratios of records that are surely within the radius, against records far outside: of one that is no entry, then of
+/// an entry. `by_chance` is the chance that a wrong entry is a given record.
+fn odds(inlier_ratio: f32, by_chance: f32) -> [f32; 2] {
+    let q = (1.0 - inlier_ratio) * by_chance;
+    [(1.0 - inlier_ratio) / (1.0 - q), (inlier_ratio / q).min(LARGEST)]
 }
 
 /// Largest value of `exp`, and of an odds ratio: products of four are finite.
@@ -210,6 +181,7 @@ fn exponential(y: f32) -> f32 {
 }
 
 /// The estimates near a place, which are the terms of the log-likelihood of a slot there, with buffers.
+#[derive(Default)]
 struct Terms<const D: usize> {
     /// Per record, whether the slot lists it, and per slot, whether it lists the slot's record.
     listed: Vec<bool>,
@@ -218,8 +190,9 @@ struct Terms<const D: usize> {
     radius: f32,
     length: f32,
     /// Differences of the estimates to the center.
-    away: [Vec<f32>; D],
+    away: Columns<D>,
     terms: Vec<Term>,
+    /// Per term, its squared distance to a place, and twice its component along a direction.
     aimed: Vec<[f32; 2]>,
 }
 
@@ -240,25 +213,18 @@ const NOTHING: (Term, f32) =
     (Term { inverse: 0.0, own: 1.0, theirs: 1.0, most: f32::INFINITY }, 1e18);
 
 impl<const D: usize> Terms<D> {
-    fn new(n_records: usize, n_slots: usize) -> Self {
-        Self {
-            listed: vec![false; n_records],
-            lists: vec![false; n_slots],
-            radius: 0.0,
-            length: 0.0,
-            away: std::array::from_fn(|_| Vec::new()),
-            terms: Vec::new(),
-            aimed: Vec::new(),
-        }
-    }
-
-    /// Prepares for places `from + t * direction`, where `from` is relative to the center.
+    /// Returns the log-likelihoods of the places `from + t * direction` at some `t`, where `from` is relative to the center. `length2` is the
+    /// squared length of `direction`.
     #[inline(always)]
-    fn aim(&mut self, from: &[f32; D], direction: &[f32; D]) {
+    fn scores(
+        &mut self,
+        from: &[f32; D],
+        (direction, length2): (&[f32; D], f32),
+        t: &Lanes,
+    ) -> Lanes {
         let n = self.terms.len();
         self.aimed.resize(n, [0.0; 2]);
-        let away: [&[f32]; D] = std::array::from_fn(|c| &self.away[c][..n]);
-        let aimed = &mut self.aimed[..n];
+        let (away, aimed) = (self.away.first(n), &mut self.aimed[..n]);
         for i in 0..n {
             let (mut s, mut a) = (0.0, 0.0);
             for c in 0..D {
@@ -268,11 +234,6 @@ impl<const D: usize> Terms<D> {
             }
             aimed[i] = [s, 2.0 * a];
         }
-    }
-
-    /// Returns the log-likelihoods at some `t`.
-    #[inline(always)]
-    fn scores(&self, t: &Lanes, length2: f32) -> Lanes {
         let t2: Lanes = t.map(|t| t * t * length2);
         let radius2 = self.radius * self.radius;
         let mut counts = [0u32; LANES];
@@ -317,60 +278,44 @@ struct Context<'a, const D: usize, F: Family<D>> {
     tree: &'a Knn<'a, D>,
     slots: &'a [u32],
     radius: &'a [f32],
-    odds: Odds,
+    /// See [`odds`].
+    odds: [f32; 2],
     inlier_ratio: f32,
     iteration: usize,
 }
 
-struct Chunk<'a, 'b, const D: usize, F: Family<D>> {
-    context: &'a Context<'b, D, F>,
-    slots: &'a [u32],
-    terms: &'a mut Terms<D>,
-}
+impl<const D: usize, F: Family<D>> Step for Context<'_, D, F> {
+    type Scratch = Terms<D>;
+    type Output = Candidate<D>;
 
-impl<const D: usize, F: Family<D>> Kernel for Chunk<'_, '_, D, F> {
-    type Output = Vec<Candidate<D>>;
-
+    /// Returns the likeliest of some places on the record of `slot`.
     #[inline(always)]
-    fn run(self) -> Vec<Candidate<D>> {
-        let Self { context, slots, terms } = self;
-        let tries_elsewhere = context.iteration == 0 && context.inlier_ratio > LEAST_ELSEWHERE;
-        let mut all = Vec::with_capacity(slots.len());
-        for &slot in slots {
-            let (mut best, is_lost) = context.likeliest(slot as usize, terms);
-            if tries_elsewhere && (is_lost || F::PIECES > 1) {
-                context.try_elsewhere(slot as usize, &mut best, terms);
-            }
-            all.push(best);
-        }
-        all
-    }
-}
-
-impl<const D: usize, F: Family<D>> Context<'_, D, F> {
-    /// Returns the likeliest of some places on the record of `slot`, and whether few listed estimates are near it.
-    #[inline(always)]
-    fn likeliest(&self, slot: usize, terms: &mut Terms<D>) -> (Candidate<D>, bool) {
+    fn solve(&self, slot: usize, terms: &mut Terms<D>) -> Candidate<D> {
         let old = self.estimates[slot];
         let item = (slot * ITERATIONS + self.iteration) as u64;
         let mut draws = Draws::new(self.problem.seed, Stage::Ranking, item);
         let n_near = self.collect(slot, slot, terms);
         let expected = self.inlier_ratio * self.problem.lists.of(slot).len() as f32;
         let is_lost = (n_near as f32) < LOST * expected;
-        let axis = usize::from(old.axis);
-        let mut best = Candidate { score: f32::NEG_INFINITY, x: old.position, piece: axis };
+        let piece = usize::from(old.axis);
+        let mut best = Candidate { score: f32::NEG_INFINITY, x: old.position, piece };
         let rounds: &[Lanes] = match F::NORMAL {
             true => &PLANE_STEPS,
             false if self.iteration < FAR_ITERATIONS => &LINE_STEPS,
             false => &NEAR_LINE_STEPS,
         };
         for steps in rounds {
-            let from = Candidate { piece: axis, ..best };
-            self.search(slot, (&old.position, from), steps, &mut draws, terms, &mut best);
+            self.search(slot, (&old.position, best), steps, &mut draws, terms, &mut best);
         }
-        (best, is_lost)
+        let tries_elsewhere = self.iteration == 0 && self.inlier_ratio > LEAST_ELSEWHERE;
+        if tries_elsewhere && (is_lost || F::PIECES > 1) {
+            self.try_elsewhere(slot, &mut best, terms);
+        }
+        best
     }
+}
 
+impl<const D: usize, F: Family<D>> Context<'_, D, F> {
     /// Searches in `steps` from a place; `terms` are around `center`.
     #[inline(always)]
     fn search(
@@ -394,7 +339,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
                 let length = distance2(&away, &[0.0; D]).sqrt().max(f32::MIN_POSITIVE);
                 away.map(|x| x / length)
             }
-            false => self.problem.family.direction(slot, axis),
+            false => piece.direction,
         };
         let size = radius * draws.between(0.75, 1.25) as f32;
         let length2 = distance2(&direction, &[0.0; D]);
@@ -405,8 +350,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
             (0..D).map(|c| (places[w][c] - from[c]) * direction[c]).sum::<f32>() / length2
         });
         let relative = std::array::from_fn(|c| from[c] - center[c]);
-        terms.aim(&relative, &direction);
-        let scores = terms.scores(&t, length2);
+        let scores = terms.scores(&relative, (&direction, length2), &t);
         for w in 0..LANES {
             if scores[w] > best.score {
                 let x = if steps[w] == 0.0 { from } else { places[w] };
@@ -418,22 +362,22 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
     /// Tries the places of `slot` that are near the estimates of listed records.
     #[inline(never)]
     fn try_elsewhere(&self, slot: usize, best: &mut Candidate<D>, terms: &mut Terms<D>) {
-        let Problem { family, lists, seed, .. } = self.problem;
+        let Problem { family, lists, graph, seed, .. } = self.problem;
         let own = lists.of(slot);
         let mut draws = Draws::new(*seed, Stage::Ranking, u64::MAX - slot as u64);
         for record in own.iter().step_by(own.len().div_ceil(ELSEWHERE).max(1)) {
-            let first = record.index() * family.slots_per_record();
-            for center in first..first + family.slots_per_record() {
+            for center in graph.slots_of(record.index()) {
                 let (x, radius) = (self.estimates[center].position, self.radius[center]);
-                let near = |axis: usize| family.piece(slot, axis).project(&x);
-                let is_near = |&axis: &usize| distance2(&near(axis), &x) < radius * radius;
-                if !(0..F::PIECES).any(|axis| is_near(&axis)) {
+                if !family.is_near(slot, &x, radius * radius) {
                     continue;
                 }
                 self.collect(slot, center, terms);
-                for axis in (0..F::PIECES).filter(is_near) {
-                    let from = Candidate { score: 0.0, x: near(axis), piece: axis };
-                    self.search(slot, (&x, from), &ELSEWHERE_STEPS, &mut draws, terms, best);
+                for piece in 0..F::PIECES {
+                    let near = family.piece(slot, piece).project(&x);
+                    if distance2(&near, &x) < radius * radius {
+                        let from = Candidate { score: 0.0, x: near, piece };
+                        self.search(slot, (&x, from), &ELSEWHERE_STEPS, &mut draws, terms, best);
+                    }
                 }
             }
         }
@@ -442,9 +386,8 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
     /// Collects the terms of `slot` for places around the estimate of `center`; returns how many listed records are near.
     #[inline(always)]
     fn collect(&self, slot: usize, center: usize, terms: &mut Terms<D>) -> usize {
-        let Self { problem: Problem { family, lists, graph, .. }, estimates, radius, odds, .. } =
-            *self;
-        let slots_per_record = family.slots_per_record();
+        let Self { problem: Problem { lists, graph, .. }, estimates, radius, odds, .. } = *self;
+        let slots_per_record = graph.slots_per_record;
         let record = record_of(slot, slots_per_record);
         let place = |slot: usize| &estimates[slot].position;
         let at = place(center);
@@ -452,13 +395,15 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
             lists.of(slot).iter().for_each(|record| terms.listed[record.index()] = to);
             graph.listers.of(record).iter().for_each(|&slot| terms.lists[slot as usize] = to);
         };
+        terms.listed.resize(estimates.len(), false);
+        terms.lists.resize(estimates.len(), false);
         mark(terms, true);
         terms.radius = radius[center];
         terms.length = lists.of(center).len() as f32;
         terms.terms.clear();
-        terms.away.iter_mut().for_each(Vec::clear);
-        let partner = (slots_per_record == 2 && estimates[slot ^ 1].status == Status::Ok)
-            .then(|| place(slot ^ 1));
+        terms.away.resize(0, 0.0);
+        let partner =
+            (slots_per_record == 2 && estimates[slot ^ 1].is_known()).then(|| place(slot ^ 1));
         let reach = f64::from(NEAR * terms.radius);
         let mut n_near = 0;
         self.tree.within(&at.map(f64::from), reach * reach, |row| {
@@ -476,21 +421,20 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
             };
             n_near += usize::from(is_listed && !is_farther);
             let lists_slot = terms.lists[other];
-            let of_entry = |is: bool| if is { odds.listed } else { odds.not_listed };
             let most = partner.filter(|_| lists_slot).map(|partner| distance2(partner, x));
             let has_list = radius[other] > 0.0;
             terms.terms.push(Term {
                 inverse: if has_list { STEEPNESS / (radius[other] * radius[other]) } else { 0.0 },
-                own: if is_farther { 1.0 } else { of_entry(is_listed) },
-                theirs: if has_list { of_entry(lists_slot) } else { 1.0 },
+                own: if is_farther { 1.0 } else { odds[usize::from(is_listed)] },
+                theirs: if has_list { odds[usize::from(lists_slot)] } else { 1.0 },
                 most: most.unwrap_or(f32::INFINITY),
             });
-            (0..D).for_each(|c| terms.away[c].push(x[c] - at[c]));
+            (0..D).for_each(|c| terms.away.0[c].push(x[c] - at[c]));
         });
         // Terms count in pairs.
         if terms.terms.len() % 2 == 1 {
             terms.terms.push(NOTHING.0);
-            terms.away.iter_mut().for_each(|away| away.push(NOTHING.1));
+            terms.away.resize(terms.terms.len(), NOTHING.1);
         }
         mark(terms, false);
         n_near

@@ -6,10 +6,9 @@ use crate::density::{Peak, Peaks, tomography};
 use crate::neighbors::{Geometric, Neighborhoods, geometric_by};
 use crate::recover::attack::Attack;
 use crate::recover::baselines::density::published;
-use crate::recover::map::lines::rows_of;
-use crate::recover::options::{Delta, RecoverOptions};
+use crate::recover::map::rows_of;
 use crate::recover::result::{Estimate, Recovered, Status, Unknown, stored_support};
-use crate::recover::solver::Builtin;
+use crate::recover::solver::{Builtin, Delta, RecoverOptions};
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, RowOrder};
 

@@ -36,9 +36,9 @@ impl Status {
         }
     }
 
-    /// Returns the status called `name`, if there is one.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|status| status.name() == name)
+    /// The status of a slot whose neighbors do not fix a point; `n` of them may vote.
+    pub(crate) fn not_fixed(n: usize) -> Self {
+        if n < 2 { Self::TooFewNeighbors } else { Self::Degenerate }
     }
 }
 
@@ -195,37 +195,6 @@ impl Unknown {
     }
 }
 
-// Trials of the sampling loop.
-
-/// Largest number of trials, as in the paper's timings.
-pub(crate) const MAX_TRIALS: u32 = 10_000;
-
-/// Histogram of the number of trials per slot.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct TrialHistogram {
-    counts: [u64; TrialHistogram::UP_TO.len()],
-}
-
-impl TrialHistogram {
-    /// Counts the `trials` of slots. A slot without trials is not a slot that was solved quickly, and does not count.
-    pub(crate) fn new(trials: &[u32]) -> Self {
-        let mut counts = [0; Self::UP_TO.len()];
-        for &n in trials.iter().filter(|&&n| n > 0) {
-            let bin = Self::UP_TO.partition_point(|&up_to| up_to < n);
-            counts[bin.min(counts.len() - 1)] += 1;
-        }
-        Self { counts }
-    }
-
-    /// Inclusive upper ends of the bins.
-    pub const UP_TO: [u32; 9] = [1, 3, 10, 30, 100, 300, 1_000, 3_000, MAX_TRIALS];
-
-    /// Returns (upper end, number of slots) per bin.
-    pub fn bins(&self) -> impl Iterator<Item = (u32, u64)> {
-        Self::UP_TO.into_iter().zip(self.counts)
-    }
-}
-
 // The recovered map.
 
 /// Recovered positions, one row per slot, in columns.
@@ -241,7 +210,7 @@ pub struct Recovered<const D: usize> {
     axis: Option<Vec<u8>>,
     descriptor_row: Option<Vec<u32>>,
     confidence: Result<Vec<Confidence>, Unknown>,
-    trials: Option<TrialHistogram>,
+    trials: Option<Vec<(u32, u64)>>,
     about: About,
 }
 
@@ -305,22 +274,17 @@ impl<const D: usize> Recovered<D> {
             let expected = format!("{}, one per slot", released.n_slots());
             return Err(Error::new("positions", expected, positions.len().to_string()));
         }
-        let candidates = match released.obfuscation() {
-            Obfuscation::AxisCandidates(candidates) => Some(candidates.position()),
-            _ => None,
-        };
         let estimate = |(slot, &position): (usize, &[f32; D])| {
             if !position.iter().all(|x| x.is_finite()) {
                 return Estimate::lost(Status::NoSupport);
             }
-            let moved = |published: &[f32; D], c: usize| (position[c] - published[c]).abs();
-            let axis = candidates.map_or(0, |published| {
-                let farther = |&a: &usize, &b: &usize| {
-                    moved(&published[slot], a).total_cmp(&moved(&published[slot], b))
-                };
-                (0..D).max_by(farther).unwrap_or(0)
-            });
-            Estimate { position, status: Status::Ok, support: 0, axis: axis as u8, evidence: 0.0 }
+            let mut axis = 0;
+            if let Obfuscation::AxisCandidates(candidates) = released.obfuscation() {
+                let published = candidates.position()[slot];
+                let moved = |&c: &usize| (position[c] - published[c]).abs();
+                axis = (0..D).max_by(|a, b| moved(a).total_cmp(&moved(b))).unwrap_or(0);
+            }
+            Estimate::at(position, 0, axis, 0.0)
         };
         let estimates: Vec<Estimate<D>> = positions.iter().enumerate().map(estimate).collect();
         let recovered = Self::new(released, lists, &estimates, 0.0)?;
@@ -457,14 +421,14 @@ impl<const D: usize> Recovered<D> {
         Self { confidence: Err(unknown), ..self }
     }
 
-    /// Histogram of trials per slot (`ransac` only; not stored in files).
-    pub fn trials(&self) -> Option<&TrialHistogram> {
-        self.trials.as_ref()
+    /// Histogram of trials per slot (`ransac` only; not stored in files): the largest number of trials in each bin, and the number of slots.
+    pub fn trials(&self) -> Option<&[(u32, u64)]> {
+        self.trials.as_deref()
     }
 
     /// Adds the histogram of trials.
     #[must_use]
-    pub(crate) fn with_trials(self, trials: Option<TrialHistogram>) -> Self {
+    pub(crate) fn with_trials(self, trials: Option<Vec<(u32, u64)>>) -> Self {
         Self { trials, ..self }
     }
 }
@@ -481,9 +445,9 @@ fn descriptor_rows<const D: usize>(
     let descriptors = released.descriptors().filter(|_| released.slots_per_record() == 2)?;
     let cost = |row: usize, slot: usize| {
         let to_record = |record: &RecordId| {
-            let [one, other] =
+            let [first, second] =
                 [0, 1].map(|side| descriptors.squared_distance(row, 2 * record.index() + side));
-            f64::from(one.min(other).sqrt())
+            f64::from(first.min(second).sqrt())
         };
         lists.of(slot).iter().map(to_record).sum::<f64>()
     };

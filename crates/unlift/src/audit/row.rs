@@ -451,7 +451,7 @@ pub fn measure<const D: usize>(
         exact_percent: accuracy.exact_percent(),
         assignment_accuracy_percent: accuracy.assignment_percent,
         blind_median_error: blind.and_then(|blind| blind.percentile(50.0)),
-        ransac_trials: recovered.trials().map(|trials| trials.bins().collect()),
+        ransac_trials: recovered.trials().map(<[_]>::to_vec),
         repeats: 1,
         sure_unknown: recovered.confidence_unknown().map(|unknown| unknown.reason().to_owned()),
         ..Row::default()

@@ -30,7 +30,7 @@ fn threads_change_no_byte<const D: usize>(name: &str, scheme: &Entry, seed: u64)
             let recovered = solve(&hidden.released, &lists, options);
             assert_eq!(recovered.trials().is_some(), options.0 == Builtin::Ransac);
             bytes.extend(recovered_bytes(&recovered));
-            let bins = recovered.trials().into_iter().flat_map(|trials| trials.bins());
+            let bins = recovered.trials().into_iter().flatten();
             bytes.extend(bins.flat_map(|(_, slots)| slots.to_le_bytes()));
         }
         bytes

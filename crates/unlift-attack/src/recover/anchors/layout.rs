@@ -17,13 +17,11 @@ use rayon::prelude::*;
 
 use crate::RecordId;
 use crate::geometry::knn::Knn;
-use crate::geometry::vector::quantile;
+use crate::geometry::vector::{quantile, sub, widen};
 use crate::neighbors::Neighborhoods;
-use crate::recover::map::graph::Listers;
-use crate::recover::map::lines::LineRow;
-use crate::recover::result::{Estimate, Status};
+use crate::recover::map::{LineRow, Listers};
+use crate::recover::result::Estimate;
 
-/// Number of landmarks.
 const LANDMARKS: usize = 100;
 /// Number of layouts, from other landmarks each. One may be folded where another is not.
 const LAYOUTS: usize = 4;
@@ -70,7 +68,7 @@ pub(crate) fn recover<const D: usize>(
         let Some(layout) = landmark_scaling::<D>(edges, number) else { continue };
         let is_placed = |&slot: &u32| {
             let slot = slot as usize;
-            layout[slot].is_some() && rows[slot].to.is_finite() && start[slot].status == Status::Ok
+            layout[slot].is_some() && rows[slot].to.is_finite() && start[slot].is_known()
         };
         let slots: Vec<u32> = (0..rows.len() as u32).filter(is_placed).collect();
         let Some(ranges) = affine(rows, &layout, &slots) else { continue };
@@ -92,21 +90,16 @@ pub(crate) fn recover<const D: usize>(
 
 /// Returns the fraction of listed records whose estimates are as near as the nearest ones in the number of the list.
 fn agreement<const D: usize>(lists: &Neighborhoods, estimates: &[Estimate<D>]) -> f64 {
-    let points: Vec<[f64; D]> = estimates
-        .iter()
-        .map(|e| match e.status {
-            Status::Ok => e.position.map(f64::from),
-            _ => [f64::MAX.sqrt() / 4.0; D],
-        })
-        .collect();
+    let far = [f64::MAX.sqrt() / 4.0; D];
+    let point = |e: &Estimate<D>| if e.is_known() { widen(&e.position) } else { far };
+    let points: Vec<[f64; D]> = estimates.iter().map(point).collect();
     let Ok(tree) = Knn::new(&points) else { return 0.0 };
-    let near = |slot: usize| {
-        let mut found = Vec::new();
-        tree.nearest(slot, lists.of(slot).len(), &mut found);
-        let rows: Vec<u32> = found.into_iter().map(|(_, row)| row).collect();
-        lists.of(slot).iter().filter(|record| rows.contains(&(record.index() as u32))).count()
+    let n_near = |near: &mut Vec<(f64, u32)>, slot: usize| {
+        tree.nearest(slot, lists.of(slot).len(), near);
+        let is_near = |record: &&RecordId| near.iter().any(|&(_, row)| row == record.0);
+        lists.of(slot).iter().filter(is_near).count()
     };
-    let near: usize = (0..points.len()).into_par_iter().map(near).sum();
+    let near: usize = (0..points.len()).into_par_iter().map_init(Vec::new, n_near).sum();
     near as f64 / lists.records().len().max(1) as f64
 }
 
@@ -137,9 +130,9 @@ impl Edges {
         let shared = |slot: usize| -> Vec<(u32, f32)> {
             let own = &near[slot];
             let of_record = |record: &RecordId| {
-                let other = &near[record.index()];
-                let n_shared = other.iter().filter(|one| own.binary_search(one).is_ok()).count();
-                let mean = ((own.len() * other.len()) as f32).sqrt();
+                let theirs = &near[record.index()];
+                let n_shared = theirs.iter().filter(|slot| own.binary_search(slot).is_ok()).count();
+                let mean = ((own.len() * theirs.len()) as f32).sqrt();
                 (n_shared as f32 >= least).then(|| (record.index() as u32, n_shared as f32 / mean))
             };
             lists.of(slot).iter().filter_map(of_record).collect()
@@ -237,12 +230,15 @@ fn affine<const D: usize>(
 ) -> Option<Vec<f64>> {
     let n = D + 1;
     let mut ranges = vec![1.0; slots.len()];
+    let homogeneous = |slot: u32| -> Option<Vec<f64>> {
+        layout[slot as usize].map(|place| place.into_iter().chain([1.0]).collect())
+    };
     for fit in 0..FITS {
         let mut normal = DMatrix::zeros(D * n, D * n);
         let mut right = DVector::zeros(D * n);
         for (&slot, range) in slots.iter().zip(&ranges) {
             let row = &rows[slot as usize];
-            let place = homogeneous(layout[slot as usize]?);
+            let place = homogeneous(slot)?;
             let weight = if fit == 0 { 1.0 } else { 1.0 / (range * range) };
             // The components across the ray of `M place - anchor`.
             let across = |a: usize, b: usize| {
@@ -265,7 +261,7 @@ fn affine<const D: usize>(
         }
         for (&slot, range) in slots.iter().zip(&mut ranges) {
             let row = &rows[slot as usize];
-            let place = homogeneous(layout[slot as usize]?);
+            let place = homogeneous(slot)?;
             let along = |c: usize| {
                 let x: f64 = (0..n).map(|i| map[c * n + i] * place[i]).sum();
                 (x - f64::from(row.through[c])) * f64::from(row.direction[c])
@@ -275,10 +271,6 @@ fn affine<const D: usize>(
         }
     }
     Some(ranges)
-}
-
-fn homogeneous<const D: usize>(place: [f64; D]) -> Vec<f64> {
-    place.into_iter().chain([1.0]).collect()
 }
 
 /// Gradient ascent of the ranges of `slots`.
@@ -317,31 +309,26 @@ impl<const D: usize> Ascent<'_, D> {
 
     /// Returns the derivatives of the log-likelihood by the logarithms of ranges.
     fn gradient(&self, at: &[f64], softness: f64) -> Option<Vec<f64>> {
-        let n = self.rows.len();
-        let mut points = Vec::with_capacity(at.len());
-        let mut place = vec![None; n];
-        for (row, &slot) in self.slots.iter().enumerate() {
-            place[slot as usize] = Some(row as u32);
-            let own = &self.rows[slot as usize];
-            let range = libm::exp(at[row]);
-            points.push(std::array::from_fn(|c| {
-                f64::from(own.through[c]) + range * f64::from(own.direction[c])
-            }));
-        }
-        let (points, place): (&Vec<[f64; D]>, &Vec<Option<u32>>) = (&points, &place);
-        let tree = Knn::new(points).ok()?;
-        let radius2 = |found: &mut Vec<(f64, u32)>, row: usize| {
-            tree.nearest(row, self.lists.of(self.slots[row] as usize).len(), found);
-            found.last().map_or(0.0, |last| last.0)
+        let point = |(&slot, &at): (&u32, &f64)| {
+            let (own, range) = (&self.rows[slot as usize], libm::exp(at));
+            std::array::from_fn(|c| f64::from(own.through[c]) + range * f64::from(own.direction[c]))
         };
-        let radius2: Vec<f64> =
-            (0..points.len()).into_par_iter().map_init(Vec::new, radius2).collect();
+        let points: &Vec<[f64; D]> = &self.slots.iter().zip(at).map(point).collect();
+        let mut row_of = vec![None; self.rows.len()];
+        (0u32..).zip(self.slots).for_each(|(row, &slot)| row_of[slot as usize] = Some(row));
+        let tree = Knn::new(points).ok()?;
+        let radius2 = |near: &mut Vec<(f64, u32)>, row: usize| {
+            tree.nearest(row, self.lists.of(self.slots[row] as usize).len(), near);
+            near.last().map_or(0.0, |last| last.0)
+        };
+        let rows = (0..points.len()).into_par_iter();
+        let radius2: Vec<f64> = rows.clone().map_init(Vec::new, radius2).collect();
         let far = 1.0 + 2.0 * softness * REACH;
         let of_slot = |(marks, near): &mut (Vec<u8>, Vec<u32>), row: usize| {
             let slot = self.slots[row] as usize;
             near.clear();
             let mut mark = |slot: usize, bit: u8| {
-                if let Some(row) = place[slot] {
+                if let Some(row) = row_of[slot] {
                     if marks[row as usize] == 0 {
                         near.push(row);
                     }
@@ -356,23 +343,19 @@ impl<const D: usize> Ascent<'_, D> {
             });
             let own = &self.rows[slot];
             let mut sum = 0.0;
-            for &other in near.iter() {
-                let other = other as usize;
-                let mark = std::mem::take(&mut marks[other]);
-                if other == row {
+            for near in near.iter().map(|&near| near as usize) {
+                let mark = std::mem::take(&mut marks[near]);
+                if near == row {
                     continue;
                 }
-                let away: [f64; D] = std::array::from_fn(|c| points[other][c] - points[row][c]);
+                let away = sub(&points[near], &points[row]);
                 let d2: f64 = away.iter().map(|x| x * x).sum();
                 let slope = |radius2: f64, listed: bool| {
                     if radius2 <= 0.0 {
                         return 0.0;
                     }
-                    let inside = 1.0
-                        / (1.0
-                            + libm::exp(
-                                ((d2 / radius2 - 1.0) / (2.0 * softness)).clamp(-30.0, 30.0),
-                            ));
+                    let steps = (d2 / radius2 - 1.0) / (2.0 * softness);
+                    let inside = 1.0 / (1.0 + libm::exp(steps.clamp(-30.0, 30.0)));
                     let slope = match listed {
                         true if mark & EDGE == 0 => 0.0,
                         true => 1.0 - inside,
@@ -383,15 +366,15 @@ impl<const D: usize> Ascent<'_, D> {
                     };
                     slope / (2.0 * softness * radius2)
                 };
-                let slope = slope(radius2[row], mark & LISTED > 0)
-                    + slope(radius2[other], mark & LISTS > 0);
+                let slope =
+                    slope(radius2[row], mark & LISTED > 0) + slope(radius2[near], mark & LISTS > 0);
                 let along: f64 = (0..D).map(|c| away[c] * f64::from(own.direction[c])).sum();
                 sum += 2.0 * slope * along;
             }
             sum * libm::exp(at[row])
         };
         let buffers = || (vec![0u8; points.len()], Vec::new());
-        Some((0..points.len()).into_par_iter().map_init(buffers, of_slot).collect())
+        Some(rows.map_init(buffers, of_slot).collect())
     }
 }
 

@@ -9,12 +9,9 @@
 use rayon::prelude::*;
 
 use crate::neighbors::Neighborhoods;
-use crate::recover::map::chance::mixed;
-use crate::recover::map::lines::{LineRow, evidence};
+use crate::recover::map::{LineRow, evenly, evidence, mixed};
 use crate::recover::result::{Estimate, Status};
 
-/// Slots with mixed lists, to measure evidence by chance: a mean over so many has an error of a few percent.
-const SAMPLE: usize = 1 << 9;
 /// Only evidence beyond this many times the mean by chance counts, because half of the slots exceed the mean.
 const CHANCE: f32 = 2.0;
 /// Number of times that scores are averaged with those of neighbors. Each time halves the weight of a slot's own score.
@@ -36,14 +33,13 @@ struct Window {
 pub(in crate::recover) fn solve<const D: usize>(
     rows: &[LineRow<D>],
     lists: &Neighborhoods,
-    slots: &[usize],
 ) -> Vec<Estimate<D>> {
     let bearings = bearings(rows);
     let n = lists.n_slots();
     let windows: Vec<Option<Window>> =
         (0..n).into_par_iter().map(|slot| window(rows, &bearings, slot, lists)).collect();
-    // The best of several windows has some evidence even by chance.
-    let sample: Vec<usize> = (0..n).step_by(n.div_ceil(SAMPLE).max(1)).collect();
+    // The best of several windows has some evidence even by chance. A mean over so many has an error of a few percent.
+    let sample: Vec<usize> = evenly(n, 1 << 9).collect();
     let mixed = mixed(lists, &sample, 1);
     let window_by_chance = |&slot: &usize| window(rows, &bearings, slot, &mixed);
     let by_chance: Vec<f32> =
@@ -61,7 +57,7 @@ pub(in crate::recover) fn solve<const D: usize>(
         let range = libm::powf(fraction, 1.0 / D as f32) * rows[slot].to;
         Estimate::at(rows[slot].at(range), count, 0, excess)
     };
-    slots.iter().copied().map(estimate).collect()
+    (0..n).map(estimate).collect()
 }
 
 /// Returns, per slot, the fraction of its ray's region before its point: the rank of its window among rays of similar bearing.
@@ -99,11 +95,11 @@ fn fractions_before<const D: usize>(
         let half = (of_group.len() / SECTORS).max(LEAST_SECTOR);
         let from = at.saturating_sub(half).max(of_group.start);
         let (mut below, mut all) = (0.0f32, 0.0f32);
-        for &(_, _, other) in &bearings[from..(at + half + 1).min(of_group.end)] {
-            let other = score[other as usize];
-            all += f32::from(u8::from(!other.is_nan()));
-            below += f32::from(u8::from(other < own));
-            below += 0.5 * f32::from(u8::from(other == own));
+        for &(_, _, near) in &bearings[from..(at + half + 1).min(of_group.end)] {
+            let near = score[near as usize];
+            all += f32::from(u8::from(!near.is_nan()));
+            below += f32::from(u8::from(near < own));
+            below += 0.5 * f32::from(u8::from(near == own));
         }
         below / all
     };

@@ -10,14 +10,13 @@
 use rayon::prelude::*;
 
 use crate::density::feasible::{Feasible, Hides};
+use crate::density::peaks::maxima;
 use crate::density::{Peak, Peaks};
-use crate::recover::map::lines::{LineRow, NO_GROUP, NO_VOTE};
+use crate::recover::map::{LineRow, NO_GROUP, NO_VOTE};
 use crate::released::Released;
 
-/// Nearest lines that vote first: the largest number, and the largest fraction of all lines.
-const COARSE: (usize, f64) = (500, 0.05);
-/// Nearest lines that vote first for paired lines, of which a vote may mean either point.
-const COARSE_OF_PAIRS: (usize, f64) = (1000, 0.05);
+/// Largest fraction of all lines that votes first: the nearest ones.
+const COARSE: f64 = 0.05;
 /// Rounds of refinement, each with new voting lines.
 const REFINEMENTS: usize = 3;
 /// Number of estimates nearest to a line, and of lines nearest to its estimate; lines in both sets vote.
@@ -25,7 +24,7 @@ const REFINE: usize = 100;
 /// With fewer lines in both sets, all lines of the near estimates vote.
 const FEWEST: usize = 10;
 /// Largest number of lines that vote, spread evenly over the file: all pairs of a larger map would be too many.
-const MOST_VOTERS: usize = 100_000;
+const MAX_VOTERS: usize = 100_000;
 
 /// Returns the points that the published attacks find. They support neither planes, nor axis candidates, nor 2D maps.
 pub(crate) fn published<const D: usize>(released: &Released<D>) -> Peaks {
@@ -36,23 +35,20 @@ pub(crate) fn published<const D: usize>(released: &Released<D>) -> Peaks {
     if feasible.hides == Hides::OnAxis || n_slots == 0 {
         return Peaks::none(n_slots);
     }
-    let lines = &feasible.lines;
-    let every = lines.len().div_ceil(MOST_VOTERS);
-    let voters: Vec<u32> = (0..lines.len() as u32).step_by(every).collect();
-    let voting: Vec<LineRow<3>> = voters.iter().map(|&voter| lines[voter as usize]).collect();
-    let (most, share) = if feasible.hides == Hides::Two { COARSE_OF_PAIRS } else { COARSE };
-    let k = most.min((share * lines.len() as f64) as usize).max(2);
+    let lines: &[LineRow<3>] = &feasible.lines;
+    let every = lines.len().div_ceil(MAX_VOTERS);
+    // A vote for paired lines may mean either point.
+    let limit = if feasible.hides == Hides::Two { 1000 } else { 500 };
+    let k = limit.min((COARSE * lines.len() as f64) as usize).max(2);
     let place = |row: usize| {
-        let mut distances: Vec<f32> = voting.iter().map(|o| section(&lines[row], o).1).collect();
-        silence(&mut distances, row, lines, &voters);
-        let (near, reach) = nearest(&distances, k);
-        let near = near.iter().map(|&at| &lines[voters[at as usize] as usize]);
-        let mut votes = passes(&lines[row], near);
-        let found = match feasible.hides {
+        let misses = lines.iter().step_by(every).map(|line| section(&lines[row], line).1);
+        let (near, reach) = nearest(misses.collect(), k, (lines, row), every);
+        let mut votes = passes(&lines[row], near.iter().map(|&at| &lines[at]));
+        let modes = match feasible.hides {
             Hides::Two => two_modes(&mut votes).map(|pair| pair.map(Some)),
             _ => mode(&mut votes).map(|t| [Some(t), None]),
         };
-        let peaks = found.unwrap_or_default().map(|t| t.and_then(|t| on(&lines[row], t)));
+        let peaks = modes.unwrap_or_default().map(|t| t.and_then(|t| on(&lines[row], t)));
         (peaks, reach)
     };
     let rows: Vec<([Option<Peak>; 2], f32)> = (0..lines.len()).into_par_iter().map(place).collect();
@@ -62,69 +58,68 @@ pub(crate) fn published<const D: usize>(released: &Released<D>) -> Peaks {
     let mut of: Vec<Option<Peak>> = peaks.collect();
     if feasible.hides == Hides::One {
         for _ in 0..REFINEMENTS {
-            of = refine(lines, (&voters, &voting), &of);
+            of = refine(lines, &of, every);
         }
     }
     Peaks { of, resolution }
 }
 
-/// Refines once: lines vote that pass near the estimate of a line and whose own estimates are near that line.
-fn refine(
-    lines: &[LineRow<3>],
-    (voters, voting): (&[u32], &[LineRow<3>]),
-    estimates: &[Option<Peak>],
-) -> Vec<Option<Peak>> {
-    let point = |&voter: &u32| estimates[voter as usize].map_or([f32::NAN; 3], |p| p.position);
-    let points: Vec<[f32; 3]> = voters.iter().map(point).collect();
+/// Refines once: lines vote that pass near the estimate of a line and whose own estimates are near that line. Every `every`-th line votes.
+fn refine(lines: &[LineRow<3>], estimates: &[Option<Peak>], every: usize) -> Vec<Option<Peak>> {
+    let distance2 = |line: &LineRow<3>, x: [f32; 3]| line.distance2(&x, line.along(&x));
     let step = |row: usize| {
         let estimate = estimates[row]?;
-        let mut distances: Vec<f32> = points
-            .iter()
-            .map(|&point| lines[row].distance2(&point, lines[row].along(&point)))
-            .collect();
-        silence(&mut distances, row, lines, voters);
-        let (near, _) = nearest(&distances, REFINE);
-        let to_line =
-            |line: &LineRow<3>| line.distance2(&estimate.position, line.along(&estimate.position));
-        let mut distances: Vec<f32> = voting.iter().map(to_line).collect();
-        silence(&mut distances, row, lines, voters);
-        let (mut passing, _) = nearest(&distances, REFINE);
+        let points = estimates.iter().step_by(every);
+        let from_own =
+            points.map(|p| distance2(&lines[row], p.map_or([f32::NAN; 3], |p| p.position)));
+        let (near, _) = nearest(from_own.collect(), REFINE, (lines, row), every);
+        let to_estimate =
+            lines.iter().step_by(every).map(|line| distance2(line, estimate.position));
+        let (mut passing, _) = nearest(to_estimate.collect(), REFINE, (lines, row), every);
         passing.sort_unstable();
-        let passes_too = |at: &u32| passing.binary_search(at).is_ok();
-        let both: Vec<u32> = near.iter().copied().filter(passes_too).collect();
+        let passes_too = |at: &usize| passing.binary_search(at).is_ok();
+        let both: Vec<usize> = near.iter().copied().filter(passes_too).collect();
         let chosen = if both.len() > FEWEST { &both } else { &near };
-        let near = chosen.iter().map(|&at| &lines[voters[at as usize] as usize]);
-        let mut votes = passes(&lines[row], near);
+        let mut votes = passes(&lines[row], chosen.iter().map(|&at| &lines[at]));
         mode(&mut votes).and_then(|t| on(&lines[row], t)).or(Some(estimate))
     };
     (0..lines.len()).into_par_iter().map(step).collect()
 }
 
-/// Removes votes, by their `distances`: that of the line of `row` itself, or those of all rays of its center.
-fn silence(distances: &mut [f32], row: usize, lines: &[LineRow<3>], voters: &[u32]) {
-    let own = lines[row].group;
-    if lines[row].is_ray() {
-        for (distance, &voter) in distances.iter_mut().zip(voters) {
-            if lines[voter as usize].group == own {
-                *distance = f32::INFINITY;
-            }
-        }
-    } else if let Ok(at) = voters.binary_search(&(row as u32)) {
-        distances[at] = f32::INFINITY;
-    }
-}
-
 /// Returns the parameters at which `line` is passed most closely by `others`, except parallel ones.
 fn passes<'a>(line: &LineRow<3>, others: impl Iterator<Item = &'a LineRow<3>>) -> Vec<f64> {
-    let sections = others.map(|other| section(line, other));
+    let sections = others.map(|passing| section(line, passing));
     let voting = sections.filter(|&(t, miss2, _)| miss2 < NO_VOTE && t > line.floor());
     voting.map(|(t, _, _)| f64::from(t)).collect()
 }
 
 /// Returns where two whole lines pass each other, see [`LineRow::section`].
-fn section(line: &LineRow<3>, other: &LineRow<3>) -> (f32, f32, f32) {
-    let whole = LineRow { group: NO_GROUP, ..*line };
-    whole.section((other.through, other.direction, other.group))
+fn section(line: &LineRow<3>, passing: &LineRow<3>) -> (f32, f32, f32) {
+    LineRow { group: NO_GROUP, ..*line }.section(passing)
+}
+
+/// Returns the `k` lines that vote with the smallest finite distances (ties by index), unordered, and the largest of these distances, not
+/// squared. `squared` has the distance of every `every`-th line. The line of `row` itself does not vote, nor do rays of its center.
+fn nearest(
+    squared: Vec<f32>,
+    k: usize,
+    (lines, row): (&[LineRow<3>], usize),
+    every: usize,
+) -> (Vec<usize>, f32) {
+    let own = &lines[row];
+    let votes = |at: usize| if own.is_ray() { lines[at].group != own.group } else { at != row };
+    // Distances are not negative, so their bits sort as they do.
+    let key = |(at, d): (usize, f32)| u64::from(d.to_bits()) << 32 | at as u64;
+    let voting = squared.into_iter().enumerate().map(|(number, d)| (number * every, d));
+    let mut keys: Vec<u64> =
+        voting.filter(|&(at, d)| d.is_finite() && votes(at)).map(key).collect();
+    if keys.len() > k {
+        keys.select_nth_unstable(k - 1);
+        keys.truncate(k);
+    }
+    let farthest = |&key: &u64| f32::from_bits((key >> 32) as u32).sqrt();
+    let reach = keys.iter().max().map_or(f32::INFINITY, farthest);
+    (keys.iter().map(|&key| key as u32 as usize).collect(), reach)
 }
 
 fn on(line: &LineRow<3>, t: f64) -> Option<Peak> {
@@ -192,13 +187,7 @@ fn mode(votes: &mut [f64]) -> Option<f64> {
 }
 
 fn first_extreme(values: &[f64], beats: impl Fn(f64, f64) -> bool) -> usize {
-    let mut found = 0;
-    for (at, &value) in values.iter().enumerate() {
-        if beats(value, values[found]) {
-            found = at;
-        }
-    }
-    found
+    (1..values.len()).fold(0, |best, at| if beats(values[at], values[best]) { at } else { best })
 }
 
 /// Standard deviation of the kernel, in standard deviations of the votes.
@@ -238,30 +227,10 @@ fn two_modes(votes: &mut [f64]) -> Option<[f64; 2]> {
             density[place] += count * kernel[place.abs_diff(at)];
         }
     }
-    let height = |at: Option<usize>| at.and_then(|at| density.get(at)).copied().unwrap_or(0.0);
-    let mut peaks: Vec<usize> = (0..PLACES)
-        .filter(|&at| {
-            density[at] > height(at.checked_sub(1)) && density[at] >= height(Some(at + 1))
-        })
-        .collect();
+    let mut peaks: Vec<usize> = maxima(&density).collect();
     peaks.sort_by(|&a, &b| density[b].total_cmp(&density[a]));
     let place = |at: usize| low + (at as f64 + 0.5) * step;
     let (&first, second) = (peaks.first()?, peaks.get(1).or(peaks.first())?);
     let pair = [place(first), place(*second)];
     Some([pair[0].min(pair[1]), pair[0].max(pair[1])])
-}
-
-/// Returns the indices of the `k` smallest finite distances (ties by index), unordered, and the largest of these, not squared.
-fn nearest(squared: &[f32], k: usize) -> (Vec<u32>, f32) {
-    // Distances are not negative, so their bits sort as they do.
-    let key = |(at, d): (usize, &f32)| u64::from(d.to_bits()) << 32 | at as u64;
-    let finite = squared.iter().enumerate().filter(|(_, d)| d.is_finite());
-    let mut keys: Vec<u64> = finite.map(key).collect();
-    if keys.len() > k {
-        keys.select_nth_unstable(k - 1);
-        keys.truncate(k);
-    }
-    let farthest = |&key: &u64| f32::from_bits((key >> 32) as u32).sqrt();
-    let reach = keys.iter().max().map_or(f32::INFINITY, farthest);
-    (keys.iter().map(|&key| key as u32).collect(), reach)
 }

@@ -11,18 +11,34 @@ use rayon::prelude::*;
 
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
-use crate::recover::consensus::{Scratch, gather_planes};
-use crate::recover::map::families::{CandidateFamily, LineFamily, PlaneFamily};
-use crate::recover::map::family::Family;
-use crate::recover::map::lines::{NO_VOTE, Sections};
-use crate::recover::result::{Estimate, MAX_TRIALS, Status};
+use crate::recover::consensus::Scratch;
+use crate::recover::map::{
+    CandidateFamily, Family, LineFamily, NO_VOTE, PlaneFamily, Step, solve_slots,
+};
+use crate::recover::result::{Estimate, Status};
 use crate::seed::{Draws, Stage};
-use crate::simd::{Kernel, dispatch};
 
 /// The loop stops when a sample without outliers was drawn with this probability.
 const CONFIDENCE: f64 = 0.99;
+/// Largest number of trials, as in the paper's timings.
+const MAX_TRIALS: u32 = 10_000;
+/// Largest number of trials in each bin of the histogram.
+const UP_TO: [u32; 9] = [1, 3, 10, 30, 100, 300, 1_000, 3_000, MAX_TRIALS];
 /// Records per sample and unknown coordinate.
 const SAMPLE: u32 = 2;
+
+/// A slot, its listed records, and what the loop needs to sample them.
+pub(crate) struct Task<'a> {
+    slot: usize,
+    listed: &'a [RecordId],
+    /// Exchanged axis of every record; empty for families without one.
+    axes: &'a [u8],
+    delta: f32,
+    draws: Draws,
+}
+
+/// A position with the largest support and this support, or why there is none; and the number of trials.
+type Solved<X> = (Result<(X, u32), Status>, u32);
 
 /// How the loop samples records of a family.
 pub(crate) trait Trials<const D: usize> {
@@ -30,50 +46,47 @@ pub(crate) trait Trials<const D: usize> {
     fn axes(&self, _lists: &Neighborhoods) -> Vec<u8> {
         Vec::new()
     }
-    /// Returns the position of `slot` with the largest support and its support, and the number of trials.
-    fn solve(
-        &self,
-        slot: usize,
-        listed: (&[RecordId], &[u8]),
-        delta: f32,
-        draws: &mut Draws,
-        scratch: &mut Scratch<D>,
-    ) -> (Result<([f32; D], u32), Status>, u32);
+    fn sample(&self, task: Task<'_>, scratch: &mut Scratch<D>) -> Solved<[f32; D]>;
 }
 
-/// Returns the estimates of all slots, and the number of trials of each; 0 if it was not tried.
+/// Returns the estimates of some `slots`, and the histogram of their numbers of trials, see [`Recovered::trials`].
+///
+/// [`Recovered::trials`]: crate::recover::Recovered::trials
 pub(crate) fn solve<const D: usize, F: Family<D>>(
     family: &F,
     lists: &Neighborhoods,
     delta: f32,
+    slots: &[usize],
     seed: u64,
-) -> (Vec<Estimate<D>>, Vec<u32>) {
-    let axes = &family.axes(lists);
-    let solve = |scratch: &mut Scratch<D>, slot| {
-        dispatch(Slot { family, lists, axes, delta, seed, slot, scratch })
-    };
-    (0..lists.n_slots()).into_par_iter().map_init(Scratch::default, solve).unzip()
+) -> (Vec<Estimate<D>>, Vec<(u32, u64)>) {
+    let sampling = Sampling { family, lists, axes: family.axes(lists), delta, seed };
+    let (estimates, trials): (_, Vec<u32>) = solve_slots(&sampling, slots).into_iter().unzip();
+    let mut histogram = UP_TO.map(|up_to| (up_to, 0)).to_vec();
+    // A slot without trials is not a slot that was solved quickly, and does not count.
+    for n in trials.into_iter().filter(|&n| n > 0) {
+        histogram[UP_TO.partition_point(|&up_to| up_to < n)].1 += 1;
+    }
+    (estimates, histogram)
 }
 
-struct Slot<'a, const D: usize, F> {
+struct Sampling<'a, const D: usize, F: Family<D>> {
     family: &'a F,
     lists: &'a Neighborhoods,
-    axes: &'a [u8],
+    axes: Vec<u8>,
     delta: f32,
     seed: u64,
-    slot: usize,
-    scratch: &'a mut Scratch<D>,
 }
 
-impl<const D: usize, F: Family<D>> Kernel for Slot<'_, D, F> {
+impl<const D: usize, F: Family<D>> Step for Sampling<'_, D, F> {
+    type Scratch = Scratch<D>;
     type Output = (Estimate<D>, u32);
 
     #[inline(always)]
-    fn run(self) -> Self::Output {
-        let Self { family, lists, axes, delta, seed, slot, scratch } = self;
-        let mut draws = Draws::new(seed, Stage::Ransac, slot as u64);
-        let (solved, trials) =
-            family.solve(slot, (lists.of(slot), axes), delta, &mut draws, scratch);
+    fn solve(&self, slot: usize, scratch: &mut Scratch<D>) -> (Estimate<D>, u32) {
+        let Self { family, lists, axes, delta, seed } = self;
+        let draws = Draws::new(*seed, Stage::Ransac, slot as u64);
+        let task = Task { slot, listed: lists.of(slot), axes, delta: *delta, draws };
+        let (solved, trials) = family.sample(task, scratch);
         let axis = axes.get(slot).copied().unwrap_or(0);
         let estimate = match solved {
             Ok((position, support)) => Estimate::at(position, support, axis.into(), 0.0),
@@ -83,45 +96,26 @@ impl<const D: usize, F: Family<D>> Kernel for Slot<'_, D, F> {
     }
 }
 
-impl<const D: usize> Trials<D> for LineFamily<D> {
-    #[inline(always)]
-    fn solve(
-        &self,
-        slot: usize,
-        (listed, _): (&[RecordId], &[u8]),
-        delta: f32,
-        draws: &mut Draws,
-        scratch: &mut Scratch<D>,
-    ) -> (Result<([f32; D], u32), Status>, u32) {
-        let own = self.own(slot);
-        scratch.lines.gather(&self.rows, listed);
-        scratch.lines.sections(own, &mut scratch.sections);
-        let may_vote = scratch.lines.n_that_may_vote(own);
-        let (found, trials) = on_line(scratch, may_vote, delta, draws);
-        (found.map(|(t, support)| (own.at(own.clamp(t)), support)), trials)
+/// Draws samples of `size` of `n` records until one without outliers was likely drawn. Returns that with the largest support and its support,
+/// if any has support, and the number of trials.
+#[inline(always)]
+fn best_sample<T>(
+    (n, size): (u32, u32),
+    mut draw: impl FnMut() -> T,
+    support: impl Fn(&T) -> u32,
+) -> (Option<(T, u32)>, u32) {
+    let (mut best, mut best_support) = (None, 0);
+    let (mut trials, mut needed) = (0, MAX_TRIALS);
+    while trials < needed {
+        trials += 1;
+        let sample = draw();
+        let support = support(&sample);
+        if support > best_support {
+            (best, best_support) = (Some((sample, support)), support);
+            needed = trials_needed(support, n, size);
+        }
     }
-}
-
-impl<const D: usize> Trials<D> for CandidateFamily<'_, D> {
-    fn axes(&self, lists: &Neighborhoods) -> Vec<u8> {
-        vote(self.rows, lists)
-    }
-
-    #[inline(always)]
-    fn solve(
-        &self,
-        slot: usize,
-        (listed, axes): (&[RecordId], &[u8]),
-        delta: f32,
-        draws: &mut Draws,
-        scratch: &mut Scratch<D>,
-    ) -> (Result<([f32; D], u32), Status>, u32) {
-        let (own, axis) = (&self.rows[slot], axes[slot]);
-        sections_of_voted(self.rows, axes, listed, slot, &mut scratch.sections);
-        let (found, trials) = on_line(scratch, listed.len(), delta, draws);
-        let at = |t| std::array::from_fn(|c| if c == axis.into() { t } else { own[c] });
-        (found.map(|(t, support)| (at(t), support)), trials)
-    }
+    (best, trials)
 }
 
 /// Returns the number of trials after which a sample of `size` inliers, of `inliers` among `n`, was drawn with probability
@@ -139,107 +133,122 @@ fn trials_needed(inliers: u32, n: u32, size: u32) -> u32 {
     (trials.ceil() as u32).clamp(1, MAX_TRIALS)
 }
 
-/// Returns the parameter along a line with the largest support, refined by least squares, its support, and the number of trials.
-/// `may_vote` is the number of listed records that may vote.
+/// Returns the parameter along the line of the gathered sections, refined by least squares. `may_vote` is the number of listed records that
+/// may vote.
 #[inline(always)]
 fn on_line<const D: usize>(
-    scratch: &mut Scratch<D>,
+    Task { delta, mut draws, .. }: Task<'_>,
     may_vote: usize,
-    delta: f32,
-    draws: &mut Draws,
-) -> (Result<(f32, u32), Status>, u32) {
-    let Scratch { sections, voting, .. } = scratch;
-    if sections.n_voting() < 2 {
-        let few = may_vote < 2;
-        return (Err(if few { Status::TooFewNeighbors } else { Status::Degenerate }), 0);
-    }
+    Scratch { sections, voting, .. }: &mut Scratch<D>,
+) -> Solved<f32> {
     voting.clear();
     voting.extend((0..sections.len()).filter(|&j| sections.miss2[j] < NO_VOTE));
     let (n, delta2) = (voting.len(), delta * delta);
-    let (mut best_t, mut best) = (0.0, 0);
-    let (mut trials, mut needed) = (0, MAX_TRIALS);
-    while trials < needed {
-        trials += 1;
-        let one = draws.below(n as u64) as usize;
-        let mut other = draws.below(n as u64 - 1) as usize;
-        other += usize::from(other >= one);
-        let [one, other] = [one, other].map(|at| voting[at]);
-        let (a, b) = (sections.bend[one], sections.bend[other]);
-        let t = (a * sections.at[one] + b * sections.at[other]) / (a + b);
+    if n < 2 {
+        return (Err(Status::not_fixed(may_vote)), 0);
+    }
+    let draw = || {
+        let first = draws.below(n as u64) as usize;
+        let mut second = draws.below(n as u64 - 1) as usize;
+        second += usize::from(second >= first);
+        let [first, second] = [first, second].map(|at| voting[at]);
+        let (a, b) = (sections.bend[first], sections.bend[second]);
+        (a * sections.at[first] + b * sections.at[second]) / (a + b)
+    };
+    let support = |t: &f32| {
         let columns = sections.at.iter().zip(&sections.miss2).zip(&sections.bend);
         let is_near = |((at, miss2), bend): ((&f32, &f32), &f32)| {
             u32::from(miss2 + bend * (t - at) * (t - at) <= delta2)
         };
-        let support = columns.map(is_near).sum();
-        if support > best {
-            (best_t, best) = (t, support);
-            needed = trials_needed(support, n as u32, SAMPLE);
-        }
-    }
-    if best == 0 {
-        return (Err(Status::NoSupport), trials);
-    }
+        columns.map(is_near).sum()
+    };
+    let (best, trials) = best_sample((n as u32, SAMPLE), draw, support);
+    let Some((t, support)) = best else { return (Err(Status::NoSupport), trials) };
     let (mut weight, mut sum) = (0.0f32, 0.0f32);
-    for &j in voting.iter() {
-        if sections.squared_distance(j, best_t) <= delta2 {
-            weight += sections.bend[j];
-            sum += sections.bend[j] * (sections.at[j] - best_t);
-        }
+    for &j in voting.iter().filter(|&&j| sections.squared_distance(j, t) <= delta2) {
+        weight += sections.bend[j];
+        sum += sections.bend[j] * (sections.at[j] - t);
     }
-    (Ok((best_t + sum / weight, best)), trials)
+    (Ok((t + sum / weight, support)), trials)
+}
+
+impl<const D: usize> Trials<D> for LineFamily<D> {
+    #[inline(always)]
+    fn sample(&self, task: Task<'_>, scratch: &mut Scratch<D>) -> Solved<[f32; D]> {
+        let own = self.own(task.slot);
+        scratch.lines.gather(&self.rows, task.listed);
+        scratch.lines.sections(own, &mut scratch.sections);
+        let may_vote = scratch.lines.n_that_may_vote(own);
+        let (solved, trials) = on_line(task, may_vote, scratch);
+        (solved.map(|(t, support)| (own.at(own.clamp(t)), support)), trials)
+    }
+}
+
+impl<const D: usize> Trials<D> for CandidateFamily<'_, D> {
+    fn axes(&self, lists: &Neighborhoods) -> Vec<u8> {
+        vote(self.rows, lists)
+    }
+
+    #[inline(always)]
+    fn sample(&self, task: Task<'_>, scratch: &mut Scratch<D>) -> Solved<[f32; D]> {
+        let (own, axis) = (self.rows[task.slot], usize::from(task.axes[task.slot]));
+        let (sections, may_vote) = (&mut scratch.sections, task.listed.len());
+        sections.resize(may_vote);
+        // Each listed record is its line along its voted axis: perpendicular to the own line, or parallel, which does not vote.
+        for (j, record) in task.listed.iter().enumerate() {
+            let (position, voted) = (self.rows[record.index()], task.axes[record.index()].into());
+            let mut miss2 = 0.0;
+            for c in 0..D {
+                let d = position[c] - own[c];
+                miss2 += if c == axis || c == voted { 0.0 } else { d * d };
+            }
+            sections.at[j] = position[axis];
+            sections.bend[j] = 1.0;
+            sections.miss2[j] = if voted == axis { NO_VOTE } else { miss2 };
+        }
+        let (solved, trials) = on_line(task, may_vote, scratch);
+        let at = |t| std::array::from_fn(|c| if c == axis { t } else { own[c] });
+        (solved.map(|(t, support)| (at(t), support)), trials)
+    }
 }
 
 impl<const D: usize> Trials<D> for PlaneFamily<'_, D> {
     #[inline(always)]
-    fn solve(
-        &self,
-        slot: usize,
-        (listed, _): (&[RecordId], &[u8]),
-        delta: f32,
-        draws: &mut Draws,
-        scratch: &mut Scratch<D>,
-    ) -> (Result<([f32; D], u32), Status>, u32) {
-        if listed.len() < 2 {
-            return (Err(Status::TooFewNeighbors), 0);
-        }
-        let by_axis = &mut scratch.by_axis;
-        gather_planes(self.planes, listed, by_axis);
-        let own = usize::from(self.planes.axis()[slot]);
-        let free = (0..D).filter(|&axis| axis != own);
-        if free.clone().any(|axis| by_axis[axis].is_empty()) {
-            return (Err(Status::Degenerate), 0);
+    fn sample(&self, task: Task<'_>, scratch: &mut Scratch<D>) -> Solved<[f32; D]> {
+        let Task { slot, listed, delta, mut draws, .. } = task;
+        self.gather(listed, &mut scratch.by_axis);
+        let by_axis = &scratch.by_axis;
+        let free = (0..D).filter(|&axis| axis != self.axis(slot));
+        if listed.len() < 2 || free.clone().any(|axis| by_axis[axis].is_empty()) {
+            return (Err(Status::not_fixed(listed.len())), 0);
         }
         let n: u32 = free.clone().map(|axis| by_axis[axis].len() as u32).sum();
-        let mut place = [0.0; D];
-        place[own] = self.planes.offset()[slot];
-        let (mut best_place, mut best) = (place, 0);
-        let (mut trials, mut needed) = (0, MAX_TRIALS);
-        while trials < needed {
-            trials += 1;
+        let own = [self.planes.offset()[slot]; D];
+        let draw = || {
+            let mut place = own;
             for axis in free.clone() {
                 let offsets = &by_axis[axis];
                 let mut draw = || offsets[draws.below(offsets.len() as u64) as usize].0;
                 place[axis] = (0..SAMPLE).map(|_| draw()).sum::<f32>() / SAMPLE as f32;
             }
+            place
+        };
+        let support = |place: &[f32; D]| {
             let is_near = |axis: usize, x: f32| u32::from((x - place[axis]).abs() <= delta);
             let of_axis =
-                |axis: usize| by_axis[axis].iter().map(|x| is_near(axis, x.0)).sum::<u32>();
-            let support = free.clone().map(of_axis).sum();
-            if support > best {
-                (best_place, best) = (place, support);
-                needed = trials_needed(support, n, SAMPLE * (D as u32 - 1));
-            }
-        }
-        if best == 0 {
-            return (Err(Status::NoSupport), 0);
-        }
-        for axis in free {
-            let away = by_axis[axis].iter().map(|x| x.0 - best_place[axis]);
+                |axis: usize| -> u32 { by_axis[axis].iter().map(|x| is_near(axis, x.0)).sum() };
+            free.clone().map(of_axis).sum()
+        };
+        let (best, trials) = best_sample((n, SAMPLE * (D as u32 - 1)), draw, support);
+        let Some((best, support)) = best else { return (Err(Status::NoSupport), 0) };
+        let mut place = own;
+        for axis in free.clone() {
+            let away = by_axis[axis].iter().map(|x| x.0 - best[axis]);
             let near = away.filter(|away| away.abs() <= delta);
             let (sum, count) = near.fold((0.0, 0), |(sum, n), away| (sum + away, n + 1));
-            place[axis] = best_place[axis] + if count > 0 { sum / count as f32 } else { 0.0 };
+            place[axis] = best[axis] + if count > 0 { sum / count as f32 } else { 0.0 };
         }
-        (Ok((place, best)), trials)
+        (Ok((place, support)), trials)
     }
 }
 
@@ -256,8 +265,15 @@ fn vote<const D: usize>(rows: &[[f32; D]], lists: &Neighborhoods) -> Vec<u8> {
     (0..lists.n_slots()).into_par_iter().for_each(|slot| {
         let mut members = vec![RecordId::from_index(slot)];
         members.extend_from_slice(lists.of(slot));
-        let distances: [Vec<f32>; D] =
-            std::array::from_fn(|axis| relative_distances(rows, &members, axis));
+        // Per axis, the sum of the distances of each member to the others, divided by the mean of these sums.
+        let distances: [Vec<f32>; D] = std::array::from_fn(|axis| {
+            let values: Vec<f32> =
+                members.iter().map(|member| rows[member.index()][axis]).collect();
+            let sum = |own: &f32| values.iter().map(|x| (own - x).abs()).sum::<f32>();
+            let sums: Vec<f32> = values.iter().map(sum).collect();
+            let mean = sums.iter().sum::<f32>() / sums.len() as f32;
+            if mean > 0.0 { sums.iter().map(|sum| sum / mean).collect() } else { sums }
+        });
         for (at, member) in members.iter().enumerate() {
             let guess = largest::<D>(|axis| distances[axis][at]);
             votes[member.index()][usize::from(guess)].fetch_add(1, Ordering::Relaxed);
@@ -273,44 +289,6 @@ fn vote<const D: usize>(rows: &[[f32; D]], lists: &Neighborhoods) -> Vec<u8> {
 /// Returns the axis with the largest value, the lowest of equal ones.
 fn largest<const D: usize>(value: impl Fn(usize) -> f32) -> u8 {
     (1..D).fold(0, |best, axis| if value(axis) > value(best) { axis } else { best }) as u8
-}
-
-/// Returns, per member, the sum of distances to the others along `axis`, divided by the mean of these sums.
-fn relative_distances<const D: usize>(
-    rows: &[[f32; D]],
-    members: &[RecordId],
-    axis: usize,
-) -> Vec<f32> {
-    let values: Vec<f32> = members.iter().map(|member| rows[member.index()][axis]).collect();
-    let sum = |one: &f32| values.iter().map(|other| (one - other).abs()).sum::<f32>();
-    let sums: Vec<f32> = values.iter().map(sum).collect();
-    let mean = sums.iter().sum::<f32>() / sums.len() as f32;
-    if mean > 0.0 { sums.iter().map(|sum| sum / mean).collect() } else { sums }
-}
-
-/// Computes the sections of listed records with the line of `slot`. Each record is its line along its voted axis: perpendicular, or
-/// parallel, which does not vote.
-#[inline(always)]
-fn sections_of_voted<const D: usize>(
-    rows: &[[f32; D]],
-    axes: &[u8],
-    listed: &[RecordId],
-    slot: usize,
-    out: &mut Sections,
-) {
-    let (own, axis) = (&rows[slot], axes[slot]);
-    out.resize(listed.len());
-    for (j, record) in listed.iter().enumerate() {
-        let (position, other) = (&rows[record.index()], axes[record.index()]);
-        let mut miss2 = 0.0;
-        for c in 0..D {
-            let d = position[c] - own[c];
-            miss2 += if c == axis.into() || c == other.into() { 0.0 } else { d * d };
-        }
-        out.at[j] = position[usize::from(axis)];
-        out.bend[j] = 1.0;
-        out.miss2[j] = if other == axis { NO_VOTE } else { miss2 };
-    }
 }
 
 #[cfg(test)]

@@ -24,10 +24,10 @@ mod temper;
 use rayon::prelude::*;
 
 use crate::geometry::knn::Knn;
-use crate::recover::map::family::{Family, Piece};
-use crate::recover::map::graph::{Graph, Side, either, side};
-use crate::recover::map::lines::ln;
-use crate::recover::map::places::{CHUNK, Candidate, along_curve, distance2};
+use crate::geometry::vector::widen;
+use crate::recover::map::{
+    Candidate, Family, Piece, Step, along_curve, distance2, known, ln, solve_slots, unit,
+};
 use crate::recover::problem::Problem;
 use crate::recover::result::{Estimate, Status};
 use crate::seed::{Draws, Stage};
@@ -65,68 +65,52 @@ const LEAST_RANGE: f32 = 1.5;
 /// The pattern search starts with this step, in typical widths, and ends below the second one, or after some changes of the step.
 const STEPS: (f32, f32) = (0.35, 0.04);
 const MAX_STEPS: usize = 15;
-/// Places with less weight are dropped.
-const LEAST_WEIGHT: f32 = 1e-3;
 
-/// Returns the estimates of all slots after beliefs from `estimates`, those of joint recovery. Without enough slots, they stay.
+/// Returns the estimates of all slots after beliefs from `start`, those of joint recovery. Without enough slots, they stay. Records have one
+/// slot each.
 pub(super) fn recover<const D: usize, F: Family<D>>(
     problem: &Problem<'_, D, F>,
-    mut estimates: Vec<Estimate<D>>,
+    start: Vec<Estimate<D>>,
 ) -> Vec<Estimate<D>> {
-    let Problem { family, graph, seed, .. } = *problem;
-
-    let n = estimates.len();
-    let n_known = estimates.iter().filter(|estimate| estimate.status == Status::Ok).count();
-    if n_known < LEAST_SLOTS {
+    let mut estimates = start.clone();
+    if start.iter().filter(|estimate| estimate.is_known()).count() < LEAST_SLOTS {
         return estimates;
     }
-    let start = estimates.clone();
-    let marginals = Marginals::new(family, n);
-    let mut beliefs: Vec<Vec<Place<D>>> = start_weights(&estimates)
-        .into_iter()
-        .zip(&estimates)
-        .map(|(weight, estimate)| match estimate.status {
-            Status::Ok => vec![Place { x: estimate.position, piece: estimate.axis, weight }],
-            _ => Vec::new(),
-        })
-        .collect();
-    let mut typical = None;
-    let mut tables = None;
+    let marginals = marginals(problem.family, start.len());
+    let belief = |(weight, estimate): (f32, &Estimate<D>)| match estimate.is_known() {
+        true => vec![Place { x: estimate.position, piece: estimate.axis, weight }],
+        false => Vec::new(),
+    };
+    let mut beliefs: Vec<Vec<Place<D>>> =
+        start_weights(&start).into_iter().zip(&start).map(belief).collect();
+    let (mut typical, mut tables) = (None, None);
     for iteration in 0..ITERATIONS {
-        let Some(places) = Places::new(&beliefs, &mut typical) else { return estimates };
-        let learned = Tables::learn(family, graph, &places, seed, tables.as_ref());
-        let temper = temper::learn(family, graph, &places, &learned, seed);
-        let proposals = proposals(&places, seed);
-        let points: Vec<[f64; D]> = places.places.iter().map(|p| p.x.map(f64::from)).collect();
+        let Some(places) = Places::new(&beliefs, &estimates, &mut typical) else {
+            return estimates;
+        };
+        let learned = Tables::learn(problem, &places, tables.as_ref());
+        let points: Vec<[f64; D]> = places.all.iter().map(|place| widen(&place.x)).collect();
         let Ok(tree) = Knn::new(&points) else { return estimates };
         let context = Context {
-            family,
-            graph,
+            problem,
+            temper: temper::learn(problem, &places, &learned),
+            proposals: proposals(&places, problem.seed),
             places: &places,
             tables: &learned,
-            temper,
-            proposals: &proposals,
             tree: &tree,
             marginals: &marginals,
-            seed,
         };
-        let moves = |slot: &u32| {
-            let mut draws = Draws::new(seed, Stage::Beliefs, u64::from(*slot));
+        let moves = |&slot: &usize| {
+            let mut draws = Draws::new(problem.seed, Stage::Beliefs, slot as u64);
             iteration == 0 || draws.below(2) as usize == iteration % 2
         };
-        let slots: Vec<u32> = places.order.iter().copied().filter(moves).collect();
-        let updated: Vec<Vec<Option<Vec<Place<D>>>>> = slots
-            .par_chunks(CHUNK)
-            .map_init(Scratch::default, |scratch, slots| {
-                slots.iter().map(|&slot| context.update(slot as usize, scratch)).collect()
-            })
-            .collect();
-        for (slot, belief) in slots.into_iter().zip(updated.into_iter().flatten()) {
+        let slots: Vec<usize> = along_curve(&estimates).into_iter().filter(moves).collect();
+        let updated = solve_slots(&context, &slots);
+        for (slot, belief) in slots.into_iter().zip(updated) {
             if let Some(belief) = belief {
-                let (slot, best) = (slot as usize, belief[0]);
-                let estimate = &mut estimates[slot];
-                (estimate.position, estimate.axis) = (best.x, best.piece);
-                estimate.status = Status::Ok;
+                let (estimate, best) = (&mut estimates[slot], belief[0]);
+                (estimate.position, estimate.axis, estimate.status) =
+                    (best.x, best.piece, Status::Ok);
                 beliefs[slot] = belief;
             }
         }
@@ -135,7 +119,7 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
     // Where both agree, the least squares of joint recovery are more precise than the kernel of the density.
     let agreed = typical.unwrap_or(0.0).powi(2);
     for (estimate, start) in estimates.iter_mut().zip(start) {
-        if start.status == Status::Ok && distance2(&start.position, &estimate.position) < agreed {
+        if start.is_known() && distance2(&start.position, &estimate.position) < agreed {
             *estimate = start;
         }
     }
@@ -163,7 +147,7 @@ struct Place<const D: usize> {
 
 /// The places of all slots, the best one of each slot first.
 struct Places<const D: usize> {
-    places: Vec<Place<D>>,
+    all: Vec<Place<D>>,
     /// Range of the places of each slot.
     offsets: Vec<u32>,
     /// Slot of each place.
@@ -172,29 +156,30 @@ struct Places<const D: usize> {
     width: Vec<f32>,
     /// The median width of the start, the unit of lengths that hold for the whole map.
     typical: f32,
-    /// All slots, near ones after each other.
-    order: Vec<u32>,
 }
 
 impl<const D: usize> Places<D> {
-    /// Measures the width at every place. The first call sets the `typical` width. Returns `None` if no slot has a place, or most
-    /// places coincide.
-    fn new(beliefs: &[Vec<Place<D>>], typical: &mut Option<f32>) -> Option<Self> {
-        let (mut places, mut slot, mut offsets) = (Vec::new(), Vec::new(), vec![0]);
-        let mut best = Vec::new();
+    /// Measures the width at every place; `estimates` are the best places. The first call sets the `typical` width. Returns `None` if no
+    /// slot has a place, or most places coincide.
+    fn new(
+        beliefs: &[Vec<Place<D>>],
+        estimates: &[Estimate<D>],
+        typical: &mut Option<f32>,
+    ) -> Option<Self> {
+        let (mut all, mut slot, mut offsets) = (Vec::new(), Vec::new(), vec![0]);
         for (at, belief) in beliefs.iter().enumerate() {
-            best.extend(belief.first().map(|place| place.x.map(f64::from)));
-            places.extend(belief);
-            slot.resize(places.len(), at as u32);
-            offsets.push(places.len() as u32);
+            all.extend(belief);
+            slot.resize(all.len(), at as u32);
+            offsets.push(all.len() as u32);
         }
+        let (_, best) = known(estimates);
         let tree = Knn::new(&best).ok()?;
         let k = (WIDTH_NEIGHBOR * best.len() / beliefs.len()).max(8) + 1;
-        let measure = |found: &mut Vec<(f64, u32)>, place: &Place<D>| {
-            tree.nearest_to(place.x.map(f64::from), k, found);
-            found.last().map_or(0.0, |last| last.0.sqrt() as f32)
+        let measure = |near: &mut Vec<(f64, u32)>, place: &Place<D>| {
+            tree.nearest_to(widen(&place.x), k, near);
+            near.last().map_or(0.0, |last| last.0.sqrt() as f32)
         };
-        let mut width: Vec<f32> = places.par_iter().map_init(Vec::new, measure).collect();
+        let mut width: Vec<f32> = all.par_iter().map_init(Vec::new, measure).collect();
         let firsts = offsets.windows(2).filter(|range| range[0] < range[1]);
         let mut of_best: Vec<f32> = firsts.map(|range| width[range[0] as usize]).collect();
         let middle = of_best.len() / 2;
@@ -204,13 +189,7 @@ impl<const D: usize> Places<D> {
             return None;
         }
         width.iter_mut().for_each(|w| *w = (*w / median).clamp(WIDTHS.0, WIDTHS.1) * typical);
-        let estimate = |belief: &Vec<Place<D>>| match belief.first() {
-            Some(place) => Estimate { position: place.x, status: Status::Ok, ..lost() },
-            None => lost(),
-        };
-        let estimates: Vec<Estimate<D>> = beliefs.iter().map(estimate).collect();
-        let order = along_curve(&estimates);
-        Some(Self { places, offsets, slot, width, typical, order })
+        Some(Self { all, offsets, slot, width, typical })
     }
 
     fn n_slots(&self) -> usize {
@@ -221,36 +200,23 @@ impl<const D: usize> Places<D> {
         self.offsets[slot] as usize..self.offsets[slot + 1] as usize
     }
 
-    /// Returns the best place of a slot, if it has any.
-    fn best(&self, slot: usize) -> Option<&Place<D>> {
-        self.places[self.of(slot)].first()
-    }
-
-    /// Returns the places at the end of an edge: those of one slot, or of both slots of a record.
-    fn at_end(&self, end: u32, class: u8, slots_per_record: usize) -> std::ops::Range<usize> {
-        let last = end as usize + usize::from(either(class, slots_per_record));
-        self.of(end as usize).start..self.of(last).end
-    }
-
     /// Returns the distance between two places, in widths of the second one.
     #[inline(always)]
     fn distance(&self, from: &[f32; D], to: usize) -> f32 {
-        distance2(from, &self.places[to].x).sqrt() / self.width[to]
+        distance2(from, &self.all[to].x).sqrt() / self.width[to]
     }
-}
-
-fn lost<const D: usize>() -> Estimate<D> {
-    Estimate::lost(Status::NoSupport)
 }
 
 /// Returns places that are likely right, in random order: what slots are near that no edge names.
 fn proposals<const D: usize>(places: &Places<D>, seed: u64) -> Vec<[f32; D]> {
-    let mut weights: Vec<f32> =
-        (0..places.n_slots()).filter_map(|slot| places.best(slot)).map(|p| p.weight).collect();
+    let best: Vec<(usize, &Place<D>)> = (0..places.n_slots())
+        .filter_map(|slot| Some((slot, places.all[places.of(slot)].first()?)))
+        .collect();
+    let mut weights: Vec<f32> = best.iter().map(|(_, place)| place.weight).collect();
     let low = 3 * weights.len() / 10;
     let least = *weights.select_nth_unstable_by(low, f32::total_cmp).1;
-    let best = (0..places.n_slots()).filter_map(|slot| Some((slot, places.best(slot)?)));
     let mut likely: Vec<(u64, [f32; D])> = best
+        .into_iter()
         .filter(|(_, place)| place.weight >= least)
         .map(|(slot, p)| (Draws::new(seed, Stage::BeliefProposals, slot as u64).bits(), p.x))
         .collect();
@@ -258,50 +224,38 @@ fn proposals<const D: usize>(places: &Places<D>, seed: u64) -> Vec<[f32; D]> {
     likely.into_iter().map(|(_, x)| x).collect()
 }
 
-/// The volume element of axis candidates: per slot and piece, the logarithm of the density of the values on the exchanged axis.
-struct Marginals(Vec<Vec<f32>>);
-
-impl Marginals {
-    /// Learns nothing for families whose feasible sets have one piece.
-    fn new<const D: usize, F: Family<D>>(family: &F, n: usize) -> Self {
-        if F::PIECES == 1 {
-            return Self(Vec::new());
-        }
-        let of_axis = |axis: usize| {
-            let values: Vec<f32> =
-                (0..n).map(|slot| family.piece(slot, axis).through[axis]).collect();
-            let mut sorted = values.clone();
-            sorted.sort_unstable_by(f32::total_cmp);
-            let around = (n / 200).max(20);
-            let density = |value: &f32| {
-                let at = sorted.partition_point(|x| x < value);
-                let (low, high) = (at.saturating_sub(around), (at + around).min(n - 1));
-                let length = (sorted[high] - sorted[low]).max(f32::MIN_POSITIVE);
-                ln((high - low) as f32 / length)
-            };
-            values.iter().map(density).collect()
+/// The volume element of axis candidates: per piece and slot, the logarithm of the density of the values on the exchanged axis. Empty for
+/// families whose feasible sets have one piece.
+fn marginals<const D: usize, F: Family<D>>(family: &F, n: usize) -> Vec<Vec<f32>> {
+    if F::PIECES == 1 {
+        return Vec::new();
+    }
+    let of_axis = |axis: usize| {
+        let values: Vec<f32> = (0..n).map(|slot| family.piece(slot, axis).through[axis]).collect();
+        let mut sorted = values.clone();
+        sorted.sort_unstable_by(f32::total_cmp);
+        let around = (n / 200).max(20);
+        let density = |value: &f32| {
+            let at = sorted.partition_point(|x| x < value);
+            let (low, high) = (at.saturating_sub(around), (at + around).min(n - 1));
+            let length = (sorted[high] - sorted[low]).max(f32::MIN_POSITIVE);
+            ln((high - low) as f32 / length)
         };
-        Self((0..F::PIECES).map(of_axis).collect())
-    }
-
-    #[inline(always)]
-    fn at(&self, slot: usize, piece: usize) -> f32 {
-        self.0.get(piece).map_or(0.0, |column| column[slot])
-    }
+        values.iter().map(density).collect()
+    };
+    (0..F::PIECES).map(of_axis).collect()
 }
 
 /// What an iteration reads.
 struct Context<'a, const D: usize, F: Family<D>> {
-    family: &'a F,
-    graph: &'a Graph,
+    problem: &'a Problem<'a, D, F>,
     places: &'a Places<D>,
     tables: &'a Tables,
     temper: f32,
-    proposals: &'a [[f32; D]],
+    proposals: Vec<[f32; D]>,
     /// All places, for their density.
     tree: &'a Knn<'a, D>,
-    marginals: &'a Marginals,
-    seed: u64,
+    marginals: &'a [Vec<f32>],
 }
 
 /// The place of a neighbor that is near a piece of the own feasible set.
@@ -322,16 +276,19 @@ struct Scratch<const D: usize> {
     candidates: Vec<Candidate<D>>,
 }
 
-impl<const D: usize, F: Family<D>> Context<'_, D, F> {
+impl<const D: usize, F: Family<D>> Step for Context<'_, D, F> {
+    type Scratch = Scratch<D>;
+    type Output = Option<Vec<Place<D>>>;
+
     /// Returns the new places of `slot`, the best one first; `None` if there is no candidate.
-    fn update(&self, slot: usize, scratch: &mut Scratch<D>) -> Option<Vec<Place<D>>> {
+    fn solve(&self, slot: usize, scratch: &mut Scratch<D>) -> Option<Vec<Place<D>>> {
         let Scratch { near, candidates } = scratch;
         near.resize_with(F::PIECES, Vec::new);
         candidates.clear();
         for (piece, near) in near.iter_mut().enumerate() {
             self.propose(slot, piece, near, candidates);
         }
-        for place in &self.places.places[self.places.of(slot)] {
+        for place in &self.places.all[self.places.of(slot)] {
             let piece = usize::from(place.piece);
             candidates.push(Candidate { x: place.x, piece, score: 0.0 });
         }
@@ -347,7 +304,9 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         candidates.push(refined);
         Some(self.kept(candidates, refined.score))
     }
+}
 
+impl<const D: usize, F: Family<D>> Context<'_, D, F> {
     /// Fills `near` with the places of neighbors that are near a piece, and adds candidates on it.
     fn propose(
         &self,
@@ -356,48 +315,32 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         near: &mut Vec<Near<D>>,
         candidates: &mut Vec<Candidate<D>>,
     ) {
-        let Self { family, places, tables, .. } = self;
-        let slots_per_record = family.slots_per_record();
+        let Self { problem: Problem { family, graph, seed, .. }, places, .. } = self;
         let own = family.piece(slot, piece);
         let first = candidates.len();
         let room = CANDIDATES / F::PIECES;
         let of_edges = (room as f32 * OF_EDGES) as usize;
-        let partner = (slots_per_record == 2).then(|| places.best(slot ^ 1)).flatten();
         near.clear();
-        let (ends, classes) = self.graph.of(slot);
-        for (&end, &class) in ends.iter().zip(classes) {
+        for (end, class) in graph.of(slot) {
             let from = near.len();
-            for at in places.at_end(end, class, slots_per_record) {
-                let (y, width) = (&places.places[at], places.width[at]);
-                let x = own.project(&y.x);
-                let d2 = distance2(&x, &y.x);
-                if d2 >= BIN_ENDS.1 * BIN_ENDS.1 * width * width || self.is_at_center(&own, &y.x) {
+            for at in places.of(end) {
+                let (Place { x: y, weight, .. }, width) = (places.all[at], places.width[at]);
+                let x = own.project(&y);
+                let d2 = distance2(&x, &y);
+                if d2 >= BIN_ENDS.1 * BIN_ENDS.1 * width * width || self.is_at_center(&own, &y) {
                     continue;
                 }
-                // A slot that lists a paired line may mean its other point, if that is near.
-                let other = partner.filter(|_| side(class) == Side::Reverse).map_or(0.0, |other| {
-                    let ratio = tables.at(class, places.distance(&other.x, at));
-                    (other.weight * y.weight * ratio).max(0.0)
-                });
-                near.push(Near {
-                    x: y.x,
-                    weight: y.weight / (1.0 + other),
-                    inverse_width: 1.0 / width,
-                    class,
-                    goes_on: true,
-                });
+                near.push(Near { x: y, weight, inverse_width: 1.0 / width, class, goes_on: true });
                 if candidates.len() - first < of_edges && d2 < NEAR2 * width * width {
                     add(candidates, first, x, piece, APART * width);
                 }
             }
-            if near.len() > from
-                && let Some(last) = near.last_mut()
-            {
+            if let Some(last) = near[from..].last_mut() {
                 last.goes_on = false;
             }
         }
         let item = (slot * F::PIECES + piece) as u64;
-        let mut draws = Draws::new(self.seed, Stage::BeliefProposals, !item);
+        let mut draws = Draws::new(*seed, Stage::BeliefProposals, !item);
         let start = draws.below(self.proposals.len() as u64) as usize;
         let (before, after) = self.proposals.split_at(start);
         let typical = places.typical;
@@ -437,7 +380,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
             }
         }
         let evidence = self.temper * (sum + ln(product));
-        let own = self.family.piece(slot, piece);
+        let own = self.problem.family.piece(slot, piece);
         let range = match own.from_center {
             true => distance2(&own.through, x) / (self.places.typical * self.places.typical),
             false => 1.0,
@@ -445,7 +388,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         evidence
             + DENSITY_WEIGHT * ln(LEAST_DENSITY + self.density(slot, x))
             + 0.5 * (D - 1) as f32 * ln(range.max(1e-6))
-            + self.marginals.at(slot, piece)
+            + self.marginals.get(piece).map_or(0.0, |column| column[slot])
     }
 
     /// Returns the weighted number of places of other slots around `x`.
@@ -453,10 +396,10 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
     fn density(&self, slot: usize, x: &[f32; D]) -> f32 {
         let radius = DENSITY_RADIUS * self.places.typical;
         let (radius2, mut sum) = (radius * radius, 0.0);
-        self.tree.within(&x.map(f64::from), f64::from(radius2), |at| {
+        self.tree.within(&widen(x), f64::from(radius2), |at| {
             let at = at as usize;
             if self.places.slot[at] as usize != slot {
-                let place = &self.places.places[at];
+                let place = &self.places.all[at];
                 let closeness = (1.0 - distance2(&place.x, x) / radius2).max(0.0);
                 sum += place.weight * closeness.powi(4);
             }
@@ -467,15 +410,11 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
     /// Moves a candidate along its piece while that improves its score, in steps that become shorter.
     fn refine(&self, slot: usize, start: Candidate<D>, near: &[Vec<Near<D>>]) -> Candidate<D> {
         let (mut best, piece) = (start, start.piece);
-        let own = self.family.piece(slot, piece);
-        let along = self.family.direction(slot, piece);
+        let own = self.problem.family.piece(slot, piece);
         // Directions of a plane are the axes other than its normal.
         let free: Vec<[f32; D]> = match F::NORMAL {
-            true => (0..D)
-                .filter(|&axis| along[axis] == 0.0)
-                .map(|axis| std::array::from_fn(|c| if c == axis { 1.0 } else { 0.0 }))
-                .collect(),
-            false => vec![along],
+            true => (0..D).filter(|&axis| own.direction[axis] == 0.0).map(unit).collect(),
+            false => vec![own.direction],
         };
         let mut step = STEPS.0 * self.places.typical;
         for _ in 0..MAX_STEPS {
@@ -506,7 +445,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         let mut kept: Vec<Place<D>> = Vec::with_capacity(PLACES);
         for candidate in candidates.iter() {
             let weight = share(candidate) / total;
-            if weight < LEAST_WEIGHT && !kept.is_empty() {
+            if weight < 1e-3 && !kept.is_empty() {
                 break;
             }
             let is_near = |place: &Place<D>| distance2(&place.x, &candidate.x) < merged * merged;

@@ -3,10 +3,8 @@
 use rayon::prelude::*;
 
 use super::Places;
-use crate::recover::map::family::Family;
-use crate::recover::map::graph::{CLASSES, Graph, either};
-use crate::recover::map::lines::ln;
-use crate::recover::map::places::CHUNK;
+use crate::recover::map::{CHUNK, CLASSES, Family, evenly, ln};
+use crate::recover::problem::Problem;
 use crate::seed::{Draws, Stage};
 
 /// Number of bins of the distance: up to the first bound, log-spaced up to the second one, and beyond.
@@ -15,9 +13,6 @@ pub(super) const BIN_ENDS: (f32, f32) = (0.1, 6.0);
 /// Entries per unit of distance in a table, and their number.
 const PER_WIDTH: f32 = 20.0;
 const ENTRIES: usize = 121;
-/// Number of slots from which tables are learned, and of random slots that each is compared with.
-const SAMPLE: usize = 1 << 12;
-const RANDOM: usize = 30;
 /// Passes of expectation maximization: at first, and when tables are known.
 const PASSES: (usize, usize) = (6, 3);
 /// Number of random pairs that every class is given: a class with few edges says little.
@@ -46,67 +41,45 @@ impl Tables {
     /// Learns tables by expectation maximization. An edge says something about the distance if the places of both ends are right, which
     /// has the probability of their weights; else its distance is unknown.
     pub(super) fn learn<const D: usize, F: Family<D>>(
-        family: &F,
-        graph: &Graph,
+        problem: &Problem<'_, D, F>,
         places: &Places<D>,
-        seed: u64,
         before: Option<&Self>,
     ) -> Self {
-        let slots_per_record = family.slots_per_record();
-        let every = places.n_slots().div_ceil(SAMPLE).max(1);
-        let sample: Vec<usize> = (0..places.n_slots()).step_by(every).collect();
-        // Pairs of places of a slot and of the end of an edge: their bin and the weight of both.
-        let pairs = |slot: usize, ends: std::ops::Range<usize>, share: f32| {
+        let sample: Vec<usize> = evenly(places.n_slots(), 1 << 12).collect();
+        // Pairs of places of two slots: their bin and the weight of both.
+        let pairs = |slot: usize, end: usize| {
             let pair = move |a: usize, b: usize| {
-                let weight = places.places[a].weight * places.places[b].weight * share;
-                (bin_of(places.distance(&places.places[a].x, b)), weight)
+                let weight = places.all[a].weight * places.all[b].weight;
+                (bin_of(places.distance(&places.all[a].x, b)) as u8, weight)
             };
-            places.of(slot).flat_map(move |a| ends.clone().map(move |b| pair(a, b)))
+            places.of(slot).flat_map(move |a| places.of(end).map(move |b| pair(a, b)))
         };
-        let by_chance: Vec<[f64; BINS]> = sample
-            .par_chunks(CHUNK)
-            .map(|slots| {
-                let mut bins = [0.0; BINS];
-                for &slot in slots {
-                    let mut draws = Draws::new(seed, Stage::BeliefTables, slot as u64);
-                    for _ in 0..RANDOM {
-                        let other = draws.below(places.n_slots() as u64) as usize;
-                        if other != slot {
-                            for (bin, weight) in pairs(slot, places.of(other), 1.0) {
-                                bins[bin] += f64::from(weight);
-                            }
-                        }
-                    }
+        let by_chance = |slots: &[usize]| {
+            let mut bins = [0.0; BINS];
+            for &slot in slots {
+                let mut draws = Draws::new(problem.seed, Stage::BeliefTables, slot as u64);
+                let random = (0..30).map(|_| draws.below(places.n_slots() as u64) as usize);
+                for (bin, weight) in
+                    random.filter(|&end| end != slot).flat_map(|end| pairs(slot, end))
+                {
+                    bins[usize::from(bin)] += f64::from(weight);
                 }
-                bins
-            })
-            .collect();
+            }
+            bins
+        };
+        let by_chance: Vec<[f64; BINS]> = sample.par_chunks(CHUNK).map(by_chance).collect();
         let mut chance = [1e-3; BINS];
-        for part in by_chance {
-            chance.iter_mut().zip(part).for_each(|(sum, x)| *sum += x);
-        }
+        by_chance.iter().for_each(|part| add(&mut chance, part));
         let total: f64 = chance.iter().sum();
         let chance = chance.map(|x| (x / total).max(1e-7));
-        let edges: Vec<Vec<Edge>> = sample
-            .par_chunks(CHUNK)
-            .map(|slots| {
-                let mut edges = Vec::new();
-                for &slot in slots {
-                    let (ends, classes) = graph.of(slot);
-                    for (&end, &class) in ends.iter().zip(classes) {
-                        let range = places.at_end(end, class, slots_per_record);
-                        let share = if either(class, slots_per_record) { 0.5 } else { 1.0 };
-                        let pairs: Vec<(u8, f32)> = pairs(slot, range, share)
-                            .map(|(bin, weight)| (bin as u8, weight))
-                            .collect();
-                        if !pairs.is_empty() {
-                            edges.push(Edge { class, pairs });
-                        }
-                    }
-                }
-                edges
-            })
-            .collect();
+        let edges = |slots: &[usize]| -> Vec<Edge> {
+            let edges = slots.iter().flat_map(|&slot| {
+                let edge = move |(end, class)| Edge { class, pairs: pairs(slot, end).collect() };
+                problem.graph.of(slot).map(edge)
+            });
+            edges.filter(|edge| !edge.pairs.is_empty()).collect()
+        };
+        let edges: Vec<Vec<Edge>> = sample.par_chunks(CHUNK).map(edges).collect();
         let first = || {
             let near = std::array::from_fn(|bin| {
                 chance[bin] * (8.0 - 7.0 * bin as f64 / (BINS - 1) as f64)
@@ -117,35 +90,33 @@ impl Tables {
         for _ in 0..if before.is_none() { PASSES.0 } else { PASSES.1 } {
             let ratios: Vec<[f64; BINS]> =
                 bins.iter().map(|f| std::array::from_fn(|bin| f[bin] / chance[bin])).collect();
-            let parts: Vec<Vec<[f64; BINS]>> = edges
-                .par_iter()
-                .map(|edges| {
-                    let mut sums = vec![[0.0; BINS]; CLASSES];
-                    for Edge { class, pairs } in edges {
-                        let class = usize::from(*class);
-                        let known: f64 = pairs.iter().map(|pair| f64::from(pair.1)).sum();
-                        let unknown = (1.0 - known).max(0.0);
-                        let likelihood = |&(bin, weight): &(u8, f32)| {
-                            f64::from(weight) * ratios[class][usize::from(bin)]
-                        };
-                        let z = unknown + pairs.iter().map(likelihood).sum::<f64>();
-                        for pair in pairs {
-                            sums[class][usize::from(pair.0)] += likelihood(pair) / z;
-                        }
-                        for bin in 0..BINS {
-                            sums[class][bin] += unknown * bins[class][bin] / z;
-                        }
+            let expected = |edges: &Vec<Edge>| {
+                let mut sums = vec![[0.0; BINS]; CLASSES];
+                for Edge { class, pairs } in edges {
+                    let class = usize::from(*class);
+                    let known: f64 = pairs.iter().map(|pair| f64::from(pair.1)).sum();
+                    let unknown = (1.0 - known).max(0.0);
+                    let likelihood = |&(bin, weight): &(u8, f32)| {
+                        f64::from(weight) * ratios[class][usize::from(bin)]
+                    };
+                    let z = unknown + pairs.iter().map(likelihood).sum::<f64>();
+                    for pair in pairs {
+                        sums[class][usize::from(pair.0)] += likelihood(pair) / z;
                     }
-                    sums
+                    for bin in 0..BINS {
+                        sums[class][bin] += unknown * bins[class][bin] / z;
+                    }
+                }
+                sums
+            };
+            let parts: Vec<Vec<[f64; BINS]>> = edges.par_iter().map(expected).collect();
+            bins = (0..CLASSES)
+                .map(|class| {
+                    let mut sum = chance.map(|share| PRIOR * share);
+                    parts.iter().for_each(|part| add(&mut sum, &part[class]));
+                    normalized(sum)
                 })
                 .collect();
-            for class in 0..CLASSES {
-                let mut sum = chance.map(|share| PRIOR * share);
-                for part in &parts {
-                    sum.iter_mut().zip(part[class]).for_each(|(sum, x)| *sum += x);
-                }
-                bins[class] = normalized(sum);
-            }
         }
         let ratios = bins.iter().map(|f| interpolated(f, &chance)).collect();
         Self { bins, ratios }
@@ -166,6 +137,10 @@ impl Tables {
 struct Edge {
     class: u8,
     pairs: Vec<(u8, f32)>,
+}
+
+fn add(sums: &mut [f64; BINS], more: &[f64; BINS]) {
+    sums.iter_mut().zip(more).for_each(|(sum, x)| *sum += x);
 }
 
 fn normalized(bins: [f64; BINS]) -> [f64; BINS] {

@@ -8,21 +8,16 @@ use rayon::prelude::*;
 
 use super::Places;
 use super::tables::Tables;
-use crate::recover::map::family::Family;
-use crate::recover::map::graph::Graph;
-use crate::recover::map::lines::ln;
-use crate::recover::map::places::distance2;
+use crate::recover::map::{Family, distance2, evenly, ln};
+use crate::recover::problem::Problem;
 use crate::seed::{Draws, Stage};
 
 /// Tempers to choose from.
 const TEMPERS: [f32; 7] = [0.14, 0.2, 0.28, 0.4, 0.56, 0.8, 1.0];
 /// The largest temper counts whose mean log-likelihood is within this many nats of the best.
 const TOLERANCE: f64 = 0.1;
-/// Number of sampled slots, and of random records that measure how often a record passes by chance.
-const SLOTS: usize = 2000;
+/// Number of random records that measure how often a record passes by chance.
 const BY_CHANCE: usize = 150;
-/// Largest number of places that are scored per slot.
-const MOST_PLACES: usize = 100;
 /// Probability that a list names the place at all.
 const NAMED: f64 = 0.9;
 /// Compared places are at least this many widths apart.
@@ -37,17 +32,14 @@ struct Named<const D: usize> {
 
 /// Returns the temper for these lists and tables.
 pub(super) fn learn<const D: usize, F: Family<D>>(
-    family: &F,
-    graph: &Graph,
+    problem: &Problem<'_, D, F>,
     places: &Places<D>,
     tables: &Tables,
-    seed: u64,
 ) -> f32 {
-    let every = places.n_slots().div_ceil(SLOTS).max(1);
-    let sample: Vec<usize> = (0..places.n_slots()).step_by(every).collect();
+    let sample: Vec<usize> = evenly(places.n_slots(), 2000).collect();
     let named: Vec<Vec<Named<D>>> = sample
         .par_iter()
-        .map(|&slot| named(family, graph, places, tables, seed, slot))
+        .map(|&slot| named(problem, places, tables, slot))
         .filter(|named| named.len() > 1)
         .collect();
     let fit = |temper: f32| -> f64 {
@@ -71,37 +63,29 @@ pub(super) fn learn<const D: usize, F: Family<D>>(
 
 /// Returns the places that the edges of `slot` lead to, far from each other, those with the most evidence first.
 fn named<const D: usize, F: Family<D>>(
-    family: &F,
-    graph: &Graph,
+    problem: &Problem<'_, D, F>,
     places: &Places<D>,
     tables: &Tables,
-    seed: u64,
     slot: usize,
 ) -> Vec<Named<D>> {
-    let slots_per_record = family.slots_per_record();
-    let (ends, classes) = graph.of(slot);
-    let best_at = |edge: usize| {
-        let range = places.at_end(ends[edge], classes[edge], slots_per_record);
-        range.clone().max_by(|&a, &b| places.places[a].weight.total_cmp(&places.places[b].weight))
+    let edges = || problem.graph.of(slot).enumerate();
+    let best_at = |end: usize| {
+        places.of(end).max_by(|&a, &b| places.all[a].weight.total_cmp(&places.all[b].weight))
     };
     let width = places.typical;
-    let passes = |slot: usize, x: &[f32; D]| {
-        let near = |piece| distance2(&family.piece(slot, piece).project(x), x) < width * width;
-        (0..F::PIECES).any(near)
-    };
-    let mut draws = Draws::new(seed, Stage::BeliefTables, !(slot as u64));
+    let passes = |slot: usize, x: &[f32; D]| problem.family.is_near(slot, x, width * width);
+    let mut draws = Draws::new(problem.seed, Stage::BeliefTables, !(slot as u64));
     let others: Vec<usize> =
         (0..BY_CHANCE).map(|_| draws.below(places.n_slots() as u64) as usize).collect();
-    let mut all: Vec<Named<D>> = (0..ends.len())
-        .filter_map(|edge| Some((edge, places.places[best_at(edge)?].x)))
-        .take(MOST_PLACES)
+    let mut all: Vec<Named<D>> = edges()
+        .filter_map(|(edge, (end, _))| Some((edge, places.all[best_at(end)?].x)))
+        .take(100)
         .map(|(edge, x)| {
             let mut evidence = 0.0;
-            for other in (0..ends.len()).filter(|&other| other != edge) {
+            for (_, (end, class)) in edges().filter(|&(at, _)| at != edge) {
                 let mut ratio = 1.0;
-                for at in places.at_end(ends[other], classes[other], slots_per_record) {
-                    let weight = places.places[at].weight;
-                    ratio += weight * tables.at(classes[other], places.distance(&x, at));
+                for at in places.of(end) {
+                    ratio += places.all[at].weight * tables.at(class, places.distance(&x, at));
                 }
                 evidence += ln(ratio.max(1e-6));
             }

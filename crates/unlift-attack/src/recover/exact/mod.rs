@@ -1,22 +1,275 @@
-//! Exact constraints: an exchanged coordinate is published by another record ([`exchanges`]), which fixes it.
+//! Exact constraints on exchanged coordinates: each of two records publishes the hidden coordinate of the other.
+//!
+//! A pair of partners must explain two estimates: each estimate lies near the value that the other record published. The
+//! distribution of these distances is learned together with the probabilities of pairs (expectation maximization), per class of
+//! evidence. Every record is in at most one pair, so the probabilities come from belief propagation on the
+//! monomer-dimer model, with one pass per round. No pair is fixed before the last round, so rivals keep their probability.
 
-mod exchanges;
 mod partners;
+
+use rayon::prelude::*;
 
 use crate::recover::result::Estimate;
 use crate::released::{Obfuscation, Released};
+use partners::{LOST, Partners, Side, by_part, side_by_side};
 
-/// Partners of exchanged coordinates are searched within this many deltas. In images, delta is narrow and values are few.
-const fn reach<const D: usize>() -> f64 {
-    if D == 2 { 4.0 } else { 1.0 }
-}
+/// Number of rounds: fixed, so that time does not depend on the map.
+const ROUNDS: usize = 6;
+/// Pairs below this probability do not enter learning: they are many, but weigh little together.
+const LEAST_PROBABILITY: f32 = 1e-3;
+/// Number of classes of evidence, with equally many records each. More evidence means smaller distances.
+const CLASSES: usize = 8;
+/// Normal distributions in the mixture of distances. Each is half as wide as the one before, down to 1 / 512 of the reach.
+const SCALES: usize = 9;
+/// Bounds of the fraction of good estimates in a class: a fraction of 0 or 1 would never change again.
+const FRACTION: (f64, f64) = (0.02, 0.995);
+/// Bins of distances from 0 to the reach: as fine as the narrowest distribution.
+const STEPS: usize = 1 << 9;
 
-/// Moves the estimates of `released` to where exact constraints allow them to be, if its family has any.
+/// Replaces the hidden coordinate of estimates of `released` by the exact value where the partner is known. Other families have no exact
+/// constraints.
 pub(crate) fn settle<const D: usize>(
     released: &Released<D>,
-    estimates: Vec<Estimate<D>>,
+    mut estimates: Vec<Estimate<D>>,
     delta: f64,
 ) -> Vec<Estimate<D>> {
     let Obfuscation::AxisCandidates(records) = released.obfuscation() else { return estimates };
-    exchanges::settle(records.position(), estimates, (reach::<D>() * delta) as f32)
+    // In images, delta is narrow and values are few.
+    let reach = if D == 2 { 4.0 } else { 1.0 };
+    let published = records.position();
+    let partners = pairs(published, &estimates, (reach * delta) as f32);
+    for (i, partner) in partners.into_iter().enumerate() {
+        if let Some(partner) = partner {
+            let axis = usize::from(estimates[i].axis);
+            estimates[i].position = published[i];
+            estimates[i].position[axis] = published[partner as usize][axis];
+        }
+    }
+    estimates
+}
+
+/// Returns the partner of every record, where it is known. Partners are mutual.
+fn pairs<const D: usize>(
+    published: &[[f32; D]],
+    estimates: &[Estimate<D>],
+    reach: f32,
+) -> Vec<Option<u32>> {
+    let n = estimates.len();
+    let side = |(record, estimate): (&[f32; D], &Estimate<D>)| {
+        let axis = usize::from(estimate.axis);
+        match estimate.is_known() {
+            true => Side { axis, published: record[axis], estimate: estimate.position[axis] },
+            false => Side { axis: LOST, published: 0.0, estimate: 0.0 },
+        }
+    };
+    let sides: Vec<Side> = published.iter().zip(estimates).map(side).collect();
+    let order = side_by_side(&sides, reach);
+    let sides: Vec<Side> = order.iter().map(|&record| sides[record as usize]).collect();
+    let Some(partners) = Partners::find(&sides, reach) else {
+        return vec![None; n];
+    };
+    let rarity = rarity(published, &sides, partners.reach);
+    // Per axis, the prior probability that some other record of this axis is the partner.
+    let prior: [f64; D] = std::array::from_fn(|axis| {
+        let n = sides.iter().filter(|side| side.axis == axis).count();
+        1.0 / n.saturating_sub(1).max(1) as f64
+    });
+    let class = classes(estimates);
+    let class: Vec<usize> = order.iter().map(|&record| class[record as usize]).collect();
+    let mut distances = Distances::new(partners.reach);
+    // Per entry, the message that the record is free of other partners.
+    let mut messages = vec![0.5; partners.of.len()];
+    let mut weight = Vec::new();
+    for _ in 0..ROUNDS {
+        let likelier = |i: usize, j: usize| {
+            let away = (sides[j].published - sides[i].estimate).abs();
+            distances.density(class[i], away) * rarity[i]
+        };
+        let odds = |i: usize, e: usize| {
+            let j = partners.of[e] as usize;
+            (likelier(i, j) * likelier(j, i) * prior[sides[i].axis]) as f32
+        };
+        weight = partners.column(|i, row| {
+            row.iter_mut().zip(partners.entries(i)).for_each(|(to, e)| *to = odds(i, e));
+        });
+        let alone = distances.alone();
+        messages = next_messages(&messages, &partners, &weight, |i| alone[class[i]]);
+        let tallies = by_part(n, |records| {
+            let mut tally = vec![[0.0; STEPS]; CLASSES];
+            for i in records {
+                for e in partners.entries(i) {
+                    let away = (sides[partners.of[e] as usize].published - sides[i].estimate).abs();
+                    let p = probability(&messages, &partners, &weight, e);
+                    if p > LEAST_PROBABILITY {
+                        tally[class[i]][distances.step(away)] += f64::from(p);
+                    }
+                }
+            }
+            tally
+        });
+        let mut total = vec![[0.0; STEPS]; CLASSES];
+        for tally in &tallies {
+            let columns = total.as_flattened_mut().iter_mut().zip(tally.as_flattened());
+            columns.for_each(|(to, more)| *to += more);
+        }
+        distances.learn(&total, &class);
+    }
+    // In an image, even a wrong partner is close.
+    let least = if D == 2 { 0.05 } else { 0.2 };
+    let best = |i: usize| {
+        let entries =
+            partners.entries(i).map(|e| (probability(&messages, &partners, &weight, e), e));
+        let likely = entries.filter(|&(p, _)| p >= least);
+        // Of equal ones, the first one wins.
+        let best = likely.reduce(|best, next| if next.0 > best.0 { next } else { best })?;
+        Some(partners.of[best.1])
+    };
+    let best: Vec<Option<u32>> = (0..n).into_par_iter().map(best).collect();
+    let mut of_record = vec![None; n];
+    for (i, &record) in order.iter().enumerate() {
+        let mutual = best[i].filter(|&j| best[j as usize] == Some(i as u32));
+        of_record[record as usize] = mutual.map(|j| order[j as usize]);
+    }
+    of_record
+}
+
+/// Returns the next messages of all pairs. `weight` is that of each pair (equal in both directions), `alone` that of a record
+/// without a partner.
+fn next_messages(
+    messages: &[f32],
+    partners: &Partners,
+    weight: &[f32],
+    alone: impl Fn(usize) -> f32 + Sync,
+) -> Vec<f32> {
+    let offer = |e: usize| weight[e] * messages[partners.back[e] as usize];
+    partners.column(|i, row| {
+        let alone = alone(i);
+        let all: f32 = alone + partners.entries(i).map(offer).sum::<f32>();
+        // Rounding must not take it below the weight without any pair.
+        let message = |e: usize| 1.0 / (all - offer(e)).max(alone);
+        row.iter_mut().zip(partners.entries(i)).for_each(|(to, e)| *to = message(e));
+    })
+}
+
+#[inline(always)]
+fn probability(messages: &[f32], partners: &Partners, weight: &[f32], e: usize) -> f32 {
+    // This order of the product gives the same bits in both directions.
+    let odds = weight[e] * (messages[e] * messages[partners.back[e] as usize]);
+    odds / (1.0 + odds)
+}
+
+/// Returns, per record, the inverse density of published values around its estimate: where values are rare, a value nearby is
+/// strong evidence.
+fn rarity<const D: usize>(published: &[[f32; D]], sides: &[Side], reach: f32) -> Vec<f64> {
+    let half = 0.5 * reach;
+    let sorted: [Vec<f32>; D] = std::array::from_fn(|axis| {
+        let mut values: Vec<f32> = published.iter().map(|p| p[axis]).collect();
+        values.par_sort_unstable_by(f32::total_cmp);
+        values
+    });
+    let of = |side: &Side| {
+        let Some(values) = sorted.get(side.axis) else {
+            return 0.0;
+        };
+        let from = values.partition_point(|&v| v < side.estimate - half);
+        let to = values.partition_point(|&v| v <= side.estimate + half);
+        2.0 * f64::from(half) * values.len() as f64 / (to - from + 1) as f64
+    };
+    sides.par_iter().map(of).collect()
+}
+
+fn classes<const D: usize>(estimates: &[Estimate<D>]) -> Vec<usize> {
+    let mut sorted: Vec<f32> = estimates.iter().map(|e| e.evidence).collect();
+    sorted.par_sort_unstable_by(f32::total_cmp);
+    let bounds: Vec<f32> =
+        (1..CLASSES).filter_map(|c| sorted.get(c * sorted.len() / CLASSES).copied()).collect();
+    estimates.iter().map(|e| bounds.partition_point(|&bound| bound <= e.evidence)).collect()
+}
+
+/// The distribution of distances between estimates and hidden coordinates: per class, the fraction of good estimates and a
+/// mixture of normal distributions.
+struct Distances {
+    good: [f64; CLASSES],
+    weight: [[f64; SCALES]; CLASSES],
+    /// Density of each normal distribution in the middle of each bin.
+    shapes: Vec<[f64; SCALES]>,
+    reach: f32,
+    /// Density times fraction of good estimates, per class and bin.
+    table: Vec<[f64; STEPS]>,
+}
+
+impl Distances {
+    /// Creates the first guess; partners are searched within `reach`.
+    fn new(reach: f32) -> Self {
+        let shape = |step: usize, scale: usize| {
+            let away = (step as f64 + 0.5) / STEPS as f64;
+            // In units of the reach. The constant is 1 / sqrt(2 pi).
+            let inverse = f64::from(2u32 << scale);
+            let z = away * inverse;
+            0.398_942_280_4 * inverse / f64::from(reach) * libm::exp(-0.5 * z * z)
+        };
+        let shapes =
+            (0..STEPS).map(|step| std::array::from_fn(|scale| shape(step, scale))).collect();
+        let weight = [[1.0 / SCALES as f64; SCALES]; CLASSES];
+        let mut distances = Self { good: [0.8; CLASSES], weight, shapes, reach, table: Vec::new() };
+        distances.tabulate();
+        distances
+    }
+
+    fn tabulate(&mut self) {
+        let density = |class: usize, step: usize| -> f64 { self.parts(class, step).iter().sum() };
+        let of_class =
+            |class: usize| std::array::from_fn(|step| self.good[class] * density(class, step));
+        self.table = (0..CLASSES).map(of_class).collect();
+    }
+
+    /// Returns the weighted density of each normal distribution of `class` in the middle of a bin.
+    fn parts(&self, class: usize, step: usize) -> [f64; SCALES] {
+        std::array::from_fn(|s| self.shapes[step][s] * self.weight[class][s])
+    }
+
+    #[inline(always)]
+    fn step(&self, away: f32) -> usize {
+        ((away / self.reach * STEPS as f32) as usize).min(STEPS - 1)
+    }
+
+    /// Returns the density of a good estimate's distance times the fraction of good ones.
+    #[inline(always)]
+    fn density(&self, class: usize, away: f32) -> f64 {
+        self.table[class][self.step(away)]
+    }
+
+    /// Returns the weight of a record without a known partner, per class.
+    fn alone(&self) -> [f32; CLASSES] {
+        let others = self.mean_good();
+        self.good.map(|good| (1.0 - good * others) as f32)
+    }
+
+    fn mean_good(&self) -> f64 {
+        self.good.iter().sum::<f64>() / CLASSES as f64
+    }
+
+    /// Learns from `weights` of pairs per class and bin. `class` has the class of every record.
+    fn learn(&mut self, weights: &[[f64; STEPS]], class: &[usize]) {
+        let others = self.mean_good().max(0.1);
+        for (own, weights) in weights.iter().enumerate() {
+            let records = class.iter().filter(|&&class| class == own).count();
+            if records == 0 {
+                continue;
+            }
+            let mut scales = [0.0; SCALES];
+            for (step, pairs) in weights.iter().enumerate().filter(|x| *x.1 > 0.0) {
+                let parts = self.parts(own, step);
+                let sum = parts.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+                for (to, part) in scales.iter_mut().zip(parts) {
+                    *to += pairs * part / sum;
+                }
+            }
+            let total: f64 = scales.iter().sum();
+            self.good[own] = (total / records as f64 / others).clamp(FRACTION.0, FRACTION.1);
+            // One prior pair, spread over all distributions.
+            self.weight[own] = scales.map(|s| (s + 1.0 / SCALES as f64) / (total + 1.0));
+        }
+        self.tabulate();
+    }
 }

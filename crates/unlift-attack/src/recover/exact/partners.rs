@@ -5,13 +5,12 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::geometry::curve;
+use crate::recover::map::{evenly, rows_mut};
 
 /// Records per parallel task: fixed, so that sums do not depend on the number of threads.
 const PART: usize = 1 << 10;
 /// Largest mean number of partners per record. A shorter reach enforces it, so that time and memory are linear in the map.
 const MOST: f64 = 16.0;
-/// Records on which the number of partners is counted.
-const SAMPLE: usize = 1 << 12;
 /// Largest number of partners of one record where a shorter reach does not help, because many records have equal coordinates
 /// (a floor at 0, a few exact heights).
 const MOST_OF_TIES: usize = 64;
@@ -43,11 +42,11 @@ impl Partners {
     /// reach if there are too many pairs. `None` if there are none.
     pub(super) fn find(sides: &[Side], reach: f32) -> Option<Self> {
         let mut strips = Strips::new(sides, reach);
-        let found = strips.mean();
+        let mean = strips.mean();
         let mut has_ties = false;
-        if found > MOST {
+        if mean > MOST {
             // The number of partners is proportional to the square of the reach.
-            strips = Strips::new(sides, reach * (MOST / found).sqrt() as f32);
+            strips = Strips::new(sides, reach * (MOST / mean).sqrt() as f32);
             has_ties = strips.mean() > MOST_OF_TIES as f64;
         }
         let (offsets, of) = if has_ties { strips.some_rows() } else { strips.rows() };
@@ -66,21 +65,9 @@ impl Partners {
 
     /// Returns a value per entry; `of` writes those of one record.
     pub(super) fn column(&self, of: impl Fn(usize, &mut [f32]) + Sync) -> Vec<f32> {
-        let (n, mut column) = (self.offsets.len() - 1, vec![0.0; self.of.len()]);
-        let (mut parts, mut rest) = (Vec::new(), &mut column[..]);
-        for first in (0..n).step_by(PART) {
-            let last = n.min(first + PART);
-            let part;
-            (part, rest) = rest.split_at_mut(self.offsets[last] - self.offsets[first]);
-            parts.push((first..last, part));
-        }
-        parts.into_par_iter().for_each(|(records, mut part)| {
-            for i in records {
-                let row;
-                (row, part) = part.split_at_mut(self.entries(i).len());
-                of(i, row);
-            }
-        });
+        let mut column = vec![0.0; self.of.len()];
+        let rows = rows_mut(&mut column, &self.offsets);
+        rows.into_par_iter().enumerate().for_each(|(i, row)| of(i, row));
         column
     }
 
@@ -132,10 +119,9 @@ impl<'a> Strips<'a> {
     }
 
     fn mean(&self) -> f64 {
-        let every = self.sides.len().div_ceil(SAMPLE).max(1);
-        let looked: Vec<usize> = (0..self.sides.len()).step_by(every).collect();
-        let found: usize = looked.par_iter().map(|&i| self.of(i).count()).sum();
-        found as f64 / looked.len().max(1) as f64
+        let sample: Vec<usize> = evenly(self.sides.len(), 1 << 12).collect();
+        let count: usize = sample.par_iter().map(|&i| self.of(i).count()).sum();
+        count as f64 / sample.len().max(1) as f64
     }
 
     /// Returns, for each of the three steps around the estimate of record `i`, the records whose estimates are near its published value.

@@ -1,10 +1,11 @@
 //! The last step of an update: weighted least squares over the estimates of nearby neighbors.
 
+use crate::recover::joint::update::Context;
 use crate::recover::joint::votes::Near;
-use crate::recover::map::family::{Family, Piece};
-use crate::recover::map::lines::{Columns, LANES, Lanes};
-use crate::recover::result::Estimate;
+use crate::recover::map::{Columns, Family, LANES, Lanes, Piece};
 
+/// Estimates within this many radii count, with less weight the farther they are.
+const RADIUS: f32 = 3.75;
 /// Number of least-squares steps. The second one recomputes the weights.
 const STEPS: usize = 2;
 
@@ -73,40 +74,47 @@ impl<const D: usize> Sums<D> {
     }
 }
 
-/// Moves `x` along `own` by weighted least squares; returns the place and the number of records within reach.
-///
-/// The residual of a neighbor is the difference to its estimate: with full weight across its own record, with less weight
-/// along it. `directions` is a buffer for unit directions (for planes: normals). `at` returns, for a place, `1 / reach^2`, the distribution of neighbors (`gain`, `1 / a^2`) and the likelihood ratio
-/// at which an estimate has half weight.
-#[inline(always)]
-pub(super) fn least_squares<const D: usize, F: Family<D>>(
-    family: &F,
-    estimates: &[Estimate<D>],
-    own: &Piece<D>,
-    (near, directions): (&Near<D>, &mut Columns<D>),
-    mut x: [f32; D],
-    at: impl Fn(&[f32; D]) -> (f32, (f32, f32), f32),
-) -> ([f32; D], u32) {
-    let of =
-        |&slot: &u32| family.direction(slot as usize, usize::from(estimates[slot as usize].axis));
-    directions.fill(&near.slot, of);
-    directions.resize(near.odds.len(), 0.0);
-    let mut records = 0;
-    for step_at in 1..=STEPS {
-        let weights = at(&x);
-        let sums = Sums::new(near, directions, &x, weights);
-        let n: u32 = sums.n.iter().sum();
-        if step_at == STEPS {
-            records = match family.slots_per_record() {
-                1 => n,
-                _ => near.n_pairs(&x, weights.0),
-            };
+impl<const D: usize, F: Family<D>> Context<'_, D, F> {
+    /// Moves `x` along `own` by weighted least squares; returns the place and the number of records within reach.
+    ///
+    /// The residual of a neighbor is the difference to its estimate: with full weight across its own record, with less weight
+    /// along it. `directions` is a buffer for unit directions (for planes: normals).
+    #[inline(always)]
+    pub(super) fn least_squares(
+        &self,
+        own: &Piece<D>,
+        (near, directions): (&Near<D>, &mut Columns<D>),
+        mut x: [f32; D],
+    ) -> ([f32; D], u32) {
+        let Self { problem, estimates, density: field, neighbors, .. } = self;
+        directions.fill(&near.slot, |&slot| {
+            let piece = usize::from(estimates[slot as usize].axis);
+            problem.family.piece(slot as usize, piece).direction
+        });
+        directions.resize(near.odds.len(), 0.0);
+        let mut records = 0;
+        for step_at in 1..=STEPS {
+            let density = field.at(&x);
+            let reach = RADIUS * neighbors.radius * field.width(density);
+            let inverse_reach2 = 1.0 / (reach * reach);
+            let half_weight_ratio = F::HALF_WEIGHT_RATIO
+                * (1.0 + neighbors.background / self.volume(density) / density);
+            let weights = (inverse_reach2, self.distribution(density), half_weight_ratio);
+            let sums = Sums::new(near, directions, &x, weights);
+            let n: u32 = sums.n.iter().sum();
+            if step_at == STEPS {
+                records = match problem.graph.slots_per_record {
+                    1 => n,
+                    _ => near.n_pairs(&x, inverse_reach2),
+                };
+            }
+            x = own.project(&step::<D, F>(own, &x, &sums, n));
         }
-        x = own.project(&step::<D, F>(own, &x, &sums, n));
+        (x, records)
     }
-    (x, records)
 }
 
+/// Returns `x` plus the least-squares step along `own`, from the sums over `n` neighbors.
 #[inline(always)]
 fn step<const D: usize, F: Family<D>>(
     own: &Piece<D>,
@@ -129,19 +137,7 @@ fn step<const D: usize, F: Family<D>>(
         row[r] += weight;
         pull[r] -= free_fraction * (whole * pull[r] + sign * total(&sums.free_pull[r]));
     }
-    solve_within(own, x, &hold, &pull, weight)
-}
-
-/// Returns `x` plus the step along `own` that solves `hold step = pull`.
-#[inline(always)]
-fn solve_within<const D: usize>(
-    own: &Piece<D>,
-    x: &[f32; D],
-    hold: &[[f32; D]; D],
-    pull: &[f32; D],
-    weight: f32,
-) -> [f32; D] {
-    // P hold P + weight (1 - P): the component across `own` is decoupled and stays 0.
+    // The step solves `hold step = pull` within the piece: P hold P + weight (1 - P). The component across is decoupled and stays 0.
     let p = &own.along;
     let (mut half, mut full, mut right) = ([[0.0f32; D]; D], [[0.0f32; D]; D], [0.0f32; D]);
     for r in 0..D {

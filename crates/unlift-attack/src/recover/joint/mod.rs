@@ -35,14 +35,12 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use rayon::prelude::*;
 
 use crate::recover::joint::neighbor_distribution::NeighborDistribution;
-use crate::recover::joint::update::{Context, Scratch, TUBE};
-use crate::recover::map::family::Family;
-use crate::recover::map::graph::{either, record_of};
-use crate::recover::map::grid::Density;
-use crate::recover::map::places::{CHUNK, along_curve, distance2};
+use crate::recover::joint::update::{Context, TUBE};
+use crate::recover::map::{
+    Density, Family, along_curve, distance2, evenly, record_of, solve_slots,
+};
 use crate::recover::problem::Problem;
 use crate::recover::result::Estimate;
-use crate::simd::{Kernel, dispatch};
 
 const ITERATIONS: usize = 16;
 /// Least radius, as a fraction of the largest coordinate: estimates of the same place differ by rounding.
@@ -52,8 +50,6 @@ const SMOOTH: f32 = 4.5;
 /// A slot is updated again once its margin is at most this many nats per jump of a neighbor. One jump can change the score by more,
 /// but some jumps confirm the place.
 const MARGIN_PER_JUMP: f32 = 2.0;
-/// Least number of jumps per parallel task.
-const JUMPS_PER_THREAD: usize = 64;
 /// Iterations end when fewer than this fraction of the slots jump.
 const SETTLED: f64 = 0.03;
 /// Distribution and density are learned again after more than this fraction of the slots have jumped. Learning once per
@@ -64,15 +60,14 @@ const STALE: f64 = 0.02;
 const SLOW: f64 = 0.9;
 /// Iterations end when agreement falls by more than this fraction of its best value; smaller changes are noise.
 const WORSE: f64 = 0.08;
-/// Number of slots on which agreement is measured.
-const AGREEMENT_SLOTS: usize = 1 << 12;
 
 /// Returns the estimates of all slots after joint recovery from `start`.
 pub(super) fn recover<const D: usize, F: Family<D>>(
     problem: &Problem<'_, D, F>,
     start: Vec<Estimate<D>>,
 ) -> Vec<Estimate<D>> {
-    let (n, family) = (start.len(), problem.family);
+    let Problem { family, graph, .. } = *problem;
+    let n = start.len();
     let order = along_curve(&start);
     let known = start.iter().filter(|estimate| estimate.is_known());
     let farthest = known.flat_map(|e| e.position).fold(0.0, |most: f32, x| most.max(x.abs()));
@@ -103,24 +98,23 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
                     margin.fill(0.0);
                 }
             }
-            let moves = |slot: &u32| {
-                let slot = *slot as usize;
+            let moves = |&slot: &usize| {
                 let n_jumps = jumps_near[slot].load(Ordering::Relaxed) as f32;
                 let is_settled = margin[slot] > 0.0 && n_jumps <= margin[slot] / MARGIN_PER_JUMP;
                 slot % groups == group && !is_settled
             };
-            let slots: Vec<u32> = order.iter().copied().filter(moves).collect();
-            let context = Context::new(problem, &estimates, &density, &neighbors);
-            let moved: Vec<Vec<(Estimate<D>, f32)>> = slots
-                .par_chunks(CHUNK)
-                .map_init(Scratch::default, |scratch, slots| {
-                    dispatch(Chunk { context: &context, slots, scratch })
-                })
-                .collect();
+            let slots: Vec<usize> = order.iter().copied().filter(moves).collect();
+            let context = Context {
+                problem,
+                estimates: &estimates,
+                density: &density,
+                neighbors: &neighbors,
+                odds: neighbors.odds_of_slot(problem.graph),
+            };
+            let moved = solve_slots(&context, &slots);
             (group..n).step_by(groups).for_each(|slot| *jumps_near[slot].get_mut() = 0);
             let mut jumped = Vec::new();
-            for (&slot, &(new, lead)) in slots.iter().zip(moved.iter().flatten()) {
-                let slot = slot as usize;
+            for (slot, (new, lead)) in slots.into_iter().zip(moved) {
                 let old = std::mem::replace(&mut estimates[slot], new);
                 let is_far = distance2(&old.position, &new.position) > neighbors.radius.powi(2);
                 margin[slot] = lead;
@@ -134,20 +128,13 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
             n_since_learning += jumped.len();
             // A jump from or to a place near the record of a neighbor may concern the neighbor.
             let reach2 = (TUBE * neighbors.radius).powi(2);
-            let may_lie_near = |slot: usize, x: &[f32; D]| {
-                let near = |piece| distance2(&family.piece(slot, piece).project(x), x) < reach2;
-                (0..F::PIECES).any(near)
-            };
-            jumped.par_iter().with_min_len(JUMPS_PER_THREAD).for_each(|(slot, places)| {
-                let (ends, class) = problem.graph.of(*slot);
-                for (&end, &class) in ends.iter().zip(class) {
-                    let end = end as usize;
-                    let slots = end..=end + usize::from(either(class, family.slots_per_record()));
+            jumped.par_iter().with_min_len(64).for_each(|(slot, places)| {
+                for edge in graph.of(*slot) {
                     // Both slots of a record lie on one piece.
-                    if slots.clone().any(|slot| margin[slot] > 0.0)
-                        && places.iter().any(|x| may_lie_near(end, x))
+                    if graph.slots_at(edge).any(|slot| margin[slot] > 0.0)
+                        && places.iter().any(|x| family.is_near(edge.0, x, reach2))
                     {
-                        slots.for_each(|slot| {
+                        graph.slots_at(edge).for_each(|slot| {
                             jumps_near[slot].fetch_add(1, Ordering::Relaxed);
                         });
                     }
@@ -172,26 +159,6 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
     accepted
 }
 
-struct Chunk<'a, 'b, const D: usize, F: Family<D>> {
-    context: &'a Context<'b, D, F>,
-    slots: &'a [u32],
-    scratch: &'a mut Scratch<D>,
-}
-
-impl<const D: usize, F: Family<D>> Kernel for Chunk<'_, '_, D, F> {
-    type Output = Vec<(Estimate<D>, f32)>;
-
-    #[inline(always)]
-    fn run(self) -> Vec<(Estimate<D>, f32)> {
-        let Self { context, slots, scratch } = self;
-        let mut moved = Vec::with_capacity(slots.len());
-        for &slot in slots {
-            moved.push(context.solve(slot as usize, scratch));
-        }
-        moved
-    }
-}
-
 /// Returns the mean number of records at the ends of a slot's edges that pass within delta of its estimate, minus the number
 /// expected by chance.
 ///
@@ -207,8 +174,8 @@ fn agreement<const D: usize, F: Family<D>>(
             return 0.0;
         }
         let (mut near, mut all) = (0u32, 0u32);
-        for &end in graph.of(slot).0 {
-            let record = record_of(end as usize, family.slots_per_record());
+        for (end, _) in graph.of(slot) {
+            let record = record_of(end, graph.slots_per_record);
             if family.may_vote(slot, record) {
                 let d2 = family.record_distance2(record, &estimate.position);
                 all += 1;
@@ -218,8 +185,7 @@ fn agreement<const D: usize, F: Family<D>>(
         let chance = family.record_chance(slot, &estimate.position, &problem.at_delta);
         f64::from(near) - f64::from(all) * f64::from(chance)
     };
-    let n = estimates.len();
-    let slots: Vec<usize> = (0..n).step_by(n.div_ceil(AGREEMENT_SLOTS).max(1)).collect();
+    let slots: Vec<usize> = evenly(estimates.len(), 1 << 12).collect();
     let parts: Vec<f64> =
         slots.par_chunks(256).map(|part| part.iter().map(of_slot).sum()).collect();
     parts.iter().sum::<f64>() / slots.len().max(1) as f64

@@ -1,13 +1,10 @@
 //! The update of one slot in one iteration: propose candidates, score them, refine the best one.
 
-use crate::recover::joint::least_squares::least_squares;
 use crate::recover::joint::neighbor_distribution::NeighborDistribution;
 use crate::recover::joint::votes::{Ends, Near, Odds};
-use crate::recover::map::family::{Family, Piece};
-use crate::recover::map::graph::{CLASSES, either, record_of};
-use crate::recover::map::grid::Density;
-use crate::recover::map::lines::{Columns, ln};
-use crate::recover::map::places::{distance2, nearest2};
+use crate::recover::map::{
+    CLASSES, Candidate, Columns, Density, Family, Piece, Step, distance2, ln, nearest2, record_of,
+};
 use crate::recover::problem::Problem;
 use crate::recover::result::Estimate;
 
@@ -16,8 +13,6 @@ pub(super) const TUBE: f32 = 6.0;
 /// Estimates within this many radii of the center of a ray are ignored: they are close to all rays of that center, so that a few
 /// wrong ones would draw many slots there.
 const CENTER_RADIUS: f32 = 3.0;
-/// Least squares uses estimates within this many radii, with less weight the farther they are.
-const LEAST_SQUARES_RADIUS: f32 = 3.75;
 /// Candidates per piece are chosen so that about this many are estimates of true neighbors.
 const TRUE_CANDIDATES: f32 = 5.0;
 /// Least and largest number of such candidates per piece.
@@ -28,58 +23,39 @@ const TIE_MARGIN: f32 = 8.0;
 const WRONG_ESTIMATES: f32 = 0.2;
 /// Weight of the density prior. It is below 1 because candidates are estimates, which already lie where density is large.
 const PRIOR: f32 = 0.5;
+
+/// What an iteration reads.
 pub(super) struct Context<'a, const D: usize, F: Family<D>> {
-    problem: &'a Problem<'a, D, F>,
-    estimates: &'a [Estimate<D>],
-    density: &'a Density<D>,
-    neighbors: &'a NeighborDistribution,
-    /// Per class, see [`Odds::of_class`].
-    odds: [(f32, f32); CLASSES],
+    pub(super) problem: &'a Problem<'a, D, F>,
+    pub(super) estimates: &'a [Estimate<D>],
+    pub(super) density: &'a Density<D>,
+    pub(super) neighbors: &'a NeighborDistribution,
+    /// Per class, the odds that an edge leads to a true neighbor of a slot.
+    pub(super) odds: [f32; CLASSES],
 }
 
-#[derive(Clone, Copy, Debug)]
-struct Candidate<const D: usize> {
-    x: [f32; D],
-    piece: usize,
-    score: f32,
-    prior: f32,
-}
-
+#[derive(Default)]
 pub(super) struct Scratch<const D: usize> {
     all: Ends<D>,
     /// One per piece.
-    near: [Near<D>; D],
+    near: Vec<Near<D>>,
     directions: Columns<D>,
     candidates: Vec<Candidate<D>>,
 }
 
-impl<const D: usize> Default for Scratch<D> {
-    fn default() -> Self {
-        let near = std::array::from_fn(|_| Near::default());
-        let directions = Columns::default();
-        Self { all: Ends::default(), near, directions, candidates: Vec::new() }
-    }
-}
-
-impl<'a, const D: usize, F: Family<D>> Context<'a, D, F> {
-    pub(super) fn new(
-        problem: &'a Problem<'a, D, F>,
-        estimates: &'a [Estimate<D>],
-        density: &'a Density<D>,
-        neighbors: &'a NeighborDistribution,
-    ) -> Self {
-        let odds = neighbors.odds_of_slot(problem.family.slots_per_record());
-        Self { problem, estimates, density, neighbors, odds }
-    }
+impl<const D: usize, F: Family<D>> Step for Context<'_, D, F> {
+    type Scratch = Scratch<D>;
+    type Output = (Estimate<D>, f32);
 
     /// Returns the new estimate of `slot`, and its margin: the lead of its place over the best candidate elsewhere in nats, or without such
     /// a candidate its log-likelihood ratio; 0 if it must be updated again. Without nearby estimates it returns the old estimate and 0.
     #[inline(always)]
-    pub(super) fn solve(&self, slot: usize, scratch: &mut Scratch<D>) -> (Estimate<D>, f32) {
+    fn solve(&self, slot: usize, scratch: &mut Scratch<D>) -> (Estimate<D>, f32) {
         let old = &self.estimates[slot];
         let Problem { family, graph, .. } = *self.problem;
         scratch.candidates.clear();
-        scratch.all.gather(graph.of(slot), self.estimates, family.slots_per_record());
+        scratch.near.resize_with(F::PIECES, Near::default);
+        scratch.all.gather(graph, slot, self.estimates);
         let (reach, center_radius) =
             (TUBE * self.neighbors.radius, CENTER_RADIUS * self.neighbors.radius);
         let odds = self.odds(slot);
@@ -91,41 +67,40 @@ impl<'a, const D: usize, F: Family<D>> Context<'a, D, F> {
         let Some((first, margin)) = self.winner(slot, &scratch.candidates) else {
             return (*old, 0.0);
         };
-        let own = family.piece(slot, first.piece);
-        let near = &mut scratch.near[first.piece];
+        let near = &scratch.near[first.piece];
         if near.len() == 0 {
             return (*old, 0.0);
         }
-        let at = |x: &[f32; D]| {
-            let density = self.density.at(x);
-            let reach = LEAST_SQUARES_RADIUS * self.neighbors.radius * self.density.width(density);
-            let half_weight_ratio = F::HALF_WEIGHT_RATIO
-                * (1.0 + self.neighbors.background / self.volume(density) / density);
-            (1.0 / (reach * reach), self.distribution(density), half_weight_ratio)
-        };
-        let near = (&*near, &mut scratch.directions);
-        let (x, support) = least_squares(family, self.estimates, &own, near, first.x, at);
+        let own = family.piece(slot, first.piece);
+        let (x, support) = self.least_squares(&own, (near, &mut scratch.directions), first.x);
         if !x.iter().all(|c| c.is_finite()) {
             return (*old, 0.0);
         }
-        let evidence = (first.score - first.prior).max(0.0);
+        let evidence = (first.score - self.prior(slot, &first.x)).max(0.0);
         (Estimate::at(x, support, first.piece, evidence), margin)
     }
+}
 
+impl<const D: usize, F: Family<D>> Context<'_, D, F> {
     #[inline(always)]
     fn odds(&self, slot: usize) -> Odds<'_, D> {
-        let (of_class, other) = (&self.odds, slot ^ 1);
-        if self.problem.family.slots_per_record() == 2 && self.estimates[other].is_known() {
-            let partner = self.estimates[other].position;
-            let (gain, inverse_a2) = self.distribution(self.density.at(&partner));
-            return Odds { of_class, partner, gain, inverse_a2 };
-        }
-        Odds { of_class, partner: [0.0; D], gain: 0.0, inverse_a2: 0.0 }
+        let is_paired = self.problem.graph.slots_per_record == 2;
+        let partner = is_paired.then(|| self.estimates[slot ^ 1]).filter(Estimate::is_known);
+        let partner = partner.map(|partner| {
+            (partner.position, self.distribution(self.density.at(&partner.position)))
+        });
+        Odds { of_class: &self.odds, partner }
+    }
+
+    /// Returns the logarithm of the prior density at a place, up to a constant.
+    #[inline(always)]
+    fn prior(&self, slot: usize, x: &[f32; D]) -> f32 {
+        PRIOR * ln(self.density.at(x)) + self.problem.family.ln_spread(slot, x)
     }
 
     /// Returns the distribution of neighbors at a place of this density: `gain = p_true(0) / p_random`, and `1 / a^2`.
     #[inline(always)]
-    fn distribution(&self, density: f32) -> (f32, f32) {
+    pub(super) fn distribution(&self, density: f32) -> (f32, f32) {
         let width = self.density.width(density);
         let gain = self.neighbors.density_at_zero / (self.volume(density) * density);
         (gain, self.neighbors.inverse_a2 / (width * width))
@@ -133,7 +108,7 @@ impl<'a, const D: usize, F: Family<D>> Context<'a, D, F> {
 
     /// Returns the volume of a cube whose edge is the local width.
     #[inline(always)]
-    fn volume(&self, density: f32) -> f32 {
+    pub(super) fn volume(&self, density: f32) -> f32 {
         let width = self.density.width(density);
         let mut volume = 1.0;
         for _ in 0..D {
@@ -159,35 +134,26 @@ impl<'a, const D: usize, F: Family<D>> Context<'a, D, F> {
         let old = Some(old).filter(|old| old.is_known() && usize::from(old.axis) == piece);
         let most_imbalance = self.neighbors.most_imbalance;
         for x in estimates.chain(old.map(|old| old.position)) {
-            let density = self.density.at(&x);
-            let prior = PRIOR * ln(density) + self.problem.family.ln_spread(slot, &x);
-            let distribution = self.distribution(density);
+            let distribution = self.distribution(self.density.at(&x));
             let likelihood = match most_imbalance < f32::INFINITY {
                 true => near.balanced_log_likelihood(&x, distribution, most_imbalance),
                 false => near.log_likelihood(&x, distribution),
             };
-            scratch.candidates.push(Candidate { x, piece, score: prior + likelihood, prior });
+            let score = self.prior(slot, &x) + likelihood;
+            scratch.candidates.push(Candidate { x, piece, score });
         }
     }
 
     /// Returns the best candidate and its margin. If the second best is close, the records decide between the two.
     #[inline(always)]
     fn winner(&self, slot: usize, candidates: &[Candidate<D>]) -> Option<(Candidate<D>, f32)> {
-        let mut best = *candidates.first()?;
-        for candidate in &candidates[1..] {
-            if candidate.score > best.score {
-                best = *candidate;
-            }
-        }
+        // Of equal scores, the first one wins.
+        let higher = |a: Candidate<D>, b: Candidate<D>| if b.score > a.score { b } else { a };
+        let best = candidates.iter().copied().reduce(higher)?;
         let apart = 4.0 * self.neighbors.radius * self.neighbors.radius;
-        let mut second: Option<Candidate<D>> = None;
-        for candidate in candidates.iter().filter(|c| distance2(&c.x, &best.x) > apart) {
-            if second.is_none_or(|s| candidate.score > s.score) {
-                second = Some(*candidate);
-            }
-        }
-        let Some(second) = second else {
-            return Some((best, best.score - best.prior));
+        let elsewhere = candidates.iter().filter(|c| distance2(&c.x, &best.x) > apart);
+        let Some(second) = elsewhere.copied().reduce(higher) else {
+            return Some((best, best.score - self.prior(slot, &best.x)));
         };
         let margin = best.score - second.score;
         if margin < TIE_MARGIN {
@@ -203,14 +169,12 @@ impl<'a, const D: usize, F: Family<D>> Context<'a, D, F> {
     #[inline(always)]
     fn record_scores(&self, slot: usize, x: [[f32; D]; 2]) -> [f32; 2] {
         let Problem { family, graph, delta, at_delta, .. } = self.problem;
-        let slots_per_record = family.slots_per_record();
         let at = x.map(|x| {
             (self.distribution(self.density.at(&x)), family.record_chance(slot, &x, at_delta))
         });
-        let (ends, class) = graph.of(slot);
         let mut sums = [0.0; 2];
-        for (&end, &class) in ends.iter().zip(class) {
-            let record = record_of(end as usize, slots_per_record);
+        for (end, class) in graph.of(slot) {
+            let record = record_of(end, graph.slots_per_record);
             if !family.may_vote(slot, record) {
                 continue;
             }
@@ -220,8 +184,8 @@ impl<'a, const D: usize, F: Family<D>> Context<'a, D, F> {
                 }
                 let ((gain, inverse_a2), chance) = at[i];
                 let odds = self.neighbors.odds[usize::from(class)];
-                let either = either(class, slots_per_record);
-                let q = 1.0 / (1.0 + nearest2(self.estimates, end, either, x) * inverse_a2);
+                let r2 = nearest2(self.estimates, graph.slots_at((end, class)), x);
+                let q = 1.0 / (1.0 + r2 * inverse_a2);
                 let by_estimate = 1.0 + odds * gain * q * q * q;
                 sums[i] += ln(1.0 + WRONG_ESTIMATES * odds / chance / by_estimate);
             }

@@ -1,9 +1,8 @@
 //! Estimates at the ends of a slot's edges, in columns, and their likelihood for a place.
 
-use crate::recover::map::family::Piece;
-use crate::recover::map::graph::{CLASSES, Side, either, side};
-use crate::recover::map::lines::{Columns, LANES, Lanes, ln};
-use crate::recover::map::places::distance2;
+use crate::recover::map::{
+    CLASSES, Columns, Graph, LANES, Lanes, Piece, Side, distance2, ln, side,
+};
 use crate::recover::result::Estimate;
 
 /// Coordinate of padding: beyond any reach, and finite when squared.
@@ -11,13 +10,9 @@ const PADDING_COORDINATE: f32 = 1e19;
 
 /// Odds that the edges of a slot lead to true neighbors of this slot.
 pub(super) struct Odds<'a, const D: usize> {
-    /// Per class, the odds, and 1 where the edge may belong to the other slot of the record, else 0.
-    pub(super) of_class: &'a [(f32, f32); CLASSES],
-    /// Place of the other slot of a paired line.
-    pub(super) partner: [f32; D],
-    /// The distribution of neighbors at that place; `gain` is 0 if there is no other slot.
-    pub(super) gain: f32,
-    pub(super) inverse_a2: f32,
+    pub(super) of_class: &'a [f32; CLASSES],
+    /// Place of the other slot of a paired line, and the distribution of neighbors there.
+    pub(super) partner: Option<([f32; D], (f32, f32))>,
 }
 
 /// The estimates at the ends of a slot's edges, in columns.
@@ -32,32 +27,27 @@ pub(super) struct Ends<const D: usize> {
 }
 
 impl<const D: usize> Ends<D> {
-    /// Gathers the estimates at the ends of edges; both estimates of a record where the edge does not specify the slot.
+    /// Gathers the estimates at the ends of the edges of `slot`; both estimates of a record where the edge does not specify the slot.
     #[inline(always)]
-    pub(super) fn gather(
-        &mut self,
-        (ends, class): (&[u32], &[u8]),
-        estimates: &[Estimate<D>],
-        slots_per_record: usize,
-    ) {
-        let most = slots_per_record * ends.len();
-        self.resize(most);
-        let columns = self.x.0.each_mut().map(|column| &mut column[..most]);
-        let (slots, classes) = (&mut self.slot[..most], &mut self.class[..most]);
+    pub(super) fn gather(&mut self, graph: &Graph, slot: usize, estimates: &[Estimate<D>]) {
+        let room = graph.slots_per_record * graph.of(slot).len();
+        self.resize(room);
+        let columns = self.x.0.each_mut().map(|column| &mut column[..room]);
+        let (slots, classes) = (&mut self.slot[..room], &mut self.class[..room]);
         let mut n = 0;
-        for (&end, &class) in ends.iter().zip(class) {
-            let mut set = |i: usize, slot: u32| {
-                let x = estimates[slot as usize].position;
+        for (end, class) in graph.of(slot) {
+            let mut set = |i: usize, slot: usize| {
+                let x = estimates[slot].position;
                 for c in 0..D {
                     columns[c][i] = x[c];
                 }
-                (slots[i], classes[i]) = (slot, class);
+                (slots[i], classes[i]) = (slot as u32, class);
             };
             set(n, end);
-            if slots_per_record == 2 {
+            if graph.slots_per_record == 2 {
                 // Always written; the next row overwrites it if it is not kept.
                 set(n + 1, end | 1);
-                n += usize::from(either(class, slots_per_record));
+                n += usize::from(graph.is_either(class));
             }
             n += 1;
         }
@@ -109,15 +99,18 @@ impl<const D: usize> Ends<D> {
             kept[n_kept] = i as u32;
             n_kept += usize::from(*apart2 < reach * reach);
         }
-        near.resize(n_kept);
+        near.resize(n_kept, 0.0);
+        near.slot.resize(n_kept, 0);
         for (to, &i) in kept[..n_kept].iter().enumerate() {
-            let i = i as usize;
-            let x = std::array::from_fn(|c| columns[c][i]);
-            let class = self.class[i];
-            near.set(to, &x, (odds.of_class[usize::from(class)], side(class)), self.slot[i]);
+            let (i, class) = (i as usize, self.class[i as usize]);
+            near.x.0.iter_mut().zip(columns).for_each(|(near, column)| near[to] = column[i]);
+            near.odds[to] = odds.of_class[usize::from(class)];
+            (near.side[to], near.slot[to]) = (side(class), self.slot[i]);
         }
-        near.discount(odds);
-        near.pad();
+        if let Some((partner, distribution)) = &odds.partner {
+            near.discount(partner, *distribution);
+        }
+        near.resize(n_kept.next_multiple_of(LANES), PADDING_COORDINATE);
     }
 }
 
@@ -127,53 +120,31 @@ pub(super) struct Near<const D: usize> {
     /// Padded to whole vectors with rows of no effect, as are `odds` and `side`.
     pub(super) x: Columns<D>,
     pub(super) odds: Vec<f32>,
-    /// 1 where the edge may belong to the other slot of the record.
-    may_be_partners: Vec<f32>,
     side: Vec<Side>,
     pub(super) slot: Vec<u32>,
 }
 
 impl<const D: usize> Near<D> {
-    /// Resizes to `n` rows, which [`set`](Self::set) must fill.
+    /// Resizes the padded columns to `n` rows; new ones are at coordinate `x` and without odds.
     #[inline(always)]
-    fn resize(&mut self, n: usize) {
-        self.x.resize(n, 0.0);
+    fn resize(&mut self, n: usize, x: f32) {
+        self.x.resize(n, x);
         self.odds.resize(n, 0.0);
-        self.may_be_partners.resize(n, 0.0);
         self.side.resize(n, Side::Mutual);
-        self.slot.resize(n, 0);
     }
 
+    /// Discounts the odds of reverse edges, which may belong to the other slot of the record, by how well that slot's place explains them.
     #[inline(always)]
-    fn set(&mut self, i: usize, x: &[f32; D], (odds, side): ((f32, f32), Side), slot: u32) {
-        for (column, x) in self.x.0.iter_mut().zip(x) {
-            column[i] = *x;
-        }
-        (self.odds[i], self.may_be_partners[i]) = odds;
-        (self.side[i], self.slot[i]) = (side, slot);
-    }
-
-    /// Discounts the odds of edges that may belong to the other slot of the record, by how well that slot's place explains them.
-    #[inline(always)]
-    fn discount(&mut self, of: &Odds<'_, D>) {
-        if of.gain == 0.0 {
-            return;
-        }
+    fn discount(&mut self, partner: &[f32; D], (gain, inverse_a2): (f32, f32)) {
         let n = self.odds.len();
         let columns = self.x.first(n);
-        let (odds, may_be_partners) = (&mut self.odds[..n], &self.may_be_partners[..n]);
+        let (odds, side) = (&mut self.odds[..n], &self.side[..n]);
         for i in 0..n {
-            let r2 = distance2(&of.partner, &std::array::from_fn(|c| columns[c][i]));
-            let q = 1.0 / (1.0 + r2 * of.inverse_a2);
-            odds[i] /= 1.0 + may_be_partners[i] * odds[i] * of.gain * q * q * q;
+            let r2 = distance2(partner, &std::array::from_fn(|c| columns[c][i]));
+            let q = 1.0 / (1.0 + r2 * inverse_a2);
+            let may_be_partner = if side[i] == Side::Reverse { 1.0 } else { 0.0 };
+            odds[i] /= 1.0 + may_be_partner * odds[i] * gain * q * q * q;
         }
-    }
-
-    fn pad(&mut self) {
-        let n = self.odds.len().next_multiple_of(LANES);
-        self.x.resize(n, PADDING_COORDINATE);
-        self.odds.resize(n, 0.0);
-        self.side.resize(n, Side::Mutual);
     }
 
     #[inline(always)]
@@ -236,10 +207,10 @@ impl<const D: usize> Near<D> {
         let likelier = self.likelier(x, distribution);
         for (i, side) in self.side.as_chunks::<LANES>().0.iter().enumerate() {
             for lane in 0..LANES {
-                let one = ln(likelier(i, lane));
-                sums[0][lane] += one;
-                sums[1][lane] += if side[lane] == Side::Forward { one } else { 0.0 };
-                sums[2][lane] += if side[lane] == Side::Reverse { one } else { 0.0 };
+                let nats = ln(likelier(i, lane));
+                sums[0][lane] += nats;
+                sums[1][lane] += if side[lane] == Side::Forward { nats } else { 0.0 };
+                sums[2][lane] += if side[lane] == Side::Reverse { nats } else { 0.0 };
             }
         }
         let [all, forward, reverse]: [f32; 3] = sums.map(|lanes| lanes.iter().sum());

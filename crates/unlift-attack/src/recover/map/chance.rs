@@ -11,29 +11,23 @@ use crate::geometry::vector::{along, dot, median, sub, widen};
 use crate::neighbors::Neighborhoods;
 use crate::recover::map::grid::Grid;
 use crate::recover::map::lines::{LineRow, MOST_CHANCE};
-use crate::recover::map::places::trimmed_box;
+use crate::recover::map::places::{evenly, trimmed_box};
 use crate::simd::{Kernel, dispatch};
 
 /// Largest number of cells of a grid: 32 per axis, because density varies over the size of a room.
-const CELLS: usize = 1 << 15;
-/// Largest number of records whose density is summed, about one per cell; they are spread over the file.
-const RECORDS: usize = 1 << 15;
-/// Slots whose crossings with listed records give the box of the map: enough for a quantile of 3 %.
-const CROSSINGS: usize = 1 << 12;
+pub(crate) const CELLS: usize = 1 << 15;
 /// Least density, as a fraction of the mean: with chance near 0, a single vote would decide.
 const FLOOR: f32 = 0.05;
-/// A map is flat if the radius of neighborhoods exceeds this many times its thickness.
-const FLAT: f64 = 2.0;
 
 /// Density of records per cell.
 #[derive(Clone, Debug)]
 pub(crate) struct ChanceField<const D: usize> {
-    grid: Grid<D>,
+    pub(crate) grid: Grid<D>,
 }
 
 impl<const D: usize> ChanceField<D> {
     /// Creates the field from sums of weighted length per cell; `weight` is the weight of all records.
-    fn new(mut grid: Grid<D>, weight: f32) -> Self {
+    pub(crate) fn new(mut grid: Grid<D>, weight: f32) -> Self {
         grid.smooth(1);
         let scale = 1.0 / (weight * grid.volume()).max(f32::MIN_POSITIVE);
         let mean = grid.values.iter().sum::<f32>() / grid.values.len() as f32;
@@ -89,13 +83,15 @@ pub(crate) fn of_lines<const D: usize>(
     lists: &Neighborhoods,
     slots_per_record: usize,
 ) -> Vec<ChanceField<D>> {
-    let n_groups = n_groups(rows);
+    // The centers up to the last one that has a ray; none for lines.
+    let rays = rows.iter().filter(|row| row.is_ray());
+    let n_groups = rays.map(|row| row.group + 1).max();
     let (low, high) = box_of_crossings(rows, lists, slots_per_record);
     let counts = times_listed(lists, rows.len());
-    let every = rows.len().div_ceil(RECORDS).max(1);
     let field = |own: u32| {
         let of_others = |&record: &usize| n_groups.is_none() || rows[record].group != own;
-        let chosen: Vec<usize> = (0..rows.len()).step_by(every).filter(of_others).collect();
+        // About one record per cell, spread over the file.
+        let chosen: Vec<usize> = evenly(rows.len(), CELLS).filter(of_others).collect();
         let weight = chosen.iter().map(|&r| counts[r] as f32).sum();
         let mut total = Grid::over(low, high, CELLS);
         let lengths = |records: &[usize]| {
@@ -110,11 +106,6 @@ pub(crate) fn of_lines<const D: usize>(
         ChanceField::new(total, weight)
     };
     (0..n_groups.unwrap_or(1)).map(field).collect()
-}
-
-/// Returns the number of centers up to the last one that has a ray; `None` for lines.
-fn n_groups<const D: usize>(rows: &[LineRow<D>]) -> Option<u32> {
-    rows.iter().filter(|row| row.is_ray()).map(|row| row.group + 1).max()
 }
 
 /// Adds the lengths of some records, each as often as it is listed, to a grid.
@@ -150,7 +141,8 @@ impl<const D: usize> Kernel for Lengths<'_, D> {
     }
 }
 
-fn times_listed(lists: &Neighborhoods, n_records: usize) -> Vec<u32> {
+/// Returns how many lists name each record.
+pub(crate) fn times_listed(lists: &Neighborhoods, n_records: usize) -> Vec<u32> {
     let mut counts = vec![0; n_records];
     lists.records().iter().for_each(|record| counts[record.index()] += 1);
     counts
@@ -162,97 +154,16 @@ fn box_of_crossings<const D: usize>(
     lists: &Neighborhoods,
     slots_per_record: usize,
 ) -> ([f32; D], [f32; D]) {
-    let every = lists.n_slots().div_ceil(CROSSINGS).max(1);
     let crossings = |slot: usize| {
         let own = &rows[slot / slots_per_record];
         // Lists are in order of record, which is random, so any entries will do.
         let listed = lists.of(slot).iter().take(2);
         listed.filter_map(|record| own.crossing(&rows[record.index()]))
     };
-    let slots = (0..lists.n_slots()).step_by(every);
+    // Enough for a quantile of 3 %.
+    let slots = evenly(lists.n_slots(), 1 << 12);
     let places: Vec<[f32; D]> = slots.flat_map(crossings).collect();
-    trimmed_box(|c| places.iter().map(|place| place[c]).collect())
-}
-
-/// Returns the field of axis candidates: the density of their lines along each axis.
-pub(crate) fn of_candidates<const D: usize>(
-    rows: &[[f32; D]],
-    lists: &Neighborhoods,
-) -> CandidateField<D> {
-    let counts = times_listed(lists, rows.len());
-    let (low, high) = trimmed_box::<D>(|c| rows.iter().map(|row| row[c]).collect());
-    let weight: f32 = counts.iter().map(|&n| n as f32).sum();
-    let along = std::array::from_fn(|axis| {
-        let (mut low, mut high) = (low, high);
-        (low[axis], high[axis]) = (0.0, 0.0);
-        let mut grid = Grid::over(low, high, CELLS / 8);
-        // The grid has one cell along this axis, in which the line is as long as the cell.
-        let length = grid.cell;
-        for (row, &n) in rows.iter().zip(&counts) {
-            let cell = grid.index(row);
-            grid.values[cell] += n as f32 * length;
-        }
-        ChanceField::new(grid, weight)
-    });
-    CandidateField { along }
-}
-
-/// The density of the lines through published points, one field per axis of the lines.
-#[derive(Clone, Debug)]
-pub(crate) struct CandidateField<const D: usize> {
-    along: [ChanceField<D>; D],
-}
-
-impl<const D: usize> CandidateField<D> {
-    /// Returns the chance that a random record passes within `delta` of a typical place.
-    pub(crate) fn typical_chance(&self, delta: f32) -> f32 {
-        self.along.iter().zip(self.tubes(delta)).map(|(field, tube)| field.typical() * tube).sum()
-    }
-
-    /// For a flat map, whose box is much thinner than neighborhoods are wide, returns the radius of the disc that holds the fraction
-    /// `share` of it; `None` for other maps.
-    pub(crate) fn radius_if_flat(&self, share: f64) -> Option<f64> {
-        // Each field has no extent along its own axis.
-        let side = |c: usize| f64::from(self.along[(c + 1) % D].grid.sides()[c]);
-        let mut sides: [f64; D] = std::array::from_fn(side);
-        sides.sort_unstable_by(f64::total_cmp);
-        let [thin, middle, long] = sides[..] else { return None };
-        let radius = (share * middle * long / std::f64::consts::PI).sqrt();
-        (FLAT * thin < radius && 2.0 * radius <= middle).then_some(radius)
-    }
-
-    /// Returns, per axis, the volume per length within `delta` of a line along it and within the box of the map.
-    pub(crate) fn tubes(&self, delta: f32) -> [f32; D] {
-        std::array::from_fn(|axis| {
-            let sides = self.along[axis].grid.sides();
-            let across = (0..D).filter(|c| *c != axis);
-            let share = across.map(|c| (sides[c] / (2.0 * delta)).min(1.0));
-            tube(D, delta) * share.product::<f32>()
-        })
-    }
-
-    /// Returns the chance that any line of a random record passes through a tube about `x`.
-    #[inline(always)]
-    pub(crate) fn at(&self, x: &[f32; D], tubes: &[f32; D]) -> f32 {
-        let along = self.along.iter().zip(tubes);
-        along.map(|(field, &tube)| field.at(x, tube)).sum::<f32>().min(MOST_CHANCE)
-    }
-
-    /// Adds the chance, without its limit, at each `t` of the line through `own` along `axis` to `chance`.
-    #[inline(always)]
-    pub(crate) fn add_along(
-        &self,
-        (own, axis): (&[f32; D], usize),
-        t: &[f32],
-        tubes: &[f32; D],
-        (cells, chance): (&mut [u32], &mut [f32]),
-    ) {
-        let (mut through, mut direction) = (*own, [0.0; D]);
-        (through[axis], direction[axis]) = (0.0, 1.0);
-        for (field, &tube) in self.along.iter().zip(tubes) {
-            field.add_along((&through, &direction), t, tube, (&mut *cells, &mut *chance));
-        }
-    }
+    trimmed_box(&places)
 }
 
 // Lists without information.
@@ -298,9 +209,6 @@ pub(crate) fn mixed(
 
 // The extent of a map, from the records alone.
 
-/// A map has separate parts if its quartiles are this many times as far apart as one part is wide.
-const FAR_APART: f64 = 4.0;
-
 pub(crate) fn interquartile_range(sorted: &[f32]) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else {
         return 0.0;
@@ -308,8 +216,8 @@ pub(crate) fn interquartile_range(sorted: &[f32]) -> f64 {
     f64::from(sorted[last - last / 4]) - f64::from(sorted[last / 4])
 }
 
-/// Whether sorted values have separate parts. For evenly spread values, the distance of the quartiles is four times the width of
-/// an eighth of the values.
+/// Whether sorted values have separate parts: their quartiles are four times as far apart as those of evenly spread values, for which the
+/// distance is four times the width of an eighth of the values.
 pub(crate) fn are_in_parts(sorted: &[f32]) -> bool {
     let many = sorted.len() / 8;
     if many == 0 {
@@ -317,18 +225,14 @@ pub(crate) fn are_in_parts(sorted: &[f32]) -> bool {
     }
     let width = |at: usize| f64::from(sorted[at + many]) - f64::from(sorted[at]);
     let mut widths: Vec<f64> = (0..sorted.len() - many).map(width).collect();
-    FAR_APART * 4.0 * median(&mut widths) < interquartile_range(sorted)
+    16.0 * median(&mut widths) < interquartile_range(sorted)
 }
-
-/// Number of lines, and of iterations (each leaves a third of the error), with which [`line_extent`] finds the middle of a map.
-const MIDDLE: (usize, usize) = (1000, 60);
 
 /// Returns the median distance of the lines from their middle. Distances from the origin would depend on how a shifted or
 /// scaled map rounds its origin.
 pub(crate) fn line_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
     // Spread over the file: a given map need not be in random order.
-    let every = rows.len().div_ceil(MIDDLE.0).max(1);
-    let rows: Vec<&LineRow<D>> = rows.iter().step_by(every).collect();
+    let rows: Vec<&LineRow<D>> = evenly(rows.len(), 1000).map(|row| &rows[row]).collect();
     let offset = |row: &LineRow<D>, from: &[f64; D]| {
         let (through, direction) = (widen(&row.through), widen(&row.direction));
         let away = sub(&through, from);
@@ -337,7 +241,7 @@ pub(crate) fn line_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
     // Each iteration moves to the mean of the lines' nearest points. The remaining error shrinks by the mean squared cosine with the
     // lines, about a third.
     let mut middle = [0.0; D];
-    for _ in 0..MIDDLE.1 {
+    for _ in 0..60 {
         let mut step = [0.0; D];
         for row in &rows {
             step = along(&step, 1.0 / rows.len() as f64, &offset(row, &middle));

@@ -1,17 +1,20 @@
 //! The three families: lines and rays, axis planes, and axis candidates.
 
 use crate::RecordId;
+use crate::geometry::vector::median;
 use crate::neighbors::Neighborhoods;
-use crate::recover::consensus::{self, Scratch};
+use crate::recover::consensus::Scratch;
 use crate::recover::map::chance::{
-    self, CandidateField, ChanceField, interquartile_range, line_extent, ray_extent, tube,
+    self, CELLS, ChanceField, are_in_parts, interquartile_range, line_extent, ray_extent,
+    times_listed, tube,
 };
 use crate::recover::map::family::{Family, Piece};
 use crate::recover::map::graph::record_of;
-use crate::recover::map::lines::{LineRow, ln, rows_of};
-use crate::recover::map::planes::{SortedPlanes, window_chance};
-use crate::recover::result::Estimate;
-use crate::released::{AxisPlanes, Released};
+use crate::recover::map::grid::Grid;
+use crate::recover::map::lines::{LineRow, MOST_CHANCE, evidence, ln, rows_of};
+use crate::recover::map::places::{evenly, trimmed_box, unit};
+use crate::recover::result::{Estimate, Status};
+use crate::released::{AxisPlanes, Obfuscation, Released};
 use crate::simd::prefetch;
 
 /// Lines with one or two slots each, or rays, which have a group.
@@ -29,12 +32,16 @@ const LEAST_RANGE: f32 = 1e-3;
 
 impl<const D: usize> LineFamily<D> {
     /// Prepares lines or rays, cut at the bounds where these are known, and learns their chance from `lists`.
-    pub(crate) fn new(released: &Released<D>, lists: &Neighborhoods, anchored: bool) -> Self {
+    pub(crate) fn new(released: &Released<D>, lists: &Neighborhoods) -> Self {
         let slots_per_record = released.slots_per_record();
         let bounds = released.bounds().map(|bounds| bounds.about(&released.origin()));
         let rows = rows_of(released, bounds.as_ref());
         let chance = chance::of_lines(&rows, lists, slots_per_record);
-        Self { rows, slots_per_record, chance, anchored }
+        let regions = match released.obfuscation() {
+            Obfuscation::Rays(rays) => rays.regions(),
+            _ => None,
+        };
+        Self { rows, slots_per_record, chance, anchored: regions.is_some() }
     }
 
     #[inline(always)]
@@ -48,7 +55,7 @@ impl<const D: usize> LineFamily<D> {
 
     /// Returns the chance of the records that may vote for a point on `own`.
     #[inline(always)]
-    pub(crate) fn field(&self, own: &LineRow<D>) -> &ChanceField<D> {
+    fn field(&self, own: &LineRow<D>) -> &ChanceField<D> {
         &self.chance[if own.is_ray() { own.group as usize } else { 0 }]
     }
 }
@@ -63,10 +70,6 @@ impl<const D: usize> Family<D> for LineFamily<D> {
 
     fn at_delta(&self, delta: f32) -> f32 {
         tube(D, delta)
-    }
-
-    fn slots_per_record(&self) -> usize {
-        self.slots_per_record
     }
 
     fn anchored(&self) -> Option<&[LineRow<D>]> {
@@ -102,11 +105,25 @@ impl<const D: usize> Family<D> for LineFamily<D> {
         &self,
         slot: usize,
         listed: &[RecordId],
-        at: (f32, &f32),
+        (delta, &tube): (f32, &f32),
         scratch: &mut Scratch<D>,
     ) -> Estimate<D> {
-        scratch.lines.gather(&self.rows, listed);
-        consensus::on_line(self, slot, at, scratch)
+        let Scratch { lines, sections, intervals, .. } = scratch;
+        let (own, delta2) = (self.own(slot), delta * delta);
+        lines.gather(&self.rows, listed);
+        lines.sections(own, sections);
+        let may_vote = lines.n_that_may_vote(own);
+        if sections.n_voting() < 2 {
+            return Estimate::lost(Status::not_fixed(may_vote));
+        }
+        let limits = (delta2, own.floor(), own.to);
+        let Some(peak) = intervals.peak(sections, limits, may_vote, |t, cells, chance| {
+            self.field(own).add_along((&own.through, &own.direction), t, tube, (cells, chance));
+        }) else {
+            return Estimate::lost(Status::NoSupport);
+        };
+        let (t, support) = sections.refit(peak.t, delta2);
+        Estimate::at(own.at(own.clamp(t)), support, 0, peak.evidence)
     }
 
     #[inline(always)]
@@ -115,11 +132,6 @@ impl<const D: usize> Family<D> for LineFamily<D> {
         let sense = if own.floor() == 0.0 { own.direction } else { [0.0; D] };
         let line = Piece::line(own.through, own.direction);
         Piece { sense, to: own.to, from_center: own.is_ray(), ..line }
-    }
-
-    #[inline(always)]
-    fn direction(&self, slot: usize, _: usize) -> [f32; D] {
-        self.own(slot).direction
     }
 
     #[inline(always)]
@@ -150,25 +162,72 @@ impl<const D: usize> Family<D> for LineFamily<D> {
     }
 }
 
-#[inline(always)]
-fn unit<const D: usize>(axis: usize) -> [f32; D] {
-    std::array::from_fn(|c| if c == axis { 1.0 } else { 0.0 })
-}
-
-/// Axis planes, sorted by their offsets.
+/// Axis planes. Each free coordinate is solved on its own, as the densest window of offsets.
 pub(crate) struct PlaneFamily<'a, const D: usize> {
     pub(crate) planes: &'a AxisPlanes<D>,
-    sorted: SortedPlanes,
+    by_axis: [SortedPlanes; D],
+}
+
+/// The planes of one axis.
+struct SortedPlanes {
+    /// Records in order of their offsets.
+    order: Vec<u32>,
+    /// Distance between the quartiles of the offsets.
+    quartiles: f64,
+    /// Sorted offsets if the map has separate parts along this axis, else empty.
+    in_parts: Vec<f32>,
+}
+
+/// Half width of the final mean in deltas. The window is already sharp, and a wider mean is more stable.
+const REFIT: f32 = 1.5;
+
+impl SortedPlanes {
+    fn new<const D: usize>(planes: &AxisPlanes<D>, axis: usize) -> Self {
+        let offset = |record: u32| planes.offset()[record as usize];
+        let of_axis = (0u32..).zip(planes.axis()).filter(|(_, of)| usize::from(**of) == axis);
+        let mut order: Vec<u32> = of_axis.map(|(record, _)| record).collect();
+        order.sort_unstable_by(|&a, &b| offset(a).total_cmp(&offset(b)).then(a.cmp(&b)));
+        let offsets: Vec<f32> = order.iter().map(|&record| offset(record)).collect();
+        let quartiles = interquartile_range(&offsets);
+        let in_parts = if are_in_parts(&offsets) { offsets } else { Vec::new() };
+        Self { order, quartiles, in_parts }
+    }
+
+    /// Returns the chance that a random plane of this axis passes within `delta` of a typical place.
+    fn typical_chance(&self, delta: f32) -> f32 {
+        let offsets = &self.in_parts;
+        if offsets.is_empty() {
+            // Half of the planes lie between the quartiles.
+            return (f64::from(delta) / self.quartiles.max(f64::from(f32::MIN_POSITIVE))) as f32;
+        }
+        let share_within = |&at: &f32| {
+            let low = offsets.partition_point(|&offset| offset < at - delta);
+            let high = offsets.partition_point(|&offset| offset <= at + delta);
+            (high - low) as f64 / offsets.len() as f64
+        };
+        let places = evenly(offsets.len(), 1 << 10).map(|at| &offsets[at]);
+        let mut shares: Vec<f64> = places.map(share_within).collect();
+        median(&mut shares) as f32
+    }
 }
 
 impl<'a, const D: usize> PlaneFamily<'a, D> {
     pub(crate) fn new(planes: &'a AxisPlanes<D>) -> Self {
-        Self { planes, sorted: SortedPlanes::new(planes) }
+        Self { planes, by_axis: std::array::from_fn(|axis| SortedPlanes::new(planes, axis)) }
     }
 
     #[inline(always)]
-    fn axis(&self, record: usize) -> usize {
+    pub(crate) fn axis(&self, record: usize) -> usize {
         usize::from(self.planes.axis()[record])
+    }
+
+    /// Sorts `listed` planes by axis.
+    pub(crate) fn gather(&self, listed: &[RecordId], by_axis: &mut Vec<Vec<(f32, RecordId)>>) {
+        by_axis.resize_with(D, Vec::new);
+        by_axis.iter_mut().for_each(Vec::clear);
+        for &record in listed {
+            by_axis[self.axis(record.index())].push((self.planes.offset()[record.index()], record));
+        }
     }
 }
 
@@ -182,20 +241,32 @@ impl<const D: usize> Family<D> for PlaneFamily<'_, D> {
     const ACROSS: f64 = 3.0 / 4.0;
     const KEEPS_NEAR_EDGE: bool = false;
 
-    /// Per record, the chance of the window that starts at its offset; and the typical chance.
+    /// Per record, the chance that a random plane of its axis has an offset in `[offset, offset + 2 delta]`, counted exactly; and the
+    /// typical chance.
     type AtDelta = (Vec<f32>, f32);
 
     fn at_delta(&self, delta: f32) -> (Vec<f32>, f32) {
-        (window_chance(self.planes, &self.sorted, delta), self.typical_chance(delta))
+        let mut chance = vec![0.0; self.planes.len()];
+        for SortedPlanes { order, .. } in &self.by_axis {
+            let offset = |at: usize| self.planes.offset()[order[at] as usize];
+            let mut end = 0;
+            for (start, &record) in order.iter().enumerate() {
+                while end < order.len() && offset(end) <= offset(start) + 2.0 * delta {
+                    end += 1;
+                }
+                chance[record as usize] = ((end - start) as f32 - 0.5) / (order.len() as f32 + 1.0);
+            }
+        }
+        (chance, self.typical_chance(delta))
     }
 
     /// The largest interquartile range over the axes.
     fn extent(&self) -> f64 {
-        self.sorted.extent()
+        self.by_axis.iter().map(|axis| axis.quartiles).fold(0.0, f64::max)
     }
 
     fn typical_chance(&self, delta: f32) -> f32 {
-        self.sorted.typical_chance(delta)
+        self.by_axis.iter().map(|axis| axis.typical_chance(delta)).fold(0.5, f32::min)
     }
 
     fn limits(&self, share: f64) -> [f64; 2] {
@@ -207,10 +278,21 @@ impl<const D: usize> Family<D> for PlaneFamily<'_, D> {
         &self,
         slot: usize,
         listed: &[RecordId],
-        (delta, at): (f32, &(Vec<f32>, f32)),
-        scratch: &mut Scratch<D>,
+        (delta, (chance, _)): (f32, &(Vec<f32>, f32)),
+        Scratch { by_axis, .. }: &mut Scratch<D>,
     ) -> Estimate<D> {
-        consensus::on_plane(self.planes, slot, listed, (delta, &at.0), &mut scratch.by_axis)
+        self.gather(listed, by_axis);
+        let own = self.axis(slot);
+        let (mut position, mut support, mut evidence) = ([self.planes.offset()[slot]; D], 0, 0.0);
+        for (axis, of_axis) in by_axis.iter_mut().enumerate().filter(|(axis, _)| *axis != own) {
+            let Some(window) = best_window(of_axis, chance, delta) else {
+                return Estimate::lost(Status::not_fixed(listed.len()));
+            };
+            position[axis] = window.0;
+            support += window.1;
+            evidence += window.2;
+        }
+        Estimate::at(position, support, 0, evidence)
     }
 
     #[inline(always)]
@@ -219,12 +301,7 @@ impl<const D: usize> Family<D> for PlaneFamily<'_, D> {
         let at = |c: usize| if c == own { offset } else { 0.0 };
         let free = |r: usize| if r == own { [0.0; D] } else { unit(r) };
         let along = std::array::from_fn(free);
-        Piece { along, ..Piece::line(std::array::from_fn(at), [0.0; D]) }
-    }
-
-    #[inline(always)]
-    fn direction(&self, slot: usize, _: usize) -> [f32; D] {
-        unit(self.axis(slot))
+        Piece { along, ..Piece::line(std::array::from_fn(at), unit(own)) }
     }
 
     #[inline(always)]
@@ -244,23 +321,68 @@ impl<const D: usize> Family<D> for PlaneFamily<'_, D> {
     }
 }
 
+/// Returns the window of width `2 delta` over the listed planes of one axis with the largest evidence plus prior: the mean of its offsets,
+/// after it was centered anew, the number of offsets that support it, and their evidence. `listed` has the (offset, record) of these planes
+/// and gets sorted; `chance` is that of a window from the offset of a record.
+// Without inlining, consensus on planes takes half as long again.
+#[inline(always)]
+fn best_window(
+    listed: &mut [(f32, RecordId)],
+    chance: &[f32],
+    delta: f32,
+) -> Option<(f32, u32, f32)> {
+    listed.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut best: Option<(f32, f32, usize, usize)> = None;
+    let mut end = 0;
+    for start in 0..listed.len() {
+        while end < listed.len() && listed[end].0 <= listed[start].0 + 2.0 * delta {
+            end += 1;
+        }
+        let p = chance[listed[start].1.index()];
+        let evidence = evidence((end - start) as f32, listed.len() as f32, p);
+        let score = evidence + ln(p);
+        if best.is_none_or(|b| score > b.0) {
+            best = Some((score, evidence, start, end));
+        }
+    }
+    let (_, evidence, start, end) = best?;
+    // Offsets are summed relative to the first, so that maps far from the origin lose no digits.
+    let mean = |rows: &[(f32, RecordId)]| {
+        rows[0].0 + rows.iter().map(|r| r.0 - rows[0].0).sum::<f32>() / rows.len() as f32
+    };
+    let first = mean(&listed[start..end]);
+    let low = listed.partition_point(|r| r.0 < first - REFIT * delta);
+    let high = listed.partition_point(|r| r.0 <= first + REFIT * delta);
+    let (offset, count) =
+        if low < high { (mean(&listed[low..high]), high - low) } else { (first, end - start) };
+    Some((offset, count as u32, evidence))
+}
+
 /// Axis candidates: published points of which one coordinate is foreign.
 pub(crate) struct CandidateFamily<'a, const D: usize> {
     pub(crate) rows: &'a [[f32; D]],
-    pub(crate) chance: CandidateField<D>,
+    /// The density of the lines through published points along each axis.
+    along: [ChanceField<D>; D],
 }
-
-/// Chance at the least delta, as a multiple of the fraction of all records in one list: if points lie on surfaces, one line passes as close
-/// as neighbors are with that probability, and a record has three lines.
-const LEAST_CHANCE: f64 = 3.0;
-/// Upper bound of that chance, for lists with a large fraction of all records.
-const MOST_LEAST_CHANCE: f64 = 0.25;
-/// Least delta in flat maps, as a fraction of the radius that holds a list's neighbors.
-const LEAST_OF_FLAT: f64 = 0.5;
 
 impl<'a, const D: usize> CandidateFamily<'a, D> {
     pub(crate) fn new(rows: &'a [[f32; D]], lists: &Neighborhoods) -> Self {
-        Self { rows, chance: chance::of_candidates(rows, lists) }
+        let counts = times_listed(lists, rows.len());
+        let (low, high) = trimmed_box(rows);
+        let weight: f32 = counts.iter().map(|&n| n as f32).sum();
+        let along = std::array::from_fn(|axis| {
+            let (mut low, mut high) = (low, high);
+            (low[axis], high[axis]) = (0.0, 0.0);
+            let mut grid = Grid::over(low, high, CELLS / 8);
+            // The grid has one cell along this axis, in which the line is as long as the cell.
+            let length = grid.cell;
+            for (row, &n) in rows.iter().zip(&counts) {
+                let cell = grid.index(row);
+                grid.values[cell] += n as f32 * length;
+            }
+            ChanceField::new(grid, weight)
+        });
+        Self { rows, along }
     }
 }
 
@@ -277,7 +399,12 @@ impl<const D: usize> Family<D> for CandidateFamily<'_, D> {
     type AtDelta = [f32; D];
 
     fn at_delta(&self, delta: f32) -> [f32; D] {
-        self.chance.tubes(delta)
+        std::array::from_fn(|axis| {
+            let sides = self.along[axis].grid.sides();
+            let across = (0..D).filter(|c| *c != axis);
+            let share = across.map(|c| (sides[c] / (2.0 * delta)).min(1.0));
+            tube(D, delta) * share.product::<f32>()
+        })
     }
 
     /// The largest interquartile range over the axes.
@@ -291,15 +418,25 @@ impl<const D: usize> Family<D> for CandidateFamily<'_, D> {
     }
 
     fn typical_chance(&self, delta: f32) -> f32 {
-        self.chance.typical_chance(delta)
+        let along = self.along.iter().zip(self.at_delta(delta));
+        along.map(|(field, tube)| field.typical() * tube).sum()
     }
 
     fn radius_if_flat(&self, share: f64) -> Option<f64> {
-        self.chance.radius_if_flat(share)
+        // Each field has no extent along its own axis.
+        let side = |c: usize| f64::from(self.along[(c + 1) % D].grid.sides()[c]);
+        let mut sides: [f64; D] = std::array::from_fn(side);
+        sides.sort_unstable_by(f64::total_cmp);
+        let [thin, middle, long] = sides[..] else { return None };
+        let radius = (share * middle * long / std::f64::consts::PI).sqrt();
+        // Flat: the radius of neighborhoods exceeds twice the thickness.
+        (2.0 * thin < radius && 2.0 * radius <= middle).then_some(radius)
     }
 
     fn least_delta(&self, share: f64) -> f64 {
-        let least = (LEAST_CHANCE * share).min(MOST_LEAST_CHANCE) as f32;
+        // If points lie on surfaces, one line passes as close as neighbors are with probability `share`, and a record has three lines. Lists
+        // may hold a large fraction of all records.
+        let least = (3.0 * share).min(0.25) as f32;
         // Chance grows with delta: bisect to more than 32 bits.
         let (mut below, mut above) = (0.0, self.extent());
         for _ in 0..48 {
@@ -310,7 +447,7 @@ impl<const D: usize> Family<D> for CandidateFamily<'_, D> {
                 above = middle;
             }
         }
-        let of_flat = self.radius_if_flat(share).map_or(0.0, |radius| LEAST_OF_FLAT * radius);
+        let of_flat = self.radius_if_flat(share).map_or(0.0, |radius| 0.5 * radius);
         f64::max(above, of_flat)
     }
 
@@ -319,26 +456,50 @@ impl<const D: usize> Family<D> for CandidateFamily<'_, D> {
         prefetch(self.rows, record);
     }
 
+    /// Returns the best estimate on any axis line. Axes are compared by evidence, not by counts: along the long axis of an elongated map
+    /// more records agree by chance.
     #[inline(always)]
     fn consensus(
         &self,
         slot: usize,
         listed: &[RecordId],
-        at: (f32, &[f32; D]),
+        (delta, tubes): (f32, &[f32; D]),
         scratch: &mut Scratch<D>,
     ) -> Estimate<D> {
-        scratch.candidates.fill(listed, |record| self.rows[record.index()]);
-        consensus::on_candidates(&self.rows[slot], &self.chance, at, scratch)
+        let Scratch { candidates, sections, intervals, .. } = scratch;
+        candidates.fill(listed, |record| self.rows[record.index()]);
+        if listed.len() < 2 {
+            return Estimate::lost(Status::TooFewNeighbors);
+        }
+        let (own, delta2) = (self.rows[slot], delta * delta);
+        let limits = (delta2, f32::NEG_INFINITY, f32::INFINITY);
+        let mut best = Estimate::lost(Status::NoSupport);
+        let mut best_score = f32::NEG_INFINITY;
+        for axis in 0..D {
+            candidates.sections(&own, axis, delta2, sections);
+            let (mut through, direction) = (own, unit(axis));
+            through[axis] = 0.0;
+            let Some(peak) = intervals.peak(sections, limits, listed.len(), |t, cells, chance| {
+                for (field, &tube) in self.along.iter().zip(tubes) {
+                    field.add_along((&through, &direction), t, tube, (&mut *cells, &mut *chance));
+                }
+            }) else {
+                continue;
+            };
+            if peak.score > best_score {
+                best_score = peak.score;
+                let (t, support) = sections.refit(peak.t, delta2);
+                let mut position = own;
+                position[axis] = t;
+                best = Estimate::at(position, support, axis, peak.evidence);
+            }
+        }
+        best
     }
 
     #[inline(always)]
     fn piece(&self, slot: usize, piece: usize) -> Piece<D> {
         Piece::line(self.rows[slot], unit(piece))
-    }
-
-    #[inline(always)]
-    fn direction(&self, _: usize, piece: usize) -> [f32; D] {
-        unit(piece)
     }
 
     #[inline(always)]
@@ -354,6 +515,7 @@ impl<const D: usize> Family<D> for CandidateFamily<'_, D> {
 
     #[inline(always)]
     fn record_chance(&self, _: usize, x: &[f32; D], tubes: &[f32; D]) -> f32 {
-        self.chance.at(x, tubes)
+        let along = self.along.iter().zip(tubes);
+        along.map(|(field, &tube)| field.at(x, tube)).sum::<f32>().min(MOST_CHANCE)
     }
 }

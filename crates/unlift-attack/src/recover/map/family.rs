@@ -4,6 +4,7 @@ use crate::RecordId;
 use crate::recover::baselines::ransac::Trials;
 use crate::recover::consensus::Scratch;
 use crate::recover::map::lines::LineRow;
+use crate::recover::map::places::distance2;
 use crate::recover::result::Estimate;
 
 /// A flat piece of a feasible set: a line, a chord, a half-line or a plane.
@@ -11,6 +12,8 @@ use crate::recover::result::Estimate;
 pub(crate) struct Piece<const D: usize> {
     /// A point of the piece; the end of a half-line.
     pub(crate) through: [f32; D],
+    /// Unit direction of the piece; of a plane, its normal.
+    pub(crate) direction: [f32; D],
     /// Projection matrix onto the directions of the piece.
     pub(crate) along: [[f32; D]; D],
     /// Direction of a half-line or a chord; zero for other pieces.
@@ -22,9 +25,11 @@ pub(crate) struct Piece<const D: usize> {
 }
 
 impl<const D: usize> Piece<D> {
+    #[inline(always)]
     pub(crate) fn line(through: [f32; D], direction: [f32; D]) -> Self {
         let along = std::array::from_fn(|r| std::array::from_fn(|c| direction[r] * direction[c]));
-        Self { through, along, sense: [0.0; D], to: f32::INFINITY, from_center: false }
+        let (sense, to) = ([0.0; D], f32::INFINITY);
+        Self { through, direction, along, sense, to, from_center: false }
     }
 
     /// Returns the point of the piece nearest to `x`.
@@ -85,9 +90,6 @@ pub(crate) trait Family<const D: usize>: Trials<D> + Sync {
     type AtDelta: Sync;
 
     fn at_delta(&self, delta: f32) -> Self::AtDelta;
-    fn slots_per_record(&self) -> usize {
-        1
-    }
     /// Returns rays whose centers have regions. Such rays of one center meet only there, and rays of two centers do not meet.
     fn anchored(&self) -> Option<&[LineRow<D>]> {
         None
@@ -104,7 +106,7 @@ pub(crate) trait Family<const D: usize>: Trials<D> + Sync {
     fn limits(&self, share: f64) -> [f64; 2] {
         [libm::pow(share, 2.0 / 3.0), libm::pow(share, 2.0)]
     }
-    /// In a flat map, returns the radius about a place that holds the fraction `share` of the points.
+    /// In a flat map, returns the radius about a place that holds the fraction `share` of the points; `None` for other maps.
     fn radius_if_flat(&self, _share: f64) -> Option<f64> {
         None
     }
@@ -124,8 +126,12 @@ pub(crate) trait Family<const D: usize>: Trials<D> + Sync {
         scratch: &mut Scratch<D>,
     ) -> Estimate<D>;
     fn piece(&self, slot: usize, piece: usize) -> Piece<D>;
-    /// Returns the unit direction of a piece, or its normal.
-    fn direction(&self, slot: usize, piece: usize) -> [f32; D];
+    /// Whether any piece of the feasible set of `slot` passes `x` within a squared distance.
+    #[inline(always)]
+    fn is_near(&self, slot: usize, x: &[f32; D], within2: f32) -> bool {
+        let is_near = |piece| distance2(&self.piece(slot, piece).project(x), x) < within2;
+        (0..Self::PIECES).any(is_near)
+    }
     /// Whether a record near a place is evidence for a point of `slot`.
     #[inline(always)]
     fn may_vote(&self, _slot: usize, _record: usize) -> bool {

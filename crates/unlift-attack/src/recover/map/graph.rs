@@ -4,6 +4,8 @@
 //! classes by direction (one end lists the other, or both do) and by the score of the source. Edges of one class share
 //! an inlier ratio, which recovery learns.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::RecordId;
@@ -21,8 +23,6 @@ pub(crate) enum Side {
 const SCORE_CLASSES: usize = 8;
 /// Quantiles of all scores at which classes begin: finer at the top, where most true neighbors are.
 const SCORE_RANKS: [f64; SCORE_CLASSES - 1] = [0.3, 0.55, 0.72, 0.84, 0.91, 0.955, 0.98];
-/// Number of scores from which these quantiles are computed.
-const SCORES: usize = 1 << 16;
 pub(crate) const CLASSES: usize = 3 * SCORE_CLASSES;
 /// Largest number of reverse edges of a slot, as a multiple of the mean list length: a record in very many lists is in most of
 /// them by mistake.
@@ -36,13 +36,6 @@ pub(crate) fn record_of(slot: usize, slots_per_record: usize) -> usize {
     slot >> (slots_per_record - 1)
 }
 
-/// Whether an edge of this class leads to a record without saying which of its two slots: lists have records as entries, while
-/// the slot that owns a list is known.
-#[inline(always)]
-pub(crate) fn either(class: u8, slots_per_record: usize) -> bool {
-    slots_per_record == 2 && side(class) != Side::Reverse
-}
-
 #[inline(always)]
 pub(crate) fn side(class: u8) -> Side {
     match usize::from(class) / SCORE_CLASSES {
@@ -54,7 +47,7 @@ pub(crate) fn side(class: u8) -> Side {
 
 /// Returns the least score of each class but the first; empty without scores.
 fn score_bounds(lists: &Neighborhoods) -> Vec<f32> {
-    let step = lists.records().len().div_ceil(SCORES).max(1);
+    let step = lists.records().len().div_ceil(1 << 16).max(1);
     let mut sample: Vec<f32> =
         lists.scores().unwrap_or(&[]).iter().step_by(step).copied().collect();
     sample.sort_unstable_by(f32::total_cmp);
@@ -109,7 +102,7 @@ pub(crate) struct Graph {
     /// Slots; the first slot of a record if the edge does not specify which.
     ends: Vec<u32>,
     class: Vec<u8>,
-    slots_per_record: usize,
+    pub(crate) slots_per_record: usize,
     pub(crate) listers: Listers,
 }
 
@@ -156,10 +149,10 @@ impl Graph {
         let parts: Vec<_> = slots
             .into_par_iter()
             .map(|first| {
-                let mut found = (Vec::new(), Vec::new());
+                let mut part = (Vec::new(), Vec::new());
                 let slots = first..(first + PART).min(n_slots);
-                let until: Vec<u64> = slots.map(|slot| edges(slot, &mut found)).collect();
-                (until, found)
+                let until: Vec<u64> = slots.map(|slot| edges(slot, &mut part)).collect();
+                (until, part)
             })
             .collect();
         let (mut offsets, mut ends, mut class) = (vec![0], Vec::new(), Vec::new());
@@ -171,16 +164,35 @@ impl Graph {
         Self { offsets, ends, class, slots_per_record, listers }
     }
 
-    /// Returns the ends of the edges of `slot`, and the class of each.
+    /// Returns the end and the class of each edge of `slot`.
     #[inline(always)]
-    pub(crate) fn of(&self, slot: usize) -> (&[u32], &[u8]) {
+    pub(crate) fn of(&self, slot: usize) -> impl ExactSizeIterator<Item = (usize, u8)> {
         let range = self.offsets[slot] as usize..self.offsets[slot + 1] as usize;
-        (&self.ends[range.clone()], &self.class[range])
+        let edges = self.ends[range.clone()].iter().zip(&self.class[range]);
+        edges.map(|(&end, &class)| (end as usize, class))
+    }
+
+    /// Whether an edge of this class leads to a record without saying which of its two slots: lists have records as entries, while
+    /// the slot that owns a list is known.
+    #[inline(always)]
+    pub(crate) fn is_either(&self, class: u8) -> bool {
+        self.slots_per_record == 2 && side(class) != Side::Reverse
+    }
+
+    /// Returns the slot at the end of an edge, or both slots of the record where the edge does not specify one.
+    #[inline(always)]
+    pub(crate) fn slots_at(&self, (end, class): (usize, u8)) -> Range<usize> {
+        end..end + 1 + usize::from(self.is_either(class))
+    }
+
+    /// Returns the slots of a record.
+    pub(crate) fn slots_of(&self, record: usize) -> Range<usize> {
+        record * self.slots_per_record..(record + 1) * self.slots_per_record
     }
 
     /// Returns the end and the class of the edge with index `at` among all edges.
-    pub(crate) fn edge(&self, at: u64) -> (u32, u8) {
-        (self.ends[at as usize], self.class[at as usize])
+    pub(crate) fn edge(&self, at: u64) -> (usize, u8) {
+        (self.ends[at as usize] as usize, self.class[at as usize])
     }
 
     pub(crate) fn n_slots(&self) -> usize {
@@ -194,21 +206,11 @@ impl Graph {
 
     /// Returns how many edges lead to each record.
     pub(crate) fn times_listed(&self) -> Vec<u32> {
-        let none = vec![0; self.n_slots() / self.slots_per_record];
-        // Sums of integers do not depend on how threads split the work.
-        let part = self.ends.len().div_ceil(rayon::current_num_threads()).max(1);
-        let counted = self.ends.par_chunks(part).map(|ends| {
-            let mut counts = none.clone();
-            for &end in ends {
-                counts[record_of(end as usize, self.slots_per_record)] += 1;
-            }
-            counts
-        });
-        let sums = |mut a: Vec<u32>, b: Vec<u32>| {
-            a.iter_mut().zip(&b).for_each(|(a, b)| *a += b);
-            a
-        };
-        counted.reduce_with(sums).unwrap_or(none)
+        let mut counts = vec![0; self.n_slots() / self.slots_per_record];
+        for &end in &self.ends {
+            counts[record_of(end as usize, self.slots_per_record)] += 1;
+        }
+        counts
     }
 
     /// Returns the edges as neighborhoods, for records with one slot.
@@ -272,14 +274,14 @@ mod tests {
     }
 
     #[test]
-    fn edges_are_those_found_one_by_one() {
+    fn edges_are_those_computed_one_by_one() {
         for per in [1, 2] {
             let lists = lists(2 * PART + 77, per);
             let on = |threads| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 pool.install(|| Graph::new(&lists, per))
             };
-            let (one, three) = (on(1), on(3));
+            let (single, parallel) = (on(1), on(3));
             let bounds = score_bounds(&lists);
             let scores = lists.scores().unwrap();
             let of_score =
@@ -288,12 +290,12 @@ mod tests {
             for slot in 0..lists.n_slots() {
                 let expected = expected(&lists, per, slot, &of_score);
                 n_edges += expected.len();
-                for (ends, class) in [one.of(slot), three.of(slot)] {
-                    let found: Vec<_> = ends.iter().copied().zip(class.iter().copied()).collect();
-                    assert_eq!(found, expected, "slot {slot}");
+                for graph in [&single, &parallel] {
+                    let edges = graph.of(slot).map(|(end, class)| (end as u32, class));
+                    assert_eq!(edges.collect::<Vec<_>>(), expected, "slot {slot}");
                 }
             }
-            assert_eq!([one.len(), three.len()], [n_edges; 2]);
+            assert_eq!([single.len(), parallel.len()], [n_edges; 2]);
         }
     }
 }

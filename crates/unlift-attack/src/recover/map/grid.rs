@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::recover::map::graph::record_of;
-use crate::recover::map::places::{box_of_most, sample};
+use crate::recover::map::places::{sample, trimmed_box};
 use crate::recover::result::Estimate;
 
 /// Cubic cells over a box. Places outside belong to the nearest cell.
@@ -167,15 +167,12 @@ impl<const D: usize> Grid<D> {
                     *out = 0.25 * (before + after) + 0.5 * values[at];
                 }
             };
-            out.par_chunks_mut(row).enumerate().with_min_len(ROWS).for_each(smooth);
+            out.par_chunks_mut(row).enumerate().with_min_len(64).for_each(smooth);
             std::mem::swap(&mut self.values, &mut out);
             stride *= n;
         }
     }
 }
-
-/// Least number of rows of cells per parallel task.
-const ROWS: usize = 64;
 
 // The density of estimates: `p_random` of joint recovery.
 
@@ -198,7 +195,8 @@ impl<const D: usize> Density<D> {
     /// Computes the density of `estimates`, smoothed over about `radius`; `listed` is the number of edges to each record.
     pub(crate) fn new(estimates: &[Estimate<D>], listed: &[u32], radius: f32) -> Self {
         let n = estimates.len();
-        let (low, high) = box_of_most(estimates);
+        let places = sample(estimates);
+        let (low, high) = trimmed_box(&places);
         let mut grid = Grid::with_cell(low, high, radius * CELL, (4 * n).max(1 << 16));
         let slots_per_record = n / listed.len().max(1);
         let mut weight = 0.0f64;
@@ -218,11 +216,11 @@ impl<const D: usize> Density<D> {
         for value in &mut grid.values {
             *value = value.max(least) * scale;
         }
-        let mut sample: Vec<f32> = sample(estimates).map(|x| grid.at(&x)).collect();
-        let middle = sample.len() / 2;
-        let typical = match sample.is_empty() {
+        let mut densities: Vec<f32> = places.iter().map(|x| grid.at(x)).collect();
+        let middle = densities.len() / 2;
+        let typical = match densities.is_empty() {
             true => scale,
-            false => *sample.select_nth_unstable_by(middle, f32::total_cmp).1,
+            false => *densities.select_nth_unstable_by(middle, f32::total_cmp).1,
         };
         Self { grid, typical }
     }

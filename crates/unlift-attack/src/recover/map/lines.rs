@@ -3,7 +3,7 @@
 use crate::RecordId;
 use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{along, widen};
-use crate::released::{Lines, Obfuscation, Rays, Released};
+use crate::released::{Obfuscation, Released};
 
 /// A line or ray. A row is half a cache line, so that a neighbor costs one memory access.
 #[derive(Clone, Copy, Debug)]
@@ -26,42 +26,38 @@ pub(crate) const NO_GROUP: u32 = u32::MAX;
 const PARALLEL: f32 = 1e-6;
 
 /// Converts lines or rays to rows; no rows for other families. `bounds`, relative to the released origin, cut lines to chords that start
-/// where the line enters.
+/// where the line enters. Rays end at the region of their center or else at `bounds`, where these are known.
 pub(crate) fn rows_of<const D: usize>(
     released: &Released<D>,
     bounds: Option<&Bounds<D>>,
 ) -> Vec<LineRow<D>> {
     match released.obfuscation() {
-        Obfuscation::Lines(lines) => from_lines(lines, bounds),
-        Obfuscation::Rays(rays) => from_rays(rays, bounds),
+        Obfuscation::Lines(lines) => {
+            let row = |(foot, &direction): (&[f32; D], &[f32; D])| {
+                let (at, toward) = (widen(foot), widen(&direction));
+                let clip = |(from, to): (f64, f64)| {
+                    (along(&at, from, &toward).map(|x| x as f32), (to - from) as f32)
+                };
+                let chord = bounds.and_then(|bounds| bounds.clip(&at, &toward)).map(clip);
+                let (through, to) = chord.unwrap_or((*foot, f32::INFINITY));
+                LineRow { through, direction, group: NO_GROUP, to }
+            };
+            lines.foot().iter().zip(lines.direction()).map(row).collect()
+        }
+        Obfuscation::Rays(rays) => {
+            let row = |(&center, &direction): (&u8, &[f32; D])| {
+                let through = rays.centers()[usize::from(center)];
+                let region = rays.regions().map(|regions| &regions[usize::from(center)]);
+                let clip = |region: &Bounds<D>| region.clip(&widen(&through), &widen(&direction));
+                // A ray that leaves its region at once is an error of the file; it is not cut.
+                let to = region.or(bounds).and_then(clip).map(|(_, to)| to as f32);
+                let to = to.filter(|&to| to > 0.0).unwrap_or(f32::INFINITY);
+                LineRow { through, direction, group: u32::from(center), to }
+            };
+            rays.center().iter().zip(rays.direction()).map(row).collect()
+        }
         Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => Vec::new(),
     }
-}
-
-fn from_lines<const D: usize>(lines: &Lines<D>, bounds: Option<&Bounds<D>>) -> Vec<LineRow<D>> {
-    let row = |(foot, &direction): (&[f32; D], &[f32; D])| {
-        let (at, toward) = (widen(foot), widen(&direction));
-        let (through, to) = match bounds.and_then(|bounds| bounds.clip(&at, &toward)) {
-            Some((from, to)) => (along(&at, from, &toward).map(|x| x as f32), (to - from) as f32),
-            None => (*foot, f32::INFINITY),
-        };
-        LineRow { through, direction, group: NO_GROUP, to }
-    };
-    lines.foot().iter().zip(lines.direction()).map(row).collect()
-}
-
-/// Converts rays to rows, cut at the region of their center or else at `bounds`, where these are known.
-fn from_rays<const D: usize>(rays: &Rays<D>, bounds: Option<&Bounds<D>>) -> Vec<LineRow<D>> {
-    let row = |(&center, &direction): (&u8, &[f32; D])| {
-        let through = rays.centers()[usize::from(center)];
-        let region = rays.regions().map(|regions| &regions[usize::from(center)]).or(bounds);
-        let clip = |region: &Bounds<D>| region.clip(&widen(&through), &widen(&direction));
-        // A ray that leaves its region at once is an error of the file; it is not cut.
-        let to = region.and_then(clip).map(|(_, to)| to as f32).filter(|&to| to > 0.0);
-        let to = to.unwrap_or(f32::INFINITY);
-        LineRow { through, direction, group: u32::from(center), to }
-    };
-    rays.center().iter().zip(rays.direction()).map(row).collect()
 }
 
 impl<const D: usize> LineRow<D> {
@@ -88,21 +84,19 @@ impl<const D: usize> LineRow<D> {
         t.max(self.floor()).min(self.to)
     }
 
-    /// Returns the point of this line nearest to `other`; `None` if they are parallel or the point is not on the row.
-    pub(crate) fn crossing(&self, other: &Self) -> Option<[f32; D]> {
-        let (t, miss2, _) = self.section((other.through, other.direction, other.group));
+    /// Returns the point of this line nearest to another `row`; `None` if they are parallel or the point is not on this one.
+    pub(crate) fn crossing(&self, row: &Self) -> Option<[f32; D]> {
+        let (t, miss2, _) = self.section(row);
         (miss2 < NO_VOTE && t >= self.floor() && t <= self.to).then(|| self.at(t))
     }
 
-    /// Returns where a record passes nearest (parameter), its squared distance there, and the squared sine of the angle.
+    /// Returns where another row passes nearest (parameter), its squared distance there, and the squared sine of the angle.
     ///
     /// Let `v` and `u` be the components of `self.through - through` and `self.direction` perpendicular to the record. Then the squared
     /// distance is `|v + t u|^2`. It is no difference of large squares, so `f32` suffices far from the origin.
     #[inline(always)]
-    pub(crate) fn section(
-        &self,
-        (through, direction, group): ([f32; D], [f32; D], u32),
-    ) -> (f32, f32, f32) {
+    pub(crate) fn section(&self, row: &Self) -> (f32, f32, f32) {
+        let Self { through, direction, group, .. } = *row;
         let (mut w_e, mut d_e) = (0.0, 0.0);
         for c in 0..D {
             w_e += (self.through[c] - through[c]) * direction[c];
@@ -197,11 +191,10 @@ impl<const D: usize> LineColumns<D> {
         self.group.extend(records.iter().map(|record| rows[record.index()].group));
     }
 
-    /// Returns how many gathered records are evidence for a point on `own`.
+    /// Returns how many gathered records are evidence for a point on `own`, see [`LineRow::may_vote_for`].
     #[inline(always)]
     pub(crate) fn n_that_may_vote(&self, own: &LineRow<D>) -> usize {
-        let strange = |&&group: &&u32| !own.is_ray() || group != own.group;
-        self.group.iter().filter(strange).count()
+        self.group.iter().filter(|&&group| !own.is_ray() || group != own.group).count()
     }
 
     /// Computes the sections of the gathered records with `own`.
@@ -215,7 +208,8 @@ impl<const D: usize> LineColumns<D> {
         for j in 0..n {
             let through = std::array::from_fn(|c| through[c][j]);
             let direction = std::array::from_fn(|c| direction[c][j]);
-            (at[j], miss2[j], bend[j]) = own.section((through, direction, group[j]));
+            let row = LineRow { through, direction, group: group[j], to: f32::INFINITY };
+            (at[j], miss2[j], bend[j]) = own.section(&row);
         }
     }
 }
@@ -301,10 +295,23 @@ impl Sections {
         self.miss2[j] + self.bend[j] * d * d
     }
 
+    /// Returns `t` after two least-squares steps over the records within delta, and its support. The step is Eq. (4) with squared
+    /// distances: on a line, a weighted mean of the closest approaches.
+    #[inline(always)]
+    pub(crate) fn refit(&self, t: f32, delta2: f32) -> (f32, u32) {
+        // The start of an interval is at distance delta up to rounding, and must count as within.
+        let reach = delta2.sqrt() * (1.0 + 5e-5) + 4.0 * f32::EPSILON * t.abs();
+        let reach2 = reach * reach;
+        let (shift, _) = self.least_squares_step(t, reach2);
+        let t = t + shift;
+        let (shift, support) = self.least_squares_step(t, reach2);
+        (t + shift, support)
+    }
+
     /// Returns the shift of `t` by one least-squares step over the records within `reach2` (squared) of `x(t)`, and their number. The shift
     /// is 0 if all of them are parallel.
     #[inline(always)]
-    pub(crate) fn least_squares_step(&self, t: f32, reach2: f32) -> (f32, u32) {
+    fn least_squares_step(&self, t: f32, reach2: f32) -> (f32, u32) {
         let (mut weight, mut sum, mut n) = ([0.0f32; LANES], [0.0f32; LANES], [0u32; LANES]);
         let (at, _) = self.at.as_chunks::<LANES>();
         let (miss2, _) = self.miss2.as_chunks::<LANES>();
@@ -339,8 +346,6 @@ pub(crate) struct Peak {
 pub(crate) struct Intervals {
     low: Vec<f32>,
     high: Vec<f32>,
-    /// Number of records within delta for every `t`.
-    everywhere: u32,
     /// For the start of each interval: the number of intervals that contain it, the chance that a random record passes there, its
     /// cell of the grid, evidence and score.
     count: Vec<u32>,
@@ -351,9 +356,9 @@ pub(crate) struct Intervals {
 }
 
 impl Intervals {
-    /// Computes the intervals of `sections`, cut to `floor..=top`.
+    /// Computes the intervals of `sections`, cut to `floor..=top`. Returns the number of records within delta for every `t`.
     #[inline(always)]
-    fn fill(&mut self, sections: &Sections, delta2: f32, floor: f32, top: f32) {
+    fn fill(&mut self, sections: &Sections, (delta2, floor, top): (f32, f32, f32)) -> u32 {
         let n = sections.len();
         self.low.resize(n, f32::INFINITY);
         self.high.resize(n, f32::NEG_INFINITY);
@@ -375,18 +380,16 @@ impl Intervals {
             kept += usize::from(start.is_finite());
             everywhere += u32::from(start == f32::NEG_INFINITY);
         }
-        self.everywhere = everywhere;
         let padded = kept.next_multiple_of(LANES);
-        for (column, nothing) in
-            [(&mut self.low, f32::INFINITY), (&mut self.high, f32::NEG_INFINITY)]
-        {
-            column.truncate(kept);
-            column.resize(padded, nothing);
-        }
+        self.low.truncate(kept);
+        self.low.resize(padded, f32::INFINITY);
+        self.high.truncate(kept);
+        self.high.resize(padded, f32::NEG_INFINITY);
+        everywhere
     }
 
-    /// Returns the position between `floor` and `top` where the agreement of `sections` is least probable by chance. The number of
-    /// agreeing records is largest at the start of some interval, so only starts are tried.
+    /// Returns the position where the agreement of `sections` is least probable by chance. `limits` are the squared delta, and the range of
+    /// positions. The number of agreeing records is largest at the start of some interval, so only starts are tried.
     ///
     /// `k` listed records may vote. `chances` gets the starts, a buffer for cells, and a column to which it adds the chance that a
     /// random record passes there. The prior is proportional to that chance, because points are denser where records are. The
@@ -395,11 +398,11 @@ impl Intervals {
     pub(crate) fn peak(
         &mut self,
         sections: &Sections,
-        (delta2, floor, top): (f32, f32, f32),
+        limits: (f32, f32, f32),
         k: usize,
         chances: impl Fn(&[f32], &mut [u32], &mut [f32]),
     ) -> Option<Peak> {
-        self.fill(sections, delta2, floor, top);
+        let everywhere = self.fill(sections, limits);
         let n = self.low.len();
         self.count.resize(n, 0);
         self.cell.resize(n, 0);
@@ -412,7 +415,7 @@ impl Intervals {
         // A vector of starts at a time is compared with every interval.
         let (starts, counts) = (self.low.as_chunks::<LANES>().0, count.as_chunks_mut::<LANES>().0);
         for (starts, counts) in starts.iter().zip(counts) {
-            let mut sums = [self.everywhere; LANES];
+            let mut sums = [everywhere; LANES];
             for (low, high) in self.low.iter().zip(&self.high) {
                 for lane in 0..LANES {
                     sums[lane] += u32::from((*low <= starts[lane]) & (starts[lane] <= *high));
@@ -427,13 +430,9 @@ impl Intervals {
             nats[i] = evidence(count[i] as i32 as f32, k as f32, p);
             score[i] = nats[i] + ln(p);
         }
-        let mut best: Option<usize> = None;
-        for (i, start) in self.low.iter().enumerate() {
-            if *start < f32::INFINITY && best.is_none_or(|best| score[i] > score[best]) {
-                best = Some(i);
-            }
-        }
-        best.map(|i| Peak { t: self.low[i], evidence: nats[i], score: score[i] })
+        let starts = (0..n).filter(|&i| self.low[i] < f32::INFINITY);
+        let best = starts.reduce(|best, i| if score[i] > score[best] { i } else { best })?;
+        Some(Peak { t: self.low[best], evidence: nats[best], score: score[best] })
     }
 }
 
@@ -499,10 +498,12 @@ mod tests {
     #[test]
     fn instruction_sets_change_no_bit() {
         let mut draws = Draws::new(5, Stage::Synthetic, 5);
-        let points: Vec<[f64; 3]> =
-            (0..403).map(|_| std::array::from_fn(|_| draws.between(-3.0, 3.0))).collect();
-        let directions: Vec<[f64; 3]> = points.iter().map(|_| draws.direction()).collect();
-        let rows = from_lines(&Lines::through(&points, &directions).unwrap(), None);
+        let mut row = || {
+            let through = std::array::from_fn(|_| draws.between(-3.0, 3.0) as f32);
+            let direction = draws.direction().map(|x| x as f32);
+            LineRow { through, direction, group: NO_GROUP, to: f32::INFINITY }
+        };
+        let rows: Vec<LineRow<3>> = (0..403).map(|_| row()).collect();
         for own in 0..50 {
             let bits = SectionBits { rows: &rows, own }.run();
             assert!(bits == dispatch(SectionBits { rows: &rows, own }));

@@ -1,14 +1,27 @@
 //! The data that solvers share, made from a released map and its lists.
 //!
-//! From the bottom up: a grid of cells and the density of estimates on it (`grid`); rows per record and their sections with a
-//! feasible line (`lines`, `planes`); the chance that a random record passes near a place (`chance`); all of these for one map
-//! (`family`, `families`); the neighborhood graph (`graph`); estimates per slot (`places`).
+//! From the bottom up: estimates per slot (`places`); a grid of cells and the density of estimates on it (`grid`); rows per record and
+//! their sections with a feasible line (`lines`); the chance that a random record passes near a place (`chance`); all of these for one map
+//! (`family`, `families`); the neighborhood graph (`graph`).
 
-pub(crate) mod chance;
-pub(crate) mod families;
-pub(crate) mod family;
-pub(crate) mod graph;
-pub(crate) mod grid;
-pub(crate) mod lines;
-pub(crate) mod places;
-pub(crate) mod planes;
+mod chance;
+mod families;
+mod family;
+mod graph;
+mod grid;
+mod lines;
+mod places;
+
+pub(crate) use chance::mixed;
+pub(crate) use families::{CandidateFamily, LineFamily, PlaneFamily};
+pub(crate) use family::{Family, Piece};
+pub(crate) use graph::{CLASSES, Graph, Listers, Side, record_of, side};
+pub(crate) use grid::{Density, Grid};
+pub(crate) use lines::{
+    Columns, Intervals, LANES, Lanes, LineColumns, LineRow, NO_GROUP, NO_VOTE, Sections, evidence,
+    ln, rows_of,
+};
+pub(crate) use places::{
+    CHUNK, Candidate, Step, along_curve, distance2, evenly, known, nearest2, rows_mut, solve_slots,
+    trimmed_box, unit,
+};

@@ -1,16 +1,62 @@
-//! Places of all slots: estimates, their box, and an order in which near ones come after each other.
+//! Places of all slots: estimates, their box, an order in which near ones come after each other, and steps that move each slot.
+
+use std::ops::Range;
 
 use rayon::prelude::*;
 
 use crate::geometry::curve;
 use crate::geometry::vector::widen;
 use crate::recover::result::Estimate;
+use crate::simd::{Kernel, dispatch};
 
 /// Slots per parallel task: fixed, so that results do not depend on the number of threads.
 pub(crate) const CHUNK: usize = 64;
 
-/// Number of places in samples: quantiles of so many have an error of about a percent.
-const SAMPLE: usize = 1 << 14;
+/// Returns at most `n_sampled` of the first `n` numbers, evenly spaced.
+pub(crate) fn evenly(n: usize, n_sampled: usize) -> std::iter::StepBy<Range<usize>> {
+    (0..n).step_by(n.div_ceil(n_sampled).max(1))
+}
+
+/// A step of an attack that treats each slot on its own. Its hot loops are `#[inline(always)]`, see [`Kernel`].
+pub(crate) trait Step: Sync {
+    /// Buffers of one thread.
+    type Scratch: Default;
+    type Output: Send;
+
+    fn solve(&self, slot: usize, scratch: &mut Self::Scratch) -> Self::Output;
+
+    /// Loads what the next slot reads; changes no result.
+    #[inline(always)]
+    fn prefetch(&self, _slot: usize) {}
+}
+
+/// Runs `step` on all `slots`; returns what it returns for each.
+pub(crate) fn solve_slots<S: Step>(step: &S, slots: &[usize]) -> Vec<S::Output> {
+    let solve = |scratch: &mut S::Scratch, slots| dispatch(Chunk { step, slots, scratch });
+    slots.par_chunks(CHUNK).map_init(S::Scratch::default, solve).flatten_iter().collect()
+}
+
+struct Chunk<'a, S: Step> {
+    step: &'a S,
+    slots: &'a [usize],
+    scratch: &'a mut S::Scratch,
+}
+
+impl<S: Step> Kernel for Chunk<'_, S> {
+    type Output = Vec<S::Output>;
+
+    #[inline(always)]
+    fn run(self) -> Vec<S::Output> {
+        let mut solved = Vec::with_capacity(self.slots.len());
+        for (number, &slot) in self.slots.iter().enumerate() {
+            if let Some(&next) = self.slots.get(number + 1) {
+                self.step.prefetch(next);
+            }
+            solved.push(self.step.solve(slot, self.scratch));
+        }
+        solved
+    }
+}
 
 /// A possible place of a slot, on a piece of its feasible set.
 #[derive(Clone, Copy, Debug)]
@@ -20,12 +66,10 @@ pub(crate) struct Candidate<const D: usize> {
     pub(crate) score: f32,
 }
 
-/// Returns a sample of the known places, evenly over the slots.
-pub(crate) fn sample<const D: usize>(
-    estimates: &[Estimate<D>],
-) -> impl Iterator<Item = [f32; D]> + '_ {
-    let every = estimates.len().div_ceil(SAMPLE).max(1);
-    estimates.iter().step_by(every).filter(|e| e.is_known()).map(|e| e.position)
+/// Returns a sample of the known places, evenly over the slots. Quantiles of so many have an error of about a percent.
+pub(crate) fn sample<const D: usize>(estimates: &[Estimate<D>]) -> Vec<[f32; D]> {
+    let sampled = evenly(estimates.len(), 1 << 14).map(|slot| &estimates[slot]);
+    sampled.filter(|e| e.is_known()).map(|e| e.position).collect()
 }
 
 /// Returns the slots that have a place, and their places.
@@ -34,48 +78,36 @@ pub(crate) fn known<const D: usize>(estimates: &[Estimate<D>]) -> (Vec<u32>, Vec
     known.map(|(slot, estimate)| (slot, widen(&estimate.position))).unzip()
 }
 
-/// Returns the corners of a box around most known places.
-pub(crate) fn box_of_most<const D: usize>(estimates: &[Estimate<D>]) -> ([f32; D], [f32; D]) {
-    trimmed_box(|c| sample(estimates).map(|x| x[c]).collect())
-}
-
-/// Returns the squared distance from `x` to the end of an edge: `end`, or with `either` the nearer of `end` and the next slot; infinite if
-/// that is lost.
+/// Returns the squared distance from `x` to the nearest estimate of some `slots`; infinite if all are lost.
 #[inline(always)]
 pub(crate) fn nearest2<const D: usize>(
     estimates: &[Estimate<D>],
-    end: u32,
-    either: bool,
+    slots: Range<usize>,
     x: &[f32; D],
 ) -> f32 {
-    let end = end as usize;
     // The least of a number and NaN is the number.
-    let d2 = distance2(&estimates[end].position, x).min(f32::INFINITY);
-    if either { d2.min(distance2(&estimates[end + 1].position, x)) } else { d2 }
+    estimates[slots].iter().map(|e| distance2(&e.position, x)).fold(f32::INFINITY, f32::min)
 }
 
-/// Fraction of values dropped at either end of a range, which may be those of wrong entries.
-const TRIM: f64 = 0.03;
-
-/// Returns the range of a column without its ends, slightly widened.
-pub(crate) fn trimmed(column: &mut [f32]) -> (f32, f32) {
-    if column.is_empty() {
-        return (0.0, 0.0);
-    }
-    let last = column.len() - 1;
-    let cut = (last as f64 * TRIM) as usize;
-    let mut at = |rank: usize| *column.select_nth_unstable_by(rank, f32::total_cmp).1;
-    let (low, high) = (at(cut), at(last - cut));
-    let margin = 0.1 * (high - low);
-    (low - margin, high + margin)
-}
-
-/// Returns the corners of a box around most places; `column` returns all values of a coordinate.
-pub(crate) fn trimmed_box<const D: usize>(
-    column: impl Fn(usize) -> Vec<f32>,
-) -> ([f32; D], [f32; D]) {
-    let ends: [(f32, f32); D] = std::array::from_fn(|c| trimmed(&mut column(c)));
+/// Returns the corners of a slightly widened box around most places. Along each axis, 3 % at either end are left out, which may be those of
+/// wrong entries.
+pub(crate) fn trimmed_box<const D: usize>(places: &[[f32; D]]) -> ([f32; D], [f32; D]) {
+    let Some(last) = places.len().checked_sub(1) else { return ([0.0; D], [0.0; D]) };
+    let cut = (last as f64 * 0.03) as usize;
+    let ends: [(f32, f32); D] = std::array::from_fn(|c| {
+        let mut column: Vec<f32> = places.iter().map(|place| place[c]).collect();
+        let mut at = |rank: usize| *column.select_nth_unstable_by(rank, f32::total_cmp).1;
+        let (low, high) = (at(cut), at(last - cut));
+        let margin = 0.1 * (high - low);
+        (low - margin, high + margin)
+    });
     (ends.map(|e| e.0), ends.map(|e| e.1))
+}
+
+/// Splits a column of ragged rows, which begin at `offsets`, into its rows.
+pub(crate) fn rows_mut<'a>(mut column: &'a mut [f32], offsets: &[usize]) -> Vec<&'a mut [f32]> {
+    let row = |ends: &[usize]| column.split_off_mut(..ends[1] - ends[0]).expect("ascending");
+    offsets.windows(2).map(row).collect()
 }
 
 #[inline(always)]
@@ -87,14 +119,20 @@ pub(crate) fn distance2<const D: usize>(a: &[f32; D], b: &[f32; D]) -> f32 {
     sum
 }
 
+/// Returns the unit vector along an axis.
+#[inline(always)]
+pub(crate) fn unit<const D: usize>(axis: usize) -> [f32; D] {
+    std::array::from_fn(|c| if c == axis { 1.0 } else { 0.0 })
+}
+
 /// Bits per coordinate on the curve: the index on the curve and the slot share 64 bits.
 const BITS: u32 = 10;
 
 /// Returns all slots in order along a space-filling curve; slots without a place are last. Records are in random order, so that
 /// each access to a neighbor misses the cache on a large map. Nearby slots share neighbors, so in this order they are often cached.
 /// Results do not depend on the order.
-pub(crate) fn along_curve<const D: usize>(estimates: &[Estimate<D>]) -> Vec<u32> {
-    let (low, high) = box_of_most(estimates);
+pub(crate) fn along_curve<const D: usize>(estimates: &[Estimate<D>]) -> Vec<usize> {
+    let (low, high) = trimmed_box(&sample(estimates));
     let cells = (1u32 << BITS) as f32;
     let key = |(slot, estimate): (usize, &Estimate<D>)| {
         if !estimate.is_known() {
@@ -108,5 +146,5 @@ pub(crate) fn along_curve<const D: usize>(estimates: &[Estimate<D>]) -> Vec<u32>
     };
     let mut keys: Vec<u64> = estimates.par_iter().enumerate().map(key).collect();
     keys.par_sort_unstable();
-    keys.into_iter().map(|key| key as u32).collect()
+    keys.into_iter().map(|key| key as u32 as usize).collect()
 }
