@@ -246,7 +246,7 @@ impl<const D: usize> Family<D> for PlaneFamily<'_, D> {
     type AtDelta = (Vec<f32>, f32);
 
     fn at_delta(&self, delta: f32) -> (Vec<f32>, f32) {
-        let mut chance = vec![0.0; self.planes.len()];
+        let mut chance = vec![0.0; self.planes.axis().len()];
         for SortedPlanes { order, .. } in &self.by_axis {
             let offset = |at: usize| self.planes.offset()[order[at] as usize];
             let mut end = 0;
