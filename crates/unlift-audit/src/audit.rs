@@ -1,33 +1,27 @@
-//! One audit of any input: attack it, check the gates, make the document and the page.
+//! One audit of any input: its gates, its document and page, and its files, which are checked before anything is computed.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use serde_json::{Map as Options, Value};
-use unlift::audit::{BreakEven, NotAudited, Plan, Row, Seconds};
-use unlift::released::Released;
-use unlift::truth::Secret;
-use unlift::{PointSet, audit::Alone};
-use unlift_report::RenderOptions;
-use unlift_report::document::{self as report, ImageFigures, Localization, TileFigures};
-use unlift_report::scene::Scene3d;
+use unlift::audit::{Plan, Seconds};
+use unlift::{OneLine, PointSet};
+use unlift_io::atomic::{Access, OutputFile, make_folders, write_file};
+use unlift_io::outputs::{Kind, OutputSet, Rules};
+use unlift_report::document as report;
+use unlift_report::{
+    Document, Opening, RenderOptions, Scene3d, Shares, gate_lines, render, shares, text_table,
+};
 
-use crate::again::Again;
-use crate::document;
-use crate::doubts::with_extent;
-use crate::gate::{Gate, Tried, check_gates, check_lengths_of_gates, gate_results};
-use crate::images::audit::Images;
-use crate::maps::Map;
-use crate::outputs::Audited;
-use crate::prepare::Prepared;
-use crate::sequence::Sequence;
-use crate::tiles::Tiles;
+use crate::document::{Attacked, Tried, not_audited};
+use crate::gate::{Gate, check_gates, check_lengths_of_gates, gate_result};
+use crate::maps::Prepared;
 use crate::{Error, Progress};
 
-/// An audit: what is attacked and how, the gates, and where the results go.
-pub struct Audit<'a> {
-    /// What is attacked, each with its plan.
-    pub input: Input<'a>,
+/// An audit of any input: what there is to say of it, the gates, and where the results go.
+#[derive(Clone, Debug)]
+pub struct Audit {
     /// The input in the report.
     pub about: report::Input,
     /// Recorded options, in addition to those of the plan.
@@ -42,37 +36,65 @@ pub struct Audit<'a> {
     pub output: Output,
 }
 
-/// The input of an audit.
-// There is one per audit, so its size costs nothing.
-#[allow(clippy::large_enum_variant)]
-pub enum Input<'a> {
-    /// A map, which is hidden under each scheme.
-    Map(Map<'a>),
-    /// A map in tiles: each is hidden and attacked as a map of its own.
-    Tiles(Map<'a>, Tiles),
-    /// A map that a program of the user hid.
-    Released(Map<'a>, Hidden<'a>),
-    /// Images, whose keypoints are hidden.
-    Images(Images<'a>),
-    /// Several releases of the same points.
-    Views(Views<'a>),
-}
+impl Audit {
+    /// Creates an audit without gates, notes and further options.
+    pub fn new(output: Output) -> Self {
+        let (about, options, notes, doubts, gates) = Default::default();
+        Self { about, options, notes, doubts, gates, output }
+    }
 
-/// Several releases of the same points.
-#[allow(clippy::large_enum_variant)]
-pub enum Views<'a> {
-    /// Images with known poses, each hidden under its own key.
-    Sequence(Sequence<'a>),
-    /// A map that is released twice.
-    Again(Again<'a>),
-}
+    /// Creates an audit of `prepared` points, with their notes and doubts.
+    pub fn of_map(prepared: &Prepared, output: Output) -> Self {
+        let n_points = prepared.original.len() as u64;
+        let (notes, doubts) = (prepared.notes.clone(), prepared.doubts.clone());
+        let about = report::Input { n_points, ..Default::default() };
+        Self { about, notes, doubts, ..Self::new(output) }
+    }
 
-/// A released map with its secret.
-pub struct Hidden<'a> {
-    /// The release and its secret.
-    pub release: &'a (Released<3>, Secret),
-    /// An attack on values of the released file that its records do not contain.
-    pub read: Option<Alone>,
+    /// Checks the gates before the attack, and reports `notes`. `points` are those of a map.
+    pub(crate) fn begin<'n>(
+        &self,
+        tried: &Tried,
+        points: Option<&PointSet<3>>,
+        notes: impl IntoIterator<Item = &'n String>,
+        progress: &dyn Progress,
+    ) -> Result<(), Error> {
+        check_gates(&self.gates, tried)?;
+        points.map_or(Ok(()), |points| check_lengths_of_gates(points, &self.gates))?;
+        notes.into_iter().for_each(|note| progress.say(&format!("note: {note}")));
+        Ok(())
+    }
+
+    /// Checks the gates after the attack by `plan`. Returns the document, and what the page draws.
+    pub(crate) fn finish<const D: usize>(
+        &self,
+        plan: &Plan<D>,
+        attacked: Attacked,
+    ) -> Result<Audited, Error> {
+        let gates = self.gates.iter().map(|gate| gate_result(gate, &attacked));
+        let mut gates = gates.collect::<Result<Vec<_>, Error>>()?;
+        if let Some(extent) = attacked.about.extent() {
+            let of = gates.iter_mut().filter_map(|gate| gate.of.as_mut());
+            of.for_each(|of| of.push_str(&format!(", in a map of {extent}")));
+        }
+        let document = Document {
+            unlift: env!("CARGO_PKG_VERSION").to_owned(),
+            schema: report::SCHEMA,
+            gates,
+            input: attacked.about,
+            options: attacked.options,
+            seed: plan.seed,
+            not_audited: not_audited(plan, &attacked.not_audited),
+            results: attacked.rows,
+            notes: attacked.notes,
+            break_even: attacked.break_even,
+            images: attacked.images,
+            tiles: attacked.tiles,
+            localization: attacked.localization,
+            run: self.output.record(&attacked.seconds),
+        };
+        Ok(Audited { document, scene: attacked.scene, rendering: attacked.rendering })
+    }
 }
 
 /// The output of an audit.
@@ -98,107 +120,195 @@ impl Output {
     }
 }
 
-/// What an attack gives, before gates.
-#[derive(Default)]
-pub(crate) struct Attacked {
-    pub(crate) tried: Tried,
-    pub(crate) rows: Vec<Row>,
-    pub(crate) not_audited: Vec<NotAudited>,
-    pub(crate) break_even: Vec<BreakEven>,
-    pub(crate) seconds: Seconds,
-    /// The input in the report, if the attack knows more of it.
-    pub(crate) about: Option<report::Input>,
-    /// Options of the report.
-    pub(crate) options: Options<String, Value>,
-    /// All notes of the report.
-    pub(crate) notes: Vec<String>,
-    /// A doubt per row, or none.
-    pub(crate) doubts: Vec<Option<String>>,
-    pub(crate) localization: Vec<Localization>,
-    pub(crate) images: Vec<ImageFigures>,
-    pub(crate) tiles: Vec<TileFigures>,
-    pub(crate) scene: Option<Scene3d>,
-    pub(crate) drawn: RenderOptions,
+/// File name of the page of an audit.
+pub const PAGE: &str = "report.html";
+/// File name of the figures of an audit.
+pub const FIGURES: &str = "audit.json";
+
+/// Converts an error of a file to an error of the option `--out`.
+pub fn refused(error: unlift_io::Error) -> Error {
+    Error::request(format!("--out: {error}"))
 }
 
-impl<'a> Audit<'a> {
-    /// Creates an audit without gates, notes and further options.
-    pub fn new(input: Input<'a>, output: Output) -> Self {
-        let about = report::Input::default();
-        let (options, notes, doubts, gates) = Default::default();
-        Self { input, about, options, notes, doubts, gates, output }
-    }
+/// Checks that the file `path` may be written, and returns its absolute place with links resolved.
+/// Call it before and after the work.
+///
+/// Like [`Output::open`] for folders, it reports a place that cannot be written as an error of the
+/// command line.
+pub fn check_file(path: &Path, kind: Kind, rules: &Rules) -> Result<PathBuf, Error> {
+    check_file_of("--out", path, kind, rules)
+}
 
-    /// Creates an audit of `prepared` points, with their notes and doubts.
-    pub fn of_map(input: Input<'a>, prepared: &Prepared, output: Output) -> Self {
-        let about =
-            report::Input { n_points: prepared.original.len() as u64, ..Default::default() };
-        let (notes, doubts) = (prepared.notes.clone(), prepared.doubts.clone());
-        Self { about, notes, doubts, ..Self::new(input, output) }
-    }
+/// Checks the file that the option `option` names, as [`check_file`] does.
+pub fn check_file_of(
+    option: &str,
+    path: &Path,
+    kind: Kind,
+    rules: &Rules,
+) -> Result<PathBuf, Error> {
+    let refused = |error: unlift_io::Error| Error::request(format!("{option}: {error}"));
+    let place = rules.check(path, kind).map_err(refused)?;
+    // Permissions alone do not show whether a file can be written.
+    drop(OutputFile::create(path, Access::Private).map_err(refused)?);
+    Ok(place)
+}
 
-    /// Runs the audit and writes nothing.
-    ///
-    /// # Errors
-    /// If the input or a file of it cannot be used, the plan does not fit it, a gate has no row, no image can be used, or `progress`
-    /// stops the audit. Images of files that cannot be used are reported and counted, if there are others.
-    pub fn run(self, progress: &dyn Progress) -> Result<Audited, Error> {
-        match &self.input {
-            Input::Map(map) => self.document(&map.plan, map.attack(None, None, &self, progress)?),
-            Input::Tiles(map, tiles) => {
-                self.document(&map.plan, map.attack(Some(*tiles), None, &self, progress)?)
-            }
-            Input::Released(map, hidden) => {
-                self.document(&map.plan, map.attack(None, Some(hidden), &self, progress)?)
-            }
-            Input::Images(images) => self.document(&images.plan, images.attack(&self, progress)?),
-            Input::Views(Views::Sequence(sequence)) => {
-                self.document(&sequence.plan, sequence.attack(&self, progress)?)
-            }
-            Input::Views(Views::Again(again)) => {
-                self.document(&again.plan, again.attack(&self, progress)?)
-            }
+/// The files of an audit, which were checked before the work.
+pub struct Files {
+    output: Output,
+    set: OutputSet,
+    rules: Rules,
+}
+
+const JUNIT: &str = "--junit";
+
+impl Output {
+    fn record(&self, seconds: &Seconds) -> report::Run {
+        let stages = [
+            ("search", seconds.search),
+            ("obfuscate", seconds.obfuscate),
+            ("neighbors", seconds.neighbors),
+            ("recover", seconds.recover),
+            ("records_alone", seconds.records_alone),
+            ("evaluate", seconds.evaluate),
+        ];
+        let rows = seconds.rows.iter().map(|row| {
+            let made = (row.neighbors > 0.0).then(|| ("neighbors".to_owned(), row.neighbors));
+            made.into_iter().chain([("recover".to_owned(), row.recover)]).collect()
+        });
+        report::Run {
+            command: self.command.clone(),
+            threads: rayon::current_num_threads() as u32,
+            peak_memory_bytes: peak_bytes(),
+            seconds: report::Seconds {
+                total: self.started.elapsed().as_secs_f64(),
+                rows: rows.collect(),
+                stages: stages.into_iter().map(|(name, s)| (name.to_owned(), s)).collect(),
+            },
         }
     }
 
-    /// Checks the gates before the attack, and reports `notes`. `points` are those of a map.
-    pub(crate) fn begin<'n>(
-        &self,
-        tried: &Tried,
-        points: Option<&PointSet<3>>,
-        notes: impl IntoIterator<Item = &'n String>,
-        progress: &dyn Progress,
-    ) -> Result<(), Error> {
-        check_gates(&self.gates, tried)?;
-        points.map_or(Ok(()), |points| check_lengths_of_gates(points, &self.gates))?;
-        notes.into_iter().for_each(|note| progress.say(&format!("note: {note}")));
-        Ok(())
+    /// Opens the output folder of an audit, and checks the file for the results of gates, which is none of the report.
+    pub fn open(&self, rules: Rules) -> Result<Files, Error> {
+        let junit = self.junit.as_ref().map(|path| self.check_junit(path, &rules)).transpose()?;
+        let first = [(PAGE, Kind::Page), (FIGURES, Kind::AuditJson)];
+        let set = OutputSet::create(&self.folder, rules.clone(), access(self.share_safe), &first);
+        let set = set.map_err(refused)?;
+        let out = std::fs::canonicalize(&self.folder).unwrap_or_default();
+        if let (Some(path), Some(target)) = (&self.junit, junit)
+            && [PAGE, FIGURES].iter().any(|name| out.join(name) == target)
+        {
+            let path = path.display();
+            let expected = "expected a file of its own, found one of --out";
+            return Err(Error::request(format!("{JUNIT}: {path}: {expected}")));
+        }
+        Ok(Files { output: self.clone(), set, rules })
     }
 
-    /// Returns the document and what the page draws.
-    fn document<const D: usize>(
+    fn check_junit(&self, path: &Path, rules: &Rules) -> Result<PathBuf, Error> {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        if let Some(folder) = folder.filter(|folder| !folder.exists()) {
+            // It may be the folder of the report.
+            make_folders(folder, access(self.share_safe))
+                .map_err(|error| Error::request(format!("{JUNIT}: {error}")))?;
+        }
+        check_file_of(JUNIT, path, Kind::Junit, rules)
+    }
+}
+
+/// Returns who can read results: others, too, if they may be shared.
+fn access(share_safe: bool) -> Access {
+    if share_safe { Access::Usual } else { Access::Private }
+}
+
+/// Returns the peak resident memory of this process in bytes, if the system reports it (Linux).
+fn peak_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    kibibytes.checked_mul(1024)
+}
+
+/// The results of an audit, before they are written.
+#[derive(Clone, Debug)]
+pub struct Audited {
+    /// The figures.
+    pub document: Document,
+    scene: Option<Scene3d>,
+    rendering: RenderOptions,
+}
+
+/// A written audit.
+pub struct Finished {
+    /// The figures, as written.
+    pub document: Document,
+    /// The path of the report.
+    pub report: PathBuf,
+}
+
+impl Audited {
+    /// Renders the self-contained page.
+    pub fn page(&self, share_safe: bool) -> Result<String, Error> {
+        let options = RenderOptions { share_safe, ..self.rendering.clone() };
+        Ok(render(&self.document, self.scene.as_ref(), &options)?)
+    }
+
+    /// Returns the recovered shares of every scheme, the largest first.
+    pub fn shares(&self) -> Vec<Shares> {
+        shares(&self.document, &self.rendering.inversions)
+    }
+
+    /// Puts the verdict and pictures of `first` at the top of this audit's page, under `title`.
+    /// `details` is a link to the page of `first`.
+    #[must_use]
+    pub fn opening_with(mut self, first: &Self, title: &str, details: &str) -> Self {
+        let inversions = &first.rendering.inversions;
+        self.rendering.opening = Some(Opening::titled(&first.document, inversions, title, details));
+        self
+    }
+
+    /// Stages page and figures under `names` in `out`. They appear when `out` is committed.
+    pub fn stage(
         &self,
-        plan: &Plan<D>,
-        attacked: Attacked,
-    ) -> Result<Audited, Error> {
-        let gates = gate_results(&self.gates, &attacked)?;
-        let input = attacked.about.unwrap_or_else(|| self.about.clone());
-        let document = report::Document {
-            unlift: env!("CARGO_PKG_VERSION").to_owned(),
-            schema: report::SCHEMA,
-            gates: with_extent(gates, &input),
-            input,
-            options: attacked.options,
-            seed: plan.seed,
-            not_audited: document::not_audited(plan, &attacked.not_audited),
-            results: attacked.rows,
-            notes: attacked.notes,
-            break_even: attacked.break_even,
-            images: attacked.images,
-            tiles: attacked.tiles,
-            localization: attacked.localization,
-            run: document::run(&self.output, &attacked.seconds),
-        };
-        Ok(Audited { document, scene: attacked.scene, drawn: attacked.drawn })
+        out: &mut OutputSet,
+        names: [&str; 2],
+        share_safe: bool,
+    ) -> Result<Document, Error> {
+        let page = self.page(share_safe)?;
+        let document = if share_safe { self.document.share_safe() } else { self.document.clone() };
+        let texts = [(Kind::Page, page), (Kind::AuditJson, document.to_json()?)];
+        for (name, (kind, text)) in names.into_iter().zip(texts) {
+            let file = out.stage(name, kind)?;
+            write_file(&file, access(share_safe), |w| w.write_all(text.as_bytes()))?;
+        }
+        Ok(document)
+    }
+
+    /// Writes page and figures, both or none, and the results of gates.
+    pub fn write(&self, files: Files) -> Result<Finished, Error> {
+        let Files { output, mut set, rules } = files;
+        let document = self.stage(&mut set, [PAGE, FIGURES], output.share_safe)?;
+        set.commit()?;
+        if let Some(path) = &output.junit {
+            check_file_of(JUNIT, path, Kind::Junit, &rules)?;
+            let text = unlift_report::junit(&document);
+            write_file(path, Access::Usual, |w| w.write_all(text.as_bytes()))?;
+        }
+        Ok(Finished { document, report: output.folder.join(PAGE) })
+    }
+}
+
+impl Finished {
+    /// Returns true if every gate held.
+    pub fn passed(&self) -> bool {
+        self.document.gates.iter().all(|gate| gate.passed)
+    }
+
+    /// Returns the short table, the results of the gates and the path of the report.
+    pub fn text(&self) -> String {
+        let mut text = text_table(&self.document);
+        text.push_str(&gate_lines(&self.document));
+        text.push_str(&format!("\nreport: {}\n", OneLine(self.report.display())));
+        text
     }
 }

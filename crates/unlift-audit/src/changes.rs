@@ -9,8 +9,8 @@ use unlift_io::Error as FileError;
 use unlift_vision::network::DescriptorKind;
 
 use crate::Error;
-use crate::images::{FeatureSource, Wanted};
-use crate::prepare::Prepared;
+use crate::images::{FeatureSource, Wanted, kind_of};
+use crate::maps::Prepared;
 use crate::request::distinct;
 
 /// Returns the changes by mitigations of a map, which may be audited in tiles.
@@ -107,12 +107,4 @@ pub fn public_descriptors(
         return Err(FileError::new(path, "", "descriptors", "none").into());
     }
     Ok(Descriptors::try_new(Values::F32(values), kind.dim())?)
-}
-
-/// Returns the kind of `descriptors`; an error about `option` if there are none.
-pub fn kind_of(option: &str, descriptors: Option<&Descriptors>) -> Result<DescriptorKind, Error> {
-    let Some(descriptors) = descriptors else {
-        return Err(Error::request(format!("{option}: expected descriptors, found none")));
-    };
-    DescriptorKind::of(descriptors, option).map_err(|error| Error::request(error.to_string()))
 }

@@ -1,17 +1,76 @@
-//! Parts of the written document. Nothing is computed here.
+//! The results of an attack, and the parts of the document that are made of them.
 
-use indexmap::IndexMap;
 use serde_json::{Map, Value, json};
-use unlift::audit::{self, NeighborsBy, NotAudited, Plan, Row};
+use unlift::audit::{BreakEven, NeighborsBy, NotAudited, Plan, Row, Seconds, Threshold};
+use unlift::neighbors::Needs;
 use unlift::recover::Delta;
-use unlift_report::document as report;
+use unlift_report::document::{ImageFigures, Input, Localization, TileFigures};
+use unlift_report::{RenderOptions, Scene3d};
 
-use crate::audit::Output;
-use crate::gate::Tried;
-use crate::tiles::Tile;
+use crate::sources;
 
-/// Returns the plan and `more` as recorded options.
-pub fn options<const D: usize>(plan: &Plan<D>, more: Map<String, Value>) -> Map<String, Value> {
+/// What an attack gives, before gates.
+#[derive(Default)]
+pub struct Attacked {
+    pub tried: Tried,
+    pub rows: Vec<Row>,
+    pub not_audited: Vec<NotAudited>,
+    pub break_even: Vec<BreakEven>,
+    pub seconds: Seconds,
+    pub about: Input,
+    pub options: Map<String, Value>,
+    pub notes: Vec<String>,
+    /// A doubt per row, or none.
+    pub doubts: Vec<Option<String>>,
+    pub localization: Vec<Localization>,
+    pub images: Vec<ImageFigures>,
+    pub tiles: Vec<TileFigures>,
+    pub scene: Option<Scene3d>,
+    pub rendering: RenderOptions,
+}
+
+/// What an audit tries, by the names that its rows have.
+#[derive(Clone, Default)]
+pub struct Tried {
+    pub schemes: Vec<String>,
+    pub solvers: Vec<String>,
+    pub sources: Vec<String>,
+    /// Inlier ratios of the oracle; none without it.
+    pub inlier_ratios: Vec<f64>,
+    pub thresholds: Vec<Threshold>,
+    /// Whether records alone could be attacked and are not.
+    pub lacks_records_alone: bool,
+    /// Whether descriptors are known and the best source for them is not tried.
+    pub lacks_best_source: bool,
+    /// Whether localization is measured.
+    pub localizes: bool,
+}
+
+impl Tried {
+    /// Returns what `plan` tries; `described` is true if there are descriptors. True neighbors alone replace a source, as no source
+    /// is better.
+    pub fn by<const D: usize>(plan: &Plan<D>, described: bool) -> Self {
+        let described = described || plan.own_sources().any(|by| by.needs() == Needs::Descriptors);
+        let is_best = |by: &NeighborsBy<D>| match by {
+            NeighborsBy::Oracle => plan.inlier_ratios.contains(&1.0),
+            by => by.name() == sources::BY_DESCRIPTORS.name,
+        };
+        let inlier_ratios = if plan.asks_oracle() { &plan.inlier_ratios[..] } else { &[] };
+        Self {
+            schemes: plan.schemes.iter().map(|scheme| scheme.name().to_owned()).collect(),
+            solvers: plan.solvers.iter().map(|solver| solver.name().to_owned()).collect(),
+            sources: plan.neighbors.iter().map(|by| by.name().to_owned()).collect(),
+            inlier_ratios: inlier_ratios.to_vec(),
+            thresholds: plan.thresholds.clone(),
+            lacks_records_alone: D == 3 && !plan.records_alone,
+            lacks_best_source: described && !plan.neighbors.iter().any(is_best),
+            localizes: false,
+        }
+    }
+}
+
+/// Returns the plan as recorded options.
+pub fn options<const D: usize>(plan: &Plan<D>) -> Map<String, Value> {
     let mut options = Map::new();
     let mut record = |name: &str, value: Value| _ = options.insert(name.to_owned(), value);
     record("schemes", plan.schemes.iter().map(|scheme| scheme.name()).collect());
@@ -37,70 +96,7 @@ pub fn options<const D: usize>(plan: &Plan<D>, more: Map<String, Value>) -> Map<
     );
     record("thresholds", plan.thresholds.iter().map(|t| t.label.as_str()).collect());
     record("repeats", json!(plan.repeats));
-    options.extend(more);
     options
-}
-
-/// Returns the names of schemes and thresholds, and `more`, as recorded options.
-pub fn names(tried: &Tried, mut more: Map<String, Value>) -> Map<String, Value> {
-    more.insert("schemes".to_owned(), json!(tried.schemes));
-    let labels = tried.thresholds.iter().map(|t| t.label.as_str());
-    more.insert("thresholds".to_owned(), labels.collect());
-    more
-}
-
-/// Returns what the document says of the run itself.
-pub fn run(output: &Output, seconds: &audit::Seconds) -> report::Run {
-    let stages = [
-        ("search", seconds.search),
-        ("obfuscate", seconds.obfuscate),
-        ("neighbors", seconds.neighbors),
-        ("recover", seconds.recover),
-        ("records_alone", seconds.records_alone),
-        ("evaluate", seconds.evaluate),
-    ];
-    let rows = seconds.rows.iter().map(|row| {
-        let made = (row.neighbors > 0.0).then(|| ("neighbors".to_owned(), row.neighbors));
-        ordered(made.into_iter().chain([("recover".to_owned(), row.recover)]))
-    });
-    report::Run {
-        command: output.command.clone(),
-        threads: rayon::current_num_threads() as u32,
-        peak_memory_bytes: peak_bytes(),
-        seconds: report::Seconds {
-            total: output.started.elapsed().as_secs_f64(),
-            rows: rows.collect(),
-            stages: ordered(stages.map(|(name, s)| (name.to_owned(), s))),
-        },
-    }
-}
-
-/// Returns the figures of every tile: those of its `rows` that are in the pooled `results`.
-pub fn tiles(tiles: &[Tile], rows: &[Vec<Row>], results: &[Row]) -> Vec<report::TileFigures> {
-    let figures = |(tile, rows): (&Tile, &Vec<Row>)| {
-        let percent = |result: &Row| {
-            let row = rows.iter().find(|row| row.is_same_cell(result));
-            row.map(|row| row.recovered_percent.clone()).unwrap_or_default()
-        };
-        report::TileFigures {
-            bounds: Some(tile.bounds),
-            n_points: tile.rows.len() as u64,
-            recovered_percent: results.iter().map(percent).collect(),
-        }
-    };
-    tiles.iter().zip(rows).map(figures).collect()
-}
-
-/// Returns the figures of one image of an audit.
-pub fn image(name: &str, n_points: usize, rows: &[Row]) -> report::ImageFigures {
-    let figures = |row: &Row| report::ImageRow {
-        recovered_percent: row.recovered_percent.clone(),
-        distinct_percent: row.distinct.clone().unwrap_or_default().recovered_percent,
-        inlier_ratio: row.inlier_ratio,
-        median_error: row.median_error,
-    };
-    let (name, rows) = (Some(name.to_owned()), rows.iter().map(figures).collect());
-    report::ImageFigures { name, n_points: n_points as u64, rows }
 }
 
 /// Fields of a row that are unknown where points come from files.
@@ -128,40 +124,24 @@ pub fn not_audited<const D: usize>(plan: &Plan<D>, missing: &[NotAudited]) -> Ve
         (&a.scheme, &a.neighbors, &a.reason) == (&b.scheme, &b.neighbors, &b.reason)
     };
     let n_parts = plan.oracle_noise.len() * plan.inlier_ratios.len();
+    // The inlier ratio, with the noise model if there are several.
+    let part = |part: &NotAudited| {
+        let ratio = part.inlier_ratio.map(|ratio| ratio.to_string());
+        let noise = part.oracle_noise.filter(|_| plan.oracle_noise.len() > 1);
+        let noise = noise.map(|noise| format!(" ({noise})"));
+        ratio.unwrap_or_default() + &noise.unwrap_or_default()
+    };
     let mut listed: Vec<NotAudited> = Vec::new();
     for (at, first) in missing.iter().enumerate() {
         if missing[..at].iter().any(|earlier| same(earlier, first)) {
             continue;
         }
-        let all = missing.iter().filter(|part| same(part, first));
-        let reason = match first.oracle_noise.filter(|_| all.clone().count() < n_parts) {
-            None => first.reason.clone(),
-            Some(_) => {
-                // Inlier ratios, with the noise model if there are several.
-                let part = |part: &NotAudited| {
-                    let ratio = part.inlier_ratio.map(|ratio| ratio.to_string());
-                    let noise = part.oracle_noise.filter(|_| plan.oracle_noise.len() > 1);
-                    let noise = noise.map(|noise| format!(" ({noise})"));
-                    ratio.unwrap_or_default() + &noise.unwrap_or_default()
-                };
-                let parts: Vec<String> = all.map(part).collect();
-                format!("at {}: {}", parts.join(", "), first.reason)
-            }
-        };
-        listed.push(NotAudited { reason, ..first.clone() });
+        let parts: Vec<String> = missing.iter().filter(|of| same(of, first)).map(part).collect();
+        let mut listing = first.clone();
+        if first.oracle_noise.is_some() && parts.len() < n_parts {
+            listing.reason = format!("at {}: {}", parts.join(", "), first.reason);
+        }
+        listed.push(listing);
     }
     listed
-}
-
-/// Collects pairs into an ordered map.
-pub fn ordered<V>(pairs: impl IntoIterator<Item = (String, V)>) -> IndexMap<String, V> {
-    pairs.into_iter().collect()
-}
-
-/// Returns the peak resident memory of this process in bytes, if the system reports it (Linux).
-pub fn peak_bytes() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    kibibytes.checked_mul(1024)
 }

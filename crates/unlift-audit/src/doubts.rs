@@ -13,10 +13,9 @@ use unlift::recover::Recovered;
 use unlift::released::Released;
 use unlift::truth::{Original, Secret};
 use unlift::{Descriptors, PointSet, Unit};
-use unlift_report::document::{GateResult, Input};
+use unlift_report::document::Input;
 
 use crate::Error;
-use crate::tiles::Tile;
 
 /// Limits of delta, in multiples of the quartiles of the distance to the K-th neighbor; beyond them
 /// the attack did not learn the distance of neighbors. On RedKitchen and Castle delta is 0.1
@@ -36,8 +35,6 @@ const LONG: f64 = 0.05;
 /// Lists of at most this length are never long.
 const SHORT: usize = 5;
 
-/// The doubts about an audit of a map.
-#[derive(Debug, Default)]
 pub(crate) struct Doubts {
     pub(crate) of_rows: Vec<Option<String>>,
     /// Notes of the whole audit.
@@ -57,15 +54,14 @@ pub(crate) fn doubts(
 ) -> Doubts {
     let Spread { low, middle, high, n_points } = spread;
     let unit = original.reveal().unit();
-    let strangers = hidden.and_then(|hidden| not_its_own(original, hidden, plan));
-    let mistaken = hidden.and_then(|_| mistaken_unit(unit, plan.k, middle));
-    let of_map = strangers.or(mistaken);
-    let mut found = Doubts::default();
-    found.notes.extend(of_map.iter().chain(of_file).cloned());
-    let of_map = of_map.or_else(|| of_file.first().cloned());
+    let of_release = hidden.and_then(|hidden| {
+        not_its_own(original, hidden, plan).or_else(|| mistaken_unit(unit, plan.k, middle))
+    });
+    let mut notes: Vec<String> = of_release.iter().chain(of_file).cloned().collect();
+    let (of_map, mut of_rows) = (notes.first().cloned(), Vec::new());
     let share = plan.k as f64 / n_points.max(1) as f64;
     if plan.asks_oracle() && plan.k > SHORT && share > LONG {
-        found.notes.push(format!(
+        notes.push(format!(
             "K = {} is {:.0} % of the map's points: such long lists may lower recovery (try a smaller --k)",
             plan.k,
             100.0 * share
@@ -89,15 +85,15 @@ pub(crate) fn doubts(
         // One line per scheme is enough.
         let start = format!("{}: delta", row.scheme);
         if let Some(doubt) = &of_delta
-            && !found.notes.iter().any(|note| note.starts_with(&start))
+            && !notes.iter().any(|note| note.starts_with(&start))
         {
-            found.notes.push(doubt.clone());
+            notes.push(doubt.clone());
         }
-        found.of_rows.push(of_map.clone().or(of_delta));
-        found.notes.extend(noise(row, f64::INFINITY));
+        of_rows.push(of_map.clone().or(of_delta));
+        notes.extend(noise(row, f64::INFINITY));
     }
-    found.notes.dedup();
-    found
+    notes.dedup();
+    Doubts { of_rows, notes }
 }
 
 /// Quartiles of the distance to the K-th neighbor.
@@ -105,7 +101,7 @@ pub(crate) struct Spread {
     low: f64,
     middle: f64,
     high: f64,
-    /// Number of points of the map, or of its smallest tile.
+    /// Number of points of the map, or of its smallest part.
     n_points: usize,
 }
 
@@ -115,19 +111,19 @@ impl Spread {
         Ok(Self::of_distances(distances(points, k, SAMPLE)?, points.len()))
     }
 
-    /// Measures the spread of a map in tiles. Neighbors are searched within a tile.
-    pub(crate) fn of_tiles(
-        original: &Original<3>,
-        tiles: &[Tile],
+    /// Measures the spread of a map in parts. Neighbors are searched within a part.
+    pub(crate) fn of_parts(
+        parts: impl ExactSizeIterator<Item = Result<Original<3>, unlift::Error>>,
         k: usize,
     ) -> Result<Self, unlift::Error> {
-        let (mut found, of_each) = (Vec::new(), SAMPLE.div_ceil(tiles.len().max(1)));
-        for tile in tiles {
-            let item = tile.item(original, None)?;
-            found.extend(distances(item.original.reveal().positions(), k, of_each)?);
+        let of_each = SAMPLE.div_ceil(parts.len().max(1));
+        let (mut all, mut fewest) = (Vec::new(), usize::MAX);
+        for part in parts {
+            let part = part?;
+            all.extend(distances(part.reveal().positions(), k, of_each)?);
+            fewest = fewest.min(part.len());
         }
-        let least = tiles.iter().map(|tile| tile.rows.len()).min();
-        Ok(Self::of_distances(found, least.unwrap_or(0)))
+        Ok(Self::of_distances(all, fewest))
     }
 
     fn of_distances(mut distances: Vec<f64>, n_points: usize) -> Self {
@@ -140,10 +136,10 @@ impl Spread {
 
 fn distances(points: &[[f64; 3]], k: usize, sample: usize) -> Result<Vec<f64>, unlift::Error> {
     let knn = Knn::new(points)?;
-    let mut found = Vec::new();
+    let mut nearest = Vec::new();
     let kth = |row: usize| {
-        knn.nearest(row, k, &mut found);
-        found.last().map_or(0.0, |last| last.0.sqrt())
+        knn.nearest(row, k, &mut nearest);
+        nearest.last().map_or(0.0, |last| last.0.sqrt())
     };
     let every = points.len().div_ceil(sample).max(1);
     Ok((0..points.len()).step_by(every).map(kth).collect())
@@ -328,15 +324,6 @@ impl Extent {
 pub fn with_sides(input: Input, points: &PointSet<3>) -> Input {
     let bounds = Bounds::quantiles(points.positions(), 0.01);
     input.with_sides(bounds.map(|bounds| sub(&bounds.high, &bounds.low)), points.unit())
-}
-
-/// Adds the extent of the map to what gates compare.
-pub(crate) fn with_extent(mut gates: Vec<GateResult>, input: &Input) -> Vec<GateResult> {
-    if let Some(extent) = input.extent() {
-        let of = gates.iter_mut().filter_map(|gate| gate.of.as_mut());
-        of.for_each(|of| of.push_str(&format!(", in a map of {extent}")));
-    }
-    gates
 }
 
 fn across(points: &[[f64; 3]]) -> f64 {

@@ -1,7 +1,7 @@
 //! Audits of files as a library call: from a map or images on disk to figures and a page.
 //!
 //! ```text
-//! input, plan, gates, output ──Audit──> run ──> Audited ──write──> audit.json, report.html
+//! Input (what is attacked, plan), Audit (gates, output) ──run──> Audited ──write──> audit.json, report.html
 //! ```
 //!
 //! ```no_run
@@ -9,8 +9,7 @@
 //!
 //! use unlift::Unit;
 //! use unlift::audit::Plan;
-//! use unlift_audit::maps::{self, Map};
-//! use unlift_audit::{Audit, Gate, Input, Output, Preparation, Quiet};
+//! use unlift_audit::{Audit, Gate, Input, Map, Output, Preparation, Quiet, maps};
 //! use unlift_io::outputs::Rules;
 //!
 //! # fn main() -> Result<(), unlift_audit::Error> {
@@ -24,9 +23,9 @@
 //! let audit = Audit {
 //!     about: prepared.about(path)?,
 //!     gates: vec![Gate::parse("all@0.5:0.10<=20").expect("a gate")],
-//!     ..Audit::of_map(input, &prepared, output)
+//!     ..Audit::of_map(&prepared, output)
 //! };
-//! let finished = audit.run(&Quiet)?.write(files)?;
+//! let finished = audit.run(&input, &Quiet)?.write(files)?;
 //! assert!(finished.passed());
 //! # Ok(())
 //! # }
@@ -34,10 +33,9 @@
 //!
 //! The schemes, sources and measures of the plan may be your own; see `unlift`.
 
-pub mod again;
+mod attack;
 mod audit;
 pub mod changes;
-mod curves;
 mod document;
 mod doubts;
 mod gate;
@@ -45,52 +43,41 @@ pub mod images;
 pub mod inversion;
 pub mod localization;
 pub mod maps;
-mod outputs;
-mod prepare;
-pub mod released;
 mod request;
-pub mod sequence;
 pub mod sources;
-mod tiles;
 
-pub use audit::{Audit, Hidden, Input, Output, Views};
-pub use document::peak_bytes;
-pub use document::{evaluated, ordered};
+pub use attack::{Again, Hidden, Images, Input, Map, Maps, Sequence, Tiles};
+pub use audit::{
+    Audit, Audited, FIGURES, Files, Finished, Output, PAGE, check_file, check_file_of, refused,
+};
+pub use document::evaluated;
 pub use doubts::{
     Checked, LengthMessages, check_scale, check_thresholds, read_from_file, unlike_neighbors,
 };
-pub use gate::{Figure, Gate, Tried, positive, ratio};
-pub use outputs::{Audited, FIGURES, Files, Finished, PAGE, check_file, check_file_of, refused};
-pub use prepare::{Preparation, Prepared, by_point, prepare};
-pub use request::{Planned, Request, check_fit, distinct};
-pub use tiles::{Tile, Tiles};
+pub use gate::{Gate, positive, ratio};
+pub use maps::released;
+pub use maps::{Preparation, Prepared, by_point, prepare};
+pub use request::{Planned, Request, distinct, headline};
 
 use std::fmt;
 
 /// An error of an audit.
 #[derive(Debug)]
 pub struct Error {
-    fault: Fault,
+    message: String,
+    is_request: bool,
     advice: Option<String>,
-}
-
-#[derive(Debug)]
-enum Fault {
-    /// The request cannot be carried out.
-    Request(String),
-    /// A file cannot be read, used or written.
-    Input(Box<dyn std::error::Error + Send + Sync>),
 }
 
 impl Error {
     /// Creates an error of the request, not of a file.
     pub fn request(message: impl Into<String>) -> Self {
-        Self { fault: Fault::Request(message.into()), advice: None }
+        Self { message: message.into(), is_request: true, advice: None }
     }
 
     /// Creates an error that is not of the request, with a text of its own.
     pub fn failed(message: impl Into<String>) -> Self {
-        Self { fault: Fault::Input(message.into().into()), advice: None }
+        Self { message: message.into(), is_request: false, advice: None }
     }
 
     /// Adds advice: what the user could try instead.
@@ -101,7 +88,7 @@ impl Error {
 
     /// Returns true if the request is wrong, not a file.
     pub fn is_request(&self) -> bool {
-        matches!(self.fault, Fault::Request(_))
+        self.is_request
     }
 
     /// Returns what the user could try instead.
@@ -112,18 +99,7 @@ impl Error {
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match &self.fault {
-            Fault::Request(message) => f.write_str(message),
-            Fault::Input(error) => {
-                write!(f, "{error}")?;
-                let mut source = error.source();
-                while let Some(error) = source {
-                    write!(f, ": {error}")?;
-                    source = error.source();
-                }
-                Ok(())
-            }
-        }
+        f.write_str(&self.message)
     }
 }
 
@@ -134,7 +110,10 @@ macro_rules! from {
     ($($error:ty),*) => {$(
         impl From<$error> for Error {
             fn from(error: $error) -> Self {
-                Self { fault: Fault::Input(Box::new(error)), advice: None }
+                use std::error::Error as _;
+                let sources = std::iter::successors(error.source(), |&source| source.source());
+                let texts = sources.map(|source| format!(": {source}"));
+                Self::failed(error.to_string() + &texts.collect::<String>())
             }
         }
     )*};

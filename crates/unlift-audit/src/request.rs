@@ -10,8 +10,7 @@ use unlift::recover::{Delta, Solver};
 use unlift::{Descriptors, ErrorKind};
 
 use crate::doubts::{LengthMessages, check_thresholds};
-use crate::images::headline;
-use crate::prepare::Prepared;
+use crate::maps::Prepared;
 use crate::{Error, sources};
 
 /// What a user requests of an attack. What is empty has its default; built-in names count once.
@@ -174,6 +173,15 @@ impl Request<3> {
         let notes = note.into_iter().chain(own).collect();
         Ok(Planned { plan, notes, doubts: doubt.into_iter().collect() })
     }
+}
+
+/// The headline threshold in pixels; the nearest given threshold is used.
+const HEADLINE_PX: f64 = 10.0;
+
+/// Returns the index of the headline threshold in `thresholds`.
+pub fn headline(thresholds: &[Threshold]) -> usize {
+    let away = |at: &usize| (thresholds[*at].value / HEADLINE_PX).ln().abs();
+    (0..thresholds.len()).min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0)
 }
 
 /// Returns an error if a source of `plan` does not support the descriptors. `place` says where they are expected.

@@ -12,10 +12,11 @@ use unlift::neighbors::Source;
 use unlift::neighbors::oracle::Noise;
 use unlift::obfuscate::{SCHEMES, Scheme, SchemeOptions};
 use unlift::recover::{Delta, Solver};
-use unlift_audit::images::audit::Images as ImagesInput;
 use unlift_audit::images::{Opened, Opening, Wanted};
-use unlift_audit::maps::Map as MapInput;
-use unlift_audit::{Audit, Audited, Error, Gate, Input, Output, Request, Tiles, sources};
+use unlift_audit::{
+    Audit, Audited, Error, Gate, Images as ImagesInput, Input, Map as MapInput, Output, Request,
+    Tiles, sources,
+};
 use unlift_vision::network::DescriptorKind;
 
 use crate::arrays::{raised, wrong};
@@ -141,10 +142,10 @@ pub fn audit(
             Some(tiles) => Input::Tiles(map, tiles),
             None => Input::Map(map),
         };
-        let mut audit = Audit { about, gates, ..Audit::of_map(input, &prepared, output) };
+        let mut audit = Audit { about, gates, ..Audit::of_map(&prepared, output) };
         audit.notes.extend(planned.notes);
         audit.doubts.extend(planned.doubts);
-        audit.run(progress)
+        audit.run(&input, progress)
     };
     Ok(observed(py, options.threads, (tell, &by), work)?.0)
 }
@@ -184,8 +185,8 @@ pub fn audit_images(
         let draws = of_images.pictures;
         let images = ImagesInput { opened: &opened, plan, draws, photos, inversion: None };
         let options = of_images.record();
-        let audit = Audit { options, gates, ..Audit::new(Input::Images(images), output) };
-        audit.run(progress).map_err(|error| {
+        let audit = Audit { options, gates, ..Audit::new(output) };
+        audit.run(&Input::Images(images), progress).map_err(|error| {
             let line = error.to_string();
             match progress.messages().first().filter(|_| line.ends_with("can be used, found 0")) {
                 // The reason of the first image tells most.

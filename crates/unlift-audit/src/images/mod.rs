@@ -1,23 +1,22 @@
 //! Features of images from a folder of photos, an HDF5 file of hloc, a COLMAP database, or memory.
 
-pub mod audit;
 mod folder;
-mod pictures;
+pub(crate) mod keypoints;
 pub mod stream;
 
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use unlift::Descriptors;
-use unlift::audit::{Plan, Threshold};
+use unlift::audit::Plan;
 use unlift::descriptors::Values;
+use unlift::neighbors::Needs;
 use unlift_io::features::{self, ImageFeatures};
 use unlift_io::hash::{hash_file, hash_files};
 use unlift_vision::features::photo::Turn;
 use unlift_vision::features::{Extraction, Extractor};
 use unlift_vision::network::DescriptorKind;
 
-use crate::changes::kind_of;
 use crate::request::check_fit;
 use crate::{Error, sources};
 
@@ -156,6 +155,14 @@ impl FeatureSource {
     }
 }
 
+/// Returns the kind of `descriptors`; an error about `option` if there are none.
+pub fn kind_of(option: &str, descriptors: Option<&Descriptors>) -> Result<DescriptorKind, Error> {
+    let Some(descriptors) = descriptors else {
+        return Err(Error::request(format!("{option}: expected descriptors, found none")));
+    };
+    DescriptorKind::of(descriptors, option).map_err(|error| Error::request(error.to_string()))
+}
+
 /// What a user requests of the extraction from photos; `None` is the default.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Wanted {
@@ -277,7 +284,8 @@ impl Opened {
             return Err(unlift_io::Error::new(photos, "", expected, "none").into());
         }
         // Extracted features always have descriptors.
-        let uses = opening.uses_descriptors || stream::Needs::of_plan(plan).descriptors();
+        let needs = |plan: &Plan<2>| plan.own_sources().any(|by| by.needs() == Needs::Descriptors);
+        let uses = opening.uses_descriptors || needs(plan);
         let first = (uses && opened.source.is_file()).then(|| opened.source.first(&opened.chosen));
         if let Some(first) = first.flatten() {
             if opening.is_usual && first.descriptors.is_none() {
@@ -301,15 +309,6 @@ impl Opened {
     pub fn kind(&self, option: &str) -> Result<DescriptorKind, Error> {
         self.source.kind(option, &self.chosen)
     }
-}
-
-/// The headline threshold in pixels; the nearest given threshold is used.
-const HEADLINE_PX: f64 = 10.0;
-
-/// Returns the index of the headline threshold in `thresholds`.
-pub fn headline(thresholds: &[Threshold]) -> usize {
-    let away = |at: &usize| (thresholds[*at].value / HEADLINE_PX).ln().abs();
-    (0..thresholds.len()).min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0)
 }
 
 /// Returns the numbers of at most `max_images` of `n` images, evenly spaced: the middles of equal parts.

@@ -4,12 +4,11 @@
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::path::Path;
-use std::sync::Arc;
 
 use rayon::prelude::*;
-use unlift::audit::{Item, NeighborsBy, Plan};
+use unlift::audit::{Item, Plan};
 use unlift::geometry::frame::Bounds;
-use unlift::neighbors::{self, Source};
+use unlift::neighbors::Needs;
 use unlift::truth::Original;
 use unlift::{PointSet, Unit};
 use unlift_io::Error;
@@ -23,12 +22,10 @@ const PER_THREAD: usize = 2;
 /// Counts of the images that were read so far.
 #[derive(Debug, Default)]
 pub struct Tally {
-    /// Keypoint counts of the images that were returned and not yet [taken](Self::take).
-    sizes: VecDeque<usize>,
     /// Numbers of the images that were returned.
     pub used: Vec<usize>,
-    /// Their total number of keypoints.
-    pub n_points: usize,
+    /// Their keypoint counts.
+    pub sizes: Vec<usize>,
     /// Their hashes, for images in memory.
     pub hashes: Vec<String>,
     /// Images that could not be used.
@@ -86,42 +83,6 @@ impl Tally {
             format!("{n} keypoints were at most a pixel outside of their images, and are moved to the edge")
         })
     }
-
-    /// Removes and returns the number of keypoints of the earliest image that was not taken yet.
-    pub fn take(&mut self) -> usize {
-        self.sizes.pop_front().unwrap_or(0)
-    }
-}
-
-/// Data that an image must have besides keypoints and a size, depending on the sources.
-#[derive(Clone, Debug, Default)]
-pub struct Needs {
-    sources: Vec<Arc<dyn Source<2>>>,
-    /// Descriptors are kept if there are any.
-    whatever: bool,
-}
-
-impl Needs {
-    /// Returns the needs of a plan.
-    pub fn of_plan(plan: &Plan<2>) -> Self {
-        let own = plan.neighbors.iter().filter_map(|by| match by {
-            NeighborsBy::Source(source) => Some(source.clone()),
-            NeighborsBy::Oracle | NeighborsBy::Given(_) => None,
-        });
-        let needy = own.filter(|source| source.needs() == neighbors::Needs::Descriptors);
-        // Measures may use descriptors if there are any.
-        Self { sources: needy.collect(), whatever: !plan.measures.is_empty() }
-    }
-
-    /// Needs nothing, but keeps descriptors if there are any.
-    pub fn whatever_there_is() -> Self {
-        Self { sources: Vec::new(), whatever: true }
-    }
-
-    /// Returns true if descriptors are needed.
-    pub fn descriptors(&self) -> bool {
-        !self.sources.is_empty()
-    }
 }
 
 /// An image that was read.
@@ -139,7 +100,7 @@ pub struct Stream<'a> {
     source: &'a FeatureSource,
     path: &'a Path,
     chosen: &'a [usize],
-    needs: Needs,
+    plan: Option<&'a Plan<2>>,
     next: usize,
     ready: VecDeque<(usize, Result<Ready, crate::Error>)>,
     tally: &'a RefCell<Tally>,
@@ -148,24 +109,25 @@ pub struct Stream<'a> {
 
 impl<'a> Stream<'a> {
     /// Creates a stream. `path` names the source in errors, which are reported to `steps` and
-    /// counted in `tally`.
+    /// counted in `tally`. Images must have the descriptors that sources of the `plan` need, and lose those that nothing needs; without
+    /// a plan, they keep theirs.
     pub fn new(
         (source, path): (&'a FeatureSource, &'a Path),
         chosen: &'a [usize],
-        needs: Needs,
+        plan: Option<&'a Plan<2>>,
         tally: &'a RefCell<Tally>,
         steps: &'a dyn Progress,
     ) -> Self {
         let ready = VecDeque::new();
-        Self { source, path, chosen, needs, next: 0, ready, tally, steps }
+        Self { source, path, chosen, plan, next: 0, ready, tally, steps }
     }
 
     fn read_ahead(&mut self) {
         let n = PER_THREAD * rayon::current_num_threads();
         let numbers = &self.chosen[self.next..self.chosen.len().min(self.next + n)];
         self.next += numbers.len();
-        let (source, path, needs) = (self.source, self.path, &self.needs);
-        let read = |&at: &usize| (at, read(source, path, at, needs));
+        let (source, path, plan) = (self.source, self.path, self.plan);
+        let read = |&at: &usize| (at, read(source, path, at, plan));
         let images: Vec<_> = numbers.par_iter().with_max_len(1).map(read).collect();
         let mut tally = self.tally.borrow_mut();
         for (at, image) in images {
@@ -201,8 +163,7 @@ impl Iterator for Stream<'_> {
             let mut tally = self.tally.borrow_mut();
             tally.used.push(at);
             tally.hashes.extend(sha256);
-            tally.n_points += image.original.len();
-            tally.sizes.push_back(image.original.len());
+            tally.sizes.push(image.original.len());
             image
         }))
     }
@@ -212,15 +173,18 @@ fn read(
     source: &FeatureSource,
     path: &Path,
     at: usize,
-    needs: &Needs,
+    plan: Option<&Plan<2>>,
 ) -> Result<Ready, crate::Error> {
     let features = source.get(at)?;
     let sha256 = source.is_in_memory().then(|| hash_features(&features));
     let place = format!("image {}", features.name.escape_debug());
     let wrong = |expected: &str, found: &str| Error::new(path, place.clone(), expected, found);
+    let sources = plan.into_iter().flat_map(Plan::own_sources);
+    let needy: Vec<_> = sources.filter(|by| by.needs() == Needs::Descriptors).collect();
+    // Measures may use descriptors, too. These are most of the memory of an image.
+    let keeps = !needy.is_empty() || plan.is_none_or(|plan| !plan.measures.is_empty());
     // An image without keypoints needs nothing.
-    let needy = needs.sources.iter().filter(|_| !features.keypoints.is_empty());
-    for source in needy {
+    for source in needy.into_iter().filter(|_| !features.keypoints.is_empty()) {
         let descriptors = features.descriptors.as_ref();
         let descriptors = descriptors.ok_or_else(|| wrong("descriptors", "none"))?;
         source.takes(descriptors).map_err(|error| wrong(error.expected(), error.found()))?;
@@ -241,9 +205,8 @@ fn read(
     let keypoints = features.keypoints.iter().copied().map(to_edge).collect();
     let points = PointSet::try_new(keypoints, Unit::Pixel).map_err(of_image)?;
     let original = Original::within(points, bounds).map_err(of_image)?;
-    // Descriptors use most of the memory of an image.
     let described = features.descriptors.is_some();
-    let descriptors = features.descriptors.filter(|_| needs.descriptors() || needs.whatever);
+    let descriptors = features.descriptors.filter(|_| keeps);
     let image = Item { name: features.name, original, descriptors };
     Ok(Ready { image, sha256, n_moved, described })
 }

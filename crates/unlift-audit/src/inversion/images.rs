@@ -6,14 +6,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use unlift::audit::{Cell, Counts, Measure, Row};
 use unlift::{Descriptors, Error};
 use unlift_report::inversions::Inversion as Sheet;
-use unlift_vision::features::ColorImage;
-use unlift_vision::features::photo::{Turn, jpeg_of, read_color};
+use unlift_vision::features::photo::{Turn, read_color};
 use unlift_vision::network::DescriptorKind;
 use unlift_vision::pictures::Points;
 
 use crate::images::FeatureSource;
 
-use super::{Painter, Photo, Picture, SHOWN, needed, size};
+use super::{Painter, Photo, Picture, needed, size};
 
 /// A photo and the picture of its true points: no attack on positions can be expected to do better.
 struct Truth {
@@ -70,7 +69,9 @@ impl Inversion {
     /// Adds the picture of `cell` to the sheet of its image.
     pub fn add(&self, cell: &Cell<'_, 2>, sheet: &mut Sheet) -> Result<(), Error> {
         let image = self.painter.image(cell.released, cell.recovered)?;
-        self.put(&*self.truth(cell)?, cell.row, image, sheet)
+        let truth = self.truth(cell)?;
+        let picture = self.painter.compare(image, &truth.photo)?;
+        picture.add_to(sheet, (&truth.photo, &truth.baseline), cell.row)
     }
 
     /// Adds the picture of `recovered` keypoints to the sheet of the image `name`, whose photo has
@@ -85,22 +86,8 @@ impl Inversion {
     ) -> Result<(), Error> {
         let truth = self.truth_of(name, size, original)?;
         let image = self.painter.inverter.invert(recovered, size)?;
-        self.put(&truth, row, image, sheet)
-    }
-
-    fn put(
-        &self,
-        truth: &Truth,
-        row: &Row,
-        image: ColorImage,
-        sheet: &mut Sheet,
-    ) -> Result<(), Error> {
-        if sheet.photo.is_empty() {
-            sheet.photo = jpeg_of(&truth.photo.image, SHOWN)?;
-            sheet.baseline = truth.baseline.painted()?;
-        }
-        sheet.views.push(self.painter.compare(image, &truth.photo)?.shown(row)?);
-        Ok(())
+        let picture = self.painter.compare(image, &truth.photo)?;
+        picture.add_to(sheet, (&truth.photo, &truth.baseline), row)
     }
 
     fn truth(&self, cell: &Cell<'_, 2>) -> Result<Arc<Truth>, Error> {

@@ -14,20 +14,18 @@ use unlift_io::read::colmap;
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::pictures::{Marks, ReleasedView};
 use unlift_report::scene::{SceneBox, Shapes};
-use unlift_vision::features::photo::{Turn, jpeg_of, read_color};
+use unlift_vision::features::photo::{Turn, read_color};
 use unlift_vision::pictures::{Lens, View};
 
-use super::{Painter, Photo, Picture, SHOWN, needed};
+use super::shapes::{near, shapes};
+use super::{Painter, Photo, Picture, needed};
 use crate::Progress;
-use crate::changes::kind_of;
-use crate::images::evenly;
-use crate::maps::{near, shapes};
-use crate::prepare::Prepared;
+use crate::images::{evenly, kind_of};
+use crate::maps::Prepared;
 
 /// Smallest side of a picture for which the metrics are defined.
 const LEAST_SIDE: usize = 16;
 
-/// One camera of the map that took a photo.
 struct PhotoView {
     name: String,
     view: View,
@@ -91,12 +89,8 @@ impl MapInversion {
         }
         let mut views = Vec::new();
         for (image, path) in evenly(n, Some(max_images)).into_iter().map(|at| &with_photo[at]) {
-            let made = image.camera(&cameras).ok_or_else(|| {
-                let id = image.camera_id.to_string();
-                Error::new(path.display().to_string(), "a camera of the model", id)
-            });
-            match made.and_then(|camera| open_photo(&painter, (camera, image), path, scale)) {
-                Ok(open_photo) => views.push(open_photo),
+            match open_photo(&painter, (&cameras, image), path, scale) {
+                Ok(view) => views.push(view),
                 Err(error) => progress.say(&format!("note: not painted: {error}")),
             }
         }
@@ -146,17 +140,13 @@ impl MapInversion {
             |sheet: &Sheet| sheet.released.iter().all(|shown| shown.scheme != cell.row.scheme);
         let records = sheets.iter().any(is_new).then(|| records(cell));
         for ((of, sheet), picture) in self.views.iter().zip(sheets).zip(pictures) {
-            if sheet.photo.is_empty() {
-                sheet.name.clone_from(&of.name);
-                sheet.size = of.view.size.map(|side| side as u32);
-                sheet.photo = jpeg_of(&of.photo.image, SHOWN)?;
-                sheet.baseline = self.truth(of, cell)?.painted()?;
-            }
+            sheet.name.clone_from(&of.name);
+            sheet.size = of.view.size.map(|side| side as u32);
             if let Some((shapes, middle)) = &records {
                 let marks = marks(&of.view, shapes, middle)?;
                 sheet.released.push(ReleasedView { scheme: cell.row.scheme.clone(), marks });
             }
-            sheet.views.push(picture.shown(cell.row)?);
+            picture.add_to(sheet, (&of.photo, self.truth(of, cell)?), cell.row)?;
         }
         Ok(())
     }
@@ -247,10 +237,14 @@ fn marks(view: &View, shapes: &Shapes, middle: &[f64; 3]) -> Result<Marks, Error
 
 fn open_photo(
     painter: &Painter,
-    (camera, image): (&colmap::Camera, &colmap::Image),
+    (cameras, image): (&[colmap::Camera], &colmap::Image),
     path: &Path,
     scale: f64,
 ) -> Result<PhotoView, Error> {
+    let camera = image.camera(cameras).ok_or_else(|| {
+        let id = image.camera_id.to_string();
+        Error::new(path.display().to_string(), "a camera of the model", id)
+    })?;
     // COLMAP ignores the orientation tag of photos.
     let photo = read_color(path, Turn::AsStored)?;
     let open = || {

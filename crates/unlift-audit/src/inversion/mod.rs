@@ -3,6 +3,7 @@
 mod bearings;
 mod images;
 mod maps;
+mod shapes;
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -12,7 +13,7 @@ use unlift::audit::Row;
 use unlift::recover::Recovered;
 use unlift::released::Released;
 use unlift::{Descriptors, Error, RowOrder};
-use unlift_report::inversions::Painted;
+use unlift_report::inversions::{Inversion as Sheet, Painted};
 use unlift_report::{Attack, ByAttack};
 use unlift_vision::features::photo::jpeg_of;
 use unlift_vision::features::{ColorImage, halved};
@@ -24,6 +25,7 @@ use unlift_vision::pictures::{
 pub use bearings::{on_bearings, six_views};
 pub use images::Inversion;
 pub use maps::{MapInversion, view};
+pub(crate) use shapes::{near, shapes};
 
 /// Points with a lower probability of being near their recovered place are omitted: they would
 /// paint wrong content over correct content.
@@ -40,7 +42,7 @@ const SURE: f32 = 0.3;
 const SAME: f32 = 0.5;
 
 /// Distance in pixels within which a keypoint's descriptor paints the correct content.
-pub(crate) const NEAR_PX: f64 = 10.0;
+const NEAR_PX: f64 = 10.0;
 /// Distance within which a map point's descriptor paints the correct content, as a share of its
 /// depth: about 15 of 640 pixels.
 const NEAR: f64 = 0.03;
@@ -101,10 +103,7 @@ impl Painter {
         released: &Released<2>,
         recovered: &Recovered<2>,
     ) -> Result<ColorImage, Error> {
-        let place = |slot| recovered.position(slot).map_or([f32::NAN; 2], |x| x.map(|x| x as f32));
-        let places: Vec<[f32; 2]> = (0..recovered.n_slots()).map(place).collect();
-        let weights: Vec<f32> =
-            (0..recovered.n_slots()).map(|slot| weight(recovered, slot, NEAR_PX)).collect();
+        let (places, weights) = trusted(recovered, |x| x.map(|x| x as f32));
         let descriptors = &*assigned(released, recovered)?;
         let points = Points { places: &places, descriptors, weights: &weights, depths: None };
         self.inverter.invert(&points, size(released)?)
@@ -178,7 +177,6 @@ impl Picture {
         named.map(|(name, value)| (name + end, value)).collect()
     }
 
-    /// Returns the figures of the picture and of the picture of the true points.
     fn figures(&self, baseline: &Self) -> Vec<(String, f64)> {
         [self.named(""), baseline.named(BASELINE)].concat()
     }
@@ -188,8 +186,19 @@ impl Picture {
         Ok(Painted { jpeg: jpeg_of(&self.image, SHOWN)?, ssim, lpips })
     }
 
-    fn shown(&self, row: &Row) -> Result<ByAttack<Painted>, Error> {
-        Ok(ByAttack { attack: Attack::of(row), recovered: self.painted()? })
+    /// Adds the picture of `row` to the sheet of its photo.
+    fn add_to(
+        &self,
+        sheet: &mut Sheet,
+        (photo, baseline): (&Photo, &Self),
+        row: &Row,
+    ) -> Result<(), Error> {
+        if sheet.photo.is_empty() {
+            sheet.photo = jpeg_of(&photo.image, SHOWN)?;
+            sheet.baseline = baseline.painted()?;
+        }
+        sheet.views.push(ByAttack { attack: Attack::of(row), recovered: self.painted()? });
+        Ok(())
     }
 }
 
@@ -242,9 +251,19 @@ fn size(released: &Released<2>) -> Result<[usize; 2], Error> {
     Ok([0, 1].map(|c| (bounds.high[c] - bounds.low[c]).round() as usize))
 }
 
+/// Returns where every recovered keypoint is `shown`, and its weight.
+pub(crate) fn trusted(
+    recovered: &Recovered<2>,
+    shown: impl Fn([f64; 2]) -> [f32; 2],
+) -> (Vec<[f32; 2]>, Vec<f32>) {
+    let place = |slot| recovered.position(slot).map_or([f32::NAN; 2], &shown);
+    let point = |slot| (place(slot), weight(recovered, slot, NEAR_PX));
+    (0..recovered.n_slots()).map(point).unzip()
+}
+
 /// Returns the probability that a recovered point is within `near` of its place; 0 below [`LEAST`],
 /// and 1 if the attack estimates no probability.
-pub(crate) fn weight<const D: usize>(recovered: &Recovered<D>, slot: usize, near: f64) -> f32 {
+fn weight<const D: usize>(recovered: &Recovered<D>, slot: usize, near: f64) -> f32 {
     match recovered.probability_within(slot, near) {
         Some(sure) if sure < LEAST => 0.0,
         Some(sure) => sure as f32,

@@ -6,12 +6,11 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 use unlift::descriptors::Values;
-use unlift::geometry::camera::{Camera, Intrinsics, PoseError};
+use unlift::geometry::camera::{Camera, PoseError};
 use unlift::geometry::frame::Bounds;
-use unlift::geometry::vector::{distance, median, squared_distance};
-use unlift::localization::{Free, Match, View, estimate, free_directions};
+use unlift::geometry::vector::{distance, median};
+use unlift::localization::{Free, Localization, Match, View, estimate, free_directions};
 use unlift::obfuscate::{Scheme, obfuscate};
-use unlift::protected::{Rule, inner};
 use unlift::released::Released;
 use unlift::seed::{Key, Stage};
 use unlift::truth::{Original, Secret};
@@ -21,21 +20,20 @@ use unlift_vision::features::Extraction;
 use unlift_vision::features::photo::Turn;
 use unlift_vision::pictures::Lens;
 
-use super::Cameras;
+use super::matches::{Pair, Unit32, mutual, of_protected_keypoints, with_protected_map};
 use crate::Progress;
 use crate::images::FeatureSource;
+use crate::images::keypoints::{Nearby, undistorted};
+use crate::maps::Cameras;
 
 /// A keypoint belongs to a point that its image observes if it is this near to the projection, in
 /// pixels. Right matches have the same limit.
 const NEAR: f64 = 3.0;
 /// Smallest number of other images in which a point of the map must be found.
 const FEWEST_OTHERS: usize = 2;
-/// Largest ratio of the distances to the most similar descriptor and the next one.
-const RATIO: f32 = 0.8;
 /// Standard deviation of the centers of starts, as a share of the distance to the points.
 const REACH: f64 = 0.1;
 
-/// A held-out image.
 struct Query {
     /// The camera with its true pose.
     camera: Camera,
@@ -45,16 +43,6 @@ struct Query {
     places: Vec<[f64; 2]>,
     descriptors: Unit32,
 }
-
-/// Rows of unit length, or zero.
-#[derive(PartialEq)]
-pub(crate) struct Unit32 {
-    dim: usize,
-    values: Vec<f32>,
-}
-
-/// A match of a keypoint with a point, by their rows.
-pub(crate) type Pair = (usize, usize);
 
 /// The rows of a map, their descriptors, and the matches of every image with them.
 type Known = (Vec<usize>, Compared, Arc<Vec<Vec<Pair>>>);
@@ -206,10 +194,7 @@ impl<'a> Held<'a> {
     /// Returns the problems of all images with the map in the clear.
     pub fn unprotected(&mut self) -> Vec<Problem> {
         let pairs = self.pairs_in_the_clear();
-        let positions = self.original.reveal().positions();
-        self.problems(&pairs, |_, query, (keypoint, row)| {
-            Some(Match::Point { place: query.places[keypoint], point: positions[row] })
-        })
+        self.problems(&pairs, |_, _, place, point| Some(Match::Point { place, point }))
     }
 
     /// Returns the problems of all images with the map that `scheme` protects under `key`.
@@ -233,14 +218,10 @@ impl<'a> Held<'a> {
         };
         let pairs = self.pairs(points, compared);
         let free = by_original(&released, &secret, self.is_part.len());
-        let positions = self.original.reveal().positions();
-        Ok(self.problems(&pairs, |_, query, (keypoint, row)| {
-            let (place, point) = (query.places[keypoint], positions[row]);
-            match free[row] {
-                Free::Nowhere => Some(Match::Point { place, point }),
-                Free::Along(direction) => Some(Match::MapLine { place, point, direction }),
-                Free::More => None,
-            }
+        Ok(self.problems(&pairs, |_, (_, row), place, point| match free[row] {
+            Free::Nowhere => Some(Match::Point { place, point }),
+            Free::Along(direction) => Some(Match::MapLine { place, point, direction }),
+            Free::More => None,
         }))
     }
 
@@ -256,20 +237,13 @@ impl<'a> Held<'a> {
         let hide = |(number, query): (usize, &Query)| {
             let n = query.places.len();
             let keypoints = PointSet::try_new(query.places.clone(), Unit::Pixel)?;
-            let original = Original::within(keypoints, query.bounds()?)?;
+            let original = Original::within(keypoints, Bounds::try_new([0.0; 2], query.size)?)?;
             let key = key.of_item(Stage::Image, number as u64);
             let (released, secret) = obfuscate(scheme, &original, None, &key)?;
             let free = by_original(&released, &secret, n);
             let Some(protection) = scheme.protection() else { return Ok((free, None)) };
-            let plain = Values::F32(query.descriptors.values.clone());
-            let protected =
-                protection.protect(&Descriptors::try_new(plain, query.descriptors.dim)?, &key)?;
-            let mut best = Best::new(n, map.len());
-            for j in 0..map.len() {
-                let similar = protected.similarities(map.row(j)).into_iter().enumerate();
-                similar.for_each(|(i, x)| best.offer(i, j, x));
-            }
-            let pairs = best.pairs(has_ties(&protected)).into_iter();
+            let protected = protection.protect(&query.descriptors.plain()?, &key)?;
+            let pairs = of_protected_keypoints(&protected, &map).into_iter();
             Ok((free, Some(pairs.map(|(i, j)| (i, points[j])).collect::<Vec<_>>())))
         };
         let hidden = self.queries.par_iter().enumerate().map(hide);
@@ -278,10 +252,8 @@ impl<'a> Held<'a> {
         if let Some(own) = of_protected.into_iter().collect::<Option<Vec<_>>>() {
             pairs = Arc::new(own);
         }
-        let positions = self.original.reveal().positions();
-        Ok(self.problems(&pairs, |number, query, (keypoint, row)| {
-            let (place, point) = (query.places[keypoint], positions[row]);
-            match free[number][keypoint] {
+        Ok(self.problems(&pairs, |image, (keypoint, _), place, point| {
+            match free[image][keypoint] {
                 Free::Nowhere => Some(Match::Point { place, point }),
                 Free::Along(direction) => Some(Match::ImageLine { place, direction, point }),
                 Free::More => None,
@@ -310,14 +282,7 @@ impl<'a> Held<'a> {
         let of = |query: &Query| {
             let matched = match &compared {
                 Compared::Plain(unit) => mutual(&query.descriptors, unit),
-                Compared::Protected(protected) => {
-                    let mut best = Best::new(query.descriptors.len(), protected.len());
-                    for i in 0..query.descriptors.len() {
-                        let similar = protected.similarities(query.descriptors.row(i));
-                        similar.into_iter().enumerate().for_each(|(j, x)| best.offer(i, j, x));
-                    }
-                    best.pairs(has_ties(protected))
-                }
+                Compared::Protected(map) => with_protected_map(&query.descriptors, map),
             };
             matched.into_iter().map(|(keypoint, at)| (keypoint, rows[at])).collect()
         };
@@ -326,11 +291,11 @@ impl<'a> Held<'a> {
         pairs
     }
 
-    /// Returns the problem of every image; `fixed` returns what a match fixes.
+    /// Returns the problem of every image; `fixed` returns what a match of an image fixes, by its keypoint and its point.
     fn problems(
         &self,
         pairs: &[Vec<Pair>],
-        fixed: impl Fn(usize, &Query, Pair) -> Option<Match> + Sync,
+        fixed: impl Fn(usize, Pair, [f64; 2], [f64; 3]) -> Option<Match>,
     ) -> Vec<Problem> {
         let positions = self.original.reveal().positions();
         let of = |(number, query): (usize, &Query)| {
@@ -338,6 +303,9 @@ impl<'a> Held<'a> {
             let is_right = |&&(keypoint, row): &&Pair| {
                 let place = query.camera.project(&positions[row]);
                 place.is_some_and(|p| distance(&p, &query.places[keypoint]) <= NEAR)
+            };
+            let fixed = |&(keypoint, row): &Pair| {
+                fixed(number, (keypoint, row), query.places[keypoint], positions[row])
             };
             let start = self.most_similar(pairs).map(|similar| {
                 let points = pairs.iter().map(|(_, row)| &positions[*row]);
@@ -351,7 +319,7 @@ impl<'a> Held<'a> {
                 start,
                 n_pairs: pairs.len(),
                 n_right: pairs.iter().filter(is_right).count(),
-                matches: pairs.iter().filter_map(|&pair| fixed(number, query, pair)).collect(),
+                matches: pairs.iter().filter_map(fixed).collect(),
             }
         };
         self.queries.iter().enumerate().map(of).collect()
@@ -386,14 +354,6 @@ pub struct Problem {
     n_right: usize,
 }
 
-/// The result of one held-out image.
-pub struct Located {
-    n_pairs: usize,
-    n_right: usize,
-    /// The error of the pose; `None` without an estimate.
-    error: Option<PoseError>,
-}
-
 impl Problem {
     /// Estimates the pose and returns its error.
     pub fn solve(&self, seed: u64) -> Option<PoseError> {
@@ -403,13 +363,9 @@ impl Problem {
     }
 }
 
-/// Estimates the poses of all images.
-pub fn locate(problems: &[Problem], seed: u64) -> Vec<Located> {
-    let of = |(number, problem): (usize, &Problem)| Located {
-        n_pairs: problem.n_pairs,
-        n_right: problem.n_right,
-        error: problem.solve(seed.wrapping_add(number as u64)),
-    };
+/// Estimates the poses of all images and returns their errors; `None` without an estimate.
+pub fn locate(problems: &[Problem], seed: u64) -> Vec<Option<PoseError>> {
+    let of = |(at, problem): (usize, &Problem)| problem.solve(seed.wrapping_add(at as u64));
     problems.par_iter().enumerate().map(of).collect()
 }
 
@@ -423,44 +379,43 @@ fn by_original<const D: usize>(released: &Released<D>, secret: &Secret, n: usize
     free
 }
 
-/// Summarizes the results of all images beside the unprotected ones. `limits` are pairs of errors
+/// Summarizes the errors of all images beside the unprotected ones. `limits` are pairs of errors
 /// with their names.
 pub fn summary(
-    located: &[Located],
-    unprotected: &[Located],
+    problems: &[Problem],
+    [errors, unprotected]: [&[Option<PoseError>]; 2],
     limits: &[(String, f64, f64)],
 ) -> HeldOut {
-    let middle = |of: &[Located], value: &dyn Fn(&Located) -> f64| {
-        let mut values: Vec<f64> = of.iter().map(value).collect();
-        values.sort_unstable_by(f64::total_cmp);
+    let [own, base] = [errors, unprotected].map(|errors| Localization::of(errors, errors));
+    let middle = |count: fn(&Problem) -> usize| {
+        let mut counts: Vec<usize> = problems.iter().map(count).collect();
+        counts.sort_unstable();
         // The upper one of an even number.
-        values.get(values.len() / 2).copied().unwrap_or(f64::INFINITY)
+        counts.get(counts.len() / 2).map_or(f64::INFINITY, |&n| n as f64)
     };
-    let center = |image: &Located| image.error.map_or(f64::INFINITY, |error| error.center);
-    let angle = |image: &Located| image.error.map_or(f64::INFINITY, |error| error.rotation_degrees);
-    let finite = |value: f64| Some(value).filter(|value| value.is_finite());
-    let error = middle(located, &center);
     let recall = |(name, max_center, max_angle): &(String, f64, f64)| {
-        let within = |image: &&Located| center(image) <= *max_center && angle(image) <= *max_angle;
-        let n = located.iter().filter(within).count();
-        (name.clone(), 100.0 * n as f64 / located.len().max(1) as f64)
+        let is_within = |error: &&PoseError| {
+            error.center <= *max_center && error.rotation_degrees <= *max_angle
+        };
+        let n = errors.iter().flatten().filter(is_within).count();
+        (name.clone(), 100.0 * n as f64 / errors.len().max(1) as f64)
     };
+    let finite = |value: f64| Some(value).filter(|value| value.is_finite());
     HeldOut {
-        n_images: located.len() as u64,
-        right_matches: middle(located, &|image| image.n_right as f64),
-        matches: middle(located, &|image| image.n_pairs as f64),
-        center_error: finite(error),
-        rotation_error_degrees: finite(middle(located, &angle)),
+        n_images: problems.len() as u64,
+        right_matches: middle(|problem| problem.n_right),
+        matches: middle(|problem| problem.n_pairs),
+        center_error: finite(own.center),
+        rotation_error_degrees: finite(own.rotation_degrees),
         // If most unprotected images have no pose, the quotient is 0, which would look precise.
-        multiple: finite(error / middle(unprotected, &center)).filter(|multiple| *multiple > 0.0),
+        multiple: finite(own.center / base.center).filter(|multiple| *multiple > 0.0),
         recall_percent: limits.iter().map(recall).collect(),
     }
 }
 
-/// A photo of the map with its features.
 struct Photo {
     /// Keypoints in pixels of the pinhole, and their rows among `descriptors`.
-    places: Vec<([f64; 2], u32)>,
+    places: Vec<([f64; 2], usize)>,
     descriptors: Descriptors,
     /// Points that the photo observes, with the row of the keypoint of each.
     of_points: Vec<(usize, usize)>,
@@ -474,128 +429,24 @@ impl Photo {
         descriptors: Descriptors,
         positions: &[[f64; 3]],
     ) -> Self {
-        // Buckets of the size of the search radius.
-        let cell = |p: &[f64; 2]| p.map(|x| (x / NEAR).floor() as i64);
-        let mut buckets: std::collections::HashMap<[i64; 2], Vec<usize>> = Default::default();
-        for (row, place) in keypoints.iter().enumerate() {
-            buckets.entry(cell(place)).or_default().push(row);
-        }
-        let nearest = |place: &[f64; 2]| {
-            let [x, y] = cell(place);
-            let near = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| [x + dx, y + dy]));
-            let rows = near.filter_map(|cell| buckets.get(&cell)).flatten().copied();
-            let rows = rows.map(|row| (squared_distance(&keypoints[row], place), row));
-            let nearest = rows.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))?;
-            (nearest.0 <= NEAR * NEAR).then_some(nearest.1)
-        };
+        let nearby = Nearby::new(keypoints, NEAR);
         let of_points = view.observed.iter().filter_map(|&row| {
             let place = lens.project(view.camera.pose.in_camera(&positions[row as usize]))?;
-            Some((row as usize, nearest(&place)?))
+            Some((row as usize, nearby.nearest(&place)?.1))
         });
         let of_points = of_points.collect();
         let flat = |(row, place): (usize, &[f64; 2])| {
-            let flat = lens.undistort(*place)?;
-            let Intrinsics { focal, principal } = &view.camera.intrinsics;
-            let place = [0, 1].map(|c| focal[c] * flat[c] + principal[c]);
+            let place = undistorted(lens, &view.camera.intrinsics, *place)?;
             let is_inside = (0..2).all(|c| (0.0..=view.size[c]).contains(&place[c]));
-            is_inside.then_some((place, row as u32))
+            is_inside.then_some((place, row))
         };
         let places = keypoints.iter().enumerate().filter_map(flat).collect();
         Self { places, descriptors, of_points }
     }
 
     fn query(self, view: &View) -> Query {
-        let rows = self.places.iter().map(|(_, row)| *row as usize);
-        let descriptors = Unit32::of(&self.descriptors, rows);
-        let places = self.places.iter().map(|(place, _)| *place).collect();
+        let (places, rows): (Vec<_>, Vec<_>) = self.places.into_iter().unzip();
+        let descriptors = Unit32::of(&self.descriptors, rows.into_iter());
         Query { camera: view.camera, size: view.size, places, descriptors }
-    }
-}
-
-impl Query {
-    fn bounds(&self) -> Result<Bounds<2>, Error> {
-        Bounds::try_new([0.0; 2], self.size)
-    }
-}
-
-impl Unit32 {
-    pub(crate) fn of(descriptors: &Descriptors, rows: impl Iterator<Item = usize>) -> Self {
-        let dim = descriptors.dim();
-        let (mut values, mut descriptor) = (Vec::new(), vec![0.0; dim]);
-        for row in rows {
-            descriptors.read_row(row, &mut descriptor);
-            let length = descriptor.iter().map(|x| x * x).sum::<f32>().sqrt();
-            let scale = if length > 0.0 { 1.0 / length } else { 0.0 };
-            values.extend(descriptor.iter().map(|x| x * scale));
-        }
-        Self { dim, values }
-    }
-
-    fn len(&self) -> usize {
-        self.values.len() / self.dim
-    }
-
-    fn row(&self, at: usize) -> &[f32] {
-        &self.values[at * self.dim..][..self.dim]
-    }
-}
-
-/// Rows of one side that are compared with a block of the other at a time, so that both stay in the
-/// cache.
-const BLOCK: usize = 64;
-
-/// Returns the mutually most similar rows that pass the ratio test.
-pub(crate) fn mutual(a: &Unit32, b: &Unit32) -> Vec<Pair> {
-    let mut best = Best::new(a.len(), b.len());
-    for from in (0..b.len()).step_by(BLOCK) {
-        for i in 0..a.len() {
-            for j in from..(from + BLOCK).min(b.len()) {
-                best.offer(i, j, inner(a.row(i), b.row(j)));
-            }
-        }
-    }
-    best.pairs(false)
-}
-
-/// Sets of words that contain a word are equally similar to it, so the ratio test would reject all.
-fn has_ties(protected: &ProtectedDescriptors) -> bool {
-    matches!(protected.rule(), Rule::Words { .. })
-}
-
-/// The most similar row of the other side, for the rows of both sides.
-struct Best {
-    /// Most similar row and the two largest similarities.
-    of_a: Vec<(usize, f32, f32)>,
-    of_b: Vec<(usize, f32)>,
-}
-
-impl Best {
-    fn new(n_a: usize, n_b: usize) -> Self {
-        Self { of_a: vec![(usize::MAX, -2.0, -2.0); n_a], of_b: vec![(usize::MAX, -2.0); n_b] }
-    }
-
-    /// Adds a pair; of equal ones, the first counts.
-    fn offer(&mut self, i: usize, j: usize, similar: f32) {
-        let best = &mut self.of_a[i];
-        if similar > best.1 {
-            *best = (j, similar, best.1);
-        } else if similar > best.2 {
-            best.2 = similar;
-        }
-        if similar > self.of_b[j].1 {
-            self.of_b[j] = (i, similar);
-        }
-    }
-
-    /// Returns the mutual pairs that pass the ratio test; all mutual ones if there are `ties`.
-    fn pairs(&self, ties: bool) -> Vec<Pair> {
-        let apart = |similar: f32| (2.0 - 2.0 * similar).max(0.0).sqrt();
-        let passes = |(i, &(j, first, second)): (usize, &(usize, f32, f32))| {
-            let is_mutual = j != usize::MAX && self.of_b[j].0 == i;
-            let stands_out = ties || apart(first) < RATIO * apart(second);
-            // Withheld descriptors are zero.
-            (is_mutual && first > 0.0 && stands_out).then_some((i, j))
-        };
-        self.of_a.iter().enumerate().filter_map(passes).collect()
     }
 }

@@ -1,20 +1,20 @@
 //! Localization with the cameras of a map: what every scheme costs.
 
 pub mod held_out;
+pub(crate) mod matches;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use unlift::audit::Plan;
-use unlift::geometry::camera::{Camera, Pose, PoseError};
+use unlift::geometry::camera::PoseError;
 use unlift::localization::{Localization, View, unprotected, with_map, with_queries};
 use unlift::obfuscate::{Change, Changed, Protection, SCHEMES, Scheme, SchemeOptions, obfuscate};
 use unlift::seed::Key;
 use unlift::truth::Original;
-use unlift_io::read::colmap;
 use unlift_report::document::{self as report, UNPROTECTED};
 
-use crate::prepare::Prepared;
+use crate::maps::{Cameras, Prepared};
 use crate::{Error, Progress};
 
 /// Localization in an audit.
@@ -56,63 +56,8 @@ impl<'a> Localize<'a> {
     }
 }
 
-/// The cameras of a map in the unit of an audit.
-#[derive(Clone, Debug, Default)]
-pub struct Cameras {
-    /// The images that observe points of the map.
-    pub views: Vec<View>,
-    /// Name and camera of each view, as in the model.
-    pub images: Vec<(Vec<u8>, colmap::Camera)>,
-    /// Number of images that observe each point.
-    pub tracks: Arc<[u32]>,
-    /// Number of images that are left out: their camera is a panorama, or has no focal length.
-    pub left_out: usize,
-}
-
-impl Cameras {
-    /// Reads the cameras and tracks of the COLMAP model in `model`. `rows` are the points of the
-    /// audit among the points of the model; lengths are multiplied by `scale`. Returns no views if
-    /// the points have no tracks.
-    pub fn read(model: &Path, rows: &[u32], scale: f64) -> Result<Self, Error> {
-        let named = |name: &str| {
-            let files = ["bin", "txt"].map(|end| model.join(format!("{name}.{end}")));
-            files.into_iter().find(|file| file.is_file())
-        };
-        let (Some(file), Some(_), Some(_)) = (named("points3D"), named("images"), named("cameras"))
-        else {
-            return Ok(Self::default());
-        };
-        let (cameras, images) = colmap::read_views(model)?;
-        let points = colmap::read_points(&file, true)?;
-        let Some(tracks) = points.tracks else { return Ok(Self::default()) };
-        let (observed, lengths) = tracks.observed(&images, rows);
-        let mut found = Self { tracks: lengths.into(), ..Self::default() };
-        for (image, observed) in images.iter().zip(observed).filter(|(_, rows)| !rows.is_empty()) {
-            let camera = image.camera(&cameras);
-            let pinhole = camera.and_then(|camera| Some((camera, camera.intrinsics()?)));
-            let Some((camera, intrinsics)) = pinhole else {
-                found.left_out += 1;
-                continue;
-            };
-            found.images.push((image.name.clone(), camera.clone()));
-            let size = [camera.width_px as f64, camera.height_px as f64];
-            let center = image.pose.center.map(|x| x * scale);
-            let camera = Camera { intrinsics, pose: Pose { center, ..image.pose } };
-            found.views.push(View { camera, size, observed });
-        }
-        Ok(found)
-    }
-
-    /// Returns a note about images that are left out.
-    pub(crate) fn note(&self) -> Option<String> {
-        (self.left_out > 0).then(|| {
-            let n = self.left_out;
-            format!("localization: {n} images are left out: their cameras have no focal length")
-        })
-    }
-}
-
 /// What a scheme protects.
+#[derive(Clone, Copy)]
 enum Protects<'a> {
     Nothing,
     Map(&'a dyn Scheme<3>),
@@ -133,42 +78,43 @@ pub(crate) fn of_schemes(
     }
     let positions = original.reveal().positions();
     let base = unprotected(views, positions);
-    let row = |scheme: &str, errors: &[Option<PoseError>]| {
+    let row = |protects: Protects<'_>, errors: &[Option<PoseError>]| {
+        let (scheme, changes_descriptors) = match protects {
+            Protects::Nothing => (UNPROTECTED, false),
+            Protects::Map(scheme) => (scheme.name(), scheme.changes_descriptors()),
+            Protects::Queries(scheme) => (scheme.name(), scheme.changes_descriptors()),
+        };
         let bound = Localization::of(errors, &base);
         let finite = |value: f64| Some(value).filter(|value| value.is_finite());
         report::Localization {
             scheme: scheme.to_owned(),
-            of_queries: false,
+            of_queries: matches!(protects, Protects::Queries(_)),
             multiple: finite(bound.multiple),
             center_error: finite(bound.center),
             rotation_error_degrees: finite(bound.rotation_degrees),
             failed_percent: bound.failed_percent,
-            changes_descriptors: false,
+            changes_descriptors,
             held_out: None,
         }
     };
     let key = Key::from_seed(plan.seed);
-    let mut rows = vec![(Protects::Nothing, row(UNPROTECTED, &base))];
+    let mut rows = vec![(Protects::Nothing, row(Protects::Nothing, &base))];
     for scheme in &plan.schemes {
         // A scheme that cannot hide the map is among those that were not audited.
         let Ok((released, secret)) = obfuscate(&**scheme, original, None, &key) else { continue };
-        let row = row(scheme.name(), &with_map(views, positions, &released, &secret));
-        let changes_descriptors = scheme.changes_descriptors();
-        rows.push((Protects::Map(&**scheme), report::Localization { changes_descriptors, ..row }));
+        let protects = Protects::Map(&**scheme);
+        rows.push((protects, row(protects, &with_map(views, positions, &released, &secret))));
     }
     let queries = localize.query_schemes();
     for scheme in &queries {
-        let row = row(scheme.name(), &with_queries(views, positions, &**scheme, &key)?);
-        let changes_descriptors = scheme.changes_descriptors();
-        let row = report::Localization { of_queries: true, changes_descriptors, ..row };
-        rows.push((Protects::Queries(&**scheme), row));
+        let protects = Protects::Queries(&**scheme);
+        rows.push((protects, row(protects, &with_queries(views, positions, &**scheme, &key)?)));
     }
     let mut notes = Vec::new();
     if let Some((path, nth)) = &localize.held_out {
         let mut held = held_out::Held::open(path, *nth, localize.cameras, original, progress)?;
         notes.push(held.note());
         progress.say(&format!("note: {}", held.note()));
-        let base = held_out::locate(&held.unprotected(), plan.seed);
         let limits: Vec<(String, f64, f64)> = match original.reveal().unit() {
             unlift::Unit::Meter => [(0.05, 5.0), (0.25, 2.0), (0.5, 5.0)]
                 .map(|(m, angle)| (format!("{:.0} cm, {angle} deg", 100.0 * m), m, angle))
@@ -181,17 +127,19 @@ pub(crate) fn of_schemes(
                     .to_vec()
             }
         };
-        let n_rows = rows.len();
+        let (n_rows, mut base) = (rows.len(), None);
         for (at, (protects, row)) in rows.iter_mut().enumerate() {
             progress.show(at, n_rows, &format!("localization, {}", row.scheme));
             let problems = match protects {
-                Protects::Nothing => None,
-                Protects::Map(scheme) => Some(held.with_map(*scheme, &key)?),
-                Protects::Queries(scheme) => Some(held.with_queries(*scheme, &key)?),
+                Protects::Nothing => held.unprotected(),
+                Protects::Map(scheme) => held.with_map(*scheme, &key)?,
+                Protects::Queries(scheme) => held.with_queries(*scheme, &key)?,
             };
-            let located = problems.map(|problems| held_out::locate(&problems, plan.seed));
-            let located = located.as_ref().unwrap_or(&base);
-            row.held_out = Some(held_out::summary(located, &base, &limits));
+            let errors = held_out::locate(&problems, plan.seed);
+            // The first row is that of the map itself.
+            let of_map = base.as_ref().unwrap_or(&errors);
+            row.held_out = Some(held_out::summary(&problems, [&errors, of_map], &limits));
+            base.get_or_insert(errors);
         }
     }
     Ok((rows.into_iter().map(|(_, row)| row).collect(), notes))

@@ -12,14 +12,13 @@ use unlift::released::{Lines, Obfuscation, Released};
 use unlift::seed::{Key, Stage};
 use unlift::truth::{Original, OriginalId, Secret};
 use unlift::{Descriptors, PointSet, Unit};
-use unlift_audit::maps::Map;
 use unlift_audit::{
-    Audit, Audited, Error, Gate, Hidden, Input, Output, Preparation, Prepared, Quiet, prepare,
-    read_from_file, unlike_neighbors,
+    Audited, Error, Hidden, Input, Map, Preparation, Prepared, prepare, read_from_file,
+    unlike_neighbors,
 };
 use unlift_io::read;
 
-use crate::schemes;
+use crate::{audited, schemes};
 
 const N: usize = 1500;
 
@@ -55,8 +54,7 @@ fn audit(
         Some(release) => Input::Released(map, Hidden { release, read: None }),
         None => Input::Map(map),
     };
-    let gates = vec![Gate::parse(gate).unwrap()];
-    Audit { gates, ..Audit::of_map(input, prepared, Output::new(Path::new(""))) }.run(&Quiet)
+    audited(prepared, &input, &[gate])
 }
 
 /// Returns the doubt with which the only gate does not hold. The notes contain it, too.
@@ -192,11 +190,10 @@ fn a_gate_that_names_no_attack_needs_the_best_of_each_kind() {
         let descriptors = Descriptors::try_new(Values::U8(values), 8).expect("descriptors");
         let descriptors = described.then_some(&descriptors);
         let input = Input::Map(Map { plan, descriptors, ..Map::of(&points.original) });
-        let gates = vec![Gate::parse(gate).expect("a gate")];
-        let audit = Audit { gates, ..Audit::new(input, Output::new(Path::new(""))) };
-        let gate = audit.run(&Quiet).expect("an audit").document.gates.remove(0);
+        let audited = audited(&points, &input, &[gate]).expect("an audit");
+        let gate = &audited.document.gates[0];
         assert_eq!(gate.passed, gate.reason.is_none());
-        gate.reason.unwrap_or_default()
+        gate.reason.clone().unwrap_or_default()
     };
     let alone = || plan(&["olc"]);
     for gate in ["olc:0.25<=100", "olc@0.5:0.25<=100"] {
@@ -266,9 +263,7 @@ fn a_released_file_that_gives_places_away_is_no_protection() {
         let release = (released, secret);
         let map = Map { plan, ..Map::of(&points.original) };
         let input = Input::Released(map, Hidden { release: &release, read });
-        let gates = vec![Gate::parse("olc:joint:0.10<=100").unwrap()];
-        let audit = Audit { gates, ..Audit::new(input, Output::new(Path::new(""))) };
-        let document = audit.run(&Quiet).unwrap().document;
+        let document = audited(&points, &input, &["olc:joint:0.10<=100"]).unwrap().document;
         let read = document.results[0].records_alone_percent.as_ref().map(|by| by["0.10"]);
         let gate = &document.gates[0];
         assert_eq!(

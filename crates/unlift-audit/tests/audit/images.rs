@@ -7,9 +7,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use unlift::Unit;
 use unlift::audit::Plan;
 use unlift::recover::Builtin;
-use unlift_audit::images::audit::Images;
 use unlift_audit::images::{FeatureSource, Opened};
-use unlift_audit::{Audit, Audited, Error, Input, Output, Quiet};
+use unlift_audit::{Audit, Audited, Error, Images, Input, Output, Quiet};
 use unlift_io::features::ImageFeatures;
 
 const NAMES: [&str; 5] = ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "e.jpg"];
@@ -39,7 +38,7 @@ fn audit(
         ..Plan::new(Unit::Pixel)
     };
     let input = Images { opened: &opened, plan, draws: true, photos: None, inversion: None };
-    Audit::new(Input::Images(input), Output::new(Path::new(""))).run(&Quiet)
+    Audit::new(Output::new(Path::new(""))).run(&Input::Images(input), &Quiet)
 }
 
 #[test]

@@ -13,12 +13,11 @@ use unlift::recover::Builtin;
 use unlift::seed::{Draws, Stage};
 use unlift_audit::localization::Localize;
 use unlift_audit::localization::held_out::Held;
-use unlift_audit::maps::{self, Map};
-use unlift_audit::{Audit, Audited, Gate, Input, Output, Preparation, Prepared, Quiet};
+use unlift_audit::{Audited, Input, Map, Preparation, Prepared, Quiet, maps};
 use unlift_io::features::{FeatureWriter, ImageFeatures};
 use unlift_report::document::Localization;
 
-use crate::schemes;
+use crate::{audited, schemes};
 
 const N_IMAGES: u32 = 12;
 const DIM: usize = 32;
@@ -97,9 +96,7 @@ fn audit(folder: &Path, mitigate: &[&str], gates: &[&str], held_out: bool) -> Au
     let held_out = held_out.then(|| (folder.join("features.h5"), 4));
     let localize = Localize { cameras: &prepared.cameras, held_out, protections: Vec::new() };
     let map = Map { plan, localize: Some(localize), ..Map::new(&prepared) };
-    let gates = gates.iter().map(|text| Gate::parse(text).unwrap()).collect();
-    let audit = Audit::of_map(Input::Map(map), &prepared, Output::new(Path::new("")));
-    Audit { gates, ..audit }.run(&Quiet).unwrap()
+    audited(&prepared, &Input::Map(map), gates).unwrap()
 }
 
 fn of<'a>(audited: &'a Audited, scheme: &str) -> &'a Localization {
@@ -179,10 +176,8 @@ fn a_model_without_tracks_is_silent_and_a_gate_on_it_is_told() {
     std::fs::remove_file(folder.path().join("images.txt")).unwrap();
     let prepared = open(folder.path());
     assert!(prepared.cameras.views.is_empty());
-    let gates = vec![Gate::parse("olc:localization<=2").unwrap()];
     let input = Input::Map(Map::new(&prepared));
-    let audit = Audit::of_map(input, &prepared, Output::new(Path::new("")));
-    let error = Audit { gates, ..audit }.run(&Quiet).err().unwrap().to_string();
+    let error = audited(&prepared, &input, &["olc:localization<=2"]).err().unwrap().to_string();
     let expected = "--gate olc:localization<=2: expected a COLMAP model with cameras and tracks, not in tiles, found none";
     assert_eq!(error, expected);
 }

@@ -14,6 +14,14 @@ use std::sync::Arc;
 
 use unlift::Unit;
 use unlift::obfuscate::{Scheme, SchemeOptions, scheme};
+use unlift_audit::{Audit, Audited, Error, Gate, Input, Output, Prepared, Quiet};
+
+/// Runs the audit of a map and writes nothing.
+fn audited(prepared: &Prepared, input: &Input<'_>, gates: &[&str]) -> Result<Audited, Error> {
+    let gates = gates.iter().map(|gate| Gate::parse(gate).unwrap()).collect();
+    let audit = Audit::of_map(prepared, Output::new(Path::new("")));
+    Audit { gates, ..audit }.run(input, &Quiet)
+}
 
 /// Returns the schemes with these names.
 fn schemes(names: &[&str], unit: Unit) -> Vec<Arc<dyn Scheme<3>>> {

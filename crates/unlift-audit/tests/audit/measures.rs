@@ -9,8 +9,9 @@ use unlift::geometry::frame::Bounds;
 use unlift::recover::Builtin;
 use unlift::truth::Original;
 use unlift::{Error, PointSet, Unit};
-use unlift_audit::maps::{self, Map};
-use unlift_audit::{Audit, Error as AuditError, Finished, Input, Output, Preparation, Quiet};
+use unlift_audit::{
+    Audit, Error as AuditError, Finished, Input, Map, Output, Preparation, Quiet, maps,
+};
 use unlift_io::outputs::Rules;
 use unlift_report::Document;
 
@@ -46,7 +47,7 @@ fn audit(folder: &Path) -> Result<Finished, AuditError> {
     let output = Output::new(&out);
     let files = output.open(Rules::new([map.as_path()], false))?;
     let input = Input::Map(Map { plan, ..Map::new(&prepared) });
-    Audit::of_map(input, &prepared, output).run(&Quiet)?.write(files)
+    Audit::of_map(&prepared, output).run(&input, &Quiet)?.write(files)
 }
 
 #[test]

@@ -4,11 +4,10 @@ use std::path::{Path, PathBuf};
 
 use unlift::audit::Plan;
 use unlift::synthetic::room;
-use unlift_audit::maps::{self, Map};
-use unlift_audit::{Audit, Gate, Input, Output, Preparation, Quiet};
+use unlift_audit::{Input, Map, Preparation, maps};
 use unlift_report::Document;
 
-use crate::write_map;
+use crate::{audited, write_map};
 
 /// Writes a room in which every `every`th point has no position.
 fn room_with_gaps(folder: &Path, every: usize) -> PathBuf {
@@ -23,10 +22,8 @@ fn audit(map: &Path) -> Document {
     let map = Map::new(&prepared);
     let mut plan = Plan { k: 10, inlier_ratios: vec![0.5], ..map.plan.clone() };
     plan.schemes.retain(|scheme| scheme.name() == "olc");
-    let gates = vec![Gate::parse("olc:1.0<=100").expect("a gate")];
     let input = Input::Map(Map { plan, ..map });
-    let audit = Audit::of_map(input, &prepared, Output::new(Path::new("")));
-    Audit { gates, ..audit }.run(&Quiet).expect("an audit").document
+    audited(&prepared, &input, &["olc:1.0<=100"]).expect("an audit").document
 }
 
 #[test]

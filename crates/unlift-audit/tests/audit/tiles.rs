@@ -1,18 +1,16 @@
 //! A map in tiles: each tile is audited as a map of its own, and the page shows which one leaks
 //! most.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use unlift::audit::{NeighborsBy, Plan};
 use unlift::neighbors::Geometric;
 use unlift::recover::Builtin;
 use unlift::{Unit, synthetic};
-use unlift_audit::maps::Map;
-use unlift_audit::{Audit, Input, Output, Preparation, Quiet, Tiles, prepare};
+use unlift_audit::{Input, Map, Preparation, Tiles, prepare};
 use unlift_io::read;
 
-use crate::{schemes, write_map};
+use crate::{audited, schemes, write_map};
 
 fn audit(only: Option<usize>, threads: usize) -> unlift_audit::Audited {
     let folder = tempfile::tempdir().unwrap();
@@ -30,9 +28,8 @@ fn audit(only: Option<usize>, threads: usize) -> unlift_audit::Audited {
     };
     let map = Map { plan, ..Map::new(&prepared) };
     let input = Input::Tiles(map, Tiles { max_points: 600, only });
-    let audit = Audit::of_map(input, &prepared, Output::new(Path::new("")));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    pool.install(|| audit.run(&Quiet)).unwrap()
+    pool.install(|| audited(&prepared, &input, &[])).unwrap()
 }
 
 #[test]

@@ -12,17 +12,14 @@ use unlift::geometry::camera::PoseError;
 use unlift::neighbors::sources::Named;
 use unlift::obfuscate::{Change, Changed, Entry, Mitigation, SCHEMES, Scheme, SchemeOptions};
 use unlift::recover::Builtin;
-use unlift_audit::again::{Again, Maps};
 use unlift_audit::changes::{mitigations, protections, protections_of_map};
-use unlift_audit::images::audit::Images;
 use unlift_audit::images::{FeatureSource, Opened, Opening};
 use unlift_audit::inversion::{Inversion, MapInversion};
 use unlift_audit::localization::Localize;
-use unlift_audit::maps::Map;
-use unlift_audit::sequence::Sequence;
 use unlift_audit::{
-    Audit, Audited, Hidden, Input, Output, Preparation, Prepared, Progress as _, Request, Tiles,
-    Views, by_point, check_thresholds, distinct, read_from_file, released,
+    Again, Audit, Audited, Hidden, Images, Input, Map, Maps, Output, Preparation, Prepared,
+    Progress as _, Request, Sequence, Tiles, by_point, check_thresholds, distinct, read_from_file,
+    released,
 };
 use unlift_io::hash::hash_file;
 use unlift_io::outputs::Rules;
@@ -65,9 +62,14 @@ fn perform<'a>(
     Ok(finished.passed())
 }
 
-/// Runs `audit` with the gates of the command line.
-fn run(audit: Audit<'_>, args: &AuditArgs, progress: &Progress) -> crate::Result<Audited> {
-    Audit { gates: args.gate.clone(), ..audit }.run(progress)
+/// Runs the audit of `input` with the gates of the command line.
+fn run(
+    audit: Audit,
+    input: &Input<'_>,
+    args: &AuditArgs,
+    progress: &Progress,
+) -> crate::Result<Audited> {
+    Audit { gates: args.gate.clone(), ..audit }.run(input, progress)
 }
 
 /// Returns a request of what several audits share.
@@ -190,11 +192,11 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<bool> {
             Some(max) => Input::Tiles(map, Tiles { max_points: max.get(), only: None }),
             None => Input::Map(map),
         };
-        let mut audit = Audit::of_map(input, &prepared, output);
+        let mut audit = Audit::of_map(&prepared, output);
         audit.about = prepared.about(&args.path)?;
         audit.about.other_sha256.extend(hashes_of_lists(&args.solvers)?);
         audit.options = args.record();
-        run(audit, &args.audit, &progress)
+        run(audit, &input, &args.audit, &progress)
     })
 }
 
@@ -230,11 +232,11 @@ pub fn released(args: &AuditReleasedArgs) -> crate::Result<bool> {
         let read = read_from_file(&published, original, secret, &plan.thresholds);
         let map = Map { plan, descriptors: prepared.descriptors.as_ref(), ..Map::of(original) };
         let input = Input::Released(map, Hidden { release: &hidden, read });
-        let mut audit = Audit::of_map(input, &prepared, output);
+        let mut audit = Audit::of_map(&prepared, output);
         audit.about = files.about(prepared.original.len())?;
         audit.about.other_sha256.extend(hashes_of_lists(&args.solvers)?);
         audit.options.insert("released".into(), json!(true));
-        run(audit, &args.audit, &progress)
+        run(audit, &input, &args.audit, &progress)
     })
 }
 
@@ -278,9 +280,9 @@ pub fn images(args: &AuditImagesArgs) -> crate::Result<bool> {
         let progress = Progress::new(args.audit.quiet);
         let photos = args.paint.photos.clone();
         let images = Images { opened: &opened, plan, draws: true, photos, inversion };
-        let mut audit = Audit::new(Input::Images(images), output);
+        let (input, mut audit) = (Input::Images(images), Audit::new(output));
         audit.options = args.record();
-        run(audit, &args.audit, &progress)
+        run(audit, &input, &args.audit, &progress)
     })
 }
 
@@ -341,9 +343,9 @@ pub fn sequence(args: &AuditSequenceArgs) -> crate::Result<bool> {
             pose_error,
             inversion,
         };
-        let mut audit = Audit::new(Input::Views(Views::Sequence(sequence)), output);
+        let (input, mut audit) = (Input::Sequence(sequence), Audit::new(output));
         audit.options = args.record();
-        run(audit, &args.audit, &progress)
+        run(audit, &input, &args.audit, &progress)
     })
 }
 
@@ -372,10 +374,10 @@ pub fn again(args: &AuditAgainArgs) -> crate::Result<bool> {
             .into_iter()
             .filter_map(|[a, b]| Some([a.of_dimension(&options)?, b.of_dimension(&options)?]));
         let progress = Progress::new(args.audit.quiet);
-        let again = Again { maps: &maps, pairs: pairs.collect(), plan };
-        let mut audit = Audit::of_map(Input::Views(Views::Again(again)), &maps.first, output);
+        let input = Input::Again(Again { maps: &maps, pairs: pairs.collect(), plan });
+        let mut audit = Audit::of_map(&maps.first, output);
         audit.about = maps.about(&args.a)?;
         audit.options.insert("again".into(), json!(args.b.display().to_string()));
-        run(audit, &args.audit, &progress)
+        run(audit, &input, &args.audit, &progress)
     })
 }

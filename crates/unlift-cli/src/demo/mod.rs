@@ -11,11 +11,9 @@ use unlift::neighbors::Geometric;
 use unlift::recover::Builtin;
 use unlift::truth::Original;
 use unlift::{PointSet, Unit, synthetic};
-use unlift_audit::images::audit::Images;
-use unlift_audit::images::{FeatureSource, Opened, headline};
+use unlift_audit::images::{FeatureSource, Opened};
 use unlift_audit::inversion::Inversion;
-use unlift_audit::maps::Map;
-use unlift_audit::{Audit, Audited, FIGURES, Input, Output, PAGE, refused};
+use unlift_audit::{Audit, Audited, FIGURES, Images, Input, Map, Output, PAGE, headline, refused};
 use unlift_io::atomic::Access;
 use unlift_io::hash::hash_positions;
 use unlift_io::outputs::{Kind, OutputSet, Rules};
@@ -84,10 +82,10 @@ fn photos(output: Output) -> crate::Result<Audited> {
     let opened = Opened::of(source, folder.path(), None);
     let inversion = Some(inversion);
     let images = Images { opened: &opened, plan, draws: true, photos: None, inversion };
-    let mut audit = Audit::new(Input::Images(images), output);
+    let mut audit = Audit::new(output);
     audit.options.insert("features".into(), json!(DescriptorKind::Aliked.name()));
     audit.options.insert("min_score".into(), json!(photos::MIN_SCORE));
-    let mut audited = audit.run(&Stderr)?;
+    let mut audited = audit.run(&Input::Images(images), &Stderr)?;
     // The temporary path is meaningless.
     audited.document.input.path = Some("Two photos of the demo".to_owned());
     Ok(audited)
@@ -107,7 +105,7 @@ fn map(output: Output) -> crate::Result<Audited> {
         },
         ..Map::of(&original)
     };
-    let mut audit = Audit::new(Input::Map(map), output);
+    let mut audit = Audit::new(output);
     audit.options.insert("room".into(), json!({ "seed": SEED }));
     audit.about = About {
         path: Some("The map of a made-up room".to_owned()),
@@ -117,7 +115,7 @@ fn map(output: Output) -> crate::Result<Audited> {
         unit_in_map_units: Some(1.0),
         ..About::default()
     };
-    audit.run(&Stderr)
+    audit.run(&Input::Map(map), &Stderr)
 }
 
 /// Formats a short summary for users who do not know the schemes.

@@ -4,21 +4,21 @@ use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use unlift::audit::{Outcome, Plan, run_many};
+use unlift::audit::{Outcome, Plan, Row, run_many};
 use unlift_io::hash::hash_list;
 use unlift_report::RenderOptions;
-use unlift_report::document::{ImageCounts, ImageFigures, Input};
-use unlift_report::inversions::Inversion as Inverted;
+use unlift_report::document::{ImageCounts, ImageFigures, ImageRow, Input};
+use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::pictures::Picture;
 
-use super::Opened;
-use super::pictures::Album;
-use super::stream::{Needs, Stream, Tally};
-use crate::audit::{Attacked, Audit};
-use crate::curves::{OfItems, curves_of};
-use crate::gate::Tried;
+use super::album::Album;
+use super::curves::OfItems;
+use crate::audit::{Audit, Audited};
+use crate::document::{self, Attacked, Tried};
+use crate::images::Opened;
+use crate::images::stream::{Stream, Tally};
 use crate::inversion::Inversion;
-use crate::{Error, Progress, document};
+use crate::{Error, Progress};
 
 /// Images, and how their keypoints are attacked.
 pub struct Images<'a> {
@@ -36,30 +36,24 @@ pub struct Images<'a> {
 
 impl Images<'_> {
     /// Attacks the images. A share-safe audit draws no pictures.
-    pub(crate) fn attack(
-        &self,
-        audit: &Audit<'_>,
-        progress: &dyn Progress,
-    ) -> Result<Attacked, Error> {
+    pub(super) fn attack(&self, audit: &Audit, progress: &dyn Progress) -> Result<Audited, Error> {
         let (plan, Opened { source, path, chosen, .. }) = (&self.plan, self.opened);
         source.passed_over.iter().for_each(|note| progress.say(&format!("note: {note}")));
         audit.begin(&Tried::by(plan, false), None, [], progress)?;
         let tally = RefCell::new(Tally::default());
         let mut images = Vec::new();
         let mut watcher = OfItems::new(plan, progress, |name, rows| {
-            let n = tally.borrow_mut().take();
-            images.push(document::image(name, n, rows));
+            images.push(figures(name, tally.borrow().sizes[images.len()], rows));
         });
         progress.show(0, chosen.len(), "reading images");
         source.refused.iter().for_each(|line| progress.say(line));
         tally.borrow_mut().unusable += source.refused.len();
-        let needs = Needs::of_plan(plan);
-        let stream = Stream::new((source, path), chosen, needs, &tally, progress);
+        let stream = Stream::new((source, path), chosen, Some(plan), &tally, progress);
         let outcome = run_many(stream, plan, &mut watcher)?;
         for error in self.inversion.iter().flat_map(|inversion| inversion.failed()) {
             progress.say(&format!("note: not painted: {error}"));
         }
-        let curves = watcher.curves.shares();
+        let error_cdf = watcher.curves.of_rows(&outcome.rows);
         let tally = tally.into_inner();
         if tally.used.is_empty() {
             let expected = format!("{} images that can be used", tally.unusable);
@@ -67,30 +61,36 @@ impl Images<'_> {
         }
         let (pictures, inversions) = match audit.output.share_safe {
             true => Default::default(),
-            false => self.drawn(&tally, &images, progress)?,
+            false => self.pictures(&tally, &images, progress)?,
         };
         let about = self.about(&tally, &outcome)?;
         let doubt = tally.doubt();
         let notes: Vec<String> = doubt.iter().cloned().chain(tally.moved()).collect();
         notes.iter().for_each(|note| progress.say(&format!("note: {note}")));
-        let mut options = audit.options.clone();
+        let mut options = document::options(plan);
+        options.extend(audit.options.clone());
         if let Some(inversion) = &self.inversion {
             options.insert("inverter_sha256".into(), inversion.sha256().into());
         }
-        let error_cdf = curves_of(curves, &outcome.rows);
-        Ok(Attacked {
+        let attacked = Attacked {
             tried: Tried::by(plan, tally.described),
-            about: Some(about),
-            options: document::options(plan, options),
+            about,
+            options,
             notes,
             doubts: vec![doubt; outcome.rows.len()],
             images,
-            drawn: RenderOptions { error_cdf, pictures, inversions, ..RenderOptions::default() },
+            rendering: RenderOptions {
+                error_cdf,
+                pictures,
+                inversions,
+                ..RenderOptions::default()
+            },
             rows: outcome.rows,
             break_even: outcome.break_even,
             seconds: outcome.seconds,
             ..Attacked::default()
-        })
+        };
+        audit.finish(plan, attacked)
     }
 
     fn about(&self, tally: &Tally, outcome: &Outcome) -> Result<Input, Error> {
@@ -106,7 +106,7 @@ impl Images<'_> {
         Ok(Input {
             path,
             sha256: Some(sha256),
-            n_points: tally.n_points as u64,
+            n_points: tally.sizes.iter().sum::<usize>() as u64,
             images: Some(ImageCounts {
                 found: (source.names.len() + source.refused.len()) as u64,
                 used: tally.used.len() as u64,
@@ -117,29 +117,26 @@ impl Images<'_> {
         })
     }
 
-    /// Audits the drawn images again, with the first solver and seed. The seed of an image depends on
+    /// Audits a few images again, with the first solver and seed, for their pictures. The seed of an image depends on
     /// its name, so the result is that of the audit, and no picture is kept in between.
-    fn drawn(
+    fn pictures(
         &self,
         tally: &Tally,
         figures: &[ImageFigures],
         progress: &dyn Progress,
-    ) -> Result<(Vec<Picture>, Vec<Inverted>), Error> {
+    ) -> Result<(Vec<Picture>, Vec<Sheet>), Error> {
         let Opened { source, path, .. } = self.opened;
         let chosen = if self.draws { telling(&self.plan, figures) } else { Vec::new() };
         if chosen.is_empty() {
-            return Ok((Vec::new(), Vec::new()));
+            return Ok(Default::default());
         }
         let numbers: Vec<usize> = chosen.iter().map(|(at, _)| tally.used[*at]).collect();
-        let mut plan = self.plan.clone();
-        plan.solvers.truncate(1);
-        plan.repeats = 1;
-        let needs = Needs::of_plan(&plan);
         // The album makes the pictures itself.
-        plan.measures.clear();
+        let mut plan = Plan { measures: Vec::new(), repeats: 1, ..self.plan.clone() };
+        plan.solvers.truncate(1);
         let mut album = Album::new(self.inversion.clone(), progress);
-        let again = RefCell::new(Tally::default());
-        let images = Stream::new((source, path), &numbers, needs, &again, progress);
+        let again = RefCell::default();
+        let images = Stream::new((source, path), &numbers, Some(&self.plan), &again, progress);
         run_many(images, &plan, &mut album)?;
         for picture in &mut album.pictures {
             let at = numbers.iter().position(|&at| source.names[at] == picture.name);
@@ -155,6 +152,17 @@ impl Images<'_> {
         }
         Ok((album.pictures, album.inversions))
     }
+}
+
+fn figures(name: &str, n_points: usize, rows: &[Row]) -> ImageFigures {
+    let row = |row: &Row| ImageRow {
+        recovered_percent: row.recovered_percent.clone(),
+        distinct_percent: row.distinct.clone().unwrap_or_default().recovered_percent,
+        inlier_ratio: row.inlier_ratio,
+        median_error: row.median_error,
+    };
+    let rows = rows.iter().map(row).collect();
+    ImageFigures { name: Some(name.to_owned()), n_points: n_points as u64, rows }
 }
 
 const PREVIEW: u32 = 640;

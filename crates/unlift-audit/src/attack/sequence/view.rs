@@ -16,6 +16,7 @@ use unlift_io::read::colmap::{self, Image};
 use unlift_vision::pictures::Lens;
 
 use crate::images::FeatureSource;
+use crate::images::keypoints::{Nearby, undistorted};
 
 /// A keypoint shows a point of the model if it is the nearest one to the point's projection and at
 /// most this far away, in pixels.
@@ -54,7 +55,7 @@ impl View {
 
 /// The model: cameras, images by name, and the points that each image shows.
 pub struct Model {
-    lenses: Vec<(u32, Result<Lens, unlift::Error>, [u64; 2])>,
+    cameras: Vec<colmap::Camera>,
     images: Vec<Image>,
     positions: Vec<[f64; 3]>,
     /// Rows of the points of each image.
@@ -68,15 +69,10 @@ impl Model {
         images.sort_by(|a, b| a.name.cmp(&b.name));
         let extension = if folder.join("points3D.bin").is_file() { "bin" } else { "txt" };
         let points = colmap::read_points(&folder.join(format!("points3D.{extension}")), true)?;
-        let lens = |camera: &colmap::Camera| {
-            let lens = Lens::try_new(camera.model.name, &camera.params);
-            (camera.id, lens, [camera.width_px, camera.height_px])
-        };
         let rows: Vec<u32> = (0..points.ids.len() as u32).collect();
         let observed = points.tracks.as_ref().map(|tracks| tracks.observed(&images, &rows).0);
         let shown = observed.unwrap_or_else(|| vec![Vec::new(); images.len()]);
-        let lenses = cameras.iter().map(lens).collect();
-        Ok(Self { lenses, images, positions: points.positions, shown })
+        Ok(Self { cameras, images, positions: points.positions, shown })
     }
 
     /// Returns the number of points.
@@ -91,80 +87,69 @@ impl Model {
         (source, path): (&FeatureSource, &Path),
         pose_error: Option<(PoseError, u64)>,
     ) -> Vec<Result<View, crate::Error>> {
-        let names = &source.names;
-        let both: Vec<(usize, usize)> = names
-            .iter()
-            .enumerate()
-            .filter_map(|(at, name)| {
-                let of = self
-                    .images
-                    .binary_search_by(|image| image.name.as_slice().cmp(name.as_bytes()));
-                Some((at, of.ok()?))
-            })
-            .collect();
+        let numbered = |(at, name): (usize, &String)| {
+            let images = &self.images;
+            let of = images.binary_search_by(|image| image.name.as_slice().cmp(name.as_bytes()));
+            Some((at, of.ok()?))
+        };
+        let both: Vec<(usize, usize)> =
+            source.names.iter().enumerate().filter_map(numbered).collect();
         let image = |&(at, of): &(usize, usize)| {
             let image = &self.images[of];
-            (&*names[at], image.id, image.pose.center)
+            (&*source.names[at], image.id, image.pose.center)
         };
         let order = in_time(&both.iter().map(image).collect::<Vec<_>>());
-        let both: Vec<(usize, usize)> = order.into_iter().map(|at| both[at]).collect();
-        let view = |&(at, of): &(usize, usize)| {
+        let view = |at: usize| {
+            let (at, of) = both[at];
             let features = source.get(at)?;
             let place = format!("image {}", features.name.escape_debug());
-            let wrong = |expected: String, found: String| {
-                crate::Error::from(Error::new(path, place.clone(), expected, found))
-            };
-            self.view(features, of, pose_error).map_err(|(expected, found)| wrong(expected, found))
+            self.view(features, of, pose_error).map_err(|error| {
+                crate::Error::from(Error::new(path, place, error.expected(), error.found()))
+            })
         };
-        both.par_iter().with_max_len(1).map(view).collect()
+        order.into_par_iter().with_max_len(1).map(view).collect()
     }
 
-    /// Returns the view of the image `of`, or what was expected and found.
     fn view(
         &self,
         features: ImageFeatures,
         of: usize,
         pose_error: Option<(PoseError, u64)>,
-    ) -> Result<View, (String, String)> {
+    ) -> Result<View, unlift::Error> {
+        let wrong = |expected: &str, found: &str| unlift::Error::new("image", expected, found);
         let image = &self.images[of];
-        let unusable =
-            |error: &unlift::Error| (error.expected().to_owned(), error.found().to_owned());
-        let lens = self.lenses.iter().find(|(id, ..)| *id == image.camera_id);
-        let Some((_, lens, [width, height])) = lens else {
-            return Err(("a camera".to_owned(), "none".to_owned()));
-        };
-        let lens = lens.as_ref().map_err(unusable)?;
+        let camera = image.camera(&self.cameras).ok_or_else(|| wrong("a camera", "none"))?;
+        let (width, height) = (camera.width_px, camera.height_px);
+        let lens = Lens::try_new(camera.model.name, &camera.params)?;
         if let Some([w, h]) = features.size
-            && [u64::from(w), u64::from(h)] != [*width, *height]
+            && [u64::from(w), u64::from(h)] != [width, height]
         {
             let expected = format!("{width} x {height} pixels, as its camera in the model");
-            return Err((expected, format!("{w} x {h}")));
+            return Err(wrong(&expected, &format!("{w} x {h}")));
         }
         let descriptors = features.descriptors.as_ref();
-        let descriptors = descriptors.ok_or(("descriptors".to_owned(), "none".to_owned()))?;
-        let bounds = bounds(lens, [*width as f64, *height as f64])
-            .ok_or(("a camera with less than 180 degrees".to_owned(), "a wider one".to_owned()))?;
-        let (mut kept, mut places) = (Vec::new(), Vec::new());
-        for (row, &keypoint) in features.keypoints.iter().enumerate() {
-            if let Some(place) = undistorted(lens, keypoint).filter(|place| bounds.contains(place))
-            {
-                kept.push(row as u32);
-                places.push(place);
-            }
-        }
-        let points = PointSet::try_new(places, Unit::Pixel).map_err(|error| unusable(&error))?;
-        let original = Original::within(points, bounds).map_err(|error| unusable(&error))?;
+        let descriptors = descriptors.ok_or_else(|| wrong("descriptors", "none"))?;
+        let bounds = bounds(&lens, [width as f64, height as f64])
+            .ok_or_else(|| wrong("a camera with less than 180 degrees", "a wider one"))?;
+        let pinhole = lens.intrinsics();
+        let place = |(row, &keypoint): (usize, &[f64; 2])| {
+            let place = undistorted(&lens, &pinhole, keypoint)?;
+            bounds.contains(&place).then_some((row as u32, place))
+        };
+        let (kept, places): (Vec<u32>, Vec<[f64; 2]>) =
+            features.keypoints.iter().enumerate().filter_map(place).unzip();
+        let original = Original::within(PointSet::try_new(places, Unit::Pixel)?, bounds)?;
         let pose = pose_error.map_or(image.pose, |(error, seed)| {
             let mut draws = Draws::new(seed, Stage::Image, u64::from(image.id));
             image.pose.with_error(error, &mut draws)
         });
         Ok(View {
-            shows: self.shows(&features, of, lens, &kept),
+            shows: self.shows(&features, of, &lens, &kept),
             original,
             descriptors: descriptors.select(&kept),
-            camera: Camera { intrinsics: lens.intrinsics(), pose },
-            lens: lens.clone(),
-            size: [*width as usize, *height as usize],
+            camera: Camera { intrinsics: pinhole, pose },
+            lens,
+            size: [width as usize, height as usize],
             n_left_out: features.keypoints.len() - kept.len(),
             name: features.name,
         })
@@ -178,35 +163,22 @@ impl Model {
         lens: &Lens,
         kept: &[u32],
     ) -> Vec<Option<u32>> {
-        let image = &self.images[of];
+        let keypoints: Vec<[f64; 2]> =
+            kept.iter().map(|&at| features.keypoints[at as usize]).collect();
+        let nearby = Nearby::new(&keypoints, SHOWS_PX);
         let mut shows: Vec<Option<(f64, u32)>> = vec![None; kept.len()];
         for &row in &self.shown[of] {
-            let x = image.pose.in_camera(&self.positions[row as usize]);
-            let Some(place) = lens.project(x) else { continue };
-            let distance2 = |at: usize| {
-                let [u, v] = features.keypoints[kept[at] as usize];
-                (u - place[0]) * (u - place[0]) + (v - place[1]) * (v - place[1])
-            };
-            let nearest = (0..kept.len()).min_by(|&a, &b| distance2(a).total_cmp(&distance2(b)));
-            let Some(at) = nearest.filter(|&at| distance2(at) <= SHOWS_PX * SHOWS_PX) else {
-                continue;
-            };
-            if shows[at].is_none_or(|(nearest2, _)| distance2(at) < nearest2) {
-                shows[at] = Some((distance2(at), row));
+            let x = self.images[of].pose.in_camera(&self.positions[row as usize]);
+            let nearest = lens.project(x).and_then(|place| nearby.nearest(&place));
+            let Some((distance2, at)) = nearest else { continue };
+            if shows[at].is_none_or(|(nearest2, _)| distance2 < nearest2) {
+                shows[at] = Some((distance2, row));
             }
         }
         shows.into_iter().map(|shown| shown.map(|(_, row)| row)).collect()
     }
 }
 
-/// Returns where a pinhole camera with the focal lengths and the principal point of the lens sees what the lens sees at `place`.
-fn undistorted(lens: &Lens, place: [f64; 2]) -> Option<[f64; 2]> {
-    let Intrinsics { focal, principal } = lens.intrinsics();
-    let flat = lens.undistort(place)?;
-    Some([0, 1].map(|c| focal[c] * flat[c] + principal[c]))
-}
-
-/// Returns the box of the undistorted image.
 fn bounds(lens: &Lens, size: [f64; 2]) -> Option<Bounds<2>> {
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     for at in 0..=PER_SIDE {
@@ -214,7 +186,7 @@ fn bounds(lens: &Lens, size: [f64; 2]) -> Option<Bounds<2>> {
         let [x, y] = size.map(|side| side * t - 0.5);
         let [right, bottom] = size.map(|side| side - 0.5);
         for place in [[x, -0.5], [x, bottom], [-0.5, y], [right, y]] {
-            let place = undistorted(lens, place)?;
+            let place = undistorted(lens, &lens.intrinsics(), place)?;
             for c in 0..2 {
                 low[c] = low[c].min(place[c]);
                 high[c] = high[c].max(place[c]);

@@ -11,9 +11,9 @@ use unlift_io::read::{self, Input as Points};
 use unlift_io::stage::{has_images, read_released, read_truth, scheme_name};
 use unlift_report::document::Input;
 
+use super::{Prepared, zeros};
+use crate::Error;
 use crate::doubts::unlike_neighbors;
-use crate::prepare::Prepared;
-use crate::{Error, maps};
 
 /// A released map, its secret, and the original points.
 pub struct Release {
@@ -36,6 +36,8 @@ pub struct Files<'a> {
 
 /// Name of a scheme without a name.
 const UNNAMED: &str = "released";
+/// The form of a user's name.
+const NAME: &str = "up to 40 letters, digits, +, -, _ and . (not all)";
 
 impl Files<'_> {
     /// Returns the name of the scheme that the file of records states.
@@ -44,12 +46,9 @@ impl Files<'_> {
     /// If the file cannot be read, or the name does not fit into a gate and a file name.
     pub fn scheme_name(&self) -> Result<String, Error> {
         let Some(stated) = scheme_name(self.released)? else { return Ok(UNNAMED.to_owned()) };
-        check_name(&stated).map_err(|wrong| {
-            let (expected, found) = wrong.split_once(", found ").unwrap_or((&wrong, &stated));
-            let expected = expected.trim_start_matches("expected ");
+        check_name(&stated).map_err(|_| {
             let place = "metadata unlift, scheme";
-            let error = FileError::new(self.released, place, expected, found);
-            Error::from(error).advise("--name NAME")
+            Error::from(FileError::new(self.released, place, NAME, &*stated)).advise("--name NAME")
         })
     }
 
@@ -69,9 +68,12 @@ impl Files<'_> {
         let slots = secret.slots_per_record();
         let secret = secret.of_map(Some(released.fingerprint()), slots);
         let secret = secret.map_err(|error| FileError::core(self.truth, error))?;
-        let notes = released.descriptors().and_then(maps::zeros).into_iter().collect();
+        let notes = released.descriptors().and_then(zeros).into_iter().collect();
         let mut prepared = Prepared { notes, ..Prepared::of(original) };
-        if let (Some(rows), Some(order)) = (released.descriptors(), rows_of_originals(&secret)) {
+        let row = |slot: Option<usize>| Some(secret.descriptor_row()[slot?]);
+        // Without the descriptors of all points, other schemes have none.
+        let order: Option<Vec<u32>> = slot_of(&secret).into_iter().map(row).collect();
+        if let (Some(rows), Some(order)) = (released.descriptors(), order) {
             let points = prepared.original.reveal();
             let rows = rows.select(&order);
             prepared.doubts.extend(unlike_neighbors(points, &rows)?);
@@ -123,13 +125,13 @@ impl Files<'_> {
     }
 }
 
-/// Returns the descriptor row of every original, if all are hidden.
-fn rows_of_originals(secret: &Secret) -> Option<Vec<u32>> {
-    let mut rows = vec![None; secret.n_originals()];
-    for (slot, &row) in secret.descriptor_row().iter().enumerate() {
-        rows[secret.hidden()[slot].index()] = Some(row);
+/// Returns the slot of each original; `None` if it is not hidden.
+pub(crate) fn slot_of(secret: &Secret) -> Vec<Option<usize>> {
+    let mut slot_of = vec![None; secret.n_originals()];
+    for (slot, original) in secret.hidden().iter().enumerate() {
+        slot_of[original.index()] = Some(slot);
     }
-    rows.into_iter().collect()
+    slot_of
 }
 
 /// Checks the name of a user's scheme, which must fit into a gate and a file name.
@@ -139,7 +141,7 @@ pub fn check_name(text: &str) -> Result<String, String> {
     if fits && text != "all" && text.starts_with(|c: char| c.is_ascii_alphanumeric()) {
         return Ok(text.to_owned());
     }
-    Err(format!("expected up to 40 letters, digits, +, -, _ and . (not all), found {text}"))
+    Err(format!("expected {NAME}, found {text}"))
 }
 
 /// Returns an error if `file` belongs to another released map than `of`. A missing fingerprint is

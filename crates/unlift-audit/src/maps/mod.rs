@@ -1,4 +1,7 @@
-//! Selects and scales the points of a file for an audit.
+//! Maps: read from files, and their points selected and scaled for an audit.
+
+mod cameras;
+pub mod released;
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -6,7 +9,7 @@ use std::sync::Arc;
 
 use unlift::audit::PointNeighbors;
 use unlift::geometry::knn::Knn;
-use unlift::geometry::vector::distance;
+use unlift::geometry::vector::{distance, median};
 use unlift::seed::{Draws, Stage};
 use unlift::truth::Original;
 use unlift::{Descriptors, Error, ErrorKind, PointSet, Unit};
@@ -15,8 +18,8 @@ use unlift_io::read;
 use unlift_io::stage::read_point_neighborhoods;
 use unlift_report::document::Input;
 
-use crate::doubts::with_sides;
-use crate::localization::Cameras;
+pub use self::cameras::Cameras;
+use crate::doubts::{check_scale, unlike_neighbors, with_sides};
 
 /// Options for the points of a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,10 +37,13 @@ pub struct Preparation {
     pub seed: u64,
 }
 
+/// K of a default audit of a map.
+pub(crate) const USUAL_K: usize = 50;
+
 /// All points, in the unit of the median distance to the 50th neighbor.
 impl Default for Preparation {
     fn default() -> Self {
-        Self { scale: None, k: 50, max_points: None, beside: false, seed: 0 }
+        Self { scale: None, k: USUAL_K, max_points: None, beside: false, seed: 0 }
     }
 }
 
@@ -125,6 +131,108 @@ impl Prepared {
     }
 }
 
+/// Reads a map and prepares it for an audit; `descriptors` is a separate file of descriptors. The result has notes and doubts about the
+/// input.
+///
+/// # Errors
+/// If a file cannot be read, if the scale makes lengths meaningless, or if too few points are
+/// left.
+pub fn open(
+    path: &Path,
+    descriptors: Option<&Path>,
+    preparation: &Preparation,
+) -> Result<Prepared, crate::Error> {
+    let input = read::open(path).map_err(|error| {
+        let way_out = "the folder of a COLMAP model or project; for photos, unlift audit images";
+        let is_other = path.is_dir() && !read::is_project(path);
+        let error = crate::Error::from(error);
+        if is_other { error.advise(way_out) } else { error }
+    })?;
+    check_scale(&input.positions, preparation.scale)?;
+    let (mut notes, mut doubts) = (input.notes.clone(), input.doubts.clone());
+    let described = match descriptors {
+        Some(file) => Some((read::descriptors(file, &input)?, file.to_owned())),
+        None if preparation.beside => match beside(&input) {
+            Ok((rows, file)) => {
+                notes.push(format!("descriptors: {}, beside the model", file.display()));
+                Some((rows, file))
+            }
+            Err(reasons) => {
+                doubts.extend(reasons);
+                None
+            }
+        },
+        None => None,
+    };
+    let (rows, file) = described.unzip();
+    let mut prepared = prepare(&input.positions, rows.as_ref(), preparation).map_err(|error| {
+        let few = error.kind() == ErrorKind::TooFewPoints && input.positions.len() > 2;
+        let error = crate::Error::from(unlift_io::Error::core(path, error));
+        if few { error.advise("a smaller --k, or more points") } else { error }
+    })?;
+    // `prepared.rows` counts the points with a place only.
+    prepared.rows = rows_of_file(&prepared.rows, &input.left_out);
+    if let Some(model) = &input.model {
+        match Cameras::read(model, &prepared.rows, 1.0 / prepared.unit_in_map_units) {
+            Ok(cameras) => {
+                prepared.notes.extend(cameras.note());
+                prepared.cameras = cameras;
+            }
+            // An audit of points needs no cameras.
+            Err(error) => prepared.notes.push(format!("localization: not measured: {error}")),
+        }
+    }
+    prepared.doubts = doubts;
+    if let Some(rows) = &prepared.descriptors {
+        prepared.notes.extend(zeros(rows));
+        prepared.doubts.extend(unlike_neighbors(prepared.original.reveal(), rows)?);
+    }
+    prepared.notes.splice(0..0, notes);
+    prepared.descriptors_file = file;
+    prepared.input = input;
+    Ok(prepared)
+}
+
+/// Reads the first file beside the model of `input` that has the descriptors of its points; returns why none of
+/// them has.
+fn beside(input: &read::Input) -> Result<(Descriptors, PathBuf), Vec<String>> {
+    let mut reasons = Vec::new();
+    for file in &input.beside {
+        match read::descriptors(file, input) {
+            Ok(rows) => return Ok((rows, file.clone())),
+            Err(error) => reasons.push(format!("descriptors: {error}")),
+        }
+    }
+    Err(reasons)
+}
+
+/// Returns `rows` among all points of the file, which may contain points that the reader left out.
+fn rows_of_file(rows: &[u32], left_out: &[u64]) -> Vec<u32> {
+    let mut left_out = left_out.iter().peekable();
+    let mut shift = 0;
+    let of_file = |&row: &u32| {
+        while left_out.next_if(|&&out| out <= u64::from(row) + shift).is_some() {
+            shift += 1;
+        }
+        row + shift as u32
+    };
+    rows.iter().map(of_file).collect()
+}
+
+/// Returns a note about descriptors that are all zero; some exporters mark missing descriptors like
+/// this.
+pub fn zeros(descriptors: &Descriptors) -> Option<String> {
+    let mut row = vec![0.0; descriptors.dim()];
+    let mut zero = |at: &usize| {
+        descriptors.read_row(*at, &mut row);
+        row.iter().all(|&value| value == 0.0)
+    };
+    let (n, of) = ((0..descriptors.len()).filter(|at| zero(at)).count(), descriptors.len());
+    (n > 0).then(|| {
+        format!("{n} of {of} descriptors are all zero and give an attacker no information")
+    })
+}
+
 /// Thins out and scales `positions` and `descriptors`. Owned positions that are all kept
 /// are not copied, because large maps need the memory.
 ///
@@ -173,11 +281,9 @@ pub fn prepare<'a>(
     Ok(Prepared { descriptors, unit_in_map_units, rows, notes, ..prepared })
 }
 
-/// Returns the median over all points of the distance to the `k`-th nearest other point.
 fn median_kth_distance(points: &[[f64; 3]], k: usize) -> Result<f64, Error> {
     let knn = Knn::new(points)?;
-    let mut distances = knn.kth_distances(k);
-    let median = unlift::geometry::vector::median(&mut distances);
+    let median = median(&mut knn.kth_distances(k));
     if median > 0.0 && (1.0 / median).is_finite() {
         return Ok(median);
     }

@@ -25,7 +25,7 @@ use unlift::recover::{Builtin, RecoverOptions, Recovered};
 use unlift::released::Obfuscation;
 use unlift::seed::Key;
 use unlift::sequence::{Links, Query, Solved, recover, with_lists};
-use unlift::truth::Secret;
+use unlift::truth::{OriginalId, Secret};
 use unlift_io::hash::hash_files;
 use unlift_io::read;
 use unlift_report::RenderOptions;
@@ -33,14 +33,15 @@ use unlift_report::document::{ImageCounts, Input};
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_vision::pictures::Points;
 
-use self::view::Model;
-pub use self::view::View;
-use crate::audit::{Attacked, Audit};
-use crate::gate::Tried;
+use self::view::{Model, View};
+use super::names;
+use crate::audit::{Audit, Audited};
+use crate::document::{Attacked, Tried};
 use crate::images::{FeatureSource, evenly};
-use crate::inversion::{Inversion, NEAR_PX, weight};
+use crate::inversion::{Inversion, trusted};
+use crate::maps::released::slot_of;
 use crate::sources::BY_DESCRIPTORS;
-use crate::{Error, Progress, check_stop, document};
+use crate::{Error, Progress, check_stop};
 
 /// Images with known poses, and how they are attacked.
 pub struct Sequence<'a> {
@@ -75,13 +76,9 @@ const LEAST_VIEWS: usize = 3;
 
 impl Sequence<'_> {
     /// Attacks the images. Fewer than two with usable features, or fewer than the smallest number of queries, are an error.
-    pub(crate) fn attack(
-        &self,
-        audit: &Audit<'_>,
-        progress: &dyn Progress,
-    ) -> Result<Attacked, Error> {
-        let passed_over = &self.source.passed_over;
-        passed_over.iter().for_each(|note| progress.say(&format!("note: {note}")));
+    pub(super) fn attack(&self, audit: &Audit, progress: &dyn Progress) -> Result<Audited, Error> {
+        let skipped = &self.source.passed_over;
+        skipped.iter().for_each(|note| progress.say(&format!("note: {note}")));
         progress.show(0, 1, "reading images");
         let input = read::open(self.model)?;
         let Some(folder) = &input.model else {
@@ -123,41 +120,43 @@ impl Sequence<'_> {
         }
         let tried = self.tried(&queries);
         audit.begin(&tried, None, &notes, progress)?;
-        let mut inversions = Vec::new();
+        let mut inversions: Vec<Sheet> = Vec::new();
         let (rows, seconds) = self.rows(&views, &queries, &mut inversions, progress)?;
         // Photos that could not be used have no pictures.
         inversions.retain(|sheet| !sheet.views.is_empty());
-        let mut options = document::names(&tried, audit.options.clone());
+        let mut options = names(&tried, audit);
         options.insert("queries".into(), json!(queries));
         options.extend(self.lists.as_ref().map(|by| ("lists".to_owned(), json!(by.name()))));
         if let Some(error) = self.pose_error {
             options.insert("pose_error_distance".into(), json!(error.center));
             options.insert("pose_error_angle_deg".into(), json!(error.rotation_degrees));
         }
-        Ok(Attacked {
+        let attacked = Attacked {
             tried,
             rows,
             seconds,
-            about: Some(self.about(&input, &views, unusable)?),
+            about: self.about(&input, &views, unusable)?,
             options,
             notes,
-            drawn: RenderOptions { inversions, ..RenderOptions::default() },
+            rendering: RenderOptions { inversions, ..RenderOptions::default() },
             ..Attacked::default()
-        })
+        };
+        audit.finish(&self.plan, attacked)
+    }
+
+    /// Returns the kinds of links.
+    fn kinds(&self) -> impl Iterator<Item = &'static str> {
+        [SEQUENCE, TRACKS].into_iter().chain(self.lists.is_some().then_some(WITH_LISTS))
     }
 
     fn tried(&self, queries: &[usize]) -> Tried {
-        let with_lists = self.lists.is_some().then_some(WITH_LISTS);
-        let kinds = || [SEQUENCE, TRACKS].into_iter().chain(with_lists);
-        let sources = queries.iter().flat_map(|n| kinds().map(move |by| format!("{by}@{n}")));
+        let sources = queries.iter().flat_map(|n| self.kinds().map(move |by| format!("{by}@{n}")));
+        let is_best = |by: &Arc<dyn Source<2>>| by.name() == BY_DESCRIPTORS.name;
         Tried {
             sources: sources.collect(),
             solvers: vec![SOLVER.to_owned()],
             inlier_ratios: Vec::new(),
-            lacks_best_source: self
-                .lists
-                .as_ref()
-                .is_none_or(|by| by.name() != BY_DESCRIPTORS.name),
+            lacks_best_source: !self.lists.as_ref().is_some_and(is_best),
             ..Tried::by(&self.plan, false)
         }
     }
@@ -193,8 +192,7 @@ impl Sequence<'_> {
         let mut rows = Vec::new();
         let reach = queries.iter().copied().max().unwrap_or(0);
         let mut known: Option<(Vec<Secret>, Links)> = None;
-        let n_kinds = if self.lists.is_some() { 3 } else { 2 };
-        let total = plan.schemes.len() * queries.len() * n_kinds;
+        let total = plan.schemes.len() * queries.len() * self.kinds().count();
         for scheme in &plan.schemes {
             let started = Instant::now();
             let (protected, secrets) = hide(&**scheme, views, plan.seed)?;
@@ -202,22 +200,14 @@ impl Sequence<'_> {
             progress.show(rows.len(), total, &format!("{}, linking queries", scheme.name()));
             let started = Instant::now();
             // Links depend on descriptors and cameras only.
-            let same = known.as_ref().and_then(|(of, links)| {
-                let orders =
-                    (!scheme.changes_descriptors()).then(|| orders(of, &secrets)).flatten()?;
-                Some(links.reordered(&orders))
-            });
-            let links = match same {
-                Some(links) => links,
-                None => {
-                    let links = Links::by_descriptors(&protected, reach)?;
-                    if !scheme.changes_descriptors() {
-                        known = Some((secrets.clone(), links.clone()));
-                    }
-                    links
-                }
-            };
-            let links = &links;
+            let is_plain = !scheme.changes_descriptors();
+            let same = known.as_ref().filter(|_| is_plain);
+            let same = same.and_then(|(of, links)| Some(links.reordered(&orders(of, &secrets)?)));
+            let is_new = same.is_none();
+            let links = &same.map_or_else(|| Links::by_descriptors(&protected, reach), Ok)?;
+            if is_plain && is_new {
+                known = Some((secrets.clone(), links.clone()));
+            }
             let tracks = tracks(views, &secrets);
             let hidden = Protected { views, queries: protected, secrets };
             let lists = self.lists.as_deref().map(|by| hidden.lists(by, plan.seed)).transpose()?;
@@ -291,12 +281,10 @@ fn hide(
 /// the same keypoints.
 fn orders(known: &[Secret], secrets: &[Secret]) -> Option<Vec<Vec<u32>>> {
     let of_query = |(known, secret): (&Secret, &Secret)| {
-        let mut slots = vec![u32::MAX; known.n_originals()];
-        for (slot, original) in known.hidden().iter().enumerate() {
-            slots[original.index()] = slot as u32;
-        }
-        let of: Vec<u32> = secret.hidden().iter().map(|original| slots[original.index()]).collect();
-        (known.n_slots() == secret.n_slots() && !of.contains(&u32::MAX)).then_some(of)
+        let slots = slot_of(known);
+        let slot = |original: &OriginalId| Some(slots[original.index()]? as u32);
+        let of: Option<Vec<u32>> = secret.hidden().iter().map(slot).collect();
+        of.filter(|_| known.n_slots() == secret.n_slots())
     };
     known.iter().zip(secrets).map(of_query).collect()
 }
@@ -314,7 +302,6 @@ fn tracks(views: &[View], secrets: &[Secret]) -> Links {
     Links::of_tracks(secrets.iter().map(Secret::n_slots), of_point.into_values())
 }
 
-/// Protected views with their secrets.
 struct Protected<'a> {
     views: &'a [View],
     queries: Vec<Query>,
@@ -384,10 +371,10 @@ impl Protected<'_> {
         let headline = plan.thresholds[plan.headline].value;
         let of_query = |query| self.of_query(attack, tracks, query, headline);
         let queries = (0..self.views.len()).into_par_iter().with_max_len(1);
-        let found = queries.map(of_query).collect::<Result<Vec<_>, unlift::Error>>()?;
+        let solved = queries.map(of_query).collect::<Result<Vec<_>, unlift::Error>>()?;
         let mut pooled = Pooled::new(&plan.thresholds);
         let mut all = Shares::default();
-        for (query, (recovered, shares)) in found.iter().enumerate() {
+        for (query, (recovered, shares)) in solved.iter().enumerate() {
             let (original, released) = (&self.views[query].original, &self.queries[query].released);
             pooled.add(recovered, original, &self.secrets[query], Some(released))?;
             for (all, share) in all.iter_mut().zip(shares) {
@@ -407,7 +394,6 @@ impl Protected<'_> {
         Ok(row)
     }
 
-    /// Attacks `query`.
     fn solve(&self, attack: &Attack<'_>, query: usize) -> Result<Solved, unlift::Error> {
         let mut solved = recover(&self.queries, attack.links, query, self.window(query, attack.n))?;
         if let Some(lists) = attack.lists {
@@ -467,7 +453,6 @@ impl Protected<'_> {
     }
 }
 
-/// Number of queries with pictures.
 const SHOWN: usize = 3;
 
 /// Paints what `row` recovers of a few queries, and adds the pictures to their sheets. Photos that
@@ -490,13 +475,9 @@ fn paint(
         let places: Vec<[f32; 2]> =
             view.original.reveal().positions().iter().map(|&place| view.in_photo(place)).collect();
         let solved = hidden.solve(attack, query)?;
-        let recovered = &solved.recovered;
-        let slots = 0..recovered.n_slots();
-        let place = |slot| recovered.position(slot).map_or([f32::NAN; 2], |p| view.in_photo(p));
-        let found: Vec<[f32; 2]> = slots.clone().map(place).collect();
-        let weights: Vec<f32> = slots.map(|slot| weight(recovered, slot, NEAR_PX)).collect();
+        let (shown, weights) = trusted(&solved.recovered, |place| view.in_photo(place));
         let Some(descriptors) = hidden.queries[query].released.descriptors() else { continue };
-        let points = Points { places: &found, descriptors, weights: &weights, depths: None };
+        let points = Points { places: &shown, descriptors, weights: &weights, depths: None };
         let original = (&places[..], &view.descriptors);
         let name = (view.name.as_str(), view.size);
         let added = inversion.add_keypoints(name, original, &points, row, &mut sheets[at]);

@@ -4,19 +4,20 @@ use std::sync::Arc;
 
 use unlift::audit::{Cell, Observer, Row, Watcher};
 use unlift::released::{Obfuscation, Released};
-use unlift_report::inversions::Inversion as Inverted;
+use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::pictures::{GRAPH_NEIGHBORS, Graph, Marks, Picture, ReleasedView};
 use unlift_report::{Attack, ByAttack};
 
 use crate::Progress;
 use crate::inversion::Inversion;
+use crate::maps::released::slot_of;
 
 /// Collects the pictures of all audited images, in their order.
 pub struct Album<'a> {
     inverter: Option<Arc<Inversion>>,
     steps: &'a dyn Progress,
     pub pictures: Vec<Picture>,
-    pub inversions: Vec<Inverted>,
+    pub inversions: Vec<Sheet>,
 }
 
 impl<'a> Album<'a> {
@@ -31,7 +32,7 @@ impl<'a> Watcher<2> for Album<'a> {
 
     fn begin(&mut self) -> Page<'a> {
         let (inverter, steps) = (self.inverter.clone(), self.steps);
-        Page { inverter, steps, picture: Picture::default(), painted: Inverted::default() }
+        Page { inverter, steps, picture: Picture::default(), painted: Sheet::default() }
     }
 
     fn item(&mut self, name: &str, _: &[Row], page: Page<'a>) {
@@ -42,7 +43,7 @@ impl<'a> Watcher<2> for Album<'a> {
             self.pictures.push(Picture { name: name.to_owned(), ..picture });
         }
         if !painted.views.is_empty() {
-            self.inversions.push(Inverted { name: name.to_owned(), ..painted });
+            self.inversions.push(Sheet { name: name.to_owned(), ..painted });
         }
     }
 }
@@ -51,7 +52,7 @@ pub struct Page<'a> {
     inverter: Option<Arc<Inversion>>,
     steps: &'a dyn Progress,
     picture: Picture,
-    painted: Inverted,
+    painted: Sheet,
 }
 
 impl Observer<2> for Page<'_> {
@@ -72,10 +73,7 @@ impl Observer<2> for Page<'_> {
             let sides = cell.original.bounds().map(|b| [0, 1].map(|c| b.high[c] - b.low[c]));
             picture.size = sides.unwrap_or([1.0; 2]).map(|side| side.round() as u32);
         }
-        let mut slot_of = vec![None; truth.len()];
-        for (slot, original) in cell.secret.hidden().iter().enumerate() {
-            slot_of[original.index()] = Some(slot);
-        }
+        let slot_of = slot_of(cell.secret);
         let scheme = &cell.row.scheme;
         if picture.released.iter().all(|view| view.scheme != *scheme)
             && let Some(marks) = marks(cell.released, &slot_of)

@@ -34,8 +34,7 @@ impl<'a> Curves<'a> {
         Self { errors, curves: Vec::new(), steps, reported: 0.0 }
     }
 
-    /// Adds the curves of another item.
-    pub fn merge(&mut self, more: Self) {
+    fn merge(&mut self, more: Self) {
         for more in more.curves {
             match self.curves.iter_mut().find(|to| to.cell.is_same_cell(&more.cell)) {
                 Some(to) => {
@@ -47,15 +46,17 @@ impl<'a> Curves<'a> {
         }
     }
 
-    /// Returns the curves in percent, by cell.
-    pub fn shares(self) -> Vec<(Row, Vec<(f64, f64)>)> {
-        let shares = |curve: Curve| {
+    /// Returns the curve of every row of `rows` that has one, in percent.
+    pub fn of_rows(&self, rows: &[Row]) -> Vec<ErrorCdf> {
+        let of_row = |curve: &Curve| {
+            // A cell that failed under another seed has no row.
+            let row = rows.iter().position(|row| row.is_same_cell(&curve.cell))?;
             let percent = |count: usize| 100.0 * count as f64 / curve.n.max(1) as f64;
             let points = self.errors.iter().zip(&curve.within);
             let points = points.map(|(&error, &n)| (error, percent(n))).collect();
-            (curve.cell, points)
+            Some(ErrorCdf { row, points })
         };
-        self.curves.into_iter().map(shares).collect()
+        self.curves.iter().filter_map(of_row).collect()
     }
 }
 
@@ -113,14 +114,4 @@ impl<'a, F: FnMut(&str, &[Row]), const D: usize> Watcher<D> for OfItems<'a, F, D
         self.curves.merge(curves);
         (self.each)(name, rows);
     }
-}
-
-/// Returns the curve of every row of `rows` that has one.
-pub fn curves_of(cells: Vec<(Row, Vec<(f64, f64)>)>, rows: &[Row]) -> Vec<ErrorCdf> {
-    let curve = |(cell, points): (Row, Vec<(f64, f64)>)| {
-        // A cell that failed under another seed has no row.
-        let row = rows.iter().position(|row| row.is_same_cell(&cell))?;
-        Some(ErrorCdf { row, points })
-    };
-    cells.into_iter().filter_map(curve).collect()
 }

@@ -1,15 +1,13 @@
 //! Large maps in tiles: each tile is hidden and attacked as a map of its own.
 
-use unlift::audit::{Item, Outcome, Plan, Row, run_many};
+use unlift::audit::{Item, Row};
 use unlift::truth::Original;
 use unlift::{Descriptors, Error, PointSet};
-
-use crate::Progress;
-use crate::curves::{Curves, OfItems};
+use unlift_report::document::TileFigures;
 
 /// A part of a map: a box in plan view that overlaps no other tile.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tile {
+pub(super) struct Tile {
     /// Its number, from 0.
     pub at: usize,
     /// Rows of the map's points, ascending.
@@ -48,7 +46,7 @@ impl Tiles {
     /// tree in plan view: across the longer side, never across the height.
     ///
     /// The height is the axis nearest to `up`; without `up`, the axis of the smallest extent.
-    pub fn of(
+    pub(super) fn of(
         self,
         positions: &[[f64; 3]],
         up: Option<[f64; 3]>,
@@ -117,21 +115,20 @@ fn bounds(positions: &[[f64; 3]], rows: &[u32]) -> [[f64; 3]; 2] {
     bounds
 }
 
-/// Runs `plan` on every tile of a map, one after the other. Also returns the rows of each tile and
-/// the curves of all.
-pub(crate) fn run<'a>(
-    (original, descriptors): (&Original<3>, Option<&Descriptors>),
-    tiles: &[Tile],
-    plan: &'a Plan<3>,
-    progress: &'a dyn Progress,
-) -> Result<(Outcome, Vec<Vec<Row>>, Curves<'a>), Error> {
-    let mut tile_rows = Vec::new();
-    let mut watcher = OfItems::new(plan, progress, |_, rows| tile_rows.push(rows.to_vec()));
-    progress.show(0, tiles.len(), "splitting the map into tiles");
-    let items = tiles.iter().map(|tile| tile.item(original, descriptors));
-    let outcome = run_many(items, plan, &mut watcher)?;
-    let curves = watcher.curves;
-    Ok((outcome, tile_rows, curves))
+/// Returns the figures of every tile: those of its `rows` that are in the pooled `results`.
+pub(super) fn figures(tiles: &[Tile], rows: &[Vec<Row>], results: &[Row]) -> Vec<TileFigures> {
+    let figures = |(tile, rows): (&Tile, &Vec<Row>)| {
+        let percent = |result: &Row| {
+            let row = rows.iter().find(|row| row.is_same_cell(result));
+            row.map(|row| row.recovered_percent.clone()).unwrap_or_default()
+        };
+        TileFigures {
+            bounds: Some(tile.bounds),
+            n_points: tile.rows.len() as u64,
+            recovered_percent: results.iter().map(percent).collect(),
+        }
+    };
+    tiles.iter().zip(rows).map(figures).collect()
 }
 
 #[cfg(test)]

@@ -1,0 +1,304 @@
+//! Maps: attacked whole, in tiles or as they are released.
+
+use std::sync::Arc;
+
+use unlift::Descriptors;
+use unlift::audit::{Alone, Cell, Observer, Plan, Row, run, run_many, run_released};
+use unlift::geometry::frame::rounded_origin;
+use unlift::released::Released;
+use unlift::truth::{Original, Secret};
+use unlift_report::inversions::Inversion as Sheet;
+use unlift_report::scene::{ObfuscationView, SceneBox, points_within_budget, subsample};
+use unlift_report::{Attack, ByAttack, RenderOptions, Scene3d};
+
+use super::curves::{Curves, OfItems};
+use super::tiles::{Tiles, figures};
+use crate::audit::{Audit, Audited};
+use crate::document::{self, Attacked, Tried};
+use crate::doubts::{Spread, check_truth, doubts, follows_places, with_sides};
+use crate::inversion::{MapInversion, near, shapes};
+use crate::localization::{self, Localize};
+use crate::maps::released::slot_of;
+use crate::maps::{Prepared, USUAL_K};
+use crate::{Error, Progress};
+
+/// A map, and how it is attacked.
+pub struct Map<'a> {
+    /// The points, in the unit of the audit.
+    pub original: &'a Original<3>,
+    /// Descriptors, one row per point.
+    pub descriptors: Option<&'a Descriptors>,
+    /// The cameras that observe the points, for localization; not used with tiles.
+    pub localize: Option<Localize<'a>>,
+    /// Camera centers in the unit of the audit, for the 3D view.
+    pub cameras: Vec<[f64; 3]>,
+    /// The up direction of the 3D view, if known.
+    pub up: Option<[f64; 3]>,
+    /// The plan of the attack.
+    pub plan: Plan<3>,
+    /// Makes pictures of recovered points; the plan measures with it, too.
+    pub inversion: Option<Arc<MapInversion>>,
+}
+
+impl<'a> Map<'a> {
+    /// Returns a map as it was read, with the default plan.
+    pub fn new(prepared: &'a Prepared) -> Self {
+        let (cameras, held_out, protections) = (&prepared.cameras, None, Vec::new());
+        Self {
+            descriptors: prepared.descriptors.as_ref(),
+            localize: Some(Localize { cameras, held_out, protections }),
+            cameras: prepared.centers(),
+            up: prepared.input.up,
+            ..Self::of(&prepared.original)
+        }
+    }
+
+    /// Returns points in memory, with the default plan.
+    pub fn of(original: &'a Original<3>) -> Self {
+        let points = original.reveal();
+        Self {
+            original,
+            descriptors: None,
+            localize: None,
+            cameras: Vec::new(),
+            up: None,
+            plan: Plan::new(points.unit()).for_map(points.len(), USUAL_K),
+            inversion: None,
+        }
+    }
+}
+
+/// A released map with its secret.
+pub struct Hidden<'a> {
+    /// The release and its secret.
+    pub release: &'a (Released<3>, Secret),
+    /// An attack on values of the released file that its records do not contain.
+    pub read: Option<Alone>,
+}
+
+/// Maximum number of photos shown beside pictures.
+const SHEETS: usize = 3;
+
+impl Map<'_> {
+    /// Attacks the map: in `tiles`, or as it is `hidden`.
+    pub(super) fn attack(
+        &self,
+        tiles: Option<Tiles>,
+        hidden: Option<&Hidden<'_>>,
+        audit: &Audit,
+        progress: &dyn Progress,
+    ) -> Result<Audited, Error> {
+        let (original, plan, points) = (self.original, &self.plan, self.original.reveal());
+        let release = hidden.map(|hidden| hidden.release);
+        let localize = self.localize.as_ref().filter(|_| tiles.is_none());
+        let of_hidden = release.is_some_and(|(released, _)| released.descriptors().is_some());
+        let mut tried = Tried::by(plan, self.descriptors.is_some() || of_hidden);
+        tried.localizes = localize.is_some_and(|localize| !localize.cameras.views.is_empty());
+        audit.begin(&tried, Some(points), audit.doubts.iter().chain(&audit.notes), progress)?;
+        let of_file = |error| match &audit.about.path {
+            Some(file) => Error::from(unlift_io::Error::core(file, error)),
+            None => Error::from(error),
+        };
+        // Localization comes first: wrong features are reported before the long attacks.
+        let (localization, notes_on_images) = match localize {
+            Some(localize) => localization::of_schemes(localize, original, plan, progress)?,
+            None => Default::default(),
+        };
+        let cut = tiles.map(|tiles| tiles.of(points.positions(), self.up)).transpose()?;
+        let spread = match &cut {
+            Some(tiles) => {
+                let parts =
+                    tiles.iter().map(|tile| tile.item(original, None).map(|item| item.original));
+                Spread::of_parts(parts, plan.k)
+            }
+            None => Spread::of(points.positions(), plan.k),
+        };
+        let spread = spread.map_err(of_file)?;
+        if let Some(release) = release {
+            check_truth(original, release, &spread).map_err(of_file)?;
+        }
+        let (mut scene, mut inversions, mut tile_rows) = (None, Vec::new(), Vec::new());
+        let (mut outcome, curves) = match &cut {
+            Some(tiles) => {
+                let mut watcher =
+                    OfItems::new(plan, progress, |_, rows| tile_rows.push(rows.to_vec()));
+                progress.show(0, tiles.len(), "splitting the map into tiles");
+                let items = tiles.iter().map(|tile| tile.item(original, self.descriptors));
+                let outcome = run_many(items, plan, &mut watcher)
+                    .map_err(|error| of_file(error).advise("a larger --tile-points"))?;
+                (outcome, watcher.curves)
+            }
+            None => {
+                let mut watcher = self.watcher(audit.output.share_safe, progress);
+                let outcome =
+                    match release {
+                        None => run(original, self.descriptors, plan, &mut watcher).map_err(
+                            |error| of_file(error).advise("a smaller --k, or fewer --schemes"),
+                        )?,
+                        Some(release) => {
+                            run_released((original, self.descriptors), release, plan, &mut watcher)
+                                .map_err(of_file)?
+                        }
+                    };
+                if let Some(error) = watcher.failed {
+                    return Err(error);
+                }
+                scene = watcher.pictures.map(|p| p.into_scene(&self.cameras, self.up));
+                inversions = watcher.sheets;
+                (outcome, watcher.curves)
+            }
+        };
+        // Of values that are no better than a blind guess there is nothing to say.
+        let beats = |alone: &&Alone, row: &Row| {
+            alone.shares.iter().any(|(label, share)| share.percent() > row.blind_percent[label])
+        };
+        let read = hidden.and_then(|hidden| hidden.read.as_ref());
+        let given = plan.schemes.first().map(|scheme| scheme.name());
+        for row in outcome.rows.iter_mut().filter(|row| given == Some(&*row.scheme)) {
+            row.add_alone(read.filter(|alone| beats(alone, row)).cloned());
+        }
+        let mut of_points = audit.doubts.clone();
+        of_points.extend(release.iter().flat_map(|release| follows_places(original, release)));
+        let rows = (plan, &outcome.rows[..], &tile_rows[..]);
+        let doubts = doubts((original, spread), release, rows, &of_points);
+        for note in doubts.notes.iter().filter(|note| !audit.doubts.contains(note)) {
+            progress.say(&format!("note: {note}"));
+        }
+        let mut options = document::options(plan);
+        options.extend(audit.options.clone());
+        if let Some(inversion) = &self.inversion {
+            options.insert("inverter_sha256".into(), inversion.sha256().into());
+        }
+        if let Some(Tiles { max_points, only }) = tiles {
+            options.insert("tile_points".into(), max_points.into());
+            options.extend(only.map(|at| ("tile".to_owned(), at.into())));
+        }
+        let error_cdf = curves.of_rows(&outcome.rows);
+        let tiles = cut.iter().flat_map(|tiles| figures(tiles, &tile_rows, &outcome.rows));
+        let attacked = Attacked {
+            tried,
+            about: with_sides(audit.about.clone(), points),
+            options,
+            notes: [audit.notes.clone(), doubts.notes, notes_on_images].concat(),
+            doubts: doubts.of_rows,
+            localization,
+            tiles: tiles.collect(),
+            scene,
+            rendering: RenderOptions { error_cdf, inversions, ..RenderOptions::default() },
+            rows: outcome.rows,
+            not_audited: outcome.not_audited,
+            break_even: outcome.break_even,
+            seconds: outcome.seconds,
+            images: Vec::new(),
+        };
+        audit.finish(plan, attacked)
+    }
+
+    fn watcher<'a>(&self, share_safe: bool, progress: &'a dyn Progress) -> Watcher<'a> {
+        let n_views = self.plan.schemes.len() * self.plan.rows_per_scheme();
+        let inversion = self.inversion.clone();
+        let n_sheets = inversion.as_ref().map_or(0, |inversion| inversion.n_photos().min(SHEETS));
+        Watcher {
+            progress,
+            pictures: (!share_safe).then(|| Pictures::new(self.original, &self.plan, n_views)),
+            curves: Curves::new(&self.plan, progress),
+            inversion,
+            sheets: vec![Sheet::default(); if share_safe { 0 } else { n_sheets }],
+            failed: None,
+        }
+    }
+}
+
+/// Reports progress and collects what the page draws.
+struct Watcher<'a> {
+    progress: &'a dyn Progress,
+    pictures: Option<Pictures>,
+    curves: Curves<'a>,
+    inversion: Option<Arc<MapInversion>>,
+    /// One sheet for each of the first cameras.
+    sheets: Vec<Sheet>,
+    failed: Option<Error>,
+}
+
+impl Observer for Watcher<'_> {
+    fn progress(&mut self, done: usize, total: usize, what: &str) {
+        self.progress.show(done, total, what);
+    }
+
+    fn goes_on(&self) -> bool {
+        self.progress.goes_on()
+    }
+
+    fn cell(&mut self, cell: &Cell<'_>) {
+        if cell.repeat > 0 {
+            return;
+        }
+        self.curves.cell(cell);
+        if let Some(pictures) = &mut self.pictures {
+            pictures.add(cell);
+        }
+        if let (Some(inversion), None) = (&self.inversion, &self.failed) {
+            self.failed = inversion.add(cell, &mut self.sheets).err().map(Error::from);
+        }
+    }
+}
+
+/// Points and shapes that are collected while an audit runs.
+struct Pictures {
+    sample: Vec<usize>,
+    /// The middle of the map. Relative to it `f32` is precise enough, even for georeferenced maps.
+    middle: [f64; 3],
+    bounds: SceneBox,
+    scene: Scene3d,
+}
+
+/// Maximum number of shapes per scheme; more lines cannot be distinguished.
+const MAX_SHAPES: usize = 3_000;
+
+impl Pictures {
+    fn new(original: &Original<3>, plan: &Plan<3>, n_views: usize) -> Self {
+        let points = original.reveal().positions();
+        let max_points = points_within_budget(n_views, plan.schemes.len());
+        let sample = subsample(points.len(), max_points, plan.seed);
+        let middle = rounded_origin(points);
+        let originals: Vec<[f32; 3]> =
+            sample.iter().map(|&at| near(&points[at], &middle)).collect();
+        let bounds = SceneBox::robust(&originals);
+        let scene = Scene3d { originals, n_points: points.len() as u64, ..Scene3d::default() };
+        Self { sample, middle, bounds, scene }
+    }
+
+    fn add(&mut self, cell: &Cell<'_>) {
+        let slot_of = slot_of(cell.secret);
+        if self.scene.obfuscations.iter().all(|view| view.scheme != cell.row.scheme) {
+            let slots = self.sample.iter().filter_map(|&at| slot_of[at]);
+            let mut records: Vec<usize> =
+                slots.map(|slot| slot / cell.released.slots_per_record()).collect();
+            records.sort_unstable();
+            records.dedup();
+            records.truncate(MAX_SHAPES);
+            let shapes = shapes(&self.bounds, &self.middle, cell.released, &records);
+            let shown = self.sample.iter().enumerate();
+            let withheld = shown.filter(|&(_, &at)| slot_of[at].is_none()).map(|(i, _)| i);
+            self.scene.obfuscations.push(ObfuscationView {
+                scheme: cell.row.scheme.to_owned(),
+                shapes,
+                n_records: cell.released.obfuscation().len() as u64,
+                withheld: withheld.collect(),
+            });
+        }
+        let recovered = self.sample.iter().map(|&at| {
+            let position = slot_of[at].and_then(|slot| cell.recovered.position(slot));
+            position.map_or([f32::NAN; 3], |p| near(&p, &self.middle))
+        });
+        let (attack, recovered) = (Attack::of(cell.row), recovered.collect());
+        self.scene.views.push(ByAttack { attack, recovered });
+    }
+
+    /// Returns the finished scene; `cameras` are in the unit of the audit.
+    fn into_scene(mut self, cameras: &[[f64; 3]], up: Option<[f64; 3]>) -> Scene3d {
+        self.scene.cameras = cameras.iter().map(|c| near(c, &self.middle)).collect();
+        self.scene.up = up.map(|v| v.map(|x| x as f32));
+        self.scene
+    }
+}

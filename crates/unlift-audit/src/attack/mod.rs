@@ -1,0 +1,67 @@
+//! The inputs of an audit, each with its plan and its attack.
+
+mod again;
+mod album;
+mod curves;
+mod frames;
+mod images;
+mod map;
+mod sequence;
+mod tiles;
+
+pub use again::{Again, Maps};
+pub use images::Images;
+pub use map::{Hidden, Map};
+pub use sequence::Sequence;
+pub use tiles::Tiles;
+
+use serde_json::{Map as Options, Value, json};
+
+use crate::audit::{Audit, Audited};
+use crate::document::Tried;
+use crate::{Error, Progress};
+
+/// The input of an audit.
+// There is one per audit, so its size costs nothing.
+#[allow(clippy::large_enum_variant)]
+pub enum Input<'a> {
+    /// A map, which is hidden under each scheme.
+    Map(Map<'a>),
+    /// A map in tiles: each is hidden and attacked as a map of its own.
+    Tiles(Map<'a>, Tiles),
+    /// A map that a program of the user hid.
+    Released(Map<'a>, Hidden<'a>),
+    /// Images, whose keypoints are hidden.
+    Images(Images<'a>),
+    /// Images with known poses, each hidden under its own key.
+    Sequence(Sequence<'a>),
+    /// A map that is released twice.
+    Again(Again<'a>),
+}
+
+impl Audit {
+    /// Runs the audit of `input` and writes nothing.
+    ///
+    /// # Errors
+    /// If the input or a file of it cannot be used, the plan does not fit it, a gate has no row, no image can be used, or `progress`
+    /// stops the audit. Images of files that cannot be used are reported and counted, if there are others.
+    pub fn run(&self, input: &Input<'_>, progress: &dyn Progress) -> Result<Audited, Error> {
+        match input {
+            Input::Map(map) => map.attack(None, None, self, progress),
+            Input::Tiles(map, tiles) => map.attack(Some(*tiles), None, self, progress),
+            Input::Released(map, hidden) => map.attack(None, Some(hidden), self, progress),
+            Input::Images(images) => images.attack(self, progress),
+            Input::Sequence(sequence) => sequence.attack(self, progress),
+            Input::Again(again) => again.attack(self, progress),
+        }
+    }
+}
+
+/// Returns the options of the user, and the names of schemes and thresholds, as recorded options.
+fn names(tried: &Tried, audit: &Audit) -> Options<String, Value> {
+    let mut options = audit.options.clone();
+    options.insert("schemes".to_owned(), json!(tried.schemes));
+    let labels = tried.thresholds.iter().map(|t| t.label.as_str());
+    options.insert("thresholds".to_owned(), labels.collect());
+    options
+}
