@@ -302,30 +302,19 @@ impl Checked {
     }
 }
 
-/// The size of a map and the distance of its points.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Extent {
-    /// Twice the distance from the median point within which 90 % of the points lie, so that a few
-    /// outliers do not count.
-    pub across: f64,
-    /// The median distance to the nearest other point.
-    pub nearest: f64,
-}
-
-impl Extent {
-    /// Measures `points`, at least two.
-    pub fn of(points: &[[f64; 3]]) -> Result<Self, unlift::Error> {
-        let nearest = median(&mut Knn::new(points)?.kth_distances(1));
-        Ok(Self { across: across(points), nearest })
-    }
-}
-
 /// Returns `input` with the sides of the box around all points but the outer 1 % of each axis.
 pub fn with_sides(input: Input, points: &PointSet<3>) -> Input {
     let bounds = Bounds::quantiles(points.positions(), 0.01);
     input.with_sides(bounds.map(|bounds| sub(&bounds.high, &bounds.low)), points.unit())
 }
 
+/// Returns the median distance to the nearest other point.
+pub(crate) fn nearest(points: &[[f64; 3]]) -> Result<f64, unlift::Error> {
+    Ok(median(&mut Knn::new(points)?.kth_distances(1)))
+}
+
+/// Returns twice the distance from the median point within which 90 % of the points lie, so that a few
+/// outliers do not count.
 fn across(points: &[[f64; 3]]) -> f64 {
     if points.is_empty() {
         return 0.0;
@@ -399,7 +388,7 @@ pub fn check_thresholds(
     else {
         return Ok(LengthMessages::default());
     };
-    let Extent { across, nearest } = Extent::of(points)?;
+    let (nearest, across) = (nearest(points)?, across(points));
     let option = if typed { "--thresholds" } else { "--scale" };
     let times = match unit {
         Unit::KthNeighbor => " times the usual distance to the K-th neighbor",

@@ -22,7 +22,7 @@ use unlift::{PointSet, Unit};
 use unlift_report::document::{FEWEST_HELD_OUT, GateResult, HeldOut, Localization, UNPROTECTED};
 
 use crate::document::{Attacked, Tried};
-use crate::doubts::{Extent, HOPELESS, noise, short};
+use crate::doubts::{HOPELESS, nearest, noise, short};
 use crate::{Error, sources};
 
 /// A bound on a figure of an audit.
@@ -352,7 +352,7 @@ fn untried(gate: &Gate, tried: &Tried) -> Option<String> {
 pub fn check_lengths_of_gates(points: &PointSet<3>, gates: &[Gate]) -> Result<(), Error> {
     let by_size = |a: &&Gate, b: &&Gate| a.threshold.total_cmp(&b.threshold);
     let Some(gate) = gates.iter().min_by(by_size) else { return Ok(()) };
-    let nearest = Extent::of(points.positions())?.nearest;
+    let nearest = nearest(points.positions())?;
     if nearest < HOPELESS * gate.threshold {
         return Ok(());
     }

@@ -84,7 +84,6 @@ impl<const D: usize> Observer<D> for Curves<'_> {
 /// Reports the progress of an audit of many items, merges their curves, and passes on the rows of
 /// each.
 pub struct OfItems<'a, F, const D: usize> {
-    /// The curves of all items.
     pub curves: Curves<'a>,
     plan: &'a Plan<D>,
     each: F,

@@ -22,7 +22,7 @@ const PER_THREAD: usize = 2;
 /// Counts of the images that were read so far.
 #[derive(Debug, Default)]
 pub struct Tally {
-    /// Numbers of the images that were returned.
+    /// Numbers of the images that can be used.
     pub used: Vec<usize>,
     /// Their keypoint counts.
     pub sizes: Vec<usize>,
@@ -102,7 +102,7 @@ pub struct Stream<'a> {
     chosen: &'a [usize],
     plan: Option<&'a Plan<2>>,
     next: usize,
-    ready: VecDeque<(usize, Result<Ready, crate::Error>)>,
+    ready: VecDeque<Result<Item<2>, crate::Error>>,
     tally: &'a RefCell<Tally>,
     steps: &'a dyn Progress,
 }
@@ -131,22 +131,24 @@ impl<'a> Stream<'a> {
         let images: Vec<_> = numbers.par_iter().with_max_len(1).map(read).collect();
         let mut tally = self.tally.borrow_mut();
         for (at, image) in images {
-            match &image {
-                Ok(Ready { image, n_moved, described, .. }) => {
+            match image {
+                Ok(Ready { image, sha256, n_moved, described }) => {
                     tally.fill(&image.original);
+                    tally.used.push(at);
+                    tally.sizes.push(image.original.len());
+                    tally.hashes.extend(sha256);
                     tally.n_moved += n_moved;
                     tally.described |= described;
+                    self.ready.push_back(Ok(image));
                 }
                 // The caller can correct images in memory, so the error ends the audit.
-                Err(_) if source.is_in_memory() => {}
+                Err(error) if source.is_in_memory() => self.ready.push_back(Err(error)),
                 Err(error) => {
                     tally.unusable += 1;
                     self.steps.say(&error.to_string());
                     self.steps.add(1.0, "");
-                    continue;
                 }
             }
-            self.ready.push_back((at, image));
         }
     }
 }
@@ -158,14 +160,7 @@ impl Iterator for Stream<'_> {
         while self.ready.is_empty() && self.next < self.chosen.len() {
             self.read_ahead();
         }
-        let (at, ready) = self.ready.pop_front()?;
-        Some(ready.map(|Ready { image, sha256, .. }| {
-            let mut tally = self.tally.borrow_mut();
-            tally.used.push(at);
-            tally.hashes.extend(sha256);
-            tally.sizes.push(image.original.len());
-            image
-        }))
+        self.ready.pop_front()
     }
 }
 

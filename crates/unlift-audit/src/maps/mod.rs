@@ -307,13 +307,11 @@ pub fn by_point(path: &Path, prepared: &mut Prepared) -> Result<PointNeighbors, 
     let (mut offsets, mut neighbors) = (vec![0u64], Vec::new());
     let mut scores = lists.scores().map(|_| Vec::new());
     for &row in &prepared.rows {
-        let start = lists.offsets()[row as usize] as usize;
         for (at, &neighbor) in lists.of(row as usize).iter().enumerate() {
-            if let Some(kept) = kept_as[neighbor.index()] {
-                neighbors.push(kept);
-                if let (Some(scores), Some(all)) = (&mut scores, lists.scores()) {
-                    scores.push(all[start + at]);
-                }
+            let Some(kept) = kept_as[neighbor.index()] else { continue };
+            neighbors.push(kept);
+            if let (Some(scores), Some(all)) = (&mut scores, lists.scores_of(row as usize)) {
+                scores.push(all[at]);
             }
         }
         offsets.push(neighbors.len() as u64);

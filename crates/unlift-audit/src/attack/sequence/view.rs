@@ -26,17 +26,13 @@ const PER_SIDE: usize = 32;
 
 /// A query before it is protected.
 pub struct View {
-    /// The name of its image.
     pub name: String,
     /// The keypoints where a pinhole camera sees them.
     pub original: Original<2>,
-    /// Their descriptors.
     pub descriptors: Descriptors,
     /// The camera, with the pose that the service has.
     pub camera: Camera,
-    /// The camera's lens.
     pub lens: Lens,
-    /// Width and height of the photo in pixels.
     pub size: [usize; 2],
     /// The row of the model's point that each keypoint shows, if any.
     pub shows: Vec<Option<u32>>,
@@ -75,7 +71,6 @@ impl Model {
         Ok(Self { cameras, images, positions: points.positions, shown })
     }
 
-    /// Returns the number of points.
     pub fn n_points(&self) -> usize {
         self.positions.len()
     }
