@@ -172,8 +172,8 @@ pub fn candidates(
     records_by!(positions => {
         let points = AxisCandidates::try_new(&rows("positions", positions)?).map_err(raised)?;
         let (axis, _) = indices("swapped_axis", swapped_axis, &[1], n_axes)?;
-        if axis.len() != points.len() {
-            let expected = format!("{} numbers, one per record", points.len());
+        if axis.len() != points.position().len() {
+            let expected = format!("{} numbers, one per record", points.position().len());
             return Err(wrong("swapped_axis", expected, axis.len()));
         }
         let swapped_axis = Some(axis.iter().map(|&at| at as u8).collect());
