@@ -48,9 +48,13 @@ pub struct Error {
 
 #[derive(Debug)]
 enum Kind {
-    Content { place: Place, expected: String, found: String },
-    Read(io::Error),
-    Write(io::Error),
+    Content {
+        place: Place,
+        expected: String,
+        found: String,
+    },
+    /// What cannot be done, `read` or `write`, and why.
+    System(&'static str, io::Error),
     Core(unlift::Error),
 }
 
@@ -76,13 +80,30 @@ impl Error {
     }
 
     /// Creates an error for a `path` that cannot be read.
+    ///
+    /// Common causes are in our own words, because system messages differ between platforms.
     pub fn read(path: impl Into<PathBuf>, source: io::Error) -> Self {
-        Self { path: path.into(), kind: Kind::Read(source) }
+        let (expected, found) = match source.kind() {
+            io::ErrorKind::NotFound => ("a file or folder", "nothing"),
+            io::ErrorKind::IsADirectory => ("a file", "a folder"),
+            io::ErrorKind::NotADirectory => ("a folder", "a file"),
+            io::ErrorKind::PermissionDenied => ("a readable file", "no permission to read"),
+            _ => return Self { path: path.into(), kind: Kind::System("read", source) },
+        };
+        Self::new(path, Place::Whole, expected, found)
     }
 
     /// Creates an error for a `path` that cannot be written.
     pub fn write(path: impl Into<PathBuf>, source: io::Error) -> Self {
-        Self { path: path.into(), kind: Kind::Write(source) }
+        let (expected, found) = match source.kind() {
+            io::ErrorKind::PermissionDenied => ("a writable place", "no permission to write"),
+            io::ErrorKind::ReadOnlyFilesystem => ("a writable place", "a read-only file system"),
+            io::ErrorKind::StorageFull => ("space to write", "a full disk"),
+            io::ErrorKind::QuotaExceeded => ("space to write", "a used-up quota"),
+            io::ErrorKind::FileTooLarge => ("space to write", "a limit on the size of files"),
+            _ => return Self { path: path.into(), kind: Kind::System("write", source) },
+        };
+        Self::new(path, Place::Whole, expected, found)
     }
 
     /// Creates an error for values from `path` that the core library refused.
@@ -132,53 +153,14 @@ impl fmt::Display for Error {
                 let (expected, found) = (OneLine(expected), OneLine(found));
                 write!(f, ": expected {expected}, found {found}")
             }
-            Kind::Read(source) => match read_cause(source.kind()) {
-                Some(cause) => write!(f, ": {cause}"),
-                None => write!(f, ": cannot read: {}", OneLine(source)),
-            },
-            Kind::Write(source) => match write_cause(source.kind()) {
-                Some(cause) => write!(f, ": {cause}"),
-                None => write!(f, ": cannot write: {}", OneLine(source)),
-            },
+            Kind::System(step, source) => write!(f, ": cannot {step}: {}", OneLine(source)),
             Kind::Core(source) => write!(f, ": {}", OneLine(source)),
         }
     }
 }
 
-/// Common causes in our own words, because system messages differ between platforms.
-fn read_cause(kind: io::ErrorKind) -> Option<&'static str> {
-    Some(match kind {
-        io::ErrorKind::NotFound => "expected a file or folder, found nothing",
-        io::ErrorKind::IsADirectory => "expected a file, found a folder",
-        io::ErrorKind::NotADirectory => "expected a folder, found a file",
-        io::ErrorKind::PermissionDenied => "expected a readable file, found no permission to read",
-        _ => return None,
-    })
-}
-
-fn write_cause(kind: io::ErrorKind) -> Option<&'static str> {
-    Some(match kind {
-        io::ErrorKind::PermissionDenied => {
-            "expected a writable place, found no permission to write"
-        }
-        io::ErrorKind::ReadOnlyFilesystem => {
-            "expected a writable place, found a read-only file system"
-        }
-        io::ErrorKind::StorageFull => "expected space to write, found a full disk",
-        io::ErrorKind::QuotaExceeded => "expected space to write, found a used-up quota",
-        io::ErrorKind::FileTooLarge => {
-            "expected space to write, found a limit on the size of files"
-        }
-        _ => return None,
-    })
-}
-
-impl std::error::Error for Error {
-    // The text already contains the cause.
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        None
-    }
-}
+// Without a source: the text already contains the cause.
+impl std::error::Error for Error {}
 
 #[cfg(test)]
 mod tests {

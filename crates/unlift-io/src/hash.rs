@@ -3,7 +3,6 @@
 use crate::Error;
 use crate::features::ImageFeatures;
 use crate::input;
-use crate::read::Input;
 use sha2::{Digest, Sha256};
 use std::io::Read;
 use std::path::Path;
@@ -35,18 +34,11 @@ pub fn hash_file(path: &Path) -> Result<String, Error> {
 /// sha256sum cameras.bin images.bin points3D.bin | sha256sum
 /// ```
 pub fn hash_files<P: AsRef<Path>>(paths: &[P]) -> Result<String, Error> {
-    let mut lines = Vec::with_capacity(paths.len());
-    for path in paths {
-        let path = path.as_ref();
-        let name = path.file_name().unwrap_or_default();
-        lines.push((name.to_string_lossy().into_owned(), hash_file(path)?));
-    }
-    Ok(hash_list(lines))
-}
-
-/// Returns [`hash_files`] of the files of a map that was read.
-pub fn hash_input(input: &Input) -> Result<String, Error> {
-    hash_files(&input.files)
+    let named = paths.iter().map(|path| {
+        let name = path.as_ref().file_name().unwrap_or_default();
+        Ok((name.to_string_lossy().into_owned(), hash_file(path.as_ref())?))
+    });
+    Ok(hash_list(named.collect::<Result<_, Error>>()?))
 }
 
 /// Combines names and hashes like [`hash_files`], also for data that is not in files.
@@ -67,9 +59,7 @@ pub fn hash_features(features: &ImageFeatures) -> String {
     for side in features.size.unwrap_or([0; 2]) {
         hasher.update(side.to_le_bytes());
     }
-    for coordinate in features.keypoints.as_flattened() {
-        hasher.update(coordinate.to_le_bytes());
-    }
+    features.keypoints.as_flattened().iter().for_each(|x| hasher.update(x.to_le_bytes()));
     match features.descriptors.as_ref().map(Descriptors::values) {
         Some(Values::U8(bytes)) => hasher.update(bytes),
         Some(Values::F32(values)) => {
@@ -83,9 +73,7 @@ pub fn hash_features(features: &ImageFeatures) -> String {
 /// Returns the SHA-256 of positions as little-endian `f64`.
 pub fn hash_positions(positions: &[[f64; 3]]) -> String {
     let mut hasher = Sha256::new();
-    for coordinate in positions.as_flattened() {
-        hasher.update(coordinate.to_le_bytes());
-    }
+    positions.as_flattened().iter().for_each(|x| hasher.update(x.to_le_bytes()));
     hex(hasher)
 }
 

@@ -1,6 +1,7 @@
 //! Opens regular files only, and limits the memory for their content by their size.
 
 use std::fs::{self, File};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Place};
@@ -18,6 +19,14 @@ pub fn open(path: &Path) -> Result<(File, u64), Error> {
     let metadata = file.metadata().map_err(failed)?;
     regular(path, &metadata)?;
     Ok((file, metadata.len()))
+}
+
+/// Returns the first bytes of `path`, at most `n`, and the length of the file.
+pub(crate) fn head(path: &Path, n: u64) -> Result<(Vec<u8>, u64), Error> {
+    let (file, len) = open(path)?;
+    let mut head = Vec::new();
+    file.take(n).read_to_end(&mut head).map_err(|source| Error::read(path, source))?;
+    Ok((head, len))
 }
 
 fn regular(path: &Path, metadata: &fs::Metadata) -> Result<(), Error> {

@@ -20,7 +20,7 @@ use unlift::obfuscate::{Scheme, obfuscate};
 use unlift::released::Released;
 use unlift::seed::Key;
 use unlift::truth::{Original, Secret};
-use unlift_io::hash::hash_input;
+use unlift_io::hash::hash_files;
 use unlift_report::document::Input;
 
 use super::frames::doubt_of_frames;
@@ -96,7 +96,7 @@ impl Maps {
 
     /// Returns what a report says of the maps, whose first is at `path`.
     pub fn about(&self, path: &Path) -> Result<Input, Error> {
-        let second = ("second".to_owned(), hash_input(&self.second().input)?);
+        let second = ("second".to_owned(), hash_files(&self.second().input.files)?);
         Ok(Input { other_sha256: [second].into_iter().collect(), ..self.first.about(path)? })
     }
 }

@@ -13,7 +13,7 @@ use unlift::geometry::vector::{distance, median};
 use unlift::seed::{Draws, Stage};
 use unlift::truth::Original;
 use unlift::{Descriptors, Error, ErrorKind, PointSet, Unit};
-use unlift_io::hash::{hash_file, hash_input};
+use unlift_io::hash::{hash_file, hash_files};
 use unlift_io::read;
 use unlift_io::stage::read_point_neighborhoods;
 use unlift_report::document::Input;
@@ -120,7 +120,7 @@ impl Prepared {
         let others = descriptors.map(|file| Ok(("descriptors".to_owned(), hash_file(file)?)));
         Ok(Input {
             path: Some(path.display().to_string()),
-            sha256: Some(hash_input(&self.input)?),
+            sha256: Some(hash_files(&self.input.files)?),
             n_points: points.len() as u64,
             scale_m_per_unit: (points.unit() == Unit::Meter)
                 .then_some(1.0 / self.unit_in_map_units),

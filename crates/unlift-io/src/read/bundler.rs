@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::lines::{Lines, coordinate, number, quoted, words};
-use super::map_input::{Input, UPWARD, camera, undeclared};
+use super::map_input::{Input, center, undeclared};
 use crate::error::Error;
 
 fn numbers<const N: usize>(lines: &Lines, what: &str) -> Result<[f64; N], Error> {
@@ -19,45 +19,41 @@ fn numbers<const N: usize>(lines: &Lines, what: &str) -> Result<[f64; N], Error>
     Ok(values)
 }
 
-fn next(lines: &mut Lines, what: &str) -> Result<(), Error> {
-    if lines.advance_to_data()? { Ok(()) } else { Err(lines.end_error(what)) }
-}
-
 pub fn read(path: &Path) -> Result<Input, Error> {
     let mut lines = Lines::open(path)?;
-    next(&mut lines, "numbers of cameras and points")?;
+    lines.expect_data("numbers of cameras and points")?;
     let counts = words(lines.line()).map(number::<u64>).collect::<Option<Vec<_>>>();
     let Some([n_cameras, n_points]) = counts.as_deref() else {
         let found = quoted(lines.line());
         return Err(lines.error("numbers of cameras and points, as Bundler writes them", found));
     };
-    let mut found = Input { format: "Bundler", ..Input::default() };
+    let mut input = Input { format: "Bundler", ..Input::default() };
     for at in 0..*n_cameras {
         let what = format!("camera {at}");
-        next(&mut lines, &what)?;
+        lines.expect_data(&what)?;
         let [focal, ..] = numbers::<3>(&lines, &what)?;
         let mut rotation = [[0.0; 3]; 3];
         for row in &mut rotation {
-            next(&mut lines, &what)?;
+            lines.expect_data(&what)?;
             *row = numbers(&lines, &what)?;
         }
-        next(&mut lines, &what)?;
+        lines.expect_data(&what)?;
         let translation = numbers(&lines, &what)?;
-        // A focal length of zero marks photos that were not registered.
-        found.camera((focal != 0.0).then(|| camera(&rotation, &translation, UPWARD)));
+        // A focal length of zero marks photos that were not registered. The y axis points up.
+        input.camera((focal != 0.0).then(|| (center(&rotation, &translation), rotation[1])));
     }
     for at in 0..*n_points {
         let what = format!("point {at}");
-        next(&mut lines, &what)?;
-        found.positions.push(numbers(&lines, &what)?);
-        next(&mut lines, &format!("the color of {what}"))?;
-        next(&mut lines, &format!("the views of {what}"))?;
+        lines.expect_data(&what)?;
+        input.positions.push(numbers(&lines, &what)?);
+        lines.expect_data(&format!("the color of {what}"))?;
+        lines.expect_data(&format!("the views of {what}"))?;
     }
     let mut more = 0;
     while lines.advance_to_data()? {
         more += 1;
     }
     // A point has three lines.
-    found.doubts.extend(undeclared(*n_points, more / 3));
-    Ok(found)
+    input.doubts.extend(undeclared(*n_points, more / 3));
+    Ok(input)
 }

@@ -10,7 +10,7 @@ use serde::Deserialize;
 use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use unlift::geometry::camera::Pose;
 
-use super::map_input::{DOWNWARD, Input, camera};
+use super::map_input::{Input, center};
 use super::ply;
 use crate::error::{Error, Place};
 use crate::input;
@@ -26,8 +26,8 @@ pub fn read(path: &Path) -> Result<Input, Error> {
         file.consume(BYTE_ORDER_MARK.len());
     }
     let mut json = serde_json::Deserializer::from_reader(Strict::new(file));
-    let found = Top::deserialize(&mut json).and_then(|found| json.end().map(|()| found));
-    let top = found.map_err(|error| {
+    let object = Object::deserialize(&mut json).and_then(|object| json.end().map(|()| object));
+    let object = object.map_err(|error| {
         if error.is_io() {
             return Error::read(path, error.into());
         }
@@ -39,10 +39,6 @@ pub fn read(path: &Path) -> Result<Input, Error> {
         };
         Error::new(path, Place::Line(error.line() as u64), expected, what)
     })?;
-    let (object, n) = match top {
-        Top::One(object) => (object, 1),
-        Top::Several(object, n) => (object, n),
-    };
     let Some(format) = object.format() else {
         let names = object.names.iter().take(5).map(|name| name.escape_debug().to_string());
         let names: Vec<String> = names.collect();
@@ -52,19 +48,18 @@ pub fn read(path: &Path) -> Result<Input, Error> {
         };
         return Err(Error::new(path, "", MAPS, found));
     };
-    let Object { mut found, cloud, .. } = object;
-    found.format = format;
+    let Object { mut input, cloud, n, .. } = object;
+    input.format = format;
     if n > 1 {
-        let points = found.positions.len();
-        found.notes.push(format!("read, the largest of {n} reconstructions ({points} points)"));
-    }
-    if found.positions.is_empty() && format != "nerfstudio" {
-        return Err(Error::new(path, "", "points", "only cameras"));
+        let points = input.positions.len();
+        input.notes.push(format!("read, the largest of {n} reconstructions ({points} points)"));
     }
     if format == "nerfstudio" {
-        with_cloud(path, &mut found, cloud)?;
+        with_cloud(path, &mut input, cloud)?;
+    } else if input.positions.is_empty() {
+        return Err(Error::new(path, "", "points", "only cameras"));
     }
-    Ok(found)
+    Ok(input)
 }
 
 const MAPS: &str = "a map of OpenSfM or nerfstudio";
@@ -129,7 +124,7 @@ impl<R: BufRead> Read for Strict<R> {
 }
 
 /// Adds the points of the point cloud that nerfstudio's file names.
-fn with_cloud(path: &Path, found: &mut Input, cloud: Option<PathBuf>) -> Result<(), Error> {
+fn with_cloud(path: &Path, input: &mut Input, cloud: Option<PathBuf>) -> Result<(), Error> {
     let Some(cloud) = cloud else {
         let expected = "ply_file_path, a point cloud beside the cameras";
         return Err(Error::new(path, "", expected, "none"));
@@ -148,34 +143,20 @@ fn with_cloud(path: &Path, found: &mut Input, cloud: Option<PathBuf>) -> Result<
     }
     let cloud = path.with_file_name("").join(cloud);
     let points = ply::read(&cloud)?;
-    found.positions = points.positions;
-    found.notes.extend(points.notes);
-    found.files.push(cloud);
+    input.positions = points.positions;
+    input.notes.extend(points.notes);
+    input.files.push(cloud);
     Ok(())
 }
 
-/// An object, or OpenSfM's list of objects, of which the one with the most points is kept.
-enum Top {
-    One(Object),
-    Several(Object, usize),
-}
-
+/// An object, or the one with the most points of OpenSfM's list of objects.
 #[derive(Default)]
 struct Object {
     names: Vec<String>,
-    found: Input,
+    input: Input,
     cloud: Option<PathBuf>,
-}
-
-impl Object {
-    fn format(&self) -> Option<&'static str> {
-        let has = |name: &str| self.names.iter().any(|its| its == name);
-        Some(match () {
-            () if has("frames") => "nerfstudio",
-            () if has("shots") && has("points") => "OpenSfM",
-            () => return None,
-        })
-    }
+    /// The number of objects in the list.
+    n: usize,
 }
 
 /// Numbers, of which missing ones are NaN.
@@ -202,22 +183,31 @@ struct Frame {
 }
 
 impl Object {
+    fn format(&self) -> Option<&'static str> {
+        let has = |name: &str| self.names.iter().any(|its| its == name);
+        if has("frames") {
+            return Some("nerfstudio");
+        }
+        (has("shots") && has("points")).then_some("OpenSfM")
+    }
+
     /// Reads the value of the last key in `names`.
     fn take<'de, A: MapAccess<'de>>(&mut self, json: &mut A) -> Result<(), A::Error> {
-        let Self { names, found, cloud } = self;
+        let Self { names, input, cloud, .. } = self;
         match names.last().map_or("", String::as_str) {
             "shots" => json.next_value_seed(Items::new(|Shot { rotation, translation }| {
                 let [x, y, z] = numbers(rotation);
                 let rotation = Pose::IDENTITY.moved(&[x, y, z, 0.0, 0.0, 0.0]).rotation;
-                found.camera(Some(camera(&rotation, &numbers(translation), DOWNWARD)));
+                let up = rotation[1].map(|x| -x);
+                input.camera(Some((center(&rotation, &numbers(translation)), up)));
             })),
             "points" => json.next_value_seed(Items::new(|Point { coordinates }| {
-                found.positions.push(numbers(coordinates));
+                input.positions.push(numbers(coordinates));
             })),
             "frames" => json.next_value_seed(Items::new(|frame: Frame| {
                 let mut rows = frame.transform_matrix.into_iter().map(numbers);
                 let rows: [_; 3] = std::array::from_fn(|_| rows.next().unwrap_or([f64::NAN; 4]));
-                found.camera(Some((rows.map(|row| row[3]), rows.map(|row| row[1]))));
+                input.camera(Some((rows.map(|row| row[3]), rows.map(|row| row[1]))));
             })),
             "ply_file_path" => json.next_value().map(|path| *cloud = path),
             _ => json.next_value::<IgnoredAny>().map(drop),
@@ -227,45 +217,37 @@ impl Object {
 
 impl<'de> Deserialize<'de> for Object {
     fn deserialize<D: Deserializer<'de>>(json: D) -> Result<Self, D::Error> {
-        json.deserialize_any(OfAny).map(|top| match top {
-            Top::One(object) | Top::Several(object, _) => object,
-        })
+        json.deserialize_any(Largest)
     }
 }
 
-impl<'de> Deserialize<'de> for Top {
-    fn deserialize<D: Deserializer<'de>>(json: D) -> Result<Self, D::Error> {
-        json.deserialize_any(OfAny)
-    }
-}
+struct Largest;
 
-struct OfAny;
-
-impl<'de> Visitor<'de> for OfAny {
-    type Value = Top;
+impl<'de> Visitor<'de> for Largest {
+    type Value = Object;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("an object, or a list of them")
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut json: A) -> Result<Top, A::Error> {
+    fn visit_map<A: MapAccess<'de>>(self, mut json: A) -> Result<Object, A::Error> {
         let mut object = Object::default();
         while let Some(name) = json.next_key()? {
             object.names.push(name);
             object.take(&mut json)?;
         }
-        Ok(Top::One(object))
+        Ok(object)
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Top, A::Error> {
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Object, A::Error> {
         let (mut largest, mut n) = (Object::default(), 0);
         while let Some(object) = list.next_element::<Object>()? {
             n += 1;
-            if n == 1 || object.found.positions.len() > largest.found.positions.len() {
+            if n == 1 || object.input.positions.len() > largest.input.positions.len() {
                 largest = object;
             }
         }
-        Ok(Top::Several(largest, n))
+        Ok(Object { n, ..largest })
     }
 }
 

@@ -98,6 +98,11 @@ impl Lines {
         Ok(false)
     }
 
+    /// Reads up to the next line that is neither blank nor a comment, which has `what`.
+    pub fn expect_data(&mut self, what: &str) -> Result<(), Error> {
+        if self.advance_to_data()? { Ok(()) } else { Err(self.end_error(what)) }
+    }
+
     pub fn line(&self) -> &[u8] {
         self.line.trim_ascii()
     }

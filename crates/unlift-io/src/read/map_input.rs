@@ -47,7 +47,8 @@ impl Input {
         self.positions.len() + self.left_out.len()
     }
 
-    /// Adds a camera: its center and up direction, or `None` without a pose.
+    /// Adds a camera: its center and the direction that points up in its photo, or `None` without
+    /// a pose.
     pub(crate) fn camera(&mut self, pose: Option<([f64; 3], [f64; 3])>) {
         let is_finite = |x: &[f64; 3]| x.iter().all(|x| x.is_finite());
         match pose.filter(|(center, up)| is_finite(center) && is_finite(up)) {
@@ -70,9 +71,10 @@ impl Input {
         self.left_out = (0..n).filter(is_left).map(|row| row as u64).collect();
         let mut notes = Vec::new();
         if !self.left_out.is_empty() {
-            let is_kept = |row: &u64| self.left_out.binary_search(row).is_err();
             let mut row = 0..;
-            self.ids.retain(|_| row.next().is_some_and(|row| is_kept(&row)));
+            self.ids.retain(|_| {
+                row.next().is_some_and(|row| self.left_out.binary_search(&row).is_err())
+            });
             self.positions.retain(|position| position.iter().all(|x| x.is_finite()));
             let note = format!("{} of {n} points have no place", self.left_out.len());
             if self.left_out.len() as f64 > MOST_LEFT_OUT * n as f64 {
@@ -103,7 +105,7 @@ impl Input {
 }
 
 /// Returns the most frequent position and its number of points.
-pub(crate) fn most_at_one_place(positions: &[[f64; 3]]) -> Option<(usize, [f64; 3])> {
+fn most_at_one_place(positions: &[[f64; 3]]) -> Option<(usize, [f64; 3])> {
     // Zeros of either sign are equal.
     let bits = |position: &[f64; 3]| position.map(|x| (x + 0.0).to_bits());
     let mix = |[x, y, z]: [u64; 3]| {
@@ -127,38 +129,23 @@ pub(crate) fn undeclared(n: u64, more: u64) -> Option<String> {
     })
 }
 
-/// Returns the center `-R^T t` of a camera with the pose `x_cam = R x + t`, and the direction
-/// `up_cam` of its frame in the world.
-pub fn camera(
-    rotation: &[[f64; 3]; 3],
-    translation: &[f64; 3],
-    up_cam: [f64; 3],
-) -> ([f64; 3], [f64; 3]) {
-    let transposed = |v: &[f64; 3]| -> [f64; 3] {
-        std::array::from_fn(|c| (0..3).map(|row| rotation[row][c] * v[row]).sum())
-    };
-    (transposed(translation).map(|x| -x), transposed(&up_cam))
+/// Returns the center `-R^T t` of a camera with the pose `x_cam = R x + t`.
+pub fn center(rotation: &[[f64; 3]; 3], translation: &[f64; 3]) -> [f64; 3] {
+    let along = |c: usize| (0..3).map(|row| rotation[row][c] * translation[row]).sum::<f64>();
+    std::array::from_fn(|c| -along(c))
 }
 
-/// Returns the rotation of a quaternion (w, x, y, z) times its squared norm, and the squared norm.
-pub fn scaled_rotation([w, x, y, z]: [f64; 4]) -> ([[f64; 3]; 3], f64) {
-    let rows = [
+/// Returns the pose `x_cam = R x + t`, given as a quaternion (w, x, y, z) and `t`. Not finite for a
+/// zero quaternion.
+pub(super) fn pose_of([w, x, y, z]: [f64; 4], t: [f64; 3]) -> Pose {
+    // The rotation times the squared norm, by which it is divided because files contain norms such
+    // as 0.9999999.
+    let r = [
         [w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
         [2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)],
         [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z],
     ];
-    (rows, w * w + x * x + y * y + z * z)
-}
-
-/// Up in the frame of a camera whose y axis points down.
-pub const DOWNWARD: [f64; 3] = [0.0, -1.0, 0.0];
-/// Up in the frame of a camera whose y axis points up.
-pub const UPWARD: [f64; 3] = [0.0, 1.0, 0.0];
-
-/// Returns the pose `x_cam = R x + t`, given as a quaternion (w, x, y, z) and `t`. Not finite for a zero quaternion.
-pub(super) fn pose_of(quaternion: [f64; 4], t: [f64; 3]) -> Pose {
-    // Divides by the squared norm, because files contain norms such as 0.9999999.
-    let (r, norm2) = scaled_rotation(quaternion);
+    let norm2 = w * w + x * x + y * y + z * z;
     let center =
         std::array::from_fn(|j| -(r[0][j] * t[0] + r[1][j] * t[1] + r[2][j] * t[2]) / norm2);
     Pose { rotation: r.map(|row| row.map(|x| x / norm2)), center }

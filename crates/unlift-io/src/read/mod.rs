@@ -14,7 +14,6 @@ mod nvm;
 mod ply;
 mod table;
 
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 pub use descriptors::{Alike, descriptors};
@@ -39,11 +38,10 @@ pub fn open(path: &Path) -> Result<Input, Error> {
     let input = input.settle();
     if input.positions.is_empty() {
         let file = input.files.last().map_or(path, PathBuf::as_path);
-        let found = match input.left_out.len() {
-            0 => "none".to_owned(),
-            n => format!("{n} without one"),
+        let (expected, found) = match input.left_out.len() {
+            0 => ("at least one point", "none".to_owned()),
+            n => ("a point with a place", format!("{n} without one")),
         };
-        let expected = if found == "none" { "at least one point" } else { "a point with a place" };
         return Err(Error::new(file, "", expected, found));
     }
     Ok(input)
@@ -57,39 +55,39 @@ pub fn is_project(path: &Path) -> bool {
 const EXPECTED: &str = "a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, \
                         .txt, .asc, .pts, .npy, .npz or .splat file";
 
-/// Files that are not read, by extension or file name, and how to convert them.
-const CONVERSIONS: [(&str, &str); 24] = [
-    ("las", "convert it: CloudCompare -O in.las -SAVE_CLOUDS, or pdal translate in.las out.ply"),
-    ("laz", "convert it: CloudCompare -O in.laz -SAVE_CLOUDS, or pdal translate in.laz out.ply"),
-    ("e57", "convert it: CloudCompare -O in.e57 -SAVE_CLOUDS, or pdal translate in.e57 out.ply"),
-    ("pcd", "convert it: CloudCompare -O in.pcd -SAVE_CLOUDS, or Open3D"),
-    ("ptx", "a grid of a scanner; convert it: CloudCompare -O in.ptx -SAVE_CLOUDS"),
-    (
-        "glb",
-        "a mesh or cloud as DUSt3R and MASt3R write it; convert it: trimesh or Blender, to .ply",
-    ),
-    ("gltf", "convert it: trimesh or Blender, to .ply"),
-    ("obj", "a mesh; convert it: CloudCompare -O in.obj -SAVE_CLOUDS"),
-    ("gz", "unpack it: gunzip"),
-    ("zip", "unpack it"),
-    ("xyzrgb", "name it .xyz"),
-    ("jpg", PHOTO),
-    ("jpeg", PHOTO),
-    ("png", PHOTO),
-    ("webp", PHOTO),
-    ("predictions.npz", "predictions of VGGT: give its COLMAP folder, which demo_colmap.py writes"),
-    ("sfm_data.json", "export the map of OpenMVG to COLMAP: openMVG_main_openMVG2Colmap"),
-    ("sfm", "export the map of Meshroom to COLMAP: aliceVision_exportColmap"),
-    ("abc", "export the map of Meshroom to COLMAP: aliceVision_exportColmap"),
-    ("spz", "export it as .ply"),
-    ("ksplat", "export it as .ply"),
-    ("sog", "export it as .ply"),
-    ("h5", FEATURES),
-    ("hdf5", FEATURES),
-];
-const PHOTO: &str = "a photo: give its folder to unlift audit images";
-const FEATURES: &str =
-    "features of images: use unlift audit images, or --descriptors with a COLMAP model";
+/// Returns how to convert a file that is not read, by its name or extension in lower case.
+fn conversion(name: &str, extension: &str) -> Option<String> {
+    let cloud_compare = format!("convert it: CloudCompare -O in.{extension} -SAVE_CLOUDS");
+    let how = match extension {
+        _ if name == "predictions.npz" => {
+            "predictions of VGGT: give its COLMAP folder, which demo_colmap.py writes"
+        }
+        _ if name == "sfm_data.json" => {
+            "export the map of OpenMVG to COLMAP: openMVG_main_openMVG2Colmap"
+        }
+        "las" | "laz" | "e57" => {
+            return Some(format!("{cloud_compare}, or pdal translate in.{extension} out.ply"));
+        }
+        "pcd" => return Some(format!("{cloud_compare}, or Open3D")),
+        "ptx" => return Some(format!("a grid of a scanner; {cloud_compare}")),
+        "obj" => return Some(format!("a mesh; {cloud_compare}")),
+        "glb" => {
+            "a mesh or cloud as DUSt3R and MASt3R write it; convert it: trimesh or Blender, to .ply"
+        }
+        "gltf" => "convert it: trimesh or Blender, to .ply",
+        "gz" => "unpack it: gunzip",
+        "zip" => "unpack it",
+        "xyzrgb" => "name it .xyz",
+        "jpg" | "jpeg" | "png" | "webp" => "a photo: give its folder to unlift audit images",
+        "sfm" | "abc" => "export the map of Meshroom to COLMAP: aliceVision_exportColmap",
+        "spz" | "ksplat" | "sog" => "export it as .ply",
+        "h5" | "hdf5" => {
+            "features of images: use unlift audit images, or --descriptors with a COLMAP model"
+        }
+        _ => return None,
+    };
+    Some(how.to_owned())
+}
 
 /// Returns the error for a file of a format that is not read.
 fn not_read(path: &Path) -> Error {
@@ -99,8 +97,9 @@ fn not_read(path: &Path) -> Error {
         "" => "a file without extension".to_owned(),
         extension => format!("a .{extension} file"),
     };
-    let conversion = CONVERSIONS.iter().find(|(known, _)| *known == extension || *known == name);
-    let found = conversion.map_or(found.clone(), |(_, how)| format!("{found} ({how})"));
+    let kind = if extension.is_empty() { &name } else { &extension };
+    let conversion = conversion(&name, kind);
+    let found = conversion.map_or(found.clone(), |how| format!("{found} ({how})"));
     Error::new(path, "", EXPECTED, found)
 }
 
@@ -124,41 +123,27 @@ fn other_in_folder(path: &Path) -> Option<PathBuf> {
     OTHERS_IN_FOLDERS.map(|name| path.join(name)).into_iter().find(|file| file.is_file())
 }
 
-fn table_of(path: &Path) -> Result<Input, Error> {
-    match table::read(path)? {
-        Some(input) => Ok(input),
-        None => colmap_points(path),
-    }
-}
-
-fn check_fetched(path: &Path) -> Result<(), Error> {
+fn file(path: &Path) -> Result<Input, Error> {
     const POINTER: &[u8] = b"version https://git-lfs";
-    let mut head = Vec::new();
-    let (file, _) = input::open(path)?;
-    file.take(POINTER.len() as u64)
-        .read_to_end(&mut head)
-        .map_err(|error| Error::read(path, error))?;
-    if head == POINTER {
+    if input::head(path, POINTER.len() as u64)?.0 == POINTER {
         let found = "a pointer of Git LFS (run git lfs pull)";
         return Err(Error::new(path, "", "a map", found));
     }
-    Ok(())
-}
-
-fn file(path: &Path) -> Result<Input, Error> {
-    check_fetched(path)?;
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let mut input = match (&*stem, &*extension.to_ascii_lowercase()) {
-        ("points3D", "txt") if table::has_three_columns(path)? => table_of(path)?,
-        ("points3D", "bin" | "txt") => colmap_points(path)?,
+        ("points3D", "bin") => colmap_points(path)?,
+        ("points3D", "txt") if !table::has_three_columns(path)? => colmap_points(path)?,
         ("cameras" | "images" | "rigs" | "frames", "bin" | "txt") => {
             let found = "another file of a COLMAP model (give its folder)";
             return Err(Error::new(path, "", "a file with points", found));
         }
         (_, "ply") => ply::read(path)?,
         (_, "splat") => ply::splats(path)?,
-        (_, "csv" | "xyz" | "txt" | "asc" | "pts") => table_of(path)?,
+        (_, "csv" | "xyz" | "txt" | "asc" | "pts") => match table::read(path)? {
+            Some(input) => input,
+            None => colmap_points(path)?,
+        },
         (_, "npy") => npy::positions(path)?,
         ("predictions", "npz") => return Err(not_read(path)),
         (_, "npz") => npz::positions(path)?,
@@ -203,16 +188,10 @@ fn folder(path: &Path) -> Result<Input, Error> {
 fn colmap_model(model: &Model) -> Result<Input, Error> {
     let mut input = Input { model: Some(model.folder.clone()), ..Input::default() };
     let extension = model.extension;
-    let mut present = |name: &str| {
-        let path = model.folder.join(format!("{name}.{extension}"));
-        let there = path.is_file();
-        if there {
-            input.files.push(path.clone());
-        }
-        there.then_some(path)
-    };
-    let cameras = present("cameras");
-    let images = present("images");
+    let file = |name: &str| model.folder.join(format!("{name}.{extension}"));
+    let [cameras, images] =
+        ["cameras", "images"].map(|name| Some(file(name)).filter(|path| path.is_file()));
+    input.files.extend([&cameras, &images].into_iter().flatten().cloned());
     input.files.push(model.points.clone());
 
     // An audit of points needs nothing from the cameras, so their errors are notes.

@@ -1,7 +1,6 @@
 //! Finds the COLMAP model of a folder.
 
 use std::fs;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::lines::Lines;
@@ -29,6 +28,8 @@ const DATABASES: [&str; 2] = ["database.db", "colmap/database.db"];
 const DATABASES_ABOVE: [&str; 2] = ["../database.db", "../../database.db"];
 
 pub(super) struct Model {
+    /// Relative to the folder that was given, with slashes. Empty for that folder.
+    name: String,
     pub folder: PathBuf,
     /// `bin` or `txt`.
     pub extension: &'static str,
@@ -41,39 +42,66 @@ impl Model {
     /// Finds the model in `path`: the one in the folder itself, else the one with the most points.
     /// Ties go to the first in the order of [`PLACES`] and of numbers.
     pub fn find(path: &Path) -> Result<Option<Self>, Error> {
-        let found = candidates(path);
-        let Some(first) = found.first() else { return Ok(None) };
-        if found.len() == 1 {
-            return Ok(Some(first.model(Vec::new())));
+        let mut models = models(path);
+        if models.len() < 2 {
+            return Ok(models.pop());
         }
-        let counts = found.iter().map(Candidate::n_points).collect::<Result<Vec<_>, _>>()?;
-        let mut chosen = 0;
-        if !first.name.is_empty() {
-            for (at, &n) in counts.iter().enumerate() {
-                if n > counts[chosen] {
-                    chosen = at;
-                }
-            }
-        }
-        let name = |at: usize| match found[at].name.as_str() {
-            "" => "the model of the folder itself",
-            name => name,
+        let counts = models.iter().map(Self::n_points).collect::<Result<Vec<_>, _>>()?;
+        let title = |model: &Self| match &*model.name {
+            "" => "the model of the folder itself".to_owned(),
+            name => name.to_owned(),
         };
-        let why = if found[chosen].name.is_empty() { "first" } else { "largest" };
+        // Of equal ones, `max_by_key` returns the last.
+        let largest = (0..models.len()).rev().max_by_key(|&at| counts[at]).unwrap_or_default();
+        let (chosen, why) =
+            if models[0].name.is_empty() { (0, "first") } else { (largest, "largest") };
         let mut notes = vec![format!(
             "{}: read, the {why} of {} models ({} points)",
-            name(chosen),
-            found.len(),
+            title(&models[chosen]),
+            models.len(),
             counts[chosen]
         )];
-        for at in (0..found.len()).filter(|&at| at != chosen) {
-            let n = counts[at];
-            notes.push(format!(
-                "{}: another model ({n} points), give its path to read it",
-                name(at)
-            ));
+        for at in (0..models.len()).filter(|&at| at != chosen) {
+            let (title, n) = (title(&models[at]), counts[at]);
+            notes.push(format!("{title}: another model ({n} points), give its path to read it"));
         }
-        Ok(Some(found[chosen].model(notes)))
+        let mut model = models.swap_remove(chosen);
+        model.notes.append(&mut notes);
+        Ok(Some(model))
+    }
+
+    fn in_folder(name: String, folder: PathBuf) -> Option<Self> {
+        let file = |stem: &str, extension: &str| folder.join(format!("{stem}.{extension}"));
+        let has_points = |extension: &&str| file("points3D", extension).is_file();
+        let form = ["bin", "txt", "ply"].into_iter().find(has_points)?;
+        let points = file("points3D", form);
+        // Beside a PLY, cameras may be in either form.
+        let is_text = form == "txt" || (form == "ply" && !file("images", "bin").is_file());
+        let extension = if is_text { "txt" } else { "bin" };
+        let mut notes = Vec::new();
+        if form == "bin" && has_points(&"txt") {
+            notes.push("points3D.txt: not read, because points3D.bin exists".to_owned());
+        }
+        Some(Self { name, folder, extension, points, notes })
+    }
+
+    /// Returns the number of points that the file declares.
+    fn n_points(&self) -> Result<u64, Error> {
+        let path = &self.points;
+        let has_extension = |name: &str| path.extension().is_some_and(|its| its == name);
+        if has_extension("ply") {
+            return Ok(ply::read(path)?.positions.len() as u64);
+        }
+        if has_extension("bin") {
+            // A truncated file counts as empty. If it is chosen, its reader returns the error.
+            let (count, _) = input::head(path, 8)?;
+            return Ok(count.try_into().map_or(0, u64::from_le_bytes));
+        }
+        let (mut lines, mut n) = (Lines::open(path)?, 0);
+        while lines.advance_to_data()? {
+            n += 1;
+        }
+        Ok(n)
     }
 }
 
@@ -102,83 +130,31 @@ fn is_features(path: &Path) -> bool {
 pub(super) const EXPECTED: &str = "points3D.bin or points3D.txt in it, or in sparse, model, models, colmap/sparse \
                                    or a numbered folder of these";
 
-struct Candidate {
-    /// Relative to the folder that was given, with slashes. Empty for that folder.
-    name: String,
-    folder: PathBuf,
-    extension: &'static str,
-    points: PathBuf,
-}
-
-impl Candidate {
-    fn in_folder(name: String, folder: PathBuf) -> Option<Self> {
-        let file = |stem: &str, extension: &str| folder.join(format!("{stem}.{extension}"));
-        let there = |extension: &&str| file("points3D", extension).is_file();
-        let form = ["bin", "txt", "ply"].into_iter().find(there)?;
-        let points = file("points3D", form);
-        // Beside a PLY, cameras may be in either form.
-        let is_text = form == "txt" || (form == "ply" && !file("images", "bin").is_file());
-        Some(Self { name, folder, extension: if is_text { "txt" } else { "bin" }, points })
-    }
-
-    fn model(&self, mut notes: Vec<String>) -> Model {
-        if self.extension == "bin" && self.folder.join("points3D.txt").is_file() {
-            notes.insert(0, "points3D.txt: not read, because points3D.bin exists".to_owned());
-        }
-        let Self { folder, extension, points, .. } = self;
-        Model { folder: folder.clone(), extension, points: points.clone(), notes }
-    }
-
-    /// Returns the number of points that the file declares.
-    fn n_points(&self) -> Result<u64, Error> {
-        let path = &self.points;
-        let ends = |with: &str| path.extension().is_some_and(|extension| extension == with);
-        if ends("ply") {
-            return Ok(ply::read(path)?.positions.len() as u64);
-        }
-        if ends("bin") {
-            let mut count = Vec::new();
-            let read = input::open(path)?.0.take(8).read_to_end(&mut count);
-            read.map_err(|error| Error::read(path, error))?;
-            // A truncated file counts as empty. If it is chosen, its reader returns the error.
-            return Ok(count.try_into().map_or(0, u64::from_le_bytes));
-        }
-        let (mut lines, mut n) = (Lines::open(path)?, 0);
-        while lines.advance_to_data()? {
-            n += 1;
-        }
-        Ok(n)
-    }
-}
-
 /// Lists all models in `path` without repetition, in the order of search.
-fn candidates(path: &Path) -> Vec<Candidate> {
-    let mut found: Vec<Candidate> = Vec::new();
-    let mut seen = Vec::new();
-    let mut look = |place: &str, inside: &str| {
+fn models(path: &Path) -> Vec<Model> {
+    let mut models: Vec<Model> = Vec::new();
+    let mut known = Vec::new();
+    let places = PLACES.map(|place| (place, "")).into_iter().chain([(UNDISTORTED, "/sparse")]);
+    for (place, inside) in places {
+        if place == UNDISTORTED && !models.is_empty() {
+            break;
+        }
         let within = |number| if place.is_empty() { number } else { format!("{place}/{number}") };
         let numbers =
             numbered(&path.join(place)).into_iter().map(|number| within(number.to_string()));
         for name in std::iter::once(place.to_owned()).chain(numbers) {
             let name = name + inside;
             let folder = if name.is_empty() { path.to_owned() } else { path.join(&name) };
-            let Some(candidate) = Candidate::in_folder(name, folder) else { continue };
+            let Some(model) = Model::in_folder(name, folder) else { continue };
             // Links can make one model appear twice.
-            let real = fs::canonicalize(&candidate.folder);
-            let real = real.unwrap_or_else(|_| candidate.folder.clone());
-            if !seen.contains(&real) {
-                seen.push(real);
-                found.push(candidate);
+            let real = fs::canonicalize(&model.folder).unwrap_or_else(|_| model.folder.clone());
+            if !known.contains(&real) {
+                known.push(real);
+                models.push(model);
             }
         }
-        found.is_empty()
-    };
-    let mut none = true;
-    PLACES.iter().for_each(|place| none = look(place, ""));
-    if none {
-        look(UNDISTORTED, "/sparse");
     }
-    found
+    models
 }
 
 fn numbered(parent: &Path) -> Vec<u32> {

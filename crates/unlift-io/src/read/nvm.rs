@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::lines::{Lines, coordinates, number, quoted, words};
-use super::map_input::{DOWNWARD, Input, camera, scaled_rotation, undeclared};
+use super::map_input::{Input, pose_of, undeclared};
 use crate::error::Error;
 
 fn count(lines: &Lines, what: &str) -> Result<u64, Error> {
@@ -16,11 +16,10 @@ fn pose(lines: &Lines, what: &str) -> Result<([f64; 3], [f64; 3]), Error> {
     let start = all.len().checked_sub(10).filter(|&start| start > 0);
     let start = start.ok_or_else(|| lines.error(what, format!("{} words", all.len())))?;
     let values = coordinates::<10>(lines, &mut all[start..].iter().copied(), what)?;
+    // NVM stores the center itself.
     let [_focal, w, x, y, z, a, b, c, ..] = values;
-    // NVM stores the rotation and the center itself.
-    let (rotation, norm2) = scaled_rotation([w, x, y, z]);
-    let rotation = rotation.map(|row| row.map(|value| value / norm2));
-    Ok(([a, b, c], camera(&rotation, &[0.0; 3], DOWNWARD).1))
+    let down = pose_of([w, x, y, z], [0.0; 3]).rotation[1];
+    Ok(([a, b, c], down.map(|value| -value)))
 }
 
 /// Reads points and cameras of the largest model.
@@ -82,9 +81,7 @@ fn model(lines: &mut Lines, n_cameras: u64) -> Result<Input, Error> {
         }
         found.camera(Some(pose(lines, &what)?));
     }
-    if !lines.advance_to_data()? {
-        return Err(lines.end_error("a number of points"));
-    }
+    lines.expect_data("a number of points")?;
     for at in 0..count(lines, "a number of points")? {
         let what = format!("3 coordinates of point {at}");
         if !lines.advance()? {
