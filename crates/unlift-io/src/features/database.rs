@@ -21,29 +21,11 @@ use crate::error::Error;
 use crate::input::{self, Budget};
 use crate::read::lines::quoted;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    Bytes,
-    /// Little-endian `f32`. The table states the row length in bytes.
-    Floats,
-}
-
-/// A matrix of one image: `n` rows of `row_bytes` bytes each.
+/// A matrix of one image: `n` rows of `dim` values each.
 struct Rows {
-    kind: Kind,
     n: usize,
-    row_bytes: usize,
-    data: Vec<u8>,
-}
-
-impl Rows {
-    /// Returns the values row by row, and their number per row.
-    fn into_values(self) -> (Values, usize) {
-        match self.kind {
-            Kind::Bytes => (Values::U8(self.data), self.row_bytes),
-            Kind::Floats => (Values::F32(floats(&self.data)), self.row_bytes / 4),
-        }
-    }
+    dim: usize,
+    values: Values,
 }
 
 const TABLES: [&str; 4] = ["images", "cameras", "keypoints", "descriptors"];
@@ -61,7 +43,7 @@ pub(crate) struct Database {
     connection: Mutex<Connection>,
     /// Sorted by name, which may not be UTF-8.
     image_ids: Vec<(Vec<u8>, i64)>,
-    names: Vec<String>,
+    pub names: Vec<String>,
     /// True if a column `type` states the extractor (COLMAP 4 and later).
     has_type: bool,
     steps: Arc<AtomicU64>,
@@ -89,10 +71,6 @@ impl Database {
         Ok(Self { path, connection, image_ids, names, has_type, steps })
     }
 
-    pub fn names(&self) -> &[String] {
-        &self.names
-    }
-
     fn error(&self, name: &[u8], expected: impl Into<String>, found: impl Into<String>) -> Error {
         Error::new(&self.path, format!("image {}", quoted(name)), expected, found)
     }
@@ -104,8 +82,8 @@ impl Database {
     }
 
     pub fn descriptors(&self, name: &[u8]) -> Result<(Values, usize), Error> {
-        let found = self.matrix(name, "descriptors")?.map(Rows::into_values);
-        found.ok_or_else(|| self.error(name, "descriptors", "none"))
+        let rows = self.matrix(name, "descriptors")?.map(|rows| (rows.values, rows.dim));
+        rows.ok_or_else(|| self.error(name, "descriptors", "none"))
     }
 
     /// Returns the descriptors or the keypoints (floats) of an image, or `None` if `table` has no
@@ -122,25 +100,28 @@ impl Database {
         })?;
         let Some((n, cols, kind, data)) = found else { return Ok(None) };
         // -1 is a database without types, 0 is SIFT, others are learned descriptors.
-        let kind = if kind <= 0 && !of_keypoints { Kind::Bytes } else { Kind::Floats };
+        let are_bytes = kind <= 0 && !of_keypoints;
         // `cols` counts values of keypoints, but bytes of descriptors.
         let bytes_each = if of_keypoints { 4 } else { 1 };
         let row_bytes = usize::try_from(cols).ok().and_then(|cols| cols.checked_mul(bytes_each));
-        let (Some(n), Some(row_bytes)) = (usize::try_from(n).ok(), row_bytes) else {
+        let (Some(n), Some(mut row_bytes)) = (usize::try_from(n).ok(), row_bytes) else {
             return Err(self.error(name, format!("sizes of {table}"), format!("{n} x {cols}")));
         };
         if n == 0 && data.is_empty() {
             // Some exporters state no columns for an image without features.
-            return Ok(Some(Rows { kind, n, row_bytes: row_bytes.max(8), data }));
-        }
-        if n.checked_mul(row_bytes) != Some(data.len())
+            row_bytes = row_bytes.max(8);
+        } else if n.checked_mul(row_bytes) != Some(data.len())
             || row_bytes == 0
-            || (kind == Kind::Floats && !row_bytes.is_multiple_of(4))
+            || !(are_bytes || row_bytes.is_multiple_of(4))
         {
             let expected = format!("{n} {table} of {row_bytes} bytes");
             return Err(self.error(name, expected, format!("{} bytes", data.len())));
         }
-        Ok(Some(Rows { kind, n, row_bytes, data }))
+        if are_bytes {
+            return Ok(Some(Rows { n, dim: row_bytes, values: Values::U8(data) }));
+        }
+        let floats = data.as_chunks().0.iter().map(|&bytes| f32::from_le_bytes(bytes)).collect();
+        Ok(Some(Rows { n, dim: row_bytes / 4, values: Values::F32(floats) }))
     }
 
     fn row<T>(
@@ -168,6 +149,43 @@ impl Database {
         })?;
         let side = |value: i64| u32::try_from(value).ok().filter(|&side| side > 0);
         Ok(found.and_then(|(width, height)| Some([side(width.ok()?)?, side(height.ok()?)?])))
+    }
+
+    /// Reads the features of image `at` of `names`.
+    pub fn get(&self, at: usize) -> Result<ImageFeatures, Error> {
+        let name = &self.image_ids[at].0[..];
+        let size = self.size(name)?;
+        let rows = self.matrix(name, "keypoints")?;
+        let Some(Rows { n, dim: columns, values: Values::F32(values) }) = rows else {
+            return Err(self.error(name, "keypoints", "none"));
+        };
+        let descriptors = self.matrix(name, "descriptors")?;
+        if ![2, 4, 6].contains(&columns) {
+            let found = format!("{columns} columns");
+            return Err(self.error(name, "keypoints of 2, 4 or 6 columns", found));
+        }
+        if let Some(bad) = values.iter().position(|value| !value.is_finite()) {
+            let expected = format!("a finite number in keypoint {}", bad / columns);
+            return Err(self.error(name, expected, values[bad].to_string()));
+        }
+        let mut image = ImageFeatures { name: self.names[at].clone(), size, ..Default::default() };
+        // COLMAP places the center of the first pixel at (0.5, 0.5).
+        let place = |row: &[f32]| [f64::from(row[0]) - 0.5, f64::from(row[1]) - 0.5];
+        image.keypoints = values.chunks(columns).map(place).collect();
+        if columns > 2 {
+            let (scales, turns) = values.chunks(columns).map(shape).unzip();
+            (image.scales, image.orientations_deg) = (Some(scales), Some(turns));
+        }
+        if let Some(rows) = descriptors {
+            if rows.n != n {
+                let expected = format!("{n} descriptors, one per keypoint");
+                return Err(self.error(name, expected, rows.n.to_string()));
+            }
+            let wrong = |error: unlift::Error| self.error(name, error.expected(), error.found());
+            let descriptors = Descriptors::try_new(rows.values, rows.dim).map_err(wrong)?;
+            image.descriptors = Some(descriptors);
+        }
+        Ok(image)
     }
 }
 
@@ -274,51 +292,6 @@ fn uri(path: &Path) -> OsString {
         uri.push_str("?immutable=1");
     }
     uri.into()
-}
-
-impl Database {
-    /// Reads the features of image `at` of [`names`](Self::names).
-    pub fn get(&self, at: usize) -> Result<ImageFeatures, Error> {
-        let name = &self.image_ids[at].0[..];
-        let size = self.size(name)?;
-        let Some(rows) = self.matrix(name, "keypoints")? else {
-            return Err(self.error(name, "keypoints", "none"));
-        };
-        let descriptors = self.matrix(name, "descriptors")?;
-        let columns = rows.row_bytes / 4;
-        if ![2, 4, 6].contains(&columns) {
-            let found = format!("{columns} columns");
-            return Err(self.error(name, "keypoints of 2, 4 or 6 columns", found));
-        }
-        let values = floats(&rows.data);
-        if let Some(bad) = values.iter().position(|value| !value.is_finite()) {
-            let (row, found) = (bad / columns, values[bad].to_string());
-            let expected = format!("a finite number in keypoint {row}");
-            return Err(self.error(name, expected, found));
-        }
-        let mut image = ImageFeatures { name: self.names[at].clone(), size, ..Default::default() };
-        // COLMAP places the center of the first pixel at (0.5, 0.5).
-        let place = |row: &[f32]| [f64::from(row[0]) - 0.5, f64::from(row[1]) - 0.5];
-        image.keypoints = values.chunks(columns).map(place).collect();
-        if columns > 2 {
-            let (scales, turns) = values.chunks(columns).map(shape).unzip();
-            (image.scales, image.orientations_deg) = (Some(scales), Some(turns));
-        }
-        if let Some(stored) = descriptors {
-            if stored.n != rows.n {
-                let expected = format!("{} descriptors, one per keypoint", rows.n);
-                return Err(self.error(name, expected, stored.n.to_string()));
-            }
-            let (values, dim) = stored.into_values();
-            let wrong = |error: unlift::Error| self.error(name, error.expected(), error.found());
-            image.descriptors = Some(Descriptors::try_new(values, dim).map_err(wrong)?);
-        }
-        Ok(image)
-    }
-}
-
-fn floats(bytes: &[u8]) -> Vec<f32> {
-    bytes.as_chunks::<4>().0.iter().map(|&four| f32::from_le_bytes(four)).collect()
 }
 
 /// Returns scale in pixels and orientation in degrees of a keypoint with 4 columns (stored

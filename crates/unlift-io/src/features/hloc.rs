@@ -2,7 +2,6 @@
 //! feature.
 
 use std::collections::BTreeSet;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use half::f16;
@@ -28,6 +27,8 @@ type Groups = Vec<(String, Group)>;
 
 /// Bytes of headers that are kept, because a header is read in a dozen pieces.
 const CACHE: usize = 1 << 20;
+/// What a file of features has.
+const GROUPS: &str = "a group per image with keypoints and descriptors";
 const KEYPOINTS: &str = "keypoints";
 /// An attribute of `keypoints`: 1 if they are in pixels of upright photos, else 0.
 const UPRIGHT: &str = "upright";
@@ -38,37 +39,19 @@ pub(super) struct Hloc {
     path: PathBuf,
     budget: Budget,
     /// Paths of all groups that contain arrays directly, sorted by bytes.
-    names: Vec<String>,
+    pub names: Vec<String>,
     /// Open handles: finding a group by path searches all names of the groups above it.
     groups: Vec<Group>,
     /// Errors about links that lead to no group.
-    broken: Vec<Error>,
+    pub broken: Vec<Error>,
 }
 
 impl Hloc {
     /// Opens `path` and finds its groups.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        let file = Self::groups_of(path)?;
-        let wrong = |found: &str| {
-            let expected = "a group per image with keypoints and descriptors";
-            Err(Error::new(path, "", expected, found))
-        };
-        let first = if file.names.is_empty() { Vec::new() } else { file.arrays(0)? };
-        let has = |name: &str| first.iter().any(|array| array == name);
-        match () {
-            () if has(KEYPOINTS) => Ok(file),
-            () if has("matches0") || has("matches") => wrong("matches of pairs of images"),
-            () if has("global_descriptor") => wrong("global descriptors of whole images"),
-            () => Ok(file),
-        }
-    }
-
-    fn groups_of(path: &Path) -> Result<Self, Error> {
-        let (mut file, len) = input::open(path)?;
-        let mut head = [0; 12];
-        let is_head = file.read_exact(&mut head).is_ok();
+        let (head, len) = input::head(path, 12)?;
         // Superblocks of version 3 say whether a writer has the file open.
-        if is_head && head[..4] == *b"\x89HDF" && head[8] == 3 && head[11] & 1 == 1 {
+        if head.len() == 12 && head.starts_with(b"\x89HDF") && head[8] == 3 && head[11] & 1 == 1 {
             let found = "one that its writer did not close (h5clear -s FILE)";
             return Err(Error::new(path, "", "a whole HDF5 file", found));
         }
@@ -79,31 +62,38 @@ impl Hloc {
             groups: Vec::new(),
             broken: Vec::new(),
         };
-        let (mut groups, broken) = all.step("", "", || {
-            let wrong = |error: hdf5_pure::Error| {
-                Error::new(path, "", "a whole HDF5 file", error.to_string())
-            };
-            let source = ReadSeekSource::new(input::open(path)?.0);
-            let cached =
-                FileAccessProperties::new().with_metadata_cache(MetadataCacheConfig::new(CACHE));
-            let file = File::from_source_with_options(source.map_err(|e| wrong(e.into()))?, cached);
-            let file = file.map_err(wrong)?;
-            let whole = file.superblock().eof_address;
-            if whole > len {
-                let expected = format!("a whole HDF5 file of {whole} bytes");
-                return Err(Error::new(path, "", expected, format!("{len} bytes")));
-            }
-            all.list(&file)
-        })?;
+        let (mut groups, broken) = all.step("", "", || all.list(len))?;
         groups.sort_unstable_by(|(a, _), (b, _)| a.cmp(b));
         (all.names, all.groups) = groups.into_iter().unzip();
         all.broken = broken;
-        Ok(all)
+        let first = if all.names.is_empty() { Vec::new() } else { all.arrays(0)? };
+        let has = |name: &str| first.iter().any(|array| array == name);
+        let found = match () {
+            () if has(KEYPOINTS) => return Ok(all),
+            () if has("matches0") || has("matches") => "matches of pairs of images",
+            () if has("global_descriptor") => "global descriptors of whole images",
+            () => return Ok(all),
+        };
+        Err(Error::new(path, "", GROUPS, found))
     }
 
-    /// Lists all groups that contain arrays directly, and errors about broken links.
-    fn list(&self, file: &File) -> Result<(Groups, Vec<Error>), Error> {
-        let (mut found, mut broken) = (Vec::new(), Vec::new());
+    /// Lists all groups of the file of `len` bytes that contain arrays directly, and errors about
+    /// broken links.
+    fn list(&self, len: u64) -> Result<(Groups, Vec<Error>), Error> {
+        let wrong = |error: hdf5_pure::Error| {
+            Error::new(&self.path, "", "a whole HDF5 file", error.to_string())
+        };
+        let source = ReadSeekSource::new(input::open(&self.path)?.0);
+        let cached =
+            FileAccessProperties::new().with_metadata_cache(MetadataCacheConfig::new(CACHE));
+        let file = File::from_source_with_options(source.map_err(|e| wrong(e.into()))?, cached);
+        let file = file.map_err(wrong)?;
+        let whole = file.superblock().eof_address;
+        if whole > len {
+            let expected = format!("a whole HDF5 file of {whole} bytes");
+            return Err(Error::new(&self.path, "", expected, format!("{len} bytes")));
+        }
+        let (mut groups, mut broken) = (Vec::new(), Vec::new());
         let raw = ReadSeekSource::new(input::open(&self.path)?.0)
             .map_err(|error| self.refuse("", "", error.into()))?;
         let root = Some(file.superblock().root_group_address);
@@ -155,15 +145,16 @@ impl Hloc {
                     }
                 }
             }
-            if path.is_empty() && waiting.is_empty() && !arrays.is_empty() {
-                let expected = "a group per image with keypoints and descriptors";
-                return Err(Error::new(&self.path, "", expected, "arrays outside any group"));
+            if arrays.is_empty() {
+                continue;
             }
-            if !path.is_empty() && !arrays.is_empty() {
-                found.push((path, group));
+            if !path.is_empty() {
+                groups.push((path, group));
+            } else if waiting.is_empty() {
+                return Err(Error::new(&self.path, "", GROUPS, "arrays outside any group"));
             }
         }
-        Ok((found, broken))
+        Ok((groups, broken))
     }
 
     /// Runs `step` and turns a panic of the library into an error.
@@ -175,14 +166,6 @@ impl Hloc {
     ) -> Result<T, Error> {
         let damaged = || Err(self.error(image, array, "readable HDF5", "damaged data"));
         caught(step).ok().unwrap_or_else(damaged)
-    }
-
-    pub fn refused(&self) -> &[Error] {
-        &self.broken
-    }
-
-    pub fn names(&self) -> &[String] {
-        &self.names
     }
 
     pub fn is_upright(&self) -> bool {
@@ -504,15 +487,40 @@ impl FeatureWriter {
     /// When a part of the name is empty, `.` or `..`, the name exists, contains or is inside
     /// another image, or a column has not one row per keypoint.
     pub fn check(&self, image: &ImageFeatures) -> Result<(), Error> {
-        check(image, self.output.path())?;
         let name = &image.name;
+        let place = format!("image {}", quoted(name.as_bytes()));
+        let wrong = |expected: &str, found: String| {
+            Err(Error::new(self.output.path(), &*place, expected, found))
+        };
+        let parts = || name.split('/');
+        if parts().any(|part| matches!(part, "" | "." | "..") || part.contains('\0')) {
+            let expected = "a name whose parts are not empty, . or ..";
+            return wrong(expected, quoted(name.as_bytes()));
+        }
+        let depth = parts().count();
+        if depth > MAX_DEPTH {
+            return wrong(&format!("a name of at most {MAX_DEPTH} parts"), depth.to_string());
+        }
+        let n = image.keypoints.len();
+        let lengths = [
+            ("descriptors", image.descriptors.as_ref().map(|rows| rows.len())),
+            ("scores", image.scores.as_ref().map(Vec::len)),
+            ("scales", image.scales.as_ref().map(Vec::len)),
+            ("oris", image.orientations_deg.as_ref().map(Vec::len)),
+        ];
+        if let Some((array, Some(len))) =
+            lengths.into_iter().find(|(_, len)| len.is_some_and(|len| len != n))
+        {
+            let place = format!("{place}, {array}");
+            let expected = format!("{n}, one per keypoint");
+            return Err(Error::new(self.output.path(), place, expected, len.to_string()));
+        }
         if self.images.contains(name)
             || self.folders.contains(name)
             || folders(name).any(|folder| self.images.contains(folder))
         {
             let found = "one that exists already, or contains or is inside another image";
-            let place = format!("image {}", quoted(name.as_bytes()));
-            return Err(Error::new(self.output.path(), place, "a new name", found));
+            return wrong("a new name", found.to_owned());
         }
         Ok(())
     }
@@ -580,34 +588,6 @@ fn failed(path: &Path, error: hdf5_pure::Error) -> Error {
 /// The folders above an image, the outermost first.
 fn folders(name: &str) -> impl Iterator<Item = &str> {
     name.match_indices('/').map(|(at, _)| &name[..at])
-}
-
-fn check(image: &ImageFeatures, path: &Path) -> Result<(), Error> {
-    let place = || format!("image {}", quoted(image.name.as_bytes()));
-    let parts = || image.name.split('/');
-    if parts().any(|part| part.is_empty() || part == "." || part == ".." || part.contains('\0')) {
-        let expected = "a name whose parts are not empty, . or ..";
-        return Err(Error::new(path, place(), expected, quoted(image.name.as_bytes())));
-    }
-    let depth = parts().count();
-    if depth > MAX_DEPTH {
-        let expected = format!("a name of at most {MAX_DEPTH} parts");
-        return Err(Error::new(path, place(), expected, depth.to_string()));
-    }
-    let n = image.keypoints.len();
-    let columns = [
-        ("descriptors", image.descriptors.as_ref().map(|rows| rows.len())),
-        ("scores", image.scores.as_ref().map(Vec::len)),
-        ("scales", image.scales.as_ref().map(Vec::len)),
-        ("oris", image.orientations_deg.as_ref().map(Vec::len)),
-    ];
-    for (name, len) in columns {
-        if let Some(len) = len.filter(|&len| len != n) {
-            let place = format!("{}, {name}", place());
-            return Err(Error::new(path, place, format!("{n}, one per keypoint"), len.to_string()));
-        }
-    }
-    Ok(())
 }
 
 /// The name, the shape, the type and the bytes of an array to write.

@@ -21,8 +21,6 @@ pub(crate) mod database;
 mod hloc;
 mod links;
 
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use half::f16;
@@ -83,17 +81,15 @@ pub fn round_to_half(values: &mut [f32]) {
 /// An open file of features that is read one image at a time.
 ///
 /// Several threads may call [`get`](Self::get) at once.
-pub struct FeatureSource {
-    kind: Kind,
-}
+pub struct FeatureSource(Kind);
 
 enum Kind {
     Hloc(hloc::Hloc),
     Colmap(database::Database),
 }
 
-const SQLITE: &[u8; 8] = b"SQLite f";
-const HDF5: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
+pub(crate) const SQLITE: &[u8; 8] = b"SQLite f";
+pub(crate) const HDF5: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
 
 impl FeatureSource {
     /// Opens hloc's HDF5 features or a COLMAP `database.db`, distinguished by the first bytes.
@@ -101,9 +97,7 @@ impl FeatureSource {
     /// # Errors
     /// When the file cannot be read, is of another format, is truncated, or contains no image.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        let (file, len) = input::open(path)?;
-        let mut start = Vec::new();
-        File::take(file, 8).read_to_end(&mut start).map_err(|e| Error::read(path, e))?;
+        let (start, len) = input::head(path, 8)?;
         let kind = match start.first_chunk() {
             Some(HDF5) => Kind::Hloc(hloc::Hloc::open(path)?),
             Some(SQLITE) => Kind::Colmap(database::Database::open(path)?),
@@ -116,7 +110,7 @@ impl FeatureSource {
                 return Err(Error::new(path, "", expected, found));
             }
         };
-        let source = Self { kind };
+        let source = Self(kind);
         if source.names().is_empty() {
             return Err(Error::new(path, "", "at least one image", "none"));
         }
@@ -125,7 +119,7 @@ impl FeatureSource {
 
     /// Returns true if the first image states that keypoints are in pixels of the upright photo.
     pub fn is_upright(&self) -> bool {
-        match &self.kind {
+        match &self.0 {
             Kind::Hloc(file) => file.is_upright(),
             Kind::Colmap(_) => false,
         }
@@ -133,17 +127,17 @@ impl FeatureSource {
 
     /// One error for each entry of the file that is not an image.
     pub fn refused(&self) -> &[Error] {
-        match &self.kind {
-            Kind::Hloc(file) => file.refused(),
+        match &self.0 {
+            Kind::Hloc(file) => &file.broken,
             Kind::Colmap(_) => &[],
         }
     }
 
     /// The names of the images, sorted by bytes.
     pub fn names(&self) -> &[String] {
-        match &self.kind {
-            Kind::Hloc(file) => file.names(),
-            Kind::Colmap(database) => database.names(),
+        match &self.0 {
+            Kind::Hloc(file) => &file.names,
+            Kind::Colmap(database) => &database.names,
         }
     }
 
@@ -155,7 +149,7 @@ impl FeatureSource {
     /// # Panics
     /// When there is no such image.
     pub fn get(&self, at: usize) -> Result<ImageFeatures, Error> {
-        match &self.kind {
+        match &self.0 {
             Kind::Hloc(file) => file.get(at),
             Kind::Colmap(database) => database.get(at),
         }

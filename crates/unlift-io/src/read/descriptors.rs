@@ -2,8 +2,6 @@
 //! observations of points in images.
 
 use std::collections::HashMap;
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 use unlift::Descriptors;
@@ -16,13 +14,11 @@ use super::lines::quoted;
 use super::map_input::Input;
 use super::npy;
 use crate::error::Error;
-use crate::features::FeatureSource;
 use crate::features::database::Database;
+use crate::features::{FeatureSource, HDF5, SQLITE};
 use crate::input;
 
 const MAGIC: &[u8; 8] = b"P3DESC01";
-const SQLITE: &[u8; 8] = b"SQLite f";
-const HDF5: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
 
 /// Reads the descriptors of the points of `input`, one row each in the same order.
 ///
@@ -39,31 +35,27 @@ const HDF5: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
 /// When the file cannot be read, is malformed or of another format, lacks a point or an observation
 /// (the error names the first), or contains placeholders (all zero, or every row the same).
 pub fn descriptors(path: &Path, input: &Input) -> Result<Descriptors, Error> {
-    let mut magic = [0; 8];
-    let (mut file, len) = input::open(path)?;
-    if len >= 8 {
-        File::read_exact(&mut file, &mut magic).map_err(|e| Error::read(path, e))?;
-    }
-    match &magic {
-        MAGIC => binary(path, input),
-        SQLITE => of_database(path, input),
-        HDF5 => of_features(path, input),
-        _ if magic.starts_with(npy::MAGIC) => {
+    let (head, len) = input::head(path, 8)?;
+    match head.first_chunk() {
+        Some(MAGIC) => binary(path, input),
+        Some(SQLITE) => of_database(path, input),
+        Some(HDF5) => of_features(path, input),
+        Some(magic) if magic.starts_with(npy::MAGIC) => {
             // Rows either exclude or include points without finite coordinates.
             let (values, dim) = npy::descriptors(path, [input.ids.len(), input.n_rows()])?;
             let all = Descriptors::try_new(values, dim).map_err(|e| Error::core(path, e))?;
             if all.len() == input.ids.len() {
                 return Ok(all);
             }
-            let left_out = |row: &u32| input.left_out.binary_search(&u64::from(*row)).is_err();
-            Ok(all.select(&(0..all.len() as u32).filter(left_out).collect::<Vec<_>>()))
+            let is_kept = |row: &u32| input.left_out.binary_search(&u64::from(*row)).is_err();
+            Ok(all.select(&(0..all.len() as u32).filter(is_kept).collect::<Vec<_>>()))
         }
         _ => {
             let expected = "a file that begins with P3DESC01, a NumPy array (.npy), a COLMAP database (SQLite) or hloc's features (HDF5)";
             let found = match len {
                 0 => "an empty file".to_owned(),
                 1..8 => format!("a file of {len} bytes"),
-                _ => quoted(&magic),
+                _ => quoted(&head),
             };
             Err(Error::new(path, "", expected, found))
         }
@@ -216,10 +208,10 @@ fn mean(
 ) -> Result<Descriptors, Error> {
     let (mut layout, mut alike, mut has_bits) = (None, Alike::default(), false);
     let bits = |&byte: &u8| (0..8).map(move |bit| f64::from(byte >> bit & 1) * 2.0 - 1.0);
-    for seen in observations.chunk_by(|a, b| a.0 == b.0) {
-        let id = seen[0].0;
+    for of_image in observations.chunk_by(|a, b| a.0 == b.0) {
+        let (id, _, point) = of_image[0];
         let Ok(image) = images.binary_search_by_key(&id, |image| image.id) else {
-            let place = format!("point {}", input.ids[seen[0].2]);
+            let place = format!("point {}", input.ids[point]);
             let expected = "images of the model in its track";
             return Err(Error::new(path, place, expected, format!("image {id}")));
         };
@@ -232,17 +224,17 @@ fn mean(
             Values::U8(values) => ("bytes", values.len() / dim),
             Values::F32(values) => ("floats", values.len() / dim),
         };
-        let (usual_kind, usual_dim) = *layout.get_or_insert((kind, dim));
+        let (usual_kind, usual_dim) = *layout.get_or_insert_with(|| {
+            has_bits = matches!(&values, Values::U8(bytes) if are_bits(bytes, dim));
+            alike = Alike::new(input.ids.len(), if has_bits { 8 * dim } else { dim });
+            (kind, dim)
+        });
         if (kind, dim) != (usual_kind, usual_dim) {
             let expected = format!("{usual_dim} {usual_kind} each, as in other images");
             return wrong(expected, format!("{dim} {kind}"));
         }
-        if alike.dim == 0 {
-            has_bits = matches!(&values, Values::U8(bytes) if are_bits(bytes, dim));
-            alike = Alike::new(input.ids.len(), if has_bits { 8 * dim } else { dim });
-        }
-        let mut rows: Vec<f64> = Vec::with_capacity(seen.len() * dim);
-        for &(_, index, _) in seen {
+        let mut rows: Vec<f64> = Vec::with_capacity(of_image.len() * dim);
+        for &(_, index, _) in of_image {
             let index = index as usize;
             if index >= n {
                 let expected = format!("a descriptor for keypoint {index}");
@@ -255,7 +247,7 @@ fn mean(
                 Values::F32(values) => rows.extend(values[row].iter().map(|&x| f64::from(x))),
             }
         }
-        let points: Vec<usize> = seen.iter().map(|&(.., out)| out).collect();
+        let points: Vec<usize> = of_image.iter().map(|&(.., out)| out).collect();
         if let Err((expected, found)) = alike.add(&points, &rows) {
             return wrong(expected, found);
         }
@@ -285,7 +277,7 @@ pub struct Alike {
     dim: usize,
     /// Sum of the descriptors of each point.
     sums: Vec<f64>,
-    told: f64,
+    n_alike: f64,
     n: usize,
 }
 
@@ -318,17 +310,17 @@ impl Alike {
             let dot: f64 = sum.iter().zip(&rows[at * self.dim..]).map(|(a, b)| a * b).sum();
             dot / sum.iter().map(|x| x * x).sum::<f64>().sqrt()
         };
-        let (mut told, mut n) = (0.0, 0);
+        let (mut n_alike, mut n) = (0.0, 0);
         for (rank, &at) in known.iter().enumerate() {
             let other = points[known[(rank + known.len() / 2) % known.len()]];
             if other != points[at] {
                 let (of_own, of_other) = (like(at, points[at]), like(at, other));
-                told += if of_own == of_other { 0.5 } else { f64::from(of_own > of_other) };
+                n_alike += if of_own == of_other { 0.5 } else { f64::from(of_own > of_other) };
                 n += 1;
             }
         }
-        check(told, n, LEAST_ALIKE_IN_IMAGE)?;
-        (self.told, self.n) = (self.told + told, self.n + n);
+        check(n_alike, n, LEAST_ALIKE_IN_IMAGE)?;
+        (self.n_alike, self.n) = (self.n_alike + n_alike, self.n + n);
         for (&point, row) in points.iter().zip(rows.chunks(self.dim)) {
             let sum = &mut self.sums[point * self.dim..][..self.dim];
             sum.iter_mut().zip(row).for_each(|(sum, x)| *sum += x);
@@ -341,18 +333,18 @@ impl Alike {
     /// # Errors
     /// As [`add`](Self::add).
     pub fn check(&self) -> Result<(), (String, String)> {
-        check(self.told, self.n, LEAST_ALIKE)
+        check(self.n_alike, self.n, LEAST_ALIKE)
     }
 }
 
 /// Returns an error if the share is smaller than `least`, beyond chance.
-fn check(told: f64, n: usize, least: f64) -> Result<(), (String, String)> {
+fn check(n_alike: f64, n: usize, least: f64) -> Result<(), (String, String)> {
     let root = (n.max(1) as f64).sqrt();
-    if n < FEWEST || told / n as f64 + 1.5 / root >= least {
+    if n < FEWEST || n_alike / n as f64 + 1.5 / root >= least {
         return Ok(());
     }
     let expected = "descriptors of the model's keypoints, more like their own point in other images than like another one";
-    Err((expected.to_owned(), format!("{told} of {n} that are")))
+    Err((expected.to_owned(), format!("{n_alike} of {n} that are")))
 }
 
 /// Scales every row to an L2 norm, so that a sum equals a mean.
