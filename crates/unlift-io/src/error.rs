@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use unlift::OneLine;
 
@@ -125,17 +125,6 @@ impl Error {
             other => other,
         };
         Self { kind, ..self }
-    }
-
-    /// Replaces the path of the error by one that the user gave.
-    #[must_use]
-    pub fn at(self, path: impl Into<PathBuf>) -> Self {
-        Self { path: path.into(), ..self }
-    }
-
-    /// The file or folder that the error is about.
-    pub fn path(&self) -> &Path {
-        &self.path
     }
 }
 

@@ -30,7 +30,7 @@ pub fn write_cameras(path: &Path, cameras: &[Camera]) -> Result<(), Error> {
 /// Writes `images.txt`: poses and names, without 2D points.
 ///
 /// # Errors
-/// When a name is empty or contains spaces or control characters, or the file cannot be written.
+/// When a name is empty or contains spaces or control characters.
 pub fn write_images(path: &Path, images: &[Image]) -> Result<(), Error> {
     let is_one_word = |name: &[u8]| !name.is_empty() && name.iter().all(|&byte| byte > b' ');
     if let Some(image) = images.iter().find(|image| !is_one_word(&image.name)) {
@@ -56,7 +56,7 @@ pub fn write_images(path: &Path, images: &[Image]) -> Result<(), Error> {
 /// the row, counted from 1.
 ///
 /// # Errors
-/// When a coordinate is not finite, or the file cannot be written.
+/// When a coordinate is not finite.
 pub fn write_model_points(path: &Path, points: &[Option<[f64; 3]>]) -> Result<(), Error> {
     for (row, point) in points.iter().enumerate() {
         finite(path, ("point", row), &[point.unwrap_or_default()])?;
@@ -89,11 +89,11 @@ fn quaternion(r: &[[f64; 3]; 3]) -> [f64; 4] {
         (1, 3) => r[0][2] + r[2][0],
         _ => r[2][1] + r[1][2],
     };
-    let most = (0..4).fold(0, |best, i| if squares[i] > squares[best] { i } else { best });
-    let root = squares[most].sqrt();
-    let q: [f64; 4] = std::array::from_fn(|i| match i == most {
+    let largest = (0..4).fold(0, |best, i| if squares[i] > squares[best] { i } else { best });
+    let root = squares[largest].sqrt();
+    let q: [f64; 4] = std::array::from_fn(|i| match i == largest {
         true => 0.5 * root,
-        false => 0.5 * sums(most, i) / root,
+        false => 0.5 * sums(largest, i) / root,
     });
     let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
     let sign = if q[0] < 0.0 { -1.0 } else { 1.0 };

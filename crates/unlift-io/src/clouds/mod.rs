@@ -36,7 +36,7 @@ fn finite<const D: usize, const N: usize>(
 /// The columns are `double x, y, z` (z is 0 in 2D).
 ///
 /// # Errors
-/// When a coordinate is not finite, or the file cannot be written.
+/// When a coordinate is not finite.
 pub fn write_points<const D: usize>(path: &Path, points: &[[f64; D]]) -> Result<(), Error> {
     for (row, point) in points.iter().enumerate() {
         finite(path, ("point", row), &[*point])?;
@@ -66,7 +66,7 @@ fn coordinates<const D: usize>(w: &mut impl Write, point: &[f64; D]) -> io::Resu
 /// Writes `segments` as an OBJ file: two `v` records and one `l` record each. In 2D, z is 0.
 ///
 /// # Errors
-/// When a coordinate is not finite, or the file cannot be written.
+/// When a coordinate is not finite.
 pub fn write_lines<const D: usize>(path: &Path, segments: &[Segment<D>]) -> Result<(), Error> {
     for (row, segment) in segments.iter().enumerate() {
         finite(path, ("segment", row), segment)?;

@@ -62,11 +62,12 @@ impl Hloc {
             groups: Vec::new(),
             broken: Vec::new(),
         };
-        let (mut groups, broken) = all.step("", "", || all.list(len))?;
+        let (mut groups, broken) = all.step("", || all.list(len))?;
         groups.sort_unstable_by(|(a, _), (b, _)| a.cmp(b));
         (all.names, all.groups) = groups.into_iter().unzip();
         all.broken = broken;
-        let first = if all.names.is_empty() { Vec::new() } else { all.arrays(0)? };
+        let Some(first) = all.names.first() else { return Ok(all) };
+        let first = all.arrays(0).map_err(|error| error.within(&place(first)))?;
         let has = |name: &str| first.iter().any(|array| array == name);
         let found = match () {
             () if has(KEYPOINTS) => return Ok(all),
@@ -83,6 +84,9 @@ impl Hloc {
         let wrong = |error: hdf5_pure::Error| {
             Error::new(&self.path, "", "a whole HDF5 file", error.to_string())
         };
+        let wrong_image = |name: &str, found: String| {
+            Error::new(&self.path, place(name), "features of an image", found)
+        };
         let source = ReadSeekSource::new(input::open(&self.path)?.0);
         let cached =
             FileAccessProperties::new().with_metadata_cache(MetadataCacheConfig::new(CACHE));
@@ -95,7 +99,7 @@ impl Hloc {
         }
         let (mut groups, mut broken) = (Vec::new(), Vec::new());
         let raw = ReadSeekSource::new(input::open(&self.path)?.0)
-            .map_err(|error| self.refuse("", "", error.into()))?;
+            .map_err(|error| self.unreadable("", error.into()))?;
         let root = Some(file.superblock().root_group_address);
         let mut waiting = vec![(String::new(), file.root(), root, 0)];
         while let Some((path, group, address, depth)) = waiting.pop() {
@@ -104,7 +108,7 @@ impl Hloc {
                 let expected = format!("groups nested at most {MAX_DEPTH} deep");
                 return Err(Error::new(&self.path, place, expected, "deeper ones, or a cycle"));
             }
-            let refuse = |error| self.refuse(&path, "", error);
+            let refuse = |error| self.unreadable(&place(&path), error);
             let within = |name: &str| match &*path {
                 "" => name.to_owned(),
                 path => format!("{path}/{name}"),
@@ -116,7 +120,7 @@ impl Hloc {
                         "a link to {} in the old form (write it with libver=\"latest\" of h5py)",
                         quoted(to.as_bytes())
                     );
-                    return Err(self.error(&within(name), "", "features of an image", found));
+                    return Err(wrong_image(&within(name), found));
                 }
             }
             let arrays = group.datasets().map_err(refuse)?;
@@ -139,10 +143,7 @@ impl Hloc {
                 };
                 match target {
                     Some(target) => waiting.push((within(name), target, None, depth + 1)),
-                    None => {
-                        let expected = "features of an image";
-                        broken.push(self.error(&within(name), "", expected, text));
-                    }
+                    None => broken.push(wrong_image(&within(name), text)),
                 }
             }
             if arrays.is_empty() {
@@ -158,84 +159,51 @@ impl Hloc {
     }
 
     /// Runs `step` and turns a panic of the library into an error.
-    fn step<T>(
-        &self,
-        image: &str,
-        array: &str,
-        step: impl FnOnce() -> Result<T, Error>,
-    ) -> Result<T, Error> {
-        let damaged = || Err(self.error(image, array, "readable HDF5", "damaged data"));
+    fn step<T>(&self, place: &str, step: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
+        let damaged = || Err(Error::new(&self.path, place, "readable HDF5", "damaged data"));
         caught(step).ok().unwrap_or_else(damaged)
+    }
+
+    fn unreadable(&self, place: &str, error: hdf5_pure::Error) -> Error {
+        Error::new(&self.path, place, "readable HDF5", error.to_string())
     }
 
     pub fn is_upright(&self) -> bool {
         !self.names.is_empty() && self.attribute(0, UPRIGHT).is_ok_and(|value| value == Some(1.0))
     }
 
-    fn arrays(&self, at: usize) -> Result<Vec<String>, Error> {
-        let image = &self.names[at];
-        let mut names = self.step(image, "", || {
-            self.groups[at].datasets().map_err(|error| self.refuse(image, "", error))
-        })?;
-        names.sort_unstable();
-        Ok(names)
-    }
-
-    fn array(&self, at: usize, name: &str) -> Result<Array, Error> {
-        let image = &self.names[at];
-        self.step(image, name, || {
-            let refuse = |error| self.refuse(image, name, error);
-            let dataset = self.groups[at].dataset(name).map_err(refuse)?;
-            let shape = dataset.shape().map_err(refuse)?;
-            let count = shape.iter().fold(1u64, |n, &side| n.saturating_mul(side));
-            // A header can declare any size. Values are widened to eight bytes at most.
-            self.budget.admit(self.place(image, name), count.saturating_mul(8))?;
-            let values = numbers(&dataset, count).map_err(refuse)?;
-            let Some(values) = values else {
-                let expected = "floats of 16, 32 or 64 bits, or integers";
-                return Err(self.error(image, name, expected, "another type"));
-            };
-            Ok(Array { shape, values })
-        })
-    }
-
-    /// Returns an attribute of the keypoints of image `at`.
-    fn attribute(&self, at: usize, key: &str) -> Result<Option<f64>, Error> {
-        let (image, name) = (&self.names[at], KEYPOINTS);
-        self.step(image, name, || {
-            let refuse = |error| self.refuse(image, name, error);
-            let dataset = self.groups[at].dataset(name).map_err(refuse)?;
-            let attributes = dataset.attrs().map_err(refuse)?;
-            Ok(attributes.get(key).and_then(AttrValue::as_f64))
-        })
-    }
-
+    /// Reads image `at` of `names`.
     pub fn get(&self, at: usize) -> Result<ImageFeatures, Error> {
-        let name = &self.names[at];
+        self.image(at).map_err(|error| error.within(&place(&self.names[at])))
+    }
+
+    // The errors of the following name the array only.
+
+    fn image(&self, at: usize) -> Result<ImageFeatures, Error> {
         let present = self.arrays(at)?;
         let has = |array: &str| present.iter().any(|name| name == array);
         let optional = |array: &str| has(array).then(|| self.array(at, array)).transpose();
         let wrong = |array: &'static str| {
-            move |(expected, found): Wrong| self.error(name, array, expected, found)
+            move |(expected, found): Wrong| Error::new(&self.path, array, expected, found)
         };
         let Some(places) = optional(KEYPOINTS)? else {
             let found = format!("only {}", present.join(", "));
-            return Err(self.error(name, "", "an array keypoints", found));
+            return Err(Error::new(&self.path, "", "an array keypoints", found));
         };
         let keypoints = keypoints(&places).map_err(wrong(KEYPOINTS))?;
         let n = keypoints.len();
-        let per_keypoint = |array: &str| -> Result<Option<Vec<f32>>, Error> {
-            let Some(values) = optional(array)? else { return Ok(None) };
-            if values.shape != [n as u64] && values.shape != [n as u64, 1] {
+        let per_keypoint = |array: &'static str| -> Result<Option<Vec<f32>>, Error> {
+            let Some(Array { shape, values }) = optional(array)? else { return Ok(None) };
+            if shape != [n as u64] && shape != [n as u64, 1] {
                 let expected = format!("one value per keypoint, ({n},)");
-                return Err(self.error(name, array, expected, tuple(&values.shape)));
+                return Err(wrong(array)((expected, tuple(&shape))));
             }
-            Ok(Some(values.values.to_f64().into_iter().map(|value| value as f32).collect()))
+            Ok(Some(values.to_f64().into_iter().map(|value| value as f32).collect()))
         };
         let descriptors = optional("descriptors")?.map(|array| descriptors(array, n));
         let size = optional("image_size")?.map(|array| size(&array));
         Ok(ImageFeatures {
-            name: name.to_owned(),
+            name: self.names[at].clone(),
             size: size.transpose().map_err(wrong("image_size"))?,
             descriptors: descriptors.transpose().map_err(wrong("descriptors"))?,
             scores: per_keypoint("scores")?,
@@ -248,27 +216,44 @@ impl Hloc {
         })
     }
 
-    fn refuse(&self, image: &str, array: &str, error: hdf5_pure::Error) -> Error {
-        self.error(image, array, "readable HDF5", error.to_string())
+    /// Returns the sorted names of the arrays of image `at`.
+    fn arrays(&self, at: usize) -> Result<Vec<String>, Error> {
+        let names = || self.groups[at].datasets().map_err(|error| self.unreadable("", error));
+        let mut names = self.step("", names)?;
+        names.sort_unstable();
+        Ok(names)
     }
 
-    fn error(
-        &self,
-        image: &str,
-        array: &str,
-        expected: impl Into<String>,
-        found: impl Into<String>,
-    ) -> Error {
-        Error::new(&self.path, self.place(image, array), expected, found)
+    fn array(&self, at: usize, name: &str) -> Result<Array, Error> {
+        self.step(name, || {
+            let refuse = |error| self.unreadable(name, error);
+            let dataset = self.groups[at].dataset(name).map_err(refuse)?;
+            let shape = dataset.shape().map_err(refuse)?;
+            let count = shape.iter().fold(1u64, |n, &side| n.saturating_mul(side));
+            // A header can declare any size. Values are widened to eight bytes at most.
+            self.budget.admit(name, count.saturating_mul(8))?;
+            let Some(values) = numbers(&dataset, count).map_err(refuse)? else {
+                let expected = "floats of 16, 32 or 64 bits, or integers";
+                return Err(Error::new(&self.path, name, expected, "another type"));
+            };
+            Ok(Array { shape, values })
+        })
     }
 
-    fn place(&self, image: &str, array: &str) -> String {
-        match (image, array) {
-            ("", _) => String::new(),
-            (_, "") => format!("image {}", quoted(image.as_bytes())),
-            _ => format!("image {}, {array}", quoted(image.as_bytes())),
-        }
+    /// Returns an attribute of the keypoints of image `at`.
+    fn attribute(&self, at: usize, key: &str) -> Result<Option<f64>, Error> {
+        self.step(KEYPOINTS, || {
+            let dataset = self.groups[at].dataset(KEYPOINTS);
+            let attributes = dataset.and_then(|dataset| dataset.attrs());
+            let attributes = attributes.map_err(|error| self.unreadable(KEYPOINTS, error))?;
+            Ok(attributes.get(key).and_then(AttrValue::as_f64))
+        })
     }
+}
+
+/// The place of an error about an image, or about the file if the name is empty.
+fn place(image: &str) -> String {
+    if image.is_empty() { String::new() } else { format!("image {}", quoted(image.as_bytes())) }
 }
 
 /// The values of an array, row-major.
@@ -461,9 +446,6 @@ const MAX_STAGED: usize = 64 << 20;
 
 impl FeatureWriter {
     /// Starts the feature file `path`.
-    ///
-    /// # Errors
-    /// When no file can be written there.
     pub fn create(path: &Path) -> Result<Self, Error> {
         let output = OutputFile::create(path, Access::Usual)?;
         // `output` holds a lock already.
@@ -528,7 +510,7 @@ impl FeatureWriter {
     /// Writes one image.
     ///
     /// # Errors
-    /// When [`check`](Self::check) fails, or the disk fails.
+    /// When [`check`](Self::check) fails.
     pub fn append(&mut self, image: &ImageFeatures) -> Result<(), Error> {
         self.check(image)?;
         self.stage(image).map_err(|error| failed(self.output.path(), error))
@@ -565,10 +547,7 @@ impl FeatureWriter {
         Ok(())
     }
 
-    /// Moves the file to its place.
-    ///
-    /// # Errors
-    /// When the disk fails. No temporary file is left then.
+    /// Moves the file to its place. If that fails, no temporary file is left.
     pub fn finish(self) -> Result<(), Error> {
         let Self { output, file, .. } = self;
         let written = file.commit().and_then(|()| file.close());

@@ -201,20 +201,16 @@ impl<R: Read> Bytes<R> {
             self.check(8, &format!("the number of {what}"))?;
         }
         let count = self.u64(what)?;
-        self.check_count(count, what, bytes_each)
-    }
-
-    fn check_count(&self, count: u64, what: &str, bytes_each: u64) -> Result<u64, Error> {
         let left = self.remaining();
-        let most = left / bytes_each;
-        if count <= most {
+        let max = left / bytes_each;
+        if count <= max {
             return Ok(count);
         }
         let is_text = |b: &u8| b.is_ascii_graphic() || b.is_ascii_whitespace();
         if self.value_at == 0 && count.to_le_bytes().iter().all(is_text) {
             return Err(self.error(format!("binary data (the number of {what})"), "text"));
         }
-        let expected = format!("at most {most} for the number of {what} ({left} bytes are left)");
+        let expected = format!("at most {max} for the number of {what} ({left} bytes are left)");
         Err(self.error(expected, count.to_string()))
     }
 

@@ -18,49 +18,42 @@ use crate::error::Error;
 /// A camera model as files store it. Audits of points do not need its projection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CameraModel {
-    /// The id in binary files and databases.
-    pub id: i32,
     /// The name in text files.
     pub name: &'static str,
     /// The number of parameters.
     pub n_params: usize,
 }
 
-const fn model(id: i32, name: &'static str, n_params: usize) -> CameraModel {
-    CameraModel { id, name, n_params }
+const fn model(name: &'static str, n_params: usize) -> CameraModel {
+    CameraModel { name, n_params }
 }
 
-/// All models of COLMAP 4.2. Row `i` has id `i`.
+/// All models of COLMAP 4.2, in the order of their ids from 0.
 pub const CAMERA_MODELS: [CameraModel; 18] = [
-    model(0, "SIMPLE_PINHOLE", 3),
-    model(1, "PINHOLE", 4),
-    model(2, "SIMPLE_RADIAL", 4),
-    model(3, "RADIAL", 5),
-    model(4, "OPENCV", 8),
-    model(5, "OPENCV_FISHEYE", 8),
-    model(6, "FULL_OPENCV", 12),
-    model(7, "FOV", 5),
-    model(8, "SIMPLE_RADIAL_FISHEYE", 4),
-    model(9, "RADIAL_FISHEYE", 5),
-    model(10, "THIN_PRISM_FISHEYE", 12),
-    model(11, "RAD_TAN_THIN_PRISM_FISHEYE", 16),
-    model(12, "SIMPLE_DIVISION", 4),
-    model(13, "DIVISION", 5),
-    model(14, "SIMPLE_FISHEYE", 3),
-    model(15, "FISHEYE", 4),
-    model(16, "EUCM", 6),
-    model(17, "EQUIRECTANGULAR", 2),
+    model("SIMPLE_PINHOLE", 3),
+    model("PINHOLE", 4),
+    model("SIMPLE_RADIAL", 4),
+    model("RADIAL", 5),
+    model("OPENCV", 8),
+    model("OPENCV_FISHEYE", 8),
+    model("FULL_OPENCV", 12),
+    model("FOV", 5),
+    model("SIMPLE_RADIAL_FISHEYE", 4),
+    model("RADIAL_FISHEYE", 5),
+    model("THIN_PRISM_FISHEYE", 12),
+    model("RAD_TAN_THIN_PRISM_FISHEYE", 16),
+    model("SIMPLE_DIVISION", 4),
+    model("DIVISION", 5),
+    model("SIMPLE_FISHEYE", 3),
+    model("FISHEYE", 4),
+    model("EUCM", 6),
+    model("EQUIRECTANGULAR", 2),
 ];
 
 impl CameraModel {
     /// Returns the model with this id.
     pub fn from_id(id: i32) -> Option<&'static Self> {
         CAMERA_MODELS.get(usize::try_from(id).ok()?)
-    }
-
-    /// Returns true if the first parameter is the focal length in both directions.
-    pub fn has_one_focal(&self) -> bool {
-        self.name.starts_with("SIMPLE_") || self.name.starts_with("RADIAL")
     }
 
     /// Returns the model with this name.
@@ -87,13 +80,15 @@ pub struct Camera {
 impl Camera {
     /// Returns focal lengths and principal point in pixels; `None` for a panorama, which has none.
     pub fn intrinsics(&self) -> Option<Intrinsics> {
-        if self.model.name == "EQUIRECTANGULAR" {
+        let name = self.model.name;
+        if name == "EQUIRECTANGULAR" {
             return None;
         }
-        let first = if self.model.has_one_focal() { 1 } else { 2 };
+        let has_one_focal = name.starts_with("SIMPLE_") || name.starts_with("RADIAL");
+        let n_focal = if has_one_focal { 1 } else { 2 };
         let value = |at: usize| self.params.get(at).copied();
-        let focal = [value(0)?, value(first - 1)?];
-        let principal = [value(first)?, value(first + 1)?];
+        let focal = [value(0)?, value(n_focal - 1)?];
+        let principal = [value(n_focal)?, value(n_focal + 1)?];
         let all = [focal, principal].concat();
         let usable = all.iter().all(|x| x.is_finite()) && focal.iter().all(|&f| f > 0.0);
         usable.then_some(Intrinsics { focal, principal })
@@ -155,8 +150,8 @@ impl Tracks {
         Self { offsets: vec![0], observations: Vec::new() }
     }
 
-    /// Returns, for each of `images`, which of the points in `rows` it observes, as indices in `rows`, and the number of images that
-    /// observe each point. An image counts once per point.
+    /// Returns, for each of `images`, which of the points in `rows` it observes, as indices in
+    /// `rows`, and the number of images that observe each point. An image counts once per point.
     pub fn observed(&self, images: &[Image], rows: &[u32]) -> (Vec<Vec<u32>>, Vec<u32>) {
         let by_id: BTreeMap<u32, usize> =
             images.iter().enumerate().rev().map(|(at, image)| (image.id, at)).collect();
@@ -187,7 +182,7 @@ fn is_text(path: &Path) -> bool {
 /// Reads `cameras.bin` or `cameras.txt`, sorted by id.
 ///
 /// # Errors
-/// When the file cannot be read, is malformed, names an unknown camera model or repeats an id.
+/// When the file is malformed, names an unknown camera model or repeats an id.
 pub fn read_cameras(path: &Path) -> Result<Vec<Camera>, Error> {
     let mut cameras = if is_text(path) { text_cameras(path)? } else { binary_cameras(path)? };
     cameras.sort_by_key(|c| c.id);
@@ -198,7 +193,7 @@ pub fn read_cameras(path: &Path) -> Result<Vec<Camera>, Error> {
 /// Reads `images.bin` or `images.txt`, sorted by id.
 ///
 /// # Errors
-/// When the file cannot be read, is malformed, or repeats an id or a name: names lead to features.
+/// When the file is malformed, or repeats an id or a name: names lead to features.
 pub fn read_images(path: &Path) -> Result<Vec<Image>, Error> {
     let mut images = if is_text(path) { text_images(path)? } else { binary_images(path)? };
     images.sort_by_key(|i| i.id);
@@ -241,7 +236,7 @@ pub fn read_views(model: &Path) -> Result<(Vec<Camera>, Vec<Image>), Error> {
 /// set.
 ///
 /// # Errors
-/// When the file cannot be read, is malformed or repeats an id.
+/// When the file is malformed or repeats an id.
 pub fn read_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
     let points = if is_text(path) {
         text_points(path, with_tracks)?
@@ -256,17 +251,12 @@ pub fn read_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
 fn refuse_repeated(
     path: &Path,
     what: &str,
-    ascending: impl Iterator<Item = u64>,
+    ascending: impl Iterator<Item = u64> + Clone,
 ) -> Result<(), Error> {
-    let mut last = None;
-    for id in ascending {
-        if last == Some(id) {
-            let place = format!("{what} {id}");
-            return Err(Error::new(path, place, "each id once", "it again"));
-        }
-        last = Some(id);
+    match ascending.clone().zip(ascending.skip(1)).find(|(id, next)| id == next) {
+        None => Ok(()),
+        Some((id, _)) => Err(Error::new(path, format!("{what} {id}"), "each id once", "it again")),
     }
-    Ok(())
 }
 
 /// Older COLMAP versions write points in the order of a hash map.
@@ -443,15 +433,14 @@ fn text_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
     let mut lines = Lines::open(path)?;
     let mut points = Points { tracks: with_tracks.then(Tracks::new), ..Points::default() };
     while lines.advance_to_data()? {
-        let mut words = words(lines.line());
+        let mut words = words(lines.line()).peekable();
         let id: u64 = next(&lines, &mut words, "a point id")?;
         let position = coordinates::<3>(&lines, &mut words, "3 coordinates")?;
         coordinates::<3>(&lines, &mut words, "a color (3 numbers)")?;
         coordinates::<1>(&lines, &mut words, "a reprojection error")?;
         if let Some(tracks) = &mut points.tracks {
-            while let Some(word) = words.next() {
-                let image_id =
-                    number(word).ok_or_else(|| lines.error("an image id", quoted(word)))?;
+            while words.peek().is_some() {
+                let image_id = next(&lines, &mut words, "an image id")?;
                 let index = next(&lines, &mut words, "the index of a 2D point")?;
                 tracks.observations.push((image_id, index));
             }
@@ -472,12 +461,6 @@ fn text_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn names_keep_their_spaces() {
-        assert_eq!(after_words(b"1 2  a b.jpg", 2), b"a b.jpg");
-        assert_eq!(after_words(b"1 2", 2), b"");
-    }
 
     #[test]
     fn unsorted_points_are_sorted_with_their_tracks() {

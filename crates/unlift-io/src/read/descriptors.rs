@@ -164,15 +164,14 @@ type Observation = (u32, u32, usize);
 /// Returns the images of the model of `input` and the observations of its points by image.
 fn tracks(path: &Path, input: &Input) -> Result<(Vec<Image>, Vec<Observation>), Error> {
     let of_model = |file: &&std::path::PathBuf| {
-        let is = |name: &str| file.file_name().is_some_and(|its| its == name);
-        is("points3D.bin") || is("points3D.txt")
+        file.file_name().is_some_and(|name| name == "points3D.bin" || name == "points3D.txt")
     };
     let Some(points_path) = input.files.iter().find(of_model) else {
         let expected = "a COLMAP model, whose tracks lead to images";
         return Err(Error::new(path, "", expected, format!("{} points", input.format)));
     };
     let points = colmap::read_points(points_path, true)?;
-    let tracks = points.tracks.expect("asked for");
+    let tracks = points.tracks.expect("requested");
     let extension = points_path.extension().unwrap_or_default();
     let images = points_path.with_file_name("images").with_extension(extension);
     let images = colmap::read_images(&images)?;

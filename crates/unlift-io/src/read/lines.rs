@@ -142,20 +142,16 @@ pub(crate) fn quoted(word: &[u8]) -> String {
     }
 }
 
-/// Finds the columns `x`, `y` and `z` among names, or returns the first missing one. Case, quotes
-/// and a unit in brackets are ignored.
-pub fn axes<'a>(names: impl Iterator<Item = &'a [u8]> + Clone) -> Result<[usize; 3], &'static str> {
-    // ParaView numbers the columns of points.
-    let find = |axis: &'static str, numbered: [&str; 2]| {
-        let is_axis = |name: &[u8]| {
-            [axis, numbered[0], numbered[1]].iter().any(|known| is_called(name, known.as_bytes()))
-        };
-        names.clone().position(is_axis).ok_or(axis)
+/// Finds the columns `x`, `y` and `z` among names. Case, quotes and a unit in brackets are ignored.
+pub fn axes<'a>(names: impl Iterator<Item = &'a [u8]> + Clone) -> Option<[usize; 3]> {
+    let find = |titles: [&[u8]; 3]| {
+        names.clone().position(|name| titles.iter().any(|title| is_called(name, title)))
     };
-    Ok([
-        find("x", ["Points:0", "Points_0"])?,
-        find("y", ["Points:1", "Points_1"])?,
-        find("z", ["Points:2", "Points_2"])?,
+    // ParaView numbers the columns of points.
+    Some([
+        find([b"x", b"Points:0", b"Points_0"])?,
+        find([b"y", b"Points:1", b"Points_1"])?,
+        find([b"z", b"Points:2", b"Points_2"])?,
     ])
 }
 

@@ -50,7 +50,6 @@ impl Input {
     /// Adds a camera: its center and the direction that points up in its photo, or `None` without
     /// a pose.
     pub(crate) fn camera(&mut self, pose: Option<([f64; 3], [f64; 3])>) {
-        let is_finite = |x: &[f64; 3]| x.iter().all(|x| x.is_finite());
         match pose.filter(|(center, up)| is_finite(center) && is_finite(up)) {
             Some((center, up)) => {
                 self.cameras.push(center);
@@ -67,15 +66,15 @@ impl Input {
         if self.ids.is_empty() {
             self.ids = (0..n as u64).collect();
         }
-        let is_left = |row: &usize| self.positions[*row].iter().any(|x| !x.is_finite());
-        self.left_out = (0..n).filter(is_left).map(|row| row as u64).collect();
+        let rows = (0..).zip(&self.positions);
+        self.left_out = rows.filter(|(_, x)| !is_finite(x)).map(|(row, _)| row).collect();
         let mut notes = Vec::new();
         if !self.left_out.is_empty() {
             let mut row = 0..;
             self.ids.retain(|_| {
                 row.next().is_some_and(|row| self.left_out.binary_search(&row).is_err())
             });
-            self.positions.retain(|position| position.iter().all(|x| x.is_finite()));
+            self.positions.retain(is_finite);
             let note = format!("{} of {n} points have no place", self.left_out.len());
             if self.left_out.len() as f64 > MOST_LEFT_OUT * n as f64 {
                 self.doubts.push(format!("{note}: what is audited is not the whole map"));
@@ -102,6 +101,10 @@ impl Input {
         });
         self
     }
+}
+
+fn is_finite(position: &[f64; 3]) -> bool {
+    position.iter().all(|x| x.is_finite())
 }
 
 /// Returns the most frequent position and its number of points.

@@ -36,7 +36,7 @@ pub(super) fn of_points<R: Read>(
     format: &'static str,
 ) -> Result<Input, Error> {
     let header = Header::read(bytes)?;
-    let mut found = Input { format, ..Input::default() };
+    let mut input = Input { format, ..Input::default() };
     let (rows, layout) = match header.points() {
         Some(points) => points,
         None if header.is_structured() => {
@@ -55,32 +55,32 @@ pub(super) fn of_points<R: Read>(
             let mut row = vec![0; size as usize];
             for _ in 0..rows {
                 bytes.fill(&mut row, "values")?;
-                found.positions.push(fields.map(|(field, big)| field.of(&row, big)));
+                input.positions.push(fields.map(|(field, big)| field.of(&row, big)));
             }
-            return Ok(found);
+            return Ok(input);
         }
         Layout::Matrix { columns } => columns,
     };
-    let Some(numbers) = header.numbers(bytes)? else { return Ok(found) };
+    let Some(numbers) = header.numbers(bytes)? else { return Ok(input) };
     numbers.check(bytes)?;
-    found.positions = vec![[0.0; 3]; rows as usize];
+    input.positions = vec![[0.0; 3]; rows as usize];
     numbers.read(bytes, |_, at, value| {
         let (row, column) = (at / columns as usize, at % columns as usize);
         if column < 3 {
-            found.positions[row][column] = value;
+            input.positions[row][column] = value;
         }
         Ok(())
     })?;
     if columns > 3 {
-        let firsts = || found.positions.iter().map(|position| position[0]).enumerate();
+        let firsts = || input.positions.iter().map(|position| position[0]).enumerate();
         let is_numbered = |from: usize| firsts().all(|(row, x)| x == (row + from) as f64);
-        if found.positions.len() >= TELLING && (is_numbered(0) || is_numbered(1)) {
+        if input.positions.len() >= TELLING && (is_numbered(0) || is_numbered(1)) {
             let expected = "x, y and z in the first columns";
             return Err(bytes.error(expected, "the row number"));
         }
-        found.notes.push(format!("the first 3 of {columns} columns are read as x, y and z"));
+        input.notes.push(format!("the first 3 of {columns} columns are read as x, y and z"));
     }
-    Ok(found)
+    Ok(input)
 }
 
 pub(super) enum Layout {
@@ -97,11 +97,9 @@ pub(super) enum Layout {
 /// Parses a type: how a value is stored, and true if it is big-endian.
 fn stored(text: &str) -> Option<(Scalar, bool)> {
     let (big, text) = (text.starts_with('>'), text.trim_start_matches(['<', '>', '|', '=']));
-    let kind = *text.as_bytes().first()?;
-    Some((
-        Scalar::of_kind(kind, number(&text.as_bytes()[1..])?).filter(|_| b"fiu".contains(&kind))?,
-        big,
-    ))
+    let (&kind, size) = text.as_bytes().split_first()?;
+    let scalar = Scalar::of_kind(kind, number(size)?).filter(|_| b"fiu".contains(&kind))?;
+    Some((scalar, big))
 }
 
 /// The size in bytes of a value of a type.
@@ -326,11 +324,9 @@ impl Header {
                 fields.push(field(at));
             }
         }
-        let by_name = || axes(names.iter().copied()).ok().map(|at| at.map(|at| fields[at]));
-        Some((
-            number(rows.trim().as_bytes())?,
-            Layout::Rows { fields: places.or_else(by_name)?, size },
-        ))
+        let by_name = || axes(names.iter().copied()).map(|at| at.map(|at| fields[at]));
+        let fields = places.or_else(by_name)?;
+        Some((number(rows.trim().as_bytes())?, Layout::Rows { fields, size }))
     }
 
     fn wrong_type<R: Read>(&self, bytes: &Bytes<R>, expected: &str) -> Error {

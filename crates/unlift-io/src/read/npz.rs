@@ -1,10 +1,11 @@
 //! NumPy archives: their arrays by name, and positions of a map.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 use zip::ZipArchive;
+use zip::read::ZipFile;
 use zip::result::ZipError;
 
 use super::bytes::Bytes;
@@ -15,6 +16,9 @@ use crate::input::{self, Budget};
 use crate::read::map_input::Input;
 use crate::stage;
 use unlift::guard::caught;
+
+/// A reader of an array, which checks its checksum.
+pub(crate) type ArrayBytes<'a> = Bytes<ZipFile<'a, BufReader<File>>>;
 
 /// An open NumPy archive.
 #[derive(Debug)]
@@ -64,21 +68,15 @@ impl Archive {
         Ok(arrays)
     }
 
-    /// Starts reading the entry at index `at`, the array `name`, and returns its size in bytes.
-    pub fn entry(&mut self, at: usize, name: &str) -> Result<(impl Read, u64), Error> {
+    /// Starts reading the entry at index `at`, the array `name`.
+    pub fn array(&mut self, at: usize, name: &str) -> Result<ArrayBytes<'_>, Error> {
         let place = format!("array {name}");
         let entry = self.zip.by_index(at).map_err(|error| {
             Error::new(&self.path, &*place, "an array that is stored or deflated", cause(error))
         })?;
         let size = entry.size();
         self.budget.admit(place, size)?;
-        Ok((entry, size))
-    }
-
-    fn array(&mut self, at: usize, name: &str) -> Result<Bytes<impl Read>, Error> {
-        let path = self.path.clone();
-        let (entry, size) = self.entry(at, name)?;
-        Ok(Bytes::of_array(&path, entry, name, size))
+        Ok(Bytes::of_array(&self.path, entry, name, size))
     }
 }
 

@@ -59,28 +59,23 @@ impl Element {
 
     /// Finds the properties with these names that are not lists.
     fn find<const N: usize>(&self, names: [&'static str; N]) -> Result<[usize; N], &'static str> {
-        let mut found = [0; N];
-        for (found, name) in found.iter_mut().zip(names) {
+        let mut places = [0; N];
+        for (place, name) in places.iter_mut().zip(names) {
             let called = |p: &Property| p.list.is_none() && is_called(&p.name, name.as_bytes());
-            *found = self.properties.iter().position(called).ok_or(name)?;
+            *place = self.properties.iter().position(called).ok_or(name)?;
         }
-        Ok(found)
+        Ok(places)
     }
-}
-
-struct Header {
-    encoding: Encoding,
-    elements: Vec<Element>,
 }
 
 /// Reads the positions of the vertices, of any numeric type.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let mut lines = Lines::open(path)?;
-    let header = header(path, &mut lines)?;
+    let (encoding, elements) = header(path, &mut lines)?;
     let refuse = |expected: String| Error::new(path, "header", expected, "none");
-    let vertex = header.elements.iter().position(|e| e.name == b"vertex");
+    let vertex = elements.iter().position(|e| e.name == b"vertex");
     let vertex = vertex.ok_or_else(|| refuse("an element vertex".to_owned()))?;
-    let element = &header.elements[vertex];
+    let element = &elements[vertex];
     let axes =
         element.find(["x", "y", "z"]).map_err(|name| match element.find(["packed_position"]) {
             Ok(_) => {
@@ -88,22 +83,22 @@ pub fn read(path: &Path) -> Result<Input, Error> {
             }
             Err(_) => refuse(format!("a property {name} in element vertex")),
         })?;
-    let mut rows = match header.encoding {
+    let mut rows = match encoding {
         Encoding::Ascii => {
             lines.expect_room(element.count, "vertices", element.properties.len() as u64)?;
             Rows::Ascii(lines)
         }
         encoding => Rows::Binary(lines.into_bytes(), encoding == Encoding::Big),
     };
-    for before in &header.elements[..vertex] {
+    for before in &elements[..vertex] {
         rows.read(before, [])?;
     }
     let positions = rows.read(element, axes)?;
-    let more = rows.more(element, &header.elements[vertex + 1..])?;
+    let more = rows.more(element, &elements[vertex + 1..])?;
     let is_splat = element.find(["opacity", "scale_0", "rot_0"]).is_ok();
     Ok(Input {
         positions,
-        format: match header.encoding {
+        format: match encoding {
             Encoding::Ascii => "ply ascii",
             Encoding::Little => "ply binary little endian",
             Encoding::Big => "ply binary big endian",
@@ -129,13 +124,14 @@ pub fn splats(path: &Path) -> Result<Input, Error> {
     let mut positions = bytes.room("splats", n)?;
     for _ in 0..n {
         bytes.fill(&mut row, "splat")?;
-        let axis = |at: usize| Field { at: 4 * at, scalar: Scalar::F32 }.of(&row, false);
-        positions.push(std::array::from_fn(axis));
+        let floats = row.as_chunks().0;
+        positions.push(std::array::from_fn(|axis| f64::from(f32::from_le_bytes(floats[axis]))));
     }
     Ok(Input { positions, format: "splat", notes: vec![SPLATS.to_owned()], ..Input::default() })
 }
 
-fn header(path: &Path, lines: &mut Lines) -> Result<Header, Error> {
+/// Reads the encoding and the elements.
+fn header(path: &Path, lines: &mut Lines) -> Result<(Encoding, Vec<Element>), Error> {
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
     let begins = "\"ply\", as every PLY file begins";
@@ -169,19 +165,16 @@ fn header(path: &Path, lines: &mut Lines) -> Result<Header, Error> {
                 elements.push(Element { name: name.to_vec(), count, properties: Vec::new() });
             }
             [b"property", ref rest @ ..] => {
-                let element = elements.last_mut();
-                let element = element
-                    .ok_or_else(|| error("an element before its properties", quoted(line)))?;
+                let Some(element) = elements.last_mut() else {
+                    return Err(error("an element before its properties", quoted(line)));
+                };
                 let known = |kind: &[u8]| {
                     scalar(kind).ok_or_else(|| error("the type of a property", quoted(kind)))
                 };
                 let (name, scalar, list) = match *rest {
                     [kind, name] => (name, known(kind)?, None),
                     [b"list", count, kind, name] => (name, known(kind)?, Some(known(count)?)),
-                    _ => {
-                        let found = quoted(line);
-                        return Err(error("property TYPE NAME", found));
-                    }
+                    _ => return Err(error("property TYPE NAME", quoted(line))),
                 };
                 element.properties.push(Property { name: name.to_vec(), scalar, list });
             }
@@ -189,9 +182,9 @@ fn header(path: &Path, lines: &mut Lines) -> Result<Header, Error> {
             _ => return Err(error("a line of a PLY header", quoted(line))),
         }
     }
-    let refuse = |expected: &str, found: String| Error::new(path, "header", expected, found);
-    let encoding = encoding.ok_or_else(|| refuse("a line with the format", "none".into()))?;
-    Ok(Header { encoding, elements })
+    let encoding =
+        encoding.ok_or_else(|| Error::new(path, "header", "a line with the format", "none"))?;
+    Ok((encoding, elements))
 }
 
 enum Rows {

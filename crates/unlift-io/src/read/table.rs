@@ -6,33 +6,24 @@ use super::lines::{Lines, axes, coordinate, is_called, number, plain, quoted, wo
 use super::map_input::Input;
 use crate::error::Error;
 
-/// The separator of values. The first line decides it for the whole file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Separator {
-    Byte(u8),
-    /// Any run of spaces and tabs.
-    Space,
+/// The byte between values, or `None` for any run of spaces and tabs. The first line decides it for
+/// the whole file.
+type Separator = Option<u8>;
+
+fn separator_of(line: &[u8]) -> Separator {
+    [b';', b','].into_iter().find(|byte| line.contains(byte))
 }
 
-impl Separator {
-    fn of(line: &[u8]) -> Self {
-        [b';', b','].into_iter().find(|byte| line.contains(byte)).map_or(Self::Space, Self::Byte)
-    }
+/// Returns the separator of a header line. A tab is one, because names may contain spaces and fields
+/// may be empty.
+fn separator_of_header(line: &[u8]) -> Separator {
+    separator_of(line).or_else(|| line.contains(&b'\t').then_some(b'\t'))
+}
 
-    /// Returns the separator of a header line. A tab is one, because names may contain spaces and
-    /// fields may be empty.
-    fn of_header(line: &[u8]) -> Self {
-        match Self::of(line) {
-            Self::Space if line.contains(&b'\t') => Self::Byte(b'\t'),
-            separator => separator,
-        }
-    }
-
-    fn split(self, line: &[u8]) -> Vec<&[u8]> {
-        match self {
-            Self::Space => words(line).collect(),
-            Self::Byte(byte) => line.split(|&b| b == byte).map(<[u8]>::trim_ascii).collect(),
-        }
+fn split(line: &[u8], separator: Separator) -> Vec<&[u8]> {
+    match separator {
+        None => words(line).collect(),
+        Some(byte) => line.split(|&b| b == byte).map(<[u8]>::trim_ascii).collect(),
     }
 }
 
@@ -57,7 +48,7 @@ pub fn read(path: &Path) -> Result<Option<Input>, Error> {
     let mut comments: Vec<Vec<u8>> = Vec::new();
     let mut format: Option<(Separator, Columns)> = None;
     let mut announced: Option<(u64, u64)> = None;
-    let mut form = Form::default();
+    let mut form = Form::OF_NO_ROWS;
     while lines.advance()? {
         let line = lines.line();
         if let Some(comment) = line.strip_prefix(b"#").or_else(|| line.strip_prefix(b"//")) {
@@ -73,15 +64,14 @@ pub fn read(path: &Path) -> Result<Option<Input>, Error> {
             continue;
         }
         let counts = positions.is_empty() || announced.is_some();
-        if let (Some(n), true, None | Some((Separator::Space, _))) = (number(line), counts, &format)
-        {
+        if let (Some(n), true, None | Some((None, _))) = (number(line), counts, &format) {
             check_count(&lines, announced, positions.len() as u64)?;
             announced = Some((n, positions.len() as u64));
             continue;
         }
         if format.is_none() {
-            let separator = Separator::of_header(line);
-            let names = separator.split(lines.untrimmed());
+            let separator = separator_of_header(line);
+            let names = split(lines.untrimmed(), separator);
             if names.len() > 1 && names.iter().all(|name| number::<f64>(name).is_none()) {
                 format = Some((separator, Columns::of_header(&lines, &names)?));
                 continue;
@@ -90,24 +80,23 @@ pub fn read(path: &Path) -> Result<Option<Input>, Error> {
         let (separator, columns) = match &format {
             Some(format) => format,
             None => {
-                let separator = Separator::of(line);
-                let n = separator.split(lines.untrimmed()).len();
+                let separator = separator_of(line);
+                let n = split(lines.untrimmed(), separator).len();
                 if comments.iter().any(|comment| is_colmap_header(comment)) {
                     return Ok(None);
                 }
                 &*format.insert((separator, Columns::of_comments(&lines, &comments, n)?))
             }
         };
-        let fields = separator.split(lines.untrimmed());
+        let fields = split(lines.untrimmed(), *separator);
         let mut position = [0.0_f64; 3];
         for ((value, &column), name) in position.iter_mut().zip(&columns.at).zip(["x", "y", "z"]) {
             let Some(field) = fields.get(column) else {
-                let found = fields.len().to_string();
-                return Err(if columns.named {
-                    lines.error(format!("{} columns up to {name}", column + 1), found)
-                } else {
-                    lines.error("3 coordinates", found)
-                });
+                let expected = match columns.named {
+                    true => format!("{} columns up to {name}", column + 1),
+                    false => "3 coordinates".to_owned(),
+                };
+                return Err(lines.error(expected, fields.len().to_string()));
             };
             *value = coordinate(field)
                 .ok_or_else(|| lines.error(format!("a number for {name}"), quoted(field)))?;
@@ -149,13 +138,11 @@ const FIRST: Columns = Columns { at: [0, 1, 2], named: false, doubt: None };
 
 impl Columns {
     fn of_header(lines: &Lines, names: &[&[u8]]) -> Result<Self, Error> {
-        match axes(names.iter().copied()) {
-            Ok(at) => Ok(Self { at, named: true, ..FIRST }),
-            Err(_) => {
-                let expected = "numbers, or columns named x, y and z";
-                Err(lines.error(expected, of_poses(names).unwrap_or_else(|| quoted(lines.line()))))
-            }
-        }
+        let at = axes(names.iter().copied()).ok_or_else(|| {
+            let found = of_poses(names).unwrap_or_else(|| quoted(lines.line()));
+            lines.error("numbers, or columns named x, y and z", found)
+        })?;
+        Ok(Self { at, named: true, ..FIRST })
     }
 
     /// Finds the columns by a comment that names the `n` columns of the first point: the last
@@ -164,10 +151,10 @@ impl Columns {
         let refuse = |expected: &str, comment: &[u8], names: &[&[u8]]| {
             Err(lines.error(expected, of_poses(names).unwrap_or_else(|| quoted(comment))))
         };
-        let mut other = None;
+        let mut last_naming = None;
         for comment in comments.iter().rev() {
             let names = names(comment, n);
-            if let Ok(at) = axes(names.iter().copied()) {
+            if let Some(at) = axes(names.iter().copied()) {
                 // Prose may mention x, y and z. With three columns they are the first three.
                 return match names.len() {
                     len if len == n || at == FIRST.at => Ok(Self { at, named: true, ..FIRST }),
@@ -180,10 +167,10 @@ impl Columns {
             let known = names.iter().filter(|name| is_quantity(name)).count();
             let is_naming = names.len() == n && n >= 3 && names.iter().all(|name| is_name(name));
             if is_naming || of_poses(&names).is_some() || known >= names.len().div_ceil(2).max(2) {
-                other.get_or_insert((comment, names));
+                last_naming.get_or_insert((comment, names));
             }
         }
-        match other {
+        match last_naming {
             None => Ok(FIRST),
             Some((comment, names)) if !names.iter().any(|name| is_quantity(name)) => {
                 let what = quoted(comment);
@@ -201,7 +188,7 @@ impl Columns {
 fn names(comment: &[u8], n: usize) -> Vec<&[u8]> {
     let start = comment.iter().rposition(|&byte| byte == b':').map_or(0, |at| at + 1);
     let list = comment[start..].trim_ascii();
-    let parts = Separator::of_header(list).split(list);
+    let parts = split(list, separator_of_header(list));
     if parts.len() == n && parts.iter().all(|part| !part.is_empty()) {
         return parts.into_iter().map(plain).collect();
     }
@@ -242,9 +229,9 @@ pub(super) fn has_three_columns(path: &Path) -> Result<bool, Error> {
     if !lines.advance_to_data()? {
         return Ok(false);
     }
-    let separator = Separator::of(lines.line());
-    let fields = separator.split(lines.line());
-    let begins_with_id = separator == Separator::Space && number::<u64>(fields[0]).is_some();
+    let separator = separator_of(lines.line());
+    let fields = split(lines.line(), separator);
+    let begins_with_id = separator.is_none() && number::<u64>(fields[0]).is_some();
     Ok(fields.len() == 3 && !begins_with_id)
 }
 
@@ -270,22 +257,17 @@ struct Form {
     numbered: [bool; 2],
 }
 
-impl Default for Form {
-    fn default() -> Self {
-        let time = f64::NEG_INFINITY;
-        Self {
-            n: 0,
-            colmap: true,
-            has_track: false,
-            ascending: true,
-            pose: true,
-            time,
-            numbered: [true; 2],
-        }
-    }
-}
-
 impl Form {
+    const OF_NO_ROWS: Self = Self {
+        n: 0,
+        colmap: true,
+        has_track: false,
+        ascending: true,
+        pose: true,
+        time: f64::NEG_INFINITY,
+        numbered: [true; 2],
+    };
+
     fn look(&mut self, fields: &[&[u8]], row: usize) {
         self.n = row + 1;
         let first = fields.first().and_then(|word| number::<f64>(word)).unwrap_or(f64::NAN);

@@ -1,66 +1,57 @@
 //! Reads the arrays of one map, or of one image, by name.
 
-use std::cell::RefCell;
-use std::io::Read;
 use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use unlift::Unit;
+use unlift::descriptors::Values;
 
 use super::Kind;
 use super::meta::{KEY, Meta};
 use crate::Error;
 use crate::input::Budget;
-use crate::read::bytes::Bytes;
 use crate::read::npy::{Header, tuple};
-use crate::read::npz::Archive;
-
-/// The values of an array that holds either bytes or floats.
-type BytesOrFloats = Result<Vec<u8>, Vec<f32>>;
+use crate::read::npz::{Archive, ArrayBytes};
 
 /// Stands for -1, "none", in whole numbers.
 pub(super) const NONE: u32 = u32::MAX;
 
 /// The longest metadata in bytes. It holds a few names and numbers.
-const MOST_TEXT: u64 = 1 << 16;
+const MAX_TEXT: u64 = 1 << 16;
 
 /// The arrays of one map or image.
 pub(super) struct Arrays<'a> {
     path: &'a Path,
-    names: Vec<String>,
-    held: Held,
+    /// Shared by the images of a file, which several threads read.
+    archive: Arc<Mutex<Archive>>,
+    /// Index in the archive and name of each array.
+    arrays: Vec<(usize, String)>,
     budget: Budget,
     meta: Meta<'a>,
-}
-
-enum Held {
-    /// Per name, the index in the archive.
-    Archive(RefCell<Archive>, Vec<usize>),
-    /// Per name, the file of the array.
-    Memory(Vec<Vec<u8>>),
 }
 
 impl<'a> Arrays<'a> {
     /// Opens the file `path`.
     pub(super) fn open(path: &'a Path) -> Result<Self, Error> {
         let archive = Archive::open(path)?;
-        let budget = archive.budget().clone();
-        let (places, names) = archive.arrays()?.into_iter().unzip();
-        let meta = Meta::parse(path, None)?;
-        let held = Held::Archive(RefCell::new(archive), places);
-        let arrays = Self { path, names, held, budget, meta };
-        Ok(Self { meta: Meta::parse(path, arrays.text()?.as_deref())?, ..arrays })
+        let (arrays, budget) = (archive.arrays()?, archive.budget().clone());
+        let archive = Arc::new(Mutex::new(archive));
+        Self { path, archive, arrays, budget, meta: Meta::empty(path) }.with_meta()
     }
 
-    /// Takes the arrays of one image of the file `path`, each with its name and its file.
-    pub(super) fn of_image(
-        path: &'a Path,
-        arrays: Vec<(String, Vec<u8>)>,
-        budget: Budget,
-        of_all: &Meta<'a>,
-    ) -> Result<Self, Error> {
-        let (names, files) = arrays.into_iter().unzip();
-        let arrays = Self { path, names, held: Held::Memory(files), budget, meta: of_all.clone() };
-        Ok(Self { meta: of_all.of_image(arrays.text()?.as_deref())?, ..arrays })
+    /// Returns the arrays of one image of this file, each with its index and its name below that of
+    /// the image.
+    pub(super) fn of_image(&self, arrays: Vec<(usize, String)>) -> Result<Self, Error> {
+        let (archive, budget) = (self.archive.clone(), self.budget.clone());
+        Self { path: self.path, archive, arrays, budget, meta: self.meta.clone() }.with_meta()
+    }
+
+    /// Reads the metadata, which replaces that of the file.
+    fn with_meta(mut self) -> Result<Self, Error> {
+        if let Some(text) = self.text()? {
+            self.meta.extend(&text)?;
+        }
+        Ok(self)
     }
 
     pub(super) fn path(&self) -> &'a Path {
@@ -71,8 +62,17 @@ impl<'a> Arrays<'a> {
         &self.meta
     }
 
+    /// Index in the archive and name of each array.
+    pub(super) fn arrays(&self) -> &[(usize, String)] {
+        &self.arrays
+    }
+
+    fn names(&self) -> impl Iterator<Item = &str> {
+        self.arrays.iter().map(|(_, name)| &**name)
+    }
+
     pub(super) fn has(&self, name: &str) -> bool {
-        self.names.iter().any(|known| known == name)
+        self.names().any(|known| known == name)
     }
 
     /// Reads the array `name`, if there is one.
@@ -86,31 +86,27 @@ impl<'a> Arrays<'a> {
 
     /// Lists the names for an error.
     pub(super) fn list(&self) -> String {
-        match self.names.len() {
+        let first = self.names().take(5).collect::<Vec<_>>().join(", ");
+        match self.arrays.len() {
             0 => "no array".to_owned(),
-            n => format!(
-                "arrays {}{}",
-                self.names[..n.min(5)].join(", "),
-                if n > 5 { ", .." } else { "" }
-            ),
+            1..=5 => format!("arrays {first}"),
+            _ => format!("arrays {first}, .."),
         }
     }
 
     /// The kind by the metadata, else by the arrays.
     pub(super) fn kind(&self) -> Result<Option<Kind>, Error> {
-        let names =
-            self.names.iter().map(|name| name.rsplit_once('/').map_or(&**name, |name| name.1));
+        let names = self.names().map(|name| name.rsplit_once('/').map_or(name, |name| name.1));
         Ok(self.meta.kind()?.or_else(|| Kind::of_arrays(names)))
     }
 
     /// Checks that these are arrays of `kind` only. Ambiguous ones are taken for it.
     pub(super) fn expect(&self, kind: Kind) -> Result<(), Error> {
-        let found = self.kind()?.unwrap_or(kind);
-        if found != kind {
-            return Err(Error::new(self.path, "", kind.to_string(), found.to_string()));
+        if let Some(other) = self.kind()?.filter(|its| *its != kind) {
+            return Err(Error::new(self.path, "", kind.to_string(), other.to_string()));
         }
-        let is_unknown = |name: &&String| *name != KEY && !kind.arrays().contains(&name.as_str());
-        match self.names.iter().find(is_unknown) {
+        let is_unknown = |name: &&str| *name != KEY && !kind.arrays().contains(name);
+        match self.names().find(is_unknown) {
             None => Ok(()),
             Some(name) => {
                 let expected = format!("only {KEY}, {}", kind.arrays().join(", "));
@@ -189,19 +185,19 @@ impl<'a> Arrays<'a> {
         &self,
         name: &str,
         sides: [Option<usize>; N],
-    ) -> Result<(BytesOrFloats, [usize; N]), Error> {
+    ) -> Result<(Values, [usize; N]), Error> {
         #[expect(clippy::redundant_closure)] // a closure works for every lifetime of the bytes
         let header = self.file(name, |bytes| Header::read(bytes))?;
         if header.is_whole() {
             let byte = |x: f64| (0.0..256.0).contains(&x).then_some(x as u8);
             let rule = "a whole number below 256, or a float";
             let (values, shape) = self.numbers(name, sides, Class::Whole, rule, byte)?;
-            return Ok((Ok(values), shape));
+            return Ok((Values::U8(values), shape));
         }
         let single = |x: f64| Some(x as f32).filter(|x| x.is_finite());
         let rule = "a finite number (as a float of 4 bytes)";
         let (values, shape) = self.numbers(name, sides, Class::Any, rule, single)?;
-        Ok((Err(values), shape))
+        Ok((Values::F32(values), shape))
     }
 
     /// Reads numbers of `class` from the array `name` of `sides`, each converted by `convert`; a
@@ -275,7 +271,7 @@ impl<'a> Arrays<'a> {
                 _ => return Err(wrong(format!("dtype {kind}"))),
             };
             let size = bytes.remaining();
-            if size > MOST_TEXT {
+            if size > MAX_TEXT {
                 return Err(wrong(format!("{size} bytes")));
             }
             let mut text = vec![0; size as usize];
@@ -299,23 +295,13 @@ impl<'a> Arrays<'a> {
     fn file<T>(
         &self,
         name: &str,
-        read: impl FnOnce(&mut Bytes<&mut dyn Read>) -> Result<T, Error>,
+        read: impl FnOnce(&mut ArrayBytes<'_>) -> Result<T, Error>,
     ) -> Result<T, Error> {
-        let Some(at) = self.names.iter().position(|known| known == name) else {
+        let Some((at, _)) = self.arrays.iter().find(|(_, known)| known == name) else {
             return Err(Error::new(self.path, format!("array {name}"), "an array", "none"));
         };
-        match &self.held {
-            Held::Archive(archive, places) => {
-                let mut archive = archive.borrow_mut();
-                let (mut entry, size) = archive.entry(places[at], name)?;
-                read(&mut Bytes::of_array(self.path, &mut entry, name, size))
-            }
-            Held::Memory(files) => {
-                let mut file = files[at].as_slice();
-                let size = file.len() as u64;
-                read(&mut Bytes::of_array(self.path, &mut file, name, size))
-            }
-        }
+        let mut archive = self.archive.lock().unwrap_or_else(PoisonError::into_inner);
+        read(&mut archive.array(*at, name)?)
     }
 }
 

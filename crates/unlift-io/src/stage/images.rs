@@ -1,8 +1,6 @@
 //! Stage files of many images: the arrays of an image are below its name, `a.jpg/foot`.
 
 use std::collections::HashSet;
-use std::fs::File;
-use std::io::{BufWriter, Read};
 use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value};
@@ -13,7 +11,7 @@ use unlift::truth::{Original, Secret};
 
 use super::arrays::Arrays;
 use super::lists::neighborhoods_of;
-use super::meta::{KEY, Meta, to_text};
+use super::meta::{KEY, to_text};
 use super::recovered::recovered_of;
 use super::released::released_of;
 use super::truth::truth_of;
@@ -21,14 +19,11 @@ use super::write::{Written, Zip};
 use super::{Kind, lists, recovered, released, truth};
 use crate::Error;
 use crate::atomic::OutputFile;
-use crate::read::npz::Archive;
 
 /// A reader of a stage file of images. One image is in memory.
 pub struct ImageFile<'a> {
-    path: &'a Path,
-    archive: Archive,
-    /// The metadata of the file.
-    meta: Meta<'a>,
+    /// All arrays of the file.
+    file: Arrays<'a>,
     /// The images in reverse order, with the index and name of each array.
     waiting: Vec<(String, Vec<(usize, String)>)>,
 }
@@ -46,14 +41,13 @@ impl<'a> ImageFile<'a> {
     /// When it is not a stage file of this kind, has no images, or the arrays of an image do not
     /// follow one another.
     pub fn open(path: &'a Path, kind: Kind) -> Result<Self, Error> {
-        let meta = Arrays::open(path)?.meta().clone();
-        if let Some(found) = meta.kind()?.filter(|found| *found != kind) {
-            return Err(Error::new(path, "", kind.to_string(), found.to_string()));
+        let file = Arrays::open(path)?;
+        if let Some(other) = file.meta().kind()?.filter(|its| *its != kind) {
+            return Err(Error::new(path, "", kind.to_string(), other.to_string()));
         }
-        let archive = Archive::open(path)?;
         let mut images: Vec<(String, Vec<(usize, String)>)> = Vec::new();
         let mut names = HashSet::new();
-        for (at, name) in archive.arrays()? {
+        for (at, name) in file.arrays() {
             let Some((image, array)) = name.rsplit_once('/') else {
                 if name == KEY {
                     continue;
@@ -61,52 +55,31 @@ impl<'a> ImageFile<'a> {
                 let expected = "arrays below the names of images, as a.jpg/foot";
                 return Err(Error::new(path, "", expected, format!("array {name}")));
             };
-            if images.last().is_none_or(|(last, _)| last != image) {
-                if !names.insert(image.to_owned()) {
+            let array = (*at, array.to_owned());
+            match images.last_mut() {
+                Some((last, arrays)) if last == image => arrays.push(array),
+                _ if names.insert(image) => images.push((image.to_owned(), vec![array])),
+                _ => {
                     let found = format!("image {image} again");
                     return Err(Error::new(path, "", "the arrays of each image together", found));
                 }
-                images.push((image.to_owned(), Vec::new()));
-            }
-            if let Some((_, arrays)) = images.last_mut() {
-                arrays.push((at, array.to_owned()));
             }
         }
         if images.is_empty() {
             return Err(Error::new(path, "", "arrays of images, as a.jpg/foot", "none"));
         }
         images.reverse();
-        Ok(Self { path, archive, meta, waiting: images })
+        Ok(Self { file, waiting: images })
     }
 
-    /// Reads the next image. Returns `None` at the end.
+    /// Opens the next image. Returns `None` at the end.
     ///
     /// # Errors
-    /// When the file is damaged, or an array is too large.
+    /// When its metadata is wrong.
     pub fn next_image(&mut self) -> Result<Option<ImageRows<'a>>, Error> {
         let Some((name, arrays)) = self.waiting.pop() else { return Ok(None) };
-        let of_image = |error: Error| error.within(&place(&name));
-        let mut held = Vec::with_capacity(arrays.len());
-        for (at, array) in arrays {
-            held.push((array.clone(), self.file(at, &array).map_err(of_image)?));
-        }
-        let budget = self.archive.budget().clone();
-        let arrays = Arrays::of_image(self.path, held, budget, &self.meta).map_err(of_image)?;
+        let arrays = self.file.of_image(arrays).map_err(|error| error.within(&place(&name)))?;
         Ok(Some(ImageRows { name, arrays }))
-    }
-
-    /// Unpacks the entry at index `at`, the array `name`.
-    fn file(&mut self, at: usize, name: &str) -> Result<Vec<u8>, Error> {
-        let mut file: Vec<u8> = Vec::new();
-        let (entry, size) = self.archive.entry(at, name)?;
-        let read = entry.take(size.saturating_add(1)).read_to_end(&mut file);
-        let wrong =
-            |found: String| Error::new(self.path, format!("array {name}"), "undamaged data", found);
-        match read {
-            Ok(n) if n as u64 == size => Ok(file),
-            Ok(_) => Err(wrong(format!("another size than {size} bytes"))),
-            Err(source) => Err(wrong(source.to_string())),
-        }
     }
 
     /// Reads the next image, which must be `name` as in the file `of`.
@@ -119,7 +92,7 @@ impl<'a> ImageFile<'a> {
             other => {
                 let expected = format!("image {name}, as in {}", of.display());
                 let found = other.map_or("no more images".to_owned(), |rows| rows.name);
-                Err(Error::new(self.path, "", expected, found))
+                Err(Error::new(self.file.path(), "", expected, found))
             }
         }
     }
@@ -130,7 +103,7 @@ impl<'a> ImageFile<'a> {
             None => Ok(()),
             Some((name, _)) => {
                 let expected = format!("no more images, as in {}", of.display());
-                Err(Error::new(self.path, "", expected, format!("image {name}")))
+                Err(Error::new(self.file.path(), "", expected, format!("image {name}")))
             }
         }
     }
@@ -188,22 +161,22 @@ const OF_ALL: [&str; 5] = ["kind", "version", "unit", "family", "slots_per_recor
 /// Images without rows are not stored.
 pub struct ImageWriter<'a> {
     path: PathBuf,
-    /// Until the first image decides the metadata of the file.
-    file: Option<&'a mut BufWriter<File>>,
-    started: Option<(Zip<'a>, Map<String, Value>)>,
+    zip: Zip<'a>,
+    /// The metadata of the file, which the first image decides.
+    of_all: Option<Map<String, Value>>,
 }
 
 impl<'a> ImageWriter<'a> {
     /// Starts a file of images.
     pub fn start(output: &'a mut OutputFile) -> Self {
         let path = output.path().to_owned();
-        Self { path, file: Some(output.writer()), started: None }
+        Self { path, zip: Zip::new(output.writer()), of_all: None }
     }
 
     /// Adds a released image.
     ///
     /// # Errors
-    /// When its family differs from the first image, or the disk fails.
+    /// When its family differs from the first image.
     pub fn released(&mut self, name: &str, released: &Released<2>) -> Result<(), Error> {
         self.append(name, released::written(released))
     }
@@ -211,7 +184,7 @@ impl<'a> ImageWriter<'a> {
     /// Adds the ground truth of an image.
     ///
     /// # Errors
-    /// When the secret does not belong to these points, or the disk fails.
+    /// When the secret does not belong to these points.
     pub fn truth(
         &mut self,
         name: &str,
@@ -231,7 +204,7 @@ impl<'a> ImageWriter<'a> {
     /// Adds the recovered points of an image.
     ///
     /// # Errors
-    /// When an evidence or delta is not finite, or the disk fails.
+    /// When an evidence or delta is not finite.
     pub fn recovered(&mut self, name: &str, recovered: &Recovered<2>) -> Result<(), Error> {
         let written = recovered::written(&self.path, recovered);
         let written = written.map_err(|error| error.within(&place(name)))?;
@@ -241,12 +214,12 @@ impl<'a> ImageWriter<'a> {
     /// Completes the file. The caller must then commit its [`OutputFile`].
     ///
     /// # Errors
-    /// When no image had rows, or the disk fails.
+    /// When no image had rows.
     pub fn finish(self) -> Result<(), Error> {
-        let Some((zip, _)) = self.started else {
+        if self.of_all.is_none() {
             return Err(Error::new(self.path, "", "an image with points", "none"));
-        };
-        zip.finish().map_err(|source| Error::write(&self.path, source))
+        }
+        self.zip.finish().map_err(|source| Error::write(&self.path, source))
     }
 
     fn append(&mut self, name: &str, written: Written<'_>) -> Result<(), Error> {
@@ -256,19 +229,16 @@ impl<'a> ImageWriter<'a> {
         let failed = |source| Error::write(&self.path, source);
         let (of_all, own): (Map<_, _>, Map<_, _>) =
             written.meta.clone().into_iter().partition(|(key, _)| OF_ALL.contains(&key.as_str()));
-        if let Some(file) = self.file.take() {
-            let mut zip = Zip::new(file);
-            zip.text(KEY, &to_text(&of_all)).map_err(failed)?;
-            self.started = Some((zip, of_all.clone()));
-        }
-        let Some((zip, first)) = &mut self.started else { unreachable!("the first image starts") };
-        if *first != of_all {
+        if self.of_all.is_none() {
+            self.zip.text(KEY, &to_text(&of_all)).map_err(failed)?;
+            self.of_all = Some(of_all);
+        } else if self.of_all.as_ref() != Some(&of_all) {
             let expected = "the family and unit of the first image";
             return Err(Error::new(&self.path, place(name), expected, to_text(&of_all)));
         }
         if !own.is_empty() {
-            zip.text(&format!("{name}/{KEY}"), &to_text(&own)).map_err(failed)?;
+            self.zip.text(&format!("{name}/{KEY}"), &to_text(&own)).map_err(failed)?;
         }
-        zip.arrays(&format!("{name}/"), written).map_err(failed)
+        self.zip.arrays(&format!("{name}/"), written).map_err(failed)
     }
 }

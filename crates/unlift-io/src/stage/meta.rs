@@ -39,35 +39,32 @@ pub(super) struct Meta<'a> {
 }
 
 impl<'a> Meta<'a> {
-    /// Parses `text`. `None` is an empty object.
-    pub(super) fn parse(path: &'a Path, text: Option<&str>) -> Result<Self, Error> {
-        let wrong = |found: String| Error::new(path, "metadata unlift", "a JSON object", found);
-        let object = match text.map(serde_json::from_str::<Value>) {
-            None => Map::new(),
-            Some(Ok(Value::Object(object))) => object,
-            Some(Ok(other)) => return Err(wrong(short(&other))),
-            Some(Err(error)) => return Err(wrong(error.to_string())),
+    pub(super) fn empty(path: &'a Path) -> Self {
+        Self { path, object: Map::new() }
+    }
+
+    /// Adds the metadata `text`, which replaces earlier values.
+    pub(super) fn extend(&mut self, text: &str) -> Result<(), Error> {
+        let wrong = |found| Err(Error::new(self.path, "metadata unlift", "a JSON object", found));
+        let object = match serde_json::from_str(text) {
+            Ok(Value::Object(object)) => object,
+            Ok(other) => return wrong(short(&other)),
+            Err(error) => return wrong(error.to_string()),
         };
         if let Some(key) = object.keys().find(|key| !KEYS.contains(&&***key) && *key != WHY_UNKNOWN)
         {
             let expected = format!("only {} and {WHY_UNKNOWN}", KEYS.join(", "));
-            return Err(Error::new(path, "metadata unlift", expected, key));
+            return Err(Error::new(self.path, "metadata unlift", expected, key));
         }
-        Ok(Self { path, object })
+        self.object.extend(object);
+        Ok(())
     }
 
-    /// Adds the metadata `text` of one image, which replaces that of the file.
-    pub(super) fn of_image(&self, text: Option<&str>) -> Result<Self, Error> {
-        let mut object = self.object.clone();
-        object.extend(Self::parse(self.path, text)?.object);
-        Ok(Self { path: self.path, object })
-    }
-
-    fn given<T>(
-        &self,
+    fn given<'s, T>(
+        &'s self,
         key: &str,
         expected: impl Into<String>,
-        read: impl FnOnce(&Value) -> Option<T>,
+        read: impl FnOnce(&'s Value) -> Option<T>,
     ) -> Result<Option<T>, Error> {
         let Some(value) = self.object.get(key) else { return Ok(None) };
         read(value).map(Some).ok_or_else(|| self.wrong(key, expected))
@@ -109,8 +106,7 @@ impl<'a> Meta<'a> {
     }
 
     pub(super) fn text(&self, key: &str) -> Result<Option<&str>, Error> {
-        let Some(value) = self.object.get(key) else { return Ok(None) };
-        value.as_str().map(Some).ok_or_else(|| self.wrong(key, "text"))
+        self.given(key, "text", Value::as_str)
     }
 
     /// The number of hidden points per record, 1 or 2.

@@ -32,7 +32,7 @@ pub(super) const ARRAYS: [&str; 9] = [
 /// coordinates of 10^6 m), by at most 10^-10 m. No position in the map's frame changes.
 ///
 /// # Errors
-/// When an evidence or delta is not finite, or the file cannot be written.
+/// When an evidence or delta is not finite.
 pub fn write_recovered<const D: usize>(path: &Path, recovered: &Recovered<D>) -> Result<(), Error> {
     write_file(path, Access::Private, written(path, recovered)?)
 }
@@ -150,8 +150,8 @@ fn estimates<const D: usize>(
         Ok(arrays.numbers(name, [Some(n)], Class::Any, "a finite number", single)?.0)
     })?;
     let estimate = |(slot, position): (usize, &[f64; D])| {
-        let is_found = !position[0].is_nan();
-        if position.iter().any(|x| x.is_nan() == is_found) {
+        let has_position = !position[0].is_nan();
+        if position.iter().any(|x| x.is_nan() == has_position) {
             let expected = format!("{D} numbers, or {D} NaN if lost");
             return Err(arrays.wrong("position", slot, expected, format!("{position:?}")));
         }
@@ -160,17 +160,17 @@ fn estimates<const D: usize>(
             let expected = "numbers in the range of f32 about the origin";
             return Err(arrays.wrong("position", slot, expected, format!("{position:?}")));
         }
-        let usual = if is_found { Status::Ok } else { Status::NoSupport };
+        let usual = if has_position { Status::Ok } else { Status::NoSupport };
         let status = status.as_ref().map_or(usual, |codes| Status::ALL[codes[slot] as usize]);
-        if (status == Status::Ok) != is_found {
-            let expected = match is_found {
+        if (status == Status::Ok) != has_position {
+            let expected = match has_position {
                 true => "0, as there is a position",
                 false => "the code of a reason, as there is no position",
             };
             return Err(arrays.wrong("status", slot, expected, (status as u8).to_string()));
         }
         let axis = match axis.as_ref().map(|axis| axis[slot]) {
-            Some(NONE) if is_found => {
+            Some(NONE) if has_position => {
                 let expected = "an axis, as there is a position";
                 return Err(arrays.wrong("axis", slot, expected, "-1"));
             }
@@ -178,7 +178,7 @@ fn estimates<const D: usize>(
             Some(axis) => axis as u8,
         };
         Ok(Estimate {
-            position: if is_found { about_origin } else { [f32::NAN; D] },
+            position: if has_position { about_origin } else { [f32::NAN; D] },
             status,
             support: support.as_ref().map_or(0, |support| support[slot] as u16),
             axis,

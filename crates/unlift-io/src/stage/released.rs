@@ -56,9 +56,6 @@ const FAMILIES: [(&str, &str); 4] = [
 /// Writes a released map, one row per record.
 ///
 /// It contains nothing of the ground truth: no ids, names or times.
-///
-/// # Errors
-/// When the file cannot be written.
 pub fn write_released<const D: usize>(path: &Path, released: &Released<D>) -> Result<(), Error> {
     write_file(path, Access::Usual, written(released))
 }
@@ -170,8 +167,9 @@ pub fn scheme_name(path: &Path) -> Result<Option<String>, Error> {
     Ok(arrays.meta().text("scheme")?.map(str::to_owned))
 }
 
-/// Returns positions that the file at `path` publishes, one per record: those of its arrays as they are written, feet and centers,
-/// and these plus directions. Nothing of them is left in the normal form of [`read_released`].
+/// Returns positions that the file at `path` publishes, one per record: those of its arrays as they
+/// are written, feet and centers, and these plus directions. Nothing of them is left in the normal
+/// form of [`read_released`].
 ///
 /// # Errors
 /// When it is no released map of dimension `D`.
@@ -307,7 +305,6 @@ fn descriptors(arrays: &Arrays<'_>, n: usize, slots: usize) -> Result<Option<Des
     if n == 0 {
         return Ok(None);
     }
-    let values = values.map_or_else(Values::F32, Values::U8);
     Descriptors::try_new(values, dim).map(Some).map_err(|source| arrays.refused(source))
 }
 

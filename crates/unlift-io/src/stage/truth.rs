@@ -19,7 +19,7 @@ pub(super) const ARRAYS: [&str; 5] =
 /// Writes the ground truth of an obfuscation, one row per original point.
 ///
 /// # Errors
-/// When `secret` has another number of points, or the file cannot be written.
+/// When `secret` has another number of points.
 pub fn write_truth<const D: usize>(
     path: &Path,
     original: &Original<D>,

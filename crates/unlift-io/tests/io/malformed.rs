@@ -178,6 +178,7 @@ fn text() -> Vec<Row> {
         points("half an observation", "7 0 0 0 0 0 0 0 1 2 3\n", ":1: expected observations of 2 numbers (image id, 2D point), found 3 numbers"),
         points("binary where text is expected", "\u{6}\0\0\0\0\0\0\0\u{2}\0\0\n", ":1: expected text, found binary data"),
         model("pose cut", "images.txt", "1 1 0 0 0 1 2\n\n", ":1: expected a translation (3 numbers), found end of line"),
+        model("no name", "images.txt", "1 1 0 0 0 1 2 3 1 \n\n", ":1: expected an image name, found end of line"),
         model("a name twice", "images.txt", "1 1 0 0 0 0 0 0 1 a.jpg\n\n2 1 0 0 0 0 0 0 1 a.jpg\n\n", ": expected each name once, found \"a.jpg\" again"),
         model("2D points cut", "images.txt", "1 1 0 0 0 1 2 3 1 a.jpg\n1 2 3 4\n", ":2: expected 2D points of 3 numbers (x, y, point id), found 4 numbers"),
         model("unknown camera model", "cameras.txt", "1 WIDE 640 480 1 2 3\n", ":1: expected a camera model of COLMAP for camera 1, found \"WIDE\""),
