@@ -2,7 +2,7 @@
 
 mod colmap;
 
-use std::io::{self, Write};
+use std::io::Write;
 use std::path::Path;
 
 use unlift::geometry::frame::Bounds;
@@ -42,25 +42,16 @@ pub fn write_points<const D: usize>(path: &Path, points: &[[f64; D]]) -> Result<
         finite(path, ("point", row), &[*point])?;
     }
     atomic::write_file(path, Access::Private, |w| {
-        header(w, points.len(), "")?;
-        points.iter().try_for_each(|point| coordinates(w, point))
+        writeln!(w, "ply\nformat binary_little_endian 1.0\ncomment {CLOUD_COMMENT}")?;
+        writeln!(w, "element vertex {}", points.len())?;
+        writeln!(w, "property double x\nproperty double y\nproperty double z\nend_header")?;
+        points.iter().flat_map(in_space).try_for_each(|value| w.write_all(&value.to_le_bytes()))
     })
 }
 
-fn header(w: &mut impl Write, n: usize, more: &str) -> io::Result<()> {
-    write!(w, "ply\nformat binary_little_endian 1.0\ncomment {CLOUD_COMMENT}\n")?;
-    writeln!(w, "element vertex {n}")?;
-    for axis in ["x", "y", "z"] {
-        writeln!(w, "property double {axis}")?;
-    }
-    writeln!(w, "{more}end_header")
-}
-
-fn coordinates<const D: usize>(w: &mut impl Write, point: &[f64; D]) -> io::Result<()> {
-    for axis in 0..3 {
-        w.write_all(&point.get(axis).copied().unwrap_or(0.0).to_le_bytes())?;
-    }
-    Ok(())
+/// Returns the coordinates of a point in 3D; in 2D, z is 0.
+fn in_space<const D: usize>(point: &[f64; D]) -> [f64; 3] {
+    std::array::from_fn(|axis| point.get(axis).copied().unwrap_or(0.0))
 }
 
 /// Writes `segments` as an OBJ file: two `v` records and one `l` record each. In 2D, z is 0.
@@ -75,7 +66,7 @@ pub fn write_lines<const D: usize>(path: &Path, segments: &[Segment<D>]) -> Resu
         writeln!(w, "# {CLOUD_COMMENT}")?;
         for (row, segment) in segments.iter().enumerate() {
             for end in segment {
-                let [x, y, z] = std::array::from_fn(|c| end.get(c).copied().unwrap_or(0.0));
+                let [x, y, z] = in_space(end);
                 writeln!(w, "v {x} {y} {z}")?;
             }
             writeln!(w, "l {} {}", 2 * row + 1, 2 * row + 2)?;

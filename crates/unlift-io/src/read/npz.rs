@@ -98,17 +98,17 @@ pub fn positions(path: &Path) -> Result<Input, Error> {
         let found = kind.unwrap_or_else(|| "a stage file of unlift".to_owned());
         return Err(Error::new(path, "", "points of a map", found));
     }
-    let (mut fit, mut n_columns) = (Vec::new(), Vec::new());
+    let (mut fit, mut has_points) = (Vec::new(), false);
     for (at, name) in &all {
         let header = archive.array(*at, name).and_then(|mut bytes| Header::read(&mut bytes));
         if let Some((_, layout)) = header.ok().and_then(|header| header.points()) {
-            n_columns.push(if let Layout::Matrix { columns } = layout { columns } else { 3 });
             fit.push((*at, &**name));
+            has_points |= !matches!(layout, Layout::Matrix { columns: 4.. });
         }
     }
     let has = |start: &str| all.iter().any(|(_, name)| name.starts_with(start));
     // Some programs store position, size and angle of keypoints in one array, beside descriptors.
-    let beside_descriptors = has("descriptors") && n_columns.iter().all(|&n| n > 3);
+    let beside_descriptors = has("descriptors") && !has_points;
     if has("keypoints") || has("OPENSFM_FEATURES") || beside_descriptors {
         return Err(Error::new(path, "", "points of a map", "features of an image"));
     }
@@ -117,17 +117,18 @@ pub fn positions(path: &Path) -> Result<Input, Error> {
         fit.retain(|(_, name)| is_known(name));
     }
     let [(at, name)] = fit[..] else {
-        let fit: Vec<&str> = fit.into_iter().map(|(_, name)| name).collect();
-        let all: Vec<&str> = all.iter().map(|(_, name)| &**name).collect();
-        let names = if fit.is_empty() { &all } else { &fit };
-        let names: Vec<String> = names.iter().take(5).map(|name| quoted(name.as_bytes())).collect();
+        if fit.is_empty() {
+            fit = all.iter().map(|(at, name)| (*at, &**name)).collect();
+        }
+        let names: Vec<String> =
+            fit.iter().take(5).map(|(_, name)| quoted(name.as_bytes())).collect();
         let found = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
         let expected = "one array of points, (n, 3), or one that is called points or xyz";
         return Err(Error::new(path, "", expected, found));
     };
-    let mut found = of_points(&mut archive.array(at, name)?, "npz")?;
+    let mut input = of_points(&mut archive.array(at, name)?, "npz")?;
     if all.len() > 1 {
-        found.notes.push(format!("read, the array {} of {}", quoted(name.as_bytes()), all.len()));
+        input.notes.push(format!("read, the array {} of {}", quoted(name.as_bytes()), all.len()));
     }
-    Ok(found)
+    Ok(input)
 }

@@ -7,7 +7,6 @@ use unlift::neighbors::Neighborhoods;
 
 use super::Kind;
 use super::arrays::{Arrays, Class, NONE};
-use super::meta::{insert_about, new_meta};
 use super::write::{Written, write_file};
 use crate::Error;
 use crate::atomic::Access;
@@ -19,10 +18,9 @@ pub fn write_neighborhoods(path: &Path, neighborhoods: &Neighborhoods) -> Result
 }
 
 pub(super) fn written(lists: &Neighborhoods) -> Written<'_> {
-    let mut meta = new_meta(Kind::Neighborhoods);
-    insert_about(&mut meta, lists.about());
     let (n, k) = (lists.n_slots(), lists.longest());
-    let mut written = Written::new(meta, n);
+    let mut written = Written::new(Kind::Neighborhoods, n);
+    written.state_about(lists.about());
     let records = (0..n).flat_map(move |slot| {
         let list = lists.of(slot).iter().map(|record| record.0 as i32);
         list.chain(std::iter::repeat(-1)).take(k)

@@ -13,7 +13,7 @@ use crate::Error;
 pub(super) const KEY: &str = "unlift";
 
 /// The version that is written, and the only one that is read.
-const VERSION: u64 = 1;
+pub(super) const VERSION: u64 = 1;
 
 const KEYS: [&str; 12] = [
     "kind",
@@ -140,23 +140,6 @@ fn short(value: &Value) -> String {
         Some((at, _)) => format!("{}...", &text[..at]),
         None => text,
     }
-}
-
-pub(super) fn new_meta(kind: Kind) -> Map<String, Value> {
-    let mut object = Map::new();
-    object.insert("kind".into(), json!(kind.name()));
-    object.insert("version".into(), json!(VERSION));
-    object
-}
-
-pub(super) fn insert_fingerprint(meta: &mut Map<String, Value>, map: Option<Fingerprint>) {
-    meta.extend(map.map(|map| ("fingerprint".to_owned(), json!(map.to_string()))));
-}
-
-pub(super) fn insert_about(meta: &mut Map<String, Value>, about: About) {
-    insert_fingerprint(meta, about.map);
-    meta.extend(about.order.name().map(|name| ("rows_by".to_owned(), json!(name))));
-    meta.extend(about.by_oracle.then(|| ("lists_by".to_owned(), json!("oracle"))));
 }
 
 /// Formats `meta` with sorted keys, so that equal values make equal bytes with any map type of

@@ -2,13 +2,12 @@
 
 use std::path::Path;
 
-use serde_json::json;
 use unlift::Unit;
 use unlift::recover::{Confidence, Estimate, Recovered, Status, Unknown};
 
 use super::Kind;
 use super::arrays::{Arrays, Class, NONE};
-use super::meta::{WHY_UNKNOWN, insert_about, new_meta};
+use super::meta::WHY_UNKNOWN;
 use super::write::{Written, write_file};
 use crate::Error;
 use crate::atomic::Access;
@@ -51,13 +50,12 @@ pub(super) fn written<'a, const D: usize>(
         return Err(Error::new(path, "delta", "a number of at least 0", found));
     }
     let n = recovered.n_slots();
-    let mut meta = new_meta(Kind::Recovered);
-    meta.insert("unit".into(), json!(recovered.unit().name()));
-    meta.insert("delta".into(), json!(recovered.delta()));
-    insert_about(&mut meta, recovered.about());
+    let mut written = Written::new(Kind::Recovered, n);
+    written.state("unit", recovered.unit().name());
+    written.state("delta", recovered.delta());
+    written.state_about(recovered.about());
     let unknown = recovered.confidence_unknown().filter(|&why| why != Unknown::NotGiven);
-    meta.extend(unknown.map(|why| (WHY_UNKNOWN.to_owned(), json!(why.name()))));
-    let mut written = Written::new(meta, n);
+    written.state(WHY_UNKNOWN, unknown.map(Unknown::name));
     let positions = (0..n).flat_map(|slot| recovered.position(slot).unwrap_or([f64::NAN; D]));
     written.array("position", &[n, D], positions);
     written.array("status", &[n], recovered.status().iter().map(|&status| status as u8));

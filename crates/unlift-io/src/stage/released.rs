@@ -3,7 +3,6 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use serde_json::json;
 use unlift::descriptors::Values;
 use unlift::geometry::frame::Bounds;
 use unlift::protected::Rule;
@@ -12,7 +11,6 @@ use unlift::{Descriptors, ProtectedDescriptors};
 
 use super::Kind;
 use super::arrays::Arrays;
-use super::meta::{insert_fingerprint, new_meta};
 use super::write::{Written, write_file};
 use crate::Error;
 use crate::atomic::Access;
@@ -63,12 +61,11 @@ pub fn write_released<const D: usize>(path: &Path, released: &Released<D>) -> Re
 pub(super) fn written<const D: usize>(released: &Released<D>) -> Written<'_> {
     let obfuscation = released.obfuscation();
     let (n, slots) = (released.n_records(), released.slots_per_record());
-    let mut meta = new_meta(Kind::Released);
-    meta.insert("family".into(), json!(obfuscation.family()));
-    meta.insert("slots_per_record".into(), json!(slots));
-    meta.insert("unit".into(), json!(released.unit().name()));
-    insert_fingerprint(&mut meta, Some(released.fingerprint()));
-    let mut written = Written::new(meta, n);
+    let mut written = Written::new(Kind::Released, n);
+    written.state("family", obfuscation.family());
+    written.state("slots_per_record", slots);
+    written.state("unit", released.unit().name());
+    written.state("fingerprint", released.fingerprint().to_string());
     match obfuscation {
         Obfuscation::Lines(lines) => {
             written.vectors("foot", lines.foot());
@@ -133,10 +130,10 @@ fn write_protected<'a>(
         Rule::Words { m, epsilon } => {
             let Values::F32(words) = rows.values() else { return };
             written.array(WORDS, &[n, slots, m], words.iter().map(|&word| word as i32));
-            written.meta.insert(EPSILON.into(), json!(epsilon));
+            written.state(EPSILON, epsilon);
         }
     }
-    written.meta.insert(OF_BYTES.into(), json!(protected.of_bytes()));
+    written.state(OF_BYTES, protected.of_bytes());
     if let Some(public) = protected.public() {
         write_rows(written, PUBLIC, public, &[public.len(), public.dim()]);
     }

@@ -2,13 +2,11 @@
 
 use std::path::Path;
 
-use serde_json::json;
 use unlift::truth::{DropReason, Dropped, Original, Secret};
 use unlift::{OriginalId, PointSet};
 
 use super::Kind;
 use super::arrays::{Arrays, NONE};
-use super::meta::{insert_fingerprint, new_meta};
 use super::write::{Written, write_file};
 use crate::Error;
 use crate::atomic::Access;
@@ -39,11 +37,10 @@ pub(super) fn written<'a, const D: usize>(
         let expected = format!("{n} originals, as in the secret");
         return Err(Error::new(path, "", expected, points.len().to_string()));
     }
-    let mut meta = new_meta(Kind::Truth);
-    meta.insert("unit".into(), json!(points.unit().name()));
-    meta.insert("slots_per_record".into(), json!(secret.slots_per_record()));
-    insert_fingerprint(&mut meta, secret.map());
-    let mut written = Written::new(meta, n);
+    let mut written = Written::new(Kind::Truth, n);
+    written.state("unit", points.unit().name());
+    written.state("slots_per_record", secret.slots_per_record());
+    written.state("fingerprint", secret.map().map(|map| map.to_string()));
     written.vectors("position", points.positions());
     // Returns a value of each slot in the order of originals, -1 for dropped ones.
     let by_original = |of_slot: &dyn Fn(usize) -> i32| {

@@ -7,10 +7,12 @@ use std::path::Path;
 use std::rc::Rc;
 
 use serde_json::{Map, Value};
+use unlift::About;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, System, ZipWriter};
 
-use super::meta::{KEY, to_text};
+use super::Kind;
+use super::meta::{KEY, VERSION, to_text};
 use crate::Error;
 use crate::atomic::{self, Access};
 use crate::read::npy::tuple;
@@ -56,8 +58,26 @@ macro_rules! numbers {
 numbers!(u8: "|u1", i8: "|i1", u16: "<u2", i32: "<i4", f32: "<f4", f64: "<f8");
 
 impl<'a> Written<'a> {
-    pub(super) fn new(meta: Map<String, Value>, n_rows: usize) -> Self {
-        Self { meta, n_rows, arrays: Vec::new() }
+    pub(super) fn new(kind: Kind, n_rows: usize) -> Self {
+        let mut written = Self { meta: Map::new(), n_rows, arrays: Vec::new() };
+        written.state("kind", kind.name());
+        written.state("version", VERSION);
+        written
+    }
+
+    /// Adds a value to the metadata, unless it is `None`.
+    pub(super) fn state(&mut self, key: &str, value: impl Into<Value>) {
+        let value = value.into();
+        if !value.is_null() {
+            self.meta.insert(key.to_owned(), value);
+        }
+    }
+
+    /// Adds the released map, the order of rows, and the author of lists, as far as known.
+    pub(super) fn state_about(&mut self, about: About) {
+        self.state("fingerprint", about.map.map(|map| map.to_string()));
+        self.state("rows_by", about.order.name());
+        self.state("lists_by", about.by_oracle.then_some("oracle"));
     }
 
     /// Adds an array of `shape` with `values` in the order of rows.
@@ -124,8 +144,7 @@ impl<'a> Zip<'a> {
         let letters: Vec<u8> = text.chars().flat_map(|c| u32::from(c).to_le_bytes()).collect();
         let descr = format!("<U{}", letters.len() / 4);
         self.start(name, &descr, &[], letters.len())?;
-        self.writer.write_all(&letters)?;
-        self.so_far()
+        self.writer.write_all(&letters)
     }
 
     /// Writes all arrays, with `prefix` before their names.
