@@ -291,7 +291,7 @@ impl Audited {
         set.commit()?;
         if let Some(path) = &output.junit {
             check_file_of(JUNIT, path, Kind::Junit, &rules)?;
-            let text = unlift_report::junit(&document);
+            let text = unlift_report::junit(&document)?;
             write_file(path, Access::Usual, |w| w.write_all(text.as_bytes()))?;
         }
         Ok(Finished { document, report: output.folder.join(PAGE) })

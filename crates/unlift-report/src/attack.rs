@@ -53,9 +53,23 @@ impl Given {
                     && noise(&self.oracle_noise) == noise(&other.oracle_noise)))
     }
 
+    /// Returns the name of the source as users type it: `oracle`, `oracle (near)`, `overlap`, `given lists`.
+    pub(crate) fn source(&self) -> String {
+        match (self.neighbors.as_str(), self.oracle_noise.as_deref()) {
+            ("oracle", None | Some("uniform")) => "oracle".to_owned(),
+            ("oracle", Some(noise)) => format!("oracle ({noise})"),
+            ("file", _) => "given lists".to_owned(),
+            (own, _) => own.to_owned(),
+        }
+    }
+
+    pub(crate) fn plain_source(&self) -> String {
+        plain_source(&self.neighbors, self.oracle_noise.as_deref())
+    }
+
+    /// Returns the source and its quality: `known neighbors, 50 % right`.
     pub(crate) fn label(&self) -> String {
-        let source = plain_source(&self.neighbors, self.oracle_noise.as_deref());
-        format!("{source}, {} % right", words::ratio_percent(self.inlier_ratio))
+        format!("{}, {} % right", self.plain_source(), words::ratio_percent(self.inlier_ratio))
     }
 }
 
@@ -104,7 +118,6 @@ impl Basis {
     }
 }
 
-/// Returns the basis of a row.
 pub(crate) fn basis(row: &Row) -> Basis {
     Basis::of(&row.neighbors, &row.solver)
 }
@@ -114,11 +127,13 @@ const SEQUENCE: &str = "sequence";
 pub(crate) const SEQUENCE_AND_LISTS: &str = "sequence+lists";
 const TRACKS: &str = "tracks";
 
+/// The attacker's own sources that use descriptors.
+pub(crate) const BY_DESCRIPTORS: [&str; 4] = ["similarity", "overlap", "descriptors", "learned"];
+
 /// Sources of two releases: links by descriptors, and by geometry alone.
 pub(crate) const AGAIN: &str = "again";
 const AGAIN_GEOMETRY: &str = "again-geometry";
 
-/// Returns whether a row is of two releases.
 pub(crate) fn is_again(neighbors: &str) -> bool {
     [AGAIN, AGAIN_GEOMETRY].contains(&neighbors)
 }
@@ -134,23 +149,12 @@ pub(crate) fn intersects(neighbors: &str) -> bool {
     is_again(neighbors) || queries(neighbors).is_some()
 }
 
-/// Returns whether a solver reads lists of neighbors.
 pub(crate) fn reads_lists(solver: &str) -> bool {
     !["density", "tomography"].contains(&solver)
 }
 
 pub(crate) fn is_oracle(neighbors: &str) -> bool {
     neighbors == "oracle"
-}
-
-/// Returns the name of a source as users type it: `oracle`, `oracle (near)`, `overlap`, `given lists`.
-pub(crate) fn source(neighbors: &str, oracle_noise: Option<&str>) -> String {
-    match (neighbors, oracle_noise) {
-        ("oracle", None | Some("uniform")) => "oracle".to_owned(),
-        ("oracle", Some(noise)) => format!("oracle ({noise})"),
-        ("file", _) => "given lists".to_owned(),
-        (own, _) => own.to_owned(),
-    }
 }
 
 /// Returns the name of a source in plain words, for the page: `known neighbors`, `neighbors by descriptor overlap`.
@@ -183,7 +187,7 @@ pub(crate) fn plain_source(neighbors: &str, oracle_noise: Option<&str>) -> Strin
 /// Returns the attack of a row in a few words, for a sentence: `known neighbors`, `records alone`.
 pub(crate) fn briefly(row: &Row) -> String {
     match reads_lists(&row.solver) {
-        true => plain_source(&row.neighbors, row.oracle_noise.as_deref()),
+        true => Given::of(row).plain_source(),
         false => records_alone(None),
     }
 }

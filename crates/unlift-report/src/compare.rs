@@ -2,15 +2,13 @@
 
 use jiff::civil::Date;
 use jiff::{Timestamp, tz::TimeZone};
-use minijinja::value::Serde;
 use serde::Serialize;
 use serde_json::json;
 
-use crate::attack::{self, Attack};
+use crate::attack::{self, Attack, Given};
 use crate::document::{Document, Input, Localization, Row};
-use crate::page::environment;
-use crate::results::Results;
-use crate::{Error, words};
+use crate::results::{Results, distinct};
+use crate::{Error, templates, words};
 
 /// The old and the new figure of one attack, scheme and threshold.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -151,62 +149,45 @@ pub fn compare(
 ) -> Result<Comparison, Incomparable> {
     let [was, is] = &[old, new].map(Results::of);
     let within = common_thresholds(was, is)?;
-    let mut changes = Vec::new();
+    let mut all = Vec::new();
     let mut only_new = Vec::new();
     let mut taken = vec![false; was.rows.len()];
     for row in is.rows {
         let attack = Attack::of(row);
-        let is_like = |at: &usize| {
-            let other = &was.rows[*at];
-            !taken[*at] && attack.is_of(other) && other.k == row.k
-        };
-        let Some(at) = (0..was.rows.len()).find(is_like) else {
+        let is_like =
+            |(before, taken): (&Row, &bool)| !taken && attack.is_of(before) && before.k == row.k;
+        let Some(at) = was.rows.iter().zip(&taken).position(is_like) else {
             only_new.push(unmatched(row));
             continue;
         };
         taken[at] = true;
-        let shares = |row: &Row, typed: &str| row.recovered_percent.get(typed).copied();
-        changes.extend(within.iter().filter_map(|[before, after]| {
-            let (before, percent) = (shares(&was.rows[at], before)?, shares(row, after)?);
-            Some(change(&row.scheme, attack_of(row), after, before, percent))
-        }));
+        let shares = [&was.rows[at], row]
+            .map(|row| move |typed: &str| row.recovered_percent.get(typed).copied());
+        all.extend(changes(&within, &row.scheme, &attack_of(row), shares));
     }
-    if changes.is_empty() {
+    if all.is_empty() {
         return Err(Incomparable {
             place: "results".into(),
             expected: "an attack of the same scheme, source, ratio, k and solver".to_owned(),
             found: format!("none among {}", is.rows.len()),
         });
     }
-    type Figure = fn(&Row, &str) -> Option<f64>;
-    let baselines: [(&str, Figure); 2] = [
-        ("blind guess", |row, typed| row.blind_percent.get(typed).copied()),
-        (RECORDS_ALONE, |row, typed| row.records_alone_percent.as_ref()?.get(typed).copied()),
-    ];
-    for scheme in &is.schemes {
-        for (name, figure) in baselines {
-            changes.extend(within.iter().filter_map(|[before, after]| {
-                let before = was.max(scheme, |row| figure(row, before))?;
-                let percent = is.max(scheme, |row| figure(row, after))?;
-                Some(change(scheme, name.to_owned(), after, before, percent))
-            }));
-        }
-    }
     let missing = was.rows.iter().zip(&taken).filter(|(_, taken)| !**taken);
     let mut only_old: Vec<Unmatched> = missing.map(|(row, _)| unmatched(row)).collect();
-    for scheme in &is.schemes {
+    for &scheme in &is.schemes {
+        let blind = [was, is].map(|of| move |typed: &str| of.blind(scheme, typed));
+        all.extend(changes(&within, scheme, "blind guess", blind));
+        let alone = [was, is].map(|of| move |typed: &str| Some(of.records_alone(scheme, typed)?.0));
+        all.extend(changes(&within, scheme, RECORDS_ALONE, alone));
         let has_alone =
-            |of: &Results<'_>| of.of_scheme(scheme).any(|row| row.records_alone_percent.is_some());
-        let (scheme, attack) = ((*scheme).to_owned(), RECORDS_ALONE.to_owned());
-        match (has_alone(was), has_alone(is)) {
-            (true, false) => only_old.push(Unmatched { scheme, attack }),
-            (false, true) if was.schemes.contains(&scheme.as_str()) => {
-                only_new.push(Unmatched { scheme, attack });
-            }
+            [was, is].map(|of| of.of_scheme(scheme).any(|row| row.records_alone_percent.is_some()));
+        let unmatched = Unmatched { scheme: scheme.to_owned(), attack: RECORDS_ALONE.to_owned() };
+        match has_alone {
+            [true, false] => only_old.push(unmatched),
+            [false, true] if was.schemes.contains(&scheme) => only_new.push(unmatched),
             _ => {}
         }
     }
-    let lost = lost(was, is, &taken);
     // The largest standard deviation of a share over repeats.
     let deviations = was.rows.iter().chain(is.rows).filter_map(|row| row.std.as_ref());
     let deviations =
@@ -218,50 +199,63 @@ pub fn compare(
     // Rounding errors in the last bit must not fail a build.
     let beyond = tolerance_points + 1e-9;
     let (mut more, rest): (Vec<_>, Vec<_>) =
-        changes.into_iter().partition(|change| change.points > beyond);
+        all.into_iter().partition(|change| change.points > beyond);
     let (mut less, same): (Vec<_>, Vec<_>) =
         rest.into_iter().partition(|change| change.points < -beyond);
     more.sort_by(|a, b| b.points.total_cmp(&a.points));
     less.sort_by(|a, b| a.points.total_cmp(&b.points));
-    let costs_more = costs_more(old, new);
-    let differs = |of: Difference| {
-        format!("{}: {} in the old audit, {} in the new one", of.property, of.was, of.is)
+    let differs = |of: Incomparable| {
+        format!("{}: {} in the old audit, {} in the new one", of.place, of.expected, of.found)
     };
-    let different: Vec<String> =
-        different(&old.input, &new.input).into_iter().map(differs).collect();
-    let is_accepted = accepted.as_ref().is_some_and(|accepted| !accepted.past);
-    let is_like = (different.is_empty() || is_accepted) && only_old.is_empty() && lost.is_empty();
-    let passed = is_like && more.is_empty() && costs_more.is_empty();
-    Ok(Comparison {
+    let mut comparison = Comparison {
         tolerance_points,
         tolerance_is,
-        passed,
-        different,
+        passed: false,
+        different: different(&old.input, &new.input).into_iter().map(differs).collect(),
         accepted,
         more,
         less,
         same,
-        costs_more,
-        lost,
+        costs_more: costs_more(old, new),
+        lost: lost(was, is, &taken),
         only_old,
         only_new,
-    })
+    };
+    comparison.passed = comparison.is_like()
+        && comparison.lost.is_empty()
+        && comparison.more.is_empty()
+        && comparison.costs_more.is_empty();
+    Ok(comparison)
 }
 
-/// A property in which two inputs differ.
-pub(crate) struct Difference {
-    pub property: String,
-    pub was: String,
-    pub is: String,
+/// Returns the changes of a figure from the old to the new audit, by pairs of thresholds.
+fn changes(
+    within: &[[&str; 2]],
+    scheme: &str,
+    attack: &str,
+    [was, is]: [impl Fn(&str) -> Option<f64>; 2],
+) -> Vec<Change> {
+    let change = |[before, after]: &[&str; 2]| {
+        let (old_percent, new_percent) = (was(before)?, is(after)?);
+        Some(Change {
+            scheme: scheme.to_owned(),
+            attack: attack.to_owned(),
+            threshold: (*after).to_owned(),
+            old_percent,
+            new_percent,
+            points: new_percent - old_percent,
+        })
+    };
+    within.iter().filter_map(change).collect()
 }
 
 /// Returns the properties in which two inputs differ. Share-safe audits have no hashes.
-pub(crate) fn different(a: &Input, b: &Input) -> Vec<Difference> {
+pub(crate) fn different(a: &Input, b: &Input) -> Vec<Incomparable> {
     let mut different = Vec::new();
     let mut expect = |property: &str, was: &str, is: &str| {
         if was != is {
-            let [property, was, is] = [property, was, is].map(str::to_owned);
-            different.push(Difference { property, was, is });
+            let [place, expected, found] = [property, was, is].map(str::to_owned);
+            different.push(Incomparable { place, expected, found });
         }
     };
     let scale = |scale: Option<f64>| scale.map_or("none".to_owned(), |scale| scale.to_string());
@@ -334,7 +328,7 @@ fn common_thresholds<'a>(
 
 /// Returns the name of a row's attack, without a measured ratio, which differs even between equal audits.
 fn attack_of(row: &Row) -> String {
-    let source = attack::source(&row.neighbors, row.oracle_noise.as_deref());
+    let source = Given::of(row).source();
     let right = match attack::is_oracle(&row.neighbors) {
         true => format!(", {} % true neighbors", words::ratio_percent(row.inlier_ratio)),
         false => String::new(),
@@ -346,57 +340,46 @@ fn unmatched(row: &Row) -> Unmatched {
     Unmatched { scheme: row.scheme.clone(), attack: attack_of(row) }
 }
 
-fn change(scheme: &str, attack: String, typed: &str, was: f64, is: f64) -> Change {
-    Change {
-        scheme: scheme.to_owned(),
-        attack,
-        threshold: typed.to_owned(),
-        old_percent: was,
-        new_percent: is,
-        points: is - was,
-    }
-}
-
 /// Returns the schemes of the old audit without a matching row in the new one, and the sources that are no longer audited.
 fn lost(old: &Results<'_>, new: &Results<'_>, taken: &[bool]) -> Vec<Lost> {
-    let mut lost: Vec<Lost> = Vec::new();
-    for Row { scheme, neighbors, .. } in old.rows {
-        let refused = |by: Option<&String>| {
-            let mut refused = new.document.not_audited.iter();
-            refused.find(|of| of.scheme == *scheme && of.neighbors.as_ref() == by)
-        };
+    let refused = |scheme: &str, by: Option<&str>| {
+        let mut refused = new.document.not_audited.iter();
+        let refused = refused.find(|of| of.scheme == scheme && of.neighbors.as_deref() == by);
+        refused.map(|of| format!("not audited: {}", of.reason))
+    };
+    let lost = old.rows.iter().filter_map(|Row { scheme, neighbors, .. }| {
         let mut rows = old.rows.iter().zip(taken).filter(|(row, _)| row.scheme == *scheme);
-        let (neighbors, reason) = if rows.all(|(_, taken)| !taken) {
-            let reason = match refused(None) {
-                Some(refused) => format!("not audited: {}", refused.reason),
-                None if new.schemes.contains(&scheme.as_str()) => {
-                    "no attack of the old audit is in the new one".to_owned()
-                }
-                None => "no row in the new audit".to_owned(),
-            };
-            (None, reason)
-        } else if let Some(refused) = refused(Some(neighbors)) {
-            (Some(neighbors.clone()), format!("not audited: {}", refused.reason))
-        } else {
-            continue;
-        };
-        let entry = Lost { scheme: scheme.clone(), neighbors, reason };
-        if !lost.contains(&entry) {
-            lost.push(entry);
+        if rows.any(|(_, taken)| *taken) {
+            let reason = refused(scheme, Some(neighbors))?;
+            return Some(Lost {
+                scheme: scheme.clone(),
+                neighbors: Some(neighbors.clone()),
+                reason,
+            });
         }
-    }
-    lost
+        let otherwise = match new.schemes.contains(&scheme.as_str()) {
+            true => "no attack of the old audit is in the new one",
+            false => "no row in the new audit",
+        };
+        let reason = refused(scheme, None).unwrap_or_else(|| otherwise.to_owned());
+        Some(Lost { scheme: scheme.clone(), neighbors: None, reason })
+    });
+    distinct(lost)
 }
 
 impl Comparison {
+    /// Returns true if the new audit has all attacks of the old one, on the same inputs or on inputs that may differ.
+    fn is_like(&self) -> bool {
+        let is_accepted = self.accepted.as_ref().is_some_and(|accepted| !accepted.past);
+        (self.different.is_empty() || is_accepted) && self.only_old.is_empty()
+    }
+
     /// Returns the comparison in one line.
     pub fn summary(&self) -> String {
         let [more, less, same] = [&self.more, &self.less, &self.same].map(Vec::len);
         let (points, is) = (self.tolerance_points, self.tolerance_is);
         let point = if points == 1.0 { "point" } else { "points" };
-        let is_accepted = self.accepted.as_ref().is_some_and(|accepted| !accepted.past);
-        let is_like = (self.different.is_empty() || is_accepted) && self.only_old.is_empty();
-        let not = if is_like { "" } else { "not compared: " };
+        let not = if self.is_like() { "" } else { "not compared: " };
         let mut text = format!(
             "{not}{} figures compared, tolerance {points} {point} ({is}): {more} leak more, {less} less, {same} as before",
             more + less + same
@@ -420,21 +403,21 @@ pub fn page(comparison: &Comparison, old: &Document, new: &Document) -> Result<S
             "which": which,
             "path": document.input.path,
             "sha256": document.input.sha256,
-            "n_points": words::thousands(document.input.n_points),
+            "n_points": document.input.n_points,
             "seed": document.seed,
             "unlift": document.unlift,
         })
     });
     let results = Results::of(new);
-    let cells = |change: &Change| {
-        [
-            change.scheme.clone(),
-            change.attack.clone(),
+    let row = |change: &Change| {
+        json!([
+            change.scheme,
+            change.attack,
             results.threshold(&change.threshold),
             words::percent(change.old_percent),
             words::percent(change.new_percent),
             format!("{:+.1}", change.points),
-        ]
+        ])
     };
     let tables = [
         ("more", "Leaks more", &comparison.more),
@@ -443,8 +426,7 @@ pub fn page(comparison: &Comparison, old: &Document, new: &Document) -> Result<S
     ];
     let tables = tables.into_iter().filter(|(.., changes)| !changes.is_empty());
     let tables = tables.map(|(id, title, changes)| {
-        let rows: Vec<[String; 6]> = changes.iter().map(cells).collect();
-        json!({ "id": id, "title": title, "rows": rows })
+        json!({ "id": id, "title": title, "rows": changes.iter().map(row).collect::<Vec<_>>() })
     });
     let page = json!({
         "style": include_str!("../template/style.css"),
@@ -454,7 +436,5 @@ pub fn page(comparison: &Comparison, old: &Document, new: &Document) -> Result<S
         "audits": audits,
         "tables": tables.collect::<Vec<_>>(),
     });
-    let mut env = environment();
-    env.add_template("compare.html", include_str!("../template/compare.html"))?;
-    Ok(env.get_template("compare.html")?.render(Serde(&page))?)
+    templates::render(&[("compare.html", include_str!("../template/compare.html"))], &page)
 }

@@ -1,9 +1,8 @@
-//! The results of the user's gates in words: on the page, in the terminal, and as JUnit XML.
+//! The results of the user's gates in words.
 
 use serde_json::{Value, json};
 
 use crate::document::{Document, GateResult};
-use crate::export::escaped;
 use crate::words;
 
 /// Returns what the page says of gates, the failed ones first; `None` without gates.
@@ -20,9 +19,12 @@ pub(crate) fn gates(document: &Document) -> Option<Value> {
         (m, n) => format!("{m} of {n} gates failed"),
     };
     gates.sort_by_key(|gate| gate.passed);
-    let gate = |gate: &&GateResult| json!({ "gate": gate.gate, "passed": gate.passed, "said": in_words(gate) });
-    let gates: Vec<Value> = gates.iter().map(gate).collect();
+    let gates: Vec<Value> = gates.into_iter().map(entry).collect();
     Some(json!({ "summary": summary, "passed": failed == 0, "gates": gates }))
+}
+
+pub(crate) fn entry(gate: &GateResult) -> Value {
+    json!({ "gate": gate.gate, "passed": gate.passed, "said": in_words(gate) })
 }
 
 /// Returns a line per gate: whether it held, the figure found, and its attack. The text ends with a line break
@@ -87,48 +89,6 @@ fn beside(figure: f64, bound: f64) -> String {
         text.parse::<f64>().is_ok_and(|rounded| (rounded > bound) == (figure > bound))
     };
     texts.into_iter().find(on_its_side).unwrap_or_else(|| figure.to_string())
-}
-
-/// Returns the gates of `document` as JUnit XML, the test results that GitLab, Jenkins and others show: one test suite
-/// with a test case per gate. A gate that did not hold is a failure. Unusable images are an error, because gates do
-/// not cover them. The text ends with a line break.
-pub fn junit(document: &Document) -> String {
-    let failures = document.gates.iter().filter(|gate| !gate.passed).count();
-    let unusable = document.input.images.as_ref().filter(|images| images.unusable > 0);
-    let errors = usize::from(unusable.is_some());
-    let tests = document.gates.len() + errors;
-    // The schema of Jenkins accepts at most three decimals.
-    let time = format!("{:.3}", document.run.seconds.total.max(0.0));
-    let counts = format!("tests=\"{tests}\" failures=\"{failures}\" errors=\"{errors}\"");
-    let suite = escaped(document.input.path.as_deref().unwrap_or("unlift audit"));
-    let mut text = format!(
-        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
-         <testsuites name=\"unlift\" {counts} time=\"{time}\">\n  \
-         <testsuite name=\"{suite}\" {counts} skipped=\"0\" time=\"{time}\">\n"
-    );
-    for gate in &document.gates {
-        // Test cases are grouped by the scheme at the start of a gate.
-        let scheme = escaped(gate.gate.split([':', '@']).next().unwrap_or_default());
-        let (name, words) = (escaped(&gate.gate), escaped(&in_words(gate)));
-        let result = match gate.passed {
-            true => format!("<system-out>{words}</system-out>"),
-            false => {
-                format!("<failure message=\"{words}\" type=\"gate\">{name}: {words}</failure>")
-            }
-        };
-        text.push_str(&format!(
-            "    <testcase name=\"{name}\" classname=\"unlift.{scheme}\">\n      {result}\n    </testcase>\n"
-        ));
-    }
-    if let Some(images) = unusable {
-        let (unusable, all) = (images.unusable, images.used + images.unusable);
-        let words = format!("{unusable} of {all} images could not be used, and are in no figure");
-        text.push_str(&format!(
-            "    <testcase name=\"images\" classname=\"unlift.input\">\n      <error message=\"{words}\" \
-             type=\"input\">{words}</error>\n    </testcase>\n"
-        ));
-    }
-    text + "  </testsuite>\n</testsuites>\n"
 }
 
 #[cfg(test)]

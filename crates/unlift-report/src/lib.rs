@@ -36,15 +36,15 @@ mod page;
 mod release;
 mod results;
 mod table;
+mod templates;
 mod words;
 
 pub use attack::{Attack, ByAttack, Given};
 pub use document::{Document, Error, rounded};
-pub use export::text_table;
-pub use gates::{gate_lines, junit};
+pub use export::{junit, text_table};
+pub use gates::gate_lines;
+pub use page::curves::ErrorCdf;
 pub use page::scene::Scene3d;
-pub use page::{
-    ErrorCdf, Opening, RenderOptions, Shares, inversions, pictures, render, scene, shares,
-};
+pub use page::{Opening, RenderOptions, Shares, inversions, pictures, render, scene, shares};
 pub use release::leak;
 pub use words::align;

@@ -27,8 +27,8 @@ pub fn leak(
     if audited.sha256.is_none() {
         return wrong("input", "the hash of the map", "a share-safe audit, without hashes");
     }
-    if let Some(other) = different(audited, input).first() {
-        return wrong(&other.property, &format!("{}, as of this release", other.is), &other.was);
+    if let Some(Incomparable { place, expected, found }) = different(audited, input).first() {
+        return wrong(place, &format!("{found}, as of this release"), expected);
     }
     let has_rows = |of: &Input| of.other_sha256.contains_key("descriptors");
     if has_rows(input) && !has_rows(audited) {

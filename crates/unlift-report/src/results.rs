@@ -43,17 +43,24 @@ impl<'a> Results<'a> {
         Self { document, rows, thresholds, headline, schemes, unit }
     }
 
-    /// Returns whether the audit is of images.
     pub(crate) fn is_of_images(&self) -> bool {
         self.unit == Unit::Pixel
     }
 
-    /// Returns whether the audit is of a sequence of queries.
+    /// Returns "these images" or "this map".
+    pub(crate) fn subject(&self) -> &'static str {
+        if self.is_of_images() { "these images" } else { "this map" }
+    }
+
+    /// Returns whether the audit is of several releases of the same points.
+    pub(crate) fn is_of_releases(&self) -> bool {
+        self.is_sequence() || self.is_again()
+    }
+
     pub(crate) fn is_sequence(&self) -> bool {
         self.rows.iter().any(|row| attack::queries(&row.neighbors).is_some())
     }
 
-    /// Returns whether the audit is of two releases.
     pub(crate) fn is_again(&self) -> bool {
         self.rows.iter().any(|row| attack::is_again(&row.neighbors))
     }
@@ -64,9 +71,8 @@ impl<'a> Results<'a> {
         refused.map(|refused| (refused.scheme.as_str(), refused.reason.as_str()))
     }
 
-    /// Returns "points" or "keypoints".
     pub(crate) fn points(&self) -> &'static str {
-        words::points(self.unit)
+        if self.is_of_images() { "keypoints" } else { "points" }
     }
 
     /// Returns a threshold in short form: `10 cm`.
@@ -89,7 +95,6 @@ impl<'a> Results<'a> {
         self.rows.iter().filter(move |row| row.scheme == scheme)
     }
 
-    /// Returns the percentage recovered within the headline threshold.
     pub(crate) fn share(&self, row: &Row) -> f64 {
         row.recovered_percent.get(self.headline).copied().unwrap_or(0.0)
     }
@@ -152,6 +157,11 @@ impl<'a> Results<'a> {
             Some((percent, by.map(String::as_str)))
         });
         shares.max_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// Returns the percentage by a blind guess within `typed`, the best of the scheme's rows.
+    pub(crate) fn blind(&self, scheme: &str, typed: &str) -> Option<f64> {
+        self.max(scheme, |row| row.blind_percent.get(typed).copied())
     }
 
     /// Returns the largest figure of a scheme's rows.

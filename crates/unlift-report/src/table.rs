@@ -79,14 +79,11 @@ impl Table {
     }
 
     pub(crate) fn without_empty_columns(mut self) -> Self {
-        let is_kept =
-            |at: usize| self.rows.is_empty() || self.rows.iter().any(|row| row[at] != NONE);
-        let kept: Vec<bool> = (0..self.columns.len()).map(is_kept).collect();
-        let mut keep = kept.iter();
-        self.columns.retain(|_| *keep.next().unwrap_or(&true));
-        for row in &mut self.rows {
-            let mut keep = kept.iter();
-            row.retain(|_| *keep.next().unwrap_or(&true));
+        for at in (0..self.columns.len()).rev() {
+            if !self.rows.is_empty() && self.rows.iter().all(|row| row[at] == NONE) {
+                self.columns.remove(at);
+                self.rows.iter_mut().for_each(|row| _ = row.remove(at));
+            }
         }
         self
     }
@@ -96,13 +93,16 @@ impl Table {
         (self.columns.len() > n && !self.rows.is_empty()).then_some(self)
     }
 
+    pub(crate) fn heads(&self) -> Vec<String> {
+        self.columns.iter().map(|head| head.name.clone()).collect()
+    }
+
     /// Returns the table for a terminal.
-    pub(crate) fn text(&self) -> String {
-        let heads = self.columns.iter().map(|head| head.name.clone()).collect();
-        let rows: Vec<Vec<String>> = [heads].into_iter().chain(self.rows.iter().cloned()).collect();
+    pub(crate) fn text(mut self) -> String {
         let is_left = |at: &usize| self.columns[*at].class != Class::Figure;
         let left: Vec<usize> = (0..self.columns.len()).filter(is_left).collect();
-        words::align(&rows, &left)
+        self.rows.insert(0, self.heads());
+        words::align(&self.rows, &left)
     }
 }
 

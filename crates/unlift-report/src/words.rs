@@ -1,5 +1,8 @@
 //! Numbers and names in words: thresholds, shares, ratios, schemes, reasons.
 
+use std::borrow::Borrow;
+use std::fmt::Display;
+
 use unlift::Unit;
 use unlift::audit::Interval;
 use unlift::obfuscate::{self, Facts};
@@ -65,13 +68,6 @@ pub(crate) fn threshold(typed: &str, unit: Unit) -> String {
     }
 }
 
-pub(crate) fn points(unit: Unit) -> &'static str {
-    match unit {
-        Unit::Meter | Unit::KthNeighbor => "points",
-        Unit::Pixel => "keypoints",
-    }
-}
-
 /// Returns a length in words: centimeters below a meter, pixels, or multiples of the unit.
 pub(crate) fn length(value: f64, unit: Unit) -> String {
     match unit {
@@ -99,12 +95,18 @@ fn grouped(value: f64) -> String {
     }
 }
 
-pub(crate) fn significant(value: f64, digits: usize) -> String {
+/// Rounds to significant decimal digits; zero and non-finite values stay unchanged.
+pub(crate) fn rounded(value: f64, digits: usize) -> f64 {
     if value == 0.0 || !value.is_finite() {
-        return value.to_string();
+        return value;
     }
-    let rounded: f64 = format!("{value:.*e}", digits - 1).parse().unwrap_or(value);
-    rounded.to_string()
+    // Rounding through decimal text is exact; `(value * 10^n).round() / 10^n` leaves a tail of
+    // nines.
+    format!("{value:.*e}", digits - 1).parse().unwrap_or(value)
+}
+
+pub(crate) fn significant(value: f64, digits: usize) -> String {
+    rounded(value, digits).to_string()
 }
 
 pub(crate) fn percent(value: f64) -> String {
@@ -143,10 +145,10 @@ pub(crate) fn capital(text: &str) -> String {
 }
 
 /// Joins items: "a, b and c".
-pub(crate) fn list(items: &[String]) -> String {
+pub(crate) fn list<S: Borrow<str> + Display>(items: &[S]) -> String {
     match items {
         [] => String::new(),
-        [item] => item.clone(),
+        [item] => item.to_string(),
         [first @ .., last] => format!("{} and {last}", first.join(", ")),
     }
 }
@@ -161,9 +163,9 @@ pub(crate) fn ratio_percent(ratio: f64) -> String {
 }
 
 /// Returns a count with thousands grouped: "21,149" for 21149.
-pub(crate) fn thousands(count: impl std::fmt::Display) -> String {
+pub(crate) fn thousands(count: impl Display) -> String {
     let digits = count.to_string();
-    let mut text = String::with_capacity(digits.len() + digits.len() / 3);
+    let mut text = String::new();
     for (i, digit) in digits.chars().enumerate() {
         if i > 0 && (digits.len() - i).is_multiple_of(3) {
             text.push(',');
@@ -230,6 +232,19 @@ pub fn align(rows: &[Vec<String>], left: &[usize]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn six_digits_are_kept_at_any_magnitude() {
+        for (value, expected) in [
+            (1.234_567_89, 1.234_57),
+            (89.123_456_7, 89.123_5),
+            (1.234_567_89e-9, 1.234_57e-9),
+            (-0.1 - 0.2, -0.3),
+            (0.0, 0.0),
+        ] {
+            assert_eq!(rounded(value, 6), expected);
+        }
+    }
 
     #[test]
     fn centimeters_need_meters() {

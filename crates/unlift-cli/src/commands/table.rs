@@ -47,7 +47,7 @@ pub fn run(args: &TableArgs) -> crate::Result<()> {
     let only = only.transpose()?;
     let text = match format {
         Some(format) => table(&document, format, only),
-        None => curves(&document, only).ok_or_else(|| {
+        None => curves(&document, only)?.ok_or_else(|| {
             Error::request(
                 "--out: expected an audit with rows by the oracle, for curves, found none",
             )

@@ -9,7 +9,7 @@ mod share;
 
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Map, Number, Value};
 use unlift::Unit;
 pub use unlift::audit::{
     Bound, BreakEven, ByReason, ByThreshold, Distinct, Intervals, NotAudited, ReliabilityBin, Row,
@@ -31,7 +31,7 @@ pub struct Document {
     /// The audited input.
     pub input: Input,
     /// The options that decide the results, by their long names without dashes.
-    pub options: serde_json::Map<String, serde_json::Value>,
+    pub options: Map<String, Value>,
     /// The random seed.
     pub seed: u64,
     /// The figures, one row per combination that was tried.
@@ -127,7 +127,7 @@ pub struct Localization {
     /// The scheme's user-facing name; [`UNPROTECTED`] for the map without protection.
     pub scheme: String,
     /// Whether the scheme protects keypoints of queries; else it protects the map.
-    #[serde(default, skip_serializing_if = "is_false")]
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub of_queries: bool,
     /// Error of the camera center, as a multiple of the unprotected one: the median over images.
     pub multiple: Option<f64>,
@@ -139,7 +139,7 @@ pub struct Localization {
     pub failed_percent: f64,
     /// Whether the scheme changes descriptors. The bound does not include matching, so it does not
     /// tell what this costs.
-    #[serde(default, skip_serializing_if = "is_false")]
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub changes_descriptors: bool,
     /// What was measured on images that were held out; `None` if it was not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -293,10 +293,6 @@ pub struct ImageRow {
     pub median_error: Option<f64>,
 }
 
-fn is_false(value: &bool) -> bool {
-    !value
-}
-
 impl Document {
     /// Returns the text of `audit.json`, indented, with measured numbers rounded to [`SIGNIFICANT_DIGITS`].
     ///
@@ -332,12 +328,11 @@ impl Document {
     pub fn from_json(text: &str) -> Result<Self, Error> {
         // Editors on Windows write a byte order mark first.
         let text = text.strip_prefix('\u{FEFF}').unwrap_or(text);
-        let value: serde_json::Value = serde_json::from_str(text)?;
+        let value: Value = serde_json::from_str(text)?;
         // A later schema would fail with an unclear error about a missing field.
-        if let Some(found) = value.get("schema").and_then(serde_json::Value::as_u64)
-            && found != u64::from(SCHEMA)
-        {
-            return Err(Error::Schema { expected: SCHEMA, found });
+        let schema = value.get("schema").and_then(Value::as_u64);
+        if let Some(schema) = schema.filter(|schema| *schema != u64::from(SCHEMA)) {
+            return Err(Error::Schema { expected: SCHEMA, found: schema });
         }
         let document: Self = serde_json::from_value(value)?;
         document.check()?;
@@ -351,16 +346,6 @@ impl Document {
 /// of sums.
 pub const SIGNIFICANT_DIGITS: usize = 6;
 
-/// Rounds `value` to [`SIGNIFICANT_DIGITS`]; zero and non-finite values stay unchanged.
-pub(crate) fn round(value: f64) -> f64 {
-    if value == 0.0 || !value.is_finite() {
-        return value;
-    }
-    // Rounding through decimal text is exact; `(value * 10^n).round() / 10^n` leaves a tail of
-    // nines.
-    format!("{value:.*e}", SIGNIFICANT_DIGITS - 1).parse().unwrap_or(value)
-}
-
 /// Returns `value` as JSON, with numbers rounded as in `audit.json`.
 pub fn rounded(value: &impl Serialize) -> serde_json::Result<Value> {
     let mut value = serde_json::to_value(value)?;
@@ -369,11 +354,11 @@ pub fn rounded(value: &impl Serialize) -> serde_json::Result<Value> {
 }
 
 /// Rounds every float in `value`; integers keep all digits.
-pub(crate) fn round_floats(value: &mut Value) {
+fn round_floats(value: &mut Value) {
     match value {
         Value::Number(number) if number.is_f64() => {
-            if let Some(rounded) = number.as_f64().map(round).and_then(serde_json::Number::from_f64)
-            {
+            let rounded = number.as_f64().map(|value| words::rounded(value, SIGNIFICANT_DIGITS));
+            if let Some(rounded) = rounded.and_then(Number::from_f64) {
                 *number = rounded;
             }
         }
@@ -411,18 +396,4 @@ pub enum Error {
         /// The value found.
         found: String,
     },
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn six_digits_are_kept_at_any_magnitude() {
-        assert_eq!(round(1.234_567_89), 1.234_57);
-        assert_eq!(round(89.123_456_7), 89.123_5);
-        assert_eq!(round(1.234_567_89e-9), 1.234_57e-9);
-        assert_eq!(round(-0.1 - 0.2), -0.3);
-        assert_eq!(round(0.0), 0.0);
-    }
 }

@@ -1,12 +1,13 @@
 //! Tables for papers and for other programs: every row as CSV (RFC 4180); in LaTeX and Markdown a row per scheme, and a column per
 //! kind of neighborhoods.
 
+use crate::attack::{self, Given};
 use crate::document::{ByThreshold, Row};
-use crate::page::curves::{GivenChoice, givens};
+use crate::page::curves::givens;
 use crate::page::tables::percent_cell;
 use crate::results::{Results, distinct};
-use crate::table::{NONE, Table, figure};
-use crate::{attack, words};
+use crate::table::{NONE, Table, figure, label};
+use crate::words;
 
 /// Returns all rows, with a column per figure, or per threshold of `within` if a figure depends on it. Unknown cells are empty.
 pub(super) fn csv(results: &Results<'_>, within: &[&str]) -> String {
@@ -42,8 +43,7 @@ pub(super) fn csv(results: &Results<'_>, within: &[&str]) -> String {
     }
     columns.push(figure("repeats", |row: &Row| row.repeats.to_string()));
     let table = Table::of("", "", results.rows, columns);
-    let heads = table.columns.into_iter().map(|head| head.name).collect();
-    [heads].iter().chain(&table.rows).map(|cells| line(cells)).collect()
+    [table.heads()].iter().chain(&table.rows).map(|cells| line(cells)).collect()
 }
 
 type Shares = fn(&Row) -> Option<&ByThreshold>;
@@ -83,102 +83,97 @@ fn quoted(cell: &str) -> String {
     }
 }
 
-/// The strongest attack per scheme and neighborhoods, and the two baselines.
-pub(super) struct Grid {
-    /// Version and seed, with which the table was made.
-    origin: String,
-    caption: String,
-    heads: Vec<String>,
-    rows: Vec<Vec<String>>,
-}
-
 /// The cell of a figure that the audit could not measure; it must not look like a small one.
 const NOT_AUDITED: &str = "not audited";
 
-impl Grid {
-    /// Returns a table whose cells have a figure per threshold of `within`.
-    pub(super) fn of(results: &Results<'_>, within: &[&str]) -> Self {
-        let document = results.document;
-        let givens = givens(results);
-        let joined = |cell: &dyn Fn(&str) -> String| {
-            within.iter().map(|typed| cell(typed)).collect::<Vec<_>>().join(" / ")
-        };
-        let any_alone = results.rows.iter().any(|row| row.records_alone_percent.is_some());
-        let mut heads = vec!["scheme".to_owned()];
-        heads.extend(givens.iter().map(head));
-        heads.push("blind".to_owned());
-        heads.extend(any_alone.then(|| attack::records_alone(None)));
-        let row = |scheme: &&str| {
-            let cell = |choice: &GivenChoice| {
-                let row = |typed: &str| results.strongest_given(scheme, &choice.given, typed);
-                if within.first().is_none_or(|typed| row(typed).is_none()) {
-                    let is_refused = document.not_audited.iter().any(|refused| {
-                        refused.scheme == *scheme
-                            && refused.neighbors.as_deref() == Some(&choice.given.neighbors)
-                    });
-                    return if is_refused { NOT_AUDITED } else { NONE }.to_owned();
-                }
-                joined(&|typed| {
-                    let row = row(typed);
-                    let spread = row.and_then(|row| row.std.as_ref()?.recovered_percent.get(typed));
-                    percent_cell(row.and_then(|row| row.recovered_percent.get(typed)), spread)
-                })
-            };
-            let blind = |typed: &str| {
-                let blind = results.max(scheme, |row| row.blind_percent.get(typed).copied());
-                percent_cell(blind.as_ref(), None)
-            };
-            let alone = |typed: &str| {
-                let alone = results.records_alone(scheme, typed).map(|(percent, _)| percent);
-                percent_cell(alone.as_ref(), None)
-            };
-            let mut cells = vec![(*scheme).to_owned()];
-            cells.extend(givens.iter().map(cell));
-            cells.push(joined(&blind));
-            cells.extend(any_alone.then(|| joined(&alone)));
-            cells
-        };
-        let mut rows: Vec<Vec<String>> = results.schemes.iter().map(row).collect();
-        rows.extend(results.refused().map(|(scheme, _)| {
-            let cells = vec![NOT_AUDITED.to_owned(); heads.len() - 1];
-            [vec![scheme.to_owned()], cells].concat()
-        }));
-        let origin = format!("unlift {}, seed {}", on_one_line(&document.unlift), document.seed);
-        Self { origin, caption: caption(results, within), heads, rows }
+/// Returns the strongest attack per scheme and neighborhoods, and the two baselines; cells have a figure per threshold of
+/// `within`.
+fn grid(results: &Results<'_>, within: &[&str]) -> Table {
+    let joined = |cell: &dyn Fn(&str) -> String| {
+        within.iter().map(|typed| cell(typed)).collect::<Vec<_>>().join(" / ")
+    };
+    let by = |scheme: &str, given: &Given| {
+        let row = |typed: &str| results.strongest_given(scheme, given, typed);
+        if within.first().is_none_or(|typed| row(typed).is_none()) {
+            let source = Some(given.neighbors.as_str());
+            let mut refused = results.document.not_audited.iter();
+            let is_refused =
+                refused.any(|of| of.scheme == scheme && of.neighbors.as_deref() == source);
+            return if is_refused { NOT_AUDITED } else { NONE }.to_owned();
+        }
+        joined(&|typed| {
+            let row = row(typed);
+            let spread = row.and_then(|row| row.std.as_ref()?.recovered_percent.get(typed));
+            percent_cell(row.and_then(|row| row.recovered_percent.get(typed)), spread)
+        })
+    };
+    let blind =
+        |scheme: &&str| joined(&|typed| percent_cell(results.blind(scheme, typed).as_ref(), None));
+    let alone = |scheme: &&str| {
+        joined(&|typed| {
+            let alone = results.records_alone(scheme, typed).map(|(percent, _)| percent);
+            percent_cell(alone.as_ref(), None)
+        })
+    };
+    let mut columns = vec![label("scheme", |scheme: &&str| (*scheme).to_owned())];
+    let by = &by;
+    columns.extend(
+        givens(results)
+            .into_iter()
+            .map(|given| figure(head(&given), move |scheme: &&str| by(scheme, &given))),
+    );
+    columns.push(figure("blind", blind));
+    if results.rows.iter().any(|row| row.records_alone_percent.is_some()) {
+        columns.push(figure(attack::records_alone(None), alone));
     }
+    let mut table = Table::of("", caption(results, within), &results.schemes, columns);
+    for (scheme, _) in results.refused() {
+        let mut cells = vec![NOT_AUDITED.to_owned(); table.columns.len()];
+        cells[0] = scheme.to_owned();
+        table.rows.push(cells);
+    }
+    table
+}
 
-    /// Returns a `tabular` with the rules of booktabs.
-    pub(super) fn latex(&self) -> String {
-        let line = |cells: &Vec<String>| {
-            let cells: Vec<String> = cells.iter().map(|cell| in_latex(cell)).collect();
-            format!("{} \\\\\n", cells.join(" & "))
-        };
-        format!(
-            "% {}; \\usepackage{{booktabs}}\n% {}\n\\begin{{tabular}}{{l{}}}\n\\toprule\n{}\\midrule\n{}\\bottomrule\n\\end{{tabular}}\n",
-            self.origin,
-            on_one_line(&self.caption),
-            "r".repeat(self.heads.len() - 1),
-            line(&self.heads),
-            self.rows.iter().map(line).collect::<String>()
-        )
-    }
+/// Returns the version and seed with which a table was made.
+fn origin(results: &Results<'_>) -> String {
+    let document = results.document;
+    format!("unlift {}, seed {}", on_one_line(&document.unlift), document.seed)
+}
 
-    /// Returns a table in GitHub's Markdown, with figures flush right, below the caption.
-    pub(super) fn markdown(&self) -> String {
-        let line = |cells: &Vec<String>| {
-            let cells: Vec<String> = cells.iter().map(|cell| in_markdown(cell)).collect();
-            format!("| {} |\n", cells.join(" | "))
-        };
-        format!(
-            "<!-- {} -->\n{}\n\n{}| --- |{}\n{}",
-            // Two dashes would end the comment.
-            self.origin.replace("--", "- -"),
-            in_markdown(&self.caption),
-            line(&self.heads),
-            " ---: |".repeat(self.heads.len() - 1),
-            self.rows.iter().map(line).collect::<String>()
-        )
-    }
+/// Returns a `tabular` with the rules of booktabs.
+pub(super) fn latex(results: &Results<'_>, within: &[&str]) -> String {
+    let table = grid(results, within);
+    let line = |cells: &Vec<String>| {
+        let cells: Vec<String> = cells.iter().map(|cell| in_latex(cell)).collect();
+        format!("{} \\\\\n", cells.join(" & "))
+    };
+    format!(
+        "% {}; \\usepackage{{booktabs}}\n% {}\n\\begin{{tabular}}{{l{}}}\n\\toprule\n{}\\midrule\n{}\\bottomrule\n\\end{{tabular}}\n",
+        origin(results),
+        on_one_line(&table.caption),
+        "r".repeat(table.columns.len() - 1),
+        line(&table.heads()),
+        table.rows.iter().map(line).collect::<String>()
+    )
+}
+
+/// Returns a table in GitHub's Markdown, with figures flush right, below the caption.
+pub(super) fn markdown(results: &Results<'_>, within: &[&str]) -> String {
+    let table = grid(results, within);
+    let line = |cells: &Vec<String>| {
+        let cells: Vec<String> = cells.iter().map(|cell| in_markdown(cell)).collect();
+        format!("| {} |\n", cells.join(" | "))
+    };
+    format!(
+        "<!-- {} -->\n{}\n\n{}| --- |{}\n{}",
+        // Two dashes would end the comment.
+        origin(results).replace("--", "- -"),
+        in_markdown(&table.caption),
+        line(&table.heads()),
+        " ---: |".repeat(table.columns.len() - 1),
+        table.rows.iter().map(line).collect::<String>()
+    )
 }
 
 fn caption(results: &Results<'_>, within: &[&str]) -> String {
@@ -200,10 +195,9 @@ fn caption(results: &Results<'_>, within: &[&str]) -> String {
 }
 
 /// Returns a short head: `0.5`, `0.5 (near)` or `overlap`.
-fn head(choice: &GivenChoice) -> String {
-    let given = &choice.given;
+fn head(given: &Given) -> String {
     match given.oracle_noise.as_deref() {
-        _ if !attack::is_oracle(&given.neighbors) => choice.source.clone(),
+        _ if !attack::is_oracle(&given.neighbors) => given.source(),
         None | Some("uniform") => format!("{:?}", given.inlier_ratio),
         Some(noise) => format!("{:?} ({noise})", given.inlier_ratio),
     }
@@ -250,16 +244,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cells_with_marks_of_the_format_are_quoted() {
-        let cells = ["a,b", "say \"c\"", "plain"].map(str::to_owned);
-        assert_eq!(line(&cells), "\"a,b\",\"say \"\"c\"\"\",plain\n");
-    }
-
-    #[test]
-    fn no_cell_is_a_formula() {
-        let cells =
-            ["=HYPERLINK(\"x\")", "+1+1", "-x", "@SUM(1)", "-1.5", "ppl+"].map(str::to_owned);
-        assert_eq!(line(&cells), "\"'=HYPERLINK(\"\"x\"\")\",'+1+1,'-x,'@SUM(1),-1.5,ppl+\n");
+    fn cells_with_marks_of_the_format_are_quoted_and_none_is_a_formula() {
+        for (cell, expected) in [
+            ("a,b", "\"a,b\""),
+            ("say \"c\"", "\"say \"\"c\"\"\""),
+            ("plain", "plain"),
+            ("=HYPERLINK(\"x\")", "\"'=HYPERLINK(\"\"x\"\")\""),
+            ("+1+1", "'+1+1"),
+            ("-x", "'-x"),
+            ("@SUM(1)", "'@SUM(1)"),
+            ("-1.5", "-1.5"),
+            ("ppl+", "ppl+"),
+        ] {
+            assert_eq!(quoted(cell), expected);
+        }
     }
 
     #[test]

@@ -2,11 +2,11 @@
 
 use unlift::Unit;
 
-use crate::attack::{self, Basis};
-use crate::document::{Bound, Document, Row, STRONGEST};
-use crate::page::cost_text;
+use crate::attack::{self, Basis, Given};
+use crate::document::{Bound, Document, NotAudited, Row, STRONGEST};
+use crate::page::cost;
 use crate::page::tables::percent_cell;
-use crate::page::verdict::{self, Verdict};
+use crate::page::verdict::{self, Card, Verdict};
 use crate::results::Results;
 use crate::table::{Column, Table, figure, label};
 use crate::words::{self, percent_or_dash};
@@ -20,109 +20,97 @@ pub fn text_table(document: &Document) -> String {
     let results = &Results::of(document);
     let Verdict { banner, cards, .. } = verdict::verdict(results);
     let extent = document.input.extent().map(|extent| format!(" ({extent})"));
-    let first = banner.headline + &extent.unwrap_or_default();
-    let lines = |sentences: Vec<String>| sentences.join("\n");
-    if results.is_sequence() {
-        let sentences = lines(verdict::sequence_sentences(results));
-        return format!("{first}\n{sentences}\n\n{}", sequence(results));
-    }
-    if results.is_again() {
-        let sentences = lines(verdict::again_sentences(results));
-        return format!("{first}\n{sentences}\n\n{}", again(results));
-    }
-    let mut lines: Vec<Line<'_>> = Vec::new();
-    for card in &cards {
-        let scheme = card.scheme.as_str();
-        let rows = results.by_source(scheme);
-        let Some(strongest) = rows.first() else { continue };
-        let alone = results.records_alone(scheme, results.headline);
-        let mut alone = alone.map(|(share, by)| (share, Line::Alone(strongest, by)));
-        for row in rows {
-            let is_oracle = attack::basis(row) == Basis::Oracle;
-            let share = results.share(row);
-            let alone = alone.take_if(|(alone, _)| is_oracle || *alone > share);
-            lines.extend(alone.map(|(_, line)| line).into_iter().chain([Line::Attack(row)]));
-        }
-        lines.extend(alone.map(|(_, line)| line));
-    }
-    let text = format!("{first}\n{}\n\n{}", banner.sentence, table(results, &lines));
+    let extent = extent.unwrap_or_default();
+    let (reasons, figures) = if results.is_sequence() {
+        (verdict::sequence_sentences(results).join("\n"), sequence(results))
+    } else if results.is_again() {
+        (verdict::again_sentences(results).join("\n"), again(results))
+    } else {
+        (banner.sentence, by_scheme(results, &cards))
+    };
+    format!("{}{extent}\n{reasons}\n\n{figures}", banner.headline)
+}
+
+/// Returns the table of a map or of images, and notes on it.
+fn by_scheme(results: &Results<'_>, cards: &[Card]) -> String {
     let (headline, unit) = (results.headline, unit(results));
-    let several = (results.thresholds.len() > 1)
-        .then(|| format!("blind, break-even: within {headline} {unit}\n"));
-    let truth = "true: share of the listed neighbors that are among the nearest\n".to_owned();
-    let shown = lines.iter().filter(|line| matches!(line, Line::Attack(_))).count();
+    let mut heads = ["scheme", "neighbors by", "true", "solver"].map(str::to_owned).to_vec();
+    heads.extend(results.thresholds.iter().map(|typed| format!("{typed} {unit}")));
+    heads.extend(["blind", "break-even"].map(str::to_owned));
+    let mut table = vec![heads];
+    let mut shown = 0;
+    for card in cards {
+        let rows = results.by_source(&card.scheme);
+        let from = table.len();
+        table.extend(rows.iter().map(|row| of_attack(results, row)));
+        shown += rows.len();
+        if let (Some(first), Some((alone, by))) =
+            (rows.first(), results.records_alone(&card.scheme, headline))
+        {
+            let is_less =
+                |row: &&Row| attack::basis(row) == Basis::Oracle || alone > results.share(row);
+            let at = rows.iter().position(is_less).unwrap_or(rows.len());
+            table.insert(from + at, of_records_alone(results, first, by));
+        }
+    }
+    let mut text = words::align(&table, &[0, 1, 3]);
+    if results.thresholds.len() > 1 {
+        text.push_str(&format!("blind, break-even: within {headline} {unit}\n"));
+    }
+    text.push_str("true: share of the listed neighbors that are among the nearest\n");
+    if results.unit == Unit::KthNeighbor {
+        text.push_str(&format!("x: times {}\n", words::USUAL_DISTANCE));
+    }
     let more = results.rows.len() - shown;
-    let more = (more > 0).then(|| {
-        format!("{more} more attacks, of other inlier ratios or solvers, are in the report\n")
-    });
-    let times = (results.unit == Unit::KthNeighbor)
-        .then(|| format!("x: times {}\n", words::USUAL_DISTANCE));
-    let refused = document.not_audited.iter().map(|refused| {
-        let by = refused.neighbors.as_deref().unwrap_or_default();
+    if more > 0 {
+        text.push_str(&format!(
+            "{more} more attacks, of other inlier ratios or solvers, are in the report\n"
+        ));
+    }
+    text.push_str(&cost::text(results));
+    for NotAudited { scheme, neighbors, reason, .. } in &results.document.not_audited {
         // The reason of a source may begin with the source's name.
-        let reason = refused.reason.strip_prefix(&format!("{by}: ")).unwrap_or(&refused.reason);
-        let by = if by.is_empty() { String::new() } else { format!(" by {by}") };
-        format!("not audited: {}{by}: {reason}\n", refused.scheme)
-    });
-    let notes = several.into_iter().chain([truth]).chain(times).chain(more);
-    text + &notes.chain([cost_text(results)]).chain(refused).collect::<String>()
+        text.push_str(&match neighbors {
+            None => format!("not audited: {scheme}: {reason}\n"),
+            Some(by) => {
+                let reason = reason.strip_prefix(&format!("{by}: ")).unwrap_or(reason);
+                format!("not audited: {scheme} by {by}: {reason}\n")
+            }
+        });
+    }
+    text
 }
 
 fn unit(results: &Results<'_>) -> &'static str {
     if results.unit == Unit::KthNeighbor { "x" } else { words::sign(results.unit) }
 }
 
-/// A line of the table of a map or of images.
-enum Line<'a> {
-    /// The figures of a row.
-    Attack(&'a Row),
-    /// The records alone of the row's scheme, and the attack's name.
-    Alone(&'a Row, Option<&'a str>),
-}
-
-impl<'a> Line<'a> {
-    fn row(&self) -> &'a Row {
-        let (Self::Attack(row) | Self::Alone(row, _)) = self;
-        row
-    }
-
-    /// Returns a cell that the records alone do not have.
-    fn cell(&self, of: impl Fn(&Row) -> String) -> String {
-        if let Self::Attack(row) = self { of(row) } else { "-".to_owned() }
-    }
-}
-
-fn table(results: &Results<'_>, lines: &[Line<'_>]) -> String {
-    let source = |line: &Line<'_>| match line {
-        Line::Attack(row) => attack::source(&row.neighbors, row.oracle_noise.as_deref()),
-        Line::Alone(..) => attack::records_alone(None),
-    };
-    let solver = |line: &Line<'_>| match line {
-        Line::Attack(row) => row.solver.clone(),
-        Line::Alone(_, by) => by.unwrap_or_default().to_owned(),
-    };
-    let share = |line: &Line<'_>, typed: &str| match line {
-        Line::Attack(row) => {
-            let spread = row.std.as_ref().and_then(|std| std.recovered_percent.get(typed));
-            let share = row.recovered_percent.get(typed);
-            share.map_or("-".to_owned(), |_| format!("{} %", percent_cell(share, spread)))
-        }
-        Line::Alone(row, _) => {
-            percent_or_dash(results.records_alone(&row.scheme, typed).map(|alone| alone.0))
+/// Returns the cells of a row.
+fn of_attack(results: &Results<'_>, row: &Row) -> Vec<String> {
+    let share = |typed: &&str| match row.recovered_percent.get(*typed) {
+        None => "-".to_owned(),
+        share => {
+            let spread = row.std.as_ref().and_then(|std| std.recovered_percent.get(*typed));
+            format!("{} %", percent_cell(share, spread))
         }
     };
-    let mut columns = vec![
-        label("scheme", |line: &Line<'_>| line.row().scheme.clone()),
-        label("neighbors by", source),
-        figure("true", |line: &Line<'_>| line.cell(right)),
-        label("solver", solver),
-    ];
-    columns.extend(results.thresholds.iter().map(|typed| {
-        figure(format!("{typed} {}", unit(results)), move |line: &Line<'_>| share(line, typed))
-    }));
-    columns.push(figure("blind", |line: &Line<'_>| blind(results, line.row())));
-    columns.push(figure("break-even", |line: &Line<'_>| line.cell(|row| break_even(results, row))));
-    Table::of("", "", lines, columns).text()
+    let mut cells =
+        vec![row.scheme.clone(), Given::of(row).source(), right(row), row.solver.clone()];
+    cells.extend(results.thresholds.iter().map(share));
+    cells.extend([blind(results, row), break_even(results, row)]);
+    cells
+}
+
+/// Returns the cells of the best attack on the records alone; `row` is any of the scheme.
+fn of_records_alone(results: &Results<'_>, row: &Row, by: Option<&str>) -> Vec<String> {
+    let share = |typed: &&str| {
+        percent_or_dash(results.records_alone(&row.scheme, typed).map(|alone| alone.0))
+    };
+    let (name, by) = (attack::records_alone(None), by.unwrap_or_default().to_owned());
+    let mut cells = vec![row.scheme.clone(), name, "-".to_owned(), by];
+    cells.extend(results.thresholds.iter().map(share));
+    cells.extend([blind(results, row), "-".to_owned()]);
+    cells
 }
 
 fn right(row: &Row) -> String {

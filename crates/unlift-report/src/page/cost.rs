@@ -27,8 +27,12 @@ const SIZE: [f64; 2] = [560.0, 300.0];
 
 #[derive(Debug, Clone, Serialize)]
 struct Dot {
+    scheme: String,
+    /// The name beside the dot; empty if there are too many.
     name: String,
-    title: String,
+    leak: String,
+    /// The multiple of the error; `None` if cameras do not localize.
+    cost: Option<String>,
     at: [f64; 2],
     best: bool,
     /// Whether the name is left of the dot.
@@ -129,11 +133,20 @@ pub(crate) fn chart(results: &Results<'_>) -> Option<Value> {
     let mut dots: Vec<Dot> = Vec::new();
     for point in &points {
         let best = is_best(&point);
-        // The titles name all dots.
         let is_named = points.len() <= MAX_NAMES || best;
-        let name = if is_named { point.of.scheme.clone() } else { String::new() };
+        let scheme = point.of.scheme.clone();
+        let cost = point.cost.is_finite().then(|| words::significant(point.cost, 3));
         let at = [x(point.cost), y(point.leak)];
-        let mut dot = Dot { name, title: title(point), at, best, is_left: false, shift: 0.0 };
+        let mut dot = Dot {
+            name: if is_named { scheme.clone() } else { String::new() },
+            leak: words::percent(point.leak),
+            scheme,
+            cost,
+            at,
+            best,
+            is_left: false,
+            shift: 0.0,
+        };
         // Names that would leave the chart are left of their dots.
         dot.is_left = dot.span()[1] > SIZE[0] + MARGIN;
         // The nearest height at which the name overlaps no other one.
@@ -150,19 +163,10 @@ pub(crate) fn chart(results: &Results<'_>) -> Option<Value> {
     let steps = [0.05, 0.1, 0.2, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0];
     let ticks = steps.into_iter().filter(|cost| (least..=largest).contains(cost));
     let ticks = ticks.map(|cost| json!({ "at": x(cost), "text": format!("{cost}×") }));
-    let is_measured = points.iter().any(|point| point.of.measured().is_some());
     Some(json!({
         "sentence": sentence(&points, &missing),
-        "leak": match basis(results) {
-            Basis::Oracle => "the strongest attack tried with known neighbors",
-            Basis::Released | Basis::Given => {
-                "the strongest attack tried from the released data alone"
-            }
-        },
-        "error": match is_measured {
-            true => "the median error of the camera center of held-out images",
-            false => "the information bound of the camera center: all true matches, noise of 1 px",
-        },
+        "by_known_neighbors": basis(results) == Basis::Oracle,
+        "is_measured": points.iter().any(|point| point.of.measured().is_some()),
         "size": SIZE,
         "dots": dots,
         "front": corners.join(" "),
@@ -173,14 +177,6 @@ pub(crate) fn chart(results: &Results<'_>) -> Option<Value> {
         "edge": fails.then_some(width),
         "missing": missing,
     }))
-}
-
-fn title(point: &Point<'_>) -> String {
-    let cost = match point.cost.is_finite() {
-        true => format!("{} times the unprotected error", words::significant(point.cost, 3)),
-        false => "most cameras do not localize".to_owned(),
-    };
-    format!("{}: {} % come back, {cost}", point.of.scheme, words::percent(point.leak))
 }
 
 /// Returns which schemes keep the attacks below [`LEAK`] at an error within [`COST`].
@@ -234,16 +230,15 @@ pub(crate) fn table(results: &Results<'_>) -> Option<Table> {
     ];
     let held_out = localization.iter().find_map(|of| of.held_out.as_ref());
     if let Some(HeldOut { recall_percent, .. }) = held_out {
-        fn own(of: &Localization, value: impl Fn(&HeldOut) -> Option<f64>) -> Option<f64> {
-            of.held_out.as_ref().and_then(value)
-        }
         columns.extend([
             figure("held out: times unprotected", move |of: &Of| {
-                number(own(of, |own| own.multiple))
+                number(of.held_out.as_ref().and_then(|own| own.multiple))
             }),
-            figure("camera center", move |of: &Of| length(own(of, |own| own.center_error))),
+            figure("camera center", move |of: &Of| {
+                length(of.held_out.as_ref().and_then(|own| own.center_error))
+            }),
             figure("rotation, degrees", move |of: &Of| {
-                number(own(of, |own| own.rotation_error_degrees))
+                number(of.held_out.as_ref().and_then(|own| own.rotation_error_degrees))
             }),
             figure("right matches", |of: &Of| {
                 let matches = |own: &HeldOut| format!("{} of {}", own.right_matches, own.matches);
@@ -251,8 +246,11 @@ pub(crate) fn table(results: &Results<'_>) -> Option<Table> {
             }),
         ]);
         columns.extend(recall_percent.keys().map(|limits| {
-            let recall = move |own: &HeldOut| own.recall_percent.get(limits).copied();
-            figure(format!("within {limits}, %"), move |of: &Of| percent(own(of, recall)))
+            figure(format!("within {limits}, %"), move |of: &Of| {
+                percent(
+                    of.held_out.as_ref().and_then(|own| own.recall_percent.get(limits).copied()),
+                )
+            })
         }));
     }
     let caption = "What protection costs: what comes back, and how precisely a camera can be placed. The bound uses all true matches of \

@@ -4,14 +4,23 @@ use serde_json::{Value, json};
 
 use crate::attack::{self, Basis, Given};
 use crate::document::{ByThreshold, Row};
-use crate::page::RenderOptions;
 use crate::results::{Results, distinct};
 use crate::words;
 
-/// Returns the titles of the charts.
-pub(crate) fn titles(results: &Results<'_>) -> Value {
+/// The error curve of one row of the results.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ErrorCdf {
+    /// Index into [`Document::results`](crate::Document::results).
+    pub row: usize,
+    /// (error in the row's unit, percent of the released points within it), ascending; a hundred
+    /// points suffice.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// Returns what the titles of the charts state.
+pub(crate) fn findings(results: &Results<'_>) -> Value {
     json!({
-        "curves": curves(results),
+        "wrong_neighbors": wrong_neighbors(results),
         "errors": errors(results),
         "certainty": certainty(results),
     })
@@ -22,10 +31,8 @@ pub(crate) fn titles(results: &Results<'_>) -> Value {
 const FLAT: f64 = 0.9;
 const STEEP: f64 = 0.5;
 
-/// Returns a title on how much wrong neighbors reduce the recovery: the best oracle rows at the lowest and
-/// highest tested ratio.
-fn curves(results: &Results<'_>) -> String {
-    let points = results.points();
+/// Returns how much wrong neighbors reduce the recovery: the best oracle rows at the lowest and highest tested ratio.
+fn wrong_neighbors(results: &Results<'_>) -> Option<Value> {
     let oracle = results.rows.iter().filter(|row| attack::basis(row) == Basis::Oracle);
     let share = |ratio: f64| {
         let rows = oracle.clone().filter(move |row| row.inlier_ratio == ratio);
@@ -35,49 +42,35 @@ fn curves(results: &Results<'_>) -> String {
     let (low, high) = (ratios.clone().fold(f64::INFINITY, f64::min), ratios.fold(0.0, f64::max));
     // Mostly right neighbors show nothing about wrong ones.
     if low >= high || low > 0.2 {
-        return format!("How many {points} come back, by the share of right neighbors");
+        return None;
     }
-    let (few, many) = (share(low), share(high));
-    let wrong = words::ratio_percent(1.0 - low);
-    let back = format!("{} % of the {points}", words::percent(few));
-    match few / many.max(f64::MIN_POSITIVE) {
-        FLAT.. => format!(
-            "Wrong neighbors hardly stop the attack: with {wrong} % of them wrong, {back} still come back"
-        ),
-        STEEP.. => format!("With {wrong} % of the neighbors wrong, {back} still come back"),
-        _ => format!(
-            "Wrong neighbors weaken the attack: with {wrong} % of them wrong, {back} come back"
-        ),
-    }
+    let kept = share(low) / share(high).max(f64::MIN_POSITIVE);
+    Some(json!({
+        "wrong": words::ratio_percent(1.0 - low),
+        "recovered": words::percent(share(low)),
+        "matter": if kept >= FLAT { "hardly" } else if kept >= STEEP { "little" } else { "much" },
+    }))
 }
 
-fn errors(results: &Results<'_>) -> String {
-    let points = results.points();
-    let Some((row, median)) = strongest(results).and_then(|row| Some((row, row.median_error?)))
-    else {
-        return format!("How far off the recovered {points} are");
-    };
-    let scheme = &row.scheme;
+/// Returns how precisely half of the points come back by the strongest attack.
+fn errors(results: &Results<'_>) -> Option<Value> {
+    let row = strongest(results)?;
+    let median = row.median_error?;
     let smallest = results.thresholds.first().and_then(|typed| typed.parse::<f64>().ok());
     // Swapped coordinates that are restored leave only an error of rounding.
-    let how = match smallest.is_some_and(|smallest| median < 0.001 * smallest) {
-        true => "exactly".to_owned(),
-        false => format!("to within {}", words::length(median, row.unit)),
-    };
-    format!("Half of the {points} come back {how} ({scheme})")
+    let is_exact = smallest.is_some_and(|smallest| median < 0.001 * smallest);
+    let within = (!is_exact).then(|| words::length(median, row.unit));
+    Some(json!({ "scheme": row.scheme, "within": within }))
 }
 
-fn certainty(results: &Results<'_>) -> String {
-    let sure = strongest(results).and_then(|row| {
-        Some(format!(
-            "The attacker is sure of {} % of the {}, and right about {} % of those ({})",
-            words::percent(row.sure_percent?),
-            results.points(),
-            words::percent(row.sure_correct_percent?),
-            row.scheme
-        ))
-    });
-    sure.unwrap_or_else(|| "How well the attacker can judge its own result".to_owned())
+/// Returns of how many points the strongest attack is sure, and how often rightly.
+fn certainty(results: &Results<'_>) -> Option<Value> {
+    let row = strongest(results)?;
+    Some(json!({
+        "scheme": row.scheme,
+        "sure": words::percent(row.sure_percent?),
+        "right": words::percent(row.sure_correct_percent?),
+    }))
 }
 
 /// Returns the strongest row from released data; without one from given, else from known neighbors.
@@ -99,14 +92,14 @@ pub(crate) fn judged(row: &Row) -> Vec<(f64, f64)> {
 }
 
 /// Returns the data of the script, without those of the 3D view and the pictures.
-pub(crate) fn page_data(results: &Results<'_>, options: &RenderOptions) -> Value {
+pub(crate) fn page_data(results: &Results<'_>, error_cdf: &[ErrorCdf]) -> Value {
     let givens = givens(results);
     let solvers = distinct(results.rows.iter().map(|row| row.solver.as_str()));
     let by_threshold = |map: &ByThreshold| {
         results.thresholds.iter().map(|typed| map.get(*typed).copied()).collect::<Vec<_>>()
     };
     let rows = results.rows.iter().enumerate().map(|(index, row)| {
-        let cdf = options.error_cdf.iter().find(|cdf| cdf.row == index);
+        let cdf = error_cdf.iter().find(|cdf| cdf.row == index);
         let given = Given::of(row);
         let strongest = results.thresholds.iter().map(|typed| {
             let strongest = results.strongest_given(&row.scheme, &given, typed);
@@ -136,7 +129,7 @@ pub(crate) fn page_data(results: &Results<'_>, options: &RenderOptions) -> Value
         "unit": words::sign(results.unit),
         "headline": headline.unwrap_or(0),
         "schemes": results.schemes.iter().map(|name| scheme(results, name)).collect::<Vec<_>>(),
-        "givens": givens.iter().map(GivenChoice::json).collect::<Vec<_>>(),
+        "givens": givens.iter().map(|given| choice(results, given)).collect::<Vec<_>>(),
         "solvers": solvers,
         "first_given": first_given(results, &givens).unwrap_or(0),
     })
@@ -158,48 +151,50 @@ fn percentile_points(row: &Row) -> Vec<(f64, f64)> {
     points
 }
 
-/// A kind of neighborhoods, as menus have it.
-pub(crate) struct GivenChoice {
-    /// `known neighbors, 50 % right`, `neighbors by descriptor overlap, 9 to 12 % right`.
-    label: String,
-    /// The group in a menu: `released`, `given` or `oracle`.
-    pub group: &'static str,
-    /// The source: one curve of the oracle's ratios, or one mark of another source.
-    pub source: String,
-    pub given: Given,
-}
-
-impl GivenChoice {
-    fn json(&self) -> Value {
-        let name = attack::plain_source(&self.given.neighbors, self.given.oracle_noise.as_deref());
-        json!({ "label": self.label, "group": self.group, "source": self.source, "name": name })
-    }
-}
-
 /// Returns the kinds of neighborhoods of an audit, by falling ratio within a source.
-pub(crate) fn givens(results: &Results<'_>) -> Vec<GivenChoice> {
-    let mut givens: Vec<GivenChoice> = Vec::new();
-    for row in results.rows {
-        if place(&givens, &Given::of(row)).is_none() {
-            givens.push(given_choice(results, row));
+pub(crate) fn givens(results: &Results<'_>) -> Vec<Given> {
+    let mut givens: Vec<Given> = Vec::new();
+    for given in results.rows.iter().map(Given::of) {
+        if place(&givens, &given).is_none() {
+            givens.push(given);
         }
     }
-    let sources: Vec<String> = givens.iter().map(|given| given.source.clone()).collect();
-    let turn = |given: &GivenChoice| sources.iter().position(|source| *source == given.source);
-    givens.sort_by(|a, b| {
-        turn(a).cmp(&turn(b)).then(b.given.inlier_ratio.total_cmp(&a.given.inlier_ratio))
-    });
+    let sources: Vec<String> = givens.iter().map(Given::source).collect();
+    let turn = |given: &Given| sources.iter().position(|source| *source == given.source());
+    givens.sort_by(|a, b| turn(a).cmp(&turn(b)).then(b.inlier_ratio.total_cmp(&a.inlier_ratio)));
     givens
 }
 
-fn place(givens: &[GivenChoice], given: &Given) -> Option<usize> {
-    givens.iter().position(|known| known.given.same_choice(given))
+fn place(givens: &[Given], given: &Given) -> Option<usize> {
+    givens.iter().position(|known| known.same_choice(given))
+}
+
+/// Returns an entry of a menu; measured ratios of its rows become a range.
+fn choice(results: &Results<'_>, given: &Given) -> Value {
+    let same = results.rows.iter().filter(|row| Given::of(row).same_choice(given));
+    let ratios = same.map(|row| row.inlier_ratio);
+    let ends = [ratios.clone().fold(f64::INFINITY, f64::min), ratios.fold(0.0, f64::max)];
+    let [low, high] = ends.map(words::ratio_percent);
+    let name = given.plain_source();
+    let label = match low == high {
+        true => given.label(),
+        false => format!("{name}, {low} to {high} % right"),
+    };
+    json!({ "label": label, "group": group(&given.neighbors), "source": given.source(), "name": name })
+}
+
+fn group(neighbors: &str) -> &'static str {
+    match neighbors {
+        "oracle" => "oracle",
+        "file" => "given",
+        _ => "released",
+    }
 }
 
 /// Returns the place of the neighborhoods that are shown first: of the attacker's own sources the one that
 /// recovers most; without one, the oracle whose ratio is nearest to half.
-fn first_given(results: &Results<'_>, givens: &[GivenChoice]) -> Option<usize> {
-    let own = results.rows.iter().filter(|row| group(row) == "released");
+fn first_given(results: &Results<'_>, givens: &[Given]) -> Option<usize> {
+    let own = results.rows.iter().filter(|row| group(&row.neighbors) == "released");
     let oracle = || results.strongest(results.schemes.first()?, Basis::Oracle);
     place(givens, &Given::of(results.largest(own).or_else(oracle)?))
 }
@@ -221,33 +216,6 @@ fn scheme(results: &Results<'_>, name: &str) -> Value {
         // Neighborhoods add what exceeds the larger of the two baselines.
         "floor": max(|row, typed| row.baseline_percent(typed)),
     })
-}
-
-fn group(row: &Row) -> &'static str {
-    match row.neighbors.as_str() {
-        "oracle" => "oracle",
-        "file" => "given",
-        _ => "released",
-    }
-}
-
-/// Returns one entry for all rows with these neighborhoods; their measured ratios become a range.
-fn given_choice(results: &Results<'_>, row: &Row) -> GivenChoice {
-    let given = Given::of(row);
-    let same = results.rows.iter().filter(|other| Given::of(other).same_choice(&given));
-    let ratios = same.map(|row| row.inlier_ratio);
-    let ends = [ratios.clone().fold(f64::INFINITY, f64::min), ratios.fold(0.0, f64::max)];
-    let [low, high] = ends.map(words::ratio_percent);
-    let noise = row.oracle_noise.as_deref();
-    let label = match low == high {
-        true => given.label(),
-        false => {
-            let name = attack::plain_source(&row.neighbors, noise);
-            format!("{name}, {low} to {high} % right")
-        }
-    };
-    let source = attack::source(&row.neighbors, noise);
-    GivenChoice { label, group: group(row), source, given }
 }
 
 /// Number of colors and marks.

@@ -1,12 +1,11 @@
 //! Pictures that a network paints from recovered points, beside the photos.
 
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::attack::{self, Basis, ByAttack};
+use crate::attack::{self, Attack, Basis, ByAttack};
 use crate::document::Row;
+use crate::page::blocks::image_source;
 use crate::page::pictures::{Marks, ReleasedView};
 use crate::page::verdict::Level;
 use crate::results::{Results, distinct};
@@ -52,17 +51,18 @@ impl View {
     }
 
     fn shown(&self) -> Shown {
-        let (given, solver) = (&self.attack.given, &self.attack.solver);
-        let without_lists = || attack::records_alone(Some(solver));
-        let label = if attack::reads_lists(solver) { given.label() } else { without_lists() };
-        self.recovered.shown(label)
+        let Attack { given, solver, .. } = &self.attack;
+        self.recovered.shown(match attack::reads_lists(solver) {
+            true => given.label(),
+            false => attack::records_alone(Some(solver)),
+        })
     }
 }
 
 impl Painted {
     fn shown(&self, label: String) -> Shown {
         let likeness = format!("SSIM {:.2}, LPIPS {:.2}", self.ssim, self.lpips);
-        Shown { label, likeness, source: source(&self.jpeg) }
+        Shown { label, likeness, source: image_source(&self.jpeg) }
     }
 }
 
@@ -136,13 +136,12 @@ fn strongest<'a>(
     scheme: &str,
     basis: Basis,
 ) -> Option<&'a View> {
-    let views = inversion.views.iter().filter(|view| view.attack.scheme == scheme);
-    let mut views = views.filter(|view| view.basis() == basis);
+    let is_of = |view: &&View| view.attack.scheme == scheme && view.basis() == basis;
+    let views = inversion.views.iter().filter(is_of);
     let row = results.strongest(scheme, basis);
-    let best = |a: &&View, b: &&View| a.recovered.ssim.total_cmp(&b.recovered.ssim);
-    // If the strongest attack was not painted, the best picture stands in.
     let painted = views.clone().find(|view| row.is_some_and(|row| view.attack.is_of(row)));
-    painted.or_else(|| views.by_ref().max_by(best))
+    // If the strongest attack was not painted, the best picture stands in.
+    painted.or_else(|| views.max_by(|a, b| a.recovered.ssim.total_cmp(&b.recovered.ssim)))
 }
 
 fn sheet(results: &Results<'_>, inversion: &Inversion) -> Sheet {
@@ -150,31 +149,25 @@ fn sheet(results: &Results<'_>, inversion: &Inversion) -> Sheet {
     let by_queries = results.is_sequence();
     let rows = schemes.into_iter().map(|scheme| {
         let views = inversion.views.iter().filter(|view| view.attack.scheme == scheme);
-        let strongest = Basis::ALL.map(|basis| strongest(results, inversion, scheme, basis));
-        let is_main = |view: &&View| {
-            by_queries || strongest.iter().flatten().any(|main| std::ptr::eq(*main, *view))
-        };
+        let strongest = |basis| strongest(results, inversion, scheme, basis);
         let main: Vec<&View> = match by_queries {
             true => views.clone().collect(),
-            false => strongest.into_iter().flatten().collect(),
+            false => Basis::ALL.into_iter().filter_map(strongest).collect(),
         };
+        let others = views.filter(|view| !main.iter().any(|main| std::ptr::eq(*main, *view)));
         SheetRow {
             scheme: scheme.to_owned(),
             by_queries,
-            main: main.into_iter().map(View::shown).collect(),
-            others: views.filter(|view| !is_main(view)).map(View::shown).collect(),
+            others: others.map(View::shown).collect(),
+            main: main.iter().map(|view| view.shown()).collect(),
         }
     });
     Sheet {
         name: inversion.name.clone(),
-        photo: source(&inversion.photo),
+        photo: image_source(&inversion.photo),
         baseline: inversion.baseline.shown("without protection".to_owned()),
         rows: rows.collect(),
     }
-}
-
-fn source(jpeg: &[u8]) -> String {
-    format!("data:image/jpeg;base64,{}", STANDARD.encode(jpeg))
 }
 
 /// Ratios of SSIM to that without protection, from which on the picture, or parts of it, count as rebuilt.
@@ -255,22 +248,18 @@ fn kept(inversion: &Inversion, view: &View) -> f64 {
 fn exhibit(results: &Results<'_>, inversion: &Inversion, view: &View) -> Option<Value> {
     let (level, verdict) = rebuilt(kept(inversion, view));
     let (row, scheme) = (view.row(results)?, &view.attack.scheme);
-    let back = format!(
-        "{} % of the {} come back {} ({}, {}).",
+    let from = match view.basis() {
+        Basis::Released => "From the released data alone,".to_owned(),
+        Basis::Given => "With given neighbors,".to_owned(),
+        Basis::Oracle => words::capital(&words::if_known(row.inlier_ratio)) + ":",
+    };
+    let mut sentence = format!(
+        "{from} {} % of the {} come back {} ({scheme}, {}).",
         words::percent(results.share(row)),
         results.points(),
         results.within(results.headline),
-        scheme,
         attack::briefly(row)
     );
-    let mut sentence = match view.basis() {
-        Basis::Released => format!("From the released data alone, {back}"),
-        Basis::Given => format!("With given neighbors, {back}"),
-        Basis::Oracle => {
-            let known = words::capital(&words::if_known(row.inlier_ratio));
-            format!("{known}: {back}")
-        }
-    };
     // If the network paints badly even from true points, the result shows little.
     let baseline = inversion.baseline.ssim;
     if baseline < POOR {
@@ -283,9 +272,9 @@ fn exhibit(results: &Results<'_>, inversion: &Inversion, view: &View) -> Option<
         "level": level,
         "verdict": verdict,
         "said": sentence,
-        "photo": source(&inversion.photo),
+        "photo": image_source(&inversion.photo),
         "released": released.and_then(|released| drawing(inversion.size, released)),
-        "painted": source(&view.recovered.jpeg),
+        "painted": image_source(&view.recovered.jpeg),
         "name": inversion.name,
     }))
 }
@@ -307,52 +296,20 @@ fn drawing(size: [u32; 2], released: &ReleasedView) -> Option<Value> {
         }
     };
     let (all, n) = (paths.len(), paths.len().min(max));
-    let [drawn, of] = [n, all].map(words::thousands);
-    let some = if n < all { format!(" ({drawn} of {of} drawn)") } else { String::new() };
-    let rule = words::scheme_rule(&released.scheme);
-    let rule = if rule.is_empty() { "What the scheme releases." } else { rule };
+    let mut text = match words::scheme_rule(&released.scheme) {
+        "" => "What the scheme releases.".to_owned(),
+        rule => rule.to_owned(),
+    };
+    if n < all {
+        text.push_str(&format!(" ({} of {} drawn)", words::thousands(n), words::thousands(all)));
+    }
     let path: String = (0..n).map(|at| paths[at * all / n].as_str()).collect();
-    (n > 0).then(
-        || json!({ "size": size, "kind": kind, "path": path, "said": rule.to_owned() + &some }),
-    )
+    (n > 0).then(|| json!({ "size": size, "kind": kind, "path": path, "said": text }))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::attack::{Attack, Given};
-    use crate::document::Document;
-
-    fn view(scheme: &str, inlier_ratio: f64, bytes: usize) -> View {
-        let given = Given { neighbors: "oracle".into(), oracle_noise: None, inlier_ratio };
-        let attack = Attack { scheme: scheme.into(), given, solver: "joint".into() };
-        View { attack, recovered: Painted { jpeg: vec![7; bytes], ..Painted::default() } }
-    }
-
-    fn document() -> Document {
-        let text = serde_json::json!({
-            "unlift": "0.1.0", "schema": 1, "options": {}, "seed": 0, "break_even": [],
-            "input": {"path": null, "n_points": 1, "scale_m_per_unit": null}, "results": [],
-            "run": {"threads": 1, "peak_memory_bytes": null, "seconds": {"total": 1.0, "rows": []}}
-        });
-        Document::from_json(&text.to_string()).expect("a document")
-    }
-
-    #[test]
-    fn pictures_that_would_make_a_page_too_large_are_left_out() {
-        let inversion = |bytes: usize| Inversion {
-            views: (0..40).map(|at| view(["olc", "cp"][at % 2], at as f64, bytes)).collect(),
-            ..Inversion::default()
-        };
-        let of = |inversions: &[Inversion]| {
-            let (sheets, left_out) = sheets(&Results::of(&document()), inversions);
-            (sheets.iter().map(|one| one.pictures().count()).collect::<Vec<_>>(), left_out)
-        };
-        assert_eq!(of(&[inversion(9_000), inversion(9_000)]), (vec![40, 40], 0));
-        assert_eq!(of(&[inversion(40_000), inversion(40_000)]), (vec![40], 40));
-        let (few, left_out) = of(&[inversion(200_000)]);
-        assert!(few[0] > 4 && few[0] + left_out == 40, "{few:?}");
-    }
 
     #[test]
     fn what_is_said_of_a_picture_follows_its_ssim() {

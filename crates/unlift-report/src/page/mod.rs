@@ -1,38 +1,38 @@
 //! The page: one file that loads nothing and shows all numbers without script.
 
-mod cost;
+mod blocks;
+pub(crate) mod cost;
 pub(crate) mod curves;
 pub mod inversions;
+mod next;
 pub mod pictures;
 pub mod scene;
 pub(crate) mod tables;
 mod tiles;
 pub(crate) mod verdict;
 
+use serde_json::{Value, json};
 use unlift::Unit;
 
-use minijinja::value::Serde;
-use minijinja::{AutoEscape, Environment, UndefinedBehavior};
-use serde_json::{Value, json};
-
 use crate::attack::{self, Basis};
-use crate::document::{Document, ImageCounts};
+use crate::document::Document;
 use crate::gates::gates;
+use crate::page::blocks::Blocks;
+use crate::page::curves::ErrorCdf;
 use crate::page::inversions::Inversion;
 use crate::page::pictures::Picture;
 use crate::page::scene::Scene3d;
 use crate::page::verdict::{Card, verdict};
 use crate::results::{Results, distinct};
-use crate::{Error, words};
-
-pub(crate) use cost::text as cost_text;
+use crate::{Error, templates, words};
 
 /// The templates, by the names under which they include each other.
-const TEMPLATES: [(&str, &str); 11] = [
+const TEMPLATES: [(&str, &str); 12] = [
     ("report.html", include_str!("../../template/report.html")),
     ("terms.html", include_str!("../../template/terms.html")),
     ("gates.html", include_str!("../../template/gates.html")),
     ("verdict.html", include_str!("../../template/verdict.html")),
+    ("next.html", include_str!("../../template/next.html")),
     ("figures.html", include_str!("../../template/figures.html")),
     ("inversions.html", include_str!("../../template/inversions.html")),
     ("pictures.html", include_str!("../../template/pictures.html")),
@@ -74,21 +74,17 @@ pub fn render(
     let document = if safe { document.share_safe() } else { document.clone() };
     let results = &Results::of(&document);
     // A share-safe page draws nothing of the input.
-    let (scene, pictures, inversions) = match safe {
-        true => (None, &[][..], &[][..]),
-        false => (scene, &options.pictures[..], &options.inversions[..]),
-    };
-    let scene = scene.filter(|scene| !scene.originals.is_empty());
+    let nothing = RenderOptions::default();
+    let (scene, private) = if safe { (None, &nothing) } else { (scene, options) };
+    let RenderOptions { pictures, inversions, opening, .. } = private;
+    let mut blocks = Blocks::default();
     let error_unit = results.thresholds.first().and_then(|typed| typed.parse().ok());
-    let scene = scene.map(|scene| scene::encode(scene, results.rows, error_unit.unwrap_or(1.0)));
-    // A view without points or without recovered points would be empty.
-    let scene = scene.filter(|scene| scene.n_drawn > 0 && scene.has_views);
-    let mut blocks = scene.as_ref().map(|scene| scene.blocks.clone()).unwrap_or_default();
+    let error_unit = error_unit.unwrap_or(1.0);
+    let scene = scene.and_then(|scene| scene::encode(scene, results.rows, error_unit, &mut blocks));
     let within = results.headline.parse().unwrap_or(10.0);
     let encoded = pictures::encode(pictures, within, &mut blocks);
-    let n_pictures = encoded.len();
-    let mut data = curves::page_data(results, options);
-    data["scene"] = scene.as_ref().map_or(Value::Null, |scene| scene.data.clone());
+    let mut data = curves::page_data(results, &options.error_cdf);
+    data["scene"] = scene.into();
     data["first_picture"] = pictures::first_choice(pictures, within).into();
     data["pictures"] = encoded.into();
     let tables = [
@@ -105,16 +101,9 @@ pub fn render(
         tables::choices(results),
     ];
     let (sheets, sheets_left_out) = inversions::sheets(results, inversions);
-    let other = options.opening.iter().filter(|_| !safe).map(|opening| opening.0.clone());
+    let first = opening.iter().map(|opening| opening.0.clone());
     let own = Opening::of(results, inversions, None);
     let oracle = results.rows.iter().filter(|row| attack::basis(row) == Basis::Oracle);
-    let scene = scene.map(|scene| {
-        json!({
-            "n_points": words::thousands(scene.n_points),
-            "n_drawn": words::thousands(scene.n_drawn),
-            "whole": scene.n_drawn as u64 >= scene.n_points,
-        })
-    });
     let not_audited = document.not_audited.iter().map(|refused| {
         let source = refused.neighbors.as_deref().map(|by| attack::plain_source(by, None));
         (&refused.scheme, source, &refused.reason)
@@ -126,16 +115,17 @@ pub fn render(
         "scripts": SCRIPTS,
         // JSON for the script; free of `<`.
         "data": script_text(&data.to_string()),
-        "blocks": blocks,
-        "pictures": n_pictures,
-        "findings": curves::titles(results),
+        "blocks": blocks.0,
+        "pictures": !pictures.is_empty(),
+        "findings": curves::findings(results),
         // The verdict of this audit, after that of another audit if there is one.
-        "parts": other.chain([own.0]).collect::<Vec<_>>(),
+        "parts": first.chain([own.0]).collect::<Vec<_>>(),
+        "next": next::steps(results),
         "sheets": sheets,
         "sheets_left_out": sheets_left_out,
         "heat_maps": tiles::heat_maps(results),
         "cost": cost::chart(results),
-        "scene": scene,
+        "scene": data["scene"],
         "share_safe": safe,
         "subject": subject(results),
         "gates": gates(&document),
@@ -154,26 +144,7 @@ pub fn render(
         "other_sha256": document.input.other_sha256.iter().collect::<Vec<_>>(),
         "document": document,
     });
-    let mut env = environment();
-    // A non-breaking space keeps a figure and its unit on one line.
-    env.add_filter("tied", |text: String| {
-        [" %", " cm", " px"]
-            .iter()
-            .fold(text, |text, unit| text.replace(unit, &unit.replace(' ', "\u{a0}")))
-    });
-    env.add_filter("coded", coded);
-    for (name, source) in TEMPLATES {
-        env.add_template(name, source)?;
-    }
-    Ok(env.get_template("report.html")?.render(Serde(&page))?.replace(turns, "\u{fffd}"))
-}
-
-/// Returns an environment that escapes text and fails on undefined names.
-pub(crate) fn environment() -> Environment<'static> {
-    let mut env = Environment::new();
-    env.set_undefined_behavior(UndefinedBehavior::Strict);
-    env.set_auto_escape_callback(|_| AutoEscape::Html);
-    env
+    Ok(templates::render(&TEMPLATES, &page)?.replace(turns, "\u{fffd}"))
 }
 
 /// Returns whether a character changes the direction of text; a name may contain one.
@@ -181,62 +152,27 @@ fn turns(c: char) -> bool {
     matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-fn coded(text: &str) -> minijinja::Value {
-    let escaped = text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
-    let parts = escaped.split('`').enumerate();
-    let parts = parts.map(|(at, part)| match at % 2 {
-        1 => format!("<code>{part}</code>"),
-        _ => part.to_owned(),
-    });
-    minijinja::Value::from_safe_string(parts.collect())
-}
-
+/// Returns what the page says of the audited input.
 fn subject(results: &Results<'_>) -> Value {
-    let (document, input) = (results.document, &results.document.input);
+    let input = &results.document.input;
     // The oracle uses the K of the audit; other sources choose their own.
     let oracle = results.rows.iter().find(|row| attack::is_oracle(&row.neighbors));
-    let typed = document.options.get("k").and_then(Value::as_u64);
+    let typed = results.document.options.get("k").and_then(Value::as_u64);
     let k = oracle.map(|row| row.k).or(typed.map(|k| k as usize)).unwrap_or(50);
-    let unit = match (results.unit, input.scale_m_per_unit, input.unit_in_map_units) {
-        (Unit::Pixel, ..) => "Lengths are in pixels.".to_owned(),
-        (Unit::Meter, scale, _) => {
-            let by =
-                scale.map(|scale| format!(", by the declared scale of {scale} m per map unit"));
-            input.size().unwrap_or("Meters".to_owned()) + &by.unwrap_or_default() + "."
-        }
-        (Unit::KthNeighbor, _, Some(unit)) => {
-            format!("Here it is {} map units.", words::significant(unit, 4))
-        }
-        (Unit::KthNeighbor, _, None) => String::new(),
-    };
     json!({
         // The last telling part of the path; the whole path is in the last section.
         "name": input.path.as_deref().map(short_name),
-        "n_points": words::thousands(input.n_points),
+        "n_points": input.n_points,
+        "images": input.images,
         "metric": results.unit != Unit::KthNeighbor,
         "kind": if results.is_of_images() { "images" } else { "map" },
         "points": results.points(),
-        "images": input.images.as_ref().map(images_text),
-        "unit": unit,
+        "size": input.size(),
+        "scale": input.scale_m_per_unit.map(|scale| scale.to_string()),
+        "map_units": input.unit_in_map_units.map(|unit| words::significant(unit, 4)),
         "kth": words::ordinal(k),
         "usual_distance": words::USUAL_DISTANCE,
     })
-}
-
-fn images_text(counts: &ImageCounts) -> String {
-    let count = words::thousands;
-    let mut text = match counts.found == counts.used {
-        true => format!("{} images.", count(counts.used)),
-        false => format!("{} of {} images.", count(counts.used), count(counts.found)),
-    };
-    if counts.unusable > 0 {
-        text.push_str(&format!(" {} could not be used.", count(counts.unusable)));
-    }
-    if counts.too_small > 0 {
-        let (n, few) = (count(counts.too_small), "had fewer keypoints than requested neighbors");
-        text.push_str(&format!(" {n} {few}, and were attacked with fewer."));
-    }
-    text
 }
 
 /// Returns the part of a path that names the map: `room` of `maps/room/sparse/0`.
@@ -250,12 +186,13 @@ fn short_name(path: &str) -> String {
     name.unwrap_or(path).to_owned()
 }
 
+/// Returns the value of an option as text.
 fn plain(value: &Value) -> String {
     match value {
         Value::String(text) => text.clone(),
         Value::Array(items) => items.iter().map(plain).collect::<Vec<_>>().join(", "),
         Value::Null => "none".to_owned(),
-        other => other.to_string(),
+        Value::Bool(_) | Value::Number(_) | Value::Object(_) => value.to_string(),
     }
 }
 
@@ -277,16 +214,6 @@ pub struct RenderOptions {
     pub inversions: Vec<Inversion>,
     /// The verdict on another audit, at the top of the page.
     pub opening: Option<Opening>,
-}
-
-/// The error curve of one row of the results.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ErrorCdf {
-    /// Index into [`Document::results`].
-    pub row: usize,
-    /// (error in the row's unit, percent of the released points within it), ascending; a hundred
-    /// points suffice.
-    pub points: Vec<(f64, f64)>,
 }
 
 /// The opening of a page: the verdict on an audit, and its pictures if it has any.

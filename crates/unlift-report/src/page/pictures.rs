@@ -3,11 +3,10 @@
 //! Positions are in pixels. The center of the first pixel is `(0, 0)`, so an image of width `w` spans
 //! `-0.5` to `w - 0.5`.
 
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
 use crate::attack::{self, ByAttack, Given};
+use crate::page::blocks::{Blocks, NOT_DRAWN, coordinate};
 use crate::page::scene::subsample;
 use crate::words;
 
@@ -72,8 +71,6 @@ pub struct Graph {
 
 /// Maximal number of bytes of all pictures without their photos, before base64.
 const BUDGET_BYTES: usize = 3_600_000;
-/// The position of a point that is not drawn. Others are 0..=65534 across the image.
-const NOT_DRAWN: u16 = u16::MAX;
 const BYTES_PER_POINT: usize = 2 * size_of::<u16>();
 
 /// Returns the key of the neighborhoods that are shown first: those made by the attacker that recover
@@ -90,49 +87,34 @@ const SHORT_SHARE: f32 = 0.1;
 
 /// Encodes up to [`MOST_PICTURES`] pictures and appends their blocks to `blocks`. Keypoints are thinned
 /// to keep the budget. Shares within `within` pixels are over all released keypoints.
-pub(crate) fn encode(pictures: &[Picture], within: f64, blocks: &mut Vec<String>) -> Vec<Value> {
+pub(crate) fn encode(pictures: &[Picture], within: f64, blocks: &mut Blocks) -> Vec<Value> {
     let pictures = &pictures[..pictures.len().min(MOST_PICTURES)];
-    let each = BUDGET_BYTES / pictures.len().max(1);
-    pictures.iter().map(|picture| encode_picture(picture, each, within, blocks)).collect()
+    let budget = BUDGET_BYTES / pictures.len().max(1);
+    pictures.iter().map(|picture| encode_picture(picture, budget, within, blocks)).collect()
 }
 
-fn encode_picture(
-    picture: &Picture,
-    budget: usize,
-    within: f64,
-    blocks: &mut Vec<String>,
-) -> Value {
+fn encode_picture(picture: &Picture, budget: usize, within: f64, blocks: &mut Blocks) -> Value {
     let points = 1
         + 2 * picture.released.len()
         + picture.views.len()
         + GRAPH_NEIGHBORS * picture.graphs.len();
-    let most = budget / (BYTES_PER_POINT * points);
-    let chosen = subsample(picture.keypoints.len(), most, 0);
+    let chosen = subsample(picture.keypoints.len(), budget / (BYTES_PER_POINT * points), 0);
     let short_px = SHORT_SHARE * picture.size[0].min(picture.size[1]) as f32;
-    let place = |point: Option<[f32; 2]>| quantize(picture.size, point);
-    let mut push = |bytes: Vec<u8>| {
-        blocks.push(STANDARD.encode(bytes));
-        blocks.len() - 1
+    let photo = picture.photo.as_ref().map(|jpeg| blocks.push(jpeg));
+    // Adds a block with places of every chosen keypoint.
+    let mut push = |of: &dyn Fn(usize) -> Vec<Option<[f32; 2]>>| {
+        let places = chosen.iter().flat_map(|&i| of(i));
+        let bytes = places.flat_map(|place| quantize(picture.size, place));
+        blocks.push(bytes.collect::<Vec<u8>>())
     };
-    let photo = picture.photo.as_ref().map(|jpeg| push(jpeg.clone()));
-    let keypoints = push(chosen.iter().flat_map(|&i| place(Some(picture.keypoints[i]))).collect());
-    let points = |all: &[Option<[f32; 2]>]| -> Vec<u8> {
-        chosen.iter().flat_map(|&i| place(all.get(i).copied().flatten())).collect()
-    };
+    let keypoints = push(&|i| vec![Some(picture.keypoints[i])]);
     let released = picture.released.iter().map(|view| {
-        let ends = |segments: &[Option<[[f32; 2]; 2]>]| -> Vec<u8> {
-            let both = |&i: &usize| {
-                let segment = segments.get(i).copied().flatten();
-                [0, 1].map(|end| place(segment.map(|segment| segment[end])))
-            };
-            chosen.iter().flat_map(both).flatten().collect()
+        let (kind, block) = match &view.marks {
+            Marks::Lines(all) => ("lines", push(&|i| ends(all, i))),
+            Marks::Rays(all) => ("rays", push(&|i| ends(all, i))),
+            Marks::Points(all) => ("points", push(&|i| vec![at(all, i)])),
         };
-        let (kind, bytes) = match &view.marks {
-            Marks::Lines(all) => ("lines", ends(all)),
-            Marks::Rays(all) => ("rays", ends(all)),
-            Marks::Points(all) => ("points", points(all)),
-        };
-        json!({ "scheme": view.scheme, "kind": kind, "block": push(bytes) })
+        json!({ "scheme": view.scheme, "kind": kind, "block": block })
     });
     let released: Vec<Value> = released.collect();
     let views = picture.views.iter().map(|view| {
@@ -142,20 +124,19 @@ fn encode_picture(
             "given": key(&view.attack.given),
             "label": view.attack.given.label(),
             "solver": view.attack.solver,
-            "block": push(points(&view.recovered)),
+            "block": push(&|i| vec![at(&view.recovered, i)]),
             "said": recovered(picture, view, within).1,
         })
     });
     let views: Vec<Value> = views.collect();
     let graphs = picture.graphs.iter().map(|graph| {
-        let listed = |&i: &usize| {
-            let of = graph.neighbors.get(i).map(Vec::as_slice).unwrap_or_default();
-            (0..GRAPH_NEIGHBORS).flat_map(|at| place(of.get(at).copied())).collect::<Vec<u8>>()
-        };
-        let block = push(chosen.iter().flat_map(listed).collect());
-        let text = edges(picture, graph, short_px);
         // Shorter lists are padded with points that are not drawn.
-        json!({ "given": key(&graph.given), "said": text, "k": GRAPH_NEIGHBORS, "block": block })
+        let listed = |i: usize| {
+            let of = graph.neighbors.get(i).map(Vec::as_slice).unwrap_or_default();
+            (0..GRAPH_NEIGHBORS).map(|rank| of.get(rank).copied()).collect()
+        };
+        let text = edges(picture, graph, short_px);
+        json!({ "given": key(&graph.given), "said": text, "k": GRAPH_NEIGHBORS, "block": push(&listed) })
     });
     let graphs: Vec<Value> = graphs.collect();
     let n = picture.keypoints.len();
@@ -176,23 +157,28 @@ fn encode_picture(
     })
 }
 
+/// Returns the record of keypoint `i`; `None` also if `all` is too short.
+fn at<T: Copy>(all: &[Option<T>], i: usize) -> Option<T> {
+    all.get(i).copied().flatten()
+}
+
+fn ends(segments: &[Option<[[f32; 2]; 2]>], i: usize) -> Vec<Option<[f32; 2]>> {
+    let segment = at(segments, i);
+    [0, 1].map(|end| segment.map(|segment| segment[end])).to_vec()
+}
+
 /// Encodes a position as a little-endian u16 pair, 0..=65534 across the image; points outside move to
 /// the border.
-fn quantize(size: [u32; 2], point: Option<[f32; 2]>) -> [u8; BYTES_PER_POINT] {
-    let steps = |c: usize| {
-        let share = (point?[c] + 0.5) / size[c].max(1) as f32;
-        share.is_finite().then(|| (share.clamp(0.0, 1.0) * f32::from(NOT_DRAWN - 1)).round() as u16)
-    };
-    let [x, y] = match (steps(0), steps(1)) {
-        (Some(x), Some(y)) => [x, y].map(u16::to_le_bytes),
-        _ => [NOT_DRAWN; 2].map(u16::to_le_bytes),
-    };
-    [x[0], x[1], y[0], y[1]]
+fn quantize(size: [u32; 2], point: Option<[f32; 2]>) -> impl Iterator<Item = u8> {
+    let shares = point.map(|point| [0, 1].map(|c| (point[c] + 0.5) / size[c].max(1) as f32));
+    let shares = shares.filter(|shares| shares.iter().all(|share| share.is_finite()));
+    let steps = shares.map_or([NOT_DRAWN; 2], |shares| shares.map(coordinate));
+    steps.into_iter().flat_map(u16::to_le_bytes)
 }
 
 /// Returns the key of neighborhoods, without a measured ratio, which differs between images.
 fn key(given: &Given) -> String {
-    let source = attack::source(&given.neighbors, given.oracle_noise.as_deref());
+    let source = given.source();
     match attack::is_oracle(&given.neighbors) {
         true => format!("{source} {}", given.inlier_ratio),
         false => source,

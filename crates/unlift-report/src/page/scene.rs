@@ -3,12 +3,11 @@
 //! All positions are in the document's unit (meters, or usual distances to the K-th neighbor), relative to an origin
 //! near the map: large coordinates (10^6) must be centered before they become `f32`.
 
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
 use crate::attack::ByAttack;
 use crate::document::Row;
+use crate::page::blocks::{Blocks, NOT_DRAWN, coordinate};
 use crate::words;
 
 /// The whole 3D view.
@@ -71,8 +70,6 @@ const BYTES_PER_RECOVERED: usize = BYTES_PER_POINT + 1;
 const BYTES_PER_PATCH: usize = 4 * BYTES_PER_POINT;
 const BYTES_PER_BLOCK: usize = 200;
 
-/// The position of a point that is not drawn: lost, not released, or outside the box. Others are 0..=65534.
-const NOT_DRAWN: u16 = u16::MAX;
 /// The error byte of a point that is lost or not released.
 const LOST: u8 = u8::MAX;
 /// Errors are stored as `log10(error / first threshold)`, from -3 to 3, in 0..=254.
@@ -88,17 +85,6 @@ pub fn points_within_budget(n_views: usize, n_schemes: usize) -> usize {
     budget.saturating_sub(fixed) / (BYTES_PER_POINT + n_views * BYTES_PER_RECOVERED)
 }
 
-/// The view as the script reads it.
-pub(crate) struct Encoded {
-    pub n_points: u64,
-    pub n_drawn: usize,
-    /// Whether a view has points.
-    pub has_views: bool,
-    pub data: Value,
-    /// Base64 blocks, to which the data refer by index.
-    pub blocks: Vec<String>,
-}
-
 /// Returns the camera in the box that is farthest from its middle, because it sees most of the scene.
 fn eye(bounds: &SceneBox, cameras: &[[f32; 3]]) -> Option<[f32; 3]> {
     let middle: [f32; 3] = std::array::from_fn(|c| 0.5 * (bounds.low[c] + bounds.high[c]));
@@ -107,66 +93,81 @@ fn eye(bounds: &SceneBox, cameras: &[[f32; 3]]) -> Option<[f32; 3]> {
     within.copied().max_by(|a, b| far(a).total_cmp(&far(b)))
 }
 
-/// Encodes `scene`, thinned further if it exceeds the budget. Errors are relative to `error_unit`, the
-/// first threshold. Leaves out views without a row in `rows`, and further views of one row.
+/// Returns the data of the script, whose blocks are added to `blocks`: first the originals, then the cameras. `None` if no point
+/// or no recovered point would be drawn.
 ///
-/// Block 0 holds the originals, block 1 the cameras.
-pub(crate) fn encode(scene: &Scene3d, rows: &[Row], error_unit: f32) -> Encoded {
-    let bounds = SceneBox::robust(&scene.originals);
-    let max = points_within_budget(scene.views.len(), scene.obfuscations.len());
-    let chosen = subsample(scene.originals.len(), max, 0);
-    let mut blocks = Vec::new();
-    let mut push = |bytes: Vec<u8>| {
-        blocks.push(STANDARD.encode(bytes));
-        blocks.len() - 1
-    };
-
-    let originals = || chosen.iter().map(|&i| scene.originals[i]);
-    push(positions(&bounds, originals()));
-    let n_outside = originals().filter(|&point| !is_drawn(&bounds, point)).count();
-    let cameras = subsample(scene.cameras.len(), MAX_CAMERAS, 0);
-    push(positions(&bounds, cameras.iter().map(|&i| scene.cameras[i])));
-
-    let mut obfuscations = Vec::new();
-    for ObfuscationView { scheme, shapes, n_records, .. } in &scene.obfuscations {
-        let (kind, name, bytes, n_drawn) = encode_shapes(&bounds, shapes);
-        let [drawn, all] = [n_drawn as u64, *n_records].map(words::thousands);
-        // "1,500 of 3,895 lines drawn".
-        let text = match n_drawn as u64 >= *n_records {
-            true => format!("{drawn} {name} drawn"),
-            false => format!("{drawn} of {all} {name} drawn"),
-        };
-        let block = push(bytes);
-        obfuscations.push(json!({
-            "scheme": scheme, "kind": kind, "count": n_drawn, "block": block, "said": text,
-        }));
-    }
-    let (mut views, mut shown) = (Vec::new(), Vec::new());
+/// Points are thinned further if they exceed the budget. Errors are relative to `error_unit`, the first threshold. Views without
+/// a row in `rows` and further views of one row are left out.
+pub(crate) fn encode(
+    scene: &Scene3d,
+    rows: &[Row],
+    error_unit: f32,
+    blocks: &mut Blocks,
+) -> Option<Value> {
+    let mut shown: Vec<(usize, &View)> = Vec::new();
     for view in &scene.views {
         let row = rows.iter().position(|row| view.attack.is_of(row));
-        let Some(row) = row.filter(|row| !shown.contains(row)) else { continue };
-        shown.push(row);
-        let (bytes, fate) = encode_view(&bounds, scene, view, &chosen, error_unit);
-        let (block, text) = (push(bytes), fate.in_words());
-        views.push(json!({ "row": row, "block": block, "drawn": fate.drawn, "said": text }));
+        let is_new = |row: &usize| shown.iter().all(|(known, _)| known != row);
+        shown.extend(row.filter(is_new).map(|row| (row, view)));
     }
-    let n_points = scene.n_points.max(scene.originals.len() as u64);
-    let drawn = chosen.len() - n_outside;
-    let data = json!({
+    let max = points_within_budget(scene.views.len(), scene.obfuscations.len());
+    let chosen = subsample(scene.originals.len(), max, 0);
+    if chosen.is_empty() || shown.is_empty() {
+        return None;
+    }
+    let bounds = SceneBox::robust(&scene.originals);
+    let originals = chosen.iter().map(|&i| scene.originals[i]);
+    blocks.push(positions(&bounds, originals.clone()));
+    let visible = originals.filter(|&point| is_drawn(&bounds, point)).count();
+    let cameras = subsample(scene.cameras.len(), MAX_CAMERAS, 0);
+    blocks.push(positions(&bounds, cameras.iter().map(|&i| scene.cameras[i])));
+
+    let obfuscations = scene.obfuscations.iter().map(|of| obfuscation(&bounds, of, blocks));
+    let obfuscations: Vec<Value> = obfuscations.collect();
+    let views = shown.into_iter().map(|(row, view)| {
+        let (bytes, fate) = encode_view(&bounds, scene, view, &chosen, error_unit);
+        let block = blocks.push(bytes);
+        json!({ "row": row, "block": block, "drawn": fate.visible, "said": fate.in_words() })
+    });
+    let views: Vec<Value> = views.collect();
+    let outside = chosen.len() - visible;
+    Some(json!({
         "low": bounds.low,
         "high": bounds.high,
         "up": scene.up.unwrap_or([0.0, 0.0, 1.0]),
-        "n_points": n_points,
+        "n_points": scene.n_points.max(scene.originals.len() as u64),
         "n_drawn": chosen.len(),
-        "originals_said": Fate { drawn, outside: n_outside, ..Fate::default() }.in_words(),
+        "originals_said": Fate { visible, outside, ..Fate::default() }.in_words(),
         "n_cameras": cameras.len(),
         // The first viewpoint: a camera of the map.
         "eye": eye(&bounds, &scene.cameras),
         "error_unit": error_unit,
         "obfuscations": obfuscations,
         "views": views,
+    }))
+}
+
+/// Returns the data of one scheme's records, whose positions become a block.
+fn obfuscation(bounds: &SceneBox, of: &ObfuscationView, blocks: &mut Blocks) -> Value {
+    let (kind, name, n, max) = match &of.shapes {
+        Shapes::Segments(all) => ("segments", "lines", all.len(), MAX_SHAPES),
+        Shapes::Patches(all) => ("patches", "planes", all.len(), MAX_SHAPES),
+        Shapes::Points(all) => ("points", "points", all.len(), MAX_SHAPE_POINTS),
+    };
+    let chosen = subsample(n, max, 0);
+    let corners = chosen.iter().flat_map(|&i| match &of.shapes {
+        Shapes::Segments(all) => &all[i][..],
+        Shapes::Patches(all) => &all[i],
+        Shapes::Points(all) => std::slice::from_ref(&all[i]),
     });
-    Encoded { n_points, n_drawn: chosen.len(), has_views: !shown.is_empty(), data, blocks }
+    let block = blocks.push(positions(bounds, corners.copied()));
+    let [some, all] = [chosen.len() as u64, of.n_records].map(words::thousands);
+    // "1,500 of 3,895 lines drawn".
+    let text = match chosen.len() as u64 >= of.n_records {
+        true => format!("{some} {name} drawn"),
+        false => format!("{some} of {all} {name} drawn"),
+    };
+    json!({ "scheme": of.scheme, "kind": kind, "count": chosen.len(), "block": block, "said": text })
 }
 
 fn encode_view(
@@ -184,7 +185,7 @@ fn encode_view(
     for &i in chosen {
         let error = distance(recovered(i), scene.originals[i]);
         match () {
-            () if is_drawn(bounds, recovered(i)) => fate.drawn += 1,
+            () if is_drawn(bounds, recovered(i)) => fate.visible += 1,
             () if !error.is_nan() => fate.outside += 1,
             () if is_withheld(i) => fate.withheld += 1,
             () => fate.lost += 1,
@@ -198,47 +199,19 @@ fn is_drawn(bounds: &SceneBox, point: [f32; 3]) -> bool {
     quantize(bounds, point) != [NOT_DRAWN; 3]
 }
 
-/// Returns the kind of the shapes, their name, their bytes, and how many are drawn.
-fn encode_shapes(
-    bounds: &SceneBox,
-    shapes: &Shapes,
-) -> (&'static str, &'static str, Vec<u8>, usize) {
-    let (kind, name, n, max) = match shapes {
-        Shapes::Segments(all) => ("segments", "lines", all.len(), MAX_SHAPES),
-        Shapes::Patches(all) => ("patches", "planes", all.len(), MAX_SHAPES),
-        Shapes::Points(all) => ("points", "points", all.len(), MAX_SHAPE_POINTS),
-    };
-    let chosen = subsample(n, max, 0);
-    let corners = chosen.iter().flat_map(|&i| match shapes {
-        Shapes::Segments(all) => &all[i][..],
-        Shapes::Patches(all) => &all[i],
-        Shapes::Points(all) => std::slice::from_ref(&all[i]),
-    });
-    (kind, name, positions(bounds, corners.copied()), chosen.len())
-}
-
 /// Encodes positions as little-endian u16 triples, 0..=65534 across the box.
 fn positions(bounds: &SceneBox, points: impl Iterator<Item = [f32; 3]>) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    for point in points {
-        for value in quantize(bounds, point) {
-            bytes.extend_from_slice(&value.to_le_bytes());
-        }
-    }
-    bytes
+    points.flat_map(|point| quantize(bounds, point)).flat_map(u16::to_le_bytes).collect()
 }
 
 fn quantize(bounds: &SceneBox, point: [f32; 3]) -> [u16; 3] {
-    let mut cells = [0; 3];
-    for axis in 0..3 {
-        let share = (point[axis] - bounds.low[axis]) / (bounds.high[axis] - bounds.low[axis]);
-        // Ends of clipped lines lie on the box only up to rounding.
-        if !(-1e-4..=1.0001).contains(&share) {
-            return [NOT_DRAWN; 3];
-        }
-        cells[axis] = (share.clamp(0.0, 1.0) * f32::from(NOT_DRAWN - 1)).round() as u16;
+    let SceneBox { low, high } = bounds;
+    let shares = [0, 1, 2].map(|c| (point[c] - low[c]) / (high[c] - low[c]));
+    // Ends of clipped lines lie on the box only up to rounding.
+    match shares.iter().all(|share| (-1e-4..=1.0001).contains(share)) {
+        true => shares.map(coordinate),
+        false => [NOT_DRAWN; 3],
     }
-    cells
 }
 
 fn error_byte(relative: f32) -> u8 {
@@ -256,7 +229,7 @@ fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
 /// Counts of the points of one pane; each point is counted once.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 struct Fate {
-    drawn: usize,
+    visible: usize,
     withheld: usize,
     lost: usize,
     outside: usize,
@@ -273,8 +246,8 @@ impl Fate {
         let missing = missing.into_iter().filter(|(n, _)| *n > 0);
         let missing: Vec<String> =
             missing.map(|(n, what)| format!("{} {what}", words::thousands(n))).collect();
-        let all = words::thousands(self.drawn + self.withheld + self.lost + self.outside);
-        let drawn = match self.drawn {
+        let all = words::thousands(self.visible + self.withheld + self.lost + self.outside);
+        let drawn = match self.visible {
             _ if missing.is_empty() => return format!("{all} points drawn"),
             0 => "None".to_owned(),
             n => words::thousands(n),
@@ -329,35 +302,25 @@ impl SceneBox {
             return None;
         }
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        let corner = |a: f32, b: f32| {
+        let Self { low, high } = self;
+        Some([(low, low), (high, low), (high, high), (low, high)].map(|(first, second)| {
             let mut point = [offset; 3];
-            point[u] = a;
-            point[v] = b;
+            point[u] = first[u];
+            point[v] = second[v];
             point
-        };
-        Some([
-            corner(self.low[u], self.low[v]),
-            corner(self.high[u], self.low[v]),
-            corner(self.high[u], self.high[v]),
-            corner(self.low[u], self.high[v]),
-        ])
+        }))
     }
 }
 
 /// Returns at most `max` of the indices `0..n`, ascending, chosen by a hash of the index and
 /// `seed`. The choice is equal on every machine and independent of the order of a map file.
 pub fn subsample(n: usize, max: usize, seed: u64) -> Vec<usize> {
-    if n <= max {
-        return (0..n).collect();
+    let mut indices: Vec<usize> = (0..n).collect();
+    if n > max {
+        indices.select_nth_unstable_by_key(max, |&i| (mix(seed, i as u64), i));
+        indices.truncate(max);
+        indices.sort_unstable();
     }
-    let mut keyed: Vec<(u64, usize)> = (0..n).map(|i| (mix(seed, i as u64), i)).collect();
-    if max == 0 {
-        return Vec::new();
-    }
-    keyed.select_nth_unstable(max - 1);
-    keyed.truncate(max);
-    let mut indices: Vec<usize> = keyed.into_iter().map(|(_, i)| i).collect();
-    indices.sort_unstable();
     indices
 }
 
@@ -371,57 +334,47 @@ fn mix(seed: u64, counter: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::attack::{Attack, Given};
+    use crate::attack::Attack;
 
     fn scene(n: usize, n_views: usize) -> Scene3d {
         let originals: Vec<[f32; 3]> =
             (0..n).map(|i| [i as f32, (i * 7 % 13) as f32, 0.5]).collect();
-        let view = |at: usize| {
-            let (scheme, solver) = ("olc".into(), "consensus".into());
-            let attack = Attack { scheme, given: given(at), solver };
-            View { attack, recovered: originals.clone() }
-        };
         let patch = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
-        let shapes = Shapes::Patches(vec![patch; n]);
         let plane = ObfuscationView {
             scheme: "plane".into(),
-            shapes,
+            shapes: Shapes::Patches(vec![patch; n]),
             n_records: n as u64,
             withheld: Vec::new(),
         };
+        let views = (0..n_views)
+            .map(|at| View { attack: Attack::of(&row(at)), recovered: originals.clone() });
         Scene3d {
             cameras: originals.clone(),
             n_points: n as u64,
             obfuscations: vec![plane; 7],
-            views: (0..n_views).map(view).collect(),
+            views: views.collect(),
             up: None,
             originals,
         }
     }
 
-    fn given(at: usize) -> Given {
-        Given { neighbors: format!("source-{at}"), oracle_noise: None, inlier_ratio: 0.5 }
-    }
-
     fn row(at: usize) -> Row {
-        let text = r#"{"scheme": "olc", "neighbors": "", "oracle_noise": null, "inlier_ratio": 0.25, "k": 50,
-            "solver": "consensus", "delta": 0.1, "unit": "m", "n_points": 9, "n_lost": 0, "lost": {},
-            "dropped": {}, "recovered_percent": {}, "blind_percent": {}, "axis_accuracy_percent": null,
-            "assignment_accuracy_percent": null, "median_error": null, "error_percentiles": {}}"#;
-        let row: Row = serde_json::from_str(text).expect("a row");
-        Row { neighbors: given(at).neighbors, ..row }
+        let neighbors = format!("source-{at}");
+        Row { scheme: "olc".into(), neighbors, solver: "consensus".into(), ..Row::default() }
     }
 
     #[test]
     fn the_budget_holds_for_any_number_of_points_and_views() {
-        for (n, n_views) in [(0, 0), (10, 1), (60_000, 7), (20_000, 84), (300, 3_000)] {
+        for (n, n_views) in [(0, 1), (10, 0), (10, 1), (60_000, 7), (20_000, 84), (300, 3_000)] {
             let rows: Vec<Row> = (0..n_views).map(row).collect();
-            let encoded = encode(&scene(n, n_views), &rows, 0.1);
-            assert_eq!(encoded.data["views"].as_array().map(Vec::len), Some(n_views));
-            let bytes: usize =
-                encoded.blocks.iter().map(|block| block.len() + BYTES_PER_BLOCK).sum();
+            let mut blocks = Blocks::default();
+            let data = encode(&scene(n, n_views), &rows, 0.1, &mut blocks);
+            let bytes: usize = blocks.0.iter().map(|block| block.len() + BYTES_PER_BLOCK).sum();
             assert!(bytes <= SCENE_BUDGET_BYTES, "{n} points, {n_views} views: {bytes} bytes");
-            assert_eq!(encoded.n_drawn, n.min(points_within_budget(n_views, 7)));
+            assert_eq!(data.is_some(), n > 0 && n_views > 0);
+            let Some(data) = data else { continue };
+            assert_eq!(data["views"].as_array().map(Vec::len), Some(n_views));
+            assert_eq!(data["n_drawn"], n.min(points_within_budget(n_views, 7)));
         }
         assert!(points_within_budget(42, 7) > 8_000, "a usual audit shows a real cloud");
         assert_eq!(points_within_budget(usize::MAX / 1_000, 7), 0);
@@ -435,7 +388,8 @@ mod tests {
         scene.views[0].recovered[3] = [f32::NAN; 3];
         scene.views[0].recovered[4] = [f32::NAN; 3];
         scene.views[0].recovered[5] = [1e6; 3];
-        let view = encode(&scene, &[row(0)], 0.1).data["views"][0].take();
+        let data = encode(&scene, &[row(0)], 0.1, &mut Blocks::default()).expect("a view");
+        let view = &data["views"][0];
         assert_eq!(view["drawn"], 6);
         assert_eq!(view["said"], "6 of 9 points drawn; 1 not released, 1 lost, 1 outside the box");
     }

@@ -4,20 +4,20 @@ use unlift::audit::Interval;
 
 use indexmap::IndexMap;
 
+use crate::attack::{self, Given};
 use crate::document::{Bound, BreakEven, ByReason, ByThreshold, Row};
 use crate::results::{Results, distinct};
 use crate::table::{Class, Column, NONE, Table, column, figure, known, label};
-use crate::{attack, words};
+use crate::words;
 
 /// The number of columns that name a row.
 const KEYS: usize = 4;
 
 fn keys<'a>() -> Vec<Column<'a, Row>> {
-    let source = |row: &Row| attack::plain_source(&row.neighbors, row.oracle_noise.as_deref());
     vec![
         label("scheme", |row: &Row| row.scheme.clone()),
         label("solver", |row: &Row| row.solver.clone()),
-        label("neighbors", source),
+        label("neighbors", |row: &Row| Given::of(row).plain_source()),
         figure("of them right", |row: &Row| {
             format!("{} %", words::ratio_percent(row.inlier_ratio))
         }),
@@ -78,39 +78,55 @@ pub(crate) fn recovered(results: &Results<'_>) -> Table {
     Table::of("recovered", caption, results.rows, columns).without_empty_columns()
 }
 
-pub(crate) fn baselines(results: &Results<'_>) -> Table {
-    /// A line: the row, and whether it is about the records alone.
-    type Line<'a> = (&'a Row, bool);
-    let lines = results.schemes.iter().flat_map(|scheme| {
-        let rows = results.of_scheme(scheme);
-        let alone = rows.clone().filter(|row| row.records_alone_percent.is_some());
-        rows.map(|row| (row, false)).chain(alone.map(|row| (row, true)))
-    });
-    let attacker = |(row, alone): &Line<'_>| {
+/// What an attacker recovers without lists of neighbors.
+struct Baseline<'a> {
+    scheme: &'a str,
+    attacker: String,
+    shares: &'a ByThreshold,
+    intervals: Option<&'a IndexMap<String, Interval>>,
+    spread: Option<&'a ByThreshold>,
+}
+
+impl<'a> Baseline<'a> {
+    fn blind(row: &'a Row) -> Self {
+        Self {
+            scheme: &row.scheme,
+            attacker: "blind guess".to_owned(),
+            shares: &row.blind_percent,
+            intervals: row.interval.as_ref().map(|of| &of.blind_percent),
+            spread: row.std.as_ref().map(|std| &std.blind_percent),
+        }
+    }
+
+    fn alone(row: &'a Row) -> Option<Self> {
         // The best attack may differ between thresholds.
         let by = row.records_alone_by.iter().flat_map(|by| by.values());
         let by = distinct(by.map(String::as_str)).join("; ");
-        match alone {
-            true => attack::records_alone(Some(by.as_str()).filter(|by| !by.is_empty())),
-            false => "blind guess".to_owned(),
-        }
-    };
+        Some(Self {
+            scheme: &row.scheme,
+            attacker: attack::records_alone(Some(by.as_str()).filter(|by| !by.is_empty())),
+            shares: row.records_alone_percent.as_ref()?,
+            intervals: row.interval.as_ref().map(|of| &of.records_alone_percent),
+            spread: None,
+        })
+    }
+}
+
+pub(crate) fn baselines(results: &Results<'_>) -> Table {
+    let lines = results.schemes.iter().flat_map(|scheme| {
+        let rows = results.of_scheme(scheme);
+        rows.clone().map(Baseline::blind).chain(rows.filter_map(Baseline::alone))
+    });
+    let lines: Vec<Baseline<'_>> = lines.collect();
     let mut columns = vec![
-        label("scheme", |(row, _): &Line<'_>| row.scheme.clone()),
-        label("attacker", attacker),
+        label("scheme", |line: &Baseline<'_>| line.scheme.to_owned()),
+        label("attacker", |line: &Baseline<'_>| line.attacker.clone()),
     ];
-    columns.extend(within(results, "", |(row, alone): &Line<'_>, typed| {
-        let of = row.interval.as_ref();
-        match row.records_alone_percent.as_ref().filter(|_| *alone) {
-            Some(shares) => share(typed, shares, of.map(|of| &of.records_alone_percent), None),
-            None => {
-                let spread = row.std.as_ref().map(|std| &std.blind_percent);
-                share(typed, &row.blind_percent, of.map(|of| &of.blind_percent), spread)
-            }
-        }
+    columns.extend(within(results, "", |line: &Baseline<'_>, typed| {
+        share(typed, line.shares, line.intervals, line.spread)
     }));
     let caption = "Baselines: what an attacker recovers without lists of neighbors. Lists add what exceeds the larger baseline.";
-    let mut table = Table::of("baselines", caption, &lines.collect::<Vec<_>>(), columns);
+    let mut table = Table::of("baselines", caption, &lines, columns);
     table.rows = distinct(table.rows);
     table
 }

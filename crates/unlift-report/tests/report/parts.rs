@@ -3,7 +3,9 @@
 use unlift_report::compare::compare;
 use unlift_report::document::{Document, GateResult, HeldOut, Localization, Row};
 use unlift_report::inversions::{Inversion, Painted};
-use unlift_report::{Attack, ByAttack, RenderOptions, gate_lines, junit, render, text_table};
+use unlift_report::{
+    Attack, ByAttack, Given, RenderOptions, gate_lines, junit, render, text_table,
+};
 
 use crate::sample;
 
@@ -130,7 +132,7 @@ fn gates_on_localization_speak_of_multiples() {
         "gate ppl:localization<=1.5: FAILED, found 1.60 times the unprotected error: ppl, bound\n";
     assert_eq!(gate_lines(&document), line);
     let said = "1.6 times the unprotected localization error, at most 1.5 times may be; ppl, bound";
-    for text in [page(&document), junit(&document)] {
+    for text in [page(&document), junit(&document).unwrap()] {
         assert!(text.contains(said), "{text}");
     }
 }
@@ -224,6 +226,29 @@ fn only_the_strongest_attacks_are_shown_at_first() {
     assert!(main.contains("known neighbors, 50 % right"));
     let (others, _) = others.split_once("</details>").expect("an end");
     assert_eq!(others.matches("<img").count(), 5);
+}
+
+#[test]
+fn pictures_that_would_make_a_page_too_large_are_left_out() {
+    let document = sample::images();
+    let of = |n_photos: usize, bytes: usize| {
+        let view = |at: usize| {
+            let scheme = ["olc", "cp"][at % 2].into();
+            let given = Given { inlier_ratio: at as f64, ..Given::default() };
+            let attack = Attack { scheme, given, ..Attack::default() };
+            ByAttack { attack, recovered: Painted { jpeg: vec![7; bytes], ..Painted::default() } }
+        };
+        let photo = Inversion { views: (0..40).map(view).collect(), ..Inversion::default() };
+        let text = painted_page(&document, vec![photo; n_photos], false);
+        let left_out = text.split_once(" more pictures were left out");
+        let left_out = left_out.and_then(|(before, _)| before.rsplit_once(' '));
+        let n_pictures = text.matches("alt=\"The picture painted from points").count();
+        (n_pictures, left_out.map_or(0, |(_, number)| number.parse().expect("a number")))
+    };
+    assert_eq!(of(2, 9_000), (80, 0));
+    assert_eq!(of(2, 40_000), (40, 40));
+    let (few, left_out) = of(1, 200_000);
+    assert!(few > 4 && few + left_out == 40, "{few}");
 }
 
 #[test]

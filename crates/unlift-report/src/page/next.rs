@@ -1,0 +1,81 @@
+//! What to do next: the facts of which the template speaks.
+
+use serde_json::{Value, json};
+
+use crate::attack::{self, Basis};
+use crate::document::{Document, Localization};
+use crate::page::verdict::{self, Card, Level, localization, localizing};
+use crate::results::Results;
+use crate::words;
+
+pub(crate) fn steps(results: &Results<'_>) -> Value {
+    let Document { options, input, localization, gates, .. } = results.document;
+    let cards = &verdict::cards(results)[..];
+    let tried = |name: &str| results.rows.iter().any(|row| row.neighbors.contains(name));
+    let with_descriptors = attack::BY_DESCRIPTORS.iter().any(|name| tried(name));
+    let has_pictures = results.rows.iter().any(|row| row.metrics.contains_key("ssim"));
+    // The records were made by another program, which alone can change them.
+    let is_given = options.contains_key("released");
+    json!({
+        "is_sequence": results.is_sequence(),
+        "after_queries": verdict::sequence_sentences(results),
+        "with_lists": tried(attack::SEQUENCE_AND_LISTS),
+        "is_again": results.is_again(),
+        "from_two_releases": verdict::again_sentences(results),
+        "of_images": results.is_of_images(),
+        "with_descriptors": with_descriptors,
+        "has_descriptors": with_descriptors || input.other_sha256.contains_key("descriptors"),
+        "with_network": tried("learned") || tried("descriptors"),
+        "least": least(results, cards),
+        "can_invert": with_descriptors && !is_given && !has_pictures,
+        "can_mitigate": !is_given && options.get("mitigate").is_none(),
+        "can_localize": !localization.is_empty() && !options.contains_key("hold_out"),
+        "gate": if gates.is_empty() { gate(results, cards) } else { None },
+    })
+}
+
+/// Returns a gate that suits the build: today's value of the scheme that leaks least, plus two points.
+fn gate(results: &Results<'_>, cards: &[Card]) -> Option<String> {
+    let today = |card: &Card| card.today().map_or(f64::INFINITY, |today| today.recovered);
+    // A gate on a changed scheme needs the options of the change.
+    let plain = cards.iter().filter(|card| !words::is_changed(&card.scheme));
+    let useful = localizing(results, plain.collect()).into_iter();
+    let card = useful.min_by(|a, b| today(a).total_cmp(&today(b)))?;
+    let (scheme, typed) = (&card.scheme, results.headline);
+    let released = results.strongest(scheme, Basis::Released);
+    let row = released.or_else(|| results.strongest(scheme, Basis::Oracle))?;
+    let attack = match row.neighbors.as_str() {
+        "oracle" => format!("@{}", row.inlier_ratio),
+        source => format!(":{source}"),
+    };
+    // A gate on an inlier ratio covers the baselines, too.
+    let today = card.today().filter(|_| released.is_none());
+    let today = today.map_or(0.0, |today| today.interval.map_or(today.recovered, |of| of[1]));
+    let own = row.recovered(typed).map_or(results.share(row), |own| own.interval[1]);
+    let limit = (own.max(today) + 2.0).ceil();
+    (limit < 100.0).then(|| format!("{scheme}{attack}:{typed}<={limit}"))
+}
+
+/// Returns which scheme leaks least, and the multiple of the localization error under it, if that is known.
+fn least(results: &Results<'_>, cards: &[Card]) -> Option<Value> {
+    let cards: Vec<&Card> = verdict::hidden(cards).collect();
+    let is_known = cards.iter().any(|card| card.today().is_some());
+    let comparable = cards.iter().copied().filter(|card| !is_known || card.today().is_some());
+    let useful = localizing(results, comparable.collect()).into_iter();
+    let share = |card: &Card| card.foremost().map(|finding| finding.recovered);
+    let card = useful.reduce(|a, b| if share(b) < share(a) { b } else { a })?;
+    // The banner says what the least leak means where it is too much, or not decided.
+    let is_little = card.foremost().is_some_and(|finding| finding.level == Level::Gray);
+    if cards.len() < 2 || !is_little || !verdict::uses_descriptors(results, Some(&card.scheme)) {
+        return None;
+    }
+    let today = card.today().map(|today| format!("{} today", today.in_words()));
+    let known = card.finding(Basis::Oracle);
+    let known = known.map(|of| format!("{} {}", of.in_words(), of.when.to_lowercase()));
+    let shares: Vec<String> = today.into_iter().chain(known).collect();
+    let localization = localization(results, &card.scheme).filter(|cost| !cost.is_unknown());
+    let times = localization.and_then(Localization::cost).map(|cost| words::significant(cost, 3));
+    let (scheme, shares) = (&card.scheme, shares.join(", "));
+    let has_cost = localization.is_some();
+    Some(json!({ "scheme": scheme, "shares": shares, "has_cost": has_cost, "times": times }))
+}

@@ -1,0 +1,78 @@
+//! Templates of pages and other files, with the filters of their text.
+
+use minijinja::value::{Serde, Value};
+use minijinja::{AutoEscape, Environment, UndefinedBehavior};
+
+use crate::document::Error;
+use crate::words;
+
+/// Renders the first of `sources`, which includes the others by their names. Text is escaped in HTML; an undefined name is an
+/// error.
+pub(crate) fn render(
+    sources: &[(&'static str, &'static str)],
+    values: &serde_json::Value,
+) -> Result<String, Error> {
+    let mut env = Environment::new();
+    env.set_undefined_behavior(UndefinedBehavior::Strict);
+    env.set_auto_escape_callback(|name| match name.ends_with(".html") {
+        true => AutoEscape::Html,
+        false => AutoEscape::None,
+    });
+    env.add_filter("thousands", |count: u64| words::thousands(count));
+    env.add_filter("tied", tied);
+    env.add_filter("coded", coded);
+    env.add_filter("xml", |text: &str| escaped(text));
+    for (name, source) in sources {
+        env.add_template(name, source)?;
+    }
+    Ok(env.get_template(sources[0].0)?.render(Serde(values))?)
+}
+
+/// Keeps figures and their units on one line, by non-breaking spaces.
+fn tied(text: Value) -> Value {
+    let mut tied = text.to_string();
+    for unit in [" %", " cm", " px"] {
+        tied = tied.replace(unit, &unit.replace(' ', "\u{a0}"));
+    }
+    if text.is_safe() { Value::from_safe_string(tied) } else { tied.into() }
+}
+
+/// Escapes text, with parts in back quotes as code.
+fn coded(text: &str) -> Value {
+    let escaped = text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+    let parts = escaped.split('`').enumerate();
+    let parts = parts.map(|(at, part)| match at % 2 {
+        1 => format!("<code>{part}</code>"),
+        _ => part.to_owned(),
+    });
+    Value::from_safe_string(parts.collect())
+}
+
+/// Escapes text for XML content and quoted attributes. Characters that XML 1.0 does not allow become U+FFFD.
+fn escaped(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            // Unescaped, they would become spaces in attributes.
+            '\t' | '\n' | '\r' => out.push_str(&format!("&#{};", u32::from(c))),
+            '\0'..='\x1f' | '\u{fffe}' | '\u{ffff}' => out.push('\u{fffd}'),
+            _ => out.push(c),
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_xml_would_read_as_its_own_is_escaped() {
+        assert_eq!(escaped("a<b> & \"c\""), "a&lt;b&gt; &amp; &quot;c&quot;");
+        assert_eq!(escaped("ü\n\x1b"), "ü&#10;\u{fffd}");
+    }
+}
