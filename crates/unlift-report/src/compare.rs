@@ -1,5 +1,6 @@
 //! The comparison of two audits: what leaks more, what leaks less, and what only one of them has.
 
+use indexmap::IndexMap;
 use jiff::civil::Date;
 use jiff::{Timestamp, tz::TimeZone};
 use serde::Serialize;
@@ -409,32 +410,14 @@ pub fn page(comparison: &Comparison, old: &Document, new: &Document) -> Result<S
         })
     });
     let results = Results::of(new);
-    let row = |change: &Change| {
-        json!([
-            change.scheme,
-            change.attack,
-            results.threshold(&change.threshold),
-            words::percent(change.old_percent),
-            words::percent(change.new_percent),
-            format!("{:+.1}", change.points),
-        ])
-    };
-    let tables = [
-        ("more", "Leaks more", &comparison.more),
-        ("less", "Leaks less", &comparison.less),
-        ("same", "As before", &comparison.same),
-    ];
-    let tables = tables.into_iter().filter(|(.., changes)| !changes.is_empty());
-    let tables = tables.map(|(id, title, changes)| {
-        json!({ "id": id, "title": title, "rows": changes.iter().map(row).collect::<Vec<_>>() })
-    });
+    let thresholds = results.thresholds.iter().map(|typed| (typed, results.threshold(typed)));
     let page = json!({
         "style": include_str!("../template/style.css"),
         "comparison": comparison,
         "summary": comparison.summary(),
         "share_safe": old.input.path.is_none() && new.input.path.is_none(),
         "audits": audits,
-        "tables": tables.collect::<Vec<_>>(),
+        "thresholds": thresholds.collect::<IndexMap<_, _>>(),
     });
     templates::render(&[("compare.html", include_str!("../template/compare.html"))], &page)
 }

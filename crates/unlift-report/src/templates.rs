@@ -19,6 +19,8 @@ pub(crate) fn render(
         false => AutoEscape::None,
     });
     env.add_filter("thousands", |count: u64| words::thousands(count));
+    env.add_filter("percent", |value: f64| words::percent(value));
+    env.add_filter("signed", |value: f64| format!("{value:+.1}"));
     env.add_filter("tied", tied);
     env.add_filter("coded", coded);
     env.add_filter("xml", |text: &str| escaped(text));

@@ -202,19 +202,17 @@ fn first_given(results: &Results<'_>, givens: &[Given]) -> Option<usize> {
 fn scheme(results: &Results<'_>, name: &str) -> Value {
     let thresholds = || results.thresholds.iter();
     let alone = |typed: &&str| results.records_alone(name, typed);
-    let max = |of: fn(&Row, &str) -> Option<f64>| -> Vec<Option<f64>> {
-        thresholds().map(|typed| results.max(name, |row| of(row, typed))).collect()
-    };
+    let floor = |typed: &&str| results.max(name, |row| row.baseline_percent(typed));
     json!({
         "name": name,
         "title": words::scheme_title(name),
         "slot": slot(results, name),
-        "blind": max(|row, typed| row.blind_percent.get(typed).copied()),
+        "blind": thresholds().map(|typed| results.blind(name, typed)).collect::<Vec<_>>(),
         // `None` where that was not tried.
         "alone": thresholds().map(|typed| Some(alone(typed)?.0)).collect::<Vec<_>>(),
         "alone_by": attack::records_alone(alone(&results.headline).and_then(|alone| alone.1)),
         // Neighborhoods add what exceeds the larger of the two baselines.
-        "floor": max(|row, typed| row.baseline_percent(typed)),
+        "floor": thresholds().map(floor).collect::<Vec<_>>(),
     })
 }
 
