@@ -7,9 +7,9 @@ use serde::Serialize;
 use serde_json::json;
 
 use crate::attack::{self, Attack, Given};
-use crate::document::{Document, Input, Localization, Row};
+use crate::document::{Document, Error, Input, Localization, Row};
 use crate::results::{Results, distinct};
-use crate::{Error, templates, words};
+use crate::{templates, words};
 
 /// The old and the new figure of one attack, scheme and threshold.
 #[derive(Debug, Clone, PartialEq, Serialize)]

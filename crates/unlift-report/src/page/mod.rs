@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 use unlift::Unit;
 
 use crate::attack::{self, Basis};
-use crate::document::Document;
+use crate::document::{Document, Error};
 use crate::gates::gates;
 use crate::page::blocks::Blocks;
 use crate::page::curves::ErrorCdf;
@@ -24,7 +24,7 @@ use crate::page::pictures::Picture;
 use crate::page::scene::Scene3d;
 use crate::page::verdict::{Card, verdict};
 use crate::results::{Results, distinct};
-use crate::{Error, templates, words};
+use crate::{templates, words};
 
 /// The templates, by the names under which they include each other.
 const TEMPLATES: [(&str, &str); 12] = [

@@ -40,9 +40,8 @@ pub(crate) fn heat_maps(results: &Results<'_>) -> Vec<Value> {
     let extent = (high[0] - low[0]).max(high[1] - low[1]);
     let scale = if extent > 0.0 { SIDE / extent } else { 1.0 };
     let heat_map = |(at, row): (usize, &Row)| {
-        let heat = |(number, (tile, [first, last])): (usize, (&TileFigures, &[[f64; 2]; 2]))| {
+        let heat = |(tile, [first, last]): (&TileFigures, &[[f64; 2]; 2])| {
             let percent = percent(results, tile, at).unwrap_or(0.0);
-            let points = words::thousands(tile.n_points);
             json!({
                 "x": scale * (first[0] - low[0]),
                 // The y axis of SVG points down.
@@ -50,16 +49,16 @@ pub(crate) fn heat_maps(results: &Results<'_>) -> Vec<Value> {
                 "width": (scale * (last[0] - first[0])).max(1.0),
                 "height": (scale * (last[1] - first[1])).max(1.0),
                 "share": percent / 100.0,
-                // Drawn if there is room; the title appears under the pointer.
-                "percent": format!("{percent:.0}"),
-                "title": format!("Tile {}: {percent:.1} % of {points} points", number + 1),
+                "percent": percent,
+                "rounded": format!("{percent:.0}"),
+                "n_points": tile.n_points,
             })
         };
         let size = [0, 1].map(|c| (scale * (high[c] - low[c])).max(1.0));
         json!({
             "title": format!("{}, {}", row.scheme, attack::briefly(row)),
             "size": size,
-            "boxes": tiles.iter().zip(&bounds).enumerate().map(heat).collect::<Vec<_>>(),
+            "boxes": tiles.iter().zip(&bounds).map(heat).collect::<Vec<_>>(),
         })
     };
     strongest(results).into_iter().take(MAX_MAPS).map(heat_map).collect()
