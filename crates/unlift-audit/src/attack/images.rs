@@ -86,6 +86,7 @@ impl Images<'_> {
                 ..RenderOptions::default()
             },
             rows: outcome.rows,
+            not_audited: outcome.not_audited,
             break_even: outcome.break_even,
             seconds: outcome.seconds,
             ..Attacked::default()

@@ -86,6 +86,11 @@ fn features_of_hloc_are_descriptors_of_the_points_that_they_made() {
     let line = read::descriptors(&path, &cloud).unwrap_err().to_string();
     let told = "whose tracks lead to images, found ply binary little endian points";
     assert!(line.ends_with(told), "{line}");
+    let array = read::open(&data("f8.npy")).unwrap();
+    let line = read::descriptors(&data("project/database.db"), &array).unwrap_err().to_string();
+    let told =
+        "database.db: expected a COLMAP model, whose tracks lead to images, found npy points";
+    assert!(line.ends_with(told), "{line}");
 }
 
 const N: usize = 60;
