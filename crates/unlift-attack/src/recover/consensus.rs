@@ -6,7 +6,7 @@ use crate::recover::anchors;
 use crate::recover::map::{Columns, Family, Intervals, LineColumns, Sections, Step, solve_slots};
 use crate::recover::result::Estimate;
 
-/// Returns the estimates of some `slots`; of rays from anchors, of all slots.
+/// Returns the estimates of `slots`. For rays that meet only in their anchors (`dcl2d`), returns those of all slots.
 pub(crate) fn solve<const D: usize, F: Family<D>>(
     family: &F,
     lists: &Neighborhoods,

@@ -4,7 +4,7 @@ use crate::neighbors::Neighborhoods;
 use crate::recover::map::{Family, Graph, evenly};
 use crate::seed::{Draws, Stage};
 
-/// Random edges per sampled slot: about as many as the slot has edges of its own.
+/// Number of random edges per sampled slot. They count as many as the edges of the slot, which has about 50 with lists of 50.
 pub(super) const RANDOM: usize = 24;
 
 /// A map as its family of records sees it, its lists, and the sample from which distributions are learned.

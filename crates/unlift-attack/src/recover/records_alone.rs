@@ -25,6 +25,7 @@ pub fn records_alone<const D: usize>(
     released: &Released<D>,
     options: &RecoverOptions,
 ) -> Result<Vec<(&'static str, Recovered<D>)>, Error> {
+    options.check()?;
     let none = Neighborhoods::unchecked(vec![0; released.n_slots() + 1], Vec::new());
     // For paired lines, the order of the two points is unknown.
     let none = none.with_about(About { order: RowOrder::Either, ..About::default() });

@@ -167,7 +167,7 @@ fn break_even<'a>(results: &Results<'a>, scheme: &str) -> Option<&'a BreakEven> 
     points.min_by(|a, b| rank(a).cmp(&rank(b)).then(a.inlier_ratio.total_cmp(&b.inlier_ratio)))
 }
 
-/// The severity of a share of recovered points. It alone decides colors on the page.
+/// The severity of a share of recovered points. It decides the color of a scheme.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Level {

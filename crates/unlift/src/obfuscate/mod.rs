@@ -27,7 +27,7 @@ pub use scheme::{Build, Entry, Facts, Lifted, LocalPoints, Scheme, SchemeOptions
 
 use crate::Error;
 
-/// All built-in schemes, in the order of the paper's tables. `tests/architecture` fails if a
+/// All built-in schemes, in the order of the paper's tables. `tests/laws/architecture.rs` fails if a
 /// scheme's file is missing here.
 pub const SCHEMES: &[Entry] = &[
     olc::ENTRY,

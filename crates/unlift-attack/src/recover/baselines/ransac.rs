@@ -240,7 +240,7 @@ impl<const D: usize> Trials<D> for PlaneFamily<'_, D> {
             free.clone().map(of_axis).sum()
         };
         let (best, trials) = best_sample((n, SAMPLE * (D as u32 - 1)), draw, support);
-        let Some((best, support)) = best else { return (Err(Status::NoSupport), 0) };
+        let Some((best, support)) = best else { return (Err(Status::NoSupport), trials) };
         let mut place = own;
         for axis in free.clone() {
             let away = by_axis[axis].iter().map(|x| x.0 - best[axis]);

@@ -13,10 +13,10 @@
 //!
 //! The density counts the places of other slots within a width: points lie on surfaces. Places of the own slot do not count, because they
 //! would confirm themselves. The volume element is `range^2` for rays, which diverge; for axis candidates, it is the density of the values
-//! published on the axis that was exchanged. The first iteration moves all slots, the others a random half of them.
+//! published on the axis that was exchanged. The first iteration moves all slots, the others one of two random halves in turn.
 //!
 //! The method is belief propagation with particles on the graph of lists, as in the localization of sensor networks (Ihler et al. 2005),
-//! without the division by messages sent before, which changed no figure. Figures are in docs/decisions/attack.md.
+//! without the division by messages sent before, which changed no figure. Figures are in docs/decisions/tried.md.
 
 mod tables;
 mod temper;
@@ -40,14 +40,14 @@ const PLACES: usize = 4;
 const WIDTH_NEIGHBOR: usize = 50;
 /// Bounds of the width of a place, as a multiple of the typical width.
 const WIDTHS: (f32, f32) = (0.3, 3.3);
-/// Maps with fewer slots than this many widths' worth of neighbors keep their estimates.
+/// Maps with fewer slots keep their estimates.
 const LEAST_SLOTS: usize = 4 * WIDTH_NEIGHBOR;
 /// Weight of an estimate of joint recovery: its least value, and what is added for the estimate with the most evidence.
 const START_WEIGHT: (f32, f32) = (0.24, 0.36);
 /// Weight of the density of places in the score, and the density of a place without neighbors.
 const DENSITY_WEIGHT: f32 = 0.5;
 const LEAST_DENSITY: f32 = 0.05;
-/// Radius of the kernel of that density, in typical widths. The kernel is about a normal distribution of a third of a width.
+/// Radius of the kernel of that density, in typical widths. The kernel `(1 - u^2)^4` is about a normal distribution of a third of a width.
 const DENSITY_RADIUS: f32 = 0.91;
 /// Largest number of candidates per slot, shared by the pieces of its feasible set, and the part of them that edges propose.
 const CANDIDATES: usize = 40;

@@ -95,7 +95,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         let mut records = 0;
         for step_at in 1..=STEPS {
             let density = field.at(&x);
-            let reach = RADIUS * neighbors.radius * field.width(density);
+            let reach = RADIUS * neighbors.radius * field.stretch(density);
             let inverse_reach2 = 1.0 / (reach * reach);
             let half_weight_ratio = F::HALF_WEIGHT_RATIO
                 * (1.0 + neighbors.background / self.volume(density) / density);

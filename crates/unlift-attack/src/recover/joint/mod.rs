@@ -23,7 +23,7 @@
 //!
 //! All slots of a turn read the old estimates, so the result depends neither on order nor on threads. If all slots moved in one
 //! turn, two neighbors could exchange places forever. So even and odd slots take turns. Only the first iteration moves all
-//! slots in one turn, because it starts from estimates that depend on records alone.
+//! slots in one turn, because no estimate that it reads depends on another.
 
 mod least_squares;
 mod neighbor_distribution;

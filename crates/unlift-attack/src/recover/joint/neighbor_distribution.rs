@@ -28,7 +28,7 @@ const TAIL: f64 = 0.1;
 /// Bounds of the fraction of true neighbors in a class, so that odds are neither 0 nor infinite.
 const FRACTION: (f64, f64) = (5e-4, 0.95);
 
-/// The learned distribution of true neighbors. Lengths are in units of the local width, [`Density::width`].
+/// The learned distribution of true neighbors. Lengths are divided by the local stretch, [`Density::stretch`].
 #[derive(Clone, Debug)]
 pub(super) struct NeighborDistribution {
     /// Radius that holds half of the true neighbors' estimates.
@@ -40,7 +40,7 @@ pub(super) struct NeighborDistribution {
     /// `1 / a^2`, and the density of true neighbors at `r = 0`.
     pub(super) inverse_a2: f32,
     pub(super) density_at_zero: f32,
-    /// Odds times density of wrong entries that lie in the same region of the map; uniform within the reach.
+    /// Density of wrong entries that lie in the same region of the map, times the odds of an entry; uniform within the reach.
     pub(super) background: f32,
     /// Bound on the imbalance of forward and reverse edges, in nats, see [`Near::balanced_log_likelihood`]; infinite where
     /// wrong entries form no clusters.
@@ -96,7 +96,7 @@ struct Learning<'a, const D: usize, F: Family<D>> {
 
 impl<const D: usize, F: Family<D>> Learning<'_, D, F> {
     fn reach_at(&self, x: &[f32; D]) -> f32 {
-        self.density.width(self.density.at(x)) * self.reach
+        self.density.stretch(self.density.at(x)) * self.reach
     }
 
     fn count(&self, Sampled { slot, random }: &Sampled, tally: &mut Tally) {
@@ -120,7 +120,7 @@ impl<const D: usize, F: Family<D>> Learning<'_, D, F> {
                 of_class[1] += 1.0;
             }
         }
-        // The few random edges get the total weight of the slot's own edges.
+        // The random edges, fewer than the slot has, get the total weight of the slot's own edges.
         let per_random = [n_edges, n_mutual].map(|n| n / RANDOM as f64);
         for &edge in random {
             let of_kind = &mut tally.random[usize::from(graph.is_either(edge.1))];

@@ -101,18 +101,18 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
     /// Returns the distribution of neighbors at a place of this density: `gain = p_true(0) / p_random`, and `1 / a^2`.
     #[inline(always)]
     pub(super) fn distribution(&self, density: f32) -> (f32, f32) {
-        let width = self.density.width(density);
+        let stretch = self.density.stretch(density);
         let gain = self.neighbors.density_at_zero / (self.volume(density) * density);
-        (gain, self.neighbors.inverse_a2 / (width * width))
+        (gain, self.neighbors.inverse_a2 / (stretch * stretch))
     }
 
-    /// Returns the volume of a cube whose edge is the local width.
+    /// Returns the volume of a cube whose edge is the local stretch.
     #[inline(always)]
     pub(super) fn volume(&self, density: f32) -> f32 {
-        let width = self.density.width(density);
+        let stretch = self.density.stretch(density);
         let mut volume = 1.0;
         for _ in 0..D {
-            volume *= width;
+            volume *= stretch;
         }
         volume
     }

@@ -230,11 +230,11 @@ impl<const D: usize> Density<D> {
         self.grid.at(x)
     }
 
-    /// Returns the local width: how much larger the distance to neighbors is than at a typical place. Lists are equally long
+    /// Returns the local stretch: how many times larger the distance to neighbors is than at a typical place. Lists are equally long
     /// everywhere, so neighbors lie farther away where the density is low. Dense places get 1, because the grid does not resolve them.
     /// The cube root is right in three dimensions; two dimensions use it, too.
     #[inline(always)]
-    pub(crate) fn width(&self, density: f32) -> f32 {
+    pub(crate) fn stretch(&self, density: f32) -> f32 {
         let ratio = self.typical / density;
         if ratio > 1.0 { cube_root(ratio).min(WIDEST) } else { 1.0 }
     }
