@@ -34,20 +34,16 @@ fn our_sources() {
     let mut draws = Draws::new(1, Stage::Shapes, 0);
     let bytes = (0..200 * 128).map(|_| draws.below(120) as u8).collect();
     let public = Descriptors::try_new(Values::U8(bytes), 128).unwrap();
-    let protected = ["subspace:2:random", "subspace:4", "subspace:2:adversarial", "ldp:16,2,6"];
-    for text in [None].into_iter().chain(protected.map(Some)) {
-        let (_, released, _) = match text {
-            None => described_map(&Olc, 300),
-            Some(text) => {
-                let protection = Protection::parse(text).unwrap().with_public(&public).unwrap();
-                let scheme = Changed::new(Arc::new(Olc), Change::Protection(protection));
-                scheme_laws(&scheme);
-                described_map(&scheme, 200)
-            }
-        };
-        for source in SOURCES.iter().filter_map(|entry| entry.of_dimension::<3>()) {
-            source_laws(&*source, &released);
-        }
+    let check = |(_, released, _): (_, Released<3>, _)| {
+        let sources = SOURCES.iter().filter_map(|entry| entry.of_dimension::<3>());
+        sources.for_each(|source| source_laws(&*source, &released));
+    };
+    check(described_map(&Olc, 300));
+    for text in ["subspace:2:random", "subspace:4", "subspace:2:adversarial", "ldp:16,2,6"] {
+        let protection = Protection::parse(text).unwrap().with_public(&public).unwrap();
+        let scheme = Changed::new(Arc::new(Olc), Change::Protection(protection));
+        scheme_laws(&scheme);
+        check(described_map(&scheme, 200));
     }
 }
 

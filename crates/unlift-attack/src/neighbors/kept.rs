@@ -100,6 +100,7 @@ mod tests {
     use crate::{Descriptors, Unit};
 
     const N: usize = 300;
+    const SOURCES: [&dyn Source<3>; 2] = [&Similarity, &Overlap];
 
     /// Returns a map whose slot `at` has the descriptor `order[at]` of `rows`.
     fn map(rows: &[[u8; 128]], order: &[usize], slots_per_record: usize) -> Released<3> {
@@ -123,8 +124,7 @@ mod tests {
         let without = |dropped: &[usize]| -> Vec<usize> {
             all.iter().copied().filter(|at| !dropped.contains(at)).collect()
         };
-        let sources: [&dyn Source<3>; 2] = [&Similarity, &Overlap];
-        for source in sources {
+        for source in SOURCES {
             let mut kept = KeptPairs::default();
             for (order, slots, n_kept) in [
                 (without(&[]), 1, N),
@@ -155,8 +155,7 @@ mod tests {
         let planes = Obfuscation::AxisPlanes(AxisPlanes::try_new(vec![0; N], &[1.0; N]).unwrap());
         let descriptors = b.descriptors().cloned();
         let b = Released::try_new(planes, 1, [0.0; 3], Unit::Meter, descriptors).unwrap();
-        let sources: [&dyn Source<3>; 2] = [&Similarity, &Overlap];
-        for source in sources {
+        for source in SOURCES {
             let kept = KeptLists::new(&a, &source.lists(&a, 12, 0).unwrap()).unwrap();
             assert_eq!(kept.of(&b).unwrap(), source.lists(&b, 12, 0).unwrap(), "{}", source.name());
         }

@@ -185,18 +185,9 @@ mod tests {
     #[test]
     fn bits_are_pinned() {
         // A change of these values changes every published figure. They were computed independently, in integers of any size.
-        let take = |seed, stage, item| {
-            let mut draws = Draws::new(seed, stage, item);
-            [draws.bits(), draws.bits(), draws.below(1000), draws.unit().to_bits()]
-        };
-        assert_eq!(
-            take(0, Stage::Scheme, 0),
-            [0x16902bd8f3403fec, 0x46d68e51eb81b1c0, 355, 0x3fe14567930e704b]
-        );
-        assert_eq!(
-            take(7, Stage::NullSample, 42),
-            [0x6f6b3f98c757ceca, 0xcad29ec3f0764152, 362, 0x3fd4e5deed96c2a6]
-        );
+        let mut draws = Draws::new(7, Stage::NullSample, 42);
+        assert_eq!([draws.bits(), draws.bits()], [0x6f6b3f98c757ceca, 0xcad29ec3f0764152]);
+        assert_eq!([draws.below(1000), draws.unit().to_bits()], [362, 0x3fd4e5deed96c2a6]);
         assert_eq!(Draws::new(0, Stage::Shuffle, 0).permutation(8), [3, 0, 5, 2, 1, 6, 7, 4]);
     }
 }

@@ -7,8 +7,7 @@ use crate::maps::*;
 const ALONE: [Builtin; 2] = [Builtin::Density, Builtin::Tomography];
 
 fn alone<const D: usize>(released: &Released<D>, solver: Builtin) -> Recovered<D> {
-    let rows = vec![Vec::new(); released.n_slots()];
-    let lists = lists_of(&rows, released.n_records(), released.slots_per_record());
+    let lists = Neighborhoods::empty(released.n_slots());
     solve(released, &lists, (solver, RecoverOptions::default()))
 }
 

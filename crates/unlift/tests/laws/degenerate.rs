@@ -12,11 +12,6 @@ fn harsh_options() -> Vec<Options> {
     [all_options(), options_with(&[1e-18, 1e-9, 1e9, 1e18].map(Delta::Fixed))].concat()
 }
 
-/// Returns the attacks on the records alone.
-fn alone_options() -> Vec<Options> {
-    [Builtin::Density, Builtin::Tomography].map(|solver| (solver, RecoverOptions::default())).into()
-}
-
 /// Returns for each slot the number of records that it lists or that list its own.
 fn both_ways<const D: usize>(released: &Released<D>, lists: &Neighborhoods) -> Vec<usize> {
     let per = released.slots_per_record();
@@ -35,10 +30,10 @@ fn statuses<const D: usize>(
     what: &str,
     released: &Released<D>,
     lists: &Neighborhoods,
-    options: Vec<Options>,
+    options: &[Options],
 ) -> Vec<(Options, Vec<Status>)> {
     let both_ways = both_ways(released, lists);
-    let of = |options: Options| {
+    let of = |&options: &Options| {
         let what = format!("{what}, {options:?}");
         let recovered = recover(released, lists, &options.0, &options.1)
             .unwrap_or_else(|error| panic!("{what}: {error}"));
@@ -47,7 +42,6 @@ fn statuses<const D: usize>(
             let ok = recovered.status()[slot] == Status::Ok;
             let position = recovered.positions()[slot];
             assert_eq!(ok, position.iter().all(|x| x.is_finite()), "{what}: {position:?}");
-            assert_eq!(ok, recovered.position(slot).is_some(), "{what}");
             let evidence = recovered.evidence()[slot];
             assert!(evidence >= 0.0 && evidence.is_finite(), "{what}: evidence {evidence}");
             let most = match options.0 {
@@ -62,7 +56,7 @@ fn statuses<const D: usize>(
         assert!(recovered.delta().is_finite() && recovered.delta() > 0.0, "{what}");
         (options, recovered.status().to_vec())
     };
-    options.into_iter().map(of).collect()
+    options.iter().map(of).collect()
 }
 
 #[test]
@@ -86,7 +80,7 @@ fn short_lists<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
         };
         let lists = hidden.lists_of(&(0..n).map(row).collect::<Vec<_>>());
         let what = format!("{name}, lists of {length}");
-        for (options, got) in statuses(&what, &hidden.released, &lists, harsh_options()) {
+        for (options, got) in statuses(&what, &hidden.released, &lists, &harsh_options()) {
             // In both directions a slot with a list of one may have two neighbors.
             if length == 0 || length == 1 && options.0 != Builtin::Joint {
                 let few = got.iter().all(|&status| status == Status::TooFewNeighbors);
@@ -104,7 +98,8 @@ fn odd_maps<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
         let what = format!("{name}, {} points", points.len());
         let released = hide::<D>(scheme, &points, seed).released;
         let lists = everyone(released.n_records(), released.slots_per_record());
-        statuses(&what, &released, &lists, [harsh_options(), alone_options()].concat());
+        statuses(&what, &released, &lists, &harsh_options());
+        statuses(&what, &released, &lists, &alone_options());
         if let Ok(lists) = geometric(&released, 5) {
             assert_eq!(lists.n_slots(), released.n_slots(), "{what}");
         }
@@ -113,12 +108,12 @@ fn odd_maps<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
 
 #[test]
 fn lists_of_a_few() {
-    seeds(2).into_iter().for_each(|seed| over_schemes!(short_lists, seed));
+    seeds(1).into_iter().for_each(|seed| over_schemes!(short_lists, seed));
 }
 
 #[test]
 fn maps_of_few_places() {
-    seeds(2).into_iter().for_each(|seed| over_schemes!(odd_maps, seed));
+    seeds(1).into_iter().for_each(|seed| over_schemes!(odd_maps, seed));
 }
 
 #[test]
@@ -153,11 +148,11 @@ fn records_that_fix_no_point_are_answered() {
     ] {
         let lists = everyone(records.len(), 1);
         let released = Released::try_new(records, 1, [0.0; 3], Unit::Meter, None).unwrap();
-        statuses(what, &released, &lists, alone_options());
+        statuses(what, &released, &lists, &alone_options());
         if ["parallel lines", "no lines"].contains(&what) {
             assert!(geometric(&released, 5).unwrap().records().is_empty());
         }
-        for (options, got) in statuses(what, &released, &lists, harsh_options()) {
+        for (options, got) in statuses(what, &released, &lists, &harsh_options()) {
             let is_usual = all_options().contains(&options);
             if let Some(status) = if is_usual { usual } else { harsh } {
                 assert!(got.iter().all(|&found| found == status), "{what}, {options:?}: {got:?}");

@@ -225,6 +225,11 @@ pub fn all_options() -> Vec<Options> {
     options_with(&[Delta::Fixed(0.1), Delta::Auto])
 }
 
+/// Returns the attacks on the records alone.
+pub fn alone_options() -> [Options; 2] {
+    [Builtin::Density, Builtin::Tomography].map(|solver| (solver, RecoverOptions::default()))
+}
+
 /// Runs recovery, which must not fail.
 pub fn solve<const D: usize>(
     released: &Released<D>,

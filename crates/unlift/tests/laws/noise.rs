@@ -56,23 +56,22 @@ fn every_model_keeps_the_share_the_same_true_neighbors_and_outliers() {
     for scheme in SCHEMES {
         let oracle = Oracle::new(scheme);
         let full = oracle.near.at_inlier_ratio(1.0, 3).unwrap();
-        let split =
-            |lists: &Neighborhoods, slot: usize| -> (BTreeSet<RecordId>, BTreeSet<RecordId>) {
-                lists.of(slot).iter().partition(|&r| full.of(slot).contains(r))
-            };
+        let split = |lists: &Neighborhoods, slot: usize| -> [BTreeSet<RecordId>; 2] {
+            lists.of(slot).iter().partition(|&r| full.of(slot).contains(r)).into()
+        };
         for noise in Noise::ALL {
             let mut higher = None;
             for ratio in [0.6, 0.5, 0.3, 0.2, 0.0] {
-                let (lists, uniform) =
-                    (oracle.lists(noise, ratio, 3), oracle.near.at_inlier_ratio(ratio, 3).unwrap());
+                let lists = oracle.lists(noise, ratio, 3);
+                let uniform = oracle.near.at_inlier_ratio(ratio, 3).unwrap();
                 assert_eq!(oracle.near.measured_inlier_ratio(&lists), ratio, "{noise:?}");
                 for slot in 0..lists.n_slots() {
                     assert_eq!(lists.of(slot).len(), K);
-                    let (right, wrong) = split(&lists, slot);
-                    assert_eq!(right, split(&uniform, slot).0, "{noise:?}, slot {slot}");
+                    let [right, wrong] = split(&lists, slot);
+                    assert_eq!(right, split(&uniform, slot)[0], "{noise:?}, slot {slot}");
                     // A lower ratio keeps fewer true neighbors, and the outliers of a higher one.
                     let Some(higher) = &higher else { continue };
-                    let (more_right, fewer_wrong) = split(higher, slot);
+                    let [more_right, fewer_wrong] = split(higher, slot);
                     assert!(right.is_subset(&more_right), "{noise:?}, slot {slot}");
                     assert!(fewer_wrong.is_subset(&wrong), "{noise:?}, slot {slot}");
                 }
