@@ -1,7 +1,7 @@
 //! Joint recovery with perfect lists: longer lists give smaller errors, and errors are smaller than
 //! those of consensus, also for rays from anchors, where a layout of the neighbors is the start.
 
-use unlift::recover::{Confidence, Estimate, recover_from};
+use unlift::recover::{Confidence, recover_from};
 
 use crate::maps::*;
 
@@ -47,25 +47,12 @@ fn known_positions_stay_and_place_their_neighbors() {
     let options = RecoverOptions::default();
     let is_known = |slot: usize| slot.is_multiple_of(3);
     let position = |slot: usize| hidden.local(slot).map(|x| x as f32);
-    let estimate = |slot: usize| match is_known(slot) {
-        true => {
-            let (position, status) = (position(slot), Status::Ok);
-            Estimate { position, status, support: 5, axis: 0, evidence: 0.0 }
-        }
-        false => Estimate::lost(Status::TooFewNeighbors),
-    };
-    let sure = |slot: usize| match is_known(slot) {
-        true => Confidence { found: 0.9, scale: 1.0 },
-        false => Confidence::LOST,
-    };
     let slots = || 0..released.n_slots();
-    let estimates: Vec<Estimate<2>> = slots().map(estimate).collect();
-    let map = Some(released.fingerprint());
-    let known =
-        Recovered::try_new(&estimates, false, None, released.origin(), released.unit(), 1.0)
-            .and_then(|known| known.with_confidence(slots().map(sure).collect()))
-            .unwrap()
-            .with_about(About { map, order: RowOrder::Slots, ..About::default() });
+    let known = |slot: usize| if is_known(slot) { position(slot) } else { [f32::NAN; 2] };
+    let known: Vec<[f32; 2]> = slots().map(known).collect();
+    let sure = vec![Confidence { found: 0.9, scale: 1.0 }; released.n_slots()];
+    let known = Recovered::from_positions(released, &lists, &known).unwrap();
+    let known = known.with_confidence(sure).unwrap();
     let with = recover_from(&known, released, &lists, &options).unwrap();
     let without = recover(released, &lists, &Builtin::Joint, &options).unwrap();
     let mut known = slots().filter(|&slot| is_known(slot));
