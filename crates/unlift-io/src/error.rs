@@ -166,6 +166,7 @@ mod tests {
             (Error::new("points3D.bin", byte, "8 bytes", "end of file"), "points3D.bin: record 12 (byte 4711): expected 8 bytes, found end of file"),
             (Error::new("a.ply", "", "a number", "x\ny"), "a.ply: expected a number, found x\\ny"),
             (Error::read("a.ply", io(io::ErrorKind::NotFound)), "a.ply: expected a file or folder, found nothing"),
+            (Error::read("a.csv", io(io::ErrorKind::PermissionDenied)), "a.csv: expected a readable file, found no permission to read"),
             (Error::write("out", io(io::ErrorKind::FileTooLarge)), "out: expected space to write, found a limit on the size of files"),
             (Error::new("a\u{202e}b", "c\u{9b}", "d", "e\u{2028}"), "a\\u{202e}b: c\\u{9b}: expected d, found e\\u{2028}"),
             (Error::read("a\nb", io(io::ErrorKind::Other)), "a\\nb: cannot read: other\\ntext"),

@@ -141,12 +141,12 @@ mod tests {
         let (read_cameras, read_images) = read_views(folder.path()).unwrap();
         assert_eq!(read_cameras, cameras);
         assert_eq!(read_images.len(), images.len());
+        let numbers = |pose: &Pose| [pose.rotation.as_flattened(), &pose.center].concat();
         for (read, written) in read_images.iter().zip(&images) {
             assert_eq!((read.id, &read.name), (written.id, &written.name));
-            let near = |a: f64, b: f64| (a - b).abs() < 1e-9 * (1.0 + b.abs());
-            assert!((0..3).all(|c| near(read.pose.center[c], written.pose.center[c])), "{read:?}");
-            let (a, b) = (read.pose.rotation.as_flattened(), written.pose.rotation.as_flattened());
-            assert!(a.iter().zip(b).all(|(&a, &b)| near(a, b)), "{read:?} {written:?}");
+            let (a, b) = (numbers(&read.pose), numbers(&written.pose));
+            let near = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-9 * (1.0 + b.abs());
+            assert!(a.iter().zip(&b).all(near), "{read:?} {written:?}");
         }
         let read = read_points(&at("points3D.txt"), false).unwrap();
         assert_eq!(read.ids, [1, 3]);

@@ -3,29 +3,12 @@
 use std::fs;
 use std::path::Path;
 
-use hdf5_pure::{DatasetBuilder, FileBuilder};
+use hdf5_pure::FileBuilder;
 use unlift::Descriptors;
 use unlift::descriptors::Values;
 use unlift_io::features::{FeatureSource, FeatureWriter, ImageFeatures};
 
 use super::{data, shown, write, write_database};
-
-/// The name and the shape of an array, and what fills it.
-type Filled<'a> = (&'a str, &'a [u64], Box<dyn Fn(&mut DatasetBuilder)>);
-
-fn bytes(image: &ImageFeatures) -> &[u8] {
-    match image.descriptors.as_ref().map(Descriptors::values) {
-        Some(Values::U8(values)) => values,
-        other => panic!("{other:?}"),
-    }
-}
-
-fn floats(image: &ImageFeatures) -> &[f32] {
-    match image.descriptors.as_ref().map(Descriptors::values) {
-        Some(Values::F32(values)) => values,
-        other => panic!("{other:?}"),
-    }
-}
 
 fn made(name: &str, n: usize) -> ImageFeatures {
     let values = |factor: f32| (0..n).map(|at| factor * at as f32).collect();
@@ -56,15 +39,19 @@ fn files_of_h5py_are_read_in_every_type_and_form() {
         assert_eq!(source.names(), ["big ü.png", "db/half.jpg", "db/seq/double.jpg"], "{file}");
         let [big, half, double] = [0, 1, 2].map(|at| source.get(at).unwrap());
         assert_eq!(big.keypoints, [[1.0, 2.0], [3.0, 4.0]]);
-        assert_eq!((bytes(&big), big.size), (&[1, 3, 5, 2, 4, 6][..], Some([10, 20])));
+        let rows = |values, dim| Descriptors::try_new(values, dim).ok();
+        assert_eq!(big.descriptors, rows(Values::U8(vec![1, 3, 5, 2, 4, 6]), 3));
+        assert_eq!(big.size, Some([10, 20]));
         assert_eq!((&big.scores, big.uncertainty_px), (&None, None));
         assert_eq!(half.keypoints, [[1.5, 2.25], [3.0, 4.0], [100.0, 50.0]]);
-        let rows = [0.0, 0.375, 0.75, 1.125, 0.125, 0.5, 0.875, 1.25, 0.25, 0.625, 1.0, 1.375];
-        assert_eq!(floats(&half), rows);
+        let values =
+            vec![0.0, 0.375, 0.75, 1.125, 0.125, 0.5, 0.875, 1.25, 0.25, 0.625, 1.0, 1.375];
+        assert_eq!(half.descriptors, rows(Values::F32(values), 4));
         assert_eq!(half.scores, Some(vec![0.5, 0.25, 0.125]));
         assert_eq!((half.size, half.uncertainty_px), (Some([640, 480]), Some(1.5)));
         assert_eq!(double.keypoints, [[0.1, 0.2], [0.3, 0.4]]);
-        assert_eq!(floats(&double), [0.0, 2.0, 4.0, 6.0, 1.0, 3.0, 5.0, 7.0]);
+        let values = vec![0.0, 2.0, 4.0, 6.0, 1.0, 3.0, 5.0, 7.0];
+        assert_eq!(double.descriptors, rows(Values::F32(values), 4));
         assert_eq!(double.size, None);
     }
 }
@@ -100,27 +87,24 @@ fn what_is_written_is_read_again_and_the_bytes_are_the_same() {
 fn names_and_columns_that_do_not_fit_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let mut writer = FeatureWriter::create(&dir.path().join("f.h5")).unwrap();
-    let refused = |writer: &mut FeatureWriter, image: &ImageFeatures, line: &str| {
-        let error = writer.append(image).unwrap_err().to_string();
-        assert!(error.ends_with(line), "{error}");
-    };
-    refused(
-        &mut writer,
-        &made("a//b", 1),
-        "image \"a//b\": expected a name whose parts are not empty, . or .., found \"a//b\"",
-    );
-    let short = ImageFeatures { scores: Some(vec![1.0]), ..made("a", 2) };
-    refused(&mut writer, &short, "image \"a\", scores: expected 2, one per keypoint, found 1");
-    writer.append(&made(&format!("{}x.jpg", "b/".repeat(63)), 2)).unwrap();
+    let deep = |n: usize| made(&format!("{}x.jpg", "b/".repeat(n - 1)), 2);
+    writer.append(&deep(64)).unwrap();
     writer.append(&made("a/b", 1)).unwrap();
-    for name in ["a/b", "a/b/c", "a"] {
-        let error = writer.append(&made(name, 1)).unwrap_err().to_string();
-        assert!(error.contains("expected a new name"), "{name}: {error}");
-    }
-    // A name of 20,000 folders overflowed the stack.
-    for n in [65, 20_000] {
-        let image = made(&format!("{}x.jpg", "a/".repeat(n - 1)), 2);
-        refused(&mut writer, &image, &format!("expected a name of at most 64 parts, found {n}"));
+    let empty =
+        "image \"a//b\": expected a name whose parts are not empty, . or .., found \"a//b\"";
+    let short = ImageFeatures { scores: Some(vec![1.0]), ..made("c", 2) };
+    for (image, line) in [
+        (made("a//b", 1), empty),
+        (short, "image \"c\", scores: expected 2, one per keypoint, found 1"),
+        (made("a/b", 1), "expected a new name"),
+        (made("a/b/c", 1), "expected a new name"),
+        (made("a", 1), "expected a new name"),
+        (deep(65), "expected a name of at most 64 parts, found 65"),
+        // A name of 20,000 folders overflowed the stack.
+        (deep(20_000), "expected a name of at most 64 parts, found 20000"),
+    ] {
+        let error = writer.append(&image).unwrap_err().to_string();
+        assert!(error.contains(line), "{error}");
     }
 }
 
@@ -148,41 +132,46 @@ fn databases_come_in_the_same_convention() {
         assert_eq!(names, ["i2.jpg", "i3.jpg", "küche/ä 0.jpg"]);
         let image = &images[2];
         assert_eq!((&image.keypoints, image.size), (&vec![[10.0, 19.75]; 8], Some([640, 480])));
-        assert_eq!(bytes(image).len(), 8 * 128);
+        let descriptors = image.descriptors.as_ref().unwrap();
+        assert!(matches!(descriptors.values(), Values::U8(bytes) if bytes.len() == 8 * 128));
         let last = |values: &Option<Vec<f32>>| values.as_ref().map(|values| values[7]);
         assert_eq!((last(&image.scales), last(&image.orientations_deg)), shape);
     }
     // A database in floats is read as floats.
     write_database(&path, "project/floats.db", &with_keypoints(2, &[0.0, 0.0]));
     let images = all(&path);
-    assert!(images.iter().all(|image| floats(image).len() == 8 * 4));
+    let descriptors = images[0].descriptors.as_ref().unwrap();
+    assert!(matches!(descriptors.values(), Values::F32(floats) if floats.len() == 8 * 4));
     assert_eq!(images[0].keypoints[0], [-0.5, -0.5]);
 }
 
-/// A name, a shape, and a function that adds the values.
-type Array<'a> = (&'a str, &'a [u64], &'a dyn Fn(&mut DatasetBuilder));
+/// The name and the shape of an array of floats, and the step between its values; without one, wide
+/// integers.
+type Array = (&'static str, &'static [u64], Option<f32>);
+
+const KEYPOINTS: Array = ("keypoints", &[3, 2], Some(1.0));
+const DESCRIPTORS: Array = ("descriptors", &[4, 3], Some(0.5));
 
 /// Returns a file with the image `a.jpg`, which has these arrays, and the valid image `b.jpg`.
-fn file(arrays: &[Array<'_>]) -> Vec<u8> {
+fn file(arrays: &[Array]) -> Vec<u8> {
     let mut builder = FileBuilder::new();
     for (image, arrays) in [("a.jpg", arrays), ("b.jpg", &[KEYPOINTS, DESCRIPTORS])] {
         let mut group = builder.create_group(image);
-        for (name, shape, fill) in arrays {
+        for &(name, shape, step) in arrays {
+            let n = shape.iter().product::<u64>();
             let dataset = group.create_dataset(name);
-            fill(dataset);
+            match step {
+                Some(step) => {
+                    dataset.with_f32_data(&(1..=n).map(|at| step * at as f32).collect::<Vec<_>>())
+                }
+                None => dataset.with_i64_data(&vec![7; n as usize]),
+            };
             dataset.with_shape(shape);
         }
         builder.add_group(group.finish());
     }
     builder.finish().unwrap()
 }
-
-const KEYPOINTS: Array<'static> = ("keypoints", &[3, 2], &|to| {
-    to.with_f32_data(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
-});
-const DESCRIPTORS: Array<'static> = ("descriptors", &[4, 3], &|to| {
-    to.with_u8_data(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
-});
 
 /// Returns the error line about the file or its first image, or `good`.
 fn line(bytes: &[u8]) -> String {
@@ -199,15 +188,10 @@ fn line(bytes: &[u8]) -> String {
 #[test]
 #[rustfmt::skip] // One row per line.
 fn every_malformed_file_of_features_is_refused_with_its_line() {
-    let floats = |name, shape: &'static [u64], value: f32| -> Filled<'_> {
-        let n = shape.iter().product::<u64>() as usize;
-        let values: Vec<f32> = (0..n).map(|at| value * (at + 1) as f32).collect();
-        (name, shape, Box::new(move |to| { to.with_f32_data(&values); }))
-    };
     // `a.jpg` has this array, and keypoints and descriptors unless it is one of them.
-    let with = |(name, shape, fill): Filled<'_>| {
+    let with = |name, shape: &'static [u64], step: Option<f32>| {
         let others = [KEYPOINTS, DESCRIPTORS].into_iter().filter(|array| array.0 != name);
-        file(&others.chain([(name, shape, &*fill)]).collect::<Vec<_>>())
+        file(&others.chain([(name, shape, step)]).collect::<Vec<_>>())
     };
     let good = file(&[KEYPOINTS, DESCRIPTORS]);
     let rows: Vec<(&str, Vec<u8>, &str)> = vec![
@@ -216,20 +200,20 @@ fn every_malformed_file_of_features_is_refused_with_its_line() {
         ("text", b"hello\nworld".to_vec(), "f: expected features in HDF5, or a COLMAP database (SQLite), found a file that begins with \"hello\\nwo\""),
         ("no image", FileBuilder::new().finish().unwrap(), "f: expected at least one image, found none"),
         ("no keypoints", file(&[DESCRIPTORS]), "f: image \"a.jpg\": expected an array keypoints, found only descriptors"),
-        ("global descriptors", file(&[("global_descriptor", &[2], &|to| { to.with_f32_data(&[0.5, 1.0]); })]), "f: expected a group per image with keypoints and descriptors, found global descriptors of whole images"),
+        ("global descriptors", file(&[("global_descriptor", &[2], Some(0.5))]), "f: expected a group per image with keypoints and descriptors, found global descriptors of whole images"),
         ("no descriptors", file(&[KEYPOINTS]), "f: image \"a.jpg\": expected descriptors, found none"),
-        ("keypoints in one column", with(floats("keypoints", &[3, 1], 1.0)), "f: image \"a.jpg\", keypoints: expected shape (N, 2), found (3, 1)"),
-        ("flat keypoints", with(floats("keypoints", &[6], 1.0)), "f: image \"a.jpg\", keypoints: expected shape (N, 2), found (6,)"),
-        ("infinite", with(floats("keypoints", &[3, 2], f32::INFINITY)), "f: image \"a.jpg\", keypoints: expected finite coordinates in row 0, found (inf, inf)"),
-        ("(N, D)", with(floats("descriptors", &[3, 4], 0.5)), "f: image \"a.jpg\", descriptors: expected shape (D, N) with N = 3, one column per keypoint, found (3, 4), rows and columns exchanged"),
-        ("another number of descriptors", with(floats("descriptors", &[4, 5], 0.5)), "f: image \"a.jpg\", descriptors: expected shape (D, N) with N = 3, one column per keypoint, found (4, 5)"),
-        ("flat descriptors", with(floats("descriptors", &[12], 0.5)), "f: image \"a.jpg\", descriptors: expected shape (D, N) with N = 3, one column per keypoint, found (12,)"),
-        ("dummies", with(floats("descriptors", &[4, 3], 0.0)), "f: image \"a.jpg\", descriptors: expected real descriptors, found only zeros (dummies)"),
-        ("NaN in descriptors", with(floats("descriptors", &[4, 3], f32::NAN)), "f: image \"a.jpg\", descriptors: expected a finite value, found NaN (descriptor 0, value 0)"),
-        ("wide integers", with(("descriptors", &[4, 3], Box::new(|to| { to.with_i64_data(&[7; 12]); }))), "f: image \"a.jpg\", descriptors: expected floats, or unsigned bytes, found other integers"),
-        ("scores of others", with(floats("scores", &[2], 0.5)), "f: image \"a.jpg\", scores: expected one value per keypoint, (3,), found (2,)"),
-        ("a size of one side", with(floats("image_size", &[1], 5.0)), "f: image \"a.jpg\", image_size: expected width and height in pixels, found (1,)"),
-        ("a negative size", with(floats("image_size", &[2], -1.0)), "f: image \"a.jpg\", image_size: expected width and height in pixels, found -1 and -2"),
+        ("keypoints in one column", with("keypoints", &[3, 1], Some(1.0)), "f: image \"a.jpg\", keypoints: expected shape (N, 2), found (3, 1)"),
+        ("flat keypoints", with("keypoints", &[6], Some(1.0)), "f: image \"a.jpg\", keypoints: expected shape (N, 2), found (6,)"),
+        ("infinite", with("keypoints", &[3, 2], Some(f32::INFINITY)), "f: image \"a.jpg\", keypoints: expected finite coordinates in row 0, found (inf, inf)"),
+        ("(N, D)", with("descriptors", &[3, 4], Some(0.5)), "f: image \"a.jpg\", descriptors: expected shape (D, N) with N = 3, one column per keypoint, found (3, 4), rows and columns exchanged"),
+        ("another number of descriptors", with("descriptors", &[4, 5], Some(0.5)), "f: image \"a.jpg\", descriptors: expected shape (D, N) with N = 3, one column per keypoint, found (4, 5)"),
+        ("flat descriptors", with("descriptors", &[12], Some(0.5)), "f: image \"a.jpg\", descriptors: expected shape (D, N) with N = 3, one column per keypoint, found (12,)"),
+        ("dummies", with("descriptors", &[4, 3], Some(0.0)), "f: image \"a.jpg\", descriptors: expected real descriptors, found only zeros (dummies)"),
+        ("NaN in descriptors", with("descriptors", &[4, 3], Some(f32::NAN)), "f: image \"a.jpg\", descriptors: expected a finite value, found NaN (descriptor 0, value 0)"),
+        ("wide integers", with("descriptors", &[4, 3], None), "f: image \"a.jpg\", descriptors: expected floats, or unsigned bytes, found other integers"),
+        ("scores of others", with("scores", &[2], Some(0.5)), "f: image \"a.jpg\", scores: expected one value per keypoint, (3,), found (2,)"),
+        ("a size of one side", with("image_size", &[1], Some(5.0)), "f: image \"a.jpg\", image_size: expected width and height in pixels, found (1,)"),
+        ("a negative size", with("image_size", &[2], Some(-1.0)), "f: image \"a.jpg\", image_size: expected width and height in pixels, found -1 and -2"),
     ];
     for (what, bytes, expected) in rows {
         assert_eq!(line(&bytes), expected, "{what}");

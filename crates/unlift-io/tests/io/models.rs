@@ -64,13 +64,11 @@ fn names_need_not_be_utf8_and_text_may_have_windows_line_ends_and_no_2d_points()
 }
 
 #[test]
-fn a_project_folder_leads_to_its_model_and_database() {
+fn a_project_folder_leads_to_its_model() {
     let project = data("project");
     let input = read::open(&project).unwrap();
     assert_eq!(input.ids, [2, 3, 4, 6, 9, 11]);
     assert_eq!(input.cameras.len(), 3);
-    assert_eq!(input.model, Some(project.join("sparse/0")));
-    assert_eq!(input.beside, [project.join("database.db")]);
     assert_eq!(input.files.len(), 3, "the classic layout: {:?}", input.files);
     let direct = read::open(&project.join("sparse/0")).unwrap();
     assert_eq!(direct.positions, input.positions);

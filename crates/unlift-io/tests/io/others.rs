@@ -25,10 +25,6 @@ fn words(values: &[f64]) -> String {
     values.iter().map(f64::to_string).collect::<Vec<_>>().join(" ")
 }
 
-fn array(values: &[f64]) -> String {
-    format!("[{}]", values.iter().map(f64::to_string).collect::<Vec<_>>().join(", "))
-}
-
 pub fn bundler() -> String {
     let mut text = "# Bundle file v0.3\n3 3\n".to_owned();
     for (at, rotation) in ROTATIONS.iter().enumerate() {
@@ -68,13 +64,11 @@ pub fn opensfm(points: &[[f64; 3]]) -> String {
     // A rotation by 90 degrees about z, as axis times angle.
     let vectors = [[0.0; 3], [0.0, 0.0, std::f64::consts::FRAC_PI_2]];
     let shots = [0, 1].map(|at| {
-        let (r, t) = (array(&vectors[at]), array(&translation(at)));
-        format!(
-            r#""{at}.jpg": {{"rotation": {r}, "translation": {t}, "camera": "v2", "gps": null}}"#
-        )
+        let (r, t) = (vectors[at], translation(at));
+        format!(r#""{at}.jpg": {{"rotation": {r:?}, "translation": {t:?}, "camera": "v2", "gps": null}}"#)
     });
     let point = |(at, point): (usize, &[f64; 3])| {
-        format!(r#""{}": {{"color": [1, 2, 3], "coordinates": {}}}"#, 90 - at, array(point))
+        format!(r#""{}": {{"color": [1, 2, 3], "coordinates": {point:?}}}"#, 90 - at)
     };
     let points: Vec<String> = points.iter().enumerate().map(point).collect();
     let (shots, points) = (shots.join(", "), points.join(", "));
@@ -84,16 +78,14 @@ pub fn opensfm(points: &[[f64; 3]]) -> String {
 }
 
 fn nerfstudio(cloud: &str) -> String {
-    let frames: Vec<String> = (0..2)
-        .map(|at| {
-            // From camera (y up, looking along -z) to world: columns of the rotation, two of them
-            // negated.
-            let r = &ROTATIONS[at];
-            let row = |c: usize| array(&[r[0][c], -r[1][c], -r[2][c], CENTERS[at][c]]);
-            let rows = [row(0), row(1), row(2), array(&[0.0, 0.0, 0.0, 1.0])];
-            format!(r#"{{"file_path": "{at}.png", "transform_matrix": [{}]}}"#, rows.join(", "))
-        })
-        .collect();
+    let frames = [0, 1].map(|at| {
+        // From camera (y up, looking along -z) to world: columns of the rotation, two of them
+        // negated.
+        let r = &ROTATIONS[at];
+        let row = |c: usize| [r[0][c], -r[1][c], -r[2][c], CENTERS[at][c]];
+        let rows = [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]];
+        format!(r#"{{"file_path": "{at}.png", "transform_matrix": {rows:?}}}"#)
+    });
     format!(r#"{{"w": 640, "frames": [{}], "ply_file_path": {cloud}}}"#, frames.join(", "))
 }
 

@@ -103,14 +103,9 @@ fn a_truncated_photo_gives_one_line() {
 #[test]
 fn a_header_with_too_many_pixels_is_refused_before_memory_is_allocated() {
     let mut png = encode(&DynamicImage::from(colors(8, 8)), ImageFormat::Png);
-    // Width and height of the header, and its checksum (CRC-32).
+    // Width and height of the header, and its checksum (Python's `zlib.crc32`).
     png[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 1, 0, 0]);
-    let checksum = png[12..29].iter().fold(!0_u32, |crc, &byte| {
-        (0..8).fold(crc ^ u32::from(byte), |crc, _| {
-            (crc >> 1) ^ if crc & 1 == 1 { 0xedb8_8320 } else { 0 }
-        })
-    });
-    png[29..33].copy_from_slice(&(!checksum).to_be_bytes());
+    png[29..33].copy_from_slice(&0xe3e6_a7b4_u32.to_be_bytes());
     let line = "a.png: expected at most 268435456 pixels, found 65536 x 65536";
     assert_eq!(text(&png, "a.png"), line);
 }
@@ -134,15 +129,11 @@ fn a_header_with_more_pixels_than_its_bytes_can_hold_is_refused() {
 #[test]
 fn files_are_read_by_content_and_missing_ones_named() {
     let read = |path: &Path| read(path, Turn::Upright);
-    let read_color = |path: &Path| read_color(path, Turn::Upright);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("really a png.jpg");
     std::fs::write(&path, encode(&DynamicImage::from(colors(8, 8)), ImageFormat::Png)).unwrap();
     assert_eq!(read(&path).unwrap().width(), 8);
-    assert_eq!(read_color(&path).unwrap(), colors(8, 8));
-    std::fs::write(&path, "text").unwrap();
-    let error = read_color(&path).unwrap_err().to_string();
-    assert!(error.ends_with("png.jpg: expected a JPEG, PNG or WebP image, found text"), "{error}");
+    assert_eq!(read_color(&path, Turn::Upright).unwrap(), colors(8, 8));
     let error = read(Path::new("nowhere/photo.jpg")).unwrap_err().to_string();
     assert!(error.starts_with("nowhere/photo.jpg: expected a JPEG, PNG or WebP image, found "));
     assert!(read(folder.path()).is_err());

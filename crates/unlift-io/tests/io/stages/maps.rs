@@ -67,7 +67,10 @@ pub fn truth<const D: usize>(seed: u64, n: usize) -> (Original<D>, Secret) {
     let n_all = n + draws.below(6) as usize;
     let original = PointSet::try_new(points(&mut draws, n_all), Unit::Meter).unwrap();
     let order: Vec<OriginalId> = draws.permutation(n_all).into_iter().map(OriginalId).collect();
-    let dropped = order[n..].iter().map(|&original| {
+    // Files have them in this order.
+    let mut without_slot = order[n..].to_vec();
+    without_slot.sort();
+    let dropped = without_slot.into_iter().map(|original| {
         let reason = DropReason::ALL[original.index() % DropReason::ALL.len()];
         Dropped { original, reason }
     });

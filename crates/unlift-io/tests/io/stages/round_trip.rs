@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use unlift::neighbors::Neighborhoods;
 use unlift::released::{AxisCandidates, Lines, Obfuscation, Released};
-use unlift::truth::{Original, Secret};
+use unlift::truth::Original;
 use unlift::{PointSet, RecordId, Unit};
 use unlift_io::Error;
 use unlift_io::stage::{self, ImageFile, Kind};
@@ -44,34 +44,14 @@ fn values_come_back<const D: usize>() {
         let write = |path: &Path| stage::write_truth(path, &original, &secret);
         let path = written(folder, Kind::Truth, write);
         let (read_original, read_secret) = stage::read_truth::<D>(&path).unwrap();
-        assert_eq!(read_original.reveal(), original.reveal());
-        // Dropped points come back in the order of originals.
-        let in_order = |secret: &Secret| {
-            let mut dropped = secret.dropped().to_vec();
-            dropped.sort_by_key(|dropped| dropped.original.0);
-            (secret.hidden().to_vec(), secret.map(), secret.slots_per_record(), dropped)
-        };
-        assert_eq!(in_order(&read_secret), in_order(&secret));
-        assert_eq!(read_secret.swapped_axis(), secret.swapped_axis());
-        assert_eq!(read_secret.descriptor_row(), secret.descriptor_row());
+        assert_eq!((read_original.reveal(), read_secret), (original.reveal(), secret));
 
         let recovered = maps::recovered::<D>(seed, n);
         let write = |path: &Path| stage::write_recovered(path, &recovered);
         let path = written(folder, Kind::Recovered, write);
-        let bytes = fs::read(&path).unwrap();
         let read = stage::read_recovered::<D>(&path).unwrap();
-        // NaN is not equal to itself, so bytes are compared, and fields that are not stored.
-        stage::write_recovered(&path, &read).unwrap();
-        assert!(bytes == fs::read(&path).unwrap());
-        assert!((0..n).all(|slot| read.position(slot) == recovered.position(slot)));
-        for (a, b) in read.positions().iter().zip(recovered.positions()) {
-            assert_eq!(a.map(f32::to_bits), b.map(f32::to_bits));
-        }
-        assert_eq!(read.about(), recovered.about());
-        assert_eq!((read.delta(), read.unit()), (recovered.delta(), recovered.unit()));
-        assert_eq!((read.status(), read.support()), (recovered.status(), recovered.support()));
-        assert_eq!((read.axis(), read.evidence()), (recovered.axis(), recovered.evidence()));
-        assert_eq!(read.descriptor_row(), recovered.descriptor_row());
+        // NaN is not equal to itself, so the texts are compared.
+        assert!(format!("{read:?}") == format!("{recovered:?}"), "{n} points in {D}D");
     }
 }
 
@@ -121,16 +101,14 @@ fn a_secret_about_other_points_is_refused() {
 #[test]
 fn images_come_back() {
     let folder = tempfile::tempdir().unwrap();
-    let in_pixels = |released: Released<2>| {
+    let in_pixels = |family: usize, n: usize| {
+        let released = maps::released::<2>(n as u64, n).swap_remove(family);
         let (kept, slots) = (released.obfuscation().clone(), released.slots_per_record());
         let descriptors = released.descriptors().cloned();
         Released::try_new(kept, slots, released.origin(), Unit::Pixel, descriptors).unwrap()
     };
-    let made = |seed: u64, n: usize, family: usize| {
-        in_pixels(maps::released::<2>(seed, n).swap_remove(family))
-    };
     let names = ["a.jpg", "day/b \u{e9}.png", "../c", "/d\\e", "f.npy"];
-    let maps: Vec<Released<2>> = (0..names.len()).map(|at| made(at as u64, 7 + at, 0)).collect();
+    let maps: Vec<Released<2>> = (0..names.len()).map(|at| in_pixels(0, 7 + at)).collect();
     let none = Obfuscation::Lines(Lines::through(&[], &[]).unwrap());
     let none = Released::<2>::try_new(none, 1, [0.0; 2], Unit::Pixel, None).unwrap();
     let path = written(folder.path(), Kind::Released, |path| {
@@ -149,6 +127,6 @@ fn images_come_back() {
     assert!(images.next_image().unwrap().is_none());
     write_images(&path, |images| {
         images.released("a", &maps[0]).unwrap();
-        assert!(images.released("b", &made(1, 5, 3)).is_err(), "another family");
+        assert!(images.released("b", &in_pixels(3, 5)).is_err(), "another family");
     });
 }
