@@ -378,41 +378,40 @@ mod tests {
             }
             let input = crate::read::open(&shared.join(scene)).unwrap();
             let source = FeatureSource::open(&path).unwrap();
-            let (images, mut seen) = tracks(&path, &input).unwrap();
-            let at = |image: &Image| {
-                source.names().iter().position(|name| name.as_bytes() == image.name)
-            };
-            let is_there =
-                |id: u32| images.iter().any(|image| image.id == id && at(image).is_some());
-            seen.retain(|one| is_there(one.0));
-            let model = (images.clone(), seen);
-            let all = (0..source.names().len()).map(|at| source.get(at).unwrap().descriptors);
+            let names = source.names();
+            let at = |image: &Image| names.iter().position(|name| name.as_bytes() == image.name);
+            let (images, mut observations) = tracks(&path, &input).unwrap();
+            let is_there = |id| images.iter().any(|image| image.id == id && at(image).is_some());
+            observations.retain(|&(id, ..)| is_there(id));
+            let model = (images, observations);
+            let all = (0..names.len()).map(|at| source.get(at).unwrap().descriptors);
             let all: Vec<Descriptors> = all.map(Option::unwrap).collect();
             for (&every, kind) in [1, 2].iter().flat_map(|n| (0..6).map(move |kind| (n, kind))) {
                 let changed = |at: usize| {
-                    let (own, other) = (&all[at], &all[(at + 1) % all.len()]);
-                    let n = own.len() as u32;
-                    let mut rows: Vec<u32> = (0..n).collect();
-                    let kind = if at.is_multiple_of(every) { kind } else { 0 };
+                    let mut rows: Vec<u32> = (0..all[at].len() as u32).collect();
                     match kind {
-                        0 => {}
+                        _ if !at.is_multiple_of(every) => {}
                         1 => Draws::new(at as u64, Stage::Subset, 0).shuffle(&mut rows),
                         2 => rows.rotate_left(1),
                         3 => rows.rotate_right(1),
                         4 => rows.reverse(),
-                        _ => rows.iter_mut().for_each(|row| *row %= other.len() as u32),
+                        5 => {
+                            let next = &all[(at + 1) % all.len()];
+                            rows.iter_mut().for_each(|row| *row %= next.len() as u32);
+                            return next.select(&rows);
+                        }
+                        _ => {}
                     }
-                    let own = if kind == 5 { other } else { own };
-                    own.select(&rows)
+                    all[at].select(&rows)
                 };
                 let changed: Vec<Descriptors> = (0..all.len()).map(changed).collect();
-                let found = mean(&path, &input, &model, |image| {
-                    let one = &changed[at(image).unwrap()];
-                    Ok((one.values().clone(), one.dim()))
+                let result = mean(&path, &input, &model, |image| {
+                    let stored = &changed[at(image).unwrap()];
+                    Ok((stored.values().clone(), stored.dim()))
                 });
-                let error = found.err().map_or(String::new(), |error| error.to_string());
-                let told = error.contains("more like their own point in other images");
-                assert_eq!(told, kind != 0, "{scene}, kind {kind} of every {every}: {error}");
+                let error = result.err().map_or(String::new(), |error| error.to_string());
+                let is_refused = error.contains("more like their own point in other images");
+                assert_eq!(is_refused, kind != 0, "{scene}, kind {kind} of every {every}: {error}");
             }
         }
     }

@@ -55,8 +55,7 @@ fn maps_are_read_as_their_makers_meant_them() {
         let map = read::open(&field.join(name)).unwrap();
         assert_eq!((map.positions.len(), map.cameras.len()), (n, n_cameras), "{name}");
         let all = [map.notes, map.doubts].concat();
-        assert_eq!(all.len(), usize::from(!text.is_empty()), "{name}: {all:?}");
-        assert!(all.concat().contains(text), "{name}: {all:?}");
+        assert!(all.len() < 2 && all.concat().contains(text), "{name}: {all:?}");
         if name.starts_with('f') {
             let is_whole = n < expected.len() || are_among(&expected, &map.positions);
             assert!(is_whole && are_among(&map.positions, &expected), "{name}");
