@@ -641,24 +641,13 @@ mod tests {
     fn few_held_out_images_fail_a_gate_but_never_pass_one() {
         let gate = Gate::parse("olc:localization<=2").unwrap();
         let of = |multiple: Option<f64>, n_images: u64, bound: f64, recall: f64| {
-            let held_out = HeldOut {
-                n_images,
-                right_matches: 50.0,
-                matches: 60.0,
-                center_error: multiple,
-                rotation_error_degrees: multiple,
-                multiple,
-                recall_percent: [("50 cm, 5 deg".to_owned(), recall)].into_iter().collect(),
-            };
+            let recall_percent = [("50 cm, 5 deg".to_owned(), recall)].into_iter().collect();
+            let held_out = HeldOut { n_images, multiple, recall_percent, ..HeldOut::default() };
             Localization {
                 scheme: "olc".to_owned(),
-                of_queries: false,
                 multiple: Some(bound),
-                center_error: Some(bound),
-                rotation_error_degrees: Some(bound),
-                failed_percent: 0.0,
-                changes_descriptors: false,
                 held_out: Some(held_out),
+                ..Localization::default()
             }
         };
         let passes = |multiple: Option<f64>, n_images: u64, bound: f64| {

@@ -1,5 +1,6 @@
 """What several tests use: the program, and points on a surface."""
 
+import json
 import os
 import shutil
 
@@ -8,6 +9,12 @@ import pytest
 
 PROGRAM = os.environ.get("UNLIFT_PROGRAM") or shutil.which("unlift")
 needs_program = pytest.mark.skipif(PROGRAM is None, reason="the command line is not here (UNLIFT_PROGRAM)")
+
+
+def figures(document):
+    """Returns what does not depend on the time, the machine and the file."""
+    keep = ["schema", "seed", "options", "results", "not_audited", "notes", "break_even", "gates", "images"]
+    return json.dumps({key: document.get(key) for key in keep}, sort_keys=True)
 
 
 @pytest.fixture

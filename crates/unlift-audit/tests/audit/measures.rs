@@ -1,72 +1,49 @@
-//! A third-party measure, from the plan to the files.
+//! A third-party measure, from the plan to the rows.
 
-use std::fs;
-use std::path::Path;
 use std::sync::Arc;
 
-use unlift::audit::{Cell, Counts, Item, Measure, Plan, Silent, run_many};
+use unlift::audit::{Cell, Counts, Item, Measure, Plan, Silent, run, run_many};
 use unlift::geometry::frame::Bounds;
 use unlift::recover::Builtin;
 use unlift::truth::Original;
-use unlift::{Error, PointSet, Unit};
-use unlift_audit::{
-    Audit, Error as AuditError, Finished, Input, Map, Output, Preparation, Quiet, maps,
-};
-use unlift_io::outputs::Rules;
-use unlift_report::Document;
+use unlift::{Error, PointSet, Unit, synthetic};
 
-use crate::{schemes, write_map};
+use crate::schemes;
 
-/// Measures the number of recovered points as `found`, and a third of it.
+/// Measures the number of recovered points, and a third of it.
 #[derive(Debug)]
-struct Found;
+struct Recovered;
 
-impl Measure<3> for Found {
+impl Measure<3> for Recovered {
     fn measure(&self, cell: &Cell<'_>) -> Result<Vec<(String, f64)>, Error> {
         let n = cell.recovered.positions().len();
-        let found = (0..n).filter(|&slot| cell.recovered.position(slot).is_some()).count() as f64;
-        Ok(vec![("found".to_owned(), found), ("thirds".to_owned(), found / 3.0)])
+        let n = (0..n).filter(|&slot| cell.recovered.position(slot).is_some()).count() as f64;
+        Ok(vec![("recovered".to_owned(), n), ("thirds".to_owned(), n / 3.0)])
     }
 }
 
-/// Audits a small room with this measure, in `folder`.
-fn audit(folder: &Path) -> Result<Finished, AuditError> {
-    let map = write_map(folder, &unlift::synthetic::room(1, 400).points);
-    let preparation = Preparation { scale: Some(1.0), k: 10, ..Preparation::default() };
-    let prepared = maps::open(&map, None, &preparation)?;
-    let usual = Plan::new(Unit::Meter);
+#[test]
+fn figures_of_a_measure_stand_in_the_rows() {
     let plan = Plan {
         schemes: schemes(&["cp"], Unit::Meter),
         inlier_ratios: vec![1.0, 0.1],
         k: 10,
         solvers: vec![Arc::new(Builtin::Joint), Arc::new(Builtin::Ransac)],
-        measures: vec![Arc::new(Found)],
-        ..usual
+        measures: vec![Arc::new(Recovered)],
+        ..Plan::new(Unit::Meter)
     };
-    let out = folder.join("audit");
-    let output = Output::new(&out);
-    let files = output.open(Rules::new([map.as_path()], false))?;
-    let input = Input::Map(Map { plan, ..Map::new(&prepared) });
-    Audit::of_map(&prepared, output).run(&input, &Quiet)?.write(files)
-}
-
-#[test]
-fn figures_of_a_measure_stand_in_the_files() {
-    let place = tempfile::tempdir().expect("a temporary folder");
-    audit(place.path()).expect("an audit");
-    let text = fs::read_to_string(place.path().join("audit/audit.json")).expect("audit.json");
-    let document = Document::from_json(&text).expect("a document");
-    assert_eq!(document.results.len(), 4);
-    for row in &document.results {
-        assert_eq!(row.metrics.keys().collect::<Vec<_>>(), ["found", "thirds"]);
-        let found = (row.n_points - row.n_lost) as f64;
-        assert!(found > 0.0, "{} {}", row.solver, row.inlier_ratio);
-        assert_eq!(row.metrics["found"], found, "{} {}", row.solver, row.inlier_ratio);
-        assert!((row.metrics["thirds"] - found / 3.0).abs() < 1e-3, "{}", row.metrics["thirds"]);
+    let points = PointSet::try_new(synthetic::room(1, 400).points, Unit::Meter).unwrap();
+    let rows = run(&Original::new(points), None, &plan, &mut Silent).unwrap().rows;
+    assert_eq!(rows.len(), 4);
+    for row in &rows {
+        let n = (row.n_points - row.n_lost) as f64;
+        assert!(n > 0.0, "{} {}", row.solver, row.inlier_ratio);
+        let expected = [("recovered", n), ("thirds", n / 3.0)];
+        let metrics = row.metrics.iter().map(|(name, value)| (name.as_str(), *value));
+        assert!(metrics.eq(expected), "{:?}, {n}", row.metrics);
     }
     // Rows differ, so a constant would fail.
-    let lost: Vec<usize> = document.results.iter().map(|row| row.n_lost).collect();
-    assert!(lost.iter().any(|&n| n != lost[0]), "{lost:?}");
+    assert!(rows.iter().any(|row| row.n_lost != rows[0].n_lost));
 }
 
 /// Measures the number of points of images whose names do not begin with `none`.

@@ -122,7 +122,7 @@ impl Input {
 /// These figures are an information bound: all true matches of an image, at the true pose, with
 /// noise of 1 px. Errors are standard deviations. A value is `None` if at least half of the images
 /// do not localize.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Localization {
     /// The scheme's user-facing name; [`UNPROTECTED`] for the map without protection.
     pub scheme: String,
@@ -147,7 +147,7 @@ pub struct Localization {
 }
 
 /// The accuracy of localization of images that the map was made without.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct HeldOut {
     /// Number of held-out images.
     pub n_images: u64,
@@ -194,7 +194,7 @@ impl Localization {
 }
 
 /// A gate of the user and its result.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct GateResult {
     /// The gate as typed, for example `ppl@0.5:0.10<=20`.
     pub gate: String,

@@ -6,8 +6,9 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use serde_json::{Value, json};
 use unlift_report::document::{Document, Spread};
-use unlift_report::{RenderOptions, Scene3d, render};
+use unlift_report::{RenderOptions, render};
 
+use crate::page::page;
 use crate::sample;
 
 const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
@@ -89,10 +90,6 @@ fn evaluate(page: &str, width: u32, scripts: bool, expression: &str) -> Option<V
     Some(result["value"].clone())
 }
 
-fn page(document: &Document, scene: Option<&Scene3d>) -> String {
-    render(document, scene, &RenderOptions::default()).expect("a page")
-}
-
 /// Picks every combination of options of a form's menus `keys`; returns an array of `[labels of the options, result of "show"]`.
 const WALK: &str = "((form, keys, show) => {
     const controls = document.getElementById(form);
@@ -138,7 +135,9 @@ fn every_choice_of_the_view_names_its_source_and_shows_points_or_words() {
     scene.views[0].recovered.fill([f32::NAN; 3]);
     let show = "() => [+root.dataset.sceneRow, +root.dataset.scenePoints, document.getElementById('panes').textContent]";
     let walk = format!("{WALK}('scene-controls', ['scheme', 'given', 'solver'], {show})");
-    let Some(seen) = evaluate(&page(&document, Some(&scene)), 1280, true, &walk) else { return };
+    let Some(seen) = evaluate(&page(&document, Some(&scene), false), 1280, true, &walk) else {
+        return;
+    };
     let seen = seen.as_array().expect("choices");
     assert_eq!(seen.len(), document.results.len() - 1, "all cells but the one without points");
     for choice in seen {
@@ -161,7 +160,8 @@ fn curves_tables_and_canvas_are_drawn_without_complaints_or_network() {
         [...document.querySelectorAll('.chart')].filter(c => c.querySelectorAll('svg path').length < 10).length,
         root.dataset.scene, +root.dataset.scenePoints > 3000])";
     for width in [1280, 390] {
-        let Some(found) = evaluate(&page(&document, Some(&scene)), width, true, drawn) else {
+        let Some(found) = evaluate(&page(&document, Some(&scene), false), width, true, drawn)
+        else {
             return;
         };
         assert_eq!(found, json!([10, 0, "drawn", true]));
@@ -177,10 +177,10 @@ fn curves_tables_and_canvas_are_drawn_without_complaints_or_network() {
         const pixels = new Uint32Array(context.getImageData(0, 0, copy.width, copy.height).data.buffer);
         return pixels.filter(p => (p & 255) + (p >> 8 & 255) + (p >> 16 & 255) > 150).length;
     })()";
-    let found = evaluate(&page(&document, Some(&scene)), 1280, true, lit).expect("a browser");
+    let found =
+        evaluate(&page(&document, Some(&scene), false), 1280, true, lit).expect("a browser");
     assert!(found.as_f64().is_some_and(|lit| lit > 5_000.0), "{found} pixels are lit");
-    let options = RenderOptions { share_safe: true, ..RenderOptions::default() };
-    let safe = render(&document, Some(&scene), &options).expect("a page");
+    let safe = page(&document, Some(&scene), true);
     let shown =
         "[document.querySelectorAll('.chart svg').length > 0, document.querySelector('canvas')]";
     assert_eq!(evaluate(&safe, 1280, true, shown), Some(json!([true, null])));
@@ -209,7 +209,9 @@ fn the_page_can_be_read_without_script_and_its_tables_be_sorted_with_it() {
     let scene = sample::scene(&document, 300);
     let seen = "['.card', '.finding', '#gates li', '#numbers details', '.stage', '.chart'].map(s =>
         [...document.querySelectorAll(s)].filter(n => n.getClientRects().length && n.clientHeight > 0).length)";
-    let Some(found) = evaluate(&page(&document, Some(&scene)), 1280, false, seen) else { return };
+    let Some(found) = evaluate(&page(&document, Some(&scene), false), 1280, false, seen) else {
+        return;
+    };
     // Cards, findings, gates and folded tables are visible; parts that need script are not.
     assert_eq!(found, json!([7, 14, 2, 6, 0, 0]));
     let sort = "unfold().then(() => [0, 1].map(() => {
@@ -217,7 +219,7 @@ fn the_page_can_be_read_without_script_and_its_tables_be_sorted_with_it() {
         table.tHead.rows[0].cells[6].querySelector('button').click();
         return [...table.tBodies[0].rows].map(r => +r.cells[6].textContent);
     }))";
-    let found = evaluate(&page(&sample::document(true), None), 1280, true, sort);
+    let found = evaluate(&page(&sample::document(true), None, false), 1280, true, sort);
     let [falling, rising]: [Vec<f64>; 2] =
         serde_json::from_value(found.expect("a browser")).unwrap();
     assert!(falling.len() == 84 && falling.is_sorted_by(|a, b| a >= b), "{falling:?}");
@@ -267,7 +269,9 @@ fn pages_keep_their_shape_on_a_laptop_and_on_a_phone() {
     ];
     for (name, document) in pages {
         for width in [1280, 390] {
-            let Some(found) = evaluate(&page(&document, None), width, true, SHAPE) else { return };
+            let Some(found) = evaluate(&page(&document, None, false), width, true, SHAPE) else {
+                return;
+            };
             assert_eq!(found["bad"], json!([]), "{name}, {width} px");
             assert!(
                 width < 1280 || name == "crowded" || found["cut"] == json!([]),

@@ -2,8 +2,9 @@
 
 use serde_json::{Value, json};
 use unlift_report::document::{GateResult, ImageCounts, NotAudited, Spread};
-use unlift_report::{Document, RenderOptions, junit, render};
+use unlift_report::{Document, junit};
 
+use crate::page::page;
 use crate::sample;
 
 #[test]
@@ -100,8 +101,7 @@ fn what_others_say_of_why_they_failed_is_kept_back() {
     ];
     document.gates[0].reason = Some("mine was not audited: mine: found secret".into());
     document.notes = vec!["/secret/rigs.bin: cut off".into(), "5 of 9 descriptors".into()];
-    let options = RenderOptions { share_safe: true, ..RenderOptions::default() };
-    let page = render(&document, None, &options).expect("a page");
+    let page = page(&document, None, true);
     let safe = document.share_safe();
     let json = safe.to_json().expect("a document");
     assert!(!page.contains("secret") && !json.contains("secret"), "{json}");

@@ -6,7 +6,8 @@ use unlift_report::{RenderOptions, Scene3d, render, text_table};
 
 use crate::sample;
 
-fn page(document: &Document, scene: Option<&Scene3d>, share_safe: bool) -> String {
+/// Returns the page of an audit, to keep or to share.
+pub fn page(document: &Document, scene: Option<&Scene3d>, share_safe: bool) -> String {
     let options = RenderOptions { share_safe, ..RenderOptions::default() };
     render(document, scene, &options).expect("a page")
 }
@@ -190,7 +191,7 @@ fn the_sampling_error_stands_beside_every_percentage_of_the_verdict() {
     let text = document.to_json().unwrap();
     let read = Document::from_json(&text).unwrap();
     assert_eq!(read.results[0].interval, document.results[0].interval);
-    let page = render(&document, None, &RenderOptions::default()).unwrap();
+    let page = page(&document, None, false);
     assert!(page.contains("The least leak, 20.2\u{a0}% (19.0 to 21.4, "), "the banner");
     assert!(page.contains(r#"title="95 % interval">19.0 to 21.4</span>"#), "the cards");
     assert!(page.contains(r#"<span class="whisker" style="left: 19.0%"#), "the bars");

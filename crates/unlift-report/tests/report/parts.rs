@@ -7,18 +7,17 @@ use unlift_report::{
     Attack, ByAttack, Given, RenderOptions, gate_lines, junit, render, text_table,
 };
 
+use crate::page::page;
 use crate::sample;
 
 fn one(scheme: &str, multiple: Option<f64>) -> Localization {
     Localization {
         scheme: scheme.to_owned(),
-        of_queries: false,
         multiple,
         center_error: multiple.map(|x| 0.0005 * x),
         rotation_error_degrees: multiple,
         failed_percent: if multiple.is_some() { 0.0 } else { 100.0 },
-        changes_descriptors: false,
-        held_out: None,
+        ..Localization::default()
     }
 }
 
@@ -43,16 +42,12 @@ fn document(protects: bool) -> Document {
     document
 }
 
-fn page(document: &Document) -> String {
-    render(document, None, &RenderOptions::default()).unwrap()
-}
-
 #[test]
 fn the_cost_of_protection_has_a_sentence_a_chart_and_a_table() {
-    let none = page(&document(false));
+    let none = page(&document(false), None, false);
     let said = "No scheme tried here keeps an attacker below 20\u{a0}% at a localization error within twice the unprotected one.";
     assert!(none.contains(said));
-    let some = page(&document(true));
+    let some = page(&document(true), None, false);
     for said in [
         "olc keeps the attacks tried here below 20\u{a0}%",
         "A better attack may recover more.",
@@ -66,7 +61,7 @@ fn the_cost_of_protection_has_a_sentence_a_chart_and_a_table() {
     let text = text_table(&document(true));
     assert!(text.contains("does not localize") && text.contains("1.4x"), "{text}");
     // The audit of a map without tracks has no chart.
-    assert!(!page(&sample::document(true)).contains("id=\"cost\""));
+    assert!(!page(&sample::document(true), None, false).contains("id=\"cost\""));
 }
 
 #[test]
@@ -74,20 +69,18 @@ fn changed_descriptors_have_no_known_cost_without_held_out_images() {
     let mut document = document(true);
     document.localization[1].changes_descriptors = true;
     assert_eq!(document.localization[1].cost(), None);
-    let text = page(&document);
+    let text = page(&document, None, false);
     assert!(text.contains("No scheme with both figures keeps"), "an unknown cost is not small");
     assert!(text.contains("olc: its descriptors are changed"));
     document.localization[1].held_out = Some(HeldOut {
         n_images: 10,
         right_matches: 300.0,
         matches: 400.0,
-        center_error: Some(0.001),
-        rotation_error_degrees: Some(0.03),
         multiple: Some(3.5),
-        recall_percent: [("5 cm, 5 deg".to_owned(), 90.0)].into_iter().collect(),
+        ..HeldOut::default()
     });
     assert_eq!(document.localization[1].cost(), Some(3.5));
-    assert!(page(&document).contains("300 of 400"));
+    assert!(page(&document, None, false).contains("300 of 400"));
     let same = Document::from_json(&document.to_json().unwrap()).unwrap();
     assert_eq!(same.localization, document.localization);
     let one = &mut document.localization[1];
@@ -108,11 +101,11 @@ fn a_scheme_that_does_not_localize_is_no_advice() {
         row.blind_percent.values_mut().for_each(|x| *x = 1.0);
         (row.records_alone_percent, row.records_alone_by) = (None, None);
     }
-    let text = page(&document);
+    let text = page(&document, None, false);
     assert!(text.contains("leaks least") && !text.contains("plane leaks least"));
     document.results.retain(|row| row.scheme == "plane");
     document.run.seconds.rows.truncate(document.results.len());
-    let text = page(&document);
+    let text = page(&document, None, false);
     assert!(text.contains(", but most cameras cannot be placed with it."), "{text}");
 }
 
@@ -122,17 +115,15 @@ fn gates_on_localization_speak_of_multiples() {
     document.gates = vec![GateResult {
         gate: "ppl:localization<=1.5".to_owned(),
         found_percent: Some(1.6),
-        highest_percent: None,
         of: Some("ppl, bound".to_owned()),
         bound_percent: 1.5,
-        passed: false,
-        reason: None,
+        ..GateResult::default()
     }];
     let line =
         "gate ppl:localization<=1.5: FAILED, found 1.60 times the unprotected error: ppl, bound\n";
     assert_eq!(gate_lines(&document), line);
     let said = "1.6 times the unprotected localization error, at most 1.5 times may be; ppl, bound";
-    for text in [page(&document), junit(&document).unwrap()] {
+    for text in [page(&document, None, false), junit(&document).unwrap()] {
         assert!(text.contains(said), "{text}");
     }
 }
