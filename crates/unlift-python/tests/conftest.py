@@ -1,4 +1,4 @@
-"""What several tests use: the program, and points on a surface."""
+"""What several tests use: the program, figures of documents, maps, and points on a surface."""
 
 import json
 import os
@@ -17,7 +17,15 @@ def figures(document):
     return json.dumps({key: document.get(key) for key in keep}, sort_keys=True)
 
 
-@pytest.fixture
+def maps(folder, n):
+    """Writes maps of different sizes, and returns their paths."""
+    paths = [str(folder / f"map{at}.npy") for at in range(n)]
+    for at, path in enumerate(paths):
+        np.save(path, np.random.default_rng(at).uniform(0, 4, (200 + 50 * at, 3)))
+    return paths
+
+
+@pytest.fixture(scope="session")
 def points():
     """Returns points on a surface, such as a wall, where neighbors are near each other."""
     random = np.random.default_rng(7)

@@ -52,8 +52,7 @@ fn write_database(path: &Path, names: &[&str], points: &[[f64; 3]]) {
     let places: Vec<u8> = places.flat_map(f32::to_le_bytes).collect();
     let rows: Vec<u8> = points.iter().flat_map(|point| descriptor(point, 128)).collect();
     for (at, name) in names.iter().enumerate() {
-        // Ids are in reverse order, because images are matched by name.
-        let id = (names.len() - at) as i64;
+        let id = at as i64 + 1;
         let insert = "INSERT INTO images VALUES (?, ?, 1)";
         database.execute(insert, rusqlite::params![id, name]).unwrap();
         for (table, n_columns, data) in [("keypoints", 2, &places), ("descriptors", 128, &rows)] {
