@@ -3,7 +3,7 @@
 
 use std::fs::{self, File};
 use std::io::{Seek, SeekFrom, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use unlift_io::features::FeatureSource;
 use unlift_io::{read, stage};
@@ -24,7 +24,7 @@ pub fn appended(mut file: Vec<u8>, bytes: &[u8]) -> Vec<u8> {
 /// A count that exceeds any file.
 pub const MANY: [u8; 8] = 1_000_000_000_000_000_000_u64.to_le_bytes();
 
-/// What is wrong, the files, the path to open, and the error line.
+/// What is wrong, the files (or, ending in `/`, folders), the path to open, and the error line.
 type Row = (&'static str, Vec<(&'static str, Vec<u8>)>, &'static str, String);
 
 /// A file by itself; `line` follows its name.
@@ -32,17 +32,23 @@ fn alone(what: &'static str, name: &'static str, bytes: impl AsRef<[u8]>, line: 
     (what, vec![(name, bytes.as_ref().to_vec())], name, format!("{name}{line}"))
 }
 
+fn made(dir: &Path, files: &[(&str, Vec<u8>)], open: &str) -> PathBuf {
+    for (name, bytes) in files {
+        let path = dir.join(name);
+        match name.ends_with('/') {
+            true => fs::create_dir_all(path).unwrap(),
+            false => fs::write(path, bytes).unwrap(),
+        }
+    }
+    if open.is_empty() { dir.to_owned() } else { dir.join(open) }
+}
+
 #[test]
 fn every_malformed_file_is_refused_with_its_line() {
     let all = [binary(), text(), ply(), tables(), arrays(), paths()];
     for (what, files, open, line) in all.into_iter().flatten() {
         let dir = tempfile::tempdir().unwrap();
-        for (name, bytes) in files {
-            let file = dir.path().join(name);
-            fs::create_dir_all(file.parent().unwrap()).unwrap();
-            fs::write(file, bytes).unwrap();
-        }
-        let path = dir.path().join(open);
+        let path = made(dir.path(), &files, open);
         // Errors in cameras are notes, because points do not need cameras.
         if line.starts_with("cameras") {
             let notes = read::open(&path).expect(what).notes;
@@ -51,6 +57,22 @@ fn every_malformed_file_is_refused_with_its_line() {
             assert_eq!(shown(dir.path(), &read::open(&path).expect_err(what)), line, "{what}");
         }
     }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_file_that_may_not_be_read_is_refused() {
+    use std::os::unix::fs::PermissionsExt;
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.csv");
+    fs::write(&path, "1,2,3").unwrap();
+    fs::set_permissions(&path, fs::Permissions::from_mode(0o000)).unwrap();
+    if fs::read(&path).is_ok() {
+        eprintln!("skipped: this user may read everything");
+        return;
+    }
+    let line = "a.csv: expected a readable file, found no permission to read";
+    assert_eq!(shown(dir.path(), &read::open(&path).unwrap_err()), line);
 }
 
 /// They must be an error before they are opened.
@@ -125,10 +147,14 @@ fn binary() -> Vec<Row> {
         in_model("trailing byte", "points3D.bin", appended(points(), b"x"), ": end (byte 434): expected end of file, found 1 more byte"),
         in_model("repeated id", "points3D.bin", patched(points(), at::POINT, &[3]), ": point 3: expected each id once, found it again"),
         in_model("text where binary is expected", "points3D.bin", b"# 3D point list\n1 0 0 0 0 0 0 0\n".to_vec(), ": header (byte 0): expected binary data (the number of points), found text"),
+        in_model("no points", "points3D.bin", vec![0; 8], ": expected at least one point, found none"),
+        in_model("empty", "images.bin", cut("images.bin", 0), ": header (byte 0): expected 8 bytes of the number of images, found end of file"),
         in_model("count of 10^18", "images.bin", patched(images(), 0, &MANY), ": header (byte 0): expected at most 11 for the number of images (822 bytes are left), found 1000000000000000000"),
         in_model("name without end", "images.bin", patched(images(), at::NAME, &name_to_end), ": record 1 (byte 72): expected a zero byte at the end of the image name, found end of file"),
         in_model("repeated id", "images.bin", patched(images(), at::IMAGE, &[2]), ": image 2: expected each id once, found it again"),
+        in_model("empty", "cameras.bin", cut("cameras.bin", 0), ": header (byte 0): expected 8 bytes of the number of cameras, found end of file"),
         in_model("unknown model", "cameras.bin", patched(cameras(), at::CAMERA_MODEL, &[99]), ": record 1 (byte 12): expected a camera model of COLMAP (0 to 17) for camera 1, found 99"),
+        in_model("longer model", "cameras.bin", patched(cameras(), at::CAMERA_MODEL, &[11]), ": record 1 (byte 64): expected 8 bytes of a parameter, found end of file"),
         in_model("count of 10^18", "cameras.bin", patched(cameras(), 0, &MANY), ": header (byte 0): expected at most 1 for the number of cameras (56 bytes are left), found 1000000000000000000"),
         in_model("parameters cut", "cameras.bin", cameras()[..at::PARAMS + 4 * 8 - 1].to_vec(), ": record 1 (byte 56): expected 8 bytes of a parameter, found 7 bytes before the end of the file"),
     ]
@@ -143,6 +169,7 @@ fn text() -> Vec<Row> {
     };
     let long = format!("1 0 0 {} 0 0 0 0", "9a".repeat(60));
     vec![
+        points("empty text", "", ": expected at least one point, found none"),
         points("two coordinates", "# c\n1 2 3\n", ":2: expected 3 coordinates, found end of line"),
         points("not a number", "1 2 3 abc 0 0 0 0\n", ":1: expected 3 coordinates, found \"abc\""),
         points("long word", &long, ":1: expected 3 coordinates, found \"9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a...\""),
@@ -238,9 +265,10 @@ fn arrays() -> Vec<Row> {
 fn paths() -> Vec<Row> {
     vec![
         ("missing", vec![], "nothing.ply", "nothing.ply: expected a file or folder, found nothing".to_owned()),
-        ("a folder without a map", vec![("project/a.txt", vec![])], "project", "project: expected points3D.bin or points3D.txt in it, or in sparse, model, models, colmap/sparse or a numbered folder of these, found none".to_owned()),
+        ("empty folder", vec![("project/", vec![])], "project", "project: expected points3D.bin or points3D.txt in it, or in sparse, model, models, colmap/sparse or a numbered folder of these, found none".to_owned()),
         alone("a dropped format", "a.laz", "LASF", ": expected a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .asc, .pts, .npy, .npz or .splat file, found a .laz file (convert it: CloudCompare -O in.laz -SAVE_CLOUDS, or pdal translate in.laz out.ply)"),
         alone("images given by themselves", "images.bin", "", ": expected a file with points, found another file of a COLMAP model (give its folder)"),
+        alone("a database", "database.db", "SQLite format 3", ": expected a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .asc, .pts, .npy, .npz or .splat file, found a .db file"),
     ]
 }
 

@@ -63,10 +63,13 @@ fn released_maps() {
         ("foot", vec![], "expected a released map, with one of the arrays foot, center, offset, position, found arrays unlift, direction"),
         ("direction", floats("(3, 3)", &[1.0; 9]), "array direction: expected shape (2, 3), found (3, 3)"),
         ("foot", floats("(2, 2)", &[1.0; 4]), "array foot: expected shape (n, 3), found (2, 2)"),
+        ("foot", floats("(6,)", &[1.0; 6]), "array foot: expected shape (n, 3), found (6,)"),
         ("foot", npy("'<c8'", "(2, 3)", &[0; 48]), "array foot: expected numbers, found dtype <c8"),
+        ("foot", npy("'|O'", "(2, 3)", &[0; 48]), "array foot: expected numbers, found dtype |O"),
         ("foot", floats("(2, 3)", &[1.0; 5]), "array foot: expected 2 rows of 24 bytes, found 40 bytes"),
         ("foot", floats("(2, 3)", &[1.0, 2.0, 3.0, 4.0, f64::NAN, 6.0]), "array foot, row 1: expected a finite number, found NaN"),
         ("feet", floats("(1,)", &[1.0]), "array feet: expected only unlift, foot, direction, center, centers, regions, axis, offset, position, descriptor, descriptor_subspace, descriptor_words, public_descriptor, origin, bounds, found an unknown array"),
+        ("records", whole("(2, 1)", &[1, 0]), "array records: expected only unlift, foot, direction, center, centers, regions, axis, offset, position, descriptor, descriptor_subspace, descriptor_words, public_descriptor, origin, bounds, found an unknown array"),
         ("descriptor", floats("(3, 2)", &[1.0; 6]), "array descriptor: expected shape (2, k), found (3, 2)"),
         ("descriptor", whole("(2, 2)", &[0, 1, 2, 256]), "array descriptor, row 1: expected a whole number below 256, or a float, found 256.0"),
         ("public_descriptor", floats("(2, 2)", &[1.0; 4]), "arrays: expected one of descriptor, descriptor_subspace and descriptor_words, and public_descriptor beside the last two, found public_descriptor"),
@@ -84,7 +87,8 @@ fn released_maps() {
         ("unlift", text(r#"{"unit": "m", "family": "rays"}"#), "array centers: expected an array of shape (n, 3), found no such array"),
         ("unlift", text(r#"{"unit": "m", "family": "curves"}"#), "metadata unlift, family: expected one of lines, rays, axis_planes, axis_candidates, found \"curves\""),
     ] {
-        refused(&with(lines(), name, bytes), read, expected);
+        let arrays = with(lines(), name, bytes);
+        refused(&arrays, read, expected);
     }
     let stated = with(lines(), "unlift", text(r#"{"unit": "m", "fingerprint": "00112233445566778899aabbccddeeff"}"#));
     let found = line(archive(&stated), read);
