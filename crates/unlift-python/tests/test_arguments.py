@@ -7,6 +7,11 @@ import unlift
 
 
 @pytest.fixture(scope="module")
+def points():
+    return np.random.default_rng(7).uniform(0, 4, (400, 3))
+
+
+@pytest.fixture(scope="module")
 def hidden(points):
     return unlift.obfuscate(unlift.Map(points, scale=1.0), "olc", seed=1)
 
@@ -38,6 +43,10 @@ def broken(points):
     return unlift.Lines(points + 1.0, np.tile([0.0, 0.0, 1.0], (len(points), 1)))
 
 
+def shuffled(points, random):
+    return unlift.Lines(random.permutation(points), random.normal(size=points.shape))
+
+
 def masked(points):
     return np.ma.masked_array(points, mask=points > 3.9)
 
@@ -61,19 +70,22 @@ def twice(points):
 @pytest.mark.parametrize(
     "wrong, said",
     [
-        (lambda p, h: unlift.Neighborhoods(h, np.full((600, 2), 2**64 - 1, "u8")), "records: expected numbers from -1 to 599, found 18446744073709551615"),
+        (lambda p, h: unlift.Neighborhoods(h, np.full((400, 2), 2**64 - 1, "u8")), "records: expected numbers from -1 to 399, found 18446744073709551615"),
         (lambda p, h: unlift.Neighborhoods(h, [[1], [2, 3]]), "records: expected an array of whole numbers, found setting an array"),
-        (lambda p, h: unlift.Neighborhoods(h, np.zeros((600, 2), int), [1.0]), r"scores: expected the shape of the records, \(600, 2\), found \(1,\)"),
+        (lambda p, h: unlift.Neighborhoods(h, np.zeros((400, 2), int), [1.0]), r"scores: expected the shape of the records, \(400, 2\), found \(1,\)"),
         (lambda p, h: unlift.Map(masked(p), scale=1.0), "positions: expected an array of numbers without a mask .*, found a masked array"),
         (lambda p, h: unlift.Map(lacking(p), scale=1.0), "point 17: expected finite coordinates"),
         (lambda p, h: cheap(p, thresholds=[0.1, "0.10"]), "thresholds: expected each once, found 0.10 again"),
         (lambda p, h: cheap(p, thresholds=[]), "thresholds: expected at least one, found none"),
         (lambda p, h: cheap(p, [ours]), "schemes: expected functions with a name that unlift does not use, found olc"),
         (lambda p, h: twice(p), "neighbors: expected each name once, found near"),
-        (lambda p, h: unlift.Map(p[:, :2]), r"positions: expected an array of shape \(n, 3\), found \(600, 2\)"),
-        (lambda p, h: unlift.Map(p, p[:5].astype("f4"), scale=1), "descriptors: expected 600 rows, one per point, found 5"),
-        (lambda p, h: unlift.Map(p, np.zeros((600, 4), int), scale=1), "descriptors: expected an array of uint8 or floats, found one of int64"),
+        (lambda p, h: unlift.obfuscate(unlift.Map(p, scale=1.0), shuffled, seed=1), "shuffled: truth: expected points nearer to their own records"),
+        (lambda p, h: unlift.Map(p[:, :2]), r"positions: expected an array of shape \(n, 3\), found \(400, 2\)"),
+        (lambda p, h: unlift.Map(p, p[:5].astype("f4"), scale=1), "descriptors: expected 400 rows, one per point, found 5"),
+        (lambda p, h: unlift.Map(p, np.zeros((400, 4), int), scale=1), "descriptors: expected an array of uint8 or floats, found one of int64"),
         (lambda p, h: unlift.Map(p, scale=-1), "scale: expected a number above 0, found -1"),
+        (lambda p, h: unlift.Map(p[:9], scale=1), "points: expected at least 51"),
+        (lambda p, h: unlift.read("no such map"), "no such map: expected"),
         (lambda p, h: unlift.obfuscate(unlift.Map(p), "cp2d"), "scheme: expected one that is defined on maps, found cp2d"),
         (lambda p, h: unlift.neighbors.overlap(h), "descriptors: expected some"),
     ],

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import unlift
-from conftest import PROGRAM, figures, needs_program
+from conftest import PROGRAM, needs_program
 
 
 @pytest.fixture
@@ -18,6 +18,12 @@ def small(points):
 def cheap(map, schemes, **more):
     options = {"inlier_ratios": [0.5], "solvers": ["consensus"], "k": 20} | more
     return unlift.audit(map, schemes, **options)
+
+
+def figures(document):
+    """Returns what does not depend on the time and the machine."""
+    keep = ["schema", "seed", "options", "results", "not_audited", "break_even", "gates"]
+    return json.dumps({key: document.get(key) for key in keep}, sort_keys=True)
 
 
 @needs_program
@@ -70,6 +76,16 @@ def test_a_solver_is_a_function(small):
     assert np.allclose(found.positions, hidden.released.columns["foot"] + hidden.released.origin, atol=1e-5)
     rows = cheap(small, ["olc"], solvers=[foot, "consensus"]).rows
     assert rows["solver"] == ["foot", "consensus"]
+    # The solver does not support planes: its rows are missing, the others are not.
+    report = cheap(small, ["plane"], solvers=[foot, "consensus"])
+    assert report.rows["solver"] == ["consensus"]
+    assert "KeyError" in report.document["not_audited"][0]["reason"]
+
+    def consensus(released, lists):
+        return foot(released, lists)
+
+    with pytest.raises(unlift.UnliftError, match="a name that no solver of unlift has, found consensus"):
+        cheap(small, ["olc"], solvers=[consensus])
 
 
 @pytest.mark.parametrize("family", ["pairs", "rays", "planes", "candidates"])
@@ -136,6 +152,20 @@ def test_what_a_function_raises_is_the_cause(small):
     with pytest.raises(unlift.UnliftError, match="schemes: expected a name or a function, found 7"):
         cheap(small, [7])
 
+    def elsewhere(points):
+        return unlift.Lines(points + 1.0, np.tile([0.0, 0.0, 1.0], (len(points), 1)))
+
+    with pytest.raises(AssertionError, match="elsewhere"):
+        unlift.testing.check_scheme(elsewhere)
+    with pytest.raises(unlift.UnliftError, match="elsewhere: hidden points: expected on their own records, found 600 of 600"):
+        cheap(small, [elsewhere], gates=["all:0.10<=20"])
+
+    def careless(points):
+        return unlift.Lines(points, np.random.default_rng().normal(size=points.shape))
+
+    with pytest.raises(unlift.UnliftError, match="careless: records: expected the same for the same key"):
+        cheap(small, [careless])
+
 
 def test_progress_is_told_and_may_stop(small):
     told = []
@@ -155,10 +185,15 @@ def test_reports_are_saved_and_tables_read_by_others(small, tmp_path):
     page = report.save(tmp_path / "out")
     assert page.name == "report.html" and "<html" in page.read_text()
     assert json.loads((tmp_path / "out" / "audit.json").read_text())["results"] == report.document["results"]
-    page.write_text("mine")
-    with pytest.raises(unlift.UnliftError, match=r"^out: .*report.html.*found another file"):
-        report.save(tmp_path / "out")
-    assert page.read_text() == "mine"
+    safe = report.save(tmp_path / "safe", share_safe=True)
+    assert len(safe.read_text()) < len(page.read_text())
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "report.html").write_text("mine")
+    with pytest.raises(unlift.UnliftError, match="report.html"):
+        report.save(tmp_path / "mine")
+    assert (tmp_path / "mine" / "report.html").read_text() == "mine"
+    assert report._repr_html_().startswith("<iframe srcdoc=")
+    assert "olc" in str(report)
 
     rows = report.rows._repr_html_()
     assert rows.startswith("<table>") and "<td>olc</td>" in rows and "<th>recovered_percent_within_0.10</th>" in rows

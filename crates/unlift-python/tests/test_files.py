@@ -35,3 +35,11 @@ def test_what_is_not_of_its_kind_stays(parts, name, tmp_path):
     with pytest.raises(unlift.UnliftError, match="expected a file, found a folder"):
         part.save(tmp_path, force=True)
     assert [entry.name for entry in tmp_path.iterdir()] == ["x.npz"]
+
+
+def test_a_report_names_the_way_out_as_python_has_it(tmp_path):
+    points = np.random.default_rng(7).uniform(0, 4, (300, 3))
+    report = unlift.audit(unlift.Map(points, scale=1.0), ["olc"], inlier_ratios=[0.5], solvers=["consensus"])
+    (tmp_path / "report.html").write_text("mine")
+    with pytest.raises(unlift.UnliftError, match=r"^out: .*found another file"):
+        report.save(tmp_path)

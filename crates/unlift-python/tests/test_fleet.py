@@ -6,10 +6,18 @@ import numpy as np
 import pytest
 
 import unlift
-from conftest import maps
 
 pa = pytest.importorskip("pyarrow")
 OPTIONS = {"schemes": ["olc", "plane"], "inlier_ratios": [0.5, 0.3], "solvers": ["consensus"], "k": 20}
+
+
+def maps(folder: pathlib.Path, n: int = 3) -> list[str]:
+    paths = []
+    for at in range(n):
+        path = folder / f"map{at}.npy"
+        np.save(path, np.random.default_rng(at).uniform(0, 4, (200 + 50 * at, 3)))
+        paths.append(str(path))
+    return paths
 
 
 def rows(tasks: "pa.Table", batch: int = 2, **options) -> "pa.Table":
@@ -19,7 +27,7 @@ def rows(tasks: "pa.Table", batch: int = 2, **options) -> "pa.Table":
 
 
 def test_rows_are_those_of_single_audits(tmp_path: pathlib.Path):
-    paths = maps(tmp_path, 3)
+    paths = maps(tmp_path)
     found = rows(pa.table({"path": paths, "scale": [1.0, 1.0, None]})).to_pylist()
     assert [row["item"] for row in found] == [path for path in paths for _ in range(4)]
     for at, path in enumerate(paths):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import unlift
-from conftest import PROGRAM, figures, needs_program
+from conftest import PROGRAM, needs_program
 
 FIXTURES = pathlib.Path(__file__).parents[2] / "unlift-io" / "tests" / "data"
 QUICK = {"inlier_ratios": [0.5], "solvers": ["consensus"], "k": 10}
@@ -38,6 +38,12 @@ def quick(images, *more, **options):
     return unlift.audit_images(images, *more, **(QUICK | options))
 
 
+def figures(document):
+    """Returns what does not depend on the time, the machine and the file."""
+    keep = ["schema", "seed", "options", "results", "not_audited", "notes", "break_even", "gates", "images"]
+    return json.dumps({key: document.get(key) for key in keep}, sort_keys=True)
+
+
 def database(path, images):
     """Writes the images to a COLMAP database, where the middle of the first pixel is (0.5, 0.5)."""
     with sqlite3.connect(path) as base:
@@ -56,14 +62,18 @@ def database(path, images):
     base.close()
 
 
+def program(line, folder, code=0):
+    done = subprocess.run([PROGRAM, *line.split()], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == code, done.stderr
+    return json.loads((folder / "cli" / "audit.json").read_text())
+
+
 @needs_program
 def test_figures_are_those_of_the_command_line(images, tmp_path):
     database(tmp_path / "database.db", images)
     line = "audit images database.db --schemes lines2d,dcl2d --neighbors oracle --neighbors overlap --inlier-ratios 0.5,0.3"
     line += " --k 10 --seed 7 --repeats 2 --gate all@0.5:10<=1 --quiet --out cli"
-    done = subprocess.run([PROGRAM, *line.split()], cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == 1, done.stderr
-    cli = json.loads((tmp_path / "cli" / "audit.json").read_text())
+    cli = program(line, tmp_path, code=1)
     options = {"inlier_ratios": [0.5, 0.3], "k": 10, "seed": 7, "repeats": 2, "gates": "all@0.5:10<=1"}
     given = (["lines2d", "dcl2d"], ["oracle", "overlap"])
     of_arrays = unlift.audit_images(images, *given, **options)
@@ -76,6 +86,20 @@ def test_figures_are_those_of_the_command_line(images, tmp_path):
     of_file = unlift.audit_images(tmp_path / "database.db", *given, **options)
     assert of_file.document["input"]["sha256"] == cli["input"]["sha256"]
     assert figures(of_file.document) == figures(cli)
+
+
+def test_a_report_of_images_is_like_one_of_maps(images, tmp_path):
+    report = quick(images, "lines2d")
+    assert report.rows["scheme"] == ["lines2d"] and report.rows["unit"] == ["px"] and report.passed
+    page = report.save(tmp_path / "out")
+    text = page.read_text()
+    assert 'id="picture-graph"' in text and "sub/c.jpg" in text
+    assert json.loads((tmp_path / "out" / "audit.json").read_text())["images"] == report.document["images"]
+    safe = report.html(share_safe=True)
+    assert 'id="picture-graph"' not in safe and "sub/c.jpg" not in safe
+    assert report._repr_html_().startswith("<iframe srcdoc=") and "lines2d" in str(report)
+    pyarrow = pytest.importorskip("pyarrow")
+    assert pyarrow.table(report.rows).column("recovered_percent_within_10").to_pylist() == report.rows["recovered_percent_within_10"]
 
 
 def test_images_are_looked_up_when_their_turn_comes(images):
@@ -146,6 +170,7 @@ def with_b(**change):
         (lambda i: quick({"a": 3}), r"""images\["a"\]: expected a dict of arrays, found <class 'int'>"""),
         (lambda i: quick(7), "images: expected a path, or a dict of names to arrays, found <class 'int'>"),
         (lambda i: quick({}), "images: expected at least one, found none"),
+        (lambda i: quick("no such file"), "no such file: expected a file or folder, found nothing"),
         (lambda i: quick(i, "olc"), "scheme: expected one that is defined on images, found olc"),
         (lambda i: quick(i, neighbors="geometric", inlier_ratios=None), "expected one that is defined in 2 dimensions, found geometric"),
         (lambda i: quick(FIXTURES / "features-latest.h5", max_features=5), "^max_features: expected with a folder of photos, found a file"),

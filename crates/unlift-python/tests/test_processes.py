@@ -1,6 +1,7 @@
 """Processes: forked children compute, and an interrupt ends the interpreter without a crash."""
 
 import os
+import pathlib
 import signal
 import subprocess
 import sys
@@ -143,9 +144,18 @@ def test_a_second_interrupt_waits_for_no_function(tmp_path):
     assert "KeyboardInterrupt" in err and process.returncode == -signal.SIGINT and time.monotonic() - started < 5, err
 
 
+IMAGES = """
+import numpy as np, unlift
+
+def image(at):
+    keypoints = np.random.default_rng(at).uniform(0, [1599, 1199], (4000, 2))
+    return {"keypoints": keypoints, "width": 1600, "height": 1200}
+"""
+
+
 def test_an_interrupt_ends_the_function_that_looks_up_images(tmp_path):
-    code = """
-import os, unlift
+    code = IMAGES + """
+import os
 
 class Slow:
     def keys(self):

@@ -44,6 +44,7 @@ def test_nothing_that_functions_raised_or_that_was_read_is_in_it(report, tmp_pat
 def test_a_notebook_keeps_no_points(report, monkeypatch):
     shown, safe = report._repr_html_(), report.html(share_safe=True)
     assert shown.startswith("<iframe srcdoc=") and len(shown) < 1.5 * len(safe) + 1000
+    assert "no points" in report.html(share_safe=True) or len(report.html()) > len(safe)
 
     class Display:
         HTML = staticmethod(lambda page: page)

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 import unlift
-from conftest import maps
 
 pytest.importorskip("pyarrow")
 pyspark = pytest.importorskip("pyspark")
@@ -40,6 +39,15 @@ def spark():
     session.stop()
 
 
+def tasks(folder: pathlib.Path, n_points: int) -> list[tuple[str, float]]:
+    found = []
+    for at in range(N_MAPS):
+        path = folder / f"map{at}.npy"
+        np.save(path, np.random.default_rng(at).uniform(0, 4, (n_points, 3)))
+        found.append((str(path), 1.0))
+    return found
+
+
 def executors() -> list[int]:
     found = subprocess.run(["pgrep", "-f", "CoarseGrainedExecutorBackend"], capture_output=True, text=True).stdout
     return [int(line) for line in found.split()]
@@ -62,7 +70,7 @@ def on(spark, rows: list[tuple[str, float]]) -> list[dict]:
 
 
 def test_a_cluster_gives_the_rows_of_one_machine(spark, tmp_path: pathlib.Path):
-    rows = [(path, 1.0) for path in [*maps(tmp_path, N_MAPS), str(tmp_path / "missing.ply")]]
+    rows = [*tasks(tmp_path, 300), (str(tmp_path / "missing.ply"), 1.0)]
     assert on(spark, rows) == sorted(alone(rows), key=lambda row: row["item"])
 
 

@@ -58,10 +58,10 @@ fn break_even_takes_the_strongest_attack_at_every_ratio() {
         row.blind_percent.values_mut().for_each(|percent| *percent = 0.0);
     }
     let of = |rows: &[Row], scheme: &str, solver: &str| {
-        let all = break_even(&plan, rows);
-        assert_eq!(all.len(), 2 * 3);
-        let of = all.iter().find(|b| (&*b.scheme, &*b.solver) == (scheme, solver)).unwrap();
-        (of.inlier_ratio, of.bound)
+        let found = break_even(&plan, rows);
+        assert_eq!(found.len(), 2 * 3);
+        let it = found.iter().find(|b| (&*b.scheme, &*b.solver) == (scheme, solver)).unwrap();
+        (it.inlier_ratio, it.bound)
     };
     assert_eq!(of(&rows, "olc", "strongest").0, 0.1, "half comes back at the lowest ratio");
     // No ratio is interpolated over the wide gap below 0.5.
@@ -74,8 +74,10 @@ fn break_even_takes_the_strongest_attack_at_every_ratio() {
         assert_eq!(of(&rows, scheme, "strongest"), (0.1, Bound::BelowTested));
         assert_eq!(of(&rows, scheme, "joint"), (0.5, Bound::AboveTested));
     }
-    plan.solvers = Builtin::list(&OURS);
+    plan.solvers = Builtin::list(&[Builtin::Joint]);
     rows.retain(|row| row.solver == "joint");
+    rows.iter_mut()
+        .for_each(|row| row.blind_percent.values_mut().for_each(|percent| *percent = 0.0));
     let alone = break_even(&plan, &rows);
     assert!(alone.iter().all(|b| b.solver == "joint"), "one attack has no strongest");
 }
@@ -102,8 +104,9 @@ fn a_scheme_that_a_map_does_not_allow_is_told_and_the_audit_goes_on() {
 
     plan.schemes.retain(|scheme| scheme.name() == "ppl+");
     let error = run(&flat(400), None, &plan, &mut Silent).unwrap_err().to_string();
-    assert!(error.starts_with("schemes: expected one that can be applied to this map"), "{error}");
-    assert!(error.contains("found none: ppl+: k: expected"), "{error}");
+    let begin =
+        "schemes: expected one that can be applied to this map, found none: ppl+: k: expected";
+    assert!(error.starts_with(begin), "{error}");
 }
 
 #[test]
@@ -116,7 +119,8 @@ fn a_source_without_lists_for_a_scheme_costs_its_rows_alone() {
     assert_eq!((&*missing.scheme, missing.neighbors.as_deref()), ("plane", Some("geometric")));
     assert!(missing.reason.ends_with("found planes"), "{}", missing.reason);
     let of = |row: &Row| format!("{} {} {}", row.scheme, row.neighbors, row.solver);
-    let expected = ["olc oracle joint", "olc geometric joint", "plane oracle joint"];
+    let expected = ["olc oracle", "olc geometric", "plane oracle"];
+    let expected = expected.iter().flat_map(|by| OURS.map(|of| format!("{by} {}", of.name())));
     assert!(outcome.rows.iter().map(of).eq(expected));
 }
 
@@ -210,8 +214,9 @@ fn a_solver_of_ones_own_has_rows_and_loses_those_that_it_fails_on() {
     let mut plan = plan(&["olc", "plane"], &[0.5]);
     plan.solvers = vec![Arc::new(AtFoot("foot")), Arc::new(Builtin::Joint)];
     let outcome = audit(&room(400), &plan);
-    let rows = outcome.rows.iter().map(|row| [&*row.scheme, &*row.solver]);
-    assert!(rows.eq([["olc", "foot"], ["olc", "joint"], ["plane", "joint"]]));
+    let rows: Vec<[&str; 2]> =
+        outcome.rows.iter().map(|row| [&*row.scheme, &*row.solver]).collect();
+    assert_eq!(rows, [["olc", "foot"], ["olc", "joint"], ["plane", "joint"]]);
     assert_eq!(outcome.rows[0].sure_unknown, Some(Unknown::OtherSolver.reason().to_owned()));
     let [missing] = &outcome.not_audited[..] else { panic!("{:?}", outcome.not_audited) };
     assert_eq!((&*missing.scheme, missing.neighbors.as_deref()), ("plane", Some("oracle")));
