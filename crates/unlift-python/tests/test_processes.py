@@ -1,7 +1,6 @@
 """Processes: forked children compute, and an interrupt ends the interpreter without a crash."""
 
 import os
-import pathlib
 import signal
 import subprocess
 import sys
