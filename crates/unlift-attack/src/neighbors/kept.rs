@@ -1,7 +1,7 @@
 //! Lists for several maps that release the same descriptors, each in its own order.
 
 use super::Neighborhoods;
-use super::rows::{Rows, by_content};
+use super::rows::{Ranked, Rows, by_content};
 use crate::descriptors::Values;
 use crate::released::Released;
 use crate::{About, Descriptors, RecordId};
@@ -53,9 +53,6 @@ impl KeptLists {
         Some(lists.with_about(About { map: Some(released.fingerprint()), ..self.lists.about() }))
     }
 }
-
-/// Partners of a row, best first.
-pub(super) type Ranked = Vec<(f32, u32)>;
 
 /// Partners of the rows of a map by its descriptors alone: as if every row were a record.
 #[derive(Clone, Debug)]

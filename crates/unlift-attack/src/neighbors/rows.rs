@@ -5,11 +5,13 @@ use std::borrow::Cow;
 use rayon::prelude::*;
 
 use super::Neighborhoods;
-use super::kept::Ranked;
 use super::kind::comparable;
 use crate::descriptors::Values;
 use crate::released::Released;
 use crate::{Descriptors, Error, RecordId, RowOrder};
+
+/// Partners of a row, best first.
+pub(super) type Ranked = Vec<(f32, u32)>;
 
 fn records_of(slots: &[u32], slots_per_record: usize) -> Vec<u32> {
     slots.iter().map(|&slot| slot / slots_per_record as u32).collect()

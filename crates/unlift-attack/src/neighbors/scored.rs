@@ -11,9 +11,9 @@ use std::collections::{BinaryHeap, HashMap};
 use rayon::prelude::*;
 
 use super::compare::{Best, KeptPairs, MOST_ROWS, higher_first, search};
-use super::kept::{Ranked, Rankings};
+use super::kept::Rankings;
 use super::overlap::Patches;
-use super::rows::Rows;
+use super::rows::{Ranked, Rows};
 use super::similarity::Cosine;
 use super::walk::CANDIDATES;
 use super::{Neighborhoods, overlap, walk};

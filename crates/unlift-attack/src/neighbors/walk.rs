@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::Neighborhoods;
 use super::compare::{Best, Found, KeptPairs, Likeness, MOST_ROWS, higher_first, search};
-use super::kept::Ranked;
+use super::rows::Ranked;
 use super::rows::Rows;
 use crate::Error;
 use crate::released::Released;

@@ -1,18 +1,18 @@
 //! The attacks of this crate, from released records and lists to recovered points: the steps in their order.
 
-use crate::Error;
-use crate::RowOrder;
+use crate::compiled::Both;
 use crate::density::tomography;
-use crate::neighbors::Neighborhoods;
+use crate::neighbors::{Geometric, Neighborhoods, geometric_by};
 use crate::recover::baselines::density::published;
 use crate::recover::baselines::ransac;
 use crate::recover::map::{CandidateFamily, Family, Graph, LineFamily, PlaneFamily};
 use crate::recover::problem::Problem;
 use crate::recover::ranking;
-use crate::recover::result::{Estimate, Recovered};
-use crate::recover::solver::{Builtin, Delta, RecoverOptions};
-use crate::recover::{anchors, beliefs, confidence, consensus, delta, exact, joint, records_alone};
+use crate::recover::result::{Estimate, Recovered, Unknown};
+use crate::recover::solver::{Builtin, Delta, RecoverOptions, Solver};
+use crate::recover::{anchors, beliefs, confidence, consensus, delta, exact, joint, peaks};
 use crate::released::{Obfuscation, Released};
+use crate::{About, Error, RowOrder};
 
 /// Number of joint recoveries from known positions, each after the known ones are put back. With eight instead of three, `dcl2d` on
 /// RedKitchen gains less than a point.
@@ -22,15 +22,93 @@ const ROUNDS: usize = 3;
 const LEAST_EVIDENCE: f64 = 1.5;
 
 /// An attack by one of our solvers.
-pub(super) struct Attack<'a, const D: usize> {
-    pub(super) released: &'a Released<D>,
-    pub(super) lists: &'a Neighborhoods,
-    pub(super) options: RecoverOptions,
-    pub(super) solver: Builtin,
+struct Attack<'a, const D: usize> {
+    released: &'a Released<D>,
+    lists: &'a Neighborhoods,
+    options: RecoverOptions,
+    solver: Builtin,
     /// Whether [`Builtin::Joint`] ends after its first step, `consensus`.
-    pub(super) only_starts: bool,
+    only_starts: bool,
     /// Estimates that stay as they are, per slot; empty if none is known.
-    pub(super) known: Vec<Option<Estimate<D>>>,
+    known: Vec<Option<Estimate<D>>>,
+}
+
+impl<const D: usize> Solver<D> for Builtin {
+    fn name(&self) -> &str {
+        Self::name(self)
+    }
+
+    fn recover(
+        &self,
+        released: &Released<D>,
+        lists: &Neighborhoods,
+        options: &RecoverOptions,
+    ) -> Result<Recovered<D>, Error> {
+        let solve: Solve<D> = SOLVE.of()?;
+        solve(*self, released, lists, options)
+    }
+
+    fn reads_lists(&self) -> bool {
+        Self::FROM_LISTS.contains(self)
+    }
+
+    fn builtin(&self) -> Option<Builtin> {
+        Some(*self)
+    }
+}
+
+type Solve<const D: usize> =
+    fn(Builtin, &Released<D>, &Neighborhoods, &RecoverOptions) -> Result<Recovered<D>, Error>;
+
+static SOLVE: Both<Solve<2>, Solve<3>> = Both(solve::<2>, solve::<3>);
+
+fn solve<const D: usize>(
+    solver: Builtin,
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    options: &RecoverOptions,
+) -> Result<Recovered<D>, Error> {
+    check(released, lists, options)?;
+    Attack::new(released, lists, options, solver).run()
+}
+
+/// Runs our attacks on the records alone; returns the name and the result of each. They recover nothing from a map of planes, or
+/// of rays from one center.
+///
+/// They read the whole map: a sample of its records is a sparser map, of which less is recovered, so that the baseline would be too low.
+/// The published density attack runs on rays only: on lines it recovered less than tomography on every map and at every
+/// threshold (docs/benchmarks.md), and took four times as long.
+///
+/// # Errors
+/// When `options` are out of range.
+pub fn records_alone<const D: usize>(
+    released: &Released<D>,
+    options: &RecoverOptions,
+) -> Result<Vec<(&'static str, Recovered<D>)>, Error> {
+    options.check()?;
+    let none = Neighborhoods::unchecked(vec![0; released.n_slots() + 1], Vec::new());
+    // For paired lines, the order of the two points is unknown.
+    let none = none.with_about(About { order: RowOrder::Either, ..About::default() });
+    let mut attacks = Vec::new();
+    if matches!(released.obfuscation(), Obfuscation::Rays(_)) {
+        attacks.push((
+            Builtin::Density.name(),
+            peaks::at_peaks(released, &none, &published(released))?,
+        ));
+    }
+    let peaks = tomography(released);
+    attacks.push((Builtin::Tomography.name(), peaks::at_peaks(released, &none, &peaks)?));
+    // Planes and rays from one center have no geometric lists.
+    if let Ok(lists) = geometric_by(released, Geometric::K, &peaks) {
+        let options = RecoverOptions { confidence: false, ..*options };
+        let joint = Attack::new(released, &lists, &options, Builtin::Joint).run()?;
+        // Delta does not need to be learned twice.
+        let options = RecoverOptions { delta: Delta::Fixed(joint.delta()), ..options };
+        let start = Attack::new(released, &lists, &options, Builtin::Joint);
+        attacks.push(("geometric, consensus", Attack { only_starts: true, ..start }.run()?));
+        attacks.push(("geometric, joint", joint));
+    }
+    Ok(attacks)
 }
 
 /// Recovers by [`Builtin::Joint`] from known positions of some slots. Positions that are more likely right than wrong, by
@@ -70,7 +148,7 @@ pub(super) fn check<const D: usize>(
 }
 
 impl<'a, const D: usize> Attack<'a, D> {
-    pub(super) fn new(
+    fn new(
         released: &'a Released<D>,
         lists: &'a Neighborhoods,
         options: &RecoverOptions,
@@ -80,14 +158,12 @@ impl<'a, const D: usize> Attack<'a, D> {
     }
 
     /// Fails when the lists belong to another map.
-    pub(super) fn run(&self) -> Result<Recovered<D>, Error> {
+    fn run(&self) -> Result<Recovered<D>, Error> {
         let Self { released, lists, .. } = *self;
         released.fingerprint().expect(lists.about().map)?;
         match (self.solver, released.obfuscation()) {
-            (Builtin::Density, _) => records_alone::at_peaks(released, lists, &published(released)),
-            (Builtin::Tomography, _) => {
-                records_alone::at_peaks(released, lists, &tomography(released))
-            }
+            (Builtin::Density, _) => peaks::at_peaks(released, lists, &published(released)),
+            (Builtin::Tomography, _) => peaks::at_peaks(released, lists, &tomography(released)),
             (_, Obfuscation::Lines(_) | Obfuscation::Rays(_)) => {
                 self.run_on(&LineFamily::new(released, lists))
             }
@@ -132,7 +208,12 @@ impl<'a, const D: usize> Attack<'a, D> {
             _ => settle(start()),
         };
         let recovered = Recovered::new(released, lists, &estimates, delta)?.with_trials(trials);
-        match confidence::predict(self, graph.as_ref(), &estimates) {
+        let predicted = match &graph {
+            None => Err(Unknown::OtherSolver),
+            Some(_) if !self.options.confidence => Err(Unknown::NotAsked),
+            Some(graph) => confidence::predict(released, lists, graph, &estimates),
+        };
+        match predicted {
             Ok(confidence) => recovered.with_confidence(confidence),
             Err(unknown) => Ok(recovered.without_confidence(unknown)),
         }

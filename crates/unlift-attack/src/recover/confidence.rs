@@ -11,7 +11,6 @@ use crate::geometry::flatness::flatness;
 use crate::geometry::knn::Knn;
 use crate::geometry::vector::median;
 use crate::neighbors::Neighborhoods;
-use crate::recover::attack::Attack;
 use crate::recover::map::{Graph, Side, distance2, known, side};
 use crate::recover::result::{Confidence, Estimate, Unknown};
 use crate::released::{Obfuscation, Released};
@@ -36,18 +35,14 @@ const FOUND: [f32; 5] = [2.494, 0.308, -0.608, -1.07, 1.33];
 /// Weights in the logarithm of the scale, of the logarithms of: all near records; the share of near entries of near slots.
 const SCALE: [f32; 2] = [-0.133, -0.675];
 
-/// Predicts the confidence of every slot that `attack` placed. `graph` is that of joint recovery.
+/// Predicts the confidence of every slot that joint recovery, whose graph is `graph`, placed.
 /// Fails where the model was never fitted or tested.
 pub(super) fn predict<const D: usize>(
-    attack: &Attack<'_, D>,
-    graph: Option<&Graph>,
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    graph: &Graph,
     estimates: &[Estimate<D>],
 ) -> Result<Vec<Confidence>, Unknown> {
-    let Attack { released, lists, options, .. } = attack;
-    let graph = graph.ok_or(Unknown::OtherSolver)?;
-    if !options.confidence {
-        return Err(Unknown::NotAsked);
-    }
     if D == 2 {
         return Err(Unknown::OfImages);
     }

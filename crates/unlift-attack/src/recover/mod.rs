@@ -13,14 +13,13 @@ mod delta;
 mod exact;
 mod joint;
 pub(crate) mod map;
+mod peaks;
 mod problem;
 mod ranking;
-mod records_alone;
 mod result;
 mod solver;
 
-pub use attack::recover_from;
-pub use records_alone::records_alone;
+pub use attack::{records_alone, recover_from};
 pub use result::{Confidence, Estimate, Recovered, Status, Unknown};
 pub use solver::{Builtin, Delta, RecoverOptions, Solver};
 

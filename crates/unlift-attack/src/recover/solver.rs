@@ -3,10 +3,8 @@
 use std::fmt::Debug;
 use std::sync::Arc;
 
-use super::attack::{Attack, check};
 use super::result::Recovered;
 use crate::Error;
-use crate::compiled::Both;
 use crate::neighbors::Neighborhoods;
 use crate::released::Released;
 
@@ -147,45 +145,6 @@ impl Builtin {
     pub fn list<const D: usize>(solvers: &[Self]) -> Vec<Arc<dyn Solver<D>>> {
         solvers.iter().map(|&solver| Arc::new(solver) as Arc<dyn Solver<D>>).collect()
     }
-}
-
-impl<const D: usize> Solver<D> for Builtin {
-    fn name(&self) -> &str {
-        Self::name(self)
-    }
-
-    fn recover(
-        &self,
-        released: &Released<D>,
-        lists: &Neighborhoods,
-        options: &RecoverOptions,
-    ) -> Result<Recovered<D>, Error> {
-        let solve: Solve<D> = SOLVE.of()?;
-        solve(*self, released, lists, options)
-    }
-
-    fn reads_lists(&self) -> bool {
-        Self::FROM_LISTS.contains(self)
-    }
-
-    fn builtin(&self) -> Option<Builtin> {
-        Some(*self)
-    }
-}
-
-type Solve<const D: usize> =
-    fn(Builtin, &Released<D>, &Neighborhoods, &RecoverOptions) -> Result<Recovered<D>, Error>;
-
-static SOLVE: Both<Solve<2>, Solve<3>> = Both(solve::<2>, solve::<3>);
-
-fn solve<const D: usize>(
-    solver: Builtin,
-    released: &Released<D>,
-    lists: &Neighborhoods,
-    options: &RecoverOptions,
-) -> Result<Recovered<D>, Error> {
-    check(released, lists, options)?;
-    Attack::new(released, lists, options, solver).run()
 }
 
 #[cfg(test)]

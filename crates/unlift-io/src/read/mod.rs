@@ -1,5 +1,6 @@
 //! Reads maps in many formats as positions, ids and camera centers.
 
+pub(crate) mod archive;
 mod bundler;
 pub(crate) mod bytes;
 pub mod colmap;
@@ -9,7 +10,7 @@ pub(crate) mod lines;
 mod map_input;
 mod models;
 pub(crate) mod npy;
-pub(crate) mod npz;
+mod npz;
 mod nvm;
 mod ply;
 mod table;

@@ -6,12 +6,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use unlift::Unit;
 use unlift::descriptors::Values;
 
-use super::Kind;
+use super::kind::Kind;
 use super::meta::{KEY, Meta};
 use crate::Error;
 use crate::input::Budget;
+use crate::read::archive::{Archive, ArrayBytes};
 use crate::read::npy::{Header, tuple};
-use crate::read::npz::{Archive, ArrayBytes};
 
 /// Stands for -1, "none", in whole numbers.
 pub(super) const NONE: u32 = u32::MAX;

@@ -10,13 +10,14 @@ use unlift::released::Released;
 use unlift::truth::{Original, Secret};
 
 use super::arrays::Arrays;
+use super::kind::Kind;
 use super::lists::neighborhoods_of;
 use super::meta::{KEY, to_text};
 use super::recovered::recovered_of;
 use super::released::released_of;
 use super::truth::truth_of;
 use super::write::{Written, Zip};
-use super::{Kind, lists, recovered, released, truth};
+use super::{lists, recovered, released, truth};
 use crate::Error;
 use crate::atomic::OutputFile;
 

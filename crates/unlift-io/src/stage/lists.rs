@@ -5,8 +5,8 @@ use std::path::Path;
 use unlift::RecordId;
 use unlift::neighbors::Neighborhoods;
 
-use super::Kind;
 use super::arrays::{Arrays, Class, NONE};
+use super::kind::Kind;
 use super::write::{Written, write_file};
 use crate::Error;
 use crate::atomic::Access;

@@ -5,12 +5,16 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 use unlift::{About, Fingerprint, RowOrder, Unit};
 
-use super::Kind;
-use super::released::{EPSILON, OF_BYTES};
+use super::kind::Kind;
 use crate::Error;
 
 /// The name of the array.
 pub(super) const KEY: &str = "unlift";
+
+/// The privacy budget of words, in the metadata.
+pub(super) const EPSILON: &str = "epsilon";
+/// Whether protected descriptors were bytes, in the metadata.
+pub(super) const OF_BYTES: &str = "of_bytes";
 
 /// The version that is written, and the only one that is read.
 pub(super) const VERSION: u64 = 1;

@@ -10,6 +10,7 @@
 
 mod arrays;
 mod images;
+mod kind;
 mod lists;
 mod meta;
 mod recovered;
@@ -17,91 +18,18 @@ mod released;
 mod truth;
 mod write;
 
-use std::fmt;
 use std::path::Path;
 
 use crate::Error;
-use crate::read::npz::Archive;
+use crate::read::archive::Archive;
 use arrays::Arrays;
 
 pub use images::{ImageFile, ImageRows, ImageWriter};
+pub use kind::Kind;
 pub use lists::{read_neighborhoods, read_point_neighborhoods, write_neighborhoods};
 pub use recovered::{read_recovered, read_recovered_in, write_recovered};
 pub use released::{published_positions, read_released, scheme_name, write_released};
 pub use truth::{read_truth, write_truth};
-
-/// The content of a stage file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// An obfuscated map: the attacker's side.
-    Released,
-    /// Originals and the secret of an obfuscation: the owner's side.
-    Truth,
-    /// Lists of records, one per slot.
-    Neighborhoods,
-    /// Lists of original points, one per point.
-    PointNeighborhoods,
-    /// Recovered points, one per slot.
-    Recovered,
-}
-
-impl Kind {
-    /// All kinds.
-    pub const ALL: [Kind; 5] = [
-        Self::Released,
-        Self::Truth,
-        Self::Neighborhoods,
-        Self::PointNeighborhoods,
-        Self::Recovered,
-    ];
-
-    /// The name used in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Released => "released",
-            Self::Truth => "truth",
-            Self::Neighborhoods => "neighborhoods",
-            Self::PointNeighborhoods => "point_neighborhoods",
-            Self::Recovered => "recovered",
-        }
-    }
-
-    /// Returns the kind with the name `name`, if there is one.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.name() == name)
-    }
-
-    /// The arrays that a file of this kind may have, besides the metadata.
-    fn arrays(self) -> &'static [&'static str] {
-        match self {
-            Self::Released => &released::ARRAYS,
-            Self::Truth => &truth::ARRAYS,
-            Self::Neighborhoods => &["records", "scores"],
-            Self::PointNeighborhoods => &["neighbors", "scores"],
-            Self::Recovered => &recovered::ARRAYS,
-        }
-    }
-
-    /// Returns the kind that alone may have such arrays.
-    fn of_arrays<'a>(mut names: impl Iterator<Item = &'a str>) -> Option<Self> {
-        names.find_map(|name| {
-            let mut kinds = Self::ALL.into_iter().filter(|kind| kind.arrays().contains(&name));
-            kinds.next().filter(|_| kinds.next().is_none())
-        })
-    }
-}
-
-impl fmt::Display for Kind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Released => "a released map",
-            Self::Truth => "a truth file",
-            Self::Neighborhoods => "neighborhoods of slots",
-            Self::PointNeighborhoods => "neighborhoods of points",
-            Self::Recovered => "a file of recovered points",
-        })
-    }
-}
 
 /// Returns the kind of the stage file `path`, by its metadata or its arrays.
 ///

@@ -5,24 +5,12 @@ use std::path::Path;
 use unlift::Unit;
 use unlift::recover::{Confidence, Estimate, Recovered, Status, Unknown};
 
-use super::Kind;
 use super::arrays::{Arrays, Class, NONE};
+use super::kind::Kind;
 use super::meta::WHY_UNKNOWN;
 use super::write::{Written, write_file};
 use crate::Error;
 use crate::atomic::Access;
-
-pub(super) const ARRAYS: [&str; 9] = [
-    "position",
-    "status",
-    "support",
-    "evidence",
-    "found",
-    "error_scale",
-    "axis",
-    "descriptor_row",
-    "origin",
-];
 
 /// Writes recovered points, one row per slot. Positions are in the map's frame (the origin is
 /// added).

@@ -9,39 +9,12 @@ use unlift::protected::Rule;
 use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
 use unlift::{Descriptors, ProtectedDescriptors};
 
-use super::Kind;
 use super::arrays::Arrays;
+use super::kind::{Kind, PUBLIC, SUBSPACE, WORDS};
+use super::meta::{EPSILON, OF_BYTES};
 use super::write::{Written, write_file};
 use crate::Error;
 use crate::atomic::Access;
-
-pub(super) const ARRAYS: [&str; 14] = [
-    "foot",
-    "direction",
-    "center",
-    "centers",
-    "regions",
-    "axis",
-    "offset",
-    "position",
-    "descriptor",
-    SUBSPACE,
-    WORDS,
-    PUBLIC,
-    "origin",
-    "bounds",
-];
-
-/// The foot and the directions of each descriptor's subspace, in place of `descriptor`.
-const SUBSPACE: &str = "descriptor_subspace";
-/// The numbers of words of each descriptor, in place of `descriptor`.
-const WORDS: &str = "descriptor_words";
-/// The descriptors that owner and attacker know.
-const PUBLIC: &str = "public_descriptor";
-/// The privacy budget of words, in the metadata.
-pub(super) const EPSILON: &str = "epsilon";
-/// Whether protected descriptors were bytes, in the metadata.
-pub(super) const OF_BYTES: &str = "of_bytes";
 
 /// The names of the families, and the array that only one of them has.
 const FAMILIES: [(&str, &str); 4] = [

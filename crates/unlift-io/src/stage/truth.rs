@@ -5,14 +5,11 @@ use std::path::Path;
 use unlift::truth::{DropReason, Dropped, Original, Secret};
 use unlift::{OriginalId, PointSet};
 
-use super::Kind;
 use super::arrays::{Arrays, NONE};
+use super::kind::Kind;
 use super::write::{Written, write_file};
 use crate::Error;
 use crate::atomic::Access;
-
-pub(super) const ARRAYS: [&str; 5] =
-    ["position", "slot", "dropped", "swapped_axis", "descriptor_row"];
 
 /// Writes the ground truth of an obfuscation, one row per original point.
 ///

@@ -11,7 +11,7 @@ use unlift::About;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, System, ZipWriter};
 
-use super::Kind;
+use super::kind::Kind;
 use super::meta::{KEY, VERSION, to_text};
 use crate::Error;
 use crate::atomic::{self, Access};

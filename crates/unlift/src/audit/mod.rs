@@ -23,10 +23,9 @@ pub use clock::{RowSeconds, Seconds};
 pub use many::{Item, Watcher, run_many};
 pub use missing::NotAudited;
 pub use observer::{Cell, Counts, Measure, Observer, Silent};
-pub use plan::{NeighborsBy, Plan, PointNeighbors, Threshold, Variant};
+pub use plan::{NeighborsBy, Plan, PointNeighbors, Variant};
 pub use row::{
-    Alone, ByReason, ByThreshold, Distinct, Intervals, PERCENTILES, Parts, ReliabilityBin, Row,
-    Spread, measure,
+    Alone, ByReason, Distinct, Intervals, PERCENTILES, Parts, ReliabilityBin, Row, Spread, measure,
 };
 pub use run::{Outcome, run, run_released, scheme_called};
-pub use share::{Interval, Share, Shares, WithInterval};
+pub use share::{ByThreshold, Interval, Share, Shares, Threshold, WithInterval};

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::observer::Measure;
+use super::share::Threshold;
 use crate::neighbors::oracle::Noise;
 use crate::neighbors::{Needs, Source, lacks_descriptors};
 use crate::obfuscate::{SCHEMES, Scheme, SchemeOptions};
@@ -274,30 +275,6 @@ fn check_names<'a>(what: &str, names: impl Iterator<Item = &'a str>) -> Result<(
         }
     }
     Ok(())
-}
-
-/// An error below which a point counts as recovered.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Threshold {
-    /// Text as the user typed it; the key in reports.
-    pub label: String,
-    /// Value in the unit of the points.
-    pub value: f64,
-}
-
-impl Threshold {
-    /// Parses a positive number and keeps its text.
-    ///
-    /// # Errors
-    /// When `text` is not a positive number.
-    pub fn parse(text: &str) -> Result<Self, Error> {
-        match text.trim().parse::<f64>() {
-            Ok(value) if value.is_finite() && value > 0.0 => {
-                Ok(Self { label: text.trim().to_owned(), value })
-            }
-            _ => Err(Error::new("threshold", "a positive number", format!("{text:?}"))),
-        }
-    }
 }
 
 /// Returns the key of the image `name` in a set with the key `key`.

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use indexmap::IndexMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use super::plan::Threshold;
 use super::share::{
-    Interval, Share, Shares, WithInterval, intervals, over_repeats, percents, shares,
+    ByThreshold, Interval, Share, Shares, Threshold, WithInterval, intervals, over_repeats,
+    percents, shares,
 };
 use crate::evaluate::{Accuracy, Bin, Reliability, evaluate, reliability};
 use crate::recover::Recovered;
@@ -16,9 +16,6 @@ use crate::{Error, Unit};
 
 /// Percentiles of the error in a row.
 pub const PERCENTILES: [f64; 5] = [50.0, 75.0, 90.0, 95.0, 99.0];
-
-/// Percentages by label of the threshold, in the order of the plan.
-pub type ByThreshold = IndexMap<String, f64>;
 
 /// Numbers of points by reason.
 pub type ByReason = BTreeMap<String, usize>;

@@ -1,0 +1,53 @@
+//! Points at the peaks of densities that the records alone give.
+
+use rayon::prelude::*;
+
+use crate::Error;
+use crate::density::{Peak, Peaks};
+use crate::neighbors::Neighborhoods;
+use crate::recover::map::rows_of;
+use crate::recover::result::{Estimate, Recovered, Status, Unknown, stored_support};
+use crate::released::Released;
+
+/// Returns the points at `peaks`.
+///
+/// Lists do not change positions. For paired lines they decide which of the two positions belongs to which slot: the cheaper
+/// assignment wins, with the distances to the listed records (Eq. (4)) as cost. With empty lists the order is that along the line.
+pub(super) fn at_peaks<const D: usize>(
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    peaks: &Peaks,
+) -> Result<Recovered<D>, Error> {
+    let rows = rows_of(released, None);
+    // Delta is the resolution of the peaks.
+    let delta = if peaks.resolution > 0.0 { peaks.resolution } else { 1.0 };
+    let peak = |slot: usize| match peaks.of[slot] {
+        // These attacks return positions in three dimensions only.
+        Some(Peak { position, axis, evidence }) => {
+            Estimate::at(std::array::from_fn(|c| position[c % 3]), 0, axis.into(), evidence)
+        }
+        None => Estimate::lost(Status::NoSupport),
+    };
+    let distances = |slot: usize, x: [f32; D]| {
+        let rows = &rows;
+        lists.of(slot).iter().map(move |record| {
+            let row = &rows[record.index()];
+            row.distance2(&x, row.along(&x)).sqrt()
+        })
+    };
+    let cost = |at: usize, slot: usize| distances(slot, peak(at).position).sum::<f32>();
+    let place = |slot: usize| {
+        let (a, b) = (slot & !1, slot | 1);
+        let is_crossed =
+            released.slots_per_record() == 2 && cost(a, a) + cost(b, b) > cost(b, a) + cost(a, b);
+        let mut estimate = peak(if is_crossed { slot ^ 1 } else { slot });
+        if !rows.is_empty() {
+            let near = distances(slot, estimate.position).filter(|&d| d <= delta as f32);
+            estimate.support = stored_support(near.count() as u32);
+        }
+        estimate
+    };
+    let estimates: Vec<_> = (0..released.n_slots()).into_par_iter().map(place).collect();
+    let recovered = Recovered::new(released, lists, &estimates, delta)?;
+    Ok(recovered.without_confidence(Unknown::OtherSolver))
+}

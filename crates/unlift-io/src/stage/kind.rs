@@ -1,0 +1,112 @@
+//! The kinds of stage files, and the arrays that each may have.
+
+use std::fmt;
+
+/// The foot and the directions of each descriptor's subspace, in place of `descriptor`.
+pub(super) const SUBSPACE: &str = "descriptor_subspace";
+/// The numbers of words of each descriptor, in place of `descriptor`.
+pub(super) const WORDS: &str = "descriptor_words";
+/// The descriptors that owner and attacker know.
+pub(super) const PUBLIC: &str = "public_descriptor";
+
+const RELEASED: [&str; 14] = [
+    "foot",
+    "direction",
+    "center",
+    "centers",
+    "regions",
+    "axis",
+    "offset",
+    "position",
+    "descriptor",
+    SUBSPACE,
+    WORDS,
+    PUBLIC,
+    "origin",
+    "bounds",
+];
+const TRUTH: [&str; 5] = ["position", "slot", "dropped", "swapped_axis", "descriptor_row"];
+const RECOVERED: [&str; 9] = [
+    "position",
+    "status",
+    "support",
+    "evidence",
+    "found",
+    "error_scale",
+    "axis",
+    "descriptor_row",
+    "origin",
+];
+
+/// The content of a stage file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// An obfuscated map: the attacker's side.
+    Released,
+    /// Originals and the secret of an obfuscation: the owner's side.
+    Truth,
+    /// Lists of records, one per slot.
+    Neighborhoods,
+    /// Lists of original points, one per point.
+    PointNeighborhoods,
+    /// Recovered points, one per slot.
+    Recovered,
+}
+
+impl Kind {
+    /// All kinds.
+    pub const ALL: [Kind; 5] = [
+        Self::Released,
+        Self::Truth,
+        Self::Neighborhoods,
+        Self::PointNeighborhoods,
+        Self::Recovered,
+    ];
+
+    /// The name used in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Released => "released",
+            Self::Truth => "truth",
+            Self::Neighborhoods => "neighborhoods",
+            Self::PointNeighborhoods => "point_neighborhoods",
+            Self::Recovered => "recovered",
+        }
+    }
+
+    /// Returns the kind with the name `name`, if there is one.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+
+    /// The arrays that a file of this kind may have, besides the metadata.
+    pub(super) fn arrays(self) -> &'static [&'static str] {
+        match self {
+            Self::Released => &RELEASED,
+            Self::Truth => &TRUTH,
+            Self::Neighborhoods => &["records", "scores"],
+            Self::PointNeighborhoods => &["neighbors", "scores"],
+            Self::Recovered => &RECOVERED,
+        }
+    }
+
+    /// Returns the kind that alone may have such arrays.
+    pub(super) fn of_arrays<'a>(mut names: impl Iterator<Item = &'a str>) -> Option<Self> {
+        names.find_map(|name| {
+            let mut kinds = Self::ALL.into_iter().filter(|kind| kind.arrays().contains(&name));
+            kinds.next().filter(|_| kinds.next().is_none())
+        })
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Released => "a released map",
+            Self::Truth => "a truth file",
+            Self::Neighborhoods => "neighborhoods of slots",
+            Self::PointNeighborhoods => "neighborhoods of points",
+            Self::Recovered => "a file of recovered points",
+        })
+    }
+}
