@@ -107,11 +107,14 @@ impl Accepted {
     /// # Errors
     /// If there is no reason, or no such day: what was expected.
     pub fn parse(text: &str) -> Result<Self, &'static str> {
+        Self::on(Timestamp::now().to_zoned(TimeZone::UTC).date(), text)
+    }
+
+    fn on(today: Date, text: &str) -> Result<Self, &'static str> {
         const EXPECTED: &str = "\"REASON, until YYYY-MM-DD\"";
         let (reason, until) = text.rsplit_once(", until ").ok_or(EXPECTED)?;
         let day: Date = until.trim().parse().map_err(|_| EXPECTED)?;
         let reason = Some(reason.trim()).filter(|reason| !reason.is_empty()).ok_or(EXPECTED)?;
-        let today = Timestamp::now().to_zoned(TimeZone::UTC).date();
         Ok(Self { reason: reason.to_owned(), until: day.to_string(), past: day < today })
     }
 }
@@ -420,4 +423,23 @@ pub fn page(comparison: &Comparison, old: &Document, new: &Document) -> Result<S
         "thresholds": thresholds.collect::<IndexMap<_, _>>(),
     });
     templates::render(&[("compare.html", include_str!("../template/compare.html"))], &page)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Accepted;
+
+    #[test]
+    fn an_accepted_difference_holds_until_the_end_of_its_day() {
+        let past = |text| {
+            let today = "2026-11-29".parse().expect("a day");
+            Accepted::on(today, text).map(|accepted| accepted.past)
+        };
+        assert_eq!(past("rooms, 2 of them, until 2026-11-29"), Ok(false));
+        assert_eq!(past("rooms, until 2026-11-28"), Ok(true));
+        for text in ["rooms", ", until 2026-11-29", "rooms, until 2026-13-01", "rooms, until soon"]
+        {
+            assert!(past(text).is_err(), "{text}");
+        }
+    }
 }

@@ -53,8 +53,13 @@ fn bearings_are_audited_and_painted() {
     let audit = "audit map room.csv --scale 1 --descriptors d.bin --neighbors similarity";
     let (stdout, _) = place.ends(&format!("{audit} --schemes sphere --out s"), 0);
     assert!(stdout.contains("bearing"), "{stdout}");
-    let obfuscate = "obfuscate room.csv --scale 1 --descriptors d.bin --schemes sphere";
-    place.ends(&format!("{obfuscate} --out sphere"), 0);
+    let obfuscate = "obfuscate room.csv --scale 1 --descriptors d.bin";
+    place.ends(&format!("{obfuscate} --schemes sphere --out sphere"), 0);
     let (stdout, _) = place.ends("invert sphere/released.npz --out views", 0);
     assert_eq!(stdout, "6 pictures, in views\n");
+    place.ends(&format!("{obfuscate} --schemes olc --out olc"), 0);
+    let stderr = place.complains("invert olc/released.npz --out none", 2);
+    assert!(stderr.contains("RECOVERED: expected"), "{stderr}");
+    let stderr = place.complains(&format!("{audit} --protect-descriptors subspace:0"), 2);
+    assert!(stderr.contains("--protect-descriptors"), "{stderr}");
 }

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 
 use image::RgbImage;
 use serde_json::Value;
@@ -123,6 +123,12 @@ impl Place {
         let mut shell = Command::new("sh");
         shell.args(["-c", line]).env("PATH", std::env::join_paths(path).expect("a path"));
         shell.current_dir(self.0.path()).stdin(Stdio::null()).output().expect("a shell")
+    }
+
+    /// Starts the program without capturing its output.
+    pub fn start(&self, line: &str) -> Child {
+        let mut command = self.program(line.split_whitespace());
+        command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program starts")
     }
 
     /// Runs a line that must end with `code`, and returns stdout and stderr.

@@ -1,5 +1,6 @@
 //! `unlift features`: photos and files in, one complete file out, unusable images named.
 
+use image::GrayImage;
 use unlift_io::features::{FeatureSource, ImageFeatures};
 
 use crate::common::Place;
@@ -51,6 +52,8 @@ fn options_are_those_of_the_extractor() {
     assert_eq!(all(&place, "features.h5")[0].uncertainty_px, Some(2.0));
     assert_eq!(count("--features aliked --min-score 0.05 --max-features 5"), 3 * 5);
     for (line, expected) in [
+        ("photos --max-features 0", "expected a whole number from 1 to 4294967295, found 0"),
+        ("photos --features orb", "expected one of sift, aliked, superpoint, found orb"),
         ("photos --min-score 0.1", "unlift: --min-score: expected with --features aliked, found none"),
         ("features.h5 --max-features 9 --out x.h5", "--max-features: expected with a folder of photos"),
         ("features.h5 --as-stored --out x.h5", "--as-stored: expected with a folder of photos"),
@@ -61,4 +64,17 @@ fn options_are_those_of_the_extractor() {
         let stderr = place.complains(&format!("features {line}"), 2);
         assert!(stderr.contains(expected), "{line}: {stderr}");
     }
+}
+
+#[test]
+fn a_broken_photo_is_one_line_and_the_rest_is_written() {
+    let place = photos();
+    let jpeg = place.bytes("photos/b/c.jpg");
+    place.write("photos/cut.jpg", &jpeg[..jpeg.len() / 2]);
+    place.write("photos/note.jpg", "not a photo");
+    place.write("photos/notes.txt", "passed over");
+    GrayImage::new(40, 40).save(place.path("photos/flat.png")).unwrap();
+    let (stdout, stderr) = place.ends("features photos", 3);
+    assert!(stdout.starts_with("4 images, "), "{stdout}");
+    assert!(stderr.ends_with("unlift: photos: expected 6 images that can be used, found 4\n"));
 }

@@ -15,6 +15,21 @@ fn a_gate_may_name_a_solver_and_a_source_and_decides_the_exit_code() {
     let line = format!("{audit} {held} --gate olc:consensus:0.25<=0 --junit new/gates.xml");
     let (text, _) = place.ends(&line, 1);
     assert!(text.contains("gate olc:consensus:0.25<=0: FAILED"), "{text}");
+    let document = place.json("a/audit.json");
+    for (at, (scheme, solver, source)) in
+        [("ppl", "joint", "oracle"), ("ppl", "", "geometric"), ("olc", "consensus", "")]
+            .into_iter()
+            .enumerate()
+    {
+        let is = |row: &Value, field: &str, name: &str| name.is_empty() || row[field] == name;
+        let of = document["results"].as_array().unwrap().iter().filter(|row| {
+            is(row, "scheme", scheme) && is(row, "solver", solver) && is(row, "neighbors", source)
+        });
+        let shares = of.filter_map(|row| row["recovered_percent"]["0.25"].as_f64());
+        let gate = &document["gates"][at];
+        assert_eq!(gate["found_percent"].as_f64(), Some(shares.fold(0.0, f64::max)), "{gate}");
+        assert_eq!(gate["passed"], at < 2);
+    }
     let junit = place.text("new/gates.xml");
     let suite = "<testsuite name=\"room.csv\" tests=\"3\" failures=\"1\" errors=\"0\"";
     assert!(junit.contains(suite), "{junit}");
@@ -57,4 +72,19 @@ fn no_gate_holds_on_a_scheme_that_the_map_does_not_allow() {
     let (text, stderr) = place.ends("table a/audit.json", 0);
     assert!(text.contains("\n| ppl+ | not audited | not audited |"), "{text}");
     assert!(stderr.starts_with("unlift: note: not audited: ppl+: k: expected"), "{stderr}");
+    let alone = place.complains("audit map flat.csv --schemes ppl+ --out b", 3);
+    let begin =
+        "unlift: flat.csv: schemes: expected one that can be applied to this map, found none";
+    assert!(alone.starts_with(begin) && !place.path("b").exists(), "{alone}");
+}
+
+#[test]
+fn images_that_cannot_be_used_are_an_error_beside_the_gates() {
+    let place = Place::with_photos(&["a.jpg", "b.png"]);
+    place.write("photos/c.png", "no picture");
+    let line = "audit images photos --schemes cp2d --inlier-ratios 1 --k 5 --quiet --out a";
+    place.ends(&format!("{line} --gate cp2d:10<=100 --junit g.xml"), 3);
+    let junit = place.text("g.xml");
+    let unusable = "<error message=\"1 of 3 images could not be used, and are in no figure\"";
+    assert!(junit.contains("failures=\"0\" errors=\"1\"") && junit.contains(unusable), "{junit}");
 }

@@ -3,7 +3,6 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Stdio;
 use std::time::Duration;
 
 use crate::common::Place;
@@ -68,7 +67,7 @@ fn a_killed_run_leaves_the_old_output_and_the_next_one_goes_on() {
     place.ends(&line(1), 0);
     let old: Vec<_> = place.names("x").iter().map(|n| place.bytes(&format!("x/{n}"))).collect();
     for delay in [2, 5, 10, 20, 40, 80] {
-        let mut child = place.program(line(1).split(' ')).stdout(Stdio::null()).spawn().unwrap();
+        let mut child = place.start(&line(1));
         std::thread::sleep(Duration::from_millis(delay));
         child.kill().unwrap();
         child.wait().unwrap();

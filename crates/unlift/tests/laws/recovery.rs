@@ -216,6 +216,7 @@ fn lists_belong_to_a_map() {
     let n = hidden.released.n_slots();
     let next: Vec<Vec<u32>> = (1..=n).map(|next| vec![(next % n) as u32]).collect();
     assert!(error(&lists_of(&next, n, 1)).contains("records below"));
+    assert!(PointSet::try_new(vec![[0.0, f64::NAN]], Unit::Meter).is_err());
 }
 
 /// Regression: where neighbors coincide, estimates differ by rounding only, and a narrower learned

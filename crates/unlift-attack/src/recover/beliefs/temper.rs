@@ -2,7 +2,7 @@
 //!
 //! The lists of a slot say where its point is, in space. Its record says so independently: a wrong place is near the record by chance
 //! only. So the temper is the exponent under which the lists, without the record, predict best where the record passes. Entries that
-//! are wrong together make it small; for the independent errors of the oracle it is 0.4 to 1.
+//! are wrong together make it small; for the independent errors of the oracle it is larger.
 
 use rayon::prelude::*;
 
