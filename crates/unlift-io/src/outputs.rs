@@ -1,12 +1,11 @@
 //! What may be written: kinds of files, which are recognized by their content, and the outputs of a
 //! run, which replace neither its inputs nor files of other kinds.
 
-use std::fs::{self, File};
-use std::io::Read;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::atomic::{Access, OutputFile, make_folders, place_of};
-use crate::{Error, features, stage};
+use crate::{Error, features, input, stage};
 
 /// A PNG chunk: length, the text "Software: unlift", checksum.
 const PICTURE_MARK: &[u8; 27] = b"\0\0\0\x0ftEXtSoftware\0unlift\xfe\xc8\xcb\xd5";
@@ -52,8 +51,8 @@ impl Kind {
             Self::Features => return features::is_ours(path),
             _ => {}
         }
-        let (mut head, (_, max_offset, marks)) = (Vec::new(), self.marks());
-        let _ = File::open(path).and_then(|file| file.take(2048).read_to_end(&mut head));
+        let (_, max_offset, marks) = self.marks();
+        let Ok((head, _)) = input::head(path, 2048) else { return false };
         let is_there = |mark: &&[u8]| {
             head.windows(mark.len()).take(max_offset + 1).any(|bytes| bytes == *mark)
         };

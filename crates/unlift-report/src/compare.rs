@@ -114,19 +114,21 @@ impl Accepted {
         const EXPECTED: &str = "\"REASON, until YYYY-MM-DD\"";
         let (reason, until) = text.rsplit_once(", until ").ok_or(EXPECTED)?;
         let day: Date = until.trim().parse().map_err(|_| EXPECTED)?;
+        // A time is a day, too, to the parser.
+        let day = Some(day).filter(|day| day.to_string() == until.trim()).ok_or(EXPECTED)?;
         let reason = Some(reason.trim()).filter(|reason| !reason.is_empty()).ok_or(EXPECTED)?;
         Ok(Self { reason: reason.to_owned(), until: day.to_string(), past: day < today })
     }
 }
 
-/// The reason why two audits cannot be compared.
+/// A property in which two audits, or an audit and a release, differ.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Incomparable {
     /// `unit`, `thresholds`, `results`, or a property of the input.
     pub place: String,
-    /// The value of the old audit.
+    /// The value of the old audit, or of the release.
     pub expected: String,
-    /// The value of the new audit.
+    /// The value of the new audit, or of the audit of the release.
     pub found: String,
 }
 
@@ -437,8 +439,13 @@ mod tests {
         };
         assert_eq!(past("rooms, 2 of them, until 2026-11-29"), Ok(false));
         assert_eq!(past("rooms, until 2026-11-28"), Ok(true));
-        for text in ["rooms", ", until 2026-11-29", "rooms, until 2026-13-01", "rooms, until soon"]
-        {
+        for text in [
+            "rooms",
+            ", until 2026-11-29",
+            "rooms, until 2026-13-01",
+            "rooms, until soon",
+            "rooms, until 2026-12-01T10:00",
+        ] {
             assert!(past(text).is_err(), "{text}");
         }
     }

@@ -27,6 +27,9 @@ pub fn leak(
     if audited.sha256.is_none() {
         return wrong("input", "the hash of the map", "a share-safe audit, without hashes");
     }
+    if audited.unit_in_map_units.is_none() {
+        return wrong("unit", "a length in units of the map", "none");
+    }
     if let Some(Incomparable { place, expected, found }) = different(audited, input).first() {
         return wrong(place, &format!("{found}, as of this release"), expected);
     }

@@ -31,12 +31,16 @@ pub(crate) fn render(
 }
 
 /// Keeps figures and their units on one line, by non-breaking spaces.
-fn tied(text: Value) -> Value {
+fn tied(text: Value) -> Result<Value, minijinja::Error> {
+    // Filters of strings refuse what is undefined, but a string would lose that it is markup.
+    if text.is_undefined() {
+        return Err(minijinja::ErrorKind::UndefinedError.into());
+    }
     let mut tied = text.to_string();
     for unit in [" %", " cm", " px"] {
         tied = tied.replace(unit, &unit.replace(' ', "\u{a0}"));
     }
-    if text.is_safe() { Value::from_safe_string(tied) } else { tied.into() }
+    Ok(if text.is_safe() { Value::from_safe_string(tied) } else { tied.into() })
 }
 
 /// Escapes text, with parts in back quotes as code.

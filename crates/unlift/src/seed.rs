@@ -78,6 +78,12 @@ impl std::fmt::Debug for Key {
 #[derive(Clone)]
 pub struct StageKey([u8; 32]);
 
+impl std::fmt::Debug for StageKey {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("StageKey(..)")
+    }
+}
+
 impl StageKey {
     /// Returns the random stream of `item`.
     pub fn draws(&self, item: u64) -> Draws<Cipher> {

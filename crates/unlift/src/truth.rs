@@ -196,7 +196,7 @@ impl Secret {
         }
         let paired = descriptor_row.iter().enumerate().any(|(slot, &row)| row as usize != slot);
         let slots_per_record = 1 + usize::from(paired);
-        let secret = Self {
+        Ok(Self {
             hidden,
             swapped_axis,
             descriptor_row,
@@ -204,8 +204,7 @@ impl Secret {
             n_originals,
             slots_per_record,
             map: None,
-        };
-        Ok(secret)
+        })
     }
 
     /// Sets the released map and the number of points per record.
@@ -300,7 +299,7 @@ impl Secret {
     }
 
     /// Returns the number of points that were left out for `reason`.
-    pub fn n_dropped(&self, reason: DropReason) -> usize {
+    pub(crate) fn n_dropped(&self, reason: DropReason) -> usize {
         self.dropped.iter().filter(|dropped| dropped.reason == reason).count()
     }
 }

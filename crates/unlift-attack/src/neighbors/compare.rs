@@ -47,7 +47,7 @@ pub trait Likeness: Sync {
     fn scores(&self, a: &Self::Block, b: &Self::Block, scores: &mut [f32]);
 }
 
-/// Returns the `most` best partners of every row among the rows of other records. The search is exact up to `exact` rows, and reads the
+/// Returns the `n_best` best partners of every row among the rows of other records. The search is exact up to `exact` rows, and reads the
 /// scores of pairs that `kept` has. With more rows, similar rows are first made adjacent, and each block is compared with the blocks that
 /// have the most similar means. Mean and deviation of scores are computed if `counts`.
 ///
@@ -56,7 +56,7 @@ pub trait Likeness: Sync {
 pub fn search<L: Likeness>(
     likeness: &L,
     rows: &mut Rows<'_>,
-    most: usize,
+    n_best: usize,
     counts: bool,
     exact: usize,
     kept: &mut KeptPairs,
@@ -64,16 +64,16 @@ pub fn search<L: Likeness>(
     if rows.len() <= exact {
         let is_like = |all: &Compared| (all.name, all.counts) == (L::NAME, counts);
         let known = kept.compared.iter().find(|all| is_like(all));
-        let mut found = known.and_then(|all| all.found(likeness, rows, most));
+        let mut found = known.and_then(|all| all.found(likeness, rows, n_best));
         // Scores of a map that lacks many points do not replace those of the whole map, which further maps need.
         let is_of_whole = known.is_some_and(|all| all.slots.len() >= rows.slots.len());
         if found.is_none() && !is_of_whole {
-            let all = Compared::new(likeness, rows, 2 * most + SPARE, counts);
-            found = all.found(likeness, rows, most);
+            let all = Compared::new(likeness, rows, 2 * n_best + SPARE, counts);
+            found = all.found(likeness, rows, n_best);
             kept.compared.retain(|all| !is_like(all));
             kept.compared.push(all);
         }
-        let anew = || compare(likeness, rows, most, &all_pairs(rows.len()), counts.then_some(1));
+        let anew = || compare(likeness, rows, n_best, &all_pairs(rows.len()), counts.then_some(1));
         return Ok(found.unwrap_or_else(|| finished::<L>(anew())));
     }
     rows.reorder(alike::order(&rows.descriptors, &rows.slots));
@@ -82,7 +82,7 @@ pub fn search<L: Likeness>(
     let alike = compare(likeness, &of_blocks, PARTNERS, &all_pairs(means.len()), None);
     let every = counts.then(|| rows.len().div_ceil(USUAL));
     let pairs = chosen(&finished::<L>(alike));
-    Ok(finished::<L>(compare(likeness, rows, most, &pairs, every)))
+    Ok(finished::<L>(compare(likeness, rows, n_best, &pairs, every)))
 }
 
 fn finished<L: Likeness>(rows: Vec<Row>) -> Vec<Found> {
@@ -107,21 +107,21 @@ const LACKING: usize = 16;
 pub(super) struct Compared {
     name: &'static str,
     counts: bool,
-    most: usize,
+    n_best: usize,
     descriptors: Descriptors,
     pub(super) slots: Vec<u32>,
     rows: Vec<Row>,
 }
 
 impl Compared {
-    fn new<L: Likeness>(likeness: &L, rows: &Rows<'_>, most: usize, counts: bool) -> Self {
+    fn new<L: Likeness>(likeness: &L, rows: &Rows<'_>, n_best: usize, counts: bool) -> Self {
         let (all, every) = (all_pairs(rows.len()), counts.then_some(1));
-        let mut compared = compare(likeness, &rows.apart(), most, &all, every);
+        let mut compared = compare(likeness, &rows.apart(), n_best, &all, every);
         compared.par_iter_mut().for_each(|row| row.best.sort());
         Self {
             name: L::NAME,
             counts,
-            most,
+            n_best,
             descriptors: rows.descriptors.clone().into_owned(),
             slots: rows.slots.clone(),
             rows: compared,
@@ -131,7 +131,12 @@ impl Compared {
     /// Returns what [`search`] returns for `rows`; `None` if their scores do not follow from those of a few pairs.
     ///
     /// Sums of scores are exact in any order, so what rows must not count can be subtracted.
-    fn found<L: Likeness>(&self, likeness: &L, rows: &Rows<'_>, most: usize) -> Option<Vec<Found>> {
+    fn found<L: Likeness>(
+        &self,
+        likeness: &L,
+        rows: &Rows<'_>,
+        n_best: usize,
+    ) -> Option<Vec<Found>> {
         // Both are ordered by content; of equal rows it does not matter which one is absent.
         let (mut own, mut absent) = (Vec::with_capacity(rows.len()), Vec::new());
         let mut row_of = vec![None; self.slots.len()];
@@ -167,13 +172,13 @@ impl Compared {
             self.uncount(likeness, &absent, &own, &mut found);
         }
         let finish = |(at, mut row): (usize, Row)| {
-            let is_full = row.best.entries.len() == self.most;
+            let is_full = row.best.entries.len() == self.n_best;
             let record = rows.records[at];
             let other = |(score, other): (f32, u32)| Some((score, row_of[other as usize]?));
             let others = row.best.entries.into_iter().filter_map(other);
             let others = others.filter(|&(_, other)| rows.records[other as usize] != record);
-            row.best = Best { entries: others.take(most).collect(), ..Best::new(most) };
-            (!is_full || row.best.entries.len() == most).then(|| row.found(L::STEP))
+            row.best = Best { entries: others.take(n_best).collect(), ..Best::new(n_best) };
+            (!is_full || row.best.entries.len() == n_best).then(|| row.found(L::STEP))
         };
         found.into_par_iter().enumerate().map(finish).collect()
     }
@@ -215,21 +220,21 @@ impl Compared {
     }
 }
 
-/// Compares rows according to `tiles`; each row keeps its `most` best partners of other records. Mean and deviation come from
-/// the pairs with every `every`-th row; for 1, from those of `tiles`.
+/// Compares rows according to `tiles`; each row keeps its `n_best` best partners of other records. Mean and deviation come from
+/// the pairs with every `every`-th row; for 1, from those of `tiles`. Without `every`, neither is computed.
 ///
 /// What a row keeps depends on the set of its scores alone, so the result does not depend on the number of threads.
 fn compare<L: Likeness>(
     likeness: &L,
     rows: &Rows<'_>,
-    most: usize,
+    n_best: usize,
     tiles: &[Tile],
     every: Option<usize>,
 ) -> Vec<Row> {
     let kept: Vec<Mutex<Vec<Row>>> = rows
         .slots
         .chunks(BLOCK)
-        .map(|slots| Mutex::new(slots.iter().map(|_| Row::new(most)).collect()))
+        .map(|slots| Mutex::new(slots.iter().map(|_| Row::new(n_best)).collect()))
         .collect();
     let range = |at: usize| at * BLOCK..rows.len().min((at + 1) * BLOCK);
     let block = |at: usize| likeness.block(&rows.descriptors, &rows.slots[range(at)]);
@@ -264,15 +269,18 @@ fn compare<L: Likeness>(
     for Tile { held, meetings } in tiles {
         let first = held.start;
         let held: Vec<L::Block> = held.clone().into_par_iter().map(block).collect();
-        held.par_iter().enumerate().for_each_init(scratch, |(scores, _), (at, block)| {
-            let a = first + at;
-            for (sample, records) in &usual {
-                likeness.scores(block, sample, scores);
-                for (i, row) in lock(&kept[a]).iter_mut().enumerate() {
-                    row.count(&scores[i * BLOCK..], records, rows.records[a * BLOCK + i], L::STEP);
+        if !usual.is_empty() {
+            held.par_iter().enumerate().for_each_init(scratch, |(scores, _), (at, block)| {
+                let a = first + at;
+                for (sample, records) in &usual {
+                    likeness.scores(block, sample, scores);
+                    for (i, row) in lock(&kept[a]).iter_mut().enumerate() {
+                        let own = rows.records[a * BLOCK + i];
+                        row.count(&scores[i * BLOCK..], records, own, L::STEP);
+                    }
                 }
-            }
-        });
+            });
+        }
         meetings.par_iter().with_max_len(1).for_each_init(
             scratch,
             |(scores, turned), (b, with)| {
@@ -315,8 +323,8 @@ struct Row {
 }
 
 impl Row {
-    fn new(most: usize) -> Self {
-        Self { best: Best::new(most), n: 0, sum: 0.0, squares: 0.0 }
+    fn new(n_best: usize) -> Self {
+        Self { best: Best::new(n_best), n: 0, sum: 0.0, squares: 0.0 }
     }
 
     /// Counts the scores with rows of other records than `own`, in steps.
@@ -371,15 +379,15 @@ pub struct Found {
 /// of entries alone.
 #[derive(Clone, Debug)]
 pub struct Best {
-    most: usize,
+    n_best: usize,
     floor: f32,
     entries: Vec<(f32, u32)>,
 }
 
 impl Best {
-    /// Keeps at most `most` entries.
-    pub fn new(most: usize) -> Self {
-        Self { most, floor: f32::NEG_INFINITY, entries: Vec::new() }
+    /// Keeps at most `n_best` entries.
+    pub fn new(n_best: usize) -> Self {
+        Self { n_best, floor: f32::NEG_INFINITY, entries: Vec::new() }
     }
 
     /// Entries with a lower score can no longer be kept.
@@ -392,19 +400,19 @@ impl Best {
     #[inline]
     pub fn push(&mut self, score: f32, id: u32) {
         self.entries.push((score, id));
-        if self.entries.len() >= 2 * self.most.max(8) {
+        if self.entries.len() >= 2 * self.n_best.max(8) {
             self.shrink();
         }
     }
 
     fn shrink(&mut self) {
-        if self.most == 0 {
+        if self.n_best == 0 {
             self.entries.clear();
             self.floor = f32::INFINITY;
-        } else if self.entries.len() > self.most {
-            self.entries.select_nth_unstable_by(self.most - 1, higher_first);
-            self.entries.truncate(self.most);
-            self.floor = self.entries[self.most - 1].0;
+        } else if self.entries.len() > self.n_best {
+            self.entries.select_nth_unstable_by(self.n_best - 1, higher_first);
+            self.entries.truncate(self.n_best);
+            self.floor = self.entries[self.n_best - 1].0;
         }
     }
 
@@ -492,12 +500,12 @@ mod tests {
     fn found<L: Likeness>(
         likeness: &L,
         descriptors: &Descriptors,
-        most: usize,
+        n_best: usize,
         exact: usize,
     ) -> Vec<Vec<(f32, u32)>> {
         let mut rows = Rows::of_all(descriptors);
         let kept = &mut KeptPairs::default();
-        let found = search(likeness, &mut rows, most, false, exact, kept).unwrap();
+        let found = search(likeness, &mut rows, n_best, false, exact, kept).unwrap();
         let mut by_slot = vec![Vec::new(); rows.len()];
         for (found, &slot) in found.into_iter().zip(&rows.slots) {
             let best = found.best.into_iter();

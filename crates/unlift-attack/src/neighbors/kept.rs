@@ -19,7 +19,7 @@ pub struct KeptLists {
 }
 
 impl KeptLists {
-    /// Keeps the lists of `released`; `None` for records with two slots.
+    /// Keeps the lists of `released`; `None` for records with two slots or without descriptors.
     pub fn new<const D: usize>(released: &Released<D>, lists: &Neighborhoods) -> Option<Self> {
         let descriptors = released.descriptors().filter(|_| released.slots_per_record() == 1)?;
         let (descriptors, slots) = (descriptors.clone(), by_content(descriptors));
@@ -60,7 +60,7 @@ pub(super) struct Rankings {
     pub(super) descriptors: Descriptors,
     pub(super) slots: Vec<u32>,
     /// Largest number of partners per row and set.
-    pub(super) most: usize,
+    pub(super) n_best: usize,
     /// By untrained scores, in standard deviations.
     pub(super) untrained: Vec<Ranked>,
     /// By the mean log probabilities of both rows.
@@ -69,9 +69,9 @@ pub(super) struct Rankings {
 
 impl Rankings {
     /// Returns whether `rows` have these descriptors, in this order.
-    pub(super) fn are_of(&self, rows: &Rows<'_>, most: usize) -> bool {
+    pub(super) fn are_of(&self, rows: &Rows<'_>, n_best: usize) -> bool {
         let mut pairs = self.slots.iter().zip(&rows.slots);
-        (self.most, self.slots.len()) == (most, rows.len())
+        (self.n_best, self.slots.len()) == (n_best, rows.len())
             && pairs.all(|(&a, &b)| are_equal((&self.descriptors, a), (&rows.descriptors, b)))
     }
 }

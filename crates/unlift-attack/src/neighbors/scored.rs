@@ -58,11 +58,11 @@ pub fn scored<const D: usize>(
     let mut rows = Rows::new(released, k)?;
     let patches = Patches::of(&rows.descriptors).ok();
     // Enough for two slots per record, so that rankings do not depend on the scheme.
-    let most = (2 * k + 1).max(CANDIDATES);
-    let known = kept.rankings.iter().position(|rankings| rankings.are_of(&rows, most));
+    let n_best = (2 * k + 1).max(CANDIDATES);
+    let known = kept.rankings.iter().position(|rankings| rankings.are_of(&rows, n_best));
     let rankings = match known {
         Some(at) => kept.rankings.remove(at),
-        None => rankings(&mut rows, most, patches.as_ref(), scores, kept)?,
+        None => rankings(&mut rows, n_best, patches.as_ref(), scores, kept)?,
     };
     let without_own = |ranked: &[Ranked]| -> Vec<Ranked> {
         let record = |row: u32| rows.records[row as usize];
@@ -92,15 +92,15 @@ pub fn scored<const D: usize>(
 /// Ranks the partners of `rows`, which it reorders if there are many.
 fn rankings(
     rows: &mut Rows<'_>,
-    most: usize,
+    n_best: usize,
     patches: Option<&Patches>,
     scores: &Scores<'_>,
     kept: &mut KeptPairs,
 ) -> Result<Rankings, Error> {
     let mut apart = rows.apart();
     let found = match patches {
-        Some(patches) => search(patches, &mut apart, most, true, MOST_ROWS, kept)?,
-        None => search(&Cosine, &mut apart, most, true, MOST_ROWS, kept)?,
+        Some(patches) => search(patches, &mut apart, n_best, true, MOST_ROWS, kept)?,
+        None => search(&Cosine, &mut apart, n_best, true, MOST_ROWS, kept)?,
     };
     let untrained = walk::standardized(&found);
     let n = apart.len();
@@ -119,7 +119,7 @@ fn rankings(
     };
     let found: Vec<Vec<Ranked>> = sets
         .par_iter()
-        .map(|set| within(set, scores(&part(set))?, most))
+        .map(|set| within(set, scores(&part(set))?, n_best))
         .collect::<Result<_, _>>()?;
     let mut trained: Vec<Ranked> = vec![Vec::new(); n];
     for (set, found) in sets.iter().zip(found) {
@@ -134,18 +134,18 @@ fn rankings(
     let trained = both_ways(trained);
     let (slots, descriptors) = (apart.slots.clone(), apart.descriptors.clone().into_owned());
     rows.reorder(slots.clone());
-    Ok(Rankings { descriptors, slots, most, untrained, trained })
+    Ok(Rankings { descriptors, slots, n_best, untrained, trained })
 }
 
-/// Returns the `most` rows with the largest mean probability over two walks.
-fn mixed(a: &[Ranked], b: &[Ranked], most: usize) -> Vec<Ranked> {
+/// Returns the `n_best` rows with the largest mean probability over two walks.
+fn mixed(a: &[Ranked], b: &[Ranked], n_best: usize) -> Vec<Ranked> {
     let mean = |entries: &[(f32, u32)]| {
         let sum: f64 = entries.iter().map(|&(log, _)| libm::exp(f64::from(log)) / 2.0).sum();
         libm::log(sum.max(f64::MIN_POSITIVE)) as f32
     };
     let row = |(a, b): (&Ranked, &Ranked)| {
         let mut ranked = merged([&a[..], b].concat(), mean);
-        ranked.truncate(most);
+        ranked.truncate(n_best);
         ranked
     };
     a.par_iter().zip(b).map(row).collect()
@@ -155,7 +155,7 @@ fn mixed(a: &[Ranked], b: &[Ranked], most: usize) -> Vec<Ranked> {
 fn within(
     Set { rows: set, inner }: &Set,
     mut logs: Vec<f32>,
-    most: usize,
+    n_best: usize,
 ) -> Result<Vec<Ranked>, Error> {
     let n = set.len();
     let wrong = |found: String| Error::new("scores of pairs", format!("{n} x {n} numbers"), found);
@@ -174,7 +174,7 @@ fn within(
         line.iter_mut().for_each(|score| *score -= log);
     }
     let best = |i: usize| {
-        let mut best = Best::new(most);
+        let mut best = Best::new(n_best);
         for j in (0..n).filter(|&j| j != i) {
             best.push((logs[i * n + j] + logs[j * n + i]) / 2.0, set[j]);
         }
@@ -272,7 +272,7 @@ struct Growth<'a> {
     set: Vec<u32>,
     /// Sum of weights per row; negative infinity for rows in the set.
     ties: HashMap<u32, f32>,
-    /// Bits of sums, which are ordered as the sums are because none is negative. Among equal sums, the lower row is first.
+    /// Rows after the bits of their sums, which are ordered as the sums are because none is negative. Among equal sums, the lower row is first.
     heap: BinaryHeap<(u32, Reverse<u32>)>,
 }
 

@@ -6,8 +6,7 @@ use rayon::prelude::*;
 
 use super::Neighborhoods;
 use super::compare::{Best, Found, KeptPairs, Likeness, MOST_ROWS, higher_first, search};
-use super::rows::Ranked;
-use super::rows::Rows;
+use super::rows::{Ranked, Rows};
 use crate::Error;
 use crate::released::Released;
 
@@ -42,8 +41,8 @@ pub fn ranked_by<L: Likeness, const D: usize>(
     kept: &mut KeptPairs,
 ) -> Result<Neighborhoods, Error> {
     let enough = rows.enough_for(k);
-    let most = if how.is_some() { enough.max(CANDIDATES) } else { enough };
-    let found = search(likeness, &mut rows, most, how.is_some(), MOST_ROWS, kept)?;
+    let n_best = if how.is_some() { enough.max(CANDIDATES) } else { enough };
+    let found = search(likeness, &mut rows, n_best, how.is_some(), MOST_ROWS, kept)?;
     let ranked = match how {
         Some(how) => walk(&standardized(&found), &rows.records, enough, how),
         None => found.into_iter().map(|row| row.best).collect(),
@@ -67,23 +66,23 @@ pub fn standardized(found: &[Found]) -> Vec<Ranked> {
     (0..found.len()).into_par_iter().map(row).collect()
 }
 
-/// Ranks at most `most` rows that a walk from each row reaches, followed by the other rows in `ranked` (standardized scores or log
+/// Ranks at most `n_best` rows that a walk from each row reaches, followed by the other rows in `ranked` (standardized scores or log
 /// probabilities, best first). Scores are natural logarithms.
-pub fn walk(ranked: &[Ranked], record_of: &[u32], most: usize, how: Walk) -> Vec<Ranked> {
+pub fn walk(ranked: &[Ranked], record_of: &[u32], n_best: usize, how: Walk) -> Vec<Ranked> {
     let steps = graph(ranked);
     let scratch = || Scratch { at: vec![0.0; ranked.len()], sum: vec![0.0; ranked.len()] };
     (0..ranked.len())
         .into_par_iter()
         .map_init(scratch, |scratch, row| {
             let reached = scratch.reached(&steps, row, how);
-            let mut best = Best::new(most);
+            let mut best = Best::new(n_best);
             for &(other, sum) in &reached {
                 if record_of[other as usize] != record_of[row] {
                     best.push(libm::log(sum) as f32, other);
                 }
             }
             let mut list = best.into_sorted();
-            let missing = most - list.len();
+            let missing = n_best - list.len();
             // Rows that are not reached rank below all others.
             let lowest = list.last().map_or(0.0, |&(score, _)| score);
             let top = ranked[row].first().map_or(0.0, |&(z, _)| z);

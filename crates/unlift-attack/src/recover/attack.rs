@@ -4,7 +4,7 @@ use crate::compiled::Both;
 use crate::density::tomography;
 use crate::neighbors::{Geometric, Neighborhoods, geometric_by};
 use crate::recover::baselines::density::published;
-use crate::recover::baselines::ransac;
+use crate::recover::baselines::ransac::{self, Trials};
 use crate::recover::map::{CandidateFamily, Family, Graph, LineFamily, PlaneFamily};
 use crate::recover::problem::Problem;
 use crate::recover::ranking;
@@ -86,7 +86,7 @@ pub fn records_alone<const D: usize>(
     options: &RecoverOptions,
 ) -> Result<Vec<(&'static str, Recovered<D>)>, Error> {
     options.check()?;
-    let none = Neighborhoods::unchecked(vec![0; released.n_slots() + 1], Vec::new());
+    let none = Neighborhoods::empty(released.n_slots());
     // For paired lines, the order of the two points is unknown.
     let none = none.with_about(About { order: RowOrder::Either, ..About::default() });
     let mut attacks = Vec::new();
@@ -175,7 +175,7 @@ impl<'a, const D: usize> Attack<'a, D> {
     }
 
     /// Runs the attack on records of one family: delta, consensus, [`joint`], exact constraints, confidence.
-    fn run_on<F: Family<D>>(&self, family: &F) -> Result<Recovered<D>, Error> {
+    fn run_on<F: Family<D> + Trials<D>>(&self, family: &F) -> Result<Recovered<D>, Error> {
         let Self { released, lists, options: RecoverOptions { seed, .. }, solver, .. } = *self;
         let is_joint = solver == Builtin::Joint;
         // Joint recovery reads lists in both directions from its start on.
@@ -188,24 +188,25 @@ impl<'a, const D: usize> Attack<'a, D> {
             Delta::Auto => delta::learn(released, family, (used, lists), is_joint, seed),
         };
         let slots: Vec<usize> = (0..lists.n_slots()).collect();
-        let start = || consensus::solve(family, used, delta as f32, &slots);
+        let start = || match family.anchored() {
+            Some(rays) => anchors::start::solve(rays, used),
+            None => consensus::solve(family, used, delta as f32, &slots),
+        };
         let settle = |estimates| exact::settle(released, estimates, delta);
         let mut trials = None;
-        let estimates = match &graph {
-            _ if solver == Builtin::Ransac => {
-                let (estimates, counts) = ransac::solve(family, lists, delta as f32, &slots, seed);
-                trials = Some(counts);
-                estimates
+        let estimates = if solver == Builtin::Ransac {
+            let (estimates, counts) = ransac::solve(family, lists, delta as f32, &slots, seed);
+            trials = Some(counts);
+            estimates
+        } else if let Some(graph) = graph.as_ref().filter(|_| !self.only_starts) {
+            let problem = Problem::new(family, (lists, graph), delta as f32, seed);
+            let mut estimates = settle(joint(&problem, start(), &self.known));
+            for _ in 0..F::RERUNS {
+                estimates = settle(joint(&problem, estimates, &[]));
             }
-            Some(graph) if !self.only_starts => {
-                let problem = Problem::new(family, (lists, graph), delta as f32, seed);
-                let mut estimates = settle(joint(&problem, start(), &self.known));
-                for _ in 0..F::RERUNS {
-                    estimates = settle(joint(&problem, estimates, &[]));
-                }
-                estimates
-            }
-            _ => settle(start()),
+            estimates
+        } else {
+            settle(start())
         };
         let recovered = Recovered::new(released, lists, &estimates, delta)?.with_trials(trials);
         let predicted = match &graph {

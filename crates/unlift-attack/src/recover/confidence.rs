@@ -145,6 +145,11 @@ fn radii<const D: usize>(estimates: &[Estimate<D>]) -> Option<Vec<f32>> {
     Some(radius)
 }
 
+/// Longest mean list, as a fraction of all hidden points, in the maps on which the model was fitted.
+const MAX_LISTED: f64 = 0.01;
+/// A map is flat if its smallest extent is at most this fraction of its largest one.
+const FLAT: f64 = 0.01;
+
 /// Returns why the model does not apply to maps recovered from `lists`, if so.
 ///
 /// In these cases, one tenth to nine tenths of the estimates with a predicted probability of 90 % were right.
@@ -159,12 +164,12 @@ fn unknown<const D: usize>(
         Some(Unknown::RankedLists)
     } else if !lists.about().by_oracle {
         Some(Unknown::GivenLists)
-    } else if mean > 0.01 * n_slots {
+    } else if mean > MAX_LISTED * n_slots {
         Some(Unknown::SmallMap)
     } else if twins(released.obfuscation()) >= 0.5 {
         Some(Unknown::Coincident)
     } else {
-        (flatness(&known(estimates).1) <= 0.01).then_some(Unknown::Flat)
+        (flatness(&known(estimates).1) <= FLAT).then_some(Unknown::Flat)
     }
 }
 

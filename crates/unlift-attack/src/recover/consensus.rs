@@ -1,38 +1,18 @@
 //! Exact consensus: on each slot's own record, the position whose agreement with the listed records is least probable by chance.
 
-use crate::RecordId;
 use crate::neighbors::Neighborhoods;
-use crate::recover::anchors;
-use crate::recover::map::{Columns, Family, Intervals, LineColumns, Sections, Step, solve_slots};
+use crate::recover::map::{Family, Scratch, Step, solve_slots};
 use crate::recover::result::Estimate;
 
-/// Returns the estimates of `slots`. For rays that meet only in their anchors (`dcl2d`), returns those of all slots.
+/// Returns the estimates of `slots`. Rays that meet only in their anchors have none (`anchors::start`).
 pub(crate) fn solve<const D: usize, F: Family<D>>(
     family: &F,
     lists: &Neighborhoods,
     delta: f32,
     slots: &[usize],
 ) -> Vec<Estimate<D>> {
-    match family.anchored() {
-        Some(rays) => anchors::start::solve(rays, lists),
-        None => {
-            let at_delta = family.at_delta(delta);
-            solve_slots(&Consensus { family, lists, delta, at_delta }, slots)
-        }
-    }
-}
-
-/// Buffers of one thread.
-#[derive(Default)]
-pub(crate) struct Scratch<const D: usize> {
-    pub(crate) lines: LineColumns<D>,
-    pub(crate) candidates: Columns<D>,
-    pub(crate) sections: Sections,
-    pub(crate) intervals: Intervals,
-    /// Indices of the sections that vote.
-    pub(crate) voting: Vec<usize>,
-    /// Listed planes by axis, as (offset, record).
-    pub(crate) by_axis: Vec<Vec<(f32, RecordId)>>,
+    let at_delta = family.at_delta(delta);
+    solve_slots(&Consensus { family, lists, delta, at_delta }, slots)
 }
 
 struct Consensus<'a, const D: usize, F: Family<D>> {

@@ -4,7 +4,7 @@ use crate::neighbors::Neighborhoods;
 use crate::recover::map::{Family, Graph, evenly};
 use crate::seed::{Draws, Stage};
 
-/// Number of random edges per sampled slot. They count as many as the edges of the slot, which has about 50 with lists of 50.
+/// Number of random edges per sampled slot. Together they get the weight of all edges of the slot.
 pub(super) const RANDOM: usize = 24;
 
 /// A map as its family of records sees it, its lists, and the sample from which distributions are learned.
@@ -40,7 +40,7 @@ impl<'a, const D: usize, F: Family<D>> Problem<'a, D, F> {
             let random = std::array::from_fn(|_| graph.edge(draws.below(graph.len() as u64)));
             Sampled { slot, random }
         };
-        // With lists of 50 they have about 100,000 edges.
+        // With lists of 50, the sampled slots have about 100,000 edges.
         let sample = evenly(n, 1 << 11).map(row).collect();
         let (at_delta, listed) = (family.at_delta(delta), graph.times_listed());
         Self { family, lists, graph, delta, at_delta, seed, listed, sample }

@@ -278,7 +278,7 @@ struct Context<'a, const D: usize, F: Family<D>> {
     tree: &'a Knn<'a, D>,
     slots: &'a [u32],
     radius: &'a [f32],
-    /// See [`odds`].
+    /// Likelihood ratios of a record that is no entry and of an entry, see [`odds`].
     odds: [f32; 2],
     inlier_ratio: f32,
     iteration: usize,
@@ -365,7 +365,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         let Problem { family, lists, graph, seed, .. } = self.problem;
         let own = lists.of(slot);
         let mut draws = Draws::new(*seed, Stage::Ranking, u64::MAX - slot as u64);
-        for record in own.iter().step_by(own.len().div_ceil(ELSEWHERE).max(1)) {
+        for record in evenly(own.len(), ELSEWHERE).map(|at| own[at]) {
             for center in graph.slots_of(record.index()) {
                 let (x, radius) = (self.estimates[center].position, self.radius[center]);
                 if !family.is_near(slot, &x, radius * radius) {

@@ -16,9 +16,10 @@ use super::tiles::{Tiles, figures};
 use crate::audit::{Audit, Audited};
 use crate::document::{self, Attacked, Tried};
 use crate::doubts::{Spread, check_truth, doubts, follows_places, with_sides};
-use crate::inversion::{MapInversion, near, shapes};
+use crate::inversion::MapInversion;
 use crate::localization::{self, Localize};
 use crate::maps::released::slot_of;
+use crate::maps::shapes::{near, shapes};
 use crate::maps::{Prepared, USUAL_K};
 use crate::{Error, Progress};
 

@@ -17,11 +17,11 @@ use unlift_report::scene::{SceneBox, Shapes};
 use unlift_vision::features::photo::{Turn, read_color};
 use unlift_vision::pictures::{Lens, View};
 
-use super::shapes::{near, shapes};
 use super::{Painter, Photo, Picture, needed};
 use crate::Progress;
 use crate::images::{evenly, kind_of};
 use crate::maps::Prepared;
+use crate::maps::shapes::{near, shapes};
 
 /// Smallest side of a picture for which the metrics are defined.
 const LEAST_SIDE: usize = 16;

@@ -3,7 +3,6 @@
 mod bearings;
 mod images;
 mod maps;
-mod shapes;
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -25,7 +24,6 @@ use unlift_vision::pictures::{
 pub use bearings::{on_bearings, six_views};
 pub use images::Inversion;
 pub use maps::{MapInversion, view};
-pub(crate) use shapes::{near, shapes};
 
 /// Points with a lower probability of being near their recovered place are omitted: they would
 /// paint wrong content over correct content.

@@ -2,6 +2,7 @@
 
 mod cameras;
 pub mod released;
+pub(crate) mod shapes;
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};

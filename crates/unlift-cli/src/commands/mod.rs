@@ -15,7 +15,7 @@ use common::with_threads;
 use crate::args::{AuditCommand, Command};
 use crate::demo;
 
-/// Runs one command, and returns false if a gate failed.
+/// Runs one command, and returns false if a gate or a comparison failed.
 pub fn run(command: Command) -> crate::Result<bool> {
     let done = match command {
         Command::Audit(AuditCommand::Map(args)) => return audits::map(&args),

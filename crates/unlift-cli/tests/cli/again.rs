@@ -52,8 +52,9 @@ fn what_is_gone_in_the_second_map_does_not_come_back() {
         let share = row["recovered_percent"]["0.10"].as_f64().unwrap();
         assert!((85.0..=93.0).contains(&share), "{}: {share}", row["neighbors"]);
     }
-    let (_, stderr) = place.ends(audit, 0);
+    let (_, stderr) = place.ends(&format!("{audit} --share-safe --out s"), 0);
     assert!(stderr.contains("links by geometry only"), "{stderr}");
+    assert!(!place.text("s/audit.json").contains(".csv"), "a safe document names no map");
 }
 
 /// Every run of SfM chooses its own frame and scale.

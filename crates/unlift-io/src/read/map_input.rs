@@ -149,7 +149,6 @@ pub(super) fn pose_of([w, x, y, z]: [f64; 4], t: [f64; 3]) -> Pose {
         [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z],
     ];
     let norm2 = w * w + x * x + y * y + z * z;
-    let center =
-        std::array::from_fn(|j| -(r[0][j] * t[0] + r[1][j] * t[1] + r[2][j] * t[2]) / norm2);
+    let center = center(&r, &t).map(|x| x / norm2);
     Pose { rotation: r.map(|row| row.map(|x| x / norm2)), center }
 }

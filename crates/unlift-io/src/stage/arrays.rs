@@ -291,7 +291,7 @@ impl<'a> Arrays<'a> {
         })
     }
 
-    /// Calls `read` with the file of the array `name`.
+    /// Calls `read` with a reader of the array `name`.
     fn file<T>(
         &self,
         name: &str,

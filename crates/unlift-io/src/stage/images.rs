@@ -21,7 +21,7 @@ use super::{lists, recovered, released, truth};
 use crate::Error;
 use crate::atomic::OutputFile;
 
-/// A reader of a stage file of images. One image is in memory.
+/// A reader of a stage file of images. The arrays of an image are unpacked when it is read.
 pub struct ImageFile<'a> {
     /// All arrays of the file.
     file: Arrays<'a>,

@@ -100,12 +100,12 @@ impl<'a> Meta<'a> {
         let expected = format!("one of {}", names.join(", "));
         let order =
             self.given("rows_by", expected, |value| RowOrder::from_name(value.as_str()?))?;
-        let is_oracle = |value: &Value| (value.as_str() == Some("oracle")).then_some(true);
+        let is_oracle = |value: &Value| (value.as_str() == Some("oracle")).then_some(());
         let by_oracle = self.given("lists_by", "oracle, or no such key", is_oracle)?;
         Ok(About {
             map: self.fingerprint()?,
             order: order.unwrap_or(RowOrder::Unstated),
-            by_oracle: by_oracle.unwrap_or_default(),
+            by_oracle: by_oracle.is_some(),
         })
     }
 

@@ -9,8 +9,18 @@ use crate::document::Document;
 const WITHHELD: &str = "(withheld)";
 
 /// Options whose value may identify a file of the owner.
-const NAMING_OPTIONS: [&str; 9] =
-    ["descriptors", "input", "inverter_sha256", "map", "model", "out", "path", "photos", "show"];
+const NAMING_OPTIONS: [&str; 10] = [
+    "again",
+    "descriptors",
+    "input",
+    "inverter_sha256",
+    "map",
+    "model",
+    "out",
+    "path",
+    "photos",
+    "show",
+];
 
 /// Further sources of unlift. A reason from another scheme or source may contain anything: a line of data, a path.
 const SOURCES: [&str; 4] = ["oracle", "file", "descriptors", "learned"];

@@ -230,15 +230,17 @@ pub(crate) fn table(results: &Results<'_>) -> Option<Table> {
     ];
     let held_out = localization.iter().find_map(|of| of.held_out.as_ref());
     if let Some(HeldOut { recall_percent, .. }) = held_out {
+        let own =
+            |of: &Of, figure: fn(&HeldOut) -> Option<f64>| of.held_out.as_ref().and_then(figure);
         columns.extend([
             figure("held out: times unprotected", move |of: &Of| {
-                number(of.held_out.as_ref().and_then(|own| own.multiple))
+                number(own(of, |held_out| held_out.multiple))
             }),
             figure("camera center", move |of: &Of| {
-                length(of.held_out.as_ref().and_then(|own| own.center_error))
+                length(own(of, |held_out| held_out.center_error))
             }),
             figure("rotation, degrees", move |of: &Of| {
-                number(of.held_out.as_ref().and_then(|own| own.rotation_error_degrees))
+                number(own(of, |held_out| held_out.rotation_error_degrees))
             }),
             figure("right matches", |of: &Of| {
                 let matches = |own: &HeldOut| format!("{} of {}", own.right_matches, own.matches);

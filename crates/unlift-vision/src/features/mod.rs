@@ -27,10 +27,12 @@
 mod extractor;
 mod image;
 mod learned;
+mod options;
 pub mod photo;
 mod sift;
 
-pub use extractor::{Extraction, Extractor, Photo, PhotoFeatures, in_order};
+pub use extractor::{Extractor, Photo, PhotoFeatures, in_order};
 pub use image::{ColorImage, GrayImage, halved};
 pub use learned::{LearnedFeatures, aliked, superpoint};
+pub use options::Extraction;
 pub use sift::{Features, Keypoint, Sift};

@@ -123,13 +123,13 @@ fn max_pixels(format: ImageFormat, n_bytes: u64) -> u64 {
 pub(crate) fn gray(photo: DynamicImage) -> Result<GrayImage, Error> {
     let (width, height) = (photo.width() as usize, photo.height() as usize);
     if !photo.color().has_color() {
-        return GrayImage::from_bytes(width, height, photo.to_luma8().as_raw());
+        return GrayImage::from_bytes(width, height, photo.into_luma8().as_raw());
     }
     let luma = |color: &Rgb<u8>| {
         let [red, green, blue] = color.0.map(f32::from);
         (0.2126 * red + 0.7152 * green + 0.0722 * blue).round() as u8
     };
-    let bytes: Vec<u8> = photo.to_rgb8().pixels().map(luma).collect();
+    let bytes: Vec<u8> = photo.into_rgb8().pixels().map(luma).collect();
     GrayImage::from_bytes(width, height, &bytes)
 }
 
@@ -191,7 +191,7 @@ pub fn jpeg(path: &Path, longest: u32, turn: Turn) -> Result<Vec<u8>, Error> {
         true => photo.resize(longest, longest, FilterType::Triangle),
         false => photo,
     };
-    encoded(&photo.to_rgb8()).map_err(|error| {
+    encoded(&photo.into_rgb8()).map_err(|error| {
         let name = path.display().to_string();
         Error::new(name, "a photo that can be downsized", error.to_string())
     })

@@ -75,10 +75,10 @@ fn nearer_to_own_record<const D: usize>(
 ) -> (usize, usize) {
     let records = released.obfuscation();
     count(places.map(|(own, place)| {
-        let other = half_a_map_away(own, records.len());
+        let far = half_a_map_away(own, records.len());
         let away = |record: usize| distance_to_record(records, record, &place);
         // Points at the same place have equal distances up to rounding.
-        away(own) <= away(other) + rounding(records, own, &place)
+        away(own) <= away(far) + rounding(records, own, &place)
     }))
 }
 
@@ -140,10 +140,8 @@ impl<const D: usize> Truth<'_, D> {
         let (nearer, n) = nearer_to_own_record(released, self.places());
         if are_strangers((nearer, n)) {
             let expected = "points nearer to their own records than to others";
-            let share = format!("{nearer} of {n}");
-            let found =
-                format!("{share} (the truth of another map, unit, frame or order of slots)");
-            return Err(Error::new("truth", expected, found));
+            let causes = "the truth of another map, unit, frame or order of slots";
+            return Err(Error::new("truth", expected, format!("{nearer} of {n} ({causes})")));
         }
         let is_outside = |bounds: &Bounds<D>, point: &[f64; D]| {
             (0..D).any(|c| {
@@ -154,8 +152,8 @@ impl<const D: usize> Truth<'_, D> {
         if let Some(bounds) = released.bounds() {
             let outside = self.points().filter(|point| is_outside(&bounds, point)).count();
             if outside as f64 > MAX_OUTSIDE * n as f64 {
-                let found = format!("{outside} of {n} outside");
-                return Err(Error::new("bounds", "a box of all hidden points", found));
+                let count = format!("{outside} of {n} outside");
+                return Err(Error::new("bounds", "a box of all hidden points", count));
             }
         }
         Ok(())

@@ -234,7 +234,7 @@ impl View {
                         information += row * row.transpose();
                     }
                 }
-                Free::More => {}
+                Free::More => unreachable!("skipped above"),
             }
         }
         // Translations count in units of the mean depth, so that the condition number does not

@@ -29,7 +29,7 @@ pub fn kmeans<const D: usize>(
         .collect();
     // The first of equally good runs counts.
     let best = runs.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
-    let mut centers = best.map(|(_, centers)| centers).unwrap_or_default();
+    let (_, mut centers) = best.expect("a restart");
     // The order of the centers must not depend on which restart won.
     centers.sort_unstable_by(|a, b| {
         a.iter()

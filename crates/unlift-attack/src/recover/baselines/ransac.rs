@@ -11,9 +11,8 @@ use rayon::prelude::*;
 
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
-use crate::recover::consensus::Scratch;
 use crate::recover::map::{
-    CandidateFamily, Family, LineFamily, NO_VOTE, PlaneFamily, Step, solve_slots,
+    CandidateFamily, Family, LineFamily, NO_VOTE, PlaneFamily, Scratch, Step, solve_slots,
 };
 use crate::recover::result::{Estimate, Status};
 use crate::seed::{Draws, Stage};
@@ -52,7 +51,7 @@ pub(crate) trait Trials<const D: usize> {
 /// Returns the estimates of some `slots`, and the histogram of their numbers of trials, see [`Recovered::trials`].
 ///
 /// [`Recovered::trials`]: crate::recover::Recovered::trials
-pub(crate) fn solve<const D: usize, F: Family<D>>(
+pub(crate) fn solve<const D: usize, F: Family<D> + Trials<D>>(
     family: &F,
     lists: &Neighborhoods,
     delta: f32,
@@ -69,7 +68,7 @@ pub(crate) fn solve<const D: usize, F: Family<D>>(
     (estimates, histogram)
 }
 
-struct Sampling<'a, const D: usize, F: Family<D>> {
+struct Sampling<'a, const D: usize, F> {
     family: &'a F,
     lists: &'a Neighborhoods,
     axes: Vec<u8>,
@@ -77,7 +76,7 @@ struct Sampling<'a, const D: usize, F: Family<D>> {
     seed: u64,
 }
 
-impl<const D: usize, F: Family<D>> Step for Sampling<'_, D, F> {
+impl<const D: usize, F: Family<D> + Trials<D>> Step for Sampling<'_, D, F> {
     type Scratch = Scratch<D>;
     type Output = (Estimate<D>, u32);
 
@@ -242,7 +241,7 @@ impl<const D: usize> Trials<D> for PlaneFamily<'_, D> {
         let (best, trials) = best_sample((n, SAMPLE * (D as u32 - 1)), draw, support);
         let Some((best, support)) = best else { return (Err(Status::NoSupport), trials) };
         let mut place = own;
-        for axis in free.clone() {
+        for axis in free {
             let away = by_axis[axis].iter().map(|x| x.0 - best[axis]);
             let near = away.filter(|away| away.abs() <= delta);
             let (sum, count) = near.fold((0.0, 0), |(sum, n), away| (sum + away, n + 1));

@@ -65,6 +65,8 @@ const LEAST_RANGE: f32 = 1.5;
 /// The pattern search starts with this step, in typical widths, and ends below the second one, or after some changes of the step.
 const STEPS: (f32, f32) = (0.35, 0.04);
 const MAX_STEPS: usize = 15;
+/// Places with less weight are dropped.
+const LEAST_WEIGHT: f32 = 1e-3;
 
 /// Returns the estimates of all slots after beliefs from `start`, those of joint recovery. Without enough slots, they stay. Records have one
 /// slot each.
@@ -445,7 +447,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         let mut kept: Vec<Place<D>> = Vec::with_capacity(PLACES);
         for candidate in candidates.iter() {
             let weight = share(candidate) / total;
-            if weight < 1e-3 && !kept.is_empty() {
+            if weight < LEAST_WEIGHT && !kept.is_empty() {
                 break;
             }
             let is_near = |place: &Place<D>| distance2(&place.x, &candidate.x) < merged * merged;

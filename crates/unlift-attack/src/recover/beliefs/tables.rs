@@ -13,6 +13,8 @@ pub(super) const BIN_ENDS: (f32, f32) = (0.1, 6.0);
 /// Entries per unit of distance in a table, and their number.
 const PER_WIDTH: f32 = 20.0;
 const ENTRIES: usize = 121;
+/// Number of random slots that each sampled slot is compared with.
+const RANDOM: usize = 30;
 /// Passes of expectation maximization: at first, and when tables are known.
 const PASSES: (usize, usize) = (6, 3);
 /// Number of random pairs that every class is given: a class with few edges says little.
@@ -58,7 +60,7 @@ impl Tables {
             let mut bins = [0.0; BINS];
             for &slot in slots {
                 let mut draws = Draws::new(problem.seed, Stage::BeliefTables, slot as u64);
-                let random = (0..30).map(|_| draws.below(places.n_slots() as u64) as usize);
+                let random = (0..RANDOM).map(|_| draws.below(places.n_slots() as u64) as usize);
                 for (bin, weight) in
                     random.filter(|&end| end != slot).flat_map(|end| pairs(slot, end))
                 {

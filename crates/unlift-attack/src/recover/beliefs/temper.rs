@@ -18,6 +18,8 @@ const TEMPERS: [f32; 7] = [0.14, 0.2, 0.28, 0.4, 0.56, 0.8, 1.0];
 const TOLERANCE: f64 = 0.1;
 /// Number of random records that measure how often a record passes by chance.
 const BY_CHANCE: usize = 150;
+/// Largest number of places that are scored per slot.
+const MAX_PLACES: usize = 100;
 /// Probability that a list names the place at all.
 const NAMED: f64 = 0.9;
 /// Compared places are at least this many widths apart.
@@ -79,7 +81,7 @@ fn named<const D: usize, F: Family<D>>(
         (0..BY_CHANCE).map(|_| draws.below(places.n_slots() as u64) as usize).collect();
     let mut all: Vec<Named<D>> = edges()
         .filter_map(|(edge, (end, _))| Some((edge, places.all[best_at(end)?].x)))
-        .take(100)
+        .take(MAX_PLACES)
         .map(|(edge, x)| {
             let mut evidence = 0.0;
             for (_, (end, class)) in edges().filter(|&(at, _)| at != edge) {

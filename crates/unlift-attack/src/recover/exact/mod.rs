@@ -26,8 +26,8 @@ const FRACTION: (f64, f64) = (0.02, 0.995);
 /// Bins of distances from 0 to the reach: as fine as the narrowest distribution.
 const STEPS: usize = 1 << 9;
 
-/// Replaces the hidden coordinate of estimates of `released` by the exact value where the partner is known. Other families have no exact
-/// constraints.
+/// Replaces the hidden coordinate of estimates of axis candidates by the exact value where the partner is known. Estimates on records of
+/// other families stay as they are.
 pub(crate) fn settle<const D: usize>(
     released: &Released<D>,
     mut estimates: Vec<Estimate<D>>,

@@ -90,7 +90,7 @@ struct Learning<'a, const D: usize, F: Family<D>> {
     problem: &'a Problem<'a, D, F>,
     estimates: &'a [Estimate<D>],
     density: &'a Density<D>,
-    /// True neighbors are counted within this many local widths.
+    /// True neighbors are counted within this length times the local stretch.
     reach: f32,
 }
 
@@ -120,7 +120,7 @@ impl<const D: usize, F: Family<D>> Learning<'_, D, F> {
                 of_class[1] += 1.0;
             }
         }
-        // The random edges, fewer than the slot has, get the total weight of the slot's own edges.
+        // The random edges get the total weight of the slot's own edges.
         let per_random = [n_edges, n_mutual].map(|n| n / RANDOM as f64);
         for &edge in random {
             let of_kind = &mut tally.random[usize::from(graph.is_either(edge.1))];

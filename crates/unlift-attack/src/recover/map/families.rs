@@ -3,7 +3,6 @@
 use crate::RecordId;
 use crate::geometry::vector::median;
 use crate::neighbors::Neighborhoods;
-use crate::recover::consensus::Scratch;
 use crate::recover::map::chance::{
     self, CELLS, ChanceField, are_in_parts, interquartile_range, line_extent, ray_extent,
     times_listed, tube,
@@ -11,7 +10,7 @@ use crate::recover::map::chance::{
 use crate::recover::map::family::{Family, Piece};
 use crate::recover::map::graph::record_of;
 use crate::recover::map::grid::Grid;
-use crate::recover::map::lines::{LineRow, MOST_CHANCE, evidence, ln, rows_of};
+use crate::recover::map::lines::{LineRow, MOST_CHANCE, Scratch, evidence, ln, rows_of};
 use crate::recover::map::places::{evenly, trimmed_box, unit};
 use crate::recover::result::{Estimate, Status};
 use crate::released::{AxisPlanes, Obfuscation, Released};
@@ -39,7 +38,9 @@ impl<const D: usize> LineFamily<D> {
         let chance = chance::of_lines(&rows, lists, slots_per_record);
         let regions = match released.obfuscation() {
             Obfuscation::Rays(rays) => rays.regions(),
-            _ => None,
+            Obfuscation::Lines(_) | Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => {
+                None
+            }
         };
         Self { rows, slots_per_record, chance, anchored: regions.is_some() }
     }

@@ -1,9 +1,7 @@
 //! Families of records behind one trait: feasible sets as flat pieces, distances to records, and chance.
 
 use crate::RecordId;
-use crate::recover::baselines::ransac::Trials;
-use crate::recover::consensus::Scratch;
-use crate::recover::map::lines::LineRow;
+use crate::recover::map::lines::{LineRow, Scratch};
 use crate::recover::map::places::distance2;
 use crate::recover::result::Estimate;
 
@@ -48,7 +46,7 @@ impl<const D: usize> Piece<D> {
 
 /// Records of one family: where a point of theirs may be, how near they pass to a place, and how likely that is by chance. All steps are
 /// generic over it, so that no step depends on a family.
-pub(crate) trait Family<const D: usize>: Trials<D> + Sync {
+pub(crate) trait Family<const D: usize>: Sync {
     /// Number of pieces of each feasible set.
     const PIECES: usize = 1;
     /// Whether pieces are planes with a normal, not lines with a direction.

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
+use crate::recover::map::places::evenly;
 
 /// Which end of an edge lists the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +24,8 @@ pub(crate) enum Side {
 const SCORE_CLASSES: usize = 8;
 /// Quantiles of all scores at which classes begin: finer at the top, where most true neighbors are.
 const SCORE_RANKS: [f64; SCORE_CLASSES - 1] = [0.3, 0.55, 0.72, 0.84, 0.91, 0.955, 0.98];
+/// Number of scores from which these quantiles are computed.
+const SCORES: usize = 1 << 16;
 pub(crate) const CLASSES: usize = 3 * SCORE_CLASSES;
 /// Largest number of reverse edges of a slot, as a multiple of the mean list length: a record in very many lists is in most of
 /// them by mistake.
@@ -47,9 +50,8 @@ pub(crate) fn side(class: u8) -> Side {
 
 /// Returns the least score of each class but the first; empty without scores.
 fn score_bounds(lists: &Neighborhoods) -> Vec<f32> {
-    let step = lists.records().len().div_ceil(1 << 16).max(1);
-    let mut sample: Vec<f32> =
-        lists.scores().unwrap_or(&[]).iter().step_by(step).copied().collect();
+    let scores = lists.scores().unwrap_or(&[]);
+    let mut sample: Vec<f32> = evenly(scores.len(), SCORES).map(|at| scores[at]).collect();
     sample.sort_unstable_by(f32::total_cmp);
     let at = |share: &f64| sample.get((share * sample.len() as f64) as usize).copied();
     SCORE_RANKS.iter().filter_map(at).collect()

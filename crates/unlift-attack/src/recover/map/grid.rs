@@ -188,8 +188,8 @@ const LEAST: f32 = 0.5;
 const ENOUGH: f32 = 0.25;
 /// Number of times that the neighborhood doubles.
 const WIDER: usize = 3;
-/// Largest local width, because the farthest points hardly have true neighbors.
-const WIDEST: f32 = 2.5;
+/// Largest local stretch, because the farthest points hardly have true neighbors.
+const LARGEST_STRETCH: f32 = 2.5;
 
 impl<const D: usize> Density<D> {
     /// Computes the density of `estimates`, smoothed over about `radius`; `listed` is the number of edges to each record.
@@ -236,7 +236,7 @@ impl<const D: usize> Density<D> {
     #[inline(always)]
     pub(crate) fn stretch(&self, density: f32) -> f32 {
         let ratio = self.typical / density;
-        if ratio > 1.0 { cube_root(ratio).min(WIDEST) } else { 1.0 }
+        if ratio > 1.0 { cube_root(ratio).min(LARGEST_STRETCH) } else { 1.0 }
     }
 }
 

@@ -468,6 +468,19 @@ pub(crate) fn ln(y: f32) -> f32 {
     exponent as f32 * std::f32::consts::LN_2 + m * (0.999_901_65 + m * (-0.497_875 + p))
 }
 
+/// Buffers of one thread, for the records that a slot lists.
+#[derive(Default)]
+pub(crate) struct Scratch<const D: usize> {
+    pub(crate) lines: LineColumns<D>,
+    pub(crate) candidates: Columns<D>,
+    pub(crate) sections: Sections,
+    pub(crate) intervals: Intervals,
+    /// Indices of the sections that vote.
+    pub(crate) voting: Vec<usize>,
+    /// Listed planes by axis, as (offset, record).
+    pub(crate) by_axis: Vec<Vec<(f32, RecordId)>>,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -18,8 +18,7 @@ pub(crate) use family::{Family, Piece};
 pub(crate) use graph::{CLASSES, Graph, Listers, Side, record_of, side};
 pub(crate) use grid::{Density, Grid};
 pub(crate) use lines::{
-    Columns, Intervals, LANES, Lanes, LineColumns, LineRow, NO_GROUP, NO_VOTE, Sections, evidence,
-    ln, rows_of,
+    Columns, LANES, Lanes, LineRow, NO_GROUP, NO_VOTE, Scratch, evidence, ln, rows_of,
 };
 pub(crate) use places::{
     CHUNK, Candidate, Step, along_curve, distance2, evenly, known, nearest2, rows_mut, solve_slots,

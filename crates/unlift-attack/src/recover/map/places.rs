@@ -17,7 +17,7 @@ pub(crate) fn evenly(n: usize, n_sampled: usize) -> std::iter::StepBy<Range<usiz
     (0..n).step_by(n.div_ceil(n_sampled).max(1))
 }
 
-/// A step of an attack that treats each slot on its own. Its hot loops are `#[inline(always)]`, see [`Kernel`].
+/// A step of an attack that treats each slot on its own. Its hot loops are `#[inline(always)]` where that pays, see [`Kernel`].
 pub(crate) trait Step: Sync {
     /// Buffers of one thread.
     type Scratch: Default;

@@ -30,12 +30,13 @@ const BATCH: usize = 1024;
 /// memory per pixel after downsizing.
 ///
 /// # Errors
-/// If the network has other inputs or outputs.
+/// If an option is out of range, or the network has other inputs or outputs.
 pub fn aliked(
     network: &Network,
     options: &Extraction,
     image: &ColorImage,
 ) -> Result<LearnedFeatures, Error> {
+    options.check()?;
     let small = fitted(image, options.max_image_size);
     let small = small.as_ref().unwrap_or(image);
     let (scores, levels) = dense(network, small)?;

@@ -22,12 +22,13 @@ const RADIUS: usize = 4;
 /// Extracts the features of an image with a network that has the inputs and outputs of SuperPoint.
 ///
 /// # Errors
-/// If its outputs do not fit together.
+/// If an option is out of range, or its outputs do not fit together.
 pub fn superpoint(
     network: &Network,
     options: &Extraction,
     image: &ColorImage,
 ) -> Result<LearnedFeatures, Error> {
+    options.check()?;
     let small = fitted(image, options.max_image_size);
     let small = small.as_ref().unwrap_or(image);
     let size = [small.width() as usize, small.height() as usize];
