@@ -14,7 +14,7 @@ use crate::geometry::vector::squared_distance;
 use crate::simd::{Kernel, dispatch};
 
 /// Largest number of points per leaf.
-const LEAF: usize = 16;
+pub(crate) const LEAF: usize = 16;
 /// Nodes with fewer points are split without parallelism.
 const ALONE: usize = 1 << 14;
 
@@ -127,6 +127,22 @@ impl<'a, const D: usize> Knn<'a, D> {
                 }
             }
         });
+    }
+
+    /// Returns the rows leaf by leaf.
+    pub(crate) fn leaf_order(&self) -> &[u32] {
+        &self.rows
+    }
+
+    /// Calls `of` with ranges of the leaf order that contain every point whose squared distance to a position is at most `bound`.
+    #[inline(always)]
+    pub(crate) fn leaves(
+        &self,
+        position: &[f64; D],
+        bound: f64,
+        of: impl FnMut(std::ops::Range<usize>),
+    ) {
+        self.leaves_within(position, (bound, usize::MAX), usize::MAX, of);
     }
 
     fn search(&self, query: [f64; D], own: Option<usize>, k: usize, found: &mut Vec<(f64, u32)>) {

@@ -7,7 +7,7 @@ use unlift::neighbors::{
     DescriptorKind, KeptPairs, Needs, Neighborhoods, Overlap, Part, Similarity, Source, dense,
     scored,
 };
-use unlift::released::Released;
+use unlift::released::{Obfuscation, Released};
 use unlift::{Descriptors, Error};
 
 use super::{Network, Tensor};
@@ -61,7 +61,11 @@ impl<const D: usize> Source<D> for Learned {
         // Images have fewer keypoints, so only the first of a ranking are near.
         match released.descriptors().map(|some| DescriptorKind::of(some, NAME)) {
             Some(Ok(DescriptorKind::Sift)) | None => Source::<D>::k(&Overlap, released),
-            Some(_) if D == 2 => 7,
+            // Lists of rays give an arrangement, which needs more edges per keypoint (docs/decisions/tried.md).
+            Some(_) if D == 2 => match released.obfuscation() {
+                Obfuscation::Rays(_) => 10,
+                _ => 7,
+            },
             Some(_) => Source::<D>::k(&Similarity, released),
         }
     }

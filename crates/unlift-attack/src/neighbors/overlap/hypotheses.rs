@@ -14,16 +14,20 @@ const FARTHEST: i32 = 4;
 /// The longest shift along one axis.
 const LONGEST: i32 = 2;
 
-/// Content of one cell of a version: up to four cells of the patch, with weights.
-pub type Cell = [(u8, f32); 4];
+/// Content of a cell after a turn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cell {
+    /// Up to four cells of the patch, with weights.
+    pub sources: [(u8, f32); 4],
+    /// Number of bins by which orientations turn.
+    pub turn: usize,
+}
 
 /// A version of a patch: its cells after a turn and a shift, in the order of comparison.
 #[derive(Clone, Debug)]
 pub struct Version {
-    /// The cells.
-    pub cells: Vec<Cell>,
-    /// Number of bins by which orientations turn.
-    pub turn: usize,
+    /// Indices into [`Hypotheses::cells`].
+    pub cells: Vec<u8>,
     /// Square root of the weight of hypotheses with this many cells; both versions carry it.
     pub root_weight: f32,
 }
@@ -52,6 +56,8 @@ pub struct Pair {
 /// All hypotheses.
 #[derive(Clone, Debug)]
 pub struct Hypotheses {
+    /// All different cells of versions.
+    pub cells: Vec<Cell>,
     /// Versions of the patch that is turned and shifted.
     pub turned: Vec<Version>,
     /// Versions of the other patch: its cells that the turned one covers.
@@ -63,7 +69,8 @@ pub struct Hypotheses {
 impl Hypotheses {
     /// Creates the hypotheses: 8 turns by 21 shifts.
     pub fn new() -> Self {
-        let mut all = Self { turned: Vec::new(), still: Vec::new(), pairs: Vec::new() };
+        let mut all =
+            Self { cells: Vec::new(), turned: Vec::new(), still: Vec::new(), pairs: Vec::new() };
         for dy in -LONGEST..=LONGEST {
             for dx in -LONGEST..=LONGEST {
                 if dx.abs() + dy.abs() < FARTHEST {
@@ -79,13 +86,13 @@ impl Hypotheses {
     fn add_shift(&mut self, shift: [i32; 2], turns: &[usize], both_ways: bool) {
         let still = self.still.len();
         for (at, &turn) in turns.iter().enumerate() {
-            let mut version = Version { cells: Vec::new(), turn, root_weight: 0.0 };
+            let mut version = Version { cells: Vec::new(), root_weight: 0.0 };
             let mut kept = version.clone();
-            kept.turn = 0;
             for cell in 0..CELLS {
                 if let Some(sources) = sources(cell, turn, shift) {
-                    version.cells.push(sources);
-                    kept.cells.push([(cell as u8, 1.0), (0, 0.0), (0, 0.0), (0, 0.0)]);
+                    version.cells.push(self.index(Cell { sources, turn }));
+                    let sources = [(cell as u8, 1.0), (0, 0.0), (0, 0.0), (0, 0.0)];
+                    kept.cells.push(self.index(Cell { sources, turn: 0 }));
                 }
             }
             // Few shared cells agree more easily by chance.
@@ -101,6 +108,15 @@ impl Hypotheses {
             self.turned.push(version);
         }
     }
+
+    /// Returns the index of a cell, which it adds if it is new.
+    fn index(&mut self, cell: Cell) -> u8 {
+        let known = self.cells.iter().position(|known| *known == cell);
+        known.unwrap_or_else(|| {
+            self.cells.push(cell);
+            self.cells.len() - 1
+        }) as u8
+    }
 }
 
 /// Exponent of the fraction of cells that are compared.
@@ -108,7 +124,7 @@ const WEIGHT_EXPONENT: f64 = 0.06;
 
 /// Returns the content of `cell` after the patch is turned by `turn` times 45 degrees about its middle and then shifted; `None` if
 /// it is outside the patch.
-fn sources(cell: usize, turn: usize, shift: [i32; 2]) -> Option<Cell> {
+fn sources(cell: usize, turn: usize, shift: [i32; 2]) -> Option<[(u8, f32); 4]> {
     let middle = (SIDE - 1) as f64 / 2.0;
     let x = (cell % SIDE) as f64 - middle - f64::from(shift[0]);
     let y = (cell / SIDE) as f64 - middle - f64::from(shift[1]);

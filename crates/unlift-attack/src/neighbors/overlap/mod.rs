@@ -5,7 +5,7 @@
 
 mod hypotheses;
 
-use hypotheses::{BINS, CELLS, DIM, Hypotheses, Version};
+use hypotheses::{BINS, CELLS, Cell, DIM, Hypotheses, Version};
 
 use super::Neighborhoods;
 use super::compare::{KeptPairs, Likeness, note};
@@ -181,17 +181,21 @@ impl Block {
         let mut turned = vec![0; of_turned[hypotheses.turned.len()]];
         let mut still = vec![0; of_still[hypotheses.still.len()]];
         let mut bytes = [0u8; DIM];
+        let mut mixed = vec![Mixed::default(); hypotheses.cells.len()];
         for (row, &slot) in slots.iter().enumerate() {
             let squares = squares(descriptors, slot as usize);
+            for (mixed, cell) in mixed.iter_mut().zip(&hypotheses.cells) {
+                *mixed = Mixed::new(&squares, cell);
+            }
             for (version, start) in hypotheses.turned.iter().zip(&of_turned) {
                 let depth = version.depth();
-                quantize(&squares, version, &mut bytes);
+                quantize(&mixed, version, &mut bytes);
                 let at = start + row * depth;
                 turned[at..at + depth].copy_from_slice(&bytes[..depth]);
             }
             for (version, start) in hypotheses.still.iter().zip(&of_still) {
                 let depth = version.depth();
-                quantize(&squares, version, &mut bytes);
+                quantize(&mixed, version, &mut bytes);
                 for (at, &byte) in bytes[..depth].iter().enumerate() {
                     still[start + simd::packed(row, at, depth)] = byte as i8;
                 }
@@ -222,25 +226,39 @@ fn squares(descriptors: &Descriptors, slot: usize) -> [[f32; BINS]; CELLS] {
     std::array::from_fn(|cell| std::array::from_fn(|bin| squares[cell * BINS + bin] / sum))
 }
 
-/// Converts a version of a patch to bytes. Histograms are mixed before the square root.
-fn quantize(squares: &[[f32; BINS]; CELLS], version: &Version, bytes: &mut [u8; DIM]) {
-    let mut mixed = [0.0f32; DIM];
-    for (cell, mixed) in version.cells.iter().zip(mixed.as_chunks_mut::<BINS>().0) {
-        for &(from, share) in cell {
-            for (mixed, square) in mixed.iter_mut().zip(&squares[usize::from(from)]) {
-                *mixed += square * share;
+/// The histogram of a cell after a turn, and the square roots of its values.
+#[derive(Clone, Copy, Default)]
+struct Mixed {
+    values: [f32; BINS],
+    roots: [f32; BINS],
+}
+
+impl Mixed {
+    /// Mixes histograms, before the square root.
+    fn new(squares: &[[f32; BINS]; CELLS], cell: &Cell) -> Self {
+        let mut values = [0.0f32; BINS];
+        for (from, share) in cell.sources {
+            for (value, square) in values.iter_mut().zip(&squares[usize::from(from)]) {
+                *value += square * share;
             }
         }
         // Orientations of a descriptor turn in the opposite sense of the grid.
-        mixed.rotate_left(version.turn);
+        values.rotate_left(cell.turn);
+        Self { values, roots: values.map(f32::sqrt) }
     }
-    let depth = version.depth();
-    let norm = mixed[..depth].iter().sum::<f32>().sqrt().max(NORM_FLOOR);
+}
+
+/// Converts a version of a patch to bytes.
+fn quantize(mixed: &[Mixed], version: &Version, bytes: &mut [u8; DIM]) {
+    let cells = || version.cells.iter().map(|&cell| &mixed[usize::from(cell)]);
+    let norm = cells().flat_map(|cell| cell.values).sum::<f32>().sqrt().max(NORM_FLOOR);
     let scale = LENGTH * version.root_weight / norm;
-    for (byte, &value) in bytes[..depth].iter_mut().zip(&mixed) {
-        // Rounds without a call: no value is negative.
-        let value = value.sqrt() * scale;
-        let whole = value as i32;
-        *byte = (whole + i32::from(value - whole as f32 >= 0.5)) as u8;
+    for (bytes, cell) in bytes.as_chunks_mut::<BINS>().0.iter_mut().zip(cells()) {
+        for (byte, root) in bytes.iter_mut().zip(cell.roots) {
+            // Rounds without a call: no value is negative.
+            let value = root * scale;
+            let whole = value as i32;
+            *byte = (whole + i32::from(value - whole as f32 >= 0.5)) as u8;
+        }
     }
 }

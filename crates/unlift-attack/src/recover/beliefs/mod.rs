@@ -21,9 +21,11 @@
 mod tables;
 mod temper;
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
-use crate::geometry::knn::Knn;
+use crate::geometry::knn::{Knn, LEAF};
 use crate::geometry::vector::widen;
 use crate::recover::map::{
     Candidate, Family, Piece, Step, along_curve, distance2, known, ln, solve_slots, unit,
@@ -99,7 +101,7 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
             proposals: proposals(&places, problem.seed),
             places: &places,
             tables: &learned,
-            tree: &tree,
+            crowd: Crowd::new(&places, &tree),
             marginals: &marginals,
         };
         let moves = |&slot: &usize| {
@@ -198,7 +200,7 @@ impl<const D: usize> Places<D> {
         self.offsets.len() - 1
     }
 
-    fn of(&self, slot: usize) -> std::ops::Range<usize> {
+    fn of(&self, slot: usize) -> Range<usize> {
         self.offsets[slot] as usize..self.offsets[slot + 1] as usize
     }
 
@@ -248,6 +250,66 @@ fn marginals<const D: usize, F: Family<D>>(family: &F, n: usize) -> Vec<Vec<f32>
     (0..F::PIECES).map(of_axis).collect()
 }
 
+/// All places in the order of the leaves of a search tree, in columns, so that the places of a leaf take a few vector instructions.
+/// Columns have a leaf more than there are places.
+struct Crowd<'a, const D: usize> {
+    tree: &'a Knn<'a, D>,
+    x: [Vec<f32>; D],
+    weight: Vec<f32>,
+    slot: Vec<u32>,
+}
+
+impl<'a, const D: usize> Crowd<'a, D> {
+    fn new(places: &Places<D>, tree: &'a Knn<'a, D>) -> Self {
+        let order = || tree.leaf_order().iter().map(|&at| at as usize);
+        let padded = |of: &dyn Fn(usize) -> f32| -> Vec<f32> {
+            order().map(of).chain([0.0; LEAF]).collect()
+        };
+        Self {
+            tree,
+            x: std::array::from_fn(|c| padded(&|at| places.all[at].x[c])),
+            weight: padded(&|at| places.all[at].weight),
+            slot: order().map(|at| places.slot[at]).chain([0; LEAF]).collect(),
+        }
+    }
+
+    /// Returns the weighted number of places of other slots than `own` within the squared radius around `x`; `leaves` is a buffer.
+    #[inline(always)]
+    fn density(&self, own: u32, x: &[f32; D], radius2: f32, leaves: &mut Vec<Range<usize>>) -> f32 {
+        leaves.clear();
+        self.tree.leaves(&widen(x), f64::from(radius2), |places| leaves.push(places));
+        let mut sum = 0.0;
+        for places in leaves {
+            for start in places.clone().step_by(LEAF) {
+                let columns = self.x.each_ref().map(|column| leaf(column, start));
+                let (weight, slot) = (leaf(&self.weight, start), leaf(&self.slot, start));
+                // All terms before the sum, which cannot be vectorized.
+                let mut terms = [0.0; LEAF];
+                for at in 0..LEAF {
+                    let mut d2 = 0.0;
+                    for c in 0..D {
+                        d2 += (columns[c][at] - x[c]) * (columns[c][at] - x[c]);
+                    }
+                    let closeness = (1.0 - d2 / radius2).max(0.0);
+                    let square = closeness * closeness;
+                    let weight = if slot[at] == own { 0.0 } else { weight[at] };
+                    terms[at] = weight * (square * square);
+                }
+                for term in &terms[..LEAF.min(places.end - start)] {
+                    sum += term;
+                }
+            }
+        }
+        sum
+    }
+}
+
+/// Returns a leaf's part of a column of [`Crowd`].
+#[inline(always)]
+fn leaf<T>(column: &[T], start: usize) -> &[T; LEAF] {
+    column[start..].first_chunk().expect("columns are padded")
+}
+
 /// What an iteration reads.
 struct Context<'a, const D: usize, F: Family<D>> {
     problem: &'a Problem<'a, D, F>,
@@ -256,7 +318,7 @@ struct Context<'a, const D: usize, F: Family<D>> {
     temper: f32,
     proposals: Vec<[f32; D]>,
     /// All places, for their density.
-    tree: &'a Knn<'a, D>,
+    crowd: Crowd<'a, D>,
     marginals: &'a [Vec<f32>],
 }
 
@@ -276,6 +338,7 @@ struct Near<const D: usize> {
 struct Scratch<const D: usize> {
     near: Vec<Vec<Near<D>>>,
     candidates: Vec<Candidate<D>>,
+    leaves: Vec<Range<usize>>,
 }
 
 impl<const D: usize, F: Family<D>> Step for Context<'_, D, F> {
@@ -283,8 +346,9 @@ impl<const D: usize, F: Family<D>> Step for Context<'_, D, F> {
     type Output = Option<Vec<Place<D>>>;
 
     /// Returns the new places of `slot`, the best one first; `None` if there is no candidate.
+    #[inline(always)]
     fn solve(&self, slot: usize, scratch: &mut Scratch<D>) -> Option<Vec<Place<D>>> {
-        let Scratch { near, candidates } = scratch;
+        let Scratch { near, candidates, leaves } = scratch;
         near.resize_with(F::PIECES, Vec::new);
         candidates.clear();
         for (piece, near) in near.iter_mut().enumerate() {
@@ -297,12 +361,12 @@ impl<const D: usize, F: Family<D>> Step for Context<'_, D, F> {
         let mut best = 0;
         for at in 0..candidates.len() {
             let Candidate { x, piece, .. } = candidates[at];
-            candidates[at].score = self.score(slot, piece, &near[piece], &x);
+            candidates[at].score = self.score(slot, piece, &near[piece], &x, leaves);
             if candidates[at].score > candidates[best].score {
                 best = at;
             }
         }
-        let refined = self.refine(slot, *candidates.get(best)?, near);
+        let refined = self.refine(slot, *candidates.get(best)?, near, leaves);
         candidates.push(refined);
         Some(self.kept(candidates, refined.score))
     }
@@ -310,6 +374,7 @@ impl<const D: usize, F: Family<D>> Step for Context<'_, D, F> {
 
 impl<const D: usize, F: Family<D>> Context<'_, D, F> {
     /// Fills `near` with the places of neighbors that are near a piece, and adds candidates on it.
+    #[inline(always)]
     fn propose(
         &self,
         slot: usize,
@@ -367,7 +432,16 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
 
     /// Returns the log-posterior of a place, up to a constant.
     #[inline(always)]
-    fn score(&self, slot: usize, piece: usize, near: &[Near<D>], x: &[f32; D]) -> f32 {
+    fn score(
+        &self,
+        slot: usize,
+        piece: usize,
+        near: &[Near<D>],
+        x: &[f32; D],
+        leaves: &mut Vec<Range<usize>>,
+    ) -> f32 {
+        let radius = DENSITY_RADIUS * self.places.typical;
+        let density = self.crowd.density(slot as u32, x, radius * radius, leaves);
         let (mut sum, mut product, mut ratio) = (0.0, 1.0f32, 1.0f32);
         for y in near {
             let u = distance2(x, &y.x).sqrt() * y.inverse_width;
@@ -388,29 +462,20 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
             false => 1.0,
         };
         evidence
-            + DENSITY_WEIGHT * ln(LEAST_DENSITY + self.density(slot, x))
+            + DENSITY_WEIGHT * ln(LEAST_DENSITY + density)
             + 0.5 * (D - 1) as f32 * ln(range.max(1e-6))
             + self.marginals.get(piece).map_or(0.0, |column| column[slot])
     }
 
-    /// Returns the weighted number of places of other slots around `x`.
-    #[inline(always)]
-    fn density(&self, slot: usize, x: &[f32; D]) -> f32 {
-        let radius = DENSITY_RADIUS * self.places.typical;
-        let (radius2, mut sum) = (radius * radius, 0.0);
-        self.tree.within(&widen(x), f64::from(radius2), |at| {
-            let at = at as usize;
-            if self.places.slot[at] as usize != slot {
-                let place = &self.places.all[at];
-                let closeness = (1.0 - distance2(&place.x, x) / radius2).max(0.0);
-                sum += place.weight * closeness.powi(4);
-            }
-        });
-        sum
-    }
-
     /// Moves a candidate along its piece while that improves its score, in steps that become shorter.
-    fn refine(&self, slot: usize, start: Candidate<D>, near: &[Vec<Near<D>>]) -> Candidate<D> {
+    #[inline(always)]
+    fn refine(
+        &self,
+        slot: usize,
+        start: Candidate<D>,
+        near: &[Vec<Near<D>>],
+        leaves: &mut Vec<Range<usize>>,
+    ) -> Candidate<D> {
         let (mut best, piece) = (start, start.piece);
         let own = self.problem.family.piece(slot, piece);
         // Directions of a plane are the axes other than its normal.
@@ -419,21 +484,23 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
             false => vec![own.direction],
         };
         let mut step = STEPS.0 * self.places.typical;
-        for _ in 0..MAX_STEPS {
+        // Loops, not iterators, whose closures would not be compiled for the vector instructions.
+        'steps: for _ in 0..MAX_STEPS {
             if step < STEPS.1 * self.places.typical {
                 break;
             }
-            let tried = free.iter().flat_map(|direction| [(direction, step), (direction, -step)]);
-            let better = tried
-                .map(|(direction, step)| {
-                    own.project(&std::array::from_fn(|c| best.x[c] + step * direction[c]))
-                })
-                .map(|x| Candidate { x, piece, score: self.score(slot, piece, &near[piece], &x) })
-                .find(|candidate| candidate.score > best.score);
-            match better {
-                Some(candidate) => best = candidate,
-                None => step *= 0.5,
+            for direction in &free {
+                for step in [step, -step] {
+                    let moved = std::array::from_fn(|c| best.x[c] + step * direction[c]);
+                    let x = own.project(&moved);
+                    let score = self.score(slot, piece, &near[piece], &x, leaves);
+                    if score > best.score {
+                        best = Candidate { x, piece, score };
+                        continue 'steps;
+                    }
+                }
             }
+            step *= 0.5;
         }
         best
     }
@@ -462,6 +529,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
 }
 
 /// Adds a candidate unless one of the same piece, from index `first` on, is close.
+#[inline(always)]
 fn add<const D: usize>(
     candidates: &mut Vec<Candidate<D>>,
     first: usize,
