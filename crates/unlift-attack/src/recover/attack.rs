@@ -250,9 +250,9 @@ fn joint<const D: usize, F: Family<D>>(
     if let Some(rays) = family.anchored().filter(|_| known.is_empty()) {
         estimates = anchors::layout::recover(rays, (lists, &graph.listers), estimates);
     }
-    // The likeliest places under the whole lists; or under their entries alone, where what is not listed says too little. Beliefs
-    // are for maps with one slot per record: points of paired lines and of images lose as often as they gain.
-    let with_beliefs = D == 3 && graph.slots_per_record == 1 && lists.scores().is_some();
+    // The likeliest places under the whole lists; or under their entries alone, where what is not listed says too little. Points of
+    // paired lines would lose by beliefs.
+    let with_beliefs = graph.slots_per_record == 1 && lists.scores().is_some();
     restore(match ranking::recover(problem, estimates) {
         Err(estimates) if with_beliefs => beliefs::recover(problem, estimates),
         Ok(estimates) | Err(estimates) => estimates,

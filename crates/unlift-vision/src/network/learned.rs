@@ -58,14 +58,13 @@ impl<const D: usize> Source<D> for Learned {
     }
 
     fn k(&self, released: &Released<D>) -> usize {
-        // Images have fewer keypoints, so only the first of a ranking are near.
+        // Images have fewer keypoints, so only the first of a ranking are near. An arrangement of rays needs more edges.
+        if D == 2 {
+            let is_rays = matches!(released.obfuscation(), Obfuscation::Rays(_));
+            return if is_rays { 10 } else { 7 };
+        }
         match released.descriptors().map(|some| DescriptorKind::of(some, NAME)) {
             Some(Ok(DescriptorKind::Sift)) | None => Source::<D>::k(&Overlap, released),
-            // Lists of rays give an arrangement, which needs more edges per keypoint (docs/decisions/tried.md).
-            Some(_) if D == 2 => match released.obfuscation() {
-                Obfuscation::Rays(_) => 10,
-                _ => 7,
-            },
             Some(_) => Source::<D>::k(&Similarity, released),
         }
     }

@@ -25,9 +25,10 @@ pub struct Made {
     pub ratio_at_k: Option<f64>,
 }
 
-/// Lists and pair scores of sources that read descriptors alone, kept by the name of the source for further schemes and repeats.
+/// Lists, by their length, and pair scores of sources that read descriptors alone, kept by the name of the source for further schemes
+/// and repeats.
 #[derive(Debug, Default)]
-pub struct Kept(RefCell<BTreeMap<String, (Option<KeptLists>, KeptPairs)>>);
+pub struct Kept(RefCell<BTreeMap<String, (BTreeMap<usize, KeptLists>, KeptPairs)>>);
 
 impl Kept {
     /// Returns the lists of `source` for `released`: kept ones if they apply, else new ones, from kept pair scores if they apply.
@@ -43,12 +44,12 @@ impl Kept {
         }
         let mut kept = self.0.borrow_mut();
         let (kept, pairs) = kept.entry(source.name().to_owned()).or_default();
-        if let Some(lists) = kept.as_ref().and_then(|kept| kept.of(released)) {
+        if let Some(lists) = kept.get(&k).and_then(|kept| kept.of(released)) {
             return Ok(lists);
         }
         let lists = source.lists_keeping(released, k, seed, pairs)?;
-        if kept.is_none() {
-            *kept = KeptLists::new(released, &lists);
+        if !kept.contains_key(&k) {
+            kept.extend(KeptLists::new(released, &lists).map(|lists| (k, lists)));
         }
         Ok(lists)
     }

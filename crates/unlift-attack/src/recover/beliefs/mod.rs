@@ -5,10 +5,12 @@
 //! support several places. This step starts from the estimates of joint recovery. In an iteration it
 //!
 //! 1. learns, for each class `c` of edges, the likelihood ratio `L_c(u)` of an edge between points at distance `u` against one between
-//!    points that are far apart (`tables`). The unit of `u` is a *width*, about the distance to the 50th nearest estimate;
+//!    points that are far apart (`tables`). The unit of `u` is a *width*, about the distance to the 50th nearest estimate
+//!    (the 20th in images);
 //! 2. learns the *temper*, an exponent below 1 for the evidence of edges that are wrong together (`temper`);
 //! 3. proposes places on the record of each slot, and scores each place `x` by
-//!    `temper * sum over edges j of ln(1 + sum over places y of j of w_y (L_c(|x - y|) - 1)) + 0.5 ln(0.05 + density(x)) + ln volume(x)`;
+//!    `temper * sum over edges j of ln(1 + sum over places y of j of w_y (L_c(|x - y|) - 1)) + 0.5 ln(0.05 + density(x)) + ln volume(x)`,
+//!    in images without the density;
 //! 4. refines the best place, and keeps the best ones with weights proportional to `exp(score)`.
 //!
 //! The density counts the places of other slots within a width: points lie on surfaces. Places of the own slot do not count, because they
@@ -38,12 +40,12 @@ use tables::{BIN_ENDS, Tables};
 const ITERATIONS: usize = 5;
 /// Largest number of places per slot.
 const PLACES: usize = 4;
-/// A width is the distance to this neighbor, counted among all slots.
-const WIDTH_NEIGHBOR: usize = 50;
+/// A width is the distance to this neighbor, counted among all slots: in images, and in maps.
+const WIDTH_NEIGHBOR: [usize; 2] = [20, 50];
 /// Bounds of the width of a place, as a multiple of the typical width.
 const WIDTHS: (f32, f32) = (0.3, 3.3);
 /// Maps with fewer slots keep their estimates.
-const LEAST_SLOTS: usize = 4 * WIDTH_NEIGHBOR;
+const LEAST_SLOTS: usize = 200;
 /// Weight of an estimate of joint recovery: its least value, and what is added for the estimate with the most evidence.
 const START_WEIGHT: (f32, f32) = (0.24, 0.36);
 /// Weight of the density of places in the score, and the density of a place without neighbors.
@@ -178,7 +180,7 @@ impl<const D: usize> Places<D> {
         }
         let (_, best) = known(estimates);
         let tree = Knn::new(&best).ok()?;
-        let k = (WIDTH_NEIGHBOR * best.len() / beliefs.len()).max(8) + 1;
+        let k = (WIDTH_NEIGHBOR[D - 2] * best.len() / beliefs.len()).max(8) + 1;
         let measure = |near: &mut Vec<(f64, u32)>, place: &Place<D>| {
             tree.nearest_to(widen(&place.x), k, near);
             near.last().map_or(0.0, |last| last.0.sqrt() as f32)
@@ -440,8 +442,6 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         x: &[f32; D],
         leaves: &mut Vec<Range<usize>>,
     ) -> f32 {
-        let radius = DENSITY_RADIUS * self.places.typical;
-        let density = self.crowd.density(slot as u32, x, radius * radius, leaves);
         let (mut sum, mut product, mut ratio) = (0.0, 1.0f32, 1.0f32);
         for y in near {
             let u = distance2(x, &y.x).sqrt() * y.inverse_width;
@@ -461,8 +461,16 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
             true => distance2(&own.through, x) / (self.places.typical * self.places.typical),
             false => 1.0,
         };
+        // Keypoints lie all over an image: their density says nothing.
+        let prior = if D == 2 {
+            0.0
+        } else {
+            let radius = DENSITY_RADIUS * self.places.typical;
+            let density = self.crowd.density(slot as u32, x, radius * radius, leaves);
+            DENSITY_WEIGHT * ln(LEAST_DENSITY + density)
+        };
         evidence
-            + DENSITY_WEIGHT * ln(LEAST_DENSITY + density)
+            + prior
             + 0.5 * (D - 1) as f32 * ln(range.max(1e-6))
             + self.marginals.get(piece).map_or(0.0, |column| column[slot])
     }
