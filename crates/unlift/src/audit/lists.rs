@@ -25,10 +25,17 @@ pub struct Made {
     pub ratio_at_k: Option<f64>,
 }
 
-/// Lists, by their length, and pair scores of sources that read descriptors alone, kept by the name of the source for further schemes
-/// and repeats.
+/// Lists and pair scores of sources that read descriptors alone, kept by the name of the source for further schemes and repeats.
 #[derive(Debug, Default)]
-pub struct Kept(RefCell<BTreeMap<String, (BTreeMap<usize, KeptLists>, KeptPairs)>>);
+pub struct Kept(RefCell<BTreeMap<String, OfSource>>);
+
+/// What one source made.
+#[derive(Debug, Default)]
+struct OfSource {
+    /// By the length that was requested.
+    lists: BTreeMap<usize, KeptLists>,
+    pairs: KeptPairs,
+}
 
 impl Kept {
     /// Returns the lists of `source` for `released`: kept ones if they apply, else new ones, from kept pair scores if they apply.
@@ -43,13 +50,13 @@ impl Kept {
             return source.lists(released, k, seed);
         }
         let mut kept = self.0.borrow_mut();
-        let (kept, pairs) = kept.entry(source.name().to_owned()).or_default();
-        if let Some(lists) = kept.get(&k).and_then(|kept| kept.of(released)) {
+        let kept = kept.entry(source.name().to_owned()).or_default();
+        if let Some(lists) = kept.lists.get(&k).and_then(|kept| kept.of(released)) {
             return Ok(lists);
         }
-        let lists = source.lists_keeping(released, k, seed, pairs)?;
-        if !kept.contains_key(&k) {
-            kept.extend(KeptLists::new(released, &lists).map(|lists| (k, lists)));
+        let lists = source.lists_keeping(released, k, seed, &mut kept.pairs)?;
+        if !kept.lists.contains_key(&k) {
+            kept.lists.extend(KeptLists::new(released, &lists).map(|lists| (k, lists)));
         }
         Ok(lists)
     }
