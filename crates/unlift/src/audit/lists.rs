@@ -191,3 +191,65 @@ impl<'a, const D: usize> Lists<'a, D> {
         Ok(&self.near[self.near.len() - 1].1)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::descriptors::Values;
+    use crate::neighbors::{Needs, Similarity};
+    use crate::obfuscate::{SchemeOptions, obfuscate};
+    use crate::obfuscate::{olc::Olc, ray};
+    use crate::released::Obfuscation;
+    use crate::seed::Key;
+    use crate::truth::Original;
+    use crate::{Descriptors, PointSet, Unit, synthetic};
+
+    /// Lists of rays are longer.
+    #[derive(Debug)]
+    struct ByFamily;
+
+    impl Source<3> for ByFamily {
+        fn name(&self) -> &str {
+            "by-family"
+        }
+
+        fn needs(&self) -> Needs {
+            Needs::Descriptors
+        }
+
+        fn k(&self, released: &Released<3>) -> usize {
+            if matches!(released.obfuscation(), Obfuscation::Rays(_)) { 10 } else { 7 }
+        }
+
+        fn lists(
+            &self,
+            released: &Released<3>,
+            k: usize,
+            seed: u64,
+        ) -> Result<Neighborhoods, Error> {
+            Similarity.lists(released, k, seed)
+        }
+
+        fn reads_descriptors_alone(&self) -> bool {
+            true
+        }
+    }
+
+    #[test]
+    fn lists_are_kept_by_their_length() {
+        let points = PointSet::try_new(synthetic::room(1, 60).points, Unit::Meter).unwrap();
+        let original = Original::new(points);
+        let values = (0..60 * 8).map(|at| (at * at % 251) as u8).collect();
+        let descriptors = Descriptors::try_new(Values::U8(values), 8).unwrap();
+        let rays = (ray::ENTRY.in_3d.unwrap())(&SchemeOptions::usual(Unit::Meter));
+        let hide = |scheme| {
+            obfuscate(scheme, &original, Some(&descriptors), &Key::from_seed(0)).unwrap().0
+        };
+        let (lines, rays) = (hide(&Olc), hide(&*rays));
+        let kept = Kept::default();
+        for (released, k) in [(&lines, 7), (&rays, 10), (&lines, 7)] {
+            let lists = kept.lists(&ByFamily, released, 0).unwrap();
+            assert_eq!(lists, ByFamily.lists(released, k, 0).unwrap());
+        }
+    }
+}
