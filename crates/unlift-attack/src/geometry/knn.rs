@@ -119,7 +119,7 @@ impl<'a, const D: usize> Knn<'a, D> {
     /// Calls `of(row)` for all points whose squared distance to a position is at most `bound`.
     #[inline(always)]
     pub fn within(&self, position: &[f64; D], bound: f64, mut of: impl FnMut(u32)) {
-        self.leaves_within(position, (bound, usize::MAX), usize::MAX, |places| {
+        self.leaves(position, bound, |places| {
             for place in places {
                 let point = std::array::from_fn(|c| self.columns[c][place]);
                 if squared_distance(position, &point) <= bound {

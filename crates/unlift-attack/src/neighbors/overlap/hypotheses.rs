@@ -112,10 +112,11 @@ impl Hypotheses {
     /// Returns the index of a cell, which it adds if it is new.
     fn index(&mut self, cell: Cell) -> u8 {
         let known = self.cells.iter().position(|known| *known == cell);
-        known.unwrap_or_else(|| {
+        let at = known.unwrap_or_else(|| {
             self.cells.push(cell);
             self.cells.len() - 1
-        }) as u8
+        });
+        u8::try_from(at).expect("about a hundred cells")
     }
 }
 

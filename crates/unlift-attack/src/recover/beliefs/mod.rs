@@ -44,7 +44,7 @@ const PLACES: usize = 4;
 const WIDTH_NEIGHBOR: [usize; 2] = [20, 50];
 /// Bounds of the width of a place, as a multiple of the typical width.
 const WIDTHS: (f32, f32) = (0.3, 3.3);
-/// Maps with fewer slots keep their estimates.
+/// Maps and images with fewer slots keep their estimates.
 const LEAST_SLOTS: usize = 200;
 /// Weight of an estimate of joint recovery: its least value, and what is added for the estimate with the most evidence.
 const START_WEIGHT: (f32, f32) = (0.24, 0.36);
