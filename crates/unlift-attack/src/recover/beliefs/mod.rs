@@ -462,7 +462,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
             false => 1.0,
         };
         // Keypoints lie all over an image: their density says nothing.
-        let prior = if D == 2 {
+        let density = if D == 2 {
             0.0
         } else {
             let radius = DENSITY_RADIUS * self.places.typical;
@@ -470,7 +470,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
             DENSITY_WEIGHT * ln(LEAST_DENSITY + density)
         };
         evidence
-            + prior
+            + density
             + 0.5 * (D - 1) as f32 * ln(range.max(1e-6))
             + self.marginals.get(piece).map_or(0.0, |column| column[slot])
     }
