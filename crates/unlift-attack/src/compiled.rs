@@ -1,11 +1,25 @@
 //! Functions for two and three dimensions that are compiled once, in this crate.
 //!
 //! A function that is generic over the number of dimensions is compiled again in every crate that calls it, and recovery is large. A
-//! pointer to its two versions in a `static` avoids that.
+//! pointer to its two versions in a `static` avoids that: [`both!`](crate::both).
 
 use std::any::Any;
 
 use crate::Error;
+
+/// Declares a [`Both`] of the two versions of a function: a `static`, which compiles them in this crate. Unit tests call neither, so there
+/// it is a constant, which compiles nothing.
+#[macro_export]
+macro_rules! both {
+    ($name:ident: $type:ident = $function:ident) => {
+        #[cfg(not(test))]
+        static $name: $crate::compiled::Both<$type<2>, $type<3>> =
+            $crate::compiled::Both($function::<2>, $function::<3>);
+        #[cfg(test)]
+        const $name: $crate::compiled::Both<$type<2>, $type<3>> =
+            $crate::compiled::Both($function::<2>, $function::<3>);
+    };
+}
 
 /// A function for two dimensions, and the one for three.
 pub struct Both<A, B>(pub A, pub B);

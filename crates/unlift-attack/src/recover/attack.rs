@@ -1,6 +1,5 @@
 //! The attacks of this crate, from released records and lists to recovered points: the steps in their order.
 
-use crate::compiled::Both;
 use crate::density::tomography;
 use crate::neighbors::{Geometric, Neighborhoods, geometric_by};
 use crate::recover::baselines::density::published;
@@ -60,7 +59,7 @@ impl<const D: usize> Solver<D> for Builtin {
 type Solve<const D: usize> =
     fn(Builtin, &Released<D>, &Neighborhoods, &RecoverOptions) -> Result<Recovered<D>, Error>;
 
-static SOLVE: Both<Solve<2>, Solve<3>> = Both(solve::<2>, solve::<3>);
+crate::both! { SOLVE: Solve = solve }
 
 fn solve<const D: usize>(
     solver: Builtin,

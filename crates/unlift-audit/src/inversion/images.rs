@@ -3,14 +3,15 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use rayon::prelude::*;
 use unlift::audit::{Cell, Counts, Measure, Row};
 use unlift::{Descriptors, Error};
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_vision::features::photo::{Turn, read_color};
 use unlift_vision::network::DescriptorKind;
-use unlift_vision::pictures::Points;
+use unlift_vision::pictures::{Gallery, Points};
 
-use crate::images::FeatureSource;
+use crate::images::{FeatureSource, evenly};
 
 use super::{Painter, Photo, Picture, needed, size};
 
@@ -29,6 +30,7 @@ pub struct Inversion {
     /// Folder of the photos, which have the names of the images.
     photos: PathBuf,
     turn: Turn,
+    gallery: Gallery,
     known: Mutex<BTreeMap<String, Arc<Truth>>>,
     failed: Mutex<BTreeMap<String, Error>>,
 }
@@ -40,10 +42,10 @@ impl fmt::Debug for Inversion {
 }
 
 impl Inversion {
-    /// Opens the measure for the images of `source` at `path`. Photos are in the folder `photos`, or in `path`. `kind` is that of the
-    /// descriptors.
+    /// Opens the measure for the images `chosen` of `source` at `path`. Photos are in the folder `photos`, or in `path`. `kind` is that
+    /// of the descriptors.
     pub fn open(
-        (source, path): (&FeatureSource, &Path),
+        (source, chosen, path): (&FeatureSource, &[usize], &Path),
         kind: DescriptorKind,
         photos: Option<&Path>,
         network: Option<&Path>,
@@ -52,8 +54,15 @@ impl Inversion {
         let none = "--invert: expected --photos, as PATH is no folder of photos";
         let photos = photos.ok_or_else(|| crate::Error::request(none))?;
         let (painter, photos) = (Painter::open(kind, network)?, photos.to_owned());
+        let read = |at: usize| {
+            let name = &source.names[chosen[at]];
+            let photo = read_color(&photos.join(name), source.turn).ok()?;
+            Some((name.clone(), Gallery::reduced(&photo)))
+        };
+        let in_gallery = evenly(chosen.len(), Some(Gallery::MAX));
+        let gallery = Gallery::new(in_gallery.into_par_iter().filter_map(read).collect());
         let (known, failed) = Default::default();
-        Ok(Self { painter, photos, turn: source.turn, known, failed })
+        Ok(Self { painter, photos, turn: source.turn, gallery, known, failed })
     }
 
     /// Returns the SHA-256 of the painting network, in hexadecimal.
@@ -118,6 +127,7 @@ impl Inversion {
         let photo = self.painter.photo(&photo)?;
         let image = self.painter.keypoints(places, descriptors, size)?;
         let baseline = self.painter.compare(image, &photo)?;
+        let baseline = self.painter.assign(baseline, name, &self.gallery)?;
         let truth = Arc::new(Truth { photo, baseline });
         let mut known = lock(&self.known);
         if known.len() >= KEPT {
@@ -146,7 +156,9 @@ impl Measure<2> for Inversion {
             }
         };
         let image = self.painter.image(cell.released, cell.recovered)?;
-        Ok(self.painter.compare(image, &truth.photo)?.figures(&truth.baseline))
+        let picture = self.painter.compare(image, &truth.photo)?;
+        let picture = self.painter.assign(picture, name, &self.gallery)?;
+        Ok(picture.figures(&truth.baseline, &self.gallery))
     }
 }
 

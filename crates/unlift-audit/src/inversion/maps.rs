@@ -14,8 +14,9 @@ use unlift_io::read::colmap;
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::pictures::{Marks, ReleasedView};
 use unlift_report::scene::{SceneBox, Shapes};
+use unlift_vision::features::ColorImage;
 use unlift_vision::features::photo::{Turn, read_color};
-use unlift_vision::pictures::{Lens, View};
+use unlift_vision::pictures::{Gallery, Lens, View};
 
 use super::{Painter, Photo, Picture, needed};
 use crate::Progress;
@@ -38,6 +39,8 @@ struct PhotoView {
 pub struct MapInversion {
     painter: Painter,
     views: Vec<PhotoView>,
+    /// The photos of the first [`Gallery::MAX`] views.
+    gallery: Gallery,
     /// The inlier ratio of the oracle whose recoveries are painted; `None`: all.
     ratio: Option<f64>,
     /// The cell that was measured last and its pictures, one per photo, so that the page does not
@@ -98,7 +101,9 @@ impl MapInversion {
             let expected = format!("photos of the images in {}", model.display());
             return Err(unlift_io::Error::new(photos, "", expected, "none").into());
         }
-        Ok(Self { painter, views, ratio: None, last: Mutex::default() })
+        let small = |of: &PhotoView| (of.name.clone(), Gallery::reduced(&of.photo.image));
+        let gallery = Gallery::new(views.iter().take(Gallery::MAX).map(small).collect());
+        Ok(Self { painter, views, gallery, ratio: None, last: Mutex::default() })
     }
 
     /// Paints the oracle's recoveries at this inlier ratio only.
@@ -154,9 +159,14 @@ impl MapInversion {
     fn pictures(&self, cell: &Cell<'_>, n: usize) -> Result<Vec<Picture>, Error> {
         let picture = |of: &PhotoView| {
             let image = self.painter.map(&of.view, cell.released, cell.recovered)?;
-            self.painter.compare(image, &of.photo)
+            self.compare(image, of)
         };
         self.views.par_iter().take(n).map(picture).collect()
+    }
+
+    fn compare(&self, image: ColorImage, of: &PhotoView) -> Result<Picture, Error> {
+        let picture = self.painter.compare(image, &of.photo)?;
+        self.painter.assign(picture, &of.name, &self.gallery)
     }
 
     fn truth<'a>(&'a self, of: &'a PhotoView, cell: &Cell<'_>) -> Result<&'a Picture, Error> {
@@ -165,7 +175,7 @@ impl MapInversion {
             let positions: Vec<Option<[f64; 3]>> = originals.iter().copied().map(Some).collect();
             let descriptors = needed(cell.descriptors)?;
             let image = self.painter.points(&of.view, &positions, descriptors, |_, _| 1.0)?;
-            self.painter.compare(image, &of.photo)
+            self.compare(image, of)
         };
         of.truth.get_or_init(make).as_ref().map_err(Error::clone)
     }
@@ -180,7 +190,7 @@ impl Measure<3> for MapInversion {
         let pictures = self.pictures(cell, self.views.len())?;
         let mut all = Vec::new();
         for (of, picture) in self.views.iter().zip(&pictures) {
-            all.extend(picture.figures(self.truth(of, cell)?));
+            all.extend(picture.figures(self.truth(of, cell)?, &self.gallery));
         }
         let mut sums = BTreeMap::new();
         for (name, value) in all {

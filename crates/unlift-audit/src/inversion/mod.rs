@@ -18,7 +18,7 @@ use unlift_vision::features::photo::jpeg_of;
 use unlift_vision::features::{ColorImage, halved};
 use unlift_vision::network::DescriptorKind;
 use unlift_vision::pictures::{
-    CLASSES, Detection, Detector, Inverter, Lpips, Metrics, Points, Projection, View,
+    CLASSES, Detection, Detector, Gallery, Inverter, Lpips, Metrics, Points, Projection, View,
 };
 
 pub use bearings::{on_bearings, six_views};
@@ -33,6 +33,8 @@ const BASELINE: &str = "_baseline";
 /// Limit of PSNR, which is infinite for equal pictures.
 const MOST_DB: f64 = 100.0;
 
+/// Share of the pictures that are nearer to their own photo than to every other one.
+const REIDENTIFIED: &str = "reidentified";
 const OBJECTS: &str = "objects_found";
 /// Minimum confidence of the detector for an object.
 const SURE: f32 = 0.3;
@@ -66,6 +68,8 @@ struct Picture {
     metrics: Metrics,
     /// The class of every object of the photo, and whether it is found in the picture.
     objects: Vec<(usize, bool)>,
+    /// Whether the picture is nearer to its photo than to every other one, if it was compared.
+    reidentified: Option<bool>,
 }
 
 impl Painter {
@@ -151,13 +155,20 @@ impl Painter {
             let mut same = found.iter().filter(|of| of.class == object.class);
             (object.class, same.any(|of| of.overlap(object) >= SAME))
         };
-        Ok(Picture { image, metrics, objects: photo.objects.iter().map(again).collect() })
+        let objects = photo.objects.iter().map(again).collect();
+        Ok(Picture { image, metrics, objects, reidentified: None })
+    }
+
+    /// Finds out whether `picture` is assigned to its photo, `name`, among those of the gallery.
+    fn assign(&self, picture: Picture, name: &str, gallery: &Gallery) -> Result<Picture, Error> {
+        let reidentified = gallery.assigns(&picture.image, name, &self.lpips)?;
+        Ok(Picture { reidentified, ..picture })
     }
 }
 
 impl Picture {
-    /// Returns the figures of the picture: its similarity, the share of the photo's objects that are found in it, if there are
-    /// any, and then by class. Names end with `end`.
+    /// Returns the figures of the picture: its similarity, whether it is assigned to its photo, the share of the photo's objects
+    /// that are found in it, if there are any, and then by class. Names end with `end`.
     fn named(&self, end: &str) -> Vec<(String, f64)> {
         let Metrics { ssim, psnr, lpips } = self.metrics;
         let figures = [("ssim", ssim), ("psnr", psnr.min(MOST_DB)), ("lpips", lpips)];
@@ -171,12 +182,16 @@ impl Picture {
         let name = |class: usize| format!("{OBJECTS}_of_{}", CLASSES[class].replace(' ', "_"));
         let each = classes.iter().map(|&class| (name(class), share(&|known| known == class)));
         let figures = figures.map(|(name, value)| (name.to_owned(), value)).into_iter();
-        let named = figures.chain(all).chain(each);
+        let assigned =
+            self.reidentified.map(|yes| (REIDENTIFIED.to_owned(), f64::from(u8::from(yes))));
+        let named = figures.chain(assigned).chain(all).chain(each);
         named.map(|(name, value)| (name + end, value)).collect()
     }
 
-    fn figures(&self, baseline: &Self) -> Vec<(String, f64)> {
-        [self.named(""), baseline.named(BASELINE)].concat()
+    fn figures(&self, baseline: &Self, gallery: &Gallery) -> Vec<(String, f64)> {
+        let chance = gallery.chance().filter(|_| self.reidentified.is_some());
+        let chance = chance.map(|chance| (format!("{REIDENTIFIED}_by_chance"), chance));
+        [self.named(""), baseline.named(BASELINE), chance.into_iter().collect()].concat()
     }
 
     fn painted(&self) -> Result<Painted, Error> {

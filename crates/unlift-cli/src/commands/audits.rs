@@ -296,7 +296,7 @@ fn inversion(
     let Some(network) = &args.invert else { return Ok(None) };
     let kind = source.kind("--invert", chosen)?;
     let inversion =
-        Inversion::open((source, path), kind, args.photos.as_deref(), network.as_deref())?;
+        Inversion::open((source, chosen, path), kind, args.photos.as_deref(), network.as_deref())?;
     Ok(Some(inversion))
 }
 

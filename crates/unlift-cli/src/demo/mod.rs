@@ -67,7 +67,8 @@ fn photos(output: Output) -> crate::Result<Audited> {
     let folder = photos::folder()?;
     let extraction = Extraction { min_score: photos::MIN_SCORE, ..Extraction::ALIKED };
     let source = FeatureSource::open(folder.path(), &extraction)?;
-    let of = (&source, folder.path());
+    let opened = Opened::of(source, folder.path(), None);
+    let of = (&opened.source, &opened.chosen[..], folder.path());
     let inversion = Arc::new(Inversion::open(of, DescriptorKind::Aliked, None, None)?);
     let usual = Plan::new(Unit::Pixel);
     let plan = Plan {
@@ -79,7 +80,6 @@ fn photos(output: Output) -> crate::Result<Audited> {
         measures: vec![Arc::clone(&inversion) as Arc<dyn Measure<2>>],
         ..usual
     };
-    let opened = Opened::of(source, folder.path(), None);
     let inversion = Some(inversion);
     let images = Images { opened: &opened, plan, draws: true, photos: None, inversion };
     let mut audit = Audit::new(output);

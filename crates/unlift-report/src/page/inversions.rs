@@ -267,6 +267,9 @@ fn exhibit(results: &Results<'_>, inversion: &Inversion, view: &View) -> Option<
             " Even from the true points this network paints a poor picture (similarity to the photo: SSIM {baseline:.2} of 1)."
         ));
     }
+    if let Some(assigned) = reidentified(row) {
+        sentence.push_str(&format!(" {assigned}."));
+    }
     let released = inversion.released.iter().find(|of| of.scheme == *scheme);
     Some(json!({
         "level": level,
@@ -277,6 +280,22 @@ fn exhibit(results: &Results<'_>, inversion: &Inversion, view: &View) -> Option<
         "painted": image_source(&view.recovered.jpeg),
         "name": inversion.name,
     }))
+}
+
+/// With fewer photos than one in this share, a picture is assigned to its photo by chance too often to say anything.
+const LIKELY_CHANCE: f64 = 0.1;
+
+/// Returns how many pictures of a row can be assigned to their photo; `None` if there are few photos.
+fn reidentified(row: &Row) -> Option<String> {
+    let of = |name: &str| row.metrics.get(name).copied();
+    let (share, chance) = (of("reidentified")?, of("reidentified_by_chance")?);
+    if chance > LIKELY_CHANCE {
+        return None;
+    }
+    let [share, chance] = [share, chance].map(|share| words::percent(100.0 * share));
+    Some(format!(
+        "{share} % of the pictures by this attack can be assigned to their photo ({chance} % by chance)"
+    ))
 }
 
 const MAX_LINES: usize = 700;

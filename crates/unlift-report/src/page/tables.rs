@@ -275,12 +275,25 @@ pub(crate) fn likeness(results: &Results<'_>) -> Option<Table> {
         let lost = of("ssim_baseline").zip(of("ssim")).map(|(baseline, ssim)| baseline - ssim);
         known(lost, |lost| format!("{lost:.3}"))
     }));
-    let caption = "Similarity of pictures, painted from recovered points, to the photos; means over photos. Higher SSIM and PSNR and lower \
-                   LPIPS mean more similar.";
+    let percent = |row: &Row, metric: &str| {
+        known(row.metrics.get(metric), |share| words::percent(100.0 * share))
+    };
+    columns.push(figure("assigned, %", move |row: &Row| percent(row, "reidentified")));
+    let mut caption = "Similarity of pictures, painted from recovered points, to the photos; means over photos. Higher SSIM and PSNR and \
+                       lower LPIPS mean more similar."
+        .to_owned();
+    if first.metrics.contains_key("reidentified") {
+        caption += &format!(
+            " Assigned: pictures with a smaller LPIPS distance to their own photo than to every other photo of the audit, all at \
+             64 x 64 pixels; {} % would be by chance.",
+            percent(first, "reidentified_by_chance")
+        );
+    }
     let table = Table::of("likeness", caption, results.rows, columns);
     let unprotected =
         LIKENESS.map(|(metric, _, digits)| cell(first, &format!("{metric}{BASELINE}"), digits));
-    let unprotected = unprotected.into_iter().chain([NONE.to_owned()]);
+    let assigned = percent(first, "reidentified_baseline");
+    let unprotected = unprotected.into_iter().chain([NONE.to_owned(), assigned]);
     Some(with_unprotected(table, unprotected).without_empty_columns())
 }
 

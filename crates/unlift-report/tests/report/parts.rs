@@ -151,6 +151,9 @@ fn painted_document() -> Document {
     for (row, ssim) in document.results.iter_mut().zip([0.48, 0.33].into_iter().cycle()) {
         row.metrics.insert("ssim".into(), ssim);
         row.metrics.insert("ssim_baseline".into(), 0.5);
+        row.metrics.insert("reidentified".into(), 0.95);
+        row.metrics.insert("reidentified_baseline".into(), 1.0);
+        row.metrics.insert("reidentified_by_chance".into(), 0.025);
         row.metrics.insert("objects_found".into(), 0.2);
         row.metrics.insert("objects_found_of_tv".into(), 0.25);
         row.metrics.insert("objects_found_of_tv_baseline".into(), 0.75);
@@ -246,7 +249,8 @@ fn pictures_that_would_make_a_page_too_large_are_left_out() {
 fn figures_of_pictures_are_in_tables() {
     let found = painted_page(&painted_document(), Vec::new(), false);
     assert!(found.contains("tv, %"), "{found}");
-    assert!(found.contains("<td>0.480</td><td>0.020</td>"), "{found}");
+    assert!(found.contains("<td>0.480</td><td>0.020</td><td>95.0</td>"), "{found}");
+    assert!(found.contains("2.5 % would be by chance"));
     assert!(!found.contains("ssim_baseline"));
     assert!(found.contains("<td>75.0</td>") && found.contains("<td>25.0</td>"));
 }

@@ -1,4 +1,4 @@
-//! Pictures from keypoints and descriptors, and their similarity to the photo (Sec. 4.3 and 6 of
+//! Pictures from keypoints and descriptors, and their similarity to photos (Sec. 4.3 and 6 of
 //! the paper).
 //!
 //! ```text
@@ -11,10 +11,12 @@
 
 mod camera;
 mod detect;
+mod gallery;
 mod inverter;
 mod metrics;
 
 pub use camera::{Lens, Projection, View};
 pub use detect::{CLASSES, Detection, Detector};
+pub use gallery::Gallery;
 pub use inverter::{CELL, Inverter, Points, feature_image};
 pub use metrics::{Lpips, Metrics};

@@ -15,7 +15,6 @@ use super::plan::Plan;
 use super::row::{Alone, ByReason, Distinct, Parts, Row, places_within, within};
 use super::run::{Outcome, none_applies};
 use super::share::{Shares, Threshold, merge, percents};
-use crate::compiled::Both;
 use crate::evaluate::{Accuracy, Reliability};
 use crate::truth::Original;
 use crate::{Descriptors, Error};
@@ -167,7 +166,7 @@ impl Sums {
 type SumsOf<const D: usize> =
     fn(&Item<D>, &Plan<D>, &mut dyn Observer<D>) -> Result<(Vec<Row>, Sums), Error>;
 
-static SUMS_OF: Both<SumsOf<2>, SumsOf<3>> = Both(sums_of::<2>, sums_of::<3>);
+unlift_attack::both! { SUMS_OF: SumsOf = sums_of }
 
 /// Returns the rows of one item and its sums; both are empty without points.
 fn sums_of<const D: usize>(

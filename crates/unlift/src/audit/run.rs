@@ -9,7 +9,6 @@ use super::missing::NotAudited;
 use super::observer::Observer;
 use super::plan::Plan;
 use super::row::Row;
-use crate::compiled::Both;
 use crate::evaluate::Truth;
 use crate::obfuscate::{Lifted, LocalPoints, Scheme};
 use crate::released::Released;
@@ -63,7 +62,7 @@ type EveryCell<const D: usize> = fn(
     &mut dyn Observer<D>,
 ) -> Result<Outcome, Error>;
 
-static EVERY_CELL: Both<EveryCell<2>, EveryCell<3>> = Both(every_cell::<2>, every_cell::<3>);
+unlift_attack::both! { EVERY_CELL: EveryCell = every_cell }
 
 /// Runs every cell of `plan`. If `hidden` is given, it is the obfuscation for the plan's first scheme.
 fn every_cell<const D: usize>(
