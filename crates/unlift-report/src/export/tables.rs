@@ -97,11 +97,8 @@ fn grid(results: &Results<'_>, within: &[&str]) -> Table {
     let by = |scheme: &str, given: &Given| {
         let row = |typed: &str| results.strongest_given(scheme, given, typed);
         if within.first().is_none_or(|typed| row(typed).is_none()) {
-            let source = Some(given.neighbors.as_str());
-            let mut refused = results.document.not_audited.iter();
-            let is_refused =
-                refused.any(|of| of.scheme == scheme && of.neighbors.as_deref() == source);
-            return if is_refused { NOT_AUDITED } else { NONE }.to_owned();
+            let refusal = results.refusal(scheme, Some(&given.neighbors));
+            return if refusal.is_some() { NOT_AUDITED } else { NONE }.to_owned();
         }
         joined(&|typed| {
             let row = row(typed);

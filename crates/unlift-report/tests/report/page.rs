@@ -128,9 +128,7 @@ fn terminal_and_page_say_the_same_numbers() {
 #[test]
 fn what_could_not_be_audited_is_said_and_never_reads_as_little() {
     let mut document = sample::document(true);
-    document.results.retain(|row| row.scheme != "ppl+");
-    document.break_even.retain(|point| point.scheme != "ppl+");
-    document.run.seconds.rows.clear();
+    sample::retain(&mut document, |scheme| scheme != "ppl+");
     let reason = "k: expected between 1 and 8, found 50";
     document.not_audited =
         serde_json::from_value(serde_json::json!([{"scheme": "ppl+", "reason": reason}])).unwrap();
@@ -175,10 +173,7 @@ fn centimeters_never_appear_without_a_scale() {
 fn the_sampling_error_stands_beside_every_percentage_of_the_verdict() {
     let mut document = sample::mixed(true);
     for row in &mut document.results {
-        row.records_alone_percent = None;
-        row.records_alone_by = None;
-        row.recovered_percent.values_mut().for_each(|percent| *percent = 20.2);
-        row.blind_percent.values_mut().for_each(|percent| *percent = 1.0);
+        sample::set(row, 20.2, 1.0);
         let ends = |low: f64, high: f64| {
             row.recovered_percent.keys().map(|typed| (typed.clone(), [low, high])).collect()
         };
@@ -289,9 +284,7 @@ fn every_figure_stands_in_a_table_and_what_must_be_known_beside_the_verdict() {
     ] {
         assert!(text.contains(said), "{said}");
     }
-    document.results.clear();
-    document.break_even.clear();
-    document.run.seconds.rows.clear();
+    sample::retain(&mut document, |_| false);
     assert!(page(&document, None, false).contains("No scheme was tested."));
 }
 
@@ -307,8 +300,7 @@ fn the_banner_says_how_bad_it_is() {
         (&["plane"], "orange", "Not tested: what an attacker recovers from the released data alone. Not tried: attacks by descriptors and the attack on the records alone. An attacker would recover 83.7 % of the points of this map within 10 cm if half of the neighbors were known (plane, known neighbors)."),
     ] {
         let mut document = sample::document(true);
-        document.results.retain(|row| schemes.contains(&row.scheme.as_str()));
-        document.run.seconds.rows.clear();
+        sample::retain(&mut document, |scheme| schemes.contains(&scheme));
         let said = verdict(&document);
         assert!(said.contains(expected), "{said}");
         let colored = format!("<section class=\"part {color}\"");

@@ -7,6 +7,7 @@ use unlift::Error;
 use unlift::descriptors::Values;
 use unlift::neighbors::DescriptorKind;
 
+use super::image::ColorImage;
 use super::learned::{LearnedFeatures, aliked, superpoint};
 use super::options::Extraction;
 use super::photo::{self, Turn};
@@ -29,9 +30,11 @@ pub struct Extractor {
 
 enum Method {
     Sift(Sift),
-    Aliked(Network),
-    SuperPoint(Network),
+    /// A network, what extracts features by it, and the standard deviation of its keypoints.
+    Learned(Network, Learned, f64),
 }
+
+type Learned = fn(&Network, &Extraction, &ColorImage) -> Result<LearnedFeatures, Error>;
 
 /// The features of a photo.
 pub struct Photo {
@@ -88,8 +91,12 @@ impl Extractor {
         options.check()?;
         let method = match options.kind {
             DescriptorKind::Sift => Method::Sift(Sift::try_new(*options)?),
-            DescriptorKind::Aliked => Method::Aliked(Network::load("aliked-n16rot")?),
-            DescriptorKind::SuperPoint => Method::SuperPoint(Network::load("superpoint")?),
+            DescriptorKind::Aliked => {
+                Method::Learned(Network::load("aliked-n16rot")?, aliked, DETECTION_NOISE)
+            }
+            DescriptorKind::SuperPoint => {
+                Method::Learned(Network::load("superpoint")?, superpoint, SUPERPOINT_NOISE)
+            }
         };
         Ok(Self { options: *options, method, turn: Turn::Upright })
     }
@@ -120,13 +127,9 @@ impl Extractor {
                 let features = sift.extract(&photo::gray(photo)?);
                 Ok(Photo::of_sift(size, noise(DETECTION_NOISE), features))
             }
-            Method::Aliked(network) => {
-                let features = aliked(network, &self.options, &photo::color(photo)?)?;
-                Ok(Photo::of_network(size, noise(DETECTION_NOISE), features))
-            }
-            Method::SuperPoint(network) => {
-                let features = superpoint(network, &self.options, &photo::color(photo)?)?;
-                Ok(Photo::of_network(size, noise(SUPERPOINT_NOISE), features))
+            Method::Learned(network, extract, noise_px) => {
+                let features = extract(network, &self.options, &photo::color(photo)?)?;
+                Ok(Photo::of_network(size, noise(*noise_px), features))
             }
         }
     }
