@@ -12,40 +12,30 @@ pub fn page(document: &Document, scene: Option<&Scene3d>, share_safe: bool) -> S
     render(document, scene, &options).expect("a page")
 }
 
-/// Returns the page without scripts and styles, as a browser without script shows it.
-fn without_script(page: &str) -> String {
-    let mut text = page.to_owned();
-    for (open, close) in [("<script", "</script>"), ("<style", "</style>")] {
-        while let Some(start) = text.find(open) {
-            let end = start + text[start..].find(close).expect("it ends") + close.len();
-            text.replace_range(start..end, "");
-        }
+/// Removes all parts from `open` to `close`.
+fn without(mut text: String, open: &str, close: &str) -> String {
+    while let Some(start) = text.find(open) {
+        let end = start + text[start..].find(close).expect("it ends") + close.len();
+        text.replace_range(start..end, "");
     }
     text
 }
 
+/// Returns the page without scripts and styles, as a browser without script shows it.
+fn without_script(page: &str) -> String {
+    without(without(page.to_owned(), "<script", "</script>"), "<style", "</style>")
+}
+
 /// Returns the text without tags and with single spaces.
 fn plain(markup: &str) -> String {
-    let mut text = String::new();
-    let mut inside = false;
-    for c in markup.chars() {
-        match c {
-            '<' => (inside, ()) = (true, text.push(' ')),
-            '>' => inside = false,
-            c if !inside => text.push(c),
-            _ => {}
-        }
-    }
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
+    let texts = markup.split('<').map(|part| part.split_once('>').map_or(part, |(_, text)| text));
+    texts.flat_map(str::split_whitespace).collect::<Vec<_>>().join(" ")
 }
 
 /// Returns the page as text without scripts, tags and tooltips.
 fn said(document: &Document) -> String {
-    let mut text = without_script(&page(document, None, false));
-    while let Some(start) = text.find("<span class=\"tip\"") {
-        let end = start + text[start..].find("</span>").expect("it ends") + "</span>".len();
-        text.replace_range(start..end, "");
-    }
+    let text = without_script(&page(document, None, false));
+    let text = without(text, "<span class=\"tip\"", "</span>");
     // Marks the start of the verdict and cuts the table of contents.
     let text = text.replace("<section class=\"part", "VERDICT <section class=\"part");
     let (contents, rest) = text.split_once("</nav>").expect("contents");
