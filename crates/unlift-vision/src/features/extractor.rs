@@ -31,10 +31,10 @@ pub struct Extractor {
 enum Method {
     Sift(Sift),
     /// A network, what extracts features by it, and the standard deviation of its keypoints.
-    Learned(Network, Learned, f64),
+    Learned(Network, Extract, f64),
 }
 
-type Learned = fn(&Network, &Extraction, &ColorImage) -> Result<LearnedFeatures, Error>;
+type Extract = fn(&Network, &Extraction, &ColorImage) -> Result<LearnedFeatures, Error>;
 
 /// The features of a photo.
 pub struct Photo {
