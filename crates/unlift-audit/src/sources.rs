@@ -132,7 +132,7 @@ mod tests {
     use unlift::seed::Key;
     use unlift::truth::Original;
     use unlift::{PointSet, Unit};
-    use unlift_vision::features::{Extraction, Extractor, PhotoFeatures};
+    use unlift_vision::features::{Extraction, Extractor};
 
     use super::*;
 
@@ -182,15 +182,15 @@ mod tests {
     fn lists_that_agree_better_decide_between_aliked_and_others() {
         let photo = "../unlift-cli/src/demo/photos/coffee.jpg".as_ref();
         let photo = Extractor::try_new(&Extraction::ALIKED).unwrap().read(photo).unwrap();
-        let PhotoFeatures::Learned(aliked) = photo.features else { panic!("no ALIKED") };
+        let Values::F32(aliked) = photo.descriptors else { panic!("no ALIKED") };
         // A Hadamard matrix turns descriptors and keeps their distances, as if another network had made them.
-        let turned = aliked.descriptors.chunks_exact(128).flat_map(|row| {
+        let turned = aliked.chunks_exact(128).flat_map(|row| {
             let sign = |r: usize, c: usize| {
                 if (r & c).count_ones().is_multiple_of(2) { 1.0 } else { -1.0 }
             };
             (0..128).map(move |r| (0..128).map(|c| sign(r, c) * row[c]).sum::<f32>())
         });
-        for (values, is_aliked) in [(aliked.descriptors.clone(), true), (turned.collect(), false)] {
+        for (values, is_aliked) in [(aliked.clone(), true), (turned.collect(), false)] {
             let descriptors = Descriptors::try_new(Values::F32(values), 128).unwrap();
             let points = (0..descriptors.len()).map(|at| [at as f64, (at % 7) as f64, 0.0]);
             let original = Original::new(PointSet::try_new(points.collect(), Unit::Meter).unwrap());

@@ -23,7 +23,6 @@ pub enum Kind {
     Picture,
     Junit,
     Table,
-    Curves,
 }
 
 impl Kind {
@@ -39,8 +38,7 @@ impl Kind {
             Self::Features => ("features", 0, &[]),
             Self::Picture => ("a picture", 33, &[PICTURE_MARK]),
             Self::Junit => ("gates as JUnit XML", 40, &[b"<testsuites name=\"unlift\""]),
-            Self::Table => ("a table", 0, &[b"scheme,neighbors,", b"% unlift ", b"<!-- unlift "]),
-            Self::Curves => ("curves", 40, &[b"<!-- unlift "]),
+            Self::Table => ("a table", 0, &[b"scheme,neighbors,", b"% unlift "]),
         }
     }
 

@@ -87,12 +87,9 @@ fn observed(
     (tell, by): (Option<Py<PyAny>>, &Raised),
     work: impl FnOnce(&Watcher) -> Result<Audited, Error> + Send + 'static,
 ) -> PyResult<(Report, Vec<String>)> {
-    let watcher = Arc::new(Watcher::new(tell, by.stop()));
+    let watcher = Arc::new(Watcher::new(tell, by.waiting.clone()));
     let progress = Arc::clone(&watcher);
-    let result = threads::run(py, threads, Some(by.stop()), move || work(&progress));
-    if let Some(error) = watcher.failed() {
-        return Err(error);
-    }
+    let result = threads::run(py, threads, Some(&by.waiting), move || work(&progress));
     let audited = result.map_err(|error| by.as_cause_of(py, renamed(py, error)))?;
     let is_note = |line: &String| {
         line.strip_prefix("note: ")

@@ -1,6 +1,7 @@
 //! Images of an audit: a path, or arrays by name, which are read when needed.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyString;
@@ -11,7 +12,6 @@ use unlift_io::features::ImageFeatures;
 
 use crate::arrays::{UnliftError, descriptors, raised, rows, wrong};
 use crate::own::Raised;
-use crate::threads;
 
 const KEYS: [&str; 4] = ["keypoints", "width", "height", "descriptors"];
 
@@ -38,19 +38,23 @@ impl Images {
             names.push(name_of(&name?)?);
         }
         names.sort_unstable();
-        let (by, by_name, keys) = (by.clone(), by_name.unbind(), names.clone());
+        let (by, by_name, keys) = (by.clone(), Arc::new(by_name.unbind()), names.clone());
         let get = move |at: usize| {
-            let (stop, name) = (by.stop(), &keys[at]);
-            let place = place(name);
-            let features = threads::attached(&stop, |py| {
+            let (by_name, name, place) = (Arc::clone(&by_name), keys[at].clone(), place(&keys[at]));
+            let at = place.clone();
+            let features = by.made(move |py| {
                 let given = by_name.bind(py).get_item(name);
-                let features = given.and_then(|given| features_of(&place, &given));
-                // The user's mapping may fail to read an image.
-                features.map_err(|error| raised_by(py, &place, &by, error).value(py).to_string())
+                match given.and_then(|given| features_of(&at, &given)) {
+                    // Our own exceptions name the image.
+                    Err(error) if error.is_instance_of::<UnliftError>(py) => {
+                        Ok(Err(error.value(py).to_string()))
+                    }
+                    features => features.map(Ok),
+                }
             });
-            features
-                .unwrap_or_else(|| Err(format!("{place}: expected arrays, found an interrupt")))
-                .map_err(Error::request)
+            // The user's mapping may fail to read an image.
+            let failed = |found| Err(format!("{place}: expected arrays, found {found}"));
+            features.unwrap_or_else(failed).map_err(Error::request)
         };
         FeatureSource::in_memory(names, get).map(Self::InMemory).map_err(raised)
     }
@@ -59,15 +63,6 @@ impl Images {
 /// Returns the place of an image in errors, in Python notation.
 fn place(name: &str) -> String {
     format!("images[{name:?}]")
-}
-
-/// Converts an exception of the user's mapping to an error about the place; keeps our own
-/// exceptions.
-fn raised_by(py: Python<'_>, place: &str, by: &Raised, error: PyErr) -> PyErr {
-    match error.is_instance_of::<UnliftError>(py) {
-        true => error,
-        false => wrong(place, "arrays", by.keep(py, error)),
-    }
 }
 
 fn is_mapping(given: &Bound<'_, PyAny>) -> PyResult<bool> {

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Work runs on threads of its own, without the interpreter's lock. KeyboardInterrupt ends the wait
-//! at once.
+//! at once, and Python functions run on the thread that waits.
 
 mod arrays;
 mod audit;
@@ -59,7 +59,6 @@ mod _unlift {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        super::threads::register(module)?;
         super::names(module)
     }
 }

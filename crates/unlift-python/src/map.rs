@@ -178,7 +178,7 @@ pub fn obfuscate(
     let scheme = scheme_of::<3>(scheme, &SchemeOptions::usual(unit), &by)?;
     let key = seed.map_or_else(Key::fresh, |seed| Ok(Key::from_seed(seed))).map_err(raised)?;
     let prepared = Arc::clone(&map.prepared);
-    let hidden = threads::run(py, None, Some(by.stop()), move || {
+    let hidden = threads::run(py, None, Some(&by.waiting), move || {
         let (original, descriptors) = (&prepared.original, prepared.descriptors.as_ref());
         let (released, secret) = hide(&*scheme, original, descriptors, &key)?;
         check_laws(&*scheme, original, &key, (&released, &secret))

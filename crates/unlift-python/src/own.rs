@@ -1,9 +1,8 @@
 //! Schemes, sources and solvers that are Python functions, and property tests of them.
 
-use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
-use pyo3::exceptions::PyAssertionError;
+use pyo3::exceptions::{PyAssertionError, PyKeyboardInterrupt};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use unlift::guard::caught;
@@ -18,29 +17,37 @@ use crate::arrays::{raised, rows, to_rows, wrong};
 use crate::hidden::{Released as PyReleased, released_of};
 use crate::lists::{self, Neighborhoods as PyNeighborhoods};
 use crate::records::hiding;
-use crate::threads::{self, locked};
+use crate::threads::{self, Waiting, locked};
 
-/// Exceptions of user functions, and a flag that prevents further calls.
+/// Exceptions of user functions, and the thread that calls them.
 #[derive(Clone, Debug, Default)]
 pub struct Raised {
     /// Exceptions, each with its message.
     errors: Arc<Mutex<Vec<(String, PyErr)>>>,
-    stop: Arc<AtomicBool>,
+    pub waiting: Waiting,
 }
 
 impl Raised {
-    /// Returns the flag that prevents further calls, set when the user interrupts.
-    pub fn stop(&self) -> Arc<AtomicBool> {
-        Arc::clone(&self.stop)
+    /// Runs `make` on the waiting thread. Stores an exception, and returns its message. An interrupt ends the wait.
+    pub fn made<T: Send + 'static>(
+        &self,
+        make: impl FnOnce(Python<'_>) -> PyResult<T> + Send + 'static,
+    ) -> Result<T, String> {
+        let raised = self.clone();
+        let made = self.waiting.call(move |py| match make(py) {
+            Err(error) if error.is_instance_of::<PyKeyboardInterrupt>(py) => Err(error),
+            made => Ok(made.map_err(|error| raised.keep(error))),
+        });
+        made.unwrap_or_else(|| Err("an interrupt".to_owned()))
     }
 
     /// Stores `error`, and returns its message.
-    pub fn keep(&self, py: Python<'_>, error: PyErr) -> String {
+    fn keep(&self, error: PyErr) -> String {
         let message = OneLine(error.to_string()).to_string();
         let mut errors = locked(&self.errors);
         // One exception may concern several points: store it once.
         if errors.iter().all(|(line, _)| *line != message) {
-            errors.push((message.clone(), error.clone_ref(py)));
+            errors.push((message.clone(), error));
         }
         message
     }
@@ -63,10 +70,10 @@ impl Raised {
 /// - a source returns the lists of a released map,
 /// - a solver returns positions `(n_slots, D)` from a released map and its lists, relative to the
 ///   released origin; rows that are not finite were not recovered.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Own {
     name: String,
-    function: Py<PyAny>,
+    function: Arc<Py<PyAny>>,
     /// True if it takes a random generator.
     takes_random: bool,
     /// What a source reads: descriptors unless the attribute `needs` is "nothing".
@@ -122,7 +129,7 @@ impl Own {
         let parameters = inspect.call_method1("signature", (function,))?.getattr("parameters")?;
         Ok(Self {
             name,
-            function: function.clone().unbind(),
+            function: Arc::new(function.clone().unbind()),
             takes_random: parameters.len()? > n_given,
             needs: Needs::Nothing,
             k: USUAL_K,
@@ -131,12 +138,13 @@ impl Own {
     }
 
     /// Calls `make`; returns an error if it raises, or if calls are no longer allowed.
-    fn made<T>(&self, make: impl FnOnce(Python<'_>) -> PyResult<T>) -> Result<T, Error> {
-        let Self { name, raised, .. } = self;
-        let made =
-            threads::attached(&raised.stop, |py| make(py).map_err(|error| raised.keep(py, error)));
-        let made = made.unwrap_or_else(|| Err("an interrupt".to_owned()));
-        made.map_err(|found| Error::new(name, "records, lists or positions", found))
+    fn made<T: Send + 'static>(
+        &self,
+        make: impl FnOnce(&Self, Python<'_>) -> PyResult<T> + Send + 'static,
+    ) -> Result<T, Error> {
+        let own = self.clone();
+        let made = self.raised.made(move |py| make(&own, py));
+        made.map_err(|found| Error::new(&self.name, "records, lists or positions", found))
     }
 
     /// Calls the function with `given`, and a generator seeded by these words if it takes one.
@@ -160,14 +168,14 @@ impl<const D: usize> Scheme<D> for Own {
     }
 
     fn lift(&self, points: &LocalPoints<'_, D>, key: &Key) -> Result<Lifted<D>, Error> {
-        let points = points.positions;
+        let (n, points) = (points.positions.len(), points.positions.to_vec());
         let mut draws = key.draws(Stage::Scheme, 0);
         let seed = [(); 4].map(|()| draws.bits());
-        let hiding = self.made(|py| {
-            let returned = self.call(py, vec![to_rows(py, points.to_vec())?.into_any()], seed)?;
-            hiding(&returned, &self.name)
+        let hiding = self.made(move |own, py| {
+            let returned = own.call(py, vec![to_rows(py, points)?.into_any()], seed)?;
+            hiding(&returned, &own.name)
         })?;
-        hiding.lifted(points.len(), &self.name)
+        hiding.lifted(n, &self.name)
     }
 }
 
@@ -188,10 +196,11 @@ where
     }
 
     fn lists(&self, released: &Released<D>, k: usize, seed: u64) -> Result<Neighborhoods, Error> {
-        self.made(|py| {
+        let released = released.clone();
+        self.made(move |own, py| {
             let shown = Bound::new(py, PyReleased::from(released.clone()))?.into_any();
-            let returned = self.call(py, vec![shown], [seed, 0, 0, 0])?;
-            lists::returned(&returned, released, k, self.needs)
+            let returned = own.call(py, vec![shown], [seed, 0, 0, 0])?;
+            lists::returned(&returned, &released, k, own.needs)
         })
     }
 }
@@ -210,10 +219,11 @@ where
         lists: &Neighborhoods,
         options: &RecoverOptions,
     ) -> Result<Recovered<D>, Error> {
-        let positions = self.made(|py| {
-            let shown = Bound::new(py, PyReleased::from(released.clone()))?.into_any();
-            let listed = Bound::new(py, PyNeighborhoods(Arc::new(lists.clone())))?.into_any();
-            let returned = self.call(py, vec![shown, listed], [options.seed, 0, 0, 0])?;
+        let (shown, listed, seed) = (released.clone(), Arc::new(lists.clone()), options.seed);
+        let positions = self.made(move |own, py| {
+            let shown = Bound::new(py, PyReleased::from(shown))?.into_any();
+            let listed = Bound::new(py, PyNeighborhoods(listed))?.into_any();
+            let returned = own.call(py, vec![shown, listed], [seed, 0, 0, 0])?;
             rows::<D>("positions", &returned)
         })?;
         let positions: Vec<[f32; D]> = positions.iter().map(|x| x.map(|x| x as f32)).collect();
@@ -237,7 +247,7 @@ where
 
 /// Runs `laws`; a failure becomes an AssertionError with the property, the points and the result.
 fn kept(py: Python<'_>, by: &Raised, laws: impl FnOnce() + Send + 'static) -> PyResult<()> {
-    let result = threads::run(py, None, Some(by.stop()), move || Ok::<_, String>(caught(laws)))?;
+    let result = threads::run(py, None, Some(&by.waiting), move || Ok::<_, String>(caught(laws)))?;
     result.map_err(|text| by.as_cause_of(py, PyAssertionError::new_err(text)))
 }
 

@@ -126,7 +126,7 @@ pub fn recover(
     }
     let lists = Arc::clone(&lists.0);
     let work = move || solve(&released, &lists, &*solver, &options);
-    let recovered = threads::run(py, threads, Some(by.stop()), work);
+    let recovered = threads::run(py, threads, Some(&by.waiting), work);
     Ok(Recovered(Arc::new(recovered.map_err(|error| by.as_cause_of(py, error))?)))
 }
 

@@ -348,27 +348,20 @@ fn unmatched(row: &Row) -> Unmatched {
 
 /// Returns the schemes of the old audit without a matching row in the new one, and the sources that are no longer audited.
 fn lost(old: &Results<'_>, new: &Results<'_>, taken: &[bool]) -> Vec<Lost> {
-    let refused = |scheme: &str, by: Option<&str>| {
-        let mut refused = new.document.not_audited.iter();
-        let refused = refused.find(|of| of.scheme == scheme && of.neighbors.as_deref() == by);
-        refused.map(|of| format!("not audited: {}", of.reason))
-    };
+    let refused =
+        |scheme: &str, by: Option<&str>| Some(format!("not audited: {}", new.refusal(scheme, by)?));
     let lost = old.rows.iter().filter_map(|Row { scheme, neighbors, .. }| {
         let mut rows = old.rows.iter().zip(taken).filter(|(row, _)| row.scheme == *scheme);
-        if rows.any(|(_, taken)| *taken) {
-            let reason = refused(scheme, Some(neighbors))?;
-            return Some(Lost {
-                scheme: scheme.clone(),
-                neighbors: Some(neighbors.clone()),
-                reason,
-            });
-        }
-        let otherwise = match new.schemes.contains(&scheme.as_str()) {
-            true => "no attack of the old audit is in the new one",
-            false => "no row in the new audit",
+        let (neighbors, reason) = if rows.any(|(_, taken)| *taken) {
+            (Some(neighbors.clone()), refused(scheme, Some(neighbors))?)
+        } else {
+            let otherwise = match new.schemes.contains(&scheme.as_str()) {
+                true => "no attack of the old audit is in the new one",
+                false => "no row in the new audit",
+            };
+            (None, refused(scheme, None).unwrap_or_else(|| otherwise.to_owned()))
         };
-        let reason = refused(scheme, None).unwrap_or_else(|| otherwise.to_owned());
-        Some(Lost { scheme: scheme.clone(), neighbors: None, reason })
+        Some(Lost { scheme: scheme.clone(), neighbors, reason })
     });
     distinct(lost)
 }

@@ -65,6 +65,13 @@ impl<'a> Results<'a> {
         self.rows.iter().any(|row| attack::is_again(&row.neighbors))
     }
 
+    /// Returns why a source, or the whole scheme, was not audited; `None` if it was.
+    pub(crate) fn refusal(&self, scheme: &str, source: Option<&str>) -> Option<&'a str> {
+        let mut refused = self.document.not_audited.iter();
+        let refused = refused.find(|of| of.scheme == scheme && of.neighbors.as_deref() == source);
+        refused.map(|of| of.reason.as_str())
+    }
+
     /// Returns the schemes that could not be audited at all, and the reasons.
     pub(crate) fn refused(&self) -> impl Iterator<Item = (&'a str, &'a str)> {
         let refused = self.document.not_audited.iter().filter(|of| of.neighbors.is_none());

@@ -8,7 +8,6 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
-use unlift::descriptors::Values;
 use unlift::neighbors::oracle::{self, TrueNeighbors};
 use unlift::neighbors::{Neighborhoods, Overlap, Similarity, Source};
 use unlift::obfuscate::obfuscate;
@@ -17,7 +16,7 @@ use unlift::released::Released;
 use unlift::seed::Key;
 use unlift::truth::Original;
 use unlift::{About, Descriptors, PointSet, RecordId, RowOrder, Unit};
-use unlift_vision::features::{Extraction, Extractor, PhotoFeatures};
+use unlift_vision::features::{Extraction, Extractor, Photo};
 use unlift_vision::network::Learned;
 
 const K: usize = 20;
@@ -71,19 +70,13 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// Measures the inlier ratios of a photo; `None` if it has too few keypoints.
 fn named(extractor: &Extractor, photo: &Path) -> Result<Option<Shares>, unlift::Error> {
-    let (places, values, dim) = match extractor.read(photo)?.features {
-        PhotoFeatures::Sift(sift) => {
-            let places: Vec<_> = sift.keypoints.iter().map(|at| [at.x, at.y]).collect();
-            (places, Values::U8(sift.descriptors.concat()), 128)
-        }
-        PhotoFeatures::Learned(of) => (of.keypoints, Values::F32(of.descriptors), of.dim),
-    };
+    let Photo { keypoints: places, descriptors, dim, .. } = extractor.read(photo)?;
     if places.len() <= K {
         return Ok(None);
     }
     let points = places.iter().map(|at| at.map(f64::from)).collect();
     let original = Original::new(PointSet::try_new(points, Unit::Pixel)?);
-    let descriptors = Descriptors::try_new(values, dim)?;
+    let descriptors = Descriptors::try_new(descriptors, dim)?;
     let key = Key::from_seed(0);
     let (released, secret) = obfuscate(&Olc, &original, Some(&descriptors), &key)?;
     let near = TrueNeighbors::new(&oracle::search(&original)?, &secret, 1, K)?;

@@ -19,7 +19,7 @@ use unlift::Descriptors;
 use unlift::descriptors::Values;
 use unlift::neighbors::{dense, usual};
 use unlift::seed::{Draws, Stage};
-use unlift_vision::features::{Extraction, Extractor, PhotoFeatures, in_order};
+use unlift_vision::features::{Extraction, Extractor, Photo, in_order};
 
 /// Steps of a pair score per standard deviation.
 const STEPS: f32 = 1024.0;
@@ -69,8 +69,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let extractor = Extractor::try_new(&extraction(&kind, max_image_size)?)?;
     let mut n_keypoints = 0;
     let crops = |&(photo, path): &(u32, &str)| -> Result<Vec<Crop>, Box<dyn Error + Send + Sync>> {
-        let photo_features = extractor.read(Path::new(path))?.features;
-        let Some(features) = features(photo_features)? else { return Ok(Vec::new()) };
+        let extracted = extractor.read(Path::new(path))?;
+        let Some(features) = features(extracted)? else { return Ok(Vec::new()) };
         let rows = chosen(&features, photo, &options);
         Ok(rows.iter().map(|rows| crop(&features, photo, rows)).collect::<Result<_, _>>()?)
     };
@@ -98,18 +98,12 @@ fn extraction(kind: &str, max_image_size: Option<usize>) -> Result<Extraction, S
 }
 
 /// Converts the features of a photo; `None` if there are too few.
-fn features(features: PhotoFeatures) -> Result<Option<Features>, unlift::Error> {
-    let (places, values, dim): (Vec<[f32; 2]>, _, _) = match features {
-        PhotoFeatures::Sift(sift) => {
-            let places = sift.keypoints.iter().map(|keypoint| [keypoint.x, keypoint.y]).collect();
-            (places, Values::U8(sift.descriptors.concat()), 128)
-        }
-        PhotoFeatures::Learned(of) => (of.keypoints, Values::F32(of.descriptors), of.dim),
-    };
+fn features(photo: Photo) -> Result<Option<Features>, unlift::Error> {
+    let places = photo.keypoints;
     if places.len() < 64 {
         return Ok(None);
     }
-    let descriptors = Descriptors::try_new(values, dim)?;
+    let descriptors = Descriptors::try_new(photo.descriptors, photo.dim)?;
     let is_sift = matches!(descriptors.values(), Values::U8(_));
     let usual = if is_sift { None } else { Some(usual(&descriptors)?) };
     Ok(Some(Features { places, descriptors, usual }))

@@ -122,17 +122,12 @@ impl FeatureSource {
     pub fn get(&self, at: usize) -> Result<ImageFeatures, Error> {
         let name = self.names[at].clone();
         Ok(match &self.from {
-            Origin::Photos { paths, extractor, .. } => {
-                let photo = extractor.read(&paths[at])?;
-                ImageFeatures {
-                    name,
-                    size: Some(photo.size.map(|side| side as u32)),
-                    uncertainty_px: Some(photo.noise_px),
-                    upright: self.turn == Turn::Upright,
-                    photo: Some(paths[at].clone()),
-                    ..folder::features_of(photo.features)
-                }
-            }
+            Origin::Photos { paths, extractor, .. } => ImageFeatures {
+                name,
+                upright: self.turn == Turn::Upright,
+                photo: Some(paths[at].clone()),
+                ..folder::features_of(extractor.read(&paths[at])?)
+            },
             Origin::File(file) => file.get(at)?,
             Origin::Memory(get) => ImageFeatures { name, ..get(at)? },
         })

@@ -103,7 +103,7 @@ pub enum Command {
     Audit(AuditCommand),
     /// Compare two audits, and fail if the later one leaks more
     Compare(CompareArgs),
-    /// Print the results of an audit as a table for a paper, or draw them as curves
+    /// Print the results of an audit as a table for a paper or another program
     Table(TableArgs),
     /// Hide the points of a map, or the keypoints of images, with one scheme
     Obfuscate(ObfuscateArgs),

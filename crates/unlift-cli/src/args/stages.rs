@@ -278,27 +278,22 @@ pub struct InvertArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 The ending of --out decides the format:
-  .md   a table in Markdown, as is printed without --out
+  .csv  every row of audit.json, with a column per value, as is printed without --out
   .tex  a table in LaTeX, for the package booktabs
-  .csv  every row of audit.json, with a column per value
-  .svg  curves: the percentage that the strongest attack recovers, against the inlier ratio
 
-A table has a row per scheme. Its columns are the inlier ratios of the oracle (the fraction of true
-neighbors in its lists), the other sources of neighbors, and the two baselines. A cell has the
-percentage that the strongest attack recovers, at each threshold. To convert curves to PDF, use
-rsvg-convert -f pdf -o curves.pdf curves.svg, or Inkscape.
+A table in LaTeX has a row per scheme. Its columns are the inlier ratios of the oracle (the fraction
+of true neighbors in its lists), the other sources of neighbors, and the two baselines. A cell has
+the percentage that the strongest attack recovers, at each threshold.
 
 Examples:
   unlift table unlift-audit/audit.json
-  unlift table unlift-audit/audit.json --thresholds 0.10 --out table.tex
-  unlift table unlift-audit/audit.json --out curves.svg")]
+  unlift table unlift-audit/audit.json --thresholds 0.10 --out table.tex")]
 pub struct TableArgs {
     /// The audit.json of an audit
     #[arg(value_name = "AUDIT.json")]
     pub audit: PathBuf,
     /// Show only this threshold (the error up to which a point counts as recovered), one of the
-    /// audit's --thresholds. By default, tables show all thresholds, and curves show one: the first
-    /// or, for images, the one nearest to 10 pixels
+    /// audit's --thresholds. By default, tables show all thresholds
     #[arg(long, value_name = "T", value_parser = values::threshold)]
     pub thresholds: Option<Threshold>,
     /// Write to this file in place of stdout; its ending decides the format, see below

@@ -1,11 +1,12 @@
-//! `unlift table`: prints the results of an audit as a table or curves.
+//! `unlift table`: prints the results of an audit as a table.
 
 use std::io::Write;
 
 use unlift_audit::check_file;
 use unlift_io::atomic::{Access, write_file};
 use unlift_io::outputs::{Kind, Rules};
-use unlift_report::export::{TableFormat, curves, table, thresholds};
+use unlift_report::Document;
+use unlift_report::export::{csv, latex, thresholds};
 
 use super::common::read_document;
 use crate::Error;
@@ -18,20 +19,18 @@ pub fn run(args: &TableArgs) -> crate::Result<()> {
         let ending = out.extension().unwrap_or_default();
         ending.to_string_lossy().to_ascii_lowercase()
     });
-    let (format, kind) = match ending.as_deref() {
-        None | Some("md") => (Some(TableFormat::Markdown), Kind::Table),
-        Some("tex") => (Some(TableFormat::Latex), Kind::Table),
-        Some("csv") => (Some(TableFormat::Csv), Kind::Table),
-        Some("svg") => (None, Kind::Curves),
+    let table: fn(&Document, &[&str]) -> String = match ending.as_deref() {
+        None | Some("csv") => csv,
+        Some("tex") => latex,
         Some(_) => {
-            let expected = "--out: expected a name that ends in .md, .tex, .csv or .svg";
+            let expected = "--out: expected a name that ends in .csv or .tex";
             let found = args.out.iter().map(|out| out.display().to_string()).collect::<String>();
             return Err(Error::request(format!("{expected}, found {found}")));
         }
     };
     let rules = Rules::new([args.audit.as_path()], false);
     if let Some(path) = &args.out {
-        check_file(path, kind, &rules)?;
+        check_file(path, Kind::Table, &rules)?;
     }
     let document = read_document(&args.audit)?;
     let known = thresholds(&document);
@@ -44,14 +43,9 @@ pub fn run(args: &TableArgs) -> crate::Result<()> {
             ))
         })
     });
-    let only = only.transpose()?;
-    let text = match format {
-        Some(format) => table(&document, format, only),
-        None => curves(&document, only)?.ok_or_else(|| {
-            Error::request(
-                "--out: expected an audit with rows by the oracle, for curves, found none",
-            )
-        })?,
+    let text = match only.transpose()? {
+        Some(typed) => table(&document, &[typed]),
+        None => table(&document, &known),
     };
     // A table does not show schemes that were not audited.
     for missing in &document.not_audited {

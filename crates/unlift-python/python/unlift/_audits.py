@@ -133,8 +133,8 @@ def audit_images(
     images: a dict of names to `Features` (dicts of arrays), or a path, as for `unlift audit images`: a folder of
         photos, features of hloc (.h5), a database of COLMAP. The same features under the same names give rows that are
         byte-identical to those of the command line.
-        To save memory, give an object with `keys()` and `[name]` that reads images from a disk. It is called from other threads
-        when an image is needed, a few images ahead, and again for those that the page draws.
+        To save memory, give an object with `keys()` and `[name]` that reads images from a disk. It is called when an
+        image is needed, a few images ahead, and again for those that the page draws.
     schemes: names in `IMAGE_SCHEMES`, or functions (`scheme`) of keypoints `(n, 2)` in pixels from the middle of the image, to
         Lines, Rays or Candidates of two columns. Default: all names. Arguments that take several items also take one.
     neighbors: "oracle", names in `IMAGE_SOURCES`, or functions (`source`).

@@ -1,16 +1,18 @@
-//! Tables for papers and for other programs: every row as CSV (RFC 4180); in LaTeX and Markdown a row per scheme, and a column per
-//! kind of neighborhoods.
+//! Tables for papers and for other programs: every row as CSV (RFC 4180); in LaTeX a row per scheme, and a column per kind of
+//! neighborhoods.
 
 use crate::attack::{self, Given};
-use crate::document::{ByThreshold, Row};
+use crate::document::{ByThreshold, Document, Row};
 use crate::page::curves::givens;
 use crate::page::tables::percent_cell;
 use crate::results::{Results, distinct};
 use crate::table::{NONE, Table, figure, label};
 use crate::words;
 
-/// Returns all rows, with a column per figure, or per threshold of `within` if a figure depends on it. Unknown cells are empty.
-pub(super) fn csv(results: &Results<'_>, within: &[&str]) -> String {
+/// Returns all rows, with a column per figure, or per threshold of `within` (as typed) if a figure depends on it. Unknown cells are
+/// empty. The text ends with a line break.
+pub fn csv(document: &Document, within: &[&str]) -> String {
+    let results = &Results::of(document);
     let number = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
     // The command line recognizes its tables by the first four columns.
     let mut columns = vec![
@@ -95,11 +97,8 @@ fn grid(results: &Results<'_>, within: &[&str]) -> Table {
     let by = |scheme: &str, given: &Given| {
         let row = |typed: &str| results.strongest_given(scheme, given, typed);
         if within.first().is_none_or(|typed| row(typed).is_none()) {
-            let source = Some(given.neighbors.as_str());
-            let mut refused = results.document.not_audited.iter();
-            let is_refused =
-                refused.any(|of| of.scheme == scheme && of.neighbors.as_deref() == source);
-            return if is_refused { NOT_AUDITED } else { NONE }.to_owned();
+            let refusal = results.refusal(scheme, Some(&given.neighbors));
+            return if refusal.is_some() { NOT_AUDITED } else { NONE }.to_owned();
         }
         joined(&|typed| {
             let row = row(typed);
@@ -135,43 +134,22 @@ fn grid(results: &Results<'_>, within: &[&str]) -> Table {
     table
 }
 
-/// Returns the version and seed with which a table was made.
-fn origin(results: &Results<'_>) -> String {
-    let document = results.document;
-    format!("unlift {}, seed {}", on_one_line(&document.unlift), document.seed)
-}
-
-/// Returns a `tabular` with the rules of booktabs.
-pub(super) fn latex(results: &Results<'_>, within: &[&str]) -> String {
+/// Returns a `tabular` with the rules of booktabs: schemes by neighborhoods, by the strongest attack, with a figure per threshold
+/// of `within` (as typed). The text ends with a line break.
+pub fn latex(document: &Document, within: &[&str]) -> String {
+    let results = &Results::of(document);
     let table = grid(results, within);
     let line = |cells: &Vec<String>| {
         let cells: Vec<String> = cells.iter().map(|cell| in_latex(cell)).collect();
         format!("{} \\\\\n", cells.join(" & "))
     };
     format!(
-        "% {}; \\usepackage{{booktabs}}\n% {}\n\\begin{{tabular}}{{l{}}}\n\\toprule\n{}\\midrule\n{}\\bottomrule\n\\end{{tabular}}\n",
-        origin(results),
+        "% unlift {}, seed {}; \\usepackage{{booktabs}}\n% {}\n\\begin{{tabular}}{{l{}}}\n\\toprule\n{}\\midrule\n{}\\bottomrule\n\\end{{tabular}}\n",
+        on_one_line(&document.unlift),
+        document.seed,
         on_one_line(&table.caption),
         "r".repeat(table.columns.len() - 1),
         line(&table.heads()),
-        table.rows.iter().map(line).collect::<String>()
-    )
-}
-
-/// Returns a table in GitHub's Markdown, with figures flush right, below the caption.
-pub(super) fn markdown(results: &Results<'_>, within: &[&str]) -> String {
-    let table = grid(results, within);
-    let line = |cells: &Vec<String>| {
-        let cells: Vec<String> = cells.iter().map(|cell| in_markdown(cell)).collect();
-        format!("| {} |\n", cells.join(" | "))
-    };
-    format!(
-        "<!-- {} -->\n{}\n\n{}| --- |{}\n{}",
-        // Two dashes would end the comment.
-        origin(results).replace("--", "- -"),
-        in_markdown(&table.caption),
-        line(&table.heads()),
-        " ---: |".repeat(table.columns.len() - 1),
         table.rows.iter().map(line).collect::<String>()
     )
 }
@@ -227,18 +205,6 @@ fn in_latex(text: &str) -> String {
     out
 }
 
-fn in_markdown(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in on_one_line(text).chars() {
-        match c {
-            '<' => out.push_str("&lt;"),
-            '|' | '\\' | '`' | '*' | '_' | '[' | ']' => out.extend(['\\', c]),
-            _ => out.push(c),
-        }
-    }
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -264,6 +230,5 @@ mod tests {
     fn what_is_markup_is_escaped() {
         assert_eq!(in_latex("a_b & 5 % ± 0.7"), "a\\_b \\& 5 \\% $\\pm$ 0.7");
         assert_eq!(in_latex("\\input{x}\n"), "\\textbackslash{}input\\{x\\} ");
-        assert_eq!(in_markdown("a|b <i> *c*"), "a\\|b &lt;i> \\*c\\*");
     }
 }

@@ -230,29 +230,19 @@ pub(crate) fn table(results: &Results<'_>) -> Option<Table> {
     ];
     let held_out = localization.iter().find_map(|of| of.held_out.as_ref());
     if let Some(HeldOut { recall_percent, .. }) = held_out {
-        let own =
-            |of: &Of, figure: fn(&HeldOut) -> Option<f64>| of.held_out.as_ref().and_then(figure);
+        fn of_held_out<'a>(cell: impl Fn(&HeldOut) -> String + 'a) -> impl Fn(&Of) -> String + 'a {
+            move |of| of.held_out.as_ref().map_or(NONE.to_owned(), &cell)
+        }
+        let matches = |own: &HeldOut| format!("{} of {}", own.right_matches, own.matches);
         columns.extend([
-            figure("held out: times unprotected", move |of: &Of| {
-                number(own(of, |held_out| held_out.multiple))
-            }),
-            figure("camera center", move |of: &Of| {
-                length(own(of, |held_out| held_out.center_error))
-            }),
-            figure("rotation, degrees", move |of: &Of| {
-                number(own(of, |held_out| held_out.rotation_error_degrees))
-            }),
-            figure("right matches", |of: &Of| {
-                let matches = |own: &HeldOut| format!("{} of {}", own.right_matches, own.matches);
-                of.held_out.as_ref().map_or(NONE.to_owned(), matches)
-            }),
+            figure("held out: times unprotected", of_held_out(move |own| number(own.multiple))),
+            figure("camera center", of_held_out(move |own| length(own.center_error))),
+            figure("rotation, degrees", of_held_out(move |own| number(own.rotation_error_degrees))),
+            figure("right matches", of_held_out(matches)),
         ]);
         columns.extend(recall_percent.keys().map(|limits| {
-            figure(format!("within {limits}, %"), move |of: &Of| {
-                percent(
-                    of.held_out.as_ref().and_then(|own| own.recall_percent.get(limits).copied()),
-                )
-            })
+            let recall = move |own: &HeldOut| percent(own.recall_percent.get(limits).copied());
+            figure(format!("within {limits}, %"), of_held_out(recall))
         }));
     }
     let caption = "What protection costs: what comes back, and how precisely a camera can be placed. The bound uses all true matches of \

@@ -220,7 +220,7 @@ fn scheme(results: &Results<'_>, name: &str) -> Value {
 const SLOTS: usize = 8;
 
 /// Returns the number of the color and mark of `scheme`; unknown schemes are numbered from the last one as they appear.
-pub(crate) fn slot(results: &Results<'_>, scheme: &str) -> usize {
+fn slot(results: &Results<'_>, scheme: &str) -> usize {
     let known = |name: &str| words::facts(name).map(|facts| facts.color);
     let mut others = results.schemes.iter().filter(|name| known(name).is_none());
     let mut number = || others.position(|name| *name == scheme).unwrap_or(0);

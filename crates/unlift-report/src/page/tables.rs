@@ -78,53 +78,40 @@ pub(crate) fn recovered(results: &Results<'_>) -> Table {
     Table::of("recovered", caption, results.rows, columns).without_empty_columns()
 }
 
-/// What an attacker recovers without lists of neighbors.
-struct Baseline<'a> {
-    scheme: &'a str,
-    attacker: String,
-    shares: &'a ByThreshold,
-    intervals: Option<&'a IndexMap<String, Interval>>,
-    spread: Option<&'a ByThreshold>,
-}
-
-impl<'a> Baseline<'a> {
-    fn blind(row: &'a Row) -> Self {
-        Self {
-            scheme: &row.scheme,
-            attacker: "blind guess".to_owned(),
-            shares: &row.blind_percent,
-            intervals: row.interval.as_ref().map(|of| &of.blind_percent),
-            spread: row.std.as_ref().map(|std| &std.blind_percent),
-        }
-    }
-
-    fn alone(row: &'a Row) -> Option<Self> {
-        // The best attack may differ between thresholds.
-        let by = row.records_alone_by.iter().flat_map(|by| by.values());
-        let by = distinct(by.map(String::as_str)).join("; ");
-        Some(Self {
-            scheme: &row.scheme,
-            attacker: attack::records_alone(Some(by.as_str()).filter(|by| !by.is_empty())),
-            shares: row.records_alone_percent.as_ref()?,
-            intervals: row.interval.as_ref().map(|of| &of.records_alone_percent),
-            spread: None,
-        })
-    }
-}
-
+/// Returns the table of what an attacker recovers without lists of neighbors.
 pub(crate) fn baselines(results: &Results<'_>) -> Table {
+    // A row, and what its records alone give away, or `None` for the blind guess.
+    type Baseline<'a> = (&'a Row, Option<&'a ByThreshold>);
+    let attacker = |(row, alone): &Baseline<'_>| match alone {
+        None => "blind guess".to_owned(),
+        Some(_) => {
+            // The best attack may differ between thresholds.
+            let by = row.records_alone_by.iter().flat_map(|by| by.values());
+            let by = distinct(by.map(String::as_str)).join("; ");
+            attack::records_alone(Some(by.as_str()).filter(|by| !by.is_empty()))
+        }
+    };
+    let cell = |(row, alone): &Baseline<'_>, typed: &str| match (alone, &row.interval) {
+        (Some(alone), of) => {
+            share(typed, alone, of.as_ref().map(|of| &of.records_alone_percent), None)
+        }
+        (None, of) => {
+            let spread = row.std.as_ref().map(|std| &std.blind_percent);
+            share(typed, &row.blind_percent, of.as_ref().map(|of| &of.blind_percent), spread)
+        }
+    };
     let lines = results.schemes.iter().flat_map(|scheme| {
         let rows = results.of_scheme(scheme);
-        rows.clone().map(Baseline::blind).chain(rows.filter_map(Baseline::alone))
+        let alone =
+            rows.clone().filter_map(|row| Some((row, Some(row.records_alone_percent.as_ref()?))));
+        rows.map(|row| (row, None)).chain(alone)
     });
     let lines: Vec<Baseline<'_>> = lines.collect();
     let mut columns = vec![
-        label("scheme", |line: &Baseline<'_>| line.scheme.to_owned()),
-        label("attacker", |line: &Baseline<'_>| line.attacker.clone()),
+        label("scheme", |(row, _): &Baseline<'_>| row.scheme.clone()),
+        label("attacker", attacker),
     ];
-    columns.extend(within(results, "", |line: &Baseline<'_>, typed| {
-        share(typed, line.shares, line.intervals, line.spread)
-    }));
+    columns.extend(within(results, "", cell));
     let caption = "Baselines: what an attacker recovers without lists of neighbors. Lists add what exceeds the larger baseline.";
     let mut table = Table::of("baselines", caption, &lines, columns);
     table.rows = distinct(table.rows);

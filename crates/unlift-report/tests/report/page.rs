@@ -12,40 +12,30 @@ pub fn page(document: &Document, scene: Option<&Scene3d>, share_safe: bool) -> S
     render(document, scene, &options).expect("a page")
 }
 
-/// Returns the page without scripts and styles, as a browser without script shows it.
-fn without_script(page: &str) -> String {
-    let mut text = page.to_owned();
-    for (open, close) in [("<script", "</script>"), ("<style", "</style>")] {
-        while let Some(start) = text.find(open) {
-            let end = start + text[start..].find(close).expect("it ends") + close.len();
-            text.replace_range(start..end, "");
-        }
+/// Removes all parts from `open` to `close`.
+fn without(mut text: String, open: &str, close: &str) -> String {
+    while let Some(start) = text.find(open) {
+        let end = start + text[start..].find(close).expect("it ends") + close.len();
+        text.replace_range(start..end, "");
     }
     text
 }
 
+/// Returns the page without scripts and styles, as a browser without script shows it.
+fn without_script(page: &str) -> String {
+    without(without(page.to_owned(), "<script", "</script>"), "<style", "</style>")
+}
+
 /// Returns the text without tags and with single spaces.
 fn plain(markup: &str) -> String {
-    let mut text = String::new();
-    let mut inside = false;
-    for c in markup.chars() {
-        match c {
-            '<' => (inside, ()) = (true, text.push(' ')),
-            '>' => inside = false,
-            c if !inside => text.push(c),
-            _ => {}
-        }
-    }
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
+    let texts = markup.split('<').map(|part| part.split_once('>').map_or(part, |(_, text)| text));
+    texts.flat_map(str::split_whitespace).collect::<Vec<_>>().join(" ")
 }
 
 /// Returns the page as text without scripts, tags and tooltips.
 fn said(document: &Document) -> String {
-    let mut text = without_script(&page(document, None, false));
-    while let Some(start) = text.find("<span class=\"tip\"") {
-        let end = start + text[start..].find("</span>").expect("it ends") + "</span>".len();
-        text.replace_range(start..end, "");
-    }
+    let text = without_script(&page(document, None, false));
+    let text = without(text, "<span class=\"tip\"", "</span>");
     // Marks the start of the verdict and cuts the table of contents.
     let text = text.replace("<section class=\"part", "VERDICT <section class=\"part");
     let (contents, rest) = text.split_once("</nav>").expect("contents");
@@ -128,9 +118,7 @@ fn terminal_and_page_say_the_same_numbers() {
 #[test]
 fn what_could_not_be_audited_is_said_and_never_reads_as_little() {
     let mut document = sample::document(true);
-    document.results.retain(|row| row.scheme != "ppl+");
-    document.break_even.retain(|point| point.scheme != "ppl+");
-    document.run.seconds.rows.clear();
+    sample::retain(&mut document, |scheme| scheme != "ppl+");
     let reason = "k: expected between 1 and 8, found 50";
     document.not_audited =
         serde_json::from_value(serde_json::json!([{"scheme": "ppl+", "reason": reason}])).unwrap();
@@ -175,10 +163,7 @@ fn centimeters_never_appear_without_a_scale() {
 fn the_sampling_error_stands_beside_every_percentage_of_the_verdict() {
     let mut document = sample::mixed(true);
     for row in &mut document.results {
-        row.records_alone_percent = None;
-        row.records_alone_by = None;
-        row.recovered_percent.values_mut().for_each(|percent| *percent = 20.2);
-        row.blind_percent.values_mut().for_each(|percent| *percent = 1.0);
+        sample::set(row, 20.2, 1.0);
         let ends = |low: f64, high: f64| {
             row.recovered_percent.keys().map(|typed| (typed.clone(), [low, high])).collect()
         };
@@ -289,9 +274,7 @@ fn every_figure_stands_in_a_table_and_what_must_be_known_beside_the_verdict() {
     ] {
         assert!(text.contains(said), "{said}");
     }
-    document.results.clear();
-    document.break_even.clear();
-    document.run.seconds.rows.clear();
+    sample::retain(&mut document, |_| false);
     assert!(page(&document, None, false).contains("No scheme was tested."));
 }
 
@@ -307,8 +290,7 @@ fn the_banner_says_how_bad_it_is() {
         (&["plane"], "orange", "Not tested: what an attacker recovers from the released data alone. Not tried: attacks by descriptors and the attack on the records alone. An attacker would recover 83.7 % of the points of this map within 10 cm if half of the neighbors were known (plane, known neighbors)."),
     ] {
         let mut document = sample::document(true);
-        document.results.retain(|row| schemes.contains(&row.scheme.as_str()));
-        document.run.seconds.rows.clear();
+        sample::retain(&mut document, |scheme| schemes.contains(&scheme));
         let said = verdict(&document);
         assert!(said.contains(expected), "{said}");
         let colored = format!("<section class=\"part {color}\"");

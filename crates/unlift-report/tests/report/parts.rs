@@ -25,11 +25,7 @@ fn one(scheme: &str, multiple: Option<f64>) -> Localization {
 fn document(protects: bool) -> Document {
     let mut document = sample::document(true);
     if protects {
-        sample::change(&mut document, "olc", |row| {
-            row.recovered_percent.values_mut().for_each(|x| *x = 10.0);
-            row.blind_percent.values_mut().for_each(|x| *x = 5.0);
-            (row.records_alone_percent, row.records_alone_by) = (None, None);
-        });
+        sample::change(&mut document, "olc", |row| sample::set(row, 10.0, 5.0));
     }
     let query = Localization { of_queries: true, ..one("lines2d", Some(1.4)) };
     document.localization = vec![
@@ -96,15 +92,11 @@ fn a_scheme_that_does_not_localize_is_no_advice() {
     let mut document = document(false);
     for row in &mut document.results {
         (row.neighbors, row.oracle_noise) = ("descriptors".to_owned(), None);
-        let percent = if row.scheme == "plane" { 5.0 } else { 12.0 };
-        row.recovered_percent.values_mut().for_each(|x| *x = percent);
-        row.blind_percent.values_mut().for_each(|x| *x = 1.0);
-        (row.records_alone_percent, row.records_alone_by) = (None, None);
+        sample::set(row, if row.scheme == "plane" { 5.0 } else { 12.0 }, 1.0);
     }
     let text = page(&document, None, false);
     assert!(text.contains("leaks least") && !text.contains("plane leaks least"));
-    document.results.retain(|row| row.scheme == "plane");
-    document.run.seconds.rows.truncate(document.results.len());
+    sample::retain(&mut document, |scheme| scheme == "plane");
     let text = page(&document, None, false);
     assert!(text.contains(", but most cameras cannot be placed with it."), "{text}");
 }

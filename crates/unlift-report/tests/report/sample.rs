@@ -75,6 +75,20 @@ pub fn change(document: &mut Document, scheme: &str, change: impl Fn(&mut Row)) 
     document.results.iter_mut().filter(|row| row.scheme == scheme).for_each(change);
 }
 
+/// Sets what a row recovers and a blind guess, in percent; the records alone were not attacked.
+pub fn set(row: &mut Row, recovered: f64, blind: f64) {
+    row.recovered_percent.values_mut().for_each(|percent| *percent = recovered);
+    row.blind_percent.values_mut().for_each(|percent| *percent = blind);
+    (row.records_alone_percent, row.records_alone_by) = (None, None);
+}
+
+/// Keeps the rows of some schemes.
+pub fn retain(document: &mut Document, is_kept: impl Fn(&str) -> bool) {
+    document.results.retain(|row| is_kept(&row.scheme));
+    document.break_even.retain(|point| is_kept(&point.scheme));
+    document.run.seconds.rows.clear();
+}
+
 fn row(s: usize, r: usize, solver: &str, thresholds: [&str; 2], metric: bool) -> Row {
     let penalty = if solver == "ransac" { 0.4 + 1.1 * r as f64 } else { 0.0 };
     let shares = [SHARES[s].0[r], SHARES[s].1[r]];

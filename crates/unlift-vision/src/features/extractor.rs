@@ -4,8 +4,10 @@ use std::path::Path;
 
 use rayon::prelude::*;
 use unlift::Error;
+use unlift::descriptors::Values;
 use unlift::neighbors::DescriptorKind;
 
+use super::image::ColorImage;
 use super::learned::{LearnedFeatures, aliked, superpoint};
 use super::options::Extraction;
 use super::photo::{self, Turn};
@@ -28,9 +30,11 @@ pub struct Extractor {
 
 enum Method {
     Sift(Sift),
-    Aliked(Network),
-    SuperPoint(Network),
+    /// A network, what extracts features by it, and the standard deviation of its keypoints.
+    Learned(Network, Extract, f64),
 }
+
+type Extract = fn(&Network, &Extraction, &ColorImage) -> Result<LearnedFeatures, Error>;
 
 /// The features of a photo.
 pub struct Photo {
@@ -38,16 +42,44 @@ pub struct Photo {
     pub size: [usize; 2],
     /// Standard deviation of a keypoint in pixels of the photo.
     pub noise_px: f64,
-    /// The features.
-    pub features: PhotoFeatures,
+    /// Positions in pixels of the photo; the middle of the first pixel is `(0, 0)`, as in hloc.
+    pub keypoints: Vec<[f32; 2]>,
+    /// How repeatable each keypoint is: the score of a network, or the scale of SIFT.
+    pub scores: Vec<f32>,
+    /// Standard deviations of the smoothing of extrema, in pixels of the photo; of SIFT alone.
+    pub scales: Option<Vec<f32>>,
+    /// Main directions of gradients, in degrees; of SIFT alone.
+    pub orientations_deg: Option<Vec<f32>>,
+    /// Descriptors `(n, dim)`, row-major.
+    pub descriptors: Values,
+    /// Number of values of a descriptor.
+    pub dim: usize,
 }
 
-/// Features of SIFT or of a network.
-pub enum PhotoFeatures {
-    /// Features of SIFT.
-    Sift(Features),
-    /// Features of a network.
-    Learned(LearnedFeatures),
+impl Photo {
+    /// Moves the middle of the first pixel from (0.5, 0.5) to (0, 0). No other function does this.
+    fn of_sift(size: [usize; 2], noise_px: f64, features: Features) -> Self {
+        let Features { keypoints, descriptors } = features;
+        let scales: Vec<f32> = keypoints.iter().map(|keypoint| keypoint.scale).collect();
+        Self {
+            size,
+            noise_px,
+            keypoints: keypoints.iter().map(|at| [at.x - 0.5, at.y - 0.5]).collect(),
+            // SIFT contrast is not kept; large features are more repeatable than small ones.
+            scores: scales.clone(),
+            scales: Some(scales),
+            orientations_deg: Some(keypoints.iter().map(|k| k.orientation.to_degrees()).collect()),
+            descriptors: Values::U8(descriptors.into_flattened()),
+            dim: 128,
+        }
+    }
+
+    fn of_network(size: [usize; 2], noise_px: f64, features: LearnedFeatures) -> Self {
+        let LearnedFeatures { keypoints, scores, descriptors, dim } = features;
+        let descriptors = Values::F32(descriptors);
+        let (scales, orientations_deg) = (None, None);
+        Self { size, noise_px, keypoints, scores, scales, orientations_deg, descriptors, dim }
+    }
 }
 
 impl Extractor {
@@ -59,8 +91,12 @@ impl Extractor {
         options.check()?;
         let method = match options.kind {
             DescriptorKind::Sift => Method::Sift(Sift::try_new(*options)?),
-            DescriptorKind::Aliked => Method::Aliked(Network::load("aliked-n16rot")?),
-            DescriptorKind::SuperPoint => Method::SuperPoint(Network::load("superpoint")?),
+            DescriptorKind::Aliked => {
+                Method::Learned(Network::load("aliked-n16rot")?, aliked, DETECTION_NOISE)
+            }
+            DescriptorKind::SuperPoint => {
+                Method::Learned(Network::load("superpoint")?, superpoint, SUPERPOINT_NOISE)
+            }
         };
         Ok(Self { options: *options, method, turn: Turn::Upright })
     }
@@ -79,26 +115,23 @@ impl Extractor {
         let photo = photo::open(path, self.turn)?;
         let (width, height) = (photo.width(), photo.height());
         if width.min(height) < LEAST_SIDE {
-            let name = path.display().to_string().escape_debug().to_string();
             let expected = format!("at least {LEAST_SIDE} pixels a side");
-            return Err(Error::new(name, expected, format!("{width} x {height}")));
+            let found = format!("{width} x {height}");
+            return Err(Error::new(path.display().to_string(), expected, found));
         }
-        let (noise_px, features) = match &self.method {
-            Method::Sift(sift) => {
-                (DETECTION_NOISE, PhotoFeatures::Sift(sift.extract(&photo::gray(photo)?)))
-            }
-            Method::Aliked(network) => {
-                let features = aliked(network, &self.options, &photo::color(photo)?)?;
-                (DETECTION_NOISE, PhotoFeatures::Learned(features))
-            }
-            Method::SuperPoint(network) => {
-                let features = superpoint(network, &self.options, &photo::color(photo)?)?;
-                (SUPERPOINT_NOISE, PhotoFeatures::Learned(features))
-            }
-        };
-        let shrunk = f64::from(width.max(height)) / self.options.max_image_size as f64;
         let size = [width as usize, height as usize];
-        Ok(Photo { size, noise_px: noise_px * shrunk.max(1.0), features })
+        let shrunk = f64::from(width.max(height)) / self.options.max_image_size as f64;
+        let noise = |noise_px: f64| noise_px * shrunk.max(1.0);
+        match &self.method {
+            Method::Sift(sift) => {
+                let features = sift.extract(&photo::gray(photo)?);
+                Ok(Photo::of_sift(size, noise(DETECTION_NOISE), features))
+            }
+            Method::Learned(network, extract, noise_px) => {
+                let features = extract(network, &self.options, &photo::color(photo)?)?;
+                Ok(Photo::of_network(size, noise(*noise_px), features))
+            }
+        }
     }
 }
 
@@ -112,18 +145,6 @@ const PER_THREAD: usize = 8;
 ///
 /// # Errors
 /// When `sink` returns an error.
-///
-/// ```
-/// use unlift_vision::features::in_order;
-///
-/// let mut squares = Vec::new();
-/// in_order(&[1, 2, 3], |n| n * n, |at, square| {
-///     squares.push((at, square));
-///     Ok::<(), std::convert::Infallible>(())
-/// })?;
-/// assert_eq!(squares, [(0, 1), (1, 4), (2, 9)]);
-/// # Ok::<(), std::convert::Infallible>(())
-/// ```
 pub fn in_order<T: Sync, R: Send, E>(
     items: &[T],
     work: impl Fn(&T) -> R + Sync,

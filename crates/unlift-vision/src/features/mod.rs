@@ -31,7 +31,7 @@ mod options;
 pub mod photo;
 mod sift;
 
-pub use extractor::{Extractor, Photo, PhotoFeatures, in_order};
+pub use extractor::{Extractor, Photo, in_order};
 pub use image::{ColorImage, GrayImage, halved};
 pub use learned::{LearnedFeatures, aliked, superpoint};
 pub use options::Extraction;

@@ -60,16 +60,12 @@ pub fn decode(bytes: &[u8], name: &str) -> Result<GrayImage, Error> {
 
 pub(crate) fn open(path: &Path, turn: Turn) -> Result<DynamicImage, Error> {
     let name = path.display().to_string();
-    let bytes = read_regular(path)
-        .map_err(|error| Error::new(name.escape_debug().to_string(), KINDS, error.to_string()))?;
+    let bytes = read_regular(path).map_err(|error| Error::new(&*name, KINDS, error.to_string()))?;
     decoded(&bytes, &name, turn)
 }
 
 fn decoded(bytes: &[u8], name: &str, turn: Turn) -> Result<DynamicImage, Error> {
-    // Escaping keeps the error in one line.
-    let wrong = |expected: &str, found: String| {
-        Error::new(name.escape_debug().to_string(), expected, found.escape_debug().to_string())
-    };
+    let wrong = |expected: &str, found: String| Error::new(name, expected, found);
     let format = match image::guess_format(bytes) {
         Ok(format @ (ImageFormat::Jpeg | ImageFormat::Png | ImageFormat::WebP)) => format,
         _ => return Err(wrong(KINDS, kind(bytes))),

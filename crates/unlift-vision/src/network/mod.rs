@@ -117,7 +117,7 @@ impl Network {
 
     /// Loads the model in the file `path`, as `entry` describes it.
     pub fn read(path: &Path, entry: &Entry) -> Result<Self, Error> {
-        let place = path.display().to_string().escape_debug().to_string();
+        let place = path.display().to_string();
         let bytes = read_regular(path)
             .map_err(|error| Error::new(place.clone(), "a model in ONNX", error.to_string()))?;
         Self::from_bytes(Cow::Owned(bytes), &place, entry)
@@ -252,7 +252,7 @@ fn aside<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, String> {
     .map_err(|panic| format!("one that fails ({panic})"))
 }
 
-/// Returns text of other libraries in one line, with control characters escaped.
+/// Joins the lines of a text of other libraries.
 fn one_line(text: &str) -> String {
-    text.lines().map(str::trim).collect::<Vec<_>>().join(" ").escape_debug().to_string()
+    text.lines().map(str::trim).collect::<Vec<_>>().join(" ")
 }

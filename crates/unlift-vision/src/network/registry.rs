@@ -62,9 +62,8 @@ impl Entry {
 /// Returns the entry called `name`.
 pub fn entry(name: &str) -> Result<&'static Entry, Error> {
     let known = || MODELS.iter().map(|entry| entry.name).collect::<Vec<_>>().join(", ");
-    MODELS.iter().find(|entry| entry.name == name).ok_or_else(|| {
-        Error::new("model", format!("one of {}", known()), name.escape_debug().to_string())
-    })
+    let entry = MODELS.iter().find(|entry| entry.name == name);
+    entry.ok_or_else(|| Error::new("model", format!("one of {}", known()), name))
 }
 
 /// The output of networks that make pictures.
@@ -245,8 +244,7 @@ impl Folders {
         if let Some(given) = &self.given
             && !given.is_dir()
         {
-            let name = given.display().to_string();
-            return Err(Error::new(VARIABLE, "a folder", name.escape_debug().to_string()));
+            return Err(Error::new(VARIABLE, "a folder", given.display().to_string()));
         }
         let folders = [&self.given, &self.user].into_iter().flatten();
         Ok(folders.map(|folder| folder.join(entry.file())).find(|path| path.is_file()))
@@ -255,8 +253,7 @@ impl Folders {
     /// Returns the error for a missing `entry`, which names the folders it belongs in.
     pub fn missing(&self, entry: &Entry) -> Error {
         let folders = [&self.given, &self.user].into_iter().flatten();
-        let folders: Vec<String> =
-            folders.map(|folder| folder.display().to_string().escape_debug().to_string()).collect();
+        let folders: Vec<String> = folders.map(|folder| folder.display().to_string()).collect();
         let expected = match folders.as_slice() {
             [] => format!("in the folder that {VARIABLE} names"),
             folders => format!("in {}", folders.join(" or ")),

@@ -16,7 +16,7 @@ use unlift::seed::Key;
 use unlift::truth::Original;
 use unlift::{Descriptors, PointSet, Unit};
 use unlift_testkit::{described_map, source_laws};
-use unlift_vision::features::{Extraction, Extractor, PhotoFeatures};
+use unlift_vision::features::{Extraction, Extractor};
 use unlift_vision::network::Learned;
 
 use crate::shared;
@@ -105,20 +105,11 @@ fn the_network_names_more_neighbors_than_its_inputs_do() {
         [(Extraction::SIFT, &Overlap, 0.03), (aliked, &Similarity, 0.2)];
     for (extraction, plain, gain) in kinds {
         let photo = Extractor::try_new(&extraction).unwrap().read(&photo).unwrap();
-        let (places, values) = match photo.features {
-            PhotoFeatures::Sift(sift) => (
-                sift.keypoints.iter().map(|at| [at.x - 0.5, at.y - 0.5]).collect::<Vec<_>>(),
-                Values::U8(sift.descriptors.concat()),
-            ),
-            PhotoFeatures::Learned(learned) => {
-                (learned.keypoints, Values::F32(learned.descriptors))
-            }
-        };
-        let points = places.iter().map(|place| place.map(f64::from)).collect();
+        let points = photo.keypoints.iter().map(|place| place.map(f64::from)).collect();
         let points = PointSet::try_new(points, Unit::Pixel).unwrap();
         let bounds = Bounds::try_new([-0.5; 2], photo.size.map(|side| side as f64 - 0.5)).unwrap();
         let original = Original::within(points, bounds).unwrap();
-        let descriptors = Descriptors::try_new(values, 128).unwrap();
+        let descriptors = Descriptors::try_new(photo.descriptors, 128).unwrap();
         let key = Key::from_seed(1);
         let (released, secret) = obfuscate(&Olc, &original, Some(&descriptors), &key).unwrap();
         let search = oracle::search(&original).unwrap();

@@ -1,5 +1,6 @@
 //! Extrema of a difference of levels among their 26 neighbors, refined between pixels and levels.
 
+use unlift::geometry::vector::dot;
 use unlift::simd::{Kernel, dispatch};
 
 use super::LEVELS;
@@ -154,7 +155,7 @@ pub(crate) fn refine(
     }
     let [dx, dy, ds] = offset;
     let (x, y, level) = (x as f64 + dx, y as f64 + dy, level as f64 + ds);
-    let value = shape.value + 0.5 * dot(shape.slope, offset);
+    let value = shape.value + 0.5 * dot(&shape.slope, &offset);
     let inside = (0.0..=(width - 1) as f64).contains(&x)
         && (0.0..=(height - 1) as f64).contains(&y)
         && (0.0..=(LEVELS + 2) as f64).contains(&level);
@@ -175,10 +176,6 @@ fn moved(at: usize, offset: f64, length: usize) -> usize {
     } else {
         at
     }
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// Value and derivatives along x, y and level, by central differences.

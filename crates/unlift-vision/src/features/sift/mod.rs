@@ -190,8 +190,7 @@ fn describe(places: &[Place], pixel: f64, workspace: &mut Workspace) -> Features
     gradients.reset(level);
     let mut features = Features::default();
     for &place in places {
-        let (angles, n_peaks) = orientation::orientations(gradients, level, place, weights);
-        for &angle in &angles[..n_peaks] {
+        for angle in orientation::orientations(gradients, level, place, weights) {
             features.keypoints.push(keypoint(place, angle, pixel));
             let histograms = descriptor::describe(gradients, level, place, angle, weights);
             features.descriptors.push(quantize(histograms));

@@ -56,14 +56,14 @@ pub(crate) fn weigh(place: Place, radius: usize, sigma: f64, weights: &mut [Vec<
     }
 }
 
-/// Returns the orientations of `place`, in radians within `0..TAU`, in the order of their bins, and
-/// their number. Lowe 2004, Sec. 5, with a smoothed histogram and linear votes.
+/// Returns the orientations of `place`, in radians within `0..TAU`, in the order of their bins. Lowe
+/// 2004, Sec. 5, with a smoothed histogram and linear votes.
 pub(crate) fn orientations(
     gradients: &mut Gradients,
     level: &Plane,
     place: Place,
     weights: &mut [Vec<f32>; 2],
-) -> ([f64; MAX_ORIENTATIONS], usize) {
+) -> Vec<f64> {
     let window = WINDOW * place.sigma;
     let radius = ((3.0 * window) as usize).max(1);
     weigh(place, radius, window, weights);
@@ -134,18 +134,15 @@ impl Kernel for Votes<'_> {
 }
 
 /// Finds the peaks of a histogram, each moved to the vertex of the parabola through its neighbors.
-fn peaks(histogram: &[f32; BINS]) -> ([f64; MAX_ORIENTATIONS], usize) {
+fn peaks(histogram: &[f32; BINS]) -> Vec<f64> {
     let highest = histogram.iter().copied().fold(0.0, f32::max);
-    let (mut angles, mut n_peaks) = ([0.0; MAX_ORIENTATIONS], 0);
-    for (bin, &here) in histogram.iter().enumerate() {
-        let before = histogram[(bin + BINS - 1) % BINS];
-        let after = histogram[(bin + 1) % BINS];
-        if n_peaks < MAX_ORIENTATIONS && here > SHARE * highest && here > before && here > after {
-            let (here, before, after) = (f64::from(here), f64::from(before), f64::from(after));
-            let offset = -0.5 * (after - before) / (after + before - 2.0 * here);
-            angles[n_peaks] = TAU * (bin as f64 + offset + 0.5) / BINS as f64;
-            n_peaks += 1;
-        }
-    }
-    (angles, n_peaks)
+    let peak = |bin: usize| {
+        let around = [bin + BINS - 1, bin, bin + 1].map(|bin| histogram[bin % BINS]);
+        let [before, here, after] = around;
+        let is_peak = here > SHARE * highest && here > before && here > after;
+        let [before, here, after] = around.map(f64::from);
+        let offset = -0.5 * (after - before) / (after + before - 2.0 * here);
+        is_peak.then(|| TAU * (bin as f64 + offset + 0.5) / BINS as f64)
+    };
+    (0..BINS).filter_map(peak).take(MAX_ORIENTATIONS).collect()
 }
