@@ -105,7 +105,7 @@ mod tests {
     use super::*;
     use unlift::geometry::camera::Pose;
 
-    use crate::read::colmap::{CameraModel, read_points, read_views};
+    use crate::read::colmap::{CAMERA_MODELS, read_points, read_views};
 
     /// Rotations about each axis and an oblique one, including half turns.
     fn rotations() -> Vec<[[f64; 3]; 3]> {
@@ -121,7 +121,7 @@ mod tests {
         let at = |name: &str| folder.path().join(name);
         let cameras = vec![Camera {
             id: 3,
-            model: CameraModel::from_name(b"SIMPLE_RADIAL").unwrap(),
+            model: &CAMERA_MODELS[2],
             width_px: 640,
             height_px: 480,
             params: vec![525.25, 320.0, 240.0, -0.01],

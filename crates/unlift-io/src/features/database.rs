@@ -133,9 +133,7 @@ impl Database {
     ) -> Result<Option<T>, Error> {
         let connection = self.connection.lock().unwrap_or_else(PoisonError::into_inner);
         self.steps.store(0, Relaxed);
-        let statement = connection.prepare(query);
-        let found =
-            statement.and_then(|mut statement| statement.query_row([image_id], read).optional());
+        let found = connection.query_row(query, [image_id], read).optional();
         found.map_err(|error| refuse(&self.path, place, &error))
     }
 
@@ -228,10 +226,8 @@ fn check_table(connection: &Connection, path: &Path, table: &str) -> Result<(), 
                  AND type IN ('table', 'view')";
     let place = format!("table {table}");
     let found: Option<(String, i64)> = connection
-        .prepare(query)
-        .and_then(|mut statement| {
-            statement.query_row([table], |row| Ok((row.get(0)?, row.get(1)?))).optional()
-        })
+        .query_row(query, [table], |row| Ok((row.get(0)?, row.get(1)?)))
+        .optional()
         .map_err(|e| refuse(path, &place, &e))?;
     match found {
         Some((kind, _)) if kind == "view" => Err(Error::new(path, place, "a table", "a view")),

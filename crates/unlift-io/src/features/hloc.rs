@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use half::f16;
 use hdf5_pure::{
-    AttrValue, DType, Dataset, Datatype, DatatypeByteOrder, File, FileAccessProperties,
-    FileCreateProperties, FileLocking, FloatingPointLayout, Group, MemoryStrategy,
-    MetadataCacheConfig, ReadSeekSource, SyncPolicy,
+    AttrValue, Dataset, Datatype, DatatypeByteOrder, File, FileAccessProperties,
+    FileCreateProperties, FileLocking, FixedPointLayout, FloatingPointLayout, Group,
+    MemoryStrategy, MetadataCacheConfig, ReadSeekSource, SyncPolicy,
 };
 use unlift::Descriptors;
 use unlift::descriptors::Values;
@@ -193,12 +193,12 @@ impl Hloc {
         let keypoints = keypoints(&places).map_err(wrong(KEYPOINTS))?;
         let n = keypoints.len();
         let per_keypoint = |array: &'static str| -> Result<Option<Vec<f32>>, Error> {
-            let Some(Array { shape, values }) = optional(array)? else { return Ok(None) };
+            let Some(Array { shape, values, .. }) = optional(array)? else { return Ok(None) };
             if shape != [n as u64] && shape != [n as u64, 1] {
                 let expected = format!("one value per keypoint, ({n},)");
                 return Err(wrong(array)((expected, tuple(&shape))));
             }
-            Ok(Some(values.to_f64().into_iter().map(|value| value as f32).collect()))
+            Ok(Some(values.into_iter().map(|value| value as f32).collect()))
         };
         let descriptors = optional("descriptors")?.map(|array| descriptors(array, n));
         let size = optional("image_size")?.map(|array| size(&array));
@@ -232,11 +232,12 @@ impl Hloc {
             let count = shape.iter().fold(1u64, |n, &side| n.saturating_mul(side));
             // A header can declare any size. Values are widened to eight bytes at most.
             self.budget.admit(name, count.saturating_mul(8))?;
-            let Some(values) = numbers(&dataset, count).map_err(refuse)? else {
+            let datatype = dataset.datatype().map_err(refuse)?;
+            let Some(values) = numbers(&dataset, &datatype, count).map_err(refuse)? else {
                 let expected = "floats of 16, 32 or 64 bits, or integers";
                 return Err(Error::new(&self.path, name, expected, "another type"));
             };
-            Ok(Array { shape, values })
+            Ok(Array { shape, datatype, values })
         })
     }
 
@@ -256,26 +257,11 @@ fn place(image: &str) -> String {
     if image.is_empty() { String::new() } else { format!("image {}", quoted(image.as_bytes())) }
 }
 
-/// The values of an array, row-major.
-enum Numbers {
-    Bytes(Vec<u8>),
-    Floats(Vec<f64>),
-    /// Other integers.
-    Whole(Vec<f64>),
-}
-
+/// An array, row-major.
 struct Array {
     shape: Vec<u64>,
-    values: Numbers,
-}
-
-impl Numbers {
-    fn to_f64(&self) -> Vec<f64> {
-        match self {
-            Self::Bytes(values) => values.iter().map(|&x| f64::from(x)).collect(),
-            Self::Floats(values) | Self::Whole(values) => values.clone(),
-        }
-    }
+    datatype: Datatype,
+    values: Vec<f64>,
 }
 
 /// The IEEE float of 16 bits, which hloc stores.
@@ -290,31 +276,24 @@ const HALF: FloatingPointLayout = FloatingPointLayout {
 };
 
 /// Reads `count` floats of 16, 32 or 64 bits, or integers. Returns `None` for other types.
-fn numbers(dataset: &Dataset, count: u64) -> Result<Option<Numbers>, hdf5_pure::Error> {
-    let dtype = dataset.dtype()?;
-    Ok(Some(match dtype {
-        DType::U8 if count == 0 => Numbers::Bytes(Vec::new()),
-        _ if count == 0 => Numbers::Floats(Vec::new()),
-        DType::F32 => Numbers::Floats(dataset.read_f32()?.into_iter().map(f64::from).collect()),
-        DType::F64 => Numbers::Floats(dataset.read_f64()?),
-        DType::U8 => Numbers::Bytes(dataset.read_u8()?),
-        DType::I8 | DType::I16 | DType::I32 | DType::I64 | DType::U16 | DType::U32 | DType::U64 => {
-            Numbers::Whole(dataset.read_i64()?.into_iter().map(|x| x as f64).collect())
+fn numbers(
+    dataset: &Dataset,
+    datatype: &Datatype,
+    count: u64,
+) -> Result<Option<Vec<f64>>, hdf5_pure::Error> {
+    use Datatype::{FixedPoint, FloatingPoint};
+    use DatatypeByteOrder::{BigEndian, LittleEndian};
+    let half = match datatype {
+        _ if count == 0 => return Ok(Some(Vec::new())),
+        FixedPoint { size: 1 | 2 | 4 | 8, .. } | FloatingPoint { size: 4 | 8, .. } => {
+            return dataset.read_f64().map(Some);
         }
-        _ => {
-            let order = match dataset.datatype()? {
-                Datatype::FloatingPoint { size: 2, byte_order, layout: HALF } => byte_order,
-                _ => return Ok(None),
-            };
-            let from = match order {
-                DatatypeByteOrder::LittleEndian => f16::from_le_bytes,
-                DatatypeByteOrder::BigEndian => f16::from_be_bytes,
-                _ => return Ok(None),
-            };
-            let bytes = dataset.read_raw()?;
-            Numbers::Floats(bytes.as_chunks().0.iter().map(|&half| from(half).to_f64()).collect())
-        }
-    }))
+        FloatingPoint { size: 2, byte_order: LittleEndian, layout: HALF } => f16::from_le_bytes,
+        FloatingPoint { size: 2, byte_order: BigEndian, layout: HALF } => f16::from_be_bytes,
+        _ => return Ok(None),
+    };
+    let bytes = dataset.read_raw()?;
+    Ok(Some(bytes.as_chunks().0.iter().map(|&bytes| half(bytes).to_f64()).collect()))
 }
 
 fn transposed<T: Copy>(values: &[T], rows: usize) -> Vec<T> {
@@ -337,8 +316,8 @@ fn keypoints(array: &Array) -> Result<Vec<[f64; 2]>, Wrong> {
         [0] | [0, _] | [2, 0] => return Ok(Vec::new()),
         _ => return Err(("shape (N, 2)".to_owned(), tuple(&array.shape))),
     };
-    let values = array.values.to_f64();
-    let rows: Vec<[f64; 2]> = values.chunks_exact(columns).map(|row| [row[0], row[1]]).collect();
+    let rows = array.values.chunks_exact(columns);
+    let rows: Vec<[f64; 2]> = rows.map(|row| [row[0], row[1]]).collect();
     match rows.iter().position(|row| !row.iter().all(|value| value.is_finite())) {
         None => Ok(rows),
         Some(at) => Err((
@@ -362,18 +341,17 @@ fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
         }
         _ => return Err((expected(), tuple(&array.shape))),
     };
-    let is_rows = dim == n && has_equal_rows(&array.values.to_f64(), n);
+    let is_rows = dim == n && has_equal_rows(&array.values, n);
     // Transposing a matrix of one row changes nothing.
-    let sides = if is_rows { 1 } else { dim };
-    let values = match array.values {
-        Numbers::Bytes(bytes) => Values::U8(transposed(&bytes, sides)),
-        Numbers::Floats(values) => {
-            let values: Vec<f32> = values.into_iter().map(|value| value as f32).collect();
-            Values::F32(transposed(&values, sides))
-        }
-        Numbers::Whole(_) => {
+    let rows = transposed(&array.values, if is_rows { 1 } else { dim }).into_iter();
+    let values = match array.datatype {
+        Datatype::FixedPoint {
+            size: 1, layout: FixedPointLayout { signed: false, .. }, ..
+        } => Values::U8(rows.map(|value| value as u8).collect()),
+        Datatype::FixedPoint { .. } if !array.values.is_empty() => {
             return Err(("floats, or unsigned bytes".to_owned(), "other integers".to_owned()));
         }
+        _ => Values::F32(rows.map(|value| value as f32).collect()),
     };
     Descriptors::try_new(values, dim).map_err(|error| {
         let found = match error.what() {
@@ -396,7 +374,7 @@ fn has_equal_rows(values: &[f64], n: usize) -> bool {
 }
 
 fn size(array: &Array) -> Result<[u32; 2], Wrong> {
-    let sides = array.values.to_f64();
+    let sides = &array.values;
     let side = |value: f64| {
         let whole = (1.0..=f64::from(u32::MAX)).contains(&value) && value.fract() == 0.0;
         whole.then_some(value as u32)
@@ -582,18 +560,13 @@ fn columns(image: &ImageFeatures) -> Vec<Column> {
     if let Some(rows) = &image.descriptors {
         let (datatype, bytes) = match rows.values() {
             Values::U8(values) => (hdf5_pure::make_u8_type(), transposed(values, rows.len())),
-            Values::F32(values) => match halves(values) {
-                Some(halves) => {
-                    let half = Datatype::FloatingPoint {
-                        size: 2,
-                        byte_order: DatatypeByteOrder::LittleEndian,
-                        layout: HALF,
-                    };
-                    let halves = transposed(&halves, rows.len());
-                    (half, halves.iter().flat_map(|x| x.to_le_bytes()).collect())
-                }
-                None => (single(), floats(&transposed(values, rows.len()))),
-            },
+            Values::F32(values) => {
+                let values = transposed(values, rows.len());
+                let byte_order = DatatypeByteOrder::LittleEndian;
+                let half = Datatype::FloatingPoint { size: 2, byte_order, layout: HALF };
+                let halves = halves(&values).map(|halves| (half, halves));
+                halves.unwrap_or_else(|| (single(), floats(&values)))
+            }
         };
         columns.push(("descriptors", vec![rows.dim() as u64, n], datatype, bytes));
     }
@@ -609,10 +582,12 @@ fn columns(image: &ImageFeatures) -> Vec<Column> {
     columns
 }
 
-/// Converts `values` to half floats, as hloc stores descriptors of networks, if all are exact.
-fn halves(values: &[f32]) -> Option<Vec<f16>> {
+/// Returns the bytes of `values` as half floats, as hloc stores descriptors of networks, if all are
+/// exact.
+fn halves(values: &[f32]) -> Option<Vec<u8>> {
     let exact = |&value: &f32| Some(f16::from_f32(value)).filter(|half| half.to_f32() == value);
-    values.iter().map(exact).collect()
+    let halves: Vec<f16> = values.iter().map(exact).collect::<Option<_>>()?;
+    Some(halves.into_iter().flat_map(f16::to_le_bytes).collect())
 }
 
 #[cfg(test)]
@@ -628,8 +603,9 @@ mod tests {
             row.iter_mut().for_each(|x| *x /= norm);
         }
         let read = |values: Vec<f32>| {
-            let values = Numbers::Floats(values.into_iter().map(f64::from).collect());
-            let array = Array { shape: vec![N as u64; 2], values };
+            let values = values.into_iter().map(f64::from).collect();
+            let array =
+                Array { shape: vec![N as u64; 2], datatype: hdf5_pure::make_f32_type(), values };
             descriptors(array, N).unwrap().values().clone()
         };
         assert_eq!(read(transposed(&rows, N)), Values::F32(rows.clone()));

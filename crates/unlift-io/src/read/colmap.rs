@@ -50,18 +50,6 @@ pub const CAMERA_MODELS: [CameraModel; 18] = [
     model("EQUIRECTANGULAR", 2),
 ];
 
-impl CameraModel {
-    /// Returns the model with this id.
-    pub fn from_id(id: i32) -> Option<&'static Self> {
-        CAMERA_MODELS.get(usize::try_from(id).ok()?)
-    }
-
-    /// Returns the model with this name.
-    pub fn from_name(name: &[u8]) -> Option<&'static Self> {
-        CAMERA_MODELS.iter().find(|m| m.name.as_bytes() == name)
-    }
-}
-
 /// A camera, shared by any number of images.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
@@ -238,12 +226,8 @@ pub fn read_views(model: &Path) -> Result<(Vec<Camera>, Vec<Image>), Error> {
 /// # Errors
 /// When the file is malformed or repeats an id.
 pub fn read_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
-    let points = if is_text(path) {
-        text_points(path, with_tracks)?
-    } else {
-        binary_points(path, with_tracks)?
-    };
-    let points = sorted(points);
+    let read = if is_text(path) { text_points } else { binary_points };
+    let points = sorted(read(path, with_tracks)?);
     refuse_repeated(path, "point", points.ids.iter().copied())?;
     Ok(points)
 }
@@ -296,7 +280,8 @@ fn binary_cameras(path: &Path) -> Result<Vec<Camera>, Error> {
         bytes.record(number);
         let id = bytes.u32("camera id")?;
         let model_id = bytes.i32("camera model")?;
-        let Some(model) = CameraModel::from_id(model_id) else {
+        let model = usize::try_from(model_id).ok().and_then(|id| CAMERA_MODELS.get(id));
+        let Some(model) = model else {
             let expected = format!("a camera model of COLMAP (0 to 17) for camera {id}");
             return Err(bytes.error(expected, model_id.to_string()));
         };
@@ -333,11 +318,10 @@ fn binary_images(path: &Path) -> Result<Vec<Image>, Error> {
 
 fn binary_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
     let mut bytes = Bytes::open(path)?;
-    let n = bytes.count("points", POINT3D_BYTES)? as usize;
-    let mut ids = Vec::with_capacity(n);
-    let mut positions = Vec::with_capacity(n);
+    let n = bytes.count("points", POINT3D_BYTES)?;
+    let (mut ids, mut positions) = (Vec::with_capacity(n as usize), Vec::with_capacity(n as usize));
     let mut tracks = with_tracks.then(Tracks::new);
-    for number in 1..=n as u64 {
+    for number in 1..=n {
         bytes.record(number);
         let id = bytes.u64("point id")?;
         let position = bytes.doubles::<3>("coordinates")?;
@@ -376,7 +360,7 @@ fn text_cameras(path: &Path) -> Result<Vec<Camera>, Error> {
         let mut words = words(lines.line());
         let id = next(&lines, &mut words, "a camera id")?;
         let name = words.next().unwrap_or_default();
-        let Some(model) = CameraModel::from_name(name) else {
+        let Some(model) = CAMERA_MODELS.iter().find(|known| known.name.as_bytes() == name) else {
             let expected = format!("a camera model of COLMAP for camera {id}");
             return Err(lines.error(expected, quoted(name)));
         };
@@ -456,27 +440,4 @@ fn text_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
         points.positions.push(position);
     }
     Ok(points)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn unsorted_points_are_sorted_with_their_tracks() {
-        let points = Points {
-            ids: vec![7, 2],
-            positions: vec![[7.0; 3], [2.0; 3]],
-            tracks: Some(Tracks {
-                offsets: vec![0, 2, 3],
-                observations: vec![(7, 0), (7, 1), (2, 0)],
-            }),
-        };
-        let sorted = sorted(points);
-        assert_eq!(sorted.ids, [2, 7]);
-        assert_eq!(sorted.positions, [[2.0; 3], [7.0; 3]]);
-        let tracks = sorted.tracks.unwrap();
-        assert_eq!(tracks.row(0), [(2, 0)]);
-        assert_eq!(tracks.row(1), [(7, 0), (7, 1)]);
-    }
 }

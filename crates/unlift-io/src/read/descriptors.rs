@@ -89,39 +89,31 @@ fn binary(path: &Path, input: &Input) -> Result<Descriptors, Error> {
             return Err(bytes.error("each id once", format!("id {id} again")));
         }
     }
-    let (dim, row_bytes) = (dim as usize, row_bytes as usize);
+    let row_bytes = row_bytes as usize;
     let mut all = vec![0; n as usize * row_bytes];
     bytes.fill(&mut all, "values")?;
-    let row = |id: &u64| match row_of_id.get(id) {
-        Some(&row) => Ok(&all[row * row_bytes..(row + 1) * row_bytes]),
-        None => {
+    let (mut whole, mut floats) = (Vec::new(), Vec::new());
+    for id in &input.ids {
+        let Some(&row) = row_of_id.get(id) else {
             let found = format!("none among {n}");
-            Err(Error::new(path, format!("point {id}"), "a descriptor", found))
+            return Err(Error::new(path, format!("point {id}"), "a descriptor", found));
+        };
+        let row = &all[row * row_bytes..(row + 1) * row_bytes];
+        if scalar == Scalar::U8 {
+            whole.extend_from_slice(row);
+            continue;
         }
-    };
-    // With more points than rows, the loop ends with an error, so the file limits the memory.
-    let n_values = input.ids.len().min(n as usize) * dim;
-    let values = if scalar == Scalar::U8 {
-        let mut values = Vec::with_capacity(n_values);
-        for id in &input.ids {
-            values.extend_from_slice(row(id)?);
-        }
-        Values::U8(values)
-    } else {
-        let mut values = Vec::with_capacity(n_values);
-        for id in &input.ids {
-            for (at, stored) in row(id)?.chunks_exact(scalar.size()).enumerate() {
-                let value = scalar.read(stored, false);
-                if !value.is_finite() {
-                    let place = format!("point {id}, value {at}");
-                    return Err(Error::new(path, place, "a finite value", value.to_string()));
-                }
-                values.push(value as f32);
+        for (at, stored) in row.chunks_exact(scalar.size()).enumerate() {
+            let value = scalar.read(stored, false);
+            if !value.is_finite() {
+                let place = format!("point {id}, value {at}");
+                return Err(Error::new(path, place, "a finite value", value.to_string()));
             }
+            floats.push(value as f32);
         }
-        Values::F32(values)
-    };
-    Descriptors::try_new(values, dim).map_err(|e| Error::core(path, e))
+    }
+    let values = if scalar == Scalar::U8 { Values::U8(whole) } else { Values::F32(floats) };
+    Descriptors::try_new(values, dim as usize).map_err(|e| Error::core(path, e))
 }
 
 /// L2 norm of the descriptors that COLMAP stores as bytes.

@@ -37,17 +37,15 @@ pub(super) fn of_points<R: Read>(
 ) -> Result<Input, Error> {
     let header = Header::read(bytes)?;
     let mut input = Input { format, ..Input::default() };
-    let (rows, layout) = match header.points() {
-        Some(points) => points,
-        None if header.is_structured() => {
-            return Err(
-                bytes.error("fields of numbers called x, y and z", quoted(header.type_text()))
-            );
-        }
-        None if header.scalar().is_none() => {
-            return Err(header.wrong_type(bytes, "numbers, or fields called x, y and z"));
-        }
-        None => return Err(bytes.error("an array of shape (n, 3)", header.shape_text())),
+    let Some((rows, layout)) = header.points() else {
+        let of_type = quoted(header.type_text());
+        return Err(match header.scalar() {
+            _ if header.is_structured() => {
+                bytes.error("fields of numbers called x, y and z", of_type)
+            }
+            None => bytes.error("numbers, or fields called x, y and z", of_type),
+            Some(_) => bytes.error("an array of shape (n, 3)", header.shape_text()),
+        });
     };
     let columns = match layout {
         Layout::Rows { fields, size } => {
@@ -123,26 +121,19 @@ pub fn descriptors(path: &Path, counts: [usize; 2]) -> Result<(Values, usize), E
     let numbers = header.numbers(&bytes)?.filter(|numbers| known.contains(&numbers.scalar));
     let Some(numbers) = numbers else {
         let expected = "bytes, or floats of 2, 4 or 8 bytes (u1, f2, f4, f8)";
-        return Err(header.wrong_type(&bytes, expected));
+        return Err(bytes.error(expected, quoted(header.type_text())));
     };
-    let (rows, columns) = match header.sides() {
-        Some([rows, columns]) if counts.contains(&(rows as usize)) && columns > 0 => {
-            (rows, columns)
-        }
-        sides => {
-            let n = counts[0];
-            let expected = format!("an array of shape ({n}, dimension), a row per point");
-            let found = match sides {
-                Some([_, columns]) if columns == n as u64 => {
-                    format!("{}, rows and columns exchanged", header.shape_text())
-                }
-                _ => header.shape_text(),
-            };
-            return Err(bytes.error(expected, found));
-        }
+    let sides = header.sides();
+    let is_right = |[rows, dim]: &[u64; 2]| counts.contains(&(*rows as usize)) && *dim > 0;
+    let Some([n, dim]) = sides.filter(is_right) else {
+        let n = counts[0];
+        let expected = format!("an array of shape ({n}, dimension), a row per point");
+        let is_exchanged = sides.is_some_and(|[_, columns]| columns == n as u64);
+        let exchanged = if is_exchanged { ", rows and columns exchanged" } else { "" };
+        return Err(bytes.error(expected, header.shape_text() + exchanged));
     };
     numbers.check(&bytes)?;
-    let (n, dim) = (rows as usize, columns as usize);
+    let (n, dim) = (n as usize, dim as usize);
     if numbers.scalar == Scalar::U8 {
         let mut values = vec![0; n * dim];
         numbers.read(&mut bytes, |_, at, value| {
@@ -169,6 +160,7 @@ pub(crate) struct Numbers {
     pub scalar: Scalar,
     pub shape: Vec<u64>,
     big: bool,
+    /// True if columns are contiguous, false if rows are.
     fortran: bool,
 }
 
@@ -235,17 +227,12 @@ pub(crate) struct Header(Vec<u8>);
 
 impl Header {
     pub fn read<R: Read>(bytes: &mut Bytes<R>) -> Result<Self, Error> {
-        let mut magic = [0; 8];
-        bytes.fill(&mut magic, "magic and version")?;
+        let magic: [u8; 8] = bytes.array("magic and version")?;
         if &magic[..6] != MAGIC {
             return Err(bytes.error("a NumPy file", quoted(&magic[..6])));
         }
         let len = match magic[6] {
-            1 => {
-                let mut len = [0; 2];
-                bytes.fill(&mut len, "header length")?;
-                u32::from(u16::from_le_bytes(len))
-            }
+            1 => bytes.array("header length").map(u16::from_le_bytes)?.into(),
             2 | 3 => bytes.u32("header length")?,
             version => return Err(bytes.error("NumPy format 1, 2 or 3", version.to_string())),
         };
@@ -329,22 +316,6 @@ impl Header {
         Some((number(rows.trim().as_bytes())?, Layout::Rows { fields, size }))
     }
 
-    fn wrong_type<R: Read>(&self, bytes: &Bytes<R>, expected: &str) -> Error {
-        bytes.error(expected, quoted(self.type_text()))
-    }
-
-    /// Returns true if columns are contiguous, false if rows are.
-    fn fortran<R: Read>(&self, bytes: &Bytes<R>) -> Result<bool, Error> {
-        match self.value("fortran_order") {
-            Some("True") => Ok(true),
-            Some("False") => Ok(false),
-            other => {
-                let found = quoted(other.unwrap_or_default().as_bytes());
-                Err(bytes.error("fortran_order True or False", found))
-            }
-        }
-    }
-
     pub fn shape_text(&self) -> String {
         quoted(self.value("shape").unwrap_or_default().as_bytes())
     }
@@ -364,6 +335,10 @@ impl Header {
         let Some(((scalar, big), shape)) = self.scalar().zip(self.shape()) else {
             return Ok(None);
         };
-        Ok(Some(Numbers { scalar, shape, big, fortran: self.fortran(bytes)? }))
+        let order = self.value("fortran_order").unwrap_or_default();
+        if !["True", "False"].contains(&order) {
+            return Err(bytes.error("fortran_order True or False", quoted(order.as_bytes())));
+        }
+        Ok(Some(Numbers { scalar, shape, big, fortran: order == "True" }))
     }
 }

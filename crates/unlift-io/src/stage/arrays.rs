@@ -180,6 +180,17 @@ impl<'a> Arrays<'a> {
         })
     }
 
+    /// Reads such numbers, one for each of `n` rows, if there is the array `name`.
+    pub(super) fn column(
+        &self,
+        name: &str,
+        n: usize,
+        below: usize,
+        or_none: bool,
+    ) -> Result<Option<Vec<u32>>, Error> {
+        self.optional(name, |name| Ok(self.integers(name, [Some(n)], below, or_none)?.0))
+    }
+
     /// Reads integers from 0 to 255 as bytes, or finite floats.
     pub(super) fn bytes_or_floats<const N: usize>(
         &self,
@@ -252,14 +263,11 @@ impl<'a> Arrays<'a> {
 
     /// Reads the metadata.
     fn text(&self) -> Result<Option<String>, Error> {
-        if !self.has(KEY) {
-            return Ok(None);
-        }
         let wrong = |found: String| {
             let expected = "a text without dimensions, as np.array(json.dumps(..))";
             Error::new(self.path, format!("array {KEY}"), expected, found)
         };
-        self.file(KEY, |bytes| {
+        let read = |bytes: &mut ArrayBytes<'_>| {
             let header = Header::read(bytes)?;
             let kind = String::from_utf8_lossy(header.type_text()).into_owned();
             if let Some(shape) = header.shape().filter(|shape| !shape.is_empty()) {
@@ -287,8 +295,9 @@ impl<'a> Arrays<'a> {
             };
             let text: Option<String> = text.chunks(width).map(letter).collect();
             let text = text.ok_or_else(|| wrong("bytes that are no text".to_owned()))?;
-            Ok(Some(text.trim_end_matches('\0').to_owned()))
-        })
+            Ok(text.trim_end_matches('\0').to_owned())
+        };
+        self.optional(KEY, |name| self.file(name, read))
     }
 
     /// Calls `read` with a reader of the array `name`.

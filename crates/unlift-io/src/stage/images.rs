@@ -179,7 +179,7 @@ impl<'a> ImageWriter<'a> {
     /// # Errors
     /// When its family differs from the first image.
     pub fn released(&mut self, name: &str, released: &Released<2>) -> Result<(), Error> {
-        self.append(name, released::written(released))
+        self.append(name, Ok(released::written(released)))
     }
 
     /// Adds the ground truth of an image.
@@ -192,14 +192,12 @@ impl<'a> ImageWriter<'a> {
         original: &Original<2>,
         secret: &Secret,
     ) -> Result<(), Error> {
-        let written = truth::written(&self.path, original, secret);
-        let written = written.map_err(|error| error.within(&place(name)))?;
-        self.append(name, written)
+        self.append(name, truth::written(&self.path, original, secret))
     }
 
     /// Adds the neighborhoods of an image.
     pub fn neighborhoods(&mut self, name: &str, lists: &Neighborhoods) -> Result<(), Error> {
-        self.append(name, lists::written(lists))
+        self.append(name, Ok(lists::written(lists)))
     }
 
     /// Adds the recovered points of an image.
@@ -207,9 +205,7 @@ impl<'a> ImageWriter<'a> {
     /// # Errors
     /// When an evidence or delta is not finite.
     pub fn recovered(&mut self, name: &str, recovered: &Recovered<2>) -> Result<(), Error> {
-        let written = recovered::written(&self.path, recovered);
-        let written = written.map_err(|error| error.within(&place(name)))?;
-        self.append(name, written)
+        self.append(name, recovered::written(&self.path, recovered))
     }
 
     /// Completes the file. The caller must then commit its [`OutputFile`].
@@ -223,7 +219,8 @@ impl<'a> ImageWriter<'a> {
         self.zip.finish().map_err(|source| Error::write(&self.path, source))
     }
 
-    fn append(&mut self, name: &str, written: Written<'_>) -> Result<(), Error> {
+    fn append(&mut self, name: &str, written: Result<Written<'_>, Error>) -> Result<(), Error> {
+        let written = written.map_err(|error| error.within(&place(name)))?;
         if written.n_rows == 0 {
             return Ok(());
         }

@@ -100,12 +100,9 @@ pub(super) fn recovered_of<const D: usize>(
     let origin = arrays.origin()?;
     let estimates = estimates(arrays, &origin)?;
     let n = estimates.len();
-    let confidence = match arrays.has("found") || arrays.has("error_scale") {
-        true => Some(confidence(arrays, &estimates)?),
-        false => None,
-    };
-    let rows = |name| Ok(arrays.integers(name, [Some(n)], n, false)?.0);
-    let rows = arrays.optional("descriptor_row", rows)?;
+    let has_confidence = arrays.has("found") || arrays.has("error_scale");
+    let confidence = has_confidence.then(|| confidence(arrays, &estimates)).transpose()?;
+    let rows = arrays.column("descriptor_row", n, n, false)?;
     Recovered::try_new(&estimates, arrays.has("axis"), rows, origin, unit, delta)
         .and_then(|recovered| match confidence {
             Some(confidence) => recovered.with_confidence(confidence),
@@ -124,13 +121,9 @@ fn estimates<const D: usize>(
     let sides = [None, Some(D)];
     let (values, [n, _]) = arrays.numbers("position", sides, Class::Any, rule, no_infinity)?;
     let positions: &[[f64; D]] = values.as_chunks().0;
-    let optional = |name: &str, below: usize, or_none: bool| {
-        let values = |name| arrays.integers(name, [Some(n)], below, or_none);
-        Ok::<_, Error>(arrays.optional(name, values)?.map(|(values, _)| values))
-    };
-    let status = optional("status", Status::ALL.len(), false)?;
-    let support = optional("support", 1 << 16, false)?;
-    let axis = optional("axis", D, true)?;
+    let status = arrays.column("status", n, Status::ALL.len(), false)?;
+    let support = arrays.column("support", n, 1 << 16, false)?;
+    let axis = arrays.column("axis", n, D, true)?;
     let evidence = arrays.optional("evidence", |name| {
         let single = |x: f64| Some(x as f32).filter(|x| x.is_finite());
         Ok(arrays.numbers(name, [Some(n)], Class::Any, "a finite number", single)?.0)

@@ -62,11 +62,10 @@ pub(super) fn written<const D: usize>(released: &Released<D>) -> Written<'_> {
     }
     match (released.protected(), released.descriptors()) {
         (Some(protected), _) => write_protected(&mut written, protected, [n, slots]),
-        (None, Some(plain)) if slots == 1 => {
-            write_rows(&mut written, "descriptor", plain, &[n, plain.dim()]);
-        }
         (None, Some(plain)) => {
-            write_rows(&mut written, "descriptor", plain, &[n, slots, plain.dim()]);
+            let (one, several) = ([n, plain.dim()], [n, slots, plain.dim()]);
+            let shape = if slots == 1 { &one[..] } else { &several };
+            write_rows(&mut written, "descriptor", plain, shape);
         }
         (None, None) => {}
     }
@@ -211,23 +210,24 @@ pub(super) fn released_of<const D: usize>(arrays: &Arrays<'_>) -> Result<Release
 
 /// The family by the metadata, else by the arrays.
 fn family(arrays: &Arrays<'_>) -> Result<&'static str, Error> {
-    let names = FAMILIES.map(|(name, _)| name).join(", ");
-    if let Some(stated) = arrays.meta().text("family")? {
-        let known = FAMILIES.into_iter().find(|(name, _)| *name == stated);
-        return known
-            .map(|(name, _)| name)
-            .ok_or_else(|| arrays.meta().wrong("family", format!("one of {names}")));
+    let stated = arrays.meta().text("family")?;
+    let is_it = |(name, array): &(&str, &str)| {
+        stated.map_or_else(|| arrays.has(array), |stated| stated == *name)
+    };
+    if let Some((name, _)) = FAMILIES.into_iter().find(is_it) {
+        return Ok(name);
     }
-    let known = FAMILIES.into_iter().find(|(_, array)| arrays.has(array));
-    known.map(|(name, _)| name).ok_or_else(|| {
-        let arrays_of = FAMILIES.map(|(_, array)| array).join(", ");
-        let expected = format!("a released map, with one of the arrays {arrays_of}");
-        let found = match arrays.kind() {
-            Ok(Some(kind)) if kind != Kind::Released => kind.to_string(),
-            _ => arrays.list(),
-        };
-        Error::new(arrays.path(), "", expected, found)
-    })
+    if stated.is_some() {
+        let names = FAMILIES.map(|(name, _)| name).join(", ");
+        return Err(arrays.meta().wrong("family", format!("one of {names}")));
+    }
+    let arrays_of = FAMILIES.map(|(_, array)| array).join(", ");
+    let expected = format!("a released map, with one of the arrays {arrays_of}");
+    let found = match arrays.kind() {
+        Ok(Some(kind)) if kind != Kind::Released => kind.to_string(),
+        _ => arrays.list(),
+    };
+    Err(Error::new(arrays.path(), "", expected, found))
 }
 
 fn rays<const D: usize>(arrays: &Arrays<'_>) -> Result<Result<Rays<D>, unlift::Error>, Error> {

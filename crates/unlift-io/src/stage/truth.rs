@@ -83,12 +83,7 @@ pub(super) fn truth_of<const D: usize>(
     let unit = arrays.unit::<D>(None)?;
     let positions = arrays.vectors("position", None)?;
     let n = positions.len();
-    // Returns the array `name` by original, or `None` if there is none.
-    let column = |name: &str, below: usize| {
-        let values = |name| arrays.integers(name, [Some(n)], below, true);
-        Ok::<_, Error>(arrays.optional(name, values)?.map(|(values, _)| values))
-    };
-    let slot = column("slot", n)?.unwrap_or_else(|| (0..n as u32).collect());
+    let slot = arrays.column("slot", n, n, true)?.unwrap_or_else(|| (0..n as u32).collect());
     let n_slots = slot.iter().filter(|&&slot| slot != NONE).count();
     let mut hidden = vec![NONE; n_slots];
     for (original, &slot) in slot.iter().enumerate().filter(|(_, slot)| **slot != NONE) {
@@ -104,8 +99,9 @@ pub(super) fn truth_of<const D: usize>(
             }
         }
     }
-    // Returns an array of a number per hidden point in the order of slots.
-    let by_slot = |name: &str, values: Vec<u32>| -> Result<Vec<u32>, Error> {
+    // Returns an array of a number below `below` per hidden point, in the order of slots.
+    let by_slot = |name: &str, below: usize| -> Result<Option<Vec<u32>>, Error> {
+        let Some(values) = arrays.column(name, n, below, true)? else { return Ok(None) };
         for (original, (value, slot)) in values.iter().zip(&slot).enumerate() {
             if (*value == NONE) != (*slot == NONE) {
                 let (expected, found) = match *slot {
@@ -115,21 +111,17 @@ pub(super) fn truth_of<const D: usize>(
                 return Err(arrays.wrong(name, original, expected, found));
             }
         }
-        Ok(hidden.iter().map(|&original| values[original as usize]).collect())
+        Ok(Some(hidden.iter().map(|&original| values[original as usize]).collect()))
     };
-    let axes = column("swapped_axis", D)?.map(|axes| by_slot("swapped_axis", axes)).transpose()?;
-    let axes = axes.map(|axes| axes.into_iter().map(|axis| axis as u8).collect());
+    let axes =
+        by_slot("swapped_axis", D)?.map(|axes| axes.into_iter().map(|axis| axis as u8).collect());
     let slots = arrays.meta().slots_per_record()?;
-    let rows = match column("descriptor_row", n)? {
-        Some(rows) => by_slot("descriptor_row", rows)?,
+    let rows = match by_slot("descriptor_row", n)? {
+        Some(rows) => rows,
         None if slots == Some(2) => {
             let expected = "the descriptor row of each point, as records have two slots";
-            return Err(Error::new(
-                arrays.path(),
-                "array descriptor_row",
-                expected,
-                "no such array",
-            ));
+            let (place, found) = ("array descriptor_row", "no such array");
+            return Err(Error::new(arrays.path(), place, expected, found));
         }
         None => (0..n_slots as u32).collect(),
     };
@@ -145,9 +137,7 @@ pub(super) fn truth_of<const D: usize>(
 
 /// Returns the originals without a slot, with their reasons.
 fn dropped(arrays: &Arrays<'_>, slot: &[u32]) -> Result<Vec<Dropped>, Error> {
-    let n = slot.len();
-    let codes = |name| arrays.integers(name, [Some(n)], 1 + DropReason::ALL.len(), false);
-    let reasons = arrays.optional("dropped", codes)?.map(|(codes, _)| codes);
+    let reasons = arrays.column("dropped", slot.len(), 1 + DropReason::ALL.len(), false)?;
     let mut dropped = Vec::new();
     for (original, &slot) in slot.iter().enumerate() {
         let code = reasons.as_ref().map(|reasons| reasons[original] as usize);

@@ -40,25 +40,31 @@ fn descriptors_follow_the_ids_of_the_input_in_every_form() {
     }
 }
 
+/// Writes hloc's features: names and descriptors of `dim` values.
+fn write_features(path: &Path, dim: usize, images: impl IntoIterator<Item = (String, Vec<f32>)>) {
+    let mut writer = FeatureWriter::create(path).unwrap();
+    for (name, values) in images {
+        let keypoints = vec![[3.0, 4.0]; values.len() / dim];
+        let descriptors = Descriptors::try_new(Values::F32(values), dim).ok();
+        let image = ImageFeatures { name, keypoints, descriptors, ..Default::default() };
+        writer.append(&image).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
 fn row(id: u32, at: u32) -> [f32; 3] {
     [id as f32, at as f32 - 2.0, 1.0]
 }
 
-/// Writes hloc's features of the images of the project. The image `odd` has an extra keypoint.
+/// Writes features of the images of the project. The image `odd` has an extra keypoint.
 fn features(path: &Path, odd: &str) {
     let images = colmap::read_images(&data("project/sparse/0/images.bin")).unwrap();
-    let mut writer = FeatureWriter::create(path).unwrap();
-    for image in images {
+    let described = |image: colmap::Image| {
         let name = String::from_utf8(image.name).unwrap();
         let n = image.n_points2d as u32 + u32::from(name == odd);
-        let values = (0..n).flat_map(|at| row(image.id, at)).collect();
-        let descriptors = Some(Descriptors::try_new(Values::F32(values), 3).unwrap());
-        let keypoints = (0..n).map(|at| [f64::from(at), 1.0]).collect();
-        writer
-            .append(&ImageFeatures { name, keypoints, descriptors, ..Default::default() })
-            .unwrap();
-    }
-    writer.finish().unwrap();
+        (name, (0..n).flat_map(|at| row(image.id, at)).collect())
+    };
+    write_features(path, 3, images.into_iter().map(described));
 }
 
 #[test]
@@ -147,17 +153,12 @@ fn features_of_changed_models_pass_unless_they_are_in_another_order() {
             };
             let rows = |image: usize| (0..N).flat_map(move |at| row(image, at));
             let [h5, db] = ["f.h5", "f.db"].map(|name| dir.path().join(name));
-            let mut writer = FeatureWriter::create(&h5).unwrap();
-            for image in 0..8 {
+            let of_image = |image: usize| {
                 let mut values: Vec<f32> = rows(image).collect();
                 round_to_half(&mut values);
-                let descriptors = Descriptors::try_new(Values::F32(values), 32).ok();
-                let (name, keypoints) = (format!("{image}.jpg"), vec![[3.0, 4.0]; N]);
-                writer
-                    .append(&ImageFeatures { name, keypoints, descriptors, ..Default::default() })
-                    .unwrap();
-            }
-            writer.finish().unwrap();
+                (format!("{image}.jpg"), values)
+            };
+            write_features(&h5, 32, (0..8).map(of_image));
             write_bytes(&db, |image| rows(image).map(|x| (60.0 * x) as u8).collect());
             for path in [h5, db] {
                 let error = read::descriptors(&path, &input).err();
