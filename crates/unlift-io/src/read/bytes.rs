@@ -279,15 +279,16 @@ impl Scalar {
     }
 }
 
-/// A number in a row of bytes: its offset and type.
+/// A number in a row of bytes: its offset and type, and true if it is big-endian.
 #[derive(Clone, Copy, Debug)]
 pub struct Field {
     pub at: usize,
     pub scalar: Scalar,
+    pub big: bool,
 }
 
 impl Field {
-    pub fn of(self, row: &[u8], big: bool) -> f64 {
-        self.scalar.read(&row[self.at..self.at + self.scalar.size()], big)
+    pub fn of(self, row: &[u8]) -> f64 {
+        self.scalar.read(&row[self.at..], self.big)
     }
 }

@@ -12,6 +12,9 @@ use crate::input::{self, Budget};
 pub(crate) const LONGEST_LINE: u64 = 16 << 20;
 /// The maximum length of a header in bytes, enough for long comments.
 const LONGEST_HEADER: u64 = 1 << 20;
+/// The least number of points at which a column of row numbers is an error. Fewer may match by
+/// accident.
+pub(super) const TELLING: usize = 10;
 
 /// A reader of text lines, counted from 1, as bytes: names need not be UTF-8.
 pub(crate) struct Lines {

@@ -8,7 +8,7 @@ use std::path::Path;
 use unlift::descriptors::Values;
 
 use super::bytes::{Bytes, Field, Scalar};
-use super::lines::{axes, number, quoted};
+use super::lines::{TELLING, axes, number, quoted};
 use crate::error::Error;
 use crate::read::map_input::Input;
 
@@ -19,9 +19,6 @@ const MOST_COLUMNS: u64 = 16;
 /// Names of arrays, or of fields of three values, that contain all coordinates.
 pub(super) const PLACES: [&str; 7] =
     ["xyz", "position", "positions", "points", "points3d", "coordinates", "pts"];
-/// The least number of points at which a column of row numbers is an error. Fewer may match by
-/// accident.
-const TELLING: usize = 10;
 
 /// Reads positions from an `.npy` file, in either byte and memory order.
 ///
@@ -53,7 +50,7 @@ pub(super) fn of_points<R: Read>(
             let mut row = vec![0; size as usize];
             for _ in 0..rows {
                 bytes.fill(&mut row, "values")?;
-                input.positions.push(fields.map(|(field, big)| field.of(&row, big)));
+                input.positions.push(fields.map(|field| field.of(&row)));
             }
             return Ok(input);
         }
@@ -85,9 +82,9 @@ pub(super) enum Layout {
     Matrix {
         columns: u64,
     },
-    /// Records of `size` bytes: the field of each coordinate, and true if it is big-endian.
+    /// Records of `size` bytes, with the field of each coordinate.
     Rows {
-        fields: [(Field, bool); 3],
+        fields: [Field; 3],
         size: u64,
     },
 }
@@ -303,7 +300,7 @@ impl Header {
             let (n, each, at) = (n?, size_of(kind)?, usize::try_from(size).ok()?);
             size = size.checked_add(n.checked_mul(each)?)?;
             let Some((scalar, big)) = stored(kind) else { continue };
-            let field = |at| (Field { at, scalar }, big);
+            let field = |at| Field { at, scalar, big };
             if n == 3 && PLACES.iter().any(|known| name.eq_ignore_ascii_case(known)) {
                 places = Some(std::array::from_fn(|axis| field(at + axis * scalar.size())));
             } else if n == 1 {

@@ -7,12 +7,14 @@ use super::lines::{Lines, coordinate, is_called, number, quoted, words};
 use super::map_input::{Input, undeclared};
 use crate::error::Error;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Encoding {
-    Ascii,
-    Little,
-    Big,
-}
+/// An encoding: its name in files, its name for users, and, of a binary one, whether it is big-endian.
+type Encoding = (&'static [u8], &'static str, Option<bool>);
+
+const ENCODINGS: [Encoding; 3] = [
+    (b"ascii", "ply ascii", None),
+    (b"binary_little_endian", "ply binary little endian", Some(false)),
+    (b"binary_big_endian", "ply binary big endian", Some(true)),
+];
 
 fn scalar(name: &[u8]) -> Option<Scalar> {
     let (kind, size) = match name {
@@ -71,7 +73,7 @@ impl Element {
 /// Reads the positions of the vertices, of any numeric type.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let mut lines = Lines::open(path)?;
-    let (encoding, elements) = header(path, &mut lines)?;
+    let ((_, format, big_endian), elements) = header(path, &mut lines)?;
     let refuse = |expected: String| Error::new(path, "header", expected, "none");
     let vertex = elements.iter().position(|e| e.name == b"vertex");
     let vertex = vertex.ok_or_else(|| refuse("an element vertex".to_owned()))?;
@@ -83,12 +85,12 @@ pub fn read(path: &Path) -> Result<Input, Error> {
             }
             Err(_) => refuse(format!("a property {name} in element vertex")),
         })?;
-    let mut rows = match encoding {
-        Encoding::Ascii => {
+    let mut rows = match big_endian {
+        None => {
             lines.expect_room(element.count, "vertices", element.properties.len() as u64)?;
             Rows::Ascii(lines)
         }
-        encoding => Rows::Binary(lines.into_bytes(), encoding == Encoding::Big),
+        Some(big) => Rows::Binary(lines.into_bytes(), big),
     };
     for before in &elements[..vertex] {
         rows.read(before, [])?;
@@ -98,11 +100,7 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     let is_splat = element.find(["opacity", "scale_0", "rot_0"]).is_ok();
     Ok(Input {
         positions,
-        format: match encoding {
-            Encoding::Ascii => "ply ascii",
-            Encoding::Little => "ply binary little endian",
-            Encoding::Big => "ply binary big endian",
-        },
+        format,
         notes: is_splat.then(|| SPLATS.to_owned()).into_iter().collect(),
         doubts: undeclared(element.count, more).into_iter().collect(),
         ..Input::default()
@@ -149,15 +147,9 @@ fn header(path: &Path, lines: &mut Lines) -> Result<(Encoding, Vec<Element>), Er
         match words[..] {
             [] | [b"comment" | b"obj_info", ..] => {}
             [b"format", name, _version] => {
-                encoding = Some(match name {
-                    b"ascii" => Encoding::Ascii,
-                    b"binary_little_endian" => Encoding::Little,
-                    b"binary_big_endian" => Encoding::Big,
-                    _ => {
-                        let expected = "ascii, binary_little_endian or binary_big_endian";
-                        return Err(error(expected, quoted(name)));
-                    }
-                });
+                let expected = "ascii, binary_little_endian or binary_big_endian";
+                let known = ENCODINGS.into_iter().find(|(known, ..)| *known == name);
+                encoding = Some(known.ok_or_else(|| error(expected, quoted(name)))?);
             }
             [b"element", name, count] => {
                 let count =
@@ -308,7 +300,7 @@ fn binary<const N: usize>(
             continue;
         }
         if let Some(slot) = wanted.iter().position(|&wanted| wanted == number) {
-            fields.push((slot, Field { at: *len, scalar: *scalar }));
+            fields.push((slot, Field { at: *len, scalar: *scalar, big }));
         }
         *len += scalar.size();
     }
@@ -320,7 +312,7 @@ fn binary<const N: usize>(
         for (len, fields, list) in &runs {
             bytes.fill(&mut buffer[..*len], &name)?;
             for (slot, field) in fields {
-                values[*slot] = field.of(&buffer, big);
+                values[*slot] = field.of(&buffer);
             }
             let Some((count, size)) = list else { continue };
             let buffer = &mut buffer[..count.size()];

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::lines::{Lines, axes, coordinate, is_called, number, plain, quoted, words};
+use super::lines::{Lines, TELLING, axes, coordinate, is_called, number, plain, quoted, words};
 use super::map_input::Input;
 use crate::error::Error;
 
@@ -31,9 +31,6 @@ fn split(line: &[u8], separator: Separator) -> Vec<&[u8]> {
 const COMMENTS: usize = 1 << 16;
 /// Columns before the tracks in COLMAP's points.
 const COLMAP_COLUMNS: usize = 8;
-/// The least number of points at which a column of row numbers is an error. Fewer may match by
-/// accident.
-const TELLING: usize = 10;
 
 /// Reads positions from lines of numbers separated by commas, semicolons, spaces or tabs. Returns
 /// `None` for the points of a COLMAP model in text.

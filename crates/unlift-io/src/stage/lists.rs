@@ -90,7 +90,6 @@ fn lists_of(
     })?;
     let (mut offsets, mut neighbors) = (vec![0], Vec::with_capacity(ids.len()));
     let mut scores = given.as_ref().map(|scores| Vec::with_capacity(scores.len()));
-    let mut sorted = Vec::new();
     for row in 0..n_rows {
         let first = neighbors.len();
         for at in row * k..(row + 1) * k {
@@ -111,11 +110,10 @@ fn lists_of(
             let found = format!("its own {word} {own}");
             return Err(arrays.wrong(name, row, format!("other {word}s"), found));
         }
-        sorted.clear();
-        sorted.extend(neighbors[first..].iter().map(|record| record.0));
+        let mut sorted = neighbors[first..].to_vec();
         sorted.sort_unstable();
         if let Some(pair) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-            let found = format!("{word} {} twice", pair[0]);
+            let found = format!("{word} {} twice", pair[0].0);
             return Err(arrays.wrong(name, row, format!("each {word} once"), found));
         }
         offsets.push(neighbors.len() as u64);
