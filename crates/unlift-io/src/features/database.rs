@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
-use std::fmt::Write;
+use std::fmt::{Display, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -71,7 +71,7 @@ impl Database {
         Ok(Self { path, connection, image_ids, names, has_type, steps })
     }
 
-    fn error(&self, name: &[u8], expected: impl Into<String>, found: impl Into<String>) -> Error {
+    fn error(&self, name: &[u8], expected: impl Display, found: impl Display) -> Error {
         Error::new(&self.path, format!("image {}", quoted(name)), expected, found)
     }
 
@@ -164,7 +164,7 @@ impl Database {
         }
         if let Some(bad) = values.iter().position(|value| !value.is_finite()) {
             let expected = format!("a finite number in keypoint {}", bad / columns);
-            return Err(self.error(name, expected, values[bad].to_string()));
+            return Err(self.error(name, expected, values[bad]));
         }
         let mut image = ImageFeatures { name: self.names[at].clone(), size, ..Default::default() };
         // COLMAP places the center of the first pixel at (0.5, 0.5).
@@ -177,7 +177,7 @@ impl Database {
         if let Some(rows) = descriptors {
             if rows.n != n {
                 let expected = format!("{n} descriptors, one per keypoint");
-                return Err(self.error(name, expected, rows.n.to_string()));
+                return Err(self.error(name, expected, rows.n));
             }
             let wrong = |error: unlift::Error| self.error(name, error.expected(), error.found());
             let descriptors = Descriptors::try_new(rows.values, rows.dim).map_err(wrong)?;

@@ -81,9 +81,8 @@ impl Hloc {
     /// Lists all groups of the file of `len` bytes that contain arrays directly, and errors about
     /// broken links.
     fn list(&self, len: u64) -> Result<(Groups, Vec<Error>), Error> {
-        let wrong = |error: hdf5_pure::Error| {
-            Error::new(&self.path, "", "a whole HDF5 file", error.to_string())
-        };
+        let wrong =
+            |error: hdf5_pure::Error| Error::new(&self.path, "", "a whole HDF5 file", error);
         let wrong_image = |name: &str, found: String| {
             Error::new(&self.path, place(name), "features of an image", found)
         };
@@ -165,7 +164,7 @@ impl Hloc {
     }
 
     fn unreadable(&self, place: &str, error: hdf5_pure::Error) -> Error {
-        Error::new(&self.path, place, "readable HDF5", error.to_string())
+        Error::new(&self.path, place, "readable HDF5", error)
     }
 
     pub fn is_upright(&self) -> bool {
@@ -473,7 +472,7 @@ impl FeatureWriter {
         {
             let place = format!("{place}, {array}");
             let expected = format!("{n}, one per keypoint");
-            return Err(Error::new(self.output.path(), place, expected, len.to_string()));
+            return Err(Error::new(self.output.path(), place, expected, len));
         }
         if self.images.contains(name)
             || self.folders.contains(name)

@@ -1,5 +1,6 @@
 //! Reads binary files and their numbers.
 
+use std::fmt::Display;
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -70,25 +71,23 @@ impl<R: Read> Bytes<R> {
     }
 
     /// Returns an error about the last value.
-    pub fn error(&self, expected: impl Into<String>, found: impl Into<String>) -> Error {
+    pub fn error(&self, expected: impl Display, found: impl Display) -> Error {
         self.error_at(self.value_at, expected, found)
     }
 
     /// Returns an error about the next value.
-    pub fn error_ahead(&self, expected: impl Into<String>, found: impl Into<String>) -> Error {
+    pub fn error_ahead(&self, expected: impl Display, found: impl Display) -> Error {
         self.error_at(self.at, expected, found)
     }
 
-    fn error_at(&self, at: u64, expected: impl Into<String>, found: impl Into<String>) -> Error {
-        let what = match &self.part {
-            Part::Header => "header".to_owned(),
-            Part::Record(number) => format!("record {number}"),
-            Part::Array(name) => {
-                return Error::new(&self.path, format!("array {name}"), expected, found);
-            }
-            Part::End => "end".to_owned(),
+    fn error_at(&self, at: u64, expected: impl Display, found: impl Display) -> Error {
+        let place = match &self.part {
+            Part::Header => format!("header (byte {at})"),
+            Part::Record(number) => format!("record {number} (byte {at})"),
+            Part::Array(name) => format!("array {name}"),
+            Part::End => format!("end (byte {at})"),
         };
-        Error::new(&self.path, Place::Byte { what, at }, expected, found)
+        Error::new(&self.path, place, expected, found)
     }
 
     /// Returns the size of `n` rows of `stride` bytes, or an error if the file has fewer bytes
@@ -128,7 +127,7 @@ impl<R: Read> Bytes<R> {
             // An archive detects damage by checksums.
             Part::Array(name) => {
                 let place = format!("array {name}");
-                Error::new(&self.path, place, "undamaged data", source.to_string())
+                Error::new(&self.path, place, "undamaged data", source)
             }
             _ => Error::read(&self.path, source),
         }

@@ -283,7 +283,7 @@ fn binary_cameras(path: &Path) -> Result<Vec<Camera>, Error> {
         let model = usize::try_from(model_id).ok().and_then(|id| CAMERA_MODELS.get(id));
         let Some(model) = model else {
             let expected = format!("a camera model of COLMAP (0 to 17) for camera {id}");
-            return Err(bytes.error(expected, model_id.to_string()));
+            return Err(bytes.error(expected, model_id));
         };
         let width_px = bytes.u64("width")?;
         let height_px = bytes.u64("height")?;
@@ -371,7 +371,7 @@ fn text_cameras(path: &Path) -> Result<Vec<Camera>, Error> {
             .collect::<Result<_, _>>()?;
         if params.len() != model.n_params {
             let expected = format!("{} parameters of {}", model.n_params, model.name);
-            return Err(lines.error(expected, params.len().to_string()));
+            return Err(lines.error(expected, params.len()));
         }
         cameras.push(Camera { id, model, width_px, height_px, params });
     }

@@ -73,7 +73,7 @@ fn binary(path: &Path, input: &Input) -> Result<Descriptors, Error> {
         3 => Scalar::F32,
         other => {
             let expected = "type 1 (u8), 2 (float16) or 3 (float32)";
-            return Err(bytes.error(expected, other.to_string()));
+            return Err(bytes.error(expected, other));
         }
     };
     let row_bytes = u64::from(dim) * scalar.size() as u64;
@@ -107,7 +107,7 @@ fn binary(path: &Path, input: &Input) -> Result<Descriptors, Error> {
             let value = scalar.read(stored, false);
             if !value.is_finite() {
                 let place = format!("point {id}, value {at}");
-                return Err(Error::new(path, place, "a finite value", value.to_string()));
+                return Err(Error::new(path, place, "a finite value", value));
             }
             floats.push(value as f32);
         }

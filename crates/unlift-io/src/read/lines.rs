@@ -1,5 +1,6 @@
 //! Reads text files line by line, and their columns and coordinates.
 
+use std::fmt::Display;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -116,12 +117,12 @@ impl Lines {
         line.strip_suffix(b"\r").unwrap_or(line)
     }
 
-    pub fn error(&self, expected: impl Into<String>, found: impl Into<String>) -> Error {
+    pub fn error(&self, expected: impl Display, found: impl Display) -> Error {
         Error::new(&self.path, Place::Line(self.number), expected, found)
     }
 
     /// Returns an error at the end of the file, where another line was expected.
-    pub fn end_error(&self, expected: impl Into<String>) -> Error {
+    pub fn end_error(&self, expected: impl Display) -> Error {
         let place = Place::Line(self.number + 1);
         Error::new(&self.path, place, expected, "end of file")
     }

@@ -231,7 +231,7 @@ impl Header {
         let len = match magic[6] {
             1 => bytes.array("header length").map(u16::from_le_bytes)?.into(),
             2 | 3 => bytes.u32("header length")?,
-            version => return Err(bytes.error("NumPy format 1, 2 or 3", version.to_string())),
+            version => return Err(bytes.error("NumPy format 1, 2 or 3", version)),
         };
         if u64::from(len) > bytes.remaining() {
             let expected = format!("a header of {len} bytes");

@@ -270,7 +270,7 @@ fn ascii<const N: usize>(
         n_words += all.count();
         if n_words != n_expected {
             let expected = format!("{n_expected} values of {name} {row}");
-            return Err(lines.error(expected, n_words.to_string()));
+            return Err(lines.error(expected, n_words));
         }
         rows.push(values);
     }
@@ -319,7 +319,7 @@ fn binary<const N: usize>(
             bytes.fill(buffer, "the length of a list")?;
             let n = count.read(buffer, big);
             if n < 0.0 || n.fract() != 0.0 {
-                return Err(bytes.error("the length of a list", n.to_string()));
+                return Err(bytes.error("the length of a list", n));
             }
             bytes.skip((n as u64).saturating_mul(*size), "a list")?;
         }

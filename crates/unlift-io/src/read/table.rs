@@ -93,7 +93,7 @@ pub fn read(path: &Path) -> Result<Option<Input>, Error> {
                     true => format!("{} columns up to {name}", column + 1),
                     false => "3 coordinates".to_owned(),
                 };
-                return Err(lines.error(expected, fields.len().to_string()));
+                return Err(lines.error(expected, fields.len()));
             };
             *value = coordinate(field)
                 .ok_or_else(|| lines.error(format!("a number for {name}"), quoted(field)))?;

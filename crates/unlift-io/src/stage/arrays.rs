@@ -1,5 +1,6 @@
 //! Reads the arrays of one map, or of one image, by name.
 
+use std::fmt::Display;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -103,7 +104,7 @@ impl<'a> Arrays<'a> {
     /// Checks that these are arrays of `kind` only. Ambiguous ones are taken for it.
     pub(super) fn expect(&self, kind: Kind) -> Result<(), Error> {
         if let Some(other) = self.kind()?.filter(|its| *its != kind) {
-            return Err(Error::new(self.path, "", kind.to_string(), other.to_string()));
+            return Err(Error::new(self.path, "", kind, other));
         }
         let is_unknown = |name: &&str| *name != KEY && !kind.arrays().contains(name);
         match self.names().find(is_unknown) {
@@ -131,8 +132,8 @@ impl<'a> Arrays<'a> {
         &self,
         name: &str,
         row: usize,
-        expected: impl Into<String>,
-        found: impl Into<String>,
+        expected: impl Display,
+        found: impl Display,
     ) -> Error {
         Error::new(self.path, format!("array {name}, row {row}"), expected, found)
     }

@@ -44,7 +44,7 @@ impl<'a> ImageFile<'a> {
     pub fn open(path: &'a Path, kind: Kind) -> Result<Self, Error> {
         let file = Arrays::open(path)?;
         if let Some(other) = file.meta().kind()?.filter(|its| *its != kind) {
-            return Err(Error::new(path, "", kind.to_string(), other.to_string()));
+            return Err(Error::new(path, "", kind, other));
         }
         let mut images: Vec<(String, Vec<(usize, String)>)> = Vec::new();
         let mut names = HashSet::new();

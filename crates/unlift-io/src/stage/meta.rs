@@ -1,5 +1,6 @@
 //! The metadata of a stage file: a JSON object in the text array `unlift`.
 
+use std::fmt::Display;
 use std::path::Path;
 
 use serde_json::{Map, Value, json};
@@ -67,7 +68,7 @@ impl<'a> Meta<'a> {
     fn given<'s, T>(
         &'s self,
         key: &str,
-        expected: impl Into<String>,
+        expected: impl Display,
         read: impl FnOnce(&'s Value) -> Option<T>,
     ) -> Result<Option<T>, Error> {
         let Some(value) = self.object.get(key) else { return Ok(None) };
@@ -130,7 +131,7 @@ impl<'a> Meta<'a> {
         Ok(self.given(key, "true or false", Value::as_bool)?.unwrap_or(false))
     }
 
-    pub(super) fn wrong(&self, key: &str, expected: impl Into<String>) -> Error {
+    pub(super) fn wrong(&self, key: &str, expected: impl Display) -> Error {
         let found = self.object.get(key).map_or("nothing".into(), short);
         Error::new(self.path, format!("metadata unlift, {key}"), expected, found)
     }

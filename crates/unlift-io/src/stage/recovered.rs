@@ -146,7 +146,7 @@ fn estimates<const D: usize>(
                 true => "0, as there is a position",
                 false => "the code of a reason, as there is no position",
             };
-            return Err(arrays.wrong("status", slot, expected, (status as u8).to_string()));
+            return Err(arrays.wrong("status", slot, expected, status as u8));
         }
         let axis = match axis.as_ref().map(|axis| axis[slot]) {
             Some(NONE) if has_position => {

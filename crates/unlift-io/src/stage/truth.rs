@@ -32,7 +32,7 @@ pub(super) fn written<'a, const D: usize>(
     let n = secret.n_originals();
     if points.len() != n {
         let expected = format!("{n} originals, as in the secret");
-        return Err(Error::new(path, "", expected, points.len().to_string()));
+        return Err(Error::new(path, "", expected, points.len()));
     }
     let mut written = Written::new(Kind::Truth, n);
     written.state("unit", points.unit().name());
@@ -95,7 +95,7 @@ pub(super) fn truth_of<const D: usize>(
             }
             None => {
                 let expected = format!("slots below {n_slots}, the number of slots");
-                return Err(arrays.wrong("slot", original, expected, slot.to_string()));
+                return Err(arrays.wrong("slot", original, expected, slot));
             }
         }
     }
@@ -151,7 +151,7 @@ fn dropped(arrays: &Arrays<'_>, slot: &[u32]) -> Result<Vec<Dropped>, Error> {
             (_, None | Some(0)) => continue,
             (_, Some(code)) => {
                 let expected = "0, as there is a slot";
-                return Err(arrays.wrong("dropped", original, expected, code.to_string()));
+                return Err(arrays.wrong("dropped", original, expected, code));
             }
         };
         dropped.push(Dropped { original: OriginalId(original as u32), reason });
