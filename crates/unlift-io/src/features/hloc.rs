@@ -2,6 +2,7 @@
 //! feature.
 
 use std::collections::BTreeSet;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use half::f16;
@@ -55,13 +56,9 @@ impl Hloc {
             let found = "one that its writer did not close (h5clear -s FILE)";
             return Err(Error::new(path, "", "a whole HDF5 file", found));
         }
-        let mut all = Self {
-            path: path.to_owned(),
-            budget: Budget::new(path, len),
-            names: Vec::new(),
-            groups: Vec::new(),
-            broken: Vec::new(),
-        };
+        let budget = Budget::new(path, len);
+        let (names, groups, broken) = Default::default();
+        let mut all = Self { path: path.to_owned(), budget, names, groups, broken };
         let (mut groups, broken) = all.step("", || all.list(len))?;
         groups.sort_unstable_by(|(a, _), (b, _)| a.cmp(b));
         (all.names, all.groups) = groups.into_iter().unzip();
@@ -115,11 +112,9 @@ impl Hloc {
             let links = address.and_then(|at| links(&raw, at)).unwrap_or_default();
             for (name, target) in &links {
                 if let Target::Unlistable(to) = target {
-                    let found = format!(
-                        "a link to {} in the old form (write it with libver=\"latest\" of h5py)",
-                        quoted(to.as_bytes())
-                    );
-                    return Err(wrong_image(&within(name), found));
+                    let to = quoted(to.as_bytes());
+                    let way_out = "in the old form (write it with libver=\"latest\" of h5py)";
+                    return Err(wrong_image(&within(name), format!("a link to {to} {way_out}")));
                 }
             }
             let arrays = group.datasets().map_err(refuse)?;
@@ -181,30 +176,27 @@ impl Hloc {
     fn image(&self, at: usize) -> Result<ImageFeatures, Error> {
         let present = self.arrays(at)?;
         let has = |array: &str| present.iter().any(|name| name == array);
-        let optional = |array: &str| has(array).then(|| self.array(at, array)).transpose();
-        let wrong = |array: &'static str| {
-            move |(expected, found): Wrong| Error::new(&self.path, array, expected, found)
-        };
+        let optional = |array: &'static str| has(array).then(|| self.array(at, array)).transpose();
         let Some(places) = optional(KEYPOINTS)? else {
             let found = format!("only {}", present.join(", "));
             return Err(Error::new(&self.path, "", "an array keypoints", found));
         };
-        let keypoints = keypoints(&places).map_err(wrong(KEYPOINTS))?;
+        let keypoints = keypoints(&places)?;
         let n = keypoints.len();
         let per_keypoint = |array: &'static str| -> Result<Option<Vec<f32>>, Error> {
-            let Some(Array { shape, values, .. }) = optional(array)? else { return Ok(None) };
-            if shape != [n as u64] && shape != [n as u64, 1] {
+            let Some(array) = optional(array)? else { return Ok(None) };
+            if array.shape != [n as u64] && array.shape != [n as u64, 1] {
                 let expected = format!("one value per keypoint, ({n},)");
-                return Err(wrong(array)((expected, tuple(&shape))));
+                return Err(array.wrong(expected, tuple(&array.shape)));
             }
-            Ok(Some(values.into_iter().map(|value| value as f32).collect()))
+            Ok(Some(array.values.into_iter().map(|value| value as f32).collect()))
         };
-        let descriptors = optional("descriptors")?.map(|array| descriptors(array, n));
+        let descriptors = optional("descriptors")?.map(|array| descriptors(&array, n));
         let size = optional("image_size")?.map(|array| size(&array));
         Ok(ImageFeatures {
             name: self.names[at].clone(),
-            size: size.transpose().map_err(wrong("image_size"))?,
-            descriptors: descriptors.transpose().map_err(wrong("descriptors"))?,
+            size: size.transpose()?,
+            descriptors: descriptors.transpose()?,
             scores: per_keypoint("scores")?,
             scales: per_keypoint("scales")?,
             orientations_deg: per_keypoint("oris")?,
@@ -223,7 +215,7 @@ impl Hloc {
         Ok(names)
     }
 
-    fn array(&self, at: usize, name: &str) -> Result<Array, Error> {
+    fn array(&self, at: usize, name: &'static str) -> Result<Array<'_>, Error> {
         self.step(name, || {
             let refuse = |error| self.unreadable(name, error);
             let dataset = self.groups[at].dataset(name).map_err(refuse)?;
@@ -236,7 +228,7 @@ impl Hloc {
                 let expected = "floats of 16, 32 or 64 bits, or integers";
                 return Err(Error::new(&self.path, name, expected, "another type"));
             };
-            Ok(Array { shape, datatype, values })
+            Ok(Array { path: &self.path, name, shape, datatype, values })
         })
     }
 
@@ -257,10 +249,18 @@ fn place(image: &str) -> String {
 }
 
 /// An array, row-major.
-struct Array {
+struct Array<'a> {
+    path: &'a Path,
+    name: &'static str,
     shape: Vec<u64>,
     datatype: Datatype,
     values: Vec<f64>,
+}
+
+impl Array<'_> {
+    fn wrong(&self, expected: impl Display, found: impl Display) -> Error {
+        Error::new(self.path, self.name, expected, found)
+    }
 }
 
 /// The IEEE float of 16 bits, which hloc stores.
@@ -304,31 +304,28 @@ fn transposed<T: Copy>(values: &[T], rows: usize) -> Vec<T> {
     transposed
 }
 
-/// The expected and the found value.
-type Wrong = (String, String);
-
 /// Columns after x and y are ignored.
-fn keypoints(array: &Array) -> Result<Vec<[f64; 2]>, Wrong> {
+fn keypoints(array: &Array<'_>) -> Result<Vec<[f64; 2]>, Error> {
     let columns = match array.shape[..] {
         [_, columns] if columns >= 2 => columns as usize,
         // Some exporters write an image without keypoints like this.
         [0] | [0, _] | [2, 0] => return Ok(Vec::new()),
-        _ => return Err(("shape (N, 2)".to_owned(), tuple(&array.shape))),
+        _ => return Err(array.wrong("shape (N, 2)", tuple(&array.shape))),
     };
     let rows = array.values.chunks_exact(columns);
     let rows: Vec<[f64; 2]> = rows.map(|row| [row[0], row[1]]).collect();
     match rows.iter().position(|row| !row.iter().all(|value| value.is_finite())) {
         None => Ok(rows),
-        Some(at) => Err((
-            format!("finite coordinates in row {at}"),
-            format!("({}, {})", rows[at][0], rows[at][1]),
-        )),
+        Some(at) => {
+            let found = format!("({}, {})", rows[at][0], rows[at][1]);
+            Err(array.wrong(format!("finite coordinates in row {at}"), found))
+        }
     }
 }
 
 /// Converts a `(D, N)` array to rows of `D` values. A square array is `(N, D)` if its rows, but not its columns, have equal norms.
-fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
-    let expected = || format!("shape (D, N) with N = {n}, one column per keypoint");
+fn descriptors(array: &Array<'_>, n: usize) -> Result<Descriptors, Error> {
+    let expected = format!("shape (D, N) with N = {n}, one column per keypoint");
     let dim = match array.shape[..] {
         ref sides if n == 0 && sides.contains(&0) => {
             sides.iter().copied().max().unwrap_or(0).max(1) as usize
@@ -336,9 +333,9 @@ fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
         [dim, count] if count == n as u64 && dim > 0 => dim as usize,
         [count, _] if count == n as u64 => {
             let found = format!("{}, rows and columns exchanged", tuple(&array.shape));
-            return Err((expected(), found));
+            return Err(array.wrong(expected, found));
         }
-        _ => return Err((expected(), tuple(&array.shape))),
+        _ => return Err(array.wrong(expected, tuple(&array.shape))),
     };
     let is_rows = dim == n && has_equal_rows(&array.values, n);
     // Transposing a matrix of one row changes nothing.
@@ -348,7 +345,7 @@ fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
             size: 1, layout: FixedPointLayout { signed: false, .. }, ..
         } => Values::U8(rows.map(|value| value as u8).collect()),
         Datatype::FixedPoint { .. } if !array.values.is_empty() => {
-            return Err(("floats, or unsigned bytes".to_owned(), "other integers".to_owned()));
+            return Err(array.wrong("floats, or unsigned bytes", "other integers"));
         }
         _ => Values::F32(rows.map(|value| value as f32).collect()),
     };
@@ -357,7 +354,7 @@ fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
             "descriptors" => error.found().to_owned(),
             place => format!("{} ({place})", error.found()),
         };
-        (error.expected().to_owned(), found)
+        array.wrong(error.expected(), found)
     })
 }
 
@@ -372,7 +369,7 @@ fn has_equal_rows(values: &[f64], n: usize) -> bool {
     spread(&|i, j| i * n + j) < 0.01 && spread(&|i, j| j * n + i) > 0.01
 }
 
-fn size(array: &Array) -> Result<[u32; 2], Wrong> {
+fn size(array: &Array<'_>) -> Result<[u32; 2], Error> {
     let sides = &array.values;
     let side = |value: f64| {
         let whole = (1.0..=f64::from(u32::MAX)).contains(&value) && value.fract() == 0.0;
@@ -387,7 +384,7 @@ fn size(array: &Array) -> Result<[u32; 2], Wrong> {
             2 => format!("{} and {}", sides[0], sides[1]),
             _ => tuple(&array.shape),
         };
-        ("width and height in pixels".to_owned(), found)
+        array.wrong("width and height in pixels", found)
     })
 }
 
@@ -448,17 +445,17 @@ impl FeatureWriter {
     pub fn check(&self, image: &ImageFeatures) -> Result<(), Error> {
         let name = &image.name;
         let place = format!("image {}", quoted(name.as_bytes()));
-        let wrong = |expected: &str, found: String| {
+        let wrong = |expected: &str, found: &dyn Display| {
             Err(Error::new(self.output.path(), &*place, expected, found))
         };
         let parts = || name.split('/');
         if parts().any(|part| matches!(part, "" | "." | "..") || part.contains('\0')) {
             let expected = "a name whose parts are not empty, . or ..";
-            return wrong(expected, quoted(name.as_bytes()));
+            return wrong(expected, &quoted(name.as_bytes()));
         }
         let depth = parts().count();
         if depth > MAX_DEPTH {
-            return wrong(&format!("a name of at most {MAX_DEPTH} parts"), depth.to_string());
+            return wrong(&format!("a name of at most {MAX_DEPTH} parts"), &depth);
         }
         let n = image.keypoints.len();
         let lengths = [
@@ -479,7 +476,7 @@ impl FeatureWriter {
             || folders(name).any(|folder| self.images.contains(folder))
         {
             let found = "one that exists already, or contains or is inside another image";
-            return wrong("a new name", found.to_owned());
+            return wrong("a new name", &found);
         }
         Ok(())
     }
@@ -603,9 +600,9 @@ mod tests {
         }
         let read = |values: Vec<f32>| {
             let values = values.into_iter().map(f64::from).collect();
-            let array =
-                Array { shape: vec![N as u64; 2], datatype: hdf5_pure::make_f32_type(), values };
-            descriptors(array, N).unwrap().values().clone()
+            let (path, name, datatype) = (Path::new(""), "", hdf5_pure::make_f32_type());
+            let array = Array { path, name, shape: vec![N as u64; 2], datatype, values };
+            descriptors(&array, N).unwrap().values().clone()
         };
         assert_eq!(read(transposed(&rows, N)), Values::F32(rows.clone()));
         assert_eq!(read(rows.clone()), Values::F32(rows));
