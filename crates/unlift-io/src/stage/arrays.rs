@@ -4,7 +4,6 @@ use std::fmt::Display;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use unlift::Unit;
 use unlift::descriptors::Values;
 
 use super::kind::Kind;
@@ -22,13 +21,13 @@ const MAX_TEXT: u64 = 1 << 16;
 
 /// The arrays of one map or image.
 pub(super) struct Arrays<'a> {
-    path: &'a Path,
+    pub(super) path: &'a Path,
     /// Shared by the images of a file, which several threads read.
     archive: Arc<Mutex<Archive>>,
     /// Index in the archive and name of each array.
-    arrays: Vec<(usize, String)>,
+    pub(super) arrays: Vec<(usize, String)>,
     budget: Budget,
-    meta: Meta<'a>,
+    pub(super) meta: Meta<'a>,
 }
 
 impl<'a> Arrays<'a> {
@@ -53,19 +52,6 @@ impl<'a> Arrays<'a> {
             self.meta.extend(&text)?;
         }
         Ok(self)
-    }
-
-    pub(super) fn path(&self) -> &'a Path {
-        self.path
-    }
-
-    pub(super) fn meta(&self) -> &Meta<'a> {
-        &self.meta
-    }
-
-    /// Index in the archive and name of each array.
-    pub(super) fn arrays(&self) -> &[(usize, String)] {
-        &self.arrays
     }
 
     fn names(&self) -> impl Iterator<Item = &str> {
@@ -114,13 +100,6 @@ impl<'a> Arrays<'a> {
                 Err(Error::new(self.path, format!("array {name}"), expected, "an unknown array"))
             }
         }
-    }
-
-    /// The unit of all lengths: as declared, else `usual`, else pixels in 2D.
-    pub(super) fn unit<const D: usize>(&self, usual: Option<Unit>) -> Result<Unit, Error> {
-        let in_plane = (D == 2).then_some(Unit::Pixel);
-        let unit = self.meta.unit()?.or(usual).or(in_plane);
-        unit.ok_or_else(|| self.meta.wrong_unit())
     }
 
     pub(super) fn refused(&self, source: unlift::Error) -> Error {

@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
+use std::vec::IntoIter;
 
 use serde_json::{Map, Value};
 use unlift::neighbors::Neighborhoods;
@@ -25,8 +26,8 @@ use crate::atomic::OutputFile;
 pub struct ImageFile<'a> {
     /// All arrays of the file.
     file: Arrays<'a>,
-    /// The images in reverse order, with the index and name of each array.
-    waiting: Vec<(String, Vec<(usize, String)>)>,
+    /// The next images, with the index and name of each array.
+    waiting: IntoIter<(String, Vec<(usize, String)>)>,
 }
 
 /// The arrays of one image.
@@ -43,12 +44,12 @@ impl<'a> ImageFile<'a> {
     /// follow one another.
     pub fn open(path: &'a Path, kind: Kind) -> Result<Self, Error> {
         let file = Arrays::open(path)?;
-        if let Some(other) = file.meta().kind()?.filter(|its| *its != kind) {
+        if let Some(other) = file.meta.kind()?.filter(|its| *its != kind) {
             return Err(Error::new(path, "", kind, other));
         }
         let mut images: Vec<(String, Vec<(usize, String)>)> = Vec::new();
         let mut names = HashSet::new();
-        for (at, name) in file.arrays() {
+        for (at, name) in &file.arrays {
             let Some((image, array)) = name.rsplit_once('/') else {
                 if name == KEY {
                     continue;
@@ -69,8 +70,7 @@ impl<'a> ImageFile<'a> {
         if images.is_empty() {
             return Err(Error::new(path, "", "arrays of images, as a.jpg/foot", "none"));
         }
-        images.reverse();
-        Ok(Self { file, waiting: images })
+        Ok(Self { file, waiting: images.into_iter() })
     }
 
     /// Opens the next image. Returns `None` at the end.
@@ -78,7 +78,7 @@ impl<'a> ImageFile<'a> {
     /// # Errors
     /// When its metadata is wrong.
     pub fn next_image(&mut self) -> Result<Option<ImageRows<'a>>, Error> {
-        let Some((name, arrays)) = self.waiting.pop() else { return Ok(None) };
+        let Some((name, arrays)) = self.waiting.next() else { return Ok(None) };
         let arrays = self.file.of_image(arrays).map_err(|error| error.within(&place(&name)))?;
         Ok(Some(ImageRows { name, arrays }))
     }
@@ -93,18 +93,18 @@ impl<'a> ImageFile<'a> {
             other => {
                 let expected = format!("image {name}, as in {}", of.display());
                 let found = other.map_or("no more images".to_owned(), |rows| rows.name);
-                Err(Error::new(self.file.path(), "", expected, found))
+                Err(Error::new(self.file.path, "", expected, found))
             }
         }
     }
 
     /// Checks that no image follows, as in the file `of`.
     pub fn expect_end(&mut self, of: &Path) -> Result<(), Error> {
-        match self.waiting.last() {
+        match self.waiting.as_slice().first() {
             None => Ok(()),
             Some((name, _)) => {
                 let expected = format!("no more images, as in {}", of.display());
-                Err(Error::new(self.file.path(), "", expected, format!("image {name}")))
+                Err(Error::new(self.file.path, "", expected, format!("image {name}")))
             }
         }
     }

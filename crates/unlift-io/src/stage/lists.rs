@@ -57,7 +57,7 @@ pub(super) fn neighborhoods_of(
     slots_per_record: usize,
 ) -> Result<Neighborhoods, Error> {
     arrays.expect(Kind::Neighborhoods)?;
-    let about = arrays.meta().about()?;
+    let about = arrays.meta.about()?;
     let lists = lists_of(arrays, ("records", "record"), n_records, slots_per_record)?;
     Ok(lists.with_about(about))
 }

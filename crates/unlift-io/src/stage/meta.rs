@@ -82,12 +82,12 @@ impl<'a> Meta<'a> {
         self.given("kind", expected, |kind| Kind::from_name(kind.as_str()?))
     }
 
-    pub(super) fn unit(&self) -> Result<Option<Unit>, Error> {
-        self.given("unit", UNITS, |unit| Unit::from_name(unit.as_str()?))
-    }
-
-    pub(super) fn wrong_unit(&self) -> Error {
-        self.wrong("unit", UNITS)
+    /// The unit of all lengths: as declared, else `usual`, else pixels in 2D.
+    pub(super) fn unit<const D: usize>(&self, usual: Option<Unit>) -> Result<Unit, Error> {
+        const UNITS: &str = "m, px or kth_neighbor";
+        let stated = self.given("unit", UNITS, |unit| Unit::from_name(unit.as_str()?))?;
+        let unit = stated.or(usual).or((D == 2).then_some(Unit::Pixel));
+        unit.ok_or_else(|| self.wrong("unit", UNITS))
     }
 
     pub(super) fn fingerprint(&self) -> Result<Option<Fingerprint>, Error> {
@@ -136,8 +136,6 @@ impl<'a> Meta<'a> {
         Error::new(self.path, format!("metadata unlift, {key}"), expected, found)
     }
 }
-
-const UNITS: &str = "m, px or kth_neighbor";
 
 fn short(value: &Value) -> String {
     let text = value.to_string();

@@ -49,5 +49,5 @@ pub fn has_images(path: &Path) -> Result<bool, Error> {
 /// Returns the kind that the metadata of the file at `path` declares, if it is a stage file and
 /// declares one.
 pub fn declared_kind(path: &Path) -> Option<Kind> {
-    Arrays::open(path).ok()?.meta().kind().ok()?
+    Arrays::open(path).ok()?.meta.kind().ok()?
 }

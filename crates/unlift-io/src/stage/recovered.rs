@@ -87,7 +87,7 @@ pub(super) fn recovered_of<const D: usize>(
     usual: Option<Unit>,
 ) -> Result<Recovered<D>, Error> {
     arrays.expect(Kind::Recovered)?;
-    let (meta, unit) = (arrays.meta(), arrays.unit::<D>(usual)?);
+    let (meta, unit) = (&arrays.meta, arrays.meta.unit::<D>(usual)?);
     let delta = meta.number("delta")?;
     let about = meta.about()?;
     let why_unknown = match meta.text(WHY_UNKNOWN)? {

@@ -133,7 +133,7 @@ pub fn read_released<const D: usize>(path: &Path) -> Result<Released<D>, Error> 
 /// When it is not a stage file, or the name is not text.
 pub fn scheme_name(path: &Path) -> Result<Option<String>, Error> {
     let arrays = Arrays::open(path)?;
-    Ok(arrays.meta().text("scheme")?.map(str::to_owned))
+    Ok(arrays.meta.text("scheme")?.map(str::to_owned))
 }
 
 /// Returns positions that the file at `path` publishes, one per record: those of its arrays as they
@@ -164,10 +164,10 @@ pub fn published_positions<const D: usize>(path: &Path) -> Result<Vec<Vec<[f64; 
 
 pub(super) fn released_of<const D: usize>(arrays: &Arrays<'_>) -> Result<Released<D>, Error> {
     let core = |source| arrays.refused(source);
-    let meta = arrays.meta();
+    let meta = &arrays.meta;
     let family = family(arrays)?;
     arrays.expect(Kind::Released)?;
-    let unit = arrays.unit::<D>(None)?;
+    let unit = arrays.meta.unit::<D>(None)?;
     let slots = meta.slots_per_record()?.unwrap_or(1);
     let obfuscation = match family {
         "lines" => {
@@ -210,7 +210,7 @@ pub(super) fn released_of<const D: usize>(arrays: &Arrays<'_>) -> Result<Release
 
 /// The family by the metadata, else by the arrays.
 fn family(arrays: &Arrays<'_>) -> Result<&'static str, Error> {
-    let stated = arrays.meta().text("family")?;
+    let stated = arrays.meta.text("family")?;
     let is_it = |(name, array): &(&str, &str)| {
         stated.map_or_else(|| arrays.has(array), |stated| stated == *name)
     };
@@ -219,7 +219,7 @@ fn family(arrays: &Arrays<'_>) -> Result<&'static str, Error> {
     }
     if stated.is_some() {
         let names = FAMILIES.map(|(name, _)| name).join(", ");
-        return Err(arrays.meta().wrong("family", format!("one of {names}")));
+        return Err(arrays.meta.wrong("family", format!("one of {names}")));
     }
     let arrays_of = FAMILIES.map(|(_, array)| array).join(", ");
     let expected = format!("a released map, with one of the arrays {arrays_of}");
@@ -227,14 +227,14 @@ fn family(arrays: &Arrays<'_>) -> Result<&'static str, Error> {
         Ok(Some(kind)) if kind != Kind::Released => kind.to_string(),
         _ => arrays.list(),
     };
-    Err(Error::new(arrays.path(), "", expected, found))
+    Err(Error::new(arrays.path, "", expected, found))
 }
 
 fn rays<const D: usize>(arrays: &Arrays<'_>) -> Result<Result<Rays<D>, unlift::Error>, Error> {
     let centers = arrays.vectors("centers", None)?;
     if centers.is_empty() || centers.len() > 255 {
         let found = format!("{} rows", centers.len());
-        return Err(Error::new(arrays.path(), "array centers", "1 to 255 rows", found));
+        return Err(Error::new(arrays.path, "array centers", "1 to 255 rows", found));
     }
     let (center, [n]) = arrays.integers("center", [None], centers.len(), false)?;
     let center = center.into_iter().map(|center| center as u8).collect();
@@ -289,7 +289,7 @@ fn protected(
     if !matches!(given[..], [] | [_] | [SUBSPACE | WORDS, PUBLIC]) || given == [PUBLIC] {
         let expected =
             format!("one of descriptor, {SUBSPACE} and {WORDS}, and {PUBLIC} beside the last two");
-        return Err(Error::new(arrays.path(), "arrays", expected, given.join(", ")));
+        return Err(Error::new(arrays.path, "arrays", expected, given.join(", ")));
     }
     let public = arrays.optional(PUBLIC, |name| arrays.floats(name, [None, None]))?;
     let n_public = public.as_ref().map_or(0, |(_, [n, _])| *n);
@@ -301,7 +301,7 @@ fn protected(
     } else if arrays.has(WORDS) {
         let (words, [.., m]) =
             arrays.integers(WORDS, [Some(n), Some(slots), None], n_public, false)?;
-        let epsilon = arrays.meta().number(EPSILON)?;
+        let epsilon = arrays.meta.number(EPSILON)?;
         (Rule::Words { m, epsilon }, words.into_iter().map(|word| word as f32).collect(), m)
     } else {
         return Ok(None);
@@ -311,7 +311,7 @@ fn protected(
         let values = values.into_iter().map(|x| x as f32).collect();
         Descriptors::try_new(Values::F32(values), dim).map(Arc::new)
     });
-    let of_bytes = arrays.meta().flag(OF_BYTES)?;
+    let of_bytes = arrays.meta.flag(OF_BYTES)?;
     public
         .transpose()
         .and_then(|public| ProtectedDescriptors::try_new(rule, rows, public, of_bytes))

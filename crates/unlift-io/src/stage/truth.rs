@@ -80,7 +80,7 @@ pub(super) fn truth_of<const D: usize>(
 ) -> Result<(Original<D>, Secret), Error> {
     arrays.expect(Kind::Truth)?;
     let core = |source| arrays.refused(source);
-    let unit = arrays.unit::<D>(None)?;
+    let unit = arrays.meta.unit::<D>(None)?;
     let positions = arrays.vectors("position", None)?;
     let n = positions.len();
     let slot = arrays.column("slot", n, n, true)?.unwrap_or_else(|| (0..n as u32).collect());
@@ -115,13 +115,13 @@ pub(super) fn truth_of<const D: usize>(
     };
     let axes =
         by_slot("swapped_axis", D)?.map(|axes| axes.into_iter().map(|axis| axis as u8).collect());
-    let slots = arrays.meta().slots_per_record()?;
+    let slots = arrays.meta.slots_per_record()?;
     let rows = match by_slot("descriptor_row", n)? {
         Some(rows) => rows,
         None if slots == Some(2) => {
             let expected = "the descriptor row of each point, as records have two slots";
             let (place, found) = ("array descriptor_row", "no such array");
-            return Err(Error::new(arrays.path(), place, expected, found));
+            return Err(Error::new(arrays.path, place, expected, found));
         }
         None => (0..n_slots as u32).collect(),
     };
@@ -130,7 +130,7 @@ pub(super) fn truth_of<const D: usize>(
     let secret = Secret::try_new(hidden, axes, rows, dropped, n).map_err(core)?;
     // Crossed descriptor rows imply two slots.
     let slots = slots.unwrap_or(secret.slots_per_record());
-    let secret = secret.of_map(arrays.meta().fingerprint()?, slots).map_err(core)?;
+    let secret = secret.of_map(arrays.meta.fingerprint()?, slots).map_err(core)?;
     let points = PointSet::try_new(positions, unit).map_err(core)?;
     Ok((Original::new(points), secret))
 }
