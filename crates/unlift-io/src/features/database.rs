@@ -176,8 +176,7 @@ impl Database {
         }
         if let Some(rows) = descriptors {
             if rows.n != n {
-                let expected = format!("{n} descriptors, one per keypoint");
-                return Err(self.error(name, expected, rows.n));
+                return Err(self.error(name, format!("{n} descriptors, one per keypoint"), rows.n));
             }
             let wrong = |error: unlift::Error| self.error(name, error.expected(), error.found());
             let descriptors = Descriptors::try_new(rows.values, rows.dim).map_err(wrong)?;

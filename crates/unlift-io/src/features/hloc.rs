@@ -450,8 +450,7 @@ impl FeatureWriter {
         };
         let parts = || name.split('/');
         if parts().any(|part| matches!(part, "" | "." | "..") || part.contains('\0')) {
-            let expected = "a name whose parts are not empty, . or ..";
-            return wrong(expected, &quoted(name.as_bytes()));
+            return wrong("a name whose parts are not empty, . or ..", &quoted(name.as_bytes()));
         }
         let depth = parts().count();
         if depth > MAX_DEPTH {
@@ -524,8 +523,7 @@ impl FeatureWriter {
     /// Moves the file to its place. If that fails, no temporary file is left.
     pub fn finish(self) -> Result<(), Error> {
         let Self { output, file, .. } = self;
-        let written = file.commit().and_then(|()| file.close());
-        written.map_err(|error| failed(output.path(), error))?;
+        file.commit().and_then(|()| file.close()).map_err(|error| failed(output.path(), error))?;
         output.commit()
     }
 }

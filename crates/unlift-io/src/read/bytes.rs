@@ -126,8 +126,7 @@ impl<R: Read> Bytes<R> {
         match &self.part {
             // An archive detects damage by checksums.
             Part::Array(name) => {
-                let place = format!("array {name}");
-                Error::new(&self.path, place, "undamaged data", source)
+                Error::new(&self.path, format!("array {name}"), "undamaged data", source)
             }
             _ => Error::read(&self.path, source),
         }

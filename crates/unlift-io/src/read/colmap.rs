@@ -304,8 +304,7 @@ fn binary_images(path: &Path) -> Result<Vec<Image>, Error> {
         bytes.record(number);
         let id = bytes.u32("image id")?;
         let rotation = bytes.doubles("rotation")?;
-        let translation = bytes.doubles("translation")?;
-        let pose = pose_of(rotation, translation);
+        let pose = pose_of(rotation, bytes.doubles("translation")?);
         let camera_id = bytes.u32("camera id")?;
         let name = bytes.zero_terminated("image name")?;
         let n_points2d = bytes.count("2D points", POINT2D_BYTES)?;

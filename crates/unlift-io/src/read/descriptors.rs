@@ -72,8 +72,7 @@ fn binary(path: &Path, input: &Input) -> Result<Descriptors, Error> {
         2 => Scalar::F16,
         3 => Scalar::F32,
         other => {
-            let expected = "type 1 (u8), 2 (float16) or 3 (float32)";
-            return Err(bytes.error(expected, other));
+            return Err(bytes.error("type 1 (u8), 2 (float16) or 3 (float32)", other));
         }
     };
     let row_bytes = u64::from(dim) * scalar.size() as u64;

@@ -119,8 +119,12 @@ impl<R: BufRead> Read for Strict<R> {
 /// Adds the points of the point cloud that nerfstudio's file names.
 fn with_cloud(path: &Path, input: &mut Input, cloud: Option<PathBuf>) -> Result<(), Error> {
     let Some(cloud) = cloud else {
-        let expected = "ply_file_path, a point cloud beside the cameras";
-        return Err(Error::new(path, "", expected, "none"));
+        return Err(Error::new(
+            path,
+            "",
+            "ply_file_path, a point cloud beside the cameras",
+            "none",
+        ));
     };
     // nerfstudio on Windows writes backslashes.
     let written = cloud.to_string_lossy();

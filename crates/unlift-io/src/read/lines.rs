@@ -123,8 +123,7 @@ impl Lines {
 
     /// Returns an error at the end of the file, where another line was expected.
     pub fn end_error(&self, expected: impl Display) -> Error {
-        let place = Place::Line(self.number + 1);
-        Error::new(&self.path, place, expected, "end of file")
+        Error::new(&self.path, Place::Line(self.number + 1), expected, "end of file")
     }
 }
 

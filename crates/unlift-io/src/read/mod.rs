@@ -116,8 +116,7 @@ fn other_in_folder(path: &Path) -> Option<PathBuf> {
 fn file(path: &Path) -> Result<Input, Error> {
     const POINTER: &[u8] = b"version https://git-lfs";
     if input::head(path, POINTER.len() as u64)?.0 == POINTER {
-        let found = "a pointer of Git LFS (run git lfs pull)";
-        return Err(Error::new(path, "", "a map", found));
+        return Err(Error::new(path, "", "a map", "a pointer of Git LFS (run git lfs pull)"));
     }
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();

@@ -70,8 +70,7 @@ pub(super) fn of_points<R: Read>(
         let firsts = || input.positions.iter().map(|position| position[0]).enumerate();
         let is_numbered = |from: usize| firsts().all(|(row, x)| x == (row + from) as f64);
         if input.positions.len() >= TELLING && (is_numbered(0) || is_numbered(1)) {
-            let expected = "x, y and z in the first columns";
-            return Err(bytes.error(expected, "the row number"));
+            return Err(bytes.error("x, y and z in the first columns", "the row number"));
         }
         input.notes.push(format!("the first 3 of {columns} columns are read as x, y and z"));
     }

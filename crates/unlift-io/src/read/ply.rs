@@ -269,8 +269,7 @@ fn ascii<const N: usize>(
         }
         n_words += all.count();
         if n_words != n_expected {
-            let expected = format!("{n_expected} values of {name} {row}");
-            return Err(lines.error(expected, n_words));
+            return Err(lines.error(format!("{n_expected} values of {name} {row}"), n_words));
         }
         rows.push(values);
     }

@@ -47,8 +47,7 @@ pub fn read_neighborhoods(
     n_records: usize,
     slots_per_record: usize,
 ) -> Result<Neighborhoods, Error> {
-    let arrays = Arrays::open(path)?;
-    neighborhoods_of(&arrays, n_records, slots_per_record)
+    neighborhoods_of(&Arrays::open(path)?, n_records, slots_per_record)
 }
 
 pub(super) fn neighborhoods_of(

@@ -37,8 +37,7 @@ pub use truth::{read_truth, write_truth};
 /// When the file is not a stage file of a known kind and version.
 pub fn kind(path: &Path) -> Result<Kind, Error> {
     let arrays = Arrays::open(path)?;
-    let kind = arrays.kind()?;
-    kind.ok_or_else(|| Error::new(path, "", "a stage file of unlift", arrays.list()))
+    arrays.kind()?.ok_or_else(|| Error::new(path, "", "a stage file of unlift", arrays.list()))
 }
 
 /// Returns true if the stage file `path` contains many images, below their names.

@@ -150,8 +150,7 @@ fn estimates<const D: usize>(
         }
         let axis = match axis.as_ref().map(|axis| axis[slot]) {
             Some(NONE) if has_position => {
-                let expected = "an axis, as there is a position";
-                return Err(arrays.wrong("axis", slot, expected, "-1"));
+                return Err(arrays.wrong("axis", slot, "an axis, as there is a position", "-1"));
             }
             None | Some(NONE) => 0,
             Some(axis) => axis as u8,

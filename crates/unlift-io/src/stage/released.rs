@@ -132,8 +132,7 @@ pub fn read_released<const D: usize>(path: &Path) -> Result<Released<D>, Error> 
 /// # Errors
 /// When it is not a stage file, or the name is not text.
 pub fn scheme_name(path: &Path) -> Result<Option<String>, Error> {
-    let arrays = Arrays::open(path)?;
-    Ok(arrays.meta.text("scheme")?.map(str::to_owned))
+    Ok(Arrays::open(path)?.meta.text("scheme")?.map(str::to_owned))
 }
 
 /// Returns positions that the file at `path` publishes, one per record: those of its arrays as they

@@ -31,8 +31,7 @@ pub(super) fn written<'a, const D: usize>(
     let points = original.reveal();
     let n = secret.n_originals();
     if points.len() != n {
-        let expected = format!("{n} originals, as in the secret");
-        return Err(Error::new(path, "", expected, points.len()));
+        return Err(Error::new(path, "", format!("{n} originals, as in the secret"), points.len()));
     }
     let mut written = Written::new(Kind::Truth, n);
     written.state("unit", points.unit().name());
@@ -131,8 +130,7 @@ pub(super) fn truth_of<const D: usize>(
     // Crossed descriptor rows imply two slots.
     let slots = slots.unwrap_or(secret.slots_per_record());
     let secret = secret.of_map(arrays.meta.fingerprint()?, slots).map_err(core)?;
-    let points = PointSet::try_new(positions, unit).map_err(core)?;
-    Ok((Original::new(points), secret))
+    Ok((Original::new(PointSet::try_new(positions, unit).map_err(core)?), secret))
 }
 
 /// Returns the originals without a slot, with their reasons.
@@ -150,8 +148,7 @@ fn dropped(arrays: &Arrays<'_>, slot: &[u32]) -> Result<Vec<Dropped>, Error> {
             (NONE, Some(code)) => DropReason::ALL[code - 1],
             (_, None | Some(0)) => continue,
             (_, Some(code)) => {
-                let expected = "0, as there is a slot";
-                return Err(arrays.wrong("dropped", original, expected, code));
+                return Err(arrays.wrong("dropped", original, "0, as there is a slot", code));
             }
         };
         dropped.push(Dropped { original: OriginalId(original as u32), reason });

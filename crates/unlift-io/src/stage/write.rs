@@ -135,8 +135,7 @@ impl<'a> Zip<'a> {
     /// Writes the text `name`, an array without dimensions.
     pub(super) fn text(&mut self, name: &str, text: &str) -> io::Result<()> {
         let letters: Vec<u8> = text.chars().flat_map(|c| u32::from(c).to_le_bytes()).collect();
-        let descr = format!("<U{}", letters.len() / 4);
-        self.start(name, &descr, &[], letters.len())?;
+        self.start(name, &format!("<U{}", letters.len() / 4), &[], letters.len())?;
         self.0.write_all(&letters)
     }
 

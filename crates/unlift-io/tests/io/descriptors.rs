@@ -253,8 +253,7 @@ fn a_database_without_types_is_read_as_bytes() {
     let dir = tempfile::tempdir().unwrap();
     // A URI would misread this name.
     let path = dir.path().join("a?b#c%20 d.db");
-    let drop = "ALTER TABLE descriptors DROP COLUMN type";
-    write_database(&path, "project/database.db", drop);
+    write_database(&path, "project/database.db", "ALTER TABLE descriptors DROP COLUMN type");
     let input = read::open(&data("project")).unwrap();
     let expected = read::descriptors(&data("project/descriptors.bin"), &input).unwrap();
     assert_eq!(read::descriptors(&path, &input).unwrap(), expected);

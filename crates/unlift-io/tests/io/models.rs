@@ -22,8 +22,7 @@ fn binary_and_text_models_are_equal() {
     assert_eq!(images[0].n_points2d, 4);
 
     let points = colmap::read_points(&file(&bin, "points3D", "bin"), true).unwrap();
-    let same = colmap::read_points(&file(&txt, "points3D", "txt"), true).unwrap();
-    assert_eq!(points, same);
+    assert_eq!(points, colmap::read_points(&file(&txt, "points3D", "txt"), true).unwrap());
     assert_eq!(points.ids, [1, 3, 5, 7, 12, 44, 900, 1 << 40]);
     assert_eq!(points.tracks.unwrap().row(1), [(2, 1), (3, 0), (4, 0)]);
 }

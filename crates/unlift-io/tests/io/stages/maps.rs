@@ -41,8 +41,7 @@ pub fn released<const D: usize>(seed: u64, n: usize) -> Vec<Released<D>> {
         families.push((Obfuscation::Lines(lines), slots));
     }
     let centers = points(&mut draws, 3);
-    let center = indices(&mut draws, 3);
-    let rays = Rays::try_new(&centers, center, &directions(&mut draws)).unwrap();
+    let rays = Rays::try_new(&centers, indices(&mut draws, 3), &directions(&mut draws)).unwrap();
     families.push((Obfuscation::Rays(rays), 1));
     let offsets: Vec<f64> = (0..n).map(|_| draws.between(-9.0, 9.0)).collect();
     let planes = AxisPlanes::try_new(indices(&mut draws, D as u64), &offsets).unwrap();

@@ -87,8 +87,7 @@ fn released_maps() {
         ("unlift", text(r#"{"unit": "m", "family": "rays"}"#), "array centers: expected an array of shape (n, 3), found no such array"),
         ("unlift", text(r#"{"unit": "m", "family": "curves"}"#), "metadata unlift, family: expected one of lines, rays, axis_planes, axis_candidates, found \"curves\""),
     ] {
-        let arrays = with(lines(), name, bytes);
-        refused(&arrays, read, expected);
+        refused(&with(lines(), name, bytes), read, expected);
     }
     let stated = with(lines(), "unlift", text(r#"{"unit": "m", "fingerprint": "00112233445566778899aabbccddeeff"}"#));
     let found = line(archive(&stated), read);
