@@ -185,67 +185,44 @@ fn bit_strings_of_a_track_are_no_numbers() {
     assert_eq!(read::descriptors(&path, &input).unwrap().values(), &Values::U8(bits));
 }
 
-/// The descriptors of the project as floats of norm 1, exact in half floats.
-fn unit_floats(input: &Input) -> Vec<f32> {
-    let bytes = read::descriptors(&data("project/descriptors.bin"), input).unwrap();
-    let Values::U8(bytes) = bytes.values() else { panic!("bytes expected") };
-    bytes.iter().map(|&byte| f32::from(byte) / 512.0).collect()
-}
-
-fn p3desc(ids: &[u64], dtype: u32) -> Vec<u8> {
-    let mut file = b"P3DESC01".to_vec();
-    file.extend((ids.len() as u64).to_le_bytes());
-    file.extend(128u32.to_le_bytes());
-    file.extend(dtype.to_le_bytes());
-    ids.iter().for_each(|id| file.extend(id.to_le_bytes()));
-    file
-}
-
 #[test]
-fn binary_descriptors_may_be_floats_of_16_or_32_bits() {
+fn descriptors_of_points_are_read_in_every_type_and_order() {
     let input = read::open(&data("project")).unwrap();
-    let floats = unit_floats(&input);
-    for dtype in [2, 3] {
-        // An extra point, and another order of rows: points are joined by id.
-        let mut file = p3desc(&[1000, 11, 9, 6, 4, 3, 2], dtype);
-        let rows = std::iter::once(&[0.5; 128][..]).chain(floats.chunks(128).rev());
-        for value in rows.flatten() {
-            match dtype {
-                2 => file.extend(f16::from_f32(*value).to_le_bytes()),
-                _ => file.extend(value.to_le_bytes()),
-            }
-        }
-        let (_dir, path) = write("d.bin", file);
-        let read = read::descriptors(&path, &input).unwrap();
-        assert_eq!(read.values(), &Values::F32(floats.clone()), "512ths of bytes fit a half");
-    }
-}
-
-#[test]
-fn arrays_of_descriptors_have_a_row_per_point_in_its_order() {
-    let all = read::open(&data("project")).unwrap();
-    let floats = unit_floats(&all);
-    let expected = Values::F32(floats.clone());
-    let bytes = |of: fn(f32) -> Vec<u8>| floats.iter().flat_map(|&x| of(x)).collect::<Vec<u8>>();
-    for (descr, values) in [
-        ("<f2", bytes(|x| f16::from_f32(x).to_le_bytes().to_vec())),
-        (">f2", bytes(|x| f16::from_f32(x).to_be_bytes().to_vec())),
-        ("<f4", bytes(|x| x.to_le_bytes().to_vec())),
-        (">f8", bytes(|x| f64::from(x).to_be_bytes().to_vec())),
+    let of_bytes = read::descriptors(&data("project/descriptors.bin"), &input).unwrap();
+    let Values::U8(bytes) = of_bytes.values() else { panic!("bytes expected") };
+    // 512ths of bytes fit a half.
+    let floats: Vec<f32> = bytes.iter().map(|&byte| f32::from(byte) / 512.0).collect();
+    let rows = || floats.chunks(128);
+    let half: fn(f32) -> Vec<u8> = |x| f16::from_f32(x).to_le_bytes().into();
+    let single: fn(f32) -> Vec<u8> = |x| x.to_le_bytes().into();
+    // An extra point, and another order of rows: points are joined by id.
+    let joined = |dtype: u32, of: fn(f32) -> Vec<u8>| {
+        let head = [&b"P3DESC01\x07\0\0\0\0\0\0\0\x80\0\0\0"[..], &dtype.to_le_bytes()].concat();
+        let ids = [1000u64, 11, 9, 6, 4, 3, 2].map(u64::to_le_bytes).concat();
+        let rows = std::iter::once(&[0.5; 128][..]).chain(rows().rev());
+        [head, ids, rows.flatten().flat_map(|&x| of(x)).collect()].concat()
+    };
+    let array = |descr: &str, of: fn(f32) -> Vec<u8>| {
+        npy(descr, "(6, 128)", &floats.iter().flat_map(|&x| of(x)).collect::<Vec<u8>>())
+    };
+    let columns = (0..128).flat_map(|c| rows().map(move |row| row[c]));
+    let columns = npy("'<f4'", "(6, 128)", &columns.flat_map(single).collect::<Vec<u8>>());
+    let order = columns.windows(5).position(|word| word == b"False").unwrap();
+    for (what, file) in [
+        ("halves by id", joined(2, half)),
+        ("floats by id", joined(3, single)),
+        ("<f2", array("'<f2'", half)),
+        (">f2", array("'>f2'", |x| f16::from_f32(x).to_be_bytes().into())),
+        ("<f4", array("'<f4'", single)),
+        (">f8", array("'>f8'", |x| f64::from(x).to_be_bytes().into())),
+        ("by columns", patched(columns, order, b"True ")),
     ] {
-        let (_dir, path) = write("d.npy", npy(&format!("'{descr}'"), "(6, 128)", &values));
-        assert_eq!(read::descriptors(&path, &all).unwrap().values(), &expected, "{descr}");
+        let (_dir, path) = write("d", file);
+        let read = read::descriptors(&path, &input).unwrap();
+        assert_eq!(read.values(), &Values::F32(floats.clone()), "{what}");
     }
-    let columns = (0..128).flat_map(|c| floats.chunks(128).map(move |row| row[c]));
-    let columns: Vec<u8> = columns.flat_map(f32::to_le_bytes).collect();
-    let by_columns = npy("'<f4'", "(6, 128)", &columns);
-    let at = by_columns.windows(5).position(|word| word == b"False").unwrap();
-    let (_dir, path) = write("d.npy", patched(by_columns, at, b"True "));
-    assert_eq!(read::descriptors(&path, &all).unwrap().values(), &expected, "by columns");
-    let of_bytes = read::descriptors(&data("project/descriptors.bin"), &all).unwrap();
-    let Values::U8(values) = of_bytes.values() else { panic!("bytes expected") };
-    let (_dir, path) = write("d.npy", npy("'|u1'", "(6, 128)", values));
-    assert_eq!(read::descriptors(&path, &all).unwrap(), of_bytes);
+    let (_dir, path) = write("d.npy", npy("'|u1'", "(6, 128)", bytes));
+    assert_eq!(read::descriptors(&path, &input).unwrap(), of_bytes);
 }
 
 #[test]

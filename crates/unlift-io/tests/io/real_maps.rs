@@ -13,12 +13,18 @@ use unlift::recover::{Builtin, RecoverOptions, recover};
 use unlift::seed::Key;
 use unlift::truth::Original;
 use unlift::{PointSet, Unit};
-use unlift_io::read;
+use unlift_io::read::{self, Input};
 
 use super::{close, shared, total};
 
-fn dataset(name: &str) -> Option<PathBuf> {
-    shared(&format!("data/{name}"))
+fn dataset(name: &str) -> Option<(PathBuf, Input)> {
+    let path = shared(&format!("data/{name}"))?;
+    let input = read::open(&path).unwrap();
+    Some((path, input))
+}
+
+fn original(input: Input) -> Original<3> {
+    Original::new(PointSet::try_new(input.positions, Unit::Meter).unwrap())
 }
 
 /// Points, cameras, sums of ids, of points, of centers, and of bytes of descriptors.
@@ -45,8 +51,7 @@ fn real_maps_are_read_as_pycolmap_reads_them() {
     for (name, (n, n_cameras, ids, positions, centers, bytes)) in
         [("redkitchen", kitchen), ("castle", castle)]
     {
-        let Some(path) = dataset(name) else { continue };
-        let input = read::open(&path).unwrap();
+        let Some((path, input)) = dataset(name) else { continue };
         assert_eq!((input.positions.len(), input.cameras.len()), (n, n_cameras));
         assert_eq!(input.ids.iter().sum::<u64>(), ids);
         // Sums of 10^4 doubles of size 10 in another order differ in the last bits only.
@@ -70,10 +75,9 @@ fn descriptors_of_real_maps_are_read_and_name_neighbors() {
         ("castle", "olc", "overlap", 0.14),
         ("castle", "ppl", "overlap", 0.13),
     ] {
-        let Some(path) = dataset(name) else { continue };
-        let input = read::open(&path).unwrap();
+        let Some((path, input)) = dataset(name) else { continue };
         let descriptors = read::descriptors(&path.join("descriptors.bin"), &input).unwrap();
-        let original = Original::new(PointSet::try_new(input.positions, Unit::Meter).unwrap());
+        let original = original(input);
         let search = oracle::search(&original).unwrap();
         let scheme = scheme(scheme_name).unwrap().of_dimension::<3>(&options).unwrap();
         let key = Key::from_seed(0);
@@ -90,9 +94,8 @@ fn descriptors_of_real_maps_are_read_and_name_neighbors() {
 #[test]
 fn what_is_said_about_a_real_map_comes_true() {
     for (name, meters) in [("redkitchen", Some(0.10)), ("castle", None)] {
-        let Some(path) = dataset(name) else { continue };
-        let points = PointSet::try_new(read::open(&path).unwrap().positions, Unit::Meter).unwrap();
-        let original = Original::new(points);
+        let Some((_, input)) = dataset(name) else { continue };
+        let original = original(input);
         let search = oracle::search(&original).unwrap();
         let typical = median(&mut search.kth_distances(50));
         let threshold = meters.unwrap_or(typical);
