@@ -36,7 +36,6 @@ const STEPS_AT_A_TIME: u64 = 1000;
 const LEAST_STEPS: u64 = 1_000_000;
 const STEPS_PER_BYTE: u64 = 4;
 
-/// An open database, with image ids by name.
 pub(crate) struct Database {
     path: PathBuf,
     // A connection cannot be used by two threads at once.

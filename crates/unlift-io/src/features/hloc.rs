@@ -23,12 +23,10 @@ use crate::read::lines::quoted;
 use crate::read::npy::tuple;
 use unlift::guard::caught;
 
-/// Groups with arrays, by their paths.
 type Groups = Vec<(String, Group)>;
 
 /// Bytes of headers that are kept, because a header is read in a dozen pieces.
 const CACHE: usize = 1 << 20;
-/// What a file of features has.
 const GROUPS: &str = "a group per image with keypoints and descriptors";
 const KEYPOINTS: &str = "keypoints";
 /// An attribute of `keypoints`: 1 if they are in pixels of upright photos, else 0.
@@ -232,7 +230,6 @@ impl Hloc {
         })
     }
 
-    /// Returns an attribute of the keypoints of image `at`.
     fn attribute(&self, at: usize, key: &str) -> Result<Option<f64>, Error> {
         self.step(KEYPOINTS, || {
             let dataset = self.groups[at].dataset(KEYPOINTS);
@@ -248,7 +245,6 @@ fn place(image: &str) -> String {
     if image.is_empty() { String::new() } else { format!("image {}", quoted(image.as_bytes())) }
 }
 
-/// An array, row-major.
 struct Array<'a> {
     path: &'a Path,
     name: &'static str,
@@ -544,7 +540,6 @@ fn folders(name: &str) -> impl Iterator<Item = &str> {
 /// The name, the shape, the type and the bytes of an array to write.
 type Column = (&'static str, Vec<u64>, Datatype, Vec<u8>);
 
-/// The arrays of an image, in hloc's types.
 fn columns(image: &ImageFeatures) -> Vec<Column> {
     let n = image.keypoints.len() as u64;
     let floats = |values: &[f32]| values.iter().flat_map(|x| x.to_le_bytes()).collect();

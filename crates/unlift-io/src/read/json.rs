@@ -188,7 +188,6 @@ impl Object {
         (has("shots") && has("points")).then_some("OpenSfM")
     }
 
-    /// Reads the value of `name`.
     fn take<'de, A: MapAccess<'de>>(&mut self, name: &str, json: &mut A) -> Result<(), A::Error> {
         match name {
             "shots" => {

@@ -96,7 +96,6 @@ fn stored(text: &str) -> Option<(Scalar, bool)> {
     Some((scalar, big))
 }
 
-/// The size in bytes of a value of a type.
 fn size_of(text: &str) -> Option<u64> {
     let text = text.trim_start_matches(['<', '>', '|', '=']);
     let digits = text.get(1..)?.split('[').next()?;

@@ -128,7 +128,6 @@ pub fn splats(path: &Path) -> Result<Input, Error> {
     Ok(Input { positions, format: "splat", notes: vec![SPLATS.to_owned()], ..Input::default() })
 }
 
-/// Reads the encoding and the elements.
 fn header(path: &Path, lines: &mut Lines) -> Result<(Encoding, Vec<Element>), Error> {
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();

@@ -31,7 +31,6 @@ pub(super) struct Arrays<'a> {
 }
 
 impl<'a> Arrays<'a> {
-    /// Opens the file `path`.
     pub(super) fn open(path: &'a Path) -> Result<Self, Error> {
         let archive = Archive::open(path)?;
         let (arrays, budget) = (archive.arrays()?, archive.budget().clone());
@@ -62,7 +61,6 @@ impl<'a> Arrays<'a> {
         self.names().any(|known| known == name)
     }
 
-    /// Reads the array `name`, if there is one.
     pub(super) fn optional<'n, T>(
         &self,
         name: &'n str,
@@ -241,7 +239,6 @@ impl<'a> Arrays<'a> {
         })
     }
 
-    /// Reads the metadata.
     fn text(&self) -> Result<Option<String>, Error> {
         let wrong = |found: String| {
             let expected = "a text without dimensions, as np.array(json.dumps(..))";

@@ -24,7 +24,6 @@ use crate::atomic::OutputFile;
 
 /// A reader of a stage file of images. The arrays of an image are unpacked when it is read.
 pub struct ImageFile<'a> {
-    /// All arrays of the file.
     file: Arrays<'a>,
     /// The next images, with the index and name of each array.
     waiting: IntoIter<(String, Vec<(usize, String)>)>,

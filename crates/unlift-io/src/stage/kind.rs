@@ -89,7 +89,6 @@ impl Kind {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
 
-    /// The arrays that a file of this kind may have, besides the metadata.
     pub(super) fn arrays(self) -> &'static [&'static str] {
         self.facts().2
     }

@@ -9,7 +9,6 @@ use unlift::{About, Fingerprint, RowOrder, Unit};
 use super::kind::Kind;
 use crate::Error;
 
-/// The name of the array.
 pub(super) const KEY: &str = "unlift";
 
 /// The privacy budget of words, in the metadata.

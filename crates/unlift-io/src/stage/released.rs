@@ -247,7 +247,6 @@ fn rays<const D: usize>(arrays: &Arrays<'_>) -> Result<Result<Rays<D>, unlift::E
     Ok(rays)
 }
 
-/// Converts low and high corners to boxes.
 fn boxes<const D: usize>(
     arrays: &Arrays<'_>,
     name: &str,
@@ -277,7 +276,6 @@ fn descriptors(arrays: &Arrays<'_>, n: usize, slots: usize) -> Result<Option<Des
     Descriptors::try_new(values, dim).map(Some).map_err(|source| arrays.refused(source))
 }
 
-/// Reads protected descriptors.
 fn protected(
     arrays: &Arrays<'_>,
     n: usize,

@@ -23,7 +23,6 @@ pub(super) struct Written<'a> {
     arrays: Vec<Array<'a>>,
 }
 
-/// Writes the values of an array.
 type Fill<'a> = Box<dyn FnOnce(&mut dyn Write) -> io::Result<()> + 'a>;
 
 struct Array<'a> {
@@ -35,7 +34,6 @@ struct Array<'a> {
     fill: Fill<'a>,
 }
 
-/// A number of an array.
 pub(super) trait Number {
     const DESCR: &'static str;
 
@@ -103,7 +101,6 @@ impl<'a> Written<'a> {
         self.arrays.push(Array { name, descr: T::DESCR, shape, size, fill });
     }
 
-    /// Adds an array of vectors.
     pub(super) fn vectors<T: Number + Copy, const D: usize>(
         &mut self,
         name: &'static str,
@@ -113,7 +110,6 @@ impl<'a> Written<'a> {
     }
 }
 
-/// Writes a stage file.
 pub(super) fn write_file(path: &Path, access: Access, written: Written<'_>) -> Result<(), Error> {
     atomic::write_file(path, access, |file| {
         let mut zip = Zip::new(file);
@@ -123,7 +119,6 @@ pub(super) fn write_file(path: &Path, access: Access, written: Written<'_>) -> R
     })
 }
 
-/// A writer of an archive.
 pub(super) struct Zip<'a>(ZipWriter<Target<'a>>);
 
 impl<'a> Zip<'a> {
