@@ -58,9 +58,7 @@ pub fn write_images(path: &Path, images: &[Image]) -> Result<(), Error> {
 /// # Errors
 /// When a coordinate is not finite.
 pub fn write_model_points(path: &Path, points: &[Option<[f64; 3]>]) -> Result<(), Error> {
-    for (row, point) in points.iter().enumerate() {
-        finite(path, ("point", row), &[point.unwrap_or_default()])?;
-    }
+    finite(path, "point", points.iter().map(|point| [point.unwrap_or_default()]))?;
     atomic::write_file(path, Access::Private, |w| {
         writeln!(w, "{MODEL_MARK}\n# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]")?;
         for (row, point) in points.iter().enumerate() {
@@ -74,27 +72,19 @@ pub fn write_model_points(path: &Path, points: &[Option<[f64; 3]>]) -> Result<()
 
 /// Returns the unit quaternion (w, x, y, z) of a rotation, with `w >= 0`.
 fn quaternion(r: &[[f64; 3]; 3]) -> [f64; 4] {
-    // Four times the square of each component.
-    let squares = [
-        1.0 + r[0][0] + r[1][1] + r[2][2],
-        1.0 + r[0][0] - r[1][1] - r[2][2],
-        1.0 - r[0][0] + r[1][1] - r[2][2],
-        1.0 - r[0][0] - r[1][1] + r[2][2],
+    let [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]] = *r;
+    // Four times the products of components.
+    let products = [
+        [1.0 + xx + yy + zz, zy - yz, xz - zx, yx - xy],
+        [zy - yz, 1.0 + xx - yy - zz, yx + xy, xz + zx],
+        [xz - zx, yx + xy, 1.0 - xx + yy - zz, zy + yz],
+        [yx - xy, xz + zx, zy + yz, 1.0 - xx - yy + zz],
     ];
-    let sums = |i: usize, j: usize| match (i.min(j), i.max(j)) {
-        (0, 1) => r[2][1] - r[1][2],
-        (0, 2) => r[0][2] - r[2][0],
-        (0, 3) => r[1][0] - r[0][1],
-        (1, 2) => r[1][0] + r[0][1],
-        (1, 3) => r[0][2] + r[2][0],
-        _ => r[2][1] + r[1][2],
-    };
-    let largest = (0..4).fold(0, |best, i| if squares[i] > squares[best] { i } else { best });
-    let root = squares[largest].sqrt();
-    let q: [f64; 4] = std::array::from_fn(|i| match i == largest {
-        true => 0.5 * root,
-        false => 0.5 * sums(largest, i) / root,
-    });
+    let is_more = |i: usize, j: usize| products[i][i] > products[j][j];
+    let largest = (0..4).fold(0, |best, i| if is_more(i, best) { i } else { best });
+    let root = products[largest][largest].sqrt();
+    let mut q = products[largest].map(|product| 0.5 * product / root);
+    q[largest] = 0.5 * root;
     let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
     let sign = if q[0] < 0.0 { -1.0 } else { 1.0 };
     q.map(|x| sign * x / norm)

@@ -18,17 +18,18 @@ const CLOUD_COMMENT: &str = "unlift";
 /// The first line of each file of a COLMAP model, by which it is recognized.
 const MODEL_MARK: &str = "# unlift model";
 
-/// Returns an error if a coordinate of the `row`-th `what` is not finite.
+/// Returns an error if a coordinate of one of the `rows`, each a `what`, is not finite.
 fn finite<const D: usize, const N: usize>(
     path: &Path,
-    (what, row): (&str, usize),
-    points: &[[f64; D]; N],
+    what: &str,
+    rows: impl IntoIterator<Item = [[f64; D]; N]>,
 ) -> Result<(), Error> {
-    if points.iter().flatten().all(|x| x.is_finite()) {
+    let is_wrong = |row: &[[f64; D]; N]| !row.iter().flatten().all(|x| x.is_finite());
+    let Some((at, row)) = rows.into_iter().enumerate().find(|(_, row)| is_wrong(row)) else {
         return Ok(());
-    }
-    let found = if N == 1 { format!("{:?}", points[0]) } else { format!("{points:?}") };
-    Err(Error::new(path, format!("{what} {row}"), "finite coordinates", found))
+    };
+    let found = if N == 1 { format!("{:?}", row[0]) } else { format!("{row:?}") };
+    Err(Error::new(path, format!("{what} {at}"), "finite coordinates", found))
 }
 
 /// Writes `points` `(n, D)` as binary little-endian PLY.
@@ -38,9 +39,7 @@ fn finite<const D: usize, const N: usize>(
 /// # Errors
 /// When a coordinate is not finite.
 pub fn write_points<const D: usize>(path: &Path, points: &[[f64; D]]) -> Result<(), Error> {
-    for (row, point) in points.iter().enumerate() {
-        finite(path, ("point", row), &[*point])?;
-    }
+    finite(path, "point", points.iter().map(|point| [*point]))?;
     atomic::write_file(path, Access::Private, |w| {
         writeln!(w, "ply\nformat binary_little_endian 1.0\ncomment {CLOUD_COMMENT}")?;
         writeln!(w, "element vertex {}", points.len())?;
@@ -59,9 +58,7 @@ fn in_space<const D: usize>(point: &[f64; D]) -> [f64; 3] {
 /// # Errors
 /// When a coordinate is not finite.
 pub fn write_lines<const D: usize>(path: &Path, segments: &[Segment<D>]) -> Result<(), Error> {
-    for (row, segment) in segments.iter().enumerate() {
-        finite(path, ("segment", row), segment)?;
-    }
+    finite(path, "segment", segments.iter().copied())?;
     atomic::write_file(path, Access::Private, |w| {
         writeln!(w, "# {CLOUD_COMMENT}")?;
         for (row, segment) in segments.iter().enumerate() {

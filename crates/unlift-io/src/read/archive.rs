@@ -16,7 +16,6 @@ use unlift::guard::caught;
 /// A reader of an array, which checks its checksum.
 pub(crate) type ArrayBytes<'a> = Bytes<ZipFile<'a, BufReader<File>>>;
 
-#[derive(Debug)]
 pub(crate) struct Archive {
     path: PathBuf,
     zip: ZipArchive<BufReader<File>>,

@@ -33,7 +33,6 @@ fn scalar(name: &[u8]) -> Option<Scalar> {
     Scalar::of_kind(kind, size)
 }
 
-#[derive(Debug)]
 struct Property {
     name: Vec<u8>,
     scalar: Scalar,
@@ -41,7 +40,6 @@ struct Property {
     list: Option<Scalar>,
 }
 
-#[derive(Debug)]
 struct Element {
     name: Vec<u8>,
     count: u64,

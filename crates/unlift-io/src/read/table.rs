@@ -124,7 +124,6 @@ fn check_count(lines: &Lines, announced: Option<(u64, u64)>, n: u64) -> Result<(
     }
 }
 
-#[derive(Debug)]
 struct Columns {
     at: [usize; 3],
     named: bool,
@@ -239,7 +238,6 @@ fn is_colmap_header(comment: &[u8]) -> bool {
 }
 
 /// Properties that hold for all rows so far.
-#[derive(Debug)]
 struct Form {
     n: usize,
     /// COLMAP's points: an id, a position, a color, an error, a track.

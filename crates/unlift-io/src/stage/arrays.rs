@@ -169,24 +169,24 @@ impl<'a> Arrays<'a> {
         self.optional(name, |name| Ok(self.integers(name, [Some(n)], below, or_none)?.0))
     }
 
-    /// Reads integers from 0 to 255 as bytes, or finite floats.
+    /// Reads integers from 0 to 255 as bytes, or finite floats. Returns also the length of a row.
     pub(super) fn bytes_or_floats<const N: usize>(
         &self,
         name: &str,
         sides: [Option<usize>; N],
-    ) -> Result<(Values, [usize; N]), Error> {
+    ) -> Result<(Values, usize), Error> {
         #[expect(clippy::redundant_closure)] // a closure works for every lifetime of the bytes
         let header = self.file(name, |bytes| Header::read(bytes))?;
         if header.is_whole() {
             let byte = |x: f64| (0.0..256.0).contains(&x).then_some(x as u8);
             let rule = "a whole number below 256, or a float";
             let (values, shape) = self.numbers(name, sides, Class::Whole, rule, byte)?;
-            return Ok((Values::U8(values), shape));
+            return Ok((Values::U8(values), shape[N - 1]));
         }
         let single = |x: f64| Some(x as f32).filter(|x| x.is_finite());
         let rule = "a finite number (as a float of 4 bytes)";
         let (values, shape) = self.numbers(name, sides, Class::Any, rule, single)?;
-        Ok((Values::F32(values), shape))
+        Ok((Values::F32(values), shape[N - 1]))
     }
 
     /// Reads numbers of `class` from the array `name` of `sides`, each converted by `convert`; a

@@ -262,13 +262,9 @@ fn descriptors(arrays: &Arrays<'_>, n: usize, slots: usize) -> Result<Option<Des
     if !arrays.has("descriptor") {
         return Ok(None);
     }
-    let (values, dim) = if slots == 1 {
-        let (values, [_, dim]) = arrays.bytes_or_floats("descriptor", [Some(n), None])?;
-        (values, dim)
-    } else {
-        let sides = [Some(n), Some(slots), None];
-        let (values, [_, _, dim]) = arrays.bytes_or_floats("descriptor", sides)?;
-        (values, dim)
+    let (values, dim) = match slots {
+        1 => arrays.bytes_or_floats("descriptor", [Some(n), None])?,
+        _ => arrays.bytes_or_floats("descriptor", [Some(n), Some(slots), None])?,
     };
     if n == 0 {
         return Ok(None);

@@ -12,7 +12,7 @@ use unlift_io::features::{FeatureWriter, ImageFeatures, round_to_half};
 use unlift_io::read::{self, Input, colmap};
 
 use super::malformed::{MANY, appended, patched};
-use super::{data, fixture, npy, shown, write, write_database};
+use super::{data, fixture, npy, place, shown, write, write_database};
 
 #[test]
 fn descriptors_follow_the_ids_of_the_input_in_every_form() {
@@ -69,8 +69,7 @@ fn features(path: &Path, odd: &str) {
 
 #[test]
 fn features_of_hloc_are_descriptors_of_the_points_that_they_made() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("features.h5");
+    let (_dir, path) = place("features.h5");
     let input = read::open(&data("project")).unwrap();
     features(&path, "");
     let descriptors = read::descriptors(&path, &input).unwrap();
@@ -227,9 +226,8 @@ fn descriptors_of_points_are_read_in_every_type_and_order() {
 
 #[test]
 fn a_database_without_types_is_read_as_bytes() {
-    let dir = tempfile::tempdir().unwrap();
     // A URI would misread this name.
-    let path = dir.path().join("a?b#c%20 d.db");
+    let (dir, path) = place("a?b#c%20 d.db");
     write_database(&path, "project/database.db", "ALTER TABLE descriptors DROP COLUMN type");
     let input = read::open(&data("project")).unwrap();
     let expected = read::descriptors(&data("project/descriptors.bin"), &input).unwrap();
@@ -240,8 +238,7 @@ fn a_database_without_types_is_read_as_bytes() {
 
 #[test]
 fn a_database_in_write_ahead_mode_is_read_whole() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("database.db");
+    let (_dir, path) = place("database.db");
     fs::copy(data("project/database.db"), &path).unwrap();
     let writer = rusqlite::Connection::open(&path).unwrap();
     writer
@@ -257,8 +254,7 @@ fn a_database_in_write_ahead_mode_is_read_whole() {
 /// The file contains uncommitted rows, and the journal beside it the rows to restore.
 #[test]
 fn a_database_with_a_transaction_that_was_not_done_is_refused() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("database.db");
+    let (dir, path) = place("database.db");
     fs::copy(data("project/database.db"), &path).unwrap();
     let writer = rusqlite::Connection::open(&path).unwrap();
     let begin = "PRAGMA journal_mode=DELETE; PRAGMA cache_size=2; BEGIN; UPDATE images SET name = name || 'x'; \
@@ -336,8 +332,7 @@ fn every_malformed_file_of_descriptors_is_refused_with_its_line() {
         bytes("65537 columns", npy("'|u1'", "(6, 65537)", &[7; 6 * 65537]), "d: descriptors: expected at most 65536 values each, found 65537"),
     ];
     for (what, wrong, line) in rows {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("d");
+        let (dir, path) = place("d");
         match wrong {
             Ok(bytes) => fs::write(&path, bytes).unwrap(),
             Err(statement) => write_database(&path, "project/database.db", statement),

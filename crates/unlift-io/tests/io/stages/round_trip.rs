@@ -11,7 +11,7 @@ use unlift_io::Error;
 use unlift_io::stage::{self, ImageFile, Kind};
 
 use super::maps;
-use crate::write_images;
+use crate::{place, write_images};
 
 /// Writes a value twice, which gives the same bytes, and returns the path of a file.
 fn written(folder: &Path, kind: Kind, write: &dyn Fn(&Path) -> Result<(), Error>) -> PathBuf {
@@ -72,8 +72,7 @@ fn values_of_every_kind_come_back() {
 
 #[test]
 fn a_map_without_records_comes_back() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("empty.npz");
+    let (_folder, path) = place("empty.npz");
     let none = Obfuscation::AxisCandidates(AxisCandidates::<3>::try_new(&[]).unwrap());
     let released = Released::try_new(none, 1, [0.0; 3], Unit::Meter, None).unwrap();
     stage::write_released(&path, &released).unwrap();
