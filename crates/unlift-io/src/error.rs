@@ -129,7 +129,6 @@ mod tests {
         let table = [
             (Error::new("points.txt", Place::Line(17), "3 coordinates", "2"), "points.txt:17: expected 3 coordinates, found 2"),
             (Error::new("points3D.bin", "record 12 (byte 4711)", "8 bytes", "end of file"), "points3D.bin: record 12 (byte 4711): expected 8 bytes, found end of file"),
-            (Error::new("a.ply", "", "a number", "x\ny"), "a.ply: expected a number, found x\\ny"),
             (Error::read("a.ply", io(io::ErrorKind::NotFound)), "a.ply: expected a file or folder, found nothing"),
             (Error::read("a.csv", io(io::ErrorKind::PermissionDenied)), "a.csv: expected a readable file, found no permission to read"),
             (Error::write("out", io(io::ErrorKind::FileTooLarge)), "out: expected space to write, found a limit on the size of files"),

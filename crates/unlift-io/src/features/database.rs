@@ -210,7 +210,7 @@ fn confine(
     for (setting, value) in settings {
         connection.set_db_config(setting, value)?;
     }
-    let most = i32::try_from(budget.most()).unwrap_or(i32::MAX);
+    let most = i32::try_from(budget.most).unwrap_or(i32::MAX);
     connection.set_limit(Limit::SQLITE_LIMIT_LENGTH, most)?;
     connection.set_limit(Limit::SQLITE_LIMIT_ATTACHED, 0)?;
     let (steps, most) =

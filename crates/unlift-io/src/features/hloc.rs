@@ -423,7 +423,7 @@ impl FeatureWriter {
             .with_locking(FileLocking::Disabled)
             .with_memory_strategy(MemoryStrategy::Bounded)
             .with_sync_policy(SyncPolicy::OnClose);
-        let file = File::create_with_options(output.partial(), FileCreateProperties::new(), access);
+        let file = File::create_with_options(&output.partial, FileCreateProperties::new(), access);
         let file = file.and_then(|file| {
             file.root().set_attr(WRITER, AttrValue::AsciiString("unlift".to_owned()))?;
             Ok(file)
@@ -442,7 +442,7 @@ impl FeatureWriter {
         let name = &image.name;
         let place = format!("image {}", quoted(name.as_bytes()));
         let wrong = |expected: &str, found: &dyn Display| {
-            Err(Error::new(self.output.path(), &*place, expected, found))
+            Err(Error::new(&self.output.path, &*place, expected, found))
         };
         let parts = || name.split('/');
         if parts().any(|part| matches!(part, "" | "." | "..") || part.contains('\0')) {
@@ -464,7 +464,7 @@ impl FeatureWriter {
         {
             let place = format!("{place}, {array}");
             let expected = format!("{n}, one per keypoint");
-            return Err(Error::new(self.output.path(), place, expected, len));
+            return Err(Error::new(&self.output.path, place, expected, len));
         }
         if self.images.contains(name)
             || self.folders.contains(name)
@@ -482,7 +482,7 @@ impl FeatureWriter {
     /// When [`check`](Self::check) fails.
     pub fn append(&mut self, image: &ImageFeatures) -> Result<(), Error> {
         self.check(image)?;
-        self.stage(image).map_err(|error| failed(self.output.path(), error))
+        self.stage(image).map_err(|error| failed(&self.output.path, error))
     }
 
     fn stage(&mut self, image: &ImageFeatures) -> Result<(), hdf5_pure::Error> {
@@ -519,7 +519,7 @@ impl FeatureWriter {
     /// Moves the file to its place. If that fails, no temporary file is left.
     pub fn finish(self) -> Result<(), Error> {
         let Self { output, file, .. } = self;
-        file.commit().and_then(|()| file.close()).map_err(|error| failed(output.path(), error))?;
+        file.commit().and_then(|()| file.close()).map_err(|error| failed(&output.path, error))?;
         output.commit()
     }
 }

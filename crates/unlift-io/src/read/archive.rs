@@ -19,7 +19,8 @@ pub(crate) type ArrayBytes<'a> = Bytes<ZipFile<'a, BufReader<File>>>;
 pub(crate) struct Archive {
     path: PathBuf,
     zip: ZipArchive<BufReader<File>>,
-    budget: Budget,
+    /// The memory that decoding may use.
+    pub budget: Budget,
 }
 
 impl Archive {
@@ -43,11 +44,6 @@ impl Archive {
         let zip = zip.unwrap_or(Err(ZipError::InvalidArchive("a damaged one".into())));
         let zip = zip.map_err(|error| wrong(cause(error)))?;
         Ok(Self { path: path.to_owned(), zip, budget: Budget::new(path, len) })
-    }
-
-    /// The memory that decoding may use.
-    pub fn budget(&self) -> &Budget {
-        &self.budget
     }
 
     /// Returns index and name of each array, in the order of the archive.

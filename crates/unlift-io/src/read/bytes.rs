@@ -227,7 +227,7 @@ impl<R: Read> Bytes<R> {
 pub(crate) struct Scalar {
     /// `f`, `i` or `u`.
     kind: u8,
-    size: usize,
+    pub size: usize,
 }
 
 impl Scalar {
@@ -248,15 +248,11 @@ impl Scalar {
         sizes.contains(&size).then_some(Self { kind, size: size as usize })
     }
 
-    pub fn size(self) -> usize {
-        self.size
-    }
-
     pub fn is_whole(self) -> bool {
         self.kind != b'f'
     }
 
-    /// Reads a number from the first [`size`](Self::size) `bytes`, big-endian if `big` is set.
+    /// Reads a number from the first `size` `bytes`, big-endian if `big` is set.
     pub fn read(self, bytes: &[u8], big: bool) -> f64 {
         let mut little = [0; 8];
         little[..self.size].copy_from_slice(&bytes[..self.size]);

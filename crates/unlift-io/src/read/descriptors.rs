@@ -75,7 +75,7 @@ fn binary(path: &Path, input: &Input) -> Result<Descriptors, Error> {
             return Err(bytes.error("type 1 (u8), 2 (float16) or 3 (float32)", other));
         }
     };
-    let row_bytes = u64::from(dim) * scalar.size() as u64;
+    let row_bytes = u64::from(dim) * scalar.size as u64;
     if dim == 0 || n.checked_mul(8 + row_bytes) != Some(bytes.remaining()) {
         let expected = format!("{n} ids and rows of {row_bytes} bytes");
         return Err(bytes.error_ahead(expected, format!("{} bytes", bytes.remaining())));
@@ -102,7 +102,7 @@ fn binary(path: &Path, input: &Input) -> Result<Descriptors, Error> {
             whole.extend_from_slice(row);
             continue;
         }
-        for (at, stored) in row.chunks_exact(scalar.size()).enumerate() {
+        for (at, stored) in row.chunks_exact(scalar.size).enumerate() {
             let value = scalar.read(stored, false);
             if !value.is_finite() {
                 let place = format!("point {id}, value {at}");

@@ -163,7 +163,7 @@ impl Numbers {
     /// Checks that exactly the declared values remain.
     pub fn check<R: Read>(&self, bytes: &Bytes<R>) -> Result<(), Error> {
         let (rows, rest) = self.shape.split_first().unwrap_or((&1, &[]));
-        let size = self.scalar.size() as u64;
+        let size = self.scalar.size as u64;
         check_size(bytes, *rows, rest.iter().try_fold(size, |all, &side| all.checked_mul(side)))
     }
 
@@ -175,7 +175,7 @@ impl Numbers {
         mut each: impl FnMut(&Bytes<R>, usize, f64) -> Result<(), Error>,
     ) -> Result<(), Error> {
         const CHUNK: usize = 1 << 13;
-        let size = self.scalar.size();
+        let size = self.scalar.size;
         let n = self.shape.iter().product::<u64>() as usize;
         let mut buffer = vec![0; size * CHUNK.min(n)];
         for first in (0..n).step_by(CHUNK) {
@@ -300,7 +300,7 @@ impl Header {
             let Some((scalar, big)) = stored(kind) else { continue };
             let field = |at| Field { at, scalar, big };
             if n == 3 && PLACES.iter().any(|known| name.eq_ignore_ascii_case(known)) {
-                places = Some(std::array::from_fn(|axis| field(at + axis * scalar.size())));
+                places = Some(std::array::from_fn(|axis| field(at + axis * scalar.size)));
             } else if n == 1 {
                 names.push(name.as_bytes());
                 fields.push(field(at));

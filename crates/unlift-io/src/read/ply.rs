@@ -53,7 +53,7 @@ impl Element {
 
     /// Bytes of one row in a binary file, with empty lists.
     fn stride(&self) -> usize {
-        let size = |property: &Property| property.list.unwrap_or(property.scalar).size();
+        let size = |property: &Property| property.list.unwrap_or(property.scalar).size;
         self.properties.iter().map(size).sum()
     }
 
@@ -291,14 +291,14 @@ fn binary<const N: usize>(
     for (number, Property { scalar, list, .. }) in element.properties.iter().enumerate() {
         let (len, fields, its_list) = runs.last_mut().expect("there is one");
         if let Some(count) = list {
-            *its_list = Some((*count, scalar.size() as u64));
+            *its_list = Some((*count, scalar.size as u64));
             runs.push((0, Vec::new(), None));
             continue;
         }
         if let Some(slot) = wanted.iter().position(|&wanted| wanted == number) {
             fields.push((slot, Field { at: *len, scalar: *scalar, big }));
         }
-        *len += scalar.size();
+        *len += scalar.size;
     }
     let mut buffer = vec![0; stride];
     let mut rows = bytes.room(&*name, if N == 0 { 0 } else { element.count })?;
@@ -311,7 +311,7 @@ fn binary<const N: usize>(
                 values[*slot] = field.of(&buffer);
             }
             let Some((count, size)) = list else { continue };
-            let buffer = &mut buffer[..count.size()];
+            let buffer = &mut buffer[..count.size];
             bytes.fill(buffer, "the length of a list")?;
             let n = count.read(buffer, big);
             if n < 0.0 || n.fract() != 0.0 {

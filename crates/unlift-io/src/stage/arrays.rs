@@ -33,7 +33,7 @@ pub(super) struct Arrays<'a> {
 impl<'a> Arrays<'a> {
     pub(super) fn open(path: &'a Path) -> Result<Self, Error> {
         let archive = Archive::open(path)?;
-        let (arrays, budget) = (archive.arrays()?, archive.budget().clone());
+        let (arrays, budget) = (archive.arrays()?, archive.budget.clone());
         let archive = Arc::new(Mutex::new(archive));
         Self { path, archive, arrays, budget, meta: Meta::empty(path) }.with_meta()
     }

@@ -169,8 +169,8 @@ pub struct ImageWriter<'a> {
 impl<'a> ImageWriter<'a> {
     /// Starts a file of images.
     pub fn start(output: &'a mut OutputFile) -> Self {
-        let path = output.path().to_owned();
-        Self { path, zip: Zip::new(output.writer()), of_all: None }
+        let path = output.path.clone();
+        Self { path, zip: Zip::new(&mut output.writer), of_all: None }
     }
 
     /// Adds a released image.

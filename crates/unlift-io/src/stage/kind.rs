@@ -84,11 +84,6 @@ impl Kind {
         self.facts().0
     }
 
-    /// Returns the kind with the name `name`, if there is one.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.name() == name)
-    }
-
     pub(super) fn arrays(self) -> &'static [&'static str] {
         self.facts().2
     }

@@ -78,7 +78,8 @@ impl<'a> Meta<'a> {
         let is_known = |version: &Value| (version.as_u64() == Some(VERSION)).then_some(());
         self.given("version", VERSION.to_string(), is_known)?;
         let expected = format!("one of {}", Kind::ALL.map(Kind::name).join(", "));
-        self.given("kind", expected, |kind| Kind::from_name(kind.as_str()?))
+        let of_name = |name: &Value| Kind::ALL.into_iter().find(|kind| name == kind.name());
+        self.given("kind", expected, of_name)
     }
 
     /// The unit of all lengths: as declared, else `usual`, else pixels in 2D.

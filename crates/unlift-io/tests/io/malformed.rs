@@ -9,7 +9,7 @@ use unlift_io::features::FeatureSource;
 use unlift_io::{read, stage};
 
 use super::stages::maps;
-use super::{copy_folder, data, fixture, npy as array, place, refused, shown, write};
+use super::{copy_folder, data, fixture, npy as array, refused, shown, write};
 
 pub fn patched(mut file: Vec<u8>, at: usize, bytes: &[u8]) -> Vec<u8> {
     file[at..at + bytes.len()].copy_from_slice(bytes);
@@ -57,21 +57,6 @@ fn every_malformed_file_is_refused_with_its_line() {
             assert_eq!(shown(dir.path(), &read::open(&path).expect_err(what)), line, "{what}");
         }
     }
-}
-
-#[cfg(unix)]
-#[test]
-fn a_file_that_may_not_be_read_is_refused() {
-    use std::os::unix::fs::PermissionsExt;
-    let (dir, path) = place("a.csv");
-    fs::write(&path, "1,2,3").unwrap();
-    fs::set_permissions(&path, fs::Permissions::from_mode(0o000)).unwrap();
-    if fs::read(&path).is_ok() {
-        eprintln!("skipped: this user may read everything");
-        return;
-    }
-    let line = "a.csv: expected a readable file, found no permission to read";
-    assert_eq!(shown(dir.path(), &read::open(&path).unwrap_err()), line);
 }
 
 /// They must be an error before they are opened.
