@@ -241,15 +241,14 @@ fn image_ids(
 ) -> Result<Vec<(Vec<u8>, i64)>, Error> {
     let failed = |e: rusqlite::Error| refuse(path, "table images", &e);
     let mut statement = connection.prepare("SELECT image_id, name FROM images").map_err(failed)?;
-    let mut rows = statement.query([]).map_err(failed)?;
+    let read = |row: &Row<'_>| Ok((row.get_ref(1)?.as_bytes()?.to_vec(), row.get(0)?));
     let (mut image_ids, mut bytes) = (BTreeMap::new(), 0);
-    while let Some(row) = rows.next().map_err(failed)? {
-        let name = row.get_ref(1).map_err(failed)?;
-        let name = name.as_bytes().map_err(|e| failed(e.into()))?;
+    for image in statement.query_map([], read).map_err(failed)? {
+        let (name, id) = image.map_err(failed)?;
         // Names of a computed column are stored nowhere, so the file size does not limit them.
         bytes += 64 + name.len() as u64;
         budget.admit("table images", bytes)?;
-        image_ids.insert(name.to_vec(), row.get(0).map_err(failed)?);
+        image_ids.insert(name, id);
     }
     Ok(image_ids.into_iter().collect())
 }

@@ -164,14 +164,9 @@ impl<R: Read> Bytes<R> {
     }
 
     pub fn doubles<const N: usize>(&mut self, what: &str) -> Result<[f64; N], Error> {
-        self.check(8 * N as u64, what)?;
-        let start = self.at;
-        let mut values = [0.0; N];
-        for value in &mut values {
-            *value = f64::from_le_bytes(self.array(what)?);
-        }
-        self.value_at = start;
-        Ok(values)
+        let mut values = [[0; 8]; N];
+        self.fill(values.as_flattened_mut(), what)?;
+        Ok(values.map(f64::from_le_bytes))
     }
 
     /// Reads bytes up to the next zero byte, which is not included.

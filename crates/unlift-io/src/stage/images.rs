@@ -29,7 +29,8 @@ pub struct ImageFile<'a> {
     waiting: IntoIter<(String, Vec<(usize, String)>)>,
 }
 
-/// The arrays of one image.
+/// The arrays of one image. Readers fail as those of maps do, with the name of the image; rows are
+/// counted within it.
 pub struct ImageRows<'a> {
     name: String,
     arrays: Arrays<'a>,
@@ -120,9 +121,6 @@ impl ImageRows<'_> {
     }
 
     /// Returns the released image.
-    ///
-    /// # Errors
-    /// When `read_released` would fail. Errors name the image; rows are counted within it.
     pub fn released(self) -> Result<Released<2>, Error> {
         self.read(released_of)
     }
