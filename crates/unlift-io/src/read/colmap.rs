@@ -11,7 +11,7 @@ use std::path::Path;
 use unlift::geometry::camera::{Intrinsics, Pose};
 
 use super::bytes::Bytes;
-use super::lines::{Lines, coordinates, number, quoted, words};
+use super::lines::{Lines, coordinates, next, number, quoted, words};
 use super::map_input::pose_of;
 use crate::error::Error;
 
@@ -343,28 +343,19 @@ fn binary_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
     Ok(Points { ids, positions, tracks })
 }
 
-fn next<'a, T: std::str::FromStr>(
-    lines: &Lines,
-    words: &mut impl Iterator<Item = &'a [u8]>,
-    what: &str,
-) -> Result<T, Error> {
-    let word = words.next().ok_or_else(|| lines.error(what, "end of line"))?;
-    number(word).ok_or_else(|| lines.error(what, quoted(word)))
-}
-
 fn text_cameras(path: &Path) -> Result<Vec<Camera>, Error> {
     let mut lines = Lines::open(path)?;
     let mut cameras = Vec::new();
     while lines.advance_to_data()? {
         let mut words = words(lines.line());
-        let id = next(&lines, &mut words, "a camera id")?;
+        let id = next(&lines, &mut words, "a camera id", number)?;
         let name = words.next().unwrap_or_default();
         let Some(model) = CAMERA_MODELS.iter().find(|known| known.name.as_bytes() == name) else {
             let expected = format!("a camera model of COLMAP for camera {id}");
             return Err(lines.error(expected, quoted(name)));
         };
-        let width_px = next(&lines, &mut words, "a width in pixels")?;
-        let height_px = next(&lines, &mut words, "a height in pixels")?;
+        let width_px = next(&lines, &mut words, "a width in pixels", number)?;
+        let height_px = next(&lines, &mut words, "a height in pixels", number)?;
         let params: Vec<f64> = words
             .map(|word| number(word).ok_or_else(|| lines.error("a parameter", quoted(word))))
             .collect::<Result<_, _>>()?;
@@ -382,11 +373,11 @@ fn text_images(path: &Path) -> Result<Vec<Image>, Error> {
     let mut images = Vec::new();
     while lines.advance_to_data()? {
         let mut words = words(lines.line());
-        let id = next(&lines, &mut words, "an image id")?;
+        let id = next(&lines, &mut words, "an image id", number)?;
         let rotation = coordinates(&lines, &mut words, "a rotation (4 numbers)")?;
         let translation = coordinates(&lines, &mut words, "a translation (3 numbers)")?;
         let pose = pose_of(rotation, translation);
-        let camera_id = next(&lines, &mut words, "a camera id")?;
+        let camera_id = next(&lines, &mut words, "a camera id", number)?;
         drop(words);
         let name = after_words(lines.line(), 9).to_vec();
         if name.is_empty() {
@@ -417,14 +408,14 @@ fn text_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
     let mut points = Points { tracks: with_tracks.then(Tracks::new), ..Points::default() };
     while lines.advance_to_data()? {
         let mut words = words(lines.line()).peekable();
-        let id: u64 = next(&lines, &mut words, "a point id")?;
+        let id: u64 = next(&lines, &mut words, "a point id", number)?;
         let position = coordinates::<3>(&lines, &mut words, "3 coordinates")?;
         coordinates::<3>(&lines, &mut words, "a color (3 numbers)")?;
         coordinates::<1>(&lines, &mut words, "a reprojection error")?;
         if let Some(tracks) = &mut points.tracks {
             while words.peek().is_some() {
-                let image_id = next(&lines, &mut words, "an image id")?;
-                let index = next(&lines, &mut words, "the index of a 2D point")?;
+                let image_id = next(&lines, &mut words, "an image id", number)?;
+                let index = next(&lines, &mut words, "the index of a 2D point", number)?;
                 tracks.observations.push((image_id, index));
             }
             tracks.offsets.push(tracks.observations.len());

@@ -56,9 +56,7 @@ impl Lines {
 
     /// Reads the next line of a header, which must not be the last line of the file.
     pub fn advance_in_header(&mut self, expected: &str) -> Result<(), Error> {
-        if !self.advance()? {
-            return Err(self.end_error(expected));
-        }
+        self.expect_line(expected)?;
         if !self.line.ends_with(b"\n") || self.at > LONGEST_HEADER {
             return Err(self.error(expected, "end of file"));
         }
@@ -100,6 +98,11 @@ impl Lines {
             }
         }
         Ok(false)
+    }
+
+    /// Reads the next line, which has `what`.
+    pub fn expect_line(&mut self, what: &str) -> Result<(), Error> {
+        if self.advance()? { Ok(()) } else { Err(self.end_error(what)) }
     }
 
     /// Reads up to the next line that is neither blank nor a comment, which has `what`.
@@ -183,6 +186,17 @@ pub fn coordinate(word: &[u8]) -> Option<f64> {
     number(word).or_else(|| none(word).then_some(f64::NAN))
 }
 
+/// Parses the next of the `words` of a line. Errors name it `what`.
+pub fn next<'a, T>(
+    lines: &Lines,
+    words: &mut impl Iterator<Item = &'a [u8]>,
+    what: &str,
+    parse: impl Fn(&[u8]) -> Option<T>,
+) -> Result<T, Error> {
+    let word = words.next().ok_or_else(|| lines.error(what, "end of line"))?;
+    parse(word).ok_or_else(|| lines.error(what, quoted(word)))
+}
+
 /// Parses the next `N` of the `words` of a line as coordinates. Errors name them `what`.
 pub fn coordinates<'a, const N: usize>(
     lines: &Lines,
@@ -191,8 +205,7 @@ pub fn coordinates<'a, const N: usize>(
 ) -> Result<[f64; N], Error> {
     let mut values = [0.0; N];
     for value in &mut values {
-        let word = words.next().ok_or_else(|| lines.error(what, "end of line"))?;
-        *value = coordinate(word).ok_or_else(|| lines.error(what, quoted(word)))?;
+        *value = next(lines, words, what, coordinate)?;
     }
     Ok(values)
 }

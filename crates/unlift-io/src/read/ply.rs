@@ -130,9 +130,7 @@ fn header(path: &Path, lines: &mut Lines) -> Result<(Encoding, Vec<Element>), Er
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
     let begins = "\"ply\", as every PLY file begins";
-    if !lines.advance()? {
-        return Err(lines.end_error(begins));
-    }
+    lines.expect_line(begins)?;
     if lines.line() != b"ply" {
         return Err(lines.error(begins, quoted(lines.line())));
     }
