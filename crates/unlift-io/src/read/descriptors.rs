@@ -166,13 +166,12 @@ fn tracks(path: &Path, input: &Input) -> Result<(Vec<Image>, Vec<Observation>), 
     let extension = points_path.extension().unwrap_or_default();
     let images = points_path.with_file_name("images").with_extension(extension);
     let images = colmap::read_images(&images)?;
-    let row_of_id: HashMap<u64, usize> = points.ids.iter().copied().zip(0..).collect();
     // Sorted by image, so that one image is in memory at a time, and by id, so that sums of floats
     // are deterministic.
     let mut observations = Vec::new();
     for (out, id) in input.ids.iter().enumerate() {
         let place = || format!("point {id}");
-        let Some(&row) = row_of_id.get(id) else {
+        let Ok(row) = points.ids.binary_search(id) else {
             return Err(Error::new(points_path, place(), "its track", "no such point"));
         };
         let track = tracks.row(row);
