@@ -213,19 +213,15 @@ impl<'a> Arrays<'a> {
                 let expected = if class == Class::Any { "numbers" } else { "whole numbers" };
                 return Err(wrong(expected, &format!("dtype {kind}")));
             };
-            let shape: Option<[usize; N]> = numbers
-                .shape
-                .iter()
-                .map(|&side| usize::try_from(side).ok())
-                .collect::<Option<Vec<_>>>()
-                .and_then(|shape| shape.try_into().ok());
-            let fits = |shape: &[usize; N]| {
-                shape.iter().zip(&sides).all(|(n, side)| side.is_none_or(|side| side == *n))
+            let fits = |shape: &[u64; N]| {
+                shape.iter().zip(&sides).all(|(n, side)| side.is_none_or(|side| side as u64 == *n))
             };
+            let shape = <[u64; N]>::try_from(&*numbers.shape).ok();
             let Some(shape) = shape.filter(fits) else {
                 return Err(wrong(&format!("shape {}", shown(&sides)), &tuple(&numbers.shape)));
             };
             numbers.check(bytes)?;
+            let shape = shape.map(|side| side as usize);
             let n = shape.iter().product::<usize>();
             let mut values = self.budget.room(format!("array {name}"), n as u64)?;
             values.resize(n, T::default());
