@@ -101,10 +101,8 @@ pub struct Image {
 impl Image {
     /// Finds the camera of this image in `cameras`, which are sorted by id.
     pub fn camera<'a>(&self, cameras: &'a [Camera]) -> Option<&'a Camera> {
-        cameras
-            .binary_search_by_key(&self.camera_id, |camera| camera.id)
-            .ok()
-            .map(|at| &cameras[at])
+        let at = cameras.binary_search_by_key(&self.camera_id, |camera| camera.id);
+        Some(&cameras[at.ok()?])
     }
 
     /// The unit vector in the world that points up in the photo.
@@ -206,15 +204,13 @@ pub fn read_views(model: &Path) -> Result<(Vec<Camera>, Vec<Image>), Error> {
     let path = model.join(format!("images.{extension}"));
     let images = read_images(&path)?;
     for image in &images {
-        let wrong = |expected: String, found| {
-            Err(Error::new(&path, format!("image {}", image.id), expected, found))
-        };
+        let place = format!("image {}", image.id);
         if image.camera(&cameras).is_none() {
             let expected = format!("the id of a camera in cameras.{extension}");
-            return wrong(expected, image.camera_id.to_string());
+            return Err(Error::new(path, place, expected, image.camera_id));
         }
         if image.pose.center.iter().any(|x| !x.is_finite()) {
-            return wrong("a finite pose".to_owned(), "none".to_owned());
+            return Err(Error::new(path, place, "a finite pose", "none"));
         }
     }
     Ok((cameras, images))

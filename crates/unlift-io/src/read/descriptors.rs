@@ -134,15 +134,15 @@ fn of_database(path: &Path, input: &Input) -> Result<Descriptors, Error> {
 fn of_features(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     let features = FeatureSource::open(path)?;
     mean(path, input, &tracks(path, input)?, |image| {
-        let wrong = |expected: String, found: String| {
-            Error::new(path, format!("image {}", quoted(&image.name)), expected, found)
-        };
+        let place = format!("image {}", quoted(&image.name));
         let at = features.names().binary_search_by(|name| name.as_bytes().cmp(&image.name));
-        let at = at.map_err(|_| wrong("this image of the model".into(), "no such image".into()))?;
+        let Ok(at) = at else {
+            return Err(Error::new(path, place, "this image of the model", "no such image"));
+        };
         let found = features.get(at)?;
         if found.keypoints.len() as u64 != image.n_points2d {
             let expected = format!("{} keypoints, as the model has", image.n_points2d);
-            return Err(wrong(expected, found.keypoints.len().to_string()));
+            return Err(Error::new(path, place, expected, found.keypoints.len()));
         }
         let descriptors = found.described(path)?;
         Ok((descriptors.values().clone(), descriptors.dim()))

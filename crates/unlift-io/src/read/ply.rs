@@ -136,7 +136,6 @@ fn header(path: &Path, lines: &mut Lines) -> Result<(Encoding, Vec<Element>), Er
     }
     loop {
         lines.advance_in_header("a header that ends with end_header")?;
-        let error = |expected: &str, found: String| lines.error(expected, found);
         let line = lines.line();
         let words: Vec<&[u8]> = words(line).collect();
         match words[..] {
@@ -144,29 +143,29 @@ fn header(path: &Path, lines: &mut Lines) -> Result<(Encoding, Vec<Element>), Er
             [b"format", name, _version] => {
                 let expected = "ascii, binary_little_endian or binary_big_endian";
                 let known = ENCODINGS.into_iter().find(|(known, ..)| *known == name);
-                encoding = Some(known.ok_or_else(|| error(expected, quoted(name)))?);
+                encoding = Some(known.ok_or_else(|| lines.error(expected, quoted(name)))?);
             }
             [b"element", name, count] => {
-                let count =
-                    number(count).ok_or_else(|| error("the number of elements", quoted(count)))?;
+                let count = number(count)
+                    .ok_or_else(|| lines.error("the number of elements", quoted(count)))?;
                 elements.push(Element { name: name.to_vec(), count, properties: Vec::new() });
             }
             [b"property", ref rest @ ..] => {
                 let Some(element) = elements.last_mut() else {
-                    return Err(error("an element before its properties", quoted(line)));
+                    return Err(lines.error("an element before its properties", quoted(line)));
                 };
                 let known = |kind: &[u8]| {
-                    scalar(kind).ok_or_else(|| error("the type of a property", quoted(kind)))
+                    scalar(kind).ok_or_else(|| lines.error("the type of a property", quoted(kind)))
                 };
                 let (name, scalar, list) = match *rest {
                     [kind, name] => (name, known(kind)?, None),
                     [b"list", count, kind, name] => (name, known(kind)?, Some(known(count)?)),
-                    _ => return Err(error("property TYPE NAME", quoted(line))),
+                    _ => return Err(lines.error("property TYPE NAME", quoted(line))),
                 };
                 element.properties.push(Property { name: name.to_vec(), scalar, list });
             }
             [b"end_header"] => break,
-            _ => return Err(error("a line of a PLY header", quoted(line))),
+            _ => return Err(lines.error("a line of a PLY header", quoted(line))),
         }
     }
     let encoding =
