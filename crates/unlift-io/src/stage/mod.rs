@@ -27,7 +27,7 @@ use arrays::Arrays;
 pub use images::{ImageFile, ImageRows, ImageWriter};
 pub use kind::Kind;
 pub use lists::{read_neighborhoods, read_point_neighborhoods, write_neighborhoods};
-pub use recovered::{read_recovered, read_recovered_in, write_recovered};
+pub use recovered::{read_recovered, write_recovered};
 pub use released::{published_positions, read_released, scheme_name, write_released};
 pub use truth::{read_truth, write_truth};
 

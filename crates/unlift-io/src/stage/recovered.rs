@@ -65,21 +65,16 @@ pub(super) fn written<'a, const D: usize>(
     Ok(written)
 }
 
-/// Reads recovered points of dimension `D`.
+/// Reads recovered points of dimension `D`, in `usual` units unless the file states others.
 ///
 /// Only `position` is required. Without `status`, a point is recovered, or without support if its
 /// coordinates are NaN; `support` and `evidence` default to 0. Confidence requires both of its
 /// arrays.
-pub fn read_recovered<const D: usize>(path: &Path) -> Result<Recovered<D>, Error> {
-    recovered_of(&Arrays::open(path)?, None)
-}
-
-/// Reads recovered points like [`read_recovered`], with `unit` as the default unit.
-///
-/// # Errors
-/// When [`read_recovered`] would fail for another reason than a missing unit.
-pub fn read_recovered_in<const D: usize>(path: &Path, unit: Unit) -> Result<Recovered<D>, Error> {
-    recovered_of(&Arrays::open(path)?, Some(unit))
+pub fn read_recovered<const D: usize>(
+    path: &Path,
+    usual: Option<Unit>,
+) -> Result<Recovered<D>, Error> {
+    recovered_of(&Arrays::open(path)?, usual)
 }
 
 pub(super) fn recovered_of<const D: usize>(

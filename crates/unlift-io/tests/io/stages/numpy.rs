@@ -70,7 +70,7 @@ fn the_snippets_of_the_document_run() {
     assert_eq!(lists.of(2)[..3], [0, 1, 3].map(RecordId));
     let points = stage::read_point_neighborhoods(&at("points.npz"), 12).unwrap();
     assert_eq!(points.of(1)[..2], [0, 2].map(RecordId));
-    let back = stage::read_recovered::<3>(&at("back.npz")).unwrap();
+    let back = stage::read_recovered::<3>(&at("back.npz"), None).unwrap();
     assert_eq!(back.status().iter().filter(|&&status| status == Status::Ok).count(), 8);
     assert_eq!((back.position(1), back.position(4)), (Some([0.0, 0.0, 1.0]), None));
     let images = at("images.npz");

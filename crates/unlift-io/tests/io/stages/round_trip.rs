@@ -49,7 +49,7 @@ pub fn values_come_back<const D: usize>(folder: &Path, sizes: &[usize], change: 
 
         let recovered = maps::recovered::<D>(seed, n);
         let path = written(Kind::Recovered, &|path| stage::write_recovered(path, &recovered));
-        let read = stage::read_recovered::<D>(&path).unwrap();
+        let read = stage::read_recovered::<D>(&path, None).unwrap();
         // NaN is not equal to itself, so the texts are compared.
         assert!(format!("{read:?}") == format!("{recovered:?}"), "{n} points in {D}D");
 
