@@ -101,10 +101,10 @@ pub fn stages(bytes: &[u8]) {
         }
     }
     let _ = stage::read_point_neighborhoods(&path, 60);
-    if let Ok(recovered) = stage::read_recovered::<3>(&path) {
+    if let Ok(recovered) = stage::read_recovered::<3>(&path, None) {
         assert!(recovered.positions().iter().flatten().all(|x| !x.is_infinite()));
     }
-    let _ = stage::read_recovered::<2>(&path);
+    let _ = stage::read_recovered::<2>(&path, None);
     if stage::has_images(&path).unwrap_or(false) {
         for kind in [Kind::Released, Kind::Truth, Kind::Neighborhoods, Kind::Recovered] {
             let Ok(mut images) = ImageFile::open(&path, kind) else { continue };

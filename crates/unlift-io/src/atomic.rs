@@ -61,7 +61,7 @@ pub fn write_file(
     fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<(), Error> {
     let mut output = OutputFile::create(path, access)?;
-    fill(output.writer()).map_err(|source| Error::write(path, source))?;
+    fill(&mut output.writer).map_err(|source| Error::write(path, source))?;
     output.commit()
 }
 
@@ -69,10 +69,12 @@ pub fn write_file(
 /// symbolic link is replaced, not the link. Without a commit nothing is left.
 #[derive(Debug)]
 pub struct OutputFile {
-    path: PathBuf,
+    /// The path as the caller gave it, for errors.
+    pub(crate) path: PathBuf,
     place: PathBuf,
-    partial: PathBuf,
-    writer: BufWriter<File>,
+    /// The path of the unfinished file, for writers that open it by themselves.
+    pub(crate) partial: PathBuf,
+    pub(crate) writer: BufWriter<File>,
 }
 
 impl OutputFile {
@@ -91,21 +93,6 @@ impl OutputFile {
         })?;
         let writer = BufWriter::with_capacity(1 << 17, file);
         Ok(Self { path: path.to_owned(), place, partial, writer })
-    }
-
-    /// The path as the caller gave it, for errors.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// The path of the unfinished file, for writers that open it by themselves.
-    pub(crate) fn partial(&self) -> &Path {
-        &self.partial
-    }
-
-    /// The buffered writer of the unfinished file.
-    pub fn writer(&mut self) -> &mut BufWriter<File> {
-        &mut self.writer
     }
 
     /// Moves the file to its place. If that fails, an existing file is unchanged.

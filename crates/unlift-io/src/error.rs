@@ -1,6 +1,6 @@
 //! The error of this crate.
 
-use std::fmt;
+use std::fmt::{self, Display};
 use std::io;
 use std::path::PathBuf;
 
@@ -9,30 +9,22 @@ use unlift::OneLine;
 /// The place of an error in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// The file (or folder) as a whole.
-    Whole,
     /// A line of a text file, counted from 1.
     Line(u64),
-    /// A byte of a binary file.
-    Byte {
-        /// The structure that was read: `record 12`, `header`.
-        what: String,
-        /// Offset of its first byte, counted from 0.
-        at: u64,
-    },
-    /// Another named place: a column, a table, a row.
+    /// Another place: `record 12 (byte 4711)`, a column, a table. Empty for the file (or folder) as a
+    /// whole.
     Named(String),
 }
 
 impl From<&str> for Place {
     fn from(name: &str) -> Self {
-        Self::from(name.to_owned())
+        Self::Named(name.to_owned())
     }
 }
 
 impl From<String> for Place {
     fn from(name: String) -> Self {
-        if name.is_empty() { Self::Whole } else { Self::Named(name) }
+        Self::Named(name)
     }
 }
 
@@ -43,19 +35,8 @@ impl From<String> for Place {
 #[derive(Debug)]
 pub struct Error {
     path: PathBuf,
-    kind: Kind,
-}
-
-#[derive(Debug)]
-enum Kind {
-    Content {
-        place: Place,
-        expected: String,
-        found: String,
-    },
-    /// What cannot be done, `read` or `write`, and why.
-    System(&'static str, io::Error),
-    Core(unlift::Error),
+    place: Place,
+    problem: String,
 }
 
 impl Error {
@@ -66,17 +47,11 @@ impl Error {
     pub fn new(
         path: impl Into<PathBuf>,
         place: impl Into<Place>,
-        expected: impl Into<String>,
-        found: impl Into<String>,
+        expected: impl Display,
+        found: impl Display,
     ) -> Self {
-        Self {
-            path: path.into(),
-            kind: Kind::Content {
-                place: place.into(),
-                expected: expected.into(),
-                found: found.into(),
-            },
-        }
+        let problem = format!("expected {expected}, found {found}");
+        Self { path: path.into(), place: place.into(), problem }
     }
 
     /// Creates an error for a `path` that cannot be read.
@@ -88,9 +63,9 @@ impl Error {
             io::ErrorKind::IsADirectory => ("a file", "a folder"),
             io::ErrorKind::NotADirectory => ("a folder", "a file"),
             io::ErrorKind::PermissionDenied => ("a readable file", "no permission to read"),
-            _ => return Self { path: path.into(), kind: Kind::System("read", source) },
+            _ => return Self::of_whole(path, format!("cannot read: {source}")),
         };
-        Self::new(path, Place::Whole, expected, found)
+        Self::new(path, "", expected, found)
     }
 
     /// Creates an error for a `path` that cannot be written.
@@ -101,50 +76,41 @@ impl Error {
             io::ErrorKind::StorageFull => ("space to write", "a full disk"),
             io::ErrorKind::QuotaExceeded => ("space to write", "a used-up quota"),
             io::ErrorKind::FileTooLarge => ("space to write", "a limit on the size of files"),
-            _ => return Self { path: path.into(), kind: Kind::System("write", source) },
+            _ => return Self::of_whole(path, format!("cannot write: {source}")),
         };
-        Self::new(path, Place::Whole, expected, found)
+        Self::new(path, "", expected, found)
     }
 
     /// Creates an error for values from `path` that the core library refused.
     pub fn core(path: impl Into<PathBuf>, source: unlift::Error) -> Self {
-        Self { path: path.into(), kind: Kind::Core(source) }
+        Self::of_whole(path, source.to_string())
+    }
+
+    fn of_whole(path: impl Into<PathBuf>, problem: String) -> Self {
+        Self { path: path.into(), place: "".into(), problem }
     }
 
     /// Adds a prefix to the place of the error: `images.npz: image a.jpg, column x: expected
     /// ...`.
     pub(crate) fn within(self, what: &str) -> Self {
-        let kind = match self.kind {
-            Kind::Content { place: Place::Whole, expected, found } => {
-                Kind::Content { place: what.into(), expected, found }
-            }
-            Kind::Content { place: Place::Named(name), expected, found } => {
-                Kind::Content { place: format!("{what}, {name}").into(), expected, found }
-            }
-            Kind::Core(source) => Kind::Core(source.within(what)),
-            other => other,
+        let place = match self.place {
+            Place::Named(name) if name.is_empty() => what.into(),
+            Place::Named(name) => format!("{what}, {name}").into(),
+            line => line,
         };
-        Self { kind, ..self }
+        Self { place, ..self }
     }
 }
 
-impl fmt::Display for Error {
+impl Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         OneLine(self.path.display()).fmt(f)?;
-        match &self.kind {
-            Kind::Content { place, expected, found } => {
-                match place {
-                    Place::Whole => {}
-                    Place::Line(line) => write!(f, ":{line}")?,
-                    Place::Byte { what, at } => write!(f, ": {} (byte {at})", OneLine(what))?,
-                    Place::Named(name) => write!(f, ": {}", OneLine(name))?,
-                }
-                let (expected, found) = (OneLine(expected), OneLine(found));
-                write!(f, ": expected {expected}, found {found}")
-            }
-            Kind::System(step, source) => write!(f, ": cannot {step}: {}", OneLine(source)),
-            Kind::Core(source) => write!(f, ": {}", OneLine(source)),
+        match &self.place {
+            Place::Line(line) => write!(f, ":{line}")?,
+            Place::Named(name) if name.is_empty() => {}
+            Place::Named(name) => write!(f, ": {}", OneLine(name))?,
         }
+        write!(f, ": {}", OneLine(&self.problem))
     }
 }
 
@@ -159,12 +125,10 @@ mod tests {
     #[rustfmt::skip] // One row per line.
     fn every_kind_prints_one_line() {
         let core = || unlift::Error::new("point 3", "finite coordinates", "[NaN, 0.0, 0.0]");
-        let byte = Place::Byte { what: "record 12".into(), at: 4711 };
         let io = |kind| io::Error::new(kind, "other\ntext");
         let table = [
             (Error::new("points.txt", Place::Line(17), "3 coordinates", "2"), "points.txt:17: expected 3 coordinates, found 2"),
-            (Error::new("points3D.bin", byte, "8 bytes", "end of file"), "points3D.bin: record 12 (byte 4711): expected 8 bytes, found end of file"),
-            (Error::new("a.ply", "", "a number", "x\ny"), "a.ply: expected a number, found x\\ny"),
+            (Error::new("points3D.bin", "record 12 (byte 4711)", "8 bytes", "end of file"), "points3D.bin: record 12 (byte 4711): expected 8 bytes, found end of file"),
             (Error::read("a.ply", io(io::ErrorKind::NotFound)), "a.ply: expected a file or folder, found nothing"),
             (Error::read("a.csv", io(io::ErrorKind::PermissionDenied)), "a.csv: expected a readable file, found no permission to read"),
             (Error::write("out", io(io::ErrorKind::FileTooLarge)), "out: expected space to write, found a limit on the size of files"),

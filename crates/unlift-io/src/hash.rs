@@ -44,11 +44,7 @@ pub fn hash_files<P: AsRef<Path>>(paths: &[P]) -> Result<String, Error> {
 /// Combines names and hashes like [`hash_files`], also for data that is not in files.
 pub fn hash_list(mut named: Vec<(String, String)>) -> String {
     named.sort();
-    let mut hasher = Sha256::new();
-    for (name, hash) in named {
-        hasher.update(format!("{hash}  {name}\n"));
-    }
-    hex(hasher)
+    hash(named.iter().map(|(name, hash)| format!("{hash}  {name}\n")))
 }
 
 /// Returns the SHA-256 of the features that an audit uses: width and height as little-endian `u32`
@@ -72,9 +68,11 @@ pub fn hash_features(features: &ImageFeatures) -> String {
 
 /// Returns the SHA-256 of positions as little-endian `f64`.
 pub fn hash_positions(positions: &[[f64; 3]]) -> String {
-    let mut hasher = Sha256::new();
-    positions.as_flattened().iter().for_each(|x| hasher.update(x.to_le_bytes()));
-    hex(hasher)
+    hash(positions.as_flattened().iter().map(|x| x.to_le_bytes()))
+}
+
+fn hash(pieces: impl Iterator<Item = impl AsRef<[u8]>>) -> String {
+    hex(pieces.fold(Sha256::new(), Sha256::chain_update))
 }
 
 fn hex(hasher: Sha256) -> String {

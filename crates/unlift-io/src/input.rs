@@ -48,7 +48,8 @@ const MULTIPLE: u64 = 64;
 pub struct Budget {
     path: PathBuf,
     len: u64,
-    most: u64,
+    /// The budget in bytes.
+    pub(crate) most: u64,
 }
 
 impl Budget {
@@ -56,11 +57,6 @@ impl Budget {
     pub fn new(path: &Path, len: u64) -> Self {
         let most = len.saturating_mul(MULTIPLE).max(LEAST);
         Self { path: path.to_owned(), len, most }
-    }
-
-    /// The budget in bytes.
-    pub fn most(&self) -> u64 {
-        self.most
     }
 
     /// Returns an empty vector with capacity for `n` entries of `place`.
@@ -106,8 +102,8 @@ mod tests {
     #[test]
     fn small_files_have_a_least_budget_and_large_ones_a_multiple() {
         let path = Path::new("a.h5");
-        assert_eq!(Budget::new(path, 266_000).most(), LEAST);
-        assert_eq!(Budget::new(path, 1 << 30).most(), 64 << 30);
+        assert_eq!(Budget::new(path, 266_000).most, LEAST);
+        assert_eq!(Budget::new(path, 1 << 30).most, 64 << 30);
         let error = Budget::new(path, 266_000).admit("array x", 4 << 30).unwrap_err();
         let expected =
             "a.h5: array x: expected at most 256 MiB in memory of a file of 259.8 KiB, found 4 GiB";

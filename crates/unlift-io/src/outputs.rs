@@ -132,7 +132,7 @@ impl OutputSet {
         let path = self.path.join(name);
         self.rules.check(&path, kind)?;
         let file = OutputFile::create(&path, Access::Private)?;
-        let partial = file.partial().to_owned();
+        let partial = file.partial.clone();
         self.files.push((file, kind));
         Ok(partial)
     }
@@ -141,7 +141,7 @@ impl OutputSet {
     /// has appeared at one.
     pub fn commit(mut self) -> Result<(), Error> {
         for (file, kind) in &self.files {
-            self.rules.check(file.path(), *kind)?;
+            self.rules.check(&file.path, *kind)?;
         }
         std::mem::take(&mut self.files).into_iter().try_for_each(|(file, _)| file.commit())
     }

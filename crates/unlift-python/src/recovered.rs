@@ -27,7 +27,7 @@ impl Recovered {
     /// Reads recovered points (`.npz`).
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let recovered = py.detach(|| read_recovered::<3>(&path)).map_err(raised)?;
+        let recovered = py.detach(|| read_recovered::<3>(&path, None)).map_err(raised)?;
         Ok(Self(Arc::new(recovered)))
     }
 

@@ -128,7 +128,7 @@ fn read(path: &Path) -> crate::Result<(Shown, Unit)> {
             Ok((shown, released.unit()))
         }
         Stage::Recovered => {
-            let recovered = read_recovered::<3>(path)?;
+            let recovered = read_recovered::<3>(path, None)?;
             let points = (0..recovered.n_slots()).map(|slot| recovered.position(slot)).collect();
             Ok((Shown::Points(points), recovered.unit()))
         }

@@ -201,7 +201,7 @@ fn map(to: &Target<'_>, recovered: &Path) -> crate::Result<Counts> {
     let scale = args.scale.unwrap_or(1.0);
     let released = read_released::<3>(path)?;
     let painter = Painter::open(kind_of("PATH", released.descriptors())?, None)?;
-    let came_back = read_recovered::<3>(recovered)?;
+    let came_back = read_recovered::<3>(recovered, None)?;
     same_map(recovered, came_back.about().map, path, Some(released.fingerprint()))?;
     let (cameras, mut images) = colmap::read_views(model)?;
     images.sort_by(|a, b| a.name.cmp(&b.name));

@@ -29,7 +29,7 @@ use unlift_io::atomic::{Access, OutputFile};
 use unlift_io::outputs::{Kind, OutputSet, Rules};
 use unlift_io::stage::{
     ImageFile, ImageRows, ImageWriter, Kind as Stage, has_images, read_neighborhoods,
-    read_recovered_in, read_released, read_truth, write_neighborhoods, write_recovered,
+    read_recovered, read_released, read_truth, write_neighborhoods, write_recovered,
     write_released, write_truth,
 };
 use unlift_report::leak;
@@ -564,7 +564,7 @@ fn evaluate_map(args: &EvaluateArgs, released: Option<&Path>) -> crate::Result<E
     let (original, secret) = read_truth::<3>(&args.truth)?;
     let unit = original.reveal().unit();
     let thresholds = thresholds(args, unit);
-    let recovered = read_recovered_in::<3>(&args.recovered, unit)?;
+    let recovered = read_recovered::<3>(&args.recovered, Some(unit))?;
     let about = recovered.about();
     same_map(&args.recovered, about.map, &args.truth, secret.map())?;
     let released = released.map(|path| {

@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
-use std::fmt::Write;
+use std::fmt::{Display, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -36,7 +36,6 @@ const STEPS_AT_A_TIME: u64 = 1000;
 const LEAST_STEPS: u64 = 1_000_000;
 const STEPS_PER_BYTE: u64 = 4;
 
-/// An open database, with image ids by name.
 pub(crate) struct Database {
     path: PathBuf,
     // A connection cannot be used by two threads at once.
@@ -71,7 +70,7 @@ impl Database {
         Ok(Self { path, connection, image_ids, names, has_type, steps })
     }
 
-    fn error(&self, name: &[u8], expected: impl Into<String>, found: impl Into<String>) -> Error {
+    fn error(&self, name: &[u8], expected: impl Display, found: impl Display) -> Error {
         Error::new(&self.path, format!("image {}", quoted(name)), expected, found)
     }
 
@@ -133,9 +132,7 @@ impl Database {
     ) -> Result<Option<T>, Error> {
         let connection = self.connection.lock().unwrap_or_else(PoisonError::into_inner);
         self.steps.store(0, Relaxed);
-        let statement = connection.prepare(query);
-        let found =
-            statement.and_then(|mut statement| statement.query_row([image_id], read).optional());
+        let found = connection.query_row(query, [image_id], read).optional();
         found.map_err(|error| refuse(&self.path, place, &error))
     }
 
@@ -166,7 +163,7 @@ impl Database {
         }
         if let Some(bad) = values.iter().position(|value| !value.is_finite()) {
             let expected = format!("a finite number in keypoint {}", bad / columns);
-            return Err(self.error(name, expected, values[bad].to_string()));
+            return Err(self.error(name, expected, values[bad]));
         }
         let mut image = ImageFeatures { name: self.names[at].clone(), size, ..Default::default() };
         // COLMAP places the center of the first pixel at (0.5, 0.5).
@@ -178,8 +175,7 @@ impl Database {
         }
         if let Some(rows) = descriptors {
             if rows.n != n {
-                let expected = format!("{n} descriptors, one per keypoint");
-                return Err(self.error(name, expected, rows.n.to_string()));
+                return Err(self.error(name, format!("{n} descriptors, one per keypoint"), rows.n));
             }
             let wrong = |error: unlift::Error| self.error(name, error.expected(), error.found());
             let descriptors = Descriptors::try_new(rows.values, rows.dim).map_err(wrong)?;
@@ -214,7 +210,7 @@ fn confine(
     for (setting, value) in settings {
         connection.set_db_config(setting, value)?;
     }
-    let most = i32::try_from(budget.most()).unwrap_or(i32::MAX);
+    let most = i32::try_from(budget.most).unwrap_or(i32::MAX);
     connection.set_limit(Limit::SQLITE_LIMIT_LENGTH, most)?;
     connection.set_limit(Limit::SQLITE_LIMIT_ATTACHED, 0)?;
     let (steps, most) =
@@ -228,10 +224,8 @@ fn check_table(connection: &Connection, path: &Path, table: &str) -> Result<(), 
                  AND type IN ('table', 'view')";
     let place = format!("table {table}");
     let found: Option<(String, i64)> = connection
-        .prepare(query)
-        .and_then(|mut statement| {
-            statement.query_row([table], |row| Ok((row.get(0)?, row.get(1)?))).optional()
-        })
+        .query_row(query, [table], |row| Ok((row.get(0)?, row.get(1)?)))
+        .optional()
         .map_err(|e| refuse(path, &place, &e))?;
     match found {
         Some((kind, _)) if kind == "view" => Err(Error::new(path, place, "a table", "a view")),
@@ -247,15 +241,14 @@ fn image_ids(
 ) -> Result<Vec<(Vec<u8>, i64)>, Error> {
     let failed = |e: rusqlite::Error| refuse(path, "table images", &e);
     let mut statement = connection.prepare("SELECT image_id, name FROM images").map_err(failed)?;
-    let mut rows = statement.query([]).map_err(failed)?;
+    let read = |row: &Row<'_>| Ok((row.get_ref(1)?.as_bytes()?.to_vec(), row.get(0)?));
     let (mut image_ids, mut bytes) = (BTreeMap::new(), 0);
-    while let Some(row) = rows.next().map_err(failed)? {
-        let name = row.get_ref(1).map_err(failed)?;
-        let name = name.as_bytes().map_err(|e| failed(e.into()))?;
+    for image in statement.query_map([], read).map_err(failed)? {
+        let (name, id) = image.map_err(failed)?;
         // Names of a computed column are stored nowhere, so the file size does not limit them.
         bytes += 64 + name.len() as u64;
         budget.admit("table images", bytes)?;
-        image_ids.insert(name.to_vec(), row.get(0).map_err(failed)?);
+        image_ids.insert(name, id);
     }
     Ok(image_ids.into_iter().collect())
 }

@@ -2,13 +2,14 @@
 //! feature.
 
 use std::collections::BTreeSet;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use half::f16;
 use hdf5_pure::{
-    AttrValue, DType, Dataset, Datatype, DatatypeByteOrder, File, FileAccessProperties,
-    FileCreateProperties, FileLocking, FloatingPointLayout, Group, MemoryStrategy,
-    MetadataCacheConfig, ReadSeekSource, SyncPolicy,
+    AttrValue, Dataset, Datatype, DatatypeByteOrder, File, FileAccessProperties,
+    FileCreateProperties, FileLocking, FixedPointLayout, FloatingPointLayout, Group,
+    MemoryStrategy, MetadataCacheConfig, ReadSeekSource, SyncPolicy,
 };
 use unlift::Descriptors;
 use unlift::descriptors::Values;
@@ -22,12 +23,10 @@ use crate::read::lines::quoted;
 use crate::read::npy::tuple;
 use unlift::guard::caught;
 
-/// Groups with arrays, by their paths.
 type Groups = Vec<(String, Group)>;
 
 /// Bytes of headers that are kept, because a header is read in a dozen pieces.
 const CACHE: usize = 1 << 20;
-/// What a file of features has.
 const GROUPS: &str = "a group per image with keypoints and descriptors";
 const KEYPOINTS: &str = "keypoints";
 /// An attribute of `keypoints`: 1 if they are in pixels of upright photos, else 0.
@@ -55,13 +54,9 @@ impl Hloc {
             let found = "one that its writer did not close (h5clear -s FILE)";
             return Err(Error::new(path, "", "a whole HDF5 file", found));
         }
-        let mut all = Self {
-            path: path.to_owned(),
-            budget: Budget::new(path, len),
-            names: Vec::new(),
-            groups: Vec::new(),
-            broken: Vec::new(),
-        };
+        let budget = Budget::new(path, len);
+        let (names, groups, broken) = Default::default();
+        let mut all = Self { path: path.to_owned(), budget, names, groups, broken };
         let (mut groups, broken) = all.step("", || all.list(len))?;
         groups.sort_unstable_by(|(a, _), (b, _)| a.cmp(b));
         (all.names, all.groups) = groups.into_iter().unzip();
@@ -81,9 +76,8 @@ impl Hloc {
     /// Lists all groups of the file of `len` bytes that contain arrays directly, and errors about
     /// broken links.
     fn list(&self, len: u64) -> Result<(Groups, Vec<Error>), Error> {
-        let wrong = |error: hdf5_pure::Error| {
-            Error::new(&self.path, "", "a whole HDF5 file", error.to_string())
-        };
+        let wrong =
+            |error: hdf5_pure::Error| Error::new(&self.path, "", "a whole HDF5 file", error);
         let wrong_image = |name: &str, found: String| {
             Error::new(&self.path, place(name), "features of an image", found)
         };
@@ -116,11 +110,9 @@ impl Hloc {
             let links = address.and_then(|at| links(&raw, at)).unwrap_or_default();
             for (name, target) in &links {
                 if let Target::Unlistable(to) = target {
-                    let found = format!(
-                        "a link to {} in the old form (write it with libver=\"latest\" of h5py)",
-                        quoted(to.as_bytes())
-                    );
-                    return Err(wrong_image(&within(name), found));
+                    let to = quoted(to.as_bytes());
+                    let way_out = "in the old form (write it with libver=\"latest\" of h5py)";
+                    return Err(wrong_image(&within(name), format!("a link to {to} {way_out}")));
                 }
             }
             let arrays = group.datasets().map_err(refuse)?;
@@ -165,7 +157,7 @@ impl Hloc {
     }
 
     fn unreadable(&self, place: &str, error: hdf5_pure::Error) -> Error {
-        Error::new(&self.path, place, "readable HDF5", error.to_string())
+        Error::new(&self.path, place, "readable HDF5", error)
     }
 
     pub fn is_upright(&self) -> bool {
@@ -182,30 +174,27 @@ impl Hloc {
     fn image(&self, at: usize) -> Result<ImageFeatures, Error> {
         let present = self.arrays(at)?;
         let has = |array: &str| present.iter().any(|name| name == array);
-        let optional = |array: &str| has(array).then(|| self.array(at, array)).transpose();
-        let wrong = |array: &'static str| {
-            move |(expected, found): Wrong| Error::new(&self.path, array, expected, found)
-        };
+        let optional = |array: &'static str| has(array).then(|| self.array(at, array)).transpose();
         let Some(places) = optional(KEYPOINTS)? else {
             let found = format!("only {}", present.join(", "));
             return Err(Error::new(&self.path, "", "an array keypoints", found));
         };
-        let keypoints = keypoints(&places).map_err(wrong(KEYPOINTS))?;
+        let keypoints = keypoints(&places)?;
         let n = keypoints.len();
         let per_keypoint = |array: &'static str| -> Result<Option<Vec<f32>>, Error> {
-            let Some(Array { shape, values }) = optional(array)? else { return Ok(None) };
-            if shape != [n as u64] && shape != [n as u64, 1] {
+            let Some(array) = optional(array)? else { return Ok(None) };
+            if array.shape != [n as u64] && array.shape != [n as u64, 1] {
                 let expected = format!("one value per keypoint, ({n},)");
-                return Err(wrong(array)((expected, tuple(&shape))));
+                return Err(array.wrong(expected, tuple(&array.shape)));
             }
-            Ok(Some(values.to_f64().into_iter().map(|value| value as f32).collect()))
+            Ok(Some(array.values.into_iter().map(|value| value as f32).collect()))
         };
-        let descriptors = optional("descriptors")?.map(|array| descriptors(array, n));
+        let descriptors = optional("descriptors")?.map(|array| descriptors(&array, n));
         let size = optional("image_size")?.map(|array| size(&array));
         Ok(ImageFeatures {
             name: self.names[at].clone(),
-            size: size.transpose().map_err(wrong("image_size"))?,
-            descriptors: descriptors.transpose().map_err(wrong("descriptors"))?,
+            size: size.transpose()?,
+            descriptors: descriptors.transpose()?,
             scores: per_keypoint("scores")?,
             scales: per_keypoint("scales")?,
             orientations_deg: per_keypoint("oris")?,
@@ -224,7 +213,7 @@ impl Hloc {
         Ok(names)
     }
 
-    fn array(&self, at: usize, name: &str) -> Result<Array, Error> {
+    fn array(&self, at: usize, name: &'static str) -> Result<Array<'_>, Error> {
         self.step(name, || {
             let refuse = |error| self.unreadable(name, error);
             let dataset = self.groups[at].dataset(name).map_err(refuse)?;
@@ -232,15 +221,15 @@ impl Hloc {
             let count = shape.iter().fold(1u64, |n, &side| n.saturating_mul(side));
             // A header can declare any size. Values are widened to eight bytes at most.
             self.budget.admit(name, count.saturating_mul(8))?;
-            let Some(values) = numbers(&dataset, count).map_err(refuse)? else {
+            let datatype = dataset.datatype().map_err(refuse)?;
+            let Some(values) = numbers(&dataset, &datatype, count).map_err(refuse)? else {
                 let expected = "floats of 16, 32 or 64 bits, or integers";
                 return Err(Error::new(&self.path, name, expected, "another type"));
             };
-            Ok(Array { shape, values })
+            Ok(Array { path: &self.path, name, shape, datatype, values })
         })
     }
 
-    /// Returns an attribute of the keypoints of image `at`.
     fn attribute(&self, at: usize, key: &str) -> Result<Option<f64>, Error> {
         self.step(KEYPOINTS, || {
             let dataset = self.groups[at].dataset(KEYPOINTS);
@@ -256,25 +245,17 @@ fn place(image: &str) -> String {
     if image.is_empty() { String::new() } else { format!("image {}", quoted(image.as_bytes())) }
 }
 
-/// The values of an array, row-major.
-enum Numbers {
-    Bytes(Vec<u8>),
-    Floats(Vec<f64>),
-    /// Other integers.
-    Whole(Vec<f64>),
-}
-
-struct Array {
+struct Array<'a> {
+    path: &'a Path,
+    name: &'static str,
     shape: Vec<u64>,
-    values: Numbers,
+    datatype: Datatype,
+    values: Vec<f64>,
 }
 
-impl Numbers {
-    fn to_f64(&self) -> Vec<f64> {
-        match self {
-            Self::Bytes(values) => values.iter().map(|&x| f64::from(x)).collect(),
-            Self::Floats(values) | Self::Whole(values) => values.clone(),
-        }
+impl Array<'_> {
+    fn wrong(&self, expected: impl Display, found: impl Display) -> Error {
+        Error::new(self.path, self.name, expected, found)
     }
 }
 
@@ -290,31 +271,24 @@ const HALF: FloatingPointLayout = FloatingPointLayout {
 };
 
 /// Reads `count` floats of 16, 32 or 64 bits, or integers. Returns `None` for other types.
-fn numbers(dataset: &Dataset, count: u64) -> Result<Option<Numbers>, hdf5_pure::Error> {
-    let dtype = dataset.dtype()?;
-    Ok(Some(match dtype {
-        DType::U8 if count == 0 => Numbers::Bytes(Vec::new()),
-        _ if count == 0 => Numbers::Floats(Vec::new()),
-        DType::F32 => Numbers::Floats(dataset.read_f32()?.into_iter().map(f64::from).collect()),
-        DType::F64 => Numbers::Floats(dataset.read_f64()?),
-        DType::U8 => Numbers::Bytes(dataset.read_u8()?),
-        DType::I8 | DType::I16 | DType::I32 | DType::I64 | DType::U16 | DType::U32 | DType::U64 => {
-            Numbers::Whole(dataset.read_i64()?.into_iter().map(|x| x as f64).collect())
+fn numbers(
+    dataset: &Dataset,
+    datatype: &Datatype,
+    count: u64,
+) -> Result<Option<Vec<f64>>, hdf5_pure::Error> {
+    use Datatype::{FixedPoint, FloatingPoint};
+    use DatatypeByteOrder::{BigEndian, LittleEndian};
+    let half = match datatype {
+        _ if count == 0 => return Ok(Some(Vec::new())),
+        FixedPoint { size: 1 | 2 | 4 | 8, .. } | FloatingPoint { size: 4 | 8, .. } => {
+            return dataset.read_f64().map(Some);
         }
-        _ => {
-            let order = match dataset.datatype()? {
-                Datatype::FloatingPoint { size: 2, byte_order, layout: HALF } => byte_order,
-                _ => return Ok(None),
-            };
-            let from = match order {
-                DatatypeByteOrder::LittleEndian => f16::from_le_bytes,
-                DatatypeByteOrder::BigEndian => f16::from_be_bytes,
-                _ => return Ok(None),
-            };
-            let bytes = dataset.read_raw()?;
-            Numbers::Floats(bytes.as_chunks().0.iter().map(|&half| from(half).to_f64()).collect())
-        }
-    }))
+        FloatingPoint { size: 2, byte_order: LittleEndian, layout: HALF } => f16::from_le_bytes,
+        FloatingPoint { size: 2, byte_order: BigEndian, layout: HALF } => f16::from_be_bytes,
+        _ => return Ok(None),
+    };
+    let bytes = dataset.read_raw()?;
+    Ok(Some(bytes.as_chunks().0.iter().map(|&bytes| half(bytes).to_f64()).collect()))
 }
 
 fn transposed<T: Copy>(values: &[T], rows: usize) -> Vec<T> {
@@ -326,31 +300,28 @@ fn transposed<T: Copy>(values: &[T], rows: usize) -> Vec<T> {
     transposed
 }
 
-/// The expected and the found value.
-type Wrong = (String, String);
-
 /// Columns after x and y are ignored.
-fn keypoints(array: &Array) -> Result<Vec<[f64; 2]>, Wrong> {
+fn keypoints(array: &Array<'_>) -> Result<Vec<[f64; 2]>, Error> {
     let columns = match array.shape[..] {
         [_, columns] if columns >= 2 => columns as usize,
         // Some exporters write an image without keypoints like this.
         [0] | [0, _] | [2, 0] => return Ok(Vec::new()),
-        _ => return Err(("shape (N, 2)".to_owned(), tuple(&array.shape))),
+        _ => return Err(array.wrong("shape (N, 2)", tuple(&array.shape))),
     };
-    let values = array.values.to_f64();
-    let rows: Vec<[f64; 2]> = values.chunks_exact(columns).map(|row| [row[0], row[1]]).collect();
+    let rows = array.values.chunks_exact(columns);
+    let rows: Vec<[f64; 2]> = rows.map(|row| [row[0], row[1]]).collect();
     match rows.iter().position(|row| !row.iter().all(|value| value.is_finite())) {
         None => Ok(rows),
-        Some(at) => Err((
-            format!("finite coordinates in row {at}"),
-            format!("({}, {})", rows[at][0], rows[at][1]),
-        )),
+        Some(at) => {
+            let found = format!("({}, {})", rows[at][0], rows[at][1]);
+            Err(array.wrong(format!("finite coordinates in row {at}"), found))
+        }
     }
 }
 
 /// Converts a `(D, N)` array to rows of `D` values. A square array is `(N, D)` if its rows, but not its columns, have equal norms.
-fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
-    let expected = || format!("shape (D, N) with N = {n}, one column per keypoint");
+fn descriptors(array: &Array<'_>, n: usize) -> Result<Descriptors, Error> {
+    let expected = format!("shape (D, N) with N = {n}, one column per keypoint");
     let dim = match array.shape[..] {
         ref sides if n == 0 && sides.contains(&0) => {
             sides.iter().copied().max().unwrap_or(0).max(1) as usize
@@ -358,29 +329,28 @@ fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
         [dim, count] if count == n as u64 && dim > 0 => dim as usize,
         [count, _] if count == n as u64 => {
             let found = format!("{}, rows and columns exchanged", tuple(&array.shape));
-            return Err((expected(), found));
+            return Err(array.wrong(expected, found));
         }
-        _ => return Err((expected(), tuple(&array.shape))),
+        _ => return Err(array.wrong(expected, tuple(&array.shape))),
     };
-    let is_rows = dim == n && has_equal_rows(&array.values.to_f64(), n);
+    let is_rows = dim == n && has_equal_rows(&array.values, n);
     // Transposing a matrix of one row changes nothing.
-    let sides = if is_rows { 1 } else { dim };
-    let values = match array.values {
-        Numbers::Bytes(bytes) => Values::U8(transposed(&bytes, sides)),
-        Numbers::Floats(values) => {
-            let values: Vec<f32> = values.into_iter().map(|value| value as f32).collect();
-            Values::F32(transposed(&values, sides))
+    let rows = transposed(&array.values, if is_rows { 1 } else { dim }).into_iter();
+    let values = match array.datatype {
+        Datatype::FixedPoint {
+            size: 1, layout: FixedPointLayout { signed: false, .. }, ..
+        } => Values::U8(rows.map(|value| value as u8).collect()),
+        Datatype::FixedPoint { .. } if !array.values.is_empty() => {
+            return Err(array.wrong("floats, or unsigned bytes", "other integers"));
         }
-        Numbers::Whole(_) => {
-            return Err(("floats, or unsigned bytes".to_owned(), "other integers".to_owned()));
-        }
+        _ => Values::F32(rows.map(|value| value as f32).collect()),
     };
     Descriptors::try_new(values, dim).map_err(|error| {
         let found = match error.what() {
             "descriptors" => error.found().to_owned(),
             place => format!("{} ({place})", error.found()),
         };
-        (error.expected().to_owned(), found)
+        array.wrong(error.expected(), found)
     })
 }
 
@@ -395,8 +365,8 @@ fn has_equal_rows(values: &[f64], n: usize) -> bool {
     spread(&|i, j| i * n + j) < 0.01 && spread(&|i, j| j * n + i) > 0.01
 }
 
-fn size(array: &Array) -> Result<[u32; 2], Wrong> {
-    let sides = array.values.to_f64();
+fn size(array: &Array<'_>) -> Result<[u32; 2], Error> {
+    let sides = &array.values;
     let side = |value: f64| {
         let whole = (1.0..=f64::from(u32::MAX)).contains(&value) && value.fract() == 0.0;
         whole.then_some(value as u32)
@@ -410,7 +380,7 @@ fn size(array: &Array) -> Result<[u32; 2], Wrong> {
             2 => format!("{} and {}", sides[0], sides[1]),
             _ => tuple(&array.shape),
         };
-        ("width and height in pixels".to_owned(), found)
+        array.wrong("width and height in pixels", found)
     })
 }
 
@@ -453,7 +423,7 @@ impl FeatureWriter {
             .with_locking(FileLocking::Disabled)
             .with_memory_strategy(MemoryStrategy::Bounded)
             .with_sync_policy(SyncPolicy::OnClose);
-        let file = File::create_with_options(output.partial(), FileCreateProperties::new(), access);
+        let file = File::create_with_options(&output.partial, FileCreateProperties::new(), access);
         let file = file.and_then(|file| {
             file.root().set_attr(WRITER, AttrValue::AsciiString("unlift".to_owned()))?;
             Ok(file)
@@ -471,17 +441,16 @@ impl FeatureWriter {
     pub fn check(&self, image: &ImageFeatures) -> Result<(), Error> {
         let name = &image.name;
         let place = format!("image {}", quoted(name.as_bytes()));
-        let wrong = |expected: &str, found: String| {
-            Err(Error::new(self.output.path(), &*place, expected, found))
+        let wrong = |expected: &str, found: &dyn Display| {
+            Err(Error::new(&self.output.path, &*place, expected, found))
         };
         let parts = || name.split('/');
         if parts().any(|part| matches!(part, "" | "." | "..") || part.contains('\0')) {
-            let expected = "a name whose parts are not empty, . or ..";
-            return wrong(expected, quoted(name.as_bytes()));
+            return wrong("a name whose parts are not empty, . or ..", &quoted(name.as_bytes()));
         }
         let depth = parts().count();
         if depth > MAX_DEPTH {
-            return wrong(&format!("a name of at most {MAX_DEPTH} parts"), depth.to_string());
+            return wrong(&format!("a name of at most {MAX_DEPTH} parts"), &depth);
         }
         let n = image.keypoints.len();
         let lengths = [
@@ -495,14 +464,14 @@ impl FeatureWriter {
         {
             let place = format!("{place}, {array}");
             let expected = format!("{n}, one per keypoint");
-            return Err(Error::new(self.output.path(), place, expected, len.to_string()));
+            return Err(Error::new(&self.output.path, place, expected, len));
         }
         if self.images.contains(name)
             || self.folders.contains(name)
             || folders(name).any(|folder| self.images.contains(folder))
         {
             let found = "one that exists already, or contains or is inside another image";
-            return wrong("a new name", found.to_owned());
+            return wrong("a new name", &found);
         }
         Ok(())
     }
@@ -513,7 +482,7 @@ impl FeatureWriter {
     /// When [`check`](Self::check) fails.
     pub fn append(&mut self, image: &ImageFeatures) -> Result<(), Error> {
         self.check(image)?;
-        self.stage(image).map_err(|error| failed(self.output.path(), error))
+        self.stage(image).map_err(|error| failed(&self.output.path, error))
     }
 
     fn stage(&mut self, image: &ImageFeatures) -> Result<(), hdf5_pure::Error> {
@@ -550,8 +519,7 @@ impl FeatureWriter {
     /// Moves the file to its place. If that fails, no temporary file is left.
     pub fn finish(self) -> Result<(), Error> {
         let Self { output, file, .. } = self;
-        let written = file.commit().and_then(|()| file.close());
-        written.map_err(|error| failed(output.path(), error))?;
+        file.commit().and_then(|()| file.close()).map_err(|error| failed(&output.path, error))?;
         output.commit()
     }
 }
@@ -572,7 +540,6 @@ fn folders(name: &str) -> impl Iterator<Item = &str> {
 /// The name, the shape, the type and the bytes of an array to write.
 type Column = (&'static str, Vec<u64>, Datatype, Vec<u8>);
 
-/// The arrays of an image, in hloc's types.
 fn columns(image: &ImageFeatures) -> Vec<Column> {
     let n = image.keypoints.len() as u64;
     let floats = |values: &[f32]| values.iter().flat_map(|x| x.to_le_bytes()).collect();
@@ -582,18 +549,13 @@ fn columns(image: &ImageFeatures) -> Vec<Column> {
     if let Some(rows) = &image.descriptors {
         let (datatype, bytes) = match rows.values() {
             Values::U8(values) => (hdf5_pure::make_u8_type(), transposed(values, rows.len())),
-            Values::F32(values) => match halves(values) {
-                Some(halves) => {
-                    let half = Datatype::FloatingPoint {
-                        size: 2,
-                        byte_order: DatatypeByteOrder::LittleEndian,
-                        layout: HALF,
-                    };
-                    let halves = transposed(&halves, rows.len());
-                    (half, halves.iter().flat_map(|x| x.to_le_bytes()).collect())
-                }
-                None => (single(), floats(&transposed(values, rows.len()))),
-            },
+            Values::F32(values) => {
+                let values = transposed(values, rows.len());
+                let byte_order = DatatypeByteOrder::LittleEndian;
+                let half = Datatype::FloatingPoint { size: 2, byte_order, layout: HALF };
+                let halves = halves(&values).map(|halves| (half, halves));
+                halves.unwrap_or_else(|| (single(), floats(&values)))
+            }
         };
         columns.push(("descriptors", vec![rows.dim() as u64, n], datatype, bytes));
     }
@@ -609,10 +571,12 @@ fn columns(image: &ImageFeatures) -> Vec<Column> {
     columns
 }
 
-/// Converts `values` to half floats, as hloc stores descriptors of networks, if all are exact.
-fn halves(values: &[f32]) -> Option<Vec<f16>> {
+/// Returns the bytes of `values` as half floats, as hloc stores descriptors of networks, if all are
+/// exact.
+fn halves(values: &[f32]) -> Option<Vec<u8>> {
     let exact = |&value: &f32| Some(f16::from_f32(value)).filter(|half| half.to_f32() == value);
-    values.iter().map(exact).collect()
+    let halves: Vec<f16> = values.iter().map(exact).collect::<Option<_>>()?;
+    Some(halves.into_iter().flat_map(f16::to_le_bytes).collect())
 }
 
 #[cfg(test)]
@@ -628,9 +592,10 @@ mod tests {
             row.iter_mut().for_each(|x| *x /= norm);
         }
         let read = |values: Vec<f32>| {
-            let values = Numbers::Floats(values.into_iter().map(f64::from).collect());
-            let array = Array { shape: vec![N as u64; 2], values };
-            descriptors(array, N).unwrap().values().clone()
+            let values = values.into_iter().map(f64::from).collect();
+            let (path, name, datatype) = (Path::new(""), "", hdf5_pure::make_f32_type());
+            let array = Array { path, name, shape: vec![N as u64; 2], datatype, values };
+            descriptors(&array, N).unwrap().values().clone()
         };
         assert_eq!(read(transposed(&rows, N)), Values::F32(rows.clone()));
         assert_eq!(read(rows.clone()), Values::F32(rows));

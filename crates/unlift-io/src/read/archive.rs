@@ -16,12 +16,11 @@ use unlift::guard::caught;
 /// A reader of an array, which checks its checksum.
 pub(crate) type ArrayBytes<'a> = Bytes<ZipFile<'a, BufReader<File>>>;
 
-/// An open NumPy archive.
-#[derive(Debug)]
 pub(crate) struct Archive {
     path: PathBuf,
     zip: ZipArchive<BufReader<File>>,
-    budget: Budget,
+    /// The memory that decoding may use.
+    pub budget: Budget,
 }
 
 impl Archive {
@@ -30,26 +29,20 @@ impl Archive {
         let (file, len) = input::open(path)?;
         let mut file = BufReader::new(file);
         let head = file.fill_buf().map_err(|source| Error::read(path, source))?;
-        let found = match head.get(..4).unwrap_or(head) {
-            b"" => "an empty file",
-            b"PAR1" => "a Parquet file, as earlier versions wrote",
-            head if head.starts_with(b"PK") => "",
-            _ => "another file",
+        let another = match head.get(..4).unwrap_or(head) {
+            b"" => Some("an empty file"),
+            b"PAR1" => Some("a Parquet file, as earlier versions wrote"),
+            head if head.starts_with(b"PK") => None,
+            _ => Some("another file"),
         };
-        let wrong =
-            |found: String| Error::new(path, "", "an archive of NumPy arrays (.npz)", found);
-        if !found.is_empty() {
-            return Err(wrong(found.to_owned()));
+        let expected = "an archive of NumPy arrays (.npz)";
+        if let Some(found) = another {
+            return Err(Error::new(path, "", expected, found));
         }
         let zip = caught(|| ZipArchive::new(file)).ok();
         let zip = zip.unwrap_or(Err(ZipError::InvalidArchive("a damaged one".into())));
-        let zip = zip.map_err(|error| wrong(cause(error)))?;
+        let zip = zip.map_err(|error| Error::new(path, "", expected, cause(error)))?;
         Ok(Self { path: path.to_owned(), zip, budget: Budget::new(path, len) })
-    }
-
-    /// The memory that decoding may use.
-    pub fn budget(&self) -> &Budget {
-        &self.budget
     }
 
     /// Returns index and name of each array, in the order of the archive.

@@ -11,7 +11,7 @@ use std::path::Path;
 use unlift::geometry::camera::{Intrinsics, Pose};
 
 use super::bytes::Bytes;
-use super::lines::{Lines, coordinates, number, quoted, words};
+use super::lines::{Lines, coordinates, next, number, quoted, words};
 use super::map_input::pose_of;
 use crate::error::Error;
 
@@ -49,18 +49,6 @@ pub const CAMERA_MODELS: [CameraModel; 18] = [
     model("EUCM", 6),
     model("EQUIRECTANGULAR", 2),
 ];
-
-impl CameraModel {
-    /// Returns the model with this id.
-    pub fn from_id(id: i32) -> Option<&'static Self> {
-        CAMERA_MODELS.get(usize::try_from(id).ok()?)
-    }
-
-    /// Returns the model with this name.
-    pub fn from_name(name: &[u8]) -> Option<&'static Self> {
-        CAMERA_MODELS.iter().find(|m| m.name.as_bytes() == name)
-    }
-}
 
 /// A camera, shared by any number of images.
 #[derive(Clone, Debug, PartialEq)]
@@ -113,10 +101,8 @@ pub struct Image {
 impl Image {
     /// Finds the camera of this image in `cameras`, which are sorted by id.
     pub fn camera<'a>(&self, cameras: &'a [Camera]) -> Option<&'a Camera> {
-        cameras
-            .binary_search_by_key(&self.camera_id, |camera| camera.id)
-            .ok()
-            .map(|at| &cameras[at])
+        let at = cameras.binary_search_by_key(&self.camera_id, |camera| camera.id);
+        Some(&cameras[at.ok()?])
     }
 
     /// The unit vector in the world that points up in the photo.
@@ -218,15 +204,13 @@ pub fn read_views(model: &Path) -> Result<(Vec<Camera>, Vec<Image>), Error> {
     let path = model.join(format!("images.{extension}"));
     let images = read_images(&path)?;
     for image in &images {
-        let wrong = |expected: String, found| {
-            Err(Error::new(&path, format!("image {}", image.id), expected, found))
-        };
+        let place = format!("image {}", image.id);
         if image.camera(&cameras).is_none() {
             let expected = format!("the id of a camera in cameras.{extension}");
-            return wrong(expected, image.camera_id.to_string());
+            return Err(Error::new(path, place, expected, image.camera_id));
         }
         if image.pose.center.iter().any(|x| !x.is_finite()) {
-            return wrong("a finite pose".to_owned(), "none".to_owned());
+            return Err(Error::new(path, place, "a finite pose", "none"));
         }
     }
     Ok((cameras, images))
@@ -238,12 +222,8 @@ pub fn read_views(model: &Path) -> Result<(Vec<Camera>, Vec<Image>), Error> {
 /// # Errors
 /// When the file is malformed or repeats an id.
 pub fn read_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
-    let points = if is_text(path) {
-        text_points(path, with_tracks)?
-    } else {
-        binary_points(path, with_tracks)?
-    };
-    let points = sorted(points);
+    let read = if is_text(path) { text_points } else { binary_points };
+    let points = sorted(read(path, with_tracks)?);
     refuse_repeated(path, "point", points.ids.iter().copied())?;
     Ok(points)
 }
@@ -296,9 +276,10 @@ fn binary_cameras(path: &Path) -> Result<Vec<Camera>, Error> {
         bytes.record(number);
         let id = bytes.u32("camera id")?;
         let model_id = bytes.i32("camera model")?;
-        let Some(model) = CameraModel::from_id(model_id) else {
+        let model = usize::try_from(model_id).ok().and_then(|id| CAMERA_MODELS.get(id));
+        let Some(model) = model else {
             let expected = format!("a camera model of COLMAP (0 to 17) for camera {id}");
-            return Err(bytes.error(expected, model_id.to_string()));
+            return Err(bytes.error(expected, model_id));
         };
         let width_px = bytes.u64("width")?;
         let height_px = bytes.u64("height")?;
@@ -319,8 +300,7 @@ fn binary_images(path: &Path) -> Result<Vec<Image>, Error> {
         bytes.record(number);
         let id = bytes.u32("image id")?;
         let rotation = bytes.doubles("rotation")?;
-        let translation = bytes.doubles("translation")?;
-        let pose = pose_of(rotation, translation);
+        let pose = pose_of(rotation, bytes.doubles("translation")?);
         let camera_id = bytes.u32("camera id")?;
         let name = bytes.zero_terminated("image name")?;
         let n_points2d = bytes.count("2D points", POINT2D_BYTES)?;
@@ -333,11 +313,10 @@ fn binary_images(path: &Path) -> Result<Vec<Image>, Error> {
 
 fn binary_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
     let mut bytes = Bytes::open(path)?;
-    let n = bytes.count("points", POINT3D_BYTES)? as usize;
-    let mut ids = Vec::with_capacity(n);
-    let mut positions = Vec::with_capacity(n);
+    let n = bytes.count("points", POINT3D_BYTES)?;
+    let (mut ids, mut positions) = (Vec::with_capacity(n as usize), Vec::with_capacity(n as usize));
     let mut tracks = with_tracks.then(Tracks::new);
-    for number in 1..=n as u64 {
+    for number in 1..=n {
         bytes.record(number);
         let id = bytes.u64("point id")?;
         let position = bytes.doubles::<3>("coordinates")?;
@@ -360,34 +339,25 @@ fn binary_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
     Ok(Points { ids, positions, tracks })
 }
 
-fn next<'a, T: std::str::FromStr>(
-    lines: &Lines,
-    words: &mut impl Iterator<Item = &'a [u8]>,
-    what: &str,
-) -> Result<T, Error> {
-    let word = words.next().ok_or_else(|| lines.error(what, "end of line"))?;
-    number(word).ok_or_else(|| lines.error(what, quoted(word)))
-}
-
 fn text_cameras(path: &Path) -> Result<Vec<Camera>, Error> {
     let mut lines = Lines::open(path)?;
     let mut cameras = Vec::new();
     while lines.advance_to_data()? {
         let mut words = words(lines.line());
-        let id = next(&lines, &mut words, "a camera id")?;
+        let id = next(&lines, &mut words, "a camera id", number)?;
         let name = words.next().unwrap_or_default();
-        let Some(model) = CameraModel::from_name(name) else {
+        let Some(model) = CAMERA_MODELS.iter().find(|known| known.name.as_bytes() == name) else {
             let expected = format!("a camera model of COLMAP for camera {id}");
             return Err(lines.error(expected, quoted(name)));
         };
-        let width_px = next(&lines, &mut words, "a width in pixels")?;
-        let height_px = next(&lines, &mut words, "a height in pixels")?;
+        let width_px = next(&lines, &mut words, "a width in pixels", number)?;
+        let height_px = next(&lines, &mut words, "a height in pixels", number)?;
         let params: Vec<f64> = words
             .map(|word| number(word).ok_or_else(|| lines.error("a parameter", quoted(word))))
             .collect::<Result<_, _>>()?;
         if params.len() != model.n_params {
             let expected = format!("{} parameters of {}", model.n_params, model.name);
-            return Err(lines.error(expected, params.len().to_string()));
+            return Err(lines.error(expected, params.len()));
         }
         cameras.push(Camera { id, model, width_px, height_px, params });
     }
@@ -399,11 +369,11 @@ fn text_images(path: &Path) -> Result<Vec<Image>, Error> {
     let mut images = Vec::new();
     while lines.advance_to_data()? {
         let mut words = words(lines.line());
-        let id = next(&lines, &mut words, "an image id")?;
+        let id = next(&lines, &mut words, "an image id", number)?;
         let rotation = coordinates(&lines, &mut words, "a rotation (4 numbers)")?;
         let translation = coordinates(&lines, &mut words, "a translation (3 numbers)")?;
         let pose = pose_of(rotation, translation);
-        let camera_id = next(&lines, &mut words, "a camera id")?;
+        let camera_id = next(&lines, &mut words, "a camera id", number)?;
         drop(words);
         let name = after_words(lines.line(), 9).to_vec();
         if name.is_empty() {
@@ -434,14 +404,14 @@ fn text_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
     let mut points = Points { tracks: with_tracks.then(Tracks::new), ..Points::default() };
     while lines.advance_to_data()? {
         let mut words = words(lines.line()).peekable();
-        let id: u64 = next(&lines, &mut words, "a point id")?;
+        let id: u64 = next(&lines, &mut words, "a point id", number)?;
         let position = coordinates::<3>(&lines, &mut words, "3 coordinates")?;
         coordinates::<3>(&lines, &mut words, "a color (3 numbers)")?;
         coordinates::<1>(&lines, &mut words, "a reprojection error")?;
         if let Some(tracks) = &mut points.tracks {
             while words.peek().is_some() {
-                let image_id = next(&lines, &mut words, "an image id")?;
-                let index = next(&lines, &mut words, "the index of a 2D point")?;
+                let image_id = next(&lines, &mut words, "an image id", number)?;
+                let index = next(&lines, &mut words, "the index of a 2D point", number)?;
                 tracks.observations.push((image_id, index));
             }
             tracks.offsets.push(tracks.observations.len());
@@ -456,27 +426,4 @@ fn text_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
         points.positions.push(position);
     }
     Ok(points)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn unsorted_points_are_sorted_with_their_tracks() {
-        let points = Points {
-            ids: vec![7, 2],
-            positions: vec![[7.0; 3], [2.0; 3]],
-            tracks: Some(Tracks {
-                offsets: vec![0, 2, 3],
-                observations: vec![(7, 0), (7, 1), (2, 0)],
-            }),
-        };
-        let sorted = sorted(points);
-        assert_eq!(sorted.ids, [2, 7]);
-        assert_eq!(sorted.positions, [[2.0; 3], [7.0; 3]]);
-        let tracks = sorted.tracks.unwrap();
-        assert_eq!(tracks.row(0), [(2, 0)]);
-        assert_eq!(tracks.row(1), [(7, 0), (7, 1)]);
-    }
 }

@@ -72,11 +72,10 @@ fn binary(path: &Path, input: &Input) -> Result<Descriptors, Error> {
         2 => Scalar::F16,
         3 => Scalar::F32,
         other => {
-            let expected = "type 1 (u8), 2 (float16) or 3 (float32)";
-            return Err(bytes.error(expected, other.to_string()));
+            return Err(bytes.error("type 1 (u8), 2 (float16) or 3 (float32)", other));
         }
     };
-    let row_bytes = u64::from(dim) * scalar.size() as u64;
+    let row_bytes = u64::from(dim) * scalar.size as u64;
     if dim == 0 || n.checked_mul(8 + row_bytes) != Some(bytes.remaining()) {
         let expected = format!("{n} ids and rows of {row_bytes} bytes");
         return Err(bytes.error_ahead(expected, format!("{} bytes", bytes.remaining())));
@@ -89,39 +88,31 @@ fn binary(path: &Path, input: &Input) -> Result<Descriptors, Error> {
             return Err(bytes.error("each id once", format!("id {id} again")));
         }
     }
-    let (dim, row_bytes) = (dim as usize, row_bytes as usize);
+    let row_bytes = row_bytes as usize;
     let mut all = vec![0; n as usize * row_bytes];
     bytes.fill(&mut all, "values")?;
-    let row = |id: &u64| match row_of_id.get(id) {
-        Some(&row) => Ok(&all[row * row_bytes..(row + 1) * row_bytes]),
-        None => {
+    let (mut whole, mut floats) = (Vec::new(), Vec::new());
+    for id in &input.ids {
+        let Some(&row) = row_of_id.get(id) else {
             let found = format!("none among {n}");
-            Err(Error::new(path, format!("point {id}"), "a descriptor", found))
+            return Err(Error::new(path, format!("point {id}"), "a descriptor", found));
+        };
+        let row = &all[row * row_bytes..(row + 1) * row_bytes];
+        if scalar == Scalar::U8 {
+            whole.extend_from_slice(row);
+            continue;
         }
-    };
-    // With more points than rows, the loop ends with an error, so the file limits the memory.
-    let n_values = input.ids.len().min(n as usize) * dim;
-    let values = if scalar == Scalar::U8 {
-        let mut values = Vec::with_capacity(n_values);
-        for id in &input.ids {
-            values.extend_from_slice(row(id)?);
-        }
-        Values::U8(values)
-    } else {
-        let mut values = Vec::with_capacity(n_values);
-        for id in &input.ids {
-            for (at, stored) in row(id)?.chunks_exact(scalar.size()).enumerate() {
-                let value = scalar.read(stored, false);
-                if !value.is_finite() {
-                    let place = format!("point {id}, value {at}");
-                    return Err(Error::new(path, place, "a finite value", value.to_string()));
-                }
-                values.push(value as f32);
+        for (at, stored) in row.chunks_exact(scalar.size).enumerate() {
+            let value = scalar.read(stored, false);
+            if !value.is_finite() {
+                let place = format!("point {id}, value {at}");
+                return Err(Error::new(path, place, "a finite value", value));
             }
+            floats.push(value as f32);
         }
-        Values::F32(values)
-    };
-    Descriptors::try_new(values, dim).map_err(|e| Error::core(path, e))
+    }
+    let values = if scalar == Scalar::U8 { Values::U8(whole) } else { Values::F32(floats) };
+    Descriptors::try_new(values, dim as usize).map_err(|e| Error::core(path, e))
 }
 
 /// L2 norm of the descriptors that COLMAP stores as bytes.
@@ -143,15 +134,15 @@ fn of_database(path: &Path, input: &Input) -> Result<Descriptors, Error> {
 fn of_features(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     let features = FeatureSource::open(path)?;
     mean(path, input, &tracks(path, input)?, |image| {
-        let wrong = |expected: String, found: String| {
-            Error::new(path, format!("image {}", quoted(&image.name)), expected, found)
-        };
+        let place = format!("image {}", quoted(&image.name));
         let at = features.names().binary_search_by(|name| name.as_bytes().cmp(&image.name));
-        let at = at.map_err(|_| wrong("this image of the model".into(), "no such image".into()))?;
+        let Ok(at) = at else {
+            return Err(Error::new(path, place, "this image of the model", "no such image"));
+        };
         let found = features.get(at)?;
         if found.keypoints.len() as u64 != image.n_points2d {
             let expected = format!("{} keypoints, as the model has", image.n_points2d);
-            return Err(wrong(expected, found.keypoints.len().to_string()));
+            return Err(Error::new(path, place, expected, found.keypoints.len()));
         }
         let descriptors = found.described(path)?;
         Ok((descriptors.values().clone(), descriptors.dim()))
@@ -175,13 +166,12 @@ fn tracks(path: &Path, input: &Input) -> Result<(Vec<Image>, Vec<Observation>), 
     let extension = points_path.extension().unwrap_or_default();
     let images = points_path.with_file_name("images").with_extension(extension);
     let images = colmap::read_images(&images)?;
-    let row_of_id: HashMap<u64, usize> = points.ids.iter().copied().zip(0..).collect();
     // Sorted by image, so that one image is in memory at a time, and by id, so that sums of floats
     // are deterministic.
     let mut observations = Vec::new();
     for (out, id) in input.ids.iter().enumerate() {
         let place = || format!("point {id}");
-        let Some(&row) = row_of_id.get(id) else {
+        let Ok(row) = points.ids.binary_search(id) else {
             return Err(Error::new(points_path, place(), "its track", "no such point"));
         };
         let track = tracks.row(row);

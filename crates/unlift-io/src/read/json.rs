@@ -3,11 +3,11 @@
 
 use std::fmt;
 use std::io::{self, BufRead, BufReader, Read};
-use std::marker::PhantomData;
+use std::iter::Peekable;
 use std::path::{Component, Path, PathBuf};
 
 use serde::Deserialize;
-use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde::de::{Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use unlift::geometry::camera::Pose;
 
 use super::map_input::{Input, center};
@@ -25,7 +25,9 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     if file.fill_buf().map_err(|error| Error::read(path, error))?.starts_with(BYTE_ORDER_MARK) {
         file.consume(BYTE_ORDER_MARK.len());
     }
-    let mut json = serde_json::Deserializer::from_reader(Strict::new(file));
+    let bytes = file.bytes().peekable();
+    let strict = Strict { bytes, ahead: b"", in_text: false, is_escaped: false };
+    let mut json = serde_json::Deserializer::from_reader(strict);
     let object = Object::deserialize(&mut json).and_then(|object| json.end().map(|()| object));
     let object = object.map_err(|error| {
         if error.is_io() {
@@ -41,10 +43,9 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     })?;
     let Some(format) = object.format() else {
         let names = object.names.iter().take(5).map(|name| name.escape_debug().to_string());
-        let names: Vec<String> = names.collect();
-        let found = match &names[..] {
-            [] => "JSON without names".to_owned(),
-            names => format!("JSON with {}", names.join(", ")),
+        let found = match object.names.is_empty() {
+            true => "JSON without names".to_owned(),
+            false => format!("JSON with {}", names.collect::<Vec<_>>().join(", ")),
         };
         return Err(Error::new(path, "", MAPS, found));
     };
@@ -65,22 +66,19 @@ pub fn read(path: &Path) -> Result<Input, Error> {
 const MAPS: &str = "a map of OpenSfM or nerfstudio";
 
 /// A reader that replaces `NaN` and `Infinity`, which other programs write, by `null`.
-struct Strict<R> {
-    bytes: io::Bytes<R>,
-    /// The bytes to return next, in reverse order.
-    ahead: Vec<u8>,
+struct Strict<R: Read> {
+    bytes: Peekable<io::Bytes<R>>,
+    /// The bytes to return next.
+    ahead: &'static [u8],
     in_text: bool,
     is_escaped: bool,
 }
 
 impl<R: BufRead> Strict<R> {
-    fn new(from: R) -> Self {
-        Self { bytes: from.bytes(), ahead: Vec::new(), in_text: false, is_escaped: false }
-    }
-
     fn next(&mut self) -> io::Result<Option<u8>> {
-        if let Some(byte) = self.ahead.pop() {
-            return Ok(Some(byte));
+        if let Some((byte, rest)) = self.ahead.split_first() {
+            self.ahead = rest;
+            return Ok(Some(*byte));
         }
         let Some(byte) = self.bytes.next().transpose()? else { return Ok(None) };
         if self.in_text {
@@ -88,25 +86,20 @@ impl<R: BufRead> Strict<R> {
             self.is_escaped = !self.is_escaped && byte == b'\\';
             return Ok(Some(byte));
         }
-        match byte {
-            b'"' => self.in_text = true,
-            // Outside strings, JSON has no such letters.
-            b'N' => return self.no_number(2),
-            b'I' => return self.no_number(7),
-            b'-' => match self.bytes.next().transpose()? {
-                Some(b'I') => return self.no_number(7),
-                other => self.ahead.extend(other),
-            },
-            _ => {}
-        }
-        Ok(Some(byte))
-    }
-
-    fn no_number(&mut self, n: usize) -> io::Result<Option<u8>> {
-        for _ in 0..n {
+        // Outside strings, JSON has no such letters.
+        let n_behind = match byte {
+            b'N' => 2,
+            b'I' => 7,
+            b'-' if matches!(self.bytes.peek(), Some(Ok(b'I'))) => 8,
+            _ => {
+                self.in_text = byte == b'"';
+                return Ok(Some(byte));
+            }
+        };
+        for _ in 0..n_behind {
             self.bytes.next().transpose()?;
         }
-        self.ahead.extend(b"llu");
+        self.ahead = b"ull";
         Ok(Some(b'n'))
     }
 }
@@ -126,8 +119,12 @@ impl<R: BufRead> Read for Strict<R> {
 /// Adds the points of the point cloud that nerfstudio's file names.
 fn with_cloud(path: &Path, input: &mut Input, cloud: Option<PathBuf>) -> Result<(), Error> {
     let Some(cloud) = cloud else {
-        let expected = "ply_file_path, a point cloud beside the cameras";
-        return Err(Error::new(path, "", expected, "none"));
+        return Err(Error::new(
+            path,
+            "",
+            "ply_file_path, a point cloud beside the cameras",
+            "none",
+        ));
     };
     // nerfstudio on Windows writes backslashes.
     let written = cloud.to_string_lossy();
@@ -191,101 +188,95 @@ impl Object {
         (has("shots") && has("points")).then_some("OpenSfM")
     }
 
-    /// Reads the value of the last key in `names`.
-    fn take<'de, A: MapAccess<'de>>(&mut self, json: &mut A) -> Result<(), A::Error> {
-        let Self { names, input, cloud, .. } = self;
-        match names.last().map_or("", String::as_str) {
-            "shots" => json.next_value_seed(Items::new(|Shot { rotation, translation }| {
-                let [x, y, z] = numbers(rotation);
-                let rotation = Pose::IDENTITY.moved(&[x, y, z, 0.0, 0.0, 0.0]).rotation;
-                let up = rotation[1].map(|x| -x);
-                input.camera(Some((center(&rotation, &numbers(translation)), up)));
-            })),
-            "points" => json.next_value_seed(Items::new(|Point { coordinates }| {
-                input.positions.push(numbers(coordinates));
-            })),
-            "frames" => json.next_value_seed(Items::new(|frame: Frame| {
-                let mut rows = frame.transform_matrix.into_iter().map(numbers);
-                let rows: [_; 3] = std::array::from_fn(|_| rows.next().unwrap_or([f64::NAN; 4]));
-                input.camera(Some((rows.map(|row| row[3]), rows.map(|row| row[1]))));
-            })),
-            "ply_file_path" => json.next_value().map(|path| *cloud = path),
-            _ => json.next_value::<IgnoredAny>().map(drop),
+    fn take<'de, A: MapAccess<'de>>(&mut self, name: &str, json: &mut A) -> Result<(), A::Error> {
+        match name {
+            "shots" => {
+                for Shot { rotation, translation } in json.next_value::<Items<_>>()?.0 {
+                    let [x, y, z] = numbers(rotation);
+                    let rotation = Pose::IDENTITY.moved(&[x, y, z, 0.0, 0.0, 0.0]).rotation;
+                    let up = rotation[1].map(|x| -x);
+                    self.input.camera(Some((center(&rotation, &numbers(translation)), up)));
+                }
+            }
+            "points" => {
+                let points = json.next_value::<Items<Point>>()?.0.into_iter();
+                self.input.positions.extend(points.map(|point| numbers(point.coordinates)));
+            }
+            "frames" => {
+                for Frame { transform_matrix } in json.next_value::<Items<_>>()?.0 {
+                    let mut rows = transform_matrix.into_iter().map(numbers);
+                    let rows: [_; 3] =
+                        std::array::from_fn(|_| rows.next().unwrap_or([f64::NAN; 4]));
+                    self.input.camera(Some((rows.map(|row| row[3]), rows.map(|row| row[1]))));
+                }
+            }
+            "ply_file_path" => self.cloud = json.next_value()?,
+            _ => drop(json.next_value::<IgnoredAny>()?),
         }
+        Ok(())
     }
 }
 
 impl<'de> Deserialize<'de> for Object {
     fn deserialize<D: Deserializer<'de>>(json: D) -> Result<Self, D::Error> {
-        json.deserialize_any(Largest)
+        json.deserialize_any(Self::default())
     }
 }
 
-struct Largest;
-
-impl<'de> Visitor<'de> for Largest {
-    type Value = Object;
+impl<'de> Visitor<'de> for Object {
+    type Value = Self;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("an object, or a list of them")
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut json: A) -> Result<Object, A::Error> {
-        let mut object = Object::default();
-        while let Some(name) = json.next_key()? {
-            object.names.push(name);
-            object.take(&mut json)?;
+    fn visit_map<A: MapAccess<'de>>(mut self, mut json: A) -> Result<Self, A::Error> {
+        while let Some(name) = json.next_key::<String>()? {
+            self.take(&name, &mut json)?;
+            self.names.push(name);
         }
-        Ok(object)
+        Ok(self)
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Object, A::Error> {
-        let (mut largest, mut n) = (Object::default(), 0);
-        while let Some(object) = list.next_element::<Object>()? {
+    fn visit_seq<A: SeqAccess<'de>>(mut self, mut list: A) -> Result<Self, A::Error> {
+        let mut n = 0;
+        while let Some(object) = list.next_element::<Self>()? {
             n += 1;
-            if n == 1 || object.input.positions.len() > largest.input.positions.len() {
-                largest = object;
+            if n == 1 || object.input.positions.len() > self.input.positions.len() {
+                self = object;
             }
         }
-        Ok(Object { n, ..largest })
+        Ok(Self { n, ..self })
     }
 }
 
-/// Applies a function to each value of a list or an object.
-struct Items<T, F>(F, PhantomData<T>);
+/// The values of a list or an object.
+struct Items<T>(Vec<T>);
 
-impl<T, F: FnMut(T)> Items<T, F> {
-    fn new(each: F) -> Self {
-        Self(each, PhantomData)
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Items<T> {
+    fn deserialize<D: Deserializer<'de>>(json: D) -> Result<Self, D::Error> {
+        json.deserialize_any(Self(Vec::new()))
     }
 }
 
-impl<'de, T: Deserialize<'de>, F: FnMut(T)> DeserializeSeed<'de> for Items<T, F> {
-    type Value = ();
-
-    fn deserialize<D: Deserializer<'de>>(self, json: D) -> Result<(), D::Error> {
-        json.deserialize_any(self)
-    }
-}
-
-impl<'de, T: Deserialize<'de>, F: FnMut(T)> Visitor<'de> for Items<T, F> {
-    type Value = ();
+impl<'de, T: Deserialize<'de>> Visitor<'de> for Items<T> {
+    type Value = Self;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("a list or an object, as in a map")
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(mut self, mut list: A) -> Result<(), A::Error> {
+    fn visit_seq<A: SeqAccess<'de>>(mut self, mut list: A) -> Result<Self, A::Error> {
         while let Some(value) = list.next_element()? {
-            (self.0)(value);
+            self.0.push(value);
         }
-        Ok(())
+        Ok(self)
     }
 
-    fn visit_map<A: MapAccess<'de>>(mut self, mut object: A) -> Result<(), A::Error> {
-        while object.next_key::<IgnoredAny>()?.is_some() {
-            (self.0)(object.next_value()?);
+    fn visit_map<A: MapAccess<'de>>(mut self, mut object: A) -> Result<Self, A::Error> {
+        while let Some((_, value)) = object.next_entry::<IgnoredAny, T>()? {
+            self.0.push(value);
         }
-        Ok(())
+        Ok(self)
     }
 }

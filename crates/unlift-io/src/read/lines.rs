@@ -1,5 +1,6 @@
 //! Reads text files line by line, and their columns and coordinates.
 
+use std::fmt::Display;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -12,6 +13,9 @@ use crate::input::{self, Budget};
 pub(crate) const LONGEST_LINE: u64 = 16 << 20;
 /// The maximum length of a header in bytes, enough for long comments.
 const LONGEST_HEADER: u64 = 1 << 20;
+/// The least number of points at which a column of row numbers is an error. Fewer may match by
+/// accident.
+pub(super) const TELLING: usize = 10;
 
 /// A reader of text lines, counted from 1, as bytes: names need not be UTF-8.
 pub(crate) struct Lines {
@@ -52,9 +56,7 @@ impl Lines {
 
     /// Reads the next line of a header, which must not be the last line of the file.
     pub fn advance_in_header(&mut self, expected: &str) -> Result<(), Error> {
-        if !self.advance()? {
-            return Err(self.end_error(expected));
-        }
+        self.expect_line(expected)?;
         if !self.line.ends_with(b"\n") || self.at > LONGEST_HEADER {
             return Err(self.error(expected, "end of file"));
         }
@@ -98,6 +100,11 @@ impl Lines {
         Ok(false)
     }
 
+    /// Reads the next line, which has `what`.
+    pub fn expect_line(&mut self, what: &str) -> Result<(), Error> {
+        if self.advance()? { Ok(()) } else { Err(self.end_error(what)) }
+    }
+
     /// Reads up to the next line that is neither blank nor a comment, which has `what`.
     pub fn expect_data(&mut self, what: &str) -> Result<(), Error> {
         if self.advance_to_data()? { Ok(()) } else { Err(self.end_error(what)) }
@@ -113,14 +120,13 @@ impl Lines {
         line.strip_suffix(b"\r").unwrap_or(line)
     }
 
-    pub fn error(&self, expected: impl Into<String>, found: impl Into<String>) -> Error {
+    pub fn error(&self, expected: impl Display, found: impl Display) -> Error {
         Error::new(&self.path, Place::Line(self.number), expected, found)
     }
 
     /// Returns an error at the end of the file, where another line was expected.
-    pub fn end_error(&self, expected: impl Into<String>) -> Error {
-        let place = Place::Line(self.number + 1);
-        Error::new(&self.path, place, expected, "end of file")
+    pub fn end_error(&self, expected: impl Display) -> Error {
+        Error::new(&self.path, Place::Line(self.number + 1), expected, "end of file")
     }
 }
 
@@ -180,6 +186,17 @@ pub fn coordinate(word: &[u8]) -> Option<f64> {
     number(word).or_else(|| none(word).then_some(f64::NAN))
 }
 
+/// Parses the next of the `words` of a line. Errors name it `what`.
+pub fn next<'a, T>(
+    lines: &Lines,
+    words: &mut impl Iterator<Item = &'a [u8]>,
+    what: &str,
+    parse: impl Fn(&[u8]) -> Option<T>,
+) -> Result<T, Error> {
+    let word = words.next().ok_or_else(|| lines.error(what, "end of line"))?;
+    parse(word).ok_or_else(|| lines.error(what, quoted(word)))
+}
+
 /// Parses the next `N` of the `words` of a line as coordinates. Errors name them `what`.
 pub fn coordinates<'a, const N: usize>(
     lines: &Lines,
@@ -188,8 +205,7 @@ pub fn coordinates<'a, const N: usize>(
 ) -> Result<[f64; N], Error> {
     let mut values = [0.0; N];
     for value in &mut values {
-        let word = words.next().ok_or_else(|| lines.error(what, "end of line"))?;
-        *value = coordinate(word).ok_or_else(|| lines.error(what, quoted(word)))?;
+        *value = next(lines, words, what, coordinate)?;
     }
     Ok(values)
 }

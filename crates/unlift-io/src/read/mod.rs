@@ -10,7 +10,6 @@ pub(crate) mod lines;
 mod map_input;
 mod models;
 pub(crate) mod npy;
-mod npz;
 mod nvm;
 mod ply;
 mod table;
@@ -56,39 +55,25 @@ pub fn is_project(path: &Path) -> bool {
 const EXPECTED: &str = "a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, \
                         .txt, .asc, .pts, .npy, .npz or .splat file";
 
-/// Returns how to convert a file that is not read, by its name or extension in lower case.
-fn conversion(name: &str, extension: &str) -> Option<String> {
-    let cloud_compare = format!("convert it: CloudCompare -O in.{extension} -SAVE_CLOUDS");
-    let how = match extension {
-        _ if name == "predictions.npz" => {
-            "predictions of VGGT: give its COLMAP folder, which demo_colmap.py writes"
-        }
-        _ if name == "sfm_data.json" => {
-            "export the map of OpenMVG to COLMAP: openMVG_main_openMVG2Colmap"
-        }
-        "las" | "laz" | "e57" => {
-            return Some(format!("{cloud_compare}, or pdal translate in.{extension} out.ply"));
-        }
-        "pcd" => return Some(format!("{cloud_compare}, or Open3D")),
-        "ptx" => return Some(format!("a grid of a scanner; {cloud_compare}")),
-        "obj" => return Some(format!("a mesh; {cloud_compare}")),
-        "glb" => {
-            "a mesh or cloud as DUSt3R and MASt3R write it; convert it: trimesh or Blender, to .ply"
-        }
-        "gltf" => "convert it: trimesh or Blender, to .ply",
-        "gz" => "unpack it: gunzip",
-        "zip" => "unpack it",
-        "xyzrgb" => "name it .xyz",
-        "jpg" | "jpeg" | "png" | "webp" => "a photo: give its folder to unlift audit images",
-        "sfm" | "abc" => "export the map of Meshroom to COLMAP: aliceVision_exportColmap",
-        "spz" | "ksplat" | "sog" => "export it as .ply",
-        "h5" | "hdf5" => {
-            "features of images: use unlift audit images, or --descriptors with a COLMAP model"
-        }
-        _ => return None,
-    };
-    Some(how.to_owned())
-}
+/// Names or extensions of files that are not read, and what to do. `EXT` stands for the extension.
+#[rustfmt::skip] // One row per line.
+const CONVERSIONS: [(&str, &str); 15] = [
+    ("predictions.npz", "predictions of VGGT: give its COLMAP folder, which demo_colmap.py writes"),
+    ("sfm_data.json", "export the map of OpenMVG to COLMAP: openMVG_main_openMVG2Colmap"),
+    ("las laz e57", "convert it: CloudCompare -O in.EXT -SAVE_CLOUDS, or pdal translate in.EXT out.ply"),
+    ("pcd", "convert it: CloudCompare -O in.EXT -SAVE_CLOUDS, or Open3D"),
+    ("ptx", "a grid of a scanner; convert it: CloudCompare -O in.EXT -SAVE_CLOUDS"),
+    ("obj", "a mesh; convert it: CloudCompare -O in.EXT -SAVE_CLOUDS"),
+    ("glb", "a mesh or cloud as DUSt3R and MASt3R write it; convert it: trimesh or Blender, to .ply"),
+    ("gltf", "convert it: trimesh or Blender, to .ply"),
+    ("gz", "unpack it: gunzip"),
+    ("zip", "unpack it"),
+    ("xyzrgb", "name it .xyz"),
+    ("jpg jpeg png webp", "a photo: give its folder to unlift audit images"),
+    ("sfm abc", "export the map of Meshroom to COLMAP: aliceVision_exportColmap"),
+    ("spz ksplat sog", "export it as .ply"),
+    ("h5 hdf5", "features of images: use unlift audit images, or --descriptors with a COLMAP model"),
+];
 
 /// Returns the error for a file of a format that is not read.
 fn not_read(path: &Path) -> Error {
@@ -99,8 +84,11 @@ fn not_read(path: &Path) -> Error {
         extension => format!("a .{extension} file"),
     };
     let kind = if extension.is_empty() { &name } else { &extension };
-    let conversion = conversion(&name, kind);
-    let found = conversion.map_or(found.clone(), |how| format!("{found} ({how})"));
+    let is_it = |names: &str| names.split(' ').any(|its| its == name || its == kind);
+    let found = match CONVERSIONS.iter().find(|(names, _)| is_it(names)) {
+        Some((_, how)) => format!("{found} ({})", how.replace("EXT", kind)),
+        None => found,
+    };
     Error::new(path, "", EXPECTED, found)
 }
 
@@ -127,8 +115,7 @@ fn other_in_folder(path: &Path) -> Option<PathBuf> {
 fn file(path: &Path) -> Result<Input, Error> {
     const POINTER: &[u8] = b"version https://git-lfs";
     if input::head(path, POINTER.len() as u64)?.0 == POINTER {
-        let found = "a pointer of Git LFS (run git lfs pull)";
-        return Err(Error::new(path, "", "a map", found));
+        return Err(Error::new(path, "", "a map", "a pointer of Git LFS (run git lfs pull)"));
     }
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
@@ -147,7 +134,7 @@ fn file(path: &Path) -> Result<Input, Error> {
         },
         (_, "npy") => npy::positions(path)?,
         ("predictions", "npz") => return Err(not_read(path)),
-        (_, "npz") => npz::positions(path)?,
+        (_, "npz") => npy::of_archive(path)?,
         ("sfm_data", "json") => return Err(not_read(path)),
         (_, "json") => json::read(path)?,
         (_, "out") => bundler::read(path)?,

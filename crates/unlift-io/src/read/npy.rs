@@ -1,4 +1,4 @@
-//! Reads positions and descriptors from NumPy arrays.
+//! Reads positions and descriptors from NumPy arrays and archives.
 //!
 //! Our own reader: few types are needed, and a header that declares 2^62 rows must be an error.
 
@@ -7,21 +7,20 @@ use std::path::Path;
 
 use unlift::descriptors::Values;
 
+use super::archive::Archive;
 use super::bytes::{Bytes, Field, Scalar};
-use super::lines::{axes, number, quoted};
+use super::lines::{TELLING, axes, number, quoted};
 use crate::error::Error;
 use crate::read::map_input::Input;
+use crate::stage;
 
 pub(crate) const MAGIC: &[u8; 6] = b"\x93NUMPY";
 
 /// The maximum number of columns of points. Wider arrays are descriptors.
 const MOST_COLUMNS: u64 = 16;
 /// Names of arrays, or of fields of three values, that contain all coordinates.
-pub(super) const PLACES: [&str; 7] =
+const PLACES: [&str; 7] =
     ["xyz", "position", "positions", "points", "points3d", "coordinates", "pts"];
-/// The least number of points at which a column of row numbers is an error. Fewer may match by
-/// accident.
-const TELLING: usize = 10;
 
 /// Reads positions from an `.npy` file, in either byte and memory order.
 ///
@@ -31,23 +30,62 @@ pub fn positions(path: &Path) -> Result<Input, Error> {
     of_points(&mut Bytes::open(path)?, "npy")
 }
 
-pub(super) fn of_points<R: Read>(
-    bytes: &mut Bytes<R>,
-    format: &'static str,
-) -> Result<Input, Error> {
+/// Reads positions from the array of points in a NumPy archive. Several or none are an error.
+pub fn of_archive(path: &Path) -> Result<Input, Error> {
+    let mut archive = Archive::open(path)?;
+    let all = archive.arrays()?;
+    if all.iter().any(|(_, name)| name.rsplit('/').next() == Some("unlift")) {
+        let kind = stage::declared_kind(path).map(|kind| kind.to_string());
+        let found = kind.unwrap_or_else(|| "a stage file of unlift".to_owned());
+        return Err(Error::new(path, "", "points of a map", found));
+    }
+    let (mut fit, mut has_points) = (Vec::new(), false);
+    for (at, name) in &all {
+        let header = archive.array(*at, name).and_then(|mut bytes| Header::read(&mut bytes));
+        if let Some((_, layout)) = header.ok().and_then(|header| header.points()) {
+            fit.push((*at, &**name));
+            has_points |= !matches!(layout, Layout::Matrix { columns: 4.. });
+        }
+    }
+    let has = |start: &str| all.iter().any(|(_, name)| name.starts_with(start));
+    // Some programs store position, size and angle of keypoints in one array, beside descriptors.
+    let beside_descriptors = has("descriptors") && !has_points;
+    if has("keypoints") || has("OPENSFM_FEATURES") || beside_descriptors {
+        return Err(Error::new(path, "", "points of a map", "features of an image"));
+    }
+    let is_known = |name: &str| PLACES.iter().any(|known| name.eq_ignore_ascii_case(known));
+    if fit.iter().filter(|(_, name)| is_known(name)).count() == 1 {
+        fit.retain(|(_, name)| is_known(name));
+    }
+    let [(at, name)] = fit[..] else {
+        if fit.is_empty() {
+            fit = all.iter().map(|(at, name)| (*at, &**name)).collect();
+        }
+        let names: Vec<String> =
+            fit.iter().take(5).map(|(_, name)| quoted(name.as_bytes())).collect();
+        let found = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+        let expected = "one array of points, (n, 3), or one that is called points or xyz";
+        return Err(Error::new(path, "", expected, found));
+    };
+    let mut input = of_points(&mut archive.array(at, name)?, "npz")?;
+    if all.len() > 1 {
+        input.notes.push(format!("read, the array {} of {}", quoted(name.as_bytes()), all.len()));
+    }
+    Ok(input)
+}
+
+fn of_points<R: Read>(bytes: &mut Bytes<R>, format: &'static str) -> Result<Input, Error> {
     let header = Header::read(bytes)?;
     let mut input = Input { format, ..Input::default() };
-    let (rows, layout) = match header.points() {
-        Some(points) => points,
-        None if header.is_structured() => {
-            return Err(
-                bytes.error("fields of numbers called x, y and z", quoted(header.type_text()))
-            );
-        }
-        None if header.scalar().is_none() => {
-            return Err(header.wrong_type(bytes, "numbers, or fields called x, y and z"));
-        }
-        None => return Err(bytes.error("an array of shape (n, 3)", header.shape_text())),
+    let Some((rows, layout)) = header.points() else {
+        let of_type = quoted(header.type_text());
+        return Err(match header.scalar() {
+            _ if header.is_structured() => {
+                bytes.error("fields of numbers called x, y and z", of_type)
+            }
+            None => bytes.error("numbers, or fields called x, y and z", of_type),
+            Some(_) => bytes.error("an array of shape (n, 3)", header.shape_text()),
+        });
     };
     let columns = match layout {
         Layout::Rows { fields, size } => {
@@ -55,7 +93,7 @@ pub(super) fn of_points<R: Read>(
             let mut row = vec![0; size as usize];
             for _ in 0..rows {
                 bytes.fill(&mut row, "values")?;
-                input.positions.push(fields.map(|(field, big)| field.of(&row, big)));
+                input.positions.push(fields.map(|field| field.of(&row)));
             }
             return Ok(input);
         }
@@ -75,21 +113,20 @@ pub(super) fn of_points<R: Read>(
         let firsts = || input.positions.iter().map(|position| position[0]).enumerate();
         let is_numbered = |from: usize| firsts().all(|(row, x)| x == (row + from) as f64);
         if input.positions.len() >= TELLING && (is_numbered(0) || is_numbered(1)) {
-            let expected = "x, y and z in the first columns";
-            return Err(bytes.error(expected, "the row number"));
+            return Err(bytes.error("x, y and z in the first columns", "the row number"));
         }
         input.notes.push(format!("the first 3 of {columns} columns are read as x, y and z"));
     }
     Ok(input)
 }
 
-pub(super) enum Layout {
+enum Layout {
     Matrix {
         columns: u64,
     },
-    /// Records of `size` bytes: the field of each coordinate, and true if it is big-endian.
+    /// Records of `size` bytes, with the field of each coordinate.
     Rows {
-        fields: [(Field, bool); 3],
+        fields: [Field; 3],
         size: u64,
     },
 }
@@ -102,7 +139,6 @@ fn stored(text: &str) -> Option<(Scalar, bool)> {
     Some((scalar, big))
 }
 
-/// The size in bytes of a value of a type.
 fn size_of(text: &str) -> Option<u64> {
     let text = text.trim_start_matches(['<', '>', '|', '=']);
     let digits = text.get(1..)?.split('[').next()?;
@@ -123,26 +159,19 @@ pub fn descriptors(path: &Path, counts: [usize; 2]) -> Result<(Values, usize), E
     let numbers = header.numbers(&bytes)?.filter(|numbers| known.contains(&numbers.scalar));
     let Some(numbers) = numbers else {
         let expected = "bytes, or floats of 2, 4 or 8 bytes (u1, f2, f4, f8)";
-        return Err(header.wrong_type(&bytes, expected));
+        return Err(bytes.error(expected, quoted(header.type_text())));
     };
-    let (rows, columns) = match header.sides() {
-        Some([rows, columns]) if counts.contains(&(rows as usize)) && columns > 0 => {
-            (rows, columns)
-        }
-        sides => {
-            let n = counts[0];
-            let expected = format!("an array of shape ({n}, dimension), a row per point");
-            let found = match sides {
-                Some([_, columns]) if columns == n as u64 => {
-                    format!("{}, rows and columns exchanged", header.shape_text())
-                }
-                _ => header.shape_text(),
-            };
-            return Err(bytes.error(expected, found));
-        }
+    let sides = header.sides();
+    let is_right = |[rows, dim]: &[u64; 2]| counts.contains(&(*rows as usize)) && *dim > 0;
+    let Some([n, dim]) = sides.filter(is_right) else {
+        let n = counts[0];
+        let expected = format!("an array of shape ({n}, dimension), a row per point");
+        let is_exchanged = sides.is_some_and(|[_, columns]| columns == n as u64);
+        let exchanged = if is_exchanged { ", rows and columns exchanged" } else { "" };
+        return Err(bytes.error(expected, header.shape_text() + exchanged));
     };
     numbers.check(&bytes)?;
-    let (n, dim) = (rows as usize, columns as usize);
+    let (n, dim) = (n as usize, dim as usize);
     if numbers.scalar == Scalar::U8 {
         let mut values = vec![0; n * dim];
         numbers.read(&mut bytes, |_, at, value| {
@@ -169,6 +198,7 @@ pub(crate) struct Numbers {
     pub scalar: Scalar,
     pub shape: Vec<u64>,
     big: bool,
+    /// True if columns are contiguous, false if rows are.
     fortran: bool,
 }
 
@@ -176,7 +206,7 @@ impl Numbers {
     /// Checks that exactly the declared values remain.
     pub fn check<R: Read>(&self, bytes: &Bytes<R>) -> Result<(), Error> {
         let (rows, rest) = self.shape.split_first().unwrap_or((&1, &[]));
-        let size = self.scalar.size() as u64;
+        let size = self.scalar.size as u64;
         check_size(bytes, *rows, rest.iter().try_fold(size, |all, &side| all.checked_mul(side)))
     }
 
@@ -188,7 +218,7 @@ impl Numbers {
         mut each: impl FnMut(&Bytes<R>, usize, f64) -> Result<(), Error>,
     ) -> Result<(), Error> {
         const CHUNK: usize = 1 << 13;
-        let size = self.scalar.size();
+        let size = self.scalar.size;
         let n = self.shape.iter().product::<u64>() as usize;
         let mut buffer = vec![0; size * CHUNK.min(n)];
         for first in (0..n).step_by(CHUNK) {
@@ -235,19 +265,14 @@ pub(crate) struct Header(Vec<u8>);
 
 impl Header {
     pub fn read<R: Read>(bytes: &mut Bytes<R>) -> Result<Self, Error> {
-        let mut magic = [0; 8];
-        bytes.fill(&mut magic, "magic and version")?;
+        let magic: [u8; 8] = bytes.array("magic and version")?;
         if &magic[..6] != MAGIC {
             return Err(bytes.error("a NumPy file", quoted(&magic[..6])));
         }
         let len = match magic[6] {
-            1 => {
-                let mut len = [0; 2];
-                bytes.fill(&mut len, "header length")?;
-                u32::from(u16::from_le_bytes(len))
-            }
+            1 => bytes.array("header length").map(u16::from_le_bytes)?.into(),
             2 | 3 => bytes.u32("header length")?,
-            version => return Err(bytes.error("NumPy format 1, 2 or 3", version.to_string())),
+            version => return Err(bytes.error("NumPy format 1, 2 or 3", version)),
         };
         if u64::from(len) > bytes.remaining() {
             let expected = format!("a header of {len} bytes");
@@ -293,7 +318,7 @@ impl Header {
 
     /// Returns the number of points and the places of their coordinates, if the array can be
     /// points.
-    pub(super) fn points(&self) -> Option<(u64, Layout)> {
+    fn points(&self) -> Option<(u64, Layout)> {
         if !self.is_structured() {
             let [rows, columns] = self.sides().filter(|_| self.scalar().is_some())?;
             let is_usual = (3..=MOST_COLUMNS).contains(&columns);
@@ -316,9 +341,9 @@ impl Header {
             let (n, each, at) = (n?, size_of(kind)?, usize::try_from(size).ok()?);
             size = size.checked_add(n.checked_mul(each)?)?;
             let Some((scalar, big)) = stored(kind) else { continue };
-            let field = |at| (Field { at, scalar }, big);
+            let field = |at| Field { at, scalar, big };
             if n == 3 && PLACES.iter().any(|known| name.eq_ignore_ascii_case(known)) {
-                places = Some(std::array::from_fn(|axis| field(at + axis * scalar.size())));
+                places = Some(std::array::from_fn(|axis| field(at + axis * scalar.size)));
             } else if n == 1 {
                 names.push(name.as_bytes());
                 fields.push(field(at));
@@ -327,22 +352,6 @@ impl Header {
         let by_name = || axes(names.iter().copied()).map(|at| at.map(|at| fields[at]));
         let fields = places.or_else(by_name)?;
         Some((number(rows.trim().as_bytes())?, Layout::Rows { fields, size }))
-    }
-
-    fn wrong_type<R: Read>(&self, bytes: &Bytes<R>, expected: &str) -> Error {
-        bytes.error(expected, quoted(self.type_text()))
-    }
-
-    /// Returns true if columns are contiguous, false if rows are.
-    fn fortran<R: Read>(&self, bytes: &Bytes<R>) -> Result<bool, Error> {
-        match self.value("fortran_order") {
-            Some("True") => Ok(true),
-            Some("False") => Ok(false),
-            other => {
-                let found = quoted(other.unwrap_or_default().as_bytes());
-                Err(bytes.error("fortran_order True or False", found))
-            }
-        }
     }
 
     pub fn shape_text(&self) -> String {
@@ -364,6 +373,10 @@ impl Header {
         let Some(((scalar, big), shape)) = self.scalar().zip(self.shape()) else {
             return Ok(None);
         };
-        Ok(Some(Numbers { scalar, shape, big, fortran: self.fortran(bytes)? }))
+        let order = self.value("fortran_order").unwrap_or_default();
+        if !["True", "False"].contains(&order) {
+            return Err(bytes.error("fortran_order True or False", quoted(order.as_bytes())));
+        }
+        Ok(Some(Numbers { scalar, shape, big, fortran: order == "True" }))
     }
 }

@@ -76,17 +76,13 @@ fn model(lines: &mut Lines, n_cameras: u64) -> Result<Input, Error> {
     let mut found = Input::default();
     for at in 0..n_cameras {
         let what = format!("camera {at}: name, focal length, quaternion, center, distortion and 0");
-        if !lines.advance()? {
-            return Err(lines.end_error(what));
-        }
+        lines.expect_line(&what)?;
         found.camera(Some(pose(lines, &what)?));
     }
     lines.expect_data("a number of points")?;
     for at in 0..count(lines, "a number of points")? {
         let what = format!("3 coordinates of point {at}");
-        if !lines.advance()? {
-            return Err(lines.end_error(what));
-        }
+        lines.expect_line(&what)?;
         found.positions.push(coordinates(lines, &mut words(lines.line()), &what)?);
     }
     Ok(found)

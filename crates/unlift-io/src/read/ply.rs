@@ -7,12 +7,14 @@ use super::lines::{Lines, coordinate, is_called, number, quoted, words};
 use super::map_input::{Input, undeclared};
 use crate::error::Error;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Encoding {
-    Ascii,
-    Little,
-    Big,
-}
+/// An encoding: its name in files, its name for users, and, of a binary one, whether it is big-endian.
+type Encoding = (&'static [u8], &'static str, Option<bool>);
+
+const ENCODINGS: [Encoding; 3] = [
+    (b"ascii", "ply ascii", None),
+    (b"binary_little_endian", "ply binary little endian", Some(false)),
+    (b"binary_big_endian", "ply binary big endian", Some(true)),
+];
 
 fn scalar(name: &[u8]) -> Option<Scalar> {
     let (kind, size) = match name {
@@ -31,7 +33,6 @@ fn scalar(name: &[u8]) -> Option<Scalar> {
     Scalar::of_kind(kind, size)
 }
 
-#[derive(Debug)]
 struct Property {
     name: Vec<u8>,
     scalar: Scalar,
@@ -39,7 +40,6 @@ struct Property {
     list: Option<Scalar>,
 }
 
-#[derive(Debug)]
 struct Element {
     name: Vec<u8>,
     count: u64,
@@ -53,7 +53,7 @@ impl Element {
 
     /// Bytes of one row in a binary file, with empty lists.
     fn stride(&self) -> usize {
-        let size = |property: &Property| property.list.unwrap_or(property.scalar).size();
+        let size = |property: &Property| property.list.unwrap_or(property.scalar).size;
         self.properties.iter().map(size).sum()
     }
 
@@ -71,7 +71,7 @@ impl Element {
 /// Reads the positions of the vertices, of any numeric type.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let mut lines = Lines::open(path)?;
-    let (encoding, elements) = header(path, &mut lines)?;
+    let ((_, format, big_endian), elements) = header(path, &mut lines)?;
     let refuse = |expected: String| Error::new(path, "header", expected, "none");
     let vertex = elements.iter().position(|e| e.name == b"vertex");
     let vertex = vertex.ok_or_else(|| refuse("an element vertex".to_owned()))?;
@@ -83,12 +83,12 @@ pub fn read(path: &Path) -> Result<Input, Error> {
             }
             Err(_) => refuse(format!("a property {name} in element vertex")),
         })?;
-    let mut rows = match encoding {
-        Encoding::Ascii => {
+    let mut rows = match big_endian {
+        None => {
             lines.expect_room(element.count, "vertices", element.properties.len() as u64)?;
             Rows::Ascii(lines)
         }
-        encoding => Rows::Binary(lines.into_bytes(), encoding == Encoding::Big),
+        Some(big) => Rows::Binary(lines.into_bytes(), big),
     };
     for before in &elements[..vertex] {
         rows.read(before, [])?;
@@ -98,11 +98,7 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     let is_splat = element.find(["opacity", "scale_0", "rot_0"]).is_ok();
     Ok(Input {
         positions,
-        format: match encoding {
-            Encoding::Ascii => "ply ascii",
-            Encoding::Little => "ply binary little endian",
-            Encoding::Big => "ply binary big endian",
-        },
+        format,
         notes: is_splat.then(|| SPLATS.to_owned()).into_iter().collect(),
         doubts: undeclared(element.count, more).into_iter().collect(),
         ..Input::default()
@@ -130,56 +126,46 @@ pub fn splats(path: &Path) -> Result<Input, Error> {
     Ok(Input { positions, format: "splat", notes: vec![SPLATS.to_owned()], ..Input::default() })
 }
 
-/// Reads the encoding and the elements.
 fn header(path: &Path, lines: &mut Lines) -> Result<(Encoding, Vec<Element>), Error> {
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
     let begins = "\"ply\", as every PLY file begins";
-    if !lines.advance()? {
-        return Err(lines.end_error(begins));
-    }
+    lines.expect_line(begins)?;
     if lines.line() != b"ply" {
         return Err(lines.error(begins, quoted(lines.line())));
     }
     loop {
         lines.advance_in_header("a header that ends with end_header")?;
-        let error = |expected: &str, found: String| lines.error(expected, found);
         let line = lines.line();
         let words: Vec<&[u8]> = words(line).collect();
         match words[..] {
             [] | [b"comment" | b"obj_info", ..] => {}
             [b"format", name, _version] => {
-                encoding = Some(match name {
-                    b"ascii" => Encoding::Ascii,
-                    b"binary_little_endian" => Encoding::Little,
-                    b"binary_big_endian" => Encoding::Big,
-                    _ => {
-                        let expected = "ascii, binary_little_endian or binary_big_endian";
-                        return Err(error(expected, quoted(name)));
-                    }
-                });
+                let expected = "ascii, binary_little_endian or binary_big_endian";
+                let known = ENCODINGS.into_iter().find(|(known, ..)| *known == name);
+                encoding = Some(known.ok_or_else(|| lines.error(expected, quoted(name)))?);
             }
             [b"element", name, count] => {
-                let count =
-                    number(count).ok_or_else(|| error("the number of elements", quoted(count)))?;
+                let count = number(count)
+                    .ok_or_else(|| lines.error("the number of elements", quoted(count)))?;
                 elements.push(Element { name: name.to_vec(), count, properties: Vec::new() });
             }
             [b"property", ref rest @ ..] => {
                 let Some(element) = elements.last_mut() else {
-                    return Err(error("an element before its properties", quoted(line)));
+                    return Err(lines.error("an element before its properties", quoted(line)));
                 };
                 let known = |kind: &[u8]| {
-                    scalar(kind).ok_or_else(|| error("the type of a property", quoted(kind)))
+                    scalar(kind).ok_or_else(|| lines.error("the type of a property", quoted(kind)))
                 };
                 let (name, scalar, list) = match *rest {
                     [kind, name] => (name, known(kind)?, None),
                     [b"list", count, kind, name] => (name, known(kind)?, Some(known(count)?)),
-                    _ => return Err(error("property TYPE NAME", quoted(line))),
+                    _ => return Err(lines.error("property TYPE NAME", quoted(line))),
                 };
                 element.properties.push(Property { name: name.to_vec(), scalar, list });
             }
             [b"end_header"] => break,
-            _ => return Err(error("a line of a PLY header", quoted(line))),
+            _ => return Err(lines.error("a line of a PLY header", quoted(line))),
         }
     }
     let encoding =
@@ -277,8 +263,7 @@ fn ascii<const N: usize>(
         }
         n_words += all.count();
         if n_words != n_expected {
-            let expected = format!("{n_expected} values of {name} {row}");
-            return Err(lines.error(expected, n_words.to_string()));
+            return Err(lines.error(format!("{n_expected} values of {name} {row}"), n_words));
         }
         rows.push(values);
     }
@@ -303,14 +288,14 @@ fn binary<const N: usize>(
     for (number, Property { scalar, list, .. }) in element.properties.iter().enumerate() {
         let (len, fields, its_list) = runs.last_mut().expect("there is one");
         if let Some(count) = list {
-            *its_list = Some((*count, scalar.size() as u64));
+            *its_list = Some((*count, scalar.size as u64));
             runs.push((0, Vec::new(), None));
             continue;
         }
         if let Some(slot) = wanted.iter().position(|&wanted| wanted == number) {
-            fields.push((slot, Field { at: *len, scalar: *scalar }));
+            fields.push((slot, Field { at: *len, scalar: *scalar, big }));
         }
-        *len += scalar.size();
+        *len += scalar.size;
     }
     let mut buffer = vec![0; stride];
     let mut rows = bytes.room(&*name, if N == 0 { 0 } else { element.count })?;
@@ -320,14 +305,14 @@ fn binary<const N: usize>(
         for (len, fields, list) in &runs {
             bytes.fill(&mut buffer[..*len], &name)?;
             for (slot, field) in fields {
-                values[*slot] = field.of(&buffer, big);
+                values[*slot] = field.of(&buffer);
             }
             let Some((count, size)) = list else { continue };
-            let buffer = &mut buffer[..count.size()];
+            let buffer = &mut buffer[..count.size];
             bytes.fill(buffer, "the length of a list")?;
             let n = count.read(buffer, big);
             if n < 0.0 || n.fract() != 0.0 {
-                return Err(bytes.error("the length of a list", n.to_string()));
+                return Err(bytes.error("the length of a list", n));
             }
             bytes.skip((n as u64).saturating_mul(*size), "a list")?;
         }

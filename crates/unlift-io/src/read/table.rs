@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::lines::{Lines, axes, coordinate, is_called, number, plain, quoted, words};
+use super::lines::{Lines, TELLING, axes, coordinate, is_called, number, plain, quoted, words};
 use super::map_input::Input;
 use crate::error::Error;
 
@@ -31,9 +31,6 @@ fn split(line: &[u8], separator: Separator) -> Vec<&[u8]> {
 const COMMENTS: usize = 1 << 16;
 /// Columns before the tracks in COLMAP's points.
 const COLMAP_COLUMNS: usize = 8;
-/// The least number of points at which a column of row numbers is an error. Fewer may match by
-/// accident.
-const TELLING: usize = 10;
 
 /// Reads positions from lines of numbers separated by commas, semicolons, spaces or tabs. Returns
 /// `None` for the points of a COLMAP model in text.
@@ -96,7 +93,7 @@ pub fn read(path: &Path) -> Result<Option<Input>, Error> {
                     true => format!("{} columns up to {name}", column + 1),
                     false => "3 coordinates".to_owned(),
                 };
-                return Err(lines.error(expected, fields.len().to_string()));
+                return Err(lines.error(expected, fields.len()));
             };
             *value = coordinate(field)
                 .ok_or_else(|| lines.error(format!("a number for {name}"), quoted(field)))?;
@@ -127,7 +124,6 @@ fn check_count(lines: &Lines, announced: Option<(u64, u64)>, n: u64) -> Result<(
     }
 }
 
-#[derive(Debug)]
 struct Columns {
     at: [usize; 3],
     named: bool,
@@ -242,7 +238,6 @@ fn is_colmap_header(comment: &[u8]) -> bool {
 }
 
 /// Properties that hold for all rows so far.
-#[derive(Debug)]
 struct Form {
     n: usize,
     /// COLMAP's points: an id, a position, a color, an error, a track.

@@ -1,9 +1,9 @@
 //! Reads the arrays of one map, or of one image, by name.
 
+use std::fmt::Display;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use unlift::Unit;
 use unlift::descriptors::Values;
 
 use super::kind::Kind;
@@ -21,20 +21,19 @@ const MAX_TEXT: u64 = 1 << 16;
 
 /// The arrays of one map or image.
 pub(super) struct Arrays<'a> {
-    path: &'a Path,
+    pub(super) path: &'a Path,
     /// Shared by the images of a file, which several threads read.
     archive: Arc<Mutex<Archive>>,
     /// Index in the archive and name of each array.
-    arrays: Vec<(usize, String)>,
+    pub(super) arrays: Vec<(usize, String)>,
     budget: Budget,
-    meta: Meta<'a>,
+    pub(super) meta: Meta<'a>,
 }
 
 impl<'a> Arrays<'a> {
-    /// Opens the file `path`.
     pub(super) fn open(path: &'a Path) -> Result<Self, Error> {
         let archive = Archive::open(path)?;
-        let (arrays, budget) = (archive.arrays()?, archive.budget().clone());
+        let (arrays, budget) = (archive.arrays()?, archive.budget.clone());
         let archive = Arc::new(Mutex::new(archive));
         Self { path, archive, arrays, budget, meta: Meta::empty(path) }.with_meta()
     }
@@ -54,19 +53,6 @@ impl<'a> Arrays<'a> {
         Ok(self)
     }
 
-    pub(super) fn path(&self) -> &'a Path {
-        self.path
-    }
-
-    pub(super) fn meta(&self) -> &Meta<'a> {
-        &self.meta
-    }
-
-    /// Index in the archive and name of each array.
-    pub(super) fn arrays(&self) -> &[(usize, String)] {
-        &self.arrays
-    }
-
     fn names(&self) -> impl Iterator<Item = &str> {
         self.arrays.iter().map(|(_, name)| &**name)
     }
@@ -75,7 +61,6 @@ impl<'a> Arrays<'a> {
         self.names().any(|known| known == name)
     }
 
-    /// Reads the array `name`, if there is one.
     pub(super) fn optional<'n, T>(
         &self,
         name: &'n str,
@@ -103,7 +88,7 @@ impl<'a> Arrays<'a> {
     /// Checks that these are arrays of `kind` only. Ambiguous ones are taken for it.
     pub(super) fn expect(&self, kind: Kind) -> Result<(), Error> {
         if let Some(other) = self.kind()?.filter(|its| *its != kind) {
-            return Err(Error::new(self.path, "", kind.to_string(), other.to_string()));
+            return Err(Error::new(self.path, "", kind, other));
         }
         let is_unknown = |name: &&str| *name != KEY && !kind.arrays().contains(name);
         match self.names().find(is_unknown) {
@@ -115,13 +100,6 @@ impl<'a> Arrays<'a> {
         }
     }
 
-    /// The unit of all lengths: as declared, else `usual`, else pixels in 2D.
-    pub(super) fn unit<const D: usize>(&self, usual: Option<Unit>) -> Result<Unit, Error> {
-        let in_plane = (D == 2).then_some(Unit::Pixel);
-        let unit = self.meta.unit()?.or(usual).or(in_plane);
-        unit.ok_or_else(|| self.meta.wrong_unit())
-    }
-
     pub(super) fn refused(&self, source: unlift::Error) -> Error {
         Error::core(self.path, source)
     }
@@ -131,8 +109,8 @@ impl<'a> Arrays<'a> {
         &self,
         name: &str,
         row: usize,
-        expected: impl Into<String>,
-        found: impl Into<String>,
+        expected: impl Display,
+        found: impl Display,
     ) -> Error {
         Error::new(self.path, format!("array {name}, row {row}"), expected, found)
     }
@@ -180,24 +158,35 @@ impl<'a> Arrays<'a> {
         })
     }
 
-    /// Reads integers from 0 to 255 as bytes, or finite floats.
+    /// Reads such numbers, one for each of `n` rows, if there is the array `name`.
+    pub(super) fn column(
+        &self,
+        name: &str,
+        n: usize,
+        below: usize,
+        or_none: bool,
+    ) -> Result<Option<Vec<u32>>, Error> {
+        self.optional(name, |name| Ok(self.integers(name, [Some(n)], below, or_none)?.0))
+    }
+
+    /// Reads integers from 0 to 255 as bytes, or finite floats. Returns also the length of a row.
     pub(super) fn bytes_or_floats<const N: usize>(
         &self,
         name: &str,
         sides: [Option<usize>; N],
-    ) -> Result<(Values, [usize; N]), Error> {
+    ) -> Result<(Values, usize), Error> {
         #[expect(clippy::redundant_closure)] // a closure works for every lifetime of the bytes
         let header = self.file(name, |bytes| Header::read(bytes))?;
         if header.is_whole() {
             let byte = |x: f64| (0.0..256.0).contains(&x).then_some(x as u8);
             let rule = "a whole number below 256, or a float";
             let (values, shape) = self.numbers(name, sides, Class::Whole, rule, byte)?;
-            return Ok((Values::U8(values), shape));
+            return Ok((Values::U8(values), shape[N - 1]));
         }
         let single = |x: f64| Some(x as f32).filter(|x| x.is_finite());
         let rule = "a finite number (as a float of 4 bytes)";
         let (values, shape) = self.numbers(name, sides, Class::Any, rule, single)?;
-        Ok((Values::F32(values), shape))
+        Ok((Values::F32(values), shape[N - 1]))
     }
 
     /// Reads numbers of `class` from the array `name` of `sides`, each converted by `convert`; a
@@ -224,19 +213,15 @@ impl<'a> Arrays<'a> {
                 let expected = if class == Class::Any { "numbers" } else { "whole numbers" };
                 return Err(wrong(expected, &format!("dtype {kind}")));
             };
-            let shape: Option<[usize; N]> = numbers
-                .shape
-                .iter()
-                .map(|&side| usize::try_from(side).ok())
-                .collect::<Option<Vec<_>>>()
-                .and_then(|shape| shape.try_into().ok());
-            let fits = |shape: &[usize; N]| {
-                shape.iter().zip(&sides).all(|(n, side)| side.is_none_or(|side| side == *n))
+            let fits = |shape: &[u64; N]| {
+                shape.iter().zip(&sides).all(|(n, side)| side.is_none_or(|side| side as u64 == *n))
             };
+            let shape = <[u64; N]>::try_from(&*numbers.shape).ok();
             let Some(shape) = shape.filter(fits) else {
                 return Err(wrong(&format!("shape {}", shown(&sides)), &tuple(&numbers.shape)));
             };
             numbers.check(bytes)?;
+            let shape = shape.map(|side| side as usize);
             let n = shape.iter().product::<usize>();
             let mut values = self.budget.room(format!("array {name}"), n as u64)?;
             values.resize(n, T::default());
@@ -250,16 +235,12 @@ impl<'a> Arrays<'a> {
         })
     }
 
-    /// Reads the metadata.
     fn text(&self) -> Result<Option<String>, Error> {
-        if !self.has(KEY) {
-            return Ok(None);
-        }
         let wrong = |found: String| {
             let expected = "a text without dimensions, as np.array(json.dumps(..))";
             Error::new(self.path, format!("array {KEY}"), expected, found)
         };
-        self.file(KEY, |bytes| {
+        let read = |bytes: &mut ArrayBytes<'_>| {
             let header = Header::read(bytes)?;
             let kind = String::from_utf8_lossy(header.type_text()).into_owned();
             if let Some(shape) = header.shape().filter(|shape| !shape.is_empty()) {
@@ -287,8 +268,9 @@ impl<'a> Arrays<'a> {
             };
             let text: Option<String> = text.chunks(width).map(letter).collect();
             let text = text.ok_or_else(|| wrong("bytes that are no text".to_owned()))?;
-            Ok(Some(text.trim_end_matches('\0').to_owned()))
-        })
+            Ok(text.trim_end_matches('\0').to_owned())
+        };
+        self.optional(KEY, |name| self.file(name, read))
     }
 
     /// Calls `read` with a reader of the array `name`.

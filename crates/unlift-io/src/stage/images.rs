@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
+use std::vec::IntoIter;
 
 use serde_json::{Map, Value};
 use unlift::neighbors::Neighborhoods;
@@ -23,13 +24,13 @@ use crate::atomic::OutputFile;
 
 /// A reader of a stage file of images. The arrays of an image are unpacked when it is read.
 pub struct ImageFile<'a> {
-    /// All arrays of the file.
     file: Arrays<'a>,
-    /// The images in reverse order, with the index and name of each array.
-    waiting: Vec<(String, Vec<(usize, String)>)>,
+    /// The next images, with the index and name of each array.
+    waiting: IntoIter<(String, Vec<(usize, String)>)>,
 }
 
-/// The arrays of one image.
+/// The arrays of one image. Readers fail as those of maps do, with the name of the image; rows are
+/// counted within it.
 pub struct ImageRows<'a> {
     name: String,
     arrays: Arrays<'a>,
@@ -43,12 +44,12 @@ impl<'a> ImageFile<'a> {
     /// follow one another.
     pub fn open(path: &'a Path, kind: Kind) -> Result<Self, Error> {
         let file = Arrays::open(path)?;
-        if let Some(other) = file.meta().kind()?.filter(|its| *its != kind) {
-            return Err(Error::new(path, "", kind.to_string(), other.to_string()));
+        if let Some(other) = file.meta.kind()?.filter(|its| *its != kind) {
+            return Err(Error::new(path, "", kind, other));
         }
         let mut images: Vec<(String, Vec<(usize, String)>)> = Vec::new();
         let mut names = HashSet::new();
-        for (at, name) in file.arrays() {
+        for (at, name) in &file.arrays {
             let Some((image, array)) = name.rsplit_once('/') else {
                 if name == KEY {
                     continue;
@@ -69,8 +70,7 @@ impl<'a> ImageFile<'a> {
         if images.is_empty() {
             return Err(Error::new(path, "", "arrays of images, as a.jpg/foot", "none"));
         }
-        images.reverse();
-        Ok(Self { file, waiting: images })
+        Ok(Self { file, waiting: images.into_iter() })
     }
 
     /// Opens the next image. Returns `None` at the end.
@@ -78,7 +78,7 @@ impl<'a> ImageFile<'a> {
     /// # Errors
     /// When its metadata is wrong.
     pub fn next_image(&mut self) -> Result<Option<ImageRows<'a>>, Error> {
-        let Some((name, arrays)) = self.waiting.pop() else { return Ok(None) };
+        let Some((name, arrays)) = self.waiting.next() else { return Ok(None) };
         let arrays = self.file.of_image(arrays).map_err(|error| error.within(&place(&name)))?;
         Ok(Some(ImageRows { name, arrays }))
     }
@@ -93,18 +93,18 @@ impl<'a> ImageFile<'a> {
             other => {
                 let expected = format!("image {name}, as in {}", of.display());
                 let found = other.map_or("no more images".to_owned(), |rows| rows.name);
-                Err(Error::new(self.file.path(), "", expected, found))
+                Err(Error::new(self.file.path, "", expected, found))
             }
         }
     }
 
     /// Checks that no image follows, as in the file `of`.
     pub fn expect_end(&mut self, of: &Path) -> Result<(), Error> {
-        match self.waiting.last() {
+        match self.waiting.as_slice().first() {
             None => Ok(()),
             Some((name, _)) => {
                 let expected = format!("no more images, as in {}", of.display());
-                Err(Error::new(self.file.path(), "", expected, format!("image {name}")))
+                Err(Error::new(self.file.path, "", expected, format!("image {name}")))
             }
         }
     }
@@ -121,9 +121,6 @@ impl ImageRows<'_> {
     }
 
     /// Returns the released image.
-    ///
-    /// # Errors
-    /// When `read_released` would fail. Errors name the image; rows are counted within it.
     pub fn released(self) -> Result<Released<2>, Error> {
         self.read(released_of)
     }
@@ -170,8 +167,8 @@ pub struct ImageWriter<'a> {
 impl<'a> ImageWriter<'a> {
     /// Starts a file of images.
     pub fn start(output: &'a mut OutputFile) -> Self {
-        let path = output.path().to_owned();
-        Self { path, zip: Zip::new(output.writer()), of_all: None }
+        let path = output.path.clone();
+        Self { path, zip: Zip::new(&mut output.writer), of_all: None }
     }
 
     /// Adds a released image.
@@ -179,7 +176,7 @@ impl<'a> ImageWriter<'a> {
     /// # Errors
     /// When its family differs from the first image.
     pub fn released(&mut self, name: &str, released: &Released<2>) -> Result<(), Error> {
-        self.append(name, released::written(released))
+        self.append(name, Ok(released::written(released)))
     }
 
     /// Adds the ground truth of an image.
@@ -192,14 +189,12 @@ impl<'a> ImageWriter<'a> {
         original: &Original<2>,
         secret: &Secret,
     ) -> Result<(), Error> {
-        let written = truth::written(&self.path, original, secret);
-        let written = written.map_err(|error| error.within(&place(name)))?;
-        self.append(name, written)
+        self.append(name, truth::written(&self.path, original, secret))
     }
 
     /// Adds the neighborhoods of an image.
     pub fn neighborhoods(&mut self, name: &str, lists: &Neighborhoods) -> Result<(), Error> {
-        self.append(name, lists::written(lists))
+        self.append(name, Ok(lists::written(lists)))
     }
 
     /// Adds the recovered points of an image.
@@ -207,9 +202,7 @@ impl<'a> ImageWriter<'a> {
     /// # Errors
     /// When an evidence or delta is not finite.
     pub fn recovered(&mut self, name: &str, recovered: &Recovered<2>) -> Result<(), Error> {
-        let written = recovered::written(&self.path, recovered);
-        let written = written.map_err(|error| error.within(&place(name)))?;
-        self.append(name, written)
+        self.append(name, recovered::written(&self.path, recovered))
     }
 
     /// Completes the file. The caller must then commit its [`OutputFile`].
@@ -223,7 +216,8 @@ impl<'a> ImageWriter<'a> {
         self.zip.finish().map_err(|source| Error::write(&self.path, source))
     }
 
-    fn append(&mut self, name: &str, written: Written<'_>) -> Result<(), Error> {
+    fn append(&mut self, name: &str, written: Result<Written<'_>, Error>) -> Result<(), Error> {
+        let written = written.map_err(|error| error.within(&place(name)))?;
         if written.n_rows == 0 {
             return Ok(());
         }

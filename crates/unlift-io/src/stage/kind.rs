@@ -63,31 +63,29 @@ impl Kind {
         Self::Recovered,
     ];
 
+    /// The name in files, the name in errors, and the arrays that a file may have besides the
+    /// metadata.
+    fn facts(self) -> (&'static str, &'static str, &'static [&'static str]) {
+        match self {
+            Self::Released => ("released", "a released map", &RELEASED),
+            Self::Truth => ("truth", "a truth file", &TRUTH),
+            Self::Neighborhoods => {
+                ("neighborhoods", "neighborhoods of slots", &["records", "scores"])
+            }
+            Self::PointNeighborhoods => {
+                ("point_neighborhoods", "neighborhoods of points", &["neighbors", "scores"])
+            }
+            Self::Recovered => ("recovered", "a file of recovered points", &RECOVERED),
+        }
+    }
+
     /// The name used in files.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Released => "released",
-            Self::Truth => "truth",
-            Self::Neighborhoods => "neighborhoods",
-            Self::PointNeighborhoods => "point_neighborhoods",
-            Self::Recovered => "recovered",
-        }
+        self.facts().0
     }
 
-    /// Returns the kind with the name `name`, if there is one.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.name() == name)
-    }
-
-    /// The arrays that a file of this kind may have, besides the metadata.
     pub(super) fn arrays(self) -> &'static [&'static str] {
-        match self {
-            Self::Released => &RELEASED,
-            Self::Truth => &TRUTH,
-            Self::Neighborhoods => &["records", "scores"],
-            Self::PointNeighborhoods => &["neighbors", "scores"],
-            Self::Recovered => &RECOVERED,
-        }
+        self.facts().2
     }
 
     /// Returns the kind that alone may have such arrays.
@@ -101,12 +99,6 @@ impl Kind {
 
 impl fmt::Display for Kind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Released => "a released map",
-            Self::Truth => "a truth file",
-            Self::Neighborhoods => "neighborhoods of slots",
-            Self::PointNeighborhoods => "neighborhoods of points",
-            Self::Recovered => "a file of recovered points",
-        })
+        f.write_str(self.facts().1)
     }
 }

@@ -47,8 +47,7 @@ pub fn read_neighborhoods(
     n_records: usize,
     slots_per_record: usize,
 ) -> Result<Neighborhoods, Error> {
-    let arrays = Arrays::open(path)?;
-    neighborhoods_of(&arrays, n_records, slots_per_record)
+    neighborhoods_of(&Arrays::open(path)?, n_records, slots_per_record)
 }
 
 pub(super) fn neighborhoods_of(
@@ -57,7 +56,7 @@ pub(super) fn neighborhoods_of(
     slots_per_record: usize,
 ) -> Result<Neighborhoods, Error> {
     arrays.expect(Kind::Neighborhoods)?;
-    let about = arrays.meta().about()?;
+    let about = arrays.meta.about()?;
     let lists = lists_of(arrays, ("records", "record"), n_records, slots_per_record)?;
     Ok(lists.with_about(about))
 }
@@ -90,7 +89,6 @@ fn lists_of(
     })?;
     let (mut offsets, mut neighbors) = (vec![0], Vec::with_capacity(ids.len()));
     let mut scores = given.as_ref().map(|scores| Vec::with_capacity(scores.len()));
-    let mut sorted = Vec::new();
     for row in 0..n_rows {
         let first = neighbors.len();
         for at in row * k..(row + 1) * k {
@@ -111,11 +109,10 @@ fn lists_of(
             let found = format!("its own {word} {own}");
             return Err(arrays.wrong(name, row, format!("other {word}s"), found));
         }
-        sorted.clear();
-        sorted.extend(neighbors[first..].iter().map(|record| record.0));
+        let mut sorted = neighbors[first..].to_vec();
         sorted.sort_unstable();
         if let Some(pair) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-            let found = format!("{word} {} twice", pair[0]);
+            let found = format!("{word} {} twice", pair[0].0);
             return Err(arrays.wrong(name, row, format!("each {word} once"), found));
         }
         offsets.push(neighbors.len() as u64);

@@ -1,5 +1,6 @@
 //! The metadata of a stage file: a JSON object in the text array `unlift`.
 
+use std::fmt::Display;
 use std::path::Path;
 
 use serde_json::{Map, Value, json};
@@ -8,7 +9,6 @@ use unlift::{About, Fingerprint, RowOrder, Unit};
 use super::kind::Kind;
 use crate::Error;
 
-/// The name of the array.
 pub(super) const KEY: &str = "unlift";
 
 /// The privacy budget of words, in the metadata.
@@ -67,7 +67,7 @@ impl<'a> Meta<'a> {
     fn given<'s, T>(
         &'s self,
         key: &str,
-        expected: impl Into<String>,
+        expected: impl Display,
         read: impl FnOnce(&'s Value) -> Option<T>,
     ) -> Result<Option<T>, Error> {
         let Some(value) = self.object.get(key) else { return Ok(None) };
@@ -78,15 +78,16 @@ impl<'a> Meta<'a> {
         let is_known = |version: &Value| (version.as_u64() == Some(VERSION)).then_some(());
         self.given("version", VERSION.to_string(), is_known)?;
         let expected = format!("one of {}", Kind::ALL.map(Kind::name).join(", "));
-        self.given("kind", expected, |kind| Kind::from_name(kind.as_str()?))
+        let of_name = |name: &Value| Kind::ALL.into_iter().find(|kind| name == kind.name());
+        self.given("kind", expected, of_name)
     }
 
-    pub(super) fn unit(&self) -> Result<Option<Unit>, Error> {
-        self.given("unit", UNITS, |unit| Unit::from_name(unit.as_str()?))
-    }
-
-    pub(super) fn wrong_unit(&self) -> Error {
-        self.wrong("unit", UNITS)
+    /// The unit of all lengths: as declared, else `usual`, else pixels in 2D.
+    pub(super) fn unit<const D: usize>(&self, usual: Option<Unit>) -> Result<Unit, Error> {
+        const UNITS: &str = "m, px or kth_neighbor";
+        let stated = self.given("unit", UNITS, |unit| Unit::from_name(unit.as_str()?))?;
+        let unit = stated.or(usual).or((D == 2).then_some(Unit::Pixel));
+        unit.ok_or_else(|| self.wrong("unit", UNITS))
     }
 
     pub(super) fn fingerprint(&self) -> Result<Option<Fingerprint>, Error> {
@@ -130,13 +131,11 @@ impl<'a> Meta<'a> {
         Ok(self.given(key, "true or false", Value::as_bool)?.unwrap_or(false))
     }
 
-    pub(super) fn wrong(&self, key: &str, expected: impl Into<String>) -> Error {
+    pub(super) fn wrong(&self, key: &str, expected: impl Display) -> Error {
         let found = self.object.get(key).map_or("nothing".into(), short);
         Error::new(self.path, format!("metadata unlift, {key}"), expected, found)
     }
 }
-
-const UNITS: &str = "m, px or kth_neighbor";
 
 fn short(value: &Value) -> String {
     let text = value.to_string();

@@ -27,7 +27,7 @@ use arrays::Arrays;
 pub use images::{ImageFile, ImageRows, ImageWriter};
 pub use kind::Kind;
 pub use lists::{read_neighborhoods, read_point_neighborhoods, write_neighborhoods};
-pub use recovered::{read_recovered, read_recovered_in, write_recovered};
+pub use recovered::{read_recovered, write_recovered};
 pub use released::{published_positions, read_released, scheme_name, write_released};
 pub use truth::{read_truth, write_truth};
 
@@ -37,8 +37,7 @@ pub use truth::{read_truth, write_truth};
 /// When the file is not a stage file of a known kind and version.
 pub fn kind(path: &Path) -> Result<Kind, Error> {
     let arrays = Arrays::open(path)?;
-    let kind = arrays.kind()?;
-    kind.ok_or_else(|| Error::new(path, "", "a stage file of unlift", arrays.list()))
+    arrays.kind()?.ok_or_else(|| Error::new(path, "", "a stage file of unlift", arrays.list()))
 }
 
 /// Returns true if the stage file `path` contains many images, below their names.
@@ -49,5 +48,5 @@ pub fn has_images(path: &Path) -> Result<bool, Error> {
 /// Returns the kind that the metadata of the file at `path` declares, if it is a stage file and
 /// declares one.
 pub fn declared_kind(path: &Path) -> Option<Kind> {
-    Arrays::open(path).ok()?.meta().kind().ok()?
+    Arrays::open(path).ok()?.meta.kind().ok()?
 }

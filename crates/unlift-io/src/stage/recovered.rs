@@ -65,21 +65,16 @@ pub(super) fn written<'a, const D: usize>(
     Ok(written)
 }
 
-/// Reads recovered points of dimension `D`.
+/// Reads recovered points of dimension `D`, in `usual` units unless the file states others.
 ///
 /// Only `position` is required. Without `status`, a point is recovered, or without support if its
 /// coordinates are NaN; `support` and `evidence` default to 0. Confidence requires both of its
 /// arrays.
-pub fn read_recovered<const D: usize>(path: &Path) -> Result<Recovered<D>, Error> {
-    recovered_of(&Arrays::open(path)?, None)
-}
-
-/// Reads recovered points like [`read_recovered`], with `unit` as the default unit.
-///
-/// # Errors
-/// When [`read_recovered`] would fail for another reason than a missing unit.
-pub fn read_recovered_in<const D: usize>(path: &Path, unit: Unit) -> Result<Recovered<D>, Error> {
-    recovered_of(&Arrays::open(path)?, Some(unit))
+pub fn read_recovered<const D: usize>(
+    path: &Path,
+    usual: Option<Unit>,
+) -> Result<Recovered<D>, Error> {
+    recovered_of(&Arrays::open(path)?, usual)
 }
 
 pub(super) fn recovered_of<const D: usize>(
@@ -87,7 +82,7 @@ pub(super) fn recovered_of<const D: usize>(
     usual: Option<Unit>,
 ) -> Result<Recovered<D>, Error> {
     arrays.expect(Kind::Recovered)?;
-    let (meta, unit) = (arrays.meta(), arrays.unit::<D>(usual)?);
+    let (meta, unit) = (&arrays.meta, arrays.meta.unit::<D>(usual)?);
     let delta = meta.number("delta")?;
     let about = meta.about()?;
     let why_unknown = match meta.text(WHY_UNKNOWN)? {
@@ -100,12 +95,9 @@ pub(super) fn recovered_of<const D: usize>(
     let origin = arrays.origin()?;
     let estimates = estimates(arrays, &origin)?;
     let n = estimates.len();
-    let confidence = match arrays.has("found") || arrays.has("error_scale") {
-        true => Some(confidence(arrays, &estimates)?),
-        false => None,
-    };
-    let rows = |name| Ok(arrays.integers(name, [Some(n)], n, false)?.0);
-    let rows = arrays.optional("descriptor_row", rows)?;
+    let has_confidence = arrays.has("found") || arrays.has("error_scale");
+    let confidence = has_confidence.then(|| confidence(arrays, &estimates)).transpose()?;
+    let rows = arrays.column("descriptor_row", n, n, false)?;
     Recovered::try_new(&estimates, arrays.has("axis"), rows, origin, unit, delta)
         .and_then(|recovered| match confidence {
             Some(confidence) => recovered.with_confidence(confidence),
@@ -124,13 +116,9 @@ fn estimates<const D: usize>(
     let sides = [None, Some(D)];
     let (values, [n, _]) = arrays.numbers("position", sides, Class::Any, rule, no_infinity)?;
     let positions: &[[f64; D]] = values.as_chunks().0;
-    let optional = |name: &str, below: usize, or_none: bool| {
-        let values = |name| arrays.integers(name, [Some(n)], below, or_none);
-        Ok::<_, Error>(arrays.optional(name, values)?.map(|(values, _)| values))
-    };
-    let status = optional("status", Status::ALL.len(), false)?;
-    let support = optional("support", 1 << 16, false)?;
-    let axis = optional("axis", D, true)?;
+    let status = arrays.column("status", n, Status::ALL.len(), false)?;
+    let support = arrays.column("support", n, 1 << 16, false)?;
+    let axis = arrays.column("axis", n, D, true)?;
     let evidence = arrays.optional("evidence", |name| {
         let single = |x: f64| Some(x as f32).filter(|x| x.is_finite());
         Ok(arrays.numbers(name, [Some(n)], Class::Any, "a finite number", single)?.0)
@@ -153,12 +141,11 @@ fn estimates<const D: usize>(
                 true => "0, as there is a position",
                 false => "the code of a reason, as there is no position",
             };
-            return Err(arrays.wrong("status", slot, expected, (status as u8).to_string()));
+            return Err(arrays.wrong("status", slot, expected, status as u8));
         }
         let axis = match axis.as_ref().map(|axis| axis[slot]) {
             Some(NONE) if has_position => {
-                let expected = "an axis, as there is a position";
-                return Err(arrays.wrong("axis", slot, expected, "-1"));
+                return Err(arrays.wrong("axis", slot, "an axis, as there is a position", "-1"));
             }
             None | Some(NONE) => 0,
             Some(axis) => axis as u8,

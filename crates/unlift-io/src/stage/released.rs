@@ -62,11 +62,10 @@ pub(super) fn written<const D: usize>(released: &Released<D>) -> Written<'_> {
     }
     match (released.protected(), released.descriptors()) {
         (Some(protected), _) => write_protected(&mut written, protected, [n, slots]),
-        (None, Some(plain)) if slots == 1 => {
-            write_rows(&mut written, "descriptor", plain, &[n, plain.dim()]);
-        }
         (None, Some(plain)) => {
-            write_rows(&mut written, "descriptor", plain, &[n, slots, plain.dim()]);
+            let (one, several) = ([n, plain.dim()], [n, slots, plain.dim()]);
+            let shape = if slots == 1 { &one[..] } else { &several };
+            write_rows(&mut written, "descriptor", plain, shape);
         }
         (None, None) => {}
     }
@@ -133,8 +132,7 @@ pub fn read_released<const D: usize>(path: &Path) -> Result<Released<D>, Error> 
 /// # Errors
 /// When it is not a stage file, or the name is not text.
 pub fn scheme_name(path: &Path) -> Result<Option<String>, Error> {
-    let arrays = Arrays::open(path)?;
-    Ok(arrays.meta().text("scheme")?.map(str::to_owned))
+    Ok(Arrays::open(path)?.meta.text("scheme")?.map(str::to_owned))
 }
 
 /// Returns positions that the file at `path` publishes, one per record: those of its arrays as they
@@ -165,10 +163,10 @@ pub fn published_positions<const D: usize>(path: &Path) -> Result<Vec<Vec<[f64; 
 
 pub(super) fn released_of<const D: usize>(arrays: &Arrays<'_>) -> Result<Released<D>, Error> {
     let core = |source| arrays.refused(source);
-    let meta = arrays.meta();
+    let meta = &arrays.meta;
     let family = family(arrays)?;
     arrays.expect(Kind::Released)?;
-    let unit = arrays.unit::<D>(None)?;
+    let unit = arrays.meta.unit::<D>(None)?;
     let slots = meta.slots_per_record()?.unwrap_or(1);
     let obfuscation = match family {
         "lines" => {
@@ -211,30 +209,31 @@ pub(super) fn released_of<const D: usize>(arrays: &Arrays<'_>) -> Result<Release
 
 /// The family by the metadata, else by the arrays.
 fn family(arrays: &Arrays<'_>) -> Result<&'static str, Error> {
-    let names = FAMILIES.map(|(name, _)| name).join(", ");
-    if let Some(stated) = arrays.meta().text("family")? {
-        let known = FAMILIES.into_iter().find(|(name, _)| *name == stated);
-        return known
-            .map(|(name, _)| name)
-            .ok_or_else(|| arrays.meta().wrong("family", format!("one of {names}")));
+    let stated = arrays.meta.text("family")?;
+    let is_it = |(name, array): &(&str, &str)| {
+        stated.map_or_else(|| arrays.has(array), |stated| stated == *name)
+    };
+    if let Some((name, _)) = FAMILIES.into_iter().find(is_it) {
+        return Ok(name);
     }
-    let known = FAMILIES.into_iter().find(|(_, array)| arrays.has(array));
-    known.map(|(name, _)| name).ok_or_else(|| {
-        let arrays_of = FAMILIES.map(|(_, array)| array).join(", ");
-        let expected = format!("a released map, with one of the arrays {arrays_of}");
-        let found = match arrays.kind() {
-            Ok(Some(kind)) if kind != Kind::Released => kind.to_string(),
-            _ => arrays.list(),
-        };
-        Error::new(arrays.path(), "", expected, found)
-    })
+    if stated.is_some() {
+        let names = FAMILIES.map(|(name, _)| name).join(", ");
+        return Err(arrays.meta.wrong("family", format!("one of {names}")));
+    }
+    let arrays_of = FAMILIES.map(|(_, array)| array).join(", ");
+    let expected = format!("a released map, with one of the arrays {arrays_of}");
+    let found = match arrays.kind() {
+        Ok(Some(kind)) if kind != Kind::Released => kind.to_string(),
+        _ => arrays.list(),
+    };
+    Err(Error::new(arrays.path, "", expected, found))
 }
 
 fn rays<const D: usize>(arrays: &Arrays<'_>) -> Result<Result<Rays<D>, unlift::Error>, Error> {
     let centers = arrays.vectors("centers", None)?;
     if centers.is_empty() || centers.len() > 255 {
         let found = format!("{} rows", centers.len());
-        return Err(Error::new(arrays.path(), "array centers", "1 to 255 rows", found));
+        return Err(Error::new(arrays.path, "array centers", "1 to 255 rows", found));
     }
     let (center, [n]) = arrays.integers("center", [None], centers.len(), false)?;
     let center = center.into_iter().map(|center| center as u8).collect();
@@ -248,7 +247,6 @@ fn rays<const D: usize>(arrays: &Arrays<'_>) -> Result<Result<Rays<D>, unlift::E
     Ok(rays)
 }
 
-/// Converts low and high corners to boxes.
 fn boxes<const D: usize>(
     arrays: &Arrays<'_>,
     name: &str,
@@ -264,13 +262,9 @@ fn descriptors(arrays: &Arrays<'_>, n: usize, slots: usize) -> Result<Option<Des
     if !arrays.has("descriptor") {
         return Ok(None);
     }
-    let (values, dim) = if slots == 1 {
-        let (values, [_, dim]) = arrays.bytes_or_floats("descriptor", [Some(n), None])?;
-        (values, dim)
-    } else {
-        let sides = [Some(n), Some(slots), None];
-        let (values, [_, _, dim]) = arrays.bytes_or_floats("descriptor", sides)?;
-        (values, dim)
+    let (values, dim) = match slots {
+        1 => arrays.bytes_or_floats("descriptor", [Some(n), None])?,
+        _ => arrays.bytes_or_floats("descriptor", [Some(n), Some(slots), None])?,
     };
     if n == 0 {
         return Ok(None);
@@ -278,7 +272,6 @@ fn descriptors(arrays: &Arrays<'_>, n: usize, slots: usize) -> Result<Option<Des
     Descriptors::try_new(values, dim).map(Some).map_err(|source| arrays.refused(source))
 }
 
-/// Reads protected descriptors.
 fn protected(
     arrays: &Arrays<'_>,
     n: usize,
@@ -289,7 +282,7 @@ fn protected(
     if !matches!(given[..], [] | [_] | [SUBSPACE | WORDS, PUBLIC]) || given == [PUBLIC] {
         let expected =
             format!("one of descriptor, {SUBSPACE} and {WORDS}, and {PUBLIC} beside the last two");
-        return Err(Error::new(arrays.path(), "arrays", expected, given.join(", ")));
+        return Err(Error::new(arrays.path, "arrays", expected, given.join(", ")));
     }
     let public = arrays.optional(PUBLIC, |name| arrays.floats(name, [None, None]))?;
     let n_public = public.as_ref().map_or(0, |(_, [n, _])| *n);
@@ -301,7 +294,7 @@ fn protected(
     } else if arrays.has(WORDS) {
         let (words, [.., m]) =
             arrays.integers(WORDS, [Some(n), Some(slots), None], n_public, false)?;
-        let epsilon = arrays.meta().number(EPSILON)?;
+        let epsilon = arrays.meta.number(EPSILON)?;
         (Rule::Words { m, epsilon }, words.into_iter().map(|word| word as f32).collect(), m)
     } else {
         return Ok(None);
@@ -311,7 +304,7 @@ fn protected(
         let values = values.into_iter().map(|x| x as f32).collect();
         Descriptors::try_new(Values::F32(values), dim).map(Arc::new)
     });
-    let of_bytes = arrays.meta().flag(OF_BYTES)?;
+    let of_bytes = arrays.meta.flag(OF_BYTES)?;
     public
         .transpose()
         .and_then(|public| ProtectedDescriptors::try_new(rule, rows, public, of_bytes))

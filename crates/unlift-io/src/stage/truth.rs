@@ -31,8 +31,7 @@ pub(super) fn written<'a, const D: usize>(
     let points = original.reveal();
     let n = secret.n_originals();
     if points.len() != n {
-        let expected = format!("{n} originals, as in the secret");
-        return Err(Error::new(path, "", expected, points.len().to_string()));
+        return Err(Error::new(path, "", format!("{n} originals, as in the secret"), points.len()));
     }
     let mut written = Written::new(Kind::Truth, n);
     written.state("unit", points.unit().name());
@@ -80,15 +79,10 @@ pub(super) fn truth_of<const D: usize>(
 ) -> Result<(Original<D>, Secret), Error> {
     arrays.expect(Kind::Truth)?;
     let core = |source| arrays.refused(source);
-    let unit = arrays.unit::<D>(None)?;
+    let unit = arrays.meta.unit::<D>(None)?;
     let positions = arrays.vectors("position", None)?;
     let n = positions.len();
-    // Returns the array `name` by original, or `None` if there is none.
-    let column = |name: &str, below: usize| {
-        let values = |name| arrays.integers(name, [Some(n)], below, true);
-        Ok::<_, Error>(arrays.optional(name, values)?.map(|(values, _)| values))
-    };
-    let slot = column("slot", n)?.unwrap_or_else(|| (0..n as u32).collect());
+    let slot = arrays.column("slot", n, n, true)?.unwrap_or_else(|| (0..n as u32).collect());
     let n_slots = slot.iter().filter(|&&slot| slot != NONE).count();
     let mut hidden = vec![NONE; n_slots];
     for (original, &slot) in slot.iter().enumerate().filter(|(_, slot)| **slot != NONE) {
@@ -100,12 +94,13 @@ pub(super) fn truth_of<const D: usize>(
             }
             None => {
                 let expected = format!("slots below {n_slots}, the number of slots");
-                return Err(arrays.wrong("slot", original, expected, slot.to_string()));
+                return Err(arrays.wrong("slot", original, expected, slot));
             }
         }
     }
-    // Returns an array of a number per hidden point in the order of slots.
-    let by_slot = |name: &str, values: Vec<u32>| -> Result<Vec<u32>, Error> {
+    // Returns an array of a number below `below` per hidden point, in the order of slots.
+    let by_slot = |name: &str, below: usize| -> Result<Option<Vec<u32>>, Error> {
+        let Some(values) = arrays.column(name, n, below, true)? else { return Ok(None) };
         for (original, (value, slot)) in values.iter().zip(&slot).enumerate() {
             if (*value == NONE) != (*slot == NONE) {
                 let (expected, found) = match *slot {
@@ -115,21 +110,17 @@ pub(super) fn truth_of<const D: usize>(
                 return Err(arrays.wrong(name, original, expected, found));
             }
         }
-        Ok(hidden.iter().map(|&original| values[original as usize]).collect())
+        Ok(Some(hidden.iter().map(|&original| values[original as usize]).collect()))
     };
-    let axes = column("swapped_axis", D)?.map(|axes| by_slot("swapped_axis", axes)).transpose()?;
-    let axes = axes.map(|axes| axes.into_iter().map(|axis| axis as u8).collect());
-    let slots = arrays.meta().slots_per_record()?;
-    let rows = match column("descriptor_row", n)? {
-        Some(rows) => by_slot("descriptor_row", rows)?,
+    let axes =
+        by_slot("swapped_axis", D)?.map(|axes| axes.into_iter().map(|axis| axis as u8).collect());
+    let slots = arrays.meta.slots_per_record()?;
+    let rows = match by_slot("descriptor_row", n)? {
+        Some(rows) => rows,
         None if slots == Some(2) => {
             let expected = "the descriptor row of each point, as records have two slots";
-            return Err(Error::new(
-                arrays.path(),
-                "array descriptor_row",
-                expected,
-                "no such array",
-            ));
+            let (place, found) = ("array descriptor_row", "no such array");
+            return Err(Error::new(arrays.path, place, expected, found));
         }
         None => (0..n_slots as u32).collect(),
     };
@@ -138,16 +129,13 @@ pub(super) fn truth_of<const D: usize>(
     let secret = Secret::try_new(hidden, axes, rows, dropped, n).map_err(core)?;
     // Crossed descriptor rows imply two slots.
     let slots = slots.unwrap_or(secret.slots_per_record());
-    let secret = secret.of_map(arrays.meta().fingerprint()?, slots).map_err(core)?;
-    let points = PointSet::try_new(positions, unit).map_err(core)?;
-    Ok((Original::new(points), secret))
+    let secret = secret.of_map(arrays.meta.fingerprint()?, slots).map_err(core)?;
+    Ok((Original::new(PointSet::try_new(positions, unit).map_err(core)?), secret))
 }
 
 /// Returns the originals without a slot, with their reasons.
 fn dropped(arrays: &Arrays<'_>, slot: &[u32]) -> Result<Vec<Dropped>, Error> {
-    let n = slot.len();
-    let codes = |name| arrays.integers(name, [Some(n)], 1 + DropReason::ALL.len(), false);
-    let reasons = arrays.optional("dropped", codes)?.map(|(codes, _)| codes);
+    let reasons = arrays.column("dropped", slot.len(), 1 + DropReason::ALL.len(), false)?;
     let mut dropped = Vec::new();
     for (original, &slot) in slot.iter().enumerate() {
         let code = reasons.as_ref().map(|reasons| reasons[original] as usize);
@@ -160,8 +148,7 @@ fn dropped(arrays: &Arrays<'_>, slot: &[u32]) -> Result<Vec<Dropped>, Error> {
             (NONE, Some(code)) => DropReason::ALL[code - 1],
             (_, None | Some(0)) => continue,
             (_, Some(code)) => {
-                let expected = "0, as there is a slot";
-                return Err(arrays.wrong("dropped", original, expected, code.to_string()));
+                return Err(arrays.wrong("dropped", original, "0, as there is a slot", code));
             }
         };
         dropped.push(Dropped { original: OriginalId(original as u32), reason });

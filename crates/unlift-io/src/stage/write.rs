@@ -4,7 +4,6 @@ use std::cell::RefCell;
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
-use std::rc::Rc;
 
 use serde_json::{Map, Value};
 use unlift::About;
@@ -24,7 +23,6 @@ pub(super) struct Written<'a> {
     arrays: Vec<Array<'a>>,
 }
 
-/// Writes the values of an array.
 type Fill<'a> = Box<dyn FnOnce(&mut dyn Write) -> io::Result<()> + 'a>;
 
 struct Array<'a> {
@@ -36,7 +34,6 @@ struct Array<'a> {
     fill: Fill<'a>,
 }
 
-/// A number of an array.
 pub(super) trait Number {
     const DESCR: &'static str;
 
@@ -104,7 +101,6 @@ impl<'a> Written<'a> {
         self.arrays.push(Array { name, descr: T::DESCR, shape, size, fill });
     }
 
-    /// Adds an array of vectors.
     pub(super) fn vectors<T: Number + Copy, const D: usize>(
         &mut self,
         name: &'static str,
@@ -114,7 +110,6 @@ impl<'a> Written<'a> {
     }
 }
 
-/// Writes a stage file.
 pub(super) fn write_file(path: &Path, access: Access, written: Written<'_>) -> Result<(), Error> {
     atomic::write_file(path, access, |file| {
         let mut zip = Zip::new(file);
@@ -124,27 +119,19 @@ pub(super) fn write_file(path: &Path, access: Access, written: Written<'_>) -> R
     })
 }
 
-/// A writer of an archive.
-pub(super) struct Zip<'a> {
-    writer: ZipWriter<Target<'a>>,
-    error: FirstError,
-}
-
-type FirstError = Rc<RefCell<Option<io::Error>>>;
+pub(super) struct Zip<'a>(ZipWriter<Target<'a>>);
 
 impl<'a> Zip<'a> {
     pub(super) fn new(file: &'a mut BufWriter<File>) -> Self {
-        let error = FirstError::default();
-        let target = Target { file, at: 0, end: 0, failed: false, error: error.clone() };
-        Self { writer: ZipWriter::new(target), error }
+        let error = RefCell::default();
+        Self(ZipWriter::new(Target { file, at: 0, end: 0, failed: false, error }))
     }
 
     /// Writes the text `name`, an array without dimensions.
     pub(super) fn text(&mut self, name: &str, text: &str) -> io::Result<()> {
         let letters: Vec<u8> = text.chars().flat_map(|c| u32::from(c).to_le_bytes()).collect();
-        let descr = format!("<U{}", letters.len() / 4);
-        self.start(name, &descr, &[], letters.len())?;
-        self.writer.write_all(&letters)
+        self.start(name, &format!("<U{}", letters.len() / 4), &[], letters.len())?;
+        self.0.write_all(&letters)
     }
 
     /// Writes all arrays, with `prefix` before their names.
@@ -152,20 +139,16 @@ impl<'a> Zip<'a> {
         for array in written.arrays {
             let name = format!("{prefix}{}", array.name);
             self.start(&name, array.descr, &array.shape, array.size)?;
-            (array.fill)(&mut self.writer)?;
-            self.so_far()?;
+            (array.fill)(&mut self.0)?;
+            self.0.get_ref().map_or(Ok(()), Target::so_far)?;
         }
         Ok(())
     }
 
     pub(super) fn finish(self) -> io::Result<()> {
-        let Self { writer, error } = self;
-        writer.finish()?.flush()?;
-        error.take().map_or(Ok(()), Err)
-    }
-
-    fn so_far(&self) -> io::Result<()> {
-        self.error.take().map_or(Ok(()), Err)
+        let mut target = self.0.finish()?;
+        target.flush()?;
+        target.so_far()
     }
 
     /// Starts the array `name` with its header.
@@ -183,8 +166,8 @@ impl<'a> Zip<'a> {
             .last_modified_time(DateTime::DEFAULT)
             .system(System::Unix)
             .large_file(is_large);
-        self.writer.start_file(format!("{name}.npy"), options)?;
-        self.writer.write_all(&header)
+        self.0.start_file(format!("{name}.npy"), options)?;
+        self.0.write_all(&header)
     }
 }
 
@@ -195,15 +178,21 @@ struct Target<'a> {
     at: u64,
     end: u64,
     failed: bool,
-    error: FirstError,
+    error: RefCell<Option<io::Error>>,
 }
 
 impl Target<'_> {
     fn note(&mut self, step: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) {
-        let mut error = self.error.borrow_mut();
         if !self.failed {
-            self.failed = step(self.file).map_err(|source| *error = Some(source)).is_err();
+            let failure = step(self.file).err();
+            self.failed = failure.is_some();
+            self.error.replace(failure);
         }
+    }
+
+    /// Returns the first error, once.
+    fn so_far(&self) -> io::Result<()> {
+        self.error.take().map_or(Ok(()), Err)
     }
 }
 

@@ -12,7 +12,7 @@ use unlift_io::features::{FeatureWriter, ImageFeatures, round_to_half};
 use unlift_io::read::{self, Input, colmap};
 
 use super::malformed::{MANY, appended, patched};
-use super::{data, fixture, npy, shown, write, write_database};
+use super::{data, fixture, npy, place, shown, write, write_database};
 
 #[test]
 fn descriptors_follow_the_ids_of_the_input_in_every_form() {
@@ -40,31 +40,36 @@ fn descriptors_follow_the_ids_of_the_input_in_every_form() {
     }
 }
 
-fn row(id: u32, at: u32) -> [f32; 3] {
-    [id as f32, at as f32 - 2.0, 1.0]
-}
-
-/// Writes hloc's features of the images of the project. The image `odd` has an extra keypoint.
-fn features(path: &Path, odd: &str) {
-    let images = colmap::read_images(&data("project/sparse/0/images.bin")).unwrap();
+/// Writes hloc's features: names and descriptors of `dim` values.
+fn write_features(path: &Path, dim: usize, images: impl IntoIterator<Item = (String, Vec<f32>)>) {
     let mut writer = FeatureWriter::create(path).unwrap();
-    for image in images {
-        let name = String::from_utf8(image.name).unwrap();
-        let n = image.n_points2d as u32 + u32::from(name == odd);
-        let values = (0..n).flat_map(|at| row(image.id, at)).collect();
-        let descriptors = Some(Descriptors::try_new(Values::F32(values), 3).unwrap());
-        let keypoints = (0..n).map(|at| [f64::from(at), 1.0]).collect();
-        writer
-            .append(&ImageFeatures { name, keypoints, descriptors, ..Default::default() })
-            .unwrap();
+    for (name, values) in images {
+        let keypoints = vec![[3.0, 4.0]; values.len() / dim];
+        let descriptors = Descriptors::try_new(Values::F32(values), dim).ok();
+        let image = ImageFeatures { name, keypoints, descriptors, ..Default::default() };
+        writer.append(&image).unwrap();
     }
     writer.finish().unwrap();
 }
 
+fn row(id: u32, at: u32) -> [f32; 3] {
+    [id as f32, at as f32 - 2.0, 1.0]
+}
+
+/// Writes features of the images of the project. The image `odd` has an extra keypoint.
+fn features(path: &Path, odd: &str) {
+    let images = colmap::read_images(&data("project/sparse/0/images.bin")).unwrap();
+    let described = |image: colmap::Image| {
+        let name = String::from_utf8(image.name).unwrap();
+        let n = image.n_points2d as u32 + u32::from(name == odd);
+        (name, (0..n).flat_map(|at| row(image.id, at)).collect())
+    };
+    write_features(path, 3, images.into_iter().map(described));
+}
+
 #[test]
 fn features_of_hloc_are_descriptors_of_the_points_that_they_made() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("features.h5");
+    let (_dir, path) = place("features.h5");
     let input = read::open(&data("project")).unwrap();
     features(&path, "");
     let descriptors = read::descriptors(&path, &input).unwrap();
@@ -147,17 +152,12 @@ fn features_of_changed_models_pass_unless_they_are_in_another_order() {
             };
             let rows = |image: usize| (0..N).flat_map(move |at| row(image, at));
             let [h5, db] = ["f.h5", "f.db"].map(|name| dir.path().join(name));
-            let mut writer = FeatureWriter::create(&h5).unwrap();
-            for image in 0..8 {
+            let of_image = |image: usize| {
                 let mut values: Vec<f32> = rows(image).collect();
                 round_to_half(&mut values);
-                let descriptors = Descriptors::try_new(Values::F32(values), 32).ok();
-                let (name, keypoints) = (format!("{image}.jpg"), vec![[3.0, 4.0]; N]);
-                writer
-                    .append(&ImageFeatures { name, keypoints, descriptors, ..Default::default() })
-                    .unwrap();
-            }
-            writer.finish().unwrap();
+                (format!("{image}.jpg"), values)
+            };
+            write_features(&h5, 32, (0..8).map(of_image));
             write_bytes(&db, |image| rows(image).map(|x| (60.0 * x) as u8).collect());
             for path in [h5, db] {
                 let error = read::descriptors(&path, &input).err();
@@ -184,76 +184,51 @@ fn bit_strings_of_a_track_are_no_numbers() {
     assert_eq!(read::descriptors(&path, &input).unwrap().values(), &Values::U8(bits));
 }
 
-/// The descriptors of the project as floats of norm 1, exact in half floats.
-fn unit_floats(input: &Input) -> Vec<f32> {
-    let bytes = read::descriptors(&data("project/descriptors.bin"), input).unwrap();
-    let Values::U8(bytes) = bytes.values() else { panic!("bytes expected") };
-    bytes.iter().map(|&byte| f32::from(byte) / 512.0).collect()
-}
-
-fn p3desc(ids: &[u64], dtype: u32) -> Vec<u8> {
-    let mut file = b"P3DESC01".to_vec();
-    file.extend((ids.len() as u64).to_le_bytes());
-    file.extend(128u32.to_le_bytes());
-    file.extend(dtype.to_le_bytes());
-    ids.iter().for_each(|id| file.extend(id.to_le_bytes()));
-    file
-}
-
 #[test]
-fn binary_descriptors_may_be_floats_of_16_or_32_bits() {
+fn descriptors_of_points_are_read_in_every_type_and_order() {
     let input = read::open(&data("project")).unwrap();
-    let floats = unit_floats(&input);
-    for dtype in [2, 3] {
-        // An extra point, and another order of rows: points are joined by id.
-        let mut file = p3desc(&[1000, 11, 9, 6, 4, 3, 2], dtype);
-        let rows = std::iter::once(&[0.5; 128][..]).chain(floats.chunks(128).rev());
-        for value in rows.flatten() {
-            match dtype {
-                2 => file.extend(f16::from_f32(*value).to_le_bytes()),
-                _ => file.extend(value.to_le_bytes()),
-            }
-        }
-        let (_dir, path) = write("d.bin", file);
-        let read = read::descriptors(&path, &input).unwrap();
-        assert_eq!(read.values(), &Values::F32(floats.clone()), "512ths of bytes fit a half");
-    }
-}
-
-#[test]
-fn arrays_of_descriptors_have_a_row_per_point_in_its_order() {
-    let all = read::open(&data("project")).unwrap();
-    let floats = unit_floats(&all);
-    let expected = Values::F32(floats.clone());
-    let bytes = |of: fn(f32) -> Vec<u8>| floats.iter().flat_map(|&x| of(x)).collect::<Vec<u8>>();
-    for (descr, values) in [
-        ("<f2", bytes(|x| f16::from_f32(x).to_le_bytes().to_vec())),
-        (">f2", bytes(|x| f16::from_f32(x).to_be_bytes().to_vec())),
-        ("<f4", bytes(|x| x.to_le_bytes().to_vec())),
-        (">f8", bytes(|x| f64::from(x).to_be_bytes().to_vec())),
+    let of_bytes = read::descriptors(&data("project/descriptors.bin"), &input).unwrap();
+    let Values::U8(bytes) = of_bytes.values() else { panic!("bytes expected") };
+    // 512ths of bytes fit a half.
+    let floats: Vec<f32> = bytes.iter().map(|&byte| f32::from(byte) / 512.0).collect();
+    let rows = || floats.chunks(128);
+    let half: fn(f32) -> Vec<u8> = |x| f16::from_f32(x).to_le_bytes().into();
+    let single: fn(f32) -> Vec<u8> = |x| x.to_le_bytes().into();
+    // An extra point, and another order of rows: points are joined by id.
+    let joined = |dtype: u32, of: fn(f32) -> Vec<u8>| {
+        let head = [&b"P3DESC01\x07\0\0\0\0\0\0\0\x80\0\0\0"[..], &dtype.to_le_bytes()].concat();
+        let ids = [1000u64, 11, 9, 6, 4, 3, 2].map(u64::to_le_bytes).concat();
+        let rows = std::iter::once(&[0.5; 128][..]).chain(rows().rev());
+        [head, ids, rows.flatten().flat_map(|&x| of(x)).collect()].concat()
+    };
+    let array = |descr: &str, of: fn(f32) -> Vec<u8>| {
+        npy(descr, "(6, 128)", &floats.iter().flat_map(|&x| of(x)).collect::<Vec<u8>>())
+    };
+    let columns = (0..128).flat_map(|c| rows().map(move |row| row[c]));
+    let columns = npy("'<f4'", "(6, 128)", &columns.flat_map(single).collect::<Vec<u8>>());
+    let order = columns.windows(5).position(|word| word == b"False").unwrap();
+    for (what, file) in [
+        ("halves by id", joined(2, half)),
+        ("floats by id", joined(3, single)),
+        ("<f2", array("'<f2'", half)),
+        (">f2", array("'>f2'", |x| f16::from_f32(x).to_be_bytes().into())),
+        ("<f4", array("'<f4'", single)),
+        (">f8", array("'>f8'", |x| f64::from(x).to_be_bytes().into())),
+        ("by columns", patched(columns, order, b"True ")),
     ] {
-        let (_dir, path) = write("d.npy", npy(&format!("'{descr}'"), "(6, 128)", &values));
-        assert_eq!(read::descriptors(&path, &all).unwrap().values(), &expected, "{descr}");
+        let (_dir, path) = write("d", file);
+        let read = read::descriptors(&path, &input).unwrap();
+        assert_eq!(read.values(), &Values::F32(floats.clone()), "{what}");
     }
-    let columns = (0..128).flat_map(|c| floats.chunks(128).map(move |row| row[c]));
-    let columns: Vec<u8> = columns.flat_map(f32::to_le_bytes).collect();
-    let by_columns = npy("'<f4'", "(6, 128)", &columns);
-    let at = by_columns.windows(5).position(|word| word == b"False").unwrap();
-    let (_dir, path) = write("d.npy", patched(by_columns, at, b"True "));
-    assert_eq!(read::descriptors(&path, &all).unwrap().values(), &expected, "by columns");
-    let of_bytes = read::descriptors(&data("project/descriptors.bin"), &all).unwrap();
-    let Values::U8(values) = of_bytes.values() else { panic!("bytes expected") };
-    let (_dir, path) = write("d.npy", npy("'|u1'", "(6, 128)", values));
-    assert_eq!(read::descriptors(&path, &all).unwrap(), of_bytes);
+    let (_dir, path) = write("d.npy", npy("'|u1'", "(6, 128)", bytes));
+    assert_eq!(read::descriptors(&path, &input).unwrap(), of_bytes);
 }
 
 #[test]
 fn a_database_without_types_is_read_as_bytes() {
-    let dir = tempfile::tempdir().unwrap();
     // A URI would misread this name.
-    let path = dir.path().join("a?b#c%20 d.db");
-    let drop = "ALTER TABLE descriptors DROP COLUMN type";
-    write_database(&path, "project/database.db", drop);
+    let (dir, path) = place("a?b#c%20 d.db");
+    write_database(&path, "project/database.db", "ALTER TABLE descriptors DROP COLUMN type");
     let input = read::open(&data("project")).unwrap();
     let expected = read::descriptors(&data("project/descriptors.bin"), &input).unwrap();
     assert_eq!(read::descriptors(&path, &input).unwrap(), expected);
@@ -263,8 +238,7 @@ fn a_database_without_types_is_read_as_bytes() {
 
 #[test]
 fn a_database_in_write_ahead_mode_is_read_whole() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("database.db");
+    let (_dir, path) = place("database.db");
     fs::copy(data("project/database.db"), &path).unwrap();
     let writer = rusqlite::Connection::open(&path).unwrap();
     writer
@@ -280,8 +254,7 @@ fn a_database_in_write_ahead_mode_is_read_whole() {
 /// The file contains uncommitted rows, and the journal beside it the rows to restore.
 #[test]
 fn a_database_with_a_transaction_that_was_not_done_is_refused() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("database.db");
+    let (dir, path) = place("database.db");
     fs::copy(data("project/database.db"), &path).unwrap();
     let writer = rusqlite::Connection::open(&path).unwrap();
     let begin = "PRAGMA journal_mode=DELETE; PRAGMA cache_size=2; BEGIN; UPDATE images SET name = name || 'x'; \
@@ -359,8 +332,7 @@ fn every_malformed_file_of_descriptors_is_refused_with_its_line() {
         bytes("65537 columns", npy("'|u1'", "(6, 65537)", &[7; 6 * 65537]), "d: descriptors: expected at most 65536 values each, found 65537"),
     ];
     for (what, wrong, line) in rows {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("d");
+        let (dir, path) = place("d");
         match wrong {
             Ok(bytes) => fs::write(&path, bytes).unwrap(),
             Err(statement) => write_database(&path, "project/database.db", statement),
@@ -368,14 +340,4 @@ fn every_malformed_file_of_descriptors_is_refused_with_its_line() {
         let error = read::descriptors(&path, &input).expect_err(what);
         assert_eq!(shown(dir.path(), &error), line, "{what}");
     }
-}
-
-/// Without rows, any dimension matches the file size. It must not allocate memory, here 17 TB.
-#[test]
-fn a_dimension_without_rows_takes_no_memory() {
-    let header = patched(fixture("project/descriptors.bin")[..24].to_vec(), 8, &[0; 8]);
-    let (dir, path) = write("d", patched(header, 16, &[255, 255, 255, 255, 3]));
-    let input = read::Input { ids: (0..1000).collect(), ..read::Input::default() };
-    let error = read::descriptors(&path, &input).unwrap_err();
-    assert_eq!(shown(dir.path(), &error), "d: point 0: expected a descriptor, found none among 0");
 }

@@ -8,7 +8,7 @@ use unlift::Descriptors;
 use unlift::descriptors::Values;
 use unlift_io::features::{FeatureSource, FeatureWriter, ImageFeatures};
 
-use super::{data, shown, write, write_database};
+use super::{data, place, shown, write, write_database};
 
 fn made(name: &str, n: usize) -> ImageFeatures {
     let values = |factor: f32| (0..n).map(|at| factor * at as f32).collect();
@@ -58,8 +58,7 @@ fn files_of_h5py_are_read_in_every_type_and_form() {
 
 #[test]
 fn what_is_written_is_read_again_and_the_bytes_are_the_same() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("features.h5");
+    let (dir, path) = place("features.h5");
     // More names than a node of the tree holds, at several depths.
     let mut images: Vec<ImageFeatures> =
         (0..700).map(|at| made(&format!("seq{}/ü {at}.jpg", at % 2), at % 4)).collect();
@@ -117,8 +116,7 @@ fn with_keypoints(columns: usize, row: &[f32]) -> String {
 
 #[test]
 fn databases_come_in_the_same_convention() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("database.db");
+    let (_dir, path) = place("database.db");
     let atan = (-4f32).atan2(3.0).to_degrees();
     for (row, shape) in [
         (&[10.5, 20.25][..], (None, None)),
@@ -249,8 +247,7 @@ fn every_malformed_database_is_refused_with_its_line() {
         ("without a camera", "PRAGMA foreign_keys=0; DELETE FROM cameras", "good"),
     ];
     for (what, statement, expected) in rows {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("f");
+        let (_dir, path) = place("f");
         write_database(&path, "project/database.db", &format!("{filled}{statement}"));
         assert_eq!(line(&fs::read(&path).unwrap()), expected, "{what}");
     }

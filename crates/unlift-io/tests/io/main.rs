@@ -28,9 +28,15 @@ fn fixture(name: &str) -> Vec<u8> {
     fs::read(data(name)).unwrap()
 }
 
-fn write(name: &str, contents: impl AsRef<[u8]>) -> (TempDir, PathBuf) {
+/// Returns a path in a folder of its own.
+fn place(name: &str) -> (TempDir, PathBuf) {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join(name);
+    (dir, path)
+}
+
+fn write(name: &str, contents: impl AsRef<[u8]>) -> (TempDir, PathBuf) {
+    let (dir, path) = place(name);
     fs::write(&path, contents).unwrap();
     (dir, path)
 }

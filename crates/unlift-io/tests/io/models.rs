@@ -22,8 +22,7 @@ fn binary_and_text_models_are_equal() {
     assert_eq!(images[0].n_points2d, 4);
 
     let points = colmap::read_points(&file(&bin, "points3D", "bin"), true).unwrap();
-    let same = colmap::read_points(&file(&txt, "points3D", "txt"), true).unwrap();
-    assert_eq!(points, same);
+    assert_eq!(points, colmap::read_points(&file(&txt, "points3D", "txt"), true).unwrap());
     assert_eq!(points.ids, [1, 3, 5, 7, 12, 44, 900, 1 << 40]);
     assert_eq!(points.tracks.unwrap().row(1), [(2, 1), (3, 0), (4, 0)]);
 }
@@ -43,6 +42,8 @@ fn model_folders_open_with_centers_ids_and_files() {
     close(*bin.cameras.last().unwrap(), center, 1e-12);
     let sum = [-14.46619668331794, -9.942024018235283, -17.581669871119047];
     close(total(&bin.positions), sum, 1e-12);
+    let alone = read::open(&data("rig-bin/points3D.bin")).unwrap();
+    assert_eq!((alone.positions, alone.ids), (bin.positions, bin.ids));
 }
 
 #[test]
@@ -63,17 +64,15 @@ fn names_need_not_be_utf8_and_text_may_have_windows_line_ends_and_no_2d_points()
     assert_eq!((images[1].name.as_slice(), images[1].n_points2d), (&b"c.jpg"[..], 0));
 }
 
+/// Older COLMAP versions write points in the order of a hash map.
 #[test]
-fn a_project_folder_leads_to_its_model() {
-    let project = data("project");
-    let input = read::open(&project).unwrap();
-    assert_eq!(input.ids, [2, 3, 4, 6, 9, 11]);
-    assert_eq!(input.cameras.len(), 3);
-    assert_eq!(input.files.len(), 3, "the classic layout: {:?}", input.files);
-    let direct = read::open(&project.join("sparse/0")).unwrap();
-    assert_eq!(direct.positions, input.positions);
-    let alone = read::open(&project.join("sparse/0/points3D.bin")).unwrap();
-    assert_eq!((&alone.positions, &alone.ids), (&input.positions, &input.ids));
+fn unsorted_points_are_sorted_with_their_tracks() {
+    let text = "7 7 7 7 0 0 0 0 7 0 7 1\n2 2 2 2 0 0 0 0 2 0\n";
+    let (_dir, path) = write("points3D.txt", text);
+    let points = colmap::read_points(&path, true).unwrap();
+    assert_eq!((points.ids, points.positions), (vec![2, 7], vec![[2.0; 3], [7.0; 3]]));
+    let tracks = points.tracks.unwrap();
+    assert_eq!((tracks.row(0), tracks.row(1)), (&[(2, 0)][..], &[(7, 0), (7, 1)][..]));
 }
 
 #[test]

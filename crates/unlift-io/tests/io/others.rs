@@ -30,8 +30,7 @@ pub fn bundler() -> String {
     for (at, rotation) in ROTATIONS.iter().enumerate() {
         text += "500 0.01 0\n";
         // Bundler's cameras look along -z, and y is up.
-        let flipped = [1.0, -1.0, -1.0];
-        for (row, sign) in rotation.iter().zip(flipped) {
+        for (row, sign) in rotation.iter().zip([1.0, -1.0, -1.0]) {
             text += &format!("{}\n", words(&row.map(|x| sign * x)));
         }
         let t = translation(at);

@@ -1,9 +1,7 @@
-//! Tests real maps, if they are present: sums by pycolmap and NumPy, and neighborhoods from
-//! descriptors.
+//! Tests real maps, if they are present: neighborhoods from descriptors, and confidence.
 
 use std::path::PathBuf;
 
-use unlift::descriptors::Values;
 use unlift::evaluate::{Reliability, evaluate, reliability};
 use unlift::geometry::vector::median;
 use unlift::neighbors::oracle;
@@ -13,50 +11,18 @@ use unlift::recover::{Builtin, RecoverOptions, recover};
 use unlift::seed::Key;
 use unlift::truth::Original;
 use unlift::{PointSet, Unit};
-use unlift_io::read;
+use unlift_io::read::{self, Input};
 
-use super::{close, shared, total};
+use super::shared;
 
-fn dataset(name: &str) -> Option<PathBuf> {
-    shared(&format!("data/{name}"))
+fn dataset(name: &str) -> Option<(PathBuf, Input)> {
+    let path = shared(&format!("data/{name}"))?;
+    let input = read::open(&path).unwrap();
+    Some((path, input))
 }
 
-/// Points, cameras, sums of ids, of points, of centers, and of bytes of descriptors.
-type Totals = (usize, usize, u64, [f64; 3], [f64; 3], u64);
-
-#[test]
-fn real_maps_are_read_as_pycolmap_reads_them() {
-    let kitchen: Totals = (
-        21_149,
-        114,
-        457_420_110,
-        [-14724.929303410438, -6123.789441610717, 51644.81699450455],
-        [-43.05353627242874, -31.937187957432283, 90.64668314637804],
-        88_317_746,
-    );
-    let castle: Totals = (
-        6_224,
-        11,
-        19_826_437,
-        [-19920.427404514652, 2174.7605237991306, 63821.610508611295],
-        [-2.9480235564438795, 0.6448085497825612, 3.522803738595307],
-        27_924_921,
-    );
-    for (name, (n, n_cameras, ids, positions, centers, bytes)) in
-        [("redkitchen", kitchen), ("castle", castle)]
-    {
-        let Some(path) = dataset(name) else { continue };
-        let input = read::open(&path).unwrap();
-        assert_eq!((input.positions.len(), input.cameras.len()), (n, n_cameras));
-        assert_eq!(input.ids.iter().sum::<u64>(), ids);
-        // Sums of 10^4 doubles of size 10 in another order differ in the last bits only.
-        close(total(&input.positions), positions, 1e-6);
-        close(total(&input.cameras), centers, 1e-9);
-        let descriptors = read::descriptors(&path.join("descriptors.bin"), &input).unwrap();
-        assert_eq!((descriptors.len(), descriptors.dim()), (n, 128));
-        let Values::U8(values) = descriptors.values() else { panic!("bytes expected") };
-        assert_eq!(values.iter().map(|&byte| u64::from(byte)).sum::<u64>(), bytes);
-    }
+fn original(input: Input) -> Original<3> {
+    Original::new(PointSet::try_new(input.positions, Unit::Meter).unwrap())
 }
 
 #[test]
@@ -70,10 +36,9 @@ fn descriptors_of_real_maps_are_read_and_name_neighbors() {
         ("castle", "olc", "overlap", 0.14),
         ("castle", "ppl", "overlap", 0.13),
     ] {
-        let Some(path) = dataset(name) else { continue };
-        let input = read::open(&path).unwrap();
+        let Some((path, input)) = dataset(name) else { continue };
         let descriptors = read::descriptors(&path.join("descriptors.bin"), &input).unwrap();
-        let original = Original::new(PointSet::try_new(input.positions, Unit::Meter).unwrap());
+        let original = original(input);
         let search = oracle::search(&original).unwrap();
         let scheme = scheme(scheme_name).unwrap().of_dimension::<3>(&options).unwrap();
         let key = Key::from_seed(0);
@@ -90,9 +55,8 @@ fn descriptors_of_real_maps_are_read_and_name_neighbors() {
 #[test]
 fn what_is_said_about_a_real_map_comes_true() {
     for (name, meters) in [("redkitchen", Some(0.10)), ("castle", None)] {
-        let Some(path) = dataset(name) else { continue };
-        let points = PointSet::try_new(read::open(&path).unwrap().positions, Unit::Meter).unwrap();
-        let original = Original::new(points);
+        let Some((_, input)) = dataset(name) else { continue };
+        let original = original(input);
         let search = oracle::search(&original).unwrap();
         let typical = median(&mut search.kth_distances(50));
         let threshold = meters.unwrap_or(typical);

@@ -30,35 +30,36 @@ fn descriptors(draws: &mut Draws, n: usize) -> Option<Descriptors> {
 
 /// One released map per family; lines with one and with two slots per record.
 pub fn released<const D: usize>(seed: u64, n: usize) -> Vec<Released<D>> {
-    let mut draws = draws(seed);
+    let draws = &mut draws(seed);
     let directions =
         |draws: &mut Draws| -> Vec<[f64; D]> { (0..n).map(|_| draws.direction()).collect() };
     let indices = |draws: &mut Draws, below| (0..n).map(|_| draws.below(below) as u8).collect();
-    let mut families = Vec::new();
-    for slots in [1, 2] {
-        let feet = points(&mut draws, n);
-        let lines = Lines::through(&feet, &directions(&mut draws)).unwrap();
-        families.push((Obfuscation::Lines(lines), slots));
-    }
-    let centers = points(&mut draws, 3);
-    let center = indices(&mut draws, 3);
-    let rays = Rays::try_new(&centers, center, &directions(&mut draws)).unwrap();
-    families.push((Obfuscation::Rays(rays), 1));
+    let lines = |draws: &mut Draws| {
+        Obfuscation::Lines(Lines::through(&points(draws, n), &directions(draws)).unwrap())
+    };
+    let [one_slot, two_slots] = [lines(draws), lines(draws)];
+    let centers = points(draws, 3);
+    let rays = Rays::try_new(&centers, indices(draws, 3), &directions(draws)).unwrap();
     let offsets: Vec<f64> = (0..n).map(|_| draws.between(-9.0, 9.0)).collect();
-    let planes = AxisPlanes::try_new(indices(&mut draws, D as u64), &offsets).unwrap();
-    families.push((Obfuscation::AxisPlanes(planes), 1));
-    let candidates = AxisCandidates::try_new(&points(&mut draws, n)).unwrap();
-    families.push((Obfuscation::AxisCandidates(candidates), 1));
+    let planes = AxisPlanes::try_new(indices(draws, D as u64), &offsets).unwrap();
+    let candidates = AxisCandidates::try_new(&points(draws, n)).unwrap();
+    let families = [
+        (one_slot, 1),
+        (two_slots, 2),
+        (Obfuscation::Rays(rays), 1),
+        (Obfuscation::AxisPlanes(planes), 1),
+        (Obfuscation::AxisCandidates(candidates), 1),
+    ];
     let with_rest = |(obfuscation, slots)| {
         let origin = std::array::from_fn(|_| draws.between(-4e6, 4e6));
         let unit = [Unit::Meter, Unit::Pixel, Unit::KthNeighbor][draws.below(3) as usize];
-        let descriptors = descriptors(&mut draws, n * slots);
+        let descriptors = descriptors(draws, n * slots);
         let released = Released::try_new(obfuscation, slots, origin, unit, descriptors).unwrap();
         // Of an image, the size is released, too.
         let image = Bounds { low: [-9.5; D], high: [90.25; D] };
         released.with_bounds((D == 2).then_some(image))
     };
-    families.into_iter().map(with_rest).collect()
+    families.map(with_rest).into()
 }
 
 /// A ground truth with `n` slots and a few dropped points; `swapped_axis` for every second seed.

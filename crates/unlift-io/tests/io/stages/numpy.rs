@@ -9,7 +9,7 @@ use unlift::truth::DropReason;
 use unlift::{RecordId, Unit};
 use unlift_io::stage::{self, ImageFile, Kind};
 
-use super::maps;
+use super::round_trip::values_come_back;
 
 /// The data that the document assumes: 12 points on a grid.
 const GIVEN: &str = r#"
@@ -70,7 +70,7 @@ fn the_snippets_of_the_document_run() {
     assert_eq!(lists.of(2)[..3], [0, 1, 3].map(RecordId));
     let points = stage::read_point_neighborhoods(&at("points.npz"), 12).unwrap();
     assert_eq!(points.of(1)[..2], [0, 2].map(RecordId));
-    let back = stage::read_recovered::<3>(&at("back.npz")).unwrap();
+    let back = stage::read_recovered::<3>(&at("back.npz"), None).unwrap();
     assert_eq!(back.status().iter().filter(|&&status| status == Status::Ok).count(), 8);
     assert_eq!((back.position(1), back.position(4)), (Some([0.0, 0.0, 1.0]), None));
     let images = at("images.npz");
@@ -99,7 +99,6 @@ fn the_snippets_of_the_document_run() {
 #[test]
 fn numpy_writes_the_same_values_in_every_form() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("a.npz");
     let rewrite = r#"
 import numpy as np
 arrays = dict(np.load("a.npz"))
@@ -109,28 +108,9 @@ for name, array in arrays.items():
         arrays[name] = np.asfortranarray(array.astype(wide[array.dtype.kind]))
 np.savez_compressed("a.npz", **arrays)
 "#;
-    for released in maps::released::<3>(4, 30) {
-        stage::write_released(&path, &released).unwrap();
-        if run(folder.path(), rewrite).is_none() {
-            return;
-        }
+    if run(folder.path(), "").is_some() {
         // Descriptors of floats stay floats, those of bytes become whole numbers.
-        assert!(stage::read_released::<3>(&path).unwrap() == released);
+        let change = |_: &Path| drop(run(folder.path(), rewrite));
+        values_come_back::<3>(folder.path(), &[30, 31], change);
     }
-    let rewritten = |write: &dyn Fn(&Path) -> Result<(), unlift_io::Error>| {
-        write(&path).unwrap();
-        run(folder.path(), rewrite).unwrap();
-    };
-    let (original, secret) = maps::truth::<2>(2, 30);
-    rewritten(&|path| stage::write_truth(path, &original, &secret));
-    let (read, read_secret) = stage::read_truth::<2>(&path).unwrap();
-    assert_eq!((read.reveal(), read_secret), (original.reveal(), secret));
-    let lists = maps::neighborhoods(2, 30, 2);
-    rewritten(&|path| stage::write_neighborhoods(path, &lists));
-    assert_eq!(stage::read_neighborhoods(&path, 30, 2).unwrap(), lists);
-    let recovered = maps::recovered::<3>(1, 30);
-    rewritten(&|path| stage::write_recovered(path, &recovered));
-    let read = stage::read_recovered::<3>(&path).unwrap();
-    // NaN is not equal to itself, so the texts are compared.
-    assert_eq!(format!("{read:?}"), format!("{recovered:?}"));
 }

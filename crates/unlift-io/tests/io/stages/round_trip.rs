@@ -11,10 +11,10 @@ use unlift_io::Error;
 use unlift_io::stage::{self, ImageFile, Kind};
 
 use super::maps;
-use crate::write_images;
+use crate::{place, write_images};
 
 /// Writes a value twice, which gives the same bytes, and returns the path of a file.
-fn written(folder: &Path, kind: Kind, write: impl Fn(&Path) -> Result<(), Error>) -> PathBuf {
+fn written(folder: &Path, kind: Kind, write: &dyn Fn(&Path) -> Result<(), Error>) -> PathBuf {
     let [a, b] = ["a.npz", "b.npz"].map(|name| folder.join(name));
     write(&a).unwrap();
     write(&b).unwrap();
@@ -23,15 +23,17 @@ fn written(folder: &Path, kind: Kind, write: impl Fn(&Path) -> Result<(), Error>
     a
 }
 
-fn values_come_back<const D: usize>() {
-    let temporary = tempfile::tempdir().unwrap();
-    let folder = temporary.path();
-    for (seed, n) in [2, 3, 40, 20_000].into_iter().enumerate() {
-        let seed = seed as u64;
+/// Writes and reads values of every kind, of `n` points each. `change` may write a file again.
+pub fn values_come_back<const D: usize>(folder: &Path, sizes: &[usize], change: impl Fn(&Path)) {
+    let written = |kind, write: &dyn Fn(&Path) -> Result<(), Error>| {
+        let path = written(folder, kind, write);
+        change(&path);
+        path
+    };
+    for (&n, seed) in sizes.iter().zip(0..) {
         for released in maps::released::<D>(seed, n) {
             let family = released.obfuscation().family();
-            let write = |path: &Path| stage::write_released(path, &released);
-            let path = written(folder, Kind::Released, write);
+            let path = written(Kind::Released, &|path| stage::write_released(path, &released));
             let read = stage::read_released::<D>(&path).unwrap();
             assert!(read == released, "{family} of {n} records in {D}D");
             // A released file says nothing of its source.
@@ -41,43 +43,36 @@ fn values_come_back<const D: usize>() {
         }
 
         let (original, secret) = maps::truth::<D>(seed, n);
-        let write = |path: &Path| stage::write_truth(path, &original, &secret);
-        let path = written(folder, Kind::Truth, write);
+        let path = written(Kind::Truth, &|path| stage::write_truth(path, &original, &secret));
         let (read_original, read_secret) = stage::read_truth::<D>(&path).unwrap();
         assert_eq!((read_original.reveal(), read_secret), (original.reveal(), secret));
 
         let recovered = maps::recovered::<D>(seed, n);
-        let write = |path: &Path| stage::write_recovered(path, &recovered);
-        let path = written(folder, Kind::Recovered, write);
-        let read = stage::read_recovered::<D>(&path).unwrap();
+        let path = written(Kind::Recovered, &|path| stage::write_recovered(path, &recovered));
+        let read = stage::read_recovered::<D>(&path, None).unwrap();
         // NaN is not equal to itself, so the texts are compared.
         assert!(format!("{read:?}") == format!("{recovered:?}"), "{n} points in {D}D");
-    }
-}
 
-#[test]
-fn maps_truths_and_recovered_points_come_back() {
-    values_come_back::<2>();
-    values_come_back::<3>();
-}
-
-#[test]
-fn neighborhoods_come_back() {
-    let folder = tempfile::tempdir().unwrap();
-    for (seed, n) in [2, 3, 40, 1000].into_iter().enumerate() {
         for slots in [1, 2] {
-            let lists = maps::neighborhoods(seed as u64, n, slots);
-            let write = |path: &Path| stage::write_neighborhoods(path, &lists);
-            let path = written(folder.path(), Kind::Neighborhoods, write);
+            let n = n.min(1000);
+            let lists = maps::neighborhoods(seed, n, slots);
+            let path =
+                written(Kind::Neighborhoods, &|path| stage::write_neighborhoods(path, &lists));
             assert_eq!(stage::read_neighborhoods(&path, n, slots).unwrap(), lists);
         }
     }
 }
 
 #[test]
-fn a_map_without_records_comes_back() {
+fn values_of_every_kind_come_back() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("empty.npz");
+    values_come_back::<2>(folder.path(), &[2, 3, 40, 20_000], |_| ());
+    values_come_back::<3>(folder.path(), &[2, 3, 40, 20_000], |_| ());
+}
+
+#[test]
+fn a_map_without_records_comes_back() {
+    let (_folder, path) = place("empty.npz");
     let none = Obfuscation::AxisCandidates(AxisCandidates::<3>::try_new(&[]).unwrap());
     let released = Released::try_new(none, 1, [0.0; 3], Unit::Meter, None).unwrap();
     stage::write_released(&path, &released).unwrap();
@@ -111,7 +106,7 @@ fn images_come_back() {
     let maps: Vec<Released<2>> = (0..names.len()).map(|at| in_pixels(0, 7 + at)).collect();
     let none = Obfuscation::Lines(Lines::through(&[], &[]).unwrap());
     let none = Released::<2>::try_new(none, 1, [0.0; 2], Unit::Pixel, None).unwrap();
-    let path = written(folder.path(), Kind::Released, |path| {
+    let path = written(folder.path(), Kind::Released, &|path| {
         write_images(path, |images| {
             images.released("none.jpg", &none).unwrap();
             names.iter().zip(&maps).for_each(|(name, map)| images.released(name, map).unwrap());

@@ -87,8 +87,7 @@ fn released_maps() {
         ("unlift", text(r#"{"unit": "m", "family": "rays"}"#), "array centers: expected an array of shape (n, 3), found no such array"),
         ("unlift", text(r#"{"unit": "m", "family": "curves"}"#), "metadata unlift, family: expected one of lines, rays, axis_planes, axis_candidates, found \"curves\""),
     ] {
-        let arrays = with(lines(), name, bytes);
-        refused(&arrays, read, expected);
+        refused(&with(lines(), name, bytes), read, expected);
     }
     let stated = with(lines(), "unlift", text(r#"{"unit": "m", "fingerprint": "00112233445566778899aabbccddeeff"}"#));
     let found = line(archive(&stated), read);
@@ -132,7 +131,7 @@ fn lists() {
 #[rustfmt::skip] // One row per line.
 fn recovered_points() {
     let position = || vec![("position", floats("(2, 2)", &[1.0, 2.0, f64::NAN, f64::NAN]))];
-    let read = stage::read_recovered::<2>;
+    let read = |path: &Path| stage::read_recovered::<2>(path, None);
     for (name, bytes, expected) in [
         ("position", floats("(1, 2)", &[1.0, f64::NAN]), "array position, row 0: expected 2 numbers, or 2 NaN if lost, found [1.0, NaN]"),
         ("position", floats("(1, 2)", &[1.0, f64::INFINITY]), "array position, row 0: expected a number, or NaN if lost, found inf"),
@@ -153,7 +152,7 @@ fn recovered_points() {
     refused(&confident(1.5, 0.1), read, "array found, row 0: expected a probability, found 1.5");
     refused(&confident(f64::NAN, 0.1), read, "array found, row 0: expected a probability, found NaN");
     refused(&confident(0.5, -1.0), read, "array error_scale, row 0: expected a length, found -1.0");
-    let in_3d = |path: &Path| stage::read_recovered_in::<3>(path, Unit::Meter);
+    let in_3d = |path: &Path| stage::read_recovered::<3>(path, Some(Unit::Meter));
     refused(&position(), in_3d, "array position: expected shape (n, 3), found (2, 2)");
 }
 

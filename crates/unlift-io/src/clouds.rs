@@ -1,15 +1,112 @@
-//! Points, cameras and images as a COLMAP model in text, without observations.
+//! Exports of points and lines for other programs: PLY, OBJ and COLMAP models in text, without
+//! observations.
 //!
 //! Source: COLMAP's documentation, "Output Format".
 
 use std::io::Write;
 use std::path::Path;
 
-use super::MODEL_MARK;
-use super::finite;
+use unlift::geometry::frame::Bounds;
+use unlift::released::{Obfuscation, Released};
+
 use crate::Error;
 use crate::atomic::{self, Access};
 use crate::read::colmap::{Camera, Image};
+
+/// The comment of clouds of points and lines, by which their outputs are recognized.
+const CLOUD_COMMENT: &str = "unlift";
+/// The first line of each file of a COLMAP model, by which it is recognized.
+const MODEL_MARK: &str = "# unlift model";
+
+/// Returns an error if a coordinate of one of the `rows`, each a `what`, is not finite.
+fn finite<const D: usize, const N: usize>(
+    path: &Path,
+    what: &str,
+    rows: impl IntoIterator<Item = [[f64; D]; N]>,
+) -> Result<(), Error> {
+    let is_wrong = |row: &[[f64; D]; N]| !row.iter().flatten().all(|x| x.is_finite());
+    let Some((at, row)) = rows.into_iter().enumerate().find(|(_, row)| is_wrong(row)) else {
+        return Ok(());
+    };
+    let found = if N == 1 { format!("{:?}", row[0]) } else { format!("{row:?}") };
+    Err(Error::new(path, format!("{what} {at}"), "finite coordinates", found))
+}
+
+/// Writes `points` `(n, D)` as binary little-endian PLY.
+///
+/// The columns are `double x, y, z` (z is 0 in 2D).
+///
+/// # Errors
+/// When a coordinate is not finite.
+pub fn write_points<const D: usize>(path: &Path, points: &[[f64; D]]) -> Result<(), Error> {
+    finite(path, "point", points.iter().map(|point| [*point]))?;
+    atomic::write_file(path, Access::Private, |w| {
+        writeln!(w, "ply\nformat binary_little_endian 1.0\ncomment {CLOUD_COMMENT}")?;
+        writeln!(w, "element vertex {}", points.len())?;
+        writeln!(w, "property double x\nproperty double y\nproperty double z\nend_header")?;
+        points.iter().flat_map(in_space).try_for_each(|value| w.write_all(&value.to_le_bytes()))
+    })
+}
+
+/// Returns the coordinates of a point in 3D; in 2D, z is 0.
+fn in_space<const D: usize>(point: &[f64; D]) -> [f64; 3] {
+    std::array::from_fn(|axis| point.get(axis).copied().unwrap_or(0.0))
+}
+
+/// Writes `segments` as an OBJ file: two `v` records and one `l` record each. In 2D, z is 0.
+///
+/// # Errors
+/// When a coordinate is not finite.
+pub fn write_lines<const D: usize>(path: &Path, segments: &[Segment<D>]) -> Result<(), Error> {
+    finite(path, "segment", segments.iter().copied())?;
+    atomic::write_file(path, Access::Private, |w| {
+        writeln!(w, "# {CLOUD_COMMENT}")?;
+        for (row, segment) in segments.iter().enumerate() {
+            for end in segment {
+                let [x, y, z] = in_space(end);
+                writeln!(w, "v {x} {y} {z}")?;
+            }
+            writeln!(w, "l {} {}", 2 * row + 1, 2 * row + 2)?;
+        }
+        Ok(())
+    })
+}
+
+/// The two ends of a line segment.
+pub type Segment<const D: usize> = [[f64; D]; 2];
+
+/// Returns the segments of these released lines or rays inside the box, in the map's frame (the
+/// origin is added). Records that miss the box, or only touch it, are left out. Other families have
+/// no segments.
+pub fn record_segments<const D: usize>(
+    released: &Released<D>,
+    bounds: &Bounds<D>,
+    records: impl IntoIterator<Item = usize>,
+) -> Vec<Segment<D>> {
+    let origin = released.origin();
+    let segment = |record: usize| {
+        let (point, direction, start) = match released.obfuscation() {
+            Obfuscation::Lines(lines) => {
+                (lines.foot()[record], lines.direction()[record], f64::NEG_INFINITY)
+            }
+            Obfuscation::Rays(rays) => {
+                let center = rays.centers()[usize::from(rays.center()[record])];
+                (center, rays.direction()[record], 0.0)
+            }
+            Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => return None,
+        };
+        let point: [f64; D] = std::array::from_fn(|c| f64::from(point[c]) + origin[c]);
+        let direction = direction.map(f64::from);
+        let (from, to) = bounds.clip(&point, &direction)?;
+        // Rounding may leave the box by an ulp.
+        let at = |t: f64| {
+            let along = |c: usize| point[c] + t * direction[c];
+            std::array::from_fn(|c| along(c).clamp(bounds.low[c], bounds.high[c]))
+        };
+        (from.max(start) < to).then(|| [at(from.max(start)), at(to)])
+    };
+    records.into_iter().filter_map(segment).collect()
+}
 
 /// Writes `cameras.txt`.
 pub fn write_cameras(path: &Path, cameras: &[Camera]) -> Result<(), Error> {
@@ -58,9 +155,7 @@ pub fn write_images(path: &Path, images: &[Image]) -> Result<(), Error> {
 /// # Errors
 /// When a coordinate is not finite.
 pub fn write_model_points(path: &Path, points: &[Option<[f64; 3]>]) -> Result<(), Error> {
-    for (row, point) in points.iter().enumerate() {
-        finite(path, ("point", row), &[point.unwrap_or_default()])?;
-    }
+    finite(path, "point", points.iter().map(|point| [point.unwrap_or_default()]))?;
     atomic::write_file(path, Access::Private, |w| {
         writeln!(w, "{MODEL_MARK}\n# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]")?;
         for (row, point) in points.iter().enumerate() {
@@ -74,27 +169,19 @@ pub fn write_model_points(path: &Path, points: &[Option<[f64; 3]>]) -> Result<()
 
 /// Returns the unit quaternion (w, x, y, z) of a rotation, with `w >= 0`.
 fn quaternion(r: &[[f64; 3]; 3]) -> [f64; 4] {
-    // Four times the square of each component.
-    let squares = [
-        1.0 + r[0][0] + r[1][1] + r[2][2],
-        1.0 + r[0][0] - r[1][1] - r[2][2],
-        1.0 - r[0][0] + r[1][1] - r[2][2],
-        1.0 - r[0][0] - r[1][1] + r[2][2],
+    let [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]] = *r;
+    // Four times the products of components.
+    let products = [
+        [1.0 + xx + yy + zz, zy - yz, xz - zx, yx - xy],
+        [zy - yz, 1.0 + xx - yy - zz, yx + xy, xz + zx],
+        [xz - zx, yx + xy, 1.0 - xx + yy - zz, zy + yz],
+        [yx - xy, xz + zx, zy + yz, 1.0 - xx - yy + zz],
     ];
-    let sums = |i: usize, j: usize| match (i.min(j), i.max(j)) {
-        (0, 1) => r[2][1] - r[1][2],
-        (0, 2) => r[0][2] - r[2][0],
-        (0, 3) => r[1][0] - r[0][1],
-        (1, 2) => r[1][0] + r[0][1],
-        (1, 3) => r[0][2] + r[2][0],
-        _ => r[2][1] + r[1][2],
-    };
-    let largest = (0..4).fold(0, |best, i| if squares[i] > squares[best] { i } else { best });
-    let root = squares[largest].sqrt();
-    let q: [f64; 4] = std::array::from_fn(|i| match i == largest {
-        true => 0.5 * root,
-        false => 0.5 * sums(largest, i) / root,
-    });
+    let is_more = |i: usize, j: usize| products[i][i] > products[j][j];
+    let largest = (0..4).fold(0, |best, i| if is_more(i, best) { i } else { best });
+    let root = products[largest][largest].sqrt();
+    let mut q = products[largest].map(|product| 0.5 * product / root);
+    q[largest] = 0.5 * root;
     let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
     let sign = if q[0] < 0.0 { -1.0 } else { 1.0 };
     q.map(|x| sign * x / norm)
@@ -105,7 +192,7 @@ mod tests {
     use super::*;
     use unlift::geometry::camera::Pose;
 
-    use crate::read::colmap::{CameraModel, read_points, read_views};
+    use crate::read::colmap::{CAMERA_MODELS, read_points, read_views};
 
     /// Rotations about each axis and an oblique one, including half turns.
     fn rotations() -> Vec<[[f64; 3]; 3]> {
@@ -121,7 +208,7 @@ mod tests {
         let at = |name: &str| folder.path().join(name);
         let cameras = vec![Camera {
             id: 3,
-            model: CameraModel::from_name(b"SIMPLE_RADIAL").unwrap(),
+            model: &CAMERA_MODELS[2],
             width_px: 640,
             height_px: 480,
             params: vec![525.25, 320.0, 240.0, -0.01],
