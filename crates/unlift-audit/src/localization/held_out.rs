@@ -10,7 +10,7 @@ use unlift::geometry::camera::{Camera, PoseError};
 use unlift::geometry::frame::Bounds;
 use unlift::geometry::vector::{distance, median};
 use unlift::localization::{Free, Localization, Match, View, estimate, free_directions};
-use unlift::obfuscate::{Scheme, obfuscate};
+use unlift::obfuscate::{Change, Scheme, obfuscate};
 use unlift::released::Released;
 use unlift::seed::{Key, Stage};
 use unlift::truth::{Original, Secret};
@@ -241,7 +241,9 @@ impl<'a> Held<'a> {
             let key = key.of_item(Stage::Image, number as u64);
             let (released, secret) = obfuscate(scheme, &original, None, &key)?;
             let free = by_original(&released, &secret, n);
-            let Some(protection) = scheme.protection() else { return Ok((free, None)) };
+            let Some(protection) = scheme.change().and_then(Change::protection) else {
+                return Ok((free, None));
+            };
             let protected = protection.protect(&query.descriptors.plain()?, &key)?;
             let pairs = of_protected_keypoints(&protected, &map).into_iter();
             Ok((free, Some(pairs.map(|(i, j)| (i, points[j])).collect::<Vec<_>>())))

@@ -135,8 +135,7 @@ struct Sums {
 }
 
 struct CellSums {
-    /// Row of the first item.
-    row: Row,
+    /// One per repeat.
     pools: Vec<Pool>,
     n_items: usize,
     seconds: RowSeconds,
@@ -152,7 +151,7 @@ impl Sums {
             }
         }
         for cell in more.cells {
-            match self.cells.iter_mut().find(|known| known.row.is_same_cell(&cell.row)) {
+            match self.cells.iter_mut().find(|known| known.pools[0].is_of(&cell.pools[0].cell)) {
                 Some(to) => {
                     to.pools.iter_mut().zip(&cell.pools).for_each(|(to, more)| to.merge(more));
                     to.seconds.add(&cell.seconds);
@@ -183,21 +182,21 @@ fn sums_of<const D: usize>(
     check(item, plan)?;
     let (original, descriptors) = (&item.original, item.descriptors.as_ref());
     let owned = Owned { original, descriptors, hidden: None, name: Some(&item.name) };
-    let mut pools: Vec<(Row, Vec<Pool>)> = Vec::new();
+    let mut all_pools: Vec<Vec<Pool>> = Vec::new();
     let mut each = |finished: &Finished<'_>| {
         let pool = Pool::of(finished, &plan.thresholds);
-        match pools.iter_mut().find(|(row, _)| row.is_same_cell(&finished.row)) {
-            Some((_, pools)) => pools.push(pool),
-            None => pools.push((finished.row.clone(), vec![pool])),
+        match all_pools.iter_mut().find(|pools| pools[0].is_of(&finished.row)) {
+            Some(pools) => pools.push(pool),
+            None => all_pools.push(vec![pool]),
         }
     };
     let Rows { rows, seconds, not_audited } =
         of_item(&owned, plan, &mut sums.clock, observer, &mut each)?;
     for (row, seconds) in rows.iter().zip(seconds) {
         // A cell that failed in another repeat has no row.
-        if let Some(at) = pools.iter().position(|(first, _)| first.is_same_cell(row)) {
-            let (row, pools) = pools.swap_remove(at);
-            sums.cells.push(CellSums { row, pools, n_items: 1, seconds });
+        if let Some(at) = all_pools.iter().position(|pools| pools[0].is_of(row)) {
+            let pools = all_pools.swap_remove(at);
+            sums.cells.push(CellSums { pools, n_items: 1, seconds });
         }
     }
     (sums.not_audited, sums.n_pooled) = (not_audited, 1);
@@ -251,6 +250,10 @@ pub(super) struct Pool {
 }
 
 impl Pool {
+    fn is_of(&self, row: &Row) -> bool {
+        self.cell.is_same_cell(row)
+    }
+
     /// Returns the sums of one image.
     pub(super) fn of(finished: &Finished<'_>, thresholds: &[Threshold]) -> Self {
         let Finished { row, accuracy, baseline, weights, whole, n_listed, .. } = finished;

@@ -252,7 +252,7 @@ fn rounding<const D: usize>(records: &Obfuscation<D>, record: usize, point: &[f6
 }
 
 /// Returns the place of a record that is nearest to `point`, relative to the released origin.
-fn on_record<const D: usize>(
+pub(super) fn on_record<const D: usize>(
     records: &Obfuscation<D>,
     record: usize,
     point: &[f64; D],

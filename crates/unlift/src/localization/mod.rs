@@ -262,10 +262,8 @@ impl View {
 mod tests {
     use super::*;
     use crate::geometry::camera::{Intrinsics, Pose};
-    use crate::geometry::vector::sub;
     use crate::obfuscate::{SCHEMES, SchemeOptions};
-    use crate::released::Rays;
-    use crate::{OriginalId, synthetic};
+    use crate::synthetic;
 
     fn view(focal: f64, n: usize) -> View {
         View {
@@ -357,15 +355,6 @@ mod tests {
     fn rays_from_one_center_do_not_localize() {
         let (view, original) = room();
         let positions = original.reveal().positions();
-        let n = positions.len();
-        let center = [0.5, 9.0, 1.0];
-        let directions: Vec<[f64; 3]> = positions.iter().map(|p| sub(p, &center)).collect();
-        let rays = Rays::try_new(&[center], vec![0; n], &directions).unwrap();
-        let released =
-            Released::try_new(Obfuscation::Rays(rays), 1, [0.0; 3], Unit::Meter, None).unwrap();
-        let hidden = (0..n).map(OriginalId::from_index).collect();
-        let secret = Secret::try_new(hidden, None, (0..n as u32).collect(), vec![], n).unwrap();
-        assert_eq!(with_map(std::slice::from_ref(&view), positions, &released, &secret), [None]);
         // Decoys do not help.
         let sphere = crate::obfuscate::sphere::Sphere;
         let (released, secret) = obfuscate(&sphere, &original, None, &Key::from_seed(0)).unwrap();

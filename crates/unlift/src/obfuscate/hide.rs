@@ -1,5 +1,6 @@
 //! Obfuscation: applies a scheme, then the steps that all schemes share (origin, shuffling).
 
+use super::changed::Change;
 use super::scheme::{LocalPoints, Scheme};
 use super::size;
 use crate::geometry::frame::rounded_origin;
@@ -29,7 +30,12 @@ pub fn obfuscate<const D: usize>(
         let expected = format!("{} rows, one per point", points.len());
         return Err(Error::new("descriptors", expected, descriptors.len().to_string()));
     }
-    let changed = descriptors.map(|rows| scheme.descriptors(rows, key)).transpose()?.flatten();
+    let changed = match (descriptors, scheme.change()) {
+        (Some(rows), Some(Change::Mitigation(by, _))) if by.changes_descriptors() => {
+            Some(by.descriptors(rows, key)?)
+        }
+        _ => None,
+    };
     let descriptors = changed.as_ref().or(descriptors);
     size::check(points.positions())?;
     // The center of known bounds reveals nothing about the points.
@@ -66,8 +72,9 @@ pub fn obfuscate<const D: usize>(
     for (slot, &row) in descriptor_row.iter().enumerate() {
         source[row as usize] = hidden[slot].0;
     }
-    let protect = |rows| scheme.protection().map(|by| by.protect(rows, key)).transpose();
-    let protected = descriptors.map(protect).transpose()?.flatten();
+    let protection = scheme.change().and_then(Change::protection);
+    let protected = descriptors.zip(protection).map(|(rows, by)| by.protect(rows, key));
+    let protected = protected.transpose()?;
     let plain = descriptors.filter(|_| protected.is_none()).map(|rows| rows.select(&source));
     let records = lifted.obfuscation.select(&order);
     let mut released = Released::try_new(records, slots, origin, points.unit(), plain)?;

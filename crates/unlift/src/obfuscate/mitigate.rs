@@ -293,7 +293,7 @@ mod tests {
         };
         let after = |text| {
             let key = Key::from_seed(1);
-            rows(&mitigated(text, None).descriptors(&before, &key).unwrap().unwrap())
+            rows(&Mitigation::parse(text).unwrap().descriptors(&before, &key).unwrap())
         };
         let zeros = after("drop:0.25").iter().filter(|row| row.iter().all(|&x| x == 0.0)).count();
         assert_eq!(zeros, 50);

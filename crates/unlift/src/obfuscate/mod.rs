@@ -5,7 +5,6 @@
 
 mod changed;
 mod hide;
-mod kmeans;
 mod mitigate;
 mod protect;
 mod scheme;

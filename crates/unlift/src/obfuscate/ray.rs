@@ -1,11 +1,13 @@
 //! Schemes of half-lines from one of two centers, which is chosen at random for every point (`ray`) or by a checkerboard of voxels
 //! (`ray-voxel`).
 
+use std::cmp::Ordering;
 use std::sync::Arc;
 
-use super::kmeans::kmeans;
+use rayon::prelude::*;
+
 use super::scheme::{Entry, Facts, Lifted, LocalPoints, Scheme};
-use crate::geometry::vector::{dot, sub};
+use crate::geometry::vector::{dot, squared_distance, sub};
 use crate::released::{Obfuscation, Rays};
 use crate::seed::{Key, Stage};
 use crate::truth::{DropReason, Dropped};
@@ -32,6 +34,8 @@ pub const ENTRY: Entry = Entry {
 
 /// Restarts of k-means (scikit-learn's `n_init` in the authors' code).
 const RESTARTS: u64 = 10;
+/// Maximum number of iterations per restart (scikit-learn's default).
+const MAX_ROUNDS: usize = 300;
 
 impl Scheme<3> for Ray {
     fn name(&self) -> &str {
@@ -101,7 +105,66 @@ fn from_centers(
     if points.len() < 2 {
         return Err(Error::new("points", "at least 2 for two centers", points.len().to_string()));
     }
-    rays_from(&kmeans(points, 2, RESTARTS, key), points, choose)
+    rays_from(&two_centers(points, key), points, choose)
+}
+
+/// Returns the centers of the best of several runs of k-means. They depend on points and `key` alone.
+fn two_centers(points: &[[f64; 3]], key: &Key) -> [[f64; 3]; 2] {
+    let run = |restart| lloyd(points, spread_start(points, key, restart));
+    let runs: Vec<_> = (0..RESTARTS).into_par_iter().map(run).collect();
+    // The first of equally good runs counts.
+    let best = runs.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+    let (_, mut centers) = best.expect("a restart");
+    // The order of the centers must not depend on which restart won.
+    centers.sort_unstable_by(|a, b| {
+        let by_axis = a.iter().zip(b).map(|(x, y)| x.total_cmp(y));
+        by_axis.fold(Ordering::Equal, Ordering::then)
+    });
+    centers
+}
+
+/// Chooses initial centers with k-means++: the second with probability proportional to the squared
+/// distance to the first.
+fn spread_start(points: &[[f64; 3]], key: &Key, restart: u64) -> [[f64; 3]; 2] {
+    let mut draws = key.draws(Stage::KMeans, restart);
+    let first = points[draws.below(points.len() as u64) as usize];
+    let weight = |p: &[f64; 3]| squared_distance(p, &first);
+    let mut left = draws.unit() * points.iter().map(weight).sum::<f64>();
+    let chosen = points.iter().position(|p| {
+        left -= weight(p);
+        left <= 0.0
+    });
+    [first, points[chosen.unwrap_or(points.len() - 1)]]
+}
+
+/// Returns the sum of squared distances and the centers of a run of Lloyd's algorithm. Sums are in row
+/// order.
+fn lloyd(points: &[[f64; 3]], mut centers: [[f64; 3]; 2]) -> (f64, [[f64; 3]; 2]) {
+    let mut cost = f64::INFINITY;
+    for _ in 0..MAX_ROUNDS {
+        let (mut sums, mut counts, mut new_cost) = ([[0.0; 3]; 2], [0u64; 2], 0.0);
+        for point in points {
+            let [first, second] = centers.map(|center| squared_distance(point, &center));
+            // The first of equally near centers counts.
+            let at = usize::from(second < first);
+            new_cost += first.min(second);
+            counts[at] += 1;
+            for c in 0..3 {
+                sums[at][c] += point[c];
+            }
+        }
+        for (at, center) in centers.iter_mut().enumerate() {
+            if counts[at] > 0 {
+                *center = sums[at].map(|s| s / counts[at] as f64);
+            }
+        }
+        let converged = new_cost >= cost * (1.0 - 1e-9);
+        cost = new_cost;
+        if converged {
+            break;
+        }
+    }
+    (cost, centers)
 }
 
 /// Returns rays from `centers` to every point. `choose` returns the center of a row.

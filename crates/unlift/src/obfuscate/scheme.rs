@@ -4,14 +4,14 @@ use std::any::Any;
 use std::fmt::Debug;
 use std::sync::Arc;
 
-use super::protect::Protection;
+use super::changed::Change;
 use crate::geometry::frame::Bounds;
 use crate::released::Obfuscation;
 use crate::seed::Key;
 #[cfg(doc)]
 use crate::seed::Stage;
 use crate::truth::Dropped;
-use crate::{Descriptors, Error, OriginalId, Unit};
+use crate::{Error, OriginalId, Unit};
 
 /// An entry of the registry: a built-in scheme and its constructors.
 #[derive(Debug)]
@@ -108,29 +108,9 @@ pub trait Scheme<const D: usize>: Debug + Send + Sync {
     /// When the rule cannot hide the points, or a parameter is out of range.
     fn lift(&self, points: &LocalPoints<'_, D>, key: &Key) -> Result<Lifted<D>, Error>;
 
-    /// Returns the descriptors that are released in place of `descriptors`, one row per original;
-    /// `None` if they are released unchanged, as geometric schemes do. Randomness must come from
-    /// `key` with [`Stage::Mitigation`].
-    ///
-    /// # Errors
-    /// If the rule cannot change these descriptors.
-    fn descriptors(
-        &self,
-        descriptors: &Descriptors,
-        key: &Key,
-    ) -> Result<Option<Descriptors>, Error> {
-        let _ = (descriptors, key);
-        Ok(None)
-    }
-
-    /// Returns the protection under which descriptors are released, if there is one.
-    fn protection(&self) -> Option<&Protection> {
+    /// Returns the mitigation or the protection of descriptors that is part of the scheme, if any.
+    fn change(&self) -> Option<&Change> {
         None
-    }
-
-    /// Returns true if the scheme changes descriptors, so that fewer keypoints find their points.
-    fn changes_descriptors(&self) -> bool {
-        false
     }
 }
 

@@ -1,7 +1,8 @@
 //! Check of the size and precision of a map's coordinates.
 
 use crate::Error;
-use crate::geometry::vector::quantile;
+use crate::geometry::frame::Bounds;
+use crate::geometry::vector::quantile_of;
 
 /// Allowed size of a map in its own unit. Records are released as `f32`, which must represent the
 /// cubes of lengths, and of thousandths of them.
@@ -12,17 +13,11 @@ const STEPS: f64 = 1e4;
 /// Rejects maps whose coordinates are too small, too large or too coarse. Little could be recovered
 /// from them, which is not protection.
 pub(super) fn check<const D: usize>(points: &[[f64; D]]) -> Result<(), Error> {
-    let (mut size, mut step) = (0.0f64, 0.0f64);
-    for axis in 0..D {
-        let mut values: Vec<f64> = points.iter().map(|p| p[axis]).collect();
-        if values.is_empty() {
-            return Ok(());
-        }
-        values.sort_unstable_by(f64::total_cmp);
-        // Quantiles ignore a few outliers.
-        size = size.max(quantile(&values, 0.95) - quantile(&values, 0.05));
-        step = step.max(quantile(&values, 0.5).abs() * f64::EPSILON);
-    }
+    // Quantiles ignore a few outliers.
+    let Some(bounds) = Bounds::quantiles(points, 0.05) else { return Ok(()) };
+    let size = bounds.longest_side();
+    let middle = |c: usize| quantile_of(points.iter().map(|p| p[c]), 0.5).abs();
+    let step = (0..D).map(middle).fold(0.0, f64::max) * f64::EPSILON;
     // Coincident points differ by rounding only.
     if size <= 4.0 * step {
         return Ok(());
@@ -35,11 +30,8 @@ pub(super) fn check<const D: usize>(points: &[[f64; D]]) -> Result<(), Error> {
     }
     if size < STEPS * step {
         let expected = "coordinates nearer to the origin: doubles there are too coarse for a map";
-        return Err(Error::new(
-            "map",
-            expected,
-            format!("steps of {step:.1e} in a size of {size:.1e}"),
-        ));
+        let found = format!("steps of {step:.1e} in a size of {size:.1e}");
+        return Err(Error::new("map", expected, found));
     }
     Ok(())
 }
