@@ -121,11 +121,6 @@ impl DropReason {
             Self::Other => "other",
         }
     }
-
-    /// Returns the reason called `name`, if there is one.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|reason| reason.name() == name)
-    }
 }
 
 /// A point that is in no record, and the reason.

@@ -73,8 +73,8 @@ pub struct Lists<'a, const D: usize> {
     seeds: (u64, u64),
     kept: &'a Kept,
     near: Vec<((usize, bool), TrueNeighbors)>,
-    /// Outliers of the last variant, and its K: variants with the same noise model are consecutive.
-    outliers: Option<(usize, Outliers)>,
+    /// K, noise model and outliers of the last variant: variants with the same model are consecutive.
+    outliers: Option<(usize, Noise, Outliers)>,
 }
 
 impl<'a, const D: usize> Lists<'a, D> {
@@ -169,11 +169,11 @@ impl<'a, const D: usize> Lists<'a, D> {
         let (search, secret, kept) = (self.search, self.secret, self.outliers.take());
         let near = self.near(k, false)?;
         let outliers = match kept {
-            Some((of, outliers)) if of == k && outliers.noise() == noise => outliers,
+            Some((of_k, of, outliers)) if (of_k, of) == (k, noise) => outliers,
             _ => Outliers::new(noise, near, search, secret, seed)?,
         };
         let lists = near.lists(ratio, &outliers, seed);
-        self.outliers = Some((k, outliers));
+        self.outliers = Some((k, noise, outliers));
         lists
     }
 

@@ -6,14 +6,13 @@ use std::ops::AddAssign;
 
 use rayon::prelude::*;
 
-use super::break_even::break_even;
 use super::cells::{Finished, Owned, Rows, of_item};
 use super::clock::{RowSeconds, Seconds};
-use super::missing::NotAudited;
+use super::missing::{NotAudited, add_new};
 use super::observer::{Observer, Silent};
 use super::plan::Plan;
 use super::row::{Alone, ByReason, Distinct, Parts, Row, places_within, within};
-use super::run::{Outcome, none_applies};
+use super::run::Outcome;
 use super::share::{Shares, Threshold, merge, percents};
 use crate::compiled::Both;
 use crate::evaluate::{Accuracy, Reliability};
@@ -113,15 +112,12 @@ pub fn run_many<const D: usize, E: From<Error>>(
     watcher.progress(n_items, n_items, "done");
     let Sums { mut cells, not_audited, n_pooled, clock } = all;
     cells.retain(|cell| cell.n_items == n_pooled);
-    if let (true, Some(first)) = (cells.is_empty(), not_audited.first()) {
-        return Err(none_applies(first).into());
-    }
-    let pooled = |cell: &CellSums| Row::mean(&cell.pools.iter().map(Pool::row).collect::<Vec<_>>());
-    let rows: Vec<Row> = cells.iter().map(pooled).collect();
-    let break_even = break_even(plan, &rows);
-    let seconds = cells.iter().map(|cell| cell.seconds).collect();
-    let seconds = Seconds { rows: seconds, ..clock };
-    Ok(Outcome { rows, not_audited, break_even, n_items, n_too_small, seconds })
+    let pooled = |cell: &CellSums| {
+        (Row::mean(&cell.pools.iter().map(Pool::row).collect::<Vec<_>>()), cell.seconds)
+    };
+    let (rows, seconds) = cells.iter().map(pooled).unzip();
+    let all = Rows { rows, seconds, not_audited };
+    Ok(Outcome::new(plan, all, clock, [n_items, n_too_small])?)
 }
 
 #[derive(Default)]
@@ -145,11 +141,7 @@ impl Sums {
     fn merge(&mut self, more: Self) {
         self.clock.merge(&more.clock);
         self.n_pooled += more.n_pooled;
-        for missing in more.not_audited {
-            if !self.not_audited.iter().any(|known| known.is_same_cell(&missing)) {
-                self.not_audited.push(missing);
-            }
-        }
+        add_new(&mut self.not_audited, more.not_audited);
         for cell in more.cells {
             match self.cells.iter_mut().find(|known| known.pools[0].is_of(&cell.pools[0].cell)) {
                 Some(to) => {

@@ -37,6 +37,28 @@ pub struct Outcome {
     pub seconds: Seconds,
 }
 
+impl Outcome {
+    /// Creates the result of `n_items` items, of which `n_too_small` have at most K points.
+    ///
+    /// # Errors
+    /// When no scheme has a row.
+    pub(super) fn new<const D: usize>(
+        plan: &Plan<D>,
+        all: Rows,
+        clock: Seconds,
+        [n_items, n_too_small]: [usize; 2],
+    ) -> Result<Self, Error> {
+        let Rows { rows, seconds, not_audited } = all;
+        if let (true, Some(first)) = (rows.is_empty(), not_audited.first()) {
+            let found = format!("none: {}: {}", first.scheme, first.reason);
+            return Err(Error::new("schemes", "one that can be applied to this map", found));
+        }
+        let break_even = break_even(plan, &rows);
+        let seconds = Seconds { rows: seconds, ..clock };
+        Ok(Self { rows, not_audited, break_even, n_items, n_too_small, seconds })
+    }
+}
+
 /// Runs `plan` on a map. `descriptors` has one row per original.
 ///
 /// Rows depend only on the map, the descriptors and the plan: byte-identical for any number of
@@ -75,18 +97,7 @@ fn every_cell<const D: usize>(
     let mut clock = Seconds::default();
     let owned = Owned { original, descriptors, hidden, name: None };
     let all = of_item(&owned, plan, &mut clock, observer, &mut |_| ())?;
-    if let (true, Some(first)) = (all.rows.is_empty(), all.not_audited.first()) {
-        return Err(none_applies(first));
-    }
-    let Rows { rows, seconds, not_audited } = all;
-    let break_even = break_even(plan, &rows);
-    let seconds = Seconds { rows: seconds, ..clock };
-    Ok(Outcome { rows, not_audited, break_even, n_items: 1, n_too_small: 0, seconds })
-}
-
-pub(super) fn none_applies(first: &NotAudited) -> Error {
-    let found = format!("none: {}: {}", first.scheme, first.reason);
-    Error::new("schemes", "one that can be applied to this map", found)
+    Outcome::new(plan, all, clock, [1, 0])
 }
 
 /// A scheme whose rule is unknown, because another program hid the points.

@@ -81,9 +81,11 @@ impl TrueNeighbors {
         let keep = (inlier_ratio * self.k as f64).round() as usize;
         let keep = keep.max(usize::from(inlier_ratio > 0.0));
         let n_wrong = self.k - keep;
-        let (available, meaning) = match outliers.noise {
-            Noise::Near => (outliers.per_slot, "between the 2K-th and the 10K-th nearest"),
-            Noise::Uniform | Noise::Clustered => (self.n_records - 1 - self.k, "not neighbors"),
+        let (available, meaning) = match outliers {
+            Outliers::Near { per_slot, .. } => {
+                (*per_slot, "between the 2K-th and the 10K-th nearest")
+            }
+            _ => (self.n_records - 1 - self.k, "not neighbors"),
         };
         if n_wrong > available {
             let what = format!("inlier ratio {inlier_ratio} at K = {}", self.k);
@@ -113,7 +115,7 @@ impl TrueNeighbors {
     /// # Errors
     /// Returns the errors of [`lists`](Self::lists).
     pub fn at_inlier_ratio(&self, inlier_ratio: f64, seed: u64) -> Result<Neighborhoods, Error> {
-        self.lists(inlier_ratio, &Outliers::uniform(), seed)
+        self.lists(inlier_ratio, &Outliers::Uniform, seed)
     }
 
     /// Returns the true neighbors of `slot`, nearest first.
@@ -347,24 +349,26 @@ const MAX_DRAWS: usize = 64;
 
 /// Outliers of one noise model, prepared for one obfuscation.
 #[derive(Clone, Debug)]
-pub struct Outliers {
-    noise: Noise,
-    /// For `near`, rows of `per_slot` outliers in random order, slot by slot. For `clustered`, the
-    /// outliers of each patch, end to end.
-    records: Vec<RecordId>,
-    per_slot: usize,
-    /// For `clustered`: the start of each patch in `records`, and the patch of each slot.
-    starts: Vec<usize>,
-    patch_of: Vec<u32>,
+pub enum Outliers {
+    /// Uniformly random ones, which need no preparation.
+    Uniform,
+    /// Rows of `per_slot` records in random order, slot by slot.
+    Near {
+        /// All rows, end to end.
+        records: Vec<RecordId>,
+        /// Length of a row.
+        per_slot: usize,
+    },
+    /// Records that the slots of a patch share.
+    Clustered {
+        /// The records of each patch.
+        patches: Vec<Vec<RecordId>>,
+        /// The patch of each slot.
+        patch_of: Vec<u32>,
+    },
 }
 
 impl Outliers {
-    /// Returns uniformly random outliers, which need no preparation.
-    fn uniform() -> Self {
-        let (records, starts, patch_of) = Default::default();
-        Self { noise: Noise::Uniform, records, per_slot: 0, starts, patch_of }
-    }
-
     /// Prepares outliers of the model `noise` for the neighborhoods `truth`. `secret` and `knn`
     /// must be those of `truth`.
     ///
@@ -384,7 +388,7 @@ impl Outliers {
         }
         let nearness = Nearness::new(knn, secret, truth.slots_per_record);
         Ok(match noise {
-            Noise::Uniform => Self::uniform(),
+            Noise::Uniform => Self::Uniform,
             Noise::Near => Self::near(truth, &nearness, seed),
             Noise::Clustered => Self::clustered(truth, knn, secret, &nearness, seed),
         })
@@ -406,7 +410,7 @@ impl Outliers {
                 }
             });
         }
-        Self { noise: Noise::Near, records, per_slot, ..Self::uniform() }
+        Self::Near { records, per_slot }
     }
 
     fn clustered<const D: usize>(
@@ -416,15 +420,14 @@ impl Outliers {
         nearness: &Nearness<'_, D>,
         seed: u64,
     ) -> Self {
-        let patches = knn.patches(PATCH * truth.k);
-        let (mut starts, mut records) = (vec![0], Vec::new());
+        let mut patches = Vec::new();
         let mut patch_of_original = vec![0u32; secret.n_originals()];
         let (mut around, mut around_place, mut near) = (Vec::new(), Vec::new(), Vec::new());
-        for (at, patch) in patches.iter().enumerate() {
+        for (at, patch) in knn.patches(PATCH * truth.k).iter().enumerate() {
             let middle = patch[patch.len() / 2];
             knn.nearest(middle as usize, RING.1 * truth.k, &mut around);
             let mut draws = Draws::new(seed, Stage::OracleLookAlikes, at as u64);
-            let start = records.len();
+            let mut records = Vec::new();
             for _ in 0..PLACES {
                 let mut place = middle;
                 for _ in 0..MAX_DRAWS {
@@ -436,23 +439,18 @@ impl Outliers {
                 let hidden_there = nearness.record_of[place as usize];
                 nearness.from(place as usize, truth.k, &mut around_place, &mut near);
                 for record in hidden_there.into_iter().chain(near.iter().copied()).take(truth.k) {
-                    if !listed(&records[start..], record) {
+                    if !listed(&records, record) {
                         records.push(record);
                     }
                 }
             }
-            starts.push(records.len());
+            patches.push(records);
             for &original in *patch {
                 patch_of_original[original as usize] = at as u32;
             }
         }
         let patch_of = secret.hidden().iter().map(|id| patch_of_original[id.index()]).collect();
-        Self { noise: Noise::Clustered, records, starts, patch_of, ..Self::uniform() }
-    }
-
-    /// Returns the noise model.
-    pub fn noise(&self) -> Noise {
-        self.noise
+        Self::Clustered { patches, patch_of }
     }
 
     /// Fills `row` with outliers of `slot`. Their order depends only on the seed and the slot, so a
@@ -466,16 +464,15 @@ impl Outliers {
         scratch: &mut Vec<RecordId>,
         row: &mut [RecordId],
     ) {
-        if self.noise == Noise::Near {
-            row.copy_from_slice(&self.records[slot * self.per_slot..][..row.len()]);
+        if let Self::Near { records, per_slot } = self {
+            row.copy_from_slice(&records[slot * per_slot..][..row.len()]);
             return;
         }
         let (near, own) = (truth.of(slot), truth.own(slot));
         let mut draws = Draws::new(seed, Stage::OracleOutliers, slot as u64);
         let mut at = 0;
-        if self.noise == Noise::Clustered {
-            let patch = self.patch_of[slot] as usize;
-            let alike = &self.records[self.starts[patch]..self.starts[patch + 1]];
+        if let Self::Clustered { patches, patch_of } = self {
+            let alike = &patches[patch_of[slot] as usize];
             scratch.clear();
             scratch.extend(alike.iter().filter(|&&r| r != own && !listed(near, r)));
             draws.shuffle(scratch);

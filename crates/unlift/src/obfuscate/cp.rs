@@ -59,12 +59,8 @@ impl<const D: usize> Scheme<D> for Cp {
                 swapped_axis.push(axis as u8);
             }
         }
-        Ok(Lifted {
-            obfuscation: Obfuscation::AxisCandidates(AxisCandidates::try_new(&positions)?),
-            slots_per_record: 1,
-            hidden,
-            swapped_axis: Some(swapped_axis),
-            dropped,
-        })
+        let swapped_axis = Some(swapped_axis);
+        let candidates = Obfuscation::AxisCandidates(AxisCandidates::try_new(&positions)?);
+        Ok(Lifted { hidden, swapped_axis, dropped, ..Lifted::one_each(candidates) })
     }
 }

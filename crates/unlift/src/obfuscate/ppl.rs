@@ -82,13 +82,9 @@ fn lines_through(
     let through: Vec<[f64; 3]> = pairs.iter().map(|[a, _]| points[a.index()]).collect();
     let direction: Vec<[f64; 3]> =
         pairs.iter().map(|[a, b]| sub(&points[b.index()], &points[a.index()])).collect();
-    Ok(Lifted {
-        obfuscation: Obfuscation::Lines(Lines::through(&through, &direction)?),
-        slots_per_record: 2,
-        hidden: pairs.as_flattened().to_vec(),
-        swapped_axis: None,
-        dropped,
-    })
+    let lines = Obfuscation::Lines(Lines::through(&through, &direction)?);
+    let hidden = pairs.as_flattened().to_vec();
+    Ok(Lifted { slots_per_record: 2, hidden, dropped, ..Lifted::one_each(lines) })
 }
 
 /// Paired-point lifting with plane rejection.

@@ -191,11 +191,6 @@ pub(super) fn rays_from<const D: usize>(
         let length = length2.sqrt();
         direction.push(along.map(|x| x / length));
     }
-    Ok(Lifted {
-        obfuscation: Obfuscation::Rays(Rays::try_new(&centers, center, &direction)?),
-        slots_per_record: 1,
-        hidden,
-        swapped_axis: None,
-        dropped,
-    })
+    let rays = Obfuscation::Rays(Rays::try_new(&centers, center, &direction)?);
+    Ok(Lifted { hidden, dropped, ..Lifted::one_each(rays) })
 }
