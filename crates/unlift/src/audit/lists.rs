@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use super::plan::{NeighborsBy, Plan, Variant};
 use crate::geometry::knn::Knn;
@@ -72,7 +73,8 @@ pub struct Lists<'a, const D: usize> {
     /// Seeds of the oracle and of the attacker.
     seeds: (u64, u64),
     kept: &'a Kept,
-    near: Vec<((usize, bool), TrueNeighbors)>,
+    /// By their number, and whether they are by descriptor row.
+    near: BTreeMap<(usize, bool), TrueNeighbors>,
     /// K, noise model and outliers of the last variant: variants with the same model are consecutive.
     outliers: Option<(usize, Noise, Outliers)>,
 }
@@ -89,7 +91,7 @@ impl<'a, const D: usize> Lists<'a, D> {
         kept: &'a Kept,
     ) -> Self {
         let (released, secret) = (&hidden.0, &hidden.1);
-        let (near, outliers) = (Vec::new(), None);
+        let (near, outliers) = (BTreeMap::new(), None);
         Self { plan, search, released, secret, by_row, seeds, kept, near, outliers }
     }
 
@@ -121,11 +123,9 @@ impl<'a, const D: usize> Lists<'a, D> {
                 let (offsets, neighbors) = (&points.offsets, &points.neighbors);
                 let lists = oracle::from_points(offsets, neighbors, scores, self.secret, slots)?;
                 let k = lists.longest().min(others).max(1);
-                let mut ratio = |k: usize| -> Result<f64, Error> {
-                    Ok(self.near(k, false)?.measured_inlier_ratio(&lists))
-                };
-                let (ratio, ratio_at_k) = (ratio(plan_k.min(others))?, Some(ratio(k)?));
-                Ok(Made { lists, ratio, k, ratio_at_k })
+                let ratio = self.near(plan_k.min(others), false)?.measured_inlier_ratio(&lists);
+                let ratio_at_k = self.near(k, false)?.measured_inlier_ratio(&lists);
+                Ok(Made { lists, ratio, k, ratio_at_k: Some(ratio_at_k) })
             }
             NeighborsBy::Source(_) if may_be_short && others == 0 => Ok(self.none(variant)),
             NeighborsBy::Source(source) => {
@@ -139,12 +139,11 @@ impl<'a, const D: usize> Lists<'a, D> {
                     }
                 };
                 // Lists of such sources are in the order of descriptor rows, not of slots.
-                let mut ratio = |k: usize| -> Result<f64, Error> {
-                    let k = if is_short { k.min(others) } else { k };
-                    Ok(self.near(k, true)?.measured_inlier_ratio(&lists))
-                };
-                let (ratio, ratio_at_k) = (ratio(plan_k)?, Some(ratio(k)?));
-                Ok(Made { lists, ratio, k, ratio_at_k })
+                let [near_plan, near] =
+                    [plan_k, k].map(|k| if is_short { k.min(others) } else { k });
+                let ratio = self.near(near_plan, true)?.measured_inlier_ratio(&lists);
+                let ratio_at_k = self.near(near, true)?.measured_inlier_ratio(&lists);
+                Ok(Made { lists, ratio, k, ratio_at_k: Some(ratio_at_k) })
             }
         }
     }
@@ -182,74 +181,12 @@ impl<'a, const D: usize> Lists<'a, D> {
         let slots = self.released.slots_per_record();
         // With one slot per record the two orders are equal.
         let by_row = by_row && slots > 1;
-        if let Some(at) = self.near.iter().position(|(of, _)| *of == (k, by_row)) {
-            return Ok(&self.near[at].1);
-        }
-        let secret = if by_row { self.by_row } else { self.secret };
-        let near = TrueNeighbors::new(self.search, secret, slots, k)?;
-        self.near.push(((k, by_row), near));
-        Ok(&self.near[self.near.len() - 1].1)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::descriptors::Values;
-    use crate::neighbors::{Needs, Similarity};
-    use crate::obfuscate::{SchemeOptions, obfuscate};
-    use crate::obfuscate::{olc::Olc, ray};
-    use crate::released::Obfuscation;
-    use crate::seed::Key;
-    use crate::truth::Original;
-    use crate::{Descriptors, PointSet, Unit, synthetic};
-
-    /// Lists of rays are longer.
-    #[derive(Debug)]
-    struct ByFamily;
-
-    impl Source<3> for ByFamily {
-        fn name(&self) -> &str {
-            "by-family"
-        }
-
-        fn needs(&self) -> Needs {
-            Needs::Descriptors
-        }
-
-        fn k(&self, released: &Released<3>) -> usize {
-            if matches!(released.obfuscation(), Obfuscation::Rays(_)) { 10 } else { 7 }
-        }
-
-        fn lists(
-            &self,
-            released: &Released<3>,
-            k: usize,
-            seed: u64,
-        ) -> Result<Neighborhoods, Error> {
-            Similarity.lists(released, k, seed)
-        }
-
-        fn reads_descriptors_alone(&self) -> bool {
-            true
-        }
-    }
-
-    #[test]
-    fn lists_are_kept_by_their_length() {
-        let points = PointSet::try_new(synthetic::room(1, 60).points, Unit::Meter).unwrap();
-        let original = Original::new(points);
-        let values = (0..60 * 8).map(|at| (at * at % 251) as u8).collect();
-        let descriptors = Descriptors::try_new(Values::U8(values), 8).unwrap();
-        let rays = (ray::ENTRY.in_3d.unwrap())(&SchemeOptions::usual(Unit::Meter));
-        let hide = |scheme| {
-            obfuscate(scheme, &original, Some(&descriptors), &Key::from_seed(0)).unwrap().0
-        };
-        let (lines, rays) = (hide(&Olc), hide(&*rays));
-        let kept = Kept::default();
-        for (released, k) in [(&lines, 7), (&rays, 10), (&lines, 7)] {
-            let lists = kept.lists(&ByFamily, released, 0).unwrap();
-            assert_eq!(lists, ByFamily.lists(released, k, 0).unwrap());
+        match self.near.entry((k, by_row)) {
+            Entry::Occupied(near) => Ok(near.into_mut()),
+            Entry::Vacant(near) => {
+                let secret = if by_row { self.by_row } else { self.secret };
+                Ok(near.insert(TrueNeighbors::new(self.search, secret, slots, k)?))
+            }
         }
     }
 }

@@ -326,8 +326,7 @@ fn area(support: &[f64], decoy: &[bool]) -> f64 {
 mod tests {
     use super::*;
     use crate::neighbors::oracle::{self, TrueNeighbors};
-    use crate::obfuscate::olc::Olc;
-    use crate::obfuscate::{SchemeOptions, obfuscate, sphere};
+    use crate::obfuscate::{obfuscate, olc::Olc, sphere::Sphere};
     use crate::seed::Key;
     use crate::{PointSet, Unit, synthetic};
 
@@ -347,8 +346,8 @@ mod tests {
             let near = TrueNeighbors::new(&search, secret, 1, 12).unwrap();
             near.at_inlier_ratio(1.0, 0).unwrap()
         };
-        let scheme = (sphere::ENTRY.in_3d.unwrap())(&SchemeOptions::usual(Unit::Meter));
-        let (released, secret) = obfuscate(&*scheme, &original, None, &Key::from_seed(0)).unwrap();
+        let key = Key::from_seed(0);
+        let (released, secret) = obfuscate(&Sphere, &original, None, &key).unwrap();
         let truth = Truth { original: &original, released: &released, secret: &secret };
         let figures = truth.bearings(&lists(&secret));
         let of = |name: &str| figures.iter().find(|(known, _)| known == name).unwrap().1;
@@ -358,7 +357,7 @@ mod tests {
         assert!(of("decoys_precision_percent") > 80.0, "{figures:?}");
         assert!(of("decoys_recall_percent") > 60.0, "{figures:?}");
         // Lines are no bearings.
-        let (released, secret) = obfuscate(&Olc, &original, None, &Key::from_seed(0)).unwrap();
+        let (released, secret) = obfuscate(&Olc, &original, None, &key).unwrap();
         let truth = Truth { original: &original, released: &released, secret: &secret };
         assert_eq!(truth.bearings(&lists(&secret)), []);
     }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::ppl::random_pairs;
-use super::scheme::{Entry, Facts, Lifted, LocalPoints, Scheme};
+use super::scheme::{Build, Entry, Facts, Lifted, LocalPoints, Scheme};
 use crate::Error;
 use crate::released::{AxisCandidates, Obfuscation};
 use crate::seed::{Key, Stage};
@@ -23,8 +23,7 @@ pub const ENTRY: Entry = Entry {
         hidden: "which coordinate was exchanged, and its value",
         patents: "none found",
     },
-    in_2d: None,
-    in_3d: Some(|_| Arc::new(Cp)),
+    build: Build::In3d(|_| Arc::new(Cp)),
 };
 
 /// Registry entry in images.
@@ -35,8 +34,7 @@ pub const CP2D: Entry = Entry {
         rule: "Two keypoints swap one of their two coordinates.",
         ..ENTRY.facts
     },
-    in_2d: Some(|_| Arc::new(Cp)),
-    in_3d: None,
+    build: Build::In2d(|_| Arc::new(Cp)),
 };
 
 impl<const D: usize> Scheme<D> for Cp {

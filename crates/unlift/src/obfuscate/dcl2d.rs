@@ -15,7 +15,7 @@
 use std::sync::Arc;
 
 use super::ray::rays_from;
-use super::scheme::{Entry, Facts, Lifted, LocalPoints, Scheme};
+use super::scheme::{Build, Entry, Facts, Lifted, LocalPoints, Scheme};
 use crate::Error;
 use crate::released::Obfuscation;
 use crate::seed::Key;
@@ -35,8 +35,7 @@ pub const ENTRY: Entry = Entry {
         hidden: "the range from the anchor (1 of 2 coordinates)",
         patents: "none found",
     },
-    in_2d: Some(|_| Arc::new(Dcl2d)),
-    in_3d: None,
+    build: Build::In2d(|_| Arc::new(Dcl2d)),
 };
 
 impl Scheme<2> for Dcl2d {

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::scheme::{Entry, Facts, Lifted, LocalPoints, Scheme};
+use super::scheme::{Build, Entry, Facts, Lifted, LocalPoints, Scheme};
 use crate::Error;
 use crate::geometry::vector::sub;
 use crate::released::{Lines, Obfuscation};
@@ -28,8 +28,7 @@ pub const ENTRY: Entry = Entry {
         hidden: "the position along the line (1 of 3 coordinates)",
         patents: "EP 3818501 B1 / WO 2020/009829 \"3D line clouds\", Microsoft (US 16/025,120)",
     },
-    in_2d: None,
-    in_3d: Some(|_| Arc::new(Olc)),
+    build: Build::In3d(|_| Arc::new(Olc)),
 };
 
 /// Registry entry in images.
@@ -43,8 +42,7 @@ pub const LINES2D: Entry = Entry {
         hidden: "the position along the line (1 of 2 coordinates)",
         patents: "US 10,839,556, Microsoft",
     },
-    in_2d: Some(|_| Arc::new(Olc)),
-    in_3d: None,
+    build: Build::In2d(|_| Arc::new(Olc)),
 };
 
 impl<const D: usize> Scheme<D> for Olc {
@@ -78,8 +76,7 @@ pub const GRAVITY: Entry = Entry {
         hidden: "the position along the line (1 of 2 coordinates)",
         patents: "none found",
     },
-    in_2d: Some(|_| Arc::new(Gravity)),
-    in_3d: None,
+    build: Build::In2d(|_| Arc::new(Gravity)),
 };
 
 /// Focal length over the tangent of the assumed tilt, in longer sides of the image.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::scheme::{Entry, Facts, Lifted, LocalPoints, Scheme};
+use super::scheme::{Build, Entry, Facts, Lifted, LocalPoints, Scheme};
 use crate::Error;
 use crate::released::{AxisPlanes, Obfuscation};
 use crate::seed::{Key, Stage};
@@ -23,8 +23,7 @@ pub const ENTRY: Entry = Entry {
         hidden: "two of three coordinates",
         patents: "none found",
     },
-    in_2d: None,
-    in_3d: Some(|_| Arc::new(Plane)),
+    build: Build::In3d(|_| Arc::new(Plane)),
 };
 
 impl Scheme<3> for Plane {

@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use super::scheme::{Entry, Facts, Lifted, LocalPoints, Scheme};
+use super::scheme::{Build, Entry, Facts, Lifted, LocalPoints, Scheme};
 use crate::geometry::knn::Knn;
 use crate::geometry::normal::local_normal;
 use crate::geometry::vector::{dot, squared_distance, sub};
@@ -29,8 +29,7 @@ pub const ENTRY: Entry = Entry {
         hidden: "two positions along the line and which descriptor is whose",
         patents: "application declared by its authors; line clouds as for olc",
     },
-    in_2d: None,
-    in_3d: Some(|_| Arc::new(Ppl)),
+    build: Build::In3d(|_| Arc::new(Ppl)),
 };
 
 /// Maximum number of re-pairings of coincident points before they are dropped.
@@ -101,8 +100,7 @@ pub const PLUS: Entry = Entry {
         patents: "as ppl",
         ..ENTRY.facts
     },
-    in_2d: None,
-    in_3d: Some(|_| Arc::new(PplPlus)),
+    build: Build::In3d(|_| Arc::new(PplPlus)),
 };
 
 const MAX_ROUNDS: usize = 1000;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::scheme::{Entry, Facts, Lifted, LocalPoints, Scheme};
+use super::scheme::{Build, Entry, Facts, Lifted, LocalPoints, Scheme};
 use crate::geometry::vector::{dot, squared_distance, sub};
 use crate::released::{Obfuscation, Rays};
 use crate::seed::{Key, Stage};
@@ -28,8 +28,7 @@ pub const ENTRY: Entry = Entry {
         hidden: "the range from the center (1 of 3 coordinates)",
         patents: "US 2025/0329045 A1; PCT application declared by its authors",
     },
-    in_2d: None,
-    in_3d: Some(|_| Arc::new(Ray)),
+    build: Build::In3d(|_| Arc::new(Ray)),
 };
 
 /// Restarts of k-means (scikit-learn's `n_init` in the authors' code).
@@ -65,8 +64,7 @@ pub const VOXEL: Entry = Entry {
         patents: "as ray",
         ..ENTRY.facts
     },
-    in_2d: None,
-    in_3d: Some(|options| Arc::new(RayVoxel { voxel: options.voxel })),
+    build: Build::In3d(|options| Arc::new(RayVoxel { voxel: options.voxel })),
 };
 
 impl Scheme<3> for RayVoxel {

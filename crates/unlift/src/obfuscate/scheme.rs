@@ -13,32 +13,47 @@ use crate::seed::Stage;
 use crate::truth::Dropped;
 use crate::{Error, OriginalId, Unit};
 
-/// An entry of the registry: a built-in scheme and its constructors.
+/// An entry of the registry: a built-in scheme and its constructor.
 #[derive(Debug)]
 pub struct Entry {
     /// Name that users type.
     pub name: &'static str,
     /// Facts for reports.
     pub facts: Facts,
-    /// Constructor for keypoints, if the scheme is defined there.
-    pub in_2d: Option<Build<2>>,
-    /// Constructor for map points, if the scheme is defined there.
-    pub in_3d: Option<Build<3>>,
+    /// Constructor.
+    pub build: Build,
 }
 
 /// Constructor of a scheme from options.
-pub type Build<const D: usize> = fn(&SchemeOptions) -> Arc<dyn Scheme<D>>;
+#[derive(Debug)]
+pub enum Build {
+    /// For keypoints of images.
+    In2d(fn(&SchemeOptions) -> Arc<dyn Scheme<2>>),
+    /// For points of maps.
+    In3d(fn(&SchemeOptions) -> Arc<dyn Scheme<3>>),
+}
 
 impl Entry {
+    /// Returns the number of dimensions of the points that the scheme hides.
+    pub fn dimensions(&self) -> usize {
+        match self.build {
+            Build::In2d(_) => 2,
+            Build::In3d(_) => 3,
+        }
+    }
+
     /// Returns the scheme for points of `D` dimensions, if it is defined there.
     pub fn of_dimension<const D: usize>(
         &self,
         options: &SchemeOptions,
     ) -> Option<Arc<dyn Scheme<D>>> {
         // `Any` compares the types at run time, because a constant cannot choose between two types.
-        let of: &dyn Any = if D == 2 { &self.in_2d } else { &self.in_3d };
-        let build = of.downcast_ref::<Option<Build<D>>>().copied().flatten();
-        build.map(|build| build(options))
+        let build: &dyn Any = match &self.build {
+            Build::In2d(build) => build,
+            Build::In3d(build) => build,
+        };
+        let build = build.downcast_ref::<fn(&SchemeOptions) -> Arc<dyn Scheme<D>>>()?;
+        Some(build(options))
     }
 }
 

@@ -12,7 +12,7 @@
 use std::sync::Arc;
 
 use super::ray::rays_from;
-use super::scheme::{Entry, Facts, Lifted, LocalPoints, Scheme};
+use super::scheme::{Build, Entry, Facts, Lifted, LocalPoints, Scheme};
 use crate::released::{Obfuscation, Rays};
 use crate::seed::{Key, Stage};
 use crate::{Error, OriginalId};
@@ -37,8 +37,7 @@ pub const ENTRY: Entry = Entry {
         hidden: "the range from the center (1 of 3 coordinates)",
         patents: "PCT application declared by its authors",
     },
-    in_2d: None,
-    in_3d: Some(|_| Arc::new(Sphere)),
+    build: Build::In3d(|_| Arc::new(Sphere)),
 };
 
 impl Scheme<3> for Sphere {

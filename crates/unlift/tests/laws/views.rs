@@ -62,7 +62,7 @@ fn fixed(a: &str, b: &str) -> std::ops::RangeInclusive<f64> {
 
 #[test]
 fn two_releases_give_back_every_point_that_their_records_fix() {
-    let names = || SCHEMES.iter().filter(|entry| entry.in_3d.is_some()).map(|entry| entry.name);
+    let names = || SCHEMES.iter().filter(|entry| entry.dimensions() == 3).map(|entry| entry.name);
     for (a, b) in names().flat_map(|a| names().map(move |b| (a, b))) {
         let (solved, accuracy, n_right, n_links) = attack((a, b), by_descriptors);
         assert_eq!(n_right, n_links, "{a}/{b}");
