@@ -15,8 +15,8 @@ mod schemes;
 mod solvers;
 mod sources;
 
-pub use points::{image_around, piles, room, uniform};
-pub use schemes::scheme_laws;
+pub use points::{piles, room, uniform};
+pub use schemes::{hide, scheme_laws};
 pub use solvers::solver_laws;
 pub use sources::{described_map, source_laws};
 

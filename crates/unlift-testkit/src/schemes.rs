@@ -7,12 +7,14 @@ use unlift::seed::Key;
 use unlift::truth::{Original, Secret};
 use unlift::{Error, PointSet, Unit};
 
-use crate::{check_name, image_around, on_threads, piles, room, uniform};
+use crate::points::image_around;
+use crate::{check_name, on_threads, piles, room, uniform};
 
 /// Records are stored in `f32`: a few units in the last place of the largest coordinate, in meters.
 const TOLERANCE: f64 = 4e-6;
 /// Maximum share of originals that keep their row.
 const MAX_IN_PLACE: f64 = 0.05;
+const IMAGE_STEP: f64 = 1.0;
 
 /// Checks all properties of a scheme:
 ///
@@ -34,7 +36,7 @@ pub fn scheme_laws<const D: usize>(scheme: &dyn Scheme<D>) {
     // Obfuscation itself counts the originals in slots and the dropped ones. A map may be refused, but not for a wrong count.
     let few = [0, 1, 2, 3, 7].into_iter().flat_map(|n| [uniform(9, n), piles(9, 1, n, 0.0)]);
     for points in few.chain([room(5, 300), piles(9, 40, 3, 0.0), uniform(8, 301)]) {
-        let error = hide(scheme, &points, 5).err().map(|error| error.to_string());
+        let error = hide(scheme, &points, IMAGE_STEP, 5).err().map(|error| error.to_string());
         let is_counted = |error: &String| {
             !error.contains("in one slot or dropped once") && !error.contains("originals below")
         };
@@ -48,14 +50,19 @@ pub fn scheme_laws<const D: usize>(scheme: &dyn Scheme<D>) {
     order_tells_nothing(scheme);
 }
 
-fn hide<const D: usize>(
+/// Hides `points`. In 2D they are keypoints of an image, whose sides are multiples of `step`.
+///
+/// # Errors
+/// When the scheme cannot hide these points.
+pub fn hide<const D: usize>(
     scheme: &dyn Scheme<D>,
     points: &[[f64; D]],
+    step: f64,
     seed: u64,
 ) -> Result<(Original<D>, Released<D>, Secret), Error> {
     let set = PointSet::try_new(points.to_vec(), Unit::Meter)?;
     let original = match D {
-        2 => Original::within(set, image_around(points, 1.0))?,
+        2 => Original::within(set, image_around(points, step))?,
         _ => Original::new(set),
     };
     let (released, secret) = obfuscate(scheme, &original, None, &Key::from_seed(seed))?;
@@ -68,8 +75,8 @@ fn points_lie_on_their_records<const D: usize>(
     tolerance: f64,
 ) {
     let name = scheme.name();
-    let (original, released, secret) =
-        hide(scheme, points, 3).unwrap_or_else(|e| panic!("{name} cannot hide a room: {e}"));
+    let (original, released, secret) = hide(scheme, points, IMAGE_STEP, 3)
+        .unwrap_or_else(|e| panic!("{name} cannot hide a room: {e}"));
     if released.obfuscation().is_bearings() {
         return;
     }
@@ -82,7 +89,7 @@ fn points_lie_on_their_records<const D: usize>(
 fn keys_decide_alone<const D: usize>(scheme: &dyn Scheme<D>) {
     let points = room(11, 700);
     let on = |threads: usize, seed: u64| {
-        let hidden = on_threads(threads, || hide(scheme, &points, seed));
+        let hidden = on_threads(threads, || hide(scheme, &points, IMAGE_STEP, seed));
         let (_, released, secret) = hidden.expect("a room");
         (released, secret)
     };
@@ -93,7 +100,7 @@ fn keys_decide_alone<const D: usize>(scheme: &dyn Scheme<D>) {
 }
 
 fn order_tells_nothing<const D: usize>(scheme: &dyn Scheme<D>) {
-    let (_, _, secret) = hide(scheme, &room(12, 600), 2).expect("a room");
+    let (_, _, secret) = hide(scheme, &room(12, 600), IMAGE_STEP, 2).expect("a room");
     let in_place = secret.hidden().iter().enumerate().filter(|(slot, id)| id.index() == *slot);
     let share = in_place.count() as f64 / secret.n_slots().max(1) as f64;
     let name = scheme.name();

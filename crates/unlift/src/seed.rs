@@ -75,14 +75,7 @@ impl std::fmt::Debug for Key {
 }
 
 /// The key of one stage. Streams of items are computed on demand.
-#[derive(Clone)]
 pub struct StageKey([u8; 32]);
-
-impl std::fmt::Debug for StageKey {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("StageKey(..)")
-    }
-}
 
 impl StageKey {
     /// Returns the random stream of `item`.

@@ -224,8 +224,7 @@ pub(super) struct Pool {
     /// Row of the first image, which identifies the cell.
     cell: Row,
     n_points: usize,
-    n_listed: usize,
-    /// Sums by figure: of true entries of lists, of percentages times points. A figure that no image has is absent.
+    /// Sums by figure: of entries and true entries of lists, of percentages times points. A figure that no image has is absent.
     sums: BTreeMap<&'static str, f64>,
     /// Points and distinct places within each threshold.
     shares: SharesByName,
@@ -253,6 +252,7 @@ impl Pool {
         let percentage = |percent: Option<f64>| percent.map(|percent| percent * n as f64);
         let mut sums = BTreeMap::from([
             ("delta", row.delta * n as f64),
+            ("listed", *n_listed as f64),
             ("hits", row.inlier_ratio * *n_listed as f64),
             ("places", weights.iter().sum()),
         ]);
@@ -271,7 +271,6 @@ impl Pool {
         Self {
             cell: row.clone(),
             n_points: n,
-            n_listed: *n_listed,
             sums,
             shares: BTreeMap::from([
                 ("recovered", within(accuracy, thresholds)),
@@ -294,7 +293,6 @@ impl Pool {
     /// Adds the sums of `more`, a pool of the same row.
     pub(super) fn merge(&mut self, more: &Self) {
         self.n_points += more.n_points;
-        self.n_listed += more.n_listed;
         merge_counts(&mut self.sums, &more.sums);
         merge_shares(&mut self.shares, &more.shares);
         merge_shares(&mut self.alone, &more.alone);
@@ -319,6 +317,7 @@ impl Pool {
     pub(super) fn row(&self) -> Row {
         let n = self.n_points.max(1) as f64;
         let sum = |name| self.sums.get(name).copied();
+        let total = |name| sum(name).unwrap_or(0.0);
         let is_known =
             |(_, figure): &(&String, &Figure)| figure.of_images || figure.known == self.n_points;
         let alone = |(&name, shares): (&&'static str, &Shares)| {
@@ -329,10 +328,10 @@ impl Pool {
         let mut row = Row {
             // A requested ratio identifies the cell. A measured one is a mean over entries.
             inlier_ratio: match self.cell.oracle_noise {
-                None if self.n_listed > 0 => sum("hits").unwrap_or(0.0) / self.n_listed as f64,
+                None if total("listed") > 0.0 => total("hits") / total("listed"),
                 _ => self.cell.inlier_ratio,
             },
-            delta: sum("delta").unwrap_or(0.0) / n,
+            delta: total("delta") / n,
             n_points: self.n_points,
             n_lost: self.lost.values().sum(),
             lost: self.lost.clone(),
@@ -355,7 +354,7 @@ impl Pool {
             assignment_accuracy_percent: sum("assignment").map(|sum| sum / n),
             sure_unknown: self.sure_unknown.clone(),
             distinct: self.cell.distinct.as_ref().map(|_| Distinct {
-                n_places: sum("places").unwrap_or(0.0).round() as usize,
+                n_places: total("places").round() as usize,
                 recovered_percent: percents(&self.shares["places"]),
                 blind_percent: percents(&self.shares["blind places"]),
             }),

@@ -75,28 +75,21 @@ pub fn run<const D: usize>(
 ) -> Result<Outcome, Error> {
     plan.check(original.len(), descriptors.is_some())?;
     let every_cell: EveryCell<D> = EVERY_CELL.of()?;
-    every_cell((original, descriptors), None, plan, observer)
+    every_cell(&Owned { original, descriptors, hidden: None, name: None }, plan, observer)
 }
 
-type EveryCell<const D: usize> = fn(
-    (&Original<D>, Option<&Descriptors>),
-    Option<&(Released<D>, Secret)>,
-    &Plan<D>,
-    &mut dyn Observer<D>,
-) -> Result<Outcome, Error>;
+type EveryCell<const D: usize> =
+    fn(&Owned<'_, D>, &Plan<D>, &mut dyn Observer<D>) -> Result<Outcome, Error>;
 
 static EVERY_CELL: Both<EveryCell<2>, EveryCell<3>> = Both(every_cell::<2>, every_cell::<3>);
 
-/// Runs every cell of `plan`. If `hidden` is given, it is the obfuscation for the plan's first scheme.
 fn every_cell<const D: usize>(
-    (original, descriptors): (&Original<D>, Option<&Descriptors>),
-    hidden: Option<&(Released<D>, Secret)>,
+    owned: &Owned<'_, D>,
     plan: &Plan<D>,
     observer: &mut dyn Observer<D>,
 ) -> Result<Outcome, Error> {
     let mut clock = Seconds::default();
-    let owned = Owned { original, descriptors, hidden, name: None };
-    let all = of_item(&owned, plan, &mut clock, observer, &mut |_| ())?;
+    let all = of_item(owned, plan, &mut clock, observer, &mut |_| ())?;
     Outcome::new(plan, all, clock, [1, 0])
 }
 
@@ -139,5 +132,5 @@ pub fn run_released(
     let (released, secret) = hidden;
     plan.check(original.len(), released.descriptors().is_some())?;
     Truth { original, released, secret }.belongs()?;
-    every_cell((original, descriptors), Some(hidden), plan, observer)
+    every_cell(&Owned { original, descriptors, hidden: Some(hidden), name: None }, plan, observer)
 }

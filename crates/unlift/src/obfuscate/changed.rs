@@ -86,9 +86,7 @@ impl<const D: usize> Scheme<D> for Changed<D> {
         let original = |id: OriginalId| OriginalId(kept[id.index()]);
         lifted.hidden.iter_mut().for_each(|id| *id = original(*id));
         lifted.dropped.iter_mut().for_each(|dropped| dropped.original = original(dropped.original));
-        let mut is_kept = vec![false; n];
-        kept.iter().for_each(|&row| is_kept[row as usize] = true);
-        let out = (0..n).filter(|&row| !is_kept[row]).map(OriginalId::from_index);
+        let out = (0..n as u32).filter(|row| kept.binary_search(row).is_err()).map(OriginalId);
         let out = out.map(|original| Dropped { original, reason: DropReason::Thinned });
         lifted.dropped.extend(out);
         Ok(lifted)

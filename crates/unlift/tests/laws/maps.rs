@@ -18,7 +18,7 @@ pub use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays,
 pub use unlift::seed::{Draws, Key, Stage};
 pub use unlift::truth::{Original, Secret};
 pub use unlift::{About, Descriptors, Error, PointSet, RecordId, RowOrder, Unit, synthetic};
-pub use unlift_testkit::{image_around, on_threads, piles, room, uniform};
+pub use unlift_testkit::{on_threads, piles, room, uniform};
 
 /// Returns `n` seeds, the same in every run. With `UNLIFT_RANDOM_TESTS=50`, 50 seeds that differ in every run; a failure prints them.
 pub fn seeds(n: usize) -> Vec<u64> {
@@ -59,13 +59,8 @@ pub fn try_hide<const D: usize>(
     voxel: f64,
     seed: u64,
 ) -> Result<Hidden<D>, Error> {
-    let set = PointSet::try_new(points.to_vec(), Unit::Meter)?;
-    let original = match D {
-        2 => Original::within(set, image_around(points, voxel))?,
-        _ => Original::new(set),
-    };
     let scheme = scheme.of_dimension(&SchemeOptions { voxel }).expect("defined there");
-    let (released, secret) = obfuscate(&*scheme, &original, None, &Key::from_seed(seed))?;
+    let (original, released, secret) = unlift_testkit::hide(&*scheme, points, voxel, seed)?;
     Ok(Hidden { original, released, secret })
 }
 
