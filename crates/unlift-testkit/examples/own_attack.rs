@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use unlift::audit::{NeighborsBy, Plan, Silent, run};
 use unlift::neighbors::{Needs, Neighborhoods, Similarity, Source};
-use unlift::obfuscate::olc::Olc;
+use unlift::obfuscate::olc;
 use unlift::recover::{Builtin, RecoverOptions, Recovered, Solver};
 use unlift::released::{Obfuscation, Released};
 use unlift::{About, Error, RecordId, RowOrder, Unit};
@@ -114,7 +114,7 @@ fn nearest(a: [f32; 3], u: [f32; 3], b: [f32; 3], v: [f32; 3]) -> f32 {
 fn main() -> Result<(), Error> {
     // Call these in tests of your crate. They check for one list and one result per slot, which do
     // not depend on the number of threads.
-    let (original, released, secret) = unlift_testkit::described_map(&Olc, 1_500);
+    let (original, released, secret) = unlift_testkit::described_map(&olc::ENTRY, 1_500);
     unlift_testkit::source_laws(&Brightness, &released);
     let lists = Brightness.lists(&released, 20, 0)?;
     unlift_testkit::solver_laws(&Median, &released, &lists);
@@ -127,7 +127,7 @@ fn main() -> Result<(), Error> {
     let descriptors = released.descriptors().map(|descriptors| descriptors.select(&row_of));
     let sources: [Arc<dyn Source<3>>; 2] = [Arc::new(Brightness), Arc::new(Similarity)];
     let plan = Plan {
-        schemes: vec![Arc::new(Olc)],
+        schemes: vec![Arc::new(olc::ENTRY)],
         neighbors: sources
             .map(NeighborsBy::Source)
             .into_iter()

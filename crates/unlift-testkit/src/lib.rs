@@ -2,10 +2,10 @@
 //! crate.
 //!
 //! ```
-//! use unlift::obfuscate::olc::Olc;
+//! use unlift::obfuscate::olc;
 //!
 //! // In `#[test] fn laws() { .. }`, with your scheme:
-//! unlift_testkit::scheme_laws::<3>(&Olc);
+//! unlift_testkit::scheme_laws::<3>(&olc::ENTRY);
 //! ```
 //!
 //! A test that fails panics with one line: the property, the points and the values.

@@ -12,7 +12,7 @@ use unlift::descriptors::Values;
 use unlift::neighbors::oracle::{self, TrueNeighbors};
 use unlift::neighbors::{Neighborhoods, Overlap, Similarity, Source};
 use unlift::obfuscate::obfuscate;
-use unlift::obfuscate::olc::Olc;
+use unlift::obfuscate::olc;
 use unlift::released::Released;
 use unlift::seed::Key;
 use unlift::truth::Original;
@@ -85,7 +85,7 @@ fn named(extractor: &Extractor, photo: &Path) -> Result<Option<Shares>, unlift::
     let original = Original::new(PointSet::try_new(points, Unit::Pixel)?);
     let descriptors = Descriptors::try_new(values, dim)?;
     let key = Key::from_seed(0);
-    let (released, secret) = obfuscate(&Olc, &original, Some(&descriptors), &key)?;
+    let (released, secret) = obfuscate(&olc::ENTRY, &original, Some(&descriptors), &key)?;
     let near = TrueNeighbors::new(&oracle::search(&original)?, &secret, 1, K)?;
     let by = |source: &dyn Source<2>| -> Result<Option<f64>, unlift::Error> {
         if source.supports(&released).is_err() {

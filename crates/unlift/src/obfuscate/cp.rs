@@ -1,21 +1,15 @@
 //! Scheme `cp`: random pairs exchange one coordinate. In images it is `cp2d`, for each image separately.
 
-use std::sync::Arc;
-
 use super::ppl::random_pairs;
-use super::scheme::{Build, Entry, Facts, Lifted, LocalPoints, Scheme};
+use super::scheme::{Entry, Facts, Lift, Lifted, LocalPoints, SchemeOptions};
 use crate::Error;
 use crate::released::{AxisCandidates, Obfuscation};
 use crate::seed::{Key, Stage};
 
-/// Coordinate permutation.
-#[derive(Clone, Copy, Debug)]
-pub struct Cp;
-
 /// Registry entry.
-pub const ENTRY: Entry = Entry {
-    name: "cp",
-    facts: Facts {
+pub const ENTRY: Entry = Entry::new(
+    "cp",
+    Facts {
         title: "Coordinate permutation",
         rule: "Two points swap one coordinate.",
         color: 6,
@@ -23,42 +17,41 @@ pub const ENTRY: Entry = Entry {
         hidden: "which coordinate was exchanged, and its value",
         patents: "none found",
     },
-    build: Build::In3d(|_| Arc::new(Cp)),
-};
+    Lift::In3d(lift),
+);
 
 /// Registry entry in images.
-pub const CP2D: Entry = Entry {
-    name: "cp2d",
-    facts: Facts {
+pub const CP2D: Entry = Entry::new(
+    "cp2d",
+    Facts {
         title: "Coordinate permutation in the image",
         rule: "Two keypoints swap one of their two coordinates.",
         ..ENTRY.facts
     },
-    build: Build::In2d(|_| Arc::new(Cp)),
-};
+    Lift::In2d(lift),
+);
 
-impl<const D: usize> Scheme<D> for Cp {
-    fn name(&self) -> &str {
-        if D == 2 { CP2D.name } else { ENTRY.name }
-    }
-
-    fn lift(&self, points: &LocalPoints<'_, D>, key: &Key) -> Result<Lifted<D>, Error> {
-        let (points, key) = (points.positions, key.stage(Stage::Scheme));
-        let (pairs, dropped) = random_pairs(points.len(), &mut key.draws(0));
-        let (mut positions, mut hidden) = (Vec::new(), Vec::new());
-        let mut swapped_axis = Vec::new();
-        for (at, pair) in pairs.iter().enumerate() {
-            let axis = key.draws(1 + at as u64).below(D as u64) as usize;
-            for (own, partner) in [(pair[0], pair[1]), (pair[1], pair[0])] {
-                let mut position = points[own.index()];
-                position[axis] = points[partner.index()][axis];
-                positions.push(position);
-                hidden.push(own);
-                swapped_axis.push(axis as u8);
-            }
+/// Coordinate permutation.
+fn lift<const D: usize>(
+    points: &LocalPoints<'_, D>,
+    key: &Key,
+    _: &SchemeOptions,
+) -> Result<Lifted<D>, Error> {
+    let (points, key) = (points.positions, key.stage(Stage::Scheme));
+    let (pairs, dropped) = random_pairs(points.len(), &mut key.draws(0));
+    let (mut positions, mut hidden) = (Vec::new(), Vec::new());
+    let mut swapped_axis = Vec::new();
+    for (at, pair) in pairs.iter().enumerate() {
+        let axis = key.draws(1 + at as u64).below(D as u64) as usize;
+        for (own, partner) in [(pair[0], pair[1]), (pair[1], pair[0])] {
+            let mut position = points[own.index()];
+            position[axis] = points[partner.index()][axis];
+            positions.push(position);
+            hidden.push(own);
+            swapped_axis.push(axis as u8);
         }
-        let swapped_axis = Some(swapped_axis);
-        let candidates = Obfuscation::AxisCandidates(AxisCandidates::try_new(&positions)?);
-        Ok(Lifted { hidden, swapped_axis, dropped, ..Lifted::one_each(candidates) })
     }
+    let swapped_axis = Some(swapped_axis);
+    let candidates = Obfuscation::AxisCandidates(AxisCandidates::try_new(&positions)?);
+    Ok(Lifted { hidden, swapped_axis, dropped, ..Lifted::one_each(candidates) })
 }

@@ -12,22 +12,16 @@
 //! - The line reveals its anchor, and so the half with its keypoint. It is therefore released as a
 //!   ray from the anchor.
 
-use std::sync::Arc;
-
 use super::ray::rays_from;
-use super::scheme::{Build, Entry, Facts, Lifted, LocalPoints, Scheme};
+use super::scheme::{Entry, Facts, Lift, Lifted, LocalPoints, SchemeOptions};
 use crate::Error;
 use crate::released::Obfuscation;
 use crate::seed::Key;
 
-/// Dual convergent lines.
-#[derive(Clone, Copy, Debug)]
-pub struct Dcl2d;
-
 /// Registry entry.
-pub const ENTRY: Entry = Entry {
-    name: "dcl2d",
-    facts: Facts {
+pub const ENTRY: Entry = Entry::new(
+    "dcl2d",
+    Facts {
         title: "Dual convergent lines",
         rule: "Each keypoint becomes a ray from the anchor of its half of the image.",
         color: 3,
@@ -35,28 +29,23 @@ pub const ENTRY: Entry = Entry {
         hidden: "the range from the anchor (1 of 2 coordinates)",
         patents: "none found",
     },
-    build: Build::In2d(|_| Arc::new(Dcl2d)),
-};
+    Lift::In2d(lift),
+);
 
-impl Scheme<2> for Dcl2d {
-    fn name(&self) -> &str {
-        ENTRY.name
+/// Dual convergent lines.
+fn lift(points: &LocalPoints<'_, 2>, _: &Key, _: &SchemeOptions) -> Result<Lifted<2>, Error> {
+    let Some(image) = points.bounds else {
+        return Err(Error::new("image size", "known: anchors lie on its border", "none"));
+    };
+    let center = image.center();
+    let half = (image.high[1] - image.low[1]) / 2.0;
+    let anchors = [-1.0, 1.0].map(|side| [center[0], center[1] + side * half]);
+    let chosen = |_, point: &[f64; 2]| usize::from(point[0] >= center[0]);
+    let mut lifted = rays_from(&anchors, points.positions, chosen)?;
+    if let Obfuscation::Rays(rays) = lifted.obfuscation {
+        let (mut first, mut second) = (image, image);
+        (first.high[0], second.low[0]) = (center[0], center[0]);
+        lifted.obfuscation = Obfuscation::Rays(rays.with_regions(vec![first, second])?);
     }
-
-    fn lift(&self, points: &LocalPoints<'_, 2>, _: &Key) -> Result<Lifted<2>, Error> {
-        let Some(image) = points.bounds else {
-            return Err(Error::new("image size", "known: anchors lie on its border", "none"));
-        };
-        let center = image.center();
-        let half = (image.high[1] - image.low[1]) / 2.0;
-        let anchors = [-1.0, 1.0].map(|side| [center[0], center[1] + side * half]);
-        let chosen = |_, point: &[f64; 2]| usize::from(point[0] >= center[0]);
-        let mut lifted = rays_from(&anchors, points.positions, chosen)?;
-        if let Obfuscation::Rays(rays) = lifted.obfuscation {
-            let (mut first, mut second) = (image, image);
-            (first.high[0], second.low[0]) = (center[0], center[0]);
-            lifted.obfuscation = Obfuscation::Rays(rays.with_regions(vec![first, second])?);
-        }
-        Ok(lifted)
-    }
+    Ok(lifted)
 }

@@ -3,24 +3,18 @@
 //!
 //! The size of an image is released, so a hidden keypoint lies on a chord. Scale and orientation of keypoints are not released.
 
-use std::sync::Arc;
-
 use rayon::prelude::*;
 
-use super::scheme::{Build, Entry, Facts, Lifted, LocalPoints, Scheme};
+use super::scheme::{Entry, Facts, Lift, Lifted, LocalPoints, SchemeOptions};
 use crate::Error;
 use crate::geometry::vector::sub;
 use crate::released::{Lines, Obfuscation};
 use crate::seed::{Key, Stage};
 
-/// Random lines ("oriented line clouds"); in images, `lines2d`.
-#[derive(Clone, Copy, Debug)]
-pub struct Olc;
-
 /// Registry entry.
-pub const ENTRY: Entry = Entry {
-    name: "olc",
-    facts: Facts {
+pub const ENTRY: Entry = Entry::new(
+    "olc",
+    Facts {
         title: "Random lines",
         rule: "Each point becomes a line of random direction through it.",
         color: 0,
@@ -28,13 +22,13 @@ pub const ENTRY: Entry = Entry {
         hidden: "the position along the line (1 of 3 coordinates)",
         patents: "EP 3818501 B1 / WO 2020/009829 \"3D line clouds\", Microsoft (US 16/025,120)",
     },
-    build: Build::In3d(|_| Arc::new(Olc)),
-};
+    Lift::In3d(lift),
+);
 
 /// Registry entry in images.
-pub const LINES2D: Entry = Entry {
-    name: "lines2d",
-    facts: Facts {
+pub const LINES2D: Entry = Entry::new(
+    "lines2d",
+    Facts {
         title: "Random lines in the image",
         rule: "Each keypoint becomes a line of random direction through it.",
         color: 0,
@@ -42,33 +36,26 @@ pub const LINES2D: Entry = Entry {
         hidden: "the position along the line (1 of 2 coordinates)",
         patents: "US 10,839,556, Microsoft",
     },
-    build: Build::In2d(|_| Arc::new(Olc)),
-};
+    Lift::In2d(lift),
+);
 
-impl<const D: usize> Scheme<D> for Olc {
-    fn name(&self) -> &str {
-        if D == 2 { LINES2D.name } else { ENTRY.name }
-    }
-
-    fn lift(&self, points: &LocalPoints<'_, D>, key: &Key) -> Result<Lifted<D>, Error> {
-        let key = key.stage(Stage::Scheme);
-        let direction = |row: usize| key.draws(row as u64).direction();
-        let rows = (0..points.positions.len()).into_par_iter();
-        let directions: Vec<[f64; D]> = rows.map(direction).collect();
-        Ok(Lifted::one_each(Obfuscation::Lines(Lines::through(points.positions, &directions)?)))
-    }
+/// Random lines ("oriented line clouds"); in images, `lines2d`.
+fn lift<const D: usize>(
+    points: &LocalPoints<'_, D>,
+    key: &Key,
+    _: &SchemeOptions,
+) -> Result<Lifted<D>, Error> {
+    let key = key.stage(Stage::Scheme);
+    let direction = |row: usize| key.draws(row as u64).direction();
+    let rows = (0..points.positions.len()).into_par_iter();
+    let directions: Vec<[f64; D]> = rows.map(direction).collect();
+    Ok(Lifted::one_each(Obfuscation::Lines(Lines::through(points.positions, &directions)?)))
 }
 
-/// Lines through the image of the gravity direction, as proposed for structure from motion. Images have no gravity here, so the camera
-/// is assumed to be upright and tilted down by 15 degrees, with a focal length of 1.2 times the longer side. All lines then meet in one
-/// point below the image.
-#[derive(Clone, Copy, Debug)]
-pub struct Gravity;
-
 /// Registry entry of the variant.
-pub const GRAVITY: Entry = Entry {
-    name: "lines2d-gravity",
-    facts: Facts {
+pub const GRAVITY: Entry = Entry::new(
+    "lines2d-gravity",
+    Facts {
         title: "Lines along gravity in the image",
         rule: "Each keypoint becomes the line through it and the image of the gravity direction.",
         color: 7,
@@ -76,25 +63,26 @@ pub const GRAVITY: Entry = Entry {
         hidden: "the position along the line (1 of 2 coordinates)",
         patents: "none found",
     },
-    build: Build::In2d(|_| Arc::new(Gravity)),
-};
+    Lift::In2d(along_gravity),
+);
 
 /// Focal length over the tangent of the assumed tilt, in longer sides of the image.
 const BELOW: f64 = 1.2 / 0.267_949;
 
-impl Scheme<2> for Gravity {
-    fn name(&self) -> &str {
-        GRAVITY.name
-    }
-
-    fn lift(&self, points: &LocalPoints<'_, 2>, _: &Key) -> Result<Lifted<2>, Error> {
-        let Some(image) = points.bounds else {
-            return Err(Error::new("image size", "known: gravity points below it", "none"));
-        };
-        let [width, height] = sub(&image.high, &image.low);
-        let [x, y] = image.center();
-        let below = [x, y + BELOW * width.max(height)];
-        let directions: Vec<[f64; 2]> = points.positions.iter().map(|p| sub(&below, p)).collect();
-        Ok(Lifted::one_each(Obfuscation::Lines(Lines::through(points.positions, &directions)?)))
-    }
+/// Lines through the image of the gravity direction, as proposed for structure from motion. Images have no gravity here, so the camera
+/// is assumed to be upright and tilted down by 15 degrees, with a focal length of 1.2 times the longer side. All lines then meet in one
+/// point below the image.
+fn along_gravity(
+    points: &LocalPoints<'_, 2>,
+    _: &Key,
+    _: &SchemeOptions,
+) -> Result<Lifted<2>, Error> {
+    let Some(image) = points.bounds else {
+        return Err(Error::new("image size", "known: gravity points below it", "none"));
+    };
+    let [width, height] = sub(&image.high, &image.low);
+    let [x, y] = image.center();
+    let below = [x, y + BELOW * width.max(height)];
+    let directions: Vec<[f64; 2]> = points.positions.iter().map(|p| sub(&below, p)).collect();
+    Ok(Lifted::one_each(Obfuscation::Lines(Lines::through(points.positions, &directions)?)))
 }

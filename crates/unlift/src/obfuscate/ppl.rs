@@ -3,9 +3,7 @@
 //! The published code of `ppl+` takes the normal from a row of the wrong matrix, so it depends on the orientation of the map. This
 //! implementation follows the paper: the normal is the direction of least spread of the neighbors.
 
-use std::sync::Arc;
-
-use super::scheme::{Build, Entry, Facts, Lifted, LocalPoints, Scheme};
+use super::scheme::{Entry, Facts, Lift, Lifted, LocalPoints, SchemeOptions};
 use crate::geometry::knn::Knn;
 use crate::geometry::normal::local_normal;
 use crate::geometry::vector::{dot, squared_distance, sub};
@@ -14,14 +12,10 @@ use crate::seed::{Cipher, Draws, Key, Stage};
 use crate::truth::{DropReason, Dropped};
 use crate::{Error, OriginalId};
 
-/// Paired-point lifting.
-#[derive(Clone, Copy, Debug)]
-pub struct Ppl;
-
 /// Registry entry.
-pub const ENTRY: Entry = Entry {
-    name: "ppl",
-    facts: Facts {
+pub const ENTRY: Entry = Entry::new(
+    "ppl",
+    Facts {
         title: "Paired-point lines",
         rule: "Two random points share the line through both.",
         color: 1,
@@ -29,32 +23,27 @@ pub const ENTRY: Entry = Entry {
         hidden: "two positions along the line and which descriptor is whose",
         patents: "application declared by its authors; line clouds as for olc",
     },
-    build: Build::In3d(|_| Arc::new(Ppl)),
-};
+    Lift::In3d(lift),
+);
 
 /// Maximum number of re-pairings of coincident points before they are dropped.
 const RE_DRAWS: usize = 100;
 
-impl Scheme<3> for Ppl {
-    fn name(&self) -> &str {
-        ENTRY.name
-    }
-
-    fn lift(&self, points: &LocalPoints<'_, 3>, key: &Key) -> Result<Lifted<3>, Error> {
-        let (points, mut draws) = (points.positions, key.draws(Stage::Scheme, 0));
-        let (mut pairs, dropped) = random_pairs(points.len(), &mut draws);
-        let accept = |pair: &[OriginalId; 2]| apart(points, pair);
-        let mut refused = refused_last(&mut pairs, accept);
-        for _ in 0..RE_DRAWS {
-            if refused == 0 {
-                break;
-            }
-            // Coincident points need other partners, so as many accepted pairs join the pool.
-            let pool = (2 * refused).min(pairs.len());
-            refused = pair_again(&mut pairs, pool, &mut draws, accept);
+/// Paired-point lifting.
+fn lift(points: &LocalPoints<'_, 3>, key: &Key, _: &SchemeOptions) -> Result<Lifted<3>, Error> {
+    let (points, mut draws) = (points.positions, key.draws(Stage::Scheme, 0));
+    let (mut pairs, dropped) = random_pairs(points.len(), &mut draws);
+    let accept = |pair: &[OriginalId; 2]| apart(points, pair);
+    let mut refused = refused_last(&mut pairs, accept);
+    for _ in 0..RE_DRAWS {
+        if refused == 0 {
+            break;
         }
-        lines_through(points, pairs, refused, dropped)
+        // Coincident points need other partners, so as many accepted pairs join the pool.
+        let pool = (2 * refused).min(pairs.len());
+        refused = pair_again(&mut pairs, pool, &mut draws, accept);
     }
+    lines_through(points, pairs, refused, dropped)
 }
 
 /// Returns true if two points are far enough apart to define a line in `f64`.
@@ -86,22 +75,18 @@ fn lines_through(
     Ok(Lifted { slots_per_record: 2, hidden, dropped, ..Lifted::one_each(lines) })
 }
 
-/// Paired-point lifting with plane rejection.
-#[derive(Clone, Copy, Debug)]
-pub struct PplPlus;
-
 /// Registry entry of `ppl+`.
-pub const PLUS: Entry = Entry {
-    name: "ppl+",
-    facts: Facts {
+pub const PLUS: Entry = Entry::new(
+    "ppl+",
+    Facts {
         title: "Paired-point lines, plane-aware",
         rule: "Two points share a line that leaves the surface around them.",
         color: 2,
         patents: "as ppl",
         ..ENTRY.facts
     },
-    build: Build::In3d(|_| Arc::new(PplPlus)),
-};
+    Lift::In3d(lift_off_surfaces),
+);
 
 const MAX_ROUNDS: usize = 1000;
 /// Re-pairing ends when fewer pairs than this are refused.
@@ -111,39 +96,38 @@ const STALL: (usize, usize) = (100, 50);
 /// sin(20 degrees). A line is refused if its angle to the surface is at most 20 degrees.
 const SIN_20_DEGREES: f64 = 0.342_020_143_325_668_7;
 
-impl Scheme<3> for PplPlus {
-    fn name(&self) -> &str {
-        PLUS.name
-    }
-
-    fn lift(&self, points: &LocalPoints<'_, 3>, key: &Key) -> Result<Lifted<3>, Error> {
-        let points = points.positions;
-        let normals = normals(points)?;
-        let on_surface = |pair: &[OriginalId; 2]| {
-            let [a, b] = pair.map(|id| points[id.index()]);
-            let along = sub(&b, &a);
-            normals[pair[0].index()].is_some_and(|normal| {
-                dot(&along, &normal).abs() <= SIN_20_DEGREES * dot(&along, &along).sqrt()
-            })
-        };
-        let mut draws = key.draws(Stage::Scheme, 0);
-        let (mut pairs, dropped) = random_pairs(points.len(), &mut draws);
-        let accept = |pair: &[OriginalId; 2]| apart(points, pair) && !on_surface(pair);
-        let mut refused = refused_last(&mut pairs, accept);
-        let mut unchanged = 0;
-        for round in 1..=MAX_ROUNDS {
-            if refused < FEW_PAIRS {
-                break;
-            }
-            let before = refused;
-            refused = pair_again(&mut pairs, refused, &mut draws, accept);
-            unchanged = if refused == before { unchanged + 1 } else { 0 };
-            if round > STALL.0 && unchanged >= STALL.1 {
-                break;
-            }
+/// Paired-point lifting with plane rejection.
+fn lift_off_surfaces(
+    points: &LocalPoints<'_, 3>,
+    key: &Key,
+    _: &SchemeOptions,
+) -> Result<Lifted<3>, Error> {
+    let points = points.positions;
+    let normals = normals(points)?;
+    let on_surface = |pair: &[OriginalId; 2]| {
+        let [a, b] = pair.map(|id| points[id.index()]);
+        let along = sub(&b, &a);
+        normals[pair[0].index()].is_some_and(|normal| {
+            dot(&along, &normal).abs() <= SIN_20_DEGREES * dot(&along, &along).sqrt()
+        })
+    };
+    let mut draws = key.draws(Stage::Scheme, 0);
+    let (mut pairs, dropped) = random_pairs(points.len(), &mut draws);
+    let accept = |pair: &[OriginalId; 2]| apart(points, pair) && !on_surface(pair);
+    let mut refused = refused_last(&mut pairs, accept);
+    let mut unchanged = 0;
+    for round in 1..=MAX_ROUNDS {
+        if refused < FEW_PAIRS {
+            break;
         }
-        lines_through(points, pairs, refused, dropped)
+        let before = refused;
+        refused = pair_again(&mut pairs, refused, &mut draws, accept);
+        unchanged = if refused == before { unchanged + 1 } else { 0 };
+        if round > STALL.0 && unchanged >= STALL.1 {
+            break;
+        }
     }
+    lines_through(points, pairs, refused, dropped)
 }
 
 /// Returns for each point the normal of the surface through its K = min(1 % of the points, 100)

@@ -2,25 +2,20 @@
 //! (`ray-voxel`).
 
 use std::cmp::Ordering;
-use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::scheme::{Build, Entry, Facts, Lifted, LocalPoints, Scheme};
+use super::scheme::{Entry, Facts, Lift, Lifted, LocalPoints, SchemeOptions};
 use crate::geometry::vector::{dot, squared_distance, sub};
 use crate::released::{Obfuscation, Rays};
 use crate::seed::{Key, Stage};
 use crate::truth::{DropReason, Dropped};
 use crate::{Error, OriginalId};
 
-/// Ray clouds.
-#[derive(Clone, Copy, Debug)]
-pub struct Ray;
-
 /// Registry entry.
-pub const ENTRY: Entry = Entry {
-    name: "ray",
-    facts: Facts {
+pub const ENTRY: Entry = Entry::new(
+    "ray",
+    Facts {
         title: "Ray cloud, two centers",
         rule: "Each point becomes a ray from one of two published centers.",
         color: 3,
@@ -28,30 +23,18 @@ pub const ENTRY: Entry = Entry {
         hidden: "the range from the center (1 of 3 coordinates)",
         patents: "US 2025/0329045 A1; PCT application declared by its authors",
     },
-    build: Build::In3d(|_| Arc::new(Ray)),
-};
+    Lift::In3d(lift),
+);
 
 /// Restarts of k-means (scikit-learn's `n_init` in the authors' code).
 const RESTARTS: u64 = 10;
 /// Maximum number of iterations per restart (scikit-learn's default).
 const MAX_ROUNDS: usize = 300;
 
-impl Scheme<3> for Ray {
-    fn name(&self) -> &str {
-        ENTRY.name
-    }
-
-    fn lift(&self, points: &LocalPoints<'_, 3>, key: &Key) -> Result<Lifted<3>, Error> {
-        let choices = key.stage(Stage::Scheme);
-        from_centers(points.positions, key, |row, _| choices.draws(row as u64).below(2) as usize)
-    }
-}
-
-/// Ray clouds, voxel variant.
-#[derive(Clone, Copy, Debug)]
-pub struct RayVoxel {
-    /// Edge of a voxel, in the unit of the points.
-    pub voxel: f64,
+/// Ray clouds.
+fn lift(points: &LocalPoints<'_, 3>, key: &Key, _: &SchemeOptions) -> Result<Lifted<3>, Error> {
+    let choices = key.stage(Stage::Scheme);
+    from_centers(points.positions, key, |row, _| choices.draws(row as u64).below(2) as usize)
 }
 
 /// Registry entry of `ray-voxel`.
@@ -64,34 +47,32 @@ pub const VOXEL: Entry = Entry {
         patents: "as ray",
         ..ENTRY.facts
     },
-    build: Build::In3d(|options| Arc::new(RayVoxel { voxel: options.voxel })),
+    lift: Lift::In3d(lift_by_voxel),
+    parameters: |options| vec![("voxel", options.voxel)],
+    ..ENTRY
 };
 
-impl Scheme<3> for RayVoxel {
-    fn name(&self) -> &str {
-        VOXEL.name
+/// Ray clouds, voxel variant.
+fn lift_by_voxel(
+    points: &LocalPoints<'_, 3>,
+    key: &Key,
+    options: &SchemeOptions,
+) -> Result<Lifted<3>, Error> {
+    let voxel = options.voxel;
+    if !(voxel.is_finite() && voxel > 0.0) {
+        return Err(Error::new("voxel", "a positive length", voxel.to_string()));
     }
-
-    fn parameters(&self) -> Vec<(&'static str, f64)> {
-        vec![("voxel", self.voxel)]
+    // The grid starts half a voxel below the smallest coordinates, as in the authors' code
+    // (Open3D).
+    let mut low = [f64::INFINITY; 3];
+    for point in points.positions {
+        low = std::array::from_fn(|c| low[c].min(point[c]));
     }
-
-    fn lift(&self, points: &LocalPoints<'_, 3>, key: &Key) -> Result<Lifted<3>, Error> {
-        if !(self.voxel.is_finite() && self.voxel > 0.0) {
-            return Err(Error::new("voxel", "a positive length", self.voxel.to_string()));
-        }
-        // The grid starts half a voxel below the smallest coordinates, as in the authors' code
-        // (Open3D).
-        let mut low = [f64::INFINITY; 3];
-        for point in points.positions {
-            low = std::array::from_fn(|c| low[c].min(point[c]));
-        }
-        let start = low.map(|x| x - 0.5 * self.voxel);
-        from_centers(points.positions, key, |_, point| {
-            let cell = |c: usize| ((point[c] - start[c]) / self.voxel).floor();
-            (0..3).map(|c| cell(c).rem_euclid(2.0) as usize).sum::<usize>() % 2
-        })
-    }
+    let start = low.map(|x| x - 0.5 * voxel);
+    from_centers(points.positions, key, |_, point| {
+        let cell = |c: usize| ((point[c] - start[c]) / voxel).floor();
+        (0..3).map(|c| cell(c).rem_euclid(2.0) as usize).sum::<usize>() % 2
+    })
 }
 
 /// Returns rays from two k-means centers to every point. `choose` returns the center of a row.

@@ -13,32 +13,46 @@ use crate::seed::Stage;
 use crate::truth::Dropped;
 use crate::{Error, OriginalId, Unit};
 
-/// An entry of the registry: a built-in scheme and its constructor.
-#[derive(Debug)]
+/// A built-in scheme, for maps or for images. It is an entry of the registry.
+#[derive(Clone, Copy, Debug)]
 pub struct Entry {
     /// Name that users type.
     pub name: &'static str,
     /// Facts for reports.
     pub facts: Facts,
-    /// Constructor.
-    pub build: Build,
+    /// Rule for hiding points.
+    pub lift: Lift,
+    /// Parameters of the rule by name, for reports.
+    pub parameters: fn(&SchemeOptions) -> Vec<(&'static str, f64)>,
+    /// Options of the rule.
+    pub options: SchemeOptions,
 }
 
-/// Constructor of a scheme from options.
-#[derive(Debug)]
-pub enum Build {
-    /// For keypoints of images.
-    In2d(fn(&SchemeOptions) -> Arc<dyn Scheme<2>>),
-    /// For points of maps.
-    In3d(fn(&SchemeOptions) -> Arc<dyn Scheme<3>>),
+/// The rule of a built-in scheme.
+#[derive(Clone, Copy, Debug)]
+pub enum Lift {
+    /// Hides keypoints of images.
+    In2d(LiftIn<2>),
+    /// Hides points of maps.
+    In3d(LiftIn<3>),
 }
+
+/// A [`Scheme::lift`] with options.
+pub type LiftIn<const D: usize> =
+    fn(&LocalPoints<'_, D>, &Key, &SchemeOptions) -> Result<Lifted<D>, Error>;
 
 impl Entry {
+    /// Returns a scheme without parameters, with options for points in meters.
+    pub(super) const fn new(name: &'static str, facts: Facts, lift: Lift) -> Self {
+        let options = SchemeOptions { voxel: 0.5 };
+        Self { name, facts, lift, parameters: |_| Vec::new(), options }
+    }
+
     /// Returns the number of dimensions of the points that the scheme hides.
     pub fn dimensions(&self) -> usize {
-        match self.build {
-            Build::In2d(_) => 2,
-            Build::In3d(_) => 3,
+        match self.lift {
+            Lift::In2d(_) => 2,
+            Lift::In3d(_) => 3,
         }
     }
 
@@ -47,13 +61,29 @@ impl Entry {
         &self,
         options: &SchemeOptions,
     ) -> Option<Arc<dyn Scheme<D>>> {
+        (self.dimensions() == D).then(|| Arc::new(Self { options: *options, ..*self }) as Arc<_>)
+    }
+}
+
+impl<const D: usize> Scheme<D> for Entry {
+    fn name(&self) -> &str {
+        self.name
+    }
+
+    fn parameters(&self) -> Vec<(&'static str, f64)> {
+        (self.parameters)(&self.options)
+    }
+
+    fn lift(&self, points: &LocalPoints<'_, D>, key: &Key) -> Result<Lifted<D>, Error> {
         // `Any` compares the types at run time, because a constant cannot choose between two types.
-        let build: &dyn Any = match &self.build {
-            Build::In2d(build) => build,
-            Build::In3d(build) => build,
+        let lift: &dyn Any = match &self.lift {
+            Lift::In2d(lift) => lift,
+            Lift::In3d(lift) => lift,
         };
-        let build = build.downcast_ref::<fn(&SchemeOptions) -> Arc<dyn Scheme<D>>>()?;
-        Some(build(options))
+        match lift.downcast_ref::<LiftIn<D>>() {
+            Some(lift) => lift(points, key, &self.options),
+            None => Err(Error::new("scheme", format!("one for {D} dimensions"), self.name)),
+        }
     }
 }
 

@@ -152,7 +152,7 @@ impl Scheme<3> for Wrong {
     fn lift(&self, points: &LocalPoints<'_, 3>, key: &Key) -> Result<Lifted<3>, Error> {
         let (off, turn) = match self {
             Self::Order => {
-                let mut lifted = unlift::obfuscate::olc::Olc.lift(points, key)?;
+                let mut lifted = unlift::obfuscate::olc::ENTRY.lift(points, key)?;
                 key.draws(Stage::Scheme, 1).shuffle(&mut lifted.hidden);
                 return Ok(lifted);
             }

@@ -90,7 +90,7 @@ fn undone(released: &Released<3>, guesses: u64) -> Option<Vec<u32>> {
 #[test]
 fn a_small_integer_is_guessed_and_a_fresh_key_is_not() {
     let olc = |key: &Key| {
-        obfuscate(&unlift::obfuscate::olc::Olc, &original(room(4, 500)), None, key).unwrap()
+        obfuscate(&unlift::obfuscate::olc::ENTRY, &original(room(4, 500)), None, key).unwrap()
     };
     let (released, secret) = olc(&Key::from_seed(321));
     let rows = undone(&released, 400).expect("the integer is among the guesses");
