@@ -9,7 +9,7 @@ use unlift::descriptors::Values;
 use unlift::geometry::camera::{Camera, PoseError};
 use unlift::geometry::frame::Bounds;
 use unlift::geometry::vector::{distance, median};
-use unlift::localization::{Free, Localization, Match, View, estimate, free_directions};
+use unlift::localization::{Free, Localization, Match, OnLine, View, estimate, free_directions};
 use unlift::obfuscate::{Change, Scheme, obfuscate};
 use unlift::released::Released;
 use unlift::seed::{Key, Stage};
@@ -194,7 +194,7 @@ impl<'a> Held<'a> {
     /// Returns the problems of all images with the map in the clear.
     pub fn unprotected(&mut self) -> Vec<Problem> {
         let pairs = self.pairs_in_the_clear();
-        self.problems(&pairs, |_, _, place, point| Some(Match::Point { place, point }))
+        self.problems(&pairs, |_, _, place, point| Some(Match { place, point, line: None }))
     }
 
     /// Returns the problems of all images with the map that `scheme` protects under `key`.
@@ -219,8 +219,10 @@ impl<'a> Held<'a> {
         let pairs = self.pairs(points, compared);
         let free = by_original(&released, &secret, self.is_part.len());
         Ok(self.problems(&pairs, |_, (_, row), place, point| match free[row] {
-            Free::Nowhere => Some(Match::Point { place, point }),
-            Free::Along(direction) => Some(Match::MapLine { place, point, direction }),
+            Free::Nowhere => Some(Match { place, point, line: None }),
+            Free::Along(direction) => {
+                Some(Match { place, point, line: Some(OnLine::OfMap(direction)) })
+            }
             Free::More => None,
         }))
     }
@@ -256,8 +258,10 @@ impl<'a> Held<'a> {
         }
         Ok(self.problems(&pairs, |image, (keypoint, _), place, point| {
             match free[image][keypoint] {
-                Free::Nowhere => Some(Match::Point { place, point }),
-                Free::Along(direction) => Some(Match::ImageLine { place, direction, point }),
+                Free::Nowhere => Some(Match { place, point, line: None }),
+                Free::Along(direction) => {
+                    Some(Match { place, point, line: Some(OnLine::OfImage(direction)) })
+                }
                 Free::More => None,
             }
         }))

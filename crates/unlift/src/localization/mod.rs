@@ -12,7 +12,7 @@
 
 mod estimate;
 
-pub use estimate::{Match, estimate};
+pub use estimate::{Match, OnLine, estimate};
 
 use nalgebra::{Matrix6, SymmetricEigen, Vector6};
 use rayon::prelude::*;

@@ -19,9 +19,9 @@ fn records_forget_their_points<const D: usize>(seed: u64) {
         // Near the foot, too, where a shortcut of the normal form could reveal the point.
         let foot = along(&point, -dot(&point, &direction), &direction);
         let near = 1e-6 * dot(&foot, &foot).sqrt();
-        for (from, reach) in [(point, 9.0), (foot, near)] {
+        for (from, start, reach) in [(point, 0.0, 9.0), (foot, 1.0, near)] {
             let t = draws.between(-reach, reach);
-            assert_eq!(line(&from, 1.0), line(&from, t), "{from:?} along {direction:?} by {t}");
+            assert_eq!(line(&from, start), line(&from, t), "{from:?} along {direction:?} by {t}");
         }
         let ray = |range: f64| {
             let moved = along(&center, range, &sub(&point, &center));
