@@ -138,9 +138,8 @@ fn cells<const D: usize>(
         alone = clock.time(|s| &mut s.records_alone, attack)?;
         progress.done += ALONE_COST;
     }
-    let by_row = secret.by_descriptor_row();
-    let mut sources =
-        Lists::new(plan, run.search, hidden, &by_row, (run.oracle_seed, run.seed), run.kept);
+    let seeds = (run.oracle_seed, run.seed);
+    let mut sources = Lists::new(plan, run.search, hidden, seeds, run.kept);
     let mut missing = Vec::new();
     for variant in &plan.variants() {
         let source = variant.noise.map_or(variant.by.name(), |noise| noise.name());

@@ -69,7 +69,8 @@ pub struct Lists<'a, const D: usize> {
     search: &'a Knn<'a, D>,
     released: &'a Released<D>,
     secret: &'a Secret,
-    by_row: &'a Secret,
+    /// The secret by descriptor row.
+    by_row: Secret,
     /// Seeds of the oracle and of the attacker.
     seeds: (u64, u64),
     kept: &'a Kept,
@@ -80,18 +81,16 @@ pub struct Lists<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Lists<'a, D> {
-    /// Prepares lists for `hidden`. `by_row` is its secret by descriptor row; `seeds` are those of
-    /// the oracle and of the attacker.
+    /// Prepares lists for `hidden`. `seeds` are those of the oracle and of the attacker.
     pub fn new(
         plan: &'a Plan<D>,
         search: &'a Knn<'a, D>,
         hidden: &'a (Released<D>, Secret),
-        by_row: &'a Secret,
         seeds: (u64, u64),
         kept: &'a Kept,
     ) -> Self {
         let (released, secret) = (&hidden.0, &hidden.1);
-        let (near, outliers) = (BTreeMap::new(), None);
+        let (by_row, near, outliers) = (secret.by_descriptor_row(), BTreeMap::new(), None);
         Self { plan, search, released, secret, by_row, seeds, kept, near, outliers }
     }
 
@@ -184,7 +183,7 @@ impl<'a, const D: usize> Lists<'a, D> {
         match self.near.entry((k, by_row)) {
             Entry::Occupied(near) => Ok(near.into_mut()),
             Entry::Vacant(near) => {
-                let secret = if by_row { self.by_row } else { self.secret };
+                let secret = if by_row { &self.by_row } else { self.secret };
                 Ok(near.insert(TrueNeighbors::new(self.search, secret, slots, k)?))
             }
         }

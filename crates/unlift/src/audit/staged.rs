@@ -35,7 +35,7 @@ pub fn oracle_lists(
     let variant = Variant { by, noise: Some(noise), inlier_ratio: Some(ratio) };
     // The oracle's lists do not depend on the attacker's seed.
     let kept = Kept::default();
-    let mut lists = Lists::new(&plan, &search, hidden, &hidden.1, (seed, 0), &kept);
+    let mut lists = Lists::new(&plan, &search, hidden, (seed, 0), &kept);
     Ok(lists.make(&variant, true)?.lists)
 }
 

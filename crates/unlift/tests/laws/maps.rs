@@ -91,6 +91,18 @@ impl<const D: usize> Hidden<D> {
         self.near(k).at_inlier_ratio(inlier_ratio, seed).unwrap()
     }
 
+    /// Returns lists of the oracle with outliers of a noise model.
+    pub fn noisy_lists(
+        &self,
+        k: usize,
+        (noise, inlier_ratio): (Noise, f64),
+        seed: u64,
+    ) -> Result<Neighborhoods, Error> {
+        let (near, search) = (self.near(k), oracle::search(&self.original)?);
+        let outliers = Outliers::new(noise, &near, &search, &self.secret, seed)?;
+        near.lists(inlier_ratio, &outliers, seed)
+    }
+
     /// Returns the given lists, row by row.
     pub fn lists_of(&self, rows: &[Vec<u32>]) -> Neighborhoods {
         lists_of(rows, self.released.n_records(), self.released.slots_per_record())
