@@ -322,7 +322,7 @@ fn area(support: &[f64], decoy: &[bool]) -> f64 {
 mod tests {
     use super::*;
     use crate::neighbors::oracle::{self, TrueNeighbors};
-    use crate::obfuscate::{obfuscate, olc, sphere};
+    use crate::obfuscate::{obfuscate, olc, ray};
     use crate::seed::Key;
     use crate::{PointSet, Unit, synthetic};
 
@@ -343,7 +343,7 @@ mod tests {
             near.at_inlier_ratio(1.0, 0).unwrap()
         };
         let key = Key::from_seed(0);
-        let (released, secret) = obfuscate(&sphere::ENTRY, &original, None, &key).unwrap();
+        let (released, secret) = obfuscate(&ray::SPHERE, &original, None, &key).unwrap();
         let truth = Truth { original: &original, released: &released, secret: &secret };
         let figures = truth.bearings(&lists(&secret));
         let of = |name: &str| figures.iter().find(|(known, _)| known == name).unwrap().1;

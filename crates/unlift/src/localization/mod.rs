@@ -356,7 +356,7 @@ mod tests {
         let (view, original) = room();
         let positions = original.reveal().positions();
         // Decoys do not help.
-        let sphere = crate::obfuscate::sphere::ENTRY;
+        let sphere = crate::obfuscate::ray::SPHERE;
         let (released, secret) = obfuscate(&sphere, &original, None, &Key::from_seed(0)).unwrap();
         assert_eq!(with_map(&[view], positions, &released, &secret), [None]);
     }

@@ -390,7 +390,7 @@ impl Outliers {
         Ok(match noise {
             Noise::Uniform => Self::Uniform,
             Noise::Near => Self::near(truth, &nearness, seed),
-            Noise::Clustered => Self::clustered(truth, knn, secret, &nearness, seed),
+            Noise::Clustered => Self::clustered(truth, &nearness, seed),
         })
     }
 
@@ -415,11 +415,10 @@ impl Outliers {
 
     fn clustered<const D: usize>(
         truth: &TrueNeighbors,
-        knn: &Knn<'_, D>,
-        secret: &Secret,
         nearness: &Nearness<'_, D>,
         seed: u64,
     ) -> Self {
+        let Nearness { knn, secret, .. } = nearness;
         let mut patches = Vec::new();
         let mut patch_of_original = vec![0u32; secret.n_originals()];
         let (mut around, mut around_place, mut near) = (Vec::new(), Vec::new(), Vec::new());

@@ -1,5 +1,5 @@
-//! Schemes of half-lines from one of two centers, which is chosen at random for every point (`ray`) or by a checkerboard of voxels
-//! (`ray-voxel`).
+//! Schemes of half-lines: from one of two centers, which is chosen at random for every point (`ray`) or by a checkerboard of voxels
+//! (`ray-voxel`); from one of two anchors of an image (`dcl2d`); and from the center of a map, among decoys (`sphere`).
 
 use std::cmp::Ordering;
 
@@ -147,7 +147,7 @@ fn lloyd(points: &[[f64; 3]], mut centers: [[f64; 3]; 2]) -> (f64, [[f64; 3]; 2]
 }
 
 /// Returns rays from `centers` to every point. `choose` returns the center of a row.
-pub(super) fn rays_from<const D: usize>(
+fn rays_from<const D: usize>(
     centers: &[[f64; D]],
     points: &[[f64; D]],
     choose: impl Fn(usize, &[f64; D]) -> usize,
@@ -172,4 +172,119 @@ pub(super) fn rays_from<const D: usize>(
     }
     let rays = Obfuscation::Rays(Rays::try_new(&centers, center, &direction)?);
     Ok(Lifted { hidden, dropped, ..Lifted::one_each(rays) })
+}
+
+/// Registry entry of `dcl2d`.
+pub const DCL2D: Entry = Entry::new(
+    "dcl2d",
+    Facts {
+        title: "Dual convergent lines",
+        rule: "Each keypoint becomes a ray from the anchor of its half of the image.",
+        color: 3,
+        source: "Kim et al., Dual Convergent Lines, CVPR 2026",
+        hidden: "the range from the anchor (1 of 2 coordinates)",
+        patents: "none found",
+    },
+    Lift::In2d(dual_convergent),
+);
+
+/// Dual convergent lines: lines through one of two anchors, chosen by the half of the image that contains
+/// the keypoint.
+///
+/// The authors have published no code. This implementation follows the paper, with these
+/// assumptions:
+///
+/// - The split is vertical, at half of the width. The anchors are the two ends of the split: the
+///   upper one for the left half, the lower one for the right half. Their distance, the image
+///   height, is the one recommended.
+/// - A keypoint on the split belongs to the right half.
+/// - A keypoint on its anchor has no line and is dropped.
+/// - The line reveals its anchor, and so the half with its keypoint. It is therefore released as a
+///   ray from the anchor.
+fn dual_convergent(
+    points: &LocalPoints<'_, 2>,
+    _: &Key,
+    _: &SchemeOptions,
+) -> Result<Lifted<2>, Error> {
+    let Some(image) = points.bounds else {
+        return Err(Error::new("image size", "known: anchors lie on its border", "none"));
+    };
+    let center = image.center();
+    let half = (image.high[1] - image.low[1]) / 2.0;
+    let anchors = [-1.0, 1.0].map(|side| [center[0], center[1] + side * half]);
+    let chosen = |_, point: &[f64; 2]| usize::from(point[0] >= center[0]);
+    let mut lifted = rays_from(&anchors, points.positions, chosen)?;
+    if let Obfuscation::Rays(rays) = lifted.obfuscation {
+        let (mut first, mut second) = (image, image);
+        (first.high[0], second.low[0]) = (center[0], center[0]);
+        lifted.obfuscation = Obfuscation::Rays(rays.with_regions(vec![first, second])?);
+    }
+    Ok(lifted)
+}
+
+/// Share of the points that keep their bearing.
+const KEPT: f64 = 1.0 / 3.0;
+/// Variance of the noise of a decoy, per component of its unit direction.
+const VARIANCE: f64 = 0.1;
+
+/// Registry entry of `sphere`.
+pub const SPHERE: Entry = Entry {
+    parameters: |_| vec![("share of real bearings", KEPT)],
+    ..Entry::new(
+        "sphere",
+        Facts {
+            title: "Sphere cloud, a third of the bearings real",
+            rule: "Each point becomes its bearing from the center of the map, among decoys.",
+            color: 7,
+            source: "Moon et al., Depth-Guided Privacy-Preserving Visual Localization Using 3D Sphere Clouds, BMVC 2024",
+            hidden: "the range from the center (1 of 3 coordinates)",
+            patents: "PCT application declared by its authors",
+        },
+        Lift::In3d(among_decoys),
+    )
+};
+
+/// Sphere clouds: the bearing of every point from the center of the map, among decoys.
+///
+/// The center is the mean of all points. A share of the points keeps its bearing. The other records
+/// are decoys: the bearing of a withheld point with Gaussian noise on each component, brought to
+/// length 1, and the descriptor of that point, so that the number of records stays. In the secret, a
+/// decoy stands for the point that it withholds; its ray does not pass through it.
+///
+/// The published code confirms the center and the share. It reads maps with
+/// decoys and does not make them: the variance of the noise and the source of a decoy's descriptor
+/// are assumptions.
+fn among_decoys(
+    points: &LocalPoints<'_, 3>,
+    key: &Key,
+    _: &SchemeOptions,
+) -> Result<Lifted<3>, Error> {
+    let points = points.positions;
+    let n = points.len();
+    if n < 2 {
+        return Err(Error::new("points", "at least 2", n.to_string()));
+    }
+    let center: [f64; 3] =
+        std::array::from_fn(|c| points.iter().map(|p| p[c]).sum::<f64>() / n as f64);
+    let mut lifted = rays_from(&[center], points, |_, _| 0)?;
+    let Obfuscation::Rays(rays) = &lifted.obfuscation else { return Ok(lifted) };
+    let order = key.draws(Stage::Scheme, 0).permutation(n);
+    let mut is_decoy = vec![true; n];
+    let n_kept = (KEPT * n as f64).round() as usize;
+    order[..n_kept].iter().for_each(|&row| is_decoy[row as usize] = false);
+    let noise = key.stage(Stage::Scheme);
+    let moved = |(direction, &OriginalId(row)): (&[f32; 3], &OriginalId)| {
+        let direction = direction.map(f64::from);
+        if !is_decoy[row as usize] {
+            return direction;
+        }
+        let mut draws = noise.draws(1 + u64::from(row));
+        direction.map(|x| x + VARIANCE.sqrt() * draws.normal())
+    };
+    let directions: Vec<[f64; 3]> =
+        rays.direction().iter().zip(&lifted.hidden).map(moved).collect();
+    let centers: Vec<[f64; 3]> = rays.centers().iter().map(|c| c.map(f64::from)).collect();
+    let rays = Rays::try_new(&centers, rays.center().to_vec(), &directions)?;
+    lifted.obfuscation = Obfuscation::Rays(rays);
+    Ok(lifted)
 }
