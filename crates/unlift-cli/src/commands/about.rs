@@ -15,10 +15,9 @@ pub fn schemes() -> crate::Result<()> {
         } else {
             ""
         };
-        let facts = scheme.facts;
         text.push_str(&format!(
             "{}: {}\n  for          {meant_for}{request}\n  rule         {}\n  hidden       {}\n  publication  {}\n  patents      {}\n",
-            scheme.name, facts.title, facts.rule, facts.hidden, facts.source, facts.patents
+            scheme.name, scheme.title, scheme.rule, scheme.hidden, scheme.source, scheme.patents
         ));
     }
     print(&text)

@@ -1,35 +1,30 @@
 //! Scheme `cp`: random pairs exchange one coordinate. In images it is `cp2d`, for each image separately.
 
 use super::ppl::random_pairs;
-use super::scheme::{Entry, Facts, Lift, Lifted, LocalPoints, SchemeOptions};
+use super::scheme::{Entry, Lift, Lifted, LocalPoints, SchemeOptions};
 use crate::Error;
 use crate::released::{AxisCandidates, Obfuscation};
 use crate::seed::{Key, Stage};
 
 /// Registry entry.
-pub const ENTRY: Entry = Entry::new(
-    "cp",
-    Facts {
-        title: "Coordinate permutation",
-        rule: "Two points swap one coordinate.",
-        color: 6,
-        source: "Pan et al., Privacy Preserving Localization via Coordinate Permutations, ICCV 2023",
-        hidden: "which coordinate was exchanged, and its value",
-        patents: "none found",
-    },
-    Lift::In3d(lift),
-);
+pub const ENTRY: Entry = Entry {
+    title: "Coordinate permutation",
+    rule: "Two points swap one coordinate.",
+    color: 6,
+    source: "Pan et al., Privacy Preserving Localization via Coordinate Permutations, ICCV 2023",
+    hidden: "which coordinate was exchanged, and its value",
+    patents: "none found",
+    ..Entry::new("cp", Lift::In3d(lift))
+};
 
 /// Registry entry in images.
-pub const CP2D: Entry = Entry::new(
-    "cp2d",
-    Facts {
-        title: "Coordinate permutation in the image",
-        rule: "Two keypoints swap one of their two coordinates.",
-        ..ENTRY.facts
-    },
-    Lift::In2d(lift),
-);
+pub const CP2D: Entry = Entry {
+    name: "cp2d",
+    title: "Coordinate permutation in the image",
+    rule: "Two keypoints swap one of their two coordinates.",
+    lift: Lift::In2d(lift),
+    ..ENTRY
+};
 
 /// Coordinate permutation.
 fn lift<const D: usize>(

@@ -19,7 +19,7 @@ pub use changed::{Change, Changed};
 pub use hide::obfuscate;
 pub use mitigate::Mitigation;
 pub use protect::Protection;
-pub use scheme::{Entry, Facts, Lift, LiftIn, Lifted, LocalPoints, Scheme, SchemeOptions};
+pub use scheme::{Entry, Lift, LiftIn, Lifted, LocalPoints, Scheme, SchemeOptions};
 
 use crate::Error;
 

@@ -5,39 +5,33 @@
 
 use rayon::prelude::*;
 
-use super::scheme::{Entry, Facts, Lift, Lifted, LocalPoints, SchemeOptions};
+use super::scheme::{Entry, Lift, Lifted, LocalPoints, SchemeOptions};
 use crate::Error;
 use crate::geometry::vector::sub;
 use crate::released::{Lines, Obfuscation};
 use crate::seed::{Key, Stage};
 
 /// Registry entry.
-pub const ENTRY: Entry = Entry::new(
-    "olc",
-    Facts {
-        title: "Random lines",
-        rule: "Each point becomes a line of random direction through it.",
-        color: 0,
-        source: "Speciale et al., Privacy Preserving Image-Based Localization, CVPR 2019",
-        hidden: "the position along the line (1 of 3 coordinates)",
-        patents: "EP 3818501 B1 / WO 2020/009829 \"3D line clouds\", Microsoft (US 16/025,120)",
-    },
-    Lift::In3d(lift),
-);
+pub const ENTRY: Entry = Entry {
+    title: "Random lines",
+    rule: "Each point becomes a line of random direction through it.",
+    color: 0,
+    source: "Speciale et al., Privacy Preserving Image-Based Localization, CVPR 2019",
+    hidden: "the position along the line (1 of 3 coordinates)",
+    patents: "EP 3818501 B1 / WO 2020/009829 \"3D line clouds\", Microsoft (US 16/025,120)",
+    ..Entry::new("olc", Lift::In3d(lift))
+};
 
 /// Registry entry in images.
-pub const LINES2D: Entry = Entry::new(
-    "lines2d",
-    Facts {
-        title: "Random lines in the image",
-        rule: "Each keypoint becomes a line of random direction through it.",
-        color: 0,
-        source: "Speciale et al., Privacy Preserving Image Queries for Camera Localization, ICCV 2019",
-        hidden: "the position along the line (1 of 2 coordinates)",
-        patents: "US 10,839,556, Microsoft",
-    },
-    Lift::In2d(lift),
-);
+pub const LINES2D: Entry = Entry {
+    title: "Random lines in the image",
+    rule: "Each keypoint becomes a line of random direction through it.",
+    color: 0,
+    source: "Speciale et al., Privacy Preserving Image Queries for Camera Localization, ICCV 2019",
+    hidden: "the position along the line (1 of 2 coordinates)",
+    patents: "US 10,839,556, Microsoft",
+    ..Entry::new("lines2d", Lift::In2d(lift))
+};
 
 /// Random lines ("oriented line clouds"); in images, `lines2d`.
 fn lift<const D: usize>(
@@ -53,18 +47,15 @@ fn lift<const D: usize>(
 }
 
 /// Registry entry of the variant.
-pub const GRAVITY: Entry = Entry::new(
-    "lines2d-gravity",
-    Facts {
-        title: "Lines along gravity in the image",
-        rule: "Each keypoint becomes the line through it and the image of the gravity direction.",
-        color: 7,
-        source: "Geppert et al., Privacy Preserving Structure-from-Motion, ECCV 2020",
-        hidden: "the position along the line (1 of 2 coordinates)",
-        patents: "none found",
-    },
-    Lift::In2d(along_gravity),
-);
+pub const GRAVITY: Entry = Entry {
+    title: "Lines along gravity in the image",
+    rule: "Each keypoint becomes the line through it and the image of the gravity direction.",
+    color: 7,
+    source: "Geppert et al., Privacy Preserving Structure-from-Motion, ECCV 2020",
+    hidden: "the position along the line (1 of 2 coordinates)",
+    patents: "none found",
+    ..Entry::new("lines2d-gravity", Lift::In2d(along_gravity))
+};
 
 /// Focal length over the tangent of the assumed tilt, in longer sides of the image.
 const BELOW: f64 = 1.2 / 0.267_949;

@@ -1,23 +1,20 @@
 //! Scheme `plane`: keeps one coordinate of every point, on one of three servers.
 
-use super::scheme::{Entry, Facts, Lift, Lifted, LocalPoints, SchemeOptions};
+use super::scheme::{Entry, Lift, Lifted, LocalPoints, SchemeOptions};
 use crate::Error;
 use crate::released::{AxisPlanes, Obfuscation};
 use crate::seed::{Key, Stage};
 
 /// Registry entry.
-pub const ENTRY: Entry = Entry::new(
-    "plane",
-    Facts {
-        title: "Axis-aligned planes",
-        rule: "Each point keeps one coordinate of three.",
-        color: 5,
-        source: "Geppert et al., Privacy Preserving Partial Localization, CVPR 2022",
-        hidden: "two of three coordinates",
-        patents: "none found",
-    },
-    Lift::In3d(lift),
-);
+pub const ENTRY: Entry = Entry {
+    title: "Axis-aligned planes",
+    rule: "Each point keeps one coordinate of three.",
+    color: 5,
+    source: "Geppert et al., Privacy Preserving Partial Localization, CVPR 2022",
+    hidden: "two of three coordinates",
+    patents: "none found",
+    ..Entry::new("plane", Lift::In3d(lift))
+};
 
 /// Partial localization: random thirds, one per axis. The attacker has the data of all three
 /// servers.

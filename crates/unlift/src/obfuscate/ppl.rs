@@ -3,7 +3,7 @@
 //! The published code of `ppl+` takes the normal from a row of the wrong matrix, so it depends on the orientation of the map. This
 //! implementation follows the paper: the normal is the direction of least spread of the neighbors.
 
-use super::scheme::{Entry, Facts, Lift, Lifted, LocalPoints, SchemeOptions};
+use super::scheme::{Entry, Lift, Lifted, LocalPoints, SchemeOptions};
 use crate::geometry::knn::Knn;
 use crate::geometry::normal::local_normal;
 use crate::geometry::vector::{dot, squared_distance, sub};
@@ -13,18 +13,15 @@ use crate::truth::{DropReason, Dropped};
 use crate::{Error, OriginalId};
 
 /// Registry entry.
-pub const ENTRY: Entry = Entry::new(
-    "ppl",
-    Facts {
-        title: "Paired-point lines",
-        rule: "Two random points share the line through both.",
-        color: 1,
-        source: "Lee et al., Paired-Point Lifting for Enhanced Privacy-Preserving Visual Localization, CVPR 2023",
-        hidden: "two positions along the line and which descriptor is whose",
-        patents: "application declared by its authors; line clouds as for olc",
-    },
-    Lift::In3d(lift),
-);
+pub const ENTRY: Entry = Entry {
+    title: "Paired-point lines",
+    rule: "Two random points share the line through both.",
+    color: 1,
+    source: "Lee et al., Paired-Point Lifting for Enhanced Privacy-Preserving Visual Localization, CVPR 2023",
+    hidden: "two positions along the line and which descriptor is whose",
+    patents: "application declared by its authors; line clouds as for olc",
+    ..Entry::new("ppl", Lift::In3d(lift))
+};
 
 /// Maximum number of re-pairings of coincident points before they are dropped.
 const RE_DRAWS: usize = 100;
@@ -76,17 +73,15 @@ fn lines_through(
 }
 
 /// Registry entry of `ppl+`.
-pub const PLUS: Entry = Entry::new(
-    "ppl+",
-    Facts {
-        title: "Paired-point lines, plane-aware",
-        rule: "Two points share a line that leaves the surface around them.",
-        color: 2,
-        patents: "as ppl",
-        ..ENTRY.facts
-    },
-    Lift::In3d(lift_off_surfaces),
-);
+pub const PLUS: Entry = Entry {
+    name: "ppl+",
+    title: "Paired-point lines, plane-aware",
+    rule: "Two points share a line that leaves the surface around them.",
+    color: 2,
+    patents: "as ppl",
+    lift: Lift::In3d(lift_off_surfaces),
+    ..ENTRY
+};
 
 const MAX_ROUNDS: usize = 1000;
 /// Re-pairing ends when fewer pairs than this are refused.

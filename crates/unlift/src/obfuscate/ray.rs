@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 
 use rayon::prelude::*;
 
-use super::scheme::{Entry, Facts, Lift, Lifted, LocalPoints, SchemeOptions};
+use super::scheme::{Entry, Lift, Lifted, LocalPoints, SchemeOptions};
 use crate::geometry::vector::{dot, squared_distance, sub};
 use crate::released::{Obfuscation, Rays};
 use crate::seed::{Key, Stage};
@@ -13,18 +13,15 @@ use crate::truth::{DropReason, Dropped};
 use crate::{Error, OriginalId};
 
 /// Registry entry.
-pub const ENTRY: Entry = Entry::new(
-    "ray",
-    Facts {
-        title: "Ray cloud, two centers",
-        rule: "Each point becomes a ray from one of two published centers.",
-        color: 3,
-        source: "Moon et al., Efficient Privacy-Preserving Visual Localization Using 3D Ray Clouds, CVPR 2024",
-        hidden: "the range from the center (1 of 3 coordinates)",
-        patents: "US 2025/0329045 A1; PCT application declared by its authors",
-    },
-    Lift::In3d(lift),
-);
+pub const ENTRY: Entry = Entry {
+    title: "Ray cloud, two centers",
+    rule: "Each point becomes a ray from one of two published centers.",
+    color: 3,
+    source: "Moon et al., Efficient Privacy-Preserving Visual Localization Using 3D Ray Clouds, CVPR 2024",
+    hidden: "the range from the center (1 of 3 coordinates)",
+    patents: "US 2025/0329045 A1; PCT application declared by its authors",
+    ..Entry::new("ray", Lift::In3d(lift))
+};
 
 /// Restarts of k-means (scikit-learn's `n_init` in the authors' code).
 const RESTARTS: u64 = 10;
@@ -40,13 +37,10 @@ fn lift(points: &LocalPoints<'_, 3>, key: &Key, _: &SchemeOptions) -> Result<Lif
 /// Registry entry of `ray-voxel`.
 pub const VOXEL: Entry = Entry {
     name: "ray-voxel",
-    facts: Facts {
-        title: "Ray cloud, voxel parity",
-        rule: "Each point becomes a ray from one of two published centers; the voxel of the point decides which.",
-        color: 4,
-        patents: "as ray",
-        ..ENTRY.facts
-    },
+    title: "Ray cloud, voxel parity",
+    rule: "Each point becomes a ray from one of two published centers; the voxel of the point decides which.",
+    color: 4,
+    patents: "as ray",
     lift: Lift::In3d(lift_by_voxel),
     parameters: |options| vec![("voxel", options.voxel)],
     ..ENTRY
@@ -175,18 +169,15 @@ fn rays_from<const D: usize>(
 }
 
 /// Registry entry of `dcl2d`.
-pub const DCL2D: Entry = Entry::new(
-    "dcl2d",
-    Facts {
-        title: "Dual convergent lines",
-        rule: "Each keypoint becomes a ray from the anchor of its half of the image.",
-        color: 3,
-        source: "Kim et al., Dual Convergent Lines, CVPR 2026",
-        hidden: "the range from the anchor (1 of 2 coordinates)",
-        patents: "none found",
-    },
-    Lift::In2d(dual_convergent),
-);
+pub const DCL2D: Entry = Entry {
+    title: "Dual convergent lines",
+    rule: "Each keypoint becomes a ray from the anchor of its half of the image.",
+    color: 3,
+    source: "Kim et al., Dual Convergent Lines, CVPR 2026",
+    hidden: "the range from the anchor (1 of 2 coordinates)",
+    patents: "none found",
+    ..Entry::new("dcl2d", Lift::In2d(dual_convergent))
+};
 
 /// Dual convergent lines: lines through one of two anchors, chosen by the half of the image that contains
 /// the keypoint.
@@ -229,19 +220,14 @@ const VARIANCE: f64 = 0.1;
 
 /// Registry entry of `sphere`.
 pub const SPHERE: Entry = Entry {
+    title: "Sphere cloud, a third of the bearings real",
+    rule: "Each point becomes its bearing from the center of the map, among decoys.",
+    color: 7,
+    source: "Moon et al., Depth-Guided Privacy-Preserving Visual Localization Using 3D Sphere Clouds, BMVC 2024",
+    hidden: "the range from the center (1 of 3 coordinates)",
+    patents: "PCT application declared by its authors",
     parameters: |_| vec![("share of real bearings", KEPT)],
-    ..Entry::new(
-        "sphere",
-        Facts {
-            title: "Sphere cloud, a third of the bearings real",
-            rule: "Each point becomes its bearing from the center of the map, among decoys.",
-            color: 7,
-            source: "Moon et al., Depth-Guided Privacy-Preserving Visual Localization Using 3D Sphere Clouds, BMVC 2024",
-            hidden: "the range from the center (1 of 3 coordinates)",
-            patents: "PCT application declared by its authors",
-        },
-        Lift::In3d(among_decoys),
-    )
+    ..Entry::new("sphere", Lift::In3d(among_decoys))
 };
 
 /// Sphere clouds: the bearing of every point from the center of the map, among decoys.

@@ -18,8 +18,18 @@ use crate::{Error, OriginalId, Unit};
 pub struct Entry {
     /// Name that users type.
     pub name: &'static str,
-    /// Facts for reports.
-    pub facts: Facts,
+    /// Title in a few words.
+    pub title: &'static str,
+    /// Sentence on what is published in place of a point.
+    pub rule: &'static str,
+    /// Number of its color in charts, 0 to 7. Schemes with similar rules for maps and images share one.
+    pub color: usize,
+    /// Publication.
+    pub source: &'static str,
+    /// Part of a point that stays secret.
+    pub hidden: &'static str,
+    /// Patents that its authors state (not legal advice).
+    pub patents: &'static str,
     /// Rule for hiding points.
     pub lift: Lift,
     /// Parameters of the rule by name, for reports.
@@ -42,10 +52,11 @@ pub type LiftIn<const D: usize> =
     fn(&LocalPoints<'_, D>, &Key, &SchemeOptions) -> Result<Lifted<D>, Error>;
 
 impl Entry {
-    /// Returns a scheme without parameters, with options for points in meters.
-    pub(super) const fn new(name: &'static str, facts: Facts, lift: Lift) -> Self {
-        let options = SchemeOptions { voxel: 0.5 };
-        Self { name, facts, lift, parameters: |_| Vec::new(), options }
+    /// Returns a scheme without facts and parameters, with options for points in meters.
+    pub(super) const fn new(name: &'static str, lift: Lift) -> Self {
+        let [title, rule, source, hidden, patents] = [""; 5];
+        let (parameters, options) = (|_: &_| Vec::new(), SchemeOptions { voxel: 0.5 });
+        Self { name, title, rule, color: 0, source, hidden, patents, lift, parameters, options }
     }
 
     /// Returns the number of dimensions of the points that the scheme hides.
@@ -85,23 +96,6 @@ impl<const D: usize> Scheme<D> for Entry {
             None => Err(Error::new("scheme", format!("one for {D} dimensions"), self.name)),
         }
     }
-}
-
-/// Facts about a scheme; empty if unknown.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Facts {
-    /// Title in a few words.
-    pub title: &'static str,
-    /// Sentence on what is published in place of a point.
-    pub rule: &'static str,
-    /// Number of its color in charts, 0 to 7. Schemes with similar rules for maps and images share one.
-    pub color: usize,
-    /// Publication.
-    pub source: &'static str,
-    /// Part of a point that stays secret.
-    pub hidden: &'static str,
-    /// Patents that its authors state (not legal advice).
-    pub patents: &'static str,
 }
 
 /// Parameters of the built-in schemes, in the unit of the points.
