@@ -63,7 +63,16 @@ impl TrueNeighbors {
         outliers: &Outliers,
         seed: u64,
     ) -> Result<Neighborhoods, Error> {
-        let records = self.rows(self.kept(inlier_ratio, outliers)?, outliers, seed);
+        let keep = self.kept(inlier_ratio, outliers)?;
+        let mut records = vec![RecordId(0); self.records.len()];
+        records.par_chunks_mut(self.k).enumerate().for_each_init(Vec::new, |order, (slot, row)| {
+            order.clear();
+            order.extend_from_slice(self.of(slot));
+            Draws::new(seed, Stage::OracleKeep, slot as u64).shuffle(order);
+            row[..keep].copy_from_slice(&order[..keep]);
+            outliers.fill(self, slot, seed, order, &mut row[keep..]);
+            row.sort_unstable();
+        });
         let n_slots = self.n_records * self.slots_per_record;
         let offsets = (0..=n_slots as u64).map(|slot| slot * self.k as u64).collect();
         let (n_records, slots) = (self.n_records, self.slots_per_record);
@@ -93,21 +102,6 @@ impl TrueNeighbors {
             return Err(Error::new(what, expected, available.to_string()));
         }
         Ok(keep)
-    }
-
-    /// Returns all lists end to end: K records each in ascending order, `keep` of them true
-    /// neighbors.
-    fn rows(&self, keep: usize, outliers: &Outliers, seed: u64) -> Vec<RecordId> {
-        let mut records = vec![RecordId(0); self.records.len()];
-        records.par_chunks_mut(self.k).enumerate().for_each_init(Vec::new, |order, (slot, row)| {
-            order.clear();
-            order.extend_from_slice(self.of(slot));
-            Draws::new(seed, Stage::OracleKeep, slot as u64).shuffle(order);
-            row[..keep].copy_from_slice(&order[..keep]);
-            outliers.fill(self, slot, seed, order, &mut row[keep..]);
-            row.sort_unstable();
-        });
-        records
     }
 
     /// Makes [`lists`](Self::lists) with uniformly random outliers.

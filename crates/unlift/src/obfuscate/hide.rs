@@ -52,7 +52,8 @@ pub fn obfuscate<const D: usize>(
     let order = key.draws(Stage::Shuffle, 0).permutation(n_records);
     let (slot_key, row_key) = (key.stage(Stage::SlotOrder), key.stage(Stage::DescriptorOrder));
     let mut hidden = Vec::with_capacity(n_records * slots);
-    let mut swapped_axis = lifted.swapped_axis.as_ref().map(|_| Vec::with_capacity(n_records));
+    let in_order = |axes: Vec<u8>| order.iter().map(|&from| axes[from as usize]).collect();
+    let swapped_axis = lifted.swapped_axis.map(in_order);
     let mut descriptor_row = Vec::with_capacity(n_records * slots);
     for (record, &from) in order.iter().enumerate() {
         let (from, to) = (from as usize, record * slots);
@@ -61,9 +62,6 @@ pub fn obfuscate<const D: usize>(
         if slots > 1 {
             slot_key.draws(record as u64).shuffle(&mut hidden[to..]);
             row_key.draws(record as u64).shuffle(&mut descriptor_row[to..]);
-        }
-        if let (Some(kept), Some(axes)) = (&mut swapped_axis, &lifted.swapped_axis) {
-            kept.push(axes[from]);
         }
     }
     // Released row r holds the descriptor of the original whose slot was given row r.
