@@ -6,25 +6,19 @@ use unlift::descriptors::Values;
 use unlift::neighbors::oracle::{TrueNeighbors, search};
 use unlift::neighbors::sources::SOURCES;
 use unlift::neighbors::{Needs, Neighborhoods, Source};
-use unlift::obfuscate::olc;
-use unlift::obfuscate::{
-    Change, Changed, Lifted, LocalPoints, Protection, Scheme, SchemeOptions, all,
-};
+use unlift::obfuscate::{Change, Changed, Lifted, LocalPoints, Protection, Scheme, all, olc};
 use unlift::recover::{Builtin, RecoverOptions, Recovered, Solver};
 use unlift::released::{Lines, Obfuscation, Released};
 use unlift::seed::{Draws, Key, Stage};
-use unlift::{Descriptors, Error, Unit};
+use unlift::{Descriptors, Error};
 use unlift_testkit::{described_map, scheme_laws, solver_laws, source_laws};
 
 #[test]
 fn our_schemes() {
-    let options = SchemeOptions::usual(Unit::Meter);
     for entry in all() {
-        if let Some(scheme) = entry.of_dimension::<3>(&options) {
-            scheme_laws(&*scheme);
-        }
-        if let Some(scheme) = entry.of_dimension::<2>(&options) {
-            scheme_laws(&*scheme);
+        match entry.dimensions() {
+            2 => scheme_laws::<2>(entry),
+            _ => scheme_laws::<3>(entry),
         }
     }
 }

@@ -21,9 +21,8 @@ fn points() -> Vec<[f64; 3]> {
 fn release<const D: usize>(name: &str, original: &Original<D>, seed: u64) -> Hidden<D> {
     let rows: Vec<u32> = (0..original.len() as u32).collect();
     let descriptors = random_descriptors(6, N, 16).select(&rows);
-    let scheme = entry(name).of_dimension::<D>(&SchemeOptions::usual(Unit::Meter)).unwrap();
-    let key = Key::from_seed(seed);
-    let (released, secret) = obfuscate(&*scheme, original, Some(&descriptors), &key).unwrap();
+    let (scheme, key) = (entry(name), Key::from_seed(seed));
+    let (released, secret) = obfuscate(scheme, original, Some(&descriptors), &key).unwrap();
     Hidden { original: original.clone(), released, secret }
 }
 
