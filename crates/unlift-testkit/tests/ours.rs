@@ -45,7 +45,7 @@ fn our_sources() {
 fn our_solvers() {
     let (original, released, secret) = described_map(&olc::ENTRY, 300);
     let knn = search(&original).unwrap();
-    let lists = TrueNeighbors::new(&knn, &secret, 1, 12).unwrap().at_inlier_ratio(0.5, 1).unwrap();
+    let lists = TrueNeighbors::new(&knn, &secret, 12).unwrap().at_inlier_ratio(0.5, 1).unwrap();
     for solver in Builtin::ALL {
         solver_laws::<3>(&solver, &released, &lists);
     }

@@ -119,9 +119,9 @@ fn the_network_names_more_neighbors_than_its_inputs_do() {
         let descriptors = Descriptors::try_new(values, 128).unwrap();
         let key = Key::from_seed(1);
         let (released, secret) =
-            obfuscate(&olc::ENTRY, &original, Some(&descriptors), &key).unwrap();
+            obfuscate(&olc::LINES2D, &original, Some(&descriptors), &key).unwrap();
         let search = oracle::search(&original).unwrap();
-        let near = TrueNeighbors::new(&search, &secret, 1, K).unwrap();
+        let near = TrueNeighbors::new(&search, &secret, K).unwrap();
         let ratio = |source: &dyn Source<2>| {
             near.measured_inlier_ratio(&source.lists(&released, K, 0).unwrap())
         };

@@ -100,7 +100,7 @@ impl<'a, const D: usize> Lists<'a, D> {
     /// # Errors
     /// When the source cannot make lists for this obfuscation.
     pub fn make(&mut self, variant: &Variant<'_, D>, may_be_short: bool) -> Result<Made, Error> {
-        let (slots, plan_k) = (self.released.slots_per_record(), self.plan.k);
+        let plan_k = self.plan.k;
         let others = self.released.n_records().saturating_sub(1);
         match variant.by {
             NeighborsBy::Oracle => {
@@ -120,7 +120,7 @@ impl<'a, const D: usize> Lists<'a, D> {
             NeighborsBy::Given(points) => {
                 let scores = points.scores.as_deref();
                 let (offsets, neighbors) = (&points.offsets, &points.neighbors);
-                let lists = oracle::from_points(offsets, neighbors, scores, self.secret, slots)?;
+                let lists = oracle::from_points(offsets, neighbors, scores, self.secret)?;
                 let k = lists.longest().min(others).max(1);
                 let ratio = self.near(plan_k.min(others), false)?.measured_inlier_ratio(&lists);
                 let ratio_at_k = self.near(k, false)?.measured_inlier_ratio(&lists);
@@ -177,14 +177,13 @@ impl<'a, const D: usize> Lists<'a, D> {
 
     /// Returns the `k` true neighbors of every slot, in the order of slots or of descriptor rows.
     fn near(&mut self, k: usize, by_row: bool) -> Result<&TrueNeighbors, Error> {
-        let slots = self.released.slots_per_record();
         // With one slot per record the two orders are equal.
-        let by_row = by_row && slots > 1;
+        let by_row = by_row && self.secret.slots_per_record() > 1;
         match self.near.entry((k, by_row)) {
             Entry::Occupied(near) => Ok(near.into_mut()),
             Entry::Vacant(near) => {
                 let secret = if by_row { &self.by_row } else { self.secret };
-                Ok(near.insert(TrueNeighbors::new(self.search, secret, slots, k)?))
+                Ok(near.insert(TrueNeighbors::new(self.search, secret, k)?))
             }
         }
     }

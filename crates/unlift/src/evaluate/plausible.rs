@@ -339,7 +339,7 @@ mod tests {
         let original = Original::new(points);
         let search = oracle::search(&original).unwrap();
         let lists = |secret: &Secret| {
-            let near = TrueNeighbors::new(&search, secret, 1, 12).unwrap();
+            let near = TrueNeighbors::new(&search, secret, 12).unwrap();
             near.at_inlier_ratio(1.0, 0).unwrap()
         };
         let key = Key::from_seed(0);

@@ -29,13 +29,8 @@ impl TrueNeighbors {
     ///
     /// # Errors
     /// When `k` is 0 or fewer than `k` other records exist.
-    pub fn new<const D: usize>(
-        knn: &Knn<'_, D>,
-        secret: &Secret,
-        slots_per_record: usize,
-        k: usize,
-    ) -> Result<Self, Error> {
-        let n_slots = secret.n_slots();
+    pub fn new<const D: usize>(knn: &Knn<'_, D>, secret: &Secret, k: usize) -> Result<Self, Error> {
+        let (n_slots, slots_per_record) = (secret.n_slots(), secret.slots_per_record());
         let n_records = n_slots / slots_per_record;
         if k == 0 || n_records <= k {
             let expected = match n_records.saturating_sub(1) {
@@ -45,7 +40,7 @@ impl TrueNeighbors {
             return Err(Error::new("k", expected, k.to_string()));
         }
         let mut records = vec![RecordId(0); n_slots * k];
-        Nearness::new(knn, secret, slots_per_record).each(k, &mut records, &|_, near, row| {
+        Nearness::new(knn, secret).each(k, &mut records, &|_, near, row| {
             row.copy_from_slice(near);
         });
         Ok(Self { k, n_records, slots_per_record, map: secret.map(), records })
@@ -167,13 +162,11 @@ struct Nearness<'a, const D: usize> {
     knn: &'a Knn<'a, D>,
     secret: &'a Secret,
     record_of: Vec<Option<RecordId>>,
-    slots_per_record: usize,
 }
 
 impl<'a, const D: usize> Nearness<'a, D> {
-    fn new(knn: &'a Knn<'a, D>, secret: &'a Secret, slots_per_record: usize) -> Self {
-        let record_of = record_of_originals(secret, slots_per_record);
-        Self { knn, secret, record_of, slots_per_record }
+    fn new(knn: &'a Knn<'a, D>, secret: &'a Secret) -> Self {
+        Self { knn, secret, record_of: record_of_originals(secret) }
     }
 
     /// Calls `make(slot, the n records nearest to its original, row)` for every slot. `rows` holds
@@ -196,7 +189,7 @@ impl<'a, const D: usize> Nearness<'a, D> {
         near: &mut Vec<(f64, u32)>,
         records: &mut Vec<RecordId>,
     ) {
-        let (own, several) = (self.record_of[original], self.slots_per_record > 1);
+        let (own, several) = (self.record_of[original], self.secret.slots_per_record() > 1);
         let mut reach = n + MARGIN;
         loop {
             self.knn.nearest(original, reach, near);
@@ -219,10 +212,10 @@ impl<'a, const D: usize> Nearness<'a, D> {
 }
 
 /// Returns the record that hides each original; `None` for dropped points.
-fn record_of_originals(secret: &Secret, slots_per_record: usize) -> Vec<Option<RecordId>> {
+fn record_of_originals(secret: &Secret) -> Vec<Option<RecordId>> {
     let mut record_of = vec![None; secret.n_originals()];
     for (slot, original) in secret.hidden().iter().enumerate() {
-        record_of[original.index()] = Some(RecordId::from_index(slot / slots_per_record));
+        record_of[original.index()] = Some(RecordId::from_index(slot / secret.slots_per_record()));
     }
     record_of
 }
@@ -244,9 +237,8 @@ pub fn from_points(
     neighbors: &[u32],
     scores: Option<&[f32]>,
     secret: &Secret,
-    slots_per_record: usize,
 ) -> Result<Neighborhoods, Error> {
-    let n = secret.n_originals();
+    let (n, slots_per_record) = (secret.n_originals(), secret.slots_per_record());
     if offsets.len() != n + 1 {
         let found = offsets.len().saturating_sub(1).to_string();
         return Err(Error::new("neighbors by point", format!("{n} rows, one per point"), found));
@@ -266,7 +258,7 @@ pub fn from_points(
         let expected = format!("{} rows", neighbors.len());
         return Err(Error::new("scores of neighbors by point", expected, scores.len().to_string()));
     }
-    let record_of = record_of_originals(secret, slots_per_record);
+    let record_of = record_of_originals(secret);
     let mut rows = vec![0u64];
     let mut records = Vec::new();
     let mut kept_scores = scores.map(|_| Vec::new());
@@ -380,7 +372,7 @@ impl Outliers {
             let found = secret.n_slots().to_string();
             return Err(Error::new("secret", format!("{n_slots} slots"), found));
         }
-        let nearness = Nearness::new(knn, secret, truth.slots_per_record);
+        let nearness = Nearness::new(knn, secret);
         Ok(match noise {
             Noise::Uniform => Self::Uniform,
             Noise::Near => Self::near(truth, &nearness, seed),

@@ -83,7 +83,7 @@ impl<const D: usize> Hidden<D> {
     /// Returns the true neighborhoods of size `k`.
     pub fn near(&self, k: usize) -> TrueNeighbors {
         let search = oracle::search(&self.original).unwrap();
-        TrueNeighbors::new(&search, &self.secret, self.released.slots_per_record(), k).unwrap()
+        TrueNeighbors::new(&search, &self.secret, k).unwrap()
     }
 
     /// Returns lists of the oracle.
