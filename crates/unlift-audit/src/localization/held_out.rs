@@ -237,7 +237,7 @@ impl<'a> Held<'a> {
             let key = key.of_item(Stage::Image, number as u64);
             let (released, secret) = obfuscate(scheme, &original, None, &key)?;
             let free = free_directions(&released, &secret);
-            let Some(protection) = scheme.change().and_then(Change::protection) else {
+            let Some(protection) = scheme.changes().into_iter().find_map(Change::protection) else {
                 return Ok((free, None));
             };
             let protected = protection.protect(&query.descriptors.plain()?, &key)?;

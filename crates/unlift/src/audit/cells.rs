@@ -139,7 +139,7 @@ fn cells<const D: usize>(
         progress.done += ALONE_COST;
     }
     let seeds = (run.oracle_seed, run.seed);
-    let mut sources = Lists::new(plan, run.search, hidden, seeds, run.kept);
+    let mut sources = Lists::new(plan.k, run.search, hidden, seeds, run.kept);
     let mut missing = Vec::new();
     for variant in &plan.variants() {
         let source = variant.noise.map_or(variant.by.name(), |noise| noise.name());

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
-use super::plan::{NeighborsBy, Plan, Variant};
+use super::plan::{NeighborsBy, Variant};
 use crate::geometry::knn::Knn;
 use crate::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
 use crate::neighbors::{KeptLists, KeptPairs, Neighborhoods, Source, of_what_there_is};
@@ -65,7 +65,8 @@ impl Kept {
 
 /// Makes lists for one obfuscation. Searches true neighborhoods on first use and keeps them.
 pub struct Lists<'a, const D: usize> {
-    plan: &'a Plan<D>,
+    /// True neighbors per slot, [`Plan::k`](super::Plan::k).
+    plan_k: usize,
     search: &'a Knn<'a, D>,
     released: &'a Released<D>,
     secret: &'a Secret,
@@ -83,7 +84,7 @@ pub struct Lists<'a, const D: usize> {
 impl<'a, const D: usize> Lists<'a, D> {
     /// Prepares lists for `hidden`. `seeds` are those of the oracle and of the attacker.
     pub fn new(
-        plan: &'a Plan<D>,
+        plan_k: usize,
         search: &'a Knn<'a, D>,
         hidden: &'a (Released<D>, Secret),
         seeds: (u64, u64),
@@ -91,7 +92,7 @@ impl<'a, const D: usize> Lists<'a, D> {
     ) -> Self {
         let (released, secret) = (&hidden.0, &hidden.1);
         let (by_row, near, outliers) = (secret.by_descriptor_row(), BTreeMap::new(), None);
-        Self { plan, search, released, secret, by_row, seeds, kept, near, outliers }
+        Self { plan_k, search, released, secret, by_row, seeds, kept, near, outliers }
     }
 
     /// Makes the lists of one variant of the plan. If `may_be_short`, they are shorter than requested
@@ -100,7 +101,7 @@ impl<'a, const D: usize> Lists<'a, D> {
     /// # Errors
     /// When the source cannot make lists for this obfuscation.
     pub fn make(&mut self, variant: &Variant<'_, D>, may_be_short: bool) -> Result<Made, Error> {
-        let plan_k = self.plan.k;
+        let plan_k = self.plan_k;
         let others = self.released.n_records().saturating_sub(1);
         match variant.by {
             NeighborsBy::Oracle => {
@@ -155,7 +156,7 @@ impl<'a, const D: usize> Lists<'a, D> {
             // The metric is a mean over all points of all images, so an empty list counts with
             // ratio 0.
             NeighborsBy::Source(source) => (source.k(self.released), Some(0.0)),
-            NeighborsBy::Oracle | NeighborsBy::Given(_) => (self.plan.k, None),
+            NeighborsBy::Oracle | NeighborsBy::Given(_) => (self.plan_k, None),
         };
         Made { lists, ratio: variant.inlier_ratio.unwrap_or(0.0), k, ratio_at_k }
     }

@@ -89,7 +89,9 @@ impl TrueNeighbors {
             Outliers::Near { per_slot, .. } => {
                 (*per_slot, "between the 2K-th and the 10K-th nearest")
             }
-            _ => (self.n_records - 1 - self.k, "not neighbors"),
+            Outliers::Uniform | Outliers::Clustered { .. } => {
+                (self.n_records - 1 - self.k, "not neighbors")
+            }
         };
         if n_wrong > available {
             let what = format!("inlier ratio {inlier_ratio} at K = {}", self.k);

@@ -92,7 +92,7 @@ impl<const D: usize> Scheme<D> for Changed<D> {
         Ok(lifted)
     }
 
-    fn change(&self) -> Option<&Change> {
-        Some(&self.change)
+    fn changes(&self) -> Vec<&Change> {
+        [self.scheme.changes(), vec![&self.change]].concat()
     }
 }

@@ -29,12 +29,14 @@ pub fn obfuscate<const D: usize>(
         let expected = format!("{} rows, one per point", points.len());
         return Err(Error::new("descriptors", expected, descriptors.len().to_string()));
     }
-    let changed = match (descriptors, scheme.change()) {
-        (Some(rows), Some(Change::Mitigation(by, _))) if by.changes_descriptors() => {
-            Some(by.descriptors(rows, key)?)
+    let mut changed = None;
+    for change in scheme.changes() {
+        if let (Some(rows), Change::Mitigation(by, _)) = (changed.as_ref().or(descriptors), change)
+            && by.changes_descriptors()
+        {
+            changed = Some(by.descriptors(rows, key)?);
         }
-        _ => None,
-    };
+    }
     let descriptors = changed.as_ref().or(descriptors);
     check_size(points.positions())?;
     // The center of known bounds reveals nothing about the points.
@@ -69,7 +71,7 @@ pub fn obfuscate<const D: usize>(
     for (slot, &row) in descriptor_row.iter().enumerate() {
         source[row as usize] = hidden[slot].0;
     }
-    let protection = scheme.change().and_then(Change::protection);
+    let protection = scheme.changes().into_iter().find_map(Change::protection);
     let protected = descriptors.zip(protection).map(|(rows, by)| by.protect(rows, key));
     let protected = protected.transpose()?;
     let plain = descriptors.filter(|_| protected.is_none()).map(|rows| rows.select(&source));

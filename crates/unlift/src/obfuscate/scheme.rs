@@ -147,9 +147,9 @@ pub trait Scheme<const D: usize>: Debug + Send + Sync {
     /// When the rule cannot hide the points, or a parameter is out of range.
     fn lift(&self, points: &LocalPoints<'_, D>, key: &Key) -> Result<Lifted<D>, Error>;
 
-    /// Returns the mitigation or the protection of descriptors that is part of the scheme, if any.
-    fn change(&self) -> Option<&Change> {
-        None
+    /// Returns the mitigations and the protection of descriptors that are part of the scheme, in order.
+    fn changes(&self) -> Vec<&Change> {
+        Vec::new()
     }
 }
 
