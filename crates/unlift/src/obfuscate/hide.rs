@@ -81,9 +81,9 @@ pub fn obfuscate<const D: usize>(
         released = released.with_protected(protected.select(&source))?;
     }
     let released = released.with_bounds(bounds);
-    let secret =
-        Secret::try_new(hidden, swapped_axis, descriptor_row, lifted.dropped, points.len())?;
-    let secret = secret.of_map(Some(released.fingerprint()), slots)?;
+    let (n, dropped) = (points.len(), lifted.dropped);
+    let secret = Secret::try_new(hidden, swapped_axis, descriptor_row, dropped, n, slots)?;
+    let secret = secret.with_map(Some(released.fingerprint()));
     Ok((released, secret))
 }
 
