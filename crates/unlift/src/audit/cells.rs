@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::clock::{RowSeconds, Seconds};
 use super::lists::{Kept, Lists};
 use super::missing::{NotAudited, add_new, shortened};
-use super::observer::{Cell, Counts, Observer};
+use super::observer::{Cell, Observer};
 use super::plan::{Plan, key_of, oracle_seed};
 use super::row::{Alone, Row, measure, within};
 use crate::evaluate::{Accuracy, Truth, blind, distinct_weights, evaluate, joined};
@@ -218,7 +218,7 @@ fn cells<const D: usize>(
             let mut whole = Vec::new();
             for measure in &plan.measures {
                 let measured = clock.time(|s| &mut s.evaluate, || measure.measure(&cell))?;
-                if measure.counts() == Counts::Images {
+                if measure.is_of_images() {
                     whole.extend(measured.iter().map(|(name, _)| name.clone()));
                 }
                 row.metrics.extend(measured);
