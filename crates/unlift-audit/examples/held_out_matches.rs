@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 use unlift::Unit;
 use unlift::geometry::camera::Camera;
-use unlift::localization::Match;
+use unlift::localization::{Match, OnLine};
 use unlift::obfuscate::{SchemeOptions, scheme};
 use unlift::seed::Key;
 use unlift_audit::localization::held_out::{Held, Problem};
@@ -48,9 +48,10 @@ fn of(problems: &[Problem]) -> Vec<Value> {
 
 /// Returns place, direction (zero for a point) and point.
 fn flat(one: &Match) -> Option<Value> {
-    match one {
-        Match::Point { place, point } => Some(json!([place, [0.0, 0.0], point])),
-        Match::ImageLine { place, direction, point } => Some(json!([place, direction, point])),
-        Match::MapLine { .. } => None,
+    let Match { place, point, line } = one;
+    match line {
+        None => Some(json!([place, [0.0, 0.0], point])),
+        Some(OnLine::OfImage(direction)) => Some(json!([place, direction, point])),
+        Some(OnLine::OfMap(_)) => None,
     }
 }

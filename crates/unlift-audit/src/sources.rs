@@ -128,7 +128,7 @@ impl<const D: usize> Source<D> for ByDescriptors {
 mod tests {
     use unlift::descriptors::Values;
     use unlift::neighbors::KeptLists;
-    use unlift::obfuscate::{obfuscate, olc::Olc};
+    use unlift::obfuscate::{obfuscate, olc};
     use unlift::seed::Key;
     use unlift::truth::Original;
     use unlift::{PointSet, Unit};
@@ -168,7 +168,7 @@ mod tests {
         let points = (0..200).map(|at| [f64::from(at), f64::from(at % 7), f64::from(at % 11)]);
         let original = Original::new(PointSet::try_new(points.collect(), Unit::Meter).unwrap());
         let [a, b] = [1, 2].map(|seed| {
-            obfuscate(&Olc, &original, Some(&descriptors), &Key::from_seed(seed)).unwrap().0
+            obfuscate(&olc::ENTRY, &original, Some(&descriptors), &Key::from_seed(seed)).unwrap().0
         });
         for name in ["learned", "descriptors"] {
             let source = named(name).unwrap().of_dimension::<3>().unwrap();
@@ -194,7 +194,9 @@ mod tests {
             let descriptors = Descriptors::try_new(Values::F32(values), 128).unwrap();
             let points = (0..descriptors.len()).map(|at| [at as f64, (at % 7) as f64, 0.0]);
             let original = Original::new(PointSet::try_new(points.collect(), Unit::Meter).unwrap());
-            let map = obfuscate(&Olc, &original, Some(&descriptors), &Key::from_seed(1)).unwrap().0;
+            let map = obfuscate(&olc::ENTRY, &original, Some(&descriptors), &Key::from_seed(1))
+                .unwrap()
+                .0;
             let lists = |source: &dyn Source<3>| source.lists(&map, 7, 0).unwrap();
             let expected: &dyn Source<3> =
                 if is_aliked { &unlift_vision::network::Learned } else { &Similarity };

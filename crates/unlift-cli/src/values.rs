@@ -65,7 +65,7 @@ pub fn score(text: &str) -> Result<f32, String> {
 
 /// Parses a scheme for maps, also one that is audited only on request.
 pub fn scheme(text: &str) -> Result<&'static Entry, String> {
-    fitting_scheme(text, |entry| entry.in_3d.is_some(), " (for images only)")
+    fitting_scheme(text, 3, " (for images only)")
 }
 
 /// Parses `olc`, the same scheme twice, or `olc/cp`, two different ones.
@@ -75,15 +75,12 @@ pub fn scheme_pair(text: &str) -> Result<[&'static Entry; 2], String> {
 }
 
 pub fn image_scheme(text: &str) -> Result<&'static Entry, String> {
-    fitting_scheme(text, |entry| entry.in_2d.is_some(), " (for maps only)")
+    fitting_scheme(text, 2, " (for maps only)")
 }
 
-fn fitting_scheme(
-    text: &str,
-    fits: impl Fn(&Entry) -> bool,
-    unfit: &str,
-) -> Result<&'static Entry, String> {
-    let fitting: Vec<_> = unlift::obfuscate::all().filter(|entry| fits(entry)).collect();
+fn fitting_scheme(text: &str, dimensions: usize, unfit: &str) -> Result<&'static Entry, String> {
+    let fits = |entry: &&Entry| entry.dimensions() == dimensions;
+    let fitting: Vec<_> = unlift::obfuscate::all().filter(fits).collect();
     fitting.iter().find(|entry| entry.name == text).copied().ok_or_else(|| {
         let note = if unlift::obfuscate::scheme(text).is_ok() { unfit } else { "" };
         none_of(fitting.iter().map(|entry| entry.name), text) + note

@@ -5,7 +5,7 @@
 //! writes are atomic and replace only files that unlift wrote ([`atomic`]).
 //!
 //! ```
-//! use unlift::obfuscate::{obfuscate, olc::Olc};
+//! use unlift::obfuscate::{obfuscate, olc};
 //! use unlift::{PointSet, Unit, seed::Key, truth::Original};
 //! use unlift_io::{read, stage};
 //!
@@ -17,7 +17,7 @@
 //! let original = Original::new(PointSet::try_new(map.positions, Unit::Meter)?);
 //!
 //! // The released data is public. The owner keeps the ground truth.
-//! let (released, secret) = obfuscate(&Olc, &original, None, &Key::from_seed(0))?;
+//! let (released, secret) = obfuscate(&olc::ENTRY, &original, None, &Key::from_seed(0))?;
 //! stage::write_released(&folder.join("released.npz"), &released)?;
 //! stage::write_truth(&folder.join("truth.npz"), &original, &secret)?;
 //! let read_again = stage::read_released::<3>(&folder.join("released.npz"))?;

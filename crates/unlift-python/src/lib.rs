@@ -66,12 +66,12 @@ mod _unlift {
 /// Adds the version, and the names that arguments accept.
 fn names(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let (schemes, sources) = (unlift::obfuscate::SCHEMES, unlift_audit::sources::all());
-    let of_images = schemes.iter().filter(|entry| entry.in_2d.is_some());
+    let of_images = schemes.iter().filter(|entry| entry.dimensions() == 2);
     module.add("IMAGE_SCHEMES", of_images.map(|entry| entry.name).collect::<Vec<_>>())?;
     let of_images = sources.iter().filter(|entry| entry.in_2d.is_some());
     module.add("IMAGE_SOURCES", of_images.map(|entry| entry.name).collect::<Vec<_>>())?;
     module.add("IMAGE_SOLVERS", Builtin::FROM_LISTS.map(|solver| solver.name()).to_vec())?;
-    let of_maps = schemes.iter().filter(|entry| entry.in_3d.is_some());
+    let of_maps = schemes.iter().filter(|entry| entry.dimensions() == 3);
     module.add("SCHEMES", of_maps.map(|entry| entry.name).collect::<Vec<_>>())?;
     let of_maps = sources.iter().filter(|entry| entry.in_3d.is_some());
     module.add("SOURCES", of_maps.map(|entry| entry.name).collect::<Vec<_>>())?;

@@ -203,11 +203,10 @@ pub fn oracle(
     seed: u64,
 ) -> PyResult<Neighborhoods> {
     let noise = Noise::from_name(noise).map_err(raised)?;
-    let slots_per_record = hidden.released.clone().of_map()?.slots_per_record();
     let truth = hidden.truth.clone();
     let lists = threads::run(py, None, None, move || {
         let knn = search(&truth.original)?;
-        let near = TrueNeighbors::new(&knn, &truth.secret, slots_per_record, k)?;
+        let near = TrueNeighbors::new(&knn, &truth.secret, k)?;
         let outliers = Outliers::new(noise, &near, &knn, &truth.secret, seed)?;
         near.lists(inlier_ratio, &outliers, seed)
     })?;

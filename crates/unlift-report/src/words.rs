@@ -5,11 +5,11 @@ use std::fmt::Display;
 
 use unlift::Unit;
 use unlift::audit::Interval;
-use unlift::obfuscate::{self, Facts};
+use unlift::obfuscate::{self, Entry};
 
 /// Returns what is known of a scheme, without its changes to the map (`olc_thin4` is `olc`); `None` for schemes of others.
-pub(crate) fn facts(scheme: &str) -> Option<&'static Facts> {
-    obfuscate::all().find(|entry| entry.name == base(scheme)).map(|entry| &entry.facts)
+pub(crate) fn facts(scheme: &str) -> Option<&'static Entry> {
+    obfuscate::all().find(|entry| entry.name == base(scheme))
 }
 
 fn base(scheme: &str) -> &str {

@@ -1,16 +1,15 @@
 //! Audit with a custom source of neighborhoods and a custom solver: `cargo run --release -p
 //! unlift-testkit --example own_attack`.
 //!
-//! The source sorts records by the mean of their descriptors and lists the next ones in this order.
-//! Your source may contain trained weights as fields. The solver returns, on each line, the median
-//! of the nearest points to the listed lines. Most of these must belong to true neighbors, so it
-//! fails where `joint` does not.
+//! The source lists the records whose descriptors have the most similar mean. Your source may contain
+//! trained weights as fields. The solver returns, on each line, the median of the nearest points to the
+//! listed lines. Most of these must belong to true neighbors, so it fails where `joint` does not.
 
 use std::sync::Arc;
 
 use unlift::audit::{NeighborsBy, Plan, Silent, run};
 use unlift::neighbors::{Needs, Neighborhoods, Similarity, Source};
-use unlift::obfuscate::olc::Olc;
+use unlift::obfuscate::olc;
 use unlift::recover::{Builtin, RecoverOptions, Recovered, Solver};
 use unlift::released::{Obfuscation, Released};
 use unlift::{About, Error, RecordId, RowOrder, Unit};
@@ -47,17 +46,15 @@ impl Source<3> for Brightness {
             row.iter().sum::<f32>()
         };
         let bright: Vec<f32> = (0..n).map(&mut brightness).collect();
-        let mut order: Vec<usize> = (0..n).collect();
-        order.sort_by(|&a, &b| bright[a].total_cmp(&bright[b]));
-        let mut place = vec![0; n];
-        order.iter().enumerate().for_each(|(at, &record)| place[record] = at);
-        let (mut offsets, mut records) = (vec![0], Vec::new());
-        for &at in &place {
-            let first = at.saturating_sub(k / 2).min(n.saturating_sub(k + 1));
-            let near = (first..n).filter(|&other| other != at).take(k);
-            records.extend(near.map(|other| RecordId::from_index(order[other])));
-            offsets.push(records.len() as u64);
-        }
+        let near = |own: usize| {
+            let unlike = |other: &usize| (bright[*other] - bright[own]).abs();
+            let mut others: Vec<usize> = (0..n).filter(|&other| other != own).collect();
+            others.sort_by(|a, b| unlike(a).total_cmp(&unlike(b)));
+            others.into_iter().take(k).map(RecordId::from_index)
+        };
+        let records: Vec<RecordId> = (0..n).flat_map(near).collect();
+        let k = k.min(n.saturating_sub(1));
+        let offsets = (0..=n).map(|record| (record * k) as u64).collect();
         // Rows are descriptor rows. With one point per record these are the slots.
         let (map, order) = (Some(released.fingerprint()), RowOrder::DescriptorRows);
         let lists = Neighborhoods::try_new(offsets, records, None, n, 1)?;
@@ -114,7 +111,7 @@ fn nearest(a: [f32; 3], u: [f32; 3], b: [f32; 3], v: [f32; 3]) -> f32 {
 fn main() -> Result<(), Error> {
     // Call these in tests of your crate. They check for one list and one result per slot, which do
     // not depend on the number of threads.
-    let (original, released, secret) = unlift_testkit::described_map(&Olc, 1_500);
+    let (original, released, secret) = unlift_testkit::described_map(&olc::ENTRY, 1_500);
     unlift_testkit::source_laws(&Brightness, &released);
     let lists = Brightness.lists(&released, 20, 0)?;
     unlift_testkit::solver_laws(&Median, &released, &lists);
@@ -127,7 +124,7 @@ fn main() -> Result<(), Error> {
     let descriptors = released.descriptors().map(|descriptors| descriptors.select(&row_of));
     let sources: [Arc<dyn Source<3>>; 2] = [Arc::new(Brightness), Arc::new(Similarity)];
     let plan = Plan {
-        schemes: vec![Arc::new(Olc)],
+        schemes: vec![Arc::new(olc::ENTRY)],
         neighbors: sources
             .map(NeighborsBy::Source)
             .into_iter()

@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use unlift::audit::{Plan, Silent, run};
-use unlift::obfuscate::olc::Olc;
+use unlift::obfuscate::olc;
 use unlift::obfuscate::{Lifted, LocalPoints, Scheme};
 use unlift::released::{Lines, Obfuscation};
 use unlift::seed::{Key, Stage};
@@ -49,7 +49,7 @@ fn main() -> Result<(), Error> {
 
     let room = Original::new(PointSet::try_new(synthetic::room(1, 3_000).points, Unit::Meter)?);
     let plan = Plan {
-        schemes: vec![Arc::new(Olc), Arc::new(Tilted { most: 0.5 })],
+        schemes: vec![Arc::new(olc::ENTRY), Arc::new(Tilted { most: 0.5 })],
         ..Plan::new(Unit::Meter).for_map(3_000, 50)
     };
     println!("scheme   right  within 0.10 and 0.25 m, by the strongest attack");

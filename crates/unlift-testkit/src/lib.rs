@@ -2,23 +2,19 @@
 //! crate.
 //!
 //! ```
-//! use unlift::obfuscate::olc::Olc;
+//! use unlift::obfuscate::olc;
 //!
 //! // In `#[test] fn laws() { .. }`, with your scheme:
-//! unlift_testkit::scheme_laws::<3>(&Olc);
+//! unlift_testkit::scheme_laws::<3>(&olc::ENTRY);
 //! ```
 //!
 //! A test that fails panics with one line: the property, the points and the values.
 
-mod points;
-mod schemes;
-mod solvers;
-mod sources;
+mod laws;
+mod maps;
 
-pub use points::{image_around, piles, room, uniform};
-pub use schemes::scheme_laws;
-pub use solvers::solver_laws;
-pub use sources::{described_map, source_laws};
+pub use laws::{scheme_laws, solver_laws, source_laws};
+pub use maps::{described_map, hide, piles, room, uniform};
 
 /// Runs `work` on `threads` threads.
 ///
@@ -26,10 +22,4 @@ pub use sources::{described_map, source_laws};
 /// When the system gives no threads.
 pub fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool").install(work)
-}
-
-/// Panics if `name` is not one plain word.
-fn check_name(name: &str) {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-+_.".contains(c);
-    assert!(!name.is_empty() && name.chars().all(is_plain), "{name:?} is not a plain name");
 }

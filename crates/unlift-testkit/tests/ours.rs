@@ -6,25 +6,19 @@ use unlift::descriptors::Values;
 use unlift::neighbors::oracle::{TrueNeighbors, search};
 use unlift::neighbors::sources::SOURCES;
 use unlift::neighbors::{Needs, Neighborhoods, Source};
-use unlift::obfuscate::olc::Olc;
-use unlift::obfuscate::{
-    Change, Changed, Lifted, LocalPoints, Protection, Scheme, SchemeOptions, all,
-};
+use unlift::obfuscate::{Change, Changed, Lifted, LocalPoints, Protection, Scheme, all, olc};
 use unlift::recover::{Builtin, RecoverOptions, Recovered, Solver};
 use unlift::released::{Lines, Obfuscation, Released};
 use unlift::seed::{Draws, Key, Stage};
-use unlift::{Descriptors, Error, Unit};
+use unlift::{Descriptors, Error};
 use unlift_testkit::{described_map, scheme_laws, solver_laws, source_laws};
 
 #[test]
 fn our_schemes() {
-    let options = SchemeOptions::usual(Unit::Meter);
     for entry in all() {
-        if let Some(scheme) = entry.of_dimension::<3>(&options) {
-            scheme_laws(&*scheme);
-        }
-        if let Some(scheme) = entry.of_dimension::<2>(&options) {
-            scheme_laws(&*scheme);
+        match entry.dimensions() {
+            2 => scheme_laws::<2>(entry),
+            _ => scheme_laws::<3>(entry),
         }
     }
 }
@@ -38,10 +32,10 @@ fn our_sources() {
         let sources = SOURCES.iter().filter_map(|entry| entry.of_dimension::<3>());
         sources.for_each(|source| source_laws(&*source, &released));
     };
-    check(described_map(&Olc, 300));
+    check(described_map(&olc::ENTRY, 300));
     for text in ["subspace:2:random", "subspace:4", "subspace:2:adversarial", "ldp:16,2,6"] {
         let protection = Protection::parse(text).unwrap().with_public(&public).unwrap();
-        let scheme = Changed::new(Arc::new(Olc), Change::Protection(protection));
+        let scheme = Changed::new(Arc::new(olc::ENTRY), Change::Protection(protection));
         scheme_laws(&scheme);
         check(described_map(&scheme, 200));
     }
@@ -49,9 +43,9 @@ fn our_sources() {
 
 #[test]
 fn our_solvers() {
-    let (original, released, secret) = described_map(&Olc, 300);
+    let (original, released, secret) = described_map(&olc::ENTRY, 300);
     let knn = search(&original).unwrap();
-    let lists = TrueNeighbors::new(&knn, &secret, 1, 12).unwrap().at_inlier_ratio(0.5, 1).unwrap();
+    let lists = TrueNeighbors::new(&knn, &secret, 12).unwrap().at_inlier_ratio(0.5, 1).unwrap();
     for solver in Builtin::ALL {
         solver_laws::<3>(&solver, &released, &lists);
     }
@@ -113,7 +107,7 @@ impl Source<3> for Wrong {
 #[test]
 #[should_panic(expected = "positions: expected 300, one per slot, found 150")]
 fn a_solver_that_answers_for_some_slots_is_found_out() {
-    let (_, released, _) = described_map(&Olc, 300);
+    let (_, released, _) = described_map(&olc::ENTRY, 300);
     let lists = Neighborhoods::empty(300);
     solver_laws(&Wrong, &released, &lists);
 }
@@ -127,5 +121,5 @@ fn a_scheme_that_loses_its_points_is_found_out() {
 #[test]
 #[should_panic(expected = "wrong map")]
 fn a_source_that_hides_its_map_is_found_out() {
-    source_laws(&Wrong, &described_map(&Olc, 50).1);
+    source_laws(&Wrong, &described_map(&olc::ENTRY, 50).1);
 }

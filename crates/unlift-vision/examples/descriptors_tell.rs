@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use unlift::neighbors::oracle::{self, TrueNeighbors};
 use unlift::neighbors::{Neighborhoods, Overlap, Similarity, Source};
 use unlift::obfuscate::obfuscate;
-use unlift::obfuscate::olc::Olc;
+use unlift::obfuscate::olc;
 use unlift::released::Released;
 use unlift::seed::Key;
 use unlift::truth::Original;
@@ -78,8 +78,8 @@ fn named(extractor: &Extractor, photo: &Path) -> Result<Option<Shares>, unlift::
     let original = Original::new(PointSet::try_new(points, Unit::Pixel)?);
     let descriptors = Descriptors::try_new(descriptors, dim)?;
     let key = Key::from_seed(0);
-    let (released, secret) = obfuscate(&Olc, &original, Some(&descriptors), &key)?;
-    let near = TrueNeighbors::new(&oracle::search(&original)?, &secret, 1, K)?;
+    let (released, secret) = obfuscate(&olc::LINES2D, &original, Some(&descriptors), &key)?;
+    let near = TrueNeighbors::new(&oracle::search(&original)?, &secret, K)?;
     let by = |source: &dyn Source<2>| -> Result<Option<f64>, unlift::Error> {
         if source.supports(&released).is_err() {
             return Ok(None);

@@ -52,7 +52,7 @@ impl Key {
     /// Returns the key of one `item` of `stage`, such as one image. It reveals neither this key nor
     /// that of another item.
     pub fn of_item(&self, stage: Stage, item: u64) -> Self {
-        Self(first_bytes(&mut self.stage(stage).stream(item)))
+        Self(first_bytes(&self.stage(stage).0, item))
     }
 
     /// Returns the random stream of `item` in `stage`. For many items of a stage,
@@ -63,7 +63,7 @@ impl Key {
 
     /// Returns the key of a stage, for the streams of its items.
     pub fn stage(&self, stage: Stage) -> StageKey {
-        StageKey(first_bytes(&mut stream(&self.0, stage as u64)))
+        StageKey(first_bytes(&self.0, stage as u64))
     }
 }
 
@@ -75,23 +75,12 @@ impl std::fmt::Debug for Key {
 }
 
 /// The key of one stage. Streams of items are computed on demand.
-#[derive(Clone)]
 pub struct StageKey([u8; 32]);
-
-impl std::fmt::Debug for StageKey {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("StageKey(..)")
-    }
-}
 
 impl StageKey {
     /// Returns the random stream of `item`.
     pub fn draws(&self, item: u64) -> Draws<Cipher> {
-        Draws::of(Cipher(self.stream(item)))
-    }
-
-    fn stream(&self, item: u64) -> ChaCha20Rng {
-        stream(&self.0, item)
+        Draws::of(Cipher(stream(&self.0, item)))
     }
 }
 
@@ -112,9 +101,9 @@ fn stream(key: &[u8; 32], number: u64) -> ChaCha20Rng {
     stream
 }
 
-fn first_bytes(stream: &mut ChaCha20Rng) -> [u8; 32] {
+fn first_bytes(key: &[u8; 32], number: u64) -> [u8; 32] {
     let mut bytes = [0; 32];
-    stream.fill_bytes(&mut bytes);
+    stream(key, number).fill_bytes(&mut bytes);
     bytes
 }
 

@@ -121,11 +121,6 @@ impl DropReason {
             Self::Other => "other",
         }
     }
-
-    /// Returns the reason called `name`, if there is one.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|reason| reason.name() == name)
-    }
 }
 
 /// A point that is in no record, and the reason.
@@ -152,19 +147,19 @@ pub struct Secret {
 impl Secret {
     /// Creates a secret from columns over slots: `hidden` (the original in each slot),
     /// `swapped_axis` (`cp` only) and `descriptor_row` (the released descriptor row of each slot),
-    /// and the dropped points.
-    ///
-    /// Records are assumed to hide two points each if any descriptor row differs from its slot.
+    /// the dropped points, and the numbers of originals and of slots per record.
     ///
     /// # Errors
-    /// When columns differ in length, or an original is neither in exactly one slot nor dropped
-    /// exactly once.
+    /// When columns differ in length, an original is neither in exactly one slot nor dropped
+    /// exactly once, slots do not fill the records, or a record's descriptor rows belong to another
+    /// record.
     pub fn try_new(
         hidden: Vec<OriginalId>,
         swapped_axis: Option<Vec<u8>>,
         descriptor_row: Vec<u32>,
         dropped: Vec<Dropped>,
         n_originals: usize,
+        slots_per_record: usize,
     ) -> Result<Self, Error> {
         let n = hidden.len();
         let n_axes = swapped_axis.as_ref().map_or(n, Vec::len);
@@ -194,8 +189,20 @@ impl Secret {
         if let Some(missing) = is_used.iter().position(|is_used| !is_used) {
             return Err(not_once(missing, "neither"));
         }
-        let paired = descriptor_row.iter().enumerate().any(|(slot, &row)| row as usize != slot);
-        let slots_per_record = 1 + usize::from(paired);
+        if slots_per_record == 0 || !n.is_multiple_of(slots_per_record) {
+            let expected = format!("a number that divides {n} slots");
+            return Err(Error::new("slots per record", expected, slots_per_record.to_string()));
+        }
+        // A wrong or repeated row would join positions with unrelated points.
+        for (record, rows) in descriptor_row.chunks(slots_per_record).enumerate() {
+            let is_own = |row: u32| row as usize / slots_per_record == record;
+            let wrong = |at: &usize| !is_own(rows[*at]) || rows[..*at].contains(&rows[*at]);
+            if let Some(at) = (0..rows.len()).find(wrong) {
+                let what = format!("descriptor row of slot {}", record * slots_per_record + at);
+                let expected = format!("a row of record {record}, each once");
+                return Err(Error::new(what, expected, rows[at].to_string()));
+            }
+        }
         Ok(Self {
             hidden,
             swapped_axis,
@@ -207,27 +214,10 @@ impl Secret {
         })
     }
 
-    /// Sets the released map and the number of points per record.
-    ///
-    /// # Errors
-    /// When slots do not fill the records, or a record's descriptor rows belong to another record.
-    pub fn of_map(self, map: Option<Fingerprint>, slots_per_record: usize) -> Result<Self, Error> {
-        let whole = slots_per_record > 0 && self.n_slots().is_multiple_of(slots_per_record);
-        if !whole {
-            let expected = format!("a number that divides {} slots", self.n_slots());
-            return Err(Error::new("slots per record", expected, slots_per_record.to_string()));
-        }
-        // A wrong or repeated row would join positions with unrelated points.
-        for (record, rows) in self.descriptor_row.chunks(slots_per_record).enumerate() {
-            let is_own = |row: u32| row as usize / slots_per_record == record;
-            let wrong = |at: &usize| !is_own(rows[*at]) || rows[..*at].contains(&rows[*at]);
-            if let Some(at) = (0..rows.len()).find(wrong) {
-                let what = format!("descriptor row of slot {}", record * slots_per_record + at);
-                let expected = format!("a row of record {record}, each once");
-                return Err(Error::new(what, expected, rows[at].to_string()));
-            }
-        }
-        Ok(Self { map, slots_per_record, ..self })
+    /// Sets the fingerprint of the released map.
+    #[must_use]
+    pub fn with_map(self, map: Option<Fingerprint>) -> Self {
+        Self { map, ..self }
     }
 
     /// Returns the fingerprint of the released map; `None` if unknown.

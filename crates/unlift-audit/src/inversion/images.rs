@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use rayon::prelude::*;
-use unlift::audit::{Cell, Counts, Measure, Row};
+use unlift::audit::{Cell, Measure, Row};
 use unlift::{Descriptors, Error};
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_vision::features::photo::{Turn, read_color};
@@ -139,8 +139,8 @@ impl Inversion {
 }
 
 impl Measure<2> for Inversion {
-    fn counts(&self) -> Counts {
-        Counts::Images
+    fn is_of_images(&self) -> bool {
+        true
     }
 
     /// Returns no figures if the photo cannot be used; [`failed`](Inversion::failed) has the

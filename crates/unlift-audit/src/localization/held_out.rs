@@ -9,11 +9,10 @@ use unlift::descriptors::Values;
 use unlift::geometry::camera::{Camera, PoseError};
 use unlift::geometry::frame::Bounds;
 use unlift::geometry::vector::{distance, median};
-use unlift::localization::{Free, Localization, Match, View, estimate, free_directions};
-use unlift::obfuscate::{Scheme, obfuscate};
-use unlift::released::Released;
+use unlift::localization::{Localization, Match, OnLine, View, estimate, free_directions};
+use unlift::obfuscate::{Change, Scheme, obfuscate};
 use unlift::seed::{Key, Stage};
-use unlift::truth::{Original, Secret};
+use unlift::truth::Original;
 use unlift::{Descriptors, Error, PointSet, ProtectedDescriptors, Unit};
 use unlift_report::document::{FEWEST_HELD_OUT, HeldOut};
 use unlift_vision::features::Extraction;
@@ -194,7 +193,7 @@ impl<'a> Held<'a> {
     /// Returns the problems of all images with the map in the clear.
     pub fn unprotected(&mut self) -> Vec<Problem> {
         let pairs = self.pairs_in_the_clear();
-        self.problems(&pairs, |_, _, place, point| Some(Match::Point { place, point }))
+        self.problems(&pairs, |_, _, place, point| Some(Match { place, point, line: None }))
     }
 
     /// Returns the problems of all images with the map that `scheme` protects under `key`.
@@ -217,11 +216,9 @@ impl<'a> Held<'a> {
             }
         };
         let pairs = self.pairs(points, compared);
-        let free = by_original(&released, &secret, self.is_part.len());
-        Ok(self.problems(&pairs, |_, (_, row), place, point| match free[row] {
-            Free::Nowhere => Some(Match::Point { place, point }),
-            Free::Along(direction) => Some(Match::MapLine { place, point, direction }),
-            Free::More => None,
+        let free = free_directions(&released, &secret);
+        Ok(self.problems(&pairs, |_, (_, row), place, point| {
+            Some(Match { place, point, line: Some(OnLine::OfMap(free[row]?)) })
         }))
     }
 
@@ -235,29 +232,26 @@ impl<'a> Held<'a> {
         let mut pairs = self.pairs_in_the_clear();
         let (points, map) = self.parts();
         let hide = |(number, query): (usize, &Query)| {
-            let n = query.places.len();
             let keypoints = PointSet::try_new(query.places.clone(), Unit::Pixel)?;
             let original = Original::within(keypoints, Bounds::try_new([0.0; 2], query.size)?)?;
             let key = key.of_item(Stage::Image, number as u64);
             let (released, secret) = obfuscate(scheme, &original, None, &key)?;
-            let free = by_original(&released, &secret, n);
-            let Some(protection) = scheme.protection() else { return Ok((free, None)) };
+            let free = free_directions(&released, &secret);
+            let Some(protection) = scheme.changes().into_iter().find_map(Change::protection) else {
+                return Ok((free, None));
+            };
             let protected = protection.protect(&query.descriptors.plain()?, &key)?;
             let pairs = of_protected_keypoints(&protected, &map).into_iter();
             Ok((free, Some(pairs.map(|(i, j)| (i, points[j])).collect::<Vec<_>>())))
         };
         let hidden = self.queries.par_iter().enumerate().map(hide);
-        let (free, of_protected): (Vec<Vec<Free<2>>>, Vec<_>) =
+        let (free, of_protected): (Vec<Vec<Option<[f64; 2]>>>, Vec<_>) =
             hidden.collect::<Result<Vec<_>, Error>>()?.into_iter().unzip();
         if let Some(own) = of_protected.into_iter().collect::<Option<Vec<_>>>() {
             pairs = Arc::new(own);
         }
         Ok(self.problems(&pairs, |image, (keypoint, _), place, point| {
-            match free[image][keypoint] {
-                Free::Nowhere => Some(Match::Point { place, point }),
-                Free::Along(direction) => Some(Match::ImageLine { place, direction, point }),
-                Free::More => None,
-            }
+            Some(Match { place, point, line: Some(OnLine::OfImage(free[image][keypoint]?)) })
         }))
     }
 
@@ -367,16 +361,6 @@ impl Problem {
 pub fn locate(problems: &[Problem], seed: u64) -> Vec<Option<PoseError>> {
     let of = |(at, problem): (usize, &Problem)| problem.solve(seed.wrapping_add(at as u64));
     problems.par_iter().enumerate().map(of).collect()
-}
-
-/// Returns the free direction of each of `n` originals; those that are not released count as
-/// unknown.
-fn by_original<const D: usize>(released: &Released<D>, secret: &Secret, n: usize) -> Vec<Free<D>> {
-    let mut free = vec![Free::More; n];
-    for (id, direction) in secret.hidden().iter().zip(free_directions(released, secret)) {
-        free[id.index()] = direction;
-    }
-    free
 }
 
 /// Summarizes the errors of all images beside the unprotected ones. `limits` are pairs of errors

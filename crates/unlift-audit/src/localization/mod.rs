@@ -79,10 +79,10 @@ pub(crate) fn of_schemes(
     let positions = original.reveal().positions();
     let base = unprotected(views, positions);
     let row = |protects: Protects<'_>, errors: &[Option<PoseError>]| {
-        let (scheme, changes_descriptors) = match protects {
-            Protects::Nothing => (UNPROTECTED, false),
-            Protects::Map(scheme) => (scheme.name(), scheme.changes_descriptors()),
-            Protects::Queries(scheme) => (scheme.name(), scheme.changes_descriptors()),
+        let (scheme, changes) = match protects {
+            Protects::Nothing => (UNPROTECTED, Vec::new()),
+            Protects::Map(scheme) => (scheme.name(), scheme.changes()),
+            Protects::Queries(scheme) => (scheme.name(), scheme.changes()),
         };
         let bound = Localization::of(errors, &base);
         let finite = |value: f64| Some(value).filter(|value| value.is_finite());
@@ -93,7 +93,7 @@ pub(crate) fn of_schemes(
             center_error: finite(bound.center),
             rotation_error_degrees: finite(bound.rotation_degrees),
             failed_percent: bound.failed_percent,
-            changes_descriptors,
+            changes_descriptors: changes.into_iter().any(Change::changes_descriptors),
             held_out: None,
         }
     };

@@ -65,9 +65,7 @@ impl Files<'_> {
         same_map(self.released, Some(released.fingerprint()), self.truth, secret.map())?;
         expect_slots(self.released, &released, &secret)?;
         let released = self.described(released, &secret)?;
-        let slots = secret.slots_per_record();
-        let secret = secret.of_map(Some(released.fingerprint()), slots);
-        let secret = secret.map_err(|error| FileError::core(self.truth, error))?;
+        let secret = secret.with_map(Some(released.fingerprint()));
         let notes = released.descriptors().and_then(zeros).into_iter().collect();
         let mut prepared = Prepared { notes, ..Prepared::of(original) };
         let row = |slot: Option<usize>| Some(secret.descriptor_row()[slot?]);

@@ -253,8 +253,8 @@ fn a_released_file_that_gives_places_away_is_no_protection() {
         let released = Released::try_new(lines, 1, [0.0; 3], unit, rows).unwrap();
         let hidden = order.iter().map(|&at| OriginalId(at)).collect();
         let rows = (0..N as u32).collect();
-        let secret = Secret::try_new(hidden, None, rows, Vec::new(), N).unwrap();
-        let secret = secret.of_map(Some(released.fingerprint()), 1).unwrap();
+        let secret = Secret::try_new(hidden, None, rows, Vec::new(), N, 1).unwrap();
+        let secret = secret.with_map(Some(released.fingerprint()));
         let plan = plan(&["olc"]);
         let read = read_from_file(&[feet], &points.original, &secret, &plan.thresholds);
         let release = (released, secret);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use unlift::audit::{Cell, Counts, Item, Measure, Plan, Silent, run, run_many};
+use unlift::audit::{Cell, Item, Measure, Plan, Silent, run, run_many};
 use unlift::geometry::frame::Bounds;
 use unlift::recover::Builtin;
 use unlift::truth::Original;
@@ -48,11 +48,13 @@ fn figures_of_a_measure_stand_in_the_rows() {
 
 /// Measures the number of points of images whose names do not begin with `none`.
 #[derive(Debug)]
-struct Size(Counts);
+struct Size {
+    is_of_images: bool,
+}
 
 impl Measure<2> for Size {
-    fn counts(&self) -> Counts {
-        self.0
+    fn is_of_images(&self) -> bool {
+        self.is_of_images
     }
 
     fn measure(&self, cell: &Cell<'_, 2>) -> Result<Vec<(String, f64)>, Error> {
@@ -63,14 +65,14 @@ impl Measure<2> for Size {
 }
 
 /// Returns the mean over images with these names and numbers of points.
-fn size(counts: Counts, images: &[(&str, usize)]) -> Option<f64> {
+fn size(is_of_images: bool, images: &[(&str, usize)]) -> Option<f64> {
     let usual = Plan::<2>::new(Unit::Pixel);
     let plan = Plan {
         schemes: usual.schemes.iter().filter(|s| s.name() == "cp2d").cloned().collect(),
         inlier_ratios: vec![1.0],
         k: 5,
         solvers: vec![Arc::new(Builtin::Consensus)],
-        measures: vec![Arc::new(Size(counts))],
+        measures: vec![Arc::new(Size { is_of_images })],
         ..usual
     };
     let images = images.iter().map(|&(name, n)| {
@@ -87,10 +89,10 @@ fn size(counts: Counts, images: &[(&str, usize)]) -> Option<f64> {
 #[test]
 fn a_mean_over_images_counts_points_or_images() {
     let images = [("a", 40), ("b", 80)];
-    assert_eq!(size(Counts::Points, &images), Some((40.0 * 40.0 + 80.0 * 80.0) / 120.0));
-    assert_eq!(size(Counts::Images, &images), Some(60.0));
+    assert_eq!(size(false, &images), Some((40.0 * 40.0 + 80.0 * 80.0) / 120.0));
+    assert_eq!(size(true, &images), Some(60.0));
     // A mean over points needs all images; a mean over images uses those that have the figure.
     let images = [("a", 40), ("none", 80)];
-    assert_eq!(size(Counts::Points, &images), None);
-    assert_eq!(size(Counts::Images, &images), Some(40.0));
+    assert_eq!(size(false, &images), None);
+    assert_eq!(size(true, &images), Some(40.0));
 }

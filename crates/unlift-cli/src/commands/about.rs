@@ -9,20 +9,15 @@ use crate::output::print;
 pub fn schemes() -> crate::Result<()> {
     let mut text = String::new();
     for scheme in all() {
-        let meant_for = match (scheme.in_3d, scheme.in_2d) {
-            (Some(_), Some(_)) => "maps and images",
-            (Some(_), None) => "maps",
-            (None, _) => "images",
-        };
+        let meant_for = if scheme.dimensions() == 3 { "maps" } else { "images" };
         let request = if ON_REQUEST.iter().any(|entry| entry.name == scheme.name) {
             ", on request"
         } else {
             ""
         };
-        let facts = scheme.facts;
         text.push_str(&format!(
             "{}: {}\n  for          {meant_for}{request}\n  rule         {}\n  hidden       {}\n  publication  {}\n  patents      {}\n",
-            scheme.name, facts.title, facts.rule, facts.hidden, facts.source, facts.patents
+            scheme.name, scheme.title, scheme.rule, scheme.hidden, scheme.source, scheme.patents
         ));
     }
     print(&text)

@@ -349,14 +349,13 @@ fn map_by_source(args: &NeighborsArgs, named: &Named) -> crate::Result<Neighborh
 /// Makes the lists of a map at one inlier ratio.
 fn map_by_oracle(args: &NeighborsArgs, truth: &Path, ratio: f64) -> crate::Result<Neighborhoods> {
     let (original, secret) = read_truth::<3>(truth)?;
-    // Only the released map has the number of points per record.
     let released = read_released::<3>(&args.released)?;
     same_map(&args.released, Some(released.fingerprint()), truth, secret.map())?;
     expect_slots(&args.released, &released, &secret)?;
     let k = usize::from(args.k.unwrap_or(K));
     let lists = || {
         let knn = search(&original)?;
-        let near = TrueNeighbors::new(&knn, &secret, released.slots_per_record(), k)?;
+        let near = TrueNeighbors::new(&knn, &secret, k)?;
         let outliers = Outliers::new(args.oracle_noise, &near, &knn, &secret, args.seed)?;
         near.lists(ratio, &outliers, args.seed)
     };

@@ -56,7 +56,7 @@ fn as_staged(row: &Value, staged: &Value) -> Value {
 fn the_stages_print_the_row_of_the_audit() {
     let place = place();
     let noises = ["uniform", "near", "clustered"].into_iter().cycle();
-    let all = SCHEMES.iter().filter(|entry| entry.in_3d.is_some()).map(|entry| entry.name);
+    let all = SCHEMES.iter().filter(|entry| entry.dimensions() == 3).map(|entry| entry.name);
     for (scheme, noise) in all.zip(noises) {
         chain(&place, "hidden", scheme, noise, 7);
         let mut sources = vec!["oracle", "similarity", "overlap"];
@@ -116,7 +116,7 @@ fn write_features(place: &Place) {
 fn the_stages_of_images_print_the_row_of_the_audit() {
     let place = Place::empty();
     write_features(&place);
-    for scheme in SCHEMES.iter().filter(|entry| entry.in_2d.is_some()).map(|entry| entry.name) {
+    for scheme in SCHEMES.iter().filter(|entry| entry.dimensions() == 2).map(|entry| entry.name) {
         place.ends(&format!("obfuscate f.h5 --schemes {scheme} --seed 7 --out hidden"), 0);
         let sources = "--inlier-ratios 0.5 --neighbors oracle --neighbors overlap --solver joint";
         let audit = format!("audit images f.h5 --k 10 --seed 7 --schemes {scheme} {sources}");

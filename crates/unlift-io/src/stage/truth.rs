@@ -126,11 +126,13 @@ pub(super) fn truth_of<const D: usize>(
     };
     let dropped = dropped(arrays, &slot)?;
     let hidden = hidden.into_iter().map(OriginalId).collect();
-    let secret = Secret::try_new(hidden, axes, rows, dropped, n).map_err(core)?;
     // Crossed descriptor rows imply two slots.
-    let slots = slots.unwrap_or(secret.slots_per_record());
-    let secret = secret.of_map(arrays.meta.fingerprint()?, slots).map_err(core)?;
-    Ok((Original::new(PointSet::try_new(positions, unit).map_err(core)?), secret))
+    let are_crossed = || rows.iter().enumerate().any(|(slot, &row)| row as usize != slot);
+    let slots = slots.unwrap_or_else(|| 1 + usize::from(are_crossed()));
+    let secret = Secret::try_new(hidden, axes, rows, dropped, n, slots).map_err(core)?;
+    let secret = secret.with_map(arrays.meta.fingerprint()?);
+    let points = PointSet::try_new(positions, unit).map_err(core)?;
+    Ok((Original::new(points), secret))
 }
 
 /// Returns the originals without a slot, with their reasons.

@@ -43,8 +43,8 @@ fn descriptors_of_real_maps_are_read_and_name_neighbors() {
         let scheme = scheme(scheme_name).unwrap().of_dimension::<3>(&options).unwrap();
         let key = Key::from_seed(0);
         let (released, secret) = obfuscate(&*scheme, &original, Some(&descriptors), &key).unwrap();
-        let (rows, slots) = (secret.by_descriptor_row(), released.slots_per_record());
-        let near = oracle::TrueNeighbors::new(&search, &rows, slots, 50).unwrap();
+        let rows = secret.by_descriptor_row();
+        let near = oracle::TrueNeighbors::new(&search, &rows, 50).unwrap();
         let source = Named::parse(by).unwrap().with_k(20).of_dimension::<3>().unwrap();
         let lists = source.lists(&released, 20, 0).unwrap();
         let ratio = near.measured_inlier_ratio(&lists);
@@ -67,8 +67,7 @@ fn what_is_said_about_a_real_map_comes_true() {
         for scheme in fitted.filter_map(|entry| entry.of_dimension::<3>(&options)) {
             let (released, secret) =
                 obfuscate(&*scheme, &original, None, &Key::from_seed(0)).unwrap();
-            let slots = released.slots_per_record();
-            let near = oracle::TrueNeighbors::new(&search, &secret, slots, 50).unwrap();
+            let near = oracle::TrueNeighbors::new(&search, &secret, 50).unwrap();
             for ratio in [0.5, 0.1] {
                 let lists = near.at_inlier_ratio(ratio, 0).unwrap();
                 let options = RecoverOptions::default();

@@ -8,9 +8,7 @@ use unlift::descriptors::Values;
 use unlift::geometry::frame::Bounds;
 use unlift::neighbors::oracle::{self, TrueNeighbors};
 use unlift::neighbors::{Overlap, Similarity, Source};
-use unlift::obfuscate::obfuscate;
-use unlift::obfuscate::olc::Olc;
-use unlift::obfuscate::ppl::Ppl;
+use unlift::obfuscate::{obfuscate, olc, ppl};
 use unlift::released::Released;
 use unlift::seed::Key;
 use unlift::truth::Original;
@@ -25,7 +23,7 @@ use crate::shared;
 fn line(descriptors: &Descriptors) -> Released<3> {
     let points = (0..descriptors.len()).map(|at| [at as f64, (at % 7) as f64, 0.0]).collect();
     let original = Original::new(PointSet::try_new(points, Unit::Meter).unwrap());
-    obfuscate(&Olc, &original, Some(descriptors), &Key::from_seed(1)).unwrap().0
+    obfuscate(&olc::ENTRY, &original, Some(descriptors), &Key::from_seed(1)).unwrap().0
 }
 
 /// Descriptors of `dim` floats that change slowly along a line of points.
@@ -39,7 +37,7 @@ fn slow_floats(n: usize, dim: usize) -> Descriptors {
 #[test]
 fn the_laws_of_sources_hold_for_every_kind_of_descriptors() {
     let floats = line(&slow_floats(300, 128));
-    for released in [described_map(&Olc, 300).1, described_map(&Ppl, 300).1, floats] {
+    for released in [described_map(&olc::ENTRY, 300).1, described_map(&ppl::ENTRY, 300).1, floats] {
         source_laws(&Learned, &released);
     }
 }
@@ -86,7 +84,7 @@ fn many_maps_may_request_the_network_at_once() {
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
         return;
     }
-    let maps: Vec<_> = (0..6).map(|at| described_map(&Olc, 60 + at).1).collect();
+    let maps: Vec<_> = (0..6).map(|at| described_map(&olc::ENTRY, 60 + at).1).collect();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
     let lists = |map: &Released<3>| Learned.lists(map, 5, 0);
     let together: Vec<_> = pool.install(|| maps.par_iter().map(lists).collect());
@@ -111,9 +109,10 @@ fn the_network_names_more_neighbors_than_its_inputs_do() {
         let original = Original::within(points, bounds).unwrap();
         let descriptors = Descriptors::try_new(photo.descriptors, 128).unwrap();
         let key = Key::from_seed(1);
-        let (released, secret) = obfuscate(&Olc, &original, Some(&descriptors), &key).unwrap();
+        let (released, secret) =
+            obfuscate(&olc::LINES2D, &original, Some(&descriptors), &key).unwrap();
         let search = oracle::search(&original).unwrap();
-        let near = TrueNeighbors::new(&search, &secret, 1, K).unwrap();
+        let near = TrueNeighbors::new(&search, &secret, K).unwrap();
         let ratio = |source: &dyn Source<2>| {
             near.measured_inlier_ratio(&source.lists(&released, K, 0).unwrap())
         };

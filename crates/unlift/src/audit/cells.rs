@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use super::clock::{RowSeconds, Seconds};
 use super::lists::{Kept, Lists};
-use super::missing::{NotAudited, shortened};
-use super::observer::{Cell, Counts, Observer};
+use super::missing::{NotAudited, add_new, shortened};
+use super::observer::{Cell, Observer};
 use super::plan::{Plan, key_of, oracle_seed};
 use super::row::{Alone, Row, measure, within};
 use crate::evaluate::{Accuracy, Truth, blind, distinct_weights, evaluate, joined};
@@ -138,9 +138,8 @@ fn cells<const D: usize>(
         alone = clock.time(|s| &mut s.records_alone, attack)?;
         progress.done += ALONE_COST;
     }
-    let by_row = secret.by_descriptor_row();
-    let mut sources =
-        Lists::new(plan, run.search, hidden, &by_row, (run.oracle_seed, run.seed), run.kept);
+    let seeds = (run.oracle_seed, run.seed);
+    let mut sources = Lists::new(plan.k, run.search, hidden, seeds, run.kept);
     let mut missing = Vec::new();
     for variant in &plan.variants() {
         let source = variant.noise.map_or(variant.by.name(), |noise| noise.name());
@@ -219,7 +218,7 @@ fn cells<const D: usize>(
             let mut whole = Vec::new();
             for measure in &plan.measures {
                 let measured = clock.time(|s| &mut s.evaluate, || measure.measure(&cell))?;
-                if measure.counts() == Counts::Images {
+                if measure.is_of_images() {
                     whole.extend(measured.iter().map(|(name, _)| name.clone()));
                 }
                 row.metrics.extend(measured);
@@ -297,7 +296,11 @@ pub(super) fn of_item<const D: usize>(
             // The attacker's crate has no keys, so its seed is the integer of the repeat. Released
             // data depends on a key.
             let seed = plan.seed.wrapping_add(u64::from(repeat));
-            let (key, oracle_seed) = seeds(seed, owned.name);
+            let key = Key::from_seed(seed);
+            let (key, oracle_seed) = match owned.name {
+                None => (key, seed),
+                Some(name) => (key_of(&key, name), oracle_seed(seed, name)),
+            };
             let scheme = &**scheme;
             let run = Run { plan, search, kept, scheme, repeat, key, oracle_seed, seed };
             let (mut of_repeat, before) = (Vec::new(), progress.done);
@@ -308,11 +311,7 @@ pub(super) fn of_item<const D: usize>(
             let lacking = cells(owned, &run, clock, &mut progress, &mut each)?;
             progress.done = before + per_scheme;
             by_repeat.push(of_repeat);
-            for cell in lacking {
-                if !missing.iter().any(|known| known.is_same_cell(&cell)) {
-                    missing.push(cell);
-                }
-            }
+            add_new(&mut missing, lacking);
         }
         for (row, _) in &by_repeat[0] {
             let same = by_repeat.iter().map(|rows| rows.iter().find(|(r, _)| r.is_same_cell(row)));
@@ -327,14 +326,6 @@ pub(super) fn of_item<const D: usize>(
     }
     progress.begin("done");
     Ok(all)
-}
-
-fn seeds(seed: u64, name: Option<&str>) -> (Key, u64) {
-    let key = Key::from_seed(seed);
-    match name {
-        None => (key, seed),
-        Some(name) => (key_of(&key, name), oracle_seed(seed, name)),
-    }
 }
 
 /// Checks two laws of schemes for what a scheme made of `original` under `key`: every hidden point

@@ -2,8 +2,9 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
-use super::plan::{NeighborsBy, Plan, Variant};
+use super::plan::{NeighborsBy, Variant};
 use crate::geometry::knn::Knn;
 use crate::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
 use crate::neighbors::{KeptLists, KeptPairs, Neighborhoods, Source, of_what_there_is};
@@ -64,33 +65,34 @@ impl Kept {
 
 /// Makes lists for one obfuscation. Searches true neighborhoods on first use and keeps them.
 pub struct Lists<'a, const D: usize> {
-    plan: &'a Plan<D>,
+    /// True neighbors per slot, [`Plan::k`](super::Plan::k).
+    plan_k: usize,
     search: &'a Knn<'a, D>,
     released: &'a Released<D>,
     secret: &'a Secret,
-    by_row: &'a Secret,
+    /// The secret by descriptor row.
+    by_row: Secret,
     /// Seeds of the oracle and of the attacker.
     seeds: (u64, u64),
     kept: &'a Kept,
-    near: Vec<((usize, bool), TrueNeighbors)>,
-    /// Outliers of the last variant, and its K: variants with the same noise model are consecutive.
-    outliers: Option<(usize, Outliers)>,
+    /// By their number, and whether they are by descriptor row.
+    near: BTreeMap<(usize, bool), TrueNeighbors>,
+    /// K, noise model and outliers of the last variant: variants with the same model are consecutive.
+    outliers: Option<(usize, Noise, Outliers)>,
 }
 
 impl<'a, const D: usize> Lists<'a, D> {
-    /// Prepares lists for `hidden`. `by_row` is its secret by descriptor row; `seeds` are those of
-    /// the oracle and of the attacker.
+    /// Prepares lists for `hidden`. `seeds` are those of the oracle and of the attacker.
     pub fn new(
-        plan: &'a Plan<D>,
+        plan_k: usize,
         search: &'a Knn<'a, D>,
         hidden: &'a (Released<D>, Secret),
-        by_row: &'a Secret,
         seeds: (u64, u64),
         kept: &'a Kept,
     ) -> Self {
         let (released, secret) = (&hidden.0, &hidden.1);
-        let (near, outliers) = (Vec::new(), None);
-        Self { plan, search, released, secret, by_row, seeds, kept, near, outliers }
+        let (by_row, near, outliers) = (secret.by_descriptor_row(), BTreeMap::new(), None);
+        Self { plan_k, search, released, secret, by_row, seeds, kept, near, outliers }
     }
 
     /// Makes the lists of one variant of the plan. If `may_be_short`, they are shorter than requested
@@ -99,7 +101,7 @@ impl<'a, const D: usize> Lists<'a, D> {
     /// # Errors
     /// When the source cannot make lists for this obfuscation.
     pub fn make(&mut self, variant: &Variant<'_, D>, may_be_short: bool) -> Result<Made, Error> {
-        let (slots, plan_k) = (self.released.slots_per_record(), self.plan.k);
+        let plan_k = self.plan_k;
         let others = self.released.n_records().saturating_sub(1);
         match variant.by {
             NeighborsBy::Oracle => {
@@ -119,13 +121,11 @@ impl<'a, const D: usize> Lists<'a, D> {
             NeighborsBy::Given(points) => {
                 let scores = points.scores.as_deref();
                 let (offsets, neighbors) = (&points.offsets, &points.neighbors);
-                let lists = oracle::from_points(offsets, neighbors, scores, self.secret, slots)?;
+                let lists = oracle::from_points(offsets, neighbors, scores, self.secret)?;
                 let k = lists.longest().min(others).max(1);
-                let mut ratio = |k: usize| -> Result<f64, Error> {
-                    Ok(self.near(k, false)?.measured_inlier_ratio(&lists))
-                };
-                let (ratio, ratio_at_k) = (ratio(plan_k.min(others))?, Some(ratio(k)?));
-                Ok(Made { lists, ratio, k, ratio_at_k })
+                let ratio = self.near(plan_k.min(others), false)?.measured_inlier_ratio(&lists);
+                let ratio_at_k = self.near(k, false)?.measured_inlier_ratio(&lists);
+                Ok(Made { lists, ratio, k, ratio_at_k: Some(ratio_at_k) })
             }
             NeighborsBy::Source(_) if may_be_short && others == 0 => Ok(self.none(variant)),
             NeighborsBy::Source(source) => {
@@ -139,12 +139,11 @@ impl<'a, const D: usize> Lists<'a, D> {
                     }
                 };
                 // Lists of such sources are in the order of descriptor rows, not of slots.
-                let mut ratio = |k: usize| -> Result<f64, Error> {
-                    let k = if is_short { k.min(others) } else { k };
-                    Ok(self.near(k, true)?.measured_inlier_ratio(&lists))
-                };
-                let (ratio, ratio_at_k) = (ratio(plan_k)?, Some(ratio(k)?));
-                Ok(Made { lists, ratio, k, ratio_at_k })
+                let [near_plan, near] =
+                    [plan_k, k].map(|k| if is_short { k.min(others) } else { k });
+                let ratio = self.near(near_plan, true)?.measured_inlier_ratio(&lists);
+                let ratio_at_k = self.near(near, true)?.measured_inlier_ratio(&lists);
+                Ok(Made { lists, ratio, k, ratio_at_k: Some(ratio_at_k) })
             }
         }
     }
@@ -157,7 +156,7 @@ impl<'a, const D: usize> Lists<'a, D> {
             // The metric is a mean over all points of all images, so an empty list counts with
             // ratio 0.
             NeighborsBy::Source(source) => (source.k(self.released), Some(0.0)),
-            NeighborsBy::Oracle | NeighborsBy::Given(_) => (self.plan.k, None),
+            NeighborsBy::Oracle | NeighborsBy::Given(_) => (self.plan_k, None),
         };
         Made { lists, ratio: variant.inlier_ratio.unwrap_or(0.0), k, ratio_at_k }
     }
@@ -169,87 +168,24 @@ impl<'a, const D: usize> Lists<'a, D> {
         let (search, secret, kept) = (self.search, self.secret, self.outliers.take());
         let near = self.near(k, false)?;
         let outliers = match kept {
-            Some((of, outliers)) if of == k && outliers.noise() == noise => outliers,
+            Some((of_k, of, outliers)) if (of_k, of) == (k, noise) => outliers,
             _ => Outliers::new(noise, near, search, secret, seed)?,
         };
         let lists = near.lists(ratio, &outliers, seed);
-        self.outliers = Some((k, outliers));
+        self.outliers = Some((k, noise, outliers));
         lists
     }
 
     /// Returns the `k` true neighbors of every slot, in the order of slots or of descriptor rows.
     fn near(&mut self, k: usize, by_row: bool) -> Result<&TrueNeighbors, Error> {
-        let slots = self.released.slots_per_record();
         // With one slot per record the two orders are equal.
-        let by_row = by_row && slots > 1;
-        if let Some(at) = self.near.iter().position(|(of, _)| *of == (k, by_row)) {
-            return Ok(&self.near[at].1);
-        }
-        let secret = if by_row { self.by_row } else { self.secret };
-        let near = TrueNeighbors::new(self.search, secret, slots, k)?;
-        self.near.push(((k, by_row), near));
-        Ok(&self.near[self.near.len() - 1].1)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::descriptors::Values;
-    use crate::neighbors::{Needs, Similarity};
-    use crate::obfuscate::{SchemeOptions, obfuscate};
-    use crate::obfuscate::{olc::Olc, ray};
-    use crate::released::Obfuscation;
-    use crate::seed::Key;
-    use crate::truth::Original;
-    use crate::{Descriptors, PointSet, Unit, synthetic};
-
-    /// Lists of rays are longer.
-    #[derive(Debug)]
-    struct ByFamily;
-
-    impl Source<3> for ByFamily {
-        fn name(&self) -> &str {
-            "by-family"
-        }
-
-        fn needs(&self) -> Needs {
-            Needs::Descriptors
-        }
-
-        fn k(&self, released: &Released<3>) -> usize {
-            if matches!(released.obfuscation(), Obfuscation::Rays(_)) { 10 } else { 7 }
-        }
-
-        fn lists(
-            &self,
-            released: &Released<3>,
-            k: usize,
-            seed: u64,
-        ) -> Result<Neighborhoods, Error> {
-            Similarity.lists(released, k, seed)
-        }
-
-        fn reads_descriptors_alone(&self) -> bool {
-            true
-        }
-    }
-
-    #[test]
-    fn lists_are_kept_by_their_length() {
-        let points = PointSet::try_new(synthetic::room(1, 60).points, Unit::Meter).unwrap();
-        let original = Original::new(points);
-        let values = (0..60 * 8).map(|at| (at * at % 251) as u8).collect();
-        let descriptors = Descriptors::try_new(Values::U8(values), 8).unwrap();
-        let rays = (ray::ENTRY.in_3d.unwrap())(&SchemeOptions::usual(Unit::Meter));
-        let hide = |scheme| {
-            obfuscate(scheme, &original, Some(&descriptors), &Key::from_seed(0)).unwrap().0
-        };
-        let (lines, rays) = (hide(&Olc), hide(&*rays));
-        let kept = Kept::default();
-        for (released, k) in [(&lines, 7), (&rays, 10), (&lines, 7)] {
-            let lists = kept.lists(&ByFamily, released, 0).unwrap();
-            assert_eq!(lists, ByFamily.lists(released, k, 0).unwrap());
+        let by_row = by_row && self.secret.slots_per_record() > 1;
+        match self.near.entry((k, by_row)) {
+            Entry::Occupied(near) => Ok(near.into_mut()),
+            Entry::Vacant(near) => {
+                let secret = if by_row { &self.by_row } else { self.secret };
+                Ok(near.insert(TrueNeighbors::new(self.search, secret, k)?))
+            }
         }
     }
 }

@@ -6,14 +6,13 @@ use std::ops::AddAssign;
 
 use rayon::prelude::*;
 
-use super::break_even::break_even;
 use super::cells::{Finished, Owned, Rows, of_item};
 use super::clock::{RowSeconds, Seconds};
-use super::missing::NotAudited;
+use super::missing::{NotAudited, add_new};
 use super::observer::{Observer, Silent};
 use super::plan::Plan;
 use super::row::{Alone, ByReason, Distinct, Parts, Row, places_within, within};
-use super::run::{Outcome, none_applies};
+use super::run::Outcome;
 use super::share::{Shares, Threshold, merge, percents};
 use crate::evaluate::{Accuracy, Reliability};
 use crate::truth::Original;
@@ -112,15 +111,12 @@ pub fn run_many<const D: usize, E: From<Error>>(
     watcher.progress(n_items, n_items, "done");
     let Sums { mut cells, not_audited, n_pooled, clock } = all;
     cells.retain(|cell| cell.n_items == n_pooled);
-    if let (true, Some(first)) = (cells.is_empty(), not_audited.first()) {
-        return Err(none_applies(first).into());
-    }
-    let pooled = |cell: &CellSums| Row::mean(&cell.pools.iter().map(Pool::row).collect::<Vec<_>>());
-    let rows: Vec<Row> = cells.iter().map(pooled).collect();
-    let break_even = break_even(plan, &rows);
-    let seconds = cells.iter().map(|cell| cell.seconds).collect();
-    let seconds = Seconds { rows: seconds, ..clock };
-    Ok(Outcome { rows, not_audited, break_even, n_items, n_too_small, seconds })
+    let pooled = |cell: &CellSums| {
+        (Row::mean(&cell.pools.iter().map(Pool::row).collect::<Vec<_>>()), cell.seconds)
+    };
+    let (rows, seconds) = cells.iter().map(pooled).unzip();
+    let all = Rows { rows, seconds, not_audited };
+    Ok(Outcome::new(plan, all, clock, [n_items, n_too_small])?)
 }
 
 #[derive(Default)]
@@ -134,8 +130,7 @@ struct Sums {
 }
 
 struct CellSums {
-    /// Row of the first item.
-    row: Row,
+    /// One per repeat.
     pools: Vec<Pool>,
     n_items: usize,
     seconds: RowSeconds,
@@ -145,13 +140,9 @@ impl Sums {
     fn merge(&mut self, more: Self) {
         self.clock.merge(&more.clock);
         self.n_pooled += more.n_pooled;
-        for missing in more.not_audited {
-            if !self.not_audited.iter().any(|known| known.is_same_cell(&missing)) {
-                self.not_audited.push(missing);
-            }
-        }
+        add_new(&mut self.not_audited, more.not_audited);
         for cell in more.cells {
-            match self.cells.iter_mut().find(|known| known.row.is_same_cell(&cell.row)) {
+            match self.cells.iter_mut().find(|known| known.pools[0].is_of(&cell.pools[0].cell)) {
                 Some(to) => {
                     to.pools.iter_mut().zip(&cell.pools).for_each(|(to, more)| to.merge(more));
                     to.seconds.add(&cell.seconds);
@@ -182,21 +173,21 @@ fn sums_of<const D: usize>(
     check(item, plan)?;
     let (original, descriptors) = (&item.original, item.descriptors.as_ref());
     let owned = Owned { original, descriptors, hidden: None, name: Some(&item.name) };
-    let mut pools: Vec<(Row, Vec<Pool>)> = Vec::new();
+    let mut all_pools: Vec<Vec<Pool>> = Vec::new();
     let mut each = |finished: &Finished<'_>| {
         let pool = Pool::of(finished, &plan.thresholds);
-        match pools.iter_mut().find(|(row, _)| row.is_same_cell(&finished.row)) {
-            Some((_, pools)) => pools.push(pool),
-            None => pools.push((finished.row.clone(), vec![pool])),
+        match all_pools.iter_mut().find(|pools| pools[0].is_of(&finished.row)) {
+            Some(pools) => pools.push(pool),
+            None => all_pools.push(vec![pool]),
         }
     };
     let Rows { rows, seconds, not_audited } =
         of_item(&owned, plan, &mut sums.clock, observer, &mut each)?;
     for (row, seconds) in rows.iter().zip(seconds) {
         // A cell that failed in another repeat has no row.
-        if let Some(at) = pools.iter().position(|(first, _)| first.is_same_cell(row)) {
-            let (row, pools) = pools.swap_remove(at);
-            sums.cells.push(CellSums { row, pools, n_items: 1, seconds });
+        if let Some(at) = all_pools.iter().position(|pools| pools[0].is_of(row)) {
+            let pools = all_pools.swap_remove(at);
+            sums.cells.push(CellSums { pools, n_items: 1, seconds });
         }
     }
     (sums.not_audited, sums.n_pooled) = (not_audited, 1);
@@ -232,8 +223,7 @@ pub(super) struct Pool {
     /// Row of the first image, which identifies the cell.
     cell: Row,
     n_points: usize,
-    n_listed: usize,
-    /// Sums by figure: of true entries of lists, of percentages times points. A figure that no image has is absent.
+    /// Sums by figure: of entries and true entries of lists, of percentages times points. A figure that no image has is absent.
     sums: BTreeMap<&'static str, f64>,
     /// Points and distinct places within each threshold.
     shares: SharesByName,
@@ -250,6 +240,10 @@ pub(super) struct Pool {
 }
 
 impl Pool {
+    fn is_of(&self, row: &Row) -> bool {
+        self.cell.is_same_cell(row)
+    }
+
     /// Returns the sums of one image.
     pub(super) fn of(finished: &Finished<'_>, thresholds: &[Threshold]) -> Self {
         let Finished { row, accuracy, baseline, weights, whole, n_listed, .. } = finished;
@@ -257,6 +251,7 @@ impl Pool {
         let percentage = |percent: Option<f64>| percent.map(|percent| percent * n as f64);
         let mut sums = BTreeMap::from([
             ("delta", row.delta * n as f64),
+            ("listed", *n_listed as f64),
             ("hits", row.inlier_ratio * *n_listed as f64),
             ("places", weights.iter().sum()),
         ]);
@@ -275,7 +270,6 @@ impl Pool {
         Self {
             cell: row.clone(),
             n_points: n,
-            n_listed: *n_listed,
             sums,
             shares: BTreeMap::from([
                 ("recovered", within(accuracy, thresholds)),
@@ -298,7 +292,6 @@ impl Pool {
     /// Adds the sums of `more`, a pool of the same row.
     pub(super) fn merge(&mut self, more: &Self) {
         self.n_points += more.n_points;
-        self.n_listed += more.n_listed;
         merge_counts(&mut self.sums, &more.sums);
         merge_shares(&mut self.shares, &more.shares);
         merge_shares(&mut self.alone, &more.alone);
@@ -323,6 +316,7 @@ impl Pool {
     pub(super) fn row(&self) -> Row {
         let n = self.n_points.max(1) as f64;
         let sum = |name| self.sums.get(name).copied();
+        let total = |name| sum(name).unwrap_or(0.0);
         let is_known =
             |(_, figure): &(&String, &Figure)| figure.of_images || figure.known == self.n_points;
         let alone = |(&name, shares): (&&'static str, &Shares)| {
@@ -333,10 +327,10 @@ impl Pool {
         let mut row = Row {
             // A requested ratio identifies the cell. A measured one is a mean over entries.
             inlier_ratio: match self.cell.oracle_noise {
-                None if self.n_listed > 0 => sum("hits").unwrap_or(0.0) / self.n_listed as f64,
+                None if total("listed") > 0.0 => total("hits") / total("listed"),
                 _ => self.cell.inlier_ratio,
             },
-            delta: sum("delta").unwrap_or(0.0) / n,
+            delta: total("delta") / n,
             n_points: self.n_points,
             n_lost: self.lost.values().sum(),
             lost: self.lost.clone(),
@@ -359,7 +353,7 @@ impl Pool {
             assignment_accuracy_percent: sum("assignment").map(|sum| sum / n),
             sure_unknown: self.sure_unknown.clone(),
             distinct: self.cell.distinct.as_ref().map(|_| Distinct {
-                n_places: sum("places").unwrap_or(0.0).round() as usize,
+                n_places: total("places").round() as usize,
                 recovered_percent: percents(&self.shares["places"]),
                 blind_percent: percents(&self.shares["blind places"]),
             }),

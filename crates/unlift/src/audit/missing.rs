@@ -57,12 +57,18 @@ impl NotAudited {
         }
     }
 
-    /// Returns true if both have the same scheme and variant. Reasons are not compared.
-    pub(super) fn is_same_cell(&self, other: &Self) -> bool {
-        self.scheme == other.scheme
-            && self.neighbors == other.neighbors
-            && self.oracle_noise == other.oracle_noise
-            && self.inlier_ratio == other.inlier_ratio
+    /// Returns all but the reason.
+    fn cell(&self) -> (&str, Option<&str>, Option<&str>, Option<f64>) {
+        (&self.scheme, self.neighbors.as_deref(), self.oracle_noise, self.inlier_ratio)
+    }
+}
+
+/// Adds the cells of `more` that `known` lacks. Reasons are not compared.
+pub(super) fn add_new(known: &mut Vec<NotAudited>, more: Vec<NotAudited>) {
+    for missing in more {
+        if known.iter().all(|known| known.cell() != missing.cell()) {
+            known.push(missing);
+        }
     }
 }
 

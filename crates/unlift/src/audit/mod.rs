@@ -22,7 +22,7 @@ pub use cells::{check_laws, records_alone};
 pub use clock::{RowSeconds, Seconds};
 pub use many::{Item, Watcher, run_many};
 pub use missing::NotAudited;
-pub use observer::{Cell, Counts, Measure, Observer, Silent};
+pub use observer::{Cell, Measure, Observer, Silent};
 pub use plan::{NeighborsBy, Plan, PointNeighbors, Variant};
 pub use row::{
     Alone, ByReason, Distinct, Intervals, PERCENTILES, Parts, ReliabilityBin, Row, Spread, measure,

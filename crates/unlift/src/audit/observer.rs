@@ -61,20 +61,12 @@ pub struct Silent;
 
 impl<const D: usize> Observer<D> for Silent {}
 
-/// Weighting of a figure in a mean over many images.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Counts {
-    /// Every point counts once, so an image counts by its number of points.
-    Points,
-    /// Every image that has the figure counts once: the figure describes an image as a whole.
-    Images,
-}
-
 /// A custom figure of every row, besides errors.
 pub trait Measure<const D: usize>: Debug + Send + Sync {
-    /// Returns the weighting in a mean over images.
-    fn counts(&self) -> Counts {
-        Counts::Points
+    /// Returns true if the figures describe an image as a whole. In a mean over images, every image that
+    /// has such a figure counts once; otherwise every point does.
+    fn is_of_images(&self) -> bool {
+        false
     }
 
     /// Returns figures by name.

@@ -118,10 +118,6 @@ impl<const D: usize> Plan<D> {
         };
         let of_images = unit == Unit::Pixel;
         let options = SchemeOptions::usual(unit);
-        let threshold = |label: &str| Threshold {
-            label: label.to_owned(),
-            value: label.parse().unwrap_or(1.0),
-        };
         Self {
             schemes: SCHEMES.iter().filter_map(|entry| entry.of_dimension(&options)).collect(),
             neighbors: vec![NeighborsBy::Oracle],
@@ -132,7 +128,7 @@ impl<const D: usize> Plan<D> {
             records_alone: true,
             delta: Delta::Auto,
             measures: Vec::new(),
-            thresholds: thresholds.iter().copied().map(threshold).collect(),
+            thresholds: thresholds.iter().flat_map(|label| Threshold::parse(label)).collect(),
             headline: if of_images { 2 } else { 0 },
             seed: 0,
             repeats: 1,

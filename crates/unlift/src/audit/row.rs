@@ -330,33 +330,26 @@ impl Row {
             return mean;
         }
         let n = rows.len() as f64;
-        let average = |value: &dyn Fn(&Row) -> Option<f64>| {
-            let values: Option<Vec<f64>> = rows.iter().map(value).collect();
-            values.map(|values| values.iter().sum::<f64>() / n)
+        let mean_and_std = |value: &dyn Fn(&Row) -> Option<f64>| {
+            let values: Vec<f64> = rows.iter().map(value).collect::<Option<_>>()?;
+            let mean = values.iter().sum::<f64>() / n;
+            let squares: f64 = values.iter().map(|x| (x - mean) * (x - mean)).sum();
+            Some((mean, (squares / (n - 1.0)).sqrt()))
         };
-        let spread = |value: &dyn Fn(&Row) -> Option<f64>| {
-            let m = average(value)?;
-            let squares: f64 = rows.iter().filter_map(value).map(|x| (x - m) * (x - m)).sum();
-            Some((squares / (n - 1.0)).sqrt())
-        };
+        let average = |value: &dyn Fn(&Row) -> Option<f64>| Some(mean_and_std(value)?.0);
         type Column = fn(&Row) -> Option<&ByThreshold>;
-        type Of<'a> = &'a dyn Fn(&dyn Fn(&Row) -> Option<f64>) -> Option<f64>;
-        let each = |of: Column, value: Of<'_>| -> ByThreshold {
+        let each = |of: Column| -> (ByThreshold, ByThreshold) {
             let labels = of(&rows[0]).into_iter().flat_map(|by| by.keys());
             let of_label = |label: &String| {
-                let value = value(&|r| of(r)?.get(label).copied()).unwrap_or(0.0);
-                (label.clone(), value)
+                let both = mean_and_std(&|r| of(r)?.get(label).copied());
+                let (mean, std) = both.unwrap_or_default();
+                ((label.clone(), mean), (label.clone(), std))
             };
-            labels.map(of_label).collect()
+            labels.map(of_label).unzip()
         };
         mean.repeats = rows.len() as u32;
-        let std = Spread {
-            recovered_percent: each(|r| Some(&r.recovered_percent), &spread),
-            blind_percent: each(|r| Some(&r.blind_percent), &spread),
-            median_error: spread(&|r| r.median_error),
-        };
-        mean.recovered_percent = each(|r| Some(&r.recovered_percent), &average);
-        mean.blind_percent = each(|r| Some(&r.blind_percent), &average);
+        let (recovered, recovered_std) = each(|r| Some(&r.recovered_percent));
+        let (blind, blind_std) = each(|r| Some(&r.blind_percent));
         type Ends = fn(&Intervals) -> &IndexMap<String, Interval>;
         let ends = |of: Ends, means: &ByThreshold, std: &ByThreshold| {
             let interval = |(label, mean): (&String, &f64)| {
@@ -368,19 +361,20 @@ impl Row {
             means.iter().filter_map(interval).collect()
         };
         mean.interval = Some(Intervals {
-            recovered_percent: ends(
-                |of| &of.recovered_percent,
-                &mean.recovered_percent,
-                &std.recovered_percent,
-            ),
-            blind_percent: ends(|of| &of.blind_percent, &mean.blind_percent, &std.blind_percent),
+            recovered_percent: ends(|of| &of.recovered_percent, &recovered, &recovered_std),
+            blind_percent: ends(|of| &of.blind_percent, &blind, &blind_std),
             ..Intervals::default()
         });
-        mean.std = Some(std);
+        (mean.recovered_percent, mean.blind_percent) = (recovered, blind);
+        mean.std = Some(Spread {
+            recovered_percent: recovered_std,
+            blind_percent: blind_std,
+            median_error: mean_and_std(&|r| r.median_error).map(|(_, std)| std),
+        });
         if let Some(distinct) = &mut mean.distinct {
-            distinct.recovered_percent =
-                each(|r| Some(&r.distinct.as_ref()?.recovered_percent), &average);
-            distinct.blind_percent = each(|r| Some(&r.distinct.as_ref()?.blind_percent), &average);
+            (distinct.recovered_percent, _) =
+                each(|r| Some(&r.distinct.as_ref()?.recovered_percent));
+            (distinct.blind_percent, _) = each(|r| Some(&r.distinct.as_ref()?.blind_percent));
         }
         mean.fill_errors(|p| average(&|r| r.error_percentiles[&format!("{p:.0}")]));
         mean.blind_median_error = average(&|r| r.blind_median_error);

@@ -36,6 +36,28 @@ pub struct Outcome {
     pub seconds: Seconds,
 }
 
+impl Outcome {
+    /// Creates the result of `n_items` items, of which `n_too_small` have at most K points.
+    ///
+    /// # Errors
+    /// When no scheme has a row.
+    pub(super) fn new<const D: usize>(
+        plan: &Plan<D>,
+        all: Rows,
+        clock: Seconds,
+        [n_items, n_too_small]: [usize; 2],
+    ) -> Result<Self, Error> {
+        let Rows { rows, seconds, not_audited } = all;
+        if let (true, Some(first)) = (rows.is_empty(), not_audited.first()) {
+            let found = format!("none: {}: {}", first.scheme, first.reason);
+            return Err(Error::new("schemes", "one that can be applied to this map", found));
+        }
+        let break_even = break_even(plan, &rows);
+        let seconds = Seconds { rows: seconds, ..clock };
+        Ok(Self { rows, not_audited, break_even, n_items, n_too_small, seconds })
+    }
+}
+
 /// Runs `plan` on a map. `descriptors` has one row per original.
 ///
 /// Rows depend only on the map, the descriptors and the plan: byte-identical for any number of
@@ -52,40 +74,22 @@ pub fn run<const D: usize>(
 ) -> Result<Outcome, Error> {
     plan.check(original.len(), descriptors.is_some())?;
     let every_cell: EveryCell<D> = EVERY_CELL.of()?;
-    every_cell((original, descriptors), None, plan, observer)
+    every_cell(&Owned { original, descriptors, hidden: None, name: None }, plan, observer)
 }
 
-type EveryCell<const D: usize> = fn(
-    (&Original<D>, Option<&Descriptors>),
-    Option<&(Released<D>, Secret)>,
-    &Plan<D>,
-    &mut dyn Observer<D>,
-) -> Result<Outcome, Error>;
+type EveryCell<const D: usize> =
+    fn(&Owned<'_, D>, &Plan<D>, &mut dyn Observer<D>) -> Result<Outcome, Error>;
 
 unlift_attack::both! { EVERY_CELL: EveryCell = every_cell }
 
-/// Runs every cell of `plan`. If `hidden` is given, it is the obfuscation for the plan's first scheme.
 fn every_cell<const D: usize>(
-    (original, descriptors): (&Original<D>, Option<&Descriptors>),
-    hidden: Option<&(Released<D>, Secret)>,
+    owned: &Owned<'_, D>,
     plan: &Plan<D>,
     observer: &mut dyn Observer<D>,
 ) -> Result<Outcome, Error> {
     let mut clock = Seconds::default();
-    let owned = Owned { original, descriptors, hidden, name: None };
-    let all = of_item(&owned, plan, &mut clock, observer, &mut |_| ())?;
-    if let (true, Some(first)) = (all.rows.is_empty(), all.not_audited.first()) {
-        return Err(none_applies(first));
-    }
-    let Rows { rows, seconds, not_audited } = all;
-    let break_even = break_even(plan, &rows);
-    let seconds = Seconds { rows: seconds, ..clock };
-    Ok(Outcome { rows, not_audited, break_even, n_items: 1, n_too_small: 0, seconds })
-}
-
-pub(super) fn none_applies(first: &NotAudited) -> Error {
-    let found = format!("none: {}: {}", first.scheme, first.reason);
-    Error::new("schemes", "one that can be applied to this map", found)
+    let all = of_item(owned, plan, &mut clock, observer, &mut |_| ())?;
+    Outcome::new(plan, all, clock, [1, 0])
 }
 
 /// A scheme whose rule is unknown, because another program hid the points.
@@ -127,5 +131,5 @@ pub fn run_released(
     let (released, secret) = hidden;
     plan.check(original.len(), released.descriptors().is_some())?;
     Truth { original, released, secret }.belongs()?;
-    every_cell((original, descriptors), Some(hidden), plan, observer)
+    every_cell(&Owned { original, descriptors, hidden: Some(hidden), name: None }, plan, observer)
 }

@@ -52,39 +52,22 @@ impl WithInterval {
     }
 }
 
-/// Sums over maps, images or tiles, whose points are not independent.
+/// Sums over maps, images or tiles, whose points are not independent: of items, points, points within,
+/// the squares of both, and their products.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Share {
-    n_items: f64,
-    points: f64,
-    within: f64,
-    points_squared: f64,
-    within_squared: f64,
-    product: f64,
-}
+pub struct Share([f64; 6]);
 
 impl Share {
     /// Creates the share of `within` of the `points` of one map, image or tile. One without points says
     /// nothing about the spread.
     pub fn of(within: f64, points: f64) -> Self {
-        Self {
-            n_items: f64::from(u8::from(points > 0.0)),
-            points,
-            within,
-            points_squared: points * points,
-            within_squared: within * within,
-            product: points * within,
-        }
+        let n_items = f64::from(u8::from(points > 0.0));
+        Self([n_items, points, within, points * points, within * within, points * within])
     }
 
     /// Adds the sums of other items.
     pub(super) fn merge(&mut self, more: &Self) {
-        self.n_items += more.n_items;
-        self.points += more.points;
-        self.within += more.within;
-        self.points_squared += more.points_squared;
-        self.within_squared += more.within_squared;
-        self.product += more.product;
+        self.0.iter_mut().zip(more.0).for_each(|(sum, more)| *sum += more);
     }
 
     /// Returns the mean over repeats, whose points are the same.
@@ -94,50 +77,44 @@ impl Share {
             all.merge(&share);
             n += 1.0;
         }
-        Self {
-            n_items: all.n_items / n,
-            points: all.points / n,
-            within: all.within / n,
-            points_squared: all.points_squared / n,
-            within_squared: all.within_squared / n,
-            product: all.product / n,
-        }
+        Self(all.0.map(|sum| sum / n))
     }
 
     /// Returns the share among `points`, of which none is within that is not counted yet.
     pub(super) fn among(mut self, points: f64) -> Self {
-        if points > self.points {
-            self.merge(&Self::of(0.0, points - self.points));
+        let [_, counted, ..] = self.0;
+        if points > counted {
+            self.merge(&Self::of(0.0, points - counted));
         }
         self
     }
 
     /// Returns the percentage; zero without points.
     pub fn percent(&self) -> f64 {
-        if self.points == 0.0 { 0.0 } else { 100.0 * self.within / self.points }
+        let [_, points, within, ..] = self.0;
+        if points == 0.0 { 0.0 } else { 100.0 * within / points }
     }
 
     /// Returns the 95 % interval of the percentage: Wilson's over points, as if they were independent;
     /// over several items, the wider of this and the t interval of a ratio of sums.
     pub fn interval(&self) -> Interval {
-        if self.points == 0.0 {
+        let [n_items, n, within, points_squared, within_squared, product] = self.0;
+        if n == 0.0 {
             return [0.0, 100.0];
         }
-        let share = self.within / self.points;
-        let z = NORMAL;
-        let (n, square) = (self.points, z * z);
+        let share = within / n;
+        let (z, square) = (NORMAL, NORMAL * NORMAL);
         let center = (share + square / (2.0 * n)) / (1.0 + square / n);
         let half = z / (1.0 + square / n)
             * (share * (1.0 - share) / n + square / (4.0 * n * n)).max(0.0).sqrt();
         let wilson =
             [100.0 * (center - half), 100.0 * (center + half)].map(|p| p.clamp(0.0, 100.0));
-        if self.n_items < 2.0 {
+        if n_items < 2.0 {
             return wilson;
         }
-        let squares =
-            self.within_squared - 2.0 * share * self.product + share * share * self.points_squared;
-        let error = (self.n_items / (self.n_items - 1.0) * squares.max(0.0)).sqrt() / self.points;
-        wider(wilson, around(100.0 * share, 100.0 * error, self.n_items - 1.0))
+        let squares = within_squared - 2.0 * share * product + share * share * points_squared;
+        let error = (n_items / (n_items - 1.0) * squares.max(0.0)).sqrt() / n;
+        wider(wilson, around(100.0 * share, 100.0 * error, n_items - 1.0))
     }
 }
 

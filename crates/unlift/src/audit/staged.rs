@@ -7,16 +7,16 @@ use super::cells::Finished;
 use super::clock::RowSeconds;
 use super::lists::{Kept, Lists};
 use super::many::{Pool, merge_counts};
-use super::plan::{NeighborsBy, Plan, Variant};
+use super::plan::{NeighborsBy, Variant};
 use super::row::{ByReason, Row, dropped, measure};
 use super::share::Threshold;
+use crate::Error;
 use crate::evaluate::{blind, distinct_weights};
 use crate::neighbors::Neighborhoods;
 use crate::neighbors::oracle::{self, Noise};
 use crate::recover::Recovered;
 use crate::released::Released;
 use crate::truth::{Original, Secret};
-use crate::{Error, Unit};
 
 /// Makes lists of `k` records at inlier ratio `ratio`, shorter in an image with too few points.
 /// `seed` comes from [`oracle_seed`].
@@ -29,13 +29,12 @@ pub fn oracle_lists(
     (noise, ratio, k): (Noise, f64, usize),
     seed: u64,
 ) -> Result<Neighborhoods, Error> {
-    let plan = Plan { k, ..Plan::<2>::new(Unit::Pixel) };
     let search = oracle::search(original)?;
     let by = &NeighborsBy::Oracle;
     let variant = Variant { by, noise: Some(noise), inlier_ratio: Some(ratio) };
     // The oracle's lists do not depend on the attacker's seed.
     let kept = Kept::default();
-    let mut lists = Lists::new(&plan, &search, hidden, &hidden.1, (seed, 0), &kept);
+    let mut lists = Lists::new(k, &search, hidden, (seed, 0), &kept);
     Ok(lists.make(&variant, true)?.lists)
 }
 

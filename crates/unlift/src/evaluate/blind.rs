@@ -1,6 +1,8 @@
 //! The blind baseline: an attack without neighborhoods. Only what exceeds it is a leak.
 
 use super::Accuracy;
+use super::plausible::on_record;
+use crate::OriginalId;
 use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{along, distance, dot, sub, widen};
 use crate::released::{Obfuscation, Released};
@@ -26,57 +28,35 @@ pub fn blind<const D: usize>(
     let origin = released.origin();
     let local: Vec<[f64; D]> = points.iter().map(|p| sub(p, &origin)).collect();
     let known = released.bounds().map(|bounds| bounds.about(&origin));
-    let guess = match known.or_else(|| Bounds::quantiles(&local, 0.01)) {
-        Some(bounds) => guesses(released, &bounds),
-        None => Vec::new(),
+    let Some(bounds) = known.or_else(|| Bounds::quantiles(&local, 0.01)) else {
+        return Accuracy::default();
     };
-    let errors = secret
-        .hidden()
-        .iter()
-        .enumerate()
-        .map(|(slot, original)| {
-            distance(&guess[slot / released.slots_per_record()], &local[original.index()])
-        })
-        .collect();
-    Accuracy::of(errors)
+    let error = |(slot, original): (usize, &OriginalId)| {
+        let guess = guess(released.obfuscation(), slot / released.slots_per_record(), &bounds);
+        distance(&guess, &local[original.index()])
+    };
+    Accuracy::of(secret.hidden().iter().enumerate().map(error).collect())
 }
 
-/// Returns one guess per record, relative to the released origin.
-fn guesses<const D: usize>(released: &Released<D>, bounds: &Bounds<D>) -> Vec<[f64; D]> {
-    let center = bounds.center();
-    match released.obfuscation() {
-        Obfuscation::Lines(lines) => lines
-            .foot()
-            .iter()
-            .zip(lines.direction())
-            .map(|(p, d)| middle(bounds, &widen(p), &widen(d), f64::NEG_INFINITY))
-            .collect(),
-        Obfuscation::Rays(rays) => rays
-            .center()
-            .iter()
-            .zip(rays.direction())
-            .map(|(&c, d)| {
-                let (center, d) = (widen(&rays.centers()[usize::from(c)]), widen(d));
-                match rays.regions().and_then(|of| of[usize::from(c)].clip(&center, &d)) {
-                    // Under uniform density the share within r is proportional to r^D.
-                    Some((_, to)) => along(&center, to * libm::pow(0.5, 1.0 / D as f64), &d),
-                    None => middle(bounds, &center, &d, 0.0),
-                }
-            })
-            .collect(),
-        Obfuscation::AxisPlanes(planes) => planes
-            .axis()
-            .iter()
-            .zip(planes.offset())
-            .map(|(&axis, &offset)| {
-                let mut guess = center;
-                guess[usize::from(axis)] = f64::from(offset);
-                guess
-            })
-            .collect(),
-        Obfuscation::AxisCandidates(candidates) => {
-            candidates.position().iter().map(widen).collect()
+/// Returns the guess for a record, relative to the released origin.
+fn guess<const D: usize>(records: &Obfuscation<D>, record: usize, bounds: &Bounds<D>) -> [f64; D] {
+    match records {
+        Obfuscation::Lines(lines) => {
+            let (foot, direction) = (&lines.foot()[record], &lines.direction()[record]);
+            middle(bounds, &widen(foot), &widen(direction), f64::NEG_INFINITY)
         }
+        Obfuscation::Rays(rays) => {
+            let at = usize::from(rays.center()[record]);
+            let (center, direction) =
+                (widen(&rays.centers()[at]), widen(&rays.direction()[record]));
+            match rays.regions().and_then(|of| of[at].clip(&center, &direction)) {
+                // Under uniform density the share within r is proportional to r^D.
+                Some((_, to)) => along(&center, to * libm::pow(0.5, 1.0 / D as f64), &direction),
+                None => middle(bounds, &center, &direction, 0.0),
+            }
+        }
+        Obfuscation::AxisPlanes(_) => on_record(records, record, &bounds.center()),
+        Obfuscation::AxisCandidates(candidates) => widen(&candidates.position()[record]),
     }
 }
 

@@ -11,4 +11,4 @@ pub use plausible::{
     OFF_RECORD, Truth, are_strangers, correlation, distance_to_record, nearer_to_own,
     recovered_away,
 };
-pub use reliability::{BINS, Bin, Reliability, SURE, reliability};
+pub use reliability::{Bin, Reliability, reliability};

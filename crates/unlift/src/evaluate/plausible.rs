@@ -143,14 +143,10 @@ impl<const D: usize> Truth<'_, D> {
             let causes = "the truth of another map, unit, frame or order of slots";
             return Err(Error::new("truth", expected, format!("{nearer} of {n} ({causes})")));
         }
-        let is_outside = |bounds: &Bounds<D>, point: &[f64; D]| {
-            (0..D).any(|c| {
-                let slack = BOUNDS_SLACK * (bounds.high[c] - bounds.low[c]);
-                point[c] < bounds.low[c] - slack || point[c] > bounds.high[c] + slack
-            })
-        };
-        if let Some(bounds) = released.bounds() {
-            let outside = self.points().filter(|point| is_outside(&bounds, point)).count();
+        if let Some(Bounds { low, high }) = released.bounds() {
+            let slack = sub(&high, &low).map(|side| BOUNDS_SLACK * side);
+            let bounds = Bounds { low: sub(&low, &slack), high: along(&high, 1.0, &slack) };
+            let outside = self.points().filter(|point| !bounds.contains(point)).count();
             if outside as f64 > MAX_OUTSIDE * n as f64 {
                 let count = format!("{outside} of {n} outside");
                 return Err(Error::new("bounds", "a box of all hidden points", count));
@@ -252,7 +248,7 @@ fn rounding<const D: usize>(records: &Obfuscation<D>, record: usize, point: &[f6
 }
 
 /// Returns the place of a record that is nearest to `point`, relative to the released origin.
-fn on_record<const D: usize>(
+pub(super) fn on_record<const D: usize>(
     records: &Obfuscation<D>,
     record: usize,
     point: &[f64; D],
@@ -326,8 +322,7 @@ fn area(support: &[f64], decoy: &[bool]) -> f64 {
 mod tests {
     use super::*;
     use crate::neighbors::oracle::{self, TrueNeighbors};
-    use crate::obfuscate::olc::Olc;
-    use crate::obfuscate::{SchemeOptions, obfuscate, sphere};
+    use crate::obfuscate::{obfuscate, olc, ray};
     use crate::seed::Key;
     use crate::{PointSet, Unit, synthetic};
 
@@ -344,11 +339,11 @@ mod tests {
         let original = Original::new(points);
         let search = oracle::search(&original).unwrap();
         let lists = |secret: &Secret| {
-            let near = TrueNeighbors::new(&search, secret, 1, 12).unwrap();
+            let near = TrueNeighbors::new(&search, secret, 12).unwrap();
             near.at_inlier_ratio(1.0, 0).unwrap()
         };
-        let scheme = (sphere::ENTRY.in_3d.unwrap())(&SchemeOptions::usual(Unit::Meter));
-        let (released, secret) = obfuscate(&*scheme, &original, None, &Key::from_seed(0)).unwrap();
+        let key = Key::from_seed(0);
+        let (released, secret) = obfuscate(&ray::SPHERE, &original, None, &key).unwrap();
         let truth = Truth { original: &original, released: &released, secret: &secret };
         let figures = truth.bearings(&lists(&secret));
         let of = |name: &str| figures.iter().find(|(known, _)| known == name).unwrap().1;
@@ -358,7 +353,7 @@ mod tests {
         assert!(of("decoys_precision_percent") > 80.0, "{figures:?}");
         assert!(of("decoys_recall_percent") > 60.0, "{figures:?}");
         // Lines are no bearings.
-        let (released, secret) = obfuscate(&Olc, &original, None, &Key::from_seed(0)).unwrap();
+        let (released, secret) = obfuscate(&olc::ENTRY, &original, None, &key).unwrap();
         let truth = Truth { original: &original, released: &released, secret: &secret };
         assert_eq!(truth.bearings(&lists(&secret)), []);
     }

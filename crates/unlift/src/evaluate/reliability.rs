@@ -3,11 +3,9 @@
 use super::Accuracy;
 use crate::recover::{Recovered, Status};
 
-/// Number of bins of the predicted probability.
-pub const BINS: usize = 10;
-
-/// Probability from which on the attacker is sure of a point.
-pub const SURE: f64 = 0.9;
+/// Number of bins of the predicted probability. The attacker is sure of the points in the last one,
+/// from 90 % on.
+const BINS: usize = 10;
 
 /// Predicted probabilities and observed results, over the recovered points.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,8 +14,6 @@ pub struct Reliability {
     pub n_points: usize,
     /// Bins of equal width from 0 to 1.
     pub bins: [Bin; BINS],
-    /// Points with a probability of at least [`SURE`].
-    pub sure: Bin,
 }
 
 /// Points with similar probabilities.
@@ -56,21 +52,25 @@ impl Bin {
 }
 
 impl Reliability {
-    /// Returns the percentage of released points with a probability of at least [`SURE`].
+    /// Returns the points of which the attacker is sure.
+    pub fn sure(&self) -> &Bin {
+        &self.bins[BINS - 1]
+    }
+
+    /// Returns the percentage of released points of which the attacker is sure.
     pub fn sure_percent(&self) -> f64 {
-        if self.n_points == 0 { 0.0 } else { 100.0 * self.sure.n as f64 / self.n_points as f64 }
+        if self.n_points == 0 { 0.0 } else { 100.0 * self.sure().n as f64 / self.n_points as f64 }
     }
 
     /// Returns the percentage of these points within the threshold; `None` without any.
     pub fn sure_correct_percent(&self) -> Option<f64> {
-        self.sure.observed().map(|share| 100.0 * share)
+        self.sure().observed().map(|share| 100.0 * share)
     }
 
     /// Adds the points of another run.
     pub fn merge(&mut self, other: &Self) {
         self.n_points += other.n_points;
         self.bins.iter_mut().zip(&other.bins).for_each(|(a, b)| a.merge(b));
-        self.sure.merge(&other.sure);
     }
 }
 
@@ -84,15 +84,11 @@ pub fn reliability<const D: usize>(
 ) -> Option<Reliability> {
     let confidence = recovered.confidence()?;
     let mut bins = [Bin::default(); BINS];
-    let mut sure = Bin::default();
     let slots = confidence.iter().zip(recovered.status()).zip(accuracy.errors());
     for ((confidence, _), &error) in slots.filter(|((_, status), _)| **status == Status::Ok) {
         let probability = confidence.probability_within(threshold);
-        let within = error <= threshold;
-        bins[((probability * BINS as f64) as usize).min(BINS - 1)].add(probability, within);
-        if probability >= SURE {
-            sure.add(probability, within);
-        }
+        let bin = &mut bins[((probability * BINS as f64) as usize).min(BINS - 1)];
+        bin.add(probability, error <= threshold);
     }
-    Some(Reliability { n_points: recovered.n_slots(), bins, sure })
+    Some(Reliability { n_points: recovered.n_slots(), bins })
 }

@@ -6,34 +6,25 @@ use crate::geometry::camera::{Camera, Intrinsics};
 use crate::geometry::vector::{cross, distance, dot, sub};
 use crate::seed::{Draws, Stage};
 
-/// A match of a keypoint of an image with a point of a map. Places are pixels of the pinhole.
+/// A match of a keypoint of an image with a point of a map, of which one may be known up to a line.
+/// Places are pixels of the pinhole.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Match {
-    /// A keypoint and a point.
-    Point {
-        /// The keypoint.
-        place: [f64; 2],
-        /// The point.
-        point: [f64; 3],
-    },
-    /// A keypoint and a line in space through the point.
-    MapLine {
-        /// The keypoint.
-        place: [f64; 2],
-        /// Any point of the line.
-        point: [f64; 3],
-        /// Direction of the line.
-        direction: [f64; 3],
-    },
-    /// A line in the image through the keypoint, and a point.
-    ImageLine {
-        /// Any place on the line.
-        place: [f64; 2],
-        /// Direction of the line.
-        direction: [f64; 2],
-        /// The point.
-        point: [f64; 3],
-    },
+pub struct Match {
+    /// The keypoint, or any place on its line.
+    pub place: [f64; 2],
+    /// The point, or any point of its line.
+    pub point: [f64; 3],
+    /// Direction of the line.
+    pub line: Option<OnLine>,
+}
+
+/// Direction of a line that one side of a match lies on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum OnLine {
+    /// Of a line in space through the point.
+    OfMap([f64; 3]),
+    /// Of a line in the image through the keypoint.
+    OfImage([f64; 2]),
 }
 
 /// Residuals up to this many pixels are inliers.
@@ -50,9 +41,10 @@ const FEWEST: usize = 6;
 impl Match {
     /// Returns the residuals in pixels, and their number; `None` if the point is behind the camera.
     fn residuals(&self, camera: &Camera) -> Option<([f64; 2], usize)> {
-        match self {
-            Self::Point { place, point } => Some((sub(&camera.project(point)?, place), 2)),
-            Self::MapLine { place, point, direction } => {
+        let Self { place, point, line } = self;
+        match line {
+            None => Some((sub(&camera.project(point)?, place), 2)),
+            Some(OnLine::OfMap(direction)) => {
                 let x = camera.pose.in_camera(point);
                 let d = camera.pose.rotation.map(|row| dot(&row, direction));
                 let Intrinsics { focal, principal } = &camera.intrinsics;
@@ -64,7 +56,7 @@ impl Match {
                 let off = (a * away[0] + b * away[1] + plane[2]) / length;
                 (length > 0.0).then_some(([off, 0.0], 1))
             }
-            Self::ImageLine { place, direction, point } => {
+            Some(OnLine::OfImage(direction)) => {
                 let away = sub(&camera.project(point)?, place);
                 let length = libm::hypot(direction[0], direction[1]);
                 let off = (away[0] * direction[1] - away[1] * direction[0]) / length;
@@ -119,12 +111,7 @@ fn size(input: &Match, camera: &Camera) -> Option<f64> {
 /// Improves the pose by Levenberg-Marquardt on reweighted squares. `weight` is the weight of a
 /// residual of some pixels.
 fn refine(camera: &mut Camera, matches: &[Match], weight: impl Fn(f64) -> f64) {
-    let depths = matches.iter().map(|input| {
-        let (Match::Point { point, .. }
-        | Match::ImageLine { point, .. }
-        | Match::MapLine { point, .. }) = input;
-        distance(point, &camera.pose.center)
-    });
+    let depths = matches.iter().map(|input| distance(&input.point, &camera.pose.center));
     let depth = depths.sum::<f64>() / matches.len() as f64;
     let mut damping = 1e-4;
     for _ in 0..ITERATIONS {
@@ -205,18 +192,16 @@ mod tests {
                     place = [640.0, 480.0].map(|side| draws.between(0.0, side));
                 }
                 match kind {
-                    "point" => Match::Point { place, point },
+                    "point" => Match { place, point, line: None },
                     "map" => {
                         let direction: [f64; 3] = draws.direction();
-                        Match::MapLine { place, point: along(&point, 1.7, &direction), direction }
+                        let line = Some(OnLine::OfMap(direction));
+                        Match { place, point: along(&point, 1.7, &direction), line }
                     }
                     _ => {
                         let direction: [f64; 2] = draws.direction();
-                        Match::ImageLine {
-                            place: along(&place, 90.0, &direction),
-                            direction,
-                            point,
-                        }
+                        let line = Some(OnLine::OfImage(direction));
+                        Match { place: along(&place, 90.0, &direction), point, line }
                     }
                 }
             };

@@ -12,7 +12,7 @@
 
 mod estimate;
 
-pub use estimate::{Match, estimate};
+pub use estimate::{Match, OnLine, estimate};
 
 use nalgebra::{Matrix6, SymmetricEigen, Vector6};
 use rayon::prelude::*;
@@ -24,7 +24,7 @@ use crate::obfuscate::{Scheme, obfuscate};
 use crate::released::{Obfuscation, Released};
 use crate::seed::{Key, Stage};
 use crate::truth::{Original, Secret};
-use crate::{Error, OriginalId, PointSet, Unit};
+use crate::{Error, PointSet, Unit};
 
 /// Largest condition number of a pose that counts as determined.
 const MAX_CONDITION: f64 = 1e12;
@@ -86,40 +86,35 @@ fn upper_median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::INFINITY)
 }
 
-/// The directions in which a record leaves its hidden point free.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Free<const D: usize> {
-    /// None: the point is known.
-    Nowhere,
-    /// One direction: the point lies on a known line.
-    Along([f64; D]),
-    /// Two directions in space, or an unknown one.
-    More,
-}
-
-/// Returns the free direction of the point in every slot, by the family of its record. The swapped
-/// axis of axis candidates counts as known, because a match can be verified under each axis.
-pub fn free_directions<const D: usize>(released: &Released<D>, secret: &Secret) -> Vec<Free<D>> {
-    let n = released.n_slots();
-    let of_record = |free: &dyn Fn(usize) -> [f64; D]| {
-        (0..n).map(|slot| Free::Along(free(slot / released.slots_per_record()))).collect()
-    };
-    match released.obfuscation() {
-        Obfuscation::Lines(lines) => of_record(&|record| widen(&lines.direction()[record])),
-        // All bearings meet in the center, so the distance of a camera from it stays free. Decoys would
-        // seem to fix it.
-        bearings if bearings.is_bearings() => vec![Free::More; n],
-        Obfuscation::Rays(rays) => of_record(&|record| widen(&rays.direction()[record])),
-        // In an image, an axis-parallel line; in space, a plane.
-        Obfuscation::AxisPlanes(planes) if D == 2 => {
-            of_record(&|record| unit_vector(1 - usize::from(planes.axis()[record])))
+/// Returns for each original the direction along which its record leaves it free; `None` for those that
+/// are free in two directions or an unknown one, or that the scheme left out. The swapped axis of axis
+/// candidates counts as known, because a match can be verified under each axis.
+pub fn free_directions<const D: usize>(
+    released: &Released<D>,
+    secret: &Secret,
+) -> Vec<Option<[f64; D]>> {
+    let of_slot = |slot: usize| -> Option<[f64; D]> {
+        let record = slot / released.slots_per_record();
+        match released.obfuscation() {
+            Obfuscation::Lines(lines) => Some(widen(&lines.direction()[record])),
+            // All bearings meet in the center, so the distance of a camera from it stays free. Decoys
+            // would seem to fix it.
+            bearings if bearings.is_bearings() => None,
+            Obfuscation::Rays(rays) => Some(widen(&rays.direction()[record])),
+            // In an image, an axis-parallel line; in space, a plane.
+            Obfuscation::AxisPlanes(planes) => {
+                (D == 2).then(|| unit_vector(1 - usize::from(planes.axis()[record])))
+            }
+            Obfuscation::AxisCandidates(_) => {
+                secret.swapped_axis().map(|axes| unit_vector(axes[slot].into()))
+            }
         }
-        Obfuscation::AxisPlanes(_) => vec![Free::More; n],
-        Obfuscation::AxisCandidates(_) => match secret.swapped_axis() {
-            Some(axes) => axes.iter().map(|&a| Free::Along(unit_vector(a.into()))).collect(),
-            None => vec![Free::More; n],
-        },
+    };
+    let mut free = vec![None; secret.n_originals()];
+    for (slot, original) in secret.hidden().iter().enumerate() {
+        free[original.index()] = of_slot(slot);
     }
+    free
 }
 
 fn unit_vector<const D: usize>(axis: usize) -> [f64; D] {
@@ -129,7 +124,7 @@ fn unit_vector<const D: usize>(axis: usize) -> [f64; D] {
 /// Returns the errors of all `views` with the points themselves.
 pub fn unprotected(views: &[View], positions: &[[f64; 3]]) -> Vec<Option<PoseError>> {
     let of = |view: &View| {
-        view.pose_error(view.observed.iter().map(|&row| (positions[row as usize], Free::Nowhere)))
+        view.pose_error(view.observed.iter().map(|&row| (positions[row as usize], None)))
     };
     views.par_iter().map(of).collect()
 }
@@ -142,19 +137,12 @@ pub fn with_map(
     released: &Released<3>,
     secret: &Secret,
 ) -> Vec<Option<PoseError>> {
-    let mut free = vec![Free::More; positions.len()];
-    for (hidden, direction) in secret.hidden().iter().zip(free_directions(released, secret)) {
-        free[hidden.index()] = direction;
-    }
+    let free = free_directions(released, secret);
     let of = |view: &View| {
         let known = view.observed.iter().filter_map(|&row| {
             let position = positions[row as usize];
-            let free = match free[row as usize] {
-                Free::Nowhere => Free::Nowhere,
-                Free::Along(direction) => Free::Along(view.image_of(&position, &direction)?),
-                Free::More => Free::More,
-            };
-            Some((position, free))
+            let direction = view.image_of(&position, &free[row as usize]?)?;
+            Some((position, Some(direction)))
         });
         view.pose_error(known)
     };
@@ -184,8 +172,11 @@ pub fn with_queries(
         let key = key.of_item(Stage::Image, number as u64);
         let (released, secret) = obfuscate(scheme, &original, None, &key)?;
         let free = free_directions(&released, &secret);
-        let point = |hidden: &OriginalId| positions[rows[hidden.index()] as usize];
-        Ok(view.pose_error(secret.hidden().iter().map(point).zip(free)))
+        let known = secret.hidden().iter().filter_map(|hidden| {
+            let direction = free[hidden.index()]?;
+            Some((positions[rows[hidden.index()] as usize], Some(direction)))
+        });
+        Ok(view.pose_error(known))
     };
     views.par_iter().enumerate().map(of).collect()
 }
@@ -206,15 +197,18 @@ impl View {
     }
 
     /// Returns the deviations of the pose from matches of known points, with the direction in the image
-    /// that each leaves free; `None` if they do not determine it.
+    /// that each leaves free, if any; `None` if they do not determine it.
     ///
     /// The pose is perturbed from the left: `dx = w x x + dt` in the camera's frame.
-    fn pose_error(&self, matches: impl Iterator<Item = ([f64; 3], Free<2>)>) -> Option<PoseError> {
+    fn pose_error(
+        &self,
+        matches: impl Iterator<Item = ([f64; 3], Option<[f64; 2]>)>,
+    ) -> Option<PoseError> {
         let mut information = Matrix6::zeros();
         let (mut depths, mut n) = (0.0, 0.0);
         for (point, free) in matches {
             let x = self.camera.pose.in_camera(&point);
-            if x[2] <= 0.0 || free == Free::More {
+            if x[2] <= 0.0 {
                 continue;
             }
             (depths, n) = (depths + x[2], n + 1.0);
@@ -223,10 +217,8 @@ impl View {
                 Vector6::new(by_rotation[0], by_rotation[1], by_rotation[2], j[0], j[1], j[2])
             });
             match free {
-                Free::Nowhere => {
-                    rows.iter().for_each(|row| information += row * row.transpose());
-                }
-                Free::Along(direction) => {
+                None => rows.iter().for_each(|row| information += row * row.transpose()),
+                Some(direction) => {
                     let length = libm::hypot(direction[0], direction[1]);
                     // A line toward the camera is a point in the image, which gives no normal.
                     if length > 0.0 {
@@ -234,7 +226,6 @@ impl View {
                         information += row * row.transpose();
                     }
                 }
-                Free::More => unreachable!("skipped above"),
             }
         }
         // Translations count in units of the mean depth, so that the condition number does not
@@ -262,10 +253,8 @@ impl View {
 mod tests {
     use super::*;
     use crate::geometry::camera::{Intrinsics, Pose};
-    use crate::geometry::vector::sub;
-    use crate::obfuscate::{SCHEMES, SchemeOptions};
-    use crate::released::Rays;
-    use crate::{OriginalId, synthetic};
+    use crate::obfuscate::SCHEMES;
+    use crate::synthetic;
 
     fn view(focal: f64, n: usize) -> View {
         View {
@@ -334,17 +323,14 @@ mod tests {
         let views = [view];
         let positions = original.reveal().positions();
         let base = unprotected(&views, positions);
-        let (key, options) = (Key::from_seed(0), SchemeOptions { voxel: 0.5 });
+        let key = Key::from_seed(0);
         assert_eq!(SCHEMES.len(), golden.len());
         for (entry, (name, golden)) in SCHEMES.iter().zip(golden) {
-            let errors = match entry.of_dimension::<3>(&options) {
-                Some(scheme) => {
-                    let (released, secret) = obfuscate(&*scheme, &original, None, &key).unwrap();
+            let errors = match entry.dimensions() {
+                2 => with_queries(&views, positions, entry, &key).unwrap(),
+                _ => {
+                    let (released, secret) = obfuscate(entry, &original, None, &key).unwrap();
                     with_map(&views, positions, &released, &secret)
-                }
-                None => {
-                    let scheme = entry.of_dimension::<2>(&options).unwrap();
-                    with_queries(&views, positions, &*scheme, &key).unwrap()
                 }
             };
             let multiple = Localization::of(&errors, &base).multiple;
@@ -357,17 +343,8 @@ mod tests {
     fn rays_from_one_center_do_not_localize() {
         let (view, original) = room();
         let positions = original.reveal().positions();
-        let n = positions.len();
-        let center = [0.5, 9.0, 1.0];
-        let directions: Vec<[f64; 3]> = positions.iter().map(|p| sub(p, &center)).collect();
-        let rays = Rays::try_new(&[center], vec![0; n], &directions).unwrap();
-        let released =
-            Released::try_new(Obfuscation::Rays(rays), 1, [0.0; 3], Unit::Meter, None).unwrap();
-        let hidden = (0..n).map(OriginalId::from_index).collect();
-        let secret = Secret::try_new(hidden, None, (0..n as u32).collect(), vec![], n).unwrap();
-        assert_eq!(with_map(std::slice::from_ref(&view), positions, &released, &secret), [None]);
         // Decoys do not help.
-        let sphere = crate::obfuscate::sphere::Sphere;
+        let sphere = crate::obfuscate::ray::SPHERE;
         let (released, secret) = obfuscate(&sphere, &original, None, &Key::from_seed(0)).unwrap();
         assert_eq!(with_map(&[view], positions, &released, &secret), [None]);
     }

@@ -29,13 +29,8 @@ impl TrueNeighbors {
     ///
     /// # Errors
     /// When `k` is 0 or fewer than `k` other records exist.
-    pub fn new<const D: usize>(
-        knn: &Knn<'_, D>,
-        secret: &Secret,
-        slots_per_record: usize,
-        k: usize,
-    ) -> Result<Self, Error> {
-        let n_slots = secret.n_slots();
+    pub fn new<const D: usize>(knn: &Knn<'_, D>, secret: &Secret, k: usize) -> Result<Self, Error> {
+        let (n_slots, slots_per_record) = (secret.n_slots(), secret.slots_per_record());
         let n_records = n_slots / slots_per_record;
         if k == 0 || n_records <= k {
             let expected = match n_records.saturating_sub(1) {
@@ -45,7 +40,7 @@ impl TrueNeighbors {
             return Err(Error::new("k", expected, k.to_string()));
         }
         let mut records = vec![RecordId(0); n_slots * k];
-        Nearness::new(knn, secret, slots_per_record).each(k, &mut records, &|_, near, row| {
+        Nearness::new(knn, secret).each(k, &mut records, &|_, near, row| {
             row.copy_from_slice(near);
         });
         Ok(Self { k, n_records, slots_per_record, map: secret.map(), records })
@@ -63,7 +58,16 @@ impl TrueNeighbors {
         outliers: &Outliers,
         seed: u64,
     ) -> Result<Neighborhoods, Error> {
-        let records = self.rows(self.kept(inlier_ratio, outliers)?, outliers, seed);
+        let keep = self.kept(inlier_ratio, outliers)?;
+        let mut records = vec![RecordId(0); self.records.len()];
+        records.par_chunks_mut(self.k).enumerate().for_each_init(Vec::new, |order, (slot, row)| {
+            order.clear();
+            order.extend_from_slice(self.of(slot));
+            Draws::new(seed, Stage::OracleKeep, slot as u64).shuffle(order);
+            row[..keep].copy_from_slice(&order[..keep]);
+            outliers.fill(self, slot, seed, order, &mut row[keep..]);
+            row.sort_unstable();
+        });
         let n_slots = self.n_records * self.slots_per_record;
         let offsets = (0..=n_slots as u64).map(|slot| slot * self.k as u64).collect();
         let (n_records, slots) = (self.n_records, self.slots_per_record);
@@ -81,9 +85,13 @@ impl TrueNeighbors {
         let keep = (inlier_ratio * self.k as f64).round() as usize;
         let keep = keep.max(usize::from(inlier_ratio > 0.0));
         let n_wrong = self.k - keep;
-        let (available, meaning) = match outliers.noise {
-            Noise::Near => (outliers.per_slot, "between the 2K-th and the 10K-th nearest"),
-            Noise::Uniform | Noise::Clustered => (self.n_records - 1 - self.k, "not neighbors"),
+        let (available, meaning) = match outliers {
+            Outliers::Near { per_slot, .. } => {
+                (*per_slot, "between the 2K-th and the 10K-th nearest")
+            }
+            Outliers::Uniform | Outliers::Clustered { .. } => {
+                (self.n_records - 1 - self.k, "not neighbors")
+            }
         };
         if n_wrong > available {
             let what = format!("inlier ratio {inlier_ratio} at K = {}", self.k);
@@ -93,27 +101,12 @@ impl TrueNeighbors {
         Ok(keep)
     }
 
-    /// Returns all lists end to end: K records each in ascending order, `keep` of them true
-    /// neighbors.
-    fn rows(&self, keep: usize, outliers: &Outliers, seed: u64) -> Vec<RecordId> {
-        let mut records = vec![RecordId(0); self.records.len()];
-        records.par_chunks_mut(self.k).enumerate().for_each_init(Vec::new, |order, (slot, row)| {
-            order.clear();
-            order.extend_from_slice(self.of(slot));
-            Draws::new(seed, Stage::OracleKeep, slot as u64).shuffle(order);
-            row[..keep].copy_from_slice(&order[..keep]);
-            outliers.fill(self, slot, seed, order, &mut row[keep..]);
-            row.sort_unstable();
-        });
-        records
-    }
-
     /// Makes [`lists`](Self::lists) with uniformly random outliers.
     ///
     /// # Errors
     /// Returns the errors of [`lists`](Self::lists).
     pub fn at_inlier_ratio(&self, inlier_ratio: f64, seed: u64) -> Result<Neighborhoods, Error> {
-        self.lists(inlier_ratio, &Outliers::uniform(), seed)
+        self.lists(inlier_ratio, &Outliers::Uniform, seed)
     }
 
     /// Returns the true neighbors of `slot`, nearest first.
@@ -171,13 +164,11 @@ struct Nearness<'a, const D: usize> {
     knn: &'a Knn<'a, D>,
     secret: &'a Secret,
     record_of: Vec<Option<RecordId>>,
-    slots_per_record: usize,
 }
 
 impl<'a, const D: usize> Nearness<'a, D> {
-    fn new(knn: &'a Knn<'a, D>, secret: &'a Secret, slots_per_record: usize) -> Self {
-        let record_of = record_of_originals(secret, slots_per_record);
-        Self { knn, secret, record_of, slots_per_record }
+    fn new(knn: &'a Knn<'a, D>, secret: &'a Secret) -> Self {
+        Self { knn, secret, record_of: record_of_originals(secret) }
     }
 
     /// Calls `make(slot, the n records nearest to its original, row)` for every slot. `rows` holds
@@ -200,7 +191,7 @@ impl<'a, const D: usize> Nearness<'a, D> {
         near: &mut Vec<(f64, u32)>,
         records: &mut Vec<RecordId>,
     ) {
-        let (own, several) = (self.record_of[original], self.slots_per_record > 1);
+        let (own, several) = (self.record_of[original], self.secret.slots_per_record() > 1);
         let mut reach = n + MARGIN;
         loop {
             self.knn.nearest(original, reach, near);
@@ -223,10 +214,10 @@ impl<'a, const D: usize> Nearness<'a, D> {
 }
 
 /// Returns the record that hides each original; `None` for dropped points.
-fn record_of_originals(secret: &Secret, slots_per_record: usize) -> Vec<Option<RecordId>> {
+fn record_of_originals(secret: &Secret) -> Vec<Option<RecordId>> {
     let mut record_of = vec![None; secret.n_originals()];
     for (slot, original) in secret.hidden().iter().enumerate() {
-        record_of[original.index()] = Some(RecordId::from_index(slot / slots_per_record));
+        record_of[original.index()] = Some(RecordId::from_index(slot / secret.slots_per_record()));
     }
     record_of
 }
@@ -248,9 +239,8 @@ pub fn from_points(
     neighbors: &[u32],
     scores: Option<&[f32]>,
     secret: &Secret,
-    slots_per_record: usize,
 ) -> Result<Neighborhoods, Error> {
-    let n = secret.n_originals();
+    let (n, slots_per_record) = (secret.n_originals(), secret.slots_per_record());
     if offsets.len() != n + 1 {
         let found = offsets.len().saturating_sub(1).to_string();
         return Err(Error::new("neighbors by point", format!("{n} rows, one per point"), found));
@@ -270,7 +260,7 @@ pub fn from_points(
         let expected = format!("{} rows", neighbors.len());
         return Err(Error::new("scores of neighbors by point", expected, scores.len().to_string()));
     }
-    let record_of = record_of_originals(secret, slots_per_record);
+    let record_of = record_of_originals(secret);
     let mut rows = vec![0u64];
     let mut records = Vec::new();
     let mut kept_scores = scores.map(|_| Vec::new());
@@ -347,24 +337,26 @@ const MAX_DRAWS: usize = 64;
 
 /// Outliers of one noise model, prepared for one obfuscation.
 #[derive(Clone, Debug)]
-pub struct Outliers {
-    noise: Noise,
-    /// For `near`, rows of `per_slot` outliers in random order, slot by slot. For `clustered`, the
-    /// outliers of each patch, end to end.
-    records: Vec<RecordId>,
-    per_slot: usize,
-    /// For `clustered`: the start of each patch in `records`, and the patch of each slot.
-    starts: Vec<usize>,
-    patch_of: Vec<u32>,
+pub enum Outliers {
+    /// Uniformly random ones, which need no preparation.
+    Uniform,
+    /// Rows of `per_slot` records in random order, slot by slot.
+    Near {
+        /// All rows, end to end.
+        records: Vec<RecordId>,
+        /// Length of a row.
+        per_slot: usize,
+    },
+    /// Records that the slots of a patch share.
+    Clustered {
+        /// The records of each patch.
+        patches: Vec<Vec<RecordId>>,
+        /// The patch of each slot.
+        patch_of: Vec<u32>,
+    },
 }
 
 impl Outliers {
-    /// Returns uniformly random outliers, which need no preparation.
-    fn uniform() -> Self {
-        let (records, starts, patch_of) = Default::default();
-        Self { noise: Noise::Uniform, records, per_slot: 0, starts, patch_of }
-    }
-
     /// Prepares outliers of the model `noise` for the neighborhoods `truth`. `secret` and `knn`
     /// must be those of `truth`.
     ///
@@ -382,11 +374,11 @@ impl Outliers {
             let found = secret.n_slots().to_string();
             return Err(Error::new("secret", format!("{n_slots} slots"), found));
         }
-        let nearness = Nearness::new(knn, secret, truth.slots_per_record);
+        let nearness = Nearness::new(knn, secret);
         Ok(match noise {
-            Noise::Uniform => Self::uniform(),
+            Noise::Uniform => Self::Uniform,
             Noise::Near => Self::near(truth, &nearness, seed),
-            Noise::Clustered => Self::clustered(truth, knn, secret, &nearness, seed),
+            Noise::Clustered => Self::clustered(truth, &nearness, seed),
         })
     }
 
@@ -406,25 +398,23 @@ impl Outliers {
                 }
             });
         }
-        Self { noise: Noise::Near, records, per_slot, ..Self::uniform() }
+        Self::Near { records, per_slot }
     }
 
     fn clustered<const D: usize>(
         truth: &TrueNeighbors,
-        knn: &Knn<'_, D>,
-        secret: &Secret,
         nearness: &Nearness<'_, D>,
         seed: u64,
     ) -> Self {
-        let patches = knn.patches(PATCH * truth.k);
-        let (mut starts, mut records) = (vec![0], Vec::new());
+        let Nearness { knn, secret, .. } = nearness;
+        let mut patches = Vec::new();
         let mut patch_of_original = vec![0u32; secret.n_originals()];
         let (mut around, mut around_place, mut near) = (Vec::new(), Vec::new(), Vec::new());
-        for (at, patch) in patches.iter().enumerate() {
+        for (at, patch) in knn.patches(PATCH * truth.k).iter().enumerate() {
             let middle = patch[patch.len() / 2];
             knn.nearest(middle as usize, RING.1 * truth.k, &mut around);
             let mut draws = Draws::new(seed, Stage::OracleLookAlikes, at as u64);
-            let start = records.len();
+            let mut records = Vec::new();
             for _ in 0..PLACES {
                 let mut place = middle;
                 for _ in 0..MAX_DRAWS {
@@ -436,23 +426,18 @@ impl Outliers {
                 let hidden_there = nearness.record_of[place as usize];
                 nearness.from(place as usize, truth.k, &mut around_place, &mut near);
                 for record in hidden_there.into_iter().chain(near.iter().copied()).take(truth.k) {
-                    if !listed(&records[start..], record) {
+                    if !listed(&records, record) {
                         records.push(record);
                     }
                 }
             }
-            starts.push(records.len());
+            patches.push(records);
             for &original in *patch {
                 patch_of_original[original as usize] = at as u32;
             }
         }
         let patch_of = secret.hidden().iter().map(|id| patch_of_original[id.index()]).collect();
-        Self { noise: Noise::Clustered, records, starts, patch_of, ..Self::uniform() }
-    }
-
-    /// Returns the noise model.
-    pub fn noise(&self) -> Noise {
-        self.noise
+        Self::Clustered { patches, patch_of }
     }
 
     /// Fills `row` with outliers of `slot`. Their order depends only on the seed and the slot, so a
@@ -466,16 +451,15 @@ impl Outliers {
         scratch: &mut Vec<RecordId>,
         row: &mut [RecordId],
     ) {
-        if self.noise == Noise::Near {
-            row.copy_from_slice(&self.records[slot * self.per_slot..][..row.len()]);
+        if let Self::Near { records, per_slot } = self {
+            row.copy_from_slice(&records[slot * per_slot..][..row.len()]);
             return;
         }
         let (near, own) = (truth.of(slot), truth.own(slot));
         let mut draws = Draws::new(seed, Stage::OracleOutliers, slot as u64);
         let mut at = 0;
-        if self.noise == Noise::Clustered {
-            let patch = self.patch_of[slot] as usize;
-            let alike = &self.records[self.starts[patch]..self.starts[patch + 1]];
+        if let Self::Clustered { patches, patch_of } = self {
+            let alike = &patches[patch_of[slot] as usize];
             scratch.clear();
             scratch.extend(alike.iter().filter(|&&r| r != own && !listed(near, r)));
             draws.shuffle(scratch);

@@ -7,7 +7,7 @@ use super::protect::Protection;
 use super::scheme::{Lifted, LocalPoints, Scheme};
 use crate::seed::Key;
 use crate::truth::{DropReason, Dropped};
-use crate::{Descriptors, Error, OriginalId};
+use crate::{Error, OriginalId};
 
 /// A change of what a scheme releases.
 #[derive(Clone, Debug)]
@@ -17,6 +17,24 @@ pub enum Change {
     Mitigation(Mitigation, Option<Arc<[u32]>>),
     /// Protected descriptors in place of plain ones.
     Protection(Protection),
+}
+
+impl Change {
+    /// Returns true if it changes descriptors, so that fewer keypoints find their points.
+    pub fn changes_descriptors(&self) -> bool {
+        match self {
+            Self::Mitigation(mitigation, _) => mitigation.changes_descriptors(),
+            Self::Protection(_) => true,
+        }
+    }
+
+    /// Returns the protection under which descriptors are released, if it is one.
+    pub fn protection(&self) -> Option<&Protection> {
+        match self {
+            Self::Mitigation(..) => None,
+            Self::Protection(protection) => Some(protection),
+        }
+    }
 }
 
 /// A scheme with a change. It is itself a scheme, so audits, gates and reports need nothing more.
@@ -68,39 +86,13 @@ impl<const D: usize> Scheme<D> for Changed<D> {
         let original = |id: OriginalId| OriginalId(kept[id.index()]);
         lifted.hidden.iter_mut().for_each(|id| *id = original(*id));
         lifted.dropped.iter_mut().for_each(|dropped| dropped.original = original(dropped.original));
-        let mut is_kept = vec![false; n];
-        kept.iter().for_each(|&row| is_kept[row as usize] = true);
-        let out = (0..n).filter(|&row| !is_kept[row]).map(OriginalId::from_index);
+        let out = (0..n as u32).filter(|row| kept.binary_search(row).is_err()).map(OriginalId);
         let out = out.map(|original| Dropped { original, reason: DropReason::Thinned });
         lifted.dropped.extend(out);
         Ok(lifted)
     }
 
-    fn descriptors(
-        &self,
-        descriptors: &Descriptors,
-        key: &Key,
-    ) -> Result<Option<Descriptors>, Error> {
-        match &self.change {
-            Change::Mitigation(mitigation, _) if mitigation.changes_descriptors() => {
-                mitigation.descriptors(descriptors, key).map(Some)
-            }
-            Change::Mitigation(..) => Ok(None),
-            Change::Protection(_) => self.scheme.descriptors(descriptors, key),
-        }
-    }
-
-    fn changes_descriptors(&self) -> bool {
-        match &self.change {
-            Change::Mitigation(mitigation, _) => mitigation.changes_descriptors(),
-            Change::Protection(_) => true,
-        }
-    }
-
-    fn protection(&self) -> Option<&Protection> {
-        match &self.change {
-            Change::Mitigation(..) => None,
-            Change::Protection(protection) => Some(protection),
-        }
+    fn changes(&self) -> Vec<&Change> {
+        [self.scheme.changes(), vec![&self.change]].concat()
     }
 }

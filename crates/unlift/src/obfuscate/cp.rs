@@ -1,70 +1,52 @@
 //! Scheme `cp`: random pairs exchange one coordinate. In images it is `cp2d`, for each image separately.
 
-use std::sync::Arc;
-
 use super::ppl::random_pairs;
-use super::scheme::{Entry, Facts, Lifted, LocalPoints, Scheme};
+use super::scheme::{Entry, Lift, Lifted, LocalPoints, SchemeOptions};
 use crate::Error;
 use crate::released::{AxisCandidates, Obfuscation};
 use crate::seed::{Key, Stage};
 
-/// Coordinate permutation.
-#[derive(Clone, Copy, Debug)]
-pub struct Cp;
-
 /// Registry entry.
 pub const ENTRY: Entry = Entry {
-    name: "cp",
-    facts: Facts {
-        title: "Coordinate permutation",
-        rule: "Two points swap one coordinate.",
-        color: 6,
-        source: "Pan et al., Privacy Preserving Localization via Coordinate Permutations, ICCV 2023",
-        hidden: "which coordinate was exchanged, and its value",
-        patents: "none found",
-    },
-    in_2d: None,
-    in_3d: Some(|_| Arc::new(Cp)),
+    title: "Coordinate permutation",
+    rule: "Two points swap one coordinate.",
+    color: 6,
+    source: "Pan et al., Privacy Preserving Localization via Coordinate Permutations, ICCV 2023",
+    hidden: "which coordinate was exchanged, and its value",
+    patents: "none found",
+    ..Entry::new("cp", Lift::In3d(lift))
 };
 
 /// Registry entry in images.
 pub const CP2D: Entry = Entry {
     name: "cp2d",
-    facts: Facts {
-        title: "Coordinate permutation in the image",
-        rule: "Two keypoints swap one of their two coordinates.",
-        ..ENTRY.facts
-    },
-    in_2d: Some(|_| Arc::new(Cp)),
-    in_3d: None,
+    title: "Coordinate permutation in the image",
+    rule: "Two keypoints swap one of their two coordinates.",
+    lift: Lift::In2d(lift),
+    ..ENTRY
 };
 
-impl<const D: usize> Scheme<D> for Cp {
-    fn name(&self) -> &str {
-        if D == 2 { CP2D.name } else { ENTRY.name }
-    }
-
-    fn lift(&self, points: &LocalPoints<'_, D>, key: &Key) -> Result<Lifted<D>, Error> {
-        let (points, key) = (points.positions, key.stage(Stage::Scheme));
-        let (pairs, dropped) = random_pairs(points.len(), &mut key.draws(0));
-        let (mut positions, mut hidden) = (Vec::new(), Vec::new());
-        let mut swapped_axis = Vec::new();
-        for (at, pair) in pairs.iter().enumerate() {
-            let axis = key.draws(1 + at as u64).below(D as u64) as usize;
-            for (own, partner) in [(pair[0], pair[1]), (pair[1], pair[0])] {
-                let mut position = points[own.index()];
-                position[axis] = points[partner.index()][axis];
-                positions.push(position);
-                hidden.push(own);
-                swapped_axis.push(axis as u8);
-            }
+/// Coordinate permutation.
+fn lift<const D: usize>(
+    points: &LocalPoints<'_, D>,
+    key: &Key,
+    _: &SchemeOptions,
+) -> Result<Lifted<D>, Error> {
+    let (points, key) = (points.positions, key.stage(Stage::Scheme));
+    let (pairs, dropped) = random_pairs(points.len(), &mut key.draws(0));
+    let (mut positions, mut hidden) = (Vec::new(), Vec::new());
+    let mut swapped_axis = Vec::new();
+    for (at, pair) in pairs.iter().enumerate() {
+        let axis = key.draws(1 + at as u64).below(D as u64) as usize;
+        for (own, partner) in [(pair[0], pair[1]), (pair[1], pair[0])] {
+            let mut position = points[own.index()];
+            position[axis] = points[partner.index()][axis];
+            positions.push(position);
+            hidden.push(own);
+            swapped_axis.push(axis as u8);
         }
-        Ok(Lifted {
-            obfuscation: Obfuscation::AxisCandidates(AxisCandidates::try_new(&positions)?),
-            slots_per_record: 1,
-            hidden,
-            swapped_axis: Some(swapped_axis),
-            dropped,
-        })
     }
+    let swapped_axis = Some(swapped_axis);
+    let candidates = Obfuscation::AxisCandidates(AxisCandidates::try_new(&positions)?);
+    Ok(Lifted { hidden, swapped_axis, dropped, ..Lifted::one_each(candidates) })
 }

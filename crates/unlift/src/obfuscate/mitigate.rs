@@ -241,14 +241,14 @@ fn project(values: &mut [f64], dim: usize, most: usize) -> Result<(), Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::obfuscate::{Change, Changed, Scheme, obfuscate, olc::Olc};
+    use crate::obfuscate::{Change, Changed, Scheme, obfuscate, olc};
     use crate::truth::{DropReason, Original};
     use crate::{PointSet, Unit, synthetic};
 
     fn mitigated(text: &str, tracks: Option<Vec<u32>>) -> Changed<3> {
         let mitigation = Mitigation::parse(text).unwrap();
         let change = Change::Mitigation(mitigation, tracks.map(Into::into));
-        Changed::new(std::sync::Arc::new(Olc), change)
+        Changed::new(std::sync::Arc::new(olc::ENTRY), change)
     }
 
     #[test]
@@ -293,7 +293,7 @@ mod tests {
         };
         let after = |text| {
             let key = Key::from_seed(1);
-            rows(&mitigated(text, None).descriptors(&before, &key).unwrap().unwrap())
+            rows(&Mitigation::parse(text).unwrap().descriptors(&before, &key).unwrap())
         };
         let zeros = after("drop:0.25").iter().filter(|row| row.iter().all(|&x| x == 0.0)).count();
         assert_eq!(zeros, 50);

@@ -5,25 +5,21 @@
 
 mod changed;
 mod hide;
-mod kmeans;
 mod mitigate;
 mod protect;
 mod scheme;
-mod size;
 
 pub mod cp;
-pub mod dcl2d;
 pub mod olc;
 pub mod plane;
 pub mod ppl;
 pub mod ray;
-pub mod sphere;
 
 pub use changed::{Change, Changed};
 pub use hide::obfuscate;
 pub use mitigate::Mitigation;
 pub use protect::Protection;
-pub use scheme::{Build, Entry, Facts, Lifted, LocalPoints, Scheme, SchemeOptions};
+pub use scheme::{Entry, Lift, LiftIn, Lifted, LocalPoints, Scheme, SchemeOptions};
 
 use crate::Error;
 
@@ -39,11 +35,11 @@ pub const SCHEMES: &[Entry] = &[
     cp::ENTRY,
     olc::LINES2D,
     cp::CP2D,
-    dcl2d::ENTRY,
+    ray::DCL2D,
 ];
 
 /// Built-in schemes that are audited only on request: their records meet in one point, so crossings give no position.
-pub const ON_REQUEST: &[Entry] = &[sphere::ENTRY, olc::GRAVITY];
+pub const ON_REQUEST: &[Entry] = &[ray::SPHERE, olc::GRAVITY];
 
 /// Returns all built-in schemes.
 pub fn all() -> impl Iterator<Item = &'static Entry> {

@@ -1,43 +1,28 @@
 //! Scheme `plane`: keeps one coordinate of every point, on one of three servers.
 
-use std::sync::Arc;
-
-use super::scheme::{Entry, Facts, Lifted, LocalPoints, Scheme};
+use super::scheme::{Entry, Lift, Lifted, LocalPoints, SchemeOptions};
 use crate::Error;
 use crate::released::{AxisPlanes, Obfuscation};
 use crate::seed::{Key, Stage};
 
-/// Partial localization: random thirds, one per axis. The attacker has the data of all three
-/// servers.
-#[derive(Clone, Copy, Debug)]
-pub struct Plane;
-
 /// Registry entry.
 pub const ENTRY: Entry = Entry {
-    name: "plane",
-    facts: Facts {
-        title: "Axis-aligned planes",
-        rule: "Each point keeps one coordinate of three.",
-        color: 5,
-        source: "Geppert et al., Privacy Preserving Partial Localization, CVPR 2022",
-        hidden: "two of three coordinates",
-        patents: "none found",
-    },
-    in_2d: None,
-    in_3d: Some(|_| Arc::new(Plane)),
+    title: "Axis-aligned planes",
+    rule: "Each point keeps one coordinate of three.",
+    color: 5,
+    source: "Geppert et al., Privacy Preserving Partial Localization, CVPR 2022",
+    hidden: "two of three coordinates",
+    patents: "none found",
+    ..Entry::new("plane", Lift::In3d(lift))
 };
 
-impl Scheme<3> for Plane {
-    fn name(&self) -> &str {
-        ENTRY.name
-    }
-
-    fn lift(&self, points: &LocalPoints<'_, 3>, key: &Key) -> Result<Lifted<3>, Error> {
-        let points = points.positions;
-        let mut axis: Vec<u8> = (0..points.len()).map(|i| (i % 3) as u8).collect();
-        key.draws(Stage::Scheme, 0).shuffle(&mut axis);
-        let offset: Vec<f64> =
-            points.iter().zip(&axis).map(|(point, &a)| point[usize::from(a)]).collect();
-        Ok(Lifted::one_each(Obfuscation::AxisPlanes(AxisPlanes::try_new(axis, &offset)?)))
-    }
+/// Partial localization: random thirds, one per axis. The attacker has the data of all three
+/// servers.
+fn lift(points: &LocalPoints<'_, 3>, key: &Key, _: &SchemeOptions) -> Result<Lifted<3>, Error> {
+    let points = points.positions;
+    let mut axis: Vec<u8> = (0..points.len()).map(|i| (i % 3) as u8).collect();
+    key.draws(Stage::Scheme, 0).shuffle(&mut axis);
+    let offset: Vec<f64> =
+        points.iter().zip(&axis).map(|(point, &a)| point[usize::from(a)]).collect();
+    Ok(Lifted::one_each(Obfuscation::AxisPlanes(AxisPlanes::try_new(axis, &offset)?)))
 }

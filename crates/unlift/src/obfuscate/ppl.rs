@@ -3,9 +3,7 @@
 //! The published code of `ppl+` takes the normal from a row of the wrong matrix, so it depends on the orientation of the map. This
 //! implementation follows the paper: the normal is the direction of least spread of the neighbors.
 
-use std::sync::Arc;
-
-use super::scheme::{Entry, Facts, Lifted, LocalPoints, Scheme};
+use super::scheme::{Entry, Lift, Lifted, LocalPoints, SchemeOptions};
 use crate::geometry::knn::Knn;
 use crate::geometry::normal::local_normal;
 use crate::geometry::vector::{dot, squared_distance, sub};
@@ -14,48 +12,35 @@ use crate::seed::{Cipher, Draws, Key, Stage};
 use crate::truth::{DropReason, Dropped};
 use crate::{Error, OriginalId};
 
-/// Paired-point lifting.
-#[derive(Clone, Copy, Debug)]
-pub struct Ppl;
-
 /// Registry entry.
 pub const ENTRY: Entry = Entry {
-    name: "ppl",
-    facts: Facts {
-        title: "Paired-point lines",
-        rule: "Two random points share the line through both.",
-        color: 1,
-        source: "Lee et al., Paired-Point Lifting for Enhanced Privacy-Preserving Visual Localization, CVPR 2023",
-        hidden: "two positions along the line and which descriptor is whose",
-        patents: "application declared by its authors; line clouds as for olc",
-    },
-    in_2d: None,
-    in_3d: Some(|_| Arc::new(Ppl)),
+    title: "Paired-point lines",
+    rule: "Two random points share the line through both.",
+    color: 1,
+    source: "Lee et al., Paired-Point Lifting for Enhanced Privacy-Preserving Visual Localization, CVPR 2023",
+    hidden: "two positions along the line and which descriptor is whose",
+    patents: "application declared by its authors; line clouds as for olc",
+    ..Entry::new("ppl", Lift::In3d(lift))
 };
 
 /// Maximum number of re-pairings of coincident points before they are dropped.
 const RE_DRAWS: usize = 100;
 
-impl Scheme<3> for Ppl {
-    fn name(&self) -> &str {
-        ENTRY.name
-    }
-
-    fn lift(&self, points: &LocalPoints<'_, 3>, key: &Key) -> Result<Lifted<3>, Error> {
-        let (points, mut draws) = (points.positions, key.draws(Stage::Scheme, 0));
-        let (mut pairs, dropped) = random_pairs(points.len(), &mut draws);
-        let accept = |pair: &[OriginalId; 2]| apart(points, pair);
-        let mut refused = refused_last(&mut pairs, accept);
-        for _ in 0..RE_DRAWS {
-            if refused == 0 {
-                break;
-            }
-            // Coincident points need other partners, so as many accepted pairs join the pool.
-            let pool = (2 * refused).min(pairs.len());
-            refused = pair_again(&mut pairs, pool, &mut draws, accept);
+/// Paired-point lifting.
+fn lift(points: &LocalPoints<'_, 3>, key: &Key, _: &SchemeOptions) -> Result<Lifted<3>, Error> {
+    let (points, mut draws) = (points.positions, key.draws(Stage::Scheme, 0));
+    let (mut pairs, dropped) = random_pairs(points.len(), &mut draws);
+    let accept = |pair: &[OriginalId; 2]| apart(points, pair);
+    let mut refused = refused_last(&mut pairs, accept);
+    for _ in 0..RE_DRAWS {
+        if refused == 0 {
+            break;
         }
-        lines_through(points, pairs, refused, dropped)
+        // Coincident points need other partners, so as many accepted pairs join the pool.
+        let pool = (2 * refused).min(pairs.len());
+        refused = pair_again(&mut pairs, pool, &mut draws, accept);
     }
+    lines_through(points, pairs, refused, dropped)
 }
 
 /// Returns true if two points are far enough apart to define a line in `f64`.
@@ -82,31 +67,20 @@ fn lines_through(
     let through: Vec<[f64; 3]> = pairs.iter().map(|[a, _]| points[a.index()]).collect();
     let direction: Vec<[f64; 3]> =
         pairs.iter().map(|[a, b]| sub(&points[b.index()], &points[a.index()])).collect();
-    Ok(Lifted {
-        obfuscation: Obfuscation::Lines(Lines::through(&through, &direction)?),
-        slots_per_record: 2,
-        hidden: pairs.as_flattened().to_vec(),
-        swapped_axis: None,
-        dropped,
-    })
+    let lines = Obfuscation::Lines(Lines::through(&through, &direction)?);
+    let hidden = pairs.as_flattened().to_vec();
+    Ok(Lifted { slots_per_record: 2, hidden, dropped, ..Lifted::one_each(lines) })
 }
-
-/// Paired-point lifting with plane rejection.
-#[derive(Clone, Copy, Debug)]
-pub struct PplPlus;
 
 /// Registry entry of `ppl+`.
 pub const PLUS: Entry = Entry {
     name: "ppl+",
-    facts: Facts {
-        title: "Paired-point lines, plane-aware",
-        rule: "Two points share a line that leaves the surface around them.",
-        color: 2,
-        patents: "as ppl",
-        ..ENTRY.facts
-    },
-    in_2d: None,
-    in_3d: Some(|_| Arc::new(PplPlus)),
+    title: "Paired-point lines, plane-aware",
+    rule: "Two points share a line that leaves the surface around them.",
+    color: 2,
+    patents: "as ppl",
+    lift: Lift::In3d(lift_off_surfaces),
+    ..ENTRY
 };
 
 const MAX_ROUNDS: usize = 1000;
@@ -117,39 +91,38 @@ const STALL: (usize, usize) = (100, 50);
 /// sin(20 degrees). A line is refused if its angle to the surface is at most 20 degrees.
 const SIN_20_DEGREES: f64 = 0.342_020_143_325_668_7;
 
-impl Scheme<3> for PplPlus {
-    fn name(&self) -> &str {
-        PLUS.name
-    }
-
-    fn lift(&self, points: &LocalPoints<'_, 3>, key: &Key) -> Result<Lifted<3>, Error> {
-        let points = points.positions;
-        let normals = normals(points)?;
-        let on_surface = |pair: &[OriginalId; 2]| {
-            let [a, b] = pair.map(|id| points[id.index()]);
-            let along = sub(&b, &a);
-            normals[pair[0].index()].is_some_and(|normal| {
-                dot(&along, &normal).abs() <= SIN_20_DEGREES * dot(&along, &along).sqrt()
-            })
-        };
-        let mut draws = key.draws(Stage::Scheme, 0);
-        let (mut pairs, dropped) = random_pairs(points.len(), &mut draws);
-        let accept = |pair: &[OriginalId; 2]| apart(points, pair) && !on_surface(pair);
-        let mut refused = refused_last(&mut pairs, accept);
-        let mut unchanged = 0;
-        for round in 1..=MAX_ROUNDS {
-            if refused < FEW_PAIRS {
-                break;
-            }
-            let before = refused;
-            refused = pair_again(&mut pairs, refused, &mut draws, accept);
-            unchanged = if refused == before { unchanged + 1 } else { 0 };
-            if round > STALL.0 && unchanged >= STALL.1 {
-                break;
-            }
+/// Paired-point lifting with plane rejection.
+fn lift_off_surfaces(
+    points: &LocalPoints<'_, 3>,
+    key: &Key,
+    _: &SchemeOptions,
+) -> Result<Lifted<3>, Error> {
+    let points = points.positions;
+    let normals = normals(points)?;
+    let on_surface = |pair: &[OriginalId; 2]| {
+        let [a, b] = pair.map(|id| points[id.index()]);
+        let along = sub(&b, &a);
+        normals[pair[0].index()].is_some_and(|normal| {
+            dot(&along, &normal).abs() <= SIN_20_DEGREES * dot(&along, &along).sqrt()
+        })
+    };
+    let mut draws = key.draws(Stage::Scheme, 0);
+    let (mut pairs, dropped) = random_pairs(points.len(), &mut draws);
+    let accept = |pair: &[OriginalId; 2]| apart(points, pair) && !on_surface(pair);
+    let mut refused = refused_last(&mut pairs, accept);
+    let mut unchanged = 0;
+    for round in 1..=MAX_ROUNDS {
+        if refused < FEW_PAIRS {
+            break;
         }
-        lines_through(points, pairs, refused, dropped)
+        let before = refused;
+        refused = pair_again(&mut pairs, refused, &mut draws, accept);
+        unchanged = if refused == before { unchanged + 1 } else { 0 };
+        if round > STALL.0 && unchanged >= STALL.1 {
+            break;
+        }
     }
+    lines_through(points, pairs, refused, dropped)
 }
 
 /// Returns for each point the normal of the surface through its K = min(1 % of the points, 100)

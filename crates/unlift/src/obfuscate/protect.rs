@@ -300,7 +300,7 @@ fn words(rows: &[Vec<f32>], n: usize) -> Vec<Vec<f32>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::obfuscate::{Change, Changed, Scheme, obfuscate, olc::Olc, ppl::Ppl};
+    use crate::obfuscate::{Change, Changed, obfuscate, olc, ppl};
     use crate::truth::Original;
     use crate::{PointSet, Unit, synthetic};
 
@@ -420,11 +420,12 @@ mod tests {
         let points = PointSet::try_new(synthetic::room(1, 200).points, Unit::Meter).unwrap();
         let (original, plain) = (Original::new(points), descriptors(200, 1));
         let public = descriptors(300, 9);
-        let schemes: [Arc<dyn Scheme<3>>; 2] = [Arc::new(Olc), Arc::new(Ppl)];
         let texts = ["subspace:2", "ldp:16,2,4"];
-        for (scheme, text) in schemes.iter().flat_map(|one| texts.map(|text| (one, text))) {
+        for (scheme, text) in
+            [olc::ENTRY, ppl::ENTRY].into_iter().flat_map(|one| texts.map(|text| (one, text)))
+        {
             let protection = Protection::parse(text).unwrap().with_public(&public).unwrap();
-            let scheme = Changed::new(Arc::clone(scheme), Change::Protection(protection));
+            let scheme = Changed::<3>::new(Arc::new(scheme), Change::Protection(protection));
             let hide = |seed| obfuscate(&scheme, &original, Some(&plain), &Key::from_seed(seed));
             let (released, secret) = hide(0).unwrap();
             let by_row = secret.by_descriptor_row();

@@ -1,95 +1,72 @@
-//! Schemes of half-lines from one of two centers, which is chosen at random for every point (`ray`) or by a checkerboard of voxels
-//! (`ray-voxel`).
+//! Schemes of half-lines: from one of two centers, which is chosen at random for every point (`ray`) or by a checkerboard of voxels
+//! (`ray-voxel`); from one of two anchors of an image (`dcl2d`); and from the center of a map, among decoys (`sphere`).
 
-use std::sync::Arc;
+use std::cmp::Ordering;
 
-use super::kmeans::kmeans;
-use super::scheme::{Entry, Facts, Lifted, LocalPoints, Scheme};
-use crate::geometry::vector::{dot, sub};
+use rayon::prelude::*;
+
+use super::scheme::{Entry, Lift, Lifted, LocalPoints, SchemeOptions};
+use crate::geometry::vector::{dot, squared_distance, sub};
 use crate::released::{Obfuscation, Rays};
 use crate::seed::{Key, Stage};
 use crate::truth::{DropReason, Dropped};
 use crate::{Error, OriginalId};
 
-/// Ray clouds.
-#[derive(Clone, Copy, Debug)]
-pub struct Ray;
-
 /// Registry entry.
 pub const ENTRY: Entry = Entry {
-    name: "ray",
-    facts: Facts {
-        title: "Ray cloud, two centers",
-        rule: "Each point becomes a ray from one of two published centers.",
-        color: 3,
-        source: "Moon et al., Efficient Privacy-Preserving Visual Localization Using 3D Ray Clouds, CVPR 2024",
-        hidden: "the range from the center (1 of 3 coordinates)",
-        patents: "US 2025/0329045 A1; PCT application declared by its authors",
-    },
-    in_2d: None,
-    in_3d: Some(|_| Arc::new(Ray)),
+    title: "Ray cloud, two centers",
+    rule: "Each point becomes a ray from one of two published centers.",
+    color: 3,
+    source: "Moon et al., Efficient Privacy-Preserving Visual Localization Using 3D Ray Clouds, CVPR 2024",
+    hidden: "the range from the center (1 of 3 coordinates)",
+    patents: "US 2025/0329045 A1; PCT application declared by its authors",
+    ..Entry::new("ray", Lift::In3d(lift))
 };
 
 /// Restarts of k-means (scikit-learn's `n_init` in the authors' code).
 const RESTARTS: u64 = 10;
+/// Maximum number of iterations per restart (scikit-learn's default).
+const MAX_ROUNDS: usize = 300;
 
-impl Scheme<3> for Ray {
-    fn name(&self) -> &str {
-        ENTRY.name
-    }
-
-    fn lift(&self, points: &LocalPoints<'_, 3>, key: &Key) -> Result<Lifted<3>, Error> {
-        let choices = key.stage(Stage::Scheme);
-        from_centers(points.positions, key, |row, _| choices.draws(row as u64).below(2) as usize)
-    }
-}
-
-/// Ray clouds, voxel variant.
-#[derive(Clone, Copy, Debug)]
-pub struct RayVoxel {
-    /// Edge of a voxel, in the unit of the points.
-    pub voxel: f64,
+/// Ray clouds.
+fn lift(points: &LocalPoints<'_, 3>, key: &Key, _: &SchemeOptions) -> Result<Lifted<3>, Error> {
+    let choices = key.stage(Stage::Scheme);
+    from_centers(points.positions, key, |row, _| choices.draws(row as u64).below(2) as usize)
 }
 
 /// Registry entry of `ray-voxel`.
 pub const VOXEL: Entry = Entry {
     name: "ray-voxel",
-    facts: Facts {
-        title: "Ray cloud, voxel parity",
-        rule: "Each point becomes a ray from one of two published centers; the voxel of the point decides which.",
-        color: 4,
-        patents: "as ray",
-        ..ENTRY.facts
-    },
-    in_2d: None,
-    in_3d: Some(|options| Arc::new(RayVoxel { voxel: options.voxel })),
+    title: "Ray cloud, voxel parity",
+    rule: "Each point becomes a ray from one of two published centers; the voxel of the point decides which.",
+    color: 4,
+    patents: "as ray",
+    lift: Lift::In3d(lift_by_voxel),
+    parameters: |options| vec![("voxel", options.voxel)],
+    ..ENTRY
 };
 
-impl Scheme<3> for RayVoxel {
-    fn name(&self) -> &str {
-        VOXEL.name
+/// Ray clouds, voxel variant.
+fn lift_by_voxel(
+    points: &LocalPoints<'_, 3>,
+    key: &Key,
+    options: &SchemeOptions,
+) -> Result<Lifted<3>, Error> {
+    let voxel = options.voxel;
+    if !(voxel.is_finite() && voxel > 0.0) {
+        return Err(Error::new("voxel", "a positive length", voxel.to_string()));
     }
-
-    fn parameters(&self) -> Vec<(&'static str, f64)> {
-        vec![("voxel", self.voxel)]
+    // The grid starts half a voxel below the smallest coordinates, as in the authors' code
+    // (Open3D).
+    let mut low = [f64::INFINITY; 3];
+    for point in points.positions {
+        low = std::array::from_fn(|c| low[c].min(point[c]));
     }
-
-    fn lift(&self, points: &LocalPoints<'_, 3>, key: &Key) -> Result<Lifted<3>, Error> {
-        if !(self.voxel.is_finite() && self.voxel > 0.0) {
-            return Err(Error::new("voxel", "a positive length", self.voxel.to_string()));
-        }
-        // The grid starts half a voxel below the smallest coordinates, as in the authors' code
-        // (Open3D).
-        let mut low = [f64::INFINITY; 3];
-        for point in points.positions {
-            low = std::array::from_fn(|c| low[c].min(point[c]));
-        }
-        let start = low.map(|x| x - 0.5 * self.voxel);
-        from_centers(points.positions, key, |_, point| {
-            let cell = |c: usize| ((point[c] - start[c]) / self.voxel).floor();
-            (0..3).map(|c| cell(c).rem_euclid(2.0) as usize).sum::<usize>() % 2
-        })
-    }
+    let start = low.map(|x| x - 0.5 * voxel);
+    from_centers(points.positions, key, |_, point| {
+        let cell = |c: usize| ((point[c] - start[c]) / voxel).floor();
+        (0..3).map(|c| cell(c).rem_euclid(2.0) as usize).sum::<usize>() % 2
+    })
 }
 
 /// Returns rays from two k-means centers to every point. `choose` returns the center of a row.
@@ -101,11 +78,70 @@ fn from_centers(
     if points.len() < 2 {
         return Err(Error::new("points", "at least 2 for two centers", points.len().to_string()));
     }
-    rays_from(&kmeans(points, 2, RESTARTS, key), points, choose)
+    rays_from(&two_centers(points, key), points, choose)
+}
+
+/// Returns the centers of the best of several runs of k-means. They depend on points and `key` alone.
+fn two_centers(points: &[[f64; 3]], key: &Key) -> [[f64; 3]; 2] {
+    let run = |restart| lloyd(points, spread_start(points, key, restart));
+    let runs: Vec<_> = (0..RESTARTS).into_par_iter().map(run).collect();
+    // The first of equally good runs counts.
+    let best = runs.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+    let (_, mut centers) = best.expect("a restart");
+    // The order of the centers must not depend on which restart won.
+    centers.sort_unstable_by(|a, b| {
+        let by_axis = a.iter().zip(b).map(|(x, y)| x.total_cmp(y));
+        by_axis.fold(Ordering::Equal, Ordering::then)
+    });
+    centers
+}
+
+/// Chooses initial centers with k-means++: the second with probability proportional to the squared
+/// distance to the first.
+fn spread_start(points: &[[f64; 3]], key: &Key, restart: u64) -> [[f64; 3]; 2] {
+    let mut draws = key.draws(Stage::KMeans, restart);
+    let first = points[draws.below(points.len() as u64) as usize];
+    let weight = |p: &[f64; 3]| squared_distance(p, &first);
+    let mut left = draws.unit() * points.iter().map(weight).sum::<f64>();
+    let chosen = points.iter().position(|p| {
+        left -= weight(p);
+        left <= 0.0
+    });
+    [first, points[chosen.unwrap_or(points.len() - 1)]]
+}
+
+/// Returns the sum of squared distances and the centers of a run of Lloyd's algorithm. Sums are in row
+/// order.
+fn lloyd(points: &[[f64; 3]], mut centers: [[f64; 3]; 2]) -> (f64, [[f64; 3]; 2]) {
+    let mut cost = f64::INFINITY;
+    for _ in 0..MAX_ROUNDS {
+        let (mut sums, mut counts, mut new_cost) = ([[0.0; 3]; 2], [0u64; 2], 0.0);
+        for point in points {
+            let [first, second] = centers.map(|center| squared_distance(point, &center));
+            // The first of equally near centers counts.
+            let at = usize::from(second < first);
+            new_cost += first.min(second);
+            counts[at] += 1;
+            for c in 0..3 {
+                sums[at][c] += point[c];
+            }
+        }
+        for (at, center) in centers.iter_mut().enumerate() {
+            if counts[at] > 0 {
+                *center = sums[at].map(|s| s / counts[at] as f64);
+            }
+        }
+        let converged = new_cost >= cost * (1.0 - 1e-9);
+        cost = new_cost;
+        if converged {
+            break;
+        }
+    }
+    (cost, centers)
 }
 
 /// Returns rays from `centers` to every point. `choose` returns the center of a row.
-pub(super) fn rays_from<const D: usize>(
+fn rays_from<const D: usize>(
     centers: &[[f64; D]],
     points: &[[f64; D]],
     choose: impl Fn(usize, &[f64; D]) -> usize,
@@ -128,11 +164,113 @@ pub(super) fn rays_from<const D: usize>(
         let length = length2.sqrt();
         direction.push(along.map(|x| x / length));
     }
-    Ok(Lifted {
-        obfuscation: Obfuscation::Rays(Rays::try_new(&centers, center, &direction)?),
-        slots_per_record: 1,
-        hidden,
-        swapped_axis: None,
-        dropped,
-    })
+    let rays = Obfuscation::Rays(Rays::try_new(&centers, center, &direction)?);
+    Ok(Lifted { hidden, dropped, ..Lifted::one_each(rays) })
+}
+
+/// Registry entry of `dcl2d`.
+pub const DCL2D: Entry = Entry {
+    title: "Dual convergent lines",
+    rule: "Each keypoint becomes a ray from the anchor of its half of the image.",
+    color: 3,
+    source: "Kim et al., Dual Convergent Lines, CVPR 2026",
+    hidden: "the range from the anchor (1 of 2 coordinates)",
+    patents: "none found",
+    ..Entry::new("dcl2d", Lift::In2d(dual_convergent))
+};
+
+/// Dual convergent lines: lines through one of two anchors, chosen by the half of the image that contains
+/// the keypoint.
+///
+/// The authors have published no code. This implementation follows the paper, with these
+/// assumptions:
+///
+/// - The split is vertical, at half of the width. The anchors are the two ends of the split: the
+///   upper one for the left half, the lower one for the right half. Their distance, the image
+///   height, is the one recommended.
+/// - A keypoint on the split belongs to the right half.
+/// - A keypoint on its anchor has no line and is dropped.
+/// - The line reveals its anchor, and so the half with its keypoint. It is therefore released as a
+///   ray from the anchor.
+fn dual_convergent(
+    points: &LocalPoints<'_, 2>,
+    _: &Key,
+    _: &SchemeOptions,
+) -> Result<Lifted<2>, Error> {
+    let Some(image) = points.bounds else {
+        return Err(Error::new("image size", "known: anchors lie on its border", "none"));
+    };
+    let center = image.center();
+    let half = (image.high[1] - image.low[1]) / 2.0;
+    let anchors = [-1.0, 1.0].map(|side| [center[0], center[1] + side * half]);
+    let chosen = |_, point: &[f64; 2]| usize::from(point[0] >= center[0]);
+    let mut lifted = rays_from(&anchors, points.positions, chosen)?;
+    if let Obfuscation::Rays(rays) = lifted.obfuscation {
+        let (mut first, mut second) = (image, image);
+        (first.high[0], second.low[0]) = (center[0], center[0]);
+        lifted.obfuscation = Obfuscation::Rays(rays.with_regions(vec![first, second])?);
+    }
+    Ok(lifted)
+}
+
+/// Share of the points that keep their bearing.
+const KEPT: f64 = 1.0 / 3.0;
+/// Variance of the noise of a decoy, per component of its unit direction.
+const VARIANCE: f64 = 0.1;
+
+/// Registry entry of `sphere`.
+pub const SPHERE: Entry = Entry {
+    title: "Sphere cloud, a third of the bearings real",
+    rule: "Each point becomes its bearing from the center of the map, among decoys.",
+    color: 7,
+    source: "Moon et al., Depth-Guided Privacy-Preserving Visual Localization Using 3D Sphere Clouds, BMVC 2024",
+    hidden: "the range from the center (1 of 3 coordinates)",
+    patents: "PCT application declared by its authors",
+    parameters: |_| vec![("share of real bearings", KEPT)],
+    ..Entry::new("sphere", Lift::In3d(among_decoys))
+};
+
+/// Sphere clouds: the bearing of every point from the center of the map, among decoys.
+///
+/// The center is the mean of all points. A share of the points keeps its bearing. The other records
+/// are decoys: the bearing of a withheld point with Gaussian noise on each component, brought to
+/// length 1, and the descriptor of that point, so that the number of records stays. In the secret, a
+/// decoy stands for the point that it withholds; its ray does not pass through it.
+///
+/// The published code confirms the center and the share. It reads maps with
+/// decoys and does not make them: the variance of the noise and the source of a decoy's descriptor
+/// are assumptions.
+fn among_decoys(
+    points: &LocalPoints<'_, 3>,
+    key: &Key,
+    _: &SchemeOptions,
+) -> Result<Lifted<3>, Error> {
+    let points = points.positions;
+    let n = points.len();
+    if n < 2 {
+        return Err(Error::new("points", "at least 2", n.to_string()));
+    }
+    let center: [f64; 3] =
+        std::array::from_fn(|c| points.iter().map(|p| p[c]).sum::<f64>() / n as f64);
+    let mut lifted = rays_from(&[center], points, |_, _| 0)?;
+    let Obfuscation::Rays(rays) = &lifted.obfuscation else { return Ok(lifted) };
+    let order = key.draws(Stage::Scheme, 0).permutation(n);
+    let mut is_decoy = vec![true; n];
+    let n_kept = (KEPT * n as f64).round() as usize;
+    order[..n_kept].iter().for_each(|&row| is_decoy[row as usize] = false);
+    let noise = key.stage(Stage::Scheme);
+    let moved = |(direction, &OriginalId(row)): (&[f32; 3], &OriginalId)| {
+        let direction = direction.map(f64::from);
+        if !is_decoy[row as usize] {
+            return direction;
+        }
+        let mut draws = noise.draws(1 + u64::from(row));
+        direction.map(|x| x + VARIANCE.sqrt() * draws.normal())
+    };
+    let directions: Vec<[f64; 3]> =
+        rays.direction().iter().zip(&lifted.hidden).map(moved).collect();
+    let centers: Vec<[f64; 3]> = rays.centers().iter().map(|c| c.map(f64::from)).collect();
+    let rays = Rays::try_new(&centers, rays.center().to_vec(), &directions)?;
+    lifted.obfuscation = Obfuscation::Rays(rays);
+    Ok(lifted)
 }

@@ -4,47 +4,20 @@ use std::any::Any;
 use std::fmt::Debug;
 use std::sync::Arc;
 
-use super::protect::Protection;
+use super::changed::Change;
 use crate::geometry::frame::Bounds;
 use crate::released::Obfuscation;
 use crate::seed::Key;
 #[cfg(doc)]
 use crate::seed::Stage;
 use crate::truth::Dropped;
-use crate::{Descriptors, Error, OriginalId, Unit};
+use crate::{Error, OriginalId, Unit};
 
-/// An entry of the registry: a built-in scheme and its constructors.
-#[derive(Debug)]
+/// A built-in scheme, for maps or for images. It is an entry of the registry.
+#[derive(Clone, Copy, Debug)]
 pub struct Entry {
     /// Name that users type.
     pub name: &'static str,
-    /// Facts for reports.
-    pub facts: Facts,
-    /// Constructor for keypoints, if the scheme is defined there.
-    pub in_2d: Option<Build<2>>,
-    /// Constructor for map points, if the scheme is defined there.
-    pub in_3d: Option<Build<3>>,
-}
-
-/// Constructor of a scheme from options.
-pub type Build<const D: usize> = fn(&SchemeOptions) -> Arc<dyn Scheme<D>>;
-
-impl Entry {
-    /// Returns the scheme for points of `D` dimensions, if it is defined there.
-    pub fn of_dimension<const D: usize>(
-        &self,
-        options: &SchemeOptions,
-    ) -> Option<Arc<dyn Scheme<D>>> {
-        // `Any` compares the types at run time, because a constant cannot choose between two types.
-        let of: &dyn Any = if D == 2 { &self.in_2d } else { &self.in_3d };
-        let build = of.downcast_ref::<Option<Build<D>>>().copied().flatten();
-        build.map(|build| build(options))
-    }
-}
-
-/// Facts about a scheme; empty if unknown.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Facts {
     /// Title in a few words.
     pub title: &'static str,
     /// Sentence on what is published in place of a point.
@@ -57,6 +30,72 @@ pub struct Facts {
     pub hidden: &'static str,
     /// Patents that its authors state (not legal advice).
     pub patents: &'static str,
+    /// Rule for hiding points.
+    pub lift: Lift,
+    /// Parameters of the rule by name, for reports.
+    pub parameters: fn(&SchemeOptions) -> Vec<(&'static str, f64)>,
+    /// Options of the rule.
+    pub options: SchemeOptions,
+}
+
+/// The rule of a built-in scheme.
+#[derive(Clone, Copy, Debug)]
+pub enum Lift {
+    /// Hides keypoints of images.
+    In2d(LiftIn<2>),
+    /// Hides points of maps.
+    In3d(LiftIn<3>),
+}
+
+/// A [`Scheme::lift`] with options.
+pub type LiftIn<const D: usize> =
+    fn(&LocalPoints<'_, D>, &Key, &SchemeOptions) -> Result<Lifted<D>, Error>;
+
+impl Entry {
+    /// Returns a scheme without facts and parameters, with options for points in meters.
+    pub(super) const fn new(name: &'static str, lift: Lift) -> Self {
+        let [title, rule, source, hidden, patents] = [""; 5];
+        let (parameters, options) = (|_: &_| Vec::new(), SchemeOptions { voxel: 0.5 });
+        Self { name, title, rule, color: 0, source, hidden, patents, lift, parameters, options }
+    }
+
+    /// Returns the number of dimensions of the points that the scheme hides.
+    pub fn dimensions(&self) -> usize {
+        match self.lift {
+            Lift::In2d(_) => 2,
+            Lift::In3d(_) => 3,
+        }
+    }
+
+    /// Returns the scheme for points of `D` dimensions, if it is defined there.
+    pub fn of_dimension<const D: usize>(
+        &self,
+        options: &SchemeOptions,
+    ) -> Option<Arc<dyn Scheme<D>>> {
+        (self.dimensions() == D).then(|| Arc::new(Self { options: *options, ..*self }) as Arc<_>)
+    }
+}
+
+impl<const D: usize> Scheme<D> for Entry {
+    fn name(&self) -> &str {
+        self.name
+    }
+
+    fn parameters(&self) -> Vec<(&'static str, f64)> {
+        (self.parameters)(&self.options)
+    }
+
+    fn lift(&self, points: &LocalPoints<'_, D>, key: &Key) -> Result<Lifted<D>, Error> {
+        // `Any` compares the types at run time, because a constant cannot choose between two types.
+        let lift: &dyn Any = match &self.lift {
+            Lift::In2d(lift) => lift,
+            Lift::In3d(lift) => lift,
+        };
+        match lift.downcast_ref::<LiftIn<D>>() {
+            Some(lift) => lift(points, key, &self.options),
+            None => Err(Error::new("scheme", format!("one for {D} dimensions"), self.name)),
+        }
+    }
 }
 
 /// Parameters of the built-in schemes, in the unit of the points.
@@ -108,29 +147,9 @@ pub trait Scheme<const D: usize>: Debug + Send + Sync {
     /// When the rule cannot hide the points, or a parameter is out of range.
     fn lift(&self, points: &LocalPoints<'_, D>, key: &Key) -> Result<Lifted<D>, Error>;
 
-    /// Returns the descriptors that are released in place of `descriptors`, one row per original;
-    /// `None` if they are released unchanged, as geometric schemes do. Randomness must come from
-    /// `key` with [`Stage::Mitigation`].
-    ///
-    /// # Errors
-    /// If the rule cannot change these descriptors.
-    fn descriptors(
-        &self,
-        descriptors: &Descriptors,
-        key: &Key,
-    ) -> Result<Option<Descriptors>, Error> {
-        let _ = (descriptors, key);
-        Ok(None)
-    }
-
-    /// Returns the protection under which descriptors are released, if there is one.
-    fn protection(&self) -> Option<&Protection> {
-        None
-    }
-
-    /// Returns true if the scheme changes descriptors, so that fewer keypoints find their points.
-    fn changes_descriptors(&self) -> bool {
-        false
+    /// Returns the mitigations and the protection of descriptors that are part of the scheme, in order.
+    fn changes(&self) -> Vec<&Change> {
+        Vec::new()
     }
 }
 

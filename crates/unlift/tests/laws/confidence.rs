@@ -32,10 +32,8 @@ fn what_is_said_comes_true_as_often_as_said() {
     let mut all: Option<Reliability> = None;
     for name in ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp"] {
         let hidden = try_hide(entry(name), &points, 5.0 * typical, 7).unwrap();
-        let (near, knn) = (hidden.near(50), oracle::search(&hidden.original).unwrap());
         for (noise, ratio) in CASES {
-            let outliers = Outliers::new(noise, &near, &knn, &hidden.secret, 7).unwrap();
-            let lists = near.lists(ratio, &outliers, 7).unwrap();
+            let lists = hidden.noisy_lists(50, (noise, ratio), 7).unwrap();
             let recovered = solve(&hidden.released, &lists, joint());
             let accuracy = evaluate(&recovered, &hidden.original, &hidden.secret).unwrap();
             let Some(of_map) = reliability(&recovered, &accuracy, typical) else {

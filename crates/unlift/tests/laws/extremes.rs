@@ -23,7 +23,7 @@ fn check(what: &str, points: Vec<[f64; 3]>, k: usize) {
         assert!(errors.all(|error| error.is_finite() && *error >= 0.0), "{cell}: {row:?}");
         assert!(row.lost.values().sum::<usize>() <= row.n_points * 2, "{cell}: {row:?}");
         let Some(reliability) = &row.parts.reliability else { continue };
-        let sure = reliability.sure;
+        let sure = reliability.sure();
         assert!(sure.expected.is_finite(), "{cell}: {sure:?}");
         if sure.n * 100 >= reliability.n_points && sure.n >= 20 {
             let right = 100.0 * sure.within as f64 / sure.n as f64;

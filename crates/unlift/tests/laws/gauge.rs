@@ -4,49 +4,43 @@
 
 use crate::maps::*;
 
-fn a_line_forgets_its_point<const D: usize>(seed: u64, n: usize) {
+/// Moves random points along a line and along a ray through them.
+fn records_forget_their_points<const D: usize>(seed: u64) {
     let mut draws = Draws::new(seed, Stage::Synthetic, 7);
-    for _ in 0..n {
-        let point: [f64; D] = std::array::from_fn(|_| draws.between(-5.0, 5.0));
+    for _ in 0..400 {
+        let mut place = || -> [f64; D] { std::array::from_fn(|_| draws.between(-5.0, 5.0)) };
+        // Centers are stored as `f32`.
+        let (point, center) = (place(), place().map(|x| f64::from(x as f32)));
         let direction = draws.direction();
-        let stored = |from: &[f64; D], t: f64| {
+        let line = |from: &[f64; D], t: f64| {
             let lines = Lines::through(&[along(from, t, &direction)], &[direction]).unwrap();
             record_bytes(&Obfuscation::Lines(lines))
         };
-        let t = draws.between(-9.0, 9.0);
-        assert_eq!(stored(&point, 0.0), stored(&point, t), "{point:?} along {direction:?} by {t}");
-        // Near the foot, where a shortcut of the normal form could reveal the point.
+        // Near the foot, too, where a shortcut of the normal form could reveal the point.
         let foot = along(&point, -dot(&point, &direction), &direction);
-        let t = dot(&foot, &foot).sqrt() * draws.between(-1e-6, 1e-6);
-        assert_eq!(stored(&foot, 1.0), stored(&foot, t), "{foot:?} along {direction:?} by {t}");
-    }
-}
-
-fn a_ray_forgets_its_range<const D: usize>(seed: u64, n: usize) {
-    let mut draws = Draws::new(seed, Stage::Synthetic, 8);
-    for _ in 0..n {
-        let center: [f64; D] = std::array::from_fn(|_| f64::from(draws.between(-5.0, 5.0) as f32));
-        let point: [f64; D] = std::array::from_fn(|_| draws.between(-5.0, 5.0));
-        let stored = |range: f64| {
+        let near = 1e-6 * dot(&foot, &foot).sqrt();
+        for (from, start, reach) in [(point, 0.0, 9.0), (foot, 1.0, near)] {
+            let t = draws.between(-reach, reach);
+            assert_eq!(line(&from, start), line(&from, t), "{from:?} along {direction:?} by {t}");
+        }
+        let ray = |range: f64| {
             let moved = along(&center, range, &sub(&point, &center));
             let rays = Rays::try_new(&[center], vec![0], &[sub(&moved, &center)]).unwrap();
             record_bytes(&Obfuscation::Rays(rays))
         };
         // Lengths near 1, too, which a shortcut of normalization could reveal.
         let near_one = 1.0 + draws.between(-3e-7, 3e-7);
-        let range = [draws.between(0.05, 9.0), near_one / distance(&point, &center)];
-        let range = range[draws.below(2) as usize];
-        assert_eq!(stored(1.0), stored(range), "{point:?} from {center:?} to {range}");
+        for range in [draws.between(0.05, 9.0), near_one / distance(&point, &center)] {
+            assert_eq!(ray(1.0), ray(range), "{point:?} from {center:?} to {range}");
+        }
     }
 }
 
 #[test]
 fn records_forget_where_on_them_the_point_was() {
     for seed in seeds(8) {
-        a_line_forgets_its_point::<3>(seed, 400);
-        a_line_forgets_its_point::<2>(seed, 400);
-        a_ray_forgets_its_range::<3>(seed, 400);
-        a_ray_forgets_its_range::<2>(seed, 400);
+        records_forget_their_points::<3>(seed);
+        records_forget_their_points::<2>(seed);
     }
 }
 

@@ -18,7 +18,7 @@ pub use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays,
 pub use unlift::seed::{Draws, Key, Stage};
 pub use unlift::truth::{Original, Secret};
 pub use unlift::{About, Descriptors, Error, PointSet, RecordId, RowOrder, Unit, synthetic};
-pub use unlift_testkit::{image_around, on_threads, piles, room, uniform};
+pub use unlift_testkit::{on_threads, piles, room, uniform};
 
 /// Returns `n` seeds, the same in every run. With `UNLIFT_RANDOM_TESTS=50`, 50 seeds that differ in every run; a failure prints them.
 pub fn seeds(n: usize) -> Vec<u64> {
@@ -59,13 +59,8 @@ pub fn try_hide<const D: usize>(
     voxel: f64,
     seed: u64,
 ) -> Result<Hidden<D>, Error> {
-    let set = PointSet::try_new(points.to_vec(), Unit::Meter)?;
-    let original = match D {
-        2 => Original::within(set, image_around(points, voxel))?,
-        _ => Original::new(set),
-    };
     let scheme = scheme.of_dimension(&SchemeOptions { voxel }).expect("defined there");
-    let (released, secret) = obfuscate(&*scheme, &original, None, &Key::from_seed(seed))?;
+    let (original, released, secret) = unlift_testkit::hide(&*scheme, points, voxel, seed)?;
     Ok(Hidden { original, released, secret })
 }
 
@@ -88,12 +83,24 @@ impl<const D: usize> Hidden<D> {
     /// Returns the true neighborhoods of size `k`.
     pub fn near(&self, k: usize) -> TrueNeighbors {
         let search = oracle::search(&self.original).unwrap();
-        TrueNeighbors::new(&search, &self.secret, self.released.slots_per_record(), k).unwrap()
+        TrueNeighbors::new(&search, &self.secret, k).unwrap()
     }
 
     /// Returns lists of the oracle.
     pub fn lists(&self, k: usize, inlier_ratio: f64, seed: u64) -> Neighborhoods {
         self.near(k).at_inlier_ratio(inlier_ratio, seed).unwrap()
+    }
+
+    /// Returns lists of the oracle with outliers of a noise model.
+    pub fn noisy_lists(
+        &self,
+        k: usize,
+        (noise, inlier_ratio): (Noise, f64),
+        seed: u64,
+    ) -> Result<Neighborhoods, Error> {
+        let (near, search) = (self.near(k), oracle::search(&self.original)?);
+        let outliers = Outliers::new(noise, &near, &search, &self.secret, seed)?;
+        near.lists(inlier_ratio, &outliers, seed)
     }
 
     /// Returns the given lists, row by row.

@@ -11,60 +11,41 @@ const K: usize = 10;
 const N: usize = 1200;
 const SCHEMES: [&Entry; 2] = [&olc::ENTRY, &ppl::ENTRY];
 
-struct Oracle {
-    hidden: Hidden<3>,
-    near: TrueNeighbors,
+fn hidden(scheme: &Entry) -> Hidden<3> {
+    hide(scheme, &room(17, N), 5)
 }
 
-impl Oracle {
-    fn new(scheme: &Entry) -> Self {
-        let hidden = hide(scheme, &room(17, N), 5);
-        let near = hidden.near(K);
-        Self { hidden, near }
-    }
-
-    fn outliers(&self, noise: Noise, seed: u64) -> Outliers {
-        let search = oracle::search(&self.hidden.original).unwrap();
-        Outliers::new(noise, &self.near, &search, &self.hidden.secret, seed).unwrap()
-    }
-
-    fn lists(&self, noise: Noise, ratio: f64, seed: u64) -> Neighborhoods {
-        self.near.lists(ratio, &self.outliers(noise, seed), seed).unwrap()
-    }
-
-    /// Returns the rank of every other record by its distance to a slot's point, by brute force.
-    fn ranks(&self, slot: usize) -> impl Fn(&RecordId) -> usize {
-        let points = self.hidden.original.reveal().positions();
-        let per = self.hidden.released.slots_per_record();
-        let hidden = self.hidden.secret.hidden();
-        let here = points[hidden[slot].index()];
-        let key = |other: usize| {
-            (squared_distance(&here, &points[hidden[other].index()]), hidden[other].0)
-        };
-        let mut order: Vec<usize> =
-            (0..hidden.len()).filter(|other| other / per != slot / per).collect();
-        order.sort_by(|&a, &b| key(a).partial_cmp(&key(b)).unwrap());
-        let mut seen = BTreeSet::new();
-        let records = order.into_iter().map(|other| RecordId::from_index(other / per));
-        let records: Vec<RecordId> = records.filter(|&r| seen.insert(r)).collect();
-        move |record| records.iter().position(|other| other == record).unwrap()
-    }
+/// Returns the rank of every other record by its distance to a slot's point, by brute force.
+fn rank_from(of: &Hidden<3>, slot: usize) -> impl Fn(&RecordId) -> usize {
+    let points = of.original.reveal().positions();
+    let (per, hidden) = (of.released.slots_per_record(), of.secret.hidden());
+    let here = points[hidden[slot].index()];
+    let key =
+        |other: usize| (squared_distance(&here, &points[hidden[other].index()]), hidden[other].0);
+    let mut order: Vec<usize> =
+        (0..hidden.len()).filter(|other| other / per != slot / per).collect();
+    order.sort_by(|&a, &b| key(a).partial_cmp(&key(b)).unwrap());
+    let mut seen = BTreeSet::new();
+    let records = order.into_iter().map(|other| RecordId::from_index(other / per));
+    let records: Vec<RecordId> = records.filter(|&r| seen.insert(r)).collect();
+    move |record| records.iter().position(|other| other == record).unwrap()
 }
 
 #[test]
 fn every_model_keeps_the_share_the_same_true_neighbors_and_outliers() {
     for scheme in SCHEMES {
-        let oracle = Oracle::new(scheme);
-        let full = oracle.near.at_inlier_ratio(1.0, 3).unwrap();
+        let hidden = hidden(scheme);
+        let near = hidden.near(K);
+        let full = near.at_inlier_ratio(1.0, 3).unwrap();
         let split = |lists: &Neighborhoods, slot: usize| -> [BTreeSet<RecordId>; 2] {
             lists.of(slot).iter().partition(|&r| full.of(slot).contains(r)).into()
         };
         for noise in Noise::ALL {
             let mut higher = None;
             for ratio in [0.6, 0.5, 0.3, 0.2, 0.0] {
-                let lists = oracle.lists(noise, ratio, 3);
-                let uniform = oracle.near.at_inlier_ratio(ratio, 3).unwrap();
-                assert_eq!(oracle.near.measured_inlier_ratio(&lists), ratio, "{noise:?}");
+                let lists = hidden.noisy_lists(K, (noise, ratio), 3).unwrap();
+                let uniform = near.at_inlier_ratio(ratio, 3).unwrap();
+                assert_eq!(near.measured_inlier_ratio(&lists), ratio, "{noise:?}");
                 for slot in 0..lists.n_slots() {
                     assert_eq!(lists.of(slot).len(), K);
                     let [right, wrong] = split(&lists, slot);
@@ -84,11 +65,11 @@ fn every_model_keeps_the_share_the_same_true_neighbors_and_outliers() {
 #[test]
 fn near_outliers_lie_between_the_2k_th_and_the_10k_th_nearest() {
     for scheme in SCHEMES {
-        let oracle = Oracle::new(scheme);
-        let lists = oracle.lists(Noise::Near, 0.0, 1);
+        let hidden = hidden(scheme);
+        let lists = hidden.noisy_lists(K, (Noise::Near, 0.0), 1).unwrap();
         let mut ranks = BTreeSet::new();
         for slot in (0..lists.n_slots()).step_by(37) {
-            let rank = oracle.ranks(slot);
+            let rank = rank_from(&hidden, slot);
             for rank in lists.of(slot).iter().map(rank) {
                 assert!((2 * K..10 * K).contains(&rank), "slot {slot}: rank {rank}");
                 ranks.insert(rank);
@@ -102,12 +83,13 @@ fn near_outliers_lie_between_the_2k_th_and_the_10k_th_nearest() {
 #[test]
 fn clustered_outliers_are_shared_by_neighbors_and_lie_in_two_far_places() {
     for scheme in SCHEMES {
-        let oracle = Oracle::new(scheme);
-        let nearest = oracle.near.at_inlier_ratio(1.0, 2).unwrap();
-        let per = oracle.hidden.released.slots_per_record();
+        let hidden = hidden(scheme);
+        let nearest = hidden.lists(K, 1.0, 2);
+        let per = hidden.released.slots_per_record();
+        let lists = |noise: Noise| hidden.noisy_lists(K, (noise, 0.0), 2).unwrap();
         // Share of a slot's outliers that a slot on its nearest listed records lists, too.
         let shared = |noise: Noise| {
-            let lists = oracle.lists(noise, 0.0, 2);
+            let lists = lists(noise);
             let both = |slot: usize| {
                 let others = nearest.of(slot).iter();
                 let others = others.flat_map(|r| (0..per).map(move |side| r.index() * per + side));
@@ -122,10 +104,10 @@ fn clustered_outliers_are_shared_by_neighbors_and_lie_in_two_far_places() {
         let (clustered, uniform) = (shared(Noise::Clustered), shared(Noise::Uniform));
         assert!(clustered > 0.5 && uniform < 0.25, "{clustered:.2} {uniform:.2}");
         // All outliers of a patch are the K records near either of two places.
-        let lists = oracle.lists(Noise::Clustered, 0.0, 2);
+        let lists = lists(Noise::Clustered);
         let slots: Vec<usize> = (0..lists.n_slots()).step_by(41).collect();
         let is_far = |&&slot: &&usize| {
-            let rank = oracle.ranks(slot);
+            let rank = rank_from(&hidden, slot);
             lists.of(slot).iter().all(|r| rank(r) >= 2 * K)
         };
         let (far, slots) = (slots.iter().filter(is_far).count(), slots.len());
@@ -137,11 +119,10 @@ fn clustered_outliers_are_shared_by_neighbors_and_lie_in_two_far_places() {
 #[test]
 fn a_map_without_a_ring_is_told() {
     let hidden = hide::<3>(&olc::ENTRY, &room(17, 2 * K + 4), 5);
-    let oracle = Oracle { near: hidden.near(K), hidden };
-    let outliers = oracle.outliers(Noise::Near, 0);
-    assert!(oracle.near.lists(0.7, &outliers, 0).is_ok());
+    let lists = |ratio| hidden.noisy_lists(K, (Noise::Near, ratio), 0);
+    assert!(lists(0.7).is_ok());
     assert_eq!(
-        oracle.near.lists(0.5, &outliers, 0).unwrap_err().to_string(),
+        lists(0.5).unwrap_err().to_string(),
         "inlier ratio 0.5 at K = 10: expected at least 5 records that are between the 2K-th and \
          the 10K-th nearest, found 3"
     );

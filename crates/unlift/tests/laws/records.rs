@@ -61,8 +61,7 @@ fn a_truth_belongs_to_its_map_alone() {
         assert!(Truth { original: &turned, ..truth }.belongs().is_err(), "{name}");
         let inner = Bounds::try_new([0.0; 3], [1.0; 3]).unwrap();
         let cut = hidden.released.clone().with_bounds(Some(inner));
-        let (secret, slots) = (hidden.secret.clone(), cut.slots_per_record());
-        let of_cut = secret.of_map(Some(cut.fingerprint()), slots).unwrap();
+        let of_cut = hidden.secret.clone().with_map(Some(cut.fingerprint()));
         let error = Truth { released: &cut, secret: &of_cut, ..truth }.belongs().unwrap_err();
         let expected = "bounds: expected a box of all hidden points";
         assert!(error.to_string().starts_with(expected), "{error}");
@@ -90,7 +89,7 @@ fn undone(released: &Released<3>, guesses: u64) -> Option<Vec<u32>> {
 #[test]
 fn a_small_integer_is_guessed_and_a_fresh_key_is_not() {
     let olc = |key: &Key| {
-        obfuscate(&unlift::obfuscate::olc::Olc, &original(room(4, 500)), None, key).unwrap()
+        obfuscate(&unlift::obfuscate::olc::ENTRY, &original(room(4, 500)), None, key).unwrap()
     };
     let (released, secret) = olc(&Key::from_seed(321));
     let rows = undone(&released, 400).expect("the integer is among the guesses");

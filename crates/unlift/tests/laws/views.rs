@@ -21,9 +21,8 @@ fn points() -> Vec<[f64; 3]> {
 fn release<const D: usize>(name: &str, original: &Original<D>, seed: u64) -> Hidden<D> {
     let rows: Vec<u32> = (0..original.len() as u32).collect();
     let descriptors = random_descriptors(6, N, 16).select(&rows);
-    let scheme = entry(name).of_dimension::<D>(&SchemeOptions::usual(Unit::Meter)).unwrap();
-    let key = Key::from_seed(seed);
-    let (released, secret) = obfuscate(&*scheme, original, Some(&descriptors), &key).unwrap();
+    let (scheme, key) = (entry(name), Key::from_seed(seed));
+    let (released, secret) = obfuscate(scheme, original, Some(&descriptors), &key).unwrap();
     Hidden { original: original.clone(), released, secret }
 }
 
@@ -62,7 +61,7 @@ fn fixed(a: &str, b: &str) -> std::ops::RangeInclusive<f64> {
 
 #[test]
 fn two_releases_give_back_every_point_that_their_records_fix() {
-    let names = || SCHEMES.iter().filter(|entry| entry.in_3d.is_some()).map(|entry| entry.name);
+    let names = || SCHEMES.iter().filter(|entry| entry.dimensions() == 3).map(|entry| entry.name);
     for (a, b) in names().flat_map(|a| names().map(move |b| (a, b))) {
         let (solved, accuracy, n_right, n_links) = attack((a, b), by_descriptors);
         assert_eq!(n_right, n_links, "{a}/{b}");

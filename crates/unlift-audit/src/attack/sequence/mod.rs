@@ -19,7 +19,7 @@ use unlift::audit::{Plan, Row, Seconds};
 use unlift::evaluate::evaluate;
 use unlift::geometry::camera::PoseError;
 use unlift::neighbors::{Neighborhoods, Source, of_what_there_is};
-use unlift::obfuscate::{Scheme, obfuscate};
+use unlift::obfuscate::{Change, Scheme, obfuscate};
 use unlift::recover::recover as recover_map;
 use unlift::recover::{Builtin, RecoverOptions, Recovered};
 use unlift::released::Obfuscation;
@@ -200,7 +200,7 @@ impl Sequence<'_> {
             progress.show(rows.len(), total, &format!("{}, linking queries", scheme.name()));
             let started = Instant::now();
             // Links depend on descriptors and cameras only.
-            let is_plain = !scheme.changes_descriptors();
+            let is_plain = !scheme.changes().into_iter().any(Change::changes_descriptors);
             let same = known.as_ref().filter(|_| is_plain);
             let same = same.and_then(|(of, links)| Some(links.reordered(&orders(of, &secrets)?)));
             let is_new = same.is_none();

@@ -86,8 +86,9 @@ pub fn truth<const D: usize>(seed: u64, n: usize) -> (Original<D>, Secret) {
         (0..n).map(row).collect(),
         dropped.collect(),
         n_all,
+        slots,
     );
-    let secret = secret.unwrap().of_map(about(seed).map, slots).unwrap();
+    let secret = secret.unwrap().with_map(about(seed).map);
     (Original::new(original), secret)
 }
 

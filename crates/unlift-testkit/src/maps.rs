@@ -1,7 +1,12 @@
-//! Points for tests.
+//! Points and maps for tests.
 
+use unlift::descriptors::Values;
 use unlift::geometry::frame::Bounds;
-use unlift::seed::{Draws, Stage};
+use unlift::obfuscate::{Scheme, obfuscate};
+use unlift::released::Released;
+use unlift::seed::{Draws, Key, Stage};
+use unlift::truth::{Original, Secret};
+use unlift::{Descriptors, Error, PointSet, Unit};
 
 /// Returns points of a room: walls, uneven clusters, scatter, and 3 % that coincide with another
 /// point.
@@ -52,7 +57,7 @@ pub fn piles<const D: usize>(
 }
 
 /// Returns image bounds around `points`, in whole units of `step`.
-pub fn image_around<const D: usize>(points: &[[f64; D]], step: f64) -> Bounds<D> {
+fn image_around<const D: usize>(points: &[[f64; D]], step: f64) -> Bounds<D> {
     if points.is_empty() {
         return Bounds { low: [0.0; D], high: [step; D] };
     }
@@ -63,4 +68,43 @@ pub fn image_around<const D: usize>(points: &[[f64; D]], step: f64) -> Bounds<D>
         low: std::array::from_fn(|c| ((low(c) / step).floor() - 1.0) * step),
         high: std::array::from_fn(|c| ((high(c) / step).ceil() + 1.0) * step),
     }
+}
+
+/// Hides `points`. In 2D they are keypoints of an image, whose sides are multiples of `step`.
+///
+/// # Errors
+/// When the scheme cannot hide these points.
+pub fn hide<const D: usize>(
+    scheme: &dyn Scheme<D>,
+    points: &[[f64; D]],
+    step: f64,
+    seed: u64,
+) -> Result<(Original<D>, Released<D>, Secret), Error> {
+    let set = PointSet::try_new(points.to_vec(), Unit::Meter)?;
+    let original = match D {
+        2 => Original::within(set, image_around(points, step))?,
+        _ => Original::new(set),
+    };
+    let (released, secret) = obfuscate(scheme, &original, None, &Key::from_seed(seed))?;
+    Ok((original, released, secret))
+}
+
+/// Returns a room hidden by `scheme`, with SIFT-like descriptors (128 bytes) that change slowly
+/// over the room, and the secret, with which you can measure lists.
+///
+/// # Panics
+/// When the scheme cannot hide a room of `n` points.
+pub fn described_map(scheme: &dyn Scheme<3>, n: usize) -> (Original<3>, Released<3>, Secret) {
+    let points: Vec<[f64; 3]> = room(4, n);
+    let value = |point: &[f64; 3], bin: usize| {
+        let mut draws = Draws::new(99, Stage::Synthetic, bin as u64);
+        let phase: f64 = point.iter().map(|x| draws.between(-3.0, 3.0) * x).sum();
+        (60.0 + 55.0 * (phase + draws.between(0.0, 6.0)).sin()) as u8
+    };
+    let bytes = points.iter().flat_map(|point| (0..128).map(|bin| value(point, bin))).collect();
+    let descriptors = Descriptors::try_new(Values::U8(bytes), 128).expect("128 bytes a point");
+    let original = Original::new(PointSet::try_new(points, Unit::Meter).expect("finite points"));
+    let (released, secret) = obfuscate(scheme, &original, Some(&descriptors), &Key::from_seed(1))
+        .unwrap_or_else(|error| panic!("{} cannot hide a room: {error}", scheme.name()));
+    (original, released, secret)
 }
