@@ -15,7 +15,7 @@ use unlift::truth::{Original, Secret};
 use unlift::{Descriptors, PointSet, Unit};
 use unlift_report::document::Input;
 
-use crate::Error;
+use crate::{Audit, Error};
 
 /// Limits of delta, in multiples of the quartiles of the distance to the K-th neighbor; beyond them
 /// the attack did not learn the distance of neighbors. On RedKitchen and Castle delta is 0.1
@@ -113,14 +113,14 @@ impl Spread {
 
     /// Measures the spread of a map in parts. Neighbors are searched within a part.
     pub(crate) fn of_parts(
-        parts: impl ExactSizeIterator<Item = Result<Original<3>, unlift::Error>>,
+        parts: impl ExactSizeIterator<Item = Result<PointSet<3>, unlift::Error>>,
         k: usize,
     ) -> Result<Self, unlift::Error> {
         let of_each = SAMPLE.div_ceil(parts.len().max(1));
         let (mut all, mut fewest) = (Vec::new(), usize::MAX);
         for part in parts {
             let part = part?;
-            all.extend(distances(part.reveal().positions(), k, of_each)?);
+            all.extend(distances(part.positions(), k, of_each)?);
             fewest = fewest.min(part.len());
         }
         Ok(Self::of_distances(all, fewest))
@@ -319,14 +319,9 @@ fn across(points: &[[f64; 3]]) -> f64 {
     if points.is_empty() {
         return 0.0;
     }
-    let middle: [f64; 3] = std::array::from_fn(|axis| {
-        let mut coordinates: Vec<f64> = points.iter().map(|p| p[axis]).collect();
-        median(&mut coordinates)
-    });
-    let distance = |p: &[f64; 3]| -> f64 {
-        (0..3).map(|axis| (p[axis] - middle[axis]).powi(2)).sum::<f64>().sqrt()
-    };
-    let mut distances: Vec<f64> = points.iter().map(distance).collect();
+    let middle =
+        [0, 1, 2].map(|axis| median(&mut points.iter().map(|p| p[axis]).collect::<Vec<_>>()));
+    let mut distances: Vec<f64> = points.iter().map(|p| distance(p, &middle)).collect();
     let at = (distances.len() - 1) * 9 / 10;
     2.0 * *distances.select_nth_unstable_by(at, f64::total_cmp).1
 }
@@ -359,36 +354,27 @@ pub fn check_scale(points: &[[f64; 3]], scale: Option<f64>) -> Result<(), Error>
     Err(error.advise("--scale 1 for a map in meters, or no --scale for relative lengths"))
 }
 
-/// Messages about lengths: a note, and a doubt, with which no gate holds.
-#[derive(Debug, Default, PartialEq, Eq)]
-pub struct LengthMessages {
-    /// Figures may be too large.
-    pub note: Option<String>,
-    /// Figures may be too small.
-    pub doubt: Option<String>,
-}
-
-/// Checks thresholds against the points, in the unit of the audit. Default thresholds in a relative
-/// unit always fit.
+/// Checks thresholds against the points, in the unit of the audit. Adds a note to `audit` if figures may be too large, and a doubt
+/// if they may be too small. Default thresholds in a relative unit always fit.
 ///
 /// # Errors
 /// If any guess would count as recovered, or no attack could come near.
 pub fn check_thresholds(
-    points: &[[f64; 3]],
-    unit: Unit,
+    audit: &mut Audit,
+    points: &PointSet<3>,
     thresholds: &[Threshold],
     typed: bool,
-) -> Result<LengthMessages, Error> {
-    if unit != Unit::Meter && !typed {
-        return Ok(LengthMessages::default());
-    }
+) -> Result<(), Error> {
+    let unit = points.unit();
     let by_size = |a: &&Threshold, b: &&Threshold| a.value.total_cmp(&b.value);
-    let (Some(smallest), Some(largest)) =
-        (thresholds.iter().min_by(by_size), thresholds.iter().max_by(by_size))
-    else {
-        return Ok(LengthMessages::default());
+    let (Some(smallest), Some(largest), true) = (
+        thresholds.iter().min_by(by_size),
+        thresholds.iter().max_by(by_size),
+        unit == Unit::Meter || typed,
+    ) else {
+        return Ok(());
     };
-    let (nearest, across) = (nearest(points)?, across(points));
+    let (nearest, across) = (nearest(points.positions())?, across(points.positions()));
     let option = if typed { "--thresholds" } else { "--scale" };
     let times = match unit {
         Unit::KthNeighbor => " times the usual distance to the K-th neighbor",
@@ -414,19 +400,17 @@ pub fn check_thresholds(
              found {nearest_text}: no attack could come near"
         )));
     }
-    let note = (across > 0.0 && largest.value >= across).then(|| {
-        format!(
+    if across > 0.0 && largest.value >= across {
+        audit.notes.push(format!(
             "the map is {across_text} across, less than the threshold {largest_text}: within it any guess counts as recovered"
-        )
-    });
-    let is_doubtful = note.is_none() && nearest >= UNUSUAL * largest.value;
-    let doubt = is_doubtful.then(|| {
-        format!(
+        ));
+    } else if nearest >= UNUSUAL * largest.value {
+        audit.doubts.push(format!(
             "lengths are doubtful: points are {nearest_text} from their nearest neighbors, far more than the largest threshold, \
              {largest_text}: is {option} right?"
-        )
-    });
-    Ok(LengthMessages { note, doubt })
+        ));
+    }
+    Ok(())
 }
 
 /// Share of a threshold that noise of records may take. Attacks stay on records, and others may average noise away.
@@ -535,6 +519,7 @@ fn columns(rows: &Descriptors, secret: &Secret, points: &[[f64; 3]]) -> Vec<Stri
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Output;
     use unlift::audit::{Silent, run};
     use unlift::recover::Builtin;
     use unlift::synthetic;
@@ -561,14 +546,19 @@ mod tests {
         synthetic::room(0, 2000).points.iter().map(|p| p.map(|x| x * scale)).collect()
     }
 
+    /// Returns the notes and doubts, or the error.
     fn checked(
         scale: f64,
         unit: Unit,
         labels: [&str; 2],
         typed: bool,
-    ) -> Result<LengthMessages, String> {
+    ) -> Result<[Vec<String>; 2], String> {
+        let points = PointSet::try_new(room(scale), unit).unwrap();
         let thresholds = labels.map(|label| Threshold::parse(label).unwrap());
-        check_thresholds(&room(scale), unit, &thresholds, typed).map_err(|error| error.to_string())
+        let mut audit = Audit::new(Output::new("".as_ref()));
+        check_thresholds(&mut audit, &points, &thresholds, typed)
+            .map(|()| [audit.notes, audit.doubts])
+            .map_err(|error| error.to_string())
     }
 
     #[test]
@@ -582,19 +572,20 @@ mod tests {
     #[test]
     fn thresholds_that_mean_nothing_for_a_map_are_refused_or_noted() {
         let usual = |scale| checked(scale, Unit::Meter, ["0.10", "0.25"], false);
-        assert_eq!(usual(1.0), Ok(LengthMessages::default()));
+        let nothing = || Ok([const { Vec::new() }; 2]);
+        assert_eq!(usual(1.0), nothing());
         // The larger threshold alone gives a note.
-        let note = usual(0.03).unwrap().note.unwrap();
-        assert!(note.contains("less than the threshold 0.25 m"), "{note}");
-        let doubt = usual(100.0).unwrap().doubt.unwrap();
-        assert!(doubt.ends_with("is --scale right?"), "{doubt}");
+        let [notes, doubts] = usual(0.03).unwrap();
+        assert!(doubts.is_empty() && notes[0].contains("less than the threshold 0.25 m"));
+        let [notes, doubts] = usual(100.0).unwrap();
+        assert!(notes.is_empty() && doubts[0].ends_with("is --scale right?"), "{doubts:?}");
         // Thresholds as typed are checked in any unit.
         let of = |labels, typed| checked(20.0, Unit::KthNeighbor, labels, typed);
         for labels in [["1e300", "1e301"], ["1e-300", "1e-9"]] {
             assert!(of(labels, true).unwrap_err().starts_with("--thresholds: expected"));
-            assert_eq!(of(labels, false), Ok(LengthMessages::default()));
+            assert_eq!(of(labels, false), nothing());
         }
-        assert_eq!(of(["1.0", "2.5"], true), Ok(LengthMessages::default()));
+        assert_eq!(of(["1.0", "2.5"], true), nothing());
     }
 
     #[test]

@@ -367,10 +367,11 @@ pub fn check_lengths_of_gates(points: &PointSet<3>, gates: &[Gate]) -> Result<()
 /// Returns the result of a gate. It fails if something it applies to was not audited, or if a row it applies to has a doubt. A gate
 /// that names no attack needs the best one of each kind.
 pub fn gate_result(gate: &Gate, attacked: &Attacked) -> Result<GateResult, Error> {
-    let Attacked { tried, rows, not_audited, doubts, localization, .. } = attacked;
+    let Attacked { tried, document, not_audited, doubts, .. } = attacked;
     if gate.figure == Figure::Localization {
-        return Ok(of_localization(gate, localization, not_audited));
+        return Ok(of_localization(gate, &document.localization, not_audited));
     }
+    let rows = &document.results;
     let label = gate.label_in(tried);
     let worst = label.and_then(|label| gate.worst(rows.iter(), label));
     let highest = worst.map(|(worst, _)| worst.interval[1]);

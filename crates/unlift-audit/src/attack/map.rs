@@ -9,7 +9,7 @@ use unlift::released::Released;
 use unlift::truth::{Original, Secret};
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::scene::{ObfuscationView, SceneBox, points_within_budget, subsample};
-use unlift_report::{Attack, ByAttack, RenderOptions, Scene3d};
+use unlift_report::{Attack, ByAttack, Document, RenderOptions, Scene3d};
 
 use super::curves::{Curves, OfItems};
 use super::tiles::{Tiles, figures};
@@ -107,11 +107,7 @@ impl Map<'_> {
         };
         let cut = tiles.map(|tiles| tiles.of(points.positions(), self.up)).transpose()?;
         let spread = match &cut {
-            Some(tiles) => {
-                let parts =
-                    tiles.iter().map(|tile| tile.item(original, None).map(|item| item.original));
-                Spread::of_parts(parts, plan.k)
-            }
+            Some(tiles) => Spread::of_parts(tiles.iter().map(|tile| tile.points(points)), plan.k),
             None => Spread::of(points.positions(), plan.k),
         };
         let spread = spread.map_err(of_file)?;
@@ -165,32 +161,32 @@ impl Map<'_> {
         for note in doubts.notes.iter().filter(|note| !audit.doubts.contains(note)) {
             progress.say(&format!("note: {note}"));
         }
-        let mut options = document::options(plan);
-        options.extend(audit.options.clone());
-        if let Some(inversion) = &self.inversion {
-            options.insert("inverter_sha256".into(), inversion.sha256().into());
-        }
+        let inverter = self.inversion.as_ref().map(|inversion| inversion.sha256());
+        let mut options = document::options(plan, &audit.options, inverter);
         if let Some(Tiles { max_points, only }) = tiles {
             options.insert("tile_points".into(), max_points.into());
             options.extend(only.map(|at| ("tile".to_owned(), at.into())));
         }
         let error_cdf = curves.of_rows(&outcome.rows);
         let tiles = cut.iter().flat_map(|tiles| figures(tiles, &tile_rows, &outcome.rows));
-        let attacked = Attacked {
-            tried,
-            about: with_sides(audit.about.clone(), points),
+        let document = Document {
+            input: with_sides(audit.about.clone(), points),
             options,
             notes: [audit.notes.clone(), doubts.notes, notes_on_images].concat(),
-            doubts: doubts.of_rows,
             localization,
             tiles: tiles.collect(),
+            results: outcome.rows,
+            break_even: outcome.break_even,
+            ..Document::default()
+        };
+        let attacked = Attacked {
+            tried,
+            document,
+            not_audited: outcome.not_audited,
+            seconds: outcome.seconds,
+            doubts: doubts.of_rows,
             scene,
             rendering: RenderOptions { error_cdf, inversions, ..RenderOptions::default() },
-            rows: outcome.rows,
-            not_audited: outcome.not_audited,
-            break_even: outcome.break_even,
-            seconds: outcome.seconds,
-            images: Vec::new(),
         };
         audit.finish(plan, attacked)
     }

@@ -19,8 +19,8 @@ use unlift_audit::{Audit, Audited, Error, Gate, Input, Output, Prepared, Quiet};
 /// Runs the audit of a map and writes nothing.
 fn audited(prepared: &Prepared, input: &Input<'_>, gates: &[&str]) -> Result<Audited, Error> {
     let gates = gates.iter().map(|gate| Gate::parse(gate).unwrap()).collect();
-    let audit = Audit::of_map(prepared, Output::new(Path::new("")));
-    Audit { gates, ..audit }.run(input, &Quiet)
+    let audit = Audit { gates, ..Audit::new(Output::new(Path::new(""))) };
+    audit.of_map(prepared).run(input, &Quiet)
 }
 
 /// Returns the schemes with these names.

@@ -40,7 +40,7 @@ pub fn run(args: &ExportArgs) -> crate::Result<()> {
         return Err(Error::request(format!("--cameras: expected a folder as --out, found {out}")));
     }
     let n = if is_cloud {
-        check_file(&args.out, Kind::Cloud, &rules)?;
+        check_file("--out", &args.out, Kind::Cloud, &rules)?;
         cloud(args, is("ply"))?
     } else if ending.is_some() && !args.out.is_dir() {
         return Err(Error::request(format!(

@@ -18,7 +18,7 @@ use unlift_audit::{Progress as _, check_file};
 
 pub fn run(args: &FeaturesArgs) -> crate::Result<()> {
     let rules = Rules::new([args.images.as_path()], false);
-    let target = check_file(&args.out, Kind::Features, &rules)?;
+    let target = check_file("--out", &args.out, Kind::Features, &rules)?;
     check_no_photo(&args.images, &target)?;
     if args.as_stored && args.images.is_file() {
         return Err(Error::request("--as-stored: expected with a folder of photos, found a file"));

@@ -250,7 +250,7 @@ const K: u16 = 50;
 pub fn neighbors(args: &NeighborsArgs) -> crate::Result<()> {
     let inputs = [Some(args.released.as_path()), args.truth.as_deref()];
     let rules = &Rules::new(inputs.into_iter().flatten(), false);
-    check_file(&args.out, Kind::Stage(Stage::Neighborhoods), rules)?;
+    check_file("--out", &args.out, Kind::Stage(Stage::Neighborhoods), rules)?;
     let images = has_images(&args.released)?;
     let alive = Progress::uncounted(false, "finding neighbors");
     let (counts, name) = match (&args.neighbors, args.truth.as_deref(), args.inlier_ratio) {
@@ -292,7 +292,7 @@ fn write_lists(
     rules: &Rules,
     lists: &Neighborhoods,
 ) -> crate::Result<Counts> {
-    check_file(&args.out, Kind::Stage(Stage::Neighborhoods), rules)?;
+    check_file("--out", &args.out, Kind::Stage(Stage::Neighborhoods), rules)?;
     write_neighborhoods(&args.out, lists)?;
     let (slots, longest) = (lists.n_slots(), lists.longest());
     Ok(Counts { slots, longest, ..Counts::default() })
@@ -405,7 +405,7 @@ fn images_by_oracle(
 pub fn recover(args: &RecoverArgs) -> crate::Result<()> {
     let rules = Rules::new([args.released.as_path(), &args.neighbors], false);
     let kind = Kind::Stage(Stage::Recovered);
-    check_file(&args.out, kind, &rules)?;
+    check_file("--out", &args.out, kind, &rules)?;
     let alive = Progress::uncounted(false, "recovering");
     let what = if has_images(&args.released)? {
         let Counts { points, slots, images, .. } = recover_images(args, &rules, &alive)?;
@@ -417,7 +417,7 @@ pub fn recover(args: &RecoverArgs) -> crate::Result<()> {
         check_lists(args, &released, &lists, &mut HashSet::new(), &alive)?;
         let recovered = recovered(args, &released, &lists)
             .map_err(|error| FileError::core(&args.released, error))?;
-        check_file(&args.out, kind, &rules)?;
+        check_file("--out", &args.out, kind, &rules)?;
         write_recovered(&args.out, &recovered)?;
         let (n, slots) = (n_recovered(&recovered), recovered.n_slots());
         let (delta, unit) = (recovered.delta(), recovered.unit().name());

@@ -31,7 +31,7 @@ pub fn run(args: &TableArgs) -> crate::Result<()> {
     };
     let rules = Rules::new([args.audit.as_path()], false);
     if let Some(path) = &args.out {
-        check_file(path, kind, &rules)?;
+        check_file("--out", path, kind, &rules)?;
     }
     let document = read_document(&args.audit)?;
     let known = thresholds(&document);

@@ -28,9 +28,9 @@ use unlift::sequence::{Links, Query, Solved, recover, with_lists};
 use unlift::truth::{OriginalId, Secret};
 use unlift_io::hash::hash_files;
 use unlift_io::read;
-use unlift_report::RenderOptions;
 use unlift_report::document::{ImageCounts, Input};
 use unlift_report::inversions::Inversion as Sheet;
+use unlift_report::{Document, RenderOptions};
 use unlift_vision::pictures::Points;
 
 use self::view::{Model, View};
@@ -77,8 +77,8 @@ const LEAST_VIEWS: usize = 3;
 impl Sequence<'_> {
     /// Attacks the images. Fewer than two with usable features, or fewer than the smallest number of queries, are an error.
     pub(super) fn attack(&self, audit: &Audit, progress: &dyn Progress) -> Result<Audited, Error> {
-        let skipped = &self.source.passed_over;
-        skipped.iter().for_each(|note| progress.say(&format!("note: {note}")));
+        let FeatureSource { passed_over, refused, .. } = self.source;
+        passed_over.iter().for_each(|note| progress.say(&format!("note: {note}")));
         progress.show(0, 1, "reading images");
         let input = read::open(self.model)?;
         let Some(folder) = &input.model else {
@@ -86,8 +86,8 @@ impl Sequence<'_> {
             return Err(unlift_io::Error::new(self.model, "", expected, input.format).into());
         };
         let pose_error = self.pose_error.map(|error| (error, self.plan.seed));
-        let (mut views, mut unusable) = (Vec::new(), self.source.refused.len());
-        self.source.refused.iter().for_each(|line| progress.say(line));
+        let (mut views, mut unusable) = (Vec::new(), refused.len());
+        refused.iter().for_each(|line| progress.say(line));
         let model = Model::read(folder)?;
         for view in model.views((self.source, self.path), pose_error) {
             match view {
@@ -121,7 +121,7 @@ impl Sequence<'_> {
         let tried = self.tried(&queries);
         audit.begin(&tried, None, &notes, progress)?;
         let mut inversions: Vec<Sheet> = Vec::new();
-        let (rows, seconds) = self.rows(&views, &queries, &mut inversions, progress)?;
+        let (results, seconds) = self.rows(&views, &queries, &mut inversions, progress)?;
         // Photos that could not be used have no pictures.
         inversions.retain(|sheet| !sheet.views.is_empty());
         let mut options = names(&tried, audit);
@@ -131,16 +131,15 @@ impl Sequence<'_> {
             options.insert("pose_error_distance".into(), json!(error.center));
             options.insert("pose_error_angle_deg".into(), json!(error.rotation_degrees));
         }
-        let attacked = Attacked {
-            tried,
-            rows,
-            seconds,
-            about: self.about(&input, &views, unusable)?,
+        let document = Document {
+            input: self.about(&input, &views, unusable)?,
             options,
+            results,
             notes,
-            rendering: RenderOptions { inversions, ..RenderOptions::default() },
-            ..Attacked::default()
+            ..Document::default()
         };
+        let rendering = RenderOptions { inversions, ..RenderOptions::default() };
+        let attacked = Attacked { tried, document, seconds, rendering, ..Attacked::default() };
         audit.finish(&self.plan, attacked)
     }
 
@@ -194,9 +193,8 @@ impl Sequence<'_> {
         let mut known: Option<(Vec<Secret>, Links)> = None;
         let total = plan.schemes.len() * queries.len() * self.kinds().count();
         for scheme in &plan.schemes {
-            let started = Instant::now();
-            let (protected, secrets) = hide(&**scheme, views, plan.seed)?;
-            seconds.obfuscate += started.elapsed().as_secs_f64();
+            let hide = || hide(&**scheme, views, plan.seed);
+            let (protected, secrets) = seconds.time(|seconds| &mut seconds.obfuscate, hide)?;
             progress.show(rows.len(), total, &format!("{}, linking queries", scheme.name()));
             let started = Instant::now();
             // Links depend on descriptors and cameras only.
@@ -219,10 +217,9 @@ impl Sequence<'_> {
                     check_stop(progress)?;
                     let what = format!("{}, {n} queries, links by {by}", scheme.name());
                     progress.show(rows.len(), total, &what);
-                    let started = Instant::now();
                     let attack = Attack { links, lists, n, seed: plan.seed };
-                    let row = hidden.row(&attack, &tracks, plan)?;
-                    seconds.recover += started.elapsed().as_secs_f64();
+                    let row = || hidden.row(&attack, &tracks, plan);
+                    let row = seconds.time(|seconds| &mut seconds.recover, row)?;
                     let (scheme, neighbors) = (scheme.name().to_owned(), format!("{by}@{n}"));
                     let share = |row: &Row| row.recovered_percent[plan.headline];
                     // Who has more queries can use fewer.
@@ -240,7 +237,6 @@ impl Sequence<'_> {
                 }
             }
         }
-        seconds.rows = vec![Default::default(); rows.len()];
         Ok((rows, seconds))
     }
 }
