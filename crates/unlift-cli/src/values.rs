@@ -8,6 +8,7 @@ use unlift::audit::Threshold;
 use unlift::neighbors::sources::Named;
 use unlift::obfuscate::{Entry, Mitigation};
 use unlift::recover::Builtin;
+use unlift_audit::number;
 use unlift_audit::sources;
 pub use unlift_audit::{positive, ratio};
 use unlift_report::compare::Accepted;
@@ -46,8 +47,8 @@ pub fn by<T>(
 /// Parses a number of points, images or features. Stage files number rows with 32 bits.
 pub fn count(text: &str) -> Result<NonZeroUsize, String> {
     const MAX: usize = u32::MAX as usize;
-    let number = text.trim().parse::<NonZeroUsize>().ok().filter(|number| number.get() <= MAX);
-    number.ok_or_else(|| format!("expected a whole number from 1 to {MAX}, found {text}"))
+    let expected = format!("a whole number from 1 to {MAX}");
+    number(text, &expected, |number: &NonZeroUsize| number.get() <= MAX)
 }
 
 /// Parses the reason why inputs of a comparison may differ.
@@ -57,10 +58,7 @@ pub fn accepted(text: &str) -> Result<Accepted, String> {
 
 /// Parses a score in `0..1`.
 pub fn score(text: &str) -> Result<f32, String> {
-    match text.trim().parse::<f32>() {
-        Ok(value) if (0.0..1.0).contains(&value) => Ok(value),
-        _ => Err(format!("expected a number from 0 to below 1, found {text}")),
-    }
+    number(text, "a number from 0 to below 1", |score| (0.0..1.0).contains(score))
 }
 
 /// Parses a scheme for maps, also one that is audited only on request.
@@ -178,8 +176,7 @@ pub fn any_source(text: &str) -> Result<NeighborSource, String> {
 
 /// Parses a number of queries: two or more.
 pub fn queries(text: &str) -> Result<usize, String> {
-    let number = text.trim().parse::<usize>().ok().filter(|n| *n >= 2);
-    number.ok_or_else(|| format!("expected a whole number from 2, found {text}"))
+    number(text, "a whole number from 2", |n| *n >= 2)
 }
 
 /// Parses `perturbed:CM,DEG`.
@@ -187,9 +184,8 @@ pub fn poses(text: &str) -> Result<(f64, f64), String> {
     let wrong = || format!("expected perturbed:CM,DEG (for example perturbed:5,0.5), found {text}");
     let (cm, angle) =
         text.strip_prefix("perturbed:").and_then(|of| of.split_once(',')).ok_or_else(wrong)?;
-    let size = |text: &str| {
-        text.trim().parse::<f64>().ok().filter(|x| x.is_finite() && *x >= 0.0).ok_or_else(wrong)
-    };
+    let size =
+        |text: &str| number(text, "", |x: &f64| x.is_finite() && *x >= 0.0).map_err(|_| wrong());
     Ok((size(cm)?, size(angle)?))
 }
 

@@ -15,7 +15,7 @@ use unlift::truth::Original;
 use unlift_report::document::{self as report, UNPROTECTED};
 
 use crate::maps::{Cameras, Prepared};
-use crate::{Error, Progress};
+use crate::{Error, Progress, bail};
 
 /// Localization in an audit.
 #[derive(Clone, Debug)]
@@ -38,8 +38,7 @@ impl<'a> Localize<'a> {
         protections: Vec<Protection>,
     ) -> Result<Self, Error> {
         if prepared.cameras.views.is_empty() {
-            let expected = "--localize: expected a COLMAP model with cameras and tracks";
-            return Err(Error::request(format!("{expected}, found none")));
+            bail!("--localize: expected a COLMAP model with cameras and tracks, found none");
         }
         let held_out = Some((path.to_owned(), nth));
         Ok(Self { cameras: &prepared.cameras, held_out, protections })

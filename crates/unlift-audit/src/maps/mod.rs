@@ -20,6 +20,7 @@ use unlift_io::stage::read_point_neighborhoods;
 use unlift_report::document::Input;
 
 pub use self::cameras::Cameras;
+use crate::bail;
 use crate::doubts::{check_scale, unlike_neighbors, with_sides};
 
 /// Options for the points of a file.
@@ -103,9 +104,7 @@ impl Prepared {
             return Ok(());
         }
         let found = input.extent().unwrap_or_default();
-        let expected = format!("a longest side of {low} to {high} m");
-        let error = format!("--expect-extent: expected {expected}, found {found}");
-        Err(crate::Error::request(error))
+        bail!("--expect-extent: expected a longest side of {low} to {high} m, found {found}")
     }
 
     /// Returns the centers of the cameras, in the unit of the audit.

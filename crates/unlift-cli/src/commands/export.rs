@@ -6,7 +6,7 @@ use std::path::Path;
 use unlift::geometry::frame::Bounds;
 use unlift::released::{Obfuscation, Released};
 use unlift::{OneLine, Unit};
-use unlift_audit::{check_file, refused};
+use unlift_audit::{bail, check_file, refused};
 use unlift_io::Error as FileError;
 use unlift_io::atomic::Access;
 use unlift_io::clouds::{
@@ -37,15 +37,15 @@ pub fn run(args: &ExportArgs) -> crate::Result<()> {
     let is_cloud = is("ply") || is("obj");
     let out = OneLine(args.out.display());
     if args.cameras.is_some() && is_cloud {
-        return Err(Error::request(format!("--cameras: expected a folder as --out, found {out}")));
+        bail!("--cameras: expected a folder as --out, found {out}");
     }
     let n = if is_cloud {
         check_file("--out", &args.out, Kind::Cloud, &rules)?;
         cloud(args, is("ply"))?
     } else if ending.is_some() && !args.out.is_dir() {
-        return Err(Error::request(format!(
+        bail!(
             "--out: expected a name that ends in .ply or .obj, or a folder without an ending, found {out}"
-        )));
+        );
     } else {
         model(args, rules)?
     };
@@ -146,12 +146,8 @@ fn read(path: &Path) -> crate::Result<(Shown, Unit)> {
 fn scaled(args: &ExportArgs, (mut shown, unit): (Shown, Unit)) -> crate::Result<Shown> {
     let Some(scale) = args.scale else { return Ok(shown) };
     if unit != Unit::Meter {
-        let expected = "a file in meters (obfuscate --scale)";
-        let path = args.path.display();
-        return Err(Error::request(format!(
-            "--scale: expected {expected}, found {path} in {}",
-            unit.name()
-        )));
+        let (path, unit) = (args.path.display(), unit.name());
+        bail!("--scale: expected a file in meters (obfuscate --scale), found {path} in {unit}");
     }
     let divide = |point: &mut [f64; 3]| *point = point.map(|x| x / scale);
     match &mut shown {

@@ -10,7 +10,6 @@ use rayon::prelude::*;
 use unlift::audit::staged::{Pooled, key_of, oracle_lists, oracle_seed};
 use unlift::audit::{Plan, Row, Threshold, measure};
 use unlift::evaluate::blind;
-use unlift::neighbors::oracle::{Outliers, TrueNeighbors, search};
 use unlift::neighbors::sources::Named;
 use unlift::neighbors::{Needs as SourceNeeds, Neighborhoods, Source, of_what_there_is};
 use unlift::obfuscate::{Change, Changed, Scheme, SchemeOptions, obfuscate as hide};
@@ -23,7 +22,7 @@ use unlift_audit::changes::{mitigations, protections_of_map};
 use unlift_audit::images::FeatureSource;
 use unlift_audit::images::stream::{Stream, Tally};
 use unlift_audit::released::{expect_slots, same_map};
-use unlift_audit::{Checked, Prepared, Progress as _, check_file, refused};
+use unlift_audit::{Checked, Prepared, Progress as _, bail, check_file, refused};
 use unlift_io::Error as FileError;
 use unlift_io::atomic::{Access, OutputFile};
 use unlift_io::outputs::{Kind, OutputSet, Rules};
@@ -172,8 +171,7 @@ fn obfuscate_images(args: &ObfuscateArgs, mut out: OutputSet) -> crate::Result<(
         ("--audit", args.audit.is_some()),
     ] {
         if given {
-            let found = format!("found {name}, which hides images");
-            return Err(Error::request(format!("{option}: expected with a map, {found}")));
+            bail!("{option}: expected with a map, found {name}, which hides images");
         }
     }
     let scheme = args.scheme.of_dimension::<2>(&SchemeOptions::usual(Unit::Pixel));
@@ -271,15 +269,9 @@ pub fn neighbors(args: &NeighborsArgs) -> crate::Result<()> {
             (counts, format!("oracle at inlier ratio {ratio}"))
         }
         (NeighborSource::Own(named), Some(_), _) => {
-            let name = named.name();
-            return Err(Error::request(format!(
-                "--truth: expected with --neighbors oracle, found {name}"
-            )));
+            bail!("--truth: expected with --neighbors oracle, found {}", named.name())
         }
-        _ => {
-            let expected = "expected --truth and --inlier-ratios, found none";
-            return Err(Error::request(format!("--neighbors oracle: {expected}")));
-        }
+        _ => bail!("--neighbors oracle: expected --truth and --inlier-ratios, found none"),
     };
     drop(alive);
     let (n, longest, out) = (counts.slots, counts.longest, OneLine(args.out.display()));
@@ -353,14 +345,9 @@ fn map_by_oracle(args: &NeighborsArgs, truth: &Path, ratio: f64) -> crate::Resul
     let released = read_released::<3>(&args.released)?;
     same_map(&args.released, Some(released.fingerprint()), truth, secret.map())?;
     expect_slots(&args.released, &released, &secret)?;
-    let k = usize::from(args.k.unwrap_or(K));
-    let lists = || {
-        let knn = search(&original)?;
-        let near = TrueNeighbors::new(&knn, &secret, released.slots_per_record(), k)?;
-        let outliers = Outliers::new(args.oracle_noise, &near, &knn, &secret, args.seed)?;
-        near.lists(ratio, &outliers, args.seed)
-    };
-    Ok(lists().map_err(|error| FileError::core(truth, error))?)
+    let how = (args.oracle_noise, ratio, usize::from(args.k.unwrap_or(K)));
+    let lists = oracle_lists(&original, &(released, secret), how, args.seed);
+    Ok(lists.map_err(|error| FileError::core(truth, error))?)
 }
 
 /// Writes a source's lists for all images.

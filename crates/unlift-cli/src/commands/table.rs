@@ -2,13 +2,12 @@
 
 use std::io::Write;
 
-use unlift_audit::check_file;
+use unlift_audit::{bail, check_file};
 use unlift_io::atomic::{Access, write_file};
 use unlift_io::outputs::{Kind, Rules};
 use unlift_report::export::{TableFormat, curves, table, thresholds};
 
 use super::common::read_document;
-use crate::Error;
 use crate::args::TableArgs;
 use crate::output::print;
 use crate::stderr;
@@ -24,9 +23,8 @@ pub fn run(args: &TableArgs) -> crate::Result<()> {
         Some("csv") => (Some(TableFormat::Csv), Kind::Table),
         Some("svg") => (None, Kind::Curves),
         Some(_) => {
-            let expected = "--out: expected a name that ends in .md, .tex, .csv or .svg";
             let found = args.out.iter().map(|out| out.display().to_string()).collect::<String>();
-            return Err(Error::request(format!("{expected}, found {found}")));
+            bail!("--out: expected a name that ends in .md, .tex, .csv or .svg, found {found}")
         }
     };
     let rules = Rules::new([args.audit.as_path()], false);
@@ -35,23 +33,22 @@ pub fn run(args: &TableArgs) -> crate::Result<()> {
     }
     let document = read_document(&args.audit)?;
     let known = thresholds(&document);
-    let only = args.thresholds.as_ref().map(|requested| {
+    let only = args.thresholds.as_ref().and_then(|requested| {
         let same = |typed: &&&str| typed.parse::<f64>().is_ok_and(|value| value == requested.value);
-        known.iter().find(same).copied().ok_or_else(|| {
-            let (known, found) = (known.join(", "), &requested.label);
-            Error::request(format!(
-                "--thresholds: expected one of {known}, as in the audit, found {found}"
-            ))
-        })
+        known.iter().find(same).copied()
     });
-    let only = only.transpose()?;
+    if let (Some(requested), None) = (&args.thresholds, only) {
+        let (known, found) = (known.join(", "), &requested.label);
+        bail!("--thresholds: expected one of {known}, as in the audit, found {found}");
+    }
     let text = match format {
         Some(format) => table(&document, format, only),
-        None => curves(&document, only)?.ok_or_else(|| {
-            Error::request(
-                "--out: expected an audit with rows by the oracle, for curves, found none",
-            )
-        })?,
+        None => match curves(&document, only)? {
+            Some(curves) => curves,
+            None => {
+                bail!("--out: expected an audit with rows by the oracle, for curves, found none")
+            }
+        },
     };
     // A table does not show schemes that were not audited.
     for missing in &document.not_audited {

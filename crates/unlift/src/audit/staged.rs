@@ -10,33 +10,33 @@ use super::many::{Pool, merge_counts};
 use super::plan::{NeighborsBy, Plan, Variant};
 use super::row::{ByReason, Row, dropped, measure};
 use super::share::Threshold;
+use crate::Error;
 use crate::evaluate::{blind, distinct_weights};
 use crate::neighbors::Neighborhoods;
 use crate::neighbors::oracle::{self, Noise};
 use crate::recover::Recovered;
 use crate::released::Released;
 use crate::truth::{Original, Secret};
-use crate::{Error, Unit};
 
 /// Makes lists of `k` records at inlier ratio `ratio`, shorter in an image with too few points.
-/// `seed` comes from [`oracle_seed`].
+/// `seed` is that of a map, or comes from [`oracle_seed`].
 ///
 /// # Errors
-/// When the secret does not belong to these points.
-pub fn oracle_lists(
-    original: &Original<2>,
-    hidden: &(Released<2>, Secret),
+/// When the secret does not belong to these points, or a map has too few of them.
+pub fn oracle_lists<const D: usize>(
+    original: &Original<D>,
+    hidden: &(Released<D>, Secret),
     (noise, ratio, k): (Noise, f64, usize),
     seed: u64,
 ) -> Result<Neighborhoods, Error> {
-    let plan = Plan { k, ..Plan::<2>::new(Unit::Pixel) };
+    let plan = Plan { k, ..Plan::<D>::new(original.reveal().unit()) };
     let search = oracle::search(original)?;
     let by = &NeighborsBy::Oracle;
     let variant = Variant { by, noise: Some(noise), inlier_ratio: Some(ratio) };
     // The oracle's lists do not depend on the attacker's seed.
     let kept = Kept::default();
     let mut lists = Lists::new(&plan, &search, hidden, &hidden.1, (seed, 0), &kept);
-    Ok(lists.make(&variant, true)?.lists)
+    Ok(lists.make(&variant, D == 2)?.lists)
 }
 
 /// A row over many images, added one by one. Memory does not grow with their number.
