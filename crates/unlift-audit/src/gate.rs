@@ -125,12 +125,8 @@ impl Gate {
 
     /// Returns the row of `rows` with the largest bounded figure. `None` if the gate covers none of
     /// them, which must never count as passing.
-    fn worst<'r>(
-        &self,
-        rows: impl Iterator<Item = &'r Row>,
-        label: &str,
-    ) -> Option<(WithInterval, &'r Row)> {
-        let covered = rows.filter(|row| self.covers(row));
+    fn worst<'r>(&self, rows: &'r [Row], label: &str) -> Option<(WithInterval, &'r Row)> {
+        let covered = rows.iter().filter(|row| self.covers(row));
         let figures = covered.map(|row| (self.bounded(row, label), row));
         figures.reduce(|a, b| if is_worse(&b.0, &a.0) { b } else { a })
     }
@@ -369,7 +365,7 @@ pub fn gate_result(gate: &Gate, attacked: &Attacked) -> Result<GateResult, Error
     }
     let rows = &document.results;
     let label = gate.label_in(tried);
-    let worst = label.and_then(|label| gate.worst(rows.iter(), label));
+    let worst = label.and_then(|label| gate.worst(rows, label));
     let highest = worst.map(|(worst, _)| worst.interval[1]);
     let is_kept = highest.is_some_and(|highest| gate.passes(highest));
     let missing = not_audited.iter().find(|missing| gate.misses(missing)).map(|missing| {
@@ -542,7 +538,7 @@ mod tests {
             ("olc:joint:0.10<=60", alone, Some(58.6)),
             ("olc:oracle:0.10<=60", alone, Some(58.6)),
         ] {
-            let worst = Gate::parse(text).unwrap().worst(rows.iter(), "0.1");
+            let worst = Gate::parse(text).unwrap().worst(rows, "0.1");
             assert_eq!(worst.map(|(worst, _)| worst.percent), expected, "{text}");
         }
         // The upper end of an interval counts, and decides which row is the worst.
@@ -550,12 +546,12 @@ mod tests {
         few.interval.as_mut().unwrap().recovered_percent[0] = [0.0, 22.0];
         let gate = Gate::parse("all:0.1<=20").unwrap();
         let rows = [few, row("olc", 0.5, 19.0)];
-        let (worst, _) = gate.worst(rows.iter(), "0.1").unwrap();
+        let (worst, _) = gate.worst(&rows, "0.1").unwrap();
         assert_eq!((worst.percent, worst.interval), (18.0, [0.0, 22.0]));
         assert!(!gate.passes(21.0) && gate.passes(20.0));
         // A figure that is no number fails, whatever the other figures.
         let rows = [row("ppl", 1.0, 3.0), row("ppl", 0.5, f64::NAN), row("ppl", 0.3, 2.0)];
-        let (worst, _) = gate.worst(rows.iter(), "0.1").unwrap();
+        let (worst, _) = gate.worst(&rows, "0.1").unwrap();
         assert!(!gate.passes(f64::NAN) && !gate.passes(worst.interval[1]));
     }
 

@@ -7,7 +7,9 @@ use unlift::descriptors::Values;
 use unlift_io::Error;
 use unlift_io::features::{ImageFeatures, round_to_half};
 use unlift_vision::features::photo::Turn;
-use unlift_vision::features::{Extraction, Extractor, Features, LearnedFeatures, PhotoFeatures};
+use unlift_vision::features::{
+    Extraction, Extractor, Features, Keypoint, LearnedFeatures, PhotoFeatures,
+};
 
 use super::{FeatureSource, Origin};
 
@@ -53,45 +55,36 @@ pub(super) fn open(root: &Path, extraction: &Extraction) -> Result<FeatureSource
     Ok(FeatureSource { names, refused, passed_over, turn: Turn::Upright, from })
 }
 
-/// Converts extracted features to those of files.
+/// Converts extracted features to those of files, in hloc's convention: for SIFT, the middle of the first pixel moves from (0.5, 0.5)
+/// to (0, 0), where a network has it already. No other function does this.
 pub(super) fn features_of(features: PhotoFeatures) -> ImageFeatures {
     match features {
-        PhotoFeatures::Sift(features) => of_sift(features),
-        PhotoFeatures::Learned(features) => of_network(features),
-    }
-}
-
-/// Converts features to hloc's convention: the middle of the first pixel moves from (0.5, 0.5) to
-/// (0, 0). No other function does this.
-fn of_sift(features: Features) -> ImageFeatures {
-    let keypoints = &features.keypoints;
-    let scales: Vec<f32> = keypoints.iter().map(|keypoint| keypoint.scale).collect();
-    let bytes = features.descriptors.into_flattened();
-    // Descriptors that are all equal are rejected; such an image has none.
-    let descriptors = Descriptors::try_new(Values::U8(bytes), 128).ok();
-    ImageFeatures {
-        keypoints: keypoints
-            .iter()
-            .map(|keypoint| [f64::from(keypoint.x - 0.5), f64::from(keypoint.y - 0.5)])
-            .collect(),
-        orientations_deg: Some(keypoints.iter().map(|k| k.orientation.to_degrees()).collect()),
-        // SIFT contrast is not kept; large features are more repeatable than small ones.
-        scores: Some(scales.clone()),
-        scales: Some(scales),
-        descriptors,
-        ..ImageFeatures::default()
-    }
-}
-
-/// Converts the features of a network, which are already in hloc's convention.
-fn of_network(features: LearnedFeatures) -> ImageFeatures {
-    let LearnedFeatures { keypoints, scores, mut descriptors, dim } = features;
-    round_to_half(&mut descriptors);
-    ImageFeatures {
-        keypoints: keypoints.into_iter().map(|place| place.map(f64::from)).collect(),
-        scores: Some(scores),
-        descriptors: Descriptors::try_new(Values::F32(descriptors), dim).ok(),
-        ..ImageFeatures::default()
+        PhotoFeatures::Sift(Features { keypoints, descriptors }) => {
+            let scales: Vec<f32> = keypoints.iter().map(|keypoint| keypoint.scale).collect();
+            let place = |keypoint: &Keypoint| [keypoint.x, keypoint.y].map(|x| f64::from(x - 0.5));
+            ImageFeatures {
+                keypoints: keypoints.iter().map(place).collect(),
+                orientations_deg: Some(
+                    keypoints.iter().map(|k| k.orientation.to_degrees()).collect(),
+                ),
+                // SIFT contrast is not kept; large features are more repeatable than small ones.
+                scores: Some(scales.clone()),
+                scales: Some(scales),
+                // Descriptors that are all equal are rejected; such an image has none.
+                descriptors: Descriptors::try_new(Values::U8(descriptors.into_flattened()), 128)
+                    .ok(),
+                ..ImageFeatures::default()
+            }
+        }
+        PhotoFeatures::Learned(LearnedFeatures { keypoints, scores, mut descriptors, dim }) => {
+            round_to_half(&mut descriptors);
+            ImageFeatures {
+                keypoints: keypoints.into_iter().map(|place| place.map(f64::from)).collect(),
+                scores: Some(scores),
+                descriptors: Descriptors::try_new(Values::F32(descriptors), dim).ok(),
+                ..ImageFeatures::default()
+            }
+        }
     }
 }
 

@@ -150,20 +150,18 @@ pub fn open(
     })?;
     check_scale(&input.positions, preparation.scale)?;
     let (mut notes, mut doubts) = (input.notes.clone(), input.doubts.clone());
-    let described = match descriptors {
-        Some(file) => Some((read::descriptors(file, &input)?, file.to_owned())),
-        None if preparation.beside => match beside(&input) {
+    let mut described = None;
+    if let Some(file) = descriptors {
+        described = Some((read::descriptors(file, &input)?, file.to_owned()));
+    } else if preparation.beside {
+        match beside(&input) {
             Ok((rows, file)) => {
                 notes.push(format!("descriptors: {}, beside the model", file.display()));
-                Some((rows, file))
+                described = Some((rows, file));
             }
-            Err(reasons) => {
-                doubts.extend(reasons);
-                None
-            }
-        },
-        None => None,
-    };
+            Err(reasons) => doubts.extend(reasons),
+        }
+    }
     let (rows, file) = described.unzip();
     let mut prepared = prepare(&input.positions, rows.as_ref(), preparation).map_err(|error| {
         let few = error.kind() == ErrorKind::TooFewPoints && input.positions.len() > 2;
@@ -197,13 +195,13 @@ pub fn open(
 /// them has.
 fn beside(input: &read::Input) -> Result<(Descriptors, PathBuf), Vec<String>> {
     let mut reasons = Vec::new();
-    for file in &input.beside {
-        match read::descriptors(file, input) {
-            Ok(rows) => return Ok((rows, file.clone())),
-            Err(error) => reasons.push(format!("descriptors: {error}")),
-        }
-    }
-    Err(reasons)
+    let read = |file: &PathBuf| {
+        let rows = read::descriptors(file, input);
+        rows.map_err(|error| reasons.push(format!("descriptors: {error}")))
+            .ok()
+            .map(|rows| (rows, file.clone()))
+    };
+    input.beside.iter().find_map(read).ok_or(reasons)
 }
 
 /// Returns `rows` among all points of the file, which may contain points that the reader left out.

@@ -107,8 +107,15 @@ pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<()> {
     prepared.doubts.iter().chain(&prepared.notes).for_each(stderr::note);
     let scheme = changed(args, scheme, &prepared)?;
     let name = scheme.name();
-    let leak = args.audit.as_deref().map(|path| leak_of(path, args, &prepared, name));
-    let leak = leak.transpose()?;
+    let leak = match &args.audit {
+        Some(path) => {
+            let public = public_name(args.public_descriptors.as_deref());
+            let public = args.protect_descriptors.as_ref().map(|_| public);
+            let leak = leak(&read_document(path)?, &prepared.about(&args.path)?, name, public);
+            Some(leak.map_err(|of| FileError::new(path, of.place, of.expected, of.found))?)
+        }
+        None => None,
+    };
     let hidden = hide(&*scheme, &prepared.original, prepared.descriptors.as_ref(), &key(args)?);
     let (released, secret) = hidden.map_err(|error| FileError::core(&args.path, error))?;
     write_truth(&out.stage(TRUTH, Kind::Stage(Stage::Truth))?, &prepared.original, &secret)?;
@@ -143,20 +150,6 @@ fn changed(
         Some(change) => Arc::new(Changed::new(scheme, change)),
         None => scheme,
     })
-}
-
-/// Returns what the audit at `path` says about this release.
-fn leak_of(
-    path: &Path,
-    args: &ObfuscateArgs,
-    prepared: &Prepared,
-    scheme: &str,
-) -> crate::Result<String> {
-    let document = read_document(path)?;
-    let public = || public_name(args.public_descriptors.as_deref());
-    let public = args.protect_descriptors.as_ref().map(|_| public());
-    leak(&document, &prepared.about(&args.path)?, scheme, public)
-        .map_err(|wrong| FileError::new(path, wrong.place, wrong.expected, wrong.found).into())
 }
 
 /// Hides the keypoints of all images, each under a key of its own, and writes both files into `out`.
@@ -255,18 +248,12 @@ pub fn neighbors(args: &NeighborsArgs) -> crate::Result<()> {
         (NeighborSource::Own(named), None, _) => {
             let of_k = |k| named.clone().with_k(usize::from(k));
             let named = args.k.map_or_else(|| named.clone(), of_k);
-            let counts = match images {
-                true => images_by_source(args, &named, rules)?,
-                false => write_lists(args, rules, &map_by_source(args, &named)?)?,
-            };
-            (counts, named.name().to_owned())
+            let by_source = if images { images_by_source } else { map_by_source };
+            (by_source(args, &named, rules)?, named.name().to_owned())
         }
         (NeighborSource::Oracle, Some(truth), Some(ratio)) => {
-            let counts = match images {
-                true => images_by_oracle(args, truth, ratio, rules)?,
-                false => write_lists(args, rules, &map_by_oracle(args, truth, ratio)?)?,
-            };
-            (counts, format!("oracle at inlier ratio {ratio}"))
+            let by_oracle = if images { images_by_oracle } else { map_by_oracle };
+            (by_oracle(args, truth, ratio, rules)?, format!("oracle at inlier ratio {ratio}"))
         }
         (NeighborSource::Own(named), Some(_), _) => {
             bail!("--truth: expected with --neighbors oracle, found {}", named.name())
@@ -318,8 +305,8 @@ fn check_descriptors<const D: usize>(
     }
 }
 
-/// Makes the lists of a map as an attacker does.
-fn map_by_source(args: &NeighborsArgs, named: &Named) -> crate::Result<Neighborhoods> {
+/// Writes a source's lists for a map.
+fn map_by_source(args: &NeighborsArgs, named: &Named, rules: &Rules) -> crate::Result<Counts> {
     let released = read_released::<3>(&args.released)?;
     let source = named.of_dimension::<3>()?;
     let of_map = |error| FileError::core(&args.released, error);
@@ -335,11 +322,17 @@ fn map_by_source(args: &NeighborsArgs, named: &Named) -> crate::Result<Neighborh
     if let Some(note) = source.note(released.n_slots()) {
         stderr::note(note);
     }
-    Ok(source.lists(&released, source.k(&released), args.seed).map_err(of_map)?)
+    let lists = source.lists(&released, source.k(&released), args.seed).map_err(of_map)?;
+    write_lists(args, rules, &lists)
 }
 
-/// Makes the lists of a map at one inlier ratio.
-fn map_by_oracle(args: &NeighborsArgs, truth: &Path, ratio: f64) -> crate::Result<Neighborhoods> {
+/// Writes the oracle's lists for a map.
+fn map_by_oracle(
+    args: &NeighborsArgs,
+    truth: &Path,
+    ratio: f64,
+    rules: &Rules,
+) -> crate::Result<Counts> {
     let (original, secret) = read_truth::<3>(truth)?;
     // Only the released map has the number of points per record.
     let released = read_released::<3>(&args.released)?;
@@ -347,14 +340,14 @@ fn map_by_oracle(args: &NeighborsArgs, truth: &Path, ratio: f64) -> crate::Resul
     expect_slots(&args.released, &released, &secret)?;
     let how = (args.oracle_noise, ratio, usize::from(args.k.unwrap_or(K)));
     let lists = oracle_lists(&original, &(released, secret), how, args.seed);
-    Ok(lists.map_err(|error| FileError::core(truth, error))?)
+    write_lists(args, rules, &lists.map_err(|error| FileError::core(truth, error))?)
 }
 
 /// Writes a source's lists for all images.
 fn images_by_source(args: &NeighborsArgs, named: &Named, rules: &Rules) -> crate::Result<Counts> {
-    let source = named.of_dimension::<2>().map_err(|_| {
-        Error::request(format!("--neighbors {}: expected with a map, found images", named.name()))
-    })?;
+    let Ok(source) = named.of_dimension::<2>() else {
+        bail!("--neighbors {}: expected with a map, found images", named.name());
+    };
     let mut images = ImageFile::open(&args.released, Stage::Released)?;
     let work = |rows: ImageRows<'_>| {
         let name = rows.name().to_owned();

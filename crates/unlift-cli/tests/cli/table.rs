@@ -1,6 +1,6 @@
 //! `unlift table`: the results of audit.json as CSV, LaTeX, Markdown and curves.
 
-use crate::common::Place;
+use crate::common::{Place, recovered, rows};
 
 #[test]
 #[rustfmt::skip] // One row per line.
@@ -10,13 +10,11 @@ fn the_ending_decides_what_is_written() {
         "audit map room.csv --scale 1 --k 10 --schemes olc,ppl --inlier-ratios 1,0.5 --quiet";
     place.ends(&format!("{audit} --neighbors oracle --neighbors geometric --out a"), 0);
     let document = place.json("a/audit.json");
-    let rows = document["results"].as_array().unwrap();
     let largest = |scheme: &str, ratio: f64, typed: &str| {
-        let of = rows.iter().filter(|row| {
+        let of = rows(&document).iter().filter(|row| {
             row["scheme"] == scheme && row["neighbors"] == "oracle" && row["inlier_ratio"] == ratio
         });
-        let shares = of.filter_map(|row| row["recovered_percent"][typed].as_f64());
-        format!("{:.1}", shares.fold(0.0, f64::max))
+        format!("{:.1}", of.map(|row| recovered(row, typed)).fold(0.0, f64::max))
     };
     let (text, _) = place.ends("table a/audit.json", 0);
     let lines: Vec<&str> = text.lines().filter(|line| line.starts_with('|')).collect();
@@ -34,7 +32,7 @@ fn the_ending_decides_what_is_written() {
     };
     assert_eq!(written("t.md", ""), text);
     let csv = written("t.csv", "--thresholds 0.1");
-    assert_eq!(csv.lines().count(), 1 + rows.len());
+    assert_eq!(csv.lines().count(), 1 + rows(&document).len());
     assert!(csv.contains("recovered_percent_within_0.10") && !csv.contains("_0.25"), "{csv}");
     let tex = written("t.tex", "--thresholds 0.25");
     let [all, half] = [1.0, 0.5].map(|ratio| largest("ppl", ratio, "0.25"));
@@ -46,18 +44,13 @@ fn the_ending_decides_what_is_written() {
 
     place.write("old.json", r#"{"unlift": "0", "schema": 9}"#);
     place.write("mine.csv", "mine");
-    place.ends(
-        &format!("{audit} --neighbors geometric --out g").replace("--inlier-ratios 1,0.5", ""),
-        0,
-    );
-    for (line, code, expected) in [
-        ("a/audit.json --out mine.csv", 2, "--out: mine.csv: expected nothing, or a table of an earlier run"),
-        ("a/audit.json --out t.pdf", 2, "--out: expected a name that ends in .md, .tex, .csv or .svg, found t.pdf"),
-        ("a/audit.json --thresholds 0.3", 2, "--thresholds: expected one of 0.10, 0.25, as in the audit, found 0.3"),
-        ("old.json", 3, "old.json: expected schema 1, found 9"),
-        ("g/audit.json --out g.svg", 2, "--out: expected an audit with rows by the oracle, for curves, found none"),
-    ] {
-        let told = place.complains(&format!("table {line}"), code);
-        assert!(told.starts_with(&format!("unlift: {expected}")), "{told}");
-    }
+    let geometric = audit.replace("--inlier-ratios 1,0.5", "--neighbors geometric");
+    place.ends(&format!("{geometric} --out g"), 0);
+    place.refuses("table", &[
+        ("a/audit.json --out mine.csv", 2, "unlift: --out: mine.csv: expected nothing, or a table of an earlier run"),
+        ("a/audit.json --out t.pdf", 2, "unlift: --out: expected a name that ends in .md, .tex, .csv or .svg, found t.pdf"),
+        ("a/audit.json --thresholds 0.3", 2, "unlift: --thresholds: expected one of 0.10, 0.25, as in the audit, found 0.3"),
+        ("old.json", 3, "unlift: old.json: expected schema 1, found 9"),
+        ("g/audit.json --out g.svg", 2, "unlift: --out: expected an audit with rows by the oracle, for curves, found none"),
+    ]);
 }
