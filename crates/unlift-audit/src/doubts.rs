@@ -67,27 +67,22 @@ pub(crate) fn doubts(
             100.0 * share
         ));
     }
+    let (shortest, longest) = (short(low), in_unit(high, unit));
     for row in rows {
         let of_tiles = tile_rows.iter().flatten().filter(|of_tile| of_tile.is_same_cell(row));
         let mut deltas = std::iter::once(row).chain(of_tiles).map(|row| row.delta);
         let unusual =
             deltas.find(|&delta| delta > 0.0 && !(NARROW * low..=WIDE * high).contains(&delta));
-        let of_delta = unusual.map(|delta| {
+        let start = format!("{}: delta", row.scheme);
+        let of_delta = unusual.map(|delta| in_unit(delta, unit)).map(|delta| {
             format!(
-                "{}: delta, {}, is far from the usual distance to the K-th neighbor, {} to {}: recovery may be too low \
-                 (try --delta, or separate parts of the map)",
-                row.scheme,
-                in_unit(delta, unit),
-                short(low),
-                in_unit(high, unit)
+                "{start}, {delta}, is far from the usual distance to the K-th neighbor, {shortest} to {longest}: recovery may be \
+                 too low (try --delta, or separate parts of the map)"
             )
         });
         // One line per scheme is enough.
-        let start = format!("{}: delta", row.scheme);
-        if let Some(doubt) = &of_delta
-            && !notes.iter().any(|note| note.starts_with(&start))
-        {
-            notes.push(doubt.clone());
+        if !notes.iter().any(|note| note.starts_with(&start)) {
+            notes.extend(of_delta.clone());
         }
         of_rows.push(of_map.clone().or(of_delta));
         notes.extend(noise(row, f64::INFINITY));
@@ -188,24 +183,21 @@ fn strays(recovered: bool, away: &[f64], thresholds: &[Threshold], unit: Unit) -
         false => ("truth", "where no attack can find them", "it is"),
     };
     let least = in_unit(least, unit);
-    (n as f64 > STRAY * of as f64).then(|| {
-        format!(
-            "{what}: {n} of {of} points are {least} or more away from their own records, {where_}: check that {it_is} \
-             of this map, in its frame, scale and order"
-        )
-    })
+    let doubt = format!(
+        "{what}: {n} of {of} points are {least} or more away from their own records, {where_}: check that {it_is} \
+         of this map, in its frame, scale and order"
+    );
+    (n as f64 > STRAY * of as f64).then_some(doubt)
 }
 
 /// Returns a doubt if lengths are not in the unit that a file states.
 fn mistaken_unit(unit: Unit, k: usize, middle: f64) -> Option<String> {
-    let is_usual = (UNIT[0]..=UNIT[1]).contains(&middle);
-    (unit == Unit::KthNeighbor && !is_usual).then(|| {
-        format!(
-            "unit: expected a usual distance to the K-th neighbor (K = {k}) of about 1, because the file \
-             states lengths in multiples of it, found {}: thresholds do not have their stated meaning",
-            short(middle)
-        )
-    })
+    let (is_usual, found) = ((UNIT[0]..=UNIT[1]).contains(&middle), short(middle));
+    let doubt = format!(
+        "unit: expected a usual distance to the K-th neighbor (K = {k}) of about 1, because the file \
+         states lengths in multiples of it, found {found}: thresholds do not have their stated meaning"
+    );
+    (unit == Unit::KthNeighbor && !is_usual).then_some(doubt)
 }
 
 /// Number of other points with which a nearest point is compared.
@@ -231,13 +223,12 @@ pub fn unlike_neighbors(
         share += others.map(more).sum::<f64>() / (OTHERS as f64 * n_rows);
     }
     // The share of a point deviates by 0.3, so this is three deviations.
-    Ok((n_rows >= FEWEST && share < 0.5 + 0.9 / n_rows.sqrt()).then(|| {
-        format!(
-            "descriptors: {:.0} % are more like that of the nearest point than like another one, where 50 % are so by \
-             chance: of another map, or in another order of rows?",
-            100.0 * share
-        )
-    }))
+    let doubt = format!(
+        "descriptors: {:.0} % are more like that of the nearest point than like another one, where 50 % are so by \
+         chance: of another map, or in another order of rows?",
+        100.0 * share
+    );
+    Ok((n_rows >= FEWEST && share < 0.5 + 0.9 / n_rows.sqrt()).then_some(doubt))
 }
 
 fn in_unit(length: f64, unit: Unit) -> String {
@@ -419,14 +410,12 @@ const NOISE: f64 = 0.1;
 /// Returns a line about a row whose points are off their records, if that matters within `threshold`; always if it is infinite.
 pub(crate) fn noise(row: &Row, threshold: f64) -> Option<String> {
     let off = *row.metrics.get(OFF_RECORD)?;
-    (!threshold.is_finite() || off > NOISE * threshold).then(|| {
-        format!(
-            "{}: half of the points are {} or more off their records, as by noise: an attack here stays on the records and \
-             keeps this error, but others may average it away",
-            row.scheme,
-            short(off)
-        )
-    })
+    let (scheme, away) = (&row.scheme, short(off));
+    let doubt = format!(
+        "{scheme}: half of the points are {away} or more off their records, as by noise: an attack here stays on the records and \
+         keeps this error, but others may average it away"
+    );
+    (!threshold.is_finite() || off > NOISE * threshold).then_some(doubt)
 }
 
 /// Formats three digits, with an exponent where there would be many zeros.
@@ -484,14 +473,12 @@ pub(crate) fn follows_places(
     let n_nearer = (0..n).filter(nearer).count();
     // By chance a half; the margin is five standard deviations.
     let is_ordered = n_nearer as f64 > 0.5 * n as f64 + 2.5 * (n as f64).sqrt();
-    let order = is_ordered.then(|| {
-        format!(
-            "order of records: after {n_nearer} of {n} comes one nearer by than another, where half are so by chance: the order \
-             gives places away, and no attack uses it (release records in random order)"
-        )
-    });
+    let order = format!(
+        "order of records: after {n_nearer} of {n} comes one nearer by than another, where half are so by chance: the order \
+         gives places away, and no attack uses it (release records in random order)"
+    );
     let columns = released.descriptors().into_iter().flat_map(|rows| columns(rows, secret, points));
-    order.into_iter().chain(columns).collect()
+    is_ordered.then_some(order).into_iter().chain(columns).collect()
 }
 
 /// Returns a doubt about each column of descriptors that follows a coordinate.

@@ -334,10 +334,10 @@ fn untried(gate: &Gate, tried: &Tried) -> Option<String> {
     if all && gate.figure == Figure::Recovered && tried.lacks_records_alone {
         return Some("records alone were not tried, and no attack is named".to_owned());
     }
-    (all && gate.inlier_ratio.is_none() && tried.lacks_best_source).then(|| {
-        let best = sources::BY_DESCRIPTORS.name;
-        format!("neighbors by {best}, the best source, were not tried, and no attack is named")
-    })
+    let best = sources::BY_DESCRIPTORS.name;
+    let doubt =
+        format!("neighbors by {best}, the best source, were not tried, and no attack is named");
+    (all && gate.inlier_ratio.is_none() && tried.lacks_best_source).then_some(doubt)
 }
 
 /// Checks the thresholds of gates: a gate that no attack can break means nothing.

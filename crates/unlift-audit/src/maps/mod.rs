@@ -220,15 +220,14 @@ fn rows_of_file(rows: &[u32], left_out: &[u64]) -> Vec<u32> {
 /// Returns a note about descriptors that are all zero; some exporters mark missing descriptors like
 /// this.
 pub fn zeros(descriptors: &Descriptors) -> Option<String> {
-    let mut row = vec![0.0; descriptors.dim()];
-    let mut zero = |at: &usize| {
-        descriptors.read_row(*at, &mut row);
+    let (mut row, of) = (vec![0.0; descriptors.dim()], descriptors.len());
+    let is_zero = |&at: &usize| {
+        descriptors.read_row(at, &mut row);
         row.iter().all(|&value| value == 0.0)
     };
-    let (n, of) = ((0..descriptors.len()).filter(|at| zero(at)).count(), descriptors.len());
-    (n > 0).then(|| {
-        format!("{n} of {of} descriptors are all zero and give an attacker no information")
-    })
+    let n = (0..of).filter(is_zero).count();
+    let note = format!("{n} of {of} descriptors are all zero and give an attacker no information");
+    (n > 0).then_some(note)
 }
 
 /// Thins out and scales `positions` and `descriptors`. Owned positions that are all kept
@@ -326,12 +325,10 @@ pub fn by_point(path: &Path, prepared: &mut Prepared) -> Result<PointNeighbors, 
 fn doubts(offsets: &[u64], neighbors: &[u32], prepared: &Prepared) -> Vec<String> {
     let points = prepared.original.reveal().positions();
     let mut doubts = Vec::new();
-    let empty = offsets.windows(2).filter(|w| w[0] == w[1]).count();
+    let (empty, n) = (offsets.windows(2).filter(|w| w[0] == w[1]).count(), points.len());
     if empty > 0 {
-        let n = points.len();
-        doubts.push(format!(
-            "lists: {empty} of {n} points have no neighbors in the file, and count as lost"
-        ));
+        let lost = "points have no neighbors in the file, and count as lost";
+        doubts.push(format!("lists: {empty} of {n} {lost}"));
     }
     let (mut nearer, mut n) = (0usize, 0usize);
     for (point, w) in offsets.windows(2).enumerate() {

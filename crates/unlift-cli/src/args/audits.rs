@@ -113,13 +113,9 @@ pub struct ProtectArgs {
 
 impl ProtectArgs {
     fn recorded(&self) -> [Recorded; 2] {
-        let names: Vec<String> = self.protect_descriptors.iter().map(Protection::name).collect();
-        let public = public_name(self.public_descriptors.as_deref());
-        let is_given = !names.is_empty();
-        [
-            ("protect_descriptors", is_given.then(|| json!(names))),
-            ("public_descriptors", is_given.then(|| json!(public))),
-        ]
+        let names = named(self.protect_descriptors.iter().map(Protection::name));
+        let public = names.as_ref().map(|_| public_name(self.public_descriptors.as_deref()));
+        [("protect_descriptors", json!(names)), ("public_descriptors", json!(public))]
     }
 }
 
@@ -184,10 +180,11 @@ impl ExtractionArgs {
     }
 
     fn recorded(&self) -> [Recorded; 3] {
+        let features = self.features.map(DescriptorKind::name);
         [
-            ("features", self.features.map(|kind| json!(kind.name()))),
-            ("max_features", self.max_features.map(|max| json!(max))),
-            ("min_score", self.min_score.map(|score| json!(score))),
+            ("features", json!(features)),
+            ("max_features", json!(self.max_features)),
+            ("min_score", json!(self.min_score)),
         ]
     }
 }
@@ -509,18 +506,18 @@ pub struct AuditReleasedArgs {
     pub audit: AuditArgs,
 }
 
-/// Name and value of an option in the report; `None` if it was not given.
-type Recorded = (&'static str, Option<Value>);
+/// Name and value of an option in the report; null if it was not given.
+type Recorded = (&'static str, Value);
 
 /// Returns the options that were given, for the report.
 fn given(options: impl IntoIterator<Item = Recorded>) -> Map<String, Value> {
-    options.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?))).collect()
+    let options = options.into_iter().filter(|(_, value)| !value.is_null());
+    options.map(|(name, value)| (name.to_owned(), value)).collect()
 }
 
-/// Returns the names of mitigations for the report, if there are any.
-fn named(mitigations: &[Mitigation]) -> Option<Value> {
-    let names = mitigations.iter().map(Mitigation::name).collect::<Vec<_>>();
-    (!names.is_empty()).then(|| json!(names))
+/// Returns names for the report, if there are any.
+fn named(names: impl Iterator<Item = String>) -> Option<Vec<String>> {
+    Some(names.collect::<Vec<_>>()).filter(|names| !names.is_empty())
 }
 
 impl AuditMapArgs {
@@ -540,15 +537,15 @@ impl AuditMapArgs {
 
     /// Returns the options that change the points, for the report.
     pub fn record(&self) -> Map<String, Value> {
-        let paints = self.paint.invert.is_some();
+        let invert = self.paint.invert.as_ref().map(|_| true);
         let options = [
-            ("max_points", self.map.max_points.map(|max| json!(max))),
-            ("mitigate", named(&self.mitigate)),
+            ("max_points", json!(self.map.max_points)),
+            ("mitigate", json!(named(self.mitigate.iter().map(Mitigation::name)))),
         ];
         given(options.into_iter().chain(self.protect.recorded()).chain([
-            ("hold_out", self.localize.is_some().then(|| json!(self.hold_out))),
-            ("invert", paints.then(|| json!(true))),
-            ("max_images", paints.then(|| json!(self.max_images))),
+            ("hold_out", json!(self.localize.as_ref().map(|_| self.hold_out))),
+            ("invert", json!(invert)),
+            ("max_images", json!(invert.map(|_| self.max_images))),
         ]))
     }
 }
@@ -557,8 +554,8 @@ impl AuditImagesArgs {
     /// Returns the options that change the images, for the report.
     pub fn record(&self) -> Map<String, Value> {
         given(self.extraction.recorded().into_iter().chain(self.protect.recorded()).chain([
-            ("max_images", self.max_images.map(|max| json!(max))),
-            ("invert", self.paint.invert.is_some().then(|| json!(true))),
+            ("max_images", json!(self.max_images)),
+            ("invert", json!(self.paint.invert.as_ref().map(|_| true))),
         ]))
     }
 }
@@ -566,8 +563,9 @@ impl AuditImagesArgs {
 impl AuditSequenceArgs {
     /// Returns the options that change the images, for the report.
     pub fn record(&self) -> Map<String, Value> {
+        let mitigate = named(self.mitigate.iter().map(Mitigation::name));
         let model = json!(self.model.display().to_string());
-        let options = [("model", Some(model)), ("mitigate", named(&self.mitigate))];
+        let options = [("model", model), ("mitigate", json!(mitigate))];
         given(options.into_iter().chain(self.extraction.recorded()))
     }
 }

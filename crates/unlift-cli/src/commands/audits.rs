@@ -175,8 +175,11 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<bool> {
         }
         let mut map = Map { plan, inversion, ..Map::new(&prepared) };
         if let Some(path) = &args.localize {
-            let nth = args.hold_out.get();
-            map.localize = Some(Localize::held_out(&prepared, path, nth, protections)?);
+            if prepared.cameras.views.is_empty() {
+                bail!("--localize: expected a COLMAP model with cameras and tracks, found none");
+            }
+            let held_out = Some((path.clone(), args.hold_out.get()));
+            map.localize = Some(Localize { cameras: &prepared.cameras, held_out, protections });
         }
         let input = match args.tile_points {
             Some(max) => Input::Tiles(map, Tiles { max_points: max.get(), only: None }),
