@@ -175,28 +175,27 @@ impl Output {
 
     /// Opens the output folder of an audit, and checks the file for the results of gates, which is none of the report.
     pub fn open(&self, rules: Rules) -> Result<Files, Error> {
-        let junit = self.junit.as_ref().map(|path| self.check_junit(path, &rules)).transpose()?;
+        let mut junit = None;
+        if let Some(path) = &self.junit {
+            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+            if let Some(folder) = folder.filter(|folder| !folder.exists()) {
+                // It may be the folder of the report.
+                make_folders(folder, access(self.share_safe))
+                    .map_err(|error| Error::request(format!("{JUNIT}: {error}")))?;
+            }
+            junit = Some((path, check_file(JUNIT, path, Kind::Junit, &rules)?));
+        }
         let first = [(PAGE, Kind::Page), (FIGURES, Kind::AuditJson)];
         let set = OutputSet::create(&self.folder, rules.clone(), access(self.share_safe), &first);
         let set = set.map_err(refused)?;
         let out = std::fs::canonicalize(&self.folder).unwrap_or_default();
-        if let (Some(path), Some(target)) = (&self.junit, junit)
+        if let Some((path, target)) = junit
             && [PAGE, FIGURES].iter().any(|name| out.join(name) == target)
         {
             let path = path.display();
             bail!("{JUNIT}: {path}: expected a file of its own, found one of --out");
         }
         Ok(Files { output: self.clone(), set, rules })
-    }
-
-    fn check_junit(&self, path: &Path, rules: &Rules) -> Result<PathBuf, Error> {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-        if let Some(folder) = folder.filter(|folder| !folder.exists()) {
-            // It may be the folder of the report.
-            make_folders(folder, access(self.share_safe))
-                .map_err(|error| Error::request(format!("{JUNIT}: {error}")))?;
-        }
-        check_file(JUNIT, path, Kind::Junit, rules)
     }
 }
 

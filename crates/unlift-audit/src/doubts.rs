@@ -2,6 +2,8 @@
 //! truth is of another map, or a released file gives away more than its records. Low recovery would
 //! look like protection, so each doubt is shown beside the verdict, and no gate holds with one.
 
+use std::borrow::Borrow;
+
 use unlift::audit::{Alone, Plan, Row, Share, Threshold};
 use unlift::evaluate::{
     OFF_RECORD, Truth, are_strangers, correlation, nearer_to_own, recovered_away,
@@ -101,43 +103,30 @@ pub(crate) struct Spread {
 }
 
 impl Spread {
-    /// Measures the spread of a map on a sample of its points.
-    pub(crate) fn of(points: &[[f64; 3]], k: usize) -> Result<Self, unlift::Error> {
-        Ok(Self::of_distances(distances(points, k, SAMPLE)?, points.len()))
-    }
-
-    /// Measures the spread of a map in parts. Neighbors are searched within a part.
-    pub(crate) fn of_parts(
-        parts: impl ExactSizeIterator<Item = Result<PointSet<3>, unlift::Error>>,
+    /// Measures the spread of the parts of a map on a sample of their points. Neighbors are searched within a part.
+    pub(crate) fn of<P: Borrow<PointSet<3>>>(
+        parts: impl ExactSizeIterator<Item = Result<P, unlift::Error>>,
         k: usize,
     ) -> Result<Self, unlift::Error> {
         let of_each = SAMPLE.div_ceil(parts.len().max(1));
-        let (mut all, mut fewest) = (Vec::new(), usize::MAX);
+        let (mut distances, mut nearest, mut n_points) = (Vec::new(), Vec::new(), usize::MAX);
         for part in parts {
             let part = part?;
-            all.extend(distances(part.positions(), k, of_each)?);
-            fewest = fewest.min(part.len());
+            let points = part.borrow().positions();
+            let knn = Knn::new(points)?;
+            let kth = |row: usize| {
+                knn.nearest(row, k, &mut nearest);
+                nearest.last().map_or(0.0, |last| last.0.sqrt())
+            };
+            let every = points.len().div_ceil(of_each).max(1);
+            distances.extend((0..points.len()).step_by(every).map(kth));
+            n_points = n_points.min(points.len());
         }
-        Ok(Self::of_distances(all, fewest))
-    }
-
-    fn of_distances(mut distances: Vec<f64>, n_points: usize) -> Self {
         distances.sort_unstable_by(f64::total_cmp);
         let last = distances.len().saturating_sub(1);
         let at = |rank: usize| distances.get(rank).copied().unwrap_or(0.0);
-        Self { low: at(last / 4), middle: at(last / 2), high: at(last - last / 4), n_points }
+        Ok(Self { low: at(last / 4), middle: at(last / 2), high: at(last - last / 4), n_points })
     }
-}
-
-fn distances(points: &[[f64; 3]], k: usize, sample: usize) -> Result<Vec<f64>, unlift::Error> {
-    let knn = Knn::new(points)?;
-    let mut nearest = Vec::new();
-    let kth = |row: usize| {
-        knn.nearest(row, k, &mut nearest);
-        nearest.last().map_or(0.0, |last| last.0.sqrt())
-    };
-    let every = points.len().div_ceil(sample).max(1);
-    Ok((0..points.len()).step_by(every).map(kth).collect())
 }
 
 /// Returns a doubt if points of the ground truth are far from their released records, other than by a scheme's noise.
@@ -521,7 +510,7 @@ mod tests {
         plan.solvers = Builtin::list(&[Builtin::Consensus]);
         let rows = run(&original, None, &plan, &mut Silent).unwrap().rows;
         let of = |tile_rows: &[Vec<Row>]| {
-            let spread = Spread::of(original.reveal().positions(), plan.k).unwrap();
+            let spread = Spread::of(std::iter::once(Ok(original.reveal())), plan.k).unwrap();
             doubts((&original, spread), None, (&plan, &rows, tile_rows), &[]).of_rows
         };
         assert_eq!(of(std::slice::from_ref(&rows)), [None]);

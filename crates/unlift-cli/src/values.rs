@@ -1,7 +1,7 @@
 //! Parses option values; gates are parsed by `unlift_audit::Gate`.
 
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::stderr::tell;
 use unlift::audit::Threshold;
@@ -26,9 +26,9 @@ pub enum NeighborSource {
 
 impl NeighborSource {
     /// Returns the files among `sources`.
-    pub fn files(sources: &[Self]) -> impl Iterator<Item = &Path> {
+    pub fn files(sources: &[Self]) -> impl Iterator<Item = &PathBuf> {
         sources.iter().filter_map(|source| match source {
-            Self::File(path) => Some(path.as_path()),
+            Self::File(path) => Some(path),
             Self::Oracle | Self::Own(_) => None,
         })
     }

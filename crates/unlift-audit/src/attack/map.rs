@@ -107,8 +107,8 @@ impl Map<'_> {
         };
         let cut = tiles.map(|tiles| tiles.of(points.positions(), self.up)).transpose()?;
         let spread = match &cut {
-            Some(tiles) => Spread::of_parts(tiles.iter().map(|tile| tile.points(points)), plan.k),
-            None => Spread::of(points.positions(), plan.k),
+            Some(tiles) => Spread::of(tiles.iter().map(|tile| tile.points(points)), plan.k),
+            None => Spread::of(std::iter::once(Ok(points)), plan.k),
         };
         let spread = spread.map_err(of_file)?;
         if let Some(release) = release {
@@ -127,20 +127,24 @@ impl Map<'_> {
             }
             None => {
                 let mut watcher = self.watcher(audit.output.share_safe, progress);
+                let of_map = (original, self.descriptors);
                 let outcome =
                     match release {
                         None => run(original, self.descriptors, plan, &mut watcher).map_err(
                             |error| of_file(error).advise("a smaller --k, or fewer --schemes"),
                         )?,
                         Some(release) => {
-                            run_released((original, self.descriptors), release, plan, &mut watcher)
-                                .map_err(of_file)?
+                            run_released(of_map, release, plan, &mut watcher).map_err(of_file)?
                         }
                     };
                 if let Some(error) = watcher.failed {
                     return Err(error);
                 }
-                scene = watcher.pictures.map(|p| p.into_scene(&self.cameras, self.up));
+                scene = watcher.pictures.map(|Pictures { scene, middle, .. }| Scene3d {
+                    cameras: self.cameras.iter().map(|camera| near(camera, &middle)).collect(),
+                    up: self.up.map(|up| up.map(|x| x as f32)),
+                    ..scene
+                });
                 inversions = watcher.sheets;
                 (outcome, watcher.curves)
             }
@@ -290,12 +294,5 @@ impl Pictures {
         });
         let (attack, recovered) = (Attack::of(cell.row), recovered.collect());
         self.scene.views.push(ByAttack { attack, recovered });
-    }
-
-    /// Returns the finished scene; `cameras` are in the unit of the audit.
-    fn into_scene(mut self, cameras: &[[f64; 3]], up: Option<[f64; 3]>) -> Scene3d {
-        self.scene.cameras = cameras.iter().map(|c| near(c, &self.middle)).collect();
-        self.scene.up = up.map(|v| v.map(|x| x as f32));
-        self.scene
     }
 }

@@ -267,7 +267,12 @@ pub fn prepare<'a>(
     let (unit_in_map_units, factor, unit) = match preparation.scale {
         Some(scale) => (1.0 / scale, scale, Unit::Meter),
         None => {
-            let distance = median_kth_distance(&kept, k)?;
+            let distance = median(&mut Knn::new(&kept)?.kth_distances(k));
+            if !(distance > 0.0 && (1.0 / distance).is_finite()) {
+                let what = format!("median distance to neighbor {k}");
+                let expected = "more than 0 (points that do not coincide)";
+                return Err(Error::new(what, expected, distance.to_string()));
+            }
             (distance, 1.0 / distance, Unit::KthNeighbor)
         }
     };
@@ -276,16 +281,6 @@ pub fn prepare<'a>(
     let descriptors = descriptors.map(|all| all.select(&rows));
     let prepared = Prepared::of(Original::new(points));
     Ok(Prepared { descriptors, unit_in_map_units, rows, notes, ..prepared })
-}
-
-fn median_kth_distance(points: &[[f64; 3]], k: usize) -> Result<f64, Error> {
-    let knn = Knn::new(points)?;
-    let median = median(&mut knn.kth_distances(k));
-    if median > 0.0 && (1.0 / median).is_finite() {
-        return Ok(median);
-    }
-    let what = format!("median distance to neighbor {k}");
-    Err(Error::new(what, "more than 0 (points that do not coincide)", median.to_string()))
 }
 
 /// Reads lists by row of the file and keeps those of the prepared rows.

@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 use std::iter;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde_json::json;
 use unlift::Unit;
-use unlift::audit::{Measure, NeighborsBy, Plan, Threshold, scheme_called};
+use unlift::audit::{Measure, NeighborsBy, Plan, scheme_called};
 use unlift::geometry::camera::PoseError;
 use unlift::neighbors::sources::Named;
-use unlift::obfuscate::{Change, Changed, Entry, Mitigation, SCHEMES, SchemeOptions};
+use unlift::obfuscate::{Change, Changed, Entry, SCHEMES, SchemeOptions};
 use unlift::recover::Builtin;
 use unlift_audit::changes::{mitigations, protections, protections_of_map};
 use unlift_audit::images::{FeatureSource, Opened, Opening};
@@ -43,8 +43,8 @@ use crate::values::NeighborSource;
 /// Among others, if images of `path` could not be used; the results without them are written.
 fn perform<'a>(
     args: &AuditArgs,
-    path: &'a Path,
-    more: impl IntoIterator<Item = &'a Path>,
+    path: &'a PathBuf,
+    more: impl Iterator<Item = &'a PathBuf>,
     work: impl FnOnce(Audit) -> crate::Result<Audited> + Send,
 ) -> crate::Result<bool> {
     let output = Output {
@@ -53,7 +53,8 @@ fn perform<'a>(
         command: Some(command_line()),
         ..Output::new(&args.out)
     };
-    let files = output.open(Rules::new(iter::once(path).chain(more), false))?;
+    let inputs = iter::once(path).chain(more).map(PathBuf::as_path);
+    let files = output.open(Rules::new(inputs, false))?;
     let audit = Audit { gates: args.gate.clone(), ..Audit::new(output) };
     let finished = with_threads(|| work(audit)?.write(files))?;
     print(&finished.text())?;
@@ -103,7 +104,7 @@ fn add_solvers(
 
 /// Returns the hashes of files with lists.
 fn hashes_of_lists(args: &SolverArgs) -> crate::Result<BTreeMap<String, String>> {
-    let hash = |path| Ok(("neighbors".to_owned(), hash_file(path)?));
+    let hash = |path: &PathBuf| Ok(("neighbors".to_owned(), hash_file(path)?));
     NeighborSource::files(&args.neighbors).map(hash).collect()
 }
 
@@ -116,8 +117,8 @@ const PAINTED_RATIO: f64 = 0.5;
 /// `unlift audit map`
 pub fn map(args: &AuditMapArgs) -> crate::Result<bool> {
     let more = args.paint.inputs().chain(&args.localize).chain(&args.protect.public_descriptors);
-    let lists = NeighborSource::files(&args.solvers.neighbors);
-    let more = lists.chain(args.map.descriptors.as_deref()).chain(more.map(|path| path.as_path()));
+    let more = more.chain(&args.map.descriptors);
+    let more = more.chain(NeighborSource::files(&args.solvers.neighbors));
     perform(&args.audit, &args.path, more, |audit| {
         let AuditArgs { seed, quiet, .. } = args.audit;
         let mut prepared = open_map(&args.path, &args.map, args.uses_descriptors(), (seed, quiet))?;
@@ -195,7 +196,7 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<bool> {
 /// `unlift audit released`
 pub fn released(args: &AuditReleasedArgs) -> crate::Result<bool> {
     let lists = NeighborSource::files(&args.solvers.neighbors);
-    let more = lists.chain([args.truth.as_path()]).chain(args.descriptors.as_deref());
+    let more = lists.chain([&args.truth]).chain(&args.descriptors);
     let files = released::Files {
         released: &args.released,
         truth: &args.truth,
@@ -244,15 +245,14 @@ pub fn images(args: &AuditImagesArgs) -> crate::Result<bool> {
     let mut plan = request.plan(Plan::new(Unit::Pixel), true)?;
     plan.check_for_many().map_err(|error| Error::request(error.to_string()))?;
     let more = args.paint.inputs().chain(&args.protect.public_descriptors);
-    perform(&args.audit, &args.path, more.map(|path| path.as_path()), |audit| {
-        let photos = args.paint.photos.as_deref();
+    perform(&args.audit, &args.path, more, |audit| {
+        let paints = args.paint.invert.is_some();
         let opening = Opening {
             wanted: args.extraction.wanted(),
             max_images: args.max_images.map(|max| max.get()),
-            photos,
-            paints: args.paint.invert.is_some(),
-            uses_descriptors: args.paint.invert.is_some()
-                || !args.protect.protect_descriptors.is_empty(),
+            photos: args.paint.photos.as_deref(),
+            paints,
+            uses_descriptors: paints || !args.protect.protect_descriptors.is_empty(),
             is_usual: args.neighbors.is_empty(),
         };
         let opened = Opened::open(&args.path, &opening, &mut plan)?;
@@ -265,8 +265,8 @@ pub fn images(args: &AuditImagesArgs) -> crate::Result<bool> {
         )?;
         let changes: Vec<Change> = protections.into_iter().map(Change::Protection).collect();
         plan.schemes.extend(Changed::all(&plan.schemes, &changes));
-        plan.measures
-            .extend(inversion.iter().map(|measure| Arc::clone(measure) as Arc<dyn Measure<2>>));
+        let measure = inversion.clone().map(|measure| measure as Arc<dyn Measure<2>>);
+        plan.measures.extend(measure);
         let progress = Progress::new(args.audit.quiet);
         let photos = args.paint.photos.clone();
         let images = Images { opened: &opened, plan, draws: true, photos, inversion };
@@ -292,11 +292,10 @@ fn inversion(
 pub fn sequence(args: &AuditSequenceArgs) -> crate::Result<bool> {
     let usual = Plan::new(Unit::Pixel);
     let mut request = request(&args.audit, usual.k as u16, &args.schemes, None, Unit::Pixel);
-    let mitigations =
-        distinct(args.mitigate.clone(), |a: &Mitigation, b| a.name() == b.name()).into_iter();
+    let mitigations = distinct(args.mitigate.clone(), |a, b| a.name() == b.name()).into_iter();
     request.changes = mitigations.map(|change| Change::Mitigation(change, None)).collect();
-    let threshold = |label: &str, value| Threshold { label: label.to_owned(), value };
-    let thresholds = vec![threshold("5", 5.0), threshold("10", 10.0), threshold("25", 25.0)];
+    // Poses and links are not exact to a pixel.
+    let thresholds = usual.thresholds[1..].to_vec();
     let plan = request.plan(Plan { thresholds, ..usual }, false)?;
     let pose_error = match (args.poses, args.scale) {
         (Some((cm, rotation_degrees)), Some(scale)) => {
@@ -311,7 +310,7 @@ pub fn sequence(args: &AuditSequenceArgs) -> crate::Result<bool> {
         bail!("--invert: expected without --share-safe, as pictures show the place");
     }
     let more = iter::once(&args.model).chain(args.paint.inputs());
-    perform(&args.audit, &args.path, more.map(|path| path.as_path()), |audit| {
+    perform(&args.audit, &args.path, more, |audit| {
         let extraction = args.extraction.wanted().extraction(&args.path)?;
         // A model is of the photos as they are stored.
         let source = FeatureSource::open(&args.path, &extraction)?.with_turn(Turn::AsStored);
@@ -338,7 +337,7 @@ pub fn sequence(args: &AuditSequenceArgs) -> crate::Result<bool> {
 /// `unlift audit again`
 pub fn again(args: &AuditAgainArgs) -> crate::Result<bool> {
     let more = iter::once(&args.b).chain(&args.descriptors);
-    perform(&args.audit, &args.a, more.map(|path| path.as_path()), |audit| {
+    perform(&args.audit, &args.a, more, |audit| {
         let preparation = Preparation { scale: args.scale, ..Preparation::default() };
         let reading = Progress::uncounted(args.audit.quiet, "reading the maps");
         let maps = Maps::open([&args.a, &args.b], &args.descriptors, &preparation)?;
