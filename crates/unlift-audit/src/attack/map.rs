@@ -45,10 +45,12 @@ impl<'a> Map<'a> {
     /// Returns a map as it was read, with the default plan.
     pub fn new(prepared: &'a Prepared) -> Self {
         let (cameras, held_out, protections) = (&prepared.cameras, None, Vec::new());
+        let scale = 1.0 / prepared.unit_in_map_units;
+        let centers = prepared.input.cameras.iter().map(|center| center.map(|x| x * scale));
         Self {
             descriptors: prepared.descriptors.as_ref(),
             localize: Some(Localize { cameras, held_out, protections }),
-            cameras: prepared.centers(),
+            cameras: centers.collect(),
             up: prepared.input.up,
             ..Self::of(&prepared.original)
         }

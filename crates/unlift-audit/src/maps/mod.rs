@@ -107,12 +107,6 @@ impl Prepared {
         bail!("--expect-extent: expected a longest side of {low} to {high} m, found {found}")
     }
 
-    /// Returns the centers of the cameras, in the unit of the audit.
-    pub fn centers(&self) -> Vec<[f64; 3]> {
-        let scale = 1.0 / self.unit_in_map_units;
-        self.input.cameras.iter().map(|center| center.map(|x| x * scale)).collect()
-    }
-
     /// Returns what a report says of the map at `path`, with the hashes of its files.
     pub fn about(&self, path: &Path) -> Result<Input, crate::Error> {
         let points = self.original.reveal();

@@ -82,7 +82,13 @@ fn model(args: &ExportArgs, rules: Rules) -> crate::Result<String> {
     };
     let (cameras, images) = match &args.cameras {
         None => (Vec::new(), Vec::new()),
-        Some(project) => views(project)?,
+        Some(project) => match read::open(project)?.model {
+            Some(folder) => colmap::read_views(&folder)?,
+            None => {
+                let expected = "a COLMAP model with cameras";
+                return Err(FileError::new(project, "", expected, "only points").into());
+            }
+        },
     };
     let [cameras_txt, images_txt, points_txt] = names.map(|name| out.stage(name, Kind::Model));
     write_cameras(&cameras_txt?, &cameras)?;
@@ -91,16 +97,6 @@ fn model(args: &ExportArgs, rules: Rules) -> crate::Result<String> {
     out.commit()?;
     let n = points.iter().flatten().count();
     Ok(format!("a model of {n} points, {} cameras and {} images", cameras.len(), images.len()))
-}
-
-fn views(project: &Path) -> crate::Result<(Vec<colmap::Camera>, Vec<colmap::Image>)> {
-    match read::open(project)?.model {
-        Some(folder) => Ok(colmap::read_views(&folder)?),
-        None => {
-            let expected = "a COLMAP model with cameras";
-            Err(FileError::new(project, "", expected, "only points").into())
-        }
-    }
 }
 
 /// Reads the file at `path`, and returns its content and its unit.
