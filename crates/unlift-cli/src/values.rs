@@ -13,7 +13,6 @@ use unlift_audit::sources;
 pub use unlift_audit::{positive, ratio};
 use unlift_report::compare::Accepted;
 
-/// Source of neighbor lists.
 #[derive(Clone, Debug, PartialEq)]
 pub enum NeighborSource {
     /// Lists from ground truth, at chosen inlier ratios.
@@ -25,7 +24,6 @@ pub enum NeighborSource {
 }
 
 impl NeighborSource {
-    /// Returns the files among `sources`.
     pub fn files(sources: &[Self]) -> impl Iterator<Item = &PathBuf> {
         sources.iter().filter_map(|source| match source {
             Self::File(path) => Some(path),
@@ -102,11 +100,8 @@ pub fn image_solver(text: &str) -> Result<Builtin, String> {
 }
 
 pub fn image_source(text: &str) -> Result<NeighborSource, String> {
-    let is_of_images = |source: &NeighborSource| match source {
-        NeighborSource::Own(named) => named.of_dimension::<2>().is_ok(),
-        _ => true,
-    };
-    any_source(text).ok().filter(is_of_images).ok_or_else(|| {
+    let is_of_maps = |source: &NeighborSource| matches!(source, NeighborSource::Own(named) if named.of_dimension::<2>().is_err());
+    any_source(text).ok().filter(|source| !is_of_maps(source)).ok_or_else(|| {
         let all = sources::all();
         let of_images = all.iter().filter(|entry| entry.in_2d.is_some()).map(|entry| entry.name);
         none_of(["oracle"].into_iter().chain(of_images), text)
@@ -153,20 +148,17 @@ pub fn neighbor_source(text: &str) -> Result<NeighborSource, String> {
     if text.is_empty() {
         return Err("expected oracle, a source or a file".to_owned());
     }
-    if let Ok(source) = any_source(text) {
-        return Ok(source);
-    }
     // If one name of a list is known, an unknown one is a typo, not a missing file.
     let is_path = text.contains(std::path::is_separator);
-    if !is_path && text.split([',', '+']).any(|name| any_source(name).is_ok()) {
-        return Err(format!(
-            "expected one source (repeat the option for rows of each), found {text}"
-        ));
+    match any_source(text) {
+        Ok(source) => Ok(source),
+        Err(_) if !is_path && text.split([',', '+']).any(|name| any_source(name).is_ok()) => {
+            Err(format!("expected one source (repeat the option for rows of each), found {text}"))
+        }
+        Err(_) => Ok(NeighborSource::File(text.into())),
     }
-    Ok(NeighborSource::File(text.into()))
 }
 
-/// Parses the name of a source.
 pub fn any_source(text: &str) -> Result<NeighborSource, String> {
     match text {
         "oracle" => Ok(NeighborSource::Oracle),

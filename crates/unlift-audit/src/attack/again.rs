@@ -122,10 +122,8 @@ impl Again<'_> {
             lacks_best_source: described,
             ..Tried::by(&self.plan, described)
         };
-        let frame = match &self.maps.second {
-            Some(second) => doubt_of_frames(first, second)?,
-            None => None,
-        };
+        let frame = self.maps.second.as_ref().map(|second| doubt_of_frames(first, second));
+        let frame = frame.transpose()?.flatten();
         let doubts: Vec<String> = audit.doubts.iter().cloned().chain(frame).collect();
         let without = "links by geometry only: both maps need descriptors for others";
         let without = (!described).then(|| without.to_owned());
@@ -155,7 +153,6 @@ impl Again<'_> {
         audit.finish(&self.plan, attacked)
     }
 
-    /// Hides both maps under a pair of schemes and attacks them.
     fn attack_pair(
         &self,
         pair: &[Arc<dyn Scheme<3>>; 2],

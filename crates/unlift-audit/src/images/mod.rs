@@ -301,11 +301,6 @@ impl Opened {
         let chosen = evenly(source.names.len(), max_images);
         Self { source, path: path.to_owned(), chosen }
     }
-
-    /// Returns the kind of the descriptors; an error about `option` if there are none.
-    pub fn kind(&self, option: &str) -> Result<DescriptorKind, Error> {
-        self.source.kind(option, &self.chosen)
-    }
 }
 
 /// Returns the numbers of at most `max_images` of `n` images, evenly spaced: the middles of equal parts.

@@ -440,10 +440,7 @@ fn named(names: impl Iterator<Item = String>) -> Option<Vec<String>> {
 impl AuditMapArgs {
     /// Returns true if the audit uses descriptors, which may lie beside the model.
     pub fn uses_descriptors(&self) -> bool {
-        let needs = |source: &NeighborSource| match source {
-            NeighborSource::Own(named) => named.name() != "geometric",
-            NeighborSource::Oracle | NeighborSource::File(_) => false,
-        };
+        let needs = |source: &NeighborSource| matches!(source, NeighborSource::Own(named) if named.name() != "geometric");
         let neighbors = &self.solvers.neighbors;
         neighbors.is_empty()
             || neighbors.iter().any(needs)

@@ -102,7 +102,6 @@ fn add_solvers(
     Ok(())
 }
 
-/// Returns the hashes of files with lists.
 fn hashes_of_lists(args: &SolverArgs) -> crate::Result<BTreeMap<String, String>> {
     let hash = |path: &PathBuf| Ok(("neighbors".to_owned(), hash_file(path)?));
     NeighborSource::files(&args.neighbors).map(hash).collect()
@@ -114,7 +113,6 @@ const NO_RECORDS_ALONE: &str =
 /// The inlier ratio of the oracle whose pictures are painted by default.
 const PAINTED_RATIO: f64 = 0.5;
 
-/// `unlift audit map`
 pub fn map(args: &AuditMapArgs) -> crate::Result<bool> {
     let more = args.paint.inputs().chain(&args.localize).chain(&args.protect.public_descriptors);
     let more = more.chain(&args.map.descriptors);
@@ -193,7 +191,6 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<bool> {
     })
 }
 
-/// `unlift audit released`
 pub fn released(args: &AuditReleasedArgs) -> crate::Result<bool> {
     let lists = NeighborSource::files(&args.solvers.neighbors);
     let more = lists.chain([&args.truth]).chain(&args.descriptors);
@@ -231,7 +228,6 @@ pub fn released(args: &AuditReleasedArgs) -> crate::Result<bool> {
     })
 }
 
-/// `unlift audit images`
 pub fn images(args: &AuditImagesArgs) -> crate::Result<bool> {
     let oracle = Some(&args.oracle);
     let mut request = request(&args.audit, args.k, &args.schemes, oracle, Unit::Pixel);
@@ -260,7 +256,7 @@ pub fn images(args: &AuditImagesArgs) -> crate::Result<bool> {
         let inversion = inversion.map(Arc::new);
         let protections = protections(
             &args.protect.protect_descriptors,
-            || opened.kind("--protect-descriptors"),
+            || opened.source.kind("--protect-descriptors", &opened.chosen),
             |kind| public(args.protect.public_descriptors.as_deref(), kind),
         )?;
         let changes: Vec<Change> = protections.into_iter().map(Change::Protection).collect();
@@ -288,7 +284,6 @@ fn inversion(
     Ok(Some(inversion))
 }
 
-/// `unlift audit sequence`
 pub fn sequence(args: &AuditSequenceArgs) -> crate::Result<bool> {
     let usual = Plan::new(Unit::Pixel);
     let mut request = request(&args.audit, usual.k as u16, &args.schemes, None, Unit::Pixel);
@@ -334,7 +329,6 @@ pub fn sequence(args: &AuditSequenceArgs) -> crate::Result<bool> {
     })
 }
 
-/// `unlift audit again`
 pub fn again(args: &AuditAgainArgs) -> crate::Result<bool> {
     let more = iter::once(&args.b).chain(&args.descriptors);
     perform(&args.audit, &args.a, more, |audit| {

@@ -46,7 +46,6 @@ const RELEASED: &str = "released.npz";
 /// File name of the truth, which only the owner has.
 const TRUTH: &str = "truth.npz";
 
-/// Counts over the images of a stage.
 #[derive(Clone, Copy, Debug, Default)]
 struct Counts {
     images: usize,
@@ -86,7 +85,6 @@ pub fn of_image(path: &Path, name: &str) -> impl Fn(unlift::Error) -> FileError 
 const GUESSABLE: &str = "unlift: note: whoever guesses the --seed can restore the order of the records and, under cp, \
     the points: do not release this map";
 
-/// `unlift obfuscate`
 pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<()> {
     let (map, unit) = (&args.map, args.map.unit());
     let more = [&map.descriptors, &args.public_descriptors, &args.audit];
@@ -237,7 +235,6 @@ fn write<T: Send, U: Send>(
 /// Entries of the oracle's lists, by default.
 const K: u16 = 50;
 
-/// `unlift neighbors`
 pub fn neighbors(args: &NeighborsArgs) -> crate::Result<()> {
     let inputs = [Some(args.released.as_path()), args.truth.as_deref()];
     let rules = &Rules::new(inputs.into_iter().flatten(), false);
@@ -265,7 +262,6 @@ pub fn neighbors(args: &NeighborsArgs) -> crate::Result<()> {
     print(&format!("{n} neighborhoods of up to {longest} by {name}, in {out}\n"))
 }
 
-/// Writes the lists of a map.
 fn write_lists(
     args: &NeighborsArgs,
     rules: &Rules,
@@ -277,7 +273,6 @@ fn write_lists(
     Ok(Counts { slots, longest, ..Counts::default() })
 }
 
-/// Adds the lists of an image to a file.
 fn add_lists(
     writer: &mut ImageWriter<'_>,
     counts: &mut Counts,
@@ -305,7 +300,6 @@ fn check_descriptors<const D: usize>(
     }
 }
 
-/// Writes a source's lists for a map.
 fn map_by_source(args: &NeighborsArgs, named: &Named, rules: &Rules) -> crate::Result<Counts> {
     let released = read_released::<3>(&args.released)?;
     let source = named.of_dimension::<3>()?;
@@ -326,7 +320,6 @@ fn map_by_source(args: &NeighborsArgs, named: &Named, rules: &Rules) -> crate::R
     write_lists(args, rules, &lists)
 }
 
-/// Writes the oracle's lists for a map.
 fn map_by_oracle(
     args: &NeighborsArgs,
     truth: &Path,
@@ -343,7 +336,6 @@ fn map_by_oracle(
     write_lists(args, rules, &lists.map_err(|error| FileError::core(truth, error))?)
 }
 
-/// Writes a source's lists for all images.
 fn images_by_source(args: &NeighborsArgs, named: &Named, rules: &Rules) -> crate::Result<Counts> {
     let Ok(source) = named.of_dimension::<2>() else {
         bail!("--neighbors {}: expected with a map, found images", named.name());
@@ -361,7 +353,6 @@ fn images_by_source(args: &NeighborsArgs, named: &Named, rules: &Rules) -> crate
     write((&args.out, rules), Stage::Neighborhoods, next, work, add_lists)
 }
 
-/// Writes the oracle's lists for all images.
 fn images_by_oracle(
     args: &NeighborsArgs,
     truth: &Path,
@@ -381,7 +372,6 @@ fn images_by_oracle(
     write((&args.out, rules), Stage::Neighborhoods, next, work, add_lists)
 }
 
-/// `unlift recover`
 pub fn recover(args: &RecoverArgs) -> crate::Result<()> {
     let rules = Rules::new([args.released.as_path(), &args.neighbors], false);
     let kind = Kind::Stage(Stage::Recovered);
@@ -420,7 +410,6 @@ fn n_recovered<const D: usize>(recovered: &Recovered<D>) -> usize {
     recovered.status().iter().filter(|&&status| status == Status::Ok).count()
 }
 
-/// Recovers all images, and writes them.
 fn recover_images(args: &RecoverArgs, rules: &Rules, alive: &Progress) -> crate::Result<Counts> {
     let mut images = ImageFile::open(&args.released, Stage::Released)?;
     let mut lists = ImageFile::open(&args.neighbors, Stage::Neighborhoods)?;
@@ -486,7 +475,6 @@ fn check_lists<const D: usize>(
     Ok(())
 }
 
-/// What was compared.
 struct Evaluated {
     row: Row,
     /// Without a fingerprint if any image lacks that of its released image.
@@ -496,7 +484,6 @@ struct Evaluated {
     doubts: Result<Vec<String>, unlift::Error>,
 }
 
-/// `unlift evaluate`
 pub fn evaluate(args: &EvaluateArgs) -> crate::Result<()> {
     // The released map beside the truth, for the blind baseline.
     let released = Some(args.truth.with_file_name(RELEASED)).filter(|path| path.exists());
@@ -564,7 +551,6 @@ fn evaluate_map(args: &EvaluateArgs, released: Option<&Path>) -> crate::Result<E
     Ok(Evaluated { row, about, slots_per_record, doubts: checked.notes(&thresholds, unit) })
 }
 
-/// Computes the row over all images.
 fn evaluate_images(args: &EvaluateArgs, released: Option<&Path>) -> crate::Result<Evaluated> {
     let thresholds = thresholds(args, Unit::Pixel);
     let mut next = pairs(&args.truth, released)?;

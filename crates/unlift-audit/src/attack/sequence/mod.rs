@@ -143,7 +143,6 @@ impl Sequence<'_> {
         audit.finish(&self.plan, attacked)
     }
 
-    /// Returns the kinds of links.
     fn kinds(&self) -> impl Iterator<Item = &'static str> {
         [SEQUENCE, TRACKS].into_iter().chain(self.lists.is_some().then_some(WITH_LISTS))
     }
@@ -335,7 +334,6 @@ impl Share {
 /// point of the service's map. Then links of which the model knows both keypoints.
 type Shares = [Share; 4];
 
-/// The names of the shares of keypoints.
 const NAMES: [&str; 3] = ["linked", "tracked", "new"];
 
 impl Protected<'_> {
