@@ -15,7 +15,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde_json::json;
 use unlift::audit::staged::{Pooled, key_of};
-use unlift::audit::{Plan, Row, Seconds};
+use unlift::audit::{Plan, Row};
 use unlift::evaluate::evaluate;
 use unlift::geometry::camera::PoseError;
 use unlift::neighbors::{Neighborhoods, Source, of_what_there_is};
@@ -28,9 +28,9 @@ use unlift::sequence::{Links, Query, Solved, recover, with_lists};
 use unlift::truth::{OriginalId, Secret};
 use unlift_io::hash::hash_files;
 use unlift_io::read;
+use unlift_report::Document;
 use unlift_report::document::{ImageCounts, Input};
 use unlift_report::inversions::Inversion as Sheet;
-use unlift_report::{Document, RenderOptions};
 use unlift_vision::pictures::Points;
 
 use self::view::{Model, View};
@@ -120,10 +120,6 @@ impl Sequence<'_> {
         }
         let tried = self.tried(&queries);
         audit.begin(&tried, None, &notes, progress)?;
-        let mut inversions: Vec<Sheet> = Vec::new();
-        let (results, seconds) = self.rows(&views, &queries, &mut inversions, progress)?;
-        // Photos that could not be used have no pictures.
-        inversions.retain(|sheet| !sheet.views.is_empty());
         let mut options = names(&tried, audit);
         options.insert("queries".into(), json!(queries));
         options.extend(self.lists.as_ref().map(|by| ("lists".to_owned(), json!(by.name()))));
@@ -131,15 +127,12 @@ impl Sequence<'_> {
             options.insert("pose_error_distance".into(), json!(error.center));
             options.insert("pose_error_angle_deg".into(), json!(error.rotation_degrees));
         }
-        let document = Document {
-            input: self.about(&input, &views, unusable)?,
-            options,
-            results,
-            notes,
-            ..Document::default()
-        };
-        let rendering = RenderOptions { inversions, ..RenderOptions::default() };
-        let attacked = Attacked { tried, document, seconds, rendering, ..Attacked::default() };
+        let input = self.about(&input, &views, unusable)?;
+        let document = Document { input, options, notes, ..Document::default() };
+        let mut attacked = Attacked { tried, document, ..Attacked::default() };
+        self.attack_views(&views, &queries, &mut attacked, progress)?;
+        // Photos that could not be used have no pictures.
+        attacked.rendering.inversions.retain(|sheet| !sheet.views.is_empty());
         audit.finish(&self.plan, attacked)
     }
 
@@ -178,16 +171,15 @@ impl Sequence<'_> {
     }
 
     /// Hides the views under each scheme and attacks them with each number of queries.
-    fn rows(
+    fn attack_views(
         &self,
         views: &[View],
         queries: &[usize],
-        inversions: &mut Vec<Sheet>,
+        attacked: &mut Attacked,
         progress: &dyn Progress,
-    ) -> Result<(Vec<Row>, Seconds), Error> {
-        let plan = &self.plan;
-        let mut seconds = Seconds::default();
-        let mut rows = Vec::new();
+    ) -> Result<(), Error> {
+        let Attacked { document, seconds, rendering, .. } = attacked;
+        let (plan, rows) = (&self.plan, &mut document.results);
         let reach = queries.iter().copied().max().unwrap_or(0);
         let mut known: Option<(Vec<Secret>, Links)> = None;
         let total = plan.schemes.len() * queries.len() * self.kinds().count();
@@ -230,13 +222,14 @@ impl Sequence<'_> {
                     let row = Row { scheme, neighbors, k: n, solver: SOLVER.to_owned(), ..row };
                     let strongest = if combined.is_some() { WITH_LISTS } else { SEQUENCE };
                     if let Some(inversion) = self.inversion.as_ref().filter(|_| by == strongest) {
-                        paint(inversion, (&hidden, &attack), &row, progress, inversions)?;
+                        let sheets = &mut rendering.inversions;
+                        paint(inversion, (&hidden, &attack), &row, progress, sheets)?;
                     }
                     rows.push(row);
                 }
             }
         }
-        Ok((rows, seconds))
+        Ok(())
     }
 }
 
