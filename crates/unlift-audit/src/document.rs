@@ -6,6 +6,7 @@ use unlift::neighbors::Needs;
 use unlift::recover::Delta;
 use unlift_report::{Document, RenderOptions, Scene3d};
 
+use crate::request::distinct;
 use crate::sources;
 
 /// What an attack gives, before gates.
@@ -128,17 +129,12 @@ pub fn not_audited<const D: usize>(plan: &Plan<D>, missing: &[NotAudited]) -> Ve
         let noise = noise.map(|noise| format!(" ({noise})"));
         ratio.unwrap_or_default() + &noise.unwrap_or_default()
     };
-    let mut listed: Vec<NotAudited> = Vec::new();
-    for (at, first) in missing.iter().enumerate() {
-        if missing[..at].iter().any(|earlier| same(earlier, first)) {
-            continue;
-        }
+    let mut listed = distinct(missing.to_vec(), same);
+    for first in &mut listed {
         let parts: Vec<String> = missing.iter().filter(|of| same(of, first)).map(part).collect();
-        let mut listing = first.clone();
         if first.oracle_noise.is_some() && parts.len() < n_parts {
-            listing.reason = format!("at {}: {}", parts.join(", "), first.reason);
+            first.reason = format!("at {}: {}", parts.join(", "), first.reason);
         }
-        listed.push(listing);
     }
     listed
 }
