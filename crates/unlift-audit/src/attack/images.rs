@@ -4,9 +4,9 @@ use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use unlift::audit::{Outcome, Plan, Row, run_many};
+use unlift::audit::{Plan, Row, run_many};
 use unlift_io::hash::hash_list;
-use unlift_report::document::{ImageCounts, ImageFigures, ImageRow, Input};
+use unlift_report::document::{ImageCounts, ImageFigures, ImageRow};
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::pictures::Picture;
 use unlift_report::{Document, RenderOptions};
@@ -60,7 +60,18 @@ impl Images<'_> {
             return Err(unlift_io::Error::new(path, "", expected, "0").into());
         }
         let (pictures, inversions) = self.pictures(&tally, &images, audit, progress)?;
-        let about = self.about(&tally, &outcome)?;
+        let counts = ImageCounts {
+            used: tally.used.len() as u64,
+            unusable: tally.unusable as u64,
+            too_small: outcome.n_too_small as u64,
+            ..ImageCounts::default()
+        };
+        let mut about = self.opened.about(&tally.used, tally.sizes.iter().sum(), counts)?;
+        if source.is_in_memory() {
+            let hashes = tally.used.iter().zip(&tally.hashes);
+            let named = hashes.map(|(&at, hash)| (source.names[at].clone(), hash.clone()));
+            about.sha256 = Some(hash_list(named.collect()));
+        }
         let doubt = tally.doubt();
         let notes: Vec<String> = doubt.iter().cloned().chain(tally.moved()).collect();
         notes.iter().for_each(|note| progress.say(&format!("note: {note}")));
@@ -83,30 +94,6 @@ impl Images<'_> {
             scene: None,
         };
         audit.finish(plan, attacked)
-    }
-
-    fn about(&self, tally: &Tally, outcome: &Outcome) -> Result<Input, Error> {
-        let Opened { source, path, .. } = self.opened;
-        let (path, sha256) = match source.is_in_memory() {
-            true => {
-                let hashes = tally.used.iter().zip(&tally.hashes);
-                let named = hashes.map(|(&at, hash)| (source.names[at].clone(), hash.clone()));
-                (None, hash_list(named.collect()))
-            }
-            false => (Some(path.display().to_string()), source.hash(path, &tally.used)?),
-        };
-        Ok(Input {
-            path,
-            sha256: Some(sha256),
-            n_points: tally.sizes.iter().sum::<usize>() as u64,
-            images: Some(ImageCounts {
-                found: (source.names.len() + source.refused.len()) as u64,
-                used: tally.used.len() as u64,
-                unusable: tally.unusable as u64,
-                too_small: outcome.n_too_small as u64,
-            }),
-            ..Input::default()
-        })
     }
 
     /// Audits a few images again, with the first solver and seed, for their pictures. The seed of an image depends on

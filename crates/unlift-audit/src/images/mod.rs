@@ -13,6 +13,7 @@ use unlift::descriptors::Values;
 use unlift::neighbors::Needs;
 use unlift_io::features::{self, ImageFeatures};
 use unlift_io::hash::{hash_file, hash_files};
+use unlift_report::document::{ImageCounts, Input};
 use unlift_vision::features::photo::Turn;
 use unlift_vision::features::{Extraction, Extractor};
 use unlift_vision::network::DescriptorKind;
@@ -294,6 +295,27 @@ impl Opened {
             check_fit(plan, first.descriptors.as_ref(), "")?;
         }
         Ok(opened)
+    }
+
+    /// Returns what a report says of the images; those in memory have no path and no hash. `used` are the images whose photos count.
+    pub(crate) fn about(
+        &self,
+        used: &[usize],
+        n_points: usize,
+        counts: ImageCounts,
+    ) -> Result<Input, Error> {
+        let Self { source, path, .. } = self;
+        let found = (source.names.len() + source.refused.len()) as u64;
+        let about = Input {
+            n_points: n_points as u64,
+            images: Some(ImageCounts { found, ..counts }),
+            ..Input::default()
+        };
+        if source.is_in_memory() {
+            return Ok(about);
+        }
+        let (path, sha256) = (Some(path.display().to_string()), source.hash(path, used)?);
+        Ok(Input { path, sha256: Some(sha256), ..about })
     }
 
     /// Takes images that were opened already.

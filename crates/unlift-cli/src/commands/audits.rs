@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::iter;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use serde_json::json;
@@ -252,8 +252,7 @@ pub fn images(args: &AuditImagesArgs) -> crate::Result<bool> {
             is_usual: args.neighbors.is_empty(),
         };
         let opened = Opened::open(&args.path, &opening, &mut plan)?;
-        let inversion = inversion(&args.paint, &opened.source, &opened.chosen, &args.path)?;
-        let inversion = inversion.map(Arc::new);
+        let inversion = inversion(&args.paint, &opened)?.map(Arc::new);
         let protections = protections(
             &args.protect.protect_descriptors,
             || opened.source.kind("--protect-descriptors", &opened.chosen),
@@ -271,17 +270,11 @@ pub fn images(args: &AuditImagesArgs) -> crate::Result<bool> {
 }
 
 /// Opens the painter of pictures, if it is requested.
-fn inversion(
-    args: &PaintArgs,
-    source: &FeatureSource,
-    chosen: &[usize],
-    path: &Path,
-) -> crate::Result<Option<Inversion>> {
+fn inversion(args: &PaintArgs, opened: &Opened) -> crate::Result<Option<Inversion>> {
     let Some(network) = &args.invert else { return Ok(None) };
-    let kind = source.kind("--invert", chosen)?;
-    let inversion =
-        Inversion::open((source, path), kind, args.photos.as_deref(), network.as_deref())?;
-    Ok(Some(inversion))
+    let Opened { source, path, chosen } = opened;
+    let (kind, photos) = (source.kind("--invert", chosen)?, args.photos.as_deref());
+    Ok(Some(Inversion::open((source, path), kind, photos, network.as_deref())?))
 }
 
 pub fn sequence(args: &AuditSequenceArgs) -> crate::Result<bool> {
@@ -309,16 +302,15 @@ pub fn sequence(args: &AuditSequenceArgs) -> crate::Result<bool> {
         let extraction = args.extraction.wanted().extraction(&args.path)?;
         // A model is of the photos as they are stored.
         let source = FeatureSource::open(&args.path, &extraction)?.with_turn(Turn::AsStored);
-        let all: Vec<usize> = (0..source.names.len()).collect();
-        let inversion = inversion(&args.paint, &source, &all, &args.path)?;
+        let opened = Opened::of(source, &args.path, None);
+        let inversion = inversion(&args.paint, &opened)?;
         let mut queries = args.queries.clone();
         queries.sort_unstable();
         queries.dedup();
         let progress = Progress::new(args.audit.quiet);
         let sequence = Sequence {
             model: &args.model,
-            source: &source,
-            path: &args.path,
+            opened: &opened,
             plan,
             lists: args.neighbors.as_ref().map(Named::of_dimension).transpose()?,
             queries,

@@ -29,7 +29,7 @@ use unlift::truth::{OriginalId, Secret};
 use unlift_io::hash::hash_files;
 use unlift_io::read;
 use unlift_report::Document;
-use unlift_report::document::{ImageCounts, Input};
+use unlift_report::document::ImageCounts;
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_vision::pictures::Points;
 
@@ -37,7 +37,7 @@ use self::view::{Model, View};
 use super::names;
 use crate::audit::{Audit, Audited};
 use crate::document::{Attacked, Tried};
-use crate::images::{FeatureSource, evenly};
+use crate::images::{FeatureSource, Opened, evenly};
 use crate::inversion::{Inversion, trusted};
 use crate::maps::released::slot_of;
 use crate::sources::BY_DESCRIPTORS;
@@ -48,9 +48,7 @@ pub struct Sequence<'a> {
     /// The COLMAP project or model with the poses.
     pub model: &'a Path,
     /// The features of the images.
-    pub source: &'a FeatureSource,
-    /// The path of the features as typed.
-    pub path: &'a Path,
+    pub opened: &'a Opened,
     /// The plan: schemes, thresholds and seed count.
     pub plan: Plan<2>,
     /// Makes lists of neighbors within each query, which the attacker combines with the other queries, if wanted.
@@ -77,7 +75,8 @@ const LEAST_VIEWS: usize = 3;
 impl Sequence<'_> {
     /// Attacks the images. Fewer than two with usable features, or fewer than the smallest number of queries, are an error.
     pub(super) fn attack(&self, audit: &Audit, progress: &dyn Progress) -> Result<Audited, Error> {
-        let FeatureSource { passed_over, refused, .. } = self.source;
+        let Opened { source, path, .. } = self.opened;
+        let FeatureSource { passed_over, refused, .. } = source;
         passed_over.iter().for_each(|note| progress.say(&format!("note: {note}")));
         progress.show(0, 1, "reading images");
         let input = read::open(self.model)?;
@@ -89,7 +88,7 @@ impl Sequence<'_> {
         let (mut views, mut unusable) = (Vec::new(), refused.len());
         refused.iter().for_each(|line| progress.say(line));
         let model = Model::read(folder)?;
-        for view in model.views((self.source, self.path), pose_error) {
+        for view in model.views((source, path), pose_error) {
             match view {
                 Ok(view) => views.push(view),
                 Err(error) => {
@@ -102,9 +101,9 @@ impl Sequence<'_> {
         if views.len() < fewest {
             let expected = format!("at least {fewest} images that are in {}", self.model.display());
             let found = views.len().to_string();
-            return Err(unlift_io::Error::new(self.path, "", expected, found).into());
+            return Err(unlift_io::Error::new(path, "", expected, found).into());
         }
-        let wrong = |(expected, found)| unlift_io::Error::new(self.path, "", expected, found);
+        let wrong = |(expected, found)| unlift_io::Error::new(path, "", expected, found);
         alike(&views, model.n_points()).map_err(wrong)?;
         let mut notes = Vec::new();
         let n_left_out: usize = views.iter().map(|view| view.n_left_out).sum();
@@ -127,8 +126,15 @@ impl Sequence<'_> {
             options.insert("pose_error_distance".into(), json!(error.center));
             options.insert("pose_error_angle_deg".into(), json!(error.rotation_degrees));
         }
-        let input = self.about(&input, &views, unusable)?;
-        let document = Document { input, options, notes, ..Document::default() };
+        let counts = ImageCounts {
+            used: views.len() as u64,
+            unusable: unusable as u64,
+            ..ImageCounts::default()
+        };
+        let n_points = views.iter().map(|view| view.original.len()).sum();
+        let mut about = self.opened.about(&self.opened.chosen, n_points, counts)?;
+        about.other_sha256.insert("model".to_owned(), hash_files(&input.files)?);
+        let document = Document { input: about, options, notes, ..Document::default() };
         let mut attacked = Attacked { tried, document, ..Attacked::default() };
         self.attack_views(&views, &queries, &mut attacked, progress)?;
         // Photos that could not be used have no pictures.
@@ -150,24 +156,6 @@ impl Sequence<'_> {
             lacks_best_source: !self.lists.as_ref().is_some_and(is_best),
             ..Tried::by(&self.plan, false)
         }
-    }
-
-    fn about(&self, model: &read::Input, views: &[View], unusable: usize) -> Result<Input, Error> {
-        let all: Vec<usize> = (0..self.source.names.len()).collect();
-        let n_points: usize = views.iter().map(|view| view.original.len()).sum();
-        Ok(Input {
-            path: Some(self.path.display().to_string()),
-            sha256: Some(self.source.hash(self.path, &all)?),
-            n_points: n_points as u64,
-            other_sha256: [("model".to_owned(), hash_files(&model.files)?)].into_iter().collect(),
-            images: Some(ImageCounts {
-                found: (self.source.names.len() + self.source.refused.len()) as u64,
-                used: views.len() as u64,
-                unusable: unusable as u64,
-                too_small: 0,
-            }),
-            ..Input::default()
-        })
     }
 
     /// Hides the views under each scheme and attacks them with each number of queries.
