@@ -422,7 +422,7 @@ const FOLLOWS: f64 = 0.9;
 
 /// Measures the attack that takes published values for the points: each of `published` has a position per record. Of a pair, the
 /// values are those of its two points in any order.
-pub fn read_from_file(
+pub(crate) fn read_from_file(
     published: &[Vec<[f64; 3]>],
     original: &Original<3>,
     secret: &Secret,

@@ -49,7 +49,7 @@ pub mod sources;
 pub use attack::{Again, Hidden, Images, Input, Map, Maps, Sequence, Tiles};
 pub use audit::{Audit, Audited, FIGURES, Files, Finished, Output, PAGE, check_file, refused};
 pub use document::evaluated;
-pub use doubts::{Checked, check_scale, check_thresholds, read_from_file, unlike_neighbors};
+pub use doubts::{Checked, check_scale, check_thresholds, unlike_neighbors};
 pub use gate::{Gate, number, positive, ratio};
 pub use maps::released;
 pub use maps::{Preparation, Prepared, by_point, prepare};

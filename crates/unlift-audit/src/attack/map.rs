@@ -15,7 +15,7 @@ use super::curves::{Curves, OfItems};
 use super::tiles::{Tiles, figures};
 use crate::audit::{Audit, Audited};
 use crate::document::{self, Attacked, Tried};
-use crate::doubts::{Spread, check_truth, doubts, follows_places, with_sides};
+use crate::doubts::{Spread, check_truth, doubts, follows_places, read_from_file, with_sides};
 use crate::inversion::MapInversion;
 use crate::localization::{self, Localize};
 use crate::maps::released::slot_of;
@@ -75,8 +75,8 @@ impl<'a> Map<'a> {
 pub struct Hidden<'a> {
     /// The release and its secret.
     pub release: &'a (Released<3>, Secret),
-    /// An attack on values of the released file that its records do not contain.
-    pub read: Option<Alone>,
+    /// Values of the released file that its records do not contain, each with a position per record.
+    pub published: Vec<Vec<[f64; 3]>>,
 }
 
 /// Maximum number of photos shown beside pictures.
@@ -152,13 +152,15 @@ impl Map<'_> {
             }
         };
         // Of values that are no better than a blind guess there is nothing to say.
-        let beats = |alone: &&Alone, row: &Row| {
+        let beats = |alone: &Alone, row: &Row| {
             alone.shares.iter().any(|(label, share)| share.percent() > row.blind_percent[label])
         };
-        let read = hidden.and_then(|hidden| hidden.read.as_ref());
+        let read = hidden.and_then(|Hidden { release, published }| {
+            read_from_file(published, original, &release.1, &plan.thresholds)
+        });
         let given = plan.schemes.first().map(|scheme| scheme.name());
         for row in outcome.rows.iter_mut().filter(|row| given == Some(&*row.scheme)) {
-            row.add_alone(read.filter(|alone| beats(alone, row)).cloned());
+            row.add_alone(read.clone().filter(|alone| beats(alone, row)));
         }
         let mut of_points = audit.doubts.clone();
         of_points.extend(release.iter().flat_map(|release| follows_places(original, release)));

@@ -13,8 +13,7 @@ use unlift::seed::{Key, Stage};
 use unlift::truth::{Original, OriginalId, Secret};
 use unlift::{Descriptors, PointSet, Unit};
 use unlift_audit::{
-    Audited, Error, Hidden, Input, Map, Preparation, Prepared, prepare, read_from_file,
-    unlike_neighbors,
+    Audited, Error, Hidden, Input, Map, Preparation, Prepared, prepare, unlike_neighbors,
 };
 use unlift_io::read;
 
@@ -56,7 +55,7 @@ fn audit(
 ) -> Result<Audited, Error> {
     let map = Map { plan, ..Map::of(&prepared.original) };
     let input = match hidden {
-        Some(release) => Input::Released(map, Hidden { release, read: None }),
+        Some(release) => Input::Released(map, Hidden { release, published: Vec::new() }),
         None => Input::Map(map),
     };
     audited(prepared, &input, &[gate])
@@ -251,11 +250,9 @@ fn a_released_file_that_gives_places_away_is_no_protection() {
         let rows = (0..N as u32).collect();
         let secret = Secret::try_new(hidden, None, rows, Vec::new(), N).unwrap();
         let secret = secret.of_map(Some(released.fingerprint()), 1).unwrap();
-        let plan = plan(&["olc"]);
-        let read = read_from_file(&[feet], &points.original, &secret, &plan.thresholds);
         let release = (released, secret);
-        let map = Map { plan, ..Map::of(&points.original) };
-        let input = Input::Released(map, Hidden { release: &release, read });
+        let map = Map { plan: plan(&["olc"]), ..Map::of(&points.original) };
+        let input = Input::Released(map, Hidden { release: &release, published: vec![feet] });
         let document = audited(&points, &input, &["olc:joint:0.10<=100"]).unwrap().document;
         let read = document.results[0].records_alone_percent.as_ref().map(|by| by["0.10"]);
         let gate = &document.gates[0];

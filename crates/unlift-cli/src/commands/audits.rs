@@ -18,8 +18,7 @@ use unlift_audit::inversion::{Inversion, MapInversion};
 use unlift_audit::localization::Localize;
 use unlift_audit::{
     Again, Audit, Audited, Hidden, Images, Input, Map, Maps, Output, Preparation, Prepared,
-    Progress as _, Request, Sequence, Tiles, bail, by_point, check_thresholds, distinct,
-    read_from_file, released,
+    Progress as _, Request, Sequence, Tiles, bail, by_point, check_thresholds, distinct, released,
 };
 use unlift_io::hash::hash_file;
 use unlift_io::outputs::Rules;
@@ -216,11 +215,10 @@ pub fn released(args: &AuditReleasedArgs) -> crate::Result<bool> {
         let descriptors = (hidden.0.descriptors(), "in the released map");
         let points = prepared.original.reveal();
         let plan = request.of_map(usual, points, descriptors, &mut audit)?;
+        let (original, descriptors) = (&prepared.original, prepared.descriptors.as_ref());
+        let map = Map { plan, descriptors, ..Map::of(original) };
         let published = published_positions(&args.released)?;
-        let (original, secret) = (&prepared.original, &hidden.1);
-        let read = read_from_file(&published, original, secret, &plan.thresholds);
-        let map = Map { plan, descriptors: prepared.descriptors.as_ref(), ..Map::of(original) };
-        let input = Input::Released(map, Hidden { release: &hidden, read });
+        let input = Input::Released(map, Hidden { release: &hidden, published });
         audit.about = files.about(n_points)?;
         audit.about.other_sha256.extend(hashes_of_lists(&args.solvers)?);
         audit.options.insert("released".into(), json!(true));
