@@ -130,15 +130,14 @@ impl Map<'_> {
             None => {
                 let mut watcher = self.watcher(audit.output.share_safe, progress);
                 let of_map = (original, self.descriptors);
-                let outcome =
-                    match release {
-                        None => run(original, self.descriptors, plan, &mut watcher).map_err(
-                            |error| of_file(error).advise("a smaller --k, or fewer --schemes"),
-                        )?,
-                        Some(release) => {
-                            run_released(of_map, release, plan, &mut watcher).map_err(of_file)?
-                        }
-                    };
+                let advice = "a smaller --k, or fewer --schemes";
+                let outcome = match release {
+                    None => run(original, self.descriptors, plan, &mut watcher)
+                        .map_err(|error| of_file(error).advise(advice)),
+                    Some(release) => {
+                        run_released(of_map, release, plan, &mut watcher).map_err(of_file)
+                    }
+                }?;
                 if let Some(error) = watcher.failed {
                     return Err(error);
                 }
