@@ -56,8 +56,11 @@ pub(crate) fn doubts(
 ) -> Doubts {
     let Spread { low, middle, high, n_points } = spread;
     let unit = original.reveal().unit();
-    let of_release = hidden.and_then(|hidden| {
-        not_its_own(original, hidden, plan).or_else(|| mistaken_unit(unit, plan.k, middle))
+    let of_release = hidden.and_then(|(released, secret)| {
+        let truth = Truth { original, released, secret };
+        // A scheme's noise has a doubt of its own.
+        let away = if truth.is_noise() { Vec::new() } else { truth.away_from_own() };
+        strays(false, &away, &plan.thresholds, unit).or_else(|| mistaken_unit(unit, plan.k, middle))
     });
     let mut notes: Vec<String> = of_release.iter().chain(of_file).cloned().collect();
     let (of_map, mut of_rows) = (notes.first().cloned(), Vec::new());
@@ -127,19 +130,6 @@ impl Spread {
         let at = |rank: usize| distances.get(rank).copied().unwrap_or(0.0);
         Ok(Self { low: at(last / 4), middle: at(last / 2), high: at(last - last / 4), n_points })
     }
-}
-
-/// Returns a doubt if points of the ground truth are far from their released records, other than by a scheme's noise.
-fn not_its_own(
-    original: &Original<3>,
-    (released, secret): &(Released<3>, Secret),
-    plan: &Plan<3>,
-) -> Option<String> {
-    let truth = Truth { original, released, secret };
-    if truth.is_noise() {
-        return None;
-    }
-    strays(false, &truth.away_from_own(), &plan.thresholds, released.unit())
 }
 
 /// Nothing is measured if the median distance of points from their own records is this many times that to the K-th neighbor.

@@ -115,7 +115,8 @@ impl Images<'_> {
         // The album makes the pictures itself.
         let mut plan = Plan { measures: Vec::new(), repeats: 1, ..self.plan.clone() };
         plan.solvers.truncate(1);
-        let mut album = Album::new(self.inversion.clone(), progress);
+        let (inverter, pictures, inversions) = (self.inversion.clone(), Vec::new(), Vec::new());
+        let mut album = Album { inverter, steps: progress, pictures, inversions };
         let again = RefCell::default();
         let images = Stream::new((source, path), &numbers, Some(&self.plan), &again, progress);
         run_many(images, &plan, &mut album)?;

@@ -139,7 +139,10 @@ impl<'a> Held<'a> {
         for (number, (at, photo)) in photos.into_iter().enumerate() {
             if is_held(number) {
                 held[at] = true;
-                queries.push(photo.query(&cameras.views[at]));
+                let View { camera, size, .. } = cameras.views[at];
+                let (places, rows): (Vec<_>, Vec<_>) = photo.places.into_iter().unzip();
+                let descriptors = Unit32::of(&photo.descriptors, rows.into_iter());
+                queries.push(Query { camera, size, places, descriptors });
                 continue;
             }
             let unit = Unit32::of(&photo.descriptors, 0..photo.descriptors.len());
@@ -435,11 +438,5 @@ impl Photo {
         };
         let places = keypoints.iter().enumerate().filter_map(flat).collect();
         Self { places, descriptors, of_points }
-    }
-
-    fn query(self, view: &View) -> Query {
-        let (places, rows): (Vec<_>, Vec<_>) = self.places.into_iter().unzip();
-        let descriptors = Unit32::of(&self.descriptors, rows.into_iter());
-        Query { camera: view.camera, size: view.size, places, descriptors }
     }
 }

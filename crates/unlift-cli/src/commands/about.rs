@@ -14,11 +14,8 @@ pub fn schemes() -> crate::Result<()> {
             (Some(_), None) => "maps",
             (None, _) => "images",
         };
-        let request = if ON_REQUEST.iter().any(|entry| entry.name == scheme.name) {
-            ", on request"
-        } else {
-            ""
-        };
+        let is_requested = ON_REQUEST.iter().any(|entry| entry.name == scheme.name);
+        let request = if is_requested { ", on request" } else { "" };
         let facts = scheme.facts;
         text.push_str(&format!(
             "{}: {}\n  for          {meant_for}{request}\n  rule         {}\n  hidden       {}\n  publication  {}\n  patents      {}\n",
