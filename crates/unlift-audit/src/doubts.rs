@@ -60,7 +60,8 @@ pub(crate) fn doubts(
         let truth = Truth { original, released, secret };
         // A scheme's noise has a doubt of its own.
         let away = if truth.is_noise() { Vec::new() } else { truth.away_from_own() };
-        strays(false, &away, &plan.thresholds, unit).or_else(|| mistaken_unit(unit, plan.k, middle))
+        strays(false, &away, &plan.thresholds, released.unit())
+            .or_else(|| mistaken_unit(unit, plan.k, middle))
     });
     let mut notes: Vec<String> = of_release.iter().chain(of_file).cloned().collect();
     let (of_map, mut of_rows) = (notes.first().cloned(), Vec::new());
