@@ -17,7 +17,7 @@ use unlift_report::{
 use crate::document::{Attacked, Tried, not_audited};
 use crate::gate::{Gate, check_gates, check_lengths_of_gates, gate_result};
 use crate::maps::Prepared;
-use crate::{Error, Progress};
+use crate::{Error, Progress, bail};
 
 /// An audit of any input: what there is to say of it, the gates, and where the results go.
 #[derive(Clone, Debug)]
@@ -43,12 +43,11 @@ impl Audit {
         Self { about, options, notes, doubts, gates, output }
     }
 
-    /// Creates an audit of `prepared` points, with their notes and doubts.
-    pub fn of_map(prepared: &Prepared, output: Output) -> Self {
-        let n_points = prepared.original.len() as u64;
-        let (notes, doubts) = (prepared.notes.clone(), prepared.doubts.clone());
-        let about = report::Input { n_points, ..Default::default() };
-        Self { about, notes, doubts, ..Self::new(output) }
+    /// Sets the input to `prepared` points, with their notes and doubts.
+    #[must_use]
+    pub fn of_map(self, prepared: &Prepared) -> Self {
+        let about = report::Input { n_points: prepared.original.len() as u64, ..self.about };
+        Self { about, notes: prepared.notes.clone(), doubts: prepared.doubts.clone(), ..self }
     }
 
     /// Checks the gates before the attack, and reports `notes`. `points` are those of a map.
@@ -73,27 +72,23 @@ impl Audit {
     ) -> Result<Audited, Error> {
         let gates = self.gates.iter().map(|gate| gate_result(gate, &attacked));
         let mut gates = gates.collect::<Result<Vec<_>, Error>>()?;
-        if let Some(extent) = attacked.about.extent() {
+        if let Some(extent) = attacked.document.input.extent() {
             let of = gates.iter_mut().filter_map(|gate| gate.of.as_mut());
             of.for_each(|of| of.push_str(&format!(", in a map of {extent}")));
         }
+        let Attacked { document, mut seconds, scene, rendering, .. } = attacked;
+        // Some attacks measure no time per row.
+        seconds.rows.resize_with(document.results.len(), Default::default);
         let document = Document {
             unlift: env!("CARGO_PKG_VERSION").to_owned(),
             schema: report::SCHEMA,
             gates,
-            input: attacked.about,
-            options: attacked.options,
             seed: plan.seed,
             not_audited: not_audited(plan, &attacked.not_audited),
-            results: attacked.rows,
-            notes: attacked.notes,
-            break_even: attacked.break_even,
-            images: attacked.images,
-            tiles: attacked.tiles,
-            localization: attacked.localization,
-            run: self.output.record(&attacked.seconds),
+            run: self.output.record(&seconds),
+            ..document
         };
-        Ok(Audited { document, scene: attacked.scene, rendering: attacked.rendering })
+        Ok(Audited { document, scene, rendering })
     }
 }
 
@@ -130,22 +125,12 @@ pub fn refused(error: unlift_io::Error) -> Error {
     Error::request(format!("--out: {error}"))
 }
 
-/// Checks that the file `path` may be written, and returns its absolute place with links resolved.
-/// Call it before and after the work.
+/// Checks that the file `path`, which `option` names, may be written, and returns its absolute place
+/// with links resolved. Call it before and after the work.
 ///
 /// Like [`Output::open`] for folders, it reports a place that cannot be written as an error of the
 /// command line.
-pub fn check_file(path: &Path, kind: Kind, rules: &Rules) -> Result<PathBuf, Error> {
-    check_file_of("--out", path, kind, rules)
-}
-
-/// Checks the file that the option `option` names, as [`check_file`] does.
-pub fn check_file_of(
-    option: &str,
-    path: &Path,
-    kind: Kind,
-    rules: &Rules,
-) -> Result<PathBuf, Error> {
+pub fn check_file(option: &str, path: &Path, kind: Kind, rules: &Rules) -> Result<PathBuf, Error> {
     let refused = |error: unlift_io::Error| Error::request(format!("{option}: {error}"));
     let place = rules.check(path, kind).map_err(refused)?;
     // Permissions alone do not show whether a file can be written.
@@ -190,29 +175,27 @@ impl Output {
 
     /// Opens the output folder of an audit, and checks the file for the results of gates, which is none of the report.
     pub fn open(&self, rules: Rules) -> Result<Files, Error> {
-        let junit = self.junit.as_ref().map(|path| self.check_junit(path, &rules)).transpose()?;
+        let mut junit = None;
+        if let Some(path) = &self.junit {
+            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+            if let Some(folder) = folder.filter(|folder| !folder.exists()) {
+                // It may be the folder of the report.
+                make_folders(folder, access(self.share_safe))
+                    .map_err(|error| Error::request(format!("{JUNIT}: {error}")))?;
+            }
+            junit = Some((path, check_file(JUNIT, path, Kind::Junit, &rules)?));
+        }
         let first = [(PAGE, Kind::Page), (FIGURES, Kind::AuditJson)];
         let set = OutputSet::create(&self.folder, rules.clone(), access(self.share_safe), &first);
         let set = set.map_err(refused)?;
         let out = std::fs::canonicalize(&self.folder).unwrap_or_default();
-        if let (Some(path), Some(target)) = (&self.junit, junit)
+        if let Some((path, target)) = junit
             && [PAGE, FIGURES].iter().any(|name| out.join(name) == target)
         {
             let path = path.display();
-            let expected = "expected a file of its own, found one of --out";
-            return Err(Error::request(format!("{JUNIT}: {path}: {expected}")));
+            bail!("{JUNIT}: {path}: expected a file of its own, found one of --out");
         }
         Ok(Files { output: self.clone(), set, rules })
-    }
-
-    fn check_junit(&self, path: &Path, rules: &Rules) -> Result<PathBuf, Error> {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-        if let Some(folder) = folder.filter(|folder| !folder.exists()) {
-            // It may be the folder of the report.
-            make_folders(folder, access(self.share_safe))
-                .map_err(|error| Error::request(format!("{JUNIT}: {error}")))?;
-        }
-        check_file_of(JUNIT, path, Kind::Junit, rules)
     }
 }
 
@@ -290,7 +273,7 @@ impl Audited {
         let document = self.stage(&mut set, [PAGE, FIGURES], output.share_safe)?;
         set.commit()?;
         if let Some(path) = &output.junit {
-            check_file_of(JUNIT, path, Kind::Junit, &rules)?;
+            check_file(JUNIT, path, Kind::Junit, &rules)?;
             let text = unlift_report::junit(&document)?;
             write_file(path, Access::Usual, |w| w.write_all(text.as_bytes()))?;
         }
@@ -306,9 +289,7 @@ impl Finished {
 
     /// Returns the short table, the results of the gates and the path of the report.
     pub fn text(&self) -> String {
-        let mut text = text_table(&self.document);
-        text.push_str(&gate_lines(&self.document));
-        text.push_str(&format!("\nreport: {}\n", OneLine(self.report.display())));
-        text
+        let (table, gates) = (text_table(&self.document), gate_lines(&self.document));
+        format!("{table}{gates}\nreport: {}\n", OneLine(self.report.display()))
     }
 }

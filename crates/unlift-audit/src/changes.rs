@@ -8,10 +8,10 @@ use unlift::obfuscate::{Change, Mitigation, Protection};
 use unlift_io::Error as FileError;
 use unlift_vision::network::DescriptorKind;
 
-use crate::Error;
 use crate::images::{FeatureSource, Wanted, kind_of};
 use crate::maps::Prepared;
 use crate::request::distinct;
+use crate::{Error, bail};
 
 /// Returns the changes by mitigations of a map, which may be audited in tiles.
 ///
@@ -26,15 +26,12 @@ pub fn mitigations(
     let change = |mitigation: &Mitigation| {
         let lacks_tracks = mitigation.needs_tracks() && (tracks.is_none() || in_tiles);
         let lacks_rows = mitigation.changes_descriptors() && prepared.descriptors.is_none();
-        let expected = match (lacks_tracks, lacks_rows) {
-            (true, _) => "a COLMAP model with tracks, not in tiles",
-            (false, true) => "descriptors (--descriptors FILE)",
-            (false, false) => {
-                return Ok(Change::Mitigation(mitigation.clone(), tracks.cloned()));
-            }
+        let (expected, name) = match (lacks_tracks, lacks_rows) {
+            (true, _) => ("a COLMAP model with tracks, not in tiles", mitigation.name()),
+            (false, true) => ("descriptors (--descriptors FILE)", mitigation.name()),
+            (false, false) => return Ok(Change::Mitigation(mitigation.clone(), tracks.cloned())),
         };
-        let name = mitigation.name();
-        Err(Error::request(format!("--mitigate {name}: expected {expected}, found none")))
+        bail!("--mitigate {name}: expected {expected}, found none")
     };
     requested.iter().map(change).collect()
 }
@@ -50,8 +47,7 @@ pub fn protections_of_map(
 ) -> Result<Vec<Protection>, Error> {
     const OPTION: &str = "--protect-descriptors";
     if let (Some(first), None) = (requested.first(), &prepared.descriptors) {
-        let expected = "expected descriptors (--descriptors FILE), found none";
-        return Err(Error::request(format!("{OPTION} {}: {expected}", first.name())));
+        bail!("{OPTION} {}: expected descriptors (--descriptors FILE), found none", first.name());
     }
     protections(requested, || kind_of(OPTION, prepared.descriptors.as_ref()), public)
 }

@@ -1,30 +1,24 @@
 //! The results of an attack, and the parts of the document that are made of them.
 
 use serde_json::{Map, Value, json};
-use unlift::audit::{BreakEven, NeighborsBy, NotAudited, Plan, Row, Seconds, Threshold};
+use unlift::audit::{NeighborsBy, NotAudited, Plan, Row, Seconds, Threshold};
 use unlift::neighbors::Needs;
 use unlift::recover::Delta;
-use unlift_report::document::{ImageFigures, Input, Localization, TileFigures};
-use unlift_report::{RenderOptions, Scene3d};
+use unlift_report::{Document, RenderOptions, Scene3d};
 
+use crate::request::distinct;
 use crate::sources;
 
 /// What an attack gives, before gates.
 #[derive(Default)]
 pub struct Attacked {
     pub tried: Tried,
-    pub rows: Vec<Row>,
+    /// The figures, and what else the attack knows of the document.
+    pub document: Document,
     pub not_audited: Vec<NotAudited>,
-    pub break_even: Vec<BreakEven>,
     pub seconds: Seconds,
-    pub about: Input,
-    pub options: Map<String, Value>,
-    pub notes: Vec<String>,
     /// A doubt per row, or none.
     pub doubts: Vec<Option<String>>,
-    pub localization: Vec<Localization>,
-    pub images: Vec<ImageFigures>,
-    pub tiles: Vec<TileFigures>,
     pub scene: Option<Scene3d>,
     pub rendering: RenderOptions,
 }
@@ -69,8 +63,12 @@ impl Tried {
     }
 }
 
-/// Returns the plan as recorded options.
-pub fn options<const D: usize>(plan: &Plan<D>) -> Map<String, Value> {
+/// Returns the plan, the options of the user and the network that paints as recorded options.
+pub fn options<const D: usize>(
+    plan: &Plan<D>,
+    given: &Map<String, Value>,
+    inverter_sha256: Option<&str>,
+) -> Map<String, Value> {
     let mut options = Map::new();
     let mut record = |name: &str, value: Value| _ = options.insert(name.to_owned(), value);
     record("schemes", plan.schemes.iter().map(|scheme| scheme.name()).collect());
@@ -87,15 +85,15 @@ pub fn options<const D: usize>(plan: &Plan<D>) -> Map<String, Value> {
     record("inlier_ratios", json!(plan.inlier_ratios));
     record("k", json!(plan.k));
     record("solver", plan.solvers.iter().map(|solver| solver.name()).collect());
-    record(
-        "delta",
-        match plan.delta {
-            Delta::Auto => json!("auto"),
-            Delta::Fixed(delta) => json!(delta),
-        },
-    );
+    let delta = match plan.delta {
+        Delta::Auto => json!("auto"),
+        Delta::Fixed(delta) => json!(delta),
+    };
+    record("delta", delta);
     record("thresholds", plan.thresholds.iter().map(|t| t.label.as_str()).collect());
     record("repeats", json!(plan.repeats));
+    options.extend(given.clone());
+    options.extend(inverter_sha256.map(|hash| ("inverter_sha256".to_owned(), hash.into())));
     options
 }
 
@@ -131,17 +129,12 @@ pub fn not_audited<const D: usize>(plan: &Plan<D>, missing: &[NotAudited]) -> Ve
         let noise = noise.map(|noise| format!(" ({noise})"));
         ratio.unwrap_or_default() + &noise.unwrap_or_default()
     };
-    let mut listed: Vec<NotAudited> = Vec::new();
-    for (at, first) in missing.iter().enumerate() {
-        if missing[..at].iter().any(|earlier| same(earlier, first)) {
-            continue;
-        }
+    let mut listed = distinct(missing.to_vec(), same);
+    for first in &mut listed {
         let parts: Vec<String> = missing.iter().filter(|of| same(of, first)).map(part).collect();
-        let mut listing = first.clone();
         if first.oracle_noise.is_some() && parts.len() < n_parts {
-            listing.reason = format!("at {}: {}", parts.join(", "), first.reason);
+            first.reason = format!("at {}: {}", parts.join(", "), first.reason);
         }
-        listed.push(listing);
     }
     listed
 }

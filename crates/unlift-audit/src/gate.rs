@@ -15,6 +15,8 @@
 //! `sequence@5`, `sequence+lists@5` and `tracks@5` are sources: `dcl2d:sequence@5:10<=20` bounds what comes back from
 //! five queries, `olc:again:0.10<=20` what comes back from two releases of a map.
 
+use std::str::FromStr;
+
 use unlift::audit::{NotAudited, Row, WithInterval};
 use unlift::neighbors::oracle::Noise;
 use unlift::recover::Builtin;
@@ -23,7 +25,7 @@ use unlift_report::document::{FEWEST_HELD_OUT, GateResult, HeldOut, Localization
 
 use crate::document::{Attacked, Tried};
 use crate::doubts::{HOPELESS, nearest, noise, short};
-use crate::{Error, sources};
+use crate::{Error, bail, sources};
 
 /// A bound on a figure of an audit.
 #[derive(Clone, Debug, PartialEq)]
@@ -74,35 +76,27 @@ impl Gate {
 
     /// Returns the part of the gate for which the audit has no row: what was expected, and what was found.
     fn not_in(&self, tried: &Tried) -> Option<String> {
-        let names = |names: &[String]| format!("one of {}", names.join(", "));
-        let line = |part: &str, expected: String, found: &str| {
-            format!("{part}: expected {expected}, found {found}")
+        let unknown = |known: &[String], named: Option<&str>| {
+            named.filter(|name| known.iter().all(|known| known != name)).map(str::to_owned)
         };
-        let lacks = |part, requested: Option<&str>, known: &[String]| {
-            let unknown = requested.filter(|name| known.iter().all(|known| known != name))?;
-            Some(line(part, names(known), unknown))
-        };
-        let scheme = lacks("scheme", self.scheme.as_deref(), &tried.schemes);
-        if scheme.is_some() || self.figure == Figure::Localization {
-            return scheme;
-        }
-        let ratio = || {
-            let ratio = self.inlier_ratio.filter(|ratio| !tried.inlier_ratios.contains(ratio))?;
-            let expected = match tried.inlier_ratios.as_slice() {
-                [] => "none, because measured ratios have no gates".to_owned(),
-                ratios => names(&ratios.iter().map(f64::to_string).collect::<Vec<_>>()),
+        let ratio = self.inlier_ratio.filter(|ratio| !tried.inlier_ratios.contains(ratio));
+        let has_threshold = self.figure == Figure::Localization || self.label_in(tried).is_some();
+        let ratios: Vec<String> = tried.inlier_ratios.iter().map(f64::to_string).collect();
+        let labels: Vec<String> = tried.thresholds.iter().map(|t| t.label.clone()).collect();
+        let parts = [
+            ("scheme", &tried.schemes, unknown(&tried.schemes, self.scheme.as_deref())),
+            ("solver", &tried.solvers, unknown(&tried.solvers, self.solver)),
+            ("neighbors", &tried.sources, unknown(&tried.sources, self.source.as_deref())),
+            ("inlier ratio", &ratios, ratio.map(|ratio| ratio.to_string())),
+            (THRESHOLD, &labels, (!has_threshold).then(|| self.threshold.to_string())),
+        ];
+        parts.into_iter().find_map(|(part, known, unknown)| {
+            let expected = match known.is_empty() {
+                true => "none, because measured ratios have no gates".to_owned(),
+                false => format!("one of {}", known.join(", ")),
             };
-            Some(line("inlier ratio", expected, &ratio.to_string()))
-        };
-        let threshold = || {
-            let labels: Vec<_> = tried.thresholds.iter().map(|t| t.label.clone()).collect();
-            let is_known = self.label_in(tried).is_some();
-            (!is_known).then(|| line(THRESHOLD, names(&labels), &self.threshold.to_string()))
-        };
-        lacks("solver", self.solver, &tried.solvers)
-            .or_else(|| lacks("neighbors", self.source.as_deref(), &tried.sources))
-            .or_else(ratio)
-            .or_else(threshold)
+            Some(format!("{part}: expected {expected}, found {}", unknown?))
+        })
     }
 
     fn label_in<'t>(&self, tried: &'t Tried) -> Option<&'t str> {
@@ -131,12 +125,8 @@ impl Gate {
 
     /// Returns the row of `rows` with the largest bounded figure. `None` if the gate covers none of
     /// them, which must never count as passing.
-    fn worst<'r>(
-        &self,
-        rows: impl Iterator<Item = &'r Row>,
-        label: &str,
-    ) -> Option<(WithInterval, &'r Row)> {
-        let covered = rows.filter(|row| self.covers(row));
+    fn worst<'r>(&self, rows: &'r [Row], label: &str) -> Option<(WithInterval, &'r Row)> {
+        let covered = rows.iter().filter(|row| self.covers(row));
         let figures = covered.map(|row| (self.bounded(row, label), row));
         figures.reduce(|a, b| if is_worse(&b.0, &a.0) { b } else { a })
     }
@@ -180,10 +170,8 @@ impl Gate {
         if let (Some(source), Some(ratio)) = (&source, inlier_ratio)
             && source != ORACLE
         {
-            return Err(format!(
-                "inlier ratio: expected none with neighbors by {source}, whose ratio is measured, \
-                 found @{ratio}"
-            ));
+            let expected = format!("none with neighbors by {source}, whose ratio is measured");
+            return Err(format!("inlier ratio: expected {expected}, found @{ratio}"));
         }
         let scheme = match scheme.trim() {
             "all" => None,
@@ -260,42 +248,46 @@ fn source_name(text: &str) -> Option<String> {
 /// Finds a solver and a source among the names after a scheme, each at most once, in any order.
 fn qualifiers(names: &[&str]) -> Result<(Option<&'static str>, Option<String>), String> {
     let (mut solver, mut source) = (None, None);
-    let once = |what: &str, earlier: Option<String>, name: &str| match earlier {
-        Some(earlier) => Err(format!("expected one {what}, found {earlier} and {name}")),
-        None => Ok(()),
-    };
     for name in names {
         if let Some(name) = solver_name(name) {
-            once("solver", solver.replace(name).map(str::to_owned), name)?;
+            if let Some(earlier) = solver.replace(name) {
+                return Err(format!("expected one solver, found {earlier} and {name}"));
+            }
         } else if let Some(name) = source_name(name) {
-            once("source", source.replace(name.clone()), &name)?;
+            if let Some(earlier) = source.replace(name.clone()) {
+                return Err(format!("expected one source, found {earlier} and {name}"));
+            }
         } else {
             let solvers = Builtin::ALL.map(|solver| solver.name()).join(", ");
             let sources: Vec<&str> = sources::all().iter().map(|entry| entry.name).collect();
+            let sources = sources.join(", ");
             return Err(format!(
-                "expected a solver ({solvers}) or a source of neighborhoods ({ORACLE}, file, {}), \
-                 found {name}",
-                sources.join(", ")
+                "expected a solver ({solvers}) or a source of neighborhoods ({ORACLE}, file, {sources}), \
+                 found {name}"
             ));
         }
     }
     Ok((solver, source))
 }
 
+/// Parses a number that `fits` what is expected.
+pub fn number<T: FromStr>(
+    text: &str,
+    expected: &str,
+    fits: impl Fn(&T) -> bool,
+) -> Result<T, String> {
+    let number = text.trim().parse().ok().filter(fits);
+    number.ok_or_else(|| format!("expected {expected}, found {text}"))
+}
+
 /// Parses a number above 0.
 pub fn positive(text: &str) -> Result<f64, String> {
-    match text.trim().parse::<f64>() {
-        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-        _ => Err(format!("expected a number above 0, found {text}")),
-    }
+    number(text, "a number above 0", |x: &f64| x.is_finite() && *x > 0.0)
 }
 
 /// Parses a number from 0 to 1.
 pub fn ratio(text: &str) -> Result<f64, String> {
-    match text.trim().parse::<f64>() {
-        Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
-        _ => Err(format!("expected a number from 0 to 1, found {text}")),
-    }
+    number(text, "a number from 0 to 1", |x| (0.0..=1.0).contains(x))
 }
 
 fn in_words(gate: &Gate, figure: f64, row: &Row, label: &str) -> String {
@@ -322,16 +314,16 @@ fn in_words(gate: &Gate, figure: f64, row: &Row, label: &str) -> String {
 /// Reports a gate without rows before the audit runs.
 pub fn check_gates(gates: &[Gate], tried: &Tried) -> Result<(), Error> {
     for gate in gates {
+        let typed = &gate.typed;
         if gate.figure == Figure::Localization && !tried.localizes {
-            let expected = "expected a COLMAP model with cameras and tracks, not in tiles";
-            return Err(Error::request(format!("--gate {}: {expected}, found none", gate.typed)));
+            bail!(
+                "--gate {typed}: expected a COLMAP model with cameras and tracks, not in tiles, found none"
+            );
         }
         let Some(wrong) = gate.not_in(tried) else { continue };
-        let error = Error::request(format!("--gate {}: {wrong}", gate.typed));
-        return Err(match wrong.starts_with(THRESHOLD) {
-            true => error.advise("--scale and --thresholds, which change them"),
-            false => error,
-        });
+        let error = Error::request(format!("--gate {typed}: {wrong}"));
+        let advice = "--scale and --thresholds, which change them";
+        return Err(if wrong.starts_with(THRESHOLD) { error.advise(advice) } else { error });
     }
     Ok(())
 }
@@ -342,10 +334,10 @@ fn untried(gate: &Gate, tried: &Tried) -> Option<String> {
     if all && gate.figure == Figure::Recovered && tried.lacks_records_alone {
         return Some("records alone were not tried, and no attack is named".to_owned());
     }
-    (all && gate.inlier_ratio.is_none() && tried.lacks_best_source).then(|| {
-        let best = sources::BY_DESCRIPTORS.name;
-        format!("neighbors by {best}, the best source, were not tried, and no attack is named")
-    })
+    let best = sources::BY_DESCRIPTORS.name;
+    let doubt =
+        format!("neighbors by {best}, the best source, were not tried, and no attack is named");
+    (all && gate.inlier_ratio.is_none() && tried.lacks_best_source).then_some(doubt)
 }
 
 /// Checks the thresholds of gates: a gate that no attack can break means nothing.
@@ -353,36 +345,33 @@ pub fn check_lengths_of_gates(points: &PointSet<3>, gates: &[Gate]) -> Result<()
     let by_size = |a: &&Gate, b: &&Gate| a.threshold.total_cmp(&b.threshold);
     let Some(gate) = gates.iter().min_by(by_size) else { return Ok(()) };
     let nearest = nearest(points.positions())?;
-    if nearest < HOPELESS * gate.threshold {
-        return Ok(());
+    if nearest >= HOPELESS * gate.threshold {
+        bail!(
+            "--gate {}: expected points less than {HOPELESS} times its threshold from their nearest neighbors, found {} times: \
+             no attack could come near",
+            gate.typed,
+            short(nearest / gate.threshold)
+        );
     }
-    Err(Error::request(format!(
-        "--gate {}: expected points less than {HOPELESS} times its threshold from their nearest neighbors, found {} times: \
-         no attack could come near",
-        gate.typed,
-        short(nearest / gate.threshold)
-    )))
+    Ok(())
 }
 
 /// Returns the result of a gate. It fails if something it applies to was not audited, or if a row it applies to has a doubt. A gate
 /// that names no attack needs the best one of each kind.
 pub fn gate_result(gate: &Gate, attacked: &Attacked) -> Result<GateResult, Error> {
-    let Attacked { tried, rows, not_audited, doubts, localization, .. } = attacked;
+    let Attacked { tried, document, not_audited, doubts, .. } = attacked;
     if gate.figure == Figure::Localization {
-        return Ok(of_localization(gate, localization, not_audited));
+        return Ok(of_localization(gate, &document.localization, not_audited));
     }
+    let rows = &document.results;
     let label = gate.label_in(tried);
-    let worst = label.and_then(|label| gate.worst(rows.iter(), label));
+    let worst = label.and_then(|label| gate.worst(rows, label));
     let highest = worst.map(|(worst, _)| worst.interval[1]);
     let is_kept = highest.is_some_and(|highest| gate.passes(highest));
     let missing = not_audited.iter().find(|missing| gate.misses(missing)).map(|missing| {
-        let with = missing.neighbors.as_ref().map(|name| format!(" with neighbors by {name}"));
-        format!(
-            "{}{} was not audited: {}",
-            missing.scheme,
-            with.unwrap_or_default(),
-            missing.reason
-        )
+        let NotAudited { scheme, neighbors, reason, .. } = missing;
+        let with = neighbors.as_ref().map(|name| format!(" with neighbors by {name}"));
+        format!("{scheme}{} was not audited: {reason}", with.unwrap_or_default())
     });
     let doubt = || {
         let mut covered = rows.iter().enumerate().filter(|(_, row)| gate.covers(row));
@@ -393,8 +382,7 @@ pub fn gate_result(gate: &Gate, attacked: &Attacked) -> Result<GateResult, Error
     let reason = missing.or_else(|| if is_kept { doubt() } else { None });
     // A gate without a row must never count as held.
     if worst.is_none() && reason.is_none() {
-        let error = format!("--gate {}: expected a row, found none", gate.typed);
-        return Err(Error::request(error));
+        bail!("--gate {}: expected a row, found none", gate.typed);
     }
     Ok(GateResult {
         gate: gate.typed.clone(),
@@ -435,8 +423,8 @@ fn of_localization(
         of.scheme == UNPROTECTED && of.held_out.as_ref().is_some_and(|held| recall(held) < 50.0)
     };
     let reason = match (worst, missing) {
-        (_, Some(missing)) => {
-            Some(format!("{} was not audited: {}", missing.scheme, missing.reason))
+        (_, Some(NotAudited { scheme, reason, .. })) => {
+            Some(format!("{scheme} was not audited: {reason}"))
         }
         (None, None) => Some("localization was not measured".to_owned()),
         (Some(worst), None) if worst.is_unknown() => Some(format!(
@@ -550,7 +538,7 @@ mod tests {
             ("olc:joint:0.10<=60", alone, Some(58.6)),
             ("olc:oracle:0.10<=60", alone, Some(58.6)),
         ] {
-            let worst = Gate::parse(text).unwrap().worst(rows.iter(), "0.1");
+            let worst = Gate::parse(text).unwrap().worst(rows, "0.1");
             assert_eq!(worst.map(|(worst, _)| worst.percent), expected, "{text}");
         }
         // The upper end of an interval counts, and decides which row is the worst.
@@ -558,12 +546,12 @@ mod tests {
         few.interval.as_mut().unwrap().recovered_percent[0] = [0.0, 22.0];
         let gate = Gate::parse("all:0.1<=20").unwrap();
         let rows = [few, row("olc", 0.5, 19.0)];
-        let (worst, _) = gate.worst(rows.iter(), "0.1").unwrap();
+        let (worst, _) = gate.worst(&rows, "0.1").unwrap();
         assert_eq!((worst.percent, worst.interval), (18.0, [0.0, 22.0]));
         assert!(!gate.passes(21.0) && gate.passes(20.0));
         // A figure that is no number fails, whatever the other figures.
         let rows = [row("ppl", 1.0, 3.0), row("ppl", 0.5, f64::NAN), row("ppl", 0.3, 2.0)];
-        let (worst, _) = gate.worst(rows.iter(), "0.1").unwrap();
+        let (worst, _) = gate.worst(&rows, "0.1").unwrap();
         assert!(!gate.passes(f64::NAN) && !gate.passes(worst.interval[1]));
     }
 

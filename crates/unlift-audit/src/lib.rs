@@ -23,7 +23,7 @@
 //! let audit = Audit {
 //!     about: prepared.about(path)?,
 //!     gates: vec![Gate::parse("all@0.5:0.10<=20").expect("a gate")],
-//!     ..Audit::of_map(&prepared, output)
+//!     ..Audit::new(output).of_map(&prepared)
 //! };
 //! let finished = audit.run(&input, &Quiet)?.write(files)?;
 //! assert!(finished.passed());
@@ -47,26 +47,30 @@ mod request;
 pub mod sources;
 
 pub use attack::{Again, Hidden, Images, Input, Map, Maps, Sequence, Tiles};
-pub use audit::{
-    Audit, Audited, FIGURES, Files, Finished, Output, PAGE, check_file, check_file_of, refused,
-};
+pub use audit::{Audit, Audited, FIGURES, Files, Finished, Output, PAGE, check_file, refused};
 pub use document::evaluated;
-pub use doubts::{
-    Checked, LengthMessages, check_scale, check_thresholds, read_from_file, unlike_neighbors,
-};
-pub use gate::{Gate, positive, ratio};
+pub use doubts::{Checked, check_scale, check_thresholds, unlike_neighbors};
+pub use gate::{Gate, number, positive, ratio};
 pub use maps::released;
 pub use maps::{Preparation, Prepared, by_point, prepare};
-pub use request::{Planned, Request, distinct, headline};
+pub use request::{Request, distinct, headline};
 
 use std::fmt;
+
+/// Ends a function with an error of the request, whose text has the form of `format!`.
+#[macro_export]
+macro_rules! bail {
+    ($($text:tt)*) => { return Err($crate::Error::request(format!($($text)*))) };
+}
 
 /// An error of an audit.
 #[derive(Debug)]
 pub struct Error {
     message: String,
-    is_request: bool,
-    advice: Option<String>,
+    /// True if the request is wrong, not a file.
+    pub is_request: bool,
+    /// What the user could try instead.
+    pub advice: Option<String>,
 }
 
 impl Error {
@@ -84,16 +88,6 @@ impl Error {
     #[must_use]
     pub fn advise(self, advice: impl Into<String>) -> Self {
         Self { advice: Some(advice.into()), ..self }
-    }
-
-    /// Returns true if the request is wrong, not a file.
-    pub fn is_request(&self) -> bool {
-        self.is_request
-    }
-
-    /// Returns what the user could try instead.
-    pub fn advice(&self) -> Option<&str> {
-        self.advice.as_deref()
     }
 }
 
@@ -124,19 +118,13 @@ from!(unlift::Error, unlift_io::Error, unlift_report::Error, serde_json::Error);
 /// Receives the progress of an audit, from any thread.
 pub trait Progress: Send + Sync {
     /// Reports that `done` of `total` items are finished and that `what` comes next.
-    fn show(&self, done: usize, total: usize, what: &str) {
-        let _ = (done, total, what);
-    }
+    fn show(&self, _done: usize, _total: usize, _what: &str) {}
 
     /// Reports that another share of an item is finished. `what` is the current step, or empty.
-    fn add(&self, share: f64, what: &str) {
-        let _ = (share, what);
-    }
+    fn add(&self, _share: f64, _what: &str) {}
 
     /// Passes a note to the user.
-    fn say(&self, line: &str) {
-        let _ = line;
-    }
+    fn say(&self, _line: &str) {}
 
     /// Returns whether the work continues. The audit calls it between cells; on false, it ends with
     /// an error and writes nothing.
@@ -147,8 +135,10 @@ pub trait Progress: Send + Sync {
 
 /// Returns an error if the user asked to stop.
 fn check_stop(progress: &dyn Progress) -> Result<(), Error> {
-    let stopped = "audit: expected to run to the end, found a request to stop";
-    if progress.goes_on() { Ok(()) } else { Err(Error::request(stopped)) }
+    if !progress.goes_on() {
+        bail!("audit: expected to run to the end, found a request to stop");
+    }
+    Ok(())
 }
 
 /// A progress receiver that ignores everything.

@@ -6,79 +6,36 @@ use unlift::audit::{NeighborsBy, Plan, Threshold};
 use unlift::neighbors::oracle::Noise;
 use unlift::neighbors::{Needs, Source};
 use unlift::obfuscate::{Change, Changed, Scheme};
-use unlift::recover::{Delta, Solver};
-use unlift::{Descriptors, ErrorKind};
+use unlift::recover::Solver;
+use unlift::{Descriptors, ErrorKind, PointSet, Unit};
 
-use crate::doubts::{LengthMessages, check_thresholds};
-use crate::maps::Prepared;
-use crate::{Error, sources};
+use crate::doubts::check_thresholds;
+use crate::{Audit, Error, bail, sources};
 
-/// What a user requests of an attack. What is empty has its default; built-in names count once.
+/// What a user requests of an attack.
 #[derive(Clone, Debug)]
 pub struct Request<const D: usize> {
-    /// Schemes.
-    pub schemes: Vec<Arc<dyn Scheme<D>>>,
+    /// The requested plan. Lists that are empty have their defaults; built-in names count once.
+    pub plan: Plan<D>,
     /// Changes under which every scheme is audited, too.
     pub changes: Vec<Change>,
-    /// Sources of neighborhoods.
-    pub neighbors: Vec<NeighborsBy<D>>,
-    /// Inlier ratios of the oracle.
-    pub inlier_ratios: Vec<f64>,
-    /// Noise models of the oracle.
-    pub oracle_noise: Vec<Noise>,
-    /// Solvers.
-    pub solvers: Vec<Arc<dyn Solver<D>>>,
-    /// Errors below which a point counts as recovered.
-    pub thresholds: Vec<Threshold>,
-    /// True neighbors per point; it has no default.
-    pub k: usize,
-    /// Distance within which a listed record supports a position.
-    pub delta: Delta,
-    /// Whether maps are also attacked by records alone.
-    pub records_alone: bool,
-    /// Seed of the first repeat.
-    pub seed: u64,
-    /// Number of seeds to average.
-    pub repeats: u32,
-}
-
-/// The plan for a map, and what there is to say of it.
-pub struct Planned {
-    /// The plan.
-    pub plan: Plan<3>,
-    /// Notes for readers of the figures.
-    pub notes: Vec<String>,
-    /// Doubts about all figures.
-    pub doubts: Vec<String>,
-}
-
-impl Planned {
-    /// Adds notes and doubts to those of the map, and returns the plan.
-    pub fn note(self, prepared: &mut Prepared) -> Plan<3> {
-        prepared.notes.extend(self.notes);
-        prepared.doubts.extend(self.doubts);
-        self.plan
-    }
 }
 
 impl<const D: usize> Request<D> {
     /// Creates a request of defaults.
     pub fn new(k: usize, seed: u64) -> Self {
-        let (schemes, changes, neighbors, solvers, thresholds) = Default::default();
-        Self {
-            schemes,
-            changes,
-            neighbors,
-            inlier_ratios: Vec::new(),
+        let plan = Plan {
+            schemes: Vec::new(),
+            neighbors: Vec::new(),
             oracle_noise: Vec::new(),
-            solvers,
-            thresholds,
+            inlier_ratios: Vec::new(),
+            solvers: Vec::new(),
+            thresholds: Vec::new(),
             k,
-            delta: Delta::Auto,
-            records_alone: true,
             seed,
-            repeats: 1,
-        }
+            ..Plan::new(if D == 2 { Unit::Pixel } else { Unit::Meter })
+        };
+        Self { plan, changes: Vec::new() }
     }
 
     /// Returns the plan `usual` with what is requested; `described` is true if there are descriptors.
@@ -86,30 +43,28 @@ impl<const D: usize> Request<D> {
     /// # Errors
     /// If a threshold or a source repeats, or an option of the oracle is given without it.
     pub fn plan(self, usual: Plan<D>, described: bool) -> Result<Plan<D>, Error> {
-        let neighbors = match self.neighbors.is_empty() {
+        let Self { plan, changes } = self;
+        let neighbors = match plan.neighbors.is_empty() {
             true => sources::usual(described),
-            false => each_once(self.neighbors)?,
+            false => each_once(plan.neighbors)?,
         };
         for (option, is_given) in [
-            ("--inlier-ratios", !self.inlier_ratios.is_empty()),
-            ("--oracle-noise", !self.oracle_noise.is_empty()),
+            ("--inlier-ratios", !plan.inlier_ratios.is_empty()),
+            ("--oracle-noise", !plan.oracle_noise.is_empty()),
         ] {
             if is_given && !neighbors.iter().any(NeighborsBy::is_oracle) {
                 let names = neighbors.iter().map(NeighborsBy::name).collect::<Vec<_>>().join(", ");
-                let expected = "expected with --neighbors oracle";
-                return Err(Error::request(format!("{option}: {expected}, found only {names}")));
+                bail!("{option}: expected with --neighbors oracle, found only {names}");
             }
         }
-        let thresholds = given_or(self.thresholds, usual.thresholds);
+        let thresholds = given_or(plan.thresholds, usual.thresholds);
         if let Some(threshold) = repeated(&thresholds, |a, b| a.value == b.value) {
-            let label = &threshold.label;
-            let error = format!("--thresholds: expected each once, found {label} again");
-            return Err(Error::request(error));
+            bail!("--thresholds: expected each once, found {} again", threshold.label);
         }
         let is_ours = |name: &str| unlift::obfuscate::scheme(name).is_ok();
-        let schemes = distinct(self.schemes, |a, b| a.name() == b.name() && is_ours(a.name()));
+        let schemes = distinct(plan.schemes, |a, b| a.name() == b.name() && is_ours(a.name()));
         let mut schemes = given_or(schemes, usual.schemes);
-        schemes.extend(Changed::all(&schemes, &self.changes));
+        schemes.extend(Changed::all(&schemes, &changes));
         let is_ours = |solver: &dyn Solver<D>| solver.builtin().is_some();
         let same = |a: &Arc<dyn Solver<D>>, b: &Arc<dyn Solver<D>>| {
             a.name() == b.name() && is_ours(&**a) && is_ours(&**b)
@@ -117,17 +72,13 @@ impl<const D: usize> Request<D> {
         Ok(Plan {
             schemes,
             neighbors,
-            inlier_ratios: given_or(distinct(self.inlier_ratios, f64::eq), usual.inlier_ratios),
-            oracle_noise: given_or(distinct(self.oracle_noise, Noise::eq), usual.oracle_noise),
-            solvers: given_or(distinct(self.solvers, same), usual.solvers),
-            k: self.k,
-            delta: self.delta,
-            records_alone: self.records_alone,
+            inlier_ratios: given_or(distinct(plan.inlier_ratios, f64::eq), usual.inlier_ratios),
+            oracle_noise: given_or(distinct(plan.oracle_noise, Noise::eq), usual.oracle_noise),
+            solvers: given_or(distinct(plan.solvers, same), usual.solvers),
             headline: if D == 2 { headline(&thresholds) } else { usual.headline },
             thresholds,
-            seed: self.seed,
-            repeats: self.repeats,
-            ..usual
+            measures: usual.measures,
+            ..plan
         })
     }
 }
@@ -142,36 +93,34 @@ impl Request<3> {
     /// Requests a small audit in place of the usual schemes and sources.
     pub fn quick(&mut self, usual: &Plan<3>, described: bool) -> Result<(), Error> {
         let is_quick = |scheme: &&Arc<dyn Scheme<3>>| QUICK_SCHEMES.contains(&scheme.name());
-        self.schemes = usual.schemes.iter().filter(is_quick).cloned().collect();
-        self.inlier_ratios = vec![QUICK_RATIO];
-        self.neighbors = vec![NeighborsBy::Oracle];
+        self.plan.schemes = usual.schemes.iter().filter(is_quick).cloned().collect();
+        self.plan.inlier_ratios = vec![QUICK_RATIO];
+        self.plan.neighbors = vec![NeighborsBy::Oracle];
         if described {
             let source = sources::named(QUICK_SOURCE)?.of_dimension()?;
-            self.neighbors.push(NeighborsBy::Source(source));
+            self.plan.neighbors.push(NeighborsBy::Source(source));
         }
         Ok(())
     }
 
-    /// Returns the plan for a map whose release has `descriptors`; `place` says where they are expected.
+    /// Returns the plan for a map whose release has `descriptors`; `place` says where they are expected. Adds to `audit` what there is
+    /// to say of it.
     ///
     /// # Errors
     /// As of [`plan`](Self::plan), if a source does not support the descriptors, or if thresholds mean nothing for the map.
     pub fn of_map(
         self,
         usual: Plan<3>,
-        prepared: &Prepared,
-        descriptors: Option<&Descriptors>,
-        place: &str,
-    ) -> Result<Planned, Error> {
-        let (points, typed) = (prepared.original.reveal(), !self.thresholds.is_empty());
+        points: &PointSet<3>,
+        (descriptors, place): (Option<&Descriptors>, &str),
+        audit: &mut Audit,
+    ) -> Result<Plan<3>, Error> {
+        let typed = !self.plan.thresholds.is_empty();
         let plan = self.plan(usual, descriptors.is_some())?;
-        let (positions, unit) = (points.positions(), points.unit());
-        let LengthMessages { note, doubt } =
-            check_thresholds(positions, unit, &plan.thresholds, typed)?;
+        check_thresholds(audit, points, &plan.thresholds, typed)?;
         check_fit(&plan, descriptors, place)?;
-        let own = plan.own_sources().filter_map(|source| source.note(points.len()));
-        let notes = note.into_iter().chain(own).collect();
-        Ok(Planned { plan, notes, doubts: doubt.into_iter().collect() })
+        audit.notes.extend(plan.own_sources().filter_map(|source| source.note(points.len())));
+        Ok(plan)
     }
 }
 
@@ -223,16 +172,12 @@ fn each_once<const D: usize>(neighbors: Vec<NeighborsBy<D>>) -> Result<Vec<Neigh
     });
     let n_files = neighbors.iter().filter(|by| matches!(by, NeighborsBy::Given(_))).count();
     if n_files > 1 {
-        let error = format!("--neighbors: expected at most one file, found {n_files}");
-        return Err(Error::request(error));
+        bail!("--neighbors: expected at most one file, found {n_files}");
     }
-    match repeated(&neighbors, |a, b| a.name() == b.name()) {
-        None => Ok(neighbors),
-        Some(by) => {
-            let error = format!("--neighbors: expected each name once, found {}", by.name());
-            Err(Error::request(error))
-        }
+    if let Some(by) = repeated(&neighbors, |a, b| a.name() == b.name()) {
+        bail!("--neighbors: expected each name once, found {}", by.name());
     }
+    Ok(neighbors)
 }
 
 /// Returns the first item that repeats an earlier one.

@@ -43,10 +43,10 @@ pub fn finish(result: crate::Result<bool>) -> u8 {
         Ok(false) => GATE_FAILED,
         Err(error) => {
             tell(format_args!("unlift: {error}"));
-            if let Some(advice) = error.advice() {
+            if let Some(advice) = &error.advice {
                 tell(format_args!("  try: {advice}"));
             }
-            if error.is_request() { USAGE } else { BAD_INPUT }
+            if error.is_request { USAGE } else { BAD_INPUT }
         }
     }
 }

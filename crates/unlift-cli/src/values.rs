@@ -1,18 +1,18 @@
 //! Parses option values; gates are parsed by `unlift_audit::Gate`.
 
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::stderr::tell;
 use unlift::audit::Threshold;
 use unlift::neighbors::sources::Named;
 use unlift::obfuscate::{Entry, Mitigation};
 use unlift::recover::Builtin;
+use unlift_audit::number;
 use unlift_audit::sources;
 pub use unlift_audit::{positive, ratio};
 use unlift_report::compare::Accepted;
 
-/// Source of neighbor lists.
 #[derive(Clone, Debug, PartialEq)]
 pub enum NeighborSource {
     /// Lists from ground truth, at chosen inlier ratios.
@@ -24,10 +24,9 @@ pub enum NeighborSource {
 }
 
 impl NeighborSource {
-    /// Returns the files among `sources`.
-    pub fn files(sources: &[Self]) -> impl Iterator<Item = &Path> {
+    pub fn files(sources: &[Self]) -> impl Iterator<Item = &PathBuf> {
         sources.iter().filter_map(|source| match source {
-            Self::File(path) => Some(path.as_path()),
+            Self::File(path) => Some(path),
             Self::Oracle | Self::Own(_) => None,
         })
     }
@@ -46,8 +45,8 @@ pub fn by<T>(
 /// Parses a number of points, images or features. Stage files number rows with 32 bits.
 pub fn count(text: &str) -> Result<NonZeroUsize, String> {
     const MAX: usize = u32::MAX as usize;
-    let number = text.trim().parse::<NonZeroUsize>().ok().filter(|number| number.get() <= MAX);
-    number.ok_or_else(|| format!("expected a whole number from 1 to {MAX}, found {text}"))
+    let expected = format!("a whole number from 1 to {MAX}");
+    number(text, &expected, |number: &NonZeroUsize| number.get() <= MAX)
 }
 
 /// Parses the reason why inputs of a comparison may differ.
@@ -57,10 +56,7 @@ pub fn accepted(text: &str) -> Result<Accepted, String> {
 
 /// Parses a score in `0..1`.
 pub fn score(text: &str) -> Result<f32, String> {
-    match text.trim().parse::<f32>() {
-        Ok(value) if (0.0..1.0).contains(&value) => Ok(value),
-        _ => Err(format!("expected a number from 0 to below 1, found {text}")),
-    }
+    number(text, "a number from 0 to below 1", |score| (0.0..1.0).contains(score))
 }
 
 /// Parses a scheme for maps, also one that is audited only on request.
@@ -101,11 +97,8 @@ pub fn image_solver(text: &str) -> Result<Builtin, String> {
 }
 
 pub fn image_source(text: &str) -> Result<NeighborSource, String> {
-    let is_of_images = |source: &NeighborSource| match source {
-        NeighborSource::Own(named) => named.of_dimension::<2>().is_ok(),
-        _ => true,
-    };
-    any_source(text).ok().filter(is_of_images).ok_or_else(|| {
+    let is_of_maps = |source: &NeighborSource| matches!(source, NeighborSource::Own(named) if named.of_dimension::<2>().is_err());
+    any_source(text).ok().filter(|source| !is_of_maps(source)).ok_or_else(|| {
         let all = sources::all();
         let of_images = all.iter().filter(|entry| entry.in_2d.is_some()).map(|entry| entry.name);
         none_of(["oracle"].into_iter().chain(of_images), text)
@@ -152,20 +145,17 @@ pub fn neighbor_source(text: &str) -> Result<NeighborSource, String> {
     if text.is_empty() {
         return Err("expected oracle, a source or a file".to_owned());
     }
-    if let Ok(source) = any_source(text) {
-        return Ok(source);
-    }
     // If one name of a list is known, an unknown one is a typo, not a missing file.
     let is_path = text.contains(std::path::is_separator);
-    if !is_path && text.split([',', '+']).any(|name| any_source(name).is_ok()) {
-        return Err(format!(
-            "expected one source (repeat the option for rows of each), found {text}"
-        ));
+    match any_source(text) {
+        Ok(source) => Ok(source),
+        Err(_) if !is_path && text.split([',', '+']).any(|name| any_source(name).is_ok()) => {
+            Err(format!("expected one source (repeat the option for rows of each), found {text}"))
+        }
+        Err(_) => Ok(NeighborSource::File(text.into())),
     }
-    Ok(NeighborSource::File(text.into()))
 }
 
-/// Parses the name of a source.
 pub fn any_source(text: &str) -> Result<NeighborSource, String> {
     match text {
         "oracle" => Ok(NeighborSource::Oracle),
@@ -175,8 +165,7 @@ pub fn any_source(text: &str) -> Result<NeighborSource, String> {
 
 /// Parses a number of queries: two or more.
 pub fn queries(text: &str) -> Result<usize, String> {
-    let number = text.trim().parse::<usize>().ok().filter(|n| *n >= 2);
-    number.ok_or_else(|| format!("expected a whole number from 2, found {text}"))
+    number(text, "a whole number from 2", |n| *n >= 2)
 }
 
 /// Parses `perturbed:CM,DEG`.
@@ -184,9 +173,8 @@ pub fn poses(text: &str) -> Result<(f64, f64), String> {
     let wrong = || format!("expected perturbed:CM,DEG (for example perturbed:5,0.5), found {text}");
     let (cm, angle) =
         text.strip_prefix("perturbed:").and_then(|of| of.split_once(',')).ok_or_else(wrong)?;
-    let size = |text: &str| {
-        text.trim().parse::<f64>().ok().filter(|x| x.is_finite() && *x >= 0.0).ok_or_else(wrong)
-    };
+    let size =
+        |text: &str| number(text, "", |x: &f64| x.is_finite() && *x >= 0.0).map_err(|_| wrong());
     Ok((size(cm)?, size(angle)?))
 }
 

@@ -132,16 +132,15 @@ pub fn audit(
     let work = move |progress: &Watcher| {
         let n_points = prepared.original.len();
         let n_together = tiles.map_or(n_points, |tiles| n_points.min(tiles.max_points));
-        let usual = Plan::new(unit).for_map(n_together, request.k);
-        let planned = request.of_map(usual, &prepared, prepared.descriptors.as_ref(), "")?;
-        let map = MapInput { plan: planned.plan, localize: None, ..MapInput::new(&prepared) };
+        let usual = Plan::new(unit).for_map(n_together, request.plan.k);
+        let mut audit = Audit { about, gates, ..Audit::new(output).of_map(&prepared) };
+        let (points, descriptors) = (prepared.original.reveal(), prepared.descriptors.as_ref());
+        let plan = request.of_map(usual, points, (descriptors, ""), &mut audit)?;
+        let map = MapInput { plan, localize: None, ..MapInput::new(&prepared) };
         let input = match tiles {
             Some(tiles) => Input::Tiles(map, tiles),
             None => Input::Map(map),
         };
-        let mut audit = Audit { about, gates, ..Audit::of_map(&prepared, output) };
-        audit.notes.extend(planned.notes);
-        audit.doubts.extend(planned.doubts);
         audit.run(&input, progress)
     };
     Ok(observed(py, options.threads, (tell, &by), work)?.0)
@@ -226,9 +225,8 @@ impl Options<'_> {
         Own: Source<D> + Solver<D>,
     {
         let noise = |name: &String| Noise::from_name(name).map_err(raised);
-        Ok(Request {
+        let plan = Plan {
             schemes: each("schemes", self.schemes.as_deref(), |given| scheme(given, unit, by))?,
-            changes: Vec::new(),
             neighbors: each("neighbors", Some(&self.neighbors), |given| source(given, by))?,
             inlier_ratios: each("inlier_ratios", self.inlier_ratios.as_deref(), |&x| Ok(x))?,
             oracle_noise: each("oracle_noise", self.oracle_noise.as_deref(), noise)?,
@@ -239,7 +237,9 @@ impl Options<'_> {
             records_alone: self.records_alone,
             seed: self.seed,
             repeats: self.repeats,
-        })
+            ..Plan::new(unit)
+        };
+        Ok(Request { plan, changes: Vec::new() })
     }
 
     fn gates(&self) -> PyResult<Vec<Gate>> {

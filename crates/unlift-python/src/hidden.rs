@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use unlift::released::{self, Obfuscation};
 use unlift::truth::{Original, Secret};
-use unlift_audit::check_file_of;
+use unlift_audit::check_file;
 use unlift_io::outputs;
 use unlift_io::stage::{Kind, read_released, read_truth, write_released, write_truth};
 
@@ -270,7 +270,7 @@ pub fn save(
 ) -> PyResult<()> {
     py.detach(|| {
         let rules = outputs::Rules::new([], force);
-        check_file_of("path", &path, outputs::Kind::Stage(kind), &rules).map_err(refused)?;
+        check_file("path", &path, outputs::Kind::Stage(kind), &rules).map_err(refused)?;
         write(&path).map_err(raised)
     })
 }

@@ -7,7 +7,6 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 
 use serde_json::json;
 use unlift::Unit;
@@ -21,6 +20,7 @@ use unlift::released::Released;
 use unlift::seed::Key;
 use unlift::truth::{Original, Secret};
 use unlift_io::hash::hash_files;
+use unlift_report::Document;
 use unlift_report::document::Input;
 
 use super::frames::doubt_of_frames;
@@ -29,7 +29,7 @@ use crate::audit::{Audit, Audited};
 use crate::document::{Attacked, Tried};
 use crate::doubts::with_sides;
 use crate::maps::{self, Preparation, Prepared};
-use crate::{Error, Progress, check_stop};
+use crate::{Error, Progress, bail, check_stop};
 
 /// The solver of all rows.
 const SOLVER: &str = "intersection";
@@ -58,11 +58,10 @@ impl Maps {
             ([], _) => [None, None],
             ([both], true) => [Some(both), Some(both)],
             ([a, b], _) => [Some(a), Some(b)],
-            (given, _) => {
-                let expected = "expected one file for A and one for B, as A and B differ";
-                let n = given.len();
-                return Err(Error::request(format!("--descriptors: {expected}, found {n}")));
-            }
+            (given, _) => bail!(
+                "--descriptors: expected one file for A and one for B, as A and B differ, found {}",
+                given.len()
+            ),
         };
         let mut first = maps::open(a, files[0], preparation)?;
         if (a, files[0]) == (b, files[1]) {
@@ -80,9 +79,7 @@ impl Maps {
         if let [Some(a), Some(b)] = dims
             && a != b
         {
-            return Err(Error::request(format!(
-                "--descriptors: expected {a} values per descriptor of B, as of A, found {b}"
-            )));
+            bail!("--descriptors: expected {a} values per descriptor of B, as of A, found {b}");
         }
         let of_second = |text: &String| format!("second map: {text}");
         first.notes.extend(second.notes.iter().map(of_second));
@@ -125,10 +122,8 @@ impl Again<'_> {
             lacks_best_source: described,
             ..Tried::by(&self.plan, described)
         };
-        let frame = match &self.maps.second {
-            Some(second) => doubt_of_frames(first, second)?,
-            None => None,
-        };
+        let frame = self.maps.second.as_ref().map(|second| doubt_of_frames(first, second));
+        let frame = frame.transpose()?.flatten();
         let doubts: Vec<String> = audit.doubts.iter().cloned().chain(frame).collect();
         let without = "links by geometry only: both maps need descriptors for others";
         let without = (!described).then(|| without.to_owned());
@@ -136,13 +131,9 @@ impl Again<'_> {
         audit.begin(&tried, Some(first.original.reveal()), &notes, progress)?;
         let mut options = names(&tried, audit);
         options.insert("records_alone".into(), json!(self.plan.records_alone));
-        let mut attacked = Attacked {
-            tried,
-            about: with_sides(audit.about.clone(), first.original.reveal()),
-            options,
-            notes,
-            ..Attacked::default()
-        };
+        let input = with_sides(audit.about.clone(), first.original.reveal());
+        let document = Document { input, options, notes, ..Document::default() };
+        let mut attacked = Attacked { tried, document, ..Attacked::default() };
         let knn = Knn::new(second.original.reveal().positions())?;
         for (at, pair) in self.pairs.iter().enumerate() {
             let (done, total) = (at * sources.len(), self.pairs.len() * sources.len());
@@ -152,18 +143,16 @@ impl Again<'_> {
             };
             self.attack_pair(pair, sources, &knn, show, &mut attacked)?;
         }
-        if attacked.rows.is_empty() {
+        let n_rows = attacked.document.results.len();
+        if n_rows == 0 {
             let first = attacked.not_audited.first();
             let reason = first.map_or("no schemes", |missing| missing.reason.as_str());
-            let error = format!("audit again: expected a row, found none: {reason}");
-            return Err(Error::request(error));
+            bail!("audit again: expected a row, found none: {reason}");
         }
-        attacked.seconds.rows = vec![Default::default(); attacked.rows.len()];
-        attacked.doubts = vec![doubts.first().cloned(); attacked.rows.len()];
+        attacked.doubts = vec![doubts.first().cloned(); n_rows];
         audit.finish(&self.plan, attacked)
     }
 
-    /// Hides both maps under a pair of schemes and attacks them.
     fn attack_pair(
         &self,
         pair: &[Arc<dyn Scheme<3>>; 2],
@@ -173,39 +162,35 @@ impl Again<'_> {
         attacked: &mut Attacked,
     ) -> Result<(), Error> {
         let (first, second, plan) = (&self.maps.first, self.maps.second(), &self.plan);
-        let seconds = &mut attacked.seconds;
+        let Attacked { seconds, not_audited, document, .. } = attacked;
         show("two releases")?;
-        let started = Instant::now();
-        let hide = |scheme: &dyn Scheme<3>, map: &Prepared, seed: u64| {
-            let key = Key::from_seed(seed);
-            obfuscate(scheme, &map.original, map.descriptors.as_ref(), &key)
+        let mut hide = |scheme: &dyn Scheme<3>, map: &Prepared, seed: u64| {
+            let (key, descriptors) = (Key::from_seed(seed), map.descriptors.as_ref());
+            let work = || obfuscate(scheme, &map.original, descriptors, &key);
+            seconds.time(|seconds| &mut seconds.obfuscate, work)
         };
         let a = hide(&*pair[0], first, plan.seed)?;
         let b = hide(&*pair[1], second, plan.seed.wrapping_add(1))?;
-        seconds.obfuscate += started.elapsed().as_secs_f64();
         let mut alone = Vec::new();
         if plan.records_alone {
             show("records alone")?;
-            let started = Instant::now();
-            alone = records_alone(&a, &first.original, plan, plan.seed)?;
-            seconds.records_alone += started.elapsed().as_secs_f64();
+            let work = || records_alone(&a, &first.original, plan, plan.seed);
+            alone = seconds.time(|seconds| &mut seconds.records_alone, work)?;
         }
         for &source in sources {
             show(source)?;
-            let started = Instant::now();
             let by = if source == AGAIN { by_descriptors } else { by_geometry };
-            let solved = match by(&a.0, &b.0) {
+            let solved = match seconds.time(|seconds| &mut seconds.recover, || by(&a.0, &b.0)) {
                 Ok(solved) => solved,
                 Err(error) => {
-                    attacked.not_audited.push(NotAudited::new(&name(pair), Some(source), error));
+                    not_audited.push(NotAudited::new(&name(pair), Some(source), error));
                     continue;
                 }
             };
-            seconds.recover += started.elapsed().as_secs_f64();
             let mut row = row(&solved, plan, (&first.original, &a), (&second.original, &b.1), knn)?;
             row.add_alone(alone.iter().cloned());
             let (neighbors, solver) = (source.to_owned(), SOLVER.to_owned());
-            attacked.rows.push(Row { scheme: name(pair), neighbors, solver, k: 2, ..row });
+            document.results.push(Row { scheme: name(pair), neighbors, solver, k: 2, ..row });
         }
         Ok(())
     }

@@ -12,19 +12,12 @@ use crate::Progress;
 use crate::inversion::Inversion;
 use crate::maps::released::slot_of;
 
-/// Collects the pictures of all audited images, in their order.
+/// Collects the pictures of all audited images, in their order. It paints if there is an inverter, and stops when `steps` does.
 pub struct Album<'a> {
-    inverter: Option<Arc<Inversion>>,
-    steps: &'a dyn Progress,
+    pub inverter: Option<Arc<Inversion>>,
+    pub steps: &'a dyn Progress,
     pub pictures: Vec<Picture>,
     pub inversions: Vec<Sheet>,
-}
-
-impl<'a> Album<'a> {
-    /// Creates an empty album. It paints if there is an inverter, and stops when `steps` does.
-    pub fn new(inverter: Option<Arc<Inversion>>, steps: &'a dyn Progress) -> Self {
-        Self { inverter, steps, pictures: Vec::new(), inversions: Vec::new() }
-    }
 }
 
 impl<'a> Watcher<2> for Album<'a> {

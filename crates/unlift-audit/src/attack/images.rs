@@ -4,12 +4,12 @@ use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use unlift::audit::{Outcome, Plan, Row, run_many};
+use unlift::audit::{Plan, Row, run_many};
 use unlift_io::hash::hash_list;
-use unlift_report::RenderOptions;
-use unlift_report::document::{ImageCounts, ImageFigures, ImageRow, Input};
+use unlift_report::document::{ImageCounts, ImageFigures, ImageRow};
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::pictures::Picture;
+use unlift_report::{Document, RenderOptions};
 
 use super::album::Album;
 use super::curves::OfItems;
@@ -59,63 +59,41 @@ impl Images<'_> {
             let expected = format!("{} images that can be used", tally.unusable);
             return Err(unlift_io::Error::new(path, "", expected, "0").into());
         }
-        let (pictures, inversions) = match audit.output.share_safe {
-            true => Default::default(),
-            false => self.pictures(&tally, &images, progress)?,
+        let (pictures, inversions) = self.pictures(&tally, &images, audit, progress)?;
+        let counts = ImageCounts {
+            used: tally.used.len() as u64,
+            unusable: tally.unusable as u64,
+            too_small: outcome.n_too_small as u64,
+            ..ImageCounts::default()
         };
-        let about = self.about(&tally, &outcome)?;
+        let mut about = self.opened.about(&tally.used, tally.sizes.iter().sum(), counts)?;
+        if source.is_in_memory() {
+            let hashes = tally.used.iter().zip(&tally.hashes);
+            let named = hashes.map(|(&at, hash)| (source.names[at].clone(), hash.clone()));
+            about.sha256 = Some(hash_list(named.collect()));
+        }
         let doubt = tally.doubt();
         let notes: Vec<String> = doubt.iter().cloned().chain(tally.moved()).collect();
         notes.iter().for_each(|note| progress.say(&format!("note: {note}")));
-        let mut options = document::options(plan);
-        options.extend(audit.options.clone());
-        if let Some(inversion) = &self.inversion {
-            options.insert("inverter_sha256".into(), inversion.sha256().into());
-        }
+        let inverter = self.inversion.as_ref().map(|inversion| inversion.sha256());
         let attacked = Attacked {
             tried: Tried::by(plan, tally.described),
-            about,
-            options,
-            notes,
             doubts: vec![doubt; outcome.rows.len()],
-            images,
-            rendering: RenderOptions {
-                error_cdf,
-                pictures,
-                inversions,
-                ..RenderOptions::default()
+            document: Document {
+                input: about,
+                options: document::options(plan, &audit.options, inverter),
+                results: outcome.rows,
+                break_even: outcome.break_even,
+                notes,
+                images,
+                ..Document::default()
             },
-            rows: outcome.rows,
             not_audited: outcome.not_audited,
-            break_even: outcome.break_even,
             seconds: outcome.seconds,
-            ..Attacked::default()
+            rendering: RenderOptions { error_cdf, pictures, inversions, ..Default::default() },
+            scene: None,
         };
         audit.finish(plan, attacked)
-    }
-
-    fn about(&self, tally: &Tally, outcome: &Outcome) -> Result<Input, Error> {
-        let Opened { source, path, .. } = self.opened;
-        let (path, sha256) = match source.is_in_memory() {
-            true => {
-                let hashes = tally.used.iter().zip(&tally.hashes);
-                let named = hashes.map(|(&at, hash)| (source.names[at].clone(), hash.clone()));
-                (None, hash_list(named.collect()))
-            }
-            false => (Some(path.display().to_string()), source.hash(path, &tally.used)?),
-        };
-        Ok(Input {
-            path,
-            sha256: Some(sha256),
-            n_points: tally.sizes.iter().sum::<usize>() as u64,
-            images: Some(ImageCounts {
-                found: (source.names.len() + source.refused.len()) as u64,
-                used: tally.used.len() as u64,
-                unusable: tally.unusable as u64,
-                too_small: outcome.n_too_small as u64,
-            }),
-            ..Input::default()
-        })
     }
 
     /// Audits a few images again, with the first solver and seed, for their pictures. The seed of an image depends on
@@ -124,10 +102,12 @@ impl Images<'_> {
         &self,
         tally: &Tally,
         figures: &[ImageFigures],
+        audit: &Audit,
         progress: &dyn Progress,
     ) -> Result<(Vec<Picture>, Vec<Sheet>), Error> {
         let Opened { source, path, .. } = self.opened;
-        let chosen = if self.draws { telling(&self.plan, figures) } else { Vec::new() };
+        let draws = self.draws && !audit.output.share_safe;
+        let chosen = if draws { telling(&self.plan, figures) } else { Vec::new() };
         if chosen.is_empty() {
             return Ok(Default::default());
         }
@@ -135,7 +115,8 @@ impl Images<'_> {
         // The album makes the pictures itself.
         let mut plan = Plan { measures: Vec::new(), repeats: 1, ..self.plan.clone() };
         plan.solvers.truncate(1);
-        let mut album = Album::new(self.inversion.clone(), progress);
+        let (inverter, pictures, inversions) = (self.inversion.clone(), Vec::new(), Vec::new());
+        let mut album = Album { inverter, steps: progress, pictures, inversions };
         let again = RefCell::default();
         let images = Stream::new((source, path), &numbers, Some(&self.plan), &again, progress);
         run_many(images, &plan, &mut album)?;
@@ -174,26 +155,23 @@ const USUAL_RATIO: f64 = 0.5;
 /// share, by the mean over schemes within the headline threshold; fewer if there are fewer.
 fn telling(plan: &Plan<2>, figures: &[ImageFigures]) -> Vec<(usize, &'static str)> {
     let label = &plan.thresholds[plan.headline].label;
-    let away = |ratio: &f64| (ratio - USUAL_RATIO).abs();
     let per_scheme = plan.rows_per_scheme();
     let variants = plan.variants();
     // The first solver's row of the variant nearest to the usual ratio; other sources have no
     // requested ratio.
-    let at = (0..variants.len())
-        .min_by(|&a, &b| {
-            let of = |at: usize| variants[at].inlier_ratio.as_ref().map_or(f64::INFINITY, away);
-            of(a).total_cmp(&of(b))
-        })
-        .unwrap_or(0);
+    let away = |&at: &usize| {
+        variants[at].inlier_ratio.map_or(f64::INFINITY, |ratio| (ratio - USUAL_RATIO).abs())
+    };
+    let nearest = (0..variants.len()).min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0);
     let score = |image: &ImageFigures| -> Option<f64> {
         let enough = image.n_points as usize > plan.k;
-        let rows = image.rows.iter().skip(at * plan.solvers.len()).step_by(per_scheme);
+        let rows = image.rows.iter().skip(nearest * plan.solvers.len()).step_by(per_scheme);
         let shares = rows.map(|row| row.recovered_percent.get(label).copied().unwrap_or(0.0));
         (enough && !image.rows.is_empty()).then(|| shares.sum())
     };
     let mut scored: Vec<(f64, usize)> =
         figures.iter().enumerate().filter_map(|(at, image)| Some((score(image)?, at))).collect();
-    scored.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    scored.sort_by(|a, b| a.0.total_cmp(&b.0));
     let n = scored.len();
     let at = |place: usize| scored[place].1;
     match n {

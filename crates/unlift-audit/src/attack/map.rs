@@ -9,13 +9,13 @@ use unlift::released::Released;
 use unlift::truth::{Original, Secret};
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::scene::{ObfuscationView, SceneBox, points_within_budget, subsample};
-use unlift_report::{Attack, ByAttack, RenderOptions, Scene3d};
+use unlift_report::{Attack, ByAttack, Document, RenderOptions, Scene3d};
 
 use super::curves::{Curves, OfItems};
 use super::tiles::{Tiles, figures};
 use crate::audit::{Audit, Audited};
 use crate::document::{self, Attacked, Tried};
-use crate::doubts::{Spread, check_truth, doubts, follows_places, with_sides};
+use crate::doubts::{Spread, check_truth, doubts, follows_places, read_from_file, with_sides};
 use crate::inversion::MapInversion;
 use crate::localization::{self, Localize};
 use crate::maps::released::slot_of;
@@ -45,10 +45,12 @@ impl<'a> Map<'a> {
     /// Returns a map as it was read, with the default plan.
     pub fn new(prepared: &'a Prepared) -> Self {
         let (cameras, held_out, protections) = (&prepared.cameras, None, Vec::new());
+        let scale = 1.0 / prepared.unit_in_map_units;
+        let centers = prepared.input.cameras.iter().map(|center| center.map(|x| x * scale));
         Self {
             descriptors: prepared.descriptors.as_ref(),
             localize: Some(Localize { cameras, held_out, protections }),
-            cameras: prepared.centers(),
+            cameras: centers.collect(),
             up: prepared.input.up,
             ..Self::of(&prepared.original)
         }
@@ -73,8 +75,8 @@ impl<'a> Map<'a> {
 pub struct Hidden<'a> {
     /// The release and its secret.
     pub release: &'a (Released<3>, Secret),
-    /// An attack on values of the released file that its records do not contain.
-    pub read: Option<Alone>,
+    /// Values of the released file that its records do not contain, each with a position per record.
+    pub published: Vec<Vec<[f64; 3]>>,
 }
 
 /// Maximum number of photos shown beside pictures.
@@ -107,12 +109,8 @@ impl Map<'_> {
         };
         let cut = tiles.map(|tiles| tiles.of(points.positions(), self.up)).transpose()?;
         let spread = match &cut {
-            Some(tiles) => {
-                let parts =
-                    tiles.iter().map(|tile| tile.item(original, None).map(|item| item.original));
-                Spread::of_parts(parts, plan.k)
-            }
-            None => Spread::of(points.positions(), plan.k),
+            Some(tiles) => Spread::of(tiles.iter().map(|tile| tile.points(points)), plan.k),
+            None => Spread::of(std::iter::once(Ok(points)), plan.k),
         };
         let spread = spread.map_err(of_file)?;
         if let Some(release) = release {
@@ -131,32 +129,37 @@ impl Map<'_> {
             }
             None => {
                 let mut watcher = self.watcher(audit.output.share_safe, progress);
-                let outcome =
-                    match release {
-                        None => run(original, self.descriptors, plan, &mut watcher).map_err(
-                            |error| of_file(error).advise("a smaller --k, or fewer --schemes"),
-                        )?,
-                        Some(release) => {
-                            run_released((original, self.descriptors), release, plan, &mut watcher)
-                                .map_err(of_file)?
-                        }
-                    };
+                let of_map = (original, self.descriptors);
+                let advice = "a smaller --k, or fewer --schemes";
+                let outcome = match release {
+                    None => run(original, self.descriptors, plan, &mut watcher)
+                        .map_err(|error| of_file(error).advise(advice)),
+                    Some(release) => {
+                        run_released(of_map, release, plan, &mut watcher).map_err(of_file)
+                    }
+                }?;
                 if let Some(error) = watcher.failed {
                     return Err(error);
                 }
-                scene = watcher.pictures.map(|p| p.into_scene(&self.cameras, self.up));
+                scene = watcher.pictures.map(|Pictures { scene, middle, .. }| Scene3d {
+                    cameras: self.cameras.iter().map(|camera| near(camera, &middle)).collect(),
+                    up: self.up.map(|up| up.map(|x| x as f32)),
+                    ..scene
+                });
                 inversions = watcher.sheets;
                 (outcome, watcher.curves)
             }
         };
         // Of values that are no better than a blind guess there is nothing to say.
-        let beats = |alone: &&Alone, row: &Row| {
+        let beats = |alone: &Alone, row: &Row| {
             alone.shares.iter().any(|(label, share)| share.percent() > row.blind_percent[label])
         };
-        let read = hidden.and_then(|hidden| hidden.read.as_ref());
+        let read = hidden.and_then(|Hidden { release, published }| {
+            read_from_file(published, original, &release.1, &plan.thresholds)
+        });
         let given = plan.schemes.first().map(|scheme| scheme.name());
         for row in outcome.rows.iter_mut().filter(|row| given == Some(&*row.scheme)) {
-            row.add_alone(read.filter(|alone| beats(alone, row)).cloned());
+            row.add_alone(read.clone().filter(|alone| beats(alone, row)));
         }
         let mut of_points = audit.doubts.clone();
         of_points.extend(release.iter().flat_map(|release| follows_places(original, release)));
@@ -165,32 +168,32 @@ impl Map<'_> {
         for note in doubts.notes.iter().filter(|note| !audit.doubts.contains(note)) {
             progress.say(&format!("note: {note}"));
         }
-        let mut options = document::options(plan);
-        options.extend(audit.options.clone());
-        if let Some(inversion) = &self.inversion {
-            options.insert("inverter_sha256".into(), inversion.sha256().into());
-        }
+        let inverter = self.inversion.as_ref().map(|inversion| inversion.sha256());
+        let mut options = document::options(plan, &audit.options, inverter);
         if let Some(Tiles { max_points, only }) = tiles {
             options.insert("tile_points".into(), max_points.into());
             options.extend(only.map(|at| ("tile".to_owned(), at.into())));
         }
         let error_cdf = curves.of_rows(&outcome.rows);
         let tiles = cut.iter().flat_map(|tiles| figures(tiles, &tile_rows, &outcome.rows));
-        let attacked = Attacked {
-            tried,
-            about: with_sides(audit.about.clone(), points),
+        let document = Document {
+            input: with_sides(audit.about.clone(), points),
             options,
             notes: [audit.notes.clone(), doubts.notes, notes_on_images].concat(),
-            doubts: doubts.of_rows,
             localization,
             tiles: tiles.collect(),
+            results: outcome.rows,
+            break_even: outcome.break_even,
+            ..Document::default()
+        };
+        let attacked = Attacked {
+            tried,
+            document,
+            not_audited: outcome.not_audited,
+            seconds: outcome.seconds,
+            doubts: doubts.of_rows,
             scene,
             rendering: RenderOptions { error_cdf, inversions, ..RenderOptions::default() },
-            rows: outcome.rows,
-            not_audited: outcome.not_audited,
-            break_even: outcome.break_even,
-            seconds: outcome.seconds,
-            images: Vec::new(),
         };
         audit.finish(plan, attacked)
     }
@@ -294,12 +297,5 @@ impl Pictures {
         });
         let (attack, recovered) = (Attack::of(cell.row), recovered.collect());
         self.scene.views.push(ByAttack { attack, recovered });
-    }
-
-    /// Returns the finished scene; `cameras` are in the unit of the audit.
-    fn into_scene(mut self, cameras: &[[f64; 3]], up: Option<[f64; 3]>) -> Scene3d {
-        self.scene.cameras = cameras.iter().map(|c| near(c, &self.middle)).collect();
-        self.scene.up = up.map(|v| v.map(|x| x as f32));
-        self.scene
     }
 }

@@ -1,9 +1,12 @@
 //! Large maps in tiles: each tile is hidden and attacked as a map of its own.
 
 use unlift::audit::{Item, Row};
+use unlift::geometry::vector::sub;
 use unlift::truth::Original;
 use unlift::{Descriptors, Error, PointSet};
 use unlift_report::document::TileFigures;
+
+use crate::bail;
 
 /// A part of a map: a box in plan view that overlaps no other tile.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,15 +21,19 @@ pub(super) struct Tile {
 }
 
 impl Tile {
+    /// Returns the tile's points among those of the map.
+    pub fn points(&self, all: &PointSet<3>) -> Result<PointSet<3>, Error> {
+        let own = self.rows.iter().map(|&row| all.positions()[row as usize]).collect();
+        PointSet::try_new(own, all.unit())
+    }
+
     /// Returns the tile as an item of an audit. Its random seed depends on its number.
     pub fn item(
         &self,
         original: &Original<3>,
         descriptors: Option<&Descriptors>,
     ) -> Result<Item<3>, Error> {
-        let points = original.reveal();
-        let own = self.rows.iter().map(|&row| points.positions()[row as usize]).collect();
-        let original = Original::new(PointSet::try_new(own, points.unit())?);
+        let original = Original::new(self.points(original.reveal())?);
         let descriptors = descriptors.map(|all| all.select(&self.rows));
         Ok(Item { name: format!("tile {}", self.at + 1), original, descriptors })
     }
@@ -52,16 +59,14 @@ impl Tiles {
         up: Option<[f64; 3]>,
     ) -> Result<Vec<Tile>, crate::Error> {
         let rows: Vec<u32> = (0..positions.len() as u32).collect();
-        let extent = bounds(positions, &rows);
-        let size: [f64; 3] = std::array::from_fn(|c| extent[1][c] - extent[0][c]);
+        let [low, high] = bounds(positions, &rows);
+        let size = sub(&high, &low);
         let longest = |by: [f64; 3]| (0..3).max_by(|&a, &b| by[a].total_cmp(&by[b])).unwrap_or(2);
         let height = longest(up.map_or(size.map(|x| -x), |up| up.map(f64::abs)));
         let plan = [[1, 2], [0, 2], [0, 1]][height];
         let n_tiles = positions.len().div_ceil(self.max_points.max(1)).max(1);
         if let Some(at) = self.only.filter(|&at| at >= n_tiles) {
-            return Err(crate::Error::request(format!(
-                "tile: expected below {n_tiles}, found {at}"
-            )));
+            bail!("tile: expected below {n_tiles}, found {at}");
         }
         let mut tiles = Vec::with_capacity(n_tiles);
         split(positions, rows, n_tiles, plan, &mut tiles);

@@ -13,12 +13,13 @@ use unlift::descriptors::Values;
 use unlift::neighbors::Needs;
 use unlift_io::features::{self, ImageFeatures};
 use unlift_io::hash::{hash_file, hash_files};
+use unlift_report::document::{ImageCounts, Input};
 use unlift_vision::features::photo::Turn;
 use unlift_vision::features::{Extraction, Extractor};
 use unlift_vision::network::DescriptorKind;
 
 use crate::request::check_fit;
-use crate::{Error, sources};
+use crate::{Error, bail, sources};
 
 pub use folder::is_photo;
 
@@ -78,12 +79,11 @@ impl FeatureSource {
         get: impl Fn(usize) -> Result<ImageFeatures, Error> + Send + Sync + 'static,
     ) -> Result<Self, Error> {
         if names.is_empty() {
-            return Err(Error::request("images: expected at least one, found none"));
+            bail!("images: expected at least one, found none");
         }
         if let Some(pair) = names.windows(2).find(|pair| pair[0].as_bytes() >= pair[1].as_bytes()) {
-            let expected = "images: expected each name once, sorted by bytes";
-            let found = format!("found {:?} before {:?}", pair[0], pair[1]);
-            return Err(Error::request(format!("{expected}, {found}")));
+            let [a, b] = [&pair[0], &pair[1]];
+            bail!("images: expected each name once, sorted by bytes, found {a:?} before {b:?}");
         }
         let (refused, from) = (Vec::new(), Origin::Memory(Box::new(get)));
         Ok(Self { names, refused, passed_over: None, turn: Turn::Upright, from })
@@ -153,7 +153,7 @@ impl FeatureSource {
 /// Returns the kind of `descriptors`; an error about `option` if there are none.
 pub fn kind_of(option: &str, descriptors: Option<&Descriptors>) -> Result<DescriptorKind, Error> {
     let Some(descriptors) = descriptors else {
-        return Err(Error::request(format!("{option}: expected descriptors, found none")));
+        bail!("{option}: expected descriptors, found none");
     };
     DescriptorKind::of(descriptors, option).map_err(|error| Error::request(error.to_string()))
 }
@@ -185,17 +185,14 @@ impl Wanted {
         let usual = match self.kind {
             Some(DescriptorKind::Aliked) => Extraction::ALIKED,
             Some(DescriptorKind::SuperPoint) => Extraction::SUPERPOINT,
-            None | Some(DescriptorKind::Sift) => {
-                let (option, aliked) = (self.option, DescriptorKind::Aliked.name());
-                if self.min_score.is_some() {
-                    let kind = self.kind.map(|kind| format!("{option} {}", kind.name()));
-                    let given = kind.unwrap_or("none".to_owned());
-                    let expected = format!("expected with {option} {aliked}");
-                    return Err(Error::request(format!("--min-score: {expected}, found {given}")));
-                }
-                Extraction::SIFT
-            }
+            None | Some(DescriptorKind::Sift) => Extraction::SIFT,
         };
+        if self.min_score.is_some() && usual.kind == DescriptorKind::Sift {
+            let (option, aliked) = (self.option, DescriptorKind::Aliked.name());
+            let kind = self.kind.map(|kind| format!("{option} {}", kind.name()));
+            let given = kind.unwrap_or("none".to_owned());
+            bail!("--min-score: expected with {option} {aliked}, found {given}");
+        }
         Ok(Extraction {
             max_features: self.max_features.map_or(usual.max_features, NonZeroUsize::get),
             min_score: self.min_score.unwrap_or(usual.min_score),
@@ -212,10 +209,10 @@ impl Wanted {
             ("--min-score", self.min_score.is_some()),
             ("--max-image-size", self.max_image_size.is_some()),
         ];
-        given.iter().find(|(_, given)| *given).map_or(Ok(()), |(name, _)| {
-            let expected = "expected with a folder of photos";
-            Err(Error::request(format!("{name}: {expected}, found {found}")))
-        })
+        if let Some((option, _)) = given.iter().find(|(_, given)| *given) {
+            bail!("{option}: expected with a folder of photos, found {found}");
+        }
+        Ok(())
     }
 }
 
@@ -254,8 +251,7 @@ impl Opened {
     /// If `path` cannot be read, or images lack what is requested.
     pub fn open(path: &Path, opening: &Opening<'_>, plan: &mut Plan<2>) -> Result<Self, Error> {
         if opening.photos.is_some() && path.is_dir() {
-            let expected = "--photos: expected with a file of features";
-            return Err(Error::request(format!("{expected}, found a folder of photos")));
+            bail!("--photos: expected with a file of features, found a folder of photos");
         }
         let extraction = opening.wanted.extraction(path)?;
         let kind = extraction.kind;
@@ -279,10 +275,12 @@ impl Opened {
             return Err(unlift_io::Error::new(photos, "", expected, "none").into());
         }
         // Extracted features always have descriptors.
-        let needs = |plan: &Plan<2>| plan.own_sources().any(|by| by.needs() == Needs::Descriptors);
-        let uses = opening.uses_descriptors || needs(plan);
-        let first = (uses && opened.source.is_file()).then(|| opened.source.first(&opened.chosen));
-        if let Some(first) = first.flatten() {
+        let uses = opening.uses_descriptors
+            || plan.own_sources().any(|by| by.needs() == Needs::Descriptors);
+        if uses
+            && opened.source.is_file()
+            && let Some(first) = opened.source.first(&opened.chosen)
+        {
             if opening.is_usual && first.descriptors.is_none() {
                 plan.neighbors = sources::usual(false);
             }
@@ -294,15 +292,31 @@ impl Opened {
         Ok(opened)
     }
 
+    /// Returns what a report says of the images; those in memory have no path and no hash. `used` are the images whose photos count.
+    pub(crate) fn about(
+        &self,
+        used: &[usize],
+        n_points: usize,
+        counts: ImageCounts,
+    ) -> Result<Input, Error> {
+        let Self { source, path, .. } = self;
+        let found = (source.names.len() + source.refused.len()) as u64;
+        let about = Input {
+            n_points: n_points as u64,
+            images: Some(ImageCounts { found, ..counts }),
+            ..Input::default()
+        };
+        if source.is_in_memory() {
+            return Ok(about);
+        }
+        let (path, sha256) = (Some(path.display().to_string()), source.hash(path, used)?);
+        Ok(Input { path, sha256: Some(sha256), ..about })
+    }
+
     /// Takes images that were opened already.
     pub fn of(source: FeatureSource, path: &Path, max_images: Option<usize>) -> Self {
         let chosen = evenly(source.names.len(), max_images);
         Self { source, path: path.to_owned(), chosen }
-    }
-
-    /// Returns the kind of the descriptors; an error about `option` if there are none.
-    pub fn kind(&self, option: &str) -> Result<DescriptorKind, Error> {
-        self.source.kind(option, &self.chosen)
     }
 }
 

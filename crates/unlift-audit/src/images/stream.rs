@@ -67,21 +67,18 @@ impl Tally {
     pub fn doubt(&self) -> Option<String> {
         let Bounds { low, high } = self.filled.as_ref()?;
         let share = (high[0] - low[0]) * (high[1] - low[1]);
-        (share < FILLED).then(|| {
-            format!(
-                "sizes: keypoints fill {:.0} % of the declared size of the images: if it is wrong, recovery may be too \
-                 low",
-                100.0 * share
-            )
-        })
+        let doubt = format!(
+            "sizes: keypoints fill {:.0} % of the declared size of the images: if it is wrong, recovery may be too low",
+            100.0 * share
+        );
+        (share < FILLED).then_some(doubt)
     }
 
     /// Returns a note about keypoints that were moved.
     pub fn moved(&self) -> Option<String> {
-        let n = self.n_moved;
-        (n > 0).then(|| {
-            format!("{n} keypoints were at most a pixel outside of their images, and are moved to the edge")
-        })
+        let what =
+            "keypoints were at most a pixel outside of their images, and are moved to the edge";
+        (self.n_moved > 0).then(|| format!("{} {what}", self.n_moved))
     }
 }
 

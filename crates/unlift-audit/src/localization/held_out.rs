@@ -14,6 +14,7 @@ use unlift::obfuscate::{Change, Scheme, obfuscate};
 use unlift::seed::{Key, Stage};
 use unlift::truth::Original;
 use unlift::{Descriptors, Error, PointSet, ProtectedDescriptors, Unit};
+use unlift_io::read::colmap;
 use unlift_report::document::{FEWEST_HELD_OUT, HeldOut};
 use unlift_vision::features::Extraction;
 use unlift_vision::features::photo::Turn;
@@ -83,12 +84,10 @@ impl<'a> Held<'a> {
     ) -> Result<Self, crate::Error> {
         let source = FeatureSource::open(path, &Extraction::default())?.with_turn(Turn::AsStored);
         let names = &source.names;
-        let images: Vec<(usize, usize)> = (0..cameras.views.len())
-            .filter_map(|at| {
-                let name = String::from_utf8_lossy(&cameras.images[at].0);
-                Some((at, names.binary_search_by(|other| (**other).cmp(&*name)).ok()?))
-            })
-            .collect();
+        let numbered = |(at, (name, _)): (usize, &(Vec<u8>, colmap::Camera))| {
+            Some((at, names.binary_search_by(|other| other.as_bytes().cmp(name)).ok()?))
+        };
+        let images = cameras.images.iter().enumerate().filter_map(numbered).collect::<Vec<_>>();
         let positions = original.reveal().positions();
         let read = |&(at, number): &(usize, usize)| {
             let features = source.get(number)?;
@@ -139,7 +138,10 @@ impl<'a> Held<'a> {
         for (number, (at, photo)) in photos.into_iter().enumerate() {
             if is_held(number) {
                 held[at] = true;
-                queries.push(photo.query(&cameras.views[at]));
+                let View { camera, size, .. } = cameras.views[at];
+                let (places, rows): (Vec<_>, Vec<_>) = photo.places.into_iter().unzip();
+                let descriptors = Unit32::of(&photo.descriptors, rows.into_iter());
+                queries.push(Query { camera, size, places, descriptors });
                 continue;
             }
             let unit = Unit32::of(&photo.descriptors, 0..photo.descriptors.len());
@@ -168,9 +170,9 @@ impl<'a> Held<'a> {
             true => Values::U8(scaled.map(|x| x.round() as u8).collect()),
             false => Values::F32(scaled.collect()),
         };
-        let others = (0..held.len()).filter(|&at| !held[at]).map(|at| &cameras.views[at]);
+        let others = cameras.views.iter().zip(&held).filter(|(_, is_held)| !**is_held);
+        let others = others.map(|(view, _)| view).collect();
         let descriptors = Descriptors::try_new(values, dim)?;
-        let others = others.collect();
         Ok(Self { original, others, queries, descriptors, is_part, known: Vec::new() })
     }
 
@@ -178,12 +180,10 @@ impl<'a> Held<'a> {
     pub fn note(&self) -> String {
         let n = self.is_part.iter().filter(|part| **part).count();
         let (n_images, n_points) = (self.queries.len(), self.is_part.len());
-        let few = match (n_images as u64) < FEWEST_HELD_OUT {
-            true => format!(
-                " (fewer than {FEWEST_HELD_OUT} do not tell schemes apart, so only the bound counts)"
-            ),
-            false => String::new(),
-        };
+        let few = format!(
+            " (fewer than {FEWEST_HELD_OUT} do not tell schemes apart, so only the bound counts)"
+        );
+        let few = if (n_images as u64) < FEWEST_HELD_OUT { &*few } else { "" };
         format!(
             "localization: images held out: {n_images}{few}; the map without them has {n} of {n_points} points, \
              those that at least {FEWEST_OTHERS} other images see"
@@ -200,19 +200,15 @@ impl<'a> Held<'a> {
     pub fn with_map(&mut self, scheme: &dyn Scheme<3>, key: &Key) -> Result<Vec<Problem>, Error> {
         let (released, secret) = obfuscate(scheme, self.original, Some(&self.descriptors), key)?;
         let secret = secret.by_descriptor_row();
-        let rows = secret.hidden().iter().enumerate().map(|(row, id)| (id.index(), row));
-        let mut rows: Vec<(usize, usize)> =
-            rows.filter(|(point, _)| self.is_part[*point]).collect();
+        let rows = secret.hidden().iter().enumerate().map(|(row, id)| (id.index(), row as u32));
+        let mut rows: Vec<(usize, u32)> = rows.filter(|(point, _)| self.is_part[*point]).collect();
         rows.sort_unstable();
-        let points: Vec<usize> = rows.iter().map(|(point, _)| *point).collect();
-        let rows = rows.iter().map(|(_, row)| *row);
+        let (points, rows): (Vec<usize>, Vec<u32>) = rows.into_iter().unzip();
         let compared = match released.protected() {
-            Some(all) => {
-                Compared::Protected(all.select(&rows.map(|row| row as u32).collect::<Vec<_>>()))
-            }
+            Some(all) => Compared::Protected(all.select(&rows)),
             None => {
                 let all = released.descriptors().unwrap_or(&self.descriptors);
-                Compared::Plain(Unit32::of(all, rows))
+                Compared::Plain(Unit32::of(all, rows.into_iter().map(|row| row as usize)))
             }
         };
         let pairs = self.pairs(points, compared);
@@ -426,11 +422,5 @@ impl Photo {
         };
         let places = keypoints.iter().enumerate().filter_map(flat).collect();
         Self { places, descriptors, of_points }
-    }
-
-    fn query(self, view: &View) -> Query {
-        let (places, rows): (Vec<_>, Vec<_>) = self.places.into_iter().unzip();
-        let descriptors = Unit32::of(&self.descriptors, rows.into_iter());
-        Query { camera: view.camera, size: view.size, places, descriptors }
     }
 }

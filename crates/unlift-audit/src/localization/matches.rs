@@ -63,27 +63,21 @@ pub fn mutual(a: &Unit32, b: &Unit32) -> Vec<Pair> {
 /// Returns the matches of plain keypoints with a protected map.
 pub fn with_protected_map(keypoints: &Unit32, map: &ProtectedDescriptors) -> Vec<Pair> {
     let mut best = Best::new(keypoints.len(), map.len());
-    each_pair(map, keypoints, |j, i, similar| best.offer(i, j, similar));
+    for i in 0..keypoints.len() {
+        let similar = map.similarities(keypoints.row(i)).into_iter().enumerate();
+        similar.for_each(|(j, similar)| best.offer(i, j, similar));
+    }
     best.pairs(has_ties(map))
 }
 
 /// Returns the matches of protected keypoints with a plain map.
 pub fn of_protected_keypoints(keypoints: &ProtectedDescriptors, map: &Unit32) -> Vec<Pair> {
     let mut best = Best::new(keypoints.len(), map.len());
-    each_pair(keypoints, map, |i, j, similar| best.offer(i, j, similar));
-    best.pairs(has_ties(keypoints))
-}
-
-/// Passes the rows and the similarity of all pairs to `add`.
-fn each_pair(
-    protected: &ProtectedDescriptors,
-    plain: &Unit32,
-    mut add: impl FnMut(usize, usize, f32),
-) {
-    for at in 0..plain.len() {
-        let similar = protected.similarities(plain.row(at)).into_iter().enumerate();
-        similar.for_each(|(row, similar)| add(row, at, similar));
+    for j in 0..map.len() {
+        let similar = keypoints.similarities(map.row(j)).into_iter().enumerate();
+        similar.for_each(|(i, similar)| best.offer(i, j, similar));
     }
+    best.pairs(has_ties(keypoints))
 }
 
 /// Sets of words that contain a word are equally similar to it, so the ratio test would reject all.

@@ -3,7 +3,7 @@
 pub mod held_out;
 pub(crate) mod matches;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use unlift::audit::Plan;
@@ -14,7 +14,7 @@ use unlift::seed::Key;
 use unlift::truth::Original;
 use unlift_report::document::{self as report, UNPROTECTED};
 
-use crate::maps::{Cameras, Prepared};
+use crate::maps::Cameras;
 use crate::{Error, Progress};
 
 /// Localization in an audit.
@@ -27,33 +27,6 @@ pub struct Localize<'a> {
     pub held_out: Option<(PathBuf, usize)>,
     /// Protections of the descriptors of queries, each with every scheme on keypoints.
     pub protections: Vec<Protection>,
-}
-
-impl<'a> Localize<'a> {
-    /// Returns the localization of one of `nth` images, with photos or features at `path`.
-    pub fn held_out(
-        prepared: &'a Prepared,
-        path: &Path,
-        nth: usize,
-        protections: Vec<Protection>,
-    ) -> Result<Self, Error> {
-        if prepared.cameras.views.is_empty() {
-            let expected = "--localize: expected a COLMAP model with cameras and tracks";
-            return Err(Error::request(format!("{expected}, found none")));
-        }
-        let held_out = Some((path.to_owned(), nth));
-        Ok(Self { cameras: &prepared.cameras, held_out, protections })
-    }
-
-    /// Returns all schemes on keypoints, and each under every protection.
-    fn query_schemes(&self) -> Vec<Arc<dyn Scheme<2>>> {
-        let options = SchemeOptions::usual(unlift::Unit::Pixel);
-        let mut schemes: Vec<_> =
-            SCHEMES.iter().filter_map(|entry| entry.of_dimension(&options)).collect();
-        let changes = self.protections.iter().cloned().map(Change::Protection);
-        schemes.extend(Changed::all(&schemes, &changes.collect::<Vec<_>>()));
-        schemes
-    }
 }
 
 /// What a scheme protects.
@@ -78,37 +51,41 @@ pub(crate) fn of_schemes(
     }
     let positions = original.reveal().positions();
     let base = unprotected(views, positions);
-    let row = |protects: Protects<'_>, errors: &[Option<PoseError>]| {
-        let (scheme, changes) = match protects {
-            Protects::Nothing => (UNPROTECTED, Vec::new()),
-            Protects::Map(scheme) => (scheme.name(), scheme.changes()),
-            Protects::Queries(scheme) => (scheme.name(), scheme.changes()),
-        };
+    let row = |scheme: &str, changes_descriptors: bool, errors: &[Option<PoseError>]| {
         let bound = Localization::of(errors, &base);
         let finite = |value: f64| Some(value).filter(|value| value.is_finite());
         report::Localization {
             scheme: scheme.to_owned(),
-            of_queries: matches!(protects, Protects::Queries(_)),
             multiple: finite(bound.multiple),
             center_error: finite(bound.center),
             rotation_error_degrees: finite(bound.rotation_degrees),
             failed_percent: bound.failed_percent,
-            changes_descriptors: changes.into_iter().any(Change::changes_descriptors),
-            held_out: None,
+            changes_descriptors,
+            ..Default::default()
         }
     };
+    let changes_descriptors =
+        |changes: Vec<&Change>| changes.into_iter().any(Change::changes_descriptors);
     let key = Key::from_seed(plan.seed);
-    let mut rows = vec![(Protects::Nothing, row(Protects::Nothing, &base))];
+    let mut rows = vec![(Protects::Nothing, row(UNPROTECTED, false, &base))];
     for scheme in &plan.schemes {
         // A scheme that cannot hide the map is among those that were not audited.
         let Ok((released, secret)) = obfuscate(&**scheme, original, None, &key) else { continue };
-        let protects = Protects::Map(&**scheme);
-        rows.push((protects, row(protects, &with_map(views, positions, &released, &secret))));
+        let errors = with_map(views, positions, &released, &secret);
+        let row = row(scheme.name(), changes_descriptors(scheme.changes()), &errors);
+        rows.push((Protects::Map(&**scheme), row));
     }
-    let queries = localize.query_schemes();
+    // All schemes on keypoints, and each under every protection.
+    let options = SchemeOptions::usual(unlift::Unit::Pixel);
+    let mut queries: Vec<Arc<dyn Scheme<2>>> =
+        SCHEMES.iter().filter_map(|entry| entry.of_dimension(&options)).collect();
+    let changes = localize.protections.iter().cloned().map(Change::Protection);
+    queries.extend(Changed::all(&queries, &changes.collect::<Vec<_>>()));
     for scheme in &queries {
-        let protects = Protects::Queries(&**scheme);
-        rows.push((protects, row(protects, &with_queries(views, positions, &**scheme, &key)?)));
+        let errors = with_queries(views, positions, &**scheme, &key)?;
+        let mut row = row(scheme.name(), changes_descriptors(scheme.changes()), &errors);
+        row.of_queries = true;
+        rows.push((Protects::Queries(&**scheme), row));
     }
     let mut notes = Vec::new();
     if let Some((path, nth)) = &localize.held_out {

@@ -57,9 +57,7 @@ impl Cameras {
     }
 
     pub(crate) fn note(&self) -> Option<String> {
-        (self.left_out > 0).then(|| {
-            let n = self.left_out;
-            format!("localization: {n} images are left out: their cameras have no focal length")
-        })
+        let what = "images are left out: their cameras have no focal length";
+        (self.left_out > 0).then(|| format!("localization: {} {what}", self.left_out))
     }
 }

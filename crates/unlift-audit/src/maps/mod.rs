@@ -20,6 +20,7 @@ use unlift_io::stage::read_point_neighborhoods;
 use unlift_report::document::Input;
 
 pub use self::cameras::Cameras;
+use crate::bail;
 use crate::doubts::{check_scale, unlike_neighbors, with_sides};
 
 /// Options for the points of a file.
@@ -103,15 +104,7 @@ impl Prepared {
             return Ok(());
         }
         let found = input.extent().unwrap_or_default();
-        let expected = format!("a longest side of {low} to {high} m");
-        let error = format!("--expect-extent: expected {expected}, found {found}");
-        Err(crate::Error::request(error))
-    }
-
-    /// Returns the centers of the cameras, in the unit of the audit.
-    pub fn centers(&self) -> Vec<[f64; 3]> {
-        let scale = 1.0 / self.unit_in_map_units;
-        self.input.cameras.iter().map(|center| center.map(|x| x * scale)).collect()
+        bail!("--expect-extent: expected a longest side of {low} to {high} m, found {found}")
     }
 
     /// Returns what a report says of the map at `path`, with the hashes of its files.
@@ -151,20 +144,18 @@ pub fn open(
     })?;
     check_scale(&input.positions, preparation.scale)?;
     let (mut notes, mut doubts) = (input.notes.clone(), input.doubts.clone());
-    let described = match descriptors {
-        Some(file) => Some((read::descriptors(file, &input)?, file.to_owned())),
-        None if preparation.beside => match beside(&input) {
+    let mut described = None;
+    if let Some(file) = descriptors {
+        described = Some((read::descriptors(file, &input)?, file.to_owned()));
+    } else if preparation.beside {
+        match beside(&input) {
             Ok((rows, file)) => {
                 notes.push(format!("descriptors: {}, beside the model", file.display()));
-                Some((rows, file))
+                described = Some((rows, file));
             }
-            Err(reasons) => {
-                doubts.extend(reasons);
-                None
-            }
-        },
-        None => None,
-    };
+            Err(reasons) => doubts.extend(reasons),
+        }
+    }
     let (rows, file) = described.unzip();
     let mut prepared = prepare(&input.positions, rows.as_ref(), preparation).map_err(|error| {
         let few = error.kind() == ErrorKind::TooFewPoints && input.positions.len() > 2;
@@ -198,13 +189,13 @@ pub fn open(
 /// them has.
 fn beside(input: &read::Input) -> Result<(Descriptors, PathBuf), Vec<String>> {
     let mut reasons = Vec::new();
-    for file in &input.beside {
-        match read::descriptors(file, input) {
-            Ok(rows) => return Ok((rows, file.clone())),
-            Err(error) => reasons.push(format!("descriptors: {error}")),
-        }
-    }
-    Err(reasons)
+    let read = |file: &PathBuf| {
+        let rows = read::descriptors(file, input);
+        rows.map_err(|error| reasons.push(format!("descriptors: {error}")))
+            .ok()
+            .map(|rows| (rows, file.clone()))
+    };
+    input.beside.iter().find_map(read).ok_or(reasons)
 }
 
 /// Returns `rows` among all points of the file, which may contain points that the reader left out.
@@ -223,15 +214,14 @@ fn rows_of_file(rows: &[u32], left_out: &[u64]) -> Vec<u32> {
 /// Returns a note about descriptors that are all zero; some exporters mark missing descriptors like
 /// this.
 pub fn zeros(descriptors: &Descriptors) -> Option<String> {
-    let mut row = vec![0.0; descriptors.dim()];
-    let mut zero = |at: &usize| {
-        descriptors.read_row(*at, &mut row);
+    let (mut row, of) = (vec![0.0; descriptors.dim()], descriptors.len());
+    let is_zero = |&at: &usize| {
+        descriptors.read_row(at, &mut row);
         row.iter().all(|&value| value == 0.0)
     };
-    let (n, of) = ((0..descriptors.len()).filter(|at| zero(at)).count(), descriptors.len());
-    (n > 0).then(|| {
-        format!("{n} of {of} descriptors are all zero and give an attacker no information")
-    })
+    let n = (0..of).filter(is_zero).count();
+    let note = format!("{n} of {of} descriptors are all zero and give an attacker no information");
+    (n > 0).then_some(note)
 }
 
 /// Thins out and scales `positions` and `descriptors`. Owned positions that are all kept
@@ -271,7 +261,12 @@ pub fn prepare<'a>(
     let (unit_in_map_units, factor, unit) = match preparation.scale {
         Some(scale) => (1.0 / scale, scale, Unit::Meter),
         None => {
-            let distance = median_kth_distance(&kept, k)?;
+            let distance = median(&mut Knn::new(&kept)?.kth_distances(k));
+            if !(distance > 0.0 && (1.0 / distance).is_finite()) {
+                let what = format!("median distance to neighbor {k}");
+                let expected = "more than 0 (points that do not coincide)";
+                return Err(Error::new(what, expected, distance.to_string()));
+            }
             (distance, 1.0 / distance, Unit::KthNeighbor)
         }
     };
@@ -280,16 +275,6 @@ pub fn prepare<'a>(
     let descriptors = descriptors.map(|all| all.select(&rows));
     let prepared = Prepared::of(Original::new(points));
     Ok(Prepared { descriptors, unit_in_map_units, rows, notes, ..prepared })
-}
-
-fn median_kth_distance(points: &[[f64; 3]], k: usize) -> Result<f64, Error> {
-    let knn = Knn::new(points)?;
-    let median = median(&mut knn.kth_distances(k));
-    if median > 0.0 && (1.0 / median).is_finite() {
-        return Ok(median);
-    }
-    let what = format!("median distance to neighbor {k}");
-    Err(Error::new(what, "more than 0 (points that do not coincide)", median.to_string()))
 }
 
 /// Reads lists by row of the file and keeps those of the prepared rows.
@@ -329,12 +314,10 @@ pub fn by_point(path: &Path, prepared: &mut Prepared) -> Result<PointNeighbors, 
 fn doubts(offsets: &[u64], neighbors: &[u32], prepared: &Prepared) -> Vec<String> {
     let points = prepared.original.reveal().positions();
     let mut doubts = Vec::new();
-    let empty = offsets.windows(2).filter(|w| w[0] == w[1]).count();
+    let (empty, n) = (offsets.windows(2).filter(|w| w[0] == w[1]).count(), points.len());
     if empty > 0 {
-        let n = points.len();
-        doubts.push(format!(
-            "lists: {empty} of {n} points have no neighbors in the file, and count as lost"
-        ));
+        let lost = "points have no neighbors in the file, and count as lost";
+        doubts.push(format!("lists: {empty} of {n} {lost}"));
     }
     let (mut nearer, mut n) = (0usize, 0usize);
     for (point, w) in offsets.windows(2).enumerate() {

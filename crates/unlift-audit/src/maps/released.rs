@@ -12,8 +12,8 @@ use unlift_io::stage::{has_images, read_released, read_truth, scheme_name};
 use unlift_report::document::Input;
 
 use super::{Prepared, zeros};
-use crate::Error;
 use crate::doubts::unlike_neighbors;
+use crate::{Error, bail};
 
 /// A released map, its secret, and the original points.
 pub struct Release {
@@ -85,9 +85,8 @@ impl Files<'_> {
     fn described(&self, released: Released<3>, secret: &Secret) -> Result<Released<3>, Error> {
         let Some(path) = self.descriptors else { return Ok(released) };
         if released.descriptors().is_some() {
-            let expected = "--descriptors: expected with a released map without";
-            let found = self.released.display();
-            return Err(Error::request(format!("{expected}, found some in {found}")));
+            let path = self.released.display();
+            bail!("--descriptors: expected with a released map without, found some in {path}");
         }
         // Only the ids of the points are needed.
         let ids = (0..secret.n_originals() as u64).collect();

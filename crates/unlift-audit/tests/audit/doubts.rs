@@ -13,8 +13,7 @@ use unlift::seed::{Key, Stage};
 use unlift::truth::{Original, OriginalId, Secret};
 use unlift::{Descriptors, PointSet, Unit};
 use unlift_audit::{
-    Audited, Error, Hidden, Input, Map, Preparation, Prepared, prepare, read_from_file,
-    unlike_neighbors,
+    Audited, Error, Hidden, Input, Map, Preparation, Prepared, prepare, unlike_neighbors,
 };
 use unlift_io::read;
 
@@ -31,15 +30,20 @@ fn prepared(points: &[[f64; 3]]) -> Prepared {
     prepare(points, None, &preparation).unwrap()
 }
 
+/// Hides points under `olc`.
+fn hidden(points: Vec<[f64; 3]>, unit: Unit) -> (Released<3>, Secret) {
+    let original = Original::new(PointSet::try_new(points, unit).unwrap());
+    obfuscate(&*schemes(&["olc"], unit)[0], &original, None, &Key::from_seed(1)).unwrap()
+}
+
 fn plan(names: &[&str]) -> Plan<3> {
-    let usual = Plan::new(Unit::Meter);
     Plan {
         schemes: schemes(names, Unit::Meter),
         inlier_ratios: vec![0.5],
         k: 20,
         solvers: vec![Arc::new(Builtin::Joint)],
         records_alone: false,
-        ..usual
+        ..Plan::new(Unit::Meter)
     }
 }
 
@@ -51,7 +55,7 @@ fn audit(
 ) -> Result<Audited, Error> {
     let map = Map { plan, ..Map::of(&prepared.original) };
     let input = match hidden {
-        Some(release) => Input::Released(map, Hidden { release, read: None }),
+        Some(release) => Input::Released(map, Hidden { release, published: Vec::new() }),
         None => Input::Map(map),
     };
     audited(prepared, &input, &[gate])
@@ -68,11 +72,10 @@ fn reason(found: &Audited) -> &str {
 
 #[test]
 fn usual_maps_are_not_doubted() {
-    let all = ["olc", "ppl", "ppl+", "ray", "plane", "cp"];
-    let found =
-        audit(&prepared(&room()), None, plan(&all), "all:joint:0.25<=100").expect("an audit");
-    assert_eq!(found.document.notes, Vec::<String>::new());
-    assert!(found.document.gates[0].passed);
+    let plan = plan(&["olc", "ppl", "ppl+", "ray", "plane", "cp"]);
+    let document = audit(&prepared(&room()), None, plan, "all:joint:0.25<=100").unwrap().document;
+    assert_eq!(document.notes, Vec::<String>::new());
+    assert!(document.gates[0].passed);
 }
 
 /// Long lists of a small map may recover less, and the audit notes it.
@@ -81,8 +84,7 @@ fn lists_that_are_long_for_a_map_are_said() {
     let points = prepared(&unlift::synthetic::room(1, 800).points);
     let within = |k: usize| {
         let found = audit(&points, None, Plan { k, ..plan(&["olc"]) }, "olc:0.25<=100");
-        let document = found.unwrap().document;
-        document.notes
+        found.unwrap().document.notes
     };
     let (said, nothing) = (within(50), within(10));
     assert!(said[0].starts_with("K = 50 is 6 % of the map's points"), "{said:?}");
@@ -131,18 +133,14 @@ fn a_gate_that_no_attack_could_break_is_refused() {
 /// others, but not near.
 #[test]
 fn a_truth_in_another_scale_is_no_protection() {
-    let prepared_truth = prepared(&room());
-    let olc = &schemes(&["olc"], Unit::Meter)[0];
-    let hide = |original| obfuscate(&**olc, original, None, &Key::from_seed(1)).unwrap();
-    let by = |factor: f64| room().iter().map(|point| point.map(|x| factor * x)).collect();
-    let far = Original::new(PointSet::try_new(by(0.01), Unit::Meter).expect("points"));
-    let error = audit(&prepared_truth, Some(&hide(&far)), plan(&["olc"]), "olc:0.10<=20");
-    let error = error.expect_err("meters and centimeters").to_string();
+    let audit = |factor: f64| {
+        let points = room().iter().map(|point| point.map(|x| factor * x)).collect();
+        let wrong = hidden(points, Unit::Meter);
+        audit(&prepared(&room()), Some(&wrong), plan(&["olc"]), "olc:0.10<=20")
+    };
+    let error = audit(0.01).expect_err("meters and centimeters").to_string();
     assert!(error.contains("not measured"), "{error}");
-    let scaled = Original::new(PointSet::try_new(by(1.3), Unit::Meter).expect("points"));
-    let wrong = hide(&scaled);
-    let found = audit(&prepared_truth, Some(&wrong), plan(&["olc"]), "olc:0.10<=20");
-    let found = found.unwrap();
+    let found = audit(1.3).unwrap();
     let told = format!("of {N} points are 0.100 m or more away from their own records");
     assert!(reason(&found).contains(&told), "{}", reason(&found));
 }
@@ -154,9 +152,7 @@ fn noise_of_records_is_measured_and_no_protection() {
     let mut draws = Key::from_seed(7).draws(Stage::Scheme, 1);
     for (noise, held) in [(0.005, [true; 2]), (0.02, [false, true]), (0.5, [false; 2])] {
         let moved = room().iter().map(|p| p.map(|x| x + noise * draws.normal())).collect();
-        let moved = Original::new(PointSet::try_new(moved, Unit::Meter).unwrap());
-        let olc = &schemes(&["olc"], Unit::Meter)[0];
-        let hidden = obfuscate(&**olc, &moved, None, &Key::from_seed(1)).unwrap();
+        let hidden = hidden(moved, Unit::Meter);
         for (threshold, held) in ["0.10", "0.25"].into_iter().zip(held) {
             let gate = format!("olc:joint:{threshold}<=100");
             let found = audit(&truth, Some(&hidden), plan(&["olc"]), &gate).unwrap();
@@ -169,11 +165,10 @@ fn noise_of_records_is_measured_and_no_protection() {
 /// Lengths in millimeters are declared as multiples of the distance to the K-th neighbor.
 #[test]
 fn a_unit_that_is_only_stated_is_no_protection() {
-    let points = room().iter().map(|point| point.map(|x| 1000.0 * x)).collect();
-    let points = PointSet::try_new(points, Unit::KthNeighbor).unwrap();
-    let prepared = Prepared::of(Original::new(points));
-    let olc = &schemes(&["olc"], Unit::KthNeighbor)[0];
-    let hidden = obfuscate(&**olc, &prepared.original, None, &Key::from_seed(1)).unwrap();
+    let points: Vec<_> = room().iter().map(|point| point.map(|x| 1000.0 * x)).collect();
+    let set = PointSet::try_new(points.clone(), Unit::KthNeighbor).unwrap();
+    let prepared = Prepared::of(Original::new(set));
+    let hidden = hidden(points, Unit::KthNeighbor);
     let plan = Plan { thresholds: vec![Threshold::parse("2.5").unwrap()], ..plan(&["olc"]) };
     let found = audit(&prepared, Some(&hidden), plan, "olc:2.5<=20").unwrap();
     assert!(reason(&found).starts_with("unit: expected a usual distance"), "{}", reason(&found));
@@ -255,11 +250,9 @@ fn a_released_file_that_gives_places_away_is_no_protection() {
         let rows = (0..N as u32).collect();
         let secret = Secret::try_new(hidden, None, rows, Vec::new(), N, 1).unwrap();
         let secret = secret.with_map(Some(released.fingerprint()));
-        let plan = plan(&["olc"]);
-        let read = read_from_file(&[feet], &points.original, &secret, &plan.thresholds);
         let release = (released, secret);
-        let map = Map { plan, ..Map::of(&points.original) };
-        let input = Input::Released(map, Hidden { release: &release, read });
+        let map = Map { plan: plan(&["olc"]), ..Map::of(&points.original) };
+        let input = Input::Released(map, Hidden { release: &release, published: vec![feet] });
         let document = audited(&points, &input, &["olc:joint:0.10<=100"]).unwrap().document;
         let read = document.results[0].records_alone_percent.as_ref().map(|by| by["0.10"]);
         let gate = &document.gates[0];
@@ -274,8 +267,6 @@ fn a_released_file_that_gives_places_away_is_no_protection() {
     let (_, order) = said(&sorted, false, 30.0);
     assert!(order.starts_with("order of records: after "), "{order}");
     let (_, column) = said(&random, true, 30.0);
-    assert!(
-        column.starts_with("descriptors: column 1 (from 0) follows the coordinate "),
-        "{column}"
-    );
+    let expected = "descriptors: column 1 (from 0) follows the coordinate ";
+    assert!(column.starts_with(expected), "{column}");
 }

@@ -79,5 +79,5 @@ fn a_mistake_in_memory_ends_the_audit_in_a_line() {
     let line = "images: image a.jpg: expected a size in pixels, found none";
     assert_eq!(unknown.expect_err("an error").to_string(), line);
     let gone = audit(|_| Err(Error::request("images: gone"))).expect_err("an error");
-    assert!(gone.is_request() && gone.to_string() == "images: gone");
+    assert!(gone.is_request && gone.to_string() == "images: gone");
 }

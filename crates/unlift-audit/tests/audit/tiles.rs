@@ -8,16 +8,12 @@ use unlift::neighbors::Geometric;
 use unlift::recover::Builtin;
 use unlift::{Unit, synthetic};
 use unlift_audit::{Input, Map, Preparation, Tiles, prepare};
-use unlift_io::read;
 
-use crate::{audited, schemes, write_map};
+use crate::{audited, schemes};
 
 fn audit(only: Option<usize>, threads: usize) -> unlift_audit::Audited {
-    let folder = tempfile::tempdir().unwrap();
-    let path = write_map(folder.path(), &synthetic::room(4, 2_000).points);
-    let input = read::open(&path).unwrap();
     let preparation = Preparation { scale: Some(1.0), ..Preparation::default() };
-    let prepared = prepare(&input.positions, None, &preparation).unwrap();
+    let prepared = prepare(synthetic::room(4, 2_000).points, None, &preparation).unwrap();
     let plan = Plan {
         schemes: schemes(&["ppl", "plane"], Unit::Meter),
         neighbors: vec![NeighborsBy::Oracle, NeighborsBy::Source(Arc::new(Geometric))],

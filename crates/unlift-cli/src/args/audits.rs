@@ -113,13 +113,9 @@ pub struct ProtectArgs {
 
 impl ProtectArgs {
     fn recorded(&self) -> [Recorded; 2] {
-        let names: Vec<String> = self.protect_descriptors.iter().map(Protection::name).collect();
-        let public = public_name(self.public_descriptors.as_deref());
-        let is_given = !names.is_empty();
-        [
-            ("protect_descriptors", is_given.then(|| json!(names))),
-            ("public_descriptors", is_given.then(|| json!(public))),
-        ]
+        let names = named(self.protect_descriptors.iter().map(Protection::name));
+        let public = names.as_ref().map(|_| public_name(self.public_descriptors.as_deref()));
+        [("protect_descriptors", json!(names)), ("public_descriptors", json!(public))]
     }
 }
 
@@ -184,10 +180,11 @@ impl ExtractionArgs {
     }
 
     fn recorded(&self) -> [Recorded; 3] {
+        let features = self.features.map(DescriptorKind::name);
         [
-            ("features", self.features.map(|kind| json!(kind.name()))),
-            ("max_features", self.max_features.map(|max| json!(max))),
-            ("min_score", self.min_score.map(|score| json!(score))),
+            ("features", json!(features)),
+            ("max_features", json!(self.max_features)),
+            ("min_score", json!(self.min_score)),
         ]
     }
 }
@@ -222,34 +219,7 @@ impl MapArgs {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = "\
-Examples:
-  unlift audit map PROJECT --scale 1
-  unlift audit map PROJECT --scale 1 --quick
-  unlift audit map cloud.ply --schemes ppl,ppl+ --inlier-ratios 1,0.5 --out ppl-audit
-  unlift audit map PROJECT --scale 1 --gate 'ppl@0.5:0.10<=20' --gate 'all:0.25:gain<=30'
-  unlift audit map cloud.ply --descriptors d.npy --neighbors overlap --gate 'all:overlap:1.0<=20'
-  unlift audit map PROJECT --descriptors PROJECT/database.db --neighbors oracle --neighbors overlap
-  unlift audit map PROJECT --scale 1 --gate 'ppl:localization<=2.0' --mitigate thin:1/4
-  unlift audit map PROJECT --descriptors d.npy --neighbors overlap --protect-descriptors subspace:2
-  unlift audit map PROJECT --scale 1 --gate 'all@0.5:0.10<=20' --junit gates.xml --share-safe
-
-Gates: SCHEME[:SOLVER][:SOURCE][@RATIO]:THRESHOLD[:gain]<=PERCENT
-
-A gate fails if more than PERCENT of the points are recovered within THRESHOLD, one of --thresholds.
-SCHEME may be all. SOLVER, SOURCE and RATIO limit the gate to some attacks; without them, it covers
-all attacks. SOURCE is a value of --neighbors, or the word \"file\" for lists from a FILE. The
-strongest attack counts.
-
-A gate without SOLVER and SOURCE also covers the two baselines: blind (a guess from one record at a
-time) and records alone (see --no-records-alone). With :gain, a gate fails if an attack exceeds the
-larger baseline by more than PERCENT percentage points.
-
-SCHEME:localization<=MULTIPLE bounds the error of localization, as a multiple of that without
-protection. It needs a COLMAP model with tracks.
-
-A gate that matches nothing in the audit is a usage error. A gate on a scheme that cannot be applied
-to the map fails.")]
+#[command(after_help = include_str!("help/audit-map.txt").trim_end())]
 pub struct AuditMapArgs {
     /// A COLMAP model or project folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply,
     /// .csv, .xyz, .txt, .asc, .pts, .npy, .npz or .splat file
@@ -313,20 +283,7 @@ pub struct AuditMapArgs {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = "\
-Examples:
-  unlift audit images photos
-  unlift audit images features.h5 --photos photos --solver joint,ransac --out audit
-  unlift audit images PROJECT/database.db --max-images 100 --schemes lines2d --inlier-ratios 1,0.5
-  unlift audit images photos --neighbors oracle --neighbors similarity --neighbors overlap
-  unlift audit images photos --features aliked --neighbors descriptors
-  unlift audit images photos --gate 'cp2d@0.5:10<=20' --share-safe
-
-Photos are JPEG, PNG or WebP files at any depth of the folder. unlift features --help explains how
-features are extracted. Results cover the keypoints of all images. Lengths are in pixels.
-
-If an image cannot be used, unlift prints a line on stderr, counts the image in audit.json, audits
-the others, and ends with exit code 3.")]
+#[command(after_help = include_str!("help/audit-images.txt").trim_end())]
 pub struct AuditImagesArgs {
     /// A folder of photos, hloc's features.h5, or a COLMAP database.db
     pub path: PathBuf,
@@ -365,24 +322,7 @@ pub struct AuditImagesArgs {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = "\
-Examples:
-  unlift audit sequence PROJECT photos
-  unlift audit sequence PROJECT PROJECT/database.db --queries 3,5,10 --schemes dcl2d
-  unlift audit sequence PROJECT photos --features aliked --gate 'dcl2d:sequence@5:10<=20'
-  unlift audit sequence PROJECT photos --features aliked --neighbors descriptors --invert
-  unlift audit sequence PROJECT photos --poses perturbed:5,0.5 --scale 1
-
-Every image is a query that hides its keypoints on its own. A service knows the pose of each query.
-A line seen from a known pose is a plane in space, and three planes meet in a point, so several
-queries give keypoints back without neighbors. The attack links keypoints by their descriptors.
-
-The row sequence@5 attacks each image with the five consecutive images around it, in the order of
-their names. The row tracks@5 links them by the tracks of MODEL instead: what better links would
-give. With --neighbors, the row sequence+lists@5 also uses lists of neighbors within each image.
-
-If an image cannot be used, unlift prints a line on stderr, counts the image in audit.json, audits
-the others, and ends with exit code 3.")]
+#[command(after_help = include_str!("help/audit-sequence.txt").trim_end())]
 pub struct AuditSequenceArgs {
     /// A COLMAP project or model with the poses of the images
     pub model: PathBuf,
@@ -424,21 +364,7 @@ pub struct AuditSequenceArgs {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = "\
-Examples:
-  unlift audit again PROJECT PROJECT --scale 1 --descriptors PROJECT/database.db
-  unlift audit again cloud.ply cloud.ply --schemes olc,cp,olc/cp
-  unlift audit again OLD NEW --descriptors OLD/database.db --descriptors NEW/database.db
-  unlift audit again PROJECT PROJECT --scale 1 --gate 'olc:again-geometry:0.10<=20'
-
-Each release hides its map under its own key. The two records of a point meet in it: two lines in a
-point, a line and a plane in a point, two planes of different axes in a line. The figures are about
-the points of A.
-
-The row again links records by their descriptors: mutual nearest neighbors whose records meet. The
-row again-geometry links lines that meet, without descriptors.
-
-In a gate, SOURCE is again or again-geometry.")]
+#[command(after_help = include_str!("help/audit-again.txt").trim_end())]
 pub struct AuditAgainArgs {
     /// The map of the first release: any PATH of unlift audit map
     pub a: PathBuf,
@@ -466,19 +392,7 @@ pub struct AuditAgainArgs {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = "\
-Examples:
-  unlift audit released mine.npz --truth truth.npz --name mine
-  unlift audit released mine.npz --truth truth.npz --schemes olc,ray
-  unlift audit released mine.npz --truth truth.npz --neighbors oracle --neighbors geometric
-  unlift audit released mine.npz --truth truth.npz --gate 'all@0.5:0.10<=20'
-
-A record is what a scheme publishes in place of a point: a line, a ray, an axis-parallel plane, or a
-point that swapped one coordinate with another point. Write two NumPy archives: the records,
-which an attacker sees, and the truth, which assigns each original point to its record.
-docs/formats.md shows how.
-
-In a gate, SCHEME is the name of your scheme, or all.")]
+#[command(after_help = include_str!("help/audit-released.txt").trim_end())]
 pub struct AuditReleasedArgs {
     /// A file with the records of your scheme: what an attacker sees
     pub released: PathBuf,
@@ -509,27 +423,24 @@ pub struct AuditReleasedArgs {
     pub audit: AuditArgs,
 }
 
-/// Name and value of an option in the report; `None` if it was not given.
-type Recorded = (&'static str, Option<Value>);
+/// Name and value of an option in the report; null if it was not given.
+type Recorded = (&'static str, Value);
 
 /// Returns the options that were given, for the report.
 fn given(options: impl IntoIterator<Item = Recorded>) -> Map<String, Value> {
-    options.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?))).collect()
+    let options = options.into_iter().filter(|(_, value)| !value.is_null());
+    options.map(|(name, value)| (name.to_owned(), value)).collect()
 }
 
-/// Returns the names of mitigations for the report, if there are any.
-fn named(mitigations: &[Mitigation]) -> Option<Value> {
-    let names = mitigations.iter().map(Mitigation::name).collect::<Vec<_>>();
-    (!names.is_empty()).then(|| json!(names))
+/// Returns names for the report, if there are any.
+fn named(names: impl Iterator<Item = String>) -> Option<Vec<String>> {
+    Some(names.collect::<Vec<_>>()).filter(|names| !names.is_empty())
 }
 
 impl AuditMapArgs {
     /// Returns true if the audit uses descriptors, which may lie beside the model.
     pub fn uses_descriptors(&self) -> bool {
-        let needs = |source: &NeighborSource| match source {
-            NeighborSource::Own(named) => named.name() != "geometric",
-            NeighborSource::Oracle | NeighborSource::File(_) => false,
-        };
+        let needs = |source: &NeighborSource| matches!(source, NeighborSource::Own(named) if named.name() != "geometric");
         let neighbors = &self.solvers.neighbors;
         neighbors.is_empty()
             || neighbors.iter().any(needs)
@@ -540,15 +451,15 @@ impl AuditMapArgs {
 
     /// Returns the options that change the points, for the report.
     pub fn record(&self) -> Map<String, Value> {
-        let paints = self.paint.invert.is_some();
+        let invert = self.paint.invert.as_ref().map(|_| true);
         let options = [
-            ("max_points", self.map.max_points.map(|max| json!(max))),
-            ("mitigate", named(&self.mitigate)),
+            ("max_points", json!(self.map.max_points)),
+            ("mitigate", json!(named(self.mitigate.iter().map(Mitigation::name)))),
         ];
         given(options.into_iter().chain(self.protect.recorded()).chain([
-            ("hold_out", self.localize.is_some().then(|| json!(self.hold_out))),
-            ("invert", paints.then(|| json!(true))),
-            ("max_images", paints.then(|| json!(self.max_images))),
+            ("hold_out", json!(self.localize.as_ref().map(|_| self.hold_out))),
+            ("invert", json!(invert)),
+            ("max_images", json!(invert.map(|_| self.max_images))),
         ]))
     }
 }
@@ -557,8 +468,8 @@ impl AuditImagesArgs {
     /// Returns the options that change the images, for the report.
     pub fn record(&self) -> Map<String, Value> {
         given(self.extraction.recorded().into_iter().chain(self.protect.recorded()).chain([
-            ("max_images", self.max_images.map(|max| json!(max))),
-            ("invert", self.paint.invert.is_some().then(|| json!(true))),
+            ("max_images", json!(self.max_images)),
+            ("invert", json!(self.paint.invert.as_ref().map(|_| true))),
         ]))
     }
 }
@@ -566,8 +477,9 @@ impl AuditImagesArgs {
 impl AuditSequenceArgs {
     /// Returns the options that change the images, for the report.
     pub fn record(&self) -> Map<String, Value> {
+        let mitigate = named(self.mitigate.iter().map(Mitigation::name));
         let model = json!(self.model.display().to_string());
-        let options = [("model", Some(model)), ("mitigate", named(&self.mitigate))];
+        let options = [("model", model), ("mitigate", json!(mitigate))];
         given(options.into_iter().chain(self.extraction.recorded()))
     }
 }

@@ -22,16 +22,7 @@ pub use stages::{
     name = "unlift",
     version = env!("UNLIFT_VERSION"),
     term_width = 100,
-    after_help = "\
-Examples:
-  unlift demo                                  protect and attack two photos and a map
-  unlift audit map PROJECT/sparse/0 --scale 1  audit a COLMAP map that is in meters
-  unlift audit images photos                   audit the keypoints of photos
-  unlift schemes                               list the schemes
-
-Exit codes: 0 done, 1 a gate failed, 2 wrong usage, 3 bad input.
-unlift replaces only files that it wrote. RAYON_NUM_THREADS=N limits the number of threads; results
-do not depend on it. Recovered points are as private as the original map."
+    after_help = include_str!("help/unlift.txt").trim_end()
 )]
 pub struct Cli {
     /// The command.
@@ -122,20 +113,13 @@ pub enum Command {
     /// List the schemes: how they hide points, what stays hidden, publication, patents
     Schemes,
     /// List the networks: purpose, license, hash, owner, and whether they are installed
-    #[command(after_help = "\
-unlift looks for a network in the folder that the environment variable UNLIFT_MODELS names, then in
-XDG_DATA_HOME/unlift/models (~/.local/share/unlift/models by default), then in the program itself.
-It refuses a file whose hash differs from the listed one.")]
+    #[command(after_help = include_str!("help/models.txt").trim_end())]
     Models,
 }
 
 /// Kinds of audits.
 #[derive(Debug, Subcommand)]
-#[command(after_help = "\
-Examples:
-  unlift audit map PROJECT --scale 1
-  unlift audit images photos
-  unlift audit released mine.npz --truth truth.npz")]
+#[command(after_help = include_str!("help/audit.txt").trim_end())]
 pub enum AuditCommand {
     /// Audit a 3D map: hide its points, attack the result, and report how many are recovered
     // Boxed, because it is ten times larger than the other commands.

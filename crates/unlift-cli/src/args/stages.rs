@@ -16,13 +16,7 @@ use super::audits::{ExtractionArgs, MapArgs};
 use crate::values::{self, NeighborSource};
 
 #[derive(Debug, Args)]
-#[command(after_help = "\
-Examples:
-  unlift demo
-  unlift demo --out /tmp/demo
-
-unlift protects two photos and the map of a made-up room with ten published schemes, attacks what a
-service would receive, and shows what is recovered. The demo needs no input.")]
+#[command(after_help = include_str!("help/demo.txt").trim_end())]
 pub struct DemoArgs {
     /// Folder for report.html, photos.html and their JSON files; other files in it stay
     #[arg(long, value_name = "DIR", default_value = "unlift-demo")]
@@ -33,22 +27,7 @@ pub struct DemoArgs {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = "\
-Examples:
-  unlift obfuscate PROJECT --schemes ppl --scale 1 --out hidden
-  unlift obfuscate PROJECT --schemes olc --descriptors PROJECT/database.db --out hidden
-  unlift obfuscate PROJECT --schemes ray --mitigate thin:1/4 --audit unlift-audit/audit.json
-  unlift obfuscate features.h5 --schemes dcl2d --out hidden-images
-
-released.npz is what an attacker sees: records (such as lines) in place of points.
-truth.npz holds the original points; keep it private.
-
-All random choices come from a fresh 256-bit key, which unlift does not store. --seed replaces this
-key, for experiments. Never release a map made with --seed: whoever guesses the seed can restore the
-order of the records and, under cp, the points.
-
-Release a map only once. From two releases with descriptors, an attacker can match the two records
-of each point, which intersect in the point.")]
+#[command(after_help = include_str!("help/obfuscate.txt").trim_end())]
 pub struct ObfuscateArgs {
     /// A map, any PATH of unlift audit map. Or images: a folder of photos, hloc's features.h5, or a
     /// COLMAP database.db
@@ -83,19 +62,7 @@ pub struct ObfuscateArgs {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = "\
-Sources:
-  descriptors  the best of the others for the descriptors: learned, overlap or similarity
-  similarity   points with similar descriptors of any kind
-  overlap      points whose patches overlap, according to their SIFT descriptors
-  learned      points that a network finds, from SIFT or ALIKED descriptors
-  geometric    points near places where many records meet; maps only; needs no descriptors
-  oracle       a chosen fraction of true nearest neighbors, from --truth: for experiments
-
-Examples:
-  unlift neighbors hidden/released.npz --neighbors overlap --out neighborhoods.npz
-  unlift neighbors hidden/released.npz --neighbors oracle --truth hidden/truth.npz \\
-      --inlier-ratios 0.5")]
+#[command(after_help = include_str!("help/neighbors.txt").trim_end())]
 pub struct NeighborsArgs {
     /// The released.npz of a map or of images
     pub released: PathBuf,
@@ -126,9 +93,7 @@ pub struct NeighborsArgs {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = "\
-Example:
-  unlift recover hidden/released.npz --neighbors neighborhoods.npz --out recovered.npz")]
+#[command(after_help = include_str!("help/recover.txt").trim_end())]
 pub struct RecoverArgs {
     /// The released.npz of a map or of images
     pub released: PathBuf,
@@ -149,13 +114,7 @@ pub struct RecoverArgs {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = "\
-Examples:
-  unlift evaluate recovered.npz --truth hidden/truth.npz
-  unlift evaluate recovered.npz --truth hidden/truth.npz --thresholds 0.05,0.10 --json
-
-If released.npz is in the folder of TRUTH, unlift also guesses from one record at a time, as a
-baseline.")]
+#[command(after_help = include_str!("help/evaluate.txt").trim_end())]
 pub struct EvaluateArgs {
     /// Recovered points that unlift recover wrote
     pub recovered: PathBuf,
@@ -172,18 +131,7 @@ pub struct EvaluateArgs {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = "\
-The ending of --out decides the format:
-  .ply       points
-  .obj       released lines or rays, drawn as segments
-  no ending  a folder with a COLMAP model in text (cameras.txt, images.txt, points3D.txt)
-
-A file that shows points is as private as the map.
-
-Examples:
-  unlift export recovered.npz --scale 1 --out back.ply
-  unlift export hidden/released.npz --scale 1 --out lines.obj
-  unlift export recovered.npz --scale 1 --cameras PROJECT --out back-model")]
+#[command(after_help = include_str!("help/export.txt").trim_end())]
 pub struct ExportArgs {
     /// A released, recovered or truth file of a map
     #[arg(value_name = "FILE")]
@@ -202,23 +150,7 @@ pub struct ExportArgs {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = "\
-Examples:
-  unlift features photos --out features.h5
-  unlift features photos --max-features 2048
-  unlift features photos --features aliked --out features.h5
-  unlift features PROJECT/database.db --out features.h5
-
-Photos are JPEG, PNG or WebP files at any depth of the folder. Images are named by their path in the
-folder. sift computes the features of COLMAP: RootSIFT descriptors times 512, as bytes. aliked and
-superpoint compute descriptors of length 1, as floats. If IMAGES is a file, its features are copied.
-
-Photos are turned upright by their EXIF orientation, and keypoints are in pixels of the upright
-photo. The output file states this: the attribute \"upright\" of its keypoints is 1. COLMAP and hloc
-do not turn photos: use --as-stored for them.
-
-If an image cannot be used, unlift prints a line on stderr, writes the others, and ends
-with exit code 3.")]
+#[command(after_help = include_str!("help/features.txt").trim_end())]
 pub struct FeaturesArgs {
     /// A folder of photos, hloc's features.h5, or a COLMAP database.db
     pub images: PathBuf,
@@ -241,14 +173,7 @@ pub struct FeaturesArgs {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = "\
-unlift writes one PNG per image, half as large as the image. The picture of a.jpg is a.jpg.png.
-unlift models lists the networks.
-
-Examples:
-  unlift invert photos --out pictures
-  unlift invert hidden/released.npz recovered.npz --out pictures
-  unlift invert hidden/released.npz recovered.npz --cameras MODEL --scale 1")]
+#[command(after_help = include_str!("help/invert.txt").trim_end())]
 pub struct InvertArgs {
     /// A folder of photos, hloc's features.h5, a COLMAP database.db, or the released.npz of a map
     /// or of images
@@ -276,18 +201,7 @@ pub struct InvertArgs {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = "\
-The ending of --out decides the format:
-  .csv  every row of audit.json, with a column per value, as is printed without --out
-  .tex  a table in LaTeX, for the package booktabs
-
-A table in LaTeX has a row per scheme. Its columns are the inlier ratios of the oracle (the fraction
-of true neighbors in its lists), the other sources of neighbors, and the two baselines. A cell has
-the percentage that the strongest attack recovers, at each threshold.
-
-Examples:
-  unlift table unlift-audit/audit.json
-  unlift table unlift-audit/audit.json --thresholds 0.10 --out table.tex")]
+#[command(after_help = include_str!("help/table.txt").trim_end())]
 pub struct TableArgs {
     /// The audit.json of an audit
     #[arg(value_name = "AUDIT.json")]
@@ -302,22 +216,7 @@ pub struct TableArgs {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = "\
-Two results are compared if they have the same scheme, source of neighbors, noise (--oracle-noise),
-number of neighbors K, solver and threshold and, for the oracle, the same inlier ratio. Baselines
-are compared by scheme and threshold. Rows that only one of the audits has are listed.
-
-The comparison fails (exit code 1) if a result of the later audit is larger by more than twice its
-standard deviation over --repeats, or by more than 2 percentage points without --repeats. It also
-fails if an attack of the earlier audit is not in the later one, or if the inputs differ (see
---accept).
-
-Audits in different units or with different thresholds are refused (exit code 3).
-
-Examples:
-  unlift compare before/audit.json unlift-audit/audit.json
-  unlift compare before/audit.json unlift-audit/audit.json --out compared
-  unlift compare baseline.json unlift-audit/audit.json --accept 'two more rooms, until 2027-03-01'")]
+#[command(after_help = include_str!("help/compare.txt").trim_end())]
 pub struct CompareArgs {
     /// The audit.json of the earlier audit
     #[arg(value_name = "OLD.json")]

@@ -10,11 +10,8 @@ pub fn schemes() -> crate::Result<()> {
     let mut text = String::new();
     for scheme in all() {
         let meant_for = if scheme.dimensions() == 3 { "maps" } else { "images" };
-        let request = if ON_REQUEST.iter().any(|entry| entry.name == scheme.name) {
-            ", on request"
-        } else {
-            ""
-        };
+        let is_requested = ON_REQUEST.iter().any(|entry| entry.name == scheme.name);
+        let request = if is_requested { ", on request" } else { "" };
         text.push_str(&format!(
             "{}: {}\n  for          {meant_for}{request}\n  rule         {}\n  hidden       {}\n  publication  {}\n  patents      {}\n",
             scheme.name, scheme.title, scheme.rule, scheme.hidden, scheme.source, scheme.patents

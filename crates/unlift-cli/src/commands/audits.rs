@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 use std::iter;
-use std::path::Path;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use serde_json::json;
 use unlift::Unit;
-use unlift::audit::{Measure, NeighborsBy, Plan, Threshold, scheme_called};
+use unlift::audit::{Measure, NeighborsBy, Plan, scheme_called};
 use unlift::geometry::camera::PoseError;
 use unlift::neighbors::sources::Named;
-use unlift::obfuscate::{Change, Changed, Entry, Mitigation, SCHEMES, Scheme, SchemeOptions};
+use unlift::obfuscate::{Change, Changed, Entry, SCHEMES, SchemeOptions};
 use unlift::recover::Builtin;
 use unlift_audit::changes::{mitigations, protections, protections_of_map};
 use unlift_audit::images::{FeatureSource, Opened, Opening};
@@ -18,8 +18,7 @@ use unlift_audit::inversion::{Inversion, MapInversion};
 use unlift_audit::localization::Localize;
 use unlift_audit::{
     Again, Audit, Audited, Hidden, Images, Input, Map, Maps, Output, Preparation, Prepared,
-    Progress as _, Request, Sequence, Tiles, by_point, check_thresholds, distinct, read_from_file,
-    released,
+    Progress as _, Request, Sequence, Tiles, bail, by_point, check_thresholds, distinct, released,
 };
 use unlift_io::hash::hash_file;
 use unlift_io::outputs::Rules;
@@ -36,16 +35,16 @@ use crate::output::{command_line, print};
 use crate::progress::Progress;
 use crate::values::NeighborSource;
 
-/// Runs the audit of `path` that `work` makes with an output, writes its results and prints them. Returns whether every gate held.
-/// `path` and the files in `more` must not be overwritten.
+/// Lets `work` complete and run an audit of `path`, writes its results and prints them. Returns whether every gate held. `path` and
+/// the files in `more` must not be overwritten.
 ///
 /// # Errors
 /// Among others, if images of `path` could not be used; the results without them are written.
 fn perform<'a>(
     args: &AuditArgs,
-    path: &'a Path,
-    more: impl IntoIterator<Item = &'a Path>,
-    work: impl FnOnce(Output) -> crate::Result<Audited> + Send,
+    path: &'a PathBuf,
+    more: impl Iterator<Item = &'a PathBuf>,
+    work: impl FnOnce(Audit) -> crate::Result<Audited> + Send,
 ) -> crate::Result<bool> {
     let output = Output {
         share_safe: args.share_safe,
@@ -53,8 +52,10 @@ fn perform<'a>(
         command: Some(command_line()),
         ..Output::new(&args.out)
     };
-    let files = output.open(Rules::new(iter::once(path).chain(more), false))?;
-    let finished = with_threads(|| work(output)?.write(files))?;
+    let inputs = iter::once(path).chain(more).map(PathBuf::as_path);
+    let files = output.open(Rules::new(inputs, false))?;
+    let audit = Audit { gates: args.gate.clone(), ..Audit::new(output) };
+    let finished = with_threads(|| work(audit)?.write(files))?;
     print(&finished.text())?;
     if let Some(count) = finished.document.input.images {
         all_could_be("used", path, count.used as usize, count.unusable as usize)?;
@@ -62,58 +63,47 @@ fn perform<'a>(
     Ok(finished.passed())
 }
 
-/// Runs the audit of `input` with the gates of the command line.
-fn run(
-    audit: Audit,
-    input: &Input<'_>,
-    args: &AuditArgs,
-    progress: &Progress,
-) -> crate::Result<Audited> {
-    Audit { gates: args.gate.clone(), ..audit }.run(input, progress)
-}
-
 /// Returns a request of what several audits share.
-fn request<const D: usize>(args: &AuditArgs, k: u16) -> Request<D> {
-    Request { thresholds: args.thresholds.clone(), ..Request::new(usize::from(k), args.seed) }
-}
-
-fn with_oracle<const D: usize>(request: Request<D>, args: &OracleArgs) -> Request<D> {
-    Request {
-        inlier_ratios: args.inlier_ratios.clone(),
-        oracle_noise: args.oracle_noise.clone(),
-        repeats: args.repeats,
-        ..request
+fn request<const D: usize>(
+    args: &AuditArgs,
+    k: u16,
+    schemes: &[&Entry],
+    oracle: Option<&OracleArgs>,
+    unit: Unit,
+) -> Request<D> {
+    let mut request = Request::new(usize::from(k), args.seed);
+    let (plan, options) = (&mut request.plan, SchemeOptions::usual(unit));
+    plan.thresholds = args.thresholds.clone();
+    plan.schemes = schemes.iter().filter_map(|entry| entry.of_dimension(&options)).collect();
+    if let Some(oracle) = oracle {
+        plan.inlier_ratios = oracle.inlier_ratios.clone();
+        plan.oracle_noise = oracle.oracle_noise.clone();
+        plan.repeats = oracle.repeats;
     }
+    request
 }
 
 /// Adds the sources and solvers of a map, and what is doubtful about a file of lists to its notes.
-fn with_solvers(
-    request: Request<3>,
+fn add_solvers(
+    plan: &mut Plan<3>,
     args: &SolverArgs,
     prepared: &mut Prepared,
-) -> crate::Result<Request<3>> {
-    let mut neighbors = Vec::new();
+) -> crate::Result<()> {
     for source in distinct(args.neighbors.clone(), NeighborSource::eq) {
-        neighbors.push(match source {
+        plan.neighbors.push(match source {
             NeighborSource::Oracle => NeighborsBy::Oracle,
             NeighborSource::Own(named) => NeighborsBy::Source(named.of_dimension()?),
             NeighborSource::File(path) => NeighborsBy::Given(by_point(&path, prepared)?),
         });
     }
-    let solvers = Builtin::list(&args.solver);
-    Ok(Request { neighbors, solvers, records_alone: !args.no_records_alone, ..request })
+    plan.solvers = Builtin::list(&args.solver);
+    plan.records_alone = !args.no_records_alone;
+    Ok(())
 }
 
-/// Returns the hashes of files with lists.
 fn hashes_of_lists(args: &SolverArgs) -> crate::Result<BTreeMap<String, String>> {
-    let hash = |path| Ok(("neighbors".to_owned(), hash_file(path)?));
+    let hash = |path: &PathBuf| Ok(("neighbors".to_owned(), hash_file(path)?));
     NeighborSource::files(&args.neighbors).map(hash).collect()
-}
-
-/// Returns the requested schemes; none means the default.
-fn schemes<const D: usize>(entries: &[&Entry], unit: Unit) -> Vec<Arc<dyn Scheme<D>>> {
-    let options = SchemeOptions::usual(unit);
-    entries.iter().filter_map(|entry| entry.of_dimension(&options)).collect()
 }
 
 const NO_RECORDS_ALONE: &str =
@@ -122,12 +112,11 @@ const NO_RECORDS_ALONE: &str =
 /// The inlier ratio of the oracle whose pictures are painted by default.
 const PAINTED_RATIO: f64 = 0.5;
 
-/// `unlift audit map`
 pub fn map(args: &AuditMapArgs) -> crate::Result<bool> {
     let more = args.paint.inputs().chain(&args.localize).chain(&args.protect.public_descriptors);
-    let lists = NeighborSource::files(&args.solvers.neighbors);
-    let more = lists.chain(args.map.descriptors.as_deref()).chain(more.map(|path| path.as_path()));
-    perform(&args.audit, &args.path, more, |output| {
+    let more = more.chain(&args.map.descriptors);
+    let more = more.chain(NeighborSource::files(&args.solvers.neighbors));
+    perform(&args.audit, &args.path, more, |audit| {
         let AuditArgs { seed, quiet, .. } = args.audit;
         let mut prepared = open_map(&args.path, &args.map, args.uses_descriptors(), (seed, quiet))?;
         let progress = Progress::new(quiet);
@@ -151,26 +140,25 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<bool> {
         if args.solvers.no_records_alone {
             prepared.notes.push(NO_RECORDS_ALONE.to_owned());
         }
-        let unit = prepared.original.reveal().unit();
-        let n_points = prepared.original.len();
+        let (unit, n_points) = (prepared.original.reveal().unit(), prepared.original.len());
         let n_together = args.tile_points.map_or(n_points, |max| n_points.min(max.get()));
         let mut usual = Plan::new(unit).for_map(n_together, usize::from(args.map.k));
         if args.full {
             usual.inlier_ratios = Plan::<3>::new(unit).inlier_ratios;
             usual.solvers = Builtin::list(&[Builtin::Joint, Builtin::Consensus, Builtin::Ransac]);
         }
-        let request = with_oracle(request(&args.audit, args.map.k), &args.oracle);
-        let mut request = with_solvers(request, &args.solvers, &mut prepared)?;
-        request.schemes = schemes(&args.schemes, unit);
+        let oracle = Some(&args.oracle);
+        let mut request = request(&args.audit, args.map.k, &args.schemes, oracle, unit);
+        add_solvers(&mut request.plan, &args.solvers, &mut prepared)?;
         if args.quick {
             request.quick(&usual, prepared.descriptors.is_some())?;
         }
         request.changes = mitigations(&args.mitigate, &prepared, args.tile_points.is_some())?;
         request.changes.extend(protections.iter().cloned().map(Change::Protection));
-        let descriptors = prepared.descriptors.as_ref();
-        let place = "(--descriptors FILE)";
-        let planned = request.of_map(usual, &prepared, descriptors, place)?;
-        let mut plan = planned.note(&mut prepared);
+        let mut audit = audit.of_map(&prepared);
+        let descriptors = (prepared.descriptors.as_ref(), "(--descriptors FILE)");
+        let points = prepared.original.reveal();
+        let mut plan = request.of_map(usual, points, descriptors, &mut audit)?;
         if let Some(inversion) = &inversion {
             let attacks = match has_ratios {
                 true => plan.rows_per_scheme(),
@@ -185,68 +173,65 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<bool> {
         }
         let mut map = Map { plan, inversion, ..Map::new(&prepared) };
         if let Some(path) = &args.localize {
-            let nth = args.hold_out.get();
-            map.localize = Some(Localize::held_out(&prepared, path, nth, protections)?);
+            if prepared.cameras.views.is_empty() {
+                bail!("--localize: expected a COLMAP model with cameras and tracks, found none");
+            }
+            let held_out = Some((path.clone(), args.hold_out.get()));
+            map.localize = Some(Localize { cameras: &prepared.cameras, held_out, protections });
         }
         let input = match args.tile_points {
             Some(max) => Input::Tiles(map, Tiles { max_points: max.get(), only: None }),
             None => Input::Map(map),
         };
-        let mut audit = Audit::of_map(&prepared, output);
         audit.about = prepared.about(&args.path)?;
         audit.about.other_sha256.extend(hashes_of_lists(&args.solvers)?);
         audit.options = args.record();
-        run(audit, &input, &args.audit, &progress)
+        audit.run(&input, &progress)
     })
 }
 
-/// `unlift audit released`
 pub fn released(args: &AuditReleasedArgs) -> crate::Result<bool> {
     let lists = NeighborSource::files(&args.solvers.neighbors);
-    let more = lists.chain([args.truth.as_path()]).chain(args.descriptors.as_deref());
+    let more = lists.chain([&args.truth]).chain(&args.descriptors);
     let files = released::Files {
         released: &args.released,
         truth: &args.truth,
         descriptors: args.descriptors.as_deref(),
     };
-    perform(&args.audit, &args.released, more, |output| {
+    perform(&args.audit, &args.released, more, |audit| {
         let name = args.name.clone().map_or_else(|| files.scheme_name(), Ok)?;
         let released::Release { mut prepared, hidden } = files.open()?;
         let progress = Progress::new(args.audit.quiet);
-        let (unit, k) = (prepared.original.reveal().unit(), usize::from(args.k));
-        let usual = Plan::new(unit).for_map(prepared.original.len(), k);
-        let request = with_oracle(request(&args.audit, args.k), &args.oracle);
-        let request = with_solvers(request, &args.solvers, &mut prepared)?;
-        let mut schemes = schemes(&args.schemes, unit);
-        if schemes.iter().any(|scheme| scheme.name() == name) {
-            let expected = "expected another name than a scheme of --schemes";
-            return Err(Error::request(format!("--name: {expected}, found {name}")));
+        let (unit, n_points) = (prepared.original.reveal().unit(), prepared.original.len());
+        let usual = Plan::new(unit).for_map(n_points, usize::from(args.k));
+        let oracle = Some(&args.oracle);
+        let mut request = request(&args.audit, args.k, &args.schemes, oracle, unit);
+        add_solvers(&mut request.plan, &args.solvers, &mut prepared)?;
+        if request.plan.schemes.iter().any(|scheme| scheme.name() == name) {
+            bail!("--name: expected another name than a scheme of --schemes, found {name}");
         }
-        schemes.insert(0, scheme_called(&name));
-        let request = Request { schemes, ..request };
-        let (descriptors, place) = (hidden.0.descriptors(), "in the released map");
-        let planned = request.of_map(usual, &prepared, descriptors, place)?;
-        let plan = planned.note(&mut prepared);
+        request.plan.schemes.insert(0, scheme_called(&name));
+        let mut audit = audit.of_map(&prepared);
+        let descriptors = (hidden.0.descriptors(), "in the released map");
+        let points = prepared.original.reveal();
+        let plan = request.of_map(usual, points, descriptors, &mut audit)?;
+        let (original, descriptors) = (&prepared.original, prepared.descriptors.as_ref());
+        let map = Map { plan, descriptors, ..Map::of(original) };
         let published = published_positions(&args.released)?;
-        let (original, secret) = (&prepared.original, &hidden.1);
-        let read = read_from_file(&published, original, secret, &plan.thresholds);
-        let map = Map { plan, descriptors: prepared.descriptors.as_ref(), ..Map::of(original) };
-        let input = Input::Released(map, Hidden { release: &hidden, read });
-        let mut audit = Audit::of_map(&prepared, output);
-        audit.about = files.about(prepared.original.len())?;
+        let input = Input::Released(map, Hidden { release: &hidden, published });
+        audit.about = files.about(n_points)?;
         audit.about.other_sha256.extend(hashes_of_lists(&args.solvers)?);
         audit.options.insert("released".into(), json!(true));
-        run(audit, &input, &args.audit, &progress)
+        audit.run(&input, &progress)
     })
 }
 
-/// `unlift audit images`
 pub fn images(args: &AuditImagesArgs) -> crate::Result<bool> {
-    let mut request = with_oracle(request::<2>(&args.audit, args.k), &args.oracle);
-    request.schemes = schemes(&args.schemes, Unit::Pixel);
-    request.solvers = Builtin::list(&args.solver);
+    let oracle = Some(&args.oracle);
+    let mut request = request(&args.audit, args.k, &args.schemes, oracle, Unit::Pixel);
+    request.plan.solvers = Builtin::list(&args.solver);
     for source in &args.neighbors {
-        request.neighbors.push(match source {
+        request.plan.neighbors.push(match source {
             NeighborSource::Own(named) => NeighborsBy::Source(named.of_dimension()?),
             NeighborSource::Oracle | NeighborSource::File(_) => NeighborsBy::Oracle,
         });
@@ -254,118 +239,101 @@ pub fn images(args: &AuditImagesArgs) -> crate::Result<bool> {
     let mut plan = request.plan(Plan::new(Unit::Pixel), true)?;
     plan.check_for_many().map_err(|error| Error::request(error.to_string()))?;
     let more = args.paint.inputs().chain(&args.protect.public_descriptors);
-    perform(&args.audit, &args.path, more.map(|path| path.as_path()), |output| {
-        let photos = args.paint.photos.as_deref();
+    perform(&args.audit, &args.path, more, |audit| {
+        let paints = args.paint.invert.is_some();
         let opening = Opening {
             wanted: args.extraction.wanted(),
             max_images: args.max_images.map(|max| max.get()),
-            photos,
-            paints: args.paint.invert.is_some(),
-            uses_descriptors: args.paint.invert.is_some()
-                || !args.protect.protect_descriptors.is_empty(),
+            photos: args.paint.photos.as_deref(),
+            paints,
+            uses_descriptors: paints || !args.protect.protect_descriptors.is_empty(),
             is_usual: args.neighbors.is_empty(),
         };
         let opened = Opened::open(&args.path, &opening, &mut plan)?;
-        let inversion = inversion(&args.paint, &opened.source, &opened.chosen, &args.path)?;
-        let inversion = inversion.map(Arc::new);
+        let inversion = inversion(&args.paint, &opened)?.map(Arc::new);
         let protections = protections(
             &args.protect.protect_descriptors,
-            || opened.kind("--protect-descriptors"),
+            || opened.source.kind("--protect-descriptors", &opened.chosen),
             |kind| public(args.protect.public_descriptors.as_deref(), kind),
         )?;
         let changes: Vec<Change> = protections.into_iter().map(Change::Protection).collect();
         plan.schemes.extend(Changed::all(&plan.schemes, &changes));
-        plan.measures
-            .extend(inversion.iter().map(|measure| Arc::clone(measure) as Arc<dyn Measure<2>>));
+        let measure = inversion.clone().map(|measure| measure as Arc<dyn Measure<2>>);
+        plan.measures.extend(measure);
         let progress = Progress::new(args.audit.quiet);
         let photos = args.paint.photos.clone();
         let images = Images { opened: &opened, plan, draws: true, photos, inversion };
-        let (input, mut audit) = (Input::Images(images), Audit::new(output));
-        audit.options = args.record();
-        run(audit, &input, &args.audit, &progress)
+        Audit { options: args.record(), ..audit }.run(&Input::Images(images), &progress)
     })
 }
 
 /// Opens the painter of pictures, if it is requested.
-fn inversion(
-    args: &PaintArgs,
-    source: &FeatureSource,
-    chosen: &[usize],
-    path: &Path,
-) -> crate::Result<Option<Inversion>> {
+fn inversion(args: &PaintArgs, opened: &Opened) -> crate::Result<Option<Inversion>> {
     let Some(network) = &args.invert else { return Ok(None) };
-    let kind = source.kind("--invert", chosen)?;
-    let inversion =
-        Inversion::open((source, chosen, path), kind, args.photos.as_deref(), network.as_deref())?;
-    Ok(Some(inversion))
+    let Opened { source, path, chosen } = opened;
+    let (kind, photos) = (source.kind("--invert", chosen)?, args.photos.as_deref());
+    Ok(Some(Inversion::open((source, chosen, path), kind, photos, network.as_deref())?))
 }
 
-/// `unlift audit sequence`
 pub fn sequence(args: &AuditSequenceArgs) -> crate::Result<bool> {
     let usual = Plan::new(Unit::Pixel);
-    let mut request = request::<2>(&args.audit, usual.k as u16);
-    request.schemes = schemes(&args.schemes, Unit::Pixel);
-    let mitigations =
-        distinct(args.mitigate.clone(), |a: &Mitigation, b| a.name() == b.name()).into_iter();
+    let mut request = request(&args.audit, usual.k as u16, &args.schemes, None, Unit::Pixel);
+    let mitigations = distinct(args.mitigate.clone(), |a, b| a.name() == b.name()).into_iter();
     request.changes = mitigations.map(|change| Change::Mitigation(change, None)).collect();
-    let threshold = |label: &str, value| Threshold { label: label.to_owned(), value };
-    let thresholds = vec![threshold("5", 5.0), threshold("10", 10.0), threshold("25", 25.0)];
+    // Poses and links are not exact to a pixel.
+    let thresholds = usual.thresholds[1..].to_vec();
     let plan = request.plan(Plan { thresholds, ..usual }, false)?;
-    let pose_error = args.poses.map(|(cm, rotation_degrees)| {
-        let expected = "--poses perturbed: expected --scale, meters per unit of the model";
-        let scale = args.scale.ok_or_else(|| Error::request(expected))?;
-        Ok::<_, Error>(PoseError { center: 0.01 * cm / scale, rotation_degrees })
-    });
-    let pose_error = pose_error.transpose()?;
+    let pose_error = match (args.poses, args.scale) {
+        (Some((cm, rotation_degrees)), Some(scale)) => {
+            Some(PoseError { center: 0.01 * cm / scale, rotation_degrees })
+        }
+        (Some(_), None) => {
+            bail!("--poses perturbed: expected --scale, meters per unit of the model")
+        }
+        (None, _) => None,
+    };
     if args.paint.invert.is_some() && args.audit.share_safe {
-        return Err(Error::request(
-            "--invert: expected without --share-safe, as pictures show the place",
-        ));
+        bail!("--invert: expected without --share-safe, as pictures show the place");
     }
     let more = iter::once(&args.model).chain(args.paint.inputs());
-    perform(&args.audit, &args.path, more.map(|path| path.as_path()), |output| {
+    perform(&args.audit, &args.path, more, |audit| {
         let extraction = args.extraction.wanted().extraction(&args.path)?;
         // A model is of the photos as they are stored.
         let source = FeatureSource::open(&args.path, &extraction)?.with_turn(Turn::AsStored);
-        let all: Vec<usize> = (0..source.names.len()).collect();
-        let inversion = inversion(&args.paint, &source, &all, &args.path)?;
+        let opened = Opened::of(source, &args.path, None);
+        let inversion = inversion(&args.paint, &opened)?;
         let mut queries = args.queries.clone();
         queries.sort_unstable();
         queries.dedup();
         let progress = Progress::new(args.audit.quiet);
         let sequence = Sequence {
             model: &args.model,
-            source: &source,
-            path: &args.path,
+            opened: &opened,
             plan,
             lists: args.neighbors.as_ref().map(Named::of_dimension).transpose()?,
             queries,
             pose_error,
             inversion,
         };
-        let (input, mut audit) = (Input::Sequence(sequence), Audit::new(output));
-        audit.options = args.record();
-        run(audit, &input, &args.audit, &progress)
+        Audit { options: args.record(), ..audit }.run(&Input::Sequence(sequence), &progress)
     })
 }
 
-/// `unlift audit again`
 pub fn again(args: &AuditAgainArgs) -> crate::Result<bool> {
     let more = iter::once(&args.b).chain(&args.descriptors);
-    perform(&args.audit, &args.a, more.map(|path| path.as_path()), |output| {
+    perform(&args.audit, &args.a, more, |audit| {
         let preparation = Preparation { scale: args.scale, ..Preparation::default() };
         let reading = Progress::uncounted(args.audit.quiet, "reading the maps");
-        let mut maps = Maps::open([&args.a, &args.b], &args.descriptors, &preparation)?;
+        let maps = Maps::open([&args.a, &args.b], &args.descriptors, &preparation)?;
         drop(reading);
         let (points, typed) = (maps.first.original.reveal(), !args.audit.thresholds.is_empty());
         let usual = Plan::new(points.unit());
-        let request = request::<3>(&args.audit, usual.k as u16);
-        let plan =
-            Request { records_alone: !args.no_records_alone, ..request }.plan(usual, false)?;
-        let lengths = check_thresholds(points.positions(), points.unit(), &plan.thresholds, typed)?;
+        let mut request = request(&args.audit, usual.k as u16, &[], None, points.unit());
+        request.plan.records_alone = !args.no_records_alone;
+        let plan = request.plan(usual, false)?;
+        let mut audit = audit.of_map(&maps.first);
+        check_thresholds(&mut audit, points, &plan.thresholds, typed)?;
         let options = SchemeOptions::usual(points.unit());
-        maps.first.notes.extend(lengths.note);
-        maps.first.doubts.extend(lengths.doubt);
         let pairs = match args.schemes.as_slice() {
             [] => SCHEMES.iter().map(|entry| [entry; 2]).collect(),
             given => distinct(given.to_vec(), |a, b| a.map(|e| e.name) == b.map(|e| e.name)),
@@ -375,9 +343,8 @@ pub fn again(args: &AuditAgainArgs) -> crate::Result<bool> {
             .filter_map(|[a, b]| Some([a.of_dimension(&options)?, b.of_dimension(&options)?]));
         let progress = Progress::new(args.audit.quiet);
         let input = Input::Again(Again { maps: &maps, pairs: pairs.collect(), plan });
-        let mut audit = Audit::of_map(&maps.first, output);
         audit.about = maps.about(&args.a)?;
         audit.options.insert("again".into(), json!(args.b.display().to_string()));
-        run(audit, &input, &args.audit, &progress)
+        audit.run(&input, &progress)
     })
 }

@@ -49,7 +49,6 @@ pub fn run(args: &CompareArgs) -> crate::Result<bool> {
     Ok(comparison.passed)
 }
 
-/// Formats the differences and the verdict.
 fn text(comparison: &Comparison, written: Option<PathBuf>) -> String {
     let accepted = match &comparison.accepted {
         None => "NOT COMPARED".to_owned(),
@@ -69,12 +68,11 @@ fn text(comparison: &Comparison, written: Option<PathBuf>) -> String {
         }
         text.push_str(&table(&rows, &[1, 6]));
     }
-    let only = [
+    let mut lines = Vec::new();
+    for (rows, which) in [
         (&comparison.only_old, "NOT COMPARED: only in the old audit"),
         (&comparison.only_new, "only in the new audit"),
-    ];
-    let mut lines = Vec::new();
-    for (rows, which) in only {
+    ] {
         let line = |Unmatched { scheme, attack }: &_| format!("{which}: {scheme}: {attack}");
         lines.extend(rows.iter().map(line));
     }

@@ -6,7 +6,7 @@ use std::path::Path;
 use unlift::geometry::frame::Bounds;
 use unlift::released::{Obfuscation, Released};
 use unlift::{OneLine, Unit};
-use unlift_audit::{check_file, refused};
+use unlift_audit::{bail, check_file, refused};
 use unlift_io::Error as FileError;
 use unlift_io::atomic::Access;
 use unlift_io::clouds::{
@@ -37,15 +37,15 @@ pub fn run(args: &ExportArgs) -> crate::Result<()> {
     let is_cloud = is("ply") || is("obj");
     let out = OneLine(args.out.display());
     if args.cameras.is_some() && is_cloud {
-        return Err(Error::request(format!("--cameras: expected a folder as --out, found {out}")));
+        bail!("--cameras: expected a folder as --out, found {out}");
     }
     let n = if is_cloud {
-        check_file(&args.out, Kind::Cloud, &rules)?;
+        check_file("--out", &args.out, Kind::Cloud, &rules)?;
         cloud(args, is("ply"))?
     } else if ending.is_some() && !args.out.is_dir() {
-        return Err(Error::request(format!(
+        bail!(
             "--out: expected a name that ends in .ply or .obj, or a folder without an ending, found {out}"
-        )));
+        );
     } else {
         model(args, rules)?
     };
@@ -82,7 +82,13 @@ fn model(args: &ExportArgs, rules: Rules) -> crate::Result<String> {
     };
     let (cameras, images) = match &args.cameras {
         None => (Vec::new(), Vec::new()),
-        Some(project) => views(project)?,
+        Some(project) => match read::open(project)?.model {
+            Some(folder) => colmap::read_views(&folder)?,
+            None => {
+                let expected = "a COLMAP model with cameras";
+                return Err(FileError::new(project, "", expected, "only points").into());
+            }
+        },
     };
     let [cameras_txt, images_txt, points_txt] = names.map(|name| out.stage(name, Kind::Model));
     write_cameras(&cameras_txt?, &cameras)?;
@@ -91,16 +97,6 @@ fn model(args: &ExportArgs, rules: Rules) -> crate::Result<String> {
     out.commit()?;
     let n = points.iter().flatten().count();
     Ok(format!("a model of {n} points, {} cameras and {} images", cameras.len(), images.len()))
-}
-
-fn views(project: &Path) -> crate::Result<(Vec<colmap::Camera>, Vec<colmap::Image>)> {
-    match read::open(project)?.model {
-        Some(folder) => Ok(colmap::read_views(&folder)?),
-        None => {
-            let expected = "a COLMAP model with cameras";
-            Err(FileError::new(project, "", expected, "only points").into())
-        }
-    }
 }
 
 /// Reads the file at `path`, and returns its content and its unit.
@@ -146,12 +142,8 @@ fn read(path: &Path) -> crate::Result<(Shown, Unit)> {
 fn scaled(args: &ExportArgs, (mut shown, unit): (Shown, Unit)) -> crate::Result<Shown> {
     let Some(scale) = args.scale else { return Ok(shown) };
     if unit != Unit::Meter {
-        let expected = "a file in meters (obfuscate --scale)";
-        let path = args.path.display();
-        return Err(Error::request(format!(
-            "--scale: expected {expected}, found {path} in {}",
-            unit.name()
-        )));
+        let (path, unit) = (args.path.display(), unit.name());
+        bail!("--scale: expected a file in meters (obfuscate --scale), found {path} in {unit}");
     }
     let divide = |point: &mut [f64; 3]| *point = point.map(|x| x / scale);
     match &mut shown {

@@ -9,19 +9,18 @@ use unlift_vision::features::in_order;
 use unlift_vision::features::photo::Turn;
 
 use super::common::all_could_be;
-use crate::Error;
 use crate::args::FeaturesArgs;
 use crate::output::print;
 use crate::progress::Progress;
 use unlift_audit::images::{FeatureSource, Wanted, is_photo};
-use unlift_audit::{Progress as _, check_file};
+use unlift_audit::{Progress as _, bail, check_file};
 
 pub fn run(args: &FeaturesArgs) -> crate::Result<()> {
     let rules = Rules::new([args.images.as_path()], false);
-    let target = check_file(&args.out, Kind::Features, &rules)?;
+    let target = check_file("--out", &args.out, Kind::Features, &rules)?;
     check_no_photo(&args.images, &target)?;
     if args.as_stored && args.images.is_file() {
-        return Err(Error::request("--as-stored: expected with a folder of photos, found a file"));
+        bail!("--as-stored: expected with a folder of photos, found a file");
     }
     let wanted = Wanted { max_image_size: args.max_image_size, ..args.extraction.wanted() };
     let extraction = wanted.extraction(&args.images)?;
@@ -80,8 +79,7 @@ fn check_no_photo(images: &Path, target: &Path) -> crate::Result<()> {
         return Ok(());
     };
     if folder.starts_with(images) && is_photo(target) {
-        let expected = "expected a name that is not read as a photo";
-        return Err(Error::request(format!("--out: {}: {expected}", target.display())));
+        bail!("--out: {}: expected a name that is not read as a photo", target.display());
     }
     Ok(())
 }

@@ -10,7 +10,6 @@ use rayon::prelude::*;
 use unlift::audit::staged::{Pooled, key_of, oracle_lists, oracle_seed};
 use unlift::audit::{Plan, Row, Threshold, measure};
 use unlift::evaluate::blind;
-use unlift::neighbors::oracle::{Outliers, TrueNeighbors, search};
 use unlift::neighbors::sources::Named;
 use unlift::neighbors::{Needs as SourceNeeds, Neighborhoods, Source, of_what_there_is};
 use unlift::obfuscate::{Change, Changed, Scheme, SchemeOptions, obfuscate as hide};
@@ -23,7 +22,7 @@ use unlift_audit::changes::{mitigations, protections_of_map};
 use unlift_audit::images::FeatureSource;
 use unlift_audit::images::stream::{Stream, Tally};
 use unlift_audit::released::{expect_slots, same_map};
-use unlift_audit::{Checked, Prepared, Progress as _, check_file, refused};
+use unlift_audit::{Checked, Prepared, Progress as _, bail, check_file, refused};
 use unlift_io::Error as FileError;
 use unlift_io::atomic::{Access, OutputFile};
 use unlift_io::outputs::{Kind, OutputSet, Rules};
@@ -47,7 +46,6 @@ const RELEASED: &str = "released.npz";
 /// File name of the truth, which only the owner has.
 const TRUTH: &str = "truth.npz";
 
-/// Counts over the images of a stage.
 #[derive(Clone, Copy, Debug, Default)]
 struct Counts {
     images: usize,
@@ -87,7 +85,6 @@ pub fn of_image(path: &Path, name: &str) -> impl Fn(unlift::Error) -> FileError 
 const GUESSABLE: &str = "unlift: note: whoever guesses the --seed can restore the order of the records and, under cp, \
     the points: do not release this map";
 
-/// `unlift obfuscate`
 pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<()> {
     let (map, unit) = (&args.map, args.map.unit());
     let more = [&map.descriptors, &args.public_descriptors, &args.audit];
@@ -108,8 +105,15 @@ pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<()> {
     prepared.doubts.iter().chain(&prepared.notes).for_each(stderr::note);
     let scheme = changed(args, scheme, &prepared)?;
     let name = scheme.name();
-    let leak = args.audit.as_deref().map(|path| leak_of(path, args, &prepared, name));
-    let leak = leak.transpose()?;
+    let leak = match &args.audit {
+        Some(path) => {
+            let public = public_name(args.public_descriptors.as_deref());
+            let public = args.protect_descriptors.as_ref().map(|_| public);
+            let leak = leak(&read_document(path)?, &prepared.about(&args.path)?, name, public);
+            Some(leak.map_err(|of| FileError::new(path, of.place, of.expected, of.found))?)
+        }
+        None => None,
+    };
     let hidden = hide(&*scheme, &prepared.original, prepared.descriptors.as_ref(), &key(args)?);
     let (released, secret) = hidden.map_err(|error| FileError::core(&args.path, error))?;
     write_truth(&out.stage(TRUTH, Kind::Stage(Stage::Truth))?, &prepared.original, &secret)?;
@@ -146,20 +150,6 @@ fn changed(
     })
 }
 
-/// Returns what the audit at `path` says about this release.
-fn leak_of(
-    path: &Path,
-    args: &ObfuscateArgs,
-    prepared: &Prepared,
-    scheme: &str,
-) -> crate::Result<String> {
-    let document = read_document(path)?;
-    let public = || public_name(args.public_descriptors.as_deref());
-    let public = args.protect_descriptors.as_ref().map(|_| public());
-    leak(&document, &prepared.about(&args.path)?, scheme, public)
-        .map_err(|wrong| FileError::new(path, wrong.place, wrong.expected, wrong.found).into())
-}
-
 /// Hides the keypoints of all images, each under a key of its own, and writes both files into `out`.
 fn obfuscate_images(args: &ObfuscateArgs, mut out: OutputSet) -> crate::Result<()> {
     let (map, path, name) = (&args.map, &args.path, args.scheme.name);
@@ -172,8 +162,7 @@ fn obfuscate_images(args: &ObfuscateArgs, mut out: OutputSet) -> crate::Result<(
         ("--audit", args.audit.is_some()),
     ] {
         if given {
-            let found = format!("found {name}, which hides images");
-            return Err(Error::request(format!("{option}: expected with a map, {found}")));
+            bail!("{option}: expected with a map, found {name}, which hides images");
         }
     }
     let scheme = args.scheme.of_dimension::<2>(&SchemeOptions::usual(Unit::Pixel));
@@ -246,59 +235,44 @@ fn write<T: Send, U: Send>(
 /// Entries of the oracle's lists, by default.
 const K: u16 = 50;
 
-/// `unlift neighbors`
 pub fn neighbors(args: &NeighborsArgs) -> crate::Result<()> {
     let inputs = [Some(args.released.as_path()), args.truth.as_deref()];
     let rules = &Rules::new(inputs.into_iter().flatten(), false);
-    check_file(&args.out, Kind::Stage(Stage::Neighborhoods), rules)?;
+    check_file("--out", &args.out, Kind::Stage(Stage::Neighborhoods), rules)?;
     let images = has_images(&args.released)?;
     let alive = Progress::uncounted(false, "finding neighbors");
     let (counts, name) = match (&args.neighbors, args.truth.as_deref(), args.inlier_ratio) {
         (NeighborSource::Own(named), None, _) => {
             let of_k = |k| named.clone().with_k(usize::from(k));
             let named = args.k.map_or_else(|| named.clone(), of_k);
-            let counts = match images {
-                true => images_by_source(args, &named, rules)?,
-                false => write_lists(args, rules, &map_by_source(args, &named)?)?,
-            };
-            (counts, named.name().to_owned())
+            let by_source = if images { images_by_source } else { map_by_source };
+            (by_source(args, &named, rules)?, named.name().to_owned())
         }
         (NeighborSource::Oracle, Some(truth), Some(ratio)) => {
-            let counts = match images {
-                true => images_by_oracle(args, truth, ratio, rules)?,
-                false => write_lists(args, rules, &map_by_oracle(args, truth, ratio)?)?,
-            };
-            (counts, format!("oracle at inlier ratio {ratio}"))
+            let by_oracle = if images { images_by_oracle } else { map_by_oracle };
+            (by_oracle(args, truth, ratio, rules)?, format!("oracle at inlier ratio {ratio}"))
         }
         (NeighborSource::Own(named), Some(_), _) => {
-            let name = named.name();
-            return Err(Error::request(format!(
-                "--truth: expected with --neighbors oracle, found {name}"
-            )));
+            bail!("--truth: expected with --neighbors oracle, found {}", named.name())
         }
-        _ => {
-            let expected = "expected --truth and --inlier-ratios, found none";
-            return Err(Error::request(format!("--neighbors oracle: {expected}")));
-        }
+        _ => bail!("--neighbors oracle: expected --truth and --inlier-ratios, found none"),
     };
     drop(alive);
     let (n, longest, out) = (counts.slots, counts.longest, OneLine(args.out.display()));
     print(&format!("{n} neighborhoods of up to {longest} by {name}, in {out}\n"))
 }
 
-/// Writes the lists of a map.
 fn write_lists(
     args: &NeighborsArgs,
     rules: &Rules,
     lists: &Neighborhoods,
 ) -> crate::Result<Counts> {
-    check_file(&args.out, Kind::Stage(Stage::Neighborhoods), rules)?;
+    check_file("--out", &args.out, Kind::Stage(Stage::Neighborhoods), rules)?;
     write_neighborhoods(&args.out, lists)?;
     let (slots, longest) = (lists.n_slots(), lists.longest());
     Ok(Counts { slots, longest, ..Counts::default() })
 }
 
-/// Adds the lists of an image to a file.
 fn add_lists(
     writer: &mut ImageWriter<'_>,
     counts: &mut Counts,
@@ -326,8 +300,7 @@ fn check_descriptors<const D: usize>(
     }
 }
 
-/// Makes the lists of a map as an attacker does.
-fn map_by_source(args: &NeighborsArgs, named: &Named) -> crate::Result<Neighborhoods> {
+fn map_by_source(args: &NeighborsArgs, named: &Named, rules: &Rules) -> crate::Result<Counts> {
     let released = read_released::<3>(&args.released)?;
     let source = named.of_dimension::<3>()?;
     let of_map = |error| FileError::core(&args.released, error);
@@ -343,30 +316,29 @@ fn map_by_source(args: &NeighborsArgs, named: &Named) -> crate::Result<Neighborh
     if let Some(note) = source.note(released.n_slots()) {
         stderr::note(note);
     }
-    Ok(source.lists(&released, source.k(&released), args.seed).map_err(of_map)?)
+    let lists = source.lists(&released, source.k(&released), args.seed).map_err(of_map)?;
+    write_lists(args, rules, &lists)
 }
 
-/// Makes the lists of a map at one inlier ratio.
-fn map_by_oracle(args: &NeighborsArgs, truth: &Path, ratio: f64) -> crate::Result<Neighborhoods> {
+fn map_by_oracle(
+    args: &NeighborsArgs,
+    truth: &Path,
+    ratio: f64,
+    rules: &Rules,
+) -> crate::Result<Counts> {
     let (original, secret) = read_truth::<3>(truth)?;
     let released = read_released::<3>(&args.released)?;
     same_map(&args.released, Some(released.fingerprint()), truth, secret.map())?;
     expect_slots(&args.released, &released, &secret)?;
-    let k = usize::from(args.k.unwrap_or(K));
-    let lists = || {
-        let knn = search(&original)?;
-        let near = TrueNeighbors::new(&knn, &secret, k)?;
-        let outliers = Outliers::new(args.oracle_noise, &near, &knn, &secret, args.seed)?;
-        near.lists(ratio, &outliers, args.seed)
-    };
-    Ok(lists().map_err(|error| FileError::core(truth, error))?)
+    let how = (args.oracle_noise, ratio, usize::from(args.k.unwrap_or(K)));
+    let lists = oracle_lists(&original, &(released, secret), how, args.seed);
+    write_lists(args, rules, &lists.map_err(|error| FileError::core(truth, error))?)
 }
 
-/// Writes a source's lists for all images.
 fn images_by_source(args: &NeighborsArgs, named: &Named, rules: &Rules) -> crate::Result<Counts> {
-    let source = named.of_dimension::<2>().map_err(|_| {
-        Error::request(format!("--neighbors {}: expected with a map, found images", named.name()))
-    })?;
+    let Ok(source) = named.of_dimension::<2>() else {
+        bail!("--neighbors {}: expected with a map, found images", named.name());
+    };
     let mut images = ImageFile::open(&args.released, Stage::Released)?;
     let work = |rows: ImageRows<'_>| {
         let name = rows.name().to_owned();
@@ -380,7 +352,6 @@ fn images_by_source(args: &NeighborsArgs, named: &Named, rules: &Rules) -> crate
     write((&args.out, rules), Stage::Neighborhoods, next, work, add_lists)
 }
 
-/// Writes the oracle's lists for all images.
 fn images_by_oracle(
     args: &NeighborsArgs,
     truth: &Path,
@@ -400,11 +371,10 @@ fn images_by_oracle(
     write((&args.out, rules), Stage::Neighborhoods, next, work, add_lists)
 }
 
-/// `unlift recover`
 pub fn recover(args: &RecoverArgs) -> crate::Result<()> {
     let rules = Rules::new([args.released.as_path(), &args.neighbors], false);
     let kind = Kind::Stage(Stage::Recovered);
-    check_file(&args.out, kind, &rules)?;
+    check_file("--out", &args.out, kind, &rules)?;
     let alive = Progress::uncounted(false, "recovering");
     let what = if has_images(&args.released)? {
         let Counts { points, slots, images, .. } = recover_images(args, &rules, &alive)?;
@@ -416,7 +386,7 @@ pub fn recover(args: &RecoverArgs) -> crate::Result<()> {
         check_lists(args, &released, &lists, &mut HashSet::new(), &alive)?;
         let recovered = recovered(args, &released, &lists)
             .map_err(|error| FileError::core(&args.released, error))?;
-        check_file(&args.out, kind, &rules)?;
+        check_file("--out", &args.out, kind, &rules)?;
         write_recovered(&args.out, &recovered)?;
         let (n, slots) = (n_recovered(&recovered), recovered.n_slots());
         let (delta, unit) = (recovered.delta(), recovered.unit().name());
@@ -439,7 +409,6 @@ fn n_recovered<const D: usize>(recovered: &Recovered<D>) -> usize {
     recovered.status().iter().filter(|&&status| status == Status::Ok).count()
 }
 
-/// Recovers all images, and writes them.
 fn recover_images(args: &RecoverArgs, rules: &Rules, alive: &Progress) -> crate::Result<Counts> {
     let mut images = ImageFile::open(&args.released, Stage::Released)?;
     let mut lists = ImageFile::open(&args.neighbors, Stage::Neighborhoods)?;
@@ -505,7 +474,6 @@ fn check_lists<const D: usize>(
     Ok(())
 }
 
-/// What was compared.
 struct Evaluated {
     row: Row,
     /// Without a fingerprint if any image lacks that of its released image.
@@ -515,7 +483,6 @@ struct Evaluated {
     doubts: Result<Vec<String>, unlift::Error>,
 }
 
-/// `unlift evaluate`
 pub fn evaluate(args: &EvaluateArgs) -> crate::Result<()> {
     // The released map beside the truth, for the blind baseline.
     let released = Some(args.truth.with_file_name(RELEASED)).filter(|path| path.exists());
@@ -583,7 +550,6 @@ fn evaluate_map(args: &EvaluateArgs, released: Option<&Path>) -> crate::Result<E
     Ok(Evaluated { row, about, slots_per_record, doubts: checked.notes(&thresholds, unit) })
 }
 
-/// Computes the row over all images.
 fn evaluate_images(args: &EvaluateArgs, released: Option<&Path>) -> crate::Result<Evaluated> {
     let thresholds = thresholds(args, Unit::Pixel);
     let mut next = pairs(&args.truth, released)?;

@@ -2,14 +2,13 @@
 
 use std::io::Write;
 
-use unlift_audit::check_file;
+use unlift_audit::{bail, check_file};
 use unlift_io::atomic::{Access, write_file};
 use unlift_io::outputs::{Kind, Rules};
 use unlift_report::Document;
 use unlift_report::export::{csv, latex, thresholds};
 
 use super::common::read_document;
-use crate::Error;
 use crate::args::TableArgs;
 use crate::output::print;
 use crate::stderr;
@@ -23,27 +22,25 @@ pub fn run(args: &TableArgs) -> crate::Result<()> {
         None | Some("csv") => csv,
         Some("tex") => latex,
         Some(_) => {
-            let expected = "--out: expected a name that ends in .csv or .tex";
             let found = args.out.iter().map(|out| out.display().to_string()).collect::<String>();
-            return Err(Error::request(format!("{expected}, found {found}")));
+            bail!("--out: expected a name that ends in .csv or .tex, found {found}")
         }
     };
     let rules = Rules::new([args.audit.as_path()], false);
     if let Some(path) = &args.out {
-        check_file(path, Kind::Table, &rules)?;
+        check_file("--out", path, Kind::Table, &rules)?;
     }
     let document = read_document(&args.audit)?;
     let known = thresholds(&document);
-    let only = args.thresholds.as_ref().map(|requested| {
+    let only = args.thresholds.as_ref().and_then(|requested| {
         let same = |typed: &&&str| typed.parse::<f64>().is_ok_and(|value| value == requested.value);
-        known.iter().find(same).copied().ok_or_else(|| {
-            let (known, found) = (known.join(", "), &requested.label);
-            Error::request(format!(
-                "--thresholds: expected one of {known}, as in the audit, found {found}"
-            ))
-        })
+        known.iter().find(same).copied()
     });
-    let text = match only.transpose()? {
+    if let (Some(requested), None) = (&args.thresholds, only) {
+        let (known, found) = (known.join(", "), &requested.label);
+        bail!("--thresholds: expected one of {known}, as in the audit, found {found}");
+    }
+    let text = match only {
         Some(typed) => table(&document, &[typed]),
         None => table(&document, &known),
     };

@@ -1,6 +1,6 @@
 //! `unlift audit again`: two maps in, rows by links out.
 
-use crate::common::{Place, row};
+use crate::common::{Place, recovered, row, rows};
 
 const N_POINTS: usize = 300;
 
@@ -30,10 +30,10 @@ fn two_releases_give_points_back() {
     assert!(stdout.contains("From two releases under olc, 100.0 % of the points"), "{stdout}");
     assert!(stdout.contains("not audited: plane, again-geometry"), "{stdout}");
     let document = place.json("a/audit.json");
-    assert_eq!(document["results"].as_array().unwrap().len(), 5);
+    assert_eq!(rows(&document).len(), 5);
     for (scheme, by) in [("olc", "again"), ("olc", "again-geometry"), ("olc/cp", "again")] {
         let row = row(&document, scheme, by);
-        assert!(row["recovered_percent"]["0.10"].as_f64() > Some(97.0), "{scheme} {by}");
+        assert!(recovered(row, "0.10") > 97.0, "{scheme} {by}");
         assert!(row["inlier_ratio"].as_f64() > Some(0.99), "{scheme} {by}");
     }
     let open = row(&document, "plane", "again")["metrics"]["open_percent"].as_f64();
@@ -44,12 +44,12 @@ fn two_releases_give_points_back() {
 fn what_is_gone_in_the_second_map_does_not_come_back() {
     let place = maps();
     let audit = "audit again a.csv b.csv --scale 1 --schemes olc --no-records-alone";
-    let stderr = place.complains(&format!("{audit} --descriptors a.bin"), 2);
-    assert!(stderr.contains("--descriptors: expected one file for A and one for B"), "{stderr}");
+    let expected = "--descriptors: expected one file for A and one for B";
+    place.refuses(audit, &[("--descriptors a.bin", 2, expected)]);
     place.ends(&format!("{audit} --descriptors a.bin --descriptors b.bin --out a"), 0);
     let document = place.json("a/audit.json");
-    for row in document["results"].as_array().unwrap() {
-        let share = row["recovered_percent"]["0.10"].as_f64().unwrap();
+    for row in rows(&document) {
+        let share = recovered(row, "0.10");
         assert!((85.0..=93.0).contains(&share), "{}: {share}", row["neighbors"]);
     }
     let (_, stderr) = place.ends(&format!("{audit} --share-safe --out s"), 0);
@@ -68,12 +68,9 @@ fn no_gate_holds_if_the_maps_are_in_other_frames_or_scales() {
         (&(|p: [f64; 3]| p) as &dyn Fn([f64; 3]) -> [f64; 3], ""),
         (
             &|[x, y, z]| [-y, x + 2.0, z],
-            "after a turn of the first map by 90.0 degrees, a scale of 1.00 and",
+            "a turn of the first map by 90.0 degrees, a scale of 1.00 and",
         ),
-        (
-            &|p| p.map(|x| 0.37 * x),
-            "after a turn of the first map by 0.0 degrees, a scale of 0.370 and",
-        ),
+        (&|p| p.map(|x| 0.37 * x), "a turn of the first map by 0.0 degrees, a scale of 0.370 and"),
     ] {
         place.write_points("c.csv", &points.iter().map(|p| change(*p)).collect::<Vec<_>>());
         let code = i32::from(!expected.is_empty());

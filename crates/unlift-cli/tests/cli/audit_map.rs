@@ -1,6 +1,6 @@
 //! `unlift audit map`: results, baselines, noise and lengths.
 
-use crate::common::Place;
+use crate::common::{Place, rows};
 
 const QUICK: &str = "--k 10 --schemes olc,ppl --inlier-ratios 1,0.5";
 
@@ -30,8 +30,8 @@ fn a_first_look_is_two_schemes_and_the_attack_on_what_is_released() {
     let attacks = |more: &str| {
         place.ends(&format!("audit map room.csv --scale 1 --k 10 --quick {more} --out a"), 0);
         let document = place.json("a/audit.json");
-        let rows = document["results"].as_array().unwrap().iter();
-        let mut found: Vec<String> = rows
+        let mut found: Vec<String> = rows(&document)
+            .iter()
             .inspect(|row| assert!(row["neighbors"] != "oracle" || row["inlier_ratio"] == 0.5))
             .map(|row| format!("{} {}", row["scheme"], row["neighbors"]).replace('"', ""))
             .collect();
@@ -41,8 +41,8 @@ fn a_first_look_is_two_schemes_and_the_attack_on_what_is_released() {
     assert_eq!(attacks(""), ["olc oracle", "ppl oracle"]);
     let with = ["olc oracle", "olc similarity", "ppl oracle", "ppl similarity"];
     assert_eq!(attacks("--descriptors d.bin"), with);
-    let (_, stderr) = place.ends("audit map room.csv --quick --schemes ppl --out b", 2);
-    assert!(stderr.contains("--quick") && stderr.contains("--schemes"), "{stderr}");
+    let both = ("--schemes ppl --out b", 2, "cannot be used with");
+    place.refuses("audit map room.csv --quick", &[both]);
 }
 
 /// The verdict of a scheme that publishes bearings leads with what they show.
@@ -58,8 +58,6 @@ fn bearings_are_audited_and_painted() {
     let (stdout, _) = place.ends("invert sphere/released.npz --out views", 0);
     assert_eq!(stdout, "6 pictures, in views\n");
     place.ends(&format!("{obfuscate} --schemes olc --out olc"), 0);
-    let stderr = place.complains("invert olc/released.npz --out none", 2);
-    assert!(stderr.contains("RECOVERED: expected"), "{stderr}");
-    let stderr = place.complains(&format!("{audit} --protect-descriptors subspace:0"), 2);
-    assert!(stderr.contains("--protect-descriptors"), "{stderr}");
+    place.refuses("invert", &[("olc/released.npz --out none", 2, "RECOVERED: expected")]);
+    place.refuses(audit, &[("--protect-descriptors subspace:0", 2, "--protect-descriptors")]);
 }

@@ -75,9 +75,8 @@ impl Place {
     /// Returns the sorted names of the entries of a folder.
     pub fn names(&self, folder: &str) -> Vec<String> {
         let entries = fs::read_dir(self.path(folder)).unwrap();
-        let name = |entry: std::io::Result<fs::DirEntry>| entry.unwrap().file_name();
-        let mut names: Vec<String> =
-            entries.map(|entry| name(entry).into_string().unwrap()).collect();
+        let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        let mut names: Vec<String> = names.collect();
         names.sort();
         names
     }
@@ -88,12 +87,11 @@ impl Place {
         while let Some(folder) = waiting.pop() {
             for entry in fs::read_dir(folder).unwrap() {
                 let path = entry.unwrap().path();
-                match path.is_dir() {
-                    true => waiting.push(path),
-                    false => {
-                        let within = path.strip_prefix(self.0.path()).unwrap();
-                        found.push(within.to_str().unwrap().to_owned());
-                    }
+                if path.is_file() {
+                    let within = path.strip_prefix(self.0.path()).unwrap();
+                    found.push(within.to_str().unwrap().to_owned());
+                } else {
+                    waiting.push(path);
                 }
             }
         }
@@ -146,17 +144,35 @@ impl Place {
         stderr
     }
 
+    /// Runs lines of a command, each of which must end with its code, an empty stdout and this text
+    /// on stderr.
+    pub fn refuses(&self, command: &str, lines: &[(&str, i32, &str)]) {
+        for (line, code, expected) in lines {
+            let told = self.complains(&format!("{command} {line}"), *code);
+            assert!(told.contains(expected), "{line}: {told}");
+        }
+    }
+
     /// Runs a line that must end with `code`, and returns the JSON from stdout.
     pub fn prints(&self, line: &str, code: i32) -> Value {
         serde_json::from_str(&self.ends(line, code).0).expect("JSON")
     }
 }
 
+/// Returns the rows of an audit's document.
+pub fn rows(document: &Value) -> &[Value] {
+    document["results"].as_array().expect("rows")
+}
+
 /// Returns the row of an audit's document for a scheme and a source.
 pub fn row<'a>(document: &'a Value, scheme: &str, neighbors: &str) -> &'a Value {
-    let mut rows = document["results"].as_array().expect("rows").iter();
-    rows.find(|row| row["scheme"] == scheme && row["neighbors"] == neighbors)
-        .unwrap_or_else(|| panic!("{scheme} {neighbors}"))
+    let is_row = |row: &&Value| row["scheme"] == scheme && row["neighbors"] == neighbors;
+    rows(document).iter().find(is_row).unwrap_or_else(|| panic!("{scheme} {neighbors}"))
+}
+
+/// Returns the percentage that a row recovers within a threshold.
+pub fn recovered(row: &Value, threshold: &str) -> f64 {
+    row["recovered_percent"][threshold].as_f64().expect("a percentage")
 }
 
 pub fn texts(output: &Output) -> (String, String) {

@@ -112,17 +112,15 @@ fn what_leaks_more_or_is_out_of_view_fails() {
 }
 
 #[test]
+#[rustfmt::skip] // One row per line.
 fn other_units_and_thresholds_are_refused() {
     let place = audited(&[]);
     let audit = "audit map room.csv --k 10 --schemes olc --inlier-ratios 1 --quiet";
     place.ends(&format!("{audit} --out u"), 0);
     place.ends(&format!("{audit} --scale 1 --thresholds 0.10 --out t"), 0);
-    for (new, expected) in [
-        ("u", "unit: expected m, as in a/audit.json, found kth_neighbor"),
-        ("t", "thresholds: expected 0.10, 0.25, as in a/audit.json, found 0.10"),
-    ] {
-        let line = format!("compare a/audit.json {new}/audit.json --out c");
-        let told = place.complains(&line, 3);
-        assert!(told.contains(expected) && !place.path("c").exists(), "{told}");
-    }
+    place.refuses("compare --out c a/audit.json", &[
+        ("u/audit.json", 3, "unit: expected m, as in a/audit.json, found kth_neighbor"),
+        ("t/audit.json", 3, "thresholds: expected 0.10, 0.25, as in a/audit.json, found 0.10"),
+    ]);
+    assert!(!place.path("c").exists());
 }

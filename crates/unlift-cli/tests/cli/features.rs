@@ -51,19 +51,16 @@ fn options_are_those_of_the_extractor() {
     assert!(count("--max-features 5") < usual && count("--max-image-size 64") < usual);
     assert_eq!(all(&place, "features.h5")[0].uncertainty_px, Some(2.0));
     assert_eq!(count("--features aliked --min-score 0.05 --max-features 5"), 3 * 5);
-    for (line, expected) in [
-        ("photos --max-features 0", "expected a whole number from 1 to 4294967295, found 0"),
-        ("photos --features orb", "expected one of sift, aliked, superpoint, found orb"),
-        ("photos --min-score 0.1", "unlift: --min-score: expected with --features aliked, found none"),
-        ("features.h5 --max-features 9 --out x.h5", "--max-features: expected with a folder of photos"),
-        ("features.h5 --as-stored --out x.h5", "--as-stored: expected with a folder of photos"),
-        ("features.h5 --features aliked --out x.h5", "--features: expected with a folder of photos"),
-        ("photos --out photos", "unlift: --out: photos: expected a file, found a folder"),
-        ("photos --out photos/new.jpg", "expected a name that is not read as a photo"),
-    ] {
-        let stderr = place.complains(&format!("features {line}"), 2);
-        assert!(stderr.contains(expected), "{line}: {stderr}");
-    }
+    place.refuses("features", &[
+        ("photos --max-features 0", 2, "expected a whole number from 1 to 4294967295, found 0"),
+        ("photos --features orb", 2, "expected one of sift, aliked, superpoint, found orb"),
+        ("photos --min-score 0.1", 2, "unlift: --min-score: expected with --features aliked, found none"),
+        ("features.h5 --max-features 9 --out x.h5", 2, "--max-features: expected with a folder of photos"),
+        ("features.h5 --as-stored --out x.h5", 2, "--as-stored: expected with a folder of photos"),
+        ("features.h5 --features aliked --out x.h5", 2, "--features: expected with a folder of photos"),
+        ("photos --out photos", 2, "unlift: --out: photos: expected a file, found a folder"),
+        ("photos --out photos/new.jpg", 2, "expected a name that is not read as a photo"),
+    ]);
 }
 
 #[test]

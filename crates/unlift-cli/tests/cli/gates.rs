@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::common::Place;
+use crate::common::{Place, recovered, rows};
 
 #[test]
 #[rustfmt::skip] // One row per line.
@@ -22,10 +22,10 @@ fn a_gate_may_name_a_solver_and_a_source_and_decides_the_exit_code() {
             .enumerate()
     {
         let is = |row: &Value, field: &str, name: &str| name.is_empty() || row[field] == name;
-        let of = document["results"].as_array().unwrap().iter().filter(|row| {
+        let of = rows(&document).iter().filter(|row| {
             is(row, "scheme", scheme) && is(row, "solver", solver) && is(row, "neighbors", source)
         });
-        let shares = of.filter_map(|row| row["recovered_percent"]["0.25"].as_f64());
+        let shares = of.map(|row| recovered(row, "0.25"));
         let gate = &document["gates"][at];
         assert_eq!(gate["found_percent"].as_f64(), Some(shares.fold(0.0, f64::max)), "{gate}");
         assert_eq!(gate["passed"], at < 2);
@@ -41,17 +41,14 @@ fn a_gate_may_name_a_solver_and_a_source_and_decides_the_exit_code() {
     place.ends(&format!("{line} --share-safe"), 1);
     assert!(!place.text("new/gates.xml").contains("room"), "it does not name the map");
     place.write("theirs.xml", "<?xml version=\"1.0\"?><project/>");
-    for (more, expected) in [
-        ("--gate ppl:ransac:0.25<=1", "--gate ppl:ransac:0.25<=1: solver: expected one of joint, consensus"),
-        ("--gate olc:0.25<=1 --junit theirs.xml", "--junit: theirs.xml: expected nothing, or gates as JUnit XML"),
-        ("--gate olc:0.25<=1 --junit room.csv", "--junit: room.csv: expected a file that is not read"),
-        ("--gate olc:0.25<=1 --junit a/report.html", "--junit: a/report.html: expected nothing, or gates as JUnit XML"),
-    ] {
-        let told = place.complains(&format!("{audit} {more}"), 2);
-        assert!(told.starts_with(&format!("unlift: {expected}")), "{told}");
-    }
-    let told = place.complains(&format!("{audit} --junit g.xml"), 2);
-    assert!(told.contains("--gate <GATE>"), "without a gate it would say that all held: {told}");
+    place.refuses(audit, &[
+        ("--gate ppl:ransac:0.25<=1", 2, "unlift: --gate ppl:ransac:0.25<=1: solver: expected one of joint, consensus"),
+        ("--gate olc:0.25<=1 --junit theirs.xml", 2, "unlift: --junit: theirs.xml: expected nothing, or gates as JUnit XML"),
+        ("--gate olc:0.25<=1 --junit room.csv", 2, "unlift: --junit: room.csv: expected a file that is not read"),
+        ("--gate olc:0.25<=1 --junit a/report.html", 2, "unlift: --junit: a/report.html: expected nothing, or gates as JUnit XML"),
+        // Without a gate it would say that all held.
+        ("--junit g.xml", 2, "--gate <GATE>"),
+    ]);
 }
 
 #[test]

@@ -7,7 +7,7 @@ use unlift::Descriptors;
 use unlift::descriptors::Values;
 use unlift_io::features::{FeatureSource, FeatureWriter, ImageFeatures};
 
-use crate::common::Place;
+use crate::common::{Place, rows};
 
 const QUICK: &str = "--k 10 --inlier-ratios 1,0.5";
 
@@ -43,9 +43,8 @@ fn photos_become_pooled_rows_rows_per_image_and_pictures() {
     let document = place.json("a/audit.json");
     let counts = &document["input"]["images"];
     assert_eq!((counts["found"].as_u64(), counts["used"].as_u64()), (Some(3), Some(3)));
-    let rows = document["results"].as_array().expect("rows");
-    assert_eq!(rows.len(), 3 * (2 + 2));
-    for row in rows {
+    assert_eq!(rows(&document).len(), 3 * (2 + 2));
+    for row in rows(&document) {
         assert_eq!(row["unit"], "px");
         let keys: Vec<&String> = row["recovered_percent"].as_object().unwrap().keys().collect();
         assert_eq!(keys, ["1", "5", "10", "25"]);
@@ -112,12 +111,13 @@ fn what_cannot_be_audited_is_one_line() {
         let told = place.complains(&format!("audit images {line}"), code);
         assert_eq!(told, format!("unlift: {expected}\n"));
     }
-    for line in ["--neighbors geometric", "--solver tomography", "--schemes olc"] {
-        place.ends(&format!("audit images photos {line}"), 2);
-    }
-    // The error comes before any photo is read.
-    let told = place.complains("audit images photos --features aliked --neighbors overlap", 2);
-    assert!(told.starts_with("unlift: --neighbors overlap: expected "), "{told}");
+    place.refuses("audit images", &[
+        ("photos --neighbors geometric", 2, "expected one of oracle, "),
+        ("photos --solver tomography", 2, ", found tomography"),
+        ("photos --schemes olc", 2, ", found olc (for maps only)"),
+        // The error comes before any photo is read.
+        ("photos --features aliked --neighbors overlap", 2, "unlift: --neighbors overlap: expected "),
+    ]);
     assert!(!place.path("unlift-audit").exists());
     place.ends("audit images floats.h5 --k 10 --neighbors similarity --out a", 0);
 }

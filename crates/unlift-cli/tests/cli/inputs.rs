@@ -36,12 +36,7 @@ fn what_cannot_be_meant_is_refused_with_a_way_out() {
         ("room.csv --scale 1e-3", 2, "any guess would count as recovered", "another --scale"),
         ("room.csv --scale 1e5", 2, "no attack could come near", "another --scale"),
         ("room.csv --thresholds 1e9", 2, "unlift: --thresholds: expected a map larger", ""),
-        (
-            "room.csv --scale 1 --expect-extent 20..50",
-            2,
-            "a longest side of 20 to 50 m, found ",
-            "",
-        ),
+        ("room.csv --scale 1 --expect-extent 20..50", 2, "a longest side of 20 to 50 m, found ", ""),
         ("room.csv --scale 1 --expect-extent 9", 2, "expected LOW..HIGH in meters", ""),
         // The gate has a threshold in meters, but the audit has no scale.
         ("room.csv --gate olc:0.10<=20", 2, "expected one of 1.0, 2.5, found 0.1", "--scale and --thresholds, which change them"),
@@ -51,10 +46,7 @@ fn what_cannot_be_meant_is_refused_with_a_way_out() {
     ] {
         let told = place.complains(&format!("audit map {line} {QUICK}"), code);
         assert!(told.contains(expected), "{line}: {told}");
-        assert!(
-            advice.is_empty() || told.contains(&format!("\n  try: {advice}")),
-            "{line}: {told}"
-        );
+        assert!(advice.is_empty() || told.contains(&format!("\n  try: {advice}")), "{line}: {told}");
         assert!(!place.path("a").exists(), "{line}");
     }
     let told = place.complains("obfuscate room.csv --schemes olc --scale 1e-300 --out a", 2);

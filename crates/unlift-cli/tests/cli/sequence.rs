@@ -5,7 +5,7 @@ use unlift::descriptors::Values;
 use unlift::geometry::camera::{Camera, Intrinsics, Pose};
 use unlift_io::features::{FeatureWriter, ImageFeatures};
 
-use crate::common::{Place, row};
+use crate::common::{Place, recovered, row, rows};
 
 const N_IMAGES: usize = 6;
 const N_POINTS: usize = 80;
@@ -64,8 +64,8 @@ fn walk() -> Place {
 
 #[test]
 fn features_in_another_order_are_refused() {
-    let stderr = walk().complains("audit sequence model g.h5", 3);
-    assert!(stderr.contains("g.h5: expected descriptors of the model's keypoints"), "{stderr}");
+    let expected = "g.h5: expected descriptors of the model's keypoints";
+    walk().refuses("audit sequence model", &[("g.h5", 3, expected)]);
 }
 
 #[test]
@@ -76,23 +76,21 @@ fn keypoints_come_back_by_the_number_of_queries() {
     assert!(stderr.contains("6 images: no rows for [9] queries"), "{stderr}");
     assert!(stdout.contains("After 2 queries 0.0 %, "), "{stdout}");
     let document = place.json("a/audit.json");
-    let share = |scheme: &str, neighbors: &str| {
-        row(&document, scheme, neighbors)["recovered_percent"]["5"].as_f64().unwrap()
-    };
+    let share = |scheme, neighbors: &str| recovered(row(&document, scheme, neighbors), "5");
     for by in ["sequence", "tracks"] {
         assert_eq!(share("lines2d", &format!("{by}@2")), 0.0);
         assert!(share("lines2d", &format!("{by}@3")) > 95.0, "{by}");
         assert!(share("lines2d", &format!("{by}@5")) > 95.0, "{by}");
         assert!(share("cp2d", &format!("{by}@5")) > 90.0, "{by}");
     }
-    assert_eq!(document["results"].as_array().unwrap().len(), 2 * 3 * 2);
+    assert_eq!(rows(&document).len(), 2 * 3 * 2);
 }
 
 #[test]
 fn an_image_of_another_size_is_counted_and_the_others_are_audited() {
     let place = walk();
-    let images = String::from_utf8(place.bytes("model/images.txt")).unwrap();
-    place.write("model/images.txt", images.replace(" 1 5.png", " 2 5.png"));
+    let images = place.text("model/images.txt").replace(" 1 5.png", " 2 5.png");
+    place.write("model/images.txt", images);
     let cameras = "1 SIMPLE_PINHOLE 640 480 500 320 240\n2 SIMPLE_PINHOLE 320 240 250 160 120\n";
     place.write("model/cameras.txt", cameras);
     let line = "audit sequence model f.h5 --queries 2 --schemes lines2d --out a";
@@ -104,6 +102,7 @@ fn an_image_of_another_size_is_counted_and_the_others_are_audited() {
 }
 
 #[test]
+#[rustfmt::skip] // One row per line.
 fn lists_and_changed_descriptors_have_rows_of_their_own() {
     let place = walk();
     let audit = "audit sequence model f.h5 --queries 2,5 --schemes lines2d --thresholds 5";
@@ -112,13 +111,13 @@ fn lists_and_changed_descriptors_have_rows_of_their_own() {
     let (text, _) = place.ends(&format!("{audit} --gate lines2d:5<=100"), 1);
     assert!(text.contains("neighbors by descriptors, the best source, were not tried"), "{text}");
     let document = place.json("unlift-audit/audit.json");
-    let share = |scheme, by| row(&document, scheme, by)["recovered_percent"]["5"].as_f64();
-    let alone = share("lines2d", "sequence@5").unwrap();
+    let share = |scheme, by| recovered(row(&document, scheme, by), "5");
+    let alone = share("lines2d", "sequence@5");
     // These descriptors say nothing about neighbors, so lists must not move what the queries fix.
-    assert!(share("lines2d", "sequence+lists@5").unwrap() >= alone);
-    assert!(share("lines2d_noise0.5", "sequence@5").unwrap() < alone - 20.0);
-    let stderr = place.complains("audit sequence model f.h5 --mitigate thin:1/4", 2);
-    assert!(stderr.contains("expected noise:DEVIATION or drop:SHARE"), "{stderr}");
-    let stderr = place.complains("audit sequence model f.h5 --neighbors oracle", 2);
-    assert!(stderr.contains("expected a source that reads released data"), "{stderr}");
+    assert!(share("lines2d", "sequence+lists@5") >= alone);
+    assert!(share("lines2d_noise0.5", "sequence@5") < alone - 20.0);
+    place.refuses("audit sequence model f.h5", &[
+        ("--mitigate thin:1/4", 2, "expected noise:DEVIATION or drop:SHARE"),
+        ("--neighbors oracle", 2, "expected a source that reads released data"),
+    ]);
 }

@@ -9,7 +9,7 @@ use unlift::descriptors::Values;
 use unlift::obfuscate::SCHEMES;
 use unlift_io::features::{FeatureWriter, ImageFeatures};
 
-use crate::common::{Place, descriptor};
+use crate::common::{Place, descriptor, recovered, row, rows};
 
 const POINTS: usize = 400;
 
@@ -67,10 +67,9 @@ fn the_stages_print_the_row_of_the_audit() {
         let oracle = format!("--inlier-ratios 0.5 --oracle-noise {noise}");
         place.ends(&format!("audit map {map} --schemes {scheme} {oracle}{names} --out a"), 0);
         let audit = place.json("a/audit.json");
-        let rows = audit["results"].as_array().expect("rows");
-        assert_eq!(rows.len(), sources.len(), "{scheme}");
+        assert_eq!(rows(&audit).len(), sources.len(), "{scheme}");
         for source in sources {
-            let row = rows.iter().find(|row| row["neighbors"] == source).expect("a row");
+            let row = row(&audit, scheme, source);
             if source != "oracle" {
                 let find = format!("neighbors hidden/released.npz --neighbors {source}");
                 let (told, _) = place.ends(&format!("{find} --seed 7 --out hidden-lists"), 0);
@@ -121,7 +120,7 @@ fn the_stages_of_images_print_the_row_of_the_audit() {
         let sources = "--inlier-ratios 0.5 --neighbors oracle --neighbors overlap --solver joint";
         let audit = format!("audit images f.h5 --k 10 --seed 7 --schemes {scheme} {sources}");
         place.ends(&format!("{audit} --out a"), 0);
-        for row in place.json("a/audit.json")["results"].as_array().expect("rows") {
+        for row in rows(&place.json("a/audit.json")) {
             let lists = match row["neighbors"].as_str() {
                 Some("oracle") => "oracle --truth hidden/truth.npz --k 10 --inlier-ratios 0.5",
                 _ => "overlap",
@@ -138,14 +137,11 @@ fn the_stages_of_images_print_the_row_of_the_audit() {
         }
     }
     place.ends("obfuscate f.h5 --schemes lines2d --seed 8 --out other", 0);
-    for (line, code, expected) in [
-        ("evaluate back --truth other/truth.npz", 3, "back: fingerprint: expected "),
-        ("obfuscate f.h5 --schemes lines2d --scale 1 --out x", 2, "--scale: expected with a map, found lines2d, which hides images\n"),
-        ("neighbors hidden/released.npz --neighbors geometric", 2, "--neighbors geometric: expected with a map, found images\n"),
-    ] {
-        let stderr = place.complains(line, code);
-        assert!(stderr.starts_with(&format!("unlift: {expected}")), "{stderr}");
-    }
+    place.refuses("", &[
+        ("evaluate back --truth other/truth.npz", 3, "unlift: back: fingerprint: expected "),
+        ("obfuscate f.h5 --schemes lines2d --scale 1 --out x", 2, "unlift: --scale: expected with a map, found lines2d, which hides images\n"),
+        ("neighbors hidden/released.npz --neighbors geometric", 2, "unlift: --neighbors geometric: expected with a map, found images\n"),
+    ]);
 }
 
 #[test]
@@ -164,17 +160,13 @@ fn files_of_another_map_are_refused() {
         let expected = format!("that of the released map of {of}, found ");
         assert!(stderr.starts_with(&format!("unlift: {file}: fingerprint: expected ")), "{stderr}");
         assert!(stderr.contains(&expected) && stderr.lines().count() == 1, "{stderr}");
-        assert!(!place.path("x").exists(), "{line}");
     }
-    let audit = "audit released one/released.npz --k 10 --out x --truth";
-    for (more, code, expected) in [
+    place.refuses("audit released one/released.npz --k 10 --out x --truth", &[
         ("two/truth.npz", 3, "unlift: one/released.npz: fingerprint: expected "),
         ("one/truth.npz --gate olc@1:0.25<=5", 2, "scheme: expected one of released, found olc"),
         ("one/truth.npz --name all", 2, "(not all), found all"),
-    ] {
-        let stderr = place.complains(&format!("{audit} {more}"), code);
-        assert!(stderr.contains(expected) && !place.path("x").exists(), "{stderr}");
-    }
+    ]);
+    assert!(!place.path("x").exists());
 }
 
 /// A release with a mitigation or protected descriptors has the figures of its audit, and `--audit` prints them.
@@ -201,10 +193,9 @@ fn a_release_is_made_as_it_was_audited() {
         let replaces = place.path("r").exists();
         let (told, notes) = place.ends(&format!("{release} --out r"), 0);
         assert_eq!(notes.contains("an earlier release is replaced"), replaces, "{notes}");
-        let row = document["results"].as_array().unwrap().iter().find(|row| row["scheme"] == name);
-        let row = row.unwrap_or_else(|| panic!("{name} in {document}"));
-        let percent = row["recovered_percent"]["0.10"].as_f64().unwrap();
-        let percent = percent.max(row["blind_percent"]["0.10"].as_f64().unwrap());
+        let row = row(&document, name, "similarity");
+        let blind = row["blind_percent"]["0.10"].as_f64().unwrap();
+        let percent = recovered(row, "0.10").max(blind);
         let leak = format!("Today, from the released data alone: {percent:.1} % (");
         assert!(told.starts_with(name) && told.contains("\naudited: "), "{told}");
         assert!(told.contains(&leak), "{leak} in {told}");
@@ -236,16 +227,12 @@ fn schemes_of_ours_stand_beside_given_records() {
                  --out a";
     place.ends(&format!("{audit} --name mine --schemes olc,plane"), 0);
     let document = place.json("a/audit.json");
-    let rows = document["results"].as_array().expect("rows");
-    let percent = |scheme: &str, by: &str| {
-        let row = rows.iter().find(|row| row["scheme"] == scheme && row["neighbors"] == by);
-        row.and_then(|row| row["recovered_percent"]["0.10"].as_f64()).expect("a figure")
-    };
-    assert_eq!(rows.len(), 6, "{rows:?}");
+    let percent = |scheme, by| recovered(row(&document, scheme, by), "0.10");
+    assert_eq!(rows(&document).len(), 6, "{document}");
     for by in ["oracle", "similarity"] {
         let (mine, olc) = (percent("mine", by), percent("olc", by));
         assert!((mine - olc).abs() < 5.0 && percent("plane", by) < mine, "{by}: {mine}, {olc}");
     }
-    let told = place.complains(&format!("{audit} --name olc --schemes olc"), 2);
-    assert!(told.starts_with("unlift: --name: expected another name"), "{told}");
+    let taken = ("--name olc --schemes olc", 2, "unlift: --name: expected another name");
+    place.refuses(audit, &[taken]);
 }

@@ -1,6 +1,6 @@
 //! `unlift table`: the results of audit.json as CSV and LaTeX.
 
-use crate::common::Place;
+use crate::common::{Place, recovered, rows};
 
 #[test]
 #[rustfmt::skip] // One row per line.
@@ -10,13 +10,11 @@ fn the_ending_decides_what_is_written() {
         "audit map room.csv --scale 1 --k 10 --schemes olc,ppl --inlier-ratios 1,0.5 --quiet";
     place.ends(&format!("{audit} --neighbors oracle --neighbors geometric --out a"), 0);
     let document = place.json("a/audit.json");
-    let rows = document["results"].as_array().unwrap();
     let largest = |scheme: &str, ratio: f64, typed: &str| {
-        let of = rows.iter().filter(|row| {
+        let of = rows(&document).iter().filter(|row| {
             row["scheme"] == scheme && row["neighbors"] == "oracle" && row["inlier_ratio"] == ratio
         });
-        let shares = of.filter_map(|row| row["recovered_percent"][typed].as_f64());
-        format!("{:.1}", shares.fold(0.0, f64::max))
+        format!("{:.1}", of.map(|row| recovered(row, typed)).fold(0.0, f64::max))
     };
     let written = |name: &str, more: &str| {
         // A table of unlift is replaced.
@@ -34,20 +32,17 @@ fn the_ending_decides_what_is_written() {
         assert!(tex.contains(expected), "{expected}\n{tex}");
     }
     let csv = written("t.csv", "--thresholds 0.1");
-    assert_eq!(csv.lines().count(), 1 + rows.len());
+    assert_eq!(csv.lines().count(), 1 + rows(&document).len());
     assert!(csv.contains("recovered_percent_within_0.10") && !csv.contains("_0.25"), "{csv}");
     let (text, _) = place.ends("table a/audit.json", 0);
     assert_eq!(text, written("t.csv", ""));
 
     place.write("old.json", r#"{"unlift": "0", "schema": 9}"#);
     place.write("mine.csv", "mine");
-    for (line, code, expected) in [
-        ("a/audit.json --out mine.csv", 2, "--out: mine.csv: expected nothing, or a table of an earlier run"),
-        ("a/audit.json --out t.pdf", 2, "--out: expected a name that ends in .csv or .tex, found t.pdf"),
-        ("a/audit.json --thresholds 0.3", 2, "--thresholds: expected one of 0.10, 0.25, as in the audit, found 0.3"),
-        ("old.json", 3, "old.json: expected schema 1, found 9"),
-    ] {
-        let told = place.complains(&format!("table {line}"), code);
-        assert!(told.starts_with(&format!("unlift: {expected}")), "{told}");
-    }
+    place.refuses("table", &[
+        ("a/audit.json --out mine.csv", 2, "unlift: --out: mine.csv: expected nothing, or a table of an earlier run"),
+        ("a/audit.json --out t.pdf", 2, "unlift: --out: expected a name that ends in .csv or .tex, found t.pdf"),
+        ("a/audit.json --thresholds 0.3", 2, "unlift: --thresholds: expected one of 0.10, 0.25, as in the audit, found 0.3"),
+        ("old.json", 3, "unlift: old.json: expected schema 1, found 9"),
+    ]);
 }

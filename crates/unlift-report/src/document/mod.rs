@@ -22,7 +22,7 @@ use crate::words;
 pub const SCHEMA: u32 = 1;
 
 /// A whole audit: the content of `audit.json`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Document {
     /// Version of the program that wrote the document.
     pub unlift: String,

@@ -41,7 +41,7 @@ impl RowSeconds {
 
 impl Seconds {
     /// Does `work` and adds its time to that of a stage.
-    pub(super) fn time<T>(
+    pub fn time<T>(
         &mut self,
         stage: impl Fn(&mut Self) -> &mut f64,
         work: impl FnOnce() -> T,

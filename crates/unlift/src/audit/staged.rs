@@ -19,13 +19,13 @@ use crate::released::Released;
 use crate::truth::{Original, Secret};
 
 /// Makes lists of `k` records at inlier ratio `ratio`, shorter in an image with too few points.
-/// `seed` comes from [`oracle_seed`].
+/// `seed` is that of a map, or comes from [`oracle_seed`].
 ///
 /// # Errors
-/// When the secret does not belong to these points.
-pub fn oracle_lists(
-    original: &Original<2>,
-    hidden: &(Released<2>, Secret),
+/// When the secret does not belong to these points, or a map has too few of them.
+pub fn oracle_lists<const D: usize>(
+    original: &Original<D>,
+    hidden: &(Released<D>, Secret),
     (noise, ratio, k): (Noise, f64, usize),
     seed: u64,
 ) -> Result<Neighborhoods, Error> {

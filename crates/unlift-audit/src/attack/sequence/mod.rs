@@ -15,7 +15,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde_json::json;
 use unlift::audit::staged::{Pooled, key_of};
-use unlift::audit::{Plan, Row, Seconds};
+use unlift::audit::{Plan, Row};
 use unlift::evaluate::evaluate;
 use unlift::geometry::camera::PoseError;
 use unlift::neighbors::{Neighborhoods, Source, of_what_there_is};
@@ -28,8 +28,8 @@ use unlift::sequence::{Links, Query, Solved, recover, with_lists};
 use unlift::truth::{OriginalId, Secret};
 use unlift_io::hash::hash_files;
 use unlift_io::read;
-use unlift_report::RenderOptions;
-use unlift_report::document::{ImageCounts, Input};
+use unlift_report::Document;
+use unlift_report::document::ImageCounts;
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_vision::pictures::Points;
 
@@ -37,7 +37,7 @@ use self::view::{Model, View};
 use super::names;
 use crate::audit::{Audit, Audited};
 use crate::document::{Attacked, Tried};
-use crate::images::{FeatureSource, evenly};
+use crate::images::{FeatureSource, Opened, evenly};
 use crate::inversion::{Inversion, trusted};
 use crate::maps::released::slot_of;
 use crate::sources::BY_DESCRIPTORS;
@@ -48,9 +48,7 @@ pub struct Sequence<'a> {
     /// The COLMAP project or model with the poses.
     pub model: &'a Path,
     /// The features of the images.
-    pub source: &'a FeatureSource,
-    /// The path of the features as typed.
-    pub path: &'a Path,
+    pub opened: &'a Opened,
     /// The plan: schemes, thresholds and seed count.
     pub plan: Plan<2>,
     /// Makes lists of neighbors within each query, which the attacker combines with the other queries, if wanted.
@@ -77,8 +75,9 @@ const LEAST_VIEWS: usize = 3;
 impl Sequence<'_> {
     /// Attacks the images. Fewer than two with usable features, or fewer than the smallest number of queries, are an error.
     pub(super) fn attack(&self, audit: &Audit, progress: &dyn Progress) -> Result<Audited, Error> {
-        let skipped = &self.source.passed_over;
-        skipped.iter().for_each(|note| progress.say(&format!("note: {note}")));
+        let Opened { source, path, .. } = self.opened;
+        let FeatureSource { passed_over, refused, .. } = source;
+        passed_over.iter().for_each(|note| progress.say(&format!("note: {note}")));
         progress.show(0, 1, "reading images");
         let input = read::open(self.model)?;
         let Some(folder) = &input.model else {
@@ -86,10 +85,10 @@ impl Sequence<'_> {
             return Err(unlift_io::Error::new(self.model, "", expected, input.format).into());
         };
         let pose_error = self.pose_error.map(|error| (error, self.plan.seed));
-        let (mut views, mut unusable) = (Vec::new(), self.source.refused.len());
-        self.source.refused.iter().for_each(|line| progress.say(line));
+        let (mut views, mut unusable) = (Vec::new(), refused.len());
+        refused.iter().for_each(|line| progress.say(line));
         let model = Model::read(folder)?;
-        for view in model.views((self.source, self.path), pose_error) {
+        for view in model.views((source, path), pose_error) {
             match view {
                 Ok(view) => views.push(view),
                 Err(error) => {
@@ -102,9 +101,9 @@ impl Sequence<'_> {
         if views.len() < fewest {
             let expected = format!("at least {fewest} images that are in {}", self.model.display());
             let found = views.len().to_string();
-            return Err(unlift_io::Error::new(self.path, "", expected, found).into());
+            return Err(unlift_io::Error::new(path, "", expected, found).into());
         }
-        let wrong = |(expected, found)| unlift_io::Error::new(self.path, "", expected, found);
+        let wrong = |(expected, found)| unlift_io::Error::new(path, "", expected, found);
         alike(&views, model.n_points()).map_err(wrong)?;
         let mut notes = Vec::new();
         let n_left_out: usize = views.iter().map(|view| view.n_left_out).sum();
@@ -120,10 +119,6 @@ impl Sequence<'_> {
         }
         let tried = self.tried(&queries);
         audit.begin(&tried, None, &notes, progress)?;
-        let mut inversions: Vec<Sheet> = Vec::new();
-        let (rows, seconds) = self.rows(&views, &queries, &mut inversions, progress)?;
-        // Photos that could not be used have no pictures.
-        inversions.retain(|sheet| !sheet.views.is_empty());
         let mut options = names(&tried, audit);
         options.insert("queries".into(), json!(queries));
         options.extend(self.lists.as_ref().map(|by| ("lists".to_owned(), json!(by.name()))));
@@ -131,20 +126,22 @@ impl Sequence<'_> {
             options.insert("pose_error_distance".into(), json!(error.center));
             options.insert("pose_error_angle_deg".into(), json!(error.rotation_degrees));
         }
-        let attacked = Attacked {
-            tried,
-            rows,
-            seconds,
-            about: self.about(&input, &views, unusable)?,
-            options,
-            notes,
-            rendering: RenderOptions { inversions, ..RenderOptions::default() },
-            ..Attacked::default()
+        let counts = ImageCounts {
+            used: views.len() as u64,
+            unusable: unusable as u64,
+            ..ImageCounts::default()
         };
+        let n_points = views.iter().map(|view| view.original.len()).sum();
+        let mut about = self.opened.about(&self.opened.chosen, n_points, counts)?;
+        about.other_sha256.insert("model".to_owned(), hash_files(&input.files)?);
+        let document = Document { input: about, options, notes, ..Document::default() };
+        let mut attacked = Attacked { tried, document, ..Attacked::default() };
+        self.attack_views(&views, &queries, &mut attacked, progress)?;
+        // Photos that could not be used have no pictures.
+        attacked.rendering.inversions.retain(|sheet| !sheet.views.is_empty());
         audit.finish(&self.plan, attacked)
     }
 
-    /// Returns the kinds of links.
     fn kinds(&self) -> impl Iterator<Item = &'static str> {
         [SEQUENCE, TRACKS].into_iter().chain(self.lists.is_some().then_some(WITH_LISTS))
     }
@@ -161,42 +158,22 @@ impl Sequence<'_> {
         }
     }
 
-    fn about(&self, model: &read::Input, views: &[View], unusable: usize) -> Result<Input, Error> {
-        let all: Vec<usize> = (0..self.source.names.len()).collect();
-        let n_points: usize = views.iter().map(|view| view.original.len()).sum();
-        Ok(Input {
-            path: Some(self.path.display().to_string()),
-            sha256: Some(self.source.hash(self.path, &all)?),
-            n_points: n_points as u64,
-            other_sha256: [("model".to_owned(), hash_files(&model.files)?)].into_iter().collect(),
-            images: Some(ImageCounts {
-                found: (self.source.names.len() + self.source.refused.len()) as u64,
-                used: views.len() as u64,
-                unusable: unusable as u64,
-                too_small: 0,
-            }),
-            ..Input::default()
-        })
-    }
-
     /// Hides the views under each scheme and attacks them with each number of queries.
-    fn rows(
+    fn attack_views(
         &self,
         views: &[View],
         queries: &[usize],
-        inversions: &mut Vec<Sheet>,
+        attacked: &mut Attacked,
         progress: &dyn Progress,
-    ) -> Result<(Vec<Row>, Seconds), Error> {
-        let plan = &self.plan;
-        let mut seconds = Seconds::default();
-        let mut rows = Vec::new();
+    ) -> Result<(), Error> {
+        let Attacked { document, seconds, rendering, .. } = attacked;
+        let (plan, rows) = (&self.plan, &mut document.results);
         let reach = queries.iter().copied().max().unwrap_or(0);
         let mut known: Option<(Vec<Secret>, Links)> = None;
         let total = plan.schemes.len() * queries.len() * self.kinds().count();
         for scheme in &plan.schemes {
-            let started = Instant::now();
-            let (protected, secrets) = hide(&**scheme, views, plan.seed)?;
-            seconds.obfuscate += started.elapsed().as_secs_f64();
+            let hide = || hide(&**scheme, views, plan.seed);
+            let (protected, secrets) = seconds.time(|seconds| &mut seconds.obfuscate, hide)?;
             progress.show(rows.len(), total, &format!("{}, linking queries", scheme.name()));
             let started = Instant::now();
             // Links depend on descriptors and cameras only.
@@ -219,10 +196,9 @@ impl Sequence<'_> {
                     check_stop(progress)?;
                     let what = format!("{}, {n} queries, links by {by}", scheme.name());
                     progress.show(rows.len(), total, &what);
-                    let started = Instant::now();
                     let attack = Attack { links, lists, n, seed: plan.seed };
-                    let row = hidden.row(&attack, &tracks, plan)?;
-                    seconds.recover += started.elapsed().as_secs_f64();
+                    let row = || hidden.row(&attack, &tracks, plan);
+                    let row = seconds.time(|seconds| &mut seconds.recover, row)?;
                     let (scheme, neighbors) = (scheme.name().to_owned(), format!("{by}@{n}"));
                     let share = |row: &Row| row.recovered_percent[plan.headline];
                     // Who has more queries can use fewer.
@@ -234,14 +210,14 @@ impl Sequence<'_> {
                     let row = Row { scheme, neighbors, k: n, solver: SOLVER.to_owned(), ..row };
                     let strongest = if combined.is_some() { WITH_LISTS } else { SEQUENCE };
                     if let Some(inversion) = self.inversion.as_ref().filter(|_| by == strongest) {
-                        paint(inversion, (&hidden, &attack), &row, progress, inversions)?;
+                        let sheets = &mut rendering.inversions;
+                        paint(inversion, (&hidden, &attack), &row, progress, sheets)?;
                     }
                     rows.push(row);
                 }
             }
         }
-        seconds.rows = vec![Default::default(); rows.len()];
-        Ok((rows, seconds))
+        Ok(())
     }
 }
 
@@ -339,7 +315,6 @@ impl Share {
 /// point of the service's map. Then links of which the model knows both keypoints.
 type Shares = [Share; 4];
 
-/// The names of the shares of keypoints.
 const NAMES: [&str; 3] = ["linked", "tracked", "new"];
 
 impl Protected<'_> {
