@@ -147,10 +147,8 @@ pub fn by_descriptors(a: &Released<3>, b: &Released<3>) -> Result<Solved, Error>
         |which: &str| Error::new(format!("descriptors of the {which} release"), "some", "none");
     let of_a = a.descriptors().ok_or_else(|| none("first"))?;
     let of_b = b.descriptors().ok_or_else(|| none("second"))?;
-    if of_a.dim() != of_b.dim() {
-        let expected = format!("{} columns, as in the first release", of_a.dim());
-        return Err(Error::new("descriptors", expected, of_b.dim().to_string()));
-    }
+    let rule = " columns, as in the first release";
+    Error::check_len("descriptors", of_b.dim(), of_a.dim(), rule)?;
     let both: Vec<Blocks> = comparable(&[of_a, of_b]).iter().map(|of| Blocks::new(of)).collect();
     let pairs = mutual(&both[0], &both[1]);
     let per_record = [a, b].map(Released::slots_per_record);
@@ -169,17 +167,15 @@ pub fn by_descriptors(a: &Released<3>, b: &Released<3>) -> Result<Solved, Error>
         .collect();
     let usual = shifted.iter().sum::<f64>() / shifted.len().max(1) as f64;
     let usual = usual.max(f64::MIN_POSITIVE);
-    let of_miss = |place: &Place| place.miss.map(|miss| miss / usual);
-    let linked = places.iter().zip(&records).zip(&pairs);
+    let linked = places.into_iter().zip(&records).zip(&pairs);
     let linked = linked.map(|((place, &(_, partner)), &(row, _, ratio))| Linked {
         row: row as usize,
         partner: partner as u32,
-        place: *place,
-        unusual: of_miss(place),
+        place,
+        unusual: place.miss.map(|miss| miss / usual),
         by_descriptor: 0.99 * f64::from(1.0 - ratio.min(1.0)),
     });
-    let linked: Vec<Linked> = linked.collect();
-    solved(a, &linked, usual, RowOrder::DescriptorRows)
+    solved(a, &linked.collect::<Vec<_>>(), usual, RowOrder::DescriptorRows)
 }
 
 /// Recovers the points of `a` from records alone: of two lines that meet within rounding, one belongs to the other. The order of the
@@ -218,15 +214,9 @@ pub fn by_geometry(a: &Released<3>, b: &Released<3>) -> Result<Solved, Error> {
                 continue;
             };
             let axis = if of_a.per_record > 1 { own as usize % 3 } else { 0 };
-            let place = Place::of(&meet, axis);
-            let (row, unusual) = (record * slots[0] + slot, Some(miss / usual));
-            linked.push(Linked {
-                row,
-                partner: partner as u32,
-                place,
-                unusual,
-                by_descriptor: 0.0,
-            });
+            let (row, partner) = (record * slots[0] + slot, partner as u32);
+            let (place, unusual) = (Place::of(&meet, axis), Some(miss / usual));
+            linked.push(Linked { row, partner, place, unusual, by_descriptor: 0.0 });
         }
     }
     let all = near_a.iter().filter_map(|near| near.last()).map(|last| last.miss);
@@ -240,7 +230,7 @@ fn check(a: &Released<3>, b: &Released<3>) -> Result<(), Error> {
         return Err(Error::new("unit of the second release", expected, b.unit().name()));
     }
     match [a, b].map(Released::n_slots).into_iter().find(|&n| n > MOST_ROWS) {
-        Some(n) => Err(Error::new("points", format!("at most {MOST_ROWS}"), n.to_string())),
+        Some(n) => Err(Error::new("points", format!("at most {MOST_ROWS}"), n)),
         None => Ok(()),
     }
 }

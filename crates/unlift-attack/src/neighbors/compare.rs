@@ -248,7 +248,7 @@ fn compare<L: Likeness>(
                 row.count(scores, records, own, L::STEP);
             }
             for (j, (&score, &record)) in scores.iter().zip(records).enumerate() {
-                if score >= row.best.floor() && record != own {
+                if score >= row.best.floor && record != own {
                     row.best.push(score, (b * BLOCK + j) as u32);
                 }
             }
@@ -380,6 +380,7 @@ pub struct Found {
 #[derive(Clone, Debug)]
 pub struct Best {
     n_best: usize,
+    /// Entries with a lower score can no longer be kept.
     floor: f32,
     entries: Vec<(f32, u32)>,
 }
@@ -388,12 +389,6 @@ impl Best {
     /// Keeps at most `n_best` entries.
     pub fn new(n_best: usize) -> Self {
         Self { n_best, floor: f32::NEG_INFINITY, entries: Vec::new() }
-    }
-
-    /// Entries with a lower score can no longer be kept.
-    #[inline(always)]
-    pub fn floor(&self) -> f32 {
-        self.floor
     }
 
     /// Adds an entry; each id at most once.

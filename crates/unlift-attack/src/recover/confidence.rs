@@ -95,10 +95,8 @@ pub(super) fn predict<const D: usize>(
     }
     let of_map = (n_near(&counts) / total(&counts, 2).max(1.0)) as f32;
     let share = |[lists, listed, all]: [f32; 3]| (lists + listed) / all.max(1.0);
-    let center = |slot: usize| match released.obfuscation() {
-        Obfuscation::Rays(rays) => rays.center()[slot],
-        _ => 0,
-    };
+    let rays = released.obfuscation().rays();
+    let center = |slot: usize| rays.map(|rays| rays.center()[slot]);
     let of_slot = |slot: usize| {
         if !estimates[slot].is_known() {
             return Confidence::LOST;

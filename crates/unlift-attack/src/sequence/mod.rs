@@ -268,7 +268,7 @@ impl Links {
         if let Some(at) = described.iter().position(|descriptors| descriptors.dim() != dim) {
             let expected = format!("{dim} columns, as in query 0");
             let what = format!("descriptors of query {at}");
-            return Err(Error::new(what, expected, described[at].dim().to_string()));
+            return Err(Error::new(what, expected, described[at].dim()));
         }
         let described = comparable(&described);
         let blocks: Vec<Blocks> = described.par_iter().map(|rows| Blocks::new(rows)).collect();

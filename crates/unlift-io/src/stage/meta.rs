@@ -82,7 +82,7 @@ impl<'a> Meta<'a> {
     }
 
     pub(super) fn unit(&self) -> Result<Option<Unit>, Error> {
-        self.given("unit", UNITS, |unit| Unit::from_name(unit.as_str()?))
+        self.given("unit", UNITS, |unit| Unit::named(unit.as_str()?))
     }
 
     pub(super) fn wrong_unit(&self) -> Error {

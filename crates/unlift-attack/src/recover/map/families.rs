@@ -13,7 +13,7 @@ use crate::recover::map::grid::Grid;
 use crate::recover::map::lines::{LineRow, MOST_CHANCE, Scratch, evidence, ln, rows_of};
 use crate::recover::map::places::{evenly, trimmed_box, unit};
 use crate::recover::result::{Estimate, Status};
-use crate::released::{AxisPlanes, Obfuscation, Released};
+use crate::released::{AxisPlanes, Released};
 use crate::simd::prefetch;
 
 /// Lines with one or two slots each, or rays, which have a group.
@@ -36,13 +36,8 @@ impl<const D: usize> LineFamily<D> {
         let bounds = released.bounds().map(|bounds| bounds.about(&released.origin()));
         let rows = rows_of(released, bounds.as_ref());
         let chance = chance::of_lines(&rows, lists, slots_per_record);
-        let regions = match released.obfuscation() {
-            Obfuscation::Rays(rays) => rays.regions(),
-            Obfuscation::Lines(_) | Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => {
-                None
-            }
-        };
-        Self { rows, slots_per_record, chance, anchored: regions.is_some() }
+        let anchored = released.obfuscation().rays().is_some_and(|rays| rays.regions().is_some());
+        Self { rows, slots_per_record, chance, anchored }
     }
 
     #[inline(always)]
