@@ -339,8 +339,7 @@ fn solved(
         match position.filter(|position| position.iter().all(|x| x.is_finite())) {
             Some(position) => {
                 let axis = if with_axis { place.axis } else { 0 };
-                let status = Status::Ok;
-                estimates[*row] = Estimate { position, status, support: 2, axis, evidence: 0.0 };
+                estimates[*row] = Estimate::at(position, 2, axis.into(), 0.0);
                 let scale = (noise * place.condition) as f32;
                 confidence[*row] = Confidence { found: (found * place.chosen) as f32, scale };
             }

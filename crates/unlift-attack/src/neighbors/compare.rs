@@ -476,7 +476,7 @@ fn chosen(alike: &[Found]) -> Vec<Tile> {
 mod tests {
     use super::*;
     use crate::descriptors::Values;
-    use crate::neighbors::overlap::Patches;
+    use crate::neighbors::overlap::Hypotheses;
     use crate::neighbors::similarity::Cosine;
     use crate::seed::{Draws, Stage};
 
@@ -518,8 +518,11 @@ mod tests {
             found(likeness, of, 10, exact).concat().into_iter().map(|(score, _)| score).collect()
         }
         assert_eq!(scores(&Cosine, &descriptors, 0), scores(&Cosine, &descriptors, MOST_ROWS));
-        let patches = Patches::of(&descriptors).unwrap();
-        assert_eq!(scores(&patches, &descriptors, 0), scores(&patches, &descriptors, MOST_ROWS));
+        let hypotheses = Hypotheses::of(&descriptors).unwrap();
+        assert_eq!(
+            scores(&hypotheses, &descriptors, 0),
+            scores(&hypotheses, &descriptors, MOST_ROWS)
+        );
     }
 
     #[test]
@@ -543,12 +546,12 @@ mod tests {
     #[test]
     fn usual_scores_are_those_of_all_rows() {
         let descriptors = crowds(6_000, 128);
-        let patches = Patches::of(&descriptors).unwrap();
+        let hypotheses = Hypotheses::of(&descriptors).unwrap();
         let rows = Rows::of_all(&descriptors);
         let all = all_pairs(rows.len());
-        let exact = compare(&patches, &rows, 1, &all, Some(1));
-        let sampled = compare(&patches, &rows, 1, &all, Some(3));
-        let [exact, sampled] = [exact, sampled].map(finished::<Patches>);
+        let exact = compare(&hypotheses, &rows, 1, &all, Some(1));
+        let sampled = compare(&hypotheses, &rows, 1, &all, Some(3));
+        let [exact, sampled] = [exact, sampled].map(finished::<Hypotheses>);
         for (exact, sampled) in exact.iter().zip(&sampled) {
             let off = (exact.mean - sampled.mean).abs() / exact.deviation;
             assert!(off < 0.2, "{off}");

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::compare::Likeness;
-use super::overlap::{Patches, REACHES};
+use super::overlap::{Hypotheses, REACHES};
 use super::similarity::Cosine;
 use crate::simd::BLOCK;
 use crate::{Descriptors, Error};
@@ -37,12 +37,12 @@ pub fn dense(descriptors: &Descriptors, usual: Option<&[(f64, f64)]>) -> Result<
 
 /// Returns `(reaches, n, n)` scores before standardization.
 fn raw(descriptors: &Descriptors) -> Vec<f32> {
-    match Patches::of(descriptors) {
-        Ok(patches) => {
+    match Hypotheses::of(descriptors) {
+        Ok(hypotheses) => {
             let best = |reach: usize, a: &_, b: &_, found: &mut [f32]| {
-                patches.best(a, b, |shift| shift.min(REACHES - 1) == reach, found);
+                hypotheses.best(a, b, |shift| shift.min(REACHES - 1) == reach, found);
             };
-            all_pairs(&patches, descriptors, REACHES, best)
+            all_pairs(&hypotheses, descriptors, REACHES, best)
         }
         Err(_) => all_pairs(&Cosine, descriptors, 1, |_, a, b, found| Cosine.scores(a, b, found)),
     }

@@ -341,14 +341,11 @@ impl<const D: usize> Recovered<D> {
     /// Returns the estimate of `slot` if it is more likely right than wrong.
     pub(crate) fn sure_estimate(&self, slot: usize) -> Option<Estimate<D>> {
         let found = self.confidence()?.get(slot)?.found;
-        (self.status[slot] == Status::Ok && found > 0.5).then(|| Estimate {
-            position: self.position[slot],
-            status: Status::Ok,
-            support: self.support[slot],
-            axis: self.axis().map_or(0, |axis| axis[slot]),
-            // How much likelier right than wrong, in nats.
-            evidence: libm::logf(found / (1.0 - found).max(f32::EPSILON)),
-        })
+        let axis = self.axis().map_or(0, |axis| axis[slot].into());
+        // How much likelier right than wrong, in nats.
+        let evidence = libm::logf(found / (1.0 - found).max(f32::EPSILON));
+        (self.status[slot] == Status::Ok && found > 0.5)
+            .then(|| Estimate::at(self.position[slot], self.support[slot].into(), axis, evidence))
     }
 
     /// Adds the confidence of every slot.

@@ -149,13 +149,11 @@ pub fn recover(
     let is_pair = matches!(own.released.obfuscation(), Obfuscation::AxisCandidates(_));
     let origin = own.released.origin();
     let estimate = |(n_views, fit): &(usize, Option<Fit>)| match fit {
-        Some(fit) => Estimate {
-            position: [0, 1].map(|c| (fit.place[c] - origin[c]) as f32),
-            status: Status::Ok,
-            support: fit.n_agree as u16,
-            axis: if is_pair { 1 - fit.line as u8 } else { 0 },
-            evidence: 0.0,
-        },
+        Some(fit) => {
+            let position = [0, 1].map(|c| (fit.place[c] - origin[c]) as f32);
+            let axis = if is_pair { 1 - fit.line } else { 0 };
+            Estimate::at(position, fit.n_agree as u32, axis, 0.0)
+        }
         None if *n_views < LEAST_VIEWS => Estimate::lost(Status::TooFewNeighbors),
         None => Estimate::lost(Status::NoSupport),
     };

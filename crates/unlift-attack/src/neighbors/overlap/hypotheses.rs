@@ -53,7 +53,7 @@ pub struct Pair {
     pub both_ways: bool,
 }
 
-/// All hypotheses.
+/// All hypotheses. Patches are compared by their best one.
 #[derive(Clone, Debug)]
 pub struct Hypotheses {
     /// All different cells of versions.

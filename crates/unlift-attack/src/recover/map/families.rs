@@ -447,11 +447,6 @@ impl<const D: usize> Family<D> for CandidateFamily<'_, D> {
         f64::max(above, of_flat)
     }
 
-    #[inline(always)]
-    fn prefetch(&self, record: usize) {
-        prefetch(self.rows, record);
-    }
-
     /// Returns the best estimate on any axis line. Axes are compared by evidence, not by counts: along the long axis of an elongated map
     /// more records agree by chance.
     #[inline(always)]
