@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::Neighborhoods;
 use super::compare::higher_first;
-use super::source::{Needs, Source};
+use super::sources::{Needs, Source};
 use crate::density::{Peaks, tomography};
 use crate::geometry::knn::Knn;
 use crate::geometry::vector::{along, distance, dot, sub, widen};
