@@ -431,7 +431,7 @@ pub fn higher_first<T: Ord>(a: &(f32, T), b: &(f32, T)) -> std::cmp::Ordering {
 }
 
 /// Blocks in memory at a time if only some pairs are compared.
-const HELD: usize = 256;
+const HELD: u32 = 256;
 
 /// Pairs of blocks with a range of blocks, which stay in memory meanwhile.
 struct Tile {
@@ -451,27 +451,21 @@ fn all_pairs(n_rows: usize) -> Vec<Tile> {
 
 /// Returns the pairs of every block with itself and with the most similar blocks.
 fn chosen(alike: &[Found]) -> Vec<Tile> {
-    let n = alike.len();
-    // Each pair is stored under its lower index.
-    let mut pairs: Vec<BTreeSet<u32>> =
-        (0..n as u32).map(|block| BTreeSet::from([block])).collect();
-    for (block, found) in alike.iter().enumerate() {
-        for &(_, other) in &found.best {
-            let other = other as usize;
-            pairs[block.min(other)].insert(block.max(other) as u32);
-        }
+    let n = alike.len() as u32;
+    // Each pair has its lower index first.
+    let mut pairs: BTreeSet<(u32, u32)> = (0..n).map(|block| (block, block)).collect();
+    for (block, found) in (0..n).zip(alike) {
+        pairs.extend(found.best.iter().map(|&(_, other)| (block.min(other), block.max(other))));
     }
-    let tiles = (0..n).step_by(HELD).map(|first| {
-        let held = first..(first + HELD).min(n);
+    let tile = |first: u32| {
+        let end = (first + HELD).min(n);
         let mut meetings: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        for a in held.clone() {
-            for &b in &pairs[a] {
-                meetings.entry(b).or_default().push(a as u32);
-            }
+        for &(a, b) in pairs.range((first, 0)..(end, 0)) {
+            meetings.entry(b).or_default().push(a);
         }
-        Tile { held, meetings: meetings.into_iter().collect() }
-    });
-    tiles.collect()
+        Tile { held: first as usize..end as usize, meetings: meetings.into_iter().collect() }
+    };
+    (0..n).step_by(HELD as usize).map(tile).collect()
 }
 
 // Similar blocks of a large map.
