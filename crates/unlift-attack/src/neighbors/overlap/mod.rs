@@ -194,21 +194,14 @@ fn starts(versions: &[Version]) -> Vec<usize> {
 
 /// Returns the gradient histogram behind a RootSIFT descriptor: the squares of its values, with sum 1.
 fn squares(descriptors: &Descriptors, slot: usize) -> [[f32; BINS]; CELLS] {
-    let range = slot * DIM..(slot + 1) * DIM;
-    let mut squares = [0.0f32; DIM];
-    match descriptors.values() {
-        Values::U8(v) => {
-            for (square, &x) in squares.iter_mut().zip(&v[range]) {
-                *square = f32::from(x) * f32::from(x);
-            }
-        }
-        Values::F32(v) => {
-            let largest = v[range.clone()].iter().copied().fold(f32::MIN_POSITIVE, f32::max);
-            for (square, &x) in squares.iter_mut().zip(&v[range]) {
-                *square = (x / largest) * (x / largest);
-            }
-        }
-    }
+    let mut row = [0.0f32; DIM];
+    descriptors.read_row(slot, &mut row);
+    // Squares of floats may exceed their range.
+    let unit = match descriptors.values() {
+        Values::U8(_) => 1.0,
+        Values::F32(_) => row.into_iter().fold(f32::MIN_POSITIVE, f32::max),
+    };
+    let squares = row.map(|x| (x / unit) * (x / unit));
     let sum: f32 = squares.iter().sum::<f32>().max(f32::MIN_POSITIVE);
     std::array::from_fn(|cell| std::array::from_fn(|bin| squares[cell * BINS + bin] / sum))
 }
