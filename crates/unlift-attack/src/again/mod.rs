@@ -260,40 +260,33 @@ fn places([a, b]: &[Flats; 2], records: &[(usize, usize)]) -> Vec<Place> {
         quantile_of(of_axis.map(|plane| plane.1), 0.5)
     });
     let same = same_coordinate(a, b, records).max(rounding);
-    let place = |&(own, other): &(usize, usize)| {
-        match (a.planes.get(own), b.planes.get(other)) {
-            (None, None) => {
-                let nearest = meet::nearest(a.of(own), b.of(other));
-                let axis = |line: usize| if a.per_record > 1 { line } else { 0 };
-                nearest.map_or(Place::NONE, |(line, meet)| Place::of(&meet, axis(line)))
-            }
-            (Some(&(axis, at)), Some(&(other_axis, other_at))) => {
-                let mut point = middle;
+    let on_plane = |&(axis, at): &(usize, f64), of: &Flats, record: usize| {
+        match of.swapped.get(record) {
+            // If the coordinates agree, one of the other two is wrong.
+            Some(p) if (p[axis] - at).abs() <= same => Place::guess(*p, (axis + 1) % 3),
+            Some(p) => {
+                let mut point = *p;
                 point[axis] = at;
-                point[other_axis] = if axis == other_axis { at } else { other_at };
-                Place::guess(point, 0)
+                Place::at(point, axis)
             }
-            (plane, other_plane) => {
-                let Some(&(axis, at)) = plane.or(other_plane) else { return Place::NONE };
-                let (lines, swapped) = match plane {
-                    Some(_) => (b.of(other), b.swapped.get(other)),
-                    None => (a.of(own), a.swapped.get(own)),
-                };
-                match swapped {
-                    Some(p) => {
-                        let mut point = *p;
-                        point[axis] = at;
-                        // If the coordinates agree, one of the other two is wrong.
-                        match (p[axis] - at).abs() <= same {
-                            true => Place::guess(*p, (axis + 1) % 3),
-                            false => Place::at(point, axis),
-                        }
-                    }
-                    None => lines[0].cross(axis, at).map_or(Place::NONE, |(point, condition)| {
-                        Place { condition, ..Place::at(point, 0) }
-                    }),
-                }
-            }
+            None => of.of(record)[0].cross(axis, at).map_or(Place::NONE, |(point, condition)| {
+                Place { condition, ..Place::at(point, 0) }
+            }),
+        }
+    };
+    let place = |&(own, other): &(usize, usize)| match (a.planes.get(own), b.planes.get(other)) {
+        (None, None) => {
+            let nearest = meet::nearest(a.of(own), b.of(other));
+            let axis = |line: usize| if a.per_record > 1 { line } else { 0 };
+            nearest.map_or(Place::NONE, |(line, meet)| Place::of(&meet, axis(line)))
+        }
+        (Some(plane), None) => on_plane(plane, b, other),
+        (None, Some(plane)) => on_plane(plane, a, own),
+        (Some(&(axis, at)), Some(&(other_axis, other_at))) => {
+            let mut point = middle;
+            point[other_axis] = other_at;
+            point[axis] = at;
+            Place::guess(point, 0)
         }
     };
     records.iter().map(place).collect()
