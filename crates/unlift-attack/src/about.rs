@@ -28,7 +28,7 @@ impl Fingerprint {
             None => Ok(()),
             Some(other) => {
                 let expected = format!("{self}, that of the released map");
-                Err(Error::new("fingerprint", expected, other.to_string()))
+                Err(Error::new("fingerprint", expected, other))
             }
         }
     }

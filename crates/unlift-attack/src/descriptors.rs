@@ -38,31 +38,22 @@ impl Descriptors {
         }
         if dim > MOST_COLUMNS {
             let expected = format!("at most {MOST_COLUMNS} values each");
-            return Err(Error::new("descriptors", expected, dim.to_string()));
+            return Err(Error::new("descriptors", expected, dim));
         }
         if let Values::F32(v) = &values
             && let Some(at) = v.iter().position(|x| !x.is_finite())
         {
             let what = format!("descriptor {}, value {}", at / dim, at % dim);
-            return Err(Error::new(what, "a finite value", v[at].to_string()));
+            return Err(Error::new(what, "a finite value", v[at]));
         }
-        let (zero, constant) = match &values {
-            Values::U8(v) => (v.iter().all(|&x| x == 0), v.chunks(dim).all(|row| *row == v[..dim])),
-            Values::F32(v) => {
-                (v.iter().all(|&x| x == 0.0), v.chunks(dim).all(|row| *row == v[..dim]))
-            }
+        let dummies = match &values {
+            Values::U8(v) => dummies(v, dim),
+            Values::F32(v) => dummies(v, dim),
         };
-        if len > 0 && zero {
-            return Err(Error::new("descriptors", "real descriptors", "only zeros (dummies)"));
+        match dummies {
+            Some(found) => Err(Error::new("descriptors", "real descriptors", found)),
+            None => Ok(Self { values, dim }),
         }
-        if len > dim && constant {
-            return Err(Error::new(
-                "descriptors",
-                "real descriptors",
-                "the same row for every point (dummies)",
-            ));
-        }
-        Ok(Self { values, dim })
     }
 
     /// Creates a matrix from values that are known to be finite and to fill its rows.
@@ -152,4 +143,13 @@ impl Descriptors {
             }
         }
     }
+}
+
+/// Returns what is wrong with values that some exporters write in place of descriptors.
+fn dummies<T: Default + PartialEq>(values: &[T], dim: usize) -> Option<&'static str> {
+    if !values.is_empty() && values.iter().all(|x| *x == T::default()) {
+        return Some("only zeros (dummies)");
+    }
+    let is_constant = values.len() > dim && values.chunks(dim).all(|row| *row == values[..dim]);
+    is_constant.then_some("the same row for every point (dummies)")
 }

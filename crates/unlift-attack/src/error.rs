@@ -31,13 +31,20 @@ pub struct Error {
 
 impl Error {
     /// Creates an error about `what` (a field, an option, a row), with the rule and the value that breaks it.
-    pub fn new(
-        what: impl Into<String>,
-        expected: impl Into<String>,
-        found: impl Into<String>,
-    ) -> Self {
+    pub fn new(what: impl Into<String>, expected: impl Into<String>, found: impl ToString) -> Self {
         let kind = ErrorKind::Invalid;
-        Self { kind, what: what.into(), expected: expected.into(), found: found.into() }
+        Self { kind, what: what.into(), expected: expected.into(), found: found.to_string() }
+    }
+
+    /// Rejects a number of rows other than `expected`; `rule` follows this number in the message, as in ` rows, one per slot`.
+    ///
+    /// # Errors
+    /// When `found` is another number.
+    pub fn check_len(what: &str, found: usize, expected: usize, rule: &str) -> Result<(), Self> {
+        match found == expected {
+            true => Ok(()),
+            false => Err(Self::new(what, format!("{expected}{rule}"), found)),
+        }
     }
 
     /// Sets the kind.

@@ -39,6 +39,7 @@ mod density;
 pub mod descriptors;
 mod error;
 pub mod geometry;
+mod named;
 pub mod neighbors;
 pub mod points;
 pub mod protected;

@@ -1,32 +1,18 @@
 //! Sets of points with a unit, and the index of a record.
 
-use crate::Error;
+use crate::{Error, named};
 
-/// What one unit of a coordinate means.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Unit {
-    /// Meters: the owner declared a scale.
-    Meter,
-    /// Pixels of an image.
-    Pixel,
-    /// The map's median distance to the K-th neighbor: the unit of maps without a declared scale.
-    #[default]
-    KthNeighbor,
-}
-
-impl Unit {
-    /// Name in files and reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Unit::Meter => "m",
-            Unit::Pixel => "px",
-            Unit::KthNeighbor => "kth_neighbor",
-        }
-    }
-
-    /// Returns the unit called `name`, if there is one.
-    pub fn from_name(name: &str) -> Option<Self> {
-        [Unit::Meter, Unit::Pixel, Unit::KthNeighbor].into_iter().find(|unit| unit.name() == name)
+named! {
+    /// What one unit of a coordinate means.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum Unit {
+        /// Meters: the owner declared a scale.
+        Meter = "m",
+        /// Pixels of an image.
+        Pixel = "px",
+        /// The map's median distance to the K-th neighbor: the unit of maps without a declared scale.
+        #[default]
+        KthNeighbor = "kth_neighbor",
     }
 }
 
@@ -47,7 +33,7 @@ impl<const D: usize> PointSet<D> {
     pub fn try_new(positions: Vec<[f64; D]>, unit: Unit) -> Result<Self, Error> {
         let () = Self::DIMENSION_IS_2_OR_3;
         if positions.len() > i32::MAX as usize {
-            return Err(Error::new("points", "fewer than 2^31", positions.len().to_string()));
+            return Err(Error::new("points", "fewer than 2^31", positions.len()));
         }
         if let Some(row) = positions.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
             let found = format!("{:?}", positions[row]);

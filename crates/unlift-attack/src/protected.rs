@@ -67,9 +67,8 @@ impl ProtectedDescriptors {
         public: Option<Arc<Descriptors>>,
         bytes: bool,
     ) -> Result<Self, Error> {
-        let wrong = |expected: String, found: usize| {
-            Error::new("protected descriptors", expected, found.to_string())
-        };
+        let wrong =
+            |expected: String, found: usize| Error::new("protected descriptors", expected, found);
         let (Rule::Subspace { m } | Rule::Words { m, .. }) = rule;
         let least = if matches!(rule, Rule::Words { .. }) { m } else { m + 1 };
         let width = rows.first().map_or(least, Vec::len);
@@ -157,13 +156,7 @@ impl ProtectedDescriptors {
     /// Returns the similarity of every row to a plain unit-length descriptor: 1 minus half of the squared distance to the subspace, or
     /// the largest cosine with a word of the set. Both are at most 1, as a cosine.
     pub fn similarities(&self, plain: &[f32]) -> Vec<f32> {
-        let Values::F32(rows) = self.rows.values() else { return vec![0.0; self.len()] };
-        let words = match self.public.as_deref().map(Descriptors::values) {
-            Some(Values::F32(words)) => &words[..],
-            _ => &[],
-        };
-        let width = self.rows.dim();
-        simd::dispatch(Similarities { rule: self.rule, rows, width, words, plain })
+        simd::dispatch(Similarities { protected: self, plain })
     }
 
     /// Returns the plain descriptors that an attacker infers, in the scale of the plain ones. A row is one point of its subspace, or the
@@ -209,11 +202,16 @@ impl ProtectedDescriptors {
 
 /// The loop of [`ProtectedDescriptors::similarities`]. Public descriptors have unit length.
 struct Similarities<'a> {
-    rule: Rule,
-    rows: &'a [f32],
-    width: usize,
-    words: &'a [f32],
+    protected: &'a ProtectedDescriptors,
     plain: &'a [f32],
+}
+
+/// Returns the values of released rows or of public descriptors, which are floats.
+fn floats(descriptors: &Descriptors) -> &[f32] {
+    match descriptors.values() {
+        Values::F32(values) => values,
+        Values::U8(_) => &[],
+    }
 }
 
 impl Kernel for Similarities<'_> {
@@ -221,10 +219,11 @@ impl Kernel for Similarities<'_> {
 
     #[inline(always)]
     fn run(self) -> Vec<f32> {
-        let (dim, plain) = (self.plain.len(), self.plain);
-        let rows = self.rows.chunks_exact(self.width);
+        let Self { protected: ProtectedDescriptors { rule, rows, public, .. }, plain } = self;
+        let dim = plain.len();
+        let rows = floats(rows).chunks_exact(rows.dim());
         let mut similar = Vec::with_capacity(rows.len());
-        match self.rule {
+        match rule {
             Rule::Subspace { .. } => {
                 let square = inner(plain, plain);
                 for row in rows {
@@ -238,8 +237,9 @@ impl Kernel for Similarities<'_> {
                 }
             }
             Rule::Words { .. } => {
-                let mut to_words = Vec::with_capacity(self.words.len() / dim.max(1));
-                for word in self.words.chunks_exact(dim) {
+                let words = public.as_deref().map_or(&[][..], floats);
+                let mut to_words = Vec::with_capacity(words.len() / dim.max(1));
+                for word in words.chunks_exact(dim) {
                     to_words.push(inner(word, plain));
                 }
                 for row in rows {

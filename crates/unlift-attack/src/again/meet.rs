@@ -85,7 +85,7 @@ pub(super) struct Near {
 
 /// Returns the [`KEPT`] lines of `others` that pass each record of `per_record` lines most closely, nearest first.
 pub(super) fn search(lines: &[Line], per_record: usize, others: &[Line]) -> Vec<Vec<Near>> {
-    let columns = Columns::new(others);
+    let columns = columns(others);
     let of_record = |(record, own): (usize, &[Line])| {
         let mut near: Vec<Near> = Vec::with_capacity(KEPT + 1);
         for (at, line) in own.iter().enumerate() {
@@ -97,22 +97,14 @@ pub(super) fn search(lines: &[Line], per_record: usize, others: &[Line]) -> Vec<
     lines.par_chunks(per_record).enumerate().map(of_record).collect()
 }
 
-/// Points and directions in columns, filled up with lines that pass far away.
-struct Columns([Vec<f64>; 6]);
-
-impl Columns {
-    fn new(lines: &[Line]) -> Self {
-        let n = lines.len().next_multiple_of(LANES);
-        let column = |value: &dyn Fn(&Line) -> f64| {
-            let mut column: Vec<f64> = lines.iter().map(value).collect();
-            column.resize(n, f64::NAN);
-            column
-        };
-        Self(std::array::from_fn(|c| match c {
-            0..3 => column(&|line| line.point[c]),
-            _ => column(&|line| line.direction[c - 3]),
-        }))
-    }
+/// Returns points and directions in columns, filled up with lines that pass far away.
+fn columns(lines: &[Line]) -> [Vec<f64>; 6] {
+    std::array::from_fn(|c| {
+        let value = |line: &Line| if c < 3 { line.point[c] } else { line.direction[c - 3] };
+        let mut column: Vec<f64> = lines.iter().map(value).collect();
+        column.resize(lines.len().next_multiple_of(LANES), f64::NAN);
+        column
+    })
 }
 
 /// Compares one line with all others.
@@ -120,7 +112,7 @@ struct Pass<'a> {
     line: Line,
     own: u32,
     others: &'a [Line],
-    columns: &'a Columns,
+    columns: &'a [Vec<f64>; 6],
     near: &'a mut Vec<Near>,
 }
 
@@ -129,7 +121,7 @@ impl Kernel for Pass<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let Self { line, own, others, columns: Columns(columns), near } = self;
+        let Self { line, own, others, columns, near } = self;
         let ([px, py, pz], [dx, dy, dz]) = (line.point, line.direction);
         let mut limit2 = limit2(near);
         for first in (0..columns[0].len()).step_by(LANES) {

@@ -147,10 +147,8 @@ pub fn by_descriptors(a: &Released<3>, b: &Released<3>) -> Result<Solved, Error>
         |which: &str| Error::new(format!("descriptors of the {which} release"), "some", "none");
     let of_a = a.descriptors().ok_or_else(|| none("first"))?;
     let of_b = b.descriptors().ok_or_else(|| none("second"))?;
-    if of_a.dim() != of_b.dim() {
-        let expected = format!("{} columns, as in the first release", of_a.dim());
-        return Err(Error::new("descriptors", expected, of_b.dim().to_string()));
-    }
+    let rule = " columns, as in the first release";
+    Error::check_len("descriptors", of_b.dim(), of_a.dim(), rule)?;
     let both: Vec<Blocks> = comparable(&[of_a, of_b]).iter().map(|of| Blocks::new(of)).collect();
     let pairs = mutual(&both[0], &both[1]);
     let per_record = [a, b].map(Released::slots_per_record);
@@ -169,17 +167,15 @@ pub fn by_descriptors(a: &Released<3>, b: &Released<3>) -> Result<Solved, Error>
         .collect();
     let usual = shifted.iter().sum::<f64>() / shifted.len().max(1) as f64;
     let usual = usual.max(f64::MIN_POSITIVE);
-    let of_miss = |place: &Place| place.miss.map(|miss| miss / usual);
-    let linked = places.iter().zip(&records).zip(&pairs);
+    let linked = places.into_iter().zip(&records).zip(&pairs);
     let linked = linked.map(|((place, &(_, partner)), &(row, _, ratio))| Linked {
         row: row as usize,
         partner: partner as u32,
-        place: *place,
-        unusual: of_miss(place),
+        place,
+        unusual: place.miss.map(|miss| miss / usual),
         by_descriptor: 0.99 * f64::from(1.0 - ratio.min(1.0)),
     });
-    let linked: Vec<Linked> = linked.collect();
-    solved(a, &linked, usual, RowOrder::DescriptorRows)
+    solved(a, &linked.collect::<Vec<_>>(), usual, RowOrder::DescriptorRows)
 }
 
 /// Recovers the points of `a` from records alone: of two lines that meet within rounding, one belongs to the other. The order of the
@@ -218,15 +214,9 @@ pub fn by_geometry(a: &Released<3>, b: &Released<3>) -> Result<Solved, Error> {
                 continue;
             };
             let axis = if of_a.per_record > 1 { own as usize % 3 } else { 0 };
-            let place = Place::of(&meet, axis);
-            let (row, unusual) = (record * slots[0] + slot, Some(miss / usual));
-            linked.push(Linked {
-                row,
-                partner: partner as u32,
-                place,
-                unusual,
-                by_descriptor: 0.0,
-            });
+            let (row, partner) = (record * slots[0] + slot, partner as u32);
+            let (place, unusual) = (Place::of(&meet, axis), Some(miss / usual));
+            linked.push(Linked { row, partner, place, unusual, by_descriptor: 0.0 });
         }
     }
     let all = near_a.iter().filter_map(|near| near.last()).map(|last| last.miss);
@@ -240,7 +230,7 @@ fn check(a: &Released<3>, b: &Released<3>) -> Result<(), Error> {
         return Err(Error::new("unit of the second release", expected, b.unit().name()));
     }
     match [a, b].map(Released::n_slots).into_iter().find(|&n| n > MOST_ROWS) {
-        Some(n) => Err(Error::new("points", format!("at most {MOST_ROWS}"), n.to_string())),
+        Some(n) => Err(Error::new("points", format!("at most {MOST_ROWS}"), n)),
         None => Ok(()),
     }
 }
@@ -270,40 +260,33 @@ fn places([a, b]: &[Flats; 2], records: &[(usize, usize)]) -> Vec<Place> {
         quantile_of(of_axis.map(|plane| plane.1), 0.5)
     });
     let same = same_coordinate(a, b, records).max(rounding);
-    let place = |&(own, other): &(usize, usize)| {
-        match (a.planes.get(own), b.planes.get(other)) {
-            (None, None) => {
-                let nearest = meet::nearest(a.of(own), b.of(other));
-                let axis = |line: usize| if a.per_record > 1 { line } else { 0 };
-                nearest.map_or(Place::NONE, |(line, meet)| Place::of(&meet, axis(line)))
-            }
-            (Some(&(axis, at)), Some(&(other_axis, other_at))) => {
-                let mut point = middle;
+    let on_plane = |&(axis, at): &(usize, f64), of: &Flats, record: usize| {
+        match of.swapped.get(record) {
+            // If the coordinates agree, one of the other two is wrong.
+            Some(p) if (p[axis] - at).abs() <= same => Place::guess(*p, (axis + 1) % 3),
+            Some(p) => {
+                let mut point = *p;
                 point[axis] = at;
-                point[other_axis] = if axis == other_axis { at } else { other_at };
-                Place::guess(point, 0)
+                Place::at(point, axis)
             }
-            (plane, other_plane) => {
-                let Some(&(axis, at)) = plane.or(other_plane) else { return Place::NONE };
-                let (lines, swapped) = match plane {
-                    Some(_) => (b.of(other), b.swapped.get(other)),
-                    None => (a.of(own), a.swapped.get(own)),
-                };
-                match swapped {
-                    Some(p) => {
-                        let mut point = *p;
-                        point[axis] = at;
-                        // If the coordinates agree, one of the other two is wrong.
-                        match (p[axis] - at).abs() <= same {
-                            true => Place::guess(*p, (axis + 1) % 3),
-                            false => Place::at(point, axis),
-                        }
-                    }
-                    None => lines[0].cross(axis, at).map_or(Place::NONE, |(point, condition)| {
-                        Place { condition, ..Place::at(point, 0) }
-                    }),
-                }
-            }
+            None => of.of(record)[0].cross(axis, at).map_or(Place::NONE, |(point, condition)| {
+                Place { condition, ..Place::at(point, 0) }
+            }),
+        }
+    };
+    let place = |&(own, other): &(usize, usize)| match (a.planes.get(own), b.planes.get(other)) {
+        (None, None) => {
+            let nearest = meet::nearest(a.of(own), b.of(other));
+            let axis = |line: usize| if a.per_record > 1 { line } else { 0 };
+            nearest.map_or(Place::NONE, |(line, meet)| Place::of(&meet, axis(line)))
+        }
+        (Some(plane), None) => on_plane(plane, b, other),
+        (None, Some(plane)) => on_plane(plane, a, own),
+        (Some(&(axis, at)), Some(&(other_axis, other_at))) => {
+            let mut point = middle;
+            point[other_axis] = other_at;
+            point[axis] = at;
+            Place::guess(point, 0)
         }
     };
     records.iter().map(place).collect()
@@ -349,8 +332,7 @@ fn solved(
         match position.filter(|position| position.iter().all(|x| x.is_finite())) {
             Some(position) => {
                 let axis = if with_axis { place.axis } else { 0 };
-                let status = Status::Ok;
-                estimates[*row] = Estimate { position, status, support: 2, axis, evidence: 0.0 };
+                estimates[*row] = Estimate::at(position, 2, axis.into(), 0.0);
                 let scale = (noise * place.condition) as f32;
                 confidence[*row] = Confidence { found: (found * place.chosen) as f32, scale };
             }

@@ -39,20 +39,14 @@ impl Feasible {
     pub(crate) fn new<const D: usize>(released: &Released<D>) -> Option<Self> {
         let released: &Released<3> = (released as &dyn Any).downcast_ref()?;
         let line = |row: LineRow<3>| LineRow { to: f32::INFINITY, ..row };
-        let mut feasible = Self {
-            hides: Hides::One,
-            lines: rows_of(released, None).into_iter().map(line).collect(),
-            prior: Vec::new(),
-            per_record: 1,
-            n_groups: 0,
-        };
-        match released.obfuscation() {
-            Obfuscation::Lines(_) if released.slots_per_record() == 2 => {
-                feasible.hides = Hides::Two;
-            }
-            Obfuscation::Lines(_) => {}
+        let mut lines: Vec<_> = rows_of(released, None).into_iter().map(line).collect();
+        let (mut prior, mut n_groups) = (Vec::new(), 0);
+        let hides = match released.obfuscation() {
+            Obfuscation::Lines(_) if released.slots_per_record() == 2 => Hides::Two,
+            Obfuscation::Lines(_) => Hides::One,
             Obfuscation::Rays(rays) => {
-                (feasible.hides, feasible.n_groups) = (Hides::OnRay, rays.centers().len());
+                n_groups = rays.centers().len();
+                Hides::OnRay
             }
             Obfuscation::AxisPlanes(_) => return None,
             Obfuscation::AxisCandidates(candidates) => {
@@ -63,14 +57,15 @@ impl Feasible {
                         let (mut through, direction) = (position, unit(axis));
                         through[axis] = 0.0;
                         let (group, to) = (NO_GROUP, f32::INFINITY);
-                        feasible.lines.push(LineRow { through, direction, group, to });
-                        feasible.prior.push(common[axis][row]);
+                        lines.push(LineRow { through, direction, group, to });
+                        prior.push(common[axis][row]);
                     }
                 }
-                (feasible.hides, feasible.per_record) = (Hides::OnAxis, 3);
+                Hides::OnAxis
             }
-        }
-        Some(feasible)
+        };
+        let per_record = if hides == Hides::OnAxis { 3 } else { 1 };
+        Some(Self { hides, lines, prior, per_record, n_groups })
     }
 
     /// Number of records.

@@ -45,34 +45,19 @@ impl Grid<3> {
         let mut finer = Self::even(low, cell, dims, 0.0);
         // Per axis and voxel: the lower of the two coarse voxels, and the weight of the upper one.
         let places: [Vec<(usize, f32)>; 3] = std::array::from_fn(|c| {
-            let place = |i: usize| {
-                let x = (low[c] + (i as f32 + 0.5) * cell - self.low[c]) / self.cell - 0.5;
-                let x = x.clamp(0.0, self.last[c]);
-                (x as usize, x - x.floor())
-            };
+            let place = |i: usize| self.lower(c, low[c] + (i as f32 + 0.5) * cell);
             (0..dims[c]).map(place).collect()
         });
         finer.values.par_chunks_mut(dims[2]).enumerate().for_each(|(row, out)| {
             let [x, y] = [places[0][row / dims[1]], places[1][row % dims[1]]];
             for (out, &z) in out.iter_mut().zip(&places[2]) {
-                *out = self.interpolate([x, y, z]);
+                for corner in 0..8 {
+                    let (at, share) = self.corner(corner, &[x, y, z], 1.0);
+                    *out += share * self.values[at];
+                }
             }
         });
         finer
-    }
-
-    fn interpolate(&self, corner: [(usize, f32); 3]) -> f32 {
-        let mut sum = 0.0;
-        for choice in 0..8 {
-            let (mut weight, mut at) = (1.0, 0);
-            for (c, &(low, share)) in corner.iter().enumerate() {
-                let upper = choice >> c & 1 == 1;
-                weight *= if upper { share } else { 1.0 - share };
-                at = at * self.dims[c] + (low + usize::from(upper)).min(self.dims[c] - 1);
-            }
-            sum += weight * self.values[at];
-        }
-        sum
     }
 
     /// Returns the box that leaves the fraction `q` of the mass beyond each wall, extended by a voxel.

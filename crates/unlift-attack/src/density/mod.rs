@@ -23,28 +23,18 @@ mod grid;
 pub(crate) mod peaks;
 mod spread;
 
+use crate::recover::Estimate;
 use crate::recover::map::Grid;
 use crate::released::Released;
 use feasible::{Feasible, Hides};
 use peaks::find;
 use spread::Spread;
 
-/// The estimate of an attack for one slot.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Peak {
-    /// Position relative to the released origin.
-    pub(crate) position: [f32; 3],
-    /// Axis along which the position was found (axis candidates; else 0).
-    pub(crate) axis: u8,
-    /// Logarithm of the likelihood ratio of the position to a uniformly random one on the record, in nats.
-    pub(crate) evidence: f32,
-}
-
-/// The result of an attack: one entry per slot, `None` without an estimate. The two peaks of a paired line are in order along the line,
-/// because it is unknown which slot each belongs to.
+/// The result of an attack: one estimate per slot, if there is one. Its evidence is the logarithm of the likelihood ratio of the place to a
+/// uniformly random one on the record. The two peaks of a paired line are in order along the line, because it is unknown which slot each belongs to.
 #[derive(Clone, Debug)]
 pub(crate) struct Peaks {
-    pub(crate) of: Vec<Option<Peak>>,
+    pub(crate) of: Vec<Option<Estimate<3>>>,
     /// Smallest distance at which positions differ, in the unit of the map; 0 without peaks.
     pub(crate) resolution: f64,
 }

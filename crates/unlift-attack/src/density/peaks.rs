@@ -4,9 +4,10 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use super::Peaks;
 use super::feasible::Hides;
 use super::spread::Spread;
-use super::{Peak, Peaks};
+use crate::recover::Estimate;
 use crate::recover::map::LineRow;
 
 /// Samples to either side that count as the same place, about as many as smoothing reaches.
@@ -16,7 +17,7 @@ const REACH: usize = 2;
 pub(super) fn find(spread: &Spread<'_>) -> Peaks {
     let feasible = spread.feasible;
     let slots = if feasible.hides == Hides::Two { 2 } else { 1 };
-    let mut of: Vec<Option<Peak>> = vec![None; slots * feasible.n_records()];
+    let mut of: Vec<Option<Estimate<3>>> = vec![None; slots * feasible.n_records()];
     of.par_chunks_mut(slots).enumerate().for_each_init(
         || (Vec::new(), Vec::new()),
         |(view, windows), (record, out)| {
@@ -43,7 +44,7 @@ fn best(
     lines: Range<usize>,
     view: &[f32],
     windows: &mut Vec<Window>,
-) -> Option<Peak> {
+) -> Option<Estimate<3>> {
     let total = view.iter().sum();
     let mut found: Option<(Window, usize)> = None;
     let mut begin = 0;
@@ -119,10 +120,10 @@ fn peak(
     axis: usize,
     total: f32,
     n_samples: usize,
-) -> Option<Peak> {
+) -> Option<Estimate<3>> {
     let position = line.at(window.t);
     let blind = (2 * REACH + 1) as f32 / n_samples as f32;
     let evidence = libm::logf(window.likelihood / total / blind).max(0.0);
     let sound = evidence.is_finite() && position.iter().all(|x| x.is_finite());
-    sound.then_some(Peak { position, axis: axis as u8, evidence })
+    sound.then(|| Estimate::at(position, 0, axis, evidence))
 }

@@ -87,10 +87,11 @@ impl<'a> Spread<'a> {
         let this = &*self;
         rows.into_par_iter().enumerate().for_each_init(Vec::new, |view, (record, row)| {
             this.view(record, row, view);
+            let mut points = 1.0;
             if this.feasible.hides == Hides::Two {
                 this.pair_up(record, view);
+                points = 2.0;
             }
-            let points = if this.feasible.hides == Hides::Two { 2.0 } else { 1.0 };
             let total: f64 = view.iter().map(|&x| f64::from(x)).sum();
             let factor = if total > 0.0 { (points / total) as f32 } else { 0.0 };
             for (weight, &likelihood) in row.iter_mut().zip(view.iter()) {

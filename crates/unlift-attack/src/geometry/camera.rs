@@ -98,18 +98,15 @@ impl Camera {
 
     /// Returns the matrix `K [R | t]`.
     pub(crate) fn projection(&self) -> [[f64; 4]; 3] {
-        let translation = self.pose.translation();
-        let row = |r: usize| -> [f64; 4] {
+        let t = self.pose.translation();
+        let rows = [0, 1, 2].map(|r| {
             let [x, y, z] = self.pose.rotation[r];
-            [x, y, z, translation[r]]
-        };
-        let last = row(2);
+            [x, y, z, t[r]]
+        });
         let Intrinsics { focal, principal } = &self.intrinsics;
-        let scaled = |r: usize| -> [f64; 4] {
-            let own = row(r);
-            std::array::from_fn(|c| focal[r] * own[c] + principal[r] * last[c])
-        };
-        [scaled(0), scaled(1), last]
+        let scaled =
+            |r: usize| [0, 1, 2, 3].map(|c| focal[r] * rows[r][c] + principal[r] * rows[2][c]);
+        [scaled(0), scaled(1), rows[2]]
     }
 }
 

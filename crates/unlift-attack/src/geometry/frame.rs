@@ -18,14 +18,12 @@ impl<const D: usize> Bounds<D> {
         if points.is_empty() {
             return None;
         }
-        let (mut low, mut high) = ([0.0; D], [0.0; D]);
-        for c in 0..D {
+        let ends: [[f64; 2]; D] = std::array::from_fn(|c| {
             let mut column: Vec<f64> = points.iter().map(|p| p[c]).collect();
             column.sort_unstable_by(f64::total_cmp);
-            low[c] = quantile(&column, q);
-            high[c] = quantile(&column, 1.0 - q);
-        }
-        Some(Self { low, high })
+            [q, 1.0 - q].map(|q| quantile(&column, q))
+        });
+        Some(Self { low: ends.map(|e| e[0]), high: ends.map(|e| e[1]) })
     }
 
     /// Creates the box from `low` to `high`.

@@ -69,7 +69,7 @@ impl<'a, const D: usize> Knn<'a, D> {
     pub fn new(points: &'a [[f64; D]]) -> Result<Self, Error> {
         let n = points.len();
         if n == 0 || u32::try_from(n).is_err() {
-            return Err(Error::new("points", "1 to 4294967295 of them", n.to_string()));
+            return Err(Error::new("points", "1 to 4294967295 of them", n));
         }
         if let Some(at) = points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
             let what = format!("point {at}");
@@ -114,6 +114,26 @@ impl<'a, const D: usize> Knn<'a, D> {
     /// Finds the `k` nearest rows of any position, in the same form.
     pub fn nearest_to(&self, position: [f64; D], k: usize, found: &mut Vec<(f64, u32)>) {
         self.search(position, None, k, found);
+    }
+
+    /// Returns `of(row, its k(row) nearest other rows)` for every row, in the order of rows. The nearest are (squared distance, row),
+    /// nearest first.
+    pub fn per_row<T: Send>(
+        &self,
+        k: impl Fn(usize) -> usize + Sync,
+        of: impl Fn(usize, &[(f64, u32)]) -> T + Sync,
+    ) -> Vec<T> {
+        let rows = (0..self.rows.len()).into_par_iter();
+        let value = |found: &mut Vec<_>, row| {
+            self.nearest(row, k(row), found);
+            of(row, found)
+        };
+        rows.map_init(Vec::new, value).collect()
+    }
+
+    /// Returns the distance of every row to its `k`-th nearest other row (to the last one in small sets).
+    pub fn kth_distances(&self, k: usize) -> Vec<f64> {
+        self.per_row(|_| k, |_, found| found.last().map_or(0.0, |last| last.0.sqrt()))
     }
 
     /// Calls `of(row)` for all points whose squared distance to a position is at most `bound`.
@@ -352,28 +372,6 @@ fn take<const D: usize>(
     }
 }
 
-impl<const D: usize> Knn<'_, D> {
-    /// Returns `of(row, its k nearest other rows)` for every row, in the order of rows. The nearest are (squared distance, row), nearest
-    /// first.
-    pub fn per_row<T: Send>(
-        &self,
-        k: usize,
-        of: impl Fn(usize, &[(f64, u32)]) -> T + Sync,
-    ) -> Vec<T> {
-        let rows = (0..self.rows.len()).into_par_iter();
-        let value = |found: &mut Vec<_>, row| {
-            self.nearest(row, k, found);
-            of(row, found)
-        };
-        rows.map_init(Vec::new, value).collect()
-    }
-
-    /// Returns the distance of every row to its `k`-th nearest other row (to the last one in small sets).
-    pub fn kth_distances(&self, k: usize) -> Vec<f64> {
-        self.per_row(k, |_, found| found.last().map_or(0.0, |last| last.0.sqrt()))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::{Knn, canonical};
@@ -394,7 +392,7 @@ mod tests {
         let knn = Knn::new(points).unwrap();
         let mut found = Vec::new();
         for k in [1, 7, 50] {
-            let all = knn.per_row(k, |_, found| found.to_vec());
+            let all = knn.per_row(|_| k, |_, found| found.to_vec());
             for (row, point) in points.iter().enumerate() {
                 let expected = brute_force(point, row, k);
                 assert_eq!(all[row], expected, "{row}, k {k}");
@@ -439,7 +437,7 @@ mod tests {
     fn points_at_one_place_cost_no_more_than_others() {
         let points = vec![[1.0; 3]; 200_000];
         let knn = Knn::new(&points).unwrap();
-        let sums = knn.per_row(50, |_, found| found.iter().map(|item| item.1).sum::<u32>());
+        let sums = knn.per_row(|_| 50, |_, found| found.iter().map(|item| item.1).sum::<u32>());
         assert_eq!(sums[199_999], (0..50).sum::<u32>());
         let mut found = Vec::new();
         (0..points.len()).for_each(|row| knn.nearest(row, 50, &mut found));

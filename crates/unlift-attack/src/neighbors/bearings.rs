@@ -1,7 +1,7 @@
 //! Decoys among bearings: records whose neighbors by descriptors do not lie in nearby directions.
 
 use super::Neighborhoods;
-use crate::released::{Obfuscation, Released};
+use crate::released::Released;
 
 /// Bearings within this angle support each other: the noise of decoys is three times as large.
 const NEARBY: f64 = 0.1;
@@ -13,9 +13,9 @@ const ROUNDS: usize = 4;
 /// Returns the support of every record by its lists, as a multiple of that by chance; `None` unless records are bearings from one
 /// center. Decoys have little support: their descriptor comes from elsewhere. Listed records count by their own support.
 pub fn support<const D: usize>(released: &Released<D>, lists: &Neighborhoods) -> Option<Vec<f64>> {
-    let Obfuscation::Rays(rays) = released.obfuscation() else { return None };
+    let rays = released.obfuscation().rays()?;
     let n = rays.center().len();
-    if !released.obfuscation().is_bearings() || lists.n_slots() != n || n < 2 {
+    if rays.centers().len() > 1 || lists.n_slots() != n || n < 2 {
         return None;
     }
     let directions = rays.direction();

@@ -6,9 +6,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use rayon::prelude::*;
 
-use super::alike;
 use super::kept::{Rankings, are_equal};
 use super::rows::Rows;
+use crate::descriptors::Values;
 use crate::simd::BLOCK;
 use crate::{Descriptors, Error};
 
@@ -76,8 +76,10 @@ pub fn search<L: Likeness>(
         let anew = || compare(likeness, rows, n_best, &all_pairs(rows.len()), counts.then_some(1));
         return Ok(found.unwrap_or_else(|| finished::<L>(anew())));
     }
-    rows.reorder(alike::order(&rows.descriptors, &rows.slots));
-    let means = alike::means(&rows.descriptors, &rows.slots)?;
+    let mut slots = rows.slots.clone();
+    halve(&rows.descriptors, &mut slots);
+    rows.reorder(slots);
+    let means = means(&rows.descriptors, &rows.slots)?;
     let of_blocks = Rows::of_all(&means);
     let alike = compare(likeness, &of_blocks, PARTNERS, &all_pairs(means.len()), None);
     let every = counts.then(|| rows.len().div_ceil(USUAL));
@@ -248,7 +250,7 @@ fn compare<L: Likeness>(
                 row.count(scores, records, own, L::STEP);
             }
             for (j, (&score, &record)) in scores.iter().zip(records).enumerate() {
-                if score >= row.best.floor() && record != own {
+                if score >= row.best.floor && record != own {
                     row.best.push(score, (b * BLOCK + j) as u32);
                 }
             }
@@ -380,6 +382,7 @@ pub struct Found {
 #[derive(Clone, Debug)]
 pub struct Best {
     n_best: usize,
+    /// Entries with a lower score can no longer be kept.
     floor: f32,
     entries: Vec<(f32, u32)>,
 }
@@ -388,12 +391,6 @@ impl Best {
     /// Keeps at most `n_best` entries.
     pub fn new(n_best: usize) -> Self {
         Self { n_best, floor: f32::NEG_INFINITY, entries: Vec::new() }
-    }
-
-    /// Entries with a lower score can no longer be kept.
-    #[inline(always)]
-    pub fn floor(&self) -> f32 {
-        self.floor
     }
 
     /// Adds an entry; each id at most once.
@@ -434,7 +431,7 @@ pub fn higher_first<T: Ord>(a: &(f32, T), b: &(f32, T)) -> std::cmp::Ordering {
 }
 
 /// Blocks in memory at a time if only some pairs are compared.
-const HELD: usize = 256;
+const HELD: u32 = 256;
 
 /// Pairs of blocks with a range of blocks, which stay in memory meanwhile.
 struct Tile {
@@ -454,34 +451,103 @@ fn all_pairs(n_rows: usize) -> Vec<Tile> {
 
 /// Returns the pairs of every block with itself and with the most similar blocks.
 fn chosen(alike: &[Found]) -> Vec<Tile> {
-    let n = alike.len();
-    // Each pair is stored under its lower index.
-    let mut pairs: Vec<BTreeSet<u32>> =
-        (0..n as u32).map(|block| BTreeSet::from([block])).collect();
-    for (block, found) in alike.iter().enumerate() {
-        for &(_, other) in &found.best {
-            let other = other as usize;
-            pairs[block.min(other)].insert(block.max(other) as u32);
-        }
+    let n = alike.len() as u32;
+    // Each pair has its lower index first.
+    let mut pairs: BTreeSet<(u32, u32)> = (0..n).map(|block| (block, block)).collect();
+    for (block, found) in (0..n).zip(alike) {
+        pairs.extend(found.best.iter().map(|&(_, other)| (block.min(other), block.max(other))));
     }
-    let tiles = (0..n).step_by(HELD).map(|first| {
-        let held = first..(first + HELD).min(n);
+    let tile = |first: u32| {
+        let end = (first + HELD).min(n);
         let mut meetings: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        for a in held.clone() {
-            for &b in &pairs[a] {
-                meetings.entry(b).or_default().push(a as u32);
-            }
+        for &(a, b) in pairs.range((first, 0)..(end, 0)) {
+            meetings.entry(b).or_default().push(a);
         }
-        Tile { held, meetings: meetings.into_iter().collect() }
-    });
-    tiles.collect()
+        Tile { held: first as usize..end as usize, meetings: meetings.into_iter().collect() }
+    };
+    (0..n).step_by(HELD as usize).map(tile).collect()
+}
+
+// Similar blocks of a large map.
+
+/// Number of rows from which the direction is computed.
+const SAMPLE: usize = 256;
+/// Number of power iterations. An approximate direction suffices.
+const ITERATIONS: usize = 8;
+
+/// Reorders `slots` so that similar descriptors are adjacent. Rows are split at the median along the direction of largest variance,
+/// recursively, until a part is one block. All parts but the last are full.
+fn halve(descriptors: &Descriptors, slots: &mut [u32]) {
+    if slots.len() <= BLOCK {
+        return;
+    }
+    let direction = widest(descriptors, slots);
+    let scratch = || vec![0.0; descriptors.dim()];
+    let product = |row: &mut Vec<f32>, &slot: &u32| {
+        descriptors.read_row(slot as usize, row);
+        (row.iter().zip(&direction).map(|(x, d)| x * d).sum(), slot)
+    };
+    let mut along: Vec<(f32, u32)> = slots.par_iter().map_init(scratch, product).collect();
+    // Whole blocks on the left. Equal rows stay in the order of slots.
+    let left = (slots.len() / 2).next_multiple_of(BLOCK);
+    let by_place = |a: &(f32, u32), b: &(f32, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+    along.par_sort_unstable_by(by_place);
+    slots.iter_mut().zip(&along).for_each(|(slot, &(_, moved))| *slot = moved);
+    drop(along);
+    let (low, high) = slots.split_at_mut(left);
+    rayon::join(|| halve(descriptors, low), || halve(descriptors, high));
+}
+
+/// Returns the direction of largest variance of a sample of the rows.
+fn widest(descriptors: &Descriptors, slots: &[u32]) -> Vec<f32> {
+    let every = slots.len().div_ceil(SAMPLE).max(1);
+    let mut rows: Vec<Vec<f32>> =
+        slots.iter().step_by(every).map(|&slot| descriptors.row(slot as usize)).collect();
+    let n = rows.len() as f32;
+    let mean: Vec<f32> =
+        (0..descriptors.dim()).map(|c| rows.iter().map(|row| row[c]).sum::<f32>() / n).collect();
+    for row in &mut rows {
+        row.iter_mut().zip(&mean).for_each(|(x, mean)| *x -= mean);
+    }
+    // Start with the row farthest from the mean.
+    let length2 = |row: &Vec<f32>| row.iter().map(|x| x * x).sum::<f32>();
+    let farthest = rows.iter().max_by(|a, b| length2(a).total_cmp(&length2(b)));
+    let mut direction = farthest.cloned().unwrap_or_default();
+    for _ in 0..ITERATIONS {
+        let mut next = vec![0.0f32; direction.len()];
+        for row in &rows {
+            let along: f32 = row.iter().zip(&direction).map(|(x, d)| x * d).sum();
+            next.iter_mut().zip(row).for_each(|(next, x)| *next += along * x);
+        }
+        let length = length2(&next).sqrt();
+        if length == 0.0 {
+            break;
+        }
+        direction = next.into_iter().map(|x| x / length).collect();
+    }
+    direction
+}
+
+/// Returns the mean row of each block of `slots`.
+///
+/// # Errors
+/// When all of them are equal.
+fn means(descriptors: &Descriptors, slots: &[u32]) -> Result<Descriptors, Error> {
+    let mean = |slots: &[u32]| {
+        let mut sum = vec![0.0f32; descriptors.dim()];
+        for &slot in slots {
+            sum.iter_mut().zip(descriptors.row(slot as usize)).for_each(|(sum, x)| *sum += x);
+        }
+        sum.into_iter().map(move |x| x / slots.len() as f32).collect::<Vec<f32>>()
+    };
+    let values: Vec<f32> = slots.par_chunks(BLOCK).flat_map_iter(mean).collect();
+    Descriptors::try_new(Values::F32(values), descriptors.dim())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::descriptors::Values;
-    use crate::neighbors::overlap::Patches;
+    use crate::neighbors::overlap::Hypotheses;
     use crate::neighbors::similarity::Cosine;
     use crate::seed::{Draws, Stage};
 
@@ -523,8 +589,11 @@ mod tests {
             found(likeness, of, 10, exact).concat().into_iter().map(|(score, _)| score).collect()
         }
         assert_eq!(scores(&Cosine, &descriptors, 0), scores(&Cosine, &descriptors, MOST_ROWS));
-        let patches = Patches::of(&descriptors).unwrap();
-        assert_eq!(scores(&patches, &descriptors, 0), scores(&patches, &descriptors, MOST_ROWS));
+        let hypotheses = Hypotheses::of(&descriptors).unwrap();
+        assert_eq!(
+            scores(&hypotheses, &descriptors, 0),
+            scores(&hypotheses, &descriptors, MOST_ROWS)
+        );
     }
 
     #[test]
@@ -548,12 +617,12 @@ mod tests {
     #[test]
     fn usual_scores_are_those_of_all_rows() {
         let descriptors = crowds(6_000, 128);
-        let patches = Patches::of(&descriptors).unwrap();
+        let hypotheses = Hypotheses::of(&descriptors).unwrap();
         let rows = Rows::of_all(&descriptors);
         let all = all_pairs(rows.len());
-        let exact = compare(&patches, &rows, 1, &all, Some(1));
-        let sampled = compare(&patches, &rows, 1, &all, Some(3));
-        let [exact, sampled] = [exact, sampled].map(finished::<Patches>);
+        let exact = compare(&hypotheses, &rows, 1, &all, Some(1));
+        let sampled = compare(&hypotheses, &rows, 1, &all, Some(3));
+        let [exact, sampled] = [exact, sampled].map(finished::<Hypotheses>);
         for (exact, sampled) in exact.iter().zip(&sampled) {
             let off = (exact.mean - sampled.mean).abs() / exact.deviation;
             assert!(off < 0.2, "{off}");

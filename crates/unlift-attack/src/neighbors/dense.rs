@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::compare::Likeness;
-use super::overlap::{Patches, REACHES};
+use super::overlap::{Hypotheses, REACHES};
 use super::similarity::Cosine;
 use crate::simd::BLOCK;
 use crate::{Descriptors, Error};
@@ -27,10 +27,8 @@ const MOST: usize = 1 << 13;
 pub fn dense(descriptors: &Descriptors, usual: Option<&[(f64, f64)]>) -> Result<Vec<f32>, Error> {
     let n = descriptors.len();
     check(n)?;
-    if let Some(usual) = usual.filter(|usual| usual.len() != n) {
-        let expected = format!("{n} means and deviations");
-        return Err(Error::new("dense scores", expected, usual.len().to_string()));
-    }
+    let n_usual = usual.map_or(n, <[_]>::len);
+    Error::check_len("dense scores", n_usual, n, " means and deviations")?;
     let mut scores = raw(descriptors);
     let usual = usual.map_or_else(|| within(&scores, n), <[_]>::to_vec);
     standardize(&mut scores, &usual);
@@ -39,12 +37,12 @@ pub fn dense(descriptors: &Descriptors, usual: Option<&[(f64, f64)]>) -> Result<
 
 /// Returns `(reaches, n, n)` scores before standardization.
 fn raw(descriptors: &Descriptors) -> Vec<f32> {
-    match Patches::of(descriptors) {
-        Ok(patches) => {
+    match Hypotheses::of(descriptors) {
+        Ok(hypotheses) => {
             let best = |reach: usize, a: &_, b: &_, found: &mut [f32]| {
-                patches.best(a, b, |shift| shift.min(REACHES - 1) == reach, found);
+                hypotheses.best(a, b, |shift| shift.min(REACHES - 1) == reach, found);
             };
-            all_pairs(&patches, descriptors, REACHES, best)
+            all_pairs(&hypotheses, descriptors, REACHES, best)
         }
         Err(_) => all_pairs(&Cosine, descriptors, 1, |_, a, b, found| Cosine.scores(a, b, found)),
     }
@@ -63,7 +61,7 @@ fn check(n: usize) -> Result<(), Error> {
     if (2..=MOST).contains(&n) {
         return Ok(());
     }
-    Err(Error::new("dense scores", format!("2 to {MOST} descriptors"), n.to_string()))
+    Err(Error::new("dense scores", format!("2 to {MOST} descriptors"), n))
 }
 
 /// Computes `(reaches, n, n)` symmetric scores; `score` compares two blocks, `(BLOCK, BLOCK)`, at a reach.

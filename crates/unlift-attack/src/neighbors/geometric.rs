@@ -7,11 +7,11 @@ use rayon::prelude::*;
 
 use super::Neighborhoods;
 use super::compare::higher_first;
-use super::source::{Needs, Source};
+use super::sources::{Needs, Source};
 use crate::density::{Peaks, tomography};
 use crate::geometry::knn::Knn;
 use crate::geometry::vector::{along, distance, dot, sub, widen};
-use crate::released::{Obfuscation, Released};
+use crate::released::{Obfuscation, Rays, Released};
 use crate::{Error, RecordId, RowOrder};
 
 /// Estimates searched per listed record: some belong to the same record, and some records pass too far away.
@@ -77,10 +77,7 @@ pub(crate) fn geometric_by<const D: usize>(
     peaks: &Peaks,
 ) -> Result<Neighborhoods, Error> {
     check(released, k)?;
-    let centers = match released.obfuscation() {
-        Obfuscation::Rays(rays) => Some(rays.center()),
-        Obfuscation::Lines(_) | Obfuscation::AxisCandidates(_) | Obfuscation::AxisPlanes(_) => None,
-    };
+    let centers = released.obfuscation().rays().map(Rays::center);
     let known = peaks.of.iter().enumerate();
     let known = known.filter_map(|(slot, peak)| Some((slot, widen(&peak.as_ref()?.position))));
     let (slots, positions): (Vec<usize>, Vec<[f64; 3]>) = known.unzip();
@@ -130,7 +127,7 @@ fn check<const D: usize>(released: &Released<D>, k: usize) -> Result<(), Error> 
     }
     let what = "geometric neighborhoods";
     if D != 3 {
-        return Err(Error::new(what, "a map in three dimensions", D.to_string()));
+        return Err(Error::new(what, "a map in three dimensions", D));
     }
     match released.obfuscation() {
         Obfuscation::AxisPlanes(_) => {

@@ -4,23 +4,22 @@ use std::borrow::Cow;
 
 use crate::descriptors::Values;
 use crate::neighbors::{Overlap, Source};
-use crate::{Descriptors, Error, ErrorKind};
+use crate::{Descriptors, Error, ErrorKind, named};
 
-/// Descriptors for which networks are trained.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DescriptorKind {
-    /// 128 nonnegative values: gradients of a patch, as `unlift features` and COLMAP write them.
-    Sift,
-    /// 128 floats that are not SIFT.
-    Aliked,
-    /// 256 floats.
-    SuperPoint,
+named! {
+    /// Descriptors for which networks are trained.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum DescriptorKind {
+        /// 128 nonnegative values: gradients of a patch, as `unlift features` and COLMAP write them.
+        Sift = "sift",
+        /// 128 floats that are not SIFT.
+        Aliked = "aliked",
+        /// 256 floats.
+        SuperPoint = "superpoint",
+    }
 }
 
 impl DescriptorKind {
-    /// All kinds, in the order of their discriminants.
-    pub const ALL: [Self; 3] = [Self::Sift, Self::Aliked, Self::SuperPoint];
-
     /// Detects the kind of `descriptors`. Other features of 128 floats are taken for ALIKED.
     ///
     /// # Errors
@@ -45,19 +44,10 @@ impl DescriptorKind {
     /// # Errors
     /// If there is none; the message lists all.
     pub fn from_name(name: &str) -> Result<Self, Error> {
-        Self::ALL.into_iter().find(|kind| kind.name() == name).ok_or_else(|| {
+        Self::named(name).ok_or_else(|| {
             let names = Self::ALL.map(Self::name).join(", ");
             Error::new("features", format!("one of {names}"), name)
         })
-    }
-
-    /// Returns the name that users type.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Sift => "sift",
-            Self::Aliked => "aliked",
-            Self::SuperPoint => "superpoint",
-        }
     }
 
     /// Returns the number of values of a descriptor.
@@ -179,7 +169,6 @@ mod tests {
             "{odd}"
         );
         for kind in DescriptorKind::ALL {
-            assert_eq!(DescriptorKind::ALL[kind as usize], kind);
             assert_eq!(DescriptorKind::from_name(kind.name()), Ok(kind));
         }
     }

@@ -3,7 +3,6 @@
 //! The oracle makes them from the originals, for experiments. A [`Source`] makes them from a released map, as an attacker can.
 //! [`sources::SOURCES`] lists the sources of this crate.
 
-mod alike;
 mod bearings;
 mod compare;
 mod dense;
@@ -17,7 +16,6 @@ mod protected;
 mod rows;
 mod scored;
 mod similarity;
-mod source;
 pub mod sources;
 mod walk;
 
@@ -38,8 +36,8 @@ pub use overlap::{Overlap, REACHES};
 pub use scored::{Part, Scores, scored};
 pub use similarity::Similarity;
 #[doc(hidden)]
-pub use source::lacks_descriptors;
-pub use source::{Needs, Source, of_what_there_is};
+pub use sources::lacks_descriptors;
+pub use sources::{Needs, Source, of_what_there_is};
 
 /// Returns parallel lines with these descriptors, for tests.
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! Mutual nearest neighbors between two sets of descriptors.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::compare::Likeness;
@@ -78,77 +80,61 @@ fn compare(
     b: &Blocks,
 ) -> (Vec<Nearest>, Vec<Nearest>) {
     let mut scores = vec![0.0f32; BLOCK * BLOCK];
-    let mut columns = Lanes::new(b.blocks.len() * BLOCK);
-    let mut rows = Vec::with_capacity(part.len() * BLOCK);
-    for (i, own) in part.iter().enumerate() {
-        let at = (first + i) * BLOCK;
-        let n_own = (n_rows - at).min(BLOCK);
-        let mut lanes = Lanes::new(BLOCK * LANES);
+    let mut rows = vec![Nearest::NONE; (n_rows - first * BLOCK).min(part.len() * BLOCK)];
+    let mut columns = Columns::new(b.blocks.len() * BLOCK);
+    for (i, (own, rows)) in part.iter().zip(rows.chunks_mut(BLOCK)).enumerate() {
         for (j, other) in b.blocks.iter().enumerate() {
             Cosine.scores(own, other, &mut scores);
-            // The last block has places without descriptors.
-            let n_other = (b.len - j * BLOCK).min(BLOCK);
-            if n_other < BLOCK {
-                let ends = scores.chunks_exact_mut(BLOCK);
-                ends.for_each(|row| row[n_other..].fill(f32::NEG_INFINITY));
-            }
-            let (rows, columns) = (&mut lanes, &mut columns);
-            simd::dispatch(Keep { scores: &scores, n_own, at, j, rows, columns });
+            let (at, others) = ((first + i) * BLOCK, j * BLOCK..b.len.min((j + 1) * BLOCK));
+            let (scores, rows, columns) = (&scores, &mut *rows, &mut columns);
+            simd::dispatch(Keep { scores, at, others, rows, columns });
         }
-        rows.extend((0..n_own).map(|row| lanes.best_of(row * LANES..(row + 1) * LANES)));
     }
-    let columns = (0..b.len).map(|column| columns.best_of(column..column + 1)).collect();
-    (rows, columns)
+    let nearest = |column: usize| {
+        let [first, second] = [columns.first[column], columns.second[column]];
+        Nearest { at: columns.at[column], first, second }
+    };
+    (rows, (0..b.len).map(nearest).collect())
 }
 
-/// The nearest of each lane, in columns.
-struct Lanes {
+/// The nearest row of each column, in columns.
+struct Columns {
     at: Vec<u32>,
     first: Vec<f32>,
     second: Vec<f32>,
 }
 
-impl Lanes {
+impl Columns {
     fn new(n: usize) -> Self {
         let least = || vec![f32::NEG_INFINITY; n];
         Self { at: vec![u32::MAX; n], first: least(), second: least() }
     }
 
-    fn best_of(&self, lanes: std::ops::Range<usize>) -> Nearest {
-        let mut best = Nearest::NONE;
-        for lane in lanes {
-            let [first, second] = [self.first[lane], self.second[lane]];
-            best.merge(&Nearest { at: self.at[lane], first, second });
-        }
-        best
-    }
-
-    /// Adds a score to each of [`LANES`] lanes from `lane` on; `at` has their indices. Free of branches, so that it is vectorized.
+    /// Adds the scores of row `at` with the columns from `column` on. Free of branches, so that it is vectorized.
     #[inline(always)]
-    fn keep(&mut self, lane: usize, scores: &[f32], at: &[u32; LANES]) {
-        let to = lane..lane + LANES;
+    fn keep(&mut self, column: usize, scores: &[f32; LANES], at: u32) {
+        let to = column..column + LANES;
         let (best, first) = (&mut self.at[to.clone()], &mut self.first[to.clone()]);
         let second = &mut self.second[to];
         for l in 0..LANES {
             let (score, old) = (scores[l], first[l]);
             let low = if score > old { old } else { score };
-            best[l] = if score > old { at[l] } else { best[l] };
+            best[l] = if score > old { at } else { best[l] };
             first[l] = if score > old { score } else { old };
             second[l] = if low > second[l] { low } else { second[l] };
         }
     }
 }
 
-/// Adds the scores of a block to the lanes of its rows and columns.
+/// Adds the scores of a block to its rows and columns.
 struct Keep<'a> {
     scores: &'a [f32],
-    n_own: usize,
     /// First row of the block.
     at: usize,
-    /// Index of the block of columns.
-    j: usize,
-    rows: &'a mut Lanes,
-    columns: &'a mut Lanes,
+    /// The columns of the block. The last block has places without descriptors.
+    others: Range<usize>,
+    rows: &'a mut [Nearest],
+    columns: &'a mut Columns,
 }
 
 impl Kernel for Keep<'_> {
@@ -156,14 +142,21 @@ impl Kernel for Keep<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let Self { scores, n_own, at, j, rows, columns } = self;
-        for (r, scores) in scores.chunks_exact(BLOCK).take(n_own).enumerate() {
-            let own = [(at + r) as u32; LANES];
-            for (c, scores) in scores.chunks_exact(LANES).enumerate() {
-                let column = j * BLOCK + c * LANES;
-                let others = std::array::from_fn(|l| (column + l) as u32);
-                rows.keep(r * LANES, scores, &others);
-                columns.keep(column, scores, &own);
+        let Self { scores, at, others, rows, columns } = self;
+        for (r, (scores, best)) in scores.chunks_exact(BLOCK).zip(rows).enumerate() {
+            let mut top = [f32::NEG_INFINITY; LANES];
+            for (c, scores) in scores.as_chunks::<LANES>().0.iter().enumerate() {
+                columns.keep(others.start + c * LANES, scores, (at + r) as u32);
+                for l in 0..LANES {
+                    top[l] = if scores[l] > top[l] { scores[l] } else { top[l] };
+                }
+            }
+            // Few blocks have one of the two nearest of a row.
+            if top.iter().any(|&top| top > best.second) {
+                for (other, &first) in others.clone().zip(scores) {
+                    let second = f32::NEG_INFINITY;
+                    best.merge(&Nearest { at: other as u32, first, second });
+                }
             }
         }
     }

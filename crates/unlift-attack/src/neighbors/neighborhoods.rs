@@ -31,11 +31,7 @@ impl Neighborhoods {
         let n_slots = n_records * slots_per_record;
         if offsets.len() != n_slots + 1 {
             let expected = format!("{n_slots} slots, as the released map has");
-            return Err(Error::new(
-                "neighborhoods",
-                expected,
-                offsets.len().saturating_sub(1).to_string(),
-            ));
+            return Err(Error::new("neighborhoods", expected, offsets.len().saturating_sub(1)));
         }
         if offsets[0] != 0
             || offsets[n_slots] != records.len() as u64
@@ -45,13 +41,10 @@ impl Neighborhoods {
             return Err(Error::new("neighborhood offsets", expected, "another sequence"));
         }
         if let Some(scores) = &scores {
-            if scores.len() != records.len() {
-                let expected = format!("{} rows", records.len());
-                return Err(Error::new("neighborhood scores", expected, scores.len().to_string()));
-            }
+            Error::check_len("neighborhood scores", scores.len(), records.len(), " rows")?;
             if let Some(at) = scores.iter().position(|x| !x.is_finite()) {
                 let what = format!("neighborhood score {at}");
-                return Err(Error::new(what, "a finite number", scores[at].to_string()));
+                return Err(Error::new(what, "a finite number", scores[at]));
             }
         }
         for slot in 0..n_slots {
@@ -157,7 +150,7 @@ fn check_row(
         && last.index() >= n_records
     {
         let expected = format!("records below {n_records}");
-        return Err(Error::new(what(), expected, last.0.to_string()));
+        return Err(Error::new(what(), expected, last.0));
     }
     let own = RecordId::from_index(slot / slots_per_record);
     if row.binary_search(&own).is_ok() {

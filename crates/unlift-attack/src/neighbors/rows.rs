@@ -72,7 +72,7 @@ impl<'a> Rows<'a> {
         let n_records = released.n_records();
         if k == 0 || n_records < k + 1 {
             let expected = format!("between 1 and {} (other records)", n_records.saturating_sub(1));
-            return Err(Error::new("k", expected, k.to_string()));
+            return Err(Error::new("k", expected, k));
         }
         let slots = by_content(descriptors);
         let slots_per_record = released.slots_per_record();

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::compare::{Best, KeptPairs, MOST_ROWS, higher_first, search};
 use super::kept::Rankings;
-use super::overlap::Patches;
+use super::overlap::Hypotheses;
 use super::rows::{Ranked, Rows};
 use super::similarity::Cosine;
 use super::walk::CANDIDATES;
@@ -56,13 +56,13 @@ pub fn scored<const D: usize>(
     kept: &mut KeptPairs,
 ) -> Result<Neighborhoods, Error> {
     let mut rows = Rows::new(released, k)?;
-    let patches = Patches::of(&rows.descriptors).ok();
+    let hypotheses = Hypotheses::of(&rows.descriptors).ok();
     // Enough for two slots per record, so that rankings do not depend on the scheme.
     let n_best = (2 * k + 1).max(CANDIDATES);
     let known = kept.rankings.iter().position(|rankings| rankings.are_of(&rows, n_best));
     let rankings = match known {
         Some(at) => kept.rankings.remove(at),
-        None => rankings(&mut rows, n_best, patches.as_ref(), scores, kept)?,
+        None => rankings(&mut rows, n_best, hypotheses.as_ref(), scores, kept)?,
     };
     let without_own = |ranked: &[Ranked]| -> Vec<Ranked> {
         let record = |row: u32| rows.records[row as usize];
@@ -80,7 +80,7 @@ pub fn scored<const D: usize>(
         kept.rankings.drain(..too_many);
     }
     let enough = rows.enough_for(k);
-    if patches.is_none() {
+    if hypotheses.is_none() {
         // The best scores are right more often than the rows that a walk reaches.
         trained.iter_mut().for_each(|row| row.truncate(enough));
         return rows.lists(released, &trained, k);
@@ -93,13 +93,13 @@ pub fn scored<const D: usize>(
 fn rankings(
     rows: &mut Rows<'_>,
     n_best: usize,
-    patches: Option<&Patches>,
+    hypotheses: Option<&Hypotheses>,
     scores: &Scores<'_>,
     kept: &mut KeptPairs,
 ) -> Result<Rankings, Error> {
     let mut apart = rows.apart();
-    let found = match patches {
-        Some(patches) => search(patches, &mut apart, n_best, true, MOST_ROWS, kept)?,
+    let found = match hypotheses {
+        Some(hypotheses) => search(hypotheses, &mut apart, n_best, true, MOST_ROWS, kept)?,
         None => search(&Cosine, &mut apart, n_best, true, MOST_ROWS, kept)?,
     };
     let untrained = walk::standardized(&found);

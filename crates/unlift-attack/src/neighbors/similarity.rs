@@ -4,7 +4,7 @@ use super::Neighborhoods;
 use super::compare::{KeptPairs, Likeness, note};
 use super::protected::Shared;
 use super::rows::Rows;
-use super::source::{Needs, Source};
+use super::sources::{Needs, Source};
 use super::walk::{Walk, ranked_by};
 use crate::descriptors::Values;
 use crate::released::Released;

@@ -34,7 +34,7 @@ struct Attack<'a, const D: usize> {
 
 impl<const D: usize> Solver<D> for Builtin {
     fn name(&self) -> &str {
-        Self::name(self)
+        Self::name(*self)
     }
 
     fn recover(
@@ -133,15 +133,13 @@ pub(super) fn check<const D: usize>(
     lists: &Neighborhoods,
     options: &RecoverOptions,
 ) -> Result<(), Error> {
-    if lists.n_slots() != released.n_slots() {
-        let expected = format!("{} rows, one per slot", released.n_slots());
-        return Err(Error::new("neighborhoods", expected, lists.n_slots().to_string()));
-    }
+    let n_slots = released.n_slots();
+    Error::check_len("neighborhoods", lists.n_slots(), n_slots, " rows, one per slot")?;
     // Lists of another map may have the same number of rows.
     let n_records = released.n_records();
     if let Some(record) = lists.records().iter().find(|record| record.index() >= n_records) {
         let expected = format!("records below {n_records}");
-        return Err(Error::new("neighborhoods", expected, record.0.to_string()));
+        return Err(Error::new("neighborhoods", expected, record.0));
     }
     options.check()
 }

@@ -43,12 +43,7 @@ pub(super) fn predict<const D: usize>(
     graph: &Graph,
     estimates: &[Estimate<D>],
 ) -> Result<Vec<Confidence>, Unknown> {
-    if D == 2 {
-        return Err(Unknown::OfImages);
-    }
-    if let Some(unknown) = unknown(released, lists, estimates) {
-        return Err(unknown);
-    }
+    unknown(released, lists, estimates).map_or(Ok(()), Err)?;
     let kind = match released.obfuscation() {
         Obfuscation::Lines(_) => released.slots_per_record() - 1,
         Obfuscation::Rays(_) => 2,
@@ -95,10 +90,8 @@ pub(super) fn predict<const D: usize>(
     }
     let of_map = (n_near(&counts) / total(&counts, 2).max(1.0)) as f32;
     let share = |[lists, listed, all]: [f32; 3]| (lists + listed) / all.max(1.0);
-    let center = |slot: usize| match released.obfuscation() {
-        Obfuscation::Rays(rays) => rays.center()[slot],
-        _ => 0,
-    };
+    let rays = released.obfuscation().rays();
+    let center = |slot: usize| rays.map(|rays| rays.center()[slot]);
     let of_slot = |slot: usize| {
         if !estimates[slot].is_known() {
             return Confidence::LOST;
@@ -160,7 +153,9 @@ fn unknown<const D: usize>(
 ) -> Option<Unknown> {
     let n_slots = lists.n_slots() as f64;
     let mean = lists.records().len() as f64 / n_slots.max(1.0);
-    if lists.scores().is_some() {
+    if D == 2 {
+        Some(Unknown::OfImages)
+    } else if lists.scores().is_some() {
         Some(Unknown::RankedLists)
     } else if !lists.about().by_oracle {
         Some(Unknown::GivenLists)

@@ -74,12 +74,10 @@ pub(super) fn learn<const D: usize, F: Family<D>>(
 /// Returns the spacing of points spread evenly over the known bounds, or else over all regions; 0 without both. Axis candidates
 /// publish coordinates, which show whether the bounds are much larger than the range of the points.
 fn spacing<const D: usize>(released: &Released<D>) -> f64 {
-    let of_regions = || match released.obfuscation() {
-        Obfuscation::Rays(rays) => {
-            let corners = rays.regions()?.iter().flat_map(|region| [region.low, region.high]);
-            Bounds::quantiles(&corners.collect::<Vec<_>>(), 0.0)
-        }
-        _ => None,
+    let of_regions = || {
+        let regions = released.obfuscation().rays()?.regions()?;
+        let corners = regions.iter().flat_map(|region| [region.low, region.high]);
+        Bounds::quantiles(&corners.collect::<Vec<_>>(), 0.0)
     };
     let Some(bounds) = released.bounds().or_else(of_regions) else { return 0.0 };
     let mut sides: [f64; D] = std::array::from_fn(|c| bounds.high[c] - bounds.low[c]);

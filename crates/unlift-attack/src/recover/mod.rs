@@ -41,10 +41,8 @@ pub fn recover<const D: usize>(
 ) -> Result<Recovered<D>, Error> {
     attack::check(released, lists, options)?;
     let recovered = solver.recover(released, lists, options)?;
-    if recovered.n_slots() == released.n_slots() {
-        return Ok(recovered);
-    }
-    let expected = format!("{} positions, one per slot", released.n_slots());
-    let found = recovered.n_slots().to_string();
-    Err(Error::new("solver", expected, found).within(solver.name()))
+    let (found, n_slots) = (recovered.n_slots(), released.n_slots());
+    Error::check_len("solver", found, n_slots, " positions, one per slot")
+        .map_err(|error| error.within(solver.name()))?;
+    Ok(recovered)
 }

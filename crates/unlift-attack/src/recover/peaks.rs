@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::Error;
-use crate::density::{Peak, Peaks};
+use crate::density::Peaks;
 use crate::neighbors::Neighborhoods;
 use crate::recover::map::rows_of;
 use crate::recover::result::{Estimate, Recovered, Status, Unknown, stored_support};
@@ -23,7 +23,7 @@ pub(super) fn at_peaks<const D: usize>(
     let delta = if peaks.resolution > 0.0 { peaks.resolution } else { 1.0 };
     let peak = |slot: usize| match peaks.of[slot] {
         // These attacks return positions in three dimensions only.
-        Some(Peak { position, axis, evidence }) => {
+        Some(Estimate { position, axis, evidence, .. }) => {
             Estimate::at(std::array::from_fn(|c| position[c % 3]), 0, axis.into(), evidence)
         }
         None => Estimate::lost(Status::NoSupport),

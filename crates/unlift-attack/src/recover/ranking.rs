@@ -130,10 +130,8 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
 /// of `tree` are the estimates of `slots`.
 fn radii<const D: usize>(tree: &Knn<'_, D>, slots: &[u32], lists: &Neighborhoods) -> Vec<f32> {
     let length = |row: usize| lists.of(slots[row] as usize).len();
-    let longest = (0..slots.len()).map(length).max().unwrap_or(0);
-    let found = tree.per_row(longest, |row, found| {
-        found[..length(row).min(found.len())].last().map_or(0.0, |last| last.0.sqrt() as f32)
-    });
+    let found =
+        tree.per_row(length, |_, found| found.last().map_or(0.0, |last| last.0.sqrt() as f32));
     let mut radius = vec![0.0; lists.n_slots()];
     slots.iter().zip(found).for_each(|(&slot, found)| radius[slot as usize] = found);
     radius

@@ -5,37 +5,25 @@ use rayon::prelude::*;
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
 use crate::released::{Obfuscation, Released};
-use crate::{About, Error, Unit};
+use crate::{About, Error, Unit, named};
 
-/// Whether a slot was recovered, or why not.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-#[repr(u8)]
-pub enum Status {
-    /// Recovered.
-    Ok = 0,
-    /// Fewer than two listed records can give evidence.
-    TooFewNeighbors = 1,
-    /// The listed records do not fix a point (parallel lines, or no plane of some axis).
-    Degenerate = 2,
-    /// No position agrees with any listed record.
-    NoSupport = 3,
+named! {
+    /// Whether a slot was recovered, or why not.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    #[repr(u8)]
+    pub enum Status {
+        /// Recovered.
+        Ok = "ok",
+        /// Fewer than two listed records can give evidence.
+        TooFewNeighbors = "too_few_neighbors",
+        /// The listed records do not fix a point (parallel lines, or no plane of some axis).
+        Degenerate = "degenerate",
+        /// No position agrees with any listed record.
+        NoSupport = "no_support",
+    }
 }
 
 impl Status {
-    /// Every status.
-    pub const ALL: [Status; 4] =
-        [Self::Ok, Self::TooFewNeighbors, Self::Degenerate, Self::NoSupport];
-
-    /// Name in files and reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Ok => "ok",
-            Self::TooFewNeighbors => "too_few_neighbors",
-            Self::Degenerate => "degenerate",
-            Self::NoSupport => "no_support",
-        }
-    }
-
     /// The status of a slot whose neighbors do not fix a point; `n` of them may vote.
     pub(crate) fn not_fixed(n: usize) -> Self {
         if n < 2 { Self::TooFewNeighbors } else { Self::Degenerate }
@@ -108,89 +96,55 @@ impl Confidence {
 
 // Reasons why confidence is missing.
 
-/// Why a recovered map has no [`Confidence`]: in these cases predicted probabilities were wrong or never tested.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Unknown {
-    /// The options turn confidence off.
-    NotAsked,
-    /// The positions were given without confidence.
-    NotGiven,
-    /// The points are in 2D: the model was fitted and tested on 3D maps alone.
-    OfImages,
-    /// The solver is not `joint`, the only one that the model was fitted for.
-    OtherSolver,
-    /// The lists have scores. The model was not fitted on the errors of sources that rank.
-    RankedLists,
-    /// The lists are not known to come from the oracle. The model was not fitted on the errors of other lists.
-    GivenLists,
-    /// The recovered map is flat or thin: lines in a plane cross everywhere, so that records agree at wrong places.
-    Flat,
-    /// Most points coincide, so that their records agree at wrong places, too.
-    Coincident,
-    /// Lists have more entries per hidden point than in all maps on which the model was fitted.
-    SmallMap,
-    /// Wrong entries of lists are near, too, so that they are no sign of a wrong place.
-    NearEntries,
+named! {
+    /// Why a recovered map has no [`Confidence`]: in these cases predicted probabilities were wrong or never tested.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Unknown {
+        /// The options turn confidence off.
+        NotAsked = "not_asked",
+        /// The positions were given without confidence.
+        NotGiven = "not_given",
+        /// The points are in 2D: the model was fitted and tested on 3D maps alone.
+        OfImages = "images",
+        /// The solver is not `joint`, the only one that the model was fitted for.
+        OtherSolver = "other_solver",
+        /// The lists have scores. The model was not fitted on the errors of sources that rank.
+        RankedLists = "ranked_lists",
+        /// The lists are not known to come from the oracle. The model was not fitted on the errors of other lists.
+        GivenLists = "given_lists",
+        /// The recovered map is flat or thin: lines in a plane cross everywhere, so that records agree at wrong places.
+        Flat = "flat",
+        /// Most points coincide, so that their records agree at wrong places, too.
+        Coincident = "coincident",
+        /// Lists have more entries per hidden point than in all maps on which the model was fitted.
+        SmallMap = "small_map",
+        /// Wrong entries of lists are near, too, so that they are no sign of a wrong place.
+        NearEntries = "near_entries",
+    }
 }
 
 impl Unknown {
-    /// All reasons.
-    pub const ALL: [Self; 10] = [
-        Self::NotAsked,
-        Self::NotGiven,
-        Self::OfImages,
-        Self::OtherSolver,
-        Self::RankedLists,
-        Self::GivenLists,
-        Self::Flat,
-        Self::Coincident,
-        Self::SmallMap,
-        Self::NearEntries,
-    ];
-
-    /// Name in files.
-    pub fn name(self) -> &'static str {
-        self.texts().0
-    }
-
-    /// Returns the reason called `name`.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|why| why.name() == name)
-    }
-
     /// Returns the reason in words, to follow "not known here: ".
     pub fn reason(self) -> &'static str {
-        self.texts().1
-    }
-
-    fn texts(self) -> (&'static str, &'static str) {
         match self {
-            Self::NotAsked => ("not_asked", "confidence was not requested"),
-            Self::NotGiven => ("not_given", "the recovered points have no confidence values"),
-            Self::OfImages => {
-                ("images", "the confidence model was fitted on maps and not tested on images")
+            Self::NotAsked => "confidence was not requested",
+            Self::NotGiven => "the recovered points have no confidence values",
+            Self::OfImages => "the confidence model was fitted on maps and not tested on images",
+            Self::OtherSolver => "only the solver joint estimates confidence",
+            Self::RankedLists => {
+                "the confidence model was not fitted on lists that a source ranked"
             }
-            Self::OtherSolver => ("other_solver", "only the solver joint estimates confidence"),
-            Self::RankedLists => (
-                "ranked_lists",
-                "the confidence model was not fitted on lists that a source ranked",
-            ),
-            Self::GivenLists => {
-                ("given_lists", "the confidence model was fitted on lists of the oracle only")
+            Self::GivenLists => "the confidence model was fitted on lists of the oracle only",
+            Self::Flat => "the confidence model was not fitted on flat or thin maps",
+            Self::Coincident => {
+                "the confidence model was not fitted on maps in which most points coincide"
             }
-            Self::Flat => ("flat", "the confidence model was not fitted on flat or thin maps"),
-            Self::Coincident => (
-                "coincident",
-                "the confidence model was not fitted on maps in which most points coincide",
-            ),
-            Self::SmallMap => (
-                "small_map",
-                "the map is small: a list holds more than a hundredth of its points, and the confidence model was not fitted on such maps",
-            ),
-            Self::NearEntries => (
-                "near_entries",
-                "wrong entries of the lists are near, too, and the confidence model was not fitted on such lists",
-            ),
+            Self::SmallMap => {
+                "the map is small: a list holds more than a hundredth of its points, and the confidence model was not fitted on such maps"
+            }
+            Self::NearEntries => {
+                "wrong entries of the lists are near, too, and the confidence model was not fitted on such lists"
+            }
         }
     }
 }
@@ -236,11 +190,8 @@ impl<const D: usize> Recovered<D> {
                 return Err(Error::new(what, expected, estimate.status.name()));
             }
         }
-        if let Some(rows) = &descriptor_row
-            && rows.len() != estimates.len()
-        {
-            let expected = format!("{} rows", estimates.len());
-            return Err(Error::new("descriptor assignment", expected, rows.len().to_string()));
+        if let Some(rows) = &descriptor_row {
+            Error::check_len("descriptor assignment", rows.len(), estimates.len(), " rows")?;
         }
         Ok(Self {
             origin,
@@ -270,10 +221,7 @@ impl<const D: usize> Recovered<D> {
         lists: &Neighborhoods,
         positions: &[[f32; D]],
     ) -> Result<Self, Error> {
-        if positions.len() != released.n_slots() {
-            let expected = format!("{}, one per slot", released.n_slots());
-            return Err(Error::new("positions", expected, positions.len().to_string()));
-        }
+        Error::check_len("positions", positions.len(), released.n_slots(), ", one per slot")?;
         let estimate = |(slot, &position): (usize, &[f32; D])| {
             if !position.iter().all(|x| x.is_finite()) {
                 return Estimate::lost(Status::NoSupport);
@@ -393,14 +341,11 @@ impl<const D: usize> Recovered<D> {
     /// Returns the estimate of `slot` if it is more likely right than wrong.
     pub(crate) fn sure_estimate(&self, slot: usize) -> Option<Estimate<D>> {
         let found = self.confidence()?.get(slot)?.found;
-        (self.status[slot] == Status::Ok && found > 0.5).then(|| Estimate {
-            position: self.position[slot],
-            status: Status::Ok,
-            support: self.support[slot],
-            axis: self.axis().map_or(0, |axis| axis[slot]),
-            // How much likelier right than wrong, in nats.
-            evidence: libm::logf(found / (1.0 - found).max(f32::EPSILON)),
-        })
+        let axis = self.axis().map_or(0, |axis| axis[slot].into());
+        // How much likelier right than wrong, in nats.
+        let evidence = libm::logf(found / (1.0 - found).max(f32::EPSILON));
+        (self.status[slot] == Status::Ok && found > 0.5)
+            .then(|| Estimate::at(self.position[slot], self.support[slot].into(), axis, evidence))
     }
 
     /// Adds the confidence of every slot.
@@ -408,10 +353,7 @@ impl<const D: usize> Recovered<D> {
     /// # Errors
     /// When there is not one row per slot.
     pub fn with_confidence(self, confidence: Vec<Confidence>) -> Result<Self, Error> {
-        if confidence.len() != self.n_slots() {
-            let expected = format!("{} rows", self.n_slots());
-            return Err(Error::new("confidence", expected, confidence.len().to_string()));
-        }
+        Error::check_len("confidence", confidence.len(), self.n_slots(), " rows")?;
         Ok(Self { confidence: Ok(confidence), ..self })
     }
 
@@ -458,18 +400,4 @@ fn descriptor_rows<const D: usize>(
         first.map(|row| row as u32)
     };
     Some((0..released.n_records()).into_par_iter().flat_map_iter(rows_of).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::Unknown;
-
-    #[test]
-    fn names_are_read_back() {
-        for (at, why) in Unknown::ALL.into_iter().enumerate() {
-            assert_eq!(Unknown::from_name(why.name()), Some(why));
-            assert_eq!(why as usize, at, "in the order of the type, none left out");
-        }
-        assert_eq!(Unknown::from_name("unknown"), None);
-    }
 }

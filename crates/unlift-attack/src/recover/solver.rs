@@ -4,9 +4,9 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 use super::result::Recovered;
-use crate::Error;
 use crate::neighbors::Neighborhoods;
 use crate::released::Released;
+use crate::{Error, named};
 
 /// The distance up to which a listed record supports a position, in the unit of the map.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,12 +42,12 @@ impl RecoverOptions {
     pub fn check(&self) -> Result<(), Error> {
         match self.delta {
             Delta::Fixed(delta) if !(delta.is_finite() && delta > 0.0) => {
-                Err(Error::new("delta", "a positive length", delta.to_string()))
+                Err(Error::new("delta", "a positive length", delta))
             }
             // Solvers compare squared distances in f32.
             Delta::Fixed(delta) if !(delta as f32 * delta as f32).is_normal() => {
                 let expected = "a length whose square is in the range of f32";
-                Err(Error::new("delta", expected, delta.to_string()))
+                Err(Error::new("delta", expected, delta))
             }
             Delta::Fixed(_) | Delta::Auto => Ok(()),
         }
@@ -85,44 +85,31 @@ pub trait Solver<const D: usize>: Debug + Send + Sync {
     }
 }
 
-/// A solver of this crate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Builtin {
-    /// On each slot's record, the position whose support is least probable by chance. The search is exact, and its cost does not
-    /// depend on the inlier ratio.
-    Consensus,
-    /// Our strongest attack: consensus with lists in both directions, then all slots together from the estimates of their neighbors,
-    /// last the positions under which the whole lists are likeliest, also by what they do not name.
-    Joint,
-    /// The sampling loop of the paper (section 4), for comparison.
-    Ransac,
-    /// The published density attacks on the records alone (Chelani et al. 2021, Lee et al. 2023, Moon et al. 2024), for comparison.
-    /// They recover nothing from planes and axis candidates.
-    Density,
-    /// Our strongest attack on the records alone: the density of points that makes the records likeliest, and its peak on each
-    /// record. It recovers nothing from planes.
-    Tomography,
+named! {
+    /// A solver of this crate, in the order of help texts.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Builtin {
+        /// Our strongest attack: consensus with lists in both directions, then all slots together from the estimates of their neighbors,
+        /// last the positions under which the whole lists are likeliest, also by what they do not name.
+        Joint = "joint",
+        /// On each slot's record, the position whose support is least probable by chance. The search is exact, and its cost does not
+        /// depend on the inlier ratio.
+        Consensus = "consensus",
+        /// The sampling loop of the paper (section 4), for comparison.
+        Ransac = "ransac",
+        /// The published density attacks on the records alone (Chelani et al. 2021, Lee et al. 2023, Moon et al. 2024), for comparison.
+        /// They recover nothing from planes and axis candidates.
+        Density = "density",
+        /// Our strongest attack on the records alone: the density of points that makes the records likeliest, and its peak on each
+        /// record. It recovers nothing from planes.
+        Tomography = "tomography",
+    }
 }
 
 impl Builtin {
-    /// All solvers, in the order of help texts.
-    pub const ALL: [Builtin; 5] =
-        [Self::Joint, Self::Consensus, Self::Ransac, Self::Density, Self::Tomography];
-
     /// The solvers that compute positions from lists. The others have no delta, and use lists only to decide which point of a
     /// paired line belongs to which slot.
     pub const FROM_LISTS: [Builtin; 3] = [Self::Joint, Self::Consensus, Self::Ransac];
-
-    /// Name of the solver on the command line.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Consensus => "consensus",
-            Self::Joint => "joint",
-            Self::Ransac => "ransac",
-            Self::Density => "density",
-            Self::Tomography => "tomography",
-        }
-    }
 
     /// Returns the solver called `name`. For one version, two former names are read: `ranking`, which is [`Self::Joint`] now, and
     /// `joint-start`, of which [`Self::Consensus`] is left.
@@ -135,8 +122,8 @@ impl Builtin {
             "joint-start" => "consensus",
             name => name,
         };
-        Self::ALL.into_iter().find(|solver| solver.name() == name).ok_or_else(|| {
-            let names = Self::ALL.map(|solver| solver.name()).join(", ");
+        Self::named(name).ok_or_else(|| {
+            let names = Self::ALL.map(Self::name).join(", ");
             Error::new("solver", format!("one of {names}"), name)
         })
     }
@@ -144,22 +131,5 @@ impl Builtin {
     /// Converts `solvers` to the type that an audit takes.
     pub fn list<const D: usize>(solvers: &[Self]) -> Vec<Arc<dyn Solver<D>>> {
         solvers.iter().map(|&solver| Arc::new(solver) as Arc<dyn Solver<D>>).collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::Builtin::{self, Consensus, Density, Joint, Ransac, Tomography};
-
-    /// Property tests run over these two lists, so no solver may be missing. A new variant does not compile until it is here.
-    #[test]
-    fn lists_hold_every_solver() {
-        let reads_lists = |solver: Builtin| match solver {
-            Joint | Consensus | Ransac => true,
-            Density | Tomography => false,
-        };
-        let all = [Joint, Consensus, Ransac, Density, Tomography];
-        assert_eq!(Builtin::ALL, all);
-        assert!(all.into_iter().filter(|&one| reads_lists(one)).eq(Builtin::FROM_LISTS));
     }
 }

@@ -43,18 +43,14 @@ impl<const D: usize> Released<D> {
         let most = if matches!(obfuscation, Obfuscation::Lines(_)) { 2 } else { 1 };
         if slots_per_record == 0 || slots_per_record > most {
             let expected = format!("1 to {most} for {}", obfuscation.family());
-            return Err(Error::new("slots per record", expected, slots_per_record.to_string()));
+            return Err(Error::new("slots per record", expected, slots_per_record));
         }
         if !origin.iter().all(|x| x.is_finite()) {
             return Err(Error::new("origin", "finite coordinates", format!("{origin:?}")));
         }
         let n_slots = obfuscation.len() * slots_per_record;
-        if let Some(descriptors) = &descriptors
-            && descriptors.len() != n_slots
-        {
-            let expected = format!("{n_slots} rows, one per slot");
-            return Err(Error::new("descriptors", expected, descriptors.len().to_string()));
-        }
+        let rows = descriptors.as_ref().map_or(n_slots, Descriptors::len);
+        Error::check_len("descriptors", rows, n_slots, " rows, one per slot")?;
         let fingerprint = Fingerprint([0; 16]);
         let bare = Self {
             obfuscation,
@@ -128,10 +124,7 @@ impl<const D: usize> Released<D> {
     /// # Errors
     /// When there is not one row per slot.
     pub fn with_protected(self, protected: ProtectedDescriptors) -> Result<Self, Error> {
-        if protected.len() != self.n_slots() {
-            let expected = format!("{} rows, one per slot", self.n_slots());
-            return Err(Error::new("descriptors", expected, protected.len().to_string()));
-        }
+        Error::check_len("descriptors", protected.len(), self.n_slots(), " rows, one per slot")?;
         let bare = Self { descriptors: None, protected: Some(protected), ..self };
         Ok(Self { fingerprint: bare.hashed(), ..bare })
     }

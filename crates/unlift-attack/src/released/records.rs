@@ -66,10 +66,18 @@ impl<const D: usize> Obfuscation<D> {
         }
     }
 
+    /// The rays, if that is the family.
+    pub(crate) fn rays(&self) -> Option<&Rays<D>> {
+        match self {
+            Self::Rays(rays) => Some(rays),
+            Self::Lines(_) | Self::AxisPlanes(_) | Self::AxisCandidates(_) => None,
+        }
+    }
+
     /// Whether the records are bearings from one center. All meet there, so neighbors say nothing about ranges, but whoever stands in
     /// the center sees the scene.
     pub fn is_bearings(&self) -> bool {
-        matches!(self, Self::Rays(rays) if rays.centers().len() == 1)
+        self.rays().is_some_and(|rays| rays.centers.len() == 1)
     }
 
     /// Name of the family in files.
@@ -101,10 +109,7 @@ impl<const D: usize> Lines<D> {
     /// # Errors
     /// When the columns differ in length, or a row is not finite or has no direction.
     pub fn through(points: &[[f64; D]], directions: &[[f64; D]]) -> Result<Self, Error> {
-        if points.len() != directions.len() {
-            let expected = format!("{} rows", points.len());
-            return Err(Error::new("line directions", expected, directions.len().to_string()));
-        }
+        Error::check_len("line directions", directions.len(), points.len(), " rows")?;
         let mut foot = Vec::with_capacity(points.len());
         let mut direction = Vec::with_capacity(points.len());
         for (row, (point, &along)) in points.iter().zip(directions).enumerate() {
@@ -164,29 +169,19 @@ impl<const D: usize> Rays<D> {
         directions: &[[f64; D]],
     ) -> Result<Self, Error> {
         if centers.is_empty() || centers.len() > 255 {
-            return Err(Error::new("ray centers", "1 to 255", centers.len().to_string()));
+            return Err(Error::new("ray centers", "1 to 255", centers.len()));
         }
-        if center.len() != directions.len() {
-            let expected = format!("{} rows", center.len());
-            return Err(Error::new("ray directions", expected, directions.len().to_string()));
-        }
+        Error::check_len("ray directions", directions.len(), center.len(), " rows")?;
         if let Some(row) = center.iter().position(|&c| usize::from(c) >= centers.len()) {
             let what = format!("center of record {row}");
             let expected = format!("an index below {}", centers.len());
-            return Err(Error::new(what, expected, center[row].to_string()));
+            return Err(Error::new(what, expected, center[row]));
         }
-        let centers = centers
-            .iter()
-            .enumerate()
-            .map(|(row, &c)| finite_f32(c, "center table entry", row))
-            .collect::<Result<_, _>>()?;
-        let direction = directions
-            .iter()
-            .enumerate()
-            .map(|(row, &d)| {
-                Ok(finite_f32(unit_direction(d, row)?, "direction", row)?.map(|x| x + 0.0))
-            })
-            .collect::<Result<_, Error>>()?;
+        let rounded = |(row, &c)| finite_f32(c, "center table entry", row);
+        let centers = centers.iter().enumerate().map(rounded).collect::<Result<_, _>>()?;
+        let unit =
+            |(row, &d)| Ok(finite_f32(unit_direction(d, row)?, "direction", row)?.map(|x| x + 0.0));
+        let direction = directions.iter().enumerate().map(unit).collect::<Result<_, Error>>()?;
         Ok(Self { centers, center, direction, regions: None })
     }
 
@@ -196,10 +191,7 @@ impl<const D: usize> Rays<D> {
     /// # Errors
     /// When there is not one region per center.
     pub fn with_regions(self, regions: Vec<Bounds<D>>) -> Result<Self, Error> {
-        if regions.len() != self.centers.len() {
-            let expected = format!("{}, one per center", self.centers.len());
-            return Err(Error::new("regions", expected, regions.len().to_string()));
-        }
+        Error::check_len("regions", regions.len(), self.centers.len(), ", one per center")?;
         Ok(Self { regions: Some(regions), ..self })
     }
 
@@ -237,22 +229,15 @@ impl<const D: usize> AxisPlanes<D> {
     /// # Errors
     /// When the columns differ in length, an axis is not below `D`, or an offset is not finite.
     pub fn try_new(axis: Vec<u8>, offset: &[f64]) -> Result<Self, Error> {
-        if axis.len() != offset.len() {
-            let expected = format!("{} rows", axis.len());
-            return Err(Error::new("plane offsets", expected, offset.len().to_string()));
-        }
+        Error::check_len("plane offsets", offset.len(), axis.len(), " rows")?;
         if let Some(row) = axis.iter().position(|&a| usize::from(a) >= D) {
             let what = format!("axis of record {row}");
-            return Err(Error::new(what, format!("below {D}"), axis[row].to_string()));
+            return Err(Error::new(what, format!("below {D}"), axis[row]));
         }
         let offset: Vec<f32> = offset.iter().map(|&x| x as f32 + 0.0).collect();
         if let Some(row) = offset.iter().position(|x| !x.is_finite()) {
             let what = format!("offset of record {row}");
-            return Err(Error::new(
-                what,
-                "a finite number in the range of f32",
-                offset[row].to_string(),
-            ));
+            return Err(Error::new(what, "a finite number in the range of f32", offset[row]));
         }
         Ok(Self { axis, offset })
     }
@@ -280,11 +265,8 @@ impl<const D: usize> AxisCandidates<D> {
     /// # Errors
     /// When a coordinate is not finite in `f32`.
     pub fn try_new(positions: &[[f64; D]]) -> Result<Self, Error> {
-        let position = positions
-            .iter()
-            .enumerate()
-            .map(|(row, &p)| Ok(finite_f32(p, "position", row)?.map(|x| x + 0.0)))
-            .collect::<Result<_, Error>>()?;
+        let rounded = |(row, &p)| Ok(finite_f32(p, "position", row)?.map(|x| x + 0.0));
+        let position = positions.iter().enumerate().map(rounded).collect::<Result<_, Error>>()?;
         Ok(Self { position })
     }
 

@@ -9,6 +9,7 @@
 
 mod triangulate;
 
+use std::collections::HashMap;
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -149,13 +150,11 @@ pub fn recover(
     let is_pair = matches!(own.released.obfuscation(), Obfuscation::AxisCandidates(_));
     let origin = own.released.origin();
     let estimate = |(n_views, fit): &(usize, Option<Fit>)| match fit {
-        Some(fit) => Estimate {
-            position: [0, 1].map(|c| (fit.place[c] - origin[c]) as f32),
-            status: Status::Ok,
-            support: fit.n_agree as u16,
-            axis: if is_pair { 1 - fit.line as u8 } else { 0 },
-            evidence: 0.0,
-        },
+        Some(fit) => {
+            let position = [0, 1].map(|c| (fit.place[c] - origin[c]) as f32);
+            let axis = if is_pair { 1 - fit.line } else { 0 };
+            Estimate::at(position, fit.n_agree as u32, axis, 0.0)
+        }
         None if *n_views < LEAST_VIEWS => Estimate::lost(Status::TooFewNeighbors),
         None => Estimate::lost(Status::NoSupport),
     };
@@ -246,8 +245,8 @@ const RATIO: f32 = 0.95;
 /// Links between the slots of all queries of a sequence.
 #[derive(Clone, Debug, Default)]
 pub struct Links {
-    /// Linked (query, slot) of each slot of each query, at most one per other query, sorted.
-    of_slot: Vec<Vec<Vec<(u32, u32)>>>,
+    /// Linked (query, slot) of each (query, slot) that has any, at most one per other query, sorted.
+    of_slot: HashMap<(u32, u32), Vec<(u32, u32)>>,
 }
 
 impl Links {
@@ -264,11 +263,9 @@ impl Links {
             };
             described.push(descriptors);
         }
-        let dim = described.first().map_or(0, |first| first.dim());
-        if let Some(at) = described.iter().position(|descriptors| descriptors.dim() != dim) {
-            let expected = format!("{dim} columns, as in query 0");
-            let what = format!("descriptors of query {at}");
-            return Err(Error::new(what, expected, described[at].dim().to_string()));
+        for (at, rows) in described.iter().enumerate() {
+            let (what, rule) = (format!("descriptors of query {at}"), " columns, as in query 0");
+            Error::check_len(&what, rows.dim(), described[0].dim(), rule)?;
         }
         let described = comparable(&described);
         let blocks: Vec<Blocks> = described.par_iter().map(|rows| Blocks::new(rows)).collect();
@@ -278,7 +275,7 @@ impl Links {
             .collect();
         let of_pair = |&(a, b): &(usize, usize)| mutual(&blocks[a], &blocks[b]);
         let found: Vec<_> = pairs.par_iter().with_max_len(1).map(of_pair).collect();
-        let mut links = Self::none(queries.iter().map(|query| query.released.n_slots()));
+        let mut links = Self::default();
         for (&(a, b), found) in pairs.iter().zip(&found) {
             for &(row, column, _) in found.iter().filter(|pair| pair.2 < RATIO * RATIO) {
                 links.link((a as u32, row), (b as u32, column));
@@ -287,16 +284,9 @@ impl Links {
         Ok(links)
     }
 
-    /// Links all slots of each track, a list of (query, slot). `n_slots` has the number of slots of each query. Of several slots of a
-    /// query in one track, the first counts.
-    ///
-    /// # Panics
-    /// When a track names a query or slot that does not exist.
-    pub fn of_tracks(
-        n_slots: impl IntoIterator<Item = usize>,
-        tracks: impl IntoIterator<Item = Vec<(u32, u32)>>,
-    ) -> Self {
-        let mut links = Self::none(n_slots);
+    /// Links all slots of each track, a list of (query, slot). Of several slots of a query in one track, the first counts.
+    pub fn of_tracks(tracks: impl IntoIterator<Item = Vec<(u32, u32)>>) -> Self {
+        let mut links = Self::default();
         for mut track in tracks {
             track.sort_unstable();
             for (at, &a) in track.iter().enumerate() {
@@ -320,22 +310,13 @@ impl Links {
         };
         let new: Vec<Vec<u32>> = of_slots.iter().map(inverse).collect();
         let moved = |&(query, slot): &(u32, u32)| (query, new[query as usize][slot as usize]);
-        let mut links = Self::none(of_slots.iter().map(Vec::len));
-        for (query, of) in of_slots.iter().enumerate() {
-            for (links, &old) in links.of_slot[query].iter_mut().zip(of) {
-                *links = self.of_slot[query][old as usize].iter().map(moved).collect();
-            }
-        }
-        links
-    }
-
-    fn none(n_slots: impl IntoIterator<Item = usize>) -> Self {
-        Self { of_slot: n_slots.into_iter().map(|n| vec![Vec::new(); n]).collect() }
+        let of_slot = |(at, linked): (_, &Vec<_>)| (moved(at), linked.iter().map(moved).collect());
+        Self { of_slot: self.of_slot.iter().map(of_slot).collect() }
     }
 
     fn link(&mut self, a: (u32, u32), b: (u32, u32)) {
         for (from, to) in [(a, b), (b, a)] {
-            let known = &mut self.of_slot[from.0 as usize][from.1 as usize];
+            let known = self.of_slot.entry(from).or_default();
             if let Err(at) = known.binary_search_by_key(&to.0, |link| link.0) {
                 known.insert(at, to);
             }
@@ -346,14 +327,14 @@ impl Links {
     /// not linked directly adds the slot to which most linked ones are linked.
     pub fn track(&self, query: usize, slot: usize, window: &Range<usize>) -> Vec<(u32, u32)> {
         let within = |link: &&(u32, u32)| window.contains(&(link.0 as usize));
-        let direct = &self.of_slot[query][slot];
+        let linked = |link: &(u32, u32)| self.of_slot.get(link).map_or(&[][..], Vec::as_slice);
+        let direct = linked(&(query as u32, slot as u32));
         let mut found: Vec<(u32, u32)> = direct.iter().filter(within).copied().collect();
         let is_new = |link: &&(u32, u32)| {
             let is_linked = direct.binary_search_by_key(&link.0, |direct| direct.0).is_ok();
             link.0 as usize != query && !is_linked
         };
-        let next = |&(other, at): &(u32, u32)| &self.of_slot[other as usize][at as usize];
-        let votes = found.iter().flat_map(|link| next(link).iter().filter(within).filter(is_new));
+        let votes = found.iter().flat_map(|link| linked(link).iter().filter(within).filter(is_new));
         let mut votes: Vec<(u32, u32)> = votes.copied().collect();
         votes.sort_unstable();
         for of_query in votes.chunk_by(|a, b| a.0 == b.0) {

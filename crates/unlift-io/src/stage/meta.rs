@@ -85,7 +85,7 @@ impl<'a> Meta<'a> {
     /// The unit of all lengths: as declared, else `usual`, else pixels in 2D.
     pub(super) fn unit<const D: usize>(&self, usual: Option<Unit>) -> Result<Unit, Error> {
         const UNITS: &str = "m, px or kth_neighbor";
-        let stated = self.given("unit", UNITS, |unit| Unit::from_name(unit.as_str()?))?;
+        let stated = self.given("unit", UNITS, |unit| Unit::named(unit.as_str()?))?;
         let unit = stated.or(usual).or((D == 2).then_some(Unit::Pixel));
         unit.ok_or_else(|| self.wrong("unit", UNITS))
     }

@@ -87,7 +87,7 @@ pub(super) fn recovered_of<const D: usize>(
     let about = meta.about()?;
     let why_unknown = match meta.text(WHY_UNKNOWN)? {
         None => Unknown::NotGiven,
-        Some(name) => Unknown::from_name(name).ok_or_else(|| {
+        Some(name) => Unknown::named(name).ok_or_else(|| {
             let names = Unknown::ALL.map(Unknown::name);
             meta.wrong(WHY_UNKNOWN, format!("one of {}", names.join(", ")))
         })?,

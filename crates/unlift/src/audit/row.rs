@@ -216,7 +216,7 @@ fn write_unit<S: Serializer>(unit: &Unit, to: S) -> Result<S::Ok, S::Error> {
 fn read_unit<'de, D: Deserializer<'de>>(from: D) -> Result<Unit, D::Error> {
     let name = String::deserialize(from)?;
     let expected = "unit: expected m, px or kth_neighbor, found";
-    Unit::from_name(&name).ok_or_else(|| serde::de::Error::custom(format!("{expected} {name}")))
+    Unit::named(&name).ok_or_else(|| serde::de::Error::custom(format!("{expected} {name}")))
 }
 
 fn single() -> u32 {

@@ -133,9 +133,10 @@ fn normals(points: &[[f64; 3]]) -> Result<Vec<Option<[f64; 3]>>, Error> {
     }
     let k = (points.len() / 100).clamp(4, 100) & !1;
     let knn = Knn::new(points)?;
-    Ok(knn.per_row(k, |row, found| {
-        local_normal(&points[row], found.iter().map(|&(_, at)| points[at as usize]))
-    }))
+    Ok(knn.per_row(
+        |_| k,
+        |row, found| local_normal(&points[row], found.iter().map(|&(_, at)| points[at as usize])),
+    ))
 }
 
 /// Returns a uniformly random pairing of `0..n`: consecutive entries of a random permutation. The

@@ -215,7 +215,7 @@ fn a_wrong_link_among_six_is_outvoted() {
     };
     let link = |query, at| (query as u32, slot(query, linked(query, at)) as u32);
     let track = |at: usize| (0..6).map(|query| link(query, at)).collect();
-    let (solved, errors) = sequence.solve(&Links::of_tracks([n; 6], (0..n).map(track)), 0);
+    let (solved, errors) = sequence.solve(&Links::of_tracks((0..n).map(track)), 0);
     assert!(solved.noise_px < 1.5, "{}", solved.noise_px);
     // A wrong line that passes nearby still pulls a little.
     assert!(errors.iter().all(|error| *error < 2.0), "{errors:?}");

@@ -53,7 +53,7 @@ pub struct Pair {
     pub both_ways: bool,
 }
 
-/// All hypotheses.
+/// All hypotheses. Patches are compared by their best one.
 #[derive(Clone, Debug)]
 pub struct Hypotheses {
     /// All different cells of versions.
@@ -131,16 +131,8 @@ fn sources(cell: usize, turn: usize, shift: [i32; 2]) -> Option<[(u8, f32); 4]> 
     let y = (cell / SIDE) as f64 - middle - f64::from(shift[1]);
     // Exact for even turns; the same bits on every machine for odd ones.
     const HALF: f64 = std::f64::consts::FRAC_1_SQRT_2;
-    let (cos, sin) = [
-        (1.0, 0.0),
-        (HALF, HALF),
-        (0.0, 1.0),
-        (-HALF, HALF),
-        (-1.0, 0.0),
-        (-HALF, -HALF),
-        (0.0, -1.0),
-        (HALF, -HALF),
-    ][turn % 8];
+    const COSINES: [f64; 8] = [1.0, HALF, 0.0, -HALF, -1.0, -HALF, 0.0, HALF];
+    let (cos, sin) = (COSINES[turn % 8], COSINES[(turn + 6) % 8]);
     let from = [cos * x + sin * y + middle, cos * y - sin * x + middle];
     let last = (SIDE - 1) as f64;
     // Rounding may move a border cell slightly outside.
@@ -149,14 +141,10 @@ fn sources(cell: usize, turn: usize, shift: [i32; 2]) -> Option<[(u8, f32); 4]> 
     }
     let low = from.map(|c| c.clamp(0.0, last).floor().min(last - 1.0));
     let part = [from[0].clamp(0.0, last) - low[0], from[1].clamp(0.0, last) - low[1]];
-    let mut result = [(0, 0.0); 4];
-    for (at, slot) in result.iter_mut().enumerate() {
+    let share = |high: usize, part: f64| if high == 1 { part } else { 1.0 - part };
+    Some([0, 1, 2, 3].map(|at| {
         let (right, down) = (at % 2, at / 2);
-        let share = |high: usize, part: f64| if high == 1 { part } else { 1.0 - part };
-        let column = low[0] as usize + right;
-        let row = low[1] as usize + down;
-        *slot =
-            ((row * SIDE + column) as u8, (share(right, part[0]) * share(down, part[1])) as f32);
-    }
-    Some(result)
+        let source = (low[1] as usize + down) * SIDE + low[0] as usize + right;
+        (source as u8, (share(right, part[0]) * share(down, part[1])) as f32)
+    }))
 }

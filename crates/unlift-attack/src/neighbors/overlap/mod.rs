@@ -5,12 +5,13 @@
 
 mod hypotheses;
 
-use hypotheses::{BINS, CELLS, Cell, DIM, Hypotheses, Version};
+pub use hypotheses::Hypotheses;
+use hypotheses::{BINS, CELLS, Cell, DIM, Version};
 
 use super::Neighborhoods;
 use super::compare::{KeptPairs, Likeness, note};
 use super::rows::Rows;
-use super::source::{Needs, Source};
+use super::sources::{Needs, Source};
 use super::walk::{Walk, ranked_by};
 use crate::descriptors::Values;
 use crate::released::Released;
@@ -57,8 +58,8 @@ impl<const D: usize> Source<D> for Overlap {
         kept: &mut KeptPairs,
     ) -> Result<Neighborhoods, Error> {
         let rows = Rows::new(released, k)?;
-        let patches = Patches::of(&rows.descriptors)?;
-        ranked_by(&patches, rows, Some(WALK), (released, k), kept)
+        let hypotheses = Hypotheses::of(&rows.descriptors)?;
+        ranked_by(&hypotheses, rows, Some(WALK), (released, k), kept)
     }
 
     fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
@@ -80,11 +81,6 @@ const LENGTH: f32 = 127.0;
 
 /// Least norm of shared cells. With a smaller one, blank parts (at the border of an image) would match each other.
 const NORM_FLOOR: f32 = 0.05;
-
-/// Compares patches by their overlap.
-pub struct Patches {
-    hypotheses: Hypotheses,
-}
 
 /// The versions of [`BLOCK`] patches, one after another, about 10 KB per patch. Rows beyond the last patch are zero.
 pub struct Block {
@@ -112,25 +108,38 @@ pub fn check(descriptors: &Descriptors) -> Result<(), Error> {
     Ok(())
 }
 
-impl Patches {
-    /// Creates the comparison for patches of `descriptors`.
-    ///
-    /// # Errors
-    /// When they are not SIFT, see [`check`].
-    pub fn of(descriptors: &Descriptors) -> Result<Self, Error> {
-        check(descriptors)?;
-        Ok(Self { hypotheses: Hypotheses::new() })
-    }
-}
-
-impl Likeness for Patches {
+impl Likeness for Hypotheses {
     const NAME: &'static str = "overlap";
     /// Scores are integers.
     const STEP: f32 = 1.0;
     type Block = Block;
 
     fn block(&self, descriptors: &Descriptors, slots: &[u32]) -> Block {
-        Block::new(&self.hypotheses, descriptors, slots)
+        let (of_turned, of_still) = (starts(&self.turned), starts(&self.still));
+        let mut turned = vec![0; of_turned[self.turned.len()]];
+        let mut still = vec![0; of_still[self.still.len()]];
+        let mut bytes = [0u8; DIM];
+        let mut mixed = vec![Mixed::default(); self.cells.len()];
+        for (row, &slot) in slots.iter().enumerate() {
+            let squares = squares(descriptors, slot as usize);
+            for (mixed, cell) in mixed.iter_mut().zip(&self.cells) {
+                *mixed = Mixed::new(&squares, cell);
+            }
+            for (version, start) in self.turned.iter().zip(&of_turned) {
+                let depth = version.depth();
+                quantize(&mixed, version, &mut bytes);
+                let at = start + row * depth;
+                turned[at..at + depth].copy_from_slice(&bytes[..depth]);
+            }
+            for (version, start) in self.still.iter().zip(&of_still) {
+                let depth = version.depth();
+                quantize(&mixed, version, &mut bytes);
+                for (at, &byte) in bytes[..depth].iter().enumerate() {
+                    still[start + simd::packed(row, at, depth)] = byte as i8;
+                }
+            }
+        }
+        Block { turned, still }
     }
 
     /// Computes the best cosine of shared cells over all hypotheses, as a product of bytes.
@@ -139,15 +148,23 @@ impl Likeness for Patches {
     }
 }
 
-impl Patches {
+impl Hypotheses {
+    /// Creates the hypotheses for patches of `descriptors`.
+    ///
+    /// # Errors
+    /// When they are not SIFT, see [`check`].
+    pub fn of(descriptors: &Descriptors) -> Result<Self, Error> {
+        check(descriptors)?;
+        Ok(Self::new())
+    }
+
     /// Computes the best cosine over the hypotheses whose shift `counts`.
     pub fn best(&self, a: &Block, b: &Block, counts: impl Fn(usize) -> bool, scores: &mut [f32]) {
         let mut forth = vec![0i16; BLOCK * BLOCK];
         let mut back = forth.clone();
-        let turned = starts(&self.hypotheses.turned);
-        let still = starts(&self.hypotheses.still);
-        for pair in self.hypotheses.pairs.iter().filter(|pair| counts(pair.shift)) {
-            let depth = self.hypotheses.turned[pair.turned].depth();
+        let (turned, still) = (starts(&self.turned), starts(&self.still));
+        for pair in self.pairs.iter().filter(|pair| counts(pair.shift)) {
+            let depth = self.turned[pair.turned].depth();
             let left = turned[pair.turned]..turned[pair.turned + 1];
             let right = still[pair.still]..still[pair.still + 1];
             let product = |left: &[u8], right: &[i8], best: &mut [i16]| {
@@ -175,53 +192,16 @@ fn starts(versions: &[Version]) -> Vec<usize> {
     starts
 }
 
-impl Block {
-    fn new(hypotheses: &Hypotheses, descriptors: &Descriptors, slots: &[u32]) -> Self {
-        let (of_turned, of_still) = (starts(&hypotheses.turned), starts(&hypotheses.still));
-        let mut turned = vec![0; of_turned[hypotheses.turned.len()]];
-        let mut still = vec![0; of_still[hypotheses.still.len()]];
-        let mut bytes = [0u8; DIM];
-        let mut mixed = vec![Mixed::default(); hypotheses.cells.len()];
-        for (row, &slot) in slots.iter().enumerate() {
-            let squares = squares(descriptors, slot as usize);
-            for (mixed, cell) in mixed.iter_mut().zip(&hypotheses.cells) {
-                *mixed = Mixed::new(&squares, cell);
-            }
-            for (version, start) in hypotheses.turned.iter().zip(&of_turned) {
-                let depth = version.depth();
-                quantize(&mixed, version, &mut bytes);
-                let at = start + row * depth;
-                turned[at..at + depth].copy_from_slice(&bytes[..depth]);
-            }
-            for (version, start) in hypotheses.still.iter().zip(&of_still) {
-                let depth = version.depth();
-                quantize(&mixed, version, &mut bytes);
-                for (at, &byte) in bytes[..depth].iter().enumerate() {
-                    still[start + simd::packed(row, at, depth)] = byte as i8;
-                }
-            }
-        }
-        Self { turned, still }
-    }
-}
-
 /// Returns the gradient histogram behind a RootSIFT descriptor: the squares of its values, with sum 1.
 fn squares(descriptors: &Descriptors, slot: usize) -> [[f32; BINS]; CELLS] {
-    let range = slot * DIM..(slot + 1) * DIM;
-    let mut squares = [0.0f32; DIM];
-    match descriptors.values() {
-        Values::U8(v) => {
-            for (square, &x) in squares.iter_mut().zip(&v[range]) {
-                *square = f32::from(x) * f32::from(x);
-            }
-        }
-        Values::F32(v) => {
-            let largest = v[range.clone()].iter().copied().fold(f32::MIN_POSITIVE, f32::max);
-            for (square, &x) in squares.iter_mut().zip(&v[range]) {
-                *square = (x / largest) * (x / largest);
-            }
-        }
-    }
+    let mut row = [0.0f32; DIM];
+    descriptors.read_row(slot, &mut row);
+    // Squares of floats may exceed their range.
+    let unit = match descriptors.values() {
+        Values::U8(_) => 1.0,
+        Values::F32(_) => row.into_iter().fold(f32::MIN_POSITIVE, f32::max),
+    };
+    let squares = row.map(|x| (x / unit) * (x / unit));
     let sum: f32 = squares.iter().sum::<f32>().max(f32::MIN_POSITIVE);
     std::array::from_fn(|cell| std::array::from_fn(|bin| squares[cell * BINS + bin] / sum))
 }

@@ -94,13 +94,12 @@ fn agreement<const D: usize>(lists: &Neighborhoods, estimates: &[Estimate<D>]) -
     let point = |e: &Estimate<D>| if e.is_known() { widen(&e.position) } else { far };
     let points: Vec<[f64; D]> = estimates.iter().map(point).collect();
     let Ok(tree) = Knn::new(&points) else { return 0.0 };
-    let n_near = |near: &mut Vec<(f64, u32)>, slot: usize| {
-        tree.nearest(slot, lists.of(slot).len(), near);
+    let n_near = |slot: usize, near: &[(f64, u32)]| {
         let is_near = |record: &&RecordId| near.iter().any(|&(_, row)| row == record.0);
         lists.of(slot).iter().filter(is_near).count()
     };
-    let near: usize = (0..points.len()).into_par_iter().map_init(Vec::new, n_near).sum();
-    near as f64 / lists.records().len().max(1) as f64
+    let near = tree.per_row(|slot| lists.of(slot).len(), n_near);
+    near.iter().sum::<usize>() as f64 / lists.records().len().max(1) as f64
 }
 
 /// Edges between likely neighbors, in both directions, with their lengths in radii.
@@ -317,12 +316,8 @@ impl<const D: usize> Ascent<'_, D> {
         let mut row_of = vec![None; self.rows.len()];
         (0u32..).zip(self.slots).for_each(|(row, &slot)| row_of[slot as usize] = Some(row));
         let tree = Knn::new(points).ok()?;
-        let radius2 = |near: &mut Vec<(f64, u32)>, row: usize| {
-            tree.nearest(row, self.lists.of(self.slots[row] as usize).len(), near);
-            near.last().map_or(0.0, |last| last.0)
-        };
-        let rows = (0..points.len()).into_par_iter();
-        let radius2: Vec<f64> = rows.clone().map_init(Vec::new, radius2).collect();
+        let length = |row: usize| self.lists.of(self.slots[row] as usize).len();
+        let radius2 = tree.per_row(length, |_, near| near.last().map_or(0.0, |last| last.0));
         let far = 1.0 + 2.0 * softness * REACH;
         let of_slot = |(marks, near): &mut (Vec<u8>, Vec<u32>), row: usize| {
             let slot = self.slots[row] as usize;
@@ -374,7 +369,7 @@ impl<const D: usize> Ascent<'_, D> {
             sum * libm::exp(at[row])
         };
         let buffers = || (vec![0u8; points.len()], Vec::new());
-        Some(rows.map_init(buffers, of_slot).collect())
+        Some((0..points.len()).into_par_iter().map_init(buffers, of_slot).collect())
     }
 }
 

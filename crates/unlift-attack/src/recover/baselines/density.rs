@@ -9,9 +9,10 @@
 
 use rayon::prelude::*;
 
+use crate::density::Peaks;
 use crate::density::feasible::{Feasible, Hides};
 use crate::density::peaks::maxima;
-use crate::density::{Peak, Peaks};
+use crate::recover::Estimate;
 use crate::recover::map::{LineRow, NO_GROUP, NO_VOTE};
 use crate::released::Released;
 
@@ -51,11 +52,12 @@ pub(crate) fn published<const D: usize>(released: &Released<D>) -> Peaks {
         let peaks = modes.unwrap_or_default().map(|t| t.and_then(|t| on(&lines[row], t)));
         (peaks, reach)
     };
-    let rows: Vec<([Option<Peak>; 2], f32)> = (0..lines.len()).into_par_iter().map(place).collect();
+    let rows: Vec<([Option<Estimate<3>>; 2], f32)> =
+        (0..lines.len()).into_par_iter().map(place).collect();
     let resolution = median(rows.iter().map(|row| row.1));
     let per_record = if feasible.hides == Hides::Two { 2 } else { 1 };
     let peaks = rows.into_iter().flat_map(|row| row.0.into_iter().take(per_record));
-    let mut of: Vec<Option<Peak>> = peaks.collect();
+    let mut of: Vec<Option<Estimate<3>>> = peaks.collect();
     if feasible.hides == Hides::One {
         for _ in 0..REFINEMENTS {
             of = refine(lines, &of, every);
@@ -65,7 +67,11 @@ pub(crate) fn published<const D: usize>(released: &Released<D>) -> Peaks {
 }
 
 /// Refines once: lines vote that pass near the estimate of a line and whose own estimates are near that line. Every `every`-th line votes.
-fn refine(lines: &[LineRow<3>], estimates: &[Option<Peak>], every: usize) -> Vec<Option<Peak>> {
+fn refine(
+    lines: &[LineRow<3>],
+    estimates: &[Option<Estimate<3>>],
+    every: usize,
+) -> Vec<Option<Estimate<3>>> {
     let distance2 = |line: &LineRow<3>, x: [f32; 3]| line.distance2(&x, line.along(&x));
     let step = |row: usize| {
         let estimate = estimates[row]?;
@@ -122,10 +128,10 @@ fn nearest(
     (keys.iter().map(|&key| key as u32 as usize).collect(), reach)
 }
 
-fn on(line: &LineRow<3>, t: f64) -> Option<Peak> {
+fn on(line: &LineRow<3>, t: f64) -> Option<Estimate<3>> {
     let position = line.at(t as f32);
     let finite = position.iter().all(|x: &f32| x.is_finite());
-    finite.then_some(Peak { position, axis: 0, evidence: 0.0 })
+    finite.then(|| Estimate::at(position, 0, 0, 0.0))
 }
 
 fn median(values: impl Iterator<Item = f32>) -> f64 {

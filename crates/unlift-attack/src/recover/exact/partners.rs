@@ -152,22 +152,18 @@ impl<'a> Strips<'a> {
 
     /// Returns all possible partners of all records: offsets of the rows, and the partners in ascending order.
     fn rows(&self) -> (Vec<usize>, Vec<u32>) {
-        let part = |records: Range<usize>| {
-            let (mut ends, mut of) = (Vec::with_capacity(records.len()), Vec::new());
-            for i in records {
-                let start = of.len();
-                of.extend(self.of(i));
-                of[start..].sort_unstable();
-                ends.push(of.len());
-            }
-            (ends, of)
+        let row = |i: usize| {
+            let mut row: Vec<u32> = self.of(i).collect();
+            row.sort_unstable();
+            row
         };
-        let (mut offsets, mut all) = (vec![0], Vec::new());
-        for (ends, of) in by_part(self.sides.len(), part) {
-            offsets.extend(ends.iter().map(|end| all.len() + end));
-            all.extend(of);
-        }
-        (offsets, all)
+        let rows: Vec<Vec<u32>> = (0..self.sides.len()).into_par_iter().map(row).collect();
+        let mut offsets = vec![0];
+        offsets.extend(rows.iter().scan(0, |end, row| {
+            *end += row.len();
+            Some(*end)
+        }));
+        (offsets, rows.concat())
     }
 
     /// Returns [`rows`](Self::rows) with some of the possible partners only.
@@ -177,13 +173,8 @@ impl<'a> Strips<'a> {
         let mut pairs = by_part(self.sides.len(), part).concat();
         pairs.par_sort_unstable();
         pairs.dedup();
-        let mut offsets = vec![0; self.sides.len() + 1];
-        for (i, _) in &pairs {
-            offsets[*i as usize + 1] += 1;
-        }
-        for i in 0..self.sides.len() {
-            offsets[i + 1] += offsets[i];
-        }
+        let start = |i: usize| pairs.partition_point(|pair| (pair.0 as usize) < i);
+        let offsets = (0..=self.sides.len()).map(start).collect();
         (offsets, pairs.into_iter().map(|(_, j)| j).collect())
     }
 

@@ -12,7 +12,6 @@ use crate::neighbors::Neighborhoods;
 use crate::recover::map::grid::Grid;
 use crate::recover::map::lines::{LineRow, MOST_CHANCE};
 use crate::recover::map::places::{evenly, trimmed_box};
-use crate::simd::{Kernel, dispatch};
 
 /// Largest number of cells of a grid: 32 per axis, because density varies over the size of a room.
 pub(crate) const CELLS: usize = 1 << 15;
@@ -94,9 +93,7 @@ pub(crate) fn of_lines<const D: usize>(
         let chosen: Vec<usize> = evenly(rows.len(), CELLS).filter(of_others).collect();
         let weight = chosen.iter().map(|&r| counts[r] as f32).sum();
         let mut total = Grid::over(low, high, CELLS);
-        let lengths = |records: &[usize]| {
-            dispatch(Lengths { grid: total.clone(), rows, counts: &counts, records })
-        };
+        let lengths = |records: &[usize]| lengths(total.clone(), rows, &counts, records);
         // Eight parts for any number of threads, so that the order of sums is fixed.
         let parts: Vec<Grid<D>> =
             chosen.par_chunks(chosen.len().div_ceil(8).max(1)).map(lengths).collect();
@@ -109,36 +106,28 @@ pub(crate) fn of_lines<const D: usize>(
 }
 
 /// Adds the lengths of some records, each as often as it is listed, to a grid.
-struct Lengths<'a, const D: usize> {
-    grid: Grid<D>,
-    rows: &'a [LineRow<D>],
-    counts: &'a [u32],
-    records: &'a [usize],
-}
-
-impl<const D: usize> Kernel for Lengths<'_, D> {
-    type Output = Grid<D>;
-
-    #[inline(always)]
-    fn run(self) -> Grid<D> {
-        let Self { mut grid, rows, counts, records } = self;
-        let (mut t, mut cells) = (Vec::new(), Vec::new());
-        for &record in records {
-            let (row, weight) = (&rows[record], counts[record] as f32);
-            let inside = grid.clip(&row.through, &row.direction, row.floor(), row.to);
-            let Some((from, to)) = inside else { continue };
-            let steps = ((to - from) / grid.cell).ceil().max(1.0);
-            let step = (to - from) / steps;
-            t.clear();
-            t.extend((0..steps as i32).map(|i| from + (i as f32 + 0.5) * step));
-            cells.resize(t.len(), 0);
-            grid.cells_along(&row.through, &row.direction, &t, &mut cells);
-            for &cell in &cells {
-                grid.values[cell as usize] += weight * step;
-            }
+fn lengths<const D: usize>(
+    mut grid: Grid<D>,
+    rows: &[LineRow<D>],
+    counts: &[u32],
+    records: &[usize],
+) -> Grid<D> {
+    let (mut t, mut cells) = (Vec::new(), Vec::new());
+    for &record in records {
+        let (row, weight) = (&rows[record], counts[record] as f32);
+        let inside = grid.clip(&row.through, &row.direction, row.floor(), row.to);
+        let Some((from, to)) = inside else { continue };
+        let steps = ((to - from) / grid.cell).ceil().max(1.0);
+        let step = (to - from) / steps;
+        t.clear();
+        t.extend((0..steps as i32).map(|i| from + (i as f32 + 0.5) * step));
+        cells.resize(t.len(), 0);
+        grid.cells_along(&row.through, &row.direction, &t, &mut cells);
+        for &cell in &cells {
+            grid.values[cell as usize] += weight * step;
         }
-        grid
     }
+    grid
 }
 
 /// Returns how many lists name each record.

@@ -108,23 +108,33 @@ impl<const D: usize> Grid<D> {
 
     /// Adds `weight` at `place`, distributed linearly over the cells around it.
     pub(crate) fn spread(&mut self, place: &[f32; D], weight: f32) {
-        let mut first = [0usize; D];
-        let mut share = [0.0f32; D];
-        for c in 0..D {
-            let at =
-                ((place[c] - self.low[c]) / self.cell - 0.5).clamp(0.0, (self.dims[c] - 1) as f32);
-            first[c] = at as usize;
-            share[c] = at - first[c] as f32;
+        let lower = std::array::from_fn(|c| self.lower(c, place[c]));
+        for corner in 0..1 << D {
+            let (index, share) = self.corner(corner, &lower, weight);
+            self.values[index] += share;
         }
-        for corner in 0..1usize << D {
-            let (mut index, mut w) = (0, weight);
-            for c in 0..D {
-                let up = corner >> c & 1;
-                index = index * self.dims[c] + (first[c] + up).min(self.dims[c] - 1);
-                w *= if up == 1 { share[c] } else { 1.0 - share[c] };
-            }
-            self.values[index] += w;
+    }
+
+    /// Returns the lower of the two cells around coordinate `x` of axis `c`, and the share of the upper one.
+    pub(crate) fn lower(&self, c: usize, x: f32) -> (usize, f32) {
+        let at = ((x - self.low[c]) / self.cell - 0.5).clamp(0.0, self.last[c]);
+        (at as usize, at - at.floor())
+    }
+
+    /// Returns the index of one of the `2^D` cells around a place, and its share of `weight`; `lower` is that of each axis.
+    pub(crate) fn corner(
+        &self,
+        corner: usize,
+        lower: &[(usize, f32); D],
+        mut weight: f32,
+    ) -> (usize, f32) {
+        let mut index = 0;
+        for (c, &(low, share)) in lower.iter().enumerate() {
+            let up = corner >> c & 1;
+            index = index * self.dims[c] + (low + up).min(self.dims[c] - 1);
+            weight *= if up == 1 { share } else { 1.0 - share };
         }
+        (index, weight)
     }
 
     /// Returns the part `[from, to]` of the line `through + t direction` inside the box, if any.

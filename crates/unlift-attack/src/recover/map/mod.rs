@@ -2,10 +2,9 @@
 //!
 //! From the bottom up: estimates per slot (`places`); a grid of cells and the density of estimates on it (`grid`); rows per record and
 //! their sections with a feasible line (`lines`); the chance that a random record passes near a place (`chance`); all of these for one map
-//! (`family`, `families`); the neighborhood graph (`graph`).
+//! (`family`); the neighborhood graph (`graph`).
 
 mod chance;
-mod families;
 mod family;
 mod graph;
 mod grid;
@@ -13,8 +12,7 @@ mod lines;
 mod places;
 
 pub(crate) use chance::mixed;
-pub(crate) use families::{CandidateFamily, LineFamily, PlaneFamily};
-pub(crate) use family::{Family, Piece};
+pub(crate) use family::{CandidateFamily, Family, LineFamily, Piece, PlaneFamily};
 pub(crate) use graph::{CLASSES, Graph, Listers, Side, record_of, side};
 pub(crate) use grid::{Density, Grid};
 pub(crate) use lines::{

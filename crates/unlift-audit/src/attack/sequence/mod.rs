@@ -275,7 +275,7 @@ fn tracks(views: &[View], secrets: &[Secret]) -> Links {
             }
         }
     }
-    Links::of_tracks(secrets.iter().map(Secret::n_slots), of_point.into_values())
+    Links::of_tracks(of_point.into_values())
 }
 
 struct Protected<'a> {
