@@ -39,7 +39,7 @@ pub const SCHEMES: &[Entry] = &[
 ];
 
 /// Built-in schemes that are audited only on request: their records meet in one point, so crossings give no position.
-pub const ON_REQUEST: &[Entry] = &[ray::SPHERE, olc::GRAVITY];
+pub const ON_REQUEST: &[Entry] = &[ray::SPHERE];
 
 /// Returns all built-in schemes.
 pub fn all() -> impl Iterator<Item = &'static Entry> {

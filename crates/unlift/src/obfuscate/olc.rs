@@ -1,5 +1,4 @@
-//! Schemes of lines through single points: `olc`, a uniformly random line through every point of a map; `lines2d`, the same in images;
-//! and `lines2d-gravity`.
+//! Schemes of lines through single points: `olc`, a uniformly random line through every point of a map; and `lines2d`, the same in images.
 //!
 //! The size of an image is released, so a hidden keypoint lies on a chord. Scale and orientation of keypoints are not released.
 
@@ -7,7 +6,6 @@ use rayon::prelude::*;
 
 use super::scheme::{Entry, Lift, Lifted, LocalPoints, SchemeOptions};
 use crate::Error;
-use crate::geometry::vector::sub;
 use crate::released::{Lines, Obfuscation};
 use crate::seed::{Key, Stage};
 
@@ -43,37 +41,5 @@ fn lift<const D: usize>(
     let direction = |row: usize| key.draws(row as u64).direction();
     let rows = (0..points.positions.len()).into_par_iter();
     let directions: Vec<[f64; D]> = rows.map(direction).collect();
-    Ok(Lifted::one_each(Obfuscation::Lines(Lines::through(points.positions, &directions)?)))
-}
-
-/// Registry entry of the variant.
-pub const GRAVITY: Entry = Entry {
-    title: "Lines along gravity in the image",
-    rule: "Each keypoint becomes the line through it and the image of the gravity direction.",
-    color: 7,
-    source: "Geppert et al., Privacy Preserving Structure-from-Motion, ECCV 2020",
-    hidden: "the position along the line (1 of 2 coordinates)",
-    patents: "none found",
-    ..Entry::new("lines2d-gravity", Lift::In2d(along_gravity))
-};
-
-/// Focal length over the tangent of the assumed tilt, in longer sides of the image.
-const BELOW: f64 = 1.2 / 0.267_949;
-
-/// Lines through the image of the gravity direction, as proposed for structure from motion. Images have no gravity here, so the camera
-/// is assumed to be upright and tilted down by 15 degrees, with a focal length of 1.2 times the longer side. All lines then meet in one
-/// point below the image.
-fn along_gravity(
-    points: &LocalPoints<'_, 2>,
-    _: &Key,
-    _: &SchemeOptions,
-) -> Result<Lifted<2>, Error> {
-    let Some(image) = points.bounds else {
-        return Err(Error::new("image size", "known: gravity points below it", "none"));
-    };
-    let [width, height] = sub(&image.high, &image.low);
-    let [x, y] = image.center();
-    let below = [x, y + BELOW * width.max(height)];
-    let directions: Vec<[f64; 2]> = points.positions.iter().map(|p| sub(&below, p)).collect();
     Ok(Lifted::one_each(Obfuscation::Lines(Lines::through(points.positions, &directions)?)))
 }

@@ -30,7 +30,7 @@ use rayon::prelude::*;
 use crate::geometry::knn::{Knn, LEAF};
 use crate::geometry::vector::widen;
 use crate::recover::map::{
-    Candidate, Family, Piece, Step, along_curve, distance2, known, ln, solve_slots, unit,
+    Candidate, Family, Piece, Step, along_curve, distance2, evenly, known, ln, solve_slots, unit,
 };
 use crate::recover::problem::Problem;
 use crate::recover::result::{Estimate, Status};
@@ -58,9 +58,10 @@ const CANDIDATES: usize = 40;
 const OF_EDGES: f32 = 0.67;
 /// An edge proposes a candidate if the squared distance of its place to the record is below this, in squared widths.
 const NEAR2: f32 = 2.0;
-/// Number of random places that are tried for candidates that no edge proposes, and their largest squared distance to the record.
+/// Number of random places that are tried for candidates that no edge proposes, and their largest squared distance to the record, in images
+/// and in maps.
 const PROPOSALS: usize = 300;
-const PROPOSAL_NEAR2: f32 = 0.3;
+const PROPOSAL_NEAR2: [f32; 2] = [0.3, 1.0];
 /// Candidates are at least this far apart, in widths; kept places are farther apart than [`MERGED`] typical widths.
 const APART: f32 = 0.25;
 const MERGED: f32 = 0.3;
@@ -69,6 +70,8 @@ const LEAST_RANGE: f32 = 1.5;
 /// The pattern search starts with this step, in typical widths, and ends below the second one, or after some changes of the step.
 const STEPS: (f32, f32) = (0.35, 0.04);
 const MAX_STEPS: usize = 15;
+/// An estimate of joint recovery stays if this step moves it by less than this part of a typical width, plus the share of short edges.
+const AGREED: f32 = 0.3;
 /// Places with less weight are dropped.
 const LEAST_WEIGHT: f32 = 1e-3;
 
@@ -122,14 +125,32 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
         }
         tables = Some(learned);
     }
-    // Where both agree, the least squares of joint recovery are more precise than the kernel of the density.
-    let agreed = typical.unwrap_or(0.0).powi(2);
+    // Near its place, the least squares of joint recovery are more precise than this step, the farther the better the lists are.
+    let typical = typical.unwrap_or(0.0);
+    let agreed = ((AGREED + short_edges(problem, &estimates, typical)) * typical).powi(2);
     for (estimate, start) in estimates.iter_mut().zip(start) {
         if start.is_known() && distance2(&start.position, &estimate.position) < agreed {
             *estimate = start;
         }
     }
     estimates
+}
+
+/// Returns the share of edges between estimates that are less than `width` apart.
+fn short_edges<const D: usize, F: Family<D>>(
+    problem: &Problem<'_, D, F>,
+    estimates: &[Estimate<D>],
+    width: f32,
+) -> f32 {
+    let (mut short, mut all) = (0, 0);
+    for slot in evenly(estimates.len(), 1 << 12) {
+        let place = &estimates[slot].position;
+        for (end, _) in problem.graph.of(slot) {
+            all += 1;
+            short += u32::from(distance2(place, &estimates[end].position) < width * width);
+        }
+    }
+    short as f32 / all.max(1) as f32
 }
 
 /// Returns the weight of each estimate of joint recovery, by the rank of its evidence.
@@ -418,7 +439,8 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
                 break;
             }
             let x = own.project(y);
-            if distance2(&x, y) < PROPOSAL_NEAR2 * typical * typical && !self.is_at_center(&own, &x)
+            if distance2(&x, y) < PROPOSAL_NEAR2[D - 2] * typical * typical
+                && !self.is_at_center(&own, &x)
             {
                 add(candidates, first, x, piece, APART * typical);
             }
