@@ -411,8 +411,12 @@ pub(crate) fn short(length: f64) -> String {
 /// made-up descriptors that change smoothly up to 0.81.
 const FOLLOWS: f64 = 0.9;
 
+/// Rounding of published positions, as a part of the size of the map: that of 32-bit floats.
+const ROUNDING: f64 = 1e-6;
+
 /// Measures the attack that takes published values for the points: each of `published` has a position per record. Of a pair, the
-/// values are those of its two points in any order.
+/// values are those of its two points in any order. If most values of a column are points of the map, whichever records hide these,
+/// all of its values count for all points.
 pub(crate) fn read_from_file(
     published: &[Vec<[f64; 3]>],
     original: &Original<3>,
@@ -423,9 +427,21 @@ pub(crate) fn read_from_file(
     let point = |slot: usize| &original.reveal().positions()[secret.hidden()[slot].index()];
     let columns: Vec<&[Vec<[f64; 3]>]> =
         if slots == 1 { published.chunks(1).collect() } else { vec![published] };
+    let points = original.reveal().positions();
+    let rounding = ROUNDING * across(points);
+    let all_points = Knn::new(points).ok();
+    let are_points = |values: &&Vec<[f64; 3]>| {
+        let is_point = |value: &&[f64; 3]| {
+            all_points.as_ref().is_some_and(|of| nearest_to(**value, of) <= rounding)
+        };
+        2 * values.iter().filter(is_point).count() > values.len()
+    };
+    let open: Vec<Knn<'_, 3>> =
+        published.iter().filter(are_points).filter_map(|values| Knn::new(values).ok()).collect();
     let within = |columns: &[Vec<[f64; 3]>], threshold: f64| {
         let is_near = |&slot: &usize| {
             columns.iter().any(|rows| distance(&rows[slot / slots], point(slot)) <= threshold)
+                || open.iter().any(|values| nearest_to(*point(slot), values) <= threshold)
         };
         (0..secret.n_slots()).filter(is_near).count()
     };
@@ -435,6 +451,12 @@ pub(crate) fn read_from_file(
     };
     let shares = thresholds.iter().map(best).collect();
     (!published.is_empty()).then_some(Alone { name: "read from the file", shares })
+}
+
+fn nearest_to(position: [f64; 3], points: &Knn<'_, 3>) -> f64 {
+    let mut near = Vec::new();
+    points.nearest_to(position, 1, &mut near);
+    near.first().map_or(f64::INFINITY, |nearest| nearest.0.sqrt())
 }
 
 /// Returns doubts about released data whose rows or columns follow the places of the points, which no attack uses.

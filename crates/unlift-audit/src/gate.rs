@@ -6,8 +6,8 @@
 //!
 //! `ppl@0.5:0.10<=20` fails if more than 20 % of the points are recovered within 0.10 under `ppl`
 //! at inlier ratio 0.5. `SCHEME` may be `all`. Without `@RATIO`, a solver or a source, all of them
-//! count. Every noise model and K counts. The upper end of the 95 % interval of the strongest attack decides. Without a solver and a
-//! source, attacks that need no neighborhoods count as well (the blind guess and records alone).
+//! count. Every noise model and K counts. The upper end of the 95 % interval of the strongest attack decides. Attacks that need no
+//! neighborhoods (the blind guess and records alone) count as well, unless a solver or the oracle is named.
 //! `:gain` bounds what neighborhoods add to the larger of these two baselines, in percentage
 //! points. `SCHEME:localization<=MULTIPLE` fails if the error of localization exceeds the
 //! unprotected one by more than this factor. Numbers are compared by value, so `0.1` matches the threshold `0.10`. No name of a
@@ -110,7 +110,9 @@ impl Gate {
         let recovered = row.recovered(label).unwrap_or(unknown);
         let baseline = row.baseline(label).unwrap_or(unknown);
         match self.figure {
-            Figure::Recovered if self.solver.is_none() && self.source.is_none() => {
+            Figure::Recovered
+                if self.solver.is_none() && self.source.as_deref() != Some(ORACLE) =>
+            {
                 if is_worse(&baseline, &recovered) { baseline } else { recovered }
             }
             Figure::Recovered => recovered,
@@ -517,6 +519,8 @@ mod tests {
         let sources = &[row("ppl", 0.5, 30.0), weak, own][..];
         // `olc` with `similarity` recovered 58.6 % but records alone 66.6 %, and a gate of 60 held.
         let alone = &[with_baseline("olc", 0.5, 58.6, 66.6)][..];
+        let by_overlap = Row { neighbors: "overlap".into(), oracle_noise: None, ..alone[0].clone() };
+        let by_overlap = &[by_overlap][..];
         let measured = &[Row { oracle_noise: None, ..row("ppl", 0.5, 18.0) }][..];
         let others = &[row("ppl", 1.0, 99.0), row("olc", 0.5, 98.0), row("ppl", 0.5, 18.0)][..];
         for (text, rows, expected) in [
@@ -532,8 +536,9 @@ mod tests {
             ("ppl:ransac:0.10<=20", sources, Some(12.0)),
             ("ppl:overlap:0.10<=20", sources, Some(15.0)),
             ("ppl:ransac:overlap:0.10<=20", sources, None),
-            // What needs no neighborhoods counts unless an attack is named.
+            // What needs no neighborhoods counts unless a solver or the oracle is named.
             ("olc:0.10<=60", alone, Some(66.6)),
+            ("olc:overlap:0.10<=60", by_overlap, Some(66.6)),
             ("all@0.5:0.10<=60", alone, Some(66.6)),
             ("olc:joint:0.10<=60", alone, Some(58.6)),
             ("olc:oracle:0.10<=60", alone, Some(58.6)),

@@ -6,7 +6,7 @@ use jiff::{Timestamp, tz::TimeZone};
 use serde::Serialize;
 use serde_json::json;
 
-use crate::attack::{self, Attack, Given};
+use crate::attack::{self, Attack, Basis, Given};
 use crate::document::{Document, Error, Input, Localization, Row};
 use crate::results::{Results, distinct};
 use crate::{templates, words};
@@ -156,7 +156,8 @@ pub fn compare(
     let [was, is] = &[old, new].map(Results::of);
     let within = common_thresholds(was, is)?;
     let mut all = Vec::new();
-    let mut only_new = Vec::new();
+    // Attacks of the new audit alone, beside the strongest of the old one. They count if they recover more.
+    let (mut only_new, mut new_attacks) = (Vec::new(), Vec::new());
     let mut taken = vec![false; was.rows.len()];
     for row in is.rows {
         let attack = Attack::of(row);
@@ -164,6 +165,12 @@ pub fn compare(
             |(before, taken): (&Row, &bool)| !taken && attack.is_of(before) && before.k == row.k;
         let Some(at) = was.rows.iter().zip(&taken).position(is_like) else {
             only_new.push(unmatched(row));
+            if attack::basis(row) != Basis::Oracle {
+                let strongest = |typed: &str| strongest(was, &row.scheme, typed);
+                let own = |typed: &str| row.recovered_percent.get(typed).copied();
+                let shares: [&dyn Fn(&str) -> Option<f64>; 2] = [&strongest, &own];
+                new_attacks.extend(changes(&within, &row.scheme, &attack_of(row), shares));
+            }
             continue;
         };
         taken[at] = true;
@@ -208,6 +215,7 @@ pub fn compare(
         all.into_iter().partition(|change| change.points > beyond);
     let (mut less, same): (Vec<_>, Vec<_>) =
         rest.into_iter().partition(|change| change.points < -beyond);
+    more.extend(new_attacks.into_iter().filter(|change: &Change| change.points > beyond));
     more.sort_by(|a, b| b.points.total_cmp(&a.points));
     less.sort_by(|a, b| a.points.total_cmp(&b.points));
     let differs = |of: Incomparable| {
@@ -232,6 +240,14 @@ pub fn compare(
         && comparison.more.is_empty()
         && comparison.costs_more.is_empty();
     Ok(comparison)
+}
+
+/// Returns the percentage that the strongest attack on the released data of a scheme recovers, a baseline included.
+fn strongest(results: &Results<'_>, scheme: &str, typed: &str) -> Option<f64> {
+    let rows = results.of_scheme(scheme).filter(|row| attack::basis(row) != Basis::Oracle);
+    let own = rows.filter_map(|row| row.recovered_percent.get(typed).copied());
+    let alone = results.records_alone(scheme, typed).map(|(percent, _)| percent);
+    own.chain(results.blind(scheme, typed)).chain(alone).reduce(f64::max)
 }
 
 /// Returns the changes of a figure from the old to the new audit, by pairs of thresholds.

@@ -12,7 +12,7 @@ use crate::results::Results;
 /// descriptors if it has some; `public` the origin of the public descriptors of a protection, as in the options of an audit.
 ///
 /// # Errors
-/// If the document is about another map, unit or descriptors, about less than is released, or lacks the scheme.
+/// If the document is about another map, unit or descriptors, or lacks the scheme.
 pub fn leak(
     document: &Document,
     input: &Input,
@@ -34,8 +34,14 @@ pub fn leak(
         return wrong(place, &format!("{found}, as of this release"), expected);
     }
     let has_rows = |of: &Input| of.other_sha256.contains_key("descriptors");
-    if has_rows(input) && !has_rows(audited) {
-        return wrong("input", "an audit with the descriptors of this release", "one without");
+    match [audited, input].map(has_rows) {
+        [false, true] => {
+            return wrong("input", "an audit with the descriptors of this release", "one without");
+        }
+        [true, false] => {
+            return wrong("input", "a release with descriptors, as in the audit", "one without");
+        }
+        _ => {}
     }
     let known = document.options.get("public_descriptors").and_then(Value::as_str);
     if let Some(public) = public.filter(|&public| known != Some(public)) {

@@ -234,13 +234,19 @@ fn a_released_file_that_gives_places_away_is_no_protection() {
     let random = draws.permutation(N);
     let mut sorted = random.clone();
     sorted.sort_by(|&a, &b| places[a as usize][0].total_cmp(&places[b as usize][0]));
-    let mut said = |order: &[u32], described: bool, offset: f64| {
+    let others = draws.permutation(N);
+    let mut said = |order: &[u32], described: bool, offset: f64, of_others: bool| {
         let directions: Vec<[f64; 3]> =
             order.iter().map(|_| [0; 3].map(|_| draws.between(-1.0, 1.0))).collect();
         let foot = |(&at, along): (&u32, &[f64; 3])| {
             std::array::from_fn(|c| places[at as usize][c] + offset * along[c])
         };
         let feet: Vec<[f64; 3]> = order.iter().zip(&directions).map(foot).collect();
+        // The lines are through their own points, but another point may be published for each.
+        let published = match of_others {
+            true => others.iter().map(|&at| places[at as usize]).collect(),
+            false => feet.clone(),
+        };
         let lines = Obfuscation::Lines(Lines::through(&feet, &directions).unwrap());
         let heights = order.iter().flat_map(|&at| [0.5, 3.0 * places[at as usize][2] as f32]);
         let rows = Descriptors::try_new(Values::F32(heights.collect()), 2).unwrap();
@@ -252,7 +258,7 @@ fn a_released_file_that_gives_places_away_is_no_protection() {
         let secret = secret.with_map(Some(released.fingerprint()));
         let release = (released, secret);
         let map = Map { plan: plan(&["olc"]), ..Map::of(&points.original) };
-        let input = Input::Released(map, Hidden { release: &release, published: vec![feet] });
+        let input = Input::Released(map, Hidden { release: &release, published: vec![published] });
         let document = audited(&points, &input, &["olc:joint:0.10<=100"]).unwrap().document;
         let read = document.results[0].records_alone_percent.as_ref().map(|by| by["0.10"]);
         let gate = &document.gates[0];
@@ -262,11 +268,12 @@ fn a_released_file_that_gives_places_away_is_no_protection() {
         );
         (read, gate.reason.clone().unwrap_or_default())
     };
-    assert_eq!(said(&random, false, 30.0), (None, String::new()));
-    assert_eq!(said(&random, false, 0.0), (Some(100.0), String::new()));
-    let (_, order) = said(&sorted, false, 30.0);
+    assert_eq!(said(&random, false, 30.0, false), (None, String::new()));
+    assert_eq!(said(&random, false, 0.0, false), (Some(100.0), String::new()));
+    assert_eq!(said(&random, false, 30.0, true), (Some(100.0), String::new()));
+    let (_, order) = said(&sorted, false, 30.0, false);
     assert!(order.starts_with("order of records: after "), "{order}");
-    let (_, column) = said(&random, true, 30.0);
+    let (_, column) = said(&random, true, 30.0, false);
     let expected = "descriptors: column 1 (from 0) follows the coordinate ";
     assert!(column.starts_with(expected), "{column}");
 }

@@ -18,7 +18,7 @@ use crate::features::database::Database;
 use crate::features::{FeatureSource, HDF5, SQLITE};
 use crate::input;
 
-const MAGIC: &[u8; 8] = b"P3DESC01";
+pub(super) const MAGIC: &[u8; 8] = b"P3DESC01";
 
 /// Reads the descriptors of the points of `input`, one row each in the same order.
 ///

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::lines::Lines;
-use super::ply;
+use super::{descriptors, ply};
 use crate::error::Error;
 use crate::input;
 
@@ -120,11 +120,13 @@ pub(super) fn beside(path: &Path, model: &Path) -> Vec<PathBuf> {
     database.into_iter().chain(features).collect()
 }
 
-/// Returns true for local features of hloc: `features.h5` or `feats-TYPE.h5`, but no matches of them.
+/// Returns true for descriptors of points in our format, `descriptors.bin`, and for local features of hloc: `features.h5` or
+/// `feats-TYPE.h5`, but no matches of them.
 fn is_features(path: &Path) -> bool {
     let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let is_named = name == "features.h5" || (name.starts_with("feats-") && name.ends_with(".h5"));
-    is_named && !name.contains("matches")
+    let is_ours = || input::head(path, 8).is_ok_and(|(head, _)| head == *descriptors::MAGIC);
+    (is_named && !name.contains("matches")) || (name == "descriptors.bin" && is_ours())
 }
 
 pub(super) const EXPECTED: &str = "points3D.bin or points3D.txt in it, or in sparse, model, models, colmap/sparse \

@@ -257,9 +257,10 @@ pub(crate) fn text(results: &Results<'_>) -> String {
         return String::new();
     }
     let percent = |value: Option<f64>| words::percent_or_dash(value);
+    let leaks = if basis(results) == Basis::Oracle { "leak by oracle" } else { "leak today" };
     let columns = vec![
         label("scheme", |of: &Localization| of.scheme.clone()),
-        figure("leak", move |of: &Localization| percent(leak(results, of))),
+        figure(leaks, move |of: &Localization| percent(leak(results, of))),
         figure("localization error", |of: &Localization| match of.cost() {
             Some(cost) => format!("{}x", words::significant(cost, 3)),
             None if of.is_unknown() => "not known".to_owned(),

@@ -48,9 +48,9 @@ fn gate(results: &Results<'_>, cards: &[Card]) -> Option<String> {
         "oracle" => format!("@{}", row.inlier_ratio),
         source => format!(":{source}"),
     };
-    // A gate on an inlier ratio covers the baselines, too.
-    let today = card.today().filter(|_| released.is_none());
-    let today = today.map_or(0.0, |today| today.interval.map_or(today.recovered, |of| of[1]));
+    // The gate covers the baselines, too.
+    let today =
+        card.today().map_or(0.0, |today| today.interval.map_or(today.recovered, |of| of[1]));
     let own = row.recovered(typed).map_or(results.share(row), |own| own.interval[1]);
     let limit = (own.max(today) + 2.0).ceil();
     (limit < 100.0).then(|| format!("{scheme}{attack}:{typed}<={limit}"))
@@ -60,7 +60,7 @@ fn gate(results: &Results<'_>, cards: &[Card]) -> Option<String> {
 fn least(results: &Results<'_>, cards: &[Card]) -> Option<Value> {
     let cards: Vec<&Card> = verdict::hidden(cards).collect();
     let is_known = cards.iter().any(|card| card.today().is_some());
-    let comparable = cards.iter().copied().filter(|card| !is_known || card.today().is_some());
+    let comparable = cards.iter().copied().filter(|card| !is_known || card.leak().is_some());
     let useful = localizing(results, comparable.collect()).into_iter();
     let share = |card: &Card| card.foremost().map(|finding| finding.recovered);
     let card = useful.reduce(|a, b| if share(b) < share(a) { b } else { a })?;

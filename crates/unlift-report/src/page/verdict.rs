@@ -251,9 +251,16 @@ impl Card {
         self.finding(Basis::Released)
     }
 
-    /// Returns what decides where schemes are compared: today's attacks, else those with known neighbors.
+    /// Returns the strongest attack on released data: one of ours, or one with lists from a given file.
+    pub(crate) fn leak(&self) -> Option<&Finding> {
+        let today = self.today()?;
+        let given = self.finding(Basis::Given).filter(|given| given.recovered > today.recovered);
+        Some(given.unwrap_or(today))
+    }
+
+    /// Returns what decides where schemes are compared: attacks on released data, else those with known neighbors.
     pub(crate) fn foremost(&self) -> Option<&Finding> {
-        self.today().or_else(|| self.finding(Basis::Oracle))
+        self.leak().or_else(|| self.finding(Basis::Oracle))
     }
 }
 
@@ -275,7 +282,7 @@ pub(crate) fn banner(results: &Results<'_>, cards: &[Card]) -> Banner {
     let names: Vec<&str> = results.refused().map(|(scheme, _)| scheme).collect();
     let unknown = (!names.is_empty())
         .then(|| format!("Not audited, so nothing is known: {}.", words::list(&names)));
-    let today = worst(cards, Basis::Released);
+    let today = largest(cards.iter().filter_map(Card::leak));
     let known = worst(cards, Basis::Given).or_else(|| worst(cards, Basis::Oracle));
     // The model may have fewer tracks than an attacker finds links.
     let every = every(cards).filter(|_| !results.is_sequence());
@@ -314,12 +321,13 @@ fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
     // Cards are sorted by their leak, the largest first.
     let (mut much, mut little, mut undecided) = (Vec::new(), Vec::new(), Vec::new());
     for card in hidden(cards) {
-        match card.today() {
+        match card.leak() {
             Some(leak) if leak.level != Level::Gray => much.push(leak),
             Some(leak) if uses_descriptors(results, Some(&card.scheme)) => little.push(leak),
             _ => undecided.push(card.scheme.as_str()),
         }
     }
+    much.sort_by(|a, b| b.recovered.total_cmp(&a.recovered));
     let names = |leaks: &[&Finding]| {
         words::list(&leaks.iter().map(|leak| leak.scheme.as_str()).collect::<Vec<_>>())
     };
@@ -327,15 +335,17 @@ fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
     let not = format!("Do not release {what} under {}.", names(&much));
     let undecided = words::list(&undecided);
     let open = (!undecided.is_empty()).then(|| format!("Nothing is decided about {undecided}."));
-    if let Some(largest) = little.first() {
+    if let Some(largest) = largest(little.iter().copied()) {
         let but = match little.iter().any(|leak| localizes(results, &leak.scheme)) {
             true => "",
             false => ", but most cameras cannot be placed with it",
         };
         let headline = format!(
-            "Under {}, no attack tried here recovers more than {}{but}.",
+            "Under {}, no attack tried here on released data recovers more than {} of the {} {}{but}.",
             names(&little),
-            largest.in_words()
+            largest.in_words(),
+            results.points(),
+            results.within(results.headline)
         );
         let not = (!much.is_empty()).then_some(not);
         return (headline, not.into_iter().chain(open).collect());
@@ -351,7 +361,8 @@ fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
         let ends = least.interval.map(|of| words::interval(of) + ", ").unwrap_or_default();
         let (percent, part) = (&least.percent, words::part(least.recovered));
         format!(
-            "The least leak, {percent} % ({ends}{}), is {part} of the {}.",
+            "The least leak{}, {percent} % ({ends}{}), is {part} of the {}.",
+            if open.is_some() { " of these" } else { "" },
             least.scheme,
             results.points()
         )
@@ -401,7 +412,10 @@ fn not_tried(results: &Results<'_>) -> Option<String> {
         (!alone).then_some("the attack on the records alone"),
         images.then_some("several queries with known poses (unlift audit sequence)"),
     ];
-    let kinds: Vec<&str> = kinds.into_iter().flatten().collect();
+    let own = results.schemes.iter().filter(|scheme| words::scheme_rule(scheme).is_empty());
+    let own: Vec<String> = own.map(|scheme| format!("an attack made for {scheme}")).collect();
+    let kinds = kinds.into_iter().flatten().chain(own.iter().map(String::as_str));
+    let kinds: Vec<&str> = kinds.collect();
     (!kinds.is_empty()).then(|| format!("Not tried: {}.", words::list(&kinds)))
 }
 
@@ -415,7 +429,10 @@ fn every(cards: &[Card]) -> Option<String> {
 }
 
 fn worst(cards: &[Card], basis: Basis) -> Option<&Finding> {
-    let findings = cards.iter().filter_map(|card| card.finding(basis));
+    largest(cards.iter().filter_map(|card| card.finding(basis)))
+}
+
+fn largest<'c>(findings: impl Iterator<Item = &'c Finding>) -> Option<&'c Finding> {
     findings.reduce(|a, b| if b.recovered > a.recovered { b } else { a })
 }
 

@@ -137,6 +137,20 @@ fn a_larger_localization_error_fails_a_comparison() {
     assert!(compare(&new, &old, None).unwrap().passed, "the old audit did not measure it");
 }
 
+#[test]
+fn an_attack_of_the_new_audit_alone_counts_if_it_recovers_more() {
+    let old = document(true);
+    for (percent, passes) in [(5.0, true), (99.0, false)] {
+        let mut new = old.clone();
+        let mut row = new.results[0].clone();
+        (row.neighbors, row.oracle_noise) = ("file".to_owned(), None);
+        sample::set(&mut row, percent, 1.0);
+        new.results.push(row);
+        let found = compare(&old, &new, None).unwrap();
+        assert_eq!((found.passed, found.only_new.len()), (passes, 1), "{percent}");
+    }
+}
+
 /// Returns an audit of images, with rows by an attacker's own lists for both schemes.
 fn painted_document() -> Document {
     let mut document = sample::images();
