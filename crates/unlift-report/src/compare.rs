@@ -166,9 +166,12 @@ pub fn compare(
         let Some(at) = was.rows.iter().zip(&taken).position(is_like) else {
             only_new.push(unmatched(row));
             if attack::basis(row) != Basis::Oracle {
-                let strongest = |typed: &str| strongest(was, &row.scheme, typed);
-                let own = |typed: &str| row.recovered_percent.get(typed).copied();
-                let shares: [&dyn Fn(&str) -> Option<f64>; 2] = [&strongest, &own];
+                let shares = [true, false].map(|before| {
+                    move |typed: &str| match before {
+                        true => strongest(was, &row.scheme, typed),
+                        false => row.recovered_percent.get(typed).copied(),
+                    }
+                });
                 new_attacks.extend(changes(&within, &row.scheme, &attack_of(row), shares));
             }
             continue;
