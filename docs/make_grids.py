@@ -31,10 +31,13 @@ def true_points(recovered, truth, out):
     for name in [name for name in arrays if name.rsplit("/", 1)[-1] == "position"]:
         of = name[: -len("position")]
         slot, position = known[f"{of}slot"], known[f"{of}position"]
+        is_hidden = slot >= 0
         places = np.empty_like(arrays[name])
-        places[slot[slot >= 0]] = position[slot >= 0]
+        places[slot[is_hidden]] = position[is_hidden]
         arrays[name] = places
-        for gone in ("origin", "status", "support", "evidence", "found", "error_scale"):
+        if f"{of}descriptor_row" in arrays:
+            arrays[f"{of}descriptor_row"][slot[is_hidden]] = known[f"{of}descriptor_row"][is_hidden]
+        for gone in ("origin", "status", "support", "evidence", "found", "error_scale", "axis"):
             arrays.pop(of + gone, None)
     np.savez(out, **arrays)
 
