@@ -23,8 +23,8 @@ mod grid;
 pub(crate) mod peaks;
 mod spread;
 
-use crate::recover::Estimate;
 use crate::recover::map::Grid;
+use crate::recover::result::Estimate;
 use crate::released::Released;
 use feasible::{Feasible, Hides};
 use peaks::find;

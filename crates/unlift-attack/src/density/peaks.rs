@@ -7,8 +7,8 @@ use rayon::prelude::*;
 use super::Peaks;
 use super::feasible::Hides;
 use super::spread::Spread;
-use crate::recover::Estimate;
 use crate::recover::map::LineRow;
+use crate::recover::result::Estimate;
 
 /// Samples to either side that count as the same place, about as many as smoothing reaches.
 const REACH: usize = 2;

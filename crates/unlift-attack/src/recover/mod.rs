@@ -16,7 +16,7 @@ pub(crate) mod map;
 mod peaks;
 mod problem;
 mod ranking;
-mod result;
+pub(crate) mod result;
 mod solver;
 
 pub use attack::{records_alone, recover_from};

@@ -10,6 +10,7 @@ pub(crate) mod lines;
 mod map_input;
 mod models;
 pub(crate) mod npy;
+mod npz;
 mod nvm;
 mod ply;
 mod table;
@@ -134,7 +135,7 @@ fn file(path: &Path) -> Result<Input, Error> {
         },
         (_, "npy") => npy::positions(path)?,
         ("predictions", "npz") => return Err(not_read(path)),
-        (_, "npz") => npy::of_archive(path)?,
+        (_, "npz") => npz::positions(path)?,
         ("sfm_data", "json") => return Err(not_read(path)),
         (_, "json") => json::read(path)?,
         (_, "out") => bundler::read(path)?,

@@ -21,9 +21,9 @@ pub struct Match {
 /// Direction of a line that one side of a match lies on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum OnLine {
-    /// Of a line in space through the point.
+    /// The direction of a line in space through the point.
     OfMap([f64; 3]),
-    /// Of a line in the image through the keypoint.
+    /// The direction of a line in the image through the keypoint.
     OfImage([f64; 2]),
 }
 

@@ -1,6 +1,6 @@
 //! Obfuscation: applies a scheme, then the steps that all schemes share (origin, shuffling).
 
-use super::changed::Change;
+use super::change::Change;
 use super::scheme::{LocalPoints, Scheme};
 use crate::geometry::frame::{Bounds, rounded_origin};
 use crate::geometry::vector::{quantile_of, sub};

@@ -3,6 +3,7 @@
 //! A scheme, built-in or custom, implements only its rule ([`Scheme::lift`]). This module does the
 //! rest for all: origin, normal form, order of records, slots and descriptors.
 
+mod change;
 mod changed;
 mod hide;
 mod mitigate;
@@ -15,7 +16,8 @@ pub mod plane;
 pub mod ppl;
 pub mod ray;
 
-pub use changed::{Change, Changed};
+pub use change::Change;
+pub use changed::Changed;
 pub use hide::obfuscate;
 pub use mitigate::Mitigation;
 pub use protect::Protection;

@@ -4,7 +4,7 @@ use std::any::Any;
 use std::fmt::Debug;
 use std::sync::Arc;
 
-use super::changed::Change;
+use super::change::Change;
 use crate::geometry::frame::Bounds;
 use crate::released::Obfuscation;
 use crate::seed::Key;

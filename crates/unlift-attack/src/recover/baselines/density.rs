@@ -12,8 +12,8 @@ use rayon::prelude::*;
 use crate::density::Peaks;
 use crate::density::feasible::{Feasible, Hides};
 use crate::density::peaks::maxima;
-use crate::recover::Estimate;
 use crate::recover::map::{LineRow, NO_GROUP, NO_VOTE};
+use crate::recover::result::Estimate;
 use crate::released::Released;
 
 /// Largest fraction of all lines that votes first: the nearest ones.
