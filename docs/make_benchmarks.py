@@ -354,7 +354,7 @@ def pictures():
         flat += lines(name, of_images, IMAGE_SCHEMES, papers[0])
         solid += lines(name, of_map, FEWER_SCHEMES, papers[1])
         if kind == "SIFT":
-            identified = [*identity("images", of_images, IMAGE_SCHEMES), *identity("map", of_map, FEWER_SCHEMES)]
+            identified = [*identity("images", of_images, IMAGE_SCHEMES)]
         true.append(line(name, baseline(of_images, papers[0]), baseline(of_map, papers[1])))
     put("docs/benchmarks.md", "pictures", [
         "SSIM / LPIPS (SqueezeNet), means over the photos at half their size; in brackets the paper's SSIM on 7-Scenes (another network, full size).", "",

@@ -11,7 +11,7 @@ macro_rules! named {
         pub enum $type { $($(#[$of_variant])* $variant,)* }
 
         impl $type {
-            /// All of them, in the order of their discriminants.
+            /// All variants, in the order of their discriminants.
             pub const ALL: [Self; [$($name),*].len()] = [$(Self::$variant),*];
 
             /// Name in files and reports, and on the command line.
@@ -19,7 +19,7 @@ macro_rules! named {
                 match self { $(Self::$variant => $name,)* }
             }
 
-            /// Returns the one called `name`, if there is one.
+            /// Returns the variant called `name`, if there is one.
             pub fn named(name: &str) -> Option<Self> {
                 Self::ALL.into_iter().find(|one| Self::name(*one) == name)
             }

@@ -411,12 +411,11 @@ pub(crate) fn short(length: f64) -> String {
 /// made-up descriptors that change smoothly up to 0.81.
 const FOLLOWS: f64 = 0.9;
 
-/// Rounding of published positions, as a part of the size of the map: that of 32-bit floats.
+/// Rounding of published positions, as a part of the largest coordinate and of the size of the map: that of 32-bit floats.
 const ROUNDING: f64 = 1e-6;
 
 /// Measures the attack that takes published values for the points: each of `published` has a position per record. Of a pair, the
-/// values are those of its two points in any order. If most values of a column are points of the map, whichever records hide these,
-/// all of its values count for all points.
+/// values are those of its two points in any order. A value that is a point of the map counts, whichever record publishes it.
 pub(crate) fn read_from_file(
     published: &[Vec<[f64; 3]>],
     original: &Original<3>,
@@ -428,20 +427,17 @@ pub(crate) fn read_from_file(
     let columns: Vec<&[Vec<[f64; 3]>]> =
         if slots == 1 { published.chunks(1).collect() } else { vec![published] };
     let points = original.reveal().positions();
-    let rounding = ROUNDING * across(points);
+    let largest = points.iter().flatten().fold(across(points), |most, x| most.max(x.abs()));
     let all_points = Knn::new(points).ok();
-    let are_points = |values: &&Vec<[f64; 3]>| {
-        let is_point = |value: &&[f64; 3]| {
-            all_points.as_ref().is_some_and(|of| nearest_to(**value, of) <= rounding)
-        };
-        2 * values.iter().filter(is_point).count() > values.len()
+    let is_point = |value: &&[f64; 3]| {
+        all_points.as_ref().is_some_and(|all| nearest_to(**value, all) <= ROUNDING * largest)
     };
-    let open: Vec<Knn<'_, 3>> =
-        published.iter().filter(are_points).filter_map(|values| Knn::new(values).ok()).collect();
+    let open: Vec<[f64; 3]> = published.iter().flatten().filter(is_point).copied().collect();
+    let open = Knn::new(&open).ok();
     let within = |columns: &[Vec<[f64; 3]>], threshold: f64| {
         let is_near = |&slot: &usize| {
             columns.iter().any(|rows| distance(&rows[slot / slots], point(slot)) <= threshold)
-                || open.iter().any(|values| nearest_to(*point(slot), values) <= threshold)
+                || open.as_ref().is_some_and(|open| nearest_to(*point(slot), open) <= threshold)
         };
         (0..secret.n_slots()).filter(is_near).count()
     };

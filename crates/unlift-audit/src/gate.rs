@@ -91,12 +91,17 @@ impl Gate {
             (THRESHOLD, &labels, (!has_threshold).then(|| self.threshold.to_string())),
         ];
         parts.into_iter().find_map(|(part, known, unknown)| {
-            let expected = match known.is_empty() {
+            let expected = match known.is_empty() && part == "inlier ratio" {
                 true => "none, because measured ratios have no gates".to_owned(),
                 false => format!("one of {}", known.join(", ")),
             };
             Some(format!("{part}: expected {expected}, found {}", unknown?))
         })
+    }
+
+    /// Whether attacks that need no neighborhoods count.
+    fn counts_baselines(&self) -> bool {
+        self.solver.is_none() && self.source.as_deref() != Some(ORACLE)
     }
 
     fn label_in<'t>(&self, tried: &'t Tried) -> Option<&'t str> {
@@ -110,10 +115,12 @@ impl Gate {
         let recovered = row.recovered(label).unwrap_or(unknown);
         let baseline = row.baseline(label).unwrap_or(unknown);
         match self.figure {
-            Figure::Recovered
-                if self.solver.is_none() && self.source.as_deref() != Some(ORACLE) =>
-            {
-                if is_worse(&baseline, &recovered) { baseline } else { recovered }
+            Figure::Recovered if self.counts_baselines() => {
+                if is_worse(&baseline, &recovered) {
+                    baseline
+                } else {
+                    recovered
+                }
             }
             Figure::Recovered => recovered,
             Figure::Gain => WithInterval {
@@ -332,10 +339,11 @@ pub fn check_gates(gates: &[Gate], tried: &Tried) -> Result<(), Error> {
 
 /// Returns an attack that was not tried although the gate covers it.
 fn untried(gate: &Gate, tried: &Tried) -> Option<String> {
-    let all = gate.solver.is_none() && gate.source.is_none();
-    if all && gate.figure == Figure::Recovered && tried.lacks_records_alone {
-        return Some("records alone were not tried, and no attack is named".to_owned());
+    let counted = gate.counts_baselines() && gate.figure == Figure::Recovered;
+    if counted && tried.lacks_records_alone {
+        return Some("records alone were not tried, which this gate counts".to_owned());
     }
+    let all = gate.solver.is_none() && gate.source.is_none();
     let best = sources::BY_DESCRIPTORS.name;
     let doubt =
         format!("neighbors by {best}, the best source, were not tried, and no attack is named");

@@ -166,13 +166,13 @@ pub fn compare(
         let Some(at) = was.rows.iter().zip(&taken).position(is_like) else {
             only_new.push(unmatched(row));
             if attack::basis(row) != Basis::Oracle {
-                let shares = [true, false].map(|before| {
-                    move |typed: &str| match before {
-                        true => strongest(was, &row.scheme, typed),
-                        false => row.recovered_percent.get(typed).copied(),
-                    }
-                });
-                new_attacks.extend(changes(&within, &row.scheme, &attack_of(row), shares));
+                let own = |typed: &str| row.recovered_percent.get(typed).copied();
+                new_attacks.extend(beside_strongest(
+                    &within,
+                    was,
+                    (&row.scheme, &attack_of(row)),
+                    own,
+                ));
             }
             continue;
         };
@@ -200,7 +200,11 @@ pub fn compare(
         let unmatched = Unmatched { scheme: scheme.to_owned(), attack: RECORDS_ALONE.to_owned() };
         match has_alone {
             [true, false] => only_old.push(unmatched),
-            [false, true] if was.schemes.contains(&scheme) => only_new.push(unmatched),
+            [false, true] if was.schemes.contains(&scheme) => {
+                let own = |typed: &str| Some(is.records_alone(scheme, typed)?.0);
+                new_attacks.extend(beside_strongest(&within, was, (scheme, RECORDS_ALONE), own));
+                only_new.push(unmatched);
+            }
             _ => {}
         }
     }
@@ -251,6 +255,20 @@ fn strongest(results: &Results<'_>, scheme: &str, typed: &str) -> Option<f64> {
     let own = rows.filter_map(|row| row.recovered_percent.get(typed).copied());
     let alone = results.records_alone(scheme, typed).map(|(percent, _)| percent);
     own.chain(results.blind(scheme, typed)).chain(alone).reduce(f64::max)
+}
+
+/// Returns the changes from the strongest attack of the old audit to one that only the new one has.
+fn beside_strongest(
+    within: &[[&str; 2]],
+    was: &Results<'_>,
+    (scheme, attack): (&str, &str),
+    own: impl Fn(&str) -> Option<f64>,
+) -> Vec<Change> {
+    let shares = [true, false].map(|is_before| {
+        let own = &own;
+        move |typed: &str| if is_before { strongest(was, scheme, typed) } else { own(typed) }
+    });
+    changes(within, scheme, attack, shares)
 }
 
 /// Returns the changes of a figure from the old to the new audit, by pairs of thresholds.

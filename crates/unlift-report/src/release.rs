@@ -12,7 +12,7 @@ use crate::results::Results;
 /// descriptors if it has some; `public` the origin of the public descriptors of a protection, as in the options of an audit.
 ///
 /// # Errors
-/// If the document is about another map, unit or descriptors, or lacks the scheme.
+/// If the document is about another map, unit or descriptors, if only one of both has descriptors, or if the document lacks the scheme.
 pub fn leak(
     document: &Document,
     input: &Input,
@@ -55,9 +55,9 @@ pub fn leak(
     let finding =
         |of: &Finding| format!("{}: {} of the {points} {within}.", of.when, of.in_words());
     let mut sentences: Vec<String> = card.findings.iter().map(finding).collect();
-    let verdict = match card.today() {
+    let verdict = match card.leak() {
         None => Some("Not tried: an attack on the released data alone."),
-        Some(today) => (today.level != Level::Gray).then_some("Do not release this."),
+        Some(leak) => (leak.level != Level::Gray).then_some("Do not release this."),
     };
     sentences.splice(0..0, verdict.map(str::to_owned));
     if !localizes(&results, scheme) {

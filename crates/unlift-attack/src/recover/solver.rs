@@ -133,3 +133,18 @@ impl Builtin {
         solvers.iter().map(|&solver| Arc::new(solver) as Arc<dyn Solver<D>>).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Builtin;
+
+    /// Property tests run over this list. A new variant does not compile until it is here.
+    #[test]
+    fn the_solvers_that_read_lists_are_listed() {
+        let reads_lists = |solver: &Builtin| match solver {
+            Builtin::Joint | Builtin::Consensus | Builtin::Ransac => true,
+            Builtin::Density | Builtin::Tomography => false,
+        };
+        assert!(Builtin::ALL.into_iter().filter(reads_lists).eq(Builtin::FROM_LISTS));
+    }
+}

@@ -4,8 +4,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use unlift::audit::{Plan, Threshold};
+use unlift::audit::{NeighborsBy, Plan, Threshold};
 use unlift::descriptors::Values;
+use unlift::neighbors::Geometric;
 use unlift::obfuscate::obfuscate;
 use unlift::recover::{Builtin, Delta};
 use unlift::released::{Lines, Obfuscation, Released};
@@ -188,9 +189,15 @@ fn a_gate_that_names_no_attack_needs_the_best_of_each_kind() {
         gate.reason.clone().unwrap_or_default()
     };
     let alone = || plan(&["olc"]);
-    for gate in ["olc:0.25<=100", "olc@0.5:0.25<=100"] {
-        let said = said(gate, alone(), false);
-        assert_eq!(said, "records alone were not tried, and no attack is named");
+    let by_geometry =
+        || Plan { neighbors: vec![NeighborsBy::Source(Arc::new(Geometric))], ..alone() };
+    for (gate, plan, described) in [
+        ("olc:0.25<=100", alone(), false),
+        ("olc@0.5:0.25<=100", alone(), false),
+        ("olc:geometric:0.25<=100", by_geometry(), false),
+    ] {
+        let said = said(gate, plan, described);
+        assert_eq!(said, "records alone were not tried, which this gate counts");
     }
     assert_eq!(said("olc:joint:0.25<=100", alone(), false), "");
     let both = || Plan { records_alone: true, ..alone() };

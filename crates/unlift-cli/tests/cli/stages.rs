@@ -161,6 +161,9 @@ fn files_of_another_map_are_refused() {
         assert!(stderr.starts_with(&format!("unlift: {file}: fingerprint: expected ")), "{stderr}");
         assert!(stderr.contains(&expected) && stderr.lines().count() == 1, "{stderr}");
     }
+    let long = "neighbors one/released.npz --neighbors oracle --truth one/truth.npz --inlier-ratios 1 --k 5000 --out x";
+    let stderr = place.complains(long, 3);
+    assert!(stderr.starts_with("unlift: one/truth.npz: k: expected between 1 and "), "{stderr}");
     place.refuses("audit released one/released.npz --k 10 --out x --truth", &[
         ("two/truth.npz", 3, "unlift: one/released.npz: fingerprint: expected "),
         ("one/truth.npz --gate olc@1:0.25<=5", 2, "scheme: expected one of released, found olc"),

@@ -31,6 +31,7 @@ fn the_ending_decides_what_is_written() {
     for expected in ["scheme & 1.0 & 0.5 & geometric & blind & records alone \\\\\n", "\\toprule", &lines[0], &lines[1]] {
         assert!(tex.contains(expected), "{expected}\n{tex}");
     }
+    assert!(!written("t.tex", "--thresholds 0.25").contains(" / "), "one threshold a cell");
     let csv = written("t.csv", "--thresholds 0.1");
     assert_eq!(csv.lines().count(), 1 + rows(&document).len());
     assert!(csv.contains("recovered_percent_within_0.10") && !csv.contains("_0.25"), "{csv}");

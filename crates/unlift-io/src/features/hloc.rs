@@ -291,11 +291,11 @@ fn numbers(
     Ok(Some(bytes.as_chunks().0.iter().map(|&bytes| half(bytes).to_f64()).collect()))
 }
 
-fn transposed<T: Copy>(values: &[T], rows: usize) -> Vec<T> {
+fn transposed<T: Copy, U>(values: &[T], rows: usize, converted: impl Fn(T) -> U) -> Vec<U> {
     let columns = values.len().checked_div(rows).unwrap_or(0);
     let mut transposed = Vec::with_capacity(values.len());
     for column in 0..columns {
-        transposed.extend((0..rows).map(|row| values[row * columns + column]));
+        transposed.extend((0..rows).map(|row| converted(values[row * columns + column])));
     }
     transposed
 }
@@ -335,15 +335,15 @@ fn descriptors(array: &Array<'_>, n: usize) -> Result<Descriptors, Error> {
     };
     let is_rows = dim == n && has_equal_rows(&array.values, n);
     // Transposing a matrix of one row changes nothing.
-    let rows = transposed(&array.values, if is_rows { 1 } else { dim }).into_iter();
+    let sides = if is_rows { 1 } else { dim };
     let values = match array.datatype {
         Datatype::FixedPoint {
             size: 1, layout: FixedPointLayout { signed: false, .. }, ..
-        } => Values::U8(rows.map(|value| value as u8).collect()),
+        } => Values::U8(transposed(&array.values, sides, |value| value as u8)),
         Datatype::FixedPoint { .. } if !array.values.is_empty() => {
             return Err(array.wrong("floats, or unsigned bytes", "other integers"));
         }
-        _ => Values::F32(rows.map(|value| value as f32).collect()),
+        _ => Values::F32(transposed(&array.values, sides, |value| value as f32)),
     };
     Descriptors::try_new(values, dim).map_err(|error| {
         let found = match error.what() {
@@ -548,9 +548,11 @@ fn columns(image: &ImageFeatures) -> Vec<Column> {
     let mut columns: Vec<Column> = vec![(KEYPOINTS, vec![n, 2], single(), floats(&places))];
     if let Some(rows) = &image.descriptors {
         let (datatype, bytes) = match rows.values() {
-            Values::U8(values) => (hdf5_pure::make_u8_type(), transposed(values, rows.len())),
+            Values::U8(values) => {
+                (hdf5_pure::make_u8_type(), transposed(values, rows.len(), |value| value))
+            }
             Values::F32(values) => {
-                let values = transposed(values, rows.len());
+                let values = transposed(values, rows.len(), |value| value);
                 let byte_order = DatatypeByteOrder::LittleEndian;
                 let half = Datatype::FloatingPoint { size: 2, byte_order, layout: HALF };
                 let halves = halves(&values).map(|halves| (half, halves));
@@ -597,10 +599,10 @@ mod tests {
             let array = Array { path, name, shape: vec![N as u64; 2], datatype, values };
             descriptors(&array, N).unwrap().values().clone()
         };
-        assert_eq!(read(transposed(&rows, N)), Values::F32(rows.clone()));
+        assert_eq!(read(transposed(&rows, N, |value| value)), Values::F32(rows.clone()));
         assert_eq!(read(rows.clone()), Values::F32(rows));
         // Without equal norms, the layout decides: (D, N).
         let odd: Vec<f32> = (0..N * N).map(|at| ((at * at) % 101) as f32).collect();
-        assert_eq!(read(transposed(&odd, N)), Values::F32(odd));
+        assert_eq!(read(transposed(&odd, N, |value| value)), Values::F32(odd));
     }
 }

@@ -164,13 +164,20 @@ fn numbers<const N: usize>(numbers: [Option<f64>; N]) -> [f64; N] {
 /// A shot of OpenSfM. Its rotation is the axis times the angle.
 #[derive(Deserialize)]
 struct Shot {
-    rotation: [Option<f64>; 3],
-    translation: [Option<f64>; 3],
+    #[serde(deserialize_with = "place")]
+    rotation: [f64; 3],
+    #[serde(deserialize_with = "place")]
+    translation: [f64; 3],
 }
 
 #[derive(Deserialize)]
 struct Point {
-    coordinates: [Option<f64>; 3],
+    #[serde(deserialize_with = "place")]
+    coordinates: [f64; 3],
+}
+
+fn place<'de, D: Deserializer<'de>>(json: D) -> Result<[f64; 3], D::Error> {
+    <[Option<f64>; 3]>::deserialize(json).map(numbers)
 }
 
 #[derive(Deserialize)]
@@ -192,15 +199,15 @@ impl Object {
         match name {
             "shots" => {
                 for Shot { rotation, translation } in json.next_value::<Items<_>>()?.0 {
-                    let [x, y, z] = numbers(rotation);
+                    let [x, y, z] = rotation;
                     let rotation = Pose::IDENTITY.moved(&[x, y, z, 0.0, 0.0, 0.0]).rotation;
                     let up = rotation[1].map(|x| -x);
-                    self.input.camera(Some((center(&rotation, &numbers(translation)), up)));
+                    self.input.camera(Some((center(&rotation, &translation), up)));
                 }
             }
             "points" => {
                 let points = json.next_value::<Items<Point>>()?.0.into_iter();
-                self.input.positions.extend(points.map(|point| numbers(point.coordinates)));
+                self.input.positions.extend(points.map(|point| point.coordinates));
             }
             "frames" => {
                 for Frame { transform_matrix } in json.next_value::<Items<_>>()?.0 {

@@ -158,7 +158,7 @@ impl<'a> Arrays<'a> {
         })
     }
 
-    /// Reads such numbers, one for each of `n` rows, if there is the array `name`.
+    /// Reads whole numbers below a bound, one for each of `n` rows, if there is the array `name`.
     pub(super) fn column(
         &self,
         name: &str,

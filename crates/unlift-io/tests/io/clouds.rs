@@ -261,12 +261,19 @@ fn arrays_may_have_more_columns_or_names() {
     assert_eq!(input.notes, ["the first 3 of 6 columns are read as x, y and z"]);
     let halves = bytes([0.5, 1.0, 2.0], |x| f16::from_f64(x).to_le_bytes());
     assert_eq!(open("a.npy", npy("'<f2'", "(1, 3)", &halves)).positions, [[0.5, 1.0, 2.0]]);
-    for (descr, of) in [("'<i2'", i16::to_le_bytes as fn(i16) -> [u8; 2]), ("'>i2'", i16::to_be_bytes)] {
-        let whole = bytes([-300.0, -1.0, 2.0], |x| of(x as i16));
-        assert_eq!(open("a.npy", npy(descr, "(1, 3)", &whole)).positions, [[-300.0, -1.0, 2.0]]);
+    let (signed, unsigned) = ([-100.0, -1.0, 2.0], [65236.0, 1.0, 2.0]);
+    let large = [9_223_372_036_854_775_808.0, 1.0, 2.0];
+    for (descr, values, whole) in [
+        ("'|i1'", signed, bytes(signed, |x| (x as i8).to_le_bytes())),
+        ("'<i2'", signed, bytes(signed, |x| (x as i16).to_le_bytes())),
+        ("'>i2'", signed, bytes(signed, |x| (x as i16).to_be_bytes())),
+        ("'<i4'", signed, bytes(signed, |x| (x as i32).to_le_bytes())),
+        ("'<i8'", signed, bytes(signed, |x| (x as i64).to_le_bytes())),
+        ("'>u2'", unsigned, bytes(unsigned, |x| (x as u16).to_be_bytes())),
+        ("'<u8'", large, bytes(large, |x| (x as u64).to_le_bytes())),
+    ] {
+        assert_eq!(open("a.npy", npy(descr, "(1, 3)", &whole)).positions, [values], "{descr}");
     }
-    let unsigned = bytes([65236.0, 1.0, 2.0], |x| (x as u16).to_be_bytes());
-    assert_eq!(open("a.npy", npy("'>u2'", "(1, 3)", &unsigned)).positions, [[65236.0, 1.0, 2.0]]);
 
     let rows: Vec<u8> = POINTS
         .iter()

@@ -341,3 +341,13 @@ fn every_malformed_file_of_descriptors_is_refused_with_its_line() {
         assert_eq!(shown(dir.path(), &error), line, "{what}");
     }
 }
+
+/// Without rows, any dimension matches the file size. It must not allocate memory, here 17 TB.
+#[test]
+fn a_dimension_without_rows_takes_no_memory() {
+    let header = patched(fixture("project/descriptors.bin")[..24].to_vec(), 8, &[0; 8]);
+    let (dir, path) = write("d", patched(header, 16, &[255, 255, 255, 255, 3]));
+    let input = read::Input { ids: (0..1000).collect(), ..read::Input::default() };
+    let error = read::descriptors(&path, &input).unwrap_err();
+    assert_eq!(shown(dir.path(), &error), "d: point 0: expected a descriptor, found none among 0");
+}

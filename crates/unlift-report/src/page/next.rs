@@ -36,11 +36,11 @@ pub(crate) fn steps(results: &Results<'_>) -> Value {
 
 /// Returns a gate that suits the build: today's value of the scheme that leaks least, plus two points.
 fn gate(results: &Results<'_>, cards: &[Card]) -> Option<String> {
-    let today = |card: &Card| card.today().map_or(f64::INFINITY, |today| today.recovered);
+    let leak = |card: &Card| card.leak().map_or(f64::INFINITY, |leak| leak.recovered);
     // A gate on a changed scheme needs the options of the change.
     let plain = cards.iter().filter(|card| !words::is_changed(&card.scheme));
     let useful = localizing(results, plain.collect()).into_iter();
-    let card = useful.min_by(|a, b| today(a).total_cmp(&today(b)))?;
+    let card = useful.min_by(|a, b| leak(a).total_cmp(&leak(b)))?;
     let (scheme, typed) = (&card.scheme, results.headline);
     let released = results.strongest(scheme, Basis::Released);
     let row = released.or_else(|| results.strongest(scheme, Basis::Oracle))?;
@@ -69,10 +69,13 @@ fn least(results: &Results<'_>, cards: &[Card]) -> Option<Value> {
     if cards.len() < 2 || !is_little || !verdict::uses_descriptors(results, Some(&card.scheme)) {
         return None;
     }
-    let today = card.today().map(|today| format!("{} today", today.in_words()));
+    let leak = card.leak().map(|leak| match leak.basis {
+        Basis::Given => format!("{} with given neighbors", leak.in_words()),
+        _ => format!("{} today", leak.in_words()),
+    });
     let known = card.finding(Basis::Oracle);
     let known = known.map(|of| format!("{} {}", of.in_words(), of.when.to_lowercase()));
-    let shares: Vec<String> = today.into_iter().chain(known).collect();
+    let shares: Vec<String> = leak.into_iter().chain(known).collect();
     let localization = localization(results, &card.scheme).filter(|cost| !cost.is_unknown());
     let times = localization.and_then(Localization::cost).map(|cost| words::significant(cost, 3));
     let (scheme, shares) = (&card.scheme, shares.join(", "));

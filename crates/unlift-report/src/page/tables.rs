@@ -271,7 +271,7 @@ pub(crate) fn likeness(results: &Results<'_>) -> Option<Table> {
         .to_owned();
     if first.metrics.contains_key("reidentified") {
         caption += &format!(
-            " Assigned: pictures with a smaller LPIPS distance to their own photo than to every other photo of the audit, all at \
+            " Assigned: pictures with a smaller LPIPS distance to their own photo than to every other of at most 100 photos, all at \
              64 x 64 pixels; {} % would be by chance.",
             percent(first, "reidentified_by_chance")
         );

@@ -318,7 +318,6 @@ pub(crate) fn banner(results: &Results<'_>, cards: &[Card]) -> Banner {
 /// Returns whether to release, by what came back from the released data alone, and the reasons. A small leak decides nothing
 /// before attacks by descriptors were tried.
 fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
-    // Cards are sorted by their leak, the largest first.
     let (mut much, mut little, mut undecided) = (Vec::new(), Vec::new(), Vec::new());
     for card in hidden(cards) {
         match card.leak() {

@@ -149,6 +149,17 @@ fn an_attack_of_the_new_audit_alone_counts_if_it_recovers_more() {
         let found = compare(&old, &new, None).unwrap();
         assert_eq!((found.passed, found.only_new.len()), (passes, 1), "{percent}");
     }
+    // The strongest of the old audit includes records alone.
+    let mut new = old.clone();
+    let mut row = new.results[0].clone();
+    (row.neighbors, row.oracle_noise) = ("file".to_owned(), None);
+    row.recovered_percent = row.records_alone_percent.clone().unwrap();
+    new.results.push(row);
+    assert!(compare(&old, &new, None).unwrap().passed);
+    let mut without = old.clone();
+    without.results.iter_mut().for_each(|row| row.records_alone_percent = None);
+    let found = compare(&without, &old, None).unwrap();
+    assert!(!found.passed && found.more.iter().all(|change| change.attack == "records alone"));
 }
 
 /// Returns an audit of images, with rows by an attacker's own lists for both schemes.

@@ -75,7 +75,7 @@ pub struct Lists<'a, const D: usize> {
     /// Seeds of the oracle and of the attacker.
     seeds: (u64, u64),
     kept: &'a Kept,
-    /// By their number, and whether they are by descriptor row.
+    /// True neighbors, by their number and by whether they are counted by descriptor row.
     near: BTreeMap<(usize, bool), TrueNeighbors>,
     /// K, noise model and outliers of the last variant: variants with the same model are consecutive.
     outliers: Option<(usize, Noise, Outliers)>,

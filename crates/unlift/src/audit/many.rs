@@ -130,7 +130,7 @@ struct Sums {
 }
 
 struct CellSums {
-    /// One per repeat.
+    /// The sums of each repeat.
     pools: Vec<Pool>,
     n_items: usize,
     seconds: RowSeconds,

@@ -35,7 +35,7 @@ pub fn oracle_lists<const D: usize>(
     // The oracle's lists do not depend on the attacker's seed.
     let kept = Kept::default();
     let mut lists = Lists::new(k, &search, hidden, (seed, 0), &kept);
-    Ok(lists.make(&variant, true)?.lists)
+    Ok(lists.make(&variant, D == 2)?.lists)
 }
 
 /// A row over many images, added one by one. Memory does not grow with their number.

@@ -338,11 +338,11 @@ const MAX_DRAWS: usize = 64;
 /// Outliers of one noise model, prepared for one obfuscation.
 #[derive(Clone, Debug)]
 pub enum Outliers {
-    /// Uniformly random ones, which need no preparation.
+    /// Outliers are uniformly random records, which need no preparation.
     Uniform,
     /// Rows of `per_slot` records in random order, slot by slot.
     Near {
-        /// All rows, end to end.
+        /// The records of all rows, end to end.
         records: Vec<RecordId>,
         /// Length of a row.
         per_slot: usize,

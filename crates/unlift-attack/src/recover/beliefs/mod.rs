@@ -136,7 +136,7 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
     estimates
 }
 
-/// Returns the share of edges between estimates that are less than `width` apart.
+/// Returns the share of edges whose ends are both known and less than `width` apart.
 fn short_edges<const D: usize, F: Family<D>>(
     problem: &Problem<'_, D, F>,
     estimates: &[Estimate<D>],
