@@ -61,7 +61,7 @@ fn what_is_gone_in_the_second_map_does_not_come_back() {
 #[test]
 fn no_gate_holds_if_the_maps_are_in_other_frames_or_scales() {
     let (place, points) = (maps(), points());
-    let audit = "audit again a.csv c.csv --scale 1 --schemes olc --no-records-alone --out a";
+    let audit = "audit again a.csv c.csv --scale 1 --schemes olc --out a";
     let gate = "--gate olc:again-geometry:0.10<=100";
     let described = "--descriptors a.bin --descriptors a.bin";
     for (change, expected) in [
