@@ -111,7 +111,7 @@ pub fn records_alone<const D: usize>(
 }
 
 /// Recovers by [`Builtin::Joint`] from known positions of some slots. Positions that are more likely right than wrong, by
-/// the confidence in `known`, stay as they are until exact constraints apply (`cp2d`). The result has no confidence.
+/// the confidence in `known`, stay as they are until exact constraints apply (axis candidates).
 ///
 /// # Errors
 /// When options are out of range, the lists do not have one row per slot, or `known` belongs to another map.
@@ -121,13 +121,13 @@ pub fn recover_from<const D: usize>(
     lists: &Neighborhoods,
     options: &RecoverOptions,
 ) -> Result<Recovered<D>, Error> {
-    released.fingerprint().expect(known.about().map)?;
     check(released, lists, options)?;
+    released.fingerprint().expect(known.about().map)?;
     let known = (0..released.n_slots()).map(|slot| known.sure_estimate(slot)).collect();
     Attack { known, ..Attack::new(released, lists, options, Builtin::Joint) }.run()
 }
 
-/// Rejects options out of range, and lists that do not fit the map.
+/// Rejects options out of range, and lists of another map.
 pub(super) fn check<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
@@ -135,7 +135,7 @@ pub(super) fn check<const D: usize>(
 ) -> Result<(), Error> {
     let n_slots = released.n_slots();
     Error::check_len("neighborhoods", lists.n_slots(), n_slots, " rows, one per slot")?;
-    // Lists of another map may have the same number of rows.
+    released.fingerprint().expect(lists.about().map)?;
     let n_records = released.n_records();
     if let Some(record) = lists.records().iter().find(|record| record.index() >= n_records) {
         let expected = format!("records below {n_records}");
@@ -154,10 +154,8 @@ impl<'a, const D: usize> Attack<'a, D> {
         Self { released, lists, options: *options, solver, only_starts: false, known: Vec::new() }
     }
 
-    /// Fails when the lists belong to another map.
     fn run(&self) -> Result<Recovered<D>, Error> {
         let Self { released, lists, .. } = *self;
-        released.fingerprint().expect(lists.about().map)?;
         match (self.solver, released.obfuscation()) {
             (Builtin::Density, _) => peaks::at_peaks(released, lists, &published(released)),
             (Builtin::Tomography, _) => peaks::at_peaks(released, lists, &tomography(released)),
@@ -177,8 +175,8 @@ impl<'a, const D: usize> Attack<'a, D> {
         let is_joint = solver == Builtin::Joint;
         // Joint recovery reads lists in both directions from its start on.
         let graph = is_joint.then(|| Graph::new(lists, released.slots_per_record()));
-        let single = graph.as_ref().filter(|_| released.slots_per_record() == 1);
-        let both_ways = single.map(Graph::neighborhoods);
+        let both_ways = graph.as_ref().filter(|_| released.slots_per_record() == 1);
+        let both_ways = both_ways.map(Graph::neighborhoods);
         let used = both_ways.as_ref().unwrap_or(lists);
         let delta = match self.options.delta {
             Delta::Fixed(delta) => delta,
@@ -250,9 +248,10 @@ fn joint<const D: usize, F: Family<D>>(
     // The likeliest places under the whole lists; or under their entries alone, where what is not listed says too little. Points of
     // paired lines would lose by beliefs.
     let with_beliefs = graph.slots_per_record == 1 && lists.scores().is_some();
-    restore(match ranking::recover(problem, estimates) {
-        Err(estimates) if with_beliefs => beliefs::recover(problem, estimates),
-        Ok(estimates) | Err(estimates) => estimates,
+    restore(match ranking::recover(problem, &estimates) {
+        Some(ranked) => ranked,
+        None if with_beliefs => beliefs::recover(problem, estimates),
+        None => estimates,
     })
 }
 

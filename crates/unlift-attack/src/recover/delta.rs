@@ -39,7 +39,7 @@ const LOWEST: i32 = 15;
 const BEYOND_EDGE: f64 = 2.25;
 /// Largest narrow delta for lists with scores, whose wrong entries have similar descriptors.
 const BEYOND_EDGE_OF_SCORED: f64 = 2.0;
-/// A chosen delta of candidates is replaced by the least one if that is more than this many times as wide. Partners of exchanges
+/// If the likely delta of candidates is more than this many times as wide as the chosen one, the likely one is taken. Partners of exchanges
 /// agree exactly, so that evidence hardly falls as delta shrinks, and on small maps or lattices the choice is arbitrary.
 const COLLAPSED: f64 = 4.0;
 
@@ -67,8 +67,8 @@ pub(super) fn learn<const D: usize, F: Family<D>>(
     let beyond_edge = sharp.then_some(beyond_edge);
     let used = (used, released.slots_per_record());
     let chosen = choose(family, used, beyond_edge, (least, share), seed).unwrap_or(1.0);
-    let least = if D == 2 { 0.0 } else { family.least_delta(share) };
-    if COLLAPSED * chosen < least { least } else { chosen }
+    let likely = if D == 2 { 0.0 } else { family.likely_delta(share) };
+    if COLLAPSED * chosen < likely { likely } else { chosen }
 }
 
 /// Returns the spacing of points spread evenly over the known bounds, or else over all regions; 0 without both. Axis candidates

@@ -1,7 +1,7 @@
-//! Recovery: from released records and neighborhoods to positions. No code here imports `truth`.
+//! Recovery: from released records and neighborhoods to positions.
 //!
-//! [`recover`] runs a [`Solver`]. `attack` has the steps of ours in their order. They are generic over the family of records
-//! (`map/family.rs`), on which no step depends otherwise; only `anchors` is for one scheme (`dcl2d`).
+//! [`recover`] runs a [`Solver`]. `attack` has the steps of ours in their order. The search is generic over the family of records
+//! (`map/family.rs`); `exact` and `confidence` have a rule or constants per kind of records, and `anchors` is for one scheme (`dcl2d`).
 
 mod anchors;
 mod attack;
@@ -27,7 +27,7 @@ use crate::Error;
 use crate::neighbors::Neighborhoods;
 use crate::released::Released;
 
-/// Recovers the hidden points of `released` from `lists` by `solver`: the map `R` of Eq. (3).
+/// Recovers the hidden points of `released` from `lists` by `solver`: the map `R` of Eq. (3) of the paper (3DV 2025).
 ///
 /// The result depends on the arguments alone, not on the number of threads.
 ///

@@ -3,7 +3,7 @@
 //! A list of the K nearest also says which records are *not* among them: if it has record `j` and not record `k`, then `j` is
 //! nearer than `k`. Joint recovery uses the entries only, so inside a ball of K neighbors all places look alike to it. Ranking
 //! starts from its estimates and uses both, in both directions. For a slot `i` at `x`, let `R_i` be the distance to the K-th
-//! nearest estimate, and `d` the distance to the estimate of record `j`. Then
+//! nearest estimate, corrected at each place by the number of estimates within it, and `d` the distance to the estimate of record `j`. Then
 //!
 //! `P(j is in the list of i) = In f(d / R_i) + q (1 - f(d / R_i))`, with `f(u) = 1 / (1 + exp((u^2 - 1) / (2 s)))` and
 //! `q = (1 - In) K / n`.
@@ -74,17 +74,18 @@ const LEAST_RATIO: f32 = 0.15;
 /// (0.9) gain up to 20 (docs/decisions/tried.md).
 const LEAST_RATIO_OF_SOURCES: f32 = 0.75;
 
-/// Returns the estimates of all slots after ranking from `estimates`, those of joint recovery; these as an error if what lists do not name
+/// Returns the estimates of all slots after ranking from `start`, those of joint recovery, or `None` if what lists do not name
 /// says too little.
 pub(super) fn recover<const D: usize, F: Family<D>>(
     problem: &Problem<'_, D, F>,
-    mut estimates: Vec<Estimate<D>>,
-) -> Result<Vec<Estimate<D>>, Vec<Estimate<D>>> {
-    let (lists, n) = (problem.lists, estimates.len());
+    start: &[Estimate<D>],
+) -> Option<Vec<Estimate<D>>> {
+    let (lists, n) = (problem.lists, start.len());
     let mean_length = lists.records().len() as f32 / n.max(1) as f32;
     if (n as f32) < LEAST_LISTS * mean_length {
-        return Err(estimates);
+        return None;
     }
+    let mut estimates = start.to_vec();
     let least_ratio = match lists.scores() {
         None => LEAST_RATIO,
         Some(_) => LEAST_RATIO_OF_SOURCES,
@@ -93,14 +94,14 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
         let mut radius = Vec::new();
         for half in 0..2 {
             let (slots, points) = known(&estimates);
-            let Ok(tree) = Knn::new(&points) else { return Err(estimates) };
+            let tree = Knn::new(&points).ok()?;
             if half == 0 {
                 radius = radii(&tree, &slots, lists);
             }
             let [near, farther] = shares_within(problem, &estimates, &radius);
             let inlier_ratio = near.clamp(INLIER_RATIO.0, INLIER_RATIO.1);
             if half == 0 && (inlier_ratio < least_ratio || farther > MOST_FARTHER * near) {
-                return if iteration == 0 { Err(estimates) } else { Ok(estimates) };
+                return (iteration > 0).then_some(estimates);
             }
             let context = Context {
                 problem,
@@ -123,7 +124,7 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
             }
         }
     }
-    Ok(estimates)
+    Some(estimates)
 }
 
 /// Returns, per slot, the distance within which as many estimates lie as its list is long; 0 for slots without estimate or list. The points
@@ -297,7 +298,7 @@ impl<const D: usize, F: Family<D>> Step for Context<'_, D, F> {
         let is_lost = (n_near as f32) < LOST * expected;
         let piece = usize::from(old.axis);
         let mut best = Candidate { score: f32::NEG_INFINITY, x: old.position, piece };
-        let rounds: &[Lanes] = match F::NORMAL {
+        let rounds: &[Lanes] = match F::IS_PLANE {
             true => &PLANE_STEPS,
             false if self.iteration < FAR_ITERATIONS => &LINE_STEPS,
             false => &NEAR_LINE_STEPS,
@@ -325,10 +326,10 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         terms: &mut Terms<D>,
         best: &mut Candidate<D>,
     ) {
-        let Candidate { x: from, piece: axis, .. } = from;
-        let piece = self.problem.family.piece(slot, axis);
+        let Candidate { x: from, piece: number, .. } = from;
+        let piece = self.problem.family.piece(slot, number);
         let radius = terms.radius;
-        let direction: [f32; D] = match F::NORMAL {
+        let direction: [f32; D] = match F::IS_PLANE {
             true => {
                 let random: [f32; D] =
                     std::array::from_fn(|c| from[c] + draws.between(-1.0, 1.0) as f32 * radius);
@@ -352,7 +353,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         for w in 0..LANES {
             if scores[w] > best.score {
                 let x = if steps[w] == 0.0 { from } else { places[w] };
-                *best = Candidate { score: scores[w], x, piece: axis };
+                *best = Candidate { score: scores[w], x, piece: number };
             }
         }
     }

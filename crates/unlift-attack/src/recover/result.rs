@@ -39,6 +39,7 @@ pub struct Estimate<const D: usize> {
     pub status: Status,
     /// Number of records that agree with the position. Consensus: listed records within delta before the last refit (planes: within
     /// 1.5 delta, summed over the free axes). Joint recovery: records at the ends of the slot's edges with an estimate nearby.
+    /// Later steps move the position only.
     /// The largest count is 65,535.
     pub support: u16,
     /// Axis of the hidden coordinate (axis candidates; else 0).
@@ -76,9 +77,9 @@ impl<const D: usize> Estimate<D> {
 /// The attacker's confidence in the estimate of one slot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Confidence {
-    /// Probability that the estimate is right up to an error.
+    /// Probability that the estimate is not grossly wrong.
     pub found: f32,
-    /// Median of that error, in the unit of the map.
+    /// Median error of such an estimate, in the unit of the map.
     pub scale: f32,
 }
 

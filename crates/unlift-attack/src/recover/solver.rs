@@ -90,7 +90,7 @@ named! {
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum Builtin {
         /// Our strongest attack: consensus with lists in both directions, then all slots together from the estimates of their neighbors,
-        /// last the positions under which the whole lists are likeliest, also by what they do not name.
+        /// last the positions under which the whole lists are likeliest, also by what they do not name, or several weighed places.
         Joint = "joint",
         /// On each slot's record, the position whose support is least probable by chance. The search is exact, and its cost does not
         /// depend on the inlier ratio.

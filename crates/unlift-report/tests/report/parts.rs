@@ -151,7 +151,8 @@ fn an_attack_of_the_new_audit_alone_counts_if_it_recovers_more() {
     }
     // The strongest of the old audit includes records alone.
     let mut new = old.clone();
-    let mut row = new.results[0].clone();
+    let mut row =
+        new.results.iter().find(|row| row.records_alone_percent.is_some()).unwrap().clone();
     (row.neighbors, row.oracle_noise) = ("file".to_owned(), None);
     row.recovered_percent = row.records_alone_percent.clone().unwrap();
     new.results.push(row);

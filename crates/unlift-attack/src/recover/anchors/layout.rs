@@ -5,7 +5,7 @@
 //! 1. Two slots have few listed records in common if they are far apart. This gives lengths of edges, and prunes wrong entries.
 //! 2. Landmark multidimensional scaling of shortest paths (de Silva and Tenenbaum 2004) lays out all slots.
 //! 3. An affine map moves the layout so that the anchors see its points along their rays.
-//! 4. All ranges move together to where the lists are likeliest, by gradient steps on the likelihood of `ranking`, from soft to sharp.
+//! 4. All ranges move together to where the lists are likeliest, by gradient steps on a likelihood like that of `ranking`, from soft to sharp.
 //!
 //! Step 3 is rough, and a layout may be folded. So the result counts only if clearly more listed records are then among the nearest.
 

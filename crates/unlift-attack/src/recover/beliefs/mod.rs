@@ -172,7 +172,7 @@ struct Place<const D: usize> {
     weight: f32,
 }
 
-/// The places of all slots, the best one of each slot first.
+/// The places of all slots, the one with the best score of each slot first.
 struct Places<const D: usize> {
     all: Vec<Place<D>>,
     /// Range of the places of each slot.
@@ -479,7 +479,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         }
         let evidence = self.temper * (sum + ln(product));
         let own = self.problem.family.piece(slot, piece);
-        let range = match own.from_center {
+        let range2 = match own.from_center {
             true => distance2(&own.through, x) / (self.places.typical * self.places.typical),
             false => 1.0,
         };
@@ -493,7 +493,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         };
         evidence
             + density
-            + 0.5 * (D - 1) as f32 * ln(range.max(1e-6))
+            + 0.5 * (D - 1) as f32 * ln(range2.max(1e-6))
             + self.marginals.get(piece).map_or(0.0, |column| column[slot])
     }
 
@@ -509,7 +509,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         let (mut best, piece) = (start, start.piece);
         let own = self.problem.family.piece(slot, piece);
         // Directions of a plane are the axes other than its normal.
-        let free: Vec<[f32; D]> = match F::NORMAL {
+        let free: Vec<[f32; D]> = match F::IS_PLANE {
             true => (0..D).filter(|&axis| own.direction[axis] == 0.0).map(unit).collect(),
             false => vec![own.direction],
         };

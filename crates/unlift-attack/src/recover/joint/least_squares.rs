@@ -126,7 +126,7 @@ fn step<const D: usize, F: Family<D>>(
     let weight = total(&sums.weight);
     let mut pull = sums.pull.map(|lanes| total(&lanes));
     // The component along a record: the direction of a line, or all but the normal of a plane.
-    let (whole, sign) = if F::NORMAL { (1.0, -1.0) } else { (0.0, 1.0) };
+    let (whole, sign) = if F::IS_PLANE { (1.0, -1.0) } else { (0.0, 1.0) };
     let free_fraction = 1.0 - F::MOST_ALONG.min(F::ALONG / n.max(1) as f32);
     let mut hold = [[0.0f32; D]; D];
     for (r, row) in hold.iter_mut().enumerate() {

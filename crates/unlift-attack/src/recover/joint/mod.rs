@@ -2,8 +2,8 @@
 //!
 //! Joint recovery starts from the estimates of consensus and iterates. In an iteration every slot
 //!
-//! 1. proposes candidates on its own record: its old estimate, and projections of the estimates at the other ends of its edges,
-//!    at most 16 per piece of its feasible set. An edge leads to a record that the slot lists or that lists the slot's record;
+//! 1. proposes candidates on its own record: its old estimate, and at most 16 projections per piece of its feasible set of
+//!    the estimates at the other ends of its edges. An edge leads to a record that the slot lists or that lists the slot's record;
 //! 2. scores each candidate `x` in nats by
 //!    `sum over edges j of ln(1 + odds_j * p_true(|x - x_j|) / p_random(x)) + 0.5 ln p_random(x) + ln p_range(x)`, see below. If the best candidate
 //!    elsewhere is nearly as good, the records that pass near the two decide;
@@ -16,14 +16,14 @@
 //! edges may differ only up to a bound (`votes`).
 //!
 //! A slot *jumps* if it moves farther than one radius, which holds half of the true neighbors, or if its status changes. A slot whose
-//! best candidate leads by a clear margin is updated again only after enough neighbors have jumped nearby. `odds`,
+//! best candidate leads by a clear margin is updated again only if enough neighbors have jumped nearby since the last turn. `odds`,
 //! `p_true` and `p_random` are learned from the current estimates (`neighbor_distribution`, `map::grid`), and again after
 //! enough slots have jumped. Iterations end when few slots jump, when the number of jumps hardly falls, when fewer records pass
 //! near the estimates than before, or after 16 iterations.
 //!
 //! All slots of a turn read the old estimates, so the result depends neither on order nor on threads. If all slots moved in one
 //! turn, two neighbors could exchange places forever. So even and odd slots take turns. Only the first iteration moves all
-//! slots in one turn, because no estimate that it reads depends on another.
+//! slots in one turn.
 
 mod least_squares;
 mod neighbor_distribution;
@@ -80,7 +80,7 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
     };
     let (mut density, mut neighbors) = learn(&start, F::MOST_RADIUS * problem.delta);
     let (mut accepted, mut estimates) = (start.clone(), start);
-    // Per slot, the lead of its place over others in nats, or 0 if it must be updated again, and the number of jumps near it since its turn.
+    // Per slot, the lead of its place over others in nats, or 0 if it must be updated again, and the number of jumps near it since the last turn of its group.
     let mut margin = vec![0.0f32; n];
     let mut jumps_near: Vec<AtomicU32> = (0..n).map(|_| AtomicU32::new(0)).collect();
     // As if all slots had jumped before.
@@ -109,7 +109,7 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
                 estimates: &estimates,
                 density: &density,
                 neighbors: &neighbors,
-                odds: neighbors.odds_of_slot(problem.graph),
+                odds: neighbors.odds_per_end(problem.graph),
             };
             let moved = solve_slots(&context, &slots);
             (group..n).step_by(groups).for_each(|slot| *jumps_near[slot].get_mut() = 0);

@@ -72,14 +72,13 @@ impl NeighborDistribution {
         let mut total = Tally::ZERO;
         parts.iter().for_each(|part| total.merge(part));
         let limits = (least_radius, F::MOST_RADIUS * problem.delta);
-        let distribution = total.distribution::<D, F>(problem.graph, learning.reach, limits);
-        Self { most_imbalance: learning.most_imbalance(), ..distribution }
+        total.distribution::<D, F>(problem.graph, &learning, limits)
     }
 
-    /// Per class, the odds that an edge leads to a true neighbor of this slot.
-    pub(super) fn odds_of_slot(&self, graph: &Graph) -> [f32; CLASSES] {
+    /// Per class, the odds that one end of an edge is a true neighbor. An edge to a record with two slots has two ends, each with half of
+    /// the odds.
+    pub(super) fn odds_per_end(&self, graph: &Graph) -> [f32; CLASSES] {
         std::array::from_fn(|class| match graph.is_either(class as u8) {
-            // The nearer of two slots is twice as likely to be close by chance.
             true => 0.5 * self.odds[class],
             false => self.odds[class],
         })
@@ -224,13 +223,13 @@ impl Tally {
         (neighbors, (fraction / (1.0 - TAIL)).min(1.0))
     }
 
-    /// Computes the distribution, without the bound on imbalance.
     fn distribution<const D: usize, F: Family<D>>(
         &self,
         graph: &Graph,
-        reach: f32,
+        learning: &Learning<'_, D, F>,
         (least_radius, most_radius): (f32, f32),
     ) -> NeighborDistribution {
+        let reach = learning.reach;
         let [(all, fraction_of_all), (mutual, fraction_of_mutual)] =
             [0, 1].map(|kind| self.excess::<D>(kind));
         let mut radius = median_radius(&all);
@@ -269,7 +268,7 @@ impl Tally {
             inverse_a2: 1.0 / (a * a),
             density_at_zero: 1.0 / (mass * a.powi(D as i32)),
             background: (background / (1.0 - background) / ball_volume(D, reach)) as f32,
-            most_imbalance: f32::INFINITY,
+            most_imbalance: learning.most_imbalance(),
         }
     }
 }

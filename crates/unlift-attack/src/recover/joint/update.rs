@@ -15,7 +15,7 @@ pub(super) const TUBE: f32 = 6.0;
 const CENTER_RADIUS: f32 = 3.0;
 /// Candidates per piece are chosen so that about this many are estimates of true neighbors.
 const TRUE_CANDIDATES: f32 = 5.0;
-/// Least and largest number of such candidates per piece.
+/// Bounds of that number; up to half as many are taken, evenly spaced among all.
 const CANDIDATES: (f32, f32) = (8.0, 16.0);
 /// If the scores of the best candidate and the best one elsewhere differ by less than this many nats, the records near them decide.
 const TIE_MARGIN: f32 = 8.0;

@@ -54,13 +54,13 @@ impl<const D: usize> Piece<D> {
     }
 }
 
-/// Records of one family: where a point of theirs may be, how near they pass to a place, and how likely that is by chance. All steps are
-/// generic over it, so that no step depends on a family.
+/// Records of one family: where a point of theirs may be, how near they pass to a place, and how likely that is by chance. The search is
+/// generic over it.
 pub(crate) trait Family<const D: usize>: Sync {
     /// Number of pieces of each feasible set.
     const PIECES: usize = 1;
     /// Whether pieces are planes with a normal, not lines with a direction.
-    const NORMAL: bool = false;
+    const IS_PLANE: bool = false;
 
     // Joint recovery.
 
@@ -118,8 +118,8 @@ pub(crate) trait Family<const D: usize>: Sync {
     fn radius_if_flat(&self, _share: f64) -> Option<f64> {
         None
     }
-    /// Returns the least delta of a map in which a list holds the fraction `share` of all records; 0 without a limit.
-    fn least_delta(&self, _share: f64) -> f64 {
+    /// Returns the likely delta of a map in which a list holds the fraction `share` of all records; 0 without a limit.
+    fn likely_delta(&self, _share: f64) -> f64 {
         0.0
     }
     /// Loads a record that is read soon; changes no result.
@@ -368,7 +368,7 @@ impl<'a, const D: usize> PlaneFamily<'a, D> {
 }
 
 impl<const D: usize> Family<D> for PlaneFamily<'_, D> {
-    const NORMAL: bool = true;
+    const IS_PLANE: bool = true;
     // Two coordinates are free: where few neighbors are true, their estimates are the only evidence.
     const HALF_WEIGHT_RATIO: f32 = 0.2;
     // Evidence hardly depends on delta, so that noise widens the plateau.
@@ -569,7 +569,7 @@ impl<const D: usize> Family<D> for CandidateFamily<'_, D> {
         (2.0 * thin < radius && 2.0 * radius <= middle).then_some(radius)
     }
 
-    fn least_delta(&self, share: f64) -> f64 {
+    fn likely_delta(&self, share: f64) -> f64 {
         // If points lie on surfaces, one line passes as close as neighbors are with probability `share`, and a record has three lines. Lists
         // may hold a large fraction of all records.
         let least = (3.0 * share).min(0.25) as f32;

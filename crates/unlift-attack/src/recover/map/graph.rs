@@ -125,7 +125,7 @@ impl Graph {
             let record = record_of(slot, slots_per_record);
             let all = listers.of(record);
             let (mut at, mut mutual) = (0, u32::MAX);
-            // Slots are in random order, so evenly spaced ones are a fair sample.
+            // Slots are usually in random order, so evenly spaced ones are a fair sample.
             for &by in all.iter().step_by(all.len().div_ceil(most).max(1)) {
                 let theirs = record_of(by as usize, slots_per_record) as u32;
                 while at < list.len() && list[at].0 < theirs {

@@ -128,7 +128,7 @@ pub(crate) fn unit<const D: usize>(axis: usize) -> [f32; D] {
 /// Bits per coordinate on the curve: the index on the curve and the slot share 64 bits.
 const BITS: u32 = 10;
 
-/// Returns all slots in order along a space-filling curve; slots without a place are last. Records are in random order, so that
+/// Returns all slots in order along a space-filling curve; slots without a place are last. Records are usually in random order, so that
 /// each access to a neighbor misses the cache on a large map. Nearby slots share neighbors, so in this order they are often cached.
 /// Results do not depend on the order.
 pub(crate) fn along_curve<const D: usize>(estimates: &[Estimate<D>]) -> Vec<usize> {
