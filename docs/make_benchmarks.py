@@ -394,7 +394,7 @@ def again():
     rows = [row for row in document["results"] if row["neighbors"] == "again"]
     linked, right = min(row["metrics"]["linked_percent"] for row in rows), 100 * min(row["inlier_ratio"] for row in rows)
     put("docs/benchmarks.md", "again", [
-        *lines, "", f"Linked by descriptors: at least {linked:.1f} %, of which at least {right:.1f} % are right.", ""])
+        *lines, "", f"Descriptors link at least {linked:.1f} % of the points; at least {right:.1f} % of the links are right.", ""])
 
 
 def cost():

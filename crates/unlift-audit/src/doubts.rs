@@ -10,7 +10,7 @@ use unlift::evaluate::{
 };
 use unlift::geometry::frame::Bounds;
 use unlift::geometry::knn::Knn;
-use unlift::geometry::vector::{distance, median, sub};
+use unlift::geometry::vector::{along, distance, dot, median, sub};
 use unlift::recover::Recovered;
 use unlift::released::Released;
 use unlift::truth::{Original, Secret};
@@ -58,9 +58,11 @@ pub(crate) fn doubts(
     let unit = original.reveal().unit();
     let of_release = hidden.and_then(|(released, secret)| {
         let truth = Truth { original, released, secret };
-        // A scheme's noise has a doubt of its own.
-        let away = if truth.is_noise() { Vec::new() } else { truth.away_from_own() };
-        strays(false, &away, &plan.thresholds, released.unit())
+        // A scheme's noise has a doubt of its own, and decoys hide no points.
+        let is_usual = truth.is_noise() || released.obfuscation().is_bearings();
+        let away = if is_usual { Vec::new() } else { truth.away_from_own() };
+        rounded(truth.usual_rounding(), &plan.thresholds, released.unit())
+            .or_else(|| strays(false, &away, &plan.thresholds, released.unit()))
             .or_else(|| mistaken_unit(unit, plan.k, middle))
     });
     let mut notes: Vec<String> = of_release.iter().chain(of_file).cloned().collect();
@@ -152,6 +154,17 @@ pub(crate) fn check_truth(
     let expected = format!("records within {} of their own points", in_unit(limit, unit));
     let found = format!("{}: not measured (another unit, scale or frame?)", in_unit(middle, unit));
     Err(unlift::Error::new("truth", expected, found))
+}
+
+/// Returns a doubt if 32 bits round records by more than the smallest threshold.
+fn rounded(usual: f64, thresholds: &[Threshold], unit: Unit) -> Option<String> {
+    let least = thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min);
+    let by = in_unit(usual, unit);
+    let doubt = format!(
+        "released: coordinates are so large that 32 bits round them by about {by}: subtract a place in the map from \
+         them, and write it as the array origin"
+    );
+    (usual > least).then_some(doubt)
 }
 
 /// Returns a doubt about positions by their distances from their own records: the ground truth, or what was `recovered`.
@@ -390,10 +403,10 @@ const NOISE: f64 = 0.1;
 /// Returns a line about a row whose points are off their records, if that matters within `threshold`; always if it is infinite.
 pub(crate) fn noise(row: &Row, threshold: f64) -> Option<String> {
     let off = *row.metrics.get(OFF_RECORD)?;
-    let (scheme, away) = (&row.scheme, short(off));
+    let (scheme, away) = (&row.scheme, in_unit(off, row.unit));
     let doubt = format!(
-        "{scheme}: half of the points are {away} or more off their records, as by noise: an attack here stays on the records and \
-         keeps this error, but others may average it away"
+        "{scheme}: half of the points are {away} or more off their records, as by noise: attacks here stay on the records, \
+         others may average the noise away"
     );
     (!threshold.is_finite() || off > NOISE * threshold).then_some(doubt)
 }
@@ -415,7 +428,8 @@ const FOLLOWS: f64 = 0.9;
 const ROUNDING: f64 = 1e-6;
 
 /// Measures the attack that takes published values for the points: each of `published` has a position per record. Of a pair, the
-/// values are those of its two points in any order. A value that is a point of the map counts, whichever record publishes it.
+/// values are those of its two points in any order. A value that is a point of the map counts, whichever record publishes it. Between
+/// two positions that a record publishes, points may also lie at a distance that the scheme fixes.
 pub(crate) fn read_from_file(
     published: &[Vec<[f64; 3]>],
     original: &Original<3>,
@@ -424,13 +438,21 @@ pub(crate) fn read_from_file(
 ) -> Option<Alone> {
     let slots = secret.slots_per_record();
     let point = |slot: usize| &original.reveal().positions()[secret.hidden()[slot].index()];
-    let columns: Vec<&[Vec<[f64; 3]>]> =
-        if slots == 1 { published.chunks(1).collect() } else { vec![published] };
+    let fixed = match published {
+        [from, to] if slots == 1 => at_fixed_distances(from, to, point).to_vec(),
+        _ => Vec::new(),
+    };
+    let columns: Vec<&[Vec<[f64; 3]>]> = match slots {
+        1 => published.chunks(1).chain(fixed.chunks(1)).collect(),
+        _ => vec![published],
+    };
     let points = original.reveal().positions();
     let largest = points.iter().flatten().fold(across(points), |most, x| most.max(x.abs()));
+    let least = thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min);
+    let rounding = (ROUNDING * largest).min(0.1 * least);
     let all_points = Knn::new(points).ok();
     let is_point = |value: &&[f64; 3]| {
-        all_points.as_ref().is_some_and(|all| nearest_to(**value, all) <= ROUNDING * largest)
+        all_points.as_ref().is_some_and(|all| nearest_to(**value, all) <= rounding)
     };
     let open: Vec<[f64; 3]> = published.iter().flatten().filter(is_point).copied().collect();
     let open = Knn::new(&open).ok();
@@ -447,6 +469,29 @@ pub(crate) fn read_from_file(
     };
     let shares = thresholds.iter().map(best).collect();
     (!published.is_empty()).then_some(Alone { name: "read from the file", shares })
+}
+
+/// Returns the places at a fixed multiple of the vector from `from` to `to`, at a fixed distance along it, and at a fixed multiple of its
+/// inverse: with the median of the values that lead to each record's point.
+fn at_fixed_distances<'a>(
+    from: &[[f64; 3]],
+    to: &[[f64; 3]],
+    point: impl Fn(usize) -> &'a [f64; 3],
+) -> [Vec<[f64; 3]>; 3] {
+    let vectors: Vec<[f64; 3]> = from.iter().zip(to).map(|(from, to)| sub(to, from)).collect();
+    [0, -1, -2].map(|power| {
+        let step = |row: usize| {
+            let length2 = dot(&vectors[row], &vectors[row]);
+            along(&[0.0; 3], length2.powf(0.5 * f64::from(power)), &vectors[row])
+        };
+        let multiple = |row: usize| {
+            let step = step(row);
+            dot(&sub(point(row), &from[row]), &step) / dot(&step, &step)
+        };
+        let mut multiples: Vec<f64> = (0..from.len()).map(multiple).collect();
+        let usual = if multiples.is_empty() { 0.0 } else { median(&mut multiples) };
+        (0..from.len()).map(|row| along(&from[row], usual, &step(row))).collect()
+    })
 }
 
 fn nearest_to(position: [f64; 3], points: &Knn<'_, 3>) -> f64 {
@@ -472,8 +517,8 @@ pub(crate) fn follows_places(
     // By chance a half; the margin is five standard deviations.
     let is_ordered = n_nearer as f64 > 0.5 * n as f64 + 2.5 * (n as f64).sqrt();
     let order = format!(
-        "order of records: after {n_nearer} of {n} comes one nearer by than another, where half are so by chance: the order \
-         gives places away, and no attack uses it (release records in random order)"
+        "order of records: in {n_nearer} of {n} cases, the next record is nearer than another one (by chance, in half of \
+         them): the order gives places away, and no attack uses it (release records in random order)"
     );
     let columns = released.descriptors().into_iter().flat_map(|rows| columns(rows, secret, points));
     is_ordered.then_some(order).into_iter().chain(columns).collect()
@@ -525,6 +570,19 @@ mod tests {
         assert_eq!(of(std::slice::from_ref(&rows)), [None]);
         let collapsed = vec![Row { delta: 1e-6, ..rows[0].clone() }];
         assert!(of(&[rows.clone(), collapsed])[0].is_some());
+    }
+
+    #[test]
+    fn points_at_a_fixed_distance_along_published_vectors_are_read() {
+        let (from, towards) = (room(1.0), room(0.3));
+        let to: Vec<[f64; 3]> = from.iter().zip(&towards).map(|(x, v)| along(x, 1.0, v)).collect();
+        for (at, power) in [0.0, -1.0, -2.0].into_iter().enumerate() {
+            let multiple = |v: &[f64; 3]| 7.0 * dot(v, v).powf(0.5 * power);
+            let hidden = from.iter().zip(&towards).map(|(x, v)| along(x, multiple(v), v));
+            let hidden: Vec<[f64; 3]> = hidden.collect();
+            let read = &at_fixed_distances(&from, &to, |row| &hidden[row])[at];
+            assert!(read.iter().zip(&hidden).all(|(a, b)| distance(a, b) < 1e-9), "{power}");
+        }
     }
 
     fn room(scale: f64) -> Vec<[f64; 3]> {

@@ -398,7 +398,11 @@ pub fn gate_result(gate: &Gate, attacked: &Attacked) -> Result<GateResult, Error
         gate: gate.typed.clone(),
         found_percent: worst.map(|(worst, _)| worst.percent),
         highest_percent: highest,
-        of: worst.zip(label).map(|((worst, row), label)| in_words(gate, worst.percent, row, label)),
+        of: worst.zip(label).map(|((worst, row), label)| {
+            let counts = gate.counts_baselines() || gate.figure == Figure::Gain;
+            let only = if counts { "" } else { " (baselines not counted)" };
+            in_words(gate, worst.percent, row, label) + only
+        }),
         bound_percent: gate.bound_percent,
         passed: reason.is_none() && is_kept,
         reason,

@@ -13,8 +13,10 @@ pub(crate) fn gates(document: &Document) -> Option<Value> {
     let summary = match (failed, gates.len()) {
         (_, 0) => return None,
         (0, 1) => "The gate passed".to_owned(),
+        (0, 2) => "Both gates passed".to_owned(),
         (0, n) => format!("All {n} gates passed"),
         (_, 1) => "The gate failed".to_owned(),
+        (2, 2) => "Both gates failed".to_owned(),
         (m, n) if m == n => format!("All {n} gates failed"),
         (m, n) => format!("{m} of {n} gates failed"),
     };

@@ -52,6 +52,11 @@ impl<'a> Results<'a> {
         if self.is_of_images() { "these images" } else { "this map" }
     }
 
+    /// Returns whether the audit is of records that another program made: those of the first scheme.
+    pub(crate) fn is_of_given_records(&self) -> bool {
+        self.document.options.contains_key("released")
+    }
+
     /// Returns whether the audit is of several releases of the same points.
     pub(crate) fn is_of_releases(&self) -> bool {
         self.is_sequence() || self.is_again()

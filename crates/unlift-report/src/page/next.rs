@@ -14,8 +14,8 @@ pub(crate) fn steps(results: &Results<'_>) -> Value {
     let tried = |name: &str| results.rows.iter().any(|row| row.neighbors.contains(name));
     let with_descriptors = attack::BY_DESCRIPTORS.iter().any(|name| tried(name));
     let has_pictures = results.rows.iter().any(|row| row.metrics.contains_key("ssim"));
-    // The records were made by another program, which alone can change them.
-    let is_given = options.contains_key("released");
+    // The program that made the records can alone change them.
+    let is_given = results.is_of_given_records();
     json!({
         "is_sequence": results.is_sequence(),
         "after_queries": verdict::sequence_sentences(results),
@@ -25,6 +25,7 @@ pub(crate) fn steps(results: &Results<'_>) -> Value {
         "of_images": results.is_of_images(),
         "with_descriptors": with_descriptors,
         "has_descriptors": with_descriptors || input.other_sha256.contains_key("descriptors"),
+        "given": results.schemes.first().filter(|_| is_given),
         "with_network": tried("learned") || tried("descriptors"),
         "least": least(results, cards),
         "can_invert": with_descriptors && !is_given && !has_pictures,

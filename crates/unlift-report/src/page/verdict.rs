@@ -279,6 +279,10 @@ pub(crate) struct Banner {
 }
 
 pub(crate) fn banner(results: &Results<'_>, cards: &[Card]) -> Banner {
+    // Given records are judged; schemes of ours beside them are for comparison.
+    let given = results.schemes.first().filter(|_| results.is_of_given_records());
+    let cards = &cards.iter().filter(|card| given.is_none_or(|name| card.scheme == *name));
+    let cards = &cards.clone().cloned().collect::<Vec<Card>>()[..];
     let names: Vec<&str> = results.refused().map(|(scheme, _)| scheme).collect();
     let unknown = (!names.is_empty())
         .then(|| format!("Not audited, so nothing is known: {}.", words::list(&names)));
@@ -305,8 +309,8 @@ pub(crate) fn banner(results: &Results<'_>, cards: &[Card]) -> Banner {
     if level == Level::Gray && bearings.is_some() {
         // Few recovered points do not mean that little is seen.
         (level, headline) = (Level::Orange, "Bearings of points are published.".to_owned());
-    } else if level == Level::Gray && !uses_descriptors(results, None) {
-        // A small leak is no good result before the main attack was tried.
+    } else if level == Level::Gray && (!uses_descriptors(results, None) || given.is_some()) {
+        // A small leak is no good result before the main attack was tried, or one made for the scheme.
         level = Level::Orange;
     }
     let strongest = today.or(known).map(|strongest| attack_sentence(results, strongest));
@@ -350,7 +354,7 @@ fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
         return (headline, not.into_iter().chain(open).collect());
     }
     let Some(least) = much.last() else {
-        return (format!("Not decided: {what} under {undecided}."), Vec::new());
+        return (format!("Nothing is decided about {what} under {undecided}."), Vec::new());
     };
     let headline = match much.len() > 1 && open.is_none() {
         true => format!("Do not release {what} under any scheme tried."),

@@ -180,10 +180,21 @@ impl<const D: usize> Truth<'_, D> {
         self.places().map(|(own, place)| rounding(records, own, &place)).fold(0.0, f64::max)
     }
 
-    /// Returns whether hidden points are off their records as by a scheme's noise: in directions that
-    /// do not depend on the place. A wrong scale, frame or order of slots moves them by their places,
-    /// or all alike.
+    /// Returns the median rounding of records by `f32`, in the unit of the map: large if coordinates
+    /// are, as those of georeferenced maps.
+    pub fn usual_rounding(&self) -> f64 {
+        let records = self.released.obfuscation();
+        let own = self.places().map(|(own, place)| rounding(records, own, &place) / ROUNDINGS);
+        median_or_zero(own.collect())
+    }
+
+    /// Returns whether most hidden points are off their records as by a scheme's noise: in directions
+    /// that do not depend on the place. A wrong scale, frame or order of slots moves them by their
+    /// places, or all alike, and broken records are few.
     pub fn is_noise(&self) -> bool {
+        if median_or_zero(self.away_from_own()) <= self.farthest_for_rounding() {
+            return false;
+        }
         let records = self.released.obfuscation();
         let (nearer, n) = nearer_to_own_record(self.released, self.places());
         let off = |(own, place)| sub(&place, &on_record(records, own, &place));
@@ -204,12 +215,8 @@ impl<const D: usize> Truth<'_, D> {
 
     /// Returns the metric [`OFF_RECORD`] of a row, if rounding does not explain it.
     pub(crate) fn off_record(&self) -> Option<(String, f64)> {
-        let mut away = self.away_from_own();
-        let middle = if away.is_empty() { 0.0 } else { median(&mut away) };
-        let is_noise = middle > self.farthest_for_rounding()
-            && !self.released.obfuscation().is_bearings()
-            && self.is_noise();
-        is_noise.then(|| (OFF_RECORD.to_owned(), middle))
+        let is_noise = !self.released.obfuscation().is_bearings() && self.is_noise();
+        is_noise.then(|| (OFF_RECORD.to_owned(), median_or_zero(self.away_from_own())))
     }
 
     /// Returns figures on bearings from one center, by name; empty for other records.
@@ -236,6 +243,13 @@ impl<const D: usize> Truth<'_, D> {
     }
 }
 
+fn median_or_zero(mut values: Vec<f64>) -> f64 {
+    if values.is_empty() { 0.0 } else { median(&mut values) }
+}
+
+/// Distances up to this many roundings are explained by rounding.
+const ROUNDINGS: f64 = 8.0;
+
 /// Returns the distance between a point and its record that rounding to `f32` explains.
 fn rounding<const D: usize>(records: &Obfuscation<D>, record: usize, point: &[f64; D]) -> f64 {
     let held = match records {
@@ -244,7 +258,7 @@ fn rounding<const D: usize>(records: &Obfuscation<D>, record: usize, point: &[f6
         Obfuscation::AxisCandidates(candidates) => candidates.position()[record],
     };
     let size = |v: &[f64; D]| dot(v, v).sqrt();
-    8.0 * f64::from(f32::EPSILON) * (size(point) + size(&widen(&held)))
+    ROUNDINGS * f64::from(f32::EPSILON) * (size(point) + size(&widen(&held)))
 }
 
 /// Returns the place of a record that is nearest to `point`, relative to the released origin.
