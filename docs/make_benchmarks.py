@@ -419,6 +419,7 @@ def cost():
         held.append(line(f"`{scheme}`", *("no pose" if r["multiple"] is None else
                                           f"{r['center_error']:.4f}, {r['rotation_error_degrees']:.3f}°, {r['multiple']:.2f}" for r in rows)))
     document, table = documents["RedKitchen, ALIKED"], []
+    as_typed = dict(zip(document["options"]["mitigate"], mitigations))
     leak = {row["scheme"]: (max(share(row), next(iter(row["blind_percent"].values()))), row["n_points"], sum(row["dropped"].values()))
             for row in document["results"]}
     for text in [None, *document["options"]["mitigate"]]:
@@ -430,7 +431,7 @@ def cost():
             shown = f"{percent:.1f}" if text is None or of_all > 0.97 * percent else f"{percent:.1f}/{of_all:.1f}"
             multiple = of["RedKitchen, ALIKED"][key]["held_out"]["multiple"]
             cells.append(f"{shown}, {'-' if multiple is None else number(multiple)}")
-        table.append(line("none" if text is None else f"`{text}`", *cells))
+        table.append(line("none" if text is None else f"`{as_typed[text]}`", *cells))
     put("docs/benchmarks.md", "cost", [
         "The bound: error of the camera center as a multiple of the unprotected one (median over images).", "",
         *head("map", "unprotected", *schemes), *bound, "",
@@ -442,7 +443,8 @@ def cost():
 
 
 def protect():
-    protections = each("--protect-descriptors", ["subspace:2", "subspace:4", "ldp:256,2,8"])
+    kinds = ["subspace:2", "subspace:4", "ldp:256,2,8"]
+    protections = each("--protect-descriptors", kinds)
 
     def leak(name, document, schemes):
         """Percent recovered by the strongest row under every variant of the descriptors."""
@@ -451,11 +453,11 @@ def protect():
         share_of = lambda row: max(row["recovered_percent"][within], row["blind_percent"][within])
         lines = [f"{name}, within {within}:", "",
                  *head("descriptors", "true in lists, %", *(f"`{s}`" for s in schemes), "right matches", "error")]
-        options = document["options"]
-        for variant in ["", *options.get("mitigate", []), *options["protect_descriptors"]]:
+        as_typed = dict(zip(document["options"]["protect_descriptors"], kinds))
+        for variant in ["", *as_typed]:
             of = {s: f"{s}_{variant}" if variant else s for s in schemes}
             best = [max((row for row in document["results"] if row["scheme"] == of[s]), key=share_of) for s in schemes]
-            cells = [f"`{variant}`" if variant else "none", f"{100 * best[0]['inlier_ratio']:.1f} `{best[0]['neighbors']}`",
+            cells = [f"`{as_typed[variant]}`" if variant else "none", f"{100 * best[0]['inlier_ratio']:.1f} `{best[0]['neighbors']}`",
                      *(f"{share_of(row):.1f}" for row in best)]
             found = held.get(of[schemes[0]])
             if found and found["multiple"] is not None:

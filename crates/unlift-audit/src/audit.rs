@@ -17,6 +17,7 @@ use unlift_report::{
 use crate::document::{Attacked, Tried, not_audited};
 use crate::gate::{Gate, check_gates, check_lengths_of_gates, gate_result};
 use crate::maps::Prepared;
+use crate::request::distinct;
 use crate::{Error, Progress, bail};
 
 /// An audit of any input: what there is to say of it, the gates, and where the results go.
@@ -85,6 +86,7 @@ impl Audit {
             gates,
             seed: plan.seed,
             not_audited: not_audited(plan, &attacked.not_audited),
+            doubts: distinct(attacked.doubts.into_iter().flatten().collect(), String::eq),
             run: self.output.record(&seconds),
             ..document
         };

@@ -228,11 +228,17 @@ pub fn compare(
     let differs = |of: Incomparable| {
         format!("{}: {} in the old audit, {} in the new one", of.place, of.expected, of.found)
     };
+    let doubts = new.doubts.iter().filter(|doubt| !old.doubts.contains(doubt));
+    let doubts = doubts.map(|doubt| format!("the new audit is doubtful: {doubt}"));
     let mut comparison = Comparison {
         tolerance_points,
         tolerance_is,
         passed: false,
-        different: different(&old.input, &new.input).into_iter().map(differs).collect(),
+        different: different(&old.input, &new.input)
+            .into_iter()
+            .map(differs)
+            .chain(doubts)
+            .collect(),
         accepted,
         more,
         less,
@@ -333,13 +339,15 @@ fn costs_more(old: &Document, new: &Document) -> Vec<CostsMore> {
         Some(held_out) if is_measured => held_out.multiple,
         _ => of.multiple.filter(|_| !of.changes_descriptors),
     };
+    // A scheme that is not audited any more is missing elsewhere.
+    let audits = |scheme: &str| new.results.iter().any(|row| row.scheme == scheme);
     let worse = |was: &Localization| {
         let is = new.localization.iter().find(|is| is.scheme == was.scheme);
         let (old_multiple, new_multiple) = (multiple(was)?, is.and_then(multiple));
         let is_worse = new_multiple.is_none_or(|new| new > GROWTH * old_multiple);
         is_worse.then(|| CostsMore { scheme: was.scheme.clone(), old_multiple, new_multiple })
     };
-    old.localization.iter().filter_map(worse).collect()
+    old.localization.iter().filter(|was| audits(&was.scheme)).filter_map(worse).collect()
 }
 
 /// Returns the thresholds of both audits, as typed in the old and in the new one.
@@ -415,7 +423,7 @@ impl Comparison {
         let [more, less, same] = [&self.more, &self.less, &self.same].map(Vec::len);
         let (points, is) = (self.tolerance_points, self.tolerance_is);
         let point = if points == 1.0 { "point" } else { "points" };
-        let not = if self.is_like() { "" } else { "not compared: " };
+        let not = if self.is_like() { "" } else { "not comparable: " };
         let mut text = format!(
             "{not}{} figures compared, tolerance {points} {point} ({is}): {more} leak more, {less} less, {same} as before",
             more + less + same

@@ -39,7 +39,11 @@ pub fn leak(
             return wrong("input", "an audit with the descriptors of this release", "one without");
         }
         [true, false] => {
-            return wrong("input", "a release with descriptors, as in the audit", "one without");
+            return wrong(
+                "input",
+                "a release with descriptors, as in the audit",
+                "one without (--descriptors)",
+            );
         }
         _ => {}
     }
@@ -59,7 +63,8 @@ pub fn leak(
         None => Some("Not tried: an attack on the released data alone."),
         Some(leak) => (leak.level != Level::Gray).then_some("Do not release this."),
     };
-    sentences.splice(0..0, verdict.map(str::to_owned));
+    let doubts = document.doubts.iter().map(|doubt| format!("Doubtful: {doubt}."));
+    sentences.splice(0..0, verdict.map(str::to_owned).into_iter().chain(doubts));
     if !localizes(&results, scheme) {
         sentences.push("Most cameras cannot be placed with it.".to_owned());
     }

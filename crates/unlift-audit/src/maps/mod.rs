@@ -174,7 +174,7 @@ pub fn open(
             Err(error) => prepared.notes.push(format!("localization: not measured: {error}")),
         }
     }
-    prepared.doubts = doubts;
+    prepared.doubts.splice(0..0, doubts);
     if let Some(rows) = &prepared.descriptors {
         prepared.notes.extend(zeros(rows));
         prepared.doubts.extend(unlike_neighbors(prepared.original.reveal(), rows)?);
@@ -235,12 +235,12 @@ pub fn prepare<'a>(
     preparation: &Preparation,
 ) -> Result<Prepared, Error> {
     let positions = positions.into();
-    let (n_read, mut notes) = (positions.len(), Vec::new());
+    let (n_read, mut doubts) = (positions.len(), Vec::new());
     let mut rows: Vec<u32> = (0..n_read as u32).collect();
     if let Some(max_points) = preparation.max_points
         && rows.len() > max_points
     {
-        notes.push(format!(
+        doubts.push(format!(
             "--max-points: {max_points} of {n_read} points are audited; the whole map is denser, so more of it is \
              recovered"
         ));
@@ -274,7 +274,7 @@ pub fn prepare<'a>(
     let points = if factor == 1.0 { points } else { points.scaled(factor, unit)? };
     let descriptors = descriptors.map(|all| all.select(&rows));
     let prepared = Prepared::of(Original::new(points));
-    Ok(Prepared { descriptors, unit_in_map_units, rows, notes, ..prepared })
+    Ok(Prepared { descriptors, unit_in_map_units, rows, doubts, ..prepared })
 }
 
 /// Reads lists by row of the file and keeps those of the prepared rows.

@@ -37,7 +37,7 @@ pub fn run(args: &CompareArgs) -> crate::Result<bool> {
     })?;
     if old.input.sha256.is_none() || new.input.sha256.is_none() {
         stderr::note(
-            "no hashes in a share-safe audit: another map of the same size and number of points is not told apart",
+            "no hashes in a share-safe audit: another map of the same size and number of points, or other descriptors, cannot be noticed",
         );
     }
     let mut written = None;

@@ -81,7 +81,7 @@ fn what_leaks_more_or_is_out_of_view_fails() {
         place.write(name, document.to_string());
         let (text, _) = place.ends(&format!("compare was.json {name}"), 1);
         assert!(text.starts_with("NOT COMPARED: "), "{name}: {text}");
-        assert!(text.contains("\nnot compared: "), "{name}: {text}");
+        assert!(text.contains("\nnot comparable: "), "{name}: {text}");
         let accepted = |until: &str, code| {
             let accept = format!("--accept=new-rooms, until {until}");
             let line = ["compare", "was.json", name, &accept];

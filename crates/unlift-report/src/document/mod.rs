@@ -42,6 +42,9 @@ pub struct Document {
     /// Notes for readers of the figures: only a part of the map was audited, unusual lengths, empty lists.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
+    /// The notes that are reasons why figures may be too small: no gate holds with one, and nothing is decided.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub doubts: Vec<String>,
     /// The smallest inlier ratio at which half of the points come back, per scheme, noise and solver.
     pub break_even: Vec<BreakEven>,
     /// How precisely a camera can be placed under every scheme; the first entry is the map without

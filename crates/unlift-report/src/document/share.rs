@@ -65,7 +65,7 @@ impl Document {
             }
             without_places(reason);
         }
-        safe.notes.iter_mut().for_each(without_places);
+        safe.notes.iter_mut().chain(&mut safe.doubts).for_each(without_places);
         safe
     }
 }

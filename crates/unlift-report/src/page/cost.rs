@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 
 use crate::attack::{self, Basis};
 use crate::document::{FEWEST_HELD_OUT, HeldOut, Localization, UNPROTECTED};
+use crate::page::verdict::is_decided;
 use crate::results::Results;
 use crate::table::{NONE, Table, figure, known, label};
 use crate::words;
@@ -164,7 +165,7 @@ pub(crate) fn chart(results: &Results<'_>) -> Option<Value> {
     let ticks = steps.into_iter().filter(|cost| (least..=largest).contains(cost));
     let ticks = ticks.map(|cost| json!({ "at": x(cost), "text": format!("{cost}×") }));
     Some(json!({
-        "sentence": sentence(&points, &missing),
+        "sentence": sentence(results, &points, &missing),
         "by_known_neighbors": basis(results) == Basis::Oracle,
         "is_measured": points.iter().any(|point| point.of.measured().is_some()),
         "size": SIZE,
@@ -180,9 +181,12 @@ pub(crate) fn chart(results: &Results<'_>) -> Option<Value> {
 }
 
 /// Returns which schemes keep the attacks below [`LEAK`] at an error within [`COST`].
-fn sentence(points: &[Point<'_>], missing: &[String]) -> String {
+fn sentence(results: &Results<'_>, points: &[Point<'_>], missing: &[String]) -> String {
     let within = points.iter().filter(|point| point.leak < LEAK && point.cost <= COST);
     let names: Vec<String> = within.map(|point| point.of.scheme.clone()).collect();
+    if names.iter().any(|scheme| !is_decided(results, Some(scheme))) {
+        return format!("Nothing is decided about {}.", words::list(&names));
+    }
     let limits = format!("below {LEAK} % at a localization error within twice the unprotected one");
     if names.is_empty() {
         let known = if missing.is_empty() { "tried here" } else { "with both figures" };
@@ -209,8 +213,6 @@ pub(crate) fn table(results: &Results<'_>) -> Option<Table> {
             row.n_points as f64 / (row.n_points + dropped).max(1) as f64
         })
     };
-    // The bound says nothing about changed descriptors.
-    let bound = |of: &Of, value: Option<f64>| value.filter(|_| !of.changes_descriptors);
     let protects = |of: &Of| match (of.scheme.as_str(), of.of_queries) {
         (UNPROTECTED, _) => "nothing".to_owned(),
         (_, true) => "the query".to_owned(),
@@ -250,6 +252,11 @@ pub(crate) fn table(results: &Results<'_>) -> Option<Table> {
     Some(Table::of("cost", caption, localization, columns))
 }
 
+/// Returns a value of the bound, which says nothing about changed descriptors.
+fn bound(of: &Localization, value: Option<f64>) -> Option<f64> {
+    value.filter(|_| !of.changes_descriptors)
+}
+
 /// Returns lines for the terminal, or an empty text.
 pub(crate) fn text(results: &Results<'_>) -> String {
     let localization = &results.document.localization;
@@ -272,12 +279,15 @@ pub(crate) fn text(results: &Results<'_>) -> String {
         }),
         // This percentage is of the bound.
         figure("not localized", move |of: &Localization| {
-            percent(Some(of.failed_percent).filter(|_| of.measured().is_none()))
+            percent(bound(of, Some(of.failed_percent)).filter(|_| of.measured().is_none()))
         }),
     ];
     let of_map = localization.iter().filter(|of| !of.of_queries);
     let table = Table::of("cost", "", of_map, columns).text();
     let (points, missing) = points(results);
-    let sentence = if points.is_empty() { String::new() } else { sentence(&points, &missing) };
+    let sentence = match points.is_empty() {
+        true => String::new(),
+        false => sentence(results, &points, &missing),
+    };
     format!("\n{table}{sentence}\n")
 }

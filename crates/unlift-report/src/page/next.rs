@@ -67,7 +67,7 @@ fn least(results: &Results<'_>, cards: &[Card]) -> Option<Value> {
     let card = useful.reduce(|a, b| if share(b) < share(a) { b } else { a })?;
     // The banner says what the least leak means where it is too much, or not decided.
     let is_little = card.foremost().is_some_and(|finding| finding.level == Level::Gray);
-    if cards.len() < 2 || !is_little || !verdict::uses_descriptors(results, Some(&card.scheme)) {
+    if cards.len() < 2 || !is_little || !verdict::is_decided(results, Some(&card.scheme)) {
         return None;
     }
     let leak = card.leak().map(|leak| match leak.basis {

@@ -309,24 +309,26 @@ pub(crate) fn banner(results: &Results<'_>, cards: &[Card]) -> Banner {
     if level == Level::Gray && bearings.is_some() {
         // Few recovered points do not mean that little is seen.
         (level, headline) = (Level::Orange, "Bearings of points are published.".to_owned());
-    } else if level == Level::Gray && (!uses_descriptors(results, None) || given.is_some()) {
+    } else if level == Level::Gray && (!is_decided(results, None) || given.is_some()) {
         // A small leak is no good result before the main attack was tried, or one made for the scheme.
         level = Level::Orange;
     }
     let strongest = today.or(known).map(|strongest| attack_sentence(results, strongest));
-    let sentences = bearings.into_iter().chain(not_tried(results)).chain(reasons).chain(strongest);
+    let doubt = results.document.doubts.first().map(|doubt| format!("Doubtful: {doubt}."));
+    let sentences = bearings.into_iter().chain(doubt).chain(not_tried(results));
+    let sentences = sentences.chain(reasons).chain(strongest);
     let sentences: Vec<String> = sentences.collect();
     Banner { level, headline, sentence: sentences.join(" "), every, unknown }
 }
 
 /// Returns whether to release, by what came back from the released data alone, and the reasons. A small leak decides nothing
-/// before attacks by descriptors were tried.
+/// before the best attack by descriptors was tried, or if figures are doubtful.
 fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
     let (mut much, mut little, mut undecided) = (Vec::new(), Vec::new(), Vec::new());
     for card in hidden(cards) {
         match card.leak() {
             Some(leak) if leak.level != Level::Gray => much.push(leak),
-            Some(leak) if uses_descriptors(results, Some(&card.scheme)) => little.push(leak),
+            Some(leak) if is_decided(results, Some(&card.scheme)) => little.push(leak),
             _ => undecided.push(card.scheme.as_str()),
         }
     }
@@ -343,15 +345,17 @@ fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
             true => "",
             false => ", but most cameras cannot be placed with it",
         };
-        let headline = format!(
+        let under = format!(
             "Under {}, no attack tried here on released data recovers more than {} of the {} {}{but}.",
             names(&little),
             largest.in_words(),
             results.points(),
             results.within(results.headline)
         );
-        let not = (!much.is_empty()).then_some(not);
-        return (headline, not.into_iter().chain(open).collect());
+        return match much.is_empty() {
+            true => (under, open.into_iter().collect()),
+            false => (not, [under].into_iter().chain(open).collect()),
+        };
     }
     let Some(least) = much.last() else {
         return (format!("Nothing is decided about {what} under {undecided}."), Vec::new());
@@ -396,11 +400,15 @@ pub(crate) fn hidden(cards: &[Card]) -> impl Iterator<Item = &Card> {
     cards.iter().filter(|card| card.bearings.is_none())
 }
 
-/// Returns true if an attack on `scheme`, or on any scheme, used descriptors.
-pub(crate) fn uses_descriptors(results: &Results<'_>, scheme: Option<&str>) -> bool {
+/// Returns true if an attack on `scheme`, or on any scheme, used one of the `sources`.
+fn uses(results: &Results<'_>, scheme: Option<&str>, sources: &[&str]) -> bool {
     let mut rows = results.rows.iter().filter(|row| scheme.is_none_or(|name| name == row.scheme));
-    results.is_of_releases()
-        || rows.any(|row| attack::BY_DESCRIPTORS.contains(&row.neighbors.as_str()))
+    results.is_of_releases() || rows.any(|row| sources.contains(&row.neighbors.as_str()))
+}
+
+/// Returns true if a small leak of `scheme`, or of any scheme, says something: the best attack was tried, and no figure is doubtful.
+pub(crate) fn is_decided(results: &Results<'_>, scheme: Option<&str>) -> bool {
+    uses(results, scheme, attack::BEST) && results.document.doubts.is_empty()
 }
 
 /// Returns which kinds of attacks on released data were not tried.
@@ -411,7 +419,11 @@ fn not_tried(results: &Results<'_>) -> Option<String> {
     let images = results.is_of_images();
     let alone = images || results.rows.iter().any(|row| row.records_alone_percent.is_some());
     let kinds = [
-        (!uses_descriptors(results, None)).then_some("attacks by descriptors"),
+        match [&attack::BY_DESCRIPTORS[..], attack::BEST].map(|of| uses(results, None, of)) {
+            [false, _] => Some("attacks by descriptors"),
+            [true, false] => Some("the best attack by descriptors (--neighbors descriptors)"),
+            [true, true] => None,
+        },
         (!alone).then_some("the attack on the records alone"),
         images.then_some("several queries with known poses (unlift audit sequence)"),
     ];
