@@ -78,6 +78,7 @@ impl Audit {
             of.for_each(|of| of.push_str(&format!(", in a map of {extent}")));
         }
         let Attacked { document, mut seconds, scene, rendering, .. } = attacked;
+        let doubts = document.doubts.iter().cloned();
         // Some attacks measure no time per row.
         seconds.rows.resize_with(document.results.len(), Default::default);
         let document = Document {
@@ -86,7 +87,10 @@ impl Audit {
             gates,
             seed: plan.seed,
             not_audited: not_audited(plan, &attacked.not_audited),
-            doubts: distinct(attacked.doubts.into_iter().flatten().collect(), String::eq),
+            doubts: distinct(
+                doubts.chain(attacked.doubts.into_iter().flatten()).collect(),
+                String::eq,
+            ),
             run: self.output.record(&seconds),
             ..document
         };

@@ -39,7 +39,9 @@ const SHORT: usize = 5;
 
 pub(crate) struct Doubts {
     pub(crate) of_rows: Vec<Option<String>>,
-    /// Notes of the whole audit.
+    /// All doubts about the audit.
+    pub(crate) all: Vec<String>,
+    /// Notes of the whole audit: its doubts and others.
     pub(crate) notes: Vec<String>,
 }
 
@@ -66,7 +68,8 @@ pub(crate) fn doubts(
             .or_else(|| mistaken_unit(unit, plan.k, middle))
     });
     let mut notes: Vec<String> = of_release.iter().chain(of_file).cloned().collect();
-    let (of_map, mut of_rows) = (notes.first().cloned(), Vec::new());
+    let (of_map, mut of_rows, mut all) = (notes.first().cloned(), Vec::new(), notes.clone());
+    let least = plan.thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min);
     let share = plan.k as f64 / n_points.max(1) as f64;
     if plan.asks_oracle() && plan.k > SHORT && share > LONG {
         notes.push(format!(
@@ -92,11 +95,12 @@ pub(crate) fn doubts(
         if !notes.iter().any(|note| note.starts_with(&start)) {
             notes.extend(of_delta.clone());
         }
+        all.extend(of_delta.iter().cloned().chain(noise(row, least)));
         of_rows.push(of_map.clone().or(of_delta));
         notes.extend(noise(row, f64::INFINITY));
     }
     notes.dedup();
-    Doubts { of_rows, notes }
+    Doubts { of_rows, all, notes }
 }
 
 /// Quartiles of the distance to the K-th neighbor.
@@ -156,7 +160,7 @@ pub(crate) fn check_truth(
     Err(unlift::Error::new("truth", expected, found))
 }
 
-/// Returns a doubt if 32 bits round records by more than the smallest threshold.
+/// Returns a doubt if 32 bits round records by more than [`NOISE`] of the smallest threshold.
 fn rounded(usual: f64, thresholds: &[Threshold], unit: Unit) -> Option<String> {
     let least = thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min);
     let by = in_unit(usual, unit);
@@ -164,7 +168,7 @@ fn rounded(usual: f64, thresholds: &[Threshold], unit: Unit) -> Option<String> {
         "released: coordinates are so large that 32 bits round them by about {by}: subtract a place in the map from \
          them, and write it as the array origin"
     );
-    (usual > least).then_some(doubt)
+    (usual > NOISE * least).then_some(doubt)
 }
 
 /// Returns a doubt about positions by their distances from their own records: the ground truth, or what was `recovered`.
@@ -425,7 +429,9 @@ pub(crate) fn short(length: f64) -> String {
 const FOLLOWS: f64 = 0.9;
 
 /// Rounding of published positions, as a part of the largest coordinate and of the size of the map: that of 32-bit floats.
-const ROUNDING: f64 = 1e-6;
+const ROUNDING: f64 = f32::EPSILON as f64;
+/// Points lie at a fixed distance along published vectors if this share does.
+const MOST: f64 = 0.5;
 
 /// Measures the attack that takes published values for the points: each of `published` has a position per record. Of a pair, the
 /// values are those of its two points in any order. A value that is a point of the map counts, whichever record publishes it. Between
@@ -443,13 +449,13 @@ pub(crate) fn read_from_file(
         _ => Vec::new(),
     };
     let columns: Vec<&[Vec<[f64; 3]>]> = match slots {
-        1 => published.chunks(1).chain(fixed.chunks(1)).collect(),
+        1 => published.chunks(1).collect(),
         _ => vec![published],
     };
     let points = original.reveal().positions();
     let largest = points.iter().flatten().fold(across(points), |most, x| most.max(x.abs()));
     let least = thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min);
-    let rounding = (ROUNDING * largest).min(0.1 * least);
+    let rounding = (ROUNDING * largest).min(least);
     let all_points = Knn::new(points).ok();
     let is_point = |value: &&[f64; 3]| {
         all_points.as_ref().is_some_and(|all| nearest_to(**value, all) <= rounding)
@@ -463,6 +469,8 @@ pub(crate) fn read_from_file(
         };
         (0..secret.n_slots()).filter(is_near).count()
     };
+    let is_rule = |of: &&[Vec<[f64; 3]>]| within(of, least) as f64 > MOST * secret.n_slots() as f64;
+    let columns: Vec<_> = columns.iter().copied().chain(fixed.chunks(1).filter(is_rule)).collect();
     let best = |t: &Threshold| {
         let n = columns.iter().map(|of| within(of, t.value)).max().unwrap_or(0);
         (t.label.clone(), Share::of(n as f64, secret.n_slots() as f64))
@@ -488,7 +496,8 @@ fn at_fixed_distances<'a>(
             let step = step(row);
             dot(&sub(point(row), &from[row]), &step) / dot(&step, &step)
         };
-        let mut multiples: Vec<f64> = (0..from.len()).map(multiple).collect();
+        let mut multiples: Vec<f64> =
+            (0..from.len()).map(multiple).filter(|x| x.is_finite()).collect();
         let usual = if multiples.is_empty() { 0.0 } else { median(&mut multiples) };
         (0..from.len()).map(|row| along(&from[row], usual, &step(row))).collect()
     })

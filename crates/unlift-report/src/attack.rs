@@ -127,10 +127,10 @@ const SEQUENCE: &str = "sequence";
 pub(crate) const SEQUENCE_AND_LISTS: &str = "sequence+lists";
 const TRACKS: &str = "tracks";
 
-/// The attacker's own sources that use descriptors, the best ones last.
-pub(crate) const BY_DESCRIPTORS: [&str; 4] = ["similarity", "overlap", "learned", "descriptors"];
-/// The best source for descriptors, and the network that it chooses for SIFT and ALIKED.
-pub(crate) const BEST: &[&str] = BY_DESCRIPTORS.split_at(2).1;
+/// The attacker's own sources that use descriptors.
+pub(crate) const BY_DESCRIPTORS: [&str; 4] = ["similarity", "overlap", "learned", BEST];
+/// The source that chooses the best of the others for given descriptors.
+pub(crate) const BEST: &str = "descriptors";
 
 /// Sources of two releases: links by descriptors, and by geometry alone.
 pub(crate) const AGAIN: &str = "again";

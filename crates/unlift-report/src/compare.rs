@@ -73,6 +73,8 @@ pub struct Comparison {
     pub different: Vec<String>,
     /// Why inputs may differ, if the user said so.
     pub accepted: Option<Accepted>,
+    /// Doubts about the new audit that the old one has not: smaller figures may say nothing, whatever is accepted.
+    pub doubts: Vec<String>,
     /// Figures that leak more, the largest difference first.
     pub more: Vec<Change>,
     /// Figures that leak less, the largest difference first.
@@ -228,18 +230,17 @@ pub fn compare(
     let differs = |of: Incomparable| {
         format!("{}: {} in the old audit, {} in the new one", of.place, of.expected, of.found)
     };
-    let doubts = new.doubts.iter().filter(|doubt| !old.doubts.contains(doubt));
-    let doubts = doubts.map(|doubt| format!("the new audit is doubtful: {doubt}"));
+    // Doubts are alike up to their figures, which differ between seeds. Earlier versions had notes only.
+    let kind = |doubt: &str| doubt.split(|c: char| c.is_ascii_digit()).next().map(str::to_owned);
+    let old_kinds: Vec<_> = old.notes.iter().chain(&old.doubts).map(|of| kind(of)).collect();
+    let doubts = new.doubts.iter().filter(|doubt| !old_kinds.contains(&kind(doubt)));
     let mut comparison = Comparison {
         tolerance_points,
         tolerance_is,
         passed: false,
-        different: different(&old.input, &new.input)
-            .into_iter()
-            .map(differs)
-            .chain(doubts)
-            .collect(),
+        different: different(&old.input, &new.input).into_iter().map(differs).collect(),
         accepted,
+        doubts: doubts.cloned().collect(),
         more,
         less,
         same,
@@ -342,12 +343,14 @@ fn costs_more(old: &Document, new: &Document) -> Vec<CostsMore> {
     // A scheme that is not audited any more is missing elsewhere.
     let audits = |scheme: &str| new.results.iter().any(|row| row.scheme == scheme);
     let worse = |was: &Localization| {
-        let is = new.localization.iter().find(|is| is.scheme == was.scheme);
+        let is_of = |is: &&Localization| is.scheme == was.scheme && is.of_queries == was.of_queries;
+        let is = new.localization.iter().find(is_of);
         let (old_multiple, new_multiple) = (multiple(was)?, is.and_then(multiple));
         let is_worse = new_multiple.is_none_or(|new| new > GROWTH * old_multiple);
         is_worse.then(|| CostsMore { scheme: was.scheme.clone(), old_multiple, new_multiple })
     };
-    old.localization.iter().filter(|was| audits(&was.scheme)).filter_map(worse).collect()
+    let compared = old.localization.iter().filter(|was| was.of_queries || audits(&was.scheme));
+    compared.filter_map(worse).collect()
 }
 
 /// Returns the thresholds of both audits, as typed in the old and in the new one.
@@ -412,10 +415,11 @@ fn lost(old: &Results<'_>, new: &Results<'_>, taken: &[bool]) -> Vec<Lost> {
 }
 
 impl Comparison {
-    /// Returns true if the new audit has all attacks of the old one, on the same inputs or on inputs that may differ.
+    /// Returns true if the new audit has all attacks of the old one without new doubts, on the same inputs or on inputs that may differ.
     fn is_like(&self) -> bool {
         let is_accepted = self.accepted.as_ref().is_some_and(|accepted| !accepted.past);
-        (self.different.is_empty() || is_accepted) && self.only_old.is_empty()
+        let is_same = self.different.is_empty() || is_accepted;
+        is_same && self.doubts.is_empty() && self.only_old.is_empty()
     }
 
     /// Returns the comparison in one line.

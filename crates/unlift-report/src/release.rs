@@ -4,8 +4,9 @@ use serde_json::Value;
 
 use crate::compare::{Incomparable, different};
 use crate::document::{Document, Input};
-use crate::page::verdict::{Finding, Level, card, localizes};
+use crate::page::verdict::{Finding, Level, card, is_decided, localizes};
 use crate::results::Results;
+use crate::words::doubts;
 
 /// Returns what the attacks of `document` recover from `input` under `scheme`: "Do not release this. Today, from the released
 /// data alone: 46.6 % (45.9 to 47.3) of the points within 10 cm." `input` is what will be released, with the hash of its
@@ -61,10 +62,13 @@ pub fn leak(
     let mut sentences: Vec<String> = card.findings.iter().map(finding).collect();
     let verdict = match card.leak() {
         None => Some("Not tried: an attack on the released data alone."),
-        Some(leak) => (leak.level != Level::Gray).then_some("Do not release this."),
+        Some(leak) if leak.level != Level::Gray => Some("Do not release this."),
+        Some(_) if !is_decided(&results, Some(scheme)) => Some(
+            "Nothing is decided: figures are doubtful, or the best attack by descriptors was not tried.",
+        ),
+        Some(_) => None,
     };
-    let doubts = document.doubts.iter().map(|doubt| format!("Doubtful: {doubt}."));
-    sentences.splice(0..0, verdict.map(str::to_owned).into_iter().chain(doubts));
+    sentences.splice(0..0, verdict.map(str::to_owned).into_iter().chain(doubts(document)));
     if !localizes(&results, scheme) {
         sentences.push("Most cameras cannot be placed with it.".to_owned());
     }

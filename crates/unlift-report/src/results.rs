@@ -52,9 +52,11 @@ impl<'a> Results<'a> {
         if self.is_of_images() { "these images" } else { "this map" }
     }
 
-    /// Returns whether the audit is of records that another program made: those of the first scheme.
-    pub(crate) fn is_of_given_records(&self) -> bool {
-        self.document.options.contains_key("released")
+    /// Returns the scheme whose records another program made, if the audit is of such.
+    pub(crate) fn given_records(&self) -> Option<&'a str> {
+        let options = &self.document.options;
+        options.get("released")?;
+        options.get("schemes")?.get(0)?.as_str()
     }
 
     /// Returns whether the audit is of several releases of the same points.

@@ -150,6 +150,7 @@ impl Again<'_> {
             bail!("audit again: expected a row, found none: {reason}");
         }
         attacked.doubts = vec![doubts.first().cloned(); n_rows];
+        attacked.document.doubts = doubts;
         audit.finish(&self.plan, attacked)
     }
 

@@ -180,6 +180,7 @@ impl Map<'_> {
             input: with_sides(audit.about.clone(), points),
             options,
             notes: [audit.notes.clone(), doubts.notes, notes_on_images].concat(),
+            doubts: doubts.all,
             localization,
             tiles: tiles.collect(),
             results: outcome.rows,

@@ -302,23 +302,25 @@ pub fn by_point(path: &Path, prepared: &mut Prepared) -> Result<PointNeighbors, 
         }
         offsets.push(neighbors.len() as u64);
     }
-    let doubts = doubts(&offsets, &neighbors, prepared);
-    prepared.notes.extend(doubts);
+    let (notes, doubts) = doubts(&offsets, &neighbors, prepared);
+    prepared.notes.extend(notes);
+    prepared.doubts.extend(doubts);
     // The hashes identify the file; a file called oracle must not appear as the source `oracle`.
     let name = "file".to_owned();
     Ok(PointNeighbors { name, offsets, neighbors, scores })
 }
 
-/// Returns doubts about given lists. With lists of another map little is recovered, which would
-/// look like protection.
-fn doubts(offsets: &[u64], neighbors: &[u32], prepared: &Prepared) -> Vec<String> {
+/// Returns notes and doubts about given lists. With lists of another map little is recovered, which
+/// would look like protection.
+fn doubts(
+    offsets: &[u64],
+    neighbors: &[u32],
+    prepared: &Prepared,
+) -> (Option<String>, Option<String>) {
     let points = prepared.original.reveal().positions();
-    let mut doubts = Vec::new();
     let (empty, n) = (offsets.windows(2).filter(|w| w[0] == w[1]).count(), points.len());
-    if empty > 0 {
-        let lost = "points have no neighbors in the file, and count as lost";
-        doubts.push(format!("lists: {empty} of {n} {lost}"));
-    }
+    let lost = "points have no neighbors in the file, and count as lost";
+    let note = (empty > 0).then(|| format!("lists: {empty} of {n} {lost}"));
     let (mut nearer, mut n) = (0usize, 0usize);
     for (point, w) in offsets.windows(2).enumerate() {
         for &neighbor in &neighbors[w[0] as usize..w[1] as usize] {
@@ -330,13 +332,14 @@ fn doubts(offsets: &[u64], neighbors: &[u32], prepared: &Prepared) -> Vec<String
         }
     }
     // Of random points half are nearer; two standard deviations are added.
-    if n > 0 && nearer as f64 <= 0.5 * n as f64 + (n as f64).sqrt() {
-        doubts.push(format!(
+    let is_random = n > 0 && nearer as f64 <= 0.5 * n as f64 + (n as f64).sqrt();
+    let doubt = is_random.then(|| {
+        format!(
             "lists: the neighbors in the file are no nearer than random points ({nearer} of {n}): check that they are \
              of this map and in its order of rows"
-        ));
-    }
-    doubts
+        )
+    });
+    (note, doubt)
 }
 
 #[cfg(test)]
@@ -392,7 +395,8 @@ mod tests {
             let offsets: Vec<u64> = (0..=n).map(|point| (point * length) as u64).collect();
             let row = |point: usize| (1..=length).map(move |step| (point * factor + step) % n);
             let neighbors: Vec<u32> = (0..n).flat_map(row).map(|other| other as u32).collect();
-            doubts(&offsets, &neighbors, &prepared).join("\n")
+            let (note, doubt) = doubts(&offsets, &neighbors, &prepared);
+            note.or(doubt).unwrap_or_default()
         };
         assert_eq!(about(1, 5), "");
         let far = about(77, 5);

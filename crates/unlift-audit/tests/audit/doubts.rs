@@ -289,16 +289,22 @@ fn a_released_file_that_gives_places_away_is_no_protection() {
             std::array::from_fn(|c| places[at as usize][c] + offset * along[c])
         };
         let feet: Vec<[f64; 3]> = order.iter().zip(&directions).map(foot).collect();
-        // The lines are through their own points, but another point may be published for each.
-        let published = match of_others {
-            true => others.iter().map(|&at| places[at as usize]).collect(),
-            false => feet.clone(),
+        // The lines are through their own points, but another point may be published for each, or vectors that are a seventh as long
+        // as the way to the point.
+        let seventh =
+            |(x, v): (&[f64; 3], &[f64; 3])| std::array::from_fn(|c| x[c] - offset * v[c] / 7.0);
+        let published: Vec<Vec<[f64; 3]>> = match (of_others, offset) {
+            (true, _) => vec![others.iter().map(|&at| places[at as usize]).collect()],
+            (false, 20.0) => {
+                vec![feet.clone(), feet.iter().zip(&directions).map(seventh).collect()]
+            }
+            (false, _) => vec![feet.clone()],
         };
         let heights = order.iter().flat_map(|&at| [0.5, 3.0 * places[at as usize][2] as f32]);
         let rows = Descriptors::try_new(Values::F32(heights.collect()), 2).unwrap();
         let release = of_lines((&feet, &directions), order, described.then_some(rows));
         let map = Map { plan: plan(&["olc"]), ..Map::of(&points.original) };
-        let input = Input::Released(map, Hidden { release: &release, published: vec![published] });
+        let input = Input::Released(map, Hidden { release: &release, published });
         let document = audited(&points, &input, &["olc:joint:0.10<=100"]).unwrap().document;
         let read = document.results[0].records_alone_percent.as_ref().map(|by| by["0.10"]);
         let gate = &document.gates[0];
@@ -311,6 +317,7 @@ fn a_released_file_that_gives_places_away_is_no_protection() {
     assert_eq!(said(&random, false, 30.0, false), (None, String::new()));
     assert_eq!(said(&random, false, 0.0, false), (Some(100.0), String::new()));
     assert_eq!(said(&random, false, 30.0, true), (Some(100.0), String::new()));
+    assert_eq!(said(&random, false, 20.0, false), (Some(100.0), String::new()));
     let (_, order) = said(&sorted, false, 30.0, false);
     assert!(order.starts_with("order of records: in "), "{order}");
     let (_, column) = said(&random, true, 30.0, false);

@@ -74,7 +74,8 @@ fn text(comparison: &Comparison, written: Option<PathBuf>) -> String {
         }
         text.push_str(&table(&rows, &[1, 6]));
     }
-    let mut lines = Vec::new();
+    let doubtful = |doubt: &String| format!("DOUBTFUL: {doubt}");
+    let mut lines: Vec<String> = comparison.doubts.iter().map(doubtful).collect();
     for (rows, which) in [
         (&comparison.only_old, "NOT COMPARED: only in the old audit"),
         (&comparison.only_new, "only in the new audit"),

@@ -183,18 +183,27 @@ pub(crate) fn chart(results: &Results<'_>) -> Option<Value> {
 /// Returns which schemes keep the attacks below [`LEAK`] at an error within [`COST`].
 fn sentence(results: &Results<'_>, points: &[Point<'_>], missing: &[String]) -> String {
     let within = points.iter().filter(|point| point.leak < LEAK && point.cost <= COST);
-    let names: Vec<String> = within.map(|point| point.of.scheme.clone()).collect();
-    if names.iter().any(|scheme| !is_decided(results, Some(scheme))) {
-        return format!("Nothing is decided about {}.", words::list(&names));
-    }
+    let names = within.map(|point| point.of.scheme.clone());
+    let (names, open): (Vec<String>, Vec<String>) =
+        names.partition(|scheme| is_decided(results, Some(scheme)));
+    let open = match open.is_empty() {
+        true => String::new(),
+        false => format!("Nothing is decided about {}.", words::list(&open)),
+    };
     let limits = format!("below {LEAK} % at a localization error within twice the unprotected one");
+    if names.is_empty() && !open.is_empty() {
+        return open;
+    }
     if names.is_empty() {
         let known = if missing.is_empty() { "tried here" } else { "with both figures" };
         return format!("No scheme {known} keeps an attacker {limits}.");
     }
     let keep = if names.len() == 1 { "keeps" } else { "keep" };
     let names = words::list(&names);
-    format!("{names} {keep} the attacks tried here {limits}. A better attack may recover more.")
+    let text = format!(
+        "{names} {keep} the attacks tried here {limits}. A better attack may recover more. {open}"
+    );
+    text.trim_end().to_owned()
 }
 
 /// Returns the table of localization errors beside the leak; `None` without any.

@@ -15,7 +15,7 @@ pub(crate) fn steps(results: &Results<'_>) -> Value {
     let with_descriptors = attack::BY_DESCRIPTORS.iter().any(|name| tried(name));
     let has_pictures = results.rows.iter().any(|row| row.metrics.contains_key("ssim"));
     // The program that made the records can alone change them.
-    let is_given = results.is_of_given_records();
+    let given = results.given_records();
     json!({
         "is_sequence": results.is_sequence(),
         "after_queries": verdict::sequence_sentences(results),
@@ -25,11 +25,11 @@ pub(crate) fn steps(results: &Results<'_>) -> Value {
         "of_images": results.is_of_images(),
         "with_descriptors": with_descriptors,
         "has_descriptors": with_descriptors || input.other_sha256.contains_key("descriptors"),
-        "given": results.schemes.first().filter(|_| is_given),
-        "with_network": tried("learned") || tried("descriptors"),
+        "given": given,
+        "with_best": tried(attack::BEST),
         "least": least(results, cards),
-        "can_invert": with_descriptors && !is_given && !has_pictures,
-        "can_mitigate": !is_given && options.get("mitigate").is_none(),
+        "can_invert": with_descriptors && given.is_none() && !has_pictures,
+        "can_mitigate": given.is_none() && options.get("mitigate").is_none(),
         "can_localize": !localization.is_empty() && !options.contains_key("hold_out"),
         "gate": if gates.is_empty() { gate(results, cards) } else { None },
     })

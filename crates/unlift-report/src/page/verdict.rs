@@ -280,8 +280,8 @@ pub(crate) struct Banner {
 
 pub(crate) fn banner(results: &Results<'_>, cards: &[Card]) -> Banner {
     // Given records are judged; schemes of ours beside them are for comparison.
-    let given = results.schemes.first().filter(|_| results.is_of_given_records());
-    let cards = &cards.iter().filter(|card| given.is_none_or(|name| card.scheme == *name));
+    let given = results.given_records();
+    let cards = &cards.iter().filter(|card| given.is_none_or(|name| card.scheme == name));
     let cards = &cards.clone().cloned().collect::<Vec<Card>>()[..];
     let names: Vec<&str> = results.refused().map(|(scheme, _)| scheme).collect();
     let unknown = (!names.is_empty())
@@ -306,16 +306,17 @@ pub(crate) fn banner(results: &Results<'_>, cards: &[Card]) -> Banner {
             (Level::Gray, "No scheme was tested.".to_owned(), vec![nothing.to_owned()])
         }
     };
-    if level == Level::Gray && bearings.is_some() {
+    if bearings.is_some() && (level == Level::Gray || hidden(cards).next().is_none()) {
         // Few recovered points do not mean that little is seen.
-        (level, headline) = (Level::Orange, "Bearings of points are published.".to_owned());
+        (level, headline) =
+            (level.max(Level::Orange), "Bearings of points are published.".to_owned());
     } else if level == Level::Gray && (!is_decided(results, None) || given.is_some()) {
         // A small leak is no good result before the main attack was tried, or one made for the scheme.
         level = Level::Orange;
     }
     let strongest = today.or(known).map(|strongest| attack_sentence(results, strongest));
-    let doubt = results.document.doubts.first().map(|doubt| format!("Doubtful: {doubt}."));
-    let sentences = bearings.into_iter().chain(doubt).chain(not_tried(results));
+    let doubts = words::doubts(results.document);
+    let sentences = bearings.into_iter().chain(doubts).chain(not_tried(results));
     let sentences = sentences.chain(reasons).chain(strongest);
     let sentences: Vec<String> = sentences.collect();
     Banner { level, headline, sentence: sentences.join(" "), every, unknown }
@@ -408,18 +409,23 @@ fn uses(results: &Results<'_>, scheme: Option<&str>, sources: &[&str]) -> bool {
 
 /// Returns true if a small leak of `scheme`, or of any scheme, says something: the best attack was tried, and no figure is doubtful.
 pub(crate) fn is_decided(results: &Results<'_>, scheme: Option<&str>) -> bool {
-    uses(results, scheme, attack::BEST) && results.document.doubts.is_empty()
+    // Two releases are not attacked by lists within one of them.
+    let is_best = uses(results, scheme, &[attack::BEST]) && !results.is_again();
+    is_best && results.document.doubts.is_empty()
 }
 
 /// Returns which kinds of attacks on released data were not tried.
 fn not_tried(results: &Results<'_>) -> Option<String> {
+    if results.is_again() {
+        return Some("Not tried: attacks on one release alone (unlift audit map).".to_owned());
+    }
     if results.is_of_releases() || results.rows.is_empty() {
         return None;
     }
     let images = results.is_of_images();
     let alone = images || results.rows.iter().any(|row| row.records_alone_percent.is_some());
     let kinds = [
-        match [&attack::BY_DESCRIPTORS[..], attack::BEST].map(|of| uses(results, None, of)) {
+        match [&attack::BY_DESCRIPTORS[..], &[attack::BEST]].map(|of| uses(results, None, of)) {
             [false, _] => Some("attacks by descriptors"),
             [true, false] => Some("the best attack by descriptors (--neighbors descriptors)"),
             [true, true] => None,

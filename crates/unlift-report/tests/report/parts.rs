@@ -1,6 +1,6 @@
 //! Tests of what some audits have besides the verdict: the cost of protection, and painted pictures.
 
-use unlift_report::compare::compare;
+use unlift_report::compare::{Accepted, compare};
 use unlift_report::document::{Document, GateResult, HeldOut, Localization, Row};
 use unlift_report::inversions::{Inversion, Painted};
 use unlift_report::{
@@ -144,6 +144,20 @@ fn a_larger_localization_error_fails_a_comparison() {
     let unknown = compare(&old, &new, None).unwrap();
     assert!(!unknown.passed && unknown.costs_more[0].new_multiple.is_none());
     assert!(compare(&new, &old, None).unwrap().passed, "the old audit did not measure it");
+}
+
+#[test]
+fn a_new_doubt_fails_a_comparison_whatever_is_accepted() {
+    let (mut old, mut new) = (document(true), document(true));
+    new.doubts = vec!["truth: 12 of 400 points".to_owned()];
+    let accepted = Some(Accepted::parse("more rooms, until 9000-01-01").unwrap());
+    let found = compare(&old, &new, accepted).unwrap();
+    assert!(!found.passed && found.doubts == new.doubts);
+    old.doubts = vec!["truth: 13 of 400 points".to_owned()];
+    assert!(compare(&old, &new, None).unwrap().passed, "the old audit has it, too");
+    // What queries cost has no rows of its own.
+    new.localization.iter_mut().filter(|of| of.of_queries).for_each(|of| of.multiple = Some(14.0));
+    assert!(!compare(&old, &new, None).unwrap().passed);
 }
 
 #[test]

@@ -192,7 +192,7 @@ impl<const D: usize> Truth<'_, D> {
     /// that do not depend on the place. A wrong scale, frame or order of slots moves them by their
     /// places, or all alike, and broken records are few.
     pub fn is_noise(&self) -> bool {
-        if median_or_zero(self.away_from_own()) <= self.farthest_for_rounding() {
+        if median_or_zero(self.away_from_own()) <= ROUNDINGS * self.usual_rounding() {
             return false;
         }
         let records = self.released.obfuscation();
