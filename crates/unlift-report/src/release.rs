@@ -6,7 +6,6 @@ use crate::compare::{Incomparable, different};
 use crate::document::{Document, Input};
 use crate::page::verdict::{Finding, Level, card, is_decided, localizes};
 use crate::results::Results;
-use crate::words::doubts;
 
 /// Returns what the attacks of `document` recover from `input` under `scheme`: "Do not release this. Today, from the released
 /// data alone: 46.6 % (45.9 to 47.3) of the points within 10 cm." `input` is what will be released, with the hash of its
@@ -68,7 +67,7 @@ pub fn leak(
         ),
         Some(_) => None,
     };
-    sentences.splice(0..0, verdict.map(str::to_owned).into_iter().chain(doubts(document)));
+    sentences.splice(0..0, verdict.map(str::to_owned).into_iter().chain(results.doubts()));
     if !localizes(&results, scheme) {
         sentences.push("Most cameras cannot be placed with it.".to_owned());
     }

@@ -52,6 +52,15 @@ impl<'a> Results<'a> {
         if self.is_of_images() { "these images" } else { "this map" }
     }
 
+    /// Returns a sentence for each doubt about the figures.
+    pub(crate) fn doubts(&self) -> impl Iterator<Item = String> + use<'a> {
+        let sentence = |doubt: &String| {
+            let end = if doubt.ends_with('?') { "" } else { "." };
+            format!("Doubtful: {doubt}{end}")
+        };
+        self.document.doubts.iter().map(sentence)
+    }
+
     /// Returns the scheme whose records another program made, if the audit is of such.
     pub(crate) fn given_records(&self) -> Option<&'a str> {
         let options = &self.document.options;

@@ -7,17 +7,6 @@ use unlift::Unit;
 use unlift::audit::Interval;
 use unlift::obfuscate::{self, Entry};
 
-use crate::document::Document;
-
-/// Returns a sentence for each doubt about the figures.
-pub(crate) fn doubts(document: &Document) -> impl Iterator<Item = String> {
-    let sentence = |doubt: &String| {
-        let end = if doubt.ends_with('?') { "" } else { "." };
-        format!("Doubtful: {doubt}{end}")
-    };
-    document.doubts.iter().map(sentence)
-}
-
 /// Returns what is known of a scheme, without its changes to the map (`olc_thin4` is `olc`); `None` for schemes of others.
 pub(crate) fn facts(scheme: &str) -> Option<&'static Entry> {
     obfuscate::all().find(|entry| entry.name == base(scheme))

@@ -281,8 +281,8 @@ pub(crate) struct Banner {
 pub(crate) fn banner(results: &Results<'_>, cards: &[Card]) -> Banner {
     // Given records are judged; schemes of ours beside them are for comparison.
     let given = results.given_records();
-    let cards = &cards.iter().filter(|card| given.is_none_or(|name| card.scheme == name));
-    let cards = &cards.clone().cloned().collect::<Vec<Card>>()[..];
+    let judged = cards.iter().filter(|card| given.is_none_or(|name| card.scheme == name));
+    let cards = &judged.cloned().collect::<Vec<Card>>()[..];
     let names: Vec<&str> = results.refused().map(|(scheme, _)| scheme).collect();
     let unknown = (!names.is_empty())
         .then(|| format!("Not audited, so nothing is known: {}.", words::list(&names)));
@@ -315,8 +315,7 @@ pub(crate) fn banner(results: &Results<'_>, cards: &[Card]) -> Banner {
         level = Level::Orange;
     }
     let strongest = today.or(known).map(|strongest| attack_sentence(results, strongest));
-    let doubts = words::doubts(results.document);
-    let sentences = bearings.into_iter().chain(doubts).chain(not_tried(results));
+    let sentences = bearings.into_iter().chain(results.doubts()).chain(not_tried(results));
     let sentences = sentences.chain(reasons).chain(strongest);
     let sentences: Vec<String> = sentences.collect();
     Banner { level, headline, sentence: sentences.join(" "), every, unknown }
