@@ -406,10 +406,15 @@ fn uses(results: &Results<'_>, scheme: Option<&str>, sources: &[&str]) -> bool {
     results.is_of_releases() || rows.any(|row| sources.contains(&row.neighbors.as_str()))
 }
 
+/// Returns the best sources for descriptors. Of images, it is the network wherever there is one.
+fn best(results: &Results<'_>) -> &'static [&'static str] {
+    if results.is_of_images() { &[attack::BEST, "learned"] } else { &[attack::BEST] }
+}
+
 /// Returns true if a small leak of `scheme`, or of any scheme, says something: the best attack was tried, and no figure is doubtful.
 pub(crate) fn is_decided(results: &Results<'_>, scheme: Option<&str>) -> bool {
     // Two releases are not attacked by lists within one of them.
-    let is_best = uses(results, scheme, &[attack::BEST]) && !results.is_again();
+    let is_best = uses(results, scheme, best(results)) && !results.is_again();
     is_best && results.document.doubts.is_empty()
 }
 
@@ -424,7 +429,7 @@ fn not_tried(results: &Results<'_>) -> Option<String> {
     let images = results.is_of_images();
     let alone = images || results.rows.iter().any(|row| row.records_alone_percent.is_some());
     let kinds = [
-        match [&attack::BY_DESCRIPTORS[..], &[attack::BEST]].map(|of| uses(results, None, of)) {
+        match [&attack::BY_DESCRIPTORS[..], best(results)].map(|of| uses(results, None, of)) {
             [false, _] => Some("attacks by descriptors"),
             [true, false] => Some("the best attack by descriptors (--neighbors descriptors)"),
             [true, true] => None,
