@@ -59,7 +59,7 @@ def attack(args, folder, schemes):
         for column in [*RATIOS, OWN, "true points"]:
             lists, recovered, out = (hidden / f"{column}-{name}" for name in ("lists.npz", "recovered.npz", "pictures"))
             if column == "true points":
-                true_points(hidden / f"{OWN}-recovered.npz", truth, recovered)
+                true_points(hidden / f"{RATIOS[0]}-recovered.npz", truth, recovered)
             else:
                 oracle = ["oracle", "--truth", truth, "--inlier-ratios", column]
                 unlift("neighbors", released, "--neighbors", *(["descriptors"] if column == OWN else oracle), "--out", lists)
