@@ -17,7 +17,7 @@ import ranking
 from model import Network
 from weights import load
 
-AT = (1, 5, 10, 20, 50)
+AT = (1, 5, 10, 20, 50, 100)
 LIKENESS = (0.0, 0.15, 0.2, 0.3)
 
 
