@@ -345,13 +345,7 @@ fn descriptors(array: &Array<'_>, n: usize) -> Result<Descriptors, Error> {
         }
         _ => Values::F32(transposed(&array.values, sides, |value| value as f32)),
     };
-    Descriptors::try_new(values, dim).map_err(|error| {
-        let found = match error.what() {
-            "descriptors" => error.found().to_owned(),
-            place => format!("{} ({place})", error.found()),
-        };
-        array.wrong(error.expected(), found)
-    })
+    Descriptors::try_new(values, dim).map_err(|error| Error::core(array.path, error))
 }
 
 /// Returns whether the rows of a square matrix, but not its columns, have equal norms, up to the rounding of bytes and half floats.
@@ -366,21 +360,14 @@ fn has_equal_rows(values: &[f64], n: usize) -> bool {
 }
 
 fn size(array: &Array<'_>) -> Result<[u32; 2], Error> {
-    let sides = &array.values;
-    let side = |value: f64| {
-        let whole = (1.0..=f64::from(u32::MAX)).contains(&value) && value.fract() == 0.0;
-        whole.then_some(value as u32)
+    let side = |value: &f64| {
+        let is_whole = (1.0..=f64::from(u32::MAX)).contains(value) && value.fract() == 0.0;
+        is_whole.then_some(*value as u32)
     };
-    match sides[..] {
-        [width, height] => side(width).zip(side(height)).map(|(width, height)| [width, height]),
-        _ => None,
-    }
-    .ok_or_else(|| {
-        let found = match sides.len() {
-            2 => format!("{} and {}", sides[0], sides[1]),
-            _ => tuple(&array.shape),
-        };
-        array.wrong("width and height in pixels", found)
+    let sides: Option<Vec<u32>> = array.values.iter().map(side).collect();
+    sides.and_then(|sides| sides.try_into().ok()).ok_or_else(|| {
+        let first = &array.values[..array.values.len().min(3)];
+        array.wrong("width and height in pixels", tuple(first))
     })
 }
 

@@ -19,8 +19,7 @@ pub(crate) type ArrayBytes<'a> = Bytes<ZipFile<'a, BufReader<File>>>;
 pub(crate) struct Archive {
     path: PathBuf,
     zip: ZipArchive<BufReader<File>>,
-    /// The memory that decoding may use.
-    pub budget: Budget,
+    budget: Budget,
 }
 
 impl Archive {
@@ -61,11 +60,11 @@ impl Archive {
     pub fn array(&mut self, at: usize, name: &str) -> Result<ArrayBytes<'_>, Error> {
         let place = format!("array {name}");
         let entry = self.zip.by_index(at).map_err(|error| {
-            Error::new(&self.path, &*place, "an array that is stored or deflated", cause(error))
+            Error::new(&self.path, &place, "an array that is stored or deflated", cause(error))
         })?;
         let size = entry.size();
-        self.budget.admit(place, size)?;
-        Ok(Bytes::of_array(&self.path, entry, name, size))
+        self.budget.admit(&place, size)?;
+        Ok(Bytes::of_array(&self.path, entry, name, size, self.budget.clone()))
     }
 }
 
