@@ -88,7 +88,7 @@ impl FeatureSource {
         let source = match start.first_chunk() {
             Some(HDF5) => {
                 let mut file = hloc::Hloc::open(path)?;
-                let (names, refused) = (file.names.clone(), std::mem::take(&mut file.broken));
+                let (names, refused) = (file.names(), std::mem::take(&mut file.broken));
                 let is_upright = file.is_upright();
                 Self { names, refused, is_upright, get: Box::new(move |at| file.get(at)) }
             }

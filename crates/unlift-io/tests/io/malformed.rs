@@ -95,10 +95,6 @@ fn model_file(name: &str) -> Vec<u8> {
     fixture(&format!("{MODEL}/{name}"))
 }
 
-fn cut(name: &str, n: usize) -> Vec<u8> {
-    model_file(name)[..n].to_vec()
-}
-
 /// The model with other bytes in one file; `line` follows its name.
 fn in_model(what: &'static str, name: &'static str, bytes: Vec<u8>, line: &str) -> Row {
     let names = ["cameras.bin", "images.bin", "points3D.bin"];
@@ -123,8 +119,8 @@ fn binary() -> Vec<Row> {
     let [points, images, cameras] = ["points3D.bin", "images.bin", "cameras.bin"].map(|name| move || model_file(name));
     let name_to_end = vec![b'a'; images().len() - at::NAME];
     vec![
-        in_model("empty", "points3D.bin", cut("points3D.bin", 0), ": header (byte 0): expected 8 bytes of the number of points, found end of file"),
-        in_model("cut in the count", "points3D.bin", cut("points3D.bin", 5), ": header (byte 0): expected 8 bytes of the number of points, found 5 bytes before the end of the file"),
+        in_model("empty", "points3D.bin", vec![], ": header (byte 0): expected 8 bytes of the number of points, found end of file"),
+        in_model("cut in the count", "points3D.bin", points()[..5].to_vec(), ": header (byte 0): expected 8 bytes of the number of points, found 5 bytes before the end of the file"),
         in_model("count of 10^18", "points3D.bin", patched(points(), 0, &MANY), ": header (byte 0): expected at most 8 for the number of points (426 bytes are left), found 1000000000000000000"),
         in_model("track of 10^18", "points3D.bin", patched(points(), at::N_TRACK, &MANY), ": record 1 (byte 51): expected at most 46 for the number of observations (375 bytes are left), found 1000000000000000000"),
         in_model("trailing byte", "points3D.bin", appended(points(), b"x"), ": record 6 (byte 434): expected end of file, found 1 byte more"),
