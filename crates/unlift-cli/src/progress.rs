@@ -21,10 +21,8 @@ const TICK: Duration = Duration::from_millis(500);
 const LINES: Duration = Duration::from_secs(60);
 /// Seconds of a day, the longest time that is estimated.
 const A_DAY: f64 = 86_400.0;
-/// Formats how far a bar is.
-type Line = fn(&ProgressBar) -> String;
 /// The progress that started last, for an interrupt.
-static CURRENT: Mutex<Option<(WeakProgressBar, Line)>> = Mutex::new(None);
+static CURRENT: Mutex<Option<WeakProgressBar>> = Mutex::new(None);
 
 /// Exit code after an interrupt, as shells have it.
 const INTERRUPTED: i32 = 130;
@@ -39,21 +37,17 @@ pub struct Progress {
 impl Progress {
     /// Starts the progress over countable items.
     pub fn new(quiet: bool) -> Self {
-        Self::start(quiet, "{bar:30} {status} {wide_msg}", |bar| {
-            format!("{}: {}", status(bar.position(), bar.length(), bar.elapsed()), bar.message())
-        })
+        Self::start(quiet, "{bar:30} {status} {wide_msg}")
     }
 
     /// Starts the progress of work whose steps cannot be counted: shows `what` and the elapsed time.
     pub fn uncounted(quiet: bool, what: &'static str) -> Self {
-        let progress = Self::start(quiet, "{spinner} {msg}, {elapsed}", |bar| {
-            format!("{}, {} s", bar.message(), bar.elapsed().as_secs())
-        });
+        let progress = Self::start(quiet, "{spinner} {msg}, {elapsed}");
         progress.bar.set_message(what);
         progress
     }
 
-    fn start(quiet: bool, template: &str, line: Line) -> Self {
+    fn start(quiet: bool, template: &str) -> Self {
         // A hidden bar still counts and estimates.
         let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::hidden());
         let style = ProgressStyle::with_template(template).expect("the template is ours");
@@ -62,13 +56,11 @@ impl Progress {
             let _ = text.write_str(&status(state.pos(), state.len(), state.elapsed()));
         }));
         let current = || CURRENT.lock().unwrap_or_else(PoisonError::into_inner);
-        *current() = Some((bar.downgrade(), line));
+        *current() = Some(bar.downgrade());
         // The first handler stays, and tells of the progress that started last.
         let _ = ctrlc::set_handler(move || {
             let last = current().take();
-            if let Some((bar, line)) = last
-                && let Some(bar) = bar.upgrade()
-            {
+            if let Some(bar) = last.and_then(|bar| bar.upgrade()) {
                 let done = line(&bar);
                 bar.finish_and_clear();
                 tell(format_args!("unlift: interrupted at {done}"));
@@ -101,6 +93,14 @@ impl Progress {
         if !what.is_empty() {
             self.bar.set_message(OneLine(what).to_string());
         }
+    }
+}
+
+/// Formats how far a bar is. Bars of work whose steps cannot be counted have no length.
+fn line(bar: &ProgressBar) -> String {
+    match bar.length() {
+        Some(0) => format!("{}, {} s", bar.message(), bar.elapsed().as_secs()),
+        length => format!("{}: {}", status(bar.position(), length, bar.elapsed()), bar.message()),
     }
 }
 

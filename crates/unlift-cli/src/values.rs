@@ -194,16 +194,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn thresholds_keep_how_they_were_typed() {
-        let threshold = threshold(" 0.10").unwrap();
-        assert_eq!(threshold, Threshold { label: "0.10".to_owned(), value: 0.1 });
-    }
-
-    #[test]
     fn wrong_values_say_what_was_expected_and_found() {
         let texts = [
             threshold("-1").unwrap_err(),
-            ratio("1.5").unwrap_err(),
+            ratio("nan").unwrap_err(),
             scheme("pppl").unwrap_err(),
             scheme("cp2d").unwrap_err(),
             solver("magic").unwrap_err(),
@@ -215,7 +209,7 @@ mod tests {
         assert_eq!(
             texts.join("\n"),
             "expected a number above 0, found -1\n\
-             expected a number from 0 to 1, found 1.5\n\
+             expected a number from 0 to 1, found nan\n\
              expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, sphere, found pppl\n\
              expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, sphere, found cp2d (for images only)\n\
              expected one of joint, consensus, ransac, density, tomography, found magic\n\
@@ -250,10 +244,5 @@ mod tests {
             let expected = format!("expected a whole number from 1 to 4294967295, found {text}");
             assert_eq!(count(text), Err(expected));
         }
-    }
-
-    #[test]
-    fn nan_and_infinity_are_no_lengths() {
-        assert!(positive("nan").is_err() && positive("inf").is_err() && ratio("nan").is_err());
     }
 }

@@ -2,31 +2,9 @@
 
 use std::fmt::{self, Display};
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use unlift::OneLine;
-
-/// The place of an error in a file.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Place {
-    /// A line of a text file, counted from 1.
-    Line(u64),
-    /// Another place: `record 12 (byte 4711)`, a column, a table. Empty for the file (or folder) as a
-    /// whole.
-    Named(String),
-}
-
-impl From<&str> for Place {
-    fn from(name: &str) -> Self {
-        Self::Named(name.to_owned())
-    }
-}
-
-impl From<String> for Place {
-    fn from(name: String) -> Self {
-        Self::Named(name)
-    }
-}
 
 /// A file that cannot be read or written, or whose content is wrong.
 ///
@@ -35,7 +13,8 @@ impl From<String> for Place {
 #[derive(Debug)]
 pub struct Error {
     path: PathBuf,
-    place: Place,
+    /// The place as it is printed behind the path: `:17` or `: record 12`, or nothing.
+    place: String,
     problem: String,
 }
 
@@ -43,15 +22,28 @@ impl Error {
     /// Creates an error about the content of `path`: what was expected at `place`, and what was
     /// found.
     ///
-    /// An empty `place` means the whole file.
+    /// A place is a record, a column or a table. An empty one means the whole file, or folder.
     pub fn new(
         path: impl Into<PathBuf>,
-        place: impl Into<Place>,
+        place: impl AsRef<str>,
         expected: impl Display,
         found: impl Display,
     ) -> Self {
-        let problem = format!("expected {expected}, found {found}");
-        Self { path: path.into(), place: place.into(), problem }
+        let place = match place.as_ref() {
+            "" => String::new(),
+            place => format!(": {place}"),
+        };
+        Self { path: path.into(), place, problem: format!("expected {expected}, found {found}") }
+    }
+
+    /// Creates an error about a line of a text file, counted from 1.
+    pub(crate) fn at_line(
+        path: &Path,
+        line: u64,
+        expected: impl Display,
+        found: impl Display,
+    ) -> Self {
+        Self { place: format!(":{line}"), ..Self::new(path, "", expected, found) }
     }
 
     /// Creates an error for a `path` that cannot be read.
@@ -87,30 +79,20 @@ impl Error {
     }
 
     fn of_whole(path: impl Into<PathBuf>, problem: String) -> Self {
-        Self { path: path.into(), place: "".into(), problem }
+        Self { path: path.into(), place: String::new(), problem }
     }
 
     /// Adds a prefix to the place of the error: `images.npz: image a.jpg, column x: expected
     /// ...`.
     pub(crate) fn within(self, what: &str) -> Self {
-        let place = match self.place {
-            Place::Named(name) if name.is_empty() => what.into(),
-            Place::Named(name) => format!("{what}, {name}").into(),
-            line => line,
-        };
-        Self { place, ..self }
+        Self { place: format!(": {what}{}", self.place.replacen(": ", ", ", 1)), ..self }
     }
 }
 
 impl Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        OneLine(self.path.display()).fmt(f)?;
-        match &self.place {
-            Place::Line(line) => write!(f, ":{line}")?,
-            Place::Named(name) if name.is_empty() => {}
-            Place::Named(name) => write!(f, ": {}", OneLine(name))?,
-        }
-        write!(f, ": {}", OneLine(&self.problem))
+        let (place, problem) = (OneLine(&self.place), OneLine(&self.problem));
+        write!(f, "{}{place}: {problem}", OneLine(self.path.display()))
     }
 }
 
@@ -127,7 +109,7 @@ mod tests {
         let core = || unlift::Error::new("point 3", "finite coordinates", "[NaN, 0.0, 0.0]");
         let io = |kind| io::Error::new(kind, "other\ntext");
         let table = [
-            (Error::new("points.txt", Place::Line(17), "3 coordinates", "2"), "points.txt:17: expected 3 coordinates, found 2"),
+            (Error::at_line(Path::new("points.txt"), 17, "3 coordinates", "2"), "points.txt:17: expected 3 coordinates, found 2"),
             (Error::new("points3D.bin", "record 12 (byte 4711)", "8 bytes", "end of file"), "points3D.bin: record 12 (byte 4711): expected 8 bytes, found end of file"),
             (Error::read("a.ply", io(io::ErrorKind::NotFound)), "a.ply: expected a file or folder, found nothing"),
             (Error::read("a.csv", io(io::ErrorKind::PermissionDenied)), "a.csv: expected a readable file, found no permission to read"),

@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Place};
+use crate::error::Error;
 
 /// Opens `path` for reading and returns it with its length in bytes.
 ///
@@ -63,9 +63,9 @@ impl Budget {
     ///
     /// # Errors
     /// When they exceed the budget or the memory of the machine. A sparse file may have any length.
-    pub fn room<T>(&self, place: impl Into<Place> + Clone, n: u64) -> Result<Vec<T>, Error> {
+    pub fn room<T>(&self, place: &str, n: u64) -> Result<Vec<T>, Error> {
         let bytes = n.saturating_mul(std::mem::size_of::<T>() as u64);
-        self.admit(place.clone(), bytes)?;
+        self.admit(place, bytes)?;
         let mut room = Vec::new();
         let there = usize::try_from(n).is_ok_and(|n| room.try_reserve_exact(n).is_ok());
         let expected = "data that fits into memory";
@@ -73,7 +73,7 @@ impl Budget {
     }
 
     /// Checks that `bytes` for `place` are within the budget.
-    pub fn admit(&self, place: impl Into<Place>, bytes: u64) -> Result<(), Error> {
+    pub fn admit(&self, place: &str, bytes: u64) -> Result<(), Error> {
         if bytes <= self.most {
             return Ok(());
         }

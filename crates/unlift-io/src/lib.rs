@@ -41,4 +41,4 @@ pub mod outputs;
 pub mod read;
 pub mod stage;
 
-pub use error::{Error, Place};
+pub use error::Error;

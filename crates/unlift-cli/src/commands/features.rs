@@ -1,7 +1,5 @@
 //! `unlift features`: writes the keypoints and descriptors of images to one file.
 
-use std::path::Path;
-
 use unlift::OneLine;
 use unlift_io::features::{FeatureWriter, ImageFeatures};
 use unlift_io::outputs::{Kind, Rules};
@@ -12,13 +10,12 @@ use super::common::all_could_be;
 use crate::args::FeaturesArgs;
 use crate::output::print;
 use crate::progress::Progress;
-use unlift_audit::images::{FeatureSource, Wanted, is_photo};
+use unlift_audit::images::{FeatureSource, Wanted};
 use unlift_audit::{Progress as _, bail, check_file};
 
 pub fn run(args: &FeaturesArgs) -> crate::Result<()> {
     let rules = Rules::new([args.images.as_path()], false);
-    let target = check_file("--out", &args.out, Kind::Features, &rules)?;
-    check_no_photo(&args.images, &target)?;
+    check_file("--out", &args.out, Kind::Features, &rules)?;
     if args.as_stored && args.images.is_file() {
         bail!("--as-stored: expected with a folder of photos, found a file");
     }
@@ -67,19 +64,4 @@ pub fn run(args: &FeaturesArgs) -> crate::Result<()> {
         print(&format!("{n_images} images, {n_features} features, in {out}\n"))?;
     }
     all_could_be("used", &args.images, n_images, n_failed)
-}
-
-/// Refuses an output file that the next run would read as a photo.
-fn check_no_photo(images: &Path, target: &Path) -> crate::Result<()> {
-    let folder = match target.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let (Ok(images), Ok(folder)) = (images.canonicalize(), folder.canonicalize()) else {
-        return Ok(());
-    };
-    if folder.starts_with(images) && is_photo(target) {
-        bail!("--out: {}: expected a name that is not read as a photo", target.display());
-    }
-    Ok(())
 }

@@ -35,7 +35,7 @@ pub fn run(args: &InvertArgs) -> crate::Result<()> {
     // Only checks that files can be written there.
     drop(OutputSet::create(&args.out, rules.clone(), Access::Private, &[]).map_err(refused)?);
     let to = Target { args, rules };
-    let Counts { painted, unusable } = match (&args.recovered, declared_kind(&args.path)) {
+    let results = match (&args.recovered, declared_kind(&args.path)) {
         (Some(recovered), _) if has_images(&args.path)? => images(&to, recovered)?,
         (Some(recovered), _) => map(&to, recovered)?,
         (None, Some(Stage::Released)) => {
@@ -51,33 +51,19 @@ pub fn run(args: &InvertArgs) -> crate::Result<()> {
         }
         (None, _) => keypoints(&to)?,
     };
+    let failed: Vec<&Error> = results.iter().filter_map(|result| result.as_ref().err()).collect();
+    failed.iter().for_each(|error| stderr::tell(format_args!("unlift: {error}")));
+    let painted = results.len() - failed.len();
     print(&format!("{painted} pictures, in {}\n", OneLine(args.out.display())))?;
-    all_could_be("painted", &args.path, painted, unusable)
+    all_could_be("painted", &args.path, painted, failed.len())
 }
+
+/// The result of each image.
+type Painted = Vec<crate::Result<()>>;
 
 struct Target<'a> {
     args: &'a InvertArgs,
     rules: Rules,
-}
-
-/// Counts of images.
-#[derive(Default)]
-struct Counts {
-    painted: usize,
-    unusable: usize,
-}
-
-impl Counts {
-    /// Counts an image, and prints its error if it has no picture.
-    fn add(&mut self, result: crate::Result<()>) {
-        match result {
-            Ok(()) => self.painted += 1,
-            Err(error) => {
-                stderr::tell(format_args!("unlift: {error}"));
-                self.unusable += 1;
-            }
-        }
-    }
 }
 
 impl Target<'_> {
@@ -107,21 +93,18 @@ impl Target<'_> {
     }
 }
 
-/// Paints all images in parallel, and prints a line for each that fails.
+/// Paints all images in parallel.
 fn each<T: Sync>(
     to: &Target<'_>,
     images: &[T],
     paint: impl Fn(&T) -> crate::Result<(String, ColorImage)> + Sync,
-) -> Counts {
+) -> Painted {
     let work = |image: &T| paint(image).and_then(|(name, picture)| to.add(&name, &picture));
-    let results: Vec<_> = images.par_iter().with_max_len(1).map(work).collect();
-    let mut counts = Counts::default();
-    results.into_iter().for_each(|result| counts.add(result));
-    counts
+    images.par_iter().with_max_len(1).map(work).collect()
 }
 
 /// Paints from the keypoints of photos or of a file.
-fn keypoints(to: &Target<'_>) -> crate::Result<Counts> {
+fn keypoints(to: &Target<'_>) -> crate::Result<Painted> {
     let path = &to.args.path;
     let wanted = Wanted { option: "--features", kind: to.args.features, ..Wanted::default() };
     let extraction = wanted.extraction(path)?;
@@ -132,14 +115,16 @@ fn keypoints(to: &Target<'_>) -> crate::Result<Counts> {
     let painter = &Painter::open(kind, None)?;
     Ok(each(to, &chosen, |&at| {
         let image = source.get(at)?;
-        let place = || format!("image {}", image.name.escape_debug());
-        let wrong = |expected: &str| FileError::new(path, place(), expected, "none");
-        let descriptors = image.descriptors.as_ref().ok_or_else(|| wrong("descriptors"))?;
-        let size = image.size.ok_or_else(|| wrong("a size in pixels"))?.map(|side| side as usize);
+        let descriptors = image.described(path)?;
+        let size = image.size.ok_or_else(|| {
+            let place = format!("image {}", image.name);
+            FileError::new(path, place, "a size in pixels", "none")
+        })?;
         let places: Vec<[f32; 2]> =
             image.keypoints.iter().map(|place| place.map(|x| x as f32)).collect();
+        let size = size.map(|side| side as usize);
         let picture = painter.keypoints(&places, descriptors, size);
-        let picture = picture.map_err(|error| FileError::core(path, error.within(&place())))?;
+        let picture = picture.map_err(of_image(path, &image.name))?;
         Ok((image.name, picture))
     }))
 }
@@ -157,7 +142,7 @@ fn kind_of_images(path: &Path) -> crate::Result<DescriptorKind> {
 }
 
 /// Paints from the recovered keypoints of released images.
-fn images(to: &Target<'_>, recovered: &Path) -> crate::Result<Counts> {
+fn images(to: &Target<'_>, recovered: &Path) -> crate::Result<Painted> {
     let path = &to.args.path;
     let painter = &Painter::open(kind_of_images(path)?, None)?;
     let mut released = ImageFile::open(path, Stage::Released)?;
@@ -178,20 +163,20 @@ fn images(to: &Target<'_>, recovered: &Path) -> crate::Result<Counts> {
         same_map(recovered, came_back.about().map, path, Some(image.fingerprint()))?;
         Ok(Some((name, image, came_back)))
     };
-    let mut counts = Counts::default();
     let work = |(name, released, recovered): (String, Released<2>, Recovered<2>)| {
         let picture = painter.image(&released, &recovered).map_err(of_image(path, &name));
         Ok(picture.map_err(Into::into).and_then(|picture| to.add(&name, &picture)))
     };
+    let mut results = Vec::new();
     stages::each(next, work, |result| {
-        counts.add(result);
+        results.push(result);
         Ok(())
     })?;
-    Ok(counts)
+    Ok(results)
 }
 
 /// Paints from the recovered points of a map, as the cameras of a model see them.
-fn map(to: &Target<'_>, recovered: &Path) -> crate::Result<Counts> {
+fn map(to: &Target<'_>, recovered: &Path) -> crate::Result<Painted> {
     let (args, path) = (to.args, &to.args.path);
     let Some(model) = &args.cameras else {
         return Err(Error::request(
@@ -209,25 +194,21 @@ fn map(to: &Target<'_>, recovered: &Path) -> crate::Result<Counts> {
     Ok(each(to, &chosen, |&at| {
         let image = &images[at];
         let name = String::from_utf8_lossy(&image.name).into_owned();
-        let of_image = |error: unlift::Error| {
-            FileError::core(model, error.within(&format!("image {}", name.escape_debug())))
-        };
-        let camera = image.camera(&cameras).ok_or_else(|| {
-            of_image(unlift::Error::new("camera", "one of the model", image.camera_id.to_string()))
-        })?;
-        let view = view(camera, image, scale).map_err(of_image)?;
-        if !painter.sees(&view, &came_back).map_err(of_image)? {
+        let camera = image.camera(&cameras).expect("checked when the model is read");
+        let view = view(camera, image, scale).map_err(of_image(model, &name))?;
+        if !painter.sees(&view, &came_back).map_err(of_image(model, &name))? {
             let error = unlift::Error::new("recovered points", "some before the camera", "none");
-            return Err(of_image(error).into());
+            return Err(of_image(model, &name)(error).into());
         }
-        let picture = painter.map(&view, &released, &came_back).map_err(of_image)?;
+        let picture = painter.map(&view, &released, &came_back);
+        let picture = picture.map_err(of_image(model, &name))?;
         Ok((name, picture))
     }))
 }
 
 /// Paints six views from the center of bearings, such as a sphere cloud: directions are released, so
 /// nothing needs to be recovered.
-fn bearings(to: &Target<'_>, released: &Released<3>) -> crate::Result<Counts> {
+fn bearings(to: &Target<'_>, released: &Released<3>) -> crate::Result<Painted> {
     let of_map = |error| FileError::core(&to.args.path, error);
     let painter = Painter::open(kind_of("PATH", released.descriptors())?, None)?;
     let places = on_bearings(released).map_err(of_map)?;

@@ -11,7 +11,7 @@ use unlift::audit::staged::{Pooled, key_of, oracle_lists, oracle_seed};
 use unlift::audit::{Plan, Row, Threshold, measure};
 use unlift::evaluate::blind;
 use unlift::neighbors::sources::Named;
-use unlift::neighbors::{Needs as SourceNeeds, Neighborhoods, Source, of_what_there_is};
+use unlift::neighbors::{Needs as SourceNeeds, Neighborhoods, of_what_there_is};
 use unlift::obfuscate::{Change, Changed, Scheme, SchemeOptions, obfuscate as hide};
 use unlift::recover::{RecoverOptions, Recovered, Status, recover as solve};
 use unlift::released::Released;
@@ -284,34 +284,21 @@ fn add_lists(
     writer.neighborhoods(name, lists)
 }
 
-/// Returns an error if `source` needs other descriptors than those of `released`, where `expected` are missing.
-fn check_descriptors<const D: usize>(
-    source: &dyn Source<D>,
-    released: &Released<D>,
-    expected: &str,
-) -> Result<(), unlift::Error> {
-    match released.descriptors() {
-        Some(descriptors) => source.takes(descriptors),
-        None if source.needs() == SourceNeeds::Descriptors => {
-            let what = format!("descriptors for {}", source.name());
-            Err(unlift::Error::new(what, expected, "none"))
-        }
-        None => Ok(()),
-    }
-}
-
 fn map_by_source(args: &NeighborsArgs, named: &Named, rules: &Rules) -> crate::Result<Counts> {
     let released = read_released::<3>(&args.released)?;
     let source = named.of_dimension::<3>()?;
     let of_map = |error| FileError::core(&args.released, error);
-    check_descriptors(&*source, &released, "some in the released map").map_err(|error| {
-        let advice = match released.descriptors() {
-            Some(_) => "--neighbors similarity, which takes descriptors of any kind",
-            None => {
-                "--neighbors geometric, or hide the map with unlift obfuscate --descriptors FILE"
+    source.supports(&released).map_err(|error| {
+        let error = Error::from(of_map(error));
+        match (source.needs(), released.descriptors()) {
+            (SourceNeeds::Nothing, _) => error,
+            (_, Some(_)) => {
+                error.advise("--neighbors similarity, which takes descriptors of any kind")
             }
-        };
-        Error::from(of_map(error)).advise(advice)
+            (_, None) => error.advise(
+                "--neighbors geometric, or hide the map with unlift obfuscate --descriptors FILE",
+            ),
+        }
     })?;
     if let Some(note) = source.note(released.n_slots()) {
         stderr::note(note);
@@ -343,9 +330,8 @@ fn images_by_source(args: &NeighborsArgs, named: &Named, rules: &Rules) -> crate
     let work = |rows: ImageRows<'_>| {
         let name = rows.name().to_owned();
         let image = rows.released()?;
-        let lists = check_descriptors(&*source, &image, "some")
-            .and_then(|()| of_what_there_is(&*source, &image, args.seed))
-            .map_err(of_image(&args.released, &name))?;
+        let lists = of_what_there_is(&*source, &image, args.seed);
+        let lists = lists.map_err(of_image(&args.released, &name))?;
         Ok(Some((name, lists)))
     };
     let next = || Ok(images.next_image()?);

@@ -6,6 +6,7 @@ use std::process::{Child, Command, Output, Stdio};
 
 use image::RgbImage;
 use serde_json::Value;
+use unlift_io::features::{FeatureSource, FeatureWriter, ImageFeatures};
 
 pub struct Place(tempfile::TempDir);
 
@@ -54,6 +55,19 @@ impl Place {
         (0..points.len() as u64).for_each(|id| bytes.extend(id.to_le_bytes()));
         points.iter().for_each(|point| bytes.extend(descriptor(point, dim)));
         self.write(name, bytes);
+    }
+
+    /// Writes features of images in hloc's format.
+    pub fn write_features(&self, name: &str, images: impl IntoIterator<Item = ImageFeatures>) {
+        let mut writer = FeatureWriter::create(&self.path(name)).unwrap();
+        images.into_iter().for_each(|image| writer.append(&image).unwrap());
+        writer.finish().unwrap();
+    }
+
+    /// Reads the features of all images of a file.
+    pub fn features(&self, name: &str) -> Vec<ImageFeatures> {
+        let source = FeatureSource::open(&self.path(name)).unwrap();
+        (0..source.names().len()).map(|at| source.get(at).unwrap()).collect()
     }
 
     pub fn path(&self, name: &str) -> PathBuf {

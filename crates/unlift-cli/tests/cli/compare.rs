@@ -98,9 +98,6 @@ fn what_leaks_more_or_is_out_of_view_fails() {
         let ended =
             ["NOT COMPARED, as --accept ended on 2020-02-29: ", start][usize::from(code == 1)];
         assert!(accepted("2020-02-29", 1).starts_with(ended), "{name}");
-        for until in ["soon", "2999-02-30"] {
-            assert_eq!(accepted(until, 2), "");
-        }
     }
     let compared = place.prints("compare old.json new.json --json --out c", 1);
     assert_eq!(compared["more"][0]["scheme"], "olc");

@@ -5,7 +5,7 @@ use std::fs;
 use image::RgbImage;
 use unlift::Descriptors;
 use unlift::descriptors::Values;
-use unlift_io::features::{FeatureSource, FeatureWriter, ImageFeatures};
+use unlift_io::features::ImageFeatures;
 
 use crate::common::{Place, rows};
 
@@ -24,14 +24,11 @@ fn features() -> Place {
 
 /// Writes the features of `f.h5` to `name`, each image modified by `change`.
 fn write_changed(place: &Place, name: &str, change: impl Fn(&mut ImageFeatures)) {
-    let source = FeatureSource::open(&place.path("f.h5")).unwrap();
-    let mut writer = FeatureWriter::create(&place.path(name)).unwrap();
-    for at in 0..source.names().len() {
-        let mut image = source.get(at).unwrap();
+    let changed = |mut image: ImageFeatures| {
         change(&mut image);
-        writer.append(&image).unwrap();
-    }
-    writer.finish().unwrap();
+        image
+    };
+    place.write_features(name, place.features("f.h5").into_iter().map(changed));
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use unlift::Descriptors;
 use unlift::descriptors::Values;
 use unlift::geometry::camera::{Camera, Intrinsics, Pose};
-use unlift_io::features::{FeatureWriter, ImageFeatures};
+use unlift_io::features::ImageFeatures;
 
 use crate::common::{Place, recovered, row, rows};
 
@@ -28,7 +28,7 @@ fn walk() -> Place {
         (0..N_POINTS * 128).map(|at| (random(at * at % 7919 + at) * 255.0) as u8).collect();
     let descriptors = Descriptors::try_new(Values::U8(values), 128).unwrap();
     let mut images = String::new();
-    let mut files = ["f.h5", "g.h5"].map(|name| FeatureWriter::create(&place.path(name)).unwrap());
+    let mut files = [Vec::new(), Vec::new()];
     for at in 0..N_IMAGES {
         // The camera walks to the right, up and down, and turns about its axis.
         let turn = 0.1 * at as f64;
@@ -42,17 +42,19 @@ fn walk() -> Place {
         let order = |row: usize| ((row + 17 * at) % N_POINTS) as u32;
         let turned = descriptors.select(&(0..N_POINTS).map(order).collect::<Vec<_>>());
         for (file, descriptors) in files.iter_mut().zip([descriptors.clone(), turned]) {
-            let image = ImageFeatures {
+            file.push(ImageFeatures {
                 name: format!("{at}.png"),
                 size: Some([640, 480]),
                 keypoints: points.iter().filter_map(|point| camera.project(point)).collect(),
                 descriptors: Some(descriptors),
                 ..ImageFeatures::default()
-            };
-            file.append(&image).unwrap();
+            });
         }
     }
-    files.into_iter().for_each(|file| file.finish().unwrap());
+    files
+        .into_iter()
+        .zip(["f.h5", "g.h5"])
+        .for_each(|(file, name)| place.write_features(name, file));
     let track: String = (1..=N_IMAGES).map(|id| format!(" {id} 0")).collect();
     let lines = points.iter().enumerate();
     let lines = lines.map(|(at, [x, y, z])| format!("{} {x} {y} {z} 9 9 9 0{track}\n", at + 1));

@@ -7,7 +7,7 @@ use serde_json::Value;
 use unlift::Descriptors;
 use unlift::descriptors::Values;
 use unlift::obfuscate::SCHEMES;
-use unlift_io::features::{FeatureWriter, ImageFeatures};
+use unlift_io::features::ImageFeatures;
 
 use crate::common::{Place, descriptor, recovered, row, rows};
 
@@ -95,18 +95,16 @@ fn the_stages_print_the_row_of_the_audit() {
 /// Writes features of images: one has fewer keypoints than a list has entries, one has a single
 /// keypoint, which some schemes do not release.
 fn write_features(place: &Place) {
-    let mut writer = FeatureWriter::create(&place.path("f.h5")).unwrap();
-    for (image, n) in [90, 5, 1, 70].into_iter().enumerate() {
+    let image = |(image, n): (usize, usize)| {
         let point = |at: usize| [(at * 97 + 31 * image) % 631, (at * 61 + 17 * image) % 467];
         let keypoints: Vec<[f64; 2]> = (0..n).map(|at| point(at).map(|x| x as f64)).collect();
         let places = keypoints.iter().map(|[x, y]| [x / 90.0, y / 90.0, 0.0]);
         let bytes = places.flat_map(|place| descriptor(&place, 128).collect::<Vec<u8>>()).collect();
         let descriptors = Some(Descriptors::try_new(Values::U8(bytes), 128).unwrap());
         let (name, size) = (format!("c/{image}.png"), Some([640, 480]));
-        let image = ImageFeatures { name, size, keypoints, descriptors, ..Default::default() };
-        writer.append(&image).unwrap();
-    }
-    writer.finish().unwrap();
+        ImageFeatures { name, size, keypoints, descriptors, ..Default::default() }
+    };
+    place.write_features("f.h5", [90, 5, 1, 70].into_iter().enumerate().map(image));
 }
 
 /// A file of many images gives the row of the audit, for any number of threads.

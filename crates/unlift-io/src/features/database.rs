@@ -21,13 +21,6 @@ use crate::error::Error;
 use crate::input::{self, Budget};
 use crate::read::lines::quoted;
 
-/// A matrix of one image: `n` rows of `dim` values each.
-struct Rows {
-    n: usize,
-    dim: usize,
-    values: Values,
-}
-
 const TABLES: [&str; 4] = ["images", "cameras", "keypoints", "descriptors"];
 /// SQLite steps between two checks of the limit.
 const STEPS_AT_A_TIME: u64 = 1000;
@@ -81,13 +74,13 @@ impl Database {
     }
 
     pub fn descriptors(&self, name: &[u8]) -> Result<(Values, usize), Error> {
-        let rows = self.matrix(name, "descriptors")?.map(|rows| (rows.values, rows.dim));
+        let rows = self.matrix(name, "descriptors")?.map(|(_, values, dim)| (values, dim));
         rows.ok_or_else(|| self.error(name, "descriptors", "none"))
     }
 
-    /// Returns the descriptors or the keypoints (floats) of an image, or `None` if `table` has no
-    /// row for it.
-    fn matrix(&self, name: &[u8], table: &str) -> Result<Option<Rows>, Error> {
+    /// Returns the descriptors or the keypoints (floats) of an image: their number, the values and
+    /// the number of values of each. `None` if `table` has no row for the image.
+    fn matrix(&self, name: &[u8], table: &str) -> Result<Option<(usize, Values, usize)>, Error> {
         let image_id = self.image_id(name)?;
         let of_keypoints = table == "keypoints";
         let kind = if self.has_type && !of_keypoints { "type" } else { "0" };
@@ -117,10 +110,10 @@ impl Database {
             return Err(self.error(name, expected, format!("{} bytes", data.len())));
         }
         if are_bytes {
-            return Ok(Some(Rows { n, dim: row_bytes, values: Values::U8(data) }));
+            return Ok(Some((n, Values::U8(data), row_bytes)));
         }
         let floats = data.as_chunks().0.iter().map(|&bytes| f32::from_le_bytes(bytes)).collect();
-        Ok(Some(Rows { n, dim: row_bytes / 4, values: Values::F32(floats) }))
+        Ok(Some((n, Values::F32(floats), row_bytes / 4)))
     }
 
     fn row<T>(
@@ -152,8 +145,7 @@ impl Database {
     pub fn get(&self, at: usize) -> Result<ImageFeatures, Error> {
         let name = &self.image_ids[at].0[..];
         let size = self.size(name)?;
-        let rows = self.matrix(name, "keypoints")?;
-        let Some(Rows { n, dim: columns, values: Values::F32(values) }) = rows else {
+        let Some((n, Values::F32(values), columns)) = self.matrix(name, "keypoints")? else {
             return Err(self.error(name, "keypoints", "none"));
         };
         let descriptors = self.matrix(name, "descriptors")?;
@@ -173,12 +165,12 @@ impl Database {
             let (scales, turns) = values.chunks(columns).map(shape).unzip();
             (image.scales, image.orientations_deg) = (Some(scales), Some(turns));
         }
-        if let Some(rows) = descriptors {
-            if rows.n != n {
-                return Err(self.error(name, format!("{n} descriptors, one per keypoint"), rows.n));
+        if let Some((found, values, dim)) = descriptors {
+            if found != n {
+                return Err(self.error(name, format!("{n} descriptors, one per keypoint"), found));
             }
             let wrong = |error: unlift::Error| self.error(name, error.expected(), error.found());
-            let descriptors = Descriptors::try_new(rows.values, rows.dim).map_err(wrong)?;
+            let descriptors = Descriptors::try_new(values, dim).map_err(wrong)?;
             image.descriptors = Some(descriptors);
         }
         Ok(image)

@@ -37,10 +37,9 @@ const UNCERTAINTY: &str = "uncertainty";
 pub(super) struct Hloc {
     path: PathBuf,
     budget: Budget,
-    /// Paths of all groups that contain arrays directly, sorted by bytes.
-    pub names: Vec<String>,
-    /// Open handles: finding a group by path searches all names of the groups above it.
-    groups: Vec<Group>,
+    /// Paths and open handles of all groups that contain arrays directly, sorted by path. Finding a
+    /// group by path would search all names of the groups above it.
+    groups: Groups,
     /// Errors about links that lead to no group.
     pub broken: Vec<Error>,
 }
@@ -55,13 +54,10 @@ impl Hloc {
             return Err(Error::new(path, "", "a whole HDF5 file", found));
         }
         let budget = Budget::new(path, len);
-        let (names, groups, broken) = Default::default();
-        let mut all = Self { path: path.to_owned(), budget, names, groups, broken };
-        let (mut groups, broken) = all.step("", || all.list(len))?;
-        groups.sort_unstable_by(|(a, _), (b, _)| a.cmp(b));
-        (all.names, all.groups) = groups.into_iter().unzip();
-        all.broken = broken;
-        let Some(first) = all.names.first() else { return Ok(all) };
+        let mut all = Self { path: path.to_owned(), budget, groups: vec![], broken: vec![] };
+        (all.groups, all.broken) = all.step("", || all.list(len))?;
+        all.groups.sort_unstable_by(|(a, _), (b, _)| a.cmp(b));
+        let Some((first, _)) = all.groups.first() else { return Ok(all) };
         let first = all.arrays(0).map_err(|error| error.within(&place(first)))?;
         let has = |name: &str| first.iter().any(|array| array == name);
         let found = match () {
@@ -160,13 +156,18 @@ impl Hloc {
         Error::new(&self.path, place, "readable HDF5", error)
     }
 
-    pub fn is_upright(&self) -> bool {
-        !self.names.is_empty() && self.attribute(0, UPRIGHT).is_ok_and(|value| value == Some(1.0))
+    /// The names of the images, sorted by bytes.
+    pub fn names(&self) -> Vec<String> {
+        self.groups.iter().map(|(name, _)| name.clone()).collect()
     }
 
-    /// Reads image `at` of `names`.
+    pub fn is_upright(&self) -> bool {
+        !self.groups.is_empty() && self.attribute(0, UPRIGHT).is_ok_and(|value| value == Some(1.0))
+    }
+
+    /// Reads image `at` of [`names`](Self::names).
     pub fn get(&self, at: usize) -> Result<ImageFeatures, Error> {
-        self.image(at).map_err(|error| error.within(&place(&self.names[at])))
+        self.image(at).map_err(|error| error.within(&place(&self.groups[at].0)))
     }
 
     // The errors of the following name the array only.
@@ -192,7 +193,7 @@ impl Hloc {
         let descriptors = optional("descriptors")?.map(|array| descriptors(&array, n));
         let size = optional("image_size")?.map(|array| size(&array));
         Ok(ImageFeatures {
-            name: self.names[at].clone(),
+            name: self.groups[at].0.clone(),
             size: size.transpose()?,
             descriptors: descriptors.transpose()?,
             scores: per_keypoint("scores")?,
@@ -207,7 +208,7 @@ impl Hloc {
 
     /// Returns the sorted names of the arrays of image `at`.
     fn arrays(&self, at: usize) -> Result<Vec<String>, Error> {
-        let names = || self.groups[at].datasets().map_err(|error| self.unreadable("", error));
+        let names = || self.groups[at].1.datasets().map_err(|error| self.unreadable("", error));
         let mut names = self.step("", names)?;
         names.sort_unstable();
         Ok(names)
@@ -216,7 +217,7 @@ impl Hloc {
     fn array(&self, at: usize, name: &'static str) -> Result<Array<'_>, Error> {
         self.step(name, || {
             let refuse = |error| self.unreadable(name, error);
-            let dataset = self.groups[at].dataset(name).map_err(refuse)?;
+            let dataset = self.groups[at].1.dataset(name).map_err(refuse)?;
             let shape = dataset.shape().map_err(refuse)?;
             let count = shape.iter().fold(1u64, |n, &side| n.saturating_mul(side));
             // A header can declare any size. Values are widened to eight bytes at most.
@@ -232,7 +233,7 @@ impl Hloc {
 
     fn attribute(&self, at: usize, key: &str) -> Result<Option<f64>, Error> {
         self.step(KEYPOINTS, || {
-            let dataset = self.groups[at].dataset(KEYPOINTS);
+            let dataset = self.groups[at].1.dataset(KEYPOINTS);
             let attributes = dataset.and_then(|dataset| dataset.attrs());
             let attributes = attributes.map_err(|error| self.unreadable(KEYPOINTS, error))?;
             Ok(attributes.get(key).and_then(AttrValue::as_f64))
@@ -345,13 +346,7 @@ fn descriptors(array: &Array<'_>, n: usize) -> Result<Descriptors, Error> {
         }
         _ => Values::F32(transposed(&array.values, sides, |value| value as f32)),
     };
-    Descriptors::try_new(values, dim).map_err(|error| {
-        let found = match error.what() {
-            "descriptors" => error.found().to_owned(),
-            place => format!("{} ({place})", error.found()),
-        };
-        array.wrong(error.expected(), found)
-    })
+    Descriptors::try_new(values, dim).map_err(|error| Error::core(array.path, error))
 }
 
 /// Returns whether the rows of a square matrix, but not its columns, have equal norms, up to the rounding of bytes and half floats.
@@ -366,21 +361,14 @@ fn has_equal_rows(values: &[f64], n: usize) -> bool {
 }
 
 fn size(array: &Array<'_>) -> Result<[u32; 2], Error> {
-    let sides = &array.values;
-    let side = |value: f64| {
-        let whole = (1.0..=f64::from(u32::MAX)).contains(&value) && value.fract() == 0.0;
-        whole.then_some(value as u32)
+    let side = |value: &f64| {
+        let is_whole = (1.0..=f64::from(u32::MAX)).contains(value) && value.fract() == 0.0;
+        is_whole.then_some(*value as u32)
     };
-    match sides[..] {
-        [width, height] => side(width).zip(side(height)).map(|(width, height)| [width, height]),
-        _ => None,
-    }
-    .ok_or_else(|| {
-        let found = match sides.len() {
-            2 => format!("{} and {}", sides[0], sides[1]),
-            _ => tuple(&array.shape),
-        };
-        array.wrong("width and height in pixels", found)
+    let sides: Option<Vec<u32>> = array.values.iter().map(side).collect();
+    sides.and_then(|sides| sides.try_into().ok()).ok_or_else(|| {
+        let first = &array.values[..array.values.len().min(3)];
+        array.wrong("width and height in pixels", tuple(first))
     })
 }
 

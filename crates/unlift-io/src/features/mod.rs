@@ -3,19 +3,6 @@
 //! The coordinates are **hloc's** in this module. Keypoints are `(x, y)` in pixels, and the center
 //! of the first pixel is `(0, 0)`. COLMAP's, where it is `(0.5, 0.5)`, are converted when they are
 //! read. Names of images are relative to their folder, with slashes.
-//!
-//! ```no_run
-//! use unlift_io::features::FeatureSource;
-//!
-//! let source = FeatureSource::open("features.h5".as_ref())?;
-//! for at in 0..source.names().len() {
-//!     match source.get(at) {
-//!         Ok(image) => println!("{}: {} keypoints", image.name, image.keypoints.len()),
-//!         Err(error) => eprintln!("{error}"),
-//!     }
-//! }
-//! # Ok::<(), unlift_io::Error>(())
-//! ```
 
 pub(crate) mod database;
 mod hloc;
@@ -81,11 +68,11 @@ pub fn round_to_half(values: &mut [f32]) {
 /// An open file of features that is read one image at a time.
 ///
 /// Several threads may call [`get`](Self::get) at once.
-pub struct FeatureSource(Kind);
-
-enum Kind {
-    Hloc(hloc::Hloc),
-    Colmap(database::Database),
+pub struct FeatureSource {
+    names: Vec<String>,
+    refused: Vec<Error>,
+    is_upright: bool,
+    get: Box<dyn Fn(usize) -> Result<ImageFeatures, Error> + Send + Sync>,
 }
 
 pub(crate) const SQLITE: &[u8; 8] = b"SQLite f";
@@ -98,9 +85,18 @@ impl FeatureSource {
     /// When the file cannot be read, is of another format, is truncated, or contains no image.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let (start, len) = input::head(path, 8)?;
-        let kind = match start.first_chunk() {
-            Some(HDF5) => Kind::Hloc(hloc::Hloc::open(path)?),
-            Some(SQLITE) => Kind::Colmap(database::Database::open(path)?),
+        let source = match start.first_chunk() {
+            Some(HDF5) => {
+                let mut file = hloc::Hloc::open(path)?;
+                let (names, refused) = (file.names(), std::mem::take(&mut file.broken));
+                let is_upright = file.is_upright();
+                Self { names, refused, is_upright, get: Box::new(move |at| file.get(at)) }
+            }
+            Some(SQLITE) => {
+                let file = database::Database::open(path)?;
+                let (names, refused, is_upright) = (file.names.clone(), Vec::new(), false);
+                Self { names, refused, is_upright, get: Box::new(move |at| file.get(at)) }
+            }
             _ => {
                 let expected = "features in HDF5, or a COLMAP database (SQLite)";
                 let found = match len {
@@ -110,8 +106,7 @@ impl FeatureSource {
                 return Err(Error::new(path, "", expected, found));
             }
         };
-        let source = Self(kind);
-        if source.names().is_empty() {
+        if source.names.is_empty() {
             return Err(Error::new(path, "", "at least one image", "none"));
         }
         Ok(source)
@@ -119,26 +114,17 @@ impl FeatureSource {
 
     /// Returns true if the first image states that keypoints are in pixels of the upright photo.
     pub fn is_upright(&self) -> bool {
-        match &self.0 {
-            Kind::Hloc(file) => file.is_upright(),
-            Kind::Colmap(_) => false,
-        }
+        self.is_upright
     }
 
     /// One error for each entry of the file that is not an image.
     pub fn refused(&self) -> &[Error] {
-        match &self.0 {
-            Kind::Hloc(file) => &file.broken,
-            Kind::Colmap(_) => &[],
-        }
+        &self.refused
     }
 
     /// The names of the images, sorted by bytes.
     pub fn names(&self) -> &[String] {
-        match &self.0 {
-            Kind::Hloc(file) => &file.names,
-            Kind::Colmap(database) => &database.names,
-        }
+        &self.names
     }
 
     /// Reads the features of image `at` of [`names`](Self::names).
@@ -149,9 +135,6 @@ impl FeatureSource {
     /// # Panics
     /// When there is no such image.
     pub fn get(&self, at: usize) -> Result<ImageFeatures, Error> {
-        match &self.0 {
-            Kind::Hloc(file) => file.get(at),
-            Kind::Colmap(database) => database.get(at),
-        }
+        (self.get)(at)
     }
 }

@@ -19,8 +19,7 @@ pub(crate) type ArrayBytes<'a> = Bytes<ZipFile<'a, BufReader<File>>>;
 pub(crate) struct Archive {
     path: PathBuf,
     zip: ZipArchive<BufReader<File>>,
-    /// The memory that decoding may use.
-    pub budget: Budget,
+    budget: Budget,
 }
 
 impl Archive {
@@ -29,19 +28,14 @@ impl Archive {
         let (file, len) = input::open(path)?;
         let mut file = BufReader::new(file);
         let head = file.fill_buf().map_err(|source| Error::read(path, source))?;
-        let another = match head.get(..4).unwrap_or(head) {
-            b"" => Some("an empty file"),
-            b"PAR1" => Some("a Parquet file, as earlier versions wrote"),
-            head if head.starts_with(b"PK") => None,
-            _ => Some("another file"),
-        };
         let expected = "an archive of NumPy arrays (.npz)";
-        if let Some(found) = another {
+        if !head.starts_with(b"PK") {
+            let found = if head.is_empty() { "an empty file" } else { "another file" };
             return Err(Error::new(path, "", expected, found));
         }
         let zip = caught(|| ZipArchive::new(file)).ok();
-        let zip = zip.unwrap_or(Err(ZipError::InvalidArchive("a damaged one".into())));
-        let zip = zip.map_err(|error| Error::new(path, "", expected, cause(error)))?;
+        let zip = zip.unwrap_or(Err(ZipError::InvalidArchive("a panic of its reader".into())));
+        let zip = zip.map_err(|error| Error::new(path, "", expected, error))?;
         Ok(Self { path: path.to_owned(), zip, budget: Budget::new(path, len) })
     }
 
@@ -49,9 +43,8 @@ impl Archive {
     pub fn arrays(&self) -> Result<Vec<(usize, String)>, Error> {
         let mut arrays = Vec::new();
         for (at, name) in self.zip.file_names().enumerate() {
-            let name = name.map_err(|error| {
-                Error::new(&self.path, format!("entry {at}"), "a name", cause(error))
-            })?;
+            let name = name
+                .map_err(|error| Error::new(&self.path, format!("entry {at}"), "a name", error))?;
             arrays.extend(name.strip_suffix(".npy").map(|name| (at, name.to_owned())));
         }
         Ok(arrays)
@@ -61,19 +54,10 @@ impl Archive {
     pub fn array(&mut self, at: usize, name: &str) -> Result<ArrayBytes<'_>, Error> {
         let place = format!("array {name}");
         let entry = self.zip.by_index(at).map_err(|error| {
-            Error::new(&self.path, &*place, "an array that is stored or deflated", cause(error))
+            Error::new(&self.path, &place, "an array that is stored or deflated", error)
         })?;
         let size = entry.size();
-        self.budget.admit(place, size)?;
-        Ok(Bytes::of_array(&self.path, entry, name, size))
-    }
-}
-
-/// Describes an error of the archive, without the words that repeat its type.
-fn cause(error: ZipError) -> String {
-    match error {
-        ZipError::InvalidArchive(cause) => cause.into_owned(),
-        ZipError::UnsupportedArchive(cause) => cause.to_owned(),
-        other => other.to_string(),
+        self.budget.admit(&place, size)?;
+        Ok(Bytes::of_array(&self.path, entry, name, size, self.budget.clone()))
     }
 }

@@ -2,23 +2,17 @@
 
 use std::path::Path;
 
-use super::lines::{Lines, coordinate, number, quoted, words};
+use super::lines::{Lines, coordinates, number, quoted, words};
 use super::map_input::{Input, center, undeclared};
 use crate::error::Error;
 
-fn numbers<const N: usize>(lines: &Lines, what: &str) -> Result<[f64; N], Error> {
-    let mut values = [0.0; N];
-    let mut words = words(lines.line());
-    for (at, value) in values.iter_mut().enumerate() {
-        let word = words.next();
-        let word =
-            word.ok_or_else(|| lines.error(format!("{N} numbers of {what}"), at.to_string()))?;
-        *value = coordinate(word)
-            .ok_or_else(|| lines.error(format!("a number of {what}"), quoted(word)))?;
-    }
-    Ok(values)
+/// Reads the next line of three numbers.
+fn row(lines: &mut Lines, what: &str) -> Result<[f64; 3], Error> {
+    lines.expect_data(what)?;
+    coordinates(lines, &mut words(lines.line()), what)
 }
 
+/// Reads points and cameras.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let mut lines = Lines::open(path)?;
     lines.expect_data("numbers of cameras and points")?;
@@ -30,22 +24,18 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     let mut input = Input { format: "Bundler", ..Input::default() };
     for at in 0..*n_cameras {
         let what = format!("camera {at}");
-        lines.expect_data(&what)?;
-        let [focal, ..] = numbers::<3>(&lines, &what)?;
+        let [focal, ..] = row(&mut lines, &what)?;
         let mut rotation = [[0.0; 3]; 3];
-        for row in &mut rotation {
-            lines.expect_data(&what)?;
-            *row = numbers(&lines, &what)?;
+        for its_row in &mut rotation {
+            *its_row = row(&mut lines, &what)?;
         }
-        lines.expect_data(&what)?;
-        let translation = numbers(&lines, &what)?;
+        let translation = row(&mut lines, &what)?;
         // A focal length of zero marks photos that were not registered. The y axis points up.
         input.camera((focal != 0.0).then(|| (center(&rotation, &translation), rotation[1])));
     }
     for at in 0..*n_points {
         let what = format!("point {at}");
-        lines.expect_data(&what)?;
-        input.positions.push(numbers(&lines, &what)?);
+        input.positions.push(row(&mut lines, &what)?);
         lines.expect_data(&format!("the color of {what}"))?;
         lines.expect_data(&format!("the views of {what}"))?;
     }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use half::f16;
 
-use crate::error::{Error, Place};
+use crate::error::Error;
 use crate::input::{self, Budget};
 
 /// A little-endian reader of binary files. It checks declared sizes against the remaining bytes,
@@ -19,6 +19,7 @@ pub(crate) struct Bytes<R = BufReader<File>> {
     value_at: u64,
     at: u64,
     len: u64,
+    budget: Budget,
 }
 
 /// Formatted only for errors.
@@ -27,7 +28,6 @@ enum Part {
     Record(u64),
     /// An array of an archive.
     Array(String),
-    End,
 }
 
 impl Bytes {
@@ -49,12 +49,15 @@ impl Bytes {
 impl<R: Read> Bytes<R> {
     /// Creates a reader of a file of `len` bytes of which `at` were already read.
     pub fn continuing(path: &Path, reader: R, at: u64, len: u64) -> Self {
-        Self { path: path.to_owned(), reader, part: Part::Header, value_at: at, at, len }
+        let (path, budget) = (path.to_owned(), Budget::new(path, len));
+        Self { path, reader, part: Part::Header, value_at: at, at, len, budget }
     }
 
-    /// Creates a reader of the array `name` of an archive, `len` bytes long when unpacked.
-    pub fn of_array(path: &Path, reader: R, name: &str, len: u64) -> Self {
-        Self { part: Part::Array(name.to_owned()), ..Self::continuing(path, reader, 0, len) }
+    /// Creates a reader of the array `name` of an archive, `len` bytes long when unpacked, with the
+    /// `budget` of the archive.
+    pub fn of_array(path: &Path, reader: R, name: &str, len: u64, budget: Budget) -> Self {
+        let part = Part::Array(name.to_owned());
+        Self { part, budget, ..Self::continuing(path, reader, 0, len) }
     }
 
     /// Makes later errors name record `number`, counted from 1.
@@ -62,8 +65,8 @@ impl<R: Read> Bytes<R> {
         self.part = Part::Record(number);
     }
 
-    pub fn room<T>(&self, place: impl Into<Place> + Clone, n: u64) -> Result<Vec<T>, Error> {
-        Budget::new(&self.path, self.len).room(place, n)
+    pub fn room<T>(&self, place: &str, n: u64) -> Result<Vec<T>, Error> {
+        self.budget.room(place, n)
     }
 
     pub fn remaining(&self) -> u64 {
@@ -85,7 +88,6 @@ impl<R: Read> Bytes<R> {
             Part::Header => format!("header (byte {at})"),
             Part::Record(number) => format!("record {number} (byte {at})"),
             Part::Array(name) => format!("array {name}"),
-            Part::End => format!("end (byte {at})"),
         };
         Error::new(&self.path, place, expected, found)
     }
@@ -101,17 +103,12 @@ impl<R: Read> Bytes<R> {
     }
 
     fn check(&self, bytes: u64, what: &str) -> Result<(), Error> {
-        let left = self.remaining();
-        if bytes <= left {
-            return Ok(());
-        }
-        let found = match left {
+        let found = match self.remaining() {
+            left if bytes <= left => return Ok(()),
             0 => "end of file".to_owned(),
-            1 => "1 byte before the end of the file".to_owned(),
-            n => format!("{n} bytes before the end of the file"),
+            left => format!("{} before the end of the file", counted(left)),
         };
-        let unit = if bytes == 1 { "byte" } else { "bytes" };
-        Err(self.error_ahead(format!("{bytes} {unit} of {what}"), found))
+        Err(self.error_ahead(format!("{} of {what}", counted(bytes)), found))
     }
 
     pub fn fill(&mut self, buffer: &mut [u8], what: &str) -> Result<(), Error> {
@@ -147,10 +144,6 @@ impl<R: Read> Bytes<R> {
         Ok(buffer)
     }
 
-    pub fn u8(&mut self, what: &str) -> Result<u8, Error> {
-        Ok(self.array::<1>(what)?[0])
-    }
-
     pub fn u32(&mut self, what: &str) -> Result<u32, Error> {
         self.array(what).map(u32::from_le_bytes)
     }
@@ -171,16 +164,11 @@ impl<R: Read> Bytes<R> {
 
     /// Reads bytes up to the next zero byte, which is not included.
     pub fn zero_terminated(&mut self, what: &str) -> Result<Vec<u8>, Error> {
-        let start = self.at;
         let mut bytes = Vec::new();
         loop {
-            if self.remaining() == 0 {
-                let expected = format!("a zero byte at the end of the {what}");
-                return Err(self.error_at(start, expected, "end of file"));
-            }
-            match self.u8(what)? {
-                0 => return Ok(bytes),
-                byte => bytes.push(byte),
+            match self.array(what)? {
+                [0] => return Ok(bytes),
+                [byte] => bytes.push(byte),
             }
         }
     }
@@ -207,14 +195,16 @@ impl<R: Read> Bytes<R> {
         Err(self.error(expected, count.to_string()))
     }
 
-    pub fn end(&mut self) -> Result<(), Error> {
-        self.part = Part::End;
+    pub fn end(&self) -> Result<(), Error> {
         match self.remaining() {
             0 => Ok(()),
-            1 => Err(self.error_ahead("end of file", "1 more byte")),
-            n => Err(self.error_ahead("end of file", format!("{n} more bytes"))),
+            n => Err(self.error_ahead("end of file", format!("{} more", counted(n)))),
         }
     }
+}
+
+fn counted(n: u64) -> String {
+    if n == 1 { "1 byte".to_owned() } else { format!("{n} bytes") }
 }
 
 /// The type of a number in a file.

@@ -7,12 +7,12 @@ use std::iter::Peekable;
 use std::path::{Component, Path, PathBuf};
 
 use serde::Deserialize;
-use serde::de::{Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde::de::{Deserializer, IgnoredAny, MapAccess, Visitor};
 use unlift::geometry::camera::Pose;
 
 use super::map_input::{Input, center};
 use super::ply;
-use crate::error::{Error, Place};
+use crate::error::Error;
 use crate::input;
 
 /// The mark that editors on Windows write first.
@@ -25,11 +25,15 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     if file.fill_buf().map_err(|error| Error::read(path, error))?.starts_with(BYTE_ORDER_MARK) {
         file.consume(BYTE_ORDER_MARK.len());
     }
+    let is_list = file.buffer().trim_ascii_start().starts_with(b"[");
     let bytes = file.bytes().peekable();
     let strict = Strict { bytes, ahead: b"", in_text: false, is_escaped: false };
     let mut json = serde_json::Deserializer::from_reader(strict);
-    let object = Object::deserialize(&mut json).and_then(|object| json.end().map(|()| object));
-    let object = object.map_err(|error| {
+    let maps = match is_list {
+        true => Vec::<Map>::deserialize(&mut json),
+        false => Map::deserialize(&mut json).map(|map| vec![map]),
+    };
+    let maps = maps.and_then(|maps| json.end().map(|()| maps)).map_err(|error| {
         if error.is_io() {
             return Error::read(path, error.into());
         }
@@ -39,26 +43,40 @@ pub fn read(path: &Path) -> Result<Input, Error> {
             true => (MAPS, format!("other JSON ({what})")),
             false => ("a map in JSON", what),
         };
-        Error::new(path, Place::Line(error.line() as u64), expected, what)
+        Error::at_line(path, error.line() as u64, expected, what)
     })?;
-    let Some(format) = object.format() else {
-        let names = object.names.iter().take(5).map(|name| name.escape_debug().to_string());
-        let found = match object.names.is_empty() {
-            true => "JSON without names".to_owned(),
-            false => format!("JSON with {}", names.collect::<Vec<_>>().join(", ")),
-        };
-        return Err(Error::new(path, "", MAPS, found));
-    };
-    let Object { mut input, cloud, n, .. } = object;
-    input.format = format;
+    let n = maps.len();
+    // Of equal ones, `max_by_key` returns the last.
+    let largest =
+        maps.into_iter().rev().max_by_key(|map| map.points.as_ref().map(|all| all.0.len()));
+    let mut input = Input::default();
+    match largest {
+        Some(Map { frames: Some(frames), ply_file_path, .. }) => {
+            input.format = "nerfstudio";
+            for Frame { transform_matrix: rows } in frames {
+                let at = |row: usize, c: usize| rows.get(row).and_then(|row| row[c]);
+                let column = |c| [0, 1, 2].map(|row| at(row, c).unwrap_or(f64::NAN));
+                input.camera(Some((column(3), column(1))));
+            }
+            with_cloud(path, &mut input, ply_file_path)?;
+        }
+        Some(Map { shots: Some(shots), points: Some(points), .. }) => {
+            input.format = "OpenSfM";
+            for Shot { rotation: [x, y, z], translation } in shots.0 {
+                let rotation = Pose::IDENTITY.moved(&[x, y, z, 0.0, 0.0, 0.0]).rotation;
+                let up = rotation[1].map(|x| -x);
+                input.camera(Some((center(&rotation, &translation), up)));
+            }
+            input.positions.extend(points.0.iter().map(|point| point.coordinates));
+            if input.positions.is_empty() {
+                return Err(Error::new(path, "", "points", "only cameras"));
+            }
+        }
+        _ => return Err(Error::new(path, "", MAPS, "other JSON")),
+    }
     if n > 1 {
         let points = input.positions.len();
         input.notes.push(format!("read, the largest of {n} reconstructions ({points} points)"));
-    }
-    if format == "nerfstudio" {
-        with_cloud(path, &mut input, cloud)?;
-    } else if input.positions.is_empty() {
-        return Err(Error::new(path, "", "points", "only cameras"));
     }
     Ok(input)
 }
@@ -119,12 +137,8 @@ impl<R: BufRead> Read for Strict<R> {
 /// Adds the points of the point cloud that nerfstudio's file names.
 fn with_cloud(path: &Path, input: &mut Input, cloud: Option<PathBuf>) -> Result<(), Error> {
     let Some(cloud) = cloud else {
-        return Err(Error::new(
-            path,
-            "",
-            "ply_file_path, a point cloud beside the cameras",
-            "none",
-        ));
+        let expected = "ply_file_path, a point cloud beside the cameras";
+        return Err(Error::new(path, "", expected, "none"));
     };
     // nerfstudio on Windows writes backslashes.
     let written = cloud.to_string_lossy();
@@ -146,19 +160,13 @@ fn with_cloud(path: &Path, input: &mut Input, cloud: Option<PathBuf>) -> Result<
     Ok(())
 }
 
-/// An object, or the one with the most points of OpenSfM's list of objects.
-#[derive(Default)]
-struct Object {
-    names: Vec<String>,
-    input: Input,
-    cloud: Option<PathBuf>,
-    /// The number of objects in the list.
-    n: usize,
-}
-
-/// Numbers, of which missing ones are NaN.
-fn numbers<const N: usize>(numbers: [Option<f64>; N]) -> [f64; N] {
-    numbers.map(|number| number.unwrap_or(f64::NAN))
+/// A map of OpenSfM, which has shots and points, or of nerfstudio, which has frames.
+#[derive(Deserialize)]
+struct Map {
+    shots: Option<Items<Shot>>,
+    points: Option<Items<Point>>,
+    frames: Option<Vec<Frame>>,
+    ply_file_path: Option<PathBuf>,
 }
 
 /// A shot of OpenSfM. Its rotation is the axis times the angle.
@@ -176,8 +184,10 @@ struct Point {
     coordinates: [f64; 3],
 }
 
+/// Reads three numbers, of which missing ones are NaN.
 fn place<'de, D: Deserializer<'de>>(json: D) -> Result<[f64; 3], D::Error> {
-    <[Option<f64>; 3]>::deserialize(json).map(numbers)
+    let place = <[Option<f64>; 3]>::deserialize(json)?;
+    Ok(place.map(|x| x.unwrap_or(f64::NAN)))
 }
 
 #[derive(Deserialize)]
@@ -186,83 +196,12 @@ struct Frame {
     transform_matrix: Vec<[Option<f64>; 4]>,
 }
 
-impl Object {
-    fn format(&self) -> Option<&'static str> {
-        let has = |name: &str| self.names.iter().any(|its| its == name);
-        if has("frames") {
-            return Some("nerfstudio");
-        }
-        (has("shots") && has("points")).then_some("OpenSfM")
-    }
-
-    fn take<'de, A: MapAccess<'de>>(&mut self, name: &str, json: &mut A) -> Result<(), A::Error> {
-        match name {
-            "shots" => {
-                for Shot { rotation, translation } in json.next_value::<Items<_>>()?.0 {
-                    let [x, y, z] = rotation;
-                    let rotation = Pose::IDENTITY.moved(&[x, y, z, 0.0, 0.0, 0.0]).rotation;
-                    let up = rotation[1].map(|x| -x);
-                    self.input.camera(Some((center(&rotation, &translation), up)));
-                }
-            }
-            "points" => {
-                let points = json.next_value::<Items<Point>>()?.0.into_iter();
-                self.input.positions.extend(points.map(|point| point.coordinates));
-            }
-            "frames" => {
-                for Frame { transform_matrix } in json.next_value::<Items<_>>()?.0 {
-                    let mut rows = transform_matrix.into_iter().map(numbers);
-                    let rows: [_; 3] =
-                        std::array::from_fn(|_| rows.next().unwrap_or([f64::NAN; 4]));
-                    self.input.camera(Some((rows.map(|row| row[3]), rows.map(|row| row[1]))));
-                }
-            }
-            "ply_file_path" => self.cloud = json.next_value()?,
-            _ => drop(json.next_value::<IgnoredAny>()?),
-        }
-        Ok(())
-    }
-}
-
-impl<'de> Deserialize<'de> for Object {
-    fn deserialize<D: Deserializer<'de>>(json: D) -> Result<Self, D::Error> {
-        json.deserialize_any(Self::default())
-    }
-}
-
-impl<'de> Visitor<'de> for Object {
-    type Value = Self;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("an object, or a list of them")
-    }
-
-    fn visit_map<A: MapAccess<'de>>(mut self, mut json: A) -> Result<Self, A::Error> {
-        while let Some(name) = json.next_key::<String>()? {
-            self.take(&name, &mut json)?;
-            self.names.push(name);
-        }
-        Ok(self)
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(mut self, mut list: A) -> Result<Self, A::Error> {
-        let mut n = 0;
-        while let Some(object) = list.next_element::<Self>()? {
-            n += 1;
-            if n == 1 || object.input.positions.len() > self.input.positions.len() {
-                self = object;
-            }
-        }
-        Ok(Self { n, ..self })
-    }
-}
-
-/// The values of a list or an object.
+/// The values of an object, in the order of the file.
 struct Items<T>(Vec<T>);
 
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for Items<T> {
     fn deserialize<D: Deserializer<'de>>(json: D) -> Result<Self, D::Error> {
-        json.deserialize_any(Self(Vec::new()))
+        json.deserialize_map(Self(Vec::new()))
     }
 }
 
@@ -270,14 +209,7 @@ impl<'de, T: Deserialize<'de>> Visitor<'de> for Items<T> {
     type Value = Self;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a list or an object, as in a map")
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(mut self, mut list: A) -> Result<Self, A::Error> {
-        while let Some(value) = list.next_element()? {
-            self.0.push(value);
-        }
-        Ok(self)
+        f.write_str("an object, as in a map")
     }
 
     fn visit_map<A: MapAccess<'de>>(mut self, mut object: A) -> Result<Self, A::Error> {

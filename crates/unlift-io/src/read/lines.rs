@@ -6,13 +6,11 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use super::bytes::Bytes;
-use crate::error::{Error, Place};
+use crate::error::Error;
 use crate::input::{self, Budget};
 
 /// The maximum length of a line in bytes, enough for the track of a point in a million photos.
 pub(crate) const LONGEST_LINE: u64 = 16 << 20;
-/// The maximum length of a header in bytes, enough for long comments.
-const LONGEST_HEADER: u64 = 1 << 20;
 /// The least number of points at which a column of row numbers is an error. Fewer may match by
 /// accident.
 pub(super) const TELLING: usize = 10;
@@ -39,7 +37,7 @@ impl Lines {
         Bytes::continuing(&self.path, self.reader, self.at, self.len)
     }
 
-    pub fn room<T>(&self, place: impl Into<Place> + Clone, n: u64) -> Result<Vec<T>, Error> {
+    pub fn room<T>(&self, place: &str, n: u64) -> Result<Vec<T>, Error> {
         Budget::new(&self.path, self.len).room(place, n)
     }
 
@@ -52,15 +50,6 @@ impl Lines {
         }
         let expected = format!("at most {most} {what} (by the size of the file)");
         Err(Error::new(&self.path, "header", expected, n.to_string()))
-    }
-
-    /// Reads the next line of a header, which must not be the last line of the file.
-    pub fn advance_in_header(&mut self, expected: &str) -> Result<(), Error> {
-        self.expect_line(expected)?;
-        if !self.line.ends_with(b"\n") || self.at > LONGEST_HEADER {
-            return Err(self.error(expected, "end of file"));
-        }
-        Ok(())
     }
 
     /// Reads the next line. Returns false at the end of the file. A zero byte or a line over
@@ -121,12 +110,12 @@ impl Lines {
     }
 
     pub fn error(&self, expected: impl Display, found: impl Display) -> Error {
-        Error::new(&self.path, Place::Line(self.number), expected, found)
+        Error::at_line(&self.path, self.number, expected, found)
     }
 
     /// Returns an error at the end of the file, where another line was expected.
     pub fn end_error(&self, expected: impl Display) -> Error {
-        Error::new(&self.path, Place::Line(self.number + 1), expected, "end of file")
+        Error::at_line(&self.path, self.number + 1, expected, "end of file")
     }
 }
 

@@ -70,10 +70,8 @@ impl Input {
         self.left_out = rows.filter(|(_, x)| !is_finite(x)).map(|(row, _)| row).collect();
         let mut notes = Vec::new();
         if !self.left_out.is_empty() {
-            let mut row = 0..;
-            self.ids.retain(|_| {
-                row.next().is_some_and(|row| self.left_out.binary_search(&row).is_err())
-            });
+            let mut placed = self.positions.iter().map(is_finite);
+            self.ids.retain(|_| placed.next() == Some(true));
             self.positions.retain(is_finite);
             let note = format!("{} of {n} points have no place", self.left_out.len());
             if self.left_out.len() as f64 > MOST_LEFT_OUT * n as f64 {
@@ -111,18 +109,10 @@ fn is_finite(position: &[f64; 3]) -> bool {
 fn most_at_one_place(positions: &[[f64; 3]]) -> Option<(usize, [f64; 3])> {
     // Zeros of either sign are equal.
     let bits = |position: &[f64; 3]| position.map(|x| (x + 0.0).to_bits());
-    let mix = |[x, y, z]: [u64; 3]| {
-        let step = |hash: u64, bits: u64| (hash ^ bits).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        let hash = step(step(step(0, x).rotate_left(23), y).rotate_left(23), z);
-        hash ^ hash >> 29
-    };
-    let mut hashes: Vec<u64> = positions.iter().map(|position| mix(bits(position))).collect();
-    hashes.sort_unstable();
-    let most = hashes.chunk_by(|a, b| a == b).max_by_key(|same| same.len())?[0];
-    let place = *positions.iter().find(|position| mix(bits(position)) == most)?;
-    // Two positions may have the same hash.
-    let n = positions.iter().filter(|position| bits(position) == bits(&place)).count();
-    Some((n, place))
+    let mut sorted: Vec<[u64; 3]> = positions.iter().map(bits).collect();
+    sorted.sort_unstable();
+    let most = sorted.chunk_by(|a, b| a == b).max_by_key(|same| same.len())?;
+    Some((most.len(), *positions.iter().find(|position| bits(position) == most[0])?))
 }
 
 /// Returns a doubt if `more` points follow the `n` declared ones.

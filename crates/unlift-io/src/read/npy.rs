@@ -35,13 +35,12 @@ pub(super) fn of_points<R: Read>(
     let header = Header::read(bytes)?;
     let mut input = Input { format, ..Input::default() };
     let Some((rows, layout)) = header.points() else {
-        let of_type = quoted(header.type_text());
         return Err(match header.scalar() {
-            _ if header.is_structured() => {
-                bytes.error("fields of numbers called x, y and z", of_type)
-            }
-            None => bytes.error("numbers, or fields called x, y and z", of_type),
             Some(_) => bytes.error("an array of shape (n, 3)", header.shape_text()),
+            None => {
+                let found = quoted(header.type_text().as_bytes());
+                bytes.error("numbers, or fields of numbers called x, y and z", found)
+            }
         });
     };
     let columns = match layout {
@@ -54,18 +53,12 @@ pub(super) fn of_points<R: Read>(
             }
             return Ok(input);
         }
-        Layout::Matrix { columns } => columns,
+        Layout::Matrix { columns } => columns as usize,
     };
     let Some(numbers) = header.numbers(bytes)? else { return Ok(input) };
-    numbers.check(bytes)?;
-    input.positions = vec![[0.0; 3]; rows as usize];
-    numbers.read(bytes, |_, at, value| {
-        let (row, column) = (at / columns as usize, at % columns as usize);
-        if column < 3 {
-            input.positions[row][column] = value;
-        }
-        Ok(())
-    })?;
+    let any = |bytes: &Bytes<R>, _, x| bytes.error("a number", x);
+    let values = numbers.read(bytes, Some, any)?;
+    input.positions = values.chunks_exact(columns).map(|row| [row[0], row[1], row[2]]).collect();
     if columns > 3 {
         let firsts = || input.positions.iter().map(|position| position[0]).enumerate();
         let is_numbered = |from: usize| firsts().all(|(row, x)| x == (row + from) as f64);
@@ -116,77 +109,72 @@ pub fn descriptors(path: &Path, counts: [usize; 2]) -> Result<(Values, usize), E
     let numbers = header.numbers(&bytes)?.filter(|numbers| known.contains(&numbers.scalar));
     let Some(numbers) = numbers else {
         let expected = "bytes, or floats of 2, 4 or 8 bytes (u1, f2, f4, f8)";
-        return Err(bytes.error(expected, quoted(header.type_text())));
+        return Err(bytes.error(expected, quoted(header.type_text().as_bytes())));
     };
     let sides = header.sides();
     let is_right = |[rows, dim]: &[u64; 2]| counts.contains(&(*rows as usize)) && *dim > 0;
-    let Some([n, dim]) = sides.filter(is_right) else {
+    let Some([_, dim]) = sides.filter(is_right) else {
         let n = counts[0];
         let expected = format!("an array of shape ({n}, dimension), a row per point");
         let is_exchanged = sides.is_some_and(|[_, columns]| columns == n as u64);
         let exchanged = if is_exchanged { ", rows and columns exchanged" } else { "" };
         return Err(bytes.error(expected, header.shape_text() + exchanged));
     };
-    numbers.check(&bytes)?;
-    let (n, dim) = (n as usize, dim as usize);
-    if numbers.scalar == Scalar::U8 {
-        let mut values = vec![0; n * dim];
-        numbers.read(&mut bytes, |_, at, value| {
-            values[at] = value as u8;
-            Ok(())
-        })?;
-        return Ok((Values::U8(values), dim));
-    }
-    let mut values = vec![0.0; n * dim];
-    numbers.read(&mut bytes, |bytes, at, value| {
-        let single = value as f32;
-        if !single.is_finite() {
-            let expected = format!("a finite value (as a float of 4 bytes) in row {}", at / dim);
-            return Err(bytes.error(expected, format!("{value:e}")));
-        }
-        values[at] = single;
-        Ok(())
-    })?;
-    Ok((Values::F32(values), dim))
+    Ok((numbers.descriptors(&mut bytes)?, dim as usize))
 }
 
 /// Numbers whose values come next in the file.
 pub(crate) struct Numbers {
     pub scalar: Scalar,
     pub shape: Vec<u64>,
-    big: bool,
+    pub big: bool,
     /// True if columns are contiguous, false if rows are.
-    fortran: bool,
+    pub fortran: bool,
 }
 
 impl Numbers {
-    /// Checks that exactly the declared values remain.
-    pub fn check<R: Read>(&self, bytes: &Bytes<R>) -> Result<(), Error> {
-        let (rows, rest) = self.shape.split_first().unwrap_or((&1, &[]));
-        let size = self.scalar.size as u64;
-        check_size(bytes, *rows, rest.iter().try_fold(size, |all, &side| all.checked_mul(side)))
-    }
-
-    /// Calls `each` with every number and its index in the order of rows, after
-    /// [`check`](Self::check).
-    pub fn read<R: Read>(
+    /// Reads all numbers in the order of rows, each converted by `convert`, and checks that nothing
+    /// follows. Where `convert` returns `None`, `wrong` makes the error of an index and its value.
+    pub fn read<R: Read, T: Copy + Default>(
         &self,
         bytes: &mut Bytes<R>,
-        mut each: impl FnMut(&Bytes<R>, usize, f64) -> Result<(), Error>,
-    ) -> Result<(), Error> {
+        convert: impl Fn(f64) -> Option<T>,
+        wrong: impl Fn(&Bytes<R>, usize, f64) -> Error,
+    ) -> Result<Vec<T>, Error> {
         const CHUNK: usize = 1 << 13;
+        let (rows, rest) = self.shape.split_first().unwrap_or((&1, &[]));
         let size = self.scalar.size;
+        let row = rest.iter().try_fold(size as u64, |all, &side| all.checked_mul(side));
+        check_size(bytes, *rows, row)?;
         let n = self.shape.iter().product::<u64>() as usize;
+        let mut values = bytes.room("values", n as u64)?;
+        values.resize(n, T::default());
         let mut buffer = vec![0; size * CHUNK.min(n)];
         for first in (0..n).step_by(CHUNK) {
             let buffer = &mut buffer[..size * CHUNK.min(n - first)];
             bytes.fill(buffer, "values")?;
             for (at, value) in (first..).zip(buffer.chunks_exact(size)) {
                 let at = if self.fortran { self.row_major(at) } else { at };
-                each(bytes, at, self.scalar.read(value, self.big))?;
+                let value = self.scalar.read(value, self.big);
+                values[at] = convert(value).ok_or_else(|| wrong(bytes, at, value))?;
             }
         }
-        bytes.end_of_array()
+        bytes.end_of_array()?;
+        Ok(values)
+    }
+
+    /// Reads descriptors: bytes, or finite floats, which are rounded to 4 bytes.
+    pub fn descriptors<R: Read>(&self, bytes: &mut Bytes<R>) -> Result<Values, Error> {
+        let dim = self.shape[1] as usize;
+        let wrong = |bytes: &Bytes<R>, at: usize, value: f64| {
+            let expected = format!("a finite value (as a float of 4 bytes) in row {}", at / dim);
+            bytes.error(expected, format!("{value:e}"))
+        };
+        let single = |x: f64| Some(x as f32).filter(|x| x.is_finite());
+        Ok(match self.scalar {
+            Scalar::U8 => Values::U8(self.read(bytes, |x| Some(x as u8), wrong)?),
+            _ => Values::F32(self.read(bytes, single, wrong)?),
+        })
     }
 
     /// Converts an index in the order of columns to one in the order of rows.
@@ -218,7 +206,7 @@ pub(crate) fn tuple<T: ToString>(sides: &[T]) -> String {
 }
 
 /// The header of an array: a Python dictionary with three keys.
-pub(crate) struct Header(Vec<u8>);
+pub(crate) struct Header(String);
 
 impl Header {
     pub fn read<R: Read>(bytes: &mut Bytes<R>) -> Result<Self, Error> {
@@ -237,15 +225,13 @@ impl Header {
         }
         let mut header = vec![0; len as usize];
         bytes.fill(&mut header, "header")?;
-        Ok(Self(header))
+        Ok(Self(String::from_utf8_lossy(&header).into_owned()))
     }
 
     fn value(&self, key: &str) -> Option<&str> {
-        let header = std::str::from_utf8(&self.0).ok()?;
-        let at = [format!("'{key}'"), format!("\"{key}\"")]
-            .iter()
-            .find_map(|key| header.find(key).map(|at| at + key.len()))?;
-        let text = header[at..].trim_start().strip_prefix(':')?.trim_start();
+        let keys = [format!("'{key}'"), format!("\"{key}\"")];
+        let (_, text) = keys.iter().find_map(|key| self.0.split_once(key))?;
+        let text = text.trim_start().strip_prefix(':')?.trim_start();
         // A tuple or a list ends with its bracket, other values with a comma or the end of the
         // dictionary.
         let end = match text.as_bytes().first()? {
@@ -256,12 +242,12 @@ impl Header {
         Some(text[..end].trim())
     }
 
-    pub fn type_text(&self) -> &[u8] {
-        self.value("descr").unwrap_or_default().trim_matches(['\'', '"']).as_bytes()
+    pub fn type_text(&self) -> &str {
+        self.value("descr").unwrap_or_default().trim_matches(['\'', '"'])
     }
 
     fn scalar(&self) -> Option<(Scalar, bool)> {
-        stored(std::str::from_utf8(self.type_text()).ok()?)
+        stored(self.type_text())
     }
 
     /// Returns true if this is an array of integers.
@@ -269,14 +255,10 @@ impl Header {
         self.scalar().is_some_and(|(scalar, _)| scalar.is_whole())
     }
 
-    fn is_structured(&self) -> bool {
-        self.type_text().starts_with(b"[")
-    }
-
     /// Returns the number of points and the places of their coordinates, if the array can be
     /// points.
     pub(super) fn points(&self) -> Option<(u64, Layout)> {
-        if !self.is_structured() {
+        if !self.type_text().starts_with('[') {
             let [rows, columns] = self.sides().filter(|_| self.scalar().is_some())?;
             let is_usual = (3..=MOST_COLUMNS).contains(&columns);
             return is_usual.then_some((rows, Layout::Matrix { columns }));

@@ -2,19 +2,13 @@
 
 use std::path::Path;
 
-use super::bytes::{Bytes, Field, Scalar};
+use super::bytes::{Bytes, Scalar};
 use super::lines::{Lines, coordinate, is_called, number, quoted, words};
 use super::map_input::{Input, undeclared};
 use crate::error::Error;
 
-/// An encoding: its name in files, its name for users, and, of a binary one, whether it is big-endian.
-type Encoding = (&'static [u8], &'static str, Option<bool>);
-
-const ENCODINGS: [Encoding; 3] = [
-    (b"ascii", "ply ascii", None),
-    (b"binary_little_endian", "ply binary little endian", Some(false)),
-    (b"binary_big_endian", "ply binary big endian", Some(true)),
-];
+/// An encoding: its name for users, and, of a binary one, whether it is big-endian.
+type Encoding = (&'static str, Option<bool>);
 
 fn scalar(name: &[u8]) -> Option<Scalar> {
     let (kind, size) = match name {
@@ -71,7 +65,7 @@ impl Element {
 /// Reads the positions of the vertices, of any numeric type.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let mut lines = Lines::open(path)?;
-    let ((_, format, big_endian), elements) = header(path, &mut lines)?;
+    let ((format, big_endian), elements) = header(path, &mut lines)?;
     let refuse = |expected: String| Error::new(path, "header", expected, "none");
     let vertex = elements.iter().position(|e| e.name == b"vertex");
     let vertex = vertex.ok_or_else(|| refuse("an element vertex".to_owned()))?;
@@ -135,15 +129,19 @@ fn header(path: &Path, lines: &mut Lines) -> Result<(Encoding, Vec<Element>), Er
         return Err(lines.error(begins, quoted(lines.line())));
     }
     loop {
-        lines.advance_in_header("a header that ends with end_header")?;
+        lines.expect_line("a header that ends with end_header")?;
         let line = lines.line();
         let words: Vec<&[u8]> = words(line).collect();
         match words[..] {
             [] | [b"comment" | b"obj_info", ..] => {}
             [b"format", name, _version] => {
                 let expected = "ascii, binary_little_endian or binary_big_endian";
-                let known = ENCODINGS.into_iter().find(|(known, ..)| *known == name);
-                encoding = Some(known.ok_or_else(|| lines.error(expected, quoted(name)))?);
+                encoding = Some(match name {
+                    b"ascii" => ("ply ascii", None),
+                    b"binary_little_endian" => ("ply binary little endian", Some(false)),
+                    b"binary_big_endian" => ("ply binary big endian", Some(true)),
+                    _ => return Err(lines.error(expected, quoted(name))),
+                });
             }
             [b"element", name, count] => {
                 let count = number(count)
@@ -230,7 +228,7 @@ fn ascii<const N: usize>(
     wanted: [usize; N],
 ) -> Result<Vec<[f64; N]>, Error> {
     let name = String::from_utf8_lossy(&element.name);
-    let mut rows = lines.room(&*name, if N == 0 { 0 } else { element.count })?;
+    let mut rows = lines.room(&name, if N == 0 { 0 } else { element.count })?;
     for row in 1..=element.count {
         loop {
             if !lines.advance()? {
@@ -276,45 +274,30 @@ fn binary<const N: usize>(
     element: &Element,
     wanted: [usize; N],
 ) -> Result<Vec<[f64; N]>, Error> {
-    let stride = element.stride();
     let name = String::from_utf8_lossy(&element.name);
-    let size = bytes.expect_rows(element.count, &format!("rows of {name}"), stride as u64)?;
+    let what = format!("rows of {name}");
+    let size = bytes.expect_rows(element.count, &what, element.stride() as u64)?;
     if N == 0 && !element.has_list() {
         bytes.skip(size, "an element before vertex")?;
         return Ok(Vec::new());
     }
-    // A run is the values up to a list: their size in bytes, the wanted fields, and the list.
-    let mut runs = vec![(0, Vec::new(), None)];
-    for (number, Property { scalar, list, .. }) in element.properties.iter().enumerate() {
-        let (len, fields, its_list) = runs.last_mut().expect("there is one");
-        if let Some(count) = list {
-            *its_list = Some((*count, scalar.size as u64));
-            runs.push((0, Vec::new(), None));
-            continue;
-        }
-        if let Some(slot) = wanted.iter().position(|&wanted| wanted == number) {
-            fields.push((slot, Field { at: *len, scalar: *scalar, big }));
-        }
-        *len += scalar.size;
-    }
-    let mut buffer = vec![0; stride];
-    let mut rows = bytes.room(&*name, if N == 0 { 0 } else { element.count })?;
+    let mut rows = bytes.room(&name, if N == 0 { 0 } else { element.count })?;
     for number in 1..=element.count {
         bytes.record(number);
         let mut values = [f64::NAN; N];
-        for (len, fields, list) in &runs {
-            bytes.fill(&mut buffer[..*len], &name)?;
-            for (slot, field) in fields {
-                values[*slot] = field.of(&buffer);
+        for (at, Property { scalar, list, .. }) in element.properties.iter().enumerate() {
+            let stored = list.unwrap_or(*scalar);
+            let buffer = &mut [0; 8][..stored.size];
+            bytes.fill(buffer, &name)?;
+            let value = stored.read(buffer, big);
+            if list.is_some() {
+                if value < 0.0 || value.fract() != 0.0 {
+                    return Err(bytes.error("the length of a list", value));
+                }
+                bytes.skip((value as u64).saturating_mul(scalar.size as u64), "a list")?;
+            } else if let Some(slot) = wanted.iter().position(|&wanted| wanted == at) {
+                values[slot] = value;
             }
-            let Some((count, size)) = list else { continue };
-            let buffer = &mut buffer[..count.size];
-            bytes.fill(buffer, "the length of a list")?;
-            let n = count.read(buffer, big);
-            if n < 0.0 || n.fract() != 0.0 {
-                return Err(bytes.error("the length of a list", n));
-            }
-            bytes.skip((n as u64).saturating_mul(*size), "a list")?;
         }
         rows.push(values);
     }

@@ -9,7 +9,6 @@ use unlift::descriptors::Values;
 use super::kind::Kind;
 use super::meta::{KEY, Meta};
 use crate::Error;
-use crate::input::Budget;
 use crate::read::archive::{Archive, ArrayBytes};
 use crate::read::npy::{Header, tuple};
 
@@ -26,23 +25,22 @@ pub(super) struct Arrays<'a> {
     archive: Arc<Mutex<Archive>>,
     /// Index in the archive and name of each array.
     pub(super) arrays: Vec<(usize, String)>,
-    budget: Budget,
     pub(super) meta: Meta<'a>,
 }
 
 impl<'a> Arrays<'a> {
     pub(super) fn open(path: &'a Path) -> Result<Self, Error> {
         let archive = Archive::open(path)?;
-        let (arrays, budget) = (archive.arrays()?, archive.budget.clone());
+        let arrays = archive.arrays()?;
         let archive = Arc::new(Mutex::new(archive));
-        Self { path, archive, arrays, budget, meta: Meta::empty(path) }.with_meta()
+        Self { path, archive, arrays, meta: Meta::empty(path) }.with_meta()
     }
 
     /// Returns the arrays of one image of this file, each with its index and its name below that of
     /// the image.
     pub(super) fn of_image(&self, arrays: Vec<(usize, String)>) -> Result<Self, Error> {
-        let (archive, budget) = (self.archive.clone(), self.budget.clone());
-        Self { path: self.path, archive, arrays, budget, meta: self.meta.clone() }.with_meta()
+        let (path, archive, meta) = (self.path, self.archive.clone(), self.meta.clone());
+        Self { path, archive, arrays, meta }.with_meta()
     }
 
     /// Reads the metadata, which replaces that of the file.
@@ -90,11 +88,11 @@ impl<'a> Arrays<'a> {
         if let Some(other) = self.kind()?.filter(|its| *its != kind) {
             return Err(Error::new(self.path, "", kind, other));
         }
-        let is_unknown = |name: &&str| *name != KEY && !kind.arrays().contains(name);
-        match self.names().find(is_unknown) {
+        let known: Vec<&str> = [KEY].into_iter().chain(kind.arrays()).collect();
+        match self.names().find(|name| !known.contains(name)) {
             None => Ok(()),
             Some(name) => {
-                let expected = format!("only {KEY}, {}", kind.arrays().join(", "));
+                let expected = format!("only {}", known.join(", "));
                 Err(Error::new(self.path, format!("array {name}"), expected, "an unknown array"))
             }
         }
@@ -175,9 +173,7 @@ impl<'a> Arrays<'a> {
         name: &str,
         sides: [Option<usize>; N],
     ) -> Result<(Values, usize), Error> {
-        #[expect(clippy::redundant_closure)] // a closure works for every lifetime of the bytes
-        let header = self.file(name, |bytes| Header::read(bytes))?;
-        if header.is_whole() {
+        if self.file(name, |bytes| Ok(Header::read(bytes)?.is_whole()))? {
             let byte = |x: f64| (0.0..256.0).contains(&x).then_some(x as u8);
             let rule = "a whole number below 256, or a float";
             let (values, shape) = self.numbers(name, sides, Class::Whole, rule, byte)?;
@@ -207,11 +203,10 @@ impl<'a> Arrays<'a> {
         }
         self.file(name, |bytes| {
             let header = Header::read(bytes)?;
-            let kind = String::from_utf8_lossy(header.type_text()).into_owned();
             let is_right = class == Class::Any || header.is_whole();
             let Some(numbers) = header.numbers(bytes)?.filter(|_| is_right) else {
                 let expected = if class == Class::Any { "numbers" } else { "whole numbers" };
-                return Err(wrong(expected, &format!("dtype {kind}")));
+                return Err(wrong(expected, &format!("dtype {}", header.type_text())));
             };
             let fits = |shape: &[u64; N]| {
                 shape.iter().zip(&sides).all(|(n, side)| side.is_none_or(|side| side as u64 == *n))
@@ -220,16 +215,10 @@ impl<'a> Arrays<'a> {
             let Some(shape) = shape.filter(fits) else {
                 return Err(wrong(&format!("shape {}", shown(&sides)), &tuple(&numbers.shape)));
             };
-            numbers.check(bytes)?;
             let shape = shape.map(|side| side as usize);
-            let n = shape.iter().product::<usize>();
-            let mut values = self.budget.room(format!("array {name}"), n as u64)?;
-            values.resize(n, T::default());
-            let per_row = (n / shape[0].max(1)).max(1);
-            numbers.read(bytes, |_, at, x| {
-                let wrong = || self.wrong(name, at / per_row, rule, format!("{x:?}"));
-                values[at] = convert(x).ok_or_else(wrong)?;
-                Ok(())
+            let values = numbers.read(bytes, convert, |_: &ArrayBytes<'_>, at, x| {
+                let per_row: usize = shape[1..].iter().product();
+                self.wrong(name, at / per_row, rule, format!("{x:?}"))
             })?;
             Ok((values, shape))
         })
@@ -242,7 +231,7 @@ impl<'a> Arrays<'a> {
         };
         let read = |bytes: &mut ArrayBytes<'_>| {
             let header = Header::read(bytes)?;
-            let kind = String::from_utf8_lossy(header.type_text()).into_owned();
+            let kind = header.type_text();
             if let Some(shape) = header.shape().filter(|shape| !shape.is_empty()) {
                 return Err(wrong(format!("shape {}", tuple(&shape))));
             }

@@ -9,34 +9,12 @@ pub(super) const WORDS: &str = "descriptor_words";
 /// The descriptors that owner and attacker know.
 pub(super) const PUBLIC: &str = "public_descriptor";
 
-const RELEASED: [&str; 14] = [
-    "foot",
-    "direction",
-    "center",
-    "centers",
-    "regions",
-    "axis",
-    "offset",
-    "position",
-    "descriptor",
-    SUBSPACE,
-    WORDS,
-    PUBLIC,
-    "origin",
-    "bounds",
-];
-const TRUTH: [&str; 5] = ["position", "slot", "dropped", "swapped_axis", "descriptor_row"];
-const RECOVERED: [&str; 9] = [
-    "position",
-    "status",
-    "support",
-    "evidence",
-    "found",
-    "error_scale",
-    "axis",
-    "descriptor_row",
-    "origin",
-];
+// The arrays of each kind, besides the metadata.
+const RELEASED: &str = "foot direction center centers regions axis offset position descriptor descriptor_subspace \
+                        descriptor_words public_descriptor origin bounds";
+const TRUTH: &str = "position slot dropped swapped_axis descriptor_row";
+const RECOVERED: &str =
+    "position status support evidence found error_scale axis descriptor_row origin";
 
 /// The content of a stage file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,17 +43,15 @@ impl Kind {
 
     /// The name in files, the name in errors, and the arrays that a file may have besides the
     /// metadata.
-    fn facts(self) -> (&'static str, &'static str, &'static [&'static str]) {
+    fn facts(self) -> (&'static str, &'static str, &'static str) {
         match self {
-            Self::Released => ("released", "a released map", &RELEASED),
-            Self::Truth => ("truth", "a truth file", &TRUTH),
-            Self::Neighborhoods => {
-                ("neighborhoods", "neighborhoods of slots", &["records", "scores"])
-            }
+            Self::Released => ("released", "a released map", RELEASED),
+            Self::Truth => ("truth", "a truth file", TRUTH),
+            Self::Neighborhoods => ("neighborhoods", "neighborhoods of slots", "records scores"),
             Self::PointNeighborhoods => {
-                ("point_neighborhoods", "neighborhoods of points", &["neighbors", "scores"])
+                ("point_neighborhoods", "neighborhoods of points", "neighbors scores")
             }
-            Self::Recovered => ("recovered", "a file of recovered points", &RECOVERED),
+            Self::Recovered => ("recovered", "a file of recovered points", RECOVERED),
         }
     }
 
@@ -84,14 +60,15 @@ impl Kind {
         self.facts().0
     }
 
-    pub(super) fn arrays(self) -> &'static [&'static str] {
-        self.facts().2
+    pub(super) fn arrays(self) -> impl Iterator<Item = &'static str> {
+        self.facts().2.split(' ')
     }
 
     /// Returns the kind that alone may have such arrays.
     pub(super) fn of_arrays<'a>(mut names: impl Iterator<Item = &'a str>) -> Option<Self> {
         names.find_map(|name| {
-            let mut kinds = Self::ALL.into_iter().filter(|kind| kind.arrays().contains(&name));
+            let mut kinds =
+                Self::ALL.into_iter().filter(|kind| kind.arrays().any(|its| its == name));
             kinds.next().filter(|_| kinds.next().is_none())
         })
     }

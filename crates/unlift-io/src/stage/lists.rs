@@ -57,7 +57,7 @@ pub(super) fn neighborhoods_of(
 ) -> Result<Neighborhoods, Error> {
     arrays.expect(Kind::Neighborhoods)?;
     let about = arrays.meta.about()?;
-    let lists = lists_of(arrays, ("records", "record"), n_records, slots_per_record)?;
+    let lists = lists_of(arrays, "records", n_records, slots_per_record)?;
     Ok(lists.with_about(about))
 }
 
@@ -70,53 +70,32 @@ pub(super) fn neighborhoods_of(
 pub fn read_point_neighborhoods(path: &Path, n_points: usize) -> Result<Neighborhoods, Error> {
     let arrays = Arrays::open(path)?;
     arrays.expect(Kind::PointNeighborhoods)?;
-    lists_of(&arrays, ("neighbors", "point"), n_points, 1)
+    lists_of(&arrays, "neighbors", n_points, 1)
 }
 
-/// Reads the lists in the array `name`, of records that are called `word`.
+/// Reads the lists in the array `name`.
 fn lists_of(
     arrays: &Arrays<'_>,
-    (name, word): (&str, &str),
+    name: &str,
     n_records: usize,
     slots_per_record: usize,
 ) -> Result<Neighborhoods, Error> {
     let n_rows = n_records * slots_per_record;
     let (ids, [_, k]) = arrays.integers(name, [Some(n_rows), None], n_records, true)?;
-    let given = arrays.optional("scores", |name| {
-        let sides = [Some(n_rows), Some(k)];
+    let is_record = |id: &u32| *id != NONE;
+    let scores = arrays.optional("scores", |name| {
         let single = |x: f64| Some(x as f32).filter(|x| !x.is_infinite());
-        Ok(arrays.numbers(name, sides, Class::Any, "a number", single)?.0)
+        let sides = [Some(n_rows), Some(k)];
+        let (given, _) = arrays.numbers(name, sides, Class::Any, "a number", single)?;
+        let kept = given.into_iter().zip(&ids).filter(|(_, id)| is_record(id));
+        Ok(kept.map(|(score, _)| score).collect())
     })?;
-    let (mut offsets, mut neighbors) = (vec![0], Vec::with_capacity(ids.len()));
-    let mut scores = given.as_ref().map(|scores| Vec::with_capacity(scores.len()));
+    let mut offsets = vec![0];
     for row in 0..n_rows {
-        let first = neighbors.len();
-        for at in row * k..(row + 1) * k {
-            if ids[at] == NONE {
-                continue;
-            }
-            neighbors.push(RecordId(ids[at]));
-            if let (Some(to), Some(given)) = (&mut scores, &given) {
-                if given[at].is_nan() {
-                    let expected = format!("a score for each {word}");
-                    return Err(arrays.wrong("scores", row, expected, "NaN"));
-                }
-                to.push(given[at]);
-            }
-        }
-        let own = (row / slots_per_record) as u32;
-        if neighbors[first..].contains(&RecordId(own)) {
-            let found = format!("its own {word} {own}");
-            return Err(arrays.wrong(name, row, format!("other {word}s"), found));
-        }
-        let mut sorted = neighbors[first..].to_vec();
-        sorted.sort_unstable();
-        if let Some(pair) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-            let found = format!("{word} {} twice", pair[0].0);
-            return Err(arrays.wrong(name, row, format!("each {word} once"), found));
-        }
-        offsets.push(neighbors.len() as u64);
+        let n = ids[row * k..(row + 1) * k].iter().filter(|id| is_record(id)).count();
+        offsets.push(offsets[row] + n as u64);
     }
-    Neighborhoods::try_new(offsets, neighbors, scores, n_records, slots_per_record)
+    let records = ids.into_iter().filter(is_record).map(RecordId).collect();
+    Neighborhoods::try_new(offsets, records, scores, n_records, slots_per_record)
         .map_err(|source| arrays.refused(source))
 }

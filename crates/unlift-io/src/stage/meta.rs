@@ -15,27 +15,14 @@ pub(super) const KEY: &str = "unlift";
 pub(super) const EPSILON: &str = "epsilon";
 /// Whether protected descriptors were bytes, in the metadata.
 pub(super) const OF_BYTES: &str = "of_bytes";
+/// The reason why confidence is unknown.
+pub(super) const WHY_UNKNOWN: &str = "confidence_unknown";
 
 /// The version that is written, and the only one that is read.
 pub(super) const VERSION: u64 = 1;
 
-const KEYS: [&str; 12] = [
-    "kind",
-    "version",
-    "unit",
-    "family",
-    "scheme",
-    "fingerprint",
-    "rows_by",
-    "lists_by",
-    "slots_per_record",
-    "delta",
-    EPSILON,
-    OF_BYTES,
-];
-/// The reason why confidence is unknown.
-pub(super) const WHY_UNKNOWN: &str = "confidence_unknown";
-
+const KEYS: &str = "kind version unit family scheme fingerprint rows_by lists_by slots_per_record delta epsilon of_bytes \
+                    confidence_unknown";
 #[derive(Clone, Debug)]
 pub(super) struct Meta<'a> {
     path: &'a Path,
@@ -55,9 +42,8 @@ impl<'a> Meta<'a> {
             Ok(other) => return wrong(short(&other)),
             Err(error) => return wrong(error.to_string()),
         };
-        if let Some(key) = object.keys().find(|key| !KEYS.contains(&&***key) && *key != WHY_UNKNOWN)
-        {
-            let expected = format!("only {} and {WHY_UNKNOWN}", KEYS.join(", "));
+        if let Some(key) = object.keys().find(|key| KEYS.split(' ').all(|known| known != *key)) {
+            let expected = format!("only {}", KEYS.replace(' ', ", "));
             return Err(Error::new(self.path, "metadata unlift", expected, key));
         }
         self.object.extend(object);

@@ -309,7 +309,7 @@ fn every_malformed_file_of_descriptors_is_refused_with_its_line() {
         bytes("dimension of 2^32 - 1", patched(good.clone(), 16, &[255; 4]), "d: header (byte 24): expected 6 ids and rows of 4294967295 bytes, found 816 bytes"),
         bytes("unknown type", patched(good.clone(), 20, &[4]), "d: header (byte 20): expected type 1 (u8), 2 (float16) or 3 (float32), found 4"),
         bytes("bytes said to be halves", patched(good.clone(), 20, &[2]), "d: header (byte 24): expected 6 ids and rows of 256 bytes, found 816 bytes"),
-        bytes("half that is not finite", floats(2, &f16::INFINITY.to_le_bytes()), "d: point 2, value 0: expected a finite value, found inf"),
+        bytes("half that is not finite", floats(2, &f16::INFINITY.to_le_bytes()), "d: header (byte 72): expected a finite value (as a float of 4 bytes) in row 0, found inf"),
         bytes("halves that are all the same", floats(2, &f16::ONE.to_le_bytes()), "d: descriptors: expected real descriptors, found the same row for every point (dummies)"),
         bytes("id of a point missing", patched(good.clone(), 24 + 8, &[100]), "d: point 3: expected a descriptor, found none among 6"),
         bytes("dummies", zeros, "d: descriptors: expected real descriptors, found only zeros (dummies)"),
@@ -349,5 +349,8 @@ fn a_dimension_without_rows_takes_no_memory() {
     let (dir, path) = write("d", patched(header, 16, &[255, 255, 255, 255, 3]));
     let input = read::Input { ids: (0..1000).collect(), ..read::Input::default() };
     let error = read::descriptors(&path, &input).unwrap_err();
-    assert_eq!(shown(dir.path(), &error), "d: point 0: expected a descriptor, found none among 0");
+    assert_eq!(
+        shown(dir.path(), &error),
+        "d: descriptors: expected at most 65536 values each, found 4294967295"
+    );
 }

@@ -205,12 +205,12 @@ fn every_malformed_file_of_features_is_refused_with_its_line() {
         ("(N, D)", with("descriptors", &[3, 4], Some(0.5)), "f: image \"a.jpg\", descriptors: expected shape (D, N) with N = 3, one column per keypoint, found (3, 4), rows and columns exchanged"),
         ("another number of descriptors", with("descriptors", &[4, 5], Some(0.5)), "f: image \"a.jpg\", descriptors: expected shape (D, N) with N = 3, one column per keypoint, found (4, 5)"),
         ("flat descriptors", with("descriptors", &[12], Some(0.5)), "f: image \"a.jpg\", descriptors: expected shape (D, N) with N = 3, one column per keypoint, found (12,)"),
-        ("dummies", with("descriptors", &[4, 3], Some(0.0)), "f: image \"a.jpg\", descriptors: expected real descriptors, found only zeros (dummies)"),
-        ("NaN in descriptors", with("descriptors", &[4, 3], Some(f32::NAN)), "f: image \"a.jpg\", descriptors: expected a finite value, found NaN (descriptor 0, value 0)"),
+        ("dummies", with("descriptors", &[4, 3], Some(0.0)), "f: image \"a.jpg\": descriptors: expected real descriptors, found only zeros (dummies)"),
+        ("NaN in descriptors", with("descriptors", &[4, 3], Some(f32::NAN)), "f: image \"a.jpg\": descriptor 0, value 0: expected a finite value, found NaN"),
         ("wide integers", with("descriptors", &[4, 3], None), "f: image \"a.jpg\", descriptors: expected floats, or unsigned bytes, found other integers"),
         ("scores of others", with("scores", &[2], Some(0.5)), "f: image \"a.jpg\", scores: expected one value per keypoint, (3,), found (2,)"),
-        ("a size of one side", with("image_size", &[1], Some(5.0)), "f: image \"a.jpg\", image_size: expected width and height in pixels, found (1,)"),
-        ("a negative size", with("image_size", &[2], Some(-1.0)), "f: image \"a.jpg\", image_size: expected width and height in pixels, found -1 and -2"),
+        ("a size of one side", with("image_size", &[1], Some(5.0)), "f: image \"a.jpg\", image_size: expected width and height in pixels, found (5,)"),
+        ("a negative size", with("image_size", &[2], Some(-1.0)), "f: image \"a.jpg\", image_size: expected width and height in pixels, found (-1, -2)"),
     ];
     for (what, bytes, expected) in rows {
         assert_eq!(line(&bytes), expected, "{what}");
