@@ -31,13 +31,28 @@ pub struct Cli {
 }
 
 impl Cli {
+    /// Returns the definition of all commands and options.
+    pub fn definition() -> clap::Command {
+        grouped(numbers_may_be_negative(Self::command()))
+    }
+
     /// Reads a command line, whose first word is the name of the program.
     pub fn read(
         line: impl IntoIterator<Item = impl Into<OsString> + Clone>,
     ) -> Result<Self, clap::Error> {
-        let matches = grouped(Self::command()).try_get_matches_from(line)?;
+        let matches = Self::definition().try_get_matches_from(line)?;
         Self::from_arg_matches(&matches)
     }
+}
+
+/// Accepts negative numbers as values, so that the error of `--scale -1` is about the value -1, not
+/// about an option `-1`.
+fn numbers_may_be_negative(command: clap::Command) -> clap::Command {
+    let forgiving = |arg: clap::Arg| match arg.get_action().takes_values() && !arg.is_positional() {
+        true => arg.allow_negative_numbers(true),
+        false => arg,
+    };
+    command.mut_args(forgiving).mut_subcommands(numbers_may_be_negative)
 }
 
 /// The commands under each heading of `unlift --help`.
@@ -144,6 +159,19 @@ mod tests {
         let (mut leaves, mut options) = (0, BTreeSet::new());
         names(&command, &mut leaves, &mut options);
         assert!(leaves <= 17 && options.len() <= 45, "{leaves} commands, {options:?}");
+    }
+
+    #[test]
+    fn negative_numbers_are_values_that_are_refused_as_such() {
+        for (option, expected) in [
+            ("--scale", "meters per unit of the map, a number above 0, found -1"),
+            ("--thresholds", "expected a number above 0, found -1"),
+            ("--inlier-ratios", "expected a number from 0 to 1, found -1"),
+            ("--k", "-1 is not in 1..=65535"),
+        ] {
+            let error = Cli::read(["unlift", "audit", "map", "PATH", option, "-1"]).unwrap_err();
+            assert!(error.to_string().contains(expected), "{option}: {error}");
+        }
     }
 
     /// The command lines of `docs/examples` parse, and build the version that builds this crate.
