@@ -1,35 +1,30 @@
-//! Exports of points and lines for other programs: PLY, OBJ and COLMAP models in text, without
-//! observations.
+//! Exports of points for other programs: PLY, and COLMAP models in text without observations.
 //!
 //! Source: COLMAP's documentation, "Output Format".
 
 use std::io::Write;
 use std::path::Path;
 
-use unlift::geometry::frame::Bounds;
-use unlift::released::{Obfuscation, Released};
-
 use crate::Error;
 use crate::atomic::{self, Access};
 use crate::read::colmap::{Camera, Image};
 
-/// The comment of clouds of points and lines, by which their outputs are recognized.
+/// The comment of clouds, by which their outputs are recognized.
 const CLOUD_COMMENT: &str = "unlift";
 /// The first line of each file of a COLMAP model, by which it is recognized.
 const MODEL_MARK: &str = "# unlift model";
 
-/// Returns an error if a coordinate of one of the `rows`, each a `what`, is not finite.
-fn finite<const D: usize, const N: usize>(
+/// Returns an error if a coordinate of one of the `points` is not finite.
+fn finite<const D: usize>(
     path: &Path,
-    what: &str,
-    rows: impl IntoIterator<Item = [[f64; D]; N]>,
+    points: impl IntoIterator<Item = [f64; D]>,
 ) -> Result<(), Error> {
-    let is_wrong = |row: &[[f64; D]; N]| !row.iter().flatten().all(|x| x.is_finite());
-    let Some((at, row)) = rows.into_iter().enumerate().find(|(_, row)| is_wrong(row)) else {
+    let is_wrong = |point: &[f64; D]| !point.iter().all(|x| x.is_finite());
+    let Some((at, point)) = points.into_iter().enumerate().find(|(_, point)| is_wrong(point))
+    else {
         return Ok(());
     };
-    let found = if N == 1 { format!("{:?}", row[0]) } else { format!("{row:?}") };
-    Err(Error::new(path, format!("{what} {at}"), "finite coordinates", found))
+    Err(Error::new(path, format!("point {at}"), "finite coordinates", format!("{point:?}")))
 }
 
 /// Writes `points` `(n, D)` as binary little-endian PLY.
@@ -39,7 +34,7 @@ fn finite<const D: usize, const N: usize>(
 /// # Errors
 /// When a coordinate is not finite.
 pub fn write_points<const D: usize>(path: &Path, points: &[[f64; D]]) -> Result<(), Error> {
-    finite(path, "point", points.iter().map(|point| [*point]))?;
+    finite(path, points.iter().copied())?;
     atomic::write_file(path, Access::Private, |w| {
         writeln!(w, "ply\nformat binary_little_endian 1.0\ncomment {CLOUD_COMMENT}")?;
         writeln!(w, "element vertex {}", points.len())?;
@@ -51,61 +46,6 @@ pub fn write_points<const D: usize>(path: &Path, points: &[[f64; D]]) -> Result<
 /// Returns the coordinates of a point in 3D; in 2D, z is 0.
 fn in_space<const D: usize>(point: &[f64; D]) -> [f64; 3] {
     std::array::from_fn(|axis| point.get(axis).copied().unwrap_or(0.0))
-}
-
-/// Writes `segments` as an OBJ file: two `v` records and one `l` record each. In 2D, z is 0.
-///
-/// # Errors
-/// When a coordinate is not finite.
-pub fn write_lines<const D: usize>(path: &Path, segments: &[Segment<D>]) -> Result<(), Error> {
-    finite(path, "segment", segments.iter().copied())?;
-    atomic::write_file(path, Access::Private, |w| {
-        writeln!(w, "# {CLOUD_COMMENT}")?;
-        for (row, segment) in segments.iter().enumerate() {
-            for end in segment {
-                let [x, y, z] = in_space(end);
-                writeln!(w, "v {x} {y} {z}")?;
-            }
-            writeln!(w, "l {} {}", 2 * row + 1, 2 * row + 2)?;
-        }
-        Ok(())
-    })
-}
-
-/// The two ends of a line segment.
-pub type Segment<const D: usize> = [[f64; D]; 2];
-
-/// Returns the segments of these released lines or rays inside the box, in the map's frame (the
-/// origin is added). Records that miss the box, or only touch it, are left out. Other families have
-/// no segments.
-pub fn record_segments<const D: usize>(
-    released: &Released<D>,
-    bounds: &Bounds<D>,
-    records: impl IntoIterator<Item = usize>,
-) -> Vec<Segment<D>> {
-    let origin = released.origin();
-    let segment = |record: usize| {
-        let (point, direction, start) = match released.obfuscation() {
-            Obfuscation::Lines(lines) => {
-                (lines.foot()[record], lines.direction()[record], f64::NEG_INFINITY)
-            }
-            Obfuscation::Rays(rays) => {
-                let center = rays.centers()[usize::from(rays.center()[record])];
-                (center, rays.direction()[record], 0.0)
-            }
-            Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => return None,
-        };
-        let point: [f64; D] = std::array::from_fn(|c| f64::from(point[c]) + origin[c]);
-        let direction = direction.map(f64::from);
-        let (from, to) = bounds.clip(&point, &direction)?;
-        // Rounding may leave the box by an ulp.
-        let at = |t: f64| {
-            let along = |c: usize| point[c] + t * direction[c];
-            std::array::from_fn(|c| along(c).clamp(bounds.low[c], bounds.high[c]))
-        };
-        (from.max(start) < to).then(|| [at(from.max(start)), at(to)])
-    };
-    records.into_iter().filter_map(segment).collect()
 }
 
 /// Writes `cameras.txt`.
@@ -155,7 +95,7 @@ pub fn write_images(path: &Path, images: &[Image]) -> Result<(), Error> {
 /// # Errors
 /// When a coordinate is not finite.
 pub fn write_model_points(path: &Path, points: &[Option<[f64; 3]>]) -> Result<(), Error> {
-    finite(path, "point", points.iter().map(|point| [point.unwrap_or_default()]))?;
+    finite(path, points.iter().map(|point| point.unwrap_or_default()))?;
     atomic::write_file(path, Access::Private, |w| {
         writeln!(w, "{MODEL_MARK}\n# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]")?;
         for (row, point) in points.iter().enumerate() {

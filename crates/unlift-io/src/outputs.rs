@@ -33,7 +33,7 @@ impl Kind {
             Self::AuditJson => ("an audit.json", 0, &[b"{\n  \"unlift\": \""]),
             Self::Page => ("a report", 1024, &[b"<meta name=\"generator\" content=\"unlift\">"]),
             Self::Stage(_) => ("a stage file of this kind", 0, &[]),
-            Self::Cloud => ("a cloud", 40, &[b"\ncomment unlift\n", b"# unlift\n"]),
+            Self::Cloud => ("a cloud", 40, &[b"\ncomment unlift\n"]),
             Self::Model => ("a model", 0, &[b"# unlift model"]),
             Self::Features => ("features", 0, &[]),
             Self::Picture => ("a picture", 33, &[PICTURE_MARK]),

@@ -104,7 +104,7 @@ pub enum Command {
     Recover(RecoverArgs),
     /// Compare recovered points with the original points
     Evaluate(EvaluateArgs),
-    /// Convert released, recovered or original points to PLY, OBJ or COLMAP
+    /// Convert released, recovered or original points to PLY or COLMAP
     Export(ExportArgs),
     /// Write keypoints and descriptors of photos (or a COLMAP database) in hloc's format
     Features(FeaturesArgs),

@@ -3,16 +3,12 @@
 use std::ffi::OsStr;
 use std::path::Path;
 
-use unlift::geometry::frame::Bounds;
-use unlift::released::{Obfuscation, Released};
+use unlift::released::Obfuscation;
 use unlift::{OneLine, Unit};
 use unlift_audit::{bail, check_file, refused};
 use unlift_io::Error as FileError;
 use unlift_io::atomic::Access;
-use unlift_io::clouds::{
-    Segment, record_segments, write_cameras, write_images, write_lines, write_model_points,
-    write_points,
-};
+use unlift_io::clouds::{write_cameras, write_images, write_model_points, write_points};
 use unlift_io::outputs::{Kind, OutputSet, Rules};
 use unlift_io::read::{self, colmap};
 use unlift_io::stage::{
@@ -23,28 +19,26 @@ use crate::Error;
 use crate::args::ExportArgs;
 use crate::output::print;
 
-enum Shown {
-    /// A row per slot or original; `None` for lost points.
-    Points(Vec<Option<[f64; 3]>>),
-    Segments(Vec<Segment<3>>),
-}
+/// A row per slot or original; `None` for lost points.
+type Points = Vec<Option<[f64; 3]>>;
 
 pub fn run(args: &ExportArgs) -> crate::Result<()> {
     let inputs = [Some(args.path.as_path()), args.cameras.as_deref()];
     let rules = Rules::new(inputs.into_iter().flatten(), false);
     let ending = args.out.extension().map(OsStr::to_ascii_lowercase);
-    let is = |name: &str| ending.as_deref().is_some_and(|ending| ending == name);
-    let is_cloud = is("ply") || is("obj");
+    let is_cloud = ending.as_deref().is_some_and(|ending| ending == "ply");
     let out = OneLine(args.out.display());
     if args.cameras.is_some() && is_cloud {
         bail!("--cameras: expected a folder as --out, found {out}");
     }
     let n = if is_cloud {
         check_file("--out", &args.out, Kind::Cloud, &rules)?;
-        cloud(args, is("ply"))?
+        let points: Vec<[f64; 3]> = scaled_points(args)?.into_iter().flatten().collect();
+        write_points(&args.out, &points)?;
+        format!("{} points", points.len())
     } else if ending.is_some() && !args.out.is_dir() {
         bail!(
-            "--out: expected a name that ends in .ply or .obj, or a folder without an ending, found {out}"
+            "--out: expected a name that ends in .ply, or a folder without an ending, found {out}"
         );
     } else {
         model(args, rules)?
@@ -52,34 +46,11 @@ pub fn run(args: &ExportArgs) -> crate::Result<()> {
     print(&format!("{n}, in {out}\n"))
 }
 
-/// Writes a PLY or OBJ file, and returns a description of its content.
-fn cloud(args: &ExportArgs, is_ply: bool) -> crate::Result<String> {
-    let wrong = |expected: &str, found: &str, way_out: &str| {
-        Err(Error::from(FileError::new(&args.path, "", expected, found)).advise(way_out))
-    };
-    match scaled(args, read(&args.path)?)? {
-        Shown::Points(points) if is_ply => {
-            let points: Vec<[f64; 3]> = points.into_iter().flatten().collect();
-            write_points(&args.out, &points)?;
-            Ok(format!("{} points", points.len()))
-        }
-        Shown::Segments(segments) if !is_ply => {
-            write_lines(&args.out, &segments)?;
-            Ok(format!("{} segments", segments.len()))
-        }
-        Shown::Points(_) => wrong("lines or rays, as --out is .obj", "points", "--out NAME.ply"),
-        Shown::Segments(_) => wrong("points, as --out is .ply", "lines or rays", "--out NAME.obj"),
-    }
-}
-
 fn model(args: &ExportArgs, rules: Rules) -> crate::Result<String> {
     let names = ["cameras.txt", "images.txt", "points3D.txt"];
     let first = names.map(|name| (name, Kind::Model));
     let mut out = OutputSet::create(&args.out, rules, Access::Private, &first).map_err(refused)?;
-    let Shown::Points(points) = scaled(args, read(&args.path)?)? else {
-        let error = FileError::new(&args.path, "", "points, for a model", "lines or rays");
-        return Err(Error::from(error).advise("--out NAME.obj"));
-    };
+    let points = scaled_points(args)?;
     let (cameras, images) = match &args.cameras {
         None => (Vec::new(), Vec::new()),
         Some(project) => match read::open(project)?.model {
@@ -99,11 +70,23 @@ fn model(args: &ExportArgs, rules: Rules) -> crate::Result<String> {
     Ok(format!("a model of {n} points, {} cameras and {} images", cameras.len(), images.len()))
 }
 
-/// Reads the file at `path`, and returns its content and its unit.
-fn read(path: &Path) -> crate::Result<(Shown, Unit)> {
+/// Reads the points of the file, in units of the map if `--scale` is given.
+fn scaled_points(args: &ExportArgs) -> crate::Result<Points> {
+    let (mut points, unit) = read(&args.path)?;
+    let Some(scale) = args.scale else { return Ok(points) };
+    if unit != Unit::Meter {
+        let (path, unit) = (args.path.display(), unit.name());
+        bail!("--scale: expected a file in meters (obfuscate --scale), found {path} in {unit}");
+    }
+    points.iter_mut().flatten().for_each(|point| *point = point.map(|x| x / scale));
+    Ok(points)
+}
+
+/// Reads the file at `path`, and returns its points and their unit.
+fn read(path: &Path) -> crate::Result<(Points, Unit)> {
     let kind = kind(path)?;
     let wrong = |found: &str| {
-        let expected = "a released, recovered or truth file of a map";
+        let expected = "a released file of points, a recovered or a truth file of a map";
         Err(FileError::new(path, "", expected, found).into())
     };
     if has_images(path)? {
@@ -112,63 +95,23 @@ fn read(path: &Path) -> crate::Result<(Shown, Unit)> {
     match kind {
         Stage::Released => {
             let released = read_released::<3>(path)?;
-            let shown = match released.obfuscation() {
-                Obfuscation::Lines(lines) => segments(&released, lines.foot(), 0.01, 0.5),
-                Obfuscation::Rays(rays) => segments(&released, rays.centers(), 0.0, 3.0),
-                Obfuscation::AxisCandidates(candidates) => {
-                    let places = places(&released, candidates.position());
-                    Shown::Points(places.into_iter().map(Some).collect())
-                }
-                Obfuscation::AxisPlanes(_) => return wrong("planes, which have no end"),
+            let Obfuscation::AxisCandidates(candidates) = released.obfuscation() else {
+                return wrong("lines, rays or planes");
             };
-            Ok((shown, released.unit()))
+            let origin = released.origin();
+            let place = |p: &[f32; 3]| Some([0, 1, 2].map(|c| f64::from(p[c]) + origin[c]));
+            Ok((candidates.position().iter().map(place).collect(), released.unit()))
         }
         Stage::Recovered => {
             let recovered = read_recovered::<3>(path, None)?;
             let points = (0..recovered.n_slots()).map(|slot| recovered.position(slot)).collect();
-            Ok((Shown::Points(points), recovered.unit()))
+            Ok((points, recovered.unit()))
         }
         Stage::Truth => {
             let (original, _) = read_truth::<3>(path)?;
             let points = original.reveal();
-            let places = points.positions().iter().copied().map(Some).collect();
-            Ok((Shown::Points(places), points.unit()))
+            Ok((points.positions().iter().copied().map(Some).collect(), points.unit()))
         }
         Stage::Neighborhoods | Stage::PointNeighborhoods => wrong("neighborhoods"),
     }
-}
-
-/// Converts lengths to the units of the map, if `--scale` is given.
-fn scaled(args: &ExportArgs, (mut shown, unit): (Shown, Unit)) -> crate::Result<Shown> {
-    let Some(scale) = args.scale else { return Ok(shown) };
-    if unit != Unit::Meter {
-        let (path, unit) = (args.path.display(), unit.name());
-        bail!("--scale: expected a file in meters (obfuscate --scale), found {path} in {unit}");
-    }
-    let divide = |point: &mut [f64; 3]| *point = point.map(|x| x / scale);
-    match &mut shown {
-        Shown::Points(points) => points.iter_mut().flatten().for_each(divide),
-        Shown::Segments(segments) => segments.iter_mut().flatten().for_each(divide),
-    }
-    Ok(shown)
-}
-
-/// Returns positions of released records in the frame of the map.
-fn places(released: &Released<3>, positions: &[[f32; 3]]) -> Vec<[f64; 3]> {
-    let origin = released.origin();
-    let place = |p: &[f32; 3]| std::array::from_fn(|c| f64::from(p[c]) + origin[c]);
-    positions.iter().map(place).collect()
-}
-
-/// Returns the parts of lines or rays in a box that holds most of the hidden points, estimated from feet or centers alone: the box of
-/// these without the share `left_out` at each end, extended by `around` times its width.
-fn segments(released: &Released<3>, positions: &[[f32; 3]], left_out: f64, around: f64) -> Shown {
-    let origin = released.origin();
-    let bounds = Bounds::quantiles(&places(released, positions), left_out);
-    let Bounds { low, high } = bounds.unwrap_or(Bounds { low: origin, high: origin });
-    let widest = (0..3).map(|c| high[c] - low[c]).fold(0.0, f64::max);
-    // All places may coincide: then extend by one unit.
-    let more = if widest > 0.0 { around * widest } else { 1.0 };
-    let bounds = Bounds { low: low.map(|x| x - more), high: high.map(|x| x + more) };
-    Shown::Segments(record_segments(released, &bounds, 0..released.n_records()))
 }

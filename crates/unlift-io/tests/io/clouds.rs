@@ -4,9 +4,6 @@
 use std::fs;
 
 use half::f16;
-use unlift::Unit;
-use unlift::geometry::frame::Bounds;
-use unlift::released::{Lines, Obfuscation, Rays, Released};
 use unlift_io::{clouds, read};
 
 use super::{POINTS, archive, close, data, npy, open, refused, shown, total, write};
@@ -324,7 +321,7 @@ fn the_points_of_an_archive_are_read() {
 }
 
 #[test]
-fn points_and_lines_are_written_if_they_are_finite() {
+fn points_are_written_if_they_are_finite() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     let points = [[1.0, 2.0, 3.0], [-0.1, 1e-9, 4e6]];
@@ -332,38 +329,8 @@ fn points_and_lines_are_written_if_they_are_finite() {
     assert_eq!(read::open(&path("p.ply")).unwrap().positions, points);
     clouds::write_points(&path("p.ply"), &[[1.0, 2.0]]).unwrap();
     assert_eq!(read::open(&path("p.ply")).unwrap().positions, [[1.0, 2.0, 0.0]], "in the plane");
-    let segments = [[[0.0, 0.5, 1.0], [1.0, 2.0, 3.0]], [[0.1, 0.0, 0.0], [4e6, 0.0, 0.0]]];
-    clouds::write_lines(&path("l.obj"), &segments).unwrap();
-    let expected = "# unlift\nv 0 0.5 1\nv 1 2 3\nl 1 2\nv 0.1 0 0\nv 4000000 0 0\nl 3 4\n";
-    assert_eq!(fs::read_to_string(path("l.obj")).unwrap(), expected);
-    let nan = [0.0, f64::NAN, 0.0];
-    let points = "point 0: expected finite coordinates, found [0.0, NaN, 0.0]";
-    let lines = "segment 0: expected finite coordinates, found [[0.0, 0.0, 0.0], [0.0, NaN, 0.0]]";
-    for (result, line) in [
-        (clouds::write_points(&path("a"), &[nan]), points),
-        (clouds::write_lines(&path("a"), &[[[0.0; 3], nan]]), lines),
-    ] {
-        assert_eq!(shown(folder.path(), &result.unwrap_err()), format!("a: {line}"));
-    }
+    let error = clouds::write_points(&path("a"), &[[0.0, f64::NAN, 0.0]]).unwrap_err();
+    let line = "a: point 0: expected finite coordinates, found [0.0, NaN, 0.0]";
+    assert_eq!(shown(folder.path(), &error), line);
     assert!(!path("a").exists());
-}
-
-#[test]
-fn records_are_clipped_in_the_frame_of_the_map() {
-    let bounds = Bounds { low: [1e6 - 1.0, -1.0, -1.0], high: [1e6 + 1.0, 1.0, 1.0] };
-    let segments = |obfuscation: Obfuscation<3>| {
-        let n = obfuscation.len();
-        let released = Released::try_new(obfuscation, 1, [1e6, 0.0, 0.0], Unit::Meter, None);
-        clouds::record_segments(&released.unwrap(), &bounds, 0..n)
-    };
-    let up = [0.0, 0.0, 1.0];
-    // The second line misses the box, the third one touches it.
-    let feet = [[0.5, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.0, 1.0]];
-    let lines = Lines::through(&feet, &[up, up, [0.0, 1.0, -1.0]]).unwrap();
-    let within = |x: f64, from: f64| [[1e6 + x, 0.0, from], [1e6 + x, 0.0, 1.0]];
-    assert_eq!(segments(Obfuscation::Lines(lines)), [within(0.5, -1.0)]);
-    // Rays from the middle, from below the box, and from above it.
-    let centers = [[0.0; 3], [0.0, 0.0, -5.0], [0.0, 0.0, 5.0]];
-    let rays = Rays::try_new(&centers, vec![0, 1, 2], &[up; 3]).unwrap();
-    assert_eq!(segments(Obfuscation::Rays(rays)), [within(0.0, 0.0), within(0.0, -1.0)]);
 }
